@@ -1,0 +1,46 @@
+# One place that says how every target of ours is compiled.
+
+set(PLCHOST_WARNINGS
+    -Werror -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion -Wcast-align -Wcast-qual
+    -Wformat=2 -Wnull-dereference -Wundef -Wvla -Wswitch-enum)
+set(PLCHOST_CXX_WARNINGS
+    -Wnon-virtual-dtor -Woverloaded-virtual -Wold-style-cast -Wextra-semi -Wzero-as-null-pointer-constant)
+
+function(plchost_target name)
+  target_compile_options(${name} PRIVATE ${PLCHOST_WARNINGS} $<$<COMPILE_LANGUAGE:CXX>:${PLCHOST_CXX_WARNINGS}>)
+  target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR})
+  if(SANITIZER)
+    list(JOIN SANITIZER "," sanitizers)
+    target_compile_options(${name} PRIVATE -fsanitize=${sanitizers} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+    target_link_options(${name} PUBLIC -fsanitize=${sanitizers})
+    if("thread" IN_LIST SANITIZER AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+      # The seqlock's fences: every access beside them is atomic, so nothing is hidden by this.
+      target_compile_options(${name} PRIVATE -Wno-tsan)
+    endif()
+  endif()
+endfunction()
+
+# plchost_library(NAME SOURCES... LINKS ...)
+function(plchost_library name)
+  cmake_parse_arguments(arg "" "" "SOURCES;LINKS" ${ARGN})
+  add_library(${name} STATIC ${arg_SOURCES})
+  target_link_libraries(${name} PUBLIC ${arg_LINKS})
+  plchost_target(${name})
+endfunction()
+
+function(plchost_program name)
+  cmake_parse_arguments(arg "" "" "SOURCES;LINKS" ${ARGN})
+  add_executable(${name} ${arg_SOURCES})
+  target_link_libraries(${name} PRIVATE ${arg_LINKS})
+  plchost_target(${name})
+endfunction()
+
+# A control program: a shared object that plc-instance loads. Unique symbols would survive dlclose
+# and be shared between programs, so they are off; the runtime's functions are found at load.
+function(plchost_application name)
+  cmake_parse_arguments(arg "" "" "SOURCES" ${ARGN})
+  add_library(${name} MODULE ${arg_SOURCES})
+  set_target_properties(${name} PROPERTIES PREFIX "" LIBRARY_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/applications)
+  target_compile_options(${name} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique>)
+  plchost_target(${name})
+endfunction()
