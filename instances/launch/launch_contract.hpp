@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "shm/base/result.hpp"
+
+namespace plchost {
+
+/// What a plc-instance is told when it is started: by the manager, or by hand. Both ends use this file, so
+/// that the command line has one home.
+struct LaunchOptions {
+  std::string name;                       ///< --name, at most kMaxInstanceName
+  std::vector<int> cores;                 ///< --core N[,N...]; empty: wherever it was started
+  std::string scheduler = "CmpSchedule";  ///< --scheduler
+  std::string priority_band = "normal";   ///< --priority-band high|normal|low
+  std::string settings;            ///< --settings FILE in the seeds' [Section] Key=Value form; may be empty
+  std::string application;         ///< --application FILE; empty: none (safe mode)
+  std::string pool = "plchost";    ///< --pool NAME
+  std::string run_directory;       ///< --run-directory DIR; empty: no control socket (by hand)
+  bool stopped = false;            ///< --stopped: load the application, do not start it
+  int report_fd = -1;              ///< --report-fd N: where SetupReports go; -1: standard error, as text
+  std::string log_level = "info";  ///< --log-level
+};
+
+/// argv for posix_spawn, argv[0] included.
+[[nodiscard]] std::vector<std::string> to_arguments(const std::string& program, const LaunchOptions& options);
+
+/// The control socket of an instance: "RUN_DIRECTORY/NAME.sock". ControlRequests in, ControlReplies out.
+[[nodiscard]] std::string instance_socket_path(std::string_view run_directory, std::string_view instance);
+
+/// The steps that an instance takes before it runs, in order. A failed one is reported by name.
+enum class SetupStep : std::uint8_t {
+  bind_core,
+  lock_memory,
+  read_settings,
+  attach_pool,
+  open_control_socket,
+  load_components,
+  load_application,
+  make_tasks,
+  make_status_page,
+  start_scheduler,
+  ready,  ///< all done; the control socket answers
+};
+[[nodiscard]] std::string_view to_string(SetupStep step) noexcept;
+
+/// One packet on the report descriptor (a SEQPACKET socket): a step that is done (code ok), done with a
+/// remark (ok and a text), or failed (the last one; the process then ends with kExitSetupFailed).
+struct SetupReport {
+  SetupStep step = SetupStep::bind_core;
+  ErrorCode code = ErrorCode::ok;
+  std::string text;
+};
+[[nodiscard]] std::string encode(const SetupReport& report);
+[[nodiscard]] Result<SetupReport> decode_report(std::string_view packet);
+
+/// Exit codes of plc-instance.
+inline constexpr int kExitUsage = 2;
+inline constexpr int kExitSetupFailed = 3;
+
+}  // namespace plchost

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+/// Why and for when a task runs one cycle.
+struct Activation {
+  TimePoint release;              ///< planned; latency is measured from here
+  std::uint64_t lost_cycles = 0;  ///< releases that passed since the last activation without a cycle
+  std::uint64_t lost_events = 0;  ///< external events dropped since then, beyond the backlog's bound
+  Duration spun{};                ///< time burnt ahead of the release
+};
+
+/// What one task waits on; made by the scheduler for that task. The only place where a task thread sleeps.
+class ActivationSource {
+ public:
+  virtual ~ActivationSource() = default;
+  /// Task thread, real-time. Nothing: interrupted; the thread looks at what it shall do next.
+  [[nodiscard]] virtual std::optional<Activation> wait() noexcept = 0;
+  /// Makes wait() return nothing, the one that sleeps now or the next one. Any thread.
+  virtual void interrupt() noexcept = 0;
+};
+
+}  // namespace plchost

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "schedulers/activation.hpp"
+#include "schedulers/clock.hpp"
+#include "schedulers/task_config.hpp"
+#include "shm/base/result.hpp"
+
+namespace plchost {
+
+class Task;
+
+enum class TickSourceKind : std::uint8_t { system, task };
+
+/// The settings of [CmpSchedule] and [SysTimer], already validated by whoever read them.
+struct SchedulerSettings {
+  Duration scheduler_interval =
+      std::chrono::milliseconds(1);   ///< the tick, and how often event variables are polled
+  Duration freewheeling_cycletime{};  ///< fixed sleep of freewheeling tasks; 0: a share of the execution time
+  int processor_load_maximum =
+      0;  ///< percent, 1..99; freewheeling tasks sleep (100-M) %; 0: not set, sleep 20 %
+  TickSourceKind tick_source = TickSourceKind::system;
+  Duration spin_ahead_max =
+      std::chrono::microseconds(100);  ///< bound of the guard of CmpScheduleOneShot; 0: off
+  std::uint64_t max_event_backlog = std::uint64_t{1}
+                                    << 20;  ///< external events a task may lag behind before it drops
+};
+
+/// What a scheduler needs to be made.
+struct SchedulerContext {
+  Clock& clock;
+  SchedulerSettings settings;
+  ThreadPriority tick;  ///< of its own threads: above all tasks
+};
+
+struct SchedulerCapabilities {
+  bool one_shot = false;  ///< releases may be moved each cycle (distributed clocks)
+  bool external_event_breakpoints = false;
+};
+
+/// Policy only: decides when which task is activated. Threads, statistics and the switch are TaskSet's.
+/// Life: source_for() for each task, start(), stop(); then it is done with.
+class Scheduler {
+ public:
+  virtual ~Scheduler() = default;
+  [[nodiscard]] virtual std::string_view name() const noexcept = 0;
+  [[nodiscard]] virtual SchedulerCapabilities capabilities() const noexcept = 0;
+  /// Set-up. The task outlives the source, the source does not outlive the scheduler.
+  [[nodiscard]] virtual Result<std::unique_ptr<ActivationSource>> source_for(Task& task) = 0;
+  /// Set-up. Cyclic tasks that have run keep their grid; the others start theirs at `origin`.
+  [[nodiscard]] virtual Result<void> start(TimePoint origin) = 0;
+  /// Ends the scheduler's own threads. No source is waited on any more.
+  virtual void stop() noexcept = 0;
+};
+
+/// A scheduler that can be chosen by name. A new one is a file of its own and a line in registry.cpp.
+struct SchedulerEntry {
+  std::string_view name;
+  std::unique_ptr<Scheduler> (*make)(const SchedulerContext&);
+};
+
+[[nodiscard]] std::span<const SchedulerEntry> all_schedulers() noexcept;
+/// "CmpSchedule, CmpScheduleTimer, CmpScheduleOneShot"
+[[nodiscard]] std::string scheduler_names();
+/// invalid_argument: no such scheduler; the text lists what there is.
+[[nodiscard]] Result<const SchedulerEntry*> find_scheduler(std::string_view name);
+
+}  // namespace plchost

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+
+#include "shm/base/task_statistics.hpp"
+#include "shm/base/thread.hpp"
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+/// The four kinds of iec_task_management, with the numbers of the seed's KindOfTask.
+enum class TaskKind : std::uint8_t { cyclic = 0, event = 1, external = 2, freewheeling = 3 };
+
+/// What happens to a cyclic task that is late: wait for the next point of its grid, or run at once.
+enum class LatePolicy : std::uint8_t { next, asap };
+
+/// IEC priorities: 0 (highest) to 31; 0..15 are SCHED_FIFO, 16..31 SCHED_OTHER.
+inline constexpr int kLowestIecPriority = 31;
+inline constexpr int kLowestRealTimeIecPriority = 15;
+
+/// Which part of SCHED_FIFO's range an instance uses, so that of two instances on one core one goes first.
+///            supervision  tick   IEC 0..15
+///   high         89        88     87..72
+///   normal       69        68     67..52
+///   low          49        48     47..32
+/// All of them are above the API server's threads (at most 20).
+enum class PriorityBand : std::uint8_t { high, normal, low };
+
+[[nodiscard]] ThreadPriority supervision_priority(PriorityBand band) noexcept;
+[[nodiscard]] ThreadPriority tick_priority(PriorityBand band) noexcept;
+/// `iec_priority` 0 to 31. 16..31 become SCHED_OTHER with nice 0..15.
+[[nodiscard]] ThreadPriority task_priority(PriorityBand band, int iec_priority) noexcept;
+
+/// One task as the application describes it. Validated by TaskSet::create as a whole.
+struct TaskConfig {
+  std::string name;
+  TaskKind kind = TaskKind::cyclic;
+  int iec_priority = 0;
+  Duration interval{};                   ///< cyclic only: > 0
+  LatePolicy late = LatePolicy::next;    ///< cyclic only
+  std::string external_event;            ///< external only: the event's name
+  std::function<bool()> event_variable;  ///< event only: reads the BOOL; called by the scheduler's poller
+  std::function<void()> entry;           ///< one cycle; real-time
+  /// Called on the task's thread after each cycle with the new counters; real-time. May be empty.
+  std::function<void(const TaskCounters&)> after_cycle;
+};
+
+}  // namespace plchost

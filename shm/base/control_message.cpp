@@ -1,0 +1,111 @@
+#include "shm/base/control_message.hpp"
+
+#include <array>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+namespace plchost {
+
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr std::array kVerbs = {
+    std::pair{ControlVerb::start, std::string_view("start")},
+    std::pair{ControlVerb::stop, std::string_view("stop")},
+    std::pair{ControlVerb::reset, std::string_view("reset")},
+    std::pair{ControlVerb::restart, std::string_view("restart")},
+    std::pair{ControlVerb::load_application, std::string_view("load application")},
+    std::pair{ControlVerb::set_scheduler, std::string_view("set scheduler")},
+    std::pair{ControlVerb::register_event, std::string_view("register event")},
+    std::pair{ControlVerb::unregister_event, std::string_view("unregister event")},
+    std::pair{ControlVerb::shutdown, std::string_view("shutdown")},
+    std::pair{ControlVerb::status, std::string_view("status")},
+};
+
+std::string dump(const Json& json) {
+  // Bytes that are not UTF-8 (a hostile name in an error text) are replaced, never thrown about.
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+Result<Json> parse(std::string_view packet) {
+  Json json = Json::parse(packet, nullptr, false);
+  if (!json.is_object()) return failure(ErrorCode::corrupt, "control message is not a JSON object");
+  const auto version = json.find("version");
+  if (version == json.end() || !version->is_number_integer() || *version != kControlVersion) {
+    return failure(ErrorCode::corrupt,
+                   fmt::format("control message version {} where {} is spoken",
+                               version == json.end() ? "none" : dump(*version), kControlVersion));
+  }
+  const auto number = json.find("number");
+  if (number == json.end() || !number->is_number_unsigned()) {
+    return failure(ErrorCode::corrupt, "control message has no 'number'");
+  }
+  return json;
+}
+
+Result<std::string> text_of(const Json& json, const char* key) {
+  const auto found = json.find(key);
+  if (found == json.end() || !found->is_string()) {
+    return failure(ErrorCode::corrupt, fmt::format("control message has no text '{}'", key));
+  }
+  return found->get<std::string>();
+}
+
+}  // namespace
+
+std::string_view to_string(ControlVerb verb) noexcept {
+  for (const auto& [known, name] : kVerbs) {
+    if (known == verb) return name;
+  }
+  return "unknown";
+}
+
+std::string encode(const ControlRequest& request) {
+  return dump(Json{{"version", kControlVersion},
+                   {"number", request.number},
+                   {"verb", to_string(request.verb)},
+                   {"instance", request.instance},
+                   {"argument", request.argument}});
+}
+
+std::string encode(const ControlReply& reply) {
+  return dump(Json{{"version", kControlVersion},
+                   {"number", reply.number},
+                   {"code", static_cast<unsigned>(reply.code)},
+                   {"text", reply.text}});
+}
+
+Result<ControlRequest> decode_request(std::string_view packet) {
+  const auto json = parse(packet);
+  if (!json) return std::unexpected(json.error());
+  const auto verb = text_of(*json, "verb");
+  const auto instance = text_of(*json, "instance");
+  const auto argument = text_of(*json, "argument");
+  for (const auto* text : {&verb, &instance, &argument}) {
+    if (!*text) return std::unexpected(text->error());
+  }
+  for (const auto& [known, name] : kVerbs) {
+    if (name == *verb)
+      return ControlRequest{(*json)["number"].get<std::uint64_t>(), known, *instance, *argument};
+  }
+  return failure(ErrorCode::corrupt, fmt::format("control message has the unknown verb '{}'", *verb));
+}
+
+Result<ControlReply> decode_reply(std::string_view packet) {
+  const auto json = parse(packet);
+  if (!json) return std::unexpected(json.error());
+  const auto code = json->find("code");
+  constexpr unsigned kLastCode = static_cast<unsigned>(ErrorCode::corrupt);
+  if (code == json->end() || !code->is_number_unsigned() || code->get<unsigned>() > kLastCode) {
+    return failure(ErrorCode::corrupt, "control reply has no valid 'code'");
+  }
+  auto text = text_of(*json, "text");
+  if (!text) return std::unexpected(text.error());
+  return ControlReply{(*json)["number"].get<std::uint64_t>(), static_cast<ErrorCode>(code->get<unsigned>()),
+                      std::move(*text)};
+}
+
+}  // namespace plchost

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "shm/base/result.hpp"
+
+namespace plchost {
+
+/// The version of the messages on control sockets. A peer with another one is refused by name and number.
+/// 1: first.
+inline constexpr int kControlVersion = 1;
+
+/// What can be asked of an instance, by the API server of the manager and by the manager of the instance.
+enum class ControlVerb : std::uint8_t {
+  start,             ///< run the application
+  stop,              ///< stop the application; the process stays
+  reset,             ///< fresh process, application loaded anew and stopped
+  restart,           ///< fresh process, application running
+  load_application,  ///< argument: path of the application on the host
+  set_scheduler,     ///< argument: name of a scheduler
+  register_event,    ///< argument: name of an external event
+  unregister_event,  ///< argument: name of an external event
+  shutdown,          ///< (manager to instance only) stop the application and end the process
+  status,            ///< (manager to instance only) the reply's text is the InstanceReport
+};
+
+[[nodiscard]] std::string_view to_string(ControlVerb verb) noexcept;
+
+struct ControlRequest {
+  std::uint64_t number = 0;  ///< chosen by the sender, comes back in the reply
+  ControlVerb verb = ControlVerb::status;
+  std::string instance;
+  std::string argument;
+};
+
+struct ControlReply {
+  std::uint64_t number = 0;
+  ErrorCode code = ErrorCode::ok;
+  std::string text;  ///< why it was refused; or a soft remark
+};
+
+/// One message is one JSON object in one packet.
+[[nodiscard]] std::string encode(const ControlRequest& request);
+[[nodiscard]] std::string encode(const ControlReply& reply);
+/// corrupt: not such a message, or of another version; the text says what was wrong.
+[[nodiscard]] Result<ControlRequest> decode_request(std::string_view packet);
+[[nodiscard]] Result<ControlReply> decode_reply(std::string_view packet);
+
+}  // namespace plchost

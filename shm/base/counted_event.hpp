@@ -1,0 +1,72 @@
+#pragma once
+
+#include <atomic>
+#include <bit>
+#include <cstdint>
+
+#include "shm/base/futex.hpp"
+
+namespace plchost {
+
+/// A counted event: a counter that only grows, and a futex word, in one 64-bit atomic. It may lie in
+/// shared memory; all zero is a valid new event. Everything in it is lock-free and survives the death of
+/// any user at any instruction.
+///
+///   63                                  8 7      1 0
+///   [ posts so far                       ][ nudges ][ waiter ]     low 32 bits are the futex word
+///
+/// Post is one atomic add, and at most one wake. Each waiter keeps a cursor of its own (how many posts it
+/// has seen), so nothing is consumed by anyone else and the event needs no list of waiters. `waiter` says
+/// that somebody may be asleep; who wakes clears it, so a waiter that died costs one superfluous wake.
+/// `nudges` changes the word without counting a post: it wakes a thread that shall stop or change what it
+/// waits on.
+class CountedEvent {
+ public:
+  /// One consistent view of the event.
+  class Snapshot {
+   public:
+    /// Posts since the event was made.
+    [[nodiscard]] std::uint64_t count() const noexcept { return state_ >> kCountShift; }
+
+   private:
+    friend class CountedEvent;
+    explicit Snapshot(std::uint64_t state) noexcept : state_(state) {}
+    std::uint64_t state_;
+  };
+
+  /// Any context, real-time included. Wakes every waiter if there may be one.
+  void post() noexcept {
+    // Release pairs with the acquire in snapshot(): what the poster wrote before is seen by the task.
+    const std::uint64_t before = state_.fetch_add(kOnePost, std::memory_order_release);
+    if ((before & kWaiter) != 0) wake();
+  }
+
+  [[nodiscard]] Snapshot snapshot() const noexcept {
+    return Snapshot(state_.load(std::memory_order_acquire));
+  }
+  [[nodiscard]] std::uint64_t count() const noexcept { return snapshot().count(); }
+
+  /// Sleeps until the event differs from `seen` or the deadline passes; may return early: look again.
+  /// To stop a waiter without losing the wake: the waiter takes the snapshot, then looks at its stop flag,
+  /// then waits; the stopper sets the flag, then nudges.
+  FutexResult wait(Snapshot seen, TimePoint deadline = kNoDeadline) noexcept;
+
+  /// Wakes all waiters without counting a post. Set-up and soft threads.
+  void nudge() noexcept;
+
+ private:
+  static constexpr std::uint64_t kWaiter = 1;
+  static constexpr std::uint64_t kOneNudge = 2;
+  static constexpr std::uint64_t kNudgeMask = 0xfe;
+  static constexpr unsigned kCountShift = 8;
+  static constexpr std::uint64_t kOnePost = std::uint64_t{1} << kCountShift;
+
+  void wake() noexcept;
+
+  std::atomic<std::uint64_t> state_{0};
+};
+
+static_assert(sizeof(CountedEvent) == 8 && std::atomic<std::uint64_t>::is_always_lock_free);
+static_assert(std::endian::native == std::endian::little, "the futex word is the low half of the state");
+
+}  // namespace plchost

@@ -1,0 +1,65 @@
+#include "shm/base/names.hpp"
+
+#include <numeric>
+#include <vector>
+
+#include <fmt/format.h>
+
+namespace plchost {
+
+namespace {
+
+bool is_name_character(char c) {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-' ||
+         c == '.';
+}
+
+std::size_t edit_distance(std::string_view a, std::string_view b) {
+  std::vector<std::size_t> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    std::size_t diagonal = row[0]++;
+    for (std::size_t j = 1; j <= b.size(); ++j) {
+      const std::size_t replaced = diagonal + (a[i - 1] == b[j - 1] ? 0 : 1);
+      diagonal = row[j];
+      row[j] = std::min({row[j] + 1, row[j - 1] + 1, replaced});
+    }
+  }
+  return row.back();
+}
+
+}  // namespace
+
+Result<void> check_name(std::string_view what, std::string_view name, std::size_t max) {
+  const bool good = !name.empty() && name.size() <= max && name.front() != '.' && name.front() != '-' &&
+                    std::ranges::all_of(name, is_name_character);
+  if (good) return {};
+  constexpr std::size_t kShown = 100;
+  return failure(ErrorCode::invalid_argument,
+                 fmt::format("{} '{}' is not valid: allowed are 1 to {} letters, digits, '_', '-' and '.', "
+                             "not starting with '-' or '.'",
+                             what, name.substr(0, kShown), max));
+}
+
+std::string event_object_name(std::string_view instance, std::string_view event) {
+  return fmt::format("{}/{}", instance, event);
+}
+
+std::string_view nearest_name(std::string_view unknown, std::span<const std::string_view> known) {
+  std::string_view nearest;
+  std::size_t best = unknown.size() / 3 + 2;  // further away than this is another word, not a typing error
+  for (const std::string_view candidate : known) {
+    const std::size_t distance = edit_distance(unknown, candidate);
+    if (distance < best) {
+      best = distance;
+      nearest = candidate;
+    }
+  }
+  return nearest;
+}
+
+std::string join_names(std::span<const std::string_view> names) {
+  return names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "));
+}
+
+}  // namespace plchost

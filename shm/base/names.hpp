@@ -1,0 +1,55 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "shm/base/result.hpp"
+
+namespace plchost {
+
+/// The longest names, in bytes without the terminating zero. The task and event bounds are the seed's
+/// `char stName[51]`.
+inline constexpr std::size_t kMaxHostName = 63;
+inline constexpr std::size_t kMaxInstanceName = 31;
+inline constexpr std::size_t kMaxTaskName = 50;
+inline constexpr std::size_t kMaxEventName = 50;
+inline constexpr std::size_t kMaxObjectName = 95;
+inline constexpr std::size_t kMaxPath = 255;
+
+/// A host, instance or event name: 1 to `max` characters of A-Z a-z 0-9 _ - and (not first) a dot. Such a
+/// name can stand in a path, a DDS partition and a command line unquoted. `what` is how the error calls it.
+[[nodiscard]] Result<void> check_name(std::string_view what, std::string_view name, std::size_t max);
+
+/// The object that holds the external event `event` of `instance` in the pool: "instance/event".
+[[nodiscard]] std::string event_object_name(std::string_view instance, std::string_view event);
+
+/// `known` that is most like `unknown`, or empty if none is near: for "did you mean".
+[[nodiscard]] std::string_view nearest_name(std::string_view unknown,
+                                            std::span<const std::string_view> known);
+
+/// "a, b, c", for messages that list what is allowed; "none" if there is nothing.
+[[nodiscard]] std::string join_names(std::span<const std::string_view> names);
+
+/// A bounded text in place, for shared memory: always terminated, cut if too long.
+template <std::size_t Max>
+struct FixedText {
+  std::array<char, Max + 1> bytes{};
+
+  FixedText() = default;
+  explicit FixedText(std::string_view text) { assign(text); }
+  void assign(std::string_view text) noexcept {
+    bytes.fill('\0');
+    std::copy_n(text.begin(), std::min(text.size(), Max), bytes.begin());
+  }
+  /// Never reads past the end, whatever a stranger wrote there.
+  [[nodiscard]] std::string_view view() const noexcept {
+    const auto end = std::find(bytes.begin(), bytes.end(), '\0');
+    return {bytes.data(), static_cast<std::size_t>(end - bytes.begin())};
+  }
+};
+
+}  // namespace plchost

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <expected>
+#include <string>
+#include <string_view>
+
+namespace plchost {
+
+/// What kind of failure it is, so that callers can decide without reading text. The numbers travel in
+/// control messages and in the DDS API: they are never reused.
+enum class ErrorCode : std::uint8_t {
+  ok = 0,
+  invalid_argument = 1,  ///< a name, value or file is not of the allowed form
+  not_found = 2,         ///< what was named does not exist
+  already_exists = 3,
+  wrong_state = 4,  ///< exists, but cannot do this now (stop what is stopped)
+  refused = 5,      ///< not permitted (by configuration or by the system)
+  busy = 6,         ///< a bound was hit; try again later
+  timed_out = 7,
+  unavailable = 8,   ///< the other process is not there
+  system = 9,        ///< a system call failed; see system_errno
+  unsupported = 10,  ///< known, and not possible here
+  full = 11,         ///< a table or the pool has no room
+  corrupt = 12,      ///< data in a file, message or shared memory is not valid
+};
+
+[[nodiscard]] std::string_view to_string(ErrorCode code) noexcept;
+
+/// A failure on the set-up path. The message names what was attempted, on what, and what to change.
+struct Error {
+  ErrorCode code = ErrorCode::system;
+  int system_errno = 0;
+  std::string message;
+
+  /// The message, followed by the text of system_errno if there is one.
+  [[nodiscard]] std::string describe() const;
+};
+
+template <class T>
+using Result = std::expected<T, Error>;
+
+/// Makes the failing arm of a Result: `return failure(ErrorCode::not_found, "no instance 'x'");`
+[[nodiscard]] std::unexpected<Error> failure(ErrorCode code, std::string message, int system_errno = 0);
+
+/// Passes another function's failure on, with the step that it happened in put before its message.
+[[nodiscard]] std::unexpected<Error> failure_in(std::string_view step, Error error);
+
+}  // namespace plchost

@@ -1,0 +1,173 @@
+#include "shm/base/thread.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <memory>
+#include <utility>
+
+#include <fmt/format.h>
+#include <sched.h>
+#include <sys/resource.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include "shm/base/system_call.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr std::size_t kStackSize = std::size_t{1} << 20;
+constexpr std::size_t kPrefaulted = std::size_t{256} << 10;
+
+struct StartInfo {
+  std::string name;
+  int nice = 0;
+  std::function<void()> body;
+};
+
+// With locked memory the pages are there already; without it, this is what keeps faults out of the first
+// cycles.
+void prefault_stack() noexcept {
+  volatile std::uint8_t
+      pages[kPrefaulted];  // NOLINT(modernize-avoid-c-arrays): a stack area is what is wanted
+  constexpr std::size_t kPage = 4096;
+  for (std::size_t i = 0; i < kPrefaulted; i += kPage) pages[i] = 0;
+}
+
+void* thread_main(void* argument) noexcept {
+  const std::unique_ptr<StartInfo> info(static_cast<StartInfo*>(argument));
+  pthread_setname_np(pthread_self(), info->name.substr(0, 15).c_str());
+  // A nice value belongs to a thread on Linux; a refusal (negative without the right) leaves the default.
+  if (info->nice != 0) ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), info->nice);
+  prefault_stack();
+  info->body();
+  return nullptr;
+}
+
+class Attributes {
+ public:
+  Attributes() noexcept { pthread_attr_init(&value_); }
+  ~Attributes() { pthread_attr_destroy(&value_); }
+  Attributes(const Attributes&) = delete;
+  Attributes& operator=(const Attributes&) = delete;
+  [[nodiscard]] pthread_attr_t* get() noexcept { return &value_; }
+
+ private:
+  pthread_attr_t value_{};
+};
+
+Result<void> set_scheduling(Attributes& attributes, const std::string& name, ThreadPriority priority) {
+  const sched_param parameter{.sched_priority = priority.fifo};
+  const std::string step = fmt::format("scheduling attributes of thread '{}'", name);
+  return check_returned(pthread_attr_setinheritsched(attributes.get(), PTHREAD_EXPLICIT_SCHED), step)
+      .and_then([&] {
+        return check_returned(
+            pthread_attr_setschedpolicy(attributes.get(), priority.fifo > 0 ? SCHED_FIFO : SCHED_OTHER),
+            step);
+      })
+      .and_then(
+          [&] { return check_returned(pthread_attr_setschedparam(attributes.get(), &parameter), step); });
+}
+
+std::vector<int> to_cores(const cpu_set_t& set) {
+  std::vector<int> cores;
+  for (int core = 0; core < CPU_SETSIZE; ++core) {
+    if (CPU_ISSET(core, &set)) cores.push_back(core);
+  }
+  return cores;
+}
+
+}  // namespace
+
+Thread::Thread(Thread&& other) noexcept
+    : handle_(other.handle_), running_(std::exchange(other.running_, false)) {}
+
+Thread& Thread::operator=(Thread&& other) noexcept {
+  if (this != &other) {
+    join();
+    handle_ = other.handle_;
+    running_ = std::exchange(other.running_, false);
+  }
+  return *this;
+}
+
+void Thread::join() noexcept {
+  if (std::exchange(running_, false)) pthread_join(handle_, nullptr);
+}
+
+Result<Thread> Thread::start(const std::string& name, ThreadPriority priority, std::function<void()> body) {
+  Attributes attributes;
+  if (auto set = set_scheduling(attributes, name, priority); !set) return std::unexpected(set.error());
+  pthread_attr_setstacksize(attributes.get(), kStackSize);
+  auto info = std::make_unique<StartInfo>(StartInfo{name, priority.nice, std::move(body)});
+  Thread thread;
+  const int error = pthread_create(&thread.handle_, attributes.get(), &thread_main, info.get());
+  if (error == EPERM) {
+    return failure(ErrorCode::refused,
+                   fmt::format("thread '{}' needs SCHED_FIFO priority {}: give the process CAP_SYS_NICE or "
+                               "LimitRTPRIO, and a control group with real-time run time",
+                               name, priority.fifo),
+                   error);
+  }
+  if (auto started = check_returned(error, fmt::format("start thread '{}'", name)); !started) {
+    return std::unexpected(started.error());
+  }
+  (void)info.release();  // thread_main owns it now
+  thread.running_ = true;
+  return thread;
+}
+
+Result<std::vector<int>> allowed_cores(pid_t thread) {
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  return check_errno(::sched_getaffinity(thread, sizeof set, &set), "sched_getaffinity").transform([&](int) {
+    return to_cores(set);
+  });
+}
+
+Result<std::vector<int>> bind_process_to_cores(pid_t pid, const std::vector<int>& cores) {
+  cpu_set_t set;
+  CPU_ZERO(&set);
+  for (const int core : cores) {
+    if (core < 0 || core >= CPU_SETSIZE) {
+      return failure(ErrorCode::invalid_argument, fmt::format("core {} does not exist", core));
+    }
+    CPU_SET(core, &set);
+  }
+  const pid_t process = pid == 0 ? ::getpid() : pid;
+  std::error_code error;
+  for (const auto& entry :
+       std::filesystem::directory_iterator(fmt::format("/proc/{}/task", process), error)) {
+    const auto thread = static_cast<pid_t>(std::strtol(entry.path().filename().c_str(), nullptr, 10));
+    auto bound = check_errno(::sched_setaffinity(thread, sizeof set, &set),
+                             fmt::format("bind thread {} to core {}", thread, fmt::join(cores, ",")));
+    if (!bound && bound.error().system_errno != ESRCH) return std::unexpected(bound.error());
+  }
+  if (error) return failure(ErrorCode::system, fmt::format("threads of process {}", process), error.value());
+  return allowed_cores(process);
+}
+
+Result<std::vector<int>> online_cores() {
+  std::ifstream file("/sys/devices/system/cpu/online");
+  std::string line;
+  if (!std::getline(file, line)) {
+    return failure(ErrorCode::system, "read /sys/devices/system/cpu/online", errno);
+  }
+  std::vector<int> cores;
+  const char* at = line.c_str();
+  while (*at != '\0') {
+    char* end = nullptr;
+    const long first = std::strtol(at, &end, 10);
+    if (end == at) break;
+    const long last = *end == '-' ? std::strtol(end + 1, &end, 10) : first;
+    for (long core = first; core <= last; ++core) cores.push_back(static_cast<int>(core));
+    at = *end == ',' ? end + 1 : end;
+  }
+  return cores;
+}
+
+}  // namespace plchost

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+
+#include <time.h>
+
+namespace plchost {
+
+/// CLOCK_MONOTONIC, in nanoseconds: the one clock that all processes of a host share, and the only one
+/// that releases, latencies and time-outs are computed with.
+struct MonotonicClock {
+  using duration = std::chrono::nanoseconds;
+  using rep = duration::rep;
+  using period = duration::period;
+  using time_point = std::chrono::time_point<MonotonicClock>;
+  static constexpr bool is_steady = true;
+
+  /// Real-time: no system call (vDSO).
+  [[nodiscard]] static time_point now() noexcept {
+    timespec value{};
+    ::clock_gettime(CLOCK_MONOTONIC, &value);
+    return time_point(std::chrono::seconds(value.tv_sec) + std::chrono::nanoseconds(value.tv_nsec));
+  }
+};
+
+using Duration = MonotonicClock::duration;
+using TimePoint = MonotonicClock::time_point;
+
+[[nodiscard]] constexpr timespec to_timespec(Duration since_epoch) noexcept {
+  constexpr std::int64_t kNanosecondsPerSecond = 1'000'000'000;
+  return {.tv_sec = since_epoch.count() / kNanosecondsPerSecond,
+          .tv_nsec = since_epoch.count() % kNanosecondsPerSecond};
+}
+[[nodiscard]] constexpr timespec to_timespec(TimePoint when) noexcept {
+  return to_timespec(when.time_since_epoch());
+}
+
+}  // namespace plchost

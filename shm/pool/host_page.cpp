@@ -1,0 +1,1 @@
+#include "shm/pool/host_page.hpp"

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "shm/base/names.hpp"
+#include "shm/base/seqlock.hpp"
+#include "shm/pool/memory_file.hpp"
+
+namespace plchost {
+
+/// What the supervisor says of an instance. The numbers are part of the DDS API.
+enum class InstanceState : std::uint32_t {
+  offline = 0,    ///< no process: not started yet, or ended for good
+  starting = 1,   ///< the process sets itself up
+  running = 2,    ///< the application runs
+  stopped = 3,    ///< the process is up, the application is loaded and stopped
+  stopping = 4,   ///< on its way to stopped or offline
+  waiting = 5,    ///< ended; will be started again after the back-off, or when what it comes after is up
+  safe_mode = 6,  ///< up without its application, after repeated crashes; load or reset to go on
+  failed = 7,     ///< could not be set up, or ended and is not restarted by policy
+};
+[[nodiscard]] std::string_view to_string(InstanceState state) noexcept;
+
+struct HostStatus {
+  FixedText<kMaxHostName> name;
+  FixedText<31> version;
+  std::int32_t manager_pid = 0;
+  std::uint32_t instance_count = 0;
+  std::int64_t started_unix_ns = 0;  ///< CLOCK_REALTIME when the manager started
+};
+
+struct InstanceStatus {
+  FixedText<kMaxInstanceName> name;
+  FixedText<31> scheduler;
+  FixedText<kMaxPath> application;  ///< path; empty if none
+  FixedText<kMaxPath> problem;      ///< why it is not running, or how it ended last; empty if all is well
+  InstanceState state = InstanceState::offline;
+  std::int32_t pid = 0;
+  std::int32_t core = -1;  ///< the core the kernel granted; -1 while there is no process
+  std::uint32_t restarts = 0;
+  std::int64_t state_since_unix_ns = 0;
+};
+
+inline constexpr std::uint32_t kMaxInstances = 64;
+
+/// What the manager knows, for others to read. One writer: the manager's Reactor thread.
+struct HostPageLayout {
+  std::uint64_t magic = 0;  ///< written last
+  std::uint32_t version = 0;
+  std::uint32_t size = 0;
+  std::atomic<std::uint64_t> changes{0};  ///< grows with every write: readers look at this first
+  Seqlock<HostStatus> host;
+  std::array<Seqlock<InstanceStatus>, kMaxInstances> instances;
+};
+
+[[nodiscard]] std::string host_page_name(std::string_view pool);
+
+/// The manager's end.
+class HostPageWriter {
+ public:
+  [[nodiscard]] static Result<HostPageWriter> create(std::string_view pool);
+  void write_host(const HostStatus& status) noexcept;
+  /// `index` < kMaxInstances, and < the instance_count written with the host.
+  void write_instance(std::uint32_t index, const InstanceStatus& status) noexcept;
+
+ private:
+  explicit HostPageWriter(MemoryFile memory) noexcept : memory_(std::move(memory)) {}
+  MemoryFile memory_;
+};
+
+/// A reader's end, in any process.
+class HostPageReader {
+ public:
+  /// not_found: no manager has made it yet. corrupt: not such a page.
+  [[nodiscard]] static Result<HostPageReader> open(std::string_view pool);
+  [[nodiscard]] std::uint64_t changes() const noexcept;
+  [[nodiscard]] std::optional<HostStatus> host() const noexcept;
+  [[nodiscard]] std::optional<InstanceStatus> instance(std::uint32_t index) const noexcept;
+
+ private:
+  explicit HostPageReader(MemoryFile memory) noexcept : memory_(std::move(memory)) {}
+  MemoryFile memory_;
+};
+
+}  // namespace plchost

@@ -1,0 +1,1 @@
+#include "shm/pool/instance_page.hpp"

@@ -1,0 +1,110 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "shm/base/names.hpp"
+#include "shm/base/seqlock.hpp"
+#include "shm/base/task_statistics.hpp"
+#include "shm/pool/memory_file.hpp"
+
+namespace plchost {
+
+/// The numbers of the seed's KindOfTask.
+enum class PageTaskKind : std::uint32_t { cyclic = 0, event = 1, external = 2, freewheeling = 3 };
+[[nodiscard]] std::string_view to_string(PageTaskKind kind) noexcept;
+
+/// The task monitor's status word.
+enum class PageTaskState : std::uint32_t { created = 0, running = 1, stopped = 2, exception = 3 };
+[[nodiscard]] std::string_view to_string(PageTaskState state) noexcept;
+
+/// What does not change while the application is loaded.
+struct TaskIdentity {
+  FixedText<kMaxTaskName> name;
+  FixedText<kMaxEventName> external_event;  ///< empty unless kind is external
+  PageTaskKind kind = PageTaskKind::cyclic;
+  std::int32_t iec_priority = 0;
+  std::int64_t interval_ns = 0;  ///< 0 unless kind is cyclic
+};
+
+/// What the instance says of itself. Written by its control thread.
+struct InstanceRuntime {
+  std::int32_t pid = 0;
+  std::int32_t core = -1;     ///< read back from the kernel; -1 if bound to several
+  std::uint32_t running = 0;  ///< 1 while the application runs
+  std::uint32_t memory_locked = 0;
+  std::int64_t heartbeat_ns = 0;  ///< CLOCK_MONOTONIC of the last beat
+  FixedText<31> scheduler;
+  FixedText<kMaxPath> application;
+};
+
+struct TaskSlot {
+  TaskIdentity identity;
+  std::atomic<std::uint32_t> state{0};  ///< a PageTaskState
+  TaskStatistics statistics;
+};
+
+inline constexpr std::uint32_t kMaxTasks = 1024;
+
+struct InstancePageLayout {
+  std::uint64_t magic = 0;  ///< written last
+  std::uint32_t version = 0;
+  std::uint32_t task_count = 0;
+  std::uint64_t size = 0;
+  Seqlock<InstanceRuntime> runtime;
+  // TaskSlot tasks[task_count] follow
+};
+
+[[nodiscard]] std::string instance_page_name(std::string_view pool, std::string_view instance);
+
+/// The instance's end: a fresh page for each life of the process, made when its tasks are known.
+class InstancePage {
+ public:
+  [[nodiscard]] static Result<InstancePage> create(std::string_view pool, std::string_view instance,
+                                                   std::span<const TaskIdentity> tasks);
+  static void remove(std::string_view pool, std::string_view instance) noexcept;
+
+  void write_runtime(const InstanceRuntime& runtime) noexcept;
+  [[nodiscard]] TaskSlot& task(std::uint32_t index) noexcept;
+  [[nodiscard]] std::uint32_t task_count() const noexcept;
+
+ private:
+  explicit InstancePage(MemoryFile memory) noexcept : memory_(std::move(memory)) {}
+  MemoryFile memory_;
+};
+
+/// One task as a reader sees it.
+struct TaskSnapshot {
+  TaskIdentity identity;
+  PageTaskState state = PageTaskState::created;
+  TaskCounters counters{};
+  Duration latency_p50{};
+  Duration latency_p99{};
+};
+
+/// A reader's end, in any process. It reads the page of the process that lived when it was opened: open anew
+/// when the instance has another pid.
+class InstancePageReader {
+ public:
+  /// not_found: the instance has made none. corrupt: not such a page, or of impossible size.
+  [[nodiscard]] static Result<InstancePageReader> open(std::string_view pool, std::string_view instance);
+  [[nodiscard]] std::optional<InstanceRuntime> runtime() const noexcept;
+  [[nodiscard]] std::uint32_t task_count() const noexcept;
+  /// Nothing if the writer was in the way; try again later.
+  [[nodiscard]] std::optional<TaskSnapshot> task(std::uint32_t index) const noexcept;
+  /// Changes when the task ran: readers that publish look at this first.
+  [[nodiscard]] std::uint64_t task_sequence(std::uint32_t index) const noexcept;
+
+ private:
+  explicit InstancePageReader(MemoryFile memory, std::uint32_t count) noexcept
+      : memory_(std::move(memory)), task_count_(count) {}
+  MemoryFile memory_;
+  std::uint32_t task_count_ = 0;  // as validated at open: a stranger may change the page's own
+};
+
+}  // namespace plchost

@@ -1,0 +1,1 @@
+#include "shm/pool/memory_file.hpp"

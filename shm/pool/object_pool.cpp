@@ -1,0 +1,1 @@
+#include "shm/pool/object_pool.hpp"
