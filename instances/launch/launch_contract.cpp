@@ -1,0 +1,98 @@
+#include "instances/launch/launch_contract.hpp"
+
+#include <array>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+namespace plchost {
+
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr std::array kSteps = {
+    std::pair{SetupStep::bind_core, std::string_view("bind core")},
+    std::pair{SetupStep::lock_memory, std::string_view("lock memory")},
+    std::pair{SetupStep::read_settings, std::string_view("read settings")},
+    std::pair{SetupStep::attach_pool, std::string_view("attach pool")},
+    std::pair{SetupStep::open_control_socket, std::string_view("open control socket")},
+    std::pair{SetupStep::load_components, std::string_view("load components")},
+    std::pair{SetupStep::load_application, std::string_view("load application")},
+    std::pair{SetupStep::make_tasks, std::string_view("make tasks")},
+    std::pair{SetupStep::make_status_page, std::string_view("make status page")},
+    std::pair{SetupStep::start_scheduler, std::string_view("start scheduler")},
+    std::pair{SetupStep::ready, std::string_view("ready")},
+};
+
+constexpr unsigned kLastCode = static_cast<unsigned>(ErrorCode::corrupt);
+
+// The value of `key` if it is a text; a report of any other form is corrupt.
+Result<std::string> text_of(const Json& json, const char* key) {
+  const auto found = json.find(key);
+  if (found == json.end() || !found->is_string()) {
+    return failure(ErrorCode::corrupt, fmt::format("set-up report has no text '{}'", key));
+  }
+  return found->get<std::string>();
+}
+
+}  // namespace
+
+std::string_view to_string(SetupStep step) noexcept {
+  for (const auto& [known, name] : kSteps) {
+    if (known == step) return name;
+  }
+  return "unknown";
+}
+
+std::vector<std::string> to_arguments(const std::string& program, const LaunchOptions& options) {
+  std::vector<std::string> arguments{program, "--name", options.name};
+  const auto add = [&](const char* option, std::string value) {
+    arguments.emplace_back(option);
+    arguments.push_back(std::move(value));
+  };
+  if (!options.cores.empty()) add("--core", fmt::format("{}", fmt::join(options.cores, ",")));
+  add("--scheduler", options.scheduler);
+  add("--priority-band", options.priority_band);
+  if (!options.settings.empty()) add("--settings", options.settings);
+  if (!options.application.empty()) add("--application", options.application);
+  add("--pool", options.pool);
+  if (!options.run_directory.empty()) add("--run-directory", options.run_directory);
+  if (options.stopped) arguments.emplace_back("--stopped");
+  if (options.report_fd >= 0) add("--report-fd", std::to_string(options.report_fd));
+  add("--log-level", options.log_level);
+  return arguments;
+}
+
+std::string instance_socket_path(std::string_view run_directory, std::string_view instance) {
+  return fmt::format("{}/{}.sock", run_directory, instance);
+}
+
+std::string encode(const SetupReport& report) {
+  const Json json{
+      {"step", to_string(report.step)}, {"code", static_cast<unsigned>(report.code)}, {"text", report.text}};
+  // Bytes that are not UTF-8 (a hostile file name in an error text) are replaced, never thrown about.
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+Result<SetupReport> decode_report(std::string_view packet) {
+  const Json json = Json::parse(packet, nullptr, false);
+  if (!json.is_object()) return failure(ErrorCode::corrupt, "set-up report is not a JSON object");
+  const auto step = text_of(json, "step");
+  if (!step) return std::unexpected(step.error());
+  auto text = text_of(json, "text");
+  if (!text) return std::unexpected(std::move(text).error());
+  const auto code = json.find("code");
+  if (code == json.end() || !code->is_number_unsigned() || code->get<std::uint64_t>() > kLastCode) {
+    return failure(ErrorCode::corrupt, "set-up report has no valid 'code'");
+  }
+  for (const auto& [known, name] : kSteps) {
+    if (name == *step) {
+      return SetupReport{known, static_cast<ErrorCode>(code->get<unsigned>()), *std::move(text)};
+    }
+  }
+  return failure(ErrorCode::corrupt, fmt::format("set-up report has the unknown step '{}'", *step));
+}
+
+}  // namespace plchost
