@@ -1,0 +1,88 @@
+#!/usr/bin/env bash
+# A gate that checks nothing is green for ever. Here each one is shown a planted fault and must turn red.
+# Usage: prove.sh [BUILD] (a configured build, for clang-tidy's proof)
+set -uo pipefail
+cd "$(dirname "$0")/../.."
+gates=$PWD/tests/gates
+plot=$(mktemp -d)
+trap 'rm -rf "$plot"' EXIT
+failed=0
+
+# must_be_red NAME COMMAND...: the command has to fail, and to say so
+must_be_red() {
+  local name=$1
+  shift
+  if output=$("$@" 2>&1); then
+    echo "the gate '$name' did not see the planted fault"
+    failed=1
+  elif [ -z "$output" ]; then
+    echo "the gate '$name' failed without a word"
+    failed=1
+  fi
+}
+
+new_tree() {
+  rm -rf "$plot/tree"
+  mkdir -p "$plot/tree"/{shm/base,shm/pool,schedulers,instances,api,manager,tests}
+  cp .clang-format .clang-tidy "$plot/tree/"
+}
+commit_tree() { git -C "$plot/tree" init -q && git -C "$plot/tree" add -A; }
+
+new_tree
+echo '#include "shm/pool/object_pool.hpp"' >"$plot/tree/schedulers/task.hpp"
+must_be_red layers "$gates/layers.sh" "$plot/tree"
+
+new_tree
+printf 'int  main( ){return 0;}\n' >"$plot/tree/shm/base/ugly.cpp"
+must_be_red format "$gates/format.sh" "$plot/tree"
+
+new_tree
+mkdir "$plot/tree/utilities" && touch "$plot/tree/utilities/x.txt" && commit_tree
+must_be_red "house: top level" "$gates/house.sh" "$plot/tree"
+new_tree
+seq -f '// %g' 501 >"$plot/tree/shm/base/long.cpp" && commit_tree
+must_be_red "house: long file" "$gates/house.sh" "$plot/tree"
+new_tree
+echo "// TO""DO" >"$plot/tree/shm/base/later.cpp" && commit_tree
+must_be_red "house: unfinished" "$gates/house.sh" "$plot/tree"
+new_tree
+echo '// /ho''me/somebody/x' >"$plot/tree/shm/base/path.cpp" && commit_tree
+must_be_red "house: path" "$gates/house.sh" "$plot/tree"
+
+new_tree
+echo 'int planted(int* p) { return p == 0 ? 1 : 2; }' >"$plot/tree/shm/base/planted.cpp"
+must_be_red clang-tidy clang-tidy-19 --quiet "$plot/tree/shm/base/planted.cpp" -- -std=c++23
+
+cat >"$plot/CMakeLists.txt" <<EOF
+cmake_minimum_required(VERSION 3.25)
+project(planted C CXX)
+set(CMAKE_CXX_STANDARD 23)
+include($PWD/.cmake/targets.cmake)
+add_executable(planted planted.cpp)
+plchost_target(planted)
+EOF
+# build_planted SANITIZERS: builds planted.cpp with the project's own flags and runs it
+build_planted() {
+  rm -rf "$plot/build"
+  cmake -S "$plot" -B "$plot/build" -DSANITIZER="$1" >/dev/null && cmake --build "$plot/build" 2>&1 && "$plot/build/planted" 2>&1
+}
+echo 'int main() { return 0; }' >"$plot/planted.cpp"
+build_planted "" >/dev/null || { echo "a clean program does not pass the gates"; failed=1; }
+echo 'int main() { int unused; return 0; }' >"$plot/planted.cpp"
+must_be_red "compiler warnings" build_planted ""
+echo 'int main(int n, char**) { int* p = new int[4]; p[n + 3] = 1; const int r = p[n + 3]; delete[] p; return r - 1; }' >"$plot/planted.cpp"
+must_be_red "address sanitizer" build_planted "address;undefined"
+echo 'int main(int n, char**) { int big = 2147483647; big += n; return big == 0 ? 1 : 0; }' >"$plot/planted.cpp"
+must_be_red "undefined sanitizer" build_planted "address;undefined"
+cat >"$plot/planted.cpp" <<'EOF'
+#include <thread>
+int shared = 0;
+int main() {
+  std::thread other([] { for (int i = 0; i < 1000; ++i) ++shared; });
+  for (int i = 0; i < 1000; ++i) ++shared;
+  other.join();
+  return 0;
+}
+EOF
+must_be_red "thread sanitizer" build_planted "thread"
+exit $failed

@@ -1,0 +1,14 @@
+#!/usr/bin/env bash
+# clang-tidy over all translation units of a build, or over the files named. Usage: tidy.sh BUILD [FILE...]
+set -euo pipefail
+build=$1
+shift
+cd "$(dirname "$0")/../.."
+if [ $# -eq 0 ]; then
+  mapfile -t files < <(grep -oE '"file": "[^"]+\.cpp"' "$build/compile_commands.json" | cut -d'"' -f4 | grep -v "^$build" | sort -u)
+else
+  files=("$@")
+fi
+# clang reads the compile commands of g++; flags that only g++ knows are not its business
+printf '%s\0' "${files[@]}" | xargs -0 -n 1 -P "$(nproc)" clang-tidy-19 -p "$build" --quiet \
+  --extra-arg=-Wno-unknown-warning-option --extra-arg=-Wno-ignored-optimization-argument 2>/dev/null

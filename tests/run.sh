@@ -1,0 +1,103 @@
+#!/usr/bin/env bash
+# All tests, from nothing: packages, gates, build, tests, sanitizers, fuzzers.
+#   tests/run.sh           everything (what CI runs)
+#   tests/run.sh --quick   build and the tests that take seconds: the round after an edit
+#   tests/run.sh NAME...   only tests whose name matches (ctest -R), in the plain build
+set -uo pipefail
+cd "$(dirname "$0")/.."
+build=.build/tests
+jobs=$(nproc)
+step=0
+steps=9
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+
+# run WHAT COMMAND...: one line while it runs and when it is done; the whole output only if it failed
+run() {
+  local what=$1 began=$SECONDS
+  shift
+  step=$((step + 1))
+  printf '[%d/%d] %s ...' "$step" "$steps" "$what"
+  if "$@" >"$log" 2>&1; then
+    printf ' ok (%d s)\n' $((SECONDS - began))
+  else
+    printf ' FAILED\n'
+    tail -n 300 "$log"
+    echo "failed: $what"
+    exit 1
+  fi
+}
+
+configure() { # configure DIR OPTIONS...
+  local dir=$1
+  shift
+  local launcher=()
+  command -v ccache >/dev/null && launcher=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DCMAKE_C_COMPILER_LAUNCHER=ccache)
+  cmake -S . -B "$dir" -G Ninja "${launcher[@]}" "$@"
+}
+build_plain() { configure "$build" && cmake --build "$build" -j "$jobs"; }
+build_sanitized() { # build_sanitized DIR SANITIZERS
+  configure "$1" -DSANITIZER="$2" -DPLCHOST_BENCH=OFF -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1" &&
+    cmake --build "$1" -j "$jobs"
+}
+gates() { tests/gates/layers.sh && tests/gates/house.sh && tests/gates/format.sh && tests/gates/prove.sh; }
+
+# ctest's own lines, and at the end what CI reads
+passed=0
+failed=0
+tests() { # tests DIR OPTIONS...
+  local dir=$1
+  shift
+  ctest --test-dir "$dir" --output-on-failure -j "$jobs" --no-tests=error "$@"
+}
+count() { # adds up the summary of the step that just ran
+  local all bad
+  all=$(grep -oE 'out of [0-9]+' "$log" | tail -n 1 | grep -oE '[0-9]+' || echo 0)
+  bad=$(grep -oE '[0-9]+ tests? failed out' "$log" | grep -oE '^[0-9]+' | tail -n 1 || echo 0)
+  passed=$((passed + all - bad))
+  failed=$((failed + bad))
+}
+
+fuzz() {
+  configure .build/fuzz -DCMAKE_C_COMPILER=clang-19 -DCMAKE_CXX_COMPILER=clang++-19 -DPLCHOST_FUZZ=ON \
+    -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF -DSANITIZER="address;undefined" &&
+    cmake --build .build/fuzz -j "$jobs" --target fuzzers || return 1
+  local fuzzer corpus
+  for fuzzer in .build/fuzz/bin/fuzz_*; do
+    corpus=$(mktemp -d)
+    "$fuzzer" -max_total_time="${FUZZ_SECONDS:-8}" -rss_limit_mb=2048 -print_final_stats=1 "$corpus" \
+      || { rm -rf "$corpus"; return 1; }
+    rm -rf "$corpus"
+  done
+}
+
+case "${1:-}" in
+  --quick)
+    steps=2
+    run "build" build_plain
+    run "fast tests" tests "$build" -LE slow
+    count
+    ;;
+  "")
+    run "packages" .ci/packages test
+    run "gates, each proven by a planted fault" gates
+    run "build" build_plain
+    run "tests" tests "$build"
+    count
+    run "clang-tidy" tests/gates/tidy.sh "$PWD/$build"
+    run "build with address and undefined sanitizers" build_sanitized .build/asan "address;undefined"
+    run "tests under address and undefined sanitizers" tests .build/asan
+    count
+    run "thread sanitizer: build and tests" bash -c "$(declare -f configure build_sanitized tests); jobs=$jobs
+      build_sanitized .build/tsan thread && tests .build/tsan -LE no-tsan"
+    count
+    run "fuzzers" fuzz
+    ;;
+  *)
+    steps=2
+    run "build" build_plain
+    run "tests matching $1" tests "$build" -R "$1"
+    count
+    ;;
+esac
+echo "$passed passed, $failed failed"
