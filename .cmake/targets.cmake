@@ -2,7 +2,7 @@
 
 set(PLCHOST_WARNINGS
     -Werror -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion -Wcast-align -Wcast-qual
-    -Wformat=2 -Wnull-dereference -Wundef -Wvla -Wswitch-enum)
+    -Wformat=2 -Wundef -Wvla -Wswitch-enum)
 set(PLCHOST_CXX_WARNINGS
     -Wnon-virtual-dtor -Woverloaded-virtual -Wold-style-cast -Wextra-semi -Wzero-as-null-pointer-constant)
 

@@ -35,9 +35,11 @@ Result<Json> parse(std::string_view packet) {
   if (!json.is_object()) return failure(ErrorCode::corrupt, "control message is not a JSON object");
   const auto version = json.find("version");
   if (version == json.end() || !version->is_number_integer() || *version != kControlVersion) {
-    return failure(ErrorCode::corrupt,
-                   fmt::format("control message version {} where {} is spoken",
-                               version == json.end() ? "none" : dump(*version), kControlVersion));
+    // Only a number is shown: dump() calls itself for each level of nesting, and a hostile text has
+    // thousands.
+    const bool shown = version != json.end() && version->is_number();
+    return failure(ErrorCode::corrupt, fmt::format("control message version {} where {} is spoken",
+                                                   shown ? dump(*version) : "none", kControlVersion));
   }
   const auto number = json.find("number");
   if (number == json.end() || !number->is_number_unsigned()) {
@@ -99,7 +101,7 @@ Result<ControlReply> decode_reply(std::string_view packet) {
   if (!json) return std::unexpected(json.error());
   const auto code = json->find("code");
   constexpr unsigned kLastCode = static_cast<unsigned>(ErrorCode::corrupt);
-  if (code == json->end() || !code->is_number_unsigned() || code->get<unsigned>() > kLastCode) {
+  if (code == json->end() || !code->is_number_unsigned() || code->get<std::uint64_t>() > kLastCode) {
     return failure(ErrorCode::corrupt, "control reply has no valid 'code'");
   }
   auto text = text_of(*json, "text");

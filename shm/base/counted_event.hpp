@@ -12,14 +12,16 @@ namespace plchost {
 /// shared memory; all zero is a valid new event. Everything in it is lock-free and survives the death of
 /// any user at any instruction.
 ///
-///   63                                  8 7      1 0
-///   [ posts so far                       ][ nudges ][ waiter ]     low 32 bits are the futex word
+///   63                          16 15     1 0
+///   [ posts so far               ][ turns ][ waiter ]     low 32 bits are the futex word
 ///
 /// Post is one atomic add, and at most one wake. Each waiter keeps a cursor of its own (how many posts it
 /// has seen), so nothing is consumed by anyone else and the event needs no list of waiters. `waiter` says
-/// that somebody may be asleep; who wakes clears it, so a waiter that died costs one superfluous wake.
-/// `nudges` changes the word without counting a post: it wakes a thread that shall stop or change what it
-/// waits on.
+/// that somebody may be asleep. Who wakes clears it afterwards, and only if the word is still the one that it
+/// made itself: each waiter changes `turns` before it sleeps, so an unchanged word means that all sleepers
+/// have been woken. A poster that dies at any point therefore leaves the flag set, never a sleeper without
+/// it; a waiter that died costs one superfluous wake. A nudge changes `turns` too, without counting a post:
+/// it wakes a thread that shall stop or change what it waits on.
 class CountedEvent {
  public:
   /// One consistent view of the event.
@@ -38,7 +40,7 @@ class CountedEvent {
   void post() noexcept {
     // Release pairs with the acquire in snapshot(): what the poster wrote before is seen by the task.
     const std::uint64_t before = state_.fetch_add(kOnePost, std::memory_order_release);
-    if ((before & kWaiter) != 0) wake();
+    if ((before & kWaiter) != 0) wake(before + kOnePost);
   }
 
   [[nodiscard]] Snapshot snapshot() const noexcept {
@@ -56,12 +58,16 @@ class CountedEvent {
 
  private:
   static constexpr std::uint64_t kWaiter = 1;
-  static constexpr std::uint64_t kOneNudge = 2;
-  static constexpr std::uint64_t kNudgeMask = 0xfe;
-  static constexpr unsigned kCountShift = 8;
+  static constexpr std::uint64_t kOneTurn = 2;
+  static constexpr std::uint64_t kTurnMask = 0xfffe;
+  static constexpr unsigned kCountShift = 16;
   static constexpr std::uint64_t kOnePost = std::uint64_t{1} << kCountShift;
 
-  void wake() noexcept;
+  // The turns wrap inside their own bits; a carry would count as a post.
+  [[nodiscard]] static constexpr std::uint64_t next_turn(std::uint64_t state) noexcept {
+    return (state & ~kTurnMask) | ((state + kOneTurn) & kTurnMask);
+  }
+  void wake(std::uint64_t made) noexcept;
 
   std::atomic<std::uint64_t> state_{0};
 };

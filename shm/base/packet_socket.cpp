@@ -31,8 +31,9 @@ Result<sockaddr_un> to_address(const std::string& path) {
 }
 
 Result<UniqueFd> make_socket() {
-  return check_errno(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0), "socket")
-      .transform([](int fd) { return UniqueFd(fd); });
+  const auto fd = check_errno(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0), "socket");
+  if (!fd) return std::unexpected(fd.error());
+  return UniqueFd(*fd);
 }
 
 const sockaddr* as_sockaddr(const sockaddr_un& address) {
@@ -47,15 +48,18 @@ Result<PacketSocket> PacketSocket::connect(const std::string& path) {
   auto fd = make_socket();
   if (!fd) return std::unexpected(fd.error());
   if (::connect(fd->get(), as_sockaddr(*address), sizeof *address) != 0) {
-    return failure(ErrorCode::unavailable, fmt::format("connect to {}", path), errno);
+    const int error = errno;
+    // A non-blocking connect says EAGAIN when the listener's backlog is full.
+    return failure(error == EAGAIN ? ErrorCode::busy : ErrorCode::unavailable,
+                   fmt::format("connect to {}", path), error);
   }
   return PacketSocket(std::move(*fd));
 }
 
 Result<void> PacketSocket::send(std::string_view packet) {
-  if (packet.size() > kMaxPacket) {
+  if (packet.empty() || packet.size() > kMaxPacket) {  // an empty one would look like the end of the peer
     return failure(ErrorCode::invalid_argument,
-                   fmt::format("packet of {} bytes; at most {} are allowed", packet.size(), kMaxPacket));
+                   fmt::format("packet of {} bytes; 1 to {} are allowed", packet.size(), kMaxPacket));
   }
   while (::send(fd_.get(), packet.data(), packet.size(), MSG_NOSIGNAL) < 0) {
     if (errno == EINTR) continue;
@@ -98,8 +102,10 @@ Result<std::string> PacketSocket::receive_until(TimePoint deadline) {
 Result<int> PacketSocket::peer_pid() const {
   ucred credentials{};
   socklen_t size = sizeof credentials;
-  return check_errno(::getsockopt(fd_.get(), SOL_SOCKET, SO_PEERCRED, &credentials, &size), "SO_PEERCRED")
-      .transform([&](int) { return static_cast<int>(credentials.pid); });
+  const auto got =
+      check_errno(::getsockopt(fd_.get(), SOL_SOCKET, SO_PEERCRED, &credentials, &size), "SO_PEERCRED");
+  if (!got) return std::unexpected(got.error());
+  return static_cast<int>(credentials.pid);
 }
 
 Result<PacketListener> PacketListener::listen(const std::string& path) {
@@ -110,16 +116,34 @@ Result<PacketListener> PacketListener::listen(const std::string& path) {
   ::unlink(path.c_str());
   constexpr mode_t kMode = 0660;
   constexpr int kBacklog = 16;
-  auto done =
-      check_errno(::bind(fd->get(), as_sockaddr(*address), sizeof *address), fmt::format("bind {}", path))
-          .and_then([&](int) { return check_errno(::chmod(path.c_str(), kMode), "chmod " + path); })
-          .and_then([&](int) { return check_errno(::listen(fd->get(), kBacklog), "listen on " + path); });
+  auto done = check_errno(::bind(fd->get(), as_sockaddr(*address), sizeof *address), "bind " + path);
+  if (done) done = check_errno(::chmod(path.c_str(), kMode), "chmod " + path);
+  if (done) done = check_errno(::listen(fd->get(), kBacklog), "listen on " + path);
   if (!done) return std::unexpected(done.error());
-  return PacketListener(std::move(*fd), path);
+  struct stat file{};
+  const auto found = check_errno(::stat(path.c_str(), &file), "stat " + path);
+  if (!found) return std::unexpected(found.error());
+  return PacketListener(std::move(*fd), path, file.st_ino);
+}
+
+PacketListener& PacketListener::operator=(PacketListener&& other) noexcept {
+  if (this != &other) {
+    remove_file();
+    fd_ = std::move(other.fd_);
+    path_ = std::move(other.path_);
+    inode_ = other.inode_;
+  }
+  return *this;
 }
 
 PacketListener::~PacketListener() {
-  if (fd_) ::unlink(path_.c_str());
+  remove_file();
+}
+
+void PacketListener::remove_file() noexcept {
+  // Another listener may have taken the path over since; its file is not ours to remove.
+  struct stat file{};
+  if (fd_ && ::stat(path_.c_str(), &file) == 0 && file.st_ino == inode_) ::unlink(path_.c_str());
 }
 
 Result<std::optional<PacketSocket>> PacketListener::accept() {

@@ -5,6 +5,8 @@
 #include <string>
 #include <string_view>
 
+#include <sys/types.h>
+
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
 #include "shm/base/unique_fd.hpp"
@@ -21,13 +23,14 @@ class PacketSocket {
   PacketSocket() noexcept = default;
   explicit PacketSocket(UniqueFd fd) noexcept : fd_(std::move(fd)) {}
 
-  /// Connects to the socket file at `path`. unavailable: nobody listens there.
+  /// Connects to the socket file at `path`. unavailable: nobody listens there; busy: too many connect at
+  /// once.
   [[nodiscard]] static Result<PacketSocket> connect(const std::string& path);
 
   [[nodiscard]] int fd() const noexcept { return fd_.get(); }
   [[nodiscard]] explicit operator bool() const noexcept { return static_cast<bool>(fd_); }
 
-  /// busy: the peer does not read; unavailable: the peer is gone.
+  /// 1 to kMaxPacket bytes. busy: the peer does not read; unavailable: the peer is gone.
   [[nodiscard]] Result<void> send(std::string_view packet);
   /// Nothing: no packet is there now. unavailable: the peer is gone. corrupt: larger than kMaxPacket.
   [[nodiscard]] Result<std::optional<std::string>> receive();
@@ -46,7 +49,7 @@ class PacketListener {
  public:
   [[nodiscard]] static Result<PacketListener> listen(const std::string& path);
   PacketListener(PacketListener&&) noexcept = default;
-  PacketListener& operator=(PacketListener&&) noexcept = default;
+  PacketListener& operator=(PacketListener&& other) noexcept;
   PacketListener(const PacketListener&) = delete;
   PacketListener& operator=(const PacketListener&) = delete;
   ~PacketListener();
@@ -56,9 +59,13 @@ class PacketListener {
   [[nodiscard]] Result<std::optional<PacketSocket>> accept();
 
  private:
-  PacketListener(UniqueFd fd, std::string path) : fd_(std::move(fd)), path_(std::move(path)) {}
+  PacketListener(UniqueFd fd, std::string path, ino_t inode)
+      : fd_(std::move(fd)), path_(std::move(path)), inode_(inode) {}
+  void remove_file() noexcept;
+
   UniqueFd fd_;
   std::string path_;
+  ino_t inode_ = 0;  // of the socket file
 };
 
 }  // namespace plchost

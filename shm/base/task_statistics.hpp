@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 
@@ -36,8 +37,8 @@ class DurationHistogram {
   [[nodiscard]] Duration percentile(double fraction) const noexcept {
     const std::uint64_t all = total();
     if (all == 0) return Duration::zero();
-    const auto wanted =
-        std::max<std::uint64_t>(1, static_cast<std::uint64_t>(fraction * static_cast<double>(all)));
+    const double share = std::ceil(std::clamp(fraction, 0.0, 1.0) * static_cast<double>(all));
+    const auto wanted = std::max<std::uint64_t>(1, static_cast<std::uint64_t>(share));
     std::uint64_t sum = 0;
     for (std::size_t i = 0; i < kBuckets; ++i) {
       sum += buckets_[i].load(std::memory_order_relaxed);

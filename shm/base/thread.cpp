@@ -35,7 +35,10 @@ void prefault_stack() noexcept {
   volatile std::uint8_t
       pages[kPrefaulted];  // NOLINT(modernize-avoid-c-arrays): a stack area is what is wanted
   constexpr std::size_t kPage = 4096;
-  for (std::size_t i = 0; i < kPrefaulted; i += kPage) pages[i] = 0;
+  for (std::size_t i = 0; i < kPrefaulted; i += kPage) {
+    pages[i] = 0;
+    (void)pages[i];
+  }
 }
 
 void* thread_main(void* argument) noexcept {
@@ -63,20 +66,18 @@ class Attributes {
 Result<void> set_scheduling(Attributes& attributes, const std::string& name, ThreadPriority priority) {
   const sched_param parameter{.sched_priority = priority.fifo};
   const std::string step = fmt::format("scheduling attributes of thread '{}'", name);
-  return check_returned(pthread_attr_setinheritsched(attributes.get(), PTHREAD_EXPLICIT_SCHED), step)
-      .and_then([&] {
-        return check_returned(
-            pthread_attr_setschedpolicy(attributes.get(), priority.fifo > 0 ? SCHED_FIFO : SCHED_OTHER),
-            step);
-      })
-      .and_then(
-          [&] { return check_returned(pthread_attr_setschedparam(attributes.get(), &parameter), step); });
+  auto set = check_returned(pthread_attr_setinheritsched(attributes.get(), PTHREAD_EXPLICIT_SCHED), step);
+  if (!set) return set;
+  const int policy = priority.fifo > 0 ? SCHED_FIFO : SCHED_OTHER;
+  set = check_returned(pthread_attr_setschedpolicy(attributes.get(), policy), step);
+  if (!set) return set;
+  return check_returned(pthread_attr_setschedparam(attributes.get(), &parameter), step);
 }
 
 std::vector<int> to_cores(const cpu_set_t& set) {
   std::vector<int> cores;
   for (int core = 0; core < CPU_SETSIZE; ++core) {
-    if (CPU_ISSET(core, &set)) cores.push_back(core);
+    if (CPU_ISSET(static_cast<std::size_t>(core), &set)) cores.push_back(core);
   }
   return cores;
 }
@@ -124,9 +125,9 @@ Result<Thread> Thread::start(const std::string& name, ThreadPriority priority, s
 Result<std::vector<int>> allowed_cores(pid_t thread) {
   cpu_set_t set;
   CPU_ZERO(&set);
-  return check_errno(::sched_getaffinity(thread, sizeof set, &set), "sched_getaffinity").transform([&](int) {
-    return to_cores(set);
-  });
+  auto got = check_errno(::sched_getaffinity(thread, sizeof set, &set), "sched_getaffinity");
+  if (!got) return std::unexpected(std::move(got.error()));
+  return to_cores(set);
 }
 
 Result<std::vector<int>> bind_process_to_cores(pid_t pid, const std::vector<int>& cores) {
@@ -136,13 +137,14 @@ Result<std::vector<int>> bind_process_to_cores(pid_t pid, const std::vector<int>
     if (core < 0 || core >= CPU_SETSIZE) {
       return failure(ErrorCode::invalid_argument, fmt::format("core {} does not exist", core));
     }
-    CPU_SET(core, &set);
+    CPU_SET(static_cast<std::size_t>(core), &set);
   }
   const pid_t process = pid == 0 ? ::getpid() : pid;
   std::error_code error;
-  for (const auto& entry :
-       std::filesystem::directory_iterator(fmt::format("/proc/{}/task", process), error)) {
-    const auto thread = static_cast<pid_t>(std::strtol(entry.path().filename().c_str(), nullptr, 10));
+  // Advanced by hand: the range-based form throws when the process ends in between.
+  std::filesystem::directory_iterator entry(fmt::format("/proc/{}/task", process), error);
+  for (; !error && entry != std::filesystem::directory_iterator(); entry.increment(error)) {
+    const auto thread = static_cast<pid_t>(std::strtol(entry->path().filename().c_str(), nullptr, 10));
     auto bound = check_errno(::sched_setaffinity(thread, sizeof set, &set),
                              fmt::format("bind thread {} to core {}", thread, fmt::join(cores, ",")));
     if (!bound && bound.error().system_errno != ESRCH) return std::unexpected(bound.error());
