@@ -1,0 +1,25 @@
+#!/usr/bin/env bash
+# Measures plchost beside the floor of this machine, in the same run.
+#   tests/bench/run.sh [--quick] [--json FILE] [--only PART]
+# --quick takes below four minutes. A noisy machine shows in the floor as well: read the ratios.
+set -euo pipefail
+here=$PWD
+cd "$(dirname "$0")/../.."
+.ci/packages build
+build=.build/bench
+args=()
+while [ $# -gt 0 ]; do
+  case "$1" in
+    --json) args+=(--json "$(cd "$here" && realpath -m "$2")"); shift ;;
+    *) args+=("$1") ;;
+  esac
+  shift
+done
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+echo "building ..." >&2
+if ! { cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DPLCHOST_TESTS=OFF && cmake --build "$build"; } >"$log" 2>&1; then
+  tail -n 60 "$log" >&2
+  exit 1
+fi
+exec "$build/bin/plchost-bench" "${args[@]}"
