@@ -1,0 +1,70 @@
+# For the system tests: a cell of its own (run directory, pool, DDS domain) and the user's commands.
+# Sourced with BIN (the programs) and APPLICATIONS set; ends everything that it started.
+set -euo pipefail
+
+cell=$(mktemp -d "${TMPDIR:-/tmp}/plchost-system.XXXXXX")
+pool=plchost-system-$$
+managers=()
+others=()
+
+# A domain that no other test has: above the ports that the kernel gives to clients.
+for domain in $(seq 215 230); do
+  exec {domain_lock}>"${TMPDIR:-/tmp}/plchost-test-domain-$domain.lock"
+  flock -n "$domain_lock" && break
+  exec {domain_lock}>&-
+  domain=
+done
+[ -n "$domain" ] || { echo "no DDS domain is free for this test" >&2; exit 1; }
+export PLCHOST_DOMAIN=$domain
+
+fail() {
+  echo "FAILED: $*" >&2
+  for log in "$cell"/*.log; do echo "--- $log" >&2; tail -n 40 "$log" >&2; done
+  exit 1
+}
+
+clean_up() {
+  local pid
+  for pid in "${others[@]}"; do kill -KILL "$pid" 2>/dev/null || true; done
+  for pid in "${managers[@]}"; do kill -TERM "$pid" 2>/dev/null || true; done
+  for pid in "${managers[@]}"; do wait "$pid" 2>/dev/null || true; done
+  rm -rf "$cell"
+}
+trap clean_up EXIT
+
+plcctl() { "$BIN/plcctl" --timeout 10 "$@"; }
+
+# start_manager HOST: "$cell/HOST.toml" was written before
+start_manager() {
+  "$BIN/plchostd" --config "$cell/$1.toml" 2>>"$cell/$1.log" &
+  managers+=($!)
+}
+
+# instance NAME FIELD, task INSTANCE/TASK FIELD
+instance() { plcctl list instances --json | jq -r ".[] | select(.name == \"$1\") | .$2"; }
+task() { plcctl list tasks --json | jq -r ".[] | select(.instance == \"${1%/*}\" and .task == \"${1#*/}\") | .$2"; }
+
+# until_true SECONDS COMMAND...
+until_true() {
+  local end=$((SECONDS + $1))
+  shift
+  until "$@" >/dev/null 2>&1; do
+    [ "$SECONDS" -lt "$end" ] || fail "did not happen in time: $*"
+    sleep 0.05
+  done
+}
+is() { [ "$1" = "$2" ]; }
+state_is() { [ "$(instance "$1" state)" = "$2" ]; }
+
+# refused TEXT COMMAND...: the command fails with exit code 1 and says TEXT
+refused() {
+  local text=$1 output code=0
+  shift
+  output=$("$@" 2>&1) || code=$?
+  [ "$code" -eq 1 ] || fail "exit code $code instead of 1: $* ($output)"
+  grep -qF -- "$text" <<<"$output" || fail "'$text' is not in what '$*' says: $output"
+}
+
+nothing_left() {
+  if ls /dev/shm | grep -q "^$pool"; then fail "left in /dev/shm: $(ls /dev/shm | grep "^$pool")"; fi
+}

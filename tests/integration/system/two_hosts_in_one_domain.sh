@@ -1,0 +1,44 @@
+#!/usr/bin/env bash
+# Two managers, one DDS domain: both are seen, each is addressed by name.
+. "$(dirname "$0")/common.sh"
+
+core=$(taskset -cp $$ | sed 's/.*: //' | grep -oE '^[0-9]+')
+for host in north south; do
+  cat >"$cell/$host.toml" <<EOF
+[host]
+name = "$host"
+dds_domain = $PLCHOST_DOMAIN
+run_directory = "$cell/$host"
+pool = "$pool-$host"
+cores = [$core]
+[[instance]]
+name = "packer1"
+core = $core
+scheduler = "CmpScheduleTimer"
+application = "$APPLICATIONS/packer.so"
+EOF
+  start_manager "$host"
+done
+both_running() { [ "$(plcctl list instances --json | jq '[.[] | select(.state == "running")] | length')" = 2 ]; }
+until_true 20 both_running
+is "$(plcctl list hosts --json | jq -r '[.[].host // .[].name] | unique | sort | join(",")')" north,south || fail "two hosts"
+
+cycles() { plcctl list tasks --json | jq -r ".[] | select(.host == \"$1\" and .task == \"Pack\") | .cycles"; }
+before_north=$(cycles north)
+before_south=$(cycles south)
+refused "south" plcctl post event packer1/product
+plcctl --host south post event packer1/product --count 50
+south_ran() { [ "$(cycles south)" -ge $((before_south + 50)) ]; }
+until_true 10 south_ran
+is "$(cycles north)" "$before_north" || fail "the post reached the wrong host"
+
+plcctl --host north stop instance packer1
+is "$(plcctl list instances --json | jq -r '.[] | select(.host == "north") | .state')" stopped || fail "north runs"
+is "$(plcctl list instances --json | jq -r '.[] | select(.host == "south") | .state')" running || fail "south was stopped"
+
+kill -TERM "${managers[0]}"
+wait "${managers[0]}" || fail "north ended with $?"
+plcctl --host south list tasks >/dev/null || fail "south does not answer when north is gone"
+kill -TERM "${managers[1]}"
+wait "${managers[1]}" || fail "south ended with $?"
+nothing_left
