@@ -39,7 +39,7 @@ class Seqlock {
       std::atomic_thread_fence(std::memory_order_acquire);
       if (sequence_.load(std::memory_order_relaxed) != before) continue;
       T value;
-      std::memcpy(&value, words.data(), sizeof(T));
+      std::memcpy(static_cast<void*>(&value), words.data(), sizeof(T));
       return value;
     }
     return std::nullopt;

@@ -62,9 +62,11 @@ struct HostPageLayout {
 /// The manager's end.
 class HostPageWriter {
  public:
+  /// Goes on with the page of an earlier manager if there is one, so that readers need not open it anew.
   [[nodiscard]] static Result<HostPageWriter> create(std::string_view pool);
+  static void remove(std::string_view pool) noexcept;
   void write_host(const HostStatus& status) noexcept;
-  /// `index` < kMaxInstances, and < the instance_count written with the host.
+  /// `index` < the instance_count written with the host, which is at most kMaxInstances.
   void write_instance(std::uint32_t index, const InstanceStatus& status) noexcept;
 
  private:
@@ -78,6 +80,7 @@ class HostPageReader {
   /// not_found: no manager has made it yet. corrupt: not such a page.
   [[nodiscard]] static Result<HostPageReader> open(std::string_view pool);
   [[nodiscard]] std::uint64_t changes() const noexcept;
+  /// Nothing if the writer was in the way (try again later), or nothing valid was written yet.
   [[nodiscard]] std::optional<HostStatus> host() const noexcept;
   [[nodiscard]] std::optional<InstanceStatus> instance(std::uint32_t index) const noexcept;
 

@@ -1,1 +1,153 @@
 #include "shm/pool/instance_page.hpp"
+
+#include <cassert>
+#include <cstddef>
+#include <new>
+
+#include <fmt/format.h>
+
+namespace plchost {
+
+namespace {
+
+constexpr std::uint64_t kMagic = 0x67617074'736e6970;  // "pinstpag"
+/// 1: first.
+constexpr std::uint32_t kVersion = 1;
+constexpr std::size_t kTasksOffset = (sizeof(InstancePageLayout) + 63) / 64 * 64;
+
+static_assert(offsetof(InstancePageLayout, version) == 8 && offsetof(InstancePageLayout, size) == 16);
+static_assert(sizeof(TaskIdentity) == 120 && alignof(TaskSlot) <= 64);
+
+std::size_t size_for(std::size_t task_count) noexcept {
+  return kTasksOffset + task_count * sizeof(TaskSlot);
+}
+
+InstancePageLayout& layout_of(const MemoryFile& memory) noexcept {
+  return *reinterpret_cast<InstancePageLayout*>(memory.bytes().data());
+}
+
+TaskSlot& slot_of(const MemoryFile& memory, std::uint32_t index) noexcept {
+  return reinterpret_cast<TaskSlot*>(memory.bytes().data() + kTasksOffset)[index];
+}
+
+Result<void> fill(std::span<std::byte> bytes, std::span<const TaskIdentity> tasks) {
+  auto* const page = new (bytes.data()) InstancePageLayout;
+  page->version = kVersion;
+  page->task_count = static_cast<std::uint32_t>(tasks.size());
+  page->size = bytes.size();
+  auto* place = bytes.data() + kTasksOffset;
+  for (const TaskIdentity& identity : tasks) {
+    auto* const slot = new (place) TaskSlot;
+    slot->identity = identity;
+    place += sizeof(TaskSlot);
+  }
+  page->magic = kMagic;
+  return {};
+}
+
+}  // namespace
+
+std::string_view to_string(PageTaskKind kind) noexcept {
+  switch (kind) {
+    case PageTaskKind::cyclic:
+      return "cyclic";
+    case PageTaskKind::event:
+      return "event";
+    case PageTaskKind::external:
+      return "external event";
+    case PageTaskKind::freewheeling:
+      return "freewheeling";
+  }
+  return "unknown";
+}
+
+std::string_view to_string(PageTaskState state) noexcept {
+  switch (state) {
+    case PageTaskState::created:
+      return "created";
+    case PageTaskState::running:
+      return "running";
+    case PageTaskState::stopped:
+      return "stopped";
+    case PageTaskState::exception:
+      return "exception";
+  }
+  return "unknown";
+}
+
+std::string instance_page_name(std::string_view pool, std::string_view instance) {
+  return fmt::format("{}.instance.{}", pool, instance);
+}
+
+Result<InstancePage> InstancePage::create(std::string_view pool, std::string_view instance,
+                                          std::span<const TaskIdentity> tasks) {
+  if (tasks.size() > kMaxTasks) {
+    return failure(
+        ErrorCode::invalid_argument,
+        fmt::format("instance '{}' has {} tasks; at most {} are allowed", instance, tasks.size(), kMaxTasks));
+  }
+  auto memory = MemoryFile::replace(instance_page_name(pool, instance), size_for(tasks.size()),
+                                    [&](std::span<std::byte> bytes) { return fill(bytes, tasks); });
+  if (!memory) return std::unexpected(memory.error());
+  return InstancePage(std::move(*memory), static_cast<std::uint32_t>(tasks.size()));
+}
+
+void InstancePage::remove(std::string_view pool, std::string_view instance) noexcept {
+  MemoryFile::remove(instance_page_name(pool, instance));
+}
+
+void InstancePage::write_runtime(const InstanceRuntime& runtime) noexcept {
+  layout_of(memory_).runtime.write(runtime);
+}
+
+TaskSlot& InstancePage::task(std::uint32_t index) noexcept {
+  assert(index < task_count_);
+  return slot_of(memory_, index);
+}
+
+Result<InstancePageReader> InstancePageReader::open(std::string_view pool, std::string_view instance) {
+  const std::string name = instance_page_name(pool, instance);
+  auto memory = MemoryFile::open(name, sizeof(InstancePageLayout), MemoryFile::Access::read_only);
+  if (!memory) return std::unexpected(memory.error());
+  const InstancePageLayout& page = layout_of(*memory);
+  // The name is given to complete pages only, so the magic is there from the start.
+  if (page.magic != kMagic) {
+    return failure(ErrorCode::corrupt,
+                   fmt::format("shared memory '{}' is not the page of an instance", name));
+  }
+  if (page.version != kVersion) {
+    return failure(ErrorCode::corrupt, fmt::format("page '{}' has version {}; version {} is needed", name,
+                                                   page.version, kVersion));
+  }
+  const std::uint32_t count = page.task_count;
+  if (count > kMaxTasks || page.size != size_for(count) || memory->bytes().size() != size_for(count)) {
+    return failure(ErrorCode::corrupt,
+                   fmt::format("page '{}' says {} tasks; this does not fit its size of {} bytes", name, count,
+                               memory->bytes().size()));
+  }
+  return InstancePageReader(std::move(*memory), count);
+}
+
+std::optional<InstanceRuntime> InstancePageReader::runtime() const noexcept {
+  return layout_of(memory_).runtime.read();
+}
+
+std::optional<TaskSnapshot> InstancePageReader::task(std::uint32_t index) const noexcept {
+  if (index >= task_count_) return std::nullopt;
+  const TaskSlot& slot = slot_of(memory_, index);
+  const auto counters = slot.statistics.counters.read();
+  const auto state = static_cast<PageTaskState>(slot.state.load(std::memory_order_acquire));
+  const bool valid = state <= PageTaskState::exception && slot.identity.kind <= PageTaskKind::freewheeling;
+  if (!counters || !valid) return std::nullopt;
+  return TaskSnapshot{.identity = slot.identity,
+                      .state = state,
+                      .counters = *counters,
+                      .latency_p50 = slot.statistics.latency.percentile(0.5),
+                      .latency_p99 = slot.statistics.latency.percentile(0.99)};
+}
+
+std::uint64_t InstancePageReader::task_sequence(std::uint32_t index) const noexcept {
+  return index < task_count_ ? slot_of(memory_, index).statistics.counters.sequence() : 0;
+}
+
+}  // namespace plchost

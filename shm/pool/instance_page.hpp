@@ -65,17 +65,21 @@ struct InstancePageLayout {
 /// The instance's end: a fresh page for each life of the process, made when its tasks are known.
 class InstancePage {
  public:
+  /// invalid_argument: more than kMaxTasks tasks.
   [[nodiscard]] static Result<InstancePage> create(std::string_view pool, std::string_view instance,
                                                    std::span<const TaskIdentity> tasks);
   static void remove(std::string_view pool, std::string_view instance) noexcept;
 
   void write_runtime(const InstanceRuntime& runtime) noexcept;
+  /// `index` < task_count().
   [[nodiscard]] TaskSlot& task(std::uint32_t index) noexcept;
-  [[nodiscard]] std::uint32_t task_count() const noexcept;
+  [[nodiscard]] std::uint32_t task_count() const noexcept { return task_count_; }
 
  private:
-  explicit InstancePage(MemoryFile memory) noexcept : memory_(std::move(memory)) {}
+  InstancePage(MemoryFile memory, std::uint32_t count) noexcept
+      : memory_(std::move(memory)), task_count_(count) {}
   MemoryFile memory_;
+  std::uint32_t task_count_;  // a stranger may change the page's own
 };
 
 /// One task as a reader sees it.
@@ -94,7 +98,7 @@ class InstancePageReader {
   /// not_found: the instance has made none. corrupt: not such a page, or of impossible size.
   [[nodiscard]] static Result<InstancePageReader> open(std::string_view pool, std::string_view instance);
   [[nodiscard]] std::optional<InstanceRuntime> runtime() const noexcept;
-  [[nodiscard]] std::uint32_t task_count() const noexcept;
+  [[nodiscard]] std::uint32_t task_count() const noexcept { return task_count_; }
   /// Nothing if the writer was in the way; try again later.
   [[nodiscard]] std::optional<TaskSnapshot> task(std::uint32_t index) const noexcept;
   /// Changes when the task ran: readers that publish look at this first.

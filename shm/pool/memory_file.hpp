@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <span>
 #include <string>
 
@@ -12,6 +13,9 @@ namespace plchost {
 class MemoryFile {
  public:
   enum class Access : bool { read_only, read_write };
+  /// Writes the first contents. Nobody else sees the memory before it has returned: the name is given last,
+  /// and not at all if this fails.
+  using Fill = std::function<Result<void>(std::span<std::byte>)>;
 
   MemoryFile() noexcept = default;
   MemoryFile(MemoryFile&& other) noexcept;
@@ -22,13 +26,17 @@ class MemoryFile {
 
   /// Makes a new one, zero-filled and with its memory really there (a host without memory says so now and not
   /// with SIGBUS in a cycle). Takes the place of an old one of that name, whose users keep their mapping.
-  /// `name`: one path component below /dev/shm. Mode 0660 whatever the umask.
-  [[nodiscard]] static Result<MemoryFile> replace(const std::string& name, std::size_t size);
+  /// `name`: one path component below /dev/shm. Mode 0660 whatever the umask. A process that dies in here
+  /// leaves nothing behind.
+  [[nodiscard]] static Result<MemoryFile> replace(const std::string& name, std::size_t size,
+                                                  const Fill& fill = {});
 
   /// The same, but already_exists if the name is taken.
-  [[nodiscard]] static Result<MemoryFile> create(const std::string& name, std::size_t size);
+  [[nodiscard]] static Result<MemoryFile> create(const std::string& name, std::size_t size,
+                                                 const Fill& fill = {});
 
-  /// Maps an existing one, whole. not_found: no such name. corrupt: smaller than `at_least` bytes.
+  /// Maps an existing one, whole. not_found: no such name. corrupt: smaller than `at_least` bytes, or not a
+  /// plain file.
   [[nodiscard]] static Result<MemoryFile> open(const std::string& name, std::size_t at_least, Access access);
 
   /// Removes the name if it is there; who has it mapped keeps it.
@@ -38,6 +46,7 @@ class MemoryFile {
   [[nodiscard]] explicit operator bool() const noexcept { return !bytes_.empty(); }
 
  private:
+  static Result<MemoryFile> make(const std::string& name, std::size_t size, const Fill& fill, bool take_over);
   explicit MemoryFile(std::span<std::byte> bytes) noexcept : bytes_(bytes) {}
   std::span<std::byte> bytes_;
 };

@@ -12,8 +12,12 @@
 
 namespace plchost {
 
-struct PoolHeader;
 struct ObjectEntry;
+class PoolLock;
+class PoolTable;
+
+inline constexpr std::uint32_t kMinObjects = 16;
+inline constexpr std::uint32_t kMaxObjects = 1'000'000;
 
 /// The seed's objTabType_t, with the same numbers plus one for a free entry.
 enum class ObjectType : std::uint32_t { memory = 0, semaphore = 1, event = 2, free = 3 };
@@ -36,11 +40,13 @@ class PoolEvent {
 
   /// Whether it may be posted to. A task may be bound to an event that is not registered yet.
   [[nodiscard]] bool registered() const noexcept;
-  void set_registered(bool registered) const noexcept;
+  /// False, and nothing is done, if the handle is not valid (any more).
+  bool set_registered(bool registered) const noexcept;
 
   /// How many tasks wait for it: kept by their instance, so that a poster can be told.
   [[nodiscard]] std::uint32_t bound_tasks() const noexcept;
-  void set_bound_tasks(std::uint32_t count) const noexcept;
+  /// False, and nothing is done, if the handle is not valid (any more).
+  bool set_bound_tasks(std::uint32_t count) const noexcept;
 
   /// The counter itself, for the task that waits on it. Only of a valid handle.
   [[nodiscard]] CountedEvent& counted() const noexcept;
@@ -50,8 +56,9 @@ class PoolEvent {
 
  private:
   friend class ObjectPool;
-  PoolEvent(ObjectEntry& entry, std::uint32_t generation) noexcept
-      : entry_(&entry), generation_(generation) {}
+  explicit PoolEvent(ObjectEntry& entry) noexcept;
+  bool change_binding(std::uint64_t clear, std::uint64_t set) const noexcept;
+
   ObjectEntry* entry_ = nullptr;
   std::uint32_t generation_ = 0;
 };
@@ -66,7 +73,8 @@ struct ObjectInfo {
 };
 
 struct PoolOptions {
-  std::uint32_t max_objects = 4096;  ///< 16 to 1,000,000
+  /// kMinObjects to kMaxObjects. What counts is the number that the pool was made with.
+  std::uint32_t max_objects = 4096;
 };
 
 /// The global table of named objects in shared memory (vxworks_specific, "Global object pools"). Made by the
@@ -75,7 +83,8 @@ struct PoolOptions {
 /// index if its owner died. Posting and waiting never do.
 class ObjectPool {
  public:
-  /// Makes the pool, or opens it when it is there already. `name` is its name below /dev/shm.
+  /// Makes the pool, or opens it when it is there already; several processes may do so at once. `name` is its
+  /// name below /dev/shm.
   /// corrupt: there is something of that name that is not a pool of this version.
   [[nodiscard]] static Result<ObjectPool> create(const std::string& name, const PoolOptions& options = {});
   /// not_found: no pool of that name. Waits a moment for one that is just being made.
@@ -85,22 +94,30 @@ class ObjectPool {
   ObjectPool(ObjectPool&&) noexcept = default;
   ObjectPool& operator=(ObjectPool&&) noexcept = default;
 
-  /// The event of that name, made if it is not there (then neither registered nor bound). full: no room.
-  /// already_exists: the name is taken by an object of another type.
+  /// The event of that name (1 to kMaxObjectName printable characters), made if it is not there, then neither
+  /// registered nor bound. When the table is full, it takes the place of one that is neither; full: there is
+  /// none. already_exists: the name is taken by an object of another type.
   [[nodiscard]] Result<PoolEvent> create_event(std::string_view name);
-  /// not_found: no such object.
+  /// not_found: no such object. already_exists: it is of another type.
   [[nodiscard]] Result<PoolEvent> open_event(std::string_view name) const;
 
   /// All objects that are in use: events that are registered or bound. Unordered.
+  /// Nothing if the pool cannot be locked.
   [[nodiscard]] std::vector<ObjectInfo> list() const;
 
   [[nodiscard]] const std::string& name() const noexcept { return name_; }
 
  private:
-  ObjectPool(std::string name, MemoryFile memory) noexcept
-      : name_(std::move(name)), memory_(std::move(memory)) {}
+  ObjectPool(std::string name, MemoryFile memory, std::uint32_t max_objects) noexcept
+      : name_(std::move(name)), memory_(std::move(memory)), max_objects_(max_objects) {}
+  static Result<ObjectPool> attach_now(const std::string& name);
+  static Result<ObjectPool> attach_patiently(const std::string& name);
+  [[nodiscard]] PoolTable table() const noexcept;
+  [[nodiscard]] Result<PoolLock> lock(PoolTable& table) const;
+
   std::string name_;
   MemoryFile memory_;
+  std::uint32_t max_objects_;  // as validated at attach: a stranger may change the pool's own
 };
 
 }  // namespace plchost
