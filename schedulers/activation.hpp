@@ -7,7 +7,10 @@
 
 namespace plchost {
 
-/// Why and for when a task runs one cycle.
+/// Why and for when a task runs one cycle. What `release` is depends on the kind of the task: the point of
+/// the grid (cyclic), the end of its sleep (freewheeling), the poll that saw the edge (event), or the moment
+/// at which the task first saw the post in the event's counter (external; all posts seen at once share it, so
+/// those that queue behind others show their wait as latency).
 struct Activation {
   TimePoint release;              ///< planned; latency is measured from here
   std::uint64_t lost_cycles = 0;  ///< releases that passed since the last activation without a cycle

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 
+#include "shm/base/counted_event.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
 
@@ -13,9 +14,11 @@ namespace plchost {
 class PeriodicTimer {
  public:
   virtual ~PeriodicTimer() = default;
-  /// Goes off at `first` (absolute) and then every `period`. Set-up, or the thread that waits.
-  [[nodiscard]] virtual Result<void> start(TimePoint first, Duration period) = 0;
-  /// Sleeps until it went off; how often since the last call. 0: interrupted. Real-time.
+  /// Goes off at `first` (absolute; at once if that has passed) and then every `period` (> 0). Only the
+  /// thread that waits. Real-time.
+  virtual void start(TimePoint first, Duration period) noexcept = 0;
+  /// Sleeps until it went off; how often since the last call. May return early: look at the clock. 0:
+  /// interrupted; the timer has left its grid and is to be started again. Real-time.
   [[nodiscard]] virtual std::uint64_t wait() noexcept = 0;
   /// Makes wait() return 0, the one that sleeps now or the next one. Any thread.
   virtual void interrupt() noexcept = 0;
@@ -35,15 +38,23 @@ class Clock {
   /// Burns the processor until `deadline`. Real-time; the caller bounds how far ahead that is.
   virtual void spin_until(TimePoint deadline) noexcept = 0;
   [[nodiscard]] virtual Result<std::unique_ptr<PeriodicTimer>> make_periodic_timer() = 0;
+  /// Sleeps on the event's own word while it is as `seen`. May return early. Real-time.
+  virtual void wait(CountedEvent& event, CountedEvent::Snapshot seen) noexcept = 0;
+
+  /// A thread that sleeps by this clock is about to begin (called by who starts it), or ends (by itself).
+  /// Only a clock that is driven by hand needs to know.
+  virtual void thread_begins() noexcept {}
+  virtual void thread_ends() noexcept {}
 };
 
-/// CLOCK_MONOTONIC, futexes and timerfd.
+/// CLOCK_MONOTONIC, futexes private to the process, and timerfd.
 class LinuxClock final : public Clock {
  public:
   [[nodiscard]] TimePoint now() const noexcept override { return MonotonicClock::now(); }
   void wait(const std::atomic<std::uint32_t>& word, std::uint32_t expected,
             TimePoint deadline) noexcept override;
   void wake(const std::atomic<std::uint32_t>& word) noexcept override;
+  void wait(CountedEvent& event, CountedEvent::Snapshot seen) noexcept override { event.wait(seen); }
   void spin_until(TimePoint deadline) noexcept override;
   [[nodiscard]] Result<std::unique_ptr<PeriodicTimer>> make_periodic_timer() override;
 };

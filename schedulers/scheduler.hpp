@@ -15,6 +15,11 @@ namespace plchost {
 
 class Task;
 
+/// Above it nothing would be left for other tasks.
+inline constexpr int kMaxProcessorLoad = 99;
+/// More than any wake-up latency that spinning is an answer to.
+inline constexpr Duration kMaxSpinAhead = std::chrono::milliseconds(1);
+
 enum class TickSourceKind : std::uint8_t { system, task };
 
 /// The settings of [CmpSchedule] and [SysTimer], already validated by whoever read them.
@@ -44,7 +49,7 @@ struct SchedulerCapabilities {
 };
 
 /// Policy only: decides when which task is activated. Threads, statistics and the switch are TaskSet's.
-/// Life: source_for() for each task, start(), stop(); then it is done with.
+/// Life: source_for() for each task, prepare(), start(), stop(); then it is done with.
 class Scheduler {
  public:
   virtual ~Scheduler() = default;
@@ -52,9 +57,14 @@ class Scheduler {
   [[nodiscard]] virtual SchedulerCapabilities capabilities() const noexcept = 0;
   /// Set-up. The task outlives the source, the source does not outlive the scheduler.
   [[nodiscard]] virtual Result<std::unique_ptr<ActivationSource>> source_for(Task& task) = 0;
-  /// Set-up. Cyclic tasks that have run keep their grid; the others start theirs at `origin`.
-  [[nodiscard]] virtual Result<void> start(TimePoint origin) = 0;
-  /// Ends the scheduler's own threads. No source is waited on any more.
+  /// Set-up, after the last source_for(). Makes everything that can fail to be made, its threads above all;
+  /// nothing is released yet. So a switch that cannot succeed fails while the scheduler before still runs.
+  [[nodiscard]] virtual Result<void> prepare() = 0;
+  /// Set-up. Ticks and polls lie on the grid origin + n * scheduler_interval. Grids of tasks are the tasks'
+  /// own.
+  virtual void start(TimePoint origin) noexcept = 0;
+  /// Ends the scheduler's own threads; after it, nothing of a task is touched any more. Sources may still be
+  /// waited on and are then only left by interrupt(). Set-up; may be called again, and without a start().
   virtual void stop() noexcept = 0;
 };
 
@@ -63,6 +73,9 @@ struct SchedulerEntry {
   std::string_view name;
   std::unique_ptr<Scheduler> (*make)(const SchedulerContext&);
 };
+
+/// invalid_argument: a value is out of its range; the text says which and what is allowed.
+[[nodiscard]] Result<void> check_settings(const SchedulerSettings& settings);
 
 [[nodiscard]] std::span<const SchedulerEntry> all_schedulers() noexcept;
 /// "CmpSchedule, CmpScheduleTimer, CmpScheduleOneShot"

@@ -20,6 +20,8 @@ enum class LatePolicy : std::uint8_t { next, asap };
 /// IEC priorities: 0 (highest) to 31; 0..15 are SCHED_FIFO, 16..31 SCHED_OTHER.
 inline constexpr int kLowestIecPriority = 31;
 inline constexpr int kLowestRealTimeIecPriority = 15;
+/// What a task's interval may be at most: the seed's largest, 2^32 ms, is just below.
+inline constexpr Duration kMaxInterval = std::chrono::days(50);
 
 /// Which part of SCHED_FIFO's range an instance uses, so that of two instances on one core one goes first.
 ///            supervision  tick   IEC 0..15
@@ -39,11 +41,12 @@ struct TaskConfig {
   std::string name;
   TaskKind kind = TaskKind::cyclic;
   int iec_priority = 0;
-  Duration interval{};                   ///< cyclic only: > 0
-  LatePolicy late = LatePolicy::next;    ///< cyclic only
-  std::string external_event;            ///< external only: the event's name
-  std::function<bool()> event_variable;  ///< event only: reads the BOOL; called by the scheduler's poller
-  std::function<void()> entry;           ///< one cycle; real-time
+  Duration interval{};                 ///< cyclic only: > 0
+  LatePolicy late = LatePolicy::next;  ///< cyclic only
+  std::string external_event;          ///< external only: the event's name
+  std::function<bool()>
+      event_variable;  ///< event only: reads the BOOL; called by the scheduler's poller, and by start()
+  std::function<void()> entry;  ///< one cycle; real-time
   /// Called on the task's thread after each cycle with the new counters; real-time. May be empty.
   std::function<void(const TaskCounters&)> after_cycle;
 };

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <string>
@@ -7,7 +8,9 @@
 #include <vector>
 
 #include "schedulers/scheduler.hpp"
+#include "schedulers/task.hpp"
 #include "schedulers/task_config.hpp"
+#include "schedulers/task_thread.hpp"
 #include "shm/base/counted_event.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/task_statistics.hpp"
@@ -16,39 +19,90 @@ namespace plchost {
 
 /// Where tasks find what lies outside: given by the instance (the pool), or by a test.
 struct TaskEnvironment {
-  /// The counter behind an external event's name. Called once per external task in create().
+  /// The counter behind an external event's name. Called once per external task in create(). It outlives the
+  /// TaskSet.
   std::function<Result<CountedEvent*>(std::string_view event)> find_event;
   /// Zeroed memory for the statistics of task number `index`. It outlives the TaskSet.
   std::function<TaskStatistics&(std::size_t index)> statistics;
-  /// Tells that a task's thread runs cycles (true) or is parked (false). May be empty. Soft thread.
+  /// Tells that a task's thread runs cycles (true) or is parked (false). May be empty. Called by the control
+  /// thread, from within start(), stop() and switch_to().
   std::function<void(std::size_t index, bool running)> state_changed;
+  /// For development, and tests in places without the right to SCHED_FIFO: all threads run as SCHED_OTHER, so
+  /// neither priorities nor times hold.
+  bool allow_unprivileged = false;
 };
 
 /// The tasks of one application with their threads, under one scheduler that can be exchanged while they run.
 /// All functions are set-up, from one control thread.
 class TaskSet {
  public:
+  /// Between start() and the first release, so that all threads wait when it comes.
+  static constexpr Duration kStartLead = std::chrono::milliseconds(2);
+  /// How long start() and switch_to() wait for tasks to take their new source. A task whose cycle takes
+  /// longer takes it when the cycle ends.
+  static constexpr Duration kSwitchPatience = std::chrono::seconds(1);
+
   /// Validates all tasks (names unique, priorities 0..31, an interval where one is needed ...), makes them,
   /// and starts their threads parked. The error names the task and what is allowed.
   [[nodiscard]] static Result<std::unique_ptr<TaskSet>> create(Clock& clock, PriorityBand band,
                                                                std::vector<TaskConfig> tasks,
                                                                TaskEnvironment environment);
-  virtual ~TaskSet() = default;
+  TaskSet(const TaskSet&) = delete;
+  TaskSet& operator=(const TaskSet&) = delete;
+  /// Stops everything; waits for the cycles that are running, however long they take.
+  ~TaskSet();
 
-  /// Releases the tasks under the scheduler of that name. wrong_state: they run already. External events
-  /// posted while the tasks were stopped are not run.
-  [[nodiscard]] virtual Result<void> start(std::string_view scheduler, const SchedulerSettings& settings) = 0;
+  /// Releases the tasks under the scheduler of that name. wrong_state: they run already, or one of them has
+  /// not come back since stop(). External events posted while the tasks were stopped are not run, nor are
+  /// edges of event variables: the level at the start counts as seen.
+  [[nodiscard]] Result<void> start(std::string_view scheduler, const SchedulerSettings& settings);
   /// Parks all tasks at the end of their cycles. timed_out: names the tasks that did not come back within
-  /// `limit`; they are parked when they do.
-  [[nodiscard]] virtual Result<void> stop(Duration limit) = 0;
+  /// `limit` (real time); they are parked when they do. wrong_state: they do not run.
+  [[nodiscard]] Result<void> stop(Duration limit);
   /// Exchanges the scheduler. Running tasks keep their grid, their backlog of events, counters and variables.
-  /// On failure they run on under the old one.
-  [[nodiscard]] virtual Result<void> switch_to(std::string_view scheduler,
-                                               const SchedulerSettings& settings) = 0;
+  /// On failure they run on under the old one. wrong_state: they do not run.
+  [[nodiscard]] Result<void> switch_to(std::string_view scheduler, const SchedulerSettings& settings);
 
-  [[nodiscard]] virtual bool running() const noexcept = 0;
-  /// Of the scheduler in use, or empty before the first start.
-  [[nodiscard]] virtual std::string_view scheduler_name() const noexcept = 0;
+  [[nodiscard]] bool running() const noexcept { return running_; }
+  /// Of the scheduler in use, or of the last one; empty before the first start.
+  [[nodiscard]] std::string_view scheduler_name() const noexcept { return scheduler_name_; }
+
+ private:
+  /// A scheduler and what it made for the tasks, in their order.
+  struct Arrangement {
+    Arrangement() = default;
+    Arrangement(const Arrangement&) = delete;
+    Arrangement& operator=(const Arrangement&) = delete;
+    // The scheduler's threads use the sources.
+    ~Arrangement() {
+      if (scheduler) scheduler->stop();
+    }
+    std::unique_ptr<Scheduler> scheduler;
+    std::vector<std::unique_ptr<ActivationSource>> sources;
+  };
+
+  TaskSet(Clock& clock, PriorityBand band, TaskEnvironment environment);
+  [[nodiscard]] Result<void> add(TaskConfig config);
+  [[nodiscard]] Result<std::unique_ptr<Arrangement>> arrange(std::string_view name,
+                                                             const SchedulerSettings& settings);
+  void hand_out_sources();
+  std::vector<std::string_view> wait_until_settled(TimePoint deadline);
+
+  Clock& clock_;
+  PriorityBand band_;
+  TaskEnvironment environment_;
+  bool running_ = false;
+  TimePoint origin_{};  // of all grids, until the next start()
+  std::string_view scheduler_name_;
+  std::vector<std::unique_ptr<Task>> tasks_;
+  std::vector<bool> reported_running_;
+  std::unique_ptr<Arrangement> active_;
+  std::vector<std::unique_ptr<Arrangement>>
+      retired_;  // a task in a long cycle may still hold a source of these
+  std::vector<std::unique_ptr<TaskThread>> threads_;  // last: they use all of the above
 };
+
+/// invalid_argument: the task that is not valid, and what is allowed.
+[[nodiscard]] Result<void> check_tasks(const std::vector<TaskConfig>& tasks);
 
 }  // namespace plchost

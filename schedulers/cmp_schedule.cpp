@@ -1,0 +1,43 @@
+#include "schedulers/cmp_schedule.hpp"
+
+#include "schedulers/external_event_source.hpp"
+
+namespace plchost {
+
+CmpSchedule::CmpSchedule(const SchedulerContext& context)
+    : clock_(context.clock),
+      settings_(context.settings),
+      table_(context.clock),
+      poller_(context.clock),
+      ticker_(context, "tick", [this](TimePoint tick) { on_tick(tick); }) {}
+
+Result<std::unique_ptr<ActivationSource>> CmpSchedule::source_for(Task& task) {
+  switch (task.config().kind) {
+    case TaskKind::event:
+      return poller_.add(task);
+    case TaskKind::external:
+      return std::make_unique<ExternalEventSource>(clock_, task, settings_.max_event_backlog);
+    case TaskKind::cyclic:
+    case TaskKind::freewheeling:
+      break;
+  }
+  return table_.add(task, FreewheelRule(settings_));
+}
+
+void CmpSchedule::start(TimePoint origin) noexcept {
+  // What was due before the first tick, while a switch was under way, is only late and runs at once.
+  const TimePoint first = ticker_.first_tick(origin);
+  table_.start(first - settings_.scheduler_interval);
+  ticker_.start(first);
+}
+
+void CmpSchedule::on_tick(TimePoint tick) noexcept {
+  table_.on_tick(tick);
+  poller_.poll(tick);
+}
+
+std::unique_ptr<Scheduler> make_cmp_schedule(const SchedulerContext& context) {
+  return std::make_unique<CmpSchedule>(context);
+}
+
+}  // namespace plchost

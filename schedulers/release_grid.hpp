@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+
+#include "schedulers/task_config.hpp"
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+/// The releases of a cyclic task: planned from the release before, never from "now". Pure.
+class ReleaseGrid {
+ public:
+  struct Plan {
+    TimePoint release;          ///< the release to run next; in the past if it is already due
+    std::uint64_t lost_cycles;  ///< releases before it that will never run
+  };
+
+  /// The first release is at `origin`. `interval` > 0.
+  ReleaseGrid(TimePoint origin, Duration interval, LatePolicy late) noexcept
+      : next_(origin), interval_(interval), late_(late) {}
+
+  /// What a task runs next that has been ready for it since `ready`. A release that came while it was ready
+  /// runs, however late the wake-up is. Of those that came before, `next` loses all and `asap` all but the
+  /// last.
+  [[nodiscard]] Plan plan(TimePoint ready) const noexcept {
+    if (ready <= next_) return {next_, 0};
+    const Duration behind = ready - next_;
+    const auto lost =
+        late_ == LatePolicy::asap ? behind / interval_ : (behind + interval_ - Duration(1)) / interval_;
+    return {next_ + lost * interval_, static_cast<std::uint64_t>(lost)};
+  }
+
+  /// `release`, which plan() gave, runs.
+  void ran(TimePoint release) noexcept { next_ = release + interval_; }
+
+ private:
+  TimePoint next_;  // neither run nor lost
+  Duration interval_;
+  LatePolicy late_;
+};
+
+}  // namespace plchost

@@ -1,0 +1,38 @@
+#include "schedulers/self_timed_scheduler.hpp"
+
+#include "schedulers/deadline_source.hpp"
+#include "schedulers/external_event_source.hpp"
+
+namespace plchost {
+
+SelfTimedScheduler::SelfTimedScheduler(const SchedulerContext& context)
+    : clock_(context.clock),
+      settings_(context.settings),
+      poller_(context.clock),
+      ticker_(context, "event-poll", [this](TimePoint tick) { poller_.poll(tick); }) {}
+
+Result<std::unique_ptr<ActivationSource>> SelfTimedScheduler::source_for(Task& task) {
+  switch (task.config().kind) {
+    case TaskKind::event:
+      return poller_.add(task);
+    case TaskKind::external:
+      return std::make_unique<ExternalEventSource>(clock_, task, settings_.max_event_backlog);
+    case TaskKind::freewheeling:
+      // Nobody plans with the start of its cycle to the microsecond: it sleeps without a guard.
+      return std::make_unique<DeadlineSource>(clock_, task, FreewheelRule(settings_), Duration::zero());
+    case TaskKind::cyclic:
+      break;
+  }
+  return cyclic_source(task);
+}
+
+Result<void> SelfTimedScheduler::prepare() {
+  if (poller_.empty()) return {};
+  return ticker_.prepare();
+}
+
+void SelfTimedScheduler::start(TimePoint origin) noexcept {
+  if (!poller_.empty()) ticker_.start(ticker_.first_tick(origin));
+}
+
+}  // namespace plchost

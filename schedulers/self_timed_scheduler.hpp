@@ -1,0 +1,31 @@
+#pragma once
+
+#include "schedulers/event_poller.hpp"
+#include "schedulers/ticker.hpp"
+
+namespace plchost {
+
+/// What the schedulers share under which each cyclic and freewheeling task keeps its own time: a thread of
+/// the scheduler's own is there only to poll event variables, and only if there are any.
+class SelfTimedScheduler : public Scheduler {
+ public:
+  explicit SelfTimedScheduler(const SchedulerContext& context);
+
+  [[nodiscard]] Result<std::unique_ptr<ActivationSource>> source_for(Task& task) final;
+  [[nodiscard]] Result<void> prepare() final;
+  void start(TimePoint origin) noexcept final;
+  void stop() noexcept final { ticker_.stop(); }
+
+ protected:
+  [[nodiscard]] virtual Result<std::unique_ptr<ActivationSource>> cyclic_source(const Task& task) = 0;
+  [[nodiscard]] Clock& clock() const noexcept { return clock_; }
+  [[nodiscard]] const SchedulerSettings& settings() const noexcept { return settings_; }
+
+ private:
+  Clock& clock_;
+  SchedulerSettings settings_;
+  EventPoller poller_;
+  Ticker ticker_;  // last: its thread uses the poller
+};
+
+}  // namespace plchost

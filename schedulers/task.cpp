@@ -1,0 +1,102 @@
+#include "schedulers/task.hpp"
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <exception>
+#include <utility>
+
+namespace plchost {
+
+namespace {
+
+[[noreturn]] void end_process(const char* task, const char* what) noexcept {
+  std::fprintf(stderr, "plchost: task '%s': an exception left its cycle: %s\n", task, what);
+  std::terminate();
+}
+
+void run_entry(const TaskConfig& config) noexcept {
+  try {
+    config.entry();
+  } catch (const std::exception& error) {
+    end_process(config.name.c_str(), error.what());
+  } catch (...) {
+    end_process(config.name.c_str(), "not a std::exception");
+  }
+}
+
+// Before begin() it is not used; no grid can have an interval of 0.
+Duration grid_interval(const TaskConfig& config) noexcept {
+  return std::max(config.interval, Duration(1));
+}
+
+}  // namespace
+
+Task::Task(Clock& clock, TaskConfig config, TaskStatistics& statistics, CountedEvent* event) noexcept
+    : clock_(clock),
+      config_(std::move(config)),
+      statistics_(statistics),
+      event_(event),
+      grid_(TimePoint{}, grid_interval(config_), config_.late) {}
+
+void Task::begin(TimePoint origin) {
+  grid_ = ReleaseGrid(origin, grid_interval(config_), config_.late);
+  ready_ = origin;
+  begun_ = false;
+  if (event_ != nullptr) {
+    const std::uint64_t count = event_->count();
+    cursor_ = {.next = count, .seen = count, .seen_at = origin};
+  }
+  if (config_.event_variable) latch_.prime(config_.event_variable());
+}
+
+Activation Task::next_release(const FreewheelRule& rule) const noexcept {
+  if (config_.kind == TaskKind::freewheeling) {
+    const Duration sleep = begun_ ? rule.sleep_after(last_execution_) : Duration::zero();
+    return {.release = ready_ + sleep};
+  }
+  const auto [release, lost_cycles] = grid_.plan(ready_);
+  return {.release = release, .lost_cycles = lost_cycles};
+}
+
+void Task::run_cycle(const Activation& activation) noexcept {
+  const TimePoint start = clock_.now();
+  run_entry(config_);
+  const TimePoint end = clock_.now();
+  grid_.ran(activation.release);
+  ready_ = end;
+  last_execution_ = end - start;
+  record(activation, start, end);
+  if (config_.after_cycle) config_.after_cycle(counters_);
+}
+
+void Task::record(const Activation& activation, TimePoint start, TimePoint end) noexcept {
+  const std::int64_t execution = (end - start).count();
+  const std::int64_t latency = (start - activation.release).count();
+  if (config_.kind == TaskKind::cyclic && begun_) record_jitter(activation, start);
+  counters_.exec_min_ns = counters_.cycles == 0 ? execution : std::min(counters_.exec_min_ns, execution);
+  counters_.exec_max_ns = std::max(counters_.exec_max_ns, execution);
+  counters_.exec_last_ns = execution;
+  counters_.exec_sum_ns += execution;
+  counters_.latency_last_ns = latency;
+  counters_.latency_max_ns = std::max(counters_.latency_max_ns, latency);
+  counters_.release_ns = activation.release.time_since_epoch().count();
+  counters_.spin_sum_ns += activation.spun.count();
+  counters_.lost_cycles += activation.lost_cycles;
+  counters_.lost_events += activation.lost_events;
+  ++counters_.cycles;
+  begun_ = true;
+  last_start_ = start;
+  statistics_.counters.write(counters_);
+  statistics_.latency.record(Duration(latency));
+}
+
+// Lost cycles are counted as such; they are not jitter as well.
+void Task::record_jitter(const Activation& activation, TimePoint start) noexcept {
+  const Duration planned = config_.interval * (static_cast<Duration::rep>(activation.lost_cycles) + 1);
+  const std::int64_t jitter = ((start - last_start_) - planned).count();
+  counters_.jitter_last_ns = jitter;
+  counters_.jitter_max_ns = std::max(counters_.jitter_max_ns, std::abs(jitter));
+}
+
+}  // namespace plchost

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstddef>
+
+#include "schedulers/activation.hpp"
+#include "schedulers/clock.hpp"
+#include "schedulers/event_latch.hpp"
+#include "schedulers/freewheel_rule.hpp"
+#include "schedulers/release_grid.hpp"
+#include "schedulers/task_config.hpp"
+#include "shm/base/counted_event.hpp"
+#include "shm/base/task_statistics.hpp"
+
+namespace plchost {
+
+/// One IEC task: what it runs, its statistics, and all that outlives an exchange of its ActivationSource: the
+/// grid, the place in its external event, the level of its event variable.
+class Task {
+ public:
+  /// `config` is valid; `event` is the counter of config.external_event, null for the other kinds.
+  Task(Clock& clock, TaskConfig config, TaskStatistics& statistics, CountedEvent* event) noexcept;
+
+  [[nodiscard]] const TaskConfig& config() const noexcept { return config_; }
+
+  /// Set-up, while the task is parked: a new grid from `origin` on; what happened while it was parked does
+  /// not count.
+  void begin(TimePoint origin);
+
+  /// What a cyclic or freewheeling task runs next: the same answer until a cycle has run. The task's thread.
+  [[nodiscard]] Activation next_release(const FreewheelRule& rule) const noexcept;
+
+  /// Runs one cycle and records it. An exception out of the application's code ends the process with a
+  /// message, because a control program that is half-way through a cycle cannot go on. The task's thread,
+  /// real-time.
+  void run_cycle(const Activation& activation) noexcept;
+
+  [[nodiscard]] EventLatch& latch() noexcept { return latch_; }
+  [[nodiscard]] EventCursor& cursor() noexcept { return cursor_; }
+  [[nodiscard]] CountedEvent& event() noexcept { return *event_; }
+
+ private:
+  void record(const Activation& activation, TimePoint start, TimePoint end) noexcept;
+  void record_jitter(const Activation& activation, TimePoint start) noexcept;
+
+  Clock& clock_;
+  TaskConfig config_;
+  TaskStatistics& statistics_;
+  CountedEvent* event_;
+
+  ReleaseGrid grid_;    // cyclic
+  EventLatch latch_;    // event
+  EventCursor cursor_;  // external
+  TimePoint ready_{};   // since when it could run: the end of its last cycle
+  Duration last_execution_{};
+  bool begun_ = false;  // has run since begin()
+  TimePoint last_start_{};
+  TaskCounters counters_{};
+};
+
+}  // namespace plchost

@@ -1,0 +1,141 @@
+#include "schedulers/task_set.hpp"
+
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "shm/base/names.hpp"
+
+namespace plchost {
+
+TaskSet::TaskSet(Clock& clock, PriorityBand band, TaskEnvironment environment)
+    : clock_(clock), band_(band), environment_(std::move(environment)) {}
+
+TaskSet::~TaskSet() {
+  if (active_) active_->scheduler->stop();
+  for (auto& thread : threads_) thread->park();  // all at once; their destructors then wait one by one
+}
+
+Result<std::unique_ptr<TaskSet>> TaskSet::create(Clock& clock, PriorityBand band,
+                                                 std::vector<TaskConfig> tasks, TaskEnvironment environment) {
+  if (auto valid = check_tasks(tasks); !valid) return std::unexpected(std::move(valid.error()));
+  std::unique_ptr<TaskSet> self(new TaskSet(clock, band, std::move(environment)));
+  for (TaskConfig& config : tasks) {
+    const std::string step = fmt::format("task '{}'", config.name);
+    if (auto added = self->add(std::move(config)); !added) return failure_in(step, std::move(added.error()));
+  }
+  return self;
+}
+
+Result<void> TaskSet::add(TaskConfig config) {
+  CountedEvent* event = nullptr;
+  if (config.kind == TaskKind::external) {
+    auto found = environment_.find_event(config.external_event);
+    if (!found) return std::unexpected(std::move(found.error()));
+    event = *found;
+  }
+  const ThreadPriority priority =
+      environment_.allow_unprivileged ? ThreadPriority{} : task_priority(band_, config.iec_priority);
+  tasks_.push_back(
+      std::make_unique<Task>(clock_, std::move(config), environment_.statistics(tasks_.size()), event));
+  auto thread = TaskThread::start(clock_, *tasks_.back(), priority);
+  if (!thread) return std::unexpected(std::move(thread.error()));
+  threads_.push_back(std::move(*thread));
+  reported_running_.push_back(false);
+  return {};
+}
+
+auto TaskSet::arrange(std::string_view name, const SchedulerSettings& settings)
+    -> Result<std::unique_ptr<Arrangement>> {
+  const auto entry = find_scheduler(name);
+  if (!entry) return std::unexpected(entry.error());
+  if (auto valid = check_settings(settings); !valid) return std::unexpected(std::move(valid.error()));
+  auto arrangement = std::make_unique<Arrangement>();
+  arrangement->scheduler =
+      (*entry)->make({.clock = clock_,
+                      .settings = settings,
+                      .tick = environment_.allow_unprivileged ? ThreadPriority{} : tick_priority(band_)});
+  for (auto& task : tasks_) {
+    auto source = arrangement->scheduler->source_for(*task);
+    if (!source) {
+      return failure_in(fmt::format("{}: task '{}'", name, task->config().name), std::move(source.error()));
+    }
+    arrangement->sources.push_back(std::move(*source));
+  }
+  if (auto prepared = arrangement->scheduler->prepare(); !prepared) {
+    return failure_in(name, std::move(prepared.error()));
+  }
+  return arrangement;
+}
+
+Result<void> TaskSet::start(std::string_view scheduler, const SchedulerSettings& settings) {
+  if (running_) return failure(ErrorCode::wrong_state, "the tasks are running already");
+  if (const auto busy = wait_until_settled(TimePoint{}); !busy.empty()) {
+    return failure(ErrorCode::wrong_state,
+                   fmt::format("still in the cycle in which it was to stop: task {}", join_names(busy)));
+  }
+  auto arrangement = arrange(scheduler, settings);
+  if (!arrangement) return std::unexpected(std::move(arrangement.error()));
+  active_ = std::move(*arrangement);
+  origin_ = clock_.now() + kStartLead;
+  for (auto& task : tasks_) task->begin(origin_);
+  running_ = true;
+  active_->scheduler->start(origin_);
+  hand_out_sources();
+  return {};
+}
+
+Result<void> TaskSet::switch_to(std::string_view scheduler, const SchedulerSettings& settings) {
+  if (!running_) {
+    return failure(ErrorCode::wrong_state,
+                   "the tasks are not running: start them under the other scheduler instead");
+  }
+  auto arrangement = arrange(scheduler, settings);
+  if (!arrangement) return std::unexpected(std::move(arrangement.error()));
+  // Only one of the two may look at event variables at a time; what is due in between is a little late.
+  active_->scheduler->stop();
+  retired_.push_back(std::exchange(active_, std::move(*arrangement)));
+  active_->scheduler->start(origin_);
+  hand_out_sources();
+  return {};
+}
+
+Result<void> TaskSet::stop(Duration limit) {
+  if (!running_) return failure(ErrorCode::wrong_state, "the tasks are not running");
+  const TimePoint deadline = MonotonicClock::now() + limit;
+  active_->scheduler->stop();
+  for (auto& thread : threads_) thread->park();
+  retired_.push_back(std::move(active_));
+  running_ = false;
+  if (const auto busy = wait_until_settled(deadline); !busy.empty()) {
+    return failure(
+        ErrorCode::timed_out,
+        fmt::format("not at the end of its cycle after {} ms: task {}",
+                    std::chrono::duration_cast<std::chrono::milliseconds>(limit).count(), join_names(busy)));
+  }
+  return {};
+}
+
+void TaskSet::hand_out_sources() {
+  scheduler_name_ = active_->scheduler->name();
+  for (std::size_t i = 0; i < threads_.size(); ++i) threads_[i]->use(active_->sources[i].get());
+  (void)wait_until_settled(MonotonicClock::now() + kSwitchPatience);
+}
+
+// The names of the tasks that are not settled at the deadline. If there are none, what was before is free to
+// go.
+std::vector<std::string_view> TaskSet::wait_until_settled(TimePoint deadline) {
+  std::vector<std::string_view> busy;
+  for (std::size_t i = 0; i < threads_.size(); ++i) {
+    if (!threads_[i]->settled(deadline)) {
+      busy.emplace_back(tasks_[i]->config().name);
+    } else if (reported_running_[i] != running_) {
+      reported_running_[i] = running_;
+      if (environment_.state_changed) environment_.state_changed(i, running_);
+    }
+  }
+  if (busy.empty()) retired_.clear();
+  return busy;
+}
+
+}  // namespace plchost

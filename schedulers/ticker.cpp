@@ -1,0 +1,54 @@
+#include "schedulers/ticker.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "schedulers/clock_thread.hpp"
+
+namespace plchost {
+
+Ticker::Ticker(const SchedulerContext& context, std::string thread_name, OnTick on_tick)
+    : clock_(context.clock),
+      kind_(context.settings.tick_source),
+      period_(context.settings.scheduler_interval),
+      priority_(context.tick),
+      thread_name_(std::move(thread_name)),
+      on_tick_(std::move(on_tick)) {}
+
+Result<void> Ticker::prepare() {
+  auto source = make_tick_source(clock_, kind_);
+  if (!source) return failure_in("tick source", std::move(source.error()));
+  source_ = std::move(*source);
+  auto thread = start_clock_thread(clock_, thread_name_, priority_, [this] { run(); });
+  if (!thread) return std::unexpected(std::move(thread.error()));
+  thread_ = std::move(*thread);
+  return {};
+}
+
+TimePoint Ticker::first_tick(TimePoint origin) const noexcept {
+  const Duration since = std::max(clock_.now() - origin, Duration::zero());
+  return origin + (since + period_ - Duration(1)) / period_ * period_;
+}
+
+void Ticker::start(TimePoint first) noexcept {
+  first_ = first;
+  go_.open(clock_);
+}
+
+void Ticker::stop() noexcept {
+  if (!thread_.joinable()) return;
+  stopping_.store(true, std::memory_order_release);
+  go_.interrupt(clock_);
+  source_->interrupt();
+  thread_.join();
+}
+
+void Ticker::run() noexcept {
+  if (go_.wait(clock_) != ActivationGate::Outcome::opened) return;
+  source_->start(first_, period_);
+  while (!stopping_.load(std::memory_order_acquire)) {
+    if (const auto tick = source_->wait()) on_tick_(*tick);
+  }
+}
+
+}  // namespace plchost

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "schedulers/activation_gate.hpp"
+#include "schedulers/tick_source.hpp"
+#include "shm/base/thread.hpp"
+
+namespace plchost {
+
+/// A thread of a scheduler that does something at each tick. All functions but the callback: set-up, one
+/// thread.
+class Ticker {
+ public:
+  using OnTick = std::function<void(TimePoint tick)>;
+
+  /// `on_tick` is called on the ticker's thread with the planned time of the tick; real-time.
+  Ticker(const SchedulerContext& context, std::string thread_name, OnTick on_tick);
+  Ticker(const Ticker&) = delete;
+  Ticker& operator=(const Ticker&) = delete;
+  ~Ticker() { stop(); }
+
+  /// Makes the tick source and the thread, which waits.
+  [[nodiscard]] Result<void> prepare();
+  /// The first point of the grid origin + n * scheduler_interval that is not over.
+  [[nodiscard]] TimePoint first_tick(TimePoint origin) const noexcept;
+  /// Ticks at `first` and then every scheduler_interval. After prepare().
+  void start(TimePoint first) noexcept;
+  void stop() noexcept;
+
+ private:
+  void run() noexcept;
+
+  Clock& clock_;
+  TickSourceKind kind_;
+  Duration period_;
+  ThreadPriority priority_;
+  std::string thread_name_;
+  OnTick on_tick_;
+  std::unique_ptr<TickSource> source_;
+  ActivationGate go_;
+  std::atomic<bool> stopping_{false};
+  TimePoint first_{};  // written before go_ opens
+  Thread thread_;
+};
+
+}  // namespace plchost
