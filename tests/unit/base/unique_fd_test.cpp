@@ -1,16 +1,18 @@
 #include "shm/base/unique_fd.hpp"
 
+#include <cerrno>
+#include <utility>
+
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <cerrno>
-#include <utility>
-
 namespace plchost {
 namespace {
 
-bool is_open(int fd) { return ::fcntl(fd, F_GETFD) != -1; }
+bool is_open(int fd) {
+  return ::fcntl(fd, F_GETFD) != -1;
+}
 
 TEST(UniqueFd, ClosesWhatItOwns) {
   int fd = -1;

@@ -1,0 +1,69 @@
+#include "shm/base/names.hpp"
+
+#include <array>
+
+#include <gmock/gmock.h>
+
+namespace plchost {
+namespace {
+
+using testing::HasSubstr;
+
+class InvalidName : public testing::TestWithParam<std::string> {};
+
+TEST_P(InvalidName, IsRefusedWithWhatIsAllowed) {
+  const auto checked = check_name("instance", GetParam(), kMaxInstanceName);
+  ASSERT_FALSE(checked);
+  EXPECT_EQ(checked.error().code, ErrorCode::invalid_argument);
+  EXPECT_THAT(checked.error().message, HasSubstr("instance '"));
+  EXPECT_THAT(checked.error().message, HasSubstr("1 to 31 letters"));
+}
+
+INSTANTIATE_TEST_SUITE_P(Names, InvalidName,
+                         testing::Values("", ".", "..", ".hidden", "-dash", "a/b", "a b", "a\n", "a*",
+                                         "\xc3\xa4", std::string(1, '\0'),
+                                         std::string(kMaxInstanceName + 1, 'x'), std::string(100'000, 'x')));
+
+TEST(Names, AcceptsTheLongestAndTheShortest) {
+  EXPECT_TRUE(check_name("instance", std::string(kMaxInstanceName, 'x'), kMaxInstanceName));
+  EXPECT_TRUE(check_name("instance", "a", kMaxInstanceName));
+  EXPECT_TRUE(check_name("instance", "Line_1-a.b", kMaxInstanceName));
+}
+
+TEST(Names, EventObjectsFitIntoThePool) {
+  const auto name = event_object_name(std::string(kMaxInstanceName, 'i'), std::string(kMaxEventName, 'e'));
+  EXPECT_LE(name.size(), kMaxObjectName);
+  EXPECT_EQ(event_object_name("line1", "ready"), "line1/ready");
+}
+
+TEST(Names, NearestFindsTypingErrorsOnly) {
+  constexpr std::array<std::string_view, 3> kKnown = {"CmpSchedule", "CmpScheduleTimer",
+                                                      "CmpScheduleOneShot"};
+  EXPECT_EQ(nearest_name("CmpSchedle", kKnown), "CmpSchedule");
+  EXPECT_EQ(nearest_name("cmpscheduletimer", kKnown), "CmpScheduleTimer");
+  EXPECT_EQ(nearest_name("zebra", kKnown), "");
+  EXPECT_EQ(nearest_name("x", {}), "");
+}
+
+TEST(Names, JoinsForMessages) {
+  constexpr std::array<std::string_view, 2> kTwo = {"a", "b"};
+  EXPECT_EQ(join_names(kTwo), "a, b");
+  EXPECT_EQ(join_names({}), "none");
+}
+
+TEST(FixedText, CutsWhatIsTooLong) {
+  FixedText<3> sut("abcdef");
+  EXPECT_EQ(sut.view(), "abc");
+  sut.assign("z");
+  EXPECT_EQ(sut.view(), "z");
+  EXPECT_EQ(sut.bytes[1], '\0');
+}
+
+TEST(FixedText, NeverReadsPastItsEnd) {
+  FixedText<3> sut;
+  sut.bytes.fill('x');  // as a stranger may have written it
+  EXPECT_EQ(sut.view(), "xxxx");
+}
+
+}  // namespace
+}  // namespace plchost

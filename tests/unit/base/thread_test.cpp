@@ -1,0 +1,111 @@
+#include "shm/base/thread.hpp"
+
+#include <array>
+#include <atomic>
+#include <string>
+#include <utility>
+
+#include <gmock/gmock.h>
+#include <sched.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+namespace plchost {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(Thread, RunsItsBodyWithItsNameAndJoinsAtTheEnd) {
+  std::string name;
+  {
+    auto sut = Thread::start("a-name-that-is-too-long", {}, [&] {
+      std::array<char, 16> buffer{};
+      pthread_getname_np(pthread_self(), buffer.data(), buffer.size());
+      name = buffer.data();
+    });
+    ASSERT_TRUE(sut) << sut.error().describe();
+    EXPECT_TRUE(sut->joinable());
+  }
+  EXPECT_EQ(name, "a-name-that-is-");
+}
+
+TEST(Thread, MovesOwnership) {
+  std::atomic<int> runs{0};
+  auto first = Thread::start("first", {}, [&] { ++runs; });
+  auto second = Thread::start("second", {}, [&] { ++runs; });
+  ASSERT_TRUE(first && second);
+  Thread sut = std::move(*first);
+  sut = std::move(*second);  // joins the first
+  EXPECT_FALSE(second->joinable());
+  sut.join();
+  EXPECT_FALSE(sut.joinable());
+  EXPECT_EQ(runs, 2);
+}
+
+TEST(Thread, IsNotFifoUnlessAskedFor) {
+  int policy = -1;
+  int nice = -1;
+  auto sut = Thread::start("soft", {.fifo = 0, .nice = 3}, [&] {
+    policy = ::sched_getscheduler(0);
+    nice = ::getpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()));
+  });
+  ASSERT_TRUE(sut);
+  sut->join();
+  EXPECT_EQ(policy, SCHED_OTHER);
+  EXPECT_EQ(nice, 3);
+}
+
+TEST(Thread, IsFifoOrSaysWhatIsMissing) {
+  int policy = -1;
+  auto sut = Thread::start("hard", {.fifo = 2}, [&] { policy = ::sched_getscheduler(0); });
+  if (sut) {
+    sut->join();
+    EXPECT_EQ(policy, SCHED_FIFO);
+  } else {
+    EXPECT_EQ(sut.error().code, ErrorCode::refused);
+    EXPECT_THAT(sut.error().message, HasSubstr("CAP_SYS_NICE"));
+  }
+}
+
+TEST(Thread, RefusesAPriorityThatDoesNotExist) {
+  EXPECT_FALSE(Thread::start("odd", {.fifo = 100}, [] {}));
+}
+
+TEST(Cores, BindsAllThreadsAndReadsBack) {
+  const auto before = allowed_cores(0);
+  ASSERT_TRUE(before);
+  ASSERT_FALSE(before->empty());
+  std::atomic<bool> stop{false};
+  std::atomic<pid_t> tid{0};
+  auto thread = Thread::start("other", {}, [&] {
+    tid = ::gettid();
+    while (!stop) ::usleep(1000);
+  });
+  ASSERT_TRUE(thread);
+  while (tid == 0) ::usleep(1000);
+  const std::vector<int> one = {before->front()};
+  EXPECT_EQ(bind_process_to_cores(0, one), one);
+  EXPECT_EQ(allowed_cores(tid), one);
+  EXPECT_EQ(bind_process_to_cores(::getpid(), *before), *before);
+  stop = true;
+}
+
+TEST(Cores, RefusesCoresThatDoNotExist) {
+  EXPECT_EQ(bind_process_to_cores(0, {-1}).error().code, ErrorCode::invalid_argument);
+  EXPECT_EQ(bind_process_to_cores(0, {100'000}).error().code, ErrorCode::invalid_argument);
+  EXPECT_FALSE(bind_process_to_cores(0, {CPU_SETSIZE - 1}));
+}
+
+TEST(Cores, BindingAProcessThatEndedFails) {
+  EXPECT_FALSE(bind_process_to_cores(999'999'999, {0}));
+}
+
+TEST(Cores, OnlineOnesHoldTheAllowedOnes) {
+  const auto online = online_cores();
+  const auto allowed = allowed_cores(0);
+  ASSERT_TRUE(online && allowed);
+  for (const int core : *allowed) EXPECT_THAT(*online, testing::Contains(core));
+}
+
+}  // namespace
+}  // namespace plchost
