@@ -1,0 +1,273 @@
+#include "shm/pool/object_pool.hpp"
+
+#include <chrono>
+#include <set>
+#include <string>
+#include <thread>
+
+#include <gmock/gmock.h>
+
+#include "tests/unit/pool/unique_pool_name.hpp"
+
+namespace plchost {
+namespace {
+
+using testing::HasSubstr;
+
+class ObjectPoolTest : public testing::Test {
+ protected:
+  ObjectPool create(std::uint32_t max_objects = kMinObjects) {
+    auto pool = ObjectPool::create(name_.get(), {.max_objects = max_objects});
+    EXPECT_TRUE(pool) << pool.error().describe();
+    return std::move(pool.value());
+  }
+  UniquePoolName name_;
+};
+
+TEST_F(ObjectPoolTest, AttachSeesWhatTheCreatorMade) {
+  auto made = create();
+  const auto event = made.create_event("line1/ready");
+  ASSERT_TRUE(event);
+  event->set_registered(true);
+  const auto sut = ObjectPool::attach(name_.get());
+  ASSERT_TRUE(sut) << sut.error().describe();
+  const auto opened = sut->open_event("line1/ready");
+  ASSERT_TRUE(opened);
+  EXPECT_TRUE(opened->registered());
+  EXPECT_EQ(opened->post(), PostResult::no_task);
+  EXPECT_EQ(event->counted().count(), 1U);
+}
+
+TEST_F(ObjectPoolTest, CreateOpensAnExistingPool) {
+  auto first = create(100);
+  ASSERT_TRUE(first.create_event("a"));
+  const auto sut = create(200);
+  EXPECT_TRUE(sut.open_event("a"));
+  EXPECT_EQ(sut.name(), name_.get());
+}
+
+TEST_F(ObjectPoolTest, SurvivesItsCreator) {
+  {
+    ASSERT_TRUE(create().create_event("a"));
+  }
+  EXPECT_TRUE(ObjectPool::attach(name_.get())->open_event("a"));
+}
+
+TEST_F(ObjectPoolTest, AttachFailsWithoutAPool) {
+  EXPECT_EQ(ObjectPool::attach(name_.get()).error().code, ErrorCode::not_found);
+}
+
+TEST_F(ObjectPoolTest, CreateRefusesSizesOutOfBounds) {
+  for (const std::uint32_t count : {0U, kMinObjects - 1, kMaxObjects + 1, ~0U}) {
+    const auto sut = ObjectPool::create(name_.get(), {.max_objects = count});
+    ASSERT_FALSE(sut);
+    EXPECT_EQ(sut.error().code, ErrorCode::invalid_argument);
+    EXPECT_THAT(sut.error().message, HasSubstr("16 to 1000000"));
+  }
+}
+
+TEST_F(ObjectPoolTest, OpenFailsForAnUnknownEvent) {
+  const auto sut = create();
+  const auto event = sut.open_event("none");
+  EXPECT_EQ(event.error().code, ErrorCode::not_found);
+  EXPECT_THAT(event.error().message, HasSubstr("'none'"));
+}
+
+TEST_F(ObjectPoolTest, CreateEventTwiceGivesTheSameEvent) {
+  auto sut = create();
+  const auto first = sut.create_event("a");
+  const auto second = sut.create_event("a");
+  ASSERT_TRUE(first && second);
+  EXPECT_EQ(&first->counted(), &second->counted());
+}
+
+TEST_F(ObjectPoolTest, TakesTheLongestNameAndRefusesOthers) {
+  auto sut = create();
+  const std::string longest(kMaxObjectName, 'x');
+  ASSERT_TRUE(sut.create_event(longest));
+  EXPECT_TRUE(sut.open_event(longest));
+  for (const std::string& name : {std::string(), longest + "x", std::string("a\nb"), std::string("\xc3\xa4"),
+                                  std::string("a\0b", 3), std::string("\x7f")}) {
+    for (const auto& event : {sut.create_event(name), sut.open_event(name)}) {
+      ASSERT_FALSE(event);
+      EXPECT_EQ(event.error().code, ErrorCode::invalid_argument);
+      EXPECT_THAT(event.error().message, HasSubstr("allowed are 1 to 95 printable ASCII characters"));
+    }
+  }
+}
+
+TEST_F(ObjectPoolTest, ReportsThePostOfAnUnboundEventAsSoft) {
+  auto sut = create();
+  const auto event = sut.create_event("a").value();
+  EXPECT_EQ(event.post(), PostResult::not_registered);
+  EXPECT_EQ(event.counted().count(), 0U);
+  event.set_registered(true);
+  EXPECT_EQ(event.post(), PostResult::no_task);
+  event.set_bound_tasks(3);
+  EXPECT_EQ(event.bound_tasks(), 3U);
+  EXPECT_EQ(event.post(), PostResult::posted);
+  EXPECT_EQ(event.counted().count(), 2U);
+  event.set_registered(false);
+  EXPECT_EQ(event.post(), PostResult::not_registered);
+  EXPECT_EQ(event.bound_tasks(), 3U);
+}
+
+TEST_F(ObjectPoolTest, AnEmptyHandleIsNotValid) {
+  const PoolEvent sut;
+  EXPECT_FALSE(sut.valid());
+  EXPECT_FALSE(sut.registered());
+  EXPECT_EQ(sut.bound_tasks(), 0U);
+  EXPECT_EQ(sut.post(), PostResult::not_registered);
+  EXPECT_FALSE(sut.set_registered(true));
+  EXPECT_FALSE(sut.set_bound_tasks(1));
+}
+
+TEST_F(ObjectPoolTest, ListsWhatIsRegisteredOrBound) {
+  auto sut = create();
+  ASSERT_TRUE(sut.create_event("unused"));
+  sut.create_event("bound")->set_bound_tasks(2);
+  const auto registered = sut.create_event("registered").value();
+  registered.set_registered(true);
+  registered.post();
+  std::set<std::string> names;
+  for (const auto& info : sut.list()) {
+    names.insert(info.name);
+    EXPECT_EQ(info.type, ObjectType::event);
+    EXPECT_EQ(info.registered, info.name == "registered");
+    EXPECT_EQ(info.value, info.name == "registered" ? 1U : 0U);
+    EXPECT_EQ(info.bound_tasks, info.name == "bound" ? 2U : 0U);
+  }
+  EXPECT_EQ(names, (std::set<std::string>{"bound", "registered"}));
+}
+
+TEST_F(ObjectPoolTest, SaysFullWhenAllObjectsAreInUse) {
+  auto sut = create();
+  for (std::uint32_t i = 0; i < kMinObjects; ++i) {
+    auto event = sut.create_event("event" + std::to_string(i));
+    ASSERT_TRUE(event);
+    ASSERT_TRUE(i % 2 == 0 ? event->set_registered(true) : event->set_bound_tasks(1));
+  }
+  const auto event = sut.create_event("one too many");
+  ASSERT_FALSE(event);
+  EXPECT_EQ(event.error().code, ErrorCode::full);
+  EXPECT_THAT(event.error().message, HasSubstr("holds 16 objects"));
+  EXPECT_TRUE(sut.create_event("event0"));
+}
+
+TEST_F(ObjectPoolTest, ReclaimsUnusedEventsAndMakesOldHandlesInvalid) {
+  auto sut = create();
+  std::vector<PoolEvent> events;
+  for (std::uint32_t i = 0; i < kMinObjects; ++i) {
+    events.push_back(sut.create_event("event" + std::to_string(i)).value());
+    events.back().set_registered(i != 5);
+    events.back().post();
+  }
+  const auto fresh = sut.create_event("fresh");
+  ASSERT_TRUE(fresh) << fresh.error().describe();
+  EXPECT_EQ(&fresh->counted(), &events[5].counted());
+  EXPECT_FALSE(events[5].valid());
+  EXPECT_FALSE(events[5].set_registered(true));
+  EXPECT_FALSE(events[5].set_bound_tasks(1));
+  ASSERT_TRUE(fresh->set_registered(true));
+  EXPECT_EQ(events[5].post(), PostResult::not_registered);
+  EXPECT_EQ(sut.open_event("event5").error().code, ErrorCode::not_found);
+  for (std::uint32_t i = 0; i < kMinObjects; ++i) {
+    EXPECT_EQ(sut.open_event("event" + std::to_string(i)).has_value(), i != 5);
+  }
+}
+
+TEST_F(ObjectPoolTest, AnEventInAReclaimedPlaceCountsFromZero) {
+  auto sut = create();
+  for (std::uint32_t i = 0; i < kMinObjects; ++i) {
+    const auto event = sut.create_event("old" + std::to_string(i)).value();
+    event.set_registered(true);
+    event.post();
+    event.set_registered(false);
+  }
+  const auto fresh = sut.create_event("fresh").value();
+  fresh.set_registered(true);
+  fresh.post();
+  fresh.post();
+  ASSERT_EQ(sut.list().size(), 1U);
+  EXPECT_EQ(sut.list()[0].value, 2U);
+}
+
+TEST_F(ObjectPoolTest, ReclaimTakesTheOldestFirst) {
+  auto sut = create();
+  for (int i = 0; i < 1000; ++i) {
+    const auto recent = sut.create_event("event" + std::to_string(i)).value();
+    for (int later = 1; later < static_cast<int>(kMinObjects); ++later) {
+      ASSERT_TRUE(sut.create_event("event" + std::to_string(i) + "." + std::to_string(later)));
+    }
+    EXPECT_TRUE(recent.valid());
+  }
+}
+
+TEST_F(ObjectPoolTest, HoldsAHundredThousandObjects) {
+  constexpr std::uint32_t kCount = 100'000;
+  auto sut = create(kCount);
+  for (std::uint32_t i = 0; i < kCount; ++i) {
+    const auto event = sut.create_event("instance/event" + std::to_string(i));
+    ASSERT_TRUE(event);
+    event->set_registered(true);
+  }
+  EXPECT_EQ(sut.create_event("x").error().code, ErrorCode::full);
+  for (std::uint32_t i = 0; i < kCount; ++i) {
+    ASSERT_TRUE(sut.open_event("instance/event" + std::to_string(i)));
+  }
+  EXPECT_EQ(sut.list().size(), kCount);
+}
+
+TEST_F(ObjectPoolTest, WakesATaskThatWaitsInAnotherMapping) {
+  auto sut = create();
+  const auto event = sut.create_event("a").value();
+  event.set_registered(true);
+  std::thread task([&] {
+    const auto pool = ObjectPool::attach(name_.get()).value();
+    const auto bound = pool.open_event("a").value();
+    for (auto seen = bound.counted().snapshot(); seen.count() == 0; seen = bound.counted().snapshot()) {
+      bound.counted().wait(seen);
+    }
+  });
+  event.post();
+  task.join();
+}
+
+TEST_F(ObjectPoolTest, ThreadsMayCreateAndListAtOnce) {
+  auto sut = create(1000);
+  std::vector<std::thread> threads;
+  for (int t = 0; t < 4; ++t) {
+    threads.emplace_back([&, t] {
+      for (int i = 0; i < 200; ++i) {
+        auto event = sut.create_event("event" + std::to_string((i * 7 + t) % 250));
+        ASSERT_TRUE(event);
+        event->set_registered(true);
+        event->post();
+        if (i % 50 == 0) (void)sut.list();
+      }
+    });
+  }
+  for (auto& thread : threads) thread.join();
+  EXPECT_EQ(sut.list().size(), 250U);
+}
+
+TEST_F(ObjectPoolTest, MovedHandlesStayValid) {
+  auto first = create();
+  const auto event = first.create_event("a").value();
+  const ObjectPool sut = std::move(first);
+  EXPECT_TRUE(event.valid());
+  EXPECT_TRUE(sut.open_event("a"));
+}
+
+TEST(ObjectType, HasTheNumbersOfTheSeed) {
+  EXPECT_EQ(static_cast<int>(ObjectType::memory), 0);
+  EXPECT_EQ(static_cast<int>(ObjectType::semaphore), 1);
+  EXPECT_EQ(static_cast<int>(ObjectType::event), 2);
+  for (const auto type : {ObjectType::memory, ObjectType::semaphore, ObjectType::event, ObjectType::free}) {
+    EXPECT_NE(to_string(type), "unknown");
+  }
+  EXPECT_EQ(to_string(ObjectType{77}), "unknown");
+}
+
+}  // namespace
+}  // namespace plchost

@@ -1,0 +1,227 @@
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <random>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+#include "shm/pool/host_page.hpp"
+#include "shm/pool/instance_page.hpp"
+#include "tests/unit/pool/unique_pool_name.hpp"
+
+namespace plchost {
+namespace {
+
+using testing::HasSubstr;
+
+class Pages : public testing::Test {
+ protected:
+  ~Pages() override {
+    HostPageWriter::remove(pool());
+    InstancePage::remove(pool(), "line1");
+  }
+  [[nodiscard]] const std::string& pool() const { return name_.get(); }
+  static MemoryFile map(const std::string& name) {
+    return std::move(MemoryFile::open(name, 1, MemoryFile::Access::read_write).value());
+  }
+  UniquePoolName name_;
+};
+
+std::vector<TaskIdentity> tasks_of(std::size_t count) {
+  std::vector<TaskIdentity> tasks(count);
+  for (std::size_t i = 0; i < count; ++i) tasks[i].name.assign("task" + std::to_string(i));
+  return tasks;
+}
+
+TEST_F(Pages, HostPageCarriesWhatTheManagerWrites) {
+  auto writer = HostPageWriter::create(pool());
+  ASSERT_TRUE(writer) << writer.error().describe();
+  const auto sut = HostPageReader::open(pool());
+  ASSERT_TRUE(sut) << sut.error().describe();
+  const auto before = sut->changes();
+  HostStatus host;
+  host.name.assign("controller");
+  host.instance_count = kMaxInstances;
+  writer->write_host(host);
+  InstanceStatus instance;
+  instance.name.assign("line1");
+  instance.state = InstanceState::safe_mode;
+  instance.core = 3;
+  writer->write_instance(kMaxInstances - 1, instance);
+  EXPECT_EQ(sut->changes(), before + 2);
+  EXPECT_EQ(sut->host()->name.view(), "controller");
+  const auto read = sut->instance(kMaxInstances - 1);
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read->name.view(), "line1");
+  EXPECT_EQ(read->state, InstanceState::safe_mode);
+  EXPECT_EQ(read->core, 3);
+  EXPECT_FALSE(sut->instance(kMaxInstances));
+}
+
+TEST_F(Pages, AFreshHostPageHasNoState) {
+  ASSERT_TRUE(HostPageWriter::create(pool()));
+  const auto sut = HostPageReader::open(pool());
+  EXPECT_EQ(sut->host()->instance_count, 0U);
+}
+
+TEST_F(Pages, ReadersSeeTheNextManagerWithoutOpeningAnew) {
+  {
+    ASSERT_TRUE(HostPageWriter::create(pool()));
+  }
+  const auto sut = HostPageReader::open(pool());
+  auto next = HostPageWriter::create(pool());
+  ASSERT_TRUE(next);
+  HostStatus host;
+  host.manager_pid = 42;
+  next->write_host(host);
+  EXPECT_EQ(sut->host()->manager_pid, 42);
+}
+
+TEST_F(Pages, TheNextManagerTakesOverFromOneThatDiedWhileWriting) {
+  {
+    ASSERT_TRUE(HostPageWriter::create(pool()));
+  }
+  const MemoryFile memory = map(host_page_name(pool()));
+  auto& page = *reinterpret_cast<HostPageLayout*>(memory.bytes().data());
+  reinterpret_cast<std::atomic<std::uint64_t>*>(&page.host)->fetch_add(1);
+  reinterpret_cast<std::atomic<std::uint64_t>*>(&page.instances[2])->fetch_add(1);
+  const auto sut = HostPageReader::open(pool());
+  EXPECT_FALSE(sut->host());
+  auto next = HostPageWriter::create(pool());
+  next->write_host({});
+  next->write_instance(2, {});
+  EXPECT_TRUE(sut->host());
+  EXPECT_TRUE(sut->instance(2));
+}
+
+TEST_F(Pages, InstancePageCarriesTasksAndRuntime) {
+  auto tasks = tasks_of(3);
+  tasks[1].kind = PageTaskKind::external;
+  tasks[1].external_event.assign("ready");
+  auto writer = InstancePage::create(pool(), "line1", tasks);
+  ASSERT_TRUE(writer) << writer.error().describe();
+  EXPECT_EQ(writer->task_count(), 3U);
+  InstanceRuntime runtime;
+  runtime.pid = 7;
+  writer->write_runtime(runtime);
+  const auto sut = InstancePageReader::open(pool(), "line1");
+  ASSERT_TRUE(sut) << sut.error().describe();
+  const auto before = sut->task_sequence(1);
+  TaskSlot& slot = writer->task(1);
+  slot.state.store(static_cast<std::uint32_t>(PageTaskState::exception));
+  TaskCounters counters{};
+  counters.cycles = 11;
+  slot.statistics.counters.write(counters);
+  slot.statistics.latency.record(Duration(20));
+  EXPECT_NE(sut->task_sequence(1), before);
+  EXPECT_EQ(sut->task_count(), 3U);
+  EXPECT_EQ(sut->runtime()->pid, 7);
+  const auto task = sut->task(1);
+  ASSERT_TRUE(task);
+  EXPECT_EQ(task->identity.name.view(), "task1");
+  EXPECT_EQ(task->identity.external_event.view(), "ready");
+  EXPECT_EQ(task->identity.kind, PageTaskKind::external);
+  EXPECT_EQ(task->state, PageTaskState::exception);
+  EXPECT_EQ(task->counters.cycles, 11U);
+  EXPECT_EQ(task->latency_p99, Duration(20));
+  EXPECT_FALSE(sut->task(3));
+  EXPECT_EQ(sut->task_sequence(3), 0U);
+}
+
+TEST_F(Pages, InstancePageHoldsNoneAndTheMostTasksAndRefusesMore) {
+  EXPECT_TRUE(InstancePage::create(pool(), "line1", {}));
+  EXPECT_EQ(InstancePageReader::open(pool(), "line1")->task_count(), 0U);
+  EXPECT_TRUE(InstancePage::create(pool(), "line1", tasks_of(kMaxTasks)));
+  EXPECT_EQ(InstancePageReader::open(pool(), "line1")->task(kMaxTasks - 1)->identity.name.view(), "task1023");
+  const auto more = InstancePage::create(pool(), "line1", tasks_of(kMaxTasks + 1));
+  EXPECT_EQ(more.error().code, ErrorCode::invalid_argument);
+  EXPECT_THAT(more.error().message, HasSubstr("at most 1024"));
+}
+
+TEST_F(Pages, ReadersOfAnAbsentPageAreTold) {
+  EXPECT_EQ(HostPageReader::open(pool()).error().code, ErrorCode::not_found);
+  EXPECT_EQ(InstancePageReader::open(pool(), "line1").error().code, ErrorCode::not_found);
+}
+
+TEST_F(Pages, GarbageIsCorrupt) {
+  std::mt19937 random(1);
+  for (const std::size_t size : {std::size_t{1}, sizeof(InstancePageLayout), sizeof(HostPageLayout)}) {
+    for (const auto& name : {host_page_name(pool()), instance_page_name(pool(), "line1")}) {
+      const auto memory = MemoryFile::replace(name, size);
+      ASSERT_TRUE(memory);
+      std::ranges::generate(memory->bytes(), [&] { return static_cast<std::byte>(random()); });
+    }
+    EXPECT_EQ(HostPageReader::open(pool()).error().code, ErrorCode::corrupt);
+    EXPECT_EQ(InstancePageReader::open(pool(), "line1").error().code, ErrorCode::corrupt);
+  }
+  EXPECT_TRUE(HostPageWriter::create(pool()));  // the manager makes it anew
+  EXPECT_TRUE(HostPageReader::open(pool()));
+}
+
+TEST_F(Pages, HeadersThatDoNotFitAreCorrupt) {
+  ASSERT_TRUE(InstancePage::create(pool(), "line1", tasks_of(2)));
+  const MemoryFile memory = map(instance_page_name(pool(), "line1"));
+  auto& page = *reinterpret_cast<InstancePageLayout*>(memory.bytes().data());
+  const auto refused = [&] {
+    return InstancePageReader::open(pool(), "line1").error().code == ErrorCode::corrupt;
+  };
+  for (const std::uint32_t count : {0U, 1U, 3U, kMaxTasks + 1, ~0U}) {
+    page.task_count = count;
+    EXPECT_TRUE(refused());
+  }
+  page.task_count = 2;
+  page.version += 1;
+  EXPECT_TRUE(refused());
+  page.version -= 1;
+  page.size += 1;
+  EXPECT_TRUE(refused());
+  page.size -= 1;
+  page.magic = 0;
+  EXPECT_TRUE(refused());
+}
+
+TEST_F(Pages, AReaderKeepsToTheSizeThatItOpened) {
+  auto writer = InstancePage::create(pool(), "line1", tasks_of(2));
+  const auto sut = InstancePageReader::open(pool(), "line1");
+  const MemoryFile memory = map(instance_page_name(pool(), "line1"));
+  std::ranges::fill(memory.bytes(), std::byte{0xff});
+  EXPECT_EQ(writer->task_count(), 2U);
+  EXPECT_EQ(sut->task_count(), 2U);
+  EXPECT_FALSE(sut->task(1));
+  EXPECT_FALSE(sut->task(2));
+  EXPECT_FALSE(sut->runtime());
+}
+
+TEST_F(Pages, AnImpossibleInstanceCountIsNotShown) {
+  auto writer = HostPageWriter::create(pool());
+  const auto sut = HostPageReader::open(pool());
+  HostStatus host;
+  host.instance_count = kMaxInstances + 1;
+  writer->write_host(host);
+  EXPECT_FALSE(sut->host());
+}
+
+TEST_F(Pages, AFreshInstancePageTakesThePlaceOfTheOld) {
+  ASSERT_TRUE(InstancePage::create(pool(), "line1", tasks_of(2)));
+  const auto old = InstancePageReader::open(pool(), "line1");
+  ASSERT_TRUE(InstancePage::create(pool(), "line1", tasks_of(5)));
+  EXPECT_EQ(old->task_count(), 2U);
+  EXPECT_TRUE(old->task(1));
+  EXPECT_EQ(InstancePageReader::open(pool(), "line1")->task_count(), 5U);
+  InstancePage::remove(pool(), "line1");
+  EXPECT_EQ(InstancePageReader::open(pool(), "line1").error().code, ErrorCode::not_found);
+}
+
+TEST(PageEnums, EachStateHasAName) {
+  for (std::uint32_t i = 0; i < 8; ++i) EXPECT_NE(to_string(static_cast<InstanceState>(i)), "unknown");
+  for (std::uint32_t i = 0; i < 4; ++i) {
+    EXPECT_NE(to_string(static_cast<PageTaskKind>(i)), "unknown");
+    EXPECT_NE(to_string(static_cast<PageTaskState>(i)), "unknown");
+  }
+  EXPECT_EQ(to_string(static_cast<InstanceState>(99)), "unknown");
+}
+
+}  // namespace
+}  // namespace plchost

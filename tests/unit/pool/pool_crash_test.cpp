@@ -1,0 +1,275 @@
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <fstream>
+#include <random>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <pthread.h>
+#include <signal.h>
+#include <sys/stat.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "shm/pool/object_pool.hpp"
+#include "shm/pool/pool_layout.hpp"
+#include "tests/unit/pool/unique_pool_name.hpp"
+
+namespace plchost {
+namespace {
+
+constexpr auto kReadWrite = MemoryFile::Access::read_write;
+
+template <class Body>
+pid_t in_child(Body body) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    body();
+    ::_exit(0);
+  }
+  return child;
+}
+
+int wait_for(pid_t child) {
+  int status = -1;
+  ::waitpid(child, &status, 0);
+  return status;
+}
+
+void kill_and_reap(pid_t child) {
+  ::kill(child, SIGKILL);
+  wait_for(child);
+}
+
+class PoolCrash : public testing::Test {
+ protected:
+  ObjectPool create(std::uint32_t max_objects) {
+    auto pool = ObjectPool::create(name_.get(), {.max_objects = max_objects});
+    EXPECT_TRUE(pool) << pool.error().describe();
+    return std::move(pool.value());
+  }
+  [[nodiscard]] MemoryFile map() const {
+    return std::move(MemoryFile::open(name_.get(), 1, kReadWrite).value());
+  }
+  static PoolHeader& header_of(const MemoryFile& memory) {
+    return *reinterpret_cast<PoolHeader*>(memory.bytes().data());
+  }
+  static ObjectEntry* entries_of(const MemoryFile& memory, std::uint32_t max_objects) {
+    return reinterpret_cast<ObjectEntry*>(memory.bytes().data() + entries_offset(max_objects));
+  }
+  UniquePoolName name_;
+};
+
+TEST_F(PoolCrash, SeveralProcessesCreateTheSamePoolAtOnce) {
+  for (int round = 0; round < 20; ++round) {
+    std::vector<pid_t> children;
+    for (int i = 0; i < 4; ++i) {
+      children.push_back(in_child([&] {
+        auto pool = ObjectPool::create(name_.get(), {.max_objects = 64});
+        if (!pool || !pool->create_event("child" + std::to_string(i))) ::_exit(1);
+        pool->create_event("child" + std::to_string(i))->set_registered(true);
+      }));
+    }
+    for (const pid_t child : children) EXPECT_EQ(wait_for(child), 0);
+    EXPECT_EQ(ObjectPool::attach(name_.get())->list().size(), children.size());
+    ObjectPool::remove(name_.get());
+  }
+}
+
+TEST_F(PoolCrash, ACreatorThatIsKilledLeavesNothingHalfMade) {
+  for (int round = 0; round < 30; ++round) {
+    const pid_t child = in_child([&] {
+      for (;;) {
+        (void)ObjectPool::create(name_.get(), {.max_objects = 20'000});
+        ObjectPool::remove(name_.get());
+      }
+    });
+    std::this_thread::sleep_for(std::chrono::microseconds(500 + 137 * round));
+    kill_and_reap(child);
+    auto sut = ObjectPool::create(name_.get(), {.max_objects = 20'000});
+    ASSERT_TRUE(sut) << sut.error().describe();
+    ASSERT_TRUE(sut->create_event("a"));
+  }
+}
+
+TEST_F(PoolCrash, APoolThatItsMakerNeverCompletedIsReplaced) {
+  for (const std::size_t size : {std::size_t{0}, std::size_t{8}, pool_size(64)}) {
+    std::ofstream("/dev/shm/" + name_.get()) << std::string(size, '\0');
+    if (size == 0) {
+      EXPECT_EQ(ObjectPool::attach(name_.get()).error().code, ErrorCode::corrupt);
+    }
+    auto sut = ObjectPool::create(name_.get(), {.max_objects = 64});
+    ASSERT_TRUE(sut) << sut.error().describe();
+    EXPECT_TRUE(sut->create_event("a"));
+    ObjectPool::remove(name_.get());
+  }
+}
+
+TEST_F(PoolCrash, AttachWaitsForAPoolThatIsBeingMade) {
+  create(64);
+  const MemoryFile memory = map();
+  header_of(memory).magic.store(0);
+  std::thread maker([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    header_of(memory).magic.store(kPoolMagic, std::memory_order_release);
+  });
+  EXPECT_TRUE(ObjectPool::attach(name_.get()));
+  maker.join();
+}
+
+TEST_F(PoolCrash, WorksOnAfterTheOwnerOfTheMutexWasKilled) {
+  auto sut = create(64);
+  sut.create_event("kept")->set_registered(true);
+  const MemoryFile memory = map();
+  std::array<int, 2> locked{};
+  ASSERT_EQ(::pipe(locked.data()), 0);
+  const pid_t child = in_child([&] {
+    pthread_mutex_lock(&header_of(memory).mutex);
+    // As it looks in the middle of set-up: bucket and free list are gone.
+    auto* const buckets = memory.bytes().data() + sizeof(PoolHeader);
+    std::fill_n(buckets, bucket_count_for(64) * sizeof(std::uint32_t), std::byte{0});
+    header_of(memory).high_water.store(0);
+    (void)!::write(locked[1], "x", 1);
+    for (;;) ::pause();
+  });
+  char byte = 0;
+  ASSERT_EQ(::read(locked[0], &byte, 1), 1);
+  kill_and_reap(child);
+  EXPECT_TRUE(sut.open_event("kept"));
+  EXPECT_EQ(header_of(memory).repairs.load(), 1U);
+  EXPECT_TRUE(sut.create_event("new"));
+  EXPECT_EQ(header_of(memory).repairs.load(), 1U);
+  ::close(locked[0]);
+  ::close(locked[1]);
+}
+
+TEST_F(PoolCrash, WorksOnAfterClientsWereKilledAtAnyInstruction) {
+  constexpr std::uint32_t kObjects = 64;
+  auto sut = create(kObjects);
+  sut.create_event("kept")->set_registered(true);
+  for (int round = 0; round < 60; ++round) {
+    std::array<pid_t, 2> children{};
+    for (std::size_t c = 0; c < children.size(); ++c) {
+      children[c] = in_child([&] {
+        auto pool = ObjectPool::attach(name_.get());
+        for (unsigned i = 0;; ++i) {  // more names than places: makes, finds and reclaims
+          auto event = pool->create_event("child" + std::to_string((i * 31 + c) % 200));
+          if (event && i % 3 == 0) event->post();
+        }
+      });
+    }
+    std::this_thread::sleep_for(std::chrono::microseconds(1500 + 91 * round));
+    for (const pid_t child : children) kill_and_reap(child);
+    const auto kept = sut.open_event("kept");
+    ASSERT_TRUE(kept) << kept.error().describe();
+    EXPECT_TRUE(kept->registered());
+    for (std::uint32_t i = 0; i < 2 * kObjects; ++i) {
+      const auto event = sut.create_event("round" + std::to_string(i));
+      ASSERT_TRUE(event) << event.error().describe();
+      ASSERT_TRUE(sut.open_event("round" + std::to_string(i)));
+    }
+    ASSERT_EQ(sut.list().size(), 1U);
+  }
+}
+
+TEST_F(PoolCrash, RefusesWhatIsNotAPoolOfThisVersionAndSize) {
+  create(64);
+  const MemoryFile memory = map();
+  PoolHeader& header = header_of(memory);
+  const auto refused = [&] { return ObjectPool::attach(name_.get()).error().code == ErrorCode::corrupt; };
+  for (std::uint32_t* field :
+       {&header.version, &header.entry_size, &header.max_objects, &header.bucket_count}) {
+    const std::uint32_t before = *field;
+    for (const std::uint32_t value : {0U, before + 1, ~0U}) {
+      *field = value;
+      EXPECT_TRUE(refused());
+      EXPECT_EQ(ObjectPool::create(name_.get()).error().code, ErrorCode::corrupt);
+    }
+    *field = before;
+  }
+  header.size += 1;
+  EXPECT_TRUE(refused());
+  header.size -= 1;
+  header.magic.store(1);
+  EXPECT_TRUE(refused());
+  header.magic.store(kPoolMagic);
+  EXPECT_TRUE(ObjectPool::attach(name_.get()));
+}
+
+TEST_F(PoolCrash, RefusesAFileThatIsShorterThanItsHeaderSays) {
+  create(64);
+  ASSERT_EQ(::truncate(("/dev/shm/" + name_.get()).c_str(), 4096), 0);
+  EXPECT_EQ(ObjectPool::attach(name_.get()).error().code, ErrorCode::corrupt);
+}
+
+TEST_F(PoolCrash, ADamagedMutexIsAnErrorAndNotTheEnd) {
+  auto sut = create(64);
+  const MemoryFile memory = map();
+  PoolHeader& header = header_of(memory);
+  const pthread_mutex_t sound = header.mutex;
+  const std::array words = {::gettid(), 0x3fffffff, 0x3ffffffe, -1};
+  for (const int word : words) {
+    header.mutex.__data.__lock = static_cast<int>(word & ~0x40000000);  // not marked as left by a dead one
+    EXPECT_EQ(sut.create_event("a").error().code, ErrorCode::corrupt);
+    EXPECT_TRUE(sut.list().empty());
+    header.mutex = sound;
+  }
+  for (const int kind : {0, 1, 2, 0x10, 0x20, 0x7f, -1}) {
+    header.mutex.__data.__kind = kind;
+    EXPECT_EQ(sut.open_event("a").error().code, ErrorCode::corrupt);
+    header.mutex = sound;
+  }
+  EXPECT_TRUE(sut.create_event("a"));
+}
+
+TEST_F(PoolCrash, RepairsAChainThatRunsInACircleOrLeadsOutside) {
+  constexpr std::uint32_t kObjects = 64;
+  auto sut = create(kObjects);
+  for (std::uint32_t i = 0; i < kObjects / 2; ++i) ASSERT_TRUE(sut.create_event("event" + std::to_string(i)));
+  const MemoryFile memory = map();
+  ObjectEntry* const entries = entries_of(memory, kObjects);
+  const auto self = [](std::uint32_t i) { return i + 1; };
+  const auto outside = [](std::uint32_t) { return ~0U; };
+  const auto other = [](std::uint32_t i) { return (i + 7) % kObjects + 1; };
+  for (const auto& link : std::initializer_list<std::uint32_t (*)(std::uint32_t)>{self, outside, other}) {
+    for (std::uint32_t i = 0; i < kObjects; ++i) entries[i].next.store(link(i));
+    header_of(memory).first_free.store(link(3));
+    EXPECT_EQ(sut.open_event("absent").error().code, ErrorCode::not_found);
+    for (std::uint32_t i = 0; i < kObjects / 2; ++i) EXPECT_TRUE(sut.open_event("event" + std::to_string(i)));
+    EXPECT_TRUE(sut.create_event("new"));
+  }
+}
+
+TEST_F(PoolCrash, AScribbledSegmentNeverCrashes) {
+  constexpr std::uint32_t kObjects = 64;
+  std::mt19937 random(12345);
+  for (int round = 0; round < 200; ++round) {
+    ObjectPool::remove(name_.get());
+    auto sut = create(kObjects);
+    for (std::uint32_t i = 0; i < kObjects / 2; ++i) {
+      sut.create_event("event" + std::to_string(i))->set_registered(i % 2 == 0);
+    }
+    const MemoryFile memory = map();
+    const PoolHeader& header = header_of(memory);
+    // All but the mutex: what the C library does with a damaged one is looked at above.
+    const auto first = static_cast<std::size_t>(reinterpret_cast<const std::byte*>(&header.high_water) -
+                                                memory.bytes().data());
+    for (int i = 0; i < 1 << (round % 13); ++i) {
+      memory.bytes()[first + random() % (memory.bytes().size() - first)] = static_cast<std::byte>(random());
+    }
+    (void)sut.list();
+    (void)sut.open_event("event1");
+    for (std::uint32_t i = 0; i < 2 * kObjects; ++i) {
+      auto event = sut.create_event("new" + std::to_string(i));
+      if (event) event->post();
+    }
+    (void)sut.list();
+    (void)ObjectPool::attach(name_.get());
+  }
+}
+
+}  // namespace
+}  // namespace plchost
