@@ -1,6 +1,8 @@
 #include "instances/launch/launch_contract.hpp"
 
+#include <algorithm>
 #include <array>
+#include <limits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -93,6 +95,44 @@ Result<SetupReport> decode_report(std::string_view packet) {
     }
   }
   return failure(ErrorCode::corrupt, fmt::format("set-up report has the unknown step '{}'", *step));
+}
+
+std::string encode(const InstanceReport& report) {
+  const Json json{{"pid", report.pid},
+                  {"running", report.running},
+                  {"application", report.application},
+                  {"scheduler", report.scheduler},
+                  {"cores", report.cores},
+                  {"memory_locked", report.memory_locked}};
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+Result<InstanceReport> decode_instance_report(std::string_view text) {
+  const Json json = Json::parse(text, nullptr, false);
+  if (!json.is_object()) return failure(ErrorCode::corrupt, "instance report is not a JSON object");
+  const auto has = [&](const char* key, auto test) {
+    const auto found = json.find(key);
+    return found != json.end() && test(*found);
+  };
+  const auto is_int = [](const Json& value) {
+    return value.is_number_integer() && value.get<std::int64_t>() >= std::numeric_limits<int>::min() &&
+           value.get<std::int64_t>() <= std::numeric_limits<int>::max();
+  };
+  const auto is_text = [](const Json& value) { return value.is_string(); };
+  const auto is_bool = [](const Json& value) { return value.is_boolean(); };
+  const auto is_ints = [&](const Json& value) {
+    return value.is_array() && std::all_of(value.begin(), value.end(), is_int);
+  };
+  if (!has("pid", is_int) || !has("running", is_bool) || !has("application", is_text) ||
+      !has("scheduler", is_text) || !has("cores", is_ints) || !has("memory_locked", is_bool)) {
+    return failure(ErrorCode::corrupt, "instance report lacks a field, or one is of another type");
+  }
+  return InstanceReport{.pid = json["pid"].get<int>(),
+                        .running = json["running"].get<bool>(),
+                        .application = json["application"].get<std::string>(),
+                        .scheduler = json["scheduler"].get<std::string>(),
+                        .cores = json["cores"].get<std::vector<int>>(),
+                        .memory_locked = json["memory_locked"].get<bool>()};
 }
 
 }  // namespace plchost

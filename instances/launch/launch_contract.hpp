@@ -41,8 +41,8 @@ enum class SetupStep : std::uint8_t {
   open_control_socket,
   load_components,
   load_application,
+  make_status_page,  ///< before the tasks, whose statistics lie in it
   make_tasks,
-  make_status_page,
   start_scheduler,
   ready,  ///< all done; the control socket answers
 };
@@ -57,6 +57,18 @@ struct SetupReport {
 };
 [[nodiscard]] std::string encode(const SetupReport& report);
 [[nodiscard]] Result<SetupReport> decode_report(std::string_view packet);
+
+/// What an instance says of itself when it is asked for its status on its control socket.
+struct InstanceReport {
+  int pid = 0;
+  bool running = false;     ///< the application runs
+  std::string application;  ///< path; empty: none
+  std::string scheduler;    ///< in use, or what the next start will use
+  std::vector<int> cores;   ///< read back from the kernel
+  bool memory_locked = false;
+};
+[[nodiscard]] std::string encode(const InstanceReport& report);
+[[nodiscard]] Result<InstanceReport> decode_instance_report(std::string_view text);
 
 /// Exit codes of plc-instance.
 inline constexpr int kExitUsage = 2;

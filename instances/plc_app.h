@@ -1,0 +1,200 @@
+/*
+ * The contract between plc-instance and an application (the user program) or a component: plain C89, no
+ * library to link. An application is one shared object that exports
+ *
+ *     plc_app_abi          PLC_APP_ABI_VERSION, checked before anything of it runs: write PLC_EXPORT_ABI;
+ *     int plc_app_init(void)    called once after loading; calls __sys__setup__tasks(); 0 means success
+ *     void plc_app_exit(void)   optional; called once when all tasks have ended
+ *
+ * and calls the functions of the runtime that are declared below; they are found when it is loaded.
+ *
+ *     gcc -std=c89 -shared -fPIC -I FOLDER_OF_THIS_FILE -o my.so my.c
+ *     plc-instance --check-application my.so
+ *
+ * Thread contexts: "control" is the runtime's one soft thread, on which plc_app_init, plc_app_exit, the hooks
+ * of components and the callbacks run. "any" includes the cycle of a real-time task: such a function takes no
+ * lock, does no allocation and no input or output.
+ */
+#ifndef PLC_APP_H
+#define PLC_APP_H
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* Grows when a program that was built with an older file could not run any more. */
+#define PLC_APP_ABI_VERSION 1u
+
+#define CDECL
+#define PLC_EXPORT __attribute__((visibility("default")))
+
+/* What a program must export. */
+PLC_EXPORT extern const unsigned int plc_app_abi;
+PLC_EXPORT int CDECL plc_app_init(void);
+PLC_EXPORT void CDECL plc_app_exit(void);
+
+/* Write it once, in one file of the application or component, with a semicolon behind it. */
+#define PLC_EXPORT_ABI const unsigned int plc_app_abi = PLC_APP_ABI_VERSION
+
+/* ---- Handles and results --------------------------------------------------------------------------------
+ */
+
+typedef void* RTS_HANDLE;
+#ifdef __cplusplus
+#define RTS_INVALID_HANDLE (reinterpret_cast<RTS_HANDLE>(-1L))
+#else
+#define RTS_INVALID_HANDLE ((RTS_HANDLE)(-1L))
+#endif
+
+typedef unsigned int RTS_RESULT;
+#define ERR_OK 0x0000u
+#define ERR_FAILED 0x0001u
+#define ERR_PARAMETER 0x0002u /* not a handle or name of the allowed form */
+#define ERR_NOTINITIALIZED \
+  0x0003u                     /* there is no runtime around this call, or it is not on the control thread */
+#define ERR_NO_OBJECT 0x0010u /* the event is not registered: nothing was counted */
+#define ERR_NOMEMORY 0x0011u  /* a table or the object pool has no room */
+#define ERR_DUPLICATE 0x0012u /* was there already; the handle is valid */
+#define ERR_NO_TASK 0x4000u   /* soft: counted, but no task is bound to the event at this time */
+
+/* ---- Tasks ----------------------------------------------------------------------------------------------
+ */
+
+#define Cyclic 0x0000       /* runs every dwInterval */
+#define Event 0x0001        /* runs once each time its BOOL goes from FALSE to TRUE */
+#define External 0x0002     /* runs once for each post of the external event stExternalEvent */
+#define Freewheeling 0x0003 /* runs in a loop and sleeps a share of its execution time in between */
+
+/* The value of a BOOL: 0 is FALSE, all else is TRUE. Called by the scheduler, often: only reads. */
+typedef unsigned char(CDECL* PLC_EVENT_FUNCTION)(void);
+/* One cycle of a task. */
+typedef void(CDECL* PLC_TASK_FUNCTION)(void);
+
+/*
+ * One task. The names and their order are those of the seed; only the function pointers are real ones (64
+ * bit). The runtime writes the t... fields after each cycle, all in microseconds, so it must not be const.
+ * Cycle time is the execution time of one cycle. Jitter is (start - start before) - interval, signed;
+ * tJitterMax is the one of largest magnitude; both stay 0 unless the task is cyclic. A value that does not
+ * fit is cut to the nearest int.
+ *
+ * The functions have no argument. What belongs to one task is kept in static variables of its function; if
+ * several tasks share a function, plc_current_task() tells them apart.
+ */
+typedef struct {
+  char stName[51];                           /* letters, digits, '_', '-', '.'; unique in the application */
+  short nPriority;                           /* 0 (highest) to 31; 0..15 are real-time, 16..31 are not */
+  short KindOfTask;                          /* Cyclic, Event, External or Freewheeling */
+  char bMicroseconds;                        /* unit of dwInterval: 0 milliseconds, 1 microseconds */
+  unsigned int dwInterval;                   /* cyclic: greater than 0; other kinds: not used */
+  PLC_EVENT_FUNCTION dwEventFunctionPointer; /* event: reads the BOOL; other kinds: not used */
+  char stExternalEvent[51];                  /* external: the event's name; other kinds: not used */
+  PLC_TASK_FUNCTION dwTaskEntryFunctionPointer;
+  int tLastCycleTime;
+  int tAverageCycleTime;
+  int tMaxCycleTime;
+  int tMinCycleTime;
+  int tJitterMax;
+  int tJitterLast;
+} Task_Info;
+
+#define PLC_MAX_TASKS 1024
+
+typedef struct {
+  short nTasks; /* 1 to PLC_MAX_TASKS */
+  char stApplicationName[51];
+  Task_Info* ptaskinfo; /* nTasks of them; they live as long as the application */
+} sys_setup_tasks_struct;
+
+/* Hands the task configuration over. Once, from plc_app_init. What is wrong with it is reported by the
+ * runtime, with the task's name, after plc_app_init has returned. Control. */
+void CDECL __sys__setup__tasks(sys_setup_tasks_struct* p);
+
+/* The task whose cycle (or event function) runs on this thread; NULL outside of one. Any. */
+Task_Info* CDECL plc_current_task(void);
+
+/* ---- External events ------------------------------------------------------------------------------------
+ */
+
+/*
+ * An external event has a name and is counted: n posts run each bound task n times. "ready" is this
+ * instance's own event; "packer1/product" is the event "product" of the instance packer1. A task is bound to
+ * an own event by its stExternalEvent, and registration is a separate act: before or after, by the
+ * application, by a component, or by the operator. Posting to an event that is not registered counts nothing.
+ *
+ * Registers an own event, or gives access to an event of another instance (whose registration is that
+ * instance's own). The handle stays valid until the process ends. *pResult (may be NULL): ERR_OK;
+ * ERR_DUPLICATE: the application or a component has registered it already; with RTS_INVALID_HANDLE:
+ * ERR_PARAMETER, ERR_NOMEMORY, ERR_NOTINITIALIZED. Control.
+ */
+RTS_HANDLE CDECL SchedRegisterExternalEvent(const char* pszEvent, RTS_RESULT* pResult);
+
+/* Ends the registration, unless the operator has registered the event, too. ERR_NO_OBJECT: it was not
+ * registered. Nothing is done for an event of another instance. Control. */
+RTS_RESULT CDECL SchedUnregisterExternalEvent(RTS_HANDLE hEvent);
+
+/* Posts once. ERR_OK; ERR_NO_TASK; ERR_NO_OBJECT; ERR_PARAMETER: not such a handle. Any. */
+RTS_RESULT CDECL SchedPostExternalEvent(RTS_HANDLE hEvent);
+
+/* The other way of the seed: be told when a task is there that waits for an external event, keep its hEvent,
+ * and set that. It works without a registration, and runs every task that is bound to the same event. */
+#define EVT_ExternalEventTaskCreateDone 0x0001u    /* tasks are made, not yet started */
+#define EVT_PrepareExternalEventTaskDelete 0x0002u /* forget the hEvent now */
+
+typedef struct {
+  const Task_Info* pTaskInfo;
+  RTS_HANDLE hEvent;
+} EVTPARAM_ExternalEventTask;
+
+typedef void(CDECL* PF_EVENT_CALLBACK)(unsigned int EventId, const EVTPARAM_ExternalEventTask* pParam,
+                                       void* pUser);
+
+#define PLC_MAX_EVENT_CALLBACKS 32
+
+/* ERR_OK; ERR_DUPLICATE: these three are registered already; ERR_PARAMETER; ERR_NOMEMORY. Control. */
+RTS_RESULT CDECL EventRegisterCallbackFunction(unsigned int EventId, PF_EVENT_CALLBACK pfCallback,
+                                               void* pUser);
+/* ERR_OK; ERR_NO_OBJECT: not registered. Control. */
+RTS_RESULT CDECL EventUnregisterCallbackFunction(unsigned int EventId, PF_EVENT_CALLBACK pfCallback,
+                                                 void* pUser);
+
+/* Runs the tasks bound to this event once. ERR_OK; ERR_NO_TASK; ERR_PARAMETER: not such a handle. Any. */
+RTS_RESULT CDECL CAL_SysEventSet(RTS_HANDLE hEvent);
+
+/* ---- Messages -------------------------------------------------------------------------------------------
+ */
+
+#define PLC_LOG_INFO 0
+#define PLC_LOG_WARNING 1
+#define PLC_LOG_ERROR 2
+#define PLC_LOG_MAX_TEXT 200
+
+/* Puts one line (cut to PLC_LOG_MAX_TEXT bytes) into the instance's log. It is only queued here and written
+ * by the control thread within 100 ms; what the queue has no room for is counted, and the count is logged.
+ * Any. */
+void CDECL plc_log(int nLevel, const char* pszText);
+
+/* ---- Components -----------------------------------------------------------------------------------------
+ */
+
+/*
+ * A component extends the runtime (a driver that posts events, say). It is a shared object that exports
+ * plc_app_abi and HookFunction, named in the settings: [ComponentManager] Component.1=FILE. Each hook is
+ * called for all components before the next one: CH_INIT, CH_INIT2, CH_INIT3 in the order of their numbers,
+ * before the application is loaded; CH_EXIT3, CH_EXIT2, CH_EXIT in reverse order, after the application's
+ * tasks have ended. Another result than ERR_OK from a CH_INIT.. ends the start of the instance. Threads are
+ * started in CH_INIT3 and have ended when CH_EXIT3 returns. Unknown hooks return ERR_OK.
+ */
+#define CH_INIT 1u
+#define CH_INIT2 2u
+#define CH_INIT3 3u
+#define CH_EXIT3 4u
+#define CH_EXIT2 5u
+#define CH_EXIT 6u
+
+PLC_EXPORT RTS_RESULT CDECL HookFunction(unsigned int ulHook, unsigned long ulParam1, unsigned long ulParam2);
+
+#ifdef __cplusplus
+}
+#endif
+
+#endif

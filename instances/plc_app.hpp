@@ -1,0 +1,198 @@
+#pragma once
+
+/// The thin C++ layer over plc_app.h: an application in a few lines, C++17, nothing to link.
+///
+///     #include "plc_app.hpp"
+///     using namespace std::chrono_literals;
+///
+///     static void setup(plc::Application& app) {
+///       app.cyclic("Fill", 1, 10ms, [] { ... });
+///       app.external("Stop", 0, "stop", [] { ... });
+///     }
+///     PLC_APPLICATION("Bottling", setup)
+///
+///     g++ -std=c++17 -shared -fPIC -I FOLDER_OF_THIS_FILE -o bottling.so bottling.cpp
+
+#include <chrono>
+#include <cstdarg>
+#include <cstddef>
+#include <cstdint>
+#include <cstdio>
+#include <cstring>
+#include <exception>
+#include <functional>
+#include <limits>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "plc_app.h"
+
+namespace plc {
+
+/// One line in the instance's log, in printf form, at most PLC_LOG_MAX_TEXT bytes. Any context; in a
+/// real-time task keep to integers and texts.
+__attribute__((format(printf, 1, 2))) inline void log(const char* format, ...) {
+  char text[PLC_LOG_MAX_TEXT + 1];  // NOLINT(modernize-avoid-c-arrays): filled by vsnprintf
+  std::va_list arguments;
+  va_start(arguments, format);
+  std::vsnprintf(text, sizeof text, format, arguments);
+  va_end(arguments);
+  plc_log(PLC_LOG_INFO, text);
+}
+
+/// An external event that can be posted to. Empty until it comes from Application::open_event.
+class ExternalEvent {
+ public:
+  ExternalEvent() noexcept = default;
+  /// ERR_OK, or ERR_NO_TASK / ERR_NO_OBJECT, see plc_app.h. Any context.
+  RTS_RESULT post() const noexcept { return SchedPostExternalEvent(handle_); }
+  [[nodiscard]] RTS_HANDLE handle() const noexcept { return handle_; }
+
+ private:
+  friend class Application;
+  explicit ExternalEvent(RTS_HANDLE handle) noexcept : handle_(handle) {}
+  RTS_HANDLE handle_ = RTS_INVALID_HANDLE;
+};
+
+/// Who registers the event of an external-event task.
+enum class Registration { with_task, by_others };
+
+/// The tasks of one application. Filled by the setup function, which runs once on the control thread before
+/// any task. Faults (a text too long) are exceptions there: they refuse the application with their text.
+class Application {
+ public:
+  using Cycle = std::function<void()>;
+  using Variable = std::function<bool()>;
+
+  explicit Application(const std::string& name) { copy(setup_.stApplicationName, name, "application"); }
+
+  /// Every `interval`. Priorities everywhere: 0 (highest) to 31, of which 0..15 are real-time.
+  void cyclic(const std::string& name, int priority, std::chrono::microseconds interval, Cycle cycle) {
+    if (interval.count() <= 0 || interval.count() > std::numeric_limits<unsigned int>::max()) {
+      throw std::invalid_argument("task '" + name + "': interval must be 1 us to 4294 s");
+    }
+    Task_Info& task = add(name, priority, Cyclic, std::move(cycle));
+    task.bMicroseconds = 1;
+    task.dwInterval = static_cast<unsigned int>(interval.count());
+  }
+
+  /// Once each time `variable` goes from false to true. `variable` is called by the scheduler and only reads:
+  /// what other tasks write and it reads should be std::atomic.
+  void event(const std::string& name, int priority, Variable variable, Cycle cycle) {
+    Task_Info& task = add(name, priority, Event, std::move(cycle));
+    task.dwEventFunctionPointer = &read_current;
+    variables_.back() = std::move(variable);
+  }
+
+  /// Once for each post of the external event `event`, which is registered, too, unless said otherwise.
+  void external(const std::string& name, int priority, const std::string& event, Cycle cycle,
+                Registration registration = Registration::with_task) {
+    Task_Info& task = add(name, priority, External, std::move(cycle));
+    copy(task.stExternalEvent, event, "external event");
+    if (registration == Registration::with_task) to_register_.push_back(event);
+  }
+
+  /// In a loop, sleeping a share of its execution time.
+  void freewheeling(const std::string& name, int priority, Cycle cycle) {
+    add(name, priority, Freewheeling, std::move(cycle));
+  }
+
+  /// Registers an own event ("ready"), or gives access to one of another instance ("packer1/product").
+  ExternalEvent open_event(const std::string& name) {
+    RTS_RESULT result = ERR_OK;
+    const RTS_HANDLE handle = SchedRegisterExternalEvent(name.c_str(), &result);
+    if (handle == RTS_INVALID_HANDLE) {
+      throw std::runtime_error("external event '" + name + "' cannot be had: result " +
+                               std::to_string(result));
+    }
+    return ExternalEvent(handle);
+  }
+
+  /// Runs once when all tasks have ended.
+  void on_exit(std::function<void()> action) { exit_ = std::move(action); }
+
+  /// Called by the code of PLC_APPLICATION.
+  template <class Setup>
+  int init(Setup&& setup) noexcept {
+    try {
+      current() = this;
+      std::forward<Setup>(setup)(*this);
+      setup_.nTasks = static_cast<short>(tasks_.size());
+      setup_.ptaskinfo = tasks_.data();
+      __sys__setup__tasks(&setup_);
+      for (const std::string& event : to_register_) open_event(event);
+      return 0;
+    } catch (const std::exception& error) {
+      plc_log(PLC_LOG_ERROR, error.what());
+    } catch (...) {
+      plc_log(PLC_LOG_ERROR, "the setup function threw something that is no std::exception");
+    }
+    return 1;
+  }
+  void exit() noexcept {
+    if (exit_) exit_();
+  }
+
+ private:
+  // plc_app.h's functions have no argument: all tasks share these two, which look up whose turn it is.
+  static void run_current() { current()->cycles_[index_of_current()](); }
+  static unsigned char read_current() { return current()->variables_[index_of_current()]() ? 1 : 0; }
+
+  static std::size_t index_of_current() noexcept {
+    return static_cast<std::size_t>(plc_current_task() - current()->tasks_.data());
+  }
+  static Application*& current() noexcept {
+    static Application* application = nullptr;
+    return application;
+  }
+
+  template <std::size_t Size>
+  static void copy(char (&to)[Size], const std::string& from, const char* what) {
+    if (from.size() >= Size) {
+      throw std::invalid_argument(std::string(what) + " name '" + from + "' is longer than " +
+                                  std::to_string(Size - 1) + " characters");
+    }
+    std::memcpy(to, from.c_str(), from.size() + 1);
+  }
+
+  Task_Info& add(const std::string& name, int priority, short kind, Cycle cycle) {
+    if (tasks_.size() >= PLC_MAX_TASKS) throw std::length_error("more than PLC_MAX_TASKS tasks");
+    if (priority < 0 || priority > 31) {
+      throw std::invalid_argument("task '" + name + "': priority must be 0 (highest) to 31");
+    }
+    Task_Info task{};
+    copy(task.stName, name, "task");
+    task.nPriority = static_cast<short>(priority);
+    task.KindOfTask = kind;
+    task.dwTaskEntryFunctionPointer = &run_current;
+    cycles_.push_back(std::move(cycle));
+    variables_.emplace_back();
+    tasks_.push_back(task);
+    return tasks_.back();
+  }
+
+  std::vector<Task_Info> tasks_;
+  std::vector<Cycle> cycles_;        // parallel to tasks_
+  std::vector<Variable> variables_;  // parallel to tasks_; empty unless the task is an event task
+  std::vector<std::string> to_register_;
+  std::function<void()> exit_;
+  sys_setup_tasks_struct setup_{};
+};
+
+}  // namespace plc
+
+/// Exports what plc-instance looks for. `setup` is called with a plc::Application&. Once per application.
+#define PLC_APPLICATION(name, setup)               \
+  static plc::Application& plc_the_application() { \
+    static plc::Application application(name);     \
+    return application;                            \
+  }                                                \
+  PLC_EXPORT_ABI;                                  \
+  int plc_app_init(void) {                         \
+    return plc_the_application().init(setup);      \
+  }                                                \
+  void plc_app_exit(void) {                        \
+    plc_the_application().exit();                  \
+  }

@@ -1,0 +1,12 @@
+#pragma once
+
+#include <string>
+
+namespace plchost {
+
+/// plc-instance --check-application: loads the file, runs its plc_app_init against a runtime that only
+/// collects, and prints its tasks or what is wrong. Starts no task and touches no pool. The exit code of the
+/// program.
+[[nodiscard]] int check_application(const std::string& path);
+
+}  // namespace plchost

@@ -1,0 +1,86 @@
+#include "instances/runtime/control_server.hpp"
+
+#include <array>
+#include <optional>
+#include <utility>
+
+#include <fmt/format.h>
+#include <sys/epoll.h>
+
+#include "shm/base/log.hpp"
+#include "shm/base/system_call.hpp"
+
+namespace plchost {
+
+namespace {
+
+Result<void> watch(const UniqueFd& epoll, int fd) {
+  epoll_event event{.events = EPOLLIN, .data = {.fd = fd}};
+  const auto added = check_errno(::epoll_ctl(epoll.get(), EPOLL_CTL_ADD, fd, &event), "watch control socket");
+  if (!added) return std::unexpected(added.error());
+  return {};
+}
+
+}  // namespace
+
+Result<ControlServer> ControlServer::listen(const std::string& path, Handler handler) {
+  auto listener = PacketListener::listen(path);
+  if (!listener) return std::unexpected(listener.error());
+  UniqueFd epoll(::epoll_create1(EPOLL_CLOEXEC));
+  if (!epoll) return failure(ErrorCode::system, "epoll_create1", errno);
+  if (auto watched = watch(epoll, listener->fd()); !watched) return std::unexpected(watched.error());
+  return ControlServer(*std::move(listener), std::move(epoll), std::move(handler));
+}
+
+void ControlServer::accept_all() {
+  for (std::size_t i = 0; i <= kMaxConnections; ++i) {
+    auto accepted = listener_.accept();
+    if (!accepted || !*accepted) return;
+    PacketSocket connection = *std::move(*accepted);
+    if (connections_.size() == kMaxConnections) {
+      (void)connection.send(
+          encode(ControlReply{.number = 0,
+                              .code = ErrorCode::busy,
+                              .text = fmt::format("{} control connections are open, that is all there may be",
+                                                  kMaxConnections)}));
+      continue;
+    }
+    const int fd = connection.fd();
+    if (watch(epoll_, fd)) connections_.emplace(fd, std::move(connection));
+  }
+}
+
+bool ControlServer::serve_one(PacketSocket& connection) {
+  auto packet = connection.receive();
+  if (packet && !*packet) return true;
+  std::optional<Error> error;
+  ControlReply reply;
+  if (!packet) {
+    if (packet.error().code != ErrorCode::corrupt) return false;  // the peer is gone
+    error = packet.error();
+  } else if (const auto request = decode_request(**packet)) {
+    reply = handler_(*request);
+    reply.number = request->number;
+  } else {
+    error = request.error();
+  }
+  if (error) reply = {.number = 0, .code = error->code, .text = error->describe()};
+  if (connection.send(encode(reply))) return true;
+  spdlog::warn("a control connection was closed: its client does not read its replies");
+  return false;
+}
+
+void ControlServer::serve() {
+  std::array<epoll_event, kMaxConnections + 1> events{};
+  const int count = ::epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), 0);
+  for (int i = 0; i < count; ++i) {
+    const int fd = events.at(static_cast<std::size_t>(i)).data.fd;
+    if (fd == listener_.fd()) {
+      accept_all();
+    } else if (const auto found = connections_.find(fd); found != connections_.end()) {
+      if (!serve_one(found->second)) connections_.erase(found);
+    }
+  }
+}
+
+}  // namespace plchost

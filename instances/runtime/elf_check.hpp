@@ -1,0 +1,22 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "shm/base/result.hpp"
+
+namespace plchost {
+
+inline constexpr std::size_t kMaxProgramFile = std::size_t{256} << 20;
+
+/// Checks that `file` is a whole shared object for this machine that exports plc_app_abi with our version and
+/// all of `symbols`, before the dynamic loader runs anything of it. The text says what it is instead. Set-up.
+[[nodiscard]] Result<void> check_elf(std::span<const std::byte> file,
+                                     std::span<const std::string_view> symbols);
+
+/// The same for a file; every text starts with its path. not_found: no such file.
+[[nodiscard]] Result<void> check_elf_file(const std::string& path, std::span<const std::string_view> symbols);
+
+}  // namespace plchost

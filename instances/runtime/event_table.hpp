@@ -1,0 +1,84 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "instances/plc_app.h"
+#include "shm/base/result.hpp"
+#include "shm/pool/object_pool.hpp"
+
+namespace plchost {
+
+/// The external events that this instance deals with, and the handles that applications have on them. A slot
+/// is given to a name once and for the life of the process, so that a handle stays valid and posting takes no
+/// lock. All but post() and set(): control thread only.
+class EventTable {
+ public:
+  static constexpr std::size_t kMaxEvents = 4096;
+
+  /// Without a pool (null) it only collects names: for checking an application that shall touch nothing.
+  EventTable(std::string instance, ObjectPool* pool) : instance_(std::move(instance)), pool_(pool) {}
+
+  /// Takes back what a dead process of this instance's name has left: its registrations and bound tasks.
+  void clear_own();
+
+  /// The handle of "event" (own) or "instance/event". invalid_argument; full.
+  [[nodiscard]] Result<RTS_HANDLE> open(std::string_view name);
+
+  /// Registration by the application or a component. already_exists: by one of them before.
+  [[nodiscard]] Result<void> register_by_application(RTS_HANDLE handle);
+  [[nodiscard]] Result<void> unregister_by_application(RTS_HANDLE handle);
+  /// Registration by the operator, of an own event. already_exists: by anyone before.
+  [[nodiscard]] Result<void> register_by_operator(std::string_view event);
+  /// Ends any registration of an own event. not_found: it has none.
+  [[nodiscard]] Result<void> unregister_by_operator(std::string_view event);
+  /// The own events that the operator has registered.
+  [[nodiscard]] std::vector<std::string> registered_by_operator() const;
+
+  /// The counter that a task bound to the own event waits on; counts the task. invalid_argument: not an own
+  /// event.
+  [[nodiscard]] Result<CountedEvent*> bind_task(std::string_view event);
+  void forget_tasks();
+  /// Whether all counters that tasks are bound to are still theirs (see ObjectPool: an event that is
+  /// neither registered nor bound may lose its place).
+  [[nodiscard]] Result<void> check_bound() const;
+  /// Tells posters whether the tasks run: bound, or not.
+  [[nodiscard]] Result<void> publish_bound(bool running);
+  /// Gets events of others that lost their place in the pool back. Now and then.
+  void refresh();
+
+  /// Real-time: see SchedPostExternalEvent and CAL_SysEventSet.
+  [[nodiscard]] RTS_RESULT post(RTS_HANDLE handle) const noexcept;
+  [[nodiscard]] RTS_RESULT set(RTS_HANDLE handle) const noexcept;
+
+ private:
+  struct Slot {
+    std::string name;    // as the application calls it; own events without the instance
+    std::string object;  // in the pool
+    bool own = false;
+    bool by_application = false;
+    bool by_operator = false;
+    std::uint32_t tasks = 0;                         // bound to it
+    const PoolEvent* bound = nullptr;                // what they wait on, for the life of the process
+    std::atomic<const PoolEvent*> event{nullptr};    // one of events; null without a pool
+    std::vector<std::unique_ptr<PoolEvent>> events;  // old ones stay: a poster may be looking at one
+  };
+
+  [[nodiscard]] Slot* find(RTS_HANDLE handle) const noexcept;
+  [[nodiscard]] Result<Slot*> open_own(std::string_view event);
+  [[nodiscard]] Result<void> attach(Slot& slot);
+  [[nodiscard]] Result<void> publish_registered(Slot& slot);
+
+  std::string instance_;
+  ObjectPool* pool_;
+  std::array<std::unique_ptr<Slot>, kMaxEvents> slots_;
+  std::atomic<std::size_t> count_{0};  // written by the control thread; slots below it are complete
+};
+
+}  // namespace plchost

@@ -1,0 +1,207 @@
+#include "instances/runtime/instance.hpp"
+
+#include <array>
+#include <utility>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "instances/runtime/operator_events.hpp"
+#include "instances/runtime/task_builder.hpp"
+#include "shm/base/log.hpp"
+
+namespace plchost {
+
+std::unique_ptr<Instance> Instance::set_up(const Options& options, SetupReporter& reporter) {
+  struct Step {
+    SetupStep step;
+    Result<std::string> (Instance::*take)();
+  };
+  // The tasks' statistics lie in the status page, so it is made before their threads.
+  constexpr std::array kSteps = {
+      Step{SetupStep::bind_core, &Instance::bind_core},
+      Step{SetupStep::lock_memory, &Instance::lock_memory},
+      Step{SetupStep::read_settings, &Instance::read_settings_file},
+      Step{SetupStep::attach_pool, &Instance::attach_pool},
+      Step{SetupStep::open_control_socket, &Instance::open_control_socket},
+      Step{SetupStep::load_components, &Instance::load_components},
+      Step{SetupStep::load_application, &Instance::load_application},
+      Step{SetupStep::make_status_page, &Instance::make_status_page},
+      Step{SetupStep::make_tasks, &Instance::make_tasks},
+      Step{SetupStep::start_scheduler, &Instance::start_scheduler},
+  };
+  std::unique_ptr<Instance> instance(new Instance(options));
+  for (const Step& step : kSteps) {
+    const auto remark = (instance.get()->*step.take)();
+    if (!remark) {
+      reporter.failed(step.step, remark.error());
+      (void)instance->shut_down();
+      return nullptr;
+    }
+    reporter.done(step.step, *remark);
+  }
+  instance->beat();
+  reporter.done(SetupStep::ready);
+  return instance;
+}
+
+Instance::~Instance() {
+  if (!is_down_) (void)shut_down();
+}
+
+Result<std::string> Instance::bind_core() {
+  auto granted = bind_to_cores(options_.launch.cores);
+  if (!granted) return std::unexpected(std::move(granted).error());
+  cores_ = *std::move(granted);
+  return {};
+}
+
+Result<std::string> Instance::lock_memory() {
+  real_time_ = set_up_real_time();
+  return real_time_.remark;
+}
+
+Result<std::string> Instance::read_settings_file() {
+  if (options_.launch.settings.empty()) return {};
+  auto settings = read_settings(options_.launch.settings);
+  if (!settings) return std::unexpected(std::move(settings).error());
+  settings_ = *std::move(settings);
+  for (const std::string& section : settings_.foreign_sections) {
+    spdlog::info("settings: section [{}] is not ours and is left alone", section);
+  }
+  return {};
+}
+
+Result<std::string> Instance::attach_pool() {
+  auto claim = claim_name(options_.launch.pool, options_.launch.name);
+  if (!claim) return std::unexpected(std::move(claim).error());
+  name_claim_ = *std::move(claim);
+  auto pool = ObjectPool::create(options_.launch.pool);
+  if (!pool) return std::unexpected(std::move(pool).error());
+  pool_.emplace(*std::move(pool));
+  host_.emplace(options_.launch.name, &*pool_);
+  host_->events().clear_own();
+  return {};
+}
+
+Result<std::string> Instance::open_control_socket() {
+  if (options_.launch.run_directory.empty()) return {};
+  auto server =
+      ControlServer::listen(instance_socket_path(options_.launch.run_directory, options_.launch.name),
+                            [this](const ControlRequest& request) { return handle(request); });
+  if (!server) return std::unexpected(std::move(server).error());
+  control_.emplace(*std::move(server));
+  restore_operator_events();
+  return {};
+}
+
+void Instance::restore_operator_events() {
+  const std::string path = operator_events_path(options_.launch.run_directory, options_.launch.name);
+  for (const std::string& event : read_operator_events(path)) {
+    if (const auto done = host_->events().register_by_operator(event); !done) {
+      spdlog::warn("event '{}' of the operator: {}", event, done.error().describe());
+    }
+  }
+}
+
+Result<std::string> Instance::load_components() {
+  auto loaded = components_.load(settings_.components);
+  host_->write_messages();
+  if (!loaded) return std::unexpected(std::move(loaded).error());
+  return {};
+}
+
+Result<std::string> Instance::load_application() {
+  if (options_.launch.application.empty()) return "no application is given: there is nothing to run";
+  auto application = Application::load(options_.launch.application, *host_);
+  if (!application) return std::unexpected(std::move(application).error());
+  application_.emplace(*std::move(application));
+  return {};
+}
+
+Result<std::string> Instance::make_status_page() {
+  std::vector<TaskIdentity> identities;
+  if (application_) {
+    for (const TaskConfig& task : application_->tasks()) identities.push_back(identity_of(task));
+  }
+  auto page = InstancePage::create(options_.launch.pool, options_.launch.name, identities);
+  if (!page) return std::unexpected(std::move(page).error());
+  page_.emplace(*std::move(page));
+  return {};
+}
+
+Result<std::string> Instance::make_tasks() {
+  if (!application_) return {};
+  TaskEnvironment environment{
+      .find_event = [this](std::string_view event) { return host_->events().bind_task(event); },
+      .statistics = [this](std::size_t index) -> TaskStatistics& {
+        return page_->task(static_cast<std::uint32_t>(index)).statistics;
+      },
+      .state_changed =
+          [this](std::size_t index, bool running) {
+            const auto state = running ? PageTaskState::running : PageTaskState::stopped;
+            page_->task(static_cast<std::uint32_t>(index))
+                .state.store(std::to_underlying(state), std::memory_order_relaxed);
+          },
+  };
+  auto tasks = TaskSet::create(clock_, options_.band, application_->tasks(), std::move(environment));
+  if (!tasks) return std::unexpected(std::move(tasks).error());
+  tasks_ = *std::move(tasks);
+  notify_tasks(EVT_ExternalEventTaskCreateDone);
+  return {};
+}
+
+Result<std::string> Instance::start_scheduler() {
+  if (!tasks_ || options_.launch.stopped) return {};
+  return start();
+}
+
+void Instance::notify_tasks(unsigned event) {
+  for (std::size_t i = 0; i < application_->tasks().size(); ++i) {
+    const TaskConfig& task = application_->tasks()[i];
+    if (task.kind != TaskKind::external) continue;
+    if (const auto handle = host_->events().open(task.external_event)) {
+      host_->notify(event, {.pTaskInfo = &application_->info(i), .hEvent = *handle});
+    }
+  }
+}
+
+void Instance::beat() {
+  host_->write_messages();
+  host_->events().refresh();
+  InstanceRuntime runtime;
+  runtime.pid = ::getpid();
+  runtime.core = cores_.size() == 1 ? cores_.front() : -1;
+  runtime.running = tasks_ && tasks_->running() ? 1 : 0;
+  runtime.memory_locked = real_time_.memory_locked ? 1 : 0;
+  runtime.heartbeat_ns = MonotonicClock::now().time_since_epoch().count();
+  runtime.scheduler.assign(scheduler_);
+  if (application_) runtime.application.assign(application_->path());
+  page_->write_runtime(runtime);
+}
+
+Result<void> Instance::shut_down() {
+  is_down_ = true;
+  Result<void> stopped;
+  if (tasks_) {
+    (void)host_->events().publish_bound(false);
+    if (tasks_->running()) stopped = tasks_->stop(kStopLimit);
+    if (stopped) {
+      notify_tasks(EVT_PrepareExternalEventTaskDelete);
+      tasks_.reset();
+    }
+  }
+  if (stopped) {
+    if (application_) application_->exit();
+    components_.exit();
+  }
+  if (host_) {
+    host_->write_messages();
+    host_->events().clear_own();
+  }
+  if (page_) InstancePage::remove(options_.launch.pool, options_.launch.name);
+  control_.reset();
+  return stopped;
+}
+
+}  // namespace plchost

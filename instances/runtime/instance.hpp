@@ -1,0 +1,98 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "instances/runtime/application.hpp"
+#include "instances/runtime/application_host.hpp"
+#include "instances/runtime/components.hpp"
+#include "instances/runtime/control_server.hpp"
+#include "instances/runtime/options.hpp"
+#include "instances/runtime/process_setup.hpp"
+#include "instances/runtime/settings.hpp"
+#include "instances/runtime/setup_reporter.hpp"
+#include "schedulers/task_set.hpp"
+#include "shm/pool/instance_page.hpp"
+#include "shm/pool/object_pool.hpp"
+
+namespace plchost {
+
+/// One PLC runtime: everything that a plc-instance process owns. All of it on the control thread; the tasks'
+/// threads are TaskSet's.
+class Instance {
+ public:
+  /// Takes the steps of SetupStep one after the other and reports each. Nothing: one failed, and was
+  /// reported; all that was begun is undone.
+  [[nodiscard]] static std::unique_ptr<Instance> set_up(const Options& options, SetupReporter& reporter);
+
+  /// Ends the tasks in order, then the application and the components, and takes the instance out of the
+  /// pool.
+  ~Instance();
+  Instance(const Instance&) = delete;
+  Instance& operator=(const Instance&) = delete;
+
+  /// Readable when serve_control() has something to do; -1: no control socket.
+  [[nodiscard]] int control_fd() const noexcept { return control_ ? control_->fd() : -1; }
+  void serve_control() { control_->serve(); }
+
+  /// Every kHeartbeat: status page, log of the application, handles of foreign events.
+  void beat();
+  static constexpr auto kHeartbeat = std::chrono::milliseconds(100);
+
+  /// A client has asked for the end of the process.
+  [[nodiscard]] bool shutdown_requested() const noexcept { return shutdown_requested_; }
+
+  /// Stops everything; called once before the end. timed_out: a task is caught in its cycle; then this object
+  /// cannot be destroyed, because that task's thread still uses it.
+  [[nodiscard]] Result<void> shut_down();
+
+  /// How long tasks may take to end their cycles.
+  static constexpr auto kStopLimit = std::chrono::seconds(5);
+
+ private:
+  explicit Instance(const Options& options) : options_(options), scheduler_(options.launch.scheduler) {}
+
+  // The steps of set_up().
+  [[nodiscard]] Result<std::string> bind_core();
+  [[nodiscard]] Result<std::string> lock_memory();
+  [[nodiscard]] Result<std::string> read_settings_file();
+  [[nodiscard]] Result<std::string> attach_pool();
+  [[nodiscard]] Result<std::string> open_control_socket();
+  [[nodiscard]] Result<std::string> load_components();
+  [[nodiscard]] Result<std::string> load_application();
+  [[nodiscard]] Result<std::string> make_status_page();
+  [[nodiscard]] Result<std::string> make_tasks();
+  [[nodiscard]] Result<std::string> start_scheduler();
+
+  [[nodiscard]] ControlReply handle(const ControlRequest& request);
+  [[nodiscard]] Result<std::string> obey(const ControlRequest& request);
+  [[nodiscard]] Result<std::string> start();
+  [[nodiscard]] Result<std::string> stop();
+  [[nodiscard]] Result<std::string> set_scheduler(const std::string& name);
+  [[nodiscard]] Result<std::string> change_registration(const ControlRequest& request);
+  [[nodiscard]] std::string status() const;
+
+  void restore_operator_events();
+  void notify_tasks(unsigned event);
+
+  Options options_;
+  std::string scheduler_;
+  std::vector<int> cores_;
+  RealTimeSetup real_time_;
+  InstanceSettings settings_;
+  UniqueFd name_claim_;
+  std::optional<ObjectPool> pool_;
+  std::optional<ApplicationHost> host_;
+  Components components_;
+  std::optional<Application> application_;
+  std::optional<InstancePage> page_;
+  LinuxClock clock_;
+  std::unique_ptr<TaskSet> tasks_;  // uses all of the above: destroyed before them
+  std::optional<ControlServer> control_;
+  bool shutdown_requested_ = false;
+  bool is_down_ = false;
+};
+
+}  // namespace plchost

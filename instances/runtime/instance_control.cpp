@@ -1,0 +1,118 @@
+// What an Instance does when it is asked to, over its control socket.
+
+#include <utility>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "instances/runtime/instance.hpp"
+#include "instances/runtime/operator_events.hpp"
+#include "shm/base/log.hpp"
+
+namespace plchost {
+
+ControlReply Instance::handle(const ControlRequest& request) {
+  auto done = obey(request);
+  if (request.verb != ControlVerb::status) {
+    spdlog::info("{} {}: {}", to_string(request.verb), request.argument,
+                 done ? "done" : done.error().describe());
+  }
+  if (page_) beat();  // so that who was answered finds the new state in the page
+  if (!done) return {.number = request.number, .code = done.error().code, .text = done.error().describe()};
+  return {.number = request.number, .code = ErrorCode::ok, .text = *std::move(done)};
+}
+
+Result<std::string> Instance::obey(const ControlRequest& request) {
+  if (request.instance != options_.launch.name) {
+    return failure(ErrorCode::not_found, fmt::format("this is instance '{}', the request is for '{}'",
+                                                     options_.launch.name, request.instance));
+  }
+  switch (request.verb) {
+    case ControlVerb::start:
+      return start();
+    case ControlVerb::stop:
+      return stop();
+    case ControlVerb::set_scheduler:
+      return set_scheduler(request.argument);
+    case ControlVerb::register_event:
+    case ControlVerb::unregister_event:
+      return change_registration(request);
+    case ControlVerb::shutdown:
+      shutdown_requested_ = true;
+      return {};
+    case ControlVerb::status:
+      return status();
+    case ControlVerb::reset:
+    case ControlVerb::restart:
+    case ControlVerb::load_application:
+      break;
+  }
+  return failure(ErrorCode::unsupported,
+                 fmt::format("'{}' needs a fresh process: ask the manager", to_string(request.verb)));
+}
+
+Result<std::string> Instance::start() {
+  if (!tasks_) {
+    return failure(ErrorCode::wrong_state,
+                   fmt::format("instance '{}' has no application to start: load one", options_.launch.name));
+  }
+  if (tasks_->running()) {
+    return failure(ErrorCode::wrong_state, fmt::format("instance '{}' runs already", options_.launch.name));
+  }
+  if (auto bound = host_->events().check_bound(); !bound) return std::unexpected(std::move(bound).error());
+  if (auto started = tasks_->start(scheduler_, settings_.scheduler); !started) {
+    return std::unexpected(std::move(started).error());
+  }
+  // Only now, so that no poster is told that its event will be run when it came a moment too early.
+  if (auto bound = host_->events().publish_bound(true); !bound) {
+    (void)tasks_->stop(kStopLimit);
+    return std::unexpected(std::move(bound).error());
+  }
+  spdlog::info("{} runs {} tasks under {}", application_->name(), application_->tasks().size(), scheduler_);
+  return {};
+}
+
+Result<std::string> Instance::stop() {
+  if (!tasks_ || !tasks_->running()) {
+    return failure(ErrorCode::wrong_state, fmt::format("instance '{}' does not run", options_.launch.name));
+  }
+  (void)host_->events().publish_bound(false);
+  if (auto stopped = tasks_->stop(kStopLimit); !stopped) return std::unexpected(std::move(stopped).error());
+  return {};
+}
+
+Result<std::string> Instance::set_scheduler(const std::string& name) {
+  if (const auto known = find_scheduler(name); !known) return std::unexpected(known.error());
+  if (tasks_ && tasks_->running()) {
+    if (auto switched = tasks_->switch_to(name, settings_.scheduler); !switched) {
+      return std::unexpected(std::move(switched).error());
+    }
+  }
+  scheduler_ = name;
+  return {};
+}
+
+Result<std::string> Instance::change_registration(const ControlRequest& request) {
+  EventTable& events = host_->events();
+  const bool add = request.verb == ControlVerb::register_event;
+  const auto changed =
+      add ? events.register_by_operator(request.argument) : events.unregister_by_operator(request.argument);
+  if (!changed && changed.error().code != ErrorCode::already_exists) return std::unexpected(changed.error());
+  const auto kept =
+      write_operator_events(operator_events_path(options_.launch.run_directory, options_.launch.name),
+                            events.registered_by_operator());
+  if (!changed) return changed.error().message;  // it was there: what was wanted holds
+  if (!kept) return fmt::format("done, but not kept for the next start: {}", kept.error().describe());
+  return {};
+}
+
+std::string Instance::status() const {
+  return encode(InstanceReport{.pid = ::getpid(),
+                               .running = tasks_ && tasks_->running(),
+                               .application = application_ ? application_->path() : std::string(),
+                               .scheduler = scheduler_,
+                               .cores = cores_,
+                               .memory_locked = real_time_.memory_locked});
+}
+
+}  // namespace plchost

@@ -1,0 +1,106 @@
+// plc-instance: one PLC runtime.
+
+#include <array>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/signalfd.h>
+#include <sys/timerfd.h>
+#include <unistd.h>
+
+#include "instances/runtime/application_check.hpp"
+#include "instances/runtime/instance.hpp"
+#include "instances/runtime/options.hpp"
+#include "shm/base/log.hpp"
+#include "shm/base/system_call.hpp"
+#include "shm/base/unique_fd.hpp"
+
+namespace plchost {
+
+namespace {
+
+// The mask is set as a whole: whatever the starter had blocked, we have these two. Before any thread is made.
+Result<UniqueFd> take_signals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGTERM);
+  sigaddset(&signals, SIGINT);
+  ::sigprocmask(SIG_SETMASK, &signals, nullptr);
+  UniqueFd fd(::signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK));
+  if (!fd) return failure(ErrorCode::system, "signalfd", errno);
+  return fd;
+}
+
+Result<UniqueFd> start_heartbeat() {
+  UniqueFd fd(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK));
+  if (!fd) return failure(ErrorCode::system, "timerfd_create", errno);
+  const timespec interval = to_timespec(Duration(Instance::kHeartbeat));
+  const itimerspec timer{.it_interval = interval, .it_value = interval};
+  if (const auto set = check_errno(::timerfd_settime(fd.get(), 0, &timer, nullptr), "timerfd_settime");
+      !set) {
+    return std::unexpected(set.error());
+  }
+  return fd;
+}
+
+// Until a signal or a client asks for the end.
+Result<void> serve(Instance& instance, const UniqueFd& signals) {
+  const auto heartbeat = start_heartbeat();
+  if (!heartbeat) return std::unexpected(heartbeat.error());
+  std::array<pollfd, 3> fds{{{.fd = signals.get(), .events = POLLIN, .revents = 0},
+                             {.fd = heartbeat->get(), .events = POLLIN, .revents = 0},
+                             {.fd = instance.control_fd(), .events = POLLIN, .revents = 0}}};
+  while (!instance.shutdown_requested()) {
+    if (::poll(fds.data(), fds.size(), -1) < 0) {
+      if (errno == EINTR) continue;
+      return failure(ErrorCode::system, "poll", errno);
+    }
+    if (fds[0].revents != 0) {
+      spdlog::info("a signal asks for the end");
+      return {};
+    }
+    std::uint64_t expirations = 0;
+    if (fds[1].revents != 0 && ::read(heartbeat->get(), &expirations, sizeof expirations) > 0)
+      instance.beat();
+    if (fds[2].revents != 0) instance.serve_control();
+  }
+  return {};
+}
+
+int run(const Options& options) {
+  start_log("plc-instance/" + options.launch.name, options.launch.log_level);
+  const auto signals = take_signals();
+  if (!signals) {
+    spdlog::error("{}", signals.error().describe());
+    return kExitSetupFailed;
+  }
+  if (!options.check_application.empty()) return check_application(options.check_application);
+
+  std::unique_ptr<Instance> instance;
+  {
+    SetupReporter reporter(options.launch.report_fd);
+    instance = Instance::set_up(options, reporter);
+  }
+  if (!instance) return kExitSetupFailed;
+  const auto served = serve(*instance, *signals);
+  if (!served) spdlog::error("{}", served.error().describe());
+  if (const auto down = instance->shut_down(); !down) {
+    spdlog::error("{}; the process ends without it", down.error().describe());
+    std::fflush(nullptr);
+    ::_exit(EXIT_FAILURE);  // a thread is still inside the application: nothing may be destroyed
+  }
+  spdlog::info("ended");
+  return served ? EXIT_SUCCESS : EXIT_FAILURE;
+}
+
+}  // namespace
+
+}  // namespace plchost
+
+int main(int argc, char** argv) {
+  const auto parsed = plchost::parse_options(argc, argv);
+  return parsed.options ? plchost::run(*parsed.options) : parsed.exit_code;
+}

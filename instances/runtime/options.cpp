@@ -1,0 +1,111 @@
+#include "instances/runtime/options.hpp"
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "schedulers/scheduler.hpp"
+#include "shm/base/names.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr std::array kBands = {
+    std::pair{std::string_view("high"), PriorityBand::high},
+    std::pair{std::string_view("normal"), PriorityBand::normal},
+    std::pair{std::string_view("low"), PriorityBand::low},
+};
+constexpr std::array kLogLevels = {std::string_view("trace"), std::string_view("debug"),
+                                   std::string_view("info"), std::string_view("warning"),
+                                   std::string_view("error")};
+constexpr int kMaxCore = 1023;
+
+// In CLI11 a validator returns the text of what is wrong, or nothing.
+std::string text_of(const Result<void>& result) {
+  return result ? std::string() : result.error().describe();
+}
+
+std::string check_scheduler(const std::string& name) {
+  const auto found = find_scheduler(name);
+  return found ? std::string() : found.error().describe();
+}
+
+std::string check_instance_name(const std::string& name) {
+  return text_of(check_name("instance name", name, kMaxInstanceName));
+}
+
+std::string check_pool_name(const std::string& name) {
+  return text_of(check_name("pool name", name, kMaxInstanceName));
+}
+
+std::string check_band(const std::string& name) {
+  const bool known = std::ranges::any_of(kBands, [&](const auto& band) { return band.first == name; });
+  return known ? std::string() : fmt::format("'{}' is no priority band: high, normal and low are", name);
+}
+
+std::string check_log_level(const std::string& name) {
+  const bool known = std::ranges::find(kLogLevels, name) != kLogLevels.end();
+  return known ? std::string() : fmt::format("'{}' is no log level: {} are", name, join_names(kLogLevels));
+}
+
+void describe(CLI::App& app, Options& options) {
+  LaunchOptions& launch = options.launch;
+  app.set_version_flag("--version", PLCHOST_VERSION);
+  app.add_option("--name", launch.name, "Name of this instance")
+      ->check(check_instance_name)
+      ->capture_default_str();
+  app.add_option("--core", launch.cores,
+                 "Cores for all of its threads: N[,N...]; default: where it was started")
+      ->delimiter(',')
+      ->check(CLI::Range(0, kMaxCore));
+  app.add_option("--scheduler", launch.scheduler, "One of " + scheduler_names())
+      ->check(check_scheduler)
+      ->capture_default_str();
+  app.add_option("--priority-band", launch.priority_band, "high, normal or low")
+      ->check(check_band)
+      ->capture_default_str();
+  app.add_option("--settings", launch.settings, "Settings file, [Section] Key=Value");
+  app.add_option("--application", launch.application, "The application, a shared object");
+  app.add_option("--pool", launch.pool, "Name of the object pool")
+      ->check(check_pool_name)
+      ->capture_default_str();
+  app.add_option("--run-directory", launch.run_directory, "Where the control socket goes; default: none");
+  app.add_flag("--stopped", launch.stopped, "Load the application, do not start it");
+  app.add_option("--report-fd", launch.report_fd,
+                 "Descriptor of a socket for set-up reports; default: the log")
+      ->check(CLI::NonNegativeNumber);
+  app.add_option("--log-level", launch.log_level, join_names(kLogLevels))
+      ->check(check_log_level)
+      ->capture_default_str();
+  app.add_option("--check-application", options.check_application,
+                 "Only check this file, and say what is in it");
+}
+
+}  // namespace
+
+ParsedOptions parse_options(int argc, const char* const* argv) {
+  Options options;
+  options.launch.name = "plc";
+  CLI::App app("One PLC runtime: loads an application and runs its tasks until SIGTERM or Ctrl-C.",
+               "plc-instance");
+  describe(app, options);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    const int code = app.exit(error);
+    return {.options = std::nullopt, .exit_code = code == 0 ? 0 : kExitUsage};
+  }
+  options.band =
+      std::ranges::find(kBands, std::string_view(options.launch.priority_band), [](const auto& band) {
+        return band.first;
+      })->second;
+  return {.options = std::move(options), .exit_code = 0};
+}
+
+}  // namespace plchost

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "instances/launch/launch_contract.hpp"
+#include "schedulers/task_config.hpp"
+
+namespace plchost {
+
+/// What plc-instance was asked to do.
+struct Options {
+  LaunchOptions launch;
+  PriorityBand band = PriorityBand::normal;  ///< launch.priority_band, translated
+  std::string check_application;             ///< not empty: only check this file
+};
+
+/// What came of the command line: options, or the exit code of a program that has nothing more to do (help,
+/// version, or a usage error, whose text is printed already).
+struct ParsedOptions {
+  std::optional<Options> options;
+  int exit_code = 0;
+};
+
+[[nodiscard]] ParsedOptions parse_options(int argc, const char* const* argv);
+
+}  // namespace plchost

@@ -1,0 +1,123 @@
+#include "instances/runtime/process_setup.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <linux/capability.h>
+#include <malloc.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/socket.h>
+#include <sys/syscall.h>
+#include <sys/un.h>
+
+#include "shm/base/system_call.hpp"
+#include "shm/base/thread.hpp"
+
+namespace plchost {
+
+namespace {
+
+bool has_capability(unsigned capability) {
+  __user_cap_header_struct header{.version = _LINUX_CAPABILITY_VERSION_3, .pid = 0};
+  __user_cap_data_struct sets[_LINUX_CAPABILITY_U32S_3] =
+      {};  // NOLINT(modernize-avoid-c-arrays): the kernel's
+  if (::syscall(SYS_capget, &header, &sets) != 0) return false;
+  return (sets[CAP_TO_INDEX(capability)].effective & CAP_TO_MASK(capability)) != 0;
+}
+
+// With locked memory no page of ours is ever swapped or faulted in late. malloc shall then neither give
+// memory back (M_TRIM_THRESHOLD) nor map large blocks anew each time (M_MMAP_MAX): both would bring the
+// faults back.
+Result<void> lock_memory() {
+  rlimit limit{};
+  ::getrlimit(RLIMIT_MEMLOCK, &limit);
+  if (!has_capability(CAP_IPC_LOCK) && limit.rlim_cur != RLIM_INFINITY) {
+    // Under a limit the lock may succeed now and make a later thread's stack fail: better none than half.
+    return failure(ErrorCode::refused,
+                   fmt::format("the limit for locked memory is {} KiB: give the process CAP_IPC_LOCK or "
+                               "LimitMEMLOCK=infinity",
+                               limit.rlim_cur / 1024));
+  }
+  if (const auto locked = check_errno(::mlockall(MCL_CURRENT | MCL_FUTURE), "mlockall"); !locked) {
+    return std::unexpected(locked.error());
+  }
+  ::mallopt(M_TRIM_THRESHOLD, -1);
+  ::mallopt(M_MMAP_MAX, 0);
+  return {};
+}
+
+Result<UniqueFd> hold_latency() {
+  UniqueFd fd(::open("/dev/cpu_dma_latency", O_WRONLY | O_CLOEXEC));
+  if (!fd) return failure(ErrorCode::refused, "open /dev/cpu_dma_latency", errno);
+  const std::int32_t microseconds = 0;
+  if (const auto written =
+          check_errno(::write(fd.get(), &microseconds, sizeof microseconds), "write /dev/cpu_dma_latency");
+      !written) {
+    return std::unexpected(written.error());
+  }
+  return fd;
+}
+
+}  // namespace
+
+Result<std::vector<int>> bind_to_cores(const std::vector<int>& cores) {
+  if (cores.empty()) return allowed_cores(0);
+  auto wanted = cores;
+  std::ranges::sort(wanted);
+  wanted.erase(std::ranges::unique(wanted).begin(), wanted.end());
+  const auto online = online_cores();
+  const std::string known = online ? fmt::format("; on line are {}", fmt::join(*online, ",")) : std::string();
+  auto granted = bind_process_to_cores(0, wanted);
+  if (!granted) {
+    granted.error().message += known;
+    return granted;
+  }
+  if (*granted != wanted) {
+    return failure(ErrorCode::refused, fmt::format("cores {} were asked for, the kernel granted {}{}",
+                                                   fmt::join(wanted, ","), fmt::join(*granted, ","), known));
+  }
+  return granted;
+}
+
+RealTimeSetup set_up_real_time() {
+  RealTimeSetup setup;
+  std::vector<std::string> remarks;
+  const auto locked = lock_memory();
+  setup.memory_locked = locked.has_value();
+  if (!locked) remarks.push_back(fmt::format("memory is not locked: {}", locked.error().describe()));
+  auto hold = hold_latency();
+  if (hold) {
+    setup.latency_hold = *std::move(hold);
+  } else {
+    remarks.push_back(fmt::format("sleep states of the processor stay on: {}", hold.error().describe()));
+  }
+  // Threads inherit it. Only SCHED_OTHER has slack; FIFO threads have none anyway.
+  if (::prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL) != 0)
+    remarks.emplace_back("the timer slack stays at 50 us");
+  setup.remark = fmt::format("{}", fmt::join(remarks, "; "));
+  return setup;
+}
+
+Result<UniqueFd> claim_name(const std::string& pool, const std::string& instance) {
+  // A socket name in the abstract namespace: the kernel takes it back when the process ends, however it ends.
+  UniqueFd fd(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  if (!fd) return failure(ErrorCode::system, "socket", errno);
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  const std::string name = fmt::format("plchost/{}/{}", pool, instance);
+  const std::size_t length = std::min(name.size(), sizeof address.sun_path - 1);
+  std::copy_n(name.begin(), length, address.sun_path + 1);
+  const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + length);
+  if (::bind(fd.get(), reinterpret_cast<const sockaddr*>(&address), size) == 0) return fd;
+  const int error = errno;
+  if (error != EADDRINUSE) return failure(ErrorCode::system, "claim the instance's name", error);
+  return failure(ErrorCode::already_exists,
+                 fmt::format("an instance '{}' runs already in pool '{}'", instance, pool));
+}
+
+}  // namespace plchost
