@@ -1,0 +1,94 @@
+#include "manager/api_server.hpp"
+
+#include <algorithm>
+#include <csignal>
+#include <utility>
+
+#include <fmt/format.h>
+#include <sys/epoll.h>
+
+#include "shm/base/log.hpp"
+
+namespace plchost {
+
+ApiServer::ApiServer(Reactor& reactor, const ManagerConfig& config, std::string program)
+    : reactor_(reactor),
+      config_(config),
+      program_(std::move(program)),
+      timer_(reactor, [this] { on_timer(); }) {}
+
+void ApiServer::start() {
+  spawn();
+}
+
+std::vector<std::string> ApiServer::arguments() const {
+  const HostConfig& host = config_.host;
+  std::vector<std::string> arguments = {program_,
+                                        "--host",
+                                        host.name,
+                                        "--domain",
+                                        fmt::format("{}", host.dds_domain),
+                                        "--pool",
+                                        host.pool,
+                                        "--run-directory",
+                                        host.run_directory,
+                                        "--interface",
+                                        config_.dds.interface,
+                                        "--log-level",
+                                        host.log_level};
+  for (const std::string& peer : config_.dds.peers) {
+    arguments.emplace_back("--peer");
+    arguments.push_back(peer);
+  }
+  return arguments;
+}
+
+void ApiServer::spawn() {
+  spawned_ = MonotonicClock::now();
+  auto process = spawn_process({.arguments = arguments()});
+  if (process) {
+    auto watch = reactor_.watch(process->pidfd.get(), EPOLLIN, [this](std::uint32_t) { ended(); });
+    if (watch) {
+      process_ = std::move(*process);
+      exit_watch_ = std::move(*watch);
+      spdlog::info("API server: process {}", process_->pid);
+      return;
+    }
+    (void)signal_process(*process, SIGKILL);
+    spdlog::error("API server: {}", watch.error().describe());
+  } else {
+    spdlog::error("API server: {}", process.error().describe());
+  }
+  timer_.set(MonotonicClock::now() + kApiRestartDelayMax);
+}
+
+void ApiServer::ended() {
+  const ExitStatus status = reap_process(*process_);
+  exit_watch_.reset();
+  process_.reset();
+  timer_.cancel();
+  if (shut_down_) return std::exchange(shut_down_, nullptr)();
+  const TimePoint now = MonotonicClock::now();
+  if (now - spawned_ >= kApiSettled) delay_ = Duration::zero();
+  spdlog::warn("API server: {}; starts again after {} ms", status.describe(),
+               std::chrono::duration_cast<std::chrono::milliseconds>(delay_).count());
+  timer_.set(now + delay_);
+  delay_ = std::clamp(2 * delay_, kApiRestartDelay, kApiRestartDelayMax);
+}
+
+void ApiServer::on_timer() {
+  if (!shut_down_) return spawn();
+  spdlog::warn("API server: does not end; it is killed");
+  if (process_) (void)signal_process(*process_, SIGKILL);
+}
+
+void ApiServer::shut_down(std::function<void()> done) {
+  timer_.cancel();
+  if (!process_) return done();
+  shut_down_ = std::move(done);
+  (void)signal_process(*process_, SIGTERM);
+  constexpr Duration kLimit = std::chrono::seconds(2);
+  timer_.set(MonotonicClock::now() + kLimit);
+}
+
+}  // namespace plchost

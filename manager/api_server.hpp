@@ -1,0 +1,47 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "manager/config/manager_config.hpp"
+#include "manager/system/child_process.hpp"
+#include "manager/system/reactor.hpp"
+
+namespace plchost {
+
+/// Keeps `plchost-dds` alive: started again at once when it ends, and with back-off when it keeps ending. It
+/// finds the manager by its control socket, and ends by itself when that closes.
+class ApiServer {
+ public:
+  ApiServer(Reactor& reactor, const ManagerConfig& config, std::string program);
+
+  void start();
+  /// SIGTERM, SIGKILL after a limit; `done` when it is gone, possibly at once.
+  void shut_down(std::function<void()> done);
+
+ private:
+  void spawn();
+  void ended();
+  void on_timer();
+  [[nodiscard]] std::vector<std::string> arguments() const;
+
+  Reactor& reactor_;
+  const ManagerConfig& config_;
+  std::string program_;
+  std::optional<ChildProcess> process_;
+  Reactor::Watch exit_watch_;
+  Reactor::Timer timer_;
+  TimePoint spawned_{};
+  Duration delay_{};
+  std::function<void()> shut_down_;
+};
+
+/// Of the second and later restarts in a row: doubles from the first to the second.
+inline constexpr Duration kApiRestartDelay = std::chrono::milliseconds(100);
+inline constexpr Duration kApiRestartDelayMax = std::chrono::seconds(5);
+/// Who lived that long has recovered: its next restart is at once.
+inline constexpr Duration kApiSettled = std::chrono::seconds(10);
+
+}  // namespace plchost

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "manager/config/manager_config.hpp"
+#include "manager/config/toml_document.hpp"
+#include "shm/base/result.hpp"
+
+namespace plchost {
+
+/// Where the keys of one instance stand that others are compared with.
+struct InstanceLines {
+  unsigned name = 0;
+  unsigned core = 0;
+  unsigned after = 0;
+};
+using ConfigLines = std::vector<InstanceLines>;
+
+/// What only shows when all instances are known: names twice, cores not allowed or shared without saying so,
+/// `after` naming nobody or going in a circle.
+void check_relations(const ManagerConfig& config, const ConfigLines& lines, const std::vector<int>& online,
+                     std::vector<ConfigProblem>& problems);
+
+/// The error says what is wrong with the file.
+[[nodiscard]] Result<void> check_readable_file(const std::string& path);
+
+}  // namespace plchost

@@ -1,0 +1,301 @@
+#include "manager/config/load_config.hpp"
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <sstream>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "manager/config/check_relations.hpp"
+#include "manager/config/section_reader.hpp"
+#include "manager/config/toml_document.hpp"
+#include "shm/base/names.hpp"
+#include "shm/pool/host_page.hpp"
+
+namespace plchost {
+
+namespace {
+
+using namespace std::string_view_literals;
+
+constexpr std::array kLogLevels = {"trace"sv, "debug"sv, "info"sv, "warning"sv, "error"sv};
+constexpr std::array kPriorityBands = {"high"sv, "normal"sv, "low"sv};
+constexpr std::array kRestartPolicies = {"never"sv, "on-failure"sv, "always"sv};
+constexpr std::int64_t kMaxCoreNumber = 1023;  // CPU_SETSIZE
+
+struct Loader {
+  const ConfigSurroundings& surroundings;
+  std::string folder;
+  ManagerConfig config;
+  std::vector<ConfigProblem> problems;
+  ConfigLines lines;
+
+  void read(const TomlTable& root);
+  void read_host(const TomlTable& table, unsigned line);
+  void read_cores(SectionReader& reader);
+  void read_dds(const TomlTable& table, unsigned line);
+  void read_instances(const TomlValue& value);
+  void read_instance(const TomlTable& table, unsigned line);
+  void read_restart(SectionReader& reader, InstanceConfig& instance);
+  void read_file(SectionReader& reader, std::string_view key, std::string& target);
+  const TomlTable* section(const TomlTable& root, std::string_view name);
+};
+
+void check_name_of(SectionReader& reader, std::string_view key, const std::string& name, std::size_t max) {
+  if (const auto good = check_name("name", name, max); !good) reader.problem(key, good.error().message);
+}
+
+const TomlTable* Loader::section(const TomlTable& root, std::string_view name) {
+  const auto found = root.find(name);
+  if (found == root.end()) return nullptr;
+  const auto* table = std::get_if<TomlTable>(&found->second.value);
+  if (table == nullptr) {
+    problems.push_back({found->second.line, fmt::format("'{0}' must be a section: [{0}]", name)});
+  }
+  return table;
+}
+
+void Loader::read(const TomlTable& root) {
+  constexpr std::array kSections = {"host"sv, "dds"sv, "instance"sv};
+  for (const auto& [key, value] : root) {
+    if (std::ranges::find(kSections, std::string_view(key)) != kSections.end()) continue;
+    constexpr std::size_t kShown = 80;
+    problems.push_back({value.line, fmt::format("unknown section or key '{}'; allowed are [host], [dds], "
+                                                "[[instance]]{}",
+                                                key.substr(0, kShown), suggestion(key, kSections))});
+  }
+  const TomlTable none;
+  const TomlTable* host = section(root, "host");
+  read_host(host != nullptr ? *host : none, host != nullptr ? root.find("host")->second.line : 0);
+  if (const TomlTable* dds = section(root, "dds")) read_dds(*dds, root.find("dds")->second.line);
+  if (const auto found = root.find("instance"); found != root.end()) read_instances(found->second);
+}
+
+void Loader::read_host(const TomlTable& table, unsigned line) {
+  SectionReader reader(table, line, "[host]", problems);
+  HostConfig& host = config.host;
+  host.name = surroundings.host_name;
+  std::int64_t domain = host.dds_domain;
+  std::int64_t objects = host.pool_objects;
+  reader.text("name", host.name);
+  reader.number("dds_domain", 0, kMaxDdsDomain, domain);
+  reader.text("run_directory", host.run_directory);
+  reader.text("pool", host.pool);
+  reader.number("pool_objects", kMinPoolObjects, kMaxPoolObjects, objects);
+  reader.choice("log_level", kLogLevels, host.log_level);
+  reader.truth("keep_pool", host.keep_pool);
+  host.dds_domain = static_cast<int>(domain);
+  host.pool_objects = static_cast<std::uint32_t>(objects);
+  check_name_of(reader, "name", host.name, kMaxHostName);
+  check_name_of(reader, "pool", host.pool, kMaxPoolName);
+  if (!host.run_directory.starts_with('/') || host.run_directory.size() > kMaxRunDirectory) {
+    reader.problem("run_directory",
+                   fmt::format("\"{}\" is not allowed; allowed is an absolute path of up to {} characters",
+                               host.run_directory.substr(0, kMaxPath), kMaxRunDirectory));
+  }
+  read_cores(reader);
+  reader.refuse_unknown_keys();
+}
+
+std::vector<int> without(std::vector<int> cores, const std::vector<int>& taken) {
+  std::erase_if(cores, [&](int core) { return std::ranges::find(taken, core) != taken.end(); });
+  return cores;
+}
+
+void Loader::read_cores(SectionReader& reader) {
+  const auto& online = surroundings.online_cores;
+  std::optional<std::vector<int>> cores;
+  std::optional<std::vector<int>> housekeeping;
+  reader.numbers("cores", 0, kMaxCoreNumber, cores);
+  reader.numbers("housekeeping_cores", 0, kMaxCoreNumber, housekeeping);
+  for (const auto& [key, list] :
+       {std::pair{"cores"sv, &cores}, std::pair{"housekeeping_cores"sv, &housekeeping}}) {
+    if (!*list) continue;
+    if ((*list)->empty())
+      reader.problem(key, fmt::format("is empty; online are {}", fmt::join(online, ", ")));
+    for (const int core : without(**list, online)) {
+      reader.problem(key, fmt::format("core {} is not online; online are {}", core, fmt::join(online, ", ")));
+    }
+  }
+  HostConfig& host = config.host;
+  host.cores = cores ? *cores : (surroundings.isolated_cores.empty() ? online : surroundings.isolated_cores);
+  host.housekeeping_cores = housekeeping ? *housekeeping : without(online, host.cores);
+  if (host.housekeeping_cores.empty()) host.housekeeping_cores = online;
+}
+
+void Loader::read_dds(const TomlTable& table, unsigned line) {
+  SectionReader reader(table, line, "[dds]", problems);
+  DdsConfig& dds = config.dds;
+  reader.truth("enabled", dds.enabled);
+  reader.text("interface", dds.interface);
+  reader.texts("peers", kMaxPeers, dds.peers);
+  constexpr std::size_t kMaxInterfaceName = 15;  // IFNAMSIZ
+  if (const auto good = check_name("interface", dds.interface, kMaxInterfaceName); !good) {
+    reader.problem("interface", good.error().message);
+  }
+  for (const std::string& peer : dds.peers) {
+    constexpr std::string_view kAddress =
+        "0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ.:-_%[]";
+    constexpr std::size_t kMaxAddress = 255;
+    if (!peer.empty() && peer.size() <= kMaxAddress && !peer.starts_with('-') &&
+        peer.find_first_not_of(kAddress) == std::string::npos) {
+      continue;
+    }
+    reader.problem("peers", fmt::format("\"{}\" is not an address; allowed is an IP address or a host name, "
+                                        "with a port after a colon if it must be",
+                                        peer.substr(0, kMaxPath)));
+  }
+  reader.refuse_unknown_keys();
+}
+
+void Loader::read_instances(const TomlValue& value) {
+  const auto* array = std::get_if<TomlArray>(&value.value);
+  if (array == nullptr) {
+    problems.push_back({value.line, "'instance' must be written with double brackets: [[instance]]"});
+    return;
+  }
+  if (array->size() > kMaxInstances) {
+    problems.push_back(
+        {value.line, fmt::format("{} instances; allowed are up to {}", array->size(), kMaxInstances)});
+    return;
+  }
+  for (const TomlValue& element : *array) {
+    if (const auto* table = std::get_if<TomlTable>(&element.value)) {
+      read_instance(*table, element.line);
+    } else {
+      problems.push_back({element.line, "'instance' must be written with double brackets: [[instance]]"});
+    }
+  }
+}
+
+void Loader::read_instance(const TomlTable& table, unsigned line) {
+  const auto name = table.find("name");
+  const auto* text = name == table.end() ? nullptr : std::get_if<std::string>(&name->second.value);
+  const std::string shown = text != nullptr ? *text : fmt::format("number {}", config.instances.size() + 1);
+  SectionReader reader(table, line, fmt::format("[[instance]] '{}'", shown.substr(0, kMaxInstanceName)),
+                       problems);
+  InstanceConfig instance;
+  reader.text("name", instance.name);
+  std::int64_t core = -1;
+  reader.number("core", 0, kMaxCoreNumber, core);
+  instance.core = static_cast<int>(core);
+  reader.truth("share_core", instance.share_core);
+  reader.choice("scheduler", surroundings.schedulers, instance.scheduler);
+  reader.choice("priority_band", kPriorityBands, instance.priority_band);
+  read_file(reader, "settings", instance.settings);
+  read_file(reader, "application", instance.application);
+  reader.truth("autostart", instance.autostart);
+  reader.texts("after", kMaxInstances, instance.after);
+  read_restart(reader, instance);
+  reader.refuse_unknown_keys();
+  if (!reader.has("name")) {
+    reader.problem("name", "is missing");
+  } else if (text != nullptr) {
+    check_name_of(reader, "name", instance.name, kMaxInstanceName);
+  }
+  if (instance.name == "manager") {
+    reader.problem("name", "'manager' is taken by the manager's own control socket");
+  }
+  if (!reader.has("core")) reader.problem("core", "is missing; say which core it runs on");
+  lines.push_back({reader.line_of("name"), reader.line_of("core"), reader.line_of("after")});
+  config.instances.push_back(std::move(instance));
+}
+
+void Loader::read_restart(SectionReader& reader, InstanceConfig& instance) {
+  std::string policy = "on-failure";
+  reader.choice("restart", kRestartPolicies, policy);
+  const auto found = std::ranges::find(kRestartPolicies, policy);
+  instance.restart = static_cast<RestartPolicy>(found - kRestartPolicies.begin());
+  using std::chrono::milliseconds;
+  using std::chrono::seconds;
+  auto delay = std::chrono::duration_cast<milliseconds>(instance.restart_delay).count();
+  auto delay_max = std::chrono::duration_cast<milliseconds>(instance.restart_delay_max).count();
+  auto window = std::chrono::duration_cast<seconds>(instance.crash_window).count();
+  std::int64_t limit = instance.crash_limit;
+  reader.number("restart_delay_ms", 0, kMaxRestartDelayMs, delay);
+  reader.number("restart_delay_max_ms", 0, kMaxRestartDelayMs, delay_max);
+  reader.number("crash_limit", 1, kMaxCrashLimit, limit);
+  reader.number("crash_window_s", 1, kMaxCrashWindowS, window);
+  if (delay_max < delay) {
+    reader.problem(
+        "restart_delay_max_ms",
+        fmt::format("{} is below restart_delay_ms, which is {}; allowed is that or more", delay_max, delay));
+  }
+  instance.restart_delay = milliseconds(delay);
+  instance.restart_delay_max = milliseconds(delay_max);
+  instance.crash_limit = static_cast<std::uint32_t>(limit);
+  instance.crash_window = seconds(window);
+}
+
+void Loader::read_file(SectionReader& reader, std::string_view key, std::string& target) {
+  std::string path;
+  reader.text(key, path);
+  if (path.empty()) {
+    if (reader.has(key)) reader.problem(key, "is no path; leave the key out if there is no file");
+    return;
+  }
+  path = resolve_path(folder, path);
+  if (path.size() > kMaxPath) {
+    reader.problem(key, fmt::format("path of {} characters; allowed are up to {}", path.size(), kMaxPath));
+    return;
+  }
+  if (surroundings.check_files) {
+    if (const auto readable = check_readable_file(path); !readable) {
+      reader.problem(key, readable.error().describe());
+    }
+  }
+  target = path;
+}
+
+}  // namespace
+
+std::string resolve_path(const std::string& folder, const std::string& path) {
+  return (std::filesystem::path(folder) / path).lexically_normal().string();
+}
+
+std::expected<ManagerConfig, ConfigErrors> parse_config(std::string_view text, const std::string& file,
+                                                        const ConfigSurroundings& surroundings) {
+  std::error_code ignored;
+  const auto absolute = std::filesystem::absolute(file, ignored);
+  Loader loader{.surroundings = surroundings,
+                .folder = absolute.parent_path().string(),
+                .config = {},
+                .problems = {},
+                .lines = {}};
+  if (auto root = parse_toml(text)) {
+    loader.read(*root);
+    check_relations(loader.config, loader.lines, surroundings.online_cores, loader.problems);
+  } else {
+    loader.problems.push_back(std::move(root.error()));
+  }
+  if (loader.problems.empty()) return std::move(loader.config);
+  std::ranges::stable_sort(loader.problems, {}, &ConfigProblem::line);
+  ConfigErrors errors;
+  for (const ConfigProblem& problem : loader.problems) {
+    errors.push_back(problem.line == 0 ? fmt::format("{}: {}", file, problem.text)
+                                       : fmt::format("{}:{}: {}", file, problem.line, problem.text));
+  }
+  return std::unexpected(std::move(errors));
+}
+
+std::expected<ManagerConfig, ConfigErrors> load_config(const std::string& file,
+                                                       const ConfigSurroundings& surroundings) {
+  if (const auto readable = check_readable_file(file); !readable) {
+    return std::unexpected(ConfigErrors{fmt::format("{}: {}", file, readable.error().describe())});
+  }
+  std::ifstream stream(file, std::ios::binary);
+  std::string text(kMaxConfigBytes + 1, '\0');
+  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(stream.gcount()));
+  if (text.size() > kMaxConfigBytes) {
+    return std::unexpected(
+        ConfigErrors{fmt::format("{}: is larger than the {} bytes that are allowed", file, kMaxConfigBytes)});
+  }
+  return parse_config(text, file, surroundings);
+}
+
+}  // namespace plchost

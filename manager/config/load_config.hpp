@@ -1,0 +1,37 @@
+#pragma once
+
+#include <expected>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "manager/config/manager_config.hpp"
+
+namespace plchost {
+
+/// What a configuration is checked against: this host, or what a test says.
+struct ConfigSurroundings {
+  std::string host_name;            ///< the default of [host] name
+  std::vector<int> online_cores;    ///< of the system
+  std::vector<int> isolated_cores;  ///< by the kernel; may be empty
+  std::vector<std::string_view> schedulers;
+  bool check_files = true;  ///< that settings and applications are there and readable
+};
+
+/// As the system is now.
+[[nodiscard]] ConfigSurroundings config_surroundings();
+
+/// All that is wrong, one line of text each: "FILE:LINE: [[instance]] 'line1' core: ...".
+using ConfigErrors = std::vector<std::string>;
+
+/// Parses and validates as a whole. `file` is for messages and for the folder that relative paths start in.
+[[nodiscard]] std::expected<ManagerConfig, ConfigErrors> parse_config(std::string_view text,
+                                                                      const std::string& file,
+                                                                      const ConfigSurroundings& surroundings);
+[[nodiscard]] std::expected<ManagerConfig, ConfigErrors> load_config(const std::string& file,
+                                                                     const ConfigSurroundings& surroundings);
+
+/// The path as an absolute one, seen from `folder`.
+[[nodiscard]] std::string resolve_path(const std::string& folder, const std::string& path);
+
+}  // namespace plchost

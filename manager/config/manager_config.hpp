@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+/// When an instance that ended is started again.
+enum class RestartPolicy : std::uint8_t {
+  never,
+  on_failure,  ///< ended by a signal or with an exit code other than 0, but not because of its set-up
+  always,
+};
+
+/// [host]: what concerns the controller as a whole.
+struct HostConfig {
+  std::string name;  ///< default: the system's host name
+  int dds_domain = 0;
+  std::string run_directory = "/run/plchost";
+  std::string pool = "plchost";
+  std::uint32_t pool_objects = 4096;
+  std::vector<int> cores;               ///< where instances may run
+  std::vector<int> housekeeping_cores;  ///< where the manager and the API server run
+  std::string log_level = "info";
+  bool keep_pool = false;  ///< leave the pool in place at the end, for firmware that has it mapped
+};
+
+/// [dds]: how the API server is reached.
+struct DdsConfig {
+  bool enabled = true;  ///< false: no API server
+  std::string interface = "lo";
+  std::vector<std::string> peers;  ///< addresses asked for other hosts where there is no multicast
+};
+
+/// One [[instance]]. Paths are absolute here, whatever the file said.
+struct InstanceConfig {
+  std::string name;
+  int core = -1;
+  bool share_core = false;
+  std::string scheduler = "CmpSchedule";
+  std::string priority_band = "normal";
+  std::string settings;     ///< empty: the runtime's defaults
+  std::string application;  ///< empty: comes up without one
+  bool autostart = true;
+  std::vector<std::string> after;  ///< started only when these are up
+  RestartPolicy restart = RestartPolicy::on_failure;
+  Duration restart_delay = std::chrono::milliseconds(100);  ///< doubles with each failure in a row
+  Duration restart_delay_max = std::chrono::seconds(5);
+  std::uint32_t crash_limit = 5;  ///< this many crashes within crash_window: safe mode
+  Duration crash_window = std::chrono::seconds(60);
+};
+
+struct ManagerConfig {
+  HostConfig host;
+  DdsConfig dds;
+  std::vector<InstanceConfig> instances;
+};
+
+/// Bounds of what a file may say.
+inline constexpr std::size_t kMaxConfigBytes = std::size_t{1} << 20;
+inline constexpr int kMaxDdsDomain = 232;
+inline constexpr std::int64_t kMinPoolObjects = 16;
+inline constexpr std::int64_t kMaxPoolObjects = 1'000'000;
+inline constexpr std::size_t kMaxPoolName = 31;
+/// So that "RUN_DIRECTORY/NAME.sock" fits in the 107 characters of a socket path.
+inline constexpr std::size_t kMaxRunDirectory = 70;
+inline constexpr std::size_t kMaxPeers = 32;
+inline constexpr std::int64_t kMaxRestartDelayMs = 3'600'000;
+inline constexpr std::int64_t kMaxCrashLimit = 100;
+inline constexpr std::int64_t kMaxCrashWindowS = 86'400;
+
+}  // namespace plchost

@@ -1,0 +1,135 @@
+#include "manager/control/control_server.hpp"
+
+#include <utility>
+
+#include <fmt/format.h>
+#include <sys/epoll.h>
+
+#include "shm/base/log.hpp"
+
+namespace plchost {
+
+namespace {
+
+// So that one busy peer leaves room for the others in each round.
+constexpr int kPacketsPerRound = 16;
+
+}  // namespace
+
+ControlServer::ControlServer(Reactor& reactor, PacketListener listener, ControlHandler& handler)
+    : reactor_(reactor),
+      listener_(std::move(listener)),
+      handler_(handler),
+      accept_again_(reactor, [this] { (void)listen_watch_.change(EPOLLIN); }) {}
+
+Result<std::unique_ptr<ControlServer>> ControlServer::open(Reactor& reactor, const std::string& path,
+                                                           ControlHandler& handler) {
+  auto listener = PacketListener::listen(path);
+  if (!listener) return std::unexpected(listener.error());
+  std::unique_ptr<ControlServer> server(
+      new ControlServer(reactor, std::move(*listener), handler));  // NOLINT: the constructor is private
+  auto watch =
+      reactor.watch(server->listener_.fd(), EPOLLIN, [sut = server.get()](std::uint32_t) { sut->accept(); });
+  if (!watch) return std::unexpected(watch.error());
+  server->listen_watch_ = std::move(*watch);
+  return server;
+}
+
+ControlServer::Connection* ControlServer::find(std::uint64_t id) {
+  const auto found = connections_.find(id);
+  return found == connections_.end() ? nullptr : &found->second;
+}
+
+void ControlServer::accept() {
+  auto socket = listener_.accept();
+  if (!socket) {
+    // No descriptor left, most likely: asking again at once would only burn the core.
+    spdlog::error("control socket: {}", socket.error().describe());
+    (void)listen_watch_.change(0);
+    accept_again_.set(MonotonicClock::now() + std::chrono::seconds(1));
+    return;
+  }
+  if (!*socket) return;
+  if (connections_.size() >= kMaxConnections) {
+    (void)(*socket)->send(encode(ControlReply{
+        .number = 0,
+        .code = ErrorCode::busy,
+        .text = fmt::format("{} peers are connected already; more are not allowed", kMaxConnections)}));
+    return;
+  }
+  const std::uint64_t id = next_id_++;
+  auto watch = reactor_.watch((*socket)->fd(), EPOLLIN,
+                              [this, id](std::uint32_t epoll_events) { on_ready(id, epoll_events); });
+  if (!watch) return spdlog::error("control socket: {}", watch.error().describe());
+  Connection& connection = connections_[id];
+  connection.socket = std::move(**socket);
+  connection.watch = std::move(*watch);
+}
+
+void ControlServer::on_ready(std::uint64_t id, std::uint32_t epoll_events) {
+  if ((epoll_events & EPOLLOUT) != 0) {
+    Connection* connection = find(id);
+    if (connection != nullptr && !flush(*connection)) return close(id, "cannot be sent to");
+  }
+  for (int i = 0; i < kPacketsPerRound; ++i) {
+    Connection* connection = find(id);
+    if (connection == nullptr) return;
+    auto packet = connection->socket.receive();
+    if (!packet && packet.error().code == ErrorCode::corrupt) {
+      if (++connection->bad_packets > kMaxBadPackets) return close(id, "sends no requests");
+      answer(id, ControlReply{.number = 0, .code = ErrorCode::corrupt, .text = packet.error().describe()});
+      continue;
+    }
+    if (!packet) return close(id, "");
+    if (!*packet) return;
+    take_packet(id, **packet);
+  }
+}
+
+void ControlServer::take_packet(std::uint64_t id, std::string_view packet) {
+  Connection& connection = *find(id);
+  const auto request = decode_request(packet);
+  if (!request) {
+    if (++connection.bad_packets > kMaxBadPackets) return close(id, "sends no requests");
+    return answer(id,
+                  ControlReply{.number = 0, .code = ErrorCode::corrupt, .text = request.error().describe()});
+  }
+  if (connection.pending >= kMaxPendingRequests) {
+    return answer(id, ControlReply{.number = request->number,
+                                   .code = ErrorCode::busy,
+                                   .text = fmt::format("{} requests of this peer are not answered yet",
+                                                       kMaxPendingRequests)});
+  }
+  ++connection.pending;
+  handler_.handle(*request, [this, id](const ControlReply& reply) {
+    if (Connection* asker = find(id)) --asker->pending;
+    answer(id, reply);
+  });
+}
+
+void ControlServer::answer(std::uint64_t id, const ControlReply& reply) {
+  Connection* connection = find(id);
+  if (connection == nullptr) return;  // it has gone without waiting for the answer
+  connection->unsent.push_back(encode(reply));
+  if (connection->unsent.size() > kMaxUnreadReplies) return close(id, "does not read its replies");
+  if (!flush(*connection)) close(id, "cannot be sent to");
+}
+
+bool ControlServer::flush(Connection& connection) {
+  while (!connection.unsent.empty()) {
+    const auto sent = connection.socket.send(connection.unsent.front());
+    if (!sent && sent.error().code == ErrorCode::busy) {
+      return connection.watch.change(EPOLLIN | EPOLLOUT).has_value();
+    }
+    if (!sent) return false;
+    connection.unsent.pop_front();
+  }
+  return connection.watch.change(EPOLLIN).has_value();
+}
+
+void ControlServer::close(std::uint64_t id, std::string_view why) {
+  if (!why.empty()) spdlog::warn("control socket: a peer {}; it is disconnected", why);
+  connections_.erase(id);
+}
+
+}  // namespace plchost

@@ -1,0 +1,98 @@
+#include <cstdio>
+#include <filesystem>
+#include <iostream>
+#include <string>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "manager/config/load_config.hpp"
+#include "manager/manager.hpp"
+#include "manager/system/child_process.hpp"
+#include "shm/base/log.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr int kExitDone = 0;
+constexpr int kExitFailed = 1;
+constexpr int kExitUsage = 2;
+
+struct Options {
+  std::string config;
+  std::string check_config;
+  std::string log_level;
+  std::string programs;
+};
+
+void describe(CLI::App& app, Options& options) {
+  app.set_version_flag("--version", PLCHOST_VERSION);
+  auto* config = app.add_option("--config", options.config, "Run with this configuration file");
+  auto* check = app.add_option("--check-config", options.check_config, "Only check this configuration file");
+  config->excludes(check);
+  app.add_option("--log-level", options.log_level,
+                 "Instead of the file's: trace, debug, info, warning, error")
+      ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error"}));
+  app.add_option("--programs", options.programs,
+                 "Folder of plc-instance and plchost-dds; default: that of plchostd");
+}
+
+int check_only(const std::string& file) {
+  const auto config = load_config(file, config_surroundings());
+  if (config) {
+    fmt::print("{}: ok, {} instances\n", file, config->instances.size());
+    return kExitDone;
+  }
+  for (const std::string& error : config.error()) fmt::print("{}\n", error);
+  return kExitFailed;
+}
+
+int run(const Options& options) {
+  const ConfigSurroundings surroundings = config_surroundings();
+  auto config = load_config(options.config, surroundings);
+  if (!config) {
+    for (const std::string& error : config.error()) fmt::print(stderr, "{}\n", error);
+    return kExitFailed;
+  }
+  if (!options.log_level.empty()) config->host.log_level = options.log_level;
+  start_log("plchostd", config->host.log_level);
+  std::error_code ignored;
+  const auto file = std::filesystem::absolute(options.config, ignored);
+  auto manager =
+      Manager::create(*config, {.folder = file.parent_path().string(),
+                                .programs = options.programs.empty() ? program_directory() : options.programs,
+                                .schedulers = surroundings.schedulers});
+  if (!manager) {
+    spdlog::error("{}", manager.error().describe());
+    return kExitFailed;
+  }
+  if (const auto ran = (*manager)->run(); !ran) {
+    spdlog::error("{}", ran.error().describe());
+    return kExitFailed;
+  }
+  return kExitDone;
+}
+
+int plchostd_main(int argc, const char* const* argv) {
+  Options options;
+  CLI::App app("The manager of this host's PLC runtimes.", "plchostd");
+  describe(app, options);
+  try {
+    app.parse(argc, argv);
+    if (options.config.empty() && options.check_config.empty()) {
+      throw CLI::RequiredError("--config FILE or --check-config FILE");
+    }
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kExitDone : kExitUsage;
+  }
+  return options.config.empty() ? check_only(options.check_config) : run(options);
+}
+
+}  // namespace
+
+}  // namespace plchost
+
+int main(int argc, char** argv) {
+  return plchost::plchostd_main(argc, argv);
+}

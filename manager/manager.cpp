@@ -1,0 +1,219 @@
+#include "manager/manager.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <csignal>
+#include <cstdint>
+#include <filesystem>
+#include <utility>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "api/control/control_handler.hpp"
+#include "manager/supervisor/process_host.hpp"
+#include "manager/system/child_process.hpp"
+#include "shm/base/log.hpp"
+#include "shm/base/thread.hpp"
+#include "shm/pool/instance_page.hpp"
+#include "shm/pool/memory_file.hpp"
+
+namespace plchost {
+
+namespace {
+
+// How often instances are asked what they say of themselves, by reading their pages.
+constexpr Duration kTick = std::chrono::milliseconds(250);
+
+Result<void> make_run_directory(const std::string& path) {
+  std::error_code error;
+  std::filesystem::create_directories(path, error);
+  if (error) return failure(ErrorCode::system, "make the run directory " + path, error.value());
+  return {};
+}
+
+// The lock is by run directory; two managers with one pool would overwrite each other's pages all the same.
+Result<void> check_pool_is_free(const std::string& pool) {
+  const auto reader = HostPageReader::open(pool);
+  if (!reader) return {};
+  const auto host = reader->host();
+  if (!host || host->manager_pid <= 0 || host->manager_pid == ::getpid()) return {};
+  const auto program = [](const std::string& process) {
+    std::error_code error;
+    return std::filesystem::read_symlink(fmt::format("/proc/{}/exe", process), error).filename();
+  };
+  const auto other = program(fmt::format("{}", host->manager_pid));
+  if (other.empty() || other != program("self")) return {};
+  return failure(
+      ErrorCode::already_exists,
+      fmt::format("pool '{}' is in use by another manager, process {}; give [host] pool another name", pool,
+                  host->manager_pid));
+}
+
+// "line1.sock" belongs to line1.
+bool is_ours(const ManagerConfig& config, const std::filesystem::path& file) {
+  const std::string name = file.stem().string();
+  return std::ranges::find(config.instances, name, &InstanceConfig::name) != config.instances.end();
+}
+
+// Processes of a manager before us whose instance is no longer in the configuration: not ours to stop.
+void warn_of_strangers(const ManagerConfig& config) {
+  std::error_code error;
+  for (std::filesystem::directory_iterator at(config.host.run_directory, error), end; !error && at != end;
+       at.increment(error)) {
+    const bool socket = at->path().extension() == ".sock" && at->path().stem() != "manager";
+    if (socket && !is_ours(config, at->path())) {
+      spdlog::warn("{} belongs to no configured instance; its process, if there is one, is left alone",
+                   at->path().string());
+    }
+  }
+}
+
+}  // namespace
+
+Manager::Manager(const ManagerConfig& config, Options options, LockFile lock,
+                 std::unique_ptr<Reactor> reactor)
+    : config_(config),
+      options_(std::move(options)),
+      lock_(std::move(lock)),
+      reactor_(std::move(reactor)),
+      api_server_(*reactor_, config, options_.programs + "/plchost-dds"),
+      tick_(*reactor_, [this] { tick(); }) {}
+
+Result<std::unique_ptr<Manager>> Manager::create(const ManagerConfig& config, Options options) {
+  if (auto made = make_run_directory(config.host.run_directory); !made) return std::unexpected(made.error());
+  auto lock = LockFile::take(config.host.run_directory + "/manager.lock");
+  if (!lock) return std::unexpected(lock.error());
+  auto reactor = Reactor::create();
+  if (!reactor) return std::unexpected(reactor.error());
+  std::unique_ptr<Manager> manager(new Manager(  // NOLINT: the constructor is private
+      config, std::move(options), std::move(*lock), std::move(*reactor)));
+  if (auto done = manager->set_up(); !done) return std::unexpected(done.error());
+  return manager;
+}
+
+Result<void> Manager::set_up() {
+  const HostConfig& host = config_.host;
+  if (auto free = check_pool_is_free(host.pool); !free) return free;
+  // Children inherit this: instances then bind themselves to their own cores.
+  if (auto bound = bind_process_to_cores(0, host.housekeeping_cores); !bound) {
+    spdlog::warn("the manager stays where it is: {}", bound.error().describe());
+  }
+  auto pool = ObjectPool::create(host.pool, {.max_objects = host.pool_objects});
+  if (!pool) return std::unexpected(pool.error());
+  pool_ = std::move(*pool);
+  if (auto earlier = HostPageReader::open(host.pool)) earlier_page_ = std::move(*earlier);
+  auto page = HostPageWriter::create(host.pool);
+  if (!page) return std::unexpected(page.error());
+  page_ = std::move(*page);
+  auto signals = reactor_->watch_signals({SIGTERM, SIGINT, SIGHUP}, [this](int signal) {
+    // The log is standard error, which whoever reads it rotates: nothing to do on SIGHUP.
+    if (signal != SIGHUP) shut_down();
+  });
+  if (!signals) return signals;
+  make_supervisor();
+  write_host();
+  auto server = ControlServer::open(*reactor_, manager_socket_path(host.run_directory), *supervisor_);
+  if (!server) return std::unexpected(server.error());
+  control_server_ = std::move(*server);
+  return {};
+}
+
+void Manager::make_supervisor() {
+  const auto make_host = [this](const InstanceConfig& instance) {
+    auto host = std::make_unique<ProcessHost>(
+        *reactor_, ProcessHost::Settings{.program = options_.programs + "/plc-instance",
+                                         .name = instance.name,
+                                         .pool = config_.host.pool,
+                                         .run_directory = config_.host.run_directory});
+    ProcessHost& made = *host;
+    return Supervisor::HostedInstance{
+        .host = std::move(host), .connect = [&made](InstanceEvents& events) { made.connect_events(events); }};
+  };
+  supervisor_ = std::make_unique<Supervisor>(
+      config_,
+      Supervisor::Surroundings{.folder = options_.folder,
+                               .schedulers = options_.schedulers,
+                               .now = [] { return MonotonicClock::now(); },
+                               .publish =
+                                   [this](std::size_t index, const InstanceStatus& status) {
+                                     page_->write_instance(static_cast<std::uint32_t>(index), status);
+                                   }},
+      make_host);
+}
+
+void Manager::write_host() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  HostStatus status;
+  status.name.assign(config_.host.name);
+  status.version.assign(PLCHOST_VERSION);
+  status.manager_pid = ::getpid();
+  status.instance_count = static_cast<std::uint32_t>(config_.instances.size());
+  status.started_unix_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(now).count();
+  take_over_restarts();
+  for (std::size_t i = 0; i < supervisor_->size(); ++i) {
+    page_->write_instance(static_cast<std::uint32_t>(i), supervisor_->instance(i).status());
+  }
+  page_->write_host(status);
+}
+
+// The counters of restarts go on over the end of a manager, as the instances do.
+void Manager::take_over_restarts() {
+  const auto host = earlier_page_ ? earlier_page_->host() : std::nullopt;
+  if (!host) return;
+  for (std::uint32_t i = 0; i < std::min(host->instance_count, kMaxInstances); ++i) {
+    const auto earlier = earlier_page_->instance(i);
+    for (std::size_t k = 0; earlier && k < supervisor_->size(); ++k) {
+      ManagedInstance& instance = supervisor_->instance(k);
+      if (instance.config().name == earlier->name.view()) instance.set_restarts(earlier->restarts);
+    }
+  }
+  earlier_page_.reset();
+}
+
+Result<void> Manager::run() {
+  spdlog::info("host '{}': {} instances, pool '{}', run directory {}", config_.host.name,
+               config_.instances.size(), config_.host.pool, config_.host.run_directory);
+  warn_of_strangers(config_);
+  supervisor_->start();
+  if (config_.dds.enabled) api_server_.start();
+  tick_.set(MonotonicClock::now() + kTick);
+  notify_service_manager("READY=1");
+  return reactor_->run();
+}
+
+void Manager::tick() {
+  supervisor_->refresh();
+  tick_.set(MonotonicClock::now() + kTick);
+}
+
+void Manager::shut_down() {
+  if (std::exchange(ending_, true)) return;
+  spdlog::info("ending: all instances in reverse order of their start");
+  notify_service_manager("STOPPING=1");
+  // The API server last, so that it can still tell the world how the instances end.
+  supervisor_->shut_down([this] {
+    api_server_.shut_down([this] {
+      clean_up();
+      reactor_->stop();
+    });
+  });
+}
+
+void Manager::clean_up() {
+  for (const InstanceConfig& instance : config_.instances) {
+    InstancePage::remove(config_.host.pool, instance.name);
+  }
+  // Whatever is named after an instance of ours: its socket, what it kept for its next process.
+  std::error_code error;
+  for (std::filesystem::directory_iterator at(config_.host.run_directory, error), end; !error && at != end;
+       at.increment(error)) {
+    if (is_ours(config_, at->path())) ::unlink(at->path().c_str());
+  }
+  ::unlink(manager_socket_path(config_.host.run_directory).c_str());
+  MemoryFile::remove(host_page_name(config_.host.pool));
+  if (!config_.host.keep_pool) ObjectPool::remove(config_.host.pool);
+  lock_.remove();
+}
+
+}  // namespace plchost

@@ -1,0 +1,193 @@
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "manager/config/load_config.hpp"
+#include "manager/config/section_reader.hpp"
+#include "manager/supervisor/managed_instance.hpp"
+#include "shm/base/log.hpp"
+#include "shm/base/names.hpp"
+
+namespace plchost {
+
+void ManagedInstance::handle(const ControlRequest& request, ControlReplyFunction reply) {
+  ControlRequest checked = request;
+  const auto refuse = [&](ErrorCode code, std::string text) {
+    reply(ControlReply{.number = request.number, .code = code, .text = std::move(text)});
+  };
+  if (shutting_down_) return refuse(ErrorCode::unavailable, "the manager is shutting down");
+  if (auto good = check_argument(checked); !good) return refuse(good.error().code, good.error().describe());
+  if (operation_) {
+    return refuse(ErrorCode::busy, fmt::format("instance '{}' is busy with '{}'; try again when it is done",
+                                               config_.name, to_string(operation_->request.verb)));
+  }
+  spdlog::info("instance {}: {} {}", config_.name, to_string(checked.verb), checked.argument);
+  operation_ = Operation{.request = std::move(checked), .reply = std::move(reply)};
+  switch (operation_->request.verb) {
+    case ControlVerb::start:
+      return begin_start();
+    case ControlVerb::stop:
+      return begin_stop();
+    case ControlVerb::reset:
+      return fresh_process(Next::stay_stopped);
+    case ControlVerb::restart:
+      return fresh_process(Next::run);
+    case ControlVerb::load_application:
+      return begin_load();
+    case ControlVerb::set_scheduler:
+    case ControlVerb::register_event:
+    case ControlVerb::unregister_event:
+      return begin_forwarded();
+    case ControlVerb::shutdown:
+    case ControlVerb::status:
+      return;  // refused by check_argument
+  }
+}
+
+Result<void> ManagedInstance::check_argument(ControlRequest& request) const {
+  const std::string shown = request.argument.substr(0, kMaxPath);
+  switch (request.verb) {
+    case ControlVerb::shutdown:
+    case ControlVerb::status:
+      return failure(ErrorCode::unsupported, fmt::format("'{}' is between the manager and an instance only",
+                                                         to_string(request.verb)));
+    case ControlVerb::set_scheduler: {
+      const std::vector<std::string_view>& known = surroundings_.schedulers;
+      if (std::ranges::find(known, request.argument) != known.end()) return {};
+      return failure(ErrorCode::invalid_argument, fmt::format("no scheduler '{}'; there are {}{}", shown,
+                                                              join_names(known), suggestion(shown, known)));
+    }
+    case ControlVerb::register_event:
+    case ControlVerb::unregister_event:
+      return check_name("event", request.argument, kMaxEventName);
+    case ControlVerb::load_application: {
+      if (request.argument.empty() || request.argument.find('\0') != std::string::npos) {
+        return failure(ErrorCode::invalid_argument, "load application needs the path of a file on the host");
+      }
+      std::string path = resolve_path(surroundings_.folder, request.argument);
+      if (path.size() > kMaxPath) {
+        return failure(ErrorCode::invalid_argument,
+                       fmt::format("path of {} characters; allowed are up to {}", path.size(), kMaxPath));
+      }
+      request.argument = std::move(path);
+      return {};
+    }
+    case ControlVerb::start:
+    case ControlVerb::stop:
+    case ControlVerb::reset:
+    case ControlVerb::restart:
+      return {};
+  }
+  return {};
+}
+
+void ManagedInstance::begin_start() {
+  if (idle_phase()) return fresh_process(Next::run);
+  forward_or_wait();
+}
+
+void ManagedInstance::begin_stop() {
+  if (phase_ == Phase::down) {
+    finish(ErrorCode::ok, fmt::format("'{}' has no process: nothing to stop", config_.name));
+  } else if (idle_phase()) {
+    go_down(InstanceState::offline, last_end_);
+    finish(ErrorCode::ok, fmt::format("'{}' was waiting to be started; that is cancelled", config_.name));
+  } else {
+    forward_or_wait();
+  }
+}
+
+void ManagedInstance::begin_load() {
+  operation_->step = Step::checking;
+  const auto started = host_.check_application(operation_->request.argument);
+  if (!started) finish(started.error().code, started.error().describe());
+}
+
+void ManagedInstance::on_application_checked(const Result<void>& result) {
+  if (!operation_ || operation_->step != Step::checking) return;
+  if (!result) {
+    return finish(result.error().code,
+                  fmt::format("{} is refused: {}", operation_->request.argument, result.error().describe()));
+  }
+  apply_loaded_application();
+}
+
+void ManagedInstance::apply_loaded_application() {
+  const bool stays_stopped =
+      phase_ == Phase::up && status_.state == InstanceState::stopped && !application_.empty();
+  application_ = operation_->request.argument;
+  if (phase_ == Phase::down && status_.state == InstanceState::offline) {
+    publish();
+    return finish(ErrorCode::ok,
+                  fmt::format("'{}' has no process: remembered for its next start", config_.name));
+  }
+  fresh_process(stays_stopped ? Next::stay_stopped : Next::run);
+}
+
+void ManagedInstance::begin_forwarded() {
+  if (!idle_phase()) return forward_or_wait();
+  if (operation_->request.verb != ControlVerb::set_scheduler) {
+    return finish(ErrorCode::wrong_state, fmt::format("'{}' has no process; start it first", config_.name));
+  }
+  scheduler_ = operation_->request.argument;
+  publish();
+  finish(ErrorCode::ok, fmt::format("'{}' has no process: remembered for its next start", config_.name));
+}
+
+void ManagedInstance::forward_or_wait() {
+  if (phase_ != Phase::up) {
+    operation_->step = Step::until_up;
+    return;
+  }
+  const ControlVerb verb = operation_->request.verb;
+  const bool running = status_.state == InstanceState::running;
+  if (verb == ControlVerb::start && status_.state == InstanceState::safe_mode) {
+    finish(ErrorCode::wrong_state,
+           fmt::format("'{}' is in safe mode; load an application, or reset it", config_.name));
+  } else if (verb == ControlVerb::start && running) {
+    finish(ErrorCode::ok, fmt::format("'{}' is running already", config_.name));
+  } else if (verb == ControlVerb::stop && !running) {
+    finish(ErrorCode::ok, fmt::format("'{}' is stopped already", config_.name));
+  } else {
+    forward();
+  }
+}
+
+void ManagedInstance::forward() {
+  operation_->step = Step::forwarded;
+  const auto number = send(operation_->request.verb, operation_->request.argument);
+  if (!number) return finish(number.error().code, number.error().describe());
+  operation_->forwarded_number = *number;
+  host_.set_timer(after(kCommandLimit));
+}
+
+void ManagedInstance::finish_forwarded(const ControlReply& reply) {
+  host_.set_timer(std::nullopt);
+  settled_ = surroundings_.now();
+  const ControlRequest request = operation_->request;
+  if (reply.code == ErrorCode::ok) {
+    if (request.verb == ControlVerb::set_scheduler) scheduler_ = request.argument;
+    if (request.verb == ControlVerb::start || request.verb == ControlVerb::stop) {
+      wants_running_ = request.verb == ControlVerb::start;
+      last_end_.clear();
+      set_state(Phase::up, wants_running_ ? InstanceState::running : InstanceState::stopped,
+                problem_when_up());
+    } else {
+      publish();
+    }
+  }
+  finish(reply.code, reply.text);
+}
+
+void ManagedInstance::finish(ErrorCode code, const std::string& text) {
+  // Emptied first: whoever gets the reply may ask for the next thing at once.
+  const Operation done = std::move(*operation_);
+  operation_.reset();
+  if (code != ErrorCode::ok) {
+    spdlog::warn("instance {}: {} failed: {}", config_.name, to_string(done.request.verb), text);
+  }
+  done.reply(ControlReply{.number = done.request.number, .code = code, .text = text});
+}
+
+}  // namespace plchost

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "instances/launch/launch_contract.hpp"
+#include "manager/system/child_process.hpp"
+#include "shm/base/control_message.hpp"
+#include "shm/base/result.hpp"
+#include "shm/base/time.hpp"
+#include "shm/pool/instance_page.hpp"
+
+namespace plchost {
+
+/// What a ManagedInstance asks of the world: processes, sockets, time. Of one instance. Nothing in it waits;
+/// what takes time comes back as an InstanceEvents call, never from inside one of these functions.
+class InstanceHost {
+ public:
+  virtual ~InstanceHost() = default;
+  /// Starts a process; the result is its pid. Then on_report() until it is ready, and on_exit() at its end.
+  [[nodiscard]] virtual Result<int> spawn(const LaunchOptions& options) = 0;
+  /// Takes over a process that answers on the instance's socket: its pid. unavailable: there is none.
+  [[nodiscard]] virtual Result<int> adopt() = 0;
+  /// Sends a request to the process, over a connection that is made when it is first needed; then on_reply().
+  [[nodiscard]] virtual Result<void> request(const ControlRequest& request) = 0;
+  /// Signals the process, if there is one.
+  virtual void signal(int signal) = 0;
+  /// Calls on_timer() at that time instead of any earlier setting; nothing: not at all.
+  virtual void set_timer(std::optional<TimePoint> when) = 0;
+  /// Has a file tried by a process of its own, with a time limit; then on_application_checked().
+  [[nodiscard]] virtual Result<void> check_application(const std::string& path) = 0;
+  /// What the process says of itself in its page; nothing if it has made none yet.
+  [[nodiscard]] virtual std::optional<InstanceRuntime> runtime() = 0;
+  /// The cores that the kernel lets the process's threads run on.
+  [[nodiscard]] virtual std::vector<int> granted_cores() = 0;
+};
+
+/// What happens to an instance.
+class InstanceEvents {
+ public:
+  virtual ~InstanceEvents() = default;
+  virtual void on_report(const SetupReport& report) = 0;
+  virtual void on_reply(const ControlReply& reply) = 0;
+  virtual void on_exit(const ExitStatus& status) = 0;
+  virtual void on_timer() = 0;
+  virtual void on_application_checked(const Result<void>& result) = 0;
+};
+
+}  // namespace plchost

@@ -1,0 +1,336 @@
+#include "manager/supervisor/managed_instance.hpp"
+
+#include <chrono>
+#include <csignal>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "shm/base/log.hpp"
+
+namespace plchost {
+
+ManagedInstance::ManagedInstance(const InstanceConfig& config, Surroundings surroundings, InstanceHost& host)
+    : config_(config),
+      surroundings_(std::move(surroundings)),
+      host_(host),
+      history_(config),
+      application_(config.application),
+      scheduler_(config.scheduler) {
+  status_.name.assign(config.name);
+  status_.scheduler.assign(scheduler_);
+  status_.application.assign(application_);
+}
+
+bool ManagedInstance::adopt() {
+  const auto pid = host_.adopt();
+  if (!pid) return false;
+  status_.pid = *pid;
+  set_state(Phase::adopting, InstanceState::starting, "is being adopted");
+  const auto number = send(ControlVerb::status);
+  if (!number) {
+    finish_adoption(number.error().describe());
+    return true;
+  }
+  awaited_number_ = *number;
+  host_.set_timer(after(kAdoptLimit));
+  return true;
+}
+
+void ManagedInstance::hold(const std::string& why) {
+  if (phase_ == Phase::held && status_.problem.view() == why) return;
+  set_state(Phase::held, InstanceState::waiting, why);
+}
+
+void ManagedInstance::release() {
+  if (phase_ == Phase::held) spawn(Next::run);
+}
+
+void ManagedInstance::shut_down() {
+  shutting_down_ = true;
+  next_ = Next::nothing;
+  if (operation_) finish(ErrorCode::unavailable, "the manager is shutting down");
+  if (idle_phase()) {
+    go_down(InstanceState::offline, "");
+  } else if (phase_ != Phase::ending) {
+    end_process(Next::nothing);
+  }
+}
+
+void ManagedInstance::on_report(const SetupReport& report) {
+  if (phase_ != Phase::setting_up) return;
+  if (report.code != ErrorCode::ok) {
+    setup_failure_ = fmt::format("{}: {}", to_string(report.step), report.text);
+    return;  // the process ends by itself now, or the timer sees to it
+  }
+  if (!report.text.empty()) {
+    spdlog::info("instance {}: {}: {}", config_.name, to_string(report.step), report.text);
+  }
+  if (report.step != SetupStep::ready) return;
+  come_up();
+}
+
+void ManagedInstance::on_reply(const ControlReply& reply) {
+  if (operation_ && operation_->step == Step::forwarded && reply.number == operation_->forwarded_number) {
+    finish_forwarded(reply);
+  } else if (phase_ == Phase::adopting && reply.number == awaited_number_) {
+    finish_adoption("");
+  }  // else an answer that came too late
+}
+
+void ManagedInstance::come_up() {
+  host_.set_timer(std::nullopt);
+  up_since_ = settled_ = surroundings_.now();
+  if (safe_mode_) {
+    set_state(Phase::up, InstanceState::safe_mode, problem_when_up());
+  } else {
+    const bool runs = wants_running_ && !application_.empty();
+    set_state(Phase::up, runs ? InstanceState::running : InstanceState::stopped, problem_when_up());
+  }
+  if (!operation_) return;
+  if (operation_->step == Step::fresh_process) {
+    finish(ErrorCode::ok, application_.empty() ? "it is up without an application: load one" : "");
+  } else if (operation_->step == Step::until_up) {
+    forward_or_wait();
+  }
+}
+
+std::string ManagedInstance::problem_when_up() {
+  std::string problem = core_problem();
+  const auto add = [&](const std::string& text) { problem += (problem.empty() ? "" : "; ") + text; };
+  if (safe_mode_) {
+    add(fmt::format("safe mode after {} crashes within {} s, the last: {}; load an application, or reset it",
+                    config_.crash_limit,
+                    std::chrono::ceil<std::chrono::seconds>(config_.crash_window).count(),
+                    last_end_.empty() ? "unknown" : last_end_));
+  } else if (application_.empty()) {
+    add("no application; load one");
+  } else if (!last_end_.empty()) {
+    add("ended last: " + last_end_);
+  }
+  return problem;
+}
+
+void ManagedInstance::finish_adoption(const std::string& problem) {
+  const auto runtime = host_.runtime();
+  const bool known = runtime && runtime->pid == status_.pid;
+  if (known) {
+    wants_running_ = runtime->running != 0;
+    if (!runtime->scheduler.view().empty()) scheduler_ = runtime->scheduler.view();
+    safe_mode_ = runtime->application.view().empty() && !config_.application.empty();
+    if (!safe_mode_) application_ = runtime->application.view();
+  }
+  come_up();
+  std::string text(status_.problem.view());
+  const auto add = [&](std::string_view more) { text += (text.empty() ? "" : "; ") + std::string(more); };
+  if (!problem.empty()) add("adopted, but it does not answer on its control socket: " + problem);
+  if (!known) add("adopted, but it has no status page yet");
+  if (text != status_.problem.view()) set_state(phase_, status_.state, text);
+  spdlog::info("instance {}: adopted process {}", config_.name, status_.pid);
+}
+
+void ManagedInstance::on_exit(const ExitStatus& status) {
+  status_.pid = 0;
+  status_.core = -1;
+  host_.set_timer(std::nullopt);
+  const bool set_up = phase_ == Phase::setting_up;
+  const bool exit_of_set_up = status.known && status.kind == ExitStatus::Kind::exited &&
+                              (status.value == kExitSetupFailed || status.value == kExitUsage);
+  if (phase_ == Phase::ending) {
+    const Next next = std::exchange(next_, Next::nothing);
+    if (next == Next::nothing) return go_down(InstanceState::offline, "");
+    spawn(next);
+  } else if (set_up && (exit_of_set_up || !setup_failure_.empty())) {
+    history_.record_end(surroundings_.now(), Duration::zero(), false);
+    back_off_or_give_up(config_.restart == RestartPolicy::always, InstanceState::failed,
+                        setup_failure_.empty() ? status.describe()
+                                               : fmt::format("{}: {}", status.describe(), setup_failure_));
+  } else if (set_up || phase_ == Phase::up || phase_ == Phase::adopting) {
+    ended_by_itself(status);
+  }
+}
+
+void ManagedInstance::ended_by_itself(const ExitStatus& status) {
+  const bool failed = !status.success();
+  const TimePoint now = surroundings_.now();
+  history_.record_end(now, phase_ == Phase::up ? now - up_since_ : Duration::zero(), failed);
+  const bool again =
+      config_.restart == RestartPolicy::always || (config_.restart == RestartPolicy::on_failure && failed);
+  if (again && history_.too_many_crashes()) safe_mode_ = true;
+  back_off_or_give_up(again, failed ? InstanceState::failed : InstanceState::offline, status.describe());
+}
+
+void ManagedInstance::back_off_or_give_up(bool again, InstanceState otherwise, const std::string& why) {
+  last_end_ = why;
+  // A stop that came while it was starting has its wish already.
+  const bool cancelled = operation_ && operation_->request.verb == ControlVerb::stop;
+  if (again && !cancelled) {
+    const Duration delay = history_.delay();
+    host_.set_timer(after(delay));
+    set_state(Phase::backing_off, InstanceState::waiting,
+              fmt::format("{}; starts again{} {} ms later", why, safe_mode_ ? " in safe mode" : "",
+                          std::chrono::ceil<std::chrono::milliseconds>(delay).count()));
+  } else {
+    go_down(cancelled ? InstanceState::offline : otherwise, why);
+  }
+  if (!operation_ || operation_->step == Step::checking) return;
+  if (cancelled) {
+    finish(ErrorCode::ok, fmt::format("its process ended meanwhile: {}; it is not started again", why));
+  } else {
+    finish(ErrorCode::unavailable, fmt::format("the process of '{}' ended: {}", config_.name, why));
+  }
+}
+
+void ManagedInstance::on_timer() {
+  switch (phase_) {
+    case Phase::backing_off:
+      ++status_.restarts;
+      return spawn(wants_running_ ? Next::run : Next::stay_stopped);
+    case Phase::setting_up:
+      return set_up_failed(fmt::format(
+          "was not ready after {} s", std::chrono::duration_cast<std::chrono::seconds>(kSetupLimit).count()));
+    case Phase::adopting:
+      return finish_adoption("no answer");
+    case Phase::up:
+      if (operation_ && operation_->step == Step::forwarded) {
+        finish(ErrorCode::timed_out,
+               fmt::format("'{}' did not answer within {} s", config_.name,
+                           std::chrono::duration_cast<std::chrono::seconds>(kCommandLimit).count()));
+      }
+      return;
+    case Phase::ending:
+      if (ending_ == Ending::asked) {
+        ending_ = Ending::terminated;
+        host_.signal(SIGTERM);
+        host_.set_timer(after(kTerminateLimit));
+      } else {
+        ending_ = Ending::killed;
+        spdlog::warn("instance {}: does not end; it is killed", config_.name);
+        host_.signal(SIGKILL);
+      }
+      return;
+    case Phase::down:
+    case Phase::held:
+      return;
+  }
+}
+
+void ManagedInstance::set_up_failed(const std::string& why) {
+  if (setup_failure_.empty()) setup_failure_ = why;
+  host_.set_timer(std::nullopt);
+  host_.signal(SIGKILL);
+}
+
+void ManagedInstance::fresh_process(Next next) {
+  history_.forget();
+  safe_mode_ = false;
+  last_end_.clear();
+  operation_->step = Step::fresh_process;
+  if (idle_phase()) {
+    spawn(next);
+  } else {
+    end_process(next);
+  }
+}
+
+LaunchOptions ManagedInstance::launch_options(Next next) const {
+  LaunchOptions options;
+  options.name = config_.name;
+  options.cores = {config_.core};
+  options.scheduler = scheduler_;
+  options.priority_band = config_.priority_band;
+  options.settings = config_.settings;
+  options.application = safe_mode_ ? "" : application_;
+  options.pool = surroundings_.host.pool;
+  options.run_directory = surroundings_.host.run_directory;
+  options.stopped = next == Next::stay_stopped;
+  options.report_fd = kChildReportFd;
+  options.log_level = surroundings_.host.log_level;
+  return options;
+}
+
+void ManagedInstance::spawn(Next next) {
+  wants_running_ = next == Next::run;
+  setup_failure_.clear();
+  const auto pid = host_.spawn(launch_options(next));
+  if (!pid) {
+    history_.record_end(surroundings_.now(), Duration::zero(), false);
+    return back_off_or_give_up(config_.restart == RestartPolicy::always, InstanceState::failed,
+                               pid.error().describe());
+  }
+  status_.pid = *pid;
+  host_.set_timer(after(kSetupLimit));
+  set_state(Phase::setting_up, InstanceState::starting, last_end_.empty() ? "" : "ended last: " + last_end_);
+}
+
+void ManagedInstance::end_process(Next next) {
+  next_ = next;
+  ending_ = Ending::asked;
+  if (send(ControlVerb::shutdown)) {
+    host_.set_timer(after(kShutdownLimit));
+  } else {
+    ending_ = Ending::terminated;
+    host_.signal(SIGTERM);
+    host_.set_timer(after(kTerminateLimit));
+  }
+  set_state(Phase::ending, InstanceState::stopping, "");
+}
+
+void ManagedInstance::go_down(InstanceState state, const std::string& problem) {
+  host_.set_timer(std::nullopt);
+  set_state(Phase::down, state, problem);
+}
+
+void ManagedInstance::refresh() {
+  const bool up = phase_ == Phase::up && !operation_;
+  if (!up || surroundings_.now() - settled_ < kPageLag) return;
+  const auto runtime = host_.runtime();
+  if (!runtime || runtime->pid != status_.pid) return;
+  const bool was_running = status_.state == InstanceState::running;
+  const bool runs = runtime->running != 0;
+  const bool same_names = safe_mode_ || runtime->application.view() == status_.application.view();
+  if (runs == was_running && same_names && runtime->scheduler.view() == status_.scheduler.view()) return;
+  if (!runtime->scheduler.view().empty()) scheduler_ = runtime->scheduler.view();
+  if (!safe_mode_) application_ = runtime->application.view();
+  if (runs == was_running || safe_mode_) return publish();
+  set_state(Phase::up, runs ? InstanceState::running : InstanceState::stopped,
+            runs || !wants_running_ ? problem_when_up() : "the application stopped by itself: see its tasks");
+}
+
+std::string ManagedInstance::core_problem() {
+  const auto cores = host_.granted_cores();
+  status_.core = cores.size() == 1 ? cores.front() : -1;
+  if (cores == std::vector<int>{config_.core}) return "";
+  return fmt::format("may run on cores {} where {} is configured; restart it to move it",
+                     fmt::join(cores, ", "), config_.core);
+}
+
+Result<std::uint64_t> ManagedInstance::send(ControlVerb verb, const std::string& argument) {
+  const std::uint64_t number = next_number_++;
+  const auto sent = host_.request(
+      ControlRequest{.number = number, .verb = verb, .instance = config_.name, .argument = argument});
+  if (!sent) return std::unexpected(sent.error());
+  return number;
+}
+
+void ManagedInstance::set_state(Phase phase, InstanceState state, const std::string& problem) {
+  if (state != status_.state) {
+    const auto since = std::chrono::system_clock::now().time_since_epoch();
+    status_.state_since_unix_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(since).count();
+  }
+  phase_ = phase;
+  status_.state = state;
+  status_.problem.assign(problem);
+  const bool bad = state == InstanceState::failed || state == InstanceState::safe_mode;
+  spdlog::log(bad ? spdlog::level::warn : spdlog::level::info, "instance {}: {}{}{}", config_.name,
+              to_string(state), problem.empty() ? "" : ": ", problem);
+  publish();
+}
+
+void ManagedInstance::publish() {
+  status_.scheduler.assign(scheduler_);
+  status_.application.assign(application_);
+  surroundings_.changed();
+}
+
+}  // namespace plchost

@@ -1,0 +1,186 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "api/control/control_handler.hpp"
+#include "manager/config/manager_config.hpp"
+#include "manager/supervisor/instance_host.hpp"
+#include "manager/supervisor/restart_policy.hpp"
+#include "shm/pool/host_page.hpp"
+
+namespace plchost {
+
+// The life of one instance
+// ========================
+//
+//             release()            ready
+//   held ───────────────► setting_up ─────────► up ◄── adopting (a process that outlived a manager)
+//    ▲                      ▲   │ exit          │ │
+//    │ autostart            │   ▼               │ │ stop all, reset, restart, load
+//   down ◄──────────────────┼───┴───────────────┘ ▼
+//    ▲   policy says no     │  policy says yes   ending ── SIGTERM ── SIGKILL
+//    │                      └── backing_off        │
+//    └─────────────────────────────────────────────┴──► setting_up (a fresh process was asked for)
+//
+// Phase is what this class knows; InstanceState is what the world is told:
+//   down         offline, or failed with a problem text
+//   held         waiting: for what it comes after; the problem text says for whom
+//   backing_off  waiting: for the end of the back-off
+//   setting_up, adopting   starting
+//   up           running, stopped or safe_mode: as the process says
+//   ending       stopping
+//
+// Rules
+// * One timer. Each phase that could last for ever has a limit: setting_up 30 s,
+//   then SIGKILL; ending 5 s, SIGTERM, 2 s, SIGKILL; adopting 5 s, after which it counts as up with a problem
+//   text, because a manager stops no PLC for being unable to talk to it.
+// * The order of `after` is for the first start (held) and for the end. A restart does not wait, and an
+// operator's
+//   start of a held instance overrides it.
+// * An end of its own accord: a signal, or an exit code other than 0, is a failure; exit code 0 is not.
+// Policy
+//   never: down. on_failure: restarted after a failure. always: restarted. A set-up that failed
+//   (kExitSetupFailed, wrong usage) is not retried under on_failure, because the same files would fail again:
+//   failed. Under always it is, with back-off, but it does not count as a crash.
+// * crash_limit crashes within crash_window: the next process is spawned without the application (safe_mode).
+// It
+//   stays that way until load_application, reset or restart, which also forget the crashes. A process that
+//   crashes even so is restarted without application, with back-off.
+// * Commands: one at a time; another is answered with busy. What changes a process that is still setting_up
+// waits until
+//   it is up. The reply comes when the thing is done, or when the process ended instead, or at the limit.
+//     start      up: forwarded (running: done already; safe_mode: refused). Down, held, backing_off: spawns.
+//     stop       up: forwarded (stopped: done already). held, backing_off: cancels, offline. Down: done
+//     already. reset, restart   ends the process if there is one, and spawns another one, stopped or running.
+//     load_application   checked first by a process of its own; then as restart if it ran, was in safe mode,
+//     failed,
+//                waiting or without application; as reset if it was stopped; only remembered if it was
+//                offline.
+//     set_scheduler      up: forwarded, and remembered for the next process if it was accepted. Else
+//     remembered. register_event, unregister_event   the same; registrations are repeated in each fresh
+//     process.
+// * An adopted process is no child of this manager: how it ended is unknown, and counts as a failure.
+class ManagedInstance : public InstanceEvents {
+ public:
+  struct Surroundings {
+    const HostConfig& host;
+    std::string folder;                        ///< that relative application paths start in
+    std::vector<std::string_view> schedulers;  ///< names that there are
+    std::function<TimePoint()> now;
+    std::function<void()> changed;  ///< status() is another now; may call release(), nothing else
+  };
+
+  ManagedInstance(const InstanceConfig& config, Surroundings surroundings, InstanceHost& host);
+
+  /// First of all: takes over a process that is there. False: there is none.
+  bool adopt();
+  /// Waits for what it comes after; `why` is the problem text.
+  void hold(const std::string& why);
+  /// What it comes after is up.
+  void release();
+  void handle(const ControlRequest& request, ControlReplyFunction reply);
+  /// The end of the manager: whatever goes on is broken off, and the process ends.
+  void shut_down();
+  /// Looks at what the process says of itself. To be called now and then.
+  void refresh();
+
+  [[nodiscard]] const InstanceStatus& status() const noexcept { return status_; }
+  [[nodiscard]] const InstanceConfig& config() const noexcept { return config_; }
+  [[nodiscard]] bool held() const noexcept { return phase_ == Phase::held; }
+  /// What comes after it may start.
+  [[nodiscard]] bool ready() const noexcept {
+    return phase_ == Phase::up && status_.state != InstanceState::safe_mode;
+  }
+  [[nodiscard]] bool has_process() const noexcept { return status_.pid != 0; }
+  void set_restarts(std::uint32_t restarts) { status_.restarts = restarts; }
+
+  void on_report(const SetupReport& report) override;
+  void on_reply(const ControlReply& reply) override;
+  void on_exit(const ExitStatus& status) override;
+  void on_timer() override;
+  void on_application_checked(const Result<void>& result) override;
+
+ private:
+  enum class Phase : std::uint8_t { down, held, backing_off, setting_up, adopting, up, ending };
+  enum class Ending : std::uint8_t { asked, terminated, killed };
+  enum class Next : std::uint8_t { nothing, run, stay_stopped };
+  enum class Step : std::uint8_t { checking, fresh_process, until_up, forwarded };
+  struct Operation {
+    ControlRequest request;
+    ControlReplyFunction reply;
+    Step step = Step::until_up;
+    std::uint64_t forwarded_number = 0;
+  };
+
+  // Commands: instance_commands.cpp
+  void begin(Operation operation);
+  void begin_start();
+  void begin_stop();
+  void begin_load();
+  void begin_forwarded();
+  void apply_loaded_application();
+  void forward_or_wait();
+  void forward();
+  void finish(ErrorCode code, const std::string& text);
+  void finish_forwarded(const ControlReply& reply);
+  [[nodiscard]] Result<void> check_argument(ControlRequest& request) const;
+  [[nodiscard]] bool idle_phase() const noexcept {
+    return phase_ == Phase::down || phase_ == Phase::held || phase_ == Phase::backing_off;
+  }
+
+  // Life: managed_instance.cpp
+  void fresh_process(Next next);
+  void spawn(Next next);
+  void end_process(Next next);
+  void set_up_failed(const std::string& why);
+  void come_up();
+  void finish_adoption(const std::string& problem);
+  void ended_by_itself(const ExitStatus& status);
+  void back_off_or_give_up(bool again, InstanceState otherwise, const std::string& why);
+  void go_down(InstanceState state, const std::string& problem);
+  void set_state(Phase phase, InstanceState state, const std::string& problem);
+  void publish();
+  [[nodiscard]] std::string problem_when_up();
+  [[nodiscard]] std::string core_problem();
+  [[nodiscard]] LaunchOptions launch_options(Next next) const;
+  [[nodiscard]] TimePoint after(Duration duration) const { return surroundings_.now() + duration; }
+  [[nodiscard]] Result<std::uint64_t> send(ControlVerb verb, const std::string& argument = {});
+
+  const InstanceConfig& config_;
+  Surroundings surroundings_;
+  InstanceHost& host_;
+  RestartHistory history_;
+
+  Phase phase_ = Phase::down;
+  Ending ending_ = Ending::asked;
+  Next next_ = Next::nothing;  // after ending
+  bool safe_mode_ = false;
+  bool wants_running_ = true;  // what an operator, or the start, wanted last
+  bool shutting_down_ = false;
+  TimePoint up_since_{};
+  TimePoint settled_{};        // when the state was last known from the process's own answer
+  std::string setup_failure_;  // why the set-up failed; empty: it did not
+  std::string last_end_;       // how the last process ended by itself; empty: it did not
+  std::string application_;    // of the next process
+  std::string scheduler_;      // of the next process
+  std::uint64_t next_number_ = 1;
+  std::uint64_t awaited_number_ = 0;  // of the reply in adopting
+  std::optional<Operation> operation_;
+  InstanceStatus status_;
+};
+
+/// Limits of the phases and of a command.
+inline constexpr Duration kSetupLimit = std::chrono::seconds(30);
+inline constexpr Duration kAdoptLimit = std::chrono::seconds(5);
+inline constexpr Duration kShutdownLimit = std::chrono::seconds(5);
+inline constexpr Duration kTerminateLimit = std::chrono::seconds(2);
+inline constexpr Duration kCommandLimit = std::chrono::seconds(10);
+/// The process's page is believed only this long after its own answer: it is written now and then.
+inline constexpr Duration kPageLag = std::chrono::seconds(1);
+
+}  // namespace plchost

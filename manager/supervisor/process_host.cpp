@@ -1,0 +1,205 @@
+#include "manager/supervisor/process_host.hpp"
+
+#include <csignal>
+#include <utility>
+
+#include <fmt/format.h>
+#include <sys/epoll.h>
+
+#include "shm/base/log.hpp"
+
+namespace plchost {
+
+ProcessHost::ProcessHost(Reactor& reactor, Settings settings)
+    : reactor_(reactor),
+      settings_(std::move(settings)),
+      timer_(reactor, [this] { events_->on_timer(); }),
+      check_timer_(reactor, [this] { check_timed_out(); }) {}
+
+Result<int> ProcessHost::spawn(const LaunchOptions& options) {
+  auto channel = make_report_channel();
+  if (!channel) return std::unexpected(channel.error());
+  auto process = spawn_process(
+      {.arguments = to_arguments(settings_.program, options), .report_fd = channel->childs.get()});
+  if (!process) return std::unexpected(process.error());
+  const int pid = process->pid;
+  if (auto followed = follow(std::move(*process)); !followed) return std::unexpected(followed.error());
+  report_ = std::move(channel->ours);
+  auto watch = reactor_.watch(report_.fd(), EPOLLIN, [this](std::uint32_t) { read_reports(); });
+  if (!watch) {
+    signal(SIGKILL);
+    return std::unexpected(watch.error());
+  }
+  report_watch_ = std::move(*watch);
+  return pid;
+}
+
+Result<int> ProcessHost::adopt() {
+  if (auto connected = connect(); !connected) return std::unexpected(connected.error());
+  const auto pid = link_.peer_pid();
+  if (!pid) return std::unexpected(pid.error());
+  auto process = open_process(*pid);
+  if (!process) return std::unexpected(process.error());
+  if (auto followed = follow(std::move(*process)); !followed) return std::unexpected(followed.error());
+  return *pid;
+}
+
+Result<void> ProcessHost::follow(ChildProcess process) {
+  auto watch = reactor_.watch(process.pidfd.get(), EPOLLIN, [this](std::uint32_t) { process_ended(); });
+  if (!watch) {
+    // Cannot be supervised, so it must not go on.
+    (void)signal_process(process, SIGKILL);
+    return std::unexpected(watch.error());
+  }
+  process_ = std::move(process);
+  exit_watch_ = std::move(*watch);
+  return {};
+}
+
+Result<void> ProcessHost::connect() {
+  auto socket = PacketSocket::connect(instance_socket_path(settings_.run_directory, settings_.name));
+  if (!socket) return std::unexpected(socket.error());
+  auto watch = reactor_.watch(socket->fd(), EPOLLIN, [this](std::uint32_t) { read_replies(); });
+  if (!watch) return std::unexpected(watch.error());
+  link_watch_.reset();
+  link_ = std::move(*socket);
+  link_watch_ = std::move(*watch);
+  return {};
+}
+
+Result<void> ProcessHost::request(const ControlRequest& request) {
+  if (!link_) {
+    if (auto connected = connect(); !connected) return connected;
+  }
+  return link_.send(encode(request));
+}
+
+void ProcessHost::signal(int signal) {
+  if (!process_) return;
+  if (const auto sent = signal_process(*process_, signal); !sent) {
+    spdlog::error("instance {}: {}", settings_.name, sent.error().describe());
+  }
+}
+
+void ProcessHost::set_timer(std::optional<TimePoint> when) {
+  if (when) {
+    timer_.set(*when);
+  } else {
+    timer_.cancel();
+  }
+}
+
+void ProcessHost::read_reports() {
+  for (;;) {
+    auto packet = report_ ? report_.receive() : Result<std::optional<std::string>>(std::nullopt);
+    if (!packet) {  // the process has closed it, or is gone
+      report_watch_.reset();
+      report_.close();
+      return;
+    }
+    if (!*packet) return;
+    if (const auto report = decode_report(**packet)) {
+      events_->on_report(*report);
+    } else {
+      spdlog::warn("instance {}: {}", settings_.name, report.error().describe());
+    }
+  }
+}
+
+void ProcessHost::read_replies() {
+  for (;;) {
+    auto packet = link_ ? link_.receive() : Result<std::optional<std::string>>(std::nullopt);
+    if (!packet) {
+      link_watch_.reset();
+      link_.close();
+      return;
+    }
+    if (!*packet) return;
+    if (const auto reply = decode_reply(**packet)) {
+      events_->on_reply(*reply);
+    } else {
+      spdlog::warn("instance {}: {}", settings_.name, reply.error().describe());
+    }
+  }
+}
+
+// The one place where an instance's exit is reaped. What it said last explains the exit, so it comes first.
+void ProcessHost::process_ended() {
+  read_reports();
+  read_replies();
+  const ExitStatus status = reap_process(*process_);
+  spdlog::info("instance {}: process {}: {}", settings_.name, process_->pid, status.describe());
+  forget_process();
+  events_->on_exit(status);
+}
+
+void ProcessHost::forget_process() {
+  exit_watch_.reset();
+  report_watch_.reset();
+  link_watch_.reset();
+  report_.close();
+  link_.close();
+  page_.reset();
+  process_.reset();
+}
+
+Result<void> ProcessHost::check_application(const std::string& path) {
+  auto pipe = make_output_pipe();
+  if (!pipe) return std::unexpected(pipe.error());
+  auto process = spawn_process(
+      {.arguments = {settings_.program, "--check-application", path}, .output_fd = pipe->write_end.get()});
+  if (!process) return std::unexpected(process.error());
+  auto watch = reactor_.watch(process->pidfd.get(), EPOLLIN, [this](std::uint32_t) { check_ended(); });
+  if (!watch) {
+    (void)signal_process(*process, SIGKILL);
+    return std::unexpected(watch.error());
+  }
+  check_ = std::move(*process);
+  check_watch_ = std::move(*watch);
+  check_output_ = std::move(pipe->read_end);
+  check_timed_out_ = false;
+  check_timer_.set(MonotonicClock::now() + kCheckLimit);
+  return {};
+}
+
+void ProcessHost::check_timed_out() {
+  check_timed_out_ = true;
+  if (check_) (void)signal_process(*check_, SIGKILL);  // check_ended() says the rest
+}
+
+void ProcessHost::check_ended() {
+  constexpr std::size_t kShown = 2000;
+  const ExitStatus status = reap_process(*check_);
+  std::string output = read_available(check_output_.get(), kShown);
+  while (output.ends_with('\n')) output.pop_back();
+  check_timer_.cancel();
+  check_watch_.reset();
+  check_output_.reset();
+  check_.reset();
+  if (status.success()) return events_->on_application_checked({});
+  if (check_timed_out_) {
+    return events_->on_application_checked(
+        failure(ErrorCode::timed_out, "trying it took longer than 10 s: does it return from its set-up?"));
+  }
+  events_->on_application_checked(
+      failure(ErrorCode::invalid_argument,
+              output.empty() ? fmt::format("trying it ended with {}", status.describe()) : output));
+}
+
+std::optional<InstanceRuntime> ProcessHost::runtime() {
+  if (!process_) return std::nullopt;
+  auto current = page_ ? page_->runtime() : std::nullopt;
+  if (!current || current->pid != process_->pid) {
+    auto opened = InstancePageReader::open(settings_.pool, settings_.name);
+    if (!opened) return std::nullopt;
+    page_ = std::move(*opened);
+    current = page_->runtime();
+  }
+  return current;
+}
+
+std::vector<int> ProcessHost::granted_cores() {
+  return process_ ? cores_of_process(process_->pid) : std::vector<int>();
+}
+
+}  // namespace plchost

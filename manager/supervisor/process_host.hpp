@@ -1,0 +1,72 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "manager/supervisor/instance_host.hpp"
+#include "manager/system/child_process.hpp"
+#include "manager/system/reactor.hpp"
+#include "shm/base/packet_socket.hpp"
+
+namespace plchost {
+
+/// The real InstanceHost: one instance's process, with its pidfd, report channel and control socket, in the
+/// Reactor. Every exit is reaped in one place, after what the process said before it was heard.
+class ProcessHost : public InstanceHost {
+ public:
+  struct Settings {
+    std::string program;  ///< path of plc-instance
+    std::string name;
+    std::string pool;
+    std::string run_directory;
+  };
+
+  ProcessHost(Reactor& reactor, Settings settings);
+  /// Before anything else; outlives this.
+  void connect_events(InstanceEvents& events) { events_ = &events; }
+
+  [[nodiscard]] Result<int> spawn(const LaunchOptions& options) override;
+  [[nodiscard]] Result<int> adopt() override;
+  [[nodiscard]] Result<void> request(const ControlRequest& request) override;
+  void signal(int signal) override;
+  void set_timer(std::optional<TimePoint> when) override;
+  [[nodiscard]] Result<void> check_application(const std::string& path) override;
+  [[nodiscard]] std::optional<InstanceRuntime> runtime() override;
+  [[nodiscard]] std::vector<int> granted_cores() override;
+
+ private:
+  [[nodiscard]] Result<void> follow(ChildProcess process);
+  [[nodiscard]] Result<void> connect();
+  void read_reports();
+  void read_replies();
+  void process_ended();
+  void forget_process();
+  void check_ended();
+  void check_timed_out();
+
+  Reactor& reactor_;
+  Settings settings_;
+  InstanceEvents* events_ = nullptr;
+  Reactor::Timer timer_;
+
+  std::optional<ChildProcess> process_;
+  Reactor::Watch exit_watch_;
+  PacketSocket report_;
+  Reactor::Watch report_watch_;
+  PacketSocket link_;
+  Reactor::Watch link_watch_;
+  std::optional<InstancePageReader> page_;
+
+  std::optional<ChildProcess> check_;
+  Reactor::Watch check_watch_;
+  UniqueFd check_output_;
+  Reactor::Timer check_timer_;
+  bool check_timed_out_ = false;
+};
+
+/// How long an application may take to be tried.
+inline constexpr Duration kCheckLimit = std::chrono::seconds(10);
+
+}  // namespace plchost

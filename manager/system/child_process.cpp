@@ -1,0 +1,175 @@
+#include "manager/system/child_process.hpp"
+
+#include <algorithm>
+#include <array>
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <set>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <spawn.h>
+#include <sys/socket.h>
+#include <sys/syscall.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "shm/base/system_call.hpp"
+#include "shm/base/thread.hpp"
+
+namespace plchost {
+
+namespace {
+
+struct SpawnActions {
+  posix_spawn_file_actions_t files{};
+  posix_spawnattr_t attributes{};
+  SpawnActions() noexcept {
+    posix_spawn_file_actions_init(&files);
+    posix_spawnattr_init(&attributes);
+  }
+  ~SpawnActions() {
+    posix_spawn_file_actions_destroy(&files);
+    posix_spawnattr_destroy(&attributes);
+  }
+  SpawnActions(const SpawnActions&) = delete;
+  SpawnActions& operator=(const SpawnActions&) = delete;
+};
+
+Result<void> prepare(SpawnActions& actions, const SpawnRequest& request) {
+  int error = posix_spawn_file_actions_addopen(&actions.files, STDIN_FILENO, "/dev/null", O_RDONLY, 0);
+  if (error == 0 && request.output_fd >= 0) {
+    error = posix_spawn_file_actions_adddup2(&actions.files, request.output_fd, STDOUT_FILENO);
+    if (error == 0) {
+      error = posix_spawn_file_actions_adddup2(&actions.files, request.output_fd, STDERR_FILENO);
+    }
+  }
+  int first_to_close = STDERR_FILENO + 1;
+  if (error == 0 && request.report_fd >= 0) {
+    error = posix_spawn_file_actions_adddup2(&actions.files, request.report_fd, kChildReportFd);
+    first_to_close = kChildReportFd + 1;
+  }
+  // Ours are all CLOEXEC; what the manager itself inherited may not be.
+  if (error == 0) error = posix_spawn_file_actions_addclosefrom_np(&actions.files, first_to_close);
+  sigset_t none;
+  sigset_t all;
+  sigemptyset(&none);
+  sigfillset(&all);
+  if (error == 0) error = posix_spawnattr_setsigmask(&actions.attributes, &none);
+  if (error == 0) error = posix_spawnattr_setsigdefault(&actions.attributes, &all);
+  // A session of its own: neither Ctrl-C nor the end of the manager's terminal reaches a PLC.
+  constexpr int kFlags = POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETSID;
+  if (error == 0) error = posix_spawnattr_setflags(&actions.attributes, static_cast<short>(kFlags));
+  return check_returned(error, "prepare to start " + request.arguments.front());
+}
+
+}  // namespace
+
+std::string ExitStatus::describe() const {
+  if (!known) return "ended (status unknown: it was adopted)";
+  if (kind == Kind::exited) return fmt::format("exit code {}", value);
+  const char* name = sigabbrev_np(value);
+  return name != nullptr ? fmt::format("killed by SIG{}", name) : fmt::format("killed by signal {}", value);
+}
+
+Result<ChildProcess> spawn_process(const SpawnRequest& request) {
+  SpawnActions actions;
+  if (auto prepared = prepare(actions, request); !prepared) return std::unexpected(prepared.error());
+  std::vector<std::string> arguments = request.arguments;
+  std::vector<char*> pointers;
+  for (std::string& argument : arguments) pointers.push_back(argument.data());
+  pointers.push_back(nullptr);
+  pid_t pid = 0;
+  const int error =
+      ::posix_spawn(&pid, pointers.front(), &actions.files, &actions.attributes, pointers.data(), environ);
+  if (auto started = check_returned(error, "start " + request.arguments.front()); !started) {
+    return std::unexpected(started.error());
+  }
+  auto opened = open_process(pid);
+  if (!opened) {
+    // Without a pidfd it could not be supervised. It was not waited for yet, so the number is still its own.
+    ::kill(pid, SIGKILL);
+    ::waitpid(pid, nullptr, 0);
+  }
+  return opened;
+}
+
+Result<ChildProcess> open_process(pid_t pid) {
+  const auto fd = static_cast<int>(::syscall(SYS_pidfd_open, pid, 0));  // CLOEXEC always
+  const auto opened = check_errno(fd, fmt::format("pidfd_open of process {}", pid));
+  if (!opened) return std::unexpected(opened.error());
+  return ChildProcess{.pid = pid, .pidfd = UniqueFd(fd)};
+}
+
+ExitStatus reap_process(const ChildProcess& process) {
+  siginfo_t info{};
+  int waited = 0;
+  do {
+    waited = ::waitid(P_PIDFD, static_cast<id_t>(process.pidfd.get()), &info, WEXITED | WNOHANG);
+  } while (waited != 0 && errno == EINTR);
+  if (waited != 0 || info.si_pid == 0) return ExitStatus{.known = false};
+  const bool exited = info.si_code == CLD_EXITED;
+  return ExitStatus{.kind = exited ? ExitStatus::Kind::exited : ExitStatus::Kind::killed,
+                    .value = info.si_status};
+}
+
+Result<void> signal_process(const ChildProcess& process, int signal) {
+  const long sent = ::syscall(SYS_pidfd_send_signal, process.pidfd.get(), signal, nullptr, 0);
+  if (sent != 0 && errno == ESRCH) return {};
+  const auto done = check_errno(sent, fmt::format("signal {} to process {}", signal, process.pid));
+  if (!done) return std::unexpected(done.error());
+  return {};
+}
+
+Result<ReportChannel> make_report_channel() {
+  std::array<int, 2> fds{};
+  auto made = check_errno(::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, fds.data()), "socketpair");
+  if (!made) return std::unexpected(made.error());
+  ReportChannel channel{.ours = PacketSocket(UniqueFd(fds[0])), .childs = UniqueFd(fds[1])};
+  const auto changed = check_errno(::fcntl(fds[0], F_SETFL, O_NONBLOCK), "fcntl");
+  if (!changed) return std::unexpected(changed.error());
+  return channel;
+}
+
+Result<OutputPipe> make_output_pipe() {
+  std::array<int, 2> fds{};
+  auto made = check_errno(::pipe2(fds.data(), O_CLOEXEC), "pipe2");
+  if (!made) return std::unexpected(made.error());
+  OutputPipe pipe{.read_end = UniqueFd(fds[0]), .write_end = UniqueFd(fds[1])};
+  const auto changed = check_errno(::fcntl(fds[0], F_SETFL, O_NONBLOCK), "fcntl");
+  if (!changed) return std::unexpected(changed.error());
+  return pipe;
+}
+
+std::string read_available(int fd, std::size_t most) {
+  std::string text(most, '\0');
+  std::size_t length = 0;
+  while (length < most) {
+    const ssize_t got = ::read(fd, text.data() + length, most - length);
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) break;
+    length += static_cast<std::size_t>(got);
+  }
+  text.resize(length);
+  return text;
+}
+
+std::vector<int> cores_of_process(pid_t pid) {
+  std::set<int> cores;
+  std::error_code error;
+  const std::filesystem::path tasks = fmt::format("/proc/{}/task", pid);
+  for (std::filesystem::directory_iterator at(tasks, error), end; !error && at != end; at.increment(error)) {
+    const auto thread = static_cast<pid_t>(std::strtol(at->path().filename().c_str(), nullptr, 10));
+    if (const auto allowed = allowed_cores(thread)) cores.insert(allowed->begin(), allowed->end());
+  }
+  return {cores.begin(), cores.end()};
+}
+
+std::string program_directory() {
+  std::error_code error;
+  return std::filesystem::read_symlink("/proc/self/exe", error).parent_path().string();
+}
+
+}  // namespace plchost

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <sys/types.h>
+
+#include "shm/base/packet_socket.hpp"
+#include "shm/base/result.hpp"
+#include "shm/base/unique_fd.hpp"
+
+namespace plchost {
+
+/// How a process ended.
+struct ExitStatus {
+  enum class Kind : bool { exited, killed };
+  Kind kind = Kind::exited;
+  int value = 0;      ///< exit code, or number of the signal
+  bool known = true;  ///< false: it was no child of this manager
+  [[nodiscard]] bool success() const noexcept { return known && kind == Kind::exited && value == 0; }
+  /// "exit code 3", "killed by SIGSEGV"
+  [[nodiscard]] std::string describe() const;
+};
+
+/// A process, held by its pidfd: a number that cannot come to mean another process.
+struct ChildProcess {
+  pid_t pid = 0;
+  UniqueFd pidfd;
+};
+
+/// In the child, the report channel is this descriptor.
+inline constexpr int kChildReportFd = 3;
+
+struct SpawnRequest {
+  std::vector<std::string> arguments;  ///< the program's path first
+  int report_fd = -1;                  ///< becomes kChildReportFd; -1: none
+  int output_fd = -1;                  ///< becomes standard output and error; -1: the manager's own
+};
+
+/// Starts a program in a session of its own, with no other descriptor of ours, default signals, nothing
+/// blocked, and standard input from /dev/null. It does not end when the manager does. Small and quick:
+/// posix_spawn.
+[[nodiscard]] Result<ChildProcess> spawn_process(const SpawnRequest& request);
+
+/// A process that somebody else started.
+[[nodiscard]] Result<ChildProcess> open_process(pid_t pid);
+
+/// The end of a process whose pidfd is readable.
+[[nodiscard]] ExitStatus reap_process(const ChildProcess& process);
+
+/// A process that is gone already is no error.
+[[nodiscard]] Result<void> signal_process(const ChildProcess& process, int signal);
+
+struct ReportChannel {
+  PacketSocket ours;
+  UniqueFd childs;
+};
+[[nodiscard]] Result<ReportChannel> make_report_channel();
+
+struct OutputPipe {
+  UniqueFd read_end;  ///< non-blocking
+  UniqueFd write_end;
+};
+[[nodiscard]] Result<OutputPipe> make_output_pipe();
+/// What is there to be read now, up to `most` bytes.
+[[nodiscard]] std::string read_available(int fd, std::size_t most);
+
+/// The union of the cores that the threads of a process may run on, ascending.
+[[nodiscard]] std::vector<int> cores_of_process(pid_t pid);
+
+/// The folder that this program lies in.
+[[nodiscard]] std::string program_directory();
+
+}  // namespace plchost

@@ -1,0 +1,249 @@
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <string_view>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include "manager/config/load_config.hpp"
+#include "shm/pool/host_page.hpp"
+
+namespace plchost {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+ConfigSurroundings four_cores() {
+  return {.host_name = "cell9",
+          .online_cores = {0, 1, 2, 3},
+          .isolated_cores = {},
+          .schedulers = {"CmpSchedule", "CmpScheduleTimer", "CmpScheduleOneShot"},
+          .check_files = false};
+}
+
+auto parse(std::string_view text, const ConfigSurroundings& surroundings = four_cores()) {
+  return parse_config(text, "/etc/plchost/cell.toml", surroundings);
+}
+
+TEST(Config, TakesDefaultsFromTheSystem) {
+  const auto sut = parse("");
+  ASSERT_TRUE(sut.has_value());
+  EXPECT_EQ(sut->host.name, "cell9");
+  EXPECT_EQ(sut->host.run_directory, "/run/plchost");
+  EXPECT_THAT(sut->host.cores, ElementsAre(0, 1, 2, 3));
+  EXPECT_THAT(sut->host.housekeeping_cores, ElementsAre(0, 1, 2, 3));
+  EXPECT_TRUE(sut->dds.enabled);
+  EXPECT_TRUE(sut->instances.empty());
+}
+
+TEST(Config, PrefersTheIsolatedCoresAndKeepsHouseOnTheOthers) {
+  auto surroundings = four_cores();
+  surroundings.isolated_cores = {2, 3};
+  const auto sut = parse("", surroundings);
+  ASSERT_TRUE(sut.has_value());
+  EXPECT_THAT(sut->host.cores, ElementsAre(2, 3));
+  EXPECT_THAT(sut->host.housekeeping_cores, ElementsAre(0, 1));
+}
+
+TEST(Config, ReadsEveryKey) {
+  const auto sut = parse(R"(
+[host]
+name = "cell1"
+dds_domain = 7
+run_directory = "/tmp/cell1"
+pool = "cell1"
+pool_objects = 128
+cores = [1, 2]
+housekeeping_cores = [0]
+log_level = "debug"
+keep_pool = true
+[dds]
+enabled = false
+interface = "eth0"
+peers = ["10.0.0.2", "cell2:7410"]
+[[instance]]
+name = "drive1"
+core = 2
+[[instance]]
+name = "line1"
+core = 1
+scheduler = "CmpScheduleTimer"
+priority_band = "high"
+settings = "line1.cfg"
+application = "/opt/line.so"
+autostart = false
+after = ["drive1"]
+restart = "always"
+restart_delay_ms = 10
+restart_delay_max_ms = 20
+crash_limit = 3
+crash_window_s = 5
+share_core = true
+)");
+  ASSERT_TRUE(sut.has_value());
+  EXPECT_EQ(sut->host.dds_domain, 7);
+  EXPECT_EQ(sut->host.pool_objects, 128U);
+  EXPECT_TRUE(sut->host.keep_pool);
+  EXPECT_FALSE(sut->dds.enabled);
+  EXPECT_THAT(sut->dds.peers, ElementsAre("10.0.0.2", "cell2:7410"));
+  const InstanceConfig& line = sut->instances.at(1);
+  EXPECT_EQ(line.core, 1);
+  EXPECT_EQ(line.scheduler, "CmpScheduleTimer");
+  EXPECT_EQ(line.priority_band, "high");
+  EXPECT_EQ(line.settings, "/etc/plchost/line1.cfg");
+  EXPECT_EQ(line.application, "/opt/line.so");
+  EXPECT_FALSE(line.autostart);
+  EXPECT_THAT(line.after, ElementsAre("drive1"));
+  EXPECT_EQ(line.restart, RestartPolicy::always);
+  EXPECT_EQ(line.restart_delay, std::chrono::milliseconds(10));
+  EXPECT_EQ(line.restart_delay_max, std::chrono::milliseconds(20));
+  EXPECT_EQ(line.crash_limit, 3U);
+  EXPECT_EQ(line.crash_window, std::chrono::seconds(5));
+}
+
+struct WrongConfig {
+  const char* name;
+  std::string text;
+  std::string where;  ///< the line
+  std::string what;   ///< part of the message: key, value and what is allowed
+};
+
+class ConfigRefuses : public testing::TestWithParam<WrongConfig> {};
+
+TEST_P(ConfigRefuses, WithLineKeyValueAndWhatIsAllowed) {
+  const auto sut = parse(GetParam().text);
+  ASSERT_FALSE(sut.has_value());
+  EXPECT_THAT(sut.error(), ElementsAre(testing::AllOf(
+                               testing::StartsWith("/etc/plchost/cell.toml:" + GetParam().where + ": "),
+                               HasSubstr(GetParam().what))));
+}
+
+std::string instance(std::string_view keys, std::string_view name = "a", int core = 1) {
+  return fmt::format("[[instance]]\nname = \"{}\"\ncore = {}\n{}\n", name, core, keys);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Host, ConfigRefuses,
+    testing::Values(
+        WrongConfig{"syntax", "[host]\nname = \n", "2", ""},
+        WrongConfig{"section", "[hots]\n", "1", "unknown section or key 'hots'; allowed are [host], [dds], "
+                                                "[[instance]]; did you mean 'host'?"},
+        WrongConfig{"section_type", "host = 1\n", "1", "'host' must be a section: [host]"},
+        WrongConfig{"key", "[host]\nnmae = \"x\"\n", "2", "[host] unknown key 'nmae'; allowed are name, "},
+        WrongConfig{"suggestion", "[host]\nnmae = \"x\"\n", "2", "did you mean 'name'?"},
+        WrongConfig{"name", "[host]\nname = \"a b\"\n", "2", "[host] name: name 'a b' is not valid: allowed are 1 to 63"},
+        WrongConfig{"name_type", "[host]\nname = 5\n", "2", "[host] name: 5 is a whole number; allowed is a text"},
+        WrongConfig{"domain", "[host]\n\ndds_domain = 233\n", "3", "dds_domain: 233 is out of range; allowed is 0 to 232"},
+        WrongConfig{"domain_low", "[host]\ndds_domain = -1\n", "2", "dds_domain: -1 is out of range"},
+        WrongConfig{"domain_type", "[host]\ndds_domain = \"1\"\n", "2", "allowed is a whole number from 0 to 232"},
+        WrongConfig{"run", "[host]\nrun_directory = \"run\"\n", "2", "\"run\" is not allowed; allowed is an absolute path"},
+        WrongConfig{"run_long", "[host]\nrun_directory = \"/" + std::string(70, 'x') + "\"\n", "2", "of up to 70 characters"},
+        WrongConfig{"pool", "[host]\npool = \"a/b\"\n", "2", "'a/b' is not valid"},
+        WrongConfig{"objects", "[host]\npool_objects = 15\n", "2", "allowed is 16 to 1000000"},
+        WrongConfig{"objects_high", "[host]\npool_objects = 1000001\n", "2", "allowed is 16 to 1000000"},
+        WrongConfig{"cores_type", "[host]\ncores = 1\n", "2", "allowed is an array of whole numbers"},
+        WrongConfig{"cores_element", "[host]\ncores = [\"1\"]\n", "2", "allowed is an array of whole numbers"},
+        WrongConfig{"cores_offline", "[host]\ncores = [9]\n", "2", "core 9 is not online; online are 0, 1, 2, 3"},
+        WrongConfig{"cores_empty", "[host]\ncores = []\n", "2", "is empty; online are 0, 1, 2, 3"},
+        WrongConfig{"house", "[host]\nhousekeeping_cores = [8]\n", "2", "housekeeping_cores: core 8 is not online"},
+        WrongConfig{"level", "[host]\nlog_level = \"inof\"\n", "2",
+                    "\"inof\" is not known; allowed are trace, debug, info, warning, error; did you mean 'info'?"},
+        WrongConfig{"keep", "[host]\nkeep_pool = 1\n", "2", "1 is a whole number; allowed is true or false"},
+        WrongConfig{"date", "[host]\nname = 1979-05-27\n", "2", "is a date or time; allowed is a text"},
+        WrongConfig{"dds_key", "[dds]\nport = 1\n", "2", "[dds] unknown key 'port'; allowed are enabled, interface, peers"},
+        WrongConfig{"interface", "[dds]\ninterface = \"\"\n", "2", "interface '' is not valid"},
+        WrongConfig{"peers", "[dds]\npeers = [\"-x\"]\n", "2", "\"-x\" is not an address"},
+        WrongConfig{"peers_type", "[dds]\npeers = [1]\n", "2", "allowed is an array of texts"}),
+    [](const auto& info) { return info.param.name; });
+
+INSTANTIATE_TEST_SUITE_P(
+    Instance, ConfigRefuses,
+    testing::Values(
+        WrongConfig{"single_brackets", "[instance]\n", "1", "double brackets: [[instance]]"},
+        WrongConfig{"no_name", "[[instance]]\ncore = 1\n", "1", "[[instance]] 'number 1' name: is missing"},
+        WrongConfig{"no_core", "[[instance]]\nname = \"a\"\n", "1", "[[instance]] 'a' core: is missing"},
+        WrongConfig{"name", instance("", "a/b"), "2", "'a/b' is not valid: allowed are 1 to 31"},
+        WrongConfig{"name_long", instance("", std::string(32, 'n')), "2", "allowed are 1 to 31"},
+        WrongConfig{"name_taken", instance("", "manager"), "2", "'manager' is taken"},
+        WrongConfig{"twice", instance("") + instance("", "a", 2), "6", "name: is taken already in line 2"},
+        WrongConfig{"offline", instance("", "a", 4), "3", "core: core 4 is not online; online are 0, 1, 2, 3"},
+        WrongConfig{"not_allowed", "[host]\ncores = [0]\n" + instance(""), "5", "core 1 is not allowed; [host] cores allows 0"},
+        WrongConfig{"scheduler", instance("scheduler = \"CmpSchedul\""), "4",
+                    "\"CmpSchedul\" is not known; allowed are CmpSchedule, CmpScheduleTimer, CmpScheduleOneShot; did "
+                    "you mean 'CmpSchedule'?"},
+        WrongConfig{"band", instance("priority_band = \"top\""), "4", "allowed are high, normal, low"},
+        WrongConfig{"settings", instance("settings = \"\""), "4", "settings: is no path"},
+        WrongConfig{"path_long", instance("application = \"" + std::string(300, 'x') + "\""), "4", "allowed are up to 255"},
+        WrongConfig{"autostart", instance("autostart = \"yes\""), "4", "\"yes\" is a text; allowed is true or false"},
+        WrongConfig{"after_itself", instance("after = [\"a\"]"), "4", "it cannot come after itself"},
+        WrongConfig{"after_nobody", instance("after = [\"drve1\"]") + instance("", "drive1", 2), "4",
+                    "there is no instance 'drve1'; there are a, drive1; did you mean 'drive1'?"},
+        WrongConfig{"circle", instance("after = [\"b\"]") + instance("after = [\"a\"]", "b", 2), "4",
+                    "goes in a circle: a after b after a"},
+        WrongConfig{"restart", instance("restart = \"onfailure\""), "4",
+                    "allowed are never, on-failure, always; did you mean 'on-failure'?"},
+        WrongConfig{"delay", instance("restart_delay_ms = 3600001"), "4", "allowed is 0 to 3600000"},
+        WrongConfig{"delay_max", instance("restart_delay_max_ms = 99"), "4", "99 is below restart_delay_ms, which is 100"},
+        WrongConfig{"limit", instance("crash_limit = 0"), "4", "allowed is 1 to 100"},
+        WrongConfig{"window", instance("crash_window_s = 0"), "4", "allowed is 1 to 86400"},
+        WrongConfig{"key", instance("prioritiy_band = \"low\""), "4", "did you mean 'priority_band'?"}),
+    [](const auto& info) { return info.param.name; });
+
+TEST(Config, ReportsAllErrorsInTheOrderOfTheirLines) {
+  const auto sut = parse("[host]\npool_objects = 1\nnmae = 1\n" + instance("core_ = 1", "a", 9));
+  ASSERT_FALSE(sut.has_value());
+  EXPECT_THAT(sut.error(), ElementsAre(HasSubstr("toml:2: "), HasSubstr("toml:3: "), HasSubstr("toml:6: "),
+                                       HasSubstr("toml:7: ")));
+}
+
+TEST(Config, RefusesASharedCoreUnlessAllSayIt) {
+  const auto neither = parse(instance("", "a") + instance("", "b"));
+  ASSERT_FALSE(neither.has_value());
+  EXPECT_THAT(neither.error(), ElementsAre(HasSubstr("core 1 is also used by 'b'"), HasSubstr("used by 'a'")));
+  const auto one = parse(instance("share_core = true", "a") + instance("", "b"));
+  ASSERT_FALSE(one.has_value());
+  EXPECT_THAT(one.error(), ElementsAre(HasSubstr("'b' core: core 1 is also used by 'a'")));
+  EXPECT_TRUE(parse(instance("share_core = true", "a") + instance("share_core = true", "b")).has_value());
+}
+
+std::string many_instances(std::uint32_t count) {
+  std::string text;
+  for (std::uint32_t i = 0; i < count; ++i) text += instance("share_core = true", fmt::format("i{}", i));
+  return text;
+}
+
+TEST(Config, TakesAsManyInstancesAsTheHostPageHas) {
+  EXPECT_TRUE(parse(many_instances(kMaxInstances)).has_value());
+  const auto more = parse(many_instances(kMaxInstances + 1));
+  ASSERT_FALSE(more.has_value());
+  EXPECT_THAT(more.error(), ElementsAre(HasSubstr("65 instances; allowed are up to 64")));
+}
+
+TEST(Config, SaysWhichFileIsMissing) {
+  auto surroundings = four_cores();
+  surroundings.check_files = true;
+  const auto sut = parse(instance("settings = \"x.cfg\"\napplication = \"/\""), surroundings);
+  ASSERT_FALSE(sut.has_value());
+  EXPECT_THAT(sut.error(), ElementsAre(HasSubstr("settings: there is no file /etc/plchost/x.cfg"),
+                                       HasSubstr("application: / is not a file")));
+}
+
+TEST(Config, RefusesAFileThatIsMissingOrTooLarge) {
+  const auto path = std::filesystem::temp_directory_path() / fmt::format("plchost-config-{}.toml", ::getpid());
+  const auto missing = load_config(path.string(), four_cores());
+  ASSERT_FALSE(missing.has_value());
+  EXPECT_THAT(missing.error(), ElementsAre(HasSubstr("there is no file")));
+  std::ofstream(path) << std::string(kMaxConfigBytes, '\n');
+  EXPECT_TRUE(load_config(path.string(), four_cores()).has_value());
+  std::ofstream(path) << std::string(kMaxConfigBytes + 1, '\n');
+  const auto large = load_config(path.string(), four_cores());
+  ASSERT_FALSE(large.has_value());
+  EXPECT_THAT(large.error(), ElementsAre(HasSubstr("is larger than the 1048576 bytes")));
+  std::filesystem::remove(path);
+}
+
+}  // namespace
+}  // namespace plchost

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "manager/supervisor/instance_host.hpp"
+
+namespace plchost {
+
+/// The world of one instance, in the hands of a test.
+class FakeHost : public InstanceHost {
+ public:
+  [[nodiscard]] Result<int> spawn(const LaunchOptions& options) override {
+    if (!can_spawn) return failure(ErrorCode::system, "start plc-instance");
+    spawned.push_back(options);
+    return next_pid++;
+  }
+  [[nodiscard]] Result<int> adopt() override {
+    if (!adoptable) return failure(ErrorCode::unavailable, "nobody is there");
+    return *adoptable;
+  }
+  [[nodiscard]] Result<void> request(const ControlRequest& request) override {
+    if (!can_send) return failure(ErrorCode::unavailable, "nobody listens");
+    requests.push_back(request);
+    return {};
+  }
+  void signal(int signal) override { signals.push_back(signal); }
+  void set_timer(std::optional<TimePoint> when) override { timer = when; }
+  [[nodiscard]] Result<void> check_application(const std::string& path) override {
+    checked.push_back(path);
+    return {};
+  }
+  [[nodiscard]] std::optional<InstanceRuntime> runtime() override { return page; }
+  [[nodiscard]] std::vector<int> granted_cores() override { return cores; }
+
+  std::vector<LaunchOptions> spawned;
+  std::vector<ControlRequest> requests;
+  std::vector<int> signals;
+  std::vector<std::string> checked;
+  std::optional<TimePoint> timer;
+  std::optional<InstanceRuntime> page;
+  std::optional<int> adoptable;
+  std::vector<int> cores = {1};
+  bool can_spawn = true;
+  bool can_send = true;
+  int next_pid = 100;
+};
+
+inline ExitStatus killed_by(int signal) { return {.kind = ExitStatus::Kind::killed, .value = signal}; }
+inline ExitStatus exited_with(int code) { return {.kind = ExitStatus::Kind::exited, .value = code}; }
+
+}  // namespace plchost
