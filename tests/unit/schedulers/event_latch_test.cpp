@@ -1,0 +1,72 @@
+#include "schedulers/event_latch.hpp"
+
+#include <gtest/gtest.h>
+
+namespace plchost {
+namespace {
+
+class EventLatchTest : public testing::Test {
+ protected:
+  bool poll(bool level) { return sut.poll(clock, level, TimePoint(Duration(++polls))); }
+  // As the task does: true if there is a run to do.
+  bool take() { return sut.gate.is_open() && sut.gate.wait(clock) == ActivationGate::Outcome::opened; }
+
+  LinuxClock clock;
+  EventLatch sut;
+  int polls = 0;
+};
+
+TEST_F(EventLatchTest, SeesEachRisingEdgeOnce) {
+  EXPECT_FALSE(poll(false));
+  EXPECT_TRUE(poll(true));
+  EXPECT_FALSE(poll(true));
+  EXPECT_FALSE(poll(false));
+  EXPECT_TRUE(poll(true));
+}
+
+TEST_F(EventLatchTest, LevelAtTheStartIsNoEdge) {
+  sut.prime(true);
+  EXPECT_FALSE(poll(true));
+  EXPECT_FALSE(poll(false));
+  EXPECT_TRUE(poll(true));
+}
+
+TEST_F(EventLatchTest, KeepsOneRunAndCountsFurtherEdgesAsLost) {
+  for (int i = 0; i < 5; ++i) {
+    poll(true);
+    poll(false);
+  }
+  EXPECT_TRUE(take());
+  EXPECT_EQ(sut.take_lost(), 4U);
+  EXPECT_EQ(sut.take_lost(), 0U);
+  EXPECT_FALSE(take());
+}
+
+TEST_F(EventLatchTest, EdgeDuringARunIsKeptForTheNext) {
+  poll(true);
+  EXPECT_TRUE(take());
+  poll(false);
+  poll(true);
+  EXPECT_TRUE(take());
+  EXPECT_EQ(sut.take_lost(), 0U);
+}
+
+TEST_F(EventLatchTest, SaysWhenTheEdgeOfTheRunWasSeen) {
+  poll(true);
+  poll(false);
+  poll(true);  // lost: does not move the time of the first
+  EXPECT_TRUE(take());
+  EXPECT_EQ(sut.seen_at(), TimePoint(Duration(1)));
+}
+
+TEST_F(EventLatchTest, PrimeForgetsWhatWasDue) {
+  poll(true);
+  poll(false);
+  poll(true);
+  sut.prime(true);
+  EXPECT_FALSE(take());
+  EXPECT_EQ(sut.take_lost(), 0U);
+}
+
+}  // namespace
+}  // namespace plchost

@@ -1,0 +1,144 @@
+#include "schedulers/task.hpp"
+
+#include <stdexcept>
+
+#include <gtest/gtest.h>
+
+#include "tests/support/manual_clock.hpp"
+
+namespace plchost {
+namespace {
+
+using std::chrono::microseconds;
+using std::chrono::milliseconds;
+
+class TaskTest : public testing::Test {
+ protected:
+  TaskConfig cyclic() {
+    TaskConfig config;
+    config.name = "main";
+    config.interval = milliseconds(10);
+    config.entry = [this] { clock.run_for(execution); };
+    return config;
+  }
+  TaskCounters counters() { return statistics.counters.read().value(); }
+  // Runs the next release, begun `latency` after it.
+  void run_next(Task& sut, Duration latency) {
+    const Activation activation = sut.next_release(FreewheelRule({}));
+    clock.run_until(activation.release + latency);
+    sut.run_cycle(activation);
+  }
+
+  ManualClock clock;
+  TaskStatistics statistics{};
+  Duration execution = milliseconds(2);
+};
+
+TEST_F(TaskTest, RecordsExecutionTimes) {
+  Task sut(clock, cyclic(), statistics, nullptr);
+  sut.begin(clock.now());
+  for (const int ms : {3, 1, 2}) {
+    execution = milliseconds(ms);
+    run_next(sut, Duration::zero());
+  }
+  EXPECT_EQ(counters().cycles, 3U);
+  EXPECT_EQ(counters().exec_last_ns, 2'000'000);
+  EXPECT_EQ(counters().exec_min_ns, 1'000'000);
+  EXPECT_EQ(counters().exec_max_ns, 3'000'000);
+  EXPECT_EQ(counters().exec_sum_ns, 6'000'000);
+}
+
+TEST_F(TaskTest, LatencyIsStartMinusPlannedRelease) {
+  Task sut(clock, cyclic(), statistics, nullptr);
+  const TimePoint origin = clock.now();
+  sut.begin(origin);
+  for (const int us : {30, 70, 10}) run_next(sut, microseconds(us));
+  EXPECT_EQ(counters().latency_last_ns, 10'000);
+  EXPECT_EQ(counters().latency_max_ns, 70'000);
+  EXPECT_EQ(TimePoint(Duration(counters().release_ns)), origin + milliseconds(20));
+  EXPECT_EQ(statistics.latency.total(), 3U);
+}
+
+TEST_F(TaskTest, PeriodJitterIsSignedAndItsMaximumIsAMagnitude) {
+  Task sut(clock, cyclic(), statistics, nullptr);
+  sut.begin(clock.now());
+  run_next(sut, microseconds(50));
+  EXPECT_EQ(counters().jitter_last_ns, 0) << "one start is no period";
+  run_next(sut, microseconds(10));
+  EXPECT_EQ(counters().jitter_last_ns, -40'000);
+  run_next(sut, microseconds(30));
+  EXPECT_EQ(counters().jitter_last_ns, 20'000);
+  EXPECT_EQ(counters().jitter_max_ns, 40'000);
+}
+
+TEST_F(TaskTest, LostCyclesAreCountedAndAreNoJitter) {
+  Task sut(clock, cyclic(), statistics, nullptr);
+  sut.begin(clock.now());
+  execution = milliseconds(35);
+  run_next(sut, Duration::zero());
+  execution = milliseconds(1);
+  run_next(sut, Duration::zero());
+  EXPECT_EQ(counters().lost_cycles, 3U);
+  EXPECT_EQ(counters().jitter_last_ns, 0);
+}
+
+TEST_F(TaskTest, CountersGoOnAfterANewBegin) {
+  Task sut(clock, cyclic(), statistics, nullptr);
+  sut.begin(clock.now());
+  run_next(sut, Duration::zero());
+  clock.run_for(std::chrono::seconds(3));
+  const TimePoint origin = clock.now() + milliseconds(7);
+  sut.begin(origin);
+  EXPECT_EQ(sut.next_release(FreewheelRule({})).release, origin);
+  run_next(sut, Duration::zero());
+  EXPECT_EQ(counters().cycles, 2U);
+  EXPECT_EQ(counters().lost_cycles, 0U);
+  EXPECT_EQ(counters().jitter_max_ns, 0) << "the time between stop and start is no period";
+}
+
+TEST_F(TaskTest, SpunTimeAndLostEventsAddUp) {
+  Task sut(clock, cyclic(), statistics, nullptr);
+  sut.begin(clock.now());
+  for (int i = 0; i < 3; ++i) {
+    Activation activation = sut.next_release(FreewheelRule({}));
+    activation.spun = microseconds(20);
+    activation.lost_events = 5;
+    sut.run_cycle(activation);
+  }
+  EXPECT_EQ(counters().spin_sum_ns, 60'000);
+  EXPECT_EQ(counters().lost_events, 15U);
+}
+
+TEST_F(TaskTest, AfterCycleSeesTheCountersOfItsCycle) {
+  std::uint64_t seen = 0;
+  TaskConfig config = cyclic();
+  config.after_cycle = [&](const TaskCounters& now) { seen = now.cycles; };
+  Task sut(clock, config, statistics, nullptr);
+  sut.begin(clock.now());
+  run_next(sut, Duration::zero());
+  EXPECT_EQ(seen, 1U);
+}
+
+TEST_F(TaskTest, FreewheelingBeginsAtTheOriginAndThenSleepsItsShare) {
+  TaskConfig config = cyclic();
+  config.kind = TaskKind::freewheeling;
+  Task sut(clock, config, statistics, nullptr);
+  const TimePoint origin = clock.now() + milliseconds(1);
+  sut.begin(origin);
+  EXPECT_EQ(sut.next_release(FreewheelRule({})).release, origin);
+  execution = milliseconds(10);
+  run_next(sut, Duration::zero());
+  EXPECT_EQ(sut.next_release(FreewheelRule({})).release, clock.now() + milliseconds(2));
+}
+
+TEST_F(TaskTest, ExceptionOutOfACycleEndsTheProcessAndNamesTheTask) {
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  TaskConfig config = cyclic();
+  config.entry = [] { throw std::runtime_error("index 7 is out of range"); };
+  Task sut(clock, config, statistics, nullptr);
+  sut.begin(clock.now());
+  EXPECT_DEATH(run_next(sut, Duration::zero()), "task 'main'.*index 7 is out of range");
+}
+
+}  // namespace
+}  // namespace plchost
