@@ -114,13 +114,13 @@ title "live figures of their tasks"
 show list tasks
 
 title "1,000 external events from another process, over DDS, to the packer"
-before=$(task packer1/Pack cycles)
+before=$(task packer1/Product cycles)
 show post event packer1/product --count 1000
-packed() { [ "$(task packer1/Pack cycles)" -ge $((before + 1000)) ]; }
+packed() { [ "$(task packer1/Product cycles)" -ge $((before + 1000)) ]; }
 until_true 20 "the run of 1,000 cycles" packed
 sleep 0.5
-after=$(task packer1/Pack cycles)
-echo "cycles of packer1/Pack: $before before, $after after: $((after - before)) ran, $(task packer1/Pack lost_events) events lost"
+after=$(task packer1/Product cycles)
+echo "cycles of packer1/Product: $before before, $after after: $((after - before)) ran, $(task packer1/Product lost_events) events lost"
 [ $((after - before)) -eq 1000 ] || fail "not exactly 1,000 cycles"
 
 title "SIGKILL to an instance: it comes back, the others do not notice"

@@ -13,14 +13,14 @@ namespace plchost::bench {
 
 /// How much is measured, and where.
 struct Plan {
-  int slices = 40;                                     ///< of each kind, in alternation
-  Duration slice = std::chrono::milliseconds(500);     ///< of a cyclic measurement
-  int posts = 500;                                     ///< in one slice of a post measurement
-  Duration gap = std::chrono::milliseconds(1);         ///< between two posts
+  int slices = 40;                                  ///< of each kind, in alternation
+  Duration slice = std::chrono::milliseconds(500);  ///< of a cyclic measurement
+  int posts = 500;                                  ///< in one slice of a post measurement
+  Duration gap = std::chrono::milliseconds(1);      ///< between two posts
   int task_core = 1;
   int poster_core = 0;
-  std::filesystem::path programs;                      ///< where plchostd and its helpers are
-  std::function<void(const std::string&)> progress;    ///< told before each measurement
+  std::filesystem::path programs;                    ///< where plchostd and its helpers are
+  std::function<void(const std::string&)> progress;  ///< told before each measurement
 };
 
 /// The priority that every measured thread and every floor has: IEC 0 in the normal band.

@@ -1,10 +1,10 @@
-// Start latency of a 1 ms cyclic task: planned release to the first instruction of the task's code. The floor is a
-// bare SCHED_FIFO thread in clock_nanosleep(TIMER_ABSTIME), same priority, same core, in alternation.
-
-#include <time.h>
+// Start latency of a 1 ms cyclic task: planned release to the first instruction of the task's code. The floor
+// is a bare SCHED_FIFO thread in clock_nanosleep(TIMER_ABSTIME), same priority, same core, in alternation.
 
 #include <array>
 #include <thread>
+
+#include <time.h>
 
 #include "schedulers/task_set.hpp"
 #include "shm/base/task_statistics.hpp"
@@ -16,7 +16,9 @@ namespace {
 
 constexpr Duration kPeriod = std::chrono::milliseconds(1);
 
-std::size_t samples_in(Duration slice) { return static_cast<std::size_t>(slice / kPeriod) * 2; }
+std::size_t samples_in(Duration slice) {
+  return static_cast<std::size_t>(slice / kPeriod) * 2;
+}
 
 Result<void> run_floor(const Plan& plan, Samples& into) {
   Samples samples(samples_in(plan.slice));
@@ -69,7 +71,8 @@ Result<std::vector<Row>> measure_cyclic(const Plan& plan) {
   // The process's other thread sleeps meanwhile; the measured ones inherit this core.
   if (auto bound = bind_thread(plan.task_core); !bound) return std::unexpected(bound.error());
   std::vector<Row> rows;
-  for (const auto& entry : all_schedulers()) rows.push_back({.name = "cyclic/" + std::string(entry.name) + "/1ms"});
+  for (const auto& entry : all_schedulers())
+    rows.push_back({.name = "cyclic/" + std::string(entry.name) + "/1ms"});
   plan.progress("cyclic tasks, 1 ms, beside clock_nanosleep");
   for (int slice = 0; slice < plan.slices; ++slice) {
     for (std::size_t i = 0; i < rows.size(); ++i) {

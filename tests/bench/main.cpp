@@ -1,14 +1,16 @@
 // plchost-bench: what plchost costs, beside the floor that the machine sets in the same minute.
 
-#include <fmt/format.h>
-#include <unistd.h>
-
-#include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <fstream>
 #include <iterator>
 
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <unistd.h>
+
 #include "tests/bench/bench.hpp"
+#include "tests/bench/plot.hpp"
 
 namespace {
 
@@ -16,6 +18,7 @@ using namespace plchost;  // NOLINT(google-build-using-namespace): a program's m
 
 struct Options {
   std::string json;
+  std::string plots;
   bool quick = false;
   std::string only;
 };
@@ -34,6 +37,30 @@ bench::Plan make_plan(const Options& options) {
   plan.programs = std::filesystem::read_symlink("/proc/self/exe").parent_path();
   plan.progress = [](const std::string& what) { fmt::print(stderr, "measuring {} ...\n", what); };
   return plan;
+}
+
+bool write_file(const std::string& path, const std::string& text) {
+  std::ofstream file(path);
+  file << text;
+  if (file.flush()) return true;
+  fmt::print(stderr, "plchost-bench: cannot write {}\n", path);
+  return false;
+}
+
+/// One picture for each part that was measured.
+bool write_plots(const std::string& folder, const std::vector<bench::Row>& rows) {
+  constexpr std::pair<std::string_view, std::string_view> kPictures[] = {
+      {"cyclic", "start latency of a 1 ms task: share of cycles that start later"},
+      {"post", "post to first instruction of the task: share of posts that take longer"}};
+  for (const auto& [prefix, title] : kPictures) {
+    std::vector<bench::Row> part;
+    std::ranges::copy_if(rows, std::back_inserter(part),
+                         [&](const auto& row) { return row.name.starts_with(prefix); });
+    if (part.empty()) continue;
+    if (!write_file(fmt::format("{}/{}.svg", folder, prefix), bench::to_svg(std::string(title), part)))
+      return false;
+  }
+  return true;
 }
 
 int run(const Options& options) {
@@ -60,13 +87,8 @@ int run(const Options& options) {
     std::ranges::move(*measured, std::back_inserter(rows));
   }
   fmt::print("{}", bench::to_table(rows));
-  if (options.json.empty()) return 0;
-  std::ofstream file(options.json);
-  file << bench::to_json(rows);
-  if (!file.flush()) {
-    fmt::print(stderr, "plchost-bench: cannot write {}\n", options.json);
-    return 1;
-  }
+  if (!options.json.empty() && !write_file(options.json, bench::to_json(rows))) return 1;
+  if (!options.plots.empty() && !write_plots(options.plots, rows)) return 1;
   return 0;
 }
 
@@ -76,6 +98,7 @@ int main(int argc, char** argv) {
   CLI::App app("Measures plchost beside the floor of this machine", "plchost-bench");
   Options options;
   app.add_option("--json", options.json, "write the figures to this file");
+  app.add_option("--plots", options.plots, "draw the figures into this folder, as SVG");
   app.add_flag("--quick", options.quick, "a few minutes instead of a quarter of an hour");
   app.add_option("--only", options.only, "one part: cyclic, post/process or post/dds");
   CLI11_PARSE(app, argc, argv);

@@ -1,5 +1,7 @@
-// An external event posted by another process on another core, to the first instruction of the task's code. The floor
-// is a raw futex wake between the same two cores, into a thread of the same priority.
+// An external event posted by another process on another core, to the first instruction of the task's code.
+// The floor is a raw futex wake between the same two cores, into a thread of the same priority.
+
+#include <atomic>
 
 #include <fmt/format.h>
 #include <signal.h>
@@ -7,8 +9,6 @@
 #include <sys/wait.h>
 #include <time.h>
 #include <unistd.h>
-
-#include <atomic>
 
 #include "schedulers/task_set.hpp"
 #include "shm/base/futex.hpp"
@@ -23,7 +23,7 @@ namespace {
 /// Shared by the poster and the measured process.
 struct Board {
   std::atomic<std::int64_t> posted_ns{0};
-  std::atomic<std::uint32_t> word{0};     // the floor's futex word
+  std::atomic<std::uint32_t> word{0};      // the floor's futex word
   std::atomic<std::uint32_t> answered{0};  // posts that arrived
 };
 
@@ -62,7 +62,8 @@ Duration since(const Board& board) {
 
 Result<void> wait_for(pid_t poster) {
   int status = 0;
-  if (::waitpid(poster, &status, 0) != poster || status != 0) return failure(ErrorCode::system, "the poster failed");
+  if (::waitpid(poster, &status, 0) != poster || status != 0)
+    return failure(ErrorCode::system, "the poster failed");
   return {};
 }
 
@@ -97,13 +98,11 @@ Result<void> run_floor(const Plan& plan, Board& board, const std::string& pool, 
   return done;
 }
 
-Result<void> run_ours(const Plan& plan, Board& board, ObjectPool& pool, Samples& into) {
+Result<void> run_ours(const Plan& plan, Board& board, const std::string& pool, const PoolEvent& event,
+                      Samples& into) {
   Samples samples(static_cast<std::size_t>(plan.posts));
   LinuxClock clock;
   TaskStatistics statistics;
-  auto event = pool.create_event("bench/ping");
-  if (!event) return std::unexpected(event.error());
-  event->set_registered(true);
   TaskConfig task;
   task.name = "ping";
   task.kind = TaskKind::external;
@@ -113,12 +112,12 @@ Result<void> run_ours(const Plan& plan, Board& board, ObjectPool& pool, Samples&
     board.answered.fetch_add(1);
   };
   TaskEnvironment environment;
-  environment.find_event = [&](std::string_view) -> Result<CountedEvent*> { return &event->counted(); };
+  environment.find_event = [&](std::string_view) -> Result<CountedEvent*> { return &event.counted(); };
   environment.statistics = [&](std::size_t) -> TaskStatistics& { return statistics; };
   auto tasks = TaskSet::create(clock, PriorityBand::normal, {task}, environment);
   if (!tasks) return std::unexpected(tasks.error());
   if (auto started = (*tasks)->start("CmpSchedule", {}); !started) return started;
-  const auto poster = fork_poster(plan, Kind::ours, board, pool.name());
+  const auto poster = fork_poster(plan, Kind::ours, board, pool);
   if (!poster) return std::unexpected(poster.error());
   if (auto done = wait_for(*poster); !done) return done;
   if (auto stopped = (*tasks)->stop(std::chrono::seconds(5)); !stopped) return stopped;
@@ -136,13 +135,15 @@ Result<std::vector<Row>> measure_post_process(const Plan& plan) {
   const std::string name = fmt::format("plchost-bench-{}", ::getpid());
   auto pool = ObjectPool::create(name);
   if (!pool) return std::unexpected(pool.error());
+  auto event = pool->create_event("bench/ping");
+  if (!event || !event->set_registered(true)) return failure(ErrorCode::full, "no event in the pool");
   std::vector<Row> rows(1);
   rows[0].name = "post/process";
   plan.progress("posts from another process, beside a raw futex");
   Result<void> done;
   for (int slice = 0; done && slice < plan.slices / 2; ++slice) {
     done = run_floor(plan, *board, name, rows[0].floor);
-    if (done) done = run_ours(plan, *board, *pool, rows[0].ours);
+    if (done) done = run_ours(plan, *board, name, *event, rows[0].ours);
   }
   ObjectPool::remove(name);
   ::munmap(memory, sizeof(Board));

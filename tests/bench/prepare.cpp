@@ -1,10 +1,10 @@
+#include <cstdint>
+
 #include <fcntl.h>
 #include <sched.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <unistd.h>
-
-#include <cstdint>
 
 #include "shm/base/system_call.hpp"
 #include "shm/base/unique_fd.hpp"

@@ -1,11 +1,11 @@
 // Runs in a real instance: stamps the first instruction of the task that an external event activates.
 
+#include <cstdlib>
+#include <stdexcept>
+
 #include <fcntl.h>
 #include <sys/mman.h>
 #include <unistd.h>
-
-#include <cstdlib>
-#include <stdexcept>
 
 #include "instances/plc_app.hpp"
 #include "shm/base/time.hpp"
@@ -27,12 +27,8 @@ DdsBoard& open_board() {
 
 void setup(plc::Application& app) {
   DdsBoard& board = open_board();
-  app.external("Ping", 0, "ping", [&board] {
-    const std::int64_t now = plchost::MonotonicClock::now().time_since_epoch().count();
-    const std::uint32_t index = board.arrived.load(std::memory_order_relaxed);
-    board.latency_ns[index % DdsBoard::kCapacity] = now - board.posted_ns.load(std::memory_order_relaxed);
-    board.arrived.store(index + 1, std::memory_order_release);
-  });
+  app.external("Ping", 0, "ping",
+               [&board] { board.record(plchost::MonotonicClock::now().time_since_epoch().count()); });
 }
 
 }  // namespace

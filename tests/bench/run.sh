@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Measures plchost beside the floor of this machine, in the same run.
-#   tests/bench/run.sh [--quick] [--json FILE] [--only PART]
+#   tests/bench/run.sh [--quick] [--json FILE] [--plots DIR] [--only PART]
 # --quick takes below four minutes. A noisy machine shows in the floor as well: read the ratios.
 set -euo pipefail
 here=$PWD
@@ -10,7 +10,7 @@ build=.build/bench
 args=()
 while [ $# -gt 0 ]; do
   case "$1" in
-    --json) args+=(--json "$(cd "$here" && realpath -m "$2")"); shift ;;
+    --json | --plots) args+=("$1" "$(cd "$here" && realpath -m "$2")"); shift ;;
     *) args+=("$1") ;;
   esac
   shift

@@ -1,8 +1,8 @@
 #include "tests/bench/samples.hpp"
 
-#include <fmt/format.h>
-
 #include <algorithm>
+
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 namespace plchost::bench {
@@ -16,7 +16,9 @@ struct Summary {
   double max = 0;
 };
 
-double to_us(Duration value) { return static_cast<double>(value.count()) / 1e3; }
+double to_us(Duration value) {
+  return static_cast<double>(value.count()) / 1e3;
+}
 
 Summary summarise(const Samples& samples) {
   std::vector<Duration> sorted = samples.values();
@@ -29,7 +31,9 @@ Summary summarise(const Samples& samples) {
   return {.p50 = at(0.5), .p99 = at(0.99), .p999 = at(0.999), .max = to_us(sorted.back())};
 }
 
-double ratio(double ours, double floor) { return floor > 0 ? ours / floor : 0; }
+double ratio(double ours, double floor) {
+  return floor > 0 ? ours / floor : 0;
+}
 
 }  // namespace
 
@@ -55,14 +59,15 @@ std::string to_json(const std::vector<Row>& rows) {
 }
 
 std::string to_table(const std::vector<Row>& rows) {
-  std::string text = fmt::format("{:<28} {:>9} {:>9} {:>9} {:>10} {:>10} {:>7} {:>7} {:>8}\n", "name", "p50 us",
-                                 "p99 us", "p99.9 us", "floor p50", "floor p99", "x p50", "x p99", "samples");
+  std::string text =
+      fmt::format("{:<28} {:>9} {:>9} {:>9} {:>10} {:>10} {:>7} {:>7} {:>8}\n", "name", "p50 us", "p99 us",
+                  "p99.9 us", "floor p50", "floor p99", "x p50", "x p99", "samples");
   for (const Row& row : rows) {
     const Summary ours = summarise(row.ours);
     const Summary floor = summarise(row.floor);
-    text += fmt::format("{:<28} {:>9.2f} {:>9.2f} {:>9.2f} {:>10.2f} {:>10.2f} {:>7.2f} {:>7.2f} {:>8}\n", row.name,
-                        ours.p50, ours.p99, ours.p999, floor.p50, floor.p99, ratio(ours.p50, floor.p50),
-                        ratio(ours.p99, floor.p99), row.ours.size());
+    text += fmt::format("{:<28} {:>9.2f} {:>9.2f} {:>9.2f} {:>10.2f} {:>10.2f} {:>7.2f} {:>7.2f} {:>8}\n",
+                        row.name, ours.p50, ours.p99, ours.p999, floor.p50, floor.p99,
+                        ratio(ours.p50, floor.p50), ratio(ours.p99, floor.p99), row.ours.size());
   }
   return text;
 }

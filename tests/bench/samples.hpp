@@ -16,7 +16,9 @@ class Samples {
   void add(Duration value) noexcept {
     if (values_.size() < values_.capacity()) values_.push_back(value);
   }
-  void append(const Samples& other) { values_.insert(values_.end(), other.values_.begin(), other.values_.end()); }
+  void append(const Samples& other) {
+    values_.insert(values_.end(), other.values_.begin(), other.values_.end());
+  }
   void clear() noexcept { values_.clear(); }
   [[nodiscard]] std::size_t size() const noexcept { return values_.size(); }
   [[nodiscard]] const std::vector<Duration>& values() const noexcept { return values_; }

@@ -46,7 +46,7 @@ is "$(plcctl list tasks --json | jq "map(. as \$t | $fields | map(in(\$t)) | all
 is "$(plcctl list instances --json | jq 'map(has("host") and has("name") and has("state") and has("pid") and has("core") and has("scheduler") and has("application") and has("restarts")) | all')" true || fail "a field is missing"
 
 echo "- 10,000 posts while the scheduler is switched again and again: 10,000 cycles"
-before=$(task packer1/Pack cycles)
+before=$(task packer1/Product cycles)
 plcctl post event packer1/product --count 10000 --interval-us 300 >"$cell/post.log" 2>&1 &
 poster=$!
 others+=("$poster")
@@ -58,18 +58,18 @@ while kill -0 "$poster" 2>/dev/null; do
   done
 done
 wait "$poster" || fail "the poster failed: $(cat "$cell/post.log")"
-pack_ran() { [ "$(task packer1/Pack cycles)" -ge $((before + $1)) ]; }
+pack_ran() { [ "$(task packer1/Product cycles)" -ge $((before + $1)) ]; }
 until_true 20 pack_ran 10000
 sleep 0.5
-is "$(task packer1/Pack cycles)" $((before + 10000)) || fail "$(($(task packer1/Pack cycles) - before)) cycles for 10,000 posts, $switches switches"
+is "$(task packer1/Product cycles)" $((before + 10000)) || fail "$(($(task packer1/Product cycles) - before)) cycles for 10,000 posts, $switches switches"
 [ "$switches" -ge 6 ] || fail "only $switches switches"
 
 echo "- 100,000 posts at full rate"
-before=$(task packer1/Pack cycles)
+before=$(task packer1/Product cycles)
 plcctl --timeout 60 post event packer1/product --count 100000 >/dev/null || fail "posting failed"
 until_true 60 pack_ran 100000
 sleep 0.5
-is "$(task packer1/Pack cycles)" $((before + 100000)) || fail "$(($(task packer1/Pack cycles) - before)) cycles for 100,000 posts"
+is "$(task packer1/Product cycles)" $((before + 100000)) || fail "$(($(task packer1/Product cycles) - before)) cycles for 100,000 posts"
 
 echo "- kill -9 of an instance under load: it is back, with a new pid, and the others stay"
 old=$(instance line1 pid)

@@ -23,7 +23,7 @@ both_running() { [ "$(plcctl list instances --json | jq '[.[] | select(.state ==
 until_true 20 both_running
 is "$(plcctl list hosts --json | jq -r '[.[].host // .[].name] | unique | sort | join(",")')" north,south || fail "two hosts"
 
-cycles() { plcctl list tasks --json | jq -r ".[] | select(.host == \"$1\" and .task == \"Pack\") | .cycles"; }
+cycles() { plcctl list tasks --json | jq -r ".[] | select(.host == \"$1\" and .task == \"Product\") | .cycles"; }
 before_north=$(cycles north)
 before_south=$(cycles south)
 refused "south" plcctl post event packer1/product

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tests/bench/samples.hpp"
+
+namespace plchost::bench {
+
+/// The rows as an SVG picture: for each latency, the share of samples above it; both axes logarithmic. The
+/// floors of all rows are drawn as one grey line.
+[[nodiscard]] std::string to_svg(const std::string& title, const std::vector<Row>& rows);
+
+}  // namespace plchost::bench

@@ -1,0 +1,217 @@
+// An external event posted over DDS by another process, through plchost-dds and the pool, to the first
+// instruction of the task's code in a real instance. The floor is a bare Cyclone DDS one-way, same type, same
+// QoS, from the same poster on the same core, into a waiting thread of the same priority on the same core as
+// the task.
+
+#include <fstream>
+#include <thread>
+
+#include <fmt/format.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "api/dds/domain.hpp"
+#include "api/dds/error.hpp"
+#include "api/dds/samples.hpp"
+#include "api/dds/topics.hpp"
+#include "shm/base/system_call.hpp"
+#include "shm/pool/instance_page.hpp"
+#include "tests/bench/dds_poster.hpp"
+
+namespace plchost::bench {
+
+namespace {
+
+constexpr auto kPatience = std::chrono::seconds(20);
+
+/// Starts a program, and ends it (SIGTERM) and waits for it when this object goes.
+class Child {
+ public:
+  explicit Child(pid_t pid) : pid_(pid) {}
+  Child(const Child&) = delete;
+  Child& operator=(const Child&) = delete;
+  ~Child() {
+    ::kill(pid_, SIGTERM);
+    ::waitpid(pid_, nullptr, 0);
+  }
+
+ private:
+  pid_t pid_;
+};
+
+template <class Condition>
+Result<void> wait_until(Condition condition, const std::string& what) {
+  const TimePoint end = MonotonicClock::now() + kPatience;
+  while (!condition()) {
+    if (MonotonicClock::now() > end) return failure(ErrorCode::timed_out, what + " did not happen");
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  return {};
+}
+
+/// plchostd with one instance that runs the probe.
+class Cell {
+ public:
+  Cell(const Plan& plan, const DdsDomains& domains, const std::string& name)
+      : pool_(name), folder_(std::filesystem::temp_directory_path() / name) {
+    std::filesystem::create_directories(folder_);
+    std::ofstream(folder_ / "bench.toml") << fmt::format(
+        "[host]\nname = \"{}\"\ndds_domain = {}\nrun_directory = \"{}\"\npool = \"{}\"\ncores = [{}]\n"
+        "housekeeping_cores = [{}]\nlog_level = \"warning\"\n"
+        "[[instance]]\nname = \"probe\"\ncore = {}\nscheduler = \"CmpSchedule\"\napplication = \"{}\"\n",
+        kBenchHost, domains.plchost, (folder_ / "run").string(), pool_, plan.task_core, plan.poster_core,
+        plan.task_core, (plan.programs.parent_path() / "applications" / "bench_probe.so").string());
+  }
+  Cell(const Cell&) = delete;
+  Cell& operator=(const Cell&) = delete;
+  ~Cell() {
+    manager_.reset();
+    std::error_code ignored;
+    std::filesystem::remove_all(folder_, ignored);
+  }
+
+  Result<void> start(const Plan& plan) {
+    const std::string program = (plan.programs / "plchostd").string();
+    const std::string config = (folder_ / "bench.toml").string();
+    const pid_t child = ::fork();
+    if (child < 0) return failure(ErrorCode::system, "fork", errno);
+    if (child == 0) {
+      ::execl(program.c_str(), program.c_str(), "--config", config.c_str(), nullptr);
+      ::_exit(127);
+    }
+    manager_ = std::make_unique<Child>(child);
+    return wait_until(
+        [&] {
+          const auto page = InstancePageReader::open(pool_, "probe");
+          if (!page) return false;
+          const auto runtime = page->runtime();
+          return runtime && runtime->running == 1;
+        },
+        "the start of the measured instance");
+  }
+
+ private:
+  std::string pool_;
+  std::filesystem::path folder_;
+  std::unique_ptr<Child> manager_;
+};
+
+/// The floor: a thread that waits for samples.
+class BareReader {
+ public:
+  Result<void> start(const Plan& plan, const DdsDomains& domains, DdsBoard& board) {
+    auto domain = dds::open_domain(dds::Role::server, {.domain = domains.bare});
+    if (!domain) return std::unexpected(domain.error());
+    domain_ = std::move(*domain);
+    auto participant =
+        dds::check_entity(dds_create_participant(domains.bare, nullptr, nullptr), "make a participant");
+    if (!participant) return std::unexpected(participant.error());
+    participant_ = std::move(*participant);
+    auto topic = dds::make_topic(participant_.get(), dds::kEvent);
+    if (!topic) return std::unexpected(topic.error());
+    dds::Qos qos = dds::event_qos();
+    qos.max_samples(dds::kEventReaderDepth);
+    auto reader = dds::make_reader(participant_.get(), topic->get(), qos);
+    if (!reader) return std::unexpected(reader.error());
+    topic_ = std::move(*topic);
+    reader_ = std::move(*reader);
+    waitset_ = dds::Entity(dds_create_waitset(participant_.get()));
+    dds_set_status_mask(reader_.get(), DDS_DATA_AVAILABLE_STATUS);
+    dds_waitset_attach(waitset_.get(), reader_.get(), 0);
+    dds_waitset_attach(waitset_.get(), waitset_.get(), 1);
+    auto thread = Thread::start("bare-reader", kPriority, [this, &plan, &board] {
+      if (bind_thread(plan.task_core)) run(board);
+    });
+    if (!thread) return std::unexpected(thread.error());
+    thread_ = std::move(*thread);
+    return {};
+  }
+  void stop() {
+    dds_waitset_set_trigger(waitset_.get(), true);
+    thread_.join();
+  }
+
+ private:
+  void run(DdsBoard& board) {
+    dds_attach_t reasons[2] = {};
+    while (true) {
+      const dds_return_t woken = dds_waitset_wait(waitset_.get(), reasons, 2, DDS_INFINITY);
+      for (dds_return_t i = 0; i < woken; ++i) {
+        if (reasons[i] == 1) return;
+      }
+      const dds::Samples<plc_EventPost> samples(reader_.get());
+      for (std::size_t i = 0; i < samples.size(); ++i) {
+        if (samples.valid(i)) board.record(MonotonicClock::now().time_since_epoch().count());
+      }
+    }
+  }
+
+  std::shared_ptr<dds::Entity> domain_;
+  dds::Entity participant_;
+  dds::Entity topic_;
+  dds::Entity reader_;
+  dds::Entity waitset_;
+  Thread thread_;
+};
+
+/// Lets the poster do one slice, and takes its figures.
+Result<void> run_slice(const Plan& plan, DdsBoard& board, Order order, Samples& into) {
+  Samples samples(static_cast<std::size_t>(plan.posts));
+  board.arrived.store(0);
+  board.order.store(static_cast<std::uint32_t>(order));
+  auto done =
+      wait_until([&] { return board.order.load() == static_cast<std::uint32_t>(Order::wait); }, "a slice");
+  if (!done) return done;
+  for (std::uint32_t i = 0; i < board.arrived.load(std::memory_order_acquire); ++i) {
+    samples.add(Duration(board.latency_ns[i]));
+  }
+  into.append(samples);
+  return {};
+}
+
+Result<std::vector<Row>> measure(const Plan& plan, const DdsDomains& domains, DdsBoard& board,
+                                 const std::string& name) {
+  // The bare reader's DDS threads inherit this core: the one where plchost-dds has its own.
+  if (auto bound = bind_thread(plan.poster_core); !bound) return std::unexpected(bound.error());
+  Cell cell(plan, domains, name);
+  if (auto started = cell.start(plan); !started) return std::unexpected(started.error());
+  BareReader reader;
+  if (auto started = reader.start(plan, domains, board); !started) return std::unexpected(started.error());
+  std::vector<Row> rows(1);
+  rows[0].name = "post/dds";
+  plan.progress("posts over DDS, beside a bare Cyclone DDS one-way");
+  auto done = wait_until([&] { return board.poster_ready.load() != 0; }, "the poster's start");
+  if (done && board.poster_ready.load() != 1)
+    done = failure(ErrorCode::unavailable, "the poster cannot post");
+  for (int slice = 0; done && slice < plan.slices / 2; ++slice) {
+    done = run_slice(plan, board, Order::post_bare, rows[0].floor);
+    if (done) done = run_slice(plan, board, Order::post_event, rows[0].ours);
+  }
+  reader.stop();
+  if (!done) return std::unexpected(done.error());
+  return rows;
+}
+
+}  // namespace
+
+Result<std::vector<Row>> measure_post_dds(const Plan& plan) {
+  constexpr std::uint32_t kFirstDomain = 110;
+  const auto salt = static_cast<std::uint32_t>(::getpid()) % 40U;
+  const DdsDomains domains{.plchost = kFirstDomain + 2 * salt, .bare = kFirstDomain + 2 * salt + 1};
+  const std::string name = fmt::format("plchost-bench-{}", ::getpid());
+  const std::string board_name = name + ".board";
+  auto memory = MemoryFile::replace(board_name, sizeof(DdsBoard));
+  if (!memory) return std::unexpected(memory.error());
+  ::setenv(kBoardVariable, ("/dev/shm/" + board_name).c_str(), 1);
+  auto& board = *reinterpret_cast<DdsBoard*>(memory->bytes().data());
+  // Forked before this process has any thread of DDS.
+  const pid_t poster = ::fork();
+  if (poster == 0) ::_exit(run_dds_poster(plan, domains, board));
+  auto rows = measure(plan, domains, board, name);
+  board.order.store(static_cast<std::uint32_t>(Order::end));
+  if (poster > 0) ::waitpid(poster, nullptr, 0);
+  MemoryFile::remove(board_name);
+  return rows;
+}
+
+}  // namespace plchost::bench
