@@ -1,0 +1,82 @@
+#include "api/cli/cli_session.hpp"
+
+#include <algorithm>
+#include <cstdio>
+
+#include <fmt/format.h>
+
+#include "shm/base/names.hpp"
+
+namespace plchost {
+
+Result<ControlClient*> CliSession::client() {
+  if (!client_) {
+    auto connected = ControlClient::connect(options.dds);
+    if (!connected) return std::unexpected(connected.error());
+    client_ = std::move(*connected);
+  }
+  return client_.get();
+}
+
+Duration CliSession::timeout() const {
+  return std::chrono::duration_cast<Duration>(std::chrono::duration<double>(options.timeout_s));
+}
+
+TimePoint CliSession::deadline() const {
+  return MonotonicClock::now() + timeout();
+}
+
+Result<std::vector<HostView>> CliSession::shown_hosts() {
+  const auto connected = client();
+  if (!connected) return std::unexpected(connected.error());
+  if (!options.host.empty()) {
+    auto one = (*connected)->host(options.host, deadline());
+    if (!one) return failure(ErrorCode::unavailable, one.error().message);
+    return std::vector{std::move(*one)};
+  }
+  auto all = (*connected)->hosts(deadline());
+  if (!all.empty()) return all;
+  return failure(
+      ErrorCode::unavailable,
+      fmt::format("no host answers in DDS domain {} within {} s: start one with 'plchostd --config FILE', "
+                  "or choose its domain with --domain",
+                  options.dds.domain, options.timeout_s));
+}
+
+Result<std::string> CliSession::target_host() {
+  const auto hosts = shown_hosts();
+  if (!hosts) return std::unexpected(hosts.error());
+  if (hosts->size() == 1) return hosts->front().name;
+  std::vector<std::string_view> names;
+  for (const HostView& host : *hosts) names.emplace_back(host.name);
+  return failure(ErrorCode::invalid_argument,
+                 fmt::format("several hosts answer; say which one with --host: {}", join_names(names)));
+}
+
+void CliSession::show(const std::vector<Row>& rows, const std::vector<Column>& columns) const {
+  fmt::print("{}", options.json ? format_json(rows) : format_table(rows, columns));
+  std::fflush(stdout);
+}
+
+int CliSession::fail(const Error& error) {
+  fmt::print(stderr, "plcctl: {}\n", error.describe());
+  if (error.code == ErrorCode::timed_out || error.code == ErrorCode::unavailable) return kExitNoAnswer;
+  return error.code == ErrorCode::invalid_argument ? kExitUsage : kExitFailed;
+}
+
+Result<std::pair<std::string, std::string>> split_name(std::string_view what, std::string_view text) {
+  const auto slash = text.find('/');
+  if (slash == std::string_view::npos || slash == 0 || slash + 1 == text.size()) {
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("'{}' is not of the form INSTANCE/{}", text, what));
+  }
+  return std::pair{std::string(text.substr(0, slash)), std::string(text.substr(slash + 1))};
+}
+
+std::string hint(std::string_view unknown, const std::vector<std::string>& known) {
+  const std::vector<std::string_view> views(known.begin(), known.end());
+  const auto near = nearest_name(unknown, views);
+  return near.empty() || near == unknown ? "" : fmt::format(" (did you mean '{}'?)", near);
+}
+
+}  // namespace plchost

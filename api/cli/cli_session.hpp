@@ -1,0 +1,75 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "api/cli/table.hpp"
+#include "api/client/control_client.hpp"
+
+namespace CLI {
+class App;
+}
+
+namespace plchost {
+
+/// Exit codes of plcctl.
+inline constexpr int kExitDone = 0;
+inline constexpr int kExitFailed = 1;  ///< refused or failed
+inline constexpr int kExitUsage = 2;
+inline constexpr int kExitNoAnswer = 3;
+
+/// The options of every command.
+struct CliOptions {
+  dds::DomainOptions dds{};
+  std::string host;
+  double timeout_s = 3.0;
+  bool json = false;
+};
+
+/// One run of plcctl: its options, its connection, and how it says what went wrong.
+class CliSession {
+ public:
+  CliOptions options;
+
+  /// Connects at the first call.
+  [[nodiscard]] Result<ControlClient*> client();
+  /// The end of the time-out, from now on.
+  [[nodiscard]] TimePoint deadline() const;
+  [[nodiscard]] Duration timeout() const;
+
+  /// The host of --host, or the only one there is. Several and no --host: an error that lists them.
+  [[nodiscard]] Result<std::string> target_host();
+  /// The host of --host, or all.
+  [[nodiscard]] Result<std::vector<HostView>> shown_hosts();
+
+  /// Prints rows as table or JSON.
+  void show(const std::vector<Row>& rows, const std::vector<Column>& columns) const;
+
+  /// Prints the error; returns the exit code for it.
+  static int fail(const Error& error);
+
+ private:
+  std::unique_ptr<ControlClient> client_;
+};
+
+/// A verb sets this when it was chosen; main runs it after all options are read.
+using Action = std::function<int()>;
+
+void add_list_verbs(CLI::App& app, CliSession& session, Action& action);
+void add_show_verbs(CLI::App& app, CliSession& session, Action& action);
+void add_command_verbs(CLI::App& app, CliSession& session, Action& action);
+void add_post_verb(CLI::App& app, CliSession& session, Action& action);
+void add_watch_verb(CLI::App& app, CliSession& session, Action& action);
+
+/// "I/T" split at the first slash. invalid_argument: no slash, or nothing on one side of it.
+[[nodiscard]] Result<std::pair<std::string, std::string>> split_name(std::string_view what,
+                                                                     std::string_view text);
+
+/// " (did you mean 'x'?)", or nothing if no name is near.
+[[nodiscard]] std::string hint(std::string_view unknown, const std::vector<std::string>& known);
+
+}  // namespace plchost

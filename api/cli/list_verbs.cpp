@@ -1,0 +1,61 @@
+#include <utility>
+
+#include <CLI/CLI.hpp>
+
+#include "api/cli/cli_session.hpp"
+#include "api/cli/rows.hpp"
+
+namespace plchost {
+
+namespace {
+
+int list_hosts(CliSession& session) {
+  const auto hosts = session.shown_hosts();
+  if (!hosts) return CliSession::fail(hosts.error());
+  std::vector<Row> rows;
+  for (const HostView& host : *hosts) rows.push_back(to_row(host));
+  session.show(rows, host_columns());
+  return kExitDone;
+}
+
+template <class Sample>
+using Snapshot = Result<std::vector<Sample>> (ControlClient::*)(const std::string&, TimePoint);
+
+template <class Sample>
+int list(CliSession& session, Snapshot<Sample> snapshot, const std::vector<Column>& columns) {
+  const auto hosts = session.shown_hosts();
+  if (!hosts) return CliSession::fail(hosts.error());
+  const auto client = session.client();
+  if (!client) return CliSession::fail(client.error());
+  std::vector<Row> rows;
+  for (const HostView& host : *hosts) {
+    const auto samples = ((*client)->*snapshot)(host.name, session.deadline());
+    if (!samples) return CliSession::fail(samples.error());
+    for (const Sample& sample : *samples) rows.push_back(to_row(sample));
+  }
+  session.show(rows, columns);
+  return kExitDone;
+}
+
+}  // namespace
+
+void add_list_verbs(CLI::App& app, CliSession& session, Action& action) {
+  CLI::App* const verb = app.add_subcommand("list", "Show all hosts, instances, tasks, events or objects");
+  verb->require_subcommand(1)->fallthrough();
+  const auto add = [&](const char* noun, const char* text, Action run) {
+    verb->add_subcommand(noun, text)->fallthrough()->callback([&action, run = std::move(run)] {
+      action = run;
+    });
+  };
+  add("hosts", "The controllers of the DDS domain", [&session] { return list_hosts(session); });
+  add("instances", "The PLC instances",
+      [&session] { return list(session, &ControlClient::instances, instance_columns()); });
+  add("tasks", "The tasks of all applications, with their figures",
+      [&session] { return list(session, &ControlClient::tasks, task_columns()); });
+  add("events", "The external events",
+      [&session] { return list(session, &ControlClient::events, event_columns()); });
+  add("objects", "All objects of the global pool",
+      [&session] { return list(session, &ControlClient::objects, object_columns()); });
+}
+
+}  // namespace plchost

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <string_view>
+#include <vector>
+
+#include "api/cli/table.hpp"
+#include "api/client/control_client.hpp"
+
+namespace plchost {
+
+/// From samples of status topics to rows of output. The field names are a promise to programs.
+[[nodiscard]] Row to_row(const HostView& host);
+[[nodiscard]] Row to_row(const plc_InstanceStatus& status);
+[[nodiscard]] Row to_row(const plc_TaskStatus& status);
+[[nodiscard]] Row to_row(const plc_EventStatus& status);
+[[nodiscard]] Row to_row(const plc_ObjectStatus& status);
+
+/// What the tables show of them.
+[[nodiscard]] const std::vector<Column>& host_columns();
+[[nodiscard]] const std::vector<Column>& instance_columns();
+[[nodiscard]] const std::vector<Column>& task_columns();
+[[nodiscard]] const std::vector<Column>& event_columns();
+[[nodiscard]] const std::vector<Column>& object_columns();
+
+}  // namespace plchost

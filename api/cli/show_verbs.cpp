@@ -1,0 +1,70 @@
+#include <algorithm>
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "api/cli/cli_session.hpp"
+#include "api/cli/rows.hpp"
+#include "api/dds/text.hpp"
+
+namespace plchost {
+
+namespace {
+
+int show_row(const CliSession& session, const Row& row) {
+  fmt::print("{}", session.options.json ? format_json({row}) : format_fields(row));
+  return kExitDone;
+}
+
+int show_instance(CliSession& session, const std::string& name) {
+  const auto host = session.target_host();
+  if (!host) return CliSession::fail(host.error());
+  const auto all = session.client().value()->instances(*host, session.deadline());
+  if (!all) return CliSession::fail(all.error());
+  std::vector<std::string> names;
+  for (const auto& instance : *all) {
+    if (dds::text_of(instance.instance) == name) return show_row(session, to_row(instance));
+    names.emplace_back(dds::text_of(instance.instance));
+  }
+  return CliSession::fail({ErrorCode::not_found, 0,
+                           fmt::format("no instance '{}' on host '{}'{}; there are: {}", name, *host,
+                                       hint(name, names), fmt::join(names, ", "))});
+}
+
+int show_task(CliSession& session, const std::string& name) {
+  const auto parts = split_name("TASK", name);
+  if (!parts) return CliSession::fail(parts.error());
+  const auto host = session.target_host();
+  if (!host) return CliSession::fail(host.error());
+  const auto all = session.client().value()->tasks(*host, session.deadline());
+  if (!all) return CliSession::fail(all.error());
+  std::vector<std::string> names;
+  for (const auto& task : *all) {
+    const std::string known = fmt::format("{}/{}", task.instance, task.task);
+    if (known == name) return show_row(session, to_row(task));
+    names.push_back(known);
+  }
+  return CliSession::fail({ErrorCode::not_found, 0,
+                           fmt::format("no task '{}' on host '{}'{}; there are: {}", name, *host,
+                                       hint(name, names), fmt::join(names, ", "))});
+}
+
+}  // namespace
+
+void add_show_verbs(CLI::App& app, CliSession& session, Action& action) {
+  CLI::App* const verb = app.add_subcommand("show", "Show all that is known of one instance or task");
+  verb->require_subcommand(1)->fallthrough();
+  const auto add = [&](const char* noun, const char* form, const char* text,
+                       int (*run)(CliSession&, const std::string&)) {
+    const auto name = std::make_shared<std::string>();
+    CLI::App* const command = verb->add_subcommand(noun, text)->fallthrough();
+    command->add_option(form, *name)->required();
+    command->callback(
+        [&session, &action, name, run] { action = [&session, name, run] { return run(session, *name); }; });
+  };
+  add("instance", "INSTANCE", "One PLC instance", show_instance);
+  add("task", "INSTANCE/TASK", "One task", show_task);
+}
+
+}  // namespace plchost

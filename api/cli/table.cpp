@@ -1,0 +1,79 @@
+#include "api/cli/table.hpp"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+namespace plchost {
+
+namespace {
+
+std::string printable(std::string text) {
+  std::ranges::replace_if(
+      text, [](char c) { return static_cast<unsigned char>(c) < ' ' || c == '\x7f'; }, '?');
+  return text;
+}
+
+std::string cell_of(const Row& row, const char* field, int decimals) {
+  const auto found = row.find(field);
+  if (found == row.end() || found->is_null()) return "-";
+  if (found->is_string()) {
+    auto text = printable(found->get<std::string>());
+    return text.empty() ? "-" : text;
+  }
+  if (found->is_number_float()) return fmt::format("{:.{}f}", found->get<double>(), decimals);
+  if (found->is_boolean()) return found->get<bool>() ? "yes" : "no";
+  return found->dump();
+}
+
+bool is_number(const std::vector<Row>& rows, const char* field) {
+  return std::ranges::any_of(rows, [&](const Row& row) {
+    const auto found = row.find(field);
+    return found != row.end() && found->is_number();
+  });
+}
+
+}  // namespace
+
+std::string format_table(const std::vector<Row>& rows, const std::vector<Column>& columns) {
+  std::vector<std::string> lines(rows.size() + 1);
+  for (const Column& column : columns) {
+    const bool last = &column == &columns.back();
+    std::vector<std::string> cells{column.header};
+    for (const Row& row : rows) cells.push_back(cell_of(row, column.field, column.decimals));
+    const std::size_t width = std::ranges::max(cells, {}, &std::string::size).size();
+    const bool right = is_number(rows, column.field);
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      if (right) {
+        lines[i] += fmt::format("{:>{}}", cells[i], width);
+      } else {
+        lines[i] += last ? cells[i] : fmt::format("{:<{}}", cells[i], width);
+      }
+      if (!last) lines[i] += "  ";
+    }
+  }
+  std::string text;
+  for (const std::string& line : lines) text += line + "\n";
+  return text;
+}
+
+std::string format_fields(const Row& row) {
+  std::size_t width = 0;
+  for (const auto& [field, value] : row.items()) width = std::max(width, field.size());
+  std::string text;
+  for (const auto& [field, value] : row.items()) {
+    text += fmt::format("{:<{}}  {}\n", field, width, cell_of(row, field.c_str(), 3));
+  }
+  return text;
+}
+
+std::string format_json(const std::vector<Row>& rows) {
+  std::string text = "[";
+  for (const Row& row : rows) {
+    text += &row == &rows.front() ? "\n  " : ",\n  ";
+    text += row.dump(-1, ' ', false, Row::error_handler_t::replace);
+  }
+  return text + (rows.empty() ? "]\n" : "\n]\n");
+}
+
+}  // namespace plchost

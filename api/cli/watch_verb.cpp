@@ -1,0 +1,112 @@
+#include <algorithm>
+#include <atomic>
+#include <csignal>
+#include <memory>
+#include <optional>
+
+#include <CLI/CLI.hpp>
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "api/cli/cli_session.hpp"
+#include "api/cli/rows.hpp"
+#include "api/dds/text.hpp"
+
+namespace plchost {
+
+namespace {
+
+struct WatchArguments {
+  std::string instance;
+  double interval_s = 1.0;
+  std::uint64_t count = 0;  // 0: until Ctrl-C
+};
+
+std::atomic<bool>& interrupted() {
+  static std::atomic<bool> flag{false};
+  return flag;
+}
+
+void on_interrupt(int /*signal*/) {
+  interrupted().store(true);
+}
+
+Result<std::vector<Row>> task_rows(CliSession& session, const std::string& instance) {
+  const auto hosts = session.shown_hosts();
+  if (!hosts) return std::unexpected(hosts.error());
+  std::vector<Row> rows;
+  std::vector<std::string> names;
+  ControlClient& client = *session.client().value();
+  for (const HostView& host : *hosts) {
+    const auto tasks = client.tasks(host.name, session.deadline());
+    if (!tasks) return std::unexpected(tasks.error());
+    for (const auto& task : *tasks) {
+      if (instance.empty() || dds::text_of(task.instance) == instance) rows.push_back(to_row(task));
+    }
+    if (instance.empty()) continue;
+    const auto instances = client.instances(host.name, session.deadline());
+    if (!instances) return std::unexpected(instances.error());
+    for (const auto& known : *instances) names.emplace_back(dds::text_of(known.instance));
+  }
+  if (instance.empty() || std::ranges::find(names, instance) != names.end()) return rows;
+  return failure(ErrorCode::not_found, fmt::format("no instance '{}'{}; there are: {}", instance,
+                                                   hint(instance, names), fmt::join(names, ", ")));
+}
+
+void print_block(const CliSession& session, const std::vector<Row>& rows, bool first) {
+  if (session.options.json) return session.show(rows, task_columns());
+  if (::isatty(STDOUT_FILENO) != 0) {
+    fmt::print("\x1b[H\x1b[2J");
+  } else if (!first) {
+    fmt::print("\n");
+  }
+  session.show(rows, task_columns());
+}
+
+int watch(CliSession& session, const WatchArguments& arguments) {
+  struct sigaction action{};
+  action.sa_handler = on_interrupt;
+  ::sigaction(SIGINT, &action, nullptr);
+  ::sigaction(SIGTERM, &action, nullptr);
+  const auto interval =
+      std::chrono::duration_cast<Duration>(std::chrono::duration<double>(arguments.interval_s));
+  TimePoint next = MonotonicClock::now();
+  for (std::uint64_t i = 0; !interrupted() && (arguments.count == 0 || i < arguments.count); ++i) {
+    if (i > 0) {
+      while (!interrupted() && MonotonicClock::now() < next) {
+        constexpr Duration kSlice = std::chrono::milliseconds(50);  // so that Ctrl-C ends it at once
+        const timespec slice =
+            to_timespec(std::clamp(next - MonotonicClock::now(), Duration::zero(), kSlice));
+        ::nanosleep(&slice, nullptr);
+      }
+      if (interrupted()) break;
+    }
+    const auto rows = task_rows(session, arguments.instance);
+    if (!rows) return CliSession::fail(rows.error());
+    print_block(session, *rows, i == 0);
+    next = std::max(next + interval, MonotonicClock::now());
+  }
+  return kExitDone;
+}
+
+}  // namespace
+
+void add_watch_verb(CLI::App& app, CliSession& session, Action& action) {
+  CLI::App* const verb = app.add_subcommand("watch", "Show tasks again and again");
+  verb->require_subcommand(1)->fallthrough();
+  CLI::App* const noun =
+      verb->add_subcommand("tasks", "The tasks with live figures, until Ctrl-C")->fallthrough();
+  const auto arguments = std::make_shared<WatchArguments>();
+  noun->add_option("INSTANCE", arguments->instance, "only of this instance");
+  constexpr double kMinInterval = 0.1;
+  constexpr double kMaxInterval = 3600;
+  noun->add_option("--interval", arguments->interval_s, "seconds between two looks (default 1)")
+      ->check(CLI::Range(kMinInterval, kMaxInterval));
+  noun->add_option("--count", arguments->count, "end after so many looks");
+  noun->callback([&session, &action, arguments] {
+    action = [&session, arguments] { return watch(session, *arguments); };
+  });
+}
+
+}  // namespace plchost

@@ -1,0 +1,302 @@
+#include "api/client/control_client.hpp"
+
+#include <algorithm>
+#include <tuple>
+
+#include <fmt/format.h>
+
+#include "api/dds/error.hpp"
+#include "api/dds/log_sink.hpp"
+#include "api/dds/samples.hpp"
+#include "shm/base/futex.hpp"
+#include "shm/base/names.hpp"
+
+namespace plchost {
+
+namespace {
+
+bool is_engineering(std::int32_t operation) {
+  return operation >= plc_OPERATION_LOAD_APPLICATION;
+}
+
+auto order(const plc_InstanceStatus& s) {
+  return std::string_view(s.instance);
+}
+auto order(const plc_TaskStatus& s) {
+  return std::tuple(std::string_view(s.instance), s.priority, std::string_view(s.task));
+}
+auto order(const plc_EventStatus& s) {
+  return std::pair(std::string_view(s.instance), std::string_view(s.event));
+}
+auto order(const plc_ObjectStatus& s) {
+  return std::string_view(s.object_name);
+}
+
+}  // namespace
+
+Result<std::unique_ptr<ControlClient>> ControlClient::connect(const dds::DomainOptions& options) {
+  std::unique_ptr<ControlClient> client(new ControlClient);
+  if (auto opened = client->open(options); !opened) return std::unexpected(opened.error());
+  return client;
+}
+
+Result<void> ControlClient::open(const dds::DomainOptions& options) {
+  dds::install_log_sink();
+  auto domain = dds::open_domain(dds::Role::client, options);
+  if (!domain) return std::unexpected(domain.error());
+  domain_ = std::move(*domain);
+  auto participant = dds::check_entity(dds_create_participant(options.domain, nullptr, nullptr),
+                                       fmt::format("enter DDS domain {}", options.domain));
+  if (!participant) return std::unexpected(participant.error());
+  participant_ = std::move(*participant);
+  partition_ = dds::client_partition(dds::guid_of(participant_.get()).hex());
+  auto wait_set = WaitSet::create(participant_.get());
+  if (!wait_set) return std::unexpected(wait_set.error());
+  wait_set_.emplace(std::move(*wait_set));
+  last_news_ = MonotonicClock::now();
+  if (auto opened = open_cache(presence_, dds::kPresence); !opened) return opened;
+  return open_cache(host_status_, dds::kHostStatus);
+}
+
+template <class Sample>
+Result<void> ControlClient::open_cache(StatusCache<Sample>& cache, const dds::TopicInfo& info) {
+  if (cache) return {};
+  auto topic = dds::make_topic(participant_.get(), info);
+  if (!topic) return std::unexpected(topic.error());
+  auto reader = dds::make_reader(participant_.get(), topic->get(), dds::status_qos());
+  if (!reader) return std::unexpected(reader.error());
+  if (auto added = wait_set_->add(reader->get(), DDS_DATA_AVAILABLE_STATUS); !added) return added;
+  cache = StatusCache<Sample>(std::move(*topic), std::move(*reader));
+  return {};
+}
+
+void ControlClient::update() {
+  const TimePoint now = MonotonicClock::now();
+  presence_.update([&](const plc_Presence& presence) {
+    Seen& seen = seen_[std::string(dds::text_of(presence.host))];
+    if (presence.epoch < seen.epoch) return;  // the last word of a server that was replaced
+    if (seen.epoch != presence.epoch || now - seen.last > kHostGone) last_news_ = now;
+    seen = Seen{presence.epoch, presence.pid, now};
+  });
+  host_status_.update();
+  instance_status_.update();
+  task_status_.update();
+  event_status_.update();
+  object_status_.update();
+}
+
+std::optional<HostView> ControlClient::present(std::string_view name) const {
+  const auto seen = seen_.find(std::string(name));
+  if (seen == seen_.end() || MonotonicClock::now() - seen->second.last > kHostGone) return std::nullopt;
+  const auto status = host_status_.of_host(name, seen->second.epoch);
+  if (status.empty()) return std::nullopt;
+  return HostView{std::string(name), seen->second.epoch, seen->second.pid, status.front()};
+}
+
+std::vector<HostView> ControlClient::present() const {
+  std::vector<HostView> found;
+  for (const auto& [name, seen] : seen_) {
+    if (auto view = present(name)) found.push_back(std::move(*view));
+  }
+  return found;
+}
+
+std::vector<HostView> ControlClient::hosts(TimePoint deadline) {
+  for (;;) {
+    update();
+    const TimePoint now = MonotonicClock::now();
+    auto found = present();
+    const bool settled = !found.empty() && now - last_news_ >= kQuiet;
+    if (settled || now >= deadline) return found;
+    wait_set_->wait(found.empty() ? deadline : std::min(deadline, last_news_ + kQuiet));
+  }
+}
+
+Result<HostView> ControlClient::host(std::string_view name, TimePoint deadline) {
+  for (;;) {
+    update();
+    if (auto found = present(name)) return *found;
+    if (MonotonicClock::now() >= deadline) break;
+    wait_set_->wait(deadline);
+  }
+  const auto others = present();
+  std::vector<std::string_view> names;
+  for (const HostView& other : others) names.emplace_back(other.name);
+  return failure(ErrorCode::not_found,
+                 fmt::format("no host '{}' answers; those that do: {}", name, join_names(names)));
+}
+
+template <class Sample>
+Result<std::vector<Sample>> ControlClient::snapshot(StatusCache<Sample>& cache, const dds::TopicInfo& topic,
+                                                    std::uint32_t plc_HostStatus::* expected,
+                                                    const std::string& host, TimePoint deadline) {
+  if (auto opened = open_cache(cache, topic); !opened) return std::unexpected(opened.error());
+  for (;;) {
+    update();
+    const auto view = present(host);
+    if (view && cache.count(host, view->epoch) == view->status.*expected) {
+      auto samples = cache.of_host(host, view->epoch);
+      std::ranges::sort(samples, {}, [](const Sample& sample) { return order(sample); });
+      return samples;
+    }
+    if (MonotonicClock::now() >= deadline) break;
+    wait_set_->wait(deadline);
+  }
+  return failure(ErrorCode::timed_out, fmt::format("the status of host '{}' has not come completely", host));
+}
+
+Result<std::vector<plc_InstanceStatus>> ControlClient::instances(const std::string& host,
+                                                                 TimePoint deadline) {
+  return snapshot(instance_status_, dds::kInstanceStatus, &plc_HostStatus::instance_count, host, deadline);
+}
+
+Result<std::vector<plc_TaskStatus>> ControlClient::tasks(const std::string& host, TimePoint deadline) {
+  return snapshot(task_status_, dds::kTaskStatus, &plc_HostStatus::task_count, host, deadline);
+}
+
+Result<std::vector<plc_EventStatus>> ControlClient::events(const std::string& host, TimePoint deadline) {
+  return snapshot(event_status_, dds::kEventStatus, &plc_HostStatus::event_count, host, deadline);
+}
+
+Result<std::vector<plc_ObjectStatus>> ControlClient::objects(const std::string& host, TimePoint deadline) {
+  return snapshot(object_status_, dds::kObjectStatus, &plc_HostStatus::object_count, host, deadline);
+}
+
+Result<void> ControlClient::open_own_reader(dds::Entity& topic, dds::Entity& reader,
+                                            const dds::TopicInfo& info, const dds::Qos& qos) {
+  if (reader) return {};
+  if (!own_subscriber_) {
+    auto made = dds::make_subscriber(participant_.get(), partition_);
+    if (!made) return std::unexpected(made.error());
+    own_subscriber_ = std::move(*made);
+  }
+  auto made_topic = dds::make_topic(participant_.get(), info);
+  if (!made_topic) return std::unexpected(made_topic.error());
+  auto made_reader = dds::make_reader(own_subscriber_.get(), made_topic->get(), qos);
+  if (!made_reader) return std::unexpected(made_reader.error());
+  topic = std::move(*made_topic);
+  reader = std::move(*made_reader);
+  return wait_set_->add(reader.get(), DDS_DATA_AVAILABLE_STATUS);
+}
+
+Result<RequestCaller*> ControlClient::caller(const std::string& host, bool engineering) {
+  const std::pair key(host, engineering);
+  if (const auto known = callers_.find(key); known != callers_.end()) return &known->second;
+  dds::Qos qos = dds::reply_qos();
+  qos.keep_all().max_samples(dds::kReplyDepth * dds::kMaxServersPerMachine);
+  if (auto opened = open_own_reader(reply_topic_, reply_reader_, dds::kReply, qos); !opened) {
+    return std::unexpected(opened.error());
+  }
+  dds::Entity& topic = request_topics_.at(engineering ? 1 : 0);
+  if (!topic) {
+    auto made =
+        dds::make_topic(participant_.get(), engineering ? dds::kEngineerRequest : dds::kOperatorRequest);
+    if (!made) return std::unexpected(made.error());
+    topic = std::move(*made);
+  }
+  auto made = RequestCaller::create(participant_.get(), topic.get(), host);
+  if (!made) return std::unexpected(made.error());
+  if (auto added = wait_set_->add(made->writer(), DDS_PUBLICATION_MATCHED_STATUS); !added) {
+    return std::unexpected(added.error());
+  }
+  return &callers_.emplace(key, std::move(*made)).first->second;
+}
+
+Result<ApiReply> ControlClient::call(const ApiRequest& request, TimePoint deadline) {
+  const auto asked = caller(request.host, is_engineering(request.operation));
+  if (!asked) return std::unexpected(asked.error());
+  auto reply = (*asked)->call(request, reply_reader_.get(), *wait_set_, deadline);
+  if (!reply) return reply;
+  for (;;) {
+    update();
+    const auto view = present(request.host);
+    if (!view || view->status.round >= reply->status_round || MonotonicClock::now() >= deadline) return reply;
+    wait_set_->wait(deadline);
+  }
+}
+
+Result<EventPoster*> ControlClient::poster(const std::string& host) {
+  if (const auto known = posters_.find(host); known != posters_.end()) return &known->second;
+  if (auto opened = open_own_reader(ack_topic_, ack_reader_, dds::kEventAck, dds::ack_qos()); !opened) {
+    return std::unexpected(opened.error());
+  }
+  if (!event_topic_) {
+    auto made = dds::make_topic(participant_.get(), dds::kEvent);
+    if (!made) return std::unexpected(made.error());
+    event_topic_ = std::move(*made);
+  }
+  auto made = EventPoster::create(participant_.get(), event_topic_.get(), host);
+  if (!made) return std::unexpected(made.error());
+  if (auto added = wait_set_->add(made->writer(), DDS_PUBLICATION_MATCHED_STATUS); !added) {
+    return std::unexpected(added.error());
+  }
+  return &posters_.emplace(host, std::move(*made)).first->second;
+}
+
+Result<void> ControlClient::prepare_posts(const std::string& host, TimePoint deadline) {
+  const auto way = poster(host);
+  if (!way) return std::unexpected(way.error());
+  while (!(*way)->matched()) {
+    if (MonotonicClock::now() >= deadline) {
+      return failure(ErrorCode::timed_out, fmt::format("host '{}' takes no events", host));
+    }
+    update();
+    wait_set_->wait(deadline);
+  }
+  return {};
+}
+
+bool ControlClient::take_acks(TimePoint now) {
+  bool progress = false;
+  for (bool more = true; more;) {
+    const dds::Samples<plc_EventAck> acks(ack_reader_.get());
+    for (std::size_t i = 0; i < acks.size(); ++i) {
+      if (!acks.valid(i)) continue;
+      const auto way = posters_.find(dds::text_of(acks[i].host));
+      if (way != posters_.end()) progress |= way->second.on_ack(acks[i], now);
+    }
+    more = acks.full();
+  }
+  return progress;
+}
+
+Result<PostReport> ControlClient::post_event(const ApiRequest& event, std::uint64_t count, Duration interval,
+                                             Duration patience) {
+  const TimePoint start = MonotonicClock::now();
+  if (auto ready = prepare_posts(event.host, start + patience); !ready) return std::unexpected(ready.error());
+  const auto way = poster(event.host);
+  if (!way) return std::unexpected(way.error());
+  EventPoster& posts = **way;
+  posts.begin_report(start);
+  const TimePoint first = MonotonicClock::now();
+  std::uint64_t sent = 0;
+  for (;;) {
+    TimePoint now = MonotonicClock::now();
+    (void)take_acks(now);
+    TimePoint next = kNoDeadline;
+    while (sent < count && posts.has_room()) {
+      next = first + interval * static_cast<Duration::rep>(sent);
+      if (next > now) break;
+      posts.post(event.instance, event.argument, now);
+      ++sent;
+      now = MonotonicClock::now();
+    }
+    if (posts.unacknowledged() == 0 && sent == count) return posts.report();
+    if (posts.unacknowledged() > 0 && now - posts.last_progress() > patience) {
+      PostReport report = posts.report();
+      report.unacknowledged += count - sent;
+      return report;
+    }
+    update();
+    wait_set_->wait(std::min(posts.has_room() && sent < count ? next : kNoDeadline, posts.repeat(now)));
+  }
+}
+
+Result<void> ControlClient::post_one(const std::string& host, std::string_view instance,
+                                     std::string_view event) {
+  const auto way = posters_.find(host);
+  if (way == posters_.end()) return failure(ErrorCode::wrong_state, "prepare_posts() comes first");
+  return way->second.post_once(instance, event);
+}
+
+}  // namespace plchost

@@ -1,0 +1,126 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <control.h>
+
+#include "api/client/event_poster.hpp"
+#include "api/client/request_caller.hpp"
+#include "api/client/status_cache.hpp"
+#include "api/client/wait_set.hpp"
+#include "api/dds/domain.hpp"
+#include "api/dds/topics.hpp"
+#include "shm/base/result.hpp"
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+/// One host that answers at present.
+struct HostView {
+  std::string name;
+  std::uint64_t epoch = 0;
+  std::int32_t server_pid = 0;  ///< of plchost-dds
+  plc_HostStatus status{};
+};
+
+/// The client's end of the DDS API: sees all hosts of a domain and addresses any. One thread at a time.
+/// Nothing here waits beyond the deadline it was given; deadlines are of MonotonicClock.
+class ControlClient {
+ public:
+  /// A host that has not shown its presence for so long is gone.
+  static constexpr Duration kHostGone = std::chrono::milliseconds(500);
+  /// All hosts are known when none was news for so long.
+  static constexpr Duration kQuiet = std::chrono::milliseconds(200);
+
+  [[nodiscard]] static Result<std::unique_ptr<ControlClient>> connect(const dds::DomainOptions& options);
+
+  /// The hosts that answer, by name: waits for the first one until the deadline, then until none is news any
+  /// more. Empty: none answers.
+  [[nodiscard]] std::vector<HostView> hosts(TimePoint deadline);
+  /// That host, as soon as it is seen. not_found: it does not answer; the text lists who does.
+  [[nodiscard]] Result<HostView> host(std::string_view name, TimePoint deadline);
+
+  /// All that a host shows, complete: waits until as much has come as the host says there is. Sorted by name.
+  /// timed_out: not complete at the deadline.
+  [[nodiscard]] Result<std::vector<plc_InstanceStatus>> instances(const std::string& host,
+                                                                  TimePoint deadline);
+  [[nodiscard]] Result<std::vector<plc_TaskStatus>> tasks(const std::string& host, TimePoint deadline);
+  [[nodiscard]] Result<std::vector<plc_EventStatus>> events(const std::string& host, TimePoint deadline);
+  [[nodiscard]] Result<std::vector<plc_ObjectStatus>> objects(const std::string& host, TimePoint deadline);
+
+  /// A command and its answer. The status that this client shows afterwards has its effect.
+  /// timed_out: no answer; whether it was done is not known.
+  [[nodiscard]] Result<ApiReply> call(const ApiRequest& request, TimePoint deadline);
+
+  /// Makes the way to a host's events, so that the first post finds it open.
+  [[nodiscard]] Result<void> prepare_posts(const std::string& host, TimePoint deadline);
+
+  /// Posts an event `count` times, `interval` apart (0: as fast as acknowledgements come), each counted
+  /// exactly once, also if plchost-dds dies meanwhile. Ends early when the host has acknowledged nothing for
+  /// `patience`: then the report says how many are not known.
+  [[nodiscard]] Result<PostReport> post_event(const ApiRequest& event, std::uint64_t count, Duration interval,
+                                              Duration patience);
+
+  /// One post with the least latency: one dds_write, not repeated, not waited for. prepare_posts() first.
+  [[nodiscard]] Result<void> post_one(const std::string& host, std::string_view instance,
+                                      std::string_view event);
+
+  /// Sleeps until something has changed or the deadline has come.
+  void wait_for_change(TimePoint deadline) { wait_set_->wait(deadline); }
+
+ private:
+  struct Seen {
+    std::uint64_t epoch = 0;
+    std::int32_t pid = 0;
+    TimePoint last{};
+  };
+
+  ControlClient() = default;
+  Result<void> open(const dds::DomainOptions& options);
+  void update();
+  [[nodiscard]] std::vector<HostView> present() const;
+  [[nodiscard]] std::optional<HostView> present(std::string_view name) const;
+  template <class Sample>
+  [[nodiscard]] Result<void> open_cache(StatusCache<Sample>& cache, const dds::TopicInfo& topic);
+  template <class Sample>
+  [[nodiscard]] Result<std::vector<Sample>> snapshot(StatusCache<Sample>& cache, const dds::TopicInfo& topic,
+                                                     std::uint32_t plc_HostStatus::* expected,
+                                                     const std::string& host, TimePoint deadline);
+  [[nodiscard]] Result<void> open_own_reader(dds::Entity& topic, dds::Entity& reader,
+                                             const dds::TopicInfo& info, const dds::Qos& qos);
+  [[nodiscard]] Result<RequestCaller*> caller(const std::string& host, bool engineering);
+  [[nodiscard]] Result<EventPoster*> poster(const std::string& host);
+  bool take_acks(TimePoint now);
+
+  std::shared_ptr<dds::Entity> domain_;
+  dds::Entity participant_;
+  std::optional<WaitSet> wait_set_;
+  std::string partition_;
+  dds::Entity own_subscriber_;
+  StatusCache<plc_Presence> presence_;
+  StatusCache<plc_HostStatus> host_status_;
+  StatusCache<plc_InstanceStatus> instance_status_;
+  StatusCache<plc_TaskStatus> task_status_;
+  StatusCache<plc_EventStatus> event_status_;
+  StatusCache<plc_ObjectStatus> object_status_;
+  std::map<std::string, Seen> seen_;
+  TimePoint last_news_{};
+  dds::Entity reply_topic_;
+  dds::Entity reply_reader_;
+  dds::Entity ack_topic_;
+  dds::Entity ack_reader_;
+  dds::Entity event_topic_;
+  std::array<dds::Entity, 2> request_topics_;
+  std::map<std::pair<std::string, bool>, RequestCaller> callers_;
+  std::map<std::string, EventPoster, std::less<>> posters_;
+};
+
+}  // namespace plchost

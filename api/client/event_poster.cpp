@@ -1,0 +1,104 @@
+#include "api/client/event_poster.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "api/dds/error.hpp"
+#include "api/dds/text.hpp"
+#include "api/dds/topics.hpp"
+
+namespace plchost {
+
+Result<EventPoster> EventPoster::create(dds_entity_t participant, dds_entity_t topic,
+                                        const std::string& host) {
+  EventPoster poster;
+  auto publisher = dds::make_publisher(participant, dds::host_partition(host));
+  if (!publisher) return std::unexpected(publisher.error());
+  poster.publisher_ = std::move(*publisher);
+  auto writer = dds::make_writer(poster.publisher_.get(), topic, dds::event_qos());
+  if (!writer) return std::unexpected(writer.error());
+  poster.writer_ = std::move(*writer);
+  poster.source_ = dds::guid_of(poster.writer_.get());
+  poster.source_.copy_to(poster.sample_.source);
+  dds::copy_text(poster.sample_.host, host);
+  return poster;
+}
+
+bool EventPoster::matched() const noexcept {
+  dds_publication_matched_status_t status{};
+  return dds_get_publication_matched_status(writer_.get(), &status) == DDS_RETCODE_OK &&
+         status.current_count > 0;
+}
+
+dds_return_t EventPoster::write(std::uint64_t sequence) noexcept {
+  sample_.sequence_number = sequence;
+  sample_.base_sequence = unacknowledged_.empty() ? sequence : unacknowledged_.front().sequence;
+  return dds_write(writer_.get(), &sample_);
+}
+
+void EventPoster::post(std::string_view instance, std::string_view event, TimePoint now) {
+  if (unacknowledged_.empty()) last_progress_ = now;
+  unacknowledged_.push_back({++last_sequence_, std::string(instance), std::string(event)});
+  dds::copy_text(sample_.instance, instance);
+  dds::copy_text(sample_.event, event);
+  (void)write(last_sequence_);  // one that DDS did not take is repeated like a lost one
+  last_write_ = now;
+}
+
+Result<void> EventPoster::post_once(std::string_view instance, std::string_view event) noexcept {
+  dds::copy_text(sample_.instance, instance);
+  dds::copy_text(sample_.event, event);
+  return dds::check_code(write(++last_sequence_), "post an event");
+}
+
+bool EventPoster::on_ack(const plc_EventAck& ack, TimePoint now) {
+  if (dds::Guid::from(ack.source) != source_ || ack.epoch < newest_.epoch) return false;
+  const bool new_server = newest_.epoch != 0 && ack.epoch != newest_.epoch;
+  newest_ = ack;
+  newest_.ext = {};
+  window_ = std::clamp<std::size_t>(ack.credits, 1, kWindow);
+  const std::size_t before = unacknowledged_.size();
+  while (!unacknowledged_.empty() && unacknowledged_.front().sequence <= ack.sequence_number) {
+    unacknowledged_.pop_front();
+  }
+  if (new_server) last_write_ = TimePoint{};  // what the one before took and did not do is repeated now
+  if (unacknowledged_.size() == before) return false;
+  last_progress_ = now;
+  return true;
+}
+
+TimePoint EventPoster::repeat(TimePoint now) {
+  if (unacknowledged_.empty()) return now + kResend;
+  const Duration patience = newest_.epoch == 0 ? kFirstResend : kResend;
+  const TimePoint due = std::max(last_progress_, last_write_) + patience;
+  const bool at_once = last_write_ == TimePoint{};
+  if (!at_once && now < due) return due;
+  for (const Unacknowledged& post : unacknowledged_) {
+    dds::copy_text(sample_.instance, post.instance);
+    dds::copy_text(sample_.event, post.event);
+    if (write(post.sequence) != DDS_RETCODE_OK) break;
+  }
+  last_write_ = now;
+  return now + patience;
+}
+
+void EventPoster::begin_report(TimePoint now) {
+  unacknowledged_.clear();
+  base_ = newest_;
+  last_progress_ = now;
+}
+
+PostReport EventPoster::report() const {
+  PostReport report;
+  report.accepted = newest_.accepted - base_.accepted;
+  report.no_task = newest_.no_task - base_.no_task;
+  report.rejected = newest_.rejected - base_.rejected;
+  report.unacknowledged = unacknowledged_.size();
+  if (report.rejected > 0) {
+    report.rejected_code = static_cast<ErrorCode>(newest_.rejected_code);
+    report.rejected_text = dds::text_of(newest_.rejected_text);
+  }
+  return report;
+}
+
+}  // namespace plchost

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <string>
+#include <string_view>
+
+#include <control.h>
+
+#include "api/dds/entity.hpp"
+#include "api/dds/guid.hpp"
+#include "shm/base/result.hpp"
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+/// What became of posts.
+struct PostReport {
+  std::uint64_t accepted = 0;  ///< counted by the event (no_task included)
+  std::uint64_t no_task = 0;   ///< counted, but no task was bound to the event at that time
+  std::uint64_t rejected = 0;  ///< not counted
+  ErrorCode rejected_code = ErrorCode::ok;
+  std::string rejected_text;         ///< why the last rejected one was
+  std::uint64_t unacknowledged = 0;  ///< nothing is known of these; 0 unless the host stopped answering
+};
+
+/// The posts to one host: numbers them, keeps those that are not acknowledged, and repeats them.
+class EventPoster {
+ public:
+  /// Unacknowledged posts at most.
+  static constexpr std::size_t kWindow = 32;
+  /// Repeats after so long without progress; sooner while the host has not been heard of yet.
+  static constexpr Duration kResend = std::chrono::milliseconds(200);
+  static constexpr Duration kFirstResend = std::chrono::milliseconds(20);
+
+  [[nodiscard]] static Result<EventPoster> create(dds_entity_t participant, dds_entity_t topic,
+                                                  const std::string& host);
+
+  [[nodiscard]] dds_entity_t writer() const noexcept { return writer_.get(); }
+  /// Whether the host's reader is there.
+  [[nodiscard]] bool matched() const noexcept;
+
+  /// One post that is repeated until it is acknowledged. Only while has_room().
+  void post(std::string_view instance, std::string_view event, TimePoint now);
+  [[nodiscard]] bool has_room() const noexcept { return unacknowledged_.size() < window_; }
+  [[nodiscard]] std::size_t unacknowledged() const noexcept { return unacknowledged_.size(); }
+
+  /// One post that is not repeated: as fast as DDS is. One call of dds_write.
+  [[nodiscard]] Result<void> post_once(std::string_view instance, std::string_view event) noexcept;
+
+  /// Returns true if that acknowledged something.
+  bool on_ack(const plc_EventAck& ack, TimePoint now);
+  /// Repeats what is due to be repeated. Returns when it has to be called again.
+  TimePoint repeat(TimePoint now);
+  [[nodiscard]] TimePoint last_progress() const noexcept { return last_progress_; }
+  /// From now on report() counts from 0, and nothing before is repeated.
+  void begin_report(TimePoint now);
+  [[nodiscard]] PostReport report() const;
+
+ private:
+  EventPoster() = default;
+  dds_return_t write(std::uint64_t sequence) noexcept;
+
+  struct Unacknowledged {
+    std::uint64_t sequence = 0;
+    std::string instance;
+    std::string event;
+  };
+
+  dds::Entity publisher_;
+  dds::Entity writer_;
+  plc_EventPost sample_{};  // all but numbers and names is set once
+  dds::Guid source_;
+  std::deque<Unacknowledged> unacknowledged_;
+  std::size_t window_ = kWindow;
+  std::uint64_t last_sequence_ = 0;
+  TimePoint last_progress_{};
+  TimePoint last_write_{};
+  plc_EventAck newest_{};  // epoch 0: none yet
+  plc_EventAck base_{};    // where the report counts from
+};
+
+}  // namespace plchost

@@ -1,0 +1,81 @@
+#include "api/client/request_caller.hpp"
+
+#include <algorithm>
+#include <optional>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "api/dds/samples.hpp"
+#include "api/dds/text.hpp"
+#include "api/dds/topics.hpp"
+
+namespace plchost {
+
+namespace {
+
+std::optional<ApiReply> take_reply(dds_entity_t reader, const plc_SampleIdentity& identity) {
+  std::optional<ApiReply> found;
+  for (bool more = true; more;) {
+    const dds::Samples<plc_Reply, 16> replies(reader);
+    for (std::size_t i = 0; i < replies.size(); ++i) {
+      if (!replies.valid(i)) continue;
+      const plc_SampleIdentity& related = replies[i].header.related_identity;
+      // Others are answers to calls that were given up.
+      if (related.sequence_number != identity.sequence_number ||
+          !std::ranges::equal(related.writer_guid, identity.writer_guid)) {
+        continue;
+      }
+      found = ApiReply{static_cast<ErrorCode>(replies[i].code), std::string(dds::text_of(replies[i].text)),
+                       replies[i].status_round};
+    }
+    more = replies.full();
+  }
+  return found;
+}
+
+bool is_matched(dds_entity_t writer) {
+  dds_publication_matched_status_t status{};
+  return dds_get_publication_matched_status(writer, &status) == DDS_RETCODE_OK && status.current_count > 0;
+}
+
+}  // namespace
+
+Result<RequestCaller> RequestCaller::create(dds_entity_t participant, dds_entity_t topic,
+                                            const std::string& host) {
+  RequestCaller caller;
+  auto publisher = dds::make_publisher(participant, dds::host_partition(host));
+  if (!publisher) return std::unexpected(publisher.error());
+  caller.publisher_ = std::move(*publisher);
+  auto writer = dds::make_writer(caller.publisher_.get(), topic, dds::request_qos());
+  if (!writer) return std::unexpected(writer.error());
+  caller.writer_ = std::move(*writer);
+  caller.guid_ = dds::guid_of(caller.writer_.get());
+  return caller;
+}
+
+Result<ApiReply> RequestCaller::call(const ApiRequest& request, dds_entity_t reply_reader,
+                                     const WaitSet& wait_set, TimePoint deadline) {
+  plc_Request sample{};
+  guid_.copy_to(sample.header.request_identity.writer_guid);
+  sample.header.request_identity.sequence_number = ++last_number_;
+  dds::copy_text(sample.header.instance_name, request.host);
+  sample.operation = request.operation;
+  dds::copy_text(sample.instance, request.instance);
+  dds::copy_text(sample.argument, request.argument);
+  TimePoint next_write{};
+  bool written = false;
+  while (MonotonicClock::now() < deadline) {
+    if (auto reply = take_reply(reply_reader, sample.header.request_identity)) return *reply;
+    const TimePoint now = MonotonicClock::now();
+    if (now >= next_write && is_matched(writer_.get())) {
+      (void)dds_write(writer_.get(), &sample);  // a refusal of DDS is mended by the repetition
+      next_write = now + (written ? kRepeat : kFirstRepeat);
+      written = true;
+    }
+    wait_set.wait(std::min(deadline, std::max(next_write, now + kFirstRepeat)));
+  }
+  return failure(ErrorCode::timed_out, fmt::format("host '{}' has not answered", request.host));
+}
+
+}  // namespace plchost

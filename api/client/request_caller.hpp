@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include <control.h>
+
+#include "api/client/wait_set.hpp"
+#include "api/dds/entity.hpp"
+#include "api/dds/guid.hpp"
+#include "shm/base/result.hpp"
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+/// What a client asks of one instance.
+struct ApiRequest {
+  std::string host;
+  std::int32_t operation = 0;  ///< plc_OPERATION_...
+  std::string instance;
+  std::string argument;
+};
+
+/// A host's answer.
+struct ApiReply {
+  ErrorCode code = ErrorCode::ok;
+  std::string text;                ///< why not; or a remark
+  std::uint64_t status_round = 0;  ///< the host's status from this round on shows the effect
+};
+
+/// The requests of one role to one host: writes, repeats under the same identity, waits for the answer.
+class RequestCaller {
+ public:
+  static constexpr Duration kFirstRepeat = std::chrono::milliseconds(50);
+  static constexpr Duration kRepeat = std::chrono::milliseconds(250);
+
+  [[nodiscard]] static Result<RequestCaller> create(dds_entity_t participant, dds_entity_t topic,
+                                                    const std::string& host);
+  [[nodiscard]] dds_entity_t writer() const noexcept { return writer_.get(); }
+
+  /// timed_out: no answer until the deadline; whether it was done is not known.
+  [[nodiscard]] Result<ApiReply> call(const ApiRequest& request, dds_entity_t reply_reader,
+                                      const WaitSet& wait_set, TimePoint deadline);
+
+ private:
+  RequestCaller() = default;
+
+  dds::Entity publisher_;
+  dds::Entity writer_;
+  dds::Guid guid_;
+  std::int64_t last_number_ = 0;
+};
+
+}  // namespace plchost

@@ -1,0 +1,23 @@
+#pragma once
+
+#include "api/dds/entity.hpp"
+#include "shm/base/result.hpp"
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+/// Sleeps until one of several readers has data, or one of several writers meets or loses a reader.
+class WaitSet {
+ public:
+  [[nodiscard]] static Result<WaitSet> create(dds_entity_t participant);
+  /// `statuses`: DDS_DATA_AVAILABLE_STATUS of a reader, DDS_PUBLICATION_MATCHED_STATUS of a writer.
+  [[nodiscard]] Result<void> add(dds_entity_t entity, std::uint32_t statuses);
+  /// Returns at the deadline at the latest, and earlier without cause: look again.
+  void wait(TimePoint deadline) const noexcept;
+
+ private:
+  explicit WaitSet(dds::Entity set) noexcept : set_(std::move(set)) {}
+  dds::Entity set_;
+};
+
+}  // namespace plchost

@@ -1,0 +1,135 @@
+#include "api/dds/domain.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <filesystem>
+#include <map>
+#include <mutex>
+#include <string_view>
+#include <system_error>
+
+#include <fmt/format.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+
+#include "api/dds/error.hpp"
+#include "shm/base/thread.hpp"
+
+namespace plchost::dds {
+
+namespace {
+
+// Interface names and addresses come from a command line and go into XML.
+Result<void> check_address(std::string_view what, std::string_view text) {
+  constexpr std::size_t kMaxAddress = 64;
+  const auto allowed = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
+           c == ':' || c == '-' || c == '_' || c == '[' || c == ']' || c == '%' || c == '@';
+  };
+  if (!text.empty() && text.size() <= kMaxAddress && std::ranges::all_of(text, allowed)) return {};
+  return failure(ErrorCode::invalid_argument, fmt::format("{} '{}' is not valid", what, text.substr(0, 100)));
+}
+
+std::string threads_section(int fifo) {
+  // Small stacks: with locked memory each thread would otherwise cost 8 MB.
+  constexpr std::string_view kThread = "<Thread Name=\"{}\">{}<StackSize>512 kB</StackSize></Thread>";
+  const std::string realtime =
+      fifo > 0 ? fmt::format("<Scheduling><Class>Realtime</Class><Priority>{}</Priority></Scheduling>", fifo)
+               : "";
+  std::string section = "<Threads>";
+  for (const std::string_view name : {"recv", "dq.user", "tev"})
+    section += fmt::format(kThread, name, realtime);
+  for (const std::string_view name : {"dq.builtins", "gc", "lease", "fsm"})
+    section += fmt::format(kThread, name, "");
+  return section + "</Threads>";
+}
+
+std::mutex& registry_mutex() {
+  static std::mutex mutex;
+  return mutex;
+}
+
+}  // namespace
+
+Result<std::string> domain_configuration(Role role, const DomainOptions& options) {
+  if (options.domain > kMaxDomain) {
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("domain {} is not valid: allowed are 0 to {}", options.domain, kMaxDomain));
+  }
+  std::string interfaces;
+  for (const std::string& name : options.interfaces) {
+    if (const auto good = check_address("interface", name); !good) return std::unexpected(good.error());
+    interfaces += fmt::format("<NetworkInterface name=\"{}\" multicast=\"false\"/>", name);
+  }
+  std::vector<std::string> addresses = options.peers;
+  if (addresses.empty() && role == Role::client) addresses.emplace_back("127.0.0.1");
+  std::string peers;
+  for (const std::string& address : addresses) {
+    if (const auto good = check_address("peer", address); !good) return std::unexpected(good.error());
+    peers += fmt::format("<Peer Address=\"{}\"/>", address);
+  }
+  if (!peers.empty()) peers = fmt::format("<Peers>{}</Peers>", peers);
+  // The watermarks are high because all writers of ours are bounded by their own history or window: none may
+  // be stopped because one client does not read.
+  return fmt::format(
+      "<CycloneDDS><Domain "
+      "Id=\"any\"><General><Interfaces>{}</Interfaces><AllowMulticast>false</AllowMulticast>"
+      "</General><Discovery><ParticipantIndex>{}</ParticipantIndex>"
+      "<MaxAutoParticipantIndex>{}</MaxAutoParticipantIndex>{}<SPDPInterval>1 s</SPDPInterval>"
+      "<LeaseDuration>3 s</LeaseDuration></Discovery><Internal>"
+      "<MultipleReceiveThreads>false</MultipleReceiveThreads><NackDelay>1 ms</NackDelay><AckDelay>1 "
+      "ms</AckDelay>"
+      "<PreEmptiveAckDelay>1 ms</PreEmptiveAckDelay>"
+      "<HeartbeatInterval min=\"1 ms\" minsched=\"5 ms\" max=\"100 ms\">10 ms</HeartbeatInterval>"
+      "<SocketReceiveBufferSize min=\"128 KiB\" max=\"4 MiB\"/><MaxSampleSize>64 KiB</MaxSampleSize>"
+      "<Watermarks><WhcHigh>32 MB</WhcHigh><WhcHighInit>32 MB</WhcHighInit><WhcAdaptive>false</WhcAdaptive>"
+      "</Watermarks></Internal>{}</Domain></CycloneDDS>",
+      interfaces, role == Role::server ? "auto" : "none", kMaxServersPerMachine - 1, peers,
+      threads_section(options.receive_fifo));
+}
+
+bool can_use_fifo(int priority) {
+  auto thread = Thread::start("fifo-probe", {.fifo = priority}, [] {});
+  return thread.has_value();
+}
+
+Result<std::shared_ptr<Entity>> open_domain(Role role, const DomainOptions& options) {
+  const auto configuration = domain_configuration(role, options);
+  if (!configuration) return std::unexpected(configuration.error());
+  static std::map<std::uint32_t, std::weak_ptr<Entity>> domains;
+  const std::lock_guard lock(registry_mutex());
+  if (auto known = domains[options.domain].lock()) return known;
+  auto made = check_entity(
+      dds_create_domain(options.domain, configuration->c_str()),
+      fmt::format("make DDS domain {} on interface {}", options.domain, fmt::join(options.interfaces, ", ")));
+  if (!made) return std::unexpected(made.error());
+  auto domain = std::make_shared<Entity>(std::move(*made));
+  domains[options.domain] = domain;
+  return domain;
+}
+
+Result<int> tie_sockets_to_loopback() {
+  int tied = 0;
+  std::error_code error;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd", error)) {
+    const std::string name = entry.path().filename();
+    int fd = -1;
+    std::from_chars(name.data(), name.data() + name.size(), fd);
+    int type = 0;
+    int family = 0;
+    socklen_t size = sizeof type;
+    if (::getsockopt(fd, SOL_SOCKET, SO_TYPE, &type, &size) != 0 || type != SOCK_DGRAM) continue;
+    size = sizeof family;
+    if (::getsockopt(fd, SOL_SOCKET, SO_DOMAIN, &family, &size) != 0) continue;
+    if (family != AF_INET && family != AF_INET6) continue;
+    constexpr std::string_view kLoopback = "lo";
+    if (::setsockopt(fd, SOL_SOCKET, SO_BINDTODEVICE, kLoopback.data(), kLoopback.size()) != 0) {
+      return failure(ErrorCode::system, "tie a UDP socket to lo", errno);
+    }
+    ++tied;
+  }
+  if (error) return failure(ErrorCode::system, "read /proc/self/fd", error.value());
+  return tied;
+}
+
+}  // namespace plchost::dds

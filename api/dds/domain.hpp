@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "api/dds/entity.hpp"
+#include "shm/base/result.hpp"
+
+namespace plchost::dds {
+
+/// Domains have UDP ports of their own: 7400 + 250 x domain must stay below 65536.
+inline constexpr std::uint32_t kMaxDomain = 230;
+
+/// How many servers may live in one domain on one machine. Each takes the first free one of these port pairs;
+/// clients have no fixed port and look at all of them, so that any number of clients can come.
+inline constexpr int kMaxServersPerMachine = 16;
+
+enum class Role : std::uint8_t { server, client };
+
+struct DomainOptions {
+  std::uint32_t domain = 0;
+  std::vector<std::string> interfaces{"lo"};  ///< network interfaces; no multicast on any
+  std::vector<std::string> peers;             ///< where servers are looked for; empty for clients: 127.0.0.1
+  /// SCHED_FIFO priority of the threads that receive, 0: SCHED_OTHER. Only if can_use_fifo() said yes:
+  /// Cyclone aborts the process when it may not.
+  int receive_fifo = 0;
+};
+
+/// The configuration as Cyclone wants it. Every value in it that is not a default was measured.
+[[nodiscard]] Result<std::string> domain_configuration(Role role, const DomainOptions& options);
+
+/// Whether this process may make a SCHED_FIFO thread of that priority: tried, not guessed.
+[[nodiscard]] bool can_use_fifo(int priority);
+
+/// A domain of this process, and with it its configuration. One process can have a domain once: who asks for
+/// one that is there already gets that one, as it is configured. Thread-safe.
+[[nodiscard]] Result<std::shared_ptr<Entity>> open_domain(Role role, const DomainOptions& options);
+
+/// Ties all UDP sockets of this process to the loopback device. Cyclone binds its receive sockets to any
+/// address even when it is told to use "lo" only, and parses what arrives; with this the kernel drops it.
+/// After the participant is made. Returns how many sockets were tied.
+[[nodiscard]] Result<int> tie_sockets_to_loopback();
+
+}  // namespace plchost::dds

@@ -1,0 +1,35 @@
+#include "api/dds/guid.hpp"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+namespace plchost::dds {
+
+Guid Guid::participant() const noexcept {
+  constexpr std::array<std::uint8_t, 4> kParticipantEntity{0x00, 0x00, 0x01, 0xc1};
+  Guid result = *this;
+  std::ranges::copy(kParticipantEntity, result.bytes.begin() + 12);
+  return result;
+}
+
+std::string Guid::hex() const {
+  return fmt::format("{:02x}", fmt::join(bytes, ""));
+}
+
+Guid guid_of(dds_entity_t entity) noexcept {
+  dds_guid_t raw{};
+  if (dds_get_guid(entity, &raw) != DDS_RETCODE_OK) return {};
+  return Guid::from(raw.v);
+}
+
+Guid writer_of(dds_entity_t reader, const dds_sample_info_t& info) noexcept {
+  dds_builtintopic_endpoint_t* const endpoint =
+      dds_get_matched_publication_data(reader, info.publication_handle);
+  if (endpoint == nullptr) return {};
+  const Guid guid = Guid::from(endpoint->key.v);
+  dds_builtintopic_free_endpoint(endpoint);
+  return guid;
+}
+
+}  // namespace plchost::dds

@@ -1,0 +1,48 @@
+#include "api/dds/qos.hpp"
+
+namespace plchost::dds {
+
+Qos& Qos::reliable(Duration max_blocking) {
+  dds_qset_reliability(qos_.get(), DDS_RELIABILITY_RELIABLE, max_blocking.count());
+  return *this;
+}
+
+Qos& Qos::keep_last(std::int32_t depth) {
+  dds_qset_history(qos_.get(), DDS_HISTORY_KEEP_LAST, depth);
+  // What a transient-local writer keeps for late readers is a bound of its own.
+  dds_qset_durability_service(qos_.get(), 0, DDS_HISTORY_KEEP_LAST, depth, DDS_LENGTH_UNLIMITED,
+                              DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
+  return *this;
+}
+
+Qos& Qos::keep_all() {
+  dds_qset_history(qos_.get(), DDS_HISTORY_KEEP_ALL, 0);
+  return *this;
+}
+
+Qos& Qos::transient_local() {
+  dds_qset_durability(qos_.get(), DDS_DURABILITY_TRANSIENT_LOCAL);
+  return *this;
+}
+
+Qos& Qos::max_samples(std::int32_t samples) {
+  dds_qset_resource_limits(qos_.get(), samples, DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
+  return *this;
+}
+
+Qos& Qos::deadline(Duration period) {
+  dds_qset_deadline(qos_.get(), period.count());
+  return *this;
+}
+
+Qos& Qos::partition(const std::string& name) {
+  dds_qset_partition1(qos_.get(), name.c_str());
+  return *this;
+}
+
+Qos& Qos::no_autodispose() {
+  dds_qset_writer_data_lifecycle(qos_.get(), false);
+  return *this;
+}
+
+}  // namespace plchost::dds

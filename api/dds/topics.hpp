@@ -1,0 +1,65 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include <control.h>
+
+#include "api/dds/entity.hpp"
+#include "api/dds/qos.hpp"
+#include "shm/base/result.hpp"
+
+namespace plchost::dds {
+
+inline constexpr std::uint32_t kApiVersion = 1;
+
+/// A topic of control.idl: its name and its type.
+struct TopicInfo {
+  const char* name;
+  const dds_topic_descriptor_t* type;
+};
+
+inline const TopicInfo kOperatorRequest{"plc/v1/op/request", &plc_Request_desc};
+inline const TopicInfo kEngineerRequest{"plc/v1/eng/request", &plc_Request_desc};
+inline const TopicInfo kReply{"plc/v1/reply", &plc_Reply_desc};
+inline const TopicInfo kEvent{"plc/v1/event", &plc_EventPost_desc};
+inline const TopicInfo kEventAck{"plc/v1/event_ack", &plc_EventAck_desc};
+inline const TopicInfo kPresence{"plc/v1/presence", &plc_Presence_desc};
+inline const TopicInfo kHostStatus{"plc/v1/status/host", &plc_HostStatus_desc};
+inline const TopicInfo kInstanceStatus{"plc/v1/status/instance", &plc_InstanceStatus_desc};
+inline const TopicInfo kTaskStatus{"plc/v1/status/task", &plc_TaskStatus_desc};
+inline const TopicInfo kEventStatus{"plc/v1/status/event", &plc_EventStatus_desc};
+inline const TopicInfo kObjectStatus{"plc/v1/status/object", &plc_ObjectStatus_desc};
+
+/// The bounds of the readers and histories. A reader that is full makes the writer wait: back-pressure, no
+/// loss.
+inline constexpr std::int32_t kRequestReaderDepth = 256;
+inline constexpr std::int32_t kEventReaderDepth = 4096;
+inline constexpr std::int32_t kReplyDepth = 16;
+/// No writer of the server waits longer.
+inline constexpr Duration kServerBlocking = std::chrono::milliseconds(1);
+inline constexpr Duration kRequestBlocking = std::chrono::milliseconds(100);
+inline constexpr Duration kEventBlocking = std::chrono::milliseconds(20);
+inline constexpr Duration kPresencePeriod = std::chrono::milliseconds(25);
+inline constexpr Duration kPresenceDeadline = std::chrono::milliseconds(100);
+
+[[nodiscard]] Qos request_qos();
+[[nodiscard]] Qos event_qos();
+[[nodiscard]] Qos reply_qos();
+[[nodiscard]] Qos ack_qos();
+[[nodiscard]] Qos status_qos();
+[[nodiscard]] Qos presence_qos();
+
+/// Where requests and posts for one host go, and where replies for one client (its participant's GUID in hex)
+/// go.
+[[nodiscard]] std::string host_partition(std::string_view host);
+[[nodiscard]] std::string client_partition(std::string_view guid_hex);
+
+[[nodiscard]] Result<Entity> make_topic(dds_entity_t participant, const TopicInfo& topic);
+/// `parent`: a participant, or a publisher or subscriber that carries the partition.
+[[nodiscard]] Result<Entity> make_writer(dds_entity_t parent, dds_entity_t topic, const Qos& qos);
+[[nodiscard]] Result<Entity> make_reader(dds_entity_t parent, dds_entity_t topic, const Qos& qos);
+[[nodiscard]] Result<Entity> make_publisher(dds_entity_t participant, const std::string& partition);
+[[nodiscard]] Result<Entity> make_subscriber(dds_entity_t participant, const std::string& partition);
+
+}  // namespace plchost::dds

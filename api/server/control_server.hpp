@@ -1,0 +1,41 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include <control.h>
+
+#include "api/dds/domain.hpp"
+#include "shm/base/result.hpp"
+
+namespace plchost {
+
+/// What plchost-dds is told on its command line.
+struct ServerOptions {
+  std::string host;
+  std::string pool;
+  std::string run_directory;
+  dds::DomainOptions dds{};
+};
+
+/// The server's end of the DDS API. Posts are done in DDS's receiving thread (on_event_post); everything else
+/// in one loop: requests, the manager's answers, acknowledgements, status, presence.
+class ControlServer {
+ public:
+  /// Attaches the pool, reaches the manager and enters the domain.
+  [[nodiscard]] static Result<std::unique_ptr<ControlServer>> create(ServerOptions options);
+  ControlServer(const ControlServer&) = delete;
+  ControlServer& operator=(const ControlServer&) = delete;
+  ~ControlServer();
+
+  /// Serves until SIGTERM or SIGINT, or until the manager is gone: all three are orderly ends.
+  [[nodiscard]] Result<void> run();
+
+ private:
+  struct Parts;
+  explicit ControlServer(std::unique_ptr<Parts> parts) noexcept;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace plchost

@@ -1,0 +1,50 @@
+#include <csignal>
+#include <string>
+
+#include <CLI/CLI.hpp>
+
+#include "api/server/control_server.hpp"
+#include "shm/base/log.hpp"
+
+namespace {
+
+// Above soft threads, far below every task.
+constexpr int kReceiveFifo = 20;
+constexpr int kExitFailed = 1;
+constexpr int kExitUsage = 2;
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  plchost::ServerOptions options;
+  options.pool = "plchost";
+  std::string log_level = "info";
+  CLI::App app("plchost-dds: the DDS server of plchost, started by plchostd");
+  app.add_option("--host", options.host, "name of this host in the DDS domain")->required();
+  app.add_option("--domain", options.dds.domain, "DDS domain")
+      ->check(CLI::Range(0U, plchost::dds::kMaxDomain));
+  app.add_option("--pool", options.pool, "name of the object pool");
+  app.add_option("--run-directory", options.run_directory, "where the manager's socket is")->required();
+  app.add_option("--interface", options.dds.interfaces, "network interfaces (default: lo)");
+  app.add_option("--peer", options.dds.peers, "addresses to announce this host to");
+  app.add_option("--log-level", log_level, "trace, debug, info, warning or error")
+      ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error"}));
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : kExitUsage;
+  }
+  plchost::start_log("plchost-dds", log_level);
+  (void)std::signal(SIGPIPE, SIG_IGN);
+  options.dds.receive_fifo = plchost::dds::can_use_fifo(kReceiveFifo) ? kReceiveFifo : 0;
+  const auto server = plchost::ControlServer::create(std::move(options));
+  if (!server) {
+    spdlog::error("{}", server.error().describe());
+    return kExitFailed;
+  }
+  if (const auto done = (*server)->run(); !done) {
+    spdlog::error("{}", done.error().describe());
+    return kExitFailed;
+  }
+  return 0;
+}

@@ -1,0 +1,70 @@
+#include "api/server/manager_link.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace plchost {
+
+bool same_identity(const plc_SampleIdentity& a, const plc_SampleIdentity& b) noexcept {
+  return a.sequence_number == b.sequence_number && std::ranges::equal(a.writer_guid, b.writer_guid);
+}
+
+Result<ManagerLink> ManagerLink::connect(const std::string& run_directory) {
+  auto socket = PacketSocket::connect(run_directory + "/manager.sock");
+  if (!socket) return failure_in("reach the manager", socket.error());
+  return ManagerLink(std::move(*socket));
+}
+
+Result<void> ManagerLink::send(ControlRequest request, PendingCommand command) {
+  const auto of_client = std::ranges::count_if(
+      pending_, [&](const auto& entry) { return entry.second.client == command.client; });
+  if (pending_.size() >= kMaxPending || static_cast<std::size_t>(of_client) >= kMaxPendingOfClient) {
+    return failure(ErrorCode::busy,
+                   fmt::format("{} commands are under way ({} of this client); at most {} ({})",
+                               pending_.size(), of_client, kMaxPending, kMaxPendingOfClient));
+  }
+  request.number = next_number_++;
+  if (auto sent = socket_.send(encode(request)); !sent)
+    return failure_in("pass to the manager", sent.error());
+  pending_.emplace(request.number, std::move(command));
+  return {};
+}
+
+bool ManagerLink::is_pending(const plc_SampleIdentity& identity) const {
+  return std::ranges::any_of(
+      pending_, [&](const auto& entry) { return same_identity(entry.second.identity, identity); });
+}
+
+Result<std::vector<FinishedCommand>> ManagerLink::receive() {
+  std::vector<FinishedCommand> finished;
+  for (;;) {
+    auto packet = socket_.receive();
+    if (!packet) return std::unexpected(packet.error());
+    if (!*packet) return finished;
+    auto reply = decode_reply(**packet);
+    if (!reply) return std::unexpected(reply.error());
+    const auto found = pending_.find(reply->number);
+    if (found == pending_.end()) continue;  // came after its time limit
+    finished.push_back({std::move(found->second), reply->code, std::move(reply->text)});
+    pending_.erase(found);
+  }
+}
+
+std::vector<FinishedCommand> ManagerLink::expire(TimePoint now) {
+  std::vector<FinishedCommand> late;
+  for (auto it = pending_.begin(); it != pending_.end();) {
+    if (it->second.deadline > now) {
+      ++it;
+      continue;
+    }
+    late.push_back({std::move(it->second), ErrorCode::timed_out,
+                    fmt::format("the manager has not answered within {} s",
+                                std::chrono::duration_cast<std::chrono::seconds>(kCommandLimit).count())});
+    it = pending_.erase(it);
+  }
+  return late;
+}
+
+}  // namespace plchost

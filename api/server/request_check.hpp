@@ -1,0 +1,26 @@
+#pragma once
+
+#include <span>
+#include <string_view>
+
+#include <control.h>
+
+#include "shm/base/control_message.hpp"
+
+namespace plchost {
+
+/// What a client may ask is decided by the topic that it could write to.
+enum class ApiRole : std::uint8_t { operating, engineering };
+
+/// A request as it came from the network, turned into the manager's. `number` is left 0. Every error names
+/// what was wrong and, where there is a list, what is allowed. not_found: another host, or no such instance;
+/// unsupported: unknown operation; refused: not in this role; invalid_argument: a name or argument that
+/// cannot be.
+[[nodiscard]] Result<ControlRequest> check_request(const plc_Request& request, ApiRole role,
+                                                   std::string_view host,
+                                                   std::span<const std::string_view> instances);
+
+/// DDS-RPC's own code for the reply's header.
+[[nodiscard]] std::int32_t remote_exception(ErrorCode code) noexcept;
+
+}  // namespace plchost

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <unordered_map>
+#include <unordered_set>
+#include <vector>
+
+#include <control.h>
+
+#include "api/dds/entity.hpp"
+#include "api/dds/guid.hpp"
+#include "shm/base/result.hpp"
+
+namespace plchost {
+
+/// The clients that were heard of, each with writers of its own in its own partition, so that one that does
+/// not read holds up nobody else, and with the answers it got, so that a repeated request is not done twice.
+/// Control loop only.
+class SessionTable {
+ public:
+  static constexpr std::size_t kMaxSessions = 256;
+  /// As many answers are remembered for each client.
+  static constexpr std::size_t kRemembered = 32;
+
+  [[nodiscard]] static Result<SessionTable> create(dds_entity_t participant);
+
+  /// Follows which clients came (their reply or acknowledgement reader was discovered) and went.
+  void follow_discovery();
+
+  /// `client` is a participant. Answers without a session, because the table is full, are dropped and
+  /// counted.
+  void write_reply(const dds::Guid& client, const plc_Reply& reply);
+  void write_ack(const dds::Guid& client, const plc_EventAck& ack);
+  [[nodiscard]] std::optional<plc_Reply> remembered(const dds::Guid& client,
+                                                    const plc_SampleIdentity& identity) const;
+
+  [[nodiscard]] std::size_t size() const noexcept { return sessions_.size(); }
+  [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }
+  /// The readers that follow_discovery() looks at, to be listened to.
+  [[nodiscard]] std::vector<dds_entity_t> discovery_readers() const;
+
+ private:
+  struct Session {
+    dds::Entity publisher;
+    dds::Entity reply_writer;
+    dds::Entity ack_writer;
+    std::deque<plc_Reply> answers;
+  };
+
+  SessionTable() = default;
+  void follow_participants();
+  void follow_readers();
+  /// Made if it is not there. None for a client that is not (or no longer) in the domain.
+  [[nodiscard]] Session* session_of(const dds::Guid& client);
+  [[nodiscard]] Result<Session> make_session(const dds::Guid& client) const;
+
+  dds_entity_t participant_ = 0;
+  dds::Entity reply_topic_;
+  dds::Entity ack_topic_;
+  dds::Entity participants_;
+  dds::Entity subscriptions_;
+  std::unordered_set<dds::Guid, dds::GuidHash> alive_;
+  std::unordered_map<dds::Guid, Session, dds::GuidHash> sessions_;
+  std::uint64_t dropped_ = 0;
+};
+
+}  // namespace plchost

@@ -1,0 +1,163 @@
+#include "api/server/status_publisher.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include <unistd.h>
+
+#include "api/dds/text.hpp"
+
+namespace plchost {
+
+Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const Source& source) {
+  std::vector<dds::Entity> topics;
+  const auto make = [&](const dds::TopicInfo& info, const dds::Qos& qos) -> Result<dds::Entity> {
+    auto topic = dds::make_topic(participant, info);
+    if (!topic) return std::unexpected(topic.error());
+    topics.push_back(std::move(*topic));
+    return dds::make_writer(participant, topics.back().get(), qos);
+  };
+  auto tasks = make(dds::kTaskStatus, dds::status_qos());
+  auto instances = make(dds::kInstanceStatus, dds::status_qos());
+  auto events = make(dds::kEventStatus, dds::status_qos());
+  auto objects = make(dds::kObjectStatus, dds::status_qos());
+  auto hosts = make(dds::kHostStatus, dds::status_qos());
+  auto presence = make(dds::kPresence, dds::presence_qos());
+  for (auto* made : {&tasks, &instances, &events, &objects, &hosts, &presence}) {
+    if (!*made) return failure_in("publish status", made->error());
+  }
+  StatusPublisher publisher(source, TaskWatch(source.pool->name(), source.host, source.epoch,
+                                              StatusTable<plc_TaskStatus>(std::move(*tasks))));
+  publisher.instances_ = StatusTable<plc_InstanceStatus>(std::move(*instances));
+  publisher.events_ = StatusTable<plc_EventStatus>(std::move(*events));
+  publisher.objects_ = StatusTable<plc_ObjectStatus>(std::move(*objects));
+  publisher.hosts_ = StatusTable<plc_HostStatus>(std::move(*hosts));
+  publisher.presence_ = std::move(*presence);
+  publisher.topics_ = std::move(topics);
+  return publisher;
+}
+
+void StatusPublisher::tick(TimePoint now) {
+  bool changed = look_at_instances(now);
+  if (now >= next_objects_) changed |= look_at_objects(now);
+  tasks_.look(now);
+  write_host(changed);
+}
+
+void StatusPublisher::flush(const std::string& instance, TimePoint now) {
+  bool changed = look_at_instances(now);
+  changed |= look_at_objects(now);
+  tasks_.look_at(instance, now);
+  write_host(changed);
+}
+
+bool StatusPublisher::look_at_instances(TimePoint now) {
+  if (!page_) {
+    auto opened = HostPageReader::open(source_.pool->name());
+    if (!opened) return false;
+    page_ = std::move(*opened);
+  }
+  const auto host = page_->host();
+  if (!host) return false;
+  bool changed = false;
+  instances_.begin_round();
+  std::vector<std::string> names;
+  for (std::uint32_t i = 0; i < std::min(host->instance_count, kMaxInstances); ++i) {
+    const auto status = page_->instance(i);
+    if (!status || status->name.view().empty()) continue;
+    const std::string name(status->name.view());
+    names.push_back(name);
+    changed |= tasks_.follow(*status, now);
+    plc_InstanceStatus sample{};
+    dds::copy_text(sample.host, source_.host);
+    dds::copy_text(sample.instance, name);
+    sample.epoch = source_.epoch;
+    sample.state = static_cast<std::uint32_t>(status->state);
+    sample.pid = status->pid;
+    sample.core = status->core;
+    sample.restarts = status->restarts;
+    sample.state_since_unix_ns = status->state_since_unix_ns;
+    // The process knows best what it runs; the manager knows what it will run.
+    const auto runtime = tasks_.runtime(name);
+    const bool says = runtime && !runtime->scheduler.view().empty();
+    dds::copy_text(sample.scheduler, says ? runtime->scheduler.view() : status->scheduler.view());
+    dds::copy_text(sample.application, status->application.view());
+    dds::copy_text(sample.problem, status->problem.view());
+    changed |= instances_.update(name, sample);
+  }
+  changed |= instances_.dispose_rest();
+  for (const std::string& gone : instance_names_) {
+    if (std::ranges::find(names, gone) == names.end()) changed |= tasks_.forget(gone);
+  }
+  instance_names_ = std::move(names);
+  instances_.write();
+  return changed;
+}
+
+bool StatusPublisher::look_at_objects(TimePoint now) {
+  next_objects_ = now + kObjectPeriod;
+  bool changed = false;
+  events_.begin_round();
+  objects_.begin_round();
+  for (const ObjectInfo& object : source_.pool->list()) {
+    plc_ObjectStatus sample{};
+    dds::copy_text(sample.host, source_.host);
+    dds::copy_text(sample.object_name, object.name);
+    sample.epoch = source_.epoch;
+    sample.type = static_cast<std::uint32_t>(object.type);
+    sample.value = object.value;
+    changed |= objects_.update(object.name, sample);
+    if (object.type == ObjectType::event) changed |= update_event(object);
+  }
+  changed |= events_.dispose_rest();
+  changed |= objects_.dispose_rest();
+  events_.write();
+  objects_.write();
+  return changed;
+}
+
+bool StatusPublisher::update_event(const ObjectInfo& object) {
+  const auto slash = object.name.find('/');
+  if (slash == std::string::npos) return false;
+  const std::string_view name(object.name);
+  plc_EventStatus sample{};
+  dds::copy_text(sample.host, source_.host);
+  dds::copy_text(sample.instance, name.substr(0, slash));
+  dds::copy_text(sample.event, name.substr(slash + 1));
+  sample.epoch = source_.epoch;
+  sample.registered = object.registered;
+  sample.bound_tasks = object.bound_tasks;
+  sample.posts = object.value;
+  return events_.update(object.name, sample);
+}
+
+void StatusPublisher::write_host(bool changed) {
+  const auto host = page_ ? page_->host() : std::nullopt;
+  if (changed || round_ == 0) ++round_;
+  plc_HostStatus sample{};
+  dds::copy_text(sample.host, source_.host);
+  sample.epoch = source_.epoch;
+  sample.round = round_;
+  sample.instance_count = instances_.size();
+  sample.task_count = tasks_.size();
+  sample.event_count = events_.size();
+  sample.object_count = objects_.size();
+  if (host) {
+    dds::copy_text(sample.version, host->version.view());
+    sample.manager_pid = host->manager_pid;
+    sample.started_unix_ns = host->started_unix_ns;
+  }
+  (void)hosts_.update(source_.host, sample);
+  hosts_.write();
+}
+
+void StatusPublisher::write_presence() {
+  plc_Presence sample{};
+  dds::copy_text(sample.host, source_.host);
+  sample.epoch = source_.epoch;
+  sample.pid = ::getpid();
+  sample.api_version = dds::kApiVersion;
+  (void)dds_write(presence_.get(), &sample);
+}
+
+}  // namespace plchost

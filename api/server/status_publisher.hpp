@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <control.h>
+
+#include "api/dds/topics.hpp"
+#include "api/server/status_table.hpp"
+#include "api/server/task_watch.hpp"
+#include "shm/pool/host_page.hpp"
+#include "shm/pool/object_pool.hpp"
+
+namespace plchost {
+
+/// Shows the pool's pages as status topics: written when something changed, disposed when it is gone.
+/// Control loop only.
+class StatusPublisher {
+ public:
+  struct Source {
+    std::string host;
+    const ObjectPool* pool = nullptr;
+    std::uint64_t epoch = 0;
+  };
+  [[nodiscard]] static Result<StatusPublisher> create(dds_entity_t participant, const Source& source);
+
+  /// Writes what is due; to be called every kTick.
+  void tick(TimePoint now);
+  /// Writes all that concerns an instance at once: before the answer to a command that changed it.
+  void flush(const std::string& instance, TimePoint now);
+  void write_presence();
+
+  /// HostStatus.round as last written.
+  [[nodiscard]] std::uint64_t round() const noexcept { return round_; }
+  /// The instances that the manager has at present.
+  [[nodiscard]] const std::vector<std::string>& instances() const noexcept { return instance_names_; }
+
+  static constexpr Duration kTick = std::chrono::milliseconds(10);
+  /// Events and objects are looked at so often.
+  static constexpr Duration kObjectPeriod = std::chrono::milliseconds(200);
+
+ private:
+  StatusPublisher(Source source, TaskWatch tasks) : source_(std::move(source)), tasks_(std::move(tasks)) {}
+  bool look_at_instances(TimePoint now);
+  bool look_at_objects(TimePoint now);
+  bool update_event(const ObjectInfo& object);
+  void write_host(bool changed);
+
+  Source source_;
+  TaskWatch tasks_;
+  std::optional<HostPageReader> page_;
+  std::vector<std::string> instance_names_;
+  StatusTable<plc_InstanceStatus> instances_;
+  StatusTable<plc_EventStatus> events_;
+  StatusTable<plc_ObjectStatus> objects_;
+  StatusTable<plc_HostStatus> hosts_;
+  dds::Entity presence_;
+  std::vector<dds::Entity> topics_;
+  TimePoint next_objects_{};
+  std::uint64_t round_ = 0;
+};
+
+}  // namespace plchost

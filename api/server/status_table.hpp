@@ -1,0 +1,89 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <map>
+#include <string>
+#include <type_traits>
+
+#include <dds/dds.h>
+
+#include "api/dds/entity.hpp"
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+/// What one status topic shows at present, and what of it has still to be written. Samples are compared as
+/// bytes, so they must be zero-initialised before they are filled.
+template <class Sample>
+  requires std::is_trivially_copyable_v<Sample>
+class StatusTable {
+ public:
+  StatusTable() = default;
+  explicit StatusTable(dds::Entity writer) noexcept : writer_(std::move(writer)) {}
+
+  /// Returns true if that is news.
+  bool update(const std::string& key, const Sample& sample) {
+    auto [it, added] = entries_.try_emplace(key);
+    Entry& entry = it->second;
+    entry.marked = true;
+    if (!added && std::memcmp(&entry.sample, &sample, sizeof sample) == 0) return false;
+    std::memcpy(&entry.sample, &sample, sizeof sample);
+    entry.unwritten = true;
+    return true;
+  }
+
+  /// A round: begin_round(), update() for all that is there, then dispose_rest() of what is not.
+  void begin_round() {
+    for (auto& [key, entry] : entries_) entry.marked = false;
+  }
+  bool dispose_rest() {
+    bool any = false;
+    for (auto it = entries_.begin(); it != entries_.end();) {
+      any |= !it->second.marked;
+      it = it->second.marked ? std::next(it) : dispose(it);
+    }
+    return any;
+  }
+  /// Disposes all whose key starts with `prefix`.
+  bool dispose_under(const std::string& prefix) {
+    bool any = false;
+    for (auto it = entries_.lower_bound(prefix); it != entries_.end() && it->first.starts_with(prefix);) {
+      it = dispose(it);
+      any = true;
+    }
+    return any;
+  }
+
+  /// Writes what is not written, at most `budget` samples. What a writer refuses stays for the next time.
+  void write(std::size_t budget = SIZE_MAX) {
+    for (auto& [key, entry] : entries_) {
+      if (!entry.unwritten) continue;
+      if (budget-- == 0) return;
+      if (dds_write(writer_.get(), &entry.sample) != DDS_RETCODE_OK) return;
+      entry.unwritten = false;
+    }
+  }
+
+  [[nodiscard]] std::uint32_t size() const noexcept { return static_cast<std::uint32_t>(entries_.size()); }
+
+ private:
+  struct Entry {
+    Sample sample{};
+    bool unwritten = true;
+    bool marked = true;
+  };
+  using Entries = std::map<std::string, Entry>;
+
+  typename Entries::iterator dispose(typename Entries::iterator it) {
+    (void)dds_dispose(writer_.get(), &it->second.sample);
+    (void)dds_unregister_instance(writer_.get(), &it->second.sample);
+    return entries_.erase(it);
+  }
+
+  dds::Entity writer_;
+  Entries entries_;
+};
+
+}  // namespace plchost

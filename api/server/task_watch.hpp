@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+
+#include <control.h>
+
+#include "api/server/status_table.hpp"
+#include "shm/base/time.hpp"
+#include "shm/pool/host_page.hpp"
+#include "shm/pool/instance_page.hpp"
+
+namespace plchost {
+
+/// Looks at the pages of the instances and keeps the table of tasks. Control loop only.
+class TaskWatch {
+ public:
+  /// Each task is looked at so often.
+  static constexpr Duration kPeriod = std::chrono::milliseconds(200);
+  /// How many tasks are looked at in one call of look().
+  static constexpr std::uint32_t kTasksPerLook = 256;
+
+  TaskWatch(std::string pool, std::string host, std::uint64_t epoch, StatusTable<plc_TaskStatus> table)
+      : pool_(std::move(pool)), host_(std::move(host)), epoch_(epoch), table_(std::move(table)) {}
+
+  /// What the manager says of an instance: opens its page when there is a new process, and forgets the tasks
+  /// of one that is gone. Returns true if tasks came or went.
+  bool follow(const InstanceStatus& instance, TimePoint now);
+  bool forget(const std::string& instance);
+
+  /// Tasks that are due.
+  void look(TimePoint now);
+  /// All tasks of one instance, at once.
+  void look_at(const std::string& instance, TimePoint now);
+
+  [[nodiscard]] std::uint32_t size() const noexcept { return table_.size(); }
+  /// What the process itself says, if its page is open.
+  [[nodiscard]] std::optional<InstanceRuntime> runtime(const std::string& instance) const;
+
+ private:
+  struct Watched {
+    std::int32_t pid = 0;
+    std::optional<InstancePageReader> page;
+    std::uint32_t next_task = 0;
+    TimePoint next_look{};  // of the page when it is not open, else of the tasks
+  };
+  bool open_page(const std::string& instance, Watched& watched);
+  void publish(const std::string& instance, const TaskSnapshot& task);
+
+  const std::string pool_;
+  const std::string host_;
+  const std::uint64_t epoch_;
+  StatusTable<plc_TaskStatus> table_;
+  std::map<std::string, Watched> instances_;
+};
+
+}  // namespace plchost
