@@ -20,7 +20,11 @@ namespace plchost {
 
 namespace {
 
+#if defined(__SANITIZE_THREAD__)
+constexpr std::size_t kStackSize = std::size_t{4} << 20;  // the sanitizer takes 1 MiB of it for itself
+#else
 constexpr std::size_t kStackSize = std::size_t{1} << 20;
+#endif
 constexpr std::size_t kPrefaulted = std::size_t{256} << 10;
 
 struct StartInfo {
