@@ -24,7 +24,7 @@ class ActivationSource {
   virtual ~ActivationSource() = default;
   /// Task thread, real-time. Nothing: interrupted; the thread looks at what it shall do next.
   [[nodiscard]] virtual std::optional<Activation> wait() noexcept = 0;
-  /// Makes wait() return nothing, the one that sleeps now or the next one. Any thread.
+  /// Makes wait() return nothing, the one that sleeps now or the next one that would sleep. Any thread.
   virtual void interrupt() noexcept = 0;
 };
 

@@ -19,12 +19,14 @@ class TimerSource final : public ActivationSource {
       timer_->start(activation.release, task_.config().interval);
       armed_ = true;
     }
-    do {
+    // A release that is over already is not waited for: the timer may have told of it together with the one
+    // before.
+    while (clock_.now() < activation.release) {
       if (timer_->wait() == 0) {
         armed_ = false;
         return std::nullopt;
       }
-    } while (clock_.now() < activation.release);
+    }
     return activation;
   }
 

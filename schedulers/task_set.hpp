@@ -40,7 +40,7 @@ class TaskSet {
   static constexpr Duration kStartLead = std::chrono::milliseconds(2);
   /// How long start() and switch_to() wait for tasks to take their new source. A task whose cycle takes
   /// longer takes it when the cycle ends.
-  static constexpr Duration kSwitchPatience = std::chrono::seconds(1);
+  static constexpr Duration kSwitchPatience = std::chrono::milliseconds(100);
 
   /// Validates all tasks (names unique, priorities 0..31, an interval where one is needed ...), makes them,
   /// and starts their threads parked. The error names the task and what is allowed.

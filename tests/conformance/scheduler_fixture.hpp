@@ -1,0 +1,142 @@
+#pragma once
+
+#include <deque>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "schedulers/task_set.hpp"
+#include "tests/support/manual_clock.hpp"
+
+namespace plchost {
+
+/// The names of all schedulers in the registry: what is promised here is promised by each.
+inline std::vector<std::string_view> every_scheduler() {
+  std::vector<std::string_view> names;
+  for (const SchedulerEntry& entry : all_schedulers()) names.push_back(entry.name);
+  return names;
+}
+
+inline std::string scheduler_test_name(const testing::TestParamInfo<std::string_view>& tested) {
+  return std::string(tested.param);
+}
+
+/// A set of tasks on a clock `Time`, with their statistics and the external events that they name.
+template <class Time>
+class Tasks {
+ public:
+  /// A task that is still to be filled in; add() takes it.
+  static TaskConfig cyclic(std::string name, Duration interval, std::function<void()> entry) {
+    TaskConfig config;
+    config.name = std::move(name);
+    config.interval = interval;
+    config.entry = std::move(entry);
+    return config;
+  }
+  static TaskConfig external(std::string name, std::string event, std::function<void()> entry) {
+    TaskConfig config;
+    config.name = std::move(name);
+    config.kind = TaskKind::external;
+    config.external_event = std::move(event);
+    config.entry = std::move(entry);
+    return config;
+  }
+  static TaskConfig event(std::string name, std::function<bool()> variable, std::function<void()> entry) {
+    TaskConfig config;
+    config.name = std::move(name);
+    config.kind = TaskKind::event;
+    config.event_variable = std::move(variable);
+    config.entry = std::move(entry);
+    return config;
+  }
+  static TaskConfig freewheeling(std::string name, std::function<void()> entry) {
+    TaskConfig config;
+    config.name = std::move(name);
+    config.kind = TaskKind::freewheeling;
+    config.entry = std::move(entry);
+    return config;
+  }
+
+  void add(TaskConfig config) { configs_.push_back(std::move(config)); }
+
+  Result<void> create() {
+    auto made = TaskSet::create(clock, PriorityBand::normal, std::move(configs_), environment());
+    if (!made) return std::unexpected(made.error());
+    set = std::move(*made);
+    return {};
+  }
+
+  /// The event of that name, made when it is first asked for, by a task or by who posts.
+  CountedEvent& event_named(std::string_view name) {
+    for (auto& [known, event] : events_) {
+      if (known == name) return event;
+    }
+    return events_.emplace_back(std::piecewise_construct, std::tuple(name), std::tuple()).second;
+  }
+
+  [[nodiscard]] TaskCounters counters(std::size_t task) const {
+    return statistics_[task].counters.read(1'000'000).value();
+  }
+
+  /// Waits for cycles that no clock tells of. The number is exact if nothing more is to come.
+  void wait_for_cycles(std::size_t task, std::uint64_t cycles) const {
+    while (counters(task).cycles < cycles) std::this_thread::sleep_for(std::chrono::microseconds(50));
+  }
+
+  Time clock;
+  bool unprivileged = true;
+  std::unique_ptr<TaskSet> set;
+
+ private:
+  TaskEnvironment environment() {
+    TaskEnvironment environment;
+    environment.find_event = [this](std::string_view name) -> Result<CountedEvent*> {
+      return &event_named(name);
+    };
+    environment.statistics = [this](std::size_t index) -> TaskStatistics& {
+      while (statistics_.size() <= index) statistics_.emplace_back();
+      return statistics_[index];
+    };
+    environment.allow_unprivileged = unprivileged;
+    return environment;
+  }
+
+  std::vector<TaskConfig> configs_;
+  std::deque<TaskStatistics> statistics_;
+  std::deque<std::pair<std::string, CountedEvent>> events_;
+};
+
+/// Tasks on a clock that the test moves.
+class ManualTasks : public Tasks<ManualClock> {
+ public:
+  ~ManualTasks() {
+    // Every cycle that is under way comes to its end, as long as somebody moves the clock.
+    if (set && set->running()) (void)set->stop(Duration::zero());
+    clock.run_for(std::chrono::seconds(100));
+  }
+
+  /// Starts them; the origin of their grids.
+  TimePoint start(std::string_view scheduler, const SchedulerSettings& settings = {}) {
+    const auto started = set->start(scheduler, settings);
+    EXPECT_TRUE(started) << started.error().describe();
+    return clock.now() + TaskSet::kStartLead;
+  }
+};
+
+/// When the cycles of one task began. Read only while all threads sleep.
+using Starts = std::vector<TimePoint>;
+
+/// `count` points of a grid.
+inline Starts grid(TimePoint origin, Duration interval, int count) {
+  Starts points;
+  for (int i = 0; i < count; ++i) points.push_back(origin + i * interval);
+  return points;
+}
+
+}  // namespace plchost
