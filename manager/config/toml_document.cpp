@@ -5,8 +5,6 @@
 #include <utility>
 
 #include <fmt/format.h>
-
-#define TOML_EXCEPTIONS 0
 #include <toml++/toml.h>
 
 namespace plchost {
@@ -66,12 +64,11 @@ std::string TomlValue::shown() const {
 }
 
 std::expected<TomlTable, ConfigProblem> parse_toml(std::string_view text) {
-  auto parsed = toml::parse(text);
-  if (!parsed) {
-    return std::unexpected(
-        ConfigProblem{parsed.error().source().begin.line, std::string(parsed.error().description())});
+  try {
+    return convert_table(toml::parse(text));
+  } catch (const toml::parse_error& error) {  // the library is built to say it so
+    return std::unexpected(ConfigProblem{error.source().begin.line, std::string(error.description())});
   }
-  return convert_table(parsed.table());
 }
 
 }  // namespace plchost

@@ -129,35 +129,47 @@ INSTANTIATE_TEST_SUITE_P(
     Host, ConfigRefuses,
     testing::Values(
         WrongConfig{"syntax", "[host]\nname = \n", "2", ""},
-        WrongConfig{"section", "[hots]\n", "1", "unknown section or key 'hots'; allowed are [host], [dds], "
-                                                "[[instance]]; did you mean 'host'?"},
+        WrongConfig{"section", "[hots]\n", "1",
+                    "unknown section or key 'hots'; allowed are [host], [dds], "
+                    "[[instance]]; did you mean 'host'?"},
         WrongConfig{"section_type", "host = 1\n", "1", "'host' must be a section: [host]"},
         WrongConfig{"key", "[host]\nnmae = \"x\"\n", "2", "[host] unknown key 'nmae'; allowed are name, "},
         WrongConfig{"suggestion", "[host]\nnmae = \"x\"\n", "2", "did you mean 'name'?"},
-        WrongConfig{"name", "[host]\nname = \"a b\"\n", "2", "[host] name: name 'a b' is not valid: allowed are 1 to 63"},
-        WrongConfig{"name_type", "[host]\nname = 5\n", "2", "[host] name: 5 is a whole number; allowed is a text"},
-        WrongConfig{"domain", "[host]\n\ndds_domain = 233\n", "3", "dds_domain: 233 is out of range; allowed is 0 to 232"},
+        WrongConfig{"name", "[host]\nname = \"a b\"\n", "2",
+                    "[host] name: name 'a b' is not valid: allowed are 1 to 63"},
+        WrongConfig{"name_type", "[host]\nname = 5\n", "2",
+                    "[host] name: 5 is a whole number; allowed is a text"},
+        WrongConfig{"domain", "[host]\n\ndds_domain = 233\n", "3",
+                    "dds_domain: 233 is out of range; allowed is 0 to 232"},
         WrongConfig{"domain_low", "[host]\ndds_domain = -1\n", "2", "dds_domain: -1 is out of range"},
-        WrongConfig{"domain_type", "[host]\ndds_domain = \"1\"\n", "2", "allowed is a whole number from 0 to 232"},
-        WrongConfig{"run", "[host]\nrun_directory = \"run\"\n", "2", "\"run\" is not allowed; allowed is an absolute path"},
-        WrongConfig{"run_long", "[host]\nrun_directory = \"/" + std::string(70, 'x') + "\"\n", "2", "of up to 70 characters"},
+        WrongConfig{"domain_type", "[host]\ndds_domain = \"1\"\n", "2",
+                    "allowed is a whole number from 0 to 232"},
+        WrongConfig{"run", "[host]\nrun_directory = \"run\"\n", "2",
+                    "\"run\" is not allowed; allowed is an absolute path"},
+        WrongConfig{"run_long", "[host]\nrun_directory = \"/" + std::string(70, 'x') + "\"\n", "2",
+                    "of up to 70 characters"},
         WrongConfig{"pool", "[host]\npool = \"a/b\"\n", "2", "'a/b' is not valid"},
         WrongConfig{"objects", "[host]\npool_objects = 15\n", "2", "allowed is 16 to 1000000"},
         WrongConfig{"objects_high", "[host]\npool_objects = 1000001\n", "2", "allowed is 16 to 1000000"},
         WrongConfig{"cores_type", "[host]\ncores = 1\n", "2", "allowed is an array of whole numbers"},
-        WrongConfig{"cores_element", "[host]\ncores = [\"1\"]\n", "2", "allowed is an array of whole numbers"},
-        WrongConfig{"cores_offline", "[host]\ncores = [9]\n", "2", "core 9 is not online; online are 0, 1, 2, 3"},
+        WrongConfig{"cores_element", "[host]\ncores = [\"1\"]\n", "2",
+                    "allowed is an array of whole numbers"},
+        WrongConfig{"cores_offline", "[host]\ncores = [9]\n", "2",
+                    "core 9 is not online; online are 0, 1, 2, 3"},
         WrongConfig{"cores_empty", "[host]\ncores = []\n", "2", "is empty; online are 0, 1, 2, 3"},
-        WrongConfig{"house", "[host]\nhousekeeping_cores = [8]\n", "2", "housekeeping_cores: core 8 is not online"},
-        WrongConfig{"level", "[host]\nlog_level = \"inof\"\n", "2",
-                    "\"inof\" is not known; allowed are trace, debug, info, warning, error; did you mean 'info'?"},
+        WrongConfig{"house", "[host]\nhousekeeping_cores = [8]\n", "2",
+                    "housekeeping_cores: core 8 is not online"},
+        WrongConfig{
+            "level", "[host]\nlog_level = \"inof\"\n", "2",
+            "\"inof\" is not known; allowed are trace, debug, info, warning, error; did you mean 'info'?"},
         WrongConfig{"keep", "[host]\nkeep_pool = 1\n", "2", "1 is a whole number; allowed is true or false"},
         WrongConfig{"date", "[host]\nname = 1979-05-27\n", "2", "is a date or time; allowed is a text"},
-        WrongConfig{"dds_key", "[dds]\nport = 1\n", "2", "[dds] unknown key 'port'; allowed are enabled, interface, peers"},
+        WrongConfig{"dds_key", "[dds]\nport = 1\n", "2",
+                    "[dds] unknown key 'port'; allowed are enabled, interface, peers"},
         WrongConfig{"interface", "[dds]\ninterface = \"\"\n", "2", "interface '' is not valid"},
         WrongConfig{"peers", "[dds]\npeers = [\"-x\"]\n", "2", "\"-x\" is not an address"},
         WrongConfig{"peers_type", "[dds]\npeers = [1]\n", "2", "allowed is an array of texts"}),
-    [](const auto& info) { return info.param.name; });
+    [](const auto& test) { return test.param.name; });
 
 INSTANTIATE_TEST_SUITE_P(
     Instance, ConfigRefuses,
@@ -169,15 +181,20 @@ INSTANTIATE_TEST_SUITE_P(
         WrongConfig{"name_long", instance("", std::string(32, 'n')), "2", "allowed are 1 to 31"},
         WrongConfig{"name_taken", instance("", "manager"), "2", "'manager' is taken"},
         WrongConfig{"twice", instance("") + instance("", "a", 2), "6", "name: is taken already in line 2"},
-        WrongConfig{"offline", instance("", "a", 4), "3", "core: core 4 is not online; online are 0, 1, 2, 3"},
-        WrongConfig{"not_allowed", "[host]\ncores = [0]\n" + instance(""), "5", "core 1 is not allowed; [host] cores allows 0"},
-        WrongConfig{"scheduler", instance("scheduler = \"CmpSchedul\""), "4",
-                    "\"CmpSchedul\" is not known; allowed are CmpSchedule, CmpScheduleTimer, CmpScheduleOneShot; did "
-                    "you mean 'CmpSchedule'?"},
+        WrongConfig{"offline", instance("", "a", 4), "3",
+                    "core: core 4 is not online; online are 0, 1, 2, 3"},
+        WrongConfig{"not_allowed", "[host]\ncores = [0]\n" + instance(""), "5",
+                    "core 1 is not allowed; [host] cores allows 0"},
+        WrongConfig{
+            "scheduler", instance("scheduler = \"CmpSchedul\""), "4",
+            "\"CmpSchedul\" is not known; allowed are CmpSchedule, CmpScheduleTimer, CmpScheduleOneShot; did "
+            "you mean 'CmpSchedule'?"},
         WrongConfig{"band", instance("priority_band = \"top\""), "4", "allowed are high, normal, low"},
         WrongConfig{"settings", instance("settings = \"\""), "4", "settings: is no path"},
-        WrongConfig{"path_long", instance("application = \"" + std::string(300, 'x') + "\""), "4", "allowed are up to 255"},
-        WrongConfig{"autostart", instance("autostart = \"yes\""), "4", "\"yes\" is a text; allowed is true or false"},
+        WrongConfig{"path_long", instance("application = \"" + std::string(300, 'x') + "\""), "4",
+                    "allowed are up to 255"},
+        WrongConfig{"autostart", instance("autostart = \"yes\""), "4",
+                    "\"yes\" is a text; allowed is true or false"},
         WrongConfig{"after_itself", instance("after = [\"a\"]"), "4", "it cannot come after itself"},
         WrongConfig{"after_nobody", instance("after = [\"drve1\"]") + instance("", "drive1", 2), "4",
                     "there is no instance 'drve1'; there are a, drive1; did you mean 'drive1'?"},
@@ -186,11 +203,12 @@ INSTANTIATE_TEST_SUITE_P(
         WrongConfig{"restart", instance("restart = \"onfailure\""), "4",
                     "allowed are never, on-failure, always; did you mean 'on-failure'?"},
         WrongConfig{"delay", instance("restart_delay_ms = 3600001"), "4", "allowed is 0 to 3600000"},
-        WrongConfig{"delay_max", instance("restart_delay_max_ms = 99"), "4", "99 is below restart_delay_ms, which is 100"},
+        WrongConfig{"delay_max", instance("restart_delay_max_ms = 99"), "4",
+                    "99 is below restart_delay_ms, which is 100"},
         WrongConfig{"limit", instance("crash_limit = 0"), "4", "allowed is 1 to 100"},
         WrongConfig{"window", instance("crash_window_s = 0"), "4", "allowed is 1 to 86400"},
         WrongConfig{"key", instance("prioritiy_band = \"low\""), "4", "did you mean 'priority_band'?"}),
-    [](const auto& info) { return info.param.name; });
+    [](const auto& test) { return test.param.name; });
 
 TEST(Config, ReportsAllErrorsInTheOrderOfTheirLines) {
   const auto sut = parse("[host]\npool_objects = 1\nnmae = 1\n" + instance("core_ = 1", "a", 9));
@@ -202,7 +220,8 @@ TEST(Config, ReportsAllErrorsInTheOrderOfTheirLines) {
 TEST(Config, RefusesASharedCoreUnlessAllSayIt) {
   const auto neither = parse(instance("", "a") + instance("", "b"));
   ASSERT_FALSE(neither.has_value());
-  EXPECT_THAT(neither.error(), ElementsAre(HasSubstr("core 1 is also used by 'b'"), HasSubstr("used by 'a'")));
+  EXPECT_THAT(neither.error(),
+              ElementsAre(HasSubstr("core 1 is also used by 'b'"), HasSubstr("used by 'a'")));
   const auto one = parse(instance("share_core = true", "a") + instance("", "b"));
   ASSERT_FALSE(one.has_value());
   EXPECT_THAT(one.error(), ElementsAre(HasSubstr("'b' core: core 1 is also used by 'a'")));
@@ -232,7 +251,8 @@ TEST(Config, SaysWhichFileIsMissing) {
 }
 
 TEST(Config, RefusesAFileThatIsMissingOrTooLarge) {
-  const auto path = std::filesystem::temp_directory_path() / fmt::format("plchost-config-{}.toml", ::getpid());
+  const auto path =
+      std::filesystem::temp_directory_path() / fmt::format("plchost-config-{}.toml", ::getpid());
   const auto missing = load_config(path.string(), four_cores());
   ASSERT_FALSE(missing.has_value());
   EXPECT_THAT(missing.error(), ElementsAre(HasSubstr("there is no file")));

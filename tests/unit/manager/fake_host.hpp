@@ -48,7 +48,11 @@ class FakeHost : public InstanceHost {
   int next_pid = 100;
 };
 
-inline ExitStatus killed_by(int signal) { return {.kind = ExitStatus::Kind::killed, .value = signal}; }
-inline ExitStatus exited_with(int code) { return {.kind = ExitStatus::Kind::exited, .value = code}; }
+inline ExitStatus killed_by(int signal) {
+  return {.kind = ExitStatus::Kind::killed, .value = signal};
+}
+inline ExitStatus exited_with(int code) {
+  return {.kind = ExitStatus::Kind::exited, .value = code};
+}
 
 }  // namespace plchost

@@ -1,0 +1,82 @@
+#include <csignal>
+#include <string>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+#include "tests/integration/manager/plant.hpp"
+
+namespace plchost {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+TEST(Manager, StopsNoInstanceWhenItIsKilledAndTheNextOneAdoptsThem) {
+  Plant plant;
+  plant.add("line1", "bottling_line");
+  plant.add("drive1", "drive_axis");
+  plant.start_manager();
+  ASSERT_TRUE(plant.wait_for("line1", InstanceState::running));
+  ASSERT_TRUE(plant.wait_for("drive1", InstanceState::running));
+  EXPECT_EQ(plant.ask(ControlVerb::stop, "line1").code, ErrorCode::ok);
+  EXPECT_EQ(plant.ask(ControlVerb::set_scheduler, "drive1", "CmpScheduleTimer").code, ErrorCode::ok);
+  const int line = plant.status("line1").pid;
+  const int drive = plant.status("drive1").pid;
+  const std::uint64_t cycles = plant.cycles("drive1");
+  plant.kill_manager();
+  EXPECT_TRUE(plant.wait_for_cycles("drive1", 50));
+  plant.start_manager();
+  ASSERT_TRUE(plant.wait_for("drive1", InstanceState::running));
+  ASSERT_TRUE(plant.wait_for("line1", InstanceState::stopped));
+  EXPECT_EQ(plant.status("line1").pid, line);
+  EXPECT_EQ(plant.status("drive1").pid, drive);
+  EXPECT_EQ(plant.status("drive1").core, 0);
+  EXPECT_EQ(plant.status("drive1").scheduler.view(), "CmpScheduleTimer");
+  EXPECT_GE(plant.cycles("drive1"), cycles + 50);  // the counters went on
+  EXPECT_EQ(plant.ask(ControlVerb::start, "line1").code, ErrorCode::ok);
+
+  // It goes on supervising them.
+  auto process = open_process(drive);
+  ASSERT_TRUE(process);
+  ASSERT_TRUE(signal_process(*process, SIGKILL));
+  ASSERT_TRUE(Plant::eventually([&] { return plant.status("drive1").restarts == 1; }));
+  ASSERT_TRUE(plant.wait_for("drive1", InstanceState::running));
+  EXPECT_THAT(std::string(plant.status("drive1").problem.view()),
+              HasSubstr("status unknown: it was adopted"));
+  EXPECT_EQ(plant.stop_manager().describe(), "exit code 0");
+  EXPECT_THAT(plant.leftovers(), IsEmpty());
+}
+
+TEST(Manager, IsRefusedWhileAnotherOneRuns) {
+  Plant plant;
+  plant.add("line1", "bottling_line", "autostart = false");
+  plant.start_manager();
+  EXPECT_THAT(plant.start_refused_manager(),
+              HasSubstr("another manager runs with this run directory: process "));
+  EXPECT_EQ(plant.ask(ControlVerb::stop, "line1").code, ErrorCode::ok);  // the first is unharmed
+}
+
+TEST(Manager, SurvivesGarbageOnItsControlSocket) {
+  Plant plant;
+  plant.add("line1", "bottling_line", "autostart = false");
+  plant.start_manager();
+  auto hostile = plant.connect();
+  for (const std::string_view packet : {"", "x", "{}", "[1,2", "{\"version\":1,\"number\":-1}"}) {
+    (void)hostile.send(packet);
+    hostile = plant.connect();
+  }
+  (void)hostile.send("{\"version\":1}");
+  const auto reply = hostile.receive_until(MonotonicClock::now() + std::chrono::seconds(30));
+  ASSERT_TRUE(reply) << reply.error().describe();
+  EXPECT_EQ(decode_reply(*reply)->code, ErrorCode::corrupt);
+  // A client that goes away in the middle of its request.
+  (void)hostile.send(
+      encode(ControlRequest{.number = 1, .verb = ControlVerb::start, .instance = "line1", .argument = ""}));
+  hostile.close();
+  ASSERT_TRUE(plant.wait_for("line1", InstanceState::running));
+  EXPECT_EQ(plant.ask(ControlVerb::stop, "line1").code, ErrorCode::ok);
+}
+
+}  // namespace
+}  // namespace plchost

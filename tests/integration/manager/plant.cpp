@@ -1,0 +1,188 @@
+#include "tests/integration/manager/plant.hpp"
+
+#include <csignal>
+#include <fstream>
+#include <sstream>
+#include <thread>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include "api/control/control_handler.hpp"
+#include "shm/pool/object_pool.hpp"
+
+namespace plchost {
+
+namespace {
+
+const std::string kBuild = PLCHOST_BUILD_DIRECTORY;
+constexpr Duration kPatience = std::chrono::seconds(30);
+
+}  // namespace
+
+Plant::Plant() {
+  static int count = 0;
+  pool_ = fmt::format("plchost-t{}-{}", ::getpid(), ++count);
+  folder_ = std::filesystem::temp_directory_path() / pool_;
+  std::filesystem::create_directories(folder_);
+}
+
+Plant::~Plant() {
+  if (testing::Test::HasFailure()) fmt::print("{}\n", log());
+  if (manager_.pid != 0) kill_manager();
+  end_instances();
+  for (const std::string& name : names_) InstancePage::remove(pool_, name);
+  MemoryFile::remove(host_page_name(pool_));
+  ObjectPool::remove(pool_);
+  std::error_code ignored;
+  std::filesystem::remove_all(folder_, ignored);
+}
+
+// Those that outlived their manager: found by their sockets, as a manager would.
+void Plant::end_instances() {
+  for (const std::string& name : names_) {
+    const auto link = PacketSocket::connect((folder_ / "run" / (name + ".sock")).string());
+    if (!link) continue;
+    if (auto process = open_process(link->peer_pid().value_or(0))) {
+      (void)signal_process(*process, SIGKILL);
+      wait_for_end(*process, kPatience);
+    }
+  }
+}
+
+std::string Plant::application(const std::string& name) {
+  return fmt::format("{}/applications/{}.so", kBuild, name);
+}
+
+void Plant::add(const std::string& name, const std::string& application_name, const std::string& more_keys) {
+  instances_ +=
+      fmt::format("[[instance]]\nname = \"{}\"\ncore = 0\nshare_core = true\napplication = \"{}\"\n{}\n",
+                  name, application(application_name), more_keys);
+  names_.push_back(name);
+}
+
+void Plant::start_manager() {
+  const std::string config = (folder_ / "cell.toml").string();
+  std::ofstream(config) << fmt::format(
+      "[host]\nname = \"cell\"\nrun_directory = \"{}\"\npool = \"{}\"\n[dds]\nenabled = false\n{}",
+      (folder_ / "run").string(), pool_, instances_);
+  const UniqueFd log(::open((folder_ / "log").c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC,
+                            0600));  // NOLINT: variadic
+  auto process =
+      spawn_process({.arguments = {kBuild + "/bin/plchostd", "--config", config}, .output_fd = log.get()});
+  ASSERT_TRUE(process) << process.error().describe();
+  manager_ = std::move(*process);
+  ASSERT_TRUE(eventually([&] {
+    const auto link = PacketSocket::connect(manager_socket_path((folder_ / "run").string()));
+    return link && link->peer_pid() == manager_.pid;
+  })) << this->log();
+}
+
+ExitStatus Plant::wait_for_end(ChildProcess& process, Duration limit) {
+  pollfd poll{.fd = process.pidfd.get(), .events = POLLIN, .revents = 0};
+  const auto wait = std::chrono::duration_cast<std::chrono::milliseconds>(limit).count();
+  if (::poll(&poll, 1, static_cast<int>(wait)) != 1) return {.known = false};
+  const ExitStatus status = reap_process(process);
+  process = {};
+  return status;
+}
+
+ExitStatus Plant::stop_manager() {
+  (void)signal_process(manager_, SIGTERM);
+  return wait_for_end(manager_, kPatience);
+}
+
+void Plant::kill_manager() {
+  (void)signal_process(manager_, SIGKILL);
+  wait_for_end(manager_, kPatience);
+}
+
+std::string Plant::start_refused_manager() {
+  auto pipe = std::move(*make_output_pipe());
+  auto process =
+      spawn_process({.arguments = {kBuild + "/bin/plchostd", "--config", (folder_ / "cell.toml").string()},
+                     .output_fd = pipe.write_end.get()});
+  EXPECT_TRUE(process);
+  EXPECT_EQ(wait_for_end(*process, kPatience).describe(), "exit code 1");
+  constexpr std::size_t kMost = 10'000;
+  return read_available(pipe.read_end.get(), kMost);
+}
+
+PacketSocket Plant::connect() {
+  auto link = PacketSocket::connect(manager_socket_path((folder_ / "run").string()));
+  EXPECT_TRUE(link);
+  return link ? std::move(*link) : PacketSocket();
+}
+
+ControlReply Plant::ask(ControlVerb verb, const std::string& instance, const std::string& argument) {
+  auto link = connect();
+  EXPECT_TRUE(link.send(
+      encode(ControlRequest{.number = 42, .verb = verb, .instance = instance, .argument = argument})));
+  const auto packet = link.receive_until(MonotonicClock::now() + kPatience);
+  if (!packet) return {.number = 0, .code = ErrorCode::timed_out, .text = packet.error().describe()};
+  const auto reply = decode_reply(*packet);
+  return reply ? *reply : ControlReply{.number = 0, .code = ErrorCode::corrupt, .text = *packet};
+}
+
+InstanceStatus Plant::status(const std::string& instance) {
+  const auto page = HostPageReader::open(pool_);
+  if (!page) return {};
+  for (std::uint32_t i = 0; i < names_.size(); ++i) {
+    const auto status = page->instance(i);
+    if (status && status->name.view() == instance) return *status;
+  }
+  return {};
+}
+
+bool Plant::eventually(const std::function<bool()>& condition) {
+  const TimePoint end = MonotonicClock::now() + kPatience;
+  while (!condition()) {
+    if (MonotonicClock::now() > end) return false;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return true;
+}
+
+bool Plant::wait_for(const std::string& instance, InstanceState state) {
+  const bool reached = eventually([&] { return status(instance).state == state; });
+  EXPECT_TRUE(reached) << instance << " is " << to_string(status(instance).state) << " where "
+                       << to_string(state) << " was awaited: " << status(instance).problem.view();
+  return reached;
+}
+
+std::uint64_t Plant::cycles(const std::string& instance) {
+  const auto page = InstancePageReader::open(pool_, instance);
+  std::uint64_t sum = 0;
+  for (std::uint32_t i = 0; page && i < page->task_count(); ++i) {
+    if (const auto task = page->task(i)) sum += task->counters.cycles;
+  }
+  return sum;
+}
+
+bool Plant::wait_for_cycles(const std::string& instance, std::uint64_t more) {
+  const std::uint64_t before = cycles(instance);
+  return eventually([&] { return cycles(instance) >= before + more; });
+}
+
+std::vector<std::string> Plant::leftovers() const {
+  std::vector<std::string> found;
+  for (const auto& entry : std::filesystem::directory_iterator("/dev/shm")) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with(pool_)) found.push_back(entry.path().string());
+  }
+  for (const auto& entry : std::filesystem::directory_iterator(folder_ / "run")) {
+    found.push_back(entry.path().string());
+  }
+  return found;
+}
+
+std::string Plant::log() const {
+  std::ostringstream text;
+  text << std::ifstream(folder_ / "log").rdbuf();
+  return text.str();
+}
+
+}  // namespace plchost

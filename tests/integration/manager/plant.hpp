@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "manager/system/child_process.hpp"
+#include "shm/base/control_message.hpp"
+#include "shm/base/packet_socket.hpp"
+#include "shm/pool/host_page.hpp"
+#include "shm/pool/instance_page.hpp"
+
+namespace plchost {
+
+/// A host in a temporary folder: real managers, real instances, a pool of its own. Cleans up whatever
+/// happens.
+class Plant {
+ public:
+  Plant();
+  ~Plant();
+  Plant(const Plant&) = delete;
+  Plant& operator=(const Plant&) = delete;
+
+  /// Another [[instance]]; `application` is a name in the build's folder of applications.
+  void add(const std::string& name, const std::string& application, const std::string& more_keys = "");
+  /// Writes the configuration and starts a manager.
+  void start_manager();
+  /// SIGTERM, and how it ended.
+  ExitStatus stop_manager();
+  void kill_manager();
+  /// A second one with the same configuration, and what it said before it ended.
+  std::string start_refused_manager();
+
+  ControlReply ask(ControlVerb verb, const std::string& instance, const std::string& argument = "");
+  PacketSocket connect();
+
+  InstanceStatus status(const std::string& instance);
+  bool wait_for(const std::string& instance, InstanceState state);
+  /// Cycles of all tasks so far.
+  std::uint64_t cycles(const std::string& instance);
+  bool wait_for_cycles(const std::string& instance, std::uint64_t more = 5);
+  static bool eventually(const std::function<bool()>& condition);
+  static std::string application(const std::string& name);
+
+  /// Names of ours in /dev/shm and in the run directory.
+  std::vector<std::string> leftovers() const;
+  [[nodiscard]] std::string log() const;
+  [[nodiscard]] const std::string& pool() const { return pool_; }
+
+ private:
+  ExitStatus wait_for_end(ChildProcess& process, Duration limit);
+  void end_instances();
+
+  std::filesystem::path folder_;
+  std::string pool_;
+  std::string instances_;
+  std::vector<std::string> names_;
+  ChildProcess manager_;
+};
+
+}  // namespace plchost

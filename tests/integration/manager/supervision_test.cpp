@@ -1,0 +1,126 @@
+#include <csignal>
+#include <string>
+
+#include <gmock/gmock.h>
+
+#include "tests/integration/manager/plant.hpp"
+
+namespace plchost {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+void kill_process(int pid) {
+  auto process = open_process(pid);
+  ASSERT_TRUE(process);
+  ASSERT_TRUE(signal_process(*process, SIGKILL));
+}
+
+TEST(Manager, StartsInOrderAndLeavesNothingBehindWhenItIsStopped) {
+  Plant plant;
+  plant.add("packer1", "packer", "after = [\"line1\"]");
+  plant.add("line1", "bottling_line", "after = [\"drive1\"]\nscheduler = \"CmpScheduleTimer\"");
+  plant.add("drive1", "drive_axis");
+  plant.start_manager();
+  ASSERT_TRUE(plant.wait_for("packer1", InstanceState::running));
+  const InstanceStatus line = plant.status("line1");
+  EXPECT_EQ(line.state, InstanceState::running);
+  EXPECT_EQ(line.core, 0);
+  EXPECT_EQ(line.scheduler.view(), "CmpScheduleTimer");
+  EXPECT_EQ(line.problem.view(), "");
+  EXPECT_GT(line.pid, 0);
+  EXPECT_LE(plant.status("drive1").state_since_unix_ns, line.state_since_unix_ns);
+  EXPECT_LE(line.state_since_unix_ns, plant.status("packer1").state_since_unix_ns);
+  EXPECT_TRUE(plant.wait_for_cycles("drive1"));
+  EXPECT_EQ(plant.stop_manager().describe(), "exit code 0");
+  EXPECT_THAT(plant.leftovers(), IsEmpty());
+}
+
+TEST(Manager, BringsAKilledInstanceBackWhileTheOthersGoOn) {
+  Plant plant;
+  plant.add("line1", "bottling_line");
+  plant.add("drive1", "drive_axis");
+  plant.start_manager();
+  ASSERT_TRUE(plant.wait_for("line1", InstanceState::running));
+  ASSERT_TRUE(plant.wait_for("drive1", InstanceState::running));
+  const int pid = plant.status("line1").pid;
+  const int other = plant.status("drive1").pid;
+  kill_process(pid);
+  ASSERT_TRUE(Plant::eventually([&] { return plant.status("line1").restarts == 1; }));
+  ASSERT_TRUE(plant.wait_for("line1", InstanceState::running));
+  EXPECT_NE(plant.status("line1").pid, pid);
+  EXPECT_THAT(std::string(plant.status("line1").problem.view()), HasSubstr("killed by SIGKILL"));
+  EXPECT_EQ(plant.status("drive1").pid, other);
+  EXPECT_EQ(plant.status("drive1").restarts, 0U);
+  EXPECT_TRUE(plant.wait_for_cycles("drive1"));
+  EXPECT_TRUE(plant.wait_for_cycles("line1"));
+}
+
+TEST(Manager, PutsACrashLoopIntoSafeModeUntilAnotherApplicationIsLoaded) {
+  Plant plant;
+  plant.add("line1", "manager_crash_soon", "restart_delay_ms = 1\ncrash_limit = 3");
+  plant.start_manager();
+  ASSERT_TRUE(plant.wait_for("line1", InstanceState::safe_mode));
+  EXPECT_THAT(std::string(plant.status("line1").problem.view()), HasSubstr("the last: killed by SIGSEGV"));
+  const auto loaded = plant.ask(ControlVerb::load_application, "line1", Plant::application("bottling_line"));
+  EXPECT_EQ(loaded.code, ErrorCode::ok) << loaded.text;
+  EXPECT_EQ(plant.status("line1").state, InstanceState::running);
+  EXPECT_TRUE(plant.wait_for_cycles("line1"));
+}
+
+TEST(Manager, RefusesAWrongApplicationAndLeavesTheOldOneRunning) {
+  Plant plant;
+  plant.add("line1", "bottling_line");
+  plant.start_manager();
+  ASSERT_TRUE(plant.wait_for("line1", InstanceState::running));
+  const int pid = plant.status("line1").pid;
+  for (const std::string file : {"cell.toml", "/nowhere/x.so"}) {
+    const auto refused = plant.ask(ControlVerb::load_application, "line1", file);
+    EXPECT_NE(refused.code, ErrorCode::ok);
+    EXPECT_THAT(refused.text, HasSubstr(file));
+  }
+  EXPECT_EQ(plant.status("line1").pid, pid);
+  EXPECT_TRUE(plant.wait_for_cycles("line1"));
+}
+
+TEST(Manager, SaysWhyAnInstanceCouldNotBeSetUp) {
+  Plant plant;
+  plant.add("line1", "bottling_line", "settings = \"cell.toml\"");  // not a settings file
+  plant.start_manager();
+  ASSERT_TRUE(plant.wait_for("line1", InstanceState::failed));
+  EXPECT_THAT(std::string(plant.status("line1").problem.view()), HasSubstr("exit code 3: read_settings: "));
+}
+
+TEST(Manager, CarriesOutEveryCommand) {
+  Plant plant;
+  plant.add("line1", "bottling_line");
+  plant.start_manager();
+  ASSERT_TRUE(plant.wait_for("line1", InstanceState::running));
+  const auto expect_ok = [&](ControlVerb verb, const std::string& argument, InstanceState state) {
+    const auto reply = plant.ask(verb, "line1", argument);
+    EXPECT_EQ(reply.code, ErrorCode::ok) << to_string(verb) << ": " << reply.text;
+    EXPECT_EQ(reply.number, 42U);
+    EXPECT_EQ(plant.status("line1").state, state) << to_string(verb);
+  };
+  const int first = plant.status("line1").pid;
+  expect_ok(ControlVerb::stop, "", InstanceState::stopped);
+  expect_ok(ControlVerb::stop, "", InstanceState::stopped);
+  expect_ok(ControlVerb::start, "", InstanceState::running);
+  expect_ok(ControlVerb::start, "", InstanceState::running);
+  expect_ok(ControlVerb::set_scheduler, "CmpScheduleOneShot", InstanceState::running);
+  EXPECT_EQ(plant.status("line1").scheduler.view(), "CmpScheduleOneShot");
+  expect_ok(ControlVerb::register_event, "by_hand", InstanceState::running);
+  EXPECT_EQ(plant.status("line1").pid, first);
+  expect_ok(ControlVerb::reset, "", InstanceState::stopped);
+  EXPECT_NE(plant.status("line1").pid, first);
+  EXPECT_EQ(plant.status("line1").scheduler.view(), "CmpScheduleOneShot");
+  expect_ok(ControlVerb::unregister_event, "by_hand", InstanceState::stopped);
+  expect_ok(ControlVerb::restart, "", InstanceState::running);
+  EXPECT_TRUE(plant.wait_for_cycles("line1"));
+  EXPECT_EQ(plant.status("line1").restarts, 0U);
+  EXPECT_EQ(plant.ask(ControlVerb::stop, "line2").text, "no instance 'line2'; there are line1");
+}
+
+}  // namespace
+}  // namespace plchost

@@ -1,0 +1,153 @@
+#include "manager/control/control_server.hpp"
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+namespace plchost {
+namespace {
+
+using testing::HasSubstr;
+
+/// Keeps what it is asked for, and answers when the test says so.
+class SlowHandler : public ControlHandler {
+ public:
+  void handle(const ControlRequest& request, ControlReplyFunction reply) override {
+    asked.push_back(request);
+    replies.push_back(std::move(reply));
+  }
+  std::vector<ControlRequest> asked;
+  std::vector<ControlReplyFunction> replies;
+};
+
+class ControlServerTest : public testing::Test {
+ protected:
+  ControlServerTest() {
+    static int count = 0;
+    path_ = (std::filesystem::temp_directory_path() / fmt::format("plchost-cs-{}-{}", ::getpid(), ++count))
+                .string();
+    reactor_ = std::move(*Reactor::create());
+    sut_ = std::move(*ControlServer::open(*reactor_, path_, handler_));
+  }
+  PacketSocket connect() { return std::move(*PacketSocket::connect(path_)); }
+  /// Lets the server do what there is to do.
+  void serve() {
+    Reactor::Timer end(*reactor_, [this] { reactor_->stop(); });
+    end.set(MonotonicClock::now() + std::chrono::milliseconds(30));
+    ASSERT_TRUE(reactor_->run());
+  }
+  static std::string request(std::uint64_t number) {
+    return encode(
+        ControlRequest{.number = number, .verb = ControlVerb::stop, .instance = "a", .argument = ""});
+  }
+  static ControlReply reply_on(PacketSocket& socket) {
+    auto packet = socket.receive();
+    if (!packet || !*packet) return {.number = 0, .code = ErrorCode::unavailable, .text = "no reply"};
+    return *decode_reply(**packet);
+  }
+  static bool is_closed(PacketSocket& socket) {
+    for (;;) {
+      const auto packet = socket.receive();
+      if (!packet) return true;
+      if (!*packet) return false;
+    }
+  }
+
+  std::string path_;
+  SlowHandler handler_;
+  std::unique_ptr<Reactor> reactor_;
+  std::unique_ptr<ControlServer> sut_;
+};
+
+TEST_F(ControlServerTest, BringsRequestsInAndRepliesBackInAnyOrder) {
+  auto client = connect();
+  ASSERT_TRUE(client.send(request(1)));
+  ASSERT_TRUE(client.send(request(2)));
+  serve();
+  ASSERT_EQ(handler_.asked.size(), 2U);
+  handler_.replies[1]({.number = 2, .code = ErrorCode::busy, .text = "x"});
+  handler_.replies[0]({.number = 1, .code = ErrorCode::ok, .text = ""});
+  EXPECT_EQ(reply_on(client).number, 2U);
+  EXPECT_EQ(reply_on(client).number, 1U);
+}
+
+TEST_F(ControlServerTest, AnswersGarbageAndClosesAfterTooMuchOfIt) {
+  auto client = connect();
+  auto other = connect();
+  ASSERT_TRUE(client.send("{\"version\": 99, \"number\": 1}"));
+  serve();
+  const auto reply = reply_on(client);
+  EXPECT_EQ(reply.number, 0U);
+  EXPECT_EQ(reply.code, ErrorCode::corrupt);
+  EXPECT_THAT(reply.text, HasSubstr("version 99 where 1 is spoken"));
+  for (int i = 0; i < kMaxBadPackets; ++i) ASSERT_TRUE(client.send("\xff\xfe garbage"));
+  serve();
+  EXPECT_TRUE(is_closed(client));
+  EXPECT_FALSE(is_closed(other));
+  EXPECT_TRUE(handler_.asked.empty());
+}
+
+TEST_F(ControlServerTest, DropsTheReplyOfAPeerThatHasGone) {
+  {
+    auto client = connect();
+    ASSERT_TRUE(client.send(request(1)));
+    serve();
+  }
+  serve();
+  handler_.replies.at(0)({.number = 1, .code = ErrorCode::ok, .text = ""});
+}
+
+TEST_F(ControlServerTest, BoundsTheRequestsOfOnePeer) {
+  auto client = connect();
+  for (std::size_t i = 0; i <= kMaxPendingRequests; ++i) {
+    ASSERT_TRUE(client.send(request(i + 1)));
+    serve();
+  }
+  EXPECT_EQ(handler_.asked.size(), kMaxPendingRequests);
+  const auto reply = reply_on(client);
+  EXPECT_EQ(reply.number, kMaxPendingRequests + 1);
+  EXPECT_EQ(reply.code, ErrorCode::busy);
+  EXPECT_THAT(reply.text, HasSubstr("64 requests of this peer"));
+}
+
+TEST_F(ControlServerTest, ClosesAPeerThatDoesNotReadAndServesTheOthers) {
+  auto deaf = connect();
+  auto other = connect();
+  ASSERT_TRUE(deaf.send(request(1)));
+  serve();
+  ASSERT_EQ(handler_.replies.size(), 1U);
+  // Replies beyond what the kernel holds and what the server keeps.
+  const ControlReply large{.number = 1, .code = ErrorCode::ok, .text = std::string(4000, 'x')};
+  for (std::size_t i = 0; i < 2 * kMaxUnreadReplies + 1000; ++i) handler_.replies[0](large);
+  EXPECT_TRUE(is_closed(deaf));
+  ASSERT_TRUE(other.send(request(5)));
+  serve();
+  EXPECT_EQ(handler_.asked.back().number, 5U);
+}
+
+TEST_F(ControlServerTest, RefusesMorePeersThanItHasRoomFor) {
+  std::vector<PacketSocket> clients;
+  for (std::size_t i = 0; i < kMaxConnections; ++i) {
+    clients.push_back(connect());
+    serve();
+  }
+  auto sut = connect();
+  serve();
+  const auto reply = reply_on(sut);
+  EXPECT_EQ(reply.code, ErrorCode::busy);
+  EXPECT_THAT(reply.text, HasSubstr("16 peers are connected already"));
+  clients.pop_back();
+  serve();
+  auto next = connect();
+  ASSERT_TRUE(next.send(request(9)));
+  serve();
+  EXPECT_EQ(handler_.asked.back().number, 9U);
+}
+
+}  // namespace
+}  // namespace plchost

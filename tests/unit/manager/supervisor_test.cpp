@@ -1,0 +1,182 @@
+#include "manager/supervisor/supervisor.hpp"
+
+#include <csignal>
+#include <map>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+#include "tests/unit/manager/fake_host.hpp"
+
+namespace plchost {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+/// line1 after drive1, packer1 after line1 and drive1.
+class SupervisorTest : public testing::Test {
+ protected:
+  SupervisorTest() {
+    add("packer1", {"line1", "drive1"});
+    add("line1", {"drive1"});
+    add("drive1", {});
+  }
+
+  void add(const std::string& name, std::vector<std::string> after) {
+    InstanceConfig instance;
+    instance.name = name;
+    instance.core = 1;
+    instance.application = "/opt/" + name + ".so";
+    instance.after = std::move(after);
+    config_.instances.push_back(instance);
+  }
+
+  void make() {
+    sut_.emplace(config_,
+                 Supervisor::Surroundings{
+                     .folder = "/etc",
+                     .schedulers = {"CmpSchedule"},
+                     .now = [] { return TimePoint(std::chrono::seconds(1)); },
+                     .publish = [this](std::size_t index,
+                                       const InstanceStatus& status) { published_[index] = status; }},
+                 [this](const InstanceConfig& config) {
+                   auto host = std::make_unique<FakeHost>();
+                   hosts_[config.name] = host.get();
+                   return Supervisor::HostedInstance{.host = std::move(host),
+                                                     .connect = [](InstanceEvents&) {}};
+                 });
+  }
+  ManagedInstance& instance(const std::string& name) {
+    for (std::size_t i = 0; i < sut_->size(); ++i) {
+      if (sut_->instance(i).config().name == name) return sut_->instance(i);
+    }
+    throw std::out_of_range(name);
+  }
+  InstanceState state(const std::string& name) { return instance(name).status().state; }
+  std::string problem(const std::string& name) { return std::string(instance(name).status().problem.view()); }
+  void ready(const std::string& name) {
+    instance(name).on_report({.step = SetupStep::ready, .code = ErrorCode::ok, .text = ""});
+  }
+  void start_all() {
+    make();
+    sut_->start();
+    for (const char* name : {"drive1", "line1", "packer1"}) ready(name);
+  }
+
+  ManagerConfig config_;
+  std::map<std::string, FakeHost*> hosts_;
+  std::map<std::size_t, InstanceStatus> published_;
+  std::optional<Supervisor> sut_;
+};
+
+TEST_F(SupervisorTest, StartsEachWhenWhatItComesAfterIsUp) {
+  make();
+  sut_->start();
+  EXPECT_EQ(state("drive1"), InstanceState::starting);
+  EXPECT_EQ(state("line1"), InstanceState::waiting);
+  EXPECT_EQ(problem("line1"), "waits for 'drive1', which is starting");
+  EXPECT_EQ(problem("packer1"), "waits for 'line1', which is waiting, 'drive1', which is starting");
+  ready("drive1");
+  EXPECT_EQ(state("line1"), InstanceState::starting);
+  EXPECT_EQ(state("packer1"), InstanceState::waiting);
+  ready("line1");
+  EXPECT_EQ(state("packer1"), InstanceState::starting);
+  ready("packer1");
+  EXPECT_EQ(published_.at(0).state, InstanceState::running);
+}
+
+TEST_F(SupervisorTest, LeavesTheOthersWaitingWhenOneFails) {
+  make();
+  sut_->start();
+  instance("drive1").on_report({.step = SetupStep::bind_core, .code = ErrorCode::system, .text = "no core"});
+  instance("drive1").on_exit(exited_with(kExitSetupFailed));
+  EXPECT_EQ(state("line1"), InstanceState::waiting);
+  EXPECT_EQ(problem("line1"), "waits for 'drive1', which is failed (exit code 3: bind_core: no core)");
+}
+
+TEST_F(SupervisorTest, GoesOnWhenAnOperatorStartsWhatFailed) {
+  make();
+  sut_->start();
+  instance("drive1").on_exit(exited_with(kExitSetupFailed));
+  sut_->handle({.number = 1, .verb = ControlVerb::start, .instance = "drive1", .argument = ""},
+               [](const ControlReply&) {});
+  ready("drive1");
+  EXPECT_EQ(state("line1"), InstanceState::starting);
+}
+
+TEST_F(SupervisorTest, LeavesAloneWhatShallNotStartByItself) {
+  config_.instances[2].autostart = false;
+  make();
+  sut_->start();
+  EXPECT_EQ(state("drive1"), InstanceState::offline);
+  EXPECT_TRUE(hosts_["drive1"]->spawned.empty());
+  EXPECT_THAT(problem("line1"), HasSubstr("waits for 'drive1', which is offline"));
+}
+
+TEST_F(SupervisorTest, CountsWhatWasAdoptedAsUp) {
+  make();
+  hosts_["drive1"]->adoptable = 5;
+  sut_->start();
+  EXPECT_EQ(state("line1"), InstanceState::waiting);
+  instance("drive1").on_reply(
+      {.number = hosts_["drive1"]->requests.back().number, .code = ErrorCode::ok, .text = ""});
+  EXPECT_EQ(state("line1"), InstanceState::starting);
+}
+
+TEST_F(SupervisorTest, DoesNotDisturbOthersWhenOneCrashes) {
+  start_all();
+  instance("drive1").on_exit(killed_by(SIGKILL));
+  EXPECT_EQ(state("drive1"), InstanceState::waiting);
+  EXPECT_EQ(state("line1"), InstanceState::running);
+  EXPECT_EQ(state("packer1"), InstanceState::running);
+  EXPECT_TRUE(hosts_["line1"]->requests.empty());
+}
+
+TEST_F(SupervisorTest, EndsInReverseOrder) {
+  start_all();
+  bool done = false;
+  sut_->shut_down([&] { done = true; });
+  EXPECT_EQ(state("packer1"), InstanceState::stopping);
+  EXPECT_EQ(state("line1"), InstanceState::running);
+  instance("packer1").on_exit(exited_with(0));
+  EXPECT_EQ(state("line1"), InstanceState::stopping);
+  EXPECT_EQ(state("drive1"), InstanceState::running);
+  instance("line1").on_exit(exited_with(0));
+  EXPECT_FALSE(done);
+  instance("drive1").on_exit(exited_with(0));
+  EXPECT_TRUE(done);
+  EXPECT_EQ(state("drive1"), InstanceState::offline);
+}
+
+TEST_F(SupervisorTest, StartsNothingWhileItEnds) {
+  make();
+  sut_->start();
+  bool done = false;
+  sut_->shut_down([&] { done = true; });
+  EXPECT_EQ(state("line1"), InstanceState::offline);
+  instance("drive1").on_exit(killed_by(SIGKILL));
+  EXPECT_TRUE(done);
+  EXPECT_TRUE(hosts_["line1"]->spawned.empty());
+}
+
+TEST_F(SupervisorTest, EndsAtOnceWhenNothingRuns) {
+  make();
+  bool done = false;
+  sut_->shut_down([&] { done = true; });
+  EXPECT_TRUE(done);
+}
+
+TEST_F(SupervisorTest, NamesTheInstancesThatThereAre) {
+  make();
+  ControlReply reply;
+  sut_->handle({.number = 3, .verb = ControlVerb::stop, .instance = "x", .argument = ""},
+               [&](const ControlReply& got) { reply = got; });
+  EXPECT_EQ(reply.number, 3U);
+  EXPECT_EQ(reply.code, ErrorCode::not_found);
+  EXPECT_EQ(reply.text, "no instance 'x'; there are packer1, line1, drive1");
+}
+
+}  // namespace
+}  // namespace plchost
