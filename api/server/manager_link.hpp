@@ -33,7 +33,7 @@ struct FinishedCommand {
 class ManagerLink {
  public:
   /// How many commands may be under way, together and of one client: one client cannot take all places.
-  static constexpr std::size_t kMaxPending = 128;
+  static constexpr std::size_t kMaxPending = 64;
   static constexpr std::size_t kMaxPendingOfClient = 8;
   /// The manager's time for one command.
   static constexpr Duration kCommandLimit = std::chrono::seconds(20);

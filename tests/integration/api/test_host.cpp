@@ -1,0 +1,152 @@
+#include "tests/integration/api/test_host.hpp"
+
+#include <array>
+#include <filesystem>
+#include <optional>
+
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include "shm/base/packet_socket.hpp"
+
+namespace plchost {
+
+namespace {
+
+std::string unique_name() {
+  static std::atomic<int> counter{0};
+  return "plchost-api-" + std::to_string(::getpid()) + "-" + std::to_string(counter++);
+}
+
+}  // namespace
+
+OwnDomain::OwnDomain() {
+  // All ports of these domains are below the range that clients get theirs from. The last port of a domain is
+  // used by no participant: who has it has the domain.
+  constexpr std::uint32_t kDomains = 100;
+  const auto first = static_cast<std::uint32_t>(::getpid());
+  for (std::uint32_t i = 0; i < kDomains && number_ == 0; ++i) {
+    const std::uint32_t domain = 1 + (first + i) % kDomains;
+    UniqueFd fd(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    address.sin_port = htons(static_cast<std::uint16_t>(7400 + 250 * domain + 249));
+    if (::bind(fd.get(), reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) continue;
+    claim_ = std::move(fd);
+    number_ = domain;
+  }
+}
+
+TestHost::TestHost(const OwnDomain& domain, std::string name)
+    : domain_(domain.number()),
+      name_(std::move(name)),
+      pool_name_(unique_name()),
+      run_directory_(std::filesystem::temp_directory_path() / pool_name_),
+      pool_(ObjectPool::create(pool_name_, {.max_objects = 64}).value()),
+      page_(HostPageWriter::create(pool_name_).value()) {
+  std::filesystem::create_directory(run_directory_);
+  write_count(0);
+  manager_ = std::jthread([this](const std::stop_token& stop) { serve(stop); });
+}
+
+TestHost::~TestHost() {
+  server_.reset();
+  manager_ = {};
+  for (const std::string& instance : instances_) InstancePage::remove(pool_name_, instance);
+  MemoryFile::remove(host_page_name(pool_name_));
+  MemoryFile::remove(pool_name_ + ".posts");
+  ObjectPool::remove(pool_name_);
+  std::filesystem::remove_all(run_directory_);
+}
+
+PoolEvent TestHost::add_event(const std::string& instance, const std::string& event) {
+  const PoolEvent made = pool_.create_event(event_object_name(instance, event)).value();
+  made.set_registered(true);
+  return made;
+}
+
+void TestHost::write_count(std::uint32_t count) {
+  HostStatus status;
+  status.name.assign(name_);
+  status.version.assign("0.1.0");
+  status.manager_pid = ::getpid();
+  status.instance_count = count;
+  page_.write_host(status);
+}
+
+void TestHost::write_instance(std::uint32_t index, const std::string& name, InstanceState state,
+                              std::int32_t pid) {
+  InstanceStatus status;
+  status.name.assign(name);
+  status.scheduler.assign("CmpSchedule");
+  status.state = state;
+  status.pid = pid;
+  status.core = 1;
+  page_.write_instance(index, status);
+}
+
+InstancePage TestHost::make_page(const std::string& instance, const std::string& task, std::int32_t pid) {
+  instances_.push_back(instance);
+  TaskIdentity identity;
+  identity.name.assign(task);
+  identity.interval_ns = 1'000'000;
+  auto page = InstancePage::create(pool_name_, instance, std::array{identity}).value();
+  InstanceRuntime runtime;
+  runtime.pid = pid;
+  runtime.running = 1;
+  runtime.scheduler.assign("CmpScheduleTimer");
+  page.write_runtime(runtime);
+  return page;
+}
+
+void TestHost::start_server() {
+  while (!std::filesystem::exists(run_directory_ + "/manager.sock")) ::usleep(1000);
+  server_ = std::make_unique<Child>(
+      PLCHOST_DDS_PROGRAM, std::vector<std::string>{"--host", name_, "--domain", std::to_string(domain_),
+                                                    "--pool", pool_name_, "--run-directory", run_directory_,
+                                                    "--interface", "lo", "--log-level", "warning"});
+}
+
+void TestHost::replace_server() {
+  server_->signal(SIGKILL);
+  server_->wait();
+  start_server();
+}
+
+std::vector<ControlRequest> TestHost::requests() {
+  const std::lock_guard lock(mutex_);
+  return requests_;
+}
+
+void TestHost::serve(const std::stop_token& stop) {
+  auto listener = PacketListener::listen(run_directory_ + "/manager.sock").value();
+  std::optional<PacketSocket> peer;
+  while (!stop.stop_requested()) {
+    std::array<pollfd, 2> fds{pollfd{listener.fd(), POLLIN, 0}, pollfd{peer ? peer->fd() : -1, POLLIN, 0}};
+    ::poll(fds.data(), fds.size(), 10);
+    if (auto accepted = listener.accept(); accepted && *accepted) peer = std::move(**accepted);
+    if (close_peer) peer.reset();
+    if (!peer) continue;
+    auto packet = peer->receive();
+    if (!packet) {
+      peer.reset();
+      continue;
+    }
+    if (!*packet) continue;
+    const ControlRequest request = decode_request(**packet).value();
+    {
+      const std::lock_guard lock(mutex_);
+      requests_.push_back(request);
+    }
+    if (silent) continue;
+    if (request.verb == ControlVerb::stop) write_instance(0, request.instance, InstanceState::stopped, 4711);
+    ControlReply reply = answer_;
+    reply.number = request.number;
+    (void)peer->send(encode(reply));
+  }
+}
+
+}  // namespace plchost

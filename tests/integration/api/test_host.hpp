@@ -1,0 +1,79 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "shm/base/control_message.hpp"
+#include "shm/base/unique_fd.hpp"
+#include "shm/pool/host_page.hpp"
+#include "shm/pool/instance_page.hpp"
+#include "shm/pool/object_pool.hpp"
+#include "tests/integration/api/child.hpp"
+
+namespace plchost {
+
+/// A DDS domain that no other test on this machine uses while this object lives.
+class OwnDomain {
+ public:
+  OwnDomain();
+  [[nodiscard]] std::uint32_t number() const { return number_; }
+
+ private:
+  UniqueFd claim_;
+  std::uint32_t number_ = 0;
+};
+
+/// A host without PLCs: a pool, the pages that a manager and an instance write, the manager's end of the
+/// control socket, and a real plchost-dds.
+class TestHost {
+ public:
+  TestHost(const OwnDomain& domain, std::string name);
+  TestHost(const TestHost&) = delete;
+  TestHost& operator=(const TestHost&) = delete;
+  ~TestHost();
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+  [[nodiscard]] const std::string& pool_name() const { return pool_name_; }
+  /// Makes and registers "instance/event".
+  PoolEvent add_event(const std::string& instance, const std::string& event);
+  void write_instance(std::uint32_t index, const std::string& name, InstanceState state,
+                      std::int32_t pid = 0);
+  void write_count(std::uint32_t count);
+  /// An instance page with one task, as the process `pid` would write it.
+  InstancePage make_page(const std::string& instance, const std::string& task, std::int32_t pid);
+
+  void start_server();
+  /// kill -9, and a new one, as the manager does it.
+  void replace_server();
+  [[nodiscard]] Child& server() { return *server_; }
+
+  /// The requests that came to the manager so far.
+  [[nodiscard]] std::vector<ControlRequest> requests();
+  /// What the manager answers: ok with this text, after this delay.
+  void answer_with(ControlReply reply) { answer_ = std::move(reply); }
+  std::atomic<bool> silent{false};      ///< the manager answers nothing
+  std::atomic<bool> close_peer{false};  ///< the manager hangs up
+
+ private:
+  void serve(const std::stop_token& stop);
+
+  std::uint32_t domain_;
+  std::string name_;
+  std::string pool_name_;
+  std::string run_directory_;
+  ObjectPool pool_;
+  HostPageWriter page_;
+  std::vector<std::string> instances_;
+  ControlReply answer_;
+  std::mutex mutex_;
+  std::vector<ControlRequest> requests_;
+  std::unique_ptr<Child> server_;
+  std::jthread manager_;
+};
+
+}  // namespace plchost
