@@ -13,8 +13,8 @@ class FillingStation {
   [[nodiscard]] double weight() const { return weight_; }
 
  private:
-  static constexpr double kCoarseFlow = 400.0;  // g/s
-  static constexpr double kFineFlow = 60.0;     // g/s
+  static constexpr double kCoarseFlow = 800.0;  // g/s
+  static constexpr double kFineFlow = 100.0;    // g/s
   static constexpr double kValveLag = 0.06;     // s
   double flow_ = 0.0;
   double weight_ = 0.0;

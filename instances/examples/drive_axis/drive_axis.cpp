@@ -37,14 +37,14 @@ void position() {
   static Servo servo;
   const double seconds = std::chrono::duration<double>(kInterval).count();
 
-  trajectory.step(seconds, held ? trajectory.position() : target.load());
-  carriage.step(seconds, servo.step(seconds, trajectory, carriage));
-
   const double error = trajectory.position() - carriage.position();
   actual = carriage.position();
   following_error = error;
   if (std::fabs(error) > max_following_error) max_following_error = std::fabs(error);
   outside_window = std::fabs(error) > kWindow;
+
+  carriage.step(seconds, servo.step(seconds, trajectory, carriage));
+  trajectory.step(seconds, held ? trajectory.position() : target.load());
 }
 
 void sequence() {

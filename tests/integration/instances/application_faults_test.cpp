@@ -1,0 +1,78 @@
+// Applications that cannot run: refused with a text that says why, by --check-application and at start alike.
+#include <fstream>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/integration/instances/instance_process.hpp"
+
+namespace plchost::testing {
+namespace {
+
+using ::testing::HasSubstr;
+
+struct Fault {
+  const char* application;
+  const char* text;
+};
+
+class ApplicationWith : public ::testing::TestWithParam<Fault> {};
+
+TEST_P(ApplicationWith, IsRefusedByTheCheck) {
+  const Sandbox sandbox;
+  InstanceProcess sut(sandbox, {"--check-application", application(GetParam().application)});
+  EXPECT_EQ(sut.end(), 3);
+  EXPECT_THAT(sut.log(), HasSubstr(GetParam().text));
+}
+
+TEST_P(ApplicationWith, IsRefusedAtStart) {
+  const Sandbox sandbox;
+  InstanceProcess sut(sandbox, {"--application", application(GetParam().application)});
+  EXPECT_EQ(sut.end(), 3);
+  EXPECT_THAT(sut.log(), HasSubstr("load application failed"));
+  EXPECT_THAT(sut.log(), HasSubstr(GetParam().text));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Faults, ApplicationWith,
+    ::testing::Values(Fault{"fault_init_fails", "plc_app_init returned 7"},
+                      Fault{"fault_throws", "plc_app_init threw: no valve is connected"},
+                      Fault{"fault_no_tasks", "did not call __sys__setup__tasks"},
+                      Fault{"fault_two_setups", "called __sys__setup__tasks more than once"},
+                      Fault{"fault_bad_interval", "task 'Only': dwInterval of a cyclic task must be above 0"},
+                      Fault{"fault_wrong_version", "built against version 42 of plc_app.h"},
+                      Fault{"fault_missing_init", "does not export plc_app_init"},
+                      Fault{"fault_undefined_symbol", "function_of_another_runtime"}),
+    [](const auto& test) { return std::string(test.param.application); });
+
+TEST(ApplicationCheck, ListsTheTasksOfAValidApplication) {
+  const Sandbox sandbox;
+  InstanceProcess sut(sandbox, {"--check-application", application("all_kinds")});
+  EXPECT_EQ(sut.end(), 0);
+  EXPECT_THAT(sut.log(), HasSubstr("AllKinds, 8 tasks"));
+  EXPECT_THAT(sut.log(), HasSubstr("Fast: cyclic, priority 1, every 2000 us"));
+}
+
+TEST(ApplicationCheck, RefusesATextFileAndAFolder) {
+  const Sandbox sandbox;
+  InstanceProcess text(sandbox, {"--check-application", sandbox.write("mine.so", "int main() {}\n")});
+  EXPECT_EQ(text.end(), 3);
+  EXPECT_THAT(text.log(), HasSubstr("is not a shared object"));
+  InstanceProcess folder(sandbox, {"--check-application", sandbox.folder()});
+  EXPECT_EQ(folder.end(), 3);
+  EXPECT_THAT(folder.log(), HasSubstr("is not a file"));
+}
+
+TEST(ApplicationCheck, RefusesACopyThatWasCutShort) {
+  const Sandbox sandbox;
+  std::ostringstream whole;
+  whole << std::ifstream(application("packer"), std::ios::binary).rdbuf();
+  const std::string cut = sandbox.write("packer.so", whole.str().substr(0, whole.str().size() * 3 / 4));
+  InstanceProcess sut(sandbox, {"--check-application", cut});
+  EXPECT_EQ(sut.end(), 3);
+  EXPECT_THAT(sut.log(), HasSubstr("is cut short or damaged"));
+}
+
+}  // namespace
+}  // namespace plchost::testing

@@ -1,0 +1,69 @@
+// An application with one fault, chosen when it is compiled. Everything else about it is right.
+#include <stdexcept>
+
+#include "../../../../instances/plc_app.h"
+
+namespace {
+
+void cycle() {}
+
+#ifdef FAULT_BAD_INTERVAL
+constexpr unsigned kInterval = 0;
+#else
+constexpr unsigned kInterval = 10;
+#endif
+
+Task_Info task{.stName = "Only",
+               .nPriority = 1,
+               .KindOfTask = Cyclic,
+               .bMicroseconds = 0,
+               .dwInterval = kInterval,
+               .dwEventFunctionPointer = nullptr,
+               .stExternalEvent = "",
+               .dwTaskEntryFunctionPointer = cycle,
+               .tLastCycleTime = 0,
+               .tAverageCycleTime = 0,
+               .tMaxCycleTime = 0,
+               .tMinCycleTime = 0,
+               .tJitterMax = 0,
+               .tJitterLast = 0};
+[[maybe_unused]] sys_setup_tasks_struct configuration{
+    .nTasks = 1, .stApplicationName = "Faulty", .ptaskinfo = &task};
+
+}  // namespace
+
+#ifdef FAULT_WRONG_VERSION
+const unsigned int plc_app_abi = PLC_APP_ABI_VERSION + 41;
+#else
+PLC_EXPORT_ABI;
+#endif
+
+#ifdef FAULT_UNDEFINED_SYMBOL
+extern "C" void function_of_another_runtime();
+#endif
+
+#ifndef FAULT_MISSING_INIT
+int plc_app_init() {
+#ifdef FAULT_UNDEFINED_SYMBOL
+  function_of_another_runtime();
+#endif
+#ifdef FAULT_THROWS
+  throw std::runtime_error("no valve is connected");
+#endif
+#ifndef FAULT_NO_TASKS
+  __sys__setup__tasks(&configuration);
+#endif
+#ifdef FAULT_TWO_SETUPS
+  __sys__setup__tasks(&configuration);
+#endif
+#ifdef FAULT_INIT_FAILS
+  return 7;
+#else
+  return 0;
+#endif
+}
+#else
+void keeps_the_compiler_from_calling_it_unused() {
+  __sys__setup__tasks(&configuration);
+}
+#endif

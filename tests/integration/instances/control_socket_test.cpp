@@ -1,0 +1,155 @@
+// The control socket of a real plc-instance.
+#include <csignal>
+#include <cstdlib>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "instances/launch/launch_contract.hpp"
+#include "tests/integration/instances/instance_process.hpp"
+
+namespace plchost::testing {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::HasSubstr;
+
+class ControlSocket : public ::testing::Test {
+ protected:
+  Sandbox sandbox_;
+  InstanceProcess sut_{sandbox_, {"--application", application("all_kinds")}};
+  void SetUp() override { sut_.wait_until_up(); }
+
+  static ControlReply reply(PacketSocket& socket) {
+    const auto packet = socket.receive_until(MonotonicClock::now() + 20s);
+    EXPECT_TRUE(packet);
+    return packet ? decode_reply(*packet).value_or(ControlReply{}) : ControlReply{};
+  }
+};
+
+TEST_F(ControlSocket, StopsAndStartsTheApplication) {
+  EXPECT_EQ(sut_.ask(ControlVerb::stop).code, ErrorCode::ok);
+  EXPECT_EQ(sut_.task("Fast")->state, PageTaskState::stopped);
+  EXPECT_EQ(sut_.event("work").post(), PostResult::no_task);
+  EXPECT_EQ(sut_.ask(ControlVerb::stop).code, ErrorCode::wrong_state);
+  const auto cycles = sut_.task("Fast")->counters.cycles;
+  EXPECT_EQ(sut_.ask(ControlVerb::start).code, ErrorCode::ok);
+  EXPECT_EQ(sut_.ask(ControlVerb::start).code, ErrorCode::wrong_state);
+  EXPECT_TRUE(eventually([&] { return sut_.task("Fast")->counters.cycles > cycles; }));
+  EXPECT_EQ(sut_.task("Work")->counters.cycles, 0U);  // what was posted while it was stopped is not run
+}
+
+TEST_F(ControlSocket, TellsItsStatus) {
+  const auto report = decode_instance_report(sut_.ask(ControlVerb::status).text);
+  ASSERT_TRUE(report);
+  EXPECT_EQ(report->pid, sut_.pid());
+  EXPECT_TRUE(report->running);
+  EXPECT_EQ(report->scheduler, "CmpSchedule");
+  EXPECT_THAT(report->application, HasSubstr("all_kinds.so"));
+}
+
+TEST_F(ControlSocket, RefusesAnUnknownSchedulerAndListsWhatThereIs) {
+  const auto refused = sut_.ask(ControlVerb::set_scheduler, "CmpShedule");
+  EXPECT_EQ(refused.code, ErrorCode::invalid_argument);
+  EXPECT_THAT(refused.text, HasSubstr("CmpScheduleOneShot"));
+}
+
+TEST_F(ControlSocket, BindsAnEventThatIsRegisteredLate) {
+  EXPECT_EQ(sut_.event("late").post(), PostResult::not_registered);
+  EXPECT_EQ(sut_.ask(ControlVerb::register_event, "late").code, ErrorCode::ok);
+  EXPECT_EQ(sut_.event("late").post(), PostResult::posted);
+  EXPECT_TRUE(eventually([&] { return sut_.task("Late")->counters.cycles == 1; }));
+  EXPECT_EQ(sut_.ask(ControlVerb::unregister_event, "late").code, ErrorCode::ok);
+  EXPECT_EQ(sut_.event("late").post(), PostResult::not_registered);
+  const auto refused = sut_.ask(ControlVerb::unregister_event, "late");
+  EXPECT_EQ(refused.code, ErrorCode::not_found);
+  EXPECT_THAT(refused.text, HasSubstr("work"));  // lists what is registered
+}
+
+TEST_F(ControlSocket, RefusesABadEventName) {
+  EXPECT_EQ(sut_.ask(ControlVerb::register_event, "not a name").code, ErrorCode::invalid_argument);
+  EXPECT_EQ(sut_.ask(ControlVerb::register_event, "line2/other").code, ErrorCode::invalid_argument);
+  EXPECT_EQ(sut_.ask(ControlVerb::register_event, std::string(51, 'x')).code, ErrorCode::invalid_argument);
+}
+
+TEST_F(ControlSocket, RegistrationByTheOperatorOutlivesTheProcess) {
+  EXPECT_EQ(sut_.ask(ControlVerb::register_event, "late").code, ErrorCode::ok);
+  EXPECT_EQ(sut_.end(SIGKILL), -SIGKILL);
+  InstanceProcess next(sandbox_, {"--application", application("all_kinds")});
+  next.wait_until_up();
+  EXPECT_EQ(next.event("late").post(), PostResult::posted);
+}
+
+TEST_F(ControlSocket, SendsToTheManagerWhatNeedsAFreshProcess) {
+  for (const ControlVerb verb : {ControlVerb::reset, ControlVerb::restart, ControlVerb::load_application}) {
+    EXPECT_EQ(sut_.ask(verb).code, ErrorCode::unsupported);
+  }
+}
+
+TEST_F(ControlSocket, AnswersGarbageWithAReasonAndGoesOn) {
+  PacketSocket socket = sut_.connect();
+  const std::vector<std::string> garbage{"{", std::string(100, '\xff'), "[]", "{\"version\":9}",
+                                         std::string(kMaxPacket, 'x')};
+  for (const std::string& packet : garbage) {
+    ASSERT_TRUE(socket.send(packet));
+    const auto refused = reply(socket);
+    EXPECT_EQ(refused.code, ErrorCode::corrupt);
+    EXPECT_FALSE(refused.text.empty());
+  }
+  ASSERT_TRUE(socket.send(encode(ControlRequest{5, ControlVerb::status, "another", ""})));
+  EXPECT_EQ(reply(socket).code, ErrorCode::not_found);
+  ASSERT_TRUE(socket.send(encode(ControlRequest{6, ControlVerb::status, "line1", ""})));
+  EXPECT_EQ(reply(socket).number, 6U);
+}
+
+TEST_F(ControlSocket, ClientThatNeverReadsBlocksNobody) {
+  PacketSocket deaf = sut_.connect();
+  for (int i = 0; i < 10'000; ++i) {
+    if (const auto sent = deaf.send(encode(ControlRequest{1, ControlVerb::status, "line1", ""})); !sent)
+      break;
+  }
+  EXPECT_EQ(sut_.ask(ControlVerb::status).code, ErrorCode::ok);
+}
+
+TEST_F(ControlSocket, TellsTheOneConnectionTooManyAndServesTheOthers) {
+  std::vector<PacketSocket> connections;
+  constexpr std::size_t kAllowed = 16;
+  for (std::size_t i = 0; i < kAllowed; ++i) {
+    connections.push_back(sut_.connect());
+    ASSERT_TRUE(connections.back().send(encode(ControlRequest{i, ControlVerb::status, "line1", ""})));
+    EXPECT_EQ(reply(connections.back()).code, ErrorCode::ok);
+  }
+  PacketSocket one_more = sut_.connect();
+  EXPECT_EQ(reply(one_more).code, ErrorCode::busy);
+  ASSERT_TRUE(connections.front().send(encode(ControlRequest{9, ControlVerb::status, "line1", ""})));
+  EXPECT_EQ(reply(connections.front()).number, 9U);
+}
+
+TEST_F(ControlSocket, ShutsDownInOrder) {
+  EXPECT_EQ(sut_.ask(ControlVerb::shutdown).code, ErrorCode::ok);
+  EXPECT_EQ(sut_.end(), EXIT_SUCCESS);
+  EXPECT_THAT(sut_.log(), HasSubstr("exit after"));
+}
+
+TEST(ControlSocketOfAnEmptyInstance, SaysThatThereIsNothingToStart) {
+  const Sandbox sandbox;
+  InstanceProcess sut(sandbox, {});
+  sut.wait_until_up(false);
+  const auto refused = sut.ask(ControlVerb::start);
+  EXPECT_EQ(refused.code, ErrorCode::wrong_state);
+  EXPECT_THAT(refused.text, HasSubstr("no application"));
+}
+
+TEST(ControlSocketOfAStoppedInstance, StartsIt) {
+  const Sandbox sandbox;
+  InstanceProcess sut(sandbox, {"--stopped", "--application", application("all_kinds")});
+  sut.wait_until_up(false);
+  EXPECT_EQ(sut.ask(ControlVerb::set_scheduler, "CmpScheduleTimer").code, ErrorCode::ok);
+  EXPECT_EQ(sut.ask(ControlVerb::start).code, ErrorCode::ok);
+  EXPECT_TRUE(eventually([&] { return sut.task("Fast")->counters.cycles > 10; }));
+  EXPECT_EQ(decode_instance_report(sut.ask(ControlVerb::status).text)->scheduler, "CmpScheduleTimer");
+}
+
+}  // namespace
+}  // namespace plchost::testing

@@ -1,0 +1,127 @@
+// Each set-up step's own error, as a person reads it and as the manager gets it.
+#include <array>
+#include <csignal>
+#include <fstream>
+
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+
+#include "instances/launch/launch_contract.hpp"
+#include "tests/integration/instances/instance_process.hpp"
+
+namespace plchost::testing {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::HasSubstr;
+
+struct Case {
+  const char* name;
+  std::vector<std::string> arguments;
+  int exit_code;
+  std::string text;
+};
+
+class SetupOf : public ::testing::TestWithParam<Case> {};
+
+TEST_P(SetupOf, FailsWithItsStepAndReason) {
+  const Sandbox sandbox;
+  InstanceProcess sut(sandbox, GetParam().arguments);
+  EXPECT_EQ(sut.end(), GetParam().exit_code);
+  EXPECT_THAT(sut.log(), HasSubstr(GetParam().text));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Steps, SetupOf,
+    ::testing::Values(
+        Case{"UnknownOption", {"--shceduler", "x"}, 2, "--shceduler"},
+        Case{"UnknownScheduler", {"--scheduler", "CmpShedule"}, 2, "CmpScheduleOneShot"},
+        Case{"UnknownBand", {"--priority-band", "higher"}, 2, "high, normal and low"},
+        Case{"BadName", {"--name", "a b"}, 2, "instance name"},
+        Case{"BadLogLevel", {"--log-level", "loud"}, 2, "trace, debug"},
+        Case{"CoreThatIsNotThere", {"--core", "1000"}, 3, "bind core failed"},
+        Case{"MissingSettings", {"--settings", "/nonexistent.cfg"}, 3, "read settings failed: settings file"},
+        Case{"RunDirectoryThatIsNotThere",
+             {"--run-directory", "/nonexistent"},
+             3,
+             "open control socket failed"},
+        Case{"MissingApplication",
+             {"--application", "/nonexistent.so"},
+             3,
+             "load application failed: /nonexistent.so cannot be opened"}),
+    [](const auto& test) { return std::string(test.param.name); });
+
+TEST(Setup, RefusesAnUnknownKeyWithFileLineAndSuggestion) {
+  const Sandbox sandbox;
+  const std::string file = sandbox.write("line1.cfg", "[CmpSchedule]\n\nSchedulerIntervall=1000\n");
+  InstanceProcess sut(sandbox, {"--settings", file});
+  EXPECT_EQ(sut.end(), 3);
+  EXPECT_THAT(sut.log(), HasSubstr(file + ":3: "));
+  EXPECT_THAT(sut.log(), HasSubstr("did you mean 'SchedulerInterval'?"));
+}
+
+TEST(Setup, RefusesSomethingInThePlaceOfThePool) {
+  const Sandbox sandbox;
+  InstanceProcess sut(sandbox, {"--pool", sandbox.pool() + "-no", "--stopped"});
+  const std::string file = "/dev/shm/" + sandbox.pool() + "-broken";
+  std::ofstream(file) << std::string(100'000, 'x');
+  InstanceProcess refused(sandbox, {"--pool", sandbox.pool() + "-broken"});
+  EXPECT_EQ(refused.end(), 3);
+  EXPECT_THAT(refused.log(), HasSubstr("attach pool failed"));
+  ObjectPool::remove(sandbox.pool() + "-broken");
+  EXPECT_EQ(sut.connect() ? sut.end(SIGTERM) : -1, 0);
+  ObjectPool::remove(sandbox.pool() + "-no");
+}
+
+TEST(Setup, RefusesAComponentThatIsNone) {
+  const Sandbox sandbox;
+  (void)sandbox.write("driver.so", "not a program");
+  const std::string file = sandbox.write("line1.cfg", "[ComponentManager]\nComponent.1=driver.so\n");
+  InstanceProcess sut(sandbox, {"--settings", file});
+  EXPECT_EQ(sut.end(), 3);
+  EXPECT_THAT(sut.log(), HasSubstr("load components failed: component: " + sandbox.folder() + "/driver.so"));
+}
+
+// The reports as the manager reads them.
+std::vector<SetupReport> reports_of(const Sandbox& sandbox, const std::string& program) {
+  std::array<int, 2> ends{};
+  EXPECT_EQ(::socketpair(AF_UNIX, SOCK_SEQPACKET, 0, ends.data()), 0);
+  ::fcntl(ends[0], F_SETFD, FD_CLOEXEC);
+  InstanceProcess sut(sandbox, {"--report-fd", std::to_string(ends[1]), "--application", program});
+  ::close(ends[1]);
+  PacketSocket socket{UniqueFd(ends[0])};
+  std::vector<SetupReport> reports;
+  while (true) {
+    const auto packet = socket.receive_until(MonotonicClock::now() + 20s);
+    const auto report =
+        packet ? decode_report(*packet) : Result<SetupReport>(std::unexpected(packet.error()));
+    if (!report) break;
+    reports.push_back(*report);
+    if (report->step == SetupStep::ready) break;
+  }
+  return reports;
+}
+
+TEST(SetupReports, NameEachStepInOrderAndEndWithReady) {
+  const Sandbox sandbox;
+  const auto reports = reports_of(sandbox, application("all_kinds"));
+  ASSERT_EQ(reports.size(), static_cast<std::size_t>(SetupStep::ready) + 1);
+  for (std::size_t i = 0; i < reports.size(); ++i) {
+    EXPECT_EQ(static_cast<std::size_t>(reports[i].step), i);
+    EXPECT_EQ(reports[i].code, ErrorCode::ok);
+  }
+}
+
+TEST(SetupReports, EndWithTheStepThatFailed) {
+  const Sandbox sandbox;
+  const auto reports = reports_of(sandbox, "/nonexistent.so");
+  ASSERT_FALSE(reports.empty());
+  EXPECT_EQ(reports.back().step, SetupStep::load_application);
+  EXPECT_EQ(reports.back().code, ErrorCode::not_found);
+  EXPECT_THAT(reports.back().text, HasSubstr("/nonexistent.so"));
+}
+
+}  // namespace
+}  // namespace plchost::testing

@@ -1,0 +1,38 @@
+// The layout that compiled applications rely on: a change here is a new PLC_APP_ABI_VERSION.
+#include <cstddef>
+
+#include <gtest/gtest.h>
+
+#include "instances/plc_app.h"
+
+namespace {
+
+static_assert(PLC_APP_ABI_VERSION == 1);
+static_assert(offsetof(Task_Info, stName) == 0);
+static_assert(offsetof(Task_Info, nPriority) == 52);
+static_assert(offsetof(Task_Info, KindOfTask) == 54);
+static_assert(offsetof(Task_Info, bMicroseconds) == 56);
+static_assert(offsetof(Task_Info, dwInterval) == 60);
+static_assert(offsetof(Task_Info, dwEventFunctionPointer) == 64);
+static_assert(offsetof(Task_Info, stExternalEvent) == 72);
+static_assert(offsetof(Task_Info, dwTaskEntryFunctionPointer) == 128);
+static_assert(offsetof(Task_Info, tLastCycleTime) == 136);
+static_assert(offsetof(Task_Info, tAverageCycleTime) == 140);
+static_assert(offsetof(Task_Info, tMaxCycleTime) == 144);
+static_assert(offsetof(Task_Info, tMinCycleTime) == 148);
+static_assert(offsetof(Task_Info, tJitterMax) == 152);
+static_assert(offsetof(Task_Info, tJitterLast) == 156);
+static_assert(sizeof(Task_Info) == 160);
+static_assert(offsetof(sys_setup_tasks_struct, nTasks) == 0);
+static_assert(offsetof(sys_setup_tasks_struct, stApplicationName) == 2);
+static_assert(offsetof(sys_setup_tasks_struct, ptaskinfo) == 56);
+static_assert(sizeof(sys_setup_tasks_struct) == 64);
+
+TEST(Abi, NumbersTheKindsOfTaskAsTheSeedDoes) {
+  EXPECT_EQ(Cyclic, 0);
+  EXPECT_EQ(Event, 1);
+  EXPECT_EQ(External, 2);
+  EXPECT_EQ(Freewheeling, 3);
+}
+
+}  // namespace

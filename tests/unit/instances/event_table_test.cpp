@@ -1,0 +1,110 @@
+#include "instances/runtime/event_table.hpp"
+
+#include <atomic>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+namespace plchost {
+namespace {
+
+class EventTableTest : public ::testing::Test {
+ protected:
+  static std::string unique_name() {
+    static std::atomic<int> counter{0};
+    return fmt::format("evtest-{}-{}", ::getpid(), ++counter);
+  }
+  ~EventTableTest() override { ObjectPool::remove(name_); }
+
+  std::string name_ = unique_name();
+  ObjectPool pool_ = ObjectPool::create(name_, {.max_objects = 16384}).value();
+  EventTable sut_{"line1", &pool_};
+};
+
+TEST_F(EventTableTest, PostTellsWhetherItIsRegisteredAndBound) {
+  const RTS_HANDLE handle = sut_.open("ready").value();
+  EXPECT_EQ(sut_.post(handle), ERR_NO_OBJECT);
+  ASSERT_TRUE(sut_.register_by_application(handle));
+  EXPECT_EQ(sut_.post(handle), ERR_NO_TASK);
+  CountedEvent* const counted = sut_.bind_task("ready").value();
+  ASSERT_TRUE(sut_.publish_bound(true));
+  EXPECT_EQ(sut_.post(handle), ERR_OK);
+  EXPECT_EQ(counted->count(), 2U);
+}
+
+TEST_F(EventTableTest, SetNeedsNoRegistrationButATask) {
+  const RTS_HANDLE handle = sut_.open("ready").value();
+  EXPECT_EQ(sut_.set(handle), ERR_NO_TASK);
+  CountedEvent* const counted = sut_.bind_task("ready").value();
+  ASSERT_TRUE(sut_.publish_bound(true));
+  EXPECT_EQ(sut_.set(handle), ERR_OK);
+  EXPECT_EQ(counted->count(), 1U);
+}
+
+TEST_F(EventTableTest, NamesMeanTheSameEventOnce) {
+  EXPECT_EQ(sut_.open("ready").value(), sut_.open("line1/ready").value());
+  EXPECT_NE(sut_.open("ready").value(), sut_.open("line2/ready").value());
+}
+
+TEST_F(EventTableTest, PostsToAnotherInstanceOnceThatHasRegistered) {
+  const RTS_HANDLE handle = sut_.open("packer1/product").value();
+  ASSERT_TRUE(sut_.register_by_application(handle));  // gives access only
+  EXPECT_EQ(sut_.post(handle), ERR_NO_OBJECT);
+  EventTable packer("packer1", &pool_);
+  ASSERT_TRUE(packer.register_by_application(packer.open("product").value()));
+  EXPECT_EQ(sut_.post(handle), ERR_NO_TASK);
+}
+
+TEST_F(EventTableTest, RefusesHandlesThatItDidNotGive) {
+  (void)sut_.open("ready");
+  EXPECT_EQ(sut_.post(nullptr), ERR_PARAMETER);
+  EXPECT_EQ(sut_.post(RTS_INVALID_HANDLE), ERR_PARAMETER);
+  EXPECT_EQ(sut_.set(&sut_), ERR_PARAMETER);
+}
+
+TEST_F(EventTableTest, RefusesBadNames) {
+  for (const char* const name : {"", "/", "line1/", "/ready", "a/b/c", "a b", "-x"}) {
+    EXPECT_FALSE(sut_.open(name)) << name;
+  }
+  EXPECT_FALSE(sut_.bind_task("line2/ready"));
+}
+
+TEST_F(EventTableTest, OperatorAndApplicationRegisterIndependently) {
+  const RTS_HANDLE handle = sut_.open("ready").value();
+  ASSERT_TRUE(sut_.register_by_operator("ready"));
+  ASSERT_TRUE(sut_.register_by_application(handle));
+  EXPECT_EQ(sut_.register_by_application(handle).error().code, ErrorCode::already_exists);
+  ASSERT_TRUE(sut_.unregister_by_application(handle));
+  EXPECT_EQ(sut_.post(handle), ERR_NO_TASK);  // the operator's holds
+  ASSERT_TRUE(sut_.unregister_by_operator("ready"));
+  EXPECT_EQ(sut_.post(handle), ERR_NO_OBJECT);
+  EXPECT_EQ(sut_.unregister_by_operator("ready").error().code, ErrorCode::not_found);
+}
+
+TEST_F(EventTableTest, IsFullAtItsBound) {
+  for (std::size_t i = 0; i < EventTable::kMaxEvents; ++i) ASSERT_TRUE(sut_.open(fmt::format("e{}", i)));
+  EXPECT_EQ(sut_.open("one-more").error().code, ErrorCode::full);
+  EXPECT_TRUE(sut_.open("e0"));
+}
+
+TEST_F(EventTableTest, ClearsOnlyWhatIsItsOwn) {
+  EventTable other("line10", &pool_);
+  ASSERT_TRUE(other.register_by_application(other.open("ready").value()));
+  ASSERT_TRUE(sut_.register_by_application(sut_.open("ready").value()));
+  EventTable successor("line1", &pool_);
+  successor.clear_own();
+  EXPECT_FALSE(pool_.open_event("line1/ready").value().registered());
+  EXPECT_TRUE(pool_.open_event("line10/ready").value().registered());
+}
+
+TEST(EventTableWithoutPool, OnlyCollects) {
+  EventTable sut("check", nullptr);
+  const RTS_HANDLE handle = sut.open("ready").value();
+  EXPECT_TRUE(sut.register_by_application(handle));
+  EXPECT_EQ(sut.post(handle), ERR_NO_TASK);
+  EXPECT_EQ(sut.set(handle), ERR_NO_TASK);
+}
+
+}  // namespace
+}  // namespace plchost
