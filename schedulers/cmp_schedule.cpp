@@ -24,7 +24,13 @@ Result<std::unique_ptr<ActivationSource>> CmpSchedule::source_for(Task& task) {
   return table_.add(task, FreewheelRule(settings_));
 }
 
+Result<void> CmpSchedule::prepare() {
+  if (!needs_tick()) return {};
+  return ticker_.prepare();
+}
+
 void CmpSchedule::start(TimePoint origin) noexcept {
+  if (!needs_tick()) return;
   // What was due before the first tick, while a switch was under way, is only late and runs at once.
   const TimePoint first = ticker_.first_tick(origin);
   table_.start(first - settings_.scheduler_interval);

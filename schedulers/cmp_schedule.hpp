@@ -19,11 +19,12 @@ class CmpSchedule final : public Scheduler {
     return {.one_shot = false, .external_event_breakpoints = true};
   }
   [[nodiscard]] Result<std::unique_ptr<ActivationSource>> source_for(Task& task) override;
-  [[nodiscard]] Result<void> prepare() override { return ticker_.prepare(); }
+  [[nodiscard]] Result<void> prepare() override;
   void start(TimePoint origin) noexcept override;
   void stop() noexcept override { ticker_.stop(); }
 
  private:
+  [[nodiscard]] bool needs_tick() const noexcept { return !table_.empty() || !poller_.empty(); }
   void on_tick(TimePoint tick) noexcept;
 
   Clock& clock_;

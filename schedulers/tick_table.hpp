@@ -20,6 +20,8 @@ class TickTable {
   /// The source of a cyclic or freewheeling task. Set-up.
   [[nodiscard]] std::unique_ptr<ActivationSource> add(const Task& task, FreewheelRule rule);
 
+  [[nodiscard]] bool empty() const noexcept { return slots_.empty(); }
+
   /// Orders the table by priority and takes `tick` as the last tick that passed. Set-up, after the last
   /// add().
   void start(TimePoint tick) noexcept;

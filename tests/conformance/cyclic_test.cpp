@@ -8,6 +8,8 @@ using std::chrono::milliseconds;
 
 class CyclicTasks : public testing::TestWithParam<std::string_view>, public ManualTasks {
  protected:
+  void TearDown() override { finish(); }
+
   // A task that notes when its cycles begin, and whose cycle number i takes execution[i], the others no time.
   TaskConfig noting(Duration interval, std::vector<Duration> execution = {}) {
     return cyclic("main", interval, [this, execution, cycle = std::size_t{0}]() mutable {

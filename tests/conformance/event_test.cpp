@@ -7,6 +7,8 @@ using std::chrono::milliseconds;
 
 class EventTasks : public testing::TestWithParam<std::string_view>, public ManualTasks {
  protected:
+  void TearDown() override { finish(); }
+
   void begin(Duration execution = Duration::zero()) {
     add(event(
         "on_edge", [this] { return variable.load(); },

@@ -8,9 +8,13 @@ using std::chrono::seconds;
 
 class ExternalEventTasks : public testing::TestWithParam<std::string_view>, public ManualTasks {
  protected:
+  void TearDown() override { finish(); }
+
   void post(std::string_view name, int count) {
     for (int i = 0; i < count; ++i) event_named(name).post();
   }
+  std::atomic<bool> go{false};
+
   // Nothing more is to come: the thread sleeps on its event again.
   void expect_no_further_cycle(std::size_t task, std::uint64_t cycles) {
     std::this_thread::sleep_for(milliseconds(5));
@@ -75,8 +79,7 @@ TEST_P(ExternalEventTasks, AreRefusedIfTheEventCannotBeHad) {
 }
 
 TEST_P(ExternalEventTasks, BacklogUpToItsBoundIsRunAndWhatIsBeyondIsCountedAsLost) {
-  std::atomic<bool> go{false};
-  add(external("slow", "ready", [&] {
+  add(external("slow", "ready", [this] {
     while (!go) std::this_thread::yield();
   }));
   ASSERT_TRUE(create());
@@ -110,8 +113,7 @@ TEST_P(ExternalEventTasks, PostsWhileTheyWereStoppedAreNotRun) {
 }
 
 TEST_P(ExternalEventTasks, StopAtTheEndOfACycleHoweverLongTheBacklogIs) {
-  std::atomic<bool> go{false};
-  add(external("slow", "ready", [&] {
+  add(external("slow", "ready", [this] {
     while (!go) std::this_thread::yield();
     std::this_thread::sleep_for(milliseconds(1));
   }));

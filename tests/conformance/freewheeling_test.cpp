@@ -7,6 +7,8 @@ using std::chrono::milliseconds;
 
 class FreewheelingTasks : public testing::TestWithParam<std::string_view>, public ManualTasks {
  protected:
+  void TearDown() override { finish(); }
+
   void run(Duration execution, const SchedulerSettings& settings) {
     add(freewheeling("loop", [this, execution] {
       starts.push_back(clock.now());

@@ -91,7 +91,6 @@ class Tasks {
 
   Time clock;
   bool unprivileged = true;
-  std::unique_ptr<TaskSet> set;
 
  private:
   TaskEnvironment environment() {
@@ -110,15 +109,25 @@ class Tasks {
   std::vector<TaskConfig> configs_;
   std::deque<TaskStatistics> statistics_;
   std::deque<std::pair<std::string, CountedEvent>> events_;
+
+ public:
+  std::unique_ptr<TaskSet> set;  // last: it uses all of the above
 };
 
 /// Tasks on a clock that the test moves.
 class ManualTasks : public Tasks<ManualClock> {
  public:
-  ~ManualTasks() {
-    // Every cycle that is under way comes to its end, as long as somebody moves the clock.
+  ManualTasks() = default;
+  ManualTasks(const ManualTasks&) = delete;
+  ManualTasks& operator=(const ManualTasks&) = delete;
+  ~ManualTasks() { finish(); }
+
+  /// Ends the tasks, before anything goes that their code uses. Every cycle that is under way comes to its
+  /// end, as long as somebody moves the clock.
+  void finish() {
     if (set && set->running()) (void)set->stop(Duration::zero());
     clock.run_for(std::chrono::seconds(100));
+    set.reset();
   }
 
   /// Starts them; the origin of their grids.

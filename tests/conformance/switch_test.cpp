@@ -26,6 +26,8 @@ std::string pair_name(const testing::TestParamInfo<Pair>& pair) {
 
 class Switch : public testing::TestWithParam<Pair>, public ManualTasks {
  protected:
+  void TearDown() override { finish(); }
+
   TimePoint begin(const std::vector<Duration>& execution = {}) {
     add(cyclic("main", milliseconds(2), [this, execution, cycle = std::size_t{0}]() mutable {
       starts.push_back(clock.now());
@@ -110,8 +112,8 @@ TEST(SwitchOfRunningTasks, ToAnUnknownSchedulerIsRefusedAndTheyRunOn) {
 
 TEST(SwitchOfRunningTasks, ThatCannotBePreparedLeavesTheOldSchedulerInPlace) {
   for (const auto& [from, to] : every_pair()) {
-    ManualTasks tasks;
     std::atomic<bool> variable{false};
+    ManualTasks tasks;
     tasks.add(ManualTasks::cyclic("main", milliseconds(1), [] {}));
     tasks.add(ManualTasks::event("on_edge", [&] { return variable.load(); }, [] {}));
     ASSERT_TRUE(tasks.create());
@@ -160,9 +162,9 @@ TEST(SwitchOfRunningTasks, TellsWhichTasksRunAndWhichAreParked) {
 // Real threads and real time: what may happen at any instruction happens here at some of them.
 TEST(SwitchOfRunningTasks, LosesAndRepeatsNoPostAndNoRelease) {
   constexpr std::uint64_t kPosts = 10'000;
-  Tasks<LinuxClock> tasks;
   std::atomic<bool> variable{false};
   std::atomic<std::uint64_t> runs{0};
+  Tasks<LinuxClock> tasks;
   for (int i = 0; i < 2; ++i) {
     tasks.add(ManualTasks::external("external" + std::to_string(i), "ready", [&runs] { ++runs; }));
   }
