@@ -12,14 +12,17 @@ namespace {
 
 void add_options(CLI::App& app, plchost::CliOptions& options) {
   app.add_option("--host", options.host, "which controller; not needed when there is only one")
-      ->envname("PLCHOST_HOST");
+      ->envname("PLCHOST_HOST")
+      ->take_last();
   app.add_option("--domain", options.dds.domain, "DDS domain (default 0)")
       ->envname("PLCHOST_DOMAIN")
-      ->check(CLI::Range(0U, plchost::dds::kMaxDomain));
+      ->check(CLI::Range(0U, plchost::dds::kMaxDomain))
+      ->take_last();
   constexpr double kMinTimeout = 0.1;
   constexpr double kMaxTimeout = 3600;
   app.add_option("--timeout", options.timeout_s, "seconds to wait for an answer (default 3)")
-      ->check(CLI::Range(kMinTimeout, kMaxTimeout));
+      ->check(CLI::Range(kMinTimeout, kMaxTimeout))
+      ->take_last();
   app.add_flag("--json", options.json, "an array of flat objects, for programs");
   app.add_option("--interface", options.dds.interfaces, "network interface (default lo); may be repeated")
       ->expected(1)

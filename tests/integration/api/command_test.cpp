@@ -1,0 +1,177 @@
+#include <thread>
+
+#include <gmock/gmock.h>
+
+#include "api/client/control_client.hpp"
+#include "api/dds/samples.hpp"
+#include "api/dds/text.hpp"
+#include "api/dds/topics.hpp"
+#include "tests/integration/api/test_host.hpp"
+
+namespace plchost {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+TimePoint soon() {
+  return MonotonicClock::now() + seconds(20);
+}
+
+std::unique_ptr<ControlClient> connect(const OwnDomain& domain) {
+  dds::DomainOptions options;
+  options.domain = domain.number();
+  return ControlClient::connect(options).value();
+}
+
+class RemoteCommand : public testing::Test {
+ protected:
+  RemoteCommand() {
+    host_.write_instance(0, "line1", InstanceState::running, 4711);
+    host_.write_count(1);
+  }
+
+  OwnDomain domain_;
+  TestHost host_{domain_, "hosta"};
+};
+
+TEST_F(RemoteCommand, ReachesTheManagerAndBringsItsAnswerBack) {
+  host_.answer_with({0, ErrorCode::wrong_state, "line1 runs already"});
+  host_.start_server();
+  const auto sut = connect(domain_);
+
+  const auto reply = sut->call({"hosta", plc_OPERATION_START, "line1", ""}, soon());
+
+  ASSERT_TRUE(reply) << reply.error().describe();
+  EXPECT_EQ(reply->code, ErrorCode::wrong_state);
+  EXPECT_EQ(reply->text, "line1 runs already");
+  ASSERT_EQ(host_.requests().size(), 1U);
+  EXPECT_EQ(host_.requests()[0].verb, ControlVerb::start);
+  EXPECT_EQ(host_.requests()[0].instance, "line1");
+}
+
+TEST_F(RemoteCommand, IsSeenInTheStatusOnceItIsAnswered) {
+  host_.start_server();
+  const auto sut = connect(domain_);
+  ASSERT_TRUE(sut->host("hosta", soon()));
+  ASSERT_EQ(sut->instances("hosta", soon()).value().at(0).state, 2U);
+
+  const auto reply = sut->call({"hosta", plc_OPERATION_STOP, "line1", ""}, soon());
+
+  ASSERT_TRUE(reply && reply->code == ErrorCode::ok);
+  EXPECT_EQ(sut->instances("hosta", soon()).value().at(0).state, 3U);
+}
+
+TEST_F(RemoteCommand, ForAnUnknownInstanceIsRefusedByName) {
+  host_.start_server();
+  const auto reply = connect(domain_)->call({"hosta", plc_OPERATION_START, "line9", ""}, soon());
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->code, ErrorCode::not_found);
+  EXPECT_THAT(reply->text, testing::AllOf(testing::HasSubstr("line9"), testing::HasSubstr("line1")));
+  EXPECT_TRUE(host_.requests().empty());
+}
+
+TEST_F(RemoteCommand, WithAnUnknownOperationIsRefusedByNumber) {
+  host_.start_server();
+  const auto reply = connect(domain_)->call({"hosta", 99, "line1", ""}, soon());
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->code, ErrorCode::unsupported);
+  EXPECT_THAT(reply->text, testing::HasSubstr("99"));
+}
+
+TEST_F(RemoteCommand, IsDoneOnceHoweverOftenItIsRepeated) {
+  host_.silent = true;
+  host_.start_server();
+  const auto sut = connect(domain_);
+
+  const auto reply =
+      sut->call({"hosta", plc_OPERATION_RESET, "line1", ""}, MonotonicClock::now() + seconds(2));
+
+  EXPECT_FALSE(reply);
+  EXPECT_EQ(host_.requests().size(), 1U);
+}
+
+TEST_F(RemoteCommand, OfAKilledClientDisturbsNoOther) {
+  host_.silent = true;
+  host_.start_server();
+  {
+    const Child killed(PLCCTL_PROGRAM,
+                       {"--domain", std::to_string(domain_.number()), "stop", "instance", "line1"});
+    while (host_.requests().empty()) std::this_thread::sleep_for(milliseconds(5));
+  }
+  host_.silent = false;
+
+  const auto reply = connect(domain_)->call({"hosta", plc_OPERATION_START, "line1", ""}, soon());
+
+  ASSERT_TRUE(reply) << reply.error().describe();
+  EXPECT_EQ(reply->code, ErrorCode::ok);
+}
+
+TEST_F(RemoteCommand, OfAnotherClientIsAnsweredWhileOneIsStopped) {
+  host_.start_server();
+  const Child stopped(PLCCTL_PROGRAM, {"--domain", std::to_string(domain_.number()), "watch", "tasks"},
+                      "/dev/null");
+  std::this_thread::sleep_for(milliseconds(500));
+  stopped.signal(SIGSTOP);
+  const auto sut = connect(domain_);
+
+  for (int i = 0; i < 200; ++i) {
+    const auto reply = sut->call({"hosta", plc_OPERATION_STOP, "line1", ""}, soon());
+    ASSERT_TRUE(reply) << i << ": " << reply.error().describe();
+  }
+
+  EXPECT_EQ(host_.requests().size(), 200U);
+}
+
+TEST_F(RemoteCommand, WorksForTwentyClientsAtOnce) {
+  host_.start_server();
+  std::vector<Child> clients;
+  for (int i = 0; i < 20; ++i) {
+    clients.emplace_back(PLCCTL_PROGRAM,
+                         std::vector<std::string>{"--domain", std::to_string(domain_.number()), "--timeout",
+                                                  "20", "stop", "instance", "line1"});
+  }
+  for (Child& client : clients) EXPECT_EQ(client.wait(), 0);
+  EXPECT_EQ(host_.requests().size(), 20U);
+}
+
+TEST_F(RemoteCommand, WithAnotherWritersIdentityIsRefused) {
+  host_.start_server();
+  const auto client = connect(domain_);
+  ASSERT_TRUE(client->host("hosta", soon()));
+  const dds::Entity participant(dds_create_participant(domain_.number(), nullptr, nullptr));
+  const auto topic = dds::make_topic(participant.get(), dds::kOperatorRequest).value();
+  const auto publisher = dds::make_publisher(participant.get(), dds::host_partition("hosta")).value();
+  const auto writer = dds::make_writer(publisher.get(), topic.get(), dds::request_qos()).value();
+  const auto reply_topic = dds::make_topic(participant.get(), dds::kReply).value();
+  const auto subscriber =
+      dds::make_subscriber(participant.get(), dds::client_partition(dds::guid_of(participant.get()).hex()))
+          .value();
+  const auto reader = dds::make_reader(subscriber.get(), reply_topic.get(), dds::reply_qos()).value();
+  plc_Request request{};
+  request.header.request_identity.writer_guid[0] = 0x55;
+  dds::copy_text(request.header.instance_name, "hosta");
+  dds::copy_text(request.instance, "line1");
+  request.operation = plc_OPERATION_STOP;
+
+  std::string text;
+  while (text.empty()) {
+    ASSERT_EQ(dds_write(writer.get(), &request), DDS_RETCODE_OK);
+    std::this_thread::sleep_for(milliseconds(50));
+    const dds::Samples<plc_Reply> replies(reader.get());
+    if (replies.size() > 0 && replies.valid(0)) text = dds::text_of(replies[0].text);
+  }
+
+  EXPECT_THAT(text, testing::HasSubstr("identity"));
+  EXPECT_TRUE(host_.requests().empty());
+}
+
+TEST_F(RemoteCommand, EndsTheServerWhenTheManagerIsGone) {
+  host_.start_server();
+  ASSERT_TRUE(connect(domain_)->host("hosta", soon()));
+  host_.close_peer = true;
+  EXPECT_EQ(host_.server().wait(), 0);
+}
+
+}  // namespace
+}  // namespace plchost

@@ -1,0 +1,144 @@
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+
+#include "tests/integration/api/test_host.hpp"
+
+namespace plchost {
+namespace {
+
+using testing::HasSubstr;
+
+class Plcctl : public testing::Test {
+ protected:
+  Plcctl() {
+    page_ = host_.make_page("line1", "Main", 4711);
+    host_.write_instance(0, "line1", InstanceState::running, 4711);
+    host_.write_count(1);
+    event_ = host_.add_event("line1", "ready");
+    event_.set_bound_tasks(1);
+    host_.start_server();
+  }
+  [[nodiscard]] RunResult run(std::vector<std::string> arguments) const {
+    return run_plcctl(domain_.number(), std::move(arguments));
+  }
+
+  OwnDomain domain_;
+  TestHost host_{domain_, "hosta"};
+  std::optional<InstancePage> page_;
+  PoolEvent event_;
+};
+
+TEST_F(Plcctl, ListsInstancesAsFlatObjects) {
+  const auto result = run({"list", "instances", "--json"});
+  ASSERT_EQ(result.code, 0) << result.errors;
+  const auto json = nlohmann::json::parse(result.output);
+  ASSERT_EQ(json.size(), 1U);
+  for (const char* field : {"host", "name", "state", "pid", "core", "scheduler", "application", "restarts"}) {
+    EXPECT_TRUE(json[0].contains(field)) << field;
+  }
+  EXPECT_EQ(json[0]["state"], "running");
+  EXPECT_EQ(json[0]["pid"], 4711);
+}
+
+TEST_F(Plcctl, ListsTasksWithUnitsInTheFieldNames) {
+  const auto result = run({"list", "tasks", "--json"});
+  ASSERT_EQ(result.code, 0) << result.errors;
+  const auto json = nlohmann::json::parse(result.output);
+  ASSERT_EQ(json.size(), 1U);
+  for (const char* field :
+       {"instance", "task", "kind", "priority", "interval_us", "state", "cycles", "lost_cycles",
+        "lost_events", "exec_last_us", "exec_avg_us", "exec_min_us", "exec_max_us", "latency_p50_us",
+        "latency_p99_us", "latency_max_us", "jitter_max_us"}) {
+    EXPECT_TRUE(json[0].contains(field)) << field;
+  }
+  EXPECT_EQ(json[0]["interval_us"], 1000.0);
+}
+
+TEST_F(Plcctl, ListsHostsEventsAndObjects) {
+  EXPECT_THAT(run({"list", "hosts"}).output, HasSubstr("hosta"));
+  EXPECT_THAT(run({"list", "events"}).output, HasSubstr("ready"));
+  EXPECT_THAT(run({"list", "objects"}).output, HasSubstr("line1/ready"));
+}
+
+TEST_F(Plcctl, PostsAsOftenAsAsked) {
+  const auto result = run({"post", "event", "line1/ready", "--count", "50", "--interval-us", "100"});
+  EXPECT_EQ(result.code, 0) << result.errors;
+  EXPECT_THAT(result.output, HasSubstr("50 posted"));
+  EXPECT_EQ(event_.counted().count(), 50U);
+}
+
+TEST_F(Plcctl, SuggestsTheNameThatWasMeant) {
+  const auto post = run({"post", "event", "line1/raedy"});
+  EXPECT_EQ(post.code, 1);
+  EXPECT_THAT(post.errors, HasSubstr("did you mean 'line1/ready'?"));
+  const auto show = run({"show", "instance", "lin1"});
+  EXPECT_EQ(show.code, 1);
+  EXPECT_THAT(show.errors, HasSubstr("did you mean 'line1'?"));
+  const auto stop = run({"stop", "instance", "lin1"});
+  EXPECT_EQ(stop.code, 1);
+  EXPECT_THAT(stop.errors, HasSubstr("did you mean 'line1'?"));
+}
+
+TEST_F(Plcctl, ShowsOneTask) {
+  const auto result = run({"show", "task", "line1/Main"});
+  EXPECT_EQ(result.code, 0) << result.errors;
+  EXPECT_THAT(result.output, HasSubstr("interval_us"));
+}
+
+TEST_F(Plcctl, MakesTheFileOfAnApplicationAbsolute) {
+  EXPECT_EQ(run({"load", "application", "line1", "some/app.so"}).code, 0);
+  ASSERT_EQ(host_.requests().size(), 1U);
+  EXPECT_EQ(host_.requests()[0].argument.front(), '/');
+  EXPECT_THAT(host_.requests()[0].argument, testing::EndsWith("/some/app.so"));
+}
+
+TEST_F(Plcctl, PassesEachVerbOn) {
+  EXPECT_EQ(run({"set", "scheduler", "line1", "CmpScheduleOneShot"}).code, 0);
+  EXPECT_EQ(run({"register", "event", "line1/e/2"}).code, 1) << "a slash is not allowed in an event's name";
+  EXPECT_EQ(run({"unregister", "event", "line1/e2"}).code, 0);
+  EXPECT_EQ(run({"restart", "instance", "line1"}).code, 0);
+  const auto requests = host_.requests();
+  ASSERT_EQ(requests.size(), 3U);
+  EXPECT_EQ(requests[0].verb, ControlVerb::set_scheduler);
+  EXPECT_EQ(requests[1].verb, ControlVerb::unregister_event);
+  EXPECT_EQ(requests[1].argument, "e2");
+  EXPECT_EQ(requests[2].verb, ControlVerb::restart);
+}
+
+TEST_F(Plcctl, WatchesAsOftenAsAsked) {
+  const auto result = run({"watch", "tasks", "line1", "--interval", "0.1", "--count", "3"});
+  EXPECT_EQ(result.code, 0) << result.errors;
+  std::size_t blocks = 0;
+  for (auto at = result.output.find("INSTANCE"); at != std::string::npos;
+       at = result.output.find("INSTANCE", at + 1)) {
+    ++blocks;
+  }
+  EXPECT_EQ(blocks, 3U);
+}
+
+TEST_F(Plcctl, AsksWhichHostWhenThereAreSeveral) {
+  TestHost other(domain_, "hostb");
+  other.start_server();
+  RunResult result;
+  while (result.code != 2) result = run({"stop", "instance", "line1"});
+  EXPECT_THAT(result.errors, testing::AllOf(HasSubstr("--host"), HasSubstr("hosta, hostb")));
+  EXPECT_EQ(run({"--host", "hosta", "stop", "instance", "line1"}).code, 0);
+}
+
+TEST(PlcctlAlone, SaysThatNoHostAnswers) {
+  const OwnDomain domain;
+  const auto result = run_plcctl(domain.number(), {"list", "instances", "--timeout", "0.3"});
+  EXPECT_EQ(result.code, 3);
+  EXPECT_THAT(result.errors, HasSubstr("domain " + std::to_string(domain.number())));
+}
+
+TEST(PlcctlAlone, RefusesWhatItDoesNotKnow) {
+  const auto result = run_plcctl(1, {"lst", "instances"});
+  EXPECT_EQ(result.code, 2);
+  EXPECT_EQ(run_plcctl(1, {"list"}).code, 2);
+  EXPECT_EQ(run_plcctl(1, {"post", "event", "noslash"}).code, 2);
+  EXPECT_EQ(run_plcctl(1, {"post", "event", "a/b", "--count", "0"}).code, 2);
+}
+
+}  // namespace
+}  // namespace plchost

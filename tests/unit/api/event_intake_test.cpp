@@ -1,0 +1,206 @@
+#include "api/server/event_intake.hpp"
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include "api/dds/text.hpp"
+
+namespace plchost {
+namespace {
+
+class EventIntakeTest : public testing::Test {
+ protected:
+  EventIntakeTest() {
+    event_ = pool_.create_event("line1/ready").value();
+    event_.set_registered(true);
+    event_.set_bound_tasks(1);
+  }
+  ~EventIntakeTest() override {
+    MemoryFile::remove(PostLedger::file_name(name_));
+    ObjectPool::remove(name_);
+  }
+
+  static std::string unique_name() {
+    static int counter = 0;
+    return "plchost-intake-" + std::to_string(::getpid()) + "-" + std::to_string(counter++);
+  }
+  [[nodiscard]] EventIntake make() const { return {"hosta", pool_, PostLedger::open(name_).value(), 7}; }
+
+  static plc_EventPost make_post(std::uint64_t sequence, std::uint64_t base = 1, std::uint8_t source = 1) {
+    plc_EventPost post{};
+    post.source[0] = source;
+    post.sequence_number = sequence;
+    post.base_sequence = base;
+    dds::copy_text(post.host, "hosta");
+    dds::copy_text(post.instance, "line1");
+    dds::copy_text(post.event, "ready");
+    return post;
+  }
+  static plc_EventAck only_ack(EventIntake& sut) {
+    const auto acks = sut.collect_acks();
+    EXPECT_EQ(acks.size(), 1U);
+    return acks.empty() ? plc_EventAck{} : acks.front();
+  }
+
+  std::string name_ = unique_name();
+  ObjectPool pool_ = ObjectPool::create(name_, {.max_objects = 64}).value();
+  PoolEvent event_;
+};
+
+TEST_F(EventIntakeTest, PostsAndOwesOneAcknowledgementForABatch) {
+  EventIntake sut = make();
+  for (std::uint64_t i = 1; i <= 5; ++i) sut.process(make_post(i));
+  EXPECT_EQ(event_.counted().count(), 5U);
+  const auto ack = only_ack(sut);
+  EXPECT_EQ(ack.epoch, 7U);
+  EXPECT_EQ(ack.sequence_number, 5U);
+  EXPECT_EQ(ack.accepted, 5U);
+  EXPECT_EQ(ack.credits, kPostCredits);
+  EXPECT_TRUE(sut.collect_acks().empty());
+}
+
+TEST_F(EventIntakeTest, AcknowledgesARepeatedPostWithoutPostingAgain) {
+  EventIntake sut = make();
+  sut.process(make_post(1));
+  (void)sut.collect_acks();
+  sut.process(make_post(1));
+  EXPECT_EQ(event_.counted().count(), 1U);
+  EXPECT_EQ(only_ack(sut).sequence_number, 1U);
+}
+
+TEST_F(EventIntakeTest, WaitsForAMissingPost) {
+  EventIntake sut = make();
+  sut.process(make_post(1));
+  sut.process(make_post(3));
+  EXPECT_EQ(event_.counted().count(), 1U);
+  EXPECT_EQ(only_ack(sut).sequence_number, 1U);
+  sut.process(make_post(2));
+  sut.process(make_post(3));
+  EXPECT_EQ(event_.counted().count(), 3U);
+}
+
+TEST_F(EventIntakeTest, ContinuesWhereTheServerBeforeItWasKilled) {
+  {
+    EventIntake before = make();
+    for (std::uint64_t i = 1; i <= 3; ++i) before.process(make_post(i));
+  }
+  EventIntake sut = make();
+  for (std::uint64_t i = 2; i <= 4; ++i) sut.process(make_post(i, 2));
+  EXPECT_EQ(event_.counted().count(), 4U);
+  const auto ack = only_ack(sut);
+  EXPECT_EQ(ack.sequence_number, 4U);
+  EXPECT_EQ(ack.accepted, 4U);
+}
+
+TEST_F(EventIntakeTest, StartsAtTheBaseOfASourceThatItDoesNotKnow) {
+  EventIntake sut = make();
+  sut.process(make_post(101, 100));
+  EXPECT_EQ(event_.counted().count(), 0U) << "100 is not acknowledged and has not come";
+  sut.process(make_post(100, 100));
+  sut.process(make_post(101, 100));
+  EXPECT_EQ(event_.counted().count(), 2U);
+}
+
+TEST_F(EventIntakeTest, KeepsSourcesApart) {
+  EventIntake sut = make();
+  sut.process(make_post(1, 1, 1));
+  sut.process(make_post(1, 1, 2));
+  EXPECT_EQ(event_.counted().count(), 2U);
+  EXPECT_EQ(sut.collect_acks().size(), 2U);
+}
+
+TEST_F(EventIntakeTest, RejectsByNameAndGoesOn) {
+  EventIntake sut = make();
+  auto wrong = make_post(1);
+  dds::copy_text(wrong.event, "redy");
+  sut.process(wrong);
+  sut.process(make_post(2));
+  const auto ack = only_ack(sut);
+  EXPECT_EQ(ack.sequence_number, 2U);
+  EXPECT_EQ(ack.accepted, 1U);
+  EXPECT_EQ(ack.rejected, 1U);
+  EXPECT_EQ(ack.rejected_sequence, 1U);
+  EXPECT_EQ(ack.rejected_code, static_cast<int>(ErrorCode::not_found));
+  EXPECT_THAT(std::string(dds::text_of(ack.rejected_text)), testing::HasSubstr("line1/redy"));
+}
+
+TEST_F(EventIntakeTest, RejectsAnotherHostAndImpossibleNames) {
+  EventIntake sut = make();
+  auto host = make_post(1);
+  dds::copy_text(host.host, "hostb");
+  sut.process(host);
+  EXPECT_THAT(std::string(dds::text_of(only_ack(sut).rejected_text)), testing::HasSubstr("hostb"));
+  auto empty = make_post(2);
+  dds::copy_text(empty.instance, "");
+  sut.process(empty);
+  auto path = make_post(3);
+  dds::copy_text(path.event, "../x");
+  sut.process(path);
+  EXPECT_EQ(only_ack(sut).rejected, 3U);
+  EXPECT_EQ(event_.counted().count(), 0U);
+}
+
+TEST_F(EventIntakeTest, IgnoresImpossibleNumbers) {
+  EventIntake sut = make();
+  sut.process(make_post(0, 0));
+  sut.process(make_post(1, 0));
+  sut.process(make_post(1, 2));
+  EXPECT_EQ(sut.malformed(), 3U);
+  EXPECT_TRUE(sut.collect_acks().empty());
+}
+
+TEST_F(EventIntakeTest, SeesThatAnEventWasUnregistered) {
+  EventIntake sut = make();
+  sut.process(make_post(1));
+  event_.set_registered(false);
+  sut.process(make_post(2));
+  EXPECT_EQ(only_ack(sut).rejected, 1U);
+  event_.set_registered(true);
+  sut.process(make_post(3));
+  EXPECT_EQ(only_ack(sut).accepted, 2U);
+  EXPECT_EQ(event_.counted().count(), 2U);
+}
+
+TEST_F(EventIntakeTest, SaysWhichPostsFoundNoTask) {
+  EventIntake sut = make();
+  event_.set_bound_tasks(0);
+  sut.process(make_post(1));
+  EXPECT_EQ(only_ack(sut).no_task, 1U);
+}
+
+TEST_F(EventIntakeTest, LooksUpEventsBeyondTheDirectorysBound) {
+  EventDirectory sut(pool_);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_TRUE(sut.find("line1", "ready"));
+  const auto unknown = sut.find("line1", "other");
+  ASSERT_FALSE(unknown);
+  EXPECT_EQ(unknown.error().code, ErrorCode::not_found);
+}
+
+TEST_F(EventIntakeTest, LedgerGivesTheOldestEntryAwayAtItsBound) {
+  PostLedger sut = PostLedger::open(name_).value();
+  const auto source = [](std::uint32_t number) {
+    dds::Guid guid;
+    std::memcpy(guid.bytes.data(), &number, sizeof number);
+    guid.bytes[15] = 1;
+    return guid;
+  };
+  for (std::uint32_t i = 0; i < kLedgerEntries; ++i) sut.entry_for(source(i), i + 10).last.store(i + 1);
+  EXPECT_EQ(sut.reused(), 0U);
+  (void)sut.entry_for(source(0), 1'000'000);
+  EXPECT_EQ(sut.entry_for(source(kLedgerEntries), 1'000'001).last.load(), 0U);
+  EXPECT_EQ(sut.reused(), 1U);
+  EXPECT_EQ(sut.entry_for(source(0), 1'000'002).last.load(), 1U) << "used lately, so kept";
+  EXPECT_EQ(sut.entry_for(source(1), 1'000'003).last.load(), 0U) << "was the oldest";
+}
+
+TEST_F(EventIntakeTest, LedgerOfAnotherFormIsMadeAnew) {
+  {
+    const auto strange = MemoryFile::replace(PostLedger::file_name(name_), 4096);
+    ASSERT_TRUE(strange);
+    strange->bytes()[0] = std::byte{1};
+  }
+  EXPECT_TRUE(PostLedger::open(name_));
+}
+
+}  // namespace
+}  // namespace plchost

@@ -1,0 +1,76 @@
+#include <gmock/gmock.h>
+
+#include "api/cli/cli_session.hpp"
+#include "api/cli/rows.hpp"
+#include "api/cli/table.hpp"
+#include "api/dds/domain.hpp"
+#include "api/dds/text.hpp"
+
+namespace plchost {
+namespace {
+
+using testing::HasSubstr;
+
+TEST(Table, AlignsTextsToTheLeftAndNumbersToTheRight) {
+  const std::vector<Row> rows{{{"name", "a"}, {"value", 5}}, {{"name", "long"}, {"value", 1000}}};
+  EXPECT_EQ(format_table(rows, {{"name", "NAME"}, {"value", "V"}}),
+            "NAME     V\n"
+            "a        5\n"
+            "long  1000\n");
+}
+
+TEST(Table, ShowsNothingAsADashAndFractionsAsAsked) {
+  const std::vector<Row> rows{{{"name", ""}, {"value", 1.25}}};
+  EXPECT_EQ(format_table(rows, {{"name", "NAME"}, {"value", "V", 1}}), "NAME    V\n-     1.2\n");
+}
+
+TEST(Table, LetsNoNameDriveTheTerminal) {
+  EXPECT_THAT(format_table({{{"name", "a\x1b[2J"}}}, {{"name", "NAME"}}), testing::Not(HasSubstr("\x1b")));
+}
+
+TEST(Json, IsAnArrayOfFlatObjects) {
+  EXPECT_EQ(format_json({}), "[]\n");
+  EXPECT_EQ(format_json({{{"b", 1}, {"a", "x"}}}), "[\n  {\"b\":1,\"a\":\"x\"}\n]\n");
+}
+
+TEST(Rows, GiveDurationsInMicroseconds) {
+  plc_TaskStatus status{};
+  dds::copy_text(status.task, "Main");
+  status.interval_ns = 1'500;
+  status.kind = 2;
+  status.state = 9;
+  const Row row = to_row(status);
+  EXPECT_EQ(row["interval_us"], 1.5);
+  EXPECT_EQ(row["kind"], "external");
+  EXPECT_EQ(row["state"], "9") << "what a newer host may say is shown as its number";
+}
+
+TEST(SplitName, SplitsAtTheFirstSlash) {
+  EXPECT_EQ(split_name("TASK", "a/b/c").value(), (std::pair<std::string, std::string>("a", "b/c")));
+  for (const char* wrong : {"", "a", "/a", "a/"}) EXPECT_FALSE(split_name("TASK", wrong)) << wrong;
+}
+
+TEST(DomainConfiguration, LetsNoOptionIntoTheXml) {
+  dds::DomainOptions options;
+  options.interfaces = {"lo\"/><x"};
+  EXPECT_FALSE(dds::domain_configuration(dds::Role::server, options));
+  options.interfaces = {"lo"};
+  options.peers = {"<x>"};
+  EXPECT_FALSE(dds::domain_configuration(dds::Role::client, options));
+  options.peers = {};
+  options.domain = dds::kMaxDomain + 1;
+  EXPECT_FALSE(dds::domain_configuration(dds::Role::client, options));
+  options.domain = dds::kMaxDomain;
+  EXPECT_TRUE(dds::domain_configuration(dds::Role::client, options));
+}
+
+TEST(DomainConfiguration, AsksForRealTimeThreadsOnlyWhenTheyWereGranted) {
+  dds::DomainOptions options;
+  EXPECT_THAT(dds::domain_configuration(dds::Role::server, options).value(),
+              testing::Not(HasSubstr("Realtime")));
+  options.receive_fifo = 20;
+  EXPECT_THAT(dds::domain_configuration(dds::Role::server, options).value(), HasSubstr("Realtime"));
+}
+
+}  // namespace
+}  // namespace plchost

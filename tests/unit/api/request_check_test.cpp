@@ -1,0 +1,79 @@
+#include "api/server/request_check.hpp"
+
+#include <array>
+
+#include <gmock/gmock.h>
+
+#include "api/dds/text.hpp"
+
+namespace plchost {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr std::array<std::string_view, 2> kInstances{"line1", "line2"};
+
+plc_Request make(std::int32_t operation, std::string_view instance = "line1", std::string_view argument = "",
+                 std::string_view host = "hosta") {
+  plc_Request request{};
+  dds::copy_text(request.header.instance_name, host);
+  request.operation = operation;
+  dds::copy_text(request.instance, instance);
+  dds::copy_text(request.argument, argument);
+  return request;
+}
+
+Result<ControlRequest> check(const plc_Request& request, ApiRole role) {
+  return check_request(request, role, "hosta", kInstances);
+}
+
+TEST(RequestCheck, TurnsEachOperationIntoItsVerb) {
+  EXPECT_EQ(check(make(plc_OPERATION_START), ApiRole::operating)->verb, ControlVerb::start);
+  EXPECT_EQ(check(make(plc_OPERATION_STOP), ApiRole::operating)->verb, ControlVerb::stop);
+  EXPECT_EQ(check(make(plc_OPERATION_RESET), ApiRole::operating)->verb, ControlVerb::reset);
+  EXPECT_EQ(check(make(plc_OPERATION_RESTART), ApiRole::operating)->verb, ControlVerb::restart);
+  const auto load = check(make(plc_OPERATION_LOAD_APPLICATION, "line2", "/a/b.so"), ApiRole::engineering);
+  EXPECT_EQ(load->verb, ControlVerb::load_application);
+  EXPECT_EQ(load->instance, "line2");
+  EXPECT_EQ(load->argument, "/a/b.so");
+  EXPECT_EQ(check(make(plc_OPERATION_SET_SCHEDULER, "line1", "CmpSchedule"), ApiRole::engineering)->verb,
+            ControlVerb::set_scheduler);
+  EXPECT_EQ(check(make(plc_OPERATION_REGISTER_EVENT, "line1", "e"), ApiRole::engineering)->verb,
+            ControlVerb::register_event);
+  EXPECT_EQ(check(make(plc_OPERATION_UNREGISTER_EVENT, "line1", "e"), ApiRole::engineering)->verb,
+            ControlVerb::unregister_event);
+}
+
+TEST(RequestCheck, RefusesWhatIsNotForTheRole) {
+  EXPECT_EQ(check(make(plc_OPERATION_SET_SCHEDULER, "line1", "x"), ApiRole::operating).error().code,
+            ErrorCode::refused);
+  EXPECT_EQ(check(make(plc_OPERATION_START), ApiRole::engineering).error().code, ErrorCode::refused);
+}
+
+TEST(RequestCheck, NamesWhatDoesNotExist) {
+  const auto instance = check(make(plc_OPERATION_START, "line3"), ApiRole::operating);
+  EXPECT_EQ(instance.error().code, ErrorCode::not_found);
+  EXPECT_THAT(instance.error().message, testing::AllOf(HasSubstr("line3"), HasSubstr("line1, line2")));
+  const auto host = check(make(plc_OPERATION_START, "line1", "", "hostb"), ApiRole::operating);
+  EXPECT_EQ(host.error().code, ErrorCode::not_found);
+  EXPECT_THAT(host.error().message, HasSubstr("hostb"));
+  const auto operation = check(make(5), ApiRole::operating);
+  EXPECT_EQ(operation.error().code, ErrorCode::unsupported);
+  EXPECT_THAT(operation.error().message, testing::AllOf(HasSubstr("5"), HasSubstr("set scheduler")));
+}
+
+TEST(RequestCheck, RefusesImpossibleArguments) {
+  const auto code = [](std::int32_t operation, std::string_view argument, ApiRole role) {
+    return check(make(operation, "line1", argument), role).error().code;
+  };
+  EXPECT_EQ(code(plc_OPERATION_START, "x", ApiRole::operating), ErrorCode::invalid_argument);
+  EXPECT_EQ(code(plc_OPERATION_LOAD_APPLICATION, "b.so", ApiRole::engineering), ErrorCode::invalid_argument);
+  EXPECT_EQ(code(plc_OPERATION_LOAD_APPLICATION, "", ApiRole::engineering), ErrorCode::invalid_argument);
+  EXPECT_EQ(code(plc_OPERATION_REGISTER_EVENT, "a/b", ApiRole::engineering), ErrorCode::invalid_argument);
+  EXPECT_EQ(code(plc_OPERATION_SET_SCHEDULER, "", ApiRole::engineering), ErrorCode::invalid_argument);
+  EXPECT_EQ(check(make(plc_OPERATION_START, ""), ApiRole::operating).error().code,
+            ErrorCode::invalid_argument);
+}
+
+}  // namespace
+}  // namespace plchost
