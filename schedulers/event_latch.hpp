@@ -53,7 +53,7 @@ class EventLatch {
 struct EventCursor {
   std::uint64_t next = 0;  ///< posts that were run or lost
   std::uint64_t seen = 0;  ///< posts that were seen at `seen_at`
-  TimePoint seen_at{};
+  TimePoint seen_at;
 };
 
 }  // namespace plchost

@@ -50,10 +50,10 @@ class Task {
   ReleaseGrid grid_;    // cyclic
   EventLatch latch_;    // event
   EventCursor cursor_;  // external
-  TimePoint ready_{};   // since when it could run: the end of its last cycle
+  TimePoint ready_;     // since when it could run: the end of its last cycle
   Duration last_execution_{};
   bool begun_ = false;  // has run since begin()
-  TimePoint last_start_{};
+  TimePoint last_start_;
   TaskCounters counters_{};
 };
 

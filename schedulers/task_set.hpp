@@ -92,7 +92,7 @@ class TaskSet {
   PriorityBand band_;
   TaskEnvironment environment_;
   bool running_ = false;
-  TimePoint origin_{};  // of all grids, until the next start()
+  TimePoint origin_;  // of all grids, until the next start()
   std::string_view scheduler_name_;
   std::vector<std::unique_ptr<Task>> tasks_;
   std::vector<bool> reported_running_;

@@ -24,7 +24,7 @@ class TickGrid {
   }
 
  private:
-  TimePoint next_{};
+  TimePoint next_;
   Duration period_{1};
 };
 

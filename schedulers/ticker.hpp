@@ -43,7 +43,7 @@ class Ticker {
   std::unique_ptr<TickSource> source_;
   ActivationGate go_;
   std::atomic<bool> stopping_{false};
-  TimePoint first_{};  // written before go_ opens
+  TimePoint first_;  // written before go_ opens
   Thread thread_;
 };
 

@@ -13,6 +13,7 @@ class ExternalEventTasks : public testing::TestWithParam<std::string_view>, publ
   void post(std::string_view name, int count) {
     for (int i = 0; i < count; ++i) event_named(name).post();
   }
+  std::atomic<bool> entered{false};
   std::atomic<bool> go{false};
 
   // Nothing more is to come: the thread sleeps on its event again.
@@ -80,6 +81,7 @@ TEST_P(ExternalEventTasks, AreRefusedIfTheEventCannotBeHad) {
 
 TEST_P(ExternalEventTasks, BacklogUpToItsBoundIsRunAndWhatIsBeyondIsCountedAsLost) {
   add(external("slow", "ready", [this] {
+    entered = true;
     while (!go) std::this_thread::yield();
   }));
   ASSERT_TRUE(create());
@@ -87,8 +89,7 @@ TEST_P(ExternalEventTasks, BacklogUpToItsBoundIsRunAndWhatIsBeyondIsCountedAsLos
   settings.max_event_backlog = 10;
   start(GetParam(), settings);
   post("ready", 1);
-  while (event_named("ready").count() == 0) std::this_thread::yield();
-  std::this_thread::sleep_for(milliseconds(20));  // it is in its first cycle
+  while (!entered) std::this_thread::yield();
   post("ready", 25);
   go = true;
   wait_for_cycles(0, 11);

@@ -83,7 +83,7 @@ TEST_F(TickTableTest, ReleasesAllThatIsDueAtTheSameTick) {
   for (int i = 1; i <= kTasks; ++i) add(milliseconds(i));
   for (int n = 0; n < 100; ++n) {
     std::size_t due = 0;
-    for (int i = 1; i <= kTasks; ++i) due += n % i == 0 ? 1 : 0;
+    for (int i = 1; i <= kTasks; ++i) due += n % i == 0 ? 1U : 0U;
     ASSERT_EQ(tick(n), due) << "tick " << n;
   }
 }
