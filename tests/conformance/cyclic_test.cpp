@@ -173,7 +173,7 @@ TEST_P(CyclicTasks, StopNamesTheTaskThatDoesNotComeBackAndParksItWhenItDoes) {
   add(cyclic("quick", milliseconds(1), [] {}));
   ASSERT_TRUE(create());
   clock.run_until(start(GetParam()) + milliseconds(5));
-  const auto stopped = set->stop(milliseconds(20));
+  const auto stopped = set->stop(milliseconds(300));
   ASSERT_FALSE(stopped);
   EXPECT_EQ(stopped.error().code, ErrorCode::timed_out);
   EXPECT_THAT(stopped.error().message, testing::HasSubstr("main"));
