@@ -1,3 +1,4 @@
+#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
@@ -94,5 +95,7 @@ int plchostd_main(int argc, const char* const* argv) {
 }  // namespace plchost
 
 int main(int argc, char** argv) {
+  // Who reads the log may go away: no reason to leave the instances alone.
+  (void)std::signal(SIGPIPE, SIG_IGN);
   return plchost::plchostd_main(argc, argv);
 }

@@ -61,6 +61,7 @@ void ManagedInstance::on_report(const SetupReport& report) {
   if (phase_ != Phase::setting_up) return;
   if (report.code != ErrorCode::ok) {
     setup_failure_ = fmt::format("{}: {}", to_string(report.step), report.text);
+    name_taken_ = report.code == ErrorCode::already_exists;
     return;  // the process ends by itself now, or the timer sees to it
   }
   if (!report.text.empty()) {
@@ -142,7 +143,7 @@ void ManagedInstance::on_exit(const ExitStatus& status) {
     spawn(next);
   } else if (set_up && (exit_of_set_up || !setup_failure_.empty())) {
     history_.record_end(surroundings_.now(), Duration::zero(), false);
-    back_off_or_give_up(config_.restart == RestartPolicy::always, InstanceState::failed,
+    back_off_or_give_up(config_.restart == RestartPolicy::always || name_taken_, InstanceState::failed,
                         setup_failure_.empty() ? status.describe()
                                                : fmt::format("{}: {}", status.describe(), setup_failure_));
   } else if (set_up || phase_ == Phase::up || phase_ == Phase::adopting) {
@@ -162,8 +163,10 @@ void ManagedInstance::ended_by_itself(const ExitStatus& status) {
 
 void ManagedInstance::back_off_or_give_up(bool again, InstanceState otherwise, const std::string& why) {
   last_end_ = why;
+  const bool stops = operation_ && operation_->request.verb == ControlVerb::stop;
+  if (stops) wants_running_ = false;
   // A stop that came while it was starting has its wish already.
-  const bool cancelled = operation_ && operation_->request.verb == ControlVerb::stop;
+  const bool cancelled = stops && operation_->step == Step::until_up;
   if (again && !cancelled) {
     const Duration delay = history_.delay();
     host_.set_timer(after(delay));
@@ -184,6 +187,7 @@ void ManagedInstance::back_off_or_give_up(bool again, InstanceState otherwise, c
 void ManagedInstance::on_timer() {
   switch (phase_) {
     case Phase::backing_off:
+      if (name_taken_ && adopt()) return;
       ++status_.restarts;
       return spawn(wants_running_ ? Next::run : Next::stay_stopped);
     case Phase::setting_up:
@@ -252,6 +256,7 @@ LaunchOptions ManagedInstance::launch_options(Next next) const {
 void ManagedInstance::spawn(Next next) {
   wants_running_ = next == Next::run;
   setup_failure_.clear();
+  name_taken_ = false;
   const auto pid = host_.spawn(launch_options(next));
   if (!pid) {
     history_.record_end(surroundings_.now(), Duration::zero(), false);

@@ -47,6 +47,8 @@ namespace plchost {
 //   never: down. on_failure: restarted after a failure. always: restarted. A set-up that failed
 //   (kExitSetupFailed, wrong usage) is not retried under on_failure, because the same files would fail again:
 //   failed. Under always it is, with back-off, but it does not count as a crash.
+//   So it is when a process of that name is there already: one that was still being set up when its manager
+//   died. After the back-off it is adopted.
 // * crash_limit crashes within crash_window: the next process is spawned without the application (safe_mode).
 // It
 //   stays that way until load_application, reset or restart, which also forget the crashes. A process that
@@ -162,6 +164,7 @@ class ManagedInstance : public InstanceEvents {
   bool safe_mode_ = false;
   bool wants_running_ = true;  // what an operator, or the start, wanted last
   bool shutting_down_ = false;
+  bool name_taken_ = false;  // another process of that name kept this one from being set up
   TimePoint up_since_{};
   TimePoint settled_{};        // when the state was last known from the process's own answer
   std::string setup_failure_;  // why the set-up failed; empty: it did not

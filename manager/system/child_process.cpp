@@ -57,6 +57,7 @@ Result<void> prepare(SpawnActions& actions, const SpawnRequest& request) {
   sigset_t all;
   sigemptyset(&none);
   sigfillset(&all);
+  sigdelset(&all, SIGPIPE);  // stays ignored: a PLC does not end because nobody reads its log any more
   if (error == 0) error = posix_spawnattr_setsigmask(&actions.attributes, &none);
   if (error == 0) error = posix_spawnattr_setsigdefault(&actions.attributes, &all);
   // A session of its own: neither Ctrl-C nor the end of the manager's terminal reaches a PLC.

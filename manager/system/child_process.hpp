@@ -37,9 +37,9 @@ struct SpawnRequest {
   int output_fd = -1;                  ///< becomes standard output and error; -1: the manager's own
 };
 
-/// Starts a program in a session of its own, with no other descriptor of ours, default signals, nothing
-/// blocked, and standard input from /dev/null. It does not end when the manager does. Small and quick:
-/// posix_spawn.
+/// Starts a program in a session of its own, with no other descriptor of ours, default signals (SIGPIPE as in
+/// this one), nothing blocked, and standard input from /dev/null. It does not end when the manager does.
+/// Small and quick: posix_spawn.
 [[nodiscard]] Result<ChildProcess> spawn_process(const SpawnRequest& request);
 
 /// A process that somebody else started.

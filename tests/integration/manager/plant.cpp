@@ -64,15 +64,34 @@ void Plant::add(const std::string& name, const std::string& application_name, co
   names_.push_back(name);
 }
 
+void Plant::write_file(const std::string& name, const std::string& text) const {
+  std::ofstream(folder_ / name) << text;
+}
+
+std::vector<std::string> Plant::lines_of(const std::string& name) const {
+  std::vector<std::string> lines;
+  std::ifstream file(folder_ / name);
+  for (std::string line; std::getline(file, line);) lines.push_back(line);
+  return lines;
+}
+
+void Plant::use_api_server(const std::string& script) {
+  api_server_ = true;
+  write_file("plchost-dds", fmt::format("#!/bin/sh\ncd {}\n{}", folder_.string(), script));
+  std::filesystem::permissions(folder_ / "plchost-dds", std::filesystem::perms::owner_all);
+  std::filesystem::create_symlink(kBuild + "/bin/plc-instance", folder_ / "plc-instance");
+}
+
 void Plant::start_manager() {
   const std::string config = (folder_ / "cell.toml").string();
   std::ofstream(config) << fmt::format(
-      "[host]\nname = \"cell\"\nrun_directory = \"{}\"\npool = \"{}\"\n[dds]\nenabled = false\n{}",
-      (folder_ / "run").string(), pool_, instances_);
+      "[host]\nname = \"cell\"\nrun_directory = \"{}\"\npool = \"{}\"\n[dds]\nenabled = {}\n{}",
+      (folder_ / "run").string(), pool_, api_server_, instances_);
   const UniqueFd log(::open((folder_ / "log").c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC,
                             0600));  // NOLINT: variadic
-  auto process =
-      spawn_process({.arguments = {kBuild + "/bin/plchostd", "--config", config}, .output_fd = log.get()});
+  std::vector<std::string> arguments = {kBuild + "/bin/plchostd", "--config", config};
+  if (api_server_) arguments.insert(arguments.end(), {"--programs", folder_.string()});
+  auto process = spawn_process({.arguments = arguments, .output_fd = log.get()});
   ASSERT_TRUE(process) << process.error().describe();
   manager_ = std::move(*process);
   ASSERT_TRUE(eventually([&] {

@@ -26,6 +26,11 @@ class Plant {
 
   /// Another [[instance]]; `application` is a name in the build's folder of applications.
   void add(const std::string& name, const std::string& application, const std::string& more_keys = "");
+  /// In the folder of the configuration.
+  void write_file(const std::string& name, const std::string& text) const;
+  [[nodiscard]] std::vector<std::string> lines_of(const std::string& name) const;
+  /// A shell script in place of plchost-dds.
+  void use_api_server(const std::string& script);
   /// Writes the configuration and starts a manager.
   void start_manager();
   /// SIGTERM, and how it ended.
@@ -58,6 +63,7 @@ class Plant {
   std::string pool_;
   std::string instances_;
   std::vector<std::string> names_;
+  bool api_server_ = false;
   ChildProcess manager_;
 };
 

@@ -86,10 +86,11 @@ TEST(Manager, RefusesAWrongApplicationAndLeavesTheOldOneRunning) {
 
 TEST(Manager, SaysWhyAnInstanceCouldNotBeSetUp) {
   Plant plant;
-  plant.add("line1", "bottling_line", "settings = \"cell.toml\"");  // not a settings file
+  plant.write_file("line1.cfg", "[CmpSchedule]\nSchedulerInterval=soon\n");
+  plant.add("line1", "bottling_line", "settings = \"line1.cfg\"");
   plant.start_manager();
   ASSERT_TRUE(plant.wait_for("line1", InstanceState::failed));
-  EXPECT_THAT(std::string(plant.status("line1").problem.view()), HasSubstr("exit code 3: read_settings: "));
+  EXPECT_THAT(std::string(plant.status("line1").problem.view()), HasSubstr("exit code 3: read settings: "));
 }
 
 TEST(Manager, CarriesOutEveryCommand) {
@@ -120,6 +121,21 @@ TEST(Manager, CarriesOutEveryCommand) {
   EXPECT_TRUE(plant.wait_for_cycles("line1"));
   EXPECT_EQ(plant.status("line1").restarts, 0U);
   EXPECT_EQ(plant.ask(ControlVerb::stop, "line2").text, "no instance 'line2'; there are line1");
+}
+
+TEST(Manager, KeepsTheApiServerAliveAndEndsItWithItself) {
+  Plant plant;
+  plant.use_api_server("echo \"$$ $*\" >> api.log\nexec sleep 1000\n");
+  plant.start_manager();
+  const auto lines = [&] { return plant.lines_of("api.log"); };
+  ASSERT_TRUE(Plant::eventually([&] { return lines().size() == 1; }));
+  EXPECT_THAT(lines()[0], HasSubstr("--host cell --domain 0 --pool " + plant.pool() + " --run-directory "));
+  EXPECT_THAT(lines()[0], HasSubstr("--interface lo --log-level info"));
+  kill_process(std::stoi(lines()[0]));
+  ASSERT_TRUE(Plant::eventually([&] { return lines().size() == 2; }));
+  const int second = std::stoi(lines()[1]);
+  EXPECT_EQ(plant.stop_manager().describe(), "exit code 0");
+  EXPECT_FALSE(open_process(second));
 }
 
 }  // namespace

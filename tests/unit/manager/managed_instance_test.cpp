@@ -129,7 +129,7 @@ TEST_F(ManagedInstanceTest, SaysWhatFailedInTheSetUpAndDoesNotTryAgain) {
   sut().on_report({.step = SetupStep::load_application, .code = ErrorCode::not_found, .text = "no file x"});
   sut().on_exit(exited_with(kExitSetupFailed));
   EXPECT_EQ(state(), InstanceState::failed);
-  EXPECT_EQ(problem(), "exit code 3: load_application: no file x");
+  EXPECT_EQ(problem(), "exit code 3: load application: no file x");
   EXPECT_FALSE(host_.timer.has_value());
   EXPECT_EQ(sut().status().pid, 0);
 }
@@ -384,7 +384,7 @@ TEST_F(ManagedInstanceTest, AnswersWhenTheFreshProcessDoesNotComeUp) {
   sut().on_exit(exited_with(kExitSetupFailed));
   const auto reply = take_reply();
   EXPECT_EQ(reply.code, ErrorCode::unavailable);
-  EXPECT_EQ(reply.text, "the process of 'line1' ended: exit code 3: make_tasks: bad");
+  EXPECT_EQ(reply.text, "the process of 'line1' ended: exit code 3: make tasks: bad");
   EXPECT_EQ(state(), InstanceState::failed);
 }
 
@@ -404,6 +404,8 @@ TEST_F(ManagedInstanceTest, AnswersWhenTheProcessEndsInstead) {
   const auto reply = take_reply();
   EXPECT_EQ(reply.code, ErrorCode::unavailable);
   EXPECT_THAT(reply.text, HasSubstr("killed by SIGSEGV"));
+  expire_timer();
+  EXPECT_TRUE(host_.spawned.back().stopped);  // as was wished
 }
 
 TEST_F(ManagedInstanceTest, AnswersWhenTheInstanceDoesNot) {
@@ -584,6 +586,22 @@ TEST_F(ManagedInstanceTest, LeavesAnAdoptedProcessThatDoesNotAnswerAlive) {
   EXPECT_EQ(state(), InstanceState::running);
   EXPECT_THAT(problem(), HasSubstr("does not answer on its control socket"));
   EXPECT_TRUE(host_.signals.empty());
+}
+
+TEST_F(ManagedInstanceTest, AdoptsWhoTookTheNameMeanwhile) {
+  sut().hold("");
+  sut().release();
+  sut().on_report(
+      {.step = SetupStep::attach_pool, .code = ErrorCode::already_exists, .text = "process 55 has it"});
+  sut().on_exit(exited_with(kExitSetupFailed));
+  EXPECT_EQ(state(), InstanceState::waiting);
+  host_.adoptable = 55;
+  host_.page = page_of(55, true, "CmpSchedule", "/opt/line.so");
+  expire_timer();
+  answer();
+  EXPECT_EQ(state(), InstanceState::running);
+  EXPECT_EQ(sut().status().pid, 55);
+  EXPECT_EQ(host_.spawned.size(), 1U);
 }
 
 TEST_F(ManagedInstanceTest, AdoptsSafeModeAsSafeMode) {

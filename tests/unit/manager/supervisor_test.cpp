@@ -93,7 +93,7 @@ TEST_F(SupervisorTest, LeavesTheOthersWaitingWhenOneFails) {
   instance("drive1").on_report({.step = SetupStep::bind_core, .code = ErrorCode::system, .text = "no core"});
   instance("drive1").on_exit(exited_with(kExitSetupFailed));
   EXPECT_EQ(state("line1"), InstanceState::waiting);
-  EXPECT_EQ(problem("line1"), "waits for 'drive1', which is failed (exit code 3: bind_core: no core)");
+  EXPECT_EQ(problem("line1"), "waits for 'drive1', which is failed (exit code 3: bind core: no core)");
 }
 
 TEST_F(SupervisorTest, GoesOnWhenAnOperatorStartsWhatFailed) {
