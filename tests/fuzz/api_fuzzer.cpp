@@ -1,0 +1,70 @@
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <string_view>
+
+#include <unistd.h>
+
+#include "api/dds/text.hpp"
+#include "api/server/event_intake.hpp"
+#include "api/server/request_check.hpp"
+
+namespace {
+
+using namespace plchost;
+
+/// A host whose shared memory has no name any more: nothing is left when the fuzzer ends.
+struct Host {
+  std::string name = "plchost-fuzz-" + std::to_string(::getpid());
+  ObjectPool pool = ObjectPool::create(name, {.max_objects = 16}).value();
+  PoolEvent event = pool.create_event("line1/ready").value();
+  EventIntake intake{"hosta", pool, PostLedger::open(name).value(), 1};
+
+  Host() {
+    event.set_registered(true);
+    ObjectPool::remove(name);
+    MemoryFile::remove(PostLedger::file_name(name));
+  }
+};
+
+template <class Sample>
+Sample sample_from(const std::uint8_t* data, std::size_t size) {
+  Sample sample{};
+  std::memcpy(&sample, data, std::min(size, sizeof sample));
+  sample.ext = {};
+  return sample;
+}
+
+}  // namespace
+
+// Whatever a client writes: a request is refused with a reason or is one that the manager can be given, and a
+// post is counted at most once.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static Host host;
+  constexpr std::array<std::string_view, 1> kInstances{"line1"};
+  const auto request = sample_from<plc_Request>(data, size);
+  for (const ApiRole role : {ApiRole::operating, ApiRole::engineering}) {
+    const auto checked = check_request(request, role, "hosta", kInstances);
+    if (checked ? !decode_request(encode(*checked)) || checked->instance != "line1"
+                : checked.error().message.empty()) {
+      std::abort();
+    }
+  }
+  auto post = sample_from<plc_EventPost>(data, size);
+  // Half of the runs get as far as the event's name.
+  if (size % 2 == 0) {
+    dds::copy_text(post.host, "hosta");
+    dds::copy_text(post.instance, "line1");
+    if (size % 4 == 0) dds::copy_text(post.event, "ready");
+  }
+  const std::uint64_t before = host.event.counted().count();
+  host.intake.process(post);
+  host.intake.process(post);
+  if (host.event.counted().count() > before + 1) std::abort();
+  for (const plc_EventAck& ack : host.intake.collect_acks()) {
+    if (ack.accepted + ack.rejected > 0 && ack.sequence_number == 0) std::abort();
+  }
+  return 0;
+}
