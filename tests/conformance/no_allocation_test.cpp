@@ -9,7 +9,10 @@
 // Counts every allocation of the program while it is told to. The sanitizers have a malloc of their own, with
 // hooks.
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#include <sanitizer/allocator_interface.h>
+// g++ has the function, not the header.
+extern "C" int
+__sanitizer_install_malloc_and_free_hooks(  // NOLINT(bugprone-reserved-identifier): the sanitizer's own
+    void (*malloc_hook)(const volatile void*, std::size_t), void (*free_hook)(const volatile void*));
 #define PLCHOST_COUNTS_MALLOC 0
 #else
 #define PLCHOST_COUNTS_MALLOC 1
