@@ -212,7 +212,10 @@ void Manager::clean_up() {
   }
   ::unlink(manager_socket_path(config_.host.run_directory).c_str());
   MemoryFile::remove(host_page_name(config_.host.pool));
-  if (!config_.host.keep_pool) ObjectPool::remove(config_.host.pool);
+  if (!config_.host.keep_pool) {
+    ObjectPool::remove(config_.host.pool);
+    MemoryFile::remove(config_.host.pool + ".posts");  // how far each source of remote posts had come
+  }
   lock_.remove();
 }
 

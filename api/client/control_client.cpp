@@ -8,7 +8,6 @@
 #include "api/dds/error.hpp"
 #include "api/dds/log_sink.hpp"
 #include "api/dds/samples.hpp"
-#include "shm/base/futex.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
@@ -213,90 +212,6 @@ Result<ApiReply> ControlClient::call(const ApiRequest& request, TimePoint deadli
     if (!view || view->status.round >= reply->status_round || MonotonicClock::now() >= deadline) return reply;
     wait_set_->wait(deadline);
   }
-}
-
-Result<EventPoster*> ControlClient::poster(const std::string& host) {
-  if (const auto known = posters_.find(host); known != posters_.end()) return &known->second;
-  if (auto opened = open_own_reader(ack_topic_, ack_reader_, dds::kEventAck, dds::ack_qos()); !opened) {
-    return std::unexpected(opened.error());
-  }
-  if (!event_topic_) {
-    auto made = dds::make_topic(participant_.get(), dds::kEvent);
-    if (!made) return std::unexpected(made.error());
-    event_topic_ = std::move(*made);
-  }
-  auto made = EventPoster::create(participant_.get(), event_topic_.get(), host);
-  if (!made) return std::unexpected(made.error());
-  if (auto added = wait_set_->add(made->writer(), DDS_PUBLICATION_MATCHED_STATUS); !added) {
-    return std::unexpected(added.error());
-  }
-  return &posters_.emplace(host, std::move(*made)).first->second;
-}
-
-Result<void> ControlClient::prepare_posts(const std::string& host, TimePoint deadline) {
-  const auto way = poster(host);
-  if (!way) return std::unexpected(way.error());
-  while (!(*way)->matched()) {
-    if (MonotonicClock::now() >= deadline) {
-      return failure(ErrorCode::timed_out, fmt::format("host '{}' takes no events", host));
-    }
-    update();
-    wait_set_->wait(deadline);
-  }
-  return {};
-}
-
-bool ControlClient::take_acks(TimePoint now) {
-  bool progress = false;
-  for (bool more = true; more;) {
-    const dds::Samples<plc_EventAck> acks(ack_reader_.get());
-    for (std::size_t i = 0; i < acks.size(); ++i) {
-      if (!acks.valid(i)) continue;
-      const auto way = posters_.find(dds::text_of(acks[i].host));
-      if (way != posters_.end()) progress |= way->second.on_ack(acks[i], now);
-    }
-    more = acks.full();
-  }
-  return progress;
-}
-
-Result<PostReport> ControlClient::post_event(const ApiRequest& event, std::uint64_t count, Duration interval,
-                                             Duration patience) {
-  const TimePoint start = MonotonicClock::now();
-  if (auto ready = prepare_posts(event.host, start + patience); !ready) return std::unexpected(ready.error());
-  const auto way = poster(event.host);
-  if (!way) return std::unexpected(way.error());
-  EventPoster& posts = **way;
-  posts.begin_report(start);
-  const TimePoint first = MonotonicClock::now();
-  std::uint64_t sent = 0;
-  for (;;) {
-    TimePoint now = MonotonicClock::now();
-    (void)take_acks(now);
-    TimePoint next = kNoDeadline;
-    while (sent < count && posts.has_room()) {
-      next = first + interval * static_cast<Duration::rep>(sent);
-      if (next > now) break;
-      posts.post(event.instance, event.argument, now);
-      ++sent;
-      now = MonotonicClock::now();
-    }
-    if (posts.unacknowledged() == 0 && sent == count) return posts.report();
-    if (posts.unacknowledged() > 0 && now - posts.last_progress() > patience) {
-      PostReport report = posts.report();
-      report.unacknowledged += count - sent;
-      return report;
-    }
-    update();
-    wait_set_->wait(std::min(posts.has_room() && sent < count ? next : kNoDeadline, posts.repeat(now)));
-  }
-}
-
-Result<void> ControlClient::post_one(const std::string& host, std::string_view instance,
-                                     std::string_view event) {
-  const auto way = posters_.find(host);
-  if (way == posters_.end()) return failure(ErrorCode::wrong_state, "prepare_posts() comes first");
-  return way->second.post_once(instance, event);
 }
 
 }  // namespace plchost

@@ -1,57 +1,24 @@
 #include "api/server/control_server.hpp"
 
 #include <array>
-#include <csignal>
-#include <optional>
+#include <cerrno>
 #include <utility>
 #include <vector>
 
 #include <sys/epoll.h>
-#include <sys/eventfd.h>
 #include <sys/signalfd.h>
-#include <sys/timerfd.h>
+#include <time.h>
+#include <unistd.h>
 
-#include "api/dds/error.hpp"
-#include "api/dds/log_sink.hpp"
 #include "api/dds/samples.hpp"
 #include "api/dds/text.hpp"
-#include "api/server/event_intake.hpp"
-#include "api/server/manager_link.hpp"
-#include "api/server/request_check.hpp"
-#include "api/server/session_table.hpp"
-#include "api/server/status_publisher.hpp"
+#include "api/server/control_server_parts.hpp"
 #include "shm/base/log.hpp"
 #include "shm/base/system_call.hpp"
-#include "shm/base/unique_fd.hpp"
 
 namespace plchost {
 
 namespace {
-
-Result<UniqueFd> make_timer(Duration period) {
-  const auto fd = check_errno(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK), "make a timer");
-  if (!fd) return std::unexpected(fd.error());
-  UniqueFd timer(*fd);
-  const itimerspec times{.it_interval = to_timespec(period), .it_value = to_timespec(period)};
-  if (auto set = check_errno(::timerfd_settime(timer.get(), 0, &times, nullptr), "set a timer"); !set) {
-    return std::unexpected(set.error());
-  }
-  return timer;
-}
-
-Result<UniqueFd> make_signal_fd() {
-  sigset_t set;
-  ::sigemptyset(&set);
-  ::sigaddset(&set, SIGTERM);
-  ::sigaddset(&set, SIGINT);
-  // Before any thread of DDS is made: they inherit it.
-  if (auto blocked = check_returned(::pthread_sigmask(SIG_BLOCK, &set, nullptr), "block signals"); !blocked) {
-    return std::unexpected(blocked.error());
-  }
-  const auto fd = check_errno(::signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK), "make a signal descriptor");
-  if (!fd) return std::unexpected(fd.error());
-  return UniqueFd(*fd);
-}
 
 /// Empties a timer, event or signal descriptor.
 void drain(int fd) noexcept {
@@ -59,60 +26,12 @@ void drain(int fd) noexcept {
   (void)!::read(fd, buffer.data(), buffer.size());
 }
 
+}  // namespace
+
 void raise_event(int fd) noexcept {
   constexpr std::uint64_t kOne = 1;
   (void)!::write(fd, &kOne, sizeof kOne);
 }
-
-}  // namespace
-
-struct ControlServer::Parts {
-  struct RequestReader {
-    ApiRole role = ApiRole::operating;
-    dds::Entity topic;
-    dds::Entity reader;
-  };
-
-  Parts(ServerOptions given, ObjectPool attached, std::uint64_t started)
-      : options(std::move(given)), pool(std::move(attached)), epoch(started) {}
-
-  Result<void> open(PostLedger ledger);
-  Result<void> make_loop();
-  Result<void> enter_domain();
-  Result<void> make_readers();
-  Result<void> listen();
-  Result<void> run();
-  Result<bool> dispatch(int fd);
-  void on_wake();
-  void on_requests(const RequestReader& source);
-  void on_request(ApiRole role, const dds::Guid& writer, const plc_Request& request);
-  Result<void> on_manager();
-  void answer(const dds::Guid& client, const plc_SampleIdentity& identity, ErrorCode code,
-              std::string_view text);
-  void finish(const std::vector<FinishedCommand>& commands);
-
-  static void on_event_post(dds_entity_t reader, void* server);
-  static void on_wake_listener(dds_entity_t reader, void* server);
-
-  ServerOptions options;
-  ObjectPool pool;
-  std::uint64_t epoch;
-  UniqueFd epoll;
-  UniqueFd wake;
-  UniqueFd signals;
-  UniqueFd status_timer;
-  UniqueFd presence_timer;
-  std::optional<ManagerLink> manager;
-  std::optional<EventIntake> intake;
-  std::shared_ptr<dds::Entity> domain;
-  dds::Entity participant;
-  std::optional<SessionTable> sessions;
-  std::optional<StatusPublisher> status;
-  dds::Entity subscriber;
-  dds::Entity event_topic;
-  dds::Entity event_reader;
-  std::array<RequestReader, 2> requests;
-};
 
 Result<std::unique_ptr<ControlServer>> ControlServer::create(ServerOptions options) {
   if (auto good = check_name("host", options.host, kMaxHostName); !good) return std::unexpected(good.error());
@@ -142,114 +61,6 @@ ControlServer::~ControlServer() {
 
 Result<void> ControlServer::run() {
   return parts_->run();
-}
-
-Result<void> ControlServer::Parts::open(PostLedger ledger) {
-  if (auto made = make_loop(); !made) return made;
-  auto linked = ManagerLink::connect(options.run_directory);
-  if (!linked) return std::unexpected(linked.error());
-  manager = std::move(*linked);
-  intake.emplace(options.host, pool, std::move(ledger), epoch);
-  if (auto entered = enter_domain(); !entered) return entered;
-  auto made_sessions = SessionTable::create(participant.get());
-  if (!made_sessions) return std::unexpected(made_sessions.error());
-  sessions = std::move(*made_sessions);
-  auto made_status = StatusPublisher::create(participant.get(), {options.host, &pool, epoch});
-  if (!made_status) return std::unexpected(made_status.error());
-  status.emplace(std::move(*made_status));
-  // Everything is there before a client can see that this host is: presence comes last.
-  status->tick(MonotonicClock::now());
-  if (auto made = make_readers(); !made) return made;
-  if (auto listening = listen(); !listening) return listening;
-  status->write_presence();
-  return {};
-}
-
-Result<void> ControlServer::Parts::make_loop() {
-  auto made_signals = make_signal_fd();
-  if (!made_signals) return std::unexpected(made_signals.error());
-  signals = std::move(*made_signals);
-  auto made_status = make_timer(StatusPublisher::kTick);
-  if (!made_status) return std::unexpected(made_status.error());
-  status_timer = std::move(*made_status);
-  auto made_presence = make_timer(dds::kPresencePeriod);
-  if (!made_presence) return std::unexpected(made_presence.error());
-  presence_timer = std::move(*made_presence);
-  const auto event = check_errno(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "make an event descriptor");
-  if (!event) return std::unexpected(event.error());
-  wake.reset(*event);
-  const auto loop = check_errno(::epoll_create1(EPOLL_CLOEXEC), "make an epoll descriptor");
-  if (!loop) return std::unexpected(loop.error());
-  epoll.reset(*loop);
-  return {};
-}
-
-Result<void> ControlServer::Parts::enter_domain() {
-  dds::install_log_sink();
-  auto opened = dds::open_domain(dds::Role::server, options.dds);
-  if (!opened) return std::unexpected(opened.error());
-  domain = std::move(*opened);
-  auto made = dds::check_entity(
-      dds_create_participant(options.dds.domain, nullptr, nullptr),
-      "enter DDS domain " + std::to_string(options.dds.domain) + " (at most 16 servers on one machine)");
-  if (!made) return std::unexpected(made.error());
-  participant = std::move(*made);
-  if (options.dds.interfaces == std::vector<std::string>{"lo"}) {
-    if (const auto tied = dds::tie_sockets_to_loopback(); !tied) {
-      spdlog::warn("packets from outside reach this unsecured server: {}", tied.error().describe());
-    }
-    spdlog::info("unsecured, therefore on the loopback interface only");
-  } else {
-    spdlog::warn("unsecured, and not on the loopback interface only: who reaches it controls this host");
-  }
-  return {};
-}
-
-Result<void> ControlServer::Parts::make_readers() {
-  auto made_subscriber = dds::make_subscriber(participant.get(), dds::host_partition(options.host));
-  if (!made_subscriber) return std::unexpected(made_subscriber.error());
-  subscriber = std::move(*made_subscriber);
-  const auto make = [&](const dds::TopicInfo& info, const dds::Qos& qos, dds::Entity& topic,
-                        dds::Entity& reader) -> Result<void> {
-    auto made_topic = dds::make_topic(participant.get(), info);
-    if (!made_topic) return std::unexpected(made_topic.error());
-    topic = std::move(*made_topic);
-    auto made_reader = dds::make_reader(subscriber.get(), topic.get(), qos);
-    if (!made_reader) return std::unexpected(made_reader.error());
-    reader = std::move(*made_reader);
-    return {};
-  };
-  requests[0].role = ApiRole::operating;
-  requests[1].role = ApiRole::engineering;
-  auto request_qos = dds::request_qos();
-  request_qos.max_samples(dds::kRequestReaderDepth);
-  auto event_qos = dds::event_qos();
-  event_qos.max_samples(dds::kEventReaderDepth);
-  if (auto made = make(dds::kEvent, event_qos, event_topic, event_reader); !made) return made;
-  if (auto made = make(dds::kOperatorRequest, request_qos, requests[0].topic, requests[0].reader); !made)
-    return made;
-  return make(dds::kEngineerRequest, request_qos, requests[1].topic, requests[1].reader);
-}
-
-Result<void> ControlServer::Parts::listen() {
-  const auto set = [&](dds_entity_t reader, dds_on_data_available_fn function) {
-    dds_listener_t* const listener = dds_create_listener(this);
-    dds_lset_data_available(listener, function);
-    const dds_return_t returned = dds_set_listener(reader, listener);
-    dds_delete_listener(listener);
-    return dds::check_code(returned, "listen to a reader");
-  };
-  for (const dds_entity_t reader : sessions->discovery_readers()) {
-    if (auto done = set(reader, on_wake_listener); !done) return done;
-  }
-  for (const RequestReader& request : requests) {
-    if (auto done = set(request.reader.get(), on_wake_listener); !done) return done;
-  }
-  if (auto done = set(event_reader.get(), on_event_post); !done) return done;
-  // What came before the listener was there does not call it.
-  on_event_post(event_reader.get(), this);
-  raise_event(wake.get());
-  return {};
 }
 
 void ControlServer::Parts::on_event_post(dds_entity_t reader, void* server) {

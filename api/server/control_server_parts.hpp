@@ -1,0 +1,74 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string_view>
+#include <vector>
+
+#include "api/dds/entity.hpp"
+#include "api/server/control_server.hpp"
+#include "api/server/event_intake.hpp"
+#include "api/server/manager_link.hpp"
+#include "api/server/request_check.hpp"
+#include "api/server/session_table.hpp"
+#include "api/server/status_publisher.hpp"
+#include "shm/base/unique_fd.hpp"
+#include "shm/pool/object_pool.hpp"
+
+namespace plchost {
+
+/// The inside of ControlServer. What is made is in control_server_setup.cpp, what runs in control_server.cpp.
+struct ControlServer::Parts {
+  struct RequestReader {
+    ApiRole role = ApiRole::operating;
+    dds::Entity topic;
+    dds::Entity reader;
+  };
+
+  Parts(ServerOptions given, ObjectPool attached, std::uint64_t started)
+      : options(std::move(given)), pool(std::move(attached)), epoch(started) {}
+
+  Result<void> open(PostLedger ledger);
+  Result<void> make_loop();
+  Result<void> enter_domain();
+  Result<void> make_readers();
+  Result<void> listen();
+  Result<void> run();
+  Result<bool> dispatch(int fd);
+  void on_wake();
+  void on_requests(const RequestReader& source);
+  void on_request(ApiRole role, const dds::Guid& writer, const plc_Request& request);
+  Result<void> on_manager();
+  void answer(const dds::Guid& client, const plc_SampleIdentity& identity, ErrorCode code,
+              std::string_view text);
+  void finish(const std::vector<FinishedCommand>& commands);
+
+  static void on_event_post(dds_entity_t reader, void* server);
+  static void on_wake_listener(dds_entity_t reader, void* server);
+
+  ServerOptions options;
+  ObjectPool pool;
+  std::uint64_t epoch;
+  UniqueFd epoll;
+  UniqueFd wake;
+  UniqueFd signals;
+  UniqueFd status_timer;
+  UniqueFd presence_timer;
+  std::optional<ManagerLink> manager;
+  std::optional<EventIntake> intake;
+  std::shared_ptr<dds::Entity> domain;
+  dds::Entity participant;
+  std::optional<SessionTable> sessions;
+  std::optional<StatusPublisher> status;
+  dds::Entity subscriber;
+  dds::Entity event_topic;
+  dds::Entity event_reader;
+  std::array<RequestReader, 2> requests;
+};
+
+/// Signals an event descriptor. Any thread.
+void raise_event(int fd) noexcept;
+
+}  // namespace plchost
