@@ -106,8 +106,7 @@ Result<Tables> find_tables(Bytes file, const Elf64_Ehdr& header) {
   }
   const auto segments = slice(file, header.e_phoff, std::uint64_t{header.e_phnum} * sizeof(Elf64_Phdr));
   if (!segments) return truncated("program headers");
-  for (std::uint64_t i = 0; i < header.e_phnum; ++i) {
-    const auto segment = item<Elf64_Phdr>(*segments, i);
+  for (std::uint64_t i = 0; const auto segment = item<Elf64_Phdr>(*segments, i); ++i) {
     if (segment->p_type == PT_LOAD && !slice(file, segment->p_offset, segment->p_filesz)) {
       return truncated("segments");
     }
@@ -201,7 +200,7 @@ Result<void> check_elf(Bytes file, std::span<const std::string_view> symbols) {
                        [&](std::string_view symbol) { return !find_export(*exported, symbol); });
   const auto version_symbol = find_export(*exported, kAbiSymbol);
   if (!version_symbol) missing.push_back(kAbiSymbol);
-  if (!missing.empty()) {
+  if (!missing.empty() || !version_symbol) {
     return invalid(fmt::format("does not export {}; see plc_app.h", join_names(missing)));
   }
   const auto version = read_version(file, tables->segments, *version_symbol);
