@@ -63,26 +63,32 @@ void SessionTable::follow_readers() {
     for (std::size_t i = 0; i < readers.size(); ++i) {
       if (!readers.valid(i) || readers.info(i).instance_state != DDS_IST_ALIVE) continue;
       const std::string_view topic = readers[i].topic_name;
-      if (topic != dds::kReply.name && topic != dds::kEventAck.name) continue;
-      // Its writers exist before its first request: they have met their reader when the answer comes.
-      (void)session_of(dds::Guid::from(readers[i].participant_key.v));
+      const bool replies = topic == dds::kReply.name;
+      if (!replies && topic != dds::kEventAck.name) continue;
+      Session* const session = session_of(dds::Guid::from(readers[i].participant_key.v));
+      if (session == nullptr) continue;
+      // The writer exists before the first request: it has met its reader when the answer comes. One that
+      // nobody reads is not made: each is announced to every client.
+      if (replies) {
+        (void)open_writer(*session, session->reply_writer, reply_topic_, dds::reply_qos());
+      } else {
+        (void)open_writer(*session, session->ack_writer, ack_topic_, dds::ack_qos());
+      }
     }
     more = readers.full();
   }
 }
 
-Result<SessionTable::Session> SessionTable::make_session(const dds::Guid& client) const {
-  Session session;
-  auto publisher = dds::make_publisher(participant_, dds::client_partition(client.hex()));
-  if (!publisher) return std::unexpected(publisher.error());
-  session.publisher = std::move(*publisher);
-  auto reply = dds::make_writer(session.publisher.get(), reply_topic_.get(), dds::reply_qos());
-  if (!reply) return std::unexpected(reply.error());
-  session.reply_writer = std::move(*reply);
-  auto ack = dds::make_writer(session.publisher.get(), ack_topic_.get(), dds::ack_qos());
-  if (!ack) return std::unexpected(ack.error());
-  session.ack_writer = std::move(*ack);
-  return session;
+bool SessionTable::open_writer(const Session& session, dds::Entity& writer, const dds::Entity& topic,
+                               const dds::Qos& qos) {
+  if (writer) return true;
+  auto made = dds::make_writer(session.publisher.get(), topic.get(), qos);
+  if (made) {
+    writer = std::move(*made);
+  } else {
+    spdlog::error("{}", made.error().describe());
+  }
+  return made.has_value();
 }
 
 SessionTable::Session* SessionTable::session_of(const dds::Guid& client) {
@@ -92,12 +98,12 @@ SessionTable::Session* SessionTable::session_of(const dds::Guid& client) {
     if (dropped_++ % 1000 == 0) spdlog::warn("{} clients are served, one more is not", kMaxSessions);
     return nullptr;
   }
-  auto made = make_session(client);
-  if (!made) {
-    spdlog::error("client {}: {}", client.hex(), made.error().describe());
+  auto publisher = dds::make_publisher(participant_, dds::client_partition(client.hex()));
+  if (!publisher) {
+    spdlog::error("client {}: {}", client.hex(), publisher.error().describe());
     return nullptr;
   }
-  return &sessions_.emplace(client, std::move(*made)).first->second;
+  return &sessions_.emplace(client, Session{std::move(*publisher), {}, {}, {}}).first->second;
 }
 
 void SessionTable::write_reply(const dds::Guid& client, const plc_Reply& reply) {
@@ -110,12 +116,15 @@ void SessionTable::write_reply(const dds::Guid& client, const plc_Reply& reply) 
     session->answers.push_back(reply);
     if (session->answers.size() > kRemembered) session->answers.pop_front();
   }
+  if (!open_writer(*session, session->reply_writer, reply_topic_, dds::reply_qos())) return;
   (void)dds_write(session->reply_writer.get(), &reply);  // not read: the client asks again and gets it then
 }
 
 void SessionTable::write_ack(const dds::Guid& client, const plc_EventAck& ack) {
   Session* const session = session_of(client);
-  if (session != nullptr) (void)dds_write(session->ack_writer.get(), &ack);
+  if (session == nullptr) return;
+  if (!open_writer(*session, session->ack_writer, ack_topic_, dds::ack_qos())) return;
+  (void)dds_write(session->ack_writer.get(), &ack);
 }
 
 std::optional<plc_Reply> SessionTable::remembered(const dds::Guid& client,

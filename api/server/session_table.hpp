@@ -12,6 +12,7 @@
 
 #include "api/dds/entity.hpp"
 #include "api/dds/guid.hpp"
+#include "api/dds/qos.hpp"
 #include "shm/base/result.hpp"
 
 namespace plchost {
@@ -55,7 +56,8 @@ class SessionTable {
   void follow_readers();
   /// Made if it is not there. None for a client that is not (or no longer) in the domain.
   [[nodiscard]] Session* session_of(const dds::Guid& client);
-  [[nodiscard]] Result<Session> make_session(const dds::Guid& client) const;
+  [[nodiscard]] static bool open_writer(const Session& session, dds::Entity& writer, const dds::Entity& topic,
+                                        const dds::Qos& qos);
 
   dds_entity_t participant_ = 0;
   dds::Entity reply_topic_;
