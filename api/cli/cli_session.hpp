@@ -24,7 +24,7 @@ inline constexpr int kExitNoAnswer = 3;
 
 /// The options of every command.
 struct CliOptions {
-  dds::DomainOptions dds{};
+  dds::DomainOptions dds;
   std::string host;
   double timeout_s = 3.0;
   bool json = false;

@@ -51,7 +51,7 @@ Result<void> ControlClient::open(const dds::DomainOptions& options) {
   partition_ = dds::client_partition(dds::guid_of(participant_.get()).hex());
   auto wait_set = WaitSet::create(participant_.get());
   if (!wait_set) return std::unexpected(wait_set.error());
-  wait_set_.emplace(std::move(*wait_set));
+  wait_set_ = std::move(*wait_set);
   last_news_ = MonotonicClock::now();
   if (auto opened = open_cache(presence_, dds::kPresence); !opened) return opened;
   return open_cache(host_status_, dds::kHostStatus);
@@ -64,7 +64,7 @@ Result<void> ControlClient::open_cache(StatusCache<Sample>& cache, const dds::To
   if (!topic) return std::unexpected(topic.error());
   auto reader = dds::make_reader(participant_.get(), topic->get(), dds::status_qos());
   if (!reader) return std::unexpected(reader.error());
-  if (auto added = wait_set_->add(reader->get(), DDS_DATA_AVAILABLE_STATUS); !added) return added;
+  if (auto added = wait_set_.add(reader->get(), DDS_DATA_AVAILABLE_STATUS); !added) return added;
   cache = StatusCache<Sample>(std::move(*topic), std::move(*reader));
   return {};
 }
@@ -107,7 +107,7 @@ std::vector<HostView> ControlClient::hosts(TimePoint deadline) {
     auto found = present();
     const bool settled = !found.empty() && now - last_news_ >= kQuiet;
     if (settled || now >= deadline) return found;
-    wait_set_->wait(found.empty() ? deadline : std::min(deadline, last_news_ + kQuiet));
+    wait_set_.wait(found.empty() ? deadline : std::min(deadline, last_news_ + kQuiet));
   }
 }
 
@@ -116,7 +116,7 @@ Result<HostView> ControlClient::host(std::string_view name, TimePoint deadline) 
     update();
     if (auto found = present(name)) return *found;
     if (MonotonicClock::now() >= deadline) break;
-    wait_set_->wait(deadline);
+    wait_set_.wait(deadline);
   }
   const auto others = present();
   std::vector<std::string_view> names;
@@ -139,7 +139,7 @@ Result<std::vector<Sample>> ControlClient::snapshot(StatusCache<Sample>& cache, 
       return samples;
     }
     if (MonotonicClock::now() >= deadline) break;
-    wait_set_->wait(deadline);
+    wait_set_.wait(deadline);
   }
   return failure(ErrorCode::timed_out, fmt::format("the status of host '{}' has not come completely", host));
 }
@@ -175,7 +175,7 @@ Result<void> ControlClient::open_own_reader(dds::Entity& topic, dds::Entity& rea
   if (!made_reader) return std::unexpected(made_reader.error());
   topic = std::move(*made_topic);
   reader = std::move(*made_reader);
-  return wait_set_->add(reader.get(), DDS_DATA_AVAILABLE_STATUS);
+  return wait_set_.add(reader.get(), DDS_DATA_AVAILABLE_STATUS);
 }
 
 Result<RequestCaller*> ControlClient::caller(const std::string& host, bool engineering) {
@@ -195,7 +195,7 @@ Result<RequestCaller*> ControlClient::caller(const std::string& host, bool engin
   }
   auto made = RequestCaller::create(participant_.get(), topic.get(), host);
   if (!made) return std::unexpected(made.error());
-  if (auto added = wait_set_->add(made->writer(), DDS_PUBLICATION_MATCHED_STATUS); !added) {
+  if (auto added = wait_set_.add(made->writer(), DDS_PUBLICATION_MATCHED_STATUS); !added) {
     return std::unexpected(added.error());
   }
   return &callers_.emplace(key, std::move(*made)).first->second;
@@ -204,13 +204,13 @@ Result<RequestCaller*> ControlClient::caller(const std::string& host, bool engin
 Result<ApiReply> ControlClient::call(const ApiRequest& request, TimePoint deadline) {
   const auto asked = caller(request.host, is_engineering(request.operation));
   if (!asked) return std::unexpected(asked.error());
-  auto reply = (*asked)->call(request, reply_reader_.get(), *wait_set_, deadline);
+  auto reply = (*asked)->call(request, reply_reader_.get(), wait_set_, deadline);
   if (!reply) return reply;
   for (;;) {
     update();
     const auto view = present(request.host);
     if (!view || view->status.round >= reply->status_round || MonotonicClock::now() >= deadline) return reply;
-    wait_set_->wait(deadline);
+    wait_set_.wait(deadline);
   }
 }
 

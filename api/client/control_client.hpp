@@ -74,13 +74,13 @@ class ControlClient {
                                       std::string_view event);
 
   /// Sleeps until something has changed or the deadline has come.
-  void wait_for_change(TimePoint deadline) { wait_set_->wait(deadline); }
+  void wait_for_change(TimePoint deadline) { wait_set_.wait(deadline); }
 
  private:
   struct Seen {
     std::uint64_t epoch = 0;
     std::int32_t pid = 0;
-    TimePoint last{};
+    TimePoint last;
   };
 
   ControlClient() = default;
@@ -102,7 +102,7 @@ class ControlClient {
 
   std::shared_ptr<dds::Entity> domain_;
   dds::Entity participant_;
-  std::optional<WaitSet> wait_set_;
+  WaitSet wait_set_;
   std::string partition_;
   dds::Entity own_subscriber_;
   StatusCache<plc_Presence> presence_;
@@ -112,7 +112,7 @@ class ControlClient {
   StatusCache<plc_EventStatus> event_status_;
   StatusCache<plc_ObjectStatus> object_status_;
   std::map<std::string, Seen> seen_;
-  TimePoint last_news_{};
+  TimePoint last_news_;
   dds::Entity reply_topic_;
   dds::Entity reply_reader_;
   dds::Entity ack_topic_;

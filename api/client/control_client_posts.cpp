@@ -22,7 +22,7 @@ Result<EventPoster*> ControlClient::poster(const std::string& host) {
   }
   auto made = EventPoster::create(participant_.get(), event_topic_.get(), host);
   if (!made) return std::unexpected(made.error());
-  if (auto added = wait_set_->add(made->writer(), DDS_PUBLICATION_MATCHED_STATUS); !added) {
+  if (auto added = wait_set_.add(made->writer(), DDS_PUBLICATION_MATCHED_STATUS); !added) {
     return std::unexpected(added.error());
   }
   return &posters_.emplace(host, std::move(*made)).first->second;
@@ -36,7 +36,7 @@ Result<void> ControlClient::prepare_posts(const std::string& host, TimePoint dea
       return failure(ErrorCode::timed_out, fmt::format("host '{}' takes no events", host));
     }
     update();
-    wait_set_->wait(deadline);
+    wait_set_.wait(deadline);
   }
   return {};
 }
@@ -83,7 +83,7 @@ Result<PostReport> ControlClient::post_event(const ApiRequest& event, std::uint6
       return report;
     }
     update();
-    wait_set_->wait(std::min(posts.has_room() && sent < count ? next : kNoDeadline, posts.repeat(now)));
+    wait_set_.wait(std::min(posts.has_room() && sent < count ? next : kNoDeadline, posts.repeat(now)));
   }
 }
 

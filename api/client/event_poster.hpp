@@ -74,8 +74,8 @@ class EventPoster {
   std::deque<Unacknowledged> unacknowledged_;
   std::size_t window_ = kWindow;
   std::uint64_t last_sequence_ = 0;
-  TimePoint last_progress_{};
-  TimePoint last_write_{};
+  TimePoint last_progress_;
+  TimePoint last_write_;
   plc_EventAck newest_{};  // epoch 0: none yet
   plc_EventAck base_{};    // where the report counts from
 };

@@ -9,6 +9,7 @@ namespace plchost {
 /// Sleeps until one of several readers has data, or one of several writers meets or loses a reader.
 class WaitSet {
  public:
+  WaitSet() noexcept = default;
   [[nodiscard]] static Result<WaitSet> create(dds_entity_t participant);
   /// `statuses`: DDS_DATA_AVAILABLE_STATUS of a reader, DDS_PUBLICATION_MATCHED_STATUS of a writer.
   [[nodiscard]] Result<void> add(dds_entity_t entity, std::uint32_t statuses);

@@ -35,7 +35,7 @@ class RateLimit {
 
  private:
   std::mutex mutex_;
-  TimePoint since_{};
+  TimePoint since_;
   unsigned passed_ = 0;
   unsigned dropped_ = 0;
 };

@@ -19,17 +19,17 @@ struct TopicInfo {
   const dds_topic_descriptor_t* type;
 };
 
-inline const TopicInfo kOperatorRequest{"plc/v1/op/request", &plc_Request_desc};
-inline const TopicInfo kEngineerRequest{"plc/v1/eng/request", &plc_Request_desc};
-inline const TopicInfo kReply{"plc/v1/reply", &plc_Reply_desc};
-inline const TopicInfo kEvent{"plc/v1/event", &plc_EventPost_desc};
-inline const TopicInfo kEventAck{"plc/v1/event_ack", &plc_EventAck_desc};
-inline const TopicInfo kPresence{"plc/v1/presence", &plc_Presence_desc};
-inline const TopicInfo kHostStatus{"plc/v1/status/host", &plc_HostStatus_desc};
-inline const TopicInfo kInstanceStatus{"plc/v1/status/instance", &plc_InstanceStatus_desc};
-inline const TopicInfo kTaskStatus{"plc/v1/status/task", &plc_TaskStatus_desc};
-inline const TopicInfo kEventStatus{"plc/v1/status/event", &plc_EventStatus_desc};
-inline const TopicInfo kObjectStatus{"plc/v1/status/object", &plc_ObjectStatus_desc};
+inline constexpr TopicInfo kOperatorRequest{"plc/v1/op/request", &plc_Request_desc};
+inline constexpr TopicInfo kEngineerRequest{"plc/v1/eng/request", &plc_Request_desc};
+inline constexpr TopicInfo kReply{"plc/v1/reply", &plc_Reply_desc};
+inline constexpr TopicInfo kEvent{"plc/v1/event", &plc_EventPost_desc};
+inline constexpr TopicInfo kEventAck{"plc/v1/event_ack", &plc_EventAck_desc};
+inline constexpr TopicInfo kPresence{"plc/v1/presence", &plc_Presence_desc};
+inline constexpr TopicInfo kHostStatus{"plc/v1/status/host", &plc_HostStatus_desc};
+inline constexpr TopicInfo kInstanceStatus{"plc/v1/status/instance", &plc_InstanceStatus_desc};
+inline constexpr TopicInfo kTaskStatus{"plc/v1/status/task", &plc_TaskStatus_desc};
+inline constexpr TopicInfo kEventStatus{"plc/v1/status/event", &plc_EventStatus_desc};
+inline constexpr TopicInfo kObjectStatus{"plc/v1/status/object", &plc_ObjectStatus_desc};
 
 /// The bounds of the readers and histories. A reader that is full makes the writer wait: back-pressure, no
 /// loss.

@@ -16,7 +16,7 @@ struct ServerOptions {
   std::string host;
   std::string pool;
   std::string run_directory;
-  dds::DomainOptions dds{};
+  dds::DomainOptions dds;
 };
 
 /// The server's end of the DDS API. Posts are done in DDS's receiving thread (on_event_post); everything else

@@ -59,7 +59,7 @@ class StatusPublisher {
   StatusTable<plc_HostStatus> hosts_;
   dds::Entity presence_;
   std::vector<dds::Entity> topics_;
-  TimePoint next_objects_{};
+  TimePoint next_objects_;
   std::uint64_t round_ = 0;
 };
 

@@ -46,7 +46,8 @@ bool TaskWatch::follow(const InstanceStatus& instance, TimePoint now) {
   bool changed = false;
   if (watched.pid != instance.pid) {
     changed = table_.dispose_under(name + "/");
-    watched = Watched{.pid = instance.pid, .page = {}};
+    watched = Watched{};
+    watched.pid = instance.pid;
   }
   if (watched.pid != 0 && !watched.page && now >= watched.next_look) {
     watched.next_look = now + kPageRetry;

@@ -44,7 +44,7 @@ class TaskWatch {
     std::int32_t pid = 0;
     std::optional<InstancePageReader> page;
     std::uint32_t next_task = 0;
-    TimePoint next_look{};  // of the page when it is not open, else of the tasks
+    TimePoint next_look;  // of the page when it is not open, else of the tasks
   };
   bool open_page(const std::string& instance, Watched& watched);
   void publish(const std::string& instance, const TaskSnapshot& task);
