@@ -6,7 +6,18 @@ set(PLCHOST_WARNINGS
 set(PLCHOST_CXX_WARNINGS
     -Wnon-virtual-dtor -Woverloaded-virtual -Wold-style-cast -Wextra-semi -Wzero-as-null-pointer-constant)
 
-function(plchost_target name)
+# The heavy headers of others are read once. They are third-party or the standard library's: nothing of ours is in
+# them, so no file of ours compiles only because of this.
+file(WRITE ${CMAKE_BINARY_DIR}/headers.cpp "")
+function(plchost_headers name)
+  add_library(${name} STATIC ${CMAKE_BINARY_DIR}/headers.cpp)
+  target_link_libraries(${name} PRIVATE fmt::fmt spdlog::spdlog Threads::Threads)
+  plchost_options(${name})
+  target_precompile_headers(${name} PRIVATE <algorithm> <array> <atomic> <chrono> <expected> <filesystem> <functional>
+    <map> <memory> <optional> <string> <string_view> <thread> <utility> <vector> <fmt/format.h> ${ARGN})
+endfunction()
+
+function(plchost_options name)
   target_compile_options(${name} PRIVATE ${PLCHOST_WARNINGS} $<$<COMPILE_LANGUAGE:CXX>:${PLCHOST_CXX_WARNINGS}>)
   target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR})
   if(SANITIZER)
@@ -25,14 +36,16 @@ function(plchost_library name)
   cmake_parse_arguments(arg "" "" "SOURCES;LINKS" ${ARGN})
   add_library(${name} STATIC ${arg_SOURCES})
   target_link_libraries(${name} PUBLIC ${arg_LINKS})
-  plchost_target(${name})
+  plchost_options(${name})
+  target_precompile_headers(${name} REUSE_FROM plchost_headers)
 endfunction()
 
+# plchost_program(NAME SOURCES... LINKS ...)
 function(plchost_program name)
   cmake_parse_arguments(arg "" "" "SOURCES;LINKS" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE ${arg_LINKS})
-  plchost_target(${name})
+  plchost_options(${name})
 endfunction()
 
 # A control program: a shared object that plc-instance loads. Unique symbols would survive dlclose
@@ -42,5 +55,5 @@ function(plchost_application name)
   add_library(${name} MODULE ${arg_SOURCES})
   set_target_properties(${name} PROPERTIES PREFIX "" LIBRARY_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/applications)
   target_compile_options(${name} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-fno-gnu-unique>)
-  plchost_target(${name})
+  plchost_options(${name})
 endfunction()

@@ -6,6 +6,7 @@
 set -uo pipefail
 cd "$(dirname "$0")/.."
 build=.build/tests
+export CCACHE_SLOPPINESS=pch_defines,time_macros  # or it would not cache what uses precompiled headers
 jobs=$(nproc)
 step=0
 steps=9
@@ -37,7 +38,7 @@ configure() { # configure DIR OPTIONS...
 }
 build_plain() { configure "$build" && cmake --build "$build" -j "$jobs"; }
 build_sanitized() { # build_sanitized DIR SANITIZERS
-  configure "$1" -DSANITIZER="$2" -DPLCHOST_BENCH=OFF -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1" &&
+  configure "$1" -DSANITIZER="$2" -DPLCHOST_BENCH=OFF -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1" -DCMAKE_C_FLAGS_DEBUG="-O1 -g1" &&
     cmake --build "$1" -j "$jobs"
 }
 gates() { tests/gates/layers.sh && tests/gates/house.sh && tests/gates/format.sh && tests/gates/prove.sh; }

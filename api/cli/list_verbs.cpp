@@ -1,9 +1,11 @@
+#include <memory>
 #include <utility>
 
 #include <CLI/CLI.hpp>
 
 #include "api/cli/cli_session.hpp"
 #include "api/cli/rows.hpp"
+#include "api/cli/task_rows.hpp"
 
 namespace plchost {
 
@@ -15,6 +17,13 @@ int list_hosts(CliSession& session) {
   std::vector<Row> rows;
   for (const HostView& host : *hosts) rows.push_back(to_row(host));
   session.show(rows, host_columns());
+  return kExitDone;
+}
+
+int list_tasks(CliSession& session, const std::string& instance) {
+  const auto rows = task_rows(session, instance);
+  if (!rows) return CliSession::fail(rows.error());
+  session.show(*rows, task_columns());
   return kExitDone;
 }
 
@@ -43,15 +52,17 @@ void add_list_verbs(CLI::App& app, CliSession& session, Action& action) {
   CLI::App* const verb = app.add_subcommand("list", "Show all hosts, instances, tasks, events or objects");
   verb->require_subcommand(1)->fallthrough();
   const auto add = [&](const char* noun, const char* text, Action run) {
-    verb->add_subcommand(noun, text)->fallthrough()->callback([&action, run = std::move(run)] {
-      action = run;
-    });
+    CLI::App* const command = verb->add_subcommand(noun, text)->fallthrough();
+    command->callback([&action, run = std::move(run)] { action = run; });
+    return command;
   };
   add("hosts", "The controllers of the DDS domain", [&session] { return list_hosts(session); });
   add("instances", "The PLC instances",
       [&session] { return list(session, &ControlClient::instances, instance_columns()); });
+  const auto instance = std::make_shared<std::string>();
   add("tasks", "The tasks of all applications, with their figures",
-      [&session] { return list(session, &ControlClient::tasks, task_columns()); });
+      [&session, instance] { return list_tasks(session, *instance); })
+      ->add_option("INSTANCE", *instance, "only of this instance");
   add("events", "The external events",
       [&session] { return list(session, &ControlClient::events, event_columns()); });
   add("objects", "All objects of the global pool",

@@ -2,7 +2,6 @@
 #include <atomic>
 #include <csignal>
 #include <memory>
-#include <optional>
 
 #include <CLI/CLI.hpp>
 #include <fmt/chrono.h>
@@ -11,7 +10,7 @@
 
 #include "api/cli/cli_session.hpp"
 #include "api/cli/rows.hpp"
-#include "api/dds/text.hpp"
+#include "api/cli/task_rows.hpp"
 
 namespace plchost {
 
@@ -30,28 +29,6 @@ std::atomic<bool>& interrupted() {
 
 void on_interrupt(int /*signal*/) {
   interrupted().store(true);
-}
-
-Result<std::vector<Row>> task_rows(CliSession& session, const std::string& instance) {
-  const auto hosts = session.shown_hosts();
-  if (!hosts) return std::unexpected(hosts.error());
-  std::vector<Row> rows;
-  std::vector<std::string> names;
-  ControlClient& client = *session.client().value();
-  for (const HostView& host : *hosts) {
-    const auto tasks = client.tasks(host.name, session.deadline());
-    if (!tasks) return std::unexpected(tasks.error());
-    for (const auto& task : *tasks) {
-      if (instance.empty() || dds::text_of(task.instance) == instance) rows.push_back(to_row(task));
-    }
-    if (instance.empty()) continue;
-    const auto instances = client.instances(host.name, session.deadline());
-    if (!instances) return std::unexpected(instances.error());
-    for (const auto& known : *instances) names.emplace_back(dds::text_of(known.instance));
-  }
-  if (instance.empty() || std::ranges::find(names, instance) != names.end()) return rows;
-  return failure(ErrorCode::not_found, fmt::format("no instance '{}'{}; there are: {}", instance,
-                                                   hint(instance, names), fmt::join(names, ", ")));
 }
 
 void print_block(const CliSession& session, const std::vector<Row>& rows, bool first) {

@@ -14,7 +14,7 @@ struct MonotonicClock {
   using rep = duration::rep;
   using period = duration::period;
   using time_point = std::chrono::time_point<MonotonicClock>;
-  static constexpr bool is_steady = true;
+  static constexpr bool is_steady = true;  // NOLINT(readability-identifier-naming): <chrono>'s name
 
   /// Real-time: no system call (vDSO).
   [[nodiscard]] static time_point now() noexcept {

@@ -15,7 +15,9 @@ namespace {
 class BareWriter {
  public:
   Result<void> open(std::uint32_t domain) {
-    auto made = dds::open_domain(dds::Role::client, {.domain = domain});
+    dds::DomainOptions options;
+    options.domain = domain;
+    auto made = dds::open_domain(dds::Role::client, options);
     if (!made) return std::unexpected(made.error());
     domain_ = std::move(*made);
     auto participant =
@@ -28,7 +30,7 @@ class BareWriter {
     auto writer = dds::make_writer(participant_.get(), topic_.get(), dds::event_qos());
     if (!writer) return std::unexpected(writer.error());
     writer_ = std::move(*writer);
-    FixedText<kMaxHostName>(kBenchHost).view().copy(sample_.host, sizeof sample_.host - 1);
+    std::string_view(kBenchHost).copy(sample_.host, sizeof sample_.host - 1);
     std::string_view("probe").copy(sample_.instance, sizeof sample_.instance - 1);
     std::string_view("ping").copy(sample_.event, sizeof sample_.event - 1);
     return {};
@@ -70,7 +72,9 @@ int run_dds_poster(const Plan& plan, const DdsDomains& domains, DdsBoard& board)
   BareWriter bare;
   const TimePoint patience = MonotonicClock::now() + std::chrono::seconds(20);
   bool ready = bind_thread(plan.poster_core).has_value() && bare.open(domains.bare).has_value();
-  auto client = ControlClient::connect({.domain = domains.plchost});
+  dds::DomainOptions options;
+  options.domain = domains.plchost;
+  auto client = ControlClient::connect(options);
   ready = ready && client && (*client)->prepare_posts(kBenchHost, patience);
   while (ready && !bare.matched()) {
     if (MonotonicClock::now() > patience) ready = false;

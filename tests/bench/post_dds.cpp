@@ -100,7 +100,9 @@ class Cell {
 class BareReader {
  public:
   Result<void> start(const Plan& plan, const DdsDomains& domains, DdsBoard& board) {
-    auto domain = dds::open_domain(dds::Role::server, {.domain = domains.bare});
+    dds::DomainOptions options;
+    options.domain = domains.bare;
+    auto domain = dds::open_domain(dds::Role::server, options);
     if (!domain) return std::unexpected(domain.error());
     domain_ = std::move(*domain);
     auto participant =

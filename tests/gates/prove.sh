@@ -58,8 +58,7 @@ cmake_minimum_required(VERSION 3.25)
 project(planted C CXX)
 set(CMAKE_CXX_STANDARD 23)
 include($PWD/.cmake/targets.cmake)
-add_executable(planted planted.cpp)
-plchost_target(planted)
+plchost_program(planted SOURCES planted.cpp)
 EOF
 # build_planted SANITIZERS: builds planted.cpp with the project's own flags and runs it
 build_planted() {
