@@ -12,7 +12,7 @@ case "${1:-}" in
   *) sed -n '2,5s/^# \{0,1\}//p' "$0" >&2; exit 2 ;;
 esac
 
-build=.build/release
+build=.build/demo
 plcctl="$PWD/$build/bin/plcctl"
 work=$(mktemp -d "${TMPDIR:-/tmp}/plchost-demo.XXXXXX")
 manager=
@@ -54,7 +54,7 @@ trap 'exit 130' INT TERM
 .ci/packages build
 printf 'building (a few minutes the first time) ...'
 began=$SECONDS
-if ! { cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF &&
+if ! { cmake -S . -B "$build" -G Ninja -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF &&
   cmake --build "$build"; } >"$work/build.log" 2>&1; then
   echo " FAILED"
   tail -n 60 "$work/build.log"
@@ -97,10 +97,13 @@ name = "packer1"
 core = $packer_core
 scheduler = "CmpScheduleTimer"
 priority_band = "low"
+settings = "packer1.cfg"
 application = "$applications/packer.so"
 after = ["line1"]
 share_core = true
 EOF
+
+printf '[CmpSchedule]\nTask.Freewheeling.Cycletime=5\n' >"$work/packer1.cfg"
 
 title "start: one manager, three control programs, three schedulers, cores ${cores[*]}"
 "$build/bin/plchostd" --config "$work/demo.toml" 2>"$work/log" &

@@ -59,6 +59,12 @@ count() { # adds up the summary of the step that just ran
   failed=$((failed + bad))
 }
 
+# Over the product's code; the tests are compiled with all warnings as errors like everything else.
+tidy() {
+  configure .build/tidy -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON &&
+    cmake --build .build/tidy --target plchost_idl_generate && tests/gates/tidy.sh "$PWD/.build/tidy"
+}
+
 fuzz() {
   configure .build/fuzz -DCMAKE_C_COMPILER=clang-19 -DCMAKE_CXX_COMPILER=clang++-19 -DPLCHOST_FUZZ=ON \
     -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF -DSANITIZER="address;undefined" &&
@@ -85,7 +91,7 @@ case "${1:-}" in
     run "build" build_plain
     run "tests" tests "$build"
     count
-    run "clang-tidy" tests/gates/tidy.sh "$PWD/$build"
+    run "clang-tidy" tidy
     run "build with address and undefined sanitizers" build_sanitized .build/asan "address;undefined"
     run "tests under address and undefined sanitizers" tests .build/asan
     count

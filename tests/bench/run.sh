@@ -18,7 +18,7 @@ done
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
 echo "building ..." >&2
-if ! { cmake -S . -B "$build" -G Ninja -DCMAKE_BUILD_TYPE=Release -DPLCHOST_TESTS=OFF && cmake --build "$build"; } >"$log" 2>&1; then
+if ! { cmake -S . -B "$build" -G Ninja -DPLCHOST_TESTS=OFF && cmake --build "$build"; } >"$log" 2>&1; then
   tail -n 60 "$log" >&2
   exit 1
 fi

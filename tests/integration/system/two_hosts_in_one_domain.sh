@@ -26,7 +26,10 @@ is "$(plcctl list hosts --json | jq -r '[.[].host // .[].name] | unique | sort |
 cycles() { plcctl list tasks --json | jq -r ".[] | select(.host == \"$1\" and .task == \"Product\") | .cycles"; }
 before_north=$(cycles north)
 before_south=$(cycles south)
-refused "south" plcctl post event packer1/product
+code=0
+said=$(plcctl post event packer1/product 2>&1) || code=$?
+is "$code" 2 || fail "exit code $code where no host is named"
+grep -q "north, south" <<<"$said" || fail "the hosts are not listed: $said"
 plcctl --host south post event packer1/product --count 50
 south_ran() { [ "$(cycles south)" -ge $((before_south + 50)) ]; }
 until_true 10 south_ran
