@@ -146,7 +146,8 @@ done
 title "another scheduler for the bottling line, while it runs"
 before=$(ran line1)
 show set scheduler line1 CmpScheduleOneShot
-until_true 5 "further cycles of line1" eval '[ "$(ran line1)" -gt "$before" ]'
+further_cycles() { [ "$(ran line1)" -gt $((before + 100)) ]; }
+until_true 5 "further cycles of line1" further_cycles
 show list tasks line1
 
 if [ "$keep" = yes ]; then

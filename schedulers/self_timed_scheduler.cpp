@@ -32,7 +32,8 @@ Result<void> SelfTimedScheduler::prepare() {
 }
 
 void SelfTimedScheduler::start(TimePoint origin) noexcept {
-  // Between the releases of the cyclic tasks: at the same instant the poll, which goes first, would delay them.
+  // Between the releases of the cyclic tasks: at the same instant the poll, which goes first, would delay
+  // them.
   if (!poller_.empty()) ticker_.start(ticker_.first_tick(origin) + settings_.scheduler_interval / 2);
 }
 

@@ -38,7 +38,7 @@ configure() { # configure DIR OPTIONS...
 }
 build_plain() { configure "$build" && cmake --build "$build" -j "$jobs"; }
 build_sanitized() { # build_sanitized DIR SANITIZERS
-  configure "$1" -DSANITIZER="$2" -DPLCHOST_BENCH=OFF -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1" -DCMAKE_C_FLAGS_DEBUG="-O1 -g1" &&
+  configure "$1" -DSANITIZER="$2" -DPLCHOST_BENCH=OFF -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O0 -g1" -DCMAKE_C_FLAGS_DEBUG="-O0 -g1" &&
     cmake --build "$1" -j "$jobs"
 }
 gates() { tests/gates/layers.sh && tests/gates/house.sh && tests/gates/format.sh && tests/gates/prove.sh; }
@@ -67,7 +67,7 @@ tidy() {
 
 fuzz() {
   configure .build/fuzz -DCMAKE_C_COMPILER=clang-19 -DCMAKE_CXX_COMPILER=clang++-19 -DPLCHOST_FUZZ=ON \
-    -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF -DSANITIZER="address;undefined" &&
+    -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF &&
     cmake --build .build/fuzz -j "$jobs" --target fuzzers || return 1
   local fuzzer corpus
   for fuzzer in .build/fuzz/bin/fuzz_*; do

@@ -60,9 +60,9 @@ void add_list_verbs(CLI::App& app, CliSession& session, Action& action) {
   add("instances", "The PLC instances",
       [&session] { return list(session, &ControlClient::instances, instance_columns()); });
   const auto instance = std::make_shared<std::string>();
-  add("tasks", "The tasks of all applications, with their figures",
-      [&session, instance] { return list_tasks(session, *instance); })
-      ->add_option("INSTANCE", *instance, "only of this instance");
+  add("tasks", "The tasks of all applications, with their figures", [&session, instance] {
+    return list_tasks(session, *instance);
+  })->add_option("INSTANCE", *instance, "only of this instance");
   add("events", "The external events",
       [&session] { return list(session, &ControlClient::events, event_columns()); });
   add("objects", "All objects of the global pool",

@@ -120,6 +120,7 @@ Result<HostView> ControlClient::host(std::string_view name, TimePoint deadline) 
   }
   const auto others = present();
   std::vector<std::string_view> names;
+  names.reserve(others.size());
   for (const HostView& other : others) names.emplace_back(other.name);
   return failure(ErrorCode::not_found,
                  fmt::format("no host '{}' answers; those that do: {}", name, join_names(names)));

@@ -62,7 +62,7 @@ struct ManagerConfig {
 
 /// Bounds of what a file may say.
 inline constexpr std::size_t kMaxConfigBytes = std::size_t{1} << 20;
-inline constexpr int kMaxDdsDomain = 232;
+inline constexpr int kMaxDdsDomain = 230;  // its UDP ports must stay below 65536
 inline constexpr std::int64_t kMinPoolObjects = 16;
 inline constexpr std::int64_t kMaxPoolObjects = 1'000'000;
 inline constexpr std::size_t kMaxPoolName = 31;

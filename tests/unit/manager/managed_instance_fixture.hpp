@@ -1,0 +1,98 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+#include "manager/supervisor/managed_instance.hpp"
+#include "tests/unit/manager/fake_host.hpp"
+
+namespace plchost {
+
+class ManagedInstanceTest : public testing::Test {
+ protected:
+  ManagedInstanceTest() {
+    config_.name = "line1";
+    config_.core = 1;
+    config_.application = "/opt/line.so";
+    config_.crash_limit = 3;
+    config_.crash_window = std::chrono::seconds(10);
+    host_config_.pool = "pool";
+    host_config_.run_directory = "/run/x";
+    make();
+  }
+
+  void make() {
+    sut_.emplace(config_,
+                 ManagedInstance::Surroundings{.host = host_config_,
+                                               .folder = "/etc/plchost",
+                                               .schedulers = {"CmpSchedule", "CmpScheduleTimer"},
+                                               .now = [this] { return now_; },
+                                               .changed = [this] { ++changes_; }},
+                 host_);
+  }
+
+  ManagedInstance& sut() { return *sut_; }
+  InstanceState state() { return sut().status().state; }
+  std::string problem() { return std::string(sut().status().problem.view()); }
+  void advance(Duration duration) { now_ += duration; }
+  void expire_timer() {
+    ASSERT_TRUE(host_.timer.has_value());
+    now_ = std::max(now_, *host_.timer);
+    host_.timer.reset();
+    sut().on_timer();
+  }
+  void report_ready() { sut().on_report({.step = SetupStep::ready, .code = ErrorCode::ok, .text = ""}); }
+  void bring_up() {
+    sut().hold("is to be started");
+    sut().release();
+    report_ready();
+    ASSERT_EQ(state(), InstanceState::running);
+  }
+  void bring_up_stopped() {
+    ask(ControlVerb::reset);
+    report_ready();
+    take_reply();
+    ASSERT_EQ(state(), InstanceState::stopped);
+  }
+  void ask(ControlVerb verb, const std::string& argument = "") {
+    sut().handle({.number = 7, .verb = verb, .instance = "line1", .argument = argument},
+                 [this](const ControlReply& reply) { replies_.push_back(reply); });
+  }
+  /// The one reply that came; there must be one.
+  ControlReply take_reply() {
+    EXPECT_EQ(replies_.size(), 1U);
+    if (replies_.empty()) return {.number = 0, .code = ErrorCode::system, .text = "no reply came"};
+    ControlReply reply = replies_.back();
+    replies_.clear();
+    return reply;
+  }
+  void answer(ErrorCode code = ErrorCode::ok, const std::string& text = "") {
+    ASSERT_FALSE(host_.requests.empty());
+    sut().on_reply({.number = host_.requests.back().number, .code = code, .text = text});
+  }
+  void crash_once() {
+    sut().on_exit(killed_by(SIGSEGV));
+    ASSERT_EQ(state(), InstanceState::waiting);
+    expire_timer();
+    report_ready();
+  }
+  void reach_safe_mode() {
+    bring_up();
+    for (int i = 0; i < 3; ++i) crash_once();
+    ASSERT_EQ(state(), InstanceState::safe_mode);
+  }
+
+  InstanceConfig config_;
+  HostConfig host_config_;
+  FakeHost host_;
+  TimePoint now_{std::chrono::seconds(1000)};
+  int changes_ = 0;
+  std::vector<ControlReply> replies_;
+  std::optional<ManagedInstance> sut_;
+};
+
+}  // namespace plchost
