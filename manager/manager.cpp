@@ -113,9 +113,9 @@ Result<void> Manager::set_up() {
   if (!signals) return signals;
   make_supervisor();
   write_host();
-  auto server = ControlServer::open(*reactor_, manager_socket_path(host.run_directory), *supervisor_);
+  auto server = CommandServer::open(*reactor_, manager_socket_path(host.run_directory), *supervisor_);
   if (!server) return std::unexpected(server.error());
-  control_server_ = std::move(*server);
+  command_server_ = std::move(*server);
   return {};
 }
 

@@ -8,7 +8,7 @@
 
 #include "manager/api_server.hpp"
 #include "manager/config/manager_config.hpp"
-#include "manager/control/control_server.hpp"
+#include "manager/control/command_server.hpp"
 #include "manager/supervisor/supervisor.hpp"
 #include "manager/system/lock_file.hpp"
 #include "manager/system/reactor.hpp"
@@ -53,7 +53,7 @@ class Manager {
   std::optional<HostPageReader> earlier_page_;
   std::optional<HostPageWriter> page_;
   std::unique_ptr<Supervisor> supervisor_;
-  std::unique_ptr<ControlServer> control_server_;
+  std::unique_ptr<CommandServer> command_server_;
   ApiServer api_server_;
   Reactor::Timer tick_;
   bool ending_ = false;

@@ -21,12 +21,12 @@ inline constexpr int kMaxBadPackets = 8;               ///< of one connection; m
 
 /// The manager's control socket: takes requests from any number of peers to the handler, and the replies
 /// back.
-class ControlServer {
+class CommandServer {
  public:
-  [[nodiscard]] static Result<std::unique_ptr<ControlServer>> open(Reactor& reactor, const std::string& path,
+  [[nodiscard]] static Result<std::unique_ptr<CommandServer>> open(Reactor& reactor, const std::string& path,
                                                                    ControlHandler& handler);
-  ControlServer(const ControlServer&) = delete;
-  ControlServer& operator=(const ControlServer&) = delete;
+  CommandServer(const CommandServer&) = delete;
+  CommandServer& operator=(const CommandServer&) = delete;
 
  private:
   struct Connection {
@@ -37,7 +37,7 @@ class ControlServer {
     int bad_packets = 0;
   };
 
-  ControlServer(Reactor& reactor, PacketListener listener, ControlHandler& handler);
+  CommandServer(Reactor& reactor, PacketListener listener, ControlHandler& handler);
   void accept();
   void on_ready(std::uint64_t id, std::uint32_t epoll_events);
   void take_packet(std::uint64_t id, std::string_view packet);

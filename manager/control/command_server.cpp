@@ -1,4 +1,4 @@
-#include "manager/control/control_server.hpp"
+#include "manager/control/command_server.hpp"
 
 #include <utility>
 
@@ -16,18 +16,18 @@ constexpr int kPacketsPerRound = 16;
 
 }  // namespace
 
-ControlServer::ControlServer(Reactor& reactor, PacketListener listener, ControlHandler& handler)
+CommandServer::CommandServer(Reactor& reactor, PacketListener listener, ControlHandler& handler)
     : reactor_(reactor),
       listener_(std::move(listener)),
       handler_(handler),
       accept_again_(reactor, [this] { (void)listen_watch_.change(EPOLLIN); }) {}
 
-Result<std::unique_ptr<ControlServer>> ControlServer::open(Reactor& reactor, const std::string& path,
+Result<std::unique_ptr<CommandServer>> CommandServer::open(Reactor& reactor, const std::string& path,
                                                            ControlHandler& handler) {
   auto listener = PacketListener::listen(path);
   if (!listener) return std::unexpected(listener.error());
-  std::unique_ptr<ControlServer> server(
-      new ControlServer(reactor, std::move(*listener), handler));  // NOLINT: the constructor is private
+  std::unique_ptr<CommandServer> server(
+      new CommandServer(reactor, std::move(*listener), handler));  // NOLINT: the constructor is private
   auto watch =
       reactor.watch(server->listener_.fd(), EPOLLIN, [sut = server.get()](std::uint32_t) { sut->accept(); });
   if (!watch) return std::unexpected(watch.error());
@@ -35,12 +35,12 @@ Result<std::unique_ptr<ControlServer>> ControlServer::open(Reactor& reactor, con
   return server;
 }
 
-ControlServer::Connection* ControlServer::find(std::uint64_t id) {
+CommandServer::Connection* CommandServer::find(std::uint64_t id) {
   const auto found = connections_.find(id);
   return found == connections_.end() ? nullptr : &found->second;
 }
 
-void ControlServer::accept() {
+void CommandServer::accept() {
   auto socket = listener_.accept();
   if (!socket) {
     // No descriptor left, most likely: asking again at once would only burn the core.
@@ -66,7 +66,7 @@ void ControlServer::accept() {
   connection.watch = std::move(*watch);
 }
 
-void ControlServer::on_ready(std::uint64_t id, std::uint32_t epoll_events) {
+void CommandServer::on_ready(std::uint64_t id, std::uint32_t epoll_events) {
   if ((epoll_events & EPOLLOUT) != 0) {
     Connection* connection = find(id);
     if (connection != nullptr && !flush(*connection)) return close(id, "cannot be sent to");
@@ -86,7 +86,7 @@ void ControlServer::on_ready(std::uint64_t id, std::uint32_t epoll_events) {
   }
 }
 
-void ControlServer::take_packet(std::uint64_t id, std::string_view packet) {
+void CommandServer::take_packet(std::uint64_t id, std::string_view packet) {
   Connection& connection = *find(id);
   const auto request = decode_request(packet);
   if (!request) {
@@ -107,7 +107,7 @@ void ControlServer::take_packet(std::uint64_t id, std::string_view packet) {
   });
 }
 
-void ControlServer::answer(std::uint64_t id, const ControlReply& reply) {
+void CommandServer::answer(std::uint64_t id, const ControlReply& reply) {
   Connection* connection = find(id);
   if (connection == nullptr) return;  // it has gone without waiting for the answer
   connection->unsent.push_back(encode(reply));
@@ -115,7 +115,7 @@ void ControlServer::answer(std::uint64_t id, const ControlReply& reply) {
   if (!flush(*connection)) close(id, "cannot be sent to");
 }
 
-bool ControlServer::flush(Connection& connection) {
+bool CommandServer::flush(Connection& connection) {
   while (!connection.unsent.empty()) {
     const auto sent = connection.socket.send(connection.unsent.front());
     if (!sent && sent.error().code == ErrorCode::busy) {
@@ -127,7 +127,7 @@ bool ControlServer::flush(Connection& connection) {
   return connection.watch.change(EPOLLIN).has_value();
 }
 
-void ControlServer::close(std::uint64_t id, std::string_view why) {
+void CommandServer::close(std::uint64_t id, std::string_view why) {
   if (!why.empty()) spdlog::warn("control socket: a peer {}; it is disconnected", why);
   connections_.erase(id);
 }

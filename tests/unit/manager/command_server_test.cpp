@@ -1,4 +1,4 @@
-#include "manager/control/control_server.hpp"
+#include "manager/control/command_server.hpp"
 
 #include <filesystem>
 #include <functional>
@@ -25,14 +25,14 @@ class SlowHandler : public ControlHandler {
   std::vector<ControlReplyFunction> replies;
 };
 
-class ControlServerTest : public testing::Test {
+class CommandServerTest : public testing::Test {
  protected:
-  ControlServerTest() {
+  CommandServerTest() {
     static int count = 0;
     path_ = (std::filesystem::temp_directory_path() / fmt::format("plchost-cs-{}-{}", ::getpid(), ++count))
                 .string();
     reactor_ = std::move(*Reactor::create());
-    sut_ = std::move(*ControlServer::open(*reactor_, path_, handler_));
+    sut_ = std::move(*CommandServer::open(*reactor_, path_, handler_));
   }
   PacketSocket connect() { return std::move(*PacketSocket::connect(path_)); }
   /// Lets the server do what there is to do.
@@ -61,10 +61,10 @@ class ControlServerTest : public testing::Test {
   std::string path_;
   SlowHandler handler_;
   std::unique_ptr<Reactor> reactor_;
-  std::unique_ptr<ControlServer> sut_;
+  std::unique_ptr<CommandServer> sut_;
 };
 
-TEST_F(ControlServerTest, BringsRequestsInAndRepliesBackInAnyOrder) {
+TEST_F(CommandServerTest, BringsRequestsInAndRepliesBackInAnyOrder) {
   auto client = connect();
   ASSERT_TRUE(client.send(request(1)));
   ASSERT_TRUE(client.send(request(2)));
@@ -76,7 +76,7 @@ TEST_F(ControlServerTest, BringsRequestsInAndRepliesBackInAnyOrder) {
   EXPECT_EQ(reply_on(client).number, 1U);
 }
 
-TEST_F(ControlServerTest, AnswersGarbageAndClosesAfterTooMuchOfIt) {
+TEST_F(CommandServerTest, AnswersGarbageAndClosesAfterTooMuchOfIt) {
   auto client = connect();
   auto other = connect();
   ASSERT_TRUE(client.send("{\"version\": 99, \"number\": 1}"));
@@ -92,7 +92,7 @@ TEST_F(ControlServerTest, AnswersGarbageAndClosesAfterTooMuchOfIt) {
   EXPECT_TRUE(handler_.asked.empty());
 }
 
-TEST_F(ControlServerTest, DropsTheReplyOfAPeerThatHasGone) {
+TEST_F(CommandServerTest, DropsTheReplyOfAPeerThatHasGone) {
   {
     auto client = connect();
     ASSERT_TRUE(client.send(request(1)));
@@ -102,7 +102,7 @@ TEST_F(ControlServerTest, DropsTheReplyOfAPeerThatHasGone) {
   handler_.replies.at(0)({.number = 1, .code = ErrorCode::ok, .text = ""});
 }
 
-TEST_F(ControlServerTest, BoundsTheRequestsOfOnePeer) {
+TEST_F(CommandServerTest, BoundsTheRequestsOfOnePeer) {
   auto client = connect();
   for (std::size_t i = 0; i <= kMaxPendingRequests; ++i) {
     ASSERT_TRUE(client.send(request(i + 1)));
@@ -115,7 +115,7 @@ TEST_F(ControlServerTest, BoundsTheRequestsOfOnePeer) {
   EXPECT_THAT(reply.text, HasSubstr("64 requests of this peer"));
 }
 
-TEST_F(ControlServerTest, ClosesAPeerThatDoesNotReadAndServesTheOthers) {
+TEST_F(CommandServerTest, ClosesAPeerThatDoesNotReadAndServesTheOthers) {
   auto deaf = connect();
   auto other = connect();
   ASSERT_TRUE(deaf.send(request(1)));
@@ -130,7 +130,7 @@ TEST_F(ControlServerTest, ClosesAPeerThatDoesNotReadAndServesTheOthers) {
   EXPECT_EQ(handler_.asked.back().number, 5U);
 }
 
-TEST_F(ControlServerTest, RefusesMorePeersThanItHasRoomFor) {
+TEST_F(CommandServerTest, RefusesMorePeersThanItHasRoomFor) {
   std::vector<PacketSocket> clients;
   for (std::size_t i = 0; i < kMaxConnections; ++i) {
     clients.push_back(connect());
