@@ -53,7 +53,6 @@ class ExternalEvent {
  private:
   friend class Application;
   explicit ExternalEvent(RTS_HANDLE handle) noexcept : handle_(handle) {}
-  // NOLINTNEXTLINE(performance-no-int-to-ptr): the C interface's constant
   RTS_HANDLE handle_ = RTS_INVALID_HANDLE;
 };
 
@@ -104,7 +103,6 @@ class Application {
   ExternalEvent open_event(const std::string& name) {
     RTS_RESULT result = ERR_OK;
     const RTS_HANDLE handle = SchedRegisterExternalEvent(name.c_str(), &result);
-    // NOLINTNEXTLINE(performance-no-int-to-ptr): the C interface's constant
     if (handle == RTS_INVALID_HANDLE) {
       throw std::runtime_error("external event '" + name + "' cannot be had: result " +
                                std::to_string(result));

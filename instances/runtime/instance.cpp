@@ -87,8 +87,8 @@ Result<std::string> Instance::attach_pool() {
 Result<std::string> Instance::open_control_socket() {
   if (options_.launch.run_directory.empty()) return {};
   auto server =
-      ControlServer::listen(instance_socket_path(options_.launch.run_directory, options_.launch.name),
-                            [this](const ControlRequest& request) { return handle(request); });
+      InstanceSocket::listen(instance_socket_path(options_.launch.run_directory, options_.launch.name),
+                             [this](const ControlRequest& request) { return handle(request); });
   if (!server) return std::unexpected(std::move(server).error());
   control_.emplace(*std::move(server));
   restore_operator_events();

@@ -8,7 +8,7 @@
 #include "instances/runtime/application.hpp"
 #include "instances/runtime/application_host.hpp"
 #include "instances/runtime/components.hpp"
-#include "instances/runtime/control_server.hpp"
+#include "instances/runtime/instance_socket.hpp"
 #include "instances/runtime/options.hpp"
 #include "instances/runtime/process_setup.hpp"
 #include "instances/runtime/settings.hpp"
@@ -90,7 +90,7 @@ class Instance {
   std::optional<InstancePage> page_;
   LinuxClock clock_;
   std::unique_ptr<TaskSet> tasks_;  // uses all of the above: destroyed before them
-  std::optional<ControlServer> control_;
+  std::optional<InstanceSocket> control_;
   bool shutdown_requested_ = false;
   bool is_down_ = false;
 };

@@ -24,6 +24,7 @@ constexpr std::string_view kComponentPrefix = "Component.";
 Result<std::int64_t> integer(std::string_view value, std::int64_t lowest, std::int64_t highest) {
   std::int64_t number = 0;
   const char* const end = value.data() + value.size();
+  // NOLINTNEXTLINE(bugprone-suspicious-stringview-data-usage): `end` is the size
   const auto [stop, error] = std::from_chars(value.data(), end, number);
   if (error != std::errc() || stop != end || number < lowest || number > highest) {
     return failure(ErrorCode::invalid_argument,

@@ -65,8 +65,8 @@ std::uint32_t word_of(pthread_mutex_t& mutex) noexcept {
 // The C library trusts its mutexes: with a foreign word in one it aborts, or sleeps for ever. So it is looked
 // at before: either free, or held by another living thread, or marked by the kernel as left by a dead one.
 bool is_sane(pthread_mutex_t& mutex) {
-  static const int kKind = kind_of_ours();
-  if (std::atomic_ref(mutex.__data.__kind).load(std::memory_order_relaxed) != kKind) return false;
+  static const int kind = kind_of_ours();
+  if (std::atomic_ref(mutex.__data.__kind).load(std::memory_order_relaxed) != kind) return false;
   const std::uint32_t word = word_of(mutex);
   const auto holder = static_cast<pid_t>(word & FUTEX_TID_MASK);
   if (holder == 0) return true;

@@ -12,4 +12,4 @@ fi
 # clang reads the compile commands of g++; flags that only g++ knows are not its business
 sed -i 's/ -fno-gnu-unique//g' "$build/compile_commands.json"
 printf '%s\0' "${files[@]}" | xargs -0 -n 1 -P "$(nproc)" clang-tidy-19 -p "$build" --quiet \
-  --extra-arg=-Wno-unknown-warning-option --extra-arg=-Wno-ignored-optimization-argument 2>/dev/null
+  --extra-arg=-Wno-unknown-warning-option --extra-arg=-Wno-deprecated-declarations --extra-arg=-Wno-ignored-optimization-argument 2>/dev/null

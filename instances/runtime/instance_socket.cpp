@@ -1,4 +1,4 @@
-#include "instances/runtime/control_server.hpp"
+#include "instances/runtime/instance_socket.hpp"
 
 #include <array>
 #include <optional>
@@ -23,16 +23,16 @@ Result<void> watch(const UniqueFd& epoll, int fd) {
 
 }  // namespace
 
-Result<ControlServer> ControlServer::listen(const std::string& path, Handler handler) {
+Result<InstanceSocket> InstanceSocket::listen(const std::string& path, Handler handler) {
   auto listener = PacketListener::listen(path);
   if (!listener) return std::unexpected(listener.error());
   UniqueFd epoll(::epoll_create1(EPOLL_CLOEXEC));
   if (!epoll) return failure(ErrorCode::system, "epoll_create1", errno);
   if (auto watched = watch(epoll, listener->fd()); !watched) return std::unexpected(watched.error());
-  return ControlServer(*std::move(listener), std::move(epoll), std::move(handler));
+  return InstanceSocket(*std::move(listener), std::move(epoll), std::move(handler));
 }
 
-void ControlServer::accept_all() {
+void InstanceSocket::accept_all() {
   for (std::size_t i = 0; i <= kMaxConnections; ++i) {
     auto accepted = listener_.accept();
     if (!accepted || !*accepted) return;
@@ -50,7 +50,7 @@ void ControlServer::accept_all() {
   }
 }
 
-bool ControlServer::serve_one(PacketSocket& connection) {
+bool InstanceSocket::serve_one(PacketSocket& connection) {
   auto packet = connection.receive();
   if (packet && !*packet) return true;
   std::optional<Error> error;
@@ -70,7 +70,7 @@ bool ControlServer::serve_one(PacketSocket& connection) {
   return false;
 }
 
-void ControlServer::serve() {
+void InstanceSocket::serve() {
   std::array<epoll_event, kMaxConnections + 1> events{};
   const int count = ::epoll_wait(epoll_.get(), events.data(), static_cast<int>(events.size()), 0);
   for (int i = 0; i < count; ++i) {

@@ -14,12 +14,12 @@ namespace plchost {
 /// The instance's control socket: any number of connections up to a bound, none able to block another. A
 /// client that does not read its replies is dropped; a packet that is no request gets a reply that says why.
 /// Control thread.
-class ControlServer {
+class InstanceSocket {
  public:
   using Handler = std::function<ControlReply(const ControlRequest&)>;
   static constexpr std::size_t kMaxConnections = 16;
 
-  [[nodiscard]] static Result<ControlServer> listen(const std::string& path, Handler handler);
+  [[nodiscard]] static Result<InstanceSocket> listen(const std::string& path, Handler handler);
 
   /// Readable when serve() has something to do.
   [[nodiscard]] int fd() const noexcept { return epoll_.get(); }
@@ -27,7 +27,7 @@ class ControlServer {
   void serve();
 
  private:
-  ControlServer(PacketListener listener, UniqueFd epoll, Handler handler)
+  InstanceSocket(PacketListener listener, UniqueFd epoll, Handler handler)
       : listener_(std::move(listener)), epoll_(std::move(epoll)), handler_(std::move(handler)) {}
 
   void accept_all();
