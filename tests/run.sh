@@ -11,7 +11,7 @@ jobs=$(nproc)
 step=0
 steps=10
 # Programs that the tests crash on purpose must end by their signal, not by a sanitizer's report.
-export ASAN_OPTIONS=handle_segv=0 UBSAN_OPTIONS=print_stacktrace=1 TSAN_OPTIONS=handle_segv=0
+export ASAN_OPTIONS=handle_segv=0 UBSAN_OPTIONS=print_stacktrace=1 TSAN_OPTIONS=handle_segv=0:suppressions=$PWD/tests/gates/tsan_suppressions.txt
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
 

@@ -137,13 +137,14 @@ void TestHost::serve(const std::stop_token& stop) {
     }
     if (!*packet) continue;
     const ControlRequest request = decode_request(**packet).value();
+    ControlReply reply;
     {
       const std::lock_guard lock(mutex_);
       requests_.push_back(request);
+      reply = answer_;
     }
     if (silent) continue;
     if (request.verb == ControlVerb::stop) write_instance(0, request.instance, InstanceState::stopped, 4711);
-    ControlReply reply = answer_;
     reply.number = request.number;
     (void)peer->send(encode(reply));
   }

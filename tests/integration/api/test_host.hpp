@@ -55,7 +55,10 @@ class TestHost {
   /// The requests that came to the manager so far.
   [[nodiscard]] std::vector<ControlRequest> requests();
   /// What the manager answers: ok with this text, after this delay.
-  void answer_with(ControlReply reply) { answer_ = std::move(reply); }
+  void answer_with(ControlReply reply) {
+    const std::lock_guard lock(mutex_);
+    answer_ = std::move(reply);
+  }
   std::atomic<bool> silent{false};      ///< the manager answers nothing
   std::atomic<bool> close_peer{false};  ///< the manager hangs up
 
@@ -69,7 +72,7 @@ class TestHost {
   ObjectPool pool_;
   HostPageWriter page_;
   std::vector<std::string> instances_;
-  ControlReply answer_;
+  ControlReply answer_;  // guarded by mutex_
   std::mutex mutex_;
   std::vector<ControlRequest> requests_;
   std::unique_ptr<Child> server_;
