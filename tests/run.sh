@@ -11,7 +11,7 @@ jobs=$(nproc)
 step=0
 steps=10
 # Programs that the tests crash on purpose must end by their signal, not by a sanitizer's report.
-export ASAN_OPTIONS=handle_segv=0 UBSAN_OPTIONS=print_stacktrace=1 TSAN_OPTIONS=handle_segv=0:suppressions=$PWD/tests/gates/tsan_suppressions.txt
+export ASAN_OPTIONS=handle_segv=0 UBSAN_OPTIONS=print_stacktrace=1 TSAN_OPTIONS=handle_segv=0
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
 
@@ -39,9 +39,11 @@ configure() { # configure DIR OPTIONS...
   cmake -S . -B "$dir" -G Ninja "${launcher[@]}" "$@"
 }
 build_plain() { configure "$build" && cmake --build "$build" -j "$jobs"; }
-build_sanitized() { # build_sanitized DIR SANITIZERS
-  configure "$1" -DSANITIZER="$2" -DPLCHOST_BENCH=OFF -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O0 -g1" -DCMAKE_C_FLAGS_DEBUG="-O0 -g1" &&
-    cmake --build "$1" -j "$jobs"
+build_sanitized() { # build_sanitized DIR SANITIZERS OPTIONS...
+  local dir=$1 sanitizers=$2
+  shift 2
+  configure "$dir" -DSANITIZER="$sanitizers" -DPLCHOST_BENCH=OFF -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O0 -g1" -DCMAKE_C_FLAGS_DEBUG="-O0 -g1" "$@" &&
+    cmake --build "$dir" -j "$jobs"
 }
 gates() { tests/gates/layers.sh && tests/gates/house.sh && tests/gates/format.sh && tests/gates/prove.sh; }
 
@@ -98,7 +100,8 @@ case "${1:-}" in
     run "address and undefined sanitizers: build" build_sanitized .build/asan "address;undefined"
     run "address and undefined sanitizers: tests" tests .build/asan
     count
-    run "thread sanitizer: build" build_sanitized .build/tsan thread
+    # Without the processes: Debian's Cyclone is not compiled for it, and reports from real-time threads stand still.
+    run "thread sanitizer: build" build_sanitized .build/tsan thread -DPLCHOST_INTEGRATION=OFF
     run "thread sanitizer: tests" tests .build/tsan
     count
     run "fuzzers" fuzz
