@@ -29,7 +29,7 @@ double y_of(double share) {
   return kTop + kHeight * exponent / kShareDecades;
 }
 
-std::string curve(const Samples& samples, std::string_view colour) {
+std::string curve(const Samples& samples, std::string_view colour, std::string_view style) {
   std::vector<Duration> sorted = samples.values();
   std::ranges::sort(sorted);
   std::string points;
@@ -41,8 +41,7 @@ std::string curve(const Samples& samples, std::string_view colour) {
     const double above = static_cast<double>(sorted.size() - i) / static_cast<double>(sorted.size());
     points += fmt::format("{:.1f},{:.1f} ", x, y_of(above));
   }
-  return fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"2\"/>\n", points,
-                     colour);
+  return fmt::format("<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" {}/>\n", points, colour, style);
 }
 
 std::string axes() {
@@ -76,9 +75,6 @@ std::string to_svg(const std::string& title, const std::vector<Row>& rows) {
       "<text x=\"{}\" y=\"28\" font-size=\"16\" font-weight=\"bold\">{}</text>\n",
       kLeft, title);
   text += axes();
-  Samples floors(0);
-  for (const Row& row : rows) floors.append(row.floor);
-  text += curve(floors, "#94a3b8");
   const auto legend = [&](double line, std::string_view colour, std::string_view name) {
     const double y = kTop + 20 + 24 * line;
     text += fmt::format(
@@ -86,11 +82,13 @@ std::string to_svg(const std::string& title, const std::vector<Row>& rows) {
         "<text x=\"890\" y=\"{2}\">{3}</text>\n",
         y, colour, y + 4, name);
   };
-  legend(0, "#94a3b8", "floor");
+  constexpr std::string_view kSolid = "stroke-width=\"2\"";
+  constexpr std::string_view kDashed = "stroke-width=\"1\" stroke-dasharray=\"5 4\"";
+  legend(static_cast<double>(rows.size()), "#ffffff", "dashed: the floor of each");
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const auto* const colour = kColours[i % kColours.size()];
-    text += curve(rows[i].ours, colour);
-    legend(static_cast<double>(i + 1), colour, rows[i].name);
+    text += curve(rows[i].ours, colour, kSolid) + curve(rows[i].floor, colour, kDashed);
+    legend(static_cast<double>(i), colour, rows[i].name);
   }
   return text + "</svg>\n";
 }

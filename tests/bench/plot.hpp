@@ -8,7 +8,7 @@
 namespace plchost::bench {
 
 /// The rows as an SVG picture: for each latency, the share of samples above it; both axes logarithmic. The
-/// floors of all rows are drawn as one grey line.
+/// floor of a row is dashed in its colour.
 [[nodiscard]] std::string to_svg(const std::string& title, const std::vector<Row>& rows);
 
 }  // namespace plchost::bench
