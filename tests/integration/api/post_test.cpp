@@ -12,18 +12,6 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-constexpr Duration kPatience = seconds(20);
-
-TimePoint soon() {
-  return MonotonicClock::now() + kPatience;
-}
-
-std::unique_ptr<ControlClient> connect(const OwnDomain& domain) {
-  dds::DomainOptions options;
-  options.domain = domain.number();
-  return ControlClient::connect(options).value();
-}
-
 TEST(RemotePost, CountsEachPostExactlyOnce) {
   const OwnDomain domain;
   TestHost host(domain, "hosta");

@@ -12,16 +12,6 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-TimePoint soon() {
-  return MonotonicClock::now() + seconds(20);
-}
-
-std::unique_ptr<ControlClient> connect(const OwnDomain& domain) {
-  dds::DomainOptions options;
-  options.domain = domain.number();
-  return ControlClient::connect(options).value();
-}
-
 TEST(RemoteStatus, ShowsTwoHostsOfOneDomainApart) {
   const OwnDomain domain;
   TestHost first(domain, "hosta");

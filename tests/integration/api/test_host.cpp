@@ -150,4 +150,10 @@ void TestHost::serve(const std::stop_token& stop) {
   }
 }
 
+std::unique_ptr<ControlClient> connect(const OwnDomain& domain) {
+  dds::DomainOptions options;
+  options.domain = domain.number();
+  return ControlClient::connect(options).value();
+}
+
 }  // namespace plchost

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -8,6 +9,7 @@
 #include <thread>
 #include <vector>
 
+#include "api/client/control_client.hpp"
 #include "shm/base/control_message.hpp"
 #include "shm/base/unique_fd.hpp"
 #include "shm/pool/host_page.hpp"
@@ -78,5 +80,14 @@ class TestHost {
   std::unique_ptr<Child> server_;
   std::jthread manager_;
 };
+
+/// How long a test waits for what will happen anyway.
+inline constexpr Duration kPatience = std::chrono::seconds(20);
+[[nodiscard]] inline TimePoint soon() {
+  return MonotonicClock::now() + kPatience;
+}
+
+/// A client in that domain.
+[[nodiscard]] std::unique_ptr<ControlClient> connect(const OwnDomain& domain);
 
 }  // namespace plchost
