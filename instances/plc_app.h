@@ -57,6 +57,10 @@ typedef unsigned int RTS_RESULT;
 #define ERR_DUPLICATE 0x0012u /* was there already; the handle is valid */
 #define ERR_NO_TASK 0x4000u   /* soft: counted, but no task is bound to the event at this time */
 
+/* Whole numbers of 64 bit. */
+typedef long RTS_I64;
+typedef unsigned long RTS_UI64;
+
 /* ---- Tasks ----------------------------------------------------------------------------------------------
  */
 
@@ -111,6 +115,31 @@ void CDECL __sys__setup__tasks(sys_setup_tasks_struct* p);
 
 /* The task whose cycle (or event function) runs on this thread; NULL outside of one. Any. */
 Task_Info* CDECL plc_current_task(void);
+
+/* The handle of one of the application's tasks, from __sys__setup__tasks on; it stays valid until the process
+ * ends. *pResult (may be NULL): ERR_OK; with RTS_INVALID_HANDLE: ERR_NO_OBJECT: no task of that name;
+ * ERR_PARAMETER; ERR_NOTINITIALIZED. Compares names: in a cycle keep the handle instead. Any. */
+RTS_HANDLE CDECL SchedGetTaskHandle(const char* pszTask, RTS_RESULT* pResult);
+
+/* The handle of plc_current_task(); RTS_INVALID_HANDLE outside of a cycle. Any. */
+RTS_HANDLE CDECL SchedGetCurrentTask(void);
+
+/*
+ * The interval of a cyclic task while it runs, in nanoseconds: PLC_MIN_INTERVAL_NS to PLC_MAX_INTERVAL_NS at
+ * a granularity of 1 ns, under every scheduler. This is how a fieldbus driver inside of the application lets
+ * the task follow a distributed clock ("modify the cycle times of the tasks with a fine granularity").
+ *
+ * A new interval is the distance between the release that is planned now and the one after it: set within the
+ * task's own cycle it already places the release that follows this cycle; set by others, while the task waits
+ * for a release, that release stays. It holds until it is set again, also across an exchange of the scheduler
+ * and a stop and start; a reset brings the configured one back. What Get returns is what was set last.
+ * ERR_OK; ERR_PARAMETER: not the handle of a cyclic task, or out of range; ERR_NOTINITIALIZED: the tasks are
+ * not made yet (plc_app_init). Any.
+ */
+#define PLC_MIN_INTERVAL_NS 1000L
+#define PLC_MAX_INTERVAL_NS 4320000000000000L /* 50 days */
+RTS_RESULT CDECL SchedGetTaskInterval(RTS_HANDLE hTask, RTS_I64* pIntervalNs);
+RTS_RESULT CDECL SchedSetTaskInterval(RTS_HANDLE hTask, RTS_I64 nIntervalNs);
 
 /* ---- External events ------------------------------------------------------------------------------------
  */

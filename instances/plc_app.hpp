@@ -59,6 +59,34 @@ class ExternalEvent {
 /// Who registers the event of an external-event task.
 enum class Registration { with_task, by_others };
 
+/// A task of this application, while it runs. Empty until it comes from current() or find().
+class Task {
+ public:
+  Task() noexcept = default;
+  /// The one whose cycle runs on this thread; empty outside of one. Any context.
+  [[nodiscard]] static Task current() noexcept { return Task(SchedGetCurrentTask()); }
+  /// Empty: there is none of that name (yet). Any context.
+  [[nodiscard]] static Task find(const char* name) noexcept {
+    return Task(SchedGetTaskHandle(name, nullptr));
+  }
+  [[nodiscard]] explicit operator bool() const noexcept { return handle_ != RTS_INVALID_HANDLE; }
+  [[nodiscard]] RTS_HANDLE handle() const noexcept { return handle_; }
+
+  /// What was set last; 0: not a cyclic task. Any context.
+  [[nodiscard]] std::chrono::nanoseconds interval() const noexcept {
+    RTS_I64 interval = 0;
+    return std::chrono::nanoseconds(SchedGetTaskInterval(handle_, &interval) == ERR_OK ? interval : 0);
+  }
+  /// From when on it holds, and its range: see SchedSetTaskInterval. Any context.
+  RTS_RESULT set_interval(std::chrono::nanoseconds interval) const noexcept {
+    return SchedSetTaskInterval(handle_, interval.count());
+  }
+
+ private:
+  explicit Task(RTS_HANDLE handle) noexcept : handle_(handle) {}
+  RTS_HANDLE handle_ = RTS_INVALID_HANDLE;
+};
+
 /// The tasks of one application. Filled by the setup function, which runs once on the control thread before
 /// any task. Faults (a text too long) are exceptions there: they refuse the application with their text.
 class Application {

@@ -15,15 +15,16 @@ class TimerSource final : public ActivationSource {
   // The timer says when to look; which release it is, and which were lost, follows from the grid alone.
   std::optional<Activation> wait() noexcept override {
     const Activation activation = task_.next_release(rule_);
-    if (!armed_) {
-      timer_->start(activation.release, task_.config().interval);
-      armed_ = true;
+    // Anew when the task's interval was changed at run time.
+    if (armed_ != task_.interval_in_force()) {
+      armed_ = task_.interval_in_force();
+      timer_->start(activation.release, armed_);
     }
     // A release that is over already is not waited for: the timer may have told of it together with the one
     // before.
     while (clock_.now() < activation.release) {
       if (timer_->wait() == 0) {
-        armed_ = false;
+        armed_ = Duration::zero();
         return std::nullopt;
       }
     }
@@ -37,7 +38,7 @@ class TimerSource final : public ActivationSource {
   const Task& task_;
   FreewheelRule rule_;
   std::unique_ptr<PeriodicTimer> timer_;
-  bool armed_ = false;
+  Duration armed_{};  // its period; 0: not armed
 };
 
 }  // namespace

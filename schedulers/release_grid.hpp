@@ -30,6 +30,10 @@ class ReleaseGrid {
     return {next_ + lost * interval_, static_cast<std::uint64_t>(lost)};
   }
 
+  /// The grid goes on in steps of `interval` (> 0) behind the release that is planned now, which stays.
+  void set_interval(Duration interval) noexcept { interval_ = interval; }
+  [[nodiscard]] Duration interval() const noexcept { return interval_; }
+
   /// `release`, which plan() gave, runs.
   void ran(TimePoint release) noexcept { next_ = release + interval_; }
 

@@ -37,10 +37,11 @@ Task::Task(Clock& clock, TaskConfig config, TaskStatistics& statistics, CountedE
       config_(std::move(config)),
       statistics_(statistics),
       event_(event),
-      grid_(TimePoint{}, grid_interval(config_), config_.late) {}
+      grid_(TimePoint{}, grid_interval(config_), config_.late),
+      wanted_interval_(grid_.interval().count()) {}
 
 void Task::begin(TimePoint origin) {
-  grid_ = ReleaseGrid(origin, grid_interval(config_), config_.late);
+  grid_ = ReleaseGrid(origin, Duration(wanted_interval_.load(std::memory_order_relaxed)), config_.late);
   ready_ = origin;
   begun_ = false;
   if (event_ != nullptr) {
@@ -59,10 +60,23 @@ Activation Task::next_release(const FreewheelRule& rule) const noexcept {
   return {.release = release, .lost_cycles = lost_cycles};
 }
 
+bool Task::set_interval(Duration interval) noexcept {
+  if (config_.kind != TaskKind::cyclic) return false;
+  if (interval < kMinRuntimeInterval || interval > kMaxInterval) return false;
+  wanted_interval_.store(interval.count(), std::memory_order_relaxed);
+  return true;
+}
+
+Duration Task::interval() const noexcept {
+  if (config_.kind != TaskKind::cyclic) return Duration::zero();
+  return Duration(wanted_interval_.load(std::memory_order_relaxed));
+}
+
 void Task::run_cycle(const Activation& activation) noexcept {
   const TimePoint start = clock_.now();
   run_entry(config_);
   const TimePoint end = clock_.now();
+  grid_.set_interval(Duration(wanted_interval_.load(std::memory_order_relaxed)));
   grid_.ran(activation.release);
   ready_ = end;
   last_execution_ = end - start;
@@ -81,19 +95,21 @@ void Task::record(const Activation& activation, TimePoint start, TimePoint end) 
   counters_.latency_last_ns = latency;
   counters_.latency_max_ns = std::max(counters_.latency_max_ns, latency);
   counters_.release_ns = activation.release.time_since_epoch().count();
+  if (config_.kind == TaskKind::cyclic) counters_.interval_ns = grid_.interval().count();
   counters_.spin_sum_ns += activation.spun.count();
   counters_.lost_cycles += activation.lost_cycles;
   counters_.lost_events += activation.lost_events;
   ++counters_.cycles;
   begun_ = true;
   last_start_ = start;
+  last_release_ = activation.release;
   statistics_.counters.write(counters_);
   statistics_.latency.record(Duration(latency));
 }
 
-// Lost cycles are counted as such; they are not jitter as well.
+// Against what was planned: neither lost cycles nor a change of the interval are jitter.
 void Task::record_jitter(const Activation& activation, TimePoint start) noexcept {
-  const Duration planned = config_.interval * (static_cast<Duration::rep>(activation.lost_cycles) + 1);
+  const Duration planned = activation.release - last_release_;
   const std::int64_t jitter = ((start - last_start_) - planned).count();
   counters_.jitter_last_ns = jitter;
   counters_.jitter_max_ns = std::max(counters_.jitter_max_ns, std::abs(jitter));

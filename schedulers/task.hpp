@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <cstddef>
 
 #include "schedulers/activation.hpp"
@@ -34,6 +35,16 @@ class Task {
   /// real-time.
   void run_cycle(const Activation& activation) noexcept;
 
+  /// Cyclic tasks: a new interval, from kMinRuntimeInterval to kMaxInterval. The release that is planned now
+  /// stays; the grid goes on from there in steps of the new interval, until it is set again: also after an
+  /// exchange of the scheduler, and after a stop and start. Called within a cycle it already places the
+  /// release that follows this cycle. false: not a cyclic task, or out of range. Any context.
+  [[nodiscard]] bool set_interval(Duration interval) noexcept;
+  /// The interval that was set last; 0 unless cyclic. Any context.
+  [[nodiscard]] Duration interval() const noexcept;
+  /// The interval that the grid has now: behind the release that is planned. The task's thread, real-time.
+  [[nodiscard]] Duration interval_in_force() const noexcept { return grid_.interval(); }
+
   [[nodiscard]] EventLatch& latch() noexcept { return latch_; }
   [[nodiscard]] EventCursor& cursor() noexcept { return cursor_; }
   [[nodiscard]] CountedEvent& event() noexcept { return *event_; }
@@ -47,13 +58,15 @@ class Task {
   TaskStatistics& statistics_;
   CountedEvent* event_;
 
-  ReleaseGrid grid_;    // cyclic
-  EventLatch latch_;    // event
-  EventCursor cursor_;  // external
-  TimePoint ready_;     // since when it could run: the end of its last cycle
+  ReleaseGrid grid_;                            // cyclic
+  std::atomic<Duration::rep> wanted_interval_;  // of the grid, from the end of the next cycle on
+  EventLatch latch_;                            // event
+  EventCursor cursor_;                          // external
+  TimePoint ready_;                             // since when it could run: the end of its last cycle
   Duration last_execution_{};
   bool begun_ = false;  // has run since begin()
   TimePoint last_start_;
+  TimePoint last_release_;
   TaskCounters counters_{};
 };
 

@@ -22,6 +22,9 @@ inline constexpr int kLowestIecPriority = 31;
 inline constexpr int kLowestRealTimeIecPriority = 15;
 /// What a task's interval may be at most: the seed's largest, 2^32 ms, is just below.
 inline constexpr Duration kMaxInterval = std::chrono::days(50);
+/// What it may be set to at least while the task runs: the shortest that an application can be configured
+/// with.
+inline constexpr Duration kMinRuntimeInterval = std::chrono::microseconds(1);
 
 /// Which part of SCHED_FIFO's range an instance uses, so that of two instances on one core one goes first.
 ///            supervision  tick   IEC 0..15

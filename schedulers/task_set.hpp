@@ -63,6 +63,10 @@ class TaskSet {
   /// On failure they run on under the old one. wrong_state: they do not run.
   [[nodiscard]] Result<void> switch_to(std::string_view scheduler, const SchedulerSettings& settings);
 
+  /// In the order in which they were given. What may be called on a task from which context: see Task.
+  [[nodiscard]] std::size_t size() const noexcept { return tasks_.size(); }
+  [[nodiscard]] Task& task(std::size_t index) noexcept { return *tasks_[index]; }
+
   [[nodiscard]] bool running() const noexcept { return running_; }
   /// Of the scheduler in use, or of the last one; empty before the first start.
   [[nodiscard]] std::string_view scheduler_name() const noexcept { return scheduler_name_; }

@@ -21,8 +21,9 @@ plc_TaskStatus to_sample(const std::string& host, const std::string& instance, s
   sample.kind = static_cast<std::uint32_t>(task.identity.kind);
   sample.priority = task.identity.iec_priority;
   sample.state = static_cast<std::uint32_t>(task.state);
-  sample.interval_ns = task.identity.interval_ns;
   const TaskCounters& counters = task.counters;
+  // The one in force, once a cycle has run.
+  sample.interval_ns = counters.interval_ns > 0 ? counters.interval_ns : task.identity.interval_ns;
   sample.cycles = counters.cycles;
   sample.lost_cycles = counters.lost_cycles;
   sample.lost_events = counters.lost_events;

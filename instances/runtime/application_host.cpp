@@ -37,6 +37,7 @@ ApplicationHost* ApplicationHost::current_for_control() noexcept {
 void ApplicationHost::set_up_tasks(sys_setup_tasks_struct* tasks) noexcept {
   given_twice_ = given_twice_ || tasks_ != nullptr;
   tasks_ = tasks;
+  task_table_.set_up(tasks);
 }
 
 RTS_RESULT ApplicationHost::add_callback(unsigned event, PF_EVENT_CALLBACK callback, void* user) {

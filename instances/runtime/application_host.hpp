@@ -7,6 +7,7 @@
 #include "instances/plc_app.h"
 #include "instances/runtime/event_table.hpp"
 #include "instances/runtime/message_queue.hpp"
+#include "instances/runtime/task_table.hpp"
 #include "shm/base/result.hpp"
 
 namespace plchost {
@@ -28,6 +29,7 @@ class ApplicationHost {
 
   [[nodiscard]] EventTable& events() noexcept { return events_; }
   [[nodiscard]] MessageQueue& messages() noexcept { return messages_; }
+  [[nodiscard]] TaskTable& task_table() noexcept { return task_table_; }
 
   /// What the application handed over; null if nothing yet.
   [[nodiscard]] sys_setup_tasks_struct* tasks() const noexcept { return tasks_; }
@@ -53,6 +55,7 @@ class ApplicationHost {
   std::thread::id control_thread_ = std::this_thread::get_id();
   EventTable events_;
   MessageQueue messages_;
+  TaskTable task_table_;
   sys_setup_tasks_struct* tasks_ = nullptr;
   bool given_twice_ = false;
   std::vector<Callback> callbacks_;

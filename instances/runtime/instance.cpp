@@ -147,6 +147,7 @@ Result<std::string> Instance::make_tasks() {
   auto tasks = TaskSet::create(clock_, options_.band, application_->tasks(), std::move(environment));
   if (!tasks) return std::unexpected(std::move(tasks).error());
   tasks_ = *std::move(tasks);
+  host_->task_table().attach(tasks_.get());
   notify_tasks(EVT_ExternalEventTaskCreateDone);
   return {};
 }
@@ -188,12 +189,14 @@ Result<void> Instance::shut_down() {
     if (tasks_->running()) stopped = tasks_->stop(kStopLimit);
     if (stopped) {
       notify_tasks(EVT_PrepareExternalEventTaskDelete);
-      tasks_.reset();
     }
   }
   if (stopped) {
     if (application_) application_->exit();
     components_.exit();
+    // Only now: until then a thread of a component may have used a task's handle.
+    if (host_) host_->task_table().attach(nullptr);
+    tasks_.reset();
   }
   if (host_) {
     host_->write_messages();

@@ -79,10 +79,11 @@ struct TaskCounters {
   std::int64_t exec_max_ns;
   std::int64_t latency_last_ns;  ///< start - planned release
   std::int64_t latency_max_ns;
-  std::int64_t jitter_last_ns;  ///< signed: (start - start before) - interval; cyclic tasks only
+  std::int64_t jitter_last_ns;  ///< signed: (start - start before) - planned distance; cyclic tasks only
   std::int64_t jitter_max_ns;   ///< largest magnitude of the same
   std::int64_t release_ns;      ///< planned release of the last cycle, CLOCK_MONOTONIC
   std::int64_t spin_sum_ns;     ///< time spun ahead of releases (CmpScheduleOneShot)
+  std::int64_t interval_ns;     ///< in force since the last cycle; cyclic tasks only
 };
 
 /// The statistics of one task, in memory that other processes may map. All zero is valid and empty.

@@ -29,7 +29,7 @@ struct TaskIdentity {
   FixedText<kMaxEventName> external_event;  ///< empty unless kind is external
   PageTaskKind kind = PageTaskKind::cyclic;
   std::int32_t iec_priority = 0;
-  std::int64_t interval_ns = 0;  ///< 0 unless kind is cyclic
+  std::int64_t interval_ns = 0;  ///< as configured; 0 unless kind is cyclic
 };
 
 /// What the instance says of itself. Written by its control thread.

@@ -95,5 +95,16 @@ TEST(ReleaseGrid, TakesTheLongestIntervalAndTheShortest) {
   EXPECT_EQ(shortest.plan(at(kMaxInterval)).release, at(kMaxInterval));
 }
 
+TEST(ReleaseGrid, NewIntervalBeginsBehindTheReleaseThatIsPlanned) {
+  ReleaseGrid sut(kOrigin, kInterval, LatePolicy::next);
+  sut.ran(kOrigin);
+  sut.set_interval(nanoseconds(2'500'001));
+  EXPECT_EQ(sut.plan(kOrigin).release, at(kInterval));
+  sut.ran(at(kInterval));
+  EXPECT_EQ(sut.plan(at(kInterval)).release, at(kInterval + nanoseconds(2'500'001)));
+  EXPECT_EQ(sut.plan(at(2 * kInterval)).lost_cycles, 3U);
+  EXPECT_EQ(sut.plan(at(2 * kInterval)).release, at(kInterval + nanoseconds(10'000'004)));
+}
+
 }  // namespace
 }  // namespace plchost

@@ -96,6 +96,70 @@ TEST_F(TaskTest, CountersGoOnAfterANewBegin) {
   EXPECT_EQ(counters().jitter_max_ns, 0) << "the time between stop and start is no period";
 }
 
+TEST_F(TaskTest, IntervalSetInItsOwnCyclePlacesTheNextRelease) {
+  Task* self = nullptr;
+  TaskConfig config = cyclic();
+  config.entry = [&] { ASSERT_TRUE(self->set_interval(Duration(10'000'001))); };
+  Task sut(clock, config, statistics, nullptr);
+  self = &sut;
+  const TimePoint origin = clock.now();
+  sut.begin(origin);
+  run_next(sut, Duration::zero());
+  EXPECT_EQ(sut.next_release(FreewheelRule({})).release, origin + Duration(10'000'001));
+  run_next(sut, Duration::zero());
+  EXPECT_EQ(sut.next_release(FreewheelRule({})).release, origin + Duration(20'000'002));
+}
+
+TEST_F(TaskTest, IntervalSetWhileItWaitsLeavesThePlannedRelease) {
+  Task sut(clock, cyclic(), statistics, nullptr);
+  const TimePoint origin = clock.now();
+  sut.begin(origin);
+  run_next(sut, Duration::zero());
+  ASSERT_TRUE(sut.set_interval(milliseconds(7)));
+  EXPECT_EQ(sut.interval(), milliseconds(7));
+  EXPECT_EQ(sut.interval_in_force(), milliseconds(10));
+  EXPECT_EQ(sut.next_release(FreewheelRule({})).release, origin + milliseconds(10));
+  EXPECT_EQ(counters().interval_ns, 10'000'000);
+  run_next(sut, Duration::zero());
+  EXPECT_EQ(sut.next_release(FreewheelRule({})).release, origin + milliseconds(17));
+  EXPECT_EQ(counters().interval_ns, 7'000'000);
+}
+
+TEST_F(TaskTest, ChangeOfTheIntervalIsNoJitter) {
+  Task sut(clock, cyclic(), statistics, nullptr);
+  sut.begin(clock.now());
+  for (const int ms : {10, 7, 23, 3}) {
+    ASSERT_TRUE(sut.set_interval(milliseconds(ms)));
+    run_next(sut, Duration::zero());
+  }
+  EXPECT_EQ(counters().jitter_max_ns, 0);
+}
+
+TEST_F(TaskTest, IntervalThatWasSetHoldsAfterANewBegin) {
+  Task sut(clock, cyclic(), statistics, nullptr);
+  sut.begin(clock.now());
+  ASSERT_TRUE(sut.set_interval(milliseconds(4)));
+  const TimePoint origin = clock.now() + milliseconds(1);
+  sut.begin(origin);
+  run_next(sut, Duration::zero());
+  EXPECT_EQ(sut.next_release(FreewheelRule({})).release, origin + milliseconds(4));
+}
+
+TEST_F(TaskTest, RefusesIntervalsOutOfRangeAndOfOtherKinds) {
+  Task sut(clock, cyclic(), statistics, nullptr);
+  EXPECT_FALSE(sut.set_interval(kMinRuntimeInterval - Duration(1)));
+  EXPECT_FALSE(sut.set_interval(Duration(-1)));
+  EXPECT_FALSE(sut.set_interval(kMaxInterval + Duration(1)));
+  EXPECT_EQ(sut.interval(), milliseconds(10));
+  EXPECT_TRUE(sut.set_interval(kMinRuntimeInterval));
+  EXPECT_TRUE(sut.set_interval(kMaxInterval));
+  TaskConfig config = cyclic();
+  config.kind = TaskKind::freewheeling;
+  Task other(clock, config, statistics, nullptr);
+  EXPECT_FALSE(other.set_interval(milliseconds(1)));
+  EXPECT_EQ(other.interval(), Duration::zero());
+}
+
 TEST_F(TaskTest, SpunTimeAndLostEventsAddUp) {
   Task sut(clock, cyclic(), statistics, nullptr);
   sut.begin(clock.now());

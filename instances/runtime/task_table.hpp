@@ -1,0 +1,39 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <string_view>
+
+#include "instances/plc_app.h"
+#include "schedulers/task_set.hpp"
+
+namespace plchost {
+
+/// The handles that applications have on their tasks: the number of the task, counted from 1. Names can be
+/// looked up as soon as the application has handed its tasks over, the tasks themselves are there later.
+/// Any context, unless said otherwise.
+class TaskTable {
+ public:
+  /// What the application handed over, once. Control thread.
+  void set_up(const sys_setup_tasks_struct* setup) noexcept {
+    setup_.store(setup, std::memory_order_release);
+  }
+  /// The tasks behind the handles, in the same order; null: none any more, nor does anybody use them. Control
+  /// thread.
+  void attach(TaskSet* tasks) noexcept { tasks_.store(tasks, std::memory_order_release); }
+
+  /// RTS_INVALID_HANDLE: no task of that name.
+  [[nodiscard]] RTS_HANDLE find(std::string_view name) const noexcept;
+  /// RTS_INVALID_HANDLE: not one of the application's.
+  [[nodiscard]] RTS_HANDLE find(const Task_Info* info) const noexcept;
+  /// Null: no such handle, or the tasks are not made yet.
+  [[nodiscard]] Task* task(RTS_HANDLE handle) const noexcept;
+  /// Whether the tasks are made.
+  [[nodiscard]] bool attached() const noexcept { return tasks_.load(std::memory_order_acquire) != nullptr; }
+
+ private:
+  std::atomic<const sys_setup_tasks_struct*> setup_{nullptr};
+  std::atomic<TaskSet*> tasks_{nullptr};
+};
+
+}  // namespace plchost
