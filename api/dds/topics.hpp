@@ -30,6 +30,7 @@ inline constexpr TopicInfo kInstanceStatus{"plc/v1/status/instance", &plc_Instan
 inline constexpr TopicInfo kTaskStatus{"plc/v1/status/task", &plc_TaskStatus_desc};
 inline constexpr TopicInfo kEventStatus{"plc/v1/status/event", &plc_EventStatus_desc};
 inline constexpr TopicInfo kObjectStatus{"plc/v1/status/object", &plc_ObjectStatus_desc};
+inline constexpr TopicInfo kHostFinding{"plc/v1/status/host_finding", &plc_HostFinding_desc};
 
 /// The bounds of the readers and histories. A reader that is full makes the writer wait: back-pressure, no
 /// loss.

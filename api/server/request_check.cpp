@@ -21,6 +21,7 @@ struct Operation {
   ControlVerb verb;
   ApiRole role;
   Argument argument;
+  bool of_host = false;  // names no instance
 };
 
 constexpr std::array kOperations = {
@@ -28,6 +29,8 @@ constexpr std::array kOperations = {
     Operation{plc_OPERATION_STOP, ControlVerb::stop, ApiRole::operating, Argument::none},
     Operation{plc_OPERATION_RESET, ControlVerb::reset, ApiRole::operating, Argument::none},
     Operation{plc_OPERATION_RESTART, ControlVerb::restart, ApiRole::operating, Argument::none},
+    Operation{plc_OPERATION_CHECK_HOST, ControlVerb::check_host, ApiRole::operating, Argument::none,
+              /*of_host=*/true},
     Operation{plc_OPERATION_LOAD_APPLICATION, ControlVerb::load_application, ApiRole::engineering,
               Argument::path},
     Operation{plc_OPERATION_SET_SCHEDULER, ControlVerb::set_scheduler, ApiRole::engineering,
@@ -64,8 +67,13 @@ Result<void> check_argument(const Operation& operation, std::string_view argumen
   return {};
 }
 
-Result<void> check_instance(std::string_view instance, std::string_view host,
+Result<void> check_instance(const Operation& operation, std::string_view instance, std::string_view host,
                             std::span<const std::string_view> instances) {
+  if (operation.of_host) {
+    if (instance.empty()) return {};
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("{} is for the whole host: name no instance", to_string(operation.verb)));
+  }
   if (auto good = check_name("instance", instance, kMaxInstanceName); !good) return good;
   if (std::ranges::find(instances, instance) != instances.end()) return {};
   return failure(ErrorCode::not_found, fmt::format("no instance '{}' on host '{}'; there are: {}", instance,
@@ -92,7 +100,8 @@ Result<ControlRequest> check_request(const plc_Request& request, ApiRole role, s
                     to_string(operation->verb), role == ApiRole::operating ? "operator" : "engineer"));
   }
   const auto instance = dds::text_of(request.instance);
-  if (auto good = check_instance(instance, host, instances); !good) return std::unexpected(good.error());
+  if (auto good = check_instance(*operation, instance, host, instances); !good)
+    return std::unexpected(good.error());
   const auto argument = dds::text_of(request.argument);
   if (auto good = check_argument(*operation, argument); !good) return std::unexpected(good.error());
   return ControlRequest{0, operation->verb, std::string(instance), std::string(argument)};

@@ -45,10 +45,11 @@ Result<std::string> Instance::obey(const ControlRequest& request) {
     case ControlVerb::reset:
     case ControlVerb::restart:
     case ControlVerb::load_application:
+    case ControlVerb::check_host:
       break;
   }
   return failure(ErrorCode::unsupported,
-                 fmt::format("'{}' needs a fresh process: ask the manager", to_string(request.verb)));
+                 fmt::format("'{}' is the manager's to do: ask it", to_string(request.verb)));
 }
 
 Result<std::string> Instance::start() {

@@ -39,6 +39,7 @@ void ManagedInstance::handle(const ControlRequest& request, ControlReplyFunction
     case ControlVerb::register_event:
     case ControlVerb::unregister_event:
       return begin_forwarded();
+    case ControlVerb::check_host:
     case ControlVerb::shutdown:
     case ControlVerb::status:
       return;  // refused by check_argument
@@ -48,6 +49,8 @@ void ManagedInstance::handle(const ControlRequest& request, ControlReplyFunction
 Result<void> ManagedInstance::check_argument(ControlRequest& request) const {
   const std::string shown = request.argument.substr(0, kMaxPath);
   switch (request.verb) {
+    case ControlVerb::check_host:
+      return failure(ErrorCode::invalid_argument, "'check host' is for the whole host: name no instance");
     case ControlVerb::shutdown:
     case ControlVerb::status:
       return failure(ErrorCode::unsupported, fmt::format("'{}' is between the manager and an instance only",

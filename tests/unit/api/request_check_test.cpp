@@ -42,6 +42,13 @@ TEST(RequestCheck, TurnsEachOperationIntoItsVerb) {
             ControlVerb::register_event);
   EXPECT_EQ(check(make(plc_OPERATION_UNREGISTER_EVENT, "line1", "e"), ApiRole::engineering)->verb,
             ControlVerb::unregister_event);
+  EXPECT_EQ(check(make(plc_OPERATION_CHECK_HOST, ""), ApiRole::operating)->verb, ControlVerb::check_host);
+}
+
+TEST(RequestCheck, TakesACheckOfTheHostOnlyWithoutAnInstance) {
+  const auto named = check(make(plc_OPERATION_CHECK_HOST, "line1"), ApiRole::operating);
+  EXPECT_EQ(named.error().code, ErrorCode::invalid_argument);
+  EXPECT_THAT(named.error().message, HasSubstr("whole host"));
 }
 
 TEST(RequestCheck, RefusesWhatIsNotForTheRole) {
