@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "instances/launch/core_latency.hpp"
+#include "shm/base/unique_fd.hpp"
+
+namespace plchost {
+
+/// [SysTimer] IdleStates: whether an idle core may fall into a sleep that it takes long to wake up from.
+enum class IdleStates : std::uint8_t {
+  hold,       ///< no core of the host may, while the process lives
+  hold_core,  ///< the cores of the instance may not; the others save power
+  allow,
+};
+
+/// Idle cores held awake, as long as this lives. Set-up.
+class IdleHold {
+ public:
+  /// Where the kernel's files are; a test makes its own.
+  struct Files {
+    std::string sysfs = std::string(kSysfs);
+    std::string device = "/dev/cpu_dma_latency";
+  };
+
+  IdleHold() = default;
+  /// Takes what can be had. hold_core where the kernel cannot, or without a run directory to write down what
+  /// was before: holds all cores instead. status() says what it came to.
+  [[nodiscard]] static IdleHold take(IdleStates wanted, const std::vector<int>& cores,
+                                     const std::string& run_directory, const Files& files);
+
+  /// "held for all cores", "held for core 1", "allowed", "not held: ...", with the reason where it is not
+  /// what was wanted.
+  [[nodiscard]] const std::string& status() const noexcept { return status_; }
+  /// It is what was wanted.
+  [[nodiscard]] bool as_wanted() const noexcept { return as_wanted_; }
+
+ private:
+  void hold_all(const std::string& device);
+
+  UniqueFd device_;  // /dev/cpu_dma_latency: 0 while it is open, so it ends with the process
+  std::vector<CoreLatencyHold> cores_;
+  std::string status_ = "allowed";
+  bool as_wanted_ = true;
+};
+
+}  // namespace plchost
