@@ -1,14 +1,11 @@
-// Start latency of a 1 ms cyclic task: planned release to the first instruction of the task's code. The floor
-// is a bare SCHED_FIFO thread in clock_nanosleep(TIMER_ABSTIME), same priority, same core, in alternation.
+// Start latency of a 1 ms cyclic task under each scheduler: planned release to the first instruction of the
+// task's code, with its context switches and processor time. Beside it the floor F, a bare SCHED_FIFO thread
+// in clock_nanosleep(TIMER_ABSTIME), same priority, same core, in alternation.
 
 #include <array>
-#include <thread>
 
-#include <time.h>
-
-#include "schedulers/task_set.hpp"
-#include "shm/base/task_statistics.hpp"
-#include "tests/bench/bench.hpp"
+#include "tests/bench/cyclic_loop.hpp"
+#include "tests/bench/parts.hpp"
 
 namespace plchost::bench {
 
@@ -16,71 +13,53 @@ namespace {
 
 constexpr Duration kPeriod = std::chrono::milliseconds(1);
 
-std::size_t samples_in(Duration slice) {
-  return static_cast<std::size_t>(slice / kPeriod) * 2;
-}
-
-Result<void> run_floor(const Plan& plan, Samples& into) {
-  Samples samples(samples_in(plan.slice));
-  auto body = [&] {
-    const TimePoint end = MonotonicClock::now() + plan.slice;
-    TimePoint release = MonotonicClock::now() + kPeriod;
-    while (release < end) {
-      const timespec until = to_timespec(release);
-      ::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
-      const TimePoint now = MonotonicClock::now();
-      samples.add(now - release);
-      // Like ours: what passed is skipped, never replayed.
-      do release += kPeriod;
-      while (release <= now);
-    }
-  };
-  auto thread = Thread::start("floor", kPriority, body);
-  if (!thread) return std::unexpected(thread.error());
-  thread->join();
-  into.append(samples);
-  return {};
-}
-
-Result<void> run_scheduler(const Plan& plan, std::string_view name, Samples& into) {
-  LinuxClock clock;
-  TaskStatistics statistics;
-  Samples samples(samples_in(plan.slice));
-  TimePoint began{};
-  TaskConfig task;
-  task.name = "measured";
-  task.interval = kPeriod;
-  task.entry = [&] { began = MonotonicClock::now(); };
-  task.after_cycle = [&](const TaskCounters& counters) {
-    samples.add(began - TimePoint(Duration(counters.release_ns)));
-  };
-  TaskEnvironment environment;
-  environment.statistics = [&](std::size_t) -> TaskStatistics& { return statistics; };
-  auto tasks = TaskSet::create(clock, PriorityBand::normal, {task}, environment);
-  if (!tasks) return std::unexpected(tasks.error());
-  if (auto started = (*tasks)->start(name, {}); !started) return started;
-  std::this_thread::sleep_for(plan.slice);
-  if (auto stopped = (*tasks)->stop(std::chrono::seconds(5)); !stopped) return stopped;
-  into.append(samples);
+std::vector<Target> targets_for(std::string_view scheduler, const CyclicFigures& ours,
+                                const CyclicFigures& floor) {
+  const Summary our = summarise(ours.latencies);
+  const Summary bare = summarise(floor.latencies);
+  if (scheduler == "CmpScheduleOneShot") {
+    return {{"median below 0.02 F", our.p50, 0.02 * bare.p50}, {"p99 below 0.5 F", our.p99, 0.5 * bare.p99}};
+  }
+  if (scheduler == "CmpScheduleTimer") {
+    return {{"median below F + 2 us", our.p50, bare.p50 + 2},
+            {"p99 below 1.15 F", our.p99, 1.15 * bare.p99},
+            {"1.0 context switches per cycle", ours.switches(), 1.05, true},
+            {"CPU per cycle below 1.2 F's", ours.cpu_us(), 1.2 * floor.cpu_us()}};
+  }
+  if (scheduler == "CmpSchedule") {
+    return {{"median below F + 5 us", our.p50, bare.p50 + 5},
+            {"at most 2 context switches per cycle", ours.switches(), 2.05, true}};
+  }
   return {};
 }
 
 }  // namespace
 
 Result<std::vector<Row>> measure_cyclic(const Plan& plan) {
-  // The process's other thread sleeps meanwhile; the measured ones inherit this core.
-  if (auto bound = bind_thread(plan.task_core); !bound) return std::unexpected(bound.error());
+  BareLoop bare(Wait::sleep, kPeriod);
+  CyclicFigures floor;
+  std::vector<Subject> subjects{slices_of(plan, bare, kPeriod, floor)};
+  std::vector<std::unique_ptr<ScheduledLoop>> loops;
+  std::vector<CyclicFigures> figures(all_schedulers().size());
+  for (const auto& entry : all_schedulers()) {
+    loops.push_back(std::make_unique<ScheduledLoop>(entry.name, kPeriod));
+    subjects.push_back(slices_of(plan, *loops.back(), kPeriod, figures[loops.size() - 1]));
+  }
+  if (auto done = alternate(plan, subjects); !done) return std::unexpected(std::move(done.error()));
   std::vector<Row> rows;
-  for (const auto& entry : all_schedulers())
-    rows.push_back({.name = "cyclic/" + std::string(entry.name) + "/1ms"});
-  plan.progress("cyclic tasks, 1 ms, beside clock_nanosleep");
-  for (int slice = 0; slice < plan.slices; ++slice) {
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      if (auto done = run_floor(plan, rows[i].floor); !done) return std::unexpected(done.error());
-      if (auto done = run_scheduler(plan, all_schedulers()[i].name, rows[i].ours); !done) {
-        return std::unexpected(done.error());
-      }
-    }
+  for (std::size_t i = 0; i < figures.size(); ++i) {
+    const std::string_view scheduler = all_schedulers()[i].name;
+    rows.push_back({.name = "cyclic/" + std::string(scheduler) + "/1ms",
+                    .ours = figures[i].latencies,
+                    .floor = floor.latencies,
+                    .extra = {{"switches_per_cycle", figures[i].switches()},
+                              {"floor_switches_per_cycle", floor.switches()},
+                              {"cpu_us_per_cycle", figures[i].cpu_us()},
+                              {"floor_cpu_us_per_cycle", floor.cpu_us()},
+                              {"spin_share_of_core", figures[i].spin_share()},
+                              {"lost_per_million", figures[i].lost_per_million()},
+                              {"floor_lost_per_million", floor.lost_per_million()}},
+                    .targets = targets_for(scheduler, figures[i], floor)});
   }
   return rows;
 }

@@ -12,6 +12,7 @@ struct DdsBoard {
   static constexpr std::uint32_t kCapacity = 1U << 20;
   std::atomic<std::int64_t> posted_ns;      ///< CLOCK_MONOTONIC just before the post
   std::atomic<std::uint32_t> arrived;       ///< posts whose task ran
+  std::atomic<std::uint32_t> posts;         ///< how many the poster shall make in this slice
   std::atomic<std::uint32_t> order;         ///< what the poster shall do: an Order
   std::atomic<std::uint32_t> poster_ready;  ///< 1: both ways are open; 2: they cannot be opened
   std::array<std::int64_t, kCapacity> latency_ns;
@@ -24,8 +25,5 @@ struct DdsBoard {
 };
 
 enum class Order : std::uint32_t { wait = 0, post_bare = 1, post_event = 2, end = 3 };
-
-/// The environment variable that names the board's file.
-inline constexpr const char* kBoardVariable = "PLCHOST_BENCH_BOARD";
 
 }  // namespace plchost::bench

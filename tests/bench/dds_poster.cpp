@@ -55,13 +55,13 @@ class BareWriter {
 /// One slice: each post when the one before has arrived.
 template <class Post>
 void post_slice(const Plan& plan, DdsBoard& board, Post post) {
-  for (int i = 0; i < plan.posts; ++i) {
+  for (std::uint32_t i = 0; i < board.posts.load(); ++i) {
     const std::uint32_t before = board.arrived.load();
-    std::this_thread::sleep_for(plan.gap);
+    std::this_thread::sleep_for(plan.post_gap);
     board.posted_ns.store(MonotonicClock::now().time_since_epoch().count());
     post();
     for (int waited = 0; board.arrived.load() == before && waited < 1000; ++waited) {
-      std::this_thread::sleep_for(plan.gap);
+      std::this_thread::sleep_for(plan.post_gap);
     }
   }
 }
@@ -71,20 +71,20 @@ void post_slice(const Plan& plan, DdsBoard& board, Post post) {
 int run_dds_poster(const Plan& plan, const DdsDomains& domains, DdsBoard& board) {
   BareWriter bare;
   const TimePoint patience = MonotonicClock::now() + std::chrono::seconds(20);
-  bool ready = bind_thread(plan.poster_core).has_value() && bare.open(domains.bare).has_value();
+  bool ready = bind_thread({plan.poster_core}).has_value() && bare.open(domains.bare).has_value();
   dds::DomainOptions options;
   options.domain = domains.plchost;
   auto client = ControlClient::connect(options);
   ready = ready && client && (*client)->prepare_posts(kBenchHost, patience);
   while (ready && !bare.matched()) {
     if (MonotonicClock::now() > patience) ready = false;
-    std::this_thread::sleep_for(plan.gap);
+    std::this_thread::sleep_for(plan.post_gap);
   }
   board.poster_ready.store(ready ? 1 : 2);
   for (;;) {
     switch (static_cast<Order>(board.order.load())) {
       case Order::wait:
-        std::this_thread::sleep_for(plan.gap);
+        std::this_thread::sleep_for(plan.post_gap);
         continue;
       case Order::end:
         return 0;

@@ -4,12 +4,14 @@
 #include <cstdio>
 #include <fstream>
 #include <iterator>
+#include <optional>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "tests/bench/bench.hpp"
+#include "tests/bench/child.hpp"
+#include "tests/bench/parts.hpp"
 #include "tests/bench/plot.hpp"
 
 namespace {
@@ -20,22 +22,24 @@ struct Options {
   std::string json;
   std::string plots;
   bool quick = false;
-  std::string only;
+  bool stress = false;
+  int seconds = 0;
+  std::vector<std::string> only;
 };
 
 bench::Plan make_plan(const Options& options) {
   bench::Plan plan;
-  if (!options.quick) {
-    plan.slices = 120;
-    plan.slice = std::chrono::milliseconds(1000);
-    plan.posts = 1000;
+  if (options.quick) {
+    plan.each = std::chrono::seconds(5);
+    plan.slice = std::chrono::milliseconds(2500);
+    plan.starts = 20;
   }
+  if (options.seconds > 0) plan.each = std::chrono::seconds(options.seconds);
   const auto cores = online_cores();
   // Two different cores where there are two; else everything shares the one.
   plan.task_core = cores && !cores->empty() ? cores->back() : 0;
   plan.poster_core = cores && !cores->empty() ? cores->front() : 0;
   plan.programs = std::filesystem::read_symlink("/proc/self/exe").parent_path();
-  plan.progress = [](const std::string& what) { fmt::print(stderr, "measuring {} ...\n", what); };
   return plan;
 }
 
@@ -47,20 +51,52 @@ bool write_file(const std::string& path, const std::string& text) {
   return false;
 }
 
-/// One picture for each part that was measured.
-bool write_plots(const std::string& folder, const std::vector<bench::Row>& rows) {
-  constexpr std::pair<std::string_view, std::string_view> kPictures[] = {
-      {"cyclic", "start latency of a 1 ms task: share of cycles that start later"},
-      {"post", "post to first instruction of the task: share of posts that take longer"}};
-  for (const auto& [prefix, title] : kPictures) {
-    std::vector<bench::Row> part;
-    std::ranges::copy_if(rows, std::back_inserter(part),
-                         [&](const auto& row) { return row.name.starts_with(prefix); });
-    if (part.empty()) continue;
-    if (!write_file(fmt::format("{}/{}.svg", folder, prefix), bench::to_svg(std::string(title), part)))
-      return false;
+/// One part in one condition.
+struct Job {
+  const bench::Part* part;
+  bool under_stress;
+};
+
+std::vector<Job> make_jobs(const Options& options) {
+  std::vector<Job> jobs;
+  const bool can_stress = options.stress && bench::is_installed("stress-ng");
+  if (options.stress && !can_stress)
+    fmt::print(stderr, "stress-ng is not installed: what it is needed for is skipped\n");
+  for (const bool under_stress : {false, true}) {
+    for (const bench::Part& part : bench::all_parts()) {
+      if (!options.only.empty() && std::ranges::find(options.only, part.name) == options.only.end()) continue;
+      if (!under_stress || (can_stress && part.under_stress)) jobs.push_back({&part, under_stress});
+    }
   }
-  return true;
+  return jobs;
+}
+
+/// At normal priority, on all cores, until it goes. Ends by itself if the benchmark is killed.
+Result<bench::Child> start_stress() {
+  return bench::Child::start(
+      {"stress-ng", "--quiet", "--cpu", "2", "--vm", "1", "--io", "1", "--timeout", "2h"});
+}
+
+Result<std::vector<bench::Row>> measure(const Job& job, const bench::Plan& plan) {
+  std::optional<bench::Child> stress;
+  if (job.under_stress) {
+    auto started = start_stress();
+    if (!started) return std::unexpected(std::move(started.error()));
+    stress = std::move(*started);
+  }
+  auto rows = job.part->measure(plan);
+  if (!rows) return rows;
+  for (bench::Row& row : *rows) row.condition = job.under_stress ? "stress" : "idle";
+  return rows;
+}
+
+bool write_plots(const Job& job, const std::string& folder, const std::vector<bench::Row>& rows) {
+  const std::string_view condition = job.under_stress ? ", under stress-ng" : "";
+  const std::string title = std::string(job.part->picture) + std::string(condition);
+  const std::string path =
+      fmt::format("{}/{}{}.svg", folder, job.part->name, job.under_stress ? "_stress" : "");
+  if (job.part->picture.empty()) return true;
+  return write_file(path, bench::to_svg(title, rows));
 }
 
 int run(const Options& options) {
@@ -69,38 +105,50 @@ int run(const Options& options) {
     fmt::print(stderr, "plchost-bench: {}\n", prepared.error().describe());
     return 1;
   }
-  struct Part {
-    std::string_view name;
-    Result<std::vector<bench::Row>> (*measure)(const bench::Plan&);
+  const std::vector<Job> jobs = make_jobs(options);
+  const auto seconds_of = [&](const Job& job) {
+    return job.part->turns * std::chrono::duration<double>(plan.each).count();
   };
-  constexpr Part kParts[] = {{"cyclic", &bench::measure_cyclic},
-                             {"post/process", &bench::measure_post_process},
-                             {"post/dds", &bench::measure_post_dds}};
+  double total = 0;
+  for (const Job& job : jobs) total += seconds_of(job);
+  fmt::print(stderr, "{} parts, about {:.0f} minutes\n", jobs.size(), total / 60 + 0.5);
   std::vector<bench::Row> rows;
-  for (const Part& part : kParts) {
-    if (!options.only.empty() && options.only != part.name) continue;
-    auto measured = part.measure(plan);
+  bool complete = true;
+  for (std::size_t i = 0; i < jobs.size(); ++i) {
+    const bench::Part& part = *jobs[i].part;
+    fmt::print(stderr, "[{}/{}] {} ({}): {}, about {:.0f} s ...\n", i + 1, jobs.size(), part.name,
+               jobs[i].under_stress ? "stress" : "idle", part.about, seconds_of(jobs[i]));
+    auto measured = measure(jobs[i], plan);
     if (!measured) {
+      // The others are measured all the same: an hour is not given away for one of them.
       fmt::print(stderr, "plchost-bench: {}: {}\n", part.name, measured.error().describe());
-      return 1;
+      complete = false;
+      continue;
     }
+    if (!options.plots.empty() && !write_plots(jobs[i], options.plots, *measured)) return 1;
     std::ranges::move(*measured, std::back_inserter(rows));
+    if (!options.json.empty() && !write_file(options.json, bench::to_json(rows))) return 1;
   }
   fmt::print("{}", bench::to_table(rows));
-  if (!options.json.empty() && !write_file(options.json, bench::to_json(rows))) return 1;
-  if (!options.plots.empty() && !write_plots(options.plots, rows)) return 1;
-  return 0;
+  return complete ? 0 : 1;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  std::vector<std::string> names;
+  for (const bench::Part& part : bench::all_parts()) names.emplace_back(part.name);
   CLI::App app("Measures plchost beside the floor of this machine", "plchost-bench");
   Options options;
   app.add_option("--json", options.json, "write the figures to this file");
   app.add_option("--plots", options.plots, "draw the figures into this folder, as SVG");
-  app.add_flag("--quick", options.quick, "a few minutes instead of a quarter of an hour");
-  app.add_option("--only", options.only, "one part: cyclic, post/process or post/dds");
+  app.add_flag("--quick", options.quick,
+               "minutes instead of most of an hour: 5 s of each thing instead of 60");
+  app.add_flag("--stress", options.stress, "then the same again beside stress-ng --cpu 2 --vm 1 --io 1");
+  app.add_option("--seconds", options.seconds, "so many seconds of each thing")->check(CLI::Range(1, 3600));
+  app.add_option("--only", options.only, fmt::format("only these parts: {}", fmt::join(names, ", ")))
+      ->check(CLI::IsMember(names))
+      ->delimiter(',');
   CLI11_PARSE(app, argc, argv);
   return run(options);
 }

@@ -16,28 +16,17 @@
 #include "api/dds/topics.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/pool/instance_page.hpp"
+#include "tests/bench/child.hpp"
 #include "tests/bench/dds_poster.hpp"
+#include "tests/bench/parts.hpp"
+#include "tests/bench/shared_board.hpp"
 
 namespace plchost::bench {
 
 namespace {
 
 constexpr auto kPatience = std::chrono::seconds(20);
-
-/// Starts a program, and ends it (SIGTERM) and waits for it when this object goes.
-class Child {
- public:
-  explicit Child(pid_t pid) : pid_(pid) {}
-  Child(const Child&) = delete;
-  Child& operator=(const Child&) = delete;
-  ~Child() {
-    ::kill(pid_, SIGTERM);
-    ::waitpid(pid_, nullptr, 0);
-  }
-
- private:
-  pid_t pid_;
-};
+constexpr Duration kSlice = std::chrono::seconds(1);
 
 template <class Condition>
 Result<void> wait_until(Condition condition, const std::string& what) {
@@ -65,7 +54,7 @@ class Cell {
   Cell(const Cell&) = delete;
   Cell& operator=(const Cell&) = delete;
   ~Cell() {
-    manager_.reset();
+    manager_.end();
     std::error_code ignored;
     std::filesystem::remove_all(folder_, ignored);
   }
@@ -73,13 +62,9 @@ class Cell {
   Result<void> start(const Plan& plan) {
     const std::string program = (plan.programs / "plchostd").string();
     const std::string config = (folder_ / "bench.toml").string();
-    const pid_t child = ::fork();
-    if (child < 0) return failure(ErrorCode::system, "fork", errno);
-    if (child == 0) {
-      ::execl(program.c_str(), program.c_str(), "--config", config.c_str(), nullptr);
-      ::_exit(127);
-    }
-    manager_ = std::make_unique<Child>(child);
+    auto child = Child::start({program, "--config", config});
+    if (!child) return std::unexpected(std::move(child.error()));
+    manager_ = std::move(*child);
     return wait_until(
         [&] {
           const auto page = InstancePageReader::open(pool_, "probe");
@@ -93,7 +78,7 @@ class Cell {
  private:
   std::string pool_;
   std::filesystem::path folder_;
-  std::unique_ptr<Child> manager_;
+  Child manager_;
 };
 
 /// The floor: a thread that waits for samples.
@@ -122,7 +107,7 @@ class BareReader {
     dds_waitset_attach(waitset_.get(), reader_.get(), 0);
     dds_waitset_attach(waitset_.get(), waitset_.get(), 1);
     auto thread = Thread::start("bare-reader", kPriority, [this, &plan, &board] {
-      if (bind_thread(plan.task_core)) run(board);
+      if (bind_thread({plan.task_core})) run(board);
     });
     if (!thread) return std::unexpected(thread.error());
     thread_ = std::move(*thread);
@@ -157,37 +142,39 @@ class BareReader {
 };
 
 /// Lets the poster do one slice, and takes its figures.
-Result<void> run_slice(const Plan& plan, DdsBoard& board, Order order, Samples& into) {
-  Samples samples(static_cast<std::size_t>(plan.posts));
+Result<void> run_slice(DdsBoard& board, Order order, std::uint32_t posts, Samples& into) {
   board.arrived.store(0);
+  board.posts.store(posts);
   board.order.store(static_cast<std::uint32_t>(order));
   auto done =
       wait_until([&] { return board.order.load() == static_cast<std::uint32_t>(Order::wait); }, "a slice");
   if (!done) return done;
   for (std::uint32_t i = 0; i < board.arrived.load(std::memory_order_acquire); ++i) {
-    samples.add(Duration(board.latency_ns[i]));
+    into.push(Duration(board.latency_ns[i]));
   }
-  into.append(samples);
   return {};
 }
 
 Result<std::vector<Row>> measure(const Plan& plan, const DdsDomains& domains, DdsBoard& board,
                                  const std::string& name) {
   // The bare reader's DDS threads inherit this core: the one where plchost-dds has its own.
-  if (auto bound = bind_thread(plan.poster_core); !bound) return std::unexpected(bound.error());
+  const OnCore threads_inherit_it(plan.poster_core);
   Cell cell(plan, domains, name);
   if (auto started = cell.start(plan); !started) return std::unexpected(started.error());
   BareReader reader;
   if (auto started = reader.start(plan, domains, board); !started) return std::unexpected(started.error());
   std::vector<Row> rows(1);
   rows[0].name = "post/dds";
-  plan.progress("posts over DDS, beside a bare Cyclone DDS one-way");
   auto done = wait_until([&] { return board.poster_ready.load() != 0; }, "the poster's start");
   if (done && board.poster_ready.load() != 1)
     done = failure(ErrorCode::unavailable, "the poster cannot post");
-  for (int slice = 0; done && slice < plan.slices / 2; ++slice) {
-    done = run_slice(plan, board, Order::post_bare, rows[0].floor);
-    if (done) done = run_slice(plan, board, Order::post_event, rows[0].ours);
+  const auto posts_in = [&](Duration slice) { return static_cast<std::uint32_t>(slice / plan.post_gap); };
+  if (done) {
+    done = alternate(
+        plan,
+        {[&](Duration slice) { return run_slice(board, Order::post_bare, posts_in(slice), rows[0].floor); },
+         [&](Duration slice) { return run_slice(board, Order::post_event, posts_in(slice), rows[0].ours); }},
+        kSlice);
   }
   reader.stop();
   if (!done) return std::unexpected(done.error());

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstdint>
 
 #include <fcntl.h>
@@ -23,12 +24,31 @@ Result<void> prepare_process() {
   return {};
 }
 
-Result<void> bind_thread(int core) {
+Result<void> bind_thread(const std::vector<int>& cores) {
   cpu_set_t set;
   CPU_ZERO(&set);
-  CPU_SET(static_cast<std::size_t>(core), &set);
+  for (const int core : cores) CPU_SET(static_cast<std::size_t>(core), &set);
   if (::sched_setaffinity(0, sizeof set, &set) != 0) {
-    return failure(ErrorCode::system, "bind to core " + std::to_string(core), errno);
+    return failure(ErrorCode::system, "bind a thread to its core", errno);
+  }
+  return {};
+}
+
+OnCore::OnCore(int core) {
+  if (auto before = allowed_cores(0)) before_ = *before;
+  (void)bind_thread({core});
+}
+
+OnCore::~OnCore() {
+  if (!before_.empty()) (void)bind_thread(before_);
+}
+
+Result<void> alternate(const Plan& plan, const std::vector<Subject>& subjects, Duration longest) {
+  const Duration slice = std::min({plan.slice, plan.each, longest});
+  for (int turn = 0; turn < plan.slices(slice); ++turn) {
+    for (const Subject& run : subjects) {
+      if (auto done = run(slice); !done) return done;
+    }
   }
   return {};
 }

@@ -1,11 +1,13 @@
 #!/usr/bin/env bash
 # Measures plchost beside the floor of this machine, in the same run.
-#   tests/bench/run.sh [--quick] [--json FILE] [--plots DIR] [--only PART]
-# --quick takes below four minutes. A noisy machine shows in the floor as well: read the ratios.
+#   tests/bench/run.sh [--quick] [--stress] [--json FILE] [--plots DIR] [--only PART,...] [--seconds N]
+# 60 s of each thing: three quarters of an hour idle, and half an hour more with --stress, which measures again
+# beside stress-ng. --quick: 5 s of each, five minutes. --seconds: so many of each. Progress is on standard error.
+# A noisy machine shows in the floor as well: read the ratios.
 set -euo pipefail
 here=$PWD
 cd "$(dirname "$0")/../.."
-.ci/packages build
+.ci/packages bench
 build=.build/bench
 args=()
 while [ $# -gt 0 ]; do

@@ -1,0 +1,178 @@
+// 100 cyclic tasks that are due at one tick of CmpSchedule. From the planned release to the start of the last
+// one, less what the tasks before it executed, per task: what the release of one task costs. The floor is one
+// bare thread that wakes 100 bare threads through raw futexes, same priorities, same core.
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <thread>
+
+#include <fmt/format.h>
+
+#include "shm/base/futex.hpp"
+#include "tests/bench/many_tasks.hpp"
+#include "tests/bench/parts.hpp"
+
+namespace plchost::bench {
+
+namespace {
+
+constexpr std::size_t kTasks = 100;
+constexpr Duration kInterval = std::chrono::milliseconds(10);
+constexpr Duration kWork = std::chrono::microseconds(5);
+constexpr ThreadPriority kAbove{.fifo = kPriority.fifo + 1};
+
+struct Execution {
+  TimePoint release;
+  TimePoint start;
+  TimePoint end;
+};
+
+/// What each task ran, one writer per line, reserved beforehand.
+using Log = std::vector<std::vector<Execution>>;
+
+Log make_log(Duration slice) {
+  Log log(kTasks);
+  for (auto& line : log) line.reserve(static_cast<std::size_t>((slice + 2 * kWarmUp) / kInterval) * 2);
+  return log;
+}
+
+void add(std::vector<Execution>& line, const Execution& execution) noexcept {
+  if (line.size() < line.capacity()) line.push_back(execution);
+}
+
+/// The executions of all tasks by release; ticks at which not every task ran (one was still busy) are left
+/// out.
+void add_overheads(const Log& log, TimePoint begin, TimePoint end, Samples& into) {
+  std::vector<Execution> all;
+  for (const auto& line : log) all.insert(all.end(), line.begin(), line.end());
+  std::ranges::sort(all, {}, [](const Execution& one) { return std::pair(one.release, one.start); });
+  for (std::size_t i = 0; i < all.size();) {
+    std::size_t next = i;
+    Duration before{};
+    while (next < all.size() && all[next].release == all[i].release) ++next;
+    for (std::size_t k = i; k + 1 < next; ++k) before += all[k].end - all[k].start;
+    const TimePoint release = all[i].release;
+    if (next - i == kTasks && release >= begin && release < end)
+      into.push((all[next - 1].start - release - before) / static_cast<Duration::rep>(kTasks));
+    i = next;
+  }
+}
+
+Result<void> run_ours(const Plan& plan, Duration slice, Samples& into) {
+  Log log = make_log(slice);
+  std::vector<Execution> current(kTasks);
+  std::vector<TaskConfig> configs;
+  for (std::size_t i = 0; i < kTasks; ++i) {
+    TaskConfig task;
+    task.name = fmt::format("task{}", i);
+    task.interval = kInterval;
+    task.entry = [&one = current[i]] {
+      one.start = MonotonicClock::now();
+      work(kWork);
+      one.end = MonotonicClock::now();
+    };
+    task.after_cycle = [&one = current[i], &line = log[i]](const TaskCounters& counters) {
+      one.release = TimePoint(Duration(counters.release_ns));
+      add(line, one);
+    };
+    configs.push_back(std::move(task));
+  }
+  auto tasks = ManyTasks::start(plan, "CmpSchedule", std::move(configs));
+  if (!tasks) return std::unexpected(std::move(tasks.error()));
+  const OnCore out_of_the_way(plan.poster_core);
+  std::this_thread::sleep_for(kWarmUp);
+  const TimePoint begin = MonotonicClock::now();
+  std::this_thread::sleep_for(slice);
+  const TimePoint end = MonotonicClock::now();
+  if (auto stopped = (*tasks)->stop(); !stopped) return stopped;
+  add_overheads(log, begin, end, into);
+  return {};
+}
+
+/// One futex per thread, and who opens them.
+struct BareBurst {
+  std::atomic<bool> stopping{false};
+  TimePoint release{};
+  std::array<std::atomic<std::uint32_t>, kTasks> words{};
+
+  void run_task(std::size_t index, std::vector<Execution>& line) noexcept {
+    for (std::uint32_t seen = 0;; seen = words[index].load(std::memory_order_relaxed)) {
+      while (words[index].load(std::memory_order_acquire) == seen) futex_wait(&words[index], seen);
+      if (stopping.load()) return;
+      const TimePoint start = MonotonicClock::now();
+      work(kWork);
+      add(line, {release, start, MonotonicClock::now()});
+    }
+  }
+  void open_all() noexcept {
+    for (auto& word : words) {
+      word.fetch_add(1, std::memory_order_release);
+      futex_wake(&word);
+    }
+  }
+  /// Before the tick has ended it may open once more; a thread that has seen the end does not care.
+  void end() noexcept {
+    stopping.store(true);
+    open_all();
+  }
+  void run_tick() noexcept {
+    TimePoint next = MonotonicClock::now() + kInterval;
+    while (!stopping.load()) {
+      const timespec until = to_timespec(next);
+      ::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
+      if (stopping.load()) return;
+      release = next;
+      open_all();
+      const TimePoint now = MonotonicClock::now();
+      do next += kInterval;
+      while (next <= now);
+    }
+  }
+};
+
+Result<void> start_bare(const Plan& plan, BareBurst& bare, Log& log, std::vector<Thread>& threads) {
+  const OnCore threads_inherit_it(plan.task_core);
+  for (std::size_t i = 0; i <= kTasks; ++i) {
+    auto thread = i < kTasks ? Thread::start(
+                                   "bare", kPriority, [&, i] { bare.run_task(i, log[i]); })
+                             : Thread::start("bare-tick", kAbove, [&] { bare.run_tick(); });
+    if (!thread) return std::unexpected(std::move(thread.error()));
+    threads.push_back(std::move(*thread));
+  }
+  return {};
+}
+
+Result<void> run_floor(const Plan& plan, Duration slice, Samples& into) {
+  Log log = make_log(slice);
+  BareBurst bare;
+  std::vector<Thread> threads;
+  if (auto started = start_bare(plan, bare, log, threads); !started) {
+    bare.end();
+    threads.clear();
+    return started;
+  }
+  const OnCore out_of_the_way(plan.poster_core);
+  std::this_thread::sleep_for(kWarmUp);
+  const TimePoint begin = MonotonicClock::now();
+  std::this_thread::sleep_for(slice);
+  const TimePoint end = MonotonicClock::now();
+  bare.end();
+  threads.clear();
+  add_overheads(log, begin, end, into);
+  return {};
+}
+
+}  // namespace
+
+Result<std::vector<Row>> measure_burst(const Plan& plan) {
+  Row row{.name = "burst/CmpSchedule/100tasks"};
+  auto done = alternate(plan, {[&](Duration slice) { return run_floor(plan, slice, row.floor); },
+                               [&](Duration slice) { return run_ours(plan, slice, row.ours); }});
+  if (!done) return std::unexpected(std::move(done.error()));
+  row.targets = {{"median below 3 us for each task", summarise(row.ours).p50, 3}};
+  row.note = "per task: (start of the last - planned release - executions before it) / 100";
+  return std::vector{row};
+}
+
+}  // namespace plchost::bench

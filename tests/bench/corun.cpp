@@ -1,0 +1,110 @@
+// Each scheduler and the floor F at the same time on the same core, with the same priority, so that a stall
+// of the host hits both. Their grids lie half a period apart: neither is ready when the other is released, so
+// that they do not wait for each other; a stall, which is longer, is seen by both.
+
+#include <algorithm>
+#include <thread>
+
+#include "tests/bench/cyclic_loop.hpp"
+#include "tests/bench/parts.hpp"
+
+namespace plchost::bench {
+
+namespace {
+
+constexpr Duration kPeriod = std::chrono::milliseconds(1);
+constexpr auto kPatience = std::chrono::seconds(10);
+
+struct Figures {
+  Samples ours;
+  Samples floor;
+  std::uint64_t lost_ours = 0;
+  std::uint64_t lost_floor = 0;
+  Stalls stalls;
+};
+
+/// Where the scheduler's grid lies is known from its first release.
+Result<TimePoint> release_of(const ScheduledLoop& loop) {
+  const TimePoint end = MonotonicClock::now() + kPatience;
+  while (loop.last_release() == TimePoint{}) {
+    if (MonotonicClock::now() > end) return failure(ErrorCode::timed_out, "no cycle ran");
+    std::this_thread::sleep_for(kPeriod);
+  }
+  return loop.last_release();
+}
+
+Result<void> run_slice(const Plan& plan, ScheduledLoop& loop, Duration slice, Figures& into) {
+  const auto capacity = static_cast<std::size_t>((slice + 2 * kWarmUp) / kPeriod) * 2;
+  CycleLog our_log(capacity);
+  CycleLog bare_log(capacity);
+  BareLoop bare(Wait::sleep, kPeriod);
+  {
+    const OnCore threads_inherit_it(plan.task_core);
+    if (auto started = loop.start(our_log); !started) return started;
+    const auto release = release_of(loop);
+    if (!release) return std::unexpected(release.error());
+    bare.align(*release + kPeriod / 2);
+    if (auto started = bare.start(bare_log); !started) return started;
+  }
+  const OnCore out_of_the_way(plan.poster_core);
+  std::this_thread::sleep_for(kWarmUp);
+  const TimePoint begin = MonotonicClock::now();
+  std::this_thread::sleep_for(slice);
+  const TimePoint end = MonotonicClock::now();
+  auto stopped = loop.stop();
+  (void)bare.stop();
+  const auto ours = our_log.between(begin, end);
+  const auto floor = bare_log.between(begin, end);
+  add_latencies(ours, into.ours);
+  add_latencies(floor, into.floor);
+  into.lost_ours += lost_cycles(ours, kPeriod);
+  into.lost_floor += lost_cycles(floor, kPeriod);
+  into.stalls += find_stalls(ours, floor, kPeriod);
+  return stopped;
+}
+
+double per(std::uint64_t count, std::uint64_t stalls) {
+  return stalls > 0 ? static_cast<double>(count) / static_cast<double>(stalls) : 0;
+}
+
+Row to_row(std::string_view scheduler, const Figures& figures) {
+  const Stalls& stalls = figures.stalls;
+  const double p999 = summarise(figures.ours).p999;
+  const double bare_p999 = summarise(figures.floor).p999;
+  return {.name = "corun/" + std::string(scheduler) + "/1ms",
+          .ours = figures.ours,
+          .floor = figures.floor,
+          .extra = {{"stalls", static_cast<double>(stalls.stalls)},
+                    {"late_per_stall", per(stalls.late_ours, stalls.stalls)},
+                    {"floor_late_per_stall", per(stalls.late_floor, stalls.stalls)},
+                    {"lost_per_stall", per(stalls.lost_ours, stalls.stalls)},
+                    {"floor_lost_per_stall", per(stalls.lost_floor, stalls.stalls)},
+                    {"lost", static_cast<double>(figures.lost_ours)},
+                    {"floor_lost", static_cast<double>(figures.lost_floor)}},
+          .targets = {{"p99.9 below 1.1 F", p999, 1.1 * bare_p999},
+                      {"late cycles per stall below 1.2", per(stalls.late_ours, stalls.stalls), 1.2},
+                      {"lost cycles in stalls at most 1.2 F's", static_cast<double>(stalls.lost_ours),
+                       1.2 * static_cast<double>(stalls.lost_floor), true}},
+          .note = "a stall is seen by both; a cycle is late if it starts a whole period late"};
+}
+
+}  // namespace
+
+Result<std::vector<Row>> measure_corun(const Plan& plan) {
+  std::vector<std::unique_ptr<ScheduledLoop>> loops;
+  std::vector<Figures> figures(all_schedulers().size());
+  std::vector<Subject> subjects;
+  for (const auto& entry : all_schedulers()) {
+    loops.push_back(std::make_unique<ScheduledLoop>(entry.name, kPeriod));
+    subjects.push_back([&plan, &loop = *loops.back(), &into = figures[loops.size() - 1]](Duration slice) {
+      return run_slice(plan, loop, slice, into);
+    });
+  }
+  if (auto done = alternate(plan, subjects); !done) return std::unexpected(std::move(done.error()));
+  std::vector<Row> rows;
+  for (std::size_t i = 0; i < figures.size(); ++i)
+    rows.push_back(to_row(all_schedulers()[i].name, figures[i]));
+  return rows;
+}
+
+}  // namespace plchost::bench

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "tests/bench/bench.hpp"
+#include "tests/bench/row.hpp"
+
+namespace plchost::bench {
+
+/// One part of the benchmark: a file of its own with one function, and a line in the table of parts.cpp.
+struct Part {
+  std::string_view name;     ///< for --only, and of its picture
+  std::string_view about;    ///< what is measured beside what
+  std::string_view picture;  ///< title of its picture; empty: none
+  double turns;              ///< about how many times Plan::each it takes
+  bool under_stress;         ///< measured a second time with --stress
+  Result<std::vector<Row>> (*measure)(const Plan&);
+};
+
+[[nodiscard]] std::span<const Part> all_parts() noexcept;
+
+[[nodiscard]] Result<std::vector<Row>> measure_cyclic(const Plan& plan);
+[[nodiscard]] Result<std::vector<Row>> measure_corun(const Plan& plan);
+[[nodiscard]] Result<std::vector<Row>> measure_cyclictest(const Plan& plan);
+[[nodiscard]] Result<std::vector<Row>> measure_fast(const Plan& plan);
+[[nodiscard]] Result<std::vector<Row>> measure_burst(const Plan& plan);
+[[nodiscard]] Result<std::vector<Row>> measure_post_process(const Plan& plan);
+[[nodiscard]] Result<std::vector<Row>> measure_post_dds(const Plan& plan);
+[[nodiscard]] Result<std::vector<Row>> measure_cost(const Plan& plan);
+[[nodiscard]] Result<std::vector<Row>> measure_scale(const Plan& plan);
+[[nodiscard]] Result<std::vector<Row>> measure_poll(const Plan& plan);
+[[nodiscard]] Result<std::vector<Row>> measure_start(const Plan& plan);
+
+}  // namespace plchost::bench
