@@ -113,6 +113,31 @@ typedef struct {
  * runtime, with the task's name, after plc_app_init has returned. Control. */
 void CDECL __sys__setup__tasks(sys_setup_tasks_struct* p);
 
+#define PLC_LATE_NEXT 0 /* a late cyclic task waits for the next point of its grid */
+#define PLC_LATE_ASAP 1 /* a late cyclic task runs at once, for the last release that it missed */
+
+#define PLC_WATCHDOG_APPLICATION 0 /* a hit puts the whole application into exception */
+#define PLC_WATCHDOG_TASK 1        /* a hit puts only the task into exception */
+
+/* What the seed's Task_Info has no place for. Fill it with zeros first: zero is the default everywhere. */
+typedef struct {
+  unsigned int dwSize;    /* sizeof(Task_Options) */
+  RTS_I64 nStartOffsetNs; /* cyclic: 0 to below the interval; where in its period the task is released */
+  short nLatePolicy;      /* cyclic: PLC_LATE_NEXT or PLC_LATE_ASAP */
+  unsigned char bDrivesOutputs;         /* 1: the task is stopped in the first phase of a stop */
+  unsigned int dwWatchdogTimeUs;        /* microseconds that a cycle may take; 0: no watchdog of its own */
+  unsigned int dwWatchdogSensitivity;   /* 0 (as 1) to 1000000 */
+  unsigned int dwWatchdogOmittedCycles; /* releases in a row that may not be missed, to 1000000; 0: off */
+  short nWatchdogPolicy;                /* PLC_WATCHDOG_APPLICATION or PLC_WATCHDOG_TASK */
+} Task_Options;
+
+/* Sets the options of a task, before or after __sys__setup__tasks() names it. From plc_app_init only. A
+ * section [Task.NAME] of the settings wins over what is given here. ERR_OK; ERR_PARAMETER: null, no name of a
+ * task, another dwSize, or a value that is not allowed (the log names it); ERR_DUPLICATE: given already for
+ * this task; ERR_NOTINITIALIZED. A task that is not there, or not cyclic where it has to be, is reported by
+ * the runtime after plc_app_init has returned. Control. */
+RTS_RESULT CDECL plc_set_task_options(const char* pszTask, const Task_Options* pOptions);
+
 /* The task whose cycle (or event function) runs on this thread; NULL outside of one. Any. */
 Task_Info* CDECL plc_current_task(void);
 

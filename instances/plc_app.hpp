@@ -87,6 +87,18 @@ class Task {
   RTS_HANDLE handle_ = RTS_INVALID_HANDLE;
 };
 
+/// What a task has beyond its kind and priority; see Task_Options in plc_app.h. The settings of the instance
+/// win.
+struct TaskOptions {
+  std::chrono::nanoseconds start_offset{0};  ///< cyclic: 0 to below the interval
+  bool late_asap = false;       ///< cyclic: a late cycle runs at once, not at the next point of the grid
+  bool drives_outputs = false;  ///< stopped in the first phase of a stop
+  std::chrono::microseconds watchdog_time{0};  ///< 0: no watchdog of its own
+  unsigned int watchdog_sensitivity = 1;
+  unsigned int watchdog_omitted_cycles = 0;  ///< 0: off
+  bool watchdog_stops_task_only = false;
+};
+
 /// The tasks of one application. Filled by the setup function, which runs once on the control thread before
 /// any task. Faults (a text too long) are exceptions there: they refuse the application with their text.
 class Application {
@@ -125,6 +137,28 @@ class Application {
   /// In a loop, sleeping a share of its execution time.
   void freewheeling(const std::string& name, int priority, Cycle cycle) {
     add(name, priority, Freewheeling, std::move(cycle));
+  }
+
+  /// The options of a task of this application.
+  void options(const std::string& task, const TaskOptions& wanted) {
+    constexpr long kMaxTime = std::numeric_limits<unsigned int>::max();
+    if (wanted.watchdog_time.count() < 0 || wanted.watchdog_time.count() > kMaxTime) {
+      throw std::invalid_argument("task '" + task + "': watchdog_time must be 0 to 4294 s");
+    }
+    Task_Options options{};
+    options.dwSize = sizeof options;
+    options.nStartOffsetNs = wanted.start_offset.count();
+    options.nLatePolicy = wanted.late_asap ? PLC_LATE_ASAP : PLC_LATE_NEXT;
+    options.bDrivesOutputs = wanted.drives_outputs ? 1 : 0;
+    options.dwWatchdogTimeUs = static_cast<unsigned int>(wanted.watchdog_time.count());
+    options.dwWatchdogSensitivity = wanted.watchdog_sensitivity;
+    options.dwWatchdogOmittedCycles = wanted.watchdog_omitted_cycles;
+    options.nWatchdogPolicy = wanted.watchdog_stops_task_only ? PLC_WATCHDOG_TASK : PLC_WATCHDOG_APPLICATION;
+    const RTS_RESULT result = plc_set_task_options(task.c_str(), &options);
+    if (result != ERR_OK) {
+      throw std::runtime_error("options of task '" + task + "' are refused: result " +
+                               std::to_string(result));
+    }
   }
 
   /// Registers an own event ("ready"), or gives access to one of another instance ("packer1/product").

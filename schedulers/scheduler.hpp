@@ -15,12 +15,23 @@ namespace plchost {
 
 class Task;
 
-/// Above it nothing would be left for other tasks.
-inline constexpr int kMaxProcessorLoad = 99;
+/// 100: a freewheeling task sleeps no longer than it must.
+inline constexpr int kMaxProcessorLoad = 100;
 /// More than any wake-up latency that spinning is an answer to.
 inline constexpr Duration kMaxSpinAhead = std::chrono::milliseconds(1);
 
-enum class TickSourceKind : std::uint8_t { system, task };
+/// system: a timer of the kernel. task: a thread of high priority in absolute sleeps. auxiliary: a clock
+/// device with an interrupt of its own.
+enum class TickSourceKind : std::uint8_t { system, task, auxiliary };
+
+/// The watchdogs that concern the instance as a whole.
+struct WatchdogSettings {
+  bool load = false;                                 ///< the load watchdog, at processor_load_maximum percent
+  Duration load_interval = std::chrono::seconds(1);  ///< over which the load is measured
+  bool omitted_cycles = true;                        ///< the tasks' watchdogs of omitted cycles may hit
+  Duration default_time = std::chrono::seconds(2);   ///< of an endless loop in a task without a time; 0: off
+  bool operator==(const WatchdogSettings&) const = default;
+};
 
 /// The settings of [CmpSchedule] and [SysTimer], already validated by whoever read them.
 struct SchedulerSettings {
@@ -28,12 +39,15 @@ struct SchedulerSettings {
       std::chrono::milliseconds(1);   ///< the tick, and how often event variables are polled
   Duration freewheeling_cycletime{};  ///< fixed sleep of freewheeling tasks; 0: a share of the execution time
   int processor_load_maximum =
-      0;  ///< percent, 1..99; freewheeling tasks sleep (100-M) %; 0: not set, sleep 20 %
+      0;  ///< percent, 1..100; freewheeling tasks sleep (100-M) %; 0: not set, sleep 20 %
   TickSourceKind tick_source = TickSourceKind::system;
+  std::string auxiliary_device = "/dev/rtc0";  ///< of TickSourceKind::auxiliary
   Duration spin_ahead_max =
       std::chrono::microseconds(100);  ///< bound of the guard of CmpScheduleOneShot; 0: off
   std::uint64_t max_event_backlog = std::uint64_t{1}
                                     << 20;  ///< external events a task may lag behind before it drops
+  WatchdogSettings watchdog;
+  bool operator==(const SchedulerSettings&) const = default;
 };
 
 /// What a scheduler needs to be made.

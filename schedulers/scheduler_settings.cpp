@@ -21,7 +21,7 @@ Result<void> check_settings(const SchedulerSettings& settings) {
     return bad("freewheeling_cycletime", "0 (not set) to 50 days");
   }
   if (settings.processor_load_maximum < 0 || settings.processor_load_maximum > kMaxProcessorLoad) {
-    return bad("processor_load_maximum", "1 to 99 percent, or 0 (not set)");
+    return bad("processor_load_maximum", "1 to 100 percent, or 0 (not set)");
   }
   if (settings.spin_ahead_max < Duration::zero() || settings.spin_ahead_max > kMaxSpinAhead) {
     return bad("spin_ahead_max", "0 (off) to 1 ms");

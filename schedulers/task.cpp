@@ -41,7 +41,8 @@ Task::Task(Clock& clock, TaskConfig config, TaskStatistics& statistics, CountedE
       wanted_interval_(grid_.interval().count()) {}
 
 void Task::begin(TimePoint origin) {
-  grid_ = ReleaseGrid(origin, Duration(wanted_interval_.load(std::memory_order_relaxed)), config_.late);
+  grid_ = ReleaseGrid(origin + config_.start_offset,
+                      Duration(wanted_interval_.load(std::memory_order_relaxed)), config_.late);
   ready_ = origin;
   begun_ = false;
   if (event_ != nullptr) {

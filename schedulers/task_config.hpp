@@ -17,6 +17,22 @@ enum class TaskKind : std::uint8_t { cyclic = 0, event = 1, external = 2, freewh
 /// What happens to a cyclic task that is late: wait for the next point of its grid, or run at once.
 enum class LatePolicy : std::uint8_t { next, asap };
 
+/// Who goes to exception when a task's watchdog hits.
+enum class WatchdogPolicy : std::uint8_t { application, task };
+
+/// The watchdogs of one task.
+struct TaskWatchdog {
+  Duration time{};                ///< of one cycle; 0: no time watchdog of its own
+  std::uint32_t sensitivity = 1;  ///< hits in a cycle that takes time * sensitivity, or in the n-th in a row
+                                  ///< that takes `time`; 1..kMaxWatchdogCount
+  std::uint32_t omitted_cycles = 0;  ///< hits when this many releases in a row did not run; 0: off
+  WatchdogPolicy policy = WatchdogPolicy::application;
+  bool operator==(const TaskWatchdog&) const = default;
+};
+inline constexpr std::uint32_t kMaxWatchdogCount = 1'000'000;
+/// 2^32 us, the range of the C interface.
+inline constexpr Duration kMaxWatchdogTime = std::chrono::microseconds(0xffff'ffff);
+
 /// IEC priorities: 0 (highest) to 31; 0..15 are SCHED_FIFO, 16..31 SCHED_OTHER.
 inline constexpr int kLowestIecPriority = 31;
 inline constexpr int kLowestRealTimeIecPriority = 15;
@@ -44,9 +60,13 @@ struct TaskConfig {
   std::string name;
   TaskKind kind = TaskKind::cyclic;
   int iec_priority = 0;
-  Duration interval{};                 ///< cyclic only: > 0
+  Duration interval{};  ///< cyclic only: > 0
+  Duration
+      start_offset{};  ///< cyclic only: its grid is origin + start_offset + n * interval; 0 <= . < interval
   LatePolicy late = LatePolicy::next;  ///< cyclic only
-  std::string external_event;          ///< external only: the event's name
+  TaskWatchdog watchdog;
+  bool drives_outputs = false;  ///< stops in the first of the two phases of a stop
+  std::string external_event;   ///< external only: the event's name
   std::function<bool()>
       event_variable;  ///< event only: reads the BOOL; called by the scheduler's poller, and by start()
   std::function<void()> entry;  ///< one cycle; real-time

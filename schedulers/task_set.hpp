@@ -106,7 +106,9 @@ class TaskSet {
   std::vector<std::unique_ptr<TaskThread>> threads_;  // last: they use all of the above
 };
 
-/// invalid_argument: the task that is not valid, and what is allowed.
+/// As in TaskSet::create, one task by itself, and all. invalid_argument: the text names the task that is not
+/// valid, and what is allowed.
+[[nodiscard]] Result<void> check_task(const TaskConfig& task);
 [[nodiscard]] Result<void> check_tasks(const std::vector<TaskConfig>& tasks);
 
 }  // namespace plchost

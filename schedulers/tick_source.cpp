@@ -74,6 +74,7 @@ class TaskTick final : public TickSource {
 
 Result<std::unique_ptr<TickSource>> make_tick_source(Clock& clock, TickSourceKind kind) {
   if (kind == TickSourceKind::task) return std::make_unique<TaskTick>(clock);
+  if (kind == TickSourceKind::auxiliary) return failure(ErrorCode::unsupported, "no auxiliary clock here");
   auto timer = clock.make_periodic_timer();
   if (!timer) return std::unexpected(std::move(timer.error()));
   return std::make_unique<SystemTick>(clock, std::move(*timer));

@@ -51,6 +51,9 @@ Result<Application> Application::load(const std::string& path, ApplicationHost& 
   }
   auto tasks = build_tasks(*host.tasks());
   if (!tasks) return failure_in(path, std::move(tasks).error());
+  if (auto applied = apply_task_settings(host.task_options(), *tasks); !applied) {
+    return failure_in(path, std::move(applied).error());
+  }
   return Application(*std::move(object), *host.tasks(), *std::move(tasks));
 }
 

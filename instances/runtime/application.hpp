@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -17,6 +18,11 @@ class Application {
   /// Checks and loads the file, calls its plc_app_init and checks the tasks that it hands to `host`. The text
   /// says what is wrong with the file or with which task. Control thread.
   [[nodiscard]] static Result<Application> load(const std::string& path, ApplicationHost& host);
+
+  /// What the settings say about its tasks: wins over what it said itself.
+  [[nodiscard]] Result<void> apply(std::span<const TaskSettings> settings) {
+    return apply_task_settings(settings, tasks_);
+  }
 
   /// Calls plc_app_exit, if it has one. Once, when its tasks have ended.
   void exit();

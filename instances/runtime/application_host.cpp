@@ -40,6 +40,19 @@ void ApplicationHost::set_up_tasks(sys_setup_tasks_struct* tasks) noexcept {
   task_table_.set_up(tasks);
 }
 
+RTS_RESULT ApplicationHost::set_task_options(const char* task, const Task_Options* options) {
+  auto settings = from_options(task, options);
+  if (!settings) {
+    spdlog::error("plc_set_task_options: {}", settings.error().describe());
+    return ERR_PARAMETER;
+  }
+  if (std::ranges::find(task_options_, settings->task, &TaskSettings::task) != task_options_.end()) {
+    return ERR_DUPLICATE;
+  }
+  task_options_.push_back(*std::move(settings));
+  return ERR_OK;
+}
+
 RTS_RESULT ApplicationHost::add_callback(unsigned event, PF_EVENT_CALLBACK callback, void* user) {
   const bool known = event == EVT_ExternalEventTaskCreateDone || event == EVT_PrepareExternalEventTaskDelete;
   if (!known || callback == nullptr) return ERR_PARAMETER;
@@ -89,6 +102,11 @@ using plchost::ApplicationHost;
 
 void __sys__setup__tasks(sys_setup_tasks_struct* p) {
   if (ApplicationHost* const host = ApplicationHost::current_for_control()) host->set_up_tasks(p);
+}
+
+RTS_RESULT plc_set_task_options(const char* pszTask, const Task_Options* pOptions) {
+  ApplicationHost* const host = ApplicationHost::current_for_control();
+  return host == nullptr ? ERR_NOTINITIALIZED : host->set_task_options(pszTask, pOptions);
 }
 
 Task_Info* plc_current_task() {

@@ -7,6 +7,7 @@
 #include "instances/plc_app.h"
 #include "instances/runtime/event_table.hpp"
 #include "instances/runtime/message_queue.hpp"
+#include "instances/runtime/task_settings.hpp"
 #include "instances/runtime/task_table.hpp"
 #include "shm/base/result.hpp"
 
@@ -35,7 +36,11 @@ class ApplicationHost {
   [[nodiscard]] sys_setup_tasks_struct* tasks() const noexcept { return tasks_; }
   [[nodiscard]] bool tasks_given_twice() const noexcept { return given_twice_; }
 
+  /// What the application said with plc_set_task_options().
+  [[nodiscard]] const std::vector<TaskSettings>& task_options() const noexcept { return task_options_; }
+
   void set_up_tasks(sys_setup_tasks_struct* tasks) noexcept;
+  [[nodiscard]] RTS_RESULT set_task_options(const char* task, const Task_Options* options);
   [[nodiscard]] RTS_RESULT add_callback(unsigned event, PF_EVENT_CALLBACK callback, void* user);
   [[nodiscard]] RTS_RESULT remove_callback(unsigned event, PF_EVENT_CALLBACK callback, void* user);
   /// Calls the callbacks of `event` for one task.
@@ -58,6 +63,7 @@ class ApplicationHost {
   TaskTable task_table_;
   sys_setup_tasks_struct* tasks_ = nullptr;
   bool given_twice_ = false;
+  std::vector<TaskSettings> task_options_;
   std::vector<Callback> callbacks_;
 };
 

@@ -66,9 +66,15 @@ Result<std::string> Instance::read_settings_file() {
   auto settings = read_settings(options_.launch.settings);
   if (!settings) return std::unexpected(std::move(settings).error());
   settings_ = *std::move(settings);
-  for (const std::string& section : settings_.foreign_sections) {
-    spdlog::info("settings: section [{}] is not ours and is left alone", section);
+  if (!settings_.foreign_sections.empty()) {
+    spdlog::info("settings: sections of other programs, left alone: {}",
+                 fmt::join(settings_.foreign_sections, ", "));
   }
+  if (!settings_.foreign_components.empty()) {
+    spdlog::info("settings: components of other programs, left alone: {}",
+                 fmt::join(settings_.foreign_components, ", "));
+  }
+  for (const std::string& remark : settings_.remarks) spdlog::warn("settings: {}", remark);
   return {};
 }
 
@@ -115,6 +121,9 @@ Result<std::string> Instance::load_application() {
   if (options_.launch.application.empty()) return "no application is given: there is nothing to run";
   auto application = Application::load(options_.launch.application, *host_);
   if (!application) return std::unexpected(std::move(application).error());
+  if (auto applied = application->apply(settings_.tasks); !applied) {
+    return std::unexpected(std::move(applied).error());
+  }
   application_.emplace(*std::move(application));
   return {};
 }

@@ -1,8 +1,6 @@
 #include "instances/runtime/settings.hpp"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -11,209 +9,132 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <ini.h>
 
+#include "instances/runtime/settings_key.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
 
 namespace {
 
-constexpr std::string_view kComponentPrefix = "Component.";
+constexpr std::string_view kBlank = " \t\r\v\f";
+constexpr std::string_view kTaskPrefix = "Task.";
 
-Result<std::int64_t> integer(std::string_view value, std::int64_t lowest, std::int64_t highest) {
-  std::int64_t number = 0;
-  const char* const end = value.data() + value.size();
-  // NOLINTNEXTLINE(bugprone-suspicious-stringview-data-usage): `end` is the size
-  const auto [stop, error] = std::from_chars(value.data(), end, number);
-  if (error != std::errc() || stop != end || number < lowest || number > highest) {
-    return failure(ErrorCode::invalid_argument,
-                   fmt::format("'{}' is not allowed: an integer from {} to {} is", value, lowest, highest));
+std::string_view trim(std::string_view text) {
+  text.remove_prefix(std::min(text.find_first_not_of(kBlank), text.size()));
+  return text.substr(0, text.find_last_not_of(kBlank) + 1);
+}
+
+// A ';' begins a comment at the start of a value or after a blank; elsewhere it is part of it.
+std::string_view without_comment(std::string_view value) {
+  for (std::size_t at = value.find(';'); at != std::string_view::npos; at = value.find(';', at + 1)) {
+    if (at == 0 || kBlank.contains(value[at - 1])) return value.substr(0, at);
   }
-  return number;
+  return value;
 }
 
-using Apply = Result<void> (*)(SchedulerSettings&, std::string_view value);
-
-struct Key {
-  std::string_view section;
-  std::string_view name;
-  Apply apply;
-};
-
-Result<void> set_interval(SchedulerSettings& settings, std::string_view value) {
-  const auto us = integer(value, 50, 1'000'000);
-  if (!us) return std::unexpected(us.error());
-  settings.scheduler_interval = std::chrono::microseconds(*us);
-  return {};
-}
-
-Result<void> set_freewheeling(SchedulerSettings& settings, std::string_view value) {
-  const auto ms = integer(value, 1, 60'000);
-  if (!ms) return std::unexpected(ms.error());
-  settings.freewheeling_cycletime = std::chrono::milliseconds(*ms);
-  return {};
-}
-
-Result<void> set_load(SchedulerSettings& settings, std::string_view value) {
-  const auto percent = integer(value, 1, 99);
-  if (!percent) return std::unexpected(percent.error());
-  settings.processor_load_maximum = static_cast<int>(*percent);
-  return {};
-}
-
-Result<void> set_spin(SchedulerSettings& settings, std::string_view value) {
-  const auto us = integer(value, 0, 1000);
-  if (!us) return std::unexpected(us.error());
-  settings.spin_ahead_max = std::chrono::microseconds(*us);
-  return {};
-}
-
-Result<void> set_backlog(SchedulerSettings& settings, std::string_view value) {
-  const auto events = integer(value, 1, 1'000'000'000);
-  if (!events) return std::unexpected(events.error());
-  settings.max_event_backlog = static_cast<std::uint64_t>(*events);
-  return {};
-}
-
-Result<void> set_timer_source(SchedulerSettings& settings, std::string_view value) {
-  if (value == "System") {
-    settings.tick_source = TickSourceKind::system;
-  } else if (value == "Task") {
-    settings.tick_source = TickSourceKind::task;
-  } else {
-    return failure(ErrorCode::invalid_argument,
-                   fmt::format("'{}' is not allowed: System and Task are", value));
-  }
-  return {};
-}
-
-constexpr std::array kKeys = {
-    Key{"CmpSchedule", "SchedulerInterval", set_interval},
-    Key{"CmpSchedule", "Task.Freewheeling.Cycletime", set_freewheeling},
-    Key{"CmpSchedule", "ProcessorLoad.Maximum", set_load},
-    Key{"CmpSchedule", "SpinAhead.MaxUs", set_spin},
-    Key{"CmpSchedule", "ExternalEvent.MaxBacklog", set_backlog},
-    Key{"SysTimer", "VxWorks.TimerSource", set_timer_source},
-    Key{"ComponentManager", "Component.N", nullptr},
-};
-
-bool is_owned(std::string_view section) {
-  return std::ranges::any_of(kKeys, [&](const Key& key) { return key.section == section; });
-}
-
-// "Linux.X" is the seed's "VxWorks.X".
-std::string canonical(std::string_view key) {
-  constexpr std::string_view kLinux = "Linux.";
-  return key.starts_with(kLinux) ? fmt::format("VxWorks.{}", key.substr(kLinux.size())) : std::string(key);
-}
-
-// Feeds inih line by line, so that errors can name the line: Debian's inih does not tell its handler.
 class Parser {
  public:
   Parser(std::string_view text, std::string_view file) : rest_(text), file_(file) {}
 
   Result<InstanceSettings> parse() {
-    const int wrong_line = ini_parse_stream(&Parser::read_line, this, &Parser::handle, this);
-    if (error_) return std::unexpected(*std::move(error_));
-    if (wrong_line > 0) {
-      line_ = wrong_line;
-      fail("neither [Section] nor Key=Value nor a comment (; or #)");
-      return std::unexpected(*std::move(error_));
+    constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
+    if (rest_.starts_with(kByteOrderMark)) rest_.remove_prefix(kByteOrderMark.size());
+    while (!rest_.empty() && !error_) {
+      ++line_;
+      const std::size_t end = rest_.find('\n');
+      read_line(rest_.substr(0, end));
+      rest_ = end == std::string_view::npos ? std::string_view() : rest_.substr(end + 1);
     }
-    if (wrong_line < 0) return failure(ErrorCode::system, fmt::format("{}: no memory to read it", file_));
+    if (!error_) check_sys_time();
+    if (error_) return std::unexpected(*std::move(error_));
     for (auto& [number, component] : components_) settings_.components.push_back(std::move(component));
     return std::move(settings_);
   }
 
  private:
+  [[nodiscard]] std::string place() const { return fmt::format("{}:{}", file_, line_); }
+
   void fail(std::string_view what) {
-    if (error_) return;  // the first one is told
-    error_ = Error{ErrorCode::invalid_argument, 0, fmt::format("{}:{}: {}", file_, line_, what)};
+    error_ = Error{ErrorCode::invalid_argument, 0, fmt::format("{}: {}", place(), what)};
   }
 
-  // inih's fgets.
-  static char* read_line(char* to, int size, void* stream) {
-    auto& self = *static_cast<Parser*>(stream);
-    return self.next_line(std::span(to, static_cast<std::size_t>(size))) ? to : nullptr;
+  void read_line(std::string_view line) {
+    if (line.contains('\0')) return fail("holds a zero byte: not a text file");
+    line = trim(line);
+    if (line.empty() || line.front() == ';' || line.front() == '#') return;
+    if (line.front() == '[') return begin_section(line);
+    // What other programs write in their sections is theirs alone.
+    if (!section_.empty() && !owned_) return;
+    const std::size_t equals = line.find('=');
+    if (equals == std::string_view::npos)
+      return fail("neither [Section] nor Key=Value nor a comment (; or #)");
+    const std::string_view key = trim(line.substr(0, equals));
+    if (section_.empty()) return fail(fmt::format("'{}' stands before the first [Section]", key));
+    set(key, trim(without_comment(line.substr(equals + 1))));
   }
 
-  bool next_line(std::span<char> to) {
-    if (rest_.empty() || error_) return false;
-    ++line_;
-    const std::size_t end = rest_.find('\n');
-    std::string_view line = rest_.substr(0, end);
-    rest_ = end == std::string_view::npos ? std::string_view() : rest_.substr(end + 1);
-    if (line.size() > std::min(kMaxSettingsLine, to.size() - 1)) {
-      fail(fmt::format("the line is longer than {} bytes", kMaxSettingsLine));
-      return false;
+  void begin_section(std::string_view line) {
+    const std::size_t end = line.find(']');
+    if (end == std::string_view::npos || end == 1)
+      return fail("neither [Section] nor Key=Value nor a comment");
+    section_ = line.substr(1, end - 1);
+    owned_ = is_owned(section_);
+    task_.reset();
+    auto& foreign = settings_.foreign_sections;
+    if (!owned_ && std::ranges::find(foreign, section_) == foreign.end()) foreign.emplace_back(section_);
+    if (table_section(section_) == kTaskSections) begin_task(section_.substr(kTaskPrefix.size()));
+  }
+
+  void begin_task(std::string_view name) {
+    if (auto valid = check_name("task", name, kMaxTaskName); !valid) {
+      return fail(fmt::format("[{}]: {}", section_.substr(0, kMaxTaskName), valid.error().message));
     }
-    if (line.find('\0') != std::string_view::npos) {
-      fail("holds a zero byte: not a text file");
-      return false;
+    const auto found = std::ranges::find(settings_.tasks, name, &TaskSettings::task);
+    task_ = static_cast<std::size_t>(found - settings_.tasks.begin());
+    if (found != settings_.tasks.end()) return;
+    settings_.tasks.push_back(
+        {.task = std::string(name), .where = fmt::format("{}: [{}]", place(), section_)});
+  }
+
+  void set(std::string_view name, std::string_view value) {
+    const auto key = find_setting(section_, name);
+    if (!key) return fail(key.error().message);
+    const std::string identity = setting_identity(**key, name);
+    if (!seen_.insert(fmt::format("[{}] {}", section_, identity)).second) {
+      return fail(fmt::format("[{}] {} is given twice", section_, name));
     }
-    // To inih an indented line continues the value before it; to us it is a line like any other.
-    line.remove_prefix(std::min(line.find_first_not_of(" \t"), line.size()));
-    *std::ranges::copy(line, to.begin()).out = '\0';
-    return true;
-  }
-
-  static int handle(void* user, const char* section, const char* key, const char* value) {
-    auto& self = *static_cast<Parser*>(user);
-    self.set(section, key, value);
-    return 1;
-  }
-
-  void set(std::string_view section, std::string_view key, std::string_view value) {
-    if (section.empty()) return fail(fmt::format("'{}' stands before the first [Section]", key));
-    if (!is_owned(section)) {
-      if (std::ranges::find(settings_.foreign_sections, section) == settings_.foreign_sections.end()) {
-        settings_.foreign_sections.emplace_back(section);
-      }
+    if (std::holds_alternative<UnusedSetting>((*key)->value)) {
+      settings_.remarks.push_back(
+          fmt::format("{}: [{}] {} has no meaning here and is ignored", place(), section_, name));
       return;
     }
-    const std::string name = canonical(key);
-    if (!seen_.insert(fmt::format("[{}] {}", section, name)).second) {
-      return fail(fmt::format("[{}] {} is given twice", section, key));
-    }
-    if (section == "ComponentManager") return add_component(key, value);
-    const auto known = std::ranges::find_if(
-        kKeys, [&](const Key& candidate) { return candidate.section == section && candidate.name == name; });
-    if (known == kKeys.end()) return unknown_key(section, key);
-    if (const auto applied = known->apply(settings_.scheduler, value); !applied) {
-      fail(fmt::format("[{}] {}: {}", section, key, applied.error().message));
+    const SettingsTarget target{settings_, components_, task_ ? &settings_.tasks[*task_] : nullptr};
+    if (const auto applied = apply_setting(**key, name, value, target); !applied) {
+      fail(fmt::format("[{}] {}: {}", section_, name, applied.error().message));
     }
   }
 
-  void add_component(std::string_view key, std::string_view value) {
-    const std::string_view number =
-        key.starts_with(kComponentPrefix) ? key.substr(kComponentPrefix.size()) : std::string_view();
-    const auto index = integer(number, 0, kMaxComponents);
-    if (!index) return unknown_key("ComponentManager", key);
-    if (value.empty()) return fail(fmt::format("[ComponentManager] {}: names no file", key));
-    if (!components_.emplace(*index, value).second) {
-      return fail(fmt::format("[ComponentManager] {} is given twice", key));
+  // The three keys of [SysTime] belong together.
+  void check_sys_time() {
+    const SysTimeSettings& time = settings_.sys_time;
+    if (time == SysTimeSettings{} ||
+        (!time.get_us.empty() && !time.get_ns.empty() && !time.library.empty())) {
+      return;
     }
-  }
-
-  void unknown_key(std::string_view section, std::string_view key) {
-    std::vector<std::string_view> allowed;
-    for (const Key& known : kKeys) {
-      if (known.section == section) allowed.push_back(known.name);
-    }
-    const std::string_view nearest = nearest_name(canonical(key), allowed);
-    fail(fmt::format("[{}] has no key '{}'{}; allowed are {}", section, key,
-                     nearest.empty() ? "" : fmt::format(", did you mean '{}'?", nearest),
-                     section == "ComponentManager"
-                         ? fmt::format("Component.N with N from 0 to {}", kMaxComponents)
-                         : join_names(allowed)));
+    fail(
+        "[SysTime] needs all three of CustomSysTimeGetUs, CustomSysTimeGetNs and CustomSysTimeLibrary, or "
+        "none");
   }
 
   std::string_view rest_;
   std::string_view file_;
   int line_ = 0;
+  std::string_view section_;
+  bool owned_ = false;
+  std::optional<std::size_t> task_;  // of the section [Task.NAME], in settings_.tasks
   InstanceSettings settings_;
-  std::map<std::int64_t, std::string> components_;
+  std::map<std::size_t, std::string> components_;
   std::set<std::string> seen_;
   std::optional<Error> error_;
 };
@@ -244,7 +165,9 @@ Result<InstanceSettings> read_settings(const std::string& file) {
   auto settings = parse_settings(text, file);
   if (!settings) return settings;
   const auto folder = std::filesystem::absolute(file).parent_path();
-  for (std::string& component : settings->components) component = (folder / component).lexically_normal();
+  const auto resolve = [&](std::string& path) { path = (folder / path).lexically_normal(); };
+  std::ranges::for_each(settings->components, resolve);
+  if (!settings->sys_time.library.empty()) resolve(settings->sys_time.library);
   return settings;
 }
 

@@ -27,6 +27,16 @@ static_assert(offsetof(sys_setup_tasks_struct, nTasks) == 0);
 static_assert(offsetof(sys_setup_tasks_struct, stApplicationName) == 2);
 static_assert(offsetof(sys_setup_tasks_struct, ptaskinfo) == 56);
 static_assert(sizeof(sys_setup_tasks_struct) == 64);
+static_assert(sizeof(RTS_I64) == 8 && sizeof(RTS_UI64) == 8);
+static_assert(offsetof(Task_Options, dwSize) == 0);
+static_assert(offsetof(Task_Options, nStartOffsetNs) == 8);
+static_assert(offsetof(Task_Options, nLatePolicy) == 16);
+static_assert(offsetof(Task_Options, bDrivesOutputs) == 18);
+static_assert(offsetof(Task_Options, dwWatchdogTimeUs) == 20);
+static_assert(offsetof(Task_Options, dwWatchdogSensitivity) == 24);
+static_assert(offsetof(Task_Options, dwWatchdogOmittedCycles) == 28);
+static_assert(offsetof(Task_Options, nWatchdogPolicy) == 32);
+static_assert(sizeof(Task_Options) == 40);
 
 TEST(Abi, NumbersTheKindsOfTaskAsTheSeedDoes) {
   EXPECT_EQ(Cyclic, 0);

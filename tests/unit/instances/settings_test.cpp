@@ -1,7 +1,10 @@
 #include "instances/runtime/settings.hpp"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "instances/runtime/settings_key.hpp"
 
 namespace plchost {
 namespace {
@@ -57,9 +60,10 @@ TEST(Settings, TakesLinuxAsAnotherWordForVxWorks) {
 }
 
 TEST(Settings, LeavesForeignSectionsAloneAndListsEachOnce) {
-  const auto sut = parse_settings("[SysTime]\nA=1\nB=2\n[CmpRouter]\nC=3\n[SysTime]\nD=4\n", "line1.cfg");
-  ASSERT_TRUE(sut);
-  EXPECT_THAT(sut->foreign_sections, ElementsAre("SysTime", "CmpRouter"));
+  const auto sut = parse_settings(
+      "[CmpLog]\nA=1\nany words at all\n[CmpRouter]\nC=3\n[CmpLog]\nD=4\n[Tasks]\n[Task]\n", "line1.cfg");
+  ASSERT_TRUE(sut) << sut.error().message;
+  EXPECT_THAT(sut->foreign_sections, ElementsAre("CmpLog", "CmpRouter", "Tasks", "Task"));
 }
 
 TEST(Settings, SuggestsTheKeyThatWasMeant) {
@@ -85,33 +89,90 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(
         BadFile{"[CmpSchedule]\nSchedulerInterval=49\n",
                 "line1.cfg:2: [CmpSchedule] SchedulerInterval: '49'"},
-        BadFile{"[CmpSchedule]\nSchedulerInterval=1000001\n", "an integer from 50 to 1000000"},
+        BadFile{"[CmpSchedule]\nSchedulerInterval=1000001\n", "us, 50 to 1000000"},
         BadFile{"[CmpSchedule]\nSchedulerInterval=1ms\n", "'1ms' is not allowed"},
         BadFile{"[CmpSchedule]\nSchedulerInterval=\n", "'' is not allowed"},
         BadFile{"[CmpSchedule]\nSchedulerInterval=99999999999999999999\n", "is not allowed"},
-        BadFile{"[CmpSchedule]\nTask.Freewheeling.Cycletime=0\n", "from 1 to 60000"},
-        BadFile{"[CmpSchedule]\nProcessorLoad.Maximum=100\n", "from 1 to 99"},
-        BadFile{"[CmpSchedule]\nSpinAhead.MaxUs=-1\n", "from 0 to 1000"},
-        BadFile{"[CmpSchedule]\nExternalEvent.MaxBacklog=0\n", "from 1 to"},
+        BadFile{"[CmpSchedule]\nTask.Freewheeling.Cycletime=0\n", "ms, 1 to 60000, or -1 (not set)"},
+        BadFile{"[CmpSchedule]\nProcessorLoad.Maximum=101\n", "0 to 100"},
+        BadFile{"[CmpSchedule]\nSpinAhead.MaxUs=-1\n", "0 to 1000"},
+        BadFile{"[CmpSchedule]\nExternalEvent.MaxBacklog=0\n", "events, 1 to"},
         BadFile{"[CmpSchedule]\nSchedulerInterval=100\n\nSchedulerInterval=100\n", "line1.cfg:4: "},
-        BadFile{"[SysTimer]\nVxWorks.TimerSource=Auxiliary\n",
-                "'Auxiliary' is not allowed: System and Task are"},
-        BadFile{"[SysTimer]\nVxWorks.TimerMode=OneShot\n", "has no key 'VxWorks.TimerMode'"},
+        BadFile{"[SysTimer]\nVxWorks.TimerSource=system\n",
+                "'system' is not allowed; allowed is: System, Task, Auxiliary"},
+        BadFile{"[SysTimer]\nTimerMode=OneShot\n", "did you mean 'VxWorks.TimerMode'?"},
+        BadFile{"[SysTimer]\nLinux.TimerMod=OneShot\n", "did you mean 'VxWorks.TimerMode'?"},
+        BadFile{"[SysTimer]\nLinux.AuxiliaryDevice=rtc0\n", "absolute path of a character device"},
+        BadFile{"[SysTime]\nLinux.CustomSysTimeGetUs=my time\n", "name of a C function"},
+        BadFile{"[SysTime]\nLinux.CustomSysTimeGetUs=f\nLinux.CustomSysTimeGetNs=g\n", "needs all three"},
+        BadFile{"[Task.]\n", "task '' is not valid"}, BadFile{"[Task.a b]\n", "task 'a b' is not valid"},
+        BadFile{"[Task.Fast]\nLatePolicy=asap\n",
+                "[Task.Fast] LatePolicy: 'asap' is not allowed; allowed is: Next, Asap"},
+        BadFile{"[Task.Fast]\nStartOffset=1\n", "did you mean 'StartOffsetNs'?"},
+        BadFile{"[Task.Fast]\nStartOffsetNs=-1\n", "0 to 4320000000000000"},
+        BadFile{"[Task.Fast]\nWatchdog.Sensitivity=0\n", "cycles, 1 to 1000000"},
+        BadFile{"[Task.Fast]\nDrivesOutputs=1\n[CmpLog]\n[Task.Fast]\nDrivesOutputs=0\n",
+                "line1.cfg:5: [Task.Fast] DrivesOutputs is given twice"},
         BadFile{"[ComponentManager]\nComponent.x=a.so\n", "has no key 'Component.x'"},
-        BadFile{"[ComponentManager]\nComponent.65=a.so\n", "N from 0 to 64"},
-        BadFile{"[ComponentManager]\nComponent.1=\n", "names no file"},
+        BadFile{"[ComponentManager]\nComponent.1000=a.so\n", "has no key 'Component.1000'"},
+        BadFile{"[ComponentManager]\nComponent.1=\n", "allowed is: file of a shared object"},
         BadFile{"[ComponentManager]\nComponent.1=a.so\nComponent.01=b.so\n", "given twice"},
         BadFile{"SchedulerInterval=1000\n",
                 "line1.cfg:1: 'SchedulerInterval' stands before the first [Section]"},
         BadFile{"[CmpSchedule]\nwhat is this\n", "line1.cfg:2: neither [Section] nor Key=Value"},
         BadFile{"[CmpSchedule\n", "line1.cfg:1: neither"}));
 
-TEST(Settings, RefusesALineBeyondTheBoundAndZeroBytes) {
-  const std::string fits = "[X]\n;" + std::string(kMaxSettingsLine - 1, 'x') + "\n";
-  EXPECT_EQ(complaint(fits), "");
-  EXPECT_THAT(complaint("[X]\n;" + std::string(kMaxSettingsLine, 'x') + "\n"),
-              HasSubstr("line1.cfg:2: the line is"));
+TEST(Settings, RefusesZeroBytes) {
   EXPECT_THAT(complaint(std::string_view("[X]\nA=\0\n", 8)), HasSubstr("line1.cfg:2: holds a zero byte"));
+}
+
+TEST(Settings, ReadsTheOptionsOfEachTask) {
+  const auto sut = parse_settings(
+      "[Task.Fast]\nLatePolicy=Asap\nStartOffsetNs=250000\nDrivesOutputs=1\nWatchdog.TimeUs=900\n"
+      "Watchdog.Sensitivity=3\nWatchdog.OmittedCycles=4\nWatchdog.Policy=Task\n[Task.S.low]\n[Task.Fast]\n",
+      "line1.cfg");
+  ASSERT_TRUE(sut) << sut.error().message;
+  ASSERT_EQ(sut->tasks.size(), 2U);
+  const TaskSettings wanted{.task = "Fast",
+                            .where = "line1.cfg:1: [Task.Fast]",
+                            .late = LatePolicy::asap,
+                            .start_offset = 250us,
+                            .drives_outputs = true,
+                            .watchdog_time = 900us,
+                            .watchdog_sensitivity = 3,
+                            .watchdog_omitted_cycles = 4,
+                            .watchdog_policy = WatchdogPolicy::task};
+  EXPECT_EQ(sut->tasks[0], wanted);
+  EXPECT_EQ(sut->tasks[1], (TaskSettings{.task = "S.low", .where = "line1.cfg:9: [Task.S.low]"}));
+}
+
+TEST(Settings, DefaultsOfTheTableAreThoseOfTheProgram) {
+  std::string file;
+  for (const SettingKey& key : all_setting_keys()) {
+    if (key.initial.empty() || key.section == kTaskSections) continue;
+    file += fmt::format("[{}]\n{}={}\n", key.section, written_name(key), key.initial);
+  }
+  const auto sut = parse_settings(file, "line1.cfg");
+  ASSERT_TRUE(sut) << sut.error().message;
+  EXPECT_EQ(*sut, InstanceSettings{});
+}
+
+TEST(Settings, DefaultsOfATaskAreThoseOfTheProgram) {
+  std::string file = "[Task.T]\n";
+  for (const SettingKey& key : all_setting_keys()) {
+    if (key.section == kTaskSections) file += fmt::format("{}={}\n", key.name, key.initial);
+  }
+  const auto sut = parse_settings(file, "line1.cfg");
+  ASSERT_TRUE(sut) << sut.error().message;
+  std::vector<TaskConfig> tasks(1);
+  tasks[0].name = "T";
+  tasks[0].interval = 1ms;
+  tasks[0].entry = [] {};
+  ASSERT_TRUE(apply_task_settings(sut->tasks, tasks));
+  EXPECT_EQ(tasks[0].late, TaskConfig{}.late);
+  EXPECT_EQ(tasks[0].start_offset, TaskConfig{}.start_offset);
+  EXPECT_EQ(tasks[0].watchdog, TaskWatchdog{});
+  EXPECT_EQ(tasks[0].drives_outputs, TaskConfig{}.drives_outputs);
 }
 
 TEST(Settings, NamesAFileThatIsNotThereOrNoFile) {

@@ -58,7 +58,7 @@ INSTANTIATE_TEST_SUITE_P(
         Setting{"freewheeling_cycletime",
                 [](SchedulerSettings& s) { s.freewheeling_cycletime = kMaxInterval + Duration(1); }},
         Setting{"processor_load_maximum", [](SchedulerSettings& s) { s.processor_load_maximum = -1; }},
-        Setting{"processor_load_maximum", [](SchedulerSettings& s) { s.processor_load_maximum = 100; }},
+        Setting{"processor_load_maximum", [](SchedulerSettings& s) { s.processor_load_maximum = 101; }},
         Setting{"spin_ahead_max", [](SchedulerSettings& s) { s.spin_ahead_max = Duration(-1); }},
         Setting{"spin_ahead_max",
                 [](SchedulerSettings& s) { s.spin_ahead_max = kMaxSpinAhead + Duration(1); }},

@@ -1,0 +1,47 @@
+// [ComponentManager]: what is loaded before the application.
+#include <algorithm>
+#include <array>
+
+#include "instances/runtime/settings_key.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr std::string_view kSection = "ComponentManager";
+
+// Ours are files; theirs are plain names of what is built into their runtime, "CmpBACnet".
+bool is_foreign(std::string_view component) {
+  return component.find_first_of("/.") == std::string_view::npos;
+}
+
+void add_component(const SettingsTarget& to, std::size_t number, std::string_view component) {
+  if (!is_foreign(component)) {
+    to.components.emplace(number, component);
+    return;
+  }
+  auto& foreign = to.settings.foreign_components;
+  if (std::ranges::find(foreign, component) == foreign.end()) foreign.emplace_back(component);
+}
+
+constexpr std::array kKeys = {
+    SettingKey{
+        .section = kSection,
+        .name = "Component.N",
+        .value = NumberedSetting{"file of a shared object, with a '/' or a '.' in its name", add_component}},
+    SettingKey{.section = kSection, .name = "DisablingOperations"},
+    SettingKey{.section = kSection, .name = "MinimalCommCycleHookInterval"},
+    SettingKey{.section = kSection, .name = "OverloadableFunctions"},
+    SettingKey{.section = kSection, .name = "Profiler.ComponentID"},
+    SettingKey{.section = kSection, .name = "WinCE.CommCycleInterval"},
+    SettingKey{.section = kSection, .name = "WinCE.CommCycleThreadPriority"},
+    SettingKey{.section = kSection, .name = "WindowHided"},
+};
+
+}  // namespace
+
+std::span<const SettingKey> component_keys() noexcept {
+  return kKeys;
+}
+
+}  // namespace plchost

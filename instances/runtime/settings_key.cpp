@@ -1,0 +1,179 @@
+#include "instances/runtime/settings_key.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "shm/base/names.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr std::string_view kTaskPrefix = "Task.";
+constexpr std::array<std::string_view, 2> kPlatforms = {"VxWorks.", "Linux."};
+
+// Of a name or value that is not allowed, this much is told.
+constexpr std::size_t kShown = 80;
+
+template <class... Cases>
+struct Overloaded : Cases... {
+  using Cases::operator()...;
+};
+
+std::optional<std::int64_t> integer(std::string_view text) {
+  std::int64_t number = 0;
+  const char* const end = text.data() + text.size();
+  // NOLINTNEXTLINE(bugprone-suspicious-stringview-data-usage): `end` is the size
+  const auto [stop, error] = std::from_chars(text.data(), end, number);
+  if (error != std::errc() || stop != end) return std::nullopt;
+  return number;
+}
+
+// The number of "Component.7" for the row "Component.N".
+std::optional<std::size_t> number_of(std::string_view row, std::string_view name) {
+  const std::string_view stem = row.substr(0, row.size() - 1);
+  if (!name.starts_with(stem)) return std::nullopt;
+  const auto number = integer(name.substr(stem.size()));
+  if (!number || *number < 0 || *number > static_cast<std::int64_t>(kMaxComponents)) return std::nullopt;
+  return static_cast<std::size_t>(*number);
+}
+
+bool is_numbered(const SettingKey& key) {
+  return std::holds_alternative<NumberedSetting>(key.value);
+}
+
+bool is_named(const SettingKey& key, std::string_view name) {
+  if (is_numbered(key)) return number_of(key.name, name).has_value();
+  if (!key.prefixed) return key.name == name;
+  return std::ranges::any_of(kPlatforms, [&](std::string_view platform) {
+    return name.starts_with(platform) && name.substr(platform.size()) == key.name;
+  });
+}
+
+std::string_view without_platform(std::string_view name) {
+  for (const std::string_view platform : kPlatforms) {
+    if (name.starts_with(platform)) return name.substr(platform.size());
+  }
+  return name;
+}
+
+std::unexpected<Error> unknown_key(std::string_view section, std::string_view name) {
+  std::vector<std::string_view> names;
+  std::vector<std::string> allowed;
+  for (const SettingKey& key : all_setting_keys()) {
+    if (key.section != table_section(section) || std::holds_alternative<UnusedSetting>(key.value)) continue;
+    names.push_back(key.name);
+    allowed.push_back(written_name(key));
+  }
+  const std::string_view shown = name.substr(0, kShown);
+  const std::string_view nearest = nearest_name(without_platform(shown), names);
+  const auto meant = std::ranges::find(names, nearest) - names.begin();
+  return failure(ErrorCode::invalid_argument,
+                 fmt::format("[{}] has no key '{}'{}; allowed are {}", section, shown,
+                             nearest.empty() ? ""
+                                             : fmt::format(", did you mean '{}'?",
+                                                           allowed[static_cast<std::size_t>(meant)]),
+                             fmt::join(allowed, ", ")));
+}
+
+}  // namespace
+
+const std::vector<SettingKey>& all_setting_keys() {
+  static const std::vector<SettingKey> all = [] {
+    std::vector<SettingKey> keys;
+    for (const auto table : {schedule_keys(), timer_keys(), task_keys(), component_keys()}) {
+      keys.insert(keys.end(), table.begin(), table.end());
+    }
+    return keys;
+  }();
+  return all;
+}
+
+std::string_view table_section(std::string_view section) noexcept {
+  return section.starts_with(kTaskPrefix) ? kTaskSections : section;
+}
+
+bool is_owned(std::string_view section) {
+  return std::ranges::find(all_setting_keys(), table_section(section), &SettingKey::section) !=
+         all_setting_keys().end();
+}
+
+std::string written_name(const SettingKey& key) {
+  return fmt::format("{}{}", key.prefixed ? kPlatforms.front() : "", key.name);
+}
+
+std::string allowed_values(const SettingKey& key) {
+  const std::string range = std::visit(
+      Overloaded{
+          [](const NumberSetting& number) { return fmt::format("{} to {}", number.lowest, number.highest); },
+          [](const OptionalNumberSetting& number) {
+            return fmt::format("1 to {}, or -1 (not set)", number.highest);
+          },
+          [](const WordSetting& word) { return join_names(word.words); },
+          [](const TextSetting& text) { return std::string(text.form); },
+          [](const NumberedSetting& numbered) {
+            return fmt::format("{}, N 0 to {}", numbered.form, kMaxComponents);
+          },
+          [](const UnusedSetting&) { return std::string(); },
+      },
+      key.value);
+  return key.unit.empty() ? range : fmt::format("{}, {}", key.unit, range);
+}
+
+Result<const SettingKey*> find_setting(std::string_view section, std::string_view name) {
+  const auto found = std::ranges::find_if(all_setting_keys(), [&](const SettingKey& key) {
+    return key.section == table_section(section) && is_named(key, name);
+  });
+  if (found == all_setting_keys().end()) return unknown_key(section, name);
+  return &*found;
+}
+
+std::string setting_identity(const SettingKey& key, std::string_view name) {
+  const auto number = is_numbered(key) ? number_of(key.name, name) : std::nullopt;
+  return number ? fmt::format("{}{}", key.name, *number) : std::string(key.name);
+}
+
+Result<void> apply_setting(const SettingKey& key, std::string_view name, std::string_view value,
+                           const SettingsTarget& target) {
+  const auto number = integer(value);
+  const bool applied =
+      std::visit(Overloaded{
+                     [&](const NumberSetting& setting) {
+                       if (!number || *number < setting.lowest || *number > setting.highest) return false;
+                       setting.apply(target, *number);
+                       return true;
+                     },
+                     [&](const OptionalNumberSetting& setting) {
+                       if (!number || *number < -1 || *number == 0 || *number > setting.highest) return false;
+                       setting.apply(target, *number);
+                       return true;
+                     },
+                     [&](const WordSetting& setting) {
+                       const auto word = std::ranges::find(setting.words, value);
+                       if (word == setting.words.end()) return false;
+                       setting.apply(target, static_cast<std::size_t>(word - setting.words.begin()));
+                       return true;
+                     },
+                     [&](const TextSetting& setting) {
+                       if (!setting.allows(value)) return false;
+                       setting.apply(target, value);
+                       return true;
+                     },
+                     [&](const NumberedSetting& setting) {
+                       if (value.empty()) return false;
+                       setting.apply(target, number_of(key.name, name).value_or(0), value);
+                       return true;
+                     },
+                     [](const UnusedSetting&) { return true; },
+                 },
+                 key.value);
+  if (applied) return {};
+  return failure(ErrorCode::invalid_argument, fmt::format("'{}' is not allowed; allowed is: {}",
+                                                          value.substr(0, kShown), allowed_values(key)));
+}
+
+}  // namespace plchost
