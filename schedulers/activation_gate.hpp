@@ -31,6 +31,16 @@ class ActivationGate {
     }
   }
 
+  /// Sleeps until the gate is open, and closes it; an interrupt stays for the next wait(). For who knows that
+  /// it is about to be opened. Real-time; the thread that waits.
+  void pass(Clock& clock) noexcept {
+    std::uint32_t state = word_.load(std::memory_order_acquire);
+    for (; (state & kOpen) == 0; state = word_.load(std::memory_order_acquire)) {
+      clock.wait(word_, state, kNoDeadline);
+    }
+    word_.fetch_and(~kOpen, std::memory_order_acq_rel);
+  }
+
   /// false: it was open already. Any thread, real-time.
   bool open(Clock& clock) noexcept { return raise(clock, kOpen); }
   void interrupt(Clock& clock) noexcept { raise(clock, kInterrupt); }

@@ -2,19 +2,31 @@
 
 #include <atomic>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <vector>
 
-#include "schedulers/activation_gate.hpp"
+#include "schedulers/due_queue.hpp"
 #include "schedulers/task.hpp"
 
 namespace plchost {
 
-/// The tasks that one tick releases: each task's thread states for when it waits, each tick opens the gates
-/// of those that are due. A task that is still busy has stated nothing, so its tick passes; the task counts
-/// that itself.
+/// The tasks that one tick releases. Each task's thread states for when it waits and hands itself in without
+/// a lock; the tick queues what was handed in by its time and takes out what is due, so that a tick costs
+/// what is due and what came back since the tick before, however many tasks there are.
+///
+/// The tick wakes only the first of them, and each task wakes the one after it before it runs: the tick
+/// outranks all tasks, so the highest priority would otherwise wait until all others were woken. A cycle that
+/// blocks or never ends holds up nobody, since the next task was woken before.
+///
+/// A task that is still busy has stated nothing, so its tick passes; the task counts that itself.
 class TickTable {
  public:
+  struct Work {
+    std::size_t released = 0;   ///< tasks that were due
+    std::size_t looked_at = 0;  ///< tasks that were touched at all
+  };
+
   explicit TickTable(Clock& clock) noexcept : clock_(clock) {}
 
   /// The source of a cyclic or freewheeling task. Set-up.
@@ -26,16 +38,24 @@ class TickTable {
   /// add().
   void start(TimePoint tick) noexcept;
 
-  /// Releases what is due at `tick`, the highest priority first; how many. Depends on nothing but `tick` and
-  /// the table. One thread, real-time.
-  std::size_t on_tick(TimePoint tick) noexcept;
+  /// Releases what is due at `tick`, in the order of priority. Depends on nothing but `tick` and the table.
+  /// One thread, real-time.
+  Work on_tick(TimePoint tick) noexcept;
 
  private:
   class Slot;
 
+  void hand_in(Slot& slot) noexcept;
+  void take_in(Duration::rep tick, Work& work) noexcept;
+  void take_due(Duration::rep tick, Work& work) noexcept;
+  void claim(Slot& slot, Duration::rep due) noexcept;
+
   Clock& clock_;
   std::vector<Slot*> slots_;
   std::atomic<Duration::rep> last_tick_{0};
+  std::atomic<Slot*> handed_in_{nullptr};  // a list that tasks put themselves on, and a tick takes as a whole
+  DueQueue queue_;                         // the tick's alone, like the next
+  std::vector<Slot*> due_;
 };
 
 }  // namespace plchost
