@@ -16,7 +16,7 @@ namespace plchost::bench {
 
 namespace {
 
-constexpr Duration kWork = std::chrono::microseconds(5);
+constexpr Duration kWork = std::chrono::microseconds(15);
 constexpr std::array kSizes = {std::size_t{10}, std::size_t{100}, std::size_t{1000}};
 
 /// Of each 20 tasks 1, 2, 5 and 12 have these periods: 21,000 activations per second of 1,000 tasks.
@@ -43,7 +43,7 @@ struct Figures {
   std::uint64_t lost = 0;
   Duration cpu{};
   Duration measured{};
-  Samples cpu_per_activation;  // one per slice
+  Samples cpu_per_activation;  // one per slice; less what the task itself works
 
   [[nodiscard]] double load() const { return ratio(to_us(cpu), to_us(measured)); }
 };
@@ -64,7 +64,7 @@ void measure_slice(const Plan& plan, Duration slice, Figures& into, Cycles cycle
   into.lost += lost() - lost_before;
   into.cpu += cpu;
   into.measured += MonotonicClock::now() - begin;
-  if (ran > 0) into.cpu_per_activation.push(cpu / static_cast<Duration::rep>(ran));
+  if (ran > 0) into.cpu_per_activation.push(cpu / static_cast<Duration::rep>(ran) - kWork);
 }
 
 Result<void> run_ours(const Plan& plan, std::string_view scheduler, std::size_t size, Duration slice,
@@ -157,7 +157,43 @@ Row to_row(std::string_view scheduler, const Sizes& ours, const Sizes& floor) {
                        per_million(floor.back()), true},
                       {"CPU per activation of 1,000 tasks at most 1.2 times that of 10", cost(ours[2]),
                        1.2 * cost(ours[0]), true}},
-          .note = "CPU time per activation, 5 us of it the task's own; a sample is a slice"};
+          .note = "CPU time per activation without the task's own 15 us; a sample is a slice"};
+}
+
+/// The CPU time of one tick with so many tasks that are not due.
+Result<void> measure_tick(const Plan& plan, std::size_t size, Duration slice, Samples& into) {
+  constexpr Duration kTick = std::chrono::milliseconds(1);
+  std::vector<TaskConfig> configs;
+  for (std::size_t i = 0; i < size; ++i) {
+    TaskConfig task;
+    task.name = fmt::format("task{}", i);
+    task.interval = std::chrono::hours(1);
+    task.entry = [] {};
+    configs.push_back(std::move(task));
+  }
+  auto tasks = ManyTasks::start(plan, "CmpSchedule", std::move(configs));
+  if (!tasks) return std::unexpected(std::move(tasks.error()));
+  const OnCore out_of_the_way(plan.poster_core);
+  std::this_thread::sleep_for(kWarmUp);
+  const ThreadUsage before = usage_of_other_threads("tick");
+  const TimePoint begin = MonotonicClock::now();
+  std::this_thread::sleep_for(slice);
+  const Duration cpu = (usage_of_other_threads("tick") - before).cpu;
+  into.push(cpu / ((MonotonicClock::now() - begin) / kTick));
+  return (*tasks)->stop();
+}
+
+Result<Row> measure_ticks(const Plan& plan) {
+  Row row{.name = "scale/CmpSchedule/tick"};
+  auto done = alternate(plan,
+                        {[&](Duration slice) { return measure_tick(plan, kSizes.front(), slice, row.floor); },
+                         [&](Duration slice) { return measure_tick(plan, kSizes.back(), slice, row.ours); }},
+                        std::chrono::seconds(1));
+  if (!done) return std::unexpected(std::move(done.error()));
+  row.targets = {{"a tick with 1,000 tasks that are not due at most 1.2 times one with 10",
+                  summarise(row.ours).p50, 1.2 * summarise(row.floor).p50, true}};
+  row.note = "CPU time per tick with 1,000 tasks of which none is due; floor: with 10";
+  return row;
 }
 
 }  // namespace
@@ -179,6 +215,11 @@ Result<std::vector<Row>> measure_scale(const Plan& plan) {
   std::vector<Row> rows;
   for (std::size_t i = 0; i < all_schedulers().size(); ++i)
     rows.push_back(to_row(all_schedulers()[i].name, figures[i], figures.back()));
+  Plan share = plan;
+  share.each = plan.each / 4;
+  auto ticks = measure_ticks(share);
+  if (!ticks) return std::unexpected(std::move(ticks.error()));
+  rows.push_back(std::move(*ticks));
   return rows;
 }
 
