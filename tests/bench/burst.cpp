@@ -1,15 +1,20 @@
 // 100 cyclic tasks that are due at one tick of CmpSchedule. From the planned release to the start of the last
 // one, less what the tasks before it executed, per task: what the release of one task costs. The floor is one
-// bare thread that wakes 100 bare threads through raw futexes, same priorities, same core.
+// bare thread that wakes 100 bare threads through raw futexes, same priorities, same core; a second floor
+// wakes them all through one futex with one call.
 
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <climits>
+#include <span>
 #include <thread>
 
 #include <fmt/format.h>
+#include <linux/futex.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
-#include "shm/base/futex.hpp"
 #include "tests/bench/many_tasks.hpp"
 #include "tests/bench/parts.hpp"
 
@@ -90,15 +95,25 @@ Result<void> run_ours(const Plan& plan, Duration slice, Samples& into) {
   return {};
 }
 
-/// One futex per thread, and who opens them.
+void wait_private(const std::atomic<std::uint32_t>& word, std::uint32_t seen) noexcept {
+  ::syscall(SYS_futex, &word, FUTEX_WAIT_PRIVATE, seen, nullptr, nullptr, 0);
+}
+
+void wake_private(const std::atomic<std::uint32_t>& word) noexcept {
+  ::syscall(SYS_futex, &word, FUTEX_WAKE_PRIVATE, INT_MAX, nullptr, nullptr, 0);
+}
+
+/// A futex per thread, or one for all, and who opens them.
 struct BareBurst {
+  bool one_word = false;
   std::atomic<bool> stopping{false};
   TimePoint release{};
   std::array<std::atomic<std::uint32_t>, kTasks> words{};
 
   void run_task(std::size_t index, std::vector<Execution>& line) noexcept {
-    for (std::uint32_t seen = 0;; seen = words[index].load(std::memory_order_relaxed)) {
-      while (words[index].load(std::memory_order_acquire) == seen) futex_wait(&words[index], seen);
+    auto& word = words[one_word ? 0 : index];
+    for (std::uint32_t seen = 0;; seen = word.load(std::memory_order_relaxed)) {
+      while (word.load(std::memory_order_acquire) == seen) wait_private(word, seen);
       if (stopping.load()) return;
       const TimePoint start = MonotonicClock::now();
       work(kWork);
@@ -106,9 +121,9 @@ struct BareBurst {
     }
   }
   void open_all() noexcept {
-    for (auto& word : words) {
+    for (auto& word : std::span(words).first(one_word ? 1 : kTasks)) {
       word.fetch_add(1, std::memory_order_release);
-      futex_wake(&word);
+      wake_private(word);
     }
   }
   /// Before the tick has ended it may open once more; a thread that has seen the end does not care.
@@ -143,9 +158,9 @@ Result<void> start_bare(const Plan& plan, BareBurst& bare, Log& log, std::vector
   return {};
 }
 
-Result<void> run_floor(const Plan& plan, Duration slice, Samples& into) {
+Result<void> run_floor(const Plan& plan, bool one_word, Duration slice, Samples& into) {
   Log log = make_log(slice);
-  BareBurst bare;
+  BareBurst bare{.one_word = one_word};
   std::vector<Thread> threads;
   if (auto started = start_bare(plan, bare, log, threads); !started) {
     bare.end();
@@ -167,9 +182,13 @@ Result<void> run_floor(const Plan& plan, Duration slice, Samples& into) {
 
 Result<std::vector<Row>> measure_burst(const Plan& plan) {
   Row row{.name = "burst/CmpSchedule/100tasks"};
-  auto done = alternate(plan, {[&](Duration slice) { return run_floor(plan, slice, row.floor); },
+  Samples one_word;
+  auto done = alternate(plan, {[&](Duration slice) { return run_floor(plan, false, slice, row.floor); },
+                               [&](Duration slice) { return run_floor(plan, true, slice, one_word); },
                                [&](Duration slice) { return run_ours(plan, slice, row.ours); }});
   if (!done) return std::unexpected(std::move(done.error()));
+  row.extra = {{"floor_one_futex_p50_us", summarise(one_word).p50},
+               {"floor_one_futex_p99_us", summarise(one_word).p99}};
   row.targets = {{"median below 3 us for each task", summarise(row.ours).p50, 3}};
   row.note = "per task: (start of the last - planned release - executions before it) / 100";
   return std::vector{row};

@@ -33,7 +33,7 @@ std::span<const Part> all_parts() noexcept {
       Part{.name = "burst",
            .about = "100 tasks due at one tick",
            .picture = "",
-           .turns = 2.2,
+           .turns = 3.3,
            .under_stress = true,
            .measure = &measure_burst},
       Part{.name = "post_process",
