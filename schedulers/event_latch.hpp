@@ -13,11 +13,17 @@ namespace plchost {
 /// neither the level nor a run that is due is forgotten when the scheduler is exchanged.
 class EventLatch {
  public:
-  /// The level from which the first edge is to rise; forgets what was due. While nobody polls or waits.
-  void prime(bool level) noexcept {
-    level_ = level;
+  /// Forgets what was due, and the level. While nobody polls or waits.
+  void forget() noexcept {
+    primed_ = false;
     lost_.store(0, std::memory_order_relaxed);
     gate.close();
+  }
+  [[nodiscard]] bool primed() const noexcept { return primed_; }
+  /// The level from which the first edge is to rise. The poller's thread, before its first poll.
+  void prime(bool level) noexcept {
+    level_ = level;
+    primed_ = true;
   }
 
   /// One look at the variable, at `now`. true: an edge rose. The poller's thread, real-time.
@@ -45,6 +51,7 @@ class EventLatch {
 
  private:
   bool level_ = false;  // the poller's alone
+  bool primed_ = false;
   std::atomic<Duration::rep> seen_at_{0};
   std::atomic<std::uint64_t> lost_{0};
 };

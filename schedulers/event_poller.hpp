@@ -10,16 +10,28 @@ namespace plchost {
 /// The event tasks of one scheduler: looks at their variables whenever it is told to.
 class EventPoller {
  public:
-  explicit EventPoller(Clock& clock) noexcept : clock_(clock) {}
+  /// `trap`: catches what is faulty in the variables' code; null: one of its own.
+  explicit EventPoller(Clock& clock, FaultTrap* trap = nullptr) noexcept
+      : clock_(clock), trap_(trap != nullptr ? *trap : own_trap_) {}
 
   /// The source of an event task, which is polled from now on. Set-up.
   [[nodiscard]] std::unique_ptr<ActivationSource> add(Task& task);
   [[nodiscard]] bool empty() const noexcept { return tasks_.empty(); }
+  /// Takes the levels of the variables that were never polled since their task began: from them the first
+  /// edge rises. On the thread that polls, before its first poll.
+  void prime(TimePoint now) noexcept;
   /// Sees the rising edges since the last poll and activates their tasks. One thread, real-time.
   void poll(TimePoint now) noexcept;
+  /// The thread that polls was caught in a variable's code and never goes on. Any thread.
+  [[nodiscard]] bool parked() const noexcept { return trap_.parked(); }
 
  private:
+  template <class Use>
+  void read_all(TimePoint now, Use use) noexcept;
+
   Clock& clock_;
+  FaultTrap own_trap_;
+  FaultTrap& trap_;
   std::vector<Task*> tasks_;
 };
 

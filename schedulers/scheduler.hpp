@@ -14,6 +14,7 @@
 namespace plchost {
 
 class Task;
+class FaultTrap;
 
 /// 100: a freewheeling task sleeps no longer than it must.
 inline constexpr int kMaxProcessorLoad = 100;
@@ -54,7 +55,8 @@ struct SchedulerSettings {
 struct SchedulerContext {
   Clock& clock;
   SchedulerSettings settings;
-  ThreadPriority tick;  ///< of its own threads: above all tasks
+  ThreadPriority tick;             ///< of its own threads: above all tasks
+  FaultTrap* poll_trap = nullptr;  ///< of the thread that reads event variables; null: not caught
 };
 
 struct SchedulerCapabilities {

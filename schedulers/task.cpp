@@ -1,29 +1,12 @@
 #include "schedulers/task.hpp"
 
 #include <algorithm>
-#include <cstdio>
 #include <cstdlib>
-#include <exception>
 #include <utility>
 
 namespace plchost {
 
 namespace {
-
-[[noreturn]] void end_process(const char* task, const char* what) noexcept {
-  std::fprintf(stderr, "plchost: task '%s': an exception left its cycle: %s\n", task, what);
-  std::terminate();
-}
-
-void run_entry(const TaskConfig& config) noexcept {
-  try {
-    config.entry();
-  } catch (const std::exception& error) {
-    end_process(config.name.c_str(), error.what());
-  } catch (...) {
-    end_process(config.name.c_str(), "not a std::exception");
-  }
-}
 
 // Before begin() it is not used; no grid can have an interval of 0.
 Duration grid_interval(const TaskConfig& config) noexcept {
@@ -32,24 +15,29 @@ Duration grid_interval(const TaskConfig& config) noexcept {
 
 }  // namespace
 
-Task::Task(Clock& clock, TaskConfig config, TaskStatistics& statistics, CountedEvent* event) noexcept
+Task::Task(Clock& clock, TaskConfig config, TaskStatistics& statistics, CountedEvent* event,
+           FaultBoard* board) noexcept
     : clock_(clock),
       config_(std::move(config)),
       statistics_(statistics),
       event_(event),
       grid_(TimePoint{}, grid_interval(config_), config_.late),
-      wanted_interval_(grid_.interval().count()) {}
+      wanted_interval_(grid_.interval().count()),
+      overruns_(config_.watchdog),
+      fault_(board, config_.watchdog.policy) {}
 
 void Task::begin(TimePoint origin) {
   grid_ = ReleaseGrid(origin + config_.start_offset,
                       Duration(wanted_interval_.load(std::memory_order_relaxed)), config_.late);
   ready_ = origin;
   begun_ = false;
+  set_due(origin + config_.start_offset);
+  overruns_.forgive_next();
   if (event_ != nullptr) {
     const std::uint64_t count = event_->count();
     cursor_ = {.next = count, .seen = count, .seen_at = origin};
   }
-  if (config_.event_variable) latch_.prime(config_.event_variable());
+  latch_.forget();
 }
 
 Activation Task::next_release(const FreewheelRule& rule) const noexcept {
@@ -73,9 +61,45 @@ Duration Task::interval() const noexcept {
   return Duration(wanted_interval_.load(std::memory_order_relaxed));
 }
 
+std::optional<TimePoint> Task::due() const noexcept {
+  if (config_.kind != TaskKind::cyclic) return std::nullopt;
+  return TimePoint(Duration(due_.load(std::memory_order_relaxed)));
+}
+
+void Task::set_due(TimePoint due) noexcept {
+  due_.store(due.time_since_epoch().count(), std::memory_order_relaxed);
+}
+
+// false: it did not come to its end.
+bool Task::run_entry() noexcept {
+  try {
+    config_.entry();
+    return true;
+  } catch (...) {
+    raise_current_exception(fault_);
+  }
+  return false;
+}
+
+void Task::look_at_overrun(Duration execution) noexcept {
+  const OverrunRule::Verdict verdict = overruns_.ended(execution);
+  if (verdict == OverrunRule::Verdict::fine || !fault_.claim()) return;
+  const bool one = verdict == OverrunRule::Verdict::too_long;
+  FaultRecord& record = fault_.record();
+  record.kind = one ? FaultKind::task_watchdog : FaultKind::consecutive_overruns;
+  record.figure = execution.count();
+  record.limit = one ? overruns_.limit().count() : overruns_.time().count();
+  record.count = overruns_.in_a_row();
+  fault_.publish();
+}
+
 void Task::run_cycle(const Activation& activation) noexcept {
   const TimePoint start = clock_.now();
-  run_entry(config_);
+  set_due(activation.release + interval());
+  trap_.arm(fault_, start);
+  const bool ended = run_entry();
+  trap_.disarm();
+  if (!ended) return;
   const TimePoint end = clock_.now();
   grid_.set_interval(Duration(wanted_interval_.load(std::memory_order_relaxed)));
   grid_.ran(activation.release);
@@ -83,6 +107,7 @@ void Task::run_cycle(const Activation& activation) noexcept {
   last_execution_ = end - start;
   record(activation, start, end);
   if (config_.after_cycle) config_.after_cycle(counters_);
+  look_at_overrun(end - start);
 }
 
 void Task::record(const Activation& activation, TimePoint start, TimePoint end) noexcept {

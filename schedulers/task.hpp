@@ -6,9 +6,11 @@
 #include "schedulers/activation.hpp"
 #include "schedulers/clock.hpp"
 #include "schedulers/event_latch.hpp"
+#include "schedulers/fault_trap.hpp"
 #include "schedulers/freewheel_rule.hpp"
 #include "schedulers/release_grid.hpp"
 #include "schedulers/task_config.hpp"
+#include "schedulers/watchdog_rules.hpp"
 #include "shm/base/counted_event.hpp"
 #include "shm/base/task_statistics.hpp"
 
@@ -18,8 +20,10 @@ namespace plchost {
 /// grid, the place in its external event, the level of its event variable.
 class Task {
  public:
-  /// `config` is valid; `event` is the counter of config.external_event, null for the other kinds.
-  Task(Clock& clock, TaskConfig config, TaskStatistics& statistics, CountedEvent* event) noexcept;
+  /// `config` is valid; `event` is the counter of config.external_event, null for the other kinds. `board`:
+  /// what the tasks of a set share; null: alone.
+  Task(Clock& clock, TaskConfig config, TaskStatistics& statistics, CountedEvent* event,
+       FaultBoard* board = nullptr) noexcept;
 
   [[nodiscard]] const TaskConfig& config() const noexcept { return config_; }
 
@@ -30,10 +34,17 @@ class Task {
   /// What a cyclic or freewheeling task runs next: the same answer until a cycle has run. The task's thread.
   [[nodiscard]] Activation next_release(const FreewheelRule& rule) const noexcept;
 
-  /// Runs one cycle and records it. An exception out of the application's code ends the process with a
-  /// message, because a control program that is half-way through a cycle cannot go on. The task's thread,
-  /// real-time.
+  /// Runs one cycle and records it. A C++ exception out of the application's code, or a cycle that the
+  /// watchdog does not allow, raises fault(). The task's thread, real-time.
   void run_cycle(const Activation& activation) noexcept;
+  /// The next cycle is the first from another source. The task's thread.
+  void source_changed() noexcept { overruns_.forgive_next(); }
+
+  [[nodiscard]] TaskFault& fault() noexcept { return fault_; }
+  [[nodiscard]] const TaskFault& fault() const noexcept { return fault_; }
+  [[nodiscard]] FaultTrap& trap() noexcept { return trap_; }
+  /// The first release that no cycle has begun for; nothing unless cyclic. Any thread.
+  [[nodiscard]] std::optional<TimePoint> due() const noexcept;
 
   /// Cyclic tasks: a new interval, from kMinRuntimeInterval to kMaxInterval. The release that is planned now
   /// stays; the grid goes on from there in steps of the new interval, until it is set again: also after an
@@ -50,6 +61,9 @@ class Task {
   [[nodiscard]] CountedEvent& event() noexcept { return *event_; }
 
  private:
+  [[nodiscard]] bool run_entry() noexcept;
+  void look_at_overrun(Duration execution) noexcept;
+  void set_due(TimePoint due) noexcept;
   void record(const Activation& activation, TimePoint start, TimePoint end) noexcept;
   void record_jitter(const Activation& activation, TimePoint start) noexcept;
 
@@ -68,6 +82,10 @@ class Task {
   TimePoint last_start_;
   TimePoint last_release_;
   TaskCounters counters_{};
+  OverrunRule overruns_;
+  TaskFault fault_;
+  FaultTrap trap_;
+  std::atomic<Duration::rep> due_{0};
 };
 
 }  // namespace plchost

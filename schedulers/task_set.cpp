@@ -1,17 +1,25 @@
 #include "schedulers/task_set.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include <fmt/format.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
 
 #include "shm/base/names.hpp"
 
 namespace plchost {
 
-TaskSet::TaskSet(Clock& clock, PriorityBand band, TaskEnvironment environment)
-    : clock_(clock), band_(band), environment_(std::move(environment)) {}
+TaskSet::TaskSet(Clock& clock, PriorityBand band, TaskEnvironment environment, UniqueFd fault_fd)
+    : clock_(clock),
+      band_(band),
+      environment_(std::move(environment)),
+      fault_fd_(std::move(fault_fd)),
+      fault_board_(fault_fd_.get()) {}
 
 TaskSet::~TaskSet() {
+  if (supervision_ && running_) supervision_->tasks_stop();
   if (active_) active_->scheduler->stop();
   for (auto& thread : threads_) thread->park();  // all at once; their destructors then wait one by one
 }
@@ -19,12 +27,25 @@ TaskSet::~TaskSet() {
 Result<std::unique_ptr<TaskSet>> TaskSet::create(Clock& clock, PriorityBand band,
                                                  std::vector<TaskConfig> tasks, TaskEnvironment environment) {
   if (auto valid = check_tasks(tasks); !valid) return std::unexpected(std::move(valid.error()));
-  std::unique_ptr<TaskSet> self(new TaskSet(clock, band, std::move(environment)));
+  UniqueFd fault_fd(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
+  if (!fault_fd) return failure(ErrorCode::system, "eventfd for faults", errno);
+  std::unique_ptr<TaskSet> self(new TaskSet(clock, band, std::move(environment), std::move(fault_fd)));
   for (TaskConfig& config : tasks) {
     const std::string step = fmt::format("task '{}'", config.name);
     if (auto added = self->add(std::move(config)); !added) return failure_in(step, std::move(added.error()));
   }
+  if (self->environment_.catch_faults) {
+    if (auto supervised = self->supervise(); !supervised)
+      return std::unexpected(std::move(supervised.error()));
+  }
   return self;
+}
+
+Result<void> TaskSet::supervise() {
+  if (auto installed = install_fault_handlers(); !installed) return installed;
+  supervision_.emplace(clock_, tasks_, poll_trap_);
+  return supervision_->start_thread(environment_.allow_unprivileged ? ThreadPriority{}
+                                                                    : supervision_priority(band_));
 }
 
 Result<void> TaskSet::add(TaskConfig config) {
@@ -36,12 +57,13 @@ Result<void> TaskSet::add(TaskConfig config) {
   }
   const ThreadPriority priority =
       environment_.allow_unprivileged ? ThreadPriority{} : task_priority(band_, config.iec_priority);
-  tasks_.push_back(
-      std::make_unique<Task>(clock_, std::move(config), environment_.statistics(tasks_.size()), event));
+  tasks_.push_back(std::make_unique<Task>(clock_, std::move(config), environment_.statistics(tasks_.size()),
+                                          event, &fault_board_));
   auto thread = TaskThread::start(clock_, *tasks_.back(), priority);
   if (!thread) return std::unexpected(std::move(thread.error()));
   threads_.push_back(std::move(*thread));
   reported_running_.push_back(false);
+  fault_taken_.push_back(false);
   return {};
 }
 
@@ -54,7 +76,8 @@ auto TaskSet::arrange(std::string_view name, const SchedulerSettings& settings)
   arrangement->scheduler =
       (*entry)->make({.clock = clock_,
                       .settings = settings,
-                      .tick = environment_.allow_unprivileged ? ThreadPriority{} : tick_priority(band_)});
+                      .tick = environment_.allow_unprivileged ? ThreadPriority{} : tick_priority(band_),
+                      .poll_trap = &poll_trap_});
   for (auto& task : tasks_) {
     auto source = arrangement->scheduler->source_for(*task);
     if (!source) {
@@ -74,12 +97,17 @@ Result<void> TaskSet::start(std::string_view scheduler, const SchedulerSettings&
     return failure(ErrorCode::wrong_state,
                    fmt::format("still in the cycle in which it was to stop: task {}", join_names(busy)));
   }
+  if (const auto faulty = tasks_in_exception(); !faulty.empty()) {
+    return failure(ErrorCode::wrong_state,
+                   fmt::format("in exception: task {}; reset first", join_names(faulty)));
+  }
   auto arrangement = arrange(scheduler, settings);
   if (!arrangement) return std::unexpected(std::move(arrangement.error()));
   active_ = std::move(*arrangement);
   origin_ = clock_.now() + kStartLead;
   for (auto& task : tasks_) task->begin(origin_);
   running_ = true;
+  watch(settings);
   active_->scheduler->start(origin_);
   hand_out_sources();
   return {};
@@ -95,6 +123,7 @@ Result<void> TaskSet::switch_to(std::string_view scheduler, const SchedulerSetti
   // Only one of the two may look at event variables at a time; what is due in between is a little late.
   active_->scheduler->stop();
   retired_.push_back(std::exchange(active_, std::move(*arrangement)));
+  watch(settings);
   active_->scheduler->start(origin_);
   hand_out_sources();
   return {};
@@ -103,6 +132,7 @@ Result<void> TaskSet::switch_to(std::string_view scheduler, const SchedulerSetti
 Result<void> TaskSet::stop(Duration limit) {
   if (!running_) return failure(ErrorCode::wrong_state, "the tasks are not running");
   const TimePoint deadline = MonotonicClock::now() + limit;
+  if (supervision_) supervision_->tasks_stop();
   active_->scheduler->stop();
   for (auto& thread : threads_) thread->park();
   retired_.push_back(std::move(active_));
@@ -113,7 +143,15 @@ Result<void> TaskSet::stop(Duration limit) {
         fmt::format("not at the end of its cycle after {} ms: task {}",
                     std::chrono::duration_cast<std::chrono::milliseconds>(limit).count(), join_names(busy)));
   }
+  if (supervision_) supervision_->end();
   return {};
+}
+
+// Before anything is released: the first cycle may be an endless one, and then nobody else comes to run here.
+void TaskSet::watch(const SchedulerSettings& settings) {
+  if (!supervision_) return;
+  const auto cores = allowed_cores(0);
+  supervision_->begin(settings, cores ? static_cast<int>(cores->size()) : 1);
 }
 
 void TaskSet::hand_out_sources() {
@@ -129,13 +167,42 @@ std::vector<std::string_view> TaskSet::wait_until_settled(TimePoint deadline) {
   for (std::size_t i = 0; i < threads_.size(); ++i) {
     if (!threads_[i]->settled(deadline)) {
       busy.emplace_back(tasks_[i]->config().name);
-    } else if (reported_running_[i] != running_) {
+    } else if (reported_running_[i] != running_ && !tasks_[i]->fault().raised()) {
       reported_running_[i] = running_;
       if (environment_.state_changed) environment_.state_changed(i, running_);
     }
   }
   if (busy.empty()) retired_.clear();
   return busy;
+}
+
+std::optional<TaskSet::Fault> TaskSet::take_fault() {
+  // Emptied first: a fault that comes while we look makes it readable again.
+  std::uint64_t told = 0;
+  (void)!::read(fault_fd_.get(), &told, sizeof told);
+  for (std::size_t i = 0; i < tasks_.size(); ++i) {
+    const FaultRecord* const record = tasks_[i]->fault().published();
+    if (record == nullptr || fault_taken_[i]) continue;
+    fault_taken_[i] = true;
+    return Fault{.task = i,
+                 .name = tasks_[i]->config().name,
+                 .record = *record,
+                 .whole_application = fault_board_.halted()};
+  }
+  return std::nullopt;
+}
+
+std::vector<std::string_view> TaskSet::tasks_in_exception() const {
+  std::vector<std::string_view> names;
+  for (const auto& task : tasks_) {
+    if (task->fault().raised()) names.emplace_back(task->config().name);
+  }
+  return names;
+}
+
+bool TaskSet::has_parked_thread() const noexcept {
+  return poll_trap_.parked() ||
+         std::ranges::any_of(tasks_, [](const auto& task) { return task->trap().parked(); });
 }
 
 }  // namespace plchost

@@ -3,17 +3,20 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "schedulers/scheduler.hpp"
+#include "schedulers/supervision.hpp"
 #include "schedulers/task.hpp"
 #include "schedulers/task_config.hpp"
 #include "schedulers/task_thread.hpp"
 #include "shm/base/counted_event.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/task_statistics.hpp"
+#include "shm/base/unique_fd.hpp"
 
 namespace plchost {
 
@@ -27,6 +30,10 @@ struct TaskEnvironment {
   /// Tells that a task's thread runs cycles (true) or is parked (false). May be empty. Called by the control
   /// thread, from within start(), stop() and switch_to().
   std::function<void(std::size_t index, bool running)> state_changed;
+  /// Faults and endless loops in the application's code put their task into exception: handlers for signals
+  /// are installed in this process (see install_fault_handlers()), and a thread supervises the tasks. Without
+  /// it a fault ends the process.
+  bool catch_faults = false;
   /// For development, and tests in places without the right to SCHED_FIFO: all threads run as SCHED_OTHER, so
   /// neither priorities nor times hold.
   bool allow_unprivileged = false;
@@ -53,8 +60,8 @@ class TaskSet {
   ~TaskSet();
 
   /// Releases the tasks under the scheduler of that name. wrong_state: they run already, or one of them has
-  /// not come back since stop(). External events posted while the tasks were stopped are not run, nor are
-  /// edges of event variables: the level at the start counts as seen.
+  /// not come back since stop(), or is in exception. External events posted while the tasks were stopped are
+  /// not run, nor are edges of event variables: the level at the start counts as seen.
   [[nodiscard]] Result<void> start(std::string_view scheduler, const SchedulerSettings& settings);
   /// Parks all tasks at the end of their cycles. timed_out: names the tasks that did not come back within
   /// `limit` (real time); they are parked when they do. wrong_state: they do not run.
@@ -66,6 +73,25 @@ class TaskSet {
   /// In the order in which they were given. What may be called on a task from which context: see Task.
   [[nodiscard]] std::size_t size() const noexcept { return tasks_.size(); }
   [[nodiscard]] Task& task(std::size_t index) noexcept { return *tasks_[index]; }
+
+  /// A fault, or a watchdog's hit, of one task.
+  struct Fault {
+    std::size_t task = 0;  ///< its index
+    std::string name;
+    FaultRecord record;
+    bool whole_application = true;  ///< false: the policy is `task`, the others run on
+  };
+  /// Readable when take_fault() has something new. Valid as long as this object.
+  [[nodiscard]] int fault_fd() const noexcept { return fault_fd_.get(); }
+  /// The next fault that was not taken yet, in the order of the tasks; nothing if there is none. Its task
+  /// never runs again. If it is one of the whole application, no task begins another cycle: what is left to
+  /// do is stop(), and then a fresh process.
+  [[nodiscard]] std::optional<Fault> take_fault();
+  /// The names of the tasks that are in exception, and so keep start() from it.
+  [[nodiscard]] std::vector<std::string_view> tasks_in_exception() const;
+  /// A thread was caught in the application's code and is parked there for good. Nothing waits for it, and
+  /// this object can be destroyed.
+  [[nodiscard]] bool has_parked_thread() const noexcept;
 
   [[nodiscard]] bool running() const noexcept { return running_; }
   /// Of the scheduler in use, or of the last one; empty before the first start.
@@ -85,21 +111,28 @@ class TaskSet {
     std::vector<std::unique_ptr<ActivationSource>> sources;
   };
 
-  TaskSet(Clock& clock, PriorityBand band, TaskEnvironment environment);
+  TaskSet(Clock& clock, PriorityBand band, TaskEnvironment environment, UniqueFd fault_fd);
+  [[nodiscard]] Result<void> supervise();
   [[nodiscard]] Result<void> add(TaskConfig config);
   [[nodiscard]] Result<std::unique_ptr<Arrangement>> arrange(std::string_view name,
                                                              const SchedulerSettings& settings);
+  void watch(const SchedulerSettings& settings);
   void hand_out_sources();
   std::vector<std::string_view> wait_until_settled(TimePoint deadline);
 
   Clock& clock_;
   PriorityBand band_;
   TaskEnvironment environment_;
+  UniqueFd fault_fd_;
+  FaultBoard fault_board_;
+  FaultTrap poll_trap_;  // of the thread that reads event variables
   bool running_ = false;
   TimePoint origin_;  // of all grids, until the next start()
   std::string_view scheduler_name_;
   std::vector<std::unique_ptr<Task>> tasks_;
   std::vector<bool> reported_running_;
+  std::vector<bool> fault_taken_;
+  std::optional<Supervision> supervision_;  // until all threads have ended
   std::unique_ptr<Arrangement> active_;
   std::vector<std::unique_ptr<Arrangement>>
       retired_;  // a task in a long cycle may still hold a source of these

@@ -1,11 +1,18 @@
 #include "schedulers/task_thread.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "schedulers/clock_thread.hpp"
 #include "shm/base/futex.hpp"
 
 namespace plchost {
+
+namespace {
+
+constexpr Duration kLook = std::chrono::milliseconds(10);
+
+}  // namespace
 
 Result<std::unique_ptr<TaskThread>> TaskThread::start(Clock& clock, Task& task, ThreadPriority priority) {
   std::unique_ptr<TaskThread> self(new TaskThread(clock, task));
@@ -18,6 +25,7 @@ Result<std::unique_ptr<TaskThread>> TaskThread::start(Clock& clock, Task& task, 
 TaskThread::~TaskThread() {
   ending_.store(true);
   park();
+  thread_.join_unless([this] { return task_.trap().parked(); });
 }
 
 void TaskThread::use(ActivationSource* source) noexcept {
@@ -30,9 +38,10 @@ void TaskThread::use(ActivationSource* source) noexcept {
 bool TaskThread::settled(TimePoint deadline) noexcept {
   for (;;) {
     const std::uint32_t done = done_.load(std::memory_order_acquire);
-    if (done == order_.load()) return true;
-    if (MonotonicClock::now() >= deadline) return false;
-    futex_wait(&done_, done, deadline);
+    if (done == order_.load() || task_.trap().parked()) return true;
+    const TimePoint now = MonotonicClock::now();
+    if (now >= deadline) return false;
+    futex_wait(&done_, done, std::min(deadline, now + kLook));  // a thread that is parked wakes nobody
   }
 }
 
@@ -43,11 +52,12 @@ void TaskThread::run() noexcept {
     if (const std::uint32_t order = order_.load(std::memory_order_acquire); order != obeyed) {
       source = wanted_.load(std::memory_order_acquire);
       obeyed = order;
+      task_.source_changed();
       done_.store(order, std::memory_order_release);
       futex_wake(&done_);
-    } else if (source == nullptr) {
+    } else if (source == nullptr || task_.fault().halts()) {
       clock_.wait(order_, obeyed, kNoDeadline);
-    } else if (const auto activation = source->wait()) {
+    } else if (const auto activation = source->wait(); activation && !task_.fault().halts()) {
       task_.run_cycle(*activation);
     }
   }

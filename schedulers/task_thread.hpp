@@ -18,14 +18,15 @@ class TaskThread {
                                                                  ThreadPriority priority);
   TaskThread(const TaskThread&) = delete;
   TaskThread& operator=(const TaskThread&) = delete;
-  /// Ends the thread when its cycle ends, however long that is.
+  /// Ends the thread when its cycle ends, however long that is. One that is parked by its trap is left alone.
   ~TaskThread();
 
   /// From the end of its cycle on the task waits on `source`; null: parks. The source before is in use until
   /// settled().
   void use(ActivationSource* source) noexcept;
   void park() noexcept { use(nullptr); }
-  /// Waits until the thread does what was asked for last, at most until `deadline`, which is real time.
+  /// Waits until the thread does what was asked for last, at most until `deadline`, which is real time. A
+  /// thread that is parked by its trap does nothing any more: it is settled.
   [[nodiscard]] bool settled(TimePoint deadline) noexcept;
 
  private:

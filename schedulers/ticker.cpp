@@ -4,15 +4,17 @@
 #include <utility>
 
 #include "schedulers/clock_thread.hpp"
+#include "shm/base/futex.hpp"
 
 namespace plchost {
 
-Ticker::Ticker(const SchedulerContext& context, std::string thread_name, OnTick on_tick)
+Ticker::Ticker(const SchedulerContext& context, std::string thread_name, EventPoller& poller, OnTick on_tick)
     : clock_(context.clock),
       kind_(context.settings.tick_source),
       period_(context.settings.scheduler_interval),
       priority_(context.tick),
       thread_name_(std::move(thread_name)),
+      poller_(poller),
       on_tick_(std::move(on_tick)) {}
 
 Result<void> Ticker::prepare() {
@@ -33,6 +35,10 @@ TimePoint Ticker::first_tick(TimePoint origin) const noexcept {
 void Ticker::start(TimePoint first) noexcept {
   first_ = first;
   go_.open(clock_);
+  constexpr Duration kLook = std::chrono::milliseconds(10);
+  while (primed_.load(std::memory_order_acquire) == 0 && !poller_.parked()) {
+    futex_wait(&primed_, 0, MonotonicClock::now() + kLook);
+  }
 }
 
 void Ticker::stop() noexcept {
@@ -40,11 +46,14 @@ void Ticker::stop() noexcept {
   stopping_.store(true, std::memory_order_release);
   go_.interrupt(clock_);
   source_->interrupt();
-  thread_.join();
+  thread_.join_unless([this] { return poller_.parked(); });
 }
 
 void Ticker::run() noexcept {
   if (go_.wait(clock_) != ActivationGate::Outcome::opened) return;
+  poller_.prime(clock_.now());
+  primed_.store(1, std::memory_order_release);
+  futex_wake(&primed_);
   source_->start(first_, period_);
   while (!stopping_.load(std::memory_order_acquire)) {
     if (const auto tick = source_->wait()) on_tick_(*tick);

@@ -15,6 +15,7 @@
 #include <unistd.h>
 
 #include "shm/base/system_call.hpp"
+#include "shm/base/time.hpp"
 
 namespace plchost {
 
@@ -25,6 +26,8 @@ constexpr std::size_t kStackSize = std::size_t{4} << 20;  // the sanitizer takes
 #else
 constexpr std::size_t kStackSize = std::size_t{1} << 20;
 #endif
+// Below each stack: wide enough that no array on it reaches past it into the memory of another thread.
+constexpr std::size_t kGuardSize = std::size_t{16} << 20;
 constexpr std::size_t kPrefaulted = std::size_t{256} << 10;
 
 struct StartInfo {
@@ -104,10 +107,24 @@ void Thread::join() noexcept {
   if (std::exchange(running_, false)) pthread_join(handle_, nullptr);
 }
 
+void Thread::join_unless(const std::function<bool()>& abandoned) noexcept {
+  if (!std::exchange(running_, false)) return;
+  constexpr Duration kLook = std::chrono::milliseconds(10);
+  for (;;) {
+    timespec until{};
+    ::clock_gettime(CLOCK_REALTIME, &until);
+    until = to_timespec(std::chrono::seconds(until.tv_sec) + Duration(until.tv_nsec) + kLook);
+    if (pthread_timedjoin_np(handle_, nullptr, &until) != ETIMEDOUT) return;
+    if (abandoned()) break;
+  }
+  pthread_detach(handle_);
+}
+
 Result<Thread> Thread::start(const std::string& name, ThreadPriority priority, std::function<void()> body) {
   Attributes attributes;
   if (auto set = set_scheduling(attributes, name, priority); !set) return std::unexpected(set.error());
   pthread_attr_setstacksize(attributes.get(), kStackSize);
+  pthread_attr_setguardsize(attributes.get(), kGuardSize);
   auto info = std::make_unique<StartInfo>(StartInfo{name, priority.nice, std::move(body)});
   Thread thread;
   const int error = pthread_create(&thread.handle_, attributes.get(), &thread_main, info.get());

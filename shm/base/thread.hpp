@@ -1,10 +1,12 @@
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <string>
 #include <vector>
 
 #include <pthread.h>
+#include <signal.h>
 #include <sys/types.h>
 
 #include "shm/base/result.hpp"
@@ -33,11 +35,44 @@ class Thread {
   [[nodiscard]] static Result<Thread> start(const std::string& name, ThreadPriority priority,
                                             std::function<void()> body);
   void join() noexcept;
+  /// Joins, unless `abandoned()` becomes true first: then the thread is left alone until the process ends.
+  /// For a thread that may be parked for good where it stands. `abandoned` is looked at every 10 ms.
+  void join_unless(const std::function<bool()>& abandoned) noexcept;
   [[nodiscard]] bool joinable() const noexcept { return running_; }
 
  private:
   pthread_t handle_{};
   bool running_ = false;
+};
+
+/// A stack on which a thread handles signals, so that the overflow of its own stack can be handled, too.
+/// Guard pages around it; part of the locked memory. It outlives the thread that uses it.
+class AlternateStack {
+ public:
+  /// Set-up.
+  [[nodiscard]] static Result<AlternateStack> make();
+  AlternateStack(AlternateStack&& other) noexcept;
+  AlternateStack& operator=(AlternateStack&&) = delete;
+  AlternateStack(const AlternateStack&) = delete;
+  AlternateStack& operator=(const AlternateStack&) = delete;
+  ~AlternateStack();
+
+  /// The calling thread handles signals on `stack` from now on, until this object goes.
+  class Use {
+   public:
+    explicit Use(const AlternateStack& stack) noexcept;
+    ~Use();
+    Use(const Use&) = delete;
+    Use& operator=(const Use&) = delete;
+
+   private:
+    stack_t before_{};
+  };
+
+ private:
+  AlternateStack(std::byte* memory, std::size_t size) noexcept : memory_(memory), size_(size) {}
+  std::byte* memory_;
+  std::size_t size_;  // of the whole mapping, guard pages included
 };
 
 /// Binds a whole process (0: this one), all of its threads, to the cores, and reads back what was granted.

@@ -59,11 +59,13 @@ TEST_F(EventLatchTest, SaysWhenTheEdgeOfTheRunWasSeen) {
   EXPECT_EQ(sut.seen_at(), TimePoint(Duration(1)));
 }
 
-TEST_F(EventLatchTest, PrimeForgetsWhatWasDue) {
+TEST_F(EventLatchTest, ForgetsWhatWasDueAndTheLevel) {
+  sut.prime(false);
   poll(true);
   poll(false);
   poll(true);
-  sut.prime(true);
+  sut.forget();
+  EXPECT_FALSE(sut.primed());
   EXPECT_FALSE(take());
   EXPECT_EQ(sut.take_lost(), 0U);
 }

@@ -195,13 +195,66 @@ TEST_F(TaskTest, FreewheelingBeginsAtTheOriginAndThenSleepsItsShare) {
   EXPECT_EQ(sut.next_release(FreewheelRule({})).release, clock.now() + milliseconds(2));
 }
 
-TEST_F(TaskTest, ExceptionOutOfACycleEndsTheProcessAndNamesTheTask) {
-  GTEST_FLAG_SET(death_test_style, "threadsafe");
+TEST_F(TaskTest, ExceptionOutOfACycleIsItsFaultWithTypeAndText) {
   TaskConfig config = cyclic();
-  config.entry = [] { throw std::runtime_error("index 7 is out of range"); };
+  config.entry = [] { throw std::out_of_range("index 7"); };
+  FaultBoard board;
+  Task sut(clock, config, statistics, nullptr, &board);
+  sut.begin(clock.now());
+  run_next(sut, Duration::zero());
+  ASSERT_NE(sut.fault().published(), nullptr);
+  EXPECT_EQ(describe_fault(*sut.fault().published()), "std::out_of_range left its cycle: index 7");
+  EXPECT_TRUE(board.halted());
+  EXPECT_FALSE(sut.trap().parked());
+}
+
+TEST_F(TaskTest, SomethingThrownThatIsNoStandardExceptionIsAFaultToo) {
+  TaskConfig config = cyclic();
+  config.entry = [] { throw 42; };
   Task sut(clock, config, statistics, nullptr);
   sut.begin(clock.now());
-  EXPECT_DEATH(run_next(sut, Duration::zero()), "task 'main'.*index 7 is out of range");
+  run_next(sut, Duration::zero());
+  ASSERT_NE(sut.fault().published(), nullptr);
+  EXPECT_EQ(describe_fault(*sut.fault().published()), "int left its cycle: not a std::exception");
+}
+
+TEST_F(TaskTest, FaultOfATaskByItselfHaltsNoOther) {
+  TaskConfig config = cyclic();
+  config.watchdog.policy = WatchdogPolicy::task;
+  config.entry = [] { throw 42; };
+  FaultBoard board;
+  Task sut(clock, config, statistics, nullptr, &board);
+  Task other(clock, cyclic(), statistics, nullptr, &board);
+  sut.begin(clock.now());
+  run_next(sut, Duration::zero());
+  EXPECT_TRUE(sut.fault().halts());
+  EXPECT_FALSE(other.fault().halts());
+}
+
+TEST_F(TaskTest, WatchdogHitsAtTheEndOfTheNthOverrunInARow) {
+  TaskConfig config = cyclic();
+  config.watchdog = {.time = milliseconds(3), .sensitivity = 3};
+  Task sut(clock, config, statistics, nullptr);
+  sut.begin(clock.now());
+  for (const int ms : {4, 4, 4, 3, 4, 4}) {  // the first does not count, the 3 ms break the row
+    execution = milliseconds(ms);
+    run_next(sut, Duration::zero());
+    ASSERT_FALSE(sut.fault().raised());
+  }
+  run_next(sut, Duration::zero());
+  ASSERT_NE(sut.fault().published(), nullptr);
+  EXPECT_EQ(describe_fault(*sut.fault().published()),
+            "3 cycles in a row took longer than 3.000 ms, the last 4.000 ms");
+  EXPECT_EQ(counters().cycles, 7U);
+}
+
+TEST_F(TaskTest, KnowsTheFirstReleaseThatNoCycleHasBegunFor) {
+  Task sut(clock, cyclic(), statistics, nullptr);
+  const TimePoint origin = clock.now();
+  sut.begin(origin);
+  EXPECT_EQ(sut.due(), origin);
+  run_next(sut, milliseconds(1));
+  EXPECT_EQ(sut.due(), origin + milliseconds(10));
 }
 
 }  // namespace

@@ -1,0 +1,121 @@
+#include "schedulers/watchdog_rules.hpp"
+
+#include <array>
+
+#include <gtest/gtest.h>
+
+namespace plchost {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using Verdict = OverrunRule::Verdict;
+
+TaskConfig task_with(Duration interval, TaskWatchdog watchdog = {}) {
+  TaskConfig task;
+  task.interval = interval;
+  task.watchdog = watchdog;
+  return task;
+}
+WatchdogSettings guard(Duration time) {
+  WatchdogSettings settings;
+  settings.default_time = time;
+  return settings;
+}
+
+TEST(CycleLimit, IsTimeTimesSensitivityOfTheTask) {
+  const TaskConfig task = task_with(milliseconds(10), {.time = milliseconds(4), .sensitivity = 5});
+  EXPECT_EQ(cycle_limit(task, {}), (CycleLimit{.limit = milliseconds(20), .lenient = false}));
+}
+
+TEST(CycleLimit, OfATaskWithoutWatchdogIsTheGuardAgainstEndlessLoops) {
+  EXPECT_EQ(cycle_limit(task_with(milliseconds(10)), guard(seconds(2))),
+            (CycleLimit{.limit = seconds(2), .lenient = true}));
+}
+
+TEST(CycleLimit, OfALongIntervalIsAtLeastTheInterval) {
+  EXPECT_EQ(cycle_limit(task_with(seconds(30)), guard(seconds(2)))->limit, seconds(30));
+}
+
+TEST(CycleLimit, IsNoneIfTheGuardIsOff) {
+  EXPECT_EQ(cycle_limit(task_with(milliseconds(10)), guard(Duration::zero())), std::nullopt);
+}
+
+TEST(OverrunRule, WithoutTimeAllowsEverything) {
+  OverrunRule sut({});
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(sut.ended(seconds(100)), Verdict::fine);
+}
+
+TEST(OverrunRule, HitsWhenOneCycleIsLongerThanTimeTimesSensitivityEvenTheFirst) {
+  OverrunRule sut({.time = milliseconds(2), .sensitivity = 4});
+  EXPECT_EQ(sut.ended(milliseconds(8)), Verdict::fine);
+  sut.forgive_next();
+  EXPECT_EQ(sut.ended(milliseconds(8) + Duration(1)), Verdict::too_long);
+}
+
+TEST(OverrunRule, HitsAtTheNthInARowAndNotBefore) {
+  OverrunRule sut({.time = milliseconds(2), .sensitivity = 3});
+  EXPECT_EQ(sut.ended(milliseconds(1)), Verdict::fine);
+  EXPECT_EQ(sut.ended(milliseconds(3)), Verdict::fine);
+  EXPECT_EQ(sut.ended(milliseconds(3)), Verdict::fine);
+  EXPECT_EQ(sut.ended(milliseconds(2)), Verdict::fine);  // exactly the time is no overrun
+  EXPECT_EQ(sut.ended(milliseconds(3)), Verdict::fine);
+  EXPECT_EQ(sut.ended(milliseconds(3)), Verdict::fine);
+  EXPECT_EQ(sut.ended(milliseconds(3)), Verdict::too_many_in_a_row);
+  EXPECT_EQ(sut.in_a_row(), 3U);
+}
+
+TEST(OverrunRule, FirstCycleAfterAnExchangeOfTheSchedulerIsNotCounted) {
+  OverrunRule sut({.time = milliseconds(2), .sensitivity = 2});
+  EXPECT_EQ(sut.ended(milliseconds(3)), Verdict::fine);  // the first of all
+  EXPECT_EQ(sut.ended(milliseconds(3)), Verdict::fine);
+  sut.forgive_next();
+  EXPECT_EQ(sut.ended(milliseconds(3)), Verdict::fine);
+  EXPECT_EQ(sut.ended(milliseconds(3)), Verdict::fine);
+  EXPECT_EQ(sut.ended(milliseconds(3)), Verdict::too_many_in_a_row);
+}
+
+class LoadRuleTest : public testing::Test {
+ protected:
+  // Two tasks, of which the second is freewheeling; one second passes.
+  std::optional<LoadRule::Hit> second(int process_ms, int first_ms, int second_ms, int cores = 1) {
+    process += milliseconds(process_ms);
+    tasks[0] += milliseconds(first_ms);
+    tasks[1] += milliseconds(second_ms);
+    now += seconds(1);
+    return sut.end(now, {.process = process, .tasks = tasks}, 60, cores);
+  }
+
+  LoadRule sut{{false, true}};
+  TimePoint now{seconds(100)};
+  Duration process = seconds(7);
+  std::array<Duration, 2> tasks{seconds(1), seconds(2)};
+
+  void SetUp() override { sut.begin(now, {.process = process, .tasks = tasks}); }
+};
+
+TEST_F(LoadRuleTest, HitsAboveTheMaximumAndNamesTheTask) {
+  EXPECT_FALSE(second(600, 500, 0));
+  const auto hit = second(610, 500, 0);
+  ASSERT_TRUE(hit);
+  EXPECT_EQ(hit->percent, 61);
+  EXPECT_EQ(hit->task, 0U);
+}
+
+TEST_F(LoadRuleTest, LooksAtEachWindowByItself) {
+  EXPECT_FALSE(second(100, 50, 0));
+  EXPECT_TRUE(second(990, 900, 0));
+  EXPECT_FALSE(second(100, 50, 0));
+}
+
+TEST_F(LoadRuleTest, DoesNotCountWhatFreewheelingTasksTake) {
+  EXPECT_FALSE(second(990, 100, 850));
+}
+
+TEST_F(LoadRuleTest, EndlessLoopOnOneOfManyCoresIsSeen) {
+  EXPECT_TRUE(second(1000, 1000, 0, 8));
+  EXPECT_FALSE(second(1000, 500, 0, 8));
+}
+
+}  // namespace
+}  // namespace plchost
