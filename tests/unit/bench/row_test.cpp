@@ -1,0 +1,95 @@
+#include "tests/bench/row.hpp"
+
+#include <limits>
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "tests/bench/plot.hpp"
+
+namespace plchost::bench {
+namespace {
+
+Samples one_to(int last) {
+  Samples samples;
+  for (int i = last; i >= 1; --i) samples.push(std::chrono::microseconds(i));
+  return samples;
+}
+
+TEST(Summary, GivesTheValueThatTheShareOfSamplesIsBelow) {
+  const Summary sut = summarise(one_to(1000));
+  EXPECT_EQ(sut.p50, 501);
+  EXPECT_EQ(sut.p99, 991);
+  EXPECT_EQ(sut.p999, 1000);
+  EXPECT_EQ(sut.max, 1000);
+}
+
+TEST(Summary, OfNothingIsZero) {
+  EXPECT_EQ(summarise(Samples()).max, 0);
+}
+
+TEST(Target, IsMetBelowItsBoundAndAtItOnlyIfSaid) {
+  EXPECT_TRUE((Target{"", 1, 2}.met()));
+  EXPECT_FALSE((Target{"", 2, 2}.met()));
+  EXPECT_TRUE((Target{"", 2, 2, true}.met()));
+  EXPECT_FALSE((Target{"", 3, 2, true}.met()));
+}
+
+TEST(Target, IsNotMetByWhatIsNoNumber) {
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE((Target{"", none, 2, true}.met()));
+  EXPECT_FALSE((Target{"", 1, none}.met()));
+}
+
+TEST(Row, IsMetInJsonOnlyIfAllOfItsTargetsAre) {
+  Row row{.name = "part/who", .ours = one_to(10), .floor = one_to(5)};
+  row.extra = {{"lost", 3}};
+  row.targets = {{"one", 1, 2}, {"two", 3, 2}};
+  const auto json = nlohmann::json::parse(to_json({row}));
+  const auto& sut = json["rows"][0];
+  EXPECT_EQ(sut["name"], "part/who");
+  EXPECT_EQ(sut["p50_us"], 6);
+  EXPECT_EQ(sut["floor_p50_us"], 3);
+  EXPECT_EQ(sut["ratio_p50"], 2);
+  EXPECT_EQ(sut["extra"]["lost"], 3);
+  EXPECT_EQ(sut["targets"][0]["met"], true);
+  EXPECT_EQ(sut["targets"][1]["met"], false);
+  EXPECT_EQ(sut["met"], false);
+}
+
+TEST(Row, WithoutATargetHasNoVerdict) {
+  const auto json = nlohmann::json::parse(to_json({Row{.name = "part/who"}}));
+  EXPECT_FALSE(json["rows"][0].contains("met"));
+}
+
+TEST(Table, SaysPlainlyWhatIsNotMet) {
+  Row row{.name = "part/who"};
+  row.targets = {{"median below 1 us", 3, 1}};
+  EXPECT_NE(to_table({row}).find("NOT MET median below 1 us"), std::string::npos);
+}
+
+TEST(Plot, DrawsASharedFloorOnce) {
+  const std::vector<Row> shared{{.name = "a", .ours = one_to(3), .floor = one_to(2)},
+                                {.name = "b", .ours = one_to(4), .floor = one_to(2)}};
+  const auto curves = [](const std::string& svg) {
+    std::size_t count = 0;
+    for (auto at = svg.find("<polyline"); at != std::string::npos; at = svg.find("<polyline", at + 1))
+      ++count;
+    return count;
+  };
+  EXPECT_EQ(curves(to_svg("t", shared)), 3U);
+  auto apart = shared;
+  apart[1].floor = one_to(3);
+  EXPECT_EQ(curves(to_svg("t", apart)), 4U);
+}
+
+TEST(Plot, DrawsSeriesOverTimeWhereThereAreSome) {
+  Row row{.name = "clock"};
+  row.series = {{"offset", {{0, 300000}, {10, -50}}}};
+  const auto svg = to_svg("t", {row});
+  EXPECT_NE(svg.find(">offset<"), std::string::npos);
+  EXPECT_NE(svg.find("10.0 s"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace plchost::bench
