@@ -33,6 +33,14 @@ std::string name_of(std::span<const std::string_view> names, std::uint32_t numbe
 double to_us(std::int64_t nanoseconds) {
   return static_cast<double>(nanoseconds) / 1000.0;
 }
+// What the host tells beyond the fields that this program knows. A name that is taken stays what it is.
+void add_extension(Row& row, const dds_sequence_plc_KeyValue& entries) {
+  for (const plc_KeyValue& entry : std::span(entries._buffer, entries._length)) {
+    const std::string name(text_of(entry.name));
+    if (!row.contains(name)) row[name] = text_of(entry.value);
+  }
+}
+
 std::int64_t to_seconds(std::int64_t nanoseconds) {
   return nanoseconds / 1'000'000'000;
 }
@@ -52,7 +60,7 @@ Row to_row(const HostView& host) {
 }
 
 Row to_row(const plc_InstanceStatus& status) {
-  return {{"host", text_of(status.host)},
+  Row row{{"host", text_of(status.host)},
           {"name", text_of(status.instance)},
           {"state", name_of(kInstanceStates, status.state)},
           {"pid", status.pid},
@@ -62,6 +70,8 @@ Row to_row(const plc_InstanceStatus& status) {
           {"restarts", status.restarts},
           {"state_since_unix_s", to_seconds(status.state_since_unix_ns)},
           {"problem", text_of(status.problem)}};
+  add_extension(row, status.ext);
+  return row;
 }
 
 Row to_row(const plc_TaskStatus& status) {

@@ -37,8 +37,7 @@ class StatusCache {
         if (batch.disposed(i)) {
           samples_.erase(handle);
         } else if (batch.valid(i)) {
-          samples_[handle] = batch[i];
-          samples_[handle].ext = {};  // lives on loan only
+          samples_[handle].take(batch[i]);
           on_sample(batch[i]);
         }
       }
@@ -49,24 +48,41 @@ class StatusCache {
     update([](const Sample&) {});
   }
 
-  /// All of one host that its present server wrote.
+  /// All of one host that its present server wrote. Their ext lies in this cache: valid until it is updated.
   [[nodiscard]] std::vector<Sample> of_host(std::string_view host, std::uint64_t epoch) const {
     std::vector<Sample> found;
-    for (const auto& [handle, sample] : samples_) {
-      if (sample.epoch == epoch && dds::text_of(sample.host) == host) found.push_back(sample);
+    for (const auto& [handle, kept] : samples_) {
+      if (is_of(kept.sample, host, epoch)) found.push_back(kept.sample);
     }
     return found;
   }
   [[nodiscard]] std::uint32_t count(std::string_view host, std::uint64_t epoch) const {
-    return static_cast<std::uint32_t>(std::ranges::count_if(samples_, [&](const auto& entry) {
-      return entry.second.epoch == epoch && dds::text_of(entry.second.host) == host;
-    }));
+    return static_cast<std::uint32_t>(std::ranges::count_if(
+        samples_, [&](const auto& entry) { return is_of(entry.second.sample, host, epoch); }));
   }
 
  private:
+  // What a sequence points to is on loan only, so it is copied.
+  struct Kept {
+    Sample sample{};
+    std::vector<plc_KeyValue> ext;
+
+    void take(const Sample& from) {
+      sample = from;
+      ext.assign(from.ext._buffer, from.ext._buffer + from.ext._length);
+      sample.ext = {};
+      sample.ext._length = sample.ext._maximum = static_cast<std::uint32_t>(ext.size());
+      sample.ext._buffer = ext.data();
+    }
+  };
+
+  static bool is_of(const Sample& sample, std::string_view host, std::uint64_t epoch) {
+    return sample.epoch == epoch && dds::text_of(sample.host) == host;
+  }
+
   dds::Entity topic_;
   dds::Entity reader_;
-  std::map<dds_instance_handle_t, Sample> samples_;
+  std::map<dds_instance_handle_t, Kept> samples_;
 };
 
 }  // namespace plchost

@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "api/dds/text.hpp"
+#include "api/server/instance_extension.hpp"
 
 namespace plchost {
 
@@ -83,7 +84,8 @@ bool StatusPublisher::look_at_instances(TimePoint now) {
     dds::copy_text(sample.scheduler, says ? runtime->scheduler.view() : status->scheduler.view());
     dds::copy_text(sample.application, status->application.view());
     dds::copy_text(sample.problem, status->problem.view());
-    changed |= instances_.update(name, sample);
+    changed |=
+        instances_.update(name, sample, runtime ? extension_of(*runtime) : std::vector<plc_KeyValue>());
   }
   changed |= instances_.dispose_rest();
   for (const std::string& gone : instance_names_) {

@@ -11,8 +11,8 @@ namespace plchost {
 namespace {
 
 constexpr std::uint64_t kMagic = 0x67617074'736e6970;  // "pinstpag"
-/// 1: first. 2: the interval in force.
-constexpr std::uint32_t kVersion = 2;
+/// 1: first. 2: the interval in force. 3: the tick source.
+constexpr std::uint32_t kVersion = 3;
 constexpr std::size_t kTasksOffset = (sizeof(InstancePageLayout) + 63) / 64 * 64;
 
 static_assert(offsetof(InstancePageLayout, version) == 8 && offsetof(InstancePageLayout, size) == 16);

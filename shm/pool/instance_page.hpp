@@ -32,6 +32,9 @@ struct TaskIdentity {
   std::int64_t interval_ns = 0;  ///< as configured; 0 unless kind is cyclic
 };
 
+/// The value of a plc_KeyValue.
+inline constexpr std::size_t kMaxTickText = 127;
+
 /// What the instance says of itself. Written by its control thread.
 struct InstanceRuntime {
   std::int32_t pid = 0;
@@ -41,6 +44,8 @@ struct InstanceRuntime {
   std::int64_t heartbeat_ns = 0;  ///< CLOCK_MONOTONIC of the last beat
   FixedText<31> scheduler;
   FixedText<kMaxPath> application;
+  FixedText<kMaxTickText> tick_source;    ///< where the periodic tick comes from
+  FixedText<kMaxTickText> tick_fallback;  ///< why that is not what the settings ask for; empty: it is
 };
 
 struct TaskSlot {

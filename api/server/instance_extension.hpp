@@ -1,0 +1,17 @@
+#pragma once
+
+#include <vector>
+
+#include "control.h"
+#include "shm/pool/instance_page.hpp"
+
+namespace plchost {
+
+/// What an instance says of itself beyond the fields of plc_InstanceStatus: entries of its ext, in this
+/// order. At most 16; what is not in use has none.
+///
+///   tick_source    where the periodic tick comes from
+///   tick_fallback  why that is not the source that the settings ask for
+[[nodiscard]] std::vector<plc_KeyValue> extension_of(const InstanceRuntime& runtime);
+
+}  // namespace plchost
