@@ -166,6 +166,15 @@ RTS_HANDLE CDECL SchedGetCurrentTask(void);
 RTS_RESULT CDECL SchedGetTaskInterval(RTS_HANDLE hTask, RTS_I64* pIntervalNs);
 RTS_RESULT CDECL SchedSetTaskInterval(RTS_HANDLE hTask, RTS_I64 nIntervalNs);
 
+/*
+ * Raises one rising edge for an event task. The scheduler releases the task at its next poll; n calls run it
+ * n times, so that an edge which is over between two polls is not lost. From the first call on the calls are
+ * the task's edges, for good: its event function is not asked any more. Beyond the backlog that is allowed
+ * (ExternalEvent.MaxBacklog) calls are counted as lost events. ERR_OK; ERR_PARAMETER: not the handle of an
+ * event task; ERR_NOTINITIALIZED: the tasks are not made yet (plc_app_init). Any.
+ */
+RTS_RESULT CDECL SchedRaiseEvent(RTS_HANDLE hTask);
+
 /* ---- External events ------------------------------------------------------------------------------------
  */
 

@@ -81,6 +81,8 @@ class Task {
   RTS_RESULT set_interval(std::chrono::nanoseconds interval) const noexcept {
     return SchedSetTaskInterval(handle_, interval.count());
   }
+  /// One rising edge for an event task; see SchedRaiseEvent. Any context.
+  RTS_RESULT raise_event() const noexcept { return SchedRaiseEvent(handle_); }
 
  private:
   explicit Task(RTS_HANDLE handle) noexcept : handle_(handle) {}

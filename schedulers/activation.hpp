@@ -14,8 +14,10 @@ namespace plchost {
 struct Activation {
   TimePoint release;              ///< planned; latency is measured from here
   std::uint64_t lost_cycles = 0;  ///< releases that passed since the last activation without a cycle
-  std::uint64_t lost_events = 0;  ///< external events dropped since then, beyond the backlog's bound
-  Duration spun{};                ///< time burnt ahead of the release
+  std::uint64_t lost_events =
+      0;  ///< external events dropped since then, beyond the backlog's bound, or edges beyond what is kept
+  Duration spun{};                      ///< time burnt ahead of the release
+  std::uint64_t timer_expirations = 0;  ///< how often the task's own kernel timer went off since the last one
 };
 
 /// What one task waits on; made by the scheduler for that task. The only place where a task thread sleeps.

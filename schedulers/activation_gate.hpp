@@ -44,7 +44,6 @@ class ActivationGate {
   /// false: it was open already. Any thread, real-time.
   bool open(Clock& clock) noexcept { return raise(clock, kOpen); }
   void interrupt(Clock& clock) noexcept { raise(clock, kInterrupt); }
-  [[nodiscard]] bool is_open() const noexcept { return (word_.load(std::memory_order_acquire) & kOpen) != 0; }
   /// Forgets an opening that nobody took. Only while nobody waits or opens.
   void close() noexcept { word_.fetch_and(~kOpen, std::memory_order_acq_rel); }
 

@@ -29,6 +29,9 @@ class Clock {
  public:
   virtual ~Clock() = default;
   [[nodiscard]] virtual TimePoint now() const noexcept = 0;
+  /// The processor time that the calling thread has used: without what others took from it. Real-time, a
+  /// system call.
+  [[nodiscard]] virtual Duration thread_time() const noexcept;
   /// Sleeps while `word` equals `expected`, at most until `deadline` (absolute; kNoDeadline: for ever). May
   /// return early: look again. Real-time.
   virtual void wait(const std::atomic<std::uint32_t>& word, std::uint32_t expected,

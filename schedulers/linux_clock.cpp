@@ -5,6 +5,7 @@
 #include <linux/futex.h>
 #include <sys/syscall.h>
 #include <sys/timerfd.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "schedulers/clock.hpp"
@@ -67,6 +68,12 @@ inline void relax_processor() noexcept {
 }
 
 }  // namespace
+
+Duration Clock::thread_time() const noexcept {
+  timespec used{};
+  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);  // cannot fail for the thread itself
+  return std::chrono::seconds(used.tv_sec) + Duration(used.tv_nsec);
+}
 
 void LinuxClock::wait(const std::atomic<std::uint32_t>& word, std::uint32_t expected,
                       TimePoint deadline) noexcept {

@@ -56,6 +56,12 @@ bool Task::set_interval(Duration interval) noexcept {
   return true;
 }
 
+bool Task::raise_event() noexcept {
+  if (config_.kind != TaskKind::event) return false;
+  latch_.raise();
+  return true;
+}
+
 Duration Task::interval() const noexcept {
   if (config_.kind != TaskKind::cyclic) return Duration::zero();
   return Duration(wanted_interval_.load(std::memory_order_relaxed));
@@ -94,6 +100,9 @@ void Task::look_at_overrun(Duration execution) noexcept {
 }
 
 void Task::run_cycle(const Activation& activation) noexcept {
+  // Only a freewheeling task sleeps by what it used itself, so only there it is worth the system calls.
+  const bool by_own_time = config_.kind == TaskKind::freewheeling;
+  const Duration used_before = by_own_time ? clock_.thread_time() : Duration::zero();
   const TimePoint start = clock_.now();
   set_due(activation.release + interval());
   trap_.arm(fault_, start);
@@ -101,10 +110,10 @@ void Task::run_cycle(const Activation& activation) noexcept {
   trap_.disarm();
   if (!ended) return;
   const TimePoint end = clock_.now();
+  if (by_own_time) last_execution_ = clock_.thread_time() - used_before;
   grid_.set_interval(Duration(wanted_interval_.load(std::memory_order_relaxed)));
   grid_.ran(activation.release);
   ready_ = end;
-  last_execution_ = end - start;
   record(activation, start, end);
   if (config_.after_cycle) config_.after_cycle(counters_);
   look_at_overrun(end - start);
@@ -125,6 +134,7 @@ void Task::record(const Activation& activation, TimePoint start, TimePoint end) 
   counters_.spin_sum_ns += activation.spun.count();
   counters_.lost_cycles += activation.lost_cycles;
   counters_.lost_events += activation.lost_events;
+  counters_.timer_expirations += activation.timer_expirations;
   ++counters_.cycles;
   begun_ = true;
   last_start_ = start;

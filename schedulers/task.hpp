@@ -56,6 +56,10 @@ class Task {
   /// The interval that the grid has now: behind the release that is planned. The task's thread, real-time.
   [[nodiscard]] Duration interval_in_force() const noexcept { return grid_.interval(); }
 
+  /// Event tasks: one rising edge by call, released at the scheduler's next poll; n calls are n runs. From
+  /// the first call on the task's variable is not looked at any more. false: not an event task. Any context.
+  bool raise_event() noexcept;
+
   [[nodiscard]] EventLatch& latch() noexcept { return latch_; }
   [[nodiscard]] EventCursor& cursor() noexcept { return cursor_; }
   [[nodiscard]] CountedEvent& event() noexcept { return *event_; }
@@ -77,8 +81,8 @@ class Task {
   EventLatch latch_;                            // event
   EventCursor cursor_;                          // external
   TimePoint ready_;                             // since when it could run: the end of its last cycle
-  Duration last_execution_{};
-  bool begun_ = false;  // has run since begin()
+  Duration last_execution_{};                   // freewheeling: processor time of its last cycle
+  bool begun_ = false;                          // has run since begin()
   TimePoint last_start_;
   TimePoint last_release_;
   TaskCounters counters_{};

@@ -100,3 +100,9 @@ RTS_RESULT SchedSetTaskInterval(RTS_HANDLE hTask, RTS_I64 nIntervalNs) {
   if (const RTS_RESULT found = find_task(hTask, task); found != ERR_OK) return found;
   return task->set_interval(plchost::Duration(nIntervalNs)) ? ERR_OK : ERR_PARAMETER;
 }
+
+RTS_RESULT SchedRaiseEvent(RTS_HANDLE hTask) {
+  Task* task = nullptr;
+  if (const RTS_RESULT found = find_task(hTask, task); found != ERR_OK) return found;
+  return task->raise_event() ? ERR_OK : ERR_PARAMETER;
+}

@@ -83,7 +83,10 @@ struct TaskCounters {
   std::int64_t jitter_max_ns;   ///< largest magnitude of the same
   std::int64_t release_ns;      ///< planned release of the last cycle, CLOCK_MONOTONIC
   std::int64_t spin_sum_ns;     ///< time spun ahead of releases (CmpScheduleOneShot)
-  std::int64_t interval_ns;     ///< in force since the last cycle; cyclic tasks only
+  /// How often the task's own kernel timer went off, by the timer's count (CmpScheduleTimer). Beyond `cycles`
+  /// these are overruns: as many as `lost_cycles`, as long as the timer was not armed anew in between.
+  std::uint64_t timer_expirations;
+  std::int64_t interval_ns;  ///< in force since the last cycle; cyclic tasks only
 };
 
 /// The statistics of one task, in memory that other processes may map. All zero is valid and empty.

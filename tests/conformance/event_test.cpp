@@ -133,6 +133,86 @@ TEST_P(EventTasks, KeepTheRunThatIsDueThroughASwitchDuringTheirCycle) {
   EXPECT_EQ(counters(0).lost_events, 0U);
 }
 
+TEST_P(EventTasks, RunForAnEdgeThatIsOverBetweenTwoPollsIfItIsRaisedByCall) {
+  begin();
+  for (int i = 0; i < 10; ++i) {
+    variable = true;  // and FALSE again before anybody looks
+    EXPECT_TRUE(set->task(0).raise_event());
+    variable = false;
+    clock.run_for(milliseconds(1));
+  }
+  ASSERT_EQ(starts.size(), 10U);
+  EXPECT_EQ(starts, grid(starts[0], milliseconds(1), 10)) << "each at the poll after its call";
+}
+
+TEST_P(EventTasks, RunOnceForEachCallAndLoseWhatIsBeyondTheBacklog) {
+  add(event("on_edge", [this] { return variable.load(); }, [this] { starts.push_back(clock.now()); }));
+  ASSERT_TRUE(create());
+  SchedulerSettings settings;
+  settings.max_event_backlog = 20;
+  start(GetParam(), settings);
+  for (int i = 0; i < 25; ++i) set->task(0).raise_event();
+  clock.run_for(milliseconds(10));
+  EXPECT_EQ(starts.size(), 20U);
+  EXPECT_EQ(counters(0).lost_events, 5U);
+}
+
+TEST_P(EventTasks, CountCallsOnlyFromTheFirstCallOn) {
+  begin();
+  set_for_a_tick(true);
+  set_for_a_tick(false);
+  EXPECT_EQ(starts.size(), 1U);
+  set->task(0).raise_event();
+  for (int i = 0; i < 5; ++i) {
+    set_for_a_tick(true);
+    set_for_a_tick(false);
+  }
+  EXPECT_EQ(starts.size(), 2U);
+}
+
+TEST_P(EventTasks, KeepWhatWasRaisedThroughSwitchesAndForgetItAtAStart) {
+  begin();
+  int raised = 0;
+  for (const std::string_view other : every_scheduler()) {
+    for (int i = 0; i < 3; ++i, ++raised) set->task(0).raise_event();
+    ASSERT_TRUE(set->switch_to(other, {}));
+    clock.run_for(milliseconds(5));
+    EXPECT_EQ(starts.size(), static_cast<std::size_t>(raised)) << other;
+  }
+  ASSERT_TRUE(set->stop(std::chrono::seconds(10)));
+  set->task(0).raise_event();
+  start(GetParam());
+  clock.run_for(milliseconds(10));
+  EXPECT_EQ(starts.size(), static_cast<std::size_t>(raised));
+}
+
+// What a poll costs is one look at each variable, and nothing for those whose edges are raised by call.
+TEST_P(EventTasks, EachPollLooksAtEachVariableOnce) {
+  constexpr std::size_t kTasks = 500;
+  std::atomic<std::uint64_t> looks{0};
+  for (std::size_t i = 0; i < kTasks; ++i) {
+    add(event("event" + std::to_string(i), [&] { return ++looks == 0; }, [] {}));
+  }
+  ASSERT_TRUE(create());
+  const TimePoint begin = start(GetParam());
+  clock.run_until(begin + std::chrono::microseconds(3700));
+  const std::uint64_t before = looks;
+  clock.run_for(milliseconds(10));
+  EXPECT_EQ(looks - before, 10 * kTasks);
+  for (std::size_t i = 0; i < kTasks / 2; ++i) set->task(i).raise_event();
+  clock.run_for(milliseconds(1));
+  const std::uint64_t with_calls = looks;
+  clock.run_for(milliseconds(10));
+  EXPECT_EQ(looks - with_calls, 10 * kTasks / 2);
+}
+
+TEST(TasksOfOtherKinds, HaveNoEventToRaise) {
+  ManualTasks tasks;
+  tasks.add(ManualTasks::cyclic("main", milliseconds(1), [] {}));
+  ASSERT_TRUE(tasks.create());
+  EXPECT_FALSE(tasks.set->task(0).raise_event());
+}
+
 INSTANTIATE_TEST_SUITE_P(Each, EventTasks, testing::ValuesIn(every_scheduler()), scheduler_test_name);
 
 }  // namespace

@@ -1,3 +1,5 @@
+#include <array>
+
 #include "tests/conformance/scheduler_fixture.hpp"
 
 namespace plchost {
@@ -17,6 +19,13 @@ class FreewheelingTasks : public testing::TestWithParam<std::string_view>, publi
     ASSERT_TRUE(create());
     origin = start(GetParam(), settings);
     clock.run_until(origin + milliseconds(100));
+  }
+
+  // A cycle that is under way needs the clock to come to its end.
+  bool stop_at_the_end_of_a_cycle() {
+    (void)set->stop(Duration::zero());
+    clock.run_for(milliseconds(20));
+    return !set->running();
   }
 
   Starts starts;
@@ -56,6 +65,35 @@ TEST_P(FreewheelingTasks, GoOnSleepingTheirShareAfterASwitch) {
   }
   EXPECT_EQ(starts, grid(origin, milliseconds(5 + 1), static_cast<int>(starts.size())));
   EXPECT_EQ(starts.size(), 67U);
+}
+
+// Others pre-empt it for 7 ms in each cycle: that is not its execution time.
+TEST_P(FreewheelingTasks, SleepByTheirOwnExecutionTimeHoweverLongOthersPreEmptThem) {
+  struct Way {
+    SchedulerSettings settings;
+    Duration sleep;
+  };
+  std::array<Way, 3> ways{Way{{}, milliseconds(1)}, Way{{}, milliseconds(3)}, Way{{}, milliseconds(9)}};
+  ways[1].settings.processor_load_maximum = 40;
+  ways[2].settings.freewheeling_cycletime = milliseconds(9);
+  add(freewheeling("loop", [this] {
+    starts.push_back(clock.now());
+    clock.spend(milliseconds(2));
+    clock.lose_processor(milliseconds(7));
+    clock.spend(milliseconds(3));
+  }));
+  ASSERT_TRUE(create());
+  for (const Way& way : ways) {
+    starts.clear();
+    origin = start(GetParam(), way.settings);
+    clock.run_until(origin + milliseconds(100));
+    const Duration cycle = milliseconds(2 + 7 + 3) + way.sleep;
+    EXPECT_EQ(starts, grid(origin, cycle, static_cast<int>(starts.size())));
+    EXPECT_EQ(starts.size(), static_cast<std::size_t>(milliseconds(100) / cycle) + 1);
+    EXPECT_EQ(counters(0).exec_last_ns, 12'000'000) << "the statistics show what the clock on the wall shows";
+    clock.run_for(milliseconds(3));
+    ASSERT_TRUE(stop_at_the_end_of_a_cycle());
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Each, FreewheelingTasks, testing::ValuesIn(every_scheduler()), scheduler_test_name);

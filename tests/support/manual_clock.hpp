@@ -52,6 +52,10 @@ class ManualClock final : public Clock {
 
   /// For the code of a task: the time that its cycle takes.
   void spend(Duration duration) noexcept { spin_until(now() + duration); }
+  /// Counts as processor time of the calling thread.
+  static void charge(Duration duration) noexcept { thread_time_ += duration; }
+  /// For the code of a task: the time for which others take the processor from it.
+  void lose_processor(Duration duration) noexcept { stand_until(now() + duration); }
 
   // --- Clock ---
 
@@ -70,9 +74,10 @@ class ManualClock final : public Clock {
   }
 
   void spin_until(TimePoint deadline) noexcept override {
-    std::unique_lock lock(mutex_);
-    while (now() < deadline) sleep(lock, {.deadline = deadline, .exact = true});
+    charge(std::max(deadline - now(), Duration::zero()));
+    stand_until(deadline);
   }
+  [[nodiscard]] Duration thread_time() const noexcept override { return thread_time_; }
 
   /// The event's word is not this clock's: a thread that sleeps on it counts as asleep until it runs again,
   /// so a test that posts waits for what it expects.
@@ -127,6 +132,11 @@ class ManualClock final : public Clock {
     std::atomic<std::uint32_t> interrupted_{0};
   };
 
+  void stand_until(TimePoint deadline) {
+    std::unique_lock lock(mutex_);
+    while (now() < deadline) sleep(lock, {.deadline = deadline, .exact = true});
+  }
+
   void set_now(TimePoint now) { now_.store(now.time_since_epoch().count()); }
 
   [[nodiscard]] TimePoint wakes_at(const Sleeper& sleeper) const {
@@ -174,6 +184,8 @@ class ManualClock final : public Clock {
     std::fputs("ManualClock: a thread never went back to sleep\n", stderr);
     std::abort();
   }
+
+  static inline thread_local Duration thread_time_{};  // burnt by this thread
 
   mutable std::mutex mutex_;
   std::condition_variable all_sleep_;

@@ -20,7 +20,9 @@ class TaskCalls : public testing::Test {
   TaskCalls() {
     fill(infos_[0], "Fast", Cyclic);
     fill(infos_[1], "Loop", Freewheeling);
-    setup_.nTasks = 2;
+    fill(infos_[2], "Edge", Event);
+    infos_[2].dwEventFunctionPointer = []() -> unsigned char { return 0; };
+    setup_.nTasks = 3;
     setup_.ptaskinfo = infos_.data();
   }
   ~TaskCalls() override { host.task_table().attach(nullptr); }
@@ -46,12 +48,12 @@ class TaskCalls : public testing::Test {
   }
 
   ApplicationHost host{"test", nullptr};
-  std::array<Task_Info, 2> infos_{};
+  std::array<Task_Info, 3> infos_{};
   sys_setup_tasks_struct setup_{};
 
  private:
   ManualClock clock_;
-  std::array<TaskStatistics, 2> statistics_{};
+  std::array<TaskStatistics, 3> statistics_{};
   std::unique_ptr<TaskSet> tasks_;
 };
 
@@ -109,6 +111,17 @@ TEST_F(TaskCalls, RefuseHandlesOfNoCyclicTaskAndIntervalsOutOfRange) {
     EXPECT_EQ(SchedSetTaskInterval(fast, wrong), ERR_PARAMETER) << wrong;
   }
   EXPECT_EQ(SchedSetTaskInterval(fast, PLC_MIN_INTERVAL_NS), ERR_OK);
+}
+
+TEST_F(TaskCalls, EventIsRaisedForEventTasksOnly) {
+  __sys__setup__tasks(&setup_);
+  const RTS_HANDLE edge = SchedGetTaskHandle("Edge", nullptr);
+  EXPECT_EQ(SchedRaiseEvent(edge), ERR_NOTINITIALIZED);
+  make_tasks();
+  EXPECT_EQ(SchedRaiseEvent(edge), ERR_OK);
+  EXPECT_TRUE(host.task_table().task(edge)->latch().is_raised());
+  EXPECT_EQ(SchedRaiseEvent(SchedGetTaskHandle("Fast", nullptr)), ERR_PARAMETER);
+  EXPECT_EQ(SchedRaiseEvent(RTS_INVALID_HANDLE), ERR_PARAMETER);
 }
 
 }  // namespace

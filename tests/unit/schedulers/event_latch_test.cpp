@@ -9,7 +9,7 @@ class EventLatchTest : public testing::Test {
  protected:
   bool poll(bool level) { return sut.poll(clock, level, TimePoint(Duration(++polls))); }
   // As the task does: true if there is a run to do.
-  bool take() { return sut.gate.is_open() && sut.gate.wait(clock) == ActivationGate::Outcome::opened; }
+  bool take() { return sut.take().has_value(); }
 
   LinuxClock clock;
   EventLatch sut;
@@ -55,8 +55,7 @@ TEST_F(EventLatchTest, SaysWhenTheEdgeOfTheRunWasSeen) {
   poll(true);
   poll(false);
   poll(true);  // lost: does not move the time of the first
-  EXPECT_TRUE(take());
-  EXPECT_EQ(sut.seen_at(), TimePoint(Duration(1)));
+  EXPECT_EQ(sut.take(), TimePoint(Duration(1)));
 }
 
 TEST_F(EventLatchTest, ForgetsWhatWasDueAndTheLevel) {
@@ -68,6 +67,37 @@ TEST_F(EventLatchTest, ForgetsWhatWasDueAndTheLevel) {
   EXPECT_FALSE(sut.primed());
   EXPECT_FALSE(take());
   EXPECT_EQ(sut.take_lost(), 0U);
+}
+
+TEST_F(EventLatchTest, RaisedEdgesAreAllKeptUpToTheBacklog) {
+  EXPECT_FALSE(sut.is_raised());
+  for (int i = 0; i < 7; ++i) sut.raise();
+  EXPECT_TRUE(sut.is_raised());
+  EXPECT_EQ(sut.poll_raised(clock, TimePoint(Duration(1)), 5), 7U);
+  EXPECT_EQ(sut.poll_raised(clock, TimePoint(Duration(2)), 5), 0U);
+  for (int i = 0; i < 5; ++i) EXPECT_TRUE(take());
+  EXPECT_FALSE(take());
+  EXPECT_EQ(sut.take_lost(), 2U);
+  EXPECT_TRUE(sut.is_raised());
+}
+
+TEST_F(EventLatchTest, RunsBehindOthersKeepTheTimeOfTheFirst) {
+  sut.raise();
+  sut.poll_raised(clock, TimePoint(Duration(1)), 10);
+  sut.raise();
+  sut.poll_raised(clock, TimePoint(Duration(2)), 10);
+  EXPECT_EQ(sut.take(), TimePoint(Duration(1)));
+  EXPECT_EQ(sut.take(), TimePoint(Duration(1)));
+  sut.raise();
+  sut.poll_raised(clock, TimePoint(Duration(3)), 10);
+  EXPECT_EQ(sut.take(), TimePoint(Duration(3)));
+}
+
+TEST_F(EventLatchTest, ForgetsWhatWasRaised) {
+  sut.raise();
+  sut.forget();
+  EXPECT_EQ(sut.poll_raised(clock, TimePoint(Duration(1)), 10), 0U);
+  EXPECT_TRUE(sut.is_raised());
 }
 
 }  // namespace

@@ -186,6 +186,10 @@ TEST_F(TaskTest, AfterCycleSeesTheCountersOfItsCycle) {
 TEST_F(TaskTest, FreewheelingBeginsAtTheOriginAndThenSleepsItsShare) {
   TaskConfig config = cyclic();
   config.kind = TaskKind::freewheeling;
+  config.entry = [this] {
+    clock.run_for(execution);
+    clock.charge(execution);
+  };
   Task sut(clock, config, statistics, nullptr);
   const TimePoint origin = clock.now() + milliseconds(1);
   sut.begin(origin);

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <memory>
+
+#include "schedulers/task.hpp"
+
+namespace plchost {
+
+/// A cyclic task sleeps in the read of a periodic timer of the kernel of its own. The timer says when to
+/// look, and by itself how often it went off; which release it is, and which were lost, follows from the
+/// task's grid alone.
+class TimerSource final : public ActivationSource {
+ public:
+  TimerSource(Clock& clock, const Task& task, FreewheelRule rule,
+              std::unique_ptr<PeriodicTimer> timer) noexcept;
+
+  [[nodiscard]] std::optional<Activation> wait() noexcept override;
+  void interrupt() noexcept override { timer_->interrupt(); }
+
+ private:
+  void arm_for(TimePoint release) noexcept;
+
+  Clock& clock_;
+  const Task& task_;
+  FreewheelRule rule_;
+  std::unique_ptr<PeriodicTimer> timer_;
+  TimePoint next_;     // goes off then, by its own count
+  Duration period_{};  // 0: not armed
+};
+
+}  // namespace plchost
