@@ -19,8 +19,8 @@ Task::Task(Clock& clock, TaskConfig config, TaskStatistics& statistics, CountedE
            FaultBoard* board) noexcept
     : clock_(clock),
       config_(std::move(config)),
-      statistics_(statistics),
       event_(event),
+      recorder_(statistics, clock.now()),
       grid_(TimePoint{}, grid_interval(config_), config_.late),
       wanted_interval_(grid_.interval().count()),
       overruns_(config_.watchdog),
@@ -33,6 +33,7 @@ void Task::begin(TimePoint origin) {
   begun_ = false;
   set_due(origin + config_.start_offset);
   overruns_.forgive_next();
+  recorder_.begin();
   if (event_ != nullptr) {
     const std::uint64_t count = event_->count();
     cursor_ = {.next = count, .seen = count, .seen_at = origin};
@@ -115,40 +116,20 @@ void Task::run_cycle(const Activation& activation) noexcept {
   grid_.ran(activation.release);
   ready_ = end;
   record(activation, start, end);
-  if (config_.after_cycle) config_.after_cycle(counters_);
+  if (config_.after_cycle) config_.after_cycle(recorder_.counters());
   look_at_overrun(end - start);
 }
 
 void Task::record(const Activation& activation, TimePoint start, TimePoint end) noexcept {
-  const std::int64_t execution = (end - start).count();
-  const std::int64_t latency = (start - activation.release).count();
-  if (config_.kind == TaskKind::cyclic && begun_) record_jitter(activation, start);
-  counters_.exec_min_ns = counters_.cycles == 0 ? execution : std::min(counters_.exec_min_ns, execution);
-  counters_.exec_max_ns = std::max(counters_.exec_max_ns, execution);
-  counters_.exec_last_ns = execution;
-  counters_.exec_sum_ns += execution;
-  counters_.latency_last_ns = latency;
-  counters_.latency_max_ns = std::max(counters_.latency_max_ns, latency);
-  counters_.release_ns = activation.release.time_since_epoch().count();
-  if (config_.kind == TaskKind::cyclic) counters_.interval_ns = grid_.interval().count();
-  counters_.spin_sum_ns += activation.spun.count();
-  counters_.lost_cycles += activation.lost_cycles;
-  counters_.lost_events += activation.lost_events;
-  counters_.timer_expirations += activation.timer_expirations;
-  ++counters_.cycles;
   begun_ = true;
-  last_start_ = start;
-  last_release_ = activation.release;
-  statistics_.counters.write(counters_);
-  statistics_.latency.record(Duration(latency));
-}
-
-// Against what was planned: neither lost cycles nor a change of the interval are jitter.
-void Task::record_jitter(const Activation& activation, TimePoint start) noexcept {
-  const Duration planned = activation.release - last_release_;
-  const std::int64_t jitter = ((start - last_start_) - planned).count();
-  counters_.jitter_last_ns = jitter;
-  counters_.jitter_max_ns = std::max(counters_.jitter_max_ns, std::abs(jitter));
+  recorder_.record({.release = activation.release,
+                    .start = start,
+                    .end = end,
+                    .interval = config_.kind == TaskKind::cyclic ? grid_.interval() : Duration::zero(),
+                    .lost_cycles = activation.lost_cycles,
+                    .lost_events = activation.lost_events,
+                    .timer_expirations = activation.timer_expirations,
+                    .spun = activation.spun});
 }
 
 }  // namespace plchost

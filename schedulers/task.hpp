@@ -10,6 +10,7 @@
 #include "schedulers/freewheel_rule.hpp"
 #include "schedulers/release_grid.hpp"
 #include "schedulers/task_config.hpp"
+#include "schedulers/task_recorder.hpp"
 #include "schedulers/watchdog_rules.hpp"
 #include "shm/base/counted_event.hpp"
 #include "shm/base/task_statistics.hpp"
@@ -64,17 +65,19 @@ class Task {
   [[nodiscard]] EventCursor& cursor() noexcept { return cursor_; }
   [[nodiscard]] CountedEvent& event() noexcept { return *event_; }
 
+  /// All but the cycle count begins anew. False: a record is under way; try again. Set-up.
+  [[nodiscard]] bool reset_statistics() noexcept { return recorder_.reset(clock_.now()); }
+
  private:
   [[nodiscard]] bool run_entry() noexcept;
   void look_at_overrun(Duration execution) noexcept;
   void set_due(TimePoint due) noexcept;
   void record(const Activation& activation, TimePoint start, TimePoint end) noexcept;
-  void record_jitter(const Activation& activation, TimePoint start) noexcept;
 
   Clock& clock_;
   TaskConfig config_;
-  TaskStatistics& statistics_;
   CountedEvent* event_;
+  TaskRecorder recorder_;
 
   ReleaseGrid grid_;                            // cyclic
   std::atomic<Duration::rep> wanted_interval_;  // of the grid, from the end of the next cycle on
@@ -83,9 +86,6 @@ class Task {
   TimePoint ready_;                             // since when it could run: the end of its last cycle
   Duration last_execution_{};                   // freewheeling: processor time of its last cycle
   bool begun_ = false;                          // has run since begin()
-  TimePoint last_start_;
-  TimePoint last_release_;
-  TaskCounters counters_{};
   OverrunRule overruns_;
   TaskFault fault_;
   FaultTrap trap_;

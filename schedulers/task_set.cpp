@@ -1,6 +1,7 @@
 #include "schedulers/task_set.hpp"
 
 #include <algorithm>
+#include <thread>
 #include <utility>
 
 #include <fmt/format.h>
@@ -152,6 +153,31 @@ void TaskSet::watch(const SchedulerSettings& settings) {
   if (!supervision_) return;
   const auto cores = allowed_cores(0);
   supervision_->begin(settings, cores ? static_cast<int>(cores->size()) : 1);
+}
+
+Result<void> TaskSet::reset_statistics(std::string_view task) {
+  std::vector<std::string_view> names;
+  for (auto& known : tasks_) {
+    names.emplace_back(known->config().name);
+    if (!task.empty() && task != names.back()) continue;
+    if (auto done = reset_statistics(*known); !done || !task.empty()) return done;
+  }
+  if (task.empty()) return {};
+  return failure(ErrorCode::not_found, fmt::format("no task '{}'; there are: {}", task, join_names(names)));
+}
+
+// A task that records is about to be through with it; only a higher priority can keep it from that.
+Result<void> TaskSet::reset_statistics(Task& task) {
+  const TimePoint deadline = MonotonicClock::now() + kRecordPatience;
+  while (!task.reset_statistics()) {
+    if (MonotonicClock::now() >= deadline) {
+      return failure(
+          ErrorCode::timed_out,
+          fmt::format("task '{}' is kept from ending the record of its cycle", task.config().name));
+    }
+    std::this_thread::sleep_for(std::chrono::microseconds(50));
+  }
+  return {};
 }
 
 void TaskSet::hand_out_sources() {

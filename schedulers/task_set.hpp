@@ -93,6 +93,12 @@ class TaskSet {
   /// this object can be destroyed.
   [[nodiscard]] bool has_parked_thread() const noexcept;
 
+  /// The statistics of that task, or of all if the name is empty, begin anew; whether tasks run or not.
+  /// not_found: no such task; the text lists what there is. timed_out: a task has been recording a cycle for
+  /// so long, because others keep it from running; those before it in the list are reset.
+  [[nodiscard]] Result<void> reset_statistics(std::string_view task);
+  static constexpr Duration kRecordPatience = std::chrono::seconds(1);
+
   [[nodiscard]] bool running() const noexcept { return running_; }
   /// Of the scheduler in use, or of the last one; empty before the first start.
   [[nodiscard]] std::string_view scheduler_name() const noexcept { return scheduler_name_; }
@@ -117,6 +123,7 @@ class TaskSet {
   [[nodiscard]] Result<std::unique_ptr<Arrangement>> arrange(std::string_view name,
                                                              const SchedulerSettings& settings);
   void watch(const SchedulerSettings& settings);
+  [[nodiscard]] Result<void> reset_statistics(Task& task);
   void hand_out_sources();
   std::vector<std::string_view> wait_until_settled(TimePoint deadline);
 

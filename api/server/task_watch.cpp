@@ -11,7 +11,7 @@ namespace {
 constexpr Duration kPageRetry = std::chrono::milliseconds(20);
 
 plc_TaskStatus to_sample(const std::string& host, const std::string& instance, std::uint64_t epoch,
-                         const TaskSnapshot& task) {
+                         const TaskSnapshot& task, const HistogramView& latency) {
   plc_TaskStatus sample{};
   dds::copy_text(sample.host, host);
   dds::copy_text(sample.instance, instance);
@@ -28,14 +28,13 @@ plc_TaskStatus to_sample(const std::string& host, const std::string& instance, s
   sample.lost_cycles = counters.lost_cycles;
   sample.lost_events = counters.lost_events;
   sample.exec_last_ns = counters.exec_last_ns;
-  const auto cycles = static_cast<std::int64_t>(counters.cycles);
-  sample.exec_avg_ns = cycles > 0 ? counters.exec_sum_ns / cycles : 0;
+  sample.exec_avg_ns = average(counters.exec_sum_ns, counters.recorded);
   sample.exec_min_ns = counters.exec_min_ns;
   sample.exec_max_ns = counters.exec_max_ns;
-  sample.latency_p50_ns = task.latency_p50.count();
-  sample.latency_p99_ns = task.latency_p99.count();
+  sample.latency_p50_ns = latency.percentile(0.5).count();
+  sample.latency_p99_ns = latency.percentile(0.99).count();
   sample.latency_max_ns = counters.latency_max_ns;
-  sample.jitter_max_ns = counters.jitter_max_ns;
+  sample.jitter_max_ns = largest_jitter_ns(counters);
   return sample;
 }
 
@@ -81,9 +80,12 @@ std::optional<InstanceRuntime> TaskWatch::runtime(const std::string& instance) c
   return found->second.page->runtime();
 }
 
-void TaskWatch::publish(const std::string& instance, const TaskSnapshot& task) {
-  const std::string key = instance + "/" + std::string(task.identity.name.view());
-  (void)table_.update(key, to_sample(host_, instance, epoch_, task));
+void TaskWatch::publish(const std::string& instance, const InstancePageReader& page, std::uint32_t index) {
+  const auto task = page.task(index);
+  if (!task) return;
+  const std::string key = instance + "/" + std::string(task->identity.name.view());
+  const HistogramView latency = page.histogram(index, TaskHistogram::latency);
+  (void)table_.update(key, to_sample(host_, instance, epoch_, *task, latency));
 }
 
 void TaskWatch::look(TimePoint now) {
@@ -92,7 +94,7 @@ void TaskWatch::look(TimePoint now) {
     if (!watched.page || now < watched.next_look) continue;
     const std::uint32_t count = watched.page->task_count();
     while (watched.next_task < count && budget > 0) {
-      if (const auto task = watched.page->task(watched.next_task)) publish(name, *task);
+      publish(name, *watched.page, watched.next_task);
       ++watched.next_task;
       --budget;
     }
@@ -108,7 +110,7 @@ void TaskWatch::look_at(const std::string& instance, TimePoint now) {
   if (found == instances_.end() || !found->second.page) return;
   Watched& watched = found->second;
   for (std::uint32_t i = 0; i < watched.page->task_count(); ++i) {
-    if (const auto task = watched.page->task(i)) publish(instance, *task);
+    publish(instance, *watched.page, i);
   }
   watched.next_task = 0;
   watched.next_look = now + kPeriod;

@@ -47,7 +47,7 @@ class TaskWatch {
     TimePoint next_look;  // of the page when it is not open, else of the tasks
   };
   bool open_page(const std::string& instance, Watched& watched);
-  void publish(const std::string& instance, const TaskSnapshot& task);
+  void publish(const std::string& instance, const InstancePageReader& page, std::uint32_t index);
 
   const std::string pool_;
   const std::string host_;

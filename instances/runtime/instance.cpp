@@ -144,7 +144,7 @@ Result<std::string> Instance::make_tasks() {
   TaskEnvironment environment{
       .find_event = [this](std::string_view event) { return host_->events().bind_task(event); },
       .statistics = [this](std::size_t index) -> TaskStatistics& {
-        return page_->task(static_cast<std::uint32_t>(index)).statistics;
+        return page_->statistics(static_cast<std::uint32_t>(index));
       },
       .state_changed =
           [this](std::size_t index, bool running) {

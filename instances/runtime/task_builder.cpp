@@ -127,12 +127,11 @@ void write_back(const TaskCounters& counters, Task_Info& task) noexcept {
     constexpr std::int64_t kHighest = std::numeric_limits<int>::max();
     return static_cast<int>(std::clamp(ns / kNsPerUs, kLowest, kHighest));
   };
-  const auto cycles = static_cast<std::int64_t>(std::max<std::uint64_t>(counters.cycles, 1));
   task.tLastCycleTime = us(counters.exec_last_ns);
-  task.tAverageCycleTime = us(counters.exec_sum_ns / cycles);
+  task.tAverageCycleTime = us(average(counters.exec_sum_ns, counters.recorded));
   task.tMaxCycleTime = us(counters.exec_max_ns);
   task.tMinCycleTime = us(counters.exec_min_ns);
-  task.tJitterMax = us(counters.jitter_max_ns);
+  task.tJitterMax = us(largest_jitter_ns(counters));
   task.tJitterLast = us(counters.jitter_last_ns);
 }
 

@@ -27,6 +27,13 @@ struct MonotonicClock {
 using Duration = MonotonicClock::duration;
 using TimePoint = MonotonicClock::time_point;
 
+/// CLOCK_REALTIME, only to tell people and other machines when something was: nanoseconds since 1970.
+[[nodiscard]] inline std::int64_t unix_time_ns() noexcept {
+  timespec value{};
+  ::clock_gettime(CLOCK_REALTIME, &value);
+  return Duration(std::chrono::seconds(value.tv_sec) + std::chrono::nanoseconds(value.tv_nsec)).count();
+}
+
 [[nodiscard]] constexpr timespec to_timespec(Duration since_epoch) noexcept {
   constexpr std::int64_t kNanosecondsPerSecond = 1'000'000'000;
   return {.tv_sec = since_epoch.count() / kNanosecondsPerSecond,

@@ -11,15 +11,24 @@ namespace plchost {
 namespace {
 
 constexpr std::uint64_t kMagic = 0x67617074'736e6970;  // "pinstpag"
-/// 1: first. 2: the interval in force. 3: the tick source.
-constexpr std::uint32_t kVersion = 3;
+/// 1: first. 2: the interval in force. 3: the tick source. 4: histograms behind the tasks, in two
+/// shapes.
+constexpr std::uint32_t kVersion = 4;
 constexpr std::size_t kTasksOffset = (sizeof(InstancePageLayout) + 63) / 64 * 64;
 
 static_assert(offsetof(InstancePageLayout, version) == 8 && offsetof(InstancePageLayout, size) == 16);
 static_assert(sizeof(TaskIdentity) == 120 && alignof(TaskSlot) <= 64);
 
-std::size_t size_for(std::size_t task_count) noexcept {
-  return kTasksOffset + task_count * sizeof(TaskSlot);
+HistogramShape shape_for(std::size_t task_count) noexcept {
+  return HistogramShape(task_count <= kMaxFineTasks ? HistogramShape::kFine : HistogramShape::kCoarse);
+}
+
+std::size_t buckets_offset(std::size_t task_count) noexcept {
+  return (kTasksOffset + task_count * sizeof(TaskSlot) + 63) / 64 * 64;
+}
+
+std::size_t size_for(std::size_t task_count, HistogramShape shape) noexcept {
+  return buckets_offset(task_count) + task_count * task_bucket_count(shape) * sizeof(std::uint32_t);
 }
 
 InstancePageLayout& layout_of(const MemoryFile& memory) noexcept {
@@ -30,9 +39,20 @@ TaskSlot& slot_of(const MemoryFile& memory, std::uint32_t index) noexcept {
   return reinterpret_cast<TaskSlot*>(memory.bytes().data() + kTasksOffset)[index];
 }
 
-Result<void> fill(std::span<std::byte> bytes, std::span<const TaskIdentity> tasks) {
+/// The buckets of one task.
+HistogramBuckets buckets_of(const MemoryFile& memory, std::uint32_t task_count, std::uint32_t index,
+                            HistogramShape shape) noexcept {
+  using Bucket = HistogramBuckets::element_type;
+  static_assert(sizeof(Bucket) == sizeof(std::uint32_t) && Bucket::is_always_lock_free);
+  auto* const all = reinterpret_cast<Bucket*>(memory.bytes().data() + buckets_offset(task_count));
+  return {all + index * task_bucket_count(shape), task_bucket_count(shape)};
+}
+
+// The memory is zero, as the buckets are at first.
+Result<void> fill(std::span<std::byte> bytes, std::span<const TaskIdentity> tasks, HistogramShape shape) {
   auto* const page = new (bytes.data()) InstancePageLayout;
   page->version = kVersion;
+  page->digits = shape.digits();
   page->task_count = static_cast<std::uint32_t>(tasks.size());
   page->size = bytes.size();
   auto* place = bytes.data() + kTasksOffset;
@@ -86,10 +106,19 @@ Result<InstancePage> InstancePage::create(std::string_view pool, std::string_vie
         ErrorCode::invalid_argument,
         fmt::format("instance '{}' has {} tasks; at most {} are allowed", instance, tasks.size(), kMaxTasks));
   }
-  auto memory = MemoryFile::replace(instance_page_name(pool, instance), size_for(tasks.size()),
-                                    [&](std::span<std::byte> bytes) { return fill(bytes, tasks); });
+  const HistogramShape shape = shape_for(tasks.size());
+  auto memory = MemoryFile::replace(instance_page_name(pool, instance), size_for(tasks.size(), shape),
+                                    [&](std::span<std::byte> bytes) { return fill(bytes, tasks, shape); });
   if (!memory) return std::unexpected(memory.error());
-  return InstancePage(std::move(*memory), static_cast<std::uint32_t>(tasks.size()));
+  return InstancePage(std::move(*memory), static_cast<std::uint32_t>(tasks.size()), shape);
+}
+
+InstancePage::InstancePage(MemoryFile memory, std::uint32_t count, HistogramShape shape)
+    : memory_(std::move(memory)), task_count_(count) {
+  statistics_.reserve(count);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    statistics_.emplace_back(shape, slot_of(memory_, i).counters, buckets_of(memory_, count, i, shape));
+  }
 }
 
 void InstancePage::remove(std::string_view pool, std::string_view instance) noexcept {
@@ -119,13 +148,19 @@ Result<InstancePageReader> InstancePageReader::open(std::string_view pool, std::
     return failure(ErrorCode::corrupt, fmt::format("page '{}' has version {}; version {} is needed", name,
                                                    page.version, kVersion));
   }
+  // Read once: a stranger may write to the page at any time.
   const std::uint32_t count = page.task_count;
-  if (count > kMaxTasks || page.size != size_for(count) || memory->bytes().size() != size_for(count)) {
+  const std::uint32_t digits = page.digits;
+  const std::uint64_t size = page.size;
+  const bool possible = count <= kMaxTasks && HistogramShape::is_valid(digits) &&
+                        size == size_for(count, HistogramShape(digits)) && size == memory->bytes().size();
+  if (!possible) {
     return failure(ErrorCode::corrupt,
-                   fmt::format("page '{}' says {} tasks; this does not fit its size of {} bytes", name, count,
-                               memory->bytes().size()));
+                   fmt::format("page '{}' says {} tasks with histograms of {} digits; this does not fit its "
+                               "size of {} bytes",
+                               name, count, digits, memory->bytes().size()));
   }
-  return InstancePageReader(std::move(*memory), count);
+  return InstancePageReader(std::move(*memory), count, HistogramShape(digits));
 }
 
 std::optional<InstanceRuntime> InstancePageReader::runtime() const noexcept {
@@ -135,19 +170,21 @@ std::optional<InstanceRuntime> InstancePageReader::runtime() const noexcept {
 std::optional<TaskSnapshot> InstancePageReader::task(std::uint32_t index) const noexcept {
   if (index >= task_count_) return std::nullopt;
   const TaskSlot& slot = slot_of(memory_, index);
-  const auto counters = slot.statistics.counters.read();
+  const auto counters = slot.counters.read();
   const auto state = static_cast<PageTaskState>(slot.state.load(std::memory_order_acquire));
   const bool valid = state <= PageTaskState::exception && slot.identity.kind <= PageTaskKind::freewheeling;
   if (!counters || !valid) return std::nullopt;
-  return TaskSnapshot{.identity = slot.identity,
-                      .state = state,
-                      .counters = *counters,
-                      .latency_p50 = slot.statistics.latency.percentile(0.5),
-                      .latency_p99 = slot.statistics.latency.percentile(0.99)};
+  return TaskSnapshot{.identity = slot.identity, .state = state, .counters = *counters};
+}
+
+HistogramView InstancePageReader::histogram(std::uint32_t index, TaskHistogram which) const noexcept {
+  assert(index < task_count_);
+  const ConstHistogramBuckets all = buckets_of(memory_, task_count_, index, shape_);
+  return {shape_, TaskStatistics::part(shape_, all, which)};
 }
 
 std::uint64_t InstancePageReader::task_sequence(std::uint32_t index) const noexcept {
-  return index < task_count_ ? slot_of(memory_, index).statistics.counters.sequence() : 0;
+  return index < task_count_ ? slot_of(memory_, index).counters.sequence() : 0;
 }
 
 }  // namespace plchost

@@ -51,18 +51,23 @@ struct InstanceRuntime {
 struct TaskSlot {
   TaskIdentity identity;
   std::atomic<std::uint32_t> state{0};  ///< a PageTaskState
-  TaskStatistics statistics;
+  Seqlock<TaskCounters> counters;
 };
 
 inline constexpr std::uint32_t kMaxTasks = 1024;
+/// Up to so many tasks have histograms of 3 significant digits (352 KiB a task), more have 2 (50 KiB).
+inline constexpr std::uint32_t kMaxFineTasks = 64;
 
 struct InstancePageLayout {
   std::uint64_t magic = 0;  ///< written last
   std::uint32_t version = 0;
   std::uint32_t task_count = 0;
   std::uint64_t size = 0;
+  std::uint32_t digits = 0;  ///< of the histograms: HistogramShape::kCoarse or kFine
+  std::uint32_t reserved = 0;
   Seqlock<InstanceRuntime> runtime;
-  // TaskSlot tasks[task_count] follow
+  // TaskSlot tasks[task_count] follow, and then, at a multiple of 64,
+  // std::uint32_t buckets[task_count][kTaskHistograms][bucket_count]
 };
 
 [[nodiscard]] std::string instance_page_name(std::string_view pool, std::string_view instance);
@@ -78,13 +83,15 @@ class InstancePage {
   void write_runtime(const InstanceRuntime& runtime) noexcept;
   /// `index` < task_count().
   [[nodiscard]] TaskSlot& task(std::uint32_t index) noexcept;
+  /// Where task `index` < task_count() writes its statistics. As long as the page.
+  [[nodiscard]] TaskStatistics& statistics(std::uint32_t index) noexcept { return statistics_[index]; }
   [[nodiscard]] std::uint32_t task_count() const noexcept { return task_count_; }
 
  private:
-  InstancePage(MemoryFile memory, std::uint32_t count) noexcept
-      : memory_(std::move(memory)), task_count_(count) {}
+  InstancePage(MemoryFile memory, std::uint32_t count, HistogramShape shape);
   MemoryFile memory_;
-  std::uint32_t task_count_;  // a stranger may change the page's own
+  std::uint32_t task_count_;                // a stranger may change the page's own
+  std::vector<TaskStatistics> statistics_;  // they refer into the memory
 };
 
 /// One task as a reader sees it.
@@ -92,8 +99,6 @@ struct TaskSnapshot {
   TaskIdentity identity;
   PageTaskState state = PageTaskState::created;
   TaskCounters counters{};
-  Duration latency_p50{};
-  Duration latency_p99{};
 };
 
 /// A reader's end, in any process. It reads the page of the process that lived when it was opened: open anew
@@ -106,14 +111,19 @@ class InstancePageReader {
   [[nodiscard]] std::uint32_t task_count() const noexcept { return task_count_; }
   /// Nothing if the writer was in the way; try again later.
   [[nodiscard]] std::optional<TaskSnapshot> task(std::uint32_t index) const noexcept;
+  /// The histogram as it is now and goes on growing; `index` < task_count().
+  [[nodiscard]] HistogramView histogram(std::uint32_t index, TaskHistogram which) const noexcept;
+  [[nodiscard]] HistogramShape histogram_shape() const noexcept { return shape_; }
   /// Changes when the task ran: readers that publish look at this first.
   [[nodiscard]] std::uint64_t task_sequence(std::uint32_t index) const noexcept;
 
  private:
-  explicit InstancePageReader(MemoryFile memory, std::uint32_t count) noexcept
-      : memory_(std::move(memory)), task_count_(count) {}
+  InstancePageReader(MemoryFile memory, std::uint32_t count, HistogramShape shape) noexcept
+      : memory_(std::move(memory)), task_count_(count), shape_(shape) {}
   MemoryFile memory_;
-  std::uint32_t task_count_ = 0;  // as validated at open: a stranger may change the page's own
+  // As validated at open: a stranger may change the page's own.
+  std::uint32_t task_count_ = 0;
+  HistogramShape shape_;
 };
 
 }  // namespace plchost

@@ -120,20 +120,21 @@ TEST_F(TaskBuilder, RefusesACountOutOfRange) {
 TEST(WriteBack, GivesMicrosecondsCutToWhatFits) {
   Task_Info task{};
   TaskCounters counters{};
-  counters.cycles = 4;
+  counters.cycles = 40;
+  counters.recorded = 4;
   counters.exec_last_ns = 5'000;
   counters.exec_sum_ns = 40'000;
   counters.exec_max_ns = std::numeric_limits<std::int64_t>::max();
   counters.exec_min_ns = 2'999;
   counters.jitter_last_ns = -7'000;
-  counters.jitter_max_ns = std::numeric_limits<std::int64_t>::min();
+  counters.jitter_min_ns = std::numeric_limits<std::int64_t>::min();
   write_back(counters, task);
   EXPECT_EQ(task.tLastCycleTime, 5);
   EXPECT_EQ(task.tAverageCycleTime, 10);
   EXPECT_EQ(task.tMaxCycleTime, std::numeric_limits<int>::max());
   EXPECT_EQ(task.tMinCycleTime, 2);
   EXPECT_EQ(task.tJitterLast, -7);
-  EXPECT_EQ(task.tJitterMax, std::numeric_limits<int>::min());
+  EXPECT_EQ(task.tJitterMax, std::numeric_limits<int>::max()) << "the largest magnitude";
 }
 
 }  // namespace

@@ -113,8 +113,8 @@ TEST_F(Pages, InstancePageCarriesTasksAndRuntime) {
   slot.state.store(static_cast<std::uint32_t>(PageTaskState::exception));
   TaskCounters counters{};
   counters.cycles = 11;
-  slot.statistics.counters.write(counters);
-  slot.statistics.latency.record(Duration(20));
+  slot.counters.write(counters);
+  writer->statistics(1).latency.record(Duration(20));
   EXPECT_NE(sut->task_sequence(1), before);
   EXPECT_EQ(sut->task_count(), 3U);
   EXPECT_EQ(sut->runtime()->pid, 7);
@@ -125,7 +125,7 @@ TEST_F(Pages, InstancePageCarriesTasksAndRuntime) {
   EXPECT_EQ(task->identity.kind, PageTaskKind::external);
   EXPECT_EQ(task->state, PageTaskState::exception);
   EXPECT_EQ(task->counters.cycles, 11U);
-  EXPECT_EQ(task->latency_p99, Duration(20));
+  EXPECT_EQ(sut->histogram(1, TaskHistogram::latency).percentile(0.99), Duration(20));
   EXPECT_FALSE(sut->task(3));
   EXPECT_EQ(sut->task_sequence(3), 0U);
 }

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "shm/base/task_statistics.hpp"
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+/// One cycle, as its task saw it.
+struct RecordedCycle {
+  TimePoint release;  ///< planned
+  TimePoint start;    ///< of the task's code
+  TimePoint end;
+  Duration interval{};            ///< of the grid; 0: not a cyclic task, so neither jitter nor slots
+  std::uint64_t lost_cycles = 0;  ///< right before it
+  std::uint64_t lost_events = 0;
+  std::uint64_t timer_expirations = 0;
+  Duration spun{};
+};
+
+/// Writes the statistics of one task. The task's own thread records and never waits for anybody; who resets
+/// takes them away from it for the moment that takes, and a cycle of that moment counts as one before the
+/// reset.
+class TaskRecorder {
+ public:
+  /// Set-up. The statistics count from `now` on.
+  TaskRecorder(TaskStatistics& statistics, TimePoint now) noexcept;
+
+  /// Set-up, while the task is parked: the next start ends no period.
+  void begin() noexcept { has_start_ = false; }
+
+  /// The task's thread, real-time.
+  void record(const RecordedCycle& cycle) noexcept;
+
+  /// As of the last record(). The task's thread, real-time.
+  [[nodiscard]] const TaskCounters& counters() const noexcept { return counters_; }
+
+  /// Everything but the cycle count begins anew, at `now`. False: a record is under way; try again. One
+  /// thread at a time, any.
+  [[nodiscard]] bool reset(TimePoint now) noexcept;
+
+ private:
+  enum class Owner : std::uint32_t { nobody, task, resetter };
+
+  void count(const RecordedCycle& cycle) noexcept;
+  void begin_anew() noexcept;
+  [[nodiscard]] bool acquire(Owner owner) noexcept;
+  void release() noexcept;
+
+  TaskStatistics& statistics_;
+  std::atomic<Owner> owner_{Owner::nobody};
+  std::atomic<std::uint64_t> cycles_{0};  // the task's thread adds
+
+  // Only the owner.
+  std::uint64_t resets_ = 0;
+  std::int64_t since_ns_;
+  std::int64_t since_unix_ns_;
+
+  // Only the task's thread.
+  TaskCounters counters_{};
+  std::uint64_t obeyed_resets_ = 0;
+  bool has_start_ = false;
+  TimePoint last_start_;
+  TimePoint last_release_;
+};
+
+}  // namespace plchost
