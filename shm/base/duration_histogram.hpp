@@ -29,7 +29,9 @@ class HistogramShape {
   }
   /// `digits`: kCoarse or kFine.
   explicit constexpr HistogramShape(unsigned digits) noexcept
-      : digits_(digits), sub_bits_(digits == kFine ? 10 : 7) {}
+      : HistogramShape(digits, digits == kFine ? 10 : 7) {}
+  /// The same geometry with 8 buckets per octave, to draw from: no bucket of the others lies in two of its.
+  [[nodiscard]] static constexpr HistogramShape bars() noexcept { return {1, 3}; }
 
   [[nodiscard]] constexpr unsigned digits() const noexcept { return digits_; }
   [[nodiscard]] constexpr std::size_t bucket_count() const noexcept {
@@ -54,6 +56,8 @@ class HistogramShape {
   }
 
  private:
+  constexpr HistogramShape(unsigned digits, unsigned sub_bits) noexcept
+      : digits_(digits), sub_bits_(sub_bits) {}
   static constexpr unsigned kMaxBits = 31;
   unsigned digits_;
   unsigned sub_bits_;  // buckets per octave, as a power of two
