@@ -49,10 +49,22 @@ int command_event(CliSession& session, std::int32_t operation, const std::string
   return command(session, {"", operation, parts->first, parts->second});
 }
 
+/// A verb may have several nouns.
 CLI::App* add_verb(CLI::App& app, const char* verb, const char* noun, const char* text) {
-  CLI::App* const outer = app.add_subcommand(verb, text);
+  const auto known = app.get_subcommands([verb](CLI::App* other) { return other->get_name() == verb; });
+  CLI::App* const outer = known.empty() ? app.add_subcommand(verb, text) : known.front();
   outer->require_subcommand(1)->fallthrough();
   return outer->add_subcommand(noun, text)->fallthrough();
+}
+
+/// "INSTANCE/TASK", or "INSTANCE" for all of its tasks.
+int reset_statistics(CliSession& session, const std::string& name) {
+  if (name.find('/') == std::string::npos) {
+    return command(session, {"", plc_OPERATION_RESET_STATISTICS, name, ""});
+  }
+  const auto parts = split_name("TASK", name);
+  if (!parts) return CliSession::fail(parts.error());
+  return command(session, {"", plc_OPERATION_RESET_STATISTICS, parts->first, parts->second});
 }
 
 void add_plain(CLI::App& app, CliSession& session, Action& action, const char* verb, std::int32_t operation,
@@ -86,6 +98,13 @@ void add_command_verbs(CLI::App& app, CliSession& session, Action& action) {
   add_event(app, session, action, "register", plc_OPERATION_REGISTER_EVENT, "Register an external event");
   add_event(app, session, action, "unregister", plc_OPERATION_UNREGISTER_EVENT,
             "Unregister an external event");
+
+  const auto name = std::make_shared<std::string>();
+  CLI::App* const statistics =
+      add_verb(app, "reset", "statistics", "Begin the statistics of a task, or of all of an instance, anew");
+  statistics->add_option("INSTANCE[/TASK]", *name)->required();
+  statistics->callback(
+      [&session, &action, name] { action = [&session, name] { return reset_statistics(session, *name); }; });
 
   const auto instance = std::make_shared<std::string>();
   const auto argument = std::make_shared<std::string>();

@@ -6,6 +6,8 @@
 
 #include "api/cli/cli_session.hpp"
 #include "api/cli/rows.hpp"
+#include "api/cli/statistics_rows.hpp"
+#include "api/cli/terminal.hpp"
 #include "api/dds/text.hpp"
 
 namespace plchost {
@@ -32,6 +34,25 @@ int show_instance(CliSession& session, const std::string& name) {
                                        hint(name, names), fmt::join(names, ", "))});
 }
 
+int show_statistics(CliSession& session, const std::string& host, const plc_TaskStatus& task) {
+  const auto report = session.client().value()->statistics(host, dds::text_of(task.instance),
+                                                           dds::text_of(task.task), session.deadline());
+  if (!report) return CliSession::fail(report.error());
+  Row row = to_row(task);
+  if (session.options.json) {
+    add_statistics(row, *report);
+    return show_row(session, row);
+  }
+  // What the statistics tell in more detail is left to them.
+  Row identity;
+  for (const char* field :
+       {"host", "instance", "task", "kind", "priority", "interval_us", "state", "external_event"}) {
+    identity[field] = row[field];
+  }
+  fmt::print("{}{}", format_fields(identity), format_statistics(*report, terminal_style()));
+  return kExitDone;
+}
+
 int show_task(CliSession& session, const std::string& name) {
   const auto parts = split_name("TASK", name);
   if (!parts) return CliSession::fail(parts.error());
@@ -42,7 +63,7 @@ int show_task(CliSession& session, const std::string& name) {
   std::vector<std::string> names;
   for (const auto& task : *all) {
     const std::string known = fmt::format("{}/{}", task.instance, task.task);
-    if (known == name) return show_row(session, to_row(task));
+    if (known == name) return show_statistics(session, *host, task);
     names.push_back(known);
   }
   return CliSession::fail({ErrorCode::not_found, 0,

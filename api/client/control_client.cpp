@@ -57,15 +57,15 @@ Result<void> ControlClient::open(const dds::DomainOptions& options) {
   return open_cache(host_status_, dds::kHostStatus);
 }
 
-template <class Sample>
-Result<void> ControlClient::open_cache(StatusCache<Sample>& cache, const dds::TopicInfo& info) {
+template <class Cache>
+Result<void> ControlClient::open_cache(Cache& cache, const dds::TopicInfo& info) {
   if (cache) return {};
   auto topic = dds::make_topic(participant_.get(), info);
   if (!topic) return std::unexpected(topic.error());
   auto reader = dds::make_reader(participant_.get(), topic->get(), dds::status_qos());
   if (!reader) return std::unexpected(reader.error());
   if (auto added = wait_set_.add(reader->get(), DDS_DATA_AVAILABLE_STATUS); !added) return added;
-  cache = StatusCache<Sample>(std::move(*topic), std::move(*reader));
+  cache = Cache(std::move(*topic), std::move(*reader));
   return {};
 }
 
@@ -80,6 +80,7 @@ void ControlClient::update() {
   host_status_.update();
   instance_status_.update();
   task_status_.update();
+  statistics_.update();
   event_status_.update();
   object_status_.update();
 }
@@ -152,6 +153,24 @@ Result<std::vector<plc_InstanceStatus>> ControlClient::instances(const std::stri
 
 Result<std::vector<plc_TaskStatus>> ControlClient::tasks(const std::string& host, TimePoint deadline) {
   return snapshot(task_status_, dds::kTaskStatus, &plc_HostStatus::task_count, host, deadline);
+}
+
+Result<StatisticsReport> ControlClient::statistics(const std::string& host, std::string_view instance,
+                                                   std::string_view task, TimePoint deadline) {
+  if (auto opened = open_cache(statistics_, dds::kTaskStatistics); !opened) {
+    return std::unexpected(opened.error());
+  }
+  for (;;) {
+    update();
+    if (const auto view = present(host)) {
+      if (auto found = statistics_.find(host, view->epoch, instance, task)) return std::move(*found);
+    }
+    if (MonotonicClock::now() >= deadline) break;
+    wait_set_.wait(deadline);
+  }
+  return failure(
+      ErrorCode::timed_out,
+      fmt::format("the statistics of task '{}/{}' have not come from host '{}'", instance, task, host));
 }
 
 Result<std::vector<plc_EventStatus>> ControlClient::events(const std::string& host, TimePoint deadline) {

@@ -14,6 +14,7 @@
 
 #include "api/client/event_poster.hpp"
 #include "api/client/request_caller.hpp"
+#include "api/client/statistics_cache.hpp"
 #include "api/client/status_cache.hpp"
 #include "api/client/wait_set.hpp"
 #include "api/dds/domain.hpp"
@@ -53,6 +54,10 @@ class ControlClient {
   [[nodiscard]] Result<std::vector<plc_InstanceStatus>> instances(const std::string& host,
                                                                   TimePoint deadline);
   [[nodiscard]] Result<std::vector<plc_TaskStatus>> tasks(const std::string& host, TimePoint deadline);
+  /// The statistics of one task, as the host told them last: at most about a second old.
+  /// timed_out: they have not come at the deadline; there may be no such task.
+  [[nodiscard]] Result<StatisticsReport> statistics(const std::string& host, std::string_view instance,
+                                                    std::string_view task, TimePoint deadline);
   [[nodiscard]] Result<std::vector<plc_EventStatus>> events(const std::string& host, TimePoint deadline);
   [[nodiscard]] Result<std::vector<plc_ObjectStatus>> objects(const std::string& host, TimePoint deadline);
 
@@ -88,8 +93,8 @@ class ControlClient {
   void update();
   [[nodiscard]] std::vector<HostView> present() const;
   [[nodiscard]] std::optional<HostView> present(std::string_view name) const;
-  template <class Sample>
-  [[nodiscard]] Result<void> open_cache(StatusCache<Sample>& cache, const dds::TopicInfo& topic);
+  template <class Cache>
+  [[nodiscard]] Result<void> open_cache(Cache& cache, const dds::TopicInfo& topic);
   template <class Sample>
   [[nodiscard]] Result<std::vector<Sample>> snapshot(StatusCache<Sample>& cache, const dds::TopicInfo& topic,
                                                      std::uint32_t plc_HostStatus::* expected,
@@ -109,6 +114,7 @@ class ControlClient {
   StatusCache<plc_HostStatus> host_status_;
   StatusCache<plc_InstanceStatus> instance_status_;
   StatusCache<plc_TaskStatus> task_status_;
+  StatisticsCache statistics_;
   StatusCache<plc_EventStatus> event_status_;
   StatusCache<plc_ObjectStatus> object_status_;
   std::map<std::string, Seen> seen_;

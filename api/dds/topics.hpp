@@ -28,6 +28,7 @@ inline constexpr TopicInfo kPresence{"plc/v1/presence", &plc_Presence_desc};
 inline constexpr TopicInfo kHostStatus{"plc/v1/status/host", &plc_HostStatus_desc};
 inline constexpr TopicInfo kInstanceStatus{"plc/v1/status/instance", &plc_InstanceStatus_desc};
 inline constexpr TopicInfo kTaskStatus{"plc/v1/status/task", &plc_TaskStatus_desc};
+inline constexpr TopicInfo kTaskStatistics{"plc/v1/status/task_statistics", &plc_TaskStatistics_desc};
 inline constexpr TopicInfo kEventStatus{"plc/v1/status/event", &plc_EventStatus_desc};
 inline constexpr TopicInfo kObjectStatus{"plc/v1/status/object", &plc_ObjectStatus_desc};
 inline constexpr TopicInfo kHostFinding{"plc/v1/status/host_finding", &plc_HostFinding_desc};

@@ -14,7 +14,7 @@ namespace plchost {
 
 namespace {
 
-enum class Argument : std::uint8_t { none, path, scheduler, event };
+enum class Argument : std::uint8_t { none, path, scheduler, event, task_or_none };
 
 struct Operation {
   std::int32_t number;
@@ -29,6 +29,8 @@ constexpr std::array kOperations = {
     Operation{plc_OPERATION_STOP, ControlVerb::stop, ApiRole::operating, Argument::none},
     Operation{plc_OPERATION_RESET, ControlVerb::reset, ApiRole::operating, Argument::none},
     Operation{plc_OPERATION_RESTART, ControlVerb::restart, ApiRole::operating, Argument::none},
+    Operation{plc_OPERATION_RESET_STATISTICS, ControlVerb::reset_statistics, ApiRole::operating,
+              Argument::task_or_none},
     Operation{plc_OPERATION_CHECK_HOST, ControlVerb::check_host, ApiRole::operating, Argument::none,
               /*of_host=*/true},
     Operation{plc_OPERATION_LOAD_APPLICATION, ControlVerb::load_application, ApiRole::engineering,
@@ -63,6 +65,8 @@ Result<void> check_argument(const Operation& operation, std::string_view argumen
       return check_name("scheduler", argument, 31);
     case Argument::event:
       return check_name("event", argument, kMaxEventName);
+    case Argument::task_or_none:
+      return argument.empty() ? Result<void>() : check_name("task", argument, kMaxTaskName);
   }
   return {};
 }

@@ -19,16 +19,19 @@ Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const 
     return dds::make_writer(participant, topics.back().get(), qos);
   };
   auto tasks = make(dds::kTaskStatus, dds::status_qos());
+  auto statistics = make(dds::kTaskStatistics, dds::status_qos());
   auto instances = make(dds::kInstanceStatus, dds::status_qos());
   auto events = make(dds::kEventStatus, dds::status_qos());
   auto objects = make(dds::kObjectStatus, dds::status_qos());
   auto hosts = make(dds::kHostStatus, dds::status_qos());
   auto presence = make(dds::kPresence, dds::presence_qos());
-  for (auto* made : {&tasks, &instances, &events, &objects, &hosts, &presence}) {
+  for (auto* made : {&tasks, &statistics, &instances, &events, &objects, &hosts, &presence}) {
     if (!*made) return failure_in("publish status", made->error());
   }
-  StatusPublisher publisher(source, TaskWatch(source.pool->name(), source.host, source.epoch,
-                                              StatusTable<plc_TaskStatus>(std::move(*tasks))));
+  StatusPublisher publisher(source,
+                            TaskWatch(source.pool->name(), source.host, source.epoch,
+                                      StatusTable<plc_TaskStatus>(std::move(*tasks)),
+                                      StatisticsWriter(source.host, source.epoch, std::move(*statistics))));
   publisher.instances_ = StatusTable<plc_InstanceStatus>(std::move(*instances));
   publisher.events_ = StatusTable<plc_EventStatus>(std::move(*events));
   publisher.objects_ = StatusTable<plc_ObjectStatus>(std::move(*objects));

@@ -11,7 +11,7 @@ namespace {
 constexpr Duration kPageRetry = std::chrono::milliseconds(20);
 
 plc_TaskStatus to_sample(const std::string& host, const std::string& instance, std::uint64_t epoch,
-                         const TaskSnapshot& task, const HistogramView& latency) {
+                         const TaskSnapshot& task, const StatisticsWriter::Told& told) {
   plc_TaskStatus sample{};
   dds::copy_text(sample.host, host);
   dds::copy_text(sample.instance, instance);
@@ -31,8 +31,8 @@ plc_TaskStatus to_sample(const std::string& host, const std::string& instance, s
   sample.exec_avg_ns = average(counters.exec_sum_ns, counters.recorded);
   sample.exec_min_ns = counters.exec_min_ns;
   sample.exec_max_ns = counters.exec_max_ns;
-  sample.latency_p50_ns = latency.percentile(0.5).count();
-  sample.latency_p99_ns = latency.percentile(0.99).count();
+  sample.latency_p50_ns = told.latency_p50.count();
+  sample.latency_p99_ns = told.latency_p99.count();
   sample.latency_max_ns = counters.latency_max_ns;
   sample.jitter_max_ns = largest_jitter_ns(counters);
   return sample;
@@ -45,7 +45,7 @@ bool TaskWatch::follow(const InstanceStatus& instance, TimePoint now) {
   Watched& watched = instances_[name];
   bool changed = false;
   if (watched.pid != instance.pid) {
-    changed = table_.dispose_under(name + "/");
+    changed = dispose_tasks(name, watched);
     watched = Watched{};
     watched.pid = instance.pid;
   }
@@ -66,11 +66,20 @@ bool TaskWatch::open_page(const std::string& instance, Watched& watched) {
   // The page of the life before is there until the process has made its own.
   if (!runtime || runtime->pid != watched.pid) return false;
   watched.page = std::move(*page);
+  watched.told.assign(watched.page->task_count(), {});
   return true;
 }
 
 bool TaskWatch::forget(const std::string& instance) {
-  instances_.erase(instance);
+  const auto found = instances_.find(instance);
+  if (found == instances_.end()) return false;
+  const bool changed = dispose_tasks(instance, found->second);
+  instances_.erase(found);
+  return changed;
+}
+
+bool TaskWatch::dispose_tasks(const std::string& instance, const Watched& watched) {
+  for (const auto& told : watched.told) statistics_.dispose(instance, told);
   return table_.dispose_under(instance + "/");
 }
 
@@ -80,12 +89,15 @@ std::optional<InstanceRuntime> TaskWatch::runtime(const std::string& instance) c
   return found->second.page->runtime();
 }
 
-void TaskWatch::publish(const std::string& instance, const InstancePageReader& page, std::uint32_t index) {
-  const auto task = page.task(index);
+void TaskWatch::publish(const std::string& instance, Watched& watched, std::uint32_t index) {
+  const auto task = watched.page->task(index);
   if (!task) return;
+  StatisticsWriter::Told& told = watched.told[index];
+  // New, or reset since: that is told at once. It costs little, because little was recorded.
+  const bool at_once = told.task.empty() || told.since_ns != task->counters.since_ns;
+  if (at_once) (void)statistics_.write(instance, *watched.page, index, told);
   const std::string key = instance + "/" + std::string(task->identity.name.view());
-  const HistogramView latency = page.histogram(index, TaskHistogram::latency);
-  (void)table_.update(key, to_sample(host_, instance, epoch_, *task, latency));
+  (void)table_.update(key, to_sample(host_, instance, epoch_, *task, told));
 }
 
 void TaskWatch::look(TimePoint now) {
@@ -94,7 +106,7 @@ void TaskWatch::look(TimePoint now) {
     if (!watched.page || now < watched.next_look) continue;
     const std::uint32_t count = watched.page->task_count();
     while (watched.next_task < count && budget > 0) {
-      publish(name, *watched.page, watched.next_task);
+      publish(name, watched, watched.next_task);
       ++watched.next_task;
       --budget;
     }
@@ -103,6 +115,25 @@ void TaskWatch::look(TimePoint now) {
     watched.next_look = now + kPeriod;
   }
   table_.write(kTasksPerLook);
+  look_at_statistics(now);
+}
+
+void TaskWatch::look_at_statistics(TimePoint now) {
+  std::uint32_t budget = kStatisticsPerLook;
+  auto next = instances_.upper_bound(last_told_);
+  for (std::size_t i = 0; i < instances_.size() && budget > 0; ++i) {
+    if (next == instances_.end()) next = instances_.begin();
+    auto& [name, watched] = *next++;
+    if (!watched.page || now < watched.next_statistics_look) continue;
+    std::uint32_t& task = watched.next_statistics;
+    for (; task < watched.told.size() && budget > 0; ++task) {
+      if (statistics_.write(name, *watched.page, task, watched.told[task])) --budget;
+    }
+    last_told_ = name;
+    if (task < watched.told.size()) continue;  // goes on here when the others had their turn
+    task = 0;
+    watched.next_statistics_look = now + kStatisticsPeriod;
+  }
 }
 
 void TaskWatch::look_at(const std::string& instance, TimePoint now) {
@@ -110,7 +141,7 @@ void TaskWatch::look_at(const std::string& instance, TimePoint now) {
   if (found == instances_.end() || !found->second.page) return;
   Watched& watched = found->second;
   for (std::uint32_t i = 0; i < watched.page->task_count(); ++i) {
-    publish(instance, *watched.page, i);
+    publish(instance, watched, i);
   }
   watched.next_task = 0;
   watched.next_look = now + kPeriod;

@@ -72,6 +72,7 @@ class Instance {
   [[nodiscard]] Result<std::string> stop();
   [[nodiscard]] Result<std::string> set_scheduler(const std::string& name);
   [[nodiscard]] Result<std::string> change_registration(const ControlRequest& request);
+  [[nodiscard]] Result<std::string> reset_statistics(const std::string& task);
   [[nodiscard]] std::string status() const;
 
   void restore_operator_events();

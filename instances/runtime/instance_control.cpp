@@ -37,6 +37,8 @@ Result<std::string> Instance::obey(const ControlRequest& request) {
     case ControlVerb::register_event:
     case ControlVerb::unregister_event:
       return change_registration(request);
+    case ControlVerb::reset_statistics:
+      return reset_statistics(request.argument);
     case ControlVerb::shutdown:
       shutdown_requested_ = true;
       return {};
@@ -104,6 +106,15 @@ Result<std::string> Instance::change_registration(const ControlRequest& request)
                             events.registered_by_operator());
   if (!changed) return changed.error().message;  // it was there: what was wanted holds
   if (!kept) return fmt::format("done, but not kept for the next start: {}", kept.error().describe());
+  return {};
+}
+
+Result<std::string> Instance::reset_statistics(const std::string& task) {
+  if (!tasks_) {
+    return failure(ErrorCode::wrong_state,
+                   fmt::format("instance '{}' has no application, so no tasks", options_.launch.name));
+  }
+  if (auto done = tasks_->reset_statistics(task); !done) return std::unexpected(std::move(done).error());
   return {};
 }
 

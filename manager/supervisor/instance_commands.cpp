@@ -38,6 +38,7 @@ void ManagedInstance::handle(const ControlRequest& request, ControlReplyFunction
     case ControlVerb::set_scheduler:
     case ControlVerb::register_event:
     case ControlVerb::unregister_event:
+    case ControlVerb::reset_statistics:
       return begin_forwarded();
     case ControlVerb::check_host:
     case ControlVerb::shutdown:
@@ -64,6 +65,8 @@ Result<void> ManagedInstance::check_argument(ControlRequest& request) const {
     case ControlVerb::register_event:
     case ControlVerb::unregister_event:
       return check_name("event", request.argument, kMaxEventName);
+    case ControlVerb::reset_statistics:
+      return request.argument.empty() ? Result<void>() : check_name("task", request.argument, kMaxTaskName);
     case ControlVerb::load_application: {
       if (request.argument.empty() || request.argument.find('\0') != std::string::npos) {
         return failure(ErrorCode::invalid_argument, "load application needs the path of a file on the host");

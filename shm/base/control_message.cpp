@@ -17,6 +17,7 @@ constexpr std::array kVerbs = {
     std::pair{ControlVerb::stop, std::string_view("stop")},
     std::pair{ControlVerb::reset, std::string_view("reset")},
     std::pair{ControlVerb::restart, std::string_view("restart")},
+    std::pair{ControlVerb::reset_statistics, std::string_view("reset statistics")},
     std::pair{ControlVerb::load_application, std::string_view("load application")},
     std::pair{ControlVerb::set_scheduler, std::string_view("set scheduler")},
     std::pair{ControlVerb::register_event, std::string_view("register event")},

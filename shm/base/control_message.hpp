@@ -18,6 +18,7 @@ enum class ControlVerb : std::uint8_t {
   stop,              ///< stop the application; the process stays
   reset,             ///< fresh process, application loaded anew and stopped
   restart,           ///< fresh process, application running
+  reset_statistics,  ///< argument: name of a task; empty: all tasks
   load_application,  ///< argument: path of the application on the host
   set_scheduler,     ///< argument: name of a scheduler
   register_event,    ///< argument: name of an external event

@@ -49,8 +49,15 @@ struct TaskCounters {
   std::int64_t since_unix_ns;  ///< the same, CLOCK_REALTIME
 };
 
+// Counters may come out of memory that a stranger has written to: no value of them does harm below.
+
 [[nodiscard]] constexpr std::int64_t average(std::int64_t sum, std::uint64_t count) noexcept {
-  return count == 0 ? 0 : sum / static_cast<std::int64_t>(count);
+  const auto divisor = static_cast<std::int64_t>(std::min<std::uint64_t>(count, INT64_MAX));
+  return divisor == 0 ? 0 : sum / divisor;
+}
+/// a - b, wrapping around.
+[[nodiscard]] constexpr std::int64_t difference(std::int64_t a, std::int64_t b) noexcept {
+  return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) - static_cast<std::uint64_t>(b));
 }
 /// The largest deviation of a period, in either direction.
 [[nodiscard]] constexpr std::int64_t largest_jitter_ns(const TaskCounters& counters) noexcept {
@@ -58,7 +65,7 @@ struct TaskCounters {
 }
 /// How far the latencies lie apart.
 [[nodiscard]] constexpr std::int64_t release_jitter_ns(const TaskCounters& counters) noexcept {
-  return counters.latency_max_ns - counters.latency_min_ns;
+  return difference(counters.latency_max_ns, counters.latency_min_ns);
 }
 
 /// The histograms of a task: where the buckets of each lie in its memory.

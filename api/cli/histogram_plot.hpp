@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "api/client/statistics_cache.hpp"
+
+namespace plchost {
+
+/// What a drawing has room for, and with which characters.
+struct PlotStyle {
+  std::size_t width = 80;  ///< of the terminal, in characters
+  bool unicode = true;     ///< bars in eighths of a character; else '#' and '.'
+};
+
+/// A few lines: bars over a logarithmic axis of durations, shares of all records to the left. Of nothing
+/// recorded: one line that says so.
+[[nodiscard]] std::string plot(const HistogramReport& histogram, PlotStyle style);
+/// The same of deviations with a sign: the negative ones to the left of zero, as magnitudes in their own
+/// histogram.
+[[nodiscard]] std::string plot_signed(const HistogramReport& negative, const HistogramReport& positive,
+                                      PlotStyle style);
+
+/// "980ns", "1.50us", "12.0ms", "3.00s".
+[[nodiscard]] std::string short_duration(std::int64_t nanoseconds);
+
+}  // namespace plchost

@@ -1,0 +1,11 @@
+#pragma once
+
+#include "api/cli/histogram_plot.hpp"
+
+namespace plchost {
+
+/// How to draw on standard output: its terminal's width, else $COLUMNS, else 80 characters; unicode if the
+/// locale (LC_ALL, LC_CTYPE, LANG: the first that is set) is one of UTF-8.
+[[nodiscard]] PlotStyle terminal_style();
+
+}  // namespace plchost

@@ -1,0 +1,65 @@
+#include "api/client/statistics_cache.hpp"
+
+#include <algorithm>
+#include <iterator>
+
+#include "api/dds/samples.hpp"
+#include "api/dds/text.hpp"
+
+namespace plchost {
+
+namespace {
+
+/// Copies a histogram and takes it out of the sample.
+HistogramReport take_out(plc_DurationHistogram& sample) {
+  HistogramReport report;
+  report.total = sample.total;
+  std::ranges::copy(sample.percentiles_ns, report.percentiles_ns.begin());
+  report.bars.assign(sample.bars._buffer, std::next(sample.bars._buffer, sample.bars._length));
+  sample = {};
+  return report;
+}
+
+StatisticsReport to_report(const plc_TaskStatistics& sample) {
+  StatisticsReport report;
+  report.numbers = sample;
+  report.numbers.ext = {};
+  report.latency = take_out(report.numbers.latency_histogram);
+  report.execution = take_out(report.numbers.execution_histogram);
+  report.jitter_negative = take_out(report.numbers.jitter_negative_histogram);
+  report.jitter_positive = take_out(report.numbers.jitter_positive_histogram);
+  return report;
+}
+
+}  // namespace
+
+void StatisticsCache::update() {
+  if (!reader_) return;
+  for (bool more = true; more;) {
+    const dds::Samples<plc_TaskStatistics> batch(reader_.get());
+    for (std::size_t i = 0; i < batch.size(); ++i) {
+      const auto handle = batch.info(i).instance_handle;
+      if (batch.disposed(i)) {
+        reports_.erase(handle);
+      } else if (batch.valid(i)) {
+        reports_[handle] = to_report(batch[i]);
+      }
+    }
+    more = batch.full();
+  }
+}
+
+std::optional<StatisticsReport> StatisticsCache::find(std::string_view host, std::uint64_t epoch,
+                                                      std::string_view instance,
+                                                      std::string_view task) const {
+  for (const auto& [handle, report] : reports_) {
+    const plc_TaskStatistics& numbers = report.numbers;
+    if (numbers.epoch == epoch && dds::text_of(numbers.host) == host &&
+        dds::text_of(numbers.instance) == instance && dds::text_of(numbers.task) == task) {
+      return report;
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace plchost
