@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
+#include "schedulers/task_recorder.hpp"
 #include "tests/integration/api/test_host.hpp"
 
 namespace plchost {
@@ -79,10 +80,40 @@ TEST_F(Plcctl, SuggestsTheNameThatWasMeant) {
   EXPECT_THAT(stop.errors, HasSubstr("did you mean 'line1'?"));
 }
 
-TEST_F(Plcctl, ShowsOneTask) {
-  const auto result = run({"show", "task", "line1/Main"});
-  EXPECT_EQ(result.code, 0) << result.errors;
-  EXPECT_THAT(result.output, HasSubstr("interval_us"));
+TEST_F(Plcctl, ShowsOneTaskWithItsStatistics) {
+  TaskRecorder task(page_->statistics(0), TimePoint{});
+  for (int i = 0; i < 50; ++i) {
+    const TimePoint release{i * std::chrono::milliseconds(1)};
+    task.record({.release = release, .start = release + Duration(3'000), .end = release + Duration(9'000)});
+  }
+  // The statistics come once a second.
+  nlohmann::json json;
+  do {
+    const auto result = run({"show", "task", "line1/Main", "--json"});
+    ASSERT_EQ(result.code, 0) << result.errors;
+    json = nlohmann::json::parse(result.output).at(0);
+  } while (json["recorded"] != 50);
+  EXPECT_EQ(json["interval_us"], 1000.0);
+  EXPECT_EQ(json["latency_p99_us"], 3.0);
+  EXPECT_EQ(json["exec_avg_us"], 6.0);
+  EXPECT_EQ(json["latency_histogram"][0]["count"], 50);
+  const auto text = run({"show", "task", "line1/Main"});
+  EXPECT_EQ(text.code, 0) << text.errors;
+  for (const char* part : {"interval_us", "lost_cycles", "P99.99", "latency:", "execution:", "100.00%"}) {
+    EXPECT_THAT(text.output, HasSubstr(part));
+  }
+}
+
+TEST_F(Plcctl, ResetsTheStatisticsOfOneTaskOrOfAll) {
+  EXPECT_EQ(run({"reset", "statistics", "line1/Main"}).code, 0);
+  EXPECT_EQ(run({"reset", "statistics", "line1"}).code, 0);
+  EXPECT_EQ(run({"reset", "statistics", "line1/"}).code, 2);
+  EXPECT_EQ(run({"reset", "statistics", "lin1"}).code, 1);
+  const auto requests = host_.requests();
+  ASSERT_EQ(requests.size(), 2U);
+  EXPECT_EQ(requests[0].verb, ControlVerb::reset_statistics);
+  EXPECT_EQ(requests[0].argument, "Main");
+  EXPECT_EQ(requests[1].argument, "");
 }
 
 TEST_F(Plcctl, MakesTheFileOfAnApplicationAbsolute) {

@@ -1,9 +1,11 @@
+#include <cstring>
 #include <thread>
 
 #include <gmock/gmock.h>
 
 #include "api/client/control_client.hpp"
 #include "api/dds/text.hpp"
+#include "schedulers/task_recorder.hpp"
 #include "tests/integration/api/test_host.hpp"
 
 namespace plchost {
@@ -66,6 +68,73 @@ TEST(RemoteStatus, FollowsTasksFromOneProcessToTheNext) {
     tasks = sut->tasks("hosta", soon()).value();
   }
   EXPECT_EQ(dds::text_of(sut->instances("hosta", soon()).value().at(0).scheduler), "CmpScheduleTimer");
+}
+
+TEST(RemoteStatus, TellsTheStatisticsOfATaskAndAtOnceWhenTheyBeginAnew) {
+  const OwnDomain domain;
+  TestHost host(domain, "hosta");
+  InstancePage page = host.make_page("line1", "Main", 100);
+  host.write_instance(0, "line1", InstanceState::running, 100);
+  host.write_count(1);
+  TaskRecorder task(page.statistics(0), TimePoint(seconds(1)));
+  const auto run_cycle = [&](int number, Duration latency) {
+    const TimePoint release{seconds(2) + number * milliseconds(1)};
+    task.record({.release = release,
+                 .start = release + latency,
+                 .end = release + latency + Duration(700),
+                 .interval = milliseconds(1)});
+  };
+  for (int i = 0; i < 1000; ++i) run_cycle(i, Duration(i % 100 == 0 ? 50'000 : 1'000));
+  host.start_server();
+  const auto sut = connect(domain);
+  ASSERT_TRUE(sut->host("hosta", soon()));
+
+  const auto report = sut->statistics("hosta", "line1", "Main", soon());
+
+  ASSERT_TRUE(report) << report.error().describe();
+  EXPECT_EQ(report->numbers.cycles, 1000U);
+  EXPECT_EQ(report->numbers.digits, 3U);
+  EXPECT_EQ(report->numbers.slots_max, 1U);
+  EXPECT_GT(report->numbers.elapsed_ns, 0);
+  EXPECT_EQ(report->numbers.latency.min_ns, 1'000);
+  EXPECT_EQ(report->numbers.latency.max_ns, 50'000);
+  EXPECT_EQ(report->numbers.latency.average_ns, 1'490);
+  EXPECT_EQ(report->numbers.release_jitter.max_ns, 49'000);
+  EXPECT_EQ(report->latency.total, 1000U);
+  EXPECT_EQ(report->latency.percentiles_ns[0], 1'000);
+  EXPECT_EQ(report->latency.percentiles_ns[3], 50'000);
+  ASSERT_EQ(report->latency.bars.size(), 2U);
+  EXPECT_EQ(report->latency.bars[0].count, 990U);
+  EXPECT_EQ(report->execution.percentiles_ns[4], 700);
+  EXPECT_EQ(report->numbers.period_jitter.min_ns, -49'000);
+  EXPECT_EQ(report->jitter_negative.total, 10U);
+  EXPECT_EQ(report->jitter_positive.total, 989U);
+
+  ASSERT_TRUE(task.reset(TimePoint(seconds(9))));
+  auto next = report;
+  while (next->numbers.recorded != 0) next = sut->statistics("hosta", "line1", "Main", soon());
+  EXPECT_EQ(next->numbers.cycles, 1000U);
+  EXPECT_EQ(next->latency.total, 0U);
+  EXPECT_TRUE(next->latency.bars.empty());
+  EXPECT_GE(next->numbers.since_unix_ns, report->numbers.since_unix_ns);
+}
+
+TEST(RemoteStatus, OfAPageThatAStrangerWroteToHarmsNobody) {
+  const OwnDomain domain;
+  TestHost host(domain, "hosta");
+  InstancePage page = host.make_page("line1", "Main", 100);
+  TaskCounters wild{};
+  std::memset(static_cast<void*>(&wild), 0x80, sizeof wild);
+  page.statistics(0).counters.write(wild);
+  page.statistics(0).latency.record(milliseconds(1));
+  host.write_instance(0, "line1", InstanceState::running, 100);
+  host.write_count(1);
+  host.start_server();
+  const auto sut = connect(domain);
+  ASSERT_TRUE(sut->host("hosta", soon()));
+  const auto report = sut->statistics("hosta", "line1", "Main", soon());
+  ASSERT_TRUE(report) << report.error().describe();
+  EXPECT_EQ(report->numbers.cycles, 0x8080808080808080U);
 }
 
 TEST(RemoteStatus, ForgetsAnInstanceThatIsGone) {

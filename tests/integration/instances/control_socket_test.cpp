@@ -40,6 +40,30 @@ TEST_F(ControlSocket, StopsAndStartsTheApplication) {
   EXPECT_EQ(sut_.task("Work")->counters.cycles, 0U);  // what was posted while it was stopped is not run
 }
 
+TEST_F(ControlSocket, ResetsTheStatisticsOfOneTaskOrOfAllWhileTheyRun) {
+  const auto recorded = [&](const char* task) { return sut_.task(task)->counters.recorded; };
+  ASSERT_TRUE(eventually([&] { return recorded("Fast") > 200 && recorded("Loop") > 20; }));
+  const TaskCounters before = sut_.task("Fast")->counters;
+  const auto since_of_loop = sut_.task("Loop")->counters.since_ns;
+
+  EXPECT_EQ(sut_.ask(ControlVerb::reset_statistics, "Fast").code, ErrorCode::ok);
+
+  const TaskCounters after = sut_.task("Fast")->counters;
+  EXPECT_GE(after.cycles, before.cycles) << "the cycle count goes on";
+  EXPECT_GT(after.since_ns, before.since_ns);
+  EXPECT_GE(after.cycles - after.recorded, before.recorded) << "what was before is not counted any more";
+  EXPECT_EQ(sut_.task("Loop")->counters.since_ns, since_of_loop);
+  EXPECT_EQ(sut_.ask(ControlVerb::stop).code, ErrorCode::ok);
+  EXPECT_EQ(sut_.ask(ControlVerb::reset_statistics).code, ErrorCode::ok) << "also of parked tasks";
+  for (const char* task : {"Fast", "Loop"}) {
+    EXPECT_EQ(recorded(task), 0U);
+    EXPECT_GT(sut_.task(task)->counters.cycles, 0U);
+  }
+  const auto refused = sut_.ask(ControlVerb::reset_statistics, "Fst");
+  EXPECT_EQ(refused.code, ErrorCode::not_found);
+  EXPECT_THAT(refused.text, HasSubstr("Fast"));
+}
+
 TEST_F(ControlSocket, TellsItsStatus) {
   const auto report = decode_instance_report(sut_.ask(ControlVerb::status).text);
   ASSERT_TRUE(report);

@@ -43,6 +43,11 @@ TEST(RequestCheck, TurnsEachOperationIntoItsVerb) {
   EXPECT_EQ(check(make(plc_OPERATION_UNREGISTER_EVENT, "line1", "e"), ApiRole::engineering)->verb,
             ControlVerb::unregister_event);
   EXPECT_EQ(check(make(plc_OPERATION_CHECK_HOST, ""), ApiRole::operating)->verb, ControlVerb::check_host);
+  for (const char* task : {"", "Main"}) {
+    const auto reset = check(make(plc_OPERATION_RESET_STATISTICS, "line1", task), ApiRole::operating);
+    EXPECT_EQ(reset->verb, ControlVerb::reset_statistics);
+    EXPECT_EQ(reset->argument, task);
+  }
 }
 
 TEST(RequestCheck, TakesACheckOfTheHostOnlyWithoutAnInstance) {
@@ -78,6 +83,7 @@ TEST(RequestCheck, RefusesImpossibleArguments) {
   EXPECT_EQ(code(plc_OPERATION_LOAD_APPLICATION, "", ApiRole::engineering), ErrorCode::invalid_argument);
   EXPECT_EQ(code(plc_OPERATION_REGISTER_EVENT, "a/b", ApiRole::engineering), ErrorCode::invalid_argument);
   EXPECT_EQ(code(plc_OPERATION_SET_SCHEDULER, "", ApiRole::engineering), ErrorCode::invalid_argument);
+  EXPECT_EQ(code(plc_OPERATION_RESET_STATISTICS, "a/b", ApiRole::operating), ErrorCode::invalid_argument);
   EXPECT_EQ(check(make(plc_OPERATION_START, ""), ApiRole::operating).error().code,
             ErrorCode::invalid_argument);
 }

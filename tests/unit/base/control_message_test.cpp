@@ -29,7 +29,8 @@ INSTANTIATE_TEST_SUITE_P(ControlMessage, Verb,
                                          ControlVerb::restart, ControlVerb::load_application,
                                          ControlVerb::set_scheduler, ControlVerb::register_event,
                                          ControlVerb::unregister_event, ControlVerb::check_host,
-                                         ControlVerb::shutdown, ControlVerb::status));
+                                         ControlVerb::reset_statistics, ControlVerb::shutdown,
+                                         ControlVerb::status));
 
 TEST(ControlMessage, RepliesOfEachCodeSurviveTheRoundTrip) {
   for (unsigned code = 0; code <= static_cast<unsigned>(ErrorCode::corrupt); ++code) {

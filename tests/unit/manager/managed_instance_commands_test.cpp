@@ -47,6 +47,22 @@ TEST_F(ManagedInstanceTest, PassesOnWhatTheInstanceRefuses) {
   EXPECT_EQ(state(), InstanceState::running);
 }
 
+TEST_F(ManagedInstanceTest, PassesTheResetOfStatisticsOnAndNeedsAProcessForIt) {
+  ask(ControlVerb::reset_statistics, "Main");
+  EXPECT_EQ(take_reply().code, ErrorCode::wrong_state);
+  bring_up();
+  ask(ControlVerb::reset_statistics, "no/name");
+  EXPECT_EQ(take_reply().code, ErrorCode::invalid_argument);
+  for (const char* task : {"Main", ""}) {
+    ask(ControlVerb::reset_statistics, task);
+    EXPECT_EQ(host_.requests.back().verb, ControlVerb::reset_statistics);
+    EXPECT_EQ(host_.requests.back().argument, task);
+    answer();
+    EXPECT_EQ(take_reply().code, ErrorCode::ok);
+  }
+  EXPECT_EQ(state(), InstanceState::running);
+}
+
 TEST_F(ManagedInstanceTest, StartSpawnsAProcessAndAnswersWhenItIsUp) {
   ask(ControlVerb::start);
   EXPECT_EQ(state(), InstanceState::starting);

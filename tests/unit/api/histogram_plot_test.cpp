@@ -1,0 +1,145 @@
+#include "api/cli/histogram_plot.hpp"
+
+#include <algorithm>
+#include <array>
+#include <sstream>
+
+#include <gmock/gmock.h>
+
+#include "api/cli/statistics_rows.hpp"
+#include "shm/base/duration_histogram.hpp"
+
+namespace plchost {
+namespace {
+
+using testing::HasSubstr;
+using testing::Not;
+
+HistogramReport of(std::vector<plc_HistogramBar> bars) {
+  HistogramReport report;
+  for (const auto& bar : bars) report.total += bar.count;
+  report.bars = std::move(bars);
+  return report;
+}
+
+/// As a terminal counts: UTF-8's continuation bytes have no width.
+std::size_t width(std::string_view line) {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(line, [](char c) { return (static_cast<unsigned char>(c) & 0xc0U) != 0x80U; }));
+}
+
+std::vector<std::string> lines(const std::string& text) {
+  std::vector<std::string> split;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) split.push_back(line);
+  return split;
+}
+
+TEST(HistogramPlot, DrawsTheHighestBarToTheTopAndTheRarestAtAll) {
+  const auto drawn = lines(plot(of({{1024, 1'000'000}, {2048, 500'000}, {1 << 20, 1}}), {80, false}));
+  ASSERT_EQ(drawn.size(), 10U) << "eight rows, the axis, its names";
+  EXPECT_THAT(drawn[0], HasSubstr("|##"));
+  EXPECT_THAT(drawn[0], HasSubstr("66.67%"));
+  EXPECT_EQ(std::ranges::count(drawn[0], '#'), 2) << "two characters for each bar where there is room";
+  EXPECT_EQ(std::ranges::count(drawn[4], '#'), 4) << "half as high";
+  EXPECT_TRUE(drawn[7].ends_with("..")) << "one in a million";
+}
+
+TEST(HistogramPlot, NamesThePowersOfTenAndWhereItBegins) {
+  const auto drawn = lines(plot(of({{640, 1}, {1 << 22, 1}}), {120, true}));
+  for (const char* name : {"640ns", "1us", "10us", "100us", "1ms"})
+    EXPECT_THAT(drawn.back(), HasSubstr(name));
+  EXPECT_THAT(drawn.back(), Not(HasSubstr("10ms")));
+}
+
+TEST(HistogramPlot, FitsIntoAnyTerminal) {
+  std::vector<plc_HistogramBar> all;
+  constexpr HistogramShape kBars = HistogramShape::bars();
+  for (std::size_t i = 0; i < kBars.bucket_count(); ++i) all.push_back({kBars.lower_edge(i).count(), i + 1});
+  for (const std::size_t columns : {26U, 40U, 80U, 81U, 300U}) {
+    for (const bool unicode : {false, true}) {
+      for (const auto& text : {plot(of(all), {columns, unicode}), plot(of({{1, 1}}), {columns, unicode}),
+                               plot_signed(of(all), of(all), {columns, unicode})}) {
+        const auto drawn = lines(text);
+        EXPECT_EQ(drawn.size(), 10U);
+        for (std::size_t i = 0; i + 1 < drawn.size(); ++i) EXPECT_LE(width(drawn[i]), columns);
+      }
+    }
+  }
+}
+
+TEST(HistogramPlot, UsesOnlyAsciiWhereItMust) {
+  const auto report = of({{100, 3}, {200, 8}});
+  const std::string plain = plot_signed(report, report, {60, false});
+  EXPECT_TRUE(std::ranges::all_of(plain, [](char c) { return static_cast<unsigned char>(c) < 0x80; }));
+  EXPECT_THAT(plot(report, {60, true}), HasSubstr("█"));
+}
+
+TEST(HistogramPlot, PutsNegativeDeviationsToTheLeftWithTheGreatestFirst) {
+  const auto drawn = lines(plot_signed(of({{1024, 1}, {16'384, 8}}), of({{0, 4}}), {80, false}));
+  const std::string& axis = drawn.back();
+  EXPECT_LT(axis.find("-10us"), axis.find("-1us"));
+  const std::string top = drawn[0].substr(drawn[0].find('|') + 1);
+  EXPECT_TRUE(top.starts_with("#")) << top;
+}
+
+TEST(HistogramPlot, SaysThatNothingWasRecorded) {
+  EXPECT_EQ(plot({}, {}), "  nothing recorded\n");
+  EXPECT_EQ(plot_signed({}, {}, {}), "  nothing recorded\n");
+  EXPECT_THAT(plot_signed(of({{5, 1}}), {}, {}), Not(HasSubstr("nothing")));
+}
+
+TEST(HistogramPlot, SurvivesBarsThatCannotBe) {
+  EXPECT_EQ(plot(of({{1000, 1}, {10, 1}}), {}), "  nothing recorded\n");
+  (void)plot(of({{-5, 1}, {INT64_MAX, UINT64_MAX}}), {});
+  (void)plot_signed(of({{10, 1}}), of({{9, 1}, {8, 1}}), {});
+}
+
+TEST(ShortDuration, HasThreeDigitsAndAUnit) {
+  const std::array<std::pair<std::int64_t, const char*>, 6> cases{{{0, "0ns"},
+                                                                   {980, "980ns"},
+                                                                   {1'500, "1.50us"},
+                                                                   {12'340, "12.3us"},
+                                                                   {250'000'000, "250ms"},
+                                                                   {7'000'000'000, "7.00s"}}};
+  for (const auto& [ns, text] : cases) EXPECT_EQ(short_duration(ns), text);
+}
+
+TEST(StatisticsRows, GiveEveryNumberToPrograms) {
+  StatisticsReport report;
+  report.numbers.cycles = 12;
+  report.numbers.recorded = 7;
+  report.numbers.lost_consecutive_max = 3;
+  report.numbers.spin_ppm = 65'000;
+  report.numbers.latency = {1'000, 500, 9'000, 2'500};
+  report.latency = of({{960, 7}});
+  report.latency.percentiles_ns = {1'000, 2'000, 3'000, 4'000, 5'000};
+  Row row;
+  add_statistics(row, report);
+  EXPECT_EQ(row["cycles"], 12);
+  EXPECT_EQ(row["recorded"], 7);
+  EXPECT_EQ(row["lost_consecutive_max"], 3);
+  EXPECT_EQ(row["spin_share_percent"], 6.5);
+  EXPECT_EQ(row["latency_min_us"], 0.5);
+  EXPECT_EQ(row["latency_avg_us"], 2.5);
+  EXPECT_EQ(row["latency_p99_9_us"], 4.0);
+  EXPECT_EQ(row["latency_histogram"][0]["from_us"], 0.96);
+  EXPECT_EQ(row["latency_histogram"][0]["below_us"], 1.024);
+  EXPECT_EQ(row["latency_histogram"][0]["count"], 7);
+  for (const char* field : {"exec_p50_us", "release_jitter_max_us", "period_jitter_min_us",
+                            "period_jitter_negative_p99_us", "period_jitter_positive_histogram", "slots_last",
+                            "slots_max", "lost_events", "digits", "elapsed_s", "since_unix_s"}) {
+    EXPECT_TRUE(row.contains(field)) << field;
+  }
+}
+
+TEST(StatisticsRows, ShowPeopleJitterOnlyWhereThereIsSome) {
+  StatisticsReport report;
+  report.latency = of({{960, 7}});
+  EXPECT_THAT(format_statistics(report, {}), Not(HasSubstr("period jitter")));
+  report.jitter_negative = of({{10, 1}});
+  EXPECT_THAT(format_statistics(report, {}), HasSubstr("period jitter"));
+}
+
+}  // namespace
+}  // namespace plchost
