@@ -38,7 +38,10 @@ std::vector<Target> targets_for(std::string_view scheduler, const CyclicFigures&
 Result<std::vector<Row>> measure_cyclic(const Plan& plan) {
   BareLoop bare(Wait::sleep, kPeriod);
   CyclicFigures floor;
-  std::vector<Subject> subjects{slices_of(plan, bare, kPeriod, floor)};
+  BareHop ticking(kPeriod);
+  CyclicFigures hop;
+  std::vector<Subject> subjects{slices_of(plan, bare, kPeriod, floor),
+                                slices_of(plan, ticking, kPeriod, hop)};
   std::vector<std::unique_ptr<ScheduledLoop>> loops;
   std::vector<CyclicFigures> figures(all_schedulers().size());
   for (const auto& entry : all_schedulers()) {
@@ -60,6 +63,12 @@ Result<std::vector<Row>> measure_cyclic(const Plan& plan) {
                               {"lost_per_million", figures[i].lost_per_million()},
                               {"floor_lost_per_million", floor.lost_per_million()}},
                     .targets = targets_for(scheduler, figures[i], floor)});
+    if (scheduler != "CmpSchedule") continue;
+    const Summary bare_tick = summarise(hop.latencies);
+    rows.back().extra.insert(rows.back().extra.end(), {{"bare_tick_p50_us", bare_tick.p50},
+                                                       {"bare_tick_p99_us", bare_tick.p99},
+                                                       {"bare_tick_cpu_us_per_cycle", hop.cpu_us()}});
+    rows.back().note = "bare_tick_*: a bare thread that wakes another through a futex at each release";
   }
   return rows;
 }

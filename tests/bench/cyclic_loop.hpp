@@ -53,6 +53,28 @@ class BareLoop final : public CyclicLoop {
   Thread thread_;
 };
 
+/// A bare thread one priority higher that sleeps to each release and then wakes the task's thread through a
+/// futex: the floor of any scheduler with a tick.
+class BareHop final : public CyclicLoop {
+ public:
+  explicit BareHop(Duration period) : period_(period) {}
+  ~BareHop() override;
+  [[nodiscard]] Result<void> start(CycleLog& log) override;
+  [[nodiscard]] Result<void> stop() override;
+
+ private:
+  void tick() noexcept;
+  void run(CycleLog& log) noexcept;
+  void open() noexcept;
+
+  Duration period_;
+  std::atomic<std::uint32_t> word_{0};
+  std::atomic<std::int64_t> release_ns_{0};
+  std::atomic<bool> stopping_{false};
+  Thread tick_;
+  Thread thread_;
+};
+
 /// One cyclic task of the highest priority under a scheduler.
 class ScheduledLoop final : public CyclicLoop {
  public:
