@@ -2,9 +2,8 @@
 #include <array>
 #include <span>
 
-#include <sched.h>
-
 #include "tests/conformance/scheduler_fixture.hpp"
+#include "tests/support/one_core.hpp"
 
 namespace plchost {
 namespace {
@@ -15,23 +14,11 @@ using std::chrono::seconds;
 
 class PriorityOrder : public testing::TestWithParam<std::string_view>, public Tasks<LinuxClock> {};
 
-// The threads of this test inherit its core: one of those that are allowed.
-bool bind_to_one_core() {
-  const auto cores = allowed_cores(0);
-  if (!cores || cores->empty()) return false;
-  cpu_set_t one;
-  CPU_ZERO(&one);
-  CPU_SET(static_cast<std::size_t>(cores->back()), &one);
-  return ::sched_setaffinity(0, sizeof one, &one) == 0;
-}
-
 TEST_P(PriorityOrder, TasksThatAreDueTogetherRunOneAfterTheOtherByPriority) {
   constexpr std::size_t kTasks = 4;
   unprivileged = false;
-  cpu_set_t before;
-  CPU_ZERO(&before);
-  ASSERT_EQ(::sched_getaffinity(0, sizeof before, &before), 0);
-  ASSERT_TRUE(bind_to_one_core());
+  const OneCore core;
+  ASSERT_TRUE(core.bound());
   // Each cycle notes its priority; on one core, nobody else of the same set is in between.
   std::array<int, 10'000> noted{};
   std::atomic<std::size_t> next{0};
@@ -47,7 +34,6 @@ TEST_P(PriorityOrder, TasksThatAreDueTogetherRunOneAfterTheOtherByPriority) {
   }
   const auto created = create();
   if (!created && created.error().code == ErrorCode::refused) {
-    ::sched_setaffinity(0, sizeof before, &before);
     GTEST_SKIP() << created.error().describe();
   }
   ASSERT_TRUE(created) << created.error().describe();
@@ -55,7 +41,6 @@ TEST_P(PriorityOrder, TasksThatAreDueTogetherRunOneAfterTheOtherByPriority) {
   std::this_thread::sleep_for(milliseconds(300));
   ASSERT_TRUE(set->stop(seconds(10)));
   set.reset();
-  ::sched_setaffinity(0, sizeof before, &before);
   const std::span<const int> order(noted.data(), std::min(next.load(), noted.size()));
   ASSERT_GE(order.size(), 4 * kTasks);
   // A host that takes the core away may make a release lost for some of them; the rounds that are whole are
@@ -68,6 +53,99 @@ TEST_P(PriorityOrder, TasksThatAreDueTogetherRunOneAfterTheOtherByPriority) {
   }
   EXPECT_GE(ordered, order.size() * 9 / 10);
 }
+
+// A task of each priority, every 5 ms, on one core. The first cycles are left out.
+struct Overlap {
+  Duration high_offset;
+  Duration low_offset;
+  Duration high_takes;
+  Duration low_takes;
+};
+
+class OverlappingReleases : public PriorityOrder {
+ protected:
+  // false: SCHED_FIFO is not allowed here.
+  bool run(const Overlap& overlap) {
+    unprivileged = false;
+    add(task("high", 2, overlap.high_offset, overlap.high_takes, high));
+    add(task("low", 9, overlap.low_offset, overlap.low_takes, low));
+    const auto created = create();
+    if (!created && created.error().code == ErrorCode::refused) return false;
+    EXPECT_TRUE(created) << created.error().describe();
+    EXPECT_TRUE(set->start(GetParam(), {}));
+    std::this_thread::sleep_for(milliseconds(500));
+    EXPECT_TRUE(set->stop(seconds(10)));
+    set.reset();
+    return true;
+  }
+  // The value that 9 of 10 cycles are not below.
+  static Duration usual_least(std::vector<std::int64_t> values) {
+    if (values.size() < 20) return Duration::zero();
+    std::ranges::sort(values);
+    return Duration(values[values.size() / 10]);
+  }
+
+  struct Seen {
+    std::vector<std::int64_t> latency;
+    std::vector<std::int64_t> execution;
+  };
+  Seen high;
+  Seen low;
+  OneCore core;
+
+ private:
+  TaskConfig task(std::string name, int priority, Duration offset, Duration takes, Seen& seen) {
+    TaskConfig config = cyclic(std::move(name), milliseconds(5), [this, takes] {
+      const Duration until = clock.thread_time() + takes;
+      while (clock.thread_time() < until) {
+      }
+    });
+    config.iec_priority = priority;
+    config.start_offset = offset;
+    seen.latency.reserve(10'000);
+    seen.execution.reserve(10'000);
+    config.after_cycle = [&seen](const TaskCounters& now) {
+      if (seen.latency.size() == seen.latency.capacity()) return;
+      seen.latency.push_back(now.latency_last_ns);
+      seen.execution.push_back(now.exec_last_ns);
+    };
+    return config;
+  }
+};
+
+TEST_P(OverlappingReleases, AtTheSameTimeDelayTheLowerPriorityAndItsLatencyShowsIt) {
+  if (!run({.high_offset = {}, .low_offset = {}, .high_takes = microseconds(800), .low_takes = {}})) {
+    GTEST_SKIP() << "SCHED_FIFO is not allowed";
+  }
+  EXPECT_GE(usual_least(low.latency), microseconds(800));
+  EXPECT_LT(usual_least(high.latency), microseconds(800));
+}
+
+TEST_P(OverlappingReleases, DuringACycleOfHigherPriorityWaitForItsEndAndTheirLatencyShowsIt) {
+  if (!run({.high_offset = {},
+            .low_offset = milliseconds(1),
+            .high_takes = microseconds(1800),
+            .low_takes = {}})) {
+    GTEST_SKIP() << "SCHED_FIFO is not allowed";
+  }
+  EXPECT_GE(usual_least(low.latency), microseconds(700));
+}
+
+TEST_P(OverlappingReleases, OfHigherPriorityPreEmptACycleAndItsExecutionTimeShowsIt) {
+  if (!run({.high_offset = milliseconds(1),
+            .low_offset = {},
+            .high_takes = microseconds(1000),
+            .low_takes = microseconds(2000)})) {
+    GTEST_SKIP() << "SCHED_FIFO is not allowed";
+  }
+  // The lower one spins for 2 ms of the clock, of which the other takes 1 ms: it was pre-empted, not waited
+  // for.
+  EXPECT_LT(usual_least(high.latency), microseconds(900));
+  EXPECT_GE(usual_least(low.execution), microseconds(2000));
+}
+
+INSTANTIATE_TEST_SUITE_P(Each, OverlappingReleases, testing::ValuesIn(every_scheduler()),
+                         scheduler_test_name);
 
 INSTANTIATE_TEST_SUITE_P(Each, PriorityOrder, testing::ValuesIn(every_scheduler()), scheduler_test_name);
 

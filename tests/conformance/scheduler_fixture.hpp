@@ -27,6 +27,11 @@ inline std::string scheduler_test_name(const testing::TestParamInfo<std::string_
   return std::string(tested.param);
 }
 
+/// Whether threads may have the priorities of an instance here.
+inline bool may_use_fifo() {
+  return Thread::start("probe", {.fifo = 1, .nice = 0}, [] {}).has_value();
+}
+
 /// A set of tasks on a clock `Time`, with their statistics and the external events that they name.
 template <class Time>
 class Tasks {
