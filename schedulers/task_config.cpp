@@ -32,4 +32,8 @@ ThreadPriority task_priority(PriorityBand band, int iec_priority) noexcept {
   return {.fifo = 0, .nice = iec_priority - kLowestRealTimeIecPriority - 1};
 }
 
+ThreadPriority switch_priority(PriorityBand band) noexcept {
+  return {.fifo = task_priority(band, kLowestRealTimeIecPriority).fifo - 1, .nice = 0};
+}
+
 }  // namespace plchost

@@ -43,10 +43,10 @@ inline constexpr Duration kMaxInterval = std::chrono::days(50);
 inline constexpr Duration kMinRuntimeInterval = std::chrono::microseconds(1);
 
 /// Which part of SCHED_FIFO's range an instance uses, so that of two instances on one core one goes first.
-///            supervision  tick   IEC 0..15
-///   high         89        88     87..72
-///   normal       69        68     67..52
-///   low          49        48     47..32
+///            supervision  tick   IEC 0..15   switch
+///   high         89        88     87..72       71
+///   normal       69        68     67..52       51
+///   low          49        48     47..32       31
 /// All of them are above the API server's threads (at most 20).
 enum class PriorityBand : std::uint8_t { high, normal, low };
 
@@ -54,6 +54,8 @@ enum class PriorityBand : std::uint8_t { high, normal, low };
 [[nodiscard]] ThreadPriority tick_priority(PriorityBand band) noexcept;
 /// `iec_priority` 0 to 31. 16..31 become SCHED_OTHER with nice 0..15.
 [[nodiscard]] ThreadPriority task_priority(PriorityBand band, int iec_priority) noexcept;
+/// Of the control thread while it exchanges the scheduler: it delays no task, and nobody else delays it.
+[[nodiscard]] ThreadPriority switch_priority(PriorityBand band) noexcept;
 
 /// One task as the application describes it. Validated by TaskSet::create as a whole.
 struct TaskConfig {

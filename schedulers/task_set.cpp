@@ -8,6 +8,7 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
+#include "schedulers/raised_priority.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
@@ -111,6 +112,7 @@ Result<void> TaskSet::start(std::string_view scheduler, const SchedulerSettings&
   watch(settings);
   active_->scheduler->start(origin_);
   hand_out_sources();
+  (void)wait_until_settled(MonotonicClock::now() + kSwitchPatience);
   return {};
 }
 
@@ -121,12 +123,17 @@ Result<void> TaskSet::switch_to(std::string_view scheduler, const SchedulerSetti
   }
   auto arrangement = arrange(scheduler, settings);
   if (!arrangement) return std::unexpected(std::move(arrangement.error()));
-  // Only one of the two may look at event variables at a time; what is due in between is a little late.
-  active_->scheduler->stop();
-  retired_.push_back(std::exchange(active_, std::move(*arrangement)));
-  watch(settings);
-  active_->scheduler->start(origin_);
-  hand_out_sources();
+  {
+    // Only one of the two may look at event variables at a time; what is due in between is late. Nothing but
+    // the tasks themselves may make that longer.
+    const RaisedPriority raised(environment_.allow_unprivileged ? ThreadPriority{} : switch_priority(band_));
+    active_->scheduler->stop();
+    retired_.push_back(std::exchange(active_, std::move(*arrangement)));
+    watch(settings);
+    active_->scheduler->start(origin_);
+    hand_out_sources();
+  }
+  (void)wait_until_settled(MonotonicClock::now() + kSwitchPatience);
   return {};
 }
 
@@ -183,7 +190,6 @@ Result<void> TaskSet::reset_statistics(Task& task) {
 void TaskSet::hand_out_sources() {
   scheduler_name_ = active_->scheduler->name();
   for (std::size_t i = 0; i < threads_.size(); ++i) threads_[i]->use(active_->sources[i].get());
-  (void)wait_until_settled(MonotonicClock::now() + kSwitchPatience);
 }
 
 // The names of the tasks that are not settled at the deadline. If there are none, what was before is free to

@@ -18,6 +18,7 @@ TEST_P(Priorities, FollowTheTableOfTheBand) {
   EXPECT_EQ(tick_priority(band).fifo, supervision - 1);
   EXPECT_EQ(task_priority(band, 0).fifo, supervision - 2);
   EXPECT_EQ(task_priority(band, 15).fifo, supervision - 17);
+  EXPECT_EQ(switch_priority(band).fifo, supervision - 18);
 }
 
 TEST_P(Priorities, FallWithTheIecNumber) {
