@@ -166,7 +166,8 @@ TEST_F(Recorder, ResetWhileItRecordsLeavesNothingOfBefore) {
     while (!stop.load()) {
       // The latency tells between which two resets the cycle was.
       sut_.record(cycle(n, microseconds(100 * (number.load() + 1))));
-      ++n;
+      // A reader needs a moment without a writer.
+      if (++n % 4 == 0) std::this_thread::sleep_for(microseconds(1));
     }
   });
   for (int i = 1; i <= 200; ++i) {
