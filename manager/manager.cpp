@@ -11,6 +11,8 @@
 #include <unistd.h>
 
 #include "api/control/control_handler.hpp"
+#include "instances/launch/core_latency.hpp"
+#include "manager/host_check/host_check.hpp"
 #include "manager/supervisor/process_host.hpp"
 #include "manager/system/child_process.hpp"
 #include "shm/base/log.hpp"
@@ -113,7 +115,9 @@ Result<void> Manager::set_up() {
   if (!signals) return signals;
   make_supervisor();
   write_host();
-  auto server = CommandServer::open(*reactor_, manager_socket_path(host.run_directory), *supervisor_);
+  host_check_ =
+      std::make_unique<HostCheckHandler>(*supervisor_, [this] { return check_host(this_host(config_)); });
+  auto server = CommandServer::open(*reactor_, manager_socket_path(host.run_directory), *host_check_);
   if (!server) return std::unexpected(server.error());
   command_server_ = std::move(*server);
   return {};
@@ -138,6 +142,7 @@ void Manager::make_supervisor() {
                                .publish =
                                    [this](std::size_t index, const InstanceStatus& status) {
                                      page_->write_instance(static_cast<std::uint32_t>(index), status);
+                                     latency_due_ = true;
                                    }},
       make_host);
 }
@@ -179,12 +184,22 @@ Result<void> Manager::run() {
   if (config_.dds.enabled) api_server_.start();
   tick_.set(MonotonicClock::now() + kTick);
   notify_service_manager("READY=1");
+  log_findings(check_host(this_host(config_)));
   return reactor_->run();
 }
 
 void Manager::tick() {
   supervisor_->refresh();
+  if (latency_due_) restore_latency();
   tick_.set(MonotonicClock::now() + kTick);
+}
+
+// What instances held that are gone, now or before this manager.
+void Manager::restore_latency() {
+  const auto restored = restore_core_latency(std::string(kSysfs), config_.host.run_directory);
+  latency_due_ = !restored && restored.error().code == ErrorCode::busy;
+  if (!restored) return;
+  for (const std::string& line : *restored) spdlog::info("{}", line);
 }
 
 void Manager::shut_down() {
@@ -201,6 +216,7 @@ void Manager::shut_down() {
 }
 
 void Manager::clean_up() {
+  restore_latency();
   for (const InstanceConfig& instance : config_.instances) {
     InstancePage::remove(config_.host.pool, instance.name);
   }

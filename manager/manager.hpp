@@ -9,6 +9,7 @@
 #include "manager/api_server.hpp"
 #include "manager/config/manager_config.hpp"
 #include "manager/control/command_server.hpp"
+#include "manager/host_check/host_check_handler.hpp"
 #include "manager/supervisor/supervisor.hpp"
 #include "manager/system/lock_file.hpp"
 #include "manager/system/reactor.hpp"
@@ -43,6 +44,7 @@ class Manager {
   void shut_down();
   void clean_up();
   void tick();
+  void restore_latency();
 
   const ManagerConfig& config_;
   Options options_;
@@ -53,9 +55,11 @@ class Manager {
   std::optional<HostPageReader> earlier_page_;
   std::optional<HostPageWriter> page_;
   std::unique_ptr<Supervisor> supervisor_;
+  std::unique_ptr<HostCheckHandler> host_check_;
   std::unique_ptr<CommandServer> command_server_;
   ApiServer api_server_;
   Reactor::Timer tick_;
+  bool latency_due_ = true;  // an instance may have ended without putting back what it held
   bool ending_ = false;
 };
 

@@ -18,9 +18,10 @@ namespace plchost {
 
 /// Exit codes of plcctl.
 inline constexpr int kExitDone = 0;
-inline constexpr int kExitFailed = 1;  ///< refused or failed
+inline constexpr int kExitFailed = 1;  ///< refused or failed; `check` has found a problem
 inline constexpr int kExitUsage = 2;
 inline constexpr int kExitNoAnswer = 3;
+inline constexpr int kExitWarnings = 4;  ///< `check` has found warnings, and no problem
 
 /// The options of every command.
 struct CliOptions {
@@ -62,6 +63,7 @@ using Action = std::function<int()>;
 void add_list_verbs(CLI::App& app, CliSession& session, Action& action);
 void add_show_verbs(CLI::App& app, CliSession& session, Action& action);
 void add_command_verbs(CLI::App& app, CliSession& session, Action& action);
+void add_check_verb(CLI::App& app, CliSession& session, Action& action);
 void add_post_verb(CLI::App& app, CliSession& session, Action& action);
 void add_watch_verb(CLI::App& app, CliSession& session, Action& action);
 

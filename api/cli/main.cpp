@@ -61,11 +61,13 @@ int main(int argc, char** argv) {
   plchost::Action action;
   CLI::App app("plcctl: control of plchost over DDS", "plcctl");
   app.require_subcommand(1);
-  app.footer("Exit codes: 0 done, 1 refused or failed, 2 usage, 3 no answer.");
+  app.footer(
+      "Exit codes: 0 done, 1 refused, failed or a problem found, 2 usage, 3 no answer, 4 warnings found.");
   add_options(app, session.options);
   plchost::add_list_verbs(app, session, action);
   plchost::add_show_verbs(app, session, action);
   plchost::add_command_verbs(app, session, action);
+  plchost::add_check_verb(app, session, action);
   plchost::add_post_verb(app, session, action);
   plchost::add_watch_verb(app, session, action);
   try {

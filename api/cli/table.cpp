@@ -8,12 +8,6 @@ namespace plchost {
 
 namespace {
 
-std::string printable(std::string text) {
-  std::ranges::replace_if(
-      text, [](char c) { return static_cast<unsigned char>(c) < ' ' || c == '\x7f'; }, '?');
-  return text;
-}
-
 std::string cell_of(const Row& row, const char* field, int decimals) {
   const auto found = row.find(field);
   if (found == row.end() || found->is_null()) return "-";
@@ -34,6 +28,12 @@ bool is_number(const std::vector<Row>& rows, const char* field) {
 }
 
 }  // namespace
+
+std::string printable(std::string text) {
+  std::ranges::replace_if(
+      text, [](char c) { return static_cast<unsigned char>(c) < ' ' || c == '\x7f'; }, '?');
+  return text;
+}
 
 std::string format_table(const std::vector<Row>& rows, const std::vector<Column>& columns) {
   std::vector<std::string> lines(rows.size() + 1);

@@ -19,6 +19,9 @@ struct Column {
   int decimals = 1;
 };
 
+/// The text with '?' in place of characters that could drive a terminal.
+[[nodiscard]] std::string printable(std::string text);
+
 /// An aligned table with a header line: texts to the left, numbers to the right. An empty text is shown as
 /// "-". Characters that could drive a terminal are shown as '?'.
 [[nodiscard]] std::string format_table(const std::vector<Row>& rows, const std::vector<Column>& columns);

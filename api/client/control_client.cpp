@@ -83,6 +83,7 @@ void ControlClient::update() {
   statistics_.update();
   event_status_.update();
   object_status_.update();
+  host_findings_.update();
 }
 
 std::optional<HostView> ControlClient::present(std::string_view name) const {
@@ -126,6 +127,8 @@ Result<HostView> ControlClient::host(std::string_view name, TimePoint deadline) 
   return failure(ErrorCode::not_found,
                  fmt::format("no host '{}' answers; those that do: {}", name, join_names(names)));
 }
+
+template Result<void> ControlClient::open_cache(StatusCache<plc_HostFinding>&, const dds::TopicInfo&);
 
 template <class Sample>
 Result<std::vector<Sample>> ControlClient::snapshot(StatusCache<Sample>& cache, const dds::TopicInfo& topic,

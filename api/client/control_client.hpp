@@ -61,6 +61,10 @@ class ControlClient {
   [[nodiscard]] Result<std::vector<plc_EventStatus>> events(const std::string& host, TimePoint deadline);
   [[nodiscard]] Result<std::vector<plc_ObjectStatus>> objects(const std::string& host, TimePoint deadline);
 
+  /// Has the host looked at anew, and returns what each check found, in their order. The code of the failure
+  /// is the host's own; timed_out: not complete at the deadline.
+  [[nodiscard]] Result<std::vector<plc_HostFinding>> check_host(const std::string& host, TimePoint deadline);
+
   /// A command and its answer. The status that this client shows afterwards has its effect.
   /// timed_out: no answer; whether it was done is not known.
   [[nodiscard]] Result<ApiReply> call(const ApiRequest& request, TimePoint deadline);
@@ -117,6 +121,7 @@ class ControlClient {
   StatisticsCache statistics_;
   StatusCache<plc_EventStatus> event_status_;
   StatusCache<plc_ObjectStatus> object_status_;
+  StatusCache<plc_HostFinding> host_findings_;
   std::map<std::string, Seen> seen_;
   TimePoint last_news_;
   dds::Entity reply_topic_;

@@ -153,8 +153,9 @@ void ControlServer::Parts::on_request(ApiRole role, const dds::Guid& writer, con
   const std::vector<std::string_view> instances(status->instances().begin(), status->instances().end());
   auto checked = check_request(request, role, options.host, instances);
   if (!checked) return answer(client, identity, checked.error().code, checked.error().describe());
-  const PendingCommand command{client, identity, checked->instance,
-                               MonotonicClock::now() + ManagerLink::kCommandLimit};
+  const PendingCommand command{
+      client,        identity, checked->instance, MonotonicClock::now() + ManagerLink::kCommandLimit,
+      checked->verb, {}};
   if (auto sent = manager->send(std::move(*checked), command); !sent) {
     answer(client, identity, sent.error().code, sent.error().describe());
   }
@@ -163,16 +164,51 @@ void ControlServer::Parts::on_request(ApiRole role, const dds::Guid& writer, con
 Result<void> ControlServer::Parts::on_manager() {
   auto finished = manager->receive();
   if (!finished) return std::unexpected(finished.error());
-  finish(*finished);
+  finish(*std::move(finished));
   return {};
 }
 
-void ControlServer::Parts::finish(const std::vector<FinishedCommand>& commands) {
-  for (const FinishedCommand& finished : commands) {
+void ControlServer::Parts::finish(std::vector<FinishedCommand> commands) {
+  for (FinishedCommand& finished : commands) {
+    if (finished.command.verb == ControlVerb::check_host && !collect_findings(finished)) continue;
     // Who looks at the status after the answer sees what the command did.
     status->flush(finished.command.instance, MonotonicClock::now());
     answer(finished.command.client, finished.command.identity, finished.code, finished.text);
   }
+}
+
+// What the manager found when it started is published without being asked for.
+void ControlServer::Parts::ask_for_findings() {
+  PendingCommand nobody;
+  nobody.deadline = MonotonicClock::now() + ManagerLink::kCommandLimit;
+  nobody.verb = ControlVerb::check_host;
+  const auto sent =
+      manager->send({.number = 0, .verb = ControlVerb::check_host, .instance = {}, .argument = {}}, nobody);
+  if (!sent) spdlog::warn("the host is not checked: {}", sent.error().describe());
+}
+
+// One part of the findings: asks for the next one, or publishes them all. Returns true when somebody is to be
+// answered.
+bool ControlServer::Parts::collect_findings(FinishedCommand& finished) {
+  if (finished.code == ErrorCode::ok) {
+    auto next = finished.command.findings.add(finished.text);
+    finished.text.clear();
+    if (next && *next) {
+      const ControlRequest request{
+          .number = 0, .verb = ControlVerb::check_host, .instance = {}, .argument = **next};
+      if (manager->send(request, finished.command)) return false;
+      next = failure(ErrorCode::busy, "the manager does not take the request for the rest of the findings");
+    }
+    if (next) {
+      status->publish_findings(finished.command.findings.findings());
+    } else {
+      finished.code = next.error().code;
+      finished.text = next.error().describe();
+    }
+  }
+  const bool asked = finished.command.client != dds::Guid{};
+  if (!asked && finished.code != ErrorCode::ok) spdlog::warn("the host is not checked: {}", finished.text);
+  return asked;
 }
 
 void ControlServer::Parts::answer(const dds::Guid& client, const plc_SampleIdentity& identity, ErrorCode code,

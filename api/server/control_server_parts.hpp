@@ -43,7 +43,9 @@ struct ControlServer::Parts {
   Result<void> on_manager();
   void answer(const dds::Guid& client, const plc_SampleIdentity& identity, ErrorCode code,
               std::string_view text);
-  void finish(const std::vector<FinishedCommand>& commands);
+  void finish(std::vector<FinishedCommand> commands);
+  void ask_for_findings();
+  [[nodiscard]] bool collect_findings(FinishedCommand& finished);
 
   static void on_event_post(dds_entity_t reader, void* server);
   static void on_wake_listener(dds_entity_t reader, void* server);

@@ -63,6 +63,7 @@ Result<void> ControlServer::Parts::open(PostLedger ledger) {
   if (auto made = make_readers(); !made) return made;
   if (auto listening = listen(); !listening) return listening;
   status->write_presence();
+  ask_for_findings();
   return {};
 }
 

@@ -16,6 +16,7 @@ std::vector<plc_KeyValue> extension_of(const InstanceRuntime& runtime) {
   };
   add("tick_source", runtime.tick_source.view());
   add("tick_fallback", runtime.tick_fallback.view());
+  add("idle_states", runtime.idle_states.view());
   return entries;
 }
 

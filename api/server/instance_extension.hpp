@@ -12,6 +12,7 @@ namespace plchost {
 ///
 ///   tick_source    where the periodic tick comes from
 ///   tick_fallback  why that is not the source that the settings ask for
+///   idle_states    what of the processor's idle states is held off, or why not
 [[nodiscard]] std::vector<plc_KeyValue> extension_of(const InstanceRuntime& runtime);
 
 }  // namespace plchost

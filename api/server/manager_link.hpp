@@ -8,6 +8,7 @@
 #include <control.h>
 
 #include "api/dds/guid.hpp"
+#include "api/server/findings_collector.hpp"
 #include "shm/base/control_message.hpp"
 #include "shm/base/packet_socket.hpp"
 #include "shm/base/time.hpp"
@@ -20,6 +21,8 @@ struct PendingCommand {
   plc_SampleIdentity identity{};
   std::string instance;
   TimePoint deadline;
+  ControlVerb verb = ControlVerb::status;
+  FindingsCollector findings;  ///< of check_host
 };
 
 /// A command that has its answer.

@@ -23,9 +23,10 @@ Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const 
   auto instances = make(dds::kInstanceStatus, dds::status_qos());
   auto events = make(dds::kEventStatus, dds::status_qos());
   auto objects = make(dds::kObjectStatus, dds::status_qos());
+  auto findings = make(dds::kHostFinding, dds::status_qos());
   auto hosts = make(dds::kHostStatus, dds::status_qos());
   auto presence = make(dds::kPresence, dds::presence_qos());
-  for (auto* made : {&tasks, &statistics, &instances, &events, &objects, &hosts, &presence}) {
+  for (auto* made : {&tasks, &statistics, &instances, &events, &objects, &findings, &hosts, &presence}) {
     if (!*made) return failure_in("publish status", made->error());
   }
   StatusPublisher publisher(source,
@@ -35,6 +36,7 @@ Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const 
   publisher.instances_ = StatusTable<plc_InstanceStatus>(std::move(*instances));
   publisher.events_ = StatusTable<plc_EventStatus>(std::move(*events));
   publisher.objects_ = StatusTable<plc_ObjectStatus>(std::move(*objects));
+  publisher.findings_ = StatusTable<plc_HostFinding>(std::move(*findings));
   publisher.hosts_ = StatusTable<plc_HostStatus>(std::move(*hosts));
   publisher.presence_ = std::move(*presence);
   publisher.topics_ = std::move(topics);
@@ -45,6 +47,7 @@ void StatusPublisher::tick(TimePoint now) {
   bool changed = look_at_instances(now);
   if (now >= next_objects_) changed |= look_at_objects(now);
   tasks_.look(now);
+  findings_.write();
   write_host(changed);
 }
 
@@ -134,6 +137,29 @@ bool StatusPublisher::update_event(const ObjectInfo& object) {
   sample.bound_tasks = object.bound_tasks;
   sample.posts = object.value;
   return events_.update(object.name, sample);
+}
+
+void StatusPublisher::publish_findings(const std::vector<HostFinding>& findings) {
+  findings_.begin_round();
+  for (std::size_t i = 0; i < findings.size(); ++i) {
+    const HostFinding& finding = findings[i];
+    plc_HostFinding sample{};
+    dds::copy_text(sample.host, source_.host);
+    dds::copy_text(sample.id, finding.id);
+    sample.epoch = source_.epoch;
+    sample.round = round_ + 1;
+    sample.finding_count = static_cast<std::uint32_t>(findings.size());
+    sample.position = static_cast<std::uint32_t>(i);
+    sample.level = static_cast<std::uint32_t>(finding.level);
+    dds::copy_text(sample.subject, finding.subject);
+    dds::copy_text(sample.found, finding.found);
+    dds::copy_text(sample.why, finding.why);
+    dds::copy_text(sample.advice, finding.advice);
+    (void)findings_.update(finding.id, sample);
+  }
+  (void)findings_.dispose_rest();
+  findings_.write();
+  write_host(true);
 }
 
 void StatusPublisher::write_host(bool changed) {

@@ -8,6 +8,7 @@
 
 #include <control.h>
 
+#include "api/control/host_finding.hpp"
 #include "api/dds/topics.hpp"
 #include "api/server/status_table.hpp"
 #include "api/server/task_watch.hpp"
@@ -32,6 +33,8 @@ class StatusPublisher {
   /// Writes all that concerns an instance at once: before the answer to a command that changed it.
   void flush(const std::string& instance, TimePoint now);
   void write_presence();
+  /// All findings of one check of the host, in place of those of the one before.
+  void publish_findings(const std::vector<HostFinding>& findings);
 
   /// HostStatus.round as last written.
   [[nodiscard]] std::uint64_t round() const noexcept { return round_; }
@@ -56,6 +59,7 @@ class StatusPublisher {
   StatusTable<plc_InstanceStatus> instances_;
   StatusTable<plc_EventStatus> events_;
   StatusTable<plc_ObjectStatus> objects_;
+  StatusTable<plc_HostFinding> findings_;
   StatusTable<plc_HostStatus> hosts_;
   dds::Entity presence_;
   std::vector<dds::Entity> topics_;

@@ -1,5 +1,6 @@
 #include "instances/runtime/idle_states.hpp"
 
+#include <cstdint>
 #include <utility>
 
 #include <fcntl.h>

@@ -1,20 +1,13 @@
 #pragma once
 
-#include <cstdint>
 #include <string>
 #include <vector>
 
 #include "instances/launch/core_latency.hpp"
+#include "instances/runtime/settings.hpp"
 #include "shm/base/unique_fd.hpp"
 
 namespace plchost {
-
-/// [SysTimer] IdleStates: whether an idle core may fall into a sleep that it takes long to wake up from.
-enum class IdleStates : std::uint8_t {
-  hold,       ///< no core of the host may, while the process lives
-  hold_core,  ///< the cores of the instance may not; the others save power
-  allow,
-};
 
 /// Idle cores held awake, as long as this lives. Set-up.
 class IdleHold {

@@ -62,7 +62,7 @@ Result<std::string> Instance::lock_memory() {
 }
 
 Result<std::string> Instance::read_settings_file() {
-  if (options_.launch.settings.empty()) return {};
+  if (options_.launch.settings.empty()) return hold_idle_states();
   auto settings = read_settings(options_.launch.settings);
   if (!settings) return std::unexpected(std::move(settings).error());
   settings_ = *std::move(settings);
@@ -75,7 +75,13 @@ Result<std::string> Instance::read_settings_file() {
                  fmt::join(settings_.foreign_components, ", "));
   }
   for (const std::string& remark : settings_.remarks) spdlog::warn("settings: {}", remark);
-  return {};
+  return hold_idle_states();
+}
+
+// Needs the settings, and the cores that bind_core() has got.
+std::string Instance::hold_idle_states() {
+  idle_hold_ = IdleHold::take(settings_.idle_states, cores_, options_.launch.run_directory, {});
+  return idle_hold_.as_wanted() ? std::string() : fmt::format("idle states: {}", idle_hold_.status());
 }
 
 Result<std::string> Instance::attach_pool() {
@@ -186,6 +192,7 @@ void Instance::beat() {
   runtime.memory_locked = real_time_.memory_locked ? 1 : 0;
   runtime.heartbeat_ns = MonotonicClock::now().time_since_epoch().count();
   runtime.scheduler.assign(scheduler_);
+  runtime.idle_states.assign(idle_hold_.status());
   if (application_) runtime.application.assign(application_->path());
   page_->write_runtime(runtime);
 }

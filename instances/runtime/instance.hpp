@@ -8,6 +8,7 @@
 #include "instances/runtime/application.hpp"
 #include "instances/runtime/application_host.hpp"
 #include "instances/runtime/components.hpp"
+#include "instances/runtime/idle_states.hpp"
 #include "instances/runtime/instance_socket.hpp"
 #include "instances/runtime/options.hpp"
 #include "instances/runtime/process_setup.hpp"
@@ -75,6 +76,7 @@ class Instance {
   [[nodiscard]] Result<std::string> reset_statistics(const std::string& task);
   [[nodiscard]] std::string status() const;
 
+  [[nodiscard]] std::string hold_idle_states();
   void restore_operator_events();
   void notify_tasks(unsigned event);
 
@@ -83,6 +85,7 @@ class Instance {
   std::vector<int> cores_;
   RealTimeSetup real_time_;
   InstanceSettings settings_;
+  IdleHold idle_hold_;
   UniqueFd name_claim_;
   std::optional<ObjectPool> pool_;
   std::optional<ApplicationHost> host_;

@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <cstdint>
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <linux/capability.h>
 #include <malloc.h>
@@ -51,18 +49,6 @@ Result<void> lock_memory() {
   return {};
 }
 
-Result<UniqueFd> hold_latency() {
-  UniqueFd fd(::open("/dev/cpu_dma_latency", O_WRONLY | O_CLOEXEC));
-  if (!fd) return failure(ErrorCode::refused, "open /dev/cpu_dma_latency", errno);
-  const std::int32_t microseconds = 0;
-  if (const auto written =
-          check_errno(::write(fd.get(), &microseconds, sizeof microseconds), "write /dev/cpu_dma_latency");
-      !written) {
-    return std::unexpected(written.error());
-  }
-  return fd;
-}
-
 }  // namespace
 
 Result<std::vector<int>> bind_to_cores(const std::vector<int>& cores) {
@@ -90,12 +76,6 @@ RealTimeSetup set_up_real_time() {
   const auto locked = lock_memory();
   setup.memory_locked = locked.has_value();
   if (!locked) remarks.push_back(fmt::format("memory is not locked: {}", locked.error().describe()));
-  auto hold = hold_latency();
-  if (hold) {
-    setup.latency_hold = *std::move(hold);
-  } else {
-    remarks.push_back(fmt::format("sleep states of the processor stay on: {}", hold.error().describe()));
-  }
   // Threads inherit it. Only SCHED_OTHER has slack; FIFO threads have none anyway.
   if (::prctl(PR_SET_TIMERSLACK, 1UL, 0UL, 0UL, 0UL) != 0)
     remarks.emplace_back("the timer slack stays at 50 us");

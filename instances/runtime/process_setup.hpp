@@ -12,13 +12,11 @@ namespace plchost {
 /// refused: that is something else than was asked for; the text lists the cores on line.
 [[nodiscard]] Result<std::vector<int>> bind_to_cores(const std::vector<int>& cores);
 
-/// Memory locked, timer slack 1 ns, the processor held out of its slow sleep states. Each may be refused
-/// where a right is missing: then `remark` says so and what to change, and the instance runs with worse
-/// latency.
+/// Memory locked, timer slack 1 ns. Each may be refused where a right is missing: then `remark` says so and
+/// what to change, and the instance runs with worse latency.
 struct RealTimeSetup {
   bool memory_locked = false;
-  UniqueFd latency_hold;  ///< /dev/cpu_dma_latency, held at 0 while it is open
-  std::string remark;     ///< empty: all was granted
+  std::string remark;  ///< empty: all was granted
 };
 [[nodiscard]] RealTimeSetup set_up_real_time();
 

@@ -46,6 +46,7 @@ struct InstanceRuntime {
   FixedText<kMaxPath> application;
   FixedText<kMaxTickText> tick_source;    ///< where the periodic tick comes from
   FixedText<kMaxTickText> tick_fallback;  ///< why that is not what the settings ask for; empty: it is
+  FixedText<kMaxTickText> idle_states;    ///< what of the processor's idle states is held off, or why not
 };
 
 struct TaskSlot {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "api/client/control_client.hpp"
+#include "api/control/host_finding.hpp"
 #include "shm/base/control_message.hpp"
 #include "shm/base/unique_fd.hpp"
 #include "shm/pool/host_page.hpp"
@@ -61,11 +62,22 @@ class TestHost {
     const std::lock_guard lock(mutex_);
     answer_ = std::move(reply);
   }
+  /// What the manager finds at the host from the next check on.
+  void find(std::vector<HostFinding> findings) {
+    const std::lock_guard lock(mutex_);
+    findings_ = std::move(findings);
+  }
+  /// How often it was asked to look.
+  [[nodiscard]] std::uint64_t checks() {
+    const std::lock_guard lock(mutex_);
+    return checks_;
+  }
   std::atomic<bool> silent{false};      ///< the manager answers nothing
   std::atomic<bool> close_peer{false};  ///< the manager hangs up
 
  private:
   void serve(const std::stop_token& stop);
+  ControlReply check_host(const std::string& argument);
 
   std::uint32_t domain_;
   std::string name_;
@@ -76,6 +88,8 @@ class TestHost {
   std::vector<std::string> instances_;
   ControlReply answer_;  // guarded by mutex_
   std::mutex mutex_;
+  std::vector<HostFinding> findings_;
+  std::uint64_t checks_ = 0;
   std::vector<ControlRequest> requests_;
   std::unique_ptr<Child> server_;
   std::jthread manager_;

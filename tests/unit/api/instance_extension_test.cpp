@@ -22,8 +22,10 @@ TEST(InstanceExtension, CarriesWhatTheInstanceSaysAndNothingThatIsEmpty) {
   EXPECT_TRUE(extension_of(runtime).empty());
   runtime.tick_source.assign("System");
   runtime.tick_fallback.assign("open /dev/rtc7: No such file");
+  runtime.idle_states.assign("held for core 1");
   const auto entries = extension_of(runtime);
-  ASSERT_EQ(entries.size(), 2U);
+  ASSERT_EQ(entries.size(), 3U);
+  EXPECT_EQ(dds::text_of(entries[2].name), "idle_states");
   EXPECT_EQ(dds::text_of(entries[0].name), "tick_source");
   EXPECT_EQ(dds::text_of(entries[0].value), "System");
   EXPECT_EQ(dds::text_of(entries[1].name), "tick_fallback");

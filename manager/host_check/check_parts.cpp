@@ -1,0 +1,143 @@
+#include <algorithm>
+#include <charconv>
+#include <cstdint>
+#include <sstream>
+
+#include <fmt/format.h>
+
+#include "manager/host_check/checks.hpp"
+#include "manager/host_check/cpu_list.hpp"
+
+namespace plchost::host_check {
+
+HostFinding finding(FindingLevel level, std::string subject, std::string found, std::string why,
+                    std::string advice) {
+  return {.id = {},
+          .level = level,
+          .subject = std::move(subject),
+          .found = std::move(found),
+          .why = std::move(why),
+          .advice = std::move(advice)};
+}
+
+HostFinding unknown(std::string subject, const Error& error, std::string why) {
+  return finding(FindingLevel::note, std::move(subject), fmt::format("not known: {}", error.describe()),
+                 std::move(why));
+}
+
+std::vector<int> plc_cores(const CheckedHost& host) {
+  std::vector<int> cores;
+  for (const CheckedHost::Instance& instance : host.instances) cores.push_back(instance.core);
+  std::ranges::sort(cores);
+  cores.erase(std::ranges::unique(cores).begin(), cores.end());
+  return cores;
+}
+
+std::string name_cores(const CheckedHost& host, const std::vector<int>& cores) {
+  std::string text;
+  for (const int core : cores) {
+    std::string names;
+    for (const CheckedHost::Instance& instance : host.instances) {
+      if (instance.core == core) names += fmt::format("{}{}", names.empty() ? "" : ", ", instance.name);
+    }
+    text += fmt::format("{}core {}", text.empty() ? "" : ", ", core);
+    if (!names.empty()) text += fmt::format(" ({})", names);
+  }
+  return text;
+}
+
+Result<std::vector<int>> isolated(const HostFiles& files) {
+  auto cores = files.cores("/sys/devices/system/cpu/isolated");
+  const auto sets = files.cores("/sys/fs/cgroup/cpuset.cpus.isolated");
+  if (!cores || !sets) return cores;
+  std::vector<int> all;
+  std::ranges::set_union(*cores, *sets, std::back_inserter(all));
+  return all;
+}
+
+std::string boot_value(std::string_view command_line, std::string_view key) {
+  std::string value;
+  std::istringstream words{std::string(command_line)};
+  for (std::string word; words >> word;) {
+    if (word == "--") break;  // what follows is for init
+    if (word.size() > key.size() && word.starts_with(key) && word[key.size()] == '=') {
+      value = word.substr(key.size() + 1);
+    }
+  }
+  return value;
+}
+
+namespace {
+
+bool has_controller(std::string_view list, std::string_view controller) {
+  for (std::size_t at = 0; at <= list.size();) {
+    const std::size_t end = std::min(list.find(',', at), list.size());
+    if (list.substr(at, end - at) == controller) return true;
+    at = end + 1;
+  }
+  return false;
+}
+
+}  // namespace
+
+std::vector<std::string> group_folders(const HostFiles& files, std::string_view controller) {
+  const auto groups = files.text("/proc/self/cgroup");
+  std::string root;
+  std::string path;
+  std::istringstream lines{groups.value_or("")};
+  // "4:cpu,cpuacct:/path", and "0::/path" of the unified hierarchy.
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t first = line.find(':');
+    const std::size_t second = line.find(':', first + 1);
+    if (first == std::string::npos || second == std::string::npos) continue;
+    const std::string list = line.substr(first + 1, second - first - 1);
+    const bool unified = list.empty() && root.empty();
+    if (!unified && !has_controller(list, controller)) continue;
+    root = list.empty() ? "/sys/fs/cgroup" : fmt::format("/sys/fs/cgroup/{}", list);
+    if (!list.empty() && !files.exists(root)) root = fmt::format("/sys/fs/cgroup/{}", controller);
+    path = line.substr(second + 1);
+  }
+  std::vector<std::string> folders;
+  constexpr std::size_t kDeepest = 64;
+  while (!root.empty() && folders.size() < kDeepest) {
+    const bool top = path.empty() || path == "/";
+    // A process in a name space of its own may be told a path that is not there.
+    if (const std::string folder = top ? root : root + path; files.exists(folder)) folders.push_back(folder);
+    if (top) break;
+    path.resize(path.rfind('/') == std::string::npos ? 0 : path.rfind('/'));
+  }
+  return folders;
+}
+
+Result<bool> has_capability(const HostFiles& files, unsigned capability) {
+  const std::string path = "/proc/self/status";
+  const auto status = files.text(path);
+  if (!status) return std::unexpected(status.error());
+  constexpr std::string_view kKey = "CapEff:\t";
+  const std::size_t at = status->find(kKey);
+  if (at != std::string::npos) {
+    const char* const begin = status->data() + at + kKey.size();
+    std::uint64_t set = 0;
+    const auto [stopped, error] = std::from_chars(begin, status->data() + status->size(), set, 16);
+    if (error == std::errc()) return (set >> capability & 1U) != 0;
+  }
+  return failure(ErrorCode::corrupt, fmt::format("{} has no CapEff", path));
+}
+
+Result<std::string> soft_limit(const HostFiles& files, std::string_view name) {
+  const std::string path = "/proc/self/limits";
+  const auto limits = files.text(path);
+  if (!limits) return std::unexpected(limits.error());
+  std::istringstream lines(*limits);
+  for (std::string line; std::getline(lines, line);) {
+    if (!line.starts_with(name)) continue;
+    std::istringstream rest(line.substr(name.size()));
+    std::string soft;
+    rest >> soft;
+    const bool number = !soft.empty() && soft.find_first_not_of("0123456789") == std::string::npos;
+    if (number || soft == "unlimited") return soft;
+  }
+  return failure(ErrorCode::corrupt, fmt::format("{} has no '{}'", path, name));
+}
+
+}  // namespace plchost::host_check

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <atomic>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "manager/host_check/host_check.hpp"
+
+namespace plchost {
+
+/// A host made of files in a temporary folder, with instance "line1" on core 2 and "line2" on core 3 of four.
+class FakeTree {
+ public:
+  FakeTree() {
+    static std::atomic<int> count{0};
+    root_ = std::filesystem::temp_directory_path() / fmt::format("plchost-host-{}-{}", ::getpid(), ++count);
+    std::filesystem::create_directories(root_);
+    write("/sys/devices/system/cpu/online", "0-3\n");
+    host = {.files = HostFiles(root_), .instances = {{"line1", 2}, {"line2", 3}}, .try_fifo = [this] {
+              return fifo_error;
+            }};
+  }
+  ~FakeTree() {
+    std::error_code ignored;
+    std::filesystem::remove_all(root_, ignored);
+  }
+  FakeTree(const FakeTree&) = delete;
+  FakeTree& operator=(const FakeTree&) = delete;
+
+  void write(const std::string& path, const std::string& text) const {
+    const std::filesystem::path file = root_.string() + path;
+    std::filesystem::create_directories(file.parent_path());
+    std::ofstream(file, std::ios::binary) << text;
+  }
+  void make_folder(const std::string& path) const {
+    std::filesystem::create_directories(root_.string() + path);
+  }
+  void remove(const std::string& path) const { std::filesystem::remove_all(root_.string() + path); }
+  /// There, but cannot be read as a file: even root gets an error.
+  void make_unreadable(const std::string& path) const {
+    remove(path);
+    make_folder(path);
+  }
+  /// What the check of that name finds.
+  [[nodiscard]] HostFinding look(std::string_view id) const {
+    for (const HostCheck& check : host_checks()) {
+      if (check.id == id) return check.look(host);
+    }
+    HostFinding none;
+    none.id = "no such check";
+    return none;
+  }
+
+  CheckedHost host;
+  int fifo_error = 0;
+
+ private:
+  std::filesystem::path root_;
+};
+
+}  // namespace plchost
