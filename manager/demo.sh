@@ -158,7 +158,7 @@ In another terminal:
   plcctl watch tasks                          live figures
   plcctl post event line1/stop                the emergency stop of the bottling line
   plcctl stop instance line1; plcctl start instance line1
-  plcctl set scheduler drive1 CmpSchedule     then compare latency_p50 in: plcctl show task drive1/Position
+  plcctl set scheduler drive1 CmpSchedule     then compare the latency in: plcctl show task drive1/Position
   plcctl list events; plcctl list objects
   kill -9 \$(pgrep -x plchost-dds)             the API server comes back by itself
 Configuration: $work/demo.toml, log: $work/log. Ctrl-C here stops everything.

@@ -3,6 +3,7 @@
 #include <cstring>
 #include <random>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -140,6 +141,28 @@ TEST_F(Pages, InstancePageHoldsNoneAndTheMostTasksAndRefusesMore) {
   EXPECT_THAT(more.error().message, HasSubstr("at most 1024"));
 }
 
+TEST_F(Pages, HistogramsAreFineUpTo64TasksAndCoarseBeyond) {
+  for (const auto& [count, digits] : {std::pair{kMaxFineTasks, HistogramShape::kFine},
+                                      std::pair{kMaxFineTasks + 1, HistogramShape::kCoarse}}) {
+    auto writer = InstancePage::create(pool(), "line1", tasks_of(count));
+    const auto sut = InstancePageReader::open(pool(), "line1");
+    ASSERT_TRUE(sut) << sut.error().describe();
+    EXPECT_EQ(sut->histogram_shape().digits(), digits);
+    for (std::uint32_t i = 0; i < count; ++i) {
+      writer->statistics(i).latency.record(Duration(i));
+      writer->statistics(i).jitter_positive.record(Duration::max());
+    }
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const auto total = [&](TaskHistogram which) { return sut->histogram(i, which).total(); };
+      EXPECT_EQ(sut->histogram(i, TaskHistogram::latency).count(i), 1U);
+      EXPECT_EQ(total(TaskHistogram::latency), 1U);
+      EXPECT_EQ(total(TaskHistogram::execution), 0U);
+      EXPECT_EQ(total(TaskHistogram::jitter_negative), 0U);
+      EXPECT_EQ(total(TaskHistogram::jitter_positive), 1U);
+    }
+  }
+}
+
 TEST_F(Pages, ReadersOfAnAbsentPageAreTold) {
   EXPECT_EQ(HostPageReader::open(pool()).error().code, ErrorCode::not_found);
   EXPECT_EQ(InstancePageReader::open(pool(), "line1").error().code, ErrorCode::not_found);
@@ -165,13 +188,20 @@ TEST_F(Pages, HeadersThatDoNotFitAreCorrupt) {
   const MemoryFile memory = map(instance_page_name(pool(), "line1"));
   auto& page = *reinterpret_cast<InstancePageLayout*>(memory.bytes().data());
   const auto refused = [&] {
-    return InstancePageReader::open(pool(), "line1").error().code == ErrorCode::corrupt;
+    const auto opened = InstancePageReader::open(pool(), "line1");
+    return !opened && opened.error().code == ErrorCode::corrupt;
   };
   for (const std::uint32_t count : {0U, 1U, 3U, kMaxTasks + 1, ~0U}) {
     page.task_count = count;
     EXPECT_TRUE(refused());
   }
   page.task_count = 2;
+  for (const std::uint32_t digits : {0U, 1U, HistogramShape::kCoarse, 4U, ~0U}) {
+    page.digits = digits;
+    EXPECT_TRUE(refused());
+  }
+  page.digits = HistogramShape::kFine;
+  EXPECT_FALSE(refused());
   page.version += 1;
   EXPECT_TRUE(refused());
   page.version -= 1;
@@ -192,6 +222,7 @@ TEST_F(Pages, AReaderKeepsToTheSizeThatItOpened) {
   EXPECT_FALSE(sut->task(1));
   EXPECT_FALSE(sut->task(2));
   EXPECT_FALSE(sut->runtime());
+  EXPECT_EQ(sut->histogram(1, TaskHistogram::jitter_positive).percentile(0.0), Duration::zero());
 }
 
 TEST_F(Pages, AnImpossibleInstanceCountIsNotShown) {
