@@ -223,6 +223,26 @@ RTS_RESULT CDECL EventUnregisterCallbackFunction(unsigned int EventId, PF_EVENT_
 /* Runs the tasks bound to this event once. ERR_OK; ERR_NO_TASK; ERR_PARAMETER: not such a handle. Any. */
 RTS_RESULT CDECL CAL_SysEventSet(RTS_HANDLE hEvent);
 
+/* ---- Time -----------------------------------------------------------------------------------------------
+ */
+
+/*
+ * Clocks that only go forward, from an origin that means nothing by itself: CLOCK_MONOTONIC, or what the
+ * settings name ([SysTime] CustomSysTimeGetUs, CustomSysTimeGetNs, CustomSysTimeLibrary). All three have one
+ * base. The schedulers themselves stay on CLOCK_MONOTONIC.
+ */
+typedef RTS_UI64 RTS_SYSTIME;
+
+/* ERR_OK; ERR_PARAMETER: pTime is NULL; or what the custom function returns. Any. */
+RTS_RESULT CDECL SysTimeGetUs(RTS_SYSTIME* pTime);
+RTS_RESULT CDECL SysTimeGetNs(RTS_SYSTIME* pTime);
+
+/* Milliseconds, which begin anew at 0 after 2^32 of them. Any. */
+unsigned int CDECL SysTimeGetMs(void);
+
+/* What a library has to offer that is named in the settings. It is called from any context. */
+typedef RTS_RESULT(CDECL* PF_SYSTIME)(RTS_SYSTIME* pTime);
+
 /* ---- Messages -------------------------------------------------------------------------------------------
  */
 

@@ -42,6 +42,13 @@ __attribute__((format(printf, 1, 2))) inline void log(const char* format, ...) {
   plc_log(PLC_LOG_INFO, text);
 }
 
+/// The clock of SysTimeGetNs(), see plc_app.h. Any context.
+inline std::chrono::nanoseconds system_time() noexcept {
+  RTS_SYSTIME ns = 0;
+  SysTimeGetNs(&ns);
+  return std::chrono::nanoseconds(ns);
+}
+
 /// An external event that can be posted to. Empty until it comes from Application::open_event.
 class ExternalEvent {
  public:

@@ -1,13 +1,14 @@
 #include "schedulers/cmp_schedule.hpp"
 
 #include "schedulers/external_event_source.hpp"
+#include "schedulers/tick_device.hpp"
 
 namespace plchost {
 
 CmpSchedule::CmpSchedule(const SchedulerContext& context)
     : clock_(context.clock),
       settings_(context.settings),
-      table_(context.clock),
+      table_(context.clock, context.tick_device ? context.tick_device->frequency() : 0),
       poller_(context.clock, context.settings.max_event_backlog, context.poll_trap),
       ticker_(context, "tick", poller_, [this](TimePoint tick) { on_tick(tick); }) {}
 

@@ -15,6 +15,7 @@ namespace plchost {
 
 class Task;
 class FaultTrap;
+class TickDevice;
 
 /// 100: a freewheeling task sleeps no longer than it must.
 inline constexpr int kMaxProcessorLoad = 100;
@@ -55,8 +56,9 @@ struct SchedulerSettings {
 struct SchedulerContext {
   Clock& clock;
   SchedulerSettings settings;
-  ThreadPriority tick;             ///< of its own threads: above all tasks
-  FaultTrap* poll_trap = nullptr;  ///< of the thread that reads event variables; null: not caught
+  ThreadPriority tick;                        ///< of its own threads: above all tasks
+  FaultTrap* poll_trap = nullptr;             ///< of the thread that reads event variables; null: not caught
+  std::shared_ptr<TickDevice> tick_device{};  ///< of TickSourceKind::auxiliary, its period set
 };
 
 struct SchedulerCapabilities {

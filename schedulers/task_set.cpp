@@ -75,11 +75,17 @@ auto TaskSet::arrange(std::string_view name, const SchedulerSettings& settings)
   if (!entry) return std::unexpected(entry.error());
   if (auto valid = check_settings(settings); !valid) return std::unexpected(std::move(valid.error()));
   auto arrangement = std::make_unique<Arrangement>();
-  arrangement->scheduler =
-      (*entry)->make({.clock = clock_,
-                      .settings = settings,
-                      .tick = environment_.allow_unprivileged ? ThreadPriority{} : tick_priority(band_),
-                      .poll_trap = &poll_trap_});
+  arrangement->tick = choose_tick(settings, *environment_.devices, tick_.device);
+  SchedulerContext context{.clock = clock_,
+                           .settings = settings,
+                           .tick = environment_.allow_unprivileged ? ThreadPriority{} : tick_priority(band_),
+                           .poll_trap = &poll_trap_,
+                           .tick_device = arrangement->tick.device};
+  context.settings.tick_source = arrangement->tick.kind;
+  arrangement->scheduler = (*entry)->make(context);
+  if (auto fit = check_one_shot(*arrangement->scheduler, arrangement->tick); !fit) {
+    return std::unexpected(std::move(fit).error());
+  }
   for (auto& task : tasks_) {
     auto source = arrangement->scheduler->source_for(*task);
     if (!source) {
@@ -103,9 +109,11 @@ Result<void> TaskSet::start(std::string_view scheduler, const SchedulerSettings&
     return failure(ErrorCode::wrong_state,
                    fmt::format("in exception: task {}; reset first", join_names(faulty)));
   }
+  if (tick_.device && tick_.device->fault() != TickFault::none) tick_ = {};  // is opened anew
   auto arrangement = arrange(scheduler, settings);
   if (!arrangement) return std::unexpected(std::move(arrangement.error()));
   active_ = std::move(*arrangement);
+  tick_ = active_->tick;
   origin_ = clock_.now() + kStartLead;
   for (auto& task : tasks_) task->begin(origin_);
   running_ = true;
@@ -129,6 +137,7 @@ Result<void> TaskSet::switch_to(std::string_view scheduler, const SchedulerSetti
     const RaisedPriority raised(environment_.allow_unprivileged ? ThreadPriority{} : switch_priority(band_));
     active_->scheduler->stop();
     retired_.push_back(std::exchange(active_, std::move(*arrangement)));
+    tick_ = active_->tick;
     watch(settings);
     active_->scheduler->start(origin_);
     hand_out_sources();
@@ -143,6 +152,7 @@ Result<void> TaskSet::stop(Duration limit) {
   if (supervision_) supervision_->tasks_stop();
   active_->scheduler->stop();
   for (auto& thread : threads_) thread->park();
+  if (tick_.device) tick_.device->halt();
   retired_.push_back(std::move(active_));
   running_ = false;
   if (const auto busy = wait_until_settled(deadline); !busy.empty()) {

@@ -13,6 +13,7 @@
 #include "schedulers/task.hpp"
 #include "schedulers/task_config.hpp"
 #include "schedulers/task_thread.hpp"
+#include "schedulers/tick_choice.hpp"
 #include "shm/base/counted_event.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/task_statistics.hpp"
@@ -37,6 +38,8 @@ struct TaskEnvironment {
   /// For development, and tests in places without the right to SCHED_FIFO: all threads run as SCHED_OTHER, so
   /// neither priorities nor times hold.
   bool allow_unprivileged = false;
+  /// Where clock devices are opened.
+  DeviceFiles* devices = &linux_device_files();
 };
 
 /// The tasks of one application with their threads, under one scheduler that can be exchanged while they run.
@@ -99,6 +102,9 @@ class TaskSet {
   [[nodiscard]] Result<void> reset_statistics(std::string_view task);
   static constexpr Duration kRecordPatience = std::chrono::seconds(1);
 
+  /// Of the scheduler in use, or of the last one.
+  [[nodiscard]] TickReport tick_report() const { return report_of(tick_); }
+
   [[nodiscard]] bool running() const noexcept { return running_; }
   /// Of the scheduler in use, or of the last one; empty before the first start.
   [[nodiscard]] std::string_view scheduler_name() const noexcept { return scheduler_name_; }
@@ -114,6 +120,7 @@ class TaskSet {
       if (scheduler) scheduler->stop();
     }
     std::unique_ptr<Scheduler> scheduler;
+    TickChoice tick;
     std::vector<std::unique_ptr<ActivationSource>> sources;
   };
 
@@ -133,6 +140,7 @@ class TaskSet {
   UniqueFd fault_fd_;
   FaultBoard fault_board_;
   FaultTrap poll_trap_;  // of the thread that reads event variables
+  TickChoice tick_;
   bool running_ = false;
   TimePoint origin_;  // of all grids, until the next start()
   std::string_view scheduler_name_;

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "schedulers/scheduler.hpp"
+#include "schedulers/tick_capabilities.hpp"
 
 namespace plchost {
 
@@ -11,6 +12,7 @@ namespace plchost {
 class TickSource {
  public:
   virtual ~TickSource() = default;
+  [[nodiscard]] virtual TickCapabilities capabilities() const noexcept = 0;
   /// Ticks at `first` and then every `period`. The thread that waits.
   virtual void start(TimePoint first, Duration period) noexcept = 0;
   /// Sleeps until the next tick; its planned time. Of several that have passed, the last. Nothing:
@@ -20,6 +22,14 @@ class TickSource {
   virtual void interrupt() noexcept = 0;
 };
 
-[[nodiscard]] Result<std::unique_ptr<TickSource>> make_tick_source(Clock& clock, TickSourceKind kind);
+/// What a timer of the kernel, and a thread in absolute sleeps, can do.
+inline constexpr TickCapabilities kKernelTimerCapabilities{.periods = TickCapabilities::Periods::linear,
+                                                           .resolution = Duration(1),
+                                                           .shortest = std::chrono::microseconds(50),
+                                                           .longest = kMaxInterval,
+                                                           .one_shot = true};
+
+/// The source of context.settings.tick_source. Set-up.
+[[nodiscard]] Result<std::unique_ptr<TickSource>> make_tick_source(const SchedulerContext& context);
 
 }  // namespace plchost

@@ -31,21 +31,22 @@ class TickTable::Slot final : public ActivationSource, public DueQueue::Entry {
   // it, and then the task takes its turn in the order, because others are woken by it.
   std::optional<Activation> wait() noexcept override {
     const Activation activation = task_.next_release(rule_);
-    const Duration::rep release = to_count(activation.release);
-    if (table_.last_tick_.load() >= release) return activation;
+    const Duration interval = task_.interval();
+    const Duration::rep release = to_count(activation.release) - table_.slack(interval);
+    if (table_.last_tick_.load() >= release) return table_.on_the_tick(activation, interval);
     due.store(release);
     table_.hand_in(*this);
     const bool passed = table_.last_tick_.load() >= release;
     if (!passed && gate_.wait(table_.clock_) == ActivationGate::Outcome::opened) {
       wake_next();
-      return activation;
+      return table_.on_the_tick(activation, interval);
     }
     if (due.exchange(kNotDue) == kClaimed) {
       gate_.pass(table_.clock_);
       wake_next();
     }
     if (!passed) return std::nullopt;  // the release is not run yet, so the next wait() has it again
-    return activation;
+    return table_.on_the_tick(activation, interval);
   }
 
   void interrupt() noexcept override { gate_.interrupt(table_.clock_); }
@@ -78,6 +79,30 @@ std::unique_ptr<ActivationSource> TickTable::add(const Task& task, FreewheelRule
   return slot;
 }
 
+bool TickTable::runs_on_ticks(Duration interval) const noexcept {
+  constexpr Duration::rep kSecond = 1'000'000'000;
+  return frequency_ != 0 && interval > Duration::zero() &&
+         interval.count() % kSecond * frequency_ % kSecond == 0;
+}
+
+// How much earlier than planned the tick of a release may come: the nearest tick it is, whatever the device
+// has drifted since the one before.
+Duration::rep TickTable::slack(Duration interval) const noexcept {
+  if (!runs_on_ticks(interval)) return 0;
+  return 1'000'000'000 / Duration::rep{frequency_} * 2 / 5;
+}
+
+// The thread of the task may see a later tick than the one that released it; then the release stays as
+// planned, and the next one is put on its tick.
+Activation TickTable::on_the_tick(Activation activation, Duration interval) const noexcept {
+  if (!runs_on_ticks(interval)) return activation;
+  const Duration::rep tick = device_tick_.load();
+  const Duration::rep behind = tick - (to_count(activation.release) - slack(interval));
+  if (behind >= 0 && behind < 1'000'000'000 / Duration::rep{frequency_})
+    activation.release = TimePoint(Duration(tick));
+  return activation;
+}
+
 void TickTable::start(TimePoint tick) noexcept {
   std::ranges::stable_sort(slots_, {}, &Slot::priority);
   for (std::size_t i = 0; i < slots_.size(); ++i) slots_[i]->rank = i;
@@ -94,6 +119,7 @@ void TickTable::hand_in(Slot& slot) noexcept {
 
 auto TickTable::on_tick(TimePoint tick) noexcept -> Work {
   const Duration::rep now = to_count(tick);
+  if (frequency_ != 0) device_tick_.store(now);  // before the tick can be seen
   last_tick_.store(now);
   Work work;
   due_.clear();

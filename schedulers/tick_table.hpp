@@ -27,7 +27,14 @@ class TickTable {
     std::size_t looked_at = 0;  ///< tasks that were touched at all
   };
 
-  explicit TickTable(Clock& clock) noexcept : clock_(clock) {}
+  /// `frequency`: of the device that ticks, Hz; 0: the ticks come from `clock`.
+  ///
+  /// A device has a time of its own, which drifts against the clock that releases are planned in. So under a
+  /// device a task whose interval is a multiple of the tick runs on ticks: its release is the planned time of
+  /// the tick, and its grid follows the device. Other intervals keep the grid of the clock and wait for the
+  /// next tick, as always.
+  explicit TickTable(Clock& clock, std::uint32_t frequency = 0) noexcept
+      : clock_(clock), frequency_(frequency) {}
 
   /// The source of a cyclic or freewheeling task. Set-up.
   [[nodiscard]] std::unique_ptr<ActivationSource> add(const Task& task, FreewheelRule rule);
@@ -50,9 +57,15 @@ class TickTable {
   void take_due(Duration::rep tick, Work& work) noexcept;
   void claim(Slot& slot, Duration::rep due) noexcept;
 
+  [[nodiscard]] bool runs_on_ticks(Duration interval) const noexcept;
+  [[nodiscard]] Duration::rep slack(Duration interval) const noexcept;
+  [[nodiscard]] Activation on_the_tick(Activation activation, Duration interval) const noexcept;
+
   Clock& clock_;
+  std::uint32_t frequency_;
   std::vector<Slot*> slots_;
   std::atomic<Duration::rep> last_tick_{0};
+  std::atomic<Duration::rep> device_tick_{0};  // the last one that a device has made
   std::atomic<Slot*> handed_in_{nullptr};  // a list that tasks put themselves on, and a tick takes as a whole
   DueQueue queue_;                         // the tick's alone, like the next
   std::vector<Slot*> due_;

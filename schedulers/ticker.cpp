@@ -9,19 +9,18 @@
 namespace plchost {
 
 Ticker::Ticker(const SchedulerContext& context, std::string thread_name, EventPoller& poller, OnTick on_tick)
-    : clock_(context.clock),
-      kind_(context.settings.tick_source),
+    : context_(context),
+      clock_(context.clock),
       period_(context.settings.scheduler_interval),
-      priority_(context.tick),
       thread_name_(std::move(thread_name)),
       poller_(poller),
       on_tick_(std::move(on_tick)) {}
 
 Result<void> Ticker::prepare() {
-  auto source = make_tick_source(clock_, kind_);
+  auto source = make_tick_source(context_);
   if (!source) return failure_in("tick source", std::move(source.error()));
   source_ = std::move(*source);
-  auto thread = start_clock_thread(clock_, thread_name_, priority_, [this] { run(); });
+  auto thread = start_clock_thread(clock_, thread_name_, context_.tick, [this] { run(); });
   if (!thread) return std::unexpected(std::move(thread.error()));
   thread_ = std::move(*thread);
   return {};

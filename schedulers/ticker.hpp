@@ -38,10 +38,9 @@ class Ticker {
  private:
   void run() noexcept;
 
+  SchedulerContext context_;
   Clock& clock_;
-  TickSourceKind kind_;
   Duration period_;
-  ThreadPriority priority_;
   std::string thread_name_;
   EventPoller& poller_;
   OnTick on_tick_;

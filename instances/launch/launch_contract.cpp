@@ -55,7 +55,7 @@ std::vector<std::string> to_arguments(const std::string& program, const LaunchOp
     arguments.push_back(std::move(value));
   };
   if (!options.cores.empty()) add("--core", fmt::format("{}", fmt::join(options.cores, ",")));
-  add("--scheduler", options.scheduler);
+  if (!options.scheduler.empty()) add("--scheduler", options.scheduler);
   add("--priority-band", options.priority_band);
   if (!options.settings.empty()) add("--settings", options.settings);
   if (!options.application.empty()) add("--application", options.application);

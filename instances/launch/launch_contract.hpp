@@ -13,10 +13,10 @@ namespace plchost {
 /// What a plc-instance is told when it is started: by the manager, or by hand. Both ends use this file, so
 /// that the command line has one home.
 struct LaunchOptions {
-  std::string name;                       ///< --name, at most kMaxInstanceName
-  std::vector<int> cores;                 ///< --core N[,N...]; empty: wherever it was started
-  std::string scheduler = "CmpSchedule";  ///< --scheduler
-  std::string priority_band = "normal";   ///< --priority-band high|normal|low
+  std::string name;                      ///< --name, at most kMaxInstanceName
+  std::vector<int> cores;                ///< --core N[,N...]; empty: wherever it was started
+  std::string scheduler;                 ///< --scheduler; empty: as the settings say, else CmpSchedule
+  std::string priority_band = "normal";  ///< --priority-band high|normal|low
   std::string settings;            ///< --settings FILE in the seeds' [Section] Key=Value form; may be empty
   std::string application;         ///< --application FILE; empty: none (safe mode)
   std::string pool = "plchost";    ///< --pool NAME

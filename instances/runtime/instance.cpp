@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include "instances/runtime/operator_events.hpp"
+#include "instances/runtime/system_time.hpp"
 #include "instances/runtime/task_builder.hpp"
 #include "shm/base/log.hpp"
 
@@ -62,7 +63,10 @@ Result<std::string> Instance::lock_memory() {
 }
 
 Result<std::string> Instance::read_settings_file() {
-  if (options_.launch.settings.empty()) return hold_idle_states();
+  if (options_.launch.settings.empty()) {
+    choose_scheduler();
+    return hold_idle_states();
+  }
   auto settings = read_settings(options_.launch.settings);
   if (!settings) return std::unexpected(std::move(settings).error());
   settings_ = *std::move(settings);
@@ -75,6 +79,7 @@ Result<std::string> Instance::read_settings_file() {
                  fmt::join(settings_.foreign_components, ", "));
   }
   for (const std::string& remark : settings_.remarks) spdlog::warn("settings: {}", remark);
+  choose_scheduler();
   return hold_idle_states();
 }
 
@@ -82,6 +87,19 @@ Result<std::string> Instance::read_settings_file() {
 std::string Instance::hold_idle_states() {
   idle_hold_ = IdleHold::take(settings_.idle_states, cores_, options_.launch.run_directory, {});
   return idle_hold_.as_wanted() ? std::string() : fmt::format("idle states: {}", idle_hold_.status());
+}
+
+// TimerMode=OneShot is the seed's way to ask for distributed clocks; who names a scheduler gets that.
+void Instance::choose_scheduler() {
+  const bool one_shot = settings_.timer_mode == TimerMode::one_shot;
+  if (scheduler_.empty()) {
+    scheduler_ = one_shot ? "CmpScheduleOneShot" : "CmpSchedule";
+  } else if (one_shot && scheduler_ != "CmpScheduleOneShot") {
+    spdlog::warn(
+        "settings: TimerMode=OneShot asks for CmpScheduleOneShot, but {} was asked for at the start and is "
+        "used",
+        scheduler_);
+  }
 }
 
 Result<std::string> Instance::attach_pool() {
@@ -117,6 +135,7 @@ void Instance::restore_operator_events() {
 }
 
 Result<std::string> Instance::load_components() {
+  if (auto used = use_system_time(settings_.sys_time); !used) return std::unexpected(std::move(used).error());
   auto loaded = components_.load(settings_.components);
   host_->write_messages();
   if (!loaded) return std::unexpected(std::move(loaded).error());
@@ -182,8 +201,18 @@ void Instance::notify_tasks(unsigned event) {
   }
 }
 
+void Instance::report_tick() {
+  if (!tasks_) return;
+  TickReport now = tasks_->tick_report();
+  if (!now.fallback.empty() && now.fallback != tick_.fallback) {
+    spdlog::error("tick source: {}; the system's clock ticks instead", now.fallback);
+  }
+  tick_ = std::move(now);
+}
+
 void Instance::beat() {
   host_->write_messages();
+  report_tick();
   host_->events().refresh();
   InstanceRuntime runtime;
   runtime.pid = ::getpid();
@@ -193,6 +222,8 @@ void Instance::beat() {
   runtime.heartbeat_ns = MonotonicClock::now().time_since_epoch().count();
   runtime.scheduler.assign(scheduler_);
   runtime.idle_states.assign(idle_hold_.status());
+  runtime.tick_source.assign(tick_.source);
+  runtime.tick_fallback.assign(tick_.fallback);
   if (application_) runtime.application.assign(application_->path());
   page_->write_runtime(runtime);
 }

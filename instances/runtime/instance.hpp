@@ -77,11 +77,14 @@ class Instance {
   [[nodiscard]] std::string status() const;
 
   [[nodiscard]] std::string hold_idle_states();
+  void choose_scheduler();
+  void report_tick();
   void restore_operator_events();
   void notify_tasks(unsigned event);
 
   Options options_;
   std::string scheduler_;
+  TickReport tick_;  // as it was logged last
   std::vector<int> cores_;
   RealTimeSetup real_time_;
   InstanceSettings settings_;

@@ -64,9 +64,10 @@ void describe(CLI::App& app, Options& options) {
                  "Cores for all of its threads: N[,N...]; default: where it was started")
       ->delimiter(',')
       ->check(CLI::Range(0, kMaxCore));
-  app.add_option("--scheduler", launch.scheduler, "One of " + scheduler_names())
-      ->check(check_scheduler)
-      ->capture_default_str();
+  app.add_option("--scheduler", launch.scheduler,
+                 "One of " + scheduler_names() +
+                     "; default: CmpScheduleOneShot if the settings say TimerMode=OneShot, else CmpSchedule")
+      ->check(check_scheduler);
   app.add_option("--priority-band", launch.priority_band, "high, normal or low")
       ->check(check_band)
       ->capture_default_str();

@@ -33,6 +33,22 @@ std::optional<std::int64_t> integer(std::string_view text) {
   return number;
 }
 
+// "976.5625", rounded to nanoseconds.
+std::optional<Duration> decimal_microseconds(std::string_view text) {
+  const std::size_t point = text.find('.');
+  const auto whole = integer(text.substr(0, point));
+  constexpr std::int64_t kLargest = 1'000'000'000'000;
+  if (!whole || *whole < 0 || *whole > kLargest || text.front() == '-') return std::nullopt;
+  if (point == std::string_view::npos) return Duration(*whole * 1000);
+  constexpr std::size_t kDecimals = 4;
+  std::string decimals(text.substr(point + 1));
+  if (decimals.empty() || decimals.size() > kDecimals || decimals.front() == '-') return std::nullopt;
+  decimals.resize(kDecimals, '0');
+  const auto fraction = integer(decimals);
+  if (!fraction) return std::nullopt;
+  return Duration(*whole * 1000 + (*fraction + 5) / 10);
+}
+
 // The number of "Component.7" for the row "Component.N".
 std::optional<std::size_t> number_of(std::string_view row, std::string_view name) {
   const std::string_view stem = row.substr(0, row.size() - 1);
@@ -113,6 +129,9 @@ std::string allowed_values(const SettingKey& key) {
           [](const OptionalNumberSetting& number) {
             return fmt::format("1 to {}, or -1 (not set)", number.highest);
           },
+          [](const MicrosecondSetting& us) {
+            return fmt::format("{} to {} with up to four decimals", us.lowest, us.highest);
+          },
           [](const WordSetting& word) { return join_names(word.words); },
           [](const TextSetting& text) { return std::string(text.form); },
           [](const NumberedSetting& numbered) {
@@ -150,6 +169,14 @@ Result<void> apply_setting(const SettingKey& key, std::string_view name, std::st
                      [&](const OptionalNumberSetting& setting) {
                        if (!number || *number < -1 || *number == 0 || *number > setting.highest) return false;
                        setting.apply(target, *number);
+                       return true;
+                     },
+                     [&](const MicrosecondSetting& setting) {
+                       const auto us = decimal_microseconds(value);
+                       using std::chrono::microseconds;
+                       if (!us || *us < microseconds(setting.lowest) || *us > microseconds(setting.highest))
+                         return false;
+                       setting.apply(target, *us);
                        return true;
                      },
                      [&](const WordSetting& setting) {

@@ -34,6 +34,13 @@ struct OptionalNumberSetting {
   void (*apply)(const SettingsTarget&, std::int64_t number);
 };
 
+/// Microseconds with up to four decimals, so that 1024 Hz can be written: lowest to highest.
+struct MicrosecondSetting {
+  std::int64_t lowest;
+  std::int64_t highest;
+  void (*apply)(const SettingsTarget&, Duration value);
+};
+
 /// One of these words.
 struct WordSetting {
   std::span<const std::string_view> words;
@@ -64,7 +71,8 @@ struct SettingKey {
   bool prefixed = false;       ///< written with the name of a platform in front: VxWorks.NAME, or Linux.NAME
   std::string_view unit{};     ///< empty: none
   std::string_view initial{};  ///< the default, as it would be written
-  std::variant<NumberSetting, OptionalNumberSetting, WordSetting, TextSetting, NumberedSetting, UnusedSetting>
+  std::variant<NumberSetting, OptionalNumberSetting, MicrosecondSetting, WordSetting, TextSetting,
+               NumberedSetting, UnusedSetting>
       value = UnusedSetting{};
 };
 

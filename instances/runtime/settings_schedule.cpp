@@ -17,10 +17,10 @@ constexpr std::array kKeys = {
                .name = "SchedulerInterval",
                .unit = "us",
                .initial = "1000",
-               .value = NumberSetting{50, 1'000'000,
-                                      [](const SettingsTarget& to, std::int64_t us) {
-                                        to.settings.scheduler.scheduler_interval = microseconds(us);
-                                      }}},
+               .value = MicrosecondSetting{50, 1'000'000,
+                                           [](const SettingsTarget& to, Duration interval) {
+                                             to.settings.scheduler.scheduler_interval = interval;
+                                           }}},
     SettingKey{.section = kSection,
                .name = "Task.Freewheeling.Cycletime",
                .unit = "ms",

@@ -41,7 +41,7 @@ struct InstanceConfig {
   std::string name;
   int core = -1;
   bool share_core = false;
-  std::string scheduler = "CmpSchedule";
+  std::string scheduler;  ///< empty: as the settings say, else CmpSchedule
   std::string priority_band = "normal";
   std::string settings;     ///< empty: the runtime's defaults
   std::string application;  ///< empty: comes up without one

@@ -256,6 +256,7 @@ LaunchOptions ManagedInstance::launch_options(Next next) const {
 void ManagedInstance::spawn(Next next) {
   wants_running_ = next == Next::run;
   setup_failure_.clear();
+  said_scheduler_.clear();
   name_taken_ = false;
   const auto pid = host_.spawn(launch_options(next));
   if (!pid) {
@@ -295,7 +296,7 @@ void ManagedInstance::refresh() {
   const bool runs = runtime->running != 0;
   const bool same_names = safe_mode_ || runtime->application.view() == status_.application.view();
   if (runs == was_running && same_names && runtime->scheduler.view() == status_.scheduler.view()) return;
-  if (!runtime->scheduler.view().empty()) scheduler_ = runtime->scheduler.view();
+  learn_scheduler(runtime->scheduler.view());
   if (!safe_mode_) application_ = runtime->application.view();
   if (runs == was_running || safe_mode_) return publish();
   set_state(Phase::up, runs ? InstanceState::running : InstanceState::stopped,
@@ -332,8 +333,16 @@ void ManagedInstance::set_state(Phase phase, InstanceState state, const std::str
   publish();
 }
 
+// What a process says first, without having been told, is what its settings say: the next one reads them
+// anew.
+void ManagedInstance::learn_scheduler(std::string_view name) {
+  if (name.empty() || name == said_scheduler_) return;
+  if (!scheduler_.empty() || !said_scheduler_.empty()) scheduler_ = name;
+  said_scheduler_ = name;
+}
+
 void ManagedInstance::publish() {
-  status_.scheduler.assign(scheduler_);
+  status_.scheduler.assign(scheduler_.empty() ? said_scheduler_ : scheduler_);
   status_.application.assign(application_);
   surroundings_.changed();
 }

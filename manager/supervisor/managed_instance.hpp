@@ -149,6 +149,7 @@ class ManagedInstance : public InstanceEvents {
   void publish();
   [[nodiscard]] std::string problem_when_up();
   [[nodiscard]] std::string core_problem();
+  void learn_scheduler(std::string_view name);
   [[nodiscard]] LaunchOptions launch_options(Next next) const;
   [[nodiscard]] TimePoint after(Duration duration) const { return surroundings_.now() + duration; }
   [[nodiscard]] Result<std::uint64_t> send(ControlVerb verb, const std::string& argument = {});
@@ -166,11 +167,12 @@ class ManagedInstance : public InstanceEvents {
   bool shutting_down_ = false;
   bool name_taken_ = false;  // another process of that name kept this one from being set up
   TimePoint up_since_{};
-  TimePoint settled_{};        // when the state was last known from the process's own answer
-  std::string setup_failure_;  // why the set-up failed; empty: it did not
-  std::string last_end_;       // how the last process ended by itself; empty: it did not
-  std::string application_;    // of the next process
-  std::string scheduler_;      // of the next process
+  TimePoint settled_{};         // when the state was last known from the process's own answer
+  std::string setup_failure_;   // why the set-up failed; empty: it did not
+  std::string last_end_;        // how the last process ended by itself; empty: it did not
+  std::string application_;     // of the next process
+  std::string scheduler_;       // of the next process; empty: as its settings say
+  std::string said_scheduler_;  // by this process
   std::uint64_t next_number_ = 1;
   std::uint64_t awaited_number_ = 0;  // of the reply in adopting
   std::optional<Operation> operation_;

@@ -96,6 +96,7 @@ class Tasks {
 
   Time clock;
   bool unprivileged = true;
+  DeviceFiles* devices = &linux_device_files();
 
  private:
   TaskEnvironment environment() {
@@ -108,6 +109,7 @@ class Tasks {
       return statistics_[index];
     };
     environment.allow_unprivileged = unprivileged;
+    environment.devices = devices;
     return environment;
   }
 

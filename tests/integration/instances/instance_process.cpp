@@ -62,7 +62,8 @@ std::string Sandbox::write(const std::string& name, const std::string& text) con
   return path;
 }
 
-InstanceProcess::InstanceProcess(const Sandbox& sandbox, const std::vector<std::string>& arguments)
+InstanceProcess::InstanceProcess(const Sandbox& sandbox, const std::vector<std::string>& arguments,
+                                 const std::vector<std::string>& environment)
     : sandbox_(sandbox),
       log_file_(fmt::format("{}/log-{}", sandbox.folder(), unique_name())),
       pool_(ObjectPool::create(sandbox.pool()).value()) {
@@ -77,13 +78,18 @@ InstanceProcess::InstanceProcess(const Sandbox& sandbox, const std::vector<std::
   std::vector<char*> argv;
   for (std::string& argument : all) argv.push_back(argument.data());
   argv.push_back(nullptr);
+  std::vector<std::string> own = environment;
+  std::vector<char*> envp;
+  for (char** variable = environ; *variable != nullptr; ++variable) envp.push_back(*variable);
+  for (std::string& variable : own) envp.push_back(variable.data());
+  envp.push_back(nullptr);
   posix_spawn_file_actions_t actions;
   posix_spawn_file_actions_init(&actions);
   constexpr mode_t kMode = 0600;
   posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, log_file_.c_str(), O_WRONLY | O_CREAT | O_APPEND,
                                    kMode);
   posix_spawn_file_actions_adddup2(&actions, STDERR_FILENO, STDOUT_FILENO);
-  const int error = posix_spawn(&pid_, PLC_INSTANCE, &actions, nullptr, argv.data(), environ);
+  const int error = posix_spawn(&pid_, PLC_INSTANCE, &actions, nullptr, argv.data(), envp.data());
   posix_spawn_file_actions_destroy(&actions);
   if (error != 0) pid_ = -1;
   EXPECT_EQ(error, 0);

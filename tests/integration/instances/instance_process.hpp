@@ -39,8 +39,9 @@ class Sandbox {
 class InstanceProcess {
  public:
   /// Starts it with these arguments, and with the sandbox's --pool and --run-directory unless they are among
-  /// them.
-  InstanceProcess(const Sandbox& sandbox, const std::vector<std::string>& arguments);
+  /// them. `environment`: "NAME=value", beside what the test has.
+  InstanceProcess(const Sandbox& sandbox, const std::vector<std::string>& arguments,
+                  const std::vector<std::string>& environment = {});
   ~InstanceProcess();
   InstanceProcess(const InstanceProcess&) = delete;
   InstanceProcess& operator=(const InstanceProcess&) = delete;

@@ -1,0 +1,149 @@
+#include "instances/runtime/system_time.hpp"
+
+#include <bit>
+
+#include <dlfcn.h>
+#include <fmt/format.h>
+
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr RTS_SYSTIME kNsPerUs = 1000;
+constexpr RTS_SYSTIME kNsPerMs = 1'000'000;
+
+RTS_SYSTIME monotonic_ns() noexcept {
+  return static_cast<RTS_SYSTIME>(MonotonicClock::now().time_since_epoch().count());
+}
+
+// Null: CLOCK_MONOTONIC. Set before an application is loaded, never changed after.
+PF_SYSTIME custom_us = nullptr;
+PF_SYSTIME custom_ns = nullptr;
+
+std::unexpected<Error> bad(const TimeFunction& function, std::string_view what) {
+  return failure(ErrorCode::invalid_argument, fmt::format("{} {}", function.name, what));
+}
+
+/// One function under test: its last value, and its first with the time of CLOCK_MONOTONIC beside it.
+class Watch {
+ public:
+  Watch(const TimeFunction& function, RTS_SYSTIME ns_per_unit)
+      : function_(function), ns_per_unit_(ns_per_unit) {}
+
+  Result<RTS_SYSTIME> read() {
+    RTS_SYSTIME value = 0;
+    if (const RTS_RESULT result = function_.call(&value); result != ERR_OK) {
+      return bad(function_, fmt::format("returned {:#06x}, not ERR_OK", result));
+    }
+    if (begun_ && value < last_) return bad(function_, fmt::format("went back from {} to {}", last_, value));
+    if (!begun_) {
+      first_ = value;
+      first_seen_ = MonotonicClock::now();
+      begun_ = true;
+    }
+    last_ = value;
+    return value;
+  }
+
+  // A wrong unit is a factor of 1000; a scheduler that takes the processor away in between is not.
+  Result<void> check_pace() const {
+    const auto passed =
+        static_cast<RTS_SYSTIME>((MonotonicClock::now() - first_seen_).count()) / ns_per_unit_;
+    const RTS_SYSTIME advanced = last_ - first_;
+    if (advanced == 0) return bad(function_, fmt::format("stays at {}", last_));
+    if (advanced > 4 * passed || 4 * advanced < passed) {
+      return bad(function_, fmt::format("advanced by {} in a time in which CLOCK_MONOTONIC advanced by {}",
+                                        advanced, passed));
+    }
+    return {};
+  }
+
+ private:
+  TimeFunction function_;
+  RTS_SYSTIME ns_per_unit_;
+  bool begun_ = false;
+  RTS_SYSTIME first_ = 0;
+  TimePoint first_seen_;
+  RTS_SYSTIME last_ = 0;
+};
+
+Result<PF_SYSTIME> find(void* library, const std::string& path, const std::string& symbol) {
+  void* const found = ::dlsym(library, symbol.c_str());
+  if (found != nullptr) return std::bit_cast<PF_SYSTIME>(found);
+  return failure(ErrorCode::not_found, fmt::format("[SysTime]: {} has no function '{}'", path, symbol));
+}
+
+RTS_RESULT answer(RTS_SYSTIME* to, PF_SYSTIME custom, RTS_SYSTIME ns_per_unit) noexcept {
+  if (to == nullptr) return ERR_PARAMETER;
+  if (custom != nullptr) return custom(to);
+  *to = monotonic_ns() / ns_per_unit;
+  return ERR_OK;
+}
+
+}  // namespace
+
+Result<void> check_system_time(const TimeFunction& us, const TimeFunction& ns) {
+  Watch us_watch(us, kNsPerUs);
+  Watch ns_watch(ns, 1);
+  constexpr auto kDuration = std::chrono::milliseconds(10);
+  const TimePoint end = MonotonicClock::now() + kDuration;
+  do {
+    const auto before = ns_watch.read();
+    if (!before) return std::unexpected(before.error());
+    const auto between = us_watch.read();
+    if (!between) return std::unexpected(between.error());
+    const auto after = ns_watch.read();
+    if (!after) return std::unexpected(after.error());
+    if (*between + kSystemTimeToleranceUs < *before / kNsPerUs ||
+        *between > *after / kNsPerUs + kSystemTimeToleranceUs) {
+      return failure(ErrorCode::invalid_argument,
+                     fmt::format("{} and {} have no common base: at the same moment {} us and {} ns", us.name,
+                                 ns.name, *between, *before));
+    }
+  } while (MonotonicClock::now() < end);
+  if (auto paced = ns_watch.check_pace(); !paced) return paced;
+  return us_watch.check_pace();
+}
+
+Result<void> use_system_time(const SysTimeSettings& settings) {
+  if (settings == SysTimeSettings{}) return {};
+  // It stays loaded: an application may call it to the very end.
+  void* const library = ::dlopen(settings.library.c_str(), RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
+  if (library == nullptr) {
+    const char* const why = ::dlerror();
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("[SysTime] CustomSysTimeLibrary: {}", why == nullptr ? "dlopen failed" : why));
+  }
+  const auto us = find(library, settings.library, settings.get_us);
+  if (!us) return std::unexpected(us.error());
+  const auto ns = find(library, settings.library, settings.get_ns);
+  if (!ns) return std::unexpected(ns.error());
+  if (auto good = check_system_time({settings.get_us, *us}, {settings.get_ns, *ns}); !good) {
+    return failure_in(fmt::format("[SysTime] {}", settings.library), std::move(good).error());
+  }
+  custom_us = *us;
+  custom_ns = *ns;
+  return {};
+}
+
+}  // namespace plchost
+
+RTS_RESULT SysTimeGetUs(RTS_SYSTIME* pTime) {
+  return plchost::answer(pTime, plchost::custom_us, plchost::kNsPerUs);
+}
+
+RTS_RESULT SysTimeGetNs(RTS_SYSTIME* pTime) {
+  return plchost::answer(pTime, plchost::custom_ns, 1);
+}
+
+unsigned int SysTimeGetMs() {
+  RTS_SYSTIME ns = 0;
+  if (plchost::custom_ns != nullptr) {
+    (void)plchost::custom_ns(&ns);
+  } else {
+    ns = plchost::monotonic_ns();
+  }
+  return static_cast<unsigned int>(ns / plchost::kNsPerMs);
+}

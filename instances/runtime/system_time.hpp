@@ -1,0 +1,29 @@
+#pragma once
+
+#include <string_view>
+
+#include "instances/plc_app.h"
+#include "instances/runtime/settings.hpp"
+#include "shm/base/result.hpp"
+
+namespace plchost {
+
+/// Makes the functions that [SysTime] names what SysTimeGetUs() and SysTimeGetNs() call, from here to the end
+/// of the process. Empty settings: CLOCK_MONOTONIC. The text of an error names the symbol, the library, and
+/// what was seen. Set-up, before anything of an application runs.
+[[nodiscard]] Result<void> use_system_time(const SysTimeSettings& settings);
+
+/// One function of a custom clock.
+struct TimeFunction {
+  std::string_view name;
+  PF_SYSTIME call;
+};
+
+/// The two may differ by this much at the same moment.
+inline constexpr RTS_SYSTIME kSystemTimeToleranceUs = 100;
+
+/// Takes about 10 ms: both answer ERR_OK, never go back, go on at about the pace of CLOCK_MONOTONIC, and have
+/// one base.
+[[nodiscard]] Result<void> check_system_time(const TimeFunction& us, const TimeFunction& ns);
+
+}  // namespace plchost

@@ -1,0 +1,221 @@
+// What a settings file does to a plc-instance.
+#include <cstdio>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "instances/launch/launch_contract.hpp"
+#include "tests/integration/instances/instance_process.hpp"
+
+namespace plchost::testing {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class SettingsFile : public ::testing::Test {
+ protected:
+  std::vector<std::string> with(const std::string& settings, const std::string& program = "optioned") const {
+    return {"--settings", sandbox.write("line1.cfg", settings), "--application", application(program)};
+  }
+  Sandbox sandbox;
+};
+
+/// How far the grid of `task` lies behind that of "Fast", whose offset is 0.
+Duration offset(const InstanceProcess& sut, const std::string& task, Duration interval) {
+  const auto moved = sut.task(task);
+  const auto plain = sut.task("Fast");
+  const std::int64_t apart = moved->counters.release_ns - plain->counters.release_ns;
+  return Duration((apart % interval.count() + interval.count()) % interval.count());
+}
+
+TEST_F(SettingsFile, StartOffsetOfTheApplicationHoldsAndThatOfTheSettingsWins) {
+  {
+    InstanceProcess sut(sandbox, with(""));
+    sut.wait_until_up();
+    ASSERT_TRUE(eventually([&] { return sut.task("Moved")->counters.cycles > 5; }));
+    EXPECT_EQ(offset(sut, "Moved", 2ms), 1ms) << "3 ms, seen from a grid of 2 ms";
+    EXPECT_EQ(sut.end(SIGTERM), 0);
+  }
+  InstanceProcess sut(sandbox, with("[Task.Moved]\nStartOffsetNs=250000\n"));
+  sut.wait_until_up();
+  ASSERT_TRUE(eventually([&] { return sut.task("Moved")->counters.cycles > 5; }));
+  EXPECT_EQ(offset(sut, "Moved", 2ms), 250us);
+}
+
+// Each fifth cycle of 4 ms takes 6 ms: `next` loses a release each time, `asap` runs it 2 ms late.
+TEST_F(SettingsFile, LatePolicyAsapRunsWhatNextLoses) {
+  const auto counters_with = [&](const std::string& policy) {
+    InstanceProcess sut(sandbox, with("[Task.Late]\nLatePolicy=" + policy + "\n"));
+    sut.wait_until_up();
+    EXPECT_TRUE(eventually([&] { return sut.task("Late")->counters.cycles > 200; }));
+    return sut.task("Late")->counters;
+  };
+  const auto share_lost = [](const TaskCounters& counters) {
+    return static_cast<double>(counters.lost_cycles) / static_cast<double>(counters.cycles);
+  };
+  const TaskCounters next = counters_with("Next");
+  const TaskCounters asap = counters_with("Asap");
+  EXPECT_GT(share_lost(next), 0.19);
+  EXPECT_LT(share_lost(asap), share_lost(next));
+  EXPECT_GT(asap.latency_max_ns, 1'900'000);
+}
+
+TEST_F(SettingsFile, SectionOfATaskThatThereIsNotListsTheTasks) {
+  InstanceProcess sut(sandbox, with("[CmpSchedule]\n[Task.Slow]\nLatePolicy=Asap\n"));
+  EXPECT_EQ(sut.end(), 3);
+  EXPECT_THAT(sut.log(),
+              HasSubstr("line1.cfg:2: [Task.Slow]: the application has no task 'Slow'; its tasks are Fast, "
+                        "Moved, Late, Report"));
+}
+
+TEST_F(SettingsFile, OffsetBeyondTheIntervalAndAsapOfAnEventTaskAreRefused) {
+  InstanceProcess offset(sandbox, with("[Task.Fast]\nStartOffsetNs=2000000\n"));
+  EXPECT_EQ(offset.end(), 3);
+  EXPECT_THAT(offset.log(), HasSubstr("below its interval of 2000000 ns"));
+  InstanceProcess asap(sandbox, with("[Task.Report]\nLatePolicy=Asap\n"));
+  EXPECT_EQ(asap.end(), 3);
+  EXPECT_THAT(asap.log(), HasSubstr("only a cyclic task can have a late policy"));
+}
+
+TEST_F(SettingsFile, TimerModeOneShotChoosesTheSchedulerUnlessOneIsNamed) {
+  const auto scheduler_of = [&](std::vector<std::string> arguments) {
+    InstanceProcess sut(sandbox, arguments);
+    sut.wait_until_up();
+    const auto report = decode_instance_report(sut.ask(ControlVerb::status).text);
+    return std::pair(report ? report->scheduler : "", sut.log());
+  };
+  EXPECT_EQ(scheduler_of(with("")).first, "CmpSchedule");
+  EXPECT_EQ(scheduler_of(with("[SysTimer]\nVxWorks.TimerMode=Periodic\n")).first, "CmpSchedule");
+  EXPECT_EQ(scheduler_of(with("[SysTimer]\nVxWorks.TimerMode=OneShot\n")).first, "CmpScheduleOneShot");
+  auto named = with("[SysTimer]\nVxWorks.TimerMode=OneShot\n");
+  named.insert(named.end(), {"--scheduler", "CmpScheduleTimer"});
+  const auto [scheduler, log] = scheduler_of(named);
+  EXPECT_EQ(scheduler, "CmpScheduleTimer");
+  EXPECT_THAT(log,
+              HasSubstr("TimerMode=OneShot asks for CmpScheduleOneShot, but CmpScheduleTimer was asked for"));
+}
+
+TEST_F(SettingsFile, CustomSystemTimeIsWhatTheApplicationSees) {
+  InstanceProcess sut(sandbox, with("[SysTime]\nVxWorks.CustomSysTimeGetUs=MySysTimeGetUs\n"
+                                    "VxWorks.CustomSysTimeGetNs=MySysTimeGetNs\n"
+                                    "VxWorks.CustomSysTimeLibrary=" +
+                                    application("clocks") + "\n"));
+  sut.wait_until_up();
+  (void)sut.event("report").post();
+  ASSERT_TRUE(eventually([&] { return sut.log().find("time us ") != std::string::npos; })) << sut.log();
+  const std::string log = sut.log();
+  unsigned long us = 0;
+  unsigned long ns = 0;
+  unsigned int ms = 0;
+  ASSERT_EQ(std::sscanf(log.c_str() + log.find("time us "), "time us %lu ns %lu ms %u", &us, &ns, &ms), 3);
+  EXPECT_GT(us, 1'000'000'000'000UL) << "1,000,000 s ahead of CLOCK_MONOTONIC";
+  EXPECT_NEAR(static_cast<double>(us), static_cast<double>(ns) / 1e3, 1e6);
+  EXPECT_NEAR(static_cast<double>(ms), static_cast<double>(static_cast<unsigned int>(ns / 1'000'000)), 1e3);
+}
+
+TEST_F(SettingsFile, CustomSystemTimeThatIsNoClockIsRefusedByName) {
+  const auto log_of = [&](const std::string& ns, const std::string& library) {
+    InstanceProcess sut(
+        sandbox, with("[SysTime]\nLinux.CustomSysTimeGetUs=MySysTimeGetUs\nLinux.CustomSysTimeGetNs=" + ns +
+                      "\nLinux.CustomSysTimeLibrary=" + library + "\n"));
+    EXPECT_EQ(sut.end(), 3);
+    return sut.log();
+  };
+  EXPECT_THAT(log_of("OtherBaseNs", application("clocks")),
+              HasSubstr("MySysTimeGetUs and OtherBaseNs have no common base"));
+  EXPECT_THAT(log_of("StoppedNs", application("clocks")), HasSubstr("StoppedNs"));
+  EXPECT_THAT(log_of("NoSuchNs", application("clocks")), HasSubstr("has no function 'NoSuchNs'"));
+  EXPECT_THAT(log_of("MySysTimeGetNs", "clocks.so"), HasSubstr(sandbox.folder() + "/clocks.so"));
+}
+
+// As such files are written for another runtime: all of it is accepted, and what is left alone is said.
+constexpr const char* kForeignFile = R"(;linux
+[SysFile]
+FilePath.1=/etc/, 3S.dat
+PlcLogicPrefix=1
+
+[CmpLog]
+Logger.0.Name=/tmp/codesyscontrol.log
+Logger.0.Filter=0x0000000F
+Logger.0.Backend.0.ClassId=0x00000104 ;writes logger messages in a file
+Logger.0.Type=0x314 ;Set the timestamp to RTC
+
+[ComponentManager]
+Component.1=CmpBACnet
+Component.2=CmpBACnet2
+Component.3=CmpPLCHandler
+Component.4=CmpGwClient
+Component.5=CmpXMLParser
+;Component.7=CmpGwClientCommDrvShm ; enable only if necessary, can result in higher cpu load
+;Component.8=SysPci				; enable when using Hilscher CIFX
+
+[CmpApp]
+Bootproject.RetainMismatch.Init=1
+Application.1=Application
+
+[CmpRedundancyConnectionIP]
+
+[SysExcept]
+Linux.DisableFpuUnderflowException=1
+
+[SysCpuHandling]
+Linux.DisableCpuDmaLatency=1
+
+[SysTask]
+OSPriority.Realtime.Base=45
+
+[SysEthernet]
+Linux.ProtocolFilter=3
+
+[CmpSchedule]
+EnableLogger=1
+SchedulerInterval=4000
+ProcessorLoad.Enable=0
+ProcessorLoad.Maximum=95
+ProcessorLoad.Interval=5000
+DisableOmittedCycleWatchdog=1
+Task.Freewheeling.Cycletime=10
+Scheduling.TaskSupervisor=WatchdogTimer
+Timeslicing.Mode=None
+
+[SysTimer]
+VxWorks.TimerSource=Task
+VxWorks.TimerMode=OneShot
+
+[SysMem]
+Linux.Memlock=1
+VxWorks.Area.0.Flags=0x8000
+
+[CmpSecureChannel]
+SECURITY.CommunicationMode=ONLY_PLAIN
+[CmpUserMgr]
+AsymmetricAuthKey=0a41d6cf5363d976dce29a300697919b8ece69bd
+[CmpSecureChannel]
+CertificateHash=3c0f5865dd0f0fa209668e8f68c2d1341f37a805
+)";
+
+TEST_F(SettingsFile, FileOfAnotherRuntimeIsUsedAsItIs) {
+  InstanceProcess sut(sandbox, with(kForeignFile));
+  sut.wait_until_up();
+  const auto report = decode_instance_report(sut.ask(ControlVerb::status).text);
+  ASSERT_TRUE(report);
+  EXPECT_EQ(report->scheduler, "CmpScheduleOneShot");
+  const std::string log = sut.log();
+  EXPECT_THAT(
+      log,
+      HasSubstr("sections of other programs, left alone: SysFile, CmpLog, CmpApp, CmpRedundancyConnectionIP, "
+                "SysExcept, SysCpuHandling, SysTask, SysEthernet, SysMem, CmpSecureChannel, CmpUserMgr\n"));
+  EXPECT_THAT(log,
+              HasSubstr("components of other programs, left alone: CmpBACnet, CmpBACnet2, CmpPLCHandler, "
+                        "CmpGwClient, CmpXMLParser\n"));
+  for (const char* const key : {"EnableLogger", "Scheduling.TaskSupervisor", "Timeslicing.Mode"}) {
+    EXPECT_THAT(log, HasSubstr(std::string("[CmpSchedule] ") + key + " has no meaning here and is ignored"));
+  }
+  EXPECT_EQ(sut.end(SIGTERM), 0);
+}
+
+}  // namespace
+}  // namespace plchost::testing
