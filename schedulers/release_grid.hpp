@@ -34,6 +34,10 @@ class ReleaseGrid {
   void set_interval(Duration interval) noexcept { interval_ = interval; }
   [[nodiscard]] Duration interval() const noexcept { return interval_; }
 
+  /// The release that is planned now, and where it is moved to, with all that follow.
+  [[nodiscard]] TimePoint next() const noexcept { return next_; }
+  void shift(Duration by) noexcept { next_ += by; }
+
   /// `release`, which plan() gave, runs.
   void ran(TimePoint release) noexcept { next_ = release + interval_; }
 

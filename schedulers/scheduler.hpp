@@ -8,6 +8,7 @@
 
 #include "schedulers/activation.hpp"
 #include "schedulers/clock.hpp"
+#include "schedulers/distributed_clock/settings.hpp"
 #include "schedulers/task_config.hpp"
 #include "shm/base/result.hpp"
 
@@ -48,6 +49,7 @@ struct SchedulerSettings {
       std::chrono::microseconds(100);  ///< bound of the guard of CmpScheduleOneShot; 0: off
   std::uint64_t max_event_backlog = std::uint64_t{1}
                                     << 20;  ///< external events a task may lag behind before it drops
+  DistributedClockSettings distributed_clock;
   WatchdogSettings watchdog;
   bool operator==(const SchedulerSettings&) const = default;
 };

@@ -114,6 +114,9 @@ void Task::run_cycle(const Activation& activation) noexcept {
   if (by_own_time) last_execution_ = clock_.thread_time() - used_before;
   grid_.set_interval(Duration(wanted_interval_.load(std::memory_order_relaxed)));
   grid_.ran(activation.release);
+  if (follower_ != nullptr) {
+    grid_.shift(follower_->correction(grid_.next(), grid_.interval(), config_.start_offset, end));
+  }
   ready_ = end;
   record(activation, start, end);
   if (config_.after_cycle) config_.after_cycle(recorder_.counters());

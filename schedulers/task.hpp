@@ -5,6 +5,7 @@
 
 #include "schedulers/activation.hpp"
 #include "schedulers/clock.hpp"
+#include "schedulers/distributed_clock/distributed_clock.hpp"
 #include "schedulers/event_latch.hpp"
 #include "schedulers/fault_trap.hpp"
 #include "schedulers/freewheel_rule.hpp"
@@ -27,6 +28,12 @@ class Task {
        FaultBoard* board = nullptr) noexcept;
 
   [[nodiscard]] const TaskConfig& config() const noexcept { return config_; }
+
+  /// Cyclic tasks: from now on each release that is planned is moved as `follower` says; it outlives the
+  /// task. Set-up, before the first begin().
+  void follow(ClockFollower& follower) noexcept { follower_ = &follower; }
+  /// Null: it follows no clock. Any context.
+  [[nodiscard]] const ClockFollower* follower() const noexcept { return follower_; }
 
   /// Set-up, while the task is parked: a new grid from `origin` on; what happened while it was parked does
   /// not count.
@@ -81,6 +88,7 @@ class Task {
 
   ReleaseGrid grid_;                            // cyclic
   std::atomic<Duration::rep> wanted_interval_;  // of the grid, from the end of the next cycle on
+  ClockFollower* follower_ = nullptr;
   EventLatch latch_;                            // event
   EventCursor cursor_;                          // external
   TimePoint ready_;                             // since when it could run: the end of its last cycle

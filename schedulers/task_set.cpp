@@ -61,6 +61,9 @@ Result<void> TaskSet::add(TaskConfig config) {
       environment_.allow_unprivileged ? ThreadPriority{} : task_priority(band_, config.iec_priority);
   tasks_.push_back(std::make_unique<Task>(clock_, std::move(config), environment_.statistics(tasks_.size()),
                                           event, &fault_board_));
+  if (const TaskConfig& made = tasks_.back()->config(); made.kind == TaskKind::cyclic) {
+    tasks_.back()->follow(distributed_clock_.add_follower(made.iec_priority));
+  }
   auto thread = TaskThread::start(clock_, *tasks_.back(), priority);
   if (!thread) return std::unexpected(std::move(thread.error()));
   threads_.push_back(std::move(*thread));
@@ -115,6 +118,8 @@ Result<void> TaskSet::start(std::string_view scheduler, const SchedulerSettings&
   active_ = std::move(*arrangement);
   tick_ = active_->tick;
   origin_ = clock_.now() + kStartLead;
+  distributed_clock_.configure(settings.distributed_clock);
+  distributed_clock_.set_steering(active_->scheduler->capabilities().one_shot);
   for (auto& task : tasks_) task->begin(origin_);
   running_ = true;
   watch(settings);
@@ -139,6 +144,7 @@ Result<void> TaskSet::switch_to(std::string_view scheduler, const SchedulerSetti
     retired_.push_back(std::exchange(active_, std::move(*arrangement)));
     tick_ = active_->tick;
     watch(settings);
+    distributed_clock_.set_steering(active_->scheduler->capabilities().one_shot);
     active_->scheduler->start(origin_);
     hand_out_sources();
   }

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "schedulers/distributed_clock/distributed_clock.hpp"
 #include "schedulers/scheduler.hpp"
 #include "schedulers/supervision.hpp"
 #include "schedulers/task.hpp"
@@ -76,6 +77,8 @@ class TaskSet {
   /// In the order in which they were given. What may be called on a task from which context: see Task.
   [[nodiscard]] std::size_t size() const noexcept { return tasks_.size(); }
   [[nodiscard]] Task& task(std::size_t index) noexcept { return *tasks_[index]; }
+  /// What the grids of the cyclic tasks follow, under a scheduler that can move releases.
+  [[nodiscard]] DistributedClock& distributed_clock() noexcept { return distributed_clock_; }
 
   /// A fault, or a watchdog's hit, of one task.
   struct Fault {
@@ -142,6 +145,7 @@ class TaskSet {
   FaultTrap poll_trap_;  // of the thread that reads event variables
   TickChoice tick_;
   bool running_ = false;
+  DistributedClock distributed_clock_;
   TimePoint origin_;  // of all grids, until the next start()
   std::string_view scheduler_name_;
   std::vector<std::unique_ptr<Task>> tasks_;

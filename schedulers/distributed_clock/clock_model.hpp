@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+/// Both clocks at the same instant, as whoever sees both has stamped them.
+struct ReferencePair {
+  TimePoint local;
+  std::int64_t reference_ns = 0;
+};
+
+/// What the reference clock shows at a local time: a straight line. The fraction of a nanosecond and the
+/// slope are floating-point because a drift of 1e-9 is no whole number of anything; times stay whole numbers.
+struct ClockModel {
+  TimePoint local;                ///< where the line is anchored
+  std::int64_t reference_ns = 0;  ///< what the reference shows there
+  double fraction_ns = 0;         ///< and this much more
+  double drift = 0;               ///< how much faster the reference runs: 1e-6 is 1 ppm
+
+  /// Nanoseconds of reference time that pass beyond the `elapsed` of local time, and the anchor's fraction.
+  [[nodiscard]] double excess_ns(Duration elapsed) const noexcept {
+    return fraction_ns + drift * static_cast<double>(elapsed.count());
+  }
+  /// The reference time at `when`, rounded. Wraps around where the reference's range ends.
+  [[nodiscard]] std::int64_t reference_at(TimePoint when) const noexcept {
+    const Duration elapsed = when - local;
+    return wrapping_sum(reference_ns, elapsed.count() + std::llround(excess_ns(elapsed)));
+  }
+  /// Moves the anchor along the line.
+  void move_to(TimePoint when) noexcept {
+    const Duration elapsed = when - local;
+    const double excess = excess_ns(elapsed);
+    const double whole = std::floor(excess);
+    reference_ns = wrapping_sum(reference_ns, elapsed.count() + static_cast<std::int64_t>(whole));
+    fraction_ns = excess - whole;
+    local = when;
+  }
+
+  // A stranger's stamps may lie anywhere: signed overflow must not.
+  [[nodiscard]] static std::int64_t wrapping_sum(std::int64_t a, std::int64_t b) noexcept {
+    return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) + static_cast<std::uint64_t>(b));
+  }
+  [[nodiscard]] static std::int64_t wrapping_difference(std::int64_t a, std::int64_t b) noexcept {
+    return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) - static_cast<std::uint64_t>(b));
+  }
+};
+
+}  // namespace plchost

@@ -1,0 +1,107 @@
+#include "schedulers/distributed_clock/clock_regulator.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+namespace plchost {
+
+namespace {
+
+constexpr double kPpm = 1e-6;
+/// Beyond it the gains of a line through all pairs are below any Kp and Ki.
+constexpr std::uint32_t kEnoughPairs = 1'000'000;
+/// Where the gains begin again after a step or a silence (the drift is still known), and when the drift has
+/// changed.
+constexpr std::uint32_t kPairsAfterStep = 8;
+constexpr std::uint32_t kPairsAfterChange = 16;
+/// Averages over about this many pairs.
+constexpr double kMemory = 32;
+/// Deviations that keep to one side: their average is nearly as large as their magnitude.
+constexpr double kOneSided = 0.8;
+/// An outlier is this many times further off than usual.
+constexpr double kUsualTimes = 8;
+/// One wild pair widens what is usual by no more than a pair at this many times of it would.
+constexpr double kScatterClip = 4;
+/// What a drift may change between two pairs; while it is not known yet, and when two clocks are compared
+/// that may be different ones, it is kMaxDrift.
+constexpr double kDriftChange = 20e-6;
+
+}  // namespace
+
+ClockRegulator::ClockRegulator(const DistributedClockSettings& settings) noexcept
+    : kp_(settings.kp_ppm * kPpm),
+      ki_(settings.ki_ppm * kPpm),
+      tolerance_ns_(static_cast<double>(settings.pair_tolerance.count())),
+      gap_(settings.reference_timeout),
+      scatter_ns_(tolerance_ns_ / kUsualTimes) {}
+
+auto ClockRegulator::feed(const ReferencePair& pair) noexcept -> Verdict {
+  if (pair.reference_ns > kMaxReferenceNs || pair.reference_ns < -kMaxReferenceNs) {
+    return Verdict::out_of_range;
+  }
+  if (pairs_ == 0) {
+    begin(pair);
+    return Verdict::taken;
+  }
+  const Duration elapsed = pair.local - model_.local;
+  if (elapsed <= Duration::zero()) return Verdict::out_of_order;
+  if (elapsed < kMinSpacing) return Verdict::skipped;
+  // Of two whole numbers first: a double has not enough digits for a date.
+  const std::int64_t expected = ClockModel::wrapping_sum(model_.reference_ns, elapsed.count());
+  const double error_ns = static_cast<double>(ClockModel::wrapping_difference(pair.reference_ns, expected)) -
+                          model_.excess_ns(elapsed);
+  const bool outlier = std::abs(error_ns) > limit_ns(elapsed);
+  const double clipped = std::min(std::abs(error_ns), kScatterClip * std::max(scatter_ns_, 1.0));
+  scatter_ns_ += (clipped - scatter_ns_) / kMemory;
+  if (outlier) return consider_step(pair, error_ns);
+  outliers_ = 0;
+  if (elapsed > gap_) pairs_ = std::min(pairs_, kPairsAfterStep);
+  model_.move_to(pair.local);
+  take(error_ns, elapsed);
+  return Verdict::taken;
+}
+
+void ClockRegulator::begin(const ReferencePair& pair) noexcept {
+  model_ = {.local = pair.local, .reference_ns = pair.reference_ns};
+  pairs_ = 1;
+  bias_ns_ = 0;
+}
+
+// The line has been moved to the pair's time already.
+void ClockRegulator::take(double error_ns, Duration elapsed) noexcept {
+  pairs_ = std::min(pairs_ + 1, kEnoughPairs);
+  const double n = pairs_;
+  const double kp = std::max(2 * (2 * n - 1) / (n * (n + 1)), kp_);
+  const double ki = std::max(6 / (n * (n + 1)), ki_);
+  model_.fraction_ns += kp * error_ns;
+  model_.drift =
+      std::clamp(model_.drift + ki * error_ns / static_cast<double>(elapsed.count()), -kMaxDrift, kMaxDrift);
+  bias_ns_ += (error_ns - bias_ns_) / std::min(n, kMemory);
+  if (n > 2 * kMemory && std::abs(bias_ns_) > kOneSided * scatter_ns_) {
+    pairs_ = kPairsAfterChange;
+  }
+}
+
+double ClockRegulator::limit_ns(Duration elapsed) const noexcept {
+  const double drift = usable() ? kDriftChange : kMaxDrift;
+  return std::max(tolerance_ns_, kUsualTimes * scatter_ns_) + drift * static_cast<double>(elapsed.count());
+}
+
+auto ClockRegulator::consider_step(const ReferencePair& pair, double error_ns) noexcept -> Verdict {
+  const Duration since = pair.local - last_outlier_.local;
+  const bool agrees = outliers_ > 0 && since > Duration::zero() &&
+                      std::abs(error_ns - last_outlier_error_ns_) <=
+                          tolerance_ns_ + kMaxDrift * static_cast<double>(since.count());
+  outliers_ = agrees ? outliers_ + 1 : 1;
+  last_outlier_ = pair;
+  last_outlier_error_ns_ = error_ns;
+  if (outliers_ < kStepPairs) return Verdict::outlier;
+  outliers_ = 0;
+  model_ = {.local = pair.local, .reference_ns = pair.reference_ns, .drift = model_.drift};
+  pairs_ = std::min(pairs_, kPairsAfterStep);
+  bias_ns_ = 0;
+  return Verdict::stepped;
+}
+
+}  // namespace plchost

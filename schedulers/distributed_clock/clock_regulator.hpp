@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstdint>
+
+#include "schedulers/distributed_clock/clock_model.hpp"
+#include "schedulers/distributed_clock/settings.hpp"
+
+namespace plchost {
+
+/// Learns the line between the local and the reference clock from pairs of stamps, never from wake-up times:
+/// those are late by tens of microseconds, and an integrator fed with them never settles. Pure, no
+/// allocation.
+///
+/// A PI loop: each pair's deviation from the line moves the phase by Kp and the drift by Ki of it. The first
+/// pairs count more (their gains are those of a line through all pairs so far), so that phase and drift are
+/// there within a few dozen pairs, and the gains then sink to Kp and Ki. They rise again when the deviations
+/// keep to one side: then the drift has changed.
+///
+/// A pair further off than the usual scatter allows is an outlier and left out, but kStepPairs of them in a
+/// row that agree with each other are a step of the reference: the line is moved there. What follows the line
+/// does so at its own bounded pace.
+class ClockRegulator {
+ public:
+  /// Pairs until the line may be followed.
+  static constexpr std::uint32_t kUsablePairs = 8;
+  static constexpr std::uint32_t kStepPairs = 5;
+  /// A clock further off is none: half of what the default bound of the correction can follow.
+  static constexpr double kMaxDrift = 5e-3;
+  /// Reference times beyond it (146 years either way) are taken for rubbish.
+  static constexpr std::int64_t kMaxReferenceNs = std::int64_t{1} << 62;
+  /// Two stamps closer together tell nothing about the drift.
+  static constexpr Duration kMinSpacing = std::chrono::microseconds(20);
+
+  enum class Verdict : std::uint8_t {
+    taken,
+    skipped,       ///< too close to the pair before
+    outlier,       ///< left out for now
+    stepped,       ///< the last of kStepPairs outliers that agree: the line was moved
+    out_of_order,  ///< its local stamp is not after the one before
+    out_of_range,
+  };
+
+  explicit ClockRegulator(const DistributedClockSettings& settings) noexcept;
+
+  /// Real-time.
+  Verdict feed(const ReferencePair& pair) noexcept;
+
+  [[nodiscard]] const ClockModel& model() const noexcept { return model_; }
+  /// The line is good enough to be followed.
+  [[nodiscard]] bool usable() const noexcept { return pairs_ >= kUsablePairs; }
+  /// How far the last pairs lay from the line on the average, signed: what the loop has not yet made up for.
+  [[nodiscard]] double bias_ns() const noexcept { return bias_ns_; }
+
+ private:
+  void begin(const ReferencePair& pair) noexcept;
+  void take(double error_ns, Duration elapsed) noexcept;
+  Verdict consider_step(const ReferencePair& pair, double error_ns) noexcept;
+  [[nodiscard]] double limit_ns(Duration elapsed) const noexcept;
+
+  double kp_;
+  double ki_;
+  double tolerance_ns_;
+  Duration gap_;             // after that much silence the phase is learnt anew
+  ClockModel model_;         // anchored at the last pair that was taken
+  std::uint32_t pairs_ = 0;  // that the gains are for; not above kEnoughPairs
+  double bias_ns_ = 0;
+  double scatter_ns_;           // usual magnitude of a deviation
+  std::uint32_t outliers_ = 0;  // in a row that agree
+  ReferencePair last_outlier_;
+  double last_outlier_error_ns_ = 0;
+};
+
+}  // namespace plchost

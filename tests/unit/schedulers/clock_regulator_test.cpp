@@ -1,0 +1,202 @@
+#include "schedulers/distributed_clock/clock_regulator.hpp"
+
+#include <algorithm>
+#include <limits>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "tests/support/simulated_reference.hpp"
+
+namespace plchost {
+namespace {
+
+using std::chrono::microseconds;
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using Verdict = ClockRegulator::Verdict;
+
+constexpr TimePoint kOrigin{seconds(5000)};
+constexpr double kPpm = 1e-6;
+constexpr double kNoiseNs = 200;
+
+class Regulator : public testing::Test {
+ protected:
+  // Feeds pairs up to `end`; how far the line is off one spacing after each of them.
+  std::vector<double> feed_until(TimePoint end) {
+    std::vector<double> errors;
+    for (; now < end; now += spacing) {
+      last = sut.feed(reference.stamp(now));
+      errors.push_back(std::abs(error_at(now + spacing)));
+    }
+    return errors;
+  }
+  [[nodiscard]] double error_at(TimePoint when) const {
+    return static_cast<double>(sut.model().reference_at(when) - SimulatedReference::kEpoch) -
+           reference.beyond_epoch(when);
+  }
+  static double percentile(std::vector<double> values, double share) {
+    std::ranges::sort(values);
+    return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
+  }
+
+  DistributedClockSettings settings;
+  ClockRegulator sut{settings};
+  SimulatedReference reference{kOrigin, 100 * kPpm, kNoiseNs};
+  TimePoint now = kOrigin;
+  Duration spacing = milliseconds(1);
+  Verdict last = Verdict::taken;
+};
+
+TEST_F(Regulator, IsUsableAfterAFewPairsAndKnowsDriftAndPhase) {
+  feed_until(kOrigin + 7 * spacing);
+  EXPECT_FALSE(sut.usable());
+  feed_until(kOrigin + 8 * spacing);
+  EXPECT_TRUE(sut.usable());
+  feed_until(kOrigin + milliseconds(500));
+  EXPECT_NEAR(sut.model().drift, 100 * kPpm, 0.5 * kPpm);
+  EXPECT_LT(std::abs(error_at(now)), 100);
+}
+
+TEST_F(Regulator, HoldsTheLineTenTimesTighterThanTheNoise) {
+  feed_until(kOrigin + seconds(2));
+  const auto errors = feed_until(kOrigin + seconds(60));
+  EXPECT_LT(percentile(errors, 0.5), 20);
+  EXPECT_LT(percentile(errors, 0.99), 60);
+}
+
+TEST_F(Regulator, HoldsItAtAnyRateOfPairs) {
+  for (const Duration rate :
+       {Duration(microseconds(100)), Duration(milliseconds(10)), Duration(milliseconds(100))}) {
+    sut = ClockRegulator(settings);
+    spacing = rate;
+    const TimePoint begin = now;
+    reference.set_drift(100 * kPpm, begin);
+    feed_until(begin + 200 * rate);
+    EXPECT_LT(percentile(feed_until(begin + 5000 * rate), 0.99), 60) << rate.count();
+  }
+}
+
+TEST_F(Regulator, FollowsADriftThatChangesSuddenly) {
+  feed_until(kOrigin + seconds(5));
+  reference.set_drift(-200 * kPpm, now);
+  feed_until(now + milliseconds(500));
+  EXPECT_EQ(last, Verdict::taken);
+  EXPECT_LT(percentile(feed_until(now + seconds(5)), 0.99), 60);
+  EXPECT_NEAR(sut.model().drift, -200 * kPpm, 1 * kPpm);
+}
+
+TEST_F(Regulator, LeavesASingleWildPairOut) {
+  feed_until(kOrigin + seconds(3));
+  for (const Duration wild :
+       {Duration(microseconds(50)), Duration(milliseconds(-3)), Duration(seconds(90'000))}) {
+    ReferencePair pair = reference.stamp(now);
+    pair.reference_ns += wild.count();
+    const double before = error_at(now + milliseconds(1));
+    EXPECT_EQ(sut.feed(pair), Verdict::outlier);
+    now += spacing;
+    EXPECT_DOUBLE_EQ(error_at(now), before);
+    EXPECT_LT(percentile(feed_until(now + milliseconds(100)), 1), 100);
+  }
+}
+
+TEST_F(Regulator, KeepsTheLineThoughEveryTenthPairIsWild) {
+  std::mt19937_64 random(7);
+  std::uniform_int_distribution<std::int64_t> wild(-1'000'000, 1'000'000);
+  feed_until(kOrigin + seconds(2));
+  std::vector<double> errors;
+  for (int i = 0; i < 30'000; ++i, now += spacing) {
+    ReferencePair pair = reference.stamp(now);
+    if (i % 10 == 0) pair.reference_ns += wild(random);
+    sut.feed(pair);
+    errors.push_back(std::abs(error_at(now + spacing)));
+  }
+  EXPECT_LT(percentile(errors, 0.99), 100);
+}
+
+TEST_F(Regulator, FollowsAStepAfterPairsThatAgreeAndKeepsTheDrift) {
+  feed_until(kOrigin + seconds(3));
+  reference.step(milliseconds(7));
+  for (std::uint32_t i = 1; i < ClockRegulator::kStepPairs; ++i, now += spacing) {
+    EXPECT_EQ(sut.feed(reference.stamp(now)), Verdict::outlier);
+  }
+  EXPECT_EQ(sut.feed(reference.stamp(now)), Verdict::stepped);
+  EXPECT_LT(std::abs(error_at(now)), 2 * kNoiseNs);
+  EXPECT_NEAR(sut.model().drift, 100 * kPpm, 1 * kPpm);
+  now += spacing;
+  feed_until(now + milliseconds(300));
+  EXPECT_LT(percentile(feed_until(now + seconds(5)), 0.99), 60);
+}
+
+TEST_F(Regulator, FollowsATimeThatRunsBackwardsAsAStep) {
+  feed_until(kOrigin + seconds(3));
+  reference.step(-seconds(86'400));
+  feed_until(now + milliseconds(300));
+  EXPECT_EQ(last, Verdict::taken);
+  EXPECT_LT(percentile(feed_until(now + seconds(5)), 0.99), 60);
+}
+
+TEST_F(Regulator, RecoversFromAWildFirstPair) {
+  ReferencePair pair = reference.stamp(now);
+  pair.reference_ns -= 123'456'789'012;
+  EXPECT_EQ(sut.feed(pair), Verdict::taken);
+  now += spacing;
+  feed_until(now + milliseconds(300));
+  EXPECT_LT(percentile(feed_until(now + seconds(5)), 0.99), 60);
+}
+
+TEST_F(Regulator, WidensItsToleranceForANoisyReference) {
+  reference = SimulatedReference(kOrigin, 100 * kPpm, 20'000);
+  feed_until(kOrigin + seconds(5));
+  EXPECT_LT(percentile(feed_until(kOrigin + seconds(30)), 0.99), 6'000);
+}
+
+TEST_F(Regulator, KeepsTheDriftOverASilenceAndFindsBackQuickly) {
+  feed_until(kOrigin + seconds(5));
+  now += seconds(60);
+  EXPECT_LT(std::abs(error_at(now)), 60'000) << "1 ppm of a minute";
+  feed_until(now + milliseconds(200));
+  EXPECT_LT(percentile(feed_until(now + seconds(5)), 0.99), 60);
+}
+
+TEST_F(Regulator, RefusesStampsOutOfOrderAndOutOfRange) {
+  feed_until(kOrigin + seconds(1));
+  const ClockModel before = sut.model();
+  ReferencePair pair = reference.stamp(before.local);
+  EXPECT_EQ(sut.feed(pair), Verdict::out_of_order);
+  pair.local -= seconds(1);
+  EXPECT_EQ(sut.feed(pair), Verdict::out_of_order);
+  pair.local = TimePoint::min() + seconds(10'000);
+  EXPECT_EQ(sut.feed(pair), Verdict::out_of_order);
+  pair.local = now;
+  for (const std::int64_t wild :
+       {std::numeric_limits<std::int64_t>::max(), std::numeric_limits<std::int64_t>::min(),
+        ClockRegulator::kMaxReferenceNs + 1, -ClockRegulator::kMaxReferenceNs - 1}) {
+    pair.reference_ns = wild;
+    EXPECT_EQ(sut.feed(pair), Verdict::out_of_range);
+  }
+  pair = reference.stamp(before.local + ClockRegulator::kMinSpacing - Duration(1));
+  EXPECT_EQ(sut.feed(pair), Verdict::skipped);
+  EXPECT_EQ(sut.model().drift, before.drift);
+  EXPECT_EQ(sut.model().reference_ns, before.reference_ns);
+}
+
+TEST_F(Regulator, StaysFiniteAndBoundedWhateverItIsFed) {
+  std::mt19937_64 random(99);
+  for (int i = 0; i < 200'000; ++i) {
+    now += Duration(1 + static_cast<Duration::rep>(random() % 3'000'000));
+    ReferencePair pair{.local = now, .reference_ns = static_cast<std::int64_t>(random())};
+    if (random() % 3 == 0) pair = reference.stamp(now);
+    if (random() % 7 == 0) pair.reference_ns = 0;
+    sut.feed(pair);
+    ASSERT_TRUE(std::isfinite(sut.model().drift) && std::isfinite(sut.model().fraction_ns));
+    ASSERT_TRUE(std::isfinite(sut.bias_ns()));
+    ASSERT_LE(std::abs(sut.model().drift), ClockRegulator::kMaxDrift);
+  }
+  reference.set_drift(50 * kPpm, now);
+  feed_until(now + seconds(3));
+  EXPECT_LT(percentile(feed_until(now + seconds(3)), 0.99), 100) << "and finds back to a good reference";
+}
+
+}  // namespace
+}  // namespace plchost
