@@ -175,6 +175,45 @@ RTS_RESULT CDECL SchedSetTaskInterval(RTS_HANDLE hTask, RTS_I64 nIntervalNs);
  */
 RTS_RESULT CDECL SchedRaiseEvent(RTS_HANDLE hTask);
 
+/* ---- Distributed clock ----------------------------------------------------------------------------------
+ */
+
+/*
+ * The grids of all cyclic tasks follow a reference clock: their releases lie where its time modulo the task's
+ * interval is the task's start offset. Under a scheduler that can move releases (CmpScheduleOneShot); under
+ * the others the clock is only measured. The reference comes from firmware by way of a record (see
+ * plc_reference_clock.h, [DistributedClock] Reference=NAME), or from a driver inside of the application:
+ *
+ * Reports what the reference clock shows and CLOCK_MONOTONIC at the same instant, both in nanoseconds. Best
+ * in each cycle of the bus; pairs further apart than the time-out (ReferenceTimeoutMs) are hold-over in
+ * between. ERR_OK; ERR_DUPLICATE: the settings name a record; ERR_NOTINITIALIZED: the tasks are not made yet.
+ * Any.
+ */
+RTS_RESULT CDECL SchedReportReferenceTime(RTS_I64 nReferenceNs, RTS_I64 nLocalNs);
+
+#define PLC_CLOCK_OFF 0u          /* no reference is named, and none was reported */
+#define PLC_CLOCK_FREE_RUNNING 1u /* there is no usable reference (yet) */
+#define PLC_CLOCK_ACQUIRING 2u    /* pairs come in; the grid is on its way */
+#define PLC_CLOCK_LOCKED 3u       /* pairs come in, in sync */
+#define PLC_CLOCK_HOLD_OVER 4u    /* the reference has stopped: the grid goes on with the last drift */
+#define PLC_CLOCK_MEASURING 5u    /* measured only: this scheduler does not move releases */
+
+typedef struct {
+  unsigned int dwSize;   /* sizeof(Clock_State), set by the caller */
+  unsigned int dwState;  /* PLC_CLOCK_... */
+  unsigned char bInSync; /* 1: the task's releases are within SyncWindowNs of the reference grid */
+  RTS_I64 nOffsetNs;     /* of the task's planned releases from the reference grid; above 0: late */
+  RTS_I64 nDriftPpb;     /* the reference is this much faster than CLOCK_MONOTONIC */
+  RTS_I64 nCorrectionNs; /* of the task's release that is planned now */
+  RTS_UI64 qwPairs;      /* of stamps that were used */
+  RTS_UI64 qwRejected;   /* outliers, not valid, too old, out of order or range */
+  RTS_UI64 qwSteps;      /* of the reference, that were followed */
+} Clock_State;
+
+/* As seen from a cyclic task; RTS_INVALID_HANDLE: from the one of the highest priority. ERR_OK;
+ * ERR_PARAMETER: not such a handle, or dwSize; ERR_NOTINITIALIZED. Any. */
+RTS_RESULT CDECL SchedGetClockState(RTS_HANDLE hTask, Clock_State* pState);
+
 /* ---- External events ------------------------------------------------------------------------------------
  */
 

@@ -182,6 +182,10 @@ Result<std::string> Instance::make_tasks() {
   if (!tasks) return std::unexpected(std::move(tasks).error());
   tasks_ = *std::move(tasks);
   host_->task_table().attach(tasks_.get());
+  if (const std::string& reference = settings_.scheduler.distributed_clock.reference; !reference.empty()) {
+    auto followed = reference_.follow(tasks_->distributed_clock(), options_.launch.pool, reference);
+    if (!followed) return std::unexpected(std::move(followed).error());
+  }
   notify_tasks(EVT_ExternalEventTaskCreateDone);
   return {};
 }
@@ -214,6 +218,7 @@ void Instance::beat() {
   host_->write_messages();
   report_tick();
   host_->events().refresh();
+  reference_.refresh();
   InstanceRuntime runtime;
   runtime.pid = ::getpid();
   runtime.core = cores_.size() == 1 ? cores_.front() : -1;
@@ -225,6 +230,8 @@ void Instance::beat() {
   runtime.tick_source.assign(tick_.source);
   runtime.tick_fallback.assign(tick_.fallback);
   if (application_) runtime.application.assign(application_->path());
+  if (tasks_ && tasks_->running()) runtime.clock = clock_runtime(tasks_->distributed_clock());
+  runtime.clock.reference.assign(settings_.scheduler.distributed_clock.reference);
   page_->write_runtime(runtime);
 }
 
@@ -243,6 +250,7 @@ Result<void> Instance::shut_down() {
     components_.exit();
     // Only now: until then a thread of a component may have used a task's handle.
     if (host_) host_->task_table().attach(nullptr);
+    reference_.drop();
     tasks_.reset();
   }
   if (host_) {

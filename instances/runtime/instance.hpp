@@ -12,6 +12,7 @@
 #include "instances/runtime/instance_socket.hpp"
 #include "instances/runtime/options.hpp"
 #include "instances/runtime/process_setup.hpp"
+#include "instances/runtime/reference_memory.hpp"
 #include "instances/runtime/settings.hpp"
 #include "instances/runtime/setup_reporter.hpp"
 #include "schedulers/task_set.hpp"
@@ -95,6 +96,7 @@ class Instance {
   Components components_;
   std::optional<Application> application_;
   std::optional<InstancePage> page_;
+  ReferenceMemory reference_;
   LinuxClock clock_;
   std::unique_ptr<TaskSet> tasks_;  // uses all of the above: destroyed before them
   std::optional<InstanceSocket> control_;

@@ -101,7 +101,7 @@ std::unexpected<Error> unknown_key(std::string_view section, std::string_view na
 const std::vector<SettingKey>& all_setting_keys() {
   static const std::vector<SettingKey> all = [] {
     std::vector<SettingKey> keys;
-    for (const auto table : {schedule_keys(), timer_keys(), task_keys(), component_keys()}) {
+    for (const auto table : {schedule_keys(), timer_keys(), clock_keys(), task_keys(), component_keys()}) {
       keys.insert(keys.end(), table.begin(), table.end());
     }
     return keys;

@@ -81,6 +81,7 @@ inline constexpr std::string_view kTaskSections = "Task.NAME";
 // The tables, one for each file settings_*.cpp. A new one is added to all_setting_keys().
 [[nodiscard]] std::span<const SettingKey> schedule_keys() noexcept;
 [[nodiscard]] std::span<const SettingKey> timer_keys() noexcept;
+[[nodiscard]] std::span<const SettingKey> clock_keys() noexcept;
 [[nodiscard]] std::span<const SettingKey> task_keys() noexcept;
 [[nodiscard]] std::span<const SettingKey> component_keys() noexcept;
 

@@ -63,7 +63,7 @@ namespace {
 // The task behind the handle, or why there is none.
 RTS_RESULT find_task(RTS_HANDLE handle, Task*& task) noexcept {
   ApplicationHost* const host = ApplicationHost::current();
-  if (host == nullptr || !host->task_table().attached()) return ERR_NOTINITIALIZED;
+  if (host == nullptr || host->task_table().tasks() == nullptr) return ERR_NOTINITIALIZED;
   task = host->task_table().task(handle);
   return task == nullptr ? ERR_PARAMETER : ERR_OK;
 }

@@ -28,8 +28,8 @@ class TaskTable {
   [[nodiscard]] RTS_HANDLE find(const Task_Info* info) const noexcept;
   /// Null: no such handle, or the tasks are not made yet.
   [[nodiscard]] Task* task(RTS_HANDLE handle) const noexcept;
-  /// Whether the tasks are made.
-  [[nodiscard]] bool attached() const noexcept { return tasks_.load(std::memory_order_acquire) != nullptr; }
+  /// All of them; null: they are not made yet.
+  [[nodiscard]] TaskSet* tasks() const noexcept { return tasks_.load(std::memory_order_acquire); }
 
  private:
   std::atomic<const sys_setup_tasks_struct*> setup_{nullptr};

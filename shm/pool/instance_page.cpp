@@ -12,8 +12,8 @@ namespace {
 
 constexpr std::uint64_t kMagic = 0x67617074'736e6970;  // "pinstpag"
 /// 1: first. 2: the interval in force. 3: the tick source. 4: histograms behind the tasks, in two
-/// shapes. 5: the idle states.
-constexpr std::uint32_t kVersion = 5;
+/// shapes. 5: the idle states. 6: the distributed clock.
+constexpr std::uint32_t kVersion = 6;
 constexpr std::size_t kTasksOffset = (sizeof(InstancePageLayout) + 63) / 64 * 64;
 
 static_assert(offsetof(InstancePageLayout, version) == 8 && offsetof(InstancePageLayout, size) == 16);

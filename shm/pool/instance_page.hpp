@@ -35,6 +35,22 @@ struct TaskIdentity {
 /// The value of a plc_KeyValue.
 inline constexpr std::size_t kMaxTickText = 127;
 
+/// The distributed clock as the cyclic task of the highest priority sees it: see ClockStatus.
+struct ClockRuntime {
+  FixedText<kMaxObjectName> reference;  ///< name of the record; empty: none is named
+  std::uint32_t state = 0;              ///< 0 off, then free running, acquiring, locked, hold-over, measuring
+  std::uint32_t in_sync = 0;
+  std::int64_t offset_ns = 0;
+  std::int64_t drift_ppb = 0;
+  std::int64_t correction_ns = 0;
+  std::int64_t correction_max_ns = 0;
+  std::uint64_t corrections_at_bound = 0;
+  std::uint64_t pairs = 0;
+  std::uint64_t rejected = 0;
+  std::uint64_t invalid = 0;
+  std::uint64_t steps = 0;
+};
+
 /// What the instance says of itself. Written by its control thread.
 struct InstanceRuntime {
   std::int32_t pid = 0;
@@ -47,6 +63,7 @@ struct InstanceRuntime {
   FixedText<kMaxTickText> tick_source;    ///< where the periodic tick comes from
   FixedText<kMaxTickText> tick_fallback;  ///< why that is not what the settings ask for; empty: it is
   FixedText<kMaxTickText> idle_states;    ///< what of the processor's idle states is held off, or why not
+  ClockRuntime clock;
 };
 
 struct TaskSlot {

@@ -51,6 +51,38 @@ TEST(Settings, ReadsEveryKey) {
   EXPECT_THAT(sut->components, ElementsAre("/first.so", "later.so"));
 }
 
+TEST(Settings, ReadsTheDistributedClock) {
+  const auto sut = parse_settings(
+      "[DistributedClock]\nReference=bus1\nKpPpm=10000\nKiPpm=25\nMaxCorrectionNs=500\nSyncWindowNs=200000\n"
+      "PairToleranceNs=3000\nReferenceTimeoutMs=50\nHoldOverMs=0\n",
+      "line1.cfg");
+  ASSERT_TRUE(sut) << sut.error().message;
+  const DistributedClockSettings expected{.reference = "bus1",
+                                          .kp_ppm = 10'000,
+                                          .ki_ppm = 25,
+                                          .max_correction = 500ns,
+                                          .sync_window = 200us,
+                                          .pair_tolerance = 3us,
+                                          .reference_timeout = 50ms,
+                                          .hold_over_limit = 0ms};
+  EXPECT_EQ(sut->scheduler.distributed_clock, expected);
+  EXPECT_THAT(complaint("[DistributedClock]\nReference=a/b\n"),
+              HasSubstr("line1.cfg:2: [DistributedClock] Reference"));
+  EXPECT_THAT(complaint("[DistributedClock]\nKpPpm=0\n"), HasSubstr("1 to 1000000"));
+  EXPECT_THAT(complaint("[DistributedClock]\nSyncWindow=1\n"), HasSubstr("did you mean 'SyncWindowNs'?"));
+}
+
+TEST(Settings, DefaultsOfTheDistributedClockAreThoseOfItsTable) {
+  const DistributedClockSettings initial;
+  std::string text = "[DistributedClock]\n";
+  for (const SettingKey& key : clock_keys()) {
+    if (!key.initial.empty()) text += fmt::format("{}={}\n", key.name, key.initial);
+  }
+  const auto sut = parse_settings(text, "line1.cfg");
+  ASSERT_TRUE(sut) << sut.error().message;
+  EXPECT_EQ(sut->scheduler.distributed_clock, initial);
+}
+
 TEST(Settings, TakesLinuxAsAnotherWordForVxWorks) {
   const auto sut = parse_settings("[SysTimer]\nLinux.TimerSource=Task\n", "line1.cfg");
   ASSERT_TRUE(sut);

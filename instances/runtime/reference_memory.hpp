@@ -1,0 +1,42 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "schedulers/distributed_clock/distributed_clock.hpp"
+#include "shm/base/result.hpp"
+#include "shm/pool/instance_page.hpp"
+#include "shm/pool/reference_clock.hpp"
+
+namespace plchost {
+
+/// The reference record of the pool as the schedulers see it.
+class ReferenceMemory {
+ public:
+  /// Makes `clock` follow the record of that name. `clock` is not used any more after drop(). Control thread.
+  [[nodiscard]] Result<void> follow(DistributedClock& clock, std::string pool, std::string name);
+  /// Takes up a record that was made anew under the name; now and then. Control thread.
+  void refresh();
+  /// Before the clock goes.
+  void drop() noexcept { clock_ = nullptr; }
+
+ private:
+  class Source;
+
+  DistributedClock* clock_ = nullptr;
+  std::string pool_;
+  std::string name_;
+  std::unique_ptr<Source> source_;
+
+ public:
+  ReferenceMemory();
+  ~ReferenceMemory();
+  ReferenceMemory(const ReferenceMemory&) = delete;
+  ReferenceMemory& operator=(const ReferenceMemory&) = delete;
+};
+
+/// How the status page describes the clock: all but the name of the record.
+[[nodiscard]] ClockRuntime clock_runtime(const DistributedClock& clock) noexcept;
+
+}  // namespace plchost

@@ -1,0 +1,95 @@
+#include "shm/pool/reference_clock.hpp"
+
+#include <chrono>
+#include <cstddef>
+#include <thread>
+#include <utility>
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+
+#include "shm/base/names.hpp"
+
+namespace plchost {
+
+namespace {
+
+static_assert(sizeof(plc_reference_clock) == 64);
+static_assert(offsetof(plc_reference_clock, version) == 8 && offsetof(plc_reference_clock, size) == 12);
+static_assert(offsetof(plc_reference_clock, sequence) == 16 && offsetof(plc_reference_clock, check) == 56);
+
+plc_reference_clock& record_of(std::span<std::byte> bytes) noexcept {
+  return *reinterpret_cast<plc_reference_clock*>(bytes.data());
+}
+
+Result<void> begin(std::span<std::byte> bytes) {
+  plc_reference_clock_begin(&record_of(bytes));
+  return {};
+}
+
+// Firmware that makes the record gives it its name first and its size then.
+Result<MemoryFile> open_or_make(const std::string& name) {
+  constexpr int kAttempts = 50;
+  constexpr auto kPause = std::chrono::milliseconds(1);
+  for (int attempt = 1;; ++attempt) {
+    auto memory = MemoryFile::open(name, sizeof(plc_reference_clock), MemoryFile::Access::read_write);
+    if (!memory && memory.error().code == ErrorCode::not_found) {
+      memory = MemoryFile::create(name, sizeof(plc_reference_clock), begin);
+    }
+    const bool again = !memory && (memory.error().code == ErrorCode::already_exists ||
+                                   memory.error().code == ErrorCode::corrupt);
+    if (!again || attempt == kAttempts) return memory;
+    std::this_thread::sleep_for(kPause);
+  }
+}
+
+}  // namespace
+
+Result<void> check_reference_name(std::string_view name) {
+  return check_name("name of a reference clock", name, kMaxObjectName);
+}
+
+std::string pool_memory_name(std::string_view pool, std::string_view name) {
+  return fmt::format("{}.memory.{}", pool, name);
+}
+
+Result<ReferenceClockRecord> ReferenceClockRecord::open(std::string_view pool, std::string_view name) {
+  if (auto valid = check_reference_name(name); !valid) return std::unexpected(std::move(valid).error());
+  const std::string file = pool_memory_name(pool, name);
+  auto memory = open_or_make(file);
+  if (!memory) return failure_in(fmt::format("reference clock '{}'", name), std::move(memory).error());
+  plc_reference_clock& record = record_of(memory->bytes());
+  // Made by firmware that died before it had written the first line.
+  if (__atomic_load_n(&record.magic, __ATOMIC_ACQUIRE) == 0) plc_reference_clock_begin(&record);
+  if (memory->bytes().size() != sizeof(plc_reference_clock) || plc_reference_clock_is_one(&record) == 0) {
+    return failure(
+        ErrorCode::corrupt,
+        fmt::format("reference clock '{}': shared memory {} is no reference record of version {}; remove "
+                    "it, or choose another name",
+                    name, file, PLC_REFERENCE_CLOCK_VERSION));
+  }
+  // Were it replaced in between, the next look at the name finds out only if the old file is remembered: an
+  // identity of nothing differs from any.
+  const Identity identity = identity_of(file);
+  return ReferenceClockRecord(*std::move(memory), file, identity);
+}
+
+void ReferenceClockRecord::remove(std::string_view pool, std::string_view name) noexcept {
+  MemoryFile::remove(pool_memory_name(pool, name));
+}
+
+plc_reference_clock& ReferenceClockRecord::record() const noexcept {
+  return record_of(memory_.bytes());
+}
+
+bool ReferenceClockRecord::replaced() const noexcept {
+  return identity_ == Identity{} || identity_of(file_) != identity_;
+}
+
+auto ReferenceClockRecord::identity_of(const std::string& file) noexcept -> Identity {
+  struct stat status{};
+  if (::stat(("/dev/shm/" + file).c_str(), &status) != 0) return {};
+  return {.device = status.st_dev, .inode = status.st_ino};
+}
+
+}  // namespace plchost
