@@ -108,6 +108,21 @@ struct TaskOptions {
   bool watchdog_stops_task_only = false;
 };
 
+/// Both stamps in nanoseconds and of the same instant: see SchedReportReferenceTime. Any context.
+inline RTS_RESULT report_reference_time(std::chrono::nanoseconds reference,
+                                        std::chrono::nanoseconds local) noexcept {
+  return SchedReportReferenceTime(reference.count(), local.count());
+}
+
+/// How well the distributed clock goes, as seen from `task`; empty: from the cyclic task of the highest
+/// priority. Any context.
+[[nodiscard]] inline Clock_State clock_state(Task task = {}) noexcept {
+  Clock_State state{};
+  state.dwSize = sizeof state;
+  SchedGetClockState(task.handle(), &state);
+  return state;
+}
+
 /// The tasks of one application. Filled by the setup function, which runs once on the control thread before
 /// any task. Faults (a text too long) are exceptions there: they refuse the application with their text.
 class Application {

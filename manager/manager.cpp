@@ -19,6 +19,7 @@
 #include "shm/base/thread.hpp"
 #include "shm/pool/instance_page.hpp"
 #include "shm/pool/memory_file.hpp"
+#include "shm/pool/reference_clock.hpp"
 
 namespace plchost {
 
@@ -230,6 +231,7 @@ void Manager::clean_up() {
   MemoryFile::remove(host_page_name(config_.host.pool));
   if (!config_.host.keep_pool) {
     ObjectPool::remove(config_.host.pool);
+    remove_pool_memories(config_.host.pool);
     MemoryFile::remove(config_.host.pool + ".posts");  // how far each source of remote posts had come
   }
   lock_.remove();

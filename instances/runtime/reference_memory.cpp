@@ -19,7 +19,7 @@ class ReferenceMemory::Source final : public ReferenceSource {
             .pair = {.local = TimePoint(Duration(reading.local_ns)), .reference_ns = reading.reference_ns},
             .updates = reading.updates};
       case PLC_REFERENCE_CORRUPT:
-        return {.outcome = Outcome::corrupt};
+        return {.outcome = Outcome::corrupt, .pair = {}, .updates = 0};
       default:
         return {};
     }

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <filesystem>
 #include <thread>
 #include <utility>
 
@@ -13,6 +14,8 @@
 namespace plchost {
 
 namespace {
+
+constexpr const char* kDirectory = "/dev/shm";
 
 static_assert(sizeof(plc_reference_clock) == 64);
 static_assert(offsetof(plc_reference_clock, version) == 8 && offsetof(plc_reference_clock, size) == 12);
@@ -53,6 +56,16 @@ std::string pool_memory_name(std::string_view pool, std::string_view name) {
   return fmt::format("{}.memory.{}", pool, name);
 }
 
+void remove_pool_memories(std::string_view pool) noexcept {
+  const std::string prefix = pool_memory_name(pool, "");
+  std::error_code error;
+  for (std::filesystem::directory_iterator at(kDirectory, error), end; !error && at != end;
+       at.increment(error)) {
+    const std::string name = at->path().filename();
+    if (name.starts_with(prefix)) MemoryFile::remove(name);
+  }
+}
+
 Result<ReferenceClockRecord> ReferenceClockRecord::open(std::string_view pool, std::string_view name) {
   if (auto valid = check_reference_name(name); !valid) return std::unexpected(std::move(valid).error());
   const std::string file = pool_memory_name(pool, name);
@@ -68,8 +81,6 @@ Result<ReferenceClockRecord> ReferenceClockRecord::open(std::string_view pool, s
                     "it, or choose another name",
                     name, file, PLC_REFERENCE_CLOCK_VERSION));
   }
-  // Were it replaced in between, the next look at the name finds out only if the old file is remembered: an
-  // identity of nothing differs from any.
   const Identity identity = identity_of(file);
   return ReferenceClockRecord(*std::move(memory), file, identity);
 }
@@ -88,7 +99,7 @@ bool ReferenceClockRecord::replaced() const noexcept {
 
 auto ReferenceClockRecord::identity_of(const std::string& file) noexcept -> Identity {
   struct stat status{};
-  if (::stat(("/dev/shm/" + file).c_str(), &status) != 0) return {};
+  if (::stat(fmt::format("{}/{}", kDirectory, file).c_str(), &status) != 0) return {};
   return {.device = status.st_dev, .inode = status.st_ino};
 }
 

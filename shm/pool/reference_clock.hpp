@@ -17,6 +17,9 @@ namespace plchost {
 /// The file of a shared memory of the pool: "POOL.memory.NAME".
 [[nodiscard]] std::string pool_memory_name(std::string_view pool, std::string_view name);
 
+/// Removes the names of all shared memories of the pool; who has one mapped keeps it. Set-up.
+void remove_pool_memories(std::string_view pool) noexcept;
+
 /// The record of shm/plc_reference_clock.h, mapped into this process. Set-up, but for reading and writing it.
 class ReferenceClockRecord {
  public:

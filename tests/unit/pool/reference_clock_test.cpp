@@ -129,6 +129,18 @@ TEST_F(ReferenceClockFile, OtherMemoryOfTheNameIsRefused) {
   EXPECT_THAT(sut.error().message, testing::HasSubstr("is no reference record of version 1"));
 }
 
+TEST_F(ReferenceClockFile, AllMemoriesOfAPoolGoAtOnceAndNoOthers) {
+  const std::string other = pool() + "x";
+  (void)open();
+  ASSERT_TRUE(ReferenceClockRecord::open(pool(), "second"));
+  ASSERT_TRUE(ReferenceClockRecord::open(other, "bus"));
+  remove_pool_memories(pool());
+  EXPECT_FALSE(MemoryFile::open(pool_memory_name(pool(), "bus"), 1, MemoryFile::Access::read_only));
+  EXPECT_FALSE(MemoryFile::open(pool_memory_name(pool(), "second"), 1, MemoryFile::Access::read_only));
+  EXPECT_TRUE(MemoryFile::open(pool_memory_name(other, "bus"), 1, MemoryFile::Access::read_only));
+  ReferenceClockRecord::remove(other, "bus");
+}
+
 TEST_F(ReferenceClockFile, NamesThatLeadElsewhereAreRefused) {
   for (const char* name : {"", "a/b", "../x", ".hidden"}) {
     EXPECT_FALSE(ReferenceClockRecord::open(pool(), name)) << name;

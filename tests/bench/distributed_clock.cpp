@@ -1,0 +1,218 @@
+// A 1 ms task under CmpScheduleOneShot on the grid of a reference clock that drifts by 100 ppm, with +-200 ns
+// of noise on each pair of stamps, 300 us off at the start. Firmware (a thread on the other core) writes the
+// pairs into the reference record. What is measured is held against the reference without its noise.
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <random>
+#include <thread>
+
+#include <time.h>
+
+#include "schedulers/task_set.hpp"
+#include "shm/plc_reference_clock.h"
+#include "tests/bench/cycle_log.hpp"
+#include "tests/bench/parts.hpp"
+
+namespace plchost::bench {
+
+namespace {
+
+constexpr Duration kPeriod = std::chrono::milliseconds(1);
+constexpr Duration kSettling = std::chrono::seconds(2);  // what is promised; steady state begins there
+constexpr Duration kSettled = std::chrono::microseconds(1);
+constexpr auto kStopLimit = std::chrono::seconds(10);
+constexpr double kDrift = 100e-6;
+constexpr double kNoiseNs = 200;
+constexpr double kOffAtStartNs = 300'000;
+
+/// What the reference shows, against the first release.
+class Reference {
+ public:
+  explicit Reference(TimePoint first_release) : origin_(first_release) {}
+  [[nodiscard]] double at(TimePoint when) const {
+    return kOffAtStartNs + static_cast<double>((when - origin_).count()) * (1 + kDrift);
+  }
+  /// How far it is behind the nearest point of the reference grid, in nanoseconds.
+  [[nodiscard]] double deviation(TimePoint when) const {
+    const auto period = static_cast<double>(kPeriod.count());
+    return at(when) - std::round(at(when) / period) * period;
+  }
+
+ private:
+  TimePoint origin_;
+};
+
+/// The record as an instance reads it.
+class RecordSource final : public ReferenceSource {
+ public:
+  explicit RecordSource(const plc_reference_clock& record) noexcept : record_(record) {}
+  [[nodiscard]] Reading read() noexcept override {
+    plc_reference_reading reading{};
+    if (plc_reference_clock_read(&record_, &reading) != PLC_REFERENCE_OK) return {};
+    return {.outcome = Outcome::pair,
+            .pair = {.local = TimePoint(Duration(reading.local_ns)), .reference_ns = reading.reference_ns},
+            .updates = reading.updates};
+  }
+
+ private:
+  const plc_reference_clock& record_;
+};
+
+/// Firmware that writes a pair each millisecond until it goes.
+class Firmware {
+ public:
+  Firmware(plc_reference_clock& record, Reference reference)
+      : thread_([this, &record, reference] { run(record, reference); }) {}
+  ~Firmware() {
+    ending_.store(true);
+    thread_.join();
+  }
+  Firmware(const Firmware&) = delete;
+  Firmware& operator=(const Firmware&) = delete;
+
+ private:
+  void run(plc_reference_clock& record, const Reference& reference) {
+    std::mt19937_64 random(1);
+    std::uniform_real_distribution<double> noise(-kNoiseNs, kNoiseNs);
+    for (TimePoint next = MonotonicClock::now(); !ending_.load(); next += kPeriod) {
+      const timespec until = to_timespec(next);
+      ::clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr);
+      const TimePoint local = MonotonicClock::now();
+      const double shown = reference.at(local) + noise(random);
+      plc_reference_clock_write(&record, std::llround(shown), local.time_since_epoch().count(), 1);
+    }
+  }
+
+  std::atomic<bool> ending_{false};
+  std::thread thread_;
+};
+
+/// The cycles of one run, and what became of the clock.
+struct Run {
+  CycleLog log;
+  ClockStatus status{};
+};
+
+Result<void> run_cycles(const Plan& plan, Duration length, Run& run, std::optional<Reference>& reference) {
+  plc_reference_clock record{};
+  plc_reference_clock_begin(&record);
+  RecordSource source(record);
+  LinuxClock clock;
+  TaskStatistics statistics;
+  std::atomic<std::int64_t> first_release{0};
+  TimePoint began{};
+  TaskConfig task;
+  task.name = "measured";
+  task.interval = kPeriod;
+  task.entry = [&] { began = MonotonicClock::now(); };
+  task.after_cycle = [&](const TaskCounters& counters) {
+    run.log.add({TimePoint(Duration(counters.release_ns)), began});
+    if (counters.cycles == 1) first_release.store(counters.release_ns);
+  };
+  TaskEnvironment environment;
+  environment.statistics = [&](std::size_t) -> TaskStatistics& { return statistics; };
+  Result<std::unique_ptr<TaskSet>> tasks = [&] {
+    const OnCore threads_inherit_it(plan.task_core);
+    return TaskSet::create(clock, PriorityBand::normal, {task}, environment);
+  }();
+  if (!tasks) return std::unexpected(std::move(tasks.error()));
+  TaskSet& set = **tasks;
+  if (!set.distributed_clock().use_source(&source)) return failure(ErrorCode::busy, "the clock is in use");
+  const OnCore out_of_the_way(plan.poster_core);
+  if (auto started = set.start("CmpScheduleOneShot", {}); !started) return started;
+  while (first_release.load() == 0) std::this_thread::sleep_for(kPeriod);
+  reference.emplace(TimePoint(Duration(first_release.load())));
+  {
+    const Firmware firmware(record, *reference);
+    std::this_thread::sleep_for(length);
+  }
+  run.status = set.distributed_clock().status(*set.distributed_clock().leading());
+  return set.stop(kStopLimit);
+}
+
+Duration magnitude(double ns) {
+  return Duration(std::llround(std::abs(ns)));
+}
+
+/// Since the first release: from when on the plan stayed within kSettled of the grid.
+double settling_ms(std::span<const Cycle> cycles, const Reference& reference) {
+  TimePoint last_off = cycles.front().release;
+  for (const Cycle& cycle : cycles) {
+    if (magnitude(reference.deviation(cycle.release)) > kSettled) last_off = cycle.release;
+  }
+  return to_us(last_off - cycles.front().release) / 1e3;
+}
+
+/// The largest deviation of a planned distance from whole periods.
+double largest_correction_us(std::span<const Cycle> cycles) {
+  Duration largest{};
+  for (std::size_t i = 1; i < cycles.size(); ++i) {
+    const Duration distance = cycles[i].release - cycles[i - 1].release;
+    const auto periods = (distance + kPeriod / 2) / kPeriod;
+    // What was lost in between may have been corrected only once: no more than one bound either way.
+    largest = std::max(largest, Duration(std::abs((distance - periods * kPeriod).count())));
+  }
+  return to_us(largest);
+}
+
+/// The largest deviation of each stretch, so that the picture hides nothing: short ones while it settles.
+Series series_of(std::string name, std::span<const Cycle> cycles, const Reference& reference,
+                 TimePoint Cycle::* which) {
+  constexpr Duration kShort = std::chrono::milliseconds(10);
+  constexpr Duration kLong = std::chrono::milliseconds(250);
+  Series series{.name = std::move(name), .points = {}};
+  const TimePoint origin = cycles.front().release;
+  double largest = 0;
+  TimePoint stretch = origin;
+  for (const Cycle& cycle : cycles) {
+    largest = std::max(largest, std::abs(reference.deviation(cycle.*which)));
+    const Duration length = cycle.release - origin < kSettling ? kShort : kLong;
+    if (cycle.release - stretch < length) continue;
+    series.points.emplace_back(std::chrono::duration<double>(cycle.release - origin).count(), largest);
+    stretch = cycle.release;
+    largest = 0;
+  }
+  return series;
+}
+
+}  // namespace
+
+Result<std::vector<Row>> measure_distributed_clock(const Plan& plan) {
+  const Duration length = plan.each + kSettling;
+  Run run{.log = CycleLog(static_cast<std::size_t>(length / kPeriod) * 2 + 10'000)};
+  std::optional<Reference> reference;
+  if (auto done = run_cycles(plan, length, run, reference); !done) {
+    return std::unexpected(std::move(done.error()));
+  }
+  const auto cycles = run.log.between(TimePoint::min(), TimePoint::max());
+  const auto steady = run.log.between(cycles.front().release + kSettling, TimePoint::max());
+  Row planned{.name = "distributed_clock/planned", .ours = Samples(steady.size())};
+  Row started{.name = "distributed_clock/start", .ours = Samples(steady.size())};
+  for (const Cycle& cycle : steady) {
+    planned.ours.add(magnitude(reference->deviation(cycle.release)));
+    started.ours.add(magnitude(reference->deviation(cycle.start)));
+  }
+  constexpr double kBoundUs = 10;  // 1 % of the period
+  const double settled = settling_ms(cycles, *reference);
+  const double correction = largest_correction_us(cycles);
+  planned.extra = {{"settled_after_ms", settled},
+                   {"largest_correction_us", correction},
+                   {"drift_ppb", static_cast<double>(run.status.drift_ppb)},
+                   {"pairs", static_cast<double>(run.status.pairs)},
+                   {"rejected_pairs", static_cast<double>(run.status.rejected)}};
+  planned.targets = {{"p99 below 0.1 us in steady state", summarise(planned.ours).p99, 0.1},
+                     {"settled within 2 s", settled, 2000},
+                     {"no correction above its bound", correction, kBoundUs, true}};
+  planned.series = {series_of("planned release", cycles, *reference, &Cycle::release),
+                    series_of("start of the cycle", cycles, *reference, &Cycle::start)};
+  planned.note = "planned release against the reference grid, magnitude, from 2 s on";
+  started.targets = {{"median below 1 us", summarise(started.ours).p50, 1}};
+  started.note = "first instruction against the reference grid, magnitude, from 2 s on";
+  return std::vector<Row>{std::move(planned), std::move(started)};
+}
+
+}  // namespace plchost::bench
