@@ -13,6 +13,8 @@ namespace plchost {
 ///   tick_source    where the periodic tick comes from
 ///   tick_fallback  why that is not the source that the settings ask for
 ///   idle_states    what of the processor's idle states is held off, or why not
+///   clock_...      the distributed clock as the cyclic task of the highest priority sees it: name of its
+///                  record, state, in sync, offset and drift (to the nearest hundred), corrections, pairs
 [[nodiscard]] std::vector<plc_KeyValue> extension_of(const InstanceRuntime& runtime);
 
 }  // namespace plchost

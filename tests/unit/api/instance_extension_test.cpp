@@ -31,6 +31,31 @@ TEST(InstanceExtension, CarriesWhatTheInstanceSaysAndNothingThatIsEmpty) {
   EXPECT_EQ(dds::text_of(entries[1].name), "tick_fallback");
 }
 
+TEST(InstanceExtension, TellsOfTheDistributedClockOnceThereIsOne) {
+  InstanceRuntime runtime;
+  runtime.clock.reference.assign("bus1");
+  EXPECT_EQ(extension_of(runtime).size(), 1U);
+  runtime.clock.state = 3;
+  runtime.clock.in_sync = 1;
+  runtime.clock.offset_ns = -151;
+  runtime.clock.drift_ppb = 99'960;
+  const auto entries = extension_of(runtime);
+  const auto value = [&](std::string_view name) {
+    for (const auto& entry : entries) {
+      if (dds::text_of(entry.name) == name) return std::string(dds::text_of(entry.value));
+    }
+    return std::string("none");
+  };
+  EXPECT_EQ(value("clock_reference"), "bus1");
+  EXPECT_EQ(value("clock_state"), "locked");
+  EXPECT_EQ(value("clock_in_sync"), "1");
+  EXPECT_EQ(value("clock_offset_ns"), "-200");
+  EXPECT_EQ(value("clock_drift_ppb"), "100000");
+  EXPECT_EQ(value("clock_rejected_pairs"), "0, 0 not valid, 0 steps followed");
+  runtime.clock.state = 77;
+  EXPECT_EQ(extension_of(runtime).size(), 1U) << "a stranger's page";
+}
+
 TEST(InstanceExtension, IsShownByTheCliWhateverItsNames) {
   std::vector<plc_KeyValue> entries(2);
   dds::copy_text(entries[0].name, "of_a_newer_host");

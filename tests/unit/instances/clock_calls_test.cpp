@@ -73,7 +73,7 @@ class ClockCalls : public testing::Test {
   ApplicationHost host{"test", nullptr};
   std::array<Task_Info, 2> infos_{};
   sys_setup_tasks_struct setup_{};
-  std::array<TaskStatistics, 2> statistics_{};
+  std::array<TaskStatistics, 2> statistics_;
   std::unique_ptr<TaskSet> tasks;
 };
 
