@@ -89,11 +89,11 @@ class Task {
   ReleaseGrid grid_;                            // cyclic
   std::atomic<Duration::rep> wanted_interval_;  // of the grid, from the end of the next cycle on
   ClockFollower* follower_ = nullptr;
-  EventLatch latch_;                            // event
-  EventCursor cursor_;                          // external
-  TimePoint ready_;                             // since when it could run: the end of its last cycle
-  Duration last_execution_{};                   // freewheeling: processor time of its last cycle
-  bool begun_ = false;                          // has run since begin()
+  EventLatch latch_;           // event
+  EventCursor cursor_;         // external
+  TimePoint ready_;            // since when it could run: the end of its last cycle
+  Duration last_execution_{};  // freewheeling: processor time of its last cycle
+  bool begun_ = false;         // has run since begin()
   OverrunRule overruns_;
   TaskFault fault_;
   FaultTrap trap_;

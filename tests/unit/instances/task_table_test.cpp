@@ -53,7 +53,7 @@ class TaskCalls : public testing::Test {
 
  private:
   ManualClock clock_;
-  std::array<TaskStatistics, 3> statistics_{};
+  std::array<TaskStatistics, 3> statistics_;
   std::unique_ptr<TaskSet> tasks_;
 };
 
