@@ -20,6 +20,7 @@ using namespace plchost;  // NOLINT(google-build-using-namespace): a program's m
 
 struct Options {
   std::string json;
+  std::string markdown;
   std::string plots;
   bool quick = false;
   bool stress = false;
@@ -105,6 +106,8 @@ int run(const Options& options) {
     fmt::print(stderr, "plchost-bench: {}\n", prepared.error().describe());
     return 1;
   }
+  std::error_code cannot_be_made;
+  if (!options.plots.empty()) std::filesystem::create_directories(options.plots, cannot_be_made);
   const std::vector<Job> jobs = make_jobs(options);
   const auto seconds_of = [&](const Job& job) {
     return job.part->turns * std::chrono::duration<double>(plan.each).count();
@@ -128,6 +131,7 @@ int run(const Options& options) {
     if (!options.plots.empty() && !write_plots(jobs[i], options.plots, *measured)) return 1;
     std::ranges::move(*measured, std::back_inserter(rows));
     if (!options.json.empty() && !write_file(options.json, bench::to_json(rows))) return 1;
+    if (!options.markdown.empty() && !write_file(options.markdown, bench::to_markdown(rows))) return 1;
   }
   fmt::print("{}", bench::to_table(rows));
   return complete ? 0 : 1;
@@ -141,6 +145,7 @@ int main(int argc, char** argv) {
   CLI::App app("Measures plchost beside the floor of this machine", "plchost-bench");
   Options options;
   app.add_option("--json", options.json, "write the figures to this file");
+  app.add_option("--markdown", options.markdown, "write them to this file as the README's tables");
   app.add_option("--plots", options.plots, "draw the figures into this folder, as SVG");
   app.add_flag("--quick", options.quick,
                "minutes instead of most of an hour: 5 s of each thing instead of 60");

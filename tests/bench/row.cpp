@@ -84,6 +84,27 @@ std::string to_json(const std::vector<Row>& rows) {
   return ordered_json{{"machine", machine()}, {"rows", array}}.dump(2) + "\n";
 }
 
+std::string to_markdown(const std::vector<Row>& rows) {
+  std::string text =
+      "| | | p50 µs | p99 | p99.9 | floor p50 | p99 | p99.9 | ratio p50 | p99 | p99.9 |\n"
+      "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
+  std::string verdicts = "\n| | | to show | measured | bound | |\n| --- | --- | --- | --- | --- | --- |\n";
+  for (const Row& row : rows) {
+    const Summary ours = summarise(row.ours);
+    const Summary floor = summarise(row.floor);
+    text += fmt::format(
+        "| `{}` | {} | {:.2f} | {:.1f} | {:.1f} | {:.2f} | {:.1f} | {:.1f} | {:.2f} | {:.2f} | {:.2f} |\n",
+        row.name, row.condition, ours.p50, ours.p99, ours.p999, floor.p50, floor.p99, floor.p999,
+        ratio(ours.p50, floor.p50), ratio(ours.p99, floor.p99), ratio(ours.p999, floor.p999));
+    for (const Target& target : row.targets) {
+      verdicts +=
+          fmt::format("| `{}` | {} | {} | {:.3g} | {:.3g} | {} |\n", row.name, row.condition, target.text,
+                      target.measured, target.bound, target.met() ? "met" : "**not met**");
+    }
+  }
+  return text + verdicts;
+}
+
 std::string to_table(const std::vector<Row>& rows) {
   std::string text = fmt::format("{:<34} {:<6} {:>9} {:>9} {:>10} {:>10} {:>10} {:>7} {:>7} {:>7} {:>8}\n",
                                  "name", "", "p50 us", "p99 us", "p99.9 us", "floor p50", "floor p99",

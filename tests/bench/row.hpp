@@ -41,6 +41,8 @@ struct Row {
 
 /// Where it was measured and the rows, as JSON; times in microseconds unless a key says otherwise.
 [[nodiscard]] std::string to_json(const std::vector<Row>& rows);
+/// The rows as two tables in Markdown: the figures, and what was to be shown with its verdict.
+[[nodiscard]] std::string to_markdown(const std::vector<Row>& rows);
 /// The rows as a table for people, and below it the further figures and what is met.
 [[nodiscard]] std::string to_table(const std::vector<Row>& rows);
 

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Measures plchost beside the floor of this machine, in the same run.
-#   tests/bench/run.sh [--quick] [--stress] [--json FILE] [--plots DIR] [--only PART,...] [--seconds N]
+#   tests/bench/run.sh [--quick] [--stress] [--json FILE] [--markdown FILE] [--plots DIR]
+#                      [--only PART,...] [--seconds N]
 # 60 s of each thing: three quarters of an hour idle, and half an hour more with --stress, which measures again
 # beside stress-ng. --quick: 5 s of each, five minutes. --seconds: so many of each. Progress is on standard error.
 # A noisy machine shows in the floor as well: read the ratios.
@@ -12,7 +13,7 @@ build=.build/bench
 args=()
 while [ $# -gt 0 ]; do
   case "$1" in
-    --json | --plots) args+=("$1" "$(cd "$here" && realpath -m "$2")"); shift ;;
+    --json | --markdown | --plots) args+=("$1" "$(cd "$here" && realpath -m "$2")"); shift ;;
     *) args+=("$1") ;;
   esac
   shift

@@ -68,6 +68,15 @@ TEST(Table, SaysPlainlyWhatIsNotMet) {
   EXPECT_NE(to_table({row}).find("NOT MET median below 1 us"), std::string::npos);
 }
 
+TEST(Markdown, HasALineForEachRowAndForEachTarget) {
+  Row row{.name = "part/who", .ours = one_to(10), .floor = one_to(5)};
+  row.targets = {{"median below 1 us", 3, 1}, {"median below 9 us", 3, 9}};
+  const std::string sut = to_markdown({row});
+  EXPECT_NE(sut.find("| `part/who` | idle | 6.00 |"), std::string::npos);
+  EXPECT_NE(sut.find("| median below 1 us | 3 | 1 | **not met** |"), std::string::npos);
+  EXPECT_NE(sut.find("| median below 9 us | 3 | 9 | met |"), std::string::npos);
+}
+
 TEST(Plot, DrawsASharedFloorOnce) {
   const std::vector<Row> shared{{.name = "a", .ours = one_to(3), .floor = one_to(2)},
                                 {.name = "b", .ours = one_to(4), .floor = one_to(2)}};
