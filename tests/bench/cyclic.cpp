@@ -33,6 +33,14 @@ std::vector<Target> targets_for(std::string_view scheduler, const CyclicFigures&
   return {};
 }
 
+/// The least that a scheduler's way of waiting costs.
+void add_nearer_floor(const std::string& name, const CyclicFigures& figures, Row& row) {
+  const Summary summary = summarise(figures.latencies);
+  row.extra.emplace_back(name + "_p50_us", summary.p50);
+  row.extra.emplace_back(name + "_p99_us", summary.p99);
+  row.extra.emplace_back(name + "_cpu_us_per_cycle", figures.cpu_us());
+}
+
 }  // namespace
 
 Result<std::vector<Row>> measure_cyclic(const Plan& plan) {
@@ -40,8 +48,10 @@ Result<std::vector<Row>> measure_cyclic(const Plan& plan) {
   CyclicFigures floor;
   BareHop ticking(kPeriod);
   CyclicFigures hop;
-  std::vector<Subject> subjects{slices_of(plan, bare, kPeriod, floor),
-                                slices_of(plan, ticking, kPeriod, hop)};
+  BareLoop reading(Wait::timer, kPeriod);
+  CyclicFigures timer;
+  std::vector<Subject> subjects{slices_of(plan, bare, kPeriod, floor), slices_of(plan, ticking, kPeriod, hop),
+                                slices_of(plan, reading, kPeriod, timer)};
   std::vector<std::unique_ptr<ScheduledLoop>> loops;
   std::vector<CyclicFigures> figures(all_schedulers().size());
   for (const auto& entry : all_schedulers()) {
@@ -63,12 +73,14 @@ Result<std::vector<Row>> measure_cyclic(const Plan& plan) {
                               {"lost_per_million", figures[i].lost_per_million()},
                               {"floor_lost_per_million", floor.lost_per_million()}},
                     .targets = targets_for(scheduler, figures[i], floor)});
-    if (scheduler != "CmpSchedule") continue;
-    const Summary bare_tick = summarise(hop.latencies);
-    rows.back().extra.insert(rows.back().extra.end(), {{"bare_tick_p50_us", bare_tick.p50},
-                                                       {"bare_tick_p99_us", bare_tick.p99},
-                                                       {"bare_tick_cpu_us_per_cycle", hop.cpu_us()}});
-    rows.back().note = "bare_tick_*: a bare thread that wakes another through a futex at each release";
+    if (scheduler == "CmpSchedule") {
+      add_nearer_floor("bare_tick", hop, rows.back());
+      rows.back().note = "bare_tick_*: a bare thread that wakes another through a futex at each release";
+    }
+    if (scheduler == "CmpScheduleTimer") {
+      add_nearer_floor("bare_timer", timer, rows.back());
+      rows.back().note = "bare_timer_*: a bare thread that reads a periodic timerfd";
+    }
   }
   return rows;
 }
