@@ -36,6 +36,20 @@ std::uintptr_t instruction_of(const ucontext_t& context) noexcept {
 #endif
 }
 
+// The guard below a stack refuses what comes next to its end: a call, or the first use of an array.
+bool is_near_stack(std::uintptr_t address, const ucontext_t& context) noexcept {
+  constexpr std::uintptr_t kNear = 64U << 10U;
+#if defined(__x86_64__)
+  const auto stack = static_cast<std::uintptr_t>(context.uc_mcontext.gregs[REG_RSP]);
+#elif defined(__aarch64__)
+  const std::uintptr_t stack = context.uc_mcontext.sp;
+#else
+  (void)context;
+  const std::uintptr_t stack = 0;
+#endif
+  return address + kNear >= stack && address <= stack + kNear;
+}
+
 // Of a jump to where no code is: the instruction after the call. A stack that cannot be read says nothing.
 std::uintptr_t caller_of(const ucontext_t& context) noexcept {
 #if defined(__x86_64__)
@@ -141,6 +155,8 @@ struct FaultHandlers {
       record.signal = signal;
       record.signal_code = info->si_code;
       if (info->si_code > 0) record.memory_address = reinterpret_cast<std::uintptr_t>(info->si_addr);
+      record.stack_overflow = signal == SIGSEGV && info->si_code == SEGV_ACCERR &&
+                              is_near_stack(record.memory_address, *static_cast<const ucontext_t*>(context));
       const bool no_code = signal == SIGSEGV && record.memory_address == record.address;
       if (no_code) record.caller = caller_of(*static_cast<const ucontext_t*>(context));
       park(trap, fault);

@@ -30,6 +30,7 @@ struct FaultRecord {
 
   FaultKind kind = FaultKind::signal;
   bool in_event_variable = false;     ///< while the scheduler read the task's BOOL, not in its cycle
+  bool stack_overflow = false;        ///< SIGSEGV just where the stack ended
   int signal = 0;                     ///< 0 if it was none
   int signal_code = 0;                ///< si_code
   std::uintptr_t address = 0;         ///< of the instruction; 0 if not known

@@ -177,6 +177,7 @@ Result<std::string> Instance::make_tasks() {
             page_->task(static_cast<std::uint32_t>(index))
                 .state.store(std::to_underlying(state), std::memory_order_relaxed);
           },
+      .catch_faults = true,
   };
   auto tasks = TaskSet::create(clock_, options_.band, application_->tasks(), std::move(environment));
   if (!tasks) return std::unexpected(std::move(tasks).error());
@@ -246,7 +247,8 @@ Result<void> Instance::shut_down() {
     }
   }
   if (stopped) {
-    if (application_) application_->exit();
+    // Its code may wait for what a thread that is parked in it holds.
+    if (application_ && !parked_) application_->exit();
     components_.exit();
     // Only now: until then a thread of a component may have used a task's handle.
     if (host_) host_->task_table().attach(nullptr);

@@ -16,6 +16,7 @@
 #include "instances/runtime/settings.hpp"
 #include "instances/runtime/setup_reporter.hpp"
 #include "schedulers/task_set.hpp"
+#include "shm/base/exception_history.hpp"
 #include "shm/pool/instance_page.hpp"
 #include "shm/pool/object_pool.hpp"
 
@@ -38,6 +39,14 @@ class Instance {
   /// Readable when serve_control() has something to do; -1: no control socket.
   [[nodiscard]] int control_fd() const noexcept { return control_ ? control_->fd() : -1; }
   void serve_control() { control_->serve(); }
+
+  /// Readable when serve_faults() has something to do; -1: there are no tasks.
+  [[nodiscard]] int fault_fd() const noexcept { return tasks_ ? tasks_->fault_fd() : -1; }
+  /// Takes the faults of tasks: each is logged, kept, and shown in the status page; one of the whole
+  /// application puts it into exception.
+  void serve_faults();
+  /// A thread is parked in the application's code for good.
+  [[nodiscard]] bool has_parked_thread() const noexcept { return parked_; }
 
   /// Every kHeartbeat: status page, log of the application, handles of foreign events.
   void beat();
@@ -80,6 +89,8 @@ class Instance {
   [[nodiscard]] std::string hold_idle_states();
   void choose_scheduler();
   void report_tick();
+  void enter_exception(const std::string& reason);
+  void keep_exception(const ExceptionEntry& entry) const;
   void restore_operator_events();
   void notify_tasks(unsigned event);
 
@@ -102,6 +113,7 @@ class Instance {
   std::optional<InstanceSocket> control_;
   bool shutdown_requested_ = false;
   bool is_down_ = false;
+  bool parked_ = false;
 };
 
 }  // namespace plchost

@@ -50,9 +50,10 @@ Result<UniqueFd> start_heartbeat() {
 Result<void> serve(Instance& instance, const UniqueFd& signals) {
   const auto heartbeat = start_heartbeat();
   if (!heartbeat) return std::unexpected(heartbeat.error());
-  std::array<pollfd, 3> fds{{{.fd = signals.get(), .events = POLLIN, .revents = 0},
+  std::array<pollfd, 4> fds{{{.fd = signals.get(), .events = POLLIN, .revents = 0},
                              {.fd = heartbeat->get(), .events = POLLIN, .revents = 0},
-                             {.fd = instance.control_fd(), .events = POLLIN, .revents = 0}}};
+                             {.fd = instance.control_fd(), .events = POLLIN, .revents = 0},
+                             {.fd = instance.fault_fd(), .events = POLLIN, .revents = 0}}};
   while (!instance.shutdown_requested()) {
     if (::poll(fds.data(), fds.size(), -1) < 0) {
       if (errno == EINTR) continue;
@@ -65,6 +66,7 @@ Result<void> serve(Instance& instance, const UniqueFd& signals) {
     std::uint64_t expirations = 0;
     if (fds[1].revents != 0 && ::read(heartbeat->get(), &expirations, sizeof expirations) > 0)
       instance.beat();
+    if (fds[3].revents != 0) instance.serve_faults();  // first: what is asked then finds the state right
     if (fds[2].revents != 0) instance.serve_control();
   }
   return {};
@@ -93,6 +95,11 @@ int run(const Options& options) {
     ::_exit(EXIT_FAILURE);  // a thread is still inside the application: nothing may be destroyed
   }
   spdlog::info("ended");
+  if (instance->has_parked_thread()) {
+    std::fflush(nullptr);
+    ::_exit(served ? EXIT_SUCCESS
+                   : EXIT_FAILURE);  // it may hold a lock that the application's destructors take
+  }
   return served ? EXIT_SUCCESS : EXIT_FAILURE;
 }
 

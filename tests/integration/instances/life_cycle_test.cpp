@@ -112,7 +112,7 @@ TEST(Instance, StartsFreshAfterKillWithNothingOfItsPredecessor) {
   EXPECT_TRUE(eventually([&] { return sut.task("Product")->counters.cycles == 1; }));
 }
 
-TEST(Instance, CrashOfTheApplicationEndsTheProcessWithItsSignal) {
+TEST(Instance, CrashOfAThreadOfTheApplicationsOwnEndsTheProcessWithItsSignal) {
   const Sandbox sandbox;
   InstanceProcess sut(sandbox, {"--application", application("all_kinds")});
   sut.wait_until_up();
@@ -122,7 +122,8 @@ TEST(Instance, CrashOfTheApplicationEndsTheProcessWithItsSignal) {
 
 TEST(Instance, TaskThatNeverReturnsDoesNotKeepTheProcess) {
   const Sandbox sandbox;
-  InstanceProcess sut(sandbox, {"--application", application("all_kinds")});
+  const std::string settings = sandbox.write("line1.cfg", "[CmpSchedule]\nWatchdog.DefaultTimeMs=0\n");
+  InstanceProcess sut(sandbox, {"--settings", settings, "--application", application("all_kinds")});
   sut.wait_until_up();
   (void)sut.event("hang").post();
   EXPECT_TRUE(eventually([&] { return sut.task("Fast")->counters.cycles > 100; }));

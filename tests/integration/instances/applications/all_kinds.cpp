@@ -2,6 +2,7 @@
 #include <array>
 #include <atomic>
 #include <csignal>
+#include <thread>
 
 #include "../../../../instances/plc_app.hpp"
 
@@ -43,7 +44,7 @@ void setup(plc::Application& app) {
   app.external("Work", 3, "work", [] { ++works; });
   app.external("Late", 4, "late", [] {}, plc::Registration::by_others);
   app.external("Report", 5, "report", report);
-  app.external("Crash", 6, "crash", [] { ::raise(SIGSEGV); });
+  app.external("Crash", 6, "crash", [] { std::thread([] { ::raise(SIGSEGV); }).join(); });
   app.external("Hang", 17, "hang", [] {
     for (;;) ::nanosleep(std::array<timespec, 1>{timespec{.tv_sec = 1, .tv_nsec = 0}}.data(), nullptr);
   });

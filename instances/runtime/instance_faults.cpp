@@ -1,0 +1,71 @@
+// What an Instance does when one of its tasks has a fault.
+
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "instances/runtime/instance.hpp"
+#include "instances/runtime/symbol_name.hpp"
+#include "shm/base/log.hpp"
+
+namespace plchost {
+
+namespace {
+
+ExceptionEntry entry_of(const TaskSet::Fault& fault, const std::string& application) {
+  const FaultRecord& record = fault.record;
+  ExceptionEntry entry{.unix_ns = record.unix_ns,
+                       .application = application,
+                       .task = fault.name,
+                       .kind = std::string(to_string(record.kind)),
+                       .whole_application = fault.whole_application,
+                       .signal = record.signal != 0 ? signal_name(record.signal) : std::string(),
+                       .address = record.address,
+                       .symbol = symbol_name(record.address),
+                       .memory_address = record.memory_address,
+                       .text = describe_fault(record)};
+  if (entry.symbol.empty() && record.caller != 0) {
+    entry.symbol = fmt::format("no code; called from {}", symbol_name(record.caller));
+  }
+  return entry;
+}
+
+}  // namespace
+
+void Instance::serve_faults() {
+  while (const auto fault = tasks_->take_fault()) {
+    const ExceptionEntry entry = entry_of(*fault, application_->path());
+    const std::string where = entry.symbol.empty() ? std::string() : fmt::format(" at {}", entry.symbol);
+    const std::string reason = fmt::format("task '{}': {}{}", entry.task, entry.text, where);
+    spdlog::error("exception: {}", reason);
+    page_->task(static_cast<std::uint32_t>(fault->task))
+        .state.store(std::to_underlying(PageTaskState::exception), std::memory_order_relaxed);
+    keep_exception(entry);
+    parked_ = tasks_->has_parked_thread();
+    if (fault->whole_application) enter_exception(reason);
+  }
+}
+
+void Instance::enter_exception(const std::string& /*reason*/) {
+  if (!tasks_->running()) return;
+  (void)host_->events().publish_bound(false);
+  if (const auto stopped = tasks_->stop(kStopLimit); !stopped) {
+    spdlog::error("in exception: {}", stopped.error().describe());
+  }
+}
+
+void Instance::keep_exception(const ExceptionEntry& entry) const {
+  if (options_.launch.run_directory.empty()) return;
+  const std::string path = exception_path(options_.launch.run_directory, options_.launch.name);
+  auto history = read_exceptions(path);
+  if (!history) {
+    spdlog::warn("the exceptions before this one are lost: {}", history.error().describe());
+    history = ExceptionHistory{};
+  }
+  history->add(entry);
+  if (const auto written = write_exceptions(path, *history); !written) {
+    spdlog::error("this exception is not kept: {}", written.error().describe());
+  }
+}
+
+}  // namespace plchost

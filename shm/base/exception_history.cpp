@@ -1,0 +1,123 @@
+#include "shm/base/exception_history.hpp"
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <utility>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <unistd.h>
+
+#include "shm/base/system_call.hpp"
+#include "shm/base/unique_fd.hpp"
+
+namespace plchost {
+
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr int kVersion = 1;
+constexpr std::size_t kMaxFile = std::size_t{256} << 10;
+
+Json to_json(const ExceptionEntry& entry) {
+  return {{"number", entry.number},
+          {"unix_ns", entry.unix_ns},
+          {"application", entry.application},
+          {"task", entry.task},
+          {"kind", entry.kind},
+          {"whole_application", entry.whole_application},
+          {"signal", entry.signal},
+          {"address", entry.address},
+          {"symbol", entry.symbol},
+          {"memory_address", entry.memory_address},
+          {"text", entry.text}};
+}
+
+// value() throws if a key is there with another type; the caller catches.
+ExceptionEntry from_json(const Json& json) {
+  return {.number = json.value("number", std::uint64_t{0}),
+          .unix_ns = json.value("unix_ns", std::int64_t{0}),
+          .application = json.value("application", std::string()),
+          .task = json.value("task", std::string()),
+          .kind = json.value("kind", std::string()),
+          .whole_application = json.value("whole_application", true),
+          .signal = json.value("signal", std::string()),
+          .address = json.value("address", std::uint64_t{0}),
+          .symbol = json.value("symbol", std::string()),
+          .memory_address = json.value("memory_address", std::uint64_t{0}),
+          .text = json.value("text", std::string())};
+}
+
+std::unexpected<Error> corrupt(const std::string& path, std::string_view what) {
+  return failure(ErrorCode::corrupt, fmt::format("{}: {}", path, what));
+}
+
+Result<void> write_all(const std::string& path, std::string_view text) {
+  const UniqueFd fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+  if (!fd) return failure(ErrorCode::system, "open " + path, errno);
+  while (!text.empty()) {
+    const auto written = check_errno(::write(fd.get(), text.data(), text.size()), "write " + path);
+    if (!written) return std::unexpected(written.error());
+    text.remove_prefix(static_cast<std::size_t>(*written));
+  }
+  if (const auto synced = check_errno(::fsync(fd.get()), "fsync " + path); !synced) {
+    return std::unexpected(synced.error());
+  }
+  return {};
+}
+
+}  // namespace
+
+void ExceptionHistory::add(ExceptionEntry entry) {
+  entry.number = ++count;
+  entries.push_back(std::move(entry));
+  if (entries.size() > kMaxEntries) entries.erase(entries.begin());
+}
+
+std::string exception_path(std::string_view run_directory, std::string_view instance) {
+  return fmt::format("{}/{}.exception", run_directory, instance);
+}
+
+Result<ExceptionHistory> read_exceptions(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file) {
+    std::error_code error;
+    if (!std::filesystem::exists(path, error) && !error) return ExceptionHistory{};
+    return failure(ErrorCode::system, "open " + path, errno);
+  }
+  std::string text(kMaxFile + 1, '\0');
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(file.gcount()));
+  if (text.size() > kMaxFile) return corrupt(path, "is larger than any history of exceptions");
+  const Json json = Json::parse(text, nullptr, false);
+  if (!json.is_object()) return corrupt(path, "is not a JSON object");
+  try {
+    if (json.value("version", 0) != kVersion) return corrupt(path, "is of another version");
+    ExceptionHistory history{.count = json.value("count", std::uint64_t{0}), .entries = {}};
+    for (const Json& entry : json.value("exceptions", Json::array())) {
+      if (history.entries.size() == ExceptionHistory::kMaxEntries) break;
+      history.entries.push_back(from_json(entry));
+    }
+    return history;
+  } catch (const Json::exception& error) {
+    return corrupt(path, error.what());
+  }
+}
+
+Result<void> write_exceptions(const std::string& path, const ExceptionHistory& history) {
+  Json entries = Json::array();
+  for (const ExceptionEntry& entry : history.entries) entries.push_back(to_json(entry));
+  const Json json{{"version", kVersion}, {"count", history.count}, {"exceptions", std::move(entries)}};
+  const std::string fresh = path + ".new";
+  const std::string text = json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  if (auto written = write_all(fresh, text); !written) return written;
+  std::error_code error;
+  std::filesystem::rename(fresh, path, error);
+  if (error) return failure(ErrorCode::system, "rename " + fresh, error.value());
+  return {};
+}
+
+}  // namespace plchost

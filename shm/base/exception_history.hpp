@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "shm/base/result.hpp"
+
+namespace plchost {
+
+/// One exception of an application, as it is kept and shown.
+struct ExceptionEntry {
+  std::uint64_t number = 0;  ///< among all exceptions of this instance, from 1
+  std::int64_t unix_ns = 0;  ///< CLOCK_REALTIME
+  std::string application;   ///< path of the file
+  std::string task;
+  std::string kind;                  ///< "signal", "C++ exception", "task watchdog" ...
+  bool whole_application = true;     ///< false: only the task was stopped
+  std::string signal;                ///< "SIGSEGV"; empty: none
+  std::uint64_t address = 0;         ///< of the instruction; 0: not known
+  std::string symbol;                ///< "fill(int)+0x12 in bottling.so"; empty: not known
+  std::uint64_t memory_address = 0;  ///< what SIGSEGV and SIGBUS were about
+  std::string text;                  ///< what happened, with its figures
+  bool operator==(const ExceptionEntry&) const = default;
+};
+
+/// The exceptions of one instance, the oldest first. Kept in a file, so that they outlive a reset, the
+/// process and the manager.
+struct ExceptionHistory {
+  static constexpr std::size_t kMaxEntries = 16;
+
+  std::uint64_t count = 0;  ///< of all that ever were
+  std::vector<ExceptionEntry> entries;
+
+  /// Numbers it and drops the oldest, if there are too many.
+  void add(ExceptionEntry entry);
+};
+
+/// RUN_DIRECTORY/INSTANCE.exception
+[[nodiscard]] std::string exception_path(std::string_view run_directory, std::string_view instance);
+
+/// A file that is not there is an empty history. corrupt: it is something else; the text says what.
+[[nodiscard]] Result<ExceptionHistory> read_exceptions(const std::string& path);
+/// Replaces the file as a whole: a reader finds the one before or the new one. Set-up.
+[[nodiscard]] Result<void> write_exceptions(const std::string& path, const ExceptionHistory& history);
+
+}  // namespace plchost

@@ -1,0 +1,106 @@
+// One external event for each fault that a task can have, beside a cyclic task that has none. A task whose
+// name stands in PLC_FAULT_AT_START has its fault in its first cycle, without an event.
+#include <atomic>
+#include <cstdlib>
+#include <cstring>
+#include <stdexcept>
+#include <string>
+#include <thread>
+
+#include <alloca.h>
+
+#include "../../../../instances/plc_app.hpp"
+
+namespace {
+
+using namespace std::chrono_literals;
+
+volatile int zero = 0;
+int* volatile nowhere = nullptr;
+volatile int sink = 0;
+std::atomic<bool> variable{false};
+std::atomic<bool> variable_is_faulty{false};
+std::atomic<bool> busy{false};
+std::atomic<bool> overrun{false};
+
+void spin(std::chrono::nanoseconds time) {
+  const auto end = std::chrono::steady_clock::now() + time;
+  while (std::chrono::steady_clock::now() < end) sink = sink + 1;
+}
+
+__attribute__((noinline)) void divide() {
+  sink = 42 / zero;  // 1 / x would need no division
+}
+__attribute__((noinline)) void read_null() {
+  sink = *nowhere;
+}
+__attribute__((noinline)) void write_null() {
+  *nowhere = 1;
+}
+__attribute__((noinline)) void call_null() {
+  void (*volatile function)() = nullptr;
+  function();
+  sink = 1;
+}
+__attribute__((noinline)) int recurse(int depth) {  // NOLINT(misc-no-recursion): that is the fault
+  if (zero != 0) return 0;
+  volatile char frame[512];
+  frame[0] = static_cast<char>(depth);
+  return recurse(depth + 1) + frame[0];
+}
+__attribute__((noinline)) void overflow_at_once() {
+  constexpr std::size_t kTooMuch = std::size_t{8} << 20;
+  auto* const block = static_cast<volatile char*>(alloca(kTooMuch));
+  for (std::size_t i = 0; i < kTooMuch; i += 4096) block[i] = 1;
+}
+__attribute__((noinline)) void loop() {
+  while (zero == 0) sink = sink + 1;
+}
+__attribute__((noinline)) void sleep_for_ever() {
+  while (zero == 0) std::this_thread::sleep_for(1s);
+}
+
+void at_start(plc::Application& app) {
+  const char* const fault = std::getenv("PLC_FAULT_AT_START");
+  if (fault != nullptr && std::strcmp(fault, "loop") == 0) app.cyclic("FirstLoop", 2, 10ms, loop);
+  if (fault != nullptr && std::strcmp(fault, "divide") == 0) app.cyclic("FirstDivide", 2, 10ms, divide);
+  if (fault != nullptr && std::strcmp(fault, "variable") == 0) {
+    app.event("FirstVariable", 2, [] { return (divide(), true); }, [] {});
+  }
+}
+
+void setup(plc::Application& app) {
+  app.cyclic("Fast", 1, 2ms, [] {});
+  app.cyclic("Later", 3, 10ms, [] {
+    if (busy) spin(9ms);
+    if (overrun) spin(3ms);
+  });
+  app.cyclic("Low", 8, 10ms, [] {});
+  app.external("Divide", 4, "divide", divide);
+  app.external("ReadNull", 4, "read_null", read_null);
+  app.external("WriteNull", 4, "write_null", write_null);
+  app.external("CallNull", 4, "call_null", call_null);
+  app.external("Recurse", 4, "recurse", [] { sink = recurse(0); });
+  app.external("Alloca", 4, "alloca", overflow_at_once);
+  app.external("Abort", 4, "abort", [] { std::abort(); });
+  app.external("Illegal", 4, "illegal", [] { __builtin_trap(); });
+  app.external("Throw", 4, "throw", [] { throw std::runtime_error("the valve is stuck"); });
+  app.external("Loop", 4, "loop", loop);
+  app.external("Sleep", 4, "sleep", sleep_for_ever);
+  app.external("Busy", 4, "busy", [] { busy = true; });
+  app.external("Overrun", 4, "overrun", [] { overrun = true; });
+  app.external("Starve", 4, "starve", [] { spin(300ms); });
+  app.external("Variable", 4, "variable", [] { variable_is_faulty = true; });
+  app.event(
+      "Edge", 5,
+      [] {
+        if (variable_is_faulty) divide();
+        return variable.load();
+      },
+      [] {});
+  at_start(app);
+}
+
+}  // namespace
+
+PLC_APPLICATION("TaskFaults", setup)

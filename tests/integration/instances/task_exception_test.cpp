@@ -1,0 +1,247 @@
+// Faults in the cycles of a real plc-instance: caught, recorded, and the instance stays reachable.
+#include <csignal>
+#include <cstdlib>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "shm/base/exception_history.hpp"
+#include "shm/base/thread.hpp"
+#include "tests/integration/instances/instance_process.hpp"
+
+namespace plchost::testing {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+const std::string kWatchdogs =
+    "[Task.Loop]\nWatchdog.TimeUs=20000\n"
+    "[Task.Sleep]\nWatchdog.TimeUs=20000\n";
+
+/// An instance whose tasks have faults on demand.
+class Faulty {
+ public:
+  explicit Faulty(const std::string& settings = kWatchdogs, const std::string& scheduler = "CmpSchedule",
+                  const std::string& at_start = {})
+      : process_(sandbox_, arguments(settings, scheduler, at_start)) {
+    if (at_start.empty()) process_.wait_until_up();
+  }
+
+  InstanceProcess& process() { return process_; }
+  /// The exceptions that are kept, when there are as many.
+  std::vector<ExceptionEntry> exceptions(std::size_t count = 1) {
+    std::vector<ExceptionEntry> found;
+    EXPECT_TRUE(eventually([&] {
+      const auto history = read_exceptions(exception_path(sandbox_.folder(), "line1"));
+      if (history) found = history->entries;
+      return found.size() >= count;
+    })) << process_.log();
+    found.resize(std::max(count, found.size()));
+    return found;
+  }
+  PageTaskState state_of(const std::string& task) { return process_.task(task)->state; }
+  std::uint64_t cycles_of(const std::string& task) { return process_.task(task)->counters.cycles; }
+  bool runs(const std::string& task) {
+    const auto before = cycles_of(task);
+    return eventually([&] { return cycles_of(task) > before + 5; });
+  }
+
+ private:
+  // All on one core, as it should be: so one task can starve another.
+  [[nodiscard]] std::vector<std::string> arguments(const std::string& settings, const std::string& scheduler,
+                                                   const std::string& at_start) const {
+    ::setenv("PLC_FAULT_AT_START", at_start.c_str(), 1);
+    return {"--core",        std::to_string(allowed_cores(0).value().back()),
+            "--scheduler",   scheduler,
+            "--settings",    sandbox_.write("line1.cfg", settings),
+            "--application", application("task_faults")};
+  }
+
+  Sandbox sandbox_;
+  InstanceProcess process_;
+};
+
+// What holds after every fault of the whole application.
+void expect_stopped_and_reachable(Faulty& sut, const std::string& task) {
+  EXPECT_TRUE(eventually([&] { return sut.state_of("Fast") == PageTaskState::stopped; }))
+      << sut.process().log();
+  EXPECT_EQ(sut.state_of(task), PageTaskState::exception);
+  const auto cycles = sut.cycles_of("Fast");
+  EXPECT_EQ(sut.process().ask(ControlVerb::status).code, ErrorCode::ok);
+  const auto refused = sut.process().ask(ControlVerb::start);
+  EXPECT_EQ(refused.code, ErrorCode::wrong_state);
+  EXPECT_THAT(refused.text, AllOf(HasSubstr(task), HasSubstr("reset"), HasSubstr("first")));
+  EXPECT_EQ(sut.cycles_of("Fast"), cycles);
+  EXPECT_EQ(sut.process().end(SIGTERM), EXIT_SUCCESS) << sut.process().log();
+}
+
+struct Fault {
+  const char* event;
+  const char* task;
+  const char* kind;
+  const char* signal;
+  const char* text;
+  const char* symbol;
+};
+
+void PrintTo(const Fault& fault, std::ostream* to) {
+  *to << fault.event;
+}
+
+class TaskWith : public ::testing::TestWithParam<Fault> {};
+
+TEST_P(TaskWith, GoesToExceptionAndTheInstanceStaysReachable) {
+  Faulty sut;
+  (void)sut.process().event(GetParam().event).post();
+  const auto exceptions = sut.exceptions();
+  EXPECT_EQ(exceptions.front().number, 1U);
+  EXPECT_EQ(exceptions.front().task, GetParam().task);
+  EXPECT_EQ(exceptions.front().kind, GetParam().kind);
+  EXPECT_EQ(exceptions.front().signal, GetParam().signal);
+  EXPECT_THAT(exceptions.front().text, HasSubstr(GetParam().text));
+  EXPECT_THAT(exceptions.front().symbol, HasSubstr(GetParam().symbol));
+  EXPECT_THAT(exceptions.front().application, HasSubstr("task_faults.so"));
+  EXPECT_TRUE(exceptions.front().whole_application);
+  expect_stopped_and_reachable(sut, GetParam().task);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Faults, TaskWith,
+    ::testing::Values(
+        Fault{"divide", "Divide", "signal", "SIGFPE", "integer division by zero", "divide()+0x"},
+        Fault{"read_null", "ReadNull", "signal", "SIGSEGV", "access to no memory at 0x0", "read_null()+0x"},
+        Fault{"write_null", "WriteNull", "signal", "SIGSEGV", "access to no memory at 0x0",
+              "write_null()+0x"},
+        Fault{"call_null", "CallNull", "signal", "SIGSEGV", "at 0x0",
+              "called from (anonymous namespace)::call_null()"},
+        Fault{"recurse", "Recurse", "signal", "SIGSEGV", "stack overflow", "recurse(int)+0x"},
+        Fault{"alloca", "Alloca", "signal", "SIGSEGV", "stack overflow", "overflow_at_once()+0x"},
+        Fault{"abort", "Abort", "signal", "SIGABRT", "abort", ""},
+        Fault{"illegal", "Illegal", "signal", "SIGILL", "illegal instruction", "task_faults.so"},
+        Fault{"throw", "Throw", "C++ exception", "", "std::runtime_error left its cycle: the valve is stuck",
+              ""},
+        Fault{"loop", "Loop", "task watchdog", "", "the limit is 20.000 ms", "loop()+0x"},
+        Fault{"sleep", "Sleep", "task watchdog", "", "the limit is 20.000 ms", ""},
+        Fault{"variable", "Edge", "signal", "SIGFPE", "integer division by zero in its event variable",
+              "divide()+0x"}),
+    [](const auto& test) { return std::string(test.param.event); });
+
+class EachScheduler : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(EachScheduler, StopsALoopInTheFirstCycle) {
+  Faulty sut("[Task.FirstLoop]\nWatchdog.TimeUs=10000\nWatchdog.Sensitivity=2\n", GetParam(), "loop");
+  EXPECT_THAT(sut.exceptions().front().text, HasSubstr("the limit is 20.000 ms"));
+  expect_stopped_and_reachable(sut, "FirstLoop");
+}
+
+TEST_P(EachScheduler, CatchesAFaultInTheFirstCycle) {
+  Faulty sut(kWatchdogs, GetParam(), "divide");
+  EXPECT_EQ(sut.exceptions().front().signal, "SIGFPE");
+  expect_stopped_and_reachable(sut, "FirstDivide");
+}
+
+TEST_P(EachScheduler, CatchesAFaultInAnEventVariableWhenItIsFirstRead) {
+  Faulty sut(kWatchdogs, GetParam(), "variable");
+  EXPECT_THAT(sut.exceptions().front().text, HasSubstr("in its event variable"));
+  expect_stopped_and_reachable(sut, "FirstVariable");
+}
+
+TEST_P(EachScheduler, CatchesAFaultInAnEventVariableLaterOn) {
+  Faulty sut(kWatchdogs, GetParam());
+  (void)sut.process().event("variable").post();
+  EXPECT_EQ(sut.exceptions().front().task, "Edge");
+  expect_stopped_and_reachable(sut, "Edge");
+}
+
+TEST_P(EachScheduler, StopsALoopInALaterCycle) {
+  Faulty sut(kWatchdogs, GetParam());
+  (void)sut.process().event("loop").post();
+  EXPECT_THAT(sut.exceptions().front().symbol, HasSubstr("loop()+0x"));
+  expect_stopped_and_reachable(sut, "Loop");
+}
+
+TEST_P(EachScheduler, HitsAtTheTwentiethOverrunInARow) {
+  Faulty sut("[Task.Later]\nWatchdog.TimeUs=2000\nWatchdog.Sensitivity=20\n", GetParam());
+  EXPECT_TRUE(sut.runs("Later"));
+  (void)sut.process().event("overrun").post();
+  const auto found = sut.exceptions().front();
+  EXPECT_EQ(found.kind, "consecutive overruns");
+  EXPECT_THAT(found.text, HasSubstr("20 cycles in a row took longer than 2.000 ms"));
+  expect_stopped_and_reachable(sut, "Later");
+}
+
+TEST_P(EachScheduler, SeesACycleThatNeverRan) {
+  Faulty sut("[Task.Low]\nWatchdog.OmittedCycles=10\n", GetParam());
+  EXPECT_TRUE(sut.runs("Low"));
+  std::this_thread::sleep_for(300ms);  // what happens right after a start is not counted
+  (void)sut.process().event("starve").post();
+  const auto found = sut.exceptions().front();
+  EXPECT_EQ(found.kind, "omitted cycles");
+  EXPECT_EQ(found.task, "Low");
+  expect_stopped_and_reachable(sut, "Low");
+}
+
+INSTANTIATE_TEST_SUITE_P(Each, EachScheduler,
+                         ::testing::Values("CmpSchedule", "CmpScheduleTimer", "CmpScheduleOneShot"),
+                         [](const auto& test) { return std::string(test.param); });
+
+TEST(TaskException, OfATaskByItselfLeavesTheOthersRunning) {
+  Faulty sut(
+      "[Task.Divide]\nWatchdog.Policy=Task\n[Task.Loop]\nWatchdog.TimeUs=20000\nWatchdog.Policy=Task\n");
+  (void)sut.process().event("divide").post();
+  EXPECT_FALSE(sut.exceptions().front().whole_application);
+  EXPECT_TRUE(sut.runs("Low"));
+  (void)sut.process().event("loop").post();
+  EXPECT_EQ(sut.exceptions(2).back().task, "Loop");
+  EXPECT_TRUE(sut.runs("Low"));
+  EXPECT_EQ(sut.state_of("Divide"), PageTaskState::exception);
+  EXPECT_EQ(sut.state_of("Low"), PageTaskState::running);
+  EXPECT_EQ(sut.process().ask(ControlVerb::set_scheduler, "CmpScheduleTimer").code, ErrorCode::ok);
+  EXPECT_TRUE(sut.runs("Low"));
+  EXPECT_EQ(sut.process().ask(ControlVerb::stop).code, ErrorCode::ok);
+  EXPECT_EQ(sut.process().ask(ControlVerb::start).code, ErrorCode::wrong_state);
+  EXPECT_EQ(sut.process().end(SIGTERM), EXIT_SUCCESS);
+}
+
+TEST(TaskException, OfTheLoadNamesTheTaskThatUsedTheMost) {
+  Faulty sut("[CmpSchedule]\nProcessorLoad.Enable=1\nProcessorLoad.Maximum=70\nProcessorLoad.Interval=200\n");
+  std::this_thread::sleep_for(500ms);
+  EXPECT_EQ(sut.state_of("Later"), PageTaskState::running);
+  (void)sut.process().event("busy").post();
+  const auto found = sut.exceptions().front();
+  EXPECT_EQ(found.kind, "processor load");
+  EXPECT_EQ(found.task, "Later");
+  expect_stopped_and_reachable(sut, "Later");
+}
+
+TEST(TaskException, IsKeptWhenTheProcessIsGoneAndCounted) {
+  const Sandbox sandbox;
+  for (unsigned i = 1; i <= ExceptionHistory::kMaxEntries / 8; ++i) {
+    InstanceProcess sut(sandbox, {"--application", application("task_faults")});
+    sut.wait_until_up();
+    (void)sut.event("divide").post();
+    EXPECT_TRUE(eventually([&] {
+      const auto history = read_exceptions(exception_path(sandbox.folder(), "line1"));
+      return history && history->count == i && history->entries.size() == i;
+    })) << sut.log();
+    EXPECT_EQ(sut.end(SIGKILL), -SIGKILL);
+  }
+}
+
+TEST(TaskException, DefaultGuardStopsAnEndlessLoopAndCanBeOff) {
+  Faulty sut("[CmpSchedule]\nWatchdog.DefaultTimeMs=100\n");
+  (void)sut.process().event("loop").post();
+  EXPECT_THAT(sut.exceptions().front().text, HasSubstr("the limit is 100.000 ms"));
+  Faulty off("[CmpSchedule]\nWatchdog.DefaultTimeMs=0\n");
+  (void)off.process().event("sleep").post();
+  EXPECT_TRUE(off.runs("Low"));
+  std::this_thread::sleep_for(200ms);
+  EXPECT_TRUE(off.runs("Low"));
+  EXPECT_EQ(off.state_of("Sleep"), PageTaskState::running);
+}
+
+}  // namespace
+}  // namespace plchost::testing
