@@ -1,0 +1,71 @@
+#include "shm/base/exception_history.hpp"
+
+#include <filesystem>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+namespace plchost {
+namespace {
+
+class ExceptionHistoryTest : public testing::Test {
+ protected:
+  ~ExceptionHistoryTest() override { std::filesystem::remove(path_); }
+  void write(const std::string& text) const { std::ofstream(path_) << text; }
+  static ExceptionEntry entry(std::string text) {
+    ExceptionEntry made;
+    made.task = "Fill";
+    made.kind = "signal";
+    made.signal = "SIGSEGV";
+    made.address = 0xffff'ffff'ffff'fff0;
+    made.text = std::move(text);
+    return made;
+  }
+
+  std::string path_ = testing::TempDir() + "/exceptions-" + std::to_string(::getpid());
+};
+
+TEST_F(ExceptionHistoryTest, ComesBackFromTheFileAsItWasWritten) {
+  ExceptionHistory sut;
+  sut.add(entry("a \"text\" with \xff and\nlines"));
+  ASSERT_TRUE(write_exceptions(path_, sut));
+  const auto back = read_exceptions(path_);
+  ASSERT_TRUE(back) << back.error().describe();
+  EXPECT_EQ(back->count, 1U);
+  ASSERT_EQ(back->entries.size(), 1U);
+  EXPECT_EQ(back->entries[0].number, 1U);
+  EXPECT_EQ(back->entries[0].address, sut.entries[0].address);
+  EXPECT_EQ(back->entries[0].task, "Fill");
+}
+
+TEST_F(ExceptionHistoryTest, KeepsTheLastSixteenAndCountsAll) {
+  ExceptionHistory sut;
+  for (int i = 0; i < 20; ++i) sut.add(entry("x"));
+  EXPECT_EQ(sut.count, 20U);
+  ASSERT_EQ(sut.entries.size(), ExceptionHistory::kMaxEntries);
+  EXPECT_EQ(sut.entries.front().number, 5U);
+  EXPECT_EQ(sut.entries.back().number, 20U);
+}
+
+TEST_F(ExceptionHistoryTest, IsEmptyWithoutAFile) {
+  const auto history = read_exceptions(path_);
+  ASSERT_TRUE(history);
+  EXPECT_EQ(history->count, 0U);
+}
+
+TEST_F(ExceptionHistoryTest, RefusesWhatIsSomethingElse) {
+  for (const char* const text :
+       {"", "{", "[]", "{\"version\":9}", "{\"version\":1,\"exceptions\":[{\"number\":\"x\"}]}",
+        "{\"version\":1,\"exceptions\":[7]}"}) {
+    write(text);
+    const auto history = read_exceptions(path_);
+    ASSERT_FALSE(history) << text;
+    EXPECT_EQ(history.error().code, ErrorCode::corrupt) << text;
+    EXPECT_THAT(history.error().message, testing::HasSubstr(path_));
+  }
+}
+
+}  // namespace
+}  // namespace plchost
