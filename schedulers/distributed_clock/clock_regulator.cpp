@@ -75,8 +75,11 @@ void ClockRegulator::take(double error_ns, Duration elapsed) noexcept {
   const double kp = std::max(2 * (2 * n - 1) / (n * (n + 1)), kp_);
   const double ki = std::max(6 / (n * (n + 1)), ki_);
   model_.fraction_ns += kp * error_ns;
-  model_.drift =
-      std::clamp(model_.drift + ki * error_ns / static_cast<double>(elapsed.count()), -kMaxDrift, kMaxDrift);
+  // Of two pairs that come close together, as a writer that was late gives them, the noise is no drift.
+  const auto apart = static_cast<double>(std::min(elapsed, gap_).count());
+  spacing_ns_ = spacing_ns_ > 0 ? spacing_ns_ + (apart - spacing_ns_) / std::min(n, kMemory) : apart;
+  const double base = std::max(static_cast<double>(elapsed.count()), spacing_ns_);
+  model_.drift = std::clamp(model_.drift + ki * error_ns / base, -kMaxDrift, kMaxDrift);
   bias_ns_ += (error_ns - bias_ns_) / std::min(n, kMemory);
   if (n > 2 * kMemory && std::abs(bias_ns_) > kOneSided * scatter_ns_) {
     pairs_ = kPairsAfterChange;

@@ -63,6 +63,7 @@ class ClockRegulator {
   Duration gap_;             // after that much silence the phase is learnt anew
   ClockModel model_;         // anchored at the last pair that was taken
   std::uint32_t pairs_ = 0;  // that the gains are for; not above kEnoughPairs
+  double spacing_ns_ = 0;    // usual distance of two pairs
   double bias_ns_ = 0;
   double scatter_ns_;           // usual magnitude of a deviation
   std::uint32_t outliers_ = 0;  // in a row that agree

@@ -77,6 +77,20 @@ TEST_F(Regulator, HoldsItAtAnyRateOfPairs) {
   }
 }
 
+TEST_F(Regulator, HoldsItWhenAWriterIsLateAndCatchesUpInBursts) {
+  feed_until(kOrigin + seconds(2));
+  std::mt19937_64 random(5);
+  std::vector<double> errors;
+  while (now < kOrigin + seconds(60)) {
+    const Duration gap = milliseconds(1 + static_cast<int>(random() % 30));
+    const TimePoint late = now + gap;
+    for (int i = 0; i < gap / milliseconds(1); ++i) sut.feed(reference.stamp(late + i * microseconds(25)));
+    now = late + milliseconds(1);
+    for (int ms = 0; ms < 15; ++ms) errors.push_back(std::abs(error_at(now + milliseconds(ms))));
+  }
+  EXPECT_LT(percentile(errors, 0.99), 150);
+}
+
 TEST_F(Regulator, FollowsADriftThatChangesSuddenly) {
   feed_until(kOrigin + seconds(5));
   reference.set_drift(-200 * kPpm, now);
