@@ -1,5 +1,8 @@
 #include "instances/runtime/settings.hpp"
 
+#include <fstream>
+#include <sstream>
+
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -83,6 +86,17 @@ TEST(Settings, DefaultsOfTheDistributedClockAreThoseOfItsTable) {
   EXPECT_EQ(sut->scheduler.distributed_clock, initial);
 }
 
+TEST(Settings, WritesFrequenciesOfAnRtcWithDecimals) {
+  const auto interval = [](const std::string& text) {
+    return parse_settings("[CmpSchedule]\nSchedulerInterval=" + text + "\n", "line1.cfg")
+        .value()
+        .scheduler.scheduler_interval;
+  };
+  EXPECT_EQ(interval("976.5625"), std::chrono::nanoseconds(976'563));
+  EXPECT_EQ(interval("1953.125"), std::chrono::nanoseconds(1'953'125));
+  EXPECT_EQ(interval("50.1"), std::chrono::nanoseconds(50'100));
+}
+
 TEST(Settings, TakesLinuxAsAnotherWordForVxWorks) {
   const auto sut = parse_settings("[SysTimer]\nLinux.TimerSource=Task\n", "line1.cfg");
   ASSERT_TRUE(sut);
@@ -123,6 +137,9 @@ INSTANTIATE_TEST_SUITE_P(
                 "line1.cfg:2: [CmpSchedule] SchedulerInterval: '49'"},
         BadFile{"[CmpSchedule]\nSchedulerInterval=1000001\n", "us, 50 to 1000000"},
         BadFile{"[CmpSchedule]\nSchedulerInterval=1ms\n", "'1ms' is not allowed"},
+        BadFile{"[CmpSchedule]\nSchedulerInterval=976.56255\n", "'976.56255' is not allowed"},
+        BadFile{"[CmpSchedule]\nSchedulerInterval=1000.\n", "'1000.' is not allowed"},
+        BadFile{"[CmpSchedule]\nSchedulerInterval=1000.-5\n", "with up to four decimals"},
         BadFile{"[CmpSchedule]\nSchedulerInterval=\n", "'' is not allowed"},
         BadFile{"[CmpSchedule]\nSchedulerInterval=99999999999999999999\n", "is not allowed"},
         BadFile{"[CmpSchedule]\nTask.Freewheeling.Cycletime=0\n", "ms, 1 to 60000, or -1 (not set)"},
@@ -205,6 +222,17 @@ TEST(Settings, DefaultsOfATaskAreThoseOfTheProgram) {
   EXPECT_EQ(tasks[0].start_offset, TaskConfig{}.start_offset);
   EXPECT_EQ(tasks[0].watchdog, TaskWatchdog{});
   EXPECT_EQ(tasks[0].drives_outputs, TaskConfig{}.drives_outputs);
+}
+
+TEST(Settings, ReadmeHasTheWholeTable) {
+  std::stringstream readme;
+  readme << std::ifstream(INSTANCES_README).rdbuf();
+  for (const SettingKey& key : all_setting_keys()) {
+    if (std::holds_alternative<UnusedSetting>(key.value)) continue;
+    const std::string row = fmt::format("| `[{}] {}` | {} | {} |\n", key.section, written_name(key),
+                                        allowed_values(key), key.initial.empty() ? "none" : key.initial);
+    EXPECT_THAT(readme.str(), HasSubstr(row)) << "put this line into the table of " INSTANCES_README;
+  }
 }
 
 TEST(Settings, NamesAFileThatIsNotThereOrNoFile) {

@@ -259,6 +259,28 @@ TEST_F(ManagedInstanceTest, SeesThatTheApplicationStoppedByItself) {
   EXPECT_EQ(state(), InstanceState::running);
 }
 
+TEST_F(ManagedInstanceTest, LeavesTheChoiceOfTheSchedulerToTheSettingsOfEachProcess) {
+  bring_up();
+  EXPECT_EQ(host_.spawned.back().scheduler, "");
+  host_.page = page_of(100, true, "CmpScheduleOneShot", "/opt/line.so");
+  advance(kPageLag);
+  sut().refresh();
+  EXPECT_EQ(sut().status().scheduler.view(), "CmpScheduleOneShot");
+  crash_once();
+  EXPECT_EQ(host_.spawned.back().scheduler, "") << "its settings may say something else by now";
+}
+
+TEST_F(ManagedInstanceTest, RemembersASchedulerThatTheProcessWasSwitchedToByOthers) {
+  bring_up();
+  host_.page = page_of(100, true, "CmpSchedule", "/opt/line.so");
+  advance(kPageLag);
+  sut().refresh();
+  host_.page = page_of(100, true, "CmpScheduleTimer", "/opt/line.so");
+  sut().refresh();
+  crash_once();
+  EXPECT_EQ(host_.spawned.back().scheduler, "CmpScheduleTimer");
+}
+
 TEST_F(ManagedInstanceTest, BreaksOffWhatGoesOnWhenTheManagerEnds) {
   bring_up();
   ask(ControlVerb::stop);

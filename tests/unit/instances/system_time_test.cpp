@@ -1,0 +1,100 @@
+#include "instances/runtime/system_time.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "shm/base/time.hpp"
+
+namespace plchost {
+namespace {
+
+using ::testing::HasSubstr;
+
+RTS_SYSTIME now_ns() {
+  return static_cast<RTS_SYSTIME>(MonotonicClock::now().time_since_epoch().count());
+}
+
+RTS_RESULT good_ns(RTS_SYSTIME* time) {
+  *time = now_ns() + 5'000'000'000'000;
+  return ERR_OK;
+}
+RTS_RESULT good_us(RTS_SYSTIME* time) {
+  *time = (now_ns() + 5'000'000'000'000) / 1000;
+  return ERR_OK;
+}
+RTS_RESULT other_base(RTS_SYSTIME* time) {
+  *time = now_ns() / 1000;
+  return ERR_OK;
+}
+RTS_RESULT failing(RTS_SYSTIME* /*time*/) {
+  return ERR_FAILED;
+}
+RTS_RESULT still(RTS_SYSTIME* time) {
+  *time = 7'000'000;
+  return ERR_OK;
+}
+RTS_RESULT still_us(RTS_SYSTIME* time) {
+  *time = 7'000;
+  return ERR_OK;
+}
+RTS_RESULT backwards(RTS_SYSTIME* time) {
+  static int calls = 0;
+  *time = now_ns() + 5'000'000'000'000 - (++calls % 50 == 0 ? 1'000'000'000 : 0);
+  return ERR_OK;
+}
+// Both a thousandth: they agree with each other.
+RTS_RESULT us_as_ns(RTS_SYSTIME* time) {
+  *time = now_ns() / 1000;
+  return ERR_OK;
+}
+RTS_RESULT ms_as_us(RTS_SYSTIME* time) {
+  *time = now_ns() / 1'000'000;
+  return ERR_OK;
+}
+
+std::string complaint(PF_SYSTIME us, PF_SYSTIME ns) {
+  const auto checked = check_system_time({"MyUs", us}, {"MyNs", ns});
+  return checked ? "" : checked.error().message;
+}
+
+TEST(SystemTime, TakesTwoFunctionsOfOneBase) {
+  EXPECT_EQ(complaint(good_us, good_ns), "");
+}
+
+TEST(SystemTime, RefusesWhatApplicationsCouldNotRelyOn) {
+  EXPECT_THAT(complaint(other_base, good_ns), HasSubstr("MyUs and MyNs have no common base"));
+  EXPECT_THAT(complaint(failing, good_ns), HasSubstr("MyUs returned 0x0001, not ERR_OK"));
+  EXPECT_THAT(complaint(good_us, backwards), HasSubstr("MyNs went back from"));
+  EXPECT_THAT(complaint(still_us, still), HasSubstr("MyNs stays at 7000000"));
+  EXPECT_THAT(complaint(ms_as_us, us_as_ns), HasSubstr("MyNs advanced by"));
+}
+
+TEST(SystemTime, IsClockMonotonicInAllThreeUnitsByDefault) {
+  ASSERT_TRUE(use_system_time({}));
+  const RTS_SYSTIME before = now_ns();
+  RTS_SYSTIME us = 0;
+  RTS_SYSTIME ns = 0;
+  ASSERT_EQ(SysTimeGetUs(&us), ERR_OK);
+  const unsigned int ms = SysTimeGetMs();
+  ASSERT_EQ(SysTimeGetNs(&ns), ERR_OK);
+  EXPECT_GE(us, before / 1000);
+  EXPECT_LE(us, ns / 1000);
+  EXPECT_GE(ns, before);
+  EXPECT_LE(ns, now_ns());
+  EXPECT_LE(ms - static_cast<unsigned int>(before / 1'000'000),
+            static_cast<unsigned int>((now_ns() - before) / 1'000'000 + 1));
+  EXPECT_EQ(SysTimeGetUs(nullptr), ERR_PARAMETER);
+  EXPECT_EQ(SysTimeGetNs(nullptr), ERR_PARAMETER);
+}
+
+TEST(SystemTime, NamesTheLibraryThatIsNotThereAndTheSymbolThatItLacks) {
+  const auto absent = use_system_time({.get_us = "a", .get_ns = "b", .library = "/nonexistent/clock.so"});
+  ASSERT_FALSE(absent);
+  EXPECT_THAT(absent.error().message, HasSubstr("/nonexistent/clock.so"));
+  const auto lacking = use_system_time({.get_us = "my_us", .get_ns = "my_ns", .library = "libm.so.6"});
+  ASSERT_FALSE(lacking);
+  EXPECT_THAT(lacking.error().message, HasSubstr("libm.so.6 has no function 'my_us'"));
+}
+
+}  // namespace
+}  // namespace plchost
