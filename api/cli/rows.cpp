@@ -14,10 +14,10 @@ using dds::text_of;
 
 namespace {
 
-constexpr std::array kInstanceStates{std::string_view("offline"),   std::string_view("starting"),
-                                     std::string_view("running"),   std::string_view("stopped"),
-                                     std::string_view("stopping"),  std::string_view("waiting"),
-                                     std::string_view("safe_mode"), std::string_view("failed")};
+constexpr std::array kInstanceStates{
+    std::string_view("offline"),   std::string_view("starting"), std::string_view("running"),
+    std::string_view("stopped"),   std::string_view("stopping"), std::string_view("waiting"),
+    std::string_view("safe_mode"), std::string_view("failed"),   std::string_view("exception")};
 constexpr std::array kTaskKinds{std::string_view("cyclic"), std::string_view("event"),
                                 std::string_view("external"), std::string_view("freewheeling")};
 constexpr std::array kTaskStates{std::string_view("created"), std::string_view("running"),

@@ -42,6 +42,12 @@ Qos presence_qos() {
   return qos;
 }
 
+Qos transition_qos() {
+  Qos qos;
+  qos.reliable(kServerBlocking).keep_last(kTransitionDepth).transient_local().no_autodispose();
+  return qos;
+}
+
 std::string host_partition(std::string_view host) {
   return fmt::format("h.{}", host);
 }

@@ -32,12 +32,14 @@ inline constexpr TopicInfo kTaskStatistics{"plc/v1/status/task_statistics", &plc
 inline constexpr TopicInfo kEventStatus{"plc/v1/status/event", &plc_EventStatus_desc};
 inline constexpr TopicInfo kObjectStatus{"plc/v1/status/object", &plc_ObjectStatus_desc};
 inline constexpr TopicInfo kHostFinding{"plc/v1/status/host_finding", &plc_HostFinding_desc};
+inline constexpr TopicInfo kTransition{"plc/v1/transition", &plc_Transition_desc};
 
 /// The bounds of the readers and histories. A reader that is full makes the writer wait: back-pressure, no
 /// loss.
 inline constexpr std::int32_t kRequestReaderDepth = 256;
 inline constexpr std::int32_t kEventReaderDepth = 4096;
 inline constexpr std::int32_t kReplyDepth = 16;
+inline constexpr std::int32_t kTransitionDepth = 64;  ///< of each instance; as many as its ring holds
 /// No writer of the server waits longer.
 inline constexpr Duration kServerBlocking = std::chrono::milliseconds(1);
 inline constexpr Duration kRequestBlocking = std::chrono::milliseconds(100);
@@ -51,6 +53,7 @@ inline constexpr Duration kPresenceDeadline = std::chrono::milliseconds(100);
 [[nodiscard]] Qos ack_qos();
 [[nodiscard]] Qos status_qos();
 [[nodiscard]] Qos presence_qos();
+[[nodiscard]] Qos transition_qos();
 
 /// Where requests and posts for one host go, and where replies for one client (its participant's GUID in hex)
 /// go.

@@ -28,6 +28,8 @@ constexpr std::array kOperations = {
     Operation{plc_OPERATION_START, ControlVerb::start, ApiRole::operating, Argument::none},
     Operation{plc_OPERATION_STOP, ControlVerb::stop, ApiRole::operating, Argument::none},
     Operation{plc_OPERATION_RESET, ControlVerb::reset, ApiRole::operating, Argument::none},
+    Operation{plc_OPERATION_RESET_COLD, ControlVerb::reset_cold, ApiRole::operating, Argument::none},
+    Operation{plc_OPERATION_SINGLE_CYCLE, ControlVerb::single_cycle, ApiRole::operating, Argument::none},
     Operation{plc_OPERATION_RESTART, ControlVerb::restart, ApiRole::operating, Argument::none},
     Operation{plc_OPERATION_RESET_STATISTICS, ControlVerb::reset_statistics, ApiRole::operating,
               Argument::task_or_none},

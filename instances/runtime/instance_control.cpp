@@ -44,7 +44,9 @@ Result<std::string> Instance::obey(const ControlRequest& request) {
       return {};
     case ControlVerb::status:
       return status();
+    case ControlVerb::single_cycle:
     case ControlVerb::reset:
+    case ControlVerb::reset_cold:
     case ControlVerb::restart:
     case ControlVerb::load_application:
     case ControlVerb::check_host:

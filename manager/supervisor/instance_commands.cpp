@@ -30,11 +30,13 @@ void ManagedInstance::handle(const ControlRequest& request, ControlReplyFunction
     case ControlVerb::stop:
       return begin_stop();
     case ControlVerb::reset:
+    case ControlVerb::reset_cold:
       return fresh_process(Next::stay_stopped);
     case ControlVerb::restart:
       return fresh_process(Next::run);
     case ControlVerb::load_application:
       return begin_load();
+    case ControlVerb::single_cycle:
     case ControlVerb::set_scheduler:
     case ControlVerb::register_event:
     case ControlVerb::unregister_event:
@@ -81,7 +83,9 @@ Result<void> ManagedInstance::check_argument(ControlRequest& request) const {
     }
     case ControlVerb::start:
     case ControlVerb::stop:
+    case ControlVerb::single_cycle:
     case ControlVerb::reset:
+    case ControlVerb::reset_cold:
     case ControlVerb::restart:
       return {};
   }

@@ -16,6 +16,8 @@ constexpr std::array kVerbs = {
     std::pair{ControlVerb::start, std::string_view("start")},
     std::pair{ControlVerb::stop, std::string_view("stop")},
     std::pair{ControlVerb::reset, std::string_view("reset")},
+    std::pair{ControlVerb::reset_cold, std::string_view("reset cold")},
+    std::pair{ControlVerb::single_cycle, std::string_view("single cycle")},
     std::pair{ControlVerb::restart, std::string_view("restart")},
     std::pair{ControlVerb::reset_statistics, std::string_view("reset statistics")},
     std::pair{ControlVerb::load_application, std::string_view("load application")},

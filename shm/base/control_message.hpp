@@ -16,7 +16,9 @@ inline constexpr int kControlVersion = 1;
 enum class ControlVerb : std::uint8_t {
   start,             ///< run the application
   stop,              ///< stop the application; the process stays
-  reset,             ///< fresh process, application loaded anew and stopped
+  reset,             ///< warm reset: fresh process, application loaded anew and stopped
+  reset_cold,        ///< the same, and the application is told so: it starts with initial values
+  single_cycle,      ///< one cycle of each cyclic and freewheeling task, from stopped
   restart,           ///< fresh process, application running
   reset_statistics,  ///< argument: name of a task; empty: all tasks
   load_application,  ///< argument: path of the application on the host

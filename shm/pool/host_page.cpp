@@ -66,6 +66,8 @@ std::string_view to_string(InstanceState state) noexcept {
       return "safe mode";
     case InstanceState::failed:
       return "failed";
+    case InstanceState::exception:
+      return "exception";
   }
   return "unknown";
 }

@@ -22,6 +22,7 @@ enum class InstanceState : std::uint32_t {
   waiting = 5,    ///< ended; will be started again after the back-off, or when what it comes after is up
   safe_mode = 6,  ///< up without its application, after repeated crashes; load or reset to go on
   failed = 7,     ///< could not be set up, or ended and is not restarted by policy
+  exception = 8,  ///< the process is up, the application was stopped by a fault; reset to go on
 };
 [[nodiscard]] std::string_view to_string(InstanceState state) noexcept;
 

@@ -12,8 +12,8 @@ namespace {
 
 constexpr std::uint64_t kMagic = 0x67617074'736e6970;  // "pinstpag"
 /// 1: first. 2: the interval in force. 3: the tick source. 4: histograms behind the tasks, in two
-/// shapes. 5: the idle states. 6: the distributed clock.
-constexpr std::uint32_t kVersion = 6;
+/// shapes. 5: the idle states. 6: the distributed clock. 7: state and problem of the application.
+constexpr std::uint32_t kVersion = 7;
 constexpr std::size_t kTasksOffset = (sizeof(InstancePageLayout) + 63) / 64 * 64;
 
 static_assert(offsetof(InstancePageLayout, version) == 8 && offsetof(InstancePageLayout, size) == 16);
@@ -90,6 +90,24 @@ std::string_view to_string(PageTaskState state) noexcept {
     case PageTaskState::stopped:
       return "stopped";
     case PageTaskState::exception:
+      return "exception";
+  }
+  return "unknown";
+}
+
+std::string_view to_string(ApplicationState state) noexcept {
+  switch (state) {
+    case ApplicationState::none:
+      return "none";
+    case ApplicationState::stopped:
+      return "stopped";
+    case ApplicationState::running:
+      return "running";
+    case ApplicationState::single_cycle:
+      return "single cycle";
+    case ApplicationState::stopping:
+      return "stopping";
+    case ApplicationState::exception:
       return "exception";
   }
   return "unknown";

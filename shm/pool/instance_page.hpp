@@ -23,6 +23,17 @@ enum class PageTaskKind : std::uint32_t { cyclic = 0, event = 1, external = 2, f
 enum class PageTaskState : std::uint32_t { created = 0, running = 1, stopped = 2, exception = 3 };
 [[nodiscard]] std::string_view to_string(PageTaskState state) noexcept;
 
+/// What the application of an instance is doing. The numbers are part of the DDS API.
+enum class ApplicationState : std::uint32_t {
+  none = 0,          ///< there is no application
+  stopped = 1,       ///< loaded; its tasks are parked
+  running = 2,       ///< its tasks run under a scheduler
+  single_cycle = 3,  ///< its cyclic and freewheeling tasks run one cycle each
+  stopping = 4,      ///< its tasks come to the end of their cycles
+  exception = 5,     ///< stopped by a fault; only a fresh process leads out of it
+};
+[[nodiscard]] std::string_view to_string(ApplicationState state) noexcept;
+
 /// What does not change while the application is loaded.
 struct TaskIdentity {
   FixedText<kMaxTaskName> name;
@@ -64,6 +75,8 @@ struct InstanceRuntime {
   FixedText<kMaxTickText> tick_fallback;  ///< why that is not what the settings ask for; empty: it is
   FixedText<kMaxTickText> idle_states;    ///< what of the processor's idle states is held off, or why not
   ClockRuntime clock;
+  ApplicationState state = ApplicationState::none;
+  FixedText<kMaxPath> problem;  ///< why it is in exception; else empty
 };
 
 struct TaskSlot {

@@ -69,7 +69,7 @@ TEST(RequestCheck, NamesWhatDoesNotExist) {
   const auto host = check(make(plc_OPERATION_START, "line1", "", "hostb"), ApiRole::operating);
   EXPECT_EQ(host.error().code, ErrorCode::not_found);
   EXPECT_THAT(host.error().message, HasSubstr("hostb"));
-  const auto operation = check(make(5), ApiRole::operating);
+  const auto operation = check(make(9), ApiRole::operating);
   EXPECT_EQ(operation.error().code, ErrorCode::unsupported);
   EXPECT_THAT(operation.error().message, testing::AllOf(HasSubstr("5"), HasSubstr("set scheduler")));
 }

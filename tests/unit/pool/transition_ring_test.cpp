@@ -1,0 +1,123 @@
+#include "shm/pool/transition_ring.hpp"
+
+#include <set>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+#include "tests/unit/pool/unique_pool_name.hpp"
+
+namespace plchost {
+namespace {
+
+using std::chrono::seconds;
+
+class Transitions : public testing::Test {
+ protected:
+  ~Transitions() override { TransitionRing::remove(pool(), "line1"); }
+  [[nodiscard]] const std::string& pool() const { return name_.get(); }
+  TransitionRing writer() { return std::move(TransitionRing::open(pool(), "line1").value()); }
+  TransitionRingReader reader() { return std::move(TransitionRingReader::open(pool(), "line1").value()); }
+  std::vector<std::uint64_t> numbers(TransitionRingReader& reader) {
+    std::vector<std::uint64_t> seen;
+    while (const auto next = reader.next(now_)) seen.push_back(next->sequence);
+    return seen;
+  }
+
+  UniquePoolName name_;
+  TimePoint now_{seconds(1000)};
+};
+
+TEST_F(Transitions, ComeOnceInOrderWithTimesAndReasons) {
+  TransitionRing ring = writer();
+  TransitionRingReader sut = reader();
+  ring.add(TransitionSource::application, 1, 2, 4711, "start");
+  ring.add(TransitionSource::process, 2, 8, 4711, "fault");
+  const auto first = sut.next(now_);
+  const auto second = sut.next(now_);
+  ASSERT_TRUE(first && second);
+  EXPECT_FALSE(sut.next(now_));
+  EXPECT_EQ(first->sequence, 1U);
+  EXPECT_EQ(first->from, 1U);
+  EXPECT_EQ(first->to, 2U);
+  EXPECT_EQ(first->pid, 4711);
+  EXPECT_EQ(first->reason.view(), "start");
+  EXPECT_EQ(second->sequence, 2U);
+  EXPECT_EQ(second->source, TransitionSource::process);
+  EXPECT_GT(first->time_unix_ns, 0);
+  EXPECT_LE(first->time_monotonic_ns, second->time_monotonic_ns);
+}
+
+TEST_F(Transitions, AreNumberedOverAllWritersAndTheirEnds) {
+  {
+    TransitionRing first = writer();
+    first.add(TransitionSource::application, 0, 1, 1, "");
+  }
+  TransitionRing second = writer();
+  TransitionRing third = writer();
+  second.add(TransitionSource::application, 0, 1, 2, "");
+  third.add(TransitionSource::process, 0, 1, 2, "");
+  TransitionRingReader sut = reader();
+  EXPECT_THAT(numbers(sut), testing::ElementsAre(1, 2, 3));
+}
+
+TEST_F(Transitions, ThatWereOvertakenAreAGapInTheNumbers) {
+  TransitionRing ring = writer();
+  TransitionRingReader sut = reader();
+  for (std::size_t i = 0; i < kTransitionsKept + 10; ++i) ring.add(TransitionSource::process, 0, 1, 0, "");
+  const auto seen = numbers(sut);
+  ASSERT_EQ(seen.size(), kTransitionsKept);
+  EXPECT_EQ(seen.front(), 11U);
+  EXPECT_EQ(seen.back(), kTransitionsKept + 10);
+}
+
+TEST_F(Transitions, OfTwoWritersAtOnceAreAllThere) {
+  TransitionRingReader sut = (writer(), reader());
+  constexpr int kEach = 20'000;
+  std::atomic<int> seen_by_reader{0};
+  const auto write = [&](TransitionSource source) {
+    TransitionRing ring = writer();
+    for (int i = 0; i < kEach; ++i) {
+      // As far ahead as the ring is deep, so that nothing may be overtaken.
+      while (2 * i - seen_by_reader.load() > 40) std::this_thread::yield();
+      ring.add(source, 0, 1, 0, "");
+    }
+  };
+  std::jthread first(write, TransitionSource::application);
+  std::jthread second(write, TransitionSource::process);
+  std::vector<std::uint64_t> seen;
+  while (seen.size() < 2 * kEach) {
+    if (const auto next = sut.next(now_)) {
+      seen.push_back(next->sequence);
+      ++seen_by_reader;
+    }
+  }
+  for (std::size_t i = 0; i < seen.size(); ++i) ASSERT_EQ(seen[i], i + 1);
+}
+
+TEST_F(Transitions, WaitForAWriterAndGoOnWithoutOneThatDied) {
+  TransitionRing ring = writer();
+  TransitionRingReader sut = reader();
+  ring.add(TransitionSource::process, 0, 1, 0, "");
+  const MemoryFile memory = std::move(
+      MemoryFile::open(transition_ring_name(pool(), "line1"), 1, MemoryFile::Access::read_write).value());
+  // What a writer leaves that is killed between its number and its slot.
+  reinterpret_cast<TransitionRingLayout*>(memory.bytes().data())->last.fetch_add(1);
+  ring.add(TransitionSource::process, 1, 2, 0, "");
+  EXPECT_THAT(numbers(sut), testing::ElementsAre(1));
+  now_ += TransitionRingReader::kWriterGone;
+  EXPECT_THAT(numbers(sut), testing::ElementsAre(3));
+}
+
+TEST_F(Transitions, RefuseWhatIsNoRing) {
+  (void)MemoryFile::replace(transition_ring_name(pool(), "line1"), sizeof(TransitionRingLayout));
+  EXPECT_EQ(TransitionRingReader::open(pool(), "line1").error().code, ErrorCode::corrupt);
+  EXPECT_EQ(TransitionRingReader::open(pool(), "line2").error().code, ErrorCode::not_found);
+  TransitionRing ring = writer();  // a writer makes a good one of it
+  EXPECT_TRUE(TransitionRingReader::open(pool(), "line1"));
+}
+
+}  // namespace
+}  // namespace plchost
