@@ -14,6 +14,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "instances/launch/launch_contract.hpp"
 #include "tests/integration/instances/instance_process.hpp"
 
 namespace plchost::testing {
@@ -137,7 +138,7 @@ TEST_F(FollowingFirmware, RefusesToStartOnAMemoryThatIsNoRecord) {
   const std::string file =
       sandbox_.write("line1.cfg", fmt::format("[DistributedClock]\nReference={}\n", kRecord));
   InstanceProcess refused(sandbox_, {"--settings", file, "--application", application("all_kinds")});
-  EXPECT_EQ(refused.end(), EXIT_FAILURE);
+  EXPECT_EQ(refused.end(), kExitSetupFailed);
   EXPECT_THAT(refused.log(), ::testing::HasSubstr("is no reference record of version 1"));
 }
 
