@@ -54,6 +54,13 @@ TEST(ApplicationCheck, ListsTheTasksOfAValidApplication) {
   EXPECT_THAT(sut.log(), HasSubstr("Fast: cyclic, priority 1, every 2000 us"));
 }
 
+TEST(ApplicationCheck, FindsEveryFunctionThatTheRuntimeOffers) {
+  const Sandbox sandbox;
+  InstanceProcess sut(sandbox, {"--check-application", application("every_call")});
+  EXPECT_EQ(sut.end(), 0) << sut.log();
+  EXPECT_THAT(sut.log(), HasSubstr("EveryCall, 1 task"));
+}
+
 TEST(ApplicationCheck, RefusesATextFileAndAFolder) {
   const Sandbox sandbox;
   InstanceProcess text(sandbox, {"--check-application", sandbox.write("mine.so", "int main() {}\n")});
