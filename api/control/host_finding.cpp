@@ -117,6 +117,7 @@ Result<FindingsPart> decode_part(std::string_view text) {
 Result<std::size_t> parse_first_finding(std::string_view argument) {
   std::size_t first = 0;
   const char* const end = argument.data() + argument.size();
+  // NOLINTNEXTLINE(bugprone-suspicious-stringview-data-usage): `end` is the size
   const auto [stopped, error] = std::from_chars(argument.data(), end, first);
   if (error != std::errc() || stopped != end || first > kMaxFindings) {
     return failure(ErrorCode::invalid_argument,
