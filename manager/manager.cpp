@@ -26,7 +26,7 @@ namespace plchost {
 namespace {
 
 // How often instances are asked what they say of themselves, by reading their pages.
-constexpr Duration kTick = std::chrono::milliseconds(250);
+constexpr Duration kTick = std::chrono::milliseconds(50);
 
 Result<void> make_run_directory(const std::string& path) {
   std::error_code error;
@@ -114,6 +114,11 @@ Result<void> Manager::set_up() {
     if (signal != SIGHUP) shut_down();
   });
   if (!signals) return signals;
+  for (const InstanceConfig& instance : config_.instances) {
+    auto ring = TransitionRing::open(host.pool, instance.name);
+    if (!ring) return std::unexpected(ring.error());
+    transitions_.push_back(*std::move(ring));
+  }
   make_supervisor();
   write_host();
   host_check_ =
@@ -137,14 +142,21 @@ void Manager::make_supervisor() {
   };
   supervisor_ = std::make_unique<Supervisor>(
       config_,
-      Supervisor::Surroundings{.folder = options_.folder,
-                               .schedulers = options_.schedulers,
-                               .now = [] { return MonotonicClock::now(); },
-                               .publish =
-                                   [this](std::size_t index, const InstanceStatus& status) {
-                                     page_->write_instance(static_cast<std::uint32_t>(index), status);
-                                     latency_due_ = true;
-                                   }},
+      Supervisor::Surroundings{
+          .folder = options_.folder,
+          .schedulers = options_.schedulers,
+          .now = [] { return MonotonicClock::now(); },
+          .publish =
+              [this](std::size_t index, const InstanceStatus& status) {
+                page_->write_instance(static_cast<std::uint32_t>(index), status);
+                 latency_due_ = true;
+              },
+          .transition =
+              [this](std::size_t index, InstanceState from, InstanceState to, std::string_view reason) {
+                transitions_[index].add(TransitionSource::process, std::to_underlying(from),
+                                        std::to_underlying(to), supervisor_->instance(index).status().pid,
+                                        reason);
+              }},
       make_host);
 }
 
@@ -220,6 +232,7 @@ void Manager::clean_up() {
   restore_latency();
   for (const InstanceConfig& instance : config_.instances) {
     InstancePage::remove(config_.host.pool, instance.name);
+    TransitionRing::remove(config_.host.pool, instance.name);
   }
   // Whatever is named after an instance of ours: its socket, what it kept for its next process.
   std::error_code error;

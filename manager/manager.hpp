@@ -15,6 +15,7 @@
 #include "manager/system/reactor.hpp"
 #include "shm/pool/host_page.hpp"
 #include "shm/pool/object_pool.hpp"
+#include "shm/pool/transition_ring.hpp"
 
 namespace plchost {
 
@@ -54,6 +55,7 @@ class Manager {
   std::optional<ObjectPool> pool_;
   std::optional<HostPageReader> earlier_page_;
   std::optional<HostPageWriter> page_;
+  std::vector<TransitionRing> transitions_;  // in the order of the instances
   std::unique_ptr<Supervisor> supervisor_;
   std::unique_ptr<HostCheckHandler> host_check_;
   std::unique_ptr<CommandServer> command_server_;

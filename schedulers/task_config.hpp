@@ -76,4 +76,11 @@ struct TaskConfig {
   std::function<void(const TaskCounters&)> after_cycle;
 };
 
+/// How long tasks may take to come to the end of their cycles, in each of the two phases of a stop.
+struct StopLimits {
+  Duration outputs = std::chrono::seconds(10);  ///< tasks that drive outputs; the others run on meanwhile
+  Duration others = std::chrono::seconds(25);
+  bool operator==(const StopLimits&) const = default;
+};
+
 }  // namespace plchost

@@ -22,7 +22,7 @@ TaskSet::TaskSet(Clock& clock, PriorityBand band, TaskEnvironment environment, U
 
 TaskSet::~TaskSet() {
   if (supervision_ && running_) supervision_->tasks_stop();
-  if (active_) active_->scheduler->stop();
+  if (active_ && active_->scheduler) active_->scheduler->stop();
   for (auto& thread : threads_) thread->park();  // all at once; their destructors then wait one by one
 }
 
@@ -102,7 +102,7 @@ auto TaskSet::arrange(std::string_view name, const SchedulerSettings& settings)
   return arrangement;
 }
 
-Result<void> TaskSet::start(std::string_view scheduler, const SchedulerSettings& settings) {
+Result<void> TaskSet::check_startable() {
   if (running_) return failure(ErrorCode::wrong_state, "the tasks are running already");
   if (const auto busy = wait_until_settled(TimePoint{}); !busy.empty()) {
     return failure(ErrorCode::wrong_state,
@@ -112,6 +112,11 @@ Result<void> TaskSet::start(std::string_view scheduler, const SchedulerSettings&
     return failure(ErrorCode::wrong_state,
                    fmt::format("in exception: task {}; reset first", join_names(faulty)));
   }
+  return {};
+}
+
+Result<void> TaskSet::start(std::string_view scheduler, const SchedulerSettings& settings) {
+  if (auto startable = check_startable(); !startable) return startable;
   if (tick_.device && tick_.device->fault() != TickFault::none) tick_ = {};  // is opened anew
   auto arrangement = arrange(scheduler, settings);
   if (!arrangement) return std::unexpected(std::move(arrangement.error()));
@@ -130,7 +135,7 @@ Result<void> TaskSet::start(std::string_view scheduler, const SchedulerSettings&
 }
 
 Result<void> TaskSet::switch_to(std::string_view scheduler, const SchedulerSettings& settings) {
-  if (!running_) {
+  if (!running_ || stop_ || !active_->scheduler) {
     return failure(ErrorCode::wrong_state,
                    "the tasks are not running: start them under the other scheduler instead");
   }
@@ -149,25 +154,6 @@ Result<void> TaskSet::switch_to(std::string_view scheduler, const SchedulerSetti
     hand_out_sources();
   }
   (void)wait_until_settled(MonotonicClock::now() + kSwitchPatience);
-  return {};
-}
-
-Result<void> TaskSet::stop(Duration limit) {
-  if (!running_) return failure(ErrorCode::wrong_state, "the tasks are not running");
-  const TimePoint deadline = MonotonicClock::now() + limit;
-  if (supervision_) supervision_->tasks_stop();
-  active_->scheduler->stop();
-  for (auto& thread : threads_) thread->park();
-  if (tick_.device) tick_.device->halt();
-  retired_.push_back(std::move(active_));
-  running_ = false;
-  if (const auto busy = wait_until_settled(deadline); !busy.empty()) {
-    return failure(
-        ErrorCode::timed_out,
-        fmt::format("not at the end of its cycle after {} ms: task {}",
-                    std::chrono::duration_cast<std::chrono::milliseconds>(limit).count(), join_names(busy)));
-  }
-  if (supervision_) supervision_->end();
   return {};
 }
 
@@ -208,6 +194,12 @@ void TaskSet::hand_out_sources() {
   for (std::size_t i = 0; i < threads_.size(); ++i) threads_[i]->use(active_->sources[i].get());
 }
 
+void TaskSet::report(std::size_t index, bool running) {
+  if (reported_running_[index] == running || tasks_[index]->fault().raised()) return;
+  reported_running_[index] = running;
+  if (environment_.state_changed) environment_.state_changed(index, running);
+}
+
 // The names of the tasks that are not settled at the deadline. If there are none, what was before is free to
 // go.
 std::vector<std::string_view> TaskSet::wait_until_settled(TimePoint deadline) {
@@ -215,9 +207,8 @@ std::vector<std::string_view> TaskSet::wait_until_settled(TimePoint deadline) {
   for (std::size_t i = 0; i < threads_.size(); ++i) {
     if (!threads_[i]->settled(deadline)) {
       busy.emplace_back(tasks_[i]->config().name);
-    } else if (reported_running_[i] != running_ && !tasks_[i]->fault().raised()) {
-      reported_running_[i] = running_;
-      if (environment_.state_changed) environment_.state_changed(i, running_);
+    } else {
+      report(i, running_);
     }
   }
   if (busy.empty()) retired_.clear();

@@ -10,6 +10,7 @@
 
 #include "schedulers/distributed_clock/distributed_clock.hpp"
 #include "schedulers/scheduler.hpp"
+#include "schedulers/single_cycle.hpp"
 #include "schedulers/supervision.hpp"
 #include "schedulers/task.hpp"
 #include "schedulers/task_config.hpp"
@@ -67,9 +68,29 @@ class TaskSet {
   /// not come back since stop(), or is in exception. External events posted while the tasks were stopped are
   /// not run, nor are edges of event variables: the level at the start counts as seen.
   [[nodiscard]] Result<void> start(std::string_view scheduler, const SchedulerSettings& settings);
-  /// Parks all tasks at the end of their cycles. timed_out: names the tasks that did not come back within
-  /// `limit` (real time); they are parked when they do. wrong_state: they do not run.
+  /// Parks all tasks at the end of their cycles, those that drive outputs first. Waits, at most `limit` (real
+  /// time) for each of the two phases. timed_out: names the tasks that did not come back in time; they are
+  /// parked when they do. wrong_state: they do not run.
   [[nodiscard]] Result<void> stop(Duration limit);
+  /// The same without waiting: begins it. Then advance_stop() until it is over; until then running() holds.
+  [[nodiscard]] Result<void> begin_stop(const StopLimits& limits);
+  /// Looks how far the stop is, and goes on to its second phase. Nothing: it is not over yet. Else it is: the
+  /// tasks that have not come back in time.
+  [[nodiscard]] std::optional<std::vector<std::size_t>> advance_stop();
+  [[nodiscard]] bool stop_begun() const noexcept { return stop_.has_value(); }
+  /// Stops without waiting for any cycle, also if a stop is under way. For what went wrong.
+  void park_all();
+  /// Parked tasks that were not yet reported are; the names of those that are still in their cycles at the
+  /// deadline. While the tasks are stopped.
+  std::vector<std::string_view> still_busy(TimePoint deadline) { return wait_until_settled(deadline); }
+  /// Lets each cyclic and freewheeling task run one cycle, one after the other by priority, whatever the
+  /// scheduler. When single_cycle_done(), or at any time before, it is ended by a stop. wrong_state: as
+  /// start().
+  [[nodiscard]] Result<void> begin_single_cycle(const SchedulerSettings& settings);
+  /// Each has come back from its cycle, or never will.
+  [[nodiscard]] bool single_cycle_done() noexcept;
+  /// "Main, Report"
+  [[nodiscard]] std::string names_of(const std::vector<std::size_t>& tasks) const;
   /// Exchanges the scheduler. Running tasks keep their grid, their backlog of events, counters and variables.
   /// On failure they run on under the old one. wrong_state: they do not run.
   [[nodiscard]] Result<void> switch_to(std::string_view scheduler, const SchedulerSettings& settings);
@@ -122,9 +143,17 @@ class TaskSet {
     ~Arrangement() {
       if (scheduler) scheduler->stop();
     }
-    std::unique_ptr<Scheduler> scheduler;
+    std::unique_ptr<Scheduler> scheduler;  // or a single cycle
+    std::unique_ptr<SingleCycle> single_cycle;
     TickChoice tick;
     std::vector<std::unique_ptr<ActivationSource>> sources;
+  };
+
+  struct Stop {
+    StopLimits limits;
+    bool others = false;  // the second phase
+    TimePoint deadline;   // of the phase
+    std::vector<std::size_t> stuck;
   };
 
   TaskSet(Clock& clock, PriorityBand band, TaskEnvironment environment, UniqueFd fault_fd);
@@ -134,7 +163,11 @@ class TaskSet {
                                                              const SchedulerSettings& settings);
   void watch(const SchedulerSettings& settings);
   [[nodiscard]] Result<void> reset_statistics(Task& task);
+  [[nodiscard]] Result<void> check_startable();
   void hand_out_sources();
+  void report(std::size_t index, bool running);
+  void begin_second_phase();
+  std::vector<std::size_t> busy_in_phase();
   std::vector<std::string_view> wait_until_settled(TimePoint deadline);
 
   Clock& clock_;
@@ -146,10 +179,12 @@ class TaskSet {
   TickChoice tick_;
   bool running_ = false;
   DistributedClock distributed_clock_;
+  std::optional<Stop> stop_;
   TimePoint origin_;  // of all grids, until the next start()
   std::string_view scheduler_name_;
   std::vector<std::unique_ptr<Task>> tasks_;
   std::vector<bool> reported_running_;
+  std::vector<std::size_t> single_cycle_order_;  // indices of tasks
   std::vector<bool> fault_taken_;
   std::optional<Supervision> supervision_;  // until all threads have ended
   std::unique_ptr<Arrangement> active_;

@@ -26,6 +26,10 @@ TimePoint CliSession::deadline() const {
   return MonotonicClock::now() + timeout();
 }
 
+TimePoint CliSession::deadline(Duration least) const {
+  return MonotonicClock::now() + (options.timeout_given ? timeout() : std::max(timeout(), least));
+}
+
 Result<std::vector<HostView>> CliSession::shown_hosts() {
   const auto connected = client();
   if (!connected) return std::unexpected(connected.error());

@@ -28,6 +28,7 @@ struct CliOptions {
   dds::DomainOptions dds;
   std::string host;
   double timeout_s = 3.0;
+  bool timeout_given = false;
   bool json = false;
 };
 
@@ -41,6 +42,8 @@ class CliSession {
   /// The end of the time-out, from now on.
   [[nodiscard]] TimePoint deadline() const;
   [[nodiscard]] Duration timeout() const;
+  /// The same, but at least `least` from now unless --timeout says otherwise: for what takes longer.
+  [[nodiscard]] TimePoint deadline(Duration least) const;
 
   /// The host of --host, or the only one there is. Several and no --host: an error that lists them.
   [[nodiscard]] Result<std::string> target_host();

@@ -12,13 +12,32 @@ namespace plchost {
 
 namespace {
 
+// A stop may take 35 s, and a fresh process comes after one. Longer than the server waits for the manager, so
+// that its answer is heard.
+constexpr Duration kLongCommand = std::chrono::seconds(80);
+
+bool takes_long(std::int32_t operation) {
+  switch (operation) {
+    case plc_OPERATION_STOP:
+    case plc_OPERATION_SINGLE_CYCLE:
+    case plc_OPERATION_RESET:
+    case plc_OPERATION_RESET_COLD:
+    case plc_OPERATION_RESTART:
+    case plc_OPERATION_LOAD_APPLICATION:
+      return true;
+    default:
+      return false;
+  }
+}
+
 /// Sends a command to the host and says what became of it.
 int command(CliSession& session, ApiRequest request) {
   auto host = session.target_host();
   if (!host) return CliSession::fail(host.error());
   request.host = std::move(*host);
   ControlClient& client = *session.client().value();
-  const auto reply = client.call(request, session.deadline());
+  const auto reply =
+      client.call(request, session.deadline(takes_long(request.operation) ? kLongCommand : Duration::zero()));
   if (!reply) return CliSession::fail(reply.error());
   if (reply->code == ErrorCode::ok) {
     if (session.options.json) {
@@ -77,6 +96,20 @@ void add_plain(CLI::App& app, CliSession& session, Action& action, const char* v
   });
 }
 
+void add_reset(CLI::App& app, CliSession& session, Action& action) {
+  const auto name = std::make_shared<std::string>();
+  const auto cold = std::make_shared<bool>(false);
+  CLI::App* const noun =
+      add_verb(app, "reset", "instance", "Load the application anew, in a fresh process, stopped");
+  noun->add_option("INSTANCE", *name)->required();
+  noun->add_flag("--cold", *cold, "tell the application to begin with initial values");
+  noun->callback([&session, &action, name, cold] {
+    action = [&session, name, cold] {
+      return command(session, {"", *cold ? plc_OPERATION_RESET_COLD : plc_OPERATION_RESET, *name, ""});
+    };
+  });
+}
+
 void add_event(CLI::App& app, CliSession& session, Action& action, const char* verb, std::int32_t operation,
                const char* text) {
   const auto name = std::make_shared<std::string>();
@@ -92,8 +125,9 @@ void add_event(CLI::App& app, CliSession& session, Action& action, const char* v
 void add_command_verbs(CLI::App& app, CliSession& session, Action& action) {
   add_plain(app, session, action, "start", plc_OPERATION_START, "Run the application of an instance");
   add_plain(app, session, action, "stop", plc_OPERATION_STOP, "Stop the application of an instance");
-  add_plain(app, session, action, "reset", plc_OPERATION_RESET,
-            "Load the application anew, in a fresh process, stopped");
+  add_plain(app, session, action, "single-cycle", plc_OPERATION_SINGLE_CYCLE,
+            "Run one cycle of each cyclic and freewheeling task of a stopped application");
+  add_reset(app, session, action);
   add_plain(app, session, action, "restart", plc_OPERATION_RESTART, "Load the application anew and run it");
   add_event(app, session, action, "register", plc_OPERATION_REGISTER_EVENT, "Register an external event");
   add_event(app, session, action, "unregister", plc_OPERATION_UNREGISTER_EVENT,

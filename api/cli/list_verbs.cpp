@@ -6,6 +6,7 @@
 #include "api/cli/cli_session.hpp"
 #include "api/cli/rows.hpp"
 #include "api/cli/task_rows.hpp"
+#include "api/cli/transition_verbs.hpp"
 
 namespace plchost {
 
@@ -49,7 +50,8 @@ int list(CliSession& session, Snapshot<Sample> snapshot, const std::vector<Colum
 }  // namespace
 
 void add_list_verbs(CLI::App& app, CliSession& session, Action& action) {
-  CLI::App* const verb = app.add_subcommand("list", "Show all hosts, instances, tasks, events or objects");
+  CLI::App* const verb =
+      app.add_subcommand("list", "Show all hosts, instances, tasks, events, objects or transitions");
   verb->require_subcommand(1)->fallthrough();
   const auto add = [&](const char* noun, const char* text, Action run) {
     CLI::App* const command = verb->add_subcommand(noun, text)->fallthrough();
@@ -67,6 +69,7 @@ void add_list_verbs(CLI::App& app, CliSession& session, Action& action) {
       [&session] { return list(session, &ControlClient::events, event_columns()); });
   add("objects", "All objects of the global pool",
       [&session] { return list(session, &ControlClient::objects, object_columns()); });
+  add_list_transitions(*verb, session, action);
 }
 
 }  // namespace plchost

@@ -20,7 +20,8 @@ void add_options(CLI::App& app, plchost::CliOptions& options) {
       ->take_last();
   constexpr double kMinTimeout = 0.1;
   constexpr double kMaxTimeout = 3600;
-  app.add_option("--timeout", options.timeout_s, "seconds to wait for an answer (default 3)")
+  app.add_option("--timeout", options.timeout_s,
+                 "seconds to wait for an answer (default 3; what ends a cycle or a process: 80)")
       ->check(CLI::Range(kMinTimeout, kMaxTimeout))
       ->take_last();
   app.add_flag("--json", options.json, "an array of flat objects, for programs");
@@ -81,6 +82,7 @@ int main(int argc, char** argv) {
     }
     return app.exit(error) == 0 ? plchost::kExitDone : plchost::kExitUsage;
   }
+  session.options.timeout_given = app.count("--timeout") > 0;
   plchost::start_log("plcctl", "warning");
   return action();
 }

@@ -1,9 +1,11 @@
 #include "api/cli/rows.hpp"
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <span>
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include "api/dds/text.hpp"
@@ -18,6 +20,9 @@ constexpr std::array kInstanceStates{
     std::string_view("offline"),   std::string_view("starting"), std::string_view("running"),
     std::string_view("stopped"),   std::string_view("stopping"), std::string_view("waiting"),
     std::string_view("safe_mode"), std::string_view("failed"),   std::string_view("exception")};
+constexpr std::array kApplicationStates{std::string_view("none"),     std::string_view("stopped"),
+                                        std::string_view("running"),  std::string_view("single_cycle"),
+                                        std::string_view("stopping"), std::string_view("exception")};
 constexpr std::array kTaskKinds{std::string_view("cyclic"), std::string_view("event"),
                                 std::string_view("external"), std::string_view("freewheeling")};
 constexpr std::array kTaskStates{std::string_view("created"), std::string_view("running"),
@@ -107,6 +112,27 @@ Row to_row(const plc_ObjectStatus& status) {
           {"object", text_of(status.object_name)},
           {"type", name_of(kObjectTypes, status.type)},
           {"value", status.value}};
+}
+
+Row to_row(const plc_Transition& transition) {
+  const bool process = transition.source != 0;
+  const std::span<const std::string_view> names =
+      process ? std::span<const std::string_view>(kInstanceStates) : kApplicationStates;
+  const std::chrono::sys_time<std::chrono::milliseconds> time(
+      std::chrono::milliseconds(transition.time_unix_ns / 1'000'000));
+  return {{"host", text_of(transition.host)},          {"instance", text_of(transition.instance)},
+          {"sequence", transition.sequence_number},    {"time", fmt::format("{:%Y-%m-%d %H:%M:%S}Z", time)},
+          {"of", process ? "process" : "application"}, {"from", name_of(names, transition.from_state)},
+          {"to", name_of(names, transition.to_state)}, {"pid", transition.pid},
+          {"time_unix_ns", transition.time_unix_ns},   {"time_monotonic_ns", transition.time_monotonic_ns},
+          {"reason", text_of(transition.reason)}};
+}
+
+const std::vector<Column>& transition_columns() {
+  static const std::vector<Column> columns{{"time", "TIME"},       {"host", "HOST"}, {"instance", "INSTANCE"},
+                                           {"sequence", "NUMBER"}, {"of", "OF"},     {"from", "FROM"},
+                                           {"to", "TO"},           {"pid", "PID"},   {"reason", "REASON"}};
+  return columns;
 }
 
 const std::vector<Column>& host_columns() {

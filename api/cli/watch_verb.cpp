@@ -11,6 +11,7 @@
 #include "api/cli/cli_session.hpp"
 #include "api/cli/rows.hpp"
 #include "api/cli/task_rows.hpp"
+#include "api/cli/transition_verbs.hpp"
 
 namespace plchost {
 
@@ -70,7 +71,7 @@ int watch(CliSession& session, const WatchArguments& arguments) {
 }  // namespace
 
 void add_watch_verb(CLI::App& app, CliSession& session, Action& action) {
-  CLI::App* const verb = app.add_subcommand("watch", "Show tasks again and again");
+  CLI::App* const verb = app.add_subcommand("watch", "Show tasks, or changes of state, as they come");
   verb->require_subcommand(1)->fallthrough();
   CLI::App* const noun =
       verb->add_subcommand("tasks", "The tasks with live figures, until Ctrl-C")->fallthrough();
@@ -84,6 +85,7 @@ void add_watch_verb(CLI::App& app, CliSession& session, Action& action) {
   noun->callback([&session, &action, arguments] {
     action = [&session, arguments] { return watch(session, *arguments); };
   });
+  add_watch_transitions(*verb, session, action);
 }
 
 }  // namespace plchost

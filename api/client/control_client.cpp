@@ -184,6 +184,21 @@ Result<std::vector<plc_ObjectStatus>> ControlClient::objects(const std::string& 
   return snapshot(object_status_, dds::kObjectStatus, &plc_HostStatus::object_count, host, deadline);
 }
 
+Result<std::vector<TransitionView>> ControlClient::transitions() {
+  if (!transition_log_) {
+    auto topic = dds::make_topic(participant_.get(), dds::kTransition);
+    if (!topic) return std::unexpected(topic.error());
+    auto reader = dds::make_reader(participant_.get(), topic->get(), dds::transition_qos());
+    if (!reader) return std::unexpected(reader.error());
+    if (auto added = wait_set_.add(reader->get(), DDS_DATA_AVAILABLE_STATUS); !added) {
+      return std::unexpected(added.error());
+    }
+    transition_log_ = TransitionLog(*std::move(topic), *std::move(reader));
+  }
+  update();  // or what has come on other topics would keep waits from waiting
+  return transition_log_.take();
+}
+
 Result<void> ControlClient::open_own_reader(dds::Entity& topic, dds::Entity& reader,
                                             const dds::TopicInfo& info, const dds::Qos& qos) {
   if (reader) return {};

@@ -16,6 +16,7 @@
 #include "api/client/request_caller.hpp"
 #include "api/client/statistics_cache.hpp"
 #include "api/client/status_cache.hpp"
+#include "api/client/transition_log.hpp"
 #include "api/client/wait_set.hpp"
 #include "api/dds/domain.hpp"
 #include "api/dds/topics.hpp"
@@ -64,6 +65,10 @@ class ControlClient {
   /// Has the host looked at anew, and returns what each check found, in their order. The code of the failure
   /// is the host's own; timed_out: not complete at the deadline.
   [[nodiscard]] Result<std::vector<plc_HostFinding>> check_host(const std::string& host, TimePoint deadline);
+
+  /// The changes of state of all instances of all hosts that have come since the last call, each once and in
+  /// order; the first call asks for them, those that hosts keep included. Wait with wait_for_change().
+  [[nodiscard]] Result<std::vector<TransitionView>> transitions();
 
   /// A command and its answer. The status that this client shows afterwards has its effect.
   /// timed_out: no answer; whether it was done is not known.
@@ -123,6 +128,7 @@ class ControlClient {
   StatusCache<plc_ObjectStatus> object_status_;
   StatusCache<plc_HostFinding> host_findings_;
   std::map<std::string, Seen> seen_;
+  TransitionLog transition_log_;
   TimePoint last_news_;
   dds::Entity reply_topic_;
   dds::Entity reply_reader_;

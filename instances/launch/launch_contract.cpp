@@ -28,6 +28,13 @@ constexpr std::array kSteps = {
     std::pair{SetupStep::ready, std::string_view("ready")},
 };
 
+constexpr std::array kStartKinds = {
+    std::pair{StartKind::first, std::string_view("first")},
+    std::pair{StartKind::warm, std::string_view("warm")},
+    std::pair{StartKind::cold, std::string_view("cold")},
+    std::pair{StartKind::after_fault, std::string_view("after-fault")},
+};
+
 constexpr unsigned kLastCode = static_cast<unsigned>(ErrorCode::corrupt);
 
 // The value of `key` if it is a text; a report of any other form is corrupt.
@@ -48,6 +55,21 @@ std::string_view to_string(SetupStep step) noexcept {
   return "unknown";
 }
 
+std::string_view to_string(StartKind kind) noexcept {
+  for (const auto& [known, name] : kStartKinds) {
+    if (known == kind) return name;
+  }
+  return "unknown";
+}
+
+Result<StartKind> start_kind_of(std::string_view name) {
+  for (const auto& [kind, known] : kStartKinds) {
+    if (known == name) return kind;
+  }
+  return failure(ErrorCode::invalid_argument,
+                 fmt::format("'{}' is no start kind: first, warm, cold and after-fault are", name));
+}
+
 std::vector<std::string> to_arguments(const std::string& program, const LaunchOptions& options) {
   std::vector<std::string> arguments{program, "--name", options.name};
   const auto add = [&](const char* option, std::string value) {
@@ -62,6 +84,7 @@ std::vector<std::string> to_arguments(const std::string& program, const LaunchOp
   add("--pool", options.pool);
   if (!options.run_directory.empty()) add("--run-directory", options.run_directory);
   if (options.stopped) arguments.emplace_back("--stopped");
+  if (options.start_kind != StartKind::first) add("--start-kind", std::string(to_string(options.start_kind)));
   if (options.report_fd >= 0) add("--report-fd", std::to_string(options.report_fd));
   add("--log-level", options.log_level);
   return arguments;

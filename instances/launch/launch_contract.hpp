@@ -10,6 +10,17 @@
 
 namespace plchost {
 
+/// Why a process begins, for the application that asks (plc_start_kind). The numbers are those of plc_app.h.
+enum class StartKind : std::uint8_t {
+  first = 0,        ///< by hand, by the manager's first start of it, or with another application
+  warm = 1,         ///< after a warm reset or a restart
+  cold = 2,         ///< after a cold reset: the application is to begin with initial values
+  after_fault = 3,  ///< the process before ended by itself
+};
+[[nodiscard]] std::string_view to_string(StartKind kind) noexcept;
+/// invalid_argument: no such kind; the text lists what there is.
+[[nodiscard]] Result<StartKind> start_kind_of(std::string_view name);
+
 /// What a plc-instance is told when it is started: by the manager, or by hand. Both ends use this file, so
 /// that the command line has one home.
 struct LaunchOptions {
@@ -17,11 +28,12 @@ struct LaunchOptions {
   std::vector<int> cores;                ///< --core N[,N...]; empty: wherever it was started
   std::string scheduler;                 ///< --scheduler; empty: as the settings say, else CmpSchedule
   std::string priority_band = "normal";  ///< --priority-band high|normal|low
-  std::string settings;            ///< --settings FILE in the seeds' [Section] Key=Value form; may be empty
-  std::string application;         ///< --application FILE; empty: none (safe mode)
-  std::string pool = "plchost";    ///< --pool NAME
-  std::string run_directory;       ///< --run-directory DIR; empty: no control socket (by hand)
-  bool stopped = false;            ///< --stopped: load the application, do not start it
+  std::string settings;          ///< --settings FILE in the seeds' [Section] Key=Value form; may be empty
+  std::string application;       ///< --application FILE; empty: none (safe mode)
+  std::string pool = "plchost";  ///< --pool NAME
+  std::string run_directory;     ///< --run-directory DIR; empty: no control socket (by hand)
+  bool stopped = false;          ///< --stopped: load the application, do not start it
+  StartKind start_kind = StartKind::first;  ///< --start-kind first|warm|cold|after-fault
   int report_fd = -1;              ///< --report-fd N: where SetupReports go; -1: standard error, as text
   std::string log_level = "info";  ///< --log-level
 };

@@ -162,6 +162,11 @@ RTS_RESULT CAL_SysEventSet(RTS_HANDLE hEvent) {
   return host == nullptr ? ERR_NOTINITIALIZED : host->events().set(hEvent);
 }
 
+int plc_start_kind() {
+  const ApplicationHost* const host = ApplicationHost::current();
+  return host == nullptr ? PLC_START_FIRST : host->start_kind();
+}
+
 void plc_log(int nLevel, const char* pszText) {
   ApplicationHost* const host = ApplicationHost::current();
   if (host != nullptr && pszText != nullptr) host->messages().push(nLevel, pszText);

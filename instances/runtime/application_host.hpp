@@ -29,6 +29,9 @@ class ApplicationHost {
   [[nodiscard]] static ApplicationHost* current_for_control() noexcept;
 
   [[nodiscard]] EventTable& events() noexcept { return events_; }
+  /// The answer of plc_start_kind(). Set before the application is loaded.
+  [[nodiscard]] int start_kind() const noexcept { return start_kind_; }
+  void set_start_kind(int kind) noexcept { start_kind_ = kind; }
   [[nodiscard]] MessageQueue& messages() noexcept { return messages_; }
   [[nodiscard]] TaskTable& task_table() noexcept { return task_table_; }
 
@@ -63,6 +66,7 @@ class ApplicationHost {
   TaskTable task_table_;
   sys_setup_tasks_struct* tasks_ = nullptr;
   bool given_twice_ = false;
+  int start_kind_ = PLC_START_FIRST;
   std::vector<TaskSettings> task_options_;
   std::vector<Callback> callbacks_;
 };

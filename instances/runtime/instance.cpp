@@ -110,6 +110,7 @@ Result<std::string> Instance::attach_pool() {
   if (!pool) return std::unexpected(std::move(pool).error());
   pool_.emplace(*std::move(pool));
   host_.emplace(options_.launch.name, &*pool_);
+  host_->set_start_kind(static_cast<int>(options_.launch.start_kind));
   host_->events().clear_own();
   return {};
 }
@@ -118,7 +119,9 @@ Result<std::string> Instance::open_control_socket() {
   if (options_.launch.run_directory.empty()) return {};
   auto server =
       InstanceSocket::listen(instance_socket_path(options_.launch.run_directory, options_.launch.name),
-                             [this](const ControlRequest& request) { return handle(request); });
+                             [this](const ControlRequest& request, const InstanceSocket::Asker& asker) {
+                               return handle(request, asker);
+                             });
   if (!server) return std::unexpected(std::move(server).error());
   control_.emplace(*std::move(server));
   restore_operator_events();
@@ -161,6 +164,9 @@ Result<std::string> Instance::make_status_page() {
   auto page = InstancePage::create(options_.launch.pool, options_.launch.name, identities);
   if (!page) return std::unexpected(std::move(page).error());
   page_.emplace(*std::move(page));
+  auto transitions = TransitionRing::open(options_.launch.pool, options_.launch.name);
+  if (!transitions) return std::unexpected(std::move(transitions).error());
+  transitions_.emplace(*std::move(transitions));
   return {};
 }
 
@@ -174,8 +180,10 @@ Result<std::string> Instance::make_tasks() {
       .state_changed =
           [this](std::size_t index, bool running) {
             const auto state = running ? PageTaskState::running : PageTaskState::stopped;
-            page_->task(static_cast<std::uint32_t>(index))
-                .state.store(std::to_underlying(state), std::memory_order_relaxed);
+            auto& shown = page_->task(static_cast<std::uint32_t>(index)).state;
+            // A task that comes back too late has been in exception all the same.
+            if (shown.load(std::memory_order_relaxed) == std::to_underlying(PageTaskState::exception)) return;
+            shown.store(std::to_underlying(state), std::memory_order_relaxed);
           },
       .catch_faults = true,
   };
@@ -188,12 +196,14 @@ Result<std::string> Instance::make_tasks() {
     if (!followed) return std::unexpected(std::move(followed).error());
   }
   notify_tasks(EVT_ExternalEventTaskCreateDone);
+  life_.go_to(ApplicationState::stopped, fmt::format("{} is loaded ({} start)", application_->name(),
+                                                     to_string(options_.launch.start_kind)));
   return {};
 }
 
 Result<std::string> Instance::start_scheduler() {
   if (!tasks_ || options_.launch.stopped) return {};
-  return start();
+  return start("start of the process");
 }
 
 void Instance::notify_tasks(unsigned event) {
@@ -218,12 +228,15 @@ void Instance::report_tick() {
 void Instance::beat() {
   host_->write_messages();
   report_tick();
+  if (life_.state() == ApplicationState::exception) (void)tasks_->still_busy(TimePoint{});
   host_->events().refresh();
   reference_.refresh();
   InstanceRuntime runtime;
   runtime.pid = ::getpid();
   runtime.core = cores_.size() == 1 ? cores_.front() : -1;
-  runtime.running = tasks_ && tasks_->running() ? 1 : 0;
+  runtime.running = life_.state() == ApplicationState::running ? 1 : 0;
+  runtime.state = life_.state();
+  runtime.problem.assign(life_.problem());
   runtime.memory_locked = real_time_.memory_locked ? 1 : 0;
   runtime.heartbeat_ns = MonotonicClock::now().time_since_epoch().count();
   runtime.scheduler.assign(scheduler_);
@@ -234,34 +247,6 @@ void Instance::beat() {
   if (tasks_ && tasks_->running()) runtime.clock = clock_runtime(tasks_->distributed_clock());
   runtime.clock.reference.assign(settings_.scheduler.distributed_clock.reference);
   page_->write_runtime(runtime);
-}
-
-Result<void> Instance::shut_down() {
-  is_down_ = true;
-  Result<void> stopped;
-  if (tasks_) {
-    (void)host_->events().publish_bound(false);
-    if (tasks_->running()) stopped = tasks_->stop(kStopLimit);
-    if (stopped) {
-      notify_tasks(EVT_PrepareExternalEventTaskDelete);
-    }
-  }
-  if (stopped) {
-    // Its code may wait for what a thread that is parked in it holds.
-    if (application_ && !parked_) application_->exit();
-    components_.exit();
-    // Only now: until then a thread of a component may have used a task's handle.
-    if (host_) host_->task_table().attach(nullptr);
-    reference_.drop();
-    tasks_.reset();
-  }
-  if (host_) {
-    host_->write_messages();
-    host_->events().clear_own();
-  }
-  if (page_) InstancePage::remove(options_.launch.pool, options_.launch.name);
-  control_.reset();
-  return stopped;
 }
 
 }  // namespace plchost

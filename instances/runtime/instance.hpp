@@ -3,10 +3,12 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "instances/runtime/application.hpp"
 #include "instances/runtime/application_host.hpp"
+#include "instances/runtime/application_state.hpp"
 #include "instances/runtime/components.hpp"
 #include "instances/runtime/idle_states.hpp"
 #include "instances/runtime/instance_socket.hpp"
@@ -19,6 +21,7 @@
 #include "shm/base/exception_history.hpp"
 #include "shm/pool/instance_page.hpp"
 #include "shm/pool/object_pool.hpp"
+#include "shm/pool/transition_ring.hpp"
 
 namespace plchost {
 
@@ -52,18 +55,28 @@ class Instance {
   void beat();
   static constexpr auto kHeartbeat = std::chrono::milliseconds(100);
 
-  /// A client has asked for the end of the process.
-  [[nodiscard]] bool shutdown_requested() const noexcept { return shutdown_requested_; }
+  /// Goes on with a stop or a single cycle that is under way. Never waits. To be called now and then.
+  void advance();
+  /// How soon advance() wants to be called; nothing: no need.
+  [[nodiscard]] std::optional<Duration> wants_advance_in() const noexcept;
 
-  /// Stops everything; called once before the end. timed_out: a task is caught in its cycle; then this object
-  /// cannot be destroyed, because that task's thread still uses it.
+  /// Something went wrong in the application: `reason` says what, in which task. All tasks park at the end of
+  /// their cycles, nobody waits for them, and only a fresh process leads out of it.
+  void enter_exception(const std::string& reason);
+
+  /// Begins the end of the process: the tasks come to the end of their cycles, as in a stop. The second call
+  /// says that nobody wants to wait for that.
+  void begin_shutdown(std::string_view why);
+  /// An end was asked for, and nothing is left to wait for.
+  [[nodiscard]] bool ended() const noexcept;
+
+  /// Takes everything apart; called once before the end. timed_out: a task is caught in its cycle; then this
+  /// object cannot be destroyed, because that task's thread still uses it.
   [[nodiscard]] Result<void> shut_down();
 
-  /// How long tasks may take to end their cycles.
-  static constexpr auto kStopLimit = std::chrono::seconds(5);
-
  private:
-  explicit Instance(const Options& options) : options_(options), scheduler_(options.launch.scheduler) {}
+  explicit Instance(const Options& options)
+      : options_(options), scheduler_(options.launch.scheduler), life_(recorder()) {}
 
   // The steps of set_up().
   [[nodiscard]] Result<std::string> bind_core();
@@ -77,19 +90,34 @@ class Instance {
   [[nodiscard]] Result<std::string> make_tasks();
   [[nodiscard]] Result<std::string> start_scheduler();
 
-  [[nodiscard]] ControlReply handle(const ControlRequest& request);
+  /// Who waits for the end of a stop or of a single cycle.
+  struct Waiting {
+    InstanceSocket::Asker asker;
+    ControlVerb verb = ControlVerb::stop;
+  };
+
+  // What it is asked to: instance_control.cpp
+  [[nodiscard]] std::optional<ControlReply> handle(const ControlRequest& request,
+                                                   const InstanceSocket::Asker& asker);
   [[nodiscard]] Result<std::string> obey(const ControlRequest& request);
-  [[nodiscard]] Result<std::string> start();
-  [[nodiscard]] Result<std::string> stop();
   [[nodiscard]] Result<std::string> set_scheduler(const std::string& name);
   [[nodiscard]] Result<std::string> change_registration(const ControlRequest& request);
   [[nodiscard]] Result<std::string> reset_statistics(const std::string& task);
   [[nodiscard]] std::string status() const;
 
+  // The life of the application: instance_life.cpp
+  [[nodiscard]] ApplicationLife::Record recorder();
+  [[nodiscard]] Result<std::string> start(std::string_view why);
+  void begin_stop(std::string_view why);
+  [[nodiscard]] Result<std::string> begin_single_cycle();
+  [[nodiscard]] bool in_transition() const noexcept;
+  void finish_transition(const std::vector<std::size_t>& stuck);
+  void mark_exception(std::size_t task);
+  void answer_waiting(ErrorCode code, const std::string& text);
+
   [[nodiscard]] std::string hold_idle_states();
   void choose_scheduler();
   void report_tick();
-  void enter_exception(const std::string& reason);
   void keep_exception(const ExceptionEntry& entry) const;
   void restore_operator_events();
   void notify_tasks(unsigned event);
@@ -111,7 +139,12 @@ class Instance {
   LinuxClock clock_;
   std::unique_ptr<TaskSet> tasks_;  // uses all of the above: destroyed before them
   std::optional<InstanceSocket> control_;
+  std::optional<TransitionRing> transitions_;
+  ApplicationLife life_;
+  std::optional<Waiting> waiting_;
+  TimePoint single_cycle_ends_;  // at the latest
   bool shutdown_requested_ = false;
+  bool hurried_ = false;
   bool is_down_ = false;
   bool parked_ = false;
 };

@@ -11,15 +11,25 @@
 
 namespace plchost {
 
-ControlReply Instance::handle(const ControlRequest& request) {
+std::optional<ControlReply> Instance::handle(const ControlRequest& request,
+                                             const InstanceSocket::Asker& asker) {
   auto done = obey(request);
+  const bool takes_time = request.verb == ControlVerb::stop || request.verb == ControlVerb::single_cycle;
+  if (done && takes_time && in_transition()) {
+    answer_waiting(ErrorCode::wrong_state,
+                   "stopped before it was over");  // a single cycle that is broken off
+    waiting_ = Waiting{.asker = asker, .verb = request.verb};
+    beat();
+    advance();
+    return std::nullopt;
+  }
   if (request.verb != ControlVerb::status) {
     spdlog::info("{} {}: {}", to_string(request.verb), request.argument,
                  done ? "done" : done.error().describe());
   }
   if (page_) beat();  // so that who was answered finds the new state in the page
-  if (!done) return {.number = request.number, .code = done.error().code, .text = done.error().describe()};
-  return {.number = request.number, .code = ErrorCode::ok, .text = *std::move(done)};
+  if (!done) return ControlReply{.number = 0, .code = done.error().code, .text = done.error().describe()};
+  return ControlReply{.number = 0, .code = ErrorCode::ok, .text = *std::move(done)};
 }
 
 Result<std::string> Instance::obey(const ControlRequest& request) {
@@ -27,11 +37,18 @@ Result<std::string> Instance::obey(const ControlRequest& request) {
     return failure(ErrorCode::not_found, fmt::format("this is instance '{}', the request is for '{}'",
                                                      options_.launch.name, request.instance));
   }
+  if (auto admitted = life_.admit(request.verb); !admitted || !admitted->empty()) {
+    return admitted ? admitted
+                    : failure_in(fmt::format("instance '{}'", options_.launch.name), admitted.error());
+  }
   switch (request.verb) {
     case ControlVerb::start:
-      return start();
+      return start("asked to start");
     case ControlVerb::stop:
-      return stop();
+      begin_stop("asked to stop");
+      return {};
+    case ControlVerb::single_cycle:
+      return begin_single_cycle();
     case ControlVerb::set_scheduler:
       return set_scheduler(request.argument);
     case ControlVerb::register_event:
@@ -40,11 +57,10 @@ Result<std::string> Instance::obey(const ControlRequest& request) {
     case ControlVerb::reset_statistics:
       return reset_statistics(request.argument);
     case ControlVerb::shutdown:
-      shutdown_requested_ = true;
+      begin_shutdown("the process is to end");
       return {};
     case ControlVerb::status:
       return status();
-    case ControlVerb::single_cycle:
     case ControlVerb::reset:
     case ControlVerb::reset_cold:
     case ControlVerb::restart:
@@ -56,39 +72,9 @@ Result<std::string> Instance::obey(const ControlRequest& request) {
                  fmt::format("'{}' is the manager's to do: ask it", to_string(request.verb)));
 }
 
-Result<std::string> Instance::start() {
-  if (!tasks_) {
-    return failure(ErrorCode::wrong_state,
-                   fmt::format("instance '{}' has no application to start: load one", options_.launch.name));
-  }
-  if (tasks_->running()) {
-    return failure(ErrorCode::wrong_state, fmt::format("instance '{}' runs already", options_.launch.name));
-  }
-  if (auto bound = host_->events().check_bound(); !bound) return std::unexpected(std::move(bound).error());
-  if (auto started = tasks_->start(scheduler_, settings_.scheduler); !started) {
-    return std::unexpected(std::move(started).error());
-  }
-  // Only now, so that no poster is told that its event will be run when it came a moment too early.
-  if (auto bound = host_->events().publish_bound(true); !bound) {
-    (void)tasks_->stop(kStopLimit);
-    return std::unexpected(std::move(bound).error());
-  }
-  spdlog::info("{} runs {} tasks under {}", application_->name(), application_->tasks().size(), scheduler_);
-  return {};
-}
-
-Result<std::string> Instance::stop() {
-  if (!tasks_ || !tasks_->running()) {
-    return failure(ErrorCode::wrong_state, fmt::format("instance '{}' does not run", options_.launch.name));
-  }
-  (void)host_->events().publish_bound(false);
-  if (auto stopped = tasks_->stop(kStopLimit); !stopped) return std::unexpected(std::move(stopped).error());
-  return {};
-}
-
 Result<std::string> Instance::set_scheduler(const std::string& name) {
   if (const auto known = find_scheduler(name); !known) return std::unexpected(known.error());
-  if (tasks_ && tasks_->running()) {
+  if (life_.state() == ApplicationState::running) {
     if (auto switched = tasks_->switch_to(name, settings_.scheduler); !switched) {
       return std::unexpected(std::move(switched).error());
     }
@@ -122,7 +108,7 @@ Result<std::string> Instance::reset_statistics(const std::string& task) {
 
 std::string Instance::status() const {
   return encode(InstanceReport{.pid = ::getpid(),
-                               .running = tasks_ && tasks_->running(),
+                               .running = life_.state() == ApplicationState::running,
                                .application = application_ ? application_->path() : std::string(),
                                .scheduler = scheduler_,
                                .cores = cores_,

@@ -46,14 +46,6 @@ void Instance::serve_faults() {
   }
 }
 
-void Instance::enter_exception(const std::string& /*reason*/) {
-  if (!tasks_->running()) return;
-  (void)host_->events().publish_bound(false);
-  if (const auto stopped = tasks_->stop(kStopLimit); !stopped) {
-    spdlog::error("in exception: {}", stopped.error().describe());
-  }
-}
-
 void Instance::keep_exception(const ExceptionEntry& entry) const {
   if (options_.launch.run_directory.empty()) return;
   const std::string path = exception_path(options_.launch.run_directory, options_.launch.name);

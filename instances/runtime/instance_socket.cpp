@@ -1,5 +1,6 @@
 #include "instances/runtime/instance_socket.hpp"
 
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <utility>
@@ -46,28 +47,39 @@ void InstanceSocket::accept_all() {
       continue;
     }
     const int fd = connection.fd();
-    if (watch(epoll_, fd)) connections_.emplace(fd, std::move(connection));
+    if (watch(epoll_, fd)) connections_.emplace(fd, Connection{next_id_++, std::move(connection)});
   }
 }
 
-bool InstanceSocket::serve_one(PacketSocket& connection) {
-  auto packet = connection.receive();
+bool InstanceSocket::send(Connection& connection, const ControlReply& reply) {
+  if (connection.socket.send(encode(reply))) return true;
+  spdlog::warn("a control connection was closed: its client does not read its replies");
+  return false;
+}
+
+void InstanceSocket::answer(const Asker& asker, ControlReply reply) {
+  reply.number = asker.number;
+  const auto found = std::ranges::find_if(
+      connections_, [&](const auto& entry) { return entry.second.id == asker.connection; });
+  if (found != connections_.end() && !send(found->second, reply)) connections_.erase(found);
+}
+
+bool InstanceSocket::serve_one(Connection& connection) {
+  auto packet = connection.socket.receive();
   if (packet && !*packet) return true;
   std::optional<Error> error;
-  ControlReply reply;
   if (!packet) {
     if (packet.error().code != ErrorCode::corrupt) return false;  // the peer is gone
     error = packet.error();
   } else if (const auto request = decode_request(**packet)) {
-    reply = handler_(*request);
-    reply.number = request->number;
+    auto reply = handler_(*request, Asker{.connection = connection.id, .number = request->number});
+    if (!reply) return true;
+    reply->number = request->number;
+    return send(connection, *reply);
   } else {
     error = request.error();
   }
-  if (error) reply = {.number = 0, .code = error->code, .text = error->describe()};
-  if (connection.send(encode(reply))) return true;
-  spdlog::warn("a control connection was closed: its client does not read its replies");
-  return false;
+  return send(connection, ControlReply{.number = 0, .code = error->code, .text = error->describe()});
 }
 
 void InstanceSocket::serve() {

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 
 #include "shm/base/control_message.hpp"
@@ -13,10 +15,16 @@ namespace plchost {
 
 /// The instance's control socket: any number of connections up to a bound, none able to block another. A
 /// client that does not read its replies is dropped; a packet that is no request gets a reply that says why.
-/// Control thread.
+/// Replies may come at once or later. Control thread.
 class InstanceSocket {
  public:
-  using Handler = std::function<ControlReply(const ControlRequest&)>;
+  /// Who asked for what.
+  struct Asker {
+    std::uint64_t connection = 0;
+    std::uint64_t number = 0;  ///< of the request
+  };
+  /// The reply; nothing: it follows by answer().
+  using Handler = std::function<std::optional<ControlReply>(const ControlRequest&, const Asker&)>;
   static constexpr std::size_t kMaxConnections = 16;
 
   [[nodiscard]] static Result<InstanceSocket> listen(const std::string& path, Handler handler);
@@ -25,19 +33,28 @@ class InstanceSocket {
   [[nodiscard]] int fd() const noexcept { return epoll_.get(); }
   /// Takes new connections, and at most one request of each connection.
   void serve();
+  /// The reply to a request that was not answered at once. Nobody gets it if the connection is gone.
+  void answer(const Asker& asker, ControlReply reply);
 
  private:
   InstanceSocket(PacketListener listener, UniqueFd epoll, Handler handler)
       : listener_(std::move(listener)), epoll_(std::move(epoll)), handler_(std::move(handler)) {}
 
+  struct Connection {
+    std::uint64_t id = 0;  // descriptors are used again, these are not
+    PacketSocket socket;
+  };
+
   void accept_all();
   /// False: the connection is over.
-  [[nodiscard]] bool serve_one(PacketSocket& connection);
+  [[nodiscard]] bool serve_one(Connection& connection);
+  [[nodiscard]] static bool send(Connection& connection, const ControlReply& reply);
 
   PacketListener listener_;
   UniqueFd epoll_;
   Handler handler_;
-  std::map<int, PacketSocket> connections_;  // by descriptor
+  std::map<int, Connection> connections_;  // by descriptor
+  std::uint64_t next_id_ = 1;
 };
 
 }  // namespace plchost

@@ -54,20 +54,24 @@ Result<void> serve(Instance& instance, const UniqueFd& signals) {
                              {.fd = heartbeat->get(), .events = POLLIN, .revents = 0},
                              {.fd = instance.control_fd(), .events = POLLIN, .revents = 0},
                              {.fd = instance.fault_fd(), .events = POLLIN, .revents = 0}}};
-  while (!instance.shutdown_requested()) {
-    if (::poll(fds.data(), fds.size(), -1) < 0) {
+  while (!instance.ended()) {
+    const auto soon = instance.wants_advance_in();
+    const timespec timeout = to_timespec(soon.value_or(Duration::zero()));
+    if (::ppoll(fds.data(), fds.size(), soon ? &timeout : nullptr, nullptr) < 0) {
       if (errno == EINTR) continue;
       return failure(ErrorCode::system, "poll", errno);
     }
-    if (fds[0].revents != 0) {
+    signalfd_siginfo signal{};
+    if (fds[0].revents != 0 && ::read(signals.get(), &signal, sizeof signal) > 0) {
       spdlog::info("a signal asks for the end");
-      return {};
+      instance.begin_shutdown("a signal asks for the end");
     }
     std::uint64_t expirations = 0;
     if (fds[1].revents != 0 && ::read(heartbeat->get(), &expirations, sizeof expirations) > 0)
       instance.beat();
     if (fds[3].revents != 0) instance.serve_faults();  // first: what is asked then finds the state right
     if (fds[2].revents != 0) instance.serve_control();
+    instance.advance();
   }
   return {};
 }

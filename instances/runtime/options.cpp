@@ -78,6 +78,12 @@ void describe(CLI::App& app, Options& options) {
       ->capture_default_str();
   app.add_option("--run-directory", launch.run_directory, "Where the control socket goes; default: none");
   app.add_flag("--stopped", launch.stopped, "Load the application, do not start it");
+  app.add_option("--start-kind", options.start_kind,
+                 "What the application is told about why it starts: first, warm, cold or after-fault")
+      ->check([](const std::string& name) {
+        const auto kind = start_kind_of(name);
+        return kind ? std::string() : kind.error().describe();
+      });
   app.add_option("--report-fd", launch.report_fd,
                  "Descriptor of a socket for set-up reports; default: the log")
       ->check(CLI::NonNegativeNumber);
@@ -102,6 +108,7 @@ ParsedOptions parse_options(int argc, const char* const* argv) {
     const int code = app.exit(error);
     return {.options = std::nullopt, .exit_code = code == 0 ? 0 : kExitUsage};
   }
+  if (const auto kind = start_kind_of(options.start_kind)) options.launch.start_kind = *kind;
   options.band =
       std::ranges::find(kBands, std::string_view(options.launch.priority_band), [](const auto& band) {
         return band.first;

@@ -11,6 +11,7 @@ namespace plchost {
 /// What plc-instance was asked to do.
 struct Options {
   LaunchOptions launch;
+  std::string start_kind = "first";          ///< launch.start_kind in words
   PriorityBand band = PriorityBand::normal;  ///< launch.priority_band, translated
   std::string check_application;             ///< not empty: only check this file
 };

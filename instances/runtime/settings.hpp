@@ -33,6 +33,7 @@ struct SysTimeSettings {
 /// What an instance's own settings file says, validated. README.md lists the keys.
 struct InstanceSettings {
   SchedulerSettings scheduler;
+  StopLimits stop;
   TimerMode timer_mode = TimerMode::periodic;
   IdleStates idle_states = IdleStates::hold;
   SysTimeSettings sys_time;

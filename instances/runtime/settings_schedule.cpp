@@ -95,6 +95,21 @@ constexpr std::array kKeys = {
                 [](const SettingsTarget& to, std::int64_t events) {
                   to.settings.scheduler.max_event_backlog = static_cast<std::uint64_t>(events);
                 }}},
+    // The manager waits as long as the highest of them allow.
+    SettingKey{.section = kSection,
+               .name = "Stop.OutputsLimitMs",
+               .unit = "ms",
+               .initial = "10000",
+               .value = NumberSetting{1, 10'000,
+                                      [](const SettingsTarget& to,
+                                         std::int64_t ms) { to.settings.stop.outputs = milliseconds(ms); }}},
+    SettingKey{.section = kSection,
+               .name = "Stop.OthersLimitMs",
+               .unit = "ms",
+               .initial = "25000",
+               .value = NumberSetting{1, 25'000,
+                                      [](const SettingsTarget& to,
+                                         std::int64_t ms) { to.settings.stop.others = milliseconds(ms); }}},
     // Here every scheduler times its tasks itself, without slices, and reports through the instance's log.
     SettingKey{.section = kSection, .name = "DontUseMicrosecondTiming"},
     SettingKey{.section = kSection, .name = "EnableLogger"},

@@ -16,6 +16,7 @@ void ManagedInstance::handle(const ControlRequest& request, ControlReplyFunction
   const auto refuse = [&](ErrorCode code, std::string text) {
     reply(ControlReply{.number = request.number, .code = code, .text = std::move(text)});
   };
+  refresh();  // what is decided now rests on it
   if (shutting_down_) return refuse(ErrorCode::unavailable, "the manager is shutting down");
   if (auto good = check_argument(checked); !good) return refuse(good.error().code, good.error().describe());
   if (operation_) {
@@ -30,10 +31,11 @@ void ManagedInstance::handle(const ControlRequest& request, ControlReplyFunction
     case ControlVerb::stop:
       return begin_stop();
     case ControlVerb::reset:
+      return fresh_process(Next::stay_stopped, StartKind::warm);
     case ControlVerb::reset_cold:
-      return fresh_process(Next::stay_stopped);
+      return fresh_process(Next::stay_stopped, StartKind::cold);
     case ControlVerb::restart:
-      return fresh_process(Next::run);
+      return fresh_process(Next::run, StartKind::warm);
     case ControlVerb::load_application:
       return begin_load();
     case ControlVerb::single_cycle:
@@ -93,7 +95,7 @@ Result<void> ManagedInstance::check_argument(ControlRequest& request) const {
 }
 
 void ManagedInstance::begin_start() {
-  if (idle_phase()) return fresh_process(Next::run);
+  if (idle_phase()) return fresh_process(Next::run, start_kind_);
   forward_or_wait();
 }
 
@@ -132,7 +134,7 @@ void ManagedInstance::apply_loaded_application() {
     return finish(ErrorCode::ok,
                   fmt::format("'{}' has no process: remembered for its next start", config_.name));
   }
-  fresh_process(stays_stopped ? Next::stay_stopped : Next::run);
+  fresh_process(stays_stopped ? Next::stay_stopped : Next::run, StartKind::first);
 }
 
 void ManagedInstance::begin_forwarded() {
@@ -152,12 +154,20 @@ void ManagedInstance::forward_or_wait() {
   }
   const ControlVerb verb = operation_->request.verb;
   const bool running = status_.state == InstanceState::running;
-  if (verb == ControlVerb::start && status_.state == InstanceState::safe_mode) {
+  const bool safe_mode = status_.state == InstanceState::safe_mode;
+  const bool begins = verb == ControlVerb::start || verb == ControlVerb::single_cycle;
+  if (begins && status_.state == InstanceState::exception) {
+    finish(ErrorCode::wrong_state,
+           fmt::format("'{}' is in exception: {}; reset it first", config_.name, status_.problem.view()));
+  } else if (verb == ControlVerb::stop && status_.state == InstanceState::exception) {
+    finish(ErrorCode::ok, fmt::format("'{}' is in exception, so it does not run: {}; reset it to go on",
+                                      config_.name, status_.problem.view()));
+  } else if (begins && safe_mode) {
     finish(ErrorCode::wrong_state,
            fmt::format("'{}' is in safe mode; load an application, or reset it", config_.name));
   } else if (verb == ControlVerb::start && running) {
     finish(ErrorCode::ok, fmt::format("'{}' is running already", config_.name));
-  } else if (verb == ControlVerb::stop && !running) {
+  } else if (verb == ControlVerb::stop && !running && status_.state != InstanceState::stopping) {
     finish(ErrorCode::ok, fmt::format("'{}' is stopped already", config_.name));
   } else {
     forward();
@@ -169,7 +179,10 @@ void ManagedInstance::forward() {
   const auto number = send(operation_->request.verb, operation_->request.argument);
   if (!number) return finish(number.error().code, number.error().describe());
   operation_->forwarded_number = *number;
-  host_.set_timer(after(kCommandLimit));
+  host_.set_timer(after(limit_of(operation_->request.verb)));
+  if (operation_->request.verb == ControlVerb::stop) {
+    set_state(Phase::up, InstanceState::stopping, problem_when_up());
+  }
 }
 
 void ManagedInstance::finish_forwarded(const ControlReply& reply) {
@@ -188,6 +201,22 @@ void ManagedInstance::finish_forwarded(const ControlReply& reply) {
     }
   }
   finish(reply.code, reply.text);
+  if (reply.code != ErrorCode::ok) look_again();
+}
+
+// A command has failed: the process knows what has become of it.
+void ManagedInstance::look_again() {
+  if (phase_ != Phase::up || operation_) return;
+  settled_ = {};
+  refresh();
+  if (status_.state == InstanceState::stopping && !host_.runtime()) {
+    set_state(Phase::up, wants_running_ ? InstanceState::running : InstanceState::stopped, problem_when_up());
+  }
+}
+
+Duration ManagedInstance::limit_of(ControlVerb verb) noexcept {
+  if (verb == ControlVerb::stop) return kStopLimit;
+  return verb == ControlVerb::single_cycle ? kSingleCycleLimit : kCommandLimit;
 }
 
 void ManagedInstance::finish(ErrorCode code, const std::string& text) {

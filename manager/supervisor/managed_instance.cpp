@@ -10,6 +10,27 @@
 
 namespace plchost {
 
+namespace {
+
+// What an application does, as the world is told of its instance.
+InstanceState shown_state(const InstanceRuntime& runtime) noexcept {
+  switch (runtime.state) {
+    case ApplicationState::running:
+    case ApplicationState::single_cycle:
+      return InstanceState::running;
+    case ApplicationState::stopping:
+      return InstanceState::stopping;
+    case ApplicationState::exception:
+      return InstanceState::exception;
+    case ApplicationState::none:
+    case ApplicationState::stopped:
+      break;
+  }
+  return InstanceState::stopped;
+}
+
+}  // namespace
+
 ManagedInstance::ManagedInstance(const InstanceConfig& config, Surroundings surroundings, InstanceHost& host)
     : config_(config),
       surroundings_(std::move(surroundings)),
@@ -88,6 +109,7 @@ void ManagedInstance::come_up() {
     const bool runs = wants_running_ && !application_.empty();
     set_state(Phase::up, runs ? InstanceState::running : InstanceState::stopped, problem_when_up());
   }
+  start_kind_ = StartKind::warm;
   if (!operation_) return;
   if (operation_->step == Step::fresh_process) {
     finish(ErrorCode::ok, application_.empty() ? "it is up without an application: load one" : "");
@@ -122,6 +144,7 @@ void ManagedInstance::finish_adoption(const std::string& problem) {
     if (!safe_mode_) application_ = runtime->application.view();
   }
   come_up();
+  if (known && !safe_mode_ && shown_state(*runtime) != status_.state) show_application(*runtime);
   std::string text(status_.problem.view());
   const auto add = [&](std::string_view more) { text += (text.empty() ? "" : "; ") + std::string(more); };
   if (!problem.empty()) add("adopted, but it does not answer on its control socket: " + problem);
@@ -140,7 +163,7 @@ void ManagedInstance::on_exit(const ExitStatus& status) {
   if (phase_ == Phase::ending) {
     const Next next = std::exchange(next_, Next::nothing);
     if (next == Next::nothing) return go_down(InstanceState::offline, "");
-    spawn(next);
+    spawn(next);  // of the kind that was asked for
   } else if (set_up && (exit_of_set_up || !setup_failure_.empty())) {
     history_.record_end(surroundings_.now(), Duration::zero(), false);
     back_off_or_give_up(config_.restart == RestartPolicy::always || name_taken_, InstanceState::failed,
@@ -153,6 +176,7 @@ void ManagedInstance::on_exit(const ExitStatus& status) {
 
 void ManagedInstance::ended_by_itself(const ExitStatus& status) {
   const bool failed = !status.success();
+  if (phase_ == Phase::up) start_kind_ = StartKind::after_fault;
   const TimePoint now = surroundings_.now();
   history_.record_end(now, phase_ == Phase::up ? now - up_since_ : Duration::zero(), failed);
   const bool again =
@@ -197,9 +221,12 @@ void ManagedInstance::on_timer() {
       return finish_adoption("no answer");
     case Phase::up:
       if (operation_ && operation_->step == Step::forwarded) {
-        finish(ErrorCode::timed_out,
-               fmt::format("'{}' did not answer within {} s", config_.name,
-                           std::chrono::duration_cast<std::chrono::seconds>(kCommandLimit).count()));
+        finish(
+            ErrorCode::timed_out,
+            fmt::format("'{}' did not answer within {} s", config_.name,
+                        std::chrono::duration_cast<std::chrono::seconds>(limit_of(operation_->request.verb))
+                            .count()));
+        look_again();
       }
       return;
     case Phase::ending:
@@ -225,7 +252,9 @@ void ManagedInstance::set_up_failed(const std::string& why) {
   host_.signal(SIGKILL);
 }
 
-void ManagedInstance::fresh_process(Next next) {
+void ManagedInstance::fresh_process(Next next, StartKind kind) {
+  // The first process is the first one, however it was asked for.
+  if (start_kind_ != StartKind::first || kind == StartKind::cold) start_kind_ = kind;
   history_.forget();
   safe_mode_ = false;
   last_end_.clear();
@@ -247,6 +276,7 @@ LaunchOptions ManagedInstance::launch_options(Next next) const {
   options.application = safe_mode_ ? "" : application_;
   options.pool = surroundings_.host.pool;
   options.run_directory = surroundings_.host.run_directory;
+  options.start_kind = start_kind_;
   options.stopped = next == Next::stay_stopped;
   options.report_fd = kChildReportFd;
   options.log_level = surroundings_.host.log_level;
@@ -288,19 +318,31 @@ void ManagedInstance::go_down(InstanceState state, const std::string& problem) {
 }
 
 void ManagedInstance::refresh() {
-  const bool up = phase_ == Phase::up && !operation_;
-  if (!up || surroundings_.now() - settled_ < kPageLag) return;
+  if (phase_ != Phase::up || operation_) return;
   const auto runtime = host_.runtime();
   if (!runtime || runtime->pid != status_.pid) return;
-  const bool was_running = status_.state == InstanceState::running;
-  const bool runs = runtime->running != 0;
+  // There is no way out of an exception, so this is never too early to be believed.
+  const bool excepted = runtime->state == ApplicationState::exception;
+  if (excepted && status_.state != InstanceState::exception) return show_application(*runtime);
+  if (surroundings_.now() - settled_ < kPageLag) return;
   const bool same_names = safe_mode_ || runtime->application.view() == status_.application.view();
-  if (runs == was_running && same_names && runtime->scheduler.view() == status_.scheduler.view()) return;
+  const bool same_state = safe_mode_ || status_.state == shown_state(*runtime);
+  if (same_state && same_names && runtime->scheduler.view() == status_.scheduler.view()) return;
   learn_scheduler(runtime->scheduler.view());
   if (!safe_mode_) application_ = runtime->application.view();
-  if (runs == was_running || safe_mode_) return publish();
-  set_state(Phase::up, runs ? InstanceState::running : InstanceState::stopped,
-            runs || !wants_running_ ? problem_when_up() : "the application stopped by itself: see its tasks");
+  if (same_state) return publish();
+  show_application(*runtime);
+}
+
+void ManagedInstance::show_application(const InstanceRuntime& runtime) {
+  if (safe_mode_) return;
+  const InstanceState state = shown_state(runtime);
+  if (state == InstanceState::exception) {
+    return set_state(Phase::up, state, std::string(runtime.problem.view()));
+  }
+  const bool unwanted = state == InstanceState::stopped && wants_running_;
+  set_state(Phase::up, state,
+            unwanted ? "the application stopped by itself: see its tasks" : problem_when_up());
 }
 
 std::string ManagedInstance::core_problem() {
@@ -320,16 +362,23 @@ Result<std::uint64_t> ManagedInstance::send(ControlVerb verb, const std::string&
 }
 
 void ManagedInstance::set_state(Phase phase, InstanceState state, const std::string& problem) {
-  if (state != status_.state) {
+  const InstanceState before = status_.state;
+  const bool was_up = phase_ == Phase::up;
+  if (state != before) {
     const auto since = std::chrono::system_clock::now().time_since_epoch();
     status_.state_since_unix_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(since).count();
   }
   phase_ = phase;
   status_.state = state;
   status_.problem.assign(problem);
-  const bool bad = state == InstanceState::failed || state == InstanceState::safe_mode;
+  const bool bad = state == InstanceState::failed || state == InstanceState::safe_mode ||
+                   state == InstanceState::exception;
   spdlog::log(bad ? spdlog::level::warn : spdlog::level::info, "instance {}: {}{}{}", config_.name,
               to_string(state), problem.empty() ? "" : ": ", problem);
+  const bool of_process = !was_up || phase != Phase::up;
+  if (state != before && of_process && surroundings_.transition) {
+    surroundings_.transition(before, state, problem);
+  }
   publish();
 }
 

@@ -32,13 +32,13 @@ namespace plchost {
 //   held         waiting: for what it comes after; the problem text says for whom
 //   backing_off  waiting: for the end of the back-off
 //   setting_up, adopting   starting
-//   up           running, stopped or safe_mode: as the process says
+//   up           running, stopped, stopping, exception or safe_mode: as the process says
 //   ending       stopping
 //
 // Rules
 // * One timer. Each phase that could last for ever has a limit: setting_up 30 s,
-//   then SIGKILL; ending 5 s, SIGTERM, 2 s, SIGKILL; adopting 5 s, after which it counts as up with a problem
-//   text, because a manager stops no PLC for being unable to talk to it.
+//   then SIGKILL; ending 38 s (a stop may take 10 s and 25 s), SIGTERM, 2 s, SIGKILL; adopting 5 s, after
+//   which it counts as up with a problem text, because a manager stops no PLC for being unable to talk to it.
 // * The order of `after` is for the first start (held) and for the end. A restart does not wait, and an
 // operator's
 //   start of a held instance overrides it.
@@ -53,12 +53,20 @@ namespace plchost {
 // It
 //   stays that way until load_application, reset or restart, which also forget the crashes. A process that
 //   crashes even so is restarted without application, with back-off.
+// * An exception of the application is no crash: the process stays and answers, nothing is restarted by
+// itself.
+//   It is found in the process's page within 50 ms. start and single cycle are refused, stop has nothing to
+//   do; reset, restart and load lead out of it.
 // * Commands: one at a time; another is answered with busy. What changes a process that is still setting_up
 // waits until
 //   it is up. The reply comes when the thing is done, or when the process ended instead, or at the limit.
 //     start      up: forwarded (running: done already; safe_mode: refused). Down, held, backing_off: spawns.
-//     stop       up: forwarded (stopped: done already). held, backing_off: cancels, offline. Down: done
-//     already. reset, restart   ends the process if there is one, and spawns another one, stopped or running.
+//     stop       up: forwarded (stopped, exception: done already); stopping until the answer comes. held,
+//                backing_off: cancels, offline. Down: done already.
+//     single_cycle       up: forwarded. Else refused.
+//     reset, reset_cold, restart   ends the process if there is one, and spawns another one, stopped or
+//     running.
+//                The application can ask why it starts (StartKind).
 //     load_application   checked first by a process of its own; then as restart if it ran, was in safe mode,
 //     failed,
 //                waiting or without application; as reset if it was stopped; only remembered if it was
@@ -75,6 +83,9 @@ class ManagedInstance : public InstanceEvents {
     std::vector<std::string_view> schedulers;  ///< names that there are
     std::function<TimePoint()> now;
     std::function<void()> changed;  ///< status() is another now; may call release(), nothing else
+    /// The process has gone from one state to another. What only follows the application's state is told by
+    /// the process itself, not here.
+    std::function<void(InstanceState from, InstanceState to, std::string_view reason)> transition;
   };
 
   ManagedInstance(const InstanceConfig& config, Surroundings surroundings, InstanceHost& host);
@@ -129,19 +140,22 @@ class ManagedInstance : public InstanceEvents {
   void forward_or_wait();
   void forward();
   void finish(ErrorCode code, const std::string& text);
+  void look_again();
   void finish_forwarded(const ControlReply& reply);
   [[nodiscard]] Result<void> check_argument(ControlRequest& request) const;
+  [[nodiscard]] static Duration limit_of(ControlVerb verb) noexcept;
   [[nodiscard]] bool idle_phase() const noexcept {
     return phase_ == Phase::down || phase_ == Phase::held || phase_ == Phase::backing_off;
   }
 
   // Life: managed_instance.cpp
-  void fresh_process(Next next);
+  void fresh_process(Next next, StartKind kind);
   void spawn(Next next);
   void end_process(Next next);
   void set_up_failed(const std::string& why);
   void come_up();
   void finish_adoption(const std::string& problem);
+  void show_application(const InstanceRuntime& runtime);
   void ended_by_itself(const ExitStatus& status);
   void back_off_or_give_up(bool again, InstanceState otherwise, const std::string& why);
   void go_down(InstanceState state, const std::string& problem);
@@ -161,7 +175,8 @@ class ManagedInstance : public InstanceEvents {
 
   Phase phase_ = Phase::down;
   Ending ending_ = Ending::asked;
-  Next next_ = Next::nothing;  // after ending
+  Next next_ = Next::nothing;                // after ending
+  StartKind start_kind_ = StartKind::first;  // of the next process
   bool safe_mode_ = false;
   bool wants_running_ = true;  // what an operator, or the start, wanted last
   bool shutting_down_ = false;
@@ -182,7 +197,10 @@ class ManagedInstance : public InstanceEvents {
 /// Limits of the phases and of a command.
 inline constexpr Duration kSetupLimit = std::chrono::seconds(30);
 inline constexpr Duration kAdoptLimit = std::chrono::seconds(5);
-inline constexpr Duration kShutdownLimit = std::chrono::seconds(5);
+/// Longer than a stop may take: 10 s for tasks that drive outputs, 25 s for the others.
+inline constexpr Duration kShutdownLimit = std::chrono::seconds(38);
+inline constexpr Duration kStopLimit = std::chrono::seconds(38);
+inline constexpr Duration kSingleCycleLimit = std::chrono::seconds(28);  ///< 25 s for all tasks
 inline constexpr Duration kTerminateLimit = std::chrono::seconds(2);
 inline constexpr Duration kCommandLimit = std::chrono::seconds(10);
 /// The process's page is believed only this long after its own answer: it is written now and then.

@@ -18,11 +18,18 @@ Supervisor::Supervisor(const ManagerConfig& config, Surroundings surroundings, c
     units_[i].host = std::move(hosted.host);
     units_[i].instance = std::make_unique<ManagedInstance>(
         instance,
-        ManagedInstance::Surroundings{.host = config.host,
-                                      .folder = surroundings_.folder,
-                                      .schedulers = surroundings_.schedulers,
-                                      .now = surroundings_.now,
-                                      .changed = [this, i] { changed(i); }},
+        ManagedInstance::Surroundings{
+            .host = config.host,
+            .folder = surroundings_.folder,
+            .schedulers = surroundings_.schedulers,
+            .now = surroundings_.now,
+            .changed = [this, i] { changed(i); },
+            .transition =
+                [this, i](InstanceState from, InstanceState to, std::string_view reason) {
+                  if (surroundings_.transition) {
+                    surroundings_.transition(i, from, to, reason);
+                  }
+                }},
         *units_[i].host);
     hosted.connect(*units_[i].instance);
     for (const std::string& name : instance.after) {

@@ -24,6 +24,9 @@ class Supervisor : public ControlHandler {
     std::function<TimePoint()> now;
     /// Instance number `index` has changed.
     std::function<void(std::size_t index, const InstanceStatus& status)> publish;
+    /// The process of instance number `index` has gone from one state to another. May be empty.
+    std::function<void(std::size_t index, InstanceState from, InstanceState to, std::string_view reason)>
+        transition = {};
   };
   /// Makes the host of one instance, and is told where its events go.
   struct HostedInstance {

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "shm/base/packet_socket.hpp"
+#include "shm/pool/transition_ring.hpp"
 
 namespace plchost {
 
@@ -55,7 +56,10 @@ TestHost::TestHost(const OwnDomain& domain, std::string name)
 TestHost::~TestHost() {
   server_.reset();
   manager_ = {};
-  for (const std::string& instance : instances_) InstancePage::remove(pool_name_, instance);
+  for (const std::string& instance : instances_) {
+    InstancePage::remove(pool_name_, instance);
+    TransitionRing::remove(pool_name_, instance);
+  }
   MemoryFile::remove(host_page_name(pool_name_));
   MemoryFile::remove(pool_name_ + ".posts");
   ObjectPool::remove(pool_name_);

@@ -106,7 +106,8 @@ TEST_F(ControlSocket, RegistrationByTheOperatorOutlivesTheProcess) {
 }
 
 TEST_F(ControlSocket, SendsToTheManagerWhatNeedsAFreshProcess) {
-  for (const ControlVerb verb : {ControlVerb::reset, ControlVerb::restart, ControlVerb::load_application}) {
+  for (const ControlVerb verb :
+       {ControlVerb::reset, ControlVerb::reset_cold, ControlVerb::restart, ControlVerb::load_application}) {
     EXPECT_EQ(sut_.ask(verb).code, ErrorCode::unsupported);
   }
 }

@@ -52,6 +52,7 @@ Sandbox::Sandbox()
 Sandbox::~Sandbox() {
   ObjectPool::remove(pool_);
   InstancePage::remove(pool_, "line1");
+  TransitionRing::remove(pool_, "line1");
   std::error_code ignored;
   std::filesystem::remove_all(folder_, ignored);
 }

@@ -11,6 +11,7 @@
 #include "shm/base/packet_socket.hpp"
 #include "shm/pool/instance_page.hpp"
 #include "shm/pool/object_pool.hpp"
+#include "shm/pool/transition_ring.hpp"
 
 namespace plchost::testing {
 

@@ -122,7 +122,8 @@ TEST(Instance, CrashOfAThreadOfTheApplicationsOwnEndsTheProcessWithItsSignal) {
 
 TEST(Instance, TaskThatNeverReturnsDoesNotKeepTheProcess) {
   const Sandbox sandbox;
-  const std::string settings = sandbox.write("line1.cfg", "[CmpSchedule]\nWatchdog.DefaultTimeMs=0\n");
+  const std::string settings =
+      sandbox.write("line1.cfg", "[CmpSchedule]\nWatchdog.DefaultTimeMs=0\nStop.OthersLimitMs=500\n");
   InstanceProcess sut(sandbox, {"--settings", settings, "--application", application("all_kinds")});
   sut.wait_until_up();
   (void)sut.event("hang").post();

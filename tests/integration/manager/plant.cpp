@@ -13,6 +13,7 @@
 
 #include "api/control/control_handler.hpp"
 #include "shm/pool/object_pool.hpp"
+#include "shm/pool/transition_ring.hpp"
 
 namespace plchost {
 
@@ -34,7 +35,10 @@ Plant::~Plant() {
   if (testing::Test::HasFailure()) fmt::print("{}\n", log());
   if (manager_.pid != 0) kill_manager();
   end_instances();
-  for (const std::string& name : names_) InstancePage::remove(pool_, name);
+  for (const std::string& name : names_) {
+    InstancePage::remove(pool_, name);
+    TransitionRing::remove(pool_, name);
+  }
   MemoryFile::remove(host_page_name(pool_));
   ObjectPool::remove(pool_);
   std::error_code ignored;

@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -26,13 +27,17 @@ class ManagedInstanceTest : public testing::Test {
   }
 
   void make() {
-    sut_.emplace(config_,
-                 ManagedInstance::Surroundings{.host = host_config_,
-                                               .folder = "/etc/plchost",
-                                               .schedulers = {"CmpSchedule", "CmpScheduleTimer"},
-                                               .now = [this] { return now_; },
-                                               .changed = [this] { ++changes_; }},
-                 host_);
+    sut_.emplace(
+        config_,
+        ManagedInstance::Surroundings{
+            .host = host_config_,
+            .folder = "/etc/plchost",
+            .schedulers = {"CmpSchedule", "CmpScheduleTimer"},
+            .now = [this] { return now_; },
+            .changed = [this] { ++changes_; },
+            .transition = [this](InstanceState from, InstanceState to,
+                                 std::string_view reason) { transitions_.emplace_back(from, to, reason); }},
+        host_);
   }
 
   ManagedInstance& sut() { return *sut_; }
@@ -91,6 +96,7 @@ class ManagedInstanceTest : public testing::Test {
   FakeHost host_;
   TimePoint now_{std::chrono::seconds(1000)};
   int changes_ = 0;
+  std::vector<std::tuple<InstanceState, InstanceState, std::string>> transitions_;
   std::vector<ControlReply> replies_;
   std::optional<ManagedInstance> sut_;
 };

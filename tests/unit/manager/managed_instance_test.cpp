@@ -183,6 +183,7 @@ InstanceRuntime page_of(int pid, bool running, std::string_view scheduler, std::
   InstanceRuntime runtime;
   runtime.pid = pid;
   runtime.running = running ? 1 : 0;
+  runtime.state = running ? ApplicationState::running : ApplicationState::stopped;
   runtime.scheduler.assign(scheduler);
   runtime.application.assign(application);
   return runtime;

@@ -6,6 +6,7 @@ typedef void (*any_function)(void);
 const any_function every_call[] = {
     (any_function)__sys__setup__tasks,
     (any_function)plc_current_task,
+    (any_function)plc_start_kind,
     (any_function)plc_set_task_options,
     (any_function)SchedRegisterExternalEvent,
     (any_function)SchedUnregisterExternalEvent,

@@ -1,0 +1,117 @@
+#include "api/cli/transition_verbs.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <csignal>
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "api/cli/cli_session.hpp"
+#include "api/cli/rows.hpp"
+#include "api/dds/text.hpp"
+
+namespace plchost {
+
+namespace {
+
+struct TransitionArguments {
+  std::string instance;
+  std::uint64_t count = 0;  // watch: 0 is until Ctrl-C
+};
+
+std::atomic<bool>& interrupted() {
+  static std::atomic<bool> flag{false};
+  return flag;
+}
+
+bool is_wanted(const CliSession& session, const TransitionArguments& arguments,
+               const plc_Transition& transition) {
+  const bool instance = arguments.instance.empty() || dds::text_of(transition.instance) == arguments.instance;
+  return instance && (session.options.host.empty() || dds::text_of(transition.host) == session.options.host);
+}
+
+// Complete when nothing more has come for a while: who writes them sends what it keeps in one go.
+int list_transitions(CliSession& session, const TransitionArguments& arguments) {
+  const auto hosts = session.shown_hosts();
+  if (!hosts) return CliSession::fail(hosts.error());
+  ControlClient& client = *session.client().value();
+  std::vector<plc_Transition> found;
+  TimePoint quiet_since = MonotonicClock::now();
+  const TimePoint deadline = session.deadline();
+  while (MonotonicClock::now() < std::min(deadline, quiet_since + ControlClient::kQuiet)) {
+    const auto news = client.transitions();
+    if (!news) return CliSession::fail(news.error());
+    for (const TransitionView& view : *news) {
+      if (is_wanted(session, arguments, view.sample)) found.push_back(view.sample);
+    }
+    if (!news->empty()) quiet_since = MonotonicClock::now();
+    client.wait_for_change(std::min(deadline, quiet_since + ControlClient::kQuiet));
+  }
+  std::ranges::stable_sort(found, {}, [](const plc_Transition& sample) { return sample.time_unix_ns; });
+  std::vector<Row> rows;
+  for (const plc_Transition& sample : found) rows.push_back(to_row(sample));
+  session.show(rows, transition_columns());
+  return kExitDone;
+}
+
+void print(const CliSession& session, const TransitionView& view) {
+  const Row row = to_row(view.sample);
+  if (session.options.json) {
+    fmt::print("{}\n", row.dump(-1, ' ', false, Row::error_handler_t::replace));
+    return;
+  }
+  if (view.missed > 0) fmt::print("({} were overtaken and are not shown)\n", view.missed);
+  fmt::print("{}  {}/{}  {}  {} -> {}  {}\n", row["time"].get<std::string>(), row["host"].get<std::string>(),
+             row["instance"].get<std::string>(), row["of"].get<std::string>(), row["from"].get<std::string>(),
+             row["to"].get<std::string>(), row["reason"].get<std::string>());
+}
+
+int watch_transitions(CliSession& session, const TransitionArguments& arguments) {
+  struct sigaction action{};
+  action.sa_handler = [](int /*signal*/) { interrupted().store(true); };
+  ::sigaction(SIGINT, &action, nullptr);
+  ::sigaction(SIGTERM, &action, nullptr);
+  const auto hosts = session.shown_hosts();
+  if (!hosts) return CliSession::fail(hosts.error());
+  ControlClient& client = *session.client().value();
+  std::uint64_t shown = 0;
+  while (!interrupted()) {
+    const auto news = client.transitions();
+    if (!news) return CliSession::fail(news.error());
+    for (const TransitionView& view : *news) {
+      if (!is_wanted(session, arguments, view.sample)) continue;
+      print(session, view);
+      std::fflush(stdout);
+      if (++shown == arguments.count) return kExitDone;
+    }
+    constexpr Duration kSlice = std::chrono::milliseconds(50);  // so that Ctrl-C ends it at once
+    client.wait_for_change(MonotonicClock::now() + kSlice);
+  }
+  return kExitDone;
+}
+
+}  // namespace
+
+void add_list_transitions(CLI::App& verb, CliSession& session, Action& action) {
+  CLI::App* const noun = verb.add_subcommand("transitions", "The last changes of state of the instances");
+  const auto arguments = std::make_shared<TransitionArguments>();
+  noun->add_option("INSTANCE", arguments->instance, "only of this instance");
+  noun->fallthrough()->callback([&session, &action, arguments] {
+    action = [&session, arguments] { return list_transitions(session, *arguments); };
+  });
+}
+
+void add_watch_transitions(CLI::App& verb, CliSession& session, Action& action) {
+  CLI::App* const noun = verb.add_subcommand(
+      "transitions", "Each change of state, one line (with --json one object) each, until Ctrl-C");
+  const auto arguments = std::make_shared<TransitionArguments>();
+  noun->add_option("INSTANCE", arguments->instance, "only of this instance");
+  noun->add_option("--count", arguments->count, "end after so many");
+  noun->fallthrough()->callback([&session, &action, arguments] {
+    action = [&session, arguments] { return watch_transitions(session, *arguments); };
+  });
+}
+
+}  // namespace plchost

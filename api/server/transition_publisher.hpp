@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <control.h>
+
+#include "api/dds/entity.hpp"
+#include "shm/base/result.hpp"
+#include "shm/base/time.hpp"
+#include "shm/pool/transition_ring.hpp"
+
+namespace plchost {
+
+/// Writes each change of state of each instance as one sample, in order. Control loop only.
+class TransitionPublisher {
+ public:
+  struct Source {
+    std::string host;
+    std::string pool;
+    std::uint64_t epoch = 0;
+  };
+  [[nodiscard]] static Result<TransitionPublisher> create(dds_entity_t participant, Source source);
+
+  /// Writes what is new. `instances`: those that the manager has at present. What DDS does not take comes
+  /// first the next time.
+  void publish(const std::vector<std::string>& instances, TimePoint now);
+
+ private:
+  struct Followed {
+    std::optional<TransitionRingReader> ring;
+    TimePoint next_look;               // for the ring, while there is none
+    std::optional<Transition> unsent;  // that DDS did not take
+  };
+  TransitionPublisher(Source source, dds::Entity topic, dds::Entity writer)
+      : source_(std::move(source)), topic_(std::move(topic)), writer_(std::move(writer)) {}
+  void follow(const std::string& instance, Followed& followed, TimePoint now);
+  [[nodiscard]] bool write(const std::string& instance, std::int64_t stream, const Transition& transition);
+
+  Source source_;
+  dds::Entity topic_;
+  dds::Entity writer_;
+  std::map<std::string, Followed> followed_;
+};
+
+}  // namespace plchost

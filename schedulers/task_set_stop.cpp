@@ -1,0 +1,139 @@
+// How the tasks of a set come to rest: at the end of their cycles, in two phases; and the single cycle, which
+// ends the same way.
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "schedulers/single_cycle.hpp"
+#include "schedulers/task_set.hpp"
+#include "shm/base/names.hpp"
+
+namespace plchost {
+
+Result<void> TaskSet::begin_stop(const StopLimits& limits) {
+  if (!running_) return failure(ErrorCode::wrong_state, "the tasks are not running");
+  if (stop_) return failure(ErrorCode::wrong_state, "the tasks are being stopped already");
+  stop_.emplace();
+  stop_->limits = limits;
+  stop_->deadline = MonotonicClock::now() + limits.outputs;
+  // From now on releases are missed on purpose; cycles that run are watched on.
+  if (supervision_) supervision_->tasks_stop();
+  for (std::size_t i = 0; i < threads_.size(); ++i) {
+    if (tasks_[i]->config().drives_outputs) threads_[i]->park();
+  }
+  return {};
+}
+
+void TaskSet::begin_second_phase() {
+  stop_->others = true;
+  stop_->deadline = MonotonicClock::now() + stop_->limits.others;
+  if (active_->scheduler) active_->scheduler->stop();
+  for (std::size_t i = 0; i < threads_.size(); ++i) {
+    if (!tasks_[i]->config().drives_outputs) threads_[i]->park();
+  }
+  if (tick_.device) tick_.device->halt();
+}
+
+// The tasks of this phase that are still in their cycles.
+std::vector<std::size_t> TaskSet::busy_in_phase() {
+  std::vector<std::size_t> busy;
+  for (std::size_t i = 0; i < threads_.size(); ++i) {
+    if (tasks_[i]->config().drives_outputs == stop_->others) continue;
+    if (threads_[i]->settled(TimePoint{})) {
+      report(i, false);
+    } else {
+      busy.push_back(i);
+    }
+  }
+  return busy;
+}
+
+std::optional<std::vector<std::size_t>> TaskSet::advance_stop() {
+  if (!stop_) return std::vector<std::size_t>{};
+  for (;;) {
+    const auto busy = busy_in_phase();
+    if (!busy.empty() && MonotonicClock::now() < stop_->deadline) return std::nullopt;
+    stop_->stuck.insert(stop_->stuck.end(), busy.begin(), busy.end());
+    if (stop_->others) break;
+    begin_second_phase();
+  }
+  auto stuck = std::move(stop_->stuck);
+  stop_.reset();
+  retired_.push_back(std::move(active_));
+  running_ = false;
+  if (stuck.empty()) {
+    retired_.clear();
+    if (supervision_) supervision_->end();
+  }
+  return stuck;
+}
+
+void TaskSet::park_all() {
+  if (!running_) return;
+  if (!stop_) (void)begin_stop({});
+  stop_->limits = {.outputs = Duration::zero(), .others = Duration::zero()};
+  stop_->deadline = {};
+  (void)advance_stop();
+}
+
+Result<void> TaskSet::stop(Duration limit) {
+  if (auto begun = begin_stop({.outputs = limit, .others = limit}); !begun) return begun;
+  for (;;) {
+    if (const auto stuck = advance_stop()) {
+      if (stuck->empty()) return {};
+      return failure(ErrorCode::timed_out,
+                     fmt::format("not at the end of its cycle after {} ms: task {}",
+                                 std::chrono::duration_cast<std::chrono::milliseconds>(limit).count(),
+                                 names_of(*stuck)));
+    }
+    const auto busy = busy_in_phase();
+    if (!busy.empty()) (void)threads_[busy.front()]->settled(stop_->deadline);
+  }
+}
+
+std::string TaskSet::names_of(const std::vector<std::size_t>& tasks) const {
+  std::vector<std::string_view> names;
+  for (const std::size_t task : tasks) names.emplace_back(tasks_[task]->config().name);
+  return join_names(names);
+}
+
+Result<void> TaskSet::begin_single_cycle(const SchedulerSettings& settings) {
+  if (auto startable = check_startable(); !startable) return startable;
+  std::vector<std::size_t> order;
+  for (std::size_t i = 0; i < tasks_.size(); ++i) {
+    const TaskKind kind = tasks_[i]->config().kind;
+    if (kind == TaskKind::cyclic || kind == TaskKind::freewheeling) order.push_back(i);
+  }
+  std::ranges::stable_sort(order, {}, [&](std::size_t i) { return tasks_[i]->config().iec_priority; });
+  auto arrangement = std::make_unique<Arrangement>();
+  arrangement->single_cycle = std::make_unique<SingleCycle>(clock_);
+  arrangement->sources.resize(tasks_.size());
+  for (const std::size_t i : order) arrangement->sources[i] = arrangement->single_cycle->add();
+  active_ = std::move(arrangement);
+  const TimePoint origin = clock_.now();
+  for (const std::size_t i : order) tasks_[i]->begin(origin);
+  running_ = true;
+  single_cycle_order_ = order;
+  watch(settings);
+  if (supervision_) supervision_->tasks_stop();  // no release is missed; each cycle is watched
+  for (const std::size_t i : order) {
+    threads_[i]->use(active_->sources[i].get());
+    report(i, true);
+  }
+  active_->single_cycle->begin();
+  return {};
+}
+
+bool TaskSet::single_cycle_done() noexcept {
+  if (!active_ || !active_->single_cycle) return true;
+  SingleCycle& round = *active_->single_cycle;
+  // A task whose fault has stopped only itself hands its turn on to nobody.
+  for (std::size_t turn = round.turn(); turn < single_cycle_order_.size(); turn = round.turn()) {
+    if (!tasks_[single_cycle_order_[turn]]->fault().raised()) return false;
+    round.skip(turn);
+  }
+  return true;
+}
+
+}  // namespace plchost

@@ -1,0 +1,183 @@
+// How tasks come to rest: the two phases of a stop, and the single cycle.
+#include <atomic>
+#include <mutex>
+#include <thread>
+
+#include "tests/conformance/scheduler_fixture.hpp"
+
+namespace plchost {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+class Stop : public testing::TestWithParam<std::string_view> {
+ protected:
+  /// A cycle that waits until it is let go.
+  struct Holder {
+    std::atomic<bool> let_go{false};
+    std::atomic<int> inside{0};
+    void hold() {
+      ++inside;
+      while (!let_go) std::this_thread::sleep_for(milliseconds(1));
+    }
+  };
+
+  ~Stop() override { release(); }
+  void release() {
+    for (Holder* holder : {&output_, &other_}) holder->let_go = true;
+  }
+  void add(const std::string& name, bool drives_outputs, std::function<void()> entry) {
+    TaskConfig config = Tasks<LinuxClock>::cyclic(name, milliseconds(1), std::move(entry));
+    config.drives_outputs = drives_outputs;
+    tasks_.add(std::move(config));
+  }
+  void start() {
+    ASSERT_TRUE(tasks_.create());
+    ASSERT_TRUE(tasks_.set->start(GetParam(), {}));
+  }
+  static void wait_for(const std::function<bool()>& condition) {
+    while (!condition()) std::this_thread::sleep_for(milliseconds(1));
+  }
+  std::vector<std::size_t> finish_stop() {
+    for (;;) {
+      if (auto stuck = tasks_.set->advance_stop()) return *stuck;
+      std::this_thread::sleep_for(milliseconds(1));
+    }
+  }
+
+  Holder output_;
+  Holder other_;
+  Tasks<LinuxClock> tasks_;
+};
+
+INSTANTIATE_TEST_SUITE_P(Schedulers, Stop, testing::ValuesIn(every_scheduler()), scheduler_test_name);
+
+TEST_P(Stop, LetsTheOthersRunUntilTasksThatDriveOutputsHaveParked) {
+  std::atomic<int> cycles{0};
+  add("Output", true, [this] { output_.hold(); });
+  add("Other", false, [&] { ++cycles; });
+  start();
+  wait_for([&] { return output_.inside > 0; });
+  ASSERT_TRUE(tasks_.set->begin_stop({.outputs = seconds(100), .others = seconds(100)}));
+  const int before = cycles;
+  wait_for([&] {
+    EXPECT_FALSE(tasks_.set->advance_stop());
+    return cycles > before + 10;
+  });
+  EXPECT_TRUE(tasks_.set->running());
+  output_.let_go = true;
+  EXPECT_THAT(finish_stop(), IsEmpty());
+  EXPECT_FALSE(tasks_.set->running());
+  EXPECT_EQ(output_.inside, 1);
+  const int parked = cycles;
+  std::this_thread::sleep_for(milliseconds(20));
+  EXPECT_EQ(cycles, parked);
+}
+
+TEST_P(Stop, GoesOnWithoutATaskThatDoesNotComeBack) {
+  add("Output", true, [this] { output_.hold(); });
+  add("Other", false, [this] { other_.hold(); });
+  add("Good", false, [] {});
+  start();
+  wait_for([&] { return output_.inside > 0 && other_.inside > 0; });
+  ASSERT_TRUE(tasks_.set->begin_stop({.outputs = milliseconds(20), .others = milliseconds(20)}));
+  const auto stuck = finish_stop();
+  EXPECT_THAT(stuck, ElementsAre(0, 1));
+  EXPECT_EQ(tasks_.set->names_of(stuck), "Output, Other");
+  const auto again = tasks_.set->start(GetParam(), {});
+  ASSERT_FALSE(again);
+  EXPECT_EQ(again.error().code, ErrorCode::wrong_state);
+  EXPECT_THAT(again.error().message, testing::HasSubstr("Output, Other"));
+  release();
+  wait_for([&] { return tasks_.set->start(GetParam(), {}).has_value(); });
+  EXPECT_TRUE(tasks_.set->stop(seconds(100)));
+}
+
+TEST_P(Stop, IsRefusedWhileTheTasksAreStopped) {
+  add("Good", true, [] {});
+  start();
+  ASSERT_TRUE(tasks_.set->stop(seconds(100)));
+  EXPECT_EQ(tasks_.set->begin_stop({}).error().code, ErrorCode::wrong_state);
+}
+
+TEST_P(Stop, RefusesAnotherStopAndASwitchWhileItGoesOn) {
+  add("Output", true, [this] { output_.hold(); });
+  start();
+  wait_for([&] { return output_.inside > 0; });
+  ASSERT_TRUE(tasks_.set->begin_stop({}));
+  EXPECT_EQ(tasks_.set->begin_stop({}).error().code, ErrorCode::wrong_state);
+  EXPECT_EQ(tasks_.set->switch_to("CmpSchedule", {}).error().code, ErrorCode::wrong_state);
+  EXPECT_EQ(tasks_.set->start("CmpSchedule", {}).error().code, ErrorCode::wrong_state);
+  release();
+  EXPECT_THAT(finish_stop(), IsEmpty());
+}
+
+class SingleCycleOfTasks : public testing::Test {
+ protected:
+  void add(TaskConfig config, int priority) {
+    const std::string name = config.name;
+    config.iec_priority = priority;
+    config.entry = [this, name] {
+      const std::lock_guard lock(mutex_);
+      ran_.push_back(name);
+    };
+    tasks_.add(std::move(config));
+  }
+  void run_single_cycle() {
+    const auto begun = tasks_.set->begin_single_cycle({});
+    ASSERT_TRUE(begun) << begun.error().describe();
+    while (!tasks_.set->single_cycle_done()) std::this_thread::sleep_for(milliseconds(1));
+    EXPECT_TRUE(tasks_.set->stop(seconds(100)));
+  }
+
+  std::mutex mutex_;
+  std::vector<std::string> ran_;
+  Tasks<LinuxClock> tasks_;
+};
+
+TEST_F(SingleCycleOfTasks, RunsEachCyclicAndFreewheelingTaskOnceByPriority) {
+  using T = Tasks<LinuxClock>;
+  add(T::cyclic("Slow", seconds(100), {}), 20);
+  add(T::freewheeling("Loop", {}), 5);
+  add(T::cyclic("Fast", milliseconds(1), {}), 1);
+  add(T::external("Work", "work", {}), 0);
+  add(T::event("Edge", [] { return true; }, {}), 0);
+  add(T::cyclic("Same", milliseconds(1), {}), 5);
+  ASSERT_TRUE(tasks_.create());
+  tasks_.event_named("work").post();
+  run_single_cycle();
+  EXPECT_THAT(ran_, ElementsAre("Fast", "Loop", "Same", "Slow"));
+  run_single_cycle();
+  EXPECT_EQ(ran_.size(), 8U);
+  EXPECT_EQ(tasks_.counters(0).cycles, 2U);
+  EXPECT_EQ(tasks_.counters(2).lost_cycles, 0U);
+  EXPECT_EQ(tasks_.counters(2).jitter_max_ns, 0);
+}
+
+TEST_F(SingleCycleOfTasks, ComesBetweenTwoRunsUnderEachScheduler) {
+  using T = Tasks<LinuxClock>;
+  add(T::cyclic("Fast", milliseconds(1), {}), 1);
+  ASSERT_TRUE(tasks_.create());
+  for (const std::string_view scheduler : every_scheduler()) {
+    const std::uint64_t before = tasks_.counters(0).cycles;
+    run_single_cycle();
+    EXPECT_EQ(tasks_.counters(0).cycles, before + 1);
+    ASSERT_TRUE(tasks_.set->start(scheduler, {}));
+    EXPECT_EQ(tasks_.set->begin_single_cycle({}).error().code, ErrorCode::wrong_state);
+    tasks_.wait_for_cycles(0, before + 10);
+    ASSERT_TRUE(tasks_.set->stop(seconds(100)));
+  }
+}
+
+TEST_F(SingleCycleOfTasks, WithoutSuchATaskIsDoneAtOnce) {
+  add(Tasks<LinuxClock>::external("Work", "work", {}), 0);
+  ASSERT_TRUE(tasks_.create());
+  run_single_cycle();
+  EXPECT_THAT(ran_, IsEmpty());
+}
+
+}  // namespace
+}  // namespace plchost

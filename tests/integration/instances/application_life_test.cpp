@@ -1,0 +1,263 @@
+// The life of an application in a real plc-instance: each verb in each state, and stops that do not come to
+// an end.
+#include <algorithm>
+#include <csignal>
+#include <cstdlib>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "instances/launch/launch_contract.hpp"
+#include "tests/integration/instances/instance_process.hpp"
+
+namespace plchost::testing {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+class LifeInProcess : public ::testing::Test {
+ protected:
+  /// `limit_ms`: of both phases of a stop.
+  void start(int limit_ms, std::vector<std::string> more = {}) {
+    const std::string settings = sandbox_.write(
+        "line1.cfg", fmt::format("[CmpSchedule]\nWatchdog.DefaultTimeMs=0\nStop.OutputsLimitMs={0}\n"
+                                 "Stop.OthersLimitMs={0}\n[Task.Output]\nDrivesOutputs=1\n",
+                                 limit_ms));
+    more.insert(more.end(), {"--settings", settings, "--application", application("held")});
+    const bool stopped = std::ranges::find(more, "--stopped") != more.end();
+    sut_.emplace(sandbox_, more);
+    sut_->wait_until_up(!stopped);
+  }
+  [[nodiscard]] std::uint64_t cycles(const std::string& task) const {
+    const auto found = sut_->task(task);
+    return found ? found->counters.cycles : 0;
+  }
+  void hold(const std::string& task) {
+    EXPECT_EQ(sut_->event(task == "Output" ? "hold_output" : "hold_other").post(), PostResult::posted);
+    // Held when it comes to no cycle any more while another task does.
+    EXPECT_TRUE(eventually([&] {
+      const auto held = cycles(task);
+      const auto free = cycles("Free");
+      return eventually([&] { return cycles("Free") > free + 3; }) && cycles(task) == held;
+    }));
+  }
+  [[nodiscard]] ApplicationState state() const {
+    const auto page = InstancePageReader::open(sandbox_.pool(), "line1");
+    const auto runtime = page ? page->runtime() : std::nullopt;
+    return runtime ? runtime->state : ApplicationState::none;
+  }
+  bool wait_for(ApplicationState wanted) {
+    return eventually([&] { return state() == wanted; });
+  }
+  static void send(PacketSocket& socket, ControlVerb verb, std::uint64_t number) {
+    EXPECT_TRUE(socket.send(encode(ControlRequest{number, verb, "line1", ""})));
+  }
+  static ControlReply receive(PacketSocket& socket) {
+    const auto packet = socket.receive_until(MonotonicClock::now() + 30s);
+    EXPECT_TRUE(packet);
+    return packet ? decode_reply(*packet).value_or(ControlReply{}) : ControlReply{};
+  }
+  void expect_refused(ControlVerb verb, ErrorCode code, const std::string& text,
+                      const std::string& argument = {}) {
+    const auto reply = sut_->ask(verb, argument);
+    EXPECT_EQ(reply.code, code) << to_string(verb) << ": " << reply.text;
+    EXPECT_THAT(reply.text, HasSubstr(text)) << to_string(verb);
+  }
+  void expect_exception_of(const std::string& task) {
+    EXPECT_EQ(state(), ApplicationState::exception);
+    EXPECT_EQ(sut_->task(task)->state, PageTaskState::exception);
+    EXPECT_TRUE(eventually([&] { return sut_->task("Free")->state == PageTaskState::stopped; }));
+    expect_refused(ControlVerb::start, ErrorCode::wrong_state, "reset it first");
+    expect_refused(ControlVerb::single_cycle, ErrorCode::wrong_state, "reset it first");
+    expect_refused(ControlVerb::set_scheduler, ErrorCode::wrong_state, "reset it first", "CmpScheduleTimer");
+    expect_refused(ControlVerb::stop, ErrorCode::ok, "reset it to go on");
+    EXPECT_EQ(sut_->ask(ControlVerb::status).code, ErrorCode::ok);
+    EXPECT_EQ(sut_->end(SIGTERM), EXIT_FAILURE);  // a thread is caught in the application
+    EXPECT_THAT(sut_->log(), HasSubstr(task));
+  }
+
+  Sandbox sandbox_;
+  std::optional<InstanceProcess> sut_;
+};
+
+TEST_F(LifeInProcess, ServesOthersWhileItStops) {
+  start(10'000);
+  hold("Output");
+  PacketSocket socket = sut_->connect();
+  send(socket, ControlVerb::stop, 9);
+  ASSERT_TRUE(wait_for(ApplicationState::stopping));
+  EXPECT_EQ(sut_->ask(ControlVerb::status).code, ErrorCode::ok);
+  for (const ControlVerb verb : {ControlVerb::start, ControlVerb::stop, ControlVerb::single_cycle}) {
+    expect_refused(verb, ErrorCode::busy, "is stopping");
+  }
+  expect_refused(ControlVerb::set_scheduler, ErrorCode::busy, "is stopping", "CmpScheduleTimer");
+  const auto before = cycles("Free");
+  EXPECT_TRUE(eventually([&] { return cycles("Free") > before + 10; }));  // the others run on
+  const auto beat = InstancePageReader::open(sandbox_.pool(), "line1")->runtime()->heartbeat_ns;
+  EXPECT_TRUE(eventually(
+      [&] { return InstancePageReader::open(sandbox_.pool(), "line1")->runtime()->heartbeat_ns > beat; }));
+  (void)sut_->event("let_go").post();
+  const auto reply = receive(socket);
+  EXPECT_EQ(reply.code, ErrorCode::ok) << reply.text;
+  EXPECT_EQ(reply.number, 9U);
+  EXPECT_EQ(state(), ApplicationState::stopped);
+  EXPECT_EQ(sut_->ask(ControlVerb::start).code, ErrorCode::ok);
+  EXPECT_EQ(sut_->end(SIGTERM), EXIT_SUCCESS);
+}
+
+TEST_F(LifeInProcess, GoesToExceptionByATaskThatDrivesOutputsAndDoesNotStop) {
+  start(200);
+  hold("Output");
+  expect_refused(ControlVerb::stop, ErrorCode::timed_out, "task Output");
+  expect_exception_of("Output");
+}
+
+TEST_F(LifeInProcess, GoesToExceptionByAnotherTaskThatDoesNotStop) {
+  start(200);
+  hold("Other");
+  expect_refused(ControlVerb::stop, ErrorCode::timed_out, "task Other");
+  expect_exception_of("Other");
+}
+
+TEST_F(LifeInProcess, StopsInTwoPhasesAtTheEndOfTheProcess) {
+  start(10'000);
+  hold("Output");
+  ::kill(sut_->pid(), SIGTERM);
+  ASSERT_TRUE(wait_for(ApplicationState::stopping));
+  const auto before = cycles("Free");
+  EXPECT_TRUE(eventually([&] { return cycles("Free") > before + 10; }));
+  (void)sut_->event("let_go").post();
+  EXPECT_EQ(sut_->end(), EXIT_SUCCESS);
+  EXPECT_THAT(sut_->log(), HasSubstr("application: exit"));
+}
+
+TEST_F(LifeInProcess, EndsAtOnceWhenItIsAskedTwice) {
+  start(10'000);
+  hold("Other");
+  EXPECT_EQ(sut_->ask(ControlVerb::shutdown).code, ErrorCode::ok);
+  ASSERT_TRUE(wait_for(ApplicationState::stopping));
+  EXPECT_EQ(sut_->end(SIGTERM), EXIT_FAILURE);
+  EXPECT_THAT(sut_->log(), HasSubstr("Other"));
+}
+
+TEST_F(LifeInProcess, AnswersAStopThatAnEndOfTheProcessOvertakes) {
+  start(10'000);
+  hold("Other");
+  PacketSocket socket = sut_->connect();
+  send(socket, ControlVerb::stop, 3);
+  ASSERT_TRUE(wait_for(ApplicationState::stopping));
+  EXPECT_EQ(sut_->ask(ControlVerb::shutdown).code, ErrorCode::ok);
+  EXPECT_EQ(sut_->end(SIGTERM), EXIT_FAILURE);
+  const auto packet = socket.receive_until(MonotonicClock::now() + 30s);
+  ASSERT_FALSE(packet);
+  EXPECT_EQ(packet.error().code, ErrorCode::unavailable);
+}
+
+TEST_F(LifeInProcess, DoesNotWaitForAClientThatHasGone) {
+  start(10'000);
+  hold("Output");
+  {
+    PacketSocket socket = sut_->connect();
+    send(socket, ControlVerb::stop, 3);
+    ASSERT_TRUE(wait_for(ApplicationState::stopping));
+  }
+  (void)sut_->event("let_go").post();
+  EXPECT_TRUE(wait_for(ApplicationState::stopped));
+  EXPECT_EQ(sut_->ask(ControlVerb::start).code, ErrorCode::ok);
+}
+
+class SingleCycleUnderEachScheduler : public LifeInProcess,
+                                      public ::testing::WithParamInterface<const char*> {};
+
+TEST_P(SingleCycleUnderEachScheduler, RunsEachCyclicAndFreewheelingTaskOnce) {
+  sut_.emplace(sandbox_, std::vector<std::string>{"--stopped", "--scheduler", GetParam(), "--application",
+                                                  application("all_kinds")});
+  sut_->wait_until_up(false);
+  for (std::uint64_t round = 1; round <= 3; ++round) {
+    EXPECT_EQ(sut_->ask(ControlVerb::single_cycle).code, ErrorCode::ok);
+    EXPECT_EQ(state(), ApplicationState::stopped);
+    EXPECT_EQ(cycles("Fast"), round);
+    EXPECT_EQ(cycles("Loop"), round);
+  }
+  EXPECT_EQ(sut_->task("Fast")->counters.lost_cycles, 0U);
+  EXPECT_EQ(cycles("Work") + cycles("Edge"), 0U);
+  EXPECT_EQ(sut_->task("Fast")->state, PageTaskState::stopped);
+  EXPECT_EQ(sut_->ask(ControlVerb::start).code, ErrorCode::ok);
+  expect_refused(ControlVerb::single_cycle, ErrorCode::wrong_state, "stop it first");
+  EXPECT_TRUE(eventually([&] { return cycles("Fast") > 20; }));
+  EXPECT_EQ(sut_->ask(ControlVerb::stop).code, ErrorCode::ok);
+  const auto stopped_at = cycles("Fast");
+  EXPECT_EQ(sut_->ask(ControlVerb::single_cycle).code, ErrorCode::ok);
+  EXPECT_EQ(cycles("Fast"), stopped_at + 1);
+}
+
+INSTANTIATE_TEST_SUITE_P(Schedulers, SingleCycleUnderEachScheduler,
+                         ::testing::Values("CmpSchedule", "CmpScheduleTimer", "CmpScheduleOneShot"));
+
+TEST_F(LifeInProcess, GoesToExceptionByASingleCycleThatDoesNotEnd) {
+  start(300, {"--stopped", "--start-kind", "cold"});
+  PacketSocket socket = sut_->connect();
+  send(socket, ControlVerb::single_cycle, 4);
+  ASSERT_TRUE(wait_for(ApplicationState::single_cycle));
+  expect_refused(ControlVerb::start, ErrorCode::busy, "single cycle");
+  const auto reply = receive(socket);
+  EXPECT_EQ(reply.code, ErrorCode::timed_out);
+  EXPECT_THAT(reply.text, HasSubstr("Other"));
+  EXPECT_EQ(cycles("Output"), 1U);
+  EXPECT_EQ(cycles("Free"), 0U);  // its turn comes after Other
+  expect_exception_of("Other");
+}
+
+TEST_F(LifeInProcess, IsStoppedWithinASingleCycle) {
+  start(500, {"--stopped", "--start-kind", "cold"});
+  PacketSocket socket = sut_->connect();
+  send(socket, ControlVerb::single_cycle, 4);
+  ASSERT_TRUE(wait_for(ApplicationState::single_cycle));
+  PacketSocket other = sut_->connect();
+  send(other, ControlVerb::stop, 5);
+  EXPECT_EQ(receive(socket).code, ErrorCode::wrong_state);  // broken off
+  EXPECT_EQ(receive(other).code, ErrorCode::timed_out);     // Other does not come back
+  expect_exception_of("Other");
+}
+
+TEST_F(LifeInProcess, TellsTheApplicationWhyItStarts) {
+  for (const auto& [kind, number] :
+       {std::pair("first", 0), std::pair("warm", 1), std::pair("cold", 2), std::pair("after-fault", 3)}) {
+    start(200, {"--stopped", "--start-kind", kind});
+    EXPECT_THAT(sut_->log(), HasSubstr(fmt::format("start kind {}", number)));
+    EXPECT_EQ(sut_->end(SIGTERM), EXIT_SUCCESS);
+  }
+}
+
+TEST_F(LifeInProcess, IsWrittenDownTransitionByTransition) {
+  start(200, {"--stopped"});
+  auto reader = TransitionRingReader::open(sandbox_.pool(), "line1");
+  ASSERT_TRUE(reader);
+  for (const ControlVerb verb : {ControlVerb::single_cycle, ControlVerb::start, ControlVerb::stop}) {
+    EXPECT_EQ(sut_->ask(verb).code, ErrorCode::ok);
+  }
+  EXPECT_EQ(sut_->ask(ControlVerb::stop).code, ErrorCode::wrong_state);
+  EXPECT_EQ(sut_->ask(ControlVerb::start).code, ErrorCode::ok);
+  hold("Other");
+  EXPECT_EQ(sut_->ask(ControlVerb::stop).code, ErrorCode::timed_out);
+  std::vector<std::uint64_t> numbers;
+  std::vector<ApplicationState> states;
+  std::string last_reason;
+  while (const auto next = reader->next(MonotonicClock::now())) {
+    EXPECT_EQ(next->pid, sut_->pid());
+    numbers.push_back(next->sequence);
+    states.push_back(static_cast<ApplicationState>(next->to));
+    last_reason = next->reason.view();
+  }
+  using enum ApplicationState;
+  EXPECT_THAT(states, ElementsAre(stopped, single_cycle, stopped, running, stopping, stopped, running,
+                                  stopping, exception));
+  for (std::size_t i = 0; i < numbers.size(); ++i) EXPECT_EQ(numbers[i], i + 1);
+  EXPECT_THAT(last_reason, HasSubstr("stop_timeout"));
+}
+
+}  // namespace
+}  // namespace plchost::testing

@@ -1,0 +1,36 @@
+// Tasks whose cycles can be held, in a loop that sleeps: by external events, or from the first cycle on by a
+// cold start.
+#include <atomic>
+#include <ctime>
+
+#include "../../../../instances/plc_app.hpp"
+
+namespace {
+
+using namespace std::chrono_literals;
+
+std::atomic<bool> hold_output{false};
+std::atomic<bool> hold_other{false};
+
+void wait_while(const std::atomic<bool>& held) {
+  while (held) {
+    const timespec pause{.tv_sec = 0, .tv_nsec = 1'000'000};
+    ::nanosleep(&pause, nullptr);
+  }
+}
+
+void setup(plc::Application& app) {
+  app.cyclic("Output", 2, 2ms, [] { wait_while(hold_output); });
+  app.cyclic("Other", 3, 2ms, [] { wait_while(hold_other); });
+  app.cyclic("Free", 4, 2ms, [] {});
+  app.external("HoldOutput", 0, "hold_output", [] { hold_output = true; });
+  app.external("HoldOther", 0, "hold_other", [] { hold_other = true; });
+  app.external("LetGo", 0, "let_go", [] { hold_output = hold_other = false; });
+  app.on_exit([] { plc::log("exit"); });
+  hold_other = plc_start_kind() == PLC_START_COLD;
+  plc::log("start kind %d", plc_start_kind());
+}
+
+}  // namespace
+
+PLC_APPLICATION("Held", setup)

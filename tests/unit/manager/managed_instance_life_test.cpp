@@ -1,0 +1,173 @@
+// The life of the application as the manager sees it: exception, single cycle, cold reset, kinds of start.
+#include <csignal>
+
+#include "tests/unit/manager/managed_instance_fixture.hpp"
+
+namespace plchost {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+class ManagedLife : public ManagedInstanceTest {
+ protected:
+  void show(ApplicationState state, std::string_view problem = "") {
+    InstanceRuntime runtime;
+    runtime.pid = sut().status().pid;
+    runtime.running = state == ApplicationState::running ? 1 : 0;
+    runtime.state = state;
+    runtime.scheduler.assign("CmpSchedule");
+    runtime.application.assign(config_.application);
+    runtime.problem.assign(problem);
+    host_.page = runtime;
+  }
+  void fall_into_exception() {
+    bring_up();
+    show(ApplicationState::exception, "task 'Main': division by zero");
+    sut().refresh();
+    ASSERT_EQ(state(), InstanceState::exception);
+  }
+  StartKind last_kind() { return host_.spawned.back().start_kind; }
+};
+
+TEST_F(ManagedLife, ShowsAnExceptionAtTheNextLookAndLeavesTheProcessAlone) {
+  fall_into_exception();
+  EXPECT_EQ(problem(), "task 'Main': division by zero");
+  advance(std::chrono::hours(1));
+  sut().refresh();
+  EXPECT_EQ(state(), InstanceState::exception);
+  EXPECT_EQ(host_.spawned.size(), 1U);
+  EXPECT_TRUE(host_.signals.empty());
+  EXPECT_TRUE(host_.requests.empty());
+}
+
+TEST_F(ManagedLife, RefusesToRunInExceptionAndSaysWhatHelps) {
+  fall_into_exception();
+  for (const ControlVerb verb : {ControlVerb::start, ControlVerb::single_cycle}) {
+    ask(verb);
+    const auto reply = take_reply();
+    EXPECT_EQ(reply.code, ErrorCode::wrong_state) << to_string(verb);
+    EXPECT_EQ(reply.text, "'line1' is in exception: task 'Main': division by zero; reset it first");
+  }
+  ask(ControlVerb::stop);
+  const auto stop = take_reply();
+  EXPECT_EQ(stop.code, ErrorCode::ok);
+  EXPECT_THAT(stop.text, HasSubstr("does not run"));
+  EXPECT_TRUE(host_.requests.empty());
+}
+
+TEST_F(ManagedLife, KnowsOfAnExceptionWhenACommandComesBeforeTheNextLook) {
+  bring_up();
+  show(ApplicationState::exception, "late");
+  ask(ControlVerb::start);
+  EXPECT_EQ(take_reply().code, ErrorCode::wrong_state);
+}
+
+TEST_F(ManagedLife, ResetLeadsOutOfAnException) {
+  fall_into_exception();
+  ask(ControlVerb::reset);
+  sut().on_exit(exited_with(1));
+  report_ready();
+  EXPECT_EQ(take_reply().code, ErrorCode::ok);
+  EXPECT_EQ(state(), InstanceState::stopped);
+  EXPECT_EQ(problem(), "");
+}
+
+TEST_F(ManagedLife, IsStoppingUntilTheStopIsAnswered) {
+  bring_up();
+  ask(ControlVerb::stop);
+  EXPECT_EQ(state(), InstanceState::stopping);
+  ASSERT_TRUE(host_.timer);
+  EXPECT_GE(*host_.timer - now_, std::chrono::seconds(35));  // both phases fit in
+  answer();
+  EXPECT_EQ(state(), InstanceState::stopped);
+}
+
+TEST_F(ManagedLife, ShowsWhatAFailedStopHasLedTo) {
+  bring_up();
+  ask(ControlVerb::stop);
+  show(ApplicationState::exception, "stop_timeout: task Main");
+  answer(ErrorCode::timed_out, "task Main");
+  EXPECT_EQ(take_reply().code, ErrorCode::timed_out);
+  EXPECT_EQ(state(), InstanceState::exception);
+  EXPECT_EQ(problem(), "stop_timeout: task Main");
+}
+
+TEST_F(ManagedLife, PassesASingleCycleOnAndStaysStopped) {
+  bring_up_stopped();
+  ask(ControlVerb::single_cycle);
+  EXPECT_EQ(host_.requests.back().verb, ControlVerb::single_cycle);
+  EXPECT_TRUE(replies_.empty());
+  answer();
+  EXPECT_EQ(take_reply().code, ErrorCode::ok);
+  EXPECT_EQ(state(), InstanceState::stopped);
+}
+
+TEST_F(ManagedLife, GivesAnEndingProcessTheTimeOfBothPhases) {
+  bring_up();
+  ask(ControlVerb::reset);
+  ASSERT_TRUE(host_.timer);
+  EXPECT_GE(*host_.timer - now_, std::chrono::seconds(35));
+}
+
+TEST_F(ManagedLife, TellsTheApplicationWhyItStarts) {
+  bring_up();
+  EXPECT_EQ(last_kind(), StartKind::first);
+  sut().on_exit(killed_by(SIGSEGV));
+  expire_timer();
+  report_ready();
+  EXPECT_EQ(last_kind(), StartKind::after_fault);
+  const auto renew = [&](ControlVerb verb) {
+    ask(verb);
+    sut().on_exit(exited_with(0));
+    report_ready();
+    EXPECT_EQ(take_reply().code, ErrorCode::ok);
+    return last_kind();
+  };
+  EXPECT_EQ(renew(ControlVerb::reset), StartKind::warm);
+  EXPECT_TRUE(host_.spawned.back().stopped);
+  EXPECT_EQ(renew(ControlVerb::reset_cold), StartKind::cold);
+  EXPECT_TRUE(host_.spawned.back().stopped);
+  EXPECT_EQ(renew(ControlVerb::restart), StartKind::warm);
+  EXPECT_FALSE(host_.spawned.back().stopped);
+}
+
+TEST_F(ManagedLife, TellsOfEachChangeOfTheProcessOnceAndOfNoneOfTheApplication) {
+  bring_up();
+  ask(ControlVerb::stop);
+  answer();
+  take_reply();
+  ask(ControlVerb::reset);
+  sut().on_exit(exited_with(0));
+  report_ready();
+  using enum InstanceState;
+  std::vector<std::pair<InstanceState, InstanceState>> told;
+  for (const auto& [from, to, reason] : transitions_) told.emplace_back(from, to);
+  EXPECT_THAT(told, ElementsAre(std::pair(offline, waiting), std::pair(waiting, starting),
+                                std::pair(starting, running), std::pair(InstanceState::stopped, stopping),
+                                std::pair(stopping, starting), std::pair(starting, InstanceState::stopped)));
+}
+
+TEST_F(ManagedLife, AdoptsAnInstanceInExceptionAsSuch) {
+  host_.adoptable = 55;
+  ASSERT_TRUE(sut().adopt());
+  show(ApplicationState::exception, "task 'Main': stack overflow");
+  answer();
+  EXPECT_EQ(state(), InstanceState::exception);
+  EXPECT_EQ(problem(), "task 'Main': stack overflow");
+}
+
+TEST_F(ManagedLife, AdoptsAnInstanceThatIsStoppingAndSeesItStopped) {
+  host_.adoptable = 55;
+  ASSERT_TRUE(sut().adopt());
+  show(ApplicationState::stopping);
+  answer();
+  EXPECT_EQ(state(), InstanceState::stopping);
+  show(ApplicationState::stopped);
+  advance(kPageLag);
+  sut().refresh();
+  EXPECT_EQ(state(), InstanceState::stopped);
+}
+
+}  // namespace
+}  // namespace plchost
