@@ -176,8 +176,8 @@ RTS_RESULT CDECL SchedSetTaskInterval(RTS_HANDLE hTask, RTS_I64 nIntervalNs);
 RTS_RESULT CDECL SchedRaiseEvent(RTS_HANDLE hTask);
 
 /* Why the process of this application began. An application that keeps data of its own decides by it whether
- * to go on with them. The runtime itself does nothing else by it: all variables begin with their initial values
- * in each case, because there is no retain memory yet. Any. */
+ * to go on with them. The runtime itself does nothing else by it: all variables begin with their initial
+ * values in each case, because there is no retain memory yet. Any. */
 #define PLC_START_FIRST 0       /* by hand, first start by this manager, or another application was loaded */
 #define PLC_START_WARM 1        /* warm reset, or restart */
 #define PLC_START_COLD 2        /* cold reset: begin with initial values */

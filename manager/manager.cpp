@@ -149,7 +149,7 @@ void Manager::make_supervisor() {
           .publish =
               [this](std::size_t index, const InstanceStatus& status) {
                 page_->write_instance(static_cast<std::uint32_t>(index), status);
-                 latency_due_ = true;
+                latency_due_ = true;
               },
           .transition =
               [this](std::size_t index, InstanceState from, InstanceState to, std::string_view reason) {
