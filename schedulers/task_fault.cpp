@@ -48,7 +48,7 @@ std::string_view what_of(int signal, int code) noexcept {
 
 std::string describe_signal(const FaultRecord& record) {
   if (record.stack_overflow) return fmt::format("SIGSEGV: stack overflow at {:#x}", record.memory_address);
-  const std::string text =
+  std::string text =
       fmt::format("{}: {}", signal_name(record.signal), what_of(record.signal, record.signal_code));
   const bool names_memory = record.signal == SIGSEGV || record.signal == SIGBUS;
   if (!names_memory || record.signal_code <= 0) return text;
