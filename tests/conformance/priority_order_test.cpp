@@ -118,7 +118,7 @@ TEST_P(OverlappingReleases, AtTheSameTimeDelayTheLowerPriorityAndItsLatencyShows
     GTEST_SKIP() << "SCHED_FIFO is not allowed";
   }
   EXPECT_GE(usual_least(low.latency), microseconds(800));
-  EXPECT_LT(usual_least(high.latency), microseconds(800));
+  EXPECT_LT(usual_least(high.latency), usual_least(low.latency));
 }
 
 TEST_P(OverlappingReleases, DuringACycleOfHigherPriorityWaitForItsEndAndTheirLatencyShowsIt) {
@@ -138,10 +138,8 @@ TEST_P(OverlappingReleases, OfHigherPriorityPreEmptACycleAndItsExecutionTimeShow
             .low_takes = microseconds(2000)})) {
     GTEST_SKIP() << "SCHED_FIFO is not allowed";
   }
-  // The lower one spins for 2 ms of the clock, of which the other takes 1 ms: it was pre-empted, not waited
-  // for.
-  EXPECT_LT(usual_least(high.latency), microseconds(900));
-  EXPECT_GE(usual_least(low.execution), microseconds(2000));
+  // The lower one takes 2 ms of processor time; the 1 ms of the other came in between.
+  EXPECT_GE(usual_least(low.execution), microseconds(2900));
 }
 
 INSTANTIATE_TEST_SUITE_P(Each, OverlappingReleases, testing::ValuesIn(every_scheduler()),
