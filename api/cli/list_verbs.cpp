@@ -47,11 +47,27 @@ int list(CliSession& session, Snapshot<Sample> snapshot, const std::vector<Colum
   return kExitDone;
 }
 
+// Instances that never had one have nothing to show.
+int list_exceptions(CliSession& session) {
+  const auto hosts = session.shown_hosts();
+  if (!hosts) return CliSession::fail(hosts.error());
+  std::vector<Row> rows;
+  for (const HostView& host : *hosts) {
+    const auto all = session.client().value()->exceptions(host.name, session.deadline());
+    if (!all) return CliSession::fail(all.error());
+    for (const plc_ExceptionStatus& exception : *all) {
+      if (exception.count > 0) rows.push_back(to_row(exception));
+    }
+  }
+  session.show(rows, exception_columns());
+  return kExitDone;
+}
+
 }  // namespace
 
 void add_list_verbs(CLI::App& app, CliSession& session, Action& action) {
-  CLI::App* const verb =
-      app.add_subcommand("list", "Show all hosts, instances, tasks, events, objects or transitions");
+  CLI::App* const verb = app.add_subcommand(
+      "list", "Show all hosts, instances, tasks, events, objects, exceptions or transitions");
   verb->require_subcommand(1)->fallthrough();
   const auto add = [&](const char* noun, const char* text, Action run) {
     CLI::App* const command = verb->add_subcommand(noun, text)->fallthrough();
@@ -69,6 +85,8 @@ void add_list_verbs(CLI::App& app, CliSession& session, Action& action) {
       [&session] { return list(session, &ControlClient::events, event_columns()); });
   add("objects", "All objects of the global pool",
       [&session] { return list(session, &ControlClient::objects, object_columns()); });
+  add("exceptions", "The last exception of each instance that had any",
+      [&session] { return list_exceptions(session); });
   add_list_transitions(*verb, session, action);
 }
 

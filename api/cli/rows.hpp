@@ -14,6 +14,7 @@ namespace plchost {
 [[nodiscard]] Row to_row(const plc_TaskStatus& status);
 [[nodiscard]] Row to_row(const plc_EventStatus& status);
 [[nodiscard]] Row to_row(const plc_ObjectStatus& status);
+[[nodiscard]] Row to_row(const plc_ExceptionStatus& status);
 [[nodiscard]] Row to_row(const plc_Transition& transition);
 
 /// What the tables show of them.
@@ -22,7 +23,7 @@ namespace plchost {
 [[nodiscard]] const std::vector<Column>& task_columns();
 [[nodiscard]] const std::vector<Column>& event_columns();
 [[nodiscard]] const std::vector<Column>& object_columns();
-
+[[nodiscard]] const std::vector<Column>& exception_columns();
 [[nodiscard]] const std::vector<Column>& transition_columns();
 
 }  // namespace plchost

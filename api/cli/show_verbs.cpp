@@ -71,10 +71,45 @@ int show_task(CliSession& session, const std::string& name) {
                                        hint(name, names), fmt::join(names, ", "))});
 }
 
+// For people: no field that says nothing, addresses as tools print them.
+std::string format_exception(Row row) {
+  for (const char* field : {"address", "memory_address"}) {
+    const auto address = row[field].get<std::uint64_t>();
+    row[field] = address != 0 ? fmt::format("{:#x}", address) : "";
+  }
+  row.erase("time_unix_ns");
+  Row said;
+  for (const auto& [field, value] : row.items()) {
+    if (!value.is_string() || !value.get_ref<const std::string&>().empty()) said[field] = value;
+  }
+  return format_fields(said);
+}
+
+int show_exception(CliSession& session, const std::string& name) {
+  const auto host = session.target_host();
+  if (!host) return CliSession::fail(host.error());
+  const auto all = session.client().value()->exceptions(*host, session.deadline());
+  if (!all) return CliSession::fail(all.error());
+  std::vector<std::string> names;
+  for (const plc_ExceptionStatus& exception : *all) {
+    names.emplace_back(dds::text_of(exception.instance));
+    if (names.back() != name) continue;
+    const Row row = to_row(exception);
+    if (session.options.json) return show_row(session, row);
+    fmt::print("{}", exception.count > 0 ? format_exception(row)
+                                         : fmt::format("instance '{}' has had no exception\n", name));
+    return kExitDone;
+  }
+  return CliSession::fail({ErrorCode::not_found, 0,
+                           fmt::format("no instance '{}' on host '{}'{}; there are: {}", name, *host,
+                                       hint(name, names), fmt::join(names, ", "))});
+}
+
 }  // namespace
 
 void add_show_verbs(CLI::App& app, CliSession& session, Action& action) {
-  CLI::App* const verb = app.add_subcommand("show", "Show all that is known of one instance or task");
+  CLI::App* const verb =
+      app.add_subcommand("show", "Show all that is known of one instance, its last exception, or one task");
   verb->require_subcommand(1)->fallthrough();
   const auto add = [&](const char* noun, const char* form, const char* text,
                        int (*run)(CliSession&, const std::string&)) {
@@ -85,6 +120,7 @@ void add_show_verbs(CLI::App& app, CliSession& session, Action& action) {
         [&session, &action, name, run] { action = [&session, name, run] { return run(session, *name); }; });
   };
   add("instance", "INSTANCE", "One PLC instance", show_instance);
+  add("exception", "INSTANCE", "The last exception of one PLC instance", show_exception);
   add("task", "INSTANCE/TASK", "One task", show_task);
 }
 

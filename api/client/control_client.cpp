@@ -21,6 +21,9 @@ bool is_engineering(std::int32_t operation) {
 auto order(const plc_InstanceStatus& s) {
   return std::string_view(s.instance);
 }
+auto order(const plc_ExceptionStatus& s) {
+  return std::string_view(s.instance);
+}
 auto order(const plc_TaskStatus& s) {
   return std::tuple(std::string_view(s.instance), s.priority, std::string_view(s.task));
 }
@@ -83,6 +86,7 @@ void ControlClient::update() {
   statistics_.update();
   event_status_.update();
   object_status_.update();
+  exceptions_.update();
   host_findings_.update();
 }
 
@@ -197,6 +201,11 @@ Result<std::vector<TransitionView>> ControlClient::transitions() {
   }
   update();  // or what has come on other topics would keep waits from waiting
   return transition_log_.take();
+}
+
+Result<std::vector<plc_ExceptionStatus>> ControlClient::exceptions(const std::string& host,
+                                                                   TimePoint deadline) {
+  return snapshot(exceptions_, dds::kExceptionStatus, &plc_HostStatus::instance_count, host, deadline);
 }
 
 Result<void> ControlClient::open_own_reader(dds::Entity& topic, dds::Entity& reader,

@@ -61,6 +61,9 @@ class ControlClient {
                                                     std::string_view task, TimePoint deadline);
   [[nodiscard]] Result<std::vector<plc_EventStatus>> events(const std::string& host, TimePoint deadline);
   [[nodiscard]] Result<std::vector<plc_ObjectStatus>> objects(const std::string& host, TimePoint deadline);
+  /// One for each instance; count 0: it never had an exception.
+  [[nodiscard]] Result<std::vector<plc_ExceptionStatus>> exceptions(const std::string& host,
+                                                                    TimePoint deadline);
 
   /// Has the host looked at anew, and returns what each check found, in their order. The code of the failure
   /// is the host's own; timed_out: not complete at the deadline.
@@ -126,6 +129,7 @@ class ControlClient {
   StatisticsCache statistics_;
   StatusCache<plc_EventStatus> event_status_;
   StatusCache<plc_ObjectStatus> object_status_;
+  StatusCache<plc_ExceptionStatus> exceptions_;
   StatusCache<plc_HostFinding> host_findings_;
   std::map<std::string, Seen> seen_;
   TransitionLog transition_log_;

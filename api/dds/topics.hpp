@@ -32,6 +32,7 @@ inline constexpr TopicInfo kTaskStatistics{"plc/v1/status/task_statistics", &plc
 inline constexpr TopicInfo kEventStatus{"plc/v1/status/event", &plc_EventStatus_desc};
 inline constexpr TopicInfo kObjectStatus{"plc/v1/status/object", &plc_ObjectStatus_desc};
 inline constexpr TopicInfo kHostFinding{"plc/v1/status/host_finding", &plc_HostFinding_desc};
+inline constexpr TopicInfo kExceptionStatus{"plc/v1/status/exception", &plc_ExceptionStatus_desc};
 inline constexpr TopicInfo kTransition{"plc/v1/transition", &plc_Transition_desc};
 
 /// The bounds of the readers and histories. A reader that is full makes the writer wait: back-pressure, no

@@ -55,7 +55,8 @@ Result<void> ControlServer::Parts::open(PostLedger ledger) {
   auto made_sessions = SessionTable::create(participant.get());
   if (!made_sessions) return std::unexpected(made_sessions.error());
   sessions = std::move(*made_sessions);
-  auto made_status = StatusPublisher::create(participant.get(), {options.host, &pool, epoch});
+  auto made_status =
+      StatusPublisher::create(participant.get(), {options.host, &pool, epoch, options.run_directory});
   if (!made_status) return std::unexpected(made_status.error());
   status.emplace(std::move(*made_status));
   auto made_transitions = TransitionPublisher::create(participant.get(), {options.host, options.pool, epoch});

@@ -24,15 +24,19 @@ Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const 
   auto events = make(dds::kEventStatus, dds::status_qos());
   auto objects = make(dds::kObjectStatus, dds::status_qos());
   auto findings = make(dds::kHostFinding, dds::status_qos());
+  auto exceptions = make(dds::kExceptionStatus, dds::status_qos());
   auto hosts = make(dds::kHostStatus, dds::status_qos());
   auto presence = make(dds::kPresence, dds::presence_qos());
-  for (auto* made : {&tasks, &statistics, &instances, &events, &objects, &findings, &hosts, &presence}) {
+  for (auto* made :
+       {&tasks, &statistics, &instances, &events, &objects, &findings, &exceptions, &hosts, &presence}) {
     if (!*made) return failure_in("publish status", made->error());
   }
   StatusPublisher publisher(source,
                             TaskWatch(source.pool->name(), source.host, source.epoch,
                                       StatusTable<plc_TaskStatus>(std::move(*tasks)),
-                                      StatisticsWriter(source.host, source.epoch, std::move(*statistics))));
+                                      StatisticsWriter(source.host, source.epoch, std::move(*statistics))),
+                            ExceptionWatch(source.run_directory, source.host, source.epoch,
+                                           StatusTable<plc_ExceptionStatus>(std::move(*exceptions))));
   publisher.instances_ = StatusTable<plc_InstanceStatus>(std::move(*instances));
   publisher.events_ = StatusTable<plc_EventStatus>(std::move(*events));
   publisher.objects_ = StatusTable<plc_ObjectStatus>(std::move(*objects));
@@ -68,6 +72,7 @@ bool StatusPublisher::look_at_instances(TimePoint now) {
   if (!host) return false;
   bool changed = false;
   instances_.begin_round();
+  exceptions_.begin_round();
   std::vector<std::string> names;
   for (std::uint32_t i = 0; i < std::min(host->instance_count, kMaxInstances); ++i) {
     const auto status = page_->instance(i);
@@ -75,6 +80,7 @@ bool StatusPublisher::look_at_instances(TimePoint now) {
     const std::string name(status->name.view());
     names.push_back(name);
     changed |= tasks_.follow(*status, now);
+    changed |= exceptions_.follow(*status, tasks_, now);
     plc_InstanceStatus sample{};
     dds::copy_text(sample.host, source_.host);
     dds::copy_text(sample.instance, name);
@@ -94,6 +100,7 @@ bool StatusPublisher::look_at_instances(TimePoint now) {
         instances_.update(name, sample, runtime ? extension_of(*runtime) : std::vector<plc_KeyValue>());
   }
   changed |= instances_.dispose_rest();
+  changed |= exceptions_.end_round();
   for (const std::string& gone : instance_names_) {
     if (std::ranges::find(names, gone) == names.end()) changed |= tasks_.forget(gone);
   }

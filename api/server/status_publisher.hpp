@@ -10,6 +10,7 @@
 
 #include "api/control/host_finding.hpp"
 #include "api/dds/topics.hpp"
+#include "api/server/exception_watch.hpp"
 #include "api/server/status_table.hpp"
 #include "api/server/task_watch.hpp"
 #include "shm/pool/host_page.hpp"
@@ -25,6 +26,7 @@ class StatusPublisher {
     std::string host;
     const ObjectPool* pool = nullptr;
     std::uint64_t epoch = 0;
+    std::string run_directory;
   };
   [[nodiscard]] static Result<StatusPublisher> create(dds_entity_t participant, const Source& source);
 
@@ -46,7 +48,8 @@ class StatusPublisher {
   static constexpr Duration kObjectPeriod = std::chrono::milliseconds(200);
 
  private:
-  StatusPublisher(Source source, TaskWatch tasks) : source_(std::move(source)), tasks_(std::move(tasks)) {}
+  StatusPublisher(Source source, TaskWatch tasks, ExceptionWatch exceptions)
+      : source_(std::move(source)), tasks_(std::move(tasks)), exceptions_(std::move(exceptions)) {}
   bool look_at_instances(TimePoint now);
   bool look_at_objects(TimePoint now);
   bool update_event(const ObjectInfo& object);
@@ -54,6 +57,7 @@ class StatusPublisher {
 
   Source source_;
   TaskWatch tasks_;
+  ExceptionWatch exceptions_;
   std::optional<HostPageReader> page_;
   std::vector<std::string> instance_names_;
   StatusTable<plc_InstanceStatus> instances_;

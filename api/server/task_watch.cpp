@@ -89,6 +89,17 @@ std::optional<InstanceRuntime> TaskWatch::runtime(const std::string& instance) c
   return found->second.page->runtime();
 }
 
+bool TaskWatch::in_exception(const std::string& instance, std::string_view task) const {
+  const auto found = instances_.find(instance);
+  if (found == instances_.end() || !found->second.page) return false;
+  const InstancePageReader& page = *found->second.page;
+  for (std::uint32_t i = 0; i < page.task_count(); ++i) {
+    const auto seen = page.task(i);
+    if (seen && seen->identity.name.view() == task) return seen->state == PageTaskState::exception;
+  }
+  return false;
+}
+
 void TaskWatch::publish(const std::string& instance, Watched& watched, std::uint32_t index) {
   const auto task = watched.page->task(index);
   if (!task) return;

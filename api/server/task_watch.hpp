@@ -4,6 +4,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <control.h>
@@ -51,6 +52,8 @@ class TaskWatch {
   [[nodiscard]] std::uint32_t size() const noexcept { return table_.size(); }
   /// What the process itself says, if its page is open.
   [[nodiscard]] std::optional<InstanceRuntime> runtime(const std::string& instance) const;
+  /// The process that runs now has this task in exception.
+  [[nodiscard]] bool in_exception(const std::string& instance, std::string_view task) const;
 
  private:
   struct Watched {

@@ -82,12 +82,15 @@ std::string exception_path(std::string_view run_directory, std::string_view inst
 }
 
 Result<ExceptionHistory> read_exceptions(const std::string& path) {
-  std::ifstream file(path, std::ios::binary);
-  if (!file) {
-    std::error_code error;
-    if (!std::filesystem::exists(path, error) && !error) return ExceptionHistory{};
-    return failure(ErrorCode::system, "open " + path, errno);
+  std::error_code ignored;
+  const auto type = std::filesystem::status(path, ignored).type();
+  if (type == std::filesystem::file_type::not_found) return ExceptionHistory{};
+  // What would make the open wait for ever is not opened.
+  if (type != std::filesystem::file_type::regular && type != std::filesystem::file_type::none) {
+    return corrupt(path, "is not a regular file");
   }
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return failure(ErrorCode::system, "open " + path, errno);
   std::string text(kMaxFile + 1, '\0');
   file.read(text.data(), static_cast<std::streamsize>(text.size()));
   text.resize(static_cast<std::size_t>(file.gcount()));

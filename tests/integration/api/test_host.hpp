@@ -42,6 +42,7 @@ class TestHost {
 
   [[nodiscard]] const std::string& name() const { return name_; }
   [[nodiscard]] const std::string& pool_name() const { return pool_name_; }
+  [[nodiscard]] const std::string& run_directory() const { return run_directory_; }
   /// Makes and registers "instance/event".
   PoolEvent add_event(const std::string& instance, const std::string& event);
   void write_instance(std::uint32_t index, const std::string& name, InstanceState state,

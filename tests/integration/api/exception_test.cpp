@@ -1,0 +1,170 @@
+// The last exception of each instance, from its file to plcctl.
+#include <filesystem>
+#include <fstream>
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+
+#include "shm/base/exception_history.hpp"
+#include "tests/integration/api/test_host.hpp"
+
+namespace plchost {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using testing::Not;
+
+class ExceptionOfAnInstance : public testing::Test {
+ protected:
+  ExceptionOfAnInstance() {
+    host_.write_instance(0, "line1", InstanceState::running, 4711);
+    host_.write_instance(1, "line2", InstanceState::running, 4712);
+    host_.write_count(2);
+    host_.start_server();
+  }
+
+  [[nodiscard]] std::string path() const { return exception_path(host_.run_directory(), "line1"); }
+  /// One more in the file of line1, as its process would write it.
+  void add(const std::string& task) {
+    auto history = read_exceptions(path()).value();
+    history.add({.unix_ns = 1'789'000'000'123'456'789,
+                 .application = "/opt/line.so",
+                 .task = task,
+                 .kind = "signal",
+                 .whole_application = true,
+                 .signal = "SIGFPE",
+                 .address = 0x7f0012345678,
+                 .symbol = "divide()+0x12 in line.so",
+                 .text = "integer division by zero"});
+    ASSERT_TRUE(write_exceptions(path(), history));
+  }
+  std::optional<plc_ExceptionStatus> shown(const std::string& instance) {
+    const auto all = client_->exceptions(host_.name(), soon());
+    EXPECT_TRUE(all) << all.error().describe();
+    for (const auto& exception : all.value_or(std::vector<plc_ExceptionStatus>{})) {
+      if (exception.instance == instance) return exception;
+    }
+    return std::nullopt;
+  }
+  [[nodiscard]] bool eventually_shown(std::uint64_t count) {
+    for (const TimePoint end = soon(); MonotonicClock::now() < end;) {
+      if (const auto seen = shown("line1"); seen && seen->count == count) return true;
+      client_->wait_for_change(MonotonicClock::now() + std::chrono::milliseconds(20));
+    }
+    return false;
+  }
+  [[nodiscard]] RunResult run(std::vector<std::string> arguments) const {
+    return run_plcctl(domain_.number(), std::move(arguments));
+  }
+
+  OwnDomain domain_;
+  TestHost host_{domain_, "hosta"};
+  std::unique_ptr<ControlClient> client_ = connect(domain_);
+};
+
+TEST_F(ExceptionOfAnInstance, IsShownWithAllThatIsKnown) {
+  add("Fill");
+  ASSERT_TRUE(eventually_shown(1));
+  const auto seen = shown("line1").value();
+  EXPECT_STREQ(seen.task, "Fill");
+  EXPECT_STREQ(seen.kind, "signal");
+  EXPECT_STREQ(seen.signal, "SIGFPE");
+  EXPECT_STREQ(seen.symbol, "divide()+0x12 in line.so");
+  EXPECT_STREQ(seen.text, "integer division by zero");
+  EXPECT_STREQ(seen.application, "/opt/line.so");
+  EXPECT_EQ(seen.address, 0x7f0012345678U);
+  EXPECT_EQ(seen.time_unix_ns, 1'789'000'000'123'456'789);
+  EXPECT_TRUE(seen.whole_application);
+  EXPECT_EQ(shown("line2")->count, 0U);
+  add("Label");
+  ASSERT_TRUE(eventually_shown(2));
+  EXPECT_STREQ(shown("line1")->task, "Label");
+}
+
+TEST_F(ExceptionOfAnInstance, IsPresentUntilTheProcessIsReplaced) {
+  auto page = host_.make_page("line1", "Fill", 4711);
+  page.task(0).state.store(static_cast<std::uint32_t>(PageTaskState::exception));
+  add("Fill");
+  const auto becomes = [&](bool present) {
+    for (const TimePoint end = soon(); MonotonicClock::now() < end;) {
+      if (const auto seen = shown("line1"); seen && seen->count == 1 && seen->present == present) return true;
+      client_->wait_for_change(MonotonicClock::now() + std::chrono::milliseconds(20));
+    }
+    return false;
+  };
+  EXPECT_TRUE(becomes(true));
+  page = host_.make_page("line1", "Fill", 4713);
+  host_.write_instance(0, "line1", InstanceState::stopped, 4713);
+  EXPECT_TRUE(becomes(false));
+}
+
+TEST_F(ExceptionOfAnInstance, OutlivesAFileThatIsNone) {
+  add("Fill");
+  ASSERT_TRUE(eventually_shown(1));
+  std::ofstream(path()) << "{\"version\": 1, \"count\": \"many\"";
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  EXPECT_EQ(shown("line1")->count, 1U);
+  std::filesystem::remove(path());
+  std::filesystem::create_directory(path());
+  std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  EXPECT_EQ(shown("line1")->count, 1U);
+  std::filesystem::remove(path());
+  add("Label");
+  add("Label");
+  EXPECT_TRUE(eventually_shown(2));
+}
+
+TEST_F(ExceptionOfAnInstance, IsGoneWithTheInstanceAndBackWithIt) {
+  add("Fill");
+  ASSERT_TRUE(eventually_shown(1));
+  host_.write_instance(0, "line2", InstanceState::running, 4712);
+  host_.write_count(1);
+  const auto awaited = [&](bool there) {
+    for (const TimePoint end = soon(); MonotonicClock::now() < end;) {
+      if (shown("line1").has_value() == there) return true;
+      client_->wait_for_change(MonotonicClock::now() + std::chrono::milliseconds(20));
+    }
+    return false;
+  };
+  EXPECT_TRUE(awaited(false));
+  EXPECT_TRUE(shown("line2"));
+  host_.write_instance(1, "line1", InstanceState::running, 4711);
+  host_.write_count(2);
+  EXPECT_TRUE(awaited(true));
+  EXPECT_EQ(shown("line1")->count, 1U);
+}
+
+TEST_F(ExceptionOfAnInstance, IsToldByPlcctl) {
+  add("Fill");
+  ASSERT_TRUE(eventually_shown(1));
+  const auto text = run({"show", "exception", "line1"});
+  EXPECT_EQ(text.code, 0) << text.errors;
+  EXPECT_THAT(text.output, AllOf(HasSubstr("Fill"), HasSubstr("SIGFPE"), HasSubstr("0x7f0012345678"),
+                                 HasSubstr("divide()+0x12"), HasSubstr("2026-09-10T"), HasSubstr(".123Z")));
+  EXPECT_THAT(text.output, Not(HasSubstr("memory_address"))) << "nothing is known of it";
+  const auto json = nlohmann::json::parse(run({"show", "exception", "line1", "--json"}).output);
+  ASSERT_EQ(json.size(), 1U);
+  EXPECT_EQ(json[0]["count"], 1);
+  EXPECT_EQ(json[0]["address"], 0x7f0012345678);
+  EXPECT_EQ(json[0]["time_unix_ns"], 1'789'000'000'123'456'789);
+  EXPECT_EQ(json[0]["stopped"], "application");
+  const auto list = nlohmann::json::parse(run({"list", "exceptions", "--json"}).output);
+  ASSERT_EQ(list.size(), 1U) << "line2 never had any";
+  EXPECT_EQ(list[0]["instance"], "line1");
+  EXPECT_THAT(run({"list", "exceptions"}).output, HasSubstr("integer division by zero"));
+}
+
+TEST_F(ExceptionOfAnInstance, ThatNeverWasIsNoErrorButAnUnknownInstanceIs) {
+  const auto none = run({"show", "exception", "line2"});
+  EXPECT_EQ(none.code, 0);
+  EXPECT_EQ(none.output, "instance 'line2' has had no exception\n");
+  const auto json = nlohmann::json::parse(run({"show", "exception", "line2", "--json"}).output);
+  EXPECT_EQ(json[0]["count"], 0);
+  const auto unknown = run({"show", "exception", "line3"});
+  EXPECT_EQ(unknown.code, 1);
+  EXPECT_THAT(unknown.errors, AllOf(HasSubstr("no instance 'line3'"), HasSubstr("line1, line2")));
+}
+
+}  // namespace
+}  // namespace plchost

@@ -1,0 +1,129 @@
+#include "schedulers/supervision.hpp"
+
+#include <csignal>
+
+#include <gtest/gtest.h>
+
+#include "tests/support/manual_clock.hpp"
+
+namespace plchost {
+namespace {
+
+using std::chrono::milliseconds;
+
+// What a watchdog strikes with is blocked in this thread, as an application's code could block it: so nothing
+// but the record tells of the strike, and the test goes on.
+class SupervisionTest : public testing::Test {
+ protected:
+  SupervisionTest() {
+    ::sigemptyset(&strike_);
+    ::sigaddset(&strike_, SIGRTMAX - 1);
+    ::pthread_sigmask(SIG_BLOCK, &strike_, &before_);
+    TaskConfig config;
+    config.name = "main";
+    config.interval = milliseconds(10);
+    config.watchdog.omitted_cycles = 3;
+    config.entry = [] {};
+    tasks_.push_back(std::make_unique<Task>(clock_, std::move(config), statistics_, nullptr, &board_));
+    task_ = tasks_.back().get();
+    settings_.watchdog.default_time = milliseconds(40);
+    settings_.watchdog.omitted_cycles = true;
+    sut_.emplace(clock_, tasks_, poller_);
+  }
+  ~SupervisionTest() override {
+    const timespec at_once{};
+    while (::sigtimedwait(&strike_, nullptr, &at_once) > 0) continue;
+    ::pthread_sigmask(SIG_SETMASK, &before_, nullptr);
+  }
+
+  void begin() {
+    task_->begin(clock_.now());
+    sut_->begin(settings_, 1);
+  }
+  TimePoint look() { return sut_->look(clock_.now()); }
+  [[nodiscard]] bool is_struck() const {
+    sigset_t pending;
+    ::sigpending(&pending);
+    return ::sigismember(&pending, SIGRTMAX - 1) == 1;
+  }
+
+  sigset_t strike_{};
+  sigset_t before_{};
+  ManualClock clock_;
+  TaskStatistics statistics_{};
+  FaultBoard board_;
+  std::vector<std::unique_ptr<Task>> tasks_;
+  Task* task_ = nullptr;
+  FaultTrap poller_;
+  SchedulerSettings settings_;
+  std::optional<Supervision> sut_;
+};
+
+TEST_F(SupervisionTest, StrikesACycleOnceItIsLongerThanItsLimitAndNotBefore) {
+  begin();
+  const TimePoint start = clock_.now();
+  task_->trap().arm(task_->fault(), start);
+  clock_.run_until(start + milliseconds(40));
+  EXPECT_EQ(look(), start + milliseconds(40) + Duration(1)) << "a cycle may last as long as its limit";
+  EXPECT_FALSE(is_struck());
+  clock_.run_until(start + milliseconds(40) + Duration(1));
+  EXPECT_EQ(look(), clock_.now() + Supervision::kPatience);
+  EXPECT_TRUE(is_struck());
+  EXPECT_FALSE(task_->fault().raised()) << "the thread that was struck raises it";
+  task_->trap().disarm();
+}
+
+TEST_F(SupervisionTest, RaisesTheFaultItselfOfACycleThatNoStrikeReaches) {
+  begin();
+  const TimePoint start = clock_.now();
+  task_->trap().arm(task_->fault(), start);
+  clock_.run_until(start + milliseconds(50));
+  const TimePoint again = look();
+  clock_.run_until(again - Duration(1));
+  EXPECT_EQ(look(), again);
+  EXPECT_EQ(task_->fault().published(), nullptr);
+  clock_.run_until(again);
+  (void)look();
+  const FaultRecord* const record = task_->fault().published();
+  ASSERT_NE(record, nullptr);
+  EXPECT_EQ(record->kind, FaultKind::task_watchdog);
+  EXPECT_EQ(Duration(record->figure), milliseconds(50));
+  EXPECT_EQ(Duration(record->limit), milliseconds(40));
+  EXPECT_TRUE(board_.halted()) << "the whole application stops";
+  task_->trap().disarm();
+}
+
+TEST_F(SupervisionTest, LooksAgainWhenACycleThatBeganAtTheNextReleaseWouldBeTooLong) {
+  settings_.watchdog.omitted_cycles = false;
+  begin();
+  const auto due = task_->due();
+  ASSERT_TRUE(due);
+  EXPECT_EQ(look(), *due + milliseconds(40));
+  sut_->end();
+}
+
+TEST_F(SupervisionTest, CountsNoOmittedCycleInTheGraceAfterTheStart) {
+  begin();
+  const TimePoint start = clock_.now();
+  clock_.run_until(start + Supervision::kGrace + milliseconds(30) - Duration(1));
+  (void)look();
+  EXPECT_FALSE(task_->fault().raised());
+  clock_.run_until(start + Supervision::kGrace + milliseconds(30));
+  (void)look();
+  const FaultRecord* const record = task_->fault().published();
+  ASSERT_NE(record, nullptr);
+  EXPECT_EQ(record->kind, FaultKind::omitted_cycles);
+  EXPECT_EQ(record->limit, 3);
+  EXPECT_GE(record->figure, record->limit);
+}
+
+TEST_F(SupervisionTest, CountsNoOmittedCycleWhileTheTasksStop) {
+  begin();
+  sut_->tasks_stop();
+  clock_.run_for(Supervision::kGrace * 10);
+  (void)look();
+  EXPECT_FALSE(task_->fault().raised());
+}
+
+}  // namespace
+}  // namespace plchost
