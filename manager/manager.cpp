@@ -234,11 +234,13 @@ void Manager::clean_up() {
     InstancePage::remove(config_.host.pool, instance.name);
     TransitionRing::remove(config_.host.pool, instance.name);
   }
-  // Whatever is named after an instance of ours: its socket, what it kept for its next process.
+  // Whatever is named after an instance of ours: its socket, what it kept for its next process. Its
+  // exceptions outlive the manager: that they are still known tomorrow is what they are kept for.
   std::error_code error;
   for (std::filesystem::directory_iterator at(config_.host.run_directory, error), end; !error && at != end;
        at.increment(error)) {
-    if (is_ours(config_, at->path())) ::unlink(at->path().c_str());
+    const bool kept = at->path().extension() == ".exception";
+    if (!kept && is_ours(config_, at->path())) ::unlink(at->path().c_str());
   }
   ::unlink(manager_socket_path(config_.host.run_directory).c_str());
   MemoryFile::remove(host_page_name(config_.host.pool));

@@ -1,5 +1,6 @@
 // What an Instance does when one of its tasks has a fault.
 
+#include <csignal>
 #include <utility>
 
 #include <fmt/format.h>
@@ -14,6 +15,8 @@ namespace {
 
 ExceptionEntry entry_of(const TaskSet::Fault& fault, const std::string& application) {
   const FaultRecord& record = fault.record;
+  // Other signals give the address of the instruction once more.
+  const bool of_memory = record.signal == SIGSEGV || record.signal == SIGBUS;
   ExceptionEntry entry{.unix_ns = record.unix_ns,
                        .application = application,
                        .task = fault.name,
@@ -22,7 +25,7 @@ ExceptionEntry entry_of(const TaskSet::Fault& fault, const std::string& applicat
                        .signal = record.signal != 0 ? signal_name(record.signal) : std::string(),
                        .address = record.address,
                        .symbol = symbol_name(record.address),
-                       .memory_address = record.memory_address,
+                       .memory_address = of_memory ? record.memory_address : 0,
                        .text = describe_fault(record)};
   if (entry.symbol.empty() && record.caller != 0) {
     entry.symbol = fmt::format("no code; called from {}", symbol_name(record.caller));

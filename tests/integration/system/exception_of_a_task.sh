@@ -45,7 +45,7 @@ for number in 1 2 3; do
   plcctl post event line1/divide >/dev/null
   until_true 20 has line1 count "$number"
   until_true 20 has line1 present true
-  has line1 task Divide && has line1 signal SIGFPE && has line1 kind signal || fail "$(plcctl show exception line1)"
+  has line1 memory_address 0 && has line1 task Divide && has line1 signal SIGFPE && has line1 kind signal || fail "$(plcctl show exception line1)"
   exception line1 symbol | grep -qF 'divide()+0x' || fail "$(plcctl show exception line1)"
   until_true 20 task_is line1/Divide exception
   until_true 20 task_is line1/Fast stopped
