@@ -124,25 +124,29 @@ TEST_P(OverlappingReleases, AtTheSameTimeDelayTheLowerPriorityAndItsLatencyShows
 TEST_P(OverlappingReleases, DuringACycleOfHigherPriorityWaitForItsEndAndTheirLatencyShowsIt) {
   if (!run({.high_offset = {},
             .low_offset = milliseconds(1),
-            .high_takes = microseconds(1800),
+            .high_takes = microseconds(1400),
             .low_takes = {}})) {
     GTEST_SKIP() << "SCHED_FIFO is not allowed";
   }
-  EXPECT_GE(usual_least(low.latency), microseconds(700));
+  EXPECT_GE(usual_least(low.latency), microseconds(300));
 }
 
 TEST_P(OverlappingReleases, OfHigherPriorityPreEmptACycleAndItsExecutionTimeShowsIt) {
+  // Little enough that another of these tests finds room on the same core.
   if (!run({.high_offset = milliseconds(1),
             .low_offset = {},
-            .high_takes = microseconds(1000),
-            .low_takes = microseconds(2000)})) {
+            .high_takes = microseconds(400),
+            .low_takes = microseconds(1400)})) {
     GTEST_SKIP() << "SCHED_FIFO is not allowed";
   }
-  // The lower one takes 2 ms of processor time; the 1 ms of the other came in between, unless the start was
-  // late.
-  ASSERT_GE(low.execution.size(), 20U);
-  std::ranges::sort(low.execution);
-  EXPECT_GE(Duration(low.execution[low.execution.size() * 3 / 4]), microseconds(2900));
+  // The time of the other came in between, where the lower one had begun before it.
+  std::vector<std::int64_t> pre_empted;
+  for (std::size_t i = 0; i < low.latency.size(); ++i) {
+    if (Duration(low.latency[i]) < microseconds(900)) pre_empted.push_back(low.execution[i]);
+  }
+  if (pre_empted.empty()) GTEST_SKIP() << "others had the core each time";
+  std::ranges::sort(pre_empted);
+  EXPECT_GE(Duration(pre_empted[pre_empted.size() / 4]), microseconds(1750));
 }
 
 INSTANTIATE_TEST_SUITE_P(Each, OverlappingReleases, testing::ValuesIn(every_scheduler()),
