@@ -112,8 +112,11 @@ struct BareBurst {
 
   void run_task(std::size_t index, std::vector<Execution>& line) noexcept {
     auto& word = words[one_word ? 0 : index];
-    for (std::uint32_t seen = 0;; seen = word.load(std::memory_order_relaxed)) {
-      while (word.load(std::memory_order_acquire) == seen) wait_private(word, seen);
+    std::uint32_t seen = 0;
+    for (;;) {
+      std::uint32_t now = 0;
+      while ((now = word.load(std::memory_order_acquire)) == seen) wait_private(word, seen);
+      seen = now;  // what comes from here on is not slept through
       if (stopping.load()) return;
       const TimePoint start = MonotonicClock::now();
       work(kWork);
