@@ -151,8 +151,8 @@ class TaskSet {
 
   struct Stop {
     StopLimits limits;
-    bool others = false;  // the second phase
-    TimePoint deadline;   // of the phase
+    bool others;         // the second phase; no initializer: clang would not let an optional have it
+    TimePoint deadline;  // of the phase
     std::vector<std::size_t> stuck;
   };
 

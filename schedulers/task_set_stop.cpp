@@ -14,9 +14,8 @@ namespace plchost {
 Result<void> TaskSet::begin_stop(const StopLimits& limits) {
   if (!running_) return failure(ErrorCode::wrong_state, "the tasks are not running");
   if (stop_) return failure(ErrorCode::wrong_state, "the tasks are being stopped already");
-  stop_.emplace();
-  stop_->limits = limits;
-  stop_->deadline = MonotonicClock::now() + limits.outputs;
+  stop_ = Stop{
+      .limits = limits, .others = false, .deadline = MonotonicClock::now() + limits.outputs, .stuck = {}};
   // From now on releases are missed on purpose; cycles that run are watched on.
   if (supervision_) supervision_->tasks_stop();
   for (std::size_t i = 0; i < threads_.size(); ++i) {
