@@ -5,6 +5,7 @@
 #include <random>
 
 #include "schedulers/distributed_clock/reference_source.hpp"
+#include "shm/base/seqlock.hpp"
 
 namespace plchost {
 
@@ -47,20 +48,21 @@ class SimulatedReference {
   std::mt19937_64 random_;
 };
 
-/// A record that a test fills.
+/// A record that a test fills, from one thread; the tasks that follow it read it from theirs.
 class FakeRecord final : public ReferenceSource {
  public:
-  void write(const ReferencePair& pair) {
-    reading_ = {.outcome = Outcome::pair, .pair = pair, .updates = reading_.updates + 1};
-  }
-  void write_invalid() {
-    reading_ = {.outcome = Outcome::invalid, .pair = {}, .updates = reading_.updates + 1};
-  }
-  void corrupt() { reading_.outcome = Outcome::corrupt; }
-  [[nodiscard]] Reading read() noexcept override { return reading_; }
+  void write(const ReferencePair& pair) { publish(Outcome::pair, pair); }
+  void write_invalid() { publish(Outcome::invalid, {}); }
+  void corrupt() { reading_.write({.outcome = Outcome::corrupt, .pair = {}, .updates = updates_}); }
+  [[nodiscard]] Reading read() noexcept override { return reading_.read().value_or(Reading{}); }
 
  private:
-  Reading reading_;
+  void publish(Outcome outcome, const ReferencePair& pair) {
+    reading_.write({.outcome = outcome, .pair = pair, .updates = ++updates_});
+  }
+
+  Seqlock<Reading> reading_;
+  std::uint64_t updates_ = 0;
 };
 
 }  // namespace plchost
