@@ -83,4 +83,11 @@ std::string hint(std::string_view unknown, const std::vector<std::string>& known
   return near.empty() || near == unknown ? "" : fmt::format(" (did you mean '{}'?)", near);
 }
 
+std::unexpected<Error> unknown_name(std::string_view what, std::string_view name,
+                                    const std::vector<std::string>& known, std::string_view host) {
+  const std::string where = host.empty() ? "" : fmt::format(" on host '{}'", host);
+  return failure(ErrorCode::not_found, fmt::format("no {} '{}'{}{}; there are: {}", what, name, where,
+                                                   hint(name, known), fmt::join(known, ", ")));
+}
+
 }  // namespace plchost

@@ -60,6 +60,10 @@ class CliSession {
   std::unique_ptr<ControlClient> client_;
 };
 
+/// One of the functions of ControlClient that give all samples of a topic of one host.
+template <class Sample>
+using Snapshot = Result<std::vector<Sample>> (ControlClient::*)(const std::string&, TimePoint);
+
 /// A verb sets this when it was chosen; main runs it after all options are read.
 using Action = std::function<int()>;
 
@@ -76,5 +80,11 @@ void add_watch_verb(CLI::App& app, CliSession& session, Action& action);
 
 /// " (did you mean 'x'?)", or nothing if no name is near.
 [[nodiscard]] std::string hint(std::string_view unknown, const std::vector<std::string>& known);
+
+/// not_found, for a name that is none of `known`: "no instance 'x' on host 'h' (did you mean 'y'?); there
+/// are: y, z". No host: it was looked for on all.
+[[nodiscard]] std::unexpected<Error> unknown_name(std::string_view what, std::string_view name,
+                                                  const std::vector<std::string>& known,
+                                                  std::string_view host = {});
 
 }  // namespace plchost

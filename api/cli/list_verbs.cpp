@@ -29,10 +29,13 @@ int list_tasks(CliSession& session, const std::string& instance) {
 }
 
 template <class Sample>
-using Snapshot = Result<std::vector<Sample>> (ControlClient::*)(const std::string&, TimePoint);
+bool always(const Sample& /*sample*/) {
+  return true;
+}
 
 template <class Sample>
-int list(CliSession& session, Snapshot<Sample> snapshot, const std::vector<Column>& columns) {
+int list(CliSession& session, Snapshot<Sample> snapshot, const std::vector<Column>& columns,
+         bool (*is_shown)(const Sample&) = always<Sample>) {
   const auto hosts = session.shown_hosts();
   if (!hosts) return CliSession::fail(hosts.error());
   const auto client = session.client();
@@ -41,26 +44,17 @@ int list(CliSession& session, Snapshot<Sample> snapshot, const std::vector<Colum
   for (const HostView& host : *hosts) {
     const auto samples = ((*client)->*snapshot)(host.name, session.deadline());
     if (!samples) return CliSession::fail(samples.error());
-    for (const Sample& sample : *samples) rows.push_back(to_row(sample));
+    for (const Sample& sample : *samples) {
+      if (is_shown(sample)) rows.push_back(to_row(sample));
+    }
   }
   session.show(rows, columns);
   return kExitDone;
 }
 
 // Instances that never had one have nothing to show.
-int list_exceptions(CliSession& session) {
-  const auto hosts = session.shown_hosts();
-  if (!hosts) return CliSession::fail(hosts.error());
-  std::vector<Row> rows;
-  for (const HostView& host : *hosts) {
-    const auto all = session.client().value()->exceptions(host.name, session.deadline());
-    if (!all) return CliSession::fail(all.error());
-    for (const plc_ExceptionStatus& exception : *all) {
-      if (exception.count > 0) rows.push_back(to_row(exception));
-    }
-  }
-  session.show(rows, exception_columns());
-  return kExitDone;
+bool has_happened(const plc_ExceptionStatus& exception) {
+  return exception.count > 0;
 }
 
 }  // namespace
@@ -86,7 +80,7 @@ void add_list_verbs(CLI::App& app, CliSession& session, Action& action) {
   add("objects", "All objects of the global pool",
       [&session] { return list(session, &ControlClient::objects, object_columns()); });
   add("exceptions", "The last exception of each instance that had any",
-      [&session] { return list_exceptions(session); });
+      [&session] { return list(session, &ControlClient::exceptions, exception_columns(), has_happened); });
   add_list_transitions(*verb, session, action);
 }
 

@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <memory>
 
 #include <CLI/CLI.hpp>
@@ -19,22 +18,37 @@ int show_row(const CliSession& session, const Row& row) {
   return kExitDone;
 }
 
-int show_instance(CliSession& session, const std::string& name) {
-  const auto host = session.target_host();
-  if (!host) return CliSession::fail(host.error());
-  const auto all = session.client().value()->instances(*host, session.deadline());
-  if (!all) return CliSession::fail(all.error());
-  std::vector<std::string> names;
-  for (const auto& instance : *all) {
-    if (dds::text_of(instance.instance) == name) return show_row(session, to_row(instance));
-    names.emplace_back(dds::text_of(instance.instance));
-  }
-  return CliSession::fail({ErrorCode::not_found, 0,
-                           fmt::format("no instance '{}' on host '{}'{}; there are: {}", name, *host,
-                                       hint(name, names), fmt::join(names, ", "))});
+template <class Sample>
+std::string name_of(const Sample& sample) {
+  return std::string(dds::text_of(sample.instance));
+}
+std::string name_of(const plc_TaskStatus& task) {
+  return fmt::format("{}/{}", task.instance, task.task);
 }
 
-int show_statistics(CliSession& session, const std::string& host, const plc_TaskStatus& task) {
+/// The sample of that name, of the host that is meant. not_found: lists the names that there are.
+template <class Sample>
+Result<Sample> find(CliSession& session, Snapshot<Sample> snapshot, std::string_view what,
+                    const std::string& name) {
+  const auto host = session.target_host();
+  if (!host) return std::unexpected(host.error());
+  const auto all = (session.client().value()->*snapshot)(*host, session.deadline());
+  if (!all) return std::unexpected(all.error());
+  std::vector<std::string> names;
+  for (const Sample& sample : *all) {
+    names.push_back(name_of(sample));
+    if (names.back() == name) return sample;
+  }
+  return unknown_name(what, name, names, *host);
+}
+
+int show_instance(CliSession& session, const std::string& name) {
+  const auto instance = find(session, &ControlClient::instances, "instance", name);
+  return instance ? show_row(session, to_row(*instance)) : CliSession::fail(instance.error());
+}
+
+int show_statistics(CliSession& session, const plc_TaskStatus& task) {
+  const std::string host(dds::text_of(task.host));
   const auto report = session.client().value()->statistics(host, dds::text_of(task.instance),
                                                            dds::text_of(task.task), session.deadline());
   if (!report) return CliSession::fail(report.error());
@@ -56,19 +70,8 @@ int show_statistics(CliSession& session, const std::string& host, const plc_Task
 int show_task(CliSession& session, const std::string& name) {
   const auto parts = split_name("TASK", name);
   if (!parts) return CliSession::fail(parts.error());
-  const auto host = session.target_host();
-  if (!host) return CliSession::fail(host.error());
-  const auto all = session.client().value()->tasks(*host, session.deadline());
-  if (!all) return CliSession::fail(all.error());
-  std::vector<std::string> names;
-  for (const auto& task : *all) {
-    const std::string known = fmt::format("{}/{}", task.instance, task.task);
-    if (known == name) return show_statistics(session, *host, task);
-    names.push_back(known);
-  }
-  return CliSession::fail({ErrorCode::not_found, 0,
-                           fmt::format("no task '{}' on host '{}'{}; there are: {}", name, *host,
-                                       hint(name, names), fmt::join(names, ", "))});
+  const auto task = find(session, &ControlClient::tasks, "task", name);
+  return task ? show_statistics(session, *task) : CliSession::fail(task.error());
 }
 
 // For people: no field that says nothing, addresses as tools print them.
@@ -86,23 +89,13 @@ std::string format_exception(Row row) {
 }
 
 int show_exception(CliSession& session, const std::string& name) {
-  const auto host = session.target_host();
-  if (!host) return CliSession::fail(host.error());
-  const auto all = session.client().value()->exceptions(*host, session.deadline());
-  if (!all) return CliSession::fail(all.error());
-  std::vector<std::string> names;
-  for (const plc_ExceptionStatus& exception : *all) {
-    names.emplace_back(dds::text_of(exception.instance));
-    if (names.back() != name) continue;
-    const Row row = to_row(exception);
-    if (session.options.json) return show_row(session, row);
-    fmt::print("{}", exception.count > 0 ? format_exception(row)
-                                         : fmt::format("instance '{}' has had no exception\n", name));
-    return kExitDone;
-  }
-  return CliSession::fail({ErrorCode::not_found, 0,
-                           fmt::format("no instance '{}' on host '{}'{}; there are: {}", name, *host,
-                                       hint(name, names), fmt::join(names, ", "))});
+  const auto exception = find(session, &ControlClient::exceptions, "instance", name);
+  if (!exception) return CliSession::fail(exception.error());
+  const Row row = to_row(*exception);
+  if (session.options.json) return show_row(session, row);
+  fmt::print("{}", exception->count > 0 ? format_exception(row)
+                                        : fmt::format("instance '{}' has had no exception\n", name));
+  return kExitDone;
 }
 
 }  // namespace

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 
-#include <fmt/format.h>
-
 #include "api/cli/rows.hpp"
 #include "api/dds/text.hpp"
 
@@ -27,8 +25,7 @@ Result<std::vector<Row>> task_rows(CliSession& session, const std::string& insta
     for (const auto& known : *instances) names.emplace_back(dds::text_of(known.instance));
   }
   if (instance.empty() || std::ranges::find(names, instance) != names.end()) return rows;
-  return failure(ErrorCode::not_found, fmt::format("no instance '{}'{}; there are: {}", instance,
-                                                   hint(instance, names), fmt::join(names, ", ")));
+  return unknown_name("instance", instance, names);
 }
 
 }  // namespace plchost
