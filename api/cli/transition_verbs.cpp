@@ -1,14 +1,13 @@
 #include "api/cli/transition_verbs.hpp"
 
 #include <algorithm>
-#include <atomic>
-#include <csignal>
 #include <memory>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "api/cli/cli_session.hpp"
+#include "api/cli/interrupt.hpp"
 #include "api/cli/rows.hpp"
 #include "api/dds/text.hpp"
 
@@ -20,11 +19,6 @@ struct TransitionArguments {
   std::string instance;
   std::uint64_t count = 0;  // watch: 0 is until Ctrl-C
 };
-
-std::atomic<bool>& interrupted() {
-  static std::atomic<bool> flag{false};
-  return flag;
-}
 
 bool is_wanted(const CliSession& session, const TransitionArguments& arguments,
                const plc_Transition& transition) {
@@ -69,10 +63,7 @@ void print(const CliSession& session, const TransitionView& view) {
 }
 
 int watch_transitions(CliSession& session, const TransitionArguments& arguments) {
-  struct sigaction action{};
-  action.sa_handler = [](int /*signal*/) { interrupted().store(true); };
-  ::sigaction(SIGINT, &action, nullptr);
-  ::sigaction(SIGTERM, &action, nullptr);
+  catch_interrupts();
   const auto hosts = session.shown_hosts();
   if (!hosts) return CliSession::fail(hosts.error());
   ControlClient& client = *session.client().value();
@@ -86,8 +77,7 @@ int watch_transitions(CliSession& session, const TransitionArguments& arguments)
       std::fflush(stdout);
       if (++shown == arguments.count) return kExitDone;
     }
-    constexpr Duration kSlice = std::chrono::milliseconds(50);  // so that Ctrl-C ends it at once
-    client.wait_for_change(MonotonicClock::now() + kSlice);
+    client.wait_for_change(MonotonicClock::now() + kInterruptLook);
   }
   return kExitDone;
 }

@@ -1,14 +1,12 @@
 #include <algorithm>
-#include <atomic>
-#include <csignal>
 #include <memory>
 
 #include <CLI/CLI.hpp>
-#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
 #include "api/cli/cli_session.hpp"
+#include "api/cli/interrupt.hpp"
 #include "api/cli/rows.hpp"
 #include "api/cli/task_rows.hpp"
 #include "api/cli/transition_verbs.hpp"
@@ -23,15 +21,6 @@ struct WatchArguments {
   std::uint64_t count = 0;  // 0: until Ctrl-C
 };
 
-std::atomic<bool>& interrupted() {
-  static std::atomic<bool> flag{false};
-  return flag;
-}
-
-void on_interrupt(int /*signal*/) {
-  interrupted().store(true);
-}
-
 void print_block(const CliSession& session, const std::vector<Row>& rows, bool first) {
   if (session.options.json) return session.show(rows, task_columns());
   if (::isatty(STDOUT_FILENO) != 0) {
@@ -43,19 +32,15 @@ void print_block(const CliSession& session, const std::vector<Row>& rows, bool f
 }
 
 int watch(CliSession& session, const WatchArguments& arguments) {
-  struct sigaction action{};
-  action.sa_handler = on_interrupt;
-  ::sigaction(SIGINT, &action, nullptr);
-  ::sigaction(SIGTERM, &action, nullptr);
+  catch_interrupts();
   const auto interval =
       std::chrono::duration_cast<Duration>(std::chrono::duration<double>(arguments.interval_s));
   TimePoint next = MonotonicClock::now();
   for (std::uint64_t i = 0; !interrupted() && (arguments.count == 0 || i < arguments.count); ++i) {
     if (i > 0) {
       while (!interrupted() && MonotonicClock::now() < next) {
-        constexpr Duration kSlice = std::chrono::milliseconds(50);  // so that Ctrl-C ends it at once
         const timespec slice =
-            to_timespec(std::clamp(next - MonotonicClock::now(), Duration::zero(), kSlice));
+            to_timespec(std::clamp(next - MonotonicClock::now(), Duration::zero(), kInterruptLook));
         ::nanosleep(&slice, nullptr);
       }
       if (interrupted()) break;
