@@ -1,9 +1,10 @@
 #include "api/cli/rows.hpp"
 
 #include <array>
-#include <chrono>
 #include <cstdint>
+#include <ctime>
 #include <span>
+#include <string_view>
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
@@ -38,6 +39,7 @@ std::string name_of(std::span<const std::string_view> names, std::uint32_t numbe
 double to_us(std::int64_t nanoseconds) {
   return static_cast<double>(nanoseconds) / 1000.0;
 }
+
 // What the host tells beyond the fields that this program knows. A name that is taken stays what it is.
 void add_extension(Row& row, const dds_sequence_plc_KeyValue& entries) {
   for (const plc_KeyValue& entry : std::span(entries._buffer, entries._length)) {
@@ -51,6 +53,13 @@ std::int64_t to_seconds(std::int64_t nanoseconds) {
 }
 
 }  // namespace
+
+std::string time_text(std::int64_t unix_ns) {
+  if (unix_ns <= 0) return {};
+  constexpr std::int64_t kPerMillisecond = 1'000'000;
+  const auto seconds = static_cast<std::time_t>(to_seconds(unix_ns));
+  return fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z", fmt::gmtime(seconds), unix_ns / kPerMillisecond % 1000);
+}
 
 Row to_row(const HostView& host) {
   return {{"host", host.name},
@@ -118,10 +127,8 @@ Row to_row(const plc_Transition& transition) {
   const bool process = transition.source != 0;
   const std::span<const std::string_view> names =
       process ? std::span<const std::string_view>(kInstanceStates) : kApplicationStates;
-  const std::chrono::sys_time<std::chrono::milliseconds> time(
-      std::chrono::milliseconds(transition.time_unix_ns / 1'000'000));
   return {{"host", text_of(transition.host)},          {"instance", text_of(transition.instance)},
-          {"sequence", transition.sequence_number},    {"time", fmt::format("{:%Y-%m-%d %H:%M:%S}Z", time)},
+          {"sequence", transition.sequence_number},    {"time", time_text(transition.time_unix_ns)},
           {"of", process ? "process" : "application"}, {"from", name_of(names, transition.from_state)},
           {"to", name_of(names, transition.to_state)}, {"pid", transition.pid},
           {"time_unix_ns", transition.time_unix_ns},   {"time_monotonic_ns", transition.time_monotonic_ns},

@@ -1,6 +1,7 @@
 #pragma once
 
-#include <string_view>
+#include <cstdint>
+#include <string>
 #include <vector>
 
 #include "api/cli/table.hpp"
@@ -16,6 +17,10 @@ namespace plchost {
 [[nodiscard]] Row to_row(const plc_ObjectStatus& status);
 [[nodiscard]] Row to_row(const plc_ExceptionStatus& status);
 [[nodiscard]] Row to_row(const plc_Transition& transition);
+
+/// A time of a host in these rows, ISO 8601, UTC, to the millisecond: "2026-11-21T10:48:59.502Z". Empty for
+/// none (0).
+[[nodiscard]] std::string time_text(std::int64_t unix_ns);
 
 /// What the tables show of them.
 [[nodiscard]] const std::vector<Column>& host_columns();

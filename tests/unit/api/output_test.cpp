@@ -45,6 +45,12 @@ TEST(Rows, GiveDurationsInMicroseconds) {
   EXPECT_EQ(row["state"], "9") << "what a newer host may say is shown as its number";
 }
 
+TEST(Rows, GiveTimesInUtcToTheMillisecond) {
+  EXPECT_EQ(time_text(1'789'000'000'123'987'654), "2026-09-10T00:26:40.123Z");
+  EXPECT_EQ(time_text(1'789'000'000'000'000'000), "2026-09-10T00:26:40.000Z");
+  EXPECT_EQ(time_text(0), "") << "it has not happened";
+}
+
 TEST(SplitName, SplitsAtTheFirstSlash) {
   EXPECT_EQ(split_name("TASK", "a/b/c").value(), (std::pair<std::string, std::string>("a", "b/c")));
   for (const char* wrong : {"", "a", "/a", "a/"}) EXPECT_FALSE(split_name("TASK", wrong)) << wrong;
