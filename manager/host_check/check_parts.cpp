@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 
 #include "manager/host_check/checks.hpp"
-#include "manager/host_check/cpu_list.hpp"
+#include "shm/base/cpu_list.hpp"
 
 namespace plchost::host_check {
 
@@ -28,9 +28,7 @@ HostFinding unknown(std::string subject, const Error& error, std::string why) {
 std::vector<int> plc_cores(const CheckedHost& host) {
   std::vector<int> cores;
   for (const CheckedHost::Instance& instance : host.instances) cores.push_back(instance.core);
-  std::ranges::sort(cores);
-  cores.erase(std::ranges::unique(cores).begin(), cores.end());
-  return cores;
+  return each_once(std::move(cores));
 }
 
 std::string name_cores(const CheckedHost& host, const std::vector<int>& cores) {

@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "manager/host_check/checks.hpp"
-#include "manager/host_check/cpu_list.hpp"
+#include "shm/base/cpu_list.hpp"
 
 namespace plchost::host_check {
 

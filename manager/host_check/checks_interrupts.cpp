@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "manager/host_check/checks.hpp"
-#include "manager/host_check/cpu_list.hpp"
+#include "shm/base/cpu_list.hpp"
 
 namespace plchost::host_check {
 
@@ -54,14 +54,12 @@ HostFinding interrupts(const CheckedHost& host) {
   }
   if (hits.empty() && unreadable) return unknown(kSubject, *unreadable, kWhy);
   if (hits.empty()) return finding(FindingLevel::ok, kSubject, "none comes to an instance's core", kWhy);
-  std::ranges::sort(hit_cores);
-  hit_cores.erase(std::ranges::unique(hit_cores).begin(), hit_cores.end());
   const std::size_t shown = std::min(hits.size(), kShown);
   std::string found =
       fmt::format("{} interrupts: {}", hits.size(),
                   fmt::join(hits.begin(), hits.begin() + static_cast<std::ptrdiff_t>(shown), "; "));
   if (shown < hits.size()) found += fmt::format("; and {} more", hits.size() - shown);
-  return finding(FindingLevel::warning, name_cores(host, hit_cores), found, kWhy,
+  return finding(FindingLevel::warning, name_cores(host, each_once(std::move(hit_cores))), found, kWhy,
                  "boot with irqaffinity= and isolcpus=managed_irq, or write the housekeeping cores to "
                  "/proc/irq/N/smp_affinity_list; keep irqbalance away (IRQBALANCE_BANNED_CPULIST)");
 }

@@ -6,7 +6,7 @@
 #include <linux/capability.h>
 
 #include "manager/host_check/checks.hpp"
-#include "manager/host_check/cpu_list.hpp"
+#include "shm/base/cpu_list.hpp"
 
 namespace plchost::host_check {
 

@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "manager/host_check/cpu_list.hpp"
+#include "shm/base/cpu_list.hpp"
 #include "shm/base/unique_fd.hpp"
 
 namespace plchost {

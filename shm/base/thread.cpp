@@ -14,6 +14,7 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
+#include "shm/base/cpu_list.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/time.hpp"
 
@@ -175,22 +176,13 @@ Result<std::vector<int>> bind_process_to_cores(pid_t pid, const std::vector<int>
 }
 
 Result<std::vector<int>> online_cores() {
-  std::ifstream file("/sys/devices/system/cpu/online");
+  const std::string path = "/sys/devices/system/cpu/online";
+  std::ifstream file(path);
   std::string line;
-  if (!std::getline(file, line)) {
-    return failure(ErrorCode::system, "read /sys/devices/system/cpu/online", errno);
-  }
-  std::vector<int> cores;
-  const char* at = line.c_str();
-  while (*at != '\0') {
-    char* end = nullptr;
-    const long first = std::strtol(at, &end, 10);
-    if (end == at) break;
-    const long last = *end == '-' ? std::strtol(end + 1, &end, 10) : first;
-    for (long core = first; core <= last; ++core) cores.push_back(static_cast<int>(core));
-    at = *end == ',' ? end + 1 : end;
-  }
-  return cores;
+  if (!std::getline(file, line)) return failure(ErrorCode::system, "read " + path, errno);
+  auto cores = parse_cpu_list(line);
+  if (!cores) return failure(ErrorCode::corrupt, fmt::format("{} holds '{}'", path, line));
+  return *std::move(cores);
 }
 
 }  // namespace plchost

@@ -81,7 +81,7 @@ class AlternateStack {
 /// The cores that a thread (0: the calling one) may run on.
 [[nodiscard]] Result<std::vector<int>> allowed_cores(pid_t thread);
 
-/// The cores that are on line in this host, from 0.
+/// The cores that are on line in this host, sorted.
 [[nodiscard]] Result<std::vector<int>> online_cores();
 
 }  // namespace plchost

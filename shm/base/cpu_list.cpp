@@ -1,9 +1,10 @@
-#include "manager/host_check/cpu_list.hpp"
+#include "shm/base/cpu_list.hpp"
 
 #include <algorithm>
 #include <charconv>
 #include <cstdint>
 #include <iterator>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -43,9 +44,7 @@ std::optional<std::vector<int>> parse_cpu_list(std::string_view text) {
     for (int core = *first; core <= *last; ++core) cores.push_back(core);
   } while (take(text, ','));
   if (!text.empty()) return std::nullopt;
-  std::ranges::sort(cores);
-  cores.erase(std::ranges::unique(cores).begin(), cores.end());
-  return cores;
+  return each_once(std::move(cores));
 }
 
 std::optional<std::vector<int>> parse_cpu_mask(std::string_view text) {
@@ -77,6 +76,12 @@ std::string format_cpu_list(const std::vector<int>& sorted) {
     i = last + 1;
   }
   return text;
+}
+
+std::vector<int> each_once(std::vector<int> cores) {
+  std::ranges::sort(cores);
+  cores.erase(std::ranges::unique(cores).begin(), cores.end());
+  return cores;
 }
 
 std::vector<int> common_cores(const std::vector<int>& a, const std::vector<int>& b) {

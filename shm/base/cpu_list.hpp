@@ -20,6 +20,9 @@ inline constexpr int kMaxCoreNumber = 8191;
 /// Back to the first form.
 [[nodiscard]] std::string format_cpu_list(const std::vector<int>& sorted);
 
+/// Sorted, each once.
+[[nodiscard]] std::vector<int> each_once(std::vector<int> cores);
+
 /// What is in both, and what is only in the first; sorted in, sorted out.
 [[nodiscard]] std::vector<int> common_cores(const std::vector<int>& a, const std::vector<int>& b);
 [[nodiscard]] std::vector<int> cores_without(const std::vector<int>& a, const std::vector<int>& b);
