@@ -3,22 +3,10 @@
 # idle states of a core that an instance holds, which are as before when it was killed.
 . "$(dirname "$0")/common.sh"
 
-core=$(taskset -cp $$ | sed 's/.*: //' | grep -oE '^[0-9]+')
+core=$first_core
 printf '[SysTimer]\nLinux.IdleStates=HoldCore\n' >"$cell/packer1.cfg"
-cat >"$cell/north.toml" <<EOF
-[host]
-name = "north"
-dds_domain = $PLCHOST_DOMAIN
-run_directory = "$cell/north"
-pool = "$pool"
-cores = [$core]
-[[instance]]
-name = "packer1"
-core = $core
-settings = "packer1.cfg"
-application = "$APPLICATIONS/packer.so"
-restart = "never"
-EOF
+write_host north "$core"
+write_instance north packer1 "$core" packer 'settings = "packer1.cfg"' 'restart = "never"'
 latency=/sys/devices/system/cpu/cpu$core/power/pm_qos_resume_latency_us
 if [ -w "$latency" ]; then
   exec {turn}<"$latency"

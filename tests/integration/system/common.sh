@@ -34,7 +34,38 @@ trap clean_up EXIT
 
 plcctl() { "$BIN/plcctl" --timeout 10 "$@"; }
 
-# start_manager HOST: "$cell/HOST.toml" was written before
+# The first and the last core that this test may use.
+first_core=$(taskset -cp $$ | sed 's/.*: //' | grep -oE '^[0-9]+')
+last_core=$(taskset -cp $$ | sed 's/.*: //' | grep -oE '[0-9]+$')
+
+# write_host HOST CORE...: begins the configuration of a host, "$cell/HOST.toml"
+write_host() {
+  local host=$1
+  shift
+  cat >"$cell/$host.toml" <<EOF
+[host]
+name = "$host"
+dds_domain = $PLCHOST_DOMAIN
+run_directory = "$cell/$host"
+pool = "$pool-$host"
+cores = [$(IFS=,; echo "$*")]
+EOF
+}
+
+# write_instance HOST NAME CORE APPLICATION [LINE...]: adds an instance to it
+write_instance() {
+  local file=$cell/$1.toml
+  cat >>"$file" <<EOF
+[[instance]]
+name = "$2"
+core = $3
+application = "$APPLICATIONS/$4.so"
+EOF
+  shift 4
+  [ $# -eq 0 ] || printf '%s\n' "$@" >>"$file"
+}
+
+# start_manager HOST
 start_manager() {
   "$BIN/plchostd" --config "$cell/$1.toml" 2>>"$cell/$1.log" &
   managers+=($!)

@@ -2,26 +2,9 @@
 # A task divides by zero: what the operator sees and does, while the instance beside it runs on.
 . "$(dirname "$0")/common.sh"
 
-first=$(taskset -cp $$ | sed 's/.*: //' | grep -oE '^[0-9]+')
-last=$(taskset -cp $$ | sed 's/.*: //' | grep -oE '[0-9]+$')
-cat >"$cell/cell.toml" <<EOF
-[host]
-name = "cell"
-dds_domain = $PLCHOST_DOMAIN
-run_directory = "$cell/run"
-pool = "$pool"
-cores = [$(seq -s, "$first" "$last")]
-EOF
-for entry in line1:task_faults:$first line2:task_faults:$last; do
-  IFS=: read -r name application core <<<"$entry"
-  cat >>"$cell/cell.toml" <<EOF
-[[instance]]
-name = "$name"
-core = $core
-application = "$APPLICATIONS/$application.so"
-share_core = true
-EOF
-done
+write_host cell $(seq "$first_core" "$last_core")
+write_instance cell line1 "$first_core" task_faults 'share_core = true'
+write_instance cell line2 "$last_core" task_faults 'share_core = true'
 start_manager cell
 until_true 20 state_is line1 running
 until_true 20 state_is line2 running

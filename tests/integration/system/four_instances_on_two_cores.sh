@@ -2,27 +2,12 @@
 # The main job as a user does it: own configuration, four instances on the machine's cores, every verb.
 . "$(dirname "$0")/common.sh"
 
-first=$(taskset -cp $$ | sed 's/.*: //' | grep -oE '^[0-9]+')
-last=$(taskset -cp $$ | sed 's/.*: //' | grep -oE '[0-9]+$')
-cat >"$cell/cell.toml" <<EOF
-[host]
-name = "cell"
-dds_domain = $PLCHOST_DOMAIN
-run_directory = "$cell/run"
-pool = "$pool"
-cores = [$(seq -s, "$first" "$last")]
-EOF
+write_host cell $(seq "$first_core" "$last_core")
 number=0
 for entry in line1:bottling_line:CmpSchedule drive1:drive_axis:CmpScheduleOneShot packer1:packer:CmpScheduleTimer line2:bottling_line:CmpSchedule; do
   IFS=: read -r name application scheduler <<<"$entry"
-  cat >>"$cell/cell.toml" <<EOF
-[[instance]]
-name = "$name"
-core = $((number % 2 == 0 ? first : last))
-scheduler = "$scheduler"
-application = "$APPLICATIONS/$application.so"
-share_core = true
-EOF
+  write_instance cell "$name" $((number % 2 == 0 ? first_core : last_core)) "$application" \
+    "scheduler = \"$scheduler\"" 'share_core = true'
   number=$((number + 1))
 done
 "$BIN/plchostd" --check-config "$cell/cell.toml" >/dev/null || fail "the configuration is refused"

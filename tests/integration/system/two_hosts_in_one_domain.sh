@@ -2,21 +2,9 @@
 # Two managers, one DDS domain: both are seen, each is addressed by name.
 . "$(dirname "$0")/common.sh"
 
-core=$(taskset -cp $$ | sed 's/.*: //' | grep -oE '^[0-9]+')
 for host in north south; do
-  cat >"$cell/$host.toml" <<EOF
-[host]
-name = "$host"
-dds_domain = $PLCHOST_DOMAIN
-run_directory = "$cell/$host"
-pool = "$pool-$host"
-cores = [$core]
-[[instance]]
-name = "packer1"
-core = $core
-scheduler = "CmpScheduleTimer"
-application = "$APPLICATIONS/packer.so"
-EOF
+  write_host "$host" "$first_core"
+  write_instance "$host" packer1 "$first_core" packer 'scheduler = "CmpScheduleTimer"'
   start_manager "$host"
 done
 both_running() { [ "$(plcctl list instances --json | jq '[.[] | select(.state == "running")] | length')" = 2 ]; }
