@@ -6,13 +6,15 @@
 
 #include <fmt/format.h>
 
+#include "shm/pool/fixed_page.hpp"
+
 namespace plchost {
 
 namespace {
 
-constexpr std::uint64_t kMagic = 0x65676170'74736f68;  // "hostpage"
-/// 1: first.
-constexpr std::uint32_t kVersion = 1;
+constexpr PageKind kKind{.what = "host page",
+                         .magic = 0x65676170'74736f68,  // "hostpage"
+                         .version = 1};                 // 1: first
 
 static_assert(offsetof(HostPageLayout, version) == 8 && offsetof(HostPageLayout, changes) == 16);
 static_assert(sizeof(InstanceStatus) == 600 && sizeof(HostStatus) == 112);
@@ -22,27 +24,14 @@ HostPageLayout& layout_of(const MemoryFile& memory) noexcept {
 }
 
 Result<MemoryFile> open_page(const std::string& name, MemoryFile::Access access) {
-  auto memory = MemoryFile::open(name, sizeof(HostPageLayout), access);
-  if (!memory) return memory;
-  const HostPageLayout& page = layout_of(*memory);
-  // The name is given to complete pages only, so the magic is there from the start.
-  if (page.magic != kMagic) {
-    return failure(ErrorCode::corrupt, fmt::format("shared memory '{}' is not a host page", name));
-  }
-  if (page.version != kVersion || page.size != sizeof(HostPageLayout) ||
-      memory->bytes().size() != sizeof(HostPageLayout)) {
-    return failure(ErrorCode::corrupt,
-                   fmt::format("host page '{}' has version {} and {} bytes; {} and {} are needed", name,
-                               page.version, memory->bytes().size(), kVersion, sizeof(HostPageLayout)));
-  }
-  return memory;
+  return open_fixed_page<HostPageLayout>(name, kKind, access);
 }
 
 Result<void> fill(std::span<std::byte> bytes) {
   auto* const page = new (bytes.data()) HostPageLayout;
-  page->version = kVersion;
+  page->version = kKind.version;
   page->size = sizeof(HostPageLayout);
-  page->magic = kMagic;
+  page->magic = kKind.magic;
   return {};
 }
 

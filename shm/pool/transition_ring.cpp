@@ -6,13 +6,15 @@
 #include <fmt/format.h>
 #include <time.h>
 
+#include "shm/pool/fixed_page.hpp"
+
 namespace plchost {
 
 namespace {
 
-constexpr std::uint64_t kMagic = 0x676e6972'6e617274;  // "tranring"
-/// 1: first.
-constexpr std::uint32_t kVersion = 1;
+constexpr PageKind kKind{.what = "ring of transitions",
+                         .magic = 0x676e6972'6e617274,  // "tranring"
+                         .version = 1};                 // 1: first
 
 static_assert(offsetof(TransitionRingLayout, version) == 8 && sizeof(Transition) == 232);
 
@@ -27,24 +29,15 @@ TransitionRingLayout& layout_of(const MemoryFile& memory) noexcept {
 }
 
 Result<MemoryFile> open_ring(const std::string& name, MemoryFile::Access access) {
-  auto memory = MemoryFile::open(name, sizeof(TransitionRingLayout), access);
-  if (!memory) return memory;
-  const TransitionRingLayout& ring = layout_of(*memory);
-  // The name is given to complete rings only, so the magic is there from the start.
-  if (ring.magic != kMagic || ring.version != kVersion || ring.size != sizeof(TransitionRingLayout)) {
-    return failure(ErrorCode::corrupt,
-                   fmt::format("shared memory '{}' is not a ring of transitions of version {}, {} bytes",
-                               name, kVersion, sizeof(TransitionRingLayout)));
-  }
-  return memory;
+  return open_fixed_page<TransitionRingLayout>(name, kKind, access);
 }
 
 Result<void> fill(std::span<std::byte> bytes) {
   auto* const ring = new (bytes.data()) TransitionRingLayout;
-  ring->version = kVersion;
+  ring->version = kKind.version;
   ring->size = sizeof(TransitionRingLayout);
   ring->stream_unix_ns = unix_now();
-  ring->magic = kMagic;
+  ring->magic = kKind.magic;
   return {};
 }
 

@@ -5,6 +5,7 @@
 #include <thread>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include "tests/unit/pool/unique_pool_name.hpp"
@@ -117,6 +118,20 @@ TEST_F(Transitions, RefuseWhatIsNoRing) {
   EXPECT_EQ(TransitionRingReader::open(pool(), "line2").error().code, ErrorCode::not_found);
   TransitionRing ring = writer();  // a writer makes a good one of it
   EXPECT_TRUE(TransitionRingReader::open(pool(), "line1"));
+}
+
+TEST_F(Transitions, OfAnotherVersionAreToldFromWhatIsNone) {
+  (void)writer();
+  const std::string name = transition_ring_name(pool(), "line1");
+  const auto memory = MemoryFile::open(name, 1, MemoryFile::Access::read_write);
+  auto& ring = *reinterpret_cast<TransitionRingLayout*>(memory->bytes().data());
+  ring.version += 1;
+  EXPECT_EQ(TransitionRingReader::open(pool(), "line1").error().message,
+            fmt::format("ring of transitions '{0}' has version 2 and {1} bytes; 1 and {1} are needed", name,
+                        sizeof(TransitionRingLayout)));
+  ring.magic += 1;
+  EXPECT_EQ(TransitionRingReader::open(pool(), "line1").error().message,
+            fmt::format("shared memory '{}' is not a ring of transitions", name));
 }
 
 }  // namespace
