@@ -25,6 +25,15 @@ HostFinding unknown(std::string subject, const Error& error, std::string why) {
                  std::move(why));
 }
 
+std::optional<HostFinding> unless_on(const HostFiles& files, const std::string& path,
+                                     const std::string& subject, const std::string& why) {
+  if (files.kernel_lacks(path)) return finding(FindingLevel::ok, subject, "the kernel has none", why);
+  const auto value = files.number(path);
+  if (!value) return unknown(subject, value.error(), why);
+  if (*value == 0) return finding(FindingLevel::ok, subject, "off", why);
+  return std::nullopt;
+}
+
 std::vector<int> plc_cores(const CheckedHost& host) {
   std::vector<int> cores;
   for (const CheckedHost::Instance& instance : host.instances) cores.push_back(instance.core);

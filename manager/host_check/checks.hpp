@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -53,6 +54,11 @@ HostFinding machine(const CheckedHost& host);
                                   std::string why = {}, std::string advice = {});
 /// A note that this cannot be known, and why not.
 [[nodiscard]] HostFinding unknown(std::string subject, const Error& error, std::string why);
+
+/// Of a number of the kernel that switches something on: the finding when it is off, not there or not known.
+/// Nothing: it is on.
+[[nodiscard]] std::optional<HostFinding> unless_on(const HostFiles& files, const std::string& path,
+                                                   const std::string& subject, const std::string& why);
 
 /// The cores of the instances, sorted, each once.
 [[nodiscard]] std::vector<int> plc_cores(const CheckedHost& host);

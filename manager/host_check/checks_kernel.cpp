@@ -128,14 +128,11 @@ HostFinding timer_slack(const CheckedHost& host) {
 }
 
 HostFinding timer_migration(const CheckedHost& host) {
-  const std::string path = "/proc/sys/kernel/timer_migration";
   constexpr auto kSubject = "kernel.timer_migration";
   constexpr auto kWhy =
       "timers of sleeping cores move to one that is awake, and may so interrupt an instance's core";
-  if (host.files.kernel_lacks(path)) return finding(FindingLevel::ok, kSubject, "the kernel has none", kWhy);
-  const auto on = host.files.number(path);
-  if (!on) return unknown(kSubject, on.error(), kWhy);
-  if (*on == 0) return finding(FindingLevel::ok, kSubject, "off", kWhy);
+  if (auto off = unless_on(host.files, "/proc/sys/kernel/timer_migration", kSubject, kWhy))
+    return *std::move(off);
   const auto no_tick = host.files.cores("/sys/devices/system/cpu/nohz_full");
   const auto cores = plc_cores(host);
   if (no_tick && !cores.empty() && cores_without(cores, *no_tick).empty()) {
@@ -165,14 +162,10 @@ HostFinding clock_source(const CheckedHost& host) {
 }
 
 HostFinding watchdog(const CheckedHost& host) {
-  const std::string path = "/proc/sys/kernel/watchdog";
   constexpr auto kSubject = "lock-up watchdog";
   constexpr auto kWhy =
       "it interrupts each of its cores every 4 s, with nmi_watchdog at moments that nothing can mask";
-  if (host.files.kernel_lacks(path)) return finding(FindingLevel::ok, kSubject, "the kernel has none", kWhy);
-  const auto on = host.files.number(path);
-  if (!on) return unknown(kSubject, on.error(), kWhy);
-  if (*on == 0) return finding(FindingLevel::ok, kSubject, "off", kWhy);
+  if (auto off = unless_on(host.files, "/proc/sys/kernel/watchdog", kSubject, kWhy)) return *std::move(off);
   const auto watched = host.files.cores("/proc/sys/kernel/watchdog_cpumask");
   if (!watched) return unknown(kSubject, watched.error(), kWhy);
   const auto hit = common_cores(plc_cores(host), *watched);

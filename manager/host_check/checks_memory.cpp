@@ -18,12 +18,7 @@ struct Switch {
 };
 
 HostFinding judge(const CheckedHost& host, const Switch& which) {
-  if (host.files.kernel_lacks(which.path)) {
-    return finding(FindingLevel::ok, which.subject, "the kernel has none", which.why);
-  }
-  const auto value = host.files.number(which.path);
-  if (!value) return unknown(which.subject, value.error(), which.why);
-  if (*value == 0) return finding(FindingLevel::ok, which.subject, "off", which.why);
+  if (auto off = unless_on(host.files, which.path, which.subject, which.why)) return *std::move(off);
   return finding(which.on, which.subject, "on", which.why, which.advice);
 }
 
