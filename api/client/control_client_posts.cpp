@@ -43,15 +43,10 @@ Result<void> ControlClient::prepare_posts(const std::string& host, TimePoint dea
 
 bool ControlClient::take_acks(TimePoint now) {
   bool progress = false;
-  for (bool more = true; more;) {
-    const dds::Samples<plc_EventAck> acks(ack_reader_.get());
-    for (std::size_t i = 0; i < acks.size(); ++i) {
-      if (!acks.valid(i)) continue;
-      const auto way = posters_.find(dds::text_of(acks[i].host));
-      if (way != posters_.end()) progress |= way->second.on_ack(acks[i], now);
-    }
-    more = acks.full();
-  }
+  dds::take_valid<plc_EventAck>(ack_reader_.get(), [&](const plc_EventAck& ack, const auto& /*info*/) {
+    const auto way = posters_.find(dds::text_of(ack.host));
+    if (way != posters_.end()) progress |= way->second.on_ack(ack, now);
+  });
   return progress;
 }
 

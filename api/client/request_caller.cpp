@@ -16,21 +16,16 @@ namespace {
 
 std::optional<ApiReply> take_reply(dds_entity_t reader, const plc_SampleIdentity& identity) {
   std::optional<ApiReply> found;
-  for (bool more = true; more;) {
-    const dds::Samples<plc_Reply, 16> replies(reader);
-    for (std::size_t i = 0; i < replies.size(); ++i) {
-      if (!replies.valid(i)) continue;
-      const plc_SampleIdentity& related = replies[i].header.related_identity;
-      // Others are answers to calls that were given up.
-      if (related.sequence_number != identity.sequence_number ||
-          !std::ranges::equal(related.writer_guid, identity.writer_guid)) {
-        continue;
-      }
-      found = ApiReply{static_cast<ErrorCode>(replies[i].code), std::string(dds::text_of(replies[i].text)),
-                       replies[i].status_round};
+  dds::take_valid<plc_Reply, 16>(reader, [&](const plc_Reply& reply, const auto& /*info*/) {
+    const plc_SampleIdentity& related = reply.header.related_identity;
+    // Others are answers to calls that were given up.
+    if (related.sequence_number != identity.sequence_number ||
+        !std::ranges::equal(related.writer_guid, identity.writer_guid)) {
+      return;
     }
-    more = replies.full();
-  }
+    found = ApiReply{static_cast<ErrorCode>(reply.code), std::string(dds::text_of(reply.text)),
+                     reply.status_round};
+  });
   return found;
 }
 

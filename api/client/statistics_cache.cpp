@@ -35,18 +35,12 @@ StatisticsReport to_report(const plc_TaskStatistics& sample) {
 
 void StatisticsCache::update() {
   if (!reader_) return;
-  for (bool more = true; more;) {
-    const dds::Samples<plc_TaskStatistics> batch(reader_.get());
-    for (std::size_t i = 0; i < batch.size(); ++i) {
-      const auto handle = batch.info(i).instance_handle;
-      if (batch.disposed(i)) {
-        reports_.erase(handle);
-      } else if (batch.valid(i)) {
-        reports_[handle] = to_report(batch[i]);
-      }
-    }
-    more = batch.full();
-  }
+  dds::take_changes<plc_TaskStatistics>(
+      reader_.get(),
+      [this](dds_instance_handle_t handle, const plc_TaskStatistics& sample) {
+        reports_[handle] = to_report(sample);
+      },
+      [this](dds_instance_handle_t handle) { reports_.erase(handle); });
 }
 
 std::optional<StatisticsReport> StatisticsCache::find(std::string_view host, std::uint64_t epoch,

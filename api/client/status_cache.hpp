@@ -30,19 +30,13 @@ class StatusCache {
   template <class Function>
   void update(Function on_sample) {
     if (!reader_) return;
-    for (bool more = true; more;) {
-      const dds::Samples<Sample> batch(reader_.get());
-      for (std::size_t i = 0; i < batch.size(); ++i) {
-        const auto handle = batch.info(i).instance_handle;
-        if (batch.disposed(i)) {
-          samples_.erase(handle);
-        } else if (batch.valid(i)) {
-          samples_[handle].take(batch[i]);
-          on_sample(batch[i]);
-        }
-      }
-      more = batch.full();
-    }
+    dds::take_changes<Sample>(
+        reader_.get(),
+        [&](dds_instance_handle_t handle, const Sample& sample) {
+          samples_[handle].take(sample);
+          on_sample(sample);
+        },
+        [this](dds_instance_handle_t handle) { samples_.erase(handle); });
   }
   void update() {
     update([](const Sample&) {});

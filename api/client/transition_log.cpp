@@ -7,17 +7,14 @@ namespace plchost {
 
 std::vector<TransitionView> TransitionLog::take() {
   std::vector<TransitionView> news;
-  for (bool more = static_cast<bool>(reader_); more;) {
-    const dds::Samples<plc_Transition> batch(reader_.get());
-    for (std::size_t i = 0; i < batch.size(); ++i) {
-      TransitionView view;
-      if (!batch.valid(i) || !is_news(batch[i], view.missed)) continue;
-      view.sample = batch[i];
-      view.sample.ext = {};  // lives on loan only
-      news.push_back(view);
-    }
-    more = batch.full();
-  }
+  if (!reader_) return news;
+  dds::take_valid<plc_Transition>(reader_.get(), [&](const plc_Transition& sample, const auto& /*info*/) {
+    TransitionView view;
+    if (!is_news(sample, view.missed)) return;
+    view.sample = sample;
+    view.sample.ext = {};  // lives on loan only
+    news.push_back(view);
+  });
   return news;
 }
 

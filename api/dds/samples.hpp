@@ -32,9 +32,6 @@ class Samples {
   [[nodiscard]] const dds_sample_info_t& info(std::size_t index) const noexcept { return infos_[index]; }
   /// False: only the key is there, because the instance was disposed or lost its writer.
   [[nodiscard]] bool valid(std::size_t index) const noexcept { return infos_[index].valid_data; }
-  [[nodiscard]] bool disposed(std::size_t index) const noexcept {
-    return infos_[index].instance_state == DDS_IST_NOT_ALIVE_DISPOSED;
-  }
 
  private:
   dds_entity_t reader_;
@@ -42,5 +39,37 @@ class Samples {
   std::array<dds_sample_info_t, Max> infos_{};
   std::size_t size_ = 0;
 };
+
+/// Takes all that has come, `Max` at a time. `use(sample, info)` for each, on loan as long as that runs; of
+/// one that is not valid (info.valid_data) only the key is there.
+template <class Sample, std::size_t Max = 64, class Function>
+void take_all(dds_entity_t reader, Function use) {
+  for (bool more = true; more;) {
+    const Samples<Sample, Max> batch(reader);
+    for (std::size_t i = 0; i < batch.size(); ++i) use(batch[i], batch.info(i));
+    more = batch.full();
+  }
+}
+
+/// The same, of the valid ones only.
+template <class Sample, std::size_t Max = 64, class Function>
+void take_valid(dds_entity_t reader, Function use) {
+  take_all<Sample, Max>(reader, [&use](const Sample& sample, const dds_sample_info_t& info) {
+    if (info.valid_data) use(sample, info);
+  });
+}
+
+/// The same, for what is kept of each instance: `update(handle, sample)`, or `forget(handle)` when it was
+/// disposed.
+template <class Sample, class Update, class Forget>
+void take_changes(dds_entity_t reader, Update update, Forget forget) {
+  take_all<Sample>(reader, [&](const Sample& sample, const dds_sample_info_t& info) {
+    if (info.instance_state == DDS_IST_NOT_ALIVE_DISPOSED) {
+      forget(info.instance_handle);
+    } else if (info.valid_data) {
+      update(info.instance_handle, sample);
+    }
+  });
+}
 
 }  // namespace plchost::dds

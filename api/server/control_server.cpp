@@ -128,22 +128,18 @@ void ControlServer::Parts::on_wake() {
 }
 
 void ControlServer::Parts::on_requests(const RequestReader& source) {
-  for (bool more = true; more;) {
-    const dds::Samples<plc_Request> batch(source.reader.get());
-    for (std::size_t i = 0; i < batch.size(); ++i) {
-      if (!batch.valid(i)) continue;
-      const dds::Guid writer = dds::writer_of(source.reader.get(), batch.info(i));
-      // Gone meanwhile, or pretending to be another: nobody to answer.
-      if (writer == dds::Guid{}) continue;
-      if (writer != dds::Guid::from(batch[i].header.request_identity.writer_guid)) {
-        answer(writer.participant(), batch[i].header.request_identity, ErrorCode::refused,
-               "the request's identity is not that of its writer");
-        continue;
-      }
-      on_request(source.role, writer, batch[i]);
+  const dds_entity_t reader = source.reader.get();
+  dds::take_valid<plc_Request>(reader, [&](const plc_Request& request, const dds_sample_info_t& info) {
+    const dds::Guid writer = dds::writer_of(reader, info);
+    // Gone meanwhile, or pretending to be another: nobody to answer.
+    if (writer == dds::Guid{}) return;
+    if (writer == dds::Guid::from(request.header.request_identity.writer_guid)) {
+      on_request(source.role, writer, request);
+    } else {
+      answer(writer.participant(), request.header.request_identity, ErrorCode::refused,
+             "the request's identity is not that of its writer");
     }
-    more = batch.full();
-  }
+  });
 }
 
 void ControlServer::Parts::on_request(ApiRole role, const dds::Guid& writer, const plc_Request& request) {

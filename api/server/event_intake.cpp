@@ -15,18 +15,13 @@ using dds::text_of;
 bool EventIntake::take(dds_entity_t reader) {
   const std::lock_guard lock(mutex_);
   const bool owed_before = !owed_.empty();
-  for (bool more = true; more;) {
-    const dds::Samples<plc_EventPost> posts(reader);
-    for (std::size_t i = 0; i < posts.size(); ++i) {
-      if (!posts.valid(i)) continue;
-      if (source_is_writer(reader, posts.info(i), posts[i])) {
-        process_locked(posts[i]);
-      } else {
-        ++malformed_;
-      }
+  dds::take_valid<plc_EventPost>(reader, [&](const plc_EventPost& post, const dds_sample_info_t& info) {
+    if (source_is_writer(reader, info, post)) {
+      process_locked(post);
+    } else {
+      ++malformed_;
     }
-    more = posts.full();
-  }
+  });
   return !owed_before && !owed_.empty();
 }
 

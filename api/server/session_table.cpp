@@ -42,41 +42,35 @@ void SessionTable::follow_discovery() {
 }
 
 void SessionTable::follow_participants() {
-  for (bool more = true; more;) {
-    const dds::Samples<dds_builtintopic_participant_t> participants(participants_.get());
-    for (std::size_t i = 0; i < participants.size(); ++i) {
-      const dds::Guid client = dds::Guid::from(participants[i].key.v);
-      if (participants.info(i).instance_state == DDS_IST_ALIVE) {
-        alive_.insert(client);
-      } else {
-        alive_.erase(client);
-        sessions_.erase(client);
-      }
+  using Participant = dds_builtintopic_participant_t;
+  dds::take_all<Participant>(participants_.get(), [this](const Participant& participant, const auto& info) {
+    const dds::Guid client = dds::Guid::from(participant.key.v);
+    if (info.instance_state == DDS_IST_ALIVE) {
+      alive_.insert(client);
+    } else {
+      alive_.erase(client);
+      sessions_.erase(client);
     }
-    more = participants.full();
-  }
+  });
 }
 
 void SessionTable::follow_readers() {
-  for (bool more = true; more;) {
-    const dds::Samples<dds_builtintopic_endpoint_t> readers(subscriptions_.get());
-    for (std::size_t i = 0; i < readers.size(); ++i) {
-      if (!readers.valid(i) || readers.info(i).instance_state != DDS_IST_ALIVE) continue;
-      const std::string_view topic = readers[i].topic_name;
-      const bool replies = topic == dds::kReply.name;
-      if (!replies && topic != dds::kEventAck.name) continue;
-      Session* const session = session_of(dds::Guid::from(readers[i].participant_key.v));
-      if (session == nullptr) continue;
-      // The writer exists before the first request: it has met its reader when the answer comes. One that
-      // nobody reads is not made: each is announced to every client.
-      if (replies) {
-        (void)open_writer(*session, session->reply_writer, reply_topic_, dds::reply_qos());
-      } else {
-        (void)open_writer(*session, session->ack_writer, ack_topic_, dds::ack_qos());
-      }
+  using Reader = dds_builtintopic_endpoint_t;
+  dds::take_valid<Reader>(subscriptions_.get(), [this](const Reader& reader, const auto& info) {
+    if (info.instance_state != DDS_IST_ALIVE) return;
+    const std::string_view topic = reader.topic_name;
+    const bool replies = topic == dds::kReply.name;
+    if (!replies && topic != dds::kEventAck.name) return;
+    Session* const session = session_of(dds::Guid::from(reader.participant_key.v));
+    if (session == nullptr) return;
+    // The writer exists before the first request: it has met its reader when the answer comes. One that
+    // nobody reads is not made: each is announced to every client.
+    if (replies) {
+      (void)open_writer(*session, session->reply_writer, reply_topic_, dds::reply_qos());
+    } else {
+      (void)open_writer(*session, session->ack_writer, ack_topic_, dds::ack_qos());
     }
-    more = readers.full();
-  }
+  });
 }
 
 bool SessionTable::open_writer(const Session& session, dds::Entity& writer, const dds::Entity& topic,
