@@ -50,7 +50,7 @@ class Clock {
   virtual void thread_ends() noexcept {}
 };
 
-/// CLOCK_MONOTONIC, futexes private to the process, and timerfd.
+/// CLOCK_MONOTONIC, futexes private to the process, and pairs of timerfds.
 class LinuxClock final : public Clock {
  public:
   [[nodiscard]] TimePoint now() const noexcept override { return MonotonicClock::now(); }

@@ -6,9 +6,9 @@
 
 namespace plchost {
 
-/// A cyclic task sleeps in the read of a periodic timer of the kernel of its own. The timer says when to
-/// look, and by itself how often it went off; which release it is, and which were lost, follows from the
-/// task's grid alone.
+/// A cyclic task sleeps in the read of periodic timers of the kernel of its own. They say when to
+/// look, and by themselves how often they went off; which release it is, and which were lost, follows from
+/// the task's grid alone.
 class TimerSource final : public ActivationSource {
  public:
   TimerSource(Clock& clock, const Task& task, FreewheelRule rule,

@@ -49,6 +49,15 @@ Result<void> lock_memory() {
   return {};
 }
 
+// CmpScheduleTimer has two timers per task, and the usual soft limit is 1,024 files. It is that low for
+// select(), which nothing here calls.
+void allow_many_files() {
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_NOFILE, &limit) != 0) return;
+  limit.rlim_cur = limit.rlim_max;
+  ::setrlimit(RLIMIT_NOFILE, &limit);
+}
+
 }  // namespace
 
 Result<std::vector<int>> bind_to_cores(const std::vector<int>& cores) {
@@ -73,6 +82,7 @@ Result<std::vector<int>> bind_to_cores(const std::vector<int>& cores) {
 RealTimeSetup set_up_real_time() {
   RealTimeSetup setup;
   std::vector<std::string> remarks;
+  allow_many_files();
   const auto locked = lock_memory();
   setup.memory_locked = locked.has_value();
   if (!locked) remarks.push_back(fmt::format("memory is not locked: {}", locked.error().describe()));

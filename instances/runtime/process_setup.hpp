@@ -12,8 +12,8 @@ namespace plchost {
 /// refused: that is something else than was asked for; the text lists the cores on line.
 [[nodiscard]] Result<std::vector<int>> bind_to_cores(const std::vector<int>& cores);
 
-/// Memory locked, timer slack 1 ns. Each may be refused where a right is missing: then `remark` says so and
-/// what to change, and the instance runs with worse latency.
+/// Memory locked, timer slack 1 ns, as many files as the hard limit allows. Each may be refused where a right
+/// is missing: then `remark` says so and what to change, and the instance runs with worse latency.
 struct RealTimeSetup {
   bool memory_locked = false;
   std::string remark;  ///< empty: all was granted

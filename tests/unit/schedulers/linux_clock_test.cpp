@@ -52,6 +52,22 @@ TEST(LinuxClock, PeriodicTimerStaysOnItsGrid) {
   }
 }
 
+TEST(LinuxClock, PeriodicTimerCountsEachPeriodOnceHoweverLateItIsAskedFor) {
+  LinuxClock clock;
+  const auto sut = clock.make_periodic_timer().value();
+  const TimePoint first = clock.now() + milliseconds(1);
+  sut->start(first, microseconds(500));
+  std::uint64_t went_off = 0;
+  for (int i = 0; i < 40; ++i) {
+    std::this_thread::sleep_for(microseconds(i * 97));
+    const auto least = static_cast<std::uint64_t>(std::max<std::int64_t>(
+        (clock.now() - first) / microseconds(500) + (clock.now() >= first ? 1 : 0), 0));
+    went_off += sut->wait();
+    ASSERT_GE(went_off, least);
+    ASSERT_LE(went_off, static_cast<std::uint64_t>((clock.now() - first) / microseconds(500) + 1));
+  }
+}
+
 TEST(LinuxClock, InterruptBeforeTheWaitIsNotLost) {
   LinuxClock clock;
   const auto sut = clock.make_periodic_timer().value();
@@ -65,6 +81,25 @@ TEST(LinuxClock, InterruptEndsAWaitThatWouldLastForEver) {
   for (int i = 0; i < 200; ++i) {
     sut->start(clock.now() + std::chrono::hours(1), std::chrono::hours(1));
     std::thread interrupter([&] { sut->interrupt(); });
+    while (sut->wait() != 0) {
+    }
+    interrupter.join();
+  }
+}
+
+TEST(LinuxClock, InterruptThatMeetsAStartEndsTheWaitAfterIt) {
+  LinuxClock clock;
+  const auto sut = clock.make_periodic_timer().value();
+  for (int i = 0; i < 500; ++i) {
+    std::atomic<bool> go{false};
+    std::thread interrupter([&] {
+      while (!go) {
+      }
+      sut->interrupt();
+    });
+    go = true;
+    for (int spin = 0; spin < i * 10; ++spin) go.load();
+    sut->start(clock.now() + std::chrono::hours(1), std::chrono::hours(1));
     while (sut->wait() != 0) {
     }
     interrupter.join();

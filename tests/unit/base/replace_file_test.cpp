@@ -1,0 +1,45 @@
+#include "shm/base/replace_file.hpp"
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+namespace plchost {
+namespace {
+
+class ReplaceFile : public testing::Test {
+ protected:
+  void SetUp() override { std::filesystem::create_directory(directory); }
+  void TearDown() override { std::filesystem::remove_all(directory); }
+
+  [[nodiscard]] std::string contents() const {
+    std::ifstream file(path);
+    return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+  }
+
+  std::string directory = fmt::format("{}/replace_file.{}", testing::TempDir(), ::getpid());
+  std::string path = directory + "/kept";
+};
+
+TEST_F(ReplaceFile, MakesAndReplacesAndLeavesNothingBeside) {
+  ASSERT_TRUE(replace_file(path, "a long first text\n"));
+  ASSERT_TRUE(replace_file(path, "second\n"));
+  EXPECT_EQ(contents(), "second\n");
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(directory), {}), 1);
+}
+
+TEST_F(ReplaceFile, WhatCannotBeWrittenLeavesTheOldContents) {
+  ASSERT_TRUE(replace_file(path, "kept"));
+  std::filesystem::create_directory(path + ".new");
+  const auto replaced = replace_file(path, "lost");
+  ASSERT_FALSE(replaced);
+  EXPECT_NE(replaced.error().describe().find(path + ".new"), std::string::npos);
+  EXPECT_EQ(contents(), "kept");
+}
+
+}  // namespace
+}  // namespace plchost
