@@ -1,5 +1,9 @@
 #include "tests/bench/many_tasks.hpp"
 
+#include <thread>
+
+#include "tests/bench/thread_usage.hpp"
+
 namespace plchost::bench {
 
 void work(Duration time) noexcept {
@@ -32,6 +36,21 @@ std::uint64_t ManyTasks::sum(std::uint64_t TaskCounters::* member) const {
     total += (*counters).*member;
   }
   return total;
+}
+
+Result<Duration> measure_tick(const Plan& plan, std::vector<TaskConfig> tasks, Duration slice) {
+  constexpr Duration kTick = std::chrono::milliseconds(1);
+  auto started = ManyTasks::start(plan, "CmpSchedule", std::move(tasks));
+  if (!started) return std::unexpected(std::move(started.error()));
+  const OnCore out_of_the_way(plan.poster_core);
+  std::this_thread::sleep_for(kWarmUp);
+  const ThreadUsage before = usage_of_other_threads("tick");
+  const TimePoint begin = MonotonicClock::now();
+  std::this_thread::sleep_for(slice);
+  const Duration cpu = (usage_of_other_threads("tick") - before).cpu;
+  const auto ticks = (MonotonicClock::now() - begin) / kTick;
+  if (auto stopped = (*started)->stop(); !stopped) return std::unexpected(std::move(stopped.error()));
+  return cpu / ticks;
 }
 
 }  // namespace plchost::bench

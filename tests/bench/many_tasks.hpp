@@ -33,4 +33,7 @@ class ManyTasks {
   std::unique_ptr<TaskSet> tasks_;
 };
 
+/// The CPU time of one 1 ms tick of CmpSchedule with these tasks, on average over `slice`.
+[[nodiscard]] Result<Duration> measure_tick(const Plan& plan, std::vector<TaskConfig> tasks, Duration slice);
+
 }  // namespace plchost::bench

@@ -2,7 +2,6 @@
 // thread. The floor is a bare thread that reads the same 500 variables each ms; a third one reads none.
 
 #include <atomic>
-#include <thread>
 
 #include <fmt/format.h>
 
@@ -30,16 +29,10 @@ Result<void> run_ours(const Plan& plan, const Variables& variables, Duration sli
     task.entry = [] {};
     configs.push_back(std::move(task));
   }
-  auto tasks = ManyTasks::start(plan, "CmpSchedule", std::move(configs));
-  if (!tasks) return std::unexpected(std::move(tasks.error()));
-  const OnCore out_of_the_way(plan.poster_core);
-  std::this_thread::sleep_for(kWarmUp);
-  const ThreadUsage before = usage_of_other_threads("tick");
-  const TimePoint begin = MonotonicClock::now();
-  std::this_thread::sleep_for(slice);
-  const Duration cpu = (usage_of_other_threads("tick") - before).cpu;
-  into.push(cpu / ((MonotonicClock::now() - begin) / kPeriod));
-  return (*tasks)->stop();
+  const auto cpu = measure_tick(plan, std::move(configs), slice);
+  if (!cpu) return std::unexpected(cpu.error());
+  into.push(*cpu);
+  return {};
 }
 
 }  // namespace

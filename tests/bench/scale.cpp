@@ -160,9 +160,8 @@ Row to_row(std::string_view scheduler, const Sizes& ours, const Sizes& floor) {
           .note = "CPU time per activation without the task's own 15 us; a sample is a slice"};
 }
 
-/// The CPU time of one tick with so many tasks that are not due.
-Result<void> measure_tick(const Plan& plan, std::size_t size, Duration slice, Samples& into) {
-  constexpr Duration kTick = std::chrono::milliseconds(1);
+/// With so many tasks that are not due.
+Result<void> measure_idle_tick(const Plan& plan, std::size_t size, Duration slice, Samples& into) {
   std::vector<TaskConfig> configs;
   for (std::size_t i = 0; i < size; ++i) {
     TaskConfig task;
@@ -171,24 +170,19 @@ Result<void> measure_tick(const Plan& plan, std::size_t size, Duration slice, Sa
     task.entry = [] {};
     configs.push_back(std::move(task));
   }
-  auto tasks = ManyTasks::start(plan, "CmpSchedule", std::move(configs));
-  if (!tasks) return std::unexpected(std::move(tasks.error()));
-  const OnCore out_of_the_way(plan.poster_core);
-  std::this_thread::sleep_for(kWarmUp);
-  const ThreadUsage before = usage_of_other_threads("tick");
-  const TimePoint begin = MonotonicClock::now();
-  std::this_thread::sleep_for(slice);
-  const Duration cpu = (usage_of_other_threads("tick") - before).cpu;
-  into.push(cpu / ((MonotonicClock::now() - begin) / kTick));
-  return (*tasks)->stop();
+  const auto cpu = measure_tick(plan, std::move(configs), slice);
+  if (!cpu) return std::unexpected(cpu.error());
+  into.push(*cpu);
+  return {};
 }
 
 Result<Row> measure_ticks(const Plan& plan) {
   Row row{.name = "scale/CmpSchedule/tick"};
-  auto done = alternate(plan,
-                        {[&](Duration slice) { return measure_tick(plan, kSizes.front(), slice, row.floor); },
-                         [&](Duration slice) { return measure_tick(plan, kSizes.back(), slice, row.ours); }},
-                        std::chrono::seconds(1));
+  auto done =
+      alternate(plan,
+                {[&](Duration slice) { return measure_idle_tick(plan, kSizes.front(), slice, row.floor); },
+                 [&](Duration slice) { return measure_idle_tick(plan, kSizes.back(), slice, row.ours); }},
+                std::chrono::seconds(1));
   if (!done) return std::unexpected(std::move(done.error()));
   row.targets = {{"a tick with 1,000 tasks that are not due at most 1.2 times one with 10",
                   summarise(row.ours).p50, 1.2 * summarise(row.floor).p50, true}};
