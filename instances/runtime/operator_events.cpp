@@ -1,6 +1,5 @@
 #include "instances/runtime/operator_events.hpp"
 
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 
@@ -8,6 +7,7 @@
 
 #include "instances/runtime/event_table.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/replace_file.hpp"
 
 namespace plchost {
 
@@ -31,14 +31,7 @@ Result<void> write_operator_events(const std::string& path, const std::vector<st
     if (error) return failure(ErrorCode::system, "remove " + path, error.value());
     return {};
   }
-  const std::string fresh = path + ".new";
-  std::ofstream file(fresh, std::ios::trunc);
-  for (const std::string& event : events) file << event << '\n';
-  file.close();
-  if (!file) return failure(ErrorCode::system, "write " + fresh, errno);
-  std::filesystem::rename(fresh, path, error);
-  if (error) return failure(ErrorCode::system, "rename " + fresh, error.value());
-  return {};
+  return replace_file(path, fmt::format("{}\n", fmt::join(events, "\n")));
 }
 
 }  // namespace plchost

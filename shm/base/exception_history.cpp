@@ -5,13 +5,10 @@
 #include <iterator>
 #include <utility>
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <unistd.h>
 
-#include "shm/base/system_call.hpp"
-#include "shm/base/unique_fd.hpp"
+#include "shm/base/replace_file.hpp"
 
 namespace plchost {
 
@@ -53,20 +50,6 @@ ExceptionEntry from_json(const Json& json) {
 
 std::unexpected<Error> corrupt(const std::string& path, std::string_view what) {
   return failure(ErrorCode::corrupt, fmt::format("{}: {}", path, what));
-}
-
-Result<void> write_all(const std::string& path, std::string_view text) {
-  const UniqueFd fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
-  if (!fd) return failure(ErrorCode::system, "open " + path, errno);
-  while (!text.empty()) {
-    const auto written = check_errno(::write(fd.get(), text.data(), text.size()), "write " + path);
-    if (!written) return std::unexpected(written.error());
-    text.remove_prefix(static_cast<std::size_t>(*written));
-  }
-  if (const auto synced = check_errno(::fsync(fd.get()), "fsync " + path); !synced) {
-    return std::unexpected(synced.error());
-  }
-  return {};
 }
 
 }  // namespace
@@ -114,13 +97,7 @@ Result<void> write_exceptions(const std::string& path, const ExceptionHistory& h
   Json entries = Json::array();
   for (const ExceptionEntry& entry : history.entries) entries.push_back(to_json(entry));
   const Json json{{"version", kVersion}, {"count", history.count}, {"exceptions", std::move(entries)}};
-  const std::string fresh = path + ".new";
-  const std::string text = json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
-  if (auto written = write_all(fresh, text); !written) return written;
-  std::error_code error;
-  std::filesystem::rename(fresh, path, error);
-  if (error) return failure(ErrorCode::system, "rename " + fresh, error.value());
-  return {};
+  return replace_file(path, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
 }
 
 }  // namespace plchost
