@@ -12,14 +12,13 @@
 #include <unistd.h>
 
 #include "instances/plc_app.h"
+#include "instances/runtime/elf_bytes.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/unique_fd.hpp"
 
 namespace plchost {
 
 namespace {
-
-using Bytes = std::span<const std::byte>;
 
 #if defined(__x86_64__)
 constexpr unsigned kMachine = EM_X86_64;
@@ -58,21 +57,7 @@ std::unexpected<Error> truncated(std::string_view part) {
   return invalid(fmt::format("is cut short or damaged: its {} lie beyond its end; copy it again", part));
 }
 
-// Every read of the file goes through these two: nothing that the file says about itself is believed.
-std::optional<Bytes> slice(Bytes file, std::uint64_t offset, std::uint64_t size) {
-  if (offset > file.size() || size > file.size() - offset) return std::nullopt;
-  return file.subspan(offset, size);
-}
-
-template <class T>
-std::optional<T> item(Bytes table, std::uint64_t index) {
-  if (index >= table.size() / sizeof(T)) return std::nullopt;
-  T value;
-  std::memcpy(&value, table.subspan(index * sizeof(T)).data(), sizeof(T));
-  return value;
-}
-
-Result<Elf64_Ehdr> check_header(Bytes file) {
+Result<Elf64_Ehdr> check_header(ElfBytes file) {
   if (file.size() < SELFMAG || std::memcmp(file.data(), ELFMAG, SELFMAG) != 0) {
     return invalid("is not a shared object (no ELF file at all)");
   }
@@ -83,7 +68,7 @@ Result<Elf64_Ehdr> check_header(Bytes file) {
   if (std::to_integer<unsigned>(file[EI_DATA]) != ELFDATA2LSB) {
     return invalid("is built for a big-endian machine");
   }
-  const auto header = item<Elf64_Ehdr>(file, 0);
+  const auto header = elf_item<Elf64_Ehdr>(file, 0);
   if (!header) return truncated("first bytes");
   if (header->e_machine != kMachine) {
     return invalid(fmt::format("is built for {}; this machine is {}", machine_name(header->e_machine),
@@ -96,40 +81,40 @@ Result<Elf64_Ehdr> check_header(Bytes file) {
 }
 
 struct Tables {
-  Bytes segments;
-  Bytes sections;
+  ElfBytes segments;
+  ElfBytes sections;
 };
 
-Result<Tables> find_tables(Bytes file, const Elf64_Ehdr& header) {
+Result<Tables> find_tables(ElfBytes file, const Elf64_Ehdr& header) {
   if (header.e_phentsize != sizeof(Elf64_Phdr) || header.e_phnum == 0) {
     return invalid("has no program headers: not a shared object that can be loaded");
   }
-  const auto segments = slice(file, header.e_phoff, std::uint64_t{header.e_phnum} * sizeof(Elf64_Phdr));
+  const auto segments = elf_slice(file, header.e_phoff, std::uint64_t{header.e_phnum} * sizeof(Elf64_Phdr));
   if (!segments) return truncated("program headers");
-  for (std::uint64_t i = 0; const auto segment = item<Elf64_Phdr>(*segments, i); ++i) {
-    if (segment->p_type == PT_LOAD && !slice(file, segment->p_offset, segment->p_filesz)) {
+  for (std::uint64_t i = 0; const auto segment = elf_item<Elf64_Phdr>(*segments, i); ++i) {
+    if (segment->p_type == PT_LOAD && !elf_slice(file, segment->p_offset, segment->p_filesz)) {
       return truncated("segments");
     }
   }
   if (header.e_shnum == 0 || header.e_shentsize != sizeof(Elf64_Shdr)) {
     return invalid("has no section headers, so its symbols cannot be checked: do not strip them");
   }
-  const auto sections = slice(file, header.e_shoff, std::uint64_t{header.e_shnum} * sizeof(Elf64_Shdr));
+  const auto sections = elf_slice(file, header.e_shoff, std::uint64_t{header.e_shnum} * sizeof(Elf64_Shdr));
   if (!sections) return truncated("section headers");
   return Tables{*segments, *sections};
 }
 
 struct Symbols {
-  Bytes entries;
-  Bytes names;
+  ElfBytes entries;
+  ElfBytes names;
 };
 
-Result<Symbols> find_symbols(Bytes file, Bytes sections) {
-  for (std::uint64_t i = 0; const auto section = item<Elf64_Shdr>(sections, i); ++i) {
+Result<Symbols> find_symbols(ElfBytes file, ElfBytes sections) {
+  for (std::uint64_t i = 0; const auto section = elf_item<Elf64_Shdr>(sections, i); ++i) {
     if (section->sh_type != SHT_DYNSYM) continue;
-    const auto entries = slice(file, section->sh_offset, section->sh_size);
-    const auto names = item<Elf64_Shdr>(sections, section->sh_link);
-    const auto texts = names ? slice(file, names->sh_offset, names->sh_size) : std::nullopt;
+    const auto entries = elf_slice(file, section->sh_offset, section->sh_size);
+    const auto names = elf_item<Elf64_Shdr>(sections, section->sh_link);
+    const auto texts = names ? elf_slice(file, names->sh_offset, names->sh_size) : std::nullopt;
     if (!entries || !texts) return truncated("symbols");
     return Symbols{*entries, *texts};
   }
@@ -137,9 +122,9 @@ Result<Symbols> find_symbols(Bytes file, Bytes sections) {
 }
 
 std::optional<Elf64_Sym> find_export(const Symbols& symbols, std::string_view wanted) {
-  for (std::uint64_t i = 0; const auto symbol = item<Elf64_Sym>(symbols.entries, i); ++i) {
+  for (std::uint64_t i = 0; const auto symbol = elf_item<Elf64_Sym>(symbols.entries, i); ++i) {
     if (symbol->st_shndx == SHN_UNDEF) continue;
-    const auto name = slice(symbols.names, symbol->st_name, wanted.size() + 1);
+    const auto name = elf_slice(symbols.names, symbol->st_name, wanted.size() + 1);
     if (name && std::memcmp(name->data(), wanted.data(), wanted.size()) == 0 &&
         name->back() == std::byte{0}) {
       return symbol;
@@ -149,13 +134,13 @@ std::optional<Elf64_Sym> find_export(const Symbols& symbols, std::string_view wa
 }
 
 // The version that plc_app_abi will have once it is loaded; nothing if it lies in no part of the file.
-std::optional<unsigned> read_version(Bytes file, Bytes segments, const Elf64_Sym& symbol) {
-  for (std::uint64_t i = 0; const auto segment = item<Elf64_Phdr>(segments, i); ++i) {
+std::optional<unsigned> read_version(ElfBytes file, ElfBytes segments, const Elf64_Sym& symbol) {
+  for (std::uint64_t i = 0; const auto segment = elf_item<Elf64_Phdr>(segments, i); ++i) {
     if (segment->p_type != PT_LOAD || symbol.st_value < segment->p_vaddr) continue;
     const std::uint64_t inside = symbol.st_value - segment->p_vaddr;
     if (segment->p_filesz < sizeof(unsigned) || inside > segment->p_filesz - sizeof(unsigned)) continue;
-    const auto bytes = slice(file, segment->p_offset, segment->p_filesz);
-    return bytes ? item<unsigned>(bytes->subspan(inside), 0) : std::nullopt;
+    const auto bytes = elf_slice(file, segment->p_offset, segment->p_filesz);
+    return bytes ? elf_item<unsigned>(bytes->subspan(inside), 0) : std::nullopt;
   }
   return std::nullopt;
 }
@@ -187,7 +172,7 @@ Result<std::vector<std::byte>> read_file(const std::string& path) {
 
 }  // namespace
 
-Result<void> check_elf(Bytes file, std::span<const std::string_view> symbols) {
+Result<void> check_elf(ElfBytes file, std::span<const std::string_view> symbols) {
   const auto header = check_header(file);
   if (!header) return std::unexpected(header.error());
   const auto tables = find_tables(file, *header);

@@ -16,6 +16,8 @@
 #include <elf.h>
 #include <fmt/format.h>
 
+#include "instances/runtime/elf_bytes.hpp"
+
 namespace plchost {
 
 namespace {
@@ -33,56 +35,41 @@ std::string demangled(const char* name) {
   return readable ? std::string(readable.get()) : std::string(name);
 }
 
-/// One ELF file in memory. Reads nothing beyond its end, whatever the file says.
-class ElfFile {
- public:
-  explicit ElfFile(const char* path) {
-    std::ifstream file(path, std::ios::binary);
-    bytes_.assign(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>());
+std::optional<Function> function_in(ElfBytes symbols, ElfBytes names, std::uint64_t address) {
+  for (std::uint64_t i = 0; const auto symbol = elf_item<Elf64_Sym>(symbols, i); ++i) {
+    const bool function = ELF64_ST_TYPE(symbol->st_info) == STT_FUNC && symbol->st_shndx != SHN_UNDEF;
+    if (!function || address < symbol->st_value || address - symbol->st_value >= symbol->st_size) continue;
+    if (symbol->st_name >= names.size()) break;
+    const ElfBytes rest = names.subspan(symbol->st_name);
+    const auto* const name = reinterpret_cast<const char*>(rest.data());
+    return Function{.name = demangled(std::string(name, ::strnlen(name, rest.size())).c_str()),
+                    .offset = address - symbol->st_value};
   }
+  return std::nullopt;
+}
 
-  [[nodiscard]] std::optional<Function> function_at(std::uint64_t address) const {
-    const auto header = read<Elf64_Ehdr>(0);
-    if (!header || std::memcmp(header->e_ident, ELFMAG, SELFMAG) != 0 ||
-        header->e_ident[EI_CLASS] != ELFCLASS64)
-      return std::nullopt;
-    for (unsigned i = 0; i < header->e_shnum; ++i) {
-      const auto section = read<Elf64_Shdr>(header->e_shoff + std::uint64_t{i} * sizeof(Elf64_Shdr));
-      if (!section || section->sh_type != SHT_SYMTAB) continue;
-      const auto names =
-          read<Elf64_Shdr>(header->e_shoff + std::uint64_t{section->sh_link} * sizeof(Elf64_Shdr));
-      if (names) return function_in(*section, *names, address);
-    }
+// The full symbol table, which the dynamic loader does not read: it knows the program's own functions, too.
+std::optional<Function> function_at(ElfBytes file, std::uint64_t address) {
+  const auto header = elf_item<Elf64_Ehdr>(file, 0);
+  if (!header || std::memcmp(header->e_ident, ELFMAG, SELFMAG) != 0 ||
+      header->e_ident[EI_CLASS] != ELFCLASS64)
     return std::nullopt;
+  const auto sections = elf_slice(file, header->e_shoff, std::uint64_t{header->e_shnum} * sizeof(Elf64_Shdr));
+  if (!sections) return std::nullopt;
+  for (std::uint64_t i = 0; const auto section = elf_item<Elf64_Shdr>(*sections, i); ++i) {
+    if (section->sh_type != SHT_SYMTAB) continue;
+    const auto symbols = elf_slice(file, section->sh_offset, section->sh_size);
+    const auto texts = elf_item<Elf64_Shdr>(*sections, section->sh_link);
+    const auto names = texts ? elf_slice(file, texts->sh_offset, texts->sh_size) : std::nullopt;
+    if (symbols && names) return function_in(*symbols, *names, address);
   }
+  return std::nullopt;
+}
 
- private:
-  template <class T>
-  [[nodiscard]] std::optional<T> read(std::uint64_t offset) const {
-    if (offset > bytes_.size() || bytes_.size() - offset < sizeof(T)) return std::nullopt;
-    T value;
-    std::memcpy(&value, bytes_.data() + offset, sizeof(T));
-    return value;
-  }
-
-  [[nodiscard]] std::optional<Function> function_in(const Elf64_Shdr& symbols, const Elf64_Shdr& names,
-                                                    std::uint64_t address) const {
-    for (std::uint64_t at = 0; at < symbols.sh_size; at += sizeof(Elf64_Sym)) {
-      const auto symbol = read<Elf64_Sym>(symbols.sh_offset + at);
-      if (!symbol) break;
-      const bool function = ELF64_ST_TYPE(symbol->st_info) == STT_FUNC && symbol->st_shndx != SHN_UNDEF;
-      if (!function || address < symbol->st_value || address - symbol->st_value >= symbol->st_size) continue;
-      const std::uint64_t name = names.sh_offset + symbol->st_name;
-      if (name >= bytes_.size()) break;
-      const std::size_t length = ::strnlen(bytes_.data() + name, bytes_.size() - name);
-      return Function{.name = demangled(std::string(bytes_.data() + name, length).c_str()),
-                      .offset = address - symbol->st_value};
-    }
-    return std::nullopt;
-  }
-
-  std::vector<char> bytes_;
-};
+std::vector<char> contents_of(const char* path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
 
 }  // namespace
 
@@ -94,7 +81,8 @@ std::string symbol_name(std::uintptr_t address) {
     return {};
   const std::string file = std::filesystem::path(info.dli_fname).filename();
   const auto in_file = address - reinterpret_cast<std::uintptr_t>(info.dli_fbase);
-  if (const auto function = ElfFile(info.dli_fname).function_at(in_file)) {
+  const std::vector<char> bytes = contents_of(info.dli_fname);
+  if (const auto function = function_at(std::as_bytes(std::span(bytes)), in_file)) {
     return fmt::format("{}+{:#x} in {}", function->name, function->offset, file);
   }
   if (info.dli_sname != nullptr) {
