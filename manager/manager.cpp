@@ -17,6 +17,7 @@
 #include "manager/system/child_process.hpp"
 #include "shm/base/log.hpp"
 #include "shm/base/thread.hpp"
+#include "shm/base/time.hpp"
 #include "shm/pool/instance_page.hpp"
 #include "shm/pool/memory_file.hpp"
 #include "shm/pool/reference_clock.hpp"
@@ -161,13 +162,12 @@ void Manager::make_supervisor() {
 }
 
 void Manager::write_host() {
-  const auto now = std::chrono::system_clock::now().time_since_epoch();
   HostStatus status;
   status.name.assign(config_.host.name);
   status.version.assign(PLCHOST_VERSION);
   status.manager_pid = ::getpid();
   status.instance_count = static_cast<std::uint32_t>(config_.instances.size());
-  status.started_unix_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(now).count();
+  status.started_unix_ns = unix_time_ns();
   take_over_restarts();
   for (std::size_t i = 0; i < supervisor_->size(); ++i) {
     page_->write_instance(static_cast<std::uint32_t>(i), supervisor_->instance(i).status());

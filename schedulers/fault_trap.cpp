@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "shm/base/system_call.hpp"
+#include "shm/base/time.hpp"
 
 namespace plchost {
 
@@ -67,12 +68,6 @@ std::uintptr_t caller_of(const ucontext_t& context) noexcept {
 #endif
 }
 
-std::int64_t unix_now() noexcept {
-  timespec now{};
-  ::clock_gettime(CLOCK_REALTIME, &now);
-  return (std::chrono::seconds(now.tv_sec) + std::chrono::nanoseconds(now.tv_nsec)).count();
-}
-
 // As if there were no handler. A fault of the processor comes back by itself when the handler returns; a
 // signal that was sent is sent again.
 void crash(int signal, const siginfo_t& info) noexcept {
@@ -93,7 +88,7 @@ bool TaskFault::claim(bool whole_application) noexcept {
   State none = State::none;
   if (!state_.compare_exchange_strong(none, State::claimed, std::memory_order_acq_rel)) return false;
   if (board_ != nullptr && (whole_application || policy_ == WatchdogPolicy::application)) board_->halt();
-  record_.unix_ns = unix_now();
+  record_.unix_ns = unix_time_ns();
   return true;
 }
 

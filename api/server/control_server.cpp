@@ -7,7 +7,6 @@
 
 #include <sys/epoll.h>
 #include <sys/signalfd.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "api/dds/samples.hpp"
@@ -15,6 +14,7 @@
 #include "api/server/control_server_parts.hpp"
 #include "shm/base/log.hpp"
 #include "shm/base/system_call.hpp"
+#include "shm/base/time.hpp"
 
 namespace plchost {
 
@@ -39,10 +39,7 @@ Result<std::unique_ptr<ControlServer>> ControlServer::create(ServerOptions optio
   if (!pool) return failure_in("attach the pool", pool.error());
   auto ledger = PostLedger::open(options.pool);
   if (!ledger) return std::unexpected(ledger.error());
-  timespec now{};
-  ::clock_gettime(CLOCK_REALTIME, &now);
-  const auto epoch =
-      static_cast<std::uint64_t>(now.tv_sec) * 1'000'000'000U + static_cast<std::uint64_t>(now.tv_nsec);
+  const auto epoch = static_cast<std::uint64_t>(unix_time_ns());
   auto parts = std::make_unique<Parts>(std::move(options), std::move(*pool), epoch);
   if (auto opened = parts->open(std::move(*ledger)); !opened) return std::unexpected(opened.error());
   return std::unique_ptr<ControlServer>(new ControlServer(std::move(parts)));

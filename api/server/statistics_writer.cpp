@@ -50,7 +50,7 @@ std::uint32_t share_ppm(std::int64_t part, std::int64_t whole) noexcept {
 
 void put_counters(const TaskCounters& counters, TimePoint now, plc_TaskStatistics& sample) noexcept {
   sample.since_unix_ns = counters.since_unix_ns;
-  sample.elapsed_ns = difference(now.time_since_epoch().count(), counters.since_ns);
+  sample.elapsed_ns = wrapping_difference(now.time_since_epoch().count(), counters.since_ns);
   sample.cycles = counters.cycles;
   sample.recorded = counters.recorded;
   sample.lost_cycles = counters.lost_cycles;
@@ -68,9 +68,9 @@ void put_counters(const TaskCounters& counters, TimePoint now, plc_TaskStatistic
   sample.period_jitter = {counters.jitter_last_ns, counters.jitter_min_ns, counters.jitter_max_ns,
                           average(counters.jitter_sum_ns, counters.periods)};
   const std::int64_t least = sample.latency.min_ns;
-  sample.release_jitter = {difference(sample.latency.last_ns, least), 0,
-                           difference(sample.latency.max_ns, least),
-                           difference(sample.latency.average_ns, least)};
+  sample.release_jitter = {wrapping_difference(sample.latency.last_ns, least), 0,
+                           wrapping_difference(sample.latency.max_ns, least),
+                           wrapping_difference(sample.latency.average_ns, least)};
 }
 
 }  // namespace
@@ -94,7 +94,7 @@ bool StatisticsWriter::write(const std::string& instance, const InstancePageRead
   const auto read = [&](TaskHistogram which) { return page.histogram(index, which); };
   Histogram latency(read(TaskHistogram::latency), counters.latency_min_ns, counters.latency_max_ns);
   Histogram execution(read(TaskHistogram::execution), counters.exec_min_ns, counters.exec_max_ns);
-  Histogram negative(read(TaskHistogram::jitter_negative), 0, difference(0, counters.jitter_min_ns));
+  Histogram negative(read(TaskHistogram::jitter_negative), 0, wrapping_difference(0, counters.jitter_min_ns));
   Histogram positive(read(TaskHistogram::jitter_positive), 0, counters.jitter_max_ns);
   latency.put_into(sample.latency_histogram);
   execution.put_into(sample.execution_histogram);

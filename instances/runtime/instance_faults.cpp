@@ -1,7 +1,6 @@
 // What an Instance does when one of its tasks has a fault.
 
 #include <csignal>
-#include <utility>
 
 #include <fmt/format.h>
 
@@ -41,8 +40,7 @@ void Instance::serve_faults() {
     const std::string where = entry.symbol.empty() ? std::string() : fmt::format(" at {}", entry.symbol);
     const std::string reason = fmt::format("task '{}': {}{}", entry.task, entry.text, where);
     spdlog::error("exception: {}", reason);
-    page_->task(static_cast<std::uint32_t>(fault->task))
-        .state.store(std::to_underlying(PageTaskState::exception), std::memory_order_relaxed);
+    mark_exception(fault->task);
     keep_exception(entry);
     parked_ = tasks_->has_parked_thread();
     if (fault->whole_application) enter_exception(reason);

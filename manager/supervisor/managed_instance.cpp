@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "shm/base/log.hpp"
+#include "shm/base/time.hpp"
 
 namespace plchost {
 
@@ -364,10 +365,7 @@ Result<std::uint64_t> ManagedInstance::send(ControlVerb verb, const std::string&
 void ManagedInstance::set_state(Phase phase, InstanceState state, const std::string& problem) {
   const InstanceState before = status_.state;
   const bool was_up = phase_ == Phase::up;
-  if (state != before) {
-    const auto since = std::chrono::system_clock::now().time_since_epoch();
-    status_.state_since_unix_ns = std::chrono::duration_cast<std::chrono::nanoseconds>(since).count();
-  }
+  if (state != before) status_.state_since_unix_ns = unix_time_ns();
   phase_ = phase;
   status_.state = state;
   status_.problem.assign(problem);

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "shm/base/time.hpp"
+#include "shm/base/wrapping.hpp"
 
 namespace plchost {
 
@@ -38,14 +39,6 @@ struct ClockModel {
     reference_ns = wrapping_sum(reference_ns, elapsed.count() + static_cast<std::int64_t>(whole));
     fraction_ns = excess - whole;
     local = when;
-  }
-
-  // A stranger's stamps may lie anywhere: signed overflow must not.
-  [[nodiscard]] static std::int64_t wrapping_sum(std::int64_t a, std::int64_t b) noexcept {
-    return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) + static_cast<std::uint64_t>(b));
-  }
-  [[nodiscard]] static std::int64_t wrapping_difference(std::int64_t a, std::int64_t b) noexcept {
-    return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) - static_cast<std::uint64_t>(b));
   }
 };
 

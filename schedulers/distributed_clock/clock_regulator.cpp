@@ -48,9 +48,9 @@ auto ClockRegulator::feed(const ReferencePair& pair) noexcept -> Verdict {
   if (elapsed <= Duration::zero()) return Verdict::out_of_order;
   if (elapsed < kMinSpacing) return Verdict::skipped;
   // Of two whole numbers first: a double has not enough digits for a date.
-  const std::int64_t expected = ClockModel::wrapping_sum(model_.reference_ns, elapsed.count());
-  const double error_ns = static_cast<double>(ClockModel::wrapping_difference(pair.reference_ns, expected)) -
-                          model_.excess_ns(elapsed);
+  const std::int64_t expected = wrapping_sum(model_.reference_ns, elapsed.count());
+  const double error_ns =
+      static_cast<double>(wrapping_difference(pair.reference_ns, expected)) - model_.excess_ns(elapsed);
   const bool outlier = std::abs(error_ns) > limit_ns(elapsed);
   const double clipped = std::min(std::abs(error_ns), kScatterClip * std::max(scatter_ns_, 1.0));
   scatter_ns_ += (clipped - scatter_ns_) / kMemory;

@@ -13,7 +13,7 @@ namespace plchost {
 /// `interval` (> 0) is `offset`. At most half of an interval either way; negative: ahead of it. Pure.
 [[nodiscard]] inline Duration deviation_from_grid(const ClockModel& model, TimePoint release,
                                                   Duration interval, Duration offset) noexcept {
-  const std::int64_t since = ClockModel::wrapping_difference(model.reference_at(release), offset.count());
+  const std::int64_t since = wrapping_difference(model.reference_at(release), offset.count());
   Duration phase(since % interval.count());
   if (phase < Duration::zero()) phase += interval;
   return phase > interval / 2 ? phase - interval : phase;

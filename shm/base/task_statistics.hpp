@@ -12,6 +12,7 @@
 #include "shm/base/duration_histogram.hpp"
 #include "shm/base/seqlock.hpp"
 #include "shm/base/time.hpp"
+#include "shm/base/wrapping.hpp"
 
 namespace plchost {
 
@@ -55,17 +56,13 @@ struct TaskCounters {
   const auto divisor = static_cast<std::int64_t>(std::min<std::uint64_t>(count, INT64_MAX));
   return divisor == 0 ? 0 : sum / divisor;
 }
-/// a - b, wrapping around.
-[[nodiscard]] constexpr std::int64_t difference(std::int64_t a, std::int64_t b) noexcept {
-  return static_cast<std::int64_t>(static_cast<std::uint64_t>(a) - static_cast<std::uint64_t>(b));
-}
 /// The largest deviation of a period, in either direction.
 [[nodiscard]] constexpr std::int64_t largest_jitter_ns(const TaskCounters& counters) noexcept {
   return std::max(counters.jitter_max_ns, -std::max(counters.jitter_min_ns, -INT64_MAX));
 }
 /// How far the latencies lie apart.
 [[nodiscard]] constexpr std::int64_t release_jitter_ns(const TaskCounters& counters) noexcept {
-  return difference(counters.latency_max_ns, counters.latency_min_ns);
+  return wrapping_difference(counters.latency_max_ns, counters.latency_min_ns);
 }
 
 /// The histograms of a task: where the buckets of each lie in its memory.

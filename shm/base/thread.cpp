@@ -112,9 +112,7 @@ void Thread::join_unless(const std::function<bool()>& abandoned) noexcept {
   if (!std::exchange(running_, false)) return;
   constexpr Duration kLook = std::chrono::milliseconds(10);
   for (;;) {
-    timespec until{};
-    ::clock_gettime(CLOCK_REALTIME, &until);
-    until = to_timespec(std::chrono::seconds(until.tv_sec) + Duration(until.tv_nsec) + kLook);
+    const timespec until = to_timespec(Duration(unix_time_ns()) + kLook);
     if (pthread_timedjoin_np(handle_, nullptr, &until) != ETIMEDOUT) return;
     if (abandoned()) break;
   }

@@ -17,7 +17,6 @@ namespace plchost {
 
 namespace {
 
-constexpr const char* kDirectory = "/dev/shm";
 constexpr std::size_t kMaxFileName = 255;  // NAME_MAX
 constexpr mode_t kMode = 0660;
 
@@ -25,7 +24,7 @@ Result<std::string> path_of(const std::string& name) {
   if (auto valid = check_name("shared memory name", name, kMaxFileName); !valid) {
     return std::unexpected(valid.error());
   }
-  return fmt::format("{}/{}", kDirectory, name);
+  return fmt::format("{}/{}", MemoryFile::kDirectory, name);
 }
 
 Result<std::span<std::byte>> map(const UniqueFd& fd, std::size_t size, MemoryFile::Access access,
@@ -49,7 +48,7 @@ Result<void> allocate(const UniqueFd& fd, std::size_t size, const std::string& p
         ErrorCode::full,
         fmt::format("{} bytes of shared memory for {}: {} has no room; free some there, enlarge it or "
                     "ask for less",
-                    size, path, kDirectory),
+                    size, path, MemoryFile::kDirectory),
         error);
   }
   return check_returned(error, fmt::format("allocate {} bytes for {}", size, path));
@@ -61,10 +60,10 @@ Result<UniqueFd> make_nameless(std::size_t size, const std::string& path) {
                    fmt::format("shared memory {} must have at least 1 byte", path));
   }
   // Without a name until it is complete: there is no half-made one for others to find or to clean up after.
-  UniqueFd fd(::open(kDirectory, O_TMPFILE | O_RDWR | O_CLOEXEC, kMode));
+  UniqueFd fd(::open(MemoryFile::kDirectory, O_TMPFILE | O_RDWR | O_CLOEXEC, kMode));
   if (!fd) {
     const int error = errno;
-    return failure(ErrorCode::system, fmt::format("make shared memory in {}", kDirectory), error);
+    return failure(ErrorCode::system, fmt::format("make shared memory in {}", MemoryFile::kDirectory), error);
   }
   if (auto mode = check_errno(::fchmod(fd.get(), kMode), "fchmod " + path); !mode) {
     return std::unexpected(mode.error());

@@ -12,6 +12,8 @@ namespace plchost {
 /// A named shared memory, mapped into this process. The name outlives the process; the mapping does not.
 class MemoryFile {
  public:
+  static constexpr const char* kDirectory = "/dev/shm";  ///< where all of them lie
+
   enum class Access : bool { read_only, read_write };
   /// Writes the first contents. Nobody else sees the memory before it has returned: the name is given last,
   /// and not at all if this fails.

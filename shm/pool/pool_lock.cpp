@@ -82,7 +82,7 @@ int lock_until(pthread_mutex_t& mutex, TimePoint deadline) noexcept {
   if (const int error = pthread_mutex_trylock(&mutex); error != EBUSY) return error;
   for (;;) {
     const Duration left = std::max(deadline - MonotonicClock::now(), Duration::zero());
-    const timespec until = to_timespec(std::chrono::system_clock::now().time_since_epoch() + left);
+    const timespec until = to_timespec(Duration(unix_time_ns()) + left);
     const int error = pthread_mutex_timedlock(&mutex, &until);
     if (error != ETIMEDOUT || left == Duration::zero()) return error;
   }

@@ -15,8 +15,6 @@ namespace plchost {
 
 namespace {
 
-constexpr const char* kDirectory = "/dev/shm";
-
 static_assert(sizeof(plc_reference_clock) == 64);
 static_assert(offsetof(plc_reference_clock, version) == 8 && offsetof(plc_reference_clock, size) == 12);
 static_assert(offsetof(plc_reference_clock, sequence) == 16 && offsetof(plc_reference_clock, check) == 56);
@@ -59,7 +57,7 @@ std::string pool_memory_name(std::string_view pool, std::string_view name) {
 void remove_pool_memories(std::string_view pool) noexcept {
   const std::string prefix = pool_memory_name(pool, "");
   std::error_code error;
-  for (std::filesystem::directory_iterator at(kDirectory, error), end; !error && at != end;
+  for (std::filesystem::directory_iterator at(MemoryFile::kDirectory, error), end; !error && at != end;
        at.increment(error)) {
     const std::string name = at->path().filename();
     if (name.starts_with(prefix)) MemoryFile::remove(name);
@@ -99,7 +97,7 @@ bool ReferenceClockRecord::replaced() const noexcept {
 
 auto ReferenceClockRecord::identity_of(const std::string& file) noexcept -> Identity {
   struct stat status{};
-  if (::stat(fmt::format("{}/{}", kDirectory, file).c_str(), &status) != 0) return {};
+  if (::stat(fmt::format("{}/{}", MemoryFile::kDirectory, file).c_str(), &status) != 0) return {};
   return {.device = status.st_dev, .inode = status.st_ino};
 }
 

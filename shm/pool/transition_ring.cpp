@@ -4,8 +4,8 @@
 #include <new>
 
 #include <fmt/format.h>
-#include <time.h>
 
+#include "shm/base/time.hpp"
 #include "shm/pool/fixed_page.hpp"
 
 namespace plchost {
@@ -17,12 +17,6 @@ constexpr PageKind kKind{.what = "ring of transitions",
                          .version = 1};                 // 1: first
 
 static_assert(offsetof(TransitionRingLayout, version) == 8 && sizeof(Transition) == 232);
-
-std::int64_t unix_now() noexcept {
-  timespec now{};
-  ::clock_gettime(CLOCK_REALTIME, &now);
-  return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
-}
 
 TransitionRingLayout& layout_of(const MemoryFile& memory) noexcept {
   return *reinterpret_cast<TransitionRingLayout*>(memory.bytes().data());
@@ -36,7 +30,7 @@ Result<void> fill(std::span<std::byte> bytes) {
   auto* const ring = new (bytes.data()) TransitionRingLayout;
   ring->version = kKind.version;
   ring->size = sizeof(TransitionRingLayout);
-  ring->stream_unix_ns = unix_now();
+  ring->stream_unix_ns = unix_time_ns();
   ring->magic = kKind.magic;
   return {};
 }
@@ -83,7 +77,7 @@ void TransitionRing::add(TransitionSource source, std::uint32_t from, std::uint3
                          std::string_view reason) noexcept {
   TransitionRingLayout& ring = layout_of(memory_);
   Transition transition{.sequence = ring.last.fetch_add(1, std::memory_order_acq_rel) + 1,
-                        .time_unix_ns = unix_now(),
+                        .time_unix_ns = unix_time_ns(),
                         .time_monotonic_ns = MonotonicClock::now().time_since_epoch().count(),
                         .source = source,
                         .from = from,
