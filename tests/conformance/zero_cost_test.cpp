@@ -81,8 +81,9 @@ TEST_P(ZeroCost, OfAnEmptyTaskBesideItsWaits) {
     EXPECT_EQ(after.process.ru_majflt - before.process.ru_majflt, 0);
   }
   const auto voluntary = static_cast<std::uint64_t>(after.thread.ru_nvcsw - before.thread.ru_nvcsw);
-  EXPECT_LE(voluntary, cycles);
   const TaskCounters now = counters(0);
+  // A release that is lost at the very end of a cycle may still end a wait.
+  EXPECT_LE(voluntary, cycles + now.lost_cycles);
   std::printf(
       "%llu cycles: %llu voluntary switches, %.0f ns of the task's processor time per cycle, %llu lost, %lld "
       "ns spun per cycle\n",
