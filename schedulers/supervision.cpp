@@ -8,19 +8,6 @@ namespace plchost {
 
 namespace {
 
-Duration cpu_time(clockid_t clock) noexcept {
-  timespec used{};
-  if (::clock_gettime(clock, &used) != 0) return Duration::zero();
-  return std::chrono::seconds(used.tv_sec) + Duration(used.tv_nsec);
-}
-
-// The kernel's number for the CPU clock of a thread of this process.
-clockid_t thread_clock(pid_t thread) noexcept {
-  constexpr unsigned kPerThread = 4;
-  constexpr unsigned kScheduled = 2;
-  return static_cast<clockid_t>((~static_cast<unsigned>(thread) << 3U) | kPerThread | kScheduled);
-}
-
 TimePoint at(const std::atomic<Duration::rep>& stamp) noexcept {
   return TimePoint(Duration(stamp.load(std::memory_order_relaxed)));
 }
@@ -34,8 +21,12 @@ std::vector<bool> freewheeling(const std::vector<std::unique_ptr<Task>>& tasks) 
 }  // namespace
 
 Supervision::Supervision(Clock& clock, const std::vector<std::unique_ptr<Task>>& tasks,
-                         FaultTrap& event_variables)
-    : clock_(clock), watched_(tasks.size() + 1), load_(freewheeling(tasks)), task_times_(tasks.size()) {
+                         FaultTrap& event_variables, const ProcessorTimes& times)
+    : clock_(clock),
+      times_(times),
+      watched_(tasks.size() + 1),
+      load_(freewheeling(tasks)),
+      task_times_(tasks.size()) {
   for (std::size_t i = 0; i < tasks.size(); ++i) {
     watched_[i].trap = &tasks[i]->trap();
     watched_[i].task = tasks[i].get();
@@ -81,9 +72,8 @@ void Supervision::run() noexcept {
   while (!ending_.load(std::memory_order_acquire)) {
     const std::uint32_t order = order_.load(std::memory_order_acquire);
     const bool off = mode_.load(std::memory_order_acquire) == Mode::off;
-    const TimePoint next = off ? kNoDeadline : look(clock_.now());
-    planned_ = next;
-    clock_.wait(order_, order, next);
+    if (off) planned_ = kNoDeadline;
+    clock_.wait(order_, order, off ? kNoDeadline : look(clock_.now()));
   }
 }
 
@@ -92,6 +82,7 @@ TimePoint Supervision::look(TimePoint now) noexcept {
   TimePoint next = kNoDeadline;
   for (Watched& watched : watched_) next = std::min(next, look_at(watched, now));
   if (mode_.load(std::memory_order_relaxed) == Mode::running) next = std::min(next, look_at_load(now));
+  planned_ = next;
   return next;
 }
 
@@ -164,9 +155,9 @@ void Supervision::strike(Watched& watched, TimePoint since, TimePoint now, Fault
 LoadRule::Sample Supervision::sample_load() noexcept {
   for (std::size_t i = 0; i < task_times_.size(); ++i) {
     const pid_t thread = watched_[i].trap->thread();
-    task_times_[i] = thread != 0 ? cpu_time(thread_clock(thread)) : Duration::zero();
+    task_times_[i] = thread != 0 ? times_.of_thread(thread) : Duration::zero();
   }
-  return {.process = cpu_time(CLOCK_PROCESS_CPUTIME_ID), .tasks = task_times_};
+  return {.process = times_.of_process(), .tasks = task_times_};
 }
 
 TimePoint Supervision::look_at_load(TimePoint now) noexcept {

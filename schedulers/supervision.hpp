@@ -7,6 +7,7 @@
 
 #include "schedulers/clock.hpp"
 #include "schedulers/fault_trap.hpp"
+#include "schedulers/processor_times.hpp"
 #include "schedulers/task.hpp"
 #include "schedulers/watchdog_rules.hpp"
 #include "shm/base/thread.hpp"
@@ -27,7 +28,8 @@ class Supervision {
   static constexpr Duration kPatience = std::chrono::milliseconds(10);
 
   /// `event_variables`: the trap of the thread that polls them. All outlive it. Set-up.
-  Supervision(Clock& clock, const std::vector<std::unique_ptr<Task>>& tasks, FaultTrap& event_variables);
+  Supervision(Clock& clock, const std::vector<std::unique_ptr<Task>>& tasks, FaultTrap& event_variables,
+              const ProcessorTimes& times = linux_processor_times());
   Supervision(const Supervision&) = delete;
   Supervision& operator=(const Supervision&) = delete;
   ~Supervision();
@@ -67,6 +69,7 @@ class Supervision {
   [[nodiscard]] LoadRule::Sample sample_load() noexcept;
 
   Clock& clock_;
+  const ProcessorTimes& times_;
   std::vector<Watched> watched_;
   std::atomic<std::uint32_t> order_{0};  // changes with the mode; the thread sleeps on it
   std::atomic<Mode> mode_{Mode::off};
