@@ -55,6 +55,18 @@ std::string describe_signal(const FaultRecord& record) {
   return fmt::format("{} at {:#x}", text, record.memory_address);
 }
 
+std::string_view name_of(StopPhase phase) noexcept {
+  switch (phase) {
+    case StopPhase::outputs:
+      return "the first phase of a stop (tasks that drive outputs)";
+    case StopPhase::others:
+      return "the second phase of a stop (tasks that drive no outputs)";
+    case StopPhase::single_cycle:
+      return "a single cycle of all tasks";
+  }
+  return "a stop";
+}
+
 // Both are the application's and may be faulty themselves: they are copied before the fault is claimed.
 FixedText<FaultRecord::kMaxText> what_of_exception() noexcept {
   try {
@@ -82,6 +94,15 @@ void raise_current_exception(TaskFault& fault, bool event_variable) noexcept {
   record.in_event_variable = event_variable;
   record.text = what;
   record.type = type;
+  fault.publish();
+}
+
+void raise_stop_timeout(TaskFault& fault, StopPhase phase, Duration limit) noexcept {
+  if (!fault.claim(true)) return;
+  FaultRecord& record = fault.record();
+  record.kind = FaultKind::stop_timeout;
+  record.phase = phase;
+  record.limit = limit.count();
   fault.publish();
 }
 
@@ -137,7 +158,8 @@ std::string describe_fault(const FaultRecord& record) {
       return fmt::format("the instance used {} % of its core; the limit is {} %. This task used the most",
                          record.figure, record.limit);
     case FaultKind::stop_timeout:
-      return fmt::format("not at the end of its cycle {:.0f} ms after it was to stop", ms(record.limit));
+      return fmt::format("not at the end of its cycle after {:.0f} ms, the limit of {}", ms(record.limit),
+                         name_of(record.phase));
   }
   return "unknown";
 }

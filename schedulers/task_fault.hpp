@@ -23,25 +23,33 @@ enum class FaultKind : std::uint8_t {
 };
 [[nodiscard]] std::string_view to_string(FaultKind kind) noexcept;
 
+/// What was over when a task had not come to the end of its cycle.
+enum class StopPhase : std::uint8_t {
+  outputs,       ///< the first phase of a stop: tasks that drive outputs
+  others,        ///< its second phase: all others
+  single_cycle,  ///< a single cycle of all tasks
+};
+
 /// One fault, as it was found. Filled by who finds it, also from within a signal handler: so no texts are
 /// made here, see describe_fault().
 struct FaultRecord {
   static constexpr std::size_t kMaxText = 199;
 
   FaultKind kind = FaultKind::signal;
-  bool in_event_variable = false;     ///< while the scheduler read the task's BOOL, not in its cycle
-  bool stack_overflow = false;        ///< SIGSEGV just where the stack ended
-  int signal = 0;                     ///< 0 if it was none
-  int signal_code = 0;                ///< si_code
-  std::uintptr_t address = 0;         ///< of the instruction; 0 if not known
-  std::uintptr_t caller = 0;          ///< who jumped to `address` if no code is there; 0 if not known
-  std::uintptr_t memory_address = 0;  ///< what SIGSEGV and SIGBUS were about
-  std::int64_t figure = 0;            ///< the watchdog's measure: ns, cycles or percent, by kind
-  std::int64_t limit = 0;             ///< what it may be at most, in the same unit
-  std::int64_t count = 0;             ///< consecutive_overruns: how many
-  std::int64_t unix_ns = 0;           ///< CLOCK_REALTIME
-  FixedText<kMaxText> text;           ///< cpp_exception: its what()
-  FixedText<kMaxText> type;           ///< cpp_exception: the name of its type as the compiler mangles it
+  bool in_event_variable = false;        ///< while the scheduler read the task's BOOL, not in its cycle
+  bool stack_overflow = false;           ///< SIGSEGV just where the stack ended
+  int signal = 0;                        ///< 0 if it was none
+  int signal_code = 0;                   ///< si_code
+  std::uintptr_t address = 0;            ///< of the instruction; 0 if not known
+  std::uintptr_t caller = 0;             ///< who jumped to `address` if no code is there; 0 if not known
+  std::uintptr_t memory_address = 0;     ///< what SIGSEGV and SIGBUS were about
+  std::int64_t figure = 0;               ///< the watchdog's measure: ns, cycles or percent, by kind
+  std::int64_t limit = 0;                ///< what it may be at most, in the same unit
+  std::int64_t count = 0;                ///< consecutive_overruns: how many
+  StopPhase phase = StopPhase::outputs;  ///< stop_timeout: what was over
+  std::int64_t unix_ns = 0;              ///< CLOCK_REALTIME
+  FixedText<kMaxText> text;              ///< cpp_exception: its what()
+  FixedText<kMaxText> type;              ///< cpp_exception: the name of its type as the compiler mangles it
 };
 
 /// What all tasks of a set share about faults: whoever finds one raises it here, the control thread waits for
@@ -92,6 +100,10 @@ class TaskFault {
 
 /// Within a catch (...): raises the fault for the exception that is being handled. Real-time.
 void raise_current_exception(TaskFault& fault, bool event_variable = false) noexcept;
+
+/// The task has not come to the end of its cycle within `limit`: raises the fault, and whatever its policy
+/// says no task begins another cycle. Nothing happens if a fault was raised before. Control thread.
+void raise_stop_timeout(TaskFault& fault, StopPhase phase, Duration limit) noexcept;
 
 /// In words: what happened, with its figures. Without addresses, which only the process can name.
 [[nodiscard]] std::string describe_fault(const FaultRecord& record);

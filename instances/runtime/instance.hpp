@@ -112,12 +112,13 @@ class Instance {
   [[nodiscard]] Result<std::string> begin_single_cycle();
   [[nodiscard]] bool in_transition() const noexcept;
   void finish_transition(const std::vector<std::size_t>& stuck);
-  void mark_exception(std::size_t task);
+  [[nodiscard]] std::string time_out(std::size_t task);
   void answer_waiting(ErrorCode code, const std::string& text);
 
   [[nodiscard]] std::string hold_idle_states();
   void choose_scheduler();
   void report_tick();
+  [[nodiscard]] std::string keep_fault(const TaskSet::Fault& fault);
   void keep_exception(const ExceptionEntry& entry) const;
   void restore_operator_events();
   void notify_tasks(unsigned event);

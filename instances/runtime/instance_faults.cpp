@@ -36,15 +36,21 @@ ExceptionEntry entry_of(const TaskSet::Fault& fault, const std::string& applicat
 
 void Instance::serve_faults() {
   while (const auto fault = tasks_->take_fault()) {
-    const ExceptionEntry entry = entry_of(*fault, application_->path());
-    const std::string where = entry.symbol.empty() ? std::string() : fmt::format(" at {}", entry.symbol);
-    const std::string reason = fmt::format("task '{}': {}{}", entry.task, entry.text, where);
-    spdlog::error("exception: {}", reason);
-    mark_exception(fault->task);
-    keep_exception(entry);
-    parked_ = tasks_->has_parked_thread();
+    const std::string reason = keep_fault(*fault);
     if (fault->whole_application) enter_exception(reason);
   }
+}
+
+// Logged, shown in the status page, and written down. What is to be said of it.
+std::string Instance::keep_fault(const TaskSet::Fault& fault) {
+  const ExceptionEntry entry = entry_of(fault, application_->path());
+  const std::string where = entry.symbol.empty() ? std::string() : fmt::format(" at {}", entry.symbol);
+  std::string reason = fmt::format("task '{}': {}{}", entry.task, entry.text, where);
+  spdlog::error("exception: {}", reason);
+  page_->task(static_cast<std::uint32_t>(fault.task))
+      .state.store(std::to_underlying(PageTaskState::exception), std::memory_order_relaxed);
+  keep_exception(entry);
+  return reason;
 }
 
 void Instance::keep_exception(const ExceptionEntry& entry) const {

@@ -88,16 +88,21 @@ void Instance::finish_transition(const std::vector<std::size_t>& stuck) {
     beat();
     return answer_waiting(ErrorCode::ok, "");
   }
-  for (const std::size_t task : stuck) mark_exception(task);
-  enter_exception(
-      fmt::format("stop_timeout: not at the end of its cycle after {} ms (tasks that drive outputs) or {} ms "
-                  "(the others): task {}",
-                  in_ms(settings_.stop.outputs), in_ms(settings_.stop.others), tasks_->names_of(stuck)));
+  std::vector<std::string> late;
+  for (const std::size_t task : stuck) late.push_back(time_out(task));
+  // Each is an exception of its own; the application's state names them all.
+  while (const auto fault = tasks_->take_fault()) (void)keep_fault(*fault);
+  enter_exception(fmt::format("stop_timeout: not at the end of its cycle: task {}", fmt::join(late, ", ")));
 }
 
-void Instance::mark_exception(std::size_t task) {
-  page_->task(static_cast<std::uint32_t>(task))
-      .state.store(std::to_underlying(PageTaskState::exception), std::memory_order_relaxed);
+// "Main (after 200 ms)"
+std::string Instance::time_out(std::size_t task) {
+  const TaskConfig& config = tasks_->task(task).config();
+  StopPhase phase = config.drives_outputs ? StopPhase::outputs : StopPhase::others;
+  if (life_.state() == ApplicationState::single_cycle) phase = StopPhase::single_cycle;
+  const Duration limit = phase == StopPhase::outputs ? settings_.stop.outputs : settings_.stop.others;
+  raise_stop_timeout(tasks_->task(task).fault(), phase, limit);
+  return fmt::format("{} (after {} ms)", config.name, in_ms(limit));
 }
 
 void Instance::enter_exception(const std::string& reason) {
@@ -141,6 +146,7 @@ Result<void> Instance::shut_down() {
     (void)host_->events().publish_bound(false);
     tasks_->park_all();
     const auto busy = tasks_->still_busy(MonotonicClock::now() + kParkPatience);
+    parked_ = tasks_->has_parked_thread();  // also one that a watchdog caught after its stop had timed out
     if (busy.empty()) {
       notify_tasks(EVT_PrepareExternalEventTaskDelete);
     } else {

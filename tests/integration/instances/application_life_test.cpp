@@ -3,29 +3,42 @@
 #include <algorithm>
 #include <csignal>
 #include <cstdlib>
+#include <thread>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "instances/launch/launch_contract.hpp"
+#include "shm/base/exception_history.hpp"
 #include "tests/integration/instances/instance_process.hpp"
 
 namespace plchost::testing {
 namespace {
 
 using namespace std::chrono_literals;
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 class LifeInProcess : public ::testing::Test {
  protected:
-  /// `limit_ms`: of both phases of a stop.
+  /// Of the phases of a stop.
+  struct Limits {
+    int outputs_ms;
+    int others_ms;
+  };
+  /// `limit_ms`: of both phases.
   void start(int limit_ms, std::vector<std::string> more = {}) {
+    start(Limits{.outputs_ms = limit_ms, .others_ms = limit_ms}, "", std::move(more));
+  }
+  /// `sections`: more of the settings.
+  void start(Limits limits, const std::string& sections, std::vector<std::string> more = {}) {
     const std::string settings = sandbox_.write(
-        "line1.cfg", fmt::format("[CmpSchedule]\nWatchdog.DefaultTimeMs=0\nStop.OutputsLimitMs={0}\n"
-                                 "Stop.OthersLimitMs={0}\n[Task.Output]\nDrivesOutputs=1\n",
-                                 limit_ms));
+        "line1.cfg", fmt::format("[CmpSchedule]\nWatchdog.DefaultTimeMs=0\nStop.OutputsLimitMs={}\n"
+                                 "Stop.OthersLimitMs={}\n[Task.Output]\nDrivesOutputs=1\n{}",
+                                 limits.outputs_ms, limits.others_ms, sections));
     more.insert(more.end(), {"--settings", settings, "--application", application("held")});
     const bool stopped = std::ranges::find(more, "--stopped") != more.end();
     sut_.emplace(sandbox_, more);
@@ -43,6 +56,21 @@ class LifeInProcess : public ::testing::Test {
       const auto free = cycles("Free");
       return eventually([&] { return cycles("Free") > free + 3; }) && cycles(task) == held;
     }));
+  }
+  [[nodiscard]] std::vector<ExceptionEntry> exceptions() const {
+    const auto history = read_exceptions(exception_path(sandbox_.folder(), "line1"));
+    EXPECT_TRUE(history) << history.error().describe();
+    return history.value_or(ExceptionHistory{}).entries;
+  }
+  static void expect_stop_timeout(const ExceptionEntry& entry, const std::string& task, int limit_ms,
+                                  const std::string& phase) {
+    EXPECT_EQ(entry.kind, "stop timeout");
+    EXPECT_EQ(entry.task, task);
+    EXPECT_THAT(entry.text, AllOf(HasSubstr(fmt::format("after {} ms", limit_ms)), HasSubstr(phase)));
+    EXPECT_THAT(entry.application, HasSubstr("held.so"));
+    EXPECT_TRUE(entry.whole_application);
+    EXPECT_EQ(entry.signal, "");
+    EXPECT_GT(entry.unix_ns, 0);
   }
   [[nodiscard]] ApplicationState state() const {
     const auto page = InstancePageReader::open(sandbox_.pool(), "line1");
@@ -109,17 +137,50 @@ TEST_F(LifeInProcess, ServesOthersWhileItStops) {
 }
 
 TEST_F(LifeInProcess, GoesToExceptionByATaskThatDrivesOutputsAndDoesNotStop) {
-  start(200);
+  start({.outputs_ms = 200, .others_ms = 10'000}, "");
   hold("Output");
-  expect_refused(ControlVerb::stop, ErrorCode::timed_out, "task Output");
+  expect_refused(ControlVerb::stop, ErrorCode::timed_out, "task Output (after 200 ms)");
+  ASSERT_EQ(exceptions().size(), 1U);
+  expect_stop_timeout(exceptions()[0], "Output", 200, "first phase of a stop (tasks that drive outputs)");
   expect_exception_of("Output");
 }
 
 TEST_F(LifeInProcess, GoesToExceptionByAnotherTaskThatDoesNotStop) {
-  start(200);
+  start({.outputs_ms = 10'000, .others_ms = 200}, "");
+  hold("Other");
+  expect_refused(ControlVerb::stop, ErrorCode::timed_out, "task Other (after 200 ms)");
+  ASSERT_EQ(exceptions().size(), 1U);
+  expect_stop_timeout(exceptions()[0], "Other", 200, "second phase of a stop");
+  expect_exception_of("Other");
+}
+
+TEST_F(LifeInProcess, KeepsAnExceptionForEachTaskThatDoesNotStop) {
+  start({.outputs_ms = 100, .others_ms = 200}, "");
+  hold("Output");
+  hold("Other");
+  expect_refused(ControlVerb::stop, ErrorCode::timed_out, "task Output (after 100 ms), Other (after 200 ms)");
+  ASSERT_EQ(exceptions().size(), 2U);
+  expect_stop_timeout(exceptions()[0], "Output", 100, "first phase");
+  expect_stop_timeout(exceptions()[1], "Other", 200, "second phase");
+  expect_exception_of("Output");
+}
+
+TEST_F(LifeInProcess, KeepsTheStopTimeoutOfATaskThatAWatchdogCatchesLater) {
+  start({.outputs_ms = 200, .others_ms = 200}, "[Task.Other]\nWatchdog.TimeUs=2000000\n");
   hold("Other");
   expect_refused(ControlVerb::stop, ErrorCode::timed_out, "task Other");
-  expect_exception_of("Other");
+  std::this_thread::sleep_for(3s);
+  ASSERT_EQ(exceptions().size(), 1U);
+  expect_stop_timeout(exceptions()[0], "Other", 200, "second phase");
+  EXPECT_EQ(sut_->end(SIGTERM), EXIT_SUCCESS) << "it is not caught";
+  EXPECT_THAT(sut_->log(), Not(HasSubstr("application: exit")));
+}
+
+TEST_F(LifeInProcess, KeepsNoExceptionOfAStopThatComesToItsEnd) {
+  start(10'000);
+  EXPECT_EQ(sut_->ask(ControlVerb::stop).code, ErrorCode::ok);
+  EXPECT_EQ(sut_->end(SIGTERM), EXIT_SUCCESS);
+  EXPECT_THAT(exceptions(), ::testing::IsEmpty());
 }
 
 TEST_F(LifeInProcess, StopsInTwoPhasesAtTheEndOfTheProcess) {
@@ -205,7 +266,9 @@ TEST_F(LifeInProcess, GoesToExceptionByASingleCycleThatDoesNotEnd) {
   expect_refused(ControlVerb::start, ErrorCode::busy, "single cycle");
   const auto reply = receive(socket);
   EXPECT_EQ(reply.code, ErrorCode::timed_out);
-  EXPECT_THAT(reply.text, HasSubstr("Other"));
+  EXPECT_THAT(reply.text, HasSubstr("Other (after 300 ms)"));
+  ASSERT_EQ(exceptions().size(), 1U);
+  expect_stop_timeout(exceptions()[0], "Other", 300, "a single cycle");
   EXPECT_EQ(cycles("Output"), 1U);
   EXPECT_EQ(cycles("Free"), 0U);  // its turn comes after Other
   expect_exception_of("Other");

@@ -237,6 +237,36 @@ TEST_F(TaskTest, FaultOfATaskByItselfHaltsNoOther) {
   EXPECT_FALSE(other.fault().halts());
 }
 
+TEST_F(TaskTest, StopThatItDoesNotComeBackForIsAFaultOfTheWholeApplication) {
+  TaskConfig config = cyclic();
+  config.watchdog.policy = WatchdogPolicy::task;
+  FaultBoard board;
+  Task sut(clock, config, statistics, nullptr, &board);
+  raise_stop_timeout(sut.fault(), StopPhase::outputs, milliseconds(200));
+  raise_stop_timeout(sut.fault(), StopPhase::others, milliseconds(300));  // the first one is kept
+  const FaultRecord* const record = sut.fault().published();
+  ASSERT_NE(record, nullptr);
+  EXPECT_EQ(to_string(record->kind), "stop timeout");
+  EXPECT_EQ(describe_fault(*record),
+            "not at the end of its cycle after 200 ms, the limit of the first phase of a stop (tasks that "
+            "drive outputs)");
+  EXPECT_GT(record->unix_ns, 0);
+  EXPECT_TRUE(board.halted());
+}
+
+TEST_F(TaskTest, StopTimeoutTellsItsPhase) {
+  FaultRecord record;
+  record.kind = FaultKind::stop_timeout;
+  record.limit = Duration(milliseconds(25'000)).count();
+  record.phase = StopPhase::others;
+  EXPECT_EQ(describe_fault(record),
+            "not at the end of its cycle after 25000 ms, the limit of the second phase of a stop (tasks that "
+            "drive no outputs)");
+  record.phase = StopPhase::single_cycle;
+  EXPECT_EQ(describe_fault(record),
+            "not at the end of its cycle after 25000 ms, the limit of a single cycle of all tasks");
+}
+
 TEST_F(TaskTest, WatchdogHitsAtTheEndOfTheNthOverrunInARow) {
   TaskConfig config = cyclic();
   config.watchdog = {.time = milliseconds(3), .sensitivity = 3};
