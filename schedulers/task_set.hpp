@@ -33,6 +33,10 @@ struct TaskEnvironment {
   /// Tells that a task's thread runs cycles (true) or is parked (false). May be empty. Called by the control
   /// thread, from within start(), stop() and switch_to().
   std::function<void(std::size_t index, bool running)> state_changed;
+  /// Tells that a task is to park: after the cycle that it is in it takes no release any more. Told before it
+  /// is done, in the phase of the stop that the task belongs to. May be empty. Called by the control thread,
+  /// from within begin_stop() and advance_stop().
+  std::function<void(std::size_t index)> to_park;
   /// Faults and endless loops in the application's code put their task into exception: handlers for signals
   /// are installed in this process (see install_fault_handlers()), and a thread supervises the tasks. Without
   /// it a fault ends the process.
@@ -167,6 +171,7 @@ class TaskSet {
   void hand_out_sources();
   void report(std::size_t index, bool running);
   void begin_second_phase();
+  void park_tasks(bool that_drive_outputs);
   std::vector<std::size_t> busy_in_phase();
   std::vector<std::string_view> wait_until_settled(TimePoint deadline);
 

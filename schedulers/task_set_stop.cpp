@@ -18,19 +18,27 @@ Result<void> TaskSet::begin_stop(const StopLimits& limits) {
       .limits = limits, .others = false, .deadline = MonotonicClock::now() + limits.outputs, .stuck = {}};
   // From now on releases are missed on purpose; cycles that run are watched on.
   if (supervision_) supervision_->tasks_stop();
-  for (std::size_t i = 0; i < threads_.size(); ++i) {
-    if (tasks_[i]->config().drives_outputs) threads_[i]->park();
-  }
+  park_tasks(true);
   return {};
+}
+
+void TaskSet::park_tasks(bool that_drive_outputs) {
+  const auto is_meant = [&](std::size_t i) {
+    return tasks_[i]->config().drives_outputs == that_drive_outputs;
+  };
+  for (std::size_t i = 0; i < threads_.size(); ++i) {
+    if (is_meant(i) && environment_.to_park) environment_.to_park(i);
+  }
+  for (std::size_t i = 0; i < threads_.size(); ++i) {
+    if (is_meant(i)) threads_[i]->park();
+  }
 }
 
 void TaskSet::begin_second_phase() {
   stop_->others = true;
   stop_->deadline = MonotonicClock::now() + stop_->limits.others;
   if (active_->scheduler) active_->scheduler->stop();
-  for (std::size_t i = 0; i < threads_.size(); ++i) {
-    if (!tasks_[i]->config().drives_outputs) threads_[i]->park();
-  }
+  park_tasks(false);
   if (tick_.device) tick_.device->halt();
 }
 

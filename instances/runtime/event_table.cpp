@@ -177,11 +177,18 @@ Result<void> EventTable::check_bound() const {
 
 Result<void> EventTable::publish_bound(bool running) {
   for (std::size_t i = 0; i < count_.load(std::memory_order_relaxed); ++i) {
-    const Slot& slot = *slots_[i];
+    Slot& slot = *slots_[i];
     if (slot.tasks == 0) continue;
-    if (!slot.bound->set_bound_tasks(running ? slot.tasks : 0) && running) return check_bound();
+    slot.taking = running ? slot.tasks : 0;
+    if (!slot.bound->set_bound_tasks(slot.taking) && running) return check_bound();
   }
   return {};
+}
+
+void EventTable::withdraw_task(std::string_view event) {
+  const auto slot = open_own(event);
+  if (!slot || (*slot)->taking == 0) return;
+  (void)(*slot)->bound->set_bound_tasks(--(*slot)->taking);
 }
 
 void EventTable::refresh() {

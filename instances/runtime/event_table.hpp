@@ -50,6 +50,8 @@ class EventTable {
   [[nodiscard]] Result<void> check_bound() const;
   /// Tells posters whether the tasks run: bound, or not.
   [[nodiscard]] Result<void> publish_bound(bool running);
+  /// Tells posters that one of the tasks that are bound to the own event takes no more posts, the others do.
+  void withdraw_task(std::string_view event);
   /// Gets events of others that lost their place in the pool back. Now and then.
   void refresh();
 
@@ -65,6 +67,7 @@ class EventTable {
     bool by_application = false;
     bool by_operator = false;
     std::uint32_t tasks = 0;                         // bound to it
+    std::uint32_t taking = 0;                        // of these, as posters are told: will run what is posted
     const PoolEvent* bound = nullptr;                // what they wait on, for the life of the process
     std::atomic<const PoolEvent*> event{nullptr};    // one of events; null without a pool
     std::vector<std::unique_ptr<PoolEvent>> events;  // old ones stay: a poster may be looking at one

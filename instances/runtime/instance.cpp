@@ -185,6 +185,13 @@ Result<std::string> Instance::make_tasks() {
             if (shown.load(std::memory_order_relaxed) == std::to_underlying(PageTaskState::exception)) return;
             shown.store(std::to_underlying(state), std::memory_order_relaxed);
           },
+      // Not before: in the first phase of a stop the others run what is posted. Nor later: a task in its last
+      // cycle does not, so no poster may be told that it will.
+      .to_park =
+          [this](std::size_t index) {
+            const TaskConfig& task = application_->tasks()[index];
+            if (task.kind == TaskKind::external) host_->events().withdraw_task(task.external_event);
+          },
       .catch_faults = true,
   };
   auto tasks = TaskSet::create(clock_, options_.band, application_->tasks(), std::move(environment));

@@ -51,7 +51,6 @@ Result<std::string> Instance::start(std::string_view why) {
 }
 
 void Instance::begin_stop(std::string_view why) {
-  (void)host_->events().publish_bound(false);
   (void)tasks_->begin_stop(settings_.stop);
   life_.go_to(ApplicationState::stopping, why);
 }

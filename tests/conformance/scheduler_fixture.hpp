@@ -97,6 +97,7 @@ class Tasks {
   Time clock;
   bool unprivileged = true;
   DeviceFiles* devices = &linux_device_files();
+  std::function<void(std::size_t)> to_park;
 
  private:
   TaskEnvironment environment() {
@@ -108,6 +109,7 @@ class Tasks {
       while (statistics_.size() <= index) statistics_.emplace_back();
       return statistics_[index];
     };
+    environment.to_park = to_park;
     environment.allow_unprivileged = unprivileged;
     environment.devices = devices;
     return environment;

@@ -77,6 +77,24 @@ TEST_P(Stop, LetsTheOthersRunUntilTasksThatDriveOutputsHaveParked) {
   EXPECT_EQ(cycles, parked);
 }
 
+TEST_P(Stop, TellsOfATaskThatItIsToParkWhenItsPhaseBegins) {
+  std::vector<std::size_t> told;
+  tasks_.to_park = [&](std::size_t task) { told.push_back(task); };
+  add("Output", true, [this] { output_.hold(); });
+  add("Other", false, [] {});
+  add("Second", true, [] {});
+  start();
+  wait_for([&] { return output_.inside > 0; });
+  EXPECT_THAT(told, IsEmpty());
+  ASSERT_TRUE(tasks_.set->begin_stop({.outputs = seconds(100), .others = seconds(100)}));
+  EXPECT_THAT(told, ElementsAre(0, 2));
+  EXPECT_FALSE(tasks_.set->advance_stop());
+  EXPECT_THAT(told, ElementsAre(0, 2));
+  output_.let_go = true;
+  EXPECT_THAT(finish_stop(), IsEmpty());
+  EXPECT_THAT(told, ElementsAre(0, 2, 1));
+}
+
 TEST_P(Stop, GoesOnWithoutATaskThatDoesNotComeBack) {
   add("Output", true, [this] { output_.hold(); });
   add("Other", false, [this] { other_.hold(); });

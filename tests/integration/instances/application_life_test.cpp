@@ -127,7 +127,7 @@ TEST_F(LifeInProcess, ServesOthersWhileItStops) {
   const auto beat = InstancePageReader::open(sandbox_.pool(), "line1")->runtime()->heartbeat_ns;
   EXPECT_TRUE(eventually(
       [&] { return InstancePageReader::open(sandbox_.pool(), "line1")->runtime()->heartbeat_ns > beat; }));
-  (void)sut_->event("let_go").post();
+  EXPECT_EQ(sut_->event("let_go").post(), PostResult::posted);
   const auto reply = receive(socket);
   EXPECT_EQ(reply.code, ErrorCode::ok) << reply.text;
   EXPECT_EQ(reply.number, 9U);
@@ -181,6 +181,38 @@ TEST_F(LifeInProcess, KeepsNoExceptionOfAStopThatComesToItsEnd) {
   EXPECT_EQ(sut_->ask(ControlVerb::stop).code, ErrorCode::ok);
   EXPECT_EQ(sut_->end(SIGTERM), EXIT_SUCCESS);
   EXPECT_THAT(exceptions(), ::testing::IsEmpty());
+}
+
+TEST_F(LifeInProcess, KeepsEventsBoundAsLongAsTheirTasksRunWhatIsPosted) {
+  start({.outputs_ms = 10'000, .others_ms = 10'000}, "[Task.HoldOutput]\nDrivesOutputs=1\n");
+  const auto bound = [&](const char* event) { return sut_->event(event).bound_tasks(); };
+  hold("Output");
+  EXPECT_EQ(bound("hold_output"), 1U);
+  PacketSocket socket = sut_->connect();
+  send(socket, ControlVerb::stop, 9);
+  ASSERT_TRUE(wait_for(ApplicationState::stopping));
+  EXPECT_EQ(bound("hold_output"), 0U) << "its task drives outputs: it runs nothing any more";
+  EXPECT_EQ(sut_->event("hold_output").post(), PostResult::no_task);
+  EXPECT_EQ(bound("hold_other"), 1U);
+  hold("Other");  // posted, and run
+  EXPECT_EQ(sut_->event("let_output_go").post(), PostResult::posted);
+  EXPECT_TRUE(eventually([&] { return bound("let_go") == 0; })) << "in the second phase nothing is run";
+  EXPECT_EQ(state(), ApplicationState::stopping);
+  const auto let_go = cycles("LetGo");
+  EXPECT_EQ(sut_->event("let_go").post(), PostResult::no_task);
+  EXPECT_EQ(cycles("HoldOutput"), 1U);
+  EXPECT_EQ(cycles("LetGo"), let_go);
+}
+
+TEST_F(LifeInProcess, BindsItsEventsAgainWithTheNextStart) {
+  start(10'000);
+  for (int round = 0; round < 3; ++round) {
+    EXPECT_EQ(sut_->event("let_go").bound_tasks(), 1U);
+    EXPECT_EQ(sut_->ask(ControlVerb::stop).code, ErrorCode::ok);
+    EXPECT_EQ(sut_->event("let_go").bound_tasks(), 0U);
+    EXPECT_EQ(sut_->event("let_go").post(), PostResult::no_task);
+    EXPECT_EQ(sut_->ask(ControlVerb::start).code, ErrorCode::ok);
+  }
 }
 
 TEST_F(LifeInProcess, StopsInTwoPhasesAtTheEndOfTheProcess) {

@@ -32,8 +32,8 @@ class HeldPlant {
     EXPECT_TRUE(plant_.wait_for("line1", InstanceState::stopping));
     return socket;
   }
-  /// The tasks run on in the first phase, though posters are told already that they will not.
-  void let_go() { (void)post("let_go"); }
+  /// In the first phase the other tasks run on.
+  void let_go() { EXPECT_EQ(post("let_go"), PostResult::posted); }
   Plant& plant() { return plant_; }
 
  private:

@@ -42,6 +42,22 @@ TEST_F(EventTableTest, SetNeedsNoRegistrationButATask) {
   EXPECT_EQ(counted->count(), 1U);
 }
 
+TEST_F(EventTableTest, WithdrawsItsTasksOneByOne) {
+  for (const char* const event : {"ready", "ready", "other"}) ASSERT_TRUE(sut_.bind_task(event));
+  const PoolEvent ready = pool_.open_event("line1/ready").value();
+  const PoolEvent other = pool_.open_event("line1/other").value();
+  sut_.withdraw_task("ready");  // before any is bound
+  EXPECT_EQ(ready.bound_tasks(), 0U);
+  ASSERT_TRUE(sut_.publish_bound(true));
+  for (const std::uint32_t left : {1U, 0U, 0U}) {
+    sut_.withdraw_task("ready");
+    EXPECT_EQ(ready.bound_tasks(), left);
+    EXPECT_EQ(other.bound_tasks(), 1U);
+  }
+  ASSERT_TRUE(sut_.publish_bound(true));
+  EXPECT_EQ(ready.bound_tasks(), 2U);
+}
+
 TEST_F(EventTableTest, NamesMeanTheSameEventOnce) {
   EXPECT_EQ(sut_.open("ready").value(), sut_.open("line1/ready").value());
   EXPECT_NE(sut_.open("ready").value(), sut_.open("line2/ready").value());

@@ -26,6 +26,7 @@ void setup(plc::Application& app) {
   app.external("HoldOutput", 0, "hold_output", [] { hold_output = true; });
   app.external("HoldOther", 0, "hold_other", [] { hold_other = true; });
   app.external("LetGo", 0, "let_go", [] { hold_output = hold_other = false; });
+  app.external("LetOutputGo", 0, "let_output_go", [] { hold_output = false; });
   app.on_exit([] { plc::log("exit"); });
   hold_other = plc_start_kind() == PLC_START_COLD;
   plc::log("start kind %d", plc_start_kind());
