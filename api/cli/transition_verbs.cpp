@@ -26,23 +26,42 @@ bool is_wanted(const CliSession& session, const TransitionArguments& arguments,
   return instance && (session.options.host.empty() || dds::text_of(transition.host) == session.options.host);
 }
 
-// Complete when nothing more has come for a while: who writes them sends what it keeps in one go.
-int list_transitions(CliSession& session, const TransitionArguments& arguments) {
+// DDS itself cannot tell: Cyclone's dds_reader_wait_for_historical_data() waits for nothing.
+Result<bool> has_all(ControlClient& client, const std::vector<HostView>& hosts, TimePoint deadline) {
+  for (const HostView& host : hosts) {
+    const auto complete = client.has_all_transitions(host.name, deadline);
+    if (!complete || !*complete) return complete;
+  }
+  return true;
+}
+
+// All that the hosts have told of, and what came meanwhile.
+Result<std::vector<plc_Transition>> collect(CliSession& session, const TransitionArguments& arguments) {
   const auto hosts = session.shown_hosts();
-  if (!hosts) return CliSession::fail(hosts.error());
+  if (!hosts) return std::unexpected(hosts.error());
   ControlClient& client = *session.client().value();
-  std::vector<plc_Transition> found;
-  TimePoint quiet_since = MonotonicClock::now();
   const TimePoint deadline = session.deadline();
-  while (MonotonicClock::now() < std::min(deadline, quiet_since + ControlClient::kQuiet)) {
+  std::vector<plc_Transition> found;
+  for (;;) {
+    const auto complete = has_all(client, *hosts, deadline);
+    if (!complete) return std::unexpected(complete.error());
+    if (*complete) return found;
+    if (MonotonicClock::now() >= deadline) {
+      return failure(ErrorCode::timed_out, "the changes of state have not come completely");
+    }
     const auto news = client.transitions();
-    if (!news) return CliSession::fail(news.error());
+    if (!news) return std::unexpected(news.error());
     for (const TransitionView& view : *news) {
       if (is_wanted(session, arguments, view.sample)) found.push_back(view.sample);
     }
-    if (!news->empty()) quiet_since = MonotonicClock::now();
-    client.wait_for_change(std::min(deadline, quiet_since + ControlClient::kQuiet));
+    if (news->empty()) client.wait_for_change(deadline);
   }
+}
+
+int list_transitions(CliSession& session, const TransitionArguments& arguments) {
+  auto collected = collect(session, arguments);
+  if (!collected) return CliSession::fail(collected.error());
+  std::vector<plc_Transition>& found = *collected;
   std::ranges::stable_sort(found, {}, [](const plc_Transition& sample) { return sample.time_unix_ns; });
   std::vector<Row> rows;
   for (const plc_Transition& sample : found) rows.push_back(to_row(sample));

@@ -203,6 +203,13 @@ Result<std::vector<TransitionView>> ControlClient::transitions() {
   return transition_log_.take();
 }
 
+Result<bool> ControlClient::has_all_transitions(const std::string& host, TimePoint deadline) {
+  const auto told = instances(host, deadline);
+  if (!told) return std::unexpected(told.error());
+  return std::ranges::all_of(
+      *told, [&](const plc_InstanceStatus& status) { return transition_log_.has_all(status); });
+}
+
 Result<std::vector<plc_ExceptionStatus>> ControlClient::exceptions(const std::string& host,
                                                                    TimePoint deadline) {
   return snapshot(exceptions_, dds::kExceptionStatus, &plc_HostStatus::instance_count, host, deadline);

@@ -72,6 +72,9 @@ class ControlClient {
   /// The changes of state of all instances of all hosts that have come since the last call, each once and in
   /// order; the first call asks for them, those that hosts keep included. Wait with wait_for_change().
   [[nodiscard]] Result<std::vector<TransitionView>> transitions();
+  /// Whether transitions() has returned all that this host has told of: each status of an instance says how
+  /// many changes of state there were, and those are written before it. timed_out: no complete status came.
+  [[nodiscard]] Result<bool> has_all_transitions(const std::string& host, TimePoint deadline);
 
   /// A command and its answer. The status that this client shows afterwards has its effect.
   /// timed_out: no answer; whether it was done is not known.

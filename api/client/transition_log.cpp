@@ -1,14 +1,39 @@
 #include "api/client/transition_log.hpp"
 
+#include <charconv>
+#include <optional>
+#include <span>
+
 #include "api/dds/samples.hpp"
 #include "api/dds/text.hpp"
+#include "api/dds/topics.hpp"
 
 namespace plchost {
+
+namespace {
+
+// As its host tells; nothing: it does not tell.
+std::optional<std::uint64_t> last_number(const plc_InstanceStatus& status) {
+  for (const plc_KeyValue& entry : std::span(status.ext._buffer, status.ext._length)) {
+    if (dds::text_of(entry.name) != dds::kTransitionsEntry) continue;
+    const std::string_view text = dds::text_of(entry.value);
+    std::uint64_t number = 0;
+    const auto read = std::from_chars(text.data(), text.data() + text.size(), number);
+    if (read.ec == std::errc() && read.ptr == text.data() + text.size()) return number;
+  }
+  return std::nullopt;
+}
+
+}  // namespace
 
 std::vector<TransitionView> TransitionLog::take() {
   std::vector<TransitionView> news;
   if (!reader_) return news;
   dds::take_valid<plc_Transition>(reader_.get(), [&](const plc_Transition& sample, const auto& /*info*/) {
+    if (Seen& server = seen(sample); sample.epoch >= server.epoch) {
+      server.epoch = sample.epoch;
+      server.written = sample.sequence_number;
+    }
     TransitionView view;
     if (!is_news(sample, view.missed)) return;
     view.sample = sample;
@@ -18,14 +43,27 @@ std::vector<TransitionView> TransitionLog::take() {
   return news;
 }
 
+TransitionLog::Seen& TransitionLog::seen(const plc_Transition& sample) {
+  return seen_[{std::string(dds::text_of(sample.host)), std::string(dds::text_of(sample.instance))}];
+}
+
 bool TransitionLog::is_news(const plc_Transition& sample, std::uint64_t& missed) {
-  Seen& seen = seen_[{std::string(dds::text_of(sample.host)), std::string(dds::text_of(sample.instance))}];
-  if (sample.stream < seen.stream) return false;
-  const bool first = sample.stream > seen.stream;
-  if (!first && sample.sequence_number <= seen.last) return false;
-  missed = first ? 0 : sample.sequence_number - seen.last - 1;
-  seen = {.stream = sample.stream, .last = sample.sequence_number};
+  Seen& before = seen(sample);
+  if (sample.stream < before.stream) return false;
+  const bool first = sample.stream > before.stream;
+  if (!first && sample.sequence_number <= before.last) return false;
+  missed = first ? 0 : sample.sequence_number - before.last - 1;
+  before.stream = sample.stream;
+  before.last = sample.sequence_number;
   return true;
+}
+
+bool TransitionLog::has_all(const plc_InstanceStatus& status) const {
+  const auto told = last_number(status);
+  if (!told || *told == 0) return told.has_value();
+  const auto found =
+      seen_.find({std::string(dds::text_of(status.host)), std::string(dds::text_of(status.instance))});
+  return found != seen_.end() && found->second.epoch == status.epoch && found->second.written >= *told;
 }
 
 }  // namespace plchost

@@ -30,6 +30,8 @@ class TransitionLog {
   [[nodiscard]] explicit operator bool() const noexcept { return static_cast<bool>(reader_); }
   /// What has come since the last call.
   [[nodiscard]] std::vector<TransitionView> take();
+  /// Whether everything has been taken that this instance's host had written when it wrote this status of it.
+  [[nodiscard]] bool has_all(const plc_InstanceStatus& status) const;
   /// One more. Nothing: it was there before. Public for tests.
   [[nodiscard]] bool is_news(const plc_Transition& sample, std::uint64_t& missed);
 
@@ -37,7 +39,11 @@ class TransitionLog {
   struct Seen {
     std::uint64_t stream = 0;
     std::uint64_t last = 0;
+    // What its present server has written, also if it was no news: it begins with what is kept.
+    std::uint64_t epoch = 0;
+    std::uint64_t written = 0;
   };
+  [[nodiscard]] Seen& seen(const plc_Transition& sample);
 
   dds::Entity topic_;
   dds::Entity reader_;

@@ -41,6 +41,9 @@ inline constexpr std::int32_t kRequestReaderDepth = 256;
 inline constexpr std::int32_t kEventReaderDepth = 4096;
 inline constexpr std::int32_t kReplyDepth = 16;
 inline constexpr std::int32_t kTransitionDepth = 64;  ///< of each instance; as many as its ring holds
+/// Entry of InstanceStatus.ext: the number of the last transition of this instance that its host has written;
+/// 0: none yet.
+inline constexpr std::string_view kTransitionsEntry = "transitions";
 /// No writer of the server waits longer.
 inline constexpr Duration kServerBlocking = std::chrono::milliseconds(1);
 inline constexpr Duration kRequestBlocking = std::chrono::milliseconds(100);

@@ -105,7 +105,6 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
   } else if (fd == status_timer.get()) {
     const TimePoint now = MonotonicClock::now();
     status->tick(now);
-    transitions->publish(status->instances(), now);
     finish(manager->expire(now));
   } else if (fd == presence_timer.get()) {
     status->write_presence();
@@ -167,7 +166,6 @@ void ControlServer::Parts::finish(std::vector<FinishedCommand> commands) {
     if (finished.command.verb == ControlVerb::check_host && !collect_findings(finished)) continue;
     // Who looks at the status after the answer sees what the command did.
     status->flush(finished.command.instance, MonotonicClock::now());
-    transitions->publish(status->instances(), MonotonicClock::now());
     answer(finished.command.client, finished.command.identity, finished.code, finished.text);
   }
 }

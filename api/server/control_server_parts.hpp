@@ -14,7 +14,6 @@
 #include "api/server/request_check.hpp"
 #include "api/server/session_table.hpp"
 #include "api/server/status_publisher.hpp"
-#include "api/server/transition_publisher.hpp"
 #include "shm/base/unique_fd.hpp"
 #include "shm/pool/object_pool.hpp"
 
@@ -65,7 +64,6 @@ struct ControlServer::Parts {
   dds::Entity participant;
   std::optional<SessionTable> sessions;
   std::optional<StatusPublisher> status;
-  std::optional<TransitionPublisher> transitions;
   dds::Entity subscriber;
   dds::Entity event_topic;
   dds::Entity event_reader;

@@ -59,12 +59,8 @@ Result<void> ControlServer::Parts::open(PostLedger ledger) {
       StatusPublisher::create(participant.get(), {options.host, &pool, epoch, options.run_directory});
   if (!made_status) return std::unexpected(made_status.error());
   status.emplace(std::move(*made_status));
-  auto made_transitions = TransitionPublisher::create(participant.get(), {options.host, options.pool, epoch});
-  if (!made_transitions) return std::unexpected(made_transitions.error());
-  transitions.emplace(*std::move(made_transitions));
   // Everything is there before a client can see that this host is: presence comes last.
   status->tick(MonotonicClock::now());
-  transitions->publish(status->instances(), MonotonicClock::now());
   if (auto made = make_readers(); !made) return made;
   if (auto listening = listen(); !listening) return listening;
   status->write_presence();

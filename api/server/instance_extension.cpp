@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "api/dds/text.hpp"
+#include "api/dds/topics.hpp"
 
 namespace plchost {
 
@@ -50,6 +51,13 @@ std::vector<plc_KeyValue> extension_of(const InstanceRuntime& runtime) {
   add("idle_states", runtime.idle_states.view());
   add_clock(runtime.clock, add);
   return entries;
+}
+
+plc_KeyValue transitions_entry(std::uint64_t last) {
+  plc_KeyValue entry{};
+  dds::copy_text(entry.name, dds::kTransitionsEntry);
+  dds::copy_text(entry.value, fmt::format("{}", last));
+  return entry;
 }
 
 }  // namespace plchost

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "control.h"
@@ -8,7 +9,7 @@
 namespace plchost {
 
 /// What an instance says of itself beyond the fields of plc_InstanceStatus: entries of its ext, in this
-/// order. At most 16; what is not in use has none.
+/// order. At most 15; what is not in use has none.
 ///
 ///   tick_source    where the periodic tick comes from
 ///   tick_fallback  why that is not the source that the settings ask for
@@ -16,5 +17,7 @@ namespace plchost {
 ///   clock_...      the distributed clock as the cyclic task of the highest priority sees it: name of its
 ///                  record, state, in sync, offset and drift (to the nearest hundred), corrections, pairs
 [[nodiscard]] std::vector<plc_KeyValue> extension_of(const InstanceRuntime& runtime);
+/// One more, see dds::kTransitionsEntry.
+[[nodiscard]] plc_KeyValue transitions_entry(std::uint64_t last);
 
 }  // namespace plchost

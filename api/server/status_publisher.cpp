@@ -31,12 +31,16 @@ Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const 
        {&tasks, &statistics, &instances, &events, &objects, &findings, &exceptions, &hosts, &presence}) {
     if (!*made) return failure_in("publish status", made->error());
   }
+  auto transitions =
+      TransitionPublisher::create(participant, {source.host, source.pool->name(), source.epoch});
+  if (!transitions) return std::unexpected(transitions.error());
   StatusPublisher publisher(source,
                             TaskWatch(source.pool->name(), source.host, source.epoch,
                                       StatusTable<plc_TaskStatus>(std::move(*tasks)),
                                       StatisticsWriter(source.host, source.epoch, std::move(*statistics))),
                             ExceptionWatch(source.run_directory, source.host, source.epoch,
-                                           StatusTable<plc_ExceptionStatus>(std::move(*exceptions))));
+                                           StatusTable<plc_ExceptionStatus>(std::move(*exceptions))),
+                            *std::move(transitions));
   publisher.instances_ = StatusTable<plc_InstanceStatus>(std::move(*instances));
   publisher.events_ = StatusTable<plc_EventStatus>(std::move(*events));
   publisher.objects_ = StatusTable<plc_ObjectStatus>(std::move(*objects));
@@ -96,8 +100,9 @@ bool StatusPublisher::look_at_instances(TimePoint now) {
     dds::copy_text(sample.scheduler, says ? runtime->scheduler.view() : status->scheduler.view());
     dds::copy_text(sample.application, status->application.view());
     dds::copy_text(sample.problem, status->problem.view());
-    changed |=
-        instances_.update(name, sample, runtime ? extension_of(*runtime) : std::vector<plc_KeyValue>());
+    auto extension = runtime ? extension_of(*runtime) : std::vector<plc_KeyValue>();
+    extension.push_back(transitions_entry(transitions_.publish(name, now)));
+    changed |= instances_.update(name, sample, extension);
   }
   changed |= instances_.dispose_rest();
   changed |= exceptions_.end_round();

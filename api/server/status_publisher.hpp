@@ -13,13 +13,14 @@
 #include "api/server/exception_watch.hpp"
 #include "api/server/status_table.hpp"
 #include "api/server/task_watch.hpp"
+#include "api/server/transition_publisher.hpp"
 #include "shm/pool/host_page.hpp"
 #include "shm/pool/object_pool.hpp"
 
 namespace plchost {
 
-/// Shows the pool's pages as status topics: written when something changed, disposed when it is gone.
-/// Control loop only.
+/// Shows the pool's pages as status topics: written when something changed, disposed when it is gone. And
+/// each change of state of an instance, before the status that tells how many there were. Control loop only.
 class StatusPublisher {
  public:
   struct Source {
@@ -48,8 +49,11 @@ class StatusPublisher {
   static constexpr Duration kObjectPeriod = std::chrono::milliseconds(200);
 
  private:
-  StatusPublisher(Source source, TaskWatch tasks, ExceptionWatch exceptions)
-      : source_(std::move(source)), tasks_(std::move(tasks)), exceptions_(std::move(exceptions)) {}
+  StatusPublisher(Source source, TaskWatch tasks, ExceptionWatch exceptions, TransitionPublisher transitions)
+      : source_(std::move(source)),
+        tasks_(std::move(tasks)),
+        exceptions_(std::move(exceptions)),
+        transitions_(std::move(transitions)) {}
   bool look_at_instances(TimePoint now);
   bool look_at_objects(TimePoint now);
   bool update_event(const ObjectInfo& object);
@@ -58,6 +62,7 @@ class StatusPublisher {
   Source source_;
   TaskWatch tasks_;
   ExceptionWatch exceptions_;
+  TransitionPublisher transitions_;
   std::optional<HostPageReader> page_;
   std::vector<std::string> instance_names_;
   StatusTable<plc_InstanceStatus> instances_;

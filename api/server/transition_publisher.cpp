@@ -21,8 +21,10 @@ Result<TransitionPublisher> TransitionPublisher::create(dds_entity_t participant
   return TransitionPublisher(std::move(source), *std::move(topic), *std::move(writer));
 }
 
-void TransitionPublisher::publish(const std::vector<std::string>& instances, TimePoint now) {
-  for (const std::string& instance : instances) follow(instance, followed_[instance], now);
+std::uint64_t TransitionPublisher::publish(const std::string& instance, TimePoint now) {
+  Followed& followed = followed_[instance];
+  follow(instance, followed, now);
+  return followed.written;
 }
 
 void TransitionPublisher::follow(const std::string& instance, Followed& followed, TimePoint now) {
@@ -37,6 +39,7 @@ void TransitionPublisher::follow(const std::string& instance, Followed& followed
     if (!followed.unsent) followed.unsent = followed.ring->next(now);
     if (!followed.unsent) return;
     if (!write(instance, followed.ring->stream_unix_ns(), *followed.unsent)) return;
+    followed.written = followed.unsent->sequence;
     followed.unsent.reset();
   }
 }

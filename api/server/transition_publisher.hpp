@@ -4,7 +4,6 @@
 #include <map>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include <control.h>
 
@@ -25,15 +24,16 @@ class TransitionPublisher {
   };
   [[nodiscard]] static Result<TransitionPublisher> create(dds_entity_t participant, Source source);
 
-  /// Writes what is new. `instances`: those that the manager has at present. What DDS does not take comes
-  /// first the next time.
-  void publish(const std::vector<std::string>& instances, TimePoint now);
+  /// Writes what is new of this instance; the number of the last one that was written, 0: none. What DDS does
+  /// not take comes first the next time.
+  std::uint64_t publish(const std::string& instance, TimePoint now);
 
  private:
   struct Followed {
     std::optional<TransitionRingReader> ring;
     TimePoint next_look;               // for the ring, while there is none
     std::optional<Transition> unsent;  // that DDS did not take
+    std::uint64_t written = 0;         // the last number
   };
   TransitionPublisher(Source source, dds::Entity topic, dds::Entity writer)
       : source_(std::move(source)), topic_(std::move(topic)), writer_(std::move(writer)) {}

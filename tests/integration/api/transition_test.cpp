@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
 
 #include "api/client/control_client.hpp"
 #include "api/dds/text.hpp"
@@ -38,6 +39,17 @@ class Witness {
       client_->wait_for_change(MonotonicClock::now() + std::chrono::milliseconds(10));
     }
   }
+  /// Takes what has come until the host's word is that this was all.
+  void look_until_complete(const TestHost& host) {
+    for (const TimePoint deadline = soon(); MonotonicClock::now() < deadline;) {
+      const auto complete = client_->has_all_transitions(host.name(), deadline);
+      ASSERT_TRUE(complete) << complete.error().describe();
+      if (*complete) return;
+      look();
+    }
+    FAIL() << "never complete";
+  }
+  [[nodiscard]] std::size_t size() const { return seen_.size(); }
   /// Of one instance, in the order in which they came.
   [[nodiscard]] std::vector<std::string> of(const std::string& instance) const {
     std::vector<std::string> found;
@@ -102,6 +114,49 @@ TEST(RemoteTransitions, ComeEachOnceAndInOrderOverAllEndsOfTheServer) {
   }
   EXPECT_THAT(sut.of("line1"), ElementsAreArray(script.expected(0)));
   EXPECT_THAT(sut.of("line2"), ElementsAreArray(script.expected(1)));
+}
+
+TEST(RemoteTransitions, AreCompleteWhenTheHostSaysSoAndNotBefore) {
+  const OwnDomain domain;
+  TestHost host(domain, "hosta");
+  Script script(host);
+  host.start_server();
+  {
+    Witness none(domain);
+    none.look_until_complete(host);
+    EXPECT_EQ(none.size(), 0U);
+  }
+  for (int i = 0; i < 64; ++i) {  // as many as are kept
+    script.add(0, "before the client");
+    if (i % 4 == 0) script.add(1, "before the client");
+  }
+  Witness early(domain);
+  early.look_until(script.size());
+  for (int round = 0; round < 5; ++round) {
+    if (round == 3) host.replace_server();
+    Witness sut(domain);
+    sut.look_until_complete(host);
+    EXPECT_THAT(sut.of("line1"), ElementsAreArray(script.expected(0))) << "round " << round;
+    EXPECT_THAT(sut.of("line2"), ElementsAreArray(script.expected(1))) << "round " << round;
+  }
+}
+
+TEST(RemoteTransitions, AreListedAllOfThemByPlcctl) {
+  const OwnDomain domain;
+  TestHost host(domain, "hosta");
+  Script script(host);
+  for (int i = 0; i < 60; ++i) script.add(0, "before the server");
+  for (int i = 0; i < 20; ++i) script.add(1, "before the server");
+  host.start_server();
+  const auto count = [&](std::vector<std::string> arguments) {
+    const auto result = run_plcctl(domain.number(), std::move(arguments));
+    EXPECT_EQ(result.code, 0) << result.errors;
+    return nlohmann::json::parse(result.output).size();
+  };
+  for (int round = 0; round < 5; ++round) {
+    EXPECT_EQ(count({"list", "transitions", "--json"}), 80U);
+    EXPECT_EQ(count({"list", "transitions", "line2", "--json"}), 20U);
+  }
 }
 
 TEST(RemoteTransitions, OfThePastAreSeenByAClientThatComesLate) {

@@ -56,6 +56,12 @@ TEST(InstanceExtension, TellsOfTheDistributedClockOnceThereIsOne) {
   EXPECT_EQ(extension_of(runtime).size(), 1U) << "a stranger's page";
 }
 
+TEST(InstanceExtension, TellsHowManyTransitionsThereWere) {
+  EXPECT_EQ(dds::text_of(transitions_entry(0).name), "transitions");
+  EXPECT_EQ(dds::text_of(transitions_entry(0).value), "0");
+  EXPECT_EQ(dds::text_of(transitions_entry(18'446'744'073'709'551'615U).value), "18446744073709551615");
+}
+
 TEST(InstanceExtension, IsShownByTheCliWhateverItsNames) {
   std::vector<plc_KeyValue> entries(2);
   dds::copy_text(entries[0].name, "of_a_newer_host");
