@@ -105,6 +105,8 @@ void ManagedInstance::begin_stop() {
   } else if (idle_phase()) {
     go_down(InstanceState::offline, last_end_);
     finish(ErrorCode::ok, fmt::format("'{}' was waiting to be started; that is cancelled", config_.name));
+  } else if (silent_) {
+    fresh_process(Next::stay_stopped, StartKind::warm);
   } else {
     forward_or_wait();
   }
@@ -156,7 +158,7 @@ void ManagedInstance::forward_or_wait() {
   const bool running = status_.state == InstanceState::running;
   const bool safe_mode = status_.state == InstanceState::safe_mode;
   const bool begins = verb == ControlVerb::start || verb == ControlVerb::single_cycle;
-  if (begins && status_.state == InstanceState::exception) {
+  if (silent_ || (begins && status_.state == InstanceState::exception)) {
     finish(ErrorCode::wrong_state,
            fmt::format("'{}' is in exception: {}; reset it first", config_.name, status_.problem.view()));
   } else if (verb == ControlVerb::stop && status_.state == InstanceState::exception) {

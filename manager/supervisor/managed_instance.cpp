@@ -157,6 +157,8 @@ void ManagedInstance::finish_adoption(const std::string& problem) {
 void ManagedInstance::on_exit(const ExitStatus& status) {
   status_.pid = 0;
   status_.core = -1;
+  silent_ = false;
+  heartbeat_ = {};
   host_.set_timer(std::nullopt);
   const bool set_up = phase_ == Phase::setting_up;
   const bool exit_of_set_up = status.known && status.kind == ExitStatus::Kind::exited &&
@@ -303,7 +305,7 @@ void ManagedInstance::spawn(Next next) {
 void ManagedInstance::end_process(Next next) {
   next_ = next;
   ending_ = Ending::asked;
-  if (send(ControlVerb::shutdown)) {
+  if (!silent_ && send(ControlVerb::shutdown)) {
     host_.set_timer(after(kShutdownLimit));
   } else {
     ending_ = Ending::terminated;
@@ -319,9 +321,11 @@ void ManagedInstance::go_down(InstanceState state, const std::string& problem) {
 }
 
 void ManagedInstance::refresh() {
-  if (phase_ != Phase::up || operation_) return;
+  if (phase_ != Phase::up) return;
   const auto runtime = host_.runtime();
   if (!runtime || runtime->pid != status_.pid) return;
+  watch_heartbeat(*runtime);
+  if (operation_ || silent_) return;
   // There is no way out of an exception, so this is never too early to be believed.
   const bool excepted = runtime->state == ApplicationState::exception;
   if (excepted && status_.state != InstanceState::exception) return show_application(*runtime);
@@ -373,7 +377,7 @@ void ManagedInstance::set_state(Phase phase, InstanceState state, const std::str
                    state == InstanceState::exception;
   spdlog::log(bad ? spdlog::level::warn : spdlog::level::info, "instance {}: {}{}{}", config_.name,
               to_string(state), problem.empty() ? "" : ": ", problem);
-  const bool of_process = !was_up || phase != Phase::up;
+  const bool of_process = !was_up || phase != Phase::up || silent_;
   if (state != before && of_process && surroundings_.transition) {
     surroundings_.transition(before, state, problem);
   }

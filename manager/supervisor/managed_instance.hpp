@@ -9,6 +9,7 @@
 
 #include "api/control/control_handler.hpp"
 #include "manager/config/manager_config.hpp"
+#include "manager/supervisor/heartbeat_watch.hpp"
 #include "manager/supervisor/instance_host.hpp"
 #include "manager/supervisor/restart_policy.hpp"
 #include "shm/pool/host_page.hpp"
@@ -57,6 +58,10 @@ namespace plchost {
 // itself.
 //   It is found in the process's page within 50 ms. start and single cycle are refused, stop has nothing to
 //   do; reset, restart and load lead out of it.
+// * A process whose heartbeat stands still for HeartbeatWatch::kLimit is in exception, too, until it beats
+//   again. Nothing can be asked of it: a command that it was to answer fails, others than reset, restart,
+//   load and stop are refused, and stop is what reset is. Its end begins with SIGTERM, SIGKILL follows 2 s
+//   later.
 // * Commands: one at a time; another is answered with busy. What changes a process that is still setting_up
 // waits until
 //   it is up. The reply comes when the thing is done, or when the process ended instead, or at the limit.
@@ -148,6 +153,11 @@ class ManagedInstance : public InstanceEvents {
     return phase_ == Phase::down || phase_ == Phase::held || phase_ == Phase::backing_off;
   }
 
+  // A process that does not answer: instance_watch.cpp
+  void watch_heartbeat(const InstanceRuntime& runtime);
+  void fall_silent(std::string_view before);
+  void answers_again(const InstanceRuntime& runtime);
+
   // Life: managed_instance.cpp
   void fresh_process(Next next, StartKind kind);
   void spawn(Next next);
@@ -181,6 +191,8 @@ class ManagedInstance : public InstanceEvents {
   bool wants_running_ = true;  // what an operator, or the start, wanted last
   bool shutting_down_ = false;
   bool name_taken_ = false;  // another process of that name kept this one from being set up
+  bool silent_ = false;      // its process does not beat
+  HeartbeatWatch heartbeat_;
   TimePoint up_since_{};
   TimePoint settled_{};         // when the state was last known from the process's own answer
   std::string setup_failure_;   // why the set-up failed; empty: it did not

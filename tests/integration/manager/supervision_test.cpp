@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include "manager/supervisor/managed_instance.hpp"
 #include "tests/integration/manager/plant.hpp"
 
 namespace plchost {
@@ -67,6 +68,24 @@ TEST(Manager, PutsACrashLoopIntoSafeModeUntilAnotherApplicationIsLoaded) {
   EXPECT_EQ(loaded.code, ErrorCode::ok) << loaded.text;
   EXPECT_EQ(plant.status("line1").state, InstanceState::running);
   EXPECT_TRUE(plant.wait_for_cycles("line1"));
+}
+
+TEST(Manager, LeadsOutOfAFaultThatHoldsTheHeapAsOutOfAnyOther) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "the sanitizer's own heap ends the process";
+#endif
+  Plant plant;
+  plant.add("line1", "manager_double_free");
+  plant.start_manager();
+  ASSERT_TRUE(plant.wait_for("line1", InstanceState::exception));
+  const int pid = plant.status("line1").pid;
+  EXPECT_THAT(std::string(plant.status("line1").problem.view()), HasSubstr("its control thread has not"));
+  EXPECT_EQ(plant.ask(ControlVerb::start, "line1").code, ErrorCode::wrong_state);
+  const TimePoint before = MonotonicClock::now();
+  EXPECT_EQ(plant.ask(ControlVerb::reset, "line1").code, ErrorCode::ok);
+  EXPECT_LT(MonotonicClock::now() - before, kShutdownLimit) << "it cannot be asked to end";
+  EXPECT_EQ(plant.status("line1").state, InstanceState::stopped);
+  EXPECT_NE(plant.status("line1").pid, pid);
 }
 
 TEST(Manager, RefusesAWrongApplicationAndLeavesTheOldOneRunning) {

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+/// For how long a process's control thread has written no beat. A gap between two looks counts for a little
+/// only: while the whole host or the manager stood still, nothing is known of the process. Pure.
+class HeartbeatWatch {
+ public:
+  /// Longer than the guard against endless loops takes by default: until it hits, a loop above the control
+  /// thread keeps that from beating.
+  static constexpr Duration kLimit = std::chrono::seconds(3);
+  static constexpr Duration kLongestGap = std::chrono::milliseconds(200);
+
+  void look(TimePoint now, std::int64_t beat) noexcept {
+    silence_ = beat_ == beat ? silence_ + std::min(now - looked_, kLongestGap) : Duration::zero();
+    beat_ = beat;
+    looked_ = now;
+  }
+  [[nodiscard]] bool silent() const noexcept { return silence_ >= kLimit; }
+
+ private:
+  std::optional<std::int64_t> beat_;
+  TimePoint looked_;
+  Duration silence_{};
+};
+
+}  // namespace plchost

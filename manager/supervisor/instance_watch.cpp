@@ -1,0 +1,43 @@
+// What a ManagedInstance does when the control thread of its process stands still.
+
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "manager/supervisor/managed_instance.hpp"
+
+namespace plchost {
+
+void ManagedInstance::watch_heartbeat(const InstanceRuntime& runtime) {
+  heartbeat_.look(surroundings_.now(), runtime.heartbeat_ns);
+  if (heartbeat_.silent() == silent_) return;
+  if (silent_) {
+    answers_again(runtime);
+  } else {
+    fall_silent(runtime.problem.view());
+  }
+}
+
+void ManagedInstance::fall_silent(std::string_view before) {
+  silent_ = true;
+  set_state(Phase::up, InstanceState::exception,
+            fmt::format("its control thread has not answered for {} s: it waits for a lock that a task was "
+                        "caught with, or tasks leave it no processor time{}{}",
+                        std::chrono::duration_cast<std::chrono::seconds>(HeartbeatWatch::kLimit).count(),
+                        before.empty() ? "" : "; ", before));
+  if (!operation_ || operation_->step != Step::forwarded) return;
+  host_.set_timer(std::nullopt);
+  finish(ErrorCode::timed_out, fmt::format("it is in exception now: {}; reset it", status_.problem.view()));
+}
+
+// It was kept from answering, and has missed nothing: what it says holds again.
+void ManagedInstance::answers_again(const InstanceRuntime& runtime) {
+  if (safe_mode_) {
+    set_state(Phase::up, InstanceState::safe_mode, problem_when_up());
+  } else {
+    show_application(runtime);
+  }
+  silent_ = false;  // only now, so that the transition is told
+}
+
+}  // namespace plchost
