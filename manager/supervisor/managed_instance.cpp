@@ -177,15 +177,15 @@ void ManagedInstance::on_exit(const ExitStatus& status) {
   }
 }
 
+// Nobody asked for this end, so code 0 is no success: it may be exit() in the middle of a cycle.
 void ManagedInstance::ended_by_itself(const ExitStatus& status) {
-  const bool failed = !status.success();
   if (phase_ == Phase::up) start_kind_ = StartKind::after_fault;
   const TimePoint now = surroundings_.now();
-  history_.record_end(now, phase_ == Phase::up ? now - up_since_ : Duration::zero(), failed);
-  const bool again =
-      config_.restart == RestartPolicy::always || (config_.restart == RestartPolicy::on_failure && failed);
+  history_.record_end(now, phase_ == Phase::up ? now - up_since_ : Duration::zero(), true);
+  const bool again = config_.restart != RestartPolicy::never;
   if (again && history_.too_many_crashes()) safe_mode_ = true;
-  back_off_or_give_up(again, failed ? InstanceState::failed : InstanceState::offline, status.describe());
+  back_off_or_give_up(again, InstanceState::failed,
+                      status.success() ? status.describe() + ", which nobody asked for" : status.describe());
 }
 
 void ManagedInstance::back_off_or_give_up(bool again, InstanceState otherwise, const std::string& why) {

@@ -43,9 +43,9 @@ namespace plchost {
 // * The order of `after` is for the first start (held) and for the end. A restart does not wait, and an
 // operator's
 //   start of a held instance overrides it.
-// * An end of its own accord: a signal, or an exit code other than 0, is a failure; exit code 0 is not.
-// Policy
-//   never: down. on_failure: restarted after a failure. always: restarted. A set-up that failed
+// * An end that nobody asked this manager for is a failure, whatever the exit code: exit(0) in a cycle is
+// one. Policy
+//   never: failed. on_failure, always: restarted. A set-up that failed
 //   (kExitSetupFailed, wrong usage) is not retried under on_failure, because the same files would fail again:
 //   failed. Under always it is, with back-off, but it does not count as a crash.
 //   So it is when a process of that name is there already: one that was still being set up when its manager

@@ -101,15 +101,23 @@ INSTANTIATE_TEST_SUITE_P(
     All, RestartPolicyTest,
     testing::Values(
         PolicyCase{"never_crash", RestartPolicy::never, killed_by(SIGSEGV), InstanceState::failed},
-        PolicyCase{"never_exit_0", RestartPolicy::never, exited_with(0), InstanceState::offline},
+        PolicyCase{"never_exit_0", RestartPolicy::never, exited_with(0), InstanceState::failed},
         PolicyCase{"failure_crash", RestartPolicy::on_failure, killed_by(SIGSEGV), InstanceState::waiting},
         PolicyCase{"failure_exit_1", RestartPolicy::on_failure, exited_with(1), InstanceState::waiting},
-        PolicyCase{"failure_exit_0", RestartPolicy::on_failure, exited_with(0), InstanceState::offline},
+        PolicyCase{"failure_exit_0", RestartPolicy::on_failure, exited_with(0), InstanceState::waiting},
         PolicyCase{"failure_unknown", RestartPolicy::on_failure, ExitStatus{.known = false},
                    InstanceState::waiting},
         PolicyCase{"always_crash", RestartPolicy::always, killed_by(SIGKILL), InstanceState::waiting},
         PolicyCase{"always_exit_0", RestartPolicy::always, exited_with(0), InstanceState::waiting}),
     [](const auto& test) { return test.param.name; });
+
+TEST_F(ManagedInstanceTest, SaysThatNobodyAskedForAnExitWithoutError) {
+  bring_up();
+  sut().on_exit(exited_with(0));
+  EXPECT_EQ(problem(), "exit code 0, which nobody asked for; starts again 100 ms later");
+  expire_timer();
+  EXPECT_EQ(host_.spawned.back().start_kind, StartKind::after_fault);
+}
 
 TEST_F(ManagedInstanceTest, ComesBackAfterTheDelayAndCountsIt) {
   bring_up();
