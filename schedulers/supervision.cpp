@@ -8,6 +8,15 @@ namespace plchost {
 
 namespace {
 
+// Where the clock ends before, never.
+TimePoint later(TimePoint from, std::int64_t times, Duration interval) noexcept {
+  Duration::rep distance = 0;
+  Duration::rep sum = 0;
+  const bool ends_before = __builtin_mul_overflow(times, interval.count(), &distance) ||
+                           __builtin_add_overflow(from.time_since_epoch().count(), distance, &sum);
+  return ends_before ? kNoDeadline : TimePoint(Duration(sum));
+}
+
 TimePoint at(const std::atomic<Duration::rep>& stamp) noexcept {
   return TimePoint(Duration(stamp.load(std::memory_order_relaxed)));
 }
@@ -127,7 +136,7 @@ TimePoint Supervision::look_at_releases(Watched& watched, TimePoint now) noexcep
   if (allowed == 0 || !due || task.fault().raised() || !omitted_cycles_.load(std::memory_order_relaxed))
     return kNoDeadline;
   const Duration interval = task.interval();
-  const TimePoint hit = std::max(*due, at(forgiven_until_)) + allowed * interval;
+  const TimePoint hit = later(std::max(*due, at(forgiven_until_)), allowed, interval);
   if (now < hit) return hit;
   const std::int64_t omitted = (now - *due) / interval;
   if (const auto since = watched.trap->running_since()) {

@@ -123,6 +123,21 @@ TEST_F(SupervisionTest, CountsNoOmittedCycleInTheGraceAfterTheStart) {
   EXPECT_GE(record->figure, record->limit);
 }
 
+TEST_F(SupervisionTest, NeverMissesReleasesThatLieBehindTheEndOfTheClock) {
+  TaskConfig config = task_->config();
+  config.interval = std::chrono::hours(24 * 49);
+  config.watchdog.omitted_cycles = 3000;
+  sut_.reset();
+  tasks_[0] = std::make_unique<Task>(clock_, std::move(config), statistics_, nullptr, &board_);
+  task_ = tasks_[0].get();
+  sut_.emplace(clock_, tasks_, poller_);
+  settings_.watchdog.default_time = {};
+  begin();
+  clock_.run_for(Supervision::kGrace * 10);
+  EXPECT_EQ(look(), kNoDeadline);
+  EXPECT_FALSE(task_->fault().raised());
+}
+
 TEST_F(SupervisionTest, CountsNoOmittedCycleWhileTheTasksStop) {
   begin();
   sut_->tasks_stop();
