@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -22,6 +23,11 @@ struct CycleLimit {
 };
 [[nodiscard]] std::optional<CycleLimit> cycle_limit(const TaskConfig& task,
                                                     const WatchdogSettings& settings) noexcept;
+/// The guard against endless loops is as long as the task's interval, but at most so many times its own time.
+inline constexpr int kMostStretch = 10;
+/// The limits in force, one line for each that there is, with the tasks that have it.
+[[nodiscard]] std::vector<std::string> describe_cycle_limits(std::span<const TaskConfig> tasks,
+                                                             const WatchdogSettings& settings);
 
 /// A task's look at its own cycles, when they end. Real-time.
 class OverrunRule {

@@ -9,6 +9,7 @@
 #include "instances/runtime/operator_events.hpp"
 #include "instances/runtime/system_time.hpp"
 #include "instances/runtime/task_builder.hpp"
+#include "schedulers/watchdog_rules.hpp"
 #include "shm/base/log.hpp"
 
 namespace plchost {
@@ -203,6 +204,9 @@ Result<std::string> Instance::make_tasks() {
     if (!followed) return std::unexpected(std::move(followed).error());
   }
   notify_tasks(EVT_ExternalEventTaskCreateDone);
+  for (const std::string& line : describe_cycle_limits(application_->tasks(), settings_.scheduler.watchdog)) {
+    spdlog::info("watchdog: {}", line);
+  }
   life_.go_to(ApplicationState::stopped, fmt::format("{} is loaded ({} start)", application_->name(),
                                                      to_string(options_.launch.start_kind)));
   return {};

@@ -1,7 +1,11 @@
 #include "schedulers/watchdog_rules.hpp"
 
 #include <array>
+#include <span>
+#include <vector>
 
+#include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 namespace plchost {
@@ -33,8 +37,29 @@ TEST(CycleLimit, OfATaskWithoutWatchdogIsTheGuardAgainstEndlessLoops) {
             (CycleLimit{.limit = seconds(2), .lenient = true}));
 }
 
-TEST(CycleLimit, OfALongIntervalIsAtLeastTheInterval) {
-  EXPECT_EQ(cycle_limit(task_with(seconds(30)), guard(seconds(2)))->limit, seconds(30));
+TEST(CycleLimit, OfALongIntervalIsTheInterval) {
+  EXPECT_EQ(cycle_limit(task_with(seconds(13)), guard(seconds(2)))->limit, seconds(13));
+}
+
+TEST(CycleLimit, OfAVeryLongIntervalIsTenTimesTheGuard) {
+  EXPECT_EQ(cycle_limit(task_with(seconds(60)), guard(milliseconds(700)))->limit, seconds(7));
+}
+
+TEST(CycleLimit, IsToldOncePerLimitWithItsTasks) {
+  std::vector<TaskConfig> tasks(10, task_with(milliseconds(1)));
+  for (std::size_t i = 0; i < tasks.size(); ++i) tasks[i].name = fmt::format("T{}", i);
+  tasks.push_back(task_with(seconds(60)));
+  tasks.back().name = "Minute";
+  tasks.push_back(task_with(milliseconds(10), {.time = milliseconds(2), .sensitivity = 3}));
+  tasks.back().name = "Own";
+  EXPECT_THAT(
+      describe_cycle_limits(tasks, guard(milliseconds(700))),
+      testing::ElementsAre("a cycle may take 700 ms (the guard against endless loops): task T0, T1, T2, T3, "
+                           "T4, T5, T6, T7 and 2 more",
+                           "a cycle may take 7000 ms (the guard against endless loops): task Minute",
+                           "a cycle may take 6 ms (the task's own watchdog): task Own"));
+  EXPECT_THAT(describe_cycle_limits(std::span(tasks).first(1), guard(Duration::zero())),
+              testing::ElementsAre("a cycle may take as long as it likes: task T0"));
 }
 
 TEST(CycleLimit, IsNoneIfTheGuardIsOff) {
