@@ -22,8 +22,9 @@ struct TimeFunction {
 /// The two may differ by this much at the same moment.
 inline constexpr RTS_SYSTIME kSystemTimeToleranceUs = 100;
 
-/// Takes about 10 ms: both answer ERR_OK, never go back, go on at about the pace of CLOCK_MONOTONIC, and have
-/// one base.
+/// Both answer ERR_OK, never go back, go on at about the pace of CLOCK_MONOTONIC, and have one base. Takes
+/// about 10 ms; longer, at most about a second, where the processor is taken away, which refuses no right
+/// clock.
 [[nodiscard]] Result<void> check_system_time(const TimeFunction& us, const TimeFunction& ns);
 
 }  // namespace plchost

@@ -1,5 +1,7 @@
 #include "instances/runtime/system_time.hpp"
 
+#include <thread>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -52,6 +54,22 @@ RTS_RESULT ms_as_us(RTS_SYSTIME* time) {
   return ERR_OK;
 }
 
+// What it is for a caller to lose the processor behind its first reading, and before each tenth.
+constexpr auto kLost = std::chrono::milliseconds(30);
+int late_calls = 0;
+RTS_RESULT late(PF_SYSTIME clock, RTS_SYSTIME* time) {
+  if (++late_calls % 10 == 0) std::this_thread::sleep_for(kLost);
+  const RTS_RESULT result = clock(time);
+  if (late_calls == 1) std::this_thread::sleep_for(kLost);
+  return result;
+}
+RTS_RESULT late_good_ns(RTS_SYSTIME* time) {
+  return late(good_ns, time);
+}
+RTS_RESULT late_us_as_ns(RTS_SYSTIME* time) {
+  return late(us_as_ns, time);
+}
+
 std::string complaint(PF_SYSTIME us, PF_SYSTIME ns) {
   const auto checked = check_system_time({"MyUs", us}, {"MyNs", ns});
   return checked ? "" : checked.error().message;
@@ -59,6 +77,16 @@ std::string complaint(PF_SYSTIME us, PF_SYSTIME ns) {
 
 TEST(SystemTime, TakesTwoFunctionsOfOneBase) {
   EXPECT_EQ(complaint(good_us, good_ns), "");
+}
+
+TEST(SystemTime, TakesARightClockWhateverTakesTheProcessorAway) {
+  late_calls = 0;
+  EXPECT_EQ(complaint(good_us, late_good_ns), "");
+}
+
+TEST(SystemTime, FindsAWrongPaceWhateverTakesTheProcessorAway) {
+  late_calls = 0;
+  EXPECT_THAT(complaint(ms_as_us, late_us_as_ns), HasSubstr("MyNs advanced by"));
 }
 
 TEST(SystemTime, RefusesWhatApplicationsCouldNotRelyOn) {
