@@ -1,5 +1,6 @@
 #include "instances/runtime/instance.hpp"
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -11,8 +12,29 @@
 #include "instances/runtime/task_builder.hpp"
 #include "schedulers/watchdog_rules.hpp"
 #include "shm/base/log.hpp"
+#include "shm/base/names.hpp"
 
 namespace plchost {
+
+namespace {
+
+// As many as anybody reads: the file is a stranger's.
+void log_what_is_left_alone(const InstanceSettings& settings) {
+  if (!settings.foreign_sections.empty()) {
+    spdlog::info("settings: sections of other programs, left alone: {}",
+                 join_some(settings.foreign_sections));
+  }
+  if (!settings.foreign_components.empty()) {
+    spdlog::info("settings: components of other programs, left alone: {}",
+                 join_some(settings.foreign_components));
+  }
+  constexpr std::size_t kMost = 50;
+  const auto& remarks = settings.remarks;
+  for (std::size_t i = 0; i < std::min(remarks.size(), kMost); ++i) spdlog::warn("settings: {}", remarks[i]);
+  if (remarks.size() > kMost) spdlog::warn("settings: {} more remarks", remarks.size() - kMost);
+}
+
+}  // namespace
 
 std::unique_ptr<Instance> Instance::set_up(const Options& options, SetupReporter& reporter) {
   struct Step {
@@ -71,15 +93,7 @@ Result<std::string> Instance::read_settings_file() {
   auto settings = read_settings(options_.launch.settings);
   if (!settings) return std::unexpected(std::move(settings).error());
   settings_ = *std::move(settings);
-  if (!settings_.foreign_sections.empty()) {
-    spdlog::info("settings: sections of other programs, left alone: {}",
-                 fmt::join(settings_.foreign_sections, ", "));
-  }
-  if (!settings_.foreign_components.empty()) {
-    spdlog::info("settings: components of other programs, left alone: {}",
-                 fmt::join(settings_.foreign_components, ", "));
-  }
-  for (const std::string& remark : settings_.remarks) spdlog::warn("settings: {}", remark);
+  log_what_is_left_alone(settings_);
   choose_scheduler();
   return hold_idle_states();
 }

@@ -70,7 +70,7 @@ class Parser {
     if (equals == std::string_view::npos)
       return fail("neither [Section] nor Key=Value nor a comment (; or #)");
     const std::string_view key = trim(line.substr(0, equals));
-    if (section_.empty()) return fail(fmt::format("'{}' stands before the first [Section]", key));
+    if (section_.empty()) return fail(fmt::format("'{}' stands before the first [Section]", shown(key)));
     set(key, trim(without_comment(line.substr(equals + 1))));
   }
 
@@ -81,18 +81,17 @@ class Parser {
     section_ = line.substr(1, end - 1);
     owned_ = is_owned(section_);
     task_.reset();
-    auto& foreign = settings_.foreign_sections;
-    if (!owned_ && std::ranges::find(foreign, section_) == foreign.end()) foreign.emplace_back(section_);
+    if (!owned_ && foreign_.emplace(section_).second) settings_.foreign_sections.emplace_back(section_);
     if (table_section(section_) == kTaskSections) begin_task(section_.substr(kTaskPrefix.size()));
   }
 
   void begin_task(std::string_view name) {
     if (auto valid = check_name("task", name, kMaxTaskName); !valid) {
-      return fail(fmt::format("[{}]: {}", section_.substr(0, kMaxTaskName), valid.error().message));
+      return fail(fmt::format("[{}]: {}", shown(section_), valid.error().message));
     }
-    const auto found = std::ranges::find(settings_.tasks, name, &TaskSettings::task);
-    task_ = static_cast<std::size_t>(found - settings_.tasks.begin());
-    if (found != settings_.tasks.end()) return;
+    const auto [known, is_new] = tasks_.emplace(name, settings_.tasks.size());
+    task_ = known->second;
+    if (!is_new) return;
     settings_.tasks.push_back(
         {.task = std::string(name), .where = fmt::format("{}: [{}]", place(), section_)});
   }
@@ -102,16 +101,16 @@ class Parser {
     if (!key) return fail(key.error().message);
     const std::string identity = setting_identity(**key, name);
     if (!seen_.insert(fmt::format("[{}] {}", section_, identity)).second) {
-      return fail(fmt::format("[{}] {} is given twice", section_, name));
+      return fail(fmt::format("[{}] {} is given twice", section_, shown(name)));
     }
     if (std::holds_alternative<UnusedSetting>((*key)->value)) {
       settings_.remarks.push_back(
-          fmt::format("{}: [{}] {} has no meaning here and is ignored", place(), section_, name));
+          fmt::format("{}: [{}] {} has no meaning here and is ignored", place(), section_, shown(name)));
       return;
     }
     const SettingsTarget target{settings_, components_, task_ ? &settings_.tasks[*task_] : nullptr};
     if (const auto applied = apply_setting(**key, name, value, target); !applied) {
-      fail(fmt::format("[{}] {}: {}", section_, name, applied.error().message));
+      fail(fmt::format("[{}] {}: {}", section_, shown(name), applied.error().message));
     }
   }
 
@@ -135,6 +134,8 @@ class Parser {
   std::optional<std::size_t> task_;  // of the section [Task.NAME], in settings_.tasks
   InstanceSettings settings_;
   std::map<std::size_t, std::string> components_;
+  std::map<std::string, std::size_t> tasks_;  // their places in settings_.tasks
+  std::set<std::string> foreign_;
   std::set<std::string> seen_;
   std::optional<Error> error_;
 };

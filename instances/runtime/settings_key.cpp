@@ -16,9 +16,6 @@ namespace {
 constexpr std::string_view kTaskPrefix = "Task.";
 constexpr std::array<std::string_view, 2> kPlatforms = {"VxWorks.", "Linux."};
 
-// Of a name or value that is not allowed, this much is told.
-constexpr std::size_t kShown = 80;
-
 template <class... Cases>
 struct Overloaded : Cases... {
   using Cases::operator()...;
@@ -85,11 +82,10 @@ std::unexpected<Error> unknown_key(std::string_view section, std::string_view na
     names.push_back(key.name);
     allowed.push_back(written_name(key));
   }
-  const std::string_view shown = name.substr(0, kShown);
-  const std::string_view nearest = nearest_name(without_platform(shown), names);
+  const std::string_view nearest = nearest_name(without_platform(shown(name)), names);
   const auto meant = std::ranges::find(names, nearest) - names.begin();
   return failure(ErrorCode::invalid_argument,
-                 fmt::format("[{}] has no key '{}'{}; allowed are {}", section, shown,
+                 fmt::format("[{}] has no key '{}'{}; allowed are {}", shown(section), shown(name),
                              nearest.empty() ? ""
                                              : fmt::format(", did you mean '{}'?",
                                                            allowed[static_cast<std::size_t>(meant)]),
@@ -199,8 +195,8 @@ Result<void> apply_setting(const SettingKey& key, std::string_view name, std::st
                  },
                  key.value);
   if (applied) return {};
-  return failure(ErrorCode::invalid_argument, fmt::format("'{}' is not allowed; allowed is: {}",
-                                                          value.substr(0, kShown), allowed_values(key)));
+  return failure(ErrorCode::invalid_argument,
+                 fmt::format("'{}' is not allowed; allowed is: {}", shown(value), allowed_values(key)));
 }
 
 }  // namespace plchost

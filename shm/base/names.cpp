@@ -34,11 +34,10 @@ Result<void> check_name(std::string_view what, std::string_view name, std::size_
   const bool good = !name.empty() && name.size() <= max && name.front() != '.' && name.front() != '-' &&
                     std::ranges::all_of(name, is_name_character);
   if (good) return {};
-  constexpr std::size_t kShown = 100;
   return failure(ErrorCode::invalid_argument,
                  fmt::format("{} '{}' is not valid: allowed are 1 to {} letters, digits, '_', '-' and '.', "
                              "not starting with '-' or '.'",
-                             what, name.substr(0, kShown), max));
+                             what, shown(name), max));
 }
 
 std::string event_object_name(std::string_view instance, std::string_view event) {
@@ -60,6 +59,30 @@ std::string_view nearest_name(std::string_view unknown, std::span<const std::str
 
 std::string join_names(std::span<const std::string_view> names) {
   return names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "));
+}
+
+std::string_view cut(std::string_view text, std::size_t most) noexcept {
+  if (text.size() <= most) return text;
+  const auto goes_on = [&](std::size_t at) {
+    return (static_cast<unsigned char>(text[at]) & 0xC0U) == 0x80U;
+  };
+  std::size_t end = most;
+  constexpr std::size_t kLongestCharacter = 4;
+  while (end > 0 && most - end < kLongestCharacter && goes_on(end)) --end;
+  return text.substr(0, end);
+}
+
+std::string_view shown(std::string_view text) noexcept {
+  return cut(text, kShown);
+}
+
+std::string join_some(std::span<const std::string> names) {
+  std::vector<std::string_view> first;
+  for (const std::string& name : names.first(std::min(names.size(), kShownNames)))
+    first.push_back(shown(name));
+  const std::string more =
+      names.size() > kShownNames ? fmt::format(" and {} more", names.size() - kShownNames) : "";
+  return join_names(first) + more;
 }
 
 }  // namespace plchost

@@ -34,6 +34,17 @@ inline constexpr std::size_t kMaxPath = 255;
 /// "a, b, c", for messages that list what is allowed; "none" if there is nothing.
 [[nodiscard]] std::string join_names(std::span<const std::string_view> names);
 
+/// The first `most` bytes, without a torn character of UTF-8 at the end.
+[[nodiscard]] std::string_view cut(std::string_view text, std::size_t most) noexcept;
+
+/// Of a stranger's name or value, this much is told.
+inline constexpr std::size_t kShown = 80;
+[[nodiscard]] std::string_view shown(std::string_view text) noexcept;
+
+/// "a, b, c and 7 more", for lists that a stranger wrote: the first kShownNames, each as shown() cuts it.
+inline constexpr std::size_t kShownNames = 20;
+[[nodiscard]] std::string join_some(std::span<const std::string> names);
+
 /// A bounded text in place, for shared memory: always terminated, cut if too long.
 template <std::size_t Max>
 struct FixedText {

@@ -51,6 +51,24 @@ TEST(Names, JoinsForMessages) {
   EXPECT_EQ(join_names({}), "none");
 }
 
+TEST(Names, CutsBetweenCharacters) {
+  EXPECT_EQ(cut("abc", 3), "abc");
+  EXPECT_EQ(cut("abcd", 3), "abc");
+  EXPECT_EQ(cut("ab\xc3\xa4", 3), "ab");
+  EXPECT_EQ(cut("\x80\x80\x80\x80\x80\x80\x80\x80", 6).size(), 2U) << "no UTF-8 at all";
+  EXPECT_EQ(shown(std::string(1000, 'x')).size(), kShown);
+}
+
+TEST(Names, JoinsTheFirstOfALongList) {
+  std::vector<std::string> names(kShownNames, "a");
+  EXPECT_THAT(join_some(names), testing::Not(HasSubstr("more")));
+  names.resize(1000, "b");
+  names[0] = std::string(1000, 'x');
+  EXPECT_THAT(join_some(names), testing::EndsWith(", a and 980 more"));
+  EXPECT_LT(join_some(names).size(), 200U);
+  EXPECT_EQ(join_some({}), "none");
+}
+
 TEST(FixedText, CutsWhatIsTooLong) {
   FixedText<3> sut("abcdef");
   EXPECT_EQ(sut.view(), "abc");

@@ -175,6 +175,31 @@ TEST(Settings, RefusesZeroBytes) {
   EXPECT_THAT(complaint(std::string_view("[X]\nA=\0\n", 8)), HasSubstr("line1.cfg:2: holds a zero byte"));
 }
 
+TEST(Settings, TellsOfALongTextOnlyItsBeginning) {
+  const std::string long_text(100'000, 'x');
+  for (const std::string& text :
+       {long_text + "=1\n", "[CmpSchedule]\n" + long_text + "=1\n", "[Task." + long_text + "]\n",
+        "[CmpSchedule]\nSchedulerInterval=" + long_text, "[SysTimer]\nWinCE." + long_text + "=1\n",
+        "[ComponentManager]\nComponent." + std::string(100'000, '0') + "=\n"}) {
+    EXPECT_LT(complaint(text).size(), 1000U);
+    EXPECT_GT(complaint(text).size(), 0U);
+  }
+}
+
+// 100,000 sections take far less than a second; compared with each other they took half a minute.
+TEST(Settings, ReadsAsManySectionsAsAFileCanHold) {
+  constexpr int kSections = 60'000;
+  std::string text;
+  for (int i = 0; i < kSections; ++i) text += fmt::format("[s{:06}]\n", i);
+  for (int i = 0; i < kSections / 2; ++i) text += fmt::format("[Task.t{:05}]\n", i);
+  const TimePoint begin = MonotonicClock::now();
+  const auto sut = parse_settings(text, "line1.cfg");
+  ASSERT_TRUE(sut);
+  EXPECT_EQ(sut->foreign_sections.size(), static_cast<std::size_t>(kSections));
+  EXPECT_EQ(sut->tasks.size(), static_cast<std::size_t>(kSections) / 2);
+  EXPECT_LT(MonotonicClock::now() - begin, 5s);
+}
+
 TEST(Settings, ReadsTheOptionsOfEachTask) {
   const auto sut = parse_settings(
       "[Task.Fast]\nLatePolicy=Asap\nStartOffsetNs=250000\nDrivesOutputs=1\nWatchdog.TimeUs=900\n"
