@@ -17,12 +17,16 @@ namespace plchost {
 
 namespace {
 
-constexpr std::string_view kBlank = " \t\r\v\f";
+constexpr std::string_view kBlank = " \t\v\f";
 constexpr std::string_view kTaskPrefix = "Task.";
 
 std::string_view trim(std::string_view text) {
   text.remove_prefix(std::min(text.find_first_not_of(kBlank), text.size()));
   return text.substr(0, text.find_last_not_of(kBlank) + 1);
+}
+
+bool is_comment(std::string_view text) {
+  return text.starts_with(';') || text.starts_with('#');
 }
 
 // A ';' begins a comment at the start of a value or after a blank; elsewhere it is part of it.
@@ -42,9 +46,7 @@ class Parser {
     if (rest_.starts_with(kByteOrderMark)) rest_.remove_prefix(kByteOrderMark.size());
     while (!rest_.empty() && !error_) {
       ++line_;
-      const std::size_t end = rest_.find('\n');
-      read_line(rest_.substr(0, end));
-      rest_ = end == std::string_view::npos ? std::string_view() : rest_.substr(end + 1);
+      read_line(next_line());
     }
     if (!error_) check_sys_time();
     if (error_) return std::unexpected(*std::move(error_));
@@ -59,13 +61,26 @@ class Parser {
     error_ = Error{ErrorCode::invalid_argument, 0, fmt::format("{}: {}", place(), what)};
   }
 
+  // It ends with LF, CR LF, or CR alone.
+  std::string_view next_line() {
+    const std::size_t end = std::min(rest_.find_first_of("\r\n"), rest_.size());
+    const std::string_view line = rest_.substr(0, end);
+    rest_.remove_prefix(end);
+    rest_.remove_prefix(rest_.starts_with("\r\n") ? 2 : std::min<std::size_t>(rest_.size(), 1));
+    return line;
+  }
+
+  void remark(std::string_view what) { settings_.remarks.push_back(fmt::format("{}: {}", place(), what)); }
+
+  [[nodiscard]] bool in_foreign_section() const { return !section_.empty() && !owned_; }
+
   void read_line(std::string_view line) {
     if (line.contains('\0')) return fail("holds a zero byte: not a text file");
     line = trim(line);
-    if (line.empty() || line.front() == ';' || line.front() == '#') return;
+    if (line.empty() || is_comment(line)) return;
     if (line.front() == '[') return begin_section(line);
     // What other programs write in their sections is theirs alone.
-    if (!section_.empty() && !owned_) return;
+    if (in_foreign_section()) return;
     const std::size_t equals = line.find('=');
     if (equals == std::string_view::npos)
       return fail("neither [Section] nor Key=Value nor a comment (; or #)");
@@ -76,10 +91,30 @@ class Parser {
 
   void begin_section(std::string_view line) {
     const std::size_t end = line.find(']');
-    if (end == std::string_view::npos || end == 1)
-      return fail("neither [Section] nor Key=Value nor a comment");
-    section_ = line.substr(1, end - 1);
-    owned_ = is_owned(section_);
+    const bool closed = end != std::string_view::npos;
+    const std::string_view name = trim(closed ? line.substr(1, end - 1) : line.substr(1));
+    const std::string_view behind = closed ? trim(line.substr(end + 1)) : std::string_view();
+    const bool owned = is_owned(name);
+    const std::string_view meant = owned ? std::string_view() : meant_section(name);
+    const bool whole = closed && !name.empty() && (behind.empty() || is_comment(behind));
+    if (!whole && in_foreign_section() && !owned && meant.empty()) {
+      return remark(fmt::format("'{}' is no section: taken for a line of [{}], whatever it means there",
+                                shown(line), shown(section_)));
+    }
+    if (!closed || name.empty()) return fail("neither [Section] nor Key=Value nor a comment");
+    if (!meant.empty()) {
+      return fail(fmt::format("there is no section [{}], did you mean [{}]?", shown(name), meant));
+    }
+    if (!whole) {
+      return fail(fmt::format("'{}' stands behind [{}]: it belongs on a line of its own", shown(behind),
+                              shown(name)));
+    }
+    enter(name, owned);
+  }
+
+  void enter(std::string_view name, bool owned) {
+    section_ = name;
+    owned_ = owned;
     task_.reset();
     if (!owned_ && foreign_.emplace(section_).second) settings_.foreign_sections.emplace_back(section_);
     if (table_section(section_) == kTaskSections) begin_task(section_.substr(kTaskPrefix.size()));
@@ -104,9 +139,7 @@ class Parser {
       return fail(fmt::format("[{}] {} is given twice", section_, shown(name)));
     }
     if (std::holds_alternative<UnusedSetting>((*key)->value)) {
-      settings_.remarks.push_back(
-          fmt::format("{}: [{}] {} has no meaning here and is ignored", place(), section_, shown(name)));
-      return;
+      return remark(fmt::format("[{}] {} has no meaning here and is ignored", section_, shown(name)));
     }
     const SettingsTarget target{settings_, components_, task_ ? &settings_.tasks[*task_] : nullptr};
     if (const auto applied = apply_setting(**key, name, value, target); !applied) {

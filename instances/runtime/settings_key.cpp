@@ -74,6 +74,25 @@ std::string_view without_platform(std::string_view name) {
   return name;
 }
 
+std::string lower(std::string_view text) {
+  std::string lowered(text);
+  for (char& c : lowered) {
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  }
+  return lowered;
+}
+
+const std::vector<std::string_view>& all_sections() {
+  static const std::vector<std::string_view> all = [] {
+    std::vector<std::string_view> sections;
+    for (const SettingKey& key : all_setting_keys()) {
+      if (std::ranges::find(sections, key.section) == sections.end()) sections.push_back(key.section);
+    }
+    return sections;
+  }();
+  return all;
+}
+
 std::unexpected<Error> unknown_key(std::string_view section, std::string_view name) {
   std::vector<std::string_view> names;
   std::vector<std::string> allowed;
@@ -110,8 +129,23 @@ std::string_view table_section(std::string_view section) noexcept {
 }
 
 bool is_owned(std::string_view section) {
-  return std::ranges::find(all_setting_keys(), table_section(section), &SettingKey::section) !=
-         all_setting_keys().end();
+  return std::ranges::find(all_sections(), table_section(section)) != all_sections().end();
+}
+
+std::string_view meant_section(std::string_view section) {
+  const std::string written = lower(shown(section));
+  for (const std::string_view known : all_sections()) {
+    const bool task = known == kTaskSections;
+    const std::string stem = lower(task ? kTaskPrefix : known);
+    const std::string_view begin =
+        task ? std::string_view(written).substr(0, written.find('.') + 1) : std::string_view(written);
+    // Names of other programs' sections are near to ours ([SysFile], [SysTimeRtc]): one error in five
+    // characters is a typing error, more is another name.
+    constexpr std::size_t kCharacters = 5;
+    const std::array<std::string_view, 1> only = {stem};
+    if (!nearest_name(begin, only, stem.size() / kCharacters).empty()) return known;
+  }
+  return {};
 }
 
 std::string written_name(const SettingKey& key) {

@@ -91,6 +91,9 @@ inline constexpr std::string_view kTaskSections = "Task.NAME";
 /// The key of the table for a section as written: kTaskSections for "Task.Fast".
 [[nodiscard]] std::string_view table_section(std::string_view section) noexcept;
 [[nodiscard]] bool is_owned(std::string_view section);
+/// The section of the table that a section as written was meant to be: in another case, or with a typing
+/// error. Empty: it is another program's.
+[[nodiscard]] std::string_view meant_section(std::string_view section);
 
 /// "VxWorks.TimerSource"
 [[nodiscard]] std::string written_name(const SettingKey& key);

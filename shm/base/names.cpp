@@ -45,9 +45,16 @@ std::string event_object_name(std::string_view instance, std::string_view event)
 }
 
 std::string_view nearest_name(std::string_view unknown, std::span<const std::string_view> known) {
+  // Further away than this is another word, not a typing error.
+  return nearest_name(unknown, known, unknown.size() / 3 + 1);
+}
+
+std::string_view nearest_name(std::string_view unknown, std::span<const std::string_view> known,
+                              std::size_t most) {
   std::string_view nearest;
-  std::size_t best = unknown.size() / 3 + 2;  // further away than this is another word, not a typing error
+  std::size_t best = most + 1;
   for (const std::string_view candidate : known) {
+    if (candidate.size() >= unknown.size() + best || unknown.size() >= candidate.size() + best) continue;
     const std::size_t distance = edit_distance(unknown, candidate);
     if (distance < best) {
       best = distance;

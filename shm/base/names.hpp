@@ -30,6 +30,9 @@ inline constexpr std::size_t kMaxPath = 255;
 /// `known` that is most like `unknown`, or empty if none is near: for "did you mean".
 [[nodiscard]] std::string_view nearest_name(std::string_view unknown,
                                             std::span<const std::string_view> known);
+/// The same, with no more than `most` characters to insert, remove or replace.
+[[nodiscard]] std::string_view nearest_name(std::string_view unknown, std::span<const std::string_view> known,
+                                            std::size_t most);
 
 /// "a, b, c", for messages that list what is allowed; "none" if there is nothing.
 [[nodiscard]] std::string join_names(std::span<const std::string_view> names);

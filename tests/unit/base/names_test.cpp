@@ -43,6 +43,8 @@ TEST(Names, NearestFindsTypingErrorsOnly) {
   EXPECT_EQ(nearest_name("cmpscheduletimer", kKnown), "CmpScheduleTimer");
   EXPECT_EQ(nearest_name("zebra", kKnown), "");
   EXPECT_EQ(nearest_name("x", {}), "");
+  EXPECT_EQ(nearest_name("CmpSchedle", kKnown, 1), "CmpSchedule");
+  EXPECT_EQ(nearest_name("CmpSchdle", kKnown, 1), "");
 }
 
 TEST(Names, JoinsForMessages) {

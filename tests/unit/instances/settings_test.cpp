@@ -169,7 +169,46 @@ INSTANTIATE_TEST_SUITE_P(
         BadFile{"SchedulerInterval=1000\n",
                 "line1.cfg:1: 'SchedulerInterval' stands before the first [Section]"},
         BadFile{"[CmpSchedule]\nwhat is this\n", "line1.cfg:2: neither [Section] nor Key=Value"},
-        BadFile{"[CmpSchedule\n", "line1.cfg:1: neither"}));
+        BadFile{"[CmpSchedule] SchedulerInterval=100\n",
+                "line1.cfg:1: 'SchedulerInterval=100' stands behind [CmpSchedule]"},
+        BadFile{"[Foo] a=1\n", "'a=1' stands behind [Foo]"},
+        BadFile{"[Foo]\n[CmpSchedule] a=1\n", "line1.cfg:2: 'a=1' stands behind [CmpSchedule]"},
+        BadFile{"[Foo]\n[CmpSchedule\n", "line1.cfg:2: neither"},
+        BadFile{"[cmpschedule]\n", "there is no section [cmpschedule], did you mean [CmpSchedule]?"},
+        BadFile{"[Foo]\n[ CmpShedule ]\n", "line1.cfg:2: there is no section [CmpShedule], did you mean"},
+        BadFile{"[Systimer]\n", "did you mean [SysTimer]?"},
+        BadFile{"[DistribuetdClocks]\n", "did you mean [DistributedClock]?"},
+        BadFile{"[task.Fast]\n", "did you mean [Task.NAME]?"},
+        BadFile{"; old\r[CmpSchedule]\rSchedulerInterval=junk\r", "line1.cfg:3: "},
+        BadFile{"[CmpSchedule\n", "line1.cfg:1: neither"}, BadFile{"[ ]\n", "line1.cfg:1: neither"}));
+
+TEST(Settings, TakesBlanksAndACommentAroundASection) {
+  const auto sut = parse_settings("  [ CmpSchedule ] ; ours\nSchedulerInterval=2000\n[Foo]# theirs\n", "f");
+  ASSERT_TRUE(sut) << sut.error().message;
+  EXPECT_EQ(sut->scheduler.scheduler_interval, 2ms);
+  EXPECT_THAT(sut->foreign_sections, ElementsAre("Foo"));
+}
+
+// As they stand in files of the other runtime.
+TEST(Settings, TakesNoSectionOfAnotherProgramForAMisspeltOne) {
+  for (const char* const name :
+       {"SysFile",     "SysMem",        "SysTask",          "SysCom",       "SysTimeRtc",
+        "SysTarget",   "SysProcess",    "SysSocket",        "SysExcept",    "SysCpuHandling",
+        "SysEthernet", "CmpLog",        "CmpApp",           "CmpDevice",    "CmpSettings",
+        "CmpUserMgr",  "CmpRedundancy", "CmpSecureChannel", "CmpWebServer", "CmpOPCUAServer",
+        "Task"}) {
+    EXPECT_EQ(complaint(fmt::format("[{}]\n", name)), "");
+  }
+}
+
+TEST(Settings, LeavesABrokenLineOfAForeignSectionAloneWithARemark) {
+  const auto sut = parse_settings("[Foo]\n[broken\nx\n[1] = 2\n[CmpSchedule]\nSchedulerInterval=2000\n", "f");
+  ASSERT_TRUE(sut) << sut.error().message;
+  EXPECT_EQ(sut->scheduler.scheduler_interval, 2ms);
+  EXPECT_THAT(sut->foreign_sections, ElementsAre("Foo"));
+  EXPECT_THAT(sut->remarks,
+              ElementsAre(HasSubstr("f:2: '[broken' is no section"), HasSubstr("f:4: '[1] = 2'")));
+}
 
 TEST(Settings, RefusesZeroBytes) {
   EXPECT_THAT(complaint(std::string_view("[X]\nA=\0\n", 8)), HasSubstr("line1.cfg:2: holds a zero byte"));
