@@ -39,11 +39,14 @@ configure() { # configure DIR OPTIONS...
   command -v ccache >/dev/null && launcher=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DCMAKE_C_COMPILER_LAUNCHER=ccache)
   cmake -S . -B "$dir" -G Ninja "${launcher[@]}" "$@"
 }
+# Ten files at a time, as most of the work is the headers of others. The plain build shows that each stands alone.
+unity=(-DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=10)
 build_plain() { configure "$build" && cmake --build "$build" -j "$jobs"; }
 build_sanitized() { # build_sanitized DIR SANITIZERS OPTIONS...
   local dir=$1 sanitizers=$2
   shift 2
-  configure "$dir" -DSANITIZER="$sanitizers" -DPLCHOST_BENCH=OFF -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O0 -g1" -DCMAKE_C_FLAGS_DEBUG="-O0 -g1" "$@" &&
+  configure "$dir" -DSANITIZER="$sanitizers" -DPLCHOST_BENCH=OFF "${unity[@]}" \
+    -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O0 -g1" -DCMAKE_C_FLAGS_DEBUG="-O0 -g1" "$@" &&
     cmake --build "$dir" -j "$jobs"
 }
 gates() { tests/gates/layers.sh && tests/gates/house.sh && tests/gates/format.sh && tests/gates/prove.sh; }
@@ -67,7 +70,8 @@ count() { # adds up the summary of the step that just ran
 
 # Over the product's code; the tests are compiled with all warnings as errors like everything else.
 tidy() {
-  configure .build/tidy -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON &&
+  configure .build/tidy -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON \
+    "${unity[@]}" &&
     cmake --build .build/tidy --target plchost_idl_generate && tests/gates/tidy.sh "$PWD/.build/tidy"
 }
 

@@ -22,7 +22,7 @@ std::string level_name(std::uint32_t level) {
   return level < kLevels.size() ? std::string(kLevels.at(level)) : fmt::format("level {}", level);
 }
 
-Row to_row(const plc_HostFinding& finding) {
+Row row_of(const plc_HostFinding& finding) {
   using dds::text_of;
   return {{"host", text_of(finding.host)},      {"id", text_of(finding.id)},
           {"level", level_name(finding.level)}, {"subject", text_of(finding.subject)},
@@ -59,7 +59,7 @@ int check_host(CliSession& session, bool all) {
   if (session.options.json) {
     std::vector<Row> rows;
     for (const plc_HostFinding& finding : *findings) {
-      if (all || finding.level != kOk) rows.push_back(to_row(finding));
+      if (all || finding.level != kOk) rows.push_back(row_of(finding));
     }
     fmt::print("{}", format_json(rows));
   } else {

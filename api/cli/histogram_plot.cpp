@@ -22,7 +22,7 @@ constexpr std::size_t kWidestColumn = 2;
 constexpr std::array<std::string_view, 9> kEighths{" ", "▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"};
 
 /// A column of the drawing: bars [begin, end) of the logarithmic axis.
-struct Column {
+struct PlotColumn {
   std::uint64_t count = 0;
   std::string label;
 };
@@ -57,8 +57,8 @@ std::string decade_name(std::int64_t decade) {
   return fmt::format("{}{}", decade, kUnits[unit]);
 }
 
-std::vector<Column> columns_of(const HistogramReport& histogram, Range range, std::size_t bars_each) {
-  std::vector<Column> columns((range.size() + bars_each - 1) / bars_each);
+std::vector<PlotColumn> columns_of(const HistogramReport& histogram, Range range, std::size_t bars_each) {
+  std::vector<PlotColumn> columns((range.size() + bars_each - 1) / bars_each);
   for (const auto& bar : histogram.bars) {
     const std::size_t index = kBars.index_of(Duration(bar.lower_ns));
     // What comes from the network may be in any order.
@@ -78,11 +78,11 @@ std::vector<Column> columns_of(const HistogramReport& histogram, Range range, st
 }
 
 /// One line of bars: what of each reaches into the row, 0 (the lowest) to kHeight - 1.
-std::string row_of(const std::vector<Column>& columns, std::size_t row, std::uint64_t highest,
+std::string row_of(const std::vector<PlotColumn>& columns, std::size_t row, std::uint64_t highest,
                    std::size_t column_width, bool unicode) {
   constexpr std::size_t kSteps = kEighths.size() - 1;
   std::string line;
-  for (const Column& column : columns) {
+  for (const PlotColumn& column : columns) {
     const double share = static_cast<double>(column.count) / static_cast<double>(highest);
     auto level = static_cast<std::size_t>(std::lround(share * static_cast<double>(kHeight * kSteps)));
     if (column.count > 0) level = std::max<std::size_t>(level, 1);  // the rare ones are what one looks for
@@ -94,7 +94,7 @@ std::string row_of(const std::vector<Column>& columns, std::size_t row, std::uin
 }
 
 /// The names below the axis, as many as do not run into each other.
-std::string labels_of(const std::vector<Column>& columns, std::size_t column_width) {
+std::string labels_of(const std::vector<PlotColumn>& columns, std::size_t column_width) {
   std::string line;
   for (std::size_t i = 0; i < columns.size(); ++i) {
     const std::size_t at = i * column_width;
@@ -105,8 +105,8 @@ std::string labels_of(const std::vector<Column>& columns, std::size_t column_wid
   return line;
 }
 
-std::string draw(const std::vector<Column>& columns, std::uint64_t total, PlotStyle style) {
-  const std::uint64_t highest = std::ranges::max(columns, {}, &Column::count).count;
+std::string draw(const std::vector<PlotColumn>& columns, std::uint64_t total, PlotStyle style) {
+  const std::uint64_t highest = std::ranges::max(columns, {}, &PlotColumn::count).count;
   const std::size_t room = std::max(style.width, kMargin + kLeastWidth) - kMargin;
   const std::size_t column_width = std::clamp<std::size_t>(room / columns.size(), 1, kWidestColumn);
   const std::string_view side = style.unicode ? "│" : "|";
@@ -155,12 +155,12 @@ std::string plot_signed(const HistogramReport& negative, const HistogramReport& 
   }
   // One gap for zero, and the same scale on both sides of it.
   const std::size_t each = bars_each(left.size() + right.size() + 2, style);
-  std::vector<Column> columns = columns_of(negative, left, each);
+  std::vector<PlotColumn> columns = columns_of(negative, left, each);
   std::ranges::reverse(columns);
-  for (Column& column : columns) {
+  for (PlotColumn& column : columns) {
     if (!column.label.empty()) column.label = "-" + column.label;
   }
-  const std::vector<Column> rest = columns_of(positive, right, each);
+  const std::vector<PlotColumn> rest = columns_of(positive, right, each);
   columns.insert(columns.end(), rest.begin(), rest.end());
   return draw(columns, total, style);
 }

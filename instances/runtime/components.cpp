@@ -17,7 +17,7 @@ namespace {
 
 using Hook = RTS_RESULT (*)(unsigned, unsigned long, unsigned long);
 
-constexpr std::array<std::string_view, 1> kExports = {"HookFunction"};
+constexpr std::array<std::string_view, 1> kHookExport = {"HookFunction"};
 constexpr std::array kInitHooks = {CH_INIT, CH_INIT2, CH_INIT3};
 
 RTS_RESULT call(const SharedObject& object, unsigned hook) {
@@ -40,7 +40,7 @@ Result<void> Components::call_all(unsigned hook) {
 
 Result<void> Components::load(const std::vector<std::string>& files) {
   for (const std::string& file : files) {
-    auto object = SharedObject::load(file, kExports);
+    auto object = SharedObject::load(file, kHookExport);
     if (!object) return failure_in("component", std::move(object).error());
     objects_.push_back(*std::move(object));
   }

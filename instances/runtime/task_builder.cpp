@@ -121,11 +121,11 @@ Result<std::vector<TaskConfig>> build_tasks(const sys_setup_tasks_struct& setup)
 }
 
 void write_back(const TaskCounters& counters, Task_Info& task) noexcept {
-  constexpr std::int64_t kNsPerUs = 1000;
+  constexpr std::int64_t kPerUs = 1000;
   const auto us = [](std::int64_t ns) {
     constexpr std::int64_t kLowest = std::numeric_limits<int>::min();
     constexpr std::int64_t kHighest = std::numeric_limits<int>::max();
-    return static_cast<int>(std::clamp(ns / kNsPerUs, kLowest, kHighest));
+    return static_cast<int>(std::clamp(ns / kPerUs, kLowest, kHighest));
   };
   task.tLastCycleTime = us(counters.exec_last_ns);
   task.tAverageCycleTime = us(average(counters.exec_sum_ns, counters.recorded));
