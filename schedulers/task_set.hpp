@@ -57,6 +57,11 @@ class TaskSet {
   /// How long start() and switch_to() wait for tasks to take their new source. A task whose cycle takes
   /// longer takes it when the cycle ends.
   static constexpr Duration kSwitchPatience = std::chrono::milliseconds(100);
+  /// What a thread at least gets, after the deadline of a stop was first seen to be over, before it is
+  /// judged.
+  static constexpr Duration kSecondLook = std::chrono::milliseconds(20);
+  /// How long a stop waits for a task that is in no cycle and only has not had the processor.
+  static constexpr Duration kIdlePatience = std::chrono::seconds(2);
 
   /// Validates all tasks (names unique, priorities 0..31, an interval where one is needed ...), makes them,
   /// and starts their threads parked. The error names the task and what is allowed.
@@ -73,8 +78,9 @@ class TaskSet {
   /// not run, nor are edges of event variables: the level at the start counts as seen.
   [[nodiscard]] Result<void> start(std::string_view scheduler, const SchedulerSettings& settings);
   /// Parks all tasks at the end of their cycles, those that drive outputs first. Waits, at most `limit` (real
-  /// time) for each of the two phases. timed_out: names the tasks that did not come back in time; they are
-  /// parked when they do. wrong_state: they do not run.
+  /// time, from when all were asked to) for each of the two phases; longer only for a task in no cycle.
+  /// timed_out: names the tasks that did not come back in time; they are parked when they do. wrong_state:
+  /// they do not run.
   [[nodiscard]] Result<void> stop(Duration limit);
   /// The same without waiting: begins it. Then advance_stop() until it is over; until then running() holds.
   [[nodiscard]] Result<void> begin_stop(const StopLimits& limits);
@@ -156,7 +162,9 @@ class TaskSet {
   struct Stop {
     StopLimits limits;
     bool others;         // the second phase; no initializer: clang would not let an optional have it
+    bool hurried;        // no cycle is waited for
     TimePoint deadline;  // of the phase
+    std::optional<TimePoint> judged_from;  // of the phase, once the deadline is over
     std::vector<std::size_t> stuck;
   };
 
@@ -173,6 +181,8 @@ class TaskSet {
   void begin_second_phase();
   void park_tasks(bool that_drive_outputs);
   std::vector<std::size_t> busy_in_phase();
+  [[nodiscard]] bool in_cycle(std::size_t task) const noexcept;
+  [[nodiscard]] bool phase_over(const std::vector<std::size_t>& busy);
   std::vector<std::string_view> wait_until_settled(TimePoint deadline);
 
   Clock& clock_;

@@ -11,14 +11,22 @@
 
 namespace plchost {
 
+namespace {
+
+constexpr Duration kLook = std::chrono::milliseconds(1);
+
+}  // namespace
+
 Result<void> TaskSet::begin_stop(const StopLimits& limits) {
   if (!running_) return failure(ErrorCode::wrong_state, "the tasks are not running");
   if (stop_) return failure(ErrorCode::wrong_state, "the tasks are being stopped already");
   stop_ = Stop{
-      .limits = limits, .others = false, .deadline = MonotonicClock::now() + limits.outputs, .stuck = {}};
+      .limits = limits, .others = false, .hurried = false, .deadline = {}, .judged_from = {}, .stuck = {}};
   // From now on releases are missed on purpose; cycles that run are watched on.
   if (supervision_) supervision_->tasks_stop();
   park_tasks(true);
+  // Only now: what keeps this thread from asking is no time that the tasks have had.
+  stop_->deadline = MonotonicClock::now() + limits.outputs;
   return {};
 }
 
@@ -36,13 +44,14 @@ void TaskSet::park_tasks(bool that_drive_outputs) {
 
 void TaskSet::begin_second_phase() {
   stop_->others = true;
-  stop_->deadline = MonotonicClock::now() + stop_->limits.others;
+  stop_->judged_from = {};
   if (active_->scheduler) active_->scheduler->stop();
   park_tasks(false);
+  stop_->deadline = MonotonicClock::now() + stop_->limits.others;
   if (tick_.device) tick_.device->halt();
 }
 
-// The tasks of this phase that are still in their cycles.
+// The tasks of this phase that have not parked yet.
 std::vector<std::size_t> TaskSet::busy_in_phase() {
   std::vector<std::size_t> busy;
   for (std::size_t i = 0; i < threads_.size(); ++i) {
@@ -56,11 +65,27 @@ std::vector<std::size_t> TaskSet::busy_in_phase() {
   return busy;
 }
 
+bool TaskSet::in_cycle(std::size_t task) const noexcept {
+  return tasks_[task]->trap().running_since().has_value();
+}
+
+// Nobody is stuck at the first look after the deadline: the whole host, or this core, may have stood still
+// until then. A task that is between two cycles only waits for the processor.
+bool TaskSet::phase_over(const std::vector<std::size_t>& busy) {
+  if (busy.empty() || stop_->hurried) return true;
+  const TimePoint now = MonotonicClock::now();
+  if (now < stop_->deadline) return false;
+  if (!stop_->judged_from) stop_->judged_from = now + kSecondLook;
+  if (now < *stop_->judged_from) return false;
+  return now >= *stop_->judged_from + kIdlePatience ||
+         std::ranges::all_of(busy, [&](std::size_t task) { return in_cycle(task); });
+}
+
 std::optional<std::vector<std::size_t>> TaskSet::advance_stop() {
   if (!stop_) return std::vector<std::size_t>{};
   for (;;) {
     const auto busy = busy_in_phase();
-    if (!busy.empty() && MonotonicClock::now() < stop_->deadline) return std::nullopt;
+    if (!phase_over(busy)) return std::nullopt;
     stop_->stuck.insert(stop_->stuck.end(), busy.begin(), busy.end());
     if (stop_->others) break;
     begin_second_phase();
@@ -79,8 +104,7 @@ std::optional<std::vector<std::size_t>> TaskSet::advance_stop() {
 void TaskSet::park_all() {
   if (!running_) return;
   if (!stop_) (void)begin_stop({});
-  stop_->limits = {.outputs = Duration::zero(), .others = Duration::zero()};
-  stop_->deadline = {};
+  stop_->hurried = true;
   (void)advance_stop();
 }
 
@@ -95,7 +119,7 @@ Result<void> TaskSet::stop(Duration limit) {
                                  names_of(*stuck)));
     }
     const auto busy = busy_in_phase();
-    if (!busy.empty()) (void)threads_[busy.front()]->settled(stop_->deadline);
+    if (!busy.empty()) (void)threads_[busy.front()]->settled(MonotonicClock::now() + kLook);
   }
 }
 

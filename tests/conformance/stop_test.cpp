@@ -114,6 +114,55 @@ TEST_P(Stop, GoesOnWithoutATaskThatDoesNotComeBack) {
   EXPECT_TRUE(tasks_.set->stop(seconds(100)));
 }
 
+TEST_P(Stop, CountsItsTimeFromWhenTheLastTaskWasAsked) {
+  tasks_.to_park = [](std::size_t) {
+    std::this_thread::sleep_for(milliseconds(30));
+  };  // the host stands still
+  for (const std::string name : {"A", "B", "C"}) add("Output" + name, true, [] {});
+  for (const std::string name : {"A", "B", "C"}) add("Other" + name, false, [] {});
+  start();
+  ASSERT_TRUE(tasks_.set->begin_stop({.outputs = milliseconds(1), .others = milliseconds(1)}));
+  EXPECT_THAT(finish_stop(), IsEmpty());
+}
+
+TEST_P(Stop, FindsNoIdleTaskStuckHoweverLateItLooks) {
+  for (int i = 0; i < 20; ++i) add("Task" + std::to_string(i), i % 2 == 0, [] {});
+  start();
+  for (int round = 0; round < 20; ++round) {
+    ASSERT_TRUE(tasks_.set->begin_stop({.outputs = Duration::zero(), .others = Duration::zero()}));
+    EXPECT_THAT(finish_stop(), IsEmpty());
+    ASSERT_TRUE(tasks_.set->start(GetParam(), {}));
+  }
+}
+
+TEST_P(Stop, WaitsLongerForATaskThatIsInNoCycle) {
+  TaskConfig config = Tasks<LinuxClock>::cyclic("Idle", milliseconds(1), [] {});
+  config.after_cycle = [this](const TaskCounters&) { other_.hold(); };  // as if it did not get the processor
+  tasks_.add(std::move(config));
+  start();
+  wait_for([&] { return other_.inside > 0; });
+  const TimePoint begun = MonotonicClock::now();
+  ASSERT_TRUE(tasks_.set->begin_stop({.outputs = milliseconds(1), .others = milliseconds(1)}));
+  while (MonotonicClock::now() < begun + milliseconds(300)) {
+    ASSERT_FALSE(tasks_.set->advance_stop());
+    std::this_thread::sleep_for(milliseconds(1));
+  }
+  other_.let_go = true;
+  EXPECT_THAT(finish_stop(), IsEmpty());
+}
+
+TEST_P(Stop, GivesUpOnATaskThatNeverGetsTheProcessor) {
+  TaskConfig config = Tasks<LinuxClock>::cyclic("Idle", milliseconds(1), [] {});
+  config.after_cycle = [this](const TaskCounters&) { other_.hold(); };
+  tasks_.add(std::move(config));
+  start();
+  wait_for([&] { return other_.inside > 0; });
+  const TimePoint begun = MonotonicClock::now();
+  ASSERT_TRUE(tasks_.set->begin_stop({.outputs = milliseconds(1), .others = milliseconds(1)}));
+  EXPECT_THAT(finish_stop(), ElementsAre(0));
+  EXPECT_GE(MonotonicClock::now() - begun, TaskSet::kIdlePatience);
+}
+
 TEST_P(Stop, IsRefusedWhileTheTasksAreStopped) {
   add("Good", true, [] {});
   start();
