@@ -21,6 +21,11 @@ constexpr double kMemory = 32;
 constexpr double kOneSided = 0.8;
 /// An outlier is this many times further off than usual.
 constexpr double kUsualTimes = 8;
+/// Noise that is larger than the tolerance by more is none: so far, and no further, what is usual widens.
+constexpr double kWidestNoiseNs = 100'000;
+/// A step has to be looked at for this many times the noise: a clock that stands still, or runs at half of
+/// its speed, is then further off than the noise can hide.
+constexpr double kTimesNoise = 4;
 /// One wild pair widens what is usual by no more than a pair at this many times of it would.
 constexpr double kScatterClip = 4;
 /// What a drift may change between two pairs; while it is not known yet, and when two clocks are compared
@@ -51,10 +56,8 @@ auto ClockRegulator::feed(const ReferencePair& pair) noexcept -> Verdict {
   const std::int64_t expected = wrapping_sum(model_.reference_ns, elapsed.count());
   const double error_ns =
       static_cast<double>(wrapping_difference(pair.reference_ns, expected)) - model_.excess_ns(elapsed);
-  const bool outlier = std::abs(error_ns) > limit_ns(elapsed);
-  const double clipped = std::min(std::abs(error_ns), kScatterClip * std::max(scatter_ns_, 1.0));
-  scatter_ns_ += (clipped - scatter_ns_) / kMemory;
-  if (outlier) return consider_step(pair, error_ns);
+  if (std::abs(error_ns) > limit_ns(elapsed)) return leave_out(pair, error_ns);
+  widen(error_ns);
   outliers_ = 0;
   if (elapsed > gap_) pairs_ = std::min(pairs_, kPairsAfterStep);
   model_.move_to(pair.local);
@@ -86,25 +89,52 @@ void ClockRegulator::take(double error_ns, Duration elapsed) noexcept {
   }
 }
 
-double ClockRegulator::limit_ns(Duration elapsed) const noexcept {
-  const double drift = usable() ? kDriftChange : kMaxDrift;
-  return std::max(tolerance_ns_, kUsualTimes * scatter_ns_) + drift * static_cast<double>(elapsed.count());
+void ClockRegulator::widen(double error_ns) noexcept {
+  const double clipped = std::min(std::abs(error_ns), kScatterClip * std::max(scatter_ns_, 1.0));
+  scatter_ns_ += (clipped - scatter_ns_) / kMemory;
 }
 
-auto ClockRegulator::consider_step(const ReferencePair& pair, double error_ns) noexcept -> Verdict {
-  const Duration since = pair.local - last_outlier_.local;
-  const bool agrees = outliers_ > 0 && since > Duration::zero() &&
-                      std::abs(error_ns - last_outlier_error_ns_) <=
-                          tolerance_ns_ + kMaxDrift * static_cast<double>(since.count());
-  outliers_ = agrees ? outliers_ + 1 : 1;
-  last_outlier_ = pair;
-  last_outlier_error_ns_ = error_ns;
-  if (outliers_ < kStepPairs) return Verdict::outlier;
+double ClockRegulator::noise_ns() const noexcept {
+  return std::clamp(kUsualTimes * scatter_ns_, tolerance_ns_, tolerance_ns_ + kWidestNoiseNs);
+}
+
+// A silence that goes on allows no more: what is far off after it has to show first that it is a clock.
+double ClockRegulator::limit_ns(Duration elapsed) const noexcept {
+  const double drift = usable() ? kDriftChange : kMaxDrift;
+  return noise_ns() + drift * static_cast<double>(std::min(elapsed, gap_).count());
+}
+
+// Outliers alone say little of the noise: a reference that stands still has nothing else. Noise lies on both
+// sides of the line and not just anywhere. While the line is not known yet, what lies anywhere makes it
+// doubtful.
+auto ClockRegulator::leave_out(const ReferencePair& pair, double error_ns) noexcept -> Verdict {
+  const bool near =
+      std::max(std::abs(error_ns), std::abs(last_outlier_ns_)) <= tolerance_ns_ + kWidestNoiseNs;
+  if (near && std::signbit(error_ns) != std::signbit(last_outlier_ns_)) widen(error_ns);
+  if (!near && !usable() && pairs_ > 1) --pairs_;
+  last_outlier_ns_ = error_ns;
+  const auto since = static_cast<double>((pair.local - run_began_).count());
+  const double change = error_ns - run_error_ns_;
+  const double ahead = change + model_.drift * since;  // of the local clock
+  if (outliers_ == 0 || since <= 0 || std::abs(ahead) > noise_ns() + kMaxDrift * since) {
+    outliers_ = 1;
+    run_began_ = pair.local;
+    run_error_ns_ = error_ns;
+    return Verdict::outlier;
+  }
+  ++outliers_;
+  if (outliers_ < kStepPairs || since < kTimesNoise * noise_ns()) return Verdict::outlier;
+  step_to(pair, std::abs(change) > noise_ns() + kDriftChange * since ? ahead / since : model_.drift);
+  return Verdict::stepped;
+}
+
+void ClockRegulator::step_to(const ReferencePair& pair, double drift) noexcept {
   outliers_ = 0;
-  model_ = {.local = pair.local, .reference_ns = pair.reference_ns, .drift = model_.drift};
+  model_ = {.local = pair.local,
+            .reference_ns = pair.reference_ns,
+            .drift = std::clamp(drift, -kMaxDrift, kMaxDrift)};
   pairs_ = std::min(pairs_, kPairsAfterStep);
   bias_ns_ = 0;
-  return Verdict::stepped;
 }
 
 }  // namespace plchost

@@ -17,8 +17,10 @@ namespace plchost {
 /// keep to one side: then the drift has changed.
 ///
 /// A pair further off than the usual scatter allows is an outlier and left out, but kStepPairs of them in a
-/// row that agree with each other are a step of the reference: the line is moved there. What follows the line
-/// does so at its own bounded pace.
+/// row that lie on one line of a plausible drift are a step of the reference: the line is moved there. What
+/// follows the line does so at its own bounded pace. Outliers that lie on no such line, as those of a
+/// reference that stands still, runs backwards or says anything, are never taken, however long they go on:
+/// for what follows they are no pairs at all.
 class ClockRegulator {
  public:
   /// Pairs until the line may be followed.
@@ -35,7 +37,7 @@ class ClockRegulator {
     taken,
     skipped,       ///< too close to the pair before
     outlier,       ///< left out for now
-    stepped,       ///< the last of kStepPairs outliers that agree: the line was moved
+    stepped,       ///< the last of kStepPairs outliers on one line: ours was moved there
     out_of_order,  ///< its local stamp is not after the one before
     out_of_range,
   };
@@ -54,7 +56,10 @@ class ClockRegulator {
  private:
   void begin(const ReferencePair& pair) noexcept;
   void take(double error_ns, Duration elapsed) noexcept;
-  Verdict consider_step(const ReferencePair& pair, double error_ns) noexcept;
+  Verdict leave_out(const ReferencePair& pair, double error_ns) noexcept;
+  void step_to(const ReferencePair& pair, double drift) noexcept;
+  void widen(double error_ns) noexcept;
+  [[nodiscard]] double noise_ns() const noexcept;
   [[nodiscard]] double limit_ns(Duration elapsed) const noexcept;
 
   double kp_;
@@ -66,9 +71,10 @@ class ClockRegulator {
   double spacing_ns_ = 0;    // usual distance of two pairs
   double bias_ns_ = 0;
   double scatter_ns_;           // usual magnitude of a deviation
-  std::uint32_t outliers_ = 0;  // in a row that agree
-  ReferencePair last_outlier_;
-  double last_outlier_error_ns_ = 0;
+  std::uint32_t outliers_ = 0;  // in a row that lie on one line
+  TimePoint run_began_;         // the first of them
+  double run_error_ns_ = 0;
+  double last_outlier_ns_ = 0;
 };
 
 }  // namespace plchost

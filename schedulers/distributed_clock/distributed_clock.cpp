@@ -175,7 +175,8 @@ Duration ClockFollower::follow(TimePoint release, Duration interval, Duration of
   const Duration correction = steering ? std::clamp(-deviation, -bound, bound) : Duration::zero();
   note(correction, steering && correction != -deviation);
   // What is left after the correction, and what the pairs say that the line itself is off.
-  const Duration offset_left = deviation + correction + Duration(std::llround(known_.bias_ns));
+  const Duration bias(std::llround(known_.bias_ns));
+  const Duration offset_left = std::clamp(deviation + correction + bias, -interval / 2, interval / 2);
   offset_ns_.store(offset_left.count(), std::memory_order_relaxed);
   in_sync_.store(sync_.record(offset_left), std::memory_order_relaxed);
   return correction;

@@ -1,9 +1,13 @@
 #include "schedulers/distributed_clock/clock_regulator.hpp"
 
 #include <algorithm>
+#include <array>
 #include <limits>
+#include <random>
+#include <tuple>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "tests/support/simulated_reference.hpp"
@@ -164,6 +168,117 @@ TEST_F(Regulator, WidensItsToleranceForANoisyReference) {
   feed_until(kOrigin + seconds(5));
   EXPECT_LT(percentile(feed_until(kOrigin + seconds(30)), 0.99), 6'000);
 }
+
+TEST_F(Regulator, FollowsANoiseThatGrows) {
+  for (const double noise_ns : {1'000.0, 5'000.0, 50'000.0}) {
+    sut = ClockRegulator(settings);
+    const TimePoint begin = now;
+    reference = SimulatedReference(begin, 100 * kPpm, kNoiseNs);
+    feed_until(begin + seconds(3));
+    reference = SimulatedReference(begin, 100 * kPpm, noise_ns, 2);
+    feed_until(begin + seconds(8));
+    EXPECT_LT(percentile(feed_until(begin + seconds(30)), 0.99), 0.3 * noise_ns);
+    EXPECT_EQ(last, Verdict::taken);
+    EXPECT_NEAR(sut.model().drift, 100 * kPpm, 20 * kPpm);
+  }
+}
+
+TEST_F(Regulator, StepsInNoiseAreFollowed) {
+  reference = SimulatedReference(kOrigin, 100 * kPpm, 20'000);
+  feed_until(kOrigin + seconds(5));
+  reference.step(milliseconds(1));
+  feed_until(now + milliseconds(100));
+  EXPECT_LT(percentile(feed_until(now + seconds(5)), 0.99), 8'000);
+}
+
+TEST_F(Regulator, StepOntoALineOfAnotherDriftIsFollowed) {
+  for (const double drift : {3000 * kPpm, -4000 * kPpm, 100 * kPpm}) {
+    feed_until(now + seconds(3));
+    reference.step(milliseconds(3));
+    reference.set_drift(drift, now);
+    feed_until(now + milliseconds(300));
+    EXPECT_LT(percentile(feed_until(now + seconds(5)), 0.99), 60);
+    EXPECT_NEAR(sut.model().drift, drift, 1 * kPpm);
+  }
+}
+
+/// What a broken reference shows at a local time, at this distance of its pairs.
+struct Broken {
+  const char* name;
+  std::int64_t (*shows)(Duration since, std::mt19937_64& random);
+};
+
+class BrokenReference : public Regulator, public testing::WithParamInterface<std::tuple<Broken, Duration>> {
+ protected:
+  // How many of its pairs are taken for a clock's; a step counts as all.
+  int taken_of(int pairs) {
+    const TimePoint begin = now;
+    const std::int64_t shown = reference.stamp(begin).reference_ns;
+    int taken = 0;
+    for (int i = 0; i < pairs; ++i) {
+      now += spacing;
+      const std::int64_t broken = shown + std::get<Broken>(GetParam()).shows(now - begin, random_);
+      const Verdict verdict = sut.feed({.local = now, .reference_ns = broken});
+      if (verdict == Verdict::taken) ++taken;
+      if (verdict == Verdict::stepped) taken += pairs;
+    }
+    now += spacing;
+    return taken;
+  }
+
+ private:
+  std::mt19937_64 random_{4};
+};
+
+TEST_P(BrokenReference, IsNeverFollowedAndTheRightOneAtOnce) {
+  spacing = std::get<Duration>(GetParam());
+  feed_until(kOrigin + 4000 * spacing);
+  const double drift = sut.model().drift;
+  EXPECT_LE(taken_of(6000), 3);
+  EXPECT_NEAR(sut.model().drift, drift, 20 * kPpm) << "what hold-over goes on with";
+  feed_until(now + 200 * spacing);
+  EXPECT_EQ(last, Verdict::taken);
+  EXPECT_LT(percentile(feed_until(now + 4000 * spacing), 0.99), 100);
+}
+
+TEST_P(BrokenReference, IsNotFollowedFromTheStart) {
+  spacing = std::get<Duration>(GetParam());
+  EXPECT_LT(taken_of(6000), 30);
+  EXPECT_FALSE(sut.usable());
+  feed_until(now + 500 * spacing);
+  EXPECT_LT(percentile(feed_until(now + 4000 * spacing), 0.99), 100);
+}
+
+TEST_P(BrokenReference, IsNotFollowedAfterANoisyOne) {
+  spacing = std::get<Duration>(GetParam());
+  reference = SimulatedReference(kOrigin, 100 * kPpm, 5'000);
+  feed_until(kOrigin + 4000 * spacing);
+  const double drift = sut.model().drift;
+  EXPECT_LE(taken_of(6000), 3);
+  EXPECT_NEAR(sut.model().drift, drift, 20 * kPpm);
+}
+
+constexpr std::array kBroken = {
+    Broken{"Frozen", [](Duration, std::mt19937_64&) { return std::int64_t{0}; }},
+    Broken{"Backwards", [](Duration since, std::mt19937_64&) { return std::int64_t{-since.count()}; }},
+    Broken{"HalfSpeed", [](Duration since, std::mt19937_64&) { return std::int64_t{since.count() / 2}; }},
+    Broken{"DoubleSpeed", [](Duration since, std::mt19937_64&) { return std::int64_t{since.count() * 2}; }},
+    Broken{"Random",
+           [](Duration, std::mt19937_64& random) { return static_cast<std::int64_t>(random() >> 3U); }},
+    Broken{"RandomWithinASecond",
+           [](Duration since, std::mt19937_64& random) {
+             return since.count() + static_cast<std::int64_t>(random() % 2'000'000'000) - 1'000'000'000;
+           }},
+};
+
+INSTANTIATE_TEST_SUITE_P(Kinds, BrokenReference,
+                         testing::Combine(testing::ValuesIn(kBroken),
+                                          testing::Values(Duration(microseconds(250)), milliseconds(1),
+                                                          milliseconds(10))),
+                         [](const auto& of) {
+                           return fmt::format("{}Each{}us", std::get<Broken>(of.param).name,
+                                              std::get<Duration>(of.param) / microseconds(1));
+                         });
 
 TEST_F(Regulator, KeepsTheDriftOverASilenceAndFindsBackQuickly) {
   feed_until(kOrigin + seconds(5));

@@ -1,6 +1,9 @@
 #include "schedulers/distributed_clock/distributed_clock.hpp"
 
 #include <algorithm>
+#include <random>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -189,6 +192,82 @@ TEST_F(Following, HoldsOverWhileTheWriterSaysInvalid) {
   }
   EXPECT_EQ(status().state, ClockState::hold_over);
   EXPECT_EQ(status().invalid, 400U);
+}
+
+/// A reference that goes on stamping, freshly and as valid, after it has broken.
+class FollowingBroken : public Following, public testing::WithParamInterface<const char*> {
+ protected:
+  std::int64_t shown(Duration since) {
+    const std::string_view kind = GetParam();
+    if (kind == "Frozen") return 0;
+    if (kind == "Backwards") return -since.count();
+    if (kind == "HalfSpeed") return since.count() / 2;
+    return static_cast<std::int64_t>(random_() >> 3U);
+  }
+  void run_broken(int cycles) {
+    writing = false;
+    const ReferencePair last = reference.stamp(release);
+    for (int i = 0; i < cycles; ++i) {
+      record.write({.local = release, .reference_ns = last.reference_ns + shown(release - last.local)});
+      run(1);
+      EXPECT_LE(std::abs(status().offset_ns), kInterval / Duration(2));
+    }
+    writing = true;
+  }
+
+ private:
+  std::mt19937_64 random_{11};
+};
+
+TEST_P(FollowingBroken, IsHoldOverAndLocksAgainWithoutAJump) {
+  run(5000);
+  const std::int64_t drift = status().drift_ppb;
+  const auto at_bound = status().corrections_at_bound;
+  run_broken(250);
+  EXPECT_EQ(status().state, ClockState::locked) << "within the time-out";
+  run_broken(4000);
+  EXPECT_EQ(status().state, ClockState::hold_over);
+  EXPECT_TRUE(status().in_sync);
+  EXPECT_NEAR(static_cast<double>(status().drift_ppb), static_cast<double>(drift), 500);
+  EXPECT_GT(status().rejected, 4000U);
+  EXPECT_LT(std::abs(reference.deviation_ns(release, kInterval)), 5000) << "the grid went on";
+  EXPECT_LT(percentile(run(100), 1), 5000);
+  EXPECT_EQ(status().state, ClockState::locked);
+  EXPECT_EQ(status().corrections_at_bound, at_bound);
+  EXPECT_EQ(status().steps, 0U);
+  run(500);
+  EXPECT_LT(percentile(run(5000), 0.99), 100);
+}
+
+TEST_P(FollowingBroken, MovesNothingIfThereWasNoOtherYet) {
+  run_broken(200);
+  EXPECT_EQ(status().state, ClockState::acquiring);
+  run_broken(2000);
+  EXPECT_EQ(status().state, ClockState::free_running);
+  EXPECT_EQ(status().correction_max_ns, 0);
+  run(1000);
+  EXPECT_EQ(status().state, ClockState::locked);
+}
+
+TEST_P(FollowingBroken, IsNoHoldOverInSyncForEver) {
+  run(2000);
+  run_broken(11'000);
+  EXPECT_EQ(status().state, ClockState::hold_over);
+  EXPECT_FALSE(status().in_sync);
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, FollowingBroken,
+                         testing::Values("Frozen", "Backwards", "HalfSpeed", "Random"),
+                         [](const auto& of) { return std::string(of.param); });
+
+TEST_F(Following, GrowingNoiseIsFollowed) {
+  run(5000);
+  reference = SimulatedReference(kOrigin - microseconds(300), 100 * kPpm, 5000, 3);
+  run(2000);
+  EXPECT_EQ(status().state, ClockState::locked);
+  const auto rejected = status().rejected;
+  EXPECT_LT(percentile(run(5000), 0.99), 2000);
+  EXPECT_EQ(status().rejected, rejected);
 }
 
 TEST_F(Following, RejectsCorruptRecordsAndStampsOfAnotherTime) {
