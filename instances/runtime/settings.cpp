@@ -29,12 +29,26 @@ bool is_comment(std::string_view text) {
   return text.starts_with(';') || text.starts_with('#');
 }
 
-// A ';' begins a comment at the start of a value or after a blank; elsewhere it is part of it.
+// A comment begins with a ';' or '#' at the start or after a blank, or with a ';' before one; elsewhere both
+// are part of the value.
 std::string_view without_comment(std::string_view value) {
-  for (std::size_t at = value.find(';'); at != std::string_view::npos; at = value.find(';', at + 1)) {
-    if (at == 0 || kBlank.contains(value[at - 1])) return value.substr(0, at);
+  const auto is_blank = [&](std::size_t at) { return at >= value.size() || kBlank.contains(value[at]); };
+  for (std::size_t at = value.find_first_of(";#"); at != std::string_view::npos;
+       at = value.find_first_of(";#", at + 1)) {
+    if (at == 0 || is_blank(at - 1) || (value[at] == ';' && is_blank(at + 1))) return value.substr(0, at);
   }
   return value;
+}
+
+// What stands behind the '=', without a comment, and without quotes around it.
+std::string_view value_of(std::string_view text) {
+  text = trim(text);
+  const std::size_t end = text.starts_with('"') ? text.find('"', 1) : std::string_view::npos;
+  if (end != std::string_view::npos) {
+    const std::string_view behind = trim(text.substr(end + 1));
+    if (behind.empty() || is_comment(behind)) return text.substr(1, end - 1);
+  }
+  return trim(without_comment(text));
 }
 
 class Parser {
@@ -50,7 +64,7 @@ class Parser {
     }
     if (!error_) check_sys_time();
     if (error_) return std::unexpected(*std::move(error_));
-    for (auto& [number, component] : components_) settings_.components.push_back(std::move(component));
+    take_components();
     return std::move(settings_);
   }
 
@@ -86,7 +100,7 @@ class Parser {
       return fail("neither [Section] nor Key=Value nor a comment (; or #)");
     const std::string_view key = trim(line.substr(0, equals));
     if (section_.empty()) return fail(fmt::format("'{}' stands before the first [Section]", shown(key)));
-    set(key, trim(without_comment(line.substr(equals + 1))));
+    set(key, value_of(line.substr(equals + 1)));
   }
 
   void begin_section(std::string_view line) {
@@ -135,15 +149,31 @@ class Parser {
     const auto key = find_setting(section_, name);
     if (!key) return fail(key.error().message);
     const std::string identity = setting_identity(**key, name);
-    if (!seen_.insert(fmt::format("[{}] {}", section_, identity)).second) {
-      return fail(fmt::format("[{}] {} is given twice", section_, shown(name)));
+    const auto [seen, is_new] = seen_.emplace(fmt::format("[{}] {}", section_, identity), place());
+    if (!is_new) {
+      remark(fmt::format("[{}] {} takes the place of the one in {}", section_, shown(name), seen->second));
+      seen->second = place();
     }
     if (std::holds_alternative<UnusedSetting>((*key)->value)) {
       return remark(fmt::format("[{}] {} has no meaning here and is ignored", section_, shown(name)));
     }
     const SettingsTarget target{settings_, components_, task_ ? &settings_.tasks[*task_] : nullptr};
-    if (const auto applied = apply_setting(**key, name, value, target); !applied) {
+    const auto applied = apply_setting(**key, name, value, target);
+    if (!applied) {
       fail(fmt::format("[{}] {}: {}", section_, shown(name), applied.error().message));
+    } else if (!applied->empty()) {
+      remark(fmt::format("[{}] {}: {}", section_, shown(name), *applied));
+    }
+  }
+
+  void take_components() {
+    auto& foreign = settings_.foreign_components;
+    for (auto& [number, component] : components_) {
+      if (!is_foreign_component(component)) {
+        settings_.components.push_back(std::move(component));
+      } else if (std::ranges::find(foreign, component) == foreign.end()) {
+        foreign.push_back(std::move(component));
+      }
     }
   }
 
@@ -169,7 +199,7 @@ class Parser {
   std::map<std::size_t, std::string> components_;
   std::map<std::string, std::size_t> tasks_;  // their places in settings_.tasks
   std::set<std::string> foreign_;
-  std::set<std::string> seen_;
+  std::map<std::string, std::string> seen_;  // each key's last place
   std::optional<Error> error_;
 };
 

@@ -1,5 +1,4 @@
 // [ComponentManager]: what is loaded before the application.
-#include <algorithm>
 #include <array>
 
 #include "instances/runtime/settings_key.hpp"
@@ -10,18 +9,8 @@ namespace {
 
 constexpr std::string_view kSection = "ComponentManager";
 
-// Ours are files; theirs are plain names of what is built into their runtime, "CmpBACnet".
-bool is_foreign(std::string_view component) {
-  return component.find_first_of("/.") == std::string_view::npos;
-}
-
 void add_component(const SettingsTarget& to, std::size_t number, std::string_view component) {
-  if (!is_foreign(component)) {
-    to.components.emplace(number, component);
-    return;
-  }
-  auto& foreign = to.settings.foreign_components;
-  if (std::ranges::find(foreign, component) == foreign.end()) foreign.emplace_back(component);
+  to.components.insert_or_assign(number, std::string(component));
 }
 
 constexpr std::array kKeys = {
@@ -39,6 +28,11 @@ constexpr std::array kKeys = {
 };
 
 }  // namespace
+
+// Ours are files; theirs are plain names of what is built into their runtime, "CmpBACnet".
+bool is_foreign_component(std::string_view component) {
+  return component.find_first_of("/.") == std::string_view::npos;
+}
 
 std::span<const SettingKey> component_keys() noexcept {
   return kKeys;

@@ -21,19 +21,27 @@ struct Overloaded : Cases... {
   using Cases::operator()...;
 };
 
-std::optional<std::int64_t> integer(std::string_view text) {
+std::optional<std::int64_t> integer(std::string_view text, int base = 10) {
   std::int64_t number = 0;
   const char* const end = text.data() + text.size();
   // NOLINTNEXTLINE(bugprone-suspicious-stringview-data-usage): `end` is the size
-  const auto [stop, error] = std::from_chars(text.data(), end, number);
+  const auto [stop, error] = std::from_chars(text.data(), end, number, base);
   if (error != std::errc() || stop != end) return std::nullopt;
   return number;
+}
+
+// Decimal or, as the other runtime's files have it, "0x3E8".
+std::optional<std::int64_t> any_integer(std::string_view text) {
+  if (!text.starts_with("0x") && !text.starts_with("0X")) return integer(text);
+  constexpr int kHexadecimal = 16;
+  const std::string_view digits = text.substr(2);
+  return digits.starts_with('-') ? std::nullopt : integer(digits, kHexadecimal);
 }
 
 // "976.5625", rounded to nanoseconds.
 std::optional<Duration> decimal_microseconds(std::string_view text) {
   const std::size_t point = text.find('.');
-  const auto whole = integer(text.substr(0, point));
+  const auto whole = point == std::string_view::npos ? any_integer(text) : integer(text.substr(0, point));
   constexpr std::int64_t kLargest = 1'000'000'000'000;
   if (!whole || *whole < 0 || *whole > kLargest || text.front() == '-') return std::nullopt;
   if (point == std::string_view::npos) return Duration(*whole * 1000);
@@ -155,9 +163,12 @@ std::string written_name(const SettingKey& key) {
 std::string allowed_values(const SettingKey& key) {
   const std::string range = std::visit(
       Overloaded{
-          [](const NumberSetting& number) { return fmt::format("{} to {}", number.lowest, number.highest); },
+          [](const NumberSetting& number) {
+            return fmt::format("{} to {}{}", number.lowest, number.highest,
+                               number.capped ? fmt::format(", more acts as {}", number.highest) : "");
+          },
           [](const OptionalNumberSetting& number) {
-            return fmt::format("1 to {}, or -1 (not set)", number.highest);
+            return fmt::format("1 to {}, or 0 or -1 (not set)", number.highest);
           },
           [](const MicrosecondSetting& us) {
             return fmt::format("{} to {} with up to four decimals", us.lowest, us.highest);
@@ -186,18 +197,22 @@ std::string setting_identity(const SettingKey& key, std::string_view name) {
   return number ? fmt::format("{}{}", key.name, *number) : std::string(key.name);
 }
 
-Result<void> apply_setting(const SettingKey& key, std::string_view name, std::string_view value,
-                           const SettingsTarget& target) {
-  const auto number = integer(value);
+Result<std::string> apply_setting(const SettingKey& key, std::string_view name, std::string_view value,
+                                  const SettingsTarget& target) {
+  const auto number = any_integer(value);
+  std::string remark;
   const bool applied =
       std::visit(Overloaded{
                      [&](const NumberSetting& setting) {
-                       if (!number || *number < setting.lowest || *number > setting.highest) return false;
-                       setting.apply(target, *number);
+                       if (!number || *number < setting.lowest) return false;
+                       const bool above = *number > setting.highest;
+                       if (above && !setting.capped) return false;
+                       if (above) remark = fmt::format("{} acts as {}", *number, setting.highest);
+                       setting.apply(target, std::min(*number, setting.highest));
                        return true;
                      },
                      [&](const OptionalNumberSetting& setting) {
-                       if (!number || *number < -1 || *number == 0 || *number > setting.highest) return false;
+                       if (!number || *number < -1 || *number > setting.highest) return false;
                        setting.apply(target, *number);
                        return true;
                      },
@@ -210,7 +225,7 @@ Result<void> apply_setting(const SettingKey& key, std::string_view name, std::st
                        return true;
                      },
                      [&](const WordSetting& setting) {
-                       const auto word = std::ranges::find(setting.words, value);
+                       const auto word = std::ranges::find(setting.words, lower(value), lower);
                        if (word == setting.words.end()) return false;
                        setting.apply(target, static_cast<std::size_t>(word - setting.words.begin()));
                        return true;
@@ -228,7 +243,7 @@ Result<void> apply_setting(const SettingKey& key, std::string_view name, std::st
                      [](const UnusedSetting&) { return true; },
                  },
                  key.value);
-  if (applied) return {};
+  if (applied) return remark;
   return failure(ErrorCode::invalid_argument,
                  fmt::format("'{}' is not allowed; allowed is: {}", shown(value), allowed_values(key)));
 }

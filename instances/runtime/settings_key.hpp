@@ -17,7 +17,7 @@ namespace plchost {
 /// What a row of the table writes to.
 struct SettingsTarget {
   InstanceSettings& settings;
-  std::map<std::size_t, std::string>& components;  ///< by their number
+  std::map<std::size_t, std::string>& components;  ///< by their number, foreign ones too
   TaskSettings* task;                              ///< of the section [Task.NAME]; null in other sections
 };
 
@@ -26,9 +26,10 @@ struct NumberSetting {
   std::int64_t lowest;
   std::int64_t highest;
   void (*apply)(const SettingsTarget&, std::int64_t number);
+  bool capped = false;  ///< more acts as highest, with a remark: files of the other runtime have it
 };
 
-/// -1 for "not set", or an integer of 1 to highest.
+/// 0 or -1 for "not set", or an integer of 1 to highest.
 struct OptionalNumberSetting {
   std::int64_t highest;
   void (*apply)(const SettingsTarget&, std::int64_t number);
@@ -41,7 +42,7 @@ struct MicrosecondSetting {
   void (*apply)(const SettingsTarget&, Duration value);
 };
 
-/// One of these words.
+/// One of these words, in any case.
 struct WordSetting {
   std::span<const std::string_view> words;
   void (*apply)(const SettingsTarget&, std::size_t index);
@@ -107,8 +108,12 @@ inline constexpr std::string_view kTaskSections = "Task.NAME";
 /// The same for all ways to write one key: "TimerSource", "Component.1".
 [[nodiscard]] std::string setting_identity(const SettingKey& key, std::string_view name);
 
-/// Checks the value and writes it. invalid_argument: the text says what is allowed.
-[[nodiscard]] Result<void> apply_setting(const SettingKey& key, std::string_view name, std::string_view value,
-                                         const SettingsTarget& target);
+/// The component is built into another runtime: a name and no file.
+[[nodiscard]] bool is_foreign_component(std::string_view component);
+
+/// Checks the value and writes it. The text is a remark about it, mostly empty. invalid_argument: the text
+/// says what is allowed.
+[[nodiscard]] Result<std::string> apply_setting(const SettingKey& key, std::string_view name,
+                                                std::string_view value, const SettingsTarget& target);
 
 }  // namespace plchost

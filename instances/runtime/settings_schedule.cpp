@@ -38,11 +38,12 @@ constexpr std::array kKeys = {
                                       [](const SettingsTarget& to, std::int64_t percent) {
                                         to.settings.scheduler.processor_load_maximum =
                                             static_cast<int>(percent);
-                                      }}},
+                                      },
+                                      true}},
     SettingKey{.section = kSection,
                .name = "ProcessorLoad.Enable",
                .unit = "1 is on",
-               .initial = "0",
+               .initial = "1",
                .value = NumberSetting{0, 1,
                                       [](const SettingsTarget& to, std::int64_t on) {
                                         to.settings.scheduler.watchdog.load = on != 0;

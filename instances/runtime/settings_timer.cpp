@@ -28,12 +28,17 @@ bool is_device_path(std::string_view text) {
 bool is_symbol(std::string_view text) {
   const auto is_letter = [](char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_'; };
   constexpr std::size_t kMaxSymbol = 255;
-  return !text.empty() && text.size() <= kMaxSymbol && is_letter(text.front()) &&
+  return text.size() <= kMaxSymbol && is_letter(text.front()) &&
          std::ranges::all_of(text, [&](char c) { return is_letter(c) || (c >= '0' && c <= '9'); });
 }
 
-bool is_path(std::string_view text) {
-  return !text.empty() && text.size() <= kMaxPath;
+// Nothing is the default, as the other runtime has it.
+bool is_symbol_or_nothing(std::string_view text) {
+  return text.empty() || is_symbol(text);
+}
+
+bool is_path_or_nothing(std::string_view text) {
+  return text.size() <= kMaxPath;
 }
 
 constexpr std::array kKeys = {
@@ -76,21 +81,21 @@ constexpr std::array kKeys = {
     SettingKey{.section = kTime,
                .name = "CustomSysTimeGetUs",
                .prefixed = true,
-               .value = TextSetting{"name of a C function", is_symbol,
+               .value = TextSetting{"name of a C function, or nothing", is_symbol_or_nothing,
                                     [](const SettingsTarget& to, std::string_view symbol) {
                                       to.settings.sys_time.get_us = symbol;
                                     }}},
     SettingKey{.section = kTime,
                .name = "CustomSysTimeGetNs",
                .prefixed = true,
-               .value = TextSetting{"name of a C function", is_symbol,
+               .value = TextSetting{"name of a C function, or nothing", is_symbol_or_nothing,
                                     [](const SettingsTarget& to, std::string_view symbol) {
                                       to.settings.sys_time.get_ns = symbol;
                                     }}},
     SettingKey{.section = kTime,
                .name = "CustomSysTimeLibrary",
                .prefixed = true,
-               .value = TextSetting{"file of a shared object", is_path,
+               .value = TextSetting{"file of a shared object, or nothing", is_path_or_nothing,
                                     [](const SettingsTarget& to, std::string_view path) {
                                       to.settings.sys_time.library = path;
                                     }}},

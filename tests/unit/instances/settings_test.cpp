@@ -101,8 +101,73 @@ TEST(Settings, TakesLinuxAsAnotherWordForVxWorks) {
   const auto sut = parse_settings("[SysTimer]\nLinux.TimerSource=Task\n", "line1.cfg");
   ASSERT_TRUE(sut);
   EXPECT_EQ(sut->scheduler.tick_source, TickSourceKind::task);
-  EXPECT_THAT(complaint("[SysTimer]\nLinux.TimerSource=Task\nVxWorks.TimerSource=Task\n"),
-              HasSubstr("line1.cfg:3: [SysTimer] VxWorks.TimerSource is given twice"));
+}
+
+TEST(Settings, TakesTheLastOfAKeyAndSaysWhichItReplaces) {
+  const auto sut = parse_settings(
+      "[SysTimer]\nLinux.TimerSource=Task\nVxWorks.TimerSource=System\n[Task.Fast]\nDrivesOutputs=1\n[CmpLog]"
+      "\n"
+      "[Task.Fast]\nDrivesOutputs=0\n[ComponentManager]\nComponent.1=CmpA\nComponent.01=b.so\nComponent.2=c."
+      "so\n"
+      "Component.2=CmpC\n",
+      "f");
+  ASSERT_TRUE(sut) << sut.error().message;
+  EXPECT_EQ(sut->scheduler.tick_source, TickSourceKind::system);
+  EXPECT_EQ(sut->tasks.at(0).drives_outputs, false);
+  EXPECT_THAT(sut->components, ElementsAre("b.so"));
+  EXPECT_THAT(sut->foreign_components, ElementsAre("CmpC"));
+  EXPECT_THAT(sut->remarks,
+              ElementsAre("f:3: [SysTimer] VxWorks.TimerSource takes the place of the one in f:2",
+                          "f:8: [Task.Fast] DrivesOutputs takes the place of the one in f:5",
+                          "f:11: [ComponentManager] Component.01 takes the place of the one in f:10",
+                          "f:13: [ComponentManager] Component.2 takes the place of the one in f:12"));
+}
+
+// Each is found in files that the other runtime takes.
+TEST(Settings, TakesValuesAsTheOtherRuntimesFilesHaveThem) {
+  const auto interval = [](const std::string& value) {
+    const auto sut = parse_settings("[CmpSchedule]\nSchedulerInterval=" + value + "\n", "f");
+    return sut ? sut->scheduler.scheduler_interval : Duration(-1);
+  };
+  EXPECT_EQ(interval("0x3E8"), 1ms);
+  EXPECT_EQ(interval("0X3e8 ; us"), 1ms);
+  EXPECT_EQ(interval("200; us"), 200us);
+  EXPECT_EQ(interval("200;"), 200us);
+  EXPECT_EQ(interval("200 # us"), 200us);
+  EXPECT_EQ(interval("\"200\" ; us"), 200us);
+  const auto sut = parse_settings(
+      "[SysTimer]\nVxWorks.TimerMode=\"oneshot\"\nVxWorks.TimerSource=TASK\n"
+      "VxWorks.AuxiliaryDevice=/dev/rtc0;1#2 # the clock\n[ComponentManager]\nComponent.1=\"a ; b.so\" # x\n",
+      "f");
+  ASSERT_TRUE(sut) << sut.error().message;
+  EXPECT_EQ(sut->timer_mode, TimerMode::one_shot);
+  EXPECT_EQ(sut->scheduler.tick_source, TickSourceKind::task);
+  EXPECT_EQ(sut->scheduler.auxiliary_device, "/dev/rtc0;1#2");
+  EXPECT_THAT(sut->components, ElementsAre("a ; b.so"));
+}
+
+TEST(Settings, TakesTheOtherRuntimesWaysToSayDefault) {
+  const auto sut = parse_settings(
+      "[CmpSchedule]\nTask.Freewheeling.Cycletime=0\n[SysTime]\nVxWorks.CustomSysTimeGetUs=\n"
+      "VxWorks.CustomSysTimeGetNs=\nVxWorks.CustomSysTimeLibrary=\n",
+      "f");
+  ASSERT_TRUE(sut) << sut.error().message;
+  EXPECT_EQ(*sut, InstanceSettings{});
+}
+
+TEST(Settings, ALoadAboveAHundredPercentActsAsAHundred) {
+  const auto sut = parse_settings("[CmpSchedule]\nProcessorLoad.Maximum=200\n", "f");
+  ASSERT_TRUE(sut) << sut.error().message;
+  EXPECT_EQ(sut->scheduler.processor_load_maximum, 100);
+  EXPECT_THAT(sut->remarks, ElementsAre("f:2: [CmpSchedule] ProcessorLoad.Maximum: 200 acts as 100"));
+}
+
+TEST(Settings, AMaximumOfTheLoadArmsItsWatchdogUnlessThatIsOff) {
+  const auto armed = [](const std::string& more) {
+    return parse_settings("[CmpSchedule]\nProcessorLoad.Maximum=10\n" + more, "f")->scheduler.watchdog.load;
+  };
+  EXPECT_TRUE(armed(""));
+  EXPECT_FALSE(armed("ProcessorLoad.Enable=0\n"));
 }
 
 TEST(Settings, LeavesForeignSectionsAloneAndListsEachOnce) {
@@ -142,30 +207,31 @@ INSTANTIATE_TEST_SUITE_P(
         BadFile{"[CmpSchedule]\nSchedulerInterval=1000.-5\n", "with up to four decimals"},
         BadFile{"[CmpSchedule]\nSchedulerInterval=\n", "'' is not allowed"},
         BadFile{"[CmpSchedule]\nSchedulerInterval=99999999999999999999\n", "is not allowed"},
-        BadFile{"[CmpSchedule]\nTask.Freewheeling.Cycletime=0\n", "ms, 1 to 60000, or -1 (not set)"},
-        BadFile{"[CmpSchedule]\nProcessorLoad.Maximum=101\n", "0 to 100"},
+        BadFile{"[CmpSchedule]\nTask.Freewheeling.Cycletime=-2\n", "ms, 1 to 60000, or 0 or -1 (not set)"},
+        BadFile{"[CmpSchedule]\nProcessorLoad.Maximum=-1\n", "0 to 100, more acts as 100"},
+        BadFile{"[CmpSchedule]\nProcessorLoad.Interval=0x\n", "'0x' is not allowed"},
+        BadFile{"[CmpSchedule]\nProcessorLoad.Interval=0x-5\n", "'0x-5' is not allowed"},
+        BadFile{"[CmpSchedule]\nSchedulerInterval=0x3E8.5\n", "'0x3E8.5' is not allowed"},
+        BadFile{"[CmpSchedule]\nSchedulerInterval=\"1000\n", "'\"1000' is not allowed"},
+        BadFile{"[CmpSchedule]\nSchedulerInterval=200;us\n", "'200;us' is not allowed"},
         BadFile{"[CmpSchedule]\nSpinAhead.MaxUs=-1\n", "0 to 1000"},
         BadFile{"[CmpSchedule]\nExternalEvent.MaxBacklog=0\n", "events, 1 to"},
-        BadFile{"[CmpSchedule]\nSchedulerInterval=100\n\nSchedulerInterval=100\n", "line1.cfg:4: "},
-        BadFile{"[SysTimer]\nVxWorks.TimerSource=system\n",
-                "'system' is not allowed; allowed is: System, Task, Auxiliary"},
+        BadFile{"[SysTimer]\nVxWorks.TimerSource=Clock\n",
+                "'Clock' is not allowed; allowed is: System, Task, Auxiliary"},
         BadFile{"[SysTimer]\nTimerMode=OneShot\n", "did you mean 'VxWorks.TimerMode'?"},
         BadFile{"[SysTimer]\nLinux.TimerMod=OneShot\n", "did you mean 'VxWorks.TimerMode'?"},
         BadFile{"[SysTimer]\nLinux.AuxiliaryDevice=rtc0\n", "absolute path of a character device"},
         BadFile{"[SysTime]\nLinux.CustomSysTimeGetUs=my time\n", "name of a C function"},
         BadFile{"[SysTime]\nLinux.CustomSysTimeGetUs=f\nLinux.CustomSysTimeGetNs=g\n", "needs all three"},
         BadFile{"[Task.]\n", "task '' is not valid"}, BadFile{"[Task.a b]\n", "task 'a b' is not valid"},
-        BadFile{"[Task.Fast]\nLatePolicy=asap\n",
-                "[Task.Fast] LatePolicy: 'asap' is not allowed; allowed is: Next, Asap"},
+        BadFile{"[Task.Fast]\nLatePolicy=soon\n",
+                "[Task.Fast] LatePolicy: 'soon' is not allowed; allowed is: Next, Asap"},
         BadFile{"[Task.Fast]\nStartOffset=1\n", "did you mean 'StartOffsetNs'?"},
         BadFile{"[Task.Fast]\nStartOffsetNs=-1\n", "0 to 4320000000000000"},
         BadFile{"[Task.Fast]\nWatchdog.Sensitivity=0\n", "cycles, 1 to 1000000"},
-        BadFile{"[Task.Fast]\nDrivesOutputs=1\n[CmpLog]\n[Task.Fast]\nDrivesOutputs=0\n",
-                "line1.cfg:5: [Task.Fast] DrivesOutputs is given twice"},
         BadFile{"[ComponentManager]\nComponent.x=a.so\n", "has no key 'Component.x'"},
         BadFile{"[ComponentManager]\nComponent.1000=a.so\n", "has no key 'Component.1000'"},
         BadFile{"[ComponentManager]\nComponent.1=\n", "allowed is: file of a shared object"},
-        BadFile{"[ComponentManager]\nComponent.1=a.so\nComponent.01=b.so\n", "given twice"},
         BadFile{"SchedulerInterval=1000\n",
                 "line1.cfg:1: 'SchedulerInterval' stands before the first [Section]"},
         BadFile{"[CmpSchedule]\nwhat is this\n", "line1.cfg:2: neither [Section] nor Key=Value"},
