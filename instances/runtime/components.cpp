@@ -44,6 +44,17 @@ Result<void> Components::load(const std::vector<std::string>& files) {
     if (!object) return failure_in("component", std::move(object).error());
     objects_.push_back(*std::move(object));
   }
+  return {};
+}
+
+void* Components::find(const char* symbol) const noexcept {
+  for (const SharedObject& object : objects_) {
+    if (void* const found = object.find(symbol)) return found;
+  }
+  return nullptr;
+}
+
+Result<void> Components::init() {
   if (objects_.empty()) return {};
   for (const unsigned hook : kInitHooks) {
     if (auto called = call_all(hook); !called) {

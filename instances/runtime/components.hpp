@@ -13,11 +13,17 @@ class Components {
  public:
   Components() = default;
 
-  /// Loads all files and calls CH_INIT, CH_INIT2, CH_INIT3. If one refuses, those that were called get their
-  /// CH_EXIT.. hooks. Control thread.
+  /// Loads all files, without a call of their hooks. Control thread.
   [[nodiscard]] Result<void> load(const std::vector<std::string>& files);
 
-  /// Calls CH_EXIT3, CH_EXIT2, CH_EXIT in reverse order, as far as the hooks of load() came. Once.
+  /// The first component's symbol of this name; null if none has it.
+  [[nodiscard]] void* find(const char* symbol) const noexcept;
+
+  /// Calls CH_INIT, CH_INIT2, CH_INIT3. If one refuses, those that were called get their CH_EXIT.. hooks.
+  /// Control thread.
+  [[nodiscard]] Result<void> init();
+
+  /// Calls CH_EXIT3, CH_EXIT2, CH_EXIT in reverse order, as far as the hooks of init() came. Once.
   void exit();
 
  private:

@@ -153,8 +153,12 @@ void Instance::restore_operator_events() {
 }
 
 Result<std::string> Instance::load_components() {
-  if (auto used = use_system_time(settings_.sys_time); !used) return std::unexpected(std::move(used).error());
   auto loaded = components_.load(settings_.components);
+  if (loaded) {  // a component may hold the clock, and the hooks of all see it
+    loaded =
+        use_system_time(settings_.sys_time, [this](const char* symbol) { return components_.find(symbol); });
+  }
+  if (loaded) loaded = components_.init();
   host_->write_messages();
   if (!loaded) return std::unexpected(std::move(loaded).error());
   return {};

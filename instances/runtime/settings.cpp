@@ -177,16 +177,11 @@ class Parser {
     }
   }
 
-  // The three keys of [SysTime] belong together.
+  // us and ns are to have one base, so one of them alone is not enough.
   void check_sys_time() {
     const SysTimeSettings& time = settings_.sys_time;
-    if (time == SysTimeSettings{} ||
-        (!time.get_us.empty() && !time.get_ns.empty() && !time.library.empty())) {
-      return;
-    }
-    fail(
-        "[SysTime] needs all three of CustomSysTimeGetUs, CustomSysTimeGetNs and CustomSysTimeLibrary, or "
-        "none");
+    if (time == SysTimeSettings{} || (!time.get_us.empty() && !time.get_ns.empty())) return;
+    fail("[SysTime] needs both of CustomSysTimeGetUs and CustomSysTimeGetNs, or none of its keys");
   }
 
   std::string_view rest_;

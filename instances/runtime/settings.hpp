@@ -22,11 +22,11 @@ enum class IdleStates : std::uint8_t {
   allow,      ///< nothing
 };
 
-/// [SysTime]: the clock that applications see, if it is not CLOCK_MONOTONIC. All three or none.
+/// [SysTime]: the clock that applications see, if it is not CLOCK_MONOTONIC. Both functions or none.
 struct SysTimeSettings {
   std::string get_us;   ///< the symbol of a function like SysTimeGetUs
   std::string get_ns;   ///< the symbol of a function like SysTimeGetNs
-  std::string library;  ///< the file that holds both
+  std::string library;  ///< the file that holds both; empty: a component, or what else is loaded
   bool operator==(const SysTimeSettings&) const = default;
 };
 

@@ -4,7 +4,9 @@
 
 #include <dlfcn.h>
 #include <fmt/format.h>
+#include <link.h>
 
+#include "shm/base/log.hpp"
 #include "shm/base/time.hpp"
 
 namespace plchost {
@@ -38,6 +40,8 @@ class Watch {
       : function_(function), ns_per_unit_(ns_per_unit) {}
 
   Result<RTS_SYSTIME> read() {
+    // The last line of the log, if the call is the end of the process.
+    if (!begun_) spdlog::info("[SysTime] first call of {}", function_.name);
     Sample sample;
     sample.before = MonotonicClock::now();
     const RTS_RESULT result = function_.call(&sample.value);
@@ -90,10 +94,77 @@ class Watch {
   Sample last_;
 };
 
-Result<PF_SYSTIME> find(void* library, const std::string& path, const std::string& symbol) {
+/// A function, with what it is called in texts: "MySysTimeGetUs of /opt/clock.so".
+struct Found {
+  PF_SYSTIME call = nullptr;
+  std::string name;
+};
+
+// dlsym() finds variables, too, and those must not be called. What has no entry of its own is what the
+// function of an IFUNC has chosen.
+Result<Found> as_function(void* symbol, const std::string& name) {
+  Dl_info place{};
+  void* entry = nullptr;
+  const bool is_placed = ::dladdr1(symbol, &place, &entry, RTLD_DL_SYMENT) != 0;
+  const unsigned type =
+      entry == nullptr ? STT_FUNC : ELF64_ST_TYPE(static_cast<const ElfW(Sym)*>(entry)->st_info);
+  if (!is_placed || (type != STT_FUNC && type != STT_GNU_IFUNC)) {
+    return failure(ErrorCode::invalid_argument, fmt::format("[SysTime]: '{}' is no function", name));
+  }
+  const auto call = std::bit_cast<PF_SYSTIME>(symbol);
+  if (call == SysTimeGetUs || call == SysTimeGetNs) {
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("[SysTime]: '{}' is the runtime's own and cannot stand for itself", name));
+  }
+  return Found{call, fmt::format("{} of {}", name, place.dli_fname)};
+}
+
+Result<Found> find_in_library(void* library, const std::string& path, const std::string& symbol) {
   void* const found = ::dlsym(library, symbol.c_str());
-  if (found != nullptr) return std::bit_cast<PF_SYSTIME>(found);
+  if (found != nullptr) return as_function(found, symbol);
   return failure(ErrorCode::not_found, fmt::format("[SysTime]: {} has no function '{}'", path, symbol));
+}
+
+Result<Found> find_in_loaded(const FindSymbol& find_in_components, const std::string& symbol) {
+  void* found = find_in_components ? find_in_components(symbol.c_str()) : nullptr;
+  if (found == nullptr) found = ::dlsym(RTLD_DEFAULT, symbol.c_str());
+  if (found != nullptr) return as_function(found, symbol);
+  return failure(
+      ErrorCode::not_found,
+      fmt::format("[SysTime]: no component and nothing else that is loaded has a function '{}'; the "
+                  "key CustomSysTimeLibrary names the shared object that holds it",
+                  symbol));
+}
+
+struct Clocks {
+  Found us;
+  Found ns;
+};
+
+template <class Find>
+Result<Clocks> find_both(const SysTimeSettings& settings, Find find) {
+  auto us = find(settings.get_us);
+  if (!us) return std::unexpected(std::move(us).error());
+  auto ns = find(settings.get_ns);
+  if (!ns) return std::unexpected(std::move(ns).error());
+  return Clocks{*std::move(us), *std::move(ns)};
+}
+
+Result<Clocks> find_clocks(const SysTimeSettings& settings, const FindSymbol& find_in_components) {
+  if (settings.library.empty()) {
+    return find_both(settings,
+                     [&](const std::string& symbol) { return find_in_loaded(find_in_components, symbol); });
+  }
+  // It stays loaded: an application may call it to the very end.
+  void* const library = ::dlopen(settings.library.c_str(), RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
+  if (library == nullptr) {
+    const char* const why = ::dlerror();
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("[SysTime] CustomSysTimeLibrary: {}", why == nullptr ? "dlopen failed" : why));
+  }
+  return find_both(settings, [&](const std::string& symbol) {
+    return find_in_library(library, settings.library, symbol);
+  });
 }
 
 RTS_RESULT answer(RTS_SYSTIME* to, PF_SYSTIME custom, RTS_SYSTIME ns_per_unit) noexcept {
@@ -127,24 +198,16 @@ Result<void> check_system_time(const TimeFunction& us, const TimeFunction& ns) {
   return us_watch.check_pace();
 }
 
-Result<void> use_system_time(const SysTimeSettings& settings) {
+Result<void> use_system_time(const SysTimeSettings& settings, const FindSymbol& find_in_components) {
   if (settings == SysTimeSettings{}) return {};
-  // It stays loaded: an application may call it to the very end.
-  void* const library = ::dlopen(settings.library.c_str(), RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
-  if (library == nullptr) {
-    const char* const why = ::dlerror();
-    return failure(ErrorCode::invalid_argument,
-                   fmt::format("[SysTime] CustomSysTimeLibrary: {}", why == nullptr ? "dlopen failed" : why));
+  const auto clocks = find_clocks(settings, find_in_components);
+  if (!clocks) return std::unexpected(clocks.error());
+  const auto& [us, ns] = *clocks;
+  if (auto good = check_system_time({us.name, us.call}, {ns.name, ns.call}); !good) {
+    return failure_in("[SysTime]", std::move(good).error());
   }
-  const auto us = find(library, settings.library, settings.get_us);
-  if (!us) return std::unexpected(us.error());
-  const auto ns = find(library, settings.library, settings.get_ns);
-  if (!ns) return std::unexpected(ns.error());
-  if (auto good = check_system_time({settings.get_us, *us}, {settings.get_ns, *ns}); !good) {
-    return failure_in(fmt::format("[SysTime] {}", settings.library), std::move(good).error());
-  }
-  custom_us = *us;
-  custom_ns = *ns;
+  custom_us = us.call;
+  custom_ns = ns.call;
   return {};
 }
 

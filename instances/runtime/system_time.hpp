@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <string_view>
 
 #include "instances/plc_app.h"
@@ -8,10 +9,15 @@
 
 namespace plchost {
 
+/// The address of a symbol of the components; null if none has it.
+using FindSymbol = std::function<void*(const char* symbol)>;
+
 /// Makes the functions that [SysTime] names what SysTimeGetUs() and SysTimeGetNs() call, from here to the end
-/// of the process. Empty settings: CLOCK_MONOTONIC. The text of an error names the symbol, the library, and
-/// what was seen. Set-up, before anything of an application runs.
-[[nodiscard]] Result<void> use_system_time(const SysTimeSettings& settings);
+/// of the process. Empty settings: CLOCK_MONOTONIC. Without a library they are looked for in the components,
+/// then in all that is loaded for everyone. The text of an error names the symbol, the library, and what was
+/// seen. Set-up, before anything of an application runs.
+[[nodiscard]] Result<void> use_system_time(const SysTimeSettings& settings,
+                                           const FindSymbol& find_in_components = {});
 
 /// One function of a custom clock.
 struct TimeFunction {

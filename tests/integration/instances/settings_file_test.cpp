@@ -1,4 +1,5 @@
 // What a settings file does to a plc-instance.
+#include <csignal>
 #include <cstdio>
 #include <thread>
 
@@ -12,6 +13,7 @@ namespace plchost::testing {
 namespace {
 
 using namespace std::chrono_literals;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -125,10 +127,40 @@ TEST_F(SettingsFile, CustomSystemTimeThatIsNoClockIsRefusedByName) {
     return sut.log();
   };
   EXPECT_THAT(log_of("OtherBaseNs", application("clocks")),
-              HasSubstr("MySysTimeGetUs and OtherBaseNs have no common base"));
+              AllOf(HasSubstr("MySysTimeGetUs of "), HasSubstr("have no common base")));
+  EXPECT_THAT(log_of("DataNs", application("clocks")), HasSubstr("'DataNs' is no function"));
   EXPECT_THAT(log_of("StoppedNs", application("clocks")), HasSubstr("StoppedNs"));
   EXPECT_THAT(log_of("NoSuchNs", application("clocks")), HasSubstr("has no function 'NoSuchNs'"));
   EXPECT_THAT(log_of("MySysTimeGetNs", "clocks.so"), HasSubstr(sandbox.folder() + "/clocks.so"));
+}
+
+// The two lines as the seed has them.
+constexpr const char* kSeedClock =
+    "[SysTime]\nVxWorks.CustomSysTimeGetUs=MySysTimeGetUs\nVxWorks.CustomSysTimeGetNs=MySysTimeGetNs\n";
+
+TEST_F(SettingsFile, CustomSystemTimeIsFoundInAComponentAndInWhatIsLoaded) {
+  InstanceProcess component(
+      sandbox, with(kSeedClock + ("[ComponentManager]\nComponent.1=" + application("clocks")) + "\n"));
+  component.wait_until_up();
+  EXPECT_THAT(component.log(), HasSubstr("first call of MySysTimeGetUs of " + application("clocks")));
+  EXPECT_EQ(component.end(SIGTERM), 0);
+  InstanceProcess loaded(sandbox, with(kSeedClock), {"LD_PRELOAD=" + application("clocks")});
+  loaded.wait_until_up();
+  EXPECT_THAT(loaded.log(), HasSubstr("first call of MySysTimeGetNs of " + application("clocks")));
+}
+
+TEST_F(SettingsFile, CustomSystemTimeThatIsNotLoadedNamesTheKeyOfItsLibrary) {
+  InstanceProcess sut(sandbox, with(kSeedClock));
+  EXPECT_EQ(sut.end(), 3);
+  EXPECT_THAT(sut.log(), HasSubstr("has a function 'MySysTimeGetUs'; the key CustomSysTimeLibrary names"));
+}
+
+TEST_F(SettingsFile, CrashInACustomSystemTimeIsTheLastThingTheLogSpeaksOf) {
+  InstanceProcess sut(sandbox, with("[SysTime]\nLinux.CustomSysTimeGetUs=MySysTimeGetUs\n"
+                                    "Linux.CustomSysTimeGetNs=CrashNs\nLinux.CustomSysTimeLibrary=" +
+                                    application("clocks") + "\n"));
+  EXPECT_EQ(sut.end(), -SIGABRT);
+  EXPECT_THAT(sut.log(), HasSubstr("first call of CrashNs of " + application("clocks")));
 }
 
 // As such files are written for another runtime: all of it is accepted, and what is left alone is said.

@@ -1,5 +1,6 @@
 #include "instances/runtime/system_time.hpp"
 
+#include <bit>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -122,6 +123,22 @@ TEST(SystemTime, NamesTheLibraryThatIsNotThereAndTheSymbolThatItLacks) {
   const auto lacking = use_system_time({.get_us = "my_us", .get_ns = "my_ns", .library = "libm.so.6"});
   ASSERT_FALSE(lacking);
   EXPECT_THAT(lacking.error().message, HasSubstr("libm.so.6 has no function 'my_us'"));
+}
+
+TEST(SystemTime, NamesTheKeyOfTheLibraryIfNothingThatIsLoadedHasTheSymbol) {
+  const auto sut = use_system_time({.get_us = "MySysTimeGetUs", .get_ns = "MySysTimeGetNs", .library = ""});
+  ASSERT_FALSE(sut);
+  EXPECT_EQ(sut.error().code, ErrorCode::not_found);
+  EXPECT_THAT(sut.error().message, HasSubstr("has a function 'MySysTimeGetUs'"));
+  EXPECT_THAT(sut.error().message, HasSubstr("CustomSysTimeLibrary names"));
+}
+
+TEST(SystemTime, RefusesVariablesAndItself) {
+  const SysTimeSettings settings{.get_us = "a", .get_ns = "b", .library = ""};
+  EXPECT_THAT(use_system_time({.get_us = "environ", .get_ns = "environ", .library = ""}).error().message,
+              HasSubstr("'environ' is no function"));
+  const auto itself = [](const char*) { return std::bit_cast<void*>(&SysTimeGetUs); };
+  EXPECT_THAT(use_system_time(settings, itself).error().message, HasSubstr("'a' is the runtime's own"));
 }
 
 }  // namespace
