@@ -50,11 +50,15 @@ struct InstanceSettings {
 
 inline constexpr std::size_t kMaxSettingsFile = std::size_t{1} << 20;
 inline constexpr std::size_t kMaxComponents = 999;
+/// Files that refer to each other: so many behind the first, and in all.
+inline constexpr std::size_t kMaxReferenceDepth = 8;
+inline constexpr std::size_t kMaxSettingsFiles = 64;
 
-/// `file` is how errors call it: "FILE:LINE: what is wrong, and what is allowed".
+/// `file` is how errors call it: "FILE:LINE: what is wrong, and what is allowed". Follows no references.
 [[nodiscard]] Result<InstanceSettings> parse_settings(std::string_view text, std::string_view file);
 
-/// Paths in it are absolute or count from the file's folder. not_found: no such file. Set-up.
+/// With the files of its [CmpSettings] FileReference.N. Relative paths in it are made absolute. not_found: no
+/// such file. Set-up.
 [[nodiscard]] Result<InstanceSettings> read_settings(const std::string& file);
 
 }  // namespace plchost

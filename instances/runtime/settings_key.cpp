@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <filesystem>
 #include <optional>
 
 #include <fmt/format.h>
@@ -120,6 +121,11 @@ std::unexpected<Error> unknown_key(std::string_view section, std::string_view na
 }
 
 }  // namespace
+
+std::string in_folder(const SettingsTarget& target, std::string_view path) {
+  if (target.folder.empty()) return std::string(path);
+  return (std::filesystem::path(target.folder) / path).lexically_normal();
+}
 
 const std::vector<SettingKey>& all_setting_keys() {
   static const std::vector<SettingKey> all = [] {

@@ -19,7 +19,11 @@ struct SettingsTarget {
   InstanceSettings& settings;
   std::map<std::size_t, std::string>& components;  ///< by their number, foreign ones too
   TaskSettings* task;                              ///< of the section [Task.NAME]; null in other sections
+  std::string_view folder;                         ///< of the file; empty: relative paths stay as they are
 };
+
+/// The path, as it counts from the folder of its file.
+[[nodiscard]] std::string in_folder(const SettingsTarget& target, std::string_view path);
 
 /// An integer, lowest to highest.
 struct NumberSetting {

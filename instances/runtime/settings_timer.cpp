@@ -97,7 +97,7 @@ constexpr std::array kKeys = {
                .prefixed = true,
                .value = TextSetting{"file of a shared object, or nothing", is_path_or_nothing,
                                     [](const SettingsTarget& to, std::string_view path) {
-                                      to.settings.sys_time.library = path;
+                                      to.settings.sys_time.library = path.empty() ? "" : in_folder(to, path);
                                     }}},
     SettingKey{.section = kTime, .name = "UseTimestamp", .prefixed = true},
     SettingKey{.section = kTime, .name = "WinCE.GetMsTimeFromSchedulerTicks"},

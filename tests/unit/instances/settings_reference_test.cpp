@@ -1,0 +1,105 @@
+// [CmpSettings] FileReference.N
+#include <filesystem>
+#include <fstream>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "instances/runtime/settings.hpp"
+
+namespace plchost {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+class SettingsReference : public ::testing::Test {
+ protected:
+  SettingsReference() { std::filesystem::create_directories(folder_ / "more"); }
+  ~SettingsReference() override { std::filesystem::remove_all(folder_); }
+
+  [[nodiscard]] std::string path(const std::string& name) const { return folder_ / name; }
+  std::string write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name) << text;
+    return path(name);
+  }
+
+ private:
+  std::filesystem::path folder_ = std::filesystem::path(::testing::TempDir()) /
+                                  ::testing::UnitTest::GetInstance()->current_test_info()->name();
+};
+
+TEST_F(SettingsReference, IsReadAfterTheFileThatNamesItAndCounts) {
+  write("more/user.cfg",
+        "[CmpSchedule]\nSchedulerInterval=2000\n[ComponentManager]\nComponent.1=a.so\n[CmpLog]\n");
+  const std::string first =
+      write("first.cfg",
+            "[CmpSettings]\nFileReference.1=more/user.cfg, User ; theirs\nOther=1\n"
+            "[CmpSchedule]\nSchedulerInterval=1000\n[ComponentManager]\nComponent.2=b.so\n");
+  const auto sut = read_settings(first);
+  ASSERT_TRUE(sut) << sut.error().message;
+  EXPECT_EQ(sut->scheduler.scheduler_interval, 2ms);
+  EXPECT_THAT(sut->components, ElementsAre(path("more/a.so"), path("b.so")));
+  EXPECT_THAT(sut->foreign_sections, ElementsAre("CmpSettings", "CmpLog"));
+  EXPECT_THAT(sut->remarks,
+              ElementsAre(fmt::format("{}:2: [CmpSchedule] SchedulerInterval takes the place of "
+                                      "the one in {}:5",
+                                      path("more/user.cfg"), first)));
+}
+
+TEST_F(SettingsReference, AreReadInTheOrderOfTheirNumbers) {
+  write("a.cfg", "[CmpSchedule]\nSchedulerInterval=2000\n");
+  write("b.cfg", "[CmpSchedule]\nSchedulerInterval=3000\n");
+  const auto sut =
+      read_settings(write("first.cfg", "[CmpSettings]\nFileReference.1=a.cfg\nFileReference.0=\"b.cfg\"\n"));
+  ASSERT_TRUE(sut) << sut.error().message;
+  EXPECT_EQ(sut->scheduler.scheduler_interval, 2ms);
+}
+
+TEST_F(SettingsReference, ToAFileThatIsNotThereIsARemark) {
+  const std::string first = write("first.cfg", "[CmpSettings]\nFileReference.0=none.cfg, none\n");
+  const auto sut = read_settings(first);
+  ASSERT_TRUE(sut) << sut.error().message;
+  EXPECT_THAT(sut->remarks, ElementsAre(AllOf(HasSubstr(first + ":2: "), HasSubstr(path("none.cfg")))));
+}
+
+TEST_F(SettingsReference, BackToAFileThatIsBeingReadIsAnError) {
+  write("more/user.cfg", "[CmpSettings]\nFileReference.0=../first.cfg\n");
+  const auto sut = read_settings(write("first.cfg", "[CmpSettings]\nFileReference.0=more/user.cfg\n"));
+  ASSERT_FALSE(sut);
+  EXPECT_THAT(sut.error().message, HasSubstr(path("more/user.cfg") + ":2: "));
+  EXPECT_THAT(sut.error().message, HasSubstr("it refers back"));
+}
+
+TEST_F(SettingsReference, FromTwoFilesIsReadOnce) {
+  write("a.cfg", "[CmpSettings]\nFileReference.0=c.cfg\n");
+  write("b.cfg", "[CmpSettings]\nFileReference.0=c.cfg\n");
+  write("c.cfg", "[CmpSchedule]\nSchedulerInterval=2000\n");
+  const auto sut =
+      read_settings(write("first.cfg", "[CmpSettings]\nFileReference.0=a.cfg\nFileReference.1=b.cfg\n"));
+  ASSERT_TRUE(sut) << sut.error().message;
+  EXPECT_EQ(sut->scheduler.scheduler_interval, 2ms);
+  EXPECT_THAT(sut->remarks, IsEmpty());
+}
+
+TEST_F(SettingsReference, HasALimitOfDepth) {
+  for (std::size_t i = 0; i <= kMaxReferenceDepth; ++i) {
+    write(fmt::format("{}.cfg", i), fmt::format("[CmpSettings]\nFileReference.0={}.cfg\n", i + 1));
+  }
+  write(fmt::format("{}.cfg", kMaxReferenceDepth + 1), "");
+  EXPECT_FALSE(read_settings(path("0.cfg")));
+  EXPECT_TRUE(read_settings(path("1.cfg")));
+}
+
+TEST_F(SettingsReference, ErrorsNameTheFileThatTheyAreIn) {
+  write("user.cfg", "[CmpSchedule]\nSchedulerInterval=1\n");
+  const auto sut = read_settings(write("first.cfg", "[CmpSettings]\nFileReference.0=user.cfg\n"));
+  ASSERT_FALSE(sut);
+  EXPECT_THAT(sut.error().message, HasSubstr(path("user.cfg") + ":2: [CmpSchedule] SchedulerInterval: '1'"));
+}
+
+}  // namespace
+}  // namespace plchost
