@@ -10,6 +10,7 @@
 #include <ucontext.h>
 #include <unistd.h>
 
+#include "shm/base/memory_guard.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/time.hpp"
 
@@ -137,6 +138,11 @@ void FaultTrap::fill_struck(FaultRecord& record) const noexcept {
 struct FaultHandlers {
   static void on_fault(int signal, siginfo_t* info, void* context) noexcept {
     const int saved = errno;
+    // What strangers do to a shared memory is not the application's fault, and no cause of death.
+    if (signal == SIGBUS && info->si_code > 0 && MemoryGuard::mend(info->si_addr)) {
+      errno = saved;
+      return;
+    }
     if (armed == nullptr) {
       crash(signal, *info);
       errno = saved;

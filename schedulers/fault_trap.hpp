@@ -53,8 +53,8 @@ class FaultTrap {
 };
 
 /// Catches SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP and SIGABRT of this process in code under an armed
-/// trap; anywhere else they do what they did. Also takes SIGRTMAX - 1, with which a watchdog stops a cycle.
-/// Once, before there are other threads. Set-up.
+/// trap; anywhere else they do what they did. A SIGBUS in memory under a MemoryGuard is mended. Takes
+/// SIGRTMAX - 1, too, with which a watchdog stops a cycle. Once, before there are other threads. Set-up.
 [[nodiscard]] Result<void> install_fault_handlers();
 
 }  // namespace plchost

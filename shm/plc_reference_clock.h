@@ -20,7 +20,9 @@
  * to some thousand pairs per second; more often than every 20 us is not looked at.
  *
  * A writer that is killed inside of plc_reference_clock_write leaves a record that readers do not take; the
- * next write, by whichever process, makes it good again.
+ * next write, by whichever process, makes it good again. Who removes the file or makes it empty has it made
+ * anew, by an instance or by the next plc_reference_clock_open; firmware that has it mapped then opens it
+ * again (in a file that was made empty its next write could be a SIGBUS).
  */
 #ifndef PLC_REFERENCE_CLOCK_H
 #define PLC_REFERENCE_CLOCK_H

@@ -25,6 +25,7 @@ std::int64_t to_hundreds(std::int64_t value) noexcept {
 template <class Add>
 void add_clock(const ClockRuntime& clock, const Add& add) {
   add("clock_reference", clock.reference.view());
+  add("clock_problem", clock.problem.view());
   if (clock.state == 0 || clock.state >= kClockStates.size()) return;
   add("clock_state", kClockStates[clock.state]);
   add("clock_in_sync", clock.in_sync != 0 ? "1" : "0");

@@ -218,8 +218,7 @@ Result<std::string> Instance::make_tasks() {
   tasks_ = *std::move(tasks);
   host_->task_table().attach(tasks_.get());
   if (const std::string& reference = settings_.scheduler.distributed_clock.reference; !reference.empty()) {
-    auto followed = reference_.follow(tasks_->distributed_clock(), options_.launch.pool, reference);
-    if (!followed) return std::unexpected(std::move(followed).error());
+    reference_.follow(tasks_->distributed_clock(), options_.launch.pool, reference);
   }
   notify_tasks(EVT_ExternalEventTaskCreateDone);
   for (const std::string& line : describe_cycle_limits(application_->tasks(), settings_.scheduler.watchdog)) {
@@ -275,6 +274,7 @@ void Instance::beat() {
   if (application_) runtime.application.assign(application_->path());
   if (tasks_ && tasks_->running()) runtime.clock = clock_runtime(tasks_->distributed_clock());
   runtime.clock.reference.assign(settings_.scheduler.distributed_clock.reference);
+  runtime.clock.problem.assign(reference_.problem());
   page_->write_runtime(runtime);
 }
 

@@ -1,18 +1,22 @@
 #include "instances/runtime/reference_memory.hpp"
 
+#include <optional>
+
 #include "shm/base/log.hpp"
 
 namespace plchost {
 
 class ReferenceMemory::Source final : public ReferenceSource {
  public:
-  explicit Source(ReferenceClockRecord record) noexcept : record_(std::move(record)) {}
+  explicit Source(std::optional<ReferenceClockRecord> record) noexcept : record_(std::move(record)) {}
 
-  [[nodiscard]] bool replaced() const noexcept { return record_.replaced(); }
+  [[nodiscard]] bool has_record() const noexcept { return record_.has_value(); }
+  [[nodiscard]] bool is_good() const noexcept { return record_ && !record_->gone(); }
 
   [[nodiscard]] Reading read() noexcept override {
+    if (!record_) return {};
     plc_reference_reading reading{};
-    switch (plc_reference_clock_read(&record_.record(), &reading)) {
+    switch (plc_reference_clock_read(&record_->record(), &reading)) {
       case PLC_REFERENCE_OK:
         return {
             .outcome = reading.valid != 0 ? Outcome::pair : Outcome::invalid,
@@ -26,35 +30,49 @@ class ReferenceMemory::Source final : public ReferenceSource {
   }
 
  private:
-  ReferenceClockRecord record_;
+  std::optional<ReferenceClockRecord> record_;
 };
 
 ReferenceMemory::ReferenceMemory() = default;
 ReferenceMemory::~ReferenceMemory() = default;
 
-Result<void> ReferenceMemory::follow(DistributedClock& clock, std::string pool, std::string name) {
-  auto record = ReferenceClockRecord::open(pool, name);
-  if (!record) return std::unexpected(std::move(record).error());
-  auto source = std::make_unique<Source>(*std::move(record));
-  if (!clock.use_source(source.get())) {
-    return failure(ErrorCode::busy, "a task is caught at the reference clock that was in use before");
-  }
+void ReferenceMemory::follow(DistributedClock& clock, std::string pool, std::string name) {
   clock_ = &clock;
   pool_ = std::move(pool);
   name_ = std::move(name);
-  source_ = std::move(source);  // nobody is at the one before any more
-  return {};
+  attach();
 }
 
 void ReferenceMemory::refresh() {
-  if (clock_ == nullptr || !source_->replaced()) return;
-  const auto followed = follow(*clock_, pool_, name_);
-  if (followed) {
+  if (clock_ == nullptr || (source_ && source_->is_good())) return;
+  const bool again = source_ != nullptr;
+  const Source* const before = source_.get();
+  attach();
+  if (again && source_.get() != before && problem_.empty()) {
     spdlog::info("reference clock '{}' was made anew and is followed again", name_);
-  } else if (followed.error().code != ErrorCode::busy) {
-    spdlog::error("{}", followed.error().describe());
-    drop();
   }
+}
+
+void ReferenceMemory::attach() {
+  std::optional<ReferenceClockRecord> record;
+  std::string problem;
+  if (auto opened = ReferenceClockRecord::open(pool_, name_)) {
+    record.emplace(*std::move(opened));
+  } else {
+    problem = opened.error().describe();
+  }
+  // A source without a record says nothing, which the clock takes for a reference that is silent.
+  if (record || !source_ || source_->has_record()) {
+    auto source = std::make_unique<Source>(std::move(record));
+    if (!clock_->use_source(source.get())) return;  // a task is caught at the one before: the next time
+    source_ = std::move(source);                    // nobody is at the one before any more
+  }
+  tell(std::move(problem));
+}
+
+void ReferenceMemory::tell(std::string problem) {
+  if (!problem.empty() && problem != problem_) spdlog::error("{}; the clock runs freely", problem);
+  problem_ = std::move(problem);
 }
 
 ClockRuntime clock_runtime(const DistributedClock& clock) noexcept {

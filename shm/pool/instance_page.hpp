@@ -49,6 +49,7 @@ inline constexpr std::size_t kMaxTickText = 127;
 /// The distributed clock as the cyclic task of the highest priority sees it: see ClockStatus.
 struct ClockRuntime {
   FixedText<kMaxObjectName> reference;  ///< name of the record; empty: none is named
+  FixedText<kMaxTickText> problem;      ///< why there is none to follow; empty: there is
   std::uint32_t state = 0;              ///< 0 off, then free running, acquiring, locked, hold-over, measuring
   std::uint32_t in_sync = 0;
   std::int64_t offset_ns = 0;

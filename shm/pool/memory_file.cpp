@@ -80,6 +80,31 @@ Result<void> give_name(const UniqueFd& fd, const std::string& path) {
   return failure(ErrorCode::system, fmt::format("give shared memory the name {}", path), error);
 }
 
+/// An existing file, and what it is.
+struct Opened {
+  UniqueFd fd;
+  struct stat status{};
+};
+
+Result<Opened> open_existing(const std::string& path, MemoryFile::Access access) {
+  // O_NONBLOCK: were it a FIFO, a plain open would wait for ever.
+  const int flags =
+      (access == MemoryFile::Access::read_write ? O_RDWR : O_RDONLY) | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK;
+  Opened opened{.fd = UniqueFd(::open(path.c_str(), flags))};
+  if (!opened.fd) {
+    const int error = errno;
+    return failure(error == ENOENT ? ErrorCode::not_found : ErrorCode::system, fmt::format("open {}", path),
+                   error);
+  }
+  if (auto got = check_errno(::fstat(opened.fd.get(), &opened.status), "fstat " + path); !got) {
+    return std::unexpected(got.error());
+  }
+  if (!S_ISREG(opened.status.st_mode)) {
+    return failure(ErrorCode::corrupt, fmt::format("{} is not a plain file", path));
+  }
+  return opened;
+}
+
 }  // namespace
 
 Result<MemoryFile> MemoryFile::make(const std::string& name, std::size_t size, const Fill& fill,
@@ -116,28 +141,25 @@ Result<MemoryFile> MemoryFile::replace(const std::string& name, std::size_t size
 Result<MemoryFile> MemoryFile::open(const std::string& name, std::size_t at_least, Access access) {
   const auto path = path_of(name);
   if (!path) return std::unexpected(path.error());
-  // O_NONBLOCK: were it a FIFO, a plain open would wait for ever.
-  const int flags = (access == Access::read_write ? O_RDWR : O_RDONLY) | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK;
-  const UniqueFd fd(::open(path->c_str(), flags));
-  if (!fd) {
-    const int error = errno;
-    return failure(error == ENOENT ? ErrorCode::not_found : ErrorCode::system, fmt::format("open {}", *path),
-                   error);
-  }
-  struct stat status{};
-  if (auto got = check_errno(::fstat(fd.get(), &status), "fstat " + *path); !got) {
-    return std::unexpected(got.error());
-  }
-  if (!S_ISREG(status.st_mode))
-    return failure(ErrorCode::corrupt, fmt::format("{} is not a plain file", *path));
-  const auto size = static_cast<std::size_t>(status.st_size);
+  const auto opened = open_existing(*path, access);
+  if (!opened) return std::unexpected(opened.error());
+  const auto size = static_cast<std::size_t>(opened->status.st_size);
   if (size == 0 || size < at_least) {
     return failure(ErrorCode::corrupt,
                    fmt::format("{} has {} bytes, at least {} are needed", *path, size, at_least));
   }
-  const auto bytes = map(fd, size, access, *path);
+  const auto bytes = map(opened->fd, size, access, *path);
   if (!bytes) return std::unexpected(bytes.error());
   return MemoryFile(*bytes);
+}
+
+Result<void> MemoryFile::fill_empty(const std::string& name, std::size_t size) {
+  const auto path = path_of(name);
+  if (!path) return std::unexpected(path.error());
+  const auto opened = open_existing(*path, Access::read_write);
+  if (!opened) return std::unexpected(opened.error());
+  if (opened->status.st_size != 0) return {};
+  return allocate(opened->fd, size, *path);
 }
 
 void MemoryFile::remove(const std::string& name) noexcept {

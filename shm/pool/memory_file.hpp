@@ -41,6 +41,10 @@ class MemoryFile {
   /// plain file.
   [[nodiscard]] static Result<MemoryFile> open(const std::string& name, std::size_t at_least, Access access);
 
+  /// Gives the file of that name `size` bytes if it is empty, as one is that was only just made, or that a
+  /// stranger has emptied. not_found: no such name.
+  [[nodiscard]] static Result<void> fill_empty(const std::string& name, std::size_t size);
+
   /// Removes the name if it is there; who has it mapped keeps it.
   static void remove(const std::string& name) noexcept;
 

@@ -1,9 +1,7 @@
 #include "shm/pool/reference_clock.hpp"
 
-#include <chrono>
 #include <cstddef>
 #include <filesystem>
-#include <thread>
 #include <utility>
 
 #include <fmt/format.h>
@@ -28,19 +26,23 @@ Result<void> begin(std::span<std::byte> bytes) {
   return {};
 }
 
-// Firmware that makes the record gives it its name first and its size then.
+// Firmware that makes the record gives it its name first and its size then; two who do so at once do the
+// same. A stranger who has emptied the file has made such a one.
 Result<MemoryFile> open_or_make(const std::string& name) {
-  constexpr int kAttempts = 50;
-  constexpr auto kPause = std::chrono::milliseconds(1);
+  constexpr int kAttempts = 10;  // each one fails only if another process makes or removes it in between
   for (int attempt = 1;; ++attempt) {
-    auto memory = MemoryFile::open(name, sizeof(plc_reference_clock), MemoryFile::Access::read_write);
+    auto memory = [&]() -> Result<MemoryFile> {
+      if (auto filled = MemoryFile::fill_empty(name, sizeof(plc_reference_clock)); !filled) {
+        return std::unexpected(std::move(filled).error());
+      }
+      return MemoryFile::open(name, 1, MemoryFile::Access::read_write);
+    }();
     if (!memory && memory.error().code == ErrorCode::not_found) {
       memory = MemoryFile::create(name, sizeof(plc_reference_clock), begin);
     }
     const bool again = !memory && (memory.error().code == ErrorCode::already_exists ||
-                                   memory.error().code == ErrorCode::corrupt);
+                                   memory.error().code == ErrorCode::not_found);
     if (!again || attempt == kAttempts) return memory;
-    std::this_thread::sleep_for(kPause);
   }
 }
 
@@ -69,18 +71,20 @@ Result<ReferenceClockRecord> ReferenceClockRecord::open(std::string_view pool, s
   const std::string file = pool_memory_name(pool, name);
   auto memory = open_or_make(file);
   if (!memory) return failure_in(fmt::format("reference clock '{}'", name), std::move(memory).error());
-  plc_reference_clock& record = record_of(memory->bytes());
-  // Made by firmware that died before it had written the first line.
-  if (__atomic_load_n(&record.magic, __ATOMIC_ACQUIRE) == 0) plc_reference_clock_begin(&record);
-  if (memory->bytes().size() != sizeof(plc_reference_clock) || plc_reference_clock_is_one(&record) == 0) {
-    return failure(
-        ErrorCode::corrupt,
-        fmt::format("reference clock '{}': shared memory {} is no reference record of version {}; remove "
-                    "it, or choose another name",
-                    name, file, PLC_REFERENCE_CLOCK_VERSION));
-  }
+  const auto refused = [&] {
+    return failure(ErrorCode::corrupt,
+                   fmt::format("reference clock '{}': shared memory {} is no reference record of version {}; "
+                               "remove it, or choose another name",
+                               name, file, PLC_REFERENCE_CLOCK_VERSION));
+  };
+  if (memory->bytes().size() != sizeof(plc_reference_clock)) return refused();
   const Identity identity = identity_of(file);
-  return ReferenceClockRecord(*std::move(memory), file, identity);
+  ReferenceClockRecord opened(*std::move(memory), file, identity);
+  plc_reference_clock& record = opened.record();
+  // Made by firmware that died before it had written the first line, or emptied by a stranger.
+  if (__atomic_load_n(&record.magic, __ATOMIC_ACQUIRE) == 0) plc_reference_clock_begin(&record);
+  if (plc_reference_clock_is_one(&record) == 0) return refused();
+  return opened;
 }
 
 void ReferenceClockRecord::remove(std::string_view pool, std::string_view name) noexcept {
@@ -91,14 +95,15 @@ plc_reference_clock& ReferenceClockRecord::record() const noexcept {
   return record_of(memory_.bytes());
 }
 
-bool ReferenceClockRecord::replaced() const noexcept {
+bool ReferenceClockRecord::gone() const noexcept {
+  if (guard_.lost() || plc_reference_clock_is_one(&record()) == 0) return true;
   return identity_ == Identity{} || identity_of(file_) != identity_;
 }
 
 auto ReferenceClockRecord::identity_of(const std::string& file) noexcept -> Identity {
   struct stat status{};
   if (::stat(fmt::format("{}/{}", MemoryFile::kDirectory, file).c_str(), &status) != 0) return {};
-  return {.device = status.st_dev, .inode = status.st_ino};
+  return {.device = status.st_dev, .inode = status.st_ino, .size = status.st_size};
 }
 
 }  // namespace plchost

@@ -5,6 +5,7 @@
 
 #include <sys/types.h>
 
+#include "shm/base/memory_guard.hpp"
 #include "shm/base/result.hpp"
 #include "shm/plc_reference_clock.h"
 #include "shm/pool/memory_file.hpp"
@@ -21,29 +22,34 @@ namespace plchost {
 void remove_pool_memories(std::string_view pool) noexcept;
 
 /// The record of shm/plc_reference_clock.h, mapped into this process. Set-up, but for reading and writing it.
+/// Strangers can empty its file at any time: in a process with the handlers of install_fault_handlers() it is
+/// then all zero, a record into which nothing was written.
 class ReferenceClockRecord {
  public:
-  /// Opens it, or makes it if it is not there. corrupt: there is something else of that name, or another
-  /// version.
+  /// Opens it, or makes it if it is not there or its file is empty. corrupt: there is something else of that
+  /// name, or another version.
   [[nodiscard]] static Result<ReferenceClockRecord> open(std::string_view pool, std::string_view name);
   /// Removes the name; who has it mapped keeps it.
   static void remove(std::string_view pool, std::string_view name) noexcept;
 
   [[nodiscard]] plc_reference_clock& record() const noexcept;
-  /// Whether the name now leads elsewhere: removed, or made anew by others. Then it is to be opened again.
-  [[nodiscard]] bool replaced() const noexcept;
+  /// Whether it is not what the name leads to any more: removed, made anew by others, cut short or
+  /// overwritten. Then it is to be opened again.
+  [[nodiscard]] bool gone() const noexcept;
 
  private:
   struct Identity {
     dev_t device = 0;
     ino_t inode = 0;
+    off_t size = 0;
     bool operator==(const Identity&) const = default;
   };
   ReferenceClockRecord(MemoryFile memory, std::string file, Identity identity) noexcept
-      : memory_(std::move(memory)), file_(std::move(file)), identity_(identity) {}
+      : memory_(std::move(memory)), guard_(memory_.bytes()), file_(std::move(file)), identity_(identity) {}
   [[nodiscard]] static Identity identity_of(const std::string& file) noexcept;
 
   MemoryFile memory_;
+  MemoryGuard guard_;  // below the memory, so that it goes first
   std::string file_;
   Identity identity_;
 };

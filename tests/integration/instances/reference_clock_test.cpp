@@ -3,6 +3,8 @@
 
 #include <csignal>
 #include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <optional>
 #include <string>
 #include <vector>
@@ -14,11 +16,12 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "instances/launch/launch_contract.hpp"
 #include "tests/integration/instances/instance_process.hpp"
 
 namespace plchost::testing {
 namespace {
+
+using ::testing::HasSubstr;
 
 constexpr const char* kRecord = "bus1";
 // As ClockState numbers them, for whoever reads the page.
@@ -66,6 +69,10 @@ class FollowingFirmware : public ::testing::Test {
   [[nodiscard]] bool becomes(State state) const {
     return eventually([&] { return clock().state == state; });
   }
+  [[nodiscard]] std::string record_file() const {
+    return fmt::format("{}/{}", MemoryFile::kDirectory, pool_memory_name(sandbox_.pool(), kRecord));
+  }
+  void write_record(const std::string& bytes) const { std::ofstream(record_file()) << bytes; }
   /// Of the last release of the 2 ms task, by the line through one pair of the firmware.
   [[nodiscard]] double deviation_ns(double drift) const {
     const auto record = ReferenceClockRecord::open(sandbox_.pool(), kRecord).value();
@@ -133,13 +140,56 @@ TEST_F(FollowingFirmware, FollowsARecordThatWasMadeAnew) {
   EXPECT_TRUE(becomes(locked)) << sut->log();
 }
 
-TEST_F(FollowingFirmware, RefusesToStartOnAMemoryThatIsNoRecord) {
-  ASSERT_TRUE(MemoryFile::create(pool_memory_name(sandbox_.pool(), kRecord), 4096));
-  const std::string file =
-      sandbox_.write("line1.cfg", fmt::format("[DistributedClock]\nReference={}\n", kRecord));
-  InstanceProcess refused(sandbox_, {"--settings", file, "--application", application("all_kinds")});
-  EXPECT_EQ(refused.end(), kExitSetupFailed);
-  EXPECT_THAT(refused.log(), ::testing::HasSubstr("is no reference record of version 1"));
+TEST_F(FollowingFirmware, EmptiedRecordIsNoCauseOfDeath) {
+  start();
+  for (int i = 0; i < 3; ++i) {
+    const Firmware firmware(sandbox_, {});  // which may die of it: it has no guard
+    EXPECT_TRUE(becomes(locked)) << sut->log();
+    std::filesystem::resize_file(record_file(), 0);
+    EXPECT_TRUE(eventually([&] { return std::filesystem::file_size(record_file()) == 64; }))
+        << "begun anew by the instance";
+  }
+  EXPECT_TRUE(becomes(hold_over)) << sut->log();
+  EXPECT_EQ(clock().problem.view(), "");
+  const Firmware again(sandbox_, {});
+  EXPECT_TRUE(becomes(locked)) << sut->log();
+}
+
+TEST_F(FollowingFirmware, RecordThatWasEmptiedBeforeTheStartIsBegunAnew) {
+  write_record("");
+  start();
+  EXPECT_TRUE(becomes(free_running));
+  EXPECT_EQ(clock().problem.view(), "");
+  const Firmware firmware(sandbox_, {});
+  EXPECT_TRUE(becomes(locked)) << sut->log();
+}
+
+TEST_F(FollowingFirmware, RunsFreelyBesideAMemoryThatIsNoRecordUntilThereIsOne) {
+  for (const std::size_t size : {std::size_t{10}, std::size_t{64}, std::size_t{4096}}) {
+    write_record(std::string(size, '\xa5'));
+    start();
+    EXPECT_TRUE(becomes(free_running));
+    EXPECT_THAT(std::string(clock().problem.view()), HasSubstr("is no reference record of version 1"));
+    EXPECT_THAT(sut->log(), HasSubstr("the clock runs freely"));
+    ReferenceClockRecord::remove(sandbox_.pool(), kRecord);
+    const Firmware firmware(sandbox_, {});
+    EXPECT_TRUE(becomes(locked)) << sut->log();
+    EXPECT_EQ(clock().problem.view(), "");
+  }
+}
+
+TEST_F(FollowingFirmware, RecordThatIsOverwrittenIsLetGo) {
+  start();
+  {
+    const Firmware firmware(sandbox_, {});
+    EXPECT_TRUE(becomes(locked)) << sut->log();
+  }
+  std::fstream(record_file()) << std::string(64, '\xa5');
+  EXPECT_TRUE(becomes(hold_over));
+  EXPECT_TRUE(eventually([&] { return !clock().problem.view().empty(); }));
+  ReferenceClockRecord::remove(sandbox_.pool(), kRecord);
+  const Firmware again(sandbox_, {});
+  EXPECT_TRUE(becomes(locked)) << sut->log();
 }
 
 }  // namespace

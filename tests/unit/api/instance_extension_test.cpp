@@ -52,8 +52,11 @@ TEST(InstanceExtension, TellsOfTheDistributedClockOnceThereIsOne) {
   EXPECT_EQ(value("clock_offset_ns"), "-200");
   EXPECT_EQ(value("clock_drift_ppb"), "100000");
   EXPECT_EQ(value("clock_rejected_pairs"), "0, 0 not valid, 0 steps followed");
+  EXPECT_EQ(value("clock_problem"), "none");
   runtime.clock.state = 77;
   EXPECT_EQ(extension_of(runtime).size(), 1U) << "a stranger's page";
+  runtime.clock.problem.assign("no record");
+  EXPECT_EQ(dds::text_of(extension_of(runtime)[1].value), "no record");
 }
 
 TEST(InstanceExtension, TellsHowManyTransitionsThereWere) {

@@ -2,6 +2,8 @@
 
 #include <atomic>
 #include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <random>
 #include <thread>
 
@@ -46,9 +48,9 @@ TEST_F(ReferenceClockFile, FirmwareAndInstanceMeetInOneRecordWhoeverComesFirst) 
   plc_reference_clock_close(firmware);
 
   ReferenceClockRecord::remove(pool(), "bus");
-  EXPECT_TRUE(sut.replaced());
+  EXPECT_TRUE(sut.gone());
   const auto first = open();
-  EXPECT_FALSE(first.replaced());
+  EXPECT_FALSE(first.gone());
   ASSERT_EQ(plc_reference_clock_open(pool().c_str(), "bus", &firmware), 0);
   plc_reference_clock_write(firmware, -5, 6, 0);
   ASSERT_EQ(read(first, reading), PLC_REFERENCE_OK);
@@ -59,11 +61,28 @@ TEST_F(ReferenceClockFile, FirmwareAndInstanceMeetInOneRecordWhoeverComesFirst) 
 
 TEST_F(ReferenceClockFile, RecordMadeAnewByOthersIsNoticed) {
   const auto sut = open();
-  EXPECT_FALSE(sut.replaced());
+  EXPECT_FALSE(sut.gone());
   ReferenceClockRecord::remove(pool(), "bus");
   const auto other = open();
-  EXPECT_TRUE(sut.replaced());
-  EXPECT_FALSE(other.replaced());
+  EXPECT_TRUE(sut.gone());
+  EXPECT_FALSE(other.gone());
+}
+
+TEST_F(ReferenceClockFile, EmptyFileIsBegunAnewAndOneCutShortIsNoticed) {
+  const std::string path = "/dev/shm/" + pool_memory_name(pool(), "bus");
+  std::ofstream{path};
+  const auto sut = open();
+  EXPECT_EQ(std::filesystem::file_size(path), sizeof(plc_reference_clock));
+  EXPECT_FALSE(sut.gone());
+  std::filesystem::resize_file(path, sizeof(plc_reference_clock) - 1);
+  EXPECT_TRUE(sut.gone());
+}
+
+TEST_F(ReferenceClockFile, RecordThatWasOverwrittenIsNoticed) {
+  const auto sut = open();
+  sut.record().magic ^= 1U;
+  EXPECT_TRUE(sut.gone());
+  EXPECT_FALSE(ReferenceClockRecord::open(pool(), "bus"));
 }
 
 TEST_F(ReferenceClockFile, WriterThatDiedWithinIsNotTakenAndTheNextWriteMendsIt) {

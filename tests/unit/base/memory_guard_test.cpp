@@ -1,0 +1,91 @@
+#include "shm/base/memory_guard.hpp"
+
+#include <csignal>
+#include <cstdlib>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include "shm/base/unique_fd.hpp"
+
+namespace plchost {
+namespace {
+
+void on_bus_error(int, siginfo_t* info, void*) {
+  if (!MemoryGuard::mend(info->si_addr)) std::abort();
+}
+
+class GuardedMemory : public testing::Test {
+ protected:
+  static constexpr std::size_t kSize = 64;
+
+  GuardedMemory() {
+    struct sigaction action{};
+    action.sa_flags = SA_SIGINFO;
+    action.sa_sigaction = on_bus_error;
+    ::sigaction(SIGBUS, &action, &before_);
+    resize(kSize);
+    void* const address = ::mmap(nullptr, kSize, PROT_READ | PROT_WRITE, MAP_SHARED, file_.get(), 0);
+    EXPECT_NE(address, MAP_FAILED);
+    memory = std::span(static_cast<std::byte*>(address), kSize);
+    memory[17] = std::byte{42};
+  }
+  ~GuardedMemory() override {
+    ::munmap(memory.data(), memory.size());
+    ::sigaction(SIGBUS, &before_, nullptr);
+  }
+  GuardedMemory(const GuardedMemory&) = delete;
+  GuardedMemory& operator=(const GuardedMemory&) = delete;
+  void resize(std::size_t size) const { EXPECT_EQ(::ftruncate(file_.get(), static_cast<off_t>(size)), 0); }
+  [[nodiscard]] std::byte look() const { return static_cast<const volatile std::byte&>(memory[17]); }
+
+  std::span<std::byte> memory;
+
+ private:
+  UniqueFd file_{::memfd_create("guarded", MFD_CLOEXEC)};
+  struct sigaction before_{};
+};
+
+TEST_F(GuardedMemory, IsZeroOnceItsFileWasCutShortAndStaysSo) {
+  const MemoryGuard sut(memory);
+  ASSERT_TRUE(sut);
+  EXPECT_EQ(look(), std::byte{42});
+  resize(0);
+  EXPECT_FALSE(sut.lost()) << "nobody has touched it yet";
+  EXPECT_EQ(look(), std::byte{0});
+  EXPECT_TRUE(sut.lost());
+  resize(kSize);
+  memory[17] = std::byte{7};
+  EXPECT_EQ(look(), std::byte{7});
+  EXPECT_TRUE(sut.lost());
+}
+
+TEST_F(GuardedMemory, OtherMemoryIsNotTouched) {
+  const MemoryGuard sut(memory);
+  const int other = 0;
+  EXPECT_FALSE(MemoryGuard::mend(&other));
+  EXPECT_FALSE(MemoryGuard::mend(nullptr));
+  EXPECT_FALSE(MemoryGuard::mend(memory.data() + kSize));
+  EXPECT_EQ(look(), std::byte{42});
+}
+
+TEST_F(GuardedMemory, GuardsThatGoMakeRoomForOthers) {
+  std::vector<MemoryGuard> guards;
+  for (std::size_t i = 0; i < MemoryGuard::kMost; ++i) EXPECT_TRUE(guards.emplace_back(memory));
+  EXPECT_FALSE(MemoryGuard(memory));
+  guards.clear();
+  EXPECT_FALSE(MemoryGuard::mend(memory.data()));
+  MemoryGuard first(memory);
+  const MemoryGuard sut(std::move(first));
+  EXPECT_TRUE(sut);
+  resize(0);
+  EXPECT_EQ(look(), std::byte{0});
+  EXPECT_TRUE(sut.lost());
+}
+
+}  // namespace
+}  // namespace plchost
