@@ -80,7 +80,7 @@ std::string_view cut(std::string_view text, std::size_t most) noexcept {
 }
 
 std::string_view shown(std::string_view text) noexcept {
-  return cut(text, kShown);
+  return cut(text, kShownBytes);
 }
 
 std::string join_some(std::span<const std::string> names) {

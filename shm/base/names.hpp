@@ -41,7 +41,7 @@ inline constexpr std::size_t kMaxPath = 255;
 [[nodiscard]] std::string_view cut(std::string_view text, std::size_t most) noexcept;
 
 /// Of a stranger's name or value, this much is told.
-inline constexpr std::size_t kShown = 80;
+inline constexpr std::size_t kShownBytes = 80;
 [[nodiscard]] std::string_view shown(std::string_view text) noexcept;
 
 /// "a, b, c and 7 more", for lists that a stranger wrote: the first kShownNames, each as shown() cuts it.

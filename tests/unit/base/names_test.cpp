@@ -58,7 +58,7 @@ TEST(Names, CutsBetweenCharacters) {
   EXPECT_EQ(cut("abcd", 3), "abc");
   EXPECT_EQ(cut("ab\xc3\xa4", 3), "ab");
   EXPECT_EQ(cut("\x80\x80\x80\x80\x80\x80\x80\x80", 6).size(), 2U) << "no UTF-8 at all";
-  EXPECT_EQ(shown(std::string(1000, 'x')).size(), kShown);
+  EXPECT_EQ(shown(std::string(1000, 'x')).size(), kShownBytes);
 }
 
 TEST(Names, JoinsTheFirstOfALongList) {
