@@ -30,12 +30,12 @@ Result<void> CmpSchedule::prepare() {
   return ticker_.prepare();
 }
 
-void CmpSchedule::start(TimePoint origin) noexcept {
-  if (!needs_tick()) return;
+bool CmpSchedule::start(TimePoint origin) noexcept {
+  if (!needs_tick()) return true;
   // What was due before the first tick, while a switch was under way, is only late and runs at once.
   const TimePoint first = ticker_.first_tick(origin);
   table_.start(first - settings_.scheduler_interval);
-  ticker_.start(first);
+  return ticker_.start(first);
 }
 
 void CmpSchedule::on_tick(TimePoint tick) noexcept {

@@ -20,8 +20,8 @@ class CmpSchedule final : public Scheduler {
   }
   [[nodiscard]] Result<std::unique_ptr<ActivationSource>> source_for(Task& task) override;
   [[nodiscard]] Result<void> prepare() override;
-  void start(TimePoint origin) noexcept override;
-  void stop() noexcept override { ticker_.stop(); }
+  [[nodiscard]] bool start(TimePoint origin) noexcept override;
+  [[nodiscard]] bool stop(TimePoint deadline) noexcept override { return ticker_.stop(deadline); }
 
  private:
   [[nodiscard]] bool needs_tick() const noexcept { return !table_.empty() || !poller_.empty(); }

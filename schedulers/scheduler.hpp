@@ -68,6 +68,10 @@ struct SchedulerCapabilities {
   bool external_event_breakpoints = false;
 };
 
+/// Beyond this an event variable that is read is taken for one that never returns. It is above the time of
+/// the watchdog, which knows more.
+inline constexpr Duration kVariablePatience = std::chrono::seconds(3);
+
 /// Policy only: decides when which task is activated. Threads, statistics and the switch are TaskSet's.
 /// Life: source_for() for each task, prepare(), start(), stop(); then it is done with.
 class Scheduler {
@@ -82,10 +86,13 @@ class Scheduler {
   [[nodiscard]] virtual Result<void> prepare() = 0;
   /// Set-up. Ticks and polls lie on the grid origin + n * scheduler_interval. Grids of tasks are the tasks'
   /// own.
-  virtual void start(TimePoint origin) noexcept = 0;
-  /// Ends the scheduler's own threads; after it, nothing of a task is touched any more. Sources may still be
-  /// waited on and are then only left by interrupt(). Set-up; may be called again, and without a start().
-  virtual void stop() noexcept = 0;
+  /// false: an event variable has not returned from being read for the first time, for kVariablePatience.
+  [[nodiscard]] virtual bool start(TimePoint origin) noexcept = 0;
+  /// Ends the scheduler's own threads; waits for that, at most until `deadline` (real time). true: nothing of
+  /// a task is touched any more. Sources may still be waited on and are then only left by interrupt(). false:
+  /// not yet, as long as an event variable does not return. Set-up; may be called again, and without a
+  /// start().
+  [[nodiscard]] virtual bool stop(TimePoint deadline) noexcept = 0;
 };
 
 /// A scheduler that can be chosen by name. A new one is a file of its own and a line in registry.cpp.

@@ -31,10 +31,11 @@ Result<void> SelfTimedScheduler::prepare() {
   return ticker_.prepare();
 }
 
-void SelfTimedScheduler::start(TimePoint origin) noexcept {
+bool SelfTimedScheduler::start(TimePoint origin) noexcept {
+  if (poller_.empty()) return true;
   // Between the releases of the cyclic tasks: at the same instant the poll, which goes first, would delay
   // them.
-  if (!poller_.empty()) ticker_.start(ticker_.first_tick(origin) + settings_.scheduler_interval / 2);
+  return ticker_.start(ticker_.first_tick(origin) + settings_.scheduler_interval / 2);
 }
 
 }  // namespace plchost

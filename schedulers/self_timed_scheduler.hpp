@@ -13,8 +13,8 @@ class SelfTimedScheduler : public Scheduler {
 
   [[nodiscard]] Result<std::unique_ptr<ActivationSource>> source_for(Task& task) final;
   [[nodiscard]] Result<void> prepare() final;
-  void start(TimePoint origin) noexcept final;
-  void stop() noexcept final { ticker_.stop(); }
+  [[nodiscard]] bool start(TimePoint origin) noexcept final;
+  [[nodiscard]] bool stop(TimePoint deadline) noexcept final { return ticker_.stop(deadline); }
 
  protected:
   [[nodiscard]] virtual Result<std::unique_ptr<ActivationSource>> cyclic_source(const Task& task) = 0;

@@ -97,11 +97,12 @@ void raise_current_exception(TaskFault& fault, bool event_variable) noexcept {
   fault.publish();
 }
 
-void raise_stop_timeout(TaskFault& fault, StopPhase phase, Duration limit) noexcept {
+void raise_stop_timeout(TaskFault& fault, StopPhase phase, Duration limit, bool event_variable) noexcept {
   if (!fault.claim(true)) return;
   FaultRecord& record = fault.record();
   record.kind = FaultKind::stop_timeout;
   record.phase = phase;
+  record.in_event_variable = event_variable;
   record.limit = limit.count();
   fault.publish();
 }
@@ -158,8 +159,10 @@ std::string describe_fault(const FaultRecord& record) {
       return fmt::format("the instance used {} % of its core; the limit is {} %. This task used the most",
                          record.figure, record.limit);
     case FaultKind::stop_timeout:
-      return fmt::format("not at the end of its cycle after {:.0f} ms, the limit of {}", ms(record.limit),
-                         name_of(record.phase));
+      return fmt::format(
+          "{} after {:.0f} ms, the limit of {}",
+          record.in_event_variable ? "its event variable has not returned" : "not at the end of its cycle",
+          ms(record.limit), name_of(record.phase));
   }
   return "unknown";
 }

@@ -101,9 +101,11 @@ class TaskFault {
 /// Within a catch (...): raises the fault for the exception that is being handled. Real-time.
 void raise_current_exception(TaskFault& fault, bool event_variable = false) noexcept;
 
-/// The task has not come to the end of its cycle within `limit`: raises the fault, and whatever its policy
-/// says no task begins another cycle. Nothing happens if a fault was raised before. Control thread.
-void raise_stop_timeout(TaskFault& fault, StopPhase phase, Duration limit) noexcept;
+/// The task has not come to the end of its cycle, or its event variable has not returned, within `limit`:
+/// raises the fault, and whatever its policy says no task begins another cycle. Nothing happens if a fault
+/// was raised before. Control thread.
+void raise_stop_timeout(TaskFault& fault, StopPhase phase, Duration limit,
+                        bool event_variable = false) noexcept;
 
 /// In words: what happened, with its figures. Without addresses, which only the process can name.
 [[nodiscard]] std::string describe_fault(const FaultRecord& record);

@@ -22,7 +22,7 @@ TaskSet::TaskSet(Clock& clock, PriorityBand band, TaskEnvironment environment, U
 
 TaskSet::~TaskSet() {
   if (supervision_ && running_) supervision_->tasks_stop();
-  if (active_ && active_->scheduler) active_->scheduler->stop();
+  if (active_) (void)active_->ended(kNoDeadline);
   for (auto& thread : threads_) thread->park();  // all at once; their destructors then wait one by one
 }
 
@@ -106,11 +106,14 @@ Result<void> TaskSet::check_startable() {
   if (running_) return failure(ErrorCode::wrong_state, "the tasks are running already");
   if (const auto busy = wait_until_settled(TimePoint{}); !busy.empty()) {
     return failure(ErrorCode::wrong_state,
-                   fmt::format("still in the cycle in which it was to stop: task {}", join_names(busy)));
+                   fmt::format("has not come back since it was to stop: task {}", join_names(busy)));
   }
   if (const auto faulty = tasks_in_exception(); !faulty.empty()) {
     return failure(ErrorCode::wrong_state,
                    fmt::format("in exception: task {}; reset first", join_names(faulty)));
+  }
+  if (!retired_.empty()) {
+    return failure(ErrorCode::wrong_state, "the thread of the scheduler before has not ended yet");
   }
   return {};
 }
@@ -128,7 +131,7 @@ Result<void> TaskSet::start(std::string_view scheduler, const SchedulerSettings&
   for (auto& task : tasks_) task->begin(origin_);
   running_ = true;
   watch(settings);
-  active_->scheduler->start(origin_);
+  start_scheduler();
   hand_out_sources();
   (void)wait_until_settled(MonotonicClock::now() + kSwitchPatience);
   return {};
@@ -145,16 +148,51 @@ Result<void> TaskSet::switch_to(std::string_view scheduler, const SchedulerSetti
     // Only one of the two may look at event variables at a time; what is due in between is late. Nothing but
     // the tasks themselves may make that longer.
     const RaisedPriority raised(environment_.allow_unprivileged ? ThreadPriority{} : switch_priority(band_));
-    active_->scheduler->stop();
+    if (auto ended = end_scheduler(); !ended) return ended;
     retired_.push_back(std::exchange(active_, std::move(*arrangement)));
     tick_ = active_->tick;
     watch(settings);
     distributed_clock_.set_steering(active_->scheduler->capabilities().one_shot);
-    active_->scheduler->start(origin_);
+    start_scheduler();
     hand_out_sources();
   }
   (void)wait_until_settled(MonotonicClock::now() + kSwitchPatience);
   return {};
+}
+
+void TaskSet::start_scheduler() {
+  if (active_->scheduler->start(origin_)) return;
+  if (const auto late = task_in_variable()) raise_late_variable(*late);
+}
+
+// For a switch.
+Result<void> TaskSet::end_scheduler() {
+  while (!active_->ended(MonotonicClock::now() + kVariablePatience)) {
+    const auto late = task_in_variable();
+    if (!late) continue;
+    raise_late_variable(*late);
+    return failure(ErrorCode::timed_out, fmt::format("the event variable of task '{}' does not return",
+                                                     tasks_[*late]->config().name));
+  }
+  return {};
+}
+
+// Whose event variable the scheduler's thread reads just now.
+std::optional<std::size_t> TaskSet::task_in_variable() const noexcept {
+  if (!poll_trap_.running_since()) return std::nullopt;
+  const auto read =
+      std::ranges::find(tasks_, poll_trap_.fault(), [](const auto& task) { return &task->fault(); });
+  if (read == tasks_.end()) return std::nullopt;
+  return static_cast<std::size_t>(read - tasks_.begin());
+}
+
+void TaskSet::raise_late_variable(std::size_t task) {
+  TaskFault& fault = tasks_[task]->fault();
+  if (!fault.claim(true)) return;
+  fault.record().kind = FaultKind::task_watchdog;
+  fault.record().in_event_variable = true;
+  fault.record().figure = fault.record().limit = kVariablePatience.count();
+  fault.publish();
 }
 
 // Before anything is released: the first cycle may be an endless one, and then nobody else comes to run here.
@@ -200,8 +238,15 @@ void TaskSet::report(std::size_t index, bool running) {
   if (environment_.state_changed) environment_.state_changed(index, running);
 }
 
-// The names of the tasks that are not settled at the deadline. If there are none, what was before is free to
-// go.
+// What was before is free to go when no thread uses it any more.
+bool TaskSet::let_retired_go() {
+  if (!std::ranges::all_of(retired_, [](const auto& before) { return before->ended(TimePoint{}); }))
+    return false;
+  retired_.clear();
+  return true;
+}
+
+// The names of the tasks that are not settled at the deadline, in their cycles or in an event variable.
 std::vector<std::string_view> TaskSet::wait_until_settled(TimePoint deadline) {
   std::vector<std::string_view> busy;
   for (std::size_t i = 0; i < threads_.size(); ++i) {
@@ -211,7 +256,11 @@ std::vector<std::string_view> TaskSet::wait_until_settled(TimePoint deadline) {
       report(i, running_);
     }
   }
-  if (busy.empty()) retired_.clear();
+  for (auto& before : retired_) {
+    if (before->ended(deadline)) continue;
+    if (const auto late = task_in_variable()) busy.emplace_back(tasks_[*late]->config().name);
+  }
+  if (busy.empty()) (void)let_retired_go();
   return busy;
 }
 

@@ -75,7 +75,8 @@ class TaskSet {
 
   /// Releases the tasks under the scheduler of that name. wrong_state: they run already, or one of them has
   /// not come back since stop(), or is in exception. External events posted while the tasks were stopped are
-  /// not run, nor are edges of event variables: the level at the start counts as seen.
+  /// not run, nor are edges of event variables: the level at the start counts as seen. An event variable that
+  /// does not return from being read for the first time puts its task into exception.
   [[nodiscard]] Result<void> start(std::string_view scheduler, const SchedulerSettings& settings);
   /// Parks all tasks at the end of their cycles, those that drive outputs first. Waits, at most `limit` (real
   /// time, from when all were asked to) for each of the two phases; longer only for a task in no cycle.
@@ -87,6 +88,10 @@ class TaskSet {
   /// Looks how far the stop is, and goes on to its second phase. Nothing: it is not over yet. Else it is: the
   /// tasks that have not come back in time.
   [[nodiscard]] std::optional<std::vector<std::size_t>> advance_stop();
+  /// Of the last stop: the one of the tasks that have not come back that did not because its event variable
+  /// has not returned. Nothing ends the thread that reads it; as long as it does not itself, start() is
+  /// refused.
+  [[nodiscard]] std::optional<std::size_t> late_variable() const noexcept { return late_variable_; }
   [[nodiscard]] bool stop_begun() const noexcept { return stop_.has_value(); }
   /// Stops without waiting for any cycle, also if a stop is under way. For what went wrong.
   void park_all();
@@ -102,7 +107,8 @@ class TaskSet {
   /// "Main, Report"
   [[nodiscard]] std::string names_of(const std::vector<std::size_t>& tasks) const;
   /// Exchanges the scheduler. Running tasks keep their grid, their backlog of events, counters and variables.
-  /// On failure they run on under the old one. wrong_state: they do not run.
+  /// On failure they run on under the old one. wrong_state: they do not run. timed_out: an event variable
+  /// does not return, which puts its task, and all, into exception.
   [[nodiscard]] Result<void> switch_to(std::string_view scheduler, const SchedulerSettings& settings);
 
   /// In the order in which they were given. What may be called on a task from which context: see Task.
@@ -150,9 +156,9 @@ class TaskSet {
     Arrangement(const Arrangement&) = delete;
     Arrangement& operator=(const Arrangement&) = delete;
     // The scheduler's threads use the sources.
-    ~Arrangement() {
-      if (scheduler) scheduler->stop();
-    }
+    ~Arrangement() { (void)ended(kNoDeadline); }
+    /// Asks its threads to end. false: one is still in an event variable.
+    [[nodiscard]] bool ended(TimePoint deadline) noexcept { return !scheduler || scheduler->stop(deadline); }
     std::unique_ptr<Scheduler> scheduler;  // or a single cycle
     std::unique_ptr<SingleCycle> single_cycle;
     TickChoice tick;
@@ -183,6 +189,12 @@ class TaskSet {
   std::vector<std::size_t> busy_in_phase();
   [[nodiscard]] bool in_cycle(std::size_t task) const noexcept;
   [[nodiscard]] bool phase_over(const std::vector<std::size_t>& busy);
+  void give_up(std::vector<std::size_t> busy);
+  [[nodiscard]] std::optional<std::size_t> task_in_variable() const noexcept;
+  void start_scheduler();
+  [[nodiscard]] Result<void> end_scheduler();
+  void raise_late_variable(std::size_t task);
+  [[nodiscard]] bool let_retired_go();
   std::vector<std::string_view> wait_until_settled(TimePoint deadline);
 
   Clock& clock_;
@@ -195,6 +207,7 @@ class TaskSet {
   bool running_ = false;
   DistributedClock distributed_clock_;
   std::optional<Stop> stop_;
+  std::optional<std::size_t> late_variable_;
   TimePoint origin_;  // of all grids, until the next start()
   std::string_view scheduler_name_;
   std::vector<std::unique_ptr<Task>> tasks_;

@@ -22,6 +22,7 @@ Result<void> TaskSet::begin_stop(const StopLimits& limits) {
   if (stop_) return failure(ErrorCode::wrong_state, "the tasks are being stopped already");
   stop_ = Stop{
       .limits = limits, .others = false, .hurried = false, .deadline = {}, .judged_from = {}, .stuck = {}};
+  late_variable_.reset();
   // From now on releases are missed on purpose; cycles that run are watched on.
   if (supervision_) supervision_->tasks_stop();
   park_tasks(true);
@@ -45,10 +46,10 @@ void TaskSet::park_tasks(bool that_drive_outputs) {
 void TaskSet::begin_second_phase() {
   stop_->others = true;
   stop_->judged_from = {};
-  if (active_->scheduler) active_->scheduler->stop();
+  // Before the tasks, so that nothing releases them; but what is in an event variable gets the phase's time.
+  (void)active_->ended(MonotonicClock::now() + kSecondLook);
   park_tasks(false);
   stop_->deadline = MonotonicClock::now() + stop_->limits.others;
-  if (tick_.device) tick_.device->halt();
 }
 
 // The tasks of this phase that have not parked yet.
@@ -72,13 +73,24 @@ bool TaskSet::in_cycle(std::size_t task) const noexcept {
 // Nobody is stuck at the first look after the deadline: the whole host, or this core, may have stood still
 // until then. A task that is between two cycles only waits for the processor.
 bool TaskSet::phase_over(const std::vector<std::size_t>& busy) {
-  if (busy.empty() || stop_->hurried) return true;
+  const bool ended = !stop_->others || active_->ended(TimePoint{});
+  if ((busy.empty() && ended) || stop_->hurried) return true;
   const TimePoint now = MonotonicClock::now();
   if (now < stop_->deadline) return false;
   if (!stop_->judged_from) stop_->judged_from = now + kSecondLook;
   if (now < *stop_->judged_from) return false;
   return now >= *stop_->judged_from + kIdlePatience ||
-         std::ranges::all_of(busy, [&](std::size_t task) { return in_cycle(task); });
+         ((ended || task_in_variable()) &&
+          std::ranges::all_of(busy, [&](std::size_t task) { return in_cycle(task); }));
+}
+
+// Nobody waits for these any longer.
+void TaskSet::give_up(std::vector<std::size_t> busy) {
+  if (stop_->others && !active_->ended(TimePoint{})) late_variable_ = task_in_variable();
+  if (stop_->others && late_variable_) busy.push_back(*late_variable_);
+  for (const std::size_t task : busy) {
+    if (std::ranges::find(stop_->stuck, task) == stop_->stuck.end()) stop_->stuck.push_back(task);
+  }
 }
 
 std::optional<std::vector<std::size_t>> TaskSet::advance_stop() {
@@ -86,18 +98,16 @@ std::optional<std::vector<std::size_t>> TaskSet::advance_stop() {
   for (;;) {
     const auto busy = busy_in_phase();
     if (!phase_over(busy)) return std::nullopt;
-    stop_->stuck.insert(stop_->stuck.end(), busy.begin(), busy.end());
+    give_up(busy);
     if (stop_->others) break;
     begin_second_phase();
   }
   auto stuck = std::move(stop_->stuck);
   stop_.reset();
+  if (tick_.device && active_->ended(TimePoint{})) tick_.device->halt();
   retired_.push_back(std::move(active_));
   running_ = false;
-  if (stuck.empty()) {
-    retired_.clear();
-    if (supervision_) supervision_->end();
-  }
+  if (stuck.empty() && let_retired_go() && supervision_) supervision_->end();
   return stuck;
 }
 
@@ -119,7 +129,12 @@ Result<void> TaskSet::stop(Duration limit) {
                                  names_of(*stuck)));
     }
     const auto busy = busy_in_phase();
-    if (!busy.empty()) (void)threads_[busy.front()]->settled(MonotonicClock::now() + kLook);
+    const TimePoint next_look = MonotonicClock::now() + kLook;
+    if (!busy.empty()) {
+      (void)threads_[busy.front()]->settled(next_look);
+    } else if (stop_->others) {
+      (void)active_->ended(next_look);
+    }
   }
 }
 

@@ -31,21 +31,26 @@ TimePoint Ticker::first_tick(TimePoint origin) const noexcept {
   return origin + (since + period_ - Duration(1)) / period_ * period_;
 }
 
-void Ticker::start(TimePoint first) noexcept {
+bool Ticker::start(TimePoint first) noexcept {
   first_ = first;
   go_.open(clock_);
   constexpr Duration kLook = std::chrono::milliseconds(10);
+  const TimePoint deadline = MonotonicClock::now() + kVariablePatience;
   while (primed_.load(std::memory_order_acquire) == 0 && !poller_.parked()) {
-    futex_wait(&primed_, 0, MonotonicClock::now() + kLook);
+    const TimePoint now = MonotonicClock::now();
+    if (now >= deadline) return false;
+    futex_wait(&primed_, 0, std::min(deadline, now + kLook));
   }
+  return true;
 }
 
-void Ticker::stop() noexcept {
-  if (!thread_.joinable()) return;
-  stopping_.store(true, std::memory_order_release);
-  go_.interrupt(clock_);
-  source_->interrupt();
-  thread_.join_unless([this] { return poller_.parked(); });
+bool Ticker::stop(TimePoint deadline) noexcept {
+  if (!thread_.joinable()) return true;
+  if (!stopping_.exchange(true, std::memory_order_acq_rel)) {
+    go_.interrupt(clock_);
+    source_->interrupt();
+  }
+  return thread_.join_until(deadline, [this] { return poller_.parked(); });
 }
 
 void Ticker::run() noexcept {

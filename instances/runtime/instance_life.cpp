@@ -94,14 +94,16 @@ void Instance::finish_transition(const std::vector<std::size_t>& stuck) {
   enter_exception(fmt::format("stop_timeout: not at the end of its cycle: task {}", fmt::join(late, ", ")));
 }
 
-// "Main (after 200 ms)"
+// "Main (after 200 ms)", "Edge (its event variable, after 200 ms)"
 std::string Instance::time_out(std::size_t task) {
   const TaskConfig& config = tasks_->task(task).config();
-  StopPhase phase = config.drives_outputs ? StopPhase::outputs : StopPhase::others;
+  // The thread that reads event variables runs on until the second phase, whatever the task.
+  const bool variable = tasks_->late_variable() == task;
+  StopPhase phase = config.drives_outputs && !variable ? StopPhase::outputs : StopPhase::others;
   if (life_.state() == ApplicationState::single_cycle) phase = StopPhase::single_cycle;
   const Duration limit = phase == StopPhase::outputs ? settings_.stop.outputs : settings_.stop.others;
-  raise_stop_timeout(tasks_->task(task).fault(), phase, limit);
-  return fmt::format("{} (after {} ms)", config.name, in_ms(limit));
+  raise_stop_timeout(tasks_->task(task).fault(), phase, limit, variable);
+  return fmt::format("{} ({}after {} ms)", config.name, variable ? "its event variable, " : "", in_ms(limit));
 }
 
 void Instance::enter_exception(const std::string& reason) {

@@ -15,6 +15,7 @@
 #include <unistd.h>
 
 #include "shm/base/cpu_list.hpp"
+#include "shm/base/futex.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/time.hpp"
 
@@ -109,14 +110,24 @@ void Thread::join() noexcept {
 }
 
 void Thread::join_unless(const std::function<bool()>& abandoned) noexcept {
-  if (!std::exchange(running_, false)) return;
+  (void)join_until(kNoDeadline, abandoned);
+}
+
+bool Thread::join_until(TimePoint deadline, const std::function<bool()>& abandoned) noexcept {
   constexpr Duration kLook = std::chrono::milliseconds(10);
-  for (;;) {
-    const timespec until = to_timespec(Duration(unix_time_ns()) + kLook);
-    if (pthread_timedjoin_np(handle_, nullptr, &until) != ETIMEDOUT) return;
-    if (abandoned()) break;
+  while (running_) {
+    const Duration left = std::clamp(deadline - MonotonicClock::now(), Duration::zero(), kLook);
+    const timespec until = to_timespec(Duration(unix_time_ns()) + left);
+    if (pthread_timedjoin_np(handle_, nullptr, &until) != ETIMEDOUT) {
+      running_ = false;
+    } else if (abandoned()) {
+      pthread_detach(handle_);
+      running_ = false;
+    } else if (left == Duration::zero()) {
+      return false;
+    }
   }
-  pthread_detach(handle_);
+  return true;
 }
 
 Result<Thread> Thread::start(const std::string& name, ThreadPriority priority, std::function<void()> body) {

@@ -163,6 +163,97 @@ TEST_P(Stop, GivesUpOnATaskThatNeverGetsTheProcessor) {
   EXPECT_GE(MonotonicClock::now() - begun, TaskSet::kIdlePatience);
 }
 
+TEST_P(Stop, GoesOnWithoutAnEventVariableThatDoesNotReturn) {
+  std::atomic<bool> endless{false};
+  add("Good", true, [] {});
+  tasks_.add(Tasks<LinuxClock>::event("Fine", [] { return false; }, [] {}));
+  tasks_.add(
+      Tasks<LinuxClock>::event("Edge", [&] { return (endless ? other_.hold() : void()), false; }, [] {}));
+  start();
+  endless = true;
+  wait_for([&] { return other_.inside > 0; });
+  ASSERT_TRUE(tasks_.set->begin_stop({.outputs = milliseconds(20), .others = milliseconds(50)}));
+  EXPECT_THAT(finish_stop(), ElementsAre(2));
+  EXPECT_EQ(tasks_.set->late_variable(), 2U);
+  EXPECT_THAT(tasks_.set->still_busy(TimePoint{}), ElementsAre("Edge"));
+  const auto again = tasks_.set->start(GetParam(), {});
+  ASSERT_FALSE(again);
+  EXPECT_EQ(again.error().code, ErrorCode::wrong_state);
+  EXPECT_THAT(again.error().message, testing::HasSubstr("Edge"));
+  endless = false;
+  release();
+  wait_for([&] { return tasks_.set->start(GetParam(), {}).has_value(); });
+  EXPECT_TRUE(tasks_.set->stop(seconds(100)));
+  EXPECT_EQ(tasks_.set->late_variable(), std::nullopt);
+}
+
+TEST_P(Stop, WaitsForAnEventVariableThatReturnsInTime) {
+  tasks_.add(Tasks<LinuxClock>::event("Edge", [&] { return other_.hold(), false; }, [] {}));
+  other_.let_go = true;
+  start();
+  other_.let_go = false;
+  const int before = other_.inside;
+  wait_for([&] { return other_.inside > before; });
+  ASSERT_TRUE(tasks_.set->begin_stop({.outputs = seconds(100), .others = seconds(100)}));
+  for (int look = 0; look < 50; ++look) {
+    ASSERT_FALSE(tasks_.set->advance_stop());
+    std::this_thread::sleep_for(milliseconds(1));
+  }
+  release();
+  EXPECT_THAT(finish_stop(), IsEmpty());
+}
+
+TEST_P(Stop, WithoutWaitingLeavesAnEventVariableAlone) {
+  tasks_.add(Tasks<LinuxClock>::event("Edge", [&] { return other_.hold(), false; }, [] {}));
+  other_.let_go = true;
+  start();
+  other_.let_go = false;
+  const int before = other_.inside;
+  wait_for([&] { return other_.inside > before; });
+  tasks_.set->park_all();
+  EXPECT_FALSE(tasks_.set->running());
+  EXPECT_THAT(tasks_.set->still_busy(TimePoint{}), ElementsAre("Edge"));
+  release();
+  EXPECT_THAT(tasks_.set->still_busy(MonotonicClock::now() + seconds(100)), IsEmpty());
+}
+
+class EndlessVariable : public Stop {
+ protected:
+  void expect_exception() {
+    const auto fault = tasks_.set->take_fault();
+    ASSERT_TRUE(fault);
+    EXPECT_EQ(fault->name, "Edge");
+    EXPECT_TRUE(fault->whole_application);
+    EXPECT_THAT(describe_fault(fault->record), testing::HasSubstr("still running in its event variable"));
+    tasks_.set->park_all();
+    EXPECT_FALSE(tasks_.set->start(GetParam(), {}));
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(Schedulers, EndlessVariable, testing::ValuesIn(every_scheduler()),
+                         scheduler_test_name);
+
+TEST_P(EndlessVariable, IsAFaultWhenItIsReadForTheFirstTime) {
+  add("Good", true, [] {});
+  tasks_.add(Tasks<LinuxClock>::event("Edge", [&] { return other_.hold(), false; }, [] {}));
+  start();
+  expect_exception();
+}
+
+TEST_P(EndlessVariable, IsAFaultInASwitch) {
+  tasks_.add(Tasks<LinuxClock>::event("Edge", [&] { return other_.hold(), false; }, [] {}));
+  other_.let_go = true;
+  start();
+  other_.let_go = false;
+  const int before = other_.inside;
+  wait_for([&] { return other_.inside > before; });
+  const auto switched = tasks_.set->switch_to("CmpSchedule", {});
+  ASSERT_FALSE(switched);
+  EXPECT_EQ(switched.error().code, ErrorCode::timed_out);
+  EXPECT_THAT(switched.error().message, testing::HasSubstr("Edge"));
+  expect_exception();
+}
+
 TEST_P(Stop, IsRefusedWhileTheTasksAreStopped) {
   add("Good", true, [] {});
   start();

@@ -154,6 +154,31 @@ TEST_F(LifeInProcess, GoesToExceptionByAnotherTaskThatDoesNotStop) {
   expect_exception_of("Other");
 }
 
+TEST_F(LifeInProcess, GoesToExceptionByAnEventVariableThatDoesNotReturnInAStop) {
+  start({.outputs_ms = 200, .others_ms = 300}, "");
+  EXPECT_EQ(sut_->event("hold_variable").post(), PostResult::posted);
+  EXPECT_TRUE(eventually([&] { return cycles("HoldVariable") == 1; }));
+  std::this_thread::sleep_for(20ms);  // twenty polls
+  expect_refused(ControlVerb::stop, ErrorCode::timed_out, "task Edge (its event variable, after 300 ms)");
+  ASSERT_EQ(exceptions().size(), 1U);
+  EXPECT_EQ(exceptions()[0].kind, "stop timeout");
+  EXPECT_EQ(exceptions()[0].task, "Edge");
+  EXPECT_THAT(exceptions()[0].text, HasSubstr("its event variable has not returned after 300 ms"));
+  expect_exception_of("Edge");
+}
+
+TEST_F(LifeInProcess, GoesToExceptionByAnEventVariableThatDoesNotReturnAtTheStart) {
+  ::setenv("PLC_HOLD_VARIABLE", "1", 1);
+  start({.outputs_ms = 200, .others_ms = 300}, "", {"--stopped"});
+  ::unsetenv("PLC_HOLD_VARIABLE");
+  EXPECT_EQ(sut_->ask(ControlVerb::start).code, ErrorCode::ok);
+  EXPECT_TRUE(wait_for(ApplicationState::exception));
+  ASSERT_EQ(exceptions().size(), 1U);
+  EXPECT_EQ(exceptions()[0].task, "Edge");
+  EXPECT_THAT(exceptions()[0].text, HasSubstr("still running in its event variable after 3000"));
+  expect_exception_of("Edge");
+}
+
 TEST_F(LifeInProcess, KeepsAnExceptionForEachTaskThatDoesNotStop) {
   start({.outputs_ms = 100, .others_ms = 200}, "");
   hold("Output");

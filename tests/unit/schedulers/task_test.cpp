@@ -267,6 +267,16 @@ TEST_F(TaskTest, StopTimeoutTellsItsPhase) {
             "not at the end of its cycle after 25000 ms, the limit of a single cycle of all tasks");
 }
 
+TEST_F(TaskTest, StopTimeoutTellsThatAnEventVariableHasNotReturned) {
+  FaultBoard board;
+  Task sut(clock, cyclic(), statistics, nullptr, &board);
+  raise_stop_timeout(sut.fault(), StopPhase::others, milliseconds(800), true);
+  EXPECT_EQ(
+      describe_fault(*sut.fault().published()),
+      "its event variable has not returned after 800 ms, the limit of the second phase of a stop (tasks that "
+      "drive no outputs)");
+}
+
 TEST_F(TaskTest, WatchdogHitsAtTheEndOfTheNthOverrunInARow) {
   TaskConfig config = cyclic();
   config.watchdog = {.time = milliseconds(3), .sensitivity = 3};

@@ -1,6 +1,7 @@
 // Tasks whose cycles can be held, in a loop that sleeps: by external events, or from the first cycle on by a
 // cold start.
 #include <atomic>
+#include <cstdlib>
 #include <ctime>
 
 #include "../../../../instances/plc_app.hpp"
@@ -11,6 +12,7 @@ using namespace std::chrono_literals;
 
 std::atomic<bool> hold_output{false};
 std::atomic<bool> hold_other{false};
+std::atomic<bool> hold_variable{false};
 
 void wait_while(const std::atomic<bool>& held) {
   while (held) {
@@ -25,10 +27,13 @@ void setup(plc::Application& app) {
   app.cyclic("Free", 4, 2ms, [] {});
   app.external("HoldOutput", 0, "hold_output", [] { hold_output = true; });
   app.external("HoldOther", 0, "hold_other", [] { hold_other = true; });
-  app.external("LetGo", 0, "let_go", [] { hold_output = hold_other = false; });
+  app.external("HoldVariable", 0, "hold_variable", [] { hold_variable = true; });
+  app.external("LetGo", 0, "let_go", [] { hold_output = hold_other = hold_variable = false; });
   app.external("LetOutputGo", 0, "let_output_go", [] { hold_output = false; });
+  app.event("Edge", 5, [] { return wait_while(hold_variable), false; }, [] {});
   app.on_exit([] { plc::log("exit"); });
   hold_other = plc_start_kind() == PLC_START_COLD;
+  hold_variable = std::getenv("PLC_HOLD_VARIABLE") != nullptr;
   plc::log("start kind %d", plc_start_kind());
 }
 
