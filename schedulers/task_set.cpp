@@ -258,7 +258,9 @@ std::vector<std::string_view> TaskSet::wait_until_settled(TimePoint deadline) {
   }
   for (auto& before : retired_) {
     if (before->ended(deadline)) continue;
-    if (const auto late = task_in_variable()) busy.emplace_back(tasks_[*late]->config().name);
+    const auto late = task_in_variable();
+    if (!late || std::ranges::find(busy, tasks_[*late]->config().name) != busy.end()) continue;
+    busy.emplace_back(tasks_[*late]->config().name);
   }
   if (busy.empty()) (void)let_retired_go();
   return busy;

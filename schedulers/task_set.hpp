@@ -188,8 +188,7 @@ class TaskSet {
   void park_tasks(bool that_drive_outputs);
   std::vector<std::size_t> busy_in_phase();
   [[nodiscard]] bool in_cycle(std::size_t task) const noexcept;
-  [[nodiscard]] bool phase_over(const std::vector<std::size_t>& busy);
-  void give_up(std::vector<std::size_t> busy);
+  [[nodiscard]] std::optional<std::vector<std::size_t>> stuck_in_phase(const std::vector<std::size_t>& busy);
   [[nodiscard]] std::optional<std::size_t> task_in_variable() const noexcept;
   void start_scheduler();
   [[nodiscard]] Result<void> end_scheduler();

@@ -1,6 +1,7 @@
 // How the tasks of a set come to rest: at the end of their cycles, in two phases; and the single cycle, which
 // ends the same way.
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include <fmt/format.h>
@@ -52,11 +53,12 @@ void TaskSet::begin_second_phase() {
   stop_->deadline = MonotonicClock::now() + stop_->limits.others;
 }
 
-// The tasks of this phase that have not parked yet.
+// The tasks of this phase, or left over from the first one, that have not parked yet.
 std::vector<std::size_t> TaskSet::busy_in_phase() {
   std::vector<std::size_t> busy;
   for (std::size_t i = 0; i < threads_.size(); ++i) {
-    if (tasks_[i]->config().drives_outputs == stop_->others) continue;
+    const bool given_up = std::ranges::find(stop_->stuck, i) != stop_->stuck.end();
+    if (given_up || (!stop_->others && !tasks_[i]->config().drives_outputs)) continue;
     if (threads_[i]->settled(TimePoint{})) {
       report(i, false);
     } else {
@@ -70,35 +72,36 @@ bool TaskSet::in_cycle(std::size_t task) const noexcept {
   return tasks_[task]->trap().running_since().has_value();
 }
 
-// Nobody is stuck at the first look after the deadline: the whole host, or this core, may have stood still
-// until then. A task that is between two cycles only waits for the processor.
-bool TaskSet::phase_over(const std::vector<std::size_t>& busy) {
+// Who is stuck when the phase is over; nothing: it is not. Nobody is at the first look after the deadline:
+// the whole host, or this core, may have stood still until then. A task that is between two cycles only waits
+// for the processor, which somebody who is stuck may keep from it.
+std::optional<std::vector<std::size_t>> TaskSet::stuck_in_phase(const std::vector<std::size_t>& busy) {
   const bool ended = !stop_->others || active_->ended(TimePoint{});
-  if ((busy.empty() && ended) || stop_->hurried) return true;
+  if ((busy.empty() && ended) || stop_->hurried) return busy;
   const TimePoint now = MonotonicClock::now();
-  if (now < stop_->deadline) return false;
+  if (now < stop_->deadline) return std::nullopt;
   if (!stop_->judged_from) stop_->judged_from = now + kSecondLook;
-  if (now < *stop_->judged_from) return false;
-  return now >= *stop_->judged_from + kIdlePatience ||
-         ((ended || task_in_variable()) &&
-          std::ranges::all_of(busy, [&](std::size_t task) { return in_cycle(task); }));
-}
-
-// Nobody waits for these any longer.
-void TaskSet::give_up(std::vector<std::size_t> busy) {
-  if (stop_->others && !active_->ended(TimePoint{})) late_variable_ = task_in_variable();
-  if (stop_->others && late_variable_) busy.push_back(*late_variable_);
-  for (const std::size_t task : busy) {
-    if (std::ranges::find(stop_->stuck, task) == stop_->stuck.end()) stop_->stuck.push_back(task);
+  if (now < *stop_->judged_from) return std::nullopt;
+  std::vector<std::size_t> inside;
+  std::ranges::copy_if(busy, std::back_inserter(inside), [&](std::size_t task) { return in_cycle(task); });
+  const auto variable = task_in_variable();
+  if (!ended && variable) {
+    late_variable_ = variable;
+    if (std::ranges::find(inside, *variable) == inside.end()) inside.push_back(*variable);
   }
+  // The variable is judged in the second phase, and who waits for it goes along.
+  if (!inside.empty() || (!stop_->others && variable)) return inside;
+  if (now < *stop_->judged_from + kIdlePatience) return std::nullopt;
+  return busy;
 }
 
 std::optional<std::vector<std::size_t>> TaskSet::advance_stop() {
   if (!stop_) return std::vector<std::size_t>{};
   for (;;) {
     const auto busy = busy_in_phase();
-    if (!phase_over(busy)) return std::nullopt;
-    give_up(busy);
+    const auto stuck = stuck_in_phase(busy);
+    if (!stuck) return std::nullopt;
+    stop_->stuck.insert(stop_->stuck.end(), stuck->begin(), stuck->end());
     if (stop_->others) break;
     begin_second_phase();
   }

@@ -151,6 +151,34 @@ TEST_P(Stop, WaitsLongerForATaskThatIsInNoCycle) {
   EXPECT_THAT(finish_stop(), IsEmpty());
 }
 
+TEST_P(Stop, BlamesNoIdleTaskForOneThatKeepsTheProcessorFromIt) {
+  TaskConfig config = Tasks<LinuxClock>::cyclic("Idle", milliseconds(1), [] {});
+  config.after_cycle = [this](const TaskCounters&) { other_.hold(); };
+  tasks_.add(std::move(config));
+  add("Endless", false, [this] { output_.hold(); });
+  start();
+  wait_for([&] { return other_.inside > 0 && output_.inside > 0; });
+  ASSERT_TRUE(tasks_.set->begin_stop({.outputs = milliseconds(1), .others = milliseconds(1)}));
+  EXPECT_THAT(finish_stop(), ElementsAre(1));
+  EXPECT_THAT(tasks_.set->still_busy(TimePoint{}), ElementsAre("Idle", "Endless"));
+}
+
+TEST_P(Stop, BlamesTheVariableForTasksOfTheFirstPhaseThatItKeepsTheProcessorFrom) {
+  TaskConfig config = Tasks<LinuxClock>::cyclic("Idle", milliseconds(1), [] {});
+  config.drives_outputs = true;
+  config.after_cycle = [this](const TaskCounters&) { output_.hold(); };
+  tasks_.add(std::move(config));
+  tasks_.add(Tasks<LinuxClock>::event("Edge", [&] { return other_.hold(), false; }, [] {}));
+  other_.let_go = true;
+  start();
+  other_.let_go = false;
+  const int before = other_.inside;
+  wait_for([&] { return output_.inside > 0 && other_.inside > before; });
+  ASSERT_TRUE(tasks_.set->begin_stop({.outputs = milliseconds(1), .others = milliseconds(1)}));
+  EXPECT_THAT(finish_stop(), ElementsAre(1));
+  EXPECT_EQ(tasks_.set->late_variable(), 1U);
+}
+
 TEST_P(Stop, GivesUpOnATaskThatNeverGetsTheProcessor) {
   TaskConfig config = Tasks<LinuxClock>::cyclic("Idle", milliseconds(1), [] {});
   config.after_cycle = [this](const TaskCounters&) { other_.hold(); };
