@@ -206,11 +206,7 @@ Result<std::string> Instance::make_tasks() {
           },
       // Not before: in the first phase of a stop the others run what is posted. Nor later: a task in its last
       // cycle does not, so no poster may be told that it will.
-      .to_park =
-          [this](std::size_t index) {
-            const TaskConfig& task = application_->tasks()[index];
-            if (task.kind == TaskKind::external) host_->events().withdraw_task(task.external_event);
-          },
+      .to_park = [this](std::size_t index) { unbind(index); },
       .catch_faults = true,
   };
   auto tasks = TaskSet::create(clock_, options_.band, application_->tasks(), std::move(environment));

@@ -108,6 +108,7 @@ class Instance {
   // The life of the application: instance_life.cpp
   [[nodiscard]] ApplicationLife::Record recorder();
   [[nodiscard]] Result<std::string> start(std::string_view why);
+  void unbind(std::size_t index);
   void begin_stop(std::string_view why);
   [[nodiscard]] Result<std::string> begin_single_cycle();
   [[nodiscard]] bool in_transition() const noexcept;
@@ -142,6 +143,7 @@ class Instance {
   std::optional<InstanceSocket> control_;
   std::optional<TransitionRing> transitions_;
   ApplicationLife life_;
+  std::vector<bool> unbound_;  // tasks of external events that run nothing any more, since the last start
   std::optional<Waiting> waiting_;
   TimePoint single_cycle_ends_;  // at the latest
   bool shutdown_requested_ = false;

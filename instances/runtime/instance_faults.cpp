@@ -37,7 +37,11 @@ ExceptionEntry entry_of(const TaskSet::Fault& fault, const std::string& applicat
 void Instance::serve_faults() {
   while (const auto fault = tasks_->take_fault()) {
     const std::string reason = keep_fault(*fault);
-    if (fault->whole_application) enter_exception(reason);
+    if (fault->whole_application) {
+      enter_exception(reason);
+    } else {
+      unbind(fault->task);  // nobody runs what is posted to it any more
+    }
   }
 }
 

@@ -45,9 +45,18 @@ Result<std::string> Instance::start(std::string_view why) {
     tasks_->park_all();
     return std::unexpected(std::move(bound).error());
   }
+  unbound_.assign(application_->tasks().size(), false);
   life_.go_to(ApplicationState::running,
               fmt::format("{}: {} tasks under {}", why, application_->tasks().size(), scheduler_));
   return {};
+}
+
+// Once for each task: one whose fault has stopped only itself is asked to park, too, in a stop.
+void Instance::unbind(std::size_t index) {
+  const TaskConfig& task = application_->tasks()[index];
+  if (task.kind != TaskKind::external || index >= unbound_.size() || unbound_[index]) return;
+  unbound_[index] = true;
+  host_->events().withdraw_task(task.external_event);
 }
 
 void Instance::begin_stop(std::string_view why) {

@@ -195,6 +195,9 @@ TEST(TaskException, OfATaskByItselfLeavesTheOthersRunning) {
   (void)sut.process().event("divide").post();
   EXPECT_FALSE(sut.exceptions().front().whole_application);
   EXPECT_TRUE(sut.runs("Low"));
+  EXPECT_TRUE(eventually([&] { return sut.process().event("divide").bound_tasks() == 0; }));
+  EXPECT_EQ(sut.process().event("divide").post(), PostResult::no_task) << "nothing runs it any more";
+  EXPECT_EQ(sut.process().event("loop").bound_tasks(), 1U);
   (void)sut.process().event("loop").post();
   EXPECT_EQ(sut.exceptions(2).back().task, "Loop");
   EXPECT_TRUE(sut.runs("Low"));
