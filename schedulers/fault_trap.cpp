@@ -89,11 +89,14 @@ bool TaskFault::claim(bool whole_application) noexcept {
   State none = State::none;
   if (!state_.compare_exchange_strong(none, State::claimed, std::memory_order_acq_rel)) return false;
   if (board_ != nullptr && (whole_application || policy_ == WatchdogPolicy::application)) board_->halt();
+  record_.whole_application = board_ != nullptr && board_->halted();
   record_.unix_ns = unix_time_ns();
   return true;
 }
 
 void TaskFault::publish() noexcept {
+  // First: the control thread may never get to write it down.
+  if (shown_ != nullptr) shown_->write(record_);
   state_.store(State::published, std::memory_order_release);
   if (board_ != nullptr) board_->notify();
 }

@@ -61,6 +61,9 @@ Result<void> TaskSet::add(TaskConfig config) {
       environment_.allow_unprivileged ? ThreadPriority{} : task_priority(band_, config.iec_priority);
   tasks_.push_back(std::make_unique<Task>(clock_, std::move(config), environment_.statistics(tasks_.size()),
                                           event, &fault_board_));
+  if (environment_.fault_record) {
+    tasks_.back()->fault().show_in(&environment_.fault_record(tasks_.size() - 1));
+  }
   if (const TaskConfig& made = tasks_.back()->config(); made.kind == TaskKind::cyclic) {
     tasks_.back()->follow(distributed_clock_.add_follower(made.iec_priority));
   }

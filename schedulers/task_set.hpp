@@ -30,6 +30,9 @@ struct TaskEnvironment {
   std::function<Result<CountedEvent*>(std::string_view event)> find_event;
   /// Zeroed memory for the statistics of task number `index`. It outlives the TaskSet.
   std::function<TaskStatistics&(std::size_t index)> statistics;
+  /// Zeroed memory that shows the fault of task number `index` to other processes. May be empty. It outlives
+  /// the TaskSet.
+  std::function<Seqlock<FaultRecord>&(std::size_t index)> fault_record;
   /// Tells that a task's thread runs cycles (true) or is parked (false). May be empty. Called by the control
   /// thread, from within start(), stop() and switch_to().
   std::function<void(std::size_t index, bool running)> state_changed;

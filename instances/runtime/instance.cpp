@@ -196,6 +196,9 @@ Result<std::string> Instance::make_tasks() {
       .statistics = [this](std::size_t index) -> TaskStatistics& {
         return page_->statistics(static_cast<std::uint32_t>(index));
       },
+      .fault_record = [this](std::size_t index) -> Seqlock<FaultRecord>& {
+        return page_->task(static_cast<std::uint32_t>(index)).fault;
+      },
       .state_changed =
           [this](std::size_t index, bool running) {
             const auto state = running ? PageTaskState::running : PageTaskState::stopped;

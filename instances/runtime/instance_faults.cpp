@@ -1,7 +1,5 @@
 // What an Instance does when one of its tasks has a fault.
 
-#include <csignal>
-
 #include <fmt/format.h>
 
 #include "instances/runtime/instance.hpp"
@@ -14,18 +12,9 @@ namespace {
 
 ExceptionEntry entry_of(const TaskSet::Fault& fault, const std::string& application) {
   const FaultRecord& record = fault.record;
-  // Other signals give the address of the instruction once more.
-  const bool of_memory = record.signal == SIGSEGV || record.signal == SIGBUS;
-  ExceptionEntry entry{.unix_ns = record.unix_ns,
-                       .application = application,
-                       .task = fault.name,
-                       .kind = std::string(to_string(record.kind)),
-                       .whole_application = fault.whole_application,
-                       .signal = record.signal != 0 ? signal_name(record.signal) : std::string(),
-                       .address = record.address,
-                       .symbol = symbol_name(record.address),
-                       .memory_address = of_memory ? record.memory_address : 0,
-                       .text = describe_fault(record)};
+  ExceptionEntry entry = exception_entry(record, application, fault.name);
+  entry.whole_application = fault.whole_application;
+  entry.symbol = symbol_name(record.address);
   if (entry.symbol.empty() && record.caller != 0) {
     entry.symbol = fmt::format("no code; called from {}", symbol_name(record.caller));
   }

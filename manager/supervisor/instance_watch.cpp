@@ -18,13 +18,16 @@ void ManagedInstance::watch_heartbeat(const InstanceRuntime& runtime) {
   }
 }
 
-void ManagedInstance::fall_silent(std::string_view before) {
+void ManagedInstance::fall_silent(std::string_view known) {
   silent_ = true;
-  set_state(Phase::up, InstanceState::exception,
-            fmt::format("its control thread has not answered for {} s: it waits for a lock that a task was "
-                        "caught with, or tasks leave it no processor time{}{}",
-                        std::chrono::duration_cast<std::chrono::seconds>(HeartbeatWatch::kLimit).count(),
-                        before.empty() ? "" : "; ", before));
+  const std::string lost = surroundings_.keep_lost_faults();
+  const std::string_view fault = known.empty() ? lost : known;
+  set_state(
+      Phase::up, InstanceState::exception,
+      fmt::format("{}{}its control thread has not answered for {} s: it waits for a lock that a task was "
+                  "caught with, or tasks leave it no processor time",
+                  fault, fault.empty() ? "" : "; ",
+                  std::chrono::duration_cast<std::chrono::seconds>(HeartbeatWatch::kLimit).count()));
   if (!operation_ || operation_->step != Step::forwarded) return;
   host_.set_timer(std::nullopt);
   finish(ErrorCode::timed_out, fmt::format("it is in exception now: {}; reset it", status_.problem.view()));

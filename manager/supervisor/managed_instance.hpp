@@ -88,6 +88,9 @@ class ManagedInstance : public InstanceEvents {
     std::vector<std::string_view> schedulers;  ///< names that there are
     std::function<TimePoint()> now;
     std::function<void()> changed;  ///< status() is another now; may call release(), nothing else
+    /// Writes down the faults of a process that cannot do so itself, and says the last; empty: there are
+    /// none.
+    std::function<std::string()> keep_lost_faults;
     /// The process has gone from one state to another. What only follows the application's state is told by
     /// the process itself, not here.
     std::function<void(InstanceState from, InstanceState to, std::string_view reason)> transition;
@@ -155,7 +158,7 @@ class ManagedInstance : public InstanceEvents {
 
   // A process that does not answer: instance_watch.cpp
   void watch_heartbeat(const InstanceRuntime& runtime);
-  void fall_silent(std::string_view before);
+  void fall_silent(std::string_view known);
   void answers_again(const InstanceRuntime& runtime);
 
   // Life: managed_instance.cpp

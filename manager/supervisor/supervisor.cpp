@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "manager/config/section_reader.hpp"
+#include "manager/supervisor/lost_faults.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
@@ -24,6 +25,10 @@ Supervisor::Supervisor(const ManagerConfig& config, Surroundings surroundings, c
             .schedulers = surroundings_.schedulers,
             .now = surroundings_.now,
             .changed = [this, i] { changed(i); },
+            .keep_lost_faults =
+                [&host = config.host, &instance] {
+                  return keep_lost_faults(host.pool, host.run_directory, instance.name);
+                },
             .transition =
                 [this, i](InstanceState from, InstanceState to, std::string_view reason) {
                   if (surroundings_.transition) {

@@ -1,5 +1,7 @@
 #include "shm/base/exception_history.hpp"
 
+#include <algorithm>
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -52,12 +54,45 @@ std::unexpected<Error> corrupt(const std::string& path, std::string_view what) {
   return failure(ErrorCode::corrupt, fmt::format("{}: {}", path, what));
 }
 
+// Without a time nothing is known to be the same.
+auto is_of(std::string_view task, std::int64_t unix_ns) {
+  return [=](const ExceptionEntry& entry) {
+    return unix_ns != 0 && entry.unix_ns == unix_ns && entry.task == task;
+  };
+}
+
 }  // namespace
 
+bool ExceptionHistory::has(std::string_view task, std::int64_t unix_ns) const {
+  return std::ranges::any_of(entries, is_of(task, unix_ns));
+}
+
 void ExceptionHistory::add(ExceptionEntry entry) {
+  const auto known = std::ranges::find_if(entries, is_of(entry.task, entry.unix_ns));
+  if (known != entries.end()) {
+    entry.number = known->number;
+    *known = std::move(entry);
+    return;
+  }
   entry.number = ++count;
   entries.push_back(std::move(entry));
   if (entries.size() > kMaxEntries) entries.erase(entries.begin());
+}
+
+ExceptionEntry exception_entry(const FaultRecord& record, std::string_view application,
+                               std::string_view task) {
+  // Other signals give the address of the instruction once more.
+  const bool of_memory = record.signal == SIGSEGV || record.signal == SIGBUS;
+  return {.unix_ns = record.unix_ns,
+          .application = std::string(application),
+          .task = std::string(task),
+          .kind = std::string(to_string(record.kind)),
+          .whole_application = record.whole_application != 0,
+          .signal = record.signal != 0 ? signal_name(record.signal) : std::string(),
+          .address = record.address,
+          .symbol = {},
+          .memory_address = of_memory ? record.memory_address : 0,
+          .text = describe_fault(record)};
 }
 
 std::string exception_path(std::string_view run_directory, std::string_view instance) {

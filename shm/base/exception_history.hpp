@@ -5,6 +5,7 @@
 #include <string_view>
 #include <vector>
 
+#include "shm/base/fault_record.hpp"
 #include "shm/base/result.hpp"
 
 namespace plchost {
@@ -33,9 +34,15 @@ struct ExceptionHistory {
   std::uint64_t count = 0;  ///< of all that ever were
   std::vector<ExceptionEntry> entries;
 
-  /// Numbers it and drops the oldest, if there are too many.
+  /// Numbers it and drops the oldest, if there are too many. One that is there already, by its task and time,
+  /// is replaced: the manager may have found it first, which knows no symbols.
   void add(ExceptionEntry entry);
+  [[nodiscard]] bool has(std::string_view task, std::int64_t unix_ns) const;
 };
+
+/// Without its symbol, which only the process can find.
+[[nodiscard]] ExceptionEntry exception_entry(const FaultRecord& record, std::string_view application,
+                                             std::string_view task);
 
 /// RUN_DIRECTORY/INSTANCE.exception
 [[nodiscard]] std::string exception_path(std::string_view run_directory, std::string_view instance);

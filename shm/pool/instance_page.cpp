@@ -13,7 +13,8 @@ namespace {
 constexpr std::uint64_t kMagic = 0x67617074'736e6970;  // "pinstpag"
 /// 1: first. 2: the interval in force. 3: the tick source. 4: histograms behind the tasks, in two
 /// shapes. 5: the idle states. 6: the distributed clock. 7: state and problem of the application.
-constexpr std::uint32_t kVersion = 8;
+/// 8: why a reference record is not followed. 9: faults.
+constexpr std::uint32_t kVersion = 9;
 constexpr std::size_t kTasksOffset = (sizeof(InstancePageLayout) + 63) / 64 * 64;
 
 static_assert(offsetof(InstancePageLayout, version) == 8 && offsetof(InstancePageLayout, size) == 16);
@@ -189,10 +190,18 @@ std::optional<TaskSnapshot> InstancePageReader::task(std::uint32_t index) const 
   if (index >= task_count_) return std::nullopt;
   const TaskSlot& slot = slot_of(memory_, index);
   const auto counters = slot.counters.read();
-  const auto state = static_cast<PageTaskState>(slot.state.load(std::memory_order_acquire));
+  const bool faulty = slot.fault.sequence() != 0;
+  const auto state = faulty ? PageTaskState::exception
+                            : static_cast<PageTaskState>(slot.state.load(std::memory_order_acquire));
   const bool valid = state <= PageTaskState::exception && slot.identity.kind <= PageTaskKind::freewheeling;
   if (!counters || !valid) return std::nullopt;
   return TaskSnapshot{.identity = slot.identity, .state = state, .counters = *counters};
+}
+
+std::optional<FaultRecord> InstancePageReader::fault(std::uint32_t index) const noexcept {
+  if (index >= task_count_) return std::nullopt;
+  const Seqlock<FaultRecord>& fault = slot_of(memory_, index).fault;
+  return fault.sequence() != 0 ? fault.read() : std::nullopt;
 }
 
 HistogramView InstancePageReader::histogram(std::uint32_t index, TaskHistogram which) const noexcept {

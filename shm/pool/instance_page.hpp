@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "shm/base/fault_record.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/seqlock.hpp"
 #include "shm/base/task_statistics.hpp"
@@ -84,6 +85,7 @@ struct TaskSlot {
   TaskIdentity identity;
   std::atomic<std::uint32_t> state{0};  ///< a PageTaskState
   Seqlock<TaskCounters> counters;
+  Seqlock<FaultRecord> fault;  ///< written once, by who found it; never: it has none
 };
 
 inline constexpr std::uint32_t kMaxTasks = 1024;
@@ -146,6 +148,8 @@ class InstancePageReader {
   /// The histogram as it is now and goes on growing; `index` < task_count().
   [[nodiscard]] HistogramView histogram(std::uint32_t index, TaskHistogram which) const noexcept;
   [[nodiscard]] HistogramShape histogram_shape() const noexcept { return shape_; }
+  /// What put the task into exception; nothing: nothing did.
+  [[nodiscard]] std::optional<FaultRecord> fault(std::uint32_t index) const noexcept;
   /// Changes when the task ran: readers that publish look at this first.
   [[nodiscard]] std::uint64_t task_sequence(std::uint32_t index) const noexcept;
 

@@ -28,6 +28,7 @@ void use(const InstancePageReader& page) {
   for (std::uint32_t i = 0; i < page.task_count() && i < 2; ++i) {
     const auto task = page.task(i);
     (void)page.task_sequence(i);
+    if (const auto fault = page.fault(i)) (void)describe_fault(*fault);
     if (!task) continue;
     const TaskCounters& counters = task->counters;
     (void)task->identity.name.view();

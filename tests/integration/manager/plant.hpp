@@ -53,6 +53,7 @@ class Plant {
   /// Names of ours in /dev/shm and in the run directory.
   std::vector<std::string> leftovers() const;
   [[nodiscard]] std::string log() const;
+  [[nodiscard]] std::string run_directory() const { return folder_ / "run"; }
   [[nodiscard]] const std::string& pool() const { return pool_; }
 
  private:

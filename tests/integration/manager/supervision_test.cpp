@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 
 #include "manager/supervisor/managed_instance.hpp"
+#include "shm/base/exception_history.hpp"
 #include "tests/integration/manager/plant.hpp"
 
 namespace plchost {
@@ -11,6 +12,7 @@ namespace {
 
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::StartsWith;
 
 void kill_process(int pid) {
   auto process = open_process(pid);
@@ -79,7 +81,15 @@ TEST(Manager, LeadsOutOfAFaultThatHoldsTheHeapAsOutOfAnyOther) {
   plant.start_manager();
   ASSERT_TRUE(plant.wait_for("line1", InstanceState::exception));
   const int pid = plant.status("line1").pid;
-  EXPECT_THAT(std::string(plant.status("line1").problem.view()), HasSubstr("its control thread has not"));
+  EXPECT_THAT(std::string(plant.status("line1").problem.view()),
+              StartsWith("task 'DoubleFree': SIGABRT: abort; its control thread has not"));
+  const auto kept = read_exceptions(exception_path(plant.run_directory(), "line1"));
+  ASSERT_TRUE(kept);
+  ASSERT_EQ(kept->entries.size(), 1U);
+  EXPECT_EQ(kept->entries[0].task, "DoubleFree");
+  EXPECT_EQ(kept->entries[0].signal, "SIGABRT");
+  EXPECT_NE(kept->entries[0].address, 0U);
+  EXPECT_GT(kept->entries[0].unix_ns, 0);
   EXPECT_EQ(plant.ask(ControlVerb::start, "line1").code, ErrorCode::wrong_state);
   const TimePoint before = MonotonicClock::now();
   EXPECT_EQ(plant.ask(ControlVerb::reset, "line1").code, ErrorCode::ok);

@@ -49,6 +49,22 @@ TEST_F(ExceptionHistoryTest, KeepsTheLastSixteenAndCountsAll) {
   EXPECT_EQ(sut.entries.back().number, 20U);
 }
 
+TEST_F(ExceptionHistoryTest, HasTheSameFaultOnceWhoeverFoundIt) {
+  ExceptionHistory sut;
+  ExceptionEntry fault = entry("abort");
+  fault.unix_ns = 1000;
+  EXPECT_FALSE(sut.has("Fill", 1000));
+  sut.add(fault);
+  EXPECT_TRUE(sut.has("Fill", 1000));
+  fault.symbol = "fill()+0x12";
+  sut.add(fault);
+  fault.task = "Other";
+  sut.add(fault);
+  EXPECT_EQ(sut.count, 2U);
+  EXPECT_EQ(sut.entries[0].symbol, "fill()+0x12");
+  EXPECT_EQ(sut.entries[0].number, 1U);
+}
+
 TEST_F(ExceptionHistoryTest, IsEmptyWithoutAFile) {
   const auto history = read_exceptions(path_);
   ASSERT_TRUE(history);

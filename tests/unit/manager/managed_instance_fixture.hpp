@@ -35,6 +35,7 @@ class ManagedInstanceTest : public testing::Test {
             .schedulers = {"CmpSchedule", "CmpScheduleTimer"},
             .now = [this] { return now_; },
             .changed = [this] { ++changes_; },
+            .keep_lost_faults = [this] { return lost_fault_; },
             .transition = [this](InstanceState from, InstanceState to,
                                  std::string_view reason) { transitions_.emplace_back(from, to, reason); }},
         host_);
@@ -96,6 +97,7 @@ class ManagedInstanceTest : public testing::Test {
   FakeHost host_;
   TimePoint now_{std::chrono::seconds(1000)};
   int changes_ = 0;
+  std::string lost_fault_;
   std::vector<std::tuple<InstanceState, InstanceState, std::string>> transitions_;
   std::vector<ControlReply> replies_;
   std::optional<ManagedInstance> sut_;

@@ -10,6 +10,7 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::StartsWith;
 
 TEST(HeartbeatWatch, IsSilentWhenTheBeatStandsStillForTheLimit) {
   HeartbeatWatch sut;
@@ -60,6 +61,12 @@ TEST_F(SilentProcess, IsInExceptionAndLeftAlone) {
   EXPECT_EQ(std::get<1>(transitions_.back()), InstanceState::exception) << "it cannot tell this itself";
   EXPECT_TRUE(host_.signals.empty());
   EXPECT_TRUE(host_.requests.empty());
+}
+
+TEST_F(SilentProcess, SaysTheFaultThatTheProcessCouldNotTell) {
+  lost_fault_ = "task 'Main': SIGABRT: abort";
+  bring_up_and_fall_silent();
+  EXPECT_THAT(problem(), StartsWith("task 'Main': SIGABRT: abort; its control thread has not"));
 }
 
 TEST_F(SilentProcess, IsWhatItWasWhenItAnswersAgain) {

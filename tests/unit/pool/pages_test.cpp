@@ -131,6 +131,24 @@ TEST_F(Pages, InstancePageCarriesTasksAndRuntime) {
   EXPECT_EQ(sut->task_sequence(3), 0U);
 }
 
+TEST_F(Pages, InstancePageShowsATaskWithAFaultInException) {
+  auto writer = InstancePage::create(pool(), "line1", tasks_of(2));
+  ASSERT_TRUE(writer);
+  const auto sut = InstancePageReader::open(pool(), "line1");
+  ASSERT_TRUE(sut);
+  EXPECT_FALSE(sut->fault(1));
+  FaultRecord record;
+  record.signal = 6;
+  record.unix_ns = 1000;
+  writer->task(1).fault.write(record);
+  ASSERT_TRUE(sut->fault(1));
+  EXPECT_EQ(sut->fault(1)->signal, 6);
+  EXPECT_EQ(sut->fault(1)->unix_ns, 1000);
+  EXPECT_EQ(sut->task(1)->state, PageTaskState::exception);
+  EXPECT_FALSE(sut->fault(0));
+  EXPECT_FALSE(sut->fault(2));
+}
+
 TEST_F(Pages, InstancePageHoldsNoneAndTheMostTasksAndRefusesMore) {
   EXPECT_TRUE(InstancePage::create(pool(), "line1", {}));
   EXPECT_EQ(InstancePageReader::open(pool(), "line1")->task_count(), 0U);

@@ -1,0 +1,54 @@
+#include "manager/supervisor/lost_faults.hpp"
+
+#include <algorithm>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "shm/base/exception_history.hpp"
+#include "shm/base/log.hpp"
+#include "shm/pool/instance_page.hpp"
+
+namespace plchost {
+
+namespace {
+
+// In the order in which they were found.
+std::vector<ExceptionEntry> faults_of(const InstancePageReader& page) {
+  std::vector<ExceptionEntry> found;
+  const auto runtime = page.runtime();
+  const std::string application(runtime ? runtime->application.view() : std::string_view());
+  for (std::uint32_t i = 0; i < page.task_count(); ++i) {
+    const auto fault = page.fault(i);
+    const auto task = fault ? page.task(i) : std::nullopt;
+    if (task) found.push_back(exception_entry(*fault, application, task->identity.name.view()));
+  }
+  std::ranges::sort(found, {}, &ExceptionEntry::unix_ns);
+  return found;
+}
+
+}  // namespace
+
+std::string keep_lost_faults(std::string_view pool, std::string_view run_directory,
+                             std::string_view instance) {
+  const auto page = InstancePageReader::open(pool, instance);
+  if (!page) return {};
+  const std::vector<ExceptionEntry> faults = faults_of(*page);
+  if (faults.empty()) return {};
+  const std::string path = exception_path(run_directory, instance);
+  auto history = read_exceptions(path);
+  if (!history) {
+    spdlog::warn("instance {}: the exceptions before this one are lost: {}", instance,
+                 history.error().describe());
+    history = ExceptionHistory{};
+  }
+  for (const ExceptionEntry& fault : faults) {
+    if (!history->has(fault.task, fault.unix_ns)) history->add(fault);
+  }
+  if (const auto written = write_exceptions(path, *history); !written) {
+    spdlog::error("instance {}: its exception is not kept: {}", instance, written.error().describe());
+  }
+  return fmt::format("task '{}': {}", faults.back().task, faults.back().text);
+}
+
+}  // namespace plchost

@@ -1,0 +1,130 @@
+#include "shm/base/fault_record.hpp"
+
+#include <array>
+#include <csignal>
+#include <cstdlib>
+#include <memory>
+#include <utility>
+
+#include <cxxabi.h>
+#include <fmt/format.h>
+
+namespace plchost {
+
+namespace {
+
+double ms(std::int64_t ns) noexcept {
+  constexpr double kNsPerMs = 1e6;
+  return static_cast<double>(ns) / kNsPerMs;
+}
+
+std::string demangle(const FixedText<FaultRecord::kMaxText>& type) {
+  int status = 0;
+  const std::unique_ptr<char, decltype(&std::free)> name(
+      abi::__cxa_demangle(std::string(type.view()).c_str(), nullptr, nullptr, &status), &std::free);
+  return name ? std::string(name.get()) : std::string("an exception");
+}
+
+std::string_view what_of(int signal, int code) noexcept {
+  switch (signal) {
+    case SIGSEGV:
+      return code == SEGV_ACCERR ? "access that the memory does not allow" : "access to no memory";
+    case SIGBUS:
+      return "access to memory that is not there";
+    case SIGFPE:
+      return code == FPE_INTDIV ? "integer division by zero" : "arithmetic fault";
+    case SIGILL:
+      return "illegal instruction";
+    case SIGTRAP:
+      return "breakpoint without a debugger";
+    case SIGABRT:
+      return "abort";
+    default:
+      return "fault";
+  }
+}
+
+std::string describe_signal(const FaultRecord& record) {
+  if (record.stack_overflow) return fmt::format("SIGSEGV: stack overflow at {:#x}", record.memory_address);
+  std::string text =
+      fmt::format("{}: {}", signal_name(record.signal), what_of(record.signal, record.signal_code));
+  const bool names_memory = record.signal == SIGSEGV || record.signal == SIGBUS;
+  if (!names_memory || record.signal_code <= 0) return text;
+  return fmt::format("{} at {:#x}", text, record.memory_address);
+}
+
+std::string_view name_of(StopPhase phase) noexcept {
+  switch (phase) {
+    case StopPhase::outputs:
+      return "the first phase of a stop (tasks that drive outputs)";
+    case StopPhase::others:
+      return "the second phase of a stop (tasks that drive no outputs)";
+    case StopPhase::single_cycle:
+      return "a single cycle of all tasks";
+  }
+  return "a stop";
+}
+
+}  // namespace
+
+std::string_view to_string(FaultKind kind) noexcept {
+  switch (kind) {
+    case FaultKind::signal:
+      return "signal";
+    case FaultKind::cpp_exception:
+      return "C++ exception";
+    case FaultKind::task_watchdog:
+      return "task watchdog";
+    case FaultKind::consecutive_overruns:
+      return "consecutive overruns";
+    case FaultKind::omitted_cycles:
+      return "omitted cycles";
+    case FaultKind::processor_load:
+      return "processor load";
+    case FaultKind::stop_timeout:
+      return "stop timeout";
+  }
+  return "unknown";
+}
+
+std::string signal_name(int signal) {
+  constexpr std::array kNames = {
+      std::pair{SIGSEGV, "SIGSEGV"}, std::pair{SIGBUS, "SIGBUS"},   std::pair{SIGFPE, "SIGFPE"},
+      std::pair{SIGILL, "SIGILL"},   std::pair{SIGTRAP, "SIGTRAP"}, std::pair{SIGABRT, "SIGABRT"},
+  };
+  for (const auto& [number, name] : kNames) {
+    if (number == signal) return name;
+  }
+  return fmt::format("signal {}", signal);
+}
+
+std::string describe_fault(const FaultRecord& record) {
+  const std::string_view where = record.in_event_variable ? " in its event variable" : "";
+  switch (record.kind) {
+    case FaultKind::signal:
+      return describe_signal(record) + std::string(where);
+    case FaultKind::cpp_exception:
+      return fmt::format("{} left {}: {}", demangle(record.type),
+                         record.in_event_variable ? "its event variable" : "its cycle", record.text.view());
+    case FaultKind::task_watchdog:
+      return fmt::format("still running{} after {:.3f} ms; the limit is {:.3f} ms", where, ms(record.figure),
+                         ms(record.limit));
+    case FaultKind::consecutive_overruns:
+      return fmt::format("{} cycles in a row took longer than {:.3f} ms, the last {:.3f} ms", record.count,
+                         ms(record.limit), ms(record.figure));
+    case FaultKind::omitted_cycles:
+      return fmt::format("{} releases in a row passed without a cycle; the limit is {}", record.figure,
+                         record.limit);
+    case FaultKind::processor_load:
+      return fmt::format("the instance used {} % of its core; the limit is {} %. This task used the most",
+                         record.figure, record.limit);
+    case FaultKind::stop_timeout:
+      return fmt::format(
+          "{} after {:.0f} ms, the limit of {}",
+          record.in_event_variable ? "its event variable has not returned" : "not at the end of its cycle",
+          ms(record.limit), name_of(record.phase));
+  }
+  return "unknown";
+}
+
+}  // namespace plchost
