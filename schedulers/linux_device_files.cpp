@@ -39,8 +39,10 @@ class LinuxDeviceFile final : public DeviceFile {
 
   std::optional<unsigned long> read() noexcept override {
     unsigned long word = 0;
-    if (::read(device_.get(), &word, sizeof word) == ssize_t{sizeof word}) return word;
-    if (errno == EAGAIN || errno == EINTR) return 0;
+    const ssize_t got = ::read(device_.get(), &word, sizeof word);
+    if (got == ssize_t{sizeof word}) return word;
+    // A short one, or the end of a file, says nothing of errno: the device is broken.
+    if (got < 0 && (errno == EAGAIN || errno == EINTR)) return 0;
     return std::nullopt;
   }
 

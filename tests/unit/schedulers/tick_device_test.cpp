@@ -1,5 +1,7 @@
 #include "schedulers/tick_device.hpp"
 
+#include <cerrno>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -97,6 +99,13 @@ TEST(TickDevice, IsSwitchedOffAndClosedAtTheEnd) {
   device.sut.reset();
   EXPECT_EQ(device.files.disabled, 1);
   EXPECT_EQ(device.files.opened, 0);
+}
+
+TEST(LinuxDeviceFile, IsBrokenWhenItReadsNothing) {
+  auto sut = linux_device_files().open("/dev/null");
+  ASSERT_TRUE(sut) << sut.error().describe();
+  errno = EAGAIN;  // of something else, before
+  EXPECT_EQ((*sut)->read(), std::nullopt);
 }
 
 }  // namespace
