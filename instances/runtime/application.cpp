@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "instances/runtime/task_builder.hpp"
+#include "shm/base/log.hpp"
 
 namespace plchost {
 
@@ -59,7 +60,15 @@ Result<Application> Application::load(const std::string& path, ApplicationHost& 
 
 void Application::exit() {
   using Exit = void (*)();
-  if (const auto exit = std::bit_cast<Exit>(object_.find("plc_app_exit"))) exit();
+  const auto exit = std::bit_cast<Exit>(object_.find("plc_app_exit"));
+  if (exit == nullptr) return;
+  try {
+    exit();
+  } catch (const std::exception& error) {
+    spdlog::error("{}: plc_app_exit threw: {}", object_.path(), error.what());
+  } catch (...) {
+    spdlog::error("{}: plc_app_exit threw an exception", object_.path());
+  }
 }
 
 std::string Application::name() const {

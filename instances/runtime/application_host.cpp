@@ -1,6 +1,7 @@
 #include "instances/runtime/application_host.hpp"
 
 #include <algorithm>
+#include <exception>
 #include <utility>
 
 #include "shm/base/log.hpp"
@@ -70,7 +71,14 @@ RTS_RESULT ApplicationHost::remove_callback(unsigned event, PF_EVENT_CALLBACK ca
 void ApplicationHost::notify(unsigned event, const EVTPARAM_ExternalEventTask& parameter) const {
   const auto now = callbacks_;  // a callback may register or unregister
   for (const Callback& callback : now) {
-    if (callback.event == event) callback.function(event, &parameter, callback.user);
+    if (callback.event != event) continue;
+    try {
+      callback.function(event, &parameter, callback.user);
+    } catch (const std::exception& error) {
+      spdlog::error("a callback of event {:#x} threw: {}", event, error.what());
+    } catch (...) {
+      spdlog::error("a callback of event {:#x} threw an exception", event);
+    }
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <bit>
+#include <exception>
 #include <ranges>
 #include <string_view>
 #include <utility>
@@ -21,7 +22,14 @@ constexpr std::array<std::string_view, 1> kHookExport = {"HookFunction"};
 constexpr std::array kInitHooks = {CH_INIT, CH_INIT2, CH_INIT3};
 
 RTS_RESULT call(const SharedObject& object, unsigned hook) {
-  return std::bit_cast<Hook>(object.find("HookFunction"))(hook, 0, 0);
+  try {
+    return std::bit_cast<Hook>(object.find("HookFunction"))(hook, 0, 0);
+  } catch (const std::exception& error) {
+    spdlog::error("component {}: HookFunction threw: {}", object.path(), error.what());
+  } catch (...) {
+    spdlog::error("component {}: HookFunction threw an exception", object.path());
+  }
+  return ERR_FAILED;
 }
 
 }  // namespace

@@ -164,6 +164,10 @@ Result<void> Instance::shut_down() {
           failure(ErrorCode::timed_out, fmt::format("still in its cycle: task {}", fmt::join(busy, ", ")));
     }
   }
+  // Before its code is called once more: if that ends the process, nothing of ours is left behind.
+  if (page_) InstancePage::remove(options_.launch.pool, options_.launch.name);
+  // Under a manager there will be a next process, and the numbers go on.
+  if (options_.launch.report_fd < 0) TransitionRing::remove(options_.launch.pool, options_.launch.name);
   if (stopped) {
     // Its code may wait for what a thread that is parked in it holds.
     if (application_ && !parked_) application_->exit();
@@ -177,9 +181,6 @@ Result<void> Instance::shut_down() {
     host_->write_messages();
     host_->events().clear_own();
   }
-  if (page_) InstancePage::remove(options_.launch.pool, options_.launch.name);
-  // Under a manager there will be a next process, and the numbers go on.
-  if (options_.launch.report_fd < 0) TransitionRing::remove(options_.launch.pool, options_.launch.name);
   control_.reset();
   return stopped;
 }

@@ -1,4 +1,6 @@
 // Applications that cannot run: refused with a text that says why, by --check-application and at start alike.
+#include <csignal>
+#include <cstdlib>
 #include <fstream>
 #include <sstream>
 
@@ -45,6 +47,25 @@ INSTANTIATE_TEST_SUITE_P(
                       Fault{"fault_missing_init", "does not export plc_app_init"},
                       Fault{"fault_undefined_symbol", "function_of_another_runtime"}),
     [](const auto& test) { return std::string(test.param.application); });
+
+TEST(ApplicationExit, ThatThrowsDoesNotKeepTheProcessFromItsOrderlyEnd) {
+  const Sandbox sandbox;
+  InstanceProcess sut(sandbox, {"--application", application("fault_exit_throws")});
+  sut.wait_until_up();
+  EXPECT_EQ(sut.end(SIGTERM), EXIT_SUCCESS);
+  EXPECT_THAT(sut.log(), HasSubstr("plc_app_exit threw: the valve does not close"));
+  EXPECT_THAT(sut.log(), HasSubstr("ended"));
+}
+
+TEST(ApplicationExit, ThatCrashesLeavesNoPageBehind) {
+  const Sandbox sandbox;
+  InstanceProcess sut(sandbox, {"--application", application("fault_exit_aborts")});
+  sut.wait_until_up();
+  ASSERT_TRUE(InstancePageReader::open(sandbox.pool(), "line1"));
+  EXPECT_EQ(sut.end(SIGTERM), -SIGABRT);
+  EXPECT_FALSE(InstancePageReader::open(sandbox.pool(), "line1"));
+  EXPECT_FALSE(TransitionRingReader::open(sandbox.pool(), "line1"));
+}
 
 TEST(ApplicationCheck, ListsTheTasksOfAValidApplication) {
   const Sandbox sandbox;

@@ -1,4 +1,5 @@
 // An application with one fault, chosen when it is compiled. Everything else about it is right.
+#include <cstdlib>
 #include <stdexcept>
 
 #include "../../../../instances/plc_app.h"
@@ -40,6 +41,18 @@ PLC_EXPORT_ABI;
 
 #ifdef FAULT_UNDEFINED_SYMBOL
 extern "C" void function_of_another_runtime();
+#endif
+
+#ifdef FAULT_EXIT_THROWS
+void plc_app_exit() {
+  throw std::runtime_error("the valve does not close");
+}
+#endif
+
+#ifdef FAULT_EXIT_ABORTS
+void plc_app_exit() {
+  std::abort();
+}
 #endif
 
 #ifndef FAULT_MISSING_INIT
