@@ -70,12 +70,12 @@ std::uintptr_t caller_of(const ucontext_t& context) noexcept {
 }
 
 // As if there were no handler. A fault of the processor comes back by itself when the handler returns; a
-// signal that was sent is sent again.
+// signal that was sent is sent again, and so is that of a breakpoint, behind which the thread would go on.
 void crash(int signal, const siginfo_t& info) noexcept {
   struct sigaction action{};
   action.sa_handler = SIG_DFL;
   ::sigaction(signal, &action, nullptr);
-  if (info.si_code <= 0) ::syscall(SYS_tgkill, ::getpid(), ::gettid(), signal);
+  if (info.si_code <= 0 || signal == SIGTRAP) ::syscall(SYS_tgkill, ::getpid(), ::gettid(), signal);
 }
 
 }  // namespace
@@ -158,10 +158,13 @@ struct FaultHandlers {
       record.kind = FaultKind::signal;
       record.signal = signal;
       record.signal_code = info->si_code;
-      if (info->si_code > 0) record.memory_address = reinterpret_cast<std::uintptr_t>(info->si_addr);
+      // An address that is none, as the processor sees it, is not told: SI_KERNEL.
+      if (info->si_code > 0 && info->si_code != SI_KERNEL)
+        record.memory_address = reinterpret_cast<std::uintptr_t>(info->si_addr);
       record.stack_overflow = signal == SIGSEGV && info->si_code == SEGV_ACCERR &&
                               is_near_stack(record.memory_address, *static_cast<const ucontext_t*>(context));
-      const bool no_code = signal == SIGSEGV && record.memory_address == record.address;
+      const bool no_code =
+          signal == SIGSEGV && info->si_code != SI_KERNEL && record.memory_address == record.address;
       if (no_code) record.caller = caller_of(*static_cast<const ucontext_t*>(context));
       park(trap, fault);
     }

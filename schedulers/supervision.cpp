@@ -116,6 +116,7 @@ TimePoint Supervision::look_at_cycle(Watched& watched, TimePoint since, TimePoin
     // It blocks the signal, or never gets the processor. It halts at the end of its cycle.
     if (fault.claim()) {
       watched.trap->fill_struck(fault.record());
+      fault.record().not_caught = 1;
       fault.publish();
     }
     return kNoDeadline;

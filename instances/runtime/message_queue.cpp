@@ -14,6 +14,10 @@ MessageQueue::MessageQueue() noexcept {
 }
 
 bool MessageQueue::push(int level, const char* text) noexcept {
+  // Before a cell is taken: a faulty pointer must not leave one that nobody ever fills.
+  std::array<char, kMaxText> copy;
+  const std::size_t length = ::strnlen(text, kMaxText);
+  std::memcpy(copy.data(), text, length);
   std::uint64_t mine = write_.load(std::memory_order_relaxed);
   for (;;) {
     // Acquire pairs with the release in drain(): the reader is done with the cell.
@@ -30,8 +34,8 @@ bool MessageQueue::push(int level, const char* text) noexcept {
   }
   Cell& cell = cells_[mine % kCapacity];
   cell.level = level;
-  cell.length = ::strnlen(text, kMaxText);
-  std::memcpy(cell.text.data(), text, cell.length);
+  cell.length = length;
+  std::memcpy(cell.text.data(), copy.data(), length);
   cell.ticket.store(mine + 1, std::memory_order_release);  // pairs with the acquire in drain()
   return true;
 }

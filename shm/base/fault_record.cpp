@@ -28,11 +28,12 @@ std::string demangle(const FixedText<FaultRecord::kMaxText>& type) {
 std::string_view what_of(int signal, int code) noexcept {
   switch (signal) {
     case SIGSEGV:
+      if (code == SI_KERNEL) return "access through a wild pointer; its address is not known";
       return code == SEGV_ACCERR ? "access that the memory does not allow" : "access to no memory";
     case SIGBUS:
       return "access to memory that is not there";
     case SIGFPE:
-      return code == FPE_INTDIV ? "integer division by zero" : "arithmetic fault";
+      return code == FPE_INTDIV ? "integer division by zero or overflow" : "arithmetic fault";
     case SIGILL:
       return "illegal instruction";
     case SIGTRAP:
@@ -49,7 +50,7 @@ std::string describe_signal(const FaultRecord& record) {
   std::string text =
       fmt::format("{}: {}", signal_name(record.signal), what_of(record.signal, record.signal_code));
   const bool names_memory = record.signal == SIGSEGV || record.signal == SIGBUS;
-  if (!names_memory || record.signal_code <= 0) return text;
+  if (!names_memory || record.signal_code <= 0 || record.signal_code == SI_KERNEL) return text;
   return fmt::format("{} at {:#x}", text, record.memory_address);
 }
 
@@ -100,6 +101,10 @@ std::string signal_name(int signal) {
 
 std::string describe_fault(const FaultRecord& record) {
   const std::string_view where = record.in_event_variable ? " in its event variable" : "";
+  const std::string_view runs_on =
+      record.not_caught
+          ? "; its thread could not be caught and runs on: it blocks signals, or gets no processor time"
+          : "";
   switch (record.kind) {
     case FaultKind::signal:
       return describe_signal(record) + std::string(where);
@@ -107,14 +112,14 @@ std::string describe_fault(const FaultRecord& record) {
       return fmt::format("{} left {}: {}", demangle(record.type),
                          record.in_event_variable ? "its event variable" : "its cycle", record.text.view());
     case FaultKind::task_watchdog:
-      return fmt::format("still running{} after {:.3f} ms; the limit is {:.3f} ms", where, ms(record.figure),
-                         ms(record.limit));
+      return fmt::format("still running{} after {:.3f} ms; the limit is {:.3f} ms{}", where,
+                         ms(record.figure), ms(record.limit), runs_on);
     case FaultKind::consecutive_overruns:
       return fmt::format("{} cycles in a row took longer than {:.3f} ms, the last {:.3f} ms", record.count,
                          ms(record.limit), ms(record.figure));
     case FaultKind::omitted_cycles:
-      return fmt::format("{} releases in a row passed without a cycle; the limit is {}", record.figure,
-                         record.limit);
+      return fmt::format("{} releases in a row passed without a cycle; the limit is {}{}", record.figure,
+                         record.limit, runs_on);
     case FaultKind::processor_load:
       return fmt::format("the instance used {} % of its core; the limit is {} %. This task used the most",
                          record.figure, record.limit);

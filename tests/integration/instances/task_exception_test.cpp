@@ -112,7 +112,7 @@ TEST_P(TaskWith, GoesToExceptionAndTheInstanceStaysReachable) {
 INSTANTIATE_TEST_SUITE_P(
     Faults, TaskWith,
     ::testing::Values(
-        Fault{"divide", "Divide", "signal", "SIGFPE", "integer division by zero", "divide()+0x"},
+        Fault{"divide", "Divide", "signal", "SIGFPE", "integer division by zero or overflow", "divide()+0x"},
         Fault{"read_null", "ReadNull", "signal", "SIGSEGV", "access to no memory at 0x0", "read_null()+0x"},
         Fault{"write_null", "WriteNull", "signal", "SIGSEGV", "access to no memory at 0x0",
               "write_null()+0x"},
@@ -126,8 +126,8 @@ INSTANTIATE_TEST_SUITE_P(
               ""},
         Fault{"loop", "Loop", "task watchdog", "", "the limit is 20.000 ms", "loop()+0x"},
         Fault{"sleep", "Sleep", "task watchdog", "", "the limit is 20.000 ms", ""},
-        Fault{"variable", "Edge", "signal", "SIGFPE", "integer division by zero in its event variable",
-              "divide()+0x"}),
+        Fault{"variable", "Edge", "signal", "SIGFPE",
+              "integer division by zero or overflow in its event variable", "divide()+0x"}),
     [](const auto& test) { return std::string(test.param.event); });
 
 class EachScheduler : public ::testing::TestWithParam<const char*> {};
@@ -188,6 +188,31 @@ TEST_P(EachScheduler, SeesACycleThatNeverRan) {
 INSTANTIATE_TEST_SUITE_P(Each, EachScheduler,
                          ::testing::Values("CmpSchedule", "CmpScheduleTimer", "CmpScheduleOneShot"),
                          [](const auto& test) { return std::string(test.param); });
+
+#if defined(__x86_64__)
+TEST(TaskException, OfAWildPointerDoesNotTakeItForANullPointer) {
+  Faulty sut;
+  (void)sut.process().event("write_wild").post();
+  const auto exceptions = sut.exceptions();
+  EXPECT_EQ(exceptions.front().text, "SIGSEGV: access through a wild pointer; its address is not known");
+  EXPECT_EQ(exceptions.front().memory_address, 0U);
+  EXPECT_THAT(exceptions.front().symbol, HasSubstr("write_wild()+0x"));
+}
+
+TEST(TaskException, IsNoneOfABreakpointInAThreadOfTheApplicationWhichEndsTheProcess) {
+  Faulty sut;
+  (void)sut.process().event("break").post();
+  EXPECT_EQ(sut.process().end(), -SIGTRAP);
+}
+#endif
+
+TEST(TaskException, InTheMiddleOfALogLineStopsNoOtherLine) {
+  Faulty sut("[Task.BadLog]\nWatchdog.Policy=Task\n");
+  (void)sut.process().event("bad_log").post();
+  EXPECT_EQ(sut.exceptions().front().task, "BadLog");
+  (void)sut.process().event("say").post();
+  EXPECT_TRUE(eventually([&] { return sut.process().log().find("application: said") != std::string::npos; }));
+}
 
 TEST(TaskException, OfATaskByItselfLeavesTheOthersRunning) {
   Faulty sut(

@@ -7,6 +7,7 @@
 #include <map>
 #include <thread>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -95,6 +96,7 @@ TEST_F(SupervisionTest, RaisesTheFaultItselfOfACycleThatNoStrikeReaches) {
   EXPECT_EQ(record->kind, FaultKind::task_watchdog);
   EXPECT_EQ(Duration(record->figure), milliseconds(50));
   EXPECT_EQ(Duration(record->limit), milliseconds(40));
+  EXPECT_THAT(describe_fault(*record), testing::HasSubstr("could not be caught and runs on"));
   EXPECT_TRUE(board_.halted()) << "the whole application stops";
   task_->trap().disarm();
 }

@@ -1,6 +1,7 @@
 // One external event for each fault that a task can have, beside a cyclic task that has none. A task whose
 // name stands in PLC_FAULT_AT_START has its fault in its first cycle, without an event.
 #include <atomic>
+#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <stdexcept>
@@ -60,6 +61,20 @@ __attribute__((noinline)) void sleep_for_ever() {
   while (zero == 0) std::this_thread::sleep_for(1s);
 }
 
+// Faults that only this processor has.
+#if defined(__x86_64__)
+__attribute__((noinline)) void write_wild() {
+  volatile std::uintptr_t wild = 0xdead'beef'dead'beef;
+  *reinterpret_cast<volatile int*>(wild) = 1;  // NOLINT(performance-no-int-to-ptr): that is the fault
+}
+void break_in_a_thread() {
+  std::thread([] { __asm__("int3"); }).join();
+}
+#else
+void write_wild() {}
+void break_in_a_thread() {}
+#endif
+
 void at_start(plc::Application& app) {
   const char* const fault = std::getenv("PLC_FAULT_AT_START");
   if (fault != nullptr && std::strcmp(fault, "loop") == 0) app.cyclic("FirstLoop", 2, 10ms, loop);
@@ -85,6 +100,10 @@ void setup(plc::Application& app) {
   app.external("Abort", 4, "abort", [] { std::abort(); });
   app.external("Illegal", 4, "illegal", [] { __builtin_trap(); });
   app.external("Throw", 4, "throw", [] { throw std::runtime_error("the valve is stuck"); });
+  app.external("WriteWild", 4, "write_wild", write_wild);
+  app.external("Break", 4, "break", break_in_a_thread);
+  app.external("BadLog", 4, "bad_log", [] { plc_log(0, reinterpret_cast<const char*>(8)); });
+  app.external("Say", 4, "say", [] { plc::log("said"); });
   app.external("Loop", 4, "loop", loop);
   app.external("Sleep", 4, "sleep", sleep_for_ever);
   app.external("Busy", 4, "busy", [] { busy = true; });
