@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
@@ -55,6 +56,19 @@ Result<std::string> CliSession::target_host() {
   for (const HostView& host : *hosts) names.emplace_back(host.name);
   return failure(ErrorCode::invalid_argument,
                  fmt::format("several hosts answer; say which one with --host: {}", join_names(names)));
+}
+
+Result<void> CliSession::check_instance(const std::string& instance) {
+  const auto hosts = shown_hosts();
+  if (!hosts) return std::unexpected(hosts.error());
+  std::vector<std::string> names;
+  for (const HostView& host : *hosts) {
+    const auto instances = client_->instances(host.name, deadline());
+    if (!instances) return std::unexpected(instances.error());
+    for (const auto& known : *instances) names.emplace_back(dds::text_of(known.instance));
+  }
+  if (std::ranges::find(names, instance) != names.end()) return {};
+  return unknown_name("instance", instance, names);
 }
 
 void CliSession::show(const std::vector<Row>& rows, const std::vector<Column>& columns) const {

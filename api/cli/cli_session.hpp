@@ -49,6 +49,8 @@ class CliSession {
   [[nodiscard]] Result<std::string> target_host();
   /// The host of --host, or all.
   [[nodiscard]] Result<std::vector<HostView>> shown_hosts();
+  /// not_found: none of the hosts that are shown has an instance of that name.
+  [[nodiscard]] Result<void> check_instance(const std::string& instance);
 
   /// Prints rows as table or JSON.
   void show(const std::vector<Row>& rows, const std::vector<Column>& columns) const;

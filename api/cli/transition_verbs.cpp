@@ -62,6 +62,10 @@ int list_transitions(CliSession& session, const TransitionArguments& arguments) 
   auto collected = collect(session, arguments);
   if (!collected) return CliSession::fail(collected.error());
   std::vector<plc_Transition>& found = *collected;
+  if (found.empty() && !arguments.instance.empty()) {
+    if (const auto known = session.check_instance(arguments.instance); !known)
+      return CliSession::fail(known.error());
+  }
   std::ranges::stable_sort(found, {}, [](const plc_Transition& sample) { return sample.time_unix_ns; });
   std::vector<Row> rows;
   for (const plc_Transition& sample : found) rows.push_back(to_row(sample));

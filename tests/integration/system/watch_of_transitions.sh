@@ -10,6 +10,8 @@ done
 start_manager cell
 until_true 20 state_is line1 offline
 is "$(plcctl list transitions --json | jq length)" 0 || fail "transitions before anything was done: $(plcctl list transitions)"
+if said=$(plcctl list transitions lime1 2>&1); then fail "a list of no instance: $said"; fi
+grep -qF "no instance 'lime1' (did you mean 'line1'?)" <<<"$said" || fail "$said"
 
 # Programs of this shell itself, not of a function: so that a signal reaches them.
 "$BIN/plcctl" watch transitions line1 --json >"$cell/watch.json" 2>"$cell/watch.log" &
