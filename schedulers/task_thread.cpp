@@ -10,7 +10,7 @@ namespace plchost {
 
 namespace {
 
-constexpr Duration kLook = std::chrono::milliseconds(10);
+constexpr Duration kParkedLook = std::chrono::milliseconds(10);
 
 }  // namespace
 
@@ -41,7 +41,7 @@ bool TaskThread::settled(TimePoint deadline) noexcept {
     if (done == order_.load() || task_.trap().parked()) return true;
     const TimePoint now = MonotonicClock::now();
     if (now >= deadline) return false;
-    futex_wait(&done_, done, std::min(deadline, now + kLook));  // a thread that is parked wakes nobody
+    futex_wait(&done_, done, std::min(deadline, now + kParkedLook));  // a thread that is parked wakes nobody
   }
 }
 

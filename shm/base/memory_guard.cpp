@@ -5,11 +5,11 @@
 namespace plchost {
 
 // Static, so that a signal handler finds it whatever the process is at.
-constinit std::array<MemoryGuard::Slot, MemoryGuard::kMost> MemoryGuard::slots_;
+constinit std::array<MemoryGuard::Slot, MemoryGuard::kMost> MemoryGuard::slots;
 
 MemoryGuard::MemoryGuard(std::span<std::byte> memory) noexcept {
   const auto begin = reinterpret_cast<std::uintptr_t>(memory.data());
-  for (Slot& slot : slots_) {
+  for (Slot& slot : slots) {
     std::uintptr_t free = 0;
     if (!slot.begin.compare_exchange_strong(free, begin, std::memory_order_acq_rel)) continue;
     slot_.reset(&slot);
@@ -26,7 +26,7 @@ void MemoryGuard::Release::operator()(Slot* slot) const noexcept {
 
 bool MemoryGuard::mend(const void* address) noexcept {
   const auto at = reinterpret_cast<std::uintptr_t>(address);
-  for (Slot& slot : slots_) {
+  for (Slot& slot : slots) {
     const std::uintptr_t end = slot.end.load(std::memory_order_acquire);
     const std::uintptr_t begin = slot.begin.load(std::memory_order_relaxed);
     if (at < begin || at >= end) continue;

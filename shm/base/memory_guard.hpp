@@ -41,7 +41,7 @@ class MemoryGuard {
   struct Release {
     void operator()(Slot* slot) const noexcept;
   };
-  static std::array<Slot, kMost> slots_;
+  static std::array<Slot, kMost> slots;
 
   std::unique_ptr<Slot, Release> slot_;
 };
