@@ -1,7 +1,7 @@
 #include "schedulers/cmp_schedule.hpp"
 
-#include "schedulers/external_event_source.hpp"
-#include "schedulers/tick_device.hpp"
+#include "schedulers/activation/external_event_source.hpp"
+#include "schedulers/tick/tick_device.hpp"
 
 namespace plchost {
 

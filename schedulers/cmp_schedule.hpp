@@ -1,8 +1,8 @@
 #pragma once
 
-#include "schedulers/event_poller.hpp"
-#include "schedulers/tick_table.hpp"
-#include "schedulers/ticker.hpp"
+#include "schedulers/activation/event_poller.hpp"
+#include "schedulers/tick/tick_table.hpp"
+#include "schedulers/tick/ticker.hpp"
 
 namespace plchost {
 

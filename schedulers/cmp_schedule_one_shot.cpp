@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "schedulers/deadline_source.hpp"
+#include "schedulers/activation/deadline_source.hpp"
 
 namespace plchost {
 

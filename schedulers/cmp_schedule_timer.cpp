@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "schedulers/timer_source.hpp"
+#include "schedulers/activation/timer_source.hpp"
 
 namespace plchost {
 

@@ -6,10 +6,10 @@
 #include <string>
 #include <string_view>
 
-#include "schedulers/activation.hpp"
+#include "schedulers/activation/activation.hpp"
 #include "schedulers/clock.hpp"
 #include "schedulers/distributed_clock/settings.hpp"
-#include "schedulers/task_config.hpp"
+#include "schedulers/task/task_config.hpp"
 #include "shm/base/result.hpp"
 
 namespace plchost {

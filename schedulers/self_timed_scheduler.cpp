@@ -1,7 +1,7 @@
 #include "schedulers/self_timed_scheduler.hpp"
 
-#include "schedulers/deadline_source.hpp"
-#include "schedulers/external_event_source.hpp"
+#include "schedulers/activation/deadline_source.hpp"
+#include "schedulers/activation/external_event_source.hpp"
 
 namespace plchost {
 

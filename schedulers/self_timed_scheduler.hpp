@@ -1,7 +1,7 @@
 #pragma once
 
-#include "schedulers/event_poller.hpp"
-#include "schedulers/ticker.hpp"
+#include "schedulers/activation/event_poller.hpp"
+#include "schedulers/tick/ticker.hpp"
 
 namespace plchost {
 

@@ -8,7 +8,7 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
-#include "schedulers/raised_priority.hpp"
+#include "schedulers/task/raised_priority.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {

@@ -8,14 +8,14 @@
 #include <string_view>
 #include <vector>
 
+#include "schedulers/activation/single_cycle.hpp"
 #include "schedulers/distributed_clock/distributed_clock.hpp"
+#include "schedulers/faults/supervision.hpp"
 #include "schedulers/scheduler.hpp"
-#include "schedulers/single_cycle.hpp"
-#include "schedulers/supervision.hpp"
-#include "schedulers/task.hpp"
-#include "schedulers/task_config.hpp"
-#include "schedulers/task_thread.hpp"
-#include "schedulers/tick_choice.hpp"
+#include "schedulers/task/task.hpp"
+#include "schedulers/task/task_config.hpp"
+#include "schedulers/task/task_thread.hpp"
+#include "schedulers/tick/tick_choice.hpp"
 #include "shm/base/counted_event.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/task_statistics.hpp"

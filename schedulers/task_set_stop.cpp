@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "schedulers/single_cycle.hpp"
+#include "schedulers/activation/single_cycle.hpp"
 #include "schedulers/task_set.hpp"
 #include "shm/base/names.hpp"
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "instances/launch/core_latency.hpp"
-#include "instances/runtime/settings.hpp"
+#include "instances/runtime/settings/settings.hpp"
 #include "shm/base/unique_fd.hpp"
 
 namespace plchost {

@@ -7,10 +7,10 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "instances/runtime/operator_events.hpp"
-#include "instances/runtime/system_time.hpp"
-#include "instances/runtime/task_builder.hpp"
-#include "schedulers/watchdog_rules.hpp"
+#include "instances/runtime/tasks/operator_events.hpp"
+#include "instances/runtime/tasks/task_builder.hpp"
+#include "instances/runtime/time/system_time.hpp"
+#include "schedulers/faults/watchdog_rules.hpp"
 #include "shm/base/log.hpp"
 #include "shm/base/names.hpp"
 

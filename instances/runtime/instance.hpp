@@ -6,17 +6,17 @@
 #include <string_view>
 #include <vector>
 
-#include "instances/runtime/application.hpp"
-#include "instances/runtime/application_host.hpp"
+#include "instances/runtime/application/application.hpp"
+#include "instances/runtime/application/application_host.hpp"
+#include "instances/runtime/application/components.hpp"
 #include "instances/runtime/application_state.hpp"
-#include "instances/runtime/components.hpp"
 #include "instances/runtime/idle_states.hpp"
 #include "instances/runtime/instance_socket.hpp"
 #include "instances/runtime/options.hpp"
 #include "instances/runtime/process_setup.hpp"
-#include "instances/runtime/reference_memory.hpp"
-#include "instances/runtime/settings.hpp"
+#include "instances/runtime/settings/settings.hpp"
 #include "instances/runtime/setup_reporter.hpp"
+#include "instances/runtime/time/reference_memory.hpp"
 #include "schedulers/task_set.hpp"
 #include "shm/base/exception_history.hpp"
 #include "shm/pool/instance_page.hpp"

@@ -6,7 +6,7 @@
 #include <unistd.h>
 
 #include "instances/runtime/instance.hpp"
-#include "instances/runtime/operator_events.hpp"
+#include "instances/runtime/tasks/operator_events.hpp"
 #include "shm/base/log.hpp"
 
 namespace plchost {

@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "instances/runtime/application/symbol_name.hpp"
 #include "instances/runtime/instance.hpp"
-#include "instances/runtime/symbol_name.hpp"
 #include "shm/base/log.hpp"
 
 namespace plchost {

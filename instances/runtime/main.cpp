@@ -11,7 +11,7 @@
 #include <sys/timerfd.h>
 #include <unistd.h>
 
-#include "instances/runtime/application_check.hpp"
+#include "instances/runtime/application/application_check.hpp"
 #include "instances/runtime/instance.hpp"
 #include "instances/runtime/options.hpp"
 #include "shm/base/log.hpp"

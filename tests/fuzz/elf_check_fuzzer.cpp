@@ -6,7 +6,7 @@
 #include <span>
 #include <string_view>
 
-#include "instances/runtime/elf_check.hpp"
+#include "instances/runtime/application/elf_check.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   constexpr std::array<std::string_view, 1> kExports = {"plc_app_init"};

@@ -13,7 +13,7 @@
 #include <linux/rtc.h>
 
 #include "schedulers/clock.hpp"
-#include "schedulers/device_file.hpp"
+#include "schedulers/tick/device_file.hpp"
 
 namespace plchost {
 

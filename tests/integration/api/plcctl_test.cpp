@@ -1,7 +1,7 @@
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
-#include "schedulers/task_recorder.hpp"
+#include "schedulers/task/task_recorder.hpp"
 #include "tests/integration/api/test_host.hpp"
 
 namespace plchost {

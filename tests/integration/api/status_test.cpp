@@ -5,7 +5,7 @@
 
 #include "api/client/control_client.hpp"
 #include "api/dds/text.hpp"
-#include "schedulers/task_recorder.hpp"
+#include "schedulers/task/task_recorder.hpp"
 #include "tests/integration/api/test_host.hpp"
 
 namespace plchost {

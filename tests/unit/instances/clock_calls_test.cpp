@@ -4,9 +4,9 @@
 
 #include <gtest/gtest.h>
 
-#include "instances/runtime/application_host.hpp"
-#include "instances/runtime/reference_memory.hpp"
-#include "instances/runtime/task_builder.hpp"
+#include "instances/runtime/application/application_host.hpp"
+#include "instances/runtime/tasks/task_builder.hpp"
+#include "instances/runtime/time/reference_memory.hpp"
 #include "tests/support/manual_clock.hpp"
 #include "tests/support/simulated_reference.hpp"
 

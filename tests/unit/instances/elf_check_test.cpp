@@ -1,4 +1,4 @@
-#include "instances/runtime/elf_check.hpp"
+#include "instances/runtime/application/elf_check.hpp"
 
 #include <array>
 #include <cstring>

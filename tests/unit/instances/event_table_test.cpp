@@ -1,4 +1,4 @@
-#include "instances/runtime/event_table.hpp"
+#include "instances/runtime/tasks/event_table.hpp"
 
 #include <atomic>
 

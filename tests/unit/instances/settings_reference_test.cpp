@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "instances/runtime/settings.hpp"
+#include "instances/runtime/settings/settings.hpp"
 
 namespace plchost {
 namespace {

@@ -1,4 +1,4 @@
-#include "instances/runtime/settings.hpp"
+#include "instances/runtime/settings/settings.hpp"
 
 #include <fstream>
 #include <sstream>
@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "instances/runtime/settings_key.hpp"
+#include "instances/runtime/settings/settings_key.hpp"
 
 namespace plchost {
 namespace {

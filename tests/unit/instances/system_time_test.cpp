@@ -1,4 +1,4 @@
-#include "instances/runtime/system_time.hpp"
+#include "instances/runtime/time/system_time.hpp"
 
 #include <bit>
 #include <thread>

@@ -1,4 +1,4 @@
-#include "instances/runtime/task_builder.hpp"
+#include "instances/runtime/tasks/task_builder.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "instances/runtime/task_settings.hpp"
+#include "instances/runtime/settings/task_settings.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

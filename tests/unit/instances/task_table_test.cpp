@@ -1,12 +1,12 @@
-#include "instances/runtime/task_table.hpp"
+#include "instances/runtime/tasks/task_table.hpp"
 
 #include <array>
 #include <cstring>
 
 #include <gtest/gtest.h>
 
-#include "instances/runtime/application_host.hpp"
-#include "instances/runtime/task_builder.hpp"
+#include "instances/runtime/application/application_host.hpp"
+#include "instances/runtime/tasks/task_builder.hpp"
 #include "tests/support/manual_clock.hpp"
 
 namespace plchost {

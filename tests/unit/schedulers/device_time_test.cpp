@@ -1,4 +1,4 @@
-#include "schedulers/device_time.hpp"
+#include "schedulers/tick/device_time.hpp"
 
 #include <cmath>
 #include <random>

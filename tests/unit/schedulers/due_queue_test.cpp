@@ -1,4 +1,4 @@
-#include "schedulers/due_queue.hpp"
+#include "schedulers/tick/due_queue.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "schedulers/freewheel_rule.hpp"
+#include "schedulers/task/freewheel_rule.hpp"
 
 #include <gtest/gtest.h>
 

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "schedulers/activation_gate.hpp"
+#include "schedulers/activation/activation_gate.hpp"
 #include "schedulers/clock.hpp"
 
 namespace plchost {

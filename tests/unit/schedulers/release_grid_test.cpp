@@ -1,4 +1,4 @@
-#include "schedulers/release_grid.hpp"
+#include "schedulers/task/release_grid.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "schedulers/spin_guard.hpp"
+#include "schedulers/activation/spin_guard.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "schedulers/supervision.hpp"
+#include "schedulers/faults/supervision.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "schedulers/task_recorder.hpp"
+#include "schedulers/task/task_recorder.hpp"
 
 #include <atomic>
 #include <cstring>

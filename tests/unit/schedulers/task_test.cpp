@@ -1,4 +1,4 @@
-#include "schedulers/task.hpp"
+#include "schedulers/task/task.hpp"
 
 #include <stdexcept>
 

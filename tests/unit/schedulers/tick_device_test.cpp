@@ -1,4 +1,4 @@
-#include "schedulers/tick_device.hpp"
+#include "schedulers/tick/tick_device.hpp"
 
 #include <cerrno>
 

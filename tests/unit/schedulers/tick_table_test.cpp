@@ -1,4 +1,4 @@
-#include "schedulers/tick_table.hpp"
+#include "schedulers/tick/tick_table.hpp"
 
 #include <deque>
 #include <random>

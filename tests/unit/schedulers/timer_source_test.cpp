@@ -1,4 +1,4 @@
-#include "schedulers/timer_source.hpp"
+#include "schedulers/activation/timer_source.hpp"
 
 #include <random>
 

@@ -1,4 +1,4 @@
-#include "schedulers/watchdog_rules.hpp"
+#include "schedulers/faults/watchdog_rules.hpp"
 
 #include <array>
 #include <span>

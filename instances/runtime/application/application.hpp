@@ -1,0 +1,45 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "instances/plc_app.h"
+#include "instances/runtime/application/application_host.hpp"
+#include "instances/runtime/application/shared_object.hpp"
+#include "schedulers/task/task_config.hpp"
+#include "shm/base/result.hpp"
+
+namespace plchost {
+
+/// The loaded user program.
+class Application {
+ public:
+  /// Checks and loads the file, calls its plc_app_init and checks the tasks that it hands to `host`. The text
+  /// says what is wrong with the file or with which task. Control thread.
+  [[nodiscard]] static Result<Application> load(const std::string& path, ApplicationHost& host);
+
+  /// What the settings say about its tasks: wins over what it said itself.
+  [[nodiscard]] Result<void> apply(std::span<const TaskSettings> settings) {
+    return apply_task_settings(settings, tasks_);
+  }
+
+  /// Calls plc_app_exit, if it has one. Once, when its tasks have ended.
+  void exit();
+
+  [[nodiscard]] const std::string& path() const noexcept { return object_.path(); }
+  [[nodiscard]] std::string name() const;
+  /// What the schedulers need to know. Their functions point into the application.
+  [[nodiscard]] const std::vector<TaskConfig>& tasks() const noexcept { return tasks_; }
+  [[nodiscard]] const Task_Info& info(std::size_t index) const noexcept { return setup_->ptaskinfo[index]; }
+
+ private:
+  Application(SharedObject object, const sys_setup_tasks_struct& setup, std::vector<TaskConfig> tasks)
+      : object_(std::move(object)), setup_(&setup), tasks_(std::move(tasks)) {}
+
+  SharedObject object_;
+  const sys_setup_tasks_struct* setup_;  // in the application
+  std::vector<TaskConfig> tasks_;
+};
+
+}  // namespace plchost

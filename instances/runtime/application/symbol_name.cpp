@@ -1,0 +1,95 @@
+#include "instances/runtime/application/symbol_name.hpp"
+
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include <cxxabi.h>
+#include <dlfcn.h>
+#include <elf.h>
+#include <fmt/format.h>
+
+#include "instances/runtime/application/elf_bytes.hpp"
+
+namespace plchost {
+
+namespace {
+
+/// The function that an address lies in.
+struct Function {
+  std::string name;
+  std::uint64_t offset = 0;
+};
+
+std::string demangled(const char* name) {
+  int status = 0;
+  const std::unique_ptr<char, decltype(&std::free)> readable(
+      abi::__cxa_demangle(name, nullptr, nullptr, &status), &std::free);
+  return readable ? std::string(readable.get()) : std::string(name);
+}
+
+std::optional<Function> function_in(ElfBytes symbols, ElfBytes names, std::uint64_t address) {
+  for (std::uint64_t i = 0; const auto symbol = elf_item<Elf64_Sym>(symbols, i); ++i) {
+    const bool function = ELF64_ST_TYPE(symbol->st_info) == STT_FUNC && symbol->st_shndx != SHN_UNDEF;
+    if (!function || address < symbol->st_value || address - symbol->st_value >= symbol->st_size) continue;
+    if (symbol->st_name >= names.size()) break;
+    const ElfBytes rest = names.subspan(symbol->st_name);
+    const auto* const name = reinterpret_cast<const char*>(rest.data());
+    return Function{.name = demangled(std::string(name, ::strnlen(name, rest.size())).c_str()),
+                    .offset = address - symbol->st_value};
+  }
+  return std::nullopt;
+}
+
+// The full symbol table, which the dynamic loader does not read: it knows the program's own functions, too.
+std::optional<Function> function_at(ElfBytes file, std::uint64_t address) {
+  const auto header = elf_item<Elf64_Ehdr>(file, 0);
+  if (!header || std::memcmp(header->e_ident, ELFMAG, SELFMAG) != 0 ||
+      header->e_ident[EI_CLASS] != ELFCLASS64)
+    return std::nullopt;
+  const auto sections = elf_slice(file, header->e_shoff, std::uint64_t{header->e_shnum} * sizeof(Elf64_Shdr));
+  if (!sections) return std::nullopt;
+  for (std::uint64_t i = 0; const auto section = elf_item<Elf64_Shdr>(*sections, i); ++i) {
+    if (section->sh_type != SHT_SYMTAB) continue;
+    const auto symbols = elf_slice(file, section->sh_offset, section->sh_size);
+    const auto texts = elf_item<Elf64_Shdr>(*sections, section->sh_link);
+    const auto names = texts ? elf_slice(file, texts->sh_offset, texts->sh_size) : std::nullopt;
+    if (symbols && names) return function_in(*symbols, *names, address);
+  }
+  return std::nullopt;
+}
+
+std::vector<char> contents_of(const char* path) {
+  std::ifstream file(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+}  // namespace
+
+std::string symbol_name(std::uintptr_t address) {
+  Dl_info info{};
+  // NOLINTNEXTLINE(performance-no-int-to-ptr): it is an address
+  if (address == 0 || ::dladdr(reinterpret_cast<const void*>(address), &info) == 0 ||
+      info.dli_fname == nullptr)
+    return {};
+  const std::string file = std::filesystem::path(info.dli_fname).filename();
+  const auto in_file = address - reinterpret_cast<std::uintptr_t>(info.dli_fbase);
+  const std::vector<char> bytes = contents_of(info.dli_fname);
+  if (const auto function = function_at(std::as_bytes(std::span(bytes)), in_file)) {
+    return fmt::format("{}+{:#x} in {}", function->name, function->offset, file);
+  }
+  if (info.dli_sname != nullptr) {
+    const auto offset = address - reinterpret_cast<std::uintptr_t>(info.dli_saddr);
+    return fmt::format("{}+{:#x} in {}", demangled(info.dli_sname), offset, file);
+  }
+  return fmt::format("{}+{:#x}", file, in_file);
+}
+
+}  // namespace plchost

@@ -1,0 +1,107 @@
+#include "instances/runtime/settings/settings.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <filesystem>
+#include <fstream>
+#include <set>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "instances/runtime/settings/settings_parser.hpp"
+#include "shm/base/names.hpp"
+
+namespace plchost {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+Result<std::string> read_text(const std::string& file) {
+  std::error_code error;
+  if (!fs::exists(file, error)) {
+    return failure(ErrorCode::not_found, fmt::format("settings file {} does not exist", file));
+  }
+  if (!fs::is_regular_file(file, error)) {
+    return failure(ErrorCode::invalid_argument, fmt::format("settings file {} is not a file", file));
+  }
+  std::ifstream stream(file, std::ios::binary);
+  std::string text(kMaxSettingsFile + 1, '\0');
+  if (!stream) return failure(ErrorCode::refused, fmt::format("open settings file {}", file), errno);
+  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(stream.gcount()));
+  if (text.size() > kMaxSettingsFile) {
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("settings file {} is larger than {} bytes", file, kMaxSettingsFile));
+  }
+  return text;
+}
+
+/// Reads a file, then those that it refers to, one after the other, each with its own references.
+class FileWalk {
+ public:
+  Result<void> read(const std::string& file) {
+    const auto text = read_text(file);
+    if (!text) return std::unexpected(text.error());
+    const fs::path folder = fs::absolute(file).parent_path();
+    const auto references = parser_.read(*text, file, folder);
+    if (!references) return std::unexpected(references.error());
+    std::error_code error;
+    const fs::path self = fs::canonical(file, error);
+    chain_.push_back(self);
+    read_.insert(self);
+    for (const FileReference& reference : *references) {
+      if (auto followed = follow(reference, folder); !followed) return followed;
+    }
+    chain_.pop_back();
+    return {};
+  }
+
+  Result<InstanceSettings> finish() { return std::move(parser_).finish(); }
+
+ private:
+  Result<void> follow(const FileReference& reference, const fs::path& folder) {
+    const fs::path path = (folder / reference.path).lexically_normal();
+    const auto bad = [&](std::string_view what) {
+      return failure(ErrorCode::invalid_argument,
+                     fmt::format("{}: FileReference to {}: {}", reference.where, shown(path.native()), what));
+    };
+    std::error_code error;
+    const fs::path file = fs::canonical(path, error);
+    if (error) {
+      parser_.remark(reference.where, fmt::format("FileReference to {}: {}, so it is read without that",
+                                                  shown(path.native()), error.message()));
+      return {};
+    }
+    if (std::ranges::find(chain_, file) != chain_.end()) return bad("it refers back to this file");
+    if (read_.contains(file)) return {};
+    if (chain_.size() > kMaxReferenceDepth || read_.size() >= kMaxSettingsFiles) {
+      return bad(fmt::format("more than {} files behind each other, or {} in all", kMaxReferenceDepth,
+                             kMaxSettingsFiles));
+    }
+    return read(path);
+  }
+
+  SettingsParser parser_;
+  std::vector<fs::path> chain_;  // from the first file to the one that is read
+  std::set<fs::path> read_;
+};
+
+}  // namespace
+
+Result<InstanceSettings> parse_settings(std::string_view text, std::string_view file) {
+  SettingsParser parser;
+  if (const auto read = parser.read(text, std::string(file), ""); !read) {
+    return std::unexpected(read.error());
+  }
+  return std::move(parser).finish();
+}
+
+Result<InstanceSettings> read_settings(const std::string& file) {
+  FileWalk walk;
+  if (auto read = walk.read(file); !read) return std::unexpected(std::move(read).error());
+  return walk.finish();
+}
+
+}  // namespace plchost

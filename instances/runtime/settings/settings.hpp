@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "instances/runtime/settings/task_settings.hpp"
+#include "schedulers/scheduler.hpp"
+#include "shm/base/result.hpp"
+
+namespace plchost {
+
+/// [SysTimer] TimerMode: one_shot is the seed's way to ask for distributed clocks.
+enum class TimerMode : std::uint8_t { periodic, one_shot };
+
+/// [SysTimer] IdleStates: what holds the processor out of its slow sleep states while the instance runs.
+enum class IdleStates : std::uint8_t {
+  hold,       ///< /dev/cpu_dma_latency at 0, for all cores
+  hold_core,  ///< only for the instance's own core, where the kernel offers it
+  allow,      ///< nothing
+};
+
+/// [SysTime]: the clock that applications see, if it is not CLOCK_MONOTONIC. Both functions or none.
+struct SysTimeSettings {
+  std::string get_us;   ///< the symbol of a function like SysTimeGetUs
+  std::string get_ns;   ///< the symbol of a function like SysTimeGetNs
+  std::string library;  ///< the file that holds both; empty: a component, or what else is loaded
+  bool operator==(const SysTimeSettings&) const = default;
+};
+
+/// What an instance's own settings file says, validated. README.md lists the keys.
+struct InstanceSettings {
+  SchedulerSettings scheduler;
+  StopLimits stop;
+  TimerMode timer_mode = TimerMode::periodic;
+  IdleStates idle_states = IdleStates::hold;
+  SysTimeSettings sys_time;
+  std::vector<TaskSettings> tasks;      ///< one for each [Task.NAME]
+  std::vector<std::string> components;  ///< in order; a relative path counts from the settings file's folder
+
+  /// What was left alone: sections and components of other programs, each once; and keys without a meaning
+  /// here, with their place.
+  std::vector<std::string> foreign_sections;
+  std::vector<std::string> foreign_components;
+  std::vector<std::string> remarks;
+  bool operator==(const InstanceSettings&) const = default;
+};
+
+inline constexpr std::size_t kMaxSettingsFile = std::size_t{1} << 20;
+inline constexpr std::size_t kMaxComponents = 999;
+/// Files that refer to each other: so many behind the first, and in all.
+inline constexpr std::size_t kMaxReferenceDepth = 8;
+inline constexpr std::size_t kMaxSettingsFiles = 64;
+
+/// `file` is how errors call it: "FILE:LINE: what is wrong, and what is allowed". Follows no references.
+[[nodiscard]] Result<InstanceSettings> parse_settings(std::string_view text, std::string_view file);
+
+/// With the files of its [CmpSettings] FileReference.N. Relative paths in it are made absolute. not_found: no
+/// such file. Set-up.
+[[nodiscard]] Result<InstanceSettings> read_settings(const std::string& file);
+
+}  // namespace plchost

@@ -1,0 +1,42 @@
+// [ComponentManager]: what is loaded before the application.
+#include <array>
+
+#include "instances/runtime/settings/settings_key.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr std::string_view kSection = "ComponentManager";
+
+void add_component(const SettingsTarget& to, std::size_t number, std::string_view component) {
+  to.components.insert_or_assign(
+      number, is_foreign_component(component) ? std::string(component) : in_folder(to, component));
+}
+
+constexpr std::array kKeys = {
+    SettingKey{
+        .section = kSection,
+        .name = "Component.N",
+        .value = NumberedSetting{"file of a shared object, with a '/' or a '.' in its name", add_component}},
+    SettingKey{.section = kSection, .name = "DisablingOperations"},
+    SettingKey{.section = kSection, .name = "MinimalCommCycleHookInterval"},
+    SettingKey{.section = kSection, .name = "OverloadableFunctions"},
+    SettingKey{.section = kSection, .name = "Profiler.ComponentID"},
+    SettingKey{.section = kSection, .name = "WinCE.CommCycleInterval"},
+    SettingKey{.section = kSection, .name = "WinCE.CommCycleThreadPriority"},
+    SettingKey{.section = kSection, .name = "WindowHided"},
+};
+
+}  // namespace
+
+// Ours are files; theirs are plain names of what is built into their runtime, "CmpBACnet".
+bool is_foreign_component(std::string_view component) {
+  return component.find_first_of("/.") == std::string_view::npos;
+}
+
+std::span<const SettingKey> component_keys() noexcept {
+  return kKeys;
+}
+
+}  // namespace plchost

@@ -1,0 +1,123 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <span>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "instances/runtime/settings/settings.hpp"
+#include "shm/base/result.hpp"
+
+namespace plchost {
+
+/// What a row of the table writes to.
+struct SettingsTarget {
+  InstanceSettings& settings;
+  std::map<std::size_t, std::string>& components;  ///< by their number, foreign ones too
+  TaskSettings* task;                              ///< of the section [Task.NAME]; null in other sections
+  std::string_view folder;                         ///< of the file; empty: relative paths stay as they are
+};
+
+/// The path, as it counts from the folder of its file.
+[[nodiscard]] std::string in_folder(const SettingsTarget& target, std::string_view path);
+
+/// An integer, lowest to highest.
+struct NumberSetting {
+  std::int64_t lowest;
+  std::int64_t highest;
+  void (*apply)(const SettingsTarget&, std::int64_t number);
+  bool capped = false;  ///< more acts as highest, with a remark: files of the other runtime have it
+};
+
+/// 0 or -1 for "not set", or an integer of 1 to highest.
+struct OptionalNumberSetting {
+  std::int64_t highest;
+  void (*apply)(const SettingsTarget&, std::int64_t number);
+};
+
+/// Microseconds with up to four decimals, so that 1024 Hz can be written: lowest to highest.
+struct MicrosecondSetting {
+  std::int64_t lowest;
+  std::int64_t highest;
+  void (*apply)(const SettingsTarget&, Duration value);
+};
+
+/// One of these words, in any case.
+struct WordSetting {
+  std::span<const std::string_view> words;
+  void (*apply)(const SettingsTarget&, std::size_t index);
+};
+
+/// A text.
+struct TextSetting {
+  std::string_view form;  ///< what is allowed, in words
+  bool (*allows)(std::string_view text);
+  void (*apply)(const SettingsTarget&, std::string_view text);
+};
+
+/// A key that ends in ".N": N is 0 to kMaxComponents. Its name in the table ends in ".N", too.
+struct NumberedSetting {
+  std::string_view form;
+  void (*apply)(const SettingsTarget&, std::size_t number, std::string_view text);
+};
+
+/// Documented for CODESYS, without a meaning here: accepted with a remark.
+struct UnusedSetting {};
+
+/// One row of the table of keys. Parsing, errors, lists of what is allowed and the README's table come from
+/// it.
+struct SettingKey {
+  std::string_view section;  ///< kTaskSections: any [Task.NAME]
+  std::string_view name;
+  bool prefixed = false;       ///< written with the name of a platform in front: VxWorks.NAME, or Linux.NAME
+  std::string_view unit{};     ///< empty: none
+  std::string_view initial{};  ///< the default, as it would be written
+  std::variant<NumberSetting, OptionalNumberSetting, MicrosecondSetting, WordSetting, TextSetting,
+               NumberedSetting, UnusedSetting>
+      value = UnusedSetting{};
+};
+
+inline constexpr std::string_view kTaskSections = "Task.NAME";
+
+// The tables, one for each file settings_*.cpp. A new one is added to all_setting_keys().
+[[nodiscard]] std::span<const SettingKey> schedule_keys() noexcept;
+[[nodiscard]] std::span<const SettingKey> timer_keys() noexcept;
+[[nodiscard]] std::span<const SettingKey> clock_keys() noexcept;
+[[nodiscard]] std::span<const SettingKey> task_keys() noexcept;
+[[nodiscard]] std::span<const SettingKey> component_keys() noexcept;
+
+/// All rows, in the order of the README.
+[[nodiscard]] const std::vector<SettingKey>& all_setting_keys();
+
+/// The key of the table for a section as written: kTaskSections for "Task.Fast".
+[[nodiscard]] std::string_view table_section(std::string_view section) noexcept;
+[[nodiscard]] bool is_owned(std::string_view section);
+/// The section of the table that a section as written was meant to be: in another case, or with a typing
+/// error. Empty: it is another program's.
+[[nodiscard]] std::string_view meant_section(std::string_view section);
+
+/// "VxWorks.TimerSource"
+[[nodiscard]] std::string written_name(const SettingKey& key);
+/// "us, 50 to 1000000"
+[[nodiscard]] std::string allowed_values(const SettingKey& key);
+
+/// The row for a key as written in an owned section. invalid_argument: there is none; the text lists what
+/// there is, and what may have been meant.
+[[nodiscard]] Result<const SettingKey*> find_setting(std::string_view section, std::string_view name);
+
+/// The same for all ways to write one key: "TimerSource", "Component.1".
+[[nodiscard]] std::string setting_identity(const SettingKey& key, std::string_view name);
+
+/// The component is built into another runtime: a name and no file.
+[[nodiscard]] bool is_foreign_component(std::string_view component);
+
+/// Checks the value and writes it. The text is a remark about it, mostly empty. invalid_argument: the text
+/// says what is allowed.
+[[nodiscard]] Result<std::string> apply_setting(const SettingKey& key, std::string_view name,
+                                                std::string_view value, const SettingsTarget& target);
+
+}  // namespace plchost

@@ -1,0 +1,135 @@
+// [CmpSchedule]: the schedulers and the watchdogs.
+#include <array>
+
+#include "instances/runtime/settings/settings_key.hpp"
+
+namespace plchost {
+
+namespace {
+
+using std::chrono::microseconds;
+using std::chrono::milliseconds;
+
+constexpr std::string_view kSection = "CmpSchedule";
+
+constexpr std::array kKeys = {
+    SettingKey{.section = kSection,
+               .name = "SchedulerInterval",
+               .unit = "us",
+               .initial = "1000",
+               .value = MicrosecondSetting{50, 1'000'000,
+                                           [](const SettingsTarget& to, Duration interval) {
+                                             to.settings.scheduler.scheduler_interval = interval;
+                                           }}},
+    SettingKey{.section = kSection,
+               .name = "Task.Freewheeling.Cycletime",
+               .unit = "ms",
+               .initial = "-1",
+               .value = OptionalNumberSetting{60'000,
+                                              [](const SettingsTarget& to, std::int64_t ms) {
+                                                to.settings.scheduler.freewheeling_cycletime =
+                                                    milliseconds(ms < 0 ? 0 : ms);
+                                              }}},
+    SettingKey{.section = kSection,
+               .name = "ProcessorLoad.Maximum",
+               .unit = "percent, 0 is not set",
+               .initial = "0",
+               .value = NumberSetting{0, kMaxProcessorLoad,
+                                      [](const SettingsTarget& to, std::int64_t percent) {
+                                        to.settings.scheduler.processor_load_maximum =
+                                            static_cast<int>(percent);
+                                      },
+                                      true}},
+    SettingKey{.section = kSection,
+               .name = "ProcessorLoad.Enable",
+               .unit = "1 is on",
+               .initial = "1",
+               .value = NumberSetting{0, 1,
+                                      [](const SettingsTarget& to, std::int64_t on) {
+                                        to.settings.scheduler.watchdog.load = on != 0;
+                                      }}},
+    SettingKey{.section = kSection,
+               .name = "ProcessorLoad.Interval",
+               .unit = "ms",
+               .initial = "1000",
+               .value = NumberSetting{10, 60'000,
+                                      [](const SettingsTarget& to, std::int64_t ms) {
+                                        to.settings.scheduler.watchdog.load_interval = milliseconds(ms);
+                                      }}},
+    SettingKey{.section = kSection,
+               .name = "DisableOmittedCycleWatchdog",
+               .unit = "1 is disabled",
+               .initial = "0",
+               .value = NumberSetting{0, 1,
+                                      [](const SettingsTarget& to, std::int64_t disabled) {
+                                        to.settings.scheduler.watchdog.omitted_cycles = disabled == 0;
+                                      }}},
+    SettingKey{
+        .section = kSection,
+        .name = "Watchdog.DefaultTimeMs",
+        .unit = "ms, 0 is off",
+        .initial = "2000",
+        .value =
+            NumberSetting{
+                0,
+                3'600'000,
+                [](const SettingsTarget& to,
+                   std::int64_t ms) { to.settings.scheduler.watchdog.default_time = milliseconds(ms); }}},
+    SettingKey{
+        .section = kSection,
+        .name = "SpinAhead.MaxUs",
+        .unit = "us, 0 is off",
+        .initial = "100",
+        .value =
+            NumberSetting{0, 1000,
+                          [](const SettingsTarget& to,
+                             std::int64_t us) { to.settings.scheduler.spin_ahead_max = microseconds(us); }}},
+    SettingKey{
+        .section = kSection,
+        .name = "ExternalEvent.MaxBacklog",
+        .unit = "events",
+        .initial = "1048576",
+        .value =
+            NumberSetting{
+                1,
+                1'000'000'000,
+                [](const SettingsTarget& to, std::int64_t events) {
+                  to.settings.scheduler.max_event_backlog = static_cast<std::uint64_t>(events);
+                }}},
+    // The manager waits as long as the highest of them allow.
+    SettingKey{.section = kSection,
+               .name = "Stop.OutputsLimitMs",
+               .unit = "ms",
+               .initial = "10000",
+               .value = NumberSetting{1, 10'000,
+                                      [](const SettingsTarget& to,
+                                         std::int64_t ms) { to.settings.stop.outputs = milliseconds(ms); }}},
+    SettingKey{.section = kSection,
+               .name = "Stop.OthersLimitMs",
+               .unit = "ms",
+               .initial = "25000",
+               .value = NumberSetting{1, 25'000,
+                                      [](const SettingsTarget& to,
+                                         std::int64_t ms) { to.settings.stop.others = milliseconds(ms); }}},
+    // Here every scheduler times its tasks itself, without slices, and reports through the instance's log.
+    SettingKey{.section = kSection, .name = "DontUseMicrosecondTiming"},
+    SettingKey{.section = kSection, .name = "EnableLogger"},
+    SettingKey{.section = kSection, .name = "OmittedCycleWatchdog.OnlineChangeUs"},
+    SettingKey{.section = kSection, .name = "SchedulerPriority"},
+    SettingKey{.section = kSection, .name = "Scheduling.Mode"},
+    SettingKey{.section = kSection, .name = "Scheduling.TaskSupervisor"},
+    SettingKey{.section = kSection, .name = "SupervisorTimeoutMultiplier"},
+    SettingKey{.section = kSection, .name = "Timeslicing.Mode"},
+    SettingKey{.section = kSection, .name = "Timeslicing.PlcSlicePercent"},
+    SettingKey{.section = kSection, .name = "Timeslicing.PlcSliceUs"},
+    SettingKey{.section = kSection, .name = "Timeslicing.StartOnProcessorLoad"},
+    SettingKey{.section = kSection, .name = "UseWatchdogTimer"},
+};
+
+}  // namespace
+
+std::span<const SettingKey> schedule_keys() noexcept {
+  return kKeys;
+}
+
+}  // namespace plchost

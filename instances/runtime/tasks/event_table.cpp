@@ -1,0 +1,229 @@
+#include "instances/runtime/tasks/event_table.hpp"
+
+#include <bit>
+#include <span>
+
+#include <fmt/format.h>
+
+#include "shm/base/names.hpp"
+
+namespace plchost {
+
+namespace {
+
+// Handles are 1, 2, ...: nothing that could be mistaken for an address, and 0 and -1 are none.
+RTS_HANDLE to_handle(std::size_t index) noexcept {
+  return std::bit_cast<RTS_HANDLE>(index + 1);
+}
+
+}  // namespace
+
+void EventTable::clear_own() {
+  if (pool_ == nullptr) return;
+  const std::string prefix = instance_ + "/";
+  for (const ObjectInfo& object : pool_->list()) {
+    if (object.type != ObjectType::event || !object.name.starts_with(prefix)) continue;
+    if (const auto event = pool_->open_event(object.name)) {
+      (void)event->set_bound_tasks(0);
+      (void)event->set_registered(false);
+    }
+  }
+}
+
+EventTable::Slot* EventTable::find(RTS_HANDLE handle) const noexcept {
+  const std::size_t index = std::bit_cast<std::size_t>(handle) - 1;  // of 0 it is beyond any table
+  return index < count_.load(std::memory_order_acquire) ? slots_[index].get() : nullptr;
+}
+
+Result<void> EventTable::attach(Slot& slot) {
+  if (pool_ == nullptr) return {};
+  const auto event = pool_->create_event(slot.object);
+  if (!event) return std::unexpected(event.error());
+  slot.events.push_back(std::make_unique<PoolEvent>(*event));
+  slot.event.store(slot.events.back().get(), std::memory_order_release);  // pairs with the acquire in post()
+  return {};
+}
+
+Result<RTS_HANDLE> EventTable::open(std::string_view name) {
+  const std::size_t slash = name.find('/');
+  const std::string_view owner = slash == std::string_view::npos ? instance_ : name.substr(0, slash);
+  const std::string_view event = slash == std::string_view::npos ? name : name.substr(slash + 1);
+  if (auto valid = check_name("instance name", owner, kMaxInstanceName); !valid) {
+    return std::unexpected(valid.error());
+  }
+  if (auto valid = check_name("event name", event, kMaxEventName); !valid)
+    return std::unexpected(valid.error());
+
+  const std::string object = event_object_name(owner, event);
+  const std::size_t count = count_.load(std::memory_order_relaxed);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (slots_[i]->object == object) return to_handle(i);
+  }
+  if (count == kMaxEvents) {
+    return failure(ErrorCode::full,
+                   fmt::format("external event '{}': an instance deals with at most {}", name, kMaxEvents));
+  }
+  auto slot = std::make_unique<Slot>();
+  slot->own = owner == instance_;
+  slot->name = event;
+  slot->object = object;
+  if (auto attached = attach(*slot); !attached) return std::unexpected(attached.error());
+  slots_[count] = std::move(slot);
+  count_.store(count + 1, std::memory_order_release);  // pairs with the acquire in find()
+  return to_handle(count);
+}
+
+Result<EventTable::Slot*> EventTable::open_own(std::string_view event) {
+  const auto handle = open(event);
+  if (!handle) return std::unexpected(handle.error());
+  Slot* const slot = find(*handle);
+  if (slot->own) return slot;
+  return failure(ErrorCode::invalid_argument,
+                 fmt::format("external event '{}' belongs to another instance than '{}'", event, instance_));
+}
+
+Result<void> EventTable::publish_registered(Slot& slot) {
+  if (pool_ == nullptr) return {};
+  const bool registered = slot.by_application || slot.by_operator;
+  if (slot.event.load(std::memory_order_relaxed)->set_registered(registered)) return {};
+  // It lost its place in the pool while nobody used it; a task that was bound to it notices in check_bound().
+  if (auto attached = attach(slot); !attached) return attached;
+  (void)slot.event.load(std::memory_order_relaxed)->set_registered(registered);
+  return {};
+}
+
+Result<void> EventTable::register_by_application(RTS_HANDLE handle) {
+  Slot* const slot = find(handle);
+  if (slot == nullptr) return failure(ErrorCode::invalid_argument, "not the handle of an external event");
+  if (!slot->own) return {};  // its registration is its own instance's
+  if (slot->by_application) {
+    return failure(ErrorCode::already_exists, fmt::format("external event '{}' is registered", slot->name));
+  }
+  slot->by_application = true;
+  return publish_registered(*slot);
+}
+
+Result<void> EventTable::unregister_by_application(RTS_HANDLE handle) {
+  Slot* const slot = find(handle);
+  if (slot == nullptr) return failure(ErrorCode::invalid_argument, "not the handle of an external event");
+  if (!slot->own) return {};
+  if (!slot->by_application) {
+    return failure(ErrorCode::not_found, fmt::format("external event '{}' is not registered", slot->name));
+  }
+  slot->by_application = false;
+  return publish_registered(*slot);
+}
+
+Result<void> EventTable::register_by_operator(std::string_view event) {
+  const auto slot = open_own(event);
+  if (!slot) return std::unexpected(slot.error());
+  if ((*slot)->by_application || (*slot)->by_operator) {
+    return failure(ErrorCode::already_exists,
+                   fmt::format("external event '{}' is registered already", event));
+  }
+  (*slot)->by_operator = true;
+  return publish_registered(**slot);
+}
+
+Result<void> EventTable::unregister_by_operator(std::string_view event) {
+  const auto slot = open_own(event);
+  if (!slot) return std::unexpected(slot.error());
+  if (!(*slot)->by_application && !(*slot)->by_operator) {
+    std::vector<std::string_view> known;
+    for (std::size_t i = 0; i < count_.load(std::memory_order_relaxed); ++i) {
+      const Slot& other = *slots_[i];
+      if (other.by_application || other.by_operator) known.push_back(other.name);
+    }
+    return failure(
+        ErrorCode::not_found,
+        fmt::format("external event '{}' is not registered; registered are: {}", event, join_names(known)));
+  }
+  (*slot)->by_application = (*slot)->by_operator = false;
+  return publish_registered(**slot);
+}
+
+std::vector<std::string> EventTable::registered_by_operator() const {
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < count_.load(std::memory_order_relaxed); ++i) {
+    if (slots_[i]->by_operator) names.push_back(slots_[i]->name);
+  }
+  return names;
+}
+
+Result<CountedEvent*> EventTable::bind_task(std::string_view event) {
+  const auto slot = open_own(event);
+  if (!slot) return std::unexpected(slot.error());
+  if ((*slot)->bound == nullptr) (*slot)->bound = (*slot)->event.load(std::memory_order_relaxed);
+  ++(*slot)->tasks;
+  return &(*slot)->bound->counted();
+}
+
+void EventTable::forget_tasks() {
+  (void)publish_bound(false);
+  for (std::size_t i = 0; i < count_.load(std::memory_order_relaxed); ++i) slots_[i]->tasks = 0;
+}
+
+Result<void> EventTable::check_bound() const {
+  for (std::size_t i = 0; i < count_.load(std::memory_order_relaxed); ++i) {
+    const Slot& slot = *slots_[i];
+    if (slot.tasks == 0 || slot.bound->valid()) continue;
+    return failure(ErrorCode::wrong_state,
+                   fmt::format("external event '{}' lost its place in the full object pool while the "
+                               "application was stopped: reset the instance",
+                               slot.name));
+  }
+  return {};
+}
+
+Result<void> EventTable::publish_bound(bool running) {
+  for (std::size_t i = 0; i < count_.load(std::memory_order_relaxed); ++i) {
+    Slot& slot = *slots_[i];
+    if (slot.tasks == 0) continue;
+    slot.taking = running ? slot.tasks : 0;
+    if (!slot.bound->set_bound_tasks(slot.taking) && running) return check_bound();
+  }
+  return {};
+}
+
+void EventTable::withdraw_task(std::string_view event) {
+  const auto slot = open_own(event);
+  if (!slot || (*slot)->taking == 0) return;
+  (void)(*slot)->bound->set_bound_tasks(--(*slot)->taking);
+}
+
+void EventTable::refresh() {
+  for (std::size_t i = 0; i < count_.load(std::memory_order_relaxed); ++i) {
+    Slot& slot = *slots_[i];
+    const PoolEvent* const event = slot.event.load(std::memory_order_relaxed);
+    // An own event is left to the paths above, which know what it is needed for.
+    if (!slot.own && event != nullptr && !event->valid()) (void)attach(slot);
+  }
+}
+
+RTS_RESULT EventTable::post(RTS_HANDLE handle) const noexcept {
+  const Slot* const slot = find(handle);
+  if (slot == nullptr) return ERR_PARAMETER;
+  const PoolEvent* const event = slot->event.load(std::memory_order_acquire);
+  if (event == nullptr) return ERR_NO_TASK;
+  switch (event->post()) {
+    case PostResult::posted:
+      return ERR_OK;
+    case PostResult::no_task:
+      return ERR_NO_TASK;
+    case PostResult::not_registered:
+      return ERR_NO_OBJECT;
+  }
+  return ERR_FAILED;
+}
+
+RTS_RESULT EventTable::set(RTS_HANDLE handle) const noexcept {
+  const Slot* const slot = find(handle);
+  if (slot == nullptr) return ERR_PARAMETER;
+  const PoolEvent* const event = slot->event.load(std::memory_order_acquire);
+  // Only while a task is bound is its counter surely this event's own.
+  if (event == nullptr || event->bound_tasks() == 0) return ERR_NO_TASK;
+  event->counted().post();
+  return ERR_OK;
+}
+
+}  // namespace plchost

@@ -1,0 +1,148 @@
+#include "instances/runtime/tasks/task_builder.hpp"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <set>
+#include <span>
+#include <string>
+#include <string_view>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "instances/runtime/application/application_host.hpp"
+#include "shm/base/names.hpp"
+
+namespace plchost {
+
+static_assert(PLC_MAX_TASKS == kMaxTasks);
+static_assert(Cyclic == std::to_underlying(TaskKind::cyclic) &&
+              Event == std::to_underlying(TaskKind::event) &&
+              External == std::to_underlying(TaskKind::external) &&
+              Freewheeling == std::to_underlying(TaskKind::freewheeling));
+
+namespace {
+
+std::unexpected<Error> invalid(std::string text) {
+  return failure(ErrorCode::invalid_argument, std::move(text));
+}
+
+// A text of the ABI, which may lack its terminating zero.
+template <std::size_t Size>
+Result<std::string> text_of(const char (&field)[Size], std::string_view what) {
+  const char* const end = std::find(std::begin(field), std::end(field), '\0');
+  if (end == std::end(field)) return invalid(fmt::format("{} has no terminating zero", what));
+  return std::string(std::begin(field), end);
+}
+
+Duration interval_of(const Task_Info& task) {
+  return task.bMicroseconds != 0 ? Duration(std::chrono::microseconds(task.dwInterval))
+                                 : Duration(std::chrono::milliseconds(task.dwInterval));
+}
+
+// What only one kind of task has.
+Result<void> fill_kind(Task_Info& task, TaskConfig& config) {
+  switch (config.kind) {
+    case TaskKind::cyclic:
+      config.interval = interval_of(task);
+      if (config.interval <= Duration::zero()) return invalid("dwInterval of a cyclic task must be above 0");
+      if (config.interval > kMaxInterval) return invalid("dwInterval must be at most 50 days");
+      return {};
+    case TaskKind::event:
+      if (task.dwEventFunctionPointer == nullptr)
+        return invalid("dwEventFunctionPointer of an event task is null");
+      config.event_variable = [&task, read = task.dwEventFunctionPointer] {
+        const CurrentTask current(&task);
+        return read() != 0;
+      };
+      return {};
+    case TaskKind::external: {
+      const auto event = text_of(task.stExternalEvent, "stExternalEvent");
+      if (!event) return std::unexpected(event.error());
+      config.external_event = *event;
+      return check_name("stExternalEvent", *event, kMaxEventName);
+    }
+    case TaskKind::freewheeling:
+      return {};
+  }
+  return {};
+}
+
+Result<TaskConfig> build_task(Task_Info& task) {
+  if (task.nPriority < 0 || task.nPriority > kLowestIecPriority) {
+    return invalid(
+        fmt::format("nPriority {} is not allowed: 0 (highest) to {} is", task.nPriority, kLowestIecPriority));
+  }
+  if (task.KindOfTask < Cyclic || task.KindOfTask > Freewheeling) {
+    return invalid(fmt::format(
+        "KindOfTask {} is not allowed: Cyclic (0), Event (1), External (2) and Freewheeling (3) are",
+        task.KindOfTask));
+  }
+  if (task.dwTaskEntryFunctionPointer == nullptr) return invalid("dwTaskEntryFunctionPointer is null");
+  TaskConfig config;
+  config.kind = static_cast<TaskKind>(task.KindOfTask);
+  config.iec_priority = task.nPriority;
+  config.entry = [&task, run = task.dwTaskEntryFunctionPointer] {
+    const CurrentTask current(&task);
+    run();
+  };
+  config.after_cycle = [&task](const TaskCounters& counters) { write_back(counters, task); };
+  if (auto filled = fill_kind(task, config); !filled) return std::unexpected(filled.error());
+  return config;
+}
+
+}  // namespace
+
+Result<std::vector<TaskConfig>> build_tasks(const sys_setup_tasks_struct& setup) {
+  if (setup.nTasks < 1 || setup.nTasks > PLC_MAX_TASKS) {
+    return invalid(fmt::format("nTasks {} is not allowed: 1 to {} is", setup.nTasks, PLC_MAX_TASKS));
+  }
+  if (setup.ptaskinfo == nullptr) return invalid("ptaskinfo is null");
+  if (auto name = text_of(setup.stApplicationName, "stApplicationName"); !name) {
+    return std::unexpected(name.error());
+  }
+  std::vector<TaskConfig> configs;
+  std::set<std::string> names;
+  for (int i = 0; i < setup.nTasks; ++i) {
+    Task_Info& task = setup.ptaskinfo[i];
+    const auto name = text_of(task.stName, "stName");
+    if (!name) return failure_in(fmt::format("task number {}", i), name.error());
+    if (auto valid = check_name("stName", *name, kMaxTaskName); !valid) {
+      return failure_in(fmt::format("task number {}", i), valid.error());
+    }
+    if (!names.insert(*name).second) return invalid(fmt::format("two tasks are called '{}'", *name));
+    auto config = build_task(task);
+    if (!config) return failure_in(fmt::format("task '{}'", *name), config.error());
+    config->name = *name;
+    configs.push_back(*std::move(config));
+  }
+  return configs;
+}
+
+void write_back(const TaskCounters& counters, Task_Info& task) noexcept {
+  constexpr std::int64_t kPerUs = 1000;
+  const auto us = [](std::int64_t ns) {
+    constexpr std::int64_t kLowest = std::numeric_limits<int>::min();
+    constexpr std::int64_t kHighest = std::numeric_limits<int>::max();
+    return static_cast<int>(std::clamp(ns / kPerUs, kLowest, kHighest));
+  };
+  task.tLastCycleTime = us(counters.exec_last_ns);
+  task.tAverageCycleTime = us(average(counters.exec_sum_ns, counters.recorded));
+  task.tMaxCycleTime = us(counters.exec_max_ns);
+  task.tMinCycleTime = us(counters.exec_min_ns);
+  task.tJitterMax = us(largest_jitter_ns(counters));
+  task.tJitterLast = us(counters.jitter_last_ns);
+}
+
+TaskIdentity identity_of(const TaskConfig& task) {
+  TaskIdentity identity;
+  identity.name.assign(task.name);
+  identity.external_event.assign(task.external_event);
+  identity.kind = static_cast<PageTaskKind>(task.kind);
+  identity.iec_priority = task.iec_priority;
+  identity.interval_ns = task.interval.count();
+  return identity;
+}
+
+}  // namespace plchost

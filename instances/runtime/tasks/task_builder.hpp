@@ -1,0 +1,23 @@
+#pragma once
+
+#include <vector>
+
+#include "instances/plc_app.h"
+#include "schedulers/task/task_config.hpp"
+#include "shm/base/result.hpp"
+#include "shm/pool/instance_page.hpp"
+
+namespace plchost {
+
+/// Checks the whole task configuration of an application and translates it for the schedulers. The tasks'
+/// functions are called with plc_current_task() set, and their figures are written back. `setup` outlives the
+/// tasks. invalid_argument: the text names the task, the field, and what is allowed. Set-up.
+[[nodiscard]] Result<std::vector<TaskConfig>> build_tasks(const sys_setup_tasks_struct& setup);
+
+/// Writes the cycle times and the jitter, in us, into the application's own memory. Real-time.
+void write_back(const TaskCounters& counters, Task_Info& task) noexcept;
+
+/// How the status page describes a task.
+[[nodiscard]] TaskIdentity identity_of(const TaskConfig& task);
+
+}  // namespace plchost

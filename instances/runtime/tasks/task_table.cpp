@@ -1,0 +1,108 @@
+#include "instances/runtime/tasks/task_table.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <iterator>
+#include <span>
+
+#include "instances/runtime/application/application_host.hpp"
+
+namespace plchost {
+
+namespace {
+
+RTS_HANDLE to_handle(std::size_t index) noexcept {
+  return std::bit_cast<RTS_HANDLE>(index + 1);
+}
+
+// What an application hands over is checked only after it was: it may be anything.
+std::span<const Task_Info> tasks_of(const sys_setup_tasks_struct* setup) noexcept {
+  if (setup == nullptr || setup->ptaskinfo == nullptr) return {};
+  if (setup->nTasks < 1 || setup->nTasks > PLC_MAX_TASKS) return {};
+  return {setup->ptaskinfo, static_cast<std::size_t>(setup->nTasks)};
+}
+
+std::string_view name_of(const Task_Info& task) noexcept {
+  return {std::begin(task.stName), ::strnlen(std::begin(task.stName), sizeof task.stName)};
+}
+
+}  // namespace
+
+RTS_HANDLE TaskTable::find(std::string_view name) const noexcept {
+  const auto tasks = tasks_of(setup_.load(std::memory_order_acquire));
+  const auto found = std::ranges::find(tasks, name, name_of);
+  if (found == tasks.end()) return RTS_INVALID_HANDLE;
+  return to_handle(static_cast<std::size_t>(found - tasks.begin()));
+}
+
+RTS_HANDLE TaskTable::find(const Task_Info* info) const noexcept {
+  const auto tasks = tasks_of(setup_.load(std::memory_order_acquire));
+  for (std::size_t i = 0; i < tasks.size(); ++i) {
+    if (&tasks[i] == info) return to_handle(i);
+  }
+  return RTS_INVALID_HANDLE;
+}
+
+Task* TaskTable::task(RTS_HANDLE handle) const noexcept {
+  TaskSet* const tasks = tasks_.load(std::memory_order_acquire);
+  const std::size_t index = std::bit_cast<std::size_t>(handle) - 1;  // of 0 it is beyond any table
+  if (tasks == nullptr || index >= tasks->size()) return nullptr;
+  return &tasks->task(index);
+}
+
+}  // namespace plchost
+
+// What applications call: see plc_app.h.
+
+using plchost::ApplicationHost;
+using plchost::Task;
+
+namespace {
+
+// The task behind the handle, or why there is none.
+RTS_RESULT find_task(RTS_HANDLE handle, Task*& task) noexcept {
+  ApplicationHost* const host = ApplicationHost::current();
+  if (host == nullptr || host->task_table().tasks() == nullptr) return ERR_NOTINITIALIZED;
+  task = host->task_table().task(handle);
+  return task == nullptr ? ERR_PARAMETER : ERR_OK;
+}
+
+}  // namespace
+
+RTS_HANDLE SchedGetTaskHandle(const char* pszTask, RTS_RESULT* pResult) {
+  const auto finish = [&](RTS_RESULT result, RTS_HANDLE handle) {
+    if (pResult != nullptr) *pResult = result;
+    return handle;
+  };
+  ApplicationHost* const host = ApplicationHost::current();
+  if (host == nullptr) return finish(ERR_NOTINITIALIZED, RTS_INVALID_HANDLE);
+  if (pszTask == nullptr) return finish(ERR_PARAMETER, RTS_INVALID_HANDLE);
+  const RTS_HANDLE handle = host->task_table().find(pszTask);
+  return finish(handle == RTS_INVALID_HANDLE ? ERR_NO_OBJECT : ERR_OK, handle);
+}
+
+RTS_HANDLE SchedGetCurrentTask() {
+  ApplicationHost* const host = ApplicationHost::current();
+  return host == nullptr ? RTS_INVALID_HANDLE : host->task_table().find(plc_current_task());
+}
+
+RTS_RESULT SchedGetTaskInterval(RTS_HANDLE hTask, RTS_I64* pIntervalNs) {
+  Task* task = nullptr;
+  if (const RTS_RESULT found = find_task(hTask, task); found != ERR_OK) return found;
+  if (pIntervalNs == nullptr || task->config().kind != plchost::TaskKind::cyclic) return ERR_PARAMETER;
+  *pIntervalNs = task->interval().count();
+  return ERR_OK;
+}
+
+RTS_RESULT SchedSetTaskInterval(RTS_HANDLE hTask, RTS_I64 nIntervalNs) {
+  Task* task = nullptr;
+  if (const RTS_RESULT found = find_task(hTask, task); found != ERR_OK) return found;
+  return task->set_interval(plchost::Duration(nIntervalNs)) ? ERR_OK : ERR_PARAMETER;
+}
+
+RTS_RESULT SchedRaiseEvent(RTS_HANDLE hTask) {
+  Task* task = nullptr;
+  if (const RTS_RESULT found = find_task(hTask, task); found != ERR_OK) return found;
+  return task->raise_event() ? ERR_OK : ERR_PARAMETER;
+}

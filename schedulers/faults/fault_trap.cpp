@@ -1,0 +1,223 @@
+#include "schedulers/faults/fault_trap.hpp"
+
+#include <array>
+#include <cerrno>
+#include <csignal>
+
+#include <sys/eventfd.h>
+#include <sys/syscall.h>
+#include <sys/uio.h>
+#include <ucontext.h>
+#include <unistd.h>
+
+#include "shm/base/memory_guard.hpp"
+#include "shm/base/system_call.hpp"
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+namespace {
+
+constinit thread_local FaultTrap* armed = nullptr;
+constinit thread_local pid_t own_thread = 0;
+
+constexpr std::array kFaults = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGABRT};
+
+int watchdog_signal() noexcept {
+  return SIGRTMAX - 1;
+}
+
+std::uintptr_t instruction_of(const ucontext_t& context) noexcept {
+#if defined(__x86_64__)
+  return static_cast<std::uintptr_t>(context.uc_mcontext.gregs[REG_RIP]);
+#elif defined(__aarch64__)
+  return context.uc_mcontext.pc;
+#else
+  (void)context;
+  return 0;
+#endif
+}
+
+// The guard below a stack refuses what comes next to its end: a call, or the first use of an array.
+bool is_near_stack(std::uintptr_t address, const ucontext_t& context) noexcept {
+  constexpr std::uintptr_t kNear = 64U << 10U;
+#if defined(__x86_64__)
+  const auto stack = static_cast<std::uintptr_t>(context.uc_mcontext.gregs[REG_RSP]);
+#elif defined(__aarch64__)
+  const std::uintptr_t stack = context.uc_mcontext.sp;
+#else
+  (void)context;
+  const std::uintptr_t stack = 0;
+#endif
+  return address + kNear >= stack && address <= stack + kNear;
+}
+
+// Of a jump to where no code is: the instruction after the call. A stack that cannot be read says nothing.
+std::uintptr_t caller_of(const ucontext_t& context) noexcept {
+#if defined(__x86_64__)
+  std::uintptr_t found = 0;
+  const auto stack = static_cast<std::uintptr_t>(context.uc_mcontext.gregs[REG_RSP]);
+  const iovec to{.iov_base = &found, .iov_len = sizeof found};
+  // NOLINTNEXTLINE(performance-no-int-to-ptr): it is an address
+  const iovec from{.iov_base = reinterpret_cast<void*>(stack), .iov_len = sizeof found};
+  return ::process_vm_readv(::getpid(), &to, 1, &from, 1, 0) == ssize_t{sizeof found} ? found : 0;
+#elif defined(__aarch64__)
+  return context.uc_mcontext.regs[30];
+#else
+  (void)context;
+  return 0;
+#endif
+}
+
+// As if there were no handler. A fault of the processor comes back by itself when the handler returns; a
+// signal that was sent is sent again, and so is that of a breakpoint, behind which the thread would go on.
+void crash(int signal, const siginfo_t& info) noexcept {
+  struct sigaction action{};
+  action.sa_handler = SIG_DFL;
+  ::sigaction(signal, &action, nullptr);
+  if (info.si_code <= 0 || signal == SIGTRAP) ::syscall(SYS_tgkill, ::getpid(), ::gettid(), signal);
+}
+
+}  // namespace
+
+void FaultBoard::notify() noexcept {
+  const std::uint64_t one = 1;
+  if (notify_ >= 0) (void)!::write(notify_, &one, sizeof one);  // fails only if it is readable already
+}
+
+bool TaskFault::claim(bool whole_application) noexcept {
+  State none = State::none;
+  if (!state_.compare_exchange_strong(none, State::claimed, std::memory_order_acq_rel)) return false;
+  if (board_ != nullptr && (whole_application || policy_ == WatchdogPolicy::application)) board_->halt();
+  record_.whole_application = board_ != nullptr && board_->halted();
+  record_.unix_ns = unix_time_ns();
+  return true;
+}
+
+void TaskFault::publish() noexcept {
+  // First: the control thread may never get to write it down.
+  if (shown_ != nullptr) shown_->write(record_);
+  state_.store(State::published, std::memory_order_release);
+  if (board_ != nullptr) board_->notify();
+}
+
+void FaultTrap::arm(TaskFault& fault, TimePoint start, bool event_variable) noexcept {
+  if (own_thread == 0) own_thread = ::gettid();
+  thread_.store(own_thread, std::memory_order_relaxed);
+  event_variable_ = event_variable;
+  fault_.store(&fault, std::memory_order_relaxed);
+  started_.store(start.time_since_epoch().count(), std::memory_order_release);
+  armed = this;
+  std::atomic_signal_fence(std::memory_order_seq_cst);
+}
+
+void FaultTrap::disarm() noexcept {
+  std::atomic_signal_fence(std::memory_order_seq_cst);
+  armed = nullptr;
+  started_.store(0, std::memory_order_release);
+}
+
+std::optional<TimePoint> FaultTrap::running_since() const noexcept {
+  const auto started = started_.load(std::memory_order_acquire);
+  if (started == 0) return std::nullopt;
+  return TimePoint(Duration(started));
+}
+
+void FaultTrap::strike(TimePoint since, FaultKind kind, std::int64_t figure, std::int64_t limit) noexcept {
+  struck_figure_.store(figure, std::memory_order_relaxed);
+  struck_kind_.store(kind, std::memory_order_relaxed);
+  struck_limit_.store(limit, std::memory_order_relaxed);
+  struck_.store(since.time_since_epoch().count(), std::memory_order_release);
+  ::syscall(SYS_tgkill, ::getpid(), thread_.load(std::memory_order_relaxed), watchdog_signal());
+}
+
+void FaultTrap::fill_struck(FaultRecord& record) const noexcept {
+  record.kind = struck_kind_.load(std::memory_order_relaxed);
+  record.figure = struck_figure_.load(std::memory_order_relaxed);
+  record.limit = struck_limit_.load(std::memory_order_relaxed);
+}
+
+/// What runs in signal context: only atomics, system calls and the memory of the trap's task.
+struct FaultHandlers {
+  static void on_fault(int signal, siginfo_t* info, void* context) noexcept {
+    const int saved = errno;
+    // What strangers do to a shared memory is not the application's fault, and no cause of death.
+    if (signal == SIGBUS && info->si_code > 0 && MemoryGuard::mend(info->si_addr)) {
+      errno = saved;
+      return;
+    }
+    if (armed == nullptr) {
+      crash(signal, *info);
+      errno = saved;
+      return;
+    }
+    FaultTrap& trap = *armed;
+    if (TaskFault& fault = *trap.fault(); fault.claim(trap.event_variable_)) {
+      fill(fault.record(), trap, context);
+      FaultRecord& record = fault.record();
+      record.kind = FaultKind::signal;
+      record.signal = signal;
+      record.signal_code = info->si_code;
+      // An address that is none, as the processor sees it, is not told: SI_KERNEL.
+      if (info->si_code > 0 && info->si_code != SI_KERNEL)
+        record.memory_address = reinterpret_cast<std::uintptr_t>(info->si_addr);
+      record.stack_overflow = signal == SIGSEGV && info->si_code == SEGV_ACCERR &&
+                              is_near_stack(record.memory_address, *static_cast<const ucontext_t*>(context));
+      const bool no_code =
+          signal == SIGSEGV && info->si_code != SI_KERNEL && record.memory_address == record.address;
+      if (no_code) record.caller = caller_of(*static_cast<const ucontext_t*>(context));
+      park(trap, fault);
+    }
+    park(trap);
+  }
+
+  static void on_watchdog(int, siginfo_t*, void* context) noexcept {
+    if (armed == nullptr) return;  // the cycle has ended in the meantime
+    FaultTrap& trap = *armed;
+    const auto started = trap.started_.load(std::memory_order_relaxed);
+    if (trap.struck_.load(std::memory_order_acquire) != started) return;
+    if (TaskFault& fault = *trap.fault(); fault.claim(trap.event_variable_)) {
+      fill(fault.record(), trap, context);
+      trap.fill_struck(fault.record());
+      park(trap, fault);
+    }
+    park(trap);
+  }
+
+ private:
+  static void fill(FaultRecord& record, const FaultTrap& trap, const void* context) noexcept {
+    record.in_event_variable = trap.event_variable_;
+    record.address = instruction_of(*static_cast<const ucontext_t*>(context));
+  }
+
+  // All signals are blocked in the handlers, so nothing brings the thread back.
+  [[noreturn]] static void park(FaultTrap& trap) noexcept {
+    trap.parked_.store(true, std::memory_order_release);
+    for (;;) ::pause();
+  }
+  [[noreturn]] static void park(FaultTrap& trap, TaskFault& fault) noexcept {
+    trap.parked_.store(true, std::memory_order_release);  // before anybody is told
+    fault.publish();
+    for (;;) ::pause();
+  }
+};
+
+Result<void> install_fault_handlers() {
+  struct sigaction action{};
+  action.sa_flags = SA_SIGINFO | SA_ONSTACK | SA_RESTART;
+  ::sigfillset(&action.sa_mask);
+  action.sa_sigaction = &FaultHandlers::on_fault;
+  for (const int signal : kFaults) {
+    if (const auto set = check_errno(::sigaction(signal, &action, nullptr), "catch " + signal_name(signal));
+        !set)
+      return std::unexpected(set.error());
+  }
+  action.sa_sigaction = &FaultHandlers::on_watchdog;
+  if (const auto set =
+          check_errno(::sigaction(watchdog_signal(), &action, nullptr), "catch the watchdog's signal");
+      !set)
+    return std::unexpected(set.error());
+  return {};
+}
+
+}  // namespace plchost

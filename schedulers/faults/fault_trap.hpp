@@ -1,0 +1,60 @@
+#pragma once
+
+#include <atomic>
+#include <optional>
+
+#include <sys/types.h>
+
+#include "schedulers/faults/task_fault.hpp"
+#include "shm/base/result.hpp"
+
+namespace plchost {
+
+/// One thread that runs an application's code: says for which task it does so now and since when, catches the
+/// faults of that code, and lets a watchdog stop it in the middle. A thread that is caught is parked where it
+/// stands, for good: its state is kept for diagnosis, and nothing of it is undone.
+class FaultTrap {
+ public:
+  /// From now on this thread runs code of the task whose fault this is. Real-time; the trap's own thread.
+  void arm(TaskFault& fault, TimePoint start, bool event_variable = false) noexcept;
+  /// The same, for the next one of several tasks that are looked at in one go.
+  void change(TaskFault& fault) noexcept { fault_.store(&fault, std::memory_order_relaxed); }
+  void disarm() noexcept;
+
+  /// Since when the code runs that is running now. Any thread.
+  [[nodiscard]] std::optional<TimePoint> running_since() const noexcept;
+  [[nodiscard]] TaskFault* fault() const noexcept { return fault_.load(std::memory_order_relaxed); }
+
+  /// Stops the code that runs since `since`, in its middle, with a record of this kind, figure and limit.
+  /// Nothing happens if it has ended by then. The supervision's thread.
+  void strike(TimePoint since, FaultKind kind, std::int64_t figure, std::int64_t limit) noexcept;
+
+  /// Who is or was here; 0: nobody yet. Any thread.
+  [[nodiscard]] pid_t thread() const noexcept { return thread_.load(std::memory_order_relaxed); }
+  /// What strike() was given. Any thread.
+  void fill_struck(FaultRecord& record) const noexcept;
+
+  /// The thread was caught and will never go on. Any thread.
+  [[nodiscard]] bool parked() const noexcept { return parked_.load(std::memory_order_acquire); }
+
+ private:
+  friend struct FaultHandlers;
+
+  std::atomic<TaskFault*> fault_{nullptr};
+  std::atomic<Duration::rep> started_{0};  // 0: no code of an application runs
+  std::atomic<pid_t> thread_{0};
+  std::atomic<bool> parked_{false};
+  bool event_variable_ = false;
+  // What strike() asks for; written before the signal is sent.
+  std::atomic<Duration::rep> struck_{0};
+  std::atomic<FaultKind> struck_kind_{FaultKind::task_watchdog};
+  std::atomic<std::int64_t> struck_figure_{0};
+  std::atomic<std::int64_t> struck_limit_{0};
+};
+
+/// Catches SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP and SIGABRT of this process in code under an armed
+/// trap; anywhere else they do what they did. A SIGBUS in memory under a MemoryGuard is mended. Takes
+/// SIGRTMAX - 1, too, with which a watchdog stops a cycle. Once, before there are other threads. Set-up.
+[[nodiscard]] Result<void> install_fault_handlers();
+
+}  // namespace plchost

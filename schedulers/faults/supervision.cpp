@@ -1,0 +1,198 @@
+#include "schedulers/faults/supervision.hpp"
+
+#include <algorithm>
+
+#include "schedulers/clock_thread.hpp"
+
+namespace plchost {
+
+namespace {
+
+// Where the clock ends before, never.
+TimePoint later(TimePoint from, std::int64_t times, Duration interval) noexcept {
+  Duration::rep distance = 0;
+  Duration::rep sum = 0;
+  const bool ends_before = __builtin_mul_overflow(times, interval.count(), &distance) ||
+                           __builtin_add_overflow(from.time_since_epoch().count(), distance, &sum);
+  return ends_before ? kNoDeadline : TimePoint(Duration(sum));
+}
+
+TimePoint at(const std::atomic<Duration::rep>& stamp) noexcept {
+  return TimePoint(Duration(stamp.load(std::memory_order_relaxed)));
+}
+
+std::vector<bool> freewheeling(const std::vector<std::unique_ptr<Task>>& tasks) {
+  std::vector<bool> are;
+  for (const auto& task : tasks) are.push_back(task->config().kind == TaskKind::freewheeling);
+  return are;
+}
+
+}  // namespace
+
+Supervision::Supervision(Clock& clock, const std::vector<std::unique_ptr<Task>>& tasks,
+                         FaultTrap& event_variables, const ProcessorTimes& times)
+    : clock_(clock),
+      times_(times),
+      watched_(tasks.size() + 1),
+      load_(freewheeling(tasks)),
+      task_times_(tasks.size()) {
+  for (std::size_t i = 0; i < tasks.size(); ++i) {
+    watched_[i].trap = &tasks[i]->trap();
+    watched_[i].task = tasks[i].get();
+  }
+  watched_.back().trap = &event_variables;
+}
+
+Supervision::~Supervision() {
+  ending_.store(true);
+  change(Mode::off);
+}
+
+Result<void> Supervision::start_thread(ThreadPriority priority) {
+  auto thread = start_clock_thread(clock_, "supervision", priority, [this] { run(); });
+  if (!thread) return std::unexpected(std::move(thread.error()));
+  thread_ = std::move(*thread);
+  return {};
+}
+
+void Supervision::begin(const SchedulerSettings& settings, int cores) {
+  for (Watched& watched : watched_) {
+    const auto limit =
+        cycle_limit(watched.task != nullptr ? watched.task->config() : TaskConfig{}, settings.watchdog);
+    watched.lenient.store(limit && limit->lenient, std::memory_order_relaxed);
+    watched.limit.store(limit ? limit->limit.count() : 0, std::memory_order_relaxed);
+  }
+  omitted_cycles_.store(settings.watchdog.omitted_cycles, std::memory_order_relaxed);
+  const bool load = settings.watchdog.load && settings.processor_load_maximum > 0;
+  load_maximum_.store(settings.processor_load_maximum, std::memory_order_relaxed);
+  load_interval_.store(load ? settings.watchdog.load_interval.count() : 0, std::memory_order_relaxed);
+  cores_.store(cores, std::memory_order_relaxed);
+  forgiven_until_.store((clock_.now() + kGrace).time_since_epoch().count(), std::memory_order_relaxed);
+  change(Mode::running);
+}
+
+void Supervision::change(Mode mode) noexcept {
+  mode_.store(mode, std::memory_order_release);
+  order_.fetch_add(1);
+  clock_.wake(order_);
+}
+
+void Supervision::run() noexcept {
+  while (!ending_.load(std::memory_order_acquire)) {
+    const std::uint32_t order = order_.load(std::memory_order_acquire);
+    const bool off = mode_.load(std::memory_order_acquire) == Mode::off;
+    if (off) planned_ = kNoDeadline;
+    clock_.wait(order_, order, off ? kNoDeadline : look(clock_.now()));
+  }
+}
+
+TimePoint Supervision::look(TimePoint now) noexcept {
+  if (planned_ != TimePoint{} && now - planned_ > kStandstill) standstill_end_ = now;
+  TimePoint next = kNoDeadline;
+  for (Watched& watched : watched_) next = std::min(next, look_at(watched, now));
+  if (mode_.load(std::memory_order_relaxed) == Mode::running) next = std::min(next, look_at_load(now));
+  planned_ = next;
+  return next;
+}
+
+TimePoint Supervision::look_at(Watched& watched, TimePoint now) noexcept {
+  if (watched.trap->parked()) return kNoDeadline;
+  const auto since = watched.trap->running_since();
+  const bool releases = watched.task != nullptr && mode_.load(std::memory_order_relaxed) == Mode::running;
+  TimePoint next = since ? look_at_cycle(watched, *since, now) : kNoDeadline;
+  if (!since) {
+    // The next cycle may begin now, or if the task is cyclic at its release.
+    const Duration limit(watched.limit.load(std::memory_order_relaxed));
+    const TimePoint due = releases && watched.task->due() ? *watched.task->due() : now;
+    if (limit > Duration::zero()) next = std::max(due, now) + limit;
+  }
+  return releases ? std::min(next, look_at_releases(watched, now)) : next;
+}
+
+TimePoint Supervision::look_at_cycle(Watched& watched, TimePoint since, TimePoint now) noexcept {
+  if (watched.struck_since == since) {
+    TaskFault& fault = *watched.trap->fault();
+    if (now < watched.struck_at + kPatience) return watched.struck_at + kPatience;
+    // It blocks the signal, or never gets the processor. It halts at the end of its cycle.
+    if (fault.claim()) {
+      watched.trap->fill_struck(fault.record());
+      fault.record().not_caught = 1;
+      fault.publish();
+    }
+    return kNoDeadline;
+  }
+  const Duration limit(watched.limit.load(std::memory_order_relaxed));
+  if (limit == Duration::zero()) return kNoDeadline;
+  const bool lenient = watched.lenient.load(std::memory_order_relaxed);
+  const TimePoint from = lenient ? std::max(since, standstill_end_) : since;
+  if (now <= from + limit) return from + limit + Duration(1);
+  strike(watched, since, now, FaultKind::task_watchdog, (now - since).count(), limit.count());
+  return now + kPatience;
+}
+
+TimePoint Supervision::look_at_releases(Watched& watched, TimePoint now) noexcept {
+  Task& task = *watched.task;
+  const auto allowed = static_cast<std::int64_t>(task.config().watchdog.omitted_cycles);
+  const auto due = task.due();
+  if (allowed == 0 || !due || task.fault().raised() || !omitted_cycles_.load(std::memory_order_relaxed))
+    return kNoDeadline;
+  const Duration interval = task.interval();
+  const TimePoint hit = later(std::max(*due, at(forgiven_until_)), allowed, interval);
+  if (now < hit) return hit;
+  const std::int64_t omitted = (now - *due) / interval;
+  if (const auto since = watched.trap->running_since()) {
+    strike(watched, *since, now, FaultKind::omitted_cycles, omitted, allowed);
+    return now + kPatience;
+  }
+  if (task.fault().claim()) {
+    FaultRecord& record = task.fault().record();
+    record.kind = FaultKind::omitted_cycles;
+    record.figure = omitted;
+    record.limit = allowed;
+    task.fault().publish();
+  }
+  return kNoDeadline;
+}
+
+void Supervision::strike(Watched& watched, TimePoint since, TimePoint now, FaultKind kind,
+                         std::int64_t figure, std::int64_t limit) noexcept {
+  if (watched.struck_since == since) return;
+  watched.struck_since = since;
+  watched.struck_at = now;
+  watched.trap->strike(since, kind, figure, limit);
+}
+
+LoadRule::Sample Supervision::sample_load() noexcept {
+  for (std::size_t i = 0; i < task_times_.size(); ++i) {
+    const pid_t thread = watched_[i].trap->thread();
+    task_times_[i] = thread != 0 ? times_.of_thread(thread) : Duration::zero();
+  }
+  return {.process = times_.of_process(), .tasks = task_times_};
+}
+
+TimePoint Supervision::look_at_load(TimePoint now) noexcept {
+  const Duration interval(load_interval_.load(std::memory_order_relaxed));
+  if (interval == Duration::zero()) return kNoDeadline;
+  const auto epoch = forgiven_until_.load(std::memory_order_relaxed);
+  if (const TimePoint from = at(forgiven_until_); now < from) return from;
+  if (load_epoch_ != epoch) {
+    load_epoch_ = epoch;
+    load_.begin(now, sample_load());
+    return now + interval;
+  }
+  if (now < load_.begun() + interval) return load_.begun() + interval;
+  const int maximum = load_maximum_.load(std::memory_order_relaxed);
+  if (const auto hit = load_.end(now, sample_load(), maximum, cores_.load(std::memory_order_relaxed))) {
+    TaskFault& fault = watched_[hit->task].task->fault();
+    if (fault.claim(true)) {
+      FaultRecord& record = fault.record();
+      record.kind = FaultKind::processor_load;
+      record.figure = hit->percent;
+      record.limit = maximum;
+      fault.publish();
+    }
+  }
+  return now + interval;
+}
+
+}  // namespace plchost

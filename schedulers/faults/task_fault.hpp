@@ -1,0 +1,72 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "schedulers/task/task_config.hpp"
+#include "shm/base/fault_record.hpp"
+#include "shm/base/seqlock.hpp"
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+/// What all tasks of a set share about faults: whoever finds one raises it here, the control thread waits for
+/// it on a descriptor.
+class FaultBoard {
+ public:
+  /// `notify`: an eventfd; -1: nobody is told.
+  explicit FaultBoard(int notify = -1) noexcept : notify_(notify) {}
+  /// From now on no task begins another cycle. Any context, signal handlers included.
+  void halt() noexcept { halted_.store(true, std::memory_order_relaxed); }
+  [[nodiscard]] bool halted() const noexcept { return halted_.load(std::memory_order_relaxed); }
+  /// A record is complete. Any context, signal handlers included.
+  void notify() noexcept;
+
+ private:
+  int notify_;
+  std::atomic<bool> halted_{false};
+};
+
+/// The fault of one task: raised once, by whoever is first, and kept.
+class TaskFault {
+ public:
+  TaskFault(FaultBoard* board, WatchdogPolicy policy) noexcept : board_(board), policy_(policy) {}
+
+  /// Where the record is shown from publish() on, in memory that outlives this process. Set-up.
+  void show_in(Seqlock<FaultRecord>* shown) noexcept { shown_ = shown; }
+
+  /// Raises it if it was not raised before: then the caller, and only it, fills record() and calls publish().
+  /// Any context, signal handlers included. `whole_application`: whatever the policy says.
+  [[nodiscard]] bool claim(bool whole_application = false) noexcept;
+  [[nodiscard]] FaultRecord& record() noexcept { return record_; }
+  void publish() noexcept;
+
+  [[nodiscard]] bool raised() const noexcept { return state_.load(std::memory_order_relaxed) != State::none; }
+  /// Null until publish(). Any thread.
+  [[nodiscard]] const FaultRecord* published() const noexcept {
+    return state_.load(std::memory_order_acquire) == State::published ? &record_ : nullptr;
+  }
+  /// The task may not begin another cycle. Any thread, real-time.
+  [[nodiscard]] bool halts() const noexcept { return raised() || (board_ != nullptr && board_->halted()); }
+  [[nodiscard]] WatchdogPolicy policy() const noexcept { return policy_; }
+
+ private:
+  enum class State : std::uint8_t { none, claimed, published };
+
+  FaultBoard* board_;
+  WatchdogPolicy policy_;
+  std::atomic<State> state_{State::none};
+  FaultRecord record_;
+  Seqlock<FaultRecord>* shown_ = nullptr;
+};
+
+/// Within a catch (...): raises the fault for the exception that is being handled. Real-time.
+void raise_current_exception(TaskFault& fault, bool event_variable = false) noexcept;
+
+/// The task has not come to the end of its cycle, or its event variable has not returned, within `limit`:
+/// raises the fault, and whatever its policy says no task begins another cycle. Nothing happens if a fault
+/// was raised before. Control thread.
+void raise_stop_timeout(TaskFault& fault, StopPhase phase, Duration limit,
+                        bool event_variable = false) noexcept;
+
+}  // namespace plchost

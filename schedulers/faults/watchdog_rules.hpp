@@ -1,0 +1,101 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "schedulers/scheduler.hpp"
+#include "schedulers/task/task_config.hpp"
+
+namespace plchost {
+
+/// How long a cycle may take before it is stopped in its middle; nothing: as long as it likes. Pure.
+struct CycleLimit {
+  Duration limit{};
+  /// The guard against endless loops that tasks without a watchdog of their own have: time in which the whole
+  /// process stood still does not count.
+  bool lenient = false;
+  bool operator==(const CycleLimit&) const = default;
+};
+[[nodiscard]] std::optional<CycleLimit> cycle_limit(const TaskConfig& task,
+                                                    const WatchdogSettings& settings) noexcept;
+/// The guard against endless loops is as long as the task's interval, but at most so many times its own time.
+inline constexpr int kMostStretch = 10;
+/// The limits in force, one line for each that there is, with the tasks that have it.
+[[nodiscard]] std::vector<std::string> describe_cycle_limits(std::span<const TaskConfig> tasks,
+                                                             const WatchdogSettings& settings);
+
+/// A task's look at its own cycles, when they end. Real-time.
+class OverrunRule {
+ public:
+  enum class Verdict : std::uint8_t { fine, too_long, too_many_in_a_row };
+
+  explicit OverrunRule(const TaskWatchdog& watchdog) noexcept
+      : time_(watchdog.time),
+        limit_(watchdog.time * watchdog.sensitivity),
+        sensitivity_(watchdog.sensitivity) {}
+
+  /// The next cycle is the first after a start or after an exchange of the scheduler: it may be slow, so it
+  /// is not counted among those in a row.
+  void forgive_next() noexcept {
+    in_a_row_ = 0;
+    forgiven_ = true;
+  }
+
+  [[nodiscard]] Verdict ended(Duration execution) noexcept {
+    if (time_ == Duration::zero()) return Verdict::fine;
+    const bool counts = !std::exchange(forgiven_, false);
+    if (execution > limit_) return Verdict::too_long;
+    if (execution <= time_ || !counts) {
+      in_a_row_ = 0;
+      return Verdict::fine;
+    }
+    return ++in_a_row_ >= sensitivity_ ? Verdict::too_many_in_a_row : Verdict::fine;
+  }
+
+  [[nodiscard]] std::uint32_t in_a_row() const noexcept { return in_a_row_; }
+  [[nodiscard]] Duration time() const noexcept { return time_; }
+  [[nodiscard]] Duration limit() const noexcept { return limit_; }
+
+ private:
+  Duration time_;
+  Duration limit_;
+  std::uint32_t sensitivity_;
+  std::uint32_t in_a_row_ = 0;
+  bool forgiven_ = true;
+};
+
+/// The processor load of an instance, window by window. What freewheeling tasks use does not count: they take
+/// what is left and limit themselves. One thread.
+class LoadRule {
+ public:
+  struct Sample {
+    Duration process;                 ///< CPU time of the whole process since its start
+    std::span<const Duration> tasks;  ///< of each task's thread; in the order given to the constructor
+  };
+  struct Hit {
+    int percent;
+    std::size_t task;  ///< that used the most
+  };
+
+  explicit LoadRule(std::vector<bool> freewheeling) : freewheeling_(std::move(freewheeling)) {}
+
+  /// A window begins with this sample.
+  void begin(TimePoint now, const Sample& sample);
+  /// A window ends, and the next one begins. `cores`: how many the instance may use. Hits above `maximum`
+  /// percent of one core; of several cores, if one thread alone or all together on average use more of one.
+  [[nodiscard]] std::optional<Hit> end(TimePoint now, const Sample& sample, int maximum, int cores);
+  [[nodiscard]] TimePoint begun() const noexcept { return begun_; }
+
+ private:
+  std::vector<bool> freewheeling_;
+  TimePoint begun_;
+  Duration process_{};
+  std::vector<Duration> tasks_;
+};
+
+}  // namespace plchost

@@ -1,0 +1,103 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+
+#include "schedulers/activation/activation.hpp"
+#include "schedulers/activation/event_latch.hpp"
+#include "schedulers/clock.hpp"
+#include "schedulers/distributed_clock/distributed_clock.hpp"
+#include "schedulers/faults/fault_trap.hpp"
+#include "schedulers/faults/watchdog_rules.hpp"
+#include "schedulers/task/freewheel_rule.hpp"
+#include "schedulers/task/release_grid.hpp"
+#include "schedulers/task/task_config.hpp"
+#include "schedulers/task/task_recorder.hpp"
+#include "shm/base/counted_event.hpp"
+#include "shm/base/task_statistics.hpp"
+
+namespace plchost {
+
+/// One IEC task: what it runs, its statistics, and all that outlives an exchange of its ActivationSource: the
+/// grid, the place in its external event, the level of its event variable.
+class Task {
+ public:
+  /// `config` is valid; `event` is the counter of config.external_event, null for the other kinds. `board`:
+  /// what the tasks of a set share; null: alone.
+  Task(Clock& clock, TaskConfig config, TaskStatistics& statistics, CountedEvent* event,
+       FaultBoard* board = nullptr) noexcept;
+
+  [[nodiscard]] const TaskConfig& config() const noexcept { return config_; }
+
+  /// Cyclic tasks: from now on each release that is planned is moved as `follower` says; it outlives the
+  /// task. Set-up, before the first begin().
+  void follow(ClockFollower& follower) noexcept { follower_ = &follower; }
+  /// Null: it follows no clock. Any context.
+  [[nodiscard]] const ClockFollower* follower() const noexcept { return follower_; }
+
+  /// Set-up, while the task is parked: a new grid from `origin` on; what happened while it was parked does
+  /// not count.
+  void begin(TimePoint origin);
+
+  /// What a cyclic or freewheeling task runs next: the same answer until a cycle has run. The task's thread.
+  [[nodiscard]] Activation next_release(const FreewheelRule& rule) const noexcept;
+
+  /// Runs one cycle and records it. A C++ exception out of the application's code, or a cycle that the
+  /// watchdog does not allow, raises fault(). The task's thread, real-time.
+  void run_cycle(const Activation& activation) noexcept;
+  /// The next cycle is the first from another source. The task's thread.
+  void source_changed() noexcept { overruns_.forgive_next(); }
+
+  [[nodiscard]] TaskFault& fault() noexcept { return fault_; }
+  [[nodiscard]] const TaskFault& fault() const noexcept { return fault_; }
+  [[nodiscard]] FaultTrap& trap() noexcept { return trap_; }
+  /// The first release that no cycle has begun for; nothing unless cyclic. Any thread.
+  [[nodiscard]] std::optional<TimePoint> due() const noexcept;
+
+  /// Cyclic tasks: a new interval, from kMinRuntimeInterval to kMaxInterval. The release that is planned now
+  /// stays; the grid goes on from there in steps of the new interval, until it is set again: also after an
+  /// exchange of the scheduler, and after a stop and start. Called within a cycle it already places the
+  /// release that follows this cycle. false: not a cyclic task, or out of range. Any context.
+  [[nodiscard]] bool set_interval(Duration interval) noexcept;
+  /// The interval that was set last; 0 unless cyclic. Any context.
+  [[nodiscard]] Duration interval() const noexcept;
+  /// The interval that the grid has now: behind the release that is planned. The task's thread, real-time.
+  [[nodiscard]] Duration interval_in_force() const noexcept { return grid_.interval(); }
+
+  /// Event tasks: one rising edge by call, released at the scheduler's next poll; n calls are n runs. From
+  /// the first call on the task's variable is not looked at any more. false: not an event task. Any context.
+  bool raise_event() noexcept;
+
+  [[nodiscard]] EventLatch& latch() noexcept { return latch_; }
+  [[nodiscard]] EventCursor& cursor() noexcept { return cursor_; }
+  [[nodiscard]] CountedEvent& event() noexcept { return *event_; }
+
+  /// All but the cycle count begins anew. False: a record is under way; try again. Set-up.
+  [[nodiscard]] bool reset_statistics() noexcept { return recorder_.reset(clock_.now()); }
+
+ private:
+  [[nodiscard]] bool run_entry() noexcept;
+  void look_at_overrun(Duration execution) noexcept;
+  void set_due(TimePoint due) noexcept;
+  void record(const Activation& activation, TimePoint start, TimePoint end) noexcept;
+
+  Clock& clock_;
+  TaskConfig config_;
+  CountedEvent* event_;
+  TaskRecorder recorder_;
+
+  ReleaseGrid grid_;                            // cyclic
+  std::atomic<Duration::rep> wanted_interval_;  // of the grid, from the end of the next cycle on
+  ClockFollower* follower_ = nullptr;
+  EventLatch latch_;           // event
+  EventCursor cursor_;         // external
+  TimePoint ready_;            // since when it could run: the end of its last cycle
+  Duration last_execution_{};  // freewheeling: processor time of its last cycle
+  bool begun_ = false;         // has run since begin()
+  OverrunRule overruns_;
+  TaskFault fault_;
+  FaultTrap trap_;
+  std::atomic<Duration::rep> due_{0};
+};
+
+}  // namespace plchost

@@ -1,0 +1,70 @@
+#include "schedulers/tick/tick_choice.hpp"
+
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "schedulers/tick/tick_source.hpp"
+
+namespace plchost {
+
+namespace {
+
+Result<std::shared_ptr<TickDevice>> device_for(const SchedulerSettings& settings, DeviceFiles& files,
+                                               const std::shared_ptr<TickDevice>& known) {
+  auto device = known;
+  if (!device || device->path() != settings.auxiliary_device) {
+    auto opened = TickDevice::open(files, settings.auxiliary_device);
+    if (!opened) return std::unexpected(std::move(opened).error());
+    device = *std::move(opened);
+  }
+  if (auto set = device->set_period(settings.scheduler_interval); !set) {
+    return std::unexpected(std::move(set).error());
+  }
+  return device;
+}
+
+}  // namespace
+
+TickChoice choose_tick(const SchedulerSettings& settings, DeviceFiles& files,
+                       const std::shared_ptr<TickDevice>& known) {
+  TickChoice choice{
+      .kind = settings.tick_source, .device = {}, .capabilities = kKernelTimerCapabilities, .fallback = {}};
+  if (settings.tick_source != TickSourceKind::auxiliary) return choice;
+  auto device = device_for(settings, files, known);
+  if (!device) {
+    choice.kind = TickSourceKind::system;
+    choice.fallback = device.error().describe();
+    return choice;
+  }
+  choice.device = *std::move(device);
+  choice.capabilities = choice.device->capabilities();
+  return choice;
+}
+
+Result<void> check_one_shot(const Scheduler& scheduler, const TickChoice& choice) {
+  if (!scheduler.capabilities().one_shot || choice.kind != TickSourceKind::auxiliary) return {};
+  const TickCapabilities& can = choice.capabilities;
+  const bool linear = can.periods == TickCapabilities::Periods::linear;
+  if (linear && can.one_shot) return {};
+  return failure(
+      ErrorCode::unsupported,
+      fmt::format("{} sets its timer to another time in each cycle, but {} {}{}: use the timer source "
+                  "System or Task",
+                  scheduler.name(), choice.device->path(),
+                  linear ? ""
+                         : (can.periods == TickCapabilities::Periods::powers_of_two
+                                ? "only has frequencies that are powers of two"
+                                : "only has frequencies in whole hertz"),
+                  can.one_shot ? "" : (linear ? "ticks only periodically" : " and ticks only periodically")));
+}
+
+TickReport report_of(const TickChoice& choice) {
+  if (choice.kind == TickSourceKind::task) return {.source = "Task", .fallback = {}};
+  if (choice.kind == TickSourceKind::system) return {.source = "System", .fallback = choice.fallback};
+  const TickFault fault = choice.device->fault();
+  if (fault == TickFault::none) return {.source = choice.device->describe(), .fallback = {}};
+  return {.source = "System", .fallback = fmt::format("{} {}", choice.device->path(), to_string(fault))};
+}
+
+}  // namespace plchost

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "schedulers/scheduler.hpp"
+#include "schedulers/tick/tick_device.hpp"
+
+namespace plchost {
+
+/// Which source of ticks a scheduler gets.
+struct TickChoice {
+  TickSourceKind kind = TickSourceKind::system;
+  std::shared_ptr<TickDevice> device;  ///< of TickSourceKind::auxiliary
+  TickCapabilities capabilities;
+  std::string fallback;  ///< why it is not the one that the settings ask for; empty: it is
+};
+
+/// What the settings ask for, or the system's clock if that is not there or cannot make the period. `known`
+/// is used again if it is the same device: most can be opened only once. Set-up.
+[[nodiscard]] TickChoice choose_tick(const SchedulerSettings& settings, DeviceFiles& files,
+                                     const std::shared_ptr<TickDevice>& known);
+
+/// unsupported: this scheduler sets its timer anew each cycle, and the source cannot. The text says why, and
+/// what can.
+[[nodiscard]] Result<void> check_one_shot(const Scheduler& scheduler, const TickChoice& choice);
+
+/// Where the ticks come from now.
+struct TickReport {
+  std::string source;    ///< "System", "Task", "Auxiliary /dev/rtc0 (RTC, 1024 Hz)"
+  std::string fallback;  ///< why it is not the one that the settings ask for; empty: it is
+};
+[[nodiscard]] TickReport report_of(const TickChoice& choice);
+
+}  // namespace plchost

@@ -1,0 +1,88 @@
+#include "schedulers/tick/tick_source.hpp"
+
+#include <utility>
+
+#include "schedulers/activation/activation_gate.hpp"
+#include "schedulers/tick/auxiliary_tick.hpp"
+
+namespace plchost {
+
+namespace {
+
+/// The grid of the ticks: which of them is the last that has passed.
+class TickGrid {
+ public:
+  void start(TimePoint first, Duration period) noexcept {
+    next_ = first;
+    period_ = period;
+  }
+  [[nodiscard]] TimePoint next() const noexcept { return next_; }
+  /// `now` is not before next().
+  [[nodiscard]] TimePoint take(TimePoint now) noexcept {
+    const TimePoint tick = next_ + (now - next_) / period_ * period_;
+    next_ = tick + period_;
+    return tick;
+  }
+
+ private:
+  TimePoint next_;
+  Duration period_{1};
+};
+
+/// The system's clock: a periodic timer of the kernel.
+class SystemTick final : public TickSource {
+ public:
+  SystemTick(Clock& clock, std::unique_ptr<PeriodicTimer> timer) noexcept
+      : clock_(clock), timer_(std::move(timer)) {}
+
+  [[nodiscard]] TickCapabilities capabilities() const noexcept override { return kKernelTimerCapabilities; }
+  void start(TimePoint first, Duration period) noexcept override {
+    grid_.start(first, period);
+    timer_->start(first, period);
+  }
+  std::optional<TimePoint> wait() noexcept override {
+    while (timer_->wait() != 0) {
+      if (const TimePoint now = clock_.now(); now >= grid_.next()) return grid_.take(now);
+    }
+    return std::nullopt;
+  }
+  void interrupt() noexcept override { timer_->interrupt(); }
+
+ private:
+  Clock& clock_;
+  std::unique_ptr<PeriodicTimer> timer_;
+  TickGrid grid_;
+};
+
+/// A thread of high priority in absolute sleeps.
+class TaskTick final : public TickSource {
+ public:
+  explicit TaskTick(Clock& clock) noexcept : clock_(clock) {}
+
+  [[nodiscard]] TickCapabilities capabilities() const noexcept override { return kKernelTimerCapabilities; }
+  void start(TimePoint first, Duration period) noexcept override { grid_.start(first, period); }
+  std::optional<TimePoint> wait() noexcept override {
+    if (gate_.wait(clock_, grid_.next()) != ActivationGate::Outcome::timed_out) return std::nullopt;
+    return grid_.take(clock_.now());
+  }
+  void interrupt() noexcept override { gate_.interrupt(clock_); }
+
+ private:
+  Clock& clock_;
+  ActivationGate gate_;
+  TickGrid grid_;
+};
+
+}  // namespace
+
+Result<std::unique_ptr<TickSource>> make_tick_source(const SchedulerContext& context) {
+  Clock& clock = context.clock;
+  if (context.settings.tick_source == TickSourceKind::task) return std::make_unique<TaskTick>(clock);
+  auto timer = clock.make_periodic_timer();
+  if (!timer) return std::unexpected(std::move(timer.error()));
+  auto system = std::make_unique<SystemTick>(clock, std::move(*timer));
+  if (context.settings.tick_source == TickSourceKind::system) return system;
+  return std::make_unique<AuxiliaryTick>(clock, context.tick_device, std::move(system));
+}
+
+}  // namespace plchost
