@@ -110,7 +110,7 @@ TEST_F(ExceptionOfAnInstance, OutlivesAFileThatIsNone) {
   std::this_thread::sleep_for(std::chrono::milliseconds(300));
   EXPECT_EQ(shown("line1")->count, 1U);
   std::filesystem::remove(path());
-  add("Label");
+  add("Fill");
   add("Label");
   EXPECT_TRUE(eventually_shown(2));
 }
