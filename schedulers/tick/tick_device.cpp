@@ -14,7 +14,7 @@ namespace plchost {
 
 namespace {
 
-constexpr double kSecond = 1e9;
+constexpr double kNsPerSecond = 1e9;
 constexpr std::uint32_t kLowestRtc = 2;
 constexpr std::uint32_t kHighestRtc = 8192;
 constexpr std::uint32_t kHighestHpet = 100'000;
@@ -25,12 +25,12 @@ unsigned long address_of(T& value) noexcept {
 }
 
 Duration period_of(std::uint32_t hertz) noexcept {
-  return Duration(static_cast<Duration::rep>(std::llround(kSecond / hertz)));
+  return Duration(static_cast<Duration::rep>(std::llround(kNsPerSecond / hertz)));
 }
 
 // The frequencies around a period, the higher one first. Both may be the same.
 std::pair<std::uint32_t, std::uint32_t> around(Duration period, bool powers_of_two) noexcept {
-  const double wanted = kSecond / static_cast<double>(period.count());
+  const double wanted = kNsPerSecond / static_cast<double>(period.count());
   if (!powers_of_two) {
     const auto clamp = [](double hertz) {
       return static_cast<std::uint32_t>(std::clamp(hertz, 1.0, static_cast<double>(kHighestHpet)));
