@@ -58,7 +58,8 @@ tests() { # tests DIR OPTIONS...
   local dir=$1
   shift
   # A shared machine may stand still for seconds in the middle of a test; twice in a row is a failure of ours.
-  ctest --test-dir "$dir" --output-on-failure -j "$jobs" --no-tests=error --repeat until-pass:2 "$@"
+  # One more than there are cores: most of them wait most of the time.
+  ctest --test-dir "$dir" --output-on-failure -j $((jobs + 1)) --no-tests=error --repeat until-pass:2 "$@"
 }
 count() { # adds up the summary of the step that just ran
   local all bad
