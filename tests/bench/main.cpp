@@ -145,7 +145,7 @@ int main(int argc, char** argv) {
   CLI::App app("Measures plchost beside the floor of this machine", "plchost-bench");
   Options options;
   app.add_option("--json", options.json, "write the figures to this file");
-  app.add_option("--markdown", options.markdown, "write them to this file as the README's tables");
+  app.add_option("--markdown", options.markdown, "write them to this file as tables");
   app.add_option("--plots", options.plots, "draw the figures into this folder, as SVG");
   app.add_flag("--quick", options.quick,
                "minutes instead of most of an hour: 5 s of each thing instead of 60");
