@@ -13,6 +13,7 @@
 #include <sys/syscall.h>
 #include <sys/un.h>
 
+#include "shm/base/cpu_list.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/thread.hpp"
 
@@ -62,9 +63,7 @@ void allow_many_files() {
 
 Result<std::vector<int>> bind_to_cores(const std::vector<int>& cores) {
   if (cores.empty()) return allowed_cores(0);
-  auto wanted = cores;
-  std::ranges::sort(wanted);
-  wanted.erase(std::ranges::unique(wanted).begin(), wanted.end());
+  const auto wanted = each_once(cores);
   const auto online = online_cores();
   const std::string known = online ? fmt::format("; on line are {}", fmt::join(*online, ",")) : std::string();
   auto granted = bind_process_to_cores(0, wanted);
