@@ -14,7 +14,6 @@ namespace plchost {
 
 namespace {
 
-constexpr std::string_view kTaskPrefix = "Task.";
 constexpr std::array<std::string_view, 2> kPlatforms = {"VxWorks.", "Linux."};
 
 template <class... Cases>

@@ -82,6 +82,7 @@ struct SettingKey {
 };
 
 inline constexpr std::string_view kTaskSections = "Task.NAME";
+inline constexpr std::string_view kTaskPrefix = "Task.";  ///< what its name begins with
 
 // The tables, one for each file settings_*.cpp. A new one is added to all_setting_keys().
 [[nodiscard]] std::span<const SettingKey> schedule_keys() noexcept;

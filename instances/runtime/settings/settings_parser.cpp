@@ -14,7 +14,6 @@ namespace plchost {
 namespace {
 
 constexpr std::string_view kBlank = " \t\v\f";
-constexpr std::string_view kTaskPrefix = "Task.";
 
 std::string_view trim(std::string_view text) {
   text.remove_prefix(std::min(text.find_first_not_of(kBlank), text.size()));
