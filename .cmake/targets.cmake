@@ -40,12 +40,26 @@ function(plchost_library name)
   target_precompile_headers(${name} REUSE_FROM plchost_headers)
 endfunction()
 
-# plchost_program(NAME SOURCES... LINKS ...)
+# plchost_program(NAME SOURCES... LINKS ... [HEADERS TARGET]): TARGET is one of plchost_headers()
 function(plchost_program name)
-  cmake_parse_arguments(arg "" "" "SOURCES;LINKS" ${ARGN})
+  cmake_parse_arguments(arg "" "HEADERS" "SOURCES;LINKS" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE ${arg_LINKS})
   plchost_options(${name})
+  if(arg_HEADERS)
+    # What uses precompiled headers must be compiled as they were: for a library.
+    set_target_properties(${name} PROPERTIES POSITION_INDEPENDENT_CODE OFF)
+    target_compile_options(${name} PRIVATE -fPIC)
+    target_precompile_headers(${name} REUSE_FROM ${arg_HEADERS})
+  endif()
+endfunction()
+
+# plchost_command_line(FILE...): files that include CLI11, which compiles in ten seconds, half of them to make fast what
+# runs once. Where ten files are one, they are not optimised anyway.
+function(plchost_command_line)
+  if(NOT CMAKE_UNITY_BUILD)
+    set_source_files_properties(${ARGN} PROPERTIES COMPILE_OPTIONS -O0 SKIP_PRECOMPILE_HEADERS ON)
+  endif()
 endfunction()
 
 # A control program: a shared object that plc-instance loads. Unique symbols would survive dlclose

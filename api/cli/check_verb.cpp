@@ -3,7 +3,6 @@
 #include <memory>
 #include <vector>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "api/cli/cli_session.hpp"
@@ -72,16 +71,12 @@ int check_host(CliSession& session, bool all) {
 
 }  // namespace
 
-void add_check_verb(CLI::App& app, CliSession& session, Action& action) {
-  CLI::App* const verb =
-      app.add_subcommand("check", "Look for what stands between a controller and its best");
-  verb->require_subcommand(1)->fallthrough();
+void add_check_verb(const Command& plcctl, CliSession& session) {
   const auto all = std::make_shared<bool>(false);
-  CLI::App* const noun =
-      verb->add_subcommand("host", "What to change at the controller, the worst first")->fallthrough();
-  noun->add_flag("--all", *all, "also what is as it should be");
-  noun->callback(
-      [&session, &action, all] { action = [&session, all] { return check_host(session, *all); }; });
+  plcctl.verb("check", "Look for what stands between a controller and its best")
+      .noun("host", "What to change at the controller, the worst first",
+            [&session, all] { return check_host(session, *all); })
+      .flag("--all", *all, "also what is as it should be");
 }
 
 }  // namespace plchost

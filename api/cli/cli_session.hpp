@@ -1,18 +1,14 @@
 #pragma once
 
-#include <functional>
 #include <memory>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "api/cli/command.hpp"
 #include "api/cli/table.hpp"
 #include "api/client/control_client.hpp"
-
-namespace CLI {
-class App;
-}
 
 namespace plchost {
 
@@ -66,15 +62,12 @@ class CliSession {
 template <class Sample>
 using Snapshot = Result<std::vector<Sample>> (ControlClient::*)(const std::string&, TimePoint);
 
-/// A verb sets this when it was chosen; main runs it after all options are read.
-using Action = std::function<int()>;
-
-void add_list_verbs(CLI::App& app, CliSession& session, Action& action);
-void add_show_verbs(CLI::App& app, CliSession& session, Action& action);
-void add_command_verbs(CLI::App& app, CliSession& session, Action& action);
-void add_check_verb(CLI::App& app, CliSession& session, Action& action);
-void add_post_verb(CLI::App& app, CliSession& session, Action& action);
-void add_watch_verb(CLI::App& app, CliSession& session, Action& action);
+void add_list_verbs(const Command& plcctl, CliSession& session);
+void add_show_verbs(const Command& plcctl, CliSession& session);
+void add_command_verbs(const Command& plcctl, CliSession& session);
+void add_check_verb(const Command& plcctl, CliSession& session);
+void add_post_verb(const Command& plcctl, CliSession& session);
+void add_watch_verb(const Command& plcctl, CliSession& session);
 
 /// "I/T" split at the first slash. invalid_argument: no slash, or nothing on one side of it.
 [[nodiscard]] Result<std::pair<std::string, std::string>> split_name(std::string_view what,

@@ -2,7 +2,6 @@
 #include <memory>
 #include <utility>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "api/cli/cli_session.hpp"
@@ -68,14 +67,6 @@ int command_event(CliSession& session, std::int32_t operation, const std::string
   return command(session, {"", operation, parts->first, parts->second});
 }
 
-/// A verb may have several nouns.
-CLI::App* add_verb(CLI::App& app, const char* verb, const char* noun, const char* text) {
-  const auto known = app.get_subcommands([verb](CLI::App* other) { return other->get_name() == verb; });
-  CLI::App* const outer = known.empty() ? app.add_subcommand(verb, text) : known.front();
-  outer->require_subcommand(1)->fallthrough();
-  return outer->add_subcommand(noun, text)->fallthrough();
-}
-
 /// "INSTANCE/TASK", or "INSTANCE" for all of its tasks.
 int reset_statistics(CliSession& session, const std::string& name) {
   if (name.find('/') == std::string::npos) {
@@ -86,81 +77,79 @@ int reset_statistics(CliSession& session, const std::string& name) {
   return command(session, {"", plc_OPERATION_RESET_STATISTICS, parts->first, parts->second});
 }
 
-void add_plain(CLI::App& app, CliSession& session, Action& action, const char* verb, std::int32_t operation,
+void add_plain(const Command& plcctl, CliSession& session, const char* verb, std::int32_t operation,
                const char* text) {
   const auto name = std::make_shared<std::string>();
-  CLI::App* const noun = add_verb(app, verb, "instance", text);
-  noun->add_option("INSTANCE", *name)->required();
-  noun->callback([&session, &action, name, operation] {
-    action = [&session, name, operation] { return command(session, {"", operation, *name, ""}); };
-  });
+  plcctl.verb(verb, text)
+      .noun("instance", text,
+            [&session, name, operation] { return command(session, {"", operation, *name, ""}); })
+      .argument("INSTANCE", *name);
 }
 
-void add_reset(CLI::App& app, CliSession& session, Action& action) {
+void add_reset(const Command& plcctl, CliSession& session) {
+  const Command verb = plcctl.verb("reset", "Begin anew: an instance, or its statistics");
   const auto name = std::make_shared<std::string>();
   const auto cold = std::make_shared<bool>(false);
-  CLI::App* const noun =
-      add_verb(app, "reset", "instance", "Load the application anew, in a fresh process, stopped");
-  noun->add_option("INSTANCE", *name)->required();
-  noun->add_flag("--cold", *cold, "tell the application to begin with initial values");
-  noun->callback([&session, &action, name, cold] {
-    action = [&session, name, cold] {
-      return command(session, {"", *cold ? plc_OPERATION_RESET_COLD : plc_OPERATION_RESET, *name, ""});
-    };
-  });
+  verb.noun("instance", "Load the application anew, in a fresh process, stopped",
+            [&session, name, cold] {
+              return command(session,
+                             {"", *cold ? plc_OPERATION_RESET_COLD : plc_OPERATION_RESET, *name, ""});
+            })
+      .argument("INSTANCE", *name)
+      .flag("--cold", *cold, "tell the application to begin with initial values");
+  verb.noun("statistics", "Begin the statistics of a task, or of all of an instance, anew",
+            [&session, name] { return reset_statistics(session, *name); })
+      .argument("INSTANCE[/TASK]", *name);
 }
 
-void add_event(CLI::App& app, CliSession& session, Action& action, const char* verb, std::int32_t operation,
+void add_event(const Command& plcctl, CliSession& session, const char* verb, std::int32_t operation,
                const char* text) {
   const auto name = std::make_shared<std::string>();
-  CLI::App* const noun = add_verb(app, verb, "event", text);
-  noun->add_option("INSTANCE/EVENT", *name)->required();
-  noun->callback([&session, &action, name, operation] {
-    action = [&session, name, operation] { return command_event(session, operation, *name); };
-  });
+  plcctl.verb(verb, text)
+      .noun("event", text, [&session, name, operation] { return command_event(session, operation, *name); })
+      .argument("INSTANCE/EVENT", *name);
+}
+
+void add_load(const Command& plcctl, CliSession& session) {
+  const auto instance = std::make_shared<std::string>();
+  const auto file = std::make_shared<std::string>();
+  const char* const text = "Load another application into an instance";
+  plcctl.verb("load", text)
+      .noun("application", text,
+            [&session, instance, file] {
+              const std::string path = std::filesystem::absolute(*file).lexically_normal();
+              return command(session, {"", plc_OPERATION_LOAD_APPLICATION, *instance, path});
+            })
+      .argument("INSTANCE", *instance)
+      .argument("FILE", *file, "the application; a relative path starts at the current directory");
+}
+
+void add_set(const Command& plcctl, CliSession& session) {
+  const auto instance = std::make_shared<std::string>();
+  const auto scheduler = std::make_shared<std::string>();
+  const char* const text = "Choose the scheduler of an instance, also while it runs";
+  plcctl.verb("set", text)
+      .noun("scheduler", text,
+            [&session, instance, scheduler] {
+              return command(session, {"", plc_OPERATION_SET_SCHEDULER, *instance, *scheduler});
+            })
+      .argument("INSTANCE", *instance)
+      .argument("SCHEDULER", *scheduler);
 }
 
 }  // namespace
 
-void add_command_verbs(CLI::App& app, CliSession& session, Action& action) {
-  add_plain(app, session, action, "start", plc_OPERATION_START, "Run the application of an instance");
-  add_plain(app, session, action, "stop", plc_OPERATION_STOP, "Stop the application of an instance");
-  add_plain(app, session, action, "single-cycle", plc_OPERATION_SINGLE_CYCLE,
+void add_command_verbs(const Command& plcctl, CliSession& session) {
+  add_plain(plcctl, session, "start", plc_OPERATION_START, "Run the application of an instance");
+  add_plain(plcctl, session, "stop", plc_OPERATION_STOP, "Stop the application of an instance");
+  add_plain(plcctl, session, "single-cycle", plc_OPERATION_SINGLE_CYCLE,
             "Run one cycle of each cyclic and freewheeling task of a stopped application");
-  add_reset(app, session, action);
-  add_plain(app, session, action, "restart", plc_OPERATION_RESTART, "Load the application anew and run it");
-  add_event(app, session, action, "register", plc_OPERATION_REGISTER_EVENT, "Register an external event");
-  add_event(app, session, action, "unregister", plc_OPERATION_UNREGISTER_EVENT,
-            "Unregister an external event");
-
-  const auto name = std::make_shared<std::string>();
-  CLI::App* const statistics =
-      add_verb(app, "reset", "statistics", "Begin the statistics of a task, or of all of an instance, anew");
-  statistics->add_option("INSTANCE[/TASK]", *name)->required();
-  statistics->callback(
-      [&session, &action, name] { action = [&session, name] { return reset_statistics(session, *name); }; });
-
-  const auto instance = std::make_shared<std::string>();
-  const auto argument = std::make_shared<std::string>();
-  CLI::App* const load = add_verb(app, "load", "application", "Load another application into an instance");
-  load->add_option("INSTANCE", *instance)->required();
-  load->add_option("FILE", *argument, "the application; a relative path starts at the current directory")
-      ->required();
-  load->callback([&session, &action, instance, argument] {
-    action = [&session, instance, argument] {
-      const std::string path = std::filesystem::absolute(*argument).lexically_normal();
-      return command(session, {"", plc_OPERATION_LOAD_APPLICATION, *instance, path});
-    };
-  });
-  CLI::App* const set =
-      add_verb(app, "set", "scheduler", "Choose the scheduler of an instance, also while it runs");
-  set->add_option("INSTANCE", *instance)->required();
-  set->add_option("SCHEDULER", *argument)->required();
-  set->callback([&session, &action, instance, argument] {
-    action = [&session, instance, argument] {
-      return command(session, {"", plc_OPERATION_SET_SCHEDULER, *instance, *argument});
-    };
-  });
+  add_reset(plcctl, session);
+  add_plain(plcctl, session, "restart", plc_OPERATION_RESTART, "Load the application anew and run it");
+  add_event(plcctl, session, "register", plc_OPERATION_REGISTER_EVENT, "Register an external event");
+  add_event(plcctl, session, "unregister", plc_OPERATION_UNREGISTER_EVENT, "Unregister an external event");
+  add_load(plcctl, session);
+  add_set(plcctl, session);
 }
 
 }  // namespace plchost

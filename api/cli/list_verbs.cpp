@@ -1,8 +1,6 @@
 #include <memory>
 #include <utility>
 
-#include <CLI/CLI.hpp>
-
 #include "api/cli/cli_session.hpp"
 #include "api/cli/rows.hpp"
 #include "api/cli/task_rows.hpp"
@@ -59,29 +57,24 @@ bool has_happened(const plc_ExceptionStatus& exception) {
 
 }  // namespace
 
-void add_list_verbs(CLI::App& app, CliSession& session, Action& action) {
-  CLI::App* const verb = app.add_subcommand(
-      "list", "Show all hosts, instances, tasks, events, objects, exceptions or transitions");
-  verb->require_subcommand(1)->fallthrough();
-  const auto add = [&](const char* noun, const char* text, Action run) {
-    CLI::App* const command = verb->add_subcommand(noun, text)->fallthrough();
-    command->callback([&action, run = std::move(run)] { action = run; });
-    return command;
-  };
-  add("hosts", "The controllers of the DDS domain", [&session] { return list_hosts(session); });
-  add("instances", "The PLC instances",
-      [&session] { return list(session, &ControlClient::instances, instance_columns()); });
+void add_list_verbs(const Command& plcctl, CliSession& session) {
+  const Command verb =
+      plcctl.verb("list", "Show all hosts, instances, tasks, events, objects, exceptions or transitions");
+  verb.noun("hosts", "The controllers of the DDS domain", [&session] { return list_hosts(session); });
+  verb.noun("instances", "The PLC instances",
+            [&session] { return list(session, &ControlClient::instances, instance_columns()); });
   const auto instance = std::make_shared<std::string>();
-  add("tasks", "The tasks of all applications, with their figures", [&session, instance] {
-    return list_tasks(session, *instance);
-  })->add_option("INSTANCE", *instance, "only of this instance");
-  add("events", "The external events",
-      [&session] { return list(session, &ControlClient::events, event_columns()); });
-  add("objects", "All objects of the global pool",
-      [&session] { return list(session, &ControlClient::objects, object_columns()); });
-  add("exceptions", "The last exception of each instance that had any",
-      [&session] { return list(session, &ControlClient::exceptions, exception_columns(), has_happened); });
-  add_list_transitions(*verb, session, action);
+  verb.noun("tasks", "The tasks of all applications, with their figures",
+            [&session, instance] { return list_tasks(session, *instance); })
+      .optional("INSTANCE", *instance, "only of this instance");
+  verb.noun("events", "The external events",
+            [&session] { return list(session, &ControlClient::events, event_columns()); });
+  verb.noun("objects", "All objects of the global pool",
+            [&session] { return list(session, &ControlClient::objects, object_columns()); });
+  verb.noun("exceptions", "The last exception of each instance that had any", [&session] {
+    return list(session, &ControlClient::exceptions, exception_columns(), has_happened);
+  });
+  add_list_transitions(verb, session);
 }
 
 }  // namespace plchost

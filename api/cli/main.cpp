@@ -65,12 +65,13 @@ int main(int argc, char** argv) {
   app.footer(
       "Exit codes: 0 done, 1 refused, failed or a problem found, 2 usage, 3 no answer, 4 warnings found.");
   add_options(app, session.options);
-  plchost::add_list_verbs(app, session, action);
-  plchost::add_show_verbs(app, session, action);
-  plchost::add_command_verbs(app, session, action);
-  plchost::add_check_verb(app, session, action);
-  plchost::add_post_verb(app, session, action);
-  plchost::add_watch_verb(app, session, action);
+  const plchost::Command plcctl(app, action);
+  plchost::add_list_verbs(plcctl, session);
+  plchost::add_show_verbs(plcctl, session);
+  plchost::add_command_verbs(plcctl, session);
+  plchost::add_check_verb(plcctl, session);
+  plchost::add_post_verb(plcctl, session);
+  plchost::add_watch_verb(plcctl, session);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -1,7 +1,6 @@
 #include <memory>
 #include <utility>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "api/cli/cli_session.hpp"
@@ -69,23 +68,16 @@ int post(CliSession& session, const PostArguments& arguments) {
 
 }  // namespace
 
-void add_post_verb(CLI::App& app, CliSession& session, Action& action) {
-  CLI::App* const verb = app.add_subcommand("post", "Post an external event");
-  verb->require_subcommand(1)->fallthrough();
-  CLI::App* const noun =
-      verb->add_subcommand("event", "Post an external event: each task bound to it runs once")->fallthrough();
+void add_post_verb(const Command& plcctl, CliSession& session) {
   const auto arguments = std::make_shared<PostArguments>();
-  noun->add_option("INSTANCE/EVENT", arguments->name)->required();
-  constexpr std::uint64_t kMaxCount = 1'000'000'000'000;
   constexpr std::int64_t kMaxIntervalUs = 3'600'000'000;
-  noun->add_option("--count", arguments->count, "how often (default 1)")
-      ->check(CLI::Range(std::uint64_t{1}, kMaxCount));
-  noun->add_option("--interval-us", arguments->interval_us,
-                   "time between two posts, microseconds (default 0)")
-      ->check(CLI::Range(std::int64_t{0}, kMaxIntervalUs));
-  noun->callback([&session, &action, arguments] {
-    action = [&session, arguments] { return post(session, *arguments); };
-  });
+  plcctl.verb("post", "Post an external event")
+      .noun("event", "Post an external event: each task bound to it runs once",
+            [&session, arguments] { return post(session, *arguments); })
+      .argument("INSTANCE/EVENT", arguments->name)
+      .option("--count", arguments->count, "how often (default 1)", std::uint64_t{1}, kMaxCount)
+      .option("--interval-us", arguments->interval_us, "time between two posts, microseconds (default 0)",
+              std::int64_t{0}, kMaxIntervalUs);
 }
 
 }  // namespace plchost

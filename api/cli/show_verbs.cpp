@@ -1,6 +1,5 @@
 #include <memory>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "api/cli/cli_session.hpp"
@@ -100,17 +99,13 @@ int show_exception(CliSession& session, const std::string& name) {
 
 }  // namespace
 
-void add_show_verbs(CLI::App& app, CliSession& session, Action& action) {
-  CLI::App* const verb =
-      app.add_subcommand("show", "Show all that is known of one instance, its last exception, or one task");
-  verb->require_subcommand(1)->fallthrough();
+void add_show_verbs(const Command& plcctl, CliSession& session) {
+  const Command verb =
+      plcctl.verb("show", "Show all that is known of one instance, its last exception, or one task");
   const auto add = [&](const char* noun, const char* form, const char* text,
                        int (*run)(CliSession&, const std::string&)) {
     const auto name = std::make_shared<std::string>();
-    CLI::App* const command = verb->add_subcommand(noun, text)->fallthrough();
-    command->add_option(form, *name)->required();
-    command->callback(
-        [&session, &action, name, run] { action = [&session, name, run] { return run(session, *name); }; });
+    verb.noun(noun, text, [&session, name, run] { return run(session, *name); }).argument(form, *name);
   };
   add("instance", "INSTANCE", "One PLC instance", show_instance);
   add("exception", "INSTANCE", "The last exception of one PLC instance", show_exception);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <memory>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "api/cli/cli_session.hpp"
@@ -107,24 +106,19 @@ int watch_transitions(CliSession& session, const TransitionArguments& arguments)
 
 }  // namespace
 
-void add_list_transitions(CLI::App& verb, CliSession& session, Action& action) {
-  CLI::App* const noun = verb.add_subcommand("transitions", "The last changes of state of the instances");
+void add_list_transitions(const Command& verb, CliSession& session) {
   const auto arguments = std::make_shared<TransitionArguments>();
-  noun->add_option("INSTANCE", arguments->instance, "only of this instance");
-  noun->fallthrough()->callback([&session, &action, arguments] {
-    action = [&session, arguments] { return list_transitions(session, *arguments); };
-  });
+  verb.noun("transitions", "The last changes of state of the instances",
+            [&session, arguments] { return list_transitions(session, *arguments); })
+      .optional("INSTANCE", arguments->instance, "only of this instance");
 }
 
-void add_watch_transitions(CLI::App& verb, CliSession& session, Action& action) {
-  CLI::App* const noun = verb.add_subcommand(
-      "transitions", "Each change of state, one line (with --json one object) each, until Ctrl-C");
+void add_watch_transitions(const Command& verb, CliSession& session) {
   const auto arguments = std::make_shared<TransitionArguments>();
-  noun->add_option("INSTANCE", arguments->instance, "only of this instance");
-  noun->add_option("--count", arguments->count, "end after so many");
-  noun->fallthrough()->callback([&session, &action, arguments] {
-    action = [&session, arguments] { return watch_transitions(session, *arguments); };
-  });
+  verb.noun("transitions", "Each change of state, one line (with --json one object) each, until Ctrl-C",
+            [&session, arguments] { return watch_transitions(session, *arguments); })
+      .optional("INSTANCE", arguments->instance, "only of this instance")
+      .option("--count", arguments->count, "end after so many", std::uint64_t{0}, kMaxCount);
 }
 
 }  // namespace plchost

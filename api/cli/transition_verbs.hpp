@@ -5,7 +5,7 @@
 namespace plchost {
 
 /// "list transitions" and "watch transitions", below their verbs.
-void add_list_transitions(CLI::App& verb, CliSession& session, Action& action);
-void add_watch_transitions(CLI::App& verb, CliSession& session, Action& action);
+void add_list_transitions(const Command& verb, CliSession& session);
+void add_watch_transitions(const Command& verb, CliSession& session);
 
 }  // namespace plchost

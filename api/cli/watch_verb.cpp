@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <memory>
 
-#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -55,22 +54,18 @@ int watch(CliSession& session, const WatchArguments& arguments) {
 
 }  // namespace
 
-void add_watch_verb(CLI::App& app, CliSession& session, Action& action) {
-  CLI::App* const verb = app.add_subcommand("watch", "Show tasks, or changes of state, as they come");
-  verb->require_subcommand(1)->fallthrough();
-  CLI::App* const noun =
-      verb->add_subcommand("tasks", "The tasks with live figures, until Ctrl-C")->fallthrough();
+void add_watch_verb(const Command& plcctl, CliSession& session) {
+  const Command verb = plcctl.verb("watch", "Show tasks, or changes of state, as they come");
   const auto arguments = std::make_shared<WatchArguments>();
-  noun->add_option("INSTANCE", arguments->instance, "only of this instance");
   constexpr double kMinInterval = 0.1;
   constexpr double kMaxInterval = 3600;
-  noun->add_option("--interval", arguments->interval_s, "seconds between two looks (default 1)")
-      ->check(CLI::Range(kMinInterval, kMaxInterval));
-  noun->add_option("--count", arguments->count, "end after so many looks");
-  noun->callback([&session, &action, arguments] {
-    action = [&session, arguments] { return watch(session, *arguments); };
-  });
-  add_watch_transitions(*verb, session, action);
+  verb.noun("tasks", "The tasks with live figures, until Ctrl-C",
+            [&session, arguments] { return watch(session, *arguments); })
+      .optional("INSTANCE", arguments->instance, "only of this instance")
+      .option("--interval", arguments->interval_s, "seconds between two looks (default 1)", kMinInterval,
+              kMaxInterval)
+      .option("--count", arguments->count, "end after so many looks", std::uint64_t{0}, kMaxCount);
+  add_watch_transitions(verb, session);
 }
 
 }  // namespace plchost

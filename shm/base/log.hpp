@@ -4,6 +4,12 @@
 
 #include <spdlog/spdlog.h>
 
+// libfmt has it, and its header does not say so: each file that logs would compile all of fmt's formatting
+// anew.
+extern template void fmt::detail::vformat_to<char>(fmt::detail::buffer<char>&, fmt::string_view,
+                                                   fmt::basic_format_args<fmt::buffer_context<char>>,
+                                                   fmt::detail::locale_ref);
+
 namespace plchost {
 
 /// Makes standard error the log of this process: "2026-01-31 12:00:00.000 warning plchostd: text". Set-up.
