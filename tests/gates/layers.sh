@@ -8,19 +8,20 @@ allowed() {
   case "$1" in
     shm/base) echo "" ;;
     shm/pool) echo "shm/base" ;;
+    shm/block_driver) echo "shm/pool shm/base" ;;
     schedulers) echo "shm/base" ;;
     instances/launch) echo "shm/base" ;;
-    instances) echo "instances/launch schedulers shm/pool shm/base" ;;
+    instances) echo "instances/launch schedulers shm/block_driver shm/pool shm/base" ;;
     api/control) echo "shm/base" ;;
-    api) echo "api/control shm/pool shm/base" ;;
-    manager) echo "api/control instances/launch shm/pool shm/base" ;;
+    api) echo "api/control shm/block_driver shm/pool shm/base" ;;
+    manager) echo "api/control instances/launch shm/block_driver shm/pool shm/base" ;;
   esac
 }
 
 # the longest layer that a path lies in
 layer_of() {
   local layer
-  for layer in shm/base shm/pool schedulers instances/launch instances api/control api manager; do
+  for layer in shm/base shm/pool shm/block_driver schedulers instances/launch instances api/control api manager; do
     case "$1" in "$layer"/*) echo "$layer"; return ;; esac
   done
   echo none

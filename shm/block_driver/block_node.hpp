@@ -1,0 +1,125 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "shm/base/result.hpp"
+#include "shm/block_driver/block_link.hpp"
+#include "shm/block_driver/link_gate.hpp"
+#include "shm/block_driver/node_directory.hpp"
+#include "shm/block_driver/topology.hpp"
+
+namespace plchost {
+
+/// Takes a block that is for another host; false: it cannot now. Called by the router's thread.
+using RemoteSink = std::function<bool(const BlockHeader&, std::span<const std::byte>)>;
+
+/// The longest name of a channel, bytes.
+inline constexpr std::size_t kMaxChannelName = 63;
+
+struct NodeOptions {
+  std::string pool;
+  std::string base = std::string(kDefaultBlockBase);
+  NodeEntry entry;
+  std::vector<std::string> neighbours = {};  ///< names of the nodes that it talks to; empty: all
+  std::uint8_t hop_limit = kMaxHops;         ///< 1 to kMaxHops
+  Duration hold = std::chrono::seconds(1);   ///< what nobody takes is dropped after that time
+  std::uint16_t host_number = 0;             ///< a gateway's: how other hosts call this one; 0: it is none
+  RemoteSink remote = {};                    ///< a gateway's: where blocks for entry.hosts go
+};
+
+enum class SendResult : std::uint8_t {
+  sent,         ///< it lies in the queue of the next node
+  congested,    ///< that queue is full; nothing was sent
+  connecting,   ///< the link to the next node is being made: again in the next cycle
+  unreachable,  ///< nobody has that address, or no way leads there
+  invalid,      ///< no such address, or larger than kMaxBlockSize
+};
+
+/// Of a block, what its sender says.
+struct Outgoing {
+  NodeAddress to;
+  std::uint32_t channel = 0;
+  std::uint32_t correlation = 0;
+  BlockKind kind = BlockKind::message;
+  BlockPriority priority = BlockPriority::normal;
+};
+
+/// A node as the tasks of its process see it: they send, and take what has come, without a lock, an
+/// allocation or a wait. Its router (BlockRouter) makes links and carries blocks between others.
+class BlockNode {
+ public:
+  /// Joins the directory. Set-up.
+  [[nodiscard]] static Result<std::unique_ptr<BlockNode>> join(const NodeOptions& options);
+  ~BlockNode();
+  BlockNode(const BlockNode&) = delete;
+  BlockNode& operator=(const BlockNode&) = delete;
+
+  /// Real-time, any thread. A block for all nodes does not come back to its sender.
+  SendResult send(const Outgoing& outgoing, std::span<const std::byte> contents) noexcept;
+
+  /// The next block for a channel of this node: of the highest priority, then the oldest of its sender.
+  /// Real-time, any thread.
+  TakeResult receive(std::uint32_t channel, std::span<std::byte> buffer, BlockHeader& header) noexcept;
+
+  /// Grows with each block for this node: to poll cheaply, and for soft threads to wait on.
+  [[nodiscard]] CountedEvent& arrivals() noexcept { return own_slot().arrivals; }
+
+  /// Real-time. Also asks for the link to it. Node 0: there is nobody of that name on this host.
+  [[nodiscard]] NodeAddress find(std::string_view name) noexcept;
+  /// A block that another host sent, at the gateway that got it. Any thread.
+  SendResult inject(BlockHeader header, std::span<const std::byte> contents) noexcept;
+
+  /// The number of a channel of this node, which is then in use until the node goes. already_exists: a
+  /// channel of another name has the same number. Set-up.
+  [[nodiscard]] Result<std::uint32_t> open_channel(std::string_view name);
+
+  /// A number for a request. Real-time, any thread.
+  [[nodiscard]] std::uint32_t next_correlation() noexcept {
+    return correlations_.fetch_add(1, std::memory_order_relaxed);
+  }
+
+  [[nodiscard]] NodeAddress address() const noexcept { return {.host = 0, .node = life_.node}; }
+  [[nodiscard]] const std::string& name() const noexcept { return options_.entry.name; }
+
+ private:
+  friend class BlockRouter;
+  /// A host range and the neighbour that leads there, in one word: [ first : 16 ][ last : 16 ][ node : 16 ].
+  static constexpr std::size_t kMaxHostRoutes = 16;
+
+  BlockNode(NodeOptions options, NodeDirectory directory, const NodeLife& life);
+  [[nodiscard]] NodeSlot& own_slot() const noexcept { return directory_.slot(life_.node); }
+  [[nodiscard]] bool is_local(NodeAddress address) const noexcept;
+  [[nodiscard]] bool is_for_us(NodeAddress address) const noexcept;
+  /// The neighbour (or this node) that a block is given to; 0: there is no way.
+  [[nodiscard]] std::uint16_t next_hop(NodeAddress to) const noexcept;
+  SendResult put(const BlockHeader& header, std::span<const std::byte> contents) noexcept;
+  SendResult put_to(std::uint16_t node, const BlockHeader& header,
+                    std::span<const std::byte> contents) noexcept;
+  void want_link(std::uint16_t node) noexcept;
+
+  const NodeOptions options_;
+  NodeDirectory directory_;
+  const NodeLife life_;
+  std::array<LinkGate<OutLink>, kMaxNodes> out_;
+  std::array<LinkGate<InLink>, kMaxNodes> in_;
+  std::array<std::atomic<std::uint64_t>, kMaxNodes / 64> open_in_{};  // bit of each in_ that is not closed
+  std::array<std::atomic<std::uint16_t>, kMaxNodes> next_hops_{};
+  std::array<std::atomic<std::uint64_t>, kMaxHostRoutes> host_routes_{};
+  std::array<std::atomic<std::uint64_t>, kMaxNodes / 64> wanted_{};
+  std::array<std::atomic<std::uint32_t>, kBlockPriorities> sequences_{};
+  std::atomic<std::uint32_t> correlations_{1};
+  std::atomic<std::uint32_t> turn_{0};  // which link is looked at first
+  std::mutex channels_mutex_;           // set-up only
+  std::map<std::uint32_t, std::string> channels_;
+};
+
+}  // namespace plchost

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+
+#include "shm/base/counted_event.hpp"
+#include "shm/base/names.hpp"
+#include "shm/base/seqlock.hpp"
+#include "shm/block_driver/node_address.hpp"
+
+// The directory of the nodes of a pool as it lies in shared memory. What is read here is checked before it is
+// used: strangers may have scribbled in it. It is written under a lock of its file, which the kernel gives
+// back when its holder dies.
+
+namespace plchost {
+
+inline constexpr std::uint64_t kDirectoryMagic = 0x65646f6e'6b6c6270;  // "pblknode"
+inline constexpr std::uint32_t kDirectoryVersion = 1;
+
+/// Other hosts that are reached through a node: from first to last. first 0: none.
+struct HostRange {
+  std::uint16_t first = 0;
+  std::uint16_t last = 0;
+  bool operator==(const HostRange&) const = default;
+};
+inline constexpr std::size_t kMaxHostRanges = 4;
+
+/// Who has an address.
+struct NodeRecord {
+  FixedText<kMaxInstanceName> name;  ///< kept when the node goes: it gets the same address again
+  std::int32_t pid = 0;              ///< 0: nobody has it
+  std::uint32_t generation = 0;      ///< of the last one who had it
+  std::uint32_t forwards = 0;        ///< 1: blocks between others may go through it
+  std::uint32_t queue_slots = 0;     ///< of the links that it makes
+  std::uint64_t process_start = 0;   ///< see shm/base/process_start.hpp
+  std::array<HostRange, kMaxHostRanges> hosts{};
+};
+
+/// What a node counts, besides what its links count.
+struct NodeCounters {
+  std::atomic<std::uint64_t> forwarded;    ///< blocks that went through it
+  std::atomic<std::uint64_t> no_route;     ///< had to be dropped: nothing leads to their destination
+  std::atomic<std::uint64_t> loops;        ///< had been here before, or came too far
+  std::atomic<std::uint64_t> duplicates;   ///< of a block for all nodes, that came on a second way
+  std::atomic<std::uint64_t> congested;    ///< had to be dropped: the next queue was full
+  std::atomic<std::uint64_t> expired;      ///< nobody took them in time
+  std::atomic<std::uint64_t> unconnected;  ///< sent when there was no link yet
+};
+
+struct NodeSlot {
+  /// Posted for each block for this node. Written by all senders.
+  alignas(64) CountedEvent arrivals;
+  /// Posted when its router has something to do.
+  alignas(64) CountedEvent work;
+  /// Bit of each node that has made a link to this one.
+  std::array<std::atomic<std::uint64_t>, kMaxNodes / 64> incoming;
+  // Written by the node.
+  alignas(64) std::array<std::atomic<std::uint64_t>, kMaxNodes / 64> neighbours;  ///< that it talks to
+  NodeCounters counters;
+  Seqlock<NodeRecord> record;
+};
+
+struct DirectoryLayout {
+  std::uint64_t magic = 0;
+  std::uint32_t version = 0;
+  std::uint32_t slot_count = 0;
+  std::uint64_t size = 0;
+  std::atomic<std::uint64_t> changes;      ///< grows when a node comes, goes or changes its neighbours
+  std::atomic<std::uint32_t> host_number;  ///< of this host, for others; 0: there is no gateway
+  std::array<NodeSlot, kMaxNodes> slots;
+};
+static_assert(offsetof(DirectoryLayout, slots) == 64 && sizeof(NodeSlot) % 64 == 0);
+
+}  // namespace plchost

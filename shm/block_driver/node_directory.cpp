@@ -1,0 +1,262 @@
+#include "shm/block_driver/node_directory.hpp"
+
+#include <algorithm>
+#include <filesystem>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "shm/base/process_start.hpp"
+#include "shm/block_driver/directory_lock.hpp"
+#include "shm/pool/reference_clock.hpp"
+
+namespace plchost {
+
+namespace {
+
+std::string directory_name(std::string_view pool, std::string_view base) {
+  return pool_memory_name(pool, base);
+}
+
+Result<void> fill_directory(std::span<std::byte> bytes) {
+  auto& layout = *reinterpret_cast<DirectoryLayout*>(bytes.data());
+  layout.magic = kDirectoryMagic;
+  layout.version = kDirectoryVersion;
+  layout.slot_count = kMaxNodes;
+  layout.size = sizeof(DirectoryLayout);
+  return {};
+}
+
+Result<MemoryFile> open_or_make_directory(const std::string& name) {
+  constexpr int kAttempts = 10;  // each one fails only if another process makes or removes it in between
+  for (int attempt = 1;; ++attempt) {
+    auto file = MemoryFile::open(name, sizeof(DirectoryLayout), MemoryFile::Access::read_write);
+    if (file || file.error().code != ErrorCode::not_found) return file;
+    file = MemoryFile::create(name, sizeof(DirectoryLayout), fill_directory);
+    if (file || file.error().code != ErrorCode::already_exists || attempt == kAttempts) return file;
+  }
+}
+
+Result<void> check_directory(const MemoryFile& file, const std::string& name) {
+  const auto& layout = *reinterpret_cast<const DirectoryLayout*>(file.bytes().data());
+  if (layout.magic == kDirectoryMagic && layout.version == kDirectoryVersion &&
+      layout.slot_count == kMaxNodes && file.bytes().size() == sizeof(DirectoryLayout)) {
+    return {};
+  }
+  return failure(
+      ErrorCode::corrupt,
+      fmt::format("shared memory '{}' is no directory of nodes of version {}; stop who uses it and "
+                  "remove it, or choose another [CmpBlkDrvShm] BaseName",
+                  name, kDirectoryVersion));
+}
+
+Result<void> check_base(std::string_view base) {
+  return check_name("[CmpBlkDrvShm] BaseName", base, kMaxBlockBase);
+}
+
+// No check_name(): its error is a text, and this is read in cycles.
+bool is_sane(const NodeRecord& record) noexcept {
+  const std::string_view name = record.name.view();
+  const bool printable = std::ranges::all_of(name, [](char c) { return c > ' ' && c <= '~'; });
+  return record.pid > 0 && record.generation != 0 && !name.empty() && printable;
+}
+
+}  // namespace
+
+Result<NodeDirectory> NodeDirectory::open(std::string_view pool, std::string_view base) {
+  if (auto valid = check_base(base); !valid) return std::unexpected(std::move(valid).error());
+  const std::string name = directory_name(pool, base);
+  auto file = open_or_make_directory(name);
+  if (!file) return failure_in("directory of nodes", std::move(file).error());
+  if (auto valid = check_directory(*file, name); !valid) return std::unexpected(std::move(valid).error());
+  return NodeDirectory(std::string(pool), std::string(base), *std::move(file));
+}
+
+Result<NodeDirectory> NodeDirectory::open_to_read(std::string_view pool, std::string_view base) {
+  if (auto valid = check_base(base); !valid) return std::unexpected(std::move(valid).error());
+  const std::string name = directory_name(pool, base);
+  auto file = MemoryFile::open(name, sizeof(DirectoryLayout), MemoryFile::Access::read_only);
+  if (!file) return failure_in("directory of nodes", std::move(file).error());
+  if (auto valid = check_directory(*file, name); !valid) return std::unexpected(std::move(valid).error());
+  return NodeDirectory(std::string(pool), std::string(base), *std::move(file));
+}
+
+void NodeDirectory::remove(std::string_view pool, std::string_view base) noexcept {
+  const std::string name = directory_name(pool, base);
+  const std::string links = name + ".";
+  std::error_code error;
+  for (std::filesystem::directory_iterator entry(MemoryFile::kDirectory, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string file = entry->path().filename();
+    if (file.starts_with(links)) MemoryFile::remove(file);
+  }
+  MemoryFile::remove(name);
+}
+
+DirectoryLayout& NodeDirectory::layout() const noexcept {
+  return *reinterpret_cast<DirectoryLayout*>(file_.bytes().data());
+}
+
+std::optional<NodeRecord> NodeDirectory::record(std::uint16_t node) const noexcept {
+  const auto record = slot(node).record.read();
+  if (!record || !is_sane(*record)) return std::nullopt;
+  return record;
+}
+
+std::optional<std::uint16_t> NodeDirectory::find(std::string_view name) const noexcept {
+  for (std::uint16_t node = 1; node <= kMaxNodes; ++node) {
+    const auto found = record(node);
+    if (found && found->name.view() == name) return node;
+  }
+  return std::nullopt;
+}
+
+void NodeDirectory::announce() noexcept {
+  layout().changes.fetch_add(1, std::memory_order_release);
+  for (std::uint16_t node = 1; node <= kMaxNodes; ++node) {
+    if (record(node)) slot(node).work.post();
+  }
+}
+
+Result<std::uint16_t> NodeDirectory::choose(const NodeEntry& entry) const {
+  if (const auto namesake = find(entry.name)) {
+    return failure(ErrorCode::already_exists,
+                   fmt::format("node name '{}' is taken: process {} has it, with address {}", entry.name,
+                               record(*namesake).value_or(NodeRecord{}).pid, *namesake));
+  }
+  if (entry.forced_address == 0) return choose_free(entry.name);
+  if (entry.forced_address > kMaxNodes) {
+    return failure(ErrorCode::invalid_argument, fmt::format("node address {} is not possible: 1 to {} are",
+                                                            entry.forced_address, kMaxNodes));
+  }
+  if (const auto owner = record(entry.forced_address)) {
+    return failure(ErrorCode::already_exists,
+                   fmt::format("node address {} is taken: node '{}', process {}, has it",
+                               entry.forced_address, owner->name.view(), owner->pid));
+  }
+  return entry.forced_address;
+}
+
+// Low numbers are the ones that people force, so the others come from the upper half first; among them from
+// those that nobody has had.
+Result<std::uint16_t> NodeDirectory::choose_free(std::string_view name) const {
+  std::uint16_t best = 0;
+  int best_rank = 0;
+  for (std::uint16_t node = 1; node <= kMaxNodes; ++node) {
+    if (record(node)) continue;
+    const auto last = slot(node).record.read();
+    if (last && last->name.view() == name) return node;
+    const bool never_used = last && last->generation == 0;
+    const int rank = 1 + (node > kMaxNodes / 2 ? 2 : 0) + (never_used ? 1 : 0);
+    if (rank > best_rank) {
+      best = node;
+      best_rank = rank;
+    }
+  }
+  if (best != 0) return best;
+  return failure(ErrorCode::full, fmt::format("all {} node addresses are taken", kMaxNodes));
+}
+
+void NodeDirectory::write(std::uint16_t node, const NodeRecord& record) noexcept {
+  slot(node).record.recover();  // the writer before may have died in here
+  slot(node).record.write(record);
+}
+
+void NodeDirectory::remove_links(std::uint16_t node) const noexcept {
+  for (std::uint16_t other = 1; other <= kMaxNodes; ++other) {
+    MemoryFile::remove(link(node, other));
+    MemoryFile::remove(link(other, node));
+  }
+}
+
+bool NodeDirectory::reclaim_one(std::uint16_t node) {
+  slot(node).record.recover();
+  auto owner = record(node);
+  if (!owner || !process_has_ended(owner->pid, owner->process_start)) return false;
+  owner->pid = 0;
+  write(node, *owner);
+  remove_links(node);
+  return true;
+}
+
+std::uint32_t NodeDirectory::reclaim_locked() {
+  std::uint32_t count = 0;
+  for (std::uint16_t node = 1; node <= kMaxNodes; ++node) {
+    if (reclaim_one(node)) ++count;
+  }
+  return count;
+}
+
+std::uint32_t NodeDirectory::reclaim() {
+  const auto lock = DirectoryLock::acquire(directory_name(pool_, base_));
+  if (!lock) return 0;
+  const std::uint32_t count = reclaim_locked();
+  if (count > 0) announce();
+  return count;
+}
+
+namespace {
+
+NodeRecord record_of(const NodeEntry& entry, std::uint32_t generation) {
+  NodeRecord record;
+  record.name.assign(entry.name);
+  record.pid = ::getpid();
+  record.generation = generation;
+  record.forwards = entry.forwards ? 1 : 0;
+  record.queue_slots = entry.queue_slots;
+  record.process_start = start_of(::getpid()).value_or(0);
+  std::copy_n(entry.hosts.begin(), std::min(entry.hosts.size(), kMaxHostRanges), record.hosts.begin());
+  return record;
+}
+
+}  // namespace
+
+Result<NodeLife> NodeDirectory::join(const NodeEntry& entry) {
+  if (auto valid = check_name("node name", entry.name, kMaxInstanceName); !valid) {
+    return std::unexpected(std::move(valid).error());
+  }
+  if (!is_ring_size(entry.queue_slots)) {
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("queues of {} slots are not possible: a power of two from {} to {} is",
+                               entry.queue_slots, kMinRingSlots, kMaxRingSlots));
+  }
+  const auto lock = DirectoryLock::acquire(directory_name(pool_, base_));
+  if (!lock) return failure_in("join the directory of nodes", lock.error());
+  reclaim_locked();
+  const auto node = choose(entry);
+  if (!node) return std::unexpected(node.error());
+  NodeSlot& place = slot(*node);
+  std::uint32_t generation = place.record.read().value_or(NodeRecord{}).generation + 1;
+  if (generation == 0) ++generation;
+  remove_links(*node);
+  for (auto& word : place.incoming) word.store(0, std::memory_order_relaxed);
+  for (auto& word : place.neighbours) word.store(0, std::memory_order_relaxed);
+  write(*node, record_of(entry, generation));
+  announce();
+  return NodeLife{.node = *node, .generation = generation};
+}
+
+void NodeDirectory::leave(const NodeLife& life) {
+  const auto lock = DirectoryLock::acquire(directory_name(pool_, base_));
+  auto owner = record(life.node);
+  // Without the lock it is left to the others, who find that the process has ended.
+  if (!lock || !owner || owner->pid != ::getpid() || owner->generation != life.generation) return;
+  owner->pid = 0;
+  write(life.node, *owner);
+  remove_links(life.node);
+  announce();
+}
+
+void NodeDirectory::keep(const NodeLife& life, const NodeEntry& entry) {
+  const auto is_ours = [&](const std::optional<NodeRecord>& owner) {
+    return owner && owner->pid == ::getpid() && owner->generation == life.generation &&
+           owner->name.view() == entry.name;
+  };
+  if (is_ours(record(life.node))) return;
+  const auto lock = DirectoryLock::acquire(directory_name(pool_, base_));
+  if (!lock || is_ours(record(life.node))) return;
+  write(life.node, record_of(entry, life.generation));
+  announce();
+}
+
+}  // namespace plchost

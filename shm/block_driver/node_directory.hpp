@@ -1,0 +1,84 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "shm/base/memory_guard.hpp"
+#include "shm/base/result.hpp"
+#include "shm/block_driver/block_link.hpp"
+#include "shm/block_driver/directory_layout.hpp"
+#include "shm/pool/memory_file.hpp"
+
+namespace plchost {
+
+/// A base name in a pool, if `[CmpBlkDrvShm] BaseName` says nothing else.
+inline constexpr std::string_view kDefaultBlockBase = "blocks";
+inline constexpr std::size_t kMaxBlockBase = 31;
+
+/// What a node says of itself when it joins.
+struct NodeEntry {
+  std::string name;                ///< 1 to kMaxInstanceName characters, see check_name
+  std::uint16_t forced_address{};  ///< 1 to kMaxNodes; 0: any that is free
+  bool forwards = true;
+  std::uint32_t queue_slots = 1024;
+  std::vector<HostRange> hosts = {};  ///< that are reached through it; at most kMaxHostRanges
+};
+
+/// The nodes of a pool that talk under one base name. All functions are set-up (soft threads) unless they say
+/// otherwise.
+class NodeDirectory {
+ public:
+  /// Makes it if it is not there. corrupt: there is something else of that name.
+  [[nodiscard]] static Result<NodeDirectory> open(std::string_view pool,
+                                                  std::string_view base = kDefaultBlockBase);
+  /// Only to look at. not_found: no node has ever joined.
+  [[nodiscard]] static Result<NodeDirectory> open_to_read(std::string_view pool,
+                                                          std::string_view base = kDefaultBlockBase);
+  /// Removes it with all links; who has them mapped keeps them.
+  static void remove(std::string_view pool, std::string_view base = kDefaultBlockBase) noexcept;
+
+  /// Takes an address for this process: the forced one, or the one that the name had before, or a free one
+  /// from the upper half of the numbers first. already_exists: the address or the name is taken; says by
+  /// whom. full: all addresses are taken.
+  [[nodiscard]] Result<NodeLife> join(const NodeEntry& entry);
+  /// Gives the address back.
+  void leave(const NodeLife& life);
+  /// Writes the record of a node of this process again if a stranger has changed it.
+  void keep(const NodeLife& life, const NodeEntry& entry);
+  /// Takes the addresses from nodes whose processes have ended, and removes their links. How many it were.
+  std::uint32_t reclaim();
+
+  /// Nothing: nobody has the address, or the record is not valid. Any context.
+  [[nodiscard]] std::optional<NodeRecord> record(std::uint16_t node) const noexcept;
+  /// Any context: looks at all of them.
+  [[nodiscard]] std::optional<std::uint16_t> find(std::string_view name) const noexcept;
+  [[nodiscard]] NodeSlot& slot(std::uint16_t node) const noexcept { return layout().slots[node - 1U]; }
+  [[nodiscard]] DirectoryLayout& layout() const noexcept;
+  /// Tells all nodes that something has changed.
+  void announce() noexcept;
+
+  [[nodiscard]] std::string link(std::uint16_t from, std::uint16_t to) const {
+    return link_name(pool_, base_, from, to);
+  }
+  /// Its file was cut short or removed by a stranger.
+  [[nodiscard]] bool lost() const noexcept { return guard_.lost(); }
+
+ private:
+  NodeDirectory(std::string pool, std::string base, MemoryFile file) noexcept
+      : pool_(std::move(pool)), base_(std::move(base)), file_(std::move(file)), guard_(file_.bytes()) {}
+  Result<std::uint16_t> choose(const NodeEntry& entry) const;
+  Result<std::uint16_t> choose_free(std::string_view name) const;
+  void write(std::uint16_t node, const NodeRecord& record) noexcept;
+  bool reclaim_one(std::uint16_t node);
+  std::uint32_t reclaim_locked();
+  void remove_links(std::uint16_t node) const noexcept;
+
+  std::string pool_;
+  std::string base_;
+  MemoryFile file_;
+  MemoryGuard guard_;
+};
+
+}  // namespace plchost
