@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "api/client/check_names.hpp"
 #include "api/dds/error.hpp"
 #include "api/dds/log_sink.hpp"
 #include "api/dds/samples.hpp"
@@ -118,6 +119,7 @@ std::vector<HostView> ControlClient::hosts(TimePoint deadline) {
 }
 
 Result<HostView> ControlClient::host(std::string_view name, TimePoint deadline) {
+  if (auto good = check_host_name(name); !good) return std::unexpected(std::move(good).error());
   for (;;) {
     update();
     if (auto found = present(name)) return *found;
@@ -138,6 +140,7 @@ template <class Sample>
 Result<std::vector<Sample>> ControlClient::snapshot(StatusCache<Sample>& cache, const dds::TopicInfo& topic,
                                                     std::uint32_t plc_HostStatus::* expected,
                                                     const std::string& host, TimePoint deadline) {
+  if (auto good = check_host_name(host); !good) return std::unexpected(std::move(good).error());
   if (auto opened = open_cache(cache, topic); !opened) return std::unexpected(opened.error());
   for (;;) {
     update();
@@ -164,6 +167,8 @@ Result<std::vector<plc_TaskStatus>> ControlClient::tasks(const std::string& host
 
 Result<StatisticsReport> ControlClient::statistics(const std::string& host, std::string_view instance,
                                                    std::string_view task, TimePoint deadline) {
+  if (auto good = check_host_name(host); !good) return std::unexpected(std::move(good).error());
+  if (auto good = check_task_name(instance, task); !good) return std::unexpected(std::move(good).error());
   if (auto opened = open_cache(statistics_, dds::kTaskStatistics); !opened) {
     return std::unexpected(opened.error());
   }
@@ -256,6 +261,7 @@ Result<RequestCaller*> ControlClient::caller(const std::string& host, bool engin
 }
 
 Result<ApiReply> ControlClient::call(const ApiRequest& request, TimePoint deadline) {
+  if (auto good = check_api_request(request); !good) return std::unexpected(std::move(good).error());
   const auto asked = caller(request.host, is_engineering(request.operation));
   if (!asked) return std::unexpected(asked.error());
   auto reply = (*asked)->call(request, reply_reader_.get(), wait_set_, deadline);

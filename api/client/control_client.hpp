@@ -34,7 +34,8 @@ struct HostView {
 };
 
 /// The client's end of the DDS API: sees all hosts of a domain and addresses any. One thread at a time.
-/// Nothing here waits beyond the deadline it was given; deadlines are of MonotonicClock.
+/// Nothing here waits beyond the deadline it was given; deadlines are of MonotonicClock. invalid_argument, at
+/// once and with nothing sent: a name that no host, instance, event or task can have, or a text too long.
 class ControlClient {
  public:
   /// A host that has not shown its presence for so long is gone.

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "api/client/check_names.hpp"
 #include "api/client/control_client.hpp"
 #include "api/dds/samples.hpp"
 #include "api/dds/text.hpp"
@@ -29,6 +30,7 @@ Result<EventPoster*> ControlClient::poster(const std::string& host) {
 }
 
 Result<void> ControlClient::prepare_posts(const std::string& host, TimePoint deadline) {
+  if (auto good = check_host_name(host); !good) return good;
   const auto way = poster(host);
   if (!way) return std::unexpected(way.error());
   while (!(*way)->matched()) {
@@ -52,6 +54,9 @@ bool ControlClient::take_acks(TimePoint now) {
 
 Result<PostReport> ControlClient::post_event(const ApiRequest& event, std::uint64_t count, Duration interval,
                                              Duration patience) {
+  if (auto good = check_event_name(event.instance, event.argument); !good) {
+    return std::unexpected(std::move(good).error());
+  }
   const TimePoint start = MonotonicClock::now();
   if (auto ready = prepare_posts(event.host, start + patience); !ready) return std::unexpected(ready.error());
   const auto way = poster(event.host);
@@ -84,6 +89,7 @@ Result<PostReport> ControlClient::post_event(const ApiRequest& event, std::uint6
 
 Result<void> ControlClient::post_one(const std::string& host, std::string_view instance,
                                      std::string_view event) {
+  if (auto good = check_event_name(instance, event); !good) return good;
   const auto way = posters_.find(host);
   if (way == posters_.end()) return failure(ErrorCode::wrong_state, "prepare_posts() comes first");
   return way->second.post_once(instance, event);

@@ -59,7 +59,7 @@ TEST(RemotePost, OfAnUnknownEventIsRejectedByName) {
   EXPECT_THAT(report->rejected_text, testing::HasSubstr("line1/redy"));
 }
 
-TEST(RemotePost, WithEmptyNamesIsRejectedAndTheNextOneGoesThrough) {
+TEST(RemotePost, WithANameThatCannotBeIsRefusedAndTheNextOneGoesThrough) {
   const OwnDomain domain;
   TestHost host(domain, "hosta");
   const PoolEvent event = host.add_event("line1", "ready");
@@ -69,9 +69,35 @@ TEST(RemotePost, WithEmptyNamesIsRejectedAndTheNextOneGoesThrough) {
   const auto bad = sut->post_event({"hosta", 0, "", ""}, 1, Duration::zero(), kPatience);
   const auto good = sut->post_event({"hosta", 0, "line1", "ready"}, 1, Duration::zero(), kPatience);
 
-  ASSERT_TRUE(bad && good);
-  EXPECT_EQ(bad->rejected_code, ErrorCode::invalid_argument);
+  ASSERT_FALSE(bad);
+  EXPECT_EQ(bad.error().code, ErrorCode::invalid_argument);
+  ASSERT_TRUE(good);
   EXPECT_EQ(good->accepted, 1U);
+  EXPECT_EQ(event.counted().count(), 1U);
+}
+
+// Cut to the bound, both names would be the event that is there.
+TEST(RemotePost, ToALongerNameNeverReachesTheEventThatItBeginsWith) {
+  const OwnDomain domain;
+  TestHost host(domain, "hosta");
+  const std::string longest(kMaxEventName, 'e');
+  const PoolEvent event = host.add_event("line1", longest);
+  host.start_server();
+  const auto sut = connect(domain);
+  ASSERT_TRUE(sut->prepare_posts("hosta", MonotonicClock::now() + kPatience));
+
+  const auto counted =
+      sut->post_event({"hosta", 0, "line1", longest + "eeeee"}, 1, Duration::zero(), kPatience);
+  const auto fast = sut->post_one("hosta", "line1", longest + "e");
+  const auto fits = sut->post_event({"hosta", 0, "line1", longest}, 1, Duration::zero(), kPatience);
+
+  ASSERT_FALSE(counted);
+  EXPECT_EQ(counted.error().code, ErrorCode::invalid_argument);
+  EXPECT_THAT(counted.error().message, testing::HasSubstr("1 to 50"));
+  ASSERT_FALSE(fast);
+  EXPECT_EQ(fast.error().code, ErrorCode::invalid_argument);
+  ASSERT_TRUE(fits);
+  EXPECT_EQ(fits->accepted, 1U);
   EXPECT_EQ(event.counted().count(), 1U);
 }
 

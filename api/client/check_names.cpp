@@ -1,0 +1,50 @@
+#include "api/client/check_names.hpp"
+
+#include <fmt/format.h>
+
+#include "shm/base/names.hpp"
+
+namespace plchost {
+
+namespace {
+
+// The bounds of control.idl; its texts are terminated.
+static_assert(sizeof(plc_EventPost::host) == kMaxHostName + 1);
+static_assert(sizeof(plc_EventPost::instance) == kMaxInstanceName + 1);
+static_assert(sizeof(plc_EventPost::event) == kMaxEventName + 1);
+static_assert(sizeof(plc_RequestHeader::instance_name) == kMaxHostName + 1);
+static_assert(sizeof(plc_Request::instance) == kMaxInstanceName + 1);
+static_assert(sizeof(plc_Request::argument) == kMaxPath + 1);
+
+Result<void> check_instance_name(std::string_view instance) {
+  return check_name("instance", instance, kMaxInstanceName);
+}
+
+}  // namespace
+
+Result<void> check_host_name(std::string_view host) {
+  return check_name("host", host, kMaxHostName);
+}
+
+Result<void> check_event_name(std::string_view instance, std::string_view event) {
+  if (auto good = check_instance_name(instance); !good) return good;
+  return check_name("event", event, kMaxEventName);
+}
+
+Result<void> check_task_name(std::string_view instance, std::string_view task) {
+  if (auto good = check_instance_name(instance); !good) return good;
+  return check_name("task", task, kMaxTaskName);
+}
+
+Result<void> check_api_request(const ApiRequest& request) {
+  if (auto good = check_host_name(request.host); !good) return good;
+  if (!request.instance.empty()) {
+    if (auto good = check_instance_name(request.instance); !good) return good;
+  }
+  if (request.argument.size() <= kMaxPath && !request.argument.contains('\0')) return {};
+  return failure(ErrorCode::invalid_argument,
+                 fmt::format("argument '{}' of {} bytes: allowed are up to {}, and no zero among them",
+                             shown(request.argument), request.argument.size(), kMaxPath));
+}
+
+}  // namespace plchost
