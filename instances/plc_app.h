@@ -176,13 +176,101 @@ RTS_RESULT CDECL SchedSetTaskInterval(RTS_HANDLE hTask, RTS_I64 nIntervalNs);
 RTS_RESULT CDECL SchedRaiseEvent(RTS_HANDLE hTask);
 
 /* Why the process of this application began. An application that keeps data of its own decides by it whether
- * to go on with them. The runtime itself does nothing else by it: all variables begin with their initial
- * values in each case, because there is no retain memory yet. Any. */
+ * to go on with them, as the runtime does: PLC_START_COLD gives retain areas their initial values, and in all
+ * cases retain and persistent areas go on with what was kept if its layout is theirs (see below). Any. */
 #define PLC_START_FIRST 0       /* by hand, first start by this manager, or another application was loaded */
 #define PLC_START_WARM 1        /* warm reset, or restart */
 #define PLC_START_COLD 2        /* cold reset: begin with initial values */
 #define PLC_START_AFTER_FAULT 3 /* the process before ended by itself (a crash) and is started again */
 int CDECL plc_start_kind(void);
+
+/* ---- Memory areas ---------------------------------------------------------------------------------------
+ */
+
+/*
+ * An area is a piece of memory of the application that lies where the settings of the instance want it
+ * ([SysMem] Area.N, by its flags), and that the runtime may exchange with others, or keep:
+ *
+ *     input     copied in at the start of each cycle of a task that uses it
+ *     output    copied out at the end of each cycle of a task that uses it
+ *     retain    keeps its values over a restart, a crash and a power cut, but not over a cold reset
+ *     persistent    keeps them over a cold reset, too (with or without RETAIN)
+ *     others    plain memory that all tasks share
+ *
+ * Inputs and outputs: each task that uses the area has a copy of its own, so that no other task, of whatever
+ * priority, changes it in the middle of a cycle, and nobody outside sees half of a cycle's outputs. A cycle
+ * that does not come to its end (a fault) puts nothing out. Each byte of an output has one task that writes
+ * it, by pUses; what is in no task's range is written by whichever task changes it (the last one wins).
+ */
+#define PLC_AREA_DATA 0x0001u
+#define PLC_AREA_CONSTANT 0x0002u
+#define PLC_AREA_INPUT 0x0004u
+#define PLC_AREA_OUTPUT 0x0008u
+#define PLC_AREA_MEMORY 0x0010u
+#define PLC_AREA_RETAIN 0x0020u
+#define PLC_AREA_CODE 0x0040u
+#define PLC_AREA_PERSISTENT 0x0100u
+#define PLC_AREA_USER 0xF000u /* the four bits of {attribute 'location' := '16#8000'} */
+#define PLC_AREA_ALL 0xFFFFu
+
+#define PLC_MAX_AREAS 64
+#define PLC_MAX_AREA_NAME 50
+#define PLC_MAX_AREA_USES 14      /* tasks that use one input or output area */
+#define PLC_MAX_IMAGE 0x100000u   /* bytes of an input or output area */
+#define PLC_MAX_RETAIN 0x1000000u /* bytes of all retain and persistent areas */
+
+/* A task that uses an area. */
+typedef struct {
+  const char* pszTask;
+  unsigned int
+      dwOffset; /* output: the bytes that this task writes, and no other; dwBytes 0: none of its own */
+  unsigned int dwBytes;
+  void** ppAddress; /* gets the address of this task's copy of the area (input, output); may be null */
+} Plc_Area_Use;
+
+/* Fill it with zeros first. */
+typedef struct {
+  unsigned int dwSize;       /* sizeof(Plc_Area) */
+  unsigned int dwFlags;      /* PLC_AREA_..., one or more; INPUT and OUTPUT exclude each other and RETAIN */
+  const char* pszName;       /* 1 to PLC_MAX_AREA_NAME letters, digits, _ - . ; unique in the application */
+  unsigned int dwBytes;      /* above 0 */
+  unsigned int nUses;        /* 0: all tasks use it; an output of one task is all its own then */
+  const Plc_Area_Use* pUses; /* retain, persistent: who may be inside of a cycle that changes it */
+  const void* pInitial;      /* dwBytes initial values, copied in the call; null: zeros */
+  RTS_UI64 qwLayout;         /* retain, persistent: changes when the meaning of the bytes does; yours */
+  void** ppAddress;          /* gets the address, if it is the same for all tasks; may be null */
+} Plc_Area;
+
+/*
+ * Declares an area. From plc_app_init only; it is placed, and its addresses are written, when that has
+ * returned and before the first task runs. *pResult (may be null): ERR_OK; with RTS_INVALID_HANDLE:
+ * ERR_PARAMETER (the log says what is wrong), ERR_DUPLICATE: an area of that name, ERR_NOMEMORY: there are
+ * PLC_MAX_AREAS, ERR_NOTINITIALIZED. What cannot be placed refuses the application, with the line of the
+ * settings. Control.
+ */
+RTS_HANDLE CDECL plc_declare_area(const Plc_Area* pArea, RTS_RESULT* pResult);
+
+/* Where the area is for the code that calls: an input or output as the task sees it whose cycle runs on this
+ * thread, null outside of a cycle (an event function is outside) or if the task does not use it; any other
+ * area wherever it lies. Null: no such handle, or not placed yet. Any. */
+void* CDECL plc_area_address(RTS_HANDLE hArea);
+
+#define PLC_AREA_INITIAL 0u  /* began with its initial values */
+#define PLC_AREA_KEPT 1u     /* went on with what the process before left in memory: nothing is lost */
+#define PLC_AREA_RESTORED 2u /* went on with what was written last to a file */
+
+typedef struct {
+  unsigned int dwSize;   /* sizeof(Plc_Area_State), set by the caller */
+  unsigned int dwOrigin; /* retain, persistent: PLC_AREA_... */
+  RTS_UI64 qwImages;     /* input, output: number of the latest image that was published */
+  RTS_UI64 qwMissed;     /* input: cycles that kept the image before, because the writer was in the way each
+                            time; output: cycles whose outputs went out with the next one */
+  RTS_UI64 qwSaves;      /* retain, persistent: times that all of it was written to a file */
+  RTS_UI64 qwUnsaved;    /* retain, persistent: intervals in which it was not, see the log */
+} Plc_Area_State;
+
+/* ERR_OK; ERR_PARAMETER: not such a handle, or dwSize; ERR_NOTINITIALIZED: not placed yet. Any. */
+RTS_RESULT CDECL plc_get_area_state(RTS_HANDLE hArea, Plc_Area_State* pState);
 
 /* ---- Distributed clock ----------------------------------------------------------------------------------
  */

@@ -32,7 +32,8 @@ struct LaunchOptions {
   std::string application;       ///< --application FILE; empty: none (safe mode)
   std::string pool = "plchost";  ///< --pool NAME
   std::string run_directory;     ///< --run-directory DIR; empty: no control socket (by hand)
-  bool stopped = false;          ///< --stopped: load the application, do not start it
+  std::string state_directory;  ///< --state-directory DIR: for what outlives a power cut; empty: nothing does
+  bool stopped = false;         ///< --stopped: load the application, do not start it
   StartKind start_kind = StartKind::first;  ///< --start-kind first|warm|cold|after-fault
   int report_fd = -1;              ///< --report-fd N: where SetupReports go; -1: standard error, as text
   std::string log_level = "info";  ///< --log-level

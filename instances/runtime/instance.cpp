@@ -172,7 +172,21 @@ Result<std::string> Instance::load_application() {
     return std::unexpected(std::move(applied).error());
   }
   application_.emplace(*std::move(application));
-  return {};
+  return place_areas();
+}
+
+Result<std::string> Instance::place_areas() {
+  const LaunchOptions& launch = options_.launch;
+  const std::string& directory = settings_.retain.directory;
+  return host_->areas().place({.pool = launch.pool,
+                               .instance = launch.name,
+                               .application = application_->name(),
+                               .settings = settings_.areas,
+                               .retain = {.directory = directory.empty() ? launch.state_directory : directory,
+                                          .interval = settings_.retain.interval,
+                                          .mismatch = settings_.retain.mismatch,
+                                          .cold = launch.start_kind == StartKind::cold}},
+                              application_->tasks_to_change());
 }
 
 Result<std::string> Instance::make_status_page() {

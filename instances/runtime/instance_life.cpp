@@ -93,6 +93,7 @@ void Instance::finish_transition(const std::vector<std::size_t>& stuck) {
     const bool single = life_.state() == ApplicationState::single_cycle;
     life_.go_to(ApplicationState::stopped,
                 single ? "each task has run one cycle" : "all tasks are at the end of their cycles");
+    host_->areas().save();
     beat();
     return answer_waiting(ErrorCode::ok, "");
   }
@@ -172,6 +173,7 @@ Result<void> Instance::shut_down() {
     // Its code may wait for what a thread that is parked in it holds.
     if (application_ && !parked_) application_->exit();
     components_.exit();
+    if (host_) host_->areas().finish();  // also what these two have changed
     // Only now: until then a thread of a component may have used a task's handle.
     if (host_) host_->task_table().attach(nullptr);
     reference_.drop();

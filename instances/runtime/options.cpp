@@ -77,6 +77,8 @@ void describe(CLI::App& app, Options& options) {
       ->check(check_pool_name)
       ->capture_default_str();
   app.add_option("--run-directory", launch.run_directory, "Where the control socket goes; default: none");
+  app.add_option("--state-directory", launch.state_directory,
+                 "Where retain variables are written; default: nowhere, they live as long as the pool");
   app.add_flag("--stopped", launch.stopped, "Load the application, do not start it");
   app.add_option("--start-kind", options.start_kind,
                  "What the application is told about why it starts: first, warm, cold or after-fault")

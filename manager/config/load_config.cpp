@@ -84,6 +84,7 @@ void Loader::read_host(const TomlTable& table, unsigned line) {
   reader.text("name", host.name);
   reader.number("dds_domain", 0, kMaxDdsDomain, domain);
   reader.text("run_directory", host.run_directory);
+  reader.text("state_directory", host.state_directory);
   reader.text("pool", host.pool);
   reader.number("pool_objects", kMinPoolObjects, kMaxPoolObjects, objects);
   reader.choice("log_level", kLogLevels, host.log_level);
@@ -96,6 +97,11 @@ void Loader::read_host(const TomlTable& table, unsigned line) {
     reader.problem("run_directory",
                    fmt::format("\"{}\" is not allowed; allowed is an absolute path of up to {} characters",
                                host.run_directory.substr(0, kMaxPath), kMaxRunDirectory));
+  }
+  if (!host.state_directory.starts_with('/') || host.state_directory.size() > kMaxPath) {
+    reader.problem("state_directory",
+                   fmt::format("\"{}\" is not allowed; allowed is an absolute path of up to {} characters",
+                               host.state_directory.substr(0, kMaxPath), kMaxPath));
   }
   read_cores(reader);
   reader.refuse_unknown_keys();

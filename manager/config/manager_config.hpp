@@ -21,6 +21,7 @@ struct HostConfig {
   std::string name;  ///< default: the system's host name
   int dds_domain = 0;
   std::string run_directory = "/run/plchost";
+  std::string state_directory = "/var/lib/plchost";  ///< what instances keep over a power cut
   std::string pool = "plchost";
   std::uint32_t pool_objects = 4096;
   std::vector<int> cores;               ///< where instances may run

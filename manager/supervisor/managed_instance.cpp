@@ -279,6 +279,7 @@ LaunchOptions ManagedInstance::launch_options(Next next) const {
   options.application = safe_mode_ ? "" : application_;
   options.pool = surroundings_.host.pool;
   options.run_directory = surroundings_.host.run_directory;
+  options.state_directory = surroundings_.host.state_directory;
   options.start_kind = start_kind_;
   options.stopped = next == Next::stay_stopped;
   options.report_fd = kChildReportFd;

@@ -28,6 +28,15 @@ Result<void> write_all(const std::string& path, std::string_view text) {
 
 }  // namespace
 
+Result<void> sync_directory(const std::string& path) {
+  const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (!fd) return failure(ErrorCode::system, "open " + path, errno);
+  if (const auto synced = check_errno(::fsync(fd.get()), "fsync " + path); !synced) {
+    return std::unexpected(synced.error());
+  }
+  return {};
+}
+
 Result<void> replace_file(const std::string& path, std::string_view text) {
   const std::string fresh = path + ".new";
   if (auto written = write_all(fresh, text); !written) return written;

@@ -12,4 +12,8 @@ namespace plchost {
 /// Set-up.
 [[nodiscard]] Result<void> replace_file(const std::string& path, std::string_view text);
 
+/// What was made, renamed or removed in the folder is so for good when it returns, also after a loss of
+/// power. Set-up.
+[[nodiscard]] Result<void> sync_directory(const std::string& path);
+
 }  // namespace plchost

@@ -31,6 +31,8 @@ class Application {
   [[nodiscard]] std::string name() const;
   /// What the schedulers need to know. Their functions point into the application.
   [[nodiscard]] const std::vector<TaskConfig>& tasks() const noexcept { return tasks_; }
+  /// For those that put something around the cycles. Before the tasks are made.
+  [[nodiscard]] std::span<TaskConfig> tasks_to_change() noexcept { return tasks_; }
   [[nodiscard]] const Task_Info& info(std::size_t index) const noexcept { return setup_->ptaskinfo[index]; }
 
  private:

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "instances/plc_app.h"
+#include "instances/runtime/areas/areas.hpp"
 #include "instances/runtime/message_queue.hpp"
 #include "instances/runtime/settings/task_settings.hpp"
 #include "instances/runtime/tasks/event_table.hpp"
@@ -34,6 +35,8 @@ class ApplicationHost {
   void set_start_kind(int kind) noexcept { start_kind_ = kind; }
   [[nodiscard]] MessageQueue& messages() noexcept { return messages_; }
   [[nodiscard]] TaskTable& task_table() noexcept { return task_table_; }
+  [[nodiscard]] Areas& areas() noexcept { return areas_; }
+  [[nodiscard]] const Areas& areas() const noexcept { return areas_; }
 
   /// What the application handed over; null if nothing yet.
   [[nodiscard]] sys_setup_tasks_struct* tasks() const noexcept { return tasks_; }
@@ -64,6 +67,7 @@ class ApplicationHost {
   EventTable events_;
   MessageQueue messages_;
   TaskTable task_table_;
+  Areas areas_;
   sys_setup_tasks_struct* tasks_ = nullptr;
   bool given_twice_ = false;
   int start_kind_ = PLC_START_FIRST;

@@ -9,6 +9,7 @@
 #include "instances/runtime/settings/task_settings.hpp"
 #include "schedulers/scheduler.hpp"
 #include "shm/base/result.hpp"
+#include "shm/base/time.hpp"
 
 namespace plchost {
 
@@ -30,6 +31,33 @@ struct SysTimeSettings {
   bool operator==(const SysTimeSettings&) const = default;
 };
 
+/// [SysMem] Area.N: where application areas of these flags lie.
+struct AreaSettings {
+  std::size_t number = 0;
+  std::uint32_t flags = 0;    ///< as in plc_app.h: PLC_AREA_...
+  std::uint64_t address = 0;  ///< offset in the device or file; a multiple of kAreaAlignment
+  std::uint64_t size = 0;     ///< bytes
+  std::string device;         ///< empty: `object` says where it is
+  std::string object;         ///< a shared memory of the pool
+  std::string where;          ///< "line1.cfg:12", its first line
+  bool operator==(const AreaSettings&) const = default;
+};
+
+/// [Retain] Mismatch: what happens to kept values that belong to another layout of the retain areas.
+enum class RetainMismatch : std::uint8_t {
+  initialise,  ///< all areas begin with their initial values; the file is put aside
+  refuse,      ///< the application is not loaded
+  ignore,      ///< areas of the same name get their bytes, as many as both have
+};
+
+/// [Retain]: where and how often retain and persistent variables are written.
+struct RetainSettings {
+  std::string directory;  ///< empty: the one that the instance was started with
+  Duration interval = std::chrono::seconds(1);
+  RetainMismatch mismatch = RetainMismatch::initialise;
+  bool operator==(const RetainSettings&) const = default;
+};
+
 /// What an instance's own settings file says, validated. README.md lists the keys.
 struct InstanceSettings {
   SchedulerSettings scheduler;
@@ -37,7 +65,9 @@ struct InstanceSettings {
   TimerMode timer_mode = TimerMode::periodic;
   IdleStates idle_states = IdleStates::hold;
   SysTimeSettings sys_time;
-  std::vector<TaskSettings> tasks;      ///< one for each [Task.NAME]
+  std::vector<TaskSettings> tasks;  ///< one for each [Task.NAME]
+  std::vector<AreaSettings> areas;  ///< [SysMem], in the order of their numbers: 0, 1, ...
+  RetainSettings retain;
   std::vector<std::string> components;  ///< in order; a relative path counts from the settings file's folder
 
   /// What was left alone: sections and components of other programs, each once; and keys without a meaning
@@ -50,6 +80,9 @@ struct InstanceSettings {
 
 inline constexpr std::size_t kMaxSettingsFile = std::size_t{1} << 20;
 inline constexpr std::size_t kMaxComponents = 999;
+inline constexpr std::size_t kMaxAreas = 64;
+inline constexpr std::uint64_t kMaxAreaSize = std::uint64_t{1} << 30;
+inline constexpr std::uint64_t kAreaAlignment = 8;
 /// Files that refer to each other: so many behind the first, and in all.
 inline constexpr std::size_t kMaxReferenceDepth = 8;
 inline constexpr std::size_t kMaxSettingsFiles = 64;

@@ -9,9 +9,10 @@ namespace {
 
 constexpr std::string_view kSection = "ComponentManager";
 
-void add_component(const SettingsTarget& to, std::size_t number, std::string_view component) {
+bool add_component(const SettingsTarget& to, std::size_t number, std::string_view component) {
   to.components.insert_or_assign(
       number, is_foreign_component(component) ? std::string(component) : in_folder(to, component));
+  return true;
 }
 
 constexpr std::array kKeys = {

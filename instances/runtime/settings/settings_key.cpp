@@ -30,18 +30,10 @@ std::optional<std::int64_t> integer(std::string_view text, int base = 10) {
   return number;
 }
 
-// Decimal or, as the other runtime's files have it, "0x3E8".
-std::optional<std::int64_t> any_integer(std::string_view text) {
-  if (!text.starts_with("0x") && !text.starts_with("0X")) return integer(text);
-  constexpr int kHexadecimal = 16;
-  const std::string_view digits = text.substr(2);
-  return digits.starts_with('-') ? std::nullopt : integer(digits, kHexadecimal);
-}
-
 // "976.5625", rounded to nanoseconds.
 std::optional<Duration> decimal_microseconds(std::string_view text) {
   const std::size_t point = text.find('.');
-  const auto whole = point == std::string_view::npos ? any_integer(text) : integer(text.substr(0, point));
+  const auto whole = point == std::string_view::npos ? integer_of(text) : integer(text.substr(0, point));
   constexpr std::int64_t kLargest = 1'000'000'000'000;
   if (!whole || *whole < 0 || *whole > kLargest || text.front() == '-') return std::nullopt;
   if (point == std::string_view::npos) return Duration(*whole * 1000);
@@ -54,25 +46,8 @@ std::optional<Duration> decimal_microseconds(std::string_view text) {
   return Duration(*whole * 1000 + (*fraction + 5) / 10);
 }
 
-// The number of "Component.7" for the row "Component.N".
-std::optional<std::size_t> number_of(std::string_view row, std::string_view name) {
-  const std::string_view stem = row.substr(0, row.size() - 1);
-  if (!name.starts_with(stem)) return std::nullopt;
-  const auto number = integer(name.substr(stem.size()));
-  if (!number || *number < 0 || *number > static_cast<std::int64_t>(kMaxComponents)) return std::nullopt;
-  return static_cast<std::size_t>(*number);
-}
-
 bool is_numbered(const SettingKey& key) {
   return std::holds_alternative<NumberedSetting>(key.value);
-}
-
-bool is_named(const SettingKey& key, std::string_view name) {
-  if (is_numbered(key)) return number_of(key.name, name).has_value();
-  if (!key.prefixed) return key.name == name;
-  return std::ranges::any_of(kPlatforms, [&](std::string_view platform) {
-    return name.starts_with(platform) && name.substr(platform.size()) == key.name;
-  });
 }
 
 std::string_view without_platform(std::string_view name) {
@@ -80,6 +55,35 @@ std::string_view without_platform(std::string_view name) {
     if (name.starts_with(platform)) return name.substr(platform.size());
   }
   return name;
+}
+
+// What is to be compared with the name in the table; nothing: it lacks the platform in front.
+std::optional<std::string_view> plain_name(const SettingKey& key, std::string_view name) {
+  if (!key.prefixed) return name;
+  const std::string_view plain = without_platform(name);
+  return plain.size() == name.size() ? std::nullopt : std::optional(plain);
+}
+
+// The number of "Component.7" for the row "Component.N", of "Area.3.Size" for "Area.N.Size".
+std::optional<std::size_t> number_of(const SettingKey& key, std::string_view name) {
+  const auto plain = plain_name(key, name);
+  if (!plain || !is_numbered(key)) return std::nullopt;
+  const std::size_t at = key.name.find(".N") + 1;
+  const std::string_view behind = key.name.substr(at + 1);
+  if (plain->size() <= at + behind.size() || !plain->starts_with(key.name.substr(0, at)) ||
+      !plain->ends_with(behind)) {
+    return std::nullopt;
+  }
+  const std::string_view digits = plain->substr(at, plain->size() - at - behind.size());
+  const auto number = digits.front() == '-' ? std::nullopt : integer(digits);
+  const auto highest = static_cast<std::int64_t>(std::get<NumberedSetting>(key.value).highest);
+  if (!number || *number > highest) return std::nullopt;
+  return static_cast<std::size_t>(*number);
+}
+
+bool is_named(const SettingKey& key, std::string_view name) {
+  if (is_numbered(key)) return number_of(key, name).has_value();
+  return plain_name(key, name) == key.name;
 }
 
 std::string lower(std::string_view text) {
@@ -121,6 +125,13 @@ std::unexpected<Error> unknown_key(std::string_view section, std::string_view na
 
 }  // namespace
 
+std::optional<std::int64_t> integer_of(std::string_view text) {
+  if (!text.starts_with("0x") && !text.starts_with("0X")) return integer(text);
+  constexpr int kHexadecimal = 16;
+  const std::string_view digits = text.substr(2);
+  return digits.starts_with('-') ? std::nullopt : integer(digits, kHexadecimal);
+}
+
 std::string in_folder(const SettingsTarget& target, std::string_view path) {
   if (target.folder.empty()) return std::string(path);
   return (std::filesystem::path(target.folder) / path).lexically_normal();
@@ -129,7 +140,8 @@ std::string in_folder(const SettingsTarget& target, std::string_view path) {
 const std::vector<SettingKey>& all_setting_keys() {
   static const std::vector<SettingKey> all = [] {
     std::vector<SettingKey> keys;
-    for (const auto table : {schedule_keys(), timer_keys(), clock_keys(), task_keys(), component_keys()}) {
+    for (const auto table :
+         {schedule_keys(), timer_keys(), clock_keys(), task_keys(), component_keys(), memory_keys()}) {
       keys.insert(keys.end(), table.begin(), table.end());
     }
     return keys;
@@ -181,7 +193,7 @@ std::string allowed_values(const SettingKey& key) {
           [](const WordSetting& word) { return join_names(word.words); },
           [](const TextSetting& text) { return std::string(text.form); },
           [](const NumberedSetting& numbered) {
-            return fmt::format("{}, N 0 to {}", numbered.form, kMaxComponents);
+            return fmt::format("{}, N 0 to {}", numbered.form, numbered.highest);
           },
           [](const UnusedSetting&) { return std::string(); },
       },
@@ -198,56 +210,54 @@ Result<const SettingKey*> find_setting(std::string_view section, std::string_vie
 }
 
 std::string setting_identity(const SettingKey& key, std::string_view name) {
-  const auto number = is_numbered(key) ? number_of(key.name, name) : std::nullopt;
+  const auto number = number_of(key, name);
   return number ? fmt::format("{}{}", key.name, *number) : std::string(key.name);
 }
 
 Result<std::string> apply_setting(const SettingKey& key, std::string_view name, std::string_view value,
                                   const SettingsTarget& target) {
-  const auto number = any_integer(value);
+  const auto number = integer_of(value);
   std::string remark;
-  const bool applied =
-      std::visit(Overloaded{
-                     [&](const NumberSetting& setting) {
-                       if (!number || *number < setting.lowest) return false;
-                       const bool above = *number > setting.highest;
-                       if (above && !setting.capped) return false;
-                       if (above) remark = fmt::format("{} acts as {}", *number, setting.highest);
-                       setting.apply(target, std::min(*number, setting.highest));
-                       return true;
-                     },
-                     [&](const OptionalNumberSetting& setting) {
-                       if (!number || *number < -1 || *number > setting.highest) return false;
-                       setting.apply(target, *number);
-                       return true;
-                     },
-                     [&](const MicrosecondSetting& setting) {
-                       const auto us = decimal_microseconds(value);
-                       using std::chrono::microseconds;
-                       if (!us || *us < microseconds(setting.lowest) || *us > microseconds(setting.highest))
-                         return false;
-                       setting.apply(target, *us);
-                       return true;
-                     },
-                     [&](const WordSetting& setting) {
-                       const auto word = std::ranges::find(setting.words, lower(value), lower);
-                       if (word == setting.words.end()) return false;
-                       setting.apply(target, static_cast<std::size_t>(word - setting.words.begin()));
-                       return true;
-                     },
-                     [&](const TextSetting& setting) {
-                       if (!setting.allows(value)) return false;
-                       setting.apply(target, value);
-                       return true;
-                     },
-                     [&](const NumberedSetting& setting) {
-                       if (value.empty()) return false;
-                       setting.apply(target, number_of(key.name, name).value_or(0), value);
-                       return true;
-                     },
-                     [](const UnusedSetting&) { return true; },
-                 },
-                 key.value);
+  const bool applied = std::visit(
+      Overloaded{
+          [&](const NumberSetting& setting) {
+            if (!number || *number < setting.lowest) return false;
+            const bool above = *number > setting.highest;
+            if (above && !setting.capped) return false;
+            if (above) remark = fmt::format("{} acts as {}", *number, setting.highest);
+            setting.apply(target, std::min(*number, setting.highest));
+            return true;
+          },
+          [&](const OptionalNumberSetting& setting) {
+            if (!number || *number < -1 || *number > setting.highest) return false;
+            setting.apply(target, *number);
+            return true;
+          },
+          [&](const MicrosecondSetting& setting) {
+            const auto us = decimal_microseconds(value);
+            using std::chrono::microseconds;
+            if (!us || *us < microseconds(setting.lowest) || *us > microseconds(setting.highest))
+              return false;
+            setting.apply(target, *us);
+            return true;
+          },
+          [&](const WordSetting& setting) {
+            const auto word = std::ranges::find(setting.words, lower(value), lower);
+            if (word == setting.words.end()) return false;
+            setting.apply(target, static_cast<std::size_t>(word - setting.words.begin()));
+            return true;
+          },
+          [&](const TextSetting& setting) {
+            if (!setting.allows(value)) return false;
+            setting.apply(target, value);
+            return true;
+          },
+          [&](const NumberedSetting& setting) {
+            return !value.empty() && setting.apply(target, number_of(key, name).value_or(0), value);
+          },
+          [](const UnusedSetting&) { return true; },
+      },
+      key.value);
   if (applied) return remark;
   return failure(ErrorCode::invalid_argument,
                  fmt::format("'{}' is not allowed; allowed is: {}", shown(value), allowed_values(key)));

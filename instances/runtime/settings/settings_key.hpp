@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -14,10 +15,19 @@
 
 namespace plchost {
 
+/// An Area.N as far as it was read: nothing is what was not said.
+struct AreaDraft {
+  std::string where;  ///< its first line
+  std::optional<std::int64_t> flags, address, size;
+  std::string device, object;
+};
+
 /// What a row of the table writes to.
 struct SettingsTarget {
   InstanceSettings& settings;
   std::map<std::size_t, std::string>& components;  ///< by their number, foreign ones too
+  std::map<std::size_t, AreaDraft>& areas;         ///< by their number
+  std::string_view where;                          ///< "line1.cfg:12"
   TaskSettings* task;                              ///< of the section [Task.NAME]; null in other sections
   std::string_view folder;                         ///< of the file; empty: relative paths stay as they are
 };
@@ -59,10 +69,11 @@ struct TextSetting {
   void (*apply)(const SettingsTarget&, std::string_view text);
 };
 
-/// A key that ends in ".N": N is 0 to kMaxComponents. Its name in the table ends in ".N", too.
+/// A key with ".N" at its end, or ".N." in it: N is 0 to highest. Its name in the table has it, too.
 struct NumberedSetting {
   std::string_view form;
-  void (*apply)(const SettingsTarget&, std::size_t number, std::string_view text);
+  bool (*apply)(const SettingsTarget&, std::size_t number, std::string_view text);  ///< false: not allowed
+  std::size_t highest = kMaxComponents;
 };
 
 /// Documented for CODESYS, without a meaning here: accepted with a remark.
@@ -90,6 +101,10 @@ inline constexpr std::string_view kTaskPrefix = "Task.";  ///< what its name beg
 [[nodiscard]] std::span<const SettingKey> clock_keys() noexcept;
 [[nodiscard]] std::span<const SettingKey> task_keys() noexcept;
 [[nodiscard]] std::span<const SettingKey> component_keys() noexcept;
+[[nodiscard]] std::span<const SettingKey> memory_keys() noexcept;
+
+/// What was said about all areas, checked as a whole. The error names the line of the area.
+[[nodiscard]] Result<std::vector<AreaSettings>> check_areas(const std::map<std::size_t, AreaDraft>& drafts);
 
 /// All rows, in the order of the README.
 [[nodiscard]] const std::vector<SettingKey>& all_setting_keys();
@@ -100,6 +115,9 @@ inline constexpr std::string_view kTaskPrefix = "Task.";  ///< what its name beg
 /// The section of the table that a section as written was meant to be: in another case, or with a typing
 /// error. Empty: it is another program's.
 [[nodiscard]] std::string_view meant_section(std::string_view section);
+
+/// "0x3E8", "1000"; nothing: no number.
+[[nodiscard]] std::optional<std::int64_t> integer_of(std::string_view text);
 
 /// "VxWorks.TimerSource"
 [[nodiscard]] std::string written_name(const SettingKey& key);

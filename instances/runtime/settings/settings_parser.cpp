@@ -73,6 +73,7 @@ Result<std::vector<FileReference>> SettingsParser::read(std::string_view text, c
 
 Result<InstanceSettings> SettingsParser::finish() && {
   if (!error_) check_sys_time();
+  if (!error_) take_areas();
   if (error_) return std::unexpected(*std::move(error_));
   take_components();
   return std::move(settings_);
@@ -171,7 +172,13 @@ void SettingsParser::set(std::string_view name, std::string_view value) {
   if (std::holds_alternative<UnusedSetting>((*key)->value)) {
     return remark(place(), fmt::format("[{}] {} has no meaning here and is ignored", section_, shown(name)));
   }
-  const SettingsTarget target{settings_, components_, task_ ? &settings_.tasks[*task_] : nullptr, folder_};
+  const std::string where = place();
+  const SettingsTarget target{.settings = settings_,
+                              .components = components_,
+                              .areas = areas_,
+                              .where = where,
+                              .task = task_ ? &settings_.tasks[*task_] : nullptr,
+                              .folder = folder_};
   const auto applied = apply_setting(**key, name, value, target);
   if (!applied) {
     fail(fmt::format("[{}] {}: {}", section_, shown(name), applied.error().message));
@@ -207,6 +214,15 @@ void SettingsParser::take_components() {
     } else if (std::ranges::find(foreign, component) == foreign.end()) {
       foreign.push_back(std::move(component));
     }
+  }
+}
+
+void SettingsParser::take_areas() {
+  auto areas = check_areas(areas_);
+  if (!areas) {
+    error_ = std::move(areas).error();
+  } else {
+    settings_.areas = *std::move(areas);
   }
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "instances/runtime/settings/settings.hpp"
+#include "instances/runtime/settings/settings_key.hpp"
 #include "shm/base/result.hpp"
 
 namespace plchost {
@@ -42,6 +43,7 @@ class SettingsParser {
   void set(std::string_view name, std::string_view value);
   void read_reference(std::string_view line);
   void take_components();
+  void take_areas();
   void check_sys_time();
 
   // Of the file that is read.
@@ -57,6 +59,7 @@ class SettingsParser {
   // Of all files.
   InstanceSettings settings_;
   std::map<std::size_t, std::string> components_;
+  std::map<std::size_t, AreaDraft> areas_;
   std::map<std::string, std::size_t> tasks_;  // their places in settings_.tasks
   std::set<std::string> foreign_;
   std::map<std::string, std::string> seen_;  // each key's last place

@@ -220,6 +220,8 @@ VxWorks.TimerMode=OneShot
 [SysMem]
 Linux.Memlock=1
 VxWorks.Area.0.Flags=0x8000
+VxWorks.Area.0.Address=0x60540010
+VxWorks.Area.0.Size=0x10000
 
 [CmpSecureChannel]
 SECURITY.CommunicationMode=ONLY_PLAIN
@@ -239,7 +241,7 @@ TEST_F(SettingsFile, FileOfAnotherRuntimeIsUsedAsItIs) {
   EXPECT_THAT(
       log,
       HasSubstr("sections of other programs, left alone: SysFile, CmpLog, CmpApp, CmpRedundancyConnectionIP, "
-                "SysExcept, SysCpuHandling, SysTask, SysEthernet, SysMem, CmpSecureChannel, CmpUserMgr\n"));
+                "SysExcept, SysCpuHandling, SysTask, SysEthernet, CmpSecureChannel, CmpUserMgr\n"));
   EXPECT_THAT(log,
               HasSubstr("components of other programs, left alone: CmpBACnet, CmpBACnet2, CmpPLCHandler, "
                         "CmpGwClient, CmpXMLParser\n"));

@@ -27,6 +27,7 @@ TEST(LaunchContract, CommandLineOfTheManagerIsUnderstoodByTheInstance) {
                               .application = "/opt/line1.so",
                               .pool = "plant",
                               .run_directory = "/run/plant",
+                              .state_directory = "/var/lib/plant",
                               .stopped = true,
                               .report_fd = 7,
                               .log_level = "debug"};
@@ -41,6 +42,7 @@ TEST(LaunchContract, CommandLineOfTheManagerIsUnderstoodByTheInstance) {
   EXPECT_EQ(sut.application, "/opt/line1.so");
   EXPECT_EQ(sut.pool, "plant");
   EXPECT_EQ(sut.run_directory, "/run/plant");
+  EXPECT_EQ(sut.state_directory, "/var/lib/plant");
   EXPECT_TRUE(sut.stopped);
   EXPECT_EQ(sut.report_fd, 7);
   EXPECT_EQ(sut.log_level, "debug");

@@ -1,0 +1,176 @@
+#include "instances/runtime/areas/area_memory.hpp"
+
+#include <cerrno>
+#include <utility>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "shm/base/system_call.hpp"
+#include "shm/pool/reference_clock.hpp"
+
+namespace plchost {
+
+namespace {
+
+std::unexpected<Error> not_mapped(const AreaSettings& settings, std::string_view what, int error = 0) {
+  return failure(ErrorCode::refused,
+                 fmt::format("{}: [SysMem] Area.{}: {:#x} bytes at {:#x} of {}: {}", settings.where,
+                             settings.number, settings.size, settings.address, settings.device, what),
+                 error);
+}
+
+Result<UniqueFd> open_device(const AreaSettings& settings) {
+  UniqueFd fd(::open(settings.device.c_str(), O_RDWR | O_SYNC | O_CLOEXEC | O_NONBLOCK));
+  if (!fd) return not_mapped(settings, "cannot be opened", errno);
+  struct stat status{};
+  if (::fstat(fd.get(), &status) != 0) return not_mapped(settings, "fstat", errno);
+  if (!S_ISREG(status.st_mode) && !S_ISCHR(status.st_mode)) {
+    return not_mapped(settings, "allowed is a character device or a plain file");
+  }
+  const auto size = static_cast<std::uint64_t>(status.st_size);
+  if (S_ISREG(status.st_mode) && (settings.address > size || settings.size > size - settings.address)) {
+    return not_mapped(settings, fmt::format("the file ends at {:#x}", size));
+  }
+  return fd;
+}
+
+struct Opened {
+  MemoryFile memory;
+  bool existed = false;
+};
+
+Result<MemoryFile> open_existing(const std::string& file, std::size_t bytes) {
+  // Firmware that makes one gives it its name first and its size then.
+  if (auto filled = MemoryFile::fill_empty(file, bytes); !filled) return std::unexpected(filled.error());
+  return MemoryFile::open(file, 1, MemoryFile::Access::read_write);
+}
+
+Result<Opened> open_or_make(const std::string& file, std::size_t bytes) {
+  constexpr int kAttempts = 10;  // each one fails only if another process makes or removes it in between
+  for (int attempt = 1;; ++attempt) {
+    auto memory = open_existing(file, bytes);
+    const bool existed = memory || memory.error().code != ErrorCode::not_found;
+    if (!existed) memory = MemoryFile::create(file, bytes);
+    if (memory) return Opened{.memory = *std::move(memory), .existed = existed};
+    const bool again =
+        memory.error().code == ErrorCode::already_exists || memory.error().code == ErrorCode::not_found;
+    if (!again || attempt == kAttempts) return std::unexpected(memory.error());
+  }
+}
+
+// The kernel takes it back when the process ends, however it ends.
+Result<UniqueFd> lock_file_of(const std::string& file) {
+  const std::string path = fmt::format("{}/{}", MemoryFile::kDirectory, file);
+  UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+  if (!fd) return failure(ErrorCode::system, "open " + path, errno);
+  if (::flock(fd.get(), LOCK_EX | LOCK_NB) == 0) return fd;
+  const int error = errno;
+  if (error != EWOULDBLOCK) return failure(ErrorCode::system, "lock " + path, error);
+  return failure(ErrorCode::busy, fmt::format("{} has a writer already: another process", path));
+}
+
+}  // namespace
+
+AreaMemory::AreaMemory(AreaMemory&& other) noexcept
+    : mapping_(std::exchange(other.mapping_, {})),
+      bytes_(std::exchange(other.bytes_, {})),
+      file_(std::move(other.file_)),
+      lock_(std::move(other.lock_)),
+      guard_(std::move(other.guard_)),
+      existed_(other.existed_) {}
+
+AreaMemory& AreaMemory::operator=(AreaMemory&& other) noexcept {
+  std::swap(mapping_, other.mapping_);
+  std::swap(bytes_, other.bytes_);
+  std::swap(file_, other.file_);
+  std::swap(lock_, other.lock_);
+  std::swap(guard_, other.guard_);
+  std::swap(existed_, other.existed_);
+  return *this;
+}
+
+AreaMemory::~AreaMemory() {
+  guard_ = MemoryGuard();
+  if (!mapping_.empty()) ::munmap(mapping_.data(), mapping_.size());
+}
+
+Result<AreaMemory> AreaMemory::of_process(std::size_t bytes) {
+  AreaMemory memory;
+  void* const address =
+      ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
+  if (address == MAP_FAILED) {
+    const int error = errno;
+    return failure(ErrorCode::full, fmt::format("{} bytes of memory for areas", bytes), error);
+  }
+  memory.mapping_ = std::span(static_cast<std::byte*>(address), bytes);
+  memory.bytes_ = memory.mapping_;
+  return memory;
+}
+
+Result<AreaMemory> AreaMemory::of_device(const AreaSettings& settings) {
+  const auto fd = open_device(settings);
+  if (!fd) return std::unexpected(fd.error());
+  // Memory 0 of an uio device is mapped from its beginning, whatever is wanted of it.
+  const bool uio = settings.device.starts_with("/dev/uio");
+  const auto page = static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+  const std::uint64_t begin = uio ? 0 : settings.address / page * page;
+  const std::uint64_t size = settings.address + settings.size - begin;
+  void* const address = ::mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, fd->get(),
+                               static_cast<off_t>(begin));
+  if (address == MAP_FAILED) return not_mapped(settings, "cannot be mapped", errno);
+  AreaMemory memory;
+  memory.mapping_ = std::span(static_cast<std::byte*>(address), size);
+  memory.bytes_ = memory.mapping_.subspan(settings.address - begin, settings.size);
+  memory.guard_ = MemoryGuard(memory.mapping_);
+  if (!memory.guard_)
+    return not_mapped(settings, fmt::format("more than {} memories of others", MemoryGuard::kMost));
+  return memory;
+}
+
+Result<AreaMemory> AreaMemory::of_pool(const std::string& pool, const std::string& name, std::size_t bytes,
+                                       bool exclusive) {
+  const std::string file = pool_memory_name(pool, name);
+  auto opened = open_or_make(file, bytes);
+  if (!opened) return std::unexpected(std::move(opened).error());
+  if (opened->memory.bytes().size() != bytes) {
+    return failure(
+        ErrorCode::wrong_state,
+        fmt::format("shared memory {} has {} bytes, {} are needed; remove it, or choose another name", file,
+                    opened->memory.bytes().size(), bytes));
+  }
+  AreaMemory memory;
+  if (exclusive) {
+    auto lock = lock_file_of(file);
+    if (!lock) return std::unexpected(std::move(lock).error());
+    memory.lock_ = *std::move(lock);
+  }
+  memory.existed_ = opened->existed;
+  if (auto held = memory.hold(std::move(opened->memory), file); !held) return std::unexpected(held.error());
+  return memory;
+}
+
+Result<AreaMemory> AreaMemory::new_in_pool(const std::string& pool, const std::string& name,
+                                           std::size_t bytes, const MemoryFile::Fill& fill) {
+  const std::string file = pool_memory_name(pool, name);
+  auto made = MemoryFile::replace(file, bytes, fill);
+  if (!made) return std::unexpected(std::move(made).error());
+  AreaMemory memory;
+  if (auto held = memory.hold(*std::move(made), file); !held) return std::unexpected(held.error());
+  return memory;
+}
+
+Result<void> AreaMemory::hold(MemoryFile file, const std::string& name) {
+  file_ = std::move(file);
+  bytes_ = file_.bytes();
+  guard_ = MemoryGuard(bytes_);
+  if (guard_) return {};
+  return failure(ErrorCode::full,
+                 fmt::format("shared memory {}: more than {} memories of others", name, MemoryGuard::kMost));
+}
+
+}  // namespace plchost

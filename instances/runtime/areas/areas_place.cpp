@@ -1,0 +1,255 @@
+// How Areas places what the application declared: once, before its tasks are made.
+
+#include <algorithm>
+#include <numeric>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "instances/runtime/areas/areas.hpp"
+
+namespace plchost {
+
+namespace {
+
+// The bytes of `all` that are in none of `ranges`.
+std::vector<ByteRange> rest_of(ByteRange all, std::vector<ByteRange> ranges) {
+  std::ranges::sort(ranges, {}, &ByteRange::offset);
+  std::vector<ByteRange> rest;
+  std::size_t at = all.offset;
+  for (const ByteRange range : ranges) {
+    if (range.offset > at) rest.push_back({.offset = at, .bytes = range.offset - at});
+    at = range.offset + range.bytes;
+  }
+  const std::size_t end = all.offset + all.bytes;
+  if (end > at) rest.push_back({.offset = at, .bytes = end - at});
+  return rest;
+}
+
+}  // namespace
+
+Result<std::string> Areas::place(const Environment& environment, std::span<TaskConfig> tasks) {
+  open_ = false;
+  if (declared_.empty()) return std::string();
+  for (const TaskConfig& task : tasks) tasks_.push_back(task.name);
+  if (auto done = complete_uses(declared_, tasks_); !done) return std::unexpected(done.error());
+  auto plan = plan_areas(declared_, environment.settings);
+  if (!plan) return std::unexpected(std::move(plan).error());
+  plan_ = *std::move(plan);
+  cycles_.resize(tasks.size());
+  plain_.resize(declared_.size(), nullptr);
+  if (auto made = make_blocks(environment); !made) return std::unexpected(made.error());
+  if (auto made = make_keeper(environment); !made) return std::unexpected(made.error());
+  tell_plain_addresses();
+  for (std::size_t block = 0; block < plan_.blocks.size(); ++block) make_views(block);
+  count_cycles();
+  wrap(tasks);
+  placed_ = true;
+  if (!keeper_) return std::string();
+  if (auto started = keeper_->start(); !started) return std::unexpected(started.error());
+  return fmt::format("{}", fmt::join(keeper_->remarks(), "; "));
+}
+
+Result<void> Areas::make_blocks(const Environment& environment) {
+  for (const AreaBlock& planned : plan_.blocks) {
+    Block& block = blocks_.emplace_back();
+    if (planned.settings == nullptr && first_of(planned).is_kept()) continue;  // RetainKeeper's
+    block.initial.resize(planned.bytes);
+    for (const std::size_t area : planned.areas) {
+      std::ranges::copy(declared_[area].initial,
+                        block.initial.begin() + static_cast<std::ptrdiff_t>(plan_.places[area].offset));
+    }
+    if (auto made = make_memory(environment, block, planned); !made) return made;
+    if (first_of(planned).has_image()) make_image(block, planned);
+  }
+  return {};
+}
+
+Result<void> Areas::make_memory(const Environment& environment, Block& block, const AreaBlock& planned) {
+  const DeclaredArea& first = first_of(planned);
+  const auto take = [&](Result<AreaMemory> made) -> Result<void> {
+    if (!made) return std::unexpected(std::move(made).error());
+    block.memory = *std::move(made);
+    return {};
+  };
+  if (planned.settings == nullptr) {
+    // Inputs that nobody writes and outputs that nobody reads need no memory but the tasks'.
+    if (first.is_input() || (first.is_output() && first.uses.size() == 1)) return {};
+    return take(AreaMemory::of_process(first.is_output() ? plc_image_bytes(first.bytes) : planned.bytes));
+  }
+  const AreaSettings& settings = *planned.settings;
+  if (settings.object.empty()) return take(AreaMemory::of_device(settings));
+  const auto size = static_cast<std::uint32_t>(settings.size);
+  const std::size_t bytes = first.has_image() ? plc_image_bytes(size) : settings.size;
+  auto made = AreaMemory::of_pool(environment.pool, settings.object, bytes, first.is_output());
+  if (!made) {
+    return failure_in(fmt::format("{}: [SysMem] Area.{}", settings.where, settings.number),
+                      std::move(made).error());
+  }
+  return take(std::move(made));
+}
+
+// Several areas of a block are one image: a task sees all of them as they were at one time.
+void Areas::make_image(Block& block, const AreaBlock& planned) {
+  const bool of_device = planned.settings != nullptr && planned.settings->object.empty();
+  if (of_device || block.memory.bytes().empty()) return;
+  const auto size =
+      static_cast<std::uint32_t>(planned.settings != nullptr ? planned.bytes : first_of(planned).bytes);
+  auto* const header = reinterpret_cast<plc_image_header*>(block.memory.bytes().data());
+  // Made by firmware, it is one already; whatever else was there is none of theirs.
+  if (plc_image_is_one(header, size) == 0) plc_image_begin(header, size);
+  block.initial.resize(size);
+  if (first_of(planned).is_input()) {
+    block.inputs = image_in(block.memory.bytes(), size);
+  } else {
+    block.outputs = std::make_unique<OutputImage>(block.memory.bytes(), size);
+    block.outputs->write(block.initial);
+  }
+}
+
+Result<void> Areas::make_keeper(const Environment& environment) {
+  RetainImage initial;
+  initial.layout.application = environment.application;
+  for (const DeclaredArea& area : declared_) {
+    if (!area.is_kept()) continue;
+    initial.layout.areas.push_back({.name = area.name,
+                                    .flags = area.flags & (PLC_AREA_RETAIN | PLC_AREA_PERSISTENT),
+                                    .bytes = area.bytes,
+                                    .layout = area.layout,
+                                    .offset = initial.data.size()});
+    initial.data.insert(initial.data.end(), area.initial.begin(), area.initial.end());
+    initial.data.resize((initial.data.size() + kRetainAlignment - 1) / kRetainAlignment * kRetainAlignment);
+  }
+  if (initial.layout.areas.empty()) return {};
+  initial.layout.bytes = initial.data.size();
+  kept_ = initial.layout;
+  if (initial.layout.bytes > kMaxRetainBytes) {
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("the retain and persistent areas have {} bytes, {} are allowed",
+                               initial.layout.bytes, kMaxRetainBytes));
+  }
+  auto keeper = RetainKeeper::make(environment.pool, environment.instance, initial, environment.retain);
+  if (!keeper) return std::unexpected(std::move(keeper).error());
+  keeper_ = *std::move(keeper);
+  return {};
+}
+
+void Areas::tell_plain_addresses() {
+  for (std::size_t i = 0; i < declared_.size(); ++i) {
+    const DeclaredArea& area = declared_[i];
+    if (area.has_image()) continue;
+    const AreaPlan::Place place = plan_.places[i];
+    const AreaBlock& planned = plan_.blocks[place.block];
+    const auto at_kept = [&] { return kept_.areas[kept_number(i)].offset; };
+    if (area.is_kept() && planned.settings == nullptr) {
+      plain_[i] = keeper_->memory().data().data() + at_kept();
+    } else {
+      const auto bytes = blocks_[place.block].memory.bytes().subspan(place.offset, area.bytes);
+      plain_[i] = bytes.data();
+      // What lies in a device or in the pool and is not kept, others may have written: it stays.
+      if (area.is_kept()) keeper_->memory().live_elsewhere(at_kept(), bytes);
+      if (!area.is_kept() && !blocks_[place.block].memory.existed())
+        std::ranges::copy(area.initial, bytes.begin());
+    }
+    if (area.address != nullptr) *area.address = plain_[i];
+    for (const AreaUse& use : area.uses) {
+      if (use.address != nullptr) *use.address = plain_[i];
+    }
+  }
+}
+
+std::size_t Areas::task_number(const std::string& name) const {
+  return static_cast<std::size_t>(std::ranges::find(tasks_, name) - tasks_.begin());
+}
+
+// Of the tasks that use any area of the block.
+std::vector<std::size_t> Areas::users_of(std::size_t index) const {
+  std::vector<std::size_t> users;
+  for (const std::size_t area : plan_.blocks[index].areas) {
+    for (const AreaUse& use : declared_[area].uses) users.push_back(task_number(use.task));
+  }
+  std::ranges::sort(users);
+  users.erase(std::ranges::unique(users).begin(), users.end());
+  return users;
+}
+
+OutputView::Writes Areas::writes_of(std::size_t index, std::size_t task) const {
+  OutputView::Writes writes;
+  for (const std::size_t area : plan_.blocks[index].areas) {
+    const DeclaredArea& declared = declared_[area];
+    const auto place = static_cast<std::size_t>(plan_.places[area].offset);
+    std::vector<ByteRange> owned;  // by any task
+    bool uses = false;
+    for (const AreaUse& use : declared.uses) {
+      const ByteRange range{.offset = place + use.offset, .bytes = use.bytes};
+      if (range.bytes > 0) owned.push_back(range);
+      if (task_number(use.task) != task) continue;
+      uses = true;
+      if (range.bytes > 0) writes.own.push_back(range);
+    }
+    if (!uses) continue;
+    for (const ByteRange range : rest_of({.offset = place, .bytes = declared.bytes}, owned)) {
+      writes.shared.push_back(range);
+    }
+  }
+  return writes;
+}
+
+void Areas::make_views(std::size_t index) {
+  if (!first_of(plan_.blocks[index]).has_image()) return;
+  const auto users = users_of(index);
+  for (const std::size_t task : users) make_view(index, task, users.size() == 1);
+}
+
+void Areas::make_view(std::size_t index, std::size_t task, bool sole) {
+  Block& block = blocks_[index];
+  const bool registers = block.memory.bytes().size() > 0 && !block.inputs && !block.outputs;
+  if (first_of(plan_.blocks[index]).is_input()) {
+    auto& view =
+        registers ? inputs_.emplace_back(index, block.initial, block.memory.bytes()).view
+                  : inputs_.emplace_back(index, block.initial, block.inputs ? &*block.inputs : nullptr).view;
+    cycles_[task].add(view);
+    tell_view(index, task, view.bytes());
+  } else {
+    OutputView::Writes writes = writes_of(index, task);
+    writes.sole = sole && !registers;
+    auto& view =
+        registers ? outputs_.emplace_back(index, block.initial, std::move(writes), block.memory.bytes()).view
+                  : outputs_.emplace_back(index, block.initial, std::move(writes), block.outputs.get()).view;
+    cycles_[task].add(view);
+    tell_view(index, task, view.bytes());
+  }
+}
+
+void Areas::tell_view(std::size_t index, std::size_t task, std::byte* bytes) {
+  for (const std::size_t number : plan_.blocks[index].areas) {
+    const DeclaredArea& area = declared_[number];
+    std::byte* const address = bytes + plan_.places[number].offset;
+    for (const AreaUse& use : area.uses) {
+      if (task_number(use.task) != task) continue;
+      cycles_[task].set_address(number, address);
+      if (use.address != nullptr) *use.address = address;
+      if (area.uses.size() == 1 && area.address != nullptr) *area.address = address;
+    }
+  }
+}
+
+// Tasks that may change what is kept are seen to be within a cycle.
+void Areas::count_cycles() {
+  for (const DeclaredArea& area : declared_) {
+    if (!area.is_kept()) continue;
+    for (const AreaUse& use : area.uses) {
+      const std::size_t task = task_number(use.task);
+      cycles_[task].count_into(keeper_->memory().counter(task));
+    }
+  }
+}
+
+void Areas::wrap(std::span<TaskConfig> tasks) {
+  for (std::size_t i = 0; i < tasks.size(); ++i) {
+    if (cycles_[i].empty()) continue;
+    tasks[i].entry = [cycle = &cycles_[i], entry = std::move(tasks[i].entry)] { cycle->run(entry); };
+  }
+}
+
+}  // namespace plchost

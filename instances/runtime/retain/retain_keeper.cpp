@@ -1,0 +1,220 @@
+#include "instances/runtime/retain/retain_keeper.hpp"
+
+#include <algorithm>
+#include <thread>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "shm/base/log.hpp"
+
+namespace plchost {
+
+namespace {
+
+// What the areas of two layouts have in common, for people.
+std::string describe_difference(const RetainLayout& kept, const RetainLayout& wanted) {
+  if (kept.application != wanted.application) {
+    return fmt::format("they are those of application '{}'", kept.application);
+  }
+  for (const RetainArea& area : wanted.areas) {
+    const auto other = std::ranges::find(kept.areas, area.name, &RetainArea::name);
+    if (other == kept.areas.end()) return fmt::format("they have no area '{}'", area.name);
+    if (other->bytes != area.bytes) {
+      return fmt::format("area '{}' has {} bytes in them and {} now", area.name, other->bytes, area.bytes);
+    }
+    if (other->layout != area.layout) return fmt::format("area '{}' has another layout in them", area.name);
+  }
+  return kept.areas.size() > wanted.areas.size() ? "they have more areas"
+                                                 : "their areas have other flags or places";
+}
+
+}  // namespace
+
+/// How it begins.
+struct RetainKeeper::Start {
+  std::optional<RetainFiles> files;
+  std::optional<RetainImage> source;  // the values to go on with
+  Origin origin = PLC_AREA_INITIAL;   // of those
+  std::uint64_t generation = 0;       // the highest that was used
+  std::vector<std::byte> written;     // what the newest file holds
+  RetainImage image;                  // what the memory is to hold
+  std::vector<Origin> origins;
+  std::vector<std::string> remarks;
+
+  Result<void> open_files(const Options& options, const std::string& instance) {
+    if (options.directory.empty()) {
+      remarks.emplace_back(
+          "retain variables are lost when the power is cut: no folder for them is given ([Retain] Directory, "
+          "or "
+          "state_directory of the manager)");
+      return {};
+    }
+    auto opened = RetainFiles::open(options.directory, instance);
+    if (!opened) return std::unexpected(std::move(opened).error());
+    files.emplace(*std::move(opened));
+    return {};
+  }
+
+  // The memory of a process that was not ended by the power is newer than any file that it wrote.
+  void find_source(const std::string& pool, const std::string& name) {
+    auto left = KeptMemory::left_behind(pool, name);
+    auto found = files ? files->read() : RetainFiles::Found{};
+    for (std::string& problem : found.problems) remarks.push_back(std::move(problem));
+    if (found.newest) {
+      generation = found.newest->generation;
+      written = found.newest->data;
+    }
+    if (left && left->image.generation >= generation) {
+      if (left->in_cycle > 0) {
+        remarks.push_back(
+            fmt::format("the process before ended within the cycles of {} tasks", left->in_cycle));
+      }
+      generation = left->image.generation;
+      origin = PLC_AREA_KEPT;
+      source = std::move(left->image);
+    } else if (found.newest) {
+      origin = PLC_AREA_RESTORED;
+      source = std::move(found.newest);
+    }
+  }
+
+  Result<void> judge(const RetainLayout& wanted, RetainMismatch mismatch) {
+    if (!source || source->layout == wanted) return {};
+    const std::string why = fmt::format("the kept values of retain variables are of another layout: {}",
+                                        describe_difference(source->layout, wanted));
+    switch (mismatch) {
+      case RetainMismatch::refuse:
+        return failure(ErrorCode::refused,
+                       why +
+                           "; [Retain] Mismatch=Initialise or Ignore would load it, or remove "
+                           "the files");
+      case RetainMismatch::initialise:
+        remarks.push_back(why + ": all begin with their initial values; the files are put aside as .old");
+        if (files) files->put_aside();
+        source.reset();
+        break;
+      case RetainMismatch::ignore:
+        remarks.push_back(why + ": areas of the same name have their bytes, as many as both have");
+        break;
+    }
+    return {};
+  }
+
+  void fill(const RetainImage& initial, bool cold) {
+    image = initial;
+    image.generation = generation;
+    origins.assign(initial.layout.areas.size(), PLC_AREA_INITIAL);
+    if (!source) return;
+    for (std::size_t i = 0; i < origins.size(); ++i) {
+      const RetainArea& area = initial.layout.areas[i];
+      if (cold && (area.flags & PLC_AREA_PERSISTENT) == 0) continue;
+      const auto old = std::ranges::find(source->layout.areas, area.name, &RetainArea::name);
+      if (old == source->layout.areas.end()) continue;
+      std::copy_n(source->data.begin() + static_cast<std::ptrdiff_t>(old->offset),
+                  std::min(old->bytes, area.bytes),
+                  image.data.begin() + static_cast<std::ptrdiff_t>(area.offset));
+      origins[i] = origin;
+    }
+  }
+
+  [[nodiscard]] bool goes_on_in_place(const RetainImage& initial, bool cold) const {
+    return origin == PLC_AREA_KEPT && source && source->layout == initial.layout && !cold;
+  }
+};
+
+Result<std::unique_ptr<RetainKeeper>> RetainKeeper::make(const std::string& pool, const std::string& instance,
+                                                         const RetainImage& initial, const Options& options) {
+  const std::string name = KeptMemory::name_for(instance);
+  Start start;
+  if (auto opened = start.open_files(options, instance); !opened) return std::unexpected(opened.error());
+  start.find_source(pool, name);
+  if (auto judged = start.judge(initial.layout, options.mismatch); !judged)
+    return std::unexpected(judged.error());
+  start.fill(initial, options.cold);
+  auto memory = start.goes_on_in_place(initial, options.cold)
+                    ? KeptMemory::take_over(pool, name, initial.layout)
+                    : KeptMemory::make(pool, name, start.image);
+  if (!memory) return std::unexpected(std::move(memory).error());
+  return std::unique_ptr<RetainKeeper>(new RetainKeeper(*std::move(memory), std::move(start), options));
+}
+
+Result<void> RetainKeeper::start() {
+  if (!files_) return {};
+  // What was decided for this start holds also if the power is cut before the first cycle.
+  save();
+  auto thread = Thread::start("retain", {}, [this] { run(); });
+  if (!thread) return std::unexpected(std::move(thread).error());
+  thread_ = *std::move(thread);
+  return {};
+}
+
+RetainKeeper::RetainKeeper(KeptMemory memory, Start start, const Options& options)
+    : memory_(std::move(memory)),
+      files_(std::move(start.files)),
+      origins_(std::move(start.origins)),
+      remarks_(std::move(start.remarks)),
+      interval_(options.interval),
+      image_(std::move(start.image)),
+      written_(std::move(start.written)) {}
+
+void RetainKeeper::save_soon() {
+  const std::lock_guard lock(mutex_);
+  soon_ = true;
+  wake_.notify_one();
+}
+
+void RetainKeeper::finish() {
+  {
+    const std::lock_guard lock(mutex_);
+    if (std::exchange(ending_, true)) return;
+    wake_.notify_one();
+  }
+  thread_.join();
+}
+
+void RetainKeeper::run() {
+  std::unique_lock lock(mutex_);
+  for (bool last = false; !last;) {
+    wake_.wait_for(lock, interval_, [this] { return soon_ || ending_; });
+    soon_ = false;
+    last = ending_;
+    lock.unlock();
+    save();
+    lock.lock();
+  }
+}
+
+// Cycles are short and rest in between: a moment without one comes soon, if it comes at all.
+bool RetainKeeper::take_snapshot() {
+  constexpr int kAttempts = 400;
+  constexpr auto kPause = std::chrono::microseconds(250);
+  for (int attempt = 0; attempt < kAttempts; ++attempt) {
+    if (memory_.snapshot(image_.data)) return true;
+    std::this_thread::sleep_for(kPause);
+  }
+  return false;
+}
+
+void RetainKeeper::save() {
+  if (!files_) return;
+  if (!take_snapshot()) return not_saved("a task was within a cycle each time");
+  if (image_.data == written_ && saves() > 0) return;
+  ++image_.generation;
+  image_.unix_ns = unix_time_ns();
+  // Before the file: memory that says less than a file would be taken for older.
+  memory_.set_generation(image_.generation);
+  if (auto done = files_->write(image_); !done) return not_saved(done.error().describe());
+  written_ = image_.data;
+  saves_.store(saves() + 1, std::memory_order_relaxed);
+  if (!std::exchange(problem_, {}).empty()) spdlog::info("retain variables are written again");
+}
+
+void RetainKeeper::not_saved(std::string why) {
+  unsaved_.store(unsaved() + 1, std::memory_order_relaxed);
+  if (why == problem_) return;
+  spdlog::warn("retain variables are not written: {}; the file has those before", why);
+  problem_ = std::move(why);
+}
+
+}  // namespace plchost

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "instances/runtime/retain/kept_memory.hpp"
+#include "instances/runtime/retain/retain_files.hpp"
+#include "instances/runtime/settings/settings.hpp"
+#include "shm/base/thread.hpp"
+
+namespace plchost {
+
+/// The retain and persistent variables of one application: their memory, where they come from at the start,
+/// and a soft thread that writes them to files.
+class RetainKeeper {
+ public:
+  struct Options {
+    std::string directory{};  ///< of the files; empty: they live as long as the pool
+    Duration interval = std::chrono::seconds(1);
+    RetainMismatch mismatch = RetainMismatch::initialise;
+    bool cold = false;  ///< retain areas begin with initial values
+  };
+  /// Where an area's values come from: PLC_AREA_INITIAL, PLC_AREA_KEPT, PLC_AREA_RESTORED.
+  using Origin = unsigned;
+
+  /// `initial`: the layout with its initial values. Goes on with what is left in memory, else with the newest
+  /// file that is whole. refused: that has another layout and the settings say so. Set-up.
+  [[nodiscard]] static Result<std::unique_ptr<RetainKeeper>> make(const std::string& pool,
+                                                                  const std::string& instance,
+                                                                  const RetainImage& initial,
+                                                                  const Options& options);
+  ~RetainKeeper() { finish(); }
+  RetainKeeper(const RetainKeeper&) = delete;
+  RetainKeeper& operator=(const RetainKeeper&) = delete;
+
+  [[nodiscard]] KeptMemory& memory() noexcept { return memory_; }
+  /// Begins to write: until then the memory can be arranged. Set-up, once.
+  [[nodiscard]] Result<void> start();
+  [[nodiscard]] Origin origin(std::size_t area) const noexcept { return origins_[area]; }
+  /// What is to be said of the start.
+  [[nodiscard]] const std::vector<std::string>& remarks() const noexcept { return remarks_; }
+
+  /// Does not wait for the interval. Any thread that may take a lock.
+  void save_soon();
+  /// Writes the last state and ends the thread. No cycle runs any more.
+  void finish();
+
+  [[nodiscard]] std::uint64_t saves() const noexcept { return saves_.load(std::memory_order_relaxed); }
+  [[nodiscard]] std::uint64_t unsaved() const noexcept { return unsaved_.load(std::memory_order_relaxed); }
+
+ private:
+  struct Start;
+  RetainKeeper(KeptMemory memory, Start start, const Options& options);
+  void run();
+  void save();
+  [[nodiscard]] bool take_snapshot();
+  void not_saved(std::string why);
+
+  KeptMemory memory_;
+  std::optional<RetainFiles> files_;
+  std::vector<Origin> origins_;
+  std::vector<std::string> remarks_;
+  Duration interval_;
+  RetainImage image_;               // the soft thread's: as it was taken last
+  std::vector<std::byte> written_;  // the same thread's: what is in the newest file
+  std::string problem_;             // the same thread's
+  std::atomic<std::uint64_t> saves_{0};
+  std::atomic<std::uint64_t> unsaved_{0};
+
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  bool soon_ = false;
+  bool ending_ = false;
+  Thread thread_;
+};
+
+}  // namespace plchost

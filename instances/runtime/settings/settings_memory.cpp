@@ -1,0 +1,178 @@
+// [SysMem]: where the areas of an application lie. [Retain]: how its retain variables are kept.
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "instances/plc_app.h"
+#include "instances/runtime/settings/settings_key.hpp"
+#include "shm/base/names.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr std::string_view kMemory = "SysMem";
+constexpr std::string_view kRetain = "Retain";
+constexpr std::string_view kDefaultDevice = "/dev/mem";  // whose addresses the seed's file has
+constexpr std::size_t kLastArea = kMaxAreas - 1;
+
+// In the order of their enumerators.
+constexpr std::array<std::string_view, 3> kMismatches = {"Initialise", "Refuse", "Ignore"};
+static_assert(std::to_underlying(RetainMismatch::ignore) == 2);
+
+AreaDraft& draft(const SettingsTarget& to, std::size_t number) {
+  AreaDraft& area = to.areas[number];
+  if (area.where.empty()) area.where = to.where;
+  return area;
+}
+
+bool set_flags(const SettingsTarget& to, std::size_t number, std::string_view text) {
+  const auto flags = integer_of(text);
+  if (!flags || *flags < 1 || *flags > PLC_AREA_ALL) return false;
+  draft(to, number).flags = flags;
+  return true;
+}
+
+bool set_address(const SettingsTarget& to, std::size_t number, std::string_view text) {
+  const auto address = integer_of(text);
+  constexpr std::int64_t kHighest = std::int64_t{1} << 52;
+  if (!address || *address < 0 || *address > kHighest) return false;
+  if (static_cast<std::uint64_t>(*address) % kAreaAlignment != 0) return false;
+  draft(to, number).address = address;
+  return true;
+}
+
+bool set_size(const SettingsTarget& to, std::size_t number, std::string_view text) {
+  const auto size = integer_of(text);
+  if (!size || *size < 1 || *size > static_cast<std::int64_t>(kMaxAreaSize)) return false;
+  draft(to, number).size = size;
+  return true;
+}
+
+bool set_device(const SettingsTarget& to, std::size_t number, std::string_view text) {
+  if (text.size() > kMaxPath) return false;
+  draft(to, number).device = text.starts_with('/') ? std::string(text) : in_folder(to, text);
+  return true;
+}
+
+bool set_object(const SettingsTarget& to, std::size_t number, std::string_view text) {
+  if (!check_name("shared memory", text, kMaxObjectName)) return false;
+  draft(to, number).object = text;
+  return true;
+}
+
+std::unexpected<Error> bad(std::size_t number, const AreaDraft& area, std::string_view what) {
+  return failure(ErrorCode::invalid_argument,
+                 fmt::format("{}: [SysMem] Area.{}: {}", area.where, number, what));
+}
+
+// What one area says must be whole.
+Result<AreaSettings> check_area(std::size_t number, const AreaDraft& area) {
+  if (!area.flags || !area.size) return bad(number, area, "needs Flags and Size");
+  if (!area.device.empty() && !area.object.empty()) {
+    return bad(number, area, "has both Device and Object; allowed is one of them");
+  }
+  if (!area.object.empty() && area.address) {
+    return bad(number, area, "has an Address, which a shared memory of the pool (Object) does not need");
+  }
+  if (area.object.empty() && !area.address) {
+    return bad(
+        number, area,
+        "needs an Address in the device or file (Device, without it /dev/mem), or a shared memory of the "
+        "pool (Object)");
+  }
+  AreaSettings settings{.number = number,
+                        .flags = static_cast<std::uint32_t>(*area.flags),
+                        .address = static_cast<std::uint64_t>(area.address.value_or(0)),
+                        .size = static_cast<std::uint64_t>(*area.size),
+                        .device = area.device,
+                        .object = area.object,
+                        .where = area.where};
+  if (settings.object.empty() && settings.device.empty()) settings.device = kDefaultDevice;
+  return settings;
+}
+
+bool overlap(const AreaSettings& a, const AreaSettings& b) {
+  if (!a.object.empty() || !b.object.empty()) return a.object == b.object;
+  return a.device == b.device && a.address < b.address + b.size && b.address < a.address + a.size;
+}
+
+constexpr std::array kKeys = {
+    SettingKey{.section = kMemory,
+               .name = "Area.N.Flags",
+               .prefixed = true,
+               .value = NumberedSetting{"1 to 0xFFFF", set_flags, kLastArea}},
+    SettingKey{.section = kMemory,
+               .name = "Area.N.Address",
+               .prefixed = true,
+               .value = NumberedSetting{"a multiple of 8 up to 2^52", set_address, kLastArea}},
+    SettingKey{.section = kMemory,
+               .name = "Area.N.Size",
+               .prefixed = true,
+               .unit = "bytes",
+               .value = NumberedSetting{"1 to 0x40000000", set_size, kLastArea}},
+    SettingKey{.section = kMemory,
+               .name = "Area.N.Device",
+               .prefixed = true,
+               .value = NumberedSetting{"/dev/mem (if there is no Object), /dev/uioN or a file", set_device,
+                                        kLastArea}},
+    SettingKey{.section = kMemory,
+               .name = "Area.N.Object",
+               .prefixed = true,
+               .value = NumberedSetting{"name of a shared memory of the pool, 1 to 95 letters, digits, _ - .",
+                                        set_object, kLastArea}},
+    SettingKey{.section = kMemory, .name = "Memlock", .prefixed = true},
+    SettingKey{.section = kRetain,
+               .name = "Directory",
+               .value = TextSetting{"a folder, or nothing for the one of --state-directory",
+                                    [](std::string_view path) { return path.size() <= kMaxPath; },
+                                    [](const SettingsTarget& to, std::string_view path) {
+                                      to.settings.retain.directory = path.empty() ? "" : in_folder(to, path);
+                                    }}},
+    SettingKey{.section = kRetain,
+               .name = "IntervalMs",
+               .unit = "ms",
+               .initial = "1000",
+               .value = NumberSetting{10, 3'600'000,
+                                      [](const SettingsTarget& to, std::int64_t number) {
+                                        to.settings.retain.interval = std::chrono::milliseconds(number);
+                                      }}},
+    SettingKey{.section = kRetain,
+               .name = "Mismatch",
+               .initial = "Initialise",
+               .value = WordSetting{kMismatches,
+                                    [](const SettingsTarget& to, std::size_t index) {
+                                      to.settings.retain.mismatch = static_cast<RetainMismatch>(index);
+                                    }}},
+};
+
+}  // namespace
+
+std::span<const SettingKey> memory_keys() noexcept {
+  return kKeys;
+}
+
+Result<std::vector<AreaSettings>> check_areas(const std::map<std::size_t, AreaDraft>& drafts) {
+  std::vector<AreaSettings> areas;
+  for (const auto& [number, area] : drafts) {
+    if (number != areas.size()) {
+      return bad(number, area,
+                 fmt::format("there is no Area.{}; areas are numbered 0, 1, 2 without a gap", areas.size()));
+    }
+    auto checked = check_area(number, area);
+    if (!checked) return std::unexpected(std::move(checked).error());
+    const auto other =
+        std::ranges::find_if(areas, [&](const AreaSettings& before) { return overlap(before, *checked); });
+    if (other != areas.end()) {
+      return bad(number, area,
+                 fmt::format("overlaps with Area.{} of {}; each needs bytes of its own in {}", other->number,
+                             other->where, other->object.empty() ? other->device : other->object));
+    }
+    areas.push_back(*std::move(checked));
+  }
+  return areas;
+}
+
+}  // namespace plchost

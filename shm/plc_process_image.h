@@ -1,0 +1,288 @@
+/*
+ * The process image: how firmware (an I/O driver, say) exchanges inputs and outputs with an instance of
+ * plchost. Plain C89 with GCC's or clang's atomic builtins, nothing to link:
+ *
+ *     gcc -std=c89 -D_POSIX_C_SOURCE=200809L -I FOLDER_OF_THIS_FILE firmware.c
+ *
+ *     plc_image inputs, outputs;
+ *     int error = plc_image_open("plchost", "terminal1.in", 64, PLC_IMAGE_WRITE, &inputs);     an errno
+ *     error = plc_image_open("plchost", "terminal1.out", 8, PLC_IMAGE_READ, &outputs);
+ *     every cycle of the I/O:
+ *         plc_image_read(&outputs, bytes, 0);          the outputs of whole task cycles, never half of one
+ *         plc_image_write(&inputs, measured);
+ *
+ * An image is a shared memory of the pool, the file /dev/shm/POOL.memory.NAME; an instance has its inputs or
+ * outputs in it with [SysMem] Linux.Area.n.Object=NAME in its settings. Whoever comes first makes it,
+ * firmware or instance; it outlives both. It has one writer at a time and any number of readers; nobody ever
+ * waits for anybody, also if the other one is pre-empted or killed within. The writer fills a slot that is
+ * not the latest and then publishes it; the reader copies the latest and looks whether it was overtaken
+ * meanwhile, which takes the writer PLC_IMAGE_SLOTS - 2 publications.
+ *
+ * Inputs are copied in at the start of a task's cycle, outputs out at its end. The stamp tells when an image
+ * was published: firmware that sees an old one (the instance was stopped, or is gone) brings its outputs into
+ * a safe state.
+ *
+ * Who removes the file has it made anew, by an instance's next start or by the next plc_image_open: see
+ * plc_image_gone().
+ */
+#ifndef PLC_PROCESS_IMAGE_H
+#define PLC_PROCESS_IMAGE_H
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+#ifdef __cplusplus
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wold-style-cast"
+extern "C" {
+#endif
+
+/* Whole numbers of 64 bit. */
+typedef long plc_image_i64;
+typedef unsigned long plc_image_u64;
+typedef char plc_image_needs_64_bit_long[sizeof(long) == 8 ? 1 : -1];
+
+#define PLC_IMAGE_MAGIC 0x6567616d69636c70UL /* "plcimage", as bytes in memory */
+#define PLC_IMAGE_VERSION 1u
+#define PLC_IMAGE_PATH "/dev/shm/%s.memory.%s" /* pool, name */
+#define PLC_IMAGE_SLOTS 16u
+#define PLC_IMAGE_MAX_SIZE 1048576u /* bytes of inputs or outputs in one image */
+
+/* The layout: this, then PLC_IMAGE_SLOTS slots, each a plc_image_slot and the bytes, padded to 64. All zero
+ * but for the first four is an image into which nothing was written yet. */
+typedef struct {
+  plc_image_u64 magic;  /* written last, by whoever makes the image */
+  unsigned int version; /* PLC_IMAGE_VERSION */
+  unsigned int slots;   /* PLC_IMAGE_SLOTS */
+  plc_image_u64 size;   /* bytes of one image */
+  plc_image_u64 reserved[5];
+  plc_image_u64 latest; /* sequence of the latest image * 256 + its slot; 0: none yet */
+  plc_image_u64 reserved_too[7];
+} plc_image_header;
+
+typedef struct {
+  plc_image_u64 sequence; /* of what is in it; 0 while it is being written */
+  plc_image_i64 stamp_ns; /* CLOCK_MONOTONIC, when it was published */
+  plc_image_u64 reserved[6];
+} plc_image_slot;
+
+/* An image, opened. The numbers in it are this process's own: what strangers write into the shared header
+ * leads nobody outside of the mapping. */
+typedef struct {
+  plc_image_header* header;
+  unsigned long mapped; /* bytes */
+  unsigned int size;    /* bytes of one image */
+  int descriptor;       /* keeps the writer's lock */
+  dev_t device;
+  ino_t inode;
+} plc_image;
+
+#define PLC_IMAGE_READ 0
+#define PLC_IMAGE_WRITE 1 /* and nobody else, as long as it is open: the kernel ends it with the process */
+
+/* What plc_image_read says. */
+#define PLC_IMAGE_OK 0
+#define PLC_IMAGE_NONE 1 /* nothing was written yet */
+#define PLC_IMAGE_BUSY 2 /* overtaken each time, or overwritten by a stranger: keep what you have */
+#define PLC_IMAGE_ATTEMPTS 4
+
+static __inline__ unsigned long plc_image_stride(unsigned int size) {
+  return sizeof(plc_image_slot) + (((unsigned long)size + 63u) & ~63UL);
+}
+
+/* Bytes of the whole memory. */
+static __inline__ unsigned long plc_image_bytes(unsigned int size) {
+  return sizeof(plc_image_header) + PLC_IMAGE_SLOTS * plc_image_stride(size);
+}
+
+static __inline__ plc_image_slot* plc_image_slot_at(const plc_image* image, unsigned int slot) {
+  return (plc_image_slot*)(void*)((char*)image->header + sizeof(plc_image_header) +
+                                  slot * plc_image_stride(image->size));
+}
+
+/* CLOCK_MONOTONIC in nanoseconds, for comparison with a stamp. Any context. */
+static __inline__ plc_image_i64 plc_image_now_ns(void) {
+  struct timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return (plc_image_i64)now.tv_sec * 1000000000L + (plc_image_i64)now.tv_nsec;
+}
+
+/* Fills a slot that nobody reads or writes (more); plc_image_publish makes it the latest. Real-time. */
+static __inline__ void plc_image_fill(const plc_image* image, unsigned int number, plc_image_u64 sequence,
+                                      const void* bytes, plc_image_i64 stamp_ns) {
+  plc_image_slot* const slot = plc_image_slot_at(image, number);
+  plc_image_u64* const words = (plc_image_u64*)(void*)(slot + 1);
+  const unsigned int whole = image->size / 8u;
+  unsigned int i;
+  __atomic_store_n(&slot->sequence, 0u, __ATOMIC_RELAXED);
+  /* Pairs with the acquire fence of the reader: who sees a new word sees that the slot is being written. */
+  __atomic_thread_fence(__ATOMIC_RELEASE);
+  for (i = 0; i < whole; ++i) {
+    plc_image_u64 word;
+    memcpy(&word, (const char*)bytes + 8u * i, 8u);
+    __atomic_store_n(&words[i], word, __ATOMIC_RELAXED);
+  }
+  if (image->size % 8u != 0) {
+    plc_image_u64 word = 0;
+    memcpy(&word, (const char*)bytes + 8u * whole, image->size % 8u);
+    __atomic_store_n(&words[whole], word, __ATOMIC_RELAXED);
+  }
+  __atomic_store_n(&slot->stamp_ns, stamp_ns, __ATOMIC_RELAXED);
+  __atomic_store_n(&slot->sequence, sequence, __ATOMIC_RELEASE);
+}
+
+/* The number of the image that follows `latest`, whatever a stranger has made of that. */
+static __inline__ plc_image_u64 plc_image_next_sequence(plc_image_u64 latest) {
+  const plc_image_u64 next = ((latest >> 8) + 1u) & 0x00ffffffffffffffUL;
+  return next == 0 ? 1u : next;
+}
+
+/* Publishes `bytes`, image->size of them. One writer at a time. No lock, no system call: real-time. */
+static __inline__ void plc_image_write(const plc_image* image, const void* bytes) {
+  const plc_image_u64 latest = __atomic_load_n(&image->header->latest, __ATOMIC_RELAXED);
+  const unsigned int number = (unsigned int)((latest & 0xffu) + 1u) % PLC_IMAGE_SLOTS;
+  const plc_image_u64 sequence = plc_image_next_sequence(latest);
+  plc_image_fill(image, number, sequence, bytes, plc_image_now_ns());
+  __atomic_store_n(&image->header->latest, sequence << 8 | number, __ATOMIC_RELEASE);
+}
+
+/* Copies the image that `latest` names. 1: done, and it was not overwritten meanwhile. Real-time. */
+static __inline__ int plc_image_copy(const plc_image* image, plc_image_u64 latest, void* bytes,
+                                     plc_image_i64* stamp_ns) {
+  const unsigned int number = (unsigned int)(latest & 0xffu);
+  const unsigned int whole = image->size / 8u;
+  const plc_image_slot* slot;
+  const plc_image_u64* words;
+  unsigned int i;
+  if (number >= PLC_IMAGE_SLOTS) return 0;
+  slot = plc_image_slot_at(image, number);
+  words = (const plc_image_u64*)(const void*)(slot + 1);
+  if (__atomic_load_n(&slot->sequence, __ATOMIC_ACQUIRE) != latest >> 8) return 0;
+  for (i = 0; i < whole; ++i) {
+    const plc_image_u64 word = __atomic_load_n(&words[i], __ATOMIC_RELAXED);
+    memcpy((char*)bytes + 8u * i, &word, 8u);
+  }
+  if (image->size % 8u != 0) {
+    const plc_image_u64 word = __atomic_load_n(&words[whole], __ATOMIC_RELAXED);
+    memcpy((char*)bytes + 8u * whole, &word, image->size % 8u);
+  }
+  if (stamp_ns != NULL) *stamp_ns = __atomic_load_n(&slot->stamp_ns, __ATOMIC_RELAXED);
+  __atomic_thread_fence(__ATOMIC_ACQUIRE);
+  return __atomic_load_n(&slot->sequence, __ATOMIC_RELAXED) == latest >> 8;
+}
+
+/* Copies the latest image to `bytes`, image->size of them; PLC_IMAGE_...; `stamp_ns` may be null. Unless it
+ * says PLC_IMAGE_OK, what is in `bytes` may be half of another image. A few attempts, then it gives up:
+ * real-time. */
+static __inline__ int plc_image_read(const plc_image* image, void* bytes, plc_image_i64* stamp_ns) {
+  int attempt;
+  for (attempt = 0; attempt < PLC_IMAGE_ATTEMPTS; ++attempt) {
+    const plc_image_u64 latest = __atomic_load_n(&image->header->latest, __ATOMIC_ACQUIRE);
+    if (latest == 0) return PLC_IMAGE_NONE;
+    if (plc_image_copy(image, latest, bytes, stamp_ns)) return PLC_IMAGE_OK;
+  }
+  return PLC_IMAGE_BUSY;
+}
+
+/* Changes with each publication. Any context. */
+static __inline__ plc_image_u64 plc_image_sequence(const plc_image* image) {
+  return __atomic_load_n(&image->header->latest, __ATOMIC_ACQUIRE) >> 8;
+}
+
+/* Makes a new, zeroed memory an image. Two who do so at once write the same. */
+static __inline__ void plc_image_begin(plc_image_header* header, unsigned int size) {
+  __atomic_store_n(&header->version, PLC_IMAGE_VERSION, __ATOMIC_RELAXED);
+  __atomic_store_n(&header->slots, PLC_IMAGE_SLOTS, __ATOMIC_RELAXED);
+  __atomic_store_n(&header->size, (plc_image_u64)size, __ATOMIC_RELAXED);
+  __atomic_store_n(&header->magic, PLC_IMAGE_MAGIC, __ATOMIC_RELEASE);
+}
+
+/* Whether it is an image of this version and size. */
+static __inline__ int plc_image_is_one(const plc_image_header* header, unsigned int size) {
+  return __atomic_load_n(&header->magic, __ATOMIC_ACQUIRE) == PLC_IMAGE_MAGIC &&
+         __atomic_load_n(&header->version, __ATOMIC_RELAXED) == PLC_IMAGE_VERSION &&
+         __atomic_load_n(&header->slots, __ATOMIC_RELAXED) == PLC_IMAGE_SLOTS &&
+         __atomic_load_n(&header->size, __ATOMIC_RELAXED) == size;
+}
+
+/* The file is not what the name leads to any more: open it again. Set-up. */
+static __inline__ int plc_image_gone(const plc_image* image, const char* pool, const char* name) {
+  char path[256];
+  struct stat status;
+  if (snprintf(path, sizeof path, PLC_IMAGE_PATH, pool, name) >= (int)sizeof path) return 1;
+  return stat(path, &status) != 0 || status.st_dev != image->device || status.st_ino != image->inode ||
+         (unsigned long)status.st_size != image->mapped;
+}
+
+/* Unmaps it; the image itself stays. Set-up. */
+static __inline__ void plc_image_close(plc_image* image) {
+  if (image->header != NULL) munmap(image->header, image->mapped);
+  if (image->descriptor >= 0) close(image->descriptor);
+  image->header = NULL;
+  image->descriptor = -1;
+}
+
+/* Gives an empty file its size, and maps it. An errno. */
+static __inline__ int plc_image_map(plc_image* image) {
+  struct stat status;
+  void* memory;
+  int error = 0;
+  if (fstat(image->descriptor, &status) != 0) return errno;
+  if (!S_ISREG(status.st_mode)) return EPROTO;
+  if (status.st_size == 0) {
+    (void)fchmod(image->descriptor, 0660); /* whatever the umask */
+    if (ftruncate(image->descriptor, (off_t)image->mapped) != 0) return errno;
+    /* No memory is told now, not by SIGBUS in a cycle. */
+    error = posix_fallocate(image->descriptor, 0, (off_t)image->mapped);
+    if (error != 0) return error;
+    if (fstat(image->descriptor, &status) != 0) return errno;
+  }
+  if ((unsigned long)status.st_size != image->mapped) return EPROTO;
+  memory = mmap(NULL, image->mapped, PROT_READ | PROT_WRITE, MAP_SHARED, image->descriptor, 0);
+  if (memory == MAP_FAILED) return errno;
+  image->header = (plc_image_header*)memory;
+  image->device = status.st_dev;
+  image->inode = status.st_ino;
+  if (__atomic_load_n(&image->header->magic, __ATOMIC_ACQUIRE) == 0)
+    plc_image_begin(image->header, image->size);
+  return plc_image_is_one(image->header, image->size) ? 0 : EPROTO;
+}
+
+/*
+ * Opens the image of `size` bytes, or makes it (mode 0660). 0, or an errno: EINVAL: no name, or size;
+ * ENAMETOOLONG; EPROTO: there is another kind of memory, another size or version; EBUSY: it has a writer
+ * already; what open, ftruncate, posix_fallocate and mmap give. Set-up.
+ */
+static __inline__ int plc_image_open(const char* pool, const char* name, unsigned int size, int access,
+                                     plc_image* image) {
+  char path[256];
+  int error = 0;
+  memset(image, 0, sizeof *image);
+  image->descriptor = -1;
+  if (pool[0] == '\0' || name[0] == '\0' || size == 0 || size > PLC_IMAGE_MAX_SIZE) return EINVAL;
+  if (snprintf(path, sizeof path, PLC_IMAGE_PATH, pool, name) >= (int)sizeof path) return ENAMETOOLONG;
+  image->size = size;
+  image->mapped = plc_image_bytes(size);
+  image->descriptor = open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0660);
+  if (image->descriptor < 0) return errno;
+  if (access == PLC_IMAGE_WRITE && flock(image->descriptor, LOCK_EX | LOCK_NB) != 0)
+    error = errno == EWOULDBLOCK ? EBUSY : errno;
+  if (error == 0) error = plc_image_map(image);
+  if (error != 0) plc_image_close(image);
+  return error;
+}
+
+#ifdef __cplusplus
+}
+#pragma GCC diagnostic pop
+#endif
+
+#endif

@@ -1,0 +1,312 @@
+// Where retain and persistent variables come from at a start, and when they are written.
+#include "instances/runtime/retain/retain_keeper.hpp"
+
+#include <atomic>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "instances/plc_app.h"
+#include "shm/pool/reference_clock.hpp"
+
+namespace plchost {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+constexpr std::uint64_t kInitial = 1;
+
+class Retain : public ::testing::Test {
+ protected:
+  Retain() { fs::remove_all(folder_); }
+  ~Retain() override {
+    sut.reset();
+    forget_memory();
+    fs::remove_all(folder_);
+  }
+
+  /// One retain and one persistent variable of 8 bytes.
+  static RetainImage initial(std::uint64_t layout = 0) {
+    RetainImage image{
+        .layout =
+            {.application = "Mixer",
+             .areas = {{.name = "count", .flags = PLC_AREA_RETAIN, .bytes = 8, .layout = layout, .offset = 0},
+                       {.name = "hours", .flags = PLC_AREA_PERSISTENT, .bytes = 8, .layout = 0, .offset = 8}},
+             .bytes = 16},
+        .data = std::vector<std::byte>(16)};
+    std::memcpy(image.data.data(), &kInitial, 8);
+    std::memcpy(image.data.data() + 8, &kInitial, 8);
+    return image;
+  }
+  [[nodiscard]] Result<void> start(const RetainImage& image, RetainKeeper::Options options = {}) {
+    sut.reset();
+    if (options.directory.empty()) options.directory = folder_;
+    auto made = RetainKeeper::make(pool_, "line1", image, options);
+    if (!made) return std::unexpected(made.error());
+    sut = *std::move(made);
+    return sut->start();
+  }
+  void start_well(RetainKeeper::Options options = {}) {
+    const auto started = start(initial(), options);
+    ASSERT_TRUE(started) << started.error().describe();
+  }
+  [[nodiscard]] std::uint64_t value(std::size_t area) const {
+    std::uint64_t value = 0;
+    std::memcpy(&value, sut->memory().data().data() + 8 * area, 8);
+    return value;
+  }
+  void set(std::size_t area, std::uint64_t value) const {
+    std::memcpy(sut->memory().data().data() + 8 * area, &value, 8);
+  }
+  /// As a power cut does.
+  void forget_memory() const { MemoryFile::remove(pool_memory_name(pool_, KeptMemory::name_for("line1"))); }
+  /// As a kill does: nothing is written at the end. The lock of the files goes with the process.
+  void lose_files_of_the_end() {
+    const fs::path aside = folder_.string() + ".aside";
+    fs::copy(folder_, aside);
+    sut.reset();
+    fs::remove_all(folder_);
+    fs::rename(aside, folder_);
+  }
+
+  fs::path folder_ =
+      fs::path(::testing::TempDir()) / ("keeper-" + std::to_string(::getpid()) +
+                                        ::testing::UnitTest::GetInstance()->current_test_info()->name());
+  std::string pool_ = "retain-test-" + std::to_string(::getpid());
+  std::unique_ptr<RetainKeeper> sut;
+};
+
+TEST_F(Retain, BeginsWithInitialValues) {
+  start_well();
+  EXPECT_EQ(value(0), kInitial);
+  EXPECT_EQ(sut->origin(0), PLC_AREA_INITIAL);
+  EXPECT_THAT(sut->remarks(), IsEmpty());
+  EXPECT_EQ(sut->saves(), 1U) << "also what begins so is written at once";
+}
+
+TEST_F(Retain, LosesNothingWithItsProcess) {
+  start_well({.interval = std::chrono::hours(1)});
+  set(0, 42);
+  lose_files_of_the_end();
+  start_well();
+  EXPECT_EQ(value(0), 42U);
+  EXPECT_EQ(sut->origin(0), PLC_AREA_KEPT);
+}
+
+TEST_F(Retain, HasWhatWasWrittenLastAfterAPowerCut) {
+  start_well({.interval = std::chrono::milliseconds(10)});
+  set(0, 42);
+  while (sut->saves() < 2) std::this_thread::yield();
+  lose_files_of_the_end();
+  forget_memory();
+  start_well();
+  EXPECT_EQ(value(0), 42U);
+  EXPECT_EQ(value(1), kInitial);
+  EXPECT_EQ(sut->origin(0), PLC_AREA_RESTORED);
+}
+
+TEST_F(Retain, IsWrittenAtTheEndAndWhenItIsAskedFor) {
+  start_well({.interval = std::chrono::hours(1)});
+  set(1, 2);
+  sut->save_soon();
+  while (sut->saves() < 2) std::this_thread::yield();
+  set(1, 3);
+  sut.reset();
+  forget_memory();
+  start_well();
+  EXPECT_EQ(value(1), 3U);
+}
+
+TEST_F(Retain, ThatDoesNotChangeIsNotWrittenAgain) {
+  start_well({.interval = std::chrono::milliseconds(10)});
+  const auto before = fs::last_write_time(folder_ / "line1.retain.1");
+  std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  EXPECT_EQ(sut->saves(), 1U);
+  EXPECT_EQ(fs::last_write_time(folder_ / "line1.retain.1"), before);
+}
+
+TEST_F(Retain, ColdResetInitialisesRetainAndKeepsPersistent) {
+  start_well();
+  set(0, 42);
+  set(1, 43);
+  start_well({.cold = true});
+  EXPECT_EQ(value(0), kInitial);
+  EXPECT_EQ(value(1), 43U);
+  EXPECT_EQ(sut->origin(0), PLC_AREA_INITIAL);
+  EXPECT_EQ(sut->origin(1), PLC_AREA_KEPT);
+  lose_files_of_the_end();
+  forget_memory();
+  start_well();
+  EXPECT_EQ(value(0), kInitial) << "the reset holds over a power cut right behind it";
+  EXPECT_EQ(value(1), 43U);
+}
+
+TEST_F(Retain, OfAnotherLayoutIsInitialisedAndPutAside) {
+  start_well();
+  set(0, 42);
+  ASSERT_TRUE(start(initial(1)));
+  EXPECT_EQ(value(0), kInitial);
+  EXPECT_THAT(sut->remarks(), ElementsAre(HasSubstr("area 'count' has another layout")));
+  EXPECT_TRUE(fs::exists(folder_ / "line1.retain.1.old"));
+}
+
+TEST_F(Retain, OfAnotherLayoutIsRefusedIfWanted) {
+  start_well();
+  set(0, 42);
+  const auto refused = start(initial(1), {.mismatch = RetainMismatch::refuse});
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::refused);
+  EXPECT_THAT(refused.error().message, HasSubstr("area 'count' has another layout"));
+  start_well();
+  EXPECT_EQ(value(0), 42U) << "and is still there for the right application";
+}
+
+TEST_F(Retain, OfAnotherLayoutIsTakenByNameIfWanted) {
+  start_well();
+  set(0, 42);
+  set(1, 0x0102030405060708);
+  RetainImage other = initial(1);
+  other.layout.areas = {
+      {.name = "new", .flags = PLC_AREA_RETAIN, .bytes = 4, .layout = 0, .offset = 0},
+      {.name = "hours", .flags = PLC_AREA_PERSISTENT, .bytes = 4, .layout = 0, .offset = 8}};
+  ASSERT_TRUE(start(other, {.mismatch = RetainMismatch::ignore}));
+  EXPECT_EQ(value(0), kInitial);
+  EXPECT_EQ(value(1) & 0xffffffff, 0x05060708U);
+  EXPECT_EQ(sut->origin(0), PLC_AREA_INITIAL);
+  EXPECT_EQ(sut->origin(1), PLC_AREA_KEPT);
+}
+
+TEST_F(Retain, OfAnotherApplicationIsOfAnotherLayout) {
+  start_well();
+  RetainImage other = initial();
+  other.layout.application = "Press";
+  const auto refused = start(other, {.mismatch = RetainMismatch::refuse});
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, HasSubstr("application 'Mixer'"));
+}
+
+TEST_F(Retain, TakesAFileThatIsNewerThanTheMemory) {
+  start_well();
+  set(0, 42);
+  sut.reset();
+  // The same instance ran in another pool meanwhile.
+  const std::string here = std::exchange(pool_, pool_ + "-other");
+  start_well();
+  EXPECT_EQ(value(0), 42U);
+  set(0, 43);
+  sut.reset();
+  forget_memory();
+  pool_ = here;
+  start_well();
+  EXPECT_EQ(value(0), 43U);
+  EXPECT_EQ(sut->origin(0), PLC_AREA_RESTORED);
+}
+
+TEST_F(Retain, IsNeverTakenFromTheMiddleOfACycle) {
+  start_well({.interval = std::chrono::hours(1)});
+  CycleCounter& counter = sut->memory().counter(3);
+  counter = 1;
+  set(0, 13);
+  sut->finish();
+  EXPECT_EQ(sut->unsaved(), 1U);
+  EXPECT_EQ(sut->saves(), 1U);
+  sut.reset();
+  forget_memory();
+  start_well();
+  EXPECT_EQ(value(0), kInitial) << "what was written last";
+}
+
+TEST_F(Retain, OfOneFileIsOfTheEndOfOneCycle) {
+  start_well({.interval = std::chrono::milliseconds(10)});
+  std::atomic<bool> stop{false};
+  std::thread task([&] {
+    CycleCounter& counter = sut->memory().counter(0);
+    for (std::uint64_t cycle = 2; !stop; ++cycle) {
+      counter.store(counter.load() + 1, std::memory_order_relaxed);
+      std::atomic_thread_fence(std::memory_order_release);
+      set(0, cycle);
+      std::this_thread::sleep_for(std::chrono::microseconds(50));
+      set(1, cycle);
+      counter.store(counter.load() + 1, std::memory_order_release);
+      std::this_thread::sleep_for(std::chrono::microseconds(150));
+    }
+  });
+  for (std::uint64_t seen = 0; seen < 20;) {
+    const auto files = fs::path(folder_);
+    for (const char* name : {"line1.retain.0", "line1.retain.1"}) {
+      std::ifstream stream(files / name, std::ios::binary);
+      const std::string text{std::istreambuf_iterator<char>(stream), {}};
+      const auto image = decode_retain(text);
+      if (!image) continue;  // not there yet
+      std::uint64_t count = 0;
+      std::uint64_t hours = 0;
+      std::memcpy(&count, image->data.data(), 8);
+      std::memcpy(&hours, image->data.data() + 8, 8);
+      ASSERT_EQ(count, hours) << "generation " << image->generation;
+    }
+    seen = sut->saves();
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  stop = true;
+  task.join();
+}
+
+TEST_F(Retain, WithoutAFolderLivesInMemoryAndSaysSo) {
+  sut = RetainKeeper::make(pool_, "line1", initial(), {}).value();
+  ASSERT_TRUE(sut->start());
+  EXPECT_THAT(sut->remarks(), ElementsAre(HasSubstr("lost when the power is cut")));
+  set(0, 42);
+  sut = RetainKeeper::make(pool_, "line1", initial(), {}).value();
+  EXPECT_EQ(value(0), 42U);
+}
+
+TEST_F(Retain, LivesWhereTheSettingsHaveIt) {
+  alignas(8) std::uint64_t registers = 0;
+  const auto live = std::as_writable_bytes(std::span(&registers, 1));
+  sut = RetainKeeper::make(pool_, "line1", initial(), {.directory = folder_}).value();
+  sut->memory().live_elsewhere(0, live);
+  ASSERT_TRUE(sut->start());
+  EXPECT_EQ(registers, kInitial);
+  registers = 42;
+  sut.reset();
+  forget_memory();
+  start_well();
+  EXPECT_EQ(value(0), 42U);
+}
+
+// A stranger may have scribbled over all of it: then it is the file's turn.
+TEST_F(Retain, MemoryWithAnyByteOfItsHeaderSpoiledIsTakenOrLeftAsAWhole) {
+  start_well();
+  sut.reset();
+  const std::string name = pool_memory_name(pool_, KeptMemory::name_for("line1"));
+  constexpr std::size_t kHeader = 96 + 3 * 80;
+  for (std::size_t at = 0; at < kHeader; ++at) {
+    for (const unsigned char spoil : {0x01, 0x80, 0xff}) {
+      {
+        const auto memory = MemoryFile::open(name, 1, MemoryFile::Access::read_write);
+        ASSERT_TRUE(memory);
+        memory->bytes()[at] ^= static_cast<std::byte>(spoil);
+      }
+      const auto left = KeptMemory::left_behind(pool_, KeptMemory::name_for("line1"));
+      if (left) {
+        EXPECT_TRUE(check_layout(left->image.layout));
+        EXPECT_EQ(left->image.data.size(), left->image.layout.bytes);
+      }
+      const auto memory = MemoryFile::open(name, 1, MemoryFile::Access::read_write);
+      memory->bytes()[at] ^= static_cast<std::byte>(spoil);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace plchost
