@@ -35,7 +35,7 @@ constexpr std::array kStartKinds = {
     std::pair{StartKind::after_fault, std::string_view("after-fault")},
 };
 
-constexpr unsigned kLastCode = static_cast<unsigned>(ErrorCode::corrupt);
+constexpr unsigned kLastCode = static_cast<unsigned>(ErrorCode::wrong_size);
 
 // The value of `key` if it is a text; a report of any other form is corrupt.
 Result<std::string> text_of(const Json& json, const char* key) {

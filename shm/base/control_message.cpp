@@ -104,7 +104,7 @@ Result<ControlReply> decode_reply(std::string_view packet) {
   const auto json = parse(packet);
   if (!json) return std::unexpected(json.error());
   const auto code = json->find("code");
-  constexpr unsigned kLastCode = static_cast<unsigned>(ErrorCode::corrupt);
+  constexpr unsigned kLastCode = static_cast<unsigned>(ErrorCode::wrong_size);
   if (code == json->end() || !code->is_number_unsigned() || code->get<std::uint64_t>() > kLastCode) {
     return failure(ErrorCode::corrupt, "control reply has no valid 'code'");
   }

@@ -24,6 +24,9 @@ namespace plchost {
 /// it wakes a thread that shall stop or change what it waits on.
 class CountedEvent {
  public:
+  /// The count begins anew at 0 after this.
+  static constexpr std::uint64_t kCountMask = ~std::uint64_t{0} >> 16;
+
   /// One consistent view of the event.
   class Snapshot {
    public:

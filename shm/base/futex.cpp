@@ -19,8 +19,9 @@ FutexResult futex_wait(const void* word, std::uint32_t expected, TimePoint deadl
   return errno == ETIMEDOUT ? FutexResult::timed_out : FutexResult::changed;
 }
 
-void futex_wake(const void* word, int count) noexcept {
-  ::syscall(SYS_futex, word, FUTEX_WAKE, count, nullptr, nullptr, 0);
+int futex_wake(const void* word, int count) noexcept {
+  const long woken = ::syscall(SYS_futex, word, FUTEX_WAKE, count, nullptr, nullptr, 0);
+  return woken > 0 ? static_cast<int>(woken) : 0;
 }
 
 }  // namespace plchost

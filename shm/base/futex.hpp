@@ -19,7 +19,7 @@ inline constexpr TimePoint kNoDeadline = TimePoint::max();
 /// CLOCK_MONOTONIC). Works across processes that map the same memory. Real-time: no allocation, no lock.
 FutexResult futex_wait(const void* word, std::uint32_t expected, TimePoint deadline = kNoDeadline) noexcept;
 
-/// Wakes up to `count` threads that sleep on `word`, highest priority first. Any context.
-void futex_wake(const void* word, int count = INT_MAX) noexcept;
+/// Wakes up to `count` threads that sleep on `word`, highest priority first. How many it were. Any context.
+int futex_wake(const void* word, int count = INT_MAX) noexcept;
 
 }  // namespace plchost

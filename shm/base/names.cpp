@@ -9,11 +9,6 @@ namespace plchost {
 
 namespace {
 
-bool is_name_character(char c) {
-  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-' ||
-         c == '.';
-}
-
 std::size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);
   std::iota(row.begin(), row.end(), std::size_t{0});
@@ -28,6 +23,23 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return row.back();
 }
 
+// The bytes of the character that the text begins with; 0: not one, or a control character.
+std::size_t printable_character(std::string_view text) noexcept {
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  const unsigned char lead = byte(0);
+  if (lead < 0x80) return lead >= ' ' && lead != 0x7f ? 1 : 0;
+  const std::size_t bytes = lead >= 0xf0 ? 4 : lead >= 0xe0 ? 3 : 2;
+  if (lead < 0xc2 || lead > 0xf4 || text.size() < bytes) return 0;
+  std::uint32_t code = lead & (0xffU >> (bytes + 1));
+  for (std::size_t i = 1; i < bytes; ++i) {
+    if ((byte(i) & 0xc0U) != 0x80) return 0;
+    code = code << 6 | (byte(i) & 0x3fU);
+  }
+  constexpr std::array<std::uint32_t, 5> kLeast = {0, 0, 0xa0, 0x800, 0x10000};  // shorter forms, controls
+  const bool surrogate = code >= 0xd800 && code <= 0xdfff;
+  return code >= kLeast[bytes] && !surrogate && code <= 0x10ffff ? bytes : 0;
+}
+
 }  // namespace
 
 Result<void> check_name(std::string_view what, std::string_view name, std::size_t max) {
@@ -38,6 +50,20 @@ Result<void> check_name(std::string_view what, std::string_view name, std::size_
                  fmt::format("{} '{}' is not valid: allowed are 1 to {} letters, digits, '_', '-' and '.', "
                              "not starting with '-' or '.'",
                              what, shown(name), max));
+}
+
+bool is_name_character(char c) noexcept {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '-' ||
+         c == '.';
+}
+
+bool is_printable_utf8(std::string_view text) noexcept {
+  while (!text.empty()) {
+    const std::size_t bytes = printable_character(text);
+    if (bytes == 0) return false;
+    text.remove_prefix(bytes);
+  }
+  return true;
 }
 
 std::string event_object_name(std::string_view instance, std::string_view event) {

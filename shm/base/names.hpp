@@ -24,6 +24,12 @@ inline constexpr std::size_t kMaxPath = 255;
 /// name can stand in a path, a DDS partition and a command line unquoted. `what` is how the error calls it.
 [[nodiscard]] Result<void> check_name(std::string_view what, std::string_view name, std::size_t max);
 
+/// A-Z a-z 0-9 _ - and the dot.
+[[nodiscard]] bool is_name_character(char c) noexcept;
+
+/// Whether it is well-formed UTF-8 without control characters.
+[[nodiscard]] bool is_printable_utf8(std::string_view text) noexcept;
+
 /// The object that holds the external event `event` of `instance` in the pool: "instance/event".
 [[nodiscard]] std::string event_object_name(std::string_view instance, std::string_view event);
 

@@ -33,6 +33,10 @@ std::string_view to_string(ErrorCode code) noexcept {
       return "full";
     case ErrorCode::corrupt:
       return "corrupt";
+    case ErrorCode::wrong_type:
+      return "wrong type";
+    case ErrorCode::wrong_size:
+      return "wrong size";
   }
   return "unknown";
 }

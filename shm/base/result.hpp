@@ -23,6 +23,8 @@ enum class ErrorCode : std::uint8_t {
   unsupported = 10,  ///< known, and not possible here
   full = 11,         ///< a table or the pool has no room
   corrupt = 12,      ///< data in a file, message or shared memory is not valid
+  wrong_type = 13,   ///< there is an object of that name, of another type
+  wrong_size = 14,   ///< there is a memory of that name, of another size
 };
 
 [[nodiscard]] std::string_view to_string(ErrorCode code) noexcept;

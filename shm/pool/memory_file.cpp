@@ -1,6 +1,9 @@
 #include "shm/pool/memory_file.hpp"
 
+#include <algorithm>
 #include <cerrno>
+#include <filesystem>
+#include <iterator>
 #include <utility>
 
 #include <fcntl.h>
@@ -18,10 +21,11 @@ namespace plchost {
 namespace {
 
 constexpr std::size_t kMaxFileName = 255;  // NAME_MAX
-constexpr mode_t kMode = 0660;
 
 Result<std::string> path_of(const std::string& name) {
-  if (auto valid = check_name("shared memory name", name, kMaxFileName); !valid) {
+  std::string plain = name;  // as pool_memory_name() writes bytes that a name cannot have
+  std::ranges::replace(plain, '%', '_');
+  if (auto valid = check_name("shared memory name", plain, kMaxFileName); !valid) {
     return std::unexpected(valid.error());
   }
   return fmt::format("{}/{}", MemoryFile::kDirectory, name);
@@ -54,30 +58,33 @@ Result<void> allocate(const UniqueFd& fd, std::size_t size, const std::string& p
   return check_returned(error, fmt::format("allocate {} bytes for {}", size, path));
 }
 
-Result<UniqueFd> make_nameless(std::size_t size, const std::string& path) {
+Result<UniqueFd> make_nameless(std::size_t size, const MemoryRights& rights, const std::string& path) {
   if (size == 0) {
     return failure(ErrorCode::invalid_argument,
                    fmt::format("shared memory {} must have at least 1 byte", path));
   }
   // Without a name until it is complete: there is no half-made one for others to find or to clean up after.
-  UniqueFd fd(::open(MemoryFile::kDirectory, O_TMPFILE | O_RDWR | O_CLOEXEC, kMode));
+  UniqueFd fd(::open(MemoryFile::kDirectory, O_TMPFILE | O_RDWR | O_CLOEXEC, S_IRUSR | S_IWUSR));
   if (!fd) {
     const int error = errno;
     return failure(ErrorCode::system, fmt::format("make shared memory in {}", MemoryFile::kDirectory), error);
   }
-  if (auto mode = check_errno(::fchmod(fd.get(), kMode), "fchmod " + path); !mode) {
-    return std::unexpected(mode.error());
-  }
+  if (auto given = give_rights(fd.get(), rights, path); !given) return std::unexpected(given.error());
   if (auto allocated = allocate(fd, size, path); !allocated) return std::unexpected(allocated.error());
   return fd;
 }
 
-Result<void> give_name(const UniqueFd& fd, const std::string& path) {
+Result<void> link_to(const UniqueFd& fd, const std::string& path) {
   const std::string self = fmt::format("/proc/self/fd/{}", fd.get());
   if (::linkat(AT_FDCWD, self.c_str(), AT_FDCWD, path.c_str(), AT_SYMLINK_FOLLOW) == 0) return {};
   const int error = errno;
   if (error == EEXIST) return failure(ErrorCode::already_exists, fmt::format("{} exists already", path));
   return failure(ErrorCode::system, fmt::format("give shared memory the name {}", path), error);
+}
+
+ErrorCode code_of_open(int error) noexcept {
+  if (error == ENOENT) return ErrorCode::not_found;
+  return error == EACCES ? ErrorCode::refused : ErrorCode::system;
 }
 
 /// An existing file, and what it is.
@@ -93,8 +100,7 @@ Result<Opened> open_existing(const std::string& path, MemoryFile::Access access)
   Opened opened{.fd = UniqueFd(::open(path.c_str(), flags))};
   if (!opened.fd) {
     const int error = errno;
-    return failure(error == ENOENT ? ErrorCode::not_found : ErrorCode::system, fmt::format("open {}", path),
-                   error);
+    return failure(code_of_open(error), fmt::format("open {}", path), error);
   }
   if (auto got = check_errno(::fstat(opened.fd.get(), &opened.status), "fstat " + path); !got) {
     return std::unexpected(got.error());
@@ -107,35 +113,51 @@ Result<Opened> open_existing(const std::string& path, MemoryFile::Access access)
 
 }  // namespace
 
-Result<MemoryFile> MemoryFile::make(const std::string& name, std::size_t size, const Fill& fill,
-                                    bool take_over) {
-  const auto path = path_of(name);
+Result<UnnamedMemory> UnnamedMemory::make(const std::string& name, std::size_t size,
+                                          const MemoryRights& rights) {
+  auto path = path_of(name);
   if (!path) return std::unexpected(path.error());
-  const auto fd = make_nameless(size, *path);
+  auto fd = make_nameless(size, rights, *path);
   if (!fd) return std::unexpected(fd.error());
-  const auto bytes = map(*fd, size, Access::read_write, *path);
+  const auto bytes = map(*fd, size, MemoryFile::Access::read_write, *path);
   if (!bytes) return std::unexpected(bytes.error());
-  MemoryFile file(*bytes);
-  if (fill) {
-    if (auto filled = fill(*bytes); !filled) return std::unexpected(filled.error());
-  }
+  return UnnamedMemory(*std::move(path), *std::move(fd), MemoryFile(*bytes));
+}
+
+Result<MemoryFile> UnnamedMemory::give_name(bool take_over) && {
   constexpr int kAttempts = 10;  // each one fails only if another process makes the name anew in between
   for (int attempt = 1;; ++attempt) {
-    const auto named = give_name(*fd, *path);
-    if (named) return file;
+    const auto named = link_to(fd_, path_);
+    if (named) return std::move(memory_);
     if (!take_over || named.error().code != ErrorCode::already_exists || attempt == kAttempts) {
       return std::unexpected(named.error());
     }
-    ::unlink(path->c_str());
+    ::unlink(path_.c_str());
   }
 }
 
-Result<MemoryFile> MemoryFile::create(const std::string& name, std::size_t size, const Fill& fill) {
-  return make(name, size, fill, false);
+namespace {
+
+Result<MemoryFile> make_filled(const std::string& name, std::size_t size, const MemoryFile::Fill& fill,
+                               const MemoryRights& rights, bool take_over) {
+  auto memory = UnnamedMemory::make(name, size, rights);
+  if (!memory) return std::unexpected(memory.error());
+  if (fill) {
+    if (auto filled = fill(memory->bytes()); !filled) return std::unexpected(filled.error());
+  }
+  return (*std::move(memory)).give_name(take_over);
 }
 
-Result<MemoryFile> MemoryFile::replace(const std::string& name, std::size_t size, const Fill& fill) {
-  return make(name, size, fill, true);
+}  // namespace
+
+Result<MemoryFile> MemoryFile::create(const std::string& name, std::size_t size, const Fill& fill,
+                                      const MemoryRights& rights) {
+  return make_filled(name, size, fill, rights, false);
+}
+
+Result<MemoryFile> MemoryFile::replace(const std::string& name, std::size_t size, const Fill& fill,
+                                       const MemoryRights& rights) {
+  return make_filled(name, size, fill, rights, true);
 }
 
 Result<MemoryFile> MemoryFile::open(const std::string& name, std::size_t at_least, Access access) {
@@ -177,6 +199,28 @@ MemoryFile& MemoryFile::operator=(MemoryFile&& other) noexcept {
 
 MemoryFile::~MemoryFile() {
   if (!bytes_.empty()) ::munmap(bytes_.data(), bytes_.size());
+}
+
+std::string pool_memory_name(std::string_view pool, std::string_view name) {
+  std::string file = fmt::format("{}.memory.", pool);
+  for (const char c : name) {
+    if (is_name_character(c)) {
+      file += c;
+    } else {
+      fmt::format_to(std::back_inserter(file), "%{:02X}", static_cast<unsigned char>(c));
+    }
+  }
+  return file;
+}
+
+void remove_pool_memories(std::string_view pool) noexcept {
+  const std::string prefix = pool_memory_name(pool, "");
+  std::error_code error;
+  for (std::filesystem::directory_iterator at(MemoryFile::kDirectory, error), end; !error && at != end;
+       at.increment(error)) {
+    const std::string name = at->path().filename();
+    if (name.starts_with(prefix)) ::unlink(at->path().c_str());
+  }
 }
 
 }  // namespace plchost

@@ -4,8 +4,12 @@
 #include <functional>
 #include <span>
 #include <string>
+#include <string_view>
+#include <utility>
 
 #include "shm/base/result.hpp"
+#include "shm/base/unique_fd.hpp"
+#include "shm/pool/memory_rights.hpp"
 
 namespace plchost {
 
@@ -28,17 +32,16 @@ class MemoryFile {
 
   /// Makes a new one, zero-filled and with its memory really there (a host without memory says so now and not
   /// with SIGBUS in a cycle). Takes the place of an old one of that name, whose users keep their mapping.
-  /// `name`: one path component below /dev/shm. Mode 0660 whatever the umask. A process that dies in here
-  /// leaves nothing behind.
+  /// `name`: one path component below /dev/shm. A process that dies in here leaves nothing behind.
   [[nodiscard]] static Result<MemoryFile> replace(const std::string& name, std::size_t size,
-                                                  const Fill& fill = {});
+                                                  const Fill& fill = {}, const MemoryRights& rights = {});
 
   /// The same, but already_exists if the name is taken.
   [[nodiscard]] static Result<MemoryFile> create(const std::string& name, std::size_t size,
-                                                 const Fill& fill = {});
+                                                 const Fill& fill = {}, const MemoryRights& rights = {});
 
-  /// Maps an existing one, whole. not_found: no such name. corrupt: smaller than `at_least` bytes, or not a
-  /// plain file.
+  /// Maps an existing one, whole. not_found: no such name. refused: its rights do not allow it. corrupt:
+  /// smaller than `at_least` bytes, or not a plain file.
   [[nodiscard]] static Result<MemoryFile> open(const std::string& name, std::size_t at_least, Access access);
 
   /// Gives the file of that name `size` bytes if it is empty, as one is that was only just made, or that a
@@ -52,9 +55,33 @@ class MemoryFile {
   [[nodiscard]] explicit operator bool() const noexcept { return !bytes_.empty(); }
 
  private:
-  static Result<MemoryFile> make(const std::string& name, std::size_t size, const Fill& fill, bool take_over);
+  friend class UnnamedMemory;
   explicit MemoryFile(std::span<std::byte> bytes) noexcept : bytes_(bytes) {}
   std::span<std::byte> bytes_;
 };
+
+/// A shared memory on its way: nobody else can find it before it has its name.
+class UnnamedMemory {
+ public:
+  [[nodiscard]] static Result<UnnamedMemory> make(const std::string& name, std::size_t size,
+                                                  const MemoryRights& rights);
+  [[nodiscard]] std::span<std::byte> bytes() const noexcept { return memory_.bytes(); }
+  /// already_exists: the name is taken, and `take_over` does not allow to put this one in its place.
+  [[nodiscard]] Result<MemoryFile> give_name(bool take_over) &&;
+
+ private:
+  UnnamedMemory(std::string path, UniqueFd fd, MemoryFile memory) noexcept
+      : path_(std::move(path)), fd_(std::move(fd)), memory_(std::move(memory)) {}
+  std::string path_;
+  UniqueFd fd_;
+  MemoryFile memory_;
+};
+
+/// The file of a shared memory of the pool: "POOL.memory.NAME"; bytes of the name that a check_name() would
+/// not allow are there as %XX.
+[[nodiscard]] std::string pool_memory_name(std::string_view pool, std::string_view name);
+
+/// Removes the names of all shared memories of the pool; who has one mapped keeps it. Set-up.
+void remove_pool_memories(std::string_view pool) noexcept;
 
 }  // namespace plchost

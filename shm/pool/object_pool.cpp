@@ -1,263 +1,361 @@
 #include "shm/pool/object_pool.hpp"
 
+#include <chrono>
+#include <limits>
 #include <new>
 #include <thread>
+#include <type_traits>
 
 #include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
-#include "shm/base/time.hpp"
-#include "shm/pool/pool_layout.hpp"
-#include "shm/pool/pool_lock.hpp"
+#include "shm/pool/object_listing.hpp"
+#include "shm/pool/pool_segment.hpp"
 #include "shm/pool/pool_table.hpp"
 
 namespace plchost {
 
+/// What is to be made or opened.
+struct ObjectPool::Wanted {
+  std::string_view name;
+  ObjectType type = ObjectType::event;
+  std::size_t size = 0;  // memory; 0: whatever it has
+  std::uint32_t value = 0;
+};
+
 namespace {
 
-constexpr auto kPatience = std::chrono::seconds(1);
-constexpr auto kLookInterval = std::chrono::milliseconds(1);
-
-PoolHeader& header_of(const MemoryFile& memory) noexcept {
-  return *reinterpret_cast<PoolHeader*>(memory.bytes().data());
-}
-
-// Zero-filled memory holds an empty table already; only the header has something to say.
-Result<void> fill_header(std::span<std::byte> bytes, std::uint32_t max_objects) {
-  auto* const header = new (bytes.data()) PoolHeader{};
-  header->version = kPoolVersion;
-  header->entry_size = sizeof(ObjectEntry);
-  header->size = bytes.size();
-  header->max_objects = max_objects;
-  header->bucket_count = bucket_count_for(max_objects);
-  auto made = PoolLock::make_mutex(*header);
-  if (made) header->magic.store(kPoolMagic, std::memory_order_release);
-  return made;
-}
-
-Result<void> check_header(const PoolHeader& header, std::uint32_t max_objects, std::size_t file_size,
-                          const std::string& name) {
-  if (header.version != kPoolVersion) {
-    return failure(
-        ErrorCode::corrupt,
-        fmt::format("pool '{}' has version {}, this program needs {}; stop who uses it and remove it", name,
-                    header.version, kPoolVersion));
-  }
-  const bool sound = header.entry_size == sizeof(ObjectEntry) && max_objects >= kMinObjects &&
-                     max_objects <= kMaxObjects && header.bucket_count == bucket_count_for(max_objects) &&
-                     header.size == pool_size(max_objects) && file_size == pool_size(max_objects);
-  if (sound) return {};
-  return failure(ErrorCode::corrupt,
-                 fmt::format("pool '{}': its header does not fit its size of {} bytes", name, file_size));
-}
-
-Result<void> check_object_name(std::string_view name) {
-  if (is_object_name(name)) return {};
-  std::string shown(name.substr(0, kMaxObjectName));
-  for (char& c : shown) {
-    if (c < ' ' || c > '~') c = '?';
-  }
-  return failure(
-      ErrorCode::invalid_argument,
-      fmt::format("object name '{}' ({} bytes) is not valid: allowed are 1 to {} printable ASCII characters",
-                  shown, name.size(), kMaxObjectName));
-}
+constexpr auto kRelaxed = std::memory_order_relaxed;
 
 ObjectType type_of(const ObjectEntry& entry) noexcept {
-  return static_cast<ObjectType>(entry.type.load(std::memory_order_relaxed));
+  return static_cast<ObjectType>(entry.type.load(kRelaxed));
 }
 
-Result<void> check_is_event(const ObjectEntry& entry, std::string_view name) {
-  if (type_of(entry) == ObjectType::event) return {};
-  return failure(ErrorCode::already_exists,
-                 fmt::format("object '{}' is of type {}, not an event", name, to_string(type_of(entry))));
+Result<void> check_is(const ObjectEntry& entry, ObjectType type, std::string_view name) {
+  if (type_of(entry) == type) return {};
+  return failure(ErrorCode::wrong_type, fmt::format("object '{}' is of type {}, not {}", name,
+                                                    to_string(type_of(entry)), to_string(type)));
+}
+
+Result<void> check_size(const ObjectEntry& entry, std::size_t size, std::string_view name) {
+  const std::uint64_t found = entry.size.load(kRelaxed);
+  if (size == 0 || type_of(entry) != ObjectType::memory || found == size) return {};
+  return failure(ErrorCode::wrong_size, fmt::format("memory '{}' has {} bytes, not {}", name, found, size));
+}
+
+Result<void> check_permitted(const ObjectEntry& entry, MemoryFile::Access access, std::string_view name) {
+  const uid_t owner = entry.owner.load(kRelaxed);
+  const gid_t group = entry.group.load(kRelaxed);
+  const mode_t mode = entry.mode.load(kRelaxed);
+  const Permission permission = permission_for_caller(owner, group, mode);
+  const bool to_write = access == MemoryFile::Access::read_write;
+  if (permission.read && (permission.write || !to_write)) return {};
+  return failure(ErrorCode::refused,
+                 fmt::format("object '{}' ({}) does not allow user {} to {} it", name,
+                             describe_rights(owner, group, mode), ::geteuid(), to_write ? "write" : "read"));
+}
+
+std::unexpected<Error> nothing_of_that_name(std::string_view name, const std::string& pool) {
+  return failure(ErrorCode::not_found, fmt::format("no object '{}' in pool '{}'", name, pool));
+}
+
+// What options leave open is as with the pool.
+MemoryRights rights_for(const ObjectOptions& options, const std::string& pool) {
+  struct stat status{};
+  const std::string path = fmt::format("{}/{}", MemoryFile::kDirectory, pool);
+  if (::stat(path.c_str(), &status) != 0) return {.group = options.group, .mode = options.mode};
+  constexpr mode_t kPermissions = 0666;
+  return {.group = options.group.value_or(status.st_gid),
+          .mode = options.mode != 0 ? options.mode : status.st_mode & kPermissions};
+}
+
+void describe_new(ObjectEntry& entry, const MemoryRights& rights, std::uint32_t attributes) noexcept {
+  entry.owner.store(::geteuid(), kRelaxed);
+  entry.group.store(rights.group.value_or(::getegid()), kRelaxed);
+  entry.mode.store(rights.mode, kRelaxed);
+  entry.attributes.store(attributes, kRelaxed);
 }
 
 }  // namespace
 
-std::string_view to_string(ObjectType type) noexcept {
-  switch (type) {
-    case ObjectType::memory:
-      return "memory";
-    case ObjectType::semaphore:
-      return "semaphore";
-    case ObjectType::event:
-      return "event";
-    case ObjectType::free:
-      return "free";
-  }
-  return "unknown";
-}
-
-PoolEvent::PoolEvent(ObjectEntry& entry) noexcept
-    : entry_(&entry), generation_(Binding::generation(entry.binding.load(std::memory_order_acquire))) {}
-
-PostResult PoolEvent::post() const noexcept {
-  if (entry_ == nullptr) return PostResult::not_registered;
-  // Acquire pairs with the release of who registered it, and of who gave the entry to another object.
-  const std::uint64_t binding = entry_->binding.load(std::memory_order_acquire);
-  if (Binding::generation(binding) != generation_ || !Binding::registered(binding)) {
-    return PostResult::not_registered;
-  }
-  entry_->event.post();
-  return Binding::bound(binding) > 0 ? PostResult::posted : PostResult::no_task;
-}
-
-bool PoolEvent::valid() const noexcept {
-  return entry_ != nullptr &&
-         Binding::generation(entry_->binding.load(std::memory_order_acquire)) == generation_;
-}
-
-bool PoolEvent::registered() const noexcept {
-  return valid() && Binding::registered(entry_->binding.load(std::memory_order_acquire));
-}
-
-std::uint32_t PoolEvent::bound_tasks() const noexcept {
-  return valid() ? Binding::bound(entry_->binding.load(std::memory_order_acquire)) : 0;
-}
-
-bool PoolEvent::change_binding(std::uint64_t clear, std::uint64_t set) const noexcept {
-  if (entry_ == nullptr) return false;
-  std::uint64_t before = entry_->binding.load(std::memory_order_acquire);
-  do {
-    if (Binding::generation(before) != generation_) return false;
-  } while (!entry_->binding.compare_exchange_weak(before, (before & ~clear) | set, std::memory_order_acq_rel,
-                                                  std::memory_order_acquire));
-  return true;
-}
-
-bool PoolEvent::set_registered(bool registered) const noexcept {
-  return change_binding(Binding::kRegistered, registered ? Binding::kRegistered : 0);
-}
-
-bool PoolEvent::set_bound_tasks(std::uint32_t count) const noexcept {
-  return change_binding(Binding::kBoundMask, count & Binding::kBoundMask);
-}
-
-CountedEvent& PoolEvent::counted() const noexcept {
-  return entry_->event;
-}
-
-// busy: somebody has begun to make it and has not ended yet.
-Result<ObjectPool> ObjectPool::attach_now(const std::string& name) {
-  const auto unfinished = [&] {
-    return failure(ErrorCode::busy, fmt::format("pool '{}' is not complete; remove it", name));
-  };
-  auto memory = MemoryFile::open(name, sizeof(PoolHeader), MemoryFile::Access::read_write);
-  if (!memory) {
-    return memory.error().code == ErrorCode::corrupt ? unfinished() : std::unexpected(memory.error());
-  }
-  const std::size_t file_size = memory->bytes().size();
-  const PoolHeader& header = header_of(*memory);
-  const std::uint64_t magic = header.magic.load(std::memory_order_acquire);
-  if (magic == 0) return unfinished();
-  if (magic != kPoolMagic) {
-    return failure(ErrorCode::corrupt,
-                   fmt::format("shared memory '{}' is not a pool; choose another name", name));
-  }
-  const std::uint32_t max_objects = header.max_objects;
-  if (auto sound = check_header(header, max_objects, file_size, name); !sound) {
-    return std::unexpected(sound.error());
-  }
-  return ObjectPool(name, std::move(*memory), max_objects);
-}
-
-// busy: it was not completed in time, so whoever began is gone.
-Result<ObjectPool> ObjectPool::attach_patiently(const std::string& name) {
-  const TimePoint deadline = MonotonicClock::now() + kPatience;
-  for (;;) {
-    auto pool = attach_now(name);
-    if (pool || pool.error().code != ErrorCode::busy || MonotonicClock::now() >= deadline) return pool;
-    std::this_thread::sleep_for(kLookInterval);
-  }
-}
-
-Result<ObjectPool> ObjectPool::attach(const std::string& name) {
-  auto pool = attach_patiently(name);
-  if (!pool && pool.error().code == ErrorCode::busy) pool.error().code = ErrorCode::corrupt;
-  return pool;
-}
-
 Result<ObjectPool> ObjectPool::create(const std::string& name, const PoolOptions& options) {
-  if (options.max_objects < kMinObjects || options.max_objects > kMaxObjects) {
-    return failure(ErrorCode::invalid_argument,
-                   fmt::format("pool '{}': {} objects; allowed are {} to {}", name, options.max_objects,
-                               kMinObjects, kMaxObjects));
-  }
-  constexpr int kAttempts = 10;  // another round is needed only if others make and remove the pool meanwhile
-  for (int attempt = 1;; ++attempt) {
-    auto pool = attach_patiently(name);
-    if (pool || attempt == kAttempts) return pool;
-    if (pool.error().code == ErrorCode::busy) {
-      remove(name);
-    } else if (pool.error().code != ErrorCode::not_found) {
-      return pool;
-    }
-    auto memory = MemoryFile::create(name, pool_size(options.max_objects), [&](std::span<std::byte> bytes) {
-      return fill_header(bytes, options.max_objects);
-    });
-    if (memory) return ObjectPool(name, std::move(*memory), options.max_objects);
-    if (memory.error().code != ErrorCode::already_exists) return std::unexpected(memory.error());
-  }
+  auto segment = PoolSegment::create(name, options);
+  if (!segment) return std::unexpected(std::move(segment).error());
+  return ObjectPool(*std::move(segment));
 }
 
-PoolTable ObjectPool::table() const noexcept {
-  return {memory_.bytes(), max_objects_};
+Result<ObjectPool> ObjectPool::attach(const std::string& name, Access access) {
+  auto segment = PoolSegment::attach(name, access);
+  if (!segment) return std::unexpected(std::move(segment).error());
+  return ObjectPool(*std::move(segment));
 }
 
-Result<PoolLock> ObjectPool::lock(PoolTable& table) const {
-  auto lock = PoolLock::acquire(table.header(), name_);
-  if (lock && lock->owner_died()) {
-    table.rebuild();
-    lock->make_consistent();
-  }
-  return lock;
+const std::string& ObjectPool::name() const noexcept {
+  return segment_->name();
 }
 
 Result<PoolEvent> ObjectPool::create_event(std::string_view name) {
   if (auto valid = check_object_name(name); !valid) return std::unexpected(valid.error());
-  PoolTable objects = table();
-  const auto held = lock(objects);
+  const Wanted wanted{.name = name};
+  const MemoryRights rights = rights_for({}, this->name());
+  const auto held = segment_->lock();
   if (!held) return std::unexpected(held.error());
+  PoolTable objects(segment_->view());
   ObjectEntry* entry = objects.find(name);
-  if (entry == nullptr) entry = objects.insert(name, ObjectType::event);
   if (entry == nullptr) {
-    return failure(ErrorCode::full,
-                   fmt::format("no room for event '{}': pool '{}' holds {} objects, all of them in use", name,
-                               name_, max_objects_));
+    entry = objects.insert(name, ObjectType::event, EntryState::used);
+    if (entry == nullptr) return no_room(wanted);
+    describe_new(*entry, rights, 0);
   }
-  if (auto event = check_is_event(*entry, name); !event) return std::unexpected(event.error());
+  if (auto event = check_is(*entry, ObjectType::event, name); !event) return std::unexpected(event.error());
   return PoolEvent(*entry);
 }
 
 Result<PoolEvent> ObjectPool::open_event(std::string_view name) const {
   if (auto valid = check_object_name(name); !valid) return std::unexpected(valid.error());
-  PoolTable objects = table();
-  const auto held = lock(objects);
+  const auto held = segment_->lock();
   if (!held) return std::unexpected(held.error());
-  ObjectEntry* const entry = objects.find(name);
-  if (entry == nullptr) {
-    return failure(ErrorCode::not_found, fmt::format("no object '{}' in pool '{}'", name, name_));
-  }
-  if (auto event = check_is_event(*entry, name); !event) return std::unexpected(event.error());
+  ObjectEntry* const entry = PoolTable(segment_->view()).find(name);
+  if (entry == nullptr) return nothing_of_that_name(name, this->name());
+  if (auto event = check_is(*entry, ObjectType::event, name); !event) return std::unexpected(event.error());
   return PoolEvent(*entry);
 }
 
-std::vector<ObjectInfo> ObjectPool::list() const {
-  std::vector<ObjectInfo> infos;
-  PoolTable objects = table();
-  const auto held = lock(objects);
-  if (!held) return infos;
-  for (const ObjectEntry& entry : objects.entries()) {
-    const std::uint64_t binding = entry.binding.load(std::memory_order_acquire);
-    if (!PoolTable::is_valid(entry) || !Binding::in_use(binding)) continue;
-    const std::uint64_t posts = entry.event.count() - entry.first_count.load(std::memory_order_relaxed);
-    infos.push_back({.name = std::string(entry.name.view()),
-                     .type = type_of(entry),
-                     .value = posts,
-                     .registered = Binding::registered(binding),
-                     .bound_tasks = Binding::bound(binding)});
+std::unexpected<Error> ObjectPool::no_room(const Wanted& wanted) const {
+  return failure(ErrorCode::full,
+                 fmt::format("no room for {} '{}': pool '{}' holds {} objects, all of them in use",
+                             to_string(wanted.type), wanted.name, name(), segment_->view().entries().size()));
+}
+
+// With the lock held.
+template <class T>
+Result<T> ObjectPool::refer(ObjectEntry& entry, const Wanted& wanted, Access access) const {
+  if (auto same = check_is(entry, wanted.type, wanted.name); !same) return std::unexpected(same.error());
+  if (auto same = check_size(entry, wanted.size, wanted.name); !same) return std::unexpected(same.error());
+  if (auto may = check_permitted(entry, access, wanted.name); !may) return std::unexpected(may.error());
+  T object;
+  object.entry_ = &entry;
+  object.generation_ = Binding::generation(entry.binding.load(std::memory_order_acquire));
+  object.writable_ = access == Access::read_write && segment_->writable();
+  if (segment_->writable()) {
+    const auto reference = segment_->add_reference(entry, object.writable_);
+    if (!reference) return std::unexpected(reference.error());
+    object.reference_ = *reference;
+    object.reference_generation_ = (*reference)->generation.load(kRelaxed);
   }
-  return infos;
+  object.segment_ = segment_;
+  return object;
+}
+
+Result<void> ObjectPool::map(SharedMemory& memory, const Wanted& wanted, Access access) const {
+  const std::uint64_t size = memory.entry().size.load(kRelaxed);
+  auto file = MemoryFile::open(pool_memory_name(name(), wanted.name), 1, access);
+  if (!file) return failure_in(fmt::format("memory '{}'", wanted.name), std::move(file).error());
+  if (file->bytes().size() != size) {
+    return failure(ErrorCode::corrupt, fmt::format("memory '{}' has {} bytes, and its file {}: remove it",
+                                                   wanted.name, size, file->bytes().size()));
+  }
+  memory.memory_ = *std::move(file);
+  memory.guard_ = MemoryGuard(memory.memory_.bytes());
+  return {};
+}
+
+// With the lock held; the object is not there.
+Result<ObjectEntry*> ObjectPool::make_entry(const Wanted& wanted, const MemoryRights& rights,
+                                            std::uint32_t attributes, std::optional<UnnamedMemory> memory) {
+  PoolTable objects(segment_->view());
+  ObjectEntry* const entry =
+      objects.insert(wanted.name, wanted.type, memory ? EntryState::changing : EntryState::used);
+  if (entry == nullptr) return no_room(wanted);
+  describe_new(*entry, rights, attributes);
+  if (wanted.type == ObjectType::semaphore) new (&entry->semaphore) CountingSemaphore(wanted.value);
+  if (wanted.type == ObjectType::event) entry->binding.fetch_or(Binding::kRegistered);
+  if (!memory) return entry;
+  entry->size.store(wanted.size, kRelaxed);
+  // A file of that name without an object is what is left of another pool of the name.
+  auto named = (*std::move(memory)).give_name(true);
+  if (!named) {
+    objects.erase(*entry);
+    return std::unexpected(std::move(named).error());
+  }
+  entry->state.store(static_cast<std::uint32_t>(EntryState::used), std::memory_order_release);
+  return entry;
+}
+
+template <class T>
+Result<Created<T>> ObjectPool::create_locked(const Wanted& wanted, const MemoryRights& rights,
+                                             std::uint32_t attributes, std::optional<UnnamedMemory> memory) {
+  const auto held = segment_->lock();
+  if (!held) return std::unexpected(held.error());
+  ObjectEntry* entry = PoolTable(segment_->view()).find(wanted.name);
+  const bool made = entry == nullptr;
+  if (made) {
+    const auto fresh = make_entry(wanted, rights, attributes, std::move(memory));
+    if (!fresh) return std::unexpected(fresh.error());
+    entry = *fresh;
+  }
+  auto object = refer<T>(*entry, wanted, Access::read_write);
+  if (object) return Created<T>{.object = *std::move(object), .made = made};
+  if (made) segment_->destroy(*entry);
+  return std::unexpected(std::move(object).error());
+}
+
+template <class T>
+Result<Created<T>> ObjectPool::create_object(const Wanted& wanted, const ObjectOptions& options) {
+  if (auto valid = check_object_name(wanted.name); !valid) return std::unexpected(valid.error());
+  const MemoryRights rights = rights_for(options, name());
+  const std::uint32_t attributes =
+      (options.keep ? kKept : 0) | (wanted.type == ObjectType::event ? kDirect : 0);
+  std::optional<UnnamedMemory> memory;
+  if constexpr (std::is_same_v<T, SharedMemory>) {
+    auto there = open_object<T>(wanted, Access::read_write);
+    if (there) return Created<T>{.object = *std::move(there), .made = false};
+    if (there.error().code != ErrorCode::not_found) return std::unexpected(std::move(there).error());
+    // The host takes its time to find so many bytes: not with the lock held.
+    auto unnamed = UnnamedMemory::make(pool_memory_name(name(), wanted.name), wanted.size, rights);
+    if (!unnamed) return std::unexpected(std::move(unnamed).error());
+    memory = *std::move(unnamed);
+  }
+  auto created = create_locked<T>(wanted, rights, attributes, std::move(memory));
+  if constexpr (std::is_same_v<T, SharedMemory>) {
+    if (!created) return created;
+    if (auto mapped = map(created->object, wanted, Access::read_write); !mapped) {
+      return std::unexpected(std::move(mapped).error());
+    }
+  }
+  return created;
+}
+
+// Without the lock, whose word it may not write. What it sees while somebody changes the table it sees again.
+template <class Look>
+auto ObjectPool::look_only(Look look) const {
+  constexpr int kAttempts = 100;
+  constexpr auto kPause = std::chrono::milliseconds(1);
+  const std::atomic<std::uint64_t>& changes = segment_->view().header().changes;
+  for (int attempt = 1;; ++attempt) {
+    const std::uint64_t before = changes.load();
+    auto seen = look();
+    std::atomic_thread_fence(std::memory_order_acquire);
+    // One that died with the lock held has left it odd: then what is seen has to do.
+    if (((before & 1) == 0 && changes.load() == before) || attempt == kAttempts) return seen;
+    std::this_thread::sleep_for(kPause);
+  }
+}
+
+template <class T>
+Result<T> ObjectPool::find_and_refer(const Wanted& wanted, Access access) const {
+  const auto refer_to = [&](ObjectEntry* entry) -> Result<T> {
+    if (entry == nullptr) return nothing_of_that_name(wanted.name, name());
+    return refer<T>(*entry, wanted, access);
+  };
+  PoolTable objects(segment_->view());
+  if (!segment_->writable()) {
+    if (access == Access::read_write) return std::unexpected(segment_->lock().error());
+    return look_only([&] { return refer_to(objects.peek(wanted.name)); });
+  }
+  const auto held = segment_->lock();
+  if (!held) return std::unexpected(held.error());
+  return refer_to(objects.find(wanted.name));
+}
+
+template <class T>
+Result<T> ObjectPool::open_object(const Wanted& wanted, Access access) const {
+  if (auto valid = check_object_name(wanted.name); !valid) return std::unexpected(valid.error());
+  auto object = find_and_refer<T>(wanted, access);
+  if constexpr (std::is_same_v<T, SharedMemory>) {
+    if (!object) return object;
+    if (auto mapped = map(*object, wanted, access); !mapped)
+      return std::unexpected(std::move(mapped).error());
+  }
+  return object;
+}
+
+Result<Created<SharedEvent>> ObjectPool::create_shared_event(std::string_view name,
+                                                             const ObjectOptions& options) {
+  return create_object<SharedEvent>({.name = name, .type = ObjectType::event}, options);
+}
+
+Result<Created<SharedSemaphore>> ObjectPool::create_semaphore(std::string_view name, std::uint32_t value,
+                                                              const ObjectOptions& options) {
+  if (value > CountingSemaphore::kMaxValue) {
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("semaphore '{}': value {}; allowed are 0 to {}", shown(name), value,
+                               CountingSemaphore::kMaxValue));
+  }
+  return create_object<SharedSemaphore>({.name = name, .type = ObjectType::semaphore, .value = value},
+                                        options);
+}
+
+Result<Created<SharedMutex>> ObjectPool::create_mutex(std::string_view name, const ObjectOptions& options) {
+  return create_object<SharedMutex>({.name = name, .type = ObjectType::mutex}, options);
+}
+
+Result<Created<SharedMemory>> ObjectPool::create_memory(std::string_view name, std::size_t size,
+                                                        const ObjectOptions& options) {
+  constexpr auto kMost = static_cast<std::size_t>(std::numeric_limits<off_t>::max());
+  if (size == 0 || size > kMost) {
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("memory '{}': {} bytes; allowed are 1 to {}", shown(name), size, kMost));
+  }
+  return create_object<SharedMemory>({.name = name, .type = ObjectType::memory, .size = size}, options);
+}
+
+Result<SharedEvent> ObjectPool::open_shared_event(std::string_view name, Access access) const {
+  return open_object<SharedEvent>({.name = name, .type = ObjectType::event}, access);
+}
+
+Result<SharedSemaphore> ObjectPool::open_semaphore(std::string_view name, Access access) const {
+  return open_object<SharedSemaphore>({.name = name, .type = ObjectType::semaphore}, access);
+}
+
+Result<SharedMutex> ObjectPool::open_mutex(std::string_view name) const {
+  return open_object<SharedMutex>({.name = name, .type = ObjectType::mutex}, Access::read_write);
+}
+
+Result<SharedMemory> ObjectPool::open_memory(std::string_view name, Access access) const {
+  return open_object<SharedMemory>({.name = name, .type = ObjectType::memory}, access);
+}
+
+Result<void> ObjectPool::remove_object(std::string_view name) {
+  if (auto valid = check_object_name(name); !valid) return valid;
+  const auto held = segment_->lock();
+  if (!held) return std::unexpected(held.error());
+  ObjectEntry* const entry = PoolTable(segment_->view()).find(name);
+  if (entry == nullptr) return nothing_of_that_name(name, this->name());
+  if (auto may = check_permitted(*entry, Access::read_write, name); !may) return may;
+  entry->attributes.fetch_and(~kKept, kRelaxed);
+  segment_->drop_if_idle(*entry);
+  return {};
+}
+
+std::vector<ObjectInfo> ObjectPool::list() const {
+  const PoolView& view = segment_->view();
+  const auto all = [&] {
+    std::vector<ObjectInfo> infos;
+    for (const ObjectEntry& entry : view.used_entries()) {
+      if (PoolTable::is_valid(entry) && !PoolTable::is_idle(entry))
+        infos.push_back(describe_object(view, entry));
+    }
+    return infos;
+  };
+  if (!segment_->writable()) return look_only(all);
+  const auto held = segment_->lock(true);
+  return held ? all() : std::vector<ObjectInfo>();
+}
+
+Result<ObjectInfo> ObjectPool::look_at(std::string_view name) const {
+  if (auto valid = check_object_name(name); !valid) return std::unexpected(valid.error());
+  const PoolView& view = segment_->view();
+  const auto describe = [&](const ObjectEntry* entry) -> Result<ObjectInfo> {
+    if (entry == nullptr || PoolTable::is_idle(*entry)) return nothing_of_that_name(name, this->name());
+    return describe_object(view, *entry);
+  };
+  PoolTable objects(view);
+  if (!segment_->writable()) return look_only([&] { return describe(objects.peek(name)); });
+  const auto held = segment_->lock(true);
+  if (!held) return std::unexpected(held.error());
+  return describe(objects.find(name));
 }
 
 }  // namespace plchost

@@ -1,123 +1,132 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "shm/base/counted_event.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/result.hpp"
-#include "shm/pool/memory_file.hpp"
+#include "shm/pool/memory_rights.hpp"
+#include "shm/pool/object_info.hpp"
+#include "shm/pool/object_type.hpp"
+#include "shm/pool/pool_event.hpp"
+#include "shm/pool/pool_object.hpp"
 
 namespace plchost {
-
-struct ObjectEntry;
-class PoolLock;
-class PoolTable;
 
 inline constexpr std::uint32_t kMinObjects = 16;
 inline constexpr std::uint32_t kMaxObjects = 1'000'000;
 
-/// The seed's objTabType_t, with the same numbers plus one for a free entry.
-enum class ObjectType : std::uint32_t { memory = 0, semaphore = 1, event = 2, free = 3 };
-[[nodiscard]] std::string_view to_string(ObjectType type) noexcept;
-
-/// What a post did.
-enum class PostResult : std::uint8_t {
-  posted,          ///< every task that is bound to the event will run for it
-  no_task,         ///< counted, but no task is bound at this time: a soft result
-  not_registered,  ///< nothing was counted: the event is not (or no longer) registered
-};
-
-/// A handle on one external event of the pool. Cheap to copy; valid while the ObjectPool that gave it lives.
-class PoolEvent {
- public:
-  PoolEvent() noexcept = default;
-
-  /// Any context, real-time included: one atomic add, and one wake if someone waits.
-  PostResult post() const noexcept;
-
-  /// Whether it may be posted to. A task may be bound to an event that is not registered yet.
-  [[nodiscard]] bool registered() const noexcept;
-  /// False, and nothing is done, if the handle is not valid (any more).
-  bool set_registered(bool registered) const noexcept;
-
-  /// How many tasks wait for it: kept by their instance, so that a poster can be told.
-  [[nodiscard]] std::uint32_t bound_tasks() const noexcept;
-  /// False, and nothing is done, if the handle is not valid (any more).
-  bool set_bound_tasks(std::uint32_t count) const noexcept;
-
-  /// The counter itself, for the task that waits on it. Only of a valid handle.
-  [[nodiscard]] CountedEvent& counted() const noexcept;
-
-  /// False if the handle is empty, or the object behind it was removed and its place given to another.
-  [[nodiscard]] bool valid() const noexcept;
-
- private:
-  friend class ObjectPool;
-  explicit PoolEvent(ObjectEntry& entry) noexcept;
-  bool change_binding(std::uint64_t clear, std::uint64_t set) const noexcept;
-
-  ObjectEntry* entry_ = nullptr;
-  std::uint32_t generation_ = 0;
-};
-
-/// One object as list() shows it.
-struct ObjectInfo {
-  std::string name;
-  ObjectType type = ObjectType::free;
-  std::uint64_t value = 0;        ///< event: posts so far
-  bool registered = false;        ///< event
-  std::uint32_t bound_tasks = 0;  ///< event
-};
-
 struct PoolOptions {
   /// kMinObjects to kMaxObjects. What counts is the number that the pool was made with.
   std::uint32_t max_objects = 4096;
+  /// Who may use it. What counts is what it was made with.
+  MemoryRights rights = {};
+};
+
+/// For an object that is made.
+struct ObjectOptions {
+  /// It lives on without a reference, also across the ends of all processes, until it is removed.
+  bool keep = false;
+  /// Who may use it: nothing is the caller and the pool's group. Permission bits as those of a file, 0 are
+  /// the pool's. Of a memory the kernel watches over them; of the others, which lie in the pool itself, this
+  /// library does, for all who have the right to write the pool.
+  std::optional<gid_t> group = std::nullopt;
+  mode_t mode = 0;
+};
+
+/// What create gives: an object, and whether it was made or was there already (with its own options then).
+template <class T>
+struct Created {
+  T object;
+  bool made = false;
 };
 
 /// The global table of named objects in shared memory (vxworks_specific, "Global object pools"). Made by the
 /// manager, or by the first instance that runs alone; found by name; survives every process that uses it.
-/// All functions here are set-up: they take the pool's robust, priority-inheriting mutex, and repair the
-/// index if its owner died. Posting and waiting never do.
+///
+/// All functions here are set-up: they take the pool's robust, priority-inheriting mutex, repair the pool if
+/// its owner died, and release what clients held that have ended. Operations on what they give never do. A
+/// child of fork() attaches anew.
 class ObjectPool {
  public:
+  using Access = MemoryFile::Access;
+
   /// Makes the pool, or opens it when it is there already; several processes may do so at once. `name` is its
-  /// name below /dev/shm.
+  /// name below /dev/shm. refused: its rights do not allow it.
   /// corrupt: there is something of that name that is not a pool of this version.
   [[nodiscard]] static Result<ObjectPool> create(const std::string& name, const PoolOptions& options = {});
-  /// not_found: no pool of that name. Waits a moment for one that is just being made.
-  [[nodiscard]] static Result<ObjectPool> attach(const std::string& name);
+  /// not_found: no pool of that name. Waits a moment for one that is just being made. To read only is to
+  /// list, to see events and semaphores, and to map memories that allow it.
+  [[nodiscard]] static Result<ObjectPool> attach(const std::string& name, Access access = Access::read_write);
   static void remove(const std::string& name) noexcept { MemoryFile::remove(name); }
 
-  ObjectPool(ObjectPool&&) noexcept = default;
-  ObjectPool& operator=(ObjectPool&&) noexcept = default;
-
-  /// The event of that name (1 to kMaxObjectName printable characters), made if it is not there, then neither
-  /// registered nor bound. When the table is full, it takes the place of one that is neither; full: there is
-  /// none. already_exists: the name is taken by an object of another type.
+  /// The event of that name, made if it is not there, then neither registered nor bound. When the table is
+  /// full, it takes the place of one that is neither; full: there is none. wrong_type: the name is taken.
   [[nodiscard]] Result<PoolEvent> create_event(std::string_view name);
-  /// not_found: no such object. already_exists: it is of another type.
+  /// not_found: no such object. wrong_type: it is not an event.
   [[nodiscard]] Result<PoolEvent> open_event(std::string_view name) const;
 
-  /// All objects that are in use: events that are registered or bound. Unordered.
+  // The object of that name, made if it is not there. It goes with its last reference, unless it is kept.
+  // full: no room. wrong_type, wrong_size: what is there is another one. refused: its rights do not allow it.
+  [[nodiscard]] Result<Created<SharedEvent>> create_shared_event(std::string_view name,
+                                                                 const ObjectOptions& options = {});
+  /// `value` <= CountingSemaphore::kMaxValue.
+  [[nodiscard]] Result<Created<SharedSemaphore>> create_semaphore(std::string_view name, std::uint32_t value,
+                                                                  const ObjectOptions& options = {});
+  [[nodiscard]] Result<Created<SharedMutex>> create_mutex(std::string_view name,
+                                                          const ObjectOptions& options = {});
+  /// `size` in bytes, from 1 to what the host has room for; zero-filled when made.
+  [[nodiscard]] Result<Created<SharedMemory>> create_memory(std::string_view name, std::size_t size,
+                                                            const ObjectOptions& options = {});
+
+  // not_found: no such object; and as above.
+  [[nodiscard]] Result<SharedEvent> open_shared_event(std::string_view name,
+                                                      Access access = Access::read_write) const;
+  [[nodiscard]] Result<SharedSemaphore> open_semaphore(std::string_view name,
+                                                       Access access = Access::read_write) const;
+  [[nodiscard]] Result<SharedMutex> open_mutex(std::string_view name) const;
+  [[nodiscard]] Result<SharedMemory> open_memory(std::string_view name,
+                                                 Access access = Access::read_write) const;
+
+  /// Keeps the object no longer: it goes now, or with its last reference. not_found, refused.
+  [[nodiscard]] Result<void> remove_object(std::string_view name);
+
+  /// All objects that are in use: referenced, kept, registered or bound. Unordered.
   /// Nothing if the pool cannot be locked.
   [[nodiscard]] std::vector<ObjectInfo> list() const;
+  /// One of them. not_found.
+  [[nodiscard]] Result<ObjectInfo> look_at(std::string_view name) const;
 
-  [[nodiscard]] const std::string& name() const noexcept { return name_; }
+  [[nodiscard]] const std::string& name() const noexcept;
 
  private:
-  ObjectPool(std::string name, MemoryFile memory, std::uint32_t max_objects) noexcept
-      : name_(std::move(name)), memory_(std::move(memory)), max_objects_(max_objects) {}
-  static Result<ObjectPool> attach_now(const std::string& name);
-  static Result<ObjectPool> attach_patiently(const std::string& name);
-  [[nodiscard]] PoolTable table() const noexcept;
-  [[nodiscard]] Result<PoolLock> lock(PoolTable& table) const;
+  struct Wanted;
+  explicit ObjectPool(std::shared_ptr<PoolSegment> segment) noexcept : segment_(std::move(segment)) {}
+  template <class T>
+  [[nodiscard]] Result<Created<T>> create_object(const Wanted& wanted, const ObjectOptions& options);
+  template <class T>
+  [[nodiscard]] Result<Created<T>> create_locked(const Wanted& wanted, const MemoryRights& rights,
+                                                 std::uint32_t attributes,
+                                                 std::optional<UnnamedMemory> memory);
+  template <class T>
+  [[nodiscard]] Result<T> open_object(const Wanted& wanted, Access access) const;
+  template <class T>
+  [[nodiscard]] Result<T> find_and_refer(const Wanted& wanted, Access access) const;
+  template <class T>
+  [[nodiscard]] Result<T> refer(ObjectEntry& entry, const Wanted& wanted, Access access) const;
+  [[nodiscard]] Result<ObjectEntry*> make_entry(const Wanted& wanted, const MemoryRights& rights,
+                                                std::uint32_t attributes,
+                                                std::optional<UnnamedMemory> memory);
+  [[nodiscard]] Result<void> map(SharedMemory& memory, const Wanted& wanted, Access access) const;
+  [[nodiscard]] std::unexpected<Error> no_room(const Wanted& wanted) const;
+  template <class Look>
+  auto look_only(Look look) const;
 
-  std::string name_;
-  MemoryFile memory_;
-  std::uint32_t max_objects_;  // as validated at attach: a stranger may change the pool's own
+  std::shared_ptr<PoolSegment> segment_;
 };
 
 }  // namespace plchost

@@ -6,46 +6,99 @@
 #include <cstddef>
 #include <cstdint>
 
-#include <pthread.h>
-
 #include "shm/base/counted_event.hpp"
+#include "shm/base/counting_semaphore.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/robust_mutex.hpp"
 
 // The pool as it lies in shared memory. Anyone with the right to map it may have scribbled in it, so whatever
-// is read here is checked before it is used, and sizes are read once, at attach.
+// is read here is checked before it is used, and sizes are read once, at attach. There are no pointers in it.
 //
-//   [ PoolHeader ][ std::atomic<u32> buckets[bucket_count] ][ ObjectEntry entries[max_objects] ]
+//   [ PoolHeader ][ ClientSlot clients[kMaxClients] ][ ReferenceEntry references[max_references] ]
+//   [ ObjectEntry entries[max_objects] ][ std::atomic<u32> buckets[bucket_count] ]
 //
-// Objects hang in chains by the hash of their name: bucket -> entry.next -> ... A link is the index of an
-// entry plus one, so that zero-filled memory is a valid empty table.
+// Objects hang in chains by the hash of their name: bucket -> entry.next -> ... References hang in two lists,
+// that of their object and that of their client. A link is the index of an entry plus one, so that
+// zero-filled memory is a valid empty table. All lists can be made anew from the entries themselves: who is
+// killed while he changes them leaves that to the next one.
 
 namespace plchost {
 
 inline constexpr std::uint64_t kPoolMagic = 0x6c6f6f70'74736f68;  // "hostpool"
-/// 1: first.
-inline constexpr std::uint32_t kPoolVersion = 1;
+/// 1: first. 2: semaphores, mutexes, memories, clients and their references.
+inline constexpr std::uint32_t kPoolVersion = 2;
 
-enum class EntryState : std::uint32_t { free = 0, used = 1 };
+using Link = std::atomic<std::uint32_t>;
+
+/// Free memory is all zero, so that 0 is free.
+enum class EntryState : std::uint32_t {
+  free = 0,
+  used = 1,
+  changing = 2,  ///< its file is being given its name, or taken away
+};
 
 struct alignas(64) ObjectEntry {
-  // One cache line of its own: all that a post touches.
+  // One cache line of its own: all that a post, wait, lock or unlock touches.
   CountedEvent event;
   /// Who may post and wait, in one word, so that taking an entry away and binding it cannot both succeed:
-  /// [ generation : 32 ][ registered : 1 ][ bound tasks : 31 ]
+  /// [ generation : 32 ][ registered : 1 ][ bound tasks : 31 ]. Objects of all types have their generation
+  /// here.
   std::atomic<std::uint64_t> binding;
-  /// The event's count when it was made; an event that takes over an entry goes on counting from there.
-  std::atomic<std::uint64_t> first_count;
+  CountingSemaphore semaphore;
   std::atomic<std::uint32_t> state;  ///< an EntryState; written last when the object is made
-  std::atomic<std::uint32_t> type;   ///< an ObjectType
-  std::atomic<std::uint32_t> next;   ///< link in the chain of the bucket, or of the free list
-  std::array<std::uint32_t, 7> reserved0;
+  RobustMutex mutex;
+  std::atomic<std::uint64_t> size;  ///< memory: bytes
+  std::atomic<std::uint32_t> type;  ///< an ObjectType
+  Link next;                        ///< in the chain of the bucket, or of the free list
+  Link first_reference;
+  std::atomic<std::uint32_t> reference_count;
+
   // Written with the mutex held, before the state.
   FixedText<kMaxObjectName> name;
-  std::array<std::uint32_t, 8> reserved1;
+  /// The event's count when it was made; an event that takes over an entry goes on counting from there.
+  std::atomic<std::uint64_t> first_count;
+  std::atomic<std::uint32_t> attributes;
+  std::atomic<std::uint32_t> mode;  ///< permission bits, as those of a file
+  std::atomic<std::uint32_t> owner;
+  std::atomic<std::uint32_t> group;
+  std::atomic<std::int64_t> made_unix_ns;
 };
 static_assert(sizeof(ObjectEntry) == 192 && offsetof(ObjectEntry, binding) == 8);
-static_assert(offsetof(ObjectEntry, state) == 24 && offsetof(ObjectEntry, next) == 32);
-static_assert(offsetof(ObjectEntry, name) == 64 && sizeof(FixedText<kMaxObjectName>) == 96);
+static_assert(offsetof(ObjectEntry, semaphore) == 16 && offsetof(ObjectEntry, mutex) == 24);
+static_assert(offsetof(ObjectEntry, size) == 40 && offsetof(ObjectEntry, name) == 64);
+static_assert(offsetof(ObjectEntry, first_count) == 160 && offsetof(ObjectEntry, made_unix_ns) == 184);
+
+/// ObjectEntry::attributes.
+inline constexpr std::uint32_t kKept = 1;    ///< lives without references, until it is removed
+inline constexpr std::uint32_t kDirect = 2;  ///< event: lives by its references, not by registration
+
+/// One user of the pool: an ObjectPool in a process.
+struct alignas(64) ClientSlot {
+  std::atomic<std::uint32_t> pid;         ///< 0: free; written last
+  std::atomic<std::uint32_t> generation;  ///< grows with each client of the slot
+  std::atomic<std::uint64_t> start;       ///< of the process, see start_of()
+  std::atomic<std::int64_t> looked_ns;    ///< CLOCK_MONOTONIC when it was last seen alive
+  Link first_reference;
+  std::atomic<std::uint32_t> reference_count;
+  FixedText<31> name;  ///< of the program
+};
+static_assert(sizeof(ClientSlot) == 64 && offsetof(ClientSlot, name) == 32);
+
+/// One client's hold on one object.
+struct alignas(64) ReferenceEntry {
+  Link object;  ///< 0: free; written last
+  std::atomic<std::uint32_t> object_generation;
+  Link client;
+  std::atomic<std::uint32_t> generation;  ///< grows with each reference that has this place
+  std::atomic<std::uint32_t> writable;    ///< 1: may change the object; 0: only reads
+  std::atomic<std::uint32_t> waiting;     ///< so many threads of the client wait for it
+  Link next_of_object;                    ///< or of the free list
+  Link previous_of_object;
+  Link next_of_client;
+  Link previous_of_client;
+  std::array<std::uint32_t, 6> reserved;
+};
+static_assert(sizeof(ReferenceEntry) == 64 && offsetof(ReferenceEntry, waiting) == 20);
 
 struct alignas(64) PoolHeader {
   std::atomic<std::uint64_t> magic;  ///< written last, with release
@@ -54,33 +107,49 @@ struct alignas(64) PoolHeader {
   std::uint64_t size;  ///< of the whole segment, bytes
   std::uint32_t max_objects;
   std::uint32_t bucket_count;
-  std::array<std::uint32_t, 8> reserved0;
+  std::uint32_t max_clients;
+  std::uint32_t max_references;
+  std::array<std::uint32_t, 6> reserved0;
 
-  alignas(64) pthread_mutex_t mutex;  ///< robust, inherits priority; guards set-up only
-  std::array<std::byte, 64 - sizeof(pthread_mutex_t)> reserved1;
+  alignas(64) RobustMutex mutex;  ///< guards set-up only
+  /// Odd while somebody changes what the mutex guards: for readers without the right to write.
+  std::atomic<std::uint64_t> changes;
+  std::array<std::uint32_t, 10> reserved1;
 
   // Guarded by the mutex.
   std::atomic<std::uint32_t> high_water;    ///< entries from here on were never used
-  std::atomic<std::uint32_t> first_free;    ///< link
+  Link first_free;                          ///< of the entries
   std::atomic<std::uint32_t> reclaim_hand;  ///< where the search for one to reclaim goes on
-  std::atomic<std::uint32_t> repairs;       ///< how often the index was rebuilt
-  std::array<std::uint32_t, 12> reserved2;
+  std::atomic<std::uint32_t> repairs;       ///< how often the lists were made anew
+  std::atomic<std::uint32_t> reference_high_water;
+  Link first_free_reference;
+  std::atomic<std::uint32_t> client_high_water;
+  std::atomic<std::uint32_t> departed;  ///< clients that ended without releasing what they held
+  std::array<std::uint32_t, 8> reserved2;
 };
 static_assert(sizeof(PoolHeader) == 192 && offsetof(PoolHeader, version) == 8);
 static_assert(offsetof(PoolHeader, mutex) == 64 && offsetof(PoolHeader, high_water) == 128);
 static_assert(std::atomic<std::uint32_t>::is_always_lock_free);
 
+inline constexpr std::uint32_t kMaxClients = 512;
+
 /// At most one object for each bucket, on average.
 [[nodiscard]] constexpr std::uint32_t bucket_count_for(std::uint32_t max_objects) noexcept {
   return std::bit_ceil(max_objects);
 }
+[[nodiscard]] constexpr std::uint32_t max_references_for(std::uint32_t max_objects) noexcept {
+  return 2 * max_objects + 1024;
+}
+inline constexpr std::size_t kClientsOffset = sizeof(PoolHeader);
+inline constexpr std::size_t kReferencesOffset = kClientsOffset + kMaxClients * sizeof(ClientSlot);
 [[nodiscard]] constexpr std::size_t entries_offset(std::uint32_t max_objects) noexcept {
-  const std::size_t end =
-      sizeof(PoolHeader) + std::size_t{bucket_count_for(max_objects)} * sizeof(std::uint32_t);
-  return (end + alignof(ObjectEntry) - 1) / alignof(ObjectEntry) * alignof(ObjectEntry);
+  return kReferencesOffset + std::size_t{max_references_for(max_objects)} * sizeof(ReferenceEntry);
+}
+[[nodiscard]] constexpr std::size_t buckets_offset(std::uint32_t max_objects) noexcept {
+  return entries_offset(max_objects) + std::size_t{max_objects} * sizeof(ObjectEntry);
 }
 [[nodiscard]] constexpr std::size_t pool_size(std::uint32_t max_objects) noexcept {
-  return entries_offset(max_objects) + std::size_t{max_objects} * sizeof(ObjectEntry);
+  return buckets_offset(max_objects) + std::size_t{bucket_count_for(max_objects)} * sizeof(Link);
 }
 
 /// The parts of ObjectEntry::binding.

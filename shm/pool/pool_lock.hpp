@@ -8,12 +8,10 @@
 
 namespace plchost {
 
-/// Holds the pool's mutex for set-up. Released at the end of its life, and by the kernel if the process dies.
+/// Holds the pool's mutex for set-up. Released at the end of its life, and found by the next one if the
+/// process dies. Readers without the right to write see by the header's `changes` whether it is held.
 class PoolLock {
  public:
-  /// Makes the mutex of a new pool.
-  static Result<void> make_mutex(PoolHeader& header);
-
   /// timed_out: another one holds it for longer than kPatience. corrupt: it was scribbled over.
   static Result<PoolLock> acquire(PoolHeader& header, const std::string& pool);
 
@@ -22,13 +20,11 @@ class PoolLock {
   PoolLock& operator=(PoolLock&&) = delete;
   ~PoolLock();
 
-  /// The last owner died while it held the mutex: what it guards must be repaired, then make_consistent()
-  /// called.
+  /// The last owner died while it held the mutex: what it guards must be repaired.
   [[nodiscard]] bool owner_died() const noexcept { return owner_died_; }
-  void make_consistent() noexcept;
 
  private:
-  PoolLock(PoolHeader& header, bool owner_died) noexcept : header_(&header), owner_died_(owner_died) {}
+  PoolLock(PoolHeader& header, bool owner_died) noexcept;
   PoolHeader* header_;
   bool owner_died_;
 };

@@ -1,6 +1,9 @@
 #include "shm/pool/pool_table.hpp"
 
 #include <algorithm>
+#include <new>
+
+#include "shm/base/time.hpp"
 
 namespace plchost {
 
@@ -14,55 +17,44 @@ std::uint32_t hash_of(std::string_view name) noexcept {
   return hash;
 }
 
-bool is_used(const ObjectEntry& entry) noexcept {
-  return entry.state.load(std::memory_order_acquire) == static_cast<std::uint32_t>(EntryState::used);
+bool is_taken(const ObjectEntry& entry) noexcept {
+  return entry.state.load(std::memory_order_acquire) != static_cast<std::uint32_t>(EntryState::free);
 }
 
 void set_state(ObjectEntry& entry, EntryState state) noexcept {
   entry.state.store(static_cast<std::uint32_t>(state), std::memory_order_release);
 }
 
+// Old handles on what was there are invalid from here on.
+void begin_generation(ObjectEntry& entry) noexcept {
+  entry.binding.store(Binding::next_generation(entry.binding.load(kRelaxed)), std::memory_order_release);
+}
+
 }  // namespace
 
-bool is_object_name(std::string_view name) noexcept {
-  return !name.empty() && name.size() <= kMaxObjectName &&
-         std::ranges::all_of(name, [](char c) { return c >= ' ' && c <= '~'; });
-}
-
-PoolTable::PoolTable(std::span<std::byte> memory, std::uint32_t max_objects) noexcept
-    : header_(reinterpret_cast<PoolHeader*>(memory.data())),
-      buckets_(reinterpret_cast<Link*>(memory.data() + sizeof(PoolHeader)), bucket_count_for(max_objects)),
-      entries_(reinterpret_cast<ObjectEntry*>(memory.data() + entries_offset(max_objects)), max_objects) {}
-
 bool PoolTable::is_valid(const ObjectEntry& entry) noexcept {
-  return is_used(entry) && entry.type.load(kRelaxed) < static_cast<std::uint32_t>(ObjectType::free) &&
-         is_object_name(entry.name.view());
+  return entry.state.load(std::memory_order_acquire) == static_cast<std::uint32_t>(EntryState::used) &&
+         entry.type.load(kRelaxed) < kObjectTypes && is_object_name(entry.name.view());
 }
 
-std::span<ObjectEntry> PoolTable::entries() const noexcept {
-  return entries_.first(std::min<std::size_t>(header_->high_water.load(kRelaxed), entries_.size()));
+bool PoolTable::is_idle(const ObjectEntry& entry) noexcept {
+  const std::uint32_t attributes = entry.attributes.load(kRelaxed);
+  if ((attributes & kKept) != 0 || entry.reference_count.load(kRelaxed) != 0) return false;
+  const std::uint64_t binding = entry.binding.load(std::memory_order_acquire);
+  return (attributes & kDirect) != 0 ? Binding::bound(binding) == 0 : !Binding::in_use(binding);
 }
 
-PoolTable::Link& PoolTable::bucket_of(std::string_view name) const noexcept {
-  return buckets_[hash_of(name) & (buckets_.size() - 1)];
+Link& PoolTable::bucket_of(std::string_view name) const noexcept {
+  return view_.buckets()[hash_of(name) & (view_.buckets().size() - 1)];
 }
 
-ObjectEntry* PoolTable::entry_at(std::uint32_t link) const noexcept {
-  return link >= 1 && link <= entries_.size() ? &entries_[link - 1] : nullptr;
-}
-
-std::uint32_t PoolTable::link_of(const ObjectEntry& entry) const noexcept {
-  return static_cast<std::uint32_t>(&entry - entries_.data()) + 1;
-}
-
-PoolTable::Link* PoolTable::walk(std::string_view name) const noexcept {
+Link* PoolTable::walk(std::string_view name) const noexcept {
   Link& bucket = bucket_of(name);
   Link* link = &bucket;
-  for (std::size_t step = 0; step <= entries_.size(); ++step) {
-    const std::uint32_t value = link->load(kRelaxed);
-    if (value == 0) return link;
-    ObjectEntry* const entry = entry_at(value);
-    if (entry == nullptr || !is_used(*entry)) return nullptr;
+  for (std::size_t step = 0; step <= view_.entries().size(); ++step) {
+    if (link->load(kRelaxed) == 0) return link;
+    ObjectEntry* const entry = view_.entry(*link);
+    if (entry == nullptr || !is_taken(*entry)) return nullptr;
     const std::string_view found = entry->name.view();
     if (found == name) return link;
     if (&bucket_of(found) != &bucket) return nullptr;
@@ -71,70 +63,94 @@ PoolTable::Link* PoolTable::walk(std::string_view name) const noexcept {
   return nullptr;
 }
 
-ObjectEntry* PoolTable::find(std::string_view name) noexcept {
-  Link* link = walk(name);
-  if (link == nullptr) {
-    rebuild();
-    link = walk(name);
-  }
-  return link == nullptr ? nullptr : entry_at(link->load(kRelaxed));
+ObjectEntry* PoolTable::peek(std::string_view name) const noexcept {
+  const Link* const link = walk(name);
+  return link == nullptr ? nullptr : view_.entry(*link);
 }
 
-ObjectEntry* PoolTable::insert(std::string_view name, ObjectType type) noexcept {
+ObjectEntry* PoolTable::find(std::string_view name) noexcept {
+  if (walk(name) == nullptr) rebuild();
+  ObjectEntry* const entry = peek(name);
+  return entry != nullptr && is_valid(*entry) ? entry : nullptr;
+}
+
+ObjectEntry* PoolTable::insert(std::string_view name, ObjectType type, EntryState state) noexcept {
   if (!free_places_are_sane()) rebuild();
   ObjectEntry* entry = allocate();
   if (entry == nullptr) entry = reclaim();
   if (entry == nullptr) return nullptr;
-  entry->binding.store(Binding::next_generation(entry->binding.load(kRelaxed)), std::memory_order_release);
+  begin_generation(*entry);
   entry->first_count.store(entry->event.count(), kRelaxed);
+  new (&entry->semaphore) CountingSemaphore();
+  new (&entry->mutex) RobustMutex();
+  entry->size.store(0, kRelaxed);
   entry->type.store(static_cast<std::uint32_t>(type), kRelaxed);
+  entry->attributes.store(0, kRelaxed);
+  entry->first_reference.store(0, kRelaxed);
+  entry->reference_count.store(0, kRelaxed);
+  entry->made_unix_ns.store(unix_time_ns(), kRelaxed);
   entry->name.assign(name);
   // From here on a rebuild finds it, whether or not this process lives to put it into its chain.
-  set_state(*entry, EntryState::used);
+  set_state(*entry, state);
   Link& bucket = bucket_of(name);
   entry->next.store(bucket.load(kRelaxed), kRelaxed);
-  bucket.store(link_of(*entry), kRelaxed);
+  bucket.store(view_.link_to(*entry), kRelaxed);
   return entry;
 }
 
+void PoolTable::erase(ObjectEntry& entry) noexcept {
+  begin_generation(entry);
+  if (!unlink(entry)) {
+    rebuild();  // its chain was damaged; this has made a free place of it
+    return;
+  }
+  Link& first_free = view_.header().first_free;
+  entry.next.store(first_free.load(kRelaxed), kRelaxed);
+  first_free.store(view_.link_to(entry), kRelaxed);
+}
+
 bool PoolTable::free_places_are_sane() const noexcept {
-  const std::uint32_t high_water = header_->high_water.load(kRelaxed);
-  if (high_water > entries_.size()) return false;
-  if (high_water < entries_.size() && is_used(entries_[high_water])) return false;
-  const std::uint32_t first_free = header_->first_free.load(kRelaxed);
-  if (first_free == 0) return true;
-  const ObjectEntry* const entry = entry_at(first_free);
-  return entry != nullptr && first_free <= high_water && !is_used(*entry);
+  const auto all = view_.entries();
+  const std::uint32_t high_water = view_.header().high_water.load(kRelaxed);
+  if (high_water > all.size()) return false;
+  if (high_water < all.size() && is_taken(all[high_water])) return false;
+  const Link& first_free = view_.header().first_free;
+  if (first_free.load(kRelaxed) == 0) return true;
+  const ObjectEntry* const entry = view_.entry(first_free);
+  return entry != nullptr && !is_taken(*entry) && view_.link_to(*entry) <= high_water;
 }
 
 ObjectEntry* PoolTable::allocate() noexcept {
-  if (ObjectEntry* const entry = entry_at(header_->first_free.load(kRelaxed)); entry != nullptr) {
-    header_->first_free.store(entry->next.load(kRelaxed), kRelaxed);
+  PoolHeader& header = view_.header();
+  if (ObjectEntry* const entry = view_.entry(header.first_free); entry != nullptr) {
+    header.first_free.store(entry->next.load(kRelaxed), kRelaxed);
     return entry;
   }
-  const std::uint32_t high_water = header_->high_water.load(kRelaxed);
-  if (high_water >= entries_.size()) return nullptr;
-  header_->high_water.store(high_water + 1, kRelaxed);
-  return &entries_[high_water];
+  const std::uint32_t high_water = header.high_water.load(kRelaxed);
+  if (high_water >= view_.entries().size()) return nullptr;
+  header.high_water.store(high_water + 1, kRelaxed);
+  return &view_.entries()[high_water];
 }
 
 // The search goes on where the last one ended: an event that was made just now and is about to be bound is
 // the last to be taken away.
 ObjectEntry* PoolTable::reclaim() noexcept {
-  const std::size_t start = header_->reclaim_hand.load(kRelaxed) % entries_.size();
-  for (std::size_t step = 0; step < entries_.size(); ++step) {
-    const std::size_t index = (start + step) % entries_.size();
-    ObjectEntry& entry = entries_[index];
+  const auto all = view_.entries();
+  Link& hand = view_.header().reclaim_hand;
+  const std::size_t start = hand.load(kRelaxed) % all.size();
+  for (std::size_t step = 0; step < all.size(); ++step) {
+    const std::size_t index = (start + step) % all.size();
+    ObjectEntry& entry = all[index];
     std::uint64_t binding = entry.binding.load(std::memory_order_acquire);
-    if (is_used(entry) && Binding::in_use(binding)) continue;
+    if (is_taken(entry) && !is_idle(entry)) continue;
     // Fails if it is being registered or bound at this moment. With the new generation, old handles are
     // invalid.
     if (!entry.binding.compare_exchange_strong(binding, Binding::next_generation(binding),
                                                std::memory_order_acq_rel, kRelaxed)) {
       continue;
     }
-    header_->reclaim_hand.store(static_cast<std::uint32_t>((index + 1) % entries_.size()), kRelaxed);
-    if (!is_used(entry) || unlink(entry)) return &entry;
+    hand.store(static_cast<std::uint32_t>((index + 1) % all.size()), kRelaxed);
+    if (!is_taken(entry) || unlink(entry)) return &entry;
     rebuild();  // its chain was damaged; this has made a free place of it
     return allocate();
   }
@@ -143,36 +159,35 @@ ObjectEntry* PoolTable::reclaim() noexcept {
 
 bool PoolTable::unlink(ObjectEntry& entry) noexcept {
   Link* const link = walk(entry.name.view());
-  const bool found = link != nullptr && link->load(kRelaxed) == link_of(entry);
+  const bool found = link != nullptr && link->load(kRelaxed) == view_.link_to(entry);
   if (found) link->store(entry.next.load(kRelaxed), kRelaxed);
   set_state(entry, EntryState::free);
   return found;
 }
 
 void PoolTable::rebuild() noexcept {
-  for (Link& bucket : buckets_) bucket.store(0, kRelaxed);
+  for (Link& bucket : view_.buckets()) bucket.store(0, kRelaxed);
   std::uint32_t high_water = 0;
   std::uint32_t first_free = 0;
+  const auto all = view_.entries();
   // From the top down, so that the first one in use tells where the unused rest begins.
-  for (std::size_t i = entries_.size(); i-- > 0;) {
-    ObjectEntry& entry = entries_[i];
+  for (std::size_t i = all.size(); i-- > 0;) {
+    ObjectEntry& entry = all[i];
     if (is_valid(entry)) {
       if (high_water == 0) high_water = static_cast<std::uint32_t>(i + 1);
       Link& bucket = bucket_of(entry.name.view());
       entry.next.store(bucket.load(kRelaxed), kRelaxed);
-      bucket.store(link_of(entry), kRelaxed);
+      bucket.store(view_.link_to(entry), kRelaxed);
       continue;
     }
-    if (is_used(entry)) {
-      entry.binding.store(Binding::next_generation(entry.binding.load(kRelaxed)), std::memory_order_release);
-    }
+    if (is_taken(entry)) begin_generation(entry);
     set_state(entry, EntryState::free);
     entry.next.store(first_free, kRelaxed);
-    if (high_water != 0) first_free = link_of(entry);
+    if (high_water != 0) first_free = view_.link_to(entry);
   }
-  header_->high_water.store(high_water, kRelaxed);
-  header_->first_free.store(first_free, kRelaxed);
-  header_->repairs.fetch_add(1, kRelaxed);
+  view_.header().high_water.store(high_water, kRelaxed);
+  view_.header().first_free.store(first_free, kRelaxed);
+  view_.header().repairs.fetch_add(1, kRelaxed);
 }
 
 }  // namespace plchost

@@ -1,7 +1,6 @@
 #include "shm/pool/reference_clock.hpp"
 
 #include <cstddef>
-#include <filesystem>
 #include <utility>
 
 #include <fmt/format.h>
@@ -50,20 +49,6 @@ Result<MemoryFile> open_or_make(const std::string& name) {
 
 Result<void> check_reference_name(std::string_view name) {
   return check_name("name of a reference clock", name, kMaxObjectName);
-}
-
-std::string pool_memory_name(std::string_view pool, std::string_view name) {
-  return fmt::format("{}.memory.{}", pool, name);
-}
-
-void remove_pool_memories(std::string_view pool) noexcept {
-  const std::string prefix = pool_memory_name(pool, "");
-  std::error_code error;
-  for (std::filesystem::directory_iterator at(MemoryFile::kDirectory, error), end; !error && at != end;
-       at.increment(error)) {
-    const std::string name = at->path().filename();
-    if (name.starts_with(prefix)) MemoryFile::remove(name);
-  }
 }
 
 Result<ReferenceClockRecord> ReferenceClockRecord::open(std::string_view pool, std::string_view name) {

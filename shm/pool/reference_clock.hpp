@@ -15,12 +15,6 @@ namespace plchost {
 /// The name of a shared memory of the pool: 1 to kMaxObjectName characters, see check_name.
 [[nodiscard]] Result<void> check_reference_name(std::string_view name);
 
-/// The file of a shared memory of the pool: "POOL.memory.NAME".
-[[nodiscard]] std::string pool_memory_name(std::string_view pool, std::string_view name);
-
-/// Removes the names of all shared memories of the pool; who has one mapped keeps it. Set-up.
-void remove_pool_memories(std::string_view pool) noexcept;
-
 /// The record of shm/plc_reference_clock.h, mapped into this process. Set-up, but for reading and writing it.
 /// Strangers can empty its file at any time: in a process with the handlers of install_fault_handlers() it is
 /// then all zero, a record into which nothing was written.

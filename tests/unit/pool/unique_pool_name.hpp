@@ -16,7 +16,10 @@ class UniquePoolName {
     static std::atomic<int> counter{0};
     name_ = "plchost-test-" + std::to_string(::getpid()) + "-" + std::to_string(counter++);
   }
-  ~UniquePoolName() { MemoryFile::remove(name_); }
+  ~UniquePoolName() {
+    MemoryFile::remove(name_);
+    remove_pool_memories(name_);
+  }
   UniquePoolName(const UniquePoolName&) = delete;
   UniquePoolName& operator=(const UniquePoolName&) = delete;
   [[nodiscard]] const std::string& get() const { return name_; }

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <atomic>
+#include <cstdint>
+
+#include "shm/base/futex.hpp"
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+enum class LockResult : std::uint8_t {
+  locked,
+  owner_died,  ///< locked; the one before ended while it held it: look at what it guards
+  timed_out,
+  deadlock,  ///< the calling thread holds it already
+  corrupt,   ///< what lies there is no mutex of this kind
+};
+
+/// A mutex that may lie in shared memory: priority-inheriting, and robust against the end of its owner at any
+/// instruction. All zero is a valid free one. Unlike the C library's it keeps no pointers in the memory, so
+/// whatever a stranger writes into it can at worst make a lock fail.
+///
+/// The word is a PI futex: the owner's thread id, and flags that the kernel sets. If the owner ends while
+/// others wait, the kernel hands the lock on and says so; if nobody waits, the next one finds a thread that
+/// is not there. `owner_start_` tells a thread that was given the same number later from the owner: who waits
+/// looks at it every kLook.
+class RobustMutex {
+ public:
+  /// Not taken and not busy: no system call (a thread's first one reads a file). Any context; the deadline
+  /// bounds it.
+  [[nodiscard]] LockResult lock(TimePoint deadline = kNoDeadline) noexcept;
+  /// timed_out: another thread holds it. The same, without waiting.
+  [[nodiscard]] LockResult try_lock() noexcept;
+  /// False, and nothing is done: the calling thread does not hold it. Any context.
+  bool unlock() noexcept;
+  /// The thread that holds it; 0: none. It may have ended since. Any context.
+  [[nodiscard]] std::uint32_t owner() const noexcept;
+  /// Of the owner: see this_thread(). 0: none, or not told yet.
+  [[nodiscard]] std::uint64_t owner_start() const noexcept {
+    return owner_start_.load(std::memory_order_relaxed);
+  }
+
+  /// How long one that was left by a dead thread can look as if it were held.
+  static constexpr Duration kLook = std::chrono::milliseconds(40);
+
+ private:
+  [[nodiscard]] LockResult lock_slowly(TimePoint deadline) noexcept;
+  [[nodiscard]] bool take_over_from_the_dead(bool certain) noexcept;
+  [[nodiscard]] bool take_over(std::uint32_t word) noexcept;
+  [[nodiscard]] LockResult taken() noexcept;
+
+  std::atomic<std::uint32_t> word_{0};
+  std::uint32_t reserved_ = 0;
+  std::atomic<std::uint64_t> owner_start_{0};
+};
+
+static_assert(sizeof(RobustMutex) == 16);
+
+}  // namespace plchost

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include <sys/stat.h>
+#include <sys/types.h>
+
+#include "shm/base/result.hpp"
+
+namespace plchost {
+
+/// Who may use a shared memory, as with any file.
+struct MemoryRights {
+  std::optional<uid_t> owner = std::nullopt;  ///< nothing: the caller
+  std::optional<gid_t> group = std::nullopt;  ///< nothing: the caller's
+  mode_t mode = 0660;                         ///< permission bits, whatever the umask
+};
+
+/// What an object allows the calling process. Root may do all. Set-up.
+struct Permission {
+  bool read = false;
+  bool write = false;
+};
+[[nodiscard]] Permission permission_for_caller(uid_t owner, gid_t group, mode_t mode);
+
+/// "owner 0, group 1000, mode 0660", for errors.
+[[nodiscard]] std::string describe_rights(uid_t owner, gid_t group, mode_t mode);
+
+/// Gives a file to owner and group. refused: the caller may not. Set-up.
+[[nodiscard]] Result<void> give_rights(int fd, const MemoryRights& rights, const std::string& path);
+
+}  // namespace plchost

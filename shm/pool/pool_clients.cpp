@@ -1,0 +1,60 @@
+#include "shm/pool/pool_clients.hpp"
+
+#include <cerrno>
+
+#include <signal.h>
+
+#include "shm/base/process_start.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr auto kRelaxed = std::memory_order_relaxed;  // the mutex orders what it guards
+
+bool is_gone(ClientSlot& client, TimePoint now, bool thoroughly) noexcept {
+  const auto pid = static_cast<pid_t>(client.pid.load(kRelaxed));
+  if (pid < 0) return true;  // no number that the kernel gives
+  const std::int64_t age = now.time_since_epoch().count() - client.looked_ns.load(kRelaxed);
+  if (!thoroughly && age >= 0 && age < PoolClients::kLook.count()) {
+    return ::kill(pid, 0) != 0 && errno == ESRCH;
+  }
+  client.looked_ns.store(now.time_since_epoch().count(), kRelaxed);
+  return process_has_ended(pid, client.start.load(kRelaxed));
+}
+
+}  // namespace
+
+ClientSlot* PoolClients::join(std::uint32_t pid, std::uint64_t start, std::string_view name) noexcept {
+  for (ClientSlot& client : view_.clients()) {
+    if (client.pid.load(kRelaxed) != 0) continue;
+    client.generation.fetch_add(1, kRelaxed);
+    client.start.store(start, kRelaxed);
+    client.looked_ns.store(MonotonicClock::now().time_since_epoch().count(), kRelaxed);
+    client.first_reference.store(0, kRelaxed);
+    client.reference_count.store(0, kRelaxed);
+    client.name.assign(name);
+    client.pid.store(pid, std::memory_order_release);
+    const std::uint32_t link = view_.link_to(client);
+    Link& high_water = view_.header().client_high_water;
+    if (high_water.load(kRelaxed) < link) high_water.store(link, kRelaxed);
+    return &client;
+  }
+  return nullptr;
+}
+
+void PoolClients::sweep(TimePoint now, bool thoroughly, const std::function<void(ClientSlot&)>& bury) {
+  for (ClientSlot& client : view_.used_clients()) {
+    if (client.pid.load(kRelaxed) == 0) continue;
+    if (!is_gone(client, now, thoroughly)) continue;
+    bury(client);
+    leave(client);
+    view_.header().departed.fetch_add(1, kRelaxed);
+  }
+}
+
+std::string_view program_name() noexcept {
+  return ::program_invocation_short_name;
+}
+
+}  // namespace plchost

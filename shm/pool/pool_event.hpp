@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+
+#include "shm/base/counted_event.hpp"
+
+namespace plchost {
+
+struct ObjectEntry;
+
+/// What a post did.
+enum class PostResult : std::uint8_t {
+  posted,          ///< every task that is bound to the event will run for it
+  no_task,         ///< counted, but no task is bound at this time: a soft result
+  not_registered,  ///< nothing was counted: the event is not (or no longer) registered
+};
+
+/// A handle on one external event of the pool, for who posts to it and binds tasks to it: it is these
+/// registrations and bindings that hold the event, not the handle. Cheap to copy; valid while the ObjectPool
+/// that gave it lives.
+class PoolEvent {
+ public:
+  PoolEvent() noexcept = default;
+
+  /// Any context, real-time included: one atomic add, and one wake if someone waits.
+  PostResult post() const noexcept;
+
+  /// Whether it may be posted to. A task may be bound to an event that is not registered yet.
+  [[nodiscard]] bool registered() const noexcept;
+  /// False, and nothing is done, if the handle is not valid (any more).
+  bool set_registered(bool registered) const noexcept;
+
+  /// How many tasks wait for it: kept by their instance, so that a poster can be told.
+  [[nodiscard]] std::uint32_t bound_tasks() const noexcept;
+  /// False, and nothing is done, if the handle is not valid (any more).
+  bool set_bound_tasks(std::uint32_t count) const noexcept;
+
+  /// The counter itself, for the task that waits on it. Only of a valid handle.
+  [[nodiscard]] CountedEvent& counted() const noexcept;
+
+  /// False if the handle is empty, or the object behind it was removed and its place given to another.
+  [[nodiscard]] bool valid() const noexcept;
+
+ private:
+  friend class ObjectPool;
+  friend class SharedEvent;
+  explicit PoolEvent(ObjectEntry& entry) noexcept;
+  bool change_binding(std::uint64_t clear, std::uint64_t set) const noexcept;
+
+  ObjectEntry* entry_ = nullptr;
+  std::uint32_t generation_ = 0;
+};
+
+}  // namespace plchost

@@ -1,0 +1,140 @@
+#include "shm/pool/pool_object.hpp"
+
+#include <algorithm>
+
+#include "shm/pool/pool_segment.hpp"
+
+namespace plchost {
+
+namespace {
+
+// One that is killed between its post and its wake has left the post: who waits looks for it so often.
+constexpr Duration kLook = std::chrono::milliseconds(40);
+
+ObjectStatus status_of(LockResult result) noexcept {
+  switch (result) {
+    case LockResult::locked:
+      return ObjectStatus::done;
+    case LockResult::owner_died:
+      return ObjectStatus::owner_died;
+    case LockResult::timed_out:
+      return ObjectStatus::timed_out;
+    case LockResult::deadlock:
+      return ObjectStatus::deadlock;
+    case LockResult::corrupt:
+      break;
+  }
+  return ObjectStatus::corrupt;
+}
+
+}  // namespace
+
+PoolObject::Waiting::Waiting(const PoolObject& object) noexcept : reference_(*object.reference_) {
+  reference_.waiting.fetch_add(1, std::memory_order_relaxed);
+}
+
+PoolObject::Waiting::~Waiting() {
+  reference_.waiting.fetch_sub(1, std::memory_order_relaxed);
+}
+
+void PoolObject::swap(PoolObject& other) noexcept {
+  std::swap(segment_, other.segment_);
+  std::swap(entry_, other.entry_);
+  std::swap(reference_, other.reference_);
+  std::swap(generation_, other.generation_);
+  std::swap(reference_generation_, other.reference_generation_);
+  std::swap(writable_, other.writable_);
+}
+
+void PoolObject::close() noexcept {
+  if (reference_ != nullptr) segment_->release(*reference_, reference_generation_);
+  reference_ = nullptr;
+  entry_ = nullptr;
+  writable_ = false;
+  segment_.reset();
+}
+
+bool PoolObject::valid() const noexcept {
+  return entry_ != nullptr &&
+         Binding::generation(entry_->binding.load(std::memory_order_acquire)) == generation_;
+}
+
+ObjectStatus PoolObject::usable() const noexcept {
+  if (!valid()) return ObjectStatus::gone;
+  return writable_ ? ObjectStatus::done : ObjectStatus::not_permitted;
+}
+
+ObjectStatus SharedEvent::post() const noexcept {
+  const ObjectStatus usable_now = usable();
+  if (usable_now == ObjectStatus::done) entry().event.post();
+  return usable_now;
+}
+
+std::uint64_t SharedEvent::count() const noexcept {
+  if (!valid()) return 0;
+  const std::uint64_t since = entry().event.count() - entry().first_count.load(std::memory_order_relaxed);
+  return since & CountedEvent::kCountMask;
+}
+
+// Also with the right to read only: to wait is to mark the event, which costs its poster a wake.
+ObjectStatus SharedEvent::wait(std::uint64_t& cursor, TimePoint deadline) const noexcept {
+  if (const ObjectStatus now = usable(); now != ObjectStatus::done) return now;
+  const std::uint64_t before = cursor;
+  if (cursor = count(); cursor != before) return ObjectStatus::done;
+  const Waiting waiting(*this);
+  for (;;) {
+    const auto seen = entry().event.snapshot();
+    cursor = count();
+    if (!valid()) return ObjectStatus::gone;
+    if (cursor != before) return ObjectStatus::done;
+    const TimePoint now = MonotonicClock::now();
+    if (now >= deadline) return ObjectStatus::timed_out;
+    entry().event.wait(seen, std::min(deadline, now + kLook));
+  }
+}
+
+PoolEvent SharedEvent::event() const noexcept {
+  return valid() ? PoolEvent(entry()) : PoolEvent();
+}
+
+ObjectStatus SharedSemaphore::post() const noexcept {
+  if (const ObjectStatus now = usable(); now != ObjectStatus::done) return now;
+  return entry().semaphore.post() ? ObjectStatus::done : ObjectStatus::full;
+}
+
+ObjectStatus SharedSemaphore::try_wait() const noexcept {
+  if (const ObjectStatus now = usable(); now != ObjectStatus::done) return now;
+  return entry().semaphore.try_wait() ? ObjectStatus::done : ObjectStatus::timed_out;
+}
+
+ObjectStatus SharedSemaphore::wait(TimePoint deadline) const noexcept {
+  if (const ObjectStatus at_once = try_wait(); at_once != ObjectStatus::timed_out) return at_once;
+  const Waiting waiting(*this);
+  return entry().semaphore.wait(deadline) ? ObjectStatus::done : ObjectStatus::timed_out;
+}
+
+std::uint32_t SharedSemaphore::value() const noexcept {
+  return valid() ? entry().semaphore.value() : 0;
+}
+
+ObjectStatus SharedMutex::try_lock() const noexcept {
+  if (const ObjectStatus now = usable(); now != ObjectStatus::done) return now;
+  return status_of(entry().mutex.try_lock());
+}
+
+ObjectStatus SharedMutex::lock(TimePoint deadline) const noexcept {
+  if (const ObjectStatus at_once = try_lock(); at_once != ObjectStatus::timed_out) return at_once;
+  const Waiting waiting(*this);
+  return status_of(entry().mutex.lock(deadline));
+}
+
+ObjectStatus SharedMutex::unlock() const noexcept {
+  if (const ObjectStatus now = usable(); now != ObjectStatus::done) return now;
+  return entry().mutex.unlock() ? ObjectStatus::done : ObjectStatus::not_owner;
+}
+
+std::uint32_t SharedMutex::owner() const noexcept {
+  return valid() ? entry().mutex.owner() : 0;
+}
+
+}  // namespace plchost

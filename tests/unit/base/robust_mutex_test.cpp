@@ -1,0 +1,221 @@
+#include "shm/base/robust_mutex.hpp"
+
+#include <array>
+#include <chrono>
+#include <cstring>
+#include <new>
+#include <random>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/mman.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "shm/base/process_start.hpp"
+
+namespace plchost {
+namespace {
+
+using std::chrono::milliseconds;
+
+/// Memory that children of fork() share.
+struct Shared {
+  RobustMutex mutex;
+  std::atomic<std::uint32_t> step{0};
+  std::uint64_t a = 0;
+  std::uint64_t b = 0;
+};
+
+class RobustMutexTest : public testing::Test {
+ protected:
+  RobustMutexTest()
+      : shared_(*new(::mmap(nullptr, sizeof(Shared), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1,
+                            0)) Shared) {}
+  ~RobustMutexTest() override { ::munmap(&shared_, sizeof(Shared)); }
+
+  template <class Body>
+  static pid_t in_child(Body body) {
+    const pid_t child = ::fork();
+    if (child != 0) return child;
+    body();
+    ::_exit(0);
+  }
+  static void reap(pid_t child) {
+    ::kill(child, SIGKILL);
+    ::waitpid(child, nullptr, 0);
+  }
+  void await_step(std::uint32_t step) const {
+    while (shared_.step.load() != step) std::this_thread::sleep_for(milliseconds(1));
+  }
+  /// A child that holds the mutex until it is killed.
+  pid_t hold_in_child() {
+    const pid_t child = in_child([this] {
+      (void)shared_.mutex.lock();
+      shared_.step = 1;
+      for (;;) ::pause();
+    });
+    await_step(1);
+    return child;
+  }
+  static TimePoint in(milliseconds time) { return MonotonicClock::now() + time; }
+
+  Shared& shared_;
+};
+
+TEST_F(RobustMutexTest, LocksAndUnlocks) {
+  EXPECT_EQ(shared_.mutex.owner(), 0U);
+  ASSERT_EQ(shared_.mutex.lock(), LockResult::locked);
+  EXPECT_EQ(shared_.mutex.owner(), static_cast<std::uint32_t>(::gettid()));
+  EXPECT_TRUE(shared_.mutex.unlock());
+  EXPECT_EQ(shared_.mutex.owner(), 0U);
+}
+
+TEST_F(RobustMutexTest, RefusesASecondLockOfItsOwnerAndAnUnlockOfOthers) {
+  EXPECT_FALSE(shared_.mutex.unlock());
+  ASSERT_EQ(shared_.mutex.lock(), LockResult::locked);
+  EXPECT_EQ(shared_.mutex.lock(), LockResult::deadlock);
+  EXPECT_EQ(shared_.mutex.try_lock(), LockResult::deadlock);
+  std::thread([this] {
+    EXPECT_FALSE(shared_.mutex.unlock());
+    EXPECT_EQ(shared_.mutex.try_lock(), LockResult::timed_out);
+    EXPECT_EQ(shared_.mutex.lock(in(milliseconds(1))), LockResult::timed_out);
+  }).join();
+  EXPECT_TRUE(shared_.mutex.unlock());
+}
+
+TEST_F(RobustMutexTest, SaysOnceThatTheOwnerDiedWhenNobodyWaited) {
+  reap(hold_in_child());
+  EXPECT_EQ(shared_.mutex.lock(), LockResult::owner_died);
+  EXPECT_TRUE(shared_.mutex.unlock());
+  EXPECT_EQ(shared_.mutex.lock(), LockResult::locked);
+  EXPECT_TRUE(shared_.mutex.unlock());
+}
+
+TEST_F(RobustMutexTest, HandsOverToAWaiterWhenTheOwnerDies) {
+  const pid_t child = hold_in_child();
+  std::thread waiter([this] {
+    EXPECT_EQ(shared_.mutex.lock(), LockResult::owner_died);
+    EXPECT_TRUE(shared_.mutex.unlock());
+  });
+  std::this_thread::sleep_for(milliseconds(10));
+  reap(child);
+  waiter.join();
+  EXPECT_EQ(shared_.mutex.lock(), LockResult::locked);
+  EXPECT_TRUE(shared_.mutex.unlock());
+}
+
+TEST_F(RobustMutexTest, OwnerThatIsNotReapedYetIsDeadAllTheSame) {
+  const pid_t child = hold_in_child();
+  ::kill(child, SIGKILL);
+  EXPECT_EQ(shared_.mutex.lock(), LockResult::owner_died);
+  EXPECT_TRUE(shared_.mutex.unlock());
+  reap(child);
+}
+
+TEST_F(RobustMutexTest, ThreadThatEndsWithoutUnlockingIsADeadOwner) {
+  std::thread([this] { EXPECT_EQ(shared_.mutex.lock(), LockResult::locked); }).join();
+  EXPECT_EQ(shared_.mutex.lock(), LockResult::owner_died);
+  EXPECT_TRUE(shared_.mutex.unlock());
+}
+
+/// The word of one that is held by `thread`, which began at `start`.
+void pretend(RobustMutex& mutex, std::uint32_t thread, std::uint64_t start) {
+  std::memcpy(static_cast<void*>(&mutex), &thread, sizeof(thread));
+  std::memcpy(reinterpret_cast<std::byte*>(&mutex) + 8, &start, sizeof(start));
+}
+
+TEST_F(RobustMutexTest, ThreadThatWasGivenTheNumberOfADeadOwnerIsNotTheOwner) {
+  const pid_t stranger = in_child([] { ::pause(); });
+  pretend(shared_.mutex, static_cast<std::uint32_t>(stranger), 1);
+  std::vector<std::thread> waiters;
+  std::atomic<int> deaths{0};
+  for (int i = 0; i < 4; ++i) {
+    waiters.emplace_back([&] {
+      const LockResult result = shared_.mutex.lock(in(milliseconds(20'000)));
+      EXPECT_TRUE(result == LockResult::locked || result == LockResult::owner_died);
+      deaths += result == LockResult::owner_died ? 1 : 0;
+      EXPECT_TRUE(shared_.mutex.unlock());
+    });
+  }
+  for (auto& waiter : waiters) waiter.join();
+  EXPECT_GE(deaths, 1);
+  reap(stranger);
+}
+
+TEST_F(RobustMutexTest, DeadOwnerThatHadTheNumberOfTheCallerIsNotTheCaller) {
+  pretend(shared_.mutex, this_thread().id, this_thread().start + 1);
+  EXPECT_EQ(shared_.mutex.lock(), LockResult::owner_died);
+  EXPECT_TRUE(shared_.mutex.unlock());
+}
+
+TEST_F(RobustMutexTest, OwnerThatDiedBeforeItToldItsStartIsOvercome) {
+  const pid_t stranger = in_child([] { ::pause(); });
+  pretend(shared_.mutex, static_cast<std::uint32_t>(stranger), 0);
+  EXPECT_EQ(shared_.mutex.lock(in(milliseconds(20'000))), LockResult::owner_died);
+  EXPECT_TRUE(shared_.mutex.unlock());
+  reap(stranger);
+}
+
+TEST_F(RobustMutexTest, WhateverAStrangerWritesALockEndsAndTheNextOnesDoToo) {
+  std::mt19937_64 random(4711);
+  for (int round = 0; round < 60; ++round) {
+    const auto word = static_cast<std::uint32_t>(random() >> (round % 33));
+    pretend(shared_.mutex, word, round % 3 == 0 ? 0 : random());
+    (void)shared_.mutex.lock(in(milliseconds(300)));
+    (void)shared_.mutex.unlock();
+    (void)shared_.mutex.owner();
+    pretend(shared_.mutex, 0, 0);
+    ASSERT_EQ(shared_.mutex.lock(in(milliseconds(20'000))), LockResult::locked);
+    ASSERT_TRUE(shared_.mutex.unlock());
+  }
+}
+
+TEST_F(RobustMutexTest, GuardsAgainstEachOther) {
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 4; ++i) {
+    threads.emplace_back([this] {
+      for (int n = 0; n < 5000; ++n) {
+        ASSERT_EQ(shared_.mutex.lock(), LockResult::locked);
+        ++shared_.a;
+        ASSERT_TRUE(shared_.mutex.unlock());
+      }
+    });
+  }
+  for (auto& thread : threads) thread.join();
+  EXPECT_EQ(shared_.a, 20'000U);
+}
+
+TEST_F(RobustMutexTest, KilledOwnersNeverLeaveItHeldNorLetTwoIn) {
+  for (int round = 0; round < 200; ++round) {
+    std::array<pid_t, 3> children{};
+    for (pid_t& child : children) {
+      child = in_child([this] {
+        for (;;) {
+          const LockResult result = shared_.mutex.lock();
+          if (result == LockResult::owner_died) shared_.b = shared_.a;
+          if (shared_.a != shared_.b) {
+            shared_.step = 99;  // two were in at once
+            ::_exit(1);
+          }
+          shared_.a = shared_.a + 1;
+          shared_.b = shared_.b + 1;
+          (void)shared_.mutex.unlock();
+        }
+      });
+    }
+    std::this_thread::sleep_for(std::chrono::microseconds(300 + 71 * (round % 40)));
+    for (const pid_t child : children) reap(child);
+    const LockResult result = shared_.mutex.lock(in(milliseconds(20'000)));
+    ASSERT_TRUE(result == LockResult::locked || result == LockResult::owner_died);
+    if (result == LockResult::owner_died) shared_.b = shared_.a;
+    ASSERT_EQ(shared_.a, shared_.b);
+    ASSERT_TRUE(shared_.mutex.unlock());
+    ASSERT_NE(shared_.step.load(), 99U);
+  }
+}
+
+}  // namespace
+}  // namespace plchost

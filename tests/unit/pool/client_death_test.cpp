@@ -1,0 +1,200 @@
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "shm/pool/object_pool.hpp"
+#include "shm/pool/pool_layout.hpp"
+#include "tests/unit/pool/unique_pool_name.hpp"
+
+namespace plchost {
+namespace {
+
+using std::chrono::milliseconds;
+
+class ClientDeath : public testing::Test {
+ protected:
+  ClientDeath() : pool_(std::move(ObjectPool::create(name_.get(), {.max_objects = 256}).value())) {}
+  [[nodiscard]] ObjectPool another() const { return std::move(ObjectPool::attach(name_.get()).value()); }
+
+  /// A child that does `body` with a pool of its own and then waits to be killed.
+  pid_t client(const std::function<void(ObjectPool&)>& body) {
+    std::array<int, 2> ready{};
+    EXPECT_EQ(::pipe(ready.data()), 0);
+    const pid_t child = ::fork();
+    if (child == 0) {
+      auto pool = another();
+      body(pool);
+      (void)!::write(ready[1], "x", 1);
+      for (;;) ::pause();
+    }
+    char byte = 0;
+    EXPECT_EQ(::read(ready[0], &byte, 1), 1);
+    ::close(ready[0]);
+    ::close(ready[1]);
+    return child;
+  }
+  static void kill_and_reap(pid_t child) {
+    ::kill(child, SIGKILL);
+    ::waitpid(child, nullptr, 0);
+  }
+  UniquePoolName name_;
+  ObjectPool pool_;
+};
+
+TEST_F(ClientDeath, WhatItHeldIsReleasedByTheNextCall) {
+  const pid_t child = client([](ObjectPool& pool) {
+    static auto memory = pool.create_memory("memory", 4096);
+    static auto semaphore = pool.create_semaphore("semaphore", 3);
+    static auto kept = pool.create_semaphore("kept", 3, {.keep = true});
+    static auto event = pool.create_shared_event("event");
+  });
+  EXPECT_EQ(pool_.list().size(), 4U);
+  kill_and_reap(child);
+  EXPECT_EQ(pool_.open_memory("memory").error().code, ErrorCode::not_found);
+  EXPECT_FALSE(std::filesystem::exists("/dev/shm/" + pool_memory_name(name_.get(), "memory")));
+  const auto left = pool_.list();
+  ASSERT_EQ(left.size(), 1U);
+  EXPECT_EQ(left[0].name, "kept");
+  EXPECT_TRUE(left[0].references.empty());
+}
+
+TEST_F(ClientDeath, OfAZombieIsFoundByAList) {
+  const pid_t child = client([](ObjectPool& pool) { static auto made = pool.create_semaphore("s", 3); });
+  ::kill(child, SIGKILL);
+  siginfo_t info{};
+  ::waitid(P_PID, static_cast<id_t>(child), &info, WEXITED | WNOWAIT);
+  EXPECT_TRUE(pool_.list().empty());
+  kill_and_reap(child);
+}
+
+TEST_F(ClientDeath, OfAMutexOwnerIsReportedOnce) {
+  const auto sut = pool_.create_mutex("m");
+  const pid_t child = client([](ObjectPool& pool) {
+    static auto mutex = pool.open_mutex("m");
+    (void)mutex->lock();
+  });
+  EXPECT_EQ(sut->object.try_lock(), ObjectStatus::timed_out);
+  kill_and_reap(child);
+  EXPECT_EQ(sut->object.lock(), ObjectStatus::owner_died);
+  EXPECT_EQ(sut->object.unlock(), ObjectStatus::done);
+  EXPECT_EQ(sut->object.lock(), ObjectStatus::done);
+}
+
+TEST_F(ClientDeath, OfAWaiterIsNotCountedAmongTheWaiters) {
+  const auto sut = pool_.create_semaphore("s", 0);
+  const pid_t child = client([](ObjectPool& pool) {
+    static auto semaphore = pool.open_semaphore("s");
+    static std::thread waiter([] { (void)semaphore->wait(); });
+  });
+  while (pool_.look_at("s")->waiters != 1) std::this_thread::sleep_for(milliseconds(1));
+  kill_and_reap(child);
+  EXPECT_EQ(pool_.look_at("s")->waiters, 0U);
+}
+
+TEST_F(ClientDeath, ChildOfAForkIsToldToAttachAnew) {
+  const auto held = pool_.create_mutex("m");
+  const pid_t child = ::fork();
+  if (child == 0) {
+    const bool told = pool_.create_mutex("other").error().code == ErrorCode::wrong_state;
+    ::_exit(told ? 0 : 1);
+  }
+  int status = -1;
+  ::waitpid(child, &status, 0);
+  EXPECT_EQ(status, 0);
+  EXPECT_TRUE(pool_.open_mutex("m")) << "the child's end took nothing of its parent's";
+}
+
+TEST_F(ClientDeath, SlotsOfManyDeadClientsAreUsedAgain) {
+  for (int i = 0; i < 40; ++i) {
+    std::vector<pid_t> children;
+    for (int n = 0; n < 15; ++n) {
+      children.push_back(client([](ObjectPool& pool) { static auto made = pool.create_semaphore("s", 3); }));
+    }
+    for (const pid_t child : children) kill_and_reap(child);
+  }
+  EXPECT_TRUE(pool_.create_semaphore("s", 1)->made);
+}
+
+/// What a client does that is killed in the midst of it: all kinds of calls, in a random order.
+[[noreturn]] void storm(const std::string& name, unsigned seed) {
+  auto pool = std::move(ObjectPool::attach(name).value());
+  const auto shared = [&](const char* kind) { return kind + std::to_string(seed++ * 7 % 5); };
+  for (;;) {
+    const auto soon = [] { return MonotonicClock::now() + std::chrono::microseconds(50); };
+    if (const auto memory = pool.create_memory(shared("memory"), 4096, {.keep = seed % 11 == 0})) {
+      memory->object.bytes()[seed % 4096] = std::byte{1};
+    }
+    if (const auto mutex = pool.create_mutex(shared("mutex"))) {
+      const ObjectStatus locked = mutex->object.lock(soon());
+      const bool ours = locked == ObjectStatus::done || locked == ObjectStatus::owner_died;
+      if (ours && seed % 3 != 0) (void)mutex->object.unlock();
+    }
+    if (const auto semaphore = pool.create_semaphore(shared("semaphore"), 1)) {
+      if (semaphore->object.wait(soon()) == ObjectStatus::done) (void)semaphore->object.post();
+    }
+    if (const auto event = pool.create_shared_event(shared("event"))) {
+      std::uint64_t cursor = event->object.count();
+      (void)event->object.post();
+      (void)event->object.wait(cursor, soon());
+    }
+    (void)pool.remove_object(shared("memory"));
+    if (seed % 13 == 0) (void)pool.list();
+  }
+}
+
+TEST_F(ClientDeath, AtAnyInstructionLeavesAPoolThatTheNextCallRepairs) {
+  const auto common = pool_.create_mutex("mutex0", {.keep = true});
+  ASSERT_TRUE(common);
+  constexpr unsigned kRounds = 500;
+  for (unsigned round = 0; round < kRounds; ++round) {
+    std::array<pid_t, 3> children{};
+    for (unsigned i = 0; pid_t & child : children) {
+      child = ::fork();
+      if (child == 0) storm(name_.get(), round * 31 + i);
+      ++i;
+    }
+    std::this_thread::sleep_for(std::chrono::microseconds(400 + 53 * (round % 61)));
+    for (const pid_t child : children) kill_and_reap(child);
+    // Nothing is held by the dead, and each kept memory has its file and no other one has.
+    std::size_t memories = 0;
+    for (const ObjectInfo& info : pool_.list()) {
+      const bool ours = info.name == "mutex0";
+      ASSERT_TRUE(info.kept || ours) << info.name;
+      ASSERT_EQ(info.references.size(), ours ? 1U : 0U) << info.name;
+      ASSERT_EQ(info.waiters, 0U) << info.name;
+      if (info.type != ObjectType::memory) continue;
+      ++memories;
+      ASSERT_TRUE(pool_.open_memory(info.name)) << info.name;
+    }
+    std::size_t files = 0;
+    for (const auto& file : std::filesystem::directory_iterator("/dev/shm")) {
+      if (file.path().filename().string().starts_with(name_.get() + ".memory.")) ++files;
+    }
+    ASSERT_EQ(files, memories);
+    const ObjectStatus locked = common->object.lock(MonotonicClock::now() + std::chrono::seconds(20));
+    ASSERT_TRUE(locked == ObjectStatus::done || locked == ObjectStatus::owner_died);
+    ASSERT_EQ(common->object.unlock(), ObjectStatus::done);
+    for (int i = 0; i < 5; ++i) {
+      ASSERT_TRUE(pool_.create_semaphore("semaphore" + std::to_string(i), 1)->made);
+      ASSERT_TRUE(pool_.create_shared_event("event" + std::to_string(i))->made);
+    }
+  }
+  const auto memory = MemoryFile::open(name_.get(), sizeof(PoolHeader), MemoryFile::Access::read_only);
+  const auto& header = *reinterpret_cast<const PoolHeader*>(memory->bytes().data());
+  EXPECT_GT(header.repairs.load(), 0U) << "none of them died with the pool's lock held";
+  EXPECT_GT(header.departed.load(), kRounds);
+}
+
+}  // namespace
+}  // namespace plchost
