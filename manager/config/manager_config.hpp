@@ -26,10 +26,10 @@ struct HostConfig {
   std::string state_directory = "/var/lib/plchost";  ///< what instances keep over a power cut
   std::string pool = "plchost";
   std::uint32_t pool_objects = 4096;
-  std::string pool_owner;    ///< user's name or number; empty: who starts the manager
-  std::string pool_group;    ///< group's name or number; empty: that of who starts the manager
-  mode_t pool_mode = 0660;   ///< permission bits of the pool and, where nothing else is said, of its memories
-  std::vector<int> cores;               ///< where instances may run
+  std::string pool_owner;   ///< user's name or number; empty: who starts the manager
+  std::string pool_group;   ///< group's name or number; empty: that of who starts the manager
+  mode_t pool_mode = 0660;  ///< permission bits of the pool and, where nothing else is said, of its memories
+  std::vector<int> cores;   ///< where instances may run
   std::vector<int> housekeeping_cores;  ///< where the manager and the API server run
   std::string log_level = "info";
   bool keep_pool = false;  ///< leave the pool in place at the end, for firmware that has it mapped

@@ -104,9 +104,10 @@ Result<PoolEvent> ObjectPool::create_event(std::string_view name) {
   PoolTable objects(segment_->view());
   ObjectEntry* entry = objects.find(name);
   if (entry == nullptr) {
-    entry = objects.insert(name, ObjectType::event, EntryState::used);
+    entry = objects.insert(name, ObjectType::event);
     if (entry == nullptr) return no_room(wanted);
     describe_new(*entry, rights, 0);
+    PoolTable::publish(*entry);
   }
   if (auto event = check_is(*entry, ObjectType::event, name); !event) return std::unexpected(event.error());
   return PoolEvent(*entry);
@@ -165,21 +166,21 @@ Result<void> ObjectPool::map(SharedMemory& memory, const Wanted& wanted, Access 
 Result<ObjectEntry*> ObjectPool::make_entry(const Wanted& wanted, const MemoryRights& rights,
                                             std::uint32_t attributes, std::optional<UnnamedMemory> memory) {
   PoolTable objects(segment_->view());
-  ObjectEntry* const entry =
-      objects.insert(wanted.name, wanted.type, memory ? EntryState::changing : EntryState::used);
+  ObjectEntry* const entry = objects.insert(wanted.name, wanted.type);
   if (entry == nullptr) return no_room(wanted);
   describe_new(*entry, rights, attributes);
   if (wanted.type == ObjectType::semaphore) new (&entry->semaphore) CountingSemaphore(wanted.value);
   if (wanted.type == ObjectType::event) entry->binding.fetch_or(Binding::kRegistered);
-  if (!memory) return entry;
-  entry->size.store(wanted.size, kRelaxed);
-  // A file of that name without an object is what is left of another pool of the name.
-  auto named = (*std::move(memory)).give_name(true);
-  if (!named) {
-    objects.erase(*entry);
-    return std::unexpected(std::move(named).error());
+  if (memory) {
+    entry->size.store(wanted.size, kRelaxed);
+    // A file of that name without an object is what is left of another pool of the name.
+    const auto named = (*std::move(memory)).give_name(true);
+    if (!named) {
+      objects.erase(*entry);
+      return std::unexpected(named.error());
+    }
   }
-  entry->state.store(static_cast<std::uint32_t>(EntryState::used), std::memory_order_release);
+  PoolTable::publish(*entry);
   return entry;
 }
 

@@ -34,7 +34,7 @@ using Link = std::atomic<std::uint32_t>;
 enum class EntryState : std::uint32_t {
   free = 0,
   used = 1,
-  changing = 2,  ///< its file is being given its name, or taken away
+  changing = 2,  ///< half-made, or half-gone
 };
 
 struct alignas(64) ObjectEntry {

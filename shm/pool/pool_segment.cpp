@@ -166,8 +166,10 @@ Result<PoolLock> PoolSegment::lock(bool look_thoroughly) {
 // nobody has a reference to yet.
 void PoolSegment::repair() noexcept {
   for (ObjectEntry& entry : view_.entries()) {
-    if (entry.state.load(kRelaxed) != static_cast<std::uint32_t>(EntryState::changing)) continue;
-    MemoryFile::remove(pool_memory_name(name_, entry.name.view()));
+    const bool half_made = entry.state.load(kRelaxed) == static_cast<std::uint32_t>(EntryState::changing);
+    if (half_made && entry.type.load(kRelaxed) == static_cast<std::uint32_t>(ObjectType::memory)) {
+      MemoryFile::remove(pool_memory_name(name_, entry.name.view()));
+    }
   }
   PoolTable(view_).rebuild();
   view_.header().client_high_water.store(kMaxClients, kRelaxed);

@@ -74,7 +74,7 @@ ObjectEntry* PoolTable::find(std::string_view name) noexcept {
   return entry != nullptr && is_valid(*entry) ? entry : nullptr;
 }
 
-ObjectEntry* PoolTable::insert(std::string_view name, ObjectType type, EntryState state) noexcept {
+ObjectEntry* PoolTable::insert(std::string_view name, ObjectType type) noexcept {
   if (!free_places_are_sane()) rebuild();
   ObjectEntry* entry = allocate();
   if (entry == nullptr) entry = reclaim();
@@ -90,12 +90,16 @@ ObjectEntry* PoolTable::insert(std::string_view name, ObjectType type, EntryStat
   entry->reference_count.store(0, kRelaxed);
   entry->made_unix_ns.store(unix_time_ns(), kRelaxed);
   entry->name.assign(name);
-  // From here on a rebuild finds it, whether or not this process lives to put it into its chain.
-  set_state(*entry, state);
+  // From here on a repair finds it, and frees it.
+  set_state(*entry, EntryState::changing);
   Link& bucket = bucket_of(name);
   entry->next.store(bucket.load(kRelaxed), kRelaxed);
   bucket.store(view_.link_to(*entry), kRelaxed);
   return entry;
+}
+
+void PoolTable::publish(ObjectEntry& entry) noexcept {
+  set_state(entry, EntryState::used);
 }
 
 void PoolTable::erase(ObjectEntry& entry) noexcept {

@@ -21,9 +21,10 @@ class PoolTable {
   [[nodiscard]] ObjectEntry* find(std::string_view name) noexcept;
   /// The same, only looking; null, too, if the index is damaged.
   [[nodiscard]] ObjectEntry* peek(std::string_view name) const noexcept;
-  /// `name` is not in the table. The entry has no references and is `state`. Null if the table is full and
-  /// nothing can be reclaimed.
-  [[nodiscard]] ObjectEntry* insert(std::string_view name, ObjectType type, EntryState state) noexcept;
+  /// `name` is not in the table. The entry has no references and is there for others, and after the end of
+  /// this process, only when it is published. Null if the table is full and nothing can be reclaimed.
+  [[nodiscard]] ObjectEntry* insert(std::string_view name, ObjectType type) noexcept;
+  static void publish(ObjectEntry& entry) noexcept;
   /// Frees it; handles on it are invalid from here on.
   void erase(ObjectEntry& entry) noexcept;
   /// Makes the index and the free list anew from the entries, and frees those that are not valid.

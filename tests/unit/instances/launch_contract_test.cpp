@@ -89,7 +89,7 @@ TEST_P(BadReport, IsCorrupt) {
 INSTANTIATE_TEST_SUITE_P(Packets, BadReport,
                          ::testing::Values("", "{", "[]", "{}", R"({"step":1,"code":0,"text":""})",
                                            R"({"step":"bind core","code":-1,"text":""})",
-                                           R"({"step":"bind core","code":13,"text":""})",
+                                           R"({"step":"bind core","code":15,"text":""})",
                                            R"({"step":"bind core","code":4294967296,"text":""})",
                                            R"({"step":"bind core","code":0})",
                                            R"({"step":"fly","code":0,"text":""})"));
