@@ -48,15 +48,12 @@ std::string Instance::keep_fault(const TaskSet::Fault& fault) {
 
 void Instance::keep_exception(const ExceptionEntry& entry) const {
   if (options_.launch.run_directory.empty()) return;
-  const std::string path = exception_path(options_.launch.run_directory, options_.launch.name);
-  auto history = read_exceptions(path);
-  if (!history) {
-    spdlog::warn("the exceptions before this one are lost: {}", history.error().describe());
-    history = ExceptionHistory{};
-  }
-  history->add(entry);
-  if (const auto written = write_exceptions(path, *history); !written) {
-    spdlog::error("this exception is not kept: {}", written.error().describe());
+  const auto kept = keep_exceptions(exception_path(options_.launch.run_directory, options_.launch.name),
+                                    std::span(&entry, 1));
+  if (!kept) {
+    spdlog::error("this exception is not kept: {}", kept.error().describe());
+  } else if (!kept->empty()) {
+    spdlog::warn("{}", *kept);
   }
 }
 

@@ -35,18 +35,11 @@ std::string keep_lost_faults(std::string_view pool, std::string_view run_directo
   if (!page) return {};
   const std::vector<ExceptionEntry> faults = faults_of(*page);
   if (faults.empty()) return {};
-  const std::string path = exception_path(run_directory, instance);
-  auto history = read_exceptions(path);
-  if (!history) {
-    spdlog::warn("instance {}: the exceptions before this one are lost: {}", instance,
-                 history.error().describe());
-    history = ExceptionHistory{};
-  }
-  for (const ExceptionEntry& fault : faults) {
-    if (!history->has(fault.task, fault.unix_ns)) history->add(fault);
-  }
-  if (const auto written = write_exceptions(path, *history); !written) {
-    spdlog::error("instance {}: its exception is not kept: {}", instance, written.error().describe());
+  const auto kept = keep_exceptions(exception_path(run_directory, instance), faults);
+  if (!kept) {
+    spdlog::error("instance {}: its exception is not kept: {}", instance, kept.error().describe());
+  } else if (!kept->empty()) {
+    spdlog::warn("instance {}: {}", instance, *kept);
   }
   return fmt::format("task '{}': {}", faults.back().task, faults.back().text);
 }

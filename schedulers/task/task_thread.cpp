@@ -25,7 +25,7 @@ Result<std::unique_ptr<TaskThread>> TaskThread::start(Clock& clock, Task& task, 
 TaskThread::~TaskThread() {
   ending_.store(true);
   park();
-  thread_.join_unless([this] { return task_.trap().parked(); });
+  (void)thread_.join_until(kNoDeadline, [this] { return task_.trap().parked(); });
 }
 
 void TaskThread::use(ActivationSource* source) noexcept {

@@ -55,21 +55,17 @@ std::unexpected<Error> corrupt(const std::string& path, std::string_view what) {
 }
 
 // Without a time nothing is known to be the same.
-auto is_of(std::string_view task, std::int64_t unix_ns) {
-  return [=](const ExceptionEntry& entry) {
-    return unix_ns != 0 && entry.unix_ns == unix_ns && entry.task == task;
-  };
+bool same(const ExceptionEntry& one, const ExceptionEntry& other) {
+  return one.unix_ns != 0 && one.unix_ns == other.unix_ns && one.task == other.task;
 }
 
 }  // namespace
 
-bool ExceptionHistory::has(std::string_view task, std::int64_t unix_ns) const {
-  return std::ranges::any_of(entries, is_of(task, unix_ns));
-}
-
 void ExceptionHistory::add(ExceptionEntry entry) {
-  const auto known = std::ranges::find_if(entries, is_of(entry.task, entry.unix_ns));
+  const auto known =
+      std::ranges::find_if(entries, [&](const ExceptionEntry& kept) { return same(kept, entry); });
   if (known != entries.end()) {
+    if (entry.symbol.empty()) return;
     entry.number = known->number;
     *known = std::move(entry);
     return;
@@ -133,6 +129,20 @@ Result<void> write_exceptions(const std::string& path, const ExceptionHistory& h
   for (const ExceptionEntry& entry : history.entries) entries.push_back(to_json(entry));
   const Json json{{"version", kVersion}, {"count", history.count}, {"exceptions", std::move(entries)}};
   return replace_file(path, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+Result<std::string> keep_exceptions(const std::string& path, std::span<const ExceptionEntry> found) {
+  auto history = read_exceptions(path);
+  std::string remark;
+  if (!history) {
+    remark = fmt::format("the exceptions before this one are lost: {}", history.error().describe());
+    history = ExceptionHistory{};
+  }
+  for (const ExceptionEntry& entry : found) history->add(entry);
+  if (auto written = write_exceptions(path, *history); !written) {
+    return std::unexpected(std::move(written).error());
+  }
+  return remark;
 }
 
 }  // namespace plchost

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -34,10 +35,9 @@ struct ExceptionHistory {
   std::uint64_t count = 0;  ///< of all that ever were
   std::vector<ExceptionEntry> entries;
 
-  /// Numbers it and drops the oldest, if there are too many. One that is there already, by its task and time,
-  /// is replaced: the manager may have found it first, which knows no symbols.
+  /// Numbers it and drops the oldest, if there are too many. Of one that is there already, by its task and
+  /// time, the one with a symbol stays: the manager, which finds none, may have come first, or come last.
   void add(ExceptionEntry entry);
-  [[nodiscard]] bool has(std::string_view task, std::int64_t unix_ns) const;
 };
 
 /// Without its symbol, which only the process can find.
@@ -51,5 +51,9 @@ struct ExceptionHistory {
 [[nodiscard]] Result<ExceptionHistory> read_exceptions(const std::string& path);
 /// Replaces the file as a whole: a reader finds the one before or the new one. Set-up.
 [[nodiscard]] Result<void> write_exceptions(const std::string& path, const ExceptionHistory& history);
+/// Adds to the file what was found. A file that cannot be read is begun anew: then the remark says what was
+/// lost; else it is empty. Set-up.
+[[nodiscard]] Result<std::string> keep_exceptions(const std::string& path,
+                                                  std::span<const ExceptionEntry> found);
 
 }  // namespace plchost

@@ -109,10 +109,6 @@ void Thread::join() noexcept {
   if (std::exchange(running_, false)) pthread_join(handle_, nullptr);
 }
 
-void Thread::join_unless(const std::function<bool()>& abandoned) noexcept {
-  (void)join_until(kNoDeadline, abandoned);
-}
-
 bool Thread::join_until(TimePoint deadline, const std::function<bool()>& abandoned) noexcept {
   constexpr Duration kLook = std::chrono::milliseconds(10);
   while (running_) {

@@ -37,9 +37,8 @@ class Thread {
                                             std::function<void()> body);
   void join() noexcept;
   /// Joins, unless `abandoned()` becomes true first: then the thread is left alone until the process ends.
-  /// For a thread that may be parked for good where it stands. `abandoned` is looked at every 10 ms.
-  void join_unless(const std::function<bool()>& abandoned) noexcept;
-  /// The same, not beyond `deadline` (real time). false: it has not ended, and can be joined later.
+  /// For a thread that may be parked for good where it stands. `abandoned` is looked at every 10 ms. Not
+  /// beyond `deadline` (real time). false: it has not ended, and can be joined later.
   [[nodiscard]] bool join_until(TimePoint deadline, const std::function<bool()>& abandoned) noexcept;
   [[nodiscard]] bool joinable() const noexcept { return running_; }
 

@@ -53,16 +53,40 @@ TEST_F(ExceptionHistoryTest, HasTheSameFaultOnceWhoeverFoundIt) {
   ExceptionHistory sut;
   ExceptionEntry fault = entry("abort");
   fault.unix_ns = 1000;
-  EXPECT_FALSE(sut.has("Fill", 1000));
   sut.add(fault);
-  EXPECT_TRUE(sut.has("Fill", 1000));
   fault.symbol = "fill()+0x12";
+  sut.add(fault);
+  fault.symbol = "";  // by the manager, once more
   sut.add(fault);
   fault.task = "Other";
   sut.add(fault);
   EXPECT_EQ(sut.count, 2U);
   EXPECT_EQ(sut.entries[0].symbol, "fill()+0x12");
   EXPECT_EQ(sut.entries[0].number, 1U);
+}
+
+TEST_F(ExceptionHistoryTest, IsKeptOnInTheFile) {
+  const std::vector<ExceptionEntry> first{entry("one"), entry("two")};
+  const std::vector<ExceptionEntry> second{entry("three")};
+  EXPECT_EQ(keep_exceptions(path_, first), "");
+  EXPECT_EQ(keep_exceptions(path_, second), "");
+  const auto history = read_exceptions(path_);
+  ASSERT_TRUE(history);
+  EXPECT_EQ(history->count, 3U);
+  EXPECT_EQ(history->entries.back().text, "three");
+}
+
+TEST_F(ExceptionHistoryTest, BeginsAnewWhereTheFileIsSomethingElseAndSaysSo) {
+  write("[]");
+  const auto remark = keep_exceptions(path_, std::vector{entry("one")});
+  ASSERT_TRUE(remark);
+  EXPECT_THAT(*remark, testing::HasSubstr("is not a JSON object"));
+  EXPECT_EQ(read_exceptions(path_)->count, 1U);
+}
+
+TEST_F(ExceptionHistoryTest, ThatCannotBeWrittenIsAnError) {
+  const auto kept = keep_exceptions(testing::TempDir() + "/no such folder/x", std::vector{entry("one")});
+  ASSERT_FALSE(kept);
 }
 
 TEST_F(ExceptionHistoryTest, IsEmptyWithoutAFile) {
