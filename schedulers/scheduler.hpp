@@ -29,7 +29,8 @@ enum class TickSourceKind : std::uint8_t { system, task, auxiliary };
 
 /// The watchdogs that concern the instance as a whole.
 struct WatchdogSettings {
-  bool load = true;  ///< the load watchdog, at processor_load_maximum percent if that is set
+  bool load =
+      true;  ///< the load watchdog: at processor_load_maximum percent, or if that is not set at overload
   Duration load_interval = std::chrono::seconds(1);  ///< over which the load is measured
   bool omitted_cycles = true;                        ///< the tasks' watchdogs of omitted cycles may hit
   Duration default_time = std::chrono::seconds(2);   ///< of an endless loop in a task without a time; 0: off

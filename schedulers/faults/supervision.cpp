@@ -1,6 +1,7 @@
 #include "schedulers/faults/supervision.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "schedulers/clock_thread.hpp"
 
@@ -21,10 +22,20 @@ TimePoint at(const std::atomic<Duration::rep>& stamp) noexcept {
   return TimePoint(Duration(stamp.load(std::memory_order_relaxed)));
 }
 
-std::vector<bool> freewheeling(const std::vector<std::unique_ptr<Task>>& tasks) {
-  std::vector<bool> are;
-  for (const auto& task : tasks) are.push_back(task->config().kind == TaskKind::freewheeling);
-  return are;
+// They take what is left and limit themselves.
+bool is_freewheeling(const TaskConfig& task) {
+  return task.kind == TaskKind::freewheeling;
+}
+
+// Nobody waits for what has no real-time priority.
+bool is_modest(const TaskConfig& task) {
+  return is_freewheeling(task) || task.iec_priority > kLowestRealTimeIecPriority;
+}
+
+std::vector<bool> which(const std::vector<std::unique_ptr<Task>>& tasks, bool (*are)(const TaskConfig&)) {
+  std::vector<bool> found;
+  for (const auto& task : tasks) found.push_back(are(task->config()));
+  return found;
 }
 
 }  // namespace
@@ -34,7 +45,8 @@ Supervision::Supervision(Clock& clock, const std::vector<std::unique_ptr<Task>>&
     : clock_(clock),
       times_(times),
       watched_(tasks.size() + 1),
-      load_(freewheeling(tasks)),
+      load_(which(tasks, is_freewheeling)),
+      overload_(which(tasks, is_modest)),
       task_times_(tasks.size()) {
   for (std::size_t i = 0; i < tasks.size(); ++i) {
     watched_[i].trap = &tasks[i]->trap();
@@ -63,9 +75,12 @@ void Supervision::begin(const SchedulerSettings& settings, int cores) {
     watched.limit.store(limit ? limit->limit.count() : 0, std::memory_order_relaxed);
   }
   omitted_cycles_.store(settings.watchdog.omitted_cycles, std::memory_order_relaxed);
-  const bool load = settings.watchdog.load && settings.processor_load_maximum > 0;
-  load_maximum_.store(settings.processor_load_maximum, std::memory_order_relaxed);
-  load_interval_.store(load ? settings.watchdog.load_interval.count() : 0, std::memory_order_relaxed);
+  const bool maximum = settings.processor_load_maximum > 0;
+  const Duration window = maximum ? settings.watchdog.load_interval : settings.watchdog.default_time;
+  only_overload_.store(!maximum, std::memory_order_relaxed);
+  load_maximum_.store(maximum ? settings.processor_load_maximum : kOverloadPercent,
+                      std::memory_order_relaxed);
+  load_interval_.store(settings.watchdog.load ? window.count() : 0, std::memory_order_relaxed);
   cores_.store(cores, std::memory_order_relaxed);
   forgiven_until_.store((clock_.now() + kGrace).time_since_epoch().count(), std::memory_order_relaxed);
   change(Mode::running);
@@ -170,29 +185,59 @@ LoadRule::Sample Supervision::sample_load() noexcept {
   return {.process = times_.of_process(), .tasks = task_times_};
 }
 
+// Since it was asked last, a real-time task has lost releases before each of its cycles: it gets no further.
+bool Supervision::overtaxed() noexcept {
+  bool found = false;
+  for (Watched& watched : watched_) {
+    if (watched.task == nullptr || is_modest(watched.task->config())) continue;
+    const Task::Pace before = std::exchange(watched.pace, watched.task->pace());
+    found |= watched.pace.lost > before.lost && watched.pace.on_time == before.on_time;
+  }
+  return found;
+}
+
 TimePoint Supervision::look_at_load(TimePoint now) noexcept {
   const Duration interval(load_interval_.load(std::memory_order_relaxed));
   if (interval == Duration::zero()) return kNoDeadline;
   const auto epoch = forgiven_until_.load(std::memory_order_relaxed);
   if (const TimePoint from = at(forgiven_until_); now < from) return from;
-  if (load_epoch_ != epoch) {
-    load_epoch_ = epoch;
+  const bool first = std::exchange(load_epoch_, epoch) != epoch;
+  if (!first && now < window_began_ + interval) return window_began_ + interval;
+  window_began_ = now;
+  if (only_overload_.load(std::memory_order_relaxed)) {
+    look_at_overload(now, first);
+  } else if (first) {
     load_.begin(now, sample_load());
-    return now + interval;
-  }
-  if (now < load_.begun() + interval) return load_.begun() + interval;
-  const int maximum = load_maximum_.load(std::memory_order_relaxed);
-  if (const auto hit = load_.end(now, sample_load(), maximum, cores_.load(std::memory_order_relaxed))) {
-    TaskFault& fault = watched_[hit->task].task->fault();
-    if (fault.claim(true)) {
-      FaultRecord& record = fault.record();
-      record.kind = FaultKind::processor_load;
-      record.figure = hit->percent;
-      record.limit = maximum;
-      fault.publish();
-    }
+  } else {
+    end_window(load_, now);
   }
   return now + interval;
+}
+
+// What threads use is asked only of who may have a reason to fear the answer: it costs a system call for
+// each.
+void Supervision::look_at_overload(TimePoint now, bool first) noexcept {
+  const bool suspected = overtaxed() && !first;
+  const bool measured = std::exchange(overload_measured_, suspected) && !first;
+  if (!suspected) return;
+  if (measured) {
+    end_window(overload_, now);
+  } else {
+    overload_.begin(now, sample_load());
+  }
+}
+
+void Supervision::end_window(LoadRule& rule, TimePoint now) noexcept {
+  const int maximum = load_maximum_.load(std::memory_order_relaxed);
+  const auto hit = rule.end(now, sample_load(), maximum, cores_.load(std::memory_order_relaxed));
+  if (!hit) return;
+  TaskFault& fault = watched_[hit->task].task->fault();
+  if (!fault.claim(true)) return;
+  FaultRecord& record = fault.record();
+  record.kind = FaultKind::processor_load;
+  record.figure = hit->percent;
+  record.limit = maximum;
+  fault.publish();
 }
 
 }  // namespace plchost

@@ -56,6 +56,7 @@ class Supervision {
     std::atomic<bool> lenient{false};
     TimePoint struck_since;  // the cycle that was struck
     TimePoint struck_at;
+    Task::Pace pace;  // when overtaxed() was asked last
   };
 
   void run() noexcept;
@@ -64,6 +65,9 @@ class Supervision {
   [[nodiscard]] TimePoint look_at_cycle(Watched& watched, TimePoint since, TimePoint now) noexcept;
   [[nodiscard]] TimePoint look_at_releases(Watched& watched, TimePoint now) noexcept;
   [[nodiscard]] TimePoint look_at_load(TimePoint now) noexcept;
+  void look_at_overload(TimePoint now, bool first) noexcept;
+  void end_window(LoadRule& rule, TimePoint now) noexcept;
+  [[nodiscard]] bool overtaxed() noexcept;
   void strike(Watched& watched, TimePoint since, TimePoint now, FaultKind kind, std::int64_t figure,
               std::int64_t limit) noexcept;
   [[nodiscard]] LoadRule::Sample sample_load() noexcept;
@@ -78,12 +82,16 @@ class Supervision {
   std::atomic<Duration::rep> forgiven_until_{0};
   std::atomic<Duration::rep> load_interval_{0};  // 0: off
   std::atomic<int> load_maximum_{0};
+  std::atomic<bool> only_overload_{false};  // no maximum was set
   std::atomic<int> cores_{1};
 
   // The thread's own.
   TimePoint planned_;         // when it wanted to wake
   TimePoint standstill_end_;  // what ran before stood still
   LoadRule load_;
+  LoadRule overload_;
+  bool overload_measured_ = false;  // since the window began
+  TimePoint window_began_;
   std::vector<Duration> task_times_;
   Duration::rep load_epoch_ = 0;  // the forgiven_until_ after which the window began
   Thread thread_;

@@ -67,7 +67,7 @@ std::optional<LoadRule::Hit> LoadRule::end(TimePoint now, const Sample& sample, 
   std::size_t culprit = 0;
   for (std::size_t i = 0; i < sample.tasks.size(); ++i) {
     const Duration own = sample.tasks[i] - tasks_[i];
-    if (freewheeling_[i]) {
+    if (left_out_[i]) {
       used -= own;
     } else if (own > most) {
       most = own;

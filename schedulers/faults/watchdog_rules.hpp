@@ -69,8 +69,11 @@ class OverrunRule {
   bool forgiven_ = true;
 };
 
-/// The processor load of an instance, window by window. What freewheeling tasks use does not count: they take
-/// what is left and limit themselves. One thread.
+/// The guard against overload hits above this share of the core. The kernel takes it from real-time threads
+/// for 5 % of each second, if it is set as it comes; something else may run on it, too.
+inline constexpr int kOverloadPercent = 90;
+
+/// The processor load of an instance, window by window. What some tasks use does not count. One thread.
 class LoadRule {
  public:
   struct Sample {
@@ -82,17 +85,17 @@ class LoadRule {
     std::size_t task;  ///< that used the most
   };
 
-  explicit LoadRule(std::vector<bool> freewheeling) : freewheeling_(std::move(freewheeling)) {}
+  /// `left_out`: for each task, whether what it uses does not count.
+  explicit LoadRule(std::vector<bool> left_out) : left_out_(std::move(left_out)) {}
 
   /// A window begins with this sample.
   void begin(TimePoint now, const Sample& sample);
   /// A window ends, and the next one begins. `cores`: how many the instance may use. Hits above `maximum`
   /// percent of one core; of several cores, if one thread alone or all together on average use more of one.
   [[nodiscard]] std::optional<Hit> end(TimePoint now, const Sample& sample, int maximum, int cores);
-  [[nodiscard]] TimePoint begun() const noexcept { return begun_; }
 
  private:
-  std::vector<bool> freewheeling_;
+  std::vector<bool> left_out_;
   TimePoint begun_;
   Duration process_{};
   std::vector<Duration> tasks_;

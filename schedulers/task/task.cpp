@@ -73,6 +73,10 @@ std::optional<TimePoint> Task::due() const noexcept {
   return TimePoint(Duration(due_.load(std::memory_order_relaxed)));
 }
 
+Task::Pace Task::pace() const noexcept {
+  return {.lost = lost_.load(std::memory_order_relaxed), .on_time = on_time_.load(std::memory_order_relaxed)};
+}
+
 void Task::set_due(TimePoint due) noexcept {
   due_.store(due.time_since_epoch().count(), std::memory_order_relaxed);
 }
@@ -125,6 +129,9 @@ void Task::run_cycle(const Activation& activation) noexcept {
 
 void Task::record(const Activation& activation, TimePoint start, TimePoint end) noexcept {
   begun_ = true;
+  std::atomic<std::uint64_t>& count = activation.lost_cycles > 0 ? lost_ : on_time_;
+  const std::uint64_t more = activation.lost_cycles > 0 ? activation.lost_cycles : 1;
+  count.store(count.load(std::memory_order_relaxed) + more, std::memory_order_relaxed);
   recorder_.record({.release = activation.release,
                     .start = start,
                     .end = end,

@@ -54,6 +54,13 @@ class Task {
   /// The first release that no cycle has begun for; nothing unless cyclic. Any thread.
   [[nodiscard]] std::optional<TimePoint> due() const noexcept;
 
+  /// Cyclic tasks, since they were made: releases lost, and cycles before which none was. Any thread.
+  struct Pace {
+    std::uint64_t lost = 0;
+    std::uint64_t on_time = 0;
+  };
+  [[nodiscard]] Pace pace() const noexcept;
+
   /// Cyclic tasks: a new interval, from kMinRuntimeInterval to kMaxInterval. The release that is planned now
   /// stays; the grid goes on from there in steps of the new interval, until it is set again: also after an
   /// exchange of the scheduler, and after a stop and start. Called within a cycle it already places the
@@ -98,6 +105,8 @@ class Task {
   TaskFault fault_;
   FaultTrap trap_;
   std::atomic<Duration::rep> due_{0};
+  std::atomic<std::uint64_t> lost_{0};  // these two: one writer, the task's thread
+  std::atomic<std::uint64_t> on_time_{0};
 };
 
 }  // namespace plchost

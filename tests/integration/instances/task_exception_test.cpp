@@ -25,8 +25,8 @@ const std::string kWatchdogs =
 class Faulty {
  public:
   explicit Faulty(const std::string& settings = kWatchdogs, const std::string& scheduler = "CmpSchedule",
-                  const std::string& at_start = {})
-      : process_(sandbox_, arguments(settings, scheduler, at_start)) {
+                  const std::string& at_start = {}, const std::string& band = "normal")
+      : process_(sandbox_, arguments(settings, scheduler, at_start, band)) {
     if (at_start.empty()) process_.wait_until_up();
   }
 
@@ -52,12 +52,14 @@ class Faulty {
  private:
   // All on one core, as it should be: so one task can starve another.
   [[nodiscard]] std::vector<std::string> arguments(const std::string& settings, const std::string& scheduler,
-                                                   const std::string& at_start) const {
+                                                   const std::string& at_start,
+                                                   const std::string& band) const {
     ::setenv("PLC_FAULT_AT_START", at_start.c_str(), 1);
-    return {"--core",        std::to_string(allowed_cores(0).value().back()),
-            "--scheduler",   scheduler,
-            "--settings",    sandbox_.write("line1.cfg", settings),
-            "--application", application("task_faults")};
+    return {"--core",          std::to_string(allowed_cores(0).value().back()),
+            "--scheduler",     scheduler,
+            "--priority-band", band,
+            "--settings",      sandbox_.write("line1.cfg", settings),
+            "--application",   application("task_faults")};
   }
 
   Sandbox sandbox_;
@@ -244,6 +246,19 @@ TEST(TaskException, OfTheLoadNamesTheTaskThatUsedTheMost) {
   EXPECT_EQ(found.kind, "processor load");
   EXPECT_EQ(found.task, "Later");
   expect_stopped_and_reachable(sut, "Later");
+}
+
+// An interval that is shorter than its task's cost: no cycle is long, and nobody below gets the core. In the
+// band below that of the tests that run beside this one.
+TEST(TaskException, OfAnOverloadEndsATaskThatNeverLeavesTheCore) {
+  for (const char* const scheduler : {"CmpScheduleTimer", "CmpScheduleOneShot"}) {
+    Faulty sut("[CmpSchedule]\nWatchdog.DefaultTimeMs=100\n", scheduler, "overload", "low");
+    const auto found = sut.exceptions().front();
+    EXPECT_EQ(found.kind, "processor load");
+    EXPECT_EQ(found.task, "Overload");
+    EXPECT_THAT(found.text, HasSubstr("90"));
+    expect_stopped_and_reachable(sut, "Overload");
+  }
 }
 
 TEST(TaskException, IsKeptWhenTheProcessIsGoneAndCounted) {

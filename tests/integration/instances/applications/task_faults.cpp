@@ -79,6 +79,8 @@ void at_start(plc::Application& app) {
   const char* const fault = std::getenv("PLC_FAULT_AT_START");
   if (fault != nullptr && std::strcmp(fault, "loop") == 0) app.cyclic("FirstLoop", 2, 10ms, loop);
   if (fault != nullptr && std::strcmp(fault, "divide") == 0) app.cyclic("FirstDivide", 2, 10ms, divide);
+  if (fault != nullptr && std::strcmp(fault, "overload") == 0)
+    app.cyclic("Overload", 2, 1us, [] { spin(50us); });
   if (fault != nullptr && std::strcmp(fault, "variable") == 0) {
     app.event("FirstVariable", 2, [] { return (divide(), true); }, [] {});
   }
