@@ -54,22 +54,6 @@ void PoolObject::close() noexcept {
   segment_.reset();
 }
 
-bool PoolObject::valid() const noexcept {
-  return entry_ != nullptr &&
-         Binding::generation(entry_->binding.load(std::memory_order_acquire)) == generation_;
-}
-
-ObjectStatus PoolObject::usable() const noexcept {
-  if (!valid()) return ObjectStatus::gone;
-  return writable_ ? ObjectStatus::done : ObjectStatus::not_permitted;
-}
-
-ObjectStatus SharedEvent::post() const noexcept {
-  const ObjectStatus usable_now = usable();
-  if (usable_now == ObjectStatus::done) entry().event.post();
-  return usable_now;
-}
-
 std::uint64_t SharedEvent::count() const noexcept {
   if (!valid()) return 0;
   const std::uint64_t since = entry().event.count() - entry().first_count.load(std::memory_order_relaxed);

@@ -10,12 +10,11 @@
 #include "shm/base/time.hpp"
 #include "shm/pool/memory_file.hpp"
 #include "shm/pool/pool_event.hpp"
+#include "shm/pool/pool_layout.hpp"
 
 namespace plchost {
 
 class PoolSegment;
-struct ObjectEntry;
-struct ReferenceEntry;
 
 /// What an operation on an object did. The numbers are those of shm/plc_pool.h.
 enum class ObjectStatus : std::uint8_t {
@@ -49,7 +48,10 @@ class PoolObject {
 
   void close() noexcept;
   /// False: closed, or the object was lost.
-  [[nodiscard]] bool valid() const noexcept;
+  [[nodiscard]] bool valid() const noexcept {
+    return entry_ != nullptr &&
+           Binding::generation(entry_->binding.load(std::memory_order_acquire)) == generation_;
+  }
   [[nodiscard]] bool writable() const noexcept { return writable_; }
 
  protected:
@@ -66,7 +68,10 @@ class PoolObject {
     ReferenceEntry& reference_;
   };
 
-  [[nodiscard]] ObjectStatus usable() const noexcept;
+  [[nodiscard]] ObjectStatus usable() const noexcept {
+    if (!valid()) return ObjectStatus::gone;
+    return writable_ ? ObjectStatus::done : ObjectStatus::not_permitted;
+  }
   [[nodiscard]] ObjectEntry& entry() const noexcept { return *entry_; }
 
  private:
@@ -84,7 +89,11 @@ class PoolObject {
 class SharedEvent : public PoolObject {
  public:
   /// One atomic add, and one wake if someone waits.
-  ObjectStatus post() const noexcept;
+  ObjectStatus post() const noexcept {
+    const ObjectStatus now = usable();
+    if (now == ObjectStatus::done) entry().event.post();
+    return now;
+  }
   /// Posts since it was made.
   [[nodiscard]] std::uint64_t count() const noexcept;
   /// Waits until more than `cursor` posts were made, and sets it to their number: what was posted in between
