@@ -95,6 +95,14 @@ const std::string& ObjectPool::name() const noexcept {
   return segment_->name();
 }
 
+std::uint32_t ObjectPool::capacity() const noexcept {
+  return static_cast<std::uint32_t>(segment_->view().entries().size());
+}
+
+std::uint64_t ObjectPool::changes() const noexcept {
+  return segment_->view().header().changes.load(std::memory_order_acquire);
+}
+
 Result<PoolEvent> ObjectPool::create_event(std::string_view name) {
   if (auto valid = check_object_name(name); !valid) return std::unexpected(valid.error());
   const Wanted wanted{.name = name};

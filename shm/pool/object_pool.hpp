@@ -102,6 +102,10 @@ class ObjectPool {
   [[nodiscard]] Result<ObjectInfo> look_at(std::string_view name) const;
 
   [[nodiscard]] const std::string& name() const noexcept;
+  /// How many objects it can hold.
+  [[nodiscard]] std::uint32_t capacity() const noexcept;
+  /// Another number after each call that may have changed something, of any process. Any context.
+  [[nodiscard]] std::uint64_t changes() const noexcept;
 
  private:
   struct Wanted;

@@ -16,7 +16,7 @@ namespace plchost {
 
 class PoolSegment;
 
-/// What an operation on an object did. The numbers are those of shm/plc_pool.h.
+/// What an operation on an object did. The C API has a result for each.
 enum class ObjectStatus : std::uint8_t {
   done = 0,
   timed_out,

@@ -9,6 +9,7 @@ allowed() {
     shm/base) echo "" ;;
     shm/pool) echo "shm/base" ;;
     shm/block_driver) echo "shm/pool shm/base" ;;
+    shm/library) echo "shm/pool shm/base" ;;
     schedulers) echo "shm/base" ;;
     instances/launch) echo "shm/base" ;;
     instances) echo "instances/launch schedulers shm/block_driver shm/pool shm/base" ;;
@@ -21,7 +22,7 @@ allowed() {
 # the longest layer that a path lies in
 layer_of() {
   local layer
-  for layer in shm/base shm/pool shm/block_driver schedulers instances/launch instances api/control api manager; do
+  for layer in shm/base shm/pool shm/block_driver shm/library schedulers instances/launch instances api/control api manager; do
     case "$1" in "$layer"/*) echo "$layer"; return ;; esac
   done
   echo none

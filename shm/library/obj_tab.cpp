@@ -1,0 +1,211 @@
+#include "shm/library/obj_tab.hpp"
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "shm/library/pool_result.hpp"
+
+namespace plchost {
+
+namespace {
+
+// How often this thread holds the guard: std::recursive_timed_mutex does not tell.
+thread_local unsigned held_by_this_thread = 0;
+
+template <class Object>
+std::unique_ptr<plc_sem> handle_of(Result<Object> opened) {
+  if (!opened) return nullptr;
+  auto handle = std::make_unique<plc_sem>();
+  handle->object = *std::move(opened);
+  return handle;
+}
+
+objTabType_t type_in_table(ObjectType type) noexcept {
+  switch (type) {
+    case ObjectType::memory:
+      return e_shm;
+    case ObjectType::event:
+      return e_evt;
+    case ObjectType::semaphore:
+    case ObjectType::mutex:
+      break;
+  }
+  return e_sem;
+}
+
+// Nobody but this table needs it any more.
+bool is_left_over(const ObjectInfo& info) noexcept {
+  return !info.kept && info.reference_count <= 1 && info.bound_tasks == 0;
+}
+
+std::optional<TimePoint> deadline_of(int ticks) noexcept {
+  if (ticks < 0) return std::nullopt;
+  return MonotonicClock::now() + std::chrono::milliseconds(ticks);
+}
+
+STATUS status_of(bool done) noexcept {
+  return done ? OK : ERROR;
+}
+
+STATUS take_guard(std::recursive_timed_mutex& guard, std::optional<TimePoint> deadline) {
+  if (deadline) {
+    if (!guard.try_lock_for(*deadline - MonotonicClock::now())) return ERROR;
+  } else {
+    guard.lock();
+  }
+  ++held_by_this_thread;
+  return OK;
+}
+
+STATUS take(plc_sem& semaphore, std::optional<TimePoint> deadline) {
+  const TimePoint until = deadline.value_or(kNoDeadline);
+  if (auto* const guard = std::get_if<std::recursive_timed_mutex*>(&semaphore.object)) {
+    return take_guard(**guard, deadline);
+  }
+  if (const auto* const counting = std::get_if<SharedSemaphore>(&semaphore.object)) {
+    return status_of(counting->wait(until) == ObjectStatus::done);
+  }
+  if (const auto* const mutex = std::get_if<SharedMutex>(&semaphore.object)) {
+    const ObjectStatus locked = mutex->lock(until);
+    return status_of(locked == ObjectStatus::done || locked == ObjectStatus::owner_died);
+  }
+  // One post for each call, as a semaphore would: wait() sets the cursor to all of them.
+  const auto& event = std::get<SharedEvent>(semaphore.object);
+  std::atomic_ref cursor(semaphore.cursor);
+  for (;;) {
+    std::uint64_t taken = cursor.load();
+    std::uint64_t posted = taken;
+    if (event.wait(posted, until) != ObjectStatus::done) return ERROR;
+    if (cursor.compare_exchange_strong(taken, taken + 1)) return OK;
+  }
+}
+
+STATUS give(plc_sem& semaphore) {
+  if (auto* const guard = std::get_if<std::recursive_timed_mutex*>(&semaphore.object)) {
+    if (held_by_this_thread == 0) return ERROR;
+    --held_by_this_thread;
+    (*guard)->unlock();
+    return OK;
+  }
+  if (const auto* const counting = std::get_if<SharedSemaphore>(&semaphore.object)) {
+    return status_of(counting->post() == ObjectStatus::done);
+  }
+  if (const auto* const mutex = std::get_if<SharedMutex>(&semaphore.object)) {
+    return status_of(mutex->unlock() == ObjectStatus::done);
+  }
+  return status_of(std::get<SharedEvent>(semaphore.object).post() == ObjectStatus::done);
+}
+
+}  // namespace
+
+Result<ObjTab*> ObjTab::of_this_process() {
+  static std::mutex making;
+  static std::unique_ptr<ObjTab> table;
+  const std::lock_guard one_at_a_time(making);
+  if (!table) {
+    auto pool = ObjectPool::attach(pool_name_of(nullptr));
+    if (!pool) return std::unexpected(std::move(pool).error());
+    table.reset(new ObjTab(*std::move(pool)));
+  }
+  return table.get();
+}
+
+// The entries stay where they are for good: walkers of other threads may be on them.
+ObjTab::ObjTab(ObjectPool pool) : pool_(std::move(pool)), guard_handle_{.object = &guard_} {
+  entries_.reserve(pool_.capacity());
+  table_ = {.ulVersion = OBJTAB_VERSION,
+            .hSem = &guard_handle_,
+            .ptEntries = entries_.data(),
+            .ulSize = 0,
+            .ulRefCnt = 1};
+}
+
+objTab_t* ObjTab::look() {
+  const std::lock_guard one_at_a_time(guard_);
+  if (held_by_this_thread == 0 && (rows_.empty() || pool_.changes() != seen_)) refresh();
+  return &table_;
+}
+
+void ObjTab::refresh() {
+  std::map<std::pair<std::string, ObjectType>, std::unique_ptr<Row>> before;
+  for (auto& row : rows_) before[{row->name, row->type}] = std::move(row);
+  rows_.clear();
+  for (const ObjectInfo& info : pool_.list()) {
+    const auto known = before.find({info.name, info.type});
+    if (known == before.end()) {
+      rows_.push_back(open(info));
+    } else if (!is_left_over(info)) {
+      rows_.push_back(std::move(known->second));
+    }
+  }
+  before.clear();
+  std::ranges::sort(rows_, {}, [](const std::unique_ptr<Row>& row) { return std::string_view(row->name); });
+  entries_.clear();
+  for (const auto& row : rows_) {
+    if (entries_.size() < entries_.capacity()) entries_.push_back(entry_of(*row));
+  }
+  table_.ulSize = entries_.size();
+  seen_ = pool_.changes();
+}
+
+std::unique_ptr<ObjTab::Row> ObjTab::open(const ObjectInfo& info) const {
+  auto row = std::make_unique<Row>();
+  row->name = info.name;
+  row->type = info.type;
+  switch (info.type) {
+    case ObjectType::memory:
+      if (auto writable = pool_.open_memory(info.name)) {
+        row->memory = *std::move(writable);
+      } else if (auto readable = pool_.open_memory(info.name, MemoryFile::Access::read_only)) {
+        row->memory = *std::move(readable);
+      }
+      break;
+    case ObjectType::semaphore:
+      row->semaphore = handle_of(pool_.open_semaphore(info.name));
+      break;
+    case ObjectType::mutex:
+      row->semaphore = handle_of(pool_.open_mutex(info.name));
+      break;
+    case ObjectType::event:
+      row->semaphore = handle_of(pool_.open_shared_event(info.name));
+      if (row->semaphore) row->semaphore->cursor = std::get<SharedEvent>(row->semaphore->object).count();
+      break;
+  }
+  return row;
+}
+
+objEntry_t ObjTab::entry_of(Row& row) noexcept {
+  objEntry_t entry{.tType = type_in_table(row.type), .pszName = row.name.data(), .u = {}};
+  if (row.type == ObjectType::memory) {
+    entry.u.tShmEntry = {.ulAddress = reinterpret_cast<unsigned long>(row.memory.bytes().data()),
+                         .ulSize = row.memory.bytes().size()};
+  } else if (row.type == ObjectType::event) {
+    entry.u.tEvtEntry = {.hEvt = row.semaphore.get()};
+  } else {
+    entry.u.tSemEntry = {.hSem = row.semaphore.get()};
+  }
+  return entry;
+}
+
+}  // namespace plchost
+
+objTab_t* plc_obj_tab() {
+  objTab_t* found = nullptr;
+  (void)plchost::guarded([&] {
+    const auto table = plchost::ObjTab::of_this_process();
+    if (!table) return plchost::failed(table.error());
+    found = (*table)->look();
+    return 0;
+  });
+  return found;
+}
+
+STATUS semTake(SEM_ID semId, int timeout) {
+  return semId == nullptr ? ERROR : plchost::take(*semId, plchost::deadline_of(timeout));
+}
+
+STATUS semGive(SEM_ID semId) {
+  return semId == nullptr ? ERROR : plchost::give(*semId);
+}

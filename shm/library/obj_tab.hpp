@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "shm/base/result.hpp"
+#include "shm/plc_obj_tab.h"
+#include "shm/pool/object_pool.hpp"
+
+/// What a SEM_ID of the seed's table leads to: the table's own guard, or an object of the pool.
+struct plc_sem {
+  std::variant<std::recursive_timed_mutex*, plchost::SharedSemaphore, plchost::SharedMutex,
+               plchost::SharedEvent>
+      object;
+  std::uint64_t cursor = 0;  ///< event: posts that were taken
+};
+
+namespace plchost {
+
+/// The seed's table as this process sees the pool: see shm/plc_obj_tab.h.
+class ObjTab {
+ public:
+  /// The one table of this process; made by the first call that finds the pool.
+  [[nodiscard]] static Result<ObjTab*> of_this_process();
+
+  /// Brings it up to date, unless the calling thread holds its guard.
+  [[nodiscard]] objTab_t* look();
+
+ private:
+  /// One object, opened.
+  struct Row {
+    std::string name;
+    ObjectType type = ObjectType::memory;
+    SharedMemory memory;
+    std::unique_ptr<plc_sem> semaphore;
+  };
+
+  explicit ObjTab(ObjectPool pool);
+  void refresh();
+  [[nodiscard]] std::unique_ptr<Row> open(const ObjectInfo& info) const;
+  [[nodiscard]] static objEntry_t entry_of(Row& row) noexcept;
+
+  ObjectPool pool_;
+  std::recursive_timed_mutex guard_;
+  plc_sem guard_handle_;
+  std::vector<std::unique_ptr<Row>> rows_;
+  std::vector<objEntry_t> entries_;
+  objTab_t table_{};
+  std::uint64_t seen_ = 0;
+};
+
+}  // namespace plchost
