@@ -43,12 +43,12 @@ configure() { # configure DIR OPTIONS...
 # Ten files at a time, as most of the work is the headers of others. The plain build shows that each stands alone.
 unity=(-DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=10)
 build_plain() { configure "$build" && cmake --build "$build" -j "$jobs"; }
-build_sanitized() { # build_sanitized DIR SANITIZERS OPTIONS...
-  local dir=$1 sanitizers=$2
-  shift 2
+build_sanitized() { # build_sanitized DIR SANITIZERS TARGET OPTIONS...
+  local dir=$1 sanitizers=$2 target=$3
+  shift 3
   configure "$dir" -DSANITIZER="$sanitizers" -DPLCHOST_BENCH=OFF "${unity[@]}" \
     -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O0 -g1" -DCMAKE_C_FLAGS_DEBUG="-O0 -g1" "$@" &&
-    cmake --build "$dir" -j "$jobs"
+    cmake --build "$dir" -j "$jobs" --target "$target"
 }
 gates() { tests/gates/layers.sh && tests/gates/house.sh && tests/gates/format.sh && tests/gates/prove.sh; }
 
@@ -104,11 +104,11 @@ case "${1:-}" in
     run "tests" tests "$build"
     count
     run "clang-tidy" tidy
-    run "address and undefined sanitizers: build" build_sanitized .build/asan "address;undefined"
+    run "address and undefined sanitizers: build" build_sanitized .build/asan "address;undefined" all
     run "address and undefined sanitizers: tests" tests .build/asan
     count
     # Without the processes: Debian's Cyclone is not compiled for it, and reports from real-time threads stand still.
-    run "thread sanitizer: build" build_sanitized .build/tsan thread -DPLCHOST_INTEGRATION=OFF
+    run "thread sanitizer: build" build_sanitized .build/tsan thread plchost_tests -DPLCHOST_INTEGRATION=OFF
     run "thread sanitizer: tests" tests .build/tsan
     count
     run "fuzzers" fuzz
