@@ -24,6 +24,7 @@
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -108,6 +109,46 @@ struct TaskOptions {
   bool watchdog_stops_task_only = false;
 };
 
+/// Who uses an area; see Plc_Area_Use in plc_app.h.
+struct AreaUse {
+  std::string task;
+  unsigned int offset = 0;  ///< output: the bytes that this task alone writes
+  unsigned int bytes = 0;   ///< 0: none of its own
+};
+
+/// What an area has beyond its name and flags; see Plc_Area in plc_app.h.
+struct AreaOptions {
+  std::vector<AreaUse> uses;  ///< empty: all tasks
+  unsigned long layout = 0;   ///< retain, persistent: another number when T's members mean something else
+};
+
+/// A memory area that holds a T. Empty until it comes from Application::area, and usable from the first cycle
+/// on: an input or output only within cycles of tasks that use it, each of which sees its own copy.
+template <class T>
+class Area {
+  static_assert(std::is_trivially_copyable_v<T>, "an area is copied byte by byte");
+  static_assert(alignof(T) <= 8, "areas are aligned to 8 bytes");
+
+ public:
+  Area() noexcept = default;
+  /// Null: see plc_area_address. Any context.
+  [[nodiscard]] T* get() const noexcept { return static_cast<T*>(plc_area_address(handle_)); }
+  [[nodiscard]] T& operator*() const noexcept { return *get(); }
+  [[nodiscard]] T* operator->() const noexcept { return get(); }
+  /// Any context.
+  [[nodiscard]] Plc_Area_State state() const noexcept {
+    Plc_Area_State state{};
+    state.dwSize = sizeof state;
+    plc_get_area_state(handle_, &state);
+    return state;
+  }
+
+ private:
+  friend class Application;
+  explicit Area(RTS_HANDLE handle) noexcept : handle_(handle) {}
+  RTS_HANDLE handle_ = RTS_INVALID_HANDLE;
+};
+
 /// Both stamps in nanoseconds and of the same instant: see SchedReportReferenceTime. Any context.
 inline RTS_RESULT report_reference_time(std::chrono::nanoseconds reference,
                                         std::chrono::nanoseconds local) noexcept {
@@ -183,6 +224,30 @@ class Application {
       throw std::runtime_error("options of task '" + task + "' are refused: result " +
                                std::to_string(result));
     }
+  }
+
+  /// Declares an area of `flags` (PLC_AREA_...), which begins with `initial` unless its values are kept.
+  template <class T>
+  Area<T> area(const std::string& name, unsigned int flags, const T& initial = T{},
+               const AreaOptions& options = {}) {
+    std::vector<Plc_Area_Use> uses;
+    for (const AreaUse& use : options.uses)
+      uses.push_back({use.task.c_str(), use.offset, use.bytes, nullptr});
+    Plc_Area area{};
+    area.dwSize = sizeof area;
+    area.dwFlags = flags;
+    area.pszName = name.c_str();
+    area.dwBytes = sizeof(T);
+    area.nUses = static_cast<unsigned int>(uses.size());
+    area.pUses = uses.data();
+    area.pInitial = &initial;
+    area.qwLayout = options.layout;
+    RTS_RESULT result = ERR_OK;
+    const RTS_HANDLE handle = plc_declare_area(&area, &result);
+    if (handle == RTS_INVALID_HANDLE) {
+      throw std::runtime_error("area '" + name + "' is refused: result " + std::to_string(result));
+    }
+    return Area<T>(handle);
   }
 
   /// Registers an own event ("ready"), or gives access to one of another instance ("packer1/product").

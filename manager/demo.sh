@@ -16,6 +16,7 @@ build=.build/demo
 plcctl="$PWD/$build/bin/plcctl"
 work=$(mktemp -d "${TMPDIR:-/tmp}/plchost-demo.XXXXXX")
 manager=
+terminal=
 export PLCHOST_DOMAIN=${PLCHOST_DOMAIN:-42}
 export PLCHOST_HOST=demo
 
@@ -44,8 +45,13 @@ stop_manager() {
   if [ -n "$manager" ] && kill -TERM "$manager" 2>/dev/null; then wait "$manager" || true; fi
   manager=
 }
+stop_terminal() {
+  if [ -n "$terminal" ] && kill -TERM "$terminal" 2>/dev/null; then wait "$terminal" || true; fi
+  terminal=
+}
 clean_up() {
   stop_manager
+  stop_terminal
   rm -rf "$work"
 }
 trap clean_up EXIT
@@ -74,6 +80,7 @@ cat >"$work/demo.toml" <<EOF
 name = "demo"
 dds_domain = $PLCHOST_DOMAIN
 run_directory = "$work/run"
+state_directory = "$work/state"
 pool = "plchost-demo-$$"
 cores = [$(IFS=,; echo "${cores[*]}")]
 
@@ -103,7 +110,18 @@ after = ["line1"]
 share_core = true
 EOF
 
-printf '[CmpSchedule]\nTask.Freewheeling.Cycletime=5\n' >"$work/packer1.cfg"
+cat >"$work/packer1.cfg" <<'EOF'
+[CmpSchedule]
+Task.Freewheeling.Cycletime=5
+; Inputs and outputs are those of an I/O terminal.
+[SysMem]
+Linux.Area.0.Flags=0x4
+Linux.Area.0.Object=terminal1.in
+Linux.Area.0.Size=128
+Linux.Area.1.Flags=0x8
+Linux.Area.1.Object=terminal1.out
+Linux.Area.1.Size=128
+EOF
 
 title "start: one manager, three control programs, three schedulers, cores ${cores[*]}"
 "$build/bin/plchostd" --config "$work/demo.toml" 2>"$work/log" &
@@ -125,6 +143,14 @@ sleep 0.5
 after=$(task packer1/Product cycles)
 echo "cycles of packer1/Product: $before before, $after after: $((after - before)) ran, $(task packer1/Product lost_events) events lost"
 [ $((after - before)) -eq 1000 ] || fail "not exactly 1,000 cycles"
+
+title "an I/O terminal as firmware: 64 channels, in a process that knows one C header"
+"$build/bin/io_terminal" --pool "plchost-demo-$$" --name terminal1 >"$work/terminal" &
+terminal=$!
+# Channels 0 to 2 show what the packer has counted: 1,000 products are 83 cartons, 13 layers, 2 pallets.
+shows_figures() { tail -n 1 "$work/terminal" | grep -q "driven; channel out/in: 83/83 13/13 2/2"; }
+until_true 20 "the packer's figures on the terminal" shows_figures
+tail -n 1 "$work/terminal"
 
 title "SIGKILL to an instance: it comes back, the others do not notice"
 # A stall of the whole machine loses cycles everywhere, with or without us: then the show is repeated.
@@ -169,6 +195,7 @@ EOF
 fi
 
 title "stop"
+stop_terminal
 stop_manager
 if ls /dev/shm | grep -q "plchost-demo-$$"; then fail "something was left in /dev/shm"; fi
 echo "manager, instances and API server ended; nothing is left in /dev/shm"

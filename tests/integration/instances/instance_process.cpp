@@ -18,6 +18,7 @@
 #include <unistd.h>
 
 #include "instances/launch/launch_contract.hpp"
+#include "shm/pool/reference_clock.hpp"
 
 namespace plchost::testing {
 
@@ -53,6 +54,7 @@ Sandbox::~Sandbox() {
   ObjectPool::remove(pool_);
   InstancePage::remove(pool_, "line1");
   TransitionRing::remove(pool_, "line1");
+  remove_pool_memories(pool_);
   std::error_code ignored;
   std::filesystem::remove_all(folder_, ignored);
 }

@@ -37,6 +37,15 @@ static_assert(offsetof(Task_Options, dwWatchdogSensitivity) == 24);
 static_assert(offsetof(Task_Options, dwWatchdogOmittedCycles) == 28);
 static_assert(offsetof(Task_Options, nWatchdogPolicy) == 32);
 static_assert(sizeof(Task_Options) == 40);
+static_assert(offsetof(Plc_Area_Use, dwOffset) == 8 && offsetof(Plc_Area_Use, dwBytes) == 12);
+static_assert(offsetof(Plc_Area_Use, ppAddress) == 16 && sizeof(Plc_Area_Use) == 24);
+static_assert(offsetof(Plc_Area, dwFlags) == 4 && offsetof(Plc_Area, pszName) == 8);
+static_assert(offsetof(Plc_Area, dwBytes) == 16 && offsetof(Plc_Area, nUses) == 20);
+static_assert(offsetof(Plc_Area, pUses) == 24 && offsetof(Plc_Area, pInitial) == 32);
+static_assert(offsetof(Plc_Area, qwLayout) == 40 && offsetof(Plc_Area, ppAddress) == 48);
+static_assert(sizeof(Plc_Area) == 56);
+static_assert(offsetof(Plc_Area_State, dwOrigin) == 4 && offsetof(Plc_Area_State, qwImages) == 8);
+static_assert(offsetof(Plc_Area_State, qwUnsaved) == 32 && sizeof(Plc_Area_State) == 40);
 
 TEST(Abi, NumbersTheKindsOfTaskAsTheSeedDoes) {
   EXPECT_EQ(Cyclic, 0);

@@ -1,0 +1,321 @@
+// The memory areas of real instances, beside firmware in processes of its own, under kill -9.
+#include <array>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "shm/plc_process_image.h"
+#include "shm/pool/reference_clock.hpp"
+#include "tests/integration/instances/instance_process.hpp"
+
+namespace plchost::testing {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+constexpr std::size_t kWords = 256;
+using Words = std::array<std::uint64_t, kWords>;
+struct Outputs {
+  Words fast;
+  Words slow;
+};
+
+bool is_whole(const Words& words) {
+  return std::ranges::all_of(words, [&](std::uint64_t word) { return word == words[0]; });
+}
+
+/// A process that runs `body` until it is killed. `body` returns only when something is wrong.
+class Firmware {
+ public:
+  template <class Body>
+  explicit Firmware(const Body& body) : pid_(::fork()) {
+    if (pid_ != 0) return;
+    body();
+    ::_exit(1);
+  }
+  ~Firmware() { kill(); }
+  Firmware(const Firmware&) = delete;
+  Firmware& operator=(const Firmware&) = delete;
+
+  /// false: it had ended before, because something was wrong.
+  bool kill() {
+    if (pid_ < 0) return true;
+    ::kill(pid_, SIGKILL);
+    int status = 0;
+    ::waitpid(std::exchange(pid_, -1), &status, 0);
+    return WIFSIGNALED(status);
+  }
+
+ private:
+  pid_t pid_;
+};
+
+/// What the application says about itself.
+struct Report {
+  unsigned long torn = 0, input = 0, missed = 0, late = 0, begun = 0, persistent = 0, data = 0, saves = 0;
+  unsigned origin = 0;
+};
+
+class AreasOf : public ::testing::Test {
+ protected:
+  ~AreasOf() override {
+    sut.reset();
+    remove_pool_memories(sandbox.pool());
+  }
+
+  void start(const std::string& settings, std::vector<std::string> more = {}) {
+    sut.reset();
+    more.insert(more.end(), {"--settings", sandbox.write("line1.cfg", settings), "--application",
+                             application("areas"), "--state-directory", state_directory()});
+    sut.emplace(sandbox, more);
+  }
+  void start_well(const std::string& settings = {}, std::vector<std::string> more = {}) {
+    start(settings, std::move(more));
+    sut->wait_until_up();
+  }
+  [[nodiscard]] std::string state_directory() const { return sandbox.folder() + "/state"; }
+  [[nodiscard]] Report report() {
+    const auto reports = [&] {
+      const std::string log = sut->log();
+      std::size_t count = 0;
+      for (std::size_t at = log.find("torn "); at != std::string::npos; at = log.find("torn ", at + 1))
+        ++count;
+      return count;
+    };
+    const std::size_t before = reports();
+    (void)sut->event("report").post();
+    EXPECT_TRUE(eventually([&] { return reports() > before; })) << sut->log();
+    const std::string log = sut->log();
+    Report said;
+    std::sscanf(
+        log.c_str() + log.rfind("torn "),
+        "torn %lu input %lu missed %lu late %lu begun %lu persistent %lu data %lu origin %u saves %lu",
+        &said.torn, &said.input, &said.missed, &said.late, &said.begun, &said.persistent, &said.data,
+        &said.origin, &said.saves);
+    return said;
+  }
+  void power_cut() {
+    sut->end(SIGKILL);
+    remove_pool_memories(sandbox.pool());
+  }
+
+  static constexpr const char* kTerminal =
+      "[SysMem]\nLinux.Area.0.Flags=0x4\nLinux.Area.0.Object=io.in\nLinux.Area.0.Size=2048\n"
+      "Linux.Area.1.Flags=0x8\nLinux.Area.1.Object=io.out\nLinux.Area.1.Size=4096\n";
+  Sandbox sandbox;
+  std::optional<InstanceProcess> sut;
+};
+
+TEST_F(AreasOf, AnInstanceAreWholeForAllWhoReadThemUnderKills) {
+  start_well(kTerminal);
+  const std::string pool = sandbox.pool();
+  const auto write_inputs = [&] {
+    plc_image image;
+    if (plc_image_open(pool.c_str(), "io.in", sizeof(Words), PLC_IMAGE_WRITE, &image) != 0) return;
+    Words words{};
+    for (std::uint64_t n = plc_image_sequence(&image) + 1;; ++n) {
+      words.fill(n);
+      plc_image_write(&image, words.data());
+    }
+  };
+  const auto read_outputs = [&] {
+    plc_image image;
+    if (plc_image_open(pool.c_str(), "io.out", sizeof(Outputs), PLC_IMAGE_READ, &image) != 0) return;
+    Outputs outputs{};
+    for (;;) {
+      if (plc_image_read(&image, &outputs, nullptr) != PLC_IMAGE_OK) continue;
+      if (!is_whole(outputs.fast) || !is_whole(outputs.slow)) return;
+    }
+  };
+  std::uint64_t before = 0;
+  for (int round = 0; round < 40; ++round) {
+    Firmware writer(write_inputs);
+    Firmware reader(read_outputs);
+    const auto fast = sut->task("Fast")->counters.cycles;
+    ASSERT_TRUE(eventually([&] { return sut->task("Fast")->counters.cycles > fast + 20; }));
+    EXPECT_TRUE(reader.kill()) << "it saw half a cycle";
+    EXPECT_TRUE(writer.kill()) << "it could not have the image";
+  }
+  const Report said = report();
+  EXPECT_EQ(said.torn, 0U);
+  EXPECT_EQ(said.late, 0U);
+  EXPECT_GT(said.input, before);
+  std::printf("input image %lu, %lu cycles kept the one before\n", said.input, said.missed);
+}
+
+TEST_F(AreasOf, AnInstanceThatIsKilledInACycleAreWholeAndGoOn) {
+  plc_image image;
+  std::uint64_t before = 0;
+  for (int round = 0; round < 5; ++round) {
+    start_well(kTerminal);
+    if (round == 0) {
+      ASSERT_EQ(plc_image_open(sandbox.pool().c_str(), "io.out", sizeof(Outputs), PLC_IMAGE_READ, &image), 0);
+    }
+    Outputs outputs{};
+    ASSERT_TRUE(eventually([&] { return plc_image_sequence(&image) > before + 50; }));
+    sut->end(SIGKILL);
+    before = plc_image_sequence(&image);
+    plc_image_i64 stamp = 0;
+    ASSERT_EQ(plc_image_read(&image, &outputs, &stamp), PLC_IMAGE_OK);
+    EXPECT_TRUE(is_whole(outputs.fast));
+    EXPECT_TRUE(is_whole(outputs.slow));
+    EXPECT_EQ(plc_image_gone(&image, sandbox.pool().c_str(), "io.out"), 0)
+        << "the next process goes on with it";
+  }
+  plc_image_close(&image);
+}
+
+TEST_F(AreasOf, OutputsOfTwoInstancesInOneObjectAreRefused) {
+  start_well(kTerminal);
+  InstanceProcess second(sandbox, {"--name", "line2", "--settings", sandbox.write("line2.cfg", kTerminal),
+                                   "--application", application("areas")});
+  EXPECT_EQ(second.end(), 3);
+  EXPECT_THAT(second.log(),
+              AllOf(HasSubstr("line2.cfg:5: [SysMem] Area.1"), HasSubstr("has a writer already")));
+}
+
+TEST_F(AreasOf, ObjectThatIsEmptiedUnderARunningInstanceStopsNoTask) {
+  start_well(kTerminal);
+  const std::string file =
+      fmt::format("{}/{}", MemoryFile::kDirectory, pool_memory_name(sandbox.pool(), "io.in"));
+  fs::resize_file(file, 0);
+  const auto fast = sut->task("Fast")->counters.cycles;
+  EXPECT_TRUE(eventually([&] { return sut->task("Fast")->counters.cycles > fast + 20; }));
+  EXPECT_EQ(sut->end(SIGTERM), 0);
+}
+
+TEST_F(AreasOf, AFileLieAtTheirAddressInIt) {
+  const std::string file = sandbox.write("device", std::string(8192, '\0'));
+  start_well(
+      fmt::format("[SysMem]\nLinux.Area.0.Flags=0x8000\nLinux.Area.0.Address=0x1010\n"
+                  "Linux.Area.0.Size=8\nLinux.Area.0.Device={}\n",
+                  file));
+  const auto value = [&] {
+    std::ifstream stream(file, std::ios::binary);
+    stream.seekg(0x1010);
+    std::uint64_t word = 0;
+    stream.read(reinterpret_cast<char*>(&word), sizeof word);
+    return word;
+  };
+  EXPECT_TRUE(eventually([&] { return value() > 120; }));
+}
+
+TEST_F(AreasOf, WhatCannotBePlacedIsRefusedWithItsLine) {
+  const std::string file = sandbox.write("device", std::string(4096, '\0'));
+  const auto log_with = [&](const std::string& settings) {
+    start("[SysMem]\n" + settings);
+    EXPECT_EQ(sut->end(), 3);
+    return sut->log();
+  };
+  const std::string area =
+      "Linux.Area.0.Flags=0x8000\nLinux.Area.0.Address=0x1000\nLinux.Area.0.Device=" + file + "\n";
+  EXPECT_THAT(log_with(area + "Linux.Area.0.Size=8\n"),
+              HasSubstr("line1.cfg:2: [SysMem] Area.0: 0x8 bytes at 0x1000 of " + file +
+                        ": the file ends at 0x1000"));
+  EXPECT_THAT(
+      log_with("Linux.Area.0.Flags=0x8000\nLinux.Area.0.Object=o\nLinux.Area.0.Size=7\n"),
+      HasSubstr("line1.cfg:2: [SysMem] Area.0: area 'data' of the application has 8 bytes, 7 of the 7"));
+  EXPECT_THAT(log_with("Linux.Area.0.Flags=0x8000\nLinux.Area.0.Address=0\nLinux.Area.0.Device=/dev/none\n"
+                       "Linux.Area.0.Size=8\n"),
+              HasSubstr("line1.cfg:2: [SysMem] Area.0: 0x8 bytes at 0x0 of /dev/none: cannot be opened"));
+}
+
+TEST_F(AreasOf, RetainLoseNothingWithTheProcess) {
+  start_well();
+  std::uint64_t least = 100;
+  for (int round = 0; round < 10; ++round) {
+    ASSERT_TRUE(eventually([&] { return sut->task("Fast")->counters.cycles > 20; }));
+    const auto cycles = sut->task("Fast")->counters.cycles;
+    sut->end(SIGKILL);
+    start_well("", {"--start-kind", "after-fault"});
+    least += cycles;
+    const Report said = report();
+    EXPECT_GE(said.begun, least);
+    EXPECT_GE(said.persistent + 1, least) << "at most the cycle in which it was killed";
+    EXPECT_EQ(said.origin, 1U);
+    least = said.begun;
+    sut->end(SIGKILL);
+    start_well();
+  }
+}
+
+TEST_F(AreasOf, RetainLoseAtMostAnIntervalWithThePower) {
+  start_well("[Retain]\nIntervalMs=20\n");
+  for (int round = 0; round < 5; ++round) {
+    Report last = report();
+    ASSERT_TRUE(eventually([&] { return report().saves >= 3; }));
+    // What was there three intervals ago has been written since.
+    const Report then = report();
+    ASSERT_TRUE(eventually([&] { return report().saves >= then.saves + 2; }));
+    power_cut();
+    start_well("[Retain]\nIntervalMs=20\n");
+    const Report said = report();
+    EXPECT_GE(said.begun, then.begun);
+    EXPECT_GE(said.persistent, then.persistent);
+    EXPECT_EQ(said.origin, 2U);
+    EXPECT_LT(said.data, said.persistent) << "what is not kept begins anew";
+    EXPECT_GE(then.begun, last.begun);
+  }
+}
+
+TEST_F(AreasOf, RetainHaveTheirLastValuesAfterAnOrderlyEnd) {
+  start_well("[Retain]\nIntervalMs=3600000\n");
+  ASSERT_TRUE(eventually([&] { return sut->task("Fast")->counters.cycles > 50; }));
+  EXPECT_EQ(sut->ask(ControlVerb::stop).code, ErrorCode::ok);
+  const auto cycles = sut->task("Fast")->counters.cycles;
+  EXPECT_EQ(sut->end(SIGTERM), 0);
+  remove_pool_memories(sandbox.pool());
+  start("", {"--stopped"});
+  sut->wait_until_up(false);
+  EXPECT_EQ(sut->end(SIGTERM), 0);
+  start_well();
+  EXPECT_GE(report().begun, 100 + cycles);
+}
+
+TEST_F(AreasOf, ColdResetInitialisesRetainAndKeepsPersistent) {
+  start_well();
+  ASSERT_TRUE(eventually([&] { return sut->task("Fast")->counters.cycles > 500; }));
+  const Report before = report();
+  EXPECT_EQ(sut->end(SIGTERM), 0);
+  start_well("", {"--start-kind", "cold"});
+  const Report said = report();
+  EXPECT_LT(said.begun, before.begun);
+  EXPECT_GT(said.persistent, before.persistent);
+}
+
+TEST_F(AreasOf, AnotherApplicationIsRefusedWithTheSetting) {
+  start_well();
+  EXPECT_EQ(sut->end(SIGTERM), 0);
+  const std::string settings = sandbox.write("other.cfg", "[Retain]\nMismatch=Refuse\n");
+  InstanceProcess other(sandbox, {"--settings", settings, "--application", application("areas_other"),
+                                  "--state-directory", state_directory()});
+  EXPECT_EQ(other.end(), 3);
+  EXPECT_THAT(other.log(), HasSubstr("of another layout: area 'kept' has another layout"));
+}
+
+TEST_F(AreasOf, TwoProcessesDoNotShareRetainFiles) {
+  start_well();
+  InstanceProcess second(
+      sandbox, {"--pool", sandbox.pool() + "-2", "--application", application("areas"), "--state-directory",
+                state_directory(), "--run-directory", ""});
+  EXPECT_NE(second.end(), 0);
+  EXPECT_THAT(second.log(), HasSubstr("is held by another process"));
+  ObjectPool::remove(sandbox.pool() + "-2");
+  remove_pool_memories(sandbox.pool() + "-2");
+}
+
+}  // namespace
+}  // namespace plchost::testing
