@@ -178,7 +178,7 @@ Result<std::string> Instance::load_application() {
 Result<std::string> Instance::place_areas() {
   const LaunchOptions& launch = options_.launch;
   const std::string& directory = settings_.retain.directory;
-  return host_->areas().place({.pool = launch.pool,
+  return host_->areas().place({.pool = *pool_,
                                .instance = launch.name,
                                .application = application_->name(),
                                .settings = settings_.areas,

@@ -11,7 +11,7 @@
 #include <unistd.h>
 
 #include "shm/base/system_call.hpp"
-#include "shm/pool/reference_clock.hpp"
+#include "shm/pool/memory_file.hpp"
 
 namespace plchost {
 
@@ -39,28 +39,17 @@ Result<UniqueFd> open_device(const AreaSettings& settings) {
   return fd;
 }
 
-struct Opened {
-  MemoryFile memory;
-  bool existed = false;
-};
-
-Result<MemoryFile> open_existing(const std::string& file, std::size_t bytes) {
+Result<MemoryFile> open_file(const std::string& file, std::size_t bytes) {
   // Firmware that makes one gives it its name first and its size then.
   if (auto filled = MemoryFile::fill_empty(file, bytes); !filled) return std::unexpected(filled.error());
   return MemoryFile::open(file, 1, MemoryFile::Access::read_write);
 }
 
-Result<Opened> open_or_make(const std::string& file, std::size_t bytes) {
-  constexpr int kAttempts = 10;  // each one fails only if another process makes or removes it in between
-  for (int attempt = 1;; ++attempt) {
-    auto memory = open_existing(file, bytes);
-    const bool existed = memory || memory.error().code != ErrorCode::not_found;
-    if (!existed) memory = MemoryFile::create(file, bytes);
-    if (memory) return Opened{.memory = *std::move(memory), .existed = existed};
-    const bool again =
-        memory.error().code == ErrorCode::already_exists || memory.error().code == ErrorCode::not_found;
-    if (!again || attempt == kAttempts) return std::unexpected(memory.error());
-  }
+std::unexpected<Error> wrong_size(const std::string& file, std::size_t has, std::size_t needed) {
+  return failure(
+      ErrorCode::wrong_size,
+      fmt::format("shared memory {} has {} bytes, {} are needed; remove it, or choose another name", file,
+                  has, needed));
 }
 
 // The kernel takes it back when the process ends, however it ends.
@@ -80,6 +69,7 @@ AreaMemory::AreaMemory(AreaMemory&& other) noexcept
     : mapping_(std::exchange(other.mapping_, {})),
       bytes_(std::exchange(other.bytes_, {})),
       file_(std::move(other.file_)),
+      shared_(std::move(other.shared_)),
       lock_(std::move(other.lock_)),
       guard_(std::move(other.guard_)),
       existed_(other.existed_) {}
@@ -88,6 +78,7 @@ AreaMemory& AreaMemory::operator=(AreaMemory&& other) noexcept {
   std::swap(mapping_, other.mapping_);
   std::swap(bytes_, other.bytes_);
   std::swap(file_, other.file_);
+  std::swap(shared_, other.shared_);
   std::swap(lock_, other.lock_);
   std::swap(guard_, other.guard_);
   std::swap(existed_, other.existed_);
@@ -132,45 +123,63 @@ Result<AreaMemory> AreaMemory::of_device(const AreaSettings& settings) {
   return memory;
 }
 
-Result<AreaMemory> AreaMemory::of_pool(const std::string& pool, const std::string& name, std::size_t bytes,
+Result<AreaMemory> AreaMemory::of_pool(ObjectPool& pool, const std::string& name, std::size_t bytes,
                                        bool exclusive) {
-  const std::string file = pool_memory_name(pool, name);
-  auto opened = open_or_make(file, bytes);
-  if (!opened) return std::unexpected(std::move(opened).error());
-  if (opened->memory.bytes().size() != bytes) {
-    return failure(
-        ErrorCode::wrong_state,
-        fmt::format("shared memory {} has {} bytes, {} are needed; remove it, or choose another name", file,
-                    opened->memory.bytes().size(), bytes));
-  }
+  const std::string file = pool_memory_name(pool.name(), name);
   AreaMemory memory;
+  auto shared = pool.open_memory(name);
+  const bool none = !shared && shared.error().code == ErrorCode::not_found;
+  if (!shared && !none) return std::unexpected(std::move(shared).error());
+  auto alone = none ? of_file(file, bytes) : Result<AreaMemory>();
+  if (none && alone) {
+    memory = *std::move(alone);
+  } else if (none && alone.error().code != ErrorCode::not_found) {
+    return alone;
+  } else {
+    if (none) {
+      auto created = pool.create_memory(name, bytes, {.keep = true});
+      if (!created) return std::unexpected(std::move(created).error());
+      memory.existed_ = !created->made;
+      shared = std::move(created->object);
+    } else {
+      memory.existed_ = true;
+    }
+    memory.shared_ = *std::move(shared);
+    memory.bytes_ = memory.shared_.bytes();
+    if (memory.bytes_.size() != bytes) return wrong_size(file, memory.bytes_.size(), bytes);
+  }
   if (exclusive) {
     auto lock = lock_file_of(file);
     if (!lock) return std::unexpected(std::move(lock).error());
     memory.lock_ = *std::move(lock);
   }
-  memory.existed_ = opened->existed;
-  if (auto held = memory.hold(std::move(opened->memory), file); !held) return std::unexpected(held.error());
   return memory;
 }
 
-Result<AreaMemory> AreaMemory::new_in_pool(const std::string& pool, const std::string& name,
-                                           std::size_t bytes, const MemoryFile::Fill& fill) {
-  const std::string file = pool_memory_name(pool, name);
+Result<AreaMemory> AreaMemory::of_file(const std::string& file, std::size_t bytes) {
+  auto opened = open_file(file, bytes);
+  if (!opened) return std::unexpected(std::move(opened).error());
+  auto memory = of(*std::move(opened), file, bytes);
+  if (memory) memory->existed_ = true;
+  return memory;
+}
+
+Result<AreaMemory> AreaMemory::new_file(const std::string& file, std::size_t bytes,
+                                        const MemoryFile::Fill& fill) {
   auto made = MemoryFile::replace(file, bytes, fill);
   if (!made) return std::unexpected(std::move(made).error());
-  AreaMemory memory;
-  if (auto held = memory.hold(*std::move(made), file); !held) return std::unexpected(held.error());
-  return memory;
+  return of(*std::move(made), file, bytes);
 }
 
-Result<void> AreaMemory::hold(MemoryFile file, const std::string& name) {
-  file_ = std::move(file);
-  bytes_ = file_.bytes();
-  guard_ = MemoryGuard(bytes_);
-  if (guard_) return {};
+Result<AreaMemory> AreaMemory::of(MemoryFile opened, const std::string& file, std::size_t bytes) {
+  AreaMemory memory;
+  memory.file_ = std::move(opened);
+  memory.bytes_ = memory.file_.bytes();
+  if (memory.bytes_.size() != bytes) return wrong_size(file, memory.bytes_.size(), bytes);
+  memory.guard_ = MemoryGuard(memory.bytes_);
+  if (memory.guard_) return memory;
   return failure(ErrorCode::full,
-                 fmt::format("shared memory {}: more than {} memories of others", name, MemoryGuard::kMost));
+                 fmt::format("shared memory {}: more than {} memories of others", file, MemoryGuard::kMost));
 }
 
 }  // namespace plchost

@@ -52,7 +52,7 @@ class Areas {
  public:
   /// Who is asked for memory, and where it is kept.
   struct Environment {
-    std::string pool;
+    ObjectPool& pool;
     std::string instance;
     std::string application;  ///< its name
     std::span<const AreaSettings> settings;

@@ -128,7 +128,8 @@ Result<void> Areas::make_keeper(const Environment& environment) {
                    fmt::format("the retain and persistent areas have {} bytes, {} are allowed",
                                initial.layout.bytes, kMaxRetainBytes));
   }
-  auto keeper = RetainKeeper::make(environment.pool, environment.instance, initial, environment.retain);
+  auto keeper =
+      RetainKeeper::make(environment.pool.name(), environment.instance, initial, environment.retain);
   if (!keeper) return std::unexpected(std::move(keeper).error());
   keeper_ = *std::move(keeper);
   return {};

@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 
 #include "shm/base/names.hpp"
-#include "shm/pool/reference_clock.hpp"
+#include "shm/pool/memory_file.hpp"
 
 namespace plchost {
 
@@ -100,7 +100,7 @@ std::optional<KeptMemory::Left> KeptMemory::left_behind(const std::string& pool,
 
 Result<KeptMemory> KeptMemory::take_over(const std::string& pool, const std::string& name,
                                          const RetainLayout& layout) {
-  auto memory = AreaMemory::of_pool(pool, name, bytes_for(layout.bytes), false);
+  auto memory = AreaMemory::of_file(pool_memory_name(pool, name), bytes_for(layout.bytes));
   if (!memory) return std::unexpected(std::move(memory).error());
   KeptMemory kept(*std::move(memory));
   for (CycleCounter& counter : kept.header().counters) counter.store(0, std::memory_order_relaxed);
@@ -127,7 +127,7 @@ Result<KeptMemory> KeptMemory::make(const std::string& pool, const std::string& 
     std::ranges::copy(image.data, bytes.begin() + sizeof(Header));
     return {};
   };
-  auto memory = AreaMemory::new_in_pool(pool, name, bytes_for(image.layout.bytes), fill);
+  auto memory = AreaMemory::new_file(pool_memory_name(pool, name), bytes_for(image.layout.bytes), fill);
   if (!memory) return std::unexpected(std::move(memory).error());
   return KeptMemory(*std::move(memory));
 }

@@ -2,6 +2,7 @@
 #include <array>
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -16,7 +17,7 @@
 #include <unistd.h>
 
 #include "shm/plc_process_image.h"
-#include "shm/pool/reference_clock.hpp"
+#include "shm/pool/memory_file.hpp"
 #include "tests/integration/instances/instance_process.hpp"
 
 namespace plchost::testing {
@@ -87,18 +88,19 @@ class AreasOf : public ::testing::Test {
     sut->wait_until_up();
   }
   [[nodiscard]] std::string state_directory() const { return sandbox.folder() + "/state"; }
-  [[nodiscard]] Report report() {
+  [[nodiscard]] Report report() { return report_of(*sut); }
+  static Report report_of(InstanceProcess& instance) {
     const auto reports = [&] {
-      const std::string log = sut->log();
+      const std::string log = instance.log();
       std::size_t count = 0;
       for (std::size_t at = log.find("torn "); at != std::string::npos; at = log.find("torn ", at + 1))
         ++count;
       return count;
     };
     const std::size_t before = reports();
-    (void)sut->event("report").post();
-    EXPECT_TRUE(eventually([&] { return reports() > before; })) << sut->log();
-    const std::string log = sut->log();
+    (void)instance.event("report").post();
+    EXPECT_TRUE(eventually([&] { return reports() > before; })) << instance.log();
+    const std::string log = instance.log();
     Report said;
     std::sscanf(
         log.c_str() + log.rfind("torn "),
@@ -308,13 +310,71 @@ TEST_F(AreasOf, AnotherApplicationIsRefusedWithTheSetting) {
 
 TEST_F(AreasOf, TwoProcessesDoNotShareRetainFiles) {
   start_well();
-  InstanceProcess second(
-      sandbox, {"--pool", sandbox.pool() + "-2", "--application", application("areas"), "--state-directory",
-                state_directory(), "--run-directory", ""});
+  InstanceProcess second(sandbox, {"--pool", sandbox.pool() + "-2", "--application", application("areas"),
+                                   "--state-directory", state_directory(), "--run-directory", ""});
   EXPECT_NE(second.end(), 0);
   EXPECT_THAT(second.log(), HasSubstr("is held by another process"));
   ObjectPool::remove(sandbox.pool() + "-2");
   remove_pool_memories(sandbox.pool() + "-2");
+}
+
+/// A file system of its own in a file, mounted as long as this lives.
+class LoopMount {
+ public:
+  LoopMount(std::string image, std::string folder) : folder_(std::move(folder)) {
+    fs::create_directories(folder_);
+    mounted_ = run(fmt::format("mount -o loop '{}' '{}' 2>/dev/null", image, folder_));
+  }
+  ~LoopMount() {
+    if (mounted_) {
+      EXPECT_TRUE(run(fmt::format("umount '{}'", folder_)));
+    }
+  }
+  LoopMount(const LoopMount&) = delete;
+  LoopMount& operator=(const LoopMount&) = delete;
+  [[nodiscard]] bool mounted() const { return mounted_; }
+  [[nodiscard]] const std::string& folder() const { return folder_; }
+
+  // NOLINTNEXTLINE(cert-env33-c): a test's own command
+  static bool run(const std::string& command) { return std::system(command.c_str()) == 0; }
+
+ private:
+  std::string folder_;
+  bool mounted_ = false;
+};
+
+// What lies on the disk at some moment is what a loss of power leaves of it: the file system's own cache is
+// not in the copy.
+TEST_F(AreasOf, RetainOnADiskThatLosesItsPowerHaveWhatWasWrittenLast) {
+  const std::string image = sandbox.folder() + "/disk";
+  std::ofstream(image).close();
+  fs::resize_file(image, 16U << 20U);
+  if (!LoopMount::run("mkfs.ext4 -q -F '" + image + "' >/dev/null 2>&1"))
+    GTEST_SKIP() << "there is no mkfs.ext4";
+  std::optional<LoopMount> disk(std::in_place, image, sandbox.folder() + "/state");
+  if (!disk->mounted()) GTEST_SKIP() << "this place allows no mounts";
+  start_well("[Retain]\nIntervalMs=10\n");
+  for (int round = 0; round < 8; ++round) {
+    const Report then = report();
+    ASSERT_TRUE(eventually([&] { return report().saves >= then.saves + 2; }));
+    const std::string cut = fmt::format("{}/cut{}", sandbox.folder(), round);
+    ::kill(sut->pid(), SIGSTOP);
+    fs::copy_file(image, cut);
+    ::kill(sut->pid(), SIGCONT);
+    const Sandbox after_cut;
+    const LoopMount other(cut, sandbox.folder() + "/after");
+    ASSERT_TRUE(other.mounted()) << "its journal is played back";
+    InstanceProcess next(after_cut,
+                         {"--application", application("areas"), "--state-directory", other.folder()});
+    next.wait_until_up();
+    const Report said = report_of(next);
+    EXPECT_EQ(said.origin, 2U) << next.log();
+    EXPECT_GE(said.begun, then.begun);
+    EXPECT_GE(said.persistent, then.persistent);
+    next.end(SIGTERM);
+    fs::remove(cut);
+  }
+  sut->end(SIGTERM);
 }
 
 }  // namespace

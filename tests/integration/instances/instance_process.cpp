@@ -18,7 +18,7 @@
 #include <unistd.h>
 
 #include "instances/launch/launch_contract.hpp"
-#include "shm/pool/reference_clock.hpp"
+#include "shm/pool/memory_file.hpp"
 
 namespace plchost::testing {
 

@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include "shm/pool/reference_clock.hpp"
+#include "shm/pool/memory_file.hpp"
 
 namespace plchost {
 namespace {
@@ -19,7 +19,10 @@ using ::testing::HasSubstr;
 
 class AreasUnderTest : public ::testing::Test {
  protected:
-  ~AreasUnderTest() override { remove_pool_memories(pool_); }
+  ~AreasUnderTest() override {
+    ObjectPool::remove(pool_);
+    remove_pool_memories(pool_);
+  }
 
   RTS_HANDLE declare(const char* name, unsigned flags, unsigned bytes, std::vector<Plc_Area_Use> uses = {},
                      void** address = nullptr, const void* initial = nullptr) {
@@ -42,7 +45,7 @@ class AreasUnderTest : public ::testing::Test {
   }
   [[nodiscard]] Result<std::string> place(const std::string& settings = {}) {
     settings_ = parse_settings(settings, "l.cfg").value();
-    return sut.place({.pool = pool_,
+    return sut.place({.pool = shared_,
                       .instance = "line1",
                       .application = "Test",
                       .settings = settings_.areas,
@@ -51,6 +54,7 @@ class AreasUnderTest : public ::testing::Test {
   }
 
   std::string pool_ = "areas-test-" + std::to_string(::getpid());
+  ObjectPool shared_ = ObjectPool::create(pool_).value();
   InstanceSettings settings_;
   Areas sut;
   std::vector<TaskConfig> tasks;

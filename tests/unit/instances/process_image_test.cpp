@@ -13,7 +13,7 @@
 #include "instances/runtime/areas/output_image.hpp"
 #include "instances/runtime/areas/task_areas.hpp"
 #include "shm/plc_process_image.h"
-#include "shm/pool/reference_clock.hpp"
+#include "shm/pool/memory_file.hpp"
 
 namespace plchost {
 namespace {

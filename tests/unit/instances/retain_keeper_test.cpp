@@ -14,7 +14,7 @@
 #include <unistd.h>
 
 #include "instances/plc_app.h"
-#include "shm/pool/reference_clock.hpp"
+#include "shm/pool/memory_file.hpp"
 
 namespace plchost {
 namespace {

@@ -1,0 +1,49 @@
+// A cycle with inputs, outputs and kept variables around it.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include "instances/runtime/areas/areas.hpp"
+#include "tests/conformance/malloc_count.hpp"
+
+namespace plchost {
+namespace {
+
+TEST(NoAllocation, InCyclesWithAreasOfEachKind) {
+  const std::string name = "areas-cost-" + std::to_string(::getpid());
+  auto pool = ObjectPool::create(name).value();
+  {
+    const auto settings = parse_settings(
+        "[SysMem]\nLinux.Area.0.Flags=4\nLinux.Area.0.Size=128\nLinux.Area.0.Object=in\n"
+        "Linux.Area.1.Flags=8\nLinux.Area.1.Size=128\nLinux.Area.1.Object=out\n",
+        "f");
+    Areas areas;
+    std::vector<TaskConfig> tasks(2);
+    tasks[0].name = "High";
+    tasks[1].name = "Low";
+    for (TaskConfig& task : tasks) task.entry = [] {};
+    for (const auto& [area, flags] : {std::pair{"in", PLC_AREA_INPUT}, std::pair{"out", PLC_AREA_OUTPUT},
+                                      std::pair{"kept", PLC_AREA_RETAIN}}) {
+      Plc_Area declared{};
+      declared.dwSize = sizeof declared;
+      declared.dwFlags = flags;
+      declared.pszName = area;
+      declared.dwBytes = 128;
+      RTS_RESULT result = ERR_OK;
+      ASSERT_NE(areas.declare(&declared, result), RTS_INVALID_HANDLE);
+    }
+    const auto placed = areas.place(
+        {.pool = pool, .instance = "line1", .application = "A", .settings = settings->areas, .retain = {}},
+        tasks);
+    ASSERT_TRUE(placed) << placed.error().describe();
+    MallocCount::begin();
+    for (int cycle = 0; cycle < 10'000; ++cycle) {
+      for (const TaskConfig& task : tasks) task.entry();
+    }
+    EXPECT_EQ(MallocCount::end(), 0U);
+  }
+  ObjectPool::remove(name);
+  remove_pool_memories(name);
+}
+
+}  // namespace
+}  // namespace plchost
