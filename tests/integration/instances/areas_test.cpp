@@ -6,7 +6,9 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <memory>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -178,6 +180,46 @@ TEST_F(AreasOf, AnInstanceThatIsKilledInACycleAreWholeAndGoOn) {
         << "the next process goes on with it";
   }
   plc_image_close(&image);
+}
+
+// The example firmware and the example application, each killed and started again beside the other.
+TEST_F(AreasOf, APackerAreThoseOfTheTerminalWhoeverComesFirst) {
+  const auto terminal = [&] {
+    return std::make_unique<Firmware>([&] {
+      const std::string log = sandbox.folder() + "/terminal";
+      if (std::freopen(log.c_str(), "w", stdout) == nullptr) return;
+      ::execl(IO_TERMINAL, IO_TERMINAL, "--pool", sandbox.pool().c_str(), "--name", "terminal1", "--cycle",
+              "1000", static_cast<char*>(nullptr));
+    });
+  };
+  const auto shows = [&](const std::string& text) {
+    return eventually([&] {
+      std::ostringstream log;
+      log << std::ifstream(sandbox.folder() + "/terminal").rdbuf();
+      const std::string all = log.str();
+      const std::size_t line = all.rfind("cycles ", all.size() - 1);
+      return line != std::string::npos && all.find(text, line) != std::string::npos;
+    });
+  };
+  auto firmware = terminal();
+  const auto start_packer = [&] {
+    sut.emplace(sandbox,
+                std::vector<std::string>{"--settings", PACKER_SETTINGS, "--application",
+                                         application("packer"), "--state-directory", state_directory()});
+    sut->wait_until_up();
+  };
+  start_packer();
+  for (int i = 0; i < 12 * 6 * 5; ++i) (void)sut->event("product").post();
+  EXPECT_TRUE(shows("driven; channel out/in: 30/30 5/5 1/1"));
+  EXPECT_TRUE(eventually([&] { return sut->log().find("panel 1") != std::string::npos; })) << "echoed";
+  firmware.reset();
+  firmware = terminal();
+  EXPECT_TRUE(shows("driven; channel out/in: 30/30 5/5 1/1"));
+  sut->end(SIGKILL);
+  EXPECT_TRUE(shows("safe state; channel out/in: 0/0 0/0 0/0"));
+  sut.reset();
+  start_packer();
+  EXPECT_TRUE(shows("driven; channel out/in: 30/30 5/5 1/1")) << "and its counts are kept";
 }
 
 TEST_F(AreasOf, OutputsOfTwoInstancesInOneObjectAreRefused) {

@@ -47,6 +47,7 @@ write_host() {
 name = "$host"
 dds_domain = $PLCHOST_DOMAIN
 run_directory = "$cell/$host"
+state_directory = "$cell/$host.state"
 pool = "$pool-$host"
 cores = [$(IFS=,; echo "$*")]
 EOF

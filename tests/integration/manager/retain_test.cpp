@@ -1,0 +1,91 @@
+// What a packer has counted, over the ends of its process, of its manager and of both.
+#include <csignal>
+#include <string>
+
+#include <gmock/gmock.h>
+
+#include "shm/pool/object_pool.hpp"
+#include "tests/integration/manager/plant.hpp"
+
+namespace plchost {
+namespace {
+
+using testing::IsEmpty;
+
+class RetainUnderAManager : public testing::Test {
+ protected:
+  RetainUnderAManager() {
+    plant.add("packer1", "packer");
+    plant.start_manager();
+    up();
+  }
+  void up() { ASSERT_TRUE(plant.wait_for("packer1", InstanceState::running)) << plant.log(); }
+  void post(int products) const {
+    auto event = ObjectPool::attach(plant.pool()).value().open_event("packer1/product").value();
+    for (int i = 0; i < products; ++i) (void)event.post();
+  }
+  /// It says so of itself once a second, from now on.
+  bool has_counted(const std::string& products) {
+    const std::size_t before = plant.log().size();
+    return Plant::eventually(
+        [&] { return plant.log().find("products " + products + ", ", before) != std::string::npos; });
+  }
+  void kill_instance() {
+    const auto process = open_process(plant.status("packer1").pid);
+    ASSERT_TRUE(process);
+    ASSERT_TRUE(signal_process(*process, SIGKILL));
+  }
+
+  Plant plant;
+};
+
+TEST_F(RetainUnderAManager, IsThereAfterItsProcessWasKilledAndAfterAWarmReset) {
+  post(24);
+  ASSERT_TRUE(has_counted("24"));
+  kill_instance();
+  ASSERT_TRUE(Plant::eventually([&] { return plant.status("packer1").restarts == 1; }));
+  up();
+  EXPECT_TRUE(has_counted("24"));
+  EXPECT_EQ(plant.ask(ControlVerb::reset, "packer1").code, ErrorCode::ok);
+  EXPECT_EQ(plant.ask(ControlVerb::start, "packer1").code, ErrorCode::ok);
+  EXPECT_TRUE(has_counted("24"));
+}
+
+TEST_F(RetainUnderAManager, BeginsAnewAfterAColdReset) {
+  post(24);
+  ASSERT_TRUE(has_counted("24"));
+  EXPECT_EQ(plant.ask(ControlVerb::reset_cold, "packer1").code, ErrorCode::ok);
+  EXPECT_EQ(plant.ask(ControlVerb::start, "packer1").code, ErrorCode::ok);
+  EXPECT_TRUE(has_counted("0"));
+}
+
+TEST_F(RetainUnderAManager, IsThereAfterManagerAndProcessWereKilled) {
+  post(24);
+  ASSERT_TRUE(has_counted("24"));
+  plant.kill_manager();
+  post(1);
+  ASSERT_TRUE(has_counted("25")) << "it runs on";
+  const int pid = [&] {
+    const auto page = InstancePageReader::open(plant.pool(), "packer1");
+    return page && page->runtime() ? page->runtime()->pid : 0;
+  }();
+  const auto process = open_process(pid);
+  ASSERT_TRUE(process);
+  ASSERT_TRUE(signal_process(*process, SIGKILL));
+  plant.start_manager();
+  up();
+  EXPECT_TRUE(has_counted("25"));
+}
+
+TEST_F(RetainUnderAManager, IsThereAfterAnOrderlyEndThatLeavesNoMemory) {
+  post(24);
+  ASSERT_TRUE(has_counted("24"));
+  EXPECT_EQ(plant.stop_manager().describe(), "exit code 0");
+  EXPECT_THAT(plant.leftovers(), IsEmpty());
+  plant.start_manager();
+  up();
+  EXPECT_TRUE(has_counted("24"));
+}
+
+}  // namespace
+}  // namespace plchost
