@@ -34,7 +34,7 @@ class OutputImage {
   template <class Merge>
   [[nodiscard]] bool merge(std::span<std::byte> scratch, const Merge& merge) noexcept {
     for (int attempt = 0; attempt < kAttempts; ++attempt) {
-      std::uint64_t latest = load();
+      const std::uint64_t latest = load();
       const int slot = claim(latest);
       if (slot < 0) continue;
       const bool copied = copy(latest, scratch);
