@@ -21,7 +21,8 @@ class RetainUnderAManager : public testing::Test {
   }
   void up() { ASSERT_TRUE(plant.wait_for("packer1", InstanceState::running)) << plant.log(); }
   void post(int products) const {
-    auto event = ObjectPool::attach(plant.pool()).value().open_event("packer1/product").value();
+    const auto pool = ObjectPool::attach(plant.pool()).value();
+    auto event = pool.open_event("packer1/product").value();
     for (int i = 0; i < products; ++i) (void)event.post();
   }
   /// It says so of itself once a second, from now on.
