@@ -28,6 +28,7 @@ namespace {
 
 // How often instances are asked what they say of themselves, by reading their pages.
 constexpr Duration kTick = std::chrono::milliseconds(50);
+constexpr unsigned kTicksPerTidying = 20;  // of the pool
 
 Result<void> make_run_directory(const std::string& path) {
   std::error_code error;
@@ -204,6 +205,7 @@ Result<void> Manager::run() {
 void Manager::tick() {
   supervisor_->refresh();
   if (latency_due_) restore_latency();
+  if (++ticks_ % kTicksPerTidying == 0) pool_->tidy();
   tick_.set(MonotonicClock::now() + kTick);
 }
 

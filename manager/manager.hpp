@@ -61,6 +61,7 @@ class Manager {
   std::unique_ptr<CommandServer> command_server_;
   ApiServer api_server_;
   Reactor::Timer tick_;
+  unsigned ticks_ = 0;
   bool latency_due_ = true;  // an instance may have ended without putting back what it held
   bool ending_ = false;
 };

@@ -95,6 +95,11 @@ const std::string& ObjectPool::name() const noexcept {
   return segment_->name();
 }
 
+void ObjectPool::tidy() noexcept {
+  constexpr auto kPatience = std::chrono::milliseconds(20);
+  (void)segment_->lock(true, kPatience);
+}
+
 std::uint32_t ObjectPool::capacity() const noexcept {
   return static_cast<std::uint32_t>(segment_->view().entries().size());
 }

@@ -101,6 +101,10 @@ class ObjectPool {
   /// One of them. not_found.
   [[nodiscard]] Result<ObjectInfo> look_at(std::string_view name) const;
 
+  /// Releases what dead clients held, and mends what a stranger wrote over, without waiting for the next call
+  /// of anyone. Gives up after 20 ms if another one holds the lock. For whoever watches over the host.
+  void tidy() noexcept;
+
   [[nodiscard]] const std::string& name() const noexcept;
   /// How many objects it can hold.
   [[nodiscard]] std::uint32_t capacity() const noexcept;

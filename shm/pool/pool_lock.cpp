@@ -1,19 +1,8 @@
 #include "shm/pool/pool_lock.hpp"
 
-#include <chrono>
-
 #include <fmt/format.h>
 
-#include "shm/base/time.hpp"
-
 namespace plchost {
-
-namespace {
-
-// Set-up under the mutex takes microseconds, a repair of the largest pool some 100 ms.
-constexpr auto kPatience = std::chrono::seconds(5);
-
-}  // namespace
 
 // Only who holds the mutex writes `changes`; one that died has left it odd. Sequentially consistent, so that
 // what follows is not seen before it.
@@ -27,16 +16,16 @@ PoolLock::~PoolLock() {
   header_->mutex.unlock();
 }
 
-Result<PoolLock> PoolLock::acquire(PoolHeader& header, const std::string& pool) {
-  switch (header.mutex.lock(MonotonicClock::now() + kPatience)) {
+Result<PoolLock> PoolLock::acquire(PoolHeader& header, const std::string& pool, Duration patience) {
+  switch (header.mutex.lock(MonotonicClock::now() + patience)) {
     case LockResult::locked:
       return PoolLock(header, (header.changes.load(std::memory_order_relaxed) & 1) != 0);
     case LockResult::owner_died:
       return PoolLock(header, true);
     case LockResult::timed_out:
       return failure(ErrorCode::timed_out,
-                     fmt::format("pool '{}': thread {} holds its mutex for more than {} s", pool,
-                                 header.mutex.owner(), kPatience.count()));
+                     fmt::format("pool '{}': thread {} holds its mutex for more than {} ms", pool,
+                                 header.mutex.owner(), patience / std::chrono::milliseconds(1)));
     case LockResult::deadlock:
     case LockResult::corrupt:
       break;

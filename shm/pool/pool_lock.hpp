@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "shm/base/result.hpp"
+#include "shm/base/time.hpp"
 #include "shm/pool/pool_layout.hpp"
 
 namespace plchost {
@@ -12,8 +13,11 @@ namespace plchost {
 /// process dies. Readers without the right to write see by the header's `changes` whether it is held.
 class PoolLock {
  public:
-  /// timed_out: another one holds it for longer than kPatience. corrupt: it was scribbled over.
-  static Result<PoolLock> acquire(PoolHeader& header, const std::string& pool);
+  /// Set-up under the mutex takes microseconds, a repair of the largest pool some 100 ms.
+  static constexpr Duration kPatience = std::chrono::seconds(5);
+
+  /// timed_out: another one holds it for longer than `patience`. corrupt: it was scribbled over.
+  static Result<PoolLock> acquire(PoolHeader& header, const std::string& pool, Duration patience = kPatience);
 
   PoolLock(PoolLock&& other) noexcept
       : header_(std::exchange(other.header_, nullptr)), owner_died_(other.owner_died_) {}

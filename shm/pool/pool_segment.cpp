@@ -25,17 +25,21 @@ PoolHeader& header_of(const MemoryFile& memory) noexcept {
   return *reinterpret_cast<PoolHeader*>(memory.bytes().data());
 }
 
+// What never changes while the pool is there.
+void write_constants(PoolHeader& header, std::uint32_t max_objects) noexcept {
+  header.version = kPoolVersion;
+  header.entry_size = sizeof(ObjectEntry);
+  header.size = pool_size(max_objects);
+  header.max_objects = max_objects;
+  header.bucket_count = bucket_count_for(max_objects);
+  header.max_clients = kMaxClients;
+  header.max_references = max_references_for(max_objects);
+  header.magic.store(kPoolMagic, std::memory_order_release);
+}
+
 // Zero-filled memory holds an empty table already; only the header has something to say.
 Result<void> fill_header(std::span<std::byte> bytes, std::uint32_t max_objects) {
-  auto* const header = new (bytes.data()) PoolHeader{};
-  header->version = kPoolVersion;
-  header->entry_size = sizeof(ObjectEntry);
-  header->size = bytes.size();
-  header->max_objects = max_objects;
-  header->bucket_count = bucket_count_for(max_objects);
-  header->max_clients = kMaxClients;
-  header->max_references = max_references_for(max_objects);
-  header->magic.store(kPoolMagic, std::memory_order_release);
+  write_constants(*new (bytes.data()) PoolHeader{}, max_objects);
   return {};
 }
 
@@ -144,7 +148,7 @@ Result<std::shared_ptr<PoolSegment>> PoolSegment::create(const std::string& name
   }
 }
 
-Result<PoolLock> PoolSegment::lock(bool look_thoroughly) {
+Result<PoolLock> PoolSegment::lock(bool look_thoroughly, Duration patience) {
   if (!writable()) {
     return failure(ErrorCode::refused,
                    fmt::format("pool '{}' was attached to read only; nothing can be changed in it", name_));
@@ -154,12 +158,22 @@ Result<PoolLock> PoolSegment::lock(bool look_thoroughly) {
         ErrorCode::wrong_state,
         fmt::format("pool '{}' was attached by process {}; a child attaches it anew", name_, pid_));
   }
-  auto held = PoolLock::acquire(view_.header(), name_);
+  auto held = PoolLock::acquire(view_.header(), name_, patience);
   if (!held) return held;
+  mend_header();
   if (held->owner_died()) repair();
   PoolClients(view_).sweep(MonotonicClock::now(), look_thoroughly || held->owner_died(),
                            [this](ClientSlot& client) { release_all(client); });
   return held;
+}
+
+// If a stranger wrote over it, those who come later could not attach.
+void PoolSegment::mend_header() noexcept {
+  const auto max_objects = static_cast<std::uint32_t>(view_.entries().size());
+  const PoolHeader& header = view_.header();
+  const bool sound = header.magic.load(kRelaxed) == kPoolMagic &&
+                     check_header(header, header.max_objects, pool_size(max_objects), name_).has_value();
+  if (!sound) write_constants(view_.header(), max_objects);
 }
 
 // What was half-made when its maker died: a memory whose file may have its name already, an object that

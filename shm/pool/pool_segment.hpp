@@ -36,7 +36,7 @@ class PoolSegment {
 
   /// Who holds it finds all lists repaired, and what dead clients held released.
   /// refused: mapped to read only. wrong_state: this process is a child of the one that attached.
-  [[nodiscard]] Result<PoolLock> lock(bool look_thoroughly = false);
+  [[nodiscard]] Result<PoolLock> lock(bool look_thoroughly = false, Duration patience = PoolLock::kPatience);
 
   /// With the lock held. full: too many clients, or too many references.
   [[nodiscard]] Result<ReferenceEntry*> add_reference(ObjectEntry& object, bool writable);
@@ -55,6 +55,7 @@ class PoolSegment {
   [[nodiscard]] Result<ClientSlot*> client();
   [[nodiscard]] ClientSlot* own_client() const noexcept;
   void repair() noexcept;
+  void mend_header() noexcept;
   void release_all(ClientSlot& client) noexcept;
   void release_one(ReferenceEntry& reference) noexcept;
 

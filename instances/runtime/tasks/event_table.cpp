@@ -167,10 +167,11 @@ Result<void> EventTable::check_bound() const {
   for (std::size_t i = 0; i < count_.load(std::memory_order_relaxed); ++i) {
     const Slot& slot = *slots_[i];
     if (slot.tasks == 0 || slot.bound->valid()) continue;
-    return failure(ErrorCode::wrong_state,
-                   fmt::format("external event '{}' lost its place in the full object pool while the "
-                               "application was stopped: reset the instance",
-                               slot.name));
+    return failure(
+        ErrorCode::wrong_state,
+        fmt::format("external event '{}' lost its place in the object pool, which was full or damaged, "
+                    "while the application was stopped: reset the instance",
+                    slot.name));
   }
   return {};
 }

@@ -198,6 +198,15 @@ TEST_F(PoolCrash, RefusesWhatIsNotAPoolOfThisVersionAndSize) {
   EXPECT_TRUE(ObjectPool::attach(name_.get()));
 }
 
+TEST_F(PoolCrash, AHeaderThatAStrangerWroteOverIsMendedByWhoHasItOpen) {
+  auto sut = create(64);
+  const MemoryFile memory = map();
+  std::ranges::fill(memory.bytes().first(offsetof(PoolHeader, mutex)), std::byte{0x5a});
+  EXPECT_EQ(ObjectPool::attach(name_.get()).error().code, ErrorCode::corrupt);
+  sut.tidy();
+  EXPECT_TRUE(ObjectPool::attach(name_.get()));
+}
+
 TEST_F(PoolCrash, RefusesAFileThatIsShorterThanItsHeaderSays) {
   create(64);
   ASSERT_EQ(::truncate(("/dev/shm/" + name_.get()).c_str(), 4096), 0);
