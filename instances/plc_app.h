@@ -51,8 +51,12 @@ typedef unsigned int RTS_RESULT;
 #define ERR_FAILED 0x0001u
 #define ERR_PARAMETER 0x0002u /* not a handle or name of the allowed form */
 #define ERR_NOTINITIALIZED \
-  0x0003u                     /* there is no runtime around this call, or it is not on the control thread */
-#define ERR_NO_OBJECT 0x0010u /* the event is not registered: nothing was counted */
+  0x0003u                      /* there is no runtime around this call, or it is not on the control thread */
+#define ERR_NOBUFFER 0x0006u   /* congestion: the queue to the next node is full, nothing was sent */
+#define ERR_PENDING 0x000Au    /* the link to the next node is being made: send again in the next cycle */
+#define ERR_BUFFERSIZE 0x000Fu /* the buffer is too small; the block waits for a larger one */
+#define ERR_NO_OBJECT \
+  0x0010u /* the event is not registered: nothing was counted; or: there is no such thing */
 #define ERR_NOMEMORY 0x0011u  /* a table or the object pool has no room */
 #define ERR_DUPLICATE 0x0012u /* was there already; the handle is valid */
 #define ERR_NO_TASK 0x4000u   /* soft: counted, but no task is bound to the event at this time */
@@ -358,6 +362,68 @@ RTS_RESULT CDECL EventUnregisterCallbackFunction(unsigned int EventId, PF_EVENT_
 
 /* Runs the tasks bound to this event once. ERR_OK; ERR_NO_TASK; ERR_PARAMETER: not such a handle. Any. */
 RTS_RESULT CDECL CAL_SysEventSet(RTS_HANDLE hEvent);
+
+/* ---- Blocks between instances -----------------------------------------------------------------------------
+ */
+
+/*
+ * Instances send each other blocks of 0 to PLC_MAX_BLOCK bytes by address, in their cycles (CmpBlkDrvShm). A
+ * channel is a named place where blocks come in, and from which they go to the channel of the same name of
+ * another instance. An instance that opens one gets an address ([CmpBlkDrvShm] ForcedAddress, or any). What
+ * nobody receives is dropped after a second ([CmpBlkDrvShm] HoldMs).
+ */
+#define PLC_MAX_BLOCK 65536u
+#define PLC_MAX_CHANNELS 256
+#define PLC_MAX_CHANNEL_NAME 63
+
+/* An address: the node in the lower 16 bits, its host in the upper ones; host 0 is this host. */
+#define PLC_NO_NODE 0u
+#define PLC_ALL_NODES 0xFFFFu /* every other node of this host */
+
+/* What has the higher priority is received first; each priority has queues of its own. */
+#define PLC_BLOCK_EMERGENCY 0
+#define PLC_BLOCK_HIGH 1
+#define PLC_BLOCK_NORMAL 2
+#define PLC_BLOCK_LOW 3
+
+#define PLC_BLOCK_MESSAGE 0u
+#define PLC_BLOCK_REQUEST 1u /* somebody waits for a reply: plc_channel_reply() */
+#define PLC_BLOCK_REPLY 2u   /* to the request with the same dwCorrelation */
+
+typedef struct {
+  unsigned int dwSize;        /* sizeof(Block_Info), set by the caller */
+  unsigned int dwBytes;       /* of the block; with ERR_BUFFERSIZE: that the buffer must have */
+  unsigned int dwFrom;        /* the sender's address */
+  unsigned int dwCorrelation; /* of a request, and of the reply to it */
+  unsigned char bKind;        /* PLC_BLOCK_MESSAGE, _REQUEST or _REPLY */
+  unsigned char bPriority;
+} Block_Info;
+
+/* The channel of that name: 1 to PLC_MAX_CHANNEL_NAME letters, digits, '_', '-', '.'. The same name has the
+ * same handle; it stays valid until the process ends. *pResult (may be NULL): ERR_OK; with
+ * RTS_INVALID_HANDLE: ERR_PARAMETER, ERR_NOMEMORY, ERR_NOTINITIALIZED, ERR_FAILED: the instance can be no
+ * node; the log says why. Control. */
+RTS_HANDLE CDECL plc_channel_open(const char* pszName, RTS_RESULT* pResult);
+
+/* The address of the instance of that name, NULL: of this one. PLC_NO_NODE: there is none (yet). Looks at up
+ * to 128 names: in a cycle keep the address, which an instance has again after a restart. Any. */
+unsigned int CDECL plc_node_address(const char* pszInstance);
+
+/* Sends a block. Never waits. ERR_OK: it is in the queue of the next node on the way; ERR_NOBUFFER;
+ * ERR_PENDING; ERR_NO_OBJECT: nobody has the address, or no way leads there; ERR_PARAMETER;
+ * ERR_NOTINITIALIZED. Any. */
+RTS_RESULT CDECL plc_channel_send(RTS_HANDLE hChannel, unsigned int dwTo, int nPriority, const void* pData,
+                                  unsigned int dwBytes);
+/* The same, for a block that wants a reply. *pCorrelation tells which reply is the one. Any. */
+RTS_RESULT CDECL plc_channel_request(RTS_HANDLE hChannel, unsigned int dwTo, int nPriority, const void* pData,
+                                     unsigned int dwBytes, unsigned int* pCorrelation);
+/* Answers the request that plc_channel_receive() has described. Results as plc_channel_send(). Any. */
+RTS_RESULT CDECL plc_channel_reply(RTS_HANDLE hChannel, const Block_Info* pRequest, const void* pData,
+                                   unsigned int dwBytes);
+/* The next block that has come, into pBuffer. Never waits. ERR_OK; ERR_NO_OBJECT: there is none;
+ * ERR_BUFFERSIZE; ERR_PARAMETER; ERR_NOTINITIALIZED. Any. */
+RTS_RESULT CDECL plc_channel_receive(RTS_HANDLE hChannel, void* pBuffer, unsigned int dwBufferSize,
+                                     Block_Info* pInfo);
 
 /* ---- Time -----------------------------------------------------------------------------------------------
  */

@@ -50,6 +50,44 @@ inline std::chrono::nanoseconds system_time() noexcept {
   return std::chrono::nanoseconds(ns);
 }
 
+/// A channel on which instances send each other blocks, see plc_app.h. Empty unless it was opened.
+class Channel {
+ public:
+  Channel() noexcept = default;
+  /// Control context.
+  explicit Channel(const std::string& name) {
+    RTS_RESULT result = ERR_OK;
+    handle_ = plc_channel_open(name.c_str(), &result);
+    if (result != ERR_OK) throw std::runtime_error("cannot open channel '" + name + "'");
+  }
+
+  // The rest in any context; results as in plc_app.h.
+  RTS_RESULT send(unsigned to, const void* data, std::size_t size,
+                  int priority = PLC_BLOCK_NORMAL) const noexcept {
+    return plc_channel_send(handle_, to, priority, data, static_cast<unsigned>(size));
+  }
+  RTS_RESULT request(unsigned to, const void* data, std::size_t size, unsigned& correlation,
+                     int priority = PLC_BLOCK_NORMAL) const noexcept {
+    return plc_channel_request(handle_, to, priority, data, static_cast<unsigned>(size), &correlation);
+  }
+  RTS_RESULT reply(const Block_Info& request, const void* data, std::size_t size) const noexcept {
+    return plc_channel_reply(handle_, &request, data, static_cast<unsigned>(size));
+  }
+  /// True: there was a block, and `info` describes it.
+  bool receive(void* buffer, std::size_t size, Block_Info& info) const noexcept {
+    info.dwSize = sizeof info;
+    return plc_channel_receive(handle_, buffer, static_cast<unsigned>(size), &info) == ERR_OK;
+  }
+
+ private:
+  RTS_HANDLE handle_ = RTS_INVALID_HANDLE;
+};
+
+/// The address of an instance of this host; PLC_NO_NODE: there is none of that name (yet). Any context.
+inline unsigned node_address(const std::string& instance) noexcept {
+  return plc_node_address(instance.c_str());
+}
+
 /// An external event that can be posted to. Empty until it comes from Application::open_event.
 class ExternalEvent {
  public:

@@ -127,6 +127,9 @@ Result<std::string> Instance::attach_pool() {
   host_.emplace(options_.launch.name, &*pool_);
   host_->set_start_kind(static_cast<int>(options_.launch.start_kind));
   host_->events().clear_own();
+  if (auto joined = host_->blocks().configure(settings_.blocks); !joined) {
+    return std::unexpected(std::move(joined).error());
+  }
   return {};
 }
 

@@ -125,6 +125,13 @@ bool InLink::empty() const noexcept {
   return true;
 }
 
+bool InLink::waits() const noexcept {
+  for (const RingReader& ring : rings_) {
+    if (ring.waits()) return true;
+  }
+  return false;
+}
+
 std::uint32_t InLink::tidy(TimePoint now, Duration hold) noexcept {
   std::uint32_t dropped = 0;
   std::uint64_t taken = 0;
@@ -150,9 +157,9 @@ std::uint32_t InLink::tidy_ring(std::size_t priority, TimePoint now, Duration ho
   RingReader& ring = rings_[priority];
   Progress& progress = progress_[priority];
   const std::uint64_t head = ring.head();
-  const bool waits = ring.end_of_published() != head;
-  if (!waits || head != progress.head || progress.since == TimePoint{}) {
-    progress = {.head = head, .end = ring.end_of_published(), .since = now};
+  const std::uint64_t end = ring.waits() ? ring.end_of_published() : head;
+  if (end == head || head != progress.head || progress.since == TimePoint{}) {
+    progress = {.head = head, .end = end, .since = now};
     return 0;
   }
   if (now - progress.since < hold) return 0;

@@ -120,8 +120,10 @@ class InLink {
   /// Drops what has waited for longer than `hold`, and asks for a fresh link if one is needed. To be called
   /// in turns of about a tenth of `hold`, by one thread. Blocks dropped.
   std::uint32_t tidy(TimePoint now, Duration hold) noexcept;
-  /// Whether there is anything left to take.
+  /// Whether there is nothing left to take. Looks at each slot.
   [[nodiscard]] bool empty() const noexcept;
+  /// Whether something seems to be there to take. Cheap.
+  [[nodiscard]] bool waits() const noexcept;
   [[nodiscard]] const NodeLife& from() const noexcept { return from_; }
 
  private:

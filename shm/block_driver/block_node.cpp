@@ -27,6 +27,10 @@ void touch_to_write(std::span<std::byte> bytes) noexcept {
 
 }  // namespace
 
+Result<void> check_channel_name(std::string_view name) {
+  return check_name("channel name", name, kMaxChannelName);
+}
+
 BlockNode::BlockNode(NodeOptions options, NodeDirectory directory, const NodeLife& life)
     : options_(std::move(options)), directory_(std::move(directory)), life_(life) {}
 
@@ -174,9 +178,7 @@ SendResult BlockNode::inject(BlockHeader header, std::span<const std::byte> cont
 }
 
 Result<std::uint32_t> BlockNode::open_channel(std::string_view name) {
-  if (auto valid = check_name("channel name", name, kMaxChannelName); !valid) {
-    return std::unexpected(std::move(valid).error());
-  }
+  if (auto valid = check_channel_name(name); !valid) return std::unexpected(std::move(valid).error());
   const std::uint32_t number = channel_number(name);
   const std::scoped_lock lock(channels_mutex_);
   const auto [known, is_new] = channels_.try_emplace(number, name);

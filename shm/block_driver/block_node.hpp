@@ -24,6 +24,7 @@ using RemoteSink = std::function<bool(const BlockHeader&, std::span<const std::b
 
 /// The longest name of a channel, bytes.
 inline constexpr std::size_t kMaxChannelName = 63;
+[[nodiscard]] Result<void> check_channel_name(std::string_view name);
 
 struct NodeOptions {
   std::string pool;

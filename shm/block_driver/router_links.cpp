@@ -25,6 +25,11 @@ bool is_gone(std::int32_t pid) noexcept {
 
 void BlockRouter::tick(TimePoint now) {
   ++ticks_;
+  if (node_.directory_.lost()) {
+    tell({ErrorCode::corrupt, 0,
+          "the directory of the nodes was cut short by somebody: no other node is reached until this process "
+          "is started again"});
+  }
   node_.directory_.keep(node_.life_, node_.options_.entry);
   look_for_the_dead();
   if (ticks_ % kTicksPerAudit == 0) {
@@ -237,7 +242,7 @@ void BlockRouter::tidy(TimePoint now) {
   for (auto& gate : node_.in_) {
     if (gate.get() == nullptr) continue;
     counters().expired.fetch_add(gate.get()->tidy(now, node_.options_.hold), std::memory_order_relaxed);
-    waits = waits || !gate.get()->empty();
+    waits = waits || gate.get()->waits();
   }
   // Its sender may have ended between the block and its post.
   if (waits) node_.own_slot().arrivals.post();

@@ -133,6 +133,8 @@ class RingReader {
   /// The first slot that is not free, and the end of the last block that can be seen.
   [[nodiscard]] std::uint64_t head() const noexcept { return head_.load(std::memory_order_acquire); }
   [[nodiscard]] std::uint64_t end_of_published() const noexcept;
+  /// Whether something seems to be there to take.
+  [[nodiscard]] bool waits() const noexcept { return waiting() > 0 || head_is_published(); }
   /// Whether a block begins at the head that can be taken.
   [[nodiscard]] bool head_is_published() const noexcept { return look(head()).published; }
 

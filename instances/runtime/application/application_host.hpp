@@ -6,6 +6,7 @@
 
 #include "instances/plc_app.h"
 #include "instances/runtime/areas/areas.hpp"
+#include "instances/runtime/blocks/block_service.hpp"
 #include "instances/runtime/message_queue.hpp"
 #include "instances/runtime/settings/task_settings.hpp"
 #include "instances/runtime/tasks/event_table.hpp"
@@ -30,6 +31,7 @@ class ApplicationHost {
   [[nodiscard]] static ApplicationHost* current_for_control() noexcept;
 
   [[nodiscard]] EventTable& events() noexcept { return events_; }
+  [[nodiscard]] BlockService& blocks() noexcept { return blocks_; }
   /// The answer of plc_start_kind(). Set before the application is loaded.
   [[nodiscard]] int start_kind() const noexcept { return start_kind_; }
   void set_start_kind(int kind) noexcept { start_kind_ = kind; }
@@ -65,6 +67,7 @@ class ApplicationHost {
 
   std::thread::id control_thread_ = std::this_thread::get_id();
   EventTable events_;
+  BlockService blocks_;
   MessageQueue messages_;
   TaskTable task_table_;
   Areas areas_;

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <vector>
 
+#include "instances/runtime/blocks/block_settings.hpp"
 #include "instances/runtime/settings/task_settings.hpp"
 #include "schedulers/scheduler.hpp"
 #include "shm/base/result.hpp"
@@ -65,6 +66,7 @@ struct InstanceSettings {
   TimerMode timer_mode = TimerMode::periodic;
   IdleStates idle_states = IdleStates::hold;
   SysTimeSettings sys_time;
+  BlockSettings blocks;
   std::vector<TaskSettings> tasks;  ///< one for each [Task.NAME]
   std::vector<AreaSettings> areas;  ///< [SysMem], in the order of their numbers: 0, 1, ...
   RetainSettings retain;

@@ -99,6 +99,7 @@ inline constexpr std::string_view kTaskPrefix = "Task.";  ///< what its name beg
 [[nodiscard]] std::span<const SettingKey> schedule_keys() noexcept;
 [[nodiscard]] std::span<const SettingKey> timer_keys() noexcept;
 [[nodiscard]] std::span<const SettingKey> clock_keys() noexcept;
+[[nodiscard]] std::span<const SettingKey> block_keys() noexcept;
 [[nodiscard]] std::span<const SettingKey> task_keys() noexcept;
 [[nodiscard]] std::span<const SettingKey> component_keys() noexcept;
 [[nodiscard]] std::span<const SettingKey> memory_keys() noexcept;

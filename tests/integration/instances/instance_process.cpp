@@ -19,6 +19,7 @@
 
 #include "instances/launch/launch_contract.hpp"
 #include "shm/pool/memory_file.hpp"
+#include "shm/pool/reference_clock.hpp"
 
 namespace plchost::testing {
 
@@ -52,9 +53,11 @@ Sandbox::Sandbox()
 
 Sandbox::~Sandbox() {
   ObjectPool::remove(pool_);
-  InstancePage::remove(pool_, "line1");
-  TransitionRing::remove(pool_, "line1");
   remove_pool_memories(pool_);
+  for (const char* instance : {"line1", "line2", "line3"}) {
+    InstancePage::remove(pool_, instance);
+    TransitionRing::remove(pool_, instance);
+  }
   std::error_code ignored;
   std::filesystem::remove_all(folder_, ignored);
 }

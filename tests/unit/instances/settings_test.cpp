@@ -172,9 +172,9 @@ TEST(Settings, AMaximumOfTheLoadArmsItsWatchdogUnlessThatIsOff) {
 
 TEST(Settings, LeavesForeignSectionsAloneAndListsEachOnce) {
   const auto sut = parse_settings(
-      "[CmpLog]\nA=1\nany words at all\n[CmpRouter]\nC=3\n[CmpLog]\nD=4\n[Tasks]\n[Task]\n", "line1.cfg");
+      "[CmpLog]\nA=1\nany words at all\n[CmpGateway]\nC=3\n[CmpLog]\nD=4\n[Tasks]\n[Task]\n", "line1.cfg");
   ASSERT_TRUE(sut) << sut.error().message;
-  EXPECT_THAT(sut->foreign_sections, ElementsAre("CmpLog", "CmpRouter", "Tasks", "Task"));
+  EXPECT_THAT(sut->foreign_sections, ElementsAre("CmpLog", "CmpGateway", "Tasks", "Task"));
 }
 
 TEST(Settings, SuggestsTheKeyThatWasMeant) {

@@ -1,0 +1,79 @@
+#include "instances/runtime/blocks/block_service.hpp"
+
+#include <fmt/format.h>
+
+#include "shm/base/log.hpp"
+
+namespace plchost {
+
+BlockService::~BlockService() {
+  stop_.store(true, std::memory_order_release);
+  if (thread_.joinable()) router_->wake();
+  thread_.join();
+}
+
+Result<void> BlockService::configure(const BlockSettings& settings) {
+  settings_ = settings;
+  // Who forces an address wants to be found there.
+  return settings_.enable || settings_.forced_address != 0 ? join() : Result<void>{};
+}
+
+Result<void> BlockService::join() {
+  if (node_ || pool_.empty()) return {};
+  NodeOptions options{.pool = pool_,
+                      .base = settings_.base,
+                      .entry = {.name = instance_,
+                                .forced_address = settings_.forced_address,
+                                .forwards = settings_.forward,
+                                .queue_slots = settings_.queue_slots},
+                      .neighbours = settings_.neighbours,
+                      .hop_limit = settings_.hop_limit,
+                      .hold = settings_.hold};
+  auto node = BlockNode::join(options);
+  if (!node) return failure_in("[CmpBlkDrvShm]", std::move(node).error());
+  auto router = BlockRouter::create(**node);
+  if (!router) return failure_in("[CmpBlkDrvShm]", std::move(router).error());
+  auto thread = Thread::start("blocks", {}, [this, run = router->get()] { run->run(stop_); });
+  if (!thread) return failure_in("[CmpBlkDrvShm]", std::move(thread).error());
+  node_ = *std::move(node);
+  router_ = *std::move(router);
+  thread_ = *std::move(thread);
+  node_now_.store(node_.get(), std::memory_order_release);
+  spdlog::info("node '{}' with address {}", instance_, to_string(node_->address()));
+  return {};
+}
+
+Result<RTS_HANDLE> BlockService::open_channel(std::string_view name) {
+  const std::size_t count = channel_count_.load(std::memory_order_relaxed);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (channels_[i].name == name) return &channels_[i];
+  }
+  if (auto valid = check_channel_name(name); !valid) return std::unexpected(std::move(valid).error());
+  if (count == channels_.size()) {
+    return failure(ErrorCode::full, fmt::format("more than {} channels", channels_.size()));
+  }
+  if (auto joined = join(); !joined) return std::unexpected(std::move(joined).error());
+  Channel& place = channels_[count];
+  if (node_) {
+    auto channel = BlockChannel::open(*node_, name);
+    if (!channel) return std::unexpected(std::move(channel).error());
+    place.channel.emplace(*std::move(channel));
+  }
+  place.name = name;
+  channel_count_.store(count + 1, std::memory_order_release);
+  return &place;
+}
+
+BlockChannel* BlockService::channel(RTS_HANDLE handle) noexcept {
+  const auto* const place = static_cast<const Channel*>(handle);
+  const std::size_t count = channel_count_.load(std::memory_order_acquire);
+  // Any bits may come in as a handle: compared as numbers, and used only if they are one of ours.
+  const auto offset =
+      reinterpret_cast<std::uintptr_t>(place) - reinterpret_cast<std::uintptr_t>(&channels_[0]);
+  const std::size_t index = offset / sizeof(Channel);
+  if (index >= count || offset % sizeof(Channel) != 0) return nullptr;
+  std::optional<BlockChannel>& channel = channels_[index].channel;
+  return channel ? &*channel : nullptr;
+}
+
+}  // namespace plchost

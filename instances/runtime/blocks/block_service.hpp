@@ -1,0 +1,60 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "instances/plc_app.h"
+#include "instances/runtime/blocks/block_settings.hpp"
+#include "shm/base/result.hpp"
+#include "shm/base/thread.hpp"
+#include "shm/block_driver/block_channel.hpp"
+#include "shm/block_driver/block_router.hpp"
+
+namespace plchost {
+
+/// The instance as a node of its pool: from the start if the settings say so, else from the first channel on. With a soft thread for its router. Set-up: control thread.
+class BlockService {
+ public:
+  /// Without a pool (empty) it only gives out handles: for checking an application that shall touch nothing.
+  BlockService(std::string pool, std::string instance)
+      : pool_(std::move(pool)), instance_(std::move(instance)) {}
+  ~BlockService();
+  BlockService(const BlockService&) = delete;
+  BlockService& operator=(const BlockService&) = delete;
+
+  /// Before the first channel. Joins if the settings want it. already_exists: the forced address is taken.
+  [[nodiscard]] Result<void> configure(const BlockSettings& settings);
+
+  /// The handle of the channel of that name; one name, one handle. invalid_argument; full.
+  [[nodiscard]] Result<RTS_HANDLE> open_channel(std::string_view name);
+
+  /// Null: not such a handle, or there is no node behind it. Real-time.
+  [[nodiscard]] BlockChannel* channel(RTS_HANDLE handle) noexcept;
+  /// Null: the instance is no node. Real-time.
+  [[nodiscard]] BlockNode* node() noexcept { return node_now_.load(std::memory_order_acquire); }
+
+ private:
+  struct Channel {
+    std::string name;
+    std::optional<BlockChannel> channel;
+  };
+  [[nodiscard]] Result<void> join();
+
+  std::string pool_;
+  std::string instance_;
+  BlockSettings settings_;
+  std::unique_ptr<BlockNode> node_;
+  std::atomic<BlockNode*> node_now_{nullptr};
+  std::unique_ptr<BlockRouter> router_;
+  std::array<Channel, PLC_MAX_CHANNELS> channels_;
+  std::atomic<std::size_t> channel_count_{0};
+  std::atomic<bool> stop_{false};
+  Thread thread_;  // of the router
+};
+
+}  // namespace plchost
