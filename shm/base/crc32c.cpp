@@ -1,6 +1,5 @@
 #include "shm/base/crc32c.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cstring>
 
@@ -64,76 +63,108 @@ std::uint32_t shifted(const WordTable& table, std::uint32_t state) noexcept {
          table[3][state >> 24];
 }
 
-std::uint64_t word_at(const std::byte* from) noexcept {
+/// What to do with each word beside the checksum. `past_caches`: `to` is written without reading its lines.
+enum class Copy : std::uint8_t { none, plain, past_caches };
+
+template <Copy How>
+__attribute__((always_inline)) inline std::uint64_t take_word(std::byte* to, const std::byte* from) noexcept {
+  // Read once: the checksum is that of what was copied, whatever others write there meanwhile.
   std::uint64_t word = 0;
   std::memcpy(&word, from, sizeof word);
+  asm volatile("" : "+r"(word));
+  if constexpr (How == Copy::plain) std::memcpy(to, &word, sizeof word);
+  if constexpr (How == Copy::past_caches) asm volatile("movnti %1, %0" : "=m"(*to) : "r"(word) : "memory");
   return word;
 }
 
-template <std::size_t Lane>
+/// A stretch of bytes that is gone through: `to` goes with it.
+struct Walk {
+  std::byte* to;
+  std::span<const std::byte> from;
+
+  void advance(std::size_t size) noexcept {
+    if (to != nullptr) to += size;
+    from = from.subspan(size);
+  }
+};
+
+template <Copy How, std::size_t Lane>
 __attribute__((target("sse4.2"))) std::uint32_t step_lanes(const WordTable& after_lane, std::uint32_t state,
-                                                           std::span<const std::byte>& bytes) noexcept {
-  while (bytes.size() >= kLanes * Lane) {
+                                                           Walk& walk) noexcept {
+  while (walk.from.size() >= kLanes * Lane) {
     std::uint64_t first = state;
     std::uint64_t second = 0;
     std::uint64_t third = 0;
+    const std::byte* const from = walk.from.data();
     for (std::size_t i = 0; i < Lane; i += sizeof(std::uint64_t)) {
-      first = __builtin_ia32_crc32di(first, word_at(bytes.data() + i));
-      second = __builtin_ia32_crc32di(second, word_at(bytes.data() + Lane + i));
-      third = __builtin_ia32_crc32di(third, word_at(bytes.data() + 2 * Lane + i));
+      std::byte* const to = How == Copy::none ? nullptr : walk.to + i;
+      first = __builtin_ia32_crc32di(first, take_word<How>(to, from + i));
+      second = __builtin_ia32_crc32di(
+          second, take_word<How>(How == Copy::none ? nullptr : to + Lane, from + i + Lane));
+      third = __builtin_ia32_crc32di(
+          third, take_word<How>(How == Copy::none ? nullptr : to + 2 * Lane, from + i + 2 * Lane));
     }
     state = shifted(after_lane, static_cast<std::uint32_t>(first)) ^ static_cast<std::uint32_t>(second);
     state = shifted(after_lane, state) ^ static_cast<std::uint32_t>(third);
-    bytes = bytes.subspan(kLanes * Lane);
+    walk.advance(kLanes * Lane);
   }
   return state;
 }
 
-__attribute__((target("sse4.2"))) std::uint32_t step_by_instruction(
-    std::uint32_t state, std::span<const std::byte> bytes) noexcept {
-  state = step_lanes<kLongLane>(kAfterLongLane, state, bytes);
-  state = step_lanes<kShortLane>(kAfterShortLane, state, bytes);
+template <Copy How>
+__attribute__((target("sse4.2"))) std::uint32_t step_by_instruction(std::uint32_t state, Walk walk) noexcept {
+  state = step_lanes<How, kLongLane>(kAfterLongLane, state, walk);
+  state = step_lanes<How, kShortLane>(kAfterShortLane, state, walk);
   std::uint64_t wide = state;
-  for (; bytes.size() >= sizeof(std::uint64_t); bytes = bytes.subspan(sizeof(std::uint64_t))) {
-    wide = __builtin_ia32_crc32di(wide, word_at(bytes.data()));
+  for (; walk.from.size() >= sizeof(std::uint64_t); walk.advance(sizeof(std::uint64_t))) {
+    wide = __builtin_ia32_crc32di(wide, take_word<How>(walk.to, walk.from.data()));
   }
   state = static_cast<std::uint32_t>(wide);
-  for (const std::byte byte : bytes) state = __builtin_ia32_crc32qi(state, static_cast<std::uint8_t>(byte));
+  for (; !walk.from.empty(); walk.advance(1)) {
+    const std::byte byte = *static_cast<const volatile std::byte*>(walk.from.data());
+    if constexpr (How != Copy::none) *walk.to = byte;
+    state = __builtin_ia32_crc32qi(state, static_cast<std::uint8_t>(byte));
+  }
+  if constexpr (How == Copy::past_caches) __builtin_ia32_sfence();
   return state;
 }
 
-std::uint32_t step(std::uint32_t state, std::span<const std::byte> bytes) noexcept {
-  static const bool has_instruction = __builtin_cpu_supports("sse4.2") != 0;
-  return has_instruction ? step_by_instruction(state, bytes) : step_by_table(state, bytes);
-}
-
-#else
-
-std::uint32_t step(std::uint32_t state, std::span<const std::byte> bytes) noexcept {
-  return step_by_table(state, bytes);
+bool has_instruction() noexcept {
+  static const bool has = __builtin_cpu_supports("sse4.2") != 0;
+  return has;
 }
 
 #endif
 
+std::uint32_t copy_and_step_by_table(std::byte* to, std::span<const std::byte> from,
+                                     std::uint32_t state) noexcept {
+  if (!from.empty()) std::memcpy(to, from.data(), from.size());
+  return step_by_table(state, {to, from.size()});
+}
+
 }  // namespace
 
 std::uint32_t crc32c(std::span<const std::byte> bytes, std::uint32_t so_far) noexcept {
-  return ~step(~so_far, bytes);
+#if defined(__x86_64__)
+  if (has_instruction()) return ~step_by_instruction<Copy::none>(~so_far, {nullptr, bytes});
+#endif
+  return ~step_by_table(~so_far, bytes);
 }
 
 std::uint32_t copy_with_crc32c(std::byte* to, std::span<const std::byte> from,
                                std::uint32_t so_far) noexcept {
-  // In pieces, so that what was copied is still in the nearest cache when it is read.
-  constexpr std::size_t kPiece = 6144;
-  std::uint32_t state = ~so_far;
-  while (!from.empty()) {
-    const std::size_t size = std::min(from.size(), kPiece);
-    std::memcpy(to, from.data(), size);
-    state = step(state, {to, size});
-    to += size;
-    from = from.subspan(size);
-  }
-  return ~state;
+#if defined(__x86_64__)
+  if (has_instruction()) return ~step_by_instruction<Copy::plain>(~so_far, {to, from});
+#endif
+  return ~copy_and_step_by_table(to, from, ~so_far);
+}
+
+std::uint32_t copy_out_with_crc32c(std::byte* to, std::span<const std::byte> from,
+                                   std::uint32_t so_far) noexcept {
+#if defined(__x86_64__)
+  if (has_instruction()) return ~step_by_instruction<Copy::past_caches>(~so_far, {to, from});
+#endif
+  return ~copy_and_step_by_table(to, from, ~so_far);
 }
 
 }  // namespace plchost

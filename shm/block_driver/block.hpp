@@ -40,11 +40,11 @@ struct BlockHeader {
   std::uint8_t hops = 0;                      ///< links that it has come, without the last one
   std::uint8_t hosts = 0;                     ///< hosts that it has come through
   std::array<std::uint8_t, kMaxHops> path{};  ///< the nodes of this host that have forwarded it
-  std::uint32_t reserved = 0;
+  std::array<std::uint32_t, 5> reserved{};    ///< the contents begin with a cache line of their own
 
   bool operator==(const BlockHeader&) const = default;
 };
-static_assert(sizeof(BlockHeader) == 48 && std::is_trivially_copyable_v<BlockHeader>);
+static_assert(sizeof(BlockHeader) == 64 && std::is_trivially_copyable_v<BlockHeader>);
 
 /// The checksum of a header, with which that of the contents begins. Real-time.
 [[nodiscard]] std::uint32_t checksum_of(const BlockHeader& header) noexcept;

@@ -28,6 +28,7 @@ iox::popo::PublisherOptions lossless_publisher() {
 iox::popo::SubscriberOptions lossless_subscriber() {
   iox::popo::SubscriberOptions options;
   options.queueFullPolicy = iox::popo::QueueFullPolicy::BLOCK_PRODUCER;
+  options.queueCapacity = 64;  // of RouDi's 200 chunks of that size; the default of 256 would take them all
   return options;
 }
 

@@ -1,5 +1,6 @@
 #include "shm/base/crc32c.hpp"
 
+#include <algorithm>
 #include <string_view>
 #include <vector>
 
@@ -54,10 +55,15 @@ TEST(Crc32c, GoesOnFromWhatCameBefore) {
 }
 
 TEST(Crc32c, OfACopyIsThatOfTheOriginal) {
-  const auto from = some_bytes(20'000);
-  std::vector<std::byte> to(from.size());
-  EXPECT_EQ(copy_with_crc32c(to.data(), from, 5), crc32c(from, 5));
-  EXPECT_EQ(to, from);
+  for (const std::size_t size : {0U, 1U, 9U, 400U, 3100U, 20'001U}) {
+    const auto from = some_bytes(size);
+    for (const auto copy : {copy_with_crc32c, copy_out_with_crc32c}) {
+      std::vector<std::byte> to(size + 1);
+      EXPECT_EQ(copy(to.data(), from, 5), crc32c(from, 5));
+      EXPECT_TRUE(std::ranges::equal(std::span(to).first(size), from));
+      EXPECT_EQ(to.back(), std::byte{0});
+    }
+  }
 }
 
 }  // namespace
