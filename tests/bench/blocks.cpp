@@ -1,14 +1,17 @@
 // Blocks between two processes on two cores: CmpBlkDrvShm beside iceoryx, a Unix datagram socket and memcpy.
 // Each way copies what is sent in, and what is received out.
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cstring>
 #include <new>
 #include <optional>
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <signal.h>
+#include <spawn.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
@@ -16,6 +19,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "shm/base/system_call.hpp"
 #include "shm/base/unique_fd.hpp"
 #include "shm/block_driver/block_channel.hpp"
 #include "shm/block_driver/block_router.hpp"
@@ -264,6 +268,38 @@ class Pair {
   const Pipes& pipes_;
 };
 
+/// iceoryx's daemon. It is killed at the end: asked to end, it would first end its clients, which this is one
+/// of.
+class RouDi {
+ public:
+  RouDi() noexcept = default;
+  RouDi(const RouDi&) = delete;
+  RouDi& operator=(const RouDi&) = delete;
+  ~RouDi() {
+    if (pid_ == 0) return;
+    ::kill(pid_, SIGKILL);
+    int status = 0;
+    ::waitpid(pid_, &status, 0);
+    for (const char* left : {"/iceoryx_mgmt", "/root"}) ::shm_unlink(left);
+  }
+  [[nodiscard]] Result<void> start() {
+    // Without monitoring: a process that measures keeps its other threads waiting.
+    std::array<std::string, 5> words{"iox-roudi", "-m", "off", "-l", "off"};
+    std::array<char*, 6> arguments{};
+    std::ranges::transform(words, arguments.begin(), [](std::string& word) { return word.data(); });
+    posix_spawn_file_actions_t files;
+    posix_spawn_file_actions_init(&files);
+    posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+    posix_spawn_file_actions_addopen(&files, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
+    const int error = ::posix_spawnp(&pid_, words[0].c_str(), &files, nullptr, arguments.data(), environ);
+    posix_spawn_file_actions_destroy(&files);
+    return check_returned(error, "start iox-roudi");
+  }
+
+ private:
+  pid_t pid_ = 0;
+};
+
 std::string size_text(std::size_t size) {
   return size < 1024 ? fmt::format("{}B", size) : fmt::format("{}KiB", size / 1024);
 }
@@ -354,11 +390,9 @@ Result<std::vector<Row>> measure_blocks(const Plan& plan) {
   const UniqueFd theirs(ends[1]);
   const std::string pool = fmt::format("plchost-bench-{}", ::getpid());
   const bool with_iceoryx = has_iceoryx() && is_installed("iox-roudi");
-  Child roudi;
+  RouDi roudi;
   if (with_iceoryx) {
-    auto started = Child::start({"iox-roudi", "-l", "off"});
-    if (!started) return std::unexpected(std::move(started).error());
-    roudi = *std::move(started);
+    if (auto started = roudi.start(); !started) return std::unexpected(std::move(started).error());
   }
   const pid_t peer = ::fork();
   if (peer < 0) return failure(ErrorCode::system, "fork", errno);

@@ -17,7 +17,8 @@
 
 namespace plchost {
 
-/// The instance as a node of its pool: from the start if the settings say so, else from the first channel on. With a soft thread for its router. Set-up: control thread.
+/// The instance as a node of its pool: from the start if the settings say so, else from the first channel on.
+/// With a soft thread for its router. Set-up: control thread.
 class BlockService {
  public:
   /// Without a pool (empty) it only gives out handles: for checking an application that shall touch nothing.

@@ -95,9 +95,8 @@ constexpr std::array kKeys = {
                .unit = "1 is on",
                .initial = "1",
                .value = NumberSetting{0, 1,
-                                      [](const SettingsTarget& to, std::int64_t forward) {
-                                        blocks_of(to).forward = forward != 0;
-                                      }}},
+                                      [](const SettingsTarget& to,
+                                         std::int64_t forward) { blocks_of(to).forward = forward != 0; }}},
     SettingKey{.section = kRouter,
                .name = "HopLimit",
                .initial = "8",

@@ -140,8 +140,8 @@ std::string in_folder(const SettingsTarget& target, std::string_view path) {
 const std::vector<SettingKey>& all_setting_keys() {
   static const std::vector<SettingKey> all = [] {
     std::vector<SettingKey> keys;
-    for (const auto table :
-         {schedule_keys(), timer_keys(), clock_keys(), block_keys(), task_keys(), component_keys(), memory_keys()}) {
+    for (const auto table : {schedule_keys(), timer_keys(), clock_keys(), block_keys(), task_keys(),
+                             component_keys(), memory_keys()}) {
       keys.insert(keys.end(), table.begin(), table.end());
     }
     return keys;
