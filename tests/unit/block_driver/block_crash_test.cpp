@@ -16,7 +16,7 @@
 namespace plchost {
 namespace {
 
-constexpr int kKills = 150;
+constexpr int kKills = 100;
 
 class BlockCrash : public BlockNodes {
  protected:
