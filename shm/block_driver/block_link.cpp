@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "shm/pool/reference_clock.hpp"
+#include "shm/pool/memory_file.hpp"
 
 namespace plchost {
 

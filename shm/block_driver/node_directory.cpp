@@ -8,7 +8,7 @@
 
 #include "shm/base/process_start.hpp"
 #include "shm/block_driver/directory_lock.hpp"
-#include "shm/pool/reference_clock.hpp"
+#include "shm/pool/memory_file.hpp"
 
 namespace plchost {
 

@@ -19,7 +19,6 @@
 
 #include "instances/launch/launch_contract.hpp"
 #include "shm/pool/memory_file.hpp"
-#include "shm/pool/reference_clock.hpp"
 
 namespace plchost::testing {
 
