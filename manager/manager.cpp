@@ -13,6 +13,7 @@
 #include "api/control/control_handler.hpp"
 #include "instances/launch/core_latency.hpp"
 #include "manager/host_check/host_check.hpp"
+#include "manager/pool_rights.hpp"
 #include "manager/supervisor/process_host.hpp"
 #include "manager/system/child_process.hpp"
 #include "shm/base/log.hpp"
@@ -104,8 +105,11 @@ Result<void> Manager::set_up() {
   if (auto bound = bind_process_to_cores(0, host.housekeeping_cores); !bound) {
     spdlog::warn("the manager stays where it is: {}", bound.error().describe());
   }
-  auto pool = ObjectPool::create(host.pool, {.max_objects = host.pool_objects});
+  const auto rights = pool_rights(host);
+  if (!rights) return std::unexpected(rights.error());
+  auto pool = ObjectPool::create(host.pool, {.max_objects = host.pool_objects, .rights = *rights});
   if (!pool) return std::unexpected(pool.error());
+  renew_pool_rights(host.pool, *rights);
   pool_ = std::move(*pool);
   if (auto earlier = HostPageReader::open(host.pool)) earlier_page_ = std::move(*earlier);
   auto page = HostPageWriter::create(host.pool);

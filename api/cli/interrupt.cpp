@@ -1,7 +1,9 @@
 #include "api/cli/interrupt.hpp"
 
+#include <algorithm>
 #include <atomic>
 #include <csignal>
+#include <ctime>
 
 namespace plchost {
 
@@ -23,6 +25,13 @@ void catch_interrupts() {
 
 bool interrupted() noexcept {
   return flag().load();
+}
+
+void sleep_until_interrupted(TimePoint end) {
+  for (TimePoint now = MonotonicClock::now(); now < end && !interrupted(); now = MonotonicClock::now()) {
+    const timespec slice = to_timespec(std::min(end - now, kInterruptLook));
+    ::nanosleep(&slice, nullptr);
+  }
 }
 
 }  // namespace plchost

@@ -12,5 +12,7 @@ void catch_interrupts();
 
 /// As long as such a command may wait without a look, for an end that comes at once.
 inline constexpr Duration kInterruptLook = std::chrono::milliseconds(50);
+/// Sleeps until then, or until one of them comes.
+void sleep_until_interrupted(TimePoint end);
 
 }  // namespace plchost

@@ -2,6 +2,7 @@
 #include <utility>
 
 #include "api/cli/cli_session.hpp"
+#include "api/cli/object_verbs.hpp"
 #include "api/cli/rows.hpp"
 #include "api/cli/task_rows.hpp"
 #include "api/cli/transition_verbs.hpp"
@@ -69,8 +70,7 @@ void add_list_verbs(const Command& plcctl, CliSession& session) {
       .optional("INSTANCE", *instance, "only of this instance");
   verb.noun("events", "The external events",
             [&session] { return list(session, &ControlClient::events, event_columns()); });
-  verb.noun("objects", "All objects of the global pool",
-            [&session] { return list(session, &ControlClient::objects, object_columns()); });
+  add_list_objects(verb, session);
   verb.noun("exceptions", "The last exception of each instance that had any", [&session] {
     return list(session, &ControlClient::exceptions, exception_columns(), has_happened);
   });

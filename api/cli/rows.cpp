@@ -28,8 +28,6 @@ constexpr std::array kTaskKinds{std::string_view("cyclic"), std::string_view("ev
                                 std::string_view("external"), std::string_view("freewheeling")};
 constexpr std::array kTaskStates{std::string_view("created"), std::string_view("running"),
                                  std::string_view("stopped"), std::string_view("exception")};
-constexpr std::array kObjectTypes{std::string_view("memory"), std::string_view("semaphore"),
-                                  std::string_view("event")};
 
 // A newer host may know more: its number is shown.
 std::string name_of(std::span<const std::string_view> names, std::uint32_t number) {
@@ -116,13 +114,6 @@ Row to_row(const plc_EventStatus& status) {
           {"bound_tasks", status.bound_tasks}, {"posts", status.posts}};
 }
 
-Row to_row(const plc_ObjectStatus& status) {
-  return {{"host", text_of(status.host)},
-          {"object", text_of(status.object_name)},
-          {"type", name_of(kObjectTypes, status.type)},
-          {"value", status.value}};
-}
-
 Row to_row(const plc_Transition& transition) {
   const bool process = transition.source != 0;
   const std::span<const std::string_view> names =
@@ -183,12 +174,6 @@ const std::vector<Column>& event_columns() {
   static const std::vector<Column> columns{{"host", "HOST"},         {"instance", "INSTANCE"},
                                            {"event", "EVENT"},       {"registered", "REGISTERED"},
                                            {"bound_tasks", "TASKS"}, {"posts", "POSTS"}};
-  return columns;
-}
-
-const std::vector<Column>& object_columns() {
-  static const std::vector<Column> columns{
-      {"host", "HOST"}, {"object", "OBJECT"}, {"type", "TYPE"}, {"value", "VALUE"}};
   return columns;
 }
 

@@ -14,7 +14,6 @@ namespace plchost {
 [[nodiscard]] Row to_row(const plc_InstanceStatus& status);
 [[nodiscard]] Row to_row(const plc_TaskStatus& status);
 [[nodiscard]] Row to_row(const plc_EventStatus& status);
-[[nodiscard]] Row to_row(const plc_ObjectStatus& status);
 [[nodiscard]] Row to_row(const plc_ExceptionStatus& status);
 [[nodiscard]] Row to_row(const plc_Transition& transition);
 
@@ -27,7 +26,6 @@ namespace plchost {
 [[nodiscard]] const std::vector<Column>& instance_columns();
 [[nodiscard]] const std::vector<Column>& task_columns();
 [[nodiscard]] const std::vector<Column>& event_columns();
-[[nodiscard]] const std::vector<Column>& object_columns();
 [[nodiscard]] const std::vector<Column>& exception_columns();
 [[nodiscard]] const std::vector<Column>& transition_columns();
 

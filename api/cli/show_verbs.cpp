@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "api/cli/cli_session.hpp"
+#include "api/cli/object_verbs.hpp"
 #include "api/cli/rows.hpp"
 #include "api/cli/statistics_rows.hpp"
 #include "api/cli/terminal.hpp"
@@ -100,8 +101,8 @@ int show_exception(CliSession& session, const std::string& name) {
 }  // namespace
 
 void add_show_verbs(const Command& plcctl, CliSession& session) {
-  const Command verb =
-      plcctl.verb("show", "Show all that is known of one instance, its last exception, or one task");
+  const Command verb = plcctl.verb(
+      "show", "Show all that is known of one instance, its last exception, one task or one object");
   const auto add = [&](const char* noun, const char* form, const char* text,
                        int (*run)(CliSession&, const std::string&)) {
     const auto name = std::make_shared<std::string>();
@@ -110,6 +111,7 @@ void add_show_verbs(const Command& plcctl, CliSession& session) {
   add("instance", "INSTANCE", "One PLC instance", show_instance);
   add("exception", "INSTANCE", "The last exception of one PLC instance", show_exception);
   add("task", "INSTANCE/TASK", "One task", show_task);
+  add_show_object(verb, session);
 }
 
 }  // namespace plchost

@@ -27,6 +27,12 @@ bool is_number(const std::vector<Row>& rows, const char* field) {
   });
 }
 
+// In characters of UTF-8, which is what a terminal puts side by side.
+std::size_t width_of(const std::string& text) {
+  return static_cast<std::size_t>(
+      std::ranges::count_if(text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
+}
+
 }  // namespace
 
 std::string printable(std::string text) {
@@ -41,14 +47,13 @@ std::string format_table(const std::vector<Row>& rows, const std::vector<Column>
     const bool last = &column == &columns.back();
     std::vector<std::string> cells{column.header};
     for (const Row& row : rows) cells.push_back(cell_of(row, column.field, column.decimals));
-    const std::size_t width = std::ranges::max(cells, {}, &std::string::size).size();
+    const std::size_t width = width_of(std::ranges::max(cells, {}, width_of));
     const bool right = is_number(rows, column.field);
     for (std::size_t i = 0; i < cells.size(); ++i) {
-      if (right) {
-        lines[i] += fmt::format("{:>{}}", cells[i], width);
-      } else {
-        lines[i] += last ? cells[i] : fmt::format("{:<{}}", cells[i], width);
-      }
+      const std::string padding(width - width_of(cells[i]), ' ');
+      if (right) lines[i] += padding;
+      lines[i] += cells[i];
+      if (!right && !last) lines[i] += padding;
       if (!last) lines[i] += "  ";
     }
   }

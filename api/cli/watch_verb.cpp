@@ -6,6 +6,7 @@
 
 #include "api/cli/cli_session.hpp"
 #include "api/cli/interrupt.hpp"
+#include "api/cli/object_verbs.hpp"
 #include "api/cli/rows.hpp"
 #include "api/cli/task_rows.hpp"
 #include "api/cli/transition_verbs.hpp"
@@ -37,11 +38,7 @@ int watch(CliSession& session, const WatchArguments& arguments) {
   TimePoint next = MonotonicClock::now();
   for (std::uint64_t i = 0; !interrupted() && (arguments.count == 0 || i < arguments.count); ++i) {
     if (i > 0) {
-      while (!interrupted() && MonotonicClock::now() < next) {
-        const timespec slice =
-            to_timespec(std::clamp(next - MonotonicClock::now(), Duration::zero(), kInterruptLook));
-        ::nanosleep(&slice, nullptr);
-      }
+      sleep_until_interrupted(next);
       if (interrupted()) break;
     }
     const auto rows = task_rows(session, arguments.instance);
@@ -55,7 +52,7 @@ int watch(CliSession& session, const WatchArguments& arguments) {
 }  // namespace
 
 void add_watch_verb(const Command& plcctl, CliSession& session) {
-  const Command verb = plcctl.verb("watch", "Show tasks, or changes of state, as they come");
+  const Command verb = plcctl.verb("watch", "Show tasks, changes of state, or of one object, as they come");
   const auto arguments = std::make_shared<WatchArguments>();
   constexpr double kMinInterval = 0.1;
   constexpr double kMaxInterval = 3600;
@@ -66,6 +63,7 @@ void add_watch_verb(const Command& plcctl, CliSession& session) {
               kMaxInterval)
       .option("--count", arguments->count, "end after so many looks", std::uint64_t{0}, kMaxCount);
   add_watch_transitions(verb, session);
+  add_watch_object(verb, session);
 }
 
 }  // namespace plchost

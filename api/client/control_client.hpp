@@ -19,6 +19,8 @@
 #include "api/client/transition_log.hpp"
 #include "api/client/wait_set.hpp"
 #include "api/dds/domain.hpp"
+#include "api/dds/object_page.hpp"
+#include "api/dds/object_query.hpp"
 #include "api/dds/topics.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
@@ -62,6 +64,11 @@ class ControlClient {
                                                     std::string_view task, TimePoint deadline);
   [[nodiscard]] Result<std::vector<plc_EventStatus>> events(const std::string& host, TimePoint deadline);
   [[nodiscard]] Result<std::vector<plc_ObjectStatus>> objects(const std::string& host, TimePoint deadline);
+  /// A part of the objects of a host's pool, as the query asks, with all that is known of them; complete: the
+  /// last one. Else go on with query.after = next_after. The code of the failure is the host's own:
+  /// not_found: no object of the query's name.
+  [[nodiscard]] Result<ObjectListing> list_objects(const std::string& host, const ObjectQuery& query,
+                                                   TimePoint deadline);
   /// One for each instance; count 0: it never had an exception.
   [[nodiscard]] Result<std::vector<plc_ExceptionStatus>> exceptions(const std::string& host,
                                                                     TimePoint deadline);
@@ -120,6 +127,7 @@ class ControlClient {
   [[nodiscard]] Result<RequestCaller*> caller(const std::string& host, bool engineering);
   [[nodiscard]] Result<EventPoster*> poster(const std::string& host);
   bool take_acks(TimePoint now);
+  [[nodiscard]] std::optional<ObjectListing> take_page(const plc_SampleIdentity& identity);
 
   std::shared_ptr<dds::Entity> domain_;
   dds::Entity participant_;
@@ -140,6 +148,8 @@ class ControlClient {
   TimePoint last_news_;
   dds::Entity reply_topic_;
   dds::Entity reply_reader_;
+  dds::Entity page_topic_;
+  dds::Entity page_reader_;
   dds::Entity ack_topic_;
   dds::Entity ack_reader_;
   dds::Entity event_topic_;

@@ -24,7 +24,7 @@ std::optional<ApiReply> take_reply(dds_entity_t reader, const plc_SampleIdentity
       return;
     }
     found = ApiReply{static_cast<ErrorCode>(reply.code), std::string(dds::text_of(reply.text)),
-                     reply.status_round};
+                     reply.status_round, identity};
   });
   return found;
 }
@@ -58,6 +58,9 @@ Result<ApiReply> RequestCaller::call(const ApiRequest& request, dds_entity_t rep
   sample.operation = request.operation;
   dds::copy_text(sample.instance, request.instance);
   dds::copy_text(sample.argument, request.argument);
+  std::vector<plc_KeyValue> ext = request.ext;
+  sample.ext._buffer = ext.data();
+  sample.ext._length = sample.ext._maximum = static_cast<std::uint32_t>(ext.size());
   TimePoint next_write{};
   bool written = false;
   while (MonotonicClock::now() < deadline) {

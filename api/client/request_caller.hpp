@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include <control.h>
 
@@ -19,6 +20,7 @@ struct ApiRequest {
   std::int32_t operation = 0;  ///< plc_OPERATION_...
   std::string instance;
   std::string argument;
+  std::vector<plc_KeyValue> ext = {};  ///< at most 16
 };
 
 /// A host's answer.
@@ -26,6 +28,7 @@ struct ApiReply {
   ErrorCode code = ErrorCode::ok;
   std::string text;                ///< why not; or a remark
   std::uint64_t status_round = 0;  ///< the host's status from this round on shows the effect
+  plc_SampleIdentity identity{};   ///< of the request
 };
 
 /// The requests of one role to one host: writes, repeats under the same identity, waits for the answer.

@@ -24,6 +24,12 @@ Qos reply_qos() {
   return qos;
 }
 
+Qos object_page_qos() {
+  Qos qos;
+  qos.reliable(kServerBlocking).keep_last(kObjectPageDepth).transient_local();
+  return qos;
+}
+
 Qos ack_qos() {
   Qos qos;
   qos.reliable(kServerBlocking).keep_last(1).transient_local();

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cerrno>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -105,6 +106,7 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
   } else if (fd == status_timer.get()) {
     const TimePoint now = MonotonicClock::now();
     status->tick(now);
+    lister.forget_old(now);
     finish(manager->expire(now));
   } else if (fd == presence_timer.get()) {
     status->write_presence();
@@ -146,12 +148,29 @@ void ControlServer::Parts::on_request(ApiRole role, const dds::Guid& writer, con
   const std::vector<std::string_view> instances(status->instances().begin(), status->instances().end());
   auto checked = check_request(request, role, options.host, instances);
   if (!checked) return answer(client, identity, checked.error().code, checked.error().describe());
+  if (checked->verb == ControlVerb::list_objects) return list_objects(client, request);
   const PendingCommand command{
       client,        identity, checked->instance, MonotonicClock::now() + ManagerLink::kCommandLimit,
       checked->verb, {}};
   if (auto sent = manager->send(std::move(*checked), command); !sent) {
     answer(client, identity, sent.error().code, sent.error().describe());
   }
+}
+
+// The page first: who has the answer has it, or asks again.
+void ControlServer::Parts::list_objects(const dds::Guid& client, const plc_Request& request) {
+  const plc_SampleIdentity& identity = request.header.request_identity;
+  const auto query = parse_object_query(std::span(request.ext._buffer, request.ext._length));
+  const auto listing = query ? lister.page(*query) : Result<ObjectListing>(std::unexpected(query.error()));
+  if (!listing) return answer(client, identity, listing.error().code, listing.error().describe());
+  ObjectPageSample sample(*listing);
+  plc_ObjectPage& page = sample.page();
+  page.related_identity = identity;
+  dds::copy_text(page.host, options.host);
+  page.epoch = epoch;
+  const bool written = sessions->write_page(client, page);
+  answer(client, identity, written ? ErrorCode::ok : ErrorCode::busy,
+         written ? "" : "the client does not take what it asked for; ask again");
 }
 
 Result<void> ControlServer::Parts::on_manager() {

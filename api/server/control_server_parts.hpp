@@ -11,6 +11,7 @@
 #include "api/server/control_server.hpp"
 #include "api/server/event_intake.hpp"
 #include "api/server/manager_link.hpp"
+#include "api/server/object_lister.hpp"
 #include "api/server/request_check.hpp"
 #include "api/server/session_table.hpp"
 #include "api/server/status_publisher.hpp"
@@ -28,7 +29,7 @@ struct ControlServer::Parts {
   };
 
   Parts(ServerOptions given, ObjectPool attached, std::uint64_t started)
-      : options(std::move(given)), pool(std::move(attached)), epoch(started) {}
+      : options(std::move(given)), pool(std::move(attached)), lister(pool), epoch(started) {}
 
   Result<void> open(PostLedger ledger);
   Result<void> make_loop();
@@ -45,6 +46,7 @@ struct ControlServer::Parts {
               std::string_view text);
   void finish(std::vector<FinishedCommand> commands);
   void ask_for_findings();
+  void list_objects(const dds::Guid& client, const plc_Request& request);
   [[nodiscard]] bool collect_findings(FinishedCommand& finished);
 
   static void on_event_post(dds_entity_t reader, void* server);
@@ -52,6 +54,7 @@ struct ControlServer::Parts {
 
   ServerOptions options;
   ObjectPool pool;
+  ObjectLister lister;
   std::uint64_t epoch;
   UniqueFd epoll;
   UniqueFd wake;

@@ -35,6 +35,8 @@ constexpr std::array kOperations = {
               Argument::task_or_none},
     Operation{plc_OPERATION_CHECK_HOST, ControlVerb::check_host, ApiRole::operating, Argument::none,
               /*of_host=*/true},
+    Operation{plc_OPERATION_LIST_OBJECTS, ControlVerb::list_objects, ApiRole::operating, Argument::none,
+              /*of_host=*/true},
     Operation{plc_OPERATION_LOAD_APPLICATION, ControlVerb::load_application, ApiRole::engineering,
               Argument::path},
     Operation{plc_OPERATION_SET_SCHEDULER, ControlVerb::set_scheduler, ApiRole::engineering,

@@ -17,16 +17,18 @@ Result<SessionTable> SessionTable::create(dds_entity_t participant) {
   table.participant_ = participant;
   auto reply = dds::make_topic(participant, dds::kReply);
   auto ack = dds::make_topic(participant, dds::kEventAck);
+  auto page = dds::make_topic(participant, dds::kObjectPage);
   auto participants =
       dds::check_entity(dds_create_reader(participant, DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr, nullptr),
                         "watch participants");
   auto subscriptions = dds::check_entity(
       dds_create_reader(participant, DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION, nullptr, nullptr), "watch readers");
-  for (auto* made : {&reply, &ack, &participants, &subscriptions}) {
+  for (auto* made : {&reply, &ack, &page, &participants, &subscriptions}) {
     if (!*made) return std::unexpected(made->error());
   }
   table.reply_topic_ = std::move(*reply);
   table.ack_topic_ = std::move(*ack);
+  table.page_topic_ = std::move(*page);
   table.participants_ = std::move(*participants);
   table.subscriptions_ = std::move(*subscriptions);
   return table;
@@ -60,13 +62,16 @@ void SessionTable::follow_readers() {
     if (info.instance_state != DDS_IST_ALIVE) return;
     const std::string_view topic = reader.topic_name;
     const bool replies = topic == dds::kReply.name;
-    if (!replies && topic != dds::kEventAck.name) return;
+    const bool pages = topic == dds::kObjectPage.name;
+    if (!replies && !pages && topic != dds::kEventAck.name) return;
     Session* const session = session_of(dds::Guid::from(reader.participant_key.v));
     if (session == nullptr) return;
     // The writer exists before the first request: it has met its reader when the answer comes. One that
     // nobody reads is not made: each is announced to every client.
     if (replies) {
       (void)open_writer(*session, session->reply_writer, reply_topic_, dds::reply_qos());
+    } else if (pages) {
+      (void)open_writer(*session, session->page_writer, page_topic_, dds::object_page_qos());
     } else {
       (void)open_writer(*session, session->ack_writer, ack_topic_, dds::ack_qos());
     }
@@ -97,7 +102,7 @@ SessionTable::Session* SessionTable::session_of(const dds::Guid& client) {
     spdlog::error("client {}: {}", client.hex(), publisher.error().describe());
     return nullptr;
   }
-  return &sessions_.emplace(client, Session{std::move(*publisher), {}, {}, {}}).first->second;
+  return &sessions_.emplace(client, Session{std::move(*publisher), {}, {}, {}, {}}).first->second;
 }
 
 void SessionTable::write_reply(const dds::Guid& client, const plc_Reply& reply) {
@@ -119,6 +124,13 @@ void SessionTable::write_ack(const dds::Guid& client, const plc_EventAck& ack) {
   if (session == nullptr) return;
   if (!open_writer(*session, session->ack_writer, ack_topic_, dds::ack_qos())) return;
   (void)dds_write(session->ack_writer.get(), &ack);
+}
+
+bool SessionTable::write_page(const dds::Guid& client, const plc_ObjectPage& page) {
+  Session* const session = session_of(client);
+  if (session == nullptr) return false;
+  if (!open_writer(*session, session->page_writer, page_topic_, dds::object_page_qos())) return false;
+  return dds_write(session->page_writer.get(), &page) == DDS_RETCODE_OK;
 }
 
 std::optional<plc_Reply> SessionTable::remembered(const dds::Guid& client,

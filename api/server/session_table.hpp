@@ -35,6 +35,8 @@ class SessionTable {
   /// counted.
   void write_reply(const dds::Guid& client, const plc_Reply& reply);
   void write_ack(const dds::Guid& client, const plc_EventAck& ack);
+  /// False: the client has not got it, nor will.
+  [[nodiscard]] bool write_page(const dds::Guid& client, const plc_ObjectPage& page);
   [[nodiscard]] std::optional<plc_Reply> remembered(const dds::Guid& client,
                                                     const plc_SampleIdentity& identity) const;
 
@@ -48,6 +50,7 @@ class SessionTable {
     dds::Entity publisher;
     dds::Entity reply_writer;
     dds::Entity ack_writer;
+    dds::Entity page_writer;
     std::deque<plc_Reply> answers;
   };
 
@@ -62,6 +65,7 @@ class SessionTable {
   dds_entity_t participant_ = 0;
   dds::Entity reply_topic_;
   dds::Entity ack_topic_;
+  dds::Entity page_topic_;
   dds::Entity participants_;
   dds::Entity subscriptions_;
   std::unordered_set<dds::Guid, dds::GuidHash> alive_;

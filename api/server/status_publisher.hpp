@@ -47,6 +47,8 @@ class StatusPublisher {
   static constexpr Duration kTick = std::chrono::milliseconds(10);
   /// Events and objects are looked at so often.
   static constexpr Duration kObjectPeriod = std::chrono::milliseconds(200);
+  /// Of a larger pool as many are published: those first that are events in use, then by name.
+  static constexpr std::size_t kMostPublished = 4096;
 
  private:
   StatusPublisher(Source source, TaskWatch tasks, ExceptionWatch exceptions, TransitionPublisher transitions)
@@ -57,6 +59,7 @@ class StatusPublisher {
   bool look_at_instances(TimePoint now);
   bool look_at_objects(TimePoint now);
   bool update_event(const ObjectInfo& object);
+  [[nodiscard]] std::vector<ObjectInfo> published_objects() const;
   void write_host(bool changed);
 
   Source source_;

@@ -66,6 +66,7 @@ Result<std::string> Instance::obey(const ControlRequest& request) {
     case ControlVerb::restart:
     case ControlVerb::load_application:
     case ControlVerb::check_host:
+    case ControlVerb::list_objects:
       break;
   }
   return failure(ErrorCode::unsupported,

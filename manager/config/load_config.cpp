@@ -10,6 +10,7 @@
 
 #include <fmt/format.h>
 
+#include "manager/config/accounts.hpp"
 #include "manager/config/check_relations.hpp"
 #include "manager/config/section_reader.hpp"
 #include "manager/config/toml_document.hpp"
@@ -36,6 +37,7 @@ struct Loader {
 
   void read(const TomlTable& root);
   void read_host(const TomlTable& table, unsigned line);
+  void read_pool_rights(SectionReader& reader);
   void read_cores(SectionReader& reader);
   void read_dds(const TomlTable& table, unsigned line);
   void read_instances(const TomlValue& value);
@@ -103,8 +105,31 @@ void Loader::read_host(const TomlTable& table, unsigned line) {
                    fmt::format("\"{}\" is not allowed; allowed is an absolute path of up to {} characters",
                                host.state_directory.substr(0, kMaxPath), kMaxPath));
   }
+  read_pool_rights(reader);
   read_cores(reader);
   reader.refuse_unknown_keys();
+}
+
+void Loader::read_pool_rights(SectionReader& reader) {
+  HostConfig& host = config.host;
+  std::string mode = fmt::format("{:04o}", host.pool_mode);
+  reader.text("pool_owner", host.pool_owner);
+  reader.text("pool_group", host.pool_group);
+  reader.text("pool_mode", mode);
+  if (!host.pool_owner.empty()) {
+    if (const auto user = user_number(host.pool_owner); !user)
+      reader.problem("pool_owner", user.error().message);
+  }
+  if (!host.pool_group.empty()) {
+    if (const auto group = group_number(host.pool_group); !group) {
+      reader.problem("pool_group", group.error().message);
+    }
+  }
+  if (const auto parsed = parse_mode(mode)) {
+    host.pool_mode = *parsed;
+  } else {
+    reader.problem("pool_mode", parsed.error().message);
+  }
 }
 
 std::vector<int> without(std::vector<int> cores, const std::vector<int>& taken) {

@@ -45,6 +45,7 @@ void ManagedInstance::handle(const ControlRequest& request, ControlReplyFunction
     case ControlVerb::reset_statistics:
       return begin_forwarded();
     case ControlVerb::check_host:
+    case ControlVerb::list_objects:
     case ControlVerb::shutdown:
     case ControlVerb::status:
       return;  // refused by check_argument
@@ -56,6 +57,8 @@ Result<void> ManagedInstance::check_argument(ControlRequest& request) const {
   switch (request.verb) {
     case ControlVerb::check_host:
       return failure(ErrorCode::invalid_argument, "'check host' is for the whole host: name no instance");
+    case ControlVerb::list_objects:
+      return failure(ErrorCode::unsupported, "'list objects' is answered by the API server, from the pool");
     case ControlVerb::shutdown:
     case ControlVerb::status:
       return failure(ErrorCode::unsupported, fmt::format("'{}' is between the manager and an instance only",

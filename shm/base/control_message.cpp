@@ -25,6 +25,7 @@ constexpr std::array kVerbs = {
     std::pair{ControlVerb::register_event, std::string_view("register event")},
     std::pair{ControlVerb::unregister_event, std::string_view("unregister event")},
     std::pair{ControlVerb::check_host, std::string_view("check host")},
+    std::pair{ControlVerb::list_objects, std::string_view("list objects")},
     std::pair{ControlVerb::shutdown, std::string_view("shutdown")},
     std::pair{ControlVerb::status, std::string_view("status")},
 };

@@ -85,11 +85,25 @@ Result<EventTable::Slot*> EventTable::open_own(std::string_view event) {
 Result<void> EventTable::publish_registered(Slot& slot) {
   if (pool_ == nullptr) return {};
   const bool registered = slot.by_application || slot.by_operator;
-  if (slot.event.load(std::memory_order_relaxed)->set_registered(registered)) return {};
-  // It lost its place in the pool while nobody used it; a task that was bound to it notices in check_bound().
-  if (auto attached = attach(slot); !attached) return attached;
-  (void)slot.event.load(std::memory_order_relaxed)->set_registered(registered);
+  if (!slot.event.load(std::memory_order_relaxed)->set_registered(registered)) {
+    // It lost its place in the pool while nobody used it; a task that was bound to it notices in
+    // check_bound().
+    if (auto attached = attach(slot); !attached) return attached;
+    (void)slot.event.load(std::memory_order_relaxed)->set_registered(registered);
+  }
+  show_use(slot);
   return {};
+}
+
+// So that others see who uses it, and so that it keeps its place in the pool while the tasks are stopped. It
+// works without, so no right and no room for a reference are no error.
+void EventTable::show_use(Slot& slot) {
+  const bool used = slot.by_application || slot.by_operator || slot.tasks > 0;
+  if (!used) {
+    slot.reference.close();
+  } else if (pool_ != nullptr && !slot.reference.valid()) {
+    if (auto reference = pool_->open_shared_event(slot.object)) slot.reference = *std::move(reference);
+  }
 }
 
 Result<void> EventTable::register_by_application(RTS_HANDLE handle) {
@@ -155,12 +169,16 @@ Result<CountedEvent*> EventTable::bind_task(std::string_view event) {
   if (!slot) return std::unexpected(slot.error());
   if ((*slot)->bound == nullptr) (*slot)->bound = (*slot)->event.load(std::memory_order_relaxed);
   ++(*slot)->tasks;
+  show_use(**slot);
   return &(*slot)->bound->counted();
 }
 
 void EventTable::forget_tasks() {
   (void)publish_bound(false);
-  for (std::size_t i = 0; i < count_.load(std::memory_order_relaxed); ++i) slots_[i]->tasks = 0;
+  for (std::size_t i = 0; i < count_.load(std::memory_order_relaxed); ++i) {
+    slots_[i]->tasks = 0;
+    show_use(*slots_[i]);
+  }
 }
 
 Result<void> EventTable::check_bound() const {

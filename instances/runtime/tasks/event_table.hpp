@@ -71,12 +71,14 @@ class EventTable {
     const PoolEvent* bound = nullptr;                // what they wait on, for the life of the process
     std::atomic<const PoolEvent*> event{nullptr};    // one of events; null without a pool
     std::vector<std::unique_ptr<PoolEvent>> events;  // old ones stay: a poster may be looking at one
+    SharedEvent reference;                           // while it is registered or tasks are bound to it
   };
 
   [[nodiscard]] Slot* find(RTS_HANDLE handle) const noexcept;
   [[nodiscard]] Result<Slot*> open_own(std::string_view event);
   [[nodiscard]] Result<void> attach(Slot& slot);
   [[nodiscard]] Result<void> publish_registered(Slot& slot);
+  void show_use(Slot& slot);
 
   std::string instance_;
   ObjectPool* pool_;

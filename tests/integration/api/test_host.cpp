@@ -41,12 +41,12 @@ OwnDomain::OwnDomain() {
   }
 }
 
-TestHost::TestHost(const OwnDomain& domain, std::string name)
+TestHost::TestHost(const OwnDomain& domain, std::string name, std::uint32_t max_objects)
     : domain_(domain.number()),
       name_(std::move(name)),
       pool_name_(unique_name()),
       run_directory_(std::filesystem::temp_directory_path() / pool_name_),
-      pool_(ObjectPool::create(pool_name_, {.max_objects = 64}).value()),
+      pool_(ObjectPool::create(pool_name_, {.max_objects = max_objects}).value()),
       page_(HostPageWriter::create(pool_name_).value()) {
   std::filesystem::create_directory(run_directory_);
   write_count(0);

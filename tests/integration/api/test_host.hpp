@@ -35,7 +35,7 @@ class OwnDomain {
 /// control socket, and a real plchost-dds.
 class TestHost {
  public:
-  TestHost(const OwnDomain& domain, std::string name);
+  TestHost(const OwnDomain& domain, std::string name, std::uint32_t max_objects = 64);
   TestHost(const TestHost&) = delete;
   TestHost& operator=(const TestHost&) = delete;
   ~TestHost();

@@ -5,6 +5,7 @@
 #include <functional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "manager/system/child_process.hpp"
@@ -26,6 +27,8 @@ class Plant {
 
   /// Another [[instance]]; `application` is a name in the build's folder of applications.
   void add(const std::string& name, const std::string& application, const std::string& more_keys = "");
+  /// More keys of [host], in place of those before.
+  void set_host_keys(std::string keys) { host_keys_ = std::move(keys); }
   /// In the folder of the configuration.
   void write_file(const std::string& name, const std::string& text) const;
   [[nodiscard]] std::vector<std::string> lines_of(const std::string& name) const;
@@ -62,6 +65,7 @@ class Plant {
 
   std::filesystem::path folder_;
   std::string pool_;
+  std::string host_keys_;
   std::string instances_;
   std::vector<std::string> names_;
   bool api_server_ = false;

@@ -24,6 +24,14 @@ TEST(Table, ShowsNothingAsADashAndFractionsAsAsked) {
   EXPECT_EQ(format_table(rows, {{"name", "NAME"}, {"value", "V", 1}}), "NAME    V\n-     1.2\n");
 }
 
+TEST(Table, CountsCharactersAndNotBytes) {
+  EXPECT_EQ(format_table({{{"name", "F\u00fclldruck"}, {"value", "a"}}, {{"name", "plain"}, {"value", "b"}}},
+                         {{"name", "NAME"}, {"value", "V"}}),
+            "NAME       V\n"
+            "F\u00fclldruck  a\n"
+            "plain      b\n");
+}
+
 TEST(Table, LetsNoNameDriveTheTerminal) {
   EXPECT_THAT(format_table({{{"name", "a\x1b[2J"}}}, {{"name", "NAME"}}), testing::Not(HasSubstr("\x1b")));
 }

@@ -43,6 +43,7 @@ TEST(RequestCheck, TurnsEachOperationIntoItsVerb) {
   EXPECT_EQ(check(make(plc_OPERATION_UNREGISTER_EVENT, "line1", "e"), ApiRole::engineering)->verb,
             ControlVerb::unregister_event);
   EXPECT_EQ(check(make(plc_OPERATION_CHECK_HOST, ""), ApiRole::operating)->verb, ControlVerb::check_host);
+  EXPECT_EQ(check(make(plc_OPERATION_LIST_OBJECTS, ""), ApiRole::operating)->verb, ControlVerb::list_objects);
   for (const char* task : {"", "Main"}) {
     const auto reset = check(make(plc_OPERATION_RESET_STATISTICS, "line1", task), ApiRole::operating);
     EXPECT_EQ(reset->verb, ControlVerb::reset_statistics);
@@ -69,7 +70,7 @@ TEST(RequestCheck, NamesWhatDoesNotExist) {
   const auto host = check(make(plc_OPERATION_START, "line1", "", "hostb"), ApiRole::operating);
   EXPECT_EQ(host.error().code, ErrorCode::not_found);
   EXPECT_THAT(host.error().message, HasSubstr("hostb"));
-  const auto operation = check(make(9), ApiRole::operating);
+  const auto operation = check(make(99), ApiRole::operating);
   EXPECT_EQ(operation.error().code, ErrorCode::unsupported);
   EXPECT_THAT(operation.error().message, testing::AllOf(HasSubstr("5"), HasSubstr("set scheduler")));
 }

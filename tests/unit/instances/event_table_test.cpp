@@ -114,6 +114,31 @@ TEST_F(EventTableTest, ClearsOnlyWhatIsItsOwn) {
   EXPECT_TRUE(pool_.open_event("line10/ready").value().registered());
 }
 
+TEST_F(EventTableTest, IsSeenToHoldWhatItRegistersAndBindsUntilItNeedsItNoMore) {
+  const RTS_HANDLE handle = sut_.open("ready").value();
+  EXPECT_FALSE(pool_.look_at("line1/ready")) << "a name alone holds nothing";
+  ASSERT_TRUE(sut_.bind_task("ready"));
+  ASSERT_TRUE(sut_.register_by_application(handle));
+  const auto used = pool_.look_at("line1/ready").value();
+  ASSERT_EQ(used.references.size(), 1U);
+  EXPECT_EQ(used.references[0].pid, static_cast<std::uint32_t>(::getpid()));
+  ASSERT_TRUE(sut_.unregister_by_application(handle));
+  EXPECT_EQ(pool_.look_at("line1/ready").value().reference_count, 1U) << "a task is still bound to it";
+  sut_.forget_tasks();
+  EXPECT_FALSE(pool_.look_at("line1/ready"));
+}
+
+TEST_F(EventTableTest, KeepsTheEventOfAFirmwareThatEndedWhileTheTasksAreStopped) {
+  {
+    const auto firmware = pool_.create_shared_event("line1/ready").value();
+    ASSERT_TRUE(sut_.bind_task("ready"));
+    ASSERT_TRUE(sut_.publish_bound(true));
+  }
+  ASSERT_TRUE(sut_.publish_bound(false));
+  EXPECT_TRUE(sut_.publish_bound(true));
+  EXPECT_EQ(pool_.look_at("line1/ready").value().bound_tasks, 1U);
+}
+
 TEST(EventTableWithoutPool, OnlyCollects) {
   EventTable sut("check", nullptr);
   const RTS_HANDLE handle = sut.open("ready").value();

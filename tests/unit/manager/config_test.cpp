@@ -56,6 +56,9 @@ dds_domain = 7
 run_directory = "/tmp/cell1"
 pool = "cell1"
 pool_objects = 128
+pool_owner = "root"
+pool_group = "1000"
+pool_mode = "0640"
 cores = [1, 2]
 housekeeping_cores = [0]
 log_level = "debug"
@@ -86,6 +89,9 @@ share_core = true
   ASSERT_TRUE(sut.has_value());
   EXPECT_EQ(sut->host.dds_domain, 7);
   EXPECT_EQ(sut->host.pool_objects, 128U);
+  EXPECT_EQ(sut->host.pool_owner, "root");
+  EXPECT_EQ(sut->host.pool_group, "1000");
+  EXPECT_EQ(sut->host.pool_mode, 0640U);
   EXPECT_TRUE(sut->host.keep_pool);
   EXPECT_FALSE(sut->dds.enabled);
   EXPECT_THAT(sut->dds.peers, ElementsAre("10.0.0.2", "cell2:7410"));
@@ -162,6 +168,20 @@ INSTANTIATE_TEST_SUITE_P(
         WrongConfig{
             "level", "[host]\nlog_level = \"inof\"\n", "2",
             "\"inof\" is not known; allowed are trace, debug, info, warning, error; did you mean 'info'?"},
+        WrongConfig{
+            "owner", "[host]\npool_owner = \"nobody here\"\n", "2",
+            "pool_owner: there is no user \"nobody here\" on this host; allowed is a user's name or number"},
+        WrongConfig{"owner_type", "[host]\npool_owner = 0\n", "2", "0 is a whole number; allowed is a text"},
+        WrongConfig{"owner_high", "[host]\npool_owner = \"4294967295\"\n", "2", "there is no user"},
+        WrongConfig{"group", "[host]\npool_group = \"nobody here\"\n", "2",
+                    "there is no group \"nobody here\""},
+        WrongConfig{"mode_execute", "[host]\npool_mode = \"0770\"\n", "2", "\"0770\" is not allowed"},
+        WrongConfig{"mode_owner", "[host]\npool_mode = \"0460\"\n", "2", "the owner reads and writes"},
+        WrongConfig{"mode_text", "[host]\npool_mode = \"rw-rw----\"\n", "2", "\"rw-rw----\" is not allowed"},
+        WrongConfig{"mode_digits", "[host]\npool_mode = \"00000660\"\n", "2", "\"00000660\" is not allowed"},
+        WrongConfig{"mode_empty", "[host]\npool_mode = \"\"\n", "2", "\"\" is not allowed"},
+        WrongConfig{"mode_type", "[host]\npool_mode = 660\n", "2",
+                    "660 is a whole number; allowed is a text"},
         WrongConfig{"keep", "[host]\nkeep_pool = 1\n", "2", "1 is a whole number; allowed is true or false"},
         WrongConfig{"date", "[host]\nname = 1979-05-27\n", "2", "is a date or time; allowed is a text"},
         WrongConfig{"dds_key", "[dds]\nport = 1\n", "2",

@@ -1,0 +1,135 @@
+#include "api/dds/object_query.hpp"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "api/dds/text.hpp"
+#include "shm/base/names.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr std::string_view kName = "name";
+constexpr std::string_view kType = "type";
+constexpr std::string_view kMatch = "match";
+constexpr std::string_view kAfter = "after";
+
+static_assert(sizeof(plc_KeyValue::value) > kMaxObjectName);
+
+Result<void> check_pattern(std::string_view pattern) {
+  if (pattern.size() <= kMaxObjectName && is_printable_utf8(pattern)) return {};
+  return failure(
+      ErrorCode::invalid_argument,
+      fmt::format("a pattern of {} bytes is not valid: allowed are up to {} bytes of UTF-8 without "
+                  "control characters",
+                  pattern.size(), kMaxObjectName));
+}
+
+Result<void> check_query(const ObjectQuery& query) {
+  const bool others = query.type || !query.match.empty() || !query.after.empty();
+  if (!query.name.empty() && others) {
+    return failure(ErrorCode::invalid_argument, "either one object by name, or a type, a pattern or both");
+  }
+  for (const std::string* name : {&query.name, &query.after}) {
+    if (name->empty()) continue;
+    if (auto good = check_object_name(*name); !good) return good;
+  }
+  return check_pattern(query.match);
+}
+
+bool continues_character(char c) noexcept {
+  return (static_cast<unsigned char>(c) & 0xC0U) == 0x80U;
+}
+
+// Where the next character of UTF-8 begins.
+std::size_t next_character(std::string_view text, std::size_t at) noexcept {
+  do {
+    ++at;
+  } while (at < text.size() && continues_character(text[at]));
+  return at;
+}
+
+}  // namespace
+
+Result<ObjectType> parse_object_type(std::string_view text) {
+  std::array<std::string_view, kObjectTypes> names;
+  for (std::uint32_t number = 0; number < kObjectTypes; ++number) {
+    const auto type = static_cast<ObjectType>(number);
+    names.at(number) = to_string(type);
+    if (names.at(number) == text) return type;
+  }
+  return failure(ErrorCode::invalid_argument, fmt::format("no type of object is called '{}'; allowed are: {}",
+                                                          shown(text), join_names(names)));
+}
+
+Result<std::vector<plc_KeyValue>> entries_of(const ObjectQuery& query) {
+  if (auto good = check_query(query); !good) return std::unexpected(std::move(good).error());
+  std::vector<plc_KeyValue> entries;
+  const auto add = [&](std::string_view name, std::string_view value) {
+    if (value.empty()) return;
+    plc_KeyValue& entry = entries.emplace_back();
+    dds::copy_text(entry.name, name);
+    dds::copy_text(entry.value, value);
+  };
+  add(kName, query.name);
+  add(kType, query.type ? to_string(*query.type) : std::string_view());
+  add(kMatch, query.match);
+  add(kAfter, query.after);
+  return entries;
+}
+
+Result<ObjectQuery> parse_object_query(std::span<const plc_KeyValue> entries) {
+  ObjectQuery query;
+  std::string type;
+  const std::array<std::pair<std::string_view, std::string*>, 4> known{
+      {{kName, &query.name}, {kType, &type}, {kMatch, &query.match}, {kAfter, &query.after}}};
+  for (const plc_KeyValue& entry : entries) {
+    const auto* const found =
+        std::ranges::find(known, dds::text_of(entry.name), &std::pair<std::string_view, std::string*>::first);
+    if (found == known.end()) continue;
+    if (!found->second->empty()) {
+      return failure(ErrorCode::invalid_argument, fmt::format("'{}' is there twice", found->first));
+    }
+    *found->second = dds::text_of(entry.value);
+  }
+  if (!type.empty()) {
+    const auto parsed = parse_object_type(type);
+    if (!parsed) return std::unexpected(parsed.error());
+    query.type = *parsed;
+  }
+  if (auto good = check_query(query); !good) return std::unexpected(std::move(good).error());
+  return query;
+}
+
+// On a mismatch only the last '*' takes one character more: at most pattern times name steps.
+bool matches_pattern(std::string_view pattern, std::string_view name) noexcept {
+  constexpr std::size_t kNone = std::string_view::npos;
+  std::size_t at = 0;
+  std::size_t in_name = 0;
+  std::size_t star = kNone;
+  std::size_t taken = 0;  // the name up to here belongs to that '*' and what was before it
+  while (in_name < name.size()) {
+    if (at < pattern.size() && pattern[at] == '*') {
+      star = at++;
+      taken = in_name;
+    } else if (at < pattern.size() && pattern[at] == '?') {
+      ++at;
+      in_name = next_character(name, in_name);
+    } else if (at < pattern.size() && pattern[at] == name[in_name]) {
+      ++at;
+      ++in_name;
+    } else if (star != kNone) {
+      at = star + 1;
+      in_name = taken = next_character(name, taken);
+    } else {
+      return false;
+    }
+  }
+  return pattern.find_first_not_of('*', at) == kNone;
+}
+
+}  // namespace plchost

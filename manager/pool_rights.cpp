@@ -1,0 +1,64 @@
+#include "manager/pool_rights.hpp"
+
+#include <cerrno>
+#include <cstring>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+
+#include "manager/config/accounts.hpp"
+#include "shm/base/log.hpp"
+#include "shm/base/unique_fd.hpp"
+#include "shm/pool/memory_file.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr mode_t kPermissions = 07777;
+
+bool has(const struct stat& status, const MemoryRights& rights) {
+  return status.st_uid == rights.owner.value_or(status.st_uid) &&
+         status.st_gid == rights.group.value_or(status.st_gid) &&
+         (status.st_mode & kPermissions) == rights.mode;
+}
+
+}  // namespace
+
+Result<MemoryRights> pool_rights(const HostConfig& host) {
+  MemoryRights rights{.mode = host.pool_mode};
+  if (!host.pool_owner.empty()) {
+    const auto owner = user_number(host.pool_owner);
+    if (!owner) return failure_in("[host] pool_owner", owner.error());
+    rights.owner = *owner;
+  }
+  if (!host.pool_group.empty()) {
+    const auto group = group_number(host.pool_group);
+    if (!group) return failure_in("[host] pool_group", group.error());
+    rights.group = *group;
+  }
+  return rights;
+}
+
+void renew_pool_rights(const std::string& pool, const MemoryRights& rights) {
+  const std::string path = fmt::format("{}/{}", MemoryFile::kDirectory, pool);
+  const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+  struct stat before{};
+  if (!fd || ::fstat(fd.get(), &before) != 0) {
+    spdlog::warn("the rights of pool '{}' are not known: {}", pool, std::strerror(errno));
+    return;
+  }
+  if (has(before, rights)) return;
+  const std::string had = describe_rights(before.st_uid, before.st_gid, before.st_mode);
+  if (const auto given = give_rights(fd.get(), rights, path); !given) {
+    spdlog::warn("pool '{}' was there already and keeps {}: {}", pool, had, given.error().describe());
+    return;
+  }
+  struct stat now{};
+  if (::fstat(fd.get(), &now) != 0) return;
+  spdlog::info("pool '{}' was there already with {}; it has {} now", pool, had,
+               describe_rights(now.st_uid, now.st_gid, now.st_mode));
+}
+
+}  // namespace plchost

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <string>
+
+#include "manager/config/manager_config.hpp"
+#include "shm/base/result.hpp"
+#include "shm/pool/memory_rights.hpp"
+
+namespace plchost {
+
+/// Who may use the pool, as [host] pool_owner, pool_group and pool_mode say.
+[[nodiscard]] Result<MemoryRights> pool_rights(const HostConfig& host);
+
+/// A pool that was there before this manager may have other rights than its configuration says: gives it
+/// those, and logs that, or why it cannot. Who has it mapped keeps it.
+void renew_pool_rights(const std::string& pool, const MemoryRights& rights);
+
+}  // namespace plchost

@@ -1,0 +1,51 @@
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "shm/pool/memory_file.hpp"
+#include "tests/integration/manager/plant.hpp"
+
+namespace plchost {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr mode_t kPermissions = 07777;
+
+struct stat status_of(const Plant& plant) {
+  struct stat status{};
+  EXPECT_EQ(::stat(fmt::format("{}/{}", MemoryFile::kDirectory, plant.pool()).c_str(), &status), 0);
+  return status;
+}
+
+// One that this process may give files to: any for root, else its own.
+gid_t some_group() {
+  constexpr gid_t kAnother = 1;
+  return ::geteuid() == 0 ? kAnother : ::getegid();
+}
+
+TEST(PoolRights, AreThoseOfTheConfigurationWhateverTheUmaskSays) {
+  const mode_t before = ::umask(0077);
+  Plant plant;
+  plant.set_host_keys(fmt::format("pool_group = \"{}\"\npool_mode = \"0664\"", some_group()));
+  plant.start_manager();
+  ::umask(before);
+  EXPECT_EQ(status_of(plant).st_mode & kPermissions, 0664U);
+  EXPECT_EQ(status_of(plant).st_gid, some_group());
+  EXPECT_EQ(status_of(plant).st_uid, ::geteuid());
+}
+
+TEST(PoolRights, OfAPoolThatIsThereAlreadyAreRenewedAndThatIsSaid) {
+  Plant plant;
+  plant.start_manager();
+  EXPECT_EQ(status_of(plant).st_mode & kPermissions, 0660U);
+  plant.kill_manager();
+  plant.set_host_keys("pool_mode = \"0600\"");
+  plant.start_manager();
+  EXPECT_EQ(status_of(plant).st_mode & kPermissions, 0600U);
+  EXPECT_THAT(plant.log(), HasSubstr("was there already with"));
+}
+
+}  // namespace
+}  // namespace plchost
