@@ -71,8 +71,8 @@ TEST_F(Objects, AreListedWithWhatTheirTypeHas) {
 }
 
 TEST_F(Objects, AreFilteredByTheHost) {
-  const PoolEvent ready = host_.add_event("line1", "ready");
-  const PoolEvent other = host_.add_event("line2", "ready");
+  (void)host_.add_event("line1", "ready");
+  (void)host_.add_event("line2", "ready");
   const auto memory = pool_.create_memory("line1/image", 64).value();
   EXPECT_EQ(json({"list", "objects", "line1/*"}).size(), 2U);
   EXPECT_EQ(json({"list", "objects", "--type", "event"}).size(), 2U);
@@ -175,7 +175,7 @@ TEST(ManyObjects, AreListedPageByPageWhileTheHostAnswers) {
   const OwnDomain domain;
   TestHost host(domain, "hosta", 16'384);
   ObjectPool pool = ObjectPool::attach(host.pool_name()).value();
-  const PoolEvent ready = host.add_event("line1", "ready");
+  (void)host.add_event("line1", "ready");
   std::vector<SharedSemaphore> held;
   for (std::size_t i = 0; i < kMany; ++i) {
     held.push_back(pool.create_semaphore(fmt::format("store/{:05}", i), 1).value().object);
