@@ -90,17 +90,9 @@ void Plant::use_api_server(const std::string& script) {
 void Plant::start_manager() {
   const std::string config = (folder_ / "cell.toml").string();
   std::ofstream(config) << fmt::format(
-      "[host]
-      name = \"cell\"
-      run_directory = \"{}\"
-      state_directory = \"{}\"
-      pool =
-          "
-          "\"{}\"
-      {}[dds] enabled = {} {} ",
-                        (folder_ / "run")
-                            .string(),
-      (folder_ / "state").string(), pool_, host_keys_, api_server_, instances_);
+      "[host]\nname = \"cell\"\nrun_directory = \"{}\"\nstate_directory = \"{}\"\npool = "
+      "\"{}\"\n{}\n[dds]\nenabled = {}\n{}",
+      (folder_ / "run").string(), (folder_ / "state").string(), pool_, host_keys_, api_server_, instances_);
   const UniqueFd log(::open((folder_ / "log").c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC,
                             0600));  // NOLINT: variadic
   std::vector<std::string> arguments = {kBuild + "/bin/plchostd", "--config", config};
