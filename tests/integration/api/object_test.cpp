@@ -68,6 +68,7 @@ TEST_F(Objects, AreListedWithWhatTheirTypeHas) {
       table, AllOf(HasSubstr("HOST"), HasSubstr("OBJECT"), HasSubstr("WAITERS"), HasSubstr("REFS"),
                    HasSubstr(fmt::format("integration_api({})", ::getpid())),
                    HasSubstr(fmt::format("held by integration_api({}), thread {}", ::getpid(), ::getpid()))));
+  EXPECT_TRUE(pool_.remove_object("image")) << "a kept one would outlive the test";
 }
 
 TEST_F(Objects, AreFilteredByTheHost) {

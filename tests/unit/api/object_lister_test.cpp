@@ -159,6 +159,7 @@ TEST_F(ObjectListerTest, ASampleCarriesAllThatIsKnown) {
   ASSERT_EQ(row["references"].size(), 1U);
   EXPECT_EQ(row["references"][0]["program"], "unit_api");
   EXPECT_EQ(row["references"][0]["writable"], true);
+  EXPECT_TRUE(pool_.remove_object("line1/F\u00fclldruck")) << "a kept one would outlive the test";
 }
 
 TEST(ObjectRows, CutTheListOfHolders) {
