@@ -76,7 +76,7 @@ class OurPipe : public BlocksPipe {
  public:
   static Result<std::unique_ptr<OurPipe>> open(const std::string& pool, BlocksSide side) {
     std::unique_ptr<OurPipe> pipe(new OurPipe);
-    NodeOptions options{.pool = pool, .entry = {.name = side == BlocksSide::bench ? "bench" : "peer"}};
+    const NodeOptions options{.pool = pool, .entry = {.name = side == BlocksSide::bench ? "bench" : "peer"}};
     auto node = BlockNode::join(options);
     if (!node) return std::unexpected(std::move(node).error());
     pipe->node_ = *std::move(node);

@@ -20,15 +20,15 @@ Result<void> BlockService::configure(const BlockSettings& settings) {
 
 Result<void> BlockService::join() {
   if (node_ || pool_.empty()) return {};
-  NodeOptions options{.pool = pool_,
-                      .base = settings_.base,
-                      .entry = {.name = instance_,
-                                .forced_address = settings_.forced_address,
-                                .forwards = settings_.forward,
-                                .queue_slots = settings_.queue_slots},
-                      .neighbours = settings_.neighbours,
-                      .hop_limit = settings_.hop_limit,
-                      .hold = settings_.hold};
+  const NodeOptions options{.pool = pool_,
+                            .base = settings_.base,
+                            .entry = {.name = instance_,
+                                      .forced_address = settings_.forced_address,
+                                      .forwards = settings_.forward,
+                                      .queue_slots = settings_.queue_slots},
+                            .neighbours = settings_.neighbours,
+                            .hop_limit = settings_.hop_limit,
+                            .hold = settings_.hold};
   auto node = BlockNode::join(options);
   if (!node) return failure_in("[CmpBlkDrvShm]", std::move(node).error());
   auto router = BlockRouter::create(**node);
