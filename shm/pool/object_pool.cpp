@@ -1,6 +1,8 @@
 #include "shm/pool/object_pool.hpp"
 
+#include <algorithm>
 #include <chrono>
+#include <iterator>
 #include <limits>
 #include <new>
 #include <thread>
@@ -343,19 +345,31 @@ Result<void> ObjectPool::remove_object(std::string_view name) {
   return {};
 }
 
+// In parts, so that nobody waits for long who wants the lock meanwhile.
 std::vector<ObjectInfo> ObjectPool::list() const {
+  constexpr std::size_t kPart = 256;
   const PoolView& view = segment_->view();
-  const auto all = [&] {
-    std::vector<ObjectInfo> infos;
-    for (const ObjectEntry& entry : view.used_entries()) {
-      if (PoolTable::is_valid(entry) && !PoolTable::is_idle(entry))
-        infos.push_back(describe_object(view, entry));
+  std::vector<ObjectInfo> all;
+  for (std::size_t at = 0; at == 0 || at < view.used_entries().size(); at += kPart) {
+    const auto part = [&] {
+      std::vector<ObjectInfo> infos;
+      const auto used = view.used_entries();
+      for (std::size_t i = at; i < std::min(at + kPart, used.size()); ++i) {
+        if (PoolTable::is_valid(used[i]) && !PoolTable::is_idle(used[i])) {
+          infos.push_back(describe_object(view, used[i]));
+        }
+      }
+      return infos;
+    };
+    if (!segment_->writable()) {
+      std::ranges::move(look_only(part), std::back_inserter(all));
+      continue;
     }
-    return infos;
-  };
-  if (!segment_->writable()) return look_only(all);
-  const auto held = segment_->lock(true);
-  return held ? all() : std::vector<ObjectInfo>();
+    const auto held = segment_->lock(at == 0);
+    if (!held) return {};
+    std::ranges::move(part(), std::back_inserter(all));
+  }
+  return all;
 }
 
 Result<ObjectInfo> ObjectPool::look_at(std::string_view name) const {
