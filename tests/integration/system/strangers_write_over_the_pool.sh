@@ -3,8 +3,8 @@
 . "$(dirname "$0")/common.sh"
 
 write_host cell $(seq "$first_core" "$last_core")
-write_instance cell line1 "$first_core" task_faults 'share_core = true'
-write_instance cell line2 "$last_core" task_faults 'share_core = true'
+write_instance cell line1 "$first_core" bottling_line 'share_core = true'
+write_instance cell line2 "$last_core" bottling_line 'share_core = true'
 start_manager cell
 until_true 20 state_is line1 running
 until_true 20 state_is line2 running
@@ -31,7 +31,7 @@ PYTHON
 
 pids() { echo "${managers[0]} $(instance line1 pid) $(instance line2 pid)"; }
 alive() { kill -0 "${managers[0]}" && pgrep -P "${managers[0]}" plc-instance >/dev/null; }
-cycles() { task "$1/Low" cycles; }
+cycles() { task "$1/Fill" cycles; }
 more_than() { [ "$(cycles "$1")" -gt "$2" ]; }
 
 before=$(pids)
@@ -54,10 +54,13 @@ done
 echo "- all are the processes that they were, and their tasks run"
 is "$(pids)" "$before" || fail "before: $before, now: $(pids)"
 
-sleep 1.5  # the manager looks after the pool once a second
-echo "- a reset gives an instance its events back, the manager ends in order and leaves nothing"
-plcctl reset instance line1 && plcctl start instance line1 || fail "reset and start"
-until_true 20 state_is line1 running
+echo "- the manager ends in order and leaves nothing; the next one starts them on a new pool"
 kill -TERM "${managers[0]}"
 wait "${managers[0]}" || fail "the manager ended with $?"
+nothing_left
+start_manager cell
+until_true 20 state_is line1 running
+until_true 20 state_is line2 running
+kill -TERM "${managers[1]}"
+wait "${managers[1]}" || fail "the manager ended with $?"
 nothing_left
