@@ -11,11 +11,6 @@
 
 namespace plchost {
 
-namespace {
-
-// "plckept1", as bytes in memory.
-constexpr std::uint64_t kKeptMagic = 0x317470656b636c70;
-
 struct KeptEntry {
   FixedText<kMaxTaskName> name;
   std::array<char, 5> zero{};
@@ -25,6 +20,11 @@ struct KeptEntry {
   std::uint64_t offset = 0;
 };
 static_assert(sizeof(KeptEntry) == 80);
+
+namespace {
+
+// "plckept1", as bytes in memory.
+constexpr std::uint64_t kKeptMagic = 0x317470656b636c70;
 
 // Tasks write what is read here: a copy that they were in the way of is thrown away.
 __attribute__((no_sanitize("thread"))) void copy_moving(std::byte* to, const std::byte* from,

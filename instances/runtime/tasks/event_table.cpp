@@ -1,22 +1,13 @@
 #include "instances/runtime/tasks/event_table.hpp"
 
-#include <bit>
 #include <span>
 
 #include <fmt/format.h>
 
+#include "instances/runtime/tasks/handle.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
-
-namespace {
-
-// Handles are 1, 2, ...: nothing that could be mistaken for an address, and 0 and -1 are none.
-RTS_HANDLE to_handle(std::size_t index) noexcept {
-  return std::bit_cast<RTS_HANDLE>(index + 1);
-}
-
-}  // namespace
 
 void EventTable::clear_own() {
   if (pool_ == nullptr) return;
@@ -31,7 +22,7 @@ void EventTable::clear_own() {
 }
 
 EventTable::Slot* EventTable::find(RTS_HANDLE handle) const noexcept {
-  const std::size_t index = std::bit_cast<std::size_t>(handle) - 1;  // of 0 it is beyond any table
+  const std::size_t index = index_of(handle);
   return index < count_.load(std::memory_order_acquire) ? slots_[index].get() : nullptr;
 }
 

@@ -1,20 +1,16 @@
 #include "instances/runtime/tasks/task_table.hpp"
 
 #include <algorithm>
-#include <bit>
 #include <cstring>
 #include <iterator>
 #include <span>
 
 #include "instances/runtime/application/application_host.hpp"
+#include "instances/runtime/tasks/handle.hpp"
 
 namespace plchost {
 
 namespace {
-
-RTS_HANDLE to_handle(std::size_t index) noexcept {
-  return std::bit_cast<RTS_HANDLE>(index + 1);
-}
 
 // What an application hands over is checked only after it was: it may be anything.
 std::span<const Task_Info> tasks_of(const sys_setup_tasks_struct* setup) noexcept {
@@ -46,7 +42,7 @@ RTS_HANDLE TaskTable::find(const Task_Info* info) const noexcept {
 
 Task* TaskTable::task(RTS_HANDLE handle) const noexcept {
   TaskSet* const tasks = tasks_.load(std::memory_order_acquire);
-  const std::size_t index = std::bit_cast<std::size_t>(handle) - 1;  // of 0 it is beyond any table
+  const std::size_t index = index_of(handle);
   if (tasks == nullptr || index >= tasks->size()) return nullptr;
   return &tasks->task(index);
 }
