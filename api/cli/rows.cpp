@@ -34,10 +34,6 @@ std::string name_of(std::span<const std::string_view> names, std::uint32_t numbe
   return number < names.size() ? std::string(names[number]) : fmt::format("{}", number);
 }
 
-double to_us(std::int64_t nanoseconds) {
-  return static_cast<double>(nanoseconds) / 1000.0;
-}
-
 // What the host tells beyond the fields that this program knows. A name that is taken stays what it is.
 void add_extension(Row& row, const dds_sequence_plc_KeyValue& entries) {
   for (const plc_KeyValue& entry : std::span(entries._buffer, entries._length)) {

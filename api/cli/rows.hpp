@@ -21,6 +21,11 @@ namespace plchost {
 /// none (0).
 [[nodiscard]] std::string time_text(std::int64_t unix_ns);
 
+/// Durations are in microseconds in all rows.
+[[nodiscard]] constexpr double to_us(std::int64_t nanoseconds) noexcept {
+  return static_cast<double>(nanoseconds) / 1000.0;
+}
+
 /// What the tables show of them.
 [[nodiscard]] const std::vector<Column>& host_columns();
 [[nodiscard]] const std::vector<Column>& instance_columns();

@@ -8,6 +8,7 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include "api/cli/rows.hpp"
 #include "shm/base/duration_histogram.hpp"
 
 namespace plchost {
@@ -15,10 +16,6 @@ namespace plchost {
 namespace {
 
 constexpr std::array kPercentiles{"p50", "p90", "p99", "p99_9", "p99_99"};
-
-double to_us(std::int64_t nanoseconds) {
-  return static_cast<double>(nanoseconds) / 1000.0;
-}
 
 void add_summary(Row& row, std::string_view name, const plc_DurationSummary& summary) {
   row[fmt::format("{}_last_us", name)] = to_us(summary.last_ns);
