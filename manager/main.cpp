@@ -11,6 +11,7 @@
 #include "manager/manager.hpp"
 #include "manager/system/child_process.hpp"
 #include "shm/base/log.hpp"
+#include "shm/base/memory_guard.hpp"
 
 namespace plchost {
 
@@ -97,5 +98,6 @@ int plchostd_main(int argc, const char* const* argv) {
 int main(int argc, char** argv) {
   // Who reads the log may go away: no reason to leave the instances alone.
   (void)std::signal(SIGPIPE, SIG_IGN);
+  plchost::MemoryGuard::watch_process();
   return plchost::plchostd_main(argc, argv);
 }

@@ -209,8 +209,17 @@ Result<void> Manager::run() {
 void Manager::tick() {
   supervisor_->refresh();
   if (latency_due_) restore_latency();
-  if (++ticks_ % kTicksPerTidying == 0) pool_->tidy();
+  if (++ticks_ % kTicksPerTidying == 0) look_after_pool();
   tick_.set(MonotonicClock::now() + kTick);
+}
+
+void Manager::look_after_pool() {
+  if (pool_->tidy() || pool_lost_) return;
+  pool_lost_ = true;
+  spdlog::error(
+      "pool '{}': another program has cut its file in {} short; what instances share is lost: stop this "
+      "manager, which removes it, and start it again",
+      config_.host.pool, MemoryFile::kDirectory);
 }
 
 // What instances held that are gone, now or before this manager.

@@ -45,6 +45,7 @@ class Manager {
   void shut_down();
   void clean_up();
   void tick();
+  void look_after_pool();
   void restore_latency();
 
   const ManagerConfig& config_;
@@ -62,6 +63,7 @@ class Manager {
   ApiServer api_server_;
   Reactor::Timer tick_;
   unsigned ticks_ = 0;
+  bool pool_lost_ = false;
   bool latency_due_ = true;  // an instance may have ended without putting back what it held
   bool ending_ = false;
 };

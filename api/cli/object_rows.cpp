@@ -75,7 +75,7 @@ Row to_row(std::string_view host, const ListedObject& object) {
   const bool memory = info.type == ObjectType::memory;
   const bool mutex = info.type == ObjectType::mutex;
   const bool held = mutex && info.value != 0;
-  const auto or_null = [](bool there, auto value) { return there ? Row(value) : Row(); };
+  const auto or_null = [](bool there, const auto& value) { return there ? Row(value) : Row(); };
   return {{"host", host},
           {"object", info.name},
           {"type", type_text(info.type)},

@@ -5,6 +5,7 @@
 
 #include "api/server/control_server.hpp"
 #include "shm/base/log.hpp"
+#include "shm/base/memory_guard.hpp"
 
 namespace {
 
@@ -16,6 +17,7 @@ constexpr int kExitUsage = 2;
 }  // namespace
 
 int main(int argc, char** argv) {
+  plchost::MemoryGuard::watch_process();
   plchost::ServerOptions options;
   options.pool = "plchost";
   std::string log_level = "info";

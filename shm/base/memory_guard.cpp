@@ -1,5 +1,6 @@
 #include "shm/base/memory_guard.hpp"
 
+#include <signal.h>
 #include <sys/mman.h>
 
 namespace plchost {
@@ -22,6 +23,16 @@ void MemoryGuard::Release::operator()(Slot* slot) const noexcept {
   slot->end.store(0, std::memory_order_relaxed);
   slot->lost.store(false, std::memory_order_relaxed);
   slot->begin.store(0, std::memory_order_release);
+}
+
+void MemoryGuard::watch_process() noexcept {
+  struct sigaction action{};
+  action.sa_flags = SA_SIGINFO;
+  action.sa_sigaction = [](int signal, siginfo_t* info, void*) {
+    // Of what is not guarded the next touch is the end.
+    if (info->si_code <= 0 || !mend(info->si_addr)) ::signal(signal, SIG_DFL);
+  };
+  ::sigaction(SIGBUS, &action, nullptr);
 }
 
 bool MemoryGuard::mend(const void* address) noexcept {

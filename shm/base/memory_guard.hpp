@@ -29,6 +29,9 @@ class MemoryGuard {
     return slot_ != nullptr && slot_->lost.load(std::memory_order_relaxed);
   }
 
+  /// Installs a handler of SIGBUS that does so, for a process that has no other one. What is not guarded ends
+  /// the process as ever. Set-up.
+  static void watch_process() noexcept;
   /// For the handler of SIGBUS: whether `address` is guarded, and can be touched now. Any context.
   [[nodiscard]] static bool mend(const void* address) noexcept;
 

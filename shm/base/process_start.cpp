@@ -89,16 +89,17 @@ bool process_has_ended(pid_t process, std::uint64_t start) noexcept {
   return stat && (stat->start != start || process_is_over(*stat));
 }
 
-bool thread_has_ended(pid_t thread, std::uint64_t start) noexcept {
-  if (thread <= 0 || !exists(thread)) return true;
+std::optional<std::uint64_t> start_of_thread(pid_t thread) noexcept {
+  if (thread <= 0 || !exists(thread)) return std::nullopt;
   const auto stat = read_stat(thread);
-  return stat && ((start != 0 && stat->start != start) || thread_is_over(*stat));
+  if (!stat) return 0;
+  return thread_is_over(*stat) ? std::nullopt : std::optional(stat->start);
 }
 
 const ThreadIdentity& this_thread() noexcept {
   if (identity.id == 0) {
-    static const int kWatched = ::pthread_atfork(nullptr, nullptr, [] { identity = {}; });
-    (void)kWatched;
+    [[maybe_unused]] static const int kForgottenInChildren =
+        ::pthread_atfork(nullptr, nullptr, [] { identity = {}; });
     const pid_t self = ::gettid();
     const auto stat = read_stat(self);
     identity = {.id = static_cast<std::uint32_t>(self), .start = stat ? stat->start : kUnknownStart};

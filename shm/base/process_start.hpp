@@ -14,8 +14,9 @@ namespace plchost {
 
 /// Whether the process that began at `start` has ended. In doubt (the host hides it) it has not. Set-up.
 [[nodiscard]] bool process_has_ended(pid_t process, std::uint64_t start) noexcept;
-/// The same of one thread, which ends before its process does. `start` 0: whichever has the number.
-[[nodiscard]] bool thread_has_ended(pid_t thread, std::uint64_t start) noexcept;
+/// When a thread began; nothing: it has ended, which it can do before its process does. In doubt it is there,
+/// with the start 0. Set-up.
+[[nodiscard]] std::optional<std::uint64_t> start_of_thread(pid_t thread) noexcept;
 
 /// The calling thread. The first call of a thread reads a file, later ones cost nothing; a child of fork()
 /// reads it anew.

@@ -18,6 +18,18 @@ namespace {
 constexpr Duration kDoubt = std::chrono::milliseconds(80);
 constexpr Duration kPause = std::chrono::milliseconds(1);
 
+constexpr unsigned kNumberBits = 30;
+static_assert(FUTEX_TID_MASK == (1U << kNumberBits) - 1);
+
+constexpr std::uint64_t record_of(const ThreadIdentity& thread) noexcept {
+  return thread.start << kNumberBits | thread.id;
+}
+
+/// Of a word or a record.
+constexpr std::uint32_t number_of(std::uint64_t value) noexcept {
+  return static_cast<std::uint32_t>(value) & FUTEX_TID_MASK;
+}
+
 // The errno, 0 on success. FUTEX_LOCK_PI2 takes its time-out from CLOCK_MONOTONIC, FUTEX_LOCK_PI from the
 // clock on the wall.
 int lock_in_kernel(std::atomic<std::uint32_t>& word, TimePoint until) noexcept {
@@ -36,11 +48,11 @@ LockResult RobustMutex::try_lock() noexcept {
   std::uint32_t found = 0;
   const ThreadIdentity& self = this_thread();
   if (word_.compare_exchange_strong(found, self.id, std::memory_order_acquire, std::memory_order_relaxed)) {
-    owner_start_.store(self.start, std::memory_order_relaxed);
+    record_.store(record_of(self), std::memory_order_relaxed);
     return LockResult::locked;
   }
   // One that died may have had our number.
-  const bool ours = (found & FUTEX_TID_MASK) == self.id && owner_start() == self.start;
+  const bool ours = number_of(found) == self.id && record_.load(std::memory_order_relaxed) == record_of(self);
   return ours ? LockResult::deadlock : LockResult::timed_out;
 }
 
@@ -50,43 +62,48 @@ LockResult RobustMutex::lock(TimePoint deadline) noexcept {
 }
 
 LockResult RobustMutex::lock_slowly(TimePoint deadline) noexcept {
-  const TimePoint began = MonotonicClock::now();
-  unsigned refusals = 0;
-  for (TimePoint now = began;;) {
+  TimePoint now = MonotonicClock::now();
+  TimePoint doubtful_since = kNoDeadline;
+  for (;;) {
+    const std::uint32_t before = word_.load(std::memory_order_relaxed);
     const int error = lock_in_kernel(word_, std::min(deadline, now + kLook));
     now = MonotonicClock::now();
-    const bool long_enough = now - began > kDoubt;
+    doubtful_since = error == EINVAL ? std::min(doubtful_since, now) : kNoDeadline;
     switch (error) {
       case 0:
         return taken();
-      case EAGAIN:
-      case EINTR:
-        break;
       case EDEADLK:  // one that died had our number
+        if (number_of(before) == this_thread().id && take_over(before)) return LockResult::owner_died;
+        break;
       case ESRCH:
       case EPERM:  // its number belongs to a thread of the kernel now
       case ETIMEDOUT:
-        if (take_over_from_the_dead(error == EDEADLK || long_enough)) return LockResult::owner_died;
+        if (take_over_from_the_dead(error == ESRCH)) return LockResult::owner_died;
         break;
-      default:  // EINVAL: others still wait for a dead owner that it was taken over from, or it was scribbled
-                // over
-        if (++refusals > 1 && long_enough) return LockResult::corrupt;
+      case EINVAL:  // others still wait for a dead owner that it was taken over from, or it was scribbled
+                    // over
+        if (now - doubtful_since > kDoubt) return LockResult::corrupt;
+        break;
+      default:  // EAGAIN: its owner is just ending; EINTR
+        break;
     }
     if (now >= deadline) return LockResult::timed_out;
     if (error != EINTR && error != ETIMEDOUT) pause_until(std::min(deadline, now + kPause));
   }
 }
 
-// What is looked at twice is the same owner in the same hold: the start is cleared before the word at each
-// unlock. If its owner died before it could tell its start, another thread of the same number is known from
-// it only by time: `certain`.
-bool RobustMutex::take_over_from_the_dead(bool certain) noexcept {
+// From a thread that is not there, or that has the number of the one that took it and began later. A record
+// of another number says nothing: each owner clears its own before it unlocks, and the kernel hands over what
+// a dead one has left. A living owner is never taken from, however long it takes to write its record.
+bool RobustMutex::take_over_from_the_dead(bool nobody_waits) noexcept {
   const std::uint32_t word = word_.load(std::memory_order_acquire);
-  const std::uint64_t start = owner_start_.load(std::memory_order_acquire);
-  const auto thread = static_cast<pid_t>(word & FUTEX_TID_MASK);
-  if (thread == 0) return false;
-  if (!thread_has_ended(thread, start) && (start != 0 || !certain)) return false;
-  return owner_start_.load(std::memory_order_acquire) == start && take_over(word);
+  const std::uint64_t record = record_.load(std::memory_order_acquire);
+  const std::uint32_t owner = number_of(word);
+  if (owner == 0) return false;
+  const auto start = start_of_thread(static_cast<pid_t>(owner));
+  const bool told = number_of(record) == owner;
+  const bool gone = start ? told && record != record_of({.id = owner, .start = *start}) : nobody_waits;
+  return gone && record_.load(std::memory_order_acquire) == record && take_over(word);
 }
 
 // Only if it is still as it was seen. Who waits in the kernel for the dead one wakes at its next look.
@@ -95,22 +112,22 @@ bool RobustMutex::take_over(std::uint32_t word) noexcept {
   if (!word_.compare_exchange_strong(word, mine, std::memory_order_acquire, std::memory_order_relaxed)) {
     return false;
   }
-  owner_start_.store(this_thread().start, std::memory_order_relaxed);
+  record_.store(record_of(this_thread()), std::memory_order_relaxed);
   return true;
 }
 
 // By the kernel, which leaves the mark of a dead owner in the word for us to take off.
 LockResult RobustMutex::taken() noexcept {
   const std::uint32_t before = word_.fetch_and(~std::uint32_t{FUTEX_OWNER_DIED}, std::memory_order_acquire);
-  owner_start_.store(this_thread().start, std::memory_order_relaxed);
+  record_.store(record_of(this_thread()), std::memory_order_relaxed);
   return (before & FUTEX_OWNER_DIED) != 0 ? LockResult::owner_died : LockResult::locked;
 }
 
 bool RobustMutex::unlock() noexcept {
   const std::uint32_t self = this_thread().id;
   std::uint32_t word = word_.load(std::memory_order_relaxed);
-  if ((word & FUTEX_TID_MASK) != self) return false;
-  owner_start_.store(0, std::memory_order_relaxed);
+  if (number_of(word) != self) return false;
+  record_.store(0, std::memory_order_release);
   word = self;
   if (word_.compare_exchange_strong(word, 0, std::memory_order_release, std::memory_order_relaxed))
     return true;
@@ -123,7 +140,7 @@ bool RobustMutex::unlock() noexcept {
 }
 
 std::uint32_t RobustMutex::owner() const noexcept {
-  return word_.load(std::memory_order_relaxed) & FUTEX_TID_MASK;
+  return number_of(word_.load(std::memory_order_relaxed));
 }
 
 }  // namespace plchost

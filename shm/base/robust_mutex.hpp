@@ -35,23 +35,19 @@ class RobustMutex {
   bool unlock() noexcept;
   /// The thread that holds it; 0: none. It may have ended since. Any context.
   [[nodiscard]] std::uint32_t owner() const noexcept;
-  /// Of the owner: see this_thread(). 0: none, or not told yet.
-  [[nodiscard]] std::uint64_t owner_start() const noexcept {
-    return owner_start_.load(std::memory_order_relaxed);
-  }
-
   /// How long one that was left by a dead thread can look as if it were held.
   static constexpr Duration kLook = std::chrono::milliseconds(40);
 
  private:
   [[nodiscard]] LockResult lock_slowly(TimePoint deadline) noexcept;
-  [[nodiscard]] bool take_over_from_the_dead(bool certain) noexcept;
+  [[nodiscard]] bool take_over_from_the_dead(bool nobody_waits) noexcept;
   [[nodiscard]] bool take_over(std::uint32_t word) noexcept;
   [[nodiscard]] LockResult taken() noexcept;
 
   std::atomic<std::uint32_t> word_{0};
-  std::uint32_t reserved_ = 0;
-  std::atomic<std::uint64_t> owner_start_{0};
+  [[maybe_unused]] std::uint32_t reserved_ = 0;
+  /// [ start of the owner, its lower 34 bits ][ its number : 30 ]; 0: not held, or not told yet.
+  std::atomic<std::uint64_t> record_{0};
 };
 
 static_assert(sizeof(RobustMutex) == 16);

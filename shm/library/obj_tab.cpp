@@ -73,7 +73,7 @@ STATUS take(plc_sem& semaphore, std::optional<TimePoint> deadline) {
   }
   // One post for each call, as a semaphore would: wait() sets the cursor to all of them.
   const auto& event = std::get<SharedEvent>(semaphore.object);
-  std::atomic_ref cursor(semaphore.cursor);
+  const std::atomic_ref cursor(semaphore.cursor);
   for (;;) {
     std::uint64_t taken = cursor.load();
     std::uint64_t posted = taken;

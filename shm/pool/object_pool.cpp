@@ -97,9 +97,10 @@ const std::string& ObjectPool::name() const noexcept {
   return segment_->name();
 }
 
-void ObjectPool::tidy() noexcept {
+bool ObjectPool::tidy() noexcept {
   constexpr auto kPatience = std::chrono::milliseconds(20);
   (void)segment_->lock(true, kPatience);
+  return !segment_->lost();
 }
 
 std::uint32_t ObjectPool::capacity() const noexcept {

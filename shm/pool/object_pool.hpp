@@ -102,8 +102,10 @@ class ObjectPool {
   [[nodiscard]] Result<ObjectInfo> look_at(std::string_view name) const;
 
   /// Releases what dead clients held, and mends what a stranger wrote over, without waiting for the next call
-  /// of anyone. Gives up after 20 ms if another one holds the lock. For whoever watches over the host.
-  void tidy() noexcept;
+  /// of anyone. Gives up after 20 ms if another one holds the lock. For whoever watches over the host. False:
+  /// the pool's file was cut short by a stranger, and this process is alone with what it has (see
+  /// MemoryGuard).
+  bool tidy() noexcept;
 
   [[nodiscard]] const std::string& name() const noexcept;
   /// How many objects it can hold.

@@ -179,7 +179,7 @@ void PoolSegment::mend_header() noexcept {
 // What was half-made when its maker died: a memory whose file may have its name already, an object that
 // nobody has a reference to yet.
 void PoolSegment::repair() noexcept {
-  for (ObjectEntry& entry : view_.entries()) {
+  for (const ObjectEntry& entry : view_.entries()) {
     const bool half_made = entry.state.load(kRelaxed) == static_cast<std::uint32_t>(EntryState::changing);
     if (half_made && entry.type.load(kRelaxed) == static_cast<std::uint32_t>(ObjectType::memory)) {
       MemoryFile::remove(pool_memory_name(name_, entry.name.view()));

@@ -34,6 +34,9 @@ class PoolSegment {
   [[nodiscard]] const PoolView& view() const noexcept { return view_; }
   [[nodiscard]] bool writable() const noexcept { return access_ == Access::read_write; }
 
+  /// The file was cut short by a stranger.
+  [[nodiscard]] bool lost() const noexcept { return guard_.lost(); }
+
   /// Who holds it finds all lists repaired, and what dead clients held released.
   /// refused: mapped to read only. wrong_state: this process is a child of the one that attached.
   [[nodiscard]] Result<PoolLock> lock(bool look_thoroughly = false, Duration patience = PoolLock::kPatience);

@@ -15,7 +15,7 @@ thread_local Task_Info* task_here = nullptr;
 
 }  // namespace
 
-ApplicationHost::ApplicationHost(std::string instance, ObjectPool* pool)
+ApplicationHost::ApplicationHost(const std::string& instance, ObjectPool* pool)
     : events_(instance, pool), blocks_(pool == nullptr ? "" : pool->name(), instance) {
   the_host = this;
 }

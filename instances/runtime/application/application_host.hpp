@@ -19,7 +19,7 @@ namespace plchost {
 /// is meant: so there is one of these in a process, and it is found by current().
 class ApplicationHost {
  public:
-  ApplicationHost(std::string instance, ObjectPool* pool);
+  ApplicationHost(const std::string& instance, ObjectPool* pool);
   ~ApplicationHost();
   ApplicationHost(const ApplicationHost&) = delete;
   ApplicationHost& operator=(const ApplicationHost&) = delete;

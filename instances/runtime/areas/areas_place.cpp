@@ -204,7 +204,7 @@ void Areas::make_views(std::size_t index) {
 
 void Areas::make_view(std::size_t index, std::size_t task, bool sole) {
   Block& block = blocks_[index];
-  const bool registers = block.memory.bytes().size() > 0 && !block.inputs && !block.outputs;
+  const bool registers = !block.memory.bytes().empty() && !block.inputs && !block.outputs;
   if (first_of(plan_.blocks[index]).is_input()) {
     auto& view =
         registers ? inputs_.emplace_back(index, block.initial, block.memory.bytes()).view

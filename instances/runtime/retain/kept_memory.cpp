@@ -55,7 +55,7 @@ std::string KeptMemory::name_for(const std::string& instance) {
 }
 
 std::size_t KeptMemory::bytes_for(std::uint64_t data) noexcept {
-  static_assert(sizeof(Header) == 96 + 80 * kMaxRetainAreas + 8 * PLC_MAX_TASKS &&
+  static_assert(sizeof(Header) == 96 + std::size_t{80} * kMaxRetainAreas + std::size_t{8} * PLC_MAX_TASKS &&
                 sizeof(Header) % kRetainAlignment == 0);
   return sizeof(Header) + data;
 }

@@ -121,10 +121,36 @@ TEST_F(RobustMutexTest, ThreadThatEndsWithoutUnlockingIsADeadOwner) {
   EXPECT_TRUE(shared_.mutex.unlock());
 }
 
+TEST_F(RobustMutexTest, OneDeathIsToldOnceAndLetsOneInHoweverManyWaitForLong) {
+  for (int round = 0; round < 10; ++round) {
+    const pid_t child = hold_in_child();
+    std::atomic<int> inside{0};
+    std::atomic<int> deaths{0};
+    std::vector<std::thread> waiters;
+    for (int i = 0; i < 12; ++i) {
+      waiters.emplace_back([&] {
+        const LockResult result = shared_.mutex.lock();
+        deaths += result == LockResult::owner_died ? 1 : 0;
+        EXPECT_TRUE(result == LockResult::locked || result == LockResult::owner_died);
+        EXPECT_EQ(inside.fetch_add(1), 0);
+        std::this_thread::sleep_for(std::chrono::microseconds(500));
+        inside.fetch_sub(1);
+        EXPECT_TRUE(shared_.mutex.unlock());
+      });
+    }
+    std::this_thread::sleep_for(3 * RobustMutex::kLook);  // as they look
+    reap(child);
+    for (auto& waiter : waiters) waiter.join();
+    EXPECT_EQ(deaths, 1);
+    shared_.step = 0;
+  }
+}
+
 /// The word of one that is held by `thread`, which began at `start`.
 void pretend(RobustMutex& mutex, std::uint32_t thread, std::uint64_t start) {
+  const std::uint64_t record = start << 30 | thread;
   std::memcpy(static_cast<void*>(&mutex), &thread, sizeof(thread));
-  std::memcpy(reinterpret_cast<std::byte*>(&mutex) + 8, &start, sizeof(start));
+  std::memcpy(reinterpret_cast<std::byte*>(&mutex) + 8, start == 0 ? &start : &record, sizeof(record));
 }
 
 TEST_F(RobustMutexTest, ThreadThatWasGivenTheNumberOfADeadOwnerIsNotTheOwner) {
@@ -151,12 +177,31 @@ TEST_F(RobustMutexTest, DeadOwnerThatHadTheNumberOfTheCallerIsNotTheCaller) {
   EXPECT_TRUE(shared_.mutex.unlock());
 }
 
-TEST_F(RobustMutexTest, OwnerThatDiedBeforeItToldItsStartIsOvercome) {
-  const pid_t stranger = in_child([] { ::pause(); });
-  pretend(shared_.mutex, static_cast<std::uint32_t>(stranger), 0);
-  EXPECT_EQ(shared_.mutex.lock(in(milliseconds(20'000))), LockResult::owner_died);
+TEST_F(RobustMutexTest, LivingOwnerThatHasNotToldItsStartYetIsWaitedFor) {
+  const pid_t owner = in_child([] { ::pause(); });
+  pretend(shared_.mutex, static_cast<std::uint32_t>(owner), 0);
+  EXPECT_EQ(shared_.mutex.lock(in(milliseconds(200))), LockResult::timed_out);
+  reap(owner);
+  EXPECT_EQ(shared_.mutex.lock(), LockResult::owner_died);
   EXPECT_TRUE(shared_.mutex.unlock());
-  reap(stranger);
+}
+
+TEST_F(RobustMutexTest, IsNeverTakenFromTheLivingHoweverLongTheyHoldIt) {
+  std::atomic<int> inside{0};
+  std::vector<std::thread> threads;
+  for (int i = 0; i < 8; ++i) {
+    threads.emplace_back([&] {
+      for (int n = 0; n < 6; ++n) {
+        ASSERT_EQ(shared_.mutex.lock(), LockResult::locked);
+        ASSERT_EQ(inside.fetch_add(1), 0);
+        std::this_thread::sleep_for(milliseconds(40) -
+                                    std::chrono::microseconds(100));  // as often as waiters look
+        inside.fetch_sub(1);
+        ASSERT_TRUE(shared_.mutex.unlock());
+      }
+    });
+  }
+  for (auto& thread : threads) thread.join();
 }
 
 TEST_F(RobustMutexTest, WhateverAStrangerWritesALockEndsAndTheNextOnesDoToo) {

