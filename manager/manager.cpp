@@ -107,6 +107,7 @@ Result<void> Manager::set_up() {
   }
   const auto rights = pool_rights(host);
   if (!rights) return std::unexpected(rights.error());
+  if (auto ours = check_pool_owner(host.pool, *rights); !ours) return ours;
   auto pool = ObjectPool::create(host.pool, {.max_objects = host.pool_objects, .rights = *rights});
   if (!pool) return std::unexpected(pool.error());
   renew_pool_rights(host.pool, *rights);

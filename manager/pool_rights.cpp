@@ -6,6 +6,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include "manager/config/accounts.hpp"
 #include "shm/base/log.hpp"
@@ -39,6 +40,19 @@ Result<MemoryRights> pool_rights(const HostConfig& host) {
     rights.group = *group;
   }
   return rights;
+}
+
+Result<void> check_pool_owner(const std::string& pool, const MemoryRights& rights) {
+  const std::string path = fmt::format("{}/{}", MemoryFile::kDirectory, pool);
+  struct stat status{};
+  if (::lstat(path.c_str(), &status) != 0) return {};
+  const uid_t owner = status.st_uid;
+  if (owner == 0 || owner == ::geteuid() || owner == rights.owner) return {};
+  return failure(
+      ErrorCode::refused,
+      fmt::format("pool '{}' is there already and belongs to user {}: remove {}, give [host] pool another "
+                  "name, or name that user as pool_owner",
+                  pool, owner, path));
 }
 
 void renew_pool_rights(const std::string& pool, const MemoryRights& rights) {

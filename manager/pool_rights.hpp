@@ -8,6 +8,10 @@
 
 namespace plchost {
 
+/// Refuses a pool that is there already and belongs to a user who is neither this one, nor root, nor the
+/// configured owner: whoever makes a file in /dev/shm first could own all that instances share.
+[[nodiscard]] Result<void> check_pool_owner(const std::string& pool, const MemoryRights& rights);
+
 /// Who may use the pool, as [host] pool_owner, pool_group and pool_mode say.
 [[nodiscard]] Result<MemoryRights> pool_rights(const HostConfig& host);
 

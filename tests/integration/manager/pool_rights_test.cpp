@@ -1,3 +1,5 @@
+#include "manager/pool_rights.hpp"
+
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <sys/stat.h>
@@ -45,6 +47,20 @@ TEST(PoolRights, OfAPoolThatIsThereAlreadyAreRenewedAndThatIsSaid) {
   plant.start_manager();
   EXPECT_EQ(status_of(plant).st_mode & kPermissions, 0600U);
   EXPECT_THAT(plant.log(), HasSubstr("was there already with"));
+}
+
+TEST(PoolRights, OfAPoolThatAStrangerMadeBeforeAreNotTaken) {
+  if (::geteuid() != 0) GTEST_SKIP() << "needs root to give a file to another user";
+  constexpr uid_t kNobody = 65534;
+  const std::string name = fmt::format("plchost-rights-{}", ::getpid());
+  const auto made = MemoryFile::create(name, 100, {}, {.owner = kNobody});
+  ASSERT_TRUE(made);
+  const auto refused = check_pool_owner(name, {});
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, HasSubstr("belongs to user 65534"));
+  EXPECT_TRUE(check_pool_owner(name, {.owner = kNobody}));
+  MemoryFile::remove(name);
+  EXPECT_TRUE(check_pool_owner(name, {})) << "there is none";
 }
 
 }  // namespace
