@@ -98,7 +98,7 @@ std::optional<std::uint64_t> start_of_thread(pid_t thread) noexcept {
 
 const ThreadIdentity& this_thread() noexcept {
   if (identity.id == 0) {
-    [[maybe_unused]] static const int kForgottenInChildren =
+    [[maybe_unused]] static const int forgotten_in_children =
         ::pthread_atfork(nullptr, nullptr, [] { identity = {}; });
     const pid_t self = ::gettid();
     const auto stat = read_stat(self);
