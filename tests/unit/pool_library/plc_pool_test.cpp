@@ -151,7 +151,8 @@ TEST_F(PlcPool, FirmwareInCAndCppShareATray) {
 }
 
 TEST_F(PlcPool, PythonSeesAndPosts) {
-  if (std::string(SANITIZERS) != "") GTEST_SKIP() << "Python cannot load a library that was built with sanitizers";
+  if (std::string(SANITIZERS) != "")
+    GTEST_SKIP() << "Python cannot load a library that was built with sanitizers";
   plc_event* event = nullptr;
   ASSERT_EQ(plc_event_create(pool_, "line1/ready ☃", nullptr, &event), PLC_POOL_OK);
   const Run look =
