@@ -38,7 +38,8 @@ Sample sample_from(const std::uint8_t* data, std::size_t size) {
 }
 
 bool names_what_is_there(const ControlRequest& request) {
-  return request.instance == (request.verb == ControlVerb::check_host ? "" : "line1");
+  const bool of_host = request.verb == ControlVerb::check_host || request.verb == ControlVerb::list_objects;
+  return request.instance == (of_host ? "" : "line1");
 }
 
 }  // namespace

@@ -66,6 +66,10 @@ std::unexpected<Error> no_image(std::string_view why) {
   return failure(ErrorCode::corrupt, fmt::format("no whole retain file: {}", why));
 }
 
+bool is_ended(const FixedText<kMaxTaskName>& name) noexcept {
+  return name.bytes.back() == '\0';
+}
+
 std::span<const std::byte> bytes_of(std::string_view text) {
   return std::as_bytes(std::span(text.data(), text.size()));
 }
@@ -131,11 +135,13 @@ Result<RetainImage> decode_retain(std::string_view file) {
       rest.size() != header.areas * sizeof(FileArea) + header.bytes) {
     return no_image("its size is not what it says");
   }
+  if (!is_ended(header.application)) return no_image("the application's name has no end");
   RetainImage image{.generation = header.generation, .unix_ns = header.unix_ns, .layout = {}, .data = {}};
   image.layout.application = header.application.view();
   image.layout.bytes = header.bytes;
   for (std::uint64_t i = 0; i < header.areas; ++i) {
     const auto area = take<FileArea>(rest);
+    if (!is_ended(area.name)) return no_image("an area's name has no end");
     image.layout.areas.push_back({.name = std::string(area.name.view()),
                                   .flags = area.flags,
                                   .bytes = area.bytes,
