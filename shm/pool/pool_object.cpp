@@ -11,6 +11,12 @@ namespace {
 // One that is killed between its post and its wake has left the post: who waits looks for it so often.
 constexpr Duration kLook = std::chrono::milliseconds(40);
 
+// Who waits for ever looks now and then whether the object is still there.
+TimePoint next_look(TimePoint deadline) noexcept {
+  constexpr Duration kInterval = std::chrono::milliseconds(200);
+  return std::min(deadline, MonotonicClock::now() + kInterval);
+}
+
 ObjectStatus status_of(LockResult result) noexcept {
   switch (result) {
     case LockResult::locked:
@@ -94,7 +100,12 @@ ObjectStatus SharedSemaphore::try_wait() const noexcept {
 ObjectStatus SharedSemaphore::wait(TimePoint deadline) const noexcept {
   if (const ObjectStatus at_once = try_wait(); at_once != ObjectStatus::timed_out) return at_once;
   const Waiting waiting(*this);
-  return entry().semaphore.wait(deadline) ? ObjectStatus::done : ObjectStatus::timed_out;
+  for (;;) {
+    const TimePoint until = next_look(deadline);
+    if (entry().semaphore.wait(until)) return ObjectStatus::done;
+    if (!valid()) return ObjectStatus::gone;
+    if (until == deadline) return ObjectStatus::timed_out;
+  }
 }
 
 std::uint32_t SharedSemaphore::value() const noexcept {
@@ -109,7 +120,13 @@ ObjectStatus SharedMutex::try_lock() const noexcept {
 ObjectStatus SharedMutex::lock(TimePoint deadline) const noexcept {
   if (const ObjectStatus at_once = try_lock(); at_once != ObjectStatus::timed_out) return at_once;
   const Waiting waiting(*this);
-  return status_of(entry().mutex.lock(deadline));
+  for (;;) {
+    const TimePoint until = next_look(deadline);
+    const LockResult result = entry().mutex.lock(until);
+    if (result != LockResult::timed_out) return status_of(result);
+    if (!valid()) return ObjectStatus::gone;
+    if (until == deadline) return ObjectStatus::timed_out;
+  }
 }
 
 ObjectStatus SharedMutex::unlock() const noexcept {

@@ -244,6 +244,21 @@ TEST_F(PoolCrash, RepairsAChainThatRunsInACircleOrLeadsOutside) {
   }
 }
 
+TEST_F(PoolCrash, WhoWaitsForAnObjectThatIsLostIsTold) {
+  auto sut = create(64);
+  const auto semaphore = sut.create_semaphore("semaphore", 0);
+  const auto mutex = sut.create_mutex("mutex");
+  ASSERT_TRUE(semaphore && mutex);
+  ASSERT_EQ(mutex->object.lock(), ObjectStatus::done);
+  std::thread taker([&] { EXPECT_EQ(semaphore->object.wait(), ObjectStatus::gone); });
+  std::thread locker([&] { EXPECT_EQ(mutex->object.lock(), ObjectStatus::gone); });
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  const MemoryFile memory = map();
+  for (std::uint32_t i = 0; i < 64; ++i) entries_of(memory, 64)[i].binding.fetch_add(std::uint64_t{1} << 32);
+  taker.join();
+  locker.join();
+}
+
 TEST_F(PoolCrash, AScribbledSegmentNeverCrashes) {
   constexpr std::uint32_t kObjects = 64;
   std::mt19937 random(12345);
