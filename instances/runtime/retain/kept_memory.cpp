@@ -6,20 +6,11 @@
 
 #include <fmt/format.h>
 
+#include "instances/runtime/retain/area_record.hpp"
 #include "shm/base/names.hpp"
 #include "shm/pool/memory_file.hpp"
 
 namespace plchost {
-
-struct KeptEntry {
-  FixedText<kMaxTaskName> name;
-  std::array<char, 5> zero{};
-  std::uint32_t flags = 0;
-  std::uint32_t bytes = 0;
-  std::uint64_t layout = 0;
-  std::uint64_t offset = 0;
-};
-static_assert(sizeof(KeptEntry) == 80);
 
 namespace {
 
@@ -46,7 +37,7 @@ struct KeptMemory::Header {
   std::uint64_t bytes;
   FixedText<kMaxTaskName> application;
   std::array<char, 13> zero;
-  std::array<KeptEntry, kMaxRetainAreas> entries;
+  std::array<AreaRecord, kMaxRetainAreas> entries;
   std::array<CycleCounter, PLC_MAX_TASKS> counters;  // each written by its task
 };
 
@@ -80,12 +71,9 @@ std::optional<KeptMemory::Left> KeptMemory::left_behind(const std::string& pool,
   }
   layout.application = header.application.view();
   for (std::uint64_t i = 0; i < areas; ++i) {
-    const KeptEntry entry = header.entries[i];
-    layout.areas.push_back({.name = std::string(entry.name.view()),
-                            .flags = entry.flags,
-                            .bytes = entry.bytes,
-                            .layout = entry.layout,
-                            .offset = entry.offset});
+    auto area = area_of(AreaRecord(header.entries[i]));  // a copy: a stranger may write it meanwhile
+    if (!area) return std::nullopt;
+    layout.areas.push_back(*std::move(area));
   }
   if (!check_layout(layout)) return std::nullopt;
   left.image.generation = header.generation.load(std::memory_order_relaxed);
@@ -117,12 +105,7 @@ Result<KeptMemory> KeptMemory::make(const std::string& pool, const std::string& 
     header.bytes = image.layout.bytes;
     header.application.assign(image.layout.application);
     for (std::size_t i = 0; i < image.layout.areas.size(); ++i) {
-      const RetainArea& area = image.layout.areas[i];
-      header.entries[i] = {.name = FixedText<kMaxTaskName>(area.name),
-                           .flags = area.flags,
-                           .bytes = area.bytes,
-                           .layout = area.layout,
-                           .offset = area.offset};
+      header.entries[i] = record_of(image.layout.areas[i]);
     }
     std::ranges::copy(image.data, bytes.begin() + sizeof(Header));
     return {};

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "instances/runtime/retain/area_record.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
@@ -26,16 +27,6 @@ struct FileHeader {
   std::array<char, 5> zero{};
 };
 static_assert(sizeof(FileHeader) == 96);
-
-struct FileArea {
-  FixedText<kMaxTaskName> name;
-  std::array<char, 5> zero{};
-  std::uint32_t flags = 0;
-  std::uint32_t bytes = 0;
-  std::uint64_t layout = 0;
-  std::uint64_t offset = 0;
-};
-static_assert(sizeof(FileArea) == 80);
 
 constexpr std::array<std::uint64_t, 256> kCrcTable = [] {
   constexpr std::uint64_t kPolynomial = 0xc96c5795d7870f42;
@@ -64,10 +55,6 @@ Part take(std::string_view& file) {
 
 std::unexpected<Error> no_image(std::string_view why) {
   return failure(ErrorCode::corrupt, fmt::format("no whole retain file: {}", why));
-}
-
-bool is_ended(const FixedText<kMaxTaskName>& name) noexcept {
-  return name.bytes.back() == '\0';
 }
 
 std::span<const std::byte> bytes_of(std::string_view text) {
@@ -100,7 +87,7 @@ Result<void> check_layout(const RetainLayout& layout) {
 
 std::string encode(const RetainImage& image) {
   std::string file;
-  file.reserve(sizeof(FileHeader) + image.layout.areas.size() * sizeof(FileArea) + image.data.size() +
+  file.reserve(sizeof(FileHeader) + image.layout.areas.size() * sizeof(AreaRecord) + image.data.size() +
                sizeof(std::uint64_t));
   append(file, FileHeader{.magic = kMagic,
                           .generation = image.generation,
@@ -108,13 +95,7 @@ std::string encode(const RetainImage& image) {
                           .bytes = image.layout.bytes,
                           .areas = image.layout.areas.size(),
                           .application = FixedText<kMaxTaskName>(image.layout.application)});
-  for (const RetainArea& area : image.layout.areas) {
-    append(file, FileArea{.name = FixedText<kMaxTaskName>(area.name),
-                          .flags = area.flags,
-                          .bytes = area.bytes,
-                          .layout = area.layout,
-                          .offset = area.offset});
-  }
+  for (const RetainArea& area : image.layout.areas) append(file, record_of(area));
   file.append(reinterpret_cast<const char*>(image.data.data()), image.data.size());
   append(file, crc64(bytes_of(file)));
   return file;
@@ -132,21 +113,17 @@ Result<RetainImage> decode_retain(std::string_view file) {
   const auto header = take<FileHeader>(rest);
   if (header.magic != kMagic) return no_image("it is of another kind or version");
   if (header.areas > kMaxRetainAreas || header.bytes > kMaxRetainBytes ||
-      rest.size() != header.areas * sizeof(FileArea) + header.bytes) {
+      rest.size() != header.areas * sizeof(AreaRecord) + header.bytes) {
     return no_image("its size is not what it says");
   }
-  if (!is_ended(header.application)) return no_image("the application's name has no end");
+  if (header.application.bytes.back() != '\0') return no_image("the application's name has no end");
   RetainImage image{.generation = header.generation, .unix_ns = header.unix_ns, .layout = {}, .data = {}};
   image.layout.application = header.application.view();
   image.layout.bytes = header.bytes;
   for (std::uint64_t i = 0; i < header.areas; ++i) {
-    const auto area = take<FileArea>(rest);
-    if (!is_ended(area.name)) return no_image("an area's name has no end");
-    image.layout.areas.push_back({.name = std::string(area.name.view()),
-                                  .flags = area.flags,
-                                  .bytes = area.bytes,
-                                  .layout = area.layout,
-                                  .offset = area.offset});
+    auto area = area_of(take<AreaRecord>(rest));
+    if (!area) return no_image("an area's name has no end");
+    image.layout.areas.push_back(*std::move(area));
   }
   if (auto valid = check_layout(image.layout); !valid) return std::unexpected(valid.error());
   const auto data = bytes_of(rest);
