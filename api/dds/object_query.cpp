@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "api/dds/entries.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
 
@@ -70,10 +71,7 @@ Result<std::vector<plc_KeyValue>> entries_of(const ObjectQuery& query) {
   if (auto good = check_query(query); !good) return std::unexpected(std::move(good).error());
   std::vector<plc_KeyValue> entries;
   const auto add = [&](std::string_view name, std::string_view value) {
-    if (value.empty()) return;
-    plc_KeyValue& entry = entries.emplace_back();
-    dds::copy_text(entry.name, name);
-    dds::copy_text(entry.value, value);
+    dds::add_entry(entries, name, value);
   };
   add(kName, query.name);
   add(kType, query.type ? to_string(*query.type) : std::string_view());

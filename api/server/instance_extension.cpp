@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "api/dds/entries.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"
 
@@ -42,10 +43,7 @@ void add_clock(const ClockRuntime& clock, const Add& add) {
 std::vector<plc_KeyValue> extension_of(const InstanceRuntime& runtime) {
   std::vector<plc_KeyValue> entries;
   const auto add = [&](std::string_view name, std::string_view value) {
-    if (value.empty()) return;
-    plc_KeyValue& entry = entries.emplace_back();
-    dds::copy_text(entry.name, name);
-    dds::copy_text(entry.value, value);
+    dds::add_entry(entries, name, value);
   };
   add("tick_source", runtime.tick_source.view());
   add("tick_fallback", runtime.tick_fallback.view());
