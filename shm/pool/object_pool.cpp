@@ -114,7 +114,6 @@ std::uint64_t ObjectPool::changes() const noexcept {
 Result<PoolEvent> ObjectPool::create_event(std::string_view name) {
   if (auto valid = check_object_name(name); !valid) return std::unexpected(valid.error());
   const Wanted wanted{.name = name};
-  const MemoryRights rights = rights_for({}, this->name());
   const auto held = segment_->lock();
   if (!held) return std::unexpected(held.error());
   PoolTable objects(segment_->view());
@@ -122,7 +121,7 @@ Result<PoolEvent> ObjectPool::create_event(std::string_view name) {
   if (entry == nullptr) {
     entry = objects.insert(name, ObjectType::event);
     if (entry == nullptr) return no_room(wanted);
-    describe_new(*entry, rights, 0);
+    describe_new(*entry, rights_for({}, this->name()), 0);
     PoolTable::publish(*entry);
   }
   if (auto event = check_is(*entry, ObjectType::event, name); !event) return std::unexpected(event.error());
