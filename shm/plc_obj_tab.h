@@ -73,7 +73,8 @@ typedef struct objTab_s {
   unsigned long ulRefCnt; /* 1: this process */
 } objTab_t;
 
-/* NULL: there is no such pool; plc_pool_error() of plc_pool.h says why. */
+/* NULL: there is no such pool, or it cannot be listed; plc_pool_error() of plc_pool.h says why. A child of
+ * fork() gets a table of its own: what it had of its parent's it looks up anew. */
 objTab_t* plc_obj_tab(void);
 #define g_PlcObjTab (plc_obj_tab())
 

@@ -132,7 +132,9 @@ int plc_event_post(plc_event* event);
 /* Posts so far. Any. */
 plc_pool_u64 plc_event_count(const plc_event* event);
 /* Waits until there are more posts than *cursor, and sets it to how many there are. Begin with
- * plc_event_count(). PLC_POOL_TIMED_OUT: there were none. Any. */
+ * plc_event_count(). PLC_POOL_TIMED_OUT: there were none. PLC_POOL_ARGUMENT: the cursor is ahead of them; it
+ * is of another event, or was never set. An event that was opened with PLC_POOL_READ can be waited for; in a
+ * pool that was, the wait looks for posts every millisecond. Any. */
 int plc_event_wait(plc_event* event, plc_pool_u64* cursor, long timeout_ns);
 void plc_event_close(plc_event* event);
 

@@ -56,6 +56,11 @@ class CountedEvent {
   /// then waits; the stopper sets the flag, then nudges.
   FutexResult wait(Snapshot seen, TimePoint deadline = kNoDeadline) noexcept;
 
+  /// The same where the event is mapped to read only: a post wakes it only if another one waits, too.
+  FutexResult wait_unmarked(Snapshot seen, TimePoint deadline) const noexcept {
+    return futex_wait(&state_, static_cast<std::uint32_t>(seen.state_), deadline);
+  }
+
   /// Wakes all waiters without counting a post. Set-up and soft threads.
   void nudge() noexcept;
 

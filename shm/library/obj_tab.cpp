@@ -5,11 +5,16 @@
 #include <optional>
 #include <utility>
 
+#include <pthread.h>
+#include <unistd.h>
+
 #include "shm/library/pool_result.hpp"
 
 namespace plchost {
 
 namespace {
+
+std::mutex making;  // of the one table of the process
 
 // How often this thread holds the guard: std::recursive_timed_mutex does not tell.
 thread_local unsigned held_by_this_thread = 0;
@@ -100,16 +105,23 @@ STATUS give(plc_sem& semaphore) {
 
 }  // namespace
 
+// A child of fork() has the parent's table, whose pool it cannot use and whose guard another thread may have
+// held: it makes its own. The parent's stays for good: the child may still be on its entries.
 Result<ObjTab*> ObjTab::of_this_process() {
-  static std::mutex making;
-  static std::unique_ptr<ObjTab> table;
+  static ObjTab* table = nullptr;
+  static pid_t owner = 0;
+  static const int survives_fork =
+      ::pthread_atfork([] { making.lock(); }, [] { making.unlock(); }, [] { making.unlock(); });
+  if (survives_fork != 0) return failure(ErrorCode::system, "pthread_atfork", survives_fork);
   const std::lock_guard one_at_a_time(making);
-  if (!table) {
+  if (table == nullptr || owner != ::getpid()) {
     auto pool = ObjectPool::attach(pool_name_of(nullptr));
     if (!pool) return std::unexpected(std::move(pool).error());
-    table.reset(new ObjTab(*std::move(pool)));
+    table = new ObjTab(*std::move(pool));
+    owner = ::getpid();
+    held_by_this_thread = 0;
   }
-  return table.get();
+  return table;
 }
 
 // The entries stay where they are for good: walkers of other threads may be on them.
@@ -122,17 +134,22 @@ ObjTab::ObjTab(ObjectPool pool) : pool_(std::move(pool)), guard_handle_{.object 
             .ulRefCnt = 1};
 }
 
-objTab_t* ObjTab::look() {
+Result<objTab_t*> ObjTab::look() {
   const std::lock_guard one_at_a_time(guard_);
-  if (held_by_this_thread == 0 && (rows_.empty() || pool_.changes() != seen_)) refresh();
+  if (held_by_this_thread == 0 && (!listed_ || pool_.changes() != seen_)) {
+    if (auto done = refresh(); !done) return std::unexpected(std::move(done).error());
+  }
   return &table_;
 }
 
-void ObjTab::refresh() {
+// Where it fails, the table is as it was; only one that was never listed has nothing to show.
+Result<void> ObjTab::refresh() {
+  const auto all = pool_.list();
+  if (!all) return listed_ ? Result<void>() : std::unexpected(all.error());
   std::map<std::pair<std::string, ObjectType>, std::unique_ptr<Row>> before;
   for (auto& row : rows_) before[{row->name, row->type}] = std::move(row);
   rows_.clear();
-  for (const ObjectInfo& info : pool_.list()) {
+  for (const ObjectInfo& info : *all) {
     const auto known = before.find({info.name, info.type});
     if (known == before.end()) {
       rows_.push_back(open(info));
@@ -148,6 +165,8 @@ void ObjTab::refresh() {
   }
   table_.ulSize = entries_.size();
   seen_ = pool_.changes();
+  listed_ = true;
+  return {};
 }
 
 std::unique_ptr<ObjTab::Row> ObjTab::open(const ObjectInfo& info) const {
@@ -196,7 +215,9 @@ objTab_t* plc_obj_tab() {
   (void)plchost::guarded([&] {
     const auto table = plchost::ObjTab::of_this_process();
     if (!table) return plchost::failed(table.error());
-    found = (*table)->look();
+    const auto looked = (*table)->look();
+    if (!looked) return plchost::failed(looked.error());
+    found = *looked;
     return 0;
   });
   return found;

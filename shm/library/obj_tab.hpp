@@ -25,11 +25,13 @@ namespace plchost {
 /// The seed's table as this process sees the pool: see shm/plc_obj_tab.h.
 class ObjTab {
  public:
-  /// The one table of this process; made by the first call that finds the pool.
+  /// The one table of this process; made by the first call that finds the pool, and anew in a child of
+  /// fork().
   [[nodiscard]] static Result<ObjTab*> of_this_process();
 
-  /// Brings it up to date, unless the calling thread holds its guard.
-  [[nodiscard]] objTab_t* look();
+  /// Brings it up to date, unless the calling thread holds its guard or the pool cannot be listed now; an
+  /// error only if it never could.
+  [[nodiscard]] Result<objTab_t*> look();
 
  private:
   /// One object, opened.
@@ -41,7 +43,7 @@ class ObjTab {
   };
 
   explicit ObjTab(ObjectPool pool);
-  void refresh();
+  [[nodiscard]] Result<void> refresh();
   [[nodiscard]] std::unique_ptr<Row> open(const ObjectInfo& info) const;
   [[nodiscard]] static objEntry_t entry_of(Row& row) noexcept;
 
@@ -52,6 +54,7 @@ class ObjTab {
   std::vector<objEntry_t> entries_;
   objTab_t table_{};
   std::uint64_t seen_ = 0;
+  bool listed_ = false;
 };
 
 }  // namespace plchost

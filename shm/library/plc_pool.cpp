@@ -141,8 +141,10 @@ int plc_pool_remove(plc_pool* pool, const char* name) {
 int plc_pool_list(plc_pool* pool, plc_pool_visitor visitor, void* user) {
   return guarded([&]() -> int {
     if (pool == nullptr || visitor == nullptr) return argument("a pointer is null");
+    const auto all = pool->pool.list();
+    if (!all) return failed(all.error());
     int count = 0;
-    for (const ObjectInfo& info : pool->pool.list()) {
+    for (const ObjectInfo& info : *all) {
       ++count;
       if (visit(info, visitor, user) != 0) break;
     }

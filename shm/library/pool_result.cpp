@@ -85,6 +85,8 @@ int result_of(ObjectStatus status) noexcept {
       return PLC_POOL_REFUSED;
     case ObjectStatus::gone:
       return PLC_POOL_GONE;
+    case ObjectStatus::bad_cursor:
+      return PLC_POOL_ARGUMENT;
     case ObjectStatus::corrupt:
       break;
   }

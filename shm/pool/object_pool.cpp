@@ -346,7 +346,7 @@ Result<void> ObjectPool::remove_object(std::string_view name) {
 }
 
 // In parts, so that nobody waits for long who wants the lock meanwhile.
-std::vector<ObjectInfo> ObjectPool::list() const {
+Result<std::vector<ObjectInfo>> ObjectPool::list() const {
   constexpr std::size_t kPart = 256;
   const PoolView& view = segment_->view();
   std::vector<ObjectInfo> all;
@@ -366,7 +366,7 @@ std::vector<ObjectInfo> ObjectPool::list() const {
       continue;
     }
     const auto held = segment_->lock(at == 0);
-    if (!held) return {};
+    if (!held) return std::unexpected(held.error());
     std::ranges::move(part(), std::back_inserter(all));
   }
   return all;

@@ -96,8 +96,7 @@ class ObjectPool {
   [[nodiscard]] Result<void> remove_object(std::string_view name);
 
   /// All objects that are in use: referenced, kept, registered or bound. Unordered.
-  /// Nothing if the pool cannot be locked.
-  [[nodiscard]] std::vector<ObjectInfo> list() const;
+  [[nodiscard]] Result<std::vector<ObjectInfo>> list() const;
   /// One of them. not_found.
   [[nodiscard]] Result<ObjectInfo> look_at(std::string_view name) const;
 

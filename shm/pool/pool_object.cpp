@@ -10,6 +10,8 @@ namespace {
 
 // One that is killed between its post and its wake has left the post: who waits looks for it so often.
 constexpr Duration kLook = std::chrono::milliseconds(40);
+// Nobody wakes who could not say that he waits.
+constexpr Duration kUnmarkedLook = std::chrono::milliseconds(1);
 
 // Who waits for ever looks now and then whether the object is still there.
 TimePoint next_look(TimePoint deadline) noexcept {
@@ -35,12 +37,12 @@ ObjectStatus status_of(LockResult result) noexcept {
 
 }  // namespace
 
-PoolObject::Waiting::Waiting(const PoolObject& object) noexcept : reference_(*object.reference_) {
-  reference_.waiting.fetch_add(1, std::memory_order_relaxed);
+PoolObject::Waiting::Waiting(const PoolObject& object) noexcept : reference_(object.reference_) {
+  if (reference_ != nullptr) reference_->waiting.fetch_add(1, std::memory_order_relaxed);
 }
 
 PoolObject::Waiting::~Waiting() {
-  reference_.waiting.fetch_sub(1, std::memory_order_relaxed);
+  if (reference_ != nullptr) reference_->waiting.fetch_sub(1, std::memory_order_relaxed);
 }
 
 void PoolObject::swap(PoolObject& other) noexcept {
@@ -66,20 +68,31 @@ std::uint64_t SharedEvent::count() const noexcept {
   return since & CountedEvent::kCountMask;
 }
 
-// Also with the right to read only: to wait is to mark the event, which costs its poster a wake.
+// Also with the right to read only: to wait is to mark the event, which costs its poster a wake, or, where
+// nothing can be marked, to look.
 ObjectStatus SharedEvent::wait(std::uint64_t& cursor, TimePoint deadline) const noexcept {
-  if (const ObjectStatus now = usable(); now != ObjectStatus::done) return now;
   const std::uint64_t before = cursor;
-  if (cursor = count(); cursor != before) return ObjectStatus::done;
+  if (before > CountedEvent::kCountMask) return ObjectStatus::bad_cursor;
   const Waiting waiting(*this);
   for (;;) {
-    const auto seen = entry().event.snapshot();
-    cursor = count();
     if (!valid()) return ObjectStatus::gone;
-    if (cursor != before) return ObjectStatus::done;
+    const auto seen = entry().event.snapshot();
+    const std::uint64_t posts = count();
+    if (!valid()) return ObjectStatus::gone;
+    // The count goes round.
+    const std::uint64_t missed = (posts - before) & CountedEvent::kCountMask;
+    if (missed > CountedEvent::kCountMask / 2) return ObjectStatus::bad_cursor;
+    if (missed != 0) {
+      cursor = posts;
+      return ObjectStatus::done;
+    }
     const TimePoint now = MonotonicClock::now();
     if (now >= deadline) return ObjectStatus::timed_out;
-    entry().event.wait(seen, std::min(deadline, now + kLook));
+    if (can_be_marked()) {
+      entry().event.wait(seen, std::min(deadline, now + kLook));
+    } else {
+      entry().event.wait_unmarked(seen, std::min(deadline, now + kUnmarkedLook));
+    }
   }
 }
 

@@ -27,6 +27,7 @@ enum class ObjectStatus : std::uint8_t {
   not_permitted,  ///< opened to read only
   gone,           ///< closed, or the pool was damaged and the object lost
   corrupt,        ///< a stranger has written into it
+  bad_cursor,     ///< event: the cursor is ahead of the posts that were made
 };
 
 /// A reference on one object of the pool, released at the end of its life, or by the next user of the pool if
@@ -65,7 +66,7 @@ class PoolObject {
     Waiting& operator=(const Waiting&) = delete;
 
    private:
-    ReferenceEntry& reference_;
+    ReferenceEntry* reference_;  // null: the pool is mapped to read only
   };
 
   [[nodiscard]] ObjectStatus usable() const noexcept {
@@ -73,6 +74,8 @@ class PoolObject {
     return writable_ ? ObjectStatus::done : ObjectStatus::not_permitted;
   }
   [[nodiscard]] ObjectEntry& entry() const noexcept { return *entry_; }
+  /// Somebody who waits can be marked in it, so that who posts wakes him.
+  [[nodiscard]] bool can_be_marked() const noexcept { return reference_ != nullptr; }
 
  private:
   void swap(PoolObject& other) noexcept;
@@ -97,7 +100,8 @@ class SharedEvent : public PoolObject {
   /// Posts since it was made.
   [[nodiscard]] std::uint64_t count() const noexcept;
   /// Waits until more than `cursor` posts were made, and sets it to their number: what was posted in between
-  /// is count - cursor. Begin with count().
+  /// is count - cursor. Begin with count(). bad_cursor: it is of another event, or of none. The right to read
+  /// is enough; through a pool that was attached to read only posts are looked for every millisecond.
   ObjectStatus wait(std::uint64_t& cursor, TimePoint deadline = kNoDeadline) const noexcept;
   /// For the runtime, which binds tasks to it.
   [[nodiscard]] PoolEvent event() const noexcept;

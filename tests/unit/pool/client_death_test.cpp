@@ -59,11 +59,11 @@ TEST_F(ClientDeath, WhatItHeldIsReleasedByTheNextCall) {
     static auto kept = pool.create_semaphore("kept", 3, {.keep = true});
     static auto event = pool.create_shared_event("event");
   });
-  EXPECT_EQ(pool_.list().size(), 4U);
+  EXPECT_EQ(pool_.list()->size(), 4U);
   kill_and_reap(child);
   EXPECT_EQ(pool_.open_memory("memory").error().code, ErrorCode::not_found);
   EXPECT_FALSE(std::filesystem::exists("/dev/shm/" + pool_memory_name(name_.get(), "memory")));
-  const auto left = pool_.list();
+  const auto left = pool_.list().value();
   ASSERT_EQ(left.size(), 1U);
   EXPECT_EQ(left[0].name, "kept");
   EXPECT_TRUE(left[0].references.empty());
@@ -74,7 +74,7 @@ TEST_F(ClientDeath, OfAZombieIsFoundByAList) {
   ::kill(child, SIGKILL);
   siginfo_t info{};
   ::waitid(P_PID, static_cast<id_t>(child), &info, WEXITED | WNOWAIT);
-  EXPECT_TRUE(pool_.list().empty());
+  EXPECT_TRUE(pool_.list()->empty());
   kill_and_reap(child);
 }
 
@@ -168,7 +168,7 @@ TEST_F(ClientDeath, AtAnyInstructionLeavesAPoolThatTheNextCallRepairs) {
     for (const pid_t child : children) kill_and_reap(child);
     // Nothing is held by the dead, and each kept memory has its file and no other one has.
     std::size_t memories = 0;
-    for (const ObjectInfo& info : pool_.list()) {
+    for (const auto all = pool_.list().value(); const ObjectInfo& info : all) {
       const bool ours = info.name == "mutex0";
       ASSERT_TRUE(info.kept || ours) << info.name;
       ASSERT_EQ(info.references.size(), ours ? 1U : 0U) << info.name;

@@ -73,7 +73,7 @@ TEST_F(PoolCrash, SeveralProcessesCreateTheSamePoolAtOnce) {
       }));
     }
     for (const pid_t child : children) EXPECT_EQ(wait_for(child), 0);
-    EXPECT_EQ(ObjectPool::attach(name_.get())->list().size(), children.size());
+    EXPECT_EQ(ObjectPool::attach(name_.get())->list()->size(), children.size());
     ObjectPool::remove(name_.get());
   }
 }
@@ -170,7 +170,7 @@ TEST_F(PoolCrash, WorksOnAfterClientsWereKilledAtAnyInstruction) {
       ASSERT_TRUE(event) << event.error().describe();
       ASSERT_TRUE(sut.open_event("round" + std::to_string(i)));
     }
-    ASSERT_EQ(sut.list().size(), 1U);
+    ASSERT_EQ(sut.list()->size(), 1U);
   }
 }
 

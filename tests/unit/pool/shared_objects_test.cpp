@@ -33,7 +33,7 @@ class SharedObjects : public testing::Test {
   [[nodiscard]] ObjectPool another() const { return std::move(ObjectPool::attach(name_.get()).value()); }
   [[nodiscard]] std::vector<std::string> names() const {
     std::vector<std::string> names;
-    for (const ObjectInfo& info : pool_.list()) names.push_back(info.name);
+    for (const auto all = pool_.list().value(); const ObjectInfo& info : all) names.push_back(info.name);
     std::ranges::sort(names);
     return names;
   }
@@ -260,7 +260,7 @@ TEST_F(SharedObjects, ReadersOfThePoolSeeAllAndChangeNothing) {
   const auto semaphore = pool_.create_semaphore("s", 5);
   auto sut = ObjectPool::attach(name_.get(), kReadOnly);
   ASSERT_TRUE(sut) << sut.error().describe();
-  EXPECT_EQ(sut->list().size(), 2U);
+  EXPECT_EQ(sut->list()->size(), 2U);
   EXPECT_EQ(sut->look_at("s")->value, 5U);
   const auto reader = sut->open_semaphore("s", kReadOnly);
   ASSERT_TRUE(reader);

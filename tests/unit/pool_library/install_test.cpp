@@ -33,9 +33,7 @@ class InstalledLibrary : public LibraryFixture {
 
 TEST_F(InstalledLibrary, IsFoundByPkgConfig) {
   const std::string flags = "$(PKG_CONFIG_PATH=$(dirname $(find " + prefix_ +
-                            " -name plcpool.pc)) pkg-config --cflags --libs "
-                            "--define-variable=prefix=" +
-                            prefix_ + " plcpool)";
+                            " -name plcpool.pc)) pkg-config --cflags --libs plcpool)";
   const Run built =
       run({}, "gcc -std=c89 -pedantic -Wall -Wextra -Werror " EXAMPLES "/parts_feeder/feeder.c -o " +
                   folder_ + "/feeder " + flags);

@@ -1,5 +1,7 @@
 #include "shm/plc_pool.h"
 
+#include <chrono>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <set>
@@ -7,8 +9,10 @@
 #include <thread>
 
 #include <gmock/gmock.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
+#include "shm/plc_obj_tab.h"
 #include "tests/unit/pool_library/library_fixture.hpp"
 
 namespace {
@@ -123,6 +127,85 @@ TEST_F(PlcPool, ToReadOnlyIsToLookOnly) {
   EXPECT_EQ(plc_semaphore_wait(seen, PLC_POOL_NO_WAIT), PLC_POOL_REFUSED);
   plc_semaphore_close(seen);
   plc_pool_close(reader);
+  plc_semaphore_close(semaphore);
+}
+
+void post_soon(plc_event* event) {
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  plc_event_post(event);
+}
+
+TEST_F(PlcPool, WhoMayOnlyReadCanWaitForAnEvent) {
+  plc_event* event = nullptr;
+  ASSERT_EQ(plc_event_create(pool_, "e", nullptr, &event), PLC_POOL_OK);
+  plc_pool* reader = nullptr;
+  ASSERT_EQ(plc_pool_open(name_.c_str(), PLC_POOL_READ, &reader), PLC_POOL_OK);
+  for (plc_pool* const through : {pool_, reader}) {
+    plc_event* seen = nullptr;
+    ASSERT_EQ(plc_event_open(through, "e", PLC_POOL_READ, &seen), PLC_POOL_OK);
+    EXPECT_EQ(plc_event_post(seen), PLC_POOL_REFUSED);
+    plc_pool_u64 cursor = plc_event_count(seen);
+    EXPECT_EQ(plc_event_wait(seen, &cursor, 2'000'000), PLC_POOL_TIMED_OUT);
+    std::thread poster(post_soon, event);
+    EXPECT_EQ(plc_event_wait(seen, &cursor, PLC_POOL_FOREVER), PLC_POOL_OK);
+    poster.join();
+    EXPECT_EQ(cursor, plc_event_count(event));
+    plc_event_close(seen);
+  }
+  plc_pool_close(reader);
+  plc_event_close(event);
+}
+
+TEST_F(PlcPool, ACursorAheadOfThePostsIsAnError) {
+  plc_event* event = nullptr;
+  ASSERT_EQ(plc_event_create(pool_, "e", nullptr, &event), PLC_POOL_OK);
+  plc_event_post(event);
+  for (const plc_pool_u64 wrong :
+       {plc_pool_u64{2}, plc_pool_u64{1} << 46, plc_pool_u64{1} << 48, ~plc_pool_u64{0}}) {
+    plc_pool_u64 cursor = wrong;
+    EXPECT_EQ(plc_event_wait(event, &cursor, PLC_POOL_FOREVER), PLC_POOL_ARGUMENT) << wrong;
+    EXPECT_EQ(cursor, wrong);
+  }
+  plc_event_close(event);
+}
+
+// Runs `look` in a child of this process; its exit code.
+int in_child(int (*look)(plc_pool*), plc_pool* pool) {
+  const pid_t child = ::fork();
+  if (child == 0) ::_exit(look(pool));
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+TEST_F(PlcPool, AChildOfForkIsToldThatItCannotList) {
+  const auto list = [](plc_pool* pool) {
+    const int listed = plc_pool_list(pool, [](const plc_object_info*, void*) { return 0; }, nullptr);
+    return listed == PLC_POOL_SYSTEM && std::strstr(plc_pool_error(), "anew") != nullptr ? 0 : 1;
+  };
+  EXPECT_EQ(in_child(list, pool_), 0);
+}
+
+TEST_F(PlcPool, AChildOfForkHasATableOfItsOwn) {
+  plc_semaphore* semaphore = nullptr;
+  ASSERT_EQ(plc_semaphore_create(pool_, "s", 1, nullptr, &semaphore), PLC_POOL_OK);
+  // The table belongs to the whole process: one that has another pool is none of this one's.
+  const auto in_a_process_of_its_own = [](plc_pool*) {
+    if (g_PlcObjTab == nullptr || g_PlcObjTab->ulSize != 1) return 2;
+    semTake(g_PlcObjTab->hSem, WAIT_FOREVER);  // the child shall not find it held
+    return in_child(
+        [](plc_pool*) {
+          if (g_PlcObjTab == nullptr || g_PlcObjTab->ulSize != 1) return 3;
+          if (semTake(g_PlcObjTab->hSem, NO_WAIT) != OK || semGive(g_PlcObjTab->hSem) != OK) return 4;
+          const objEntry_t& entry = g_PlcObjTab->ptEntries[0];
+          return semTake(entry.u.tSemEntry.hSem, NO_WAIT) == OK ? 0 : 5;
+        },
+        nullptr);
+  };
+  ::setenv("PLCHOST_POOL", name_.c_str(), 1);
+  EXPECT_EQ(in_child(in_a_process_of_its_own, nullptr), 0);
+  ::unsetenv("PLCHOST_POOL");
+  EXPECT_EQ(plc_semaphore_value(semaphore), 0U) << "the child of the child has taken it";
   plc_semaphore_close(semaphore);
 }
 
