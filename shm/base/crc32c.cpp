@@ -3,6 +3,8 @@
 #include <array>
 #include <cstring>
 
+#include "shm/base/crc32c_folding.hpp"
+
 namespace plchost {
 
 namespace {
@@ -64,8 +66,7 @@ std::uint32_t shifted(const WordTable& table, std::uint32_t state) noexcept {
          table[3][state >> 24];
 }
 
-/// What to do with each word beside the checksum. `past_caches`: `to` is written without reading its lines.
-enum class Copy : std::uint8_t { none, plain, past_caches };
+using Copy = ChecksumCopy;
 
 template <Copy How>
 __attribute__((always_inline)) inline std::uint64_t take_word(std::byte* to, const std::byte* from) noexcept {
@@ -121,6 +122,10 @@ __attribute__((target("sse4.2"))) std::uint32_t step_lanes(const WordTable& afte
 
 template <Copy How>
 __attribute__((target("sse4.2"))) std::uint32_t step_by_instruction(std::uint32_t state, Walk walk) noexcept {
+  const bool aligned = reinterpret_cast<std::uintptr_t>(walk.to) % kCacheLine == 0;
+  if (walk.from.size() >= kMinFolded && can_fold() && (How != Copy::past_caches || aligned)) {
+    walk.advance(fold_crc32c(How, walk.to, walk.from, state));
+  }
   state = step_lanes<How, kLongLane>(kAfterLongLane, state, walk);
   state = step_lanes<How, kShortLane>(kAfterShortLane, state, walk);
   std::uint64_t wide = state;

@@ -1,6 +1,7 @@
 #include "shm/base/crc32c.hpp"
 
 #include <algorithm>
+#include <array>
 #include <string_view>
 #include <vector>
 
@@ -55,13 +56,18 @@ TEST(Crc32c, GoesOnFromWhatCameBefore) {
 }
 
 TEST(Crc32c, OfACopyIsThatOfTheOriginal) {
-  for (const std::size_t size : {0U, 1U, 9U, 400U, 3100U, 20'001U}) {
+  constexpr std::size_t kLargest = 20'001;
+  alignas(64) static std::array<std::byte, kLargest + 64> to;
+  for (const std::size_t size : {std::size_t{0}, std::size_t{1}, std::size_t{9}, std::size_t{400},
+                                 std::size_t{1024}, std::size_t{1300}, std::size_t{3100}, kLargest}) {
     const auto from = some_bytes(size);
     for (const auto copy : {copy_with_crc32c, copy_out_with_crc32c}) {
-      std::vector<std::byte> to(size + 1);
-      EXPECT_EQ(copy(to.data(), from, 5), crc32c(from, 5));
-      EXPECT_TRUE(std::ranges::equal(std::span(to).first(size), from));
-      EXPECT_EQ(to.back(), std::byte{0});
+      for (const std::size_t begin : {0U, 1U, 16U}) {  // at the beginning of a cache line, and within it
+        to.fill(std::byte{0xee});
+        EXPECT_EQ(copy(to.data() + begin, from, 5), crc32c(from, 5)) << size << " to " << begin;
+        EXPECT_TRUE(std::ranges::equal(std::span(to).subspan(begin, size), from));
+        EXPECT_EQ(to[begin + size], std::byte{0xee});
+      }
     }
   }
 }
