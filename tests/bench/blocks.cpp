@@ -1,4 +1,5 @@
-// Blocks between two processes on two cores: CmpBlkDrvShm beside iceoryx, a Unix datagram socket and memcpy.
+// Blocks between two processes on two cores: CmpBlkDrvShm beside iceoryx, a Unix datagram socket, and memcpy
+// both within one core and into and out of shared memory, from core to core.
 // Each way copies what is sent in, and what is received out.
 
 #include <algorithm>
@@ -6,24 +7,21 @@
 #include <atomic>
 #include <cstring>
 #include <new>
-#include <optional>
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <signal.h>
-#include <spawn.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
 
 #include "shm/base/system_call.hpp"
 #include "shm/base/unique_fd.hpp"
-#include "shm/block_driver/block_channel.hpp"
-#include "shm/block_driver/block_router.hpp"
+#include "shm/block_driver/node_directory.hpp"
 #include "tests/bench/blocks_pipe.hpp"
+#include "tests/bench/blocks_roudi.hpp"
+#include "tests/bench/blocks_ways.hpp"
 #include "tests/bench/child.hpp"
 #include "tests/bench/parts.hpp"
 
@@ -35,13 +33,8 @@ constexpr Duration kBlocksSlice = std::chrono::milliseconds(500);
 constexpr std::size_t kLargest = kMaxBlockSize;
 constexpr std::array<std::size_t, 3> kSizes = {64, 512, kLargest};
 
-enum class Way : std::uint32_t { ours, iceoryx, socket, memcpy };
+enum class Way : std::uint32_t { ours, iceoryx, socket, bare, memcpy };
 enum class Mode : std::uint32_t { echo, sink };
-
-void pause_for(Duration duration) {
-  const timespec time = to_timespec(duration);
-  ::clock_nanosleep(CLOCK_MONOTONIC, 0, &time, nullptr);
-}
 
 /// Shared by the two processes: what the peer is to do.
 struct Board {
@@ -54,73 +47,8 @@ struct Board {
   std::atomic<bool> ready{false};  // the peer has all its pipes
   std::atomic<bool> quit{false};
   alignas(64) std::atomic<std::uint64_t> received{0};  // messages
-};
-
-class SocketPipe : public BlocksPipe {
- public:
-  explicit SocketPipe(int fd) noexcept : fd_(fd) {}
-  bool send(const void* data, std::size_t size) override {
-    return ::send(fd_, data, size, MSG_DONTWAIT) == static_cast<ssize_t>(size);
-  }
-  std::size_t receive(void* buffer, std::size_t size) override {
-    const ssize_t got = ::recv(fd_, buffer, size, MSG_DONTWAIT);
-    return got > 0 ? static_cast<std::size_t>(got) : 0;
-  }
-
- private:
-  int fd_;
-};
-
-/// A node with its router's thread.
-class OurPipe : public BlocksPipe {
- public:
-  static Result<std::unique_ptr<OurPipe>> open(const std::string& pool, BlocksSide side) {
-    std::unique_ptr<OurPipe> pipe(new OurPipe);
-    const NodeOptions options{.pool = pool, .entry = {.name = side == BlocksSide::bench ? "bench" : "peer"}};
-    auto node = BlockNode::join(options);
-    if (!node) return std::unexpected(std::move(node).error());
-    pipe->node_ = *std::move(node);
-    auto router = BlockRouter::create(*pipe->node_);
-    if (!router) return std::unexpected(std::move(router).error());
-    pipe->router_ = *std::move(router);
-    auto channel = BlockChannel::open(*pipe->node_, "bench");
-    if (!channel) return std::unexpected(std::move(channel).error());
-    pipe->channel_.emplace(*std::move(channel));
-    auto thread = Thread::start("router", {}, [to = pipe.get()] { to->router_->run(to->stop_); });
-    if (!thread) return std::unexpected(std::move(thread).error());
-    pipe->thread_ = *std::move(thread);
-    const std::string_view other = side == BlocksSide::bench ? "peer" : "bench";
-    while (pipe->to_ == NodeAddress{}) pipe->to_ = pipe->node_->find(other);
-    // One message each way, so that both links are there.
-    while (pipe->channel_->send(pipe->to_, {}) != SendResult::sent) pause_for(std::chrono::milliseconds(1));
-    Received received;
-    while (pipe->channel_->receive({}, received) != TakeResult::taken) {
-      pause_for(std::chrono::milliseconds(1));
-    }
-    return pipe;
-  }
-  ~OurPipe() override {
-    stop_.store(true);
-    if (router_) router_->wake();
-    thread_.join();
-  }
-  bool send(const void* data, std::size_t size) override {
-    return channel_->send(to_, std::span(static_cast<const std::byte*>(data), size)) == SendResult::sent;
-  }
-  std::size_t receive(void* buffer, std::size_t size) override {
-    Received received;
-    const std::span into(static_cast<std::byte*>(buffer), size);
-    return channel_->receive(into, received) == TakeResult::taken ? received.size : 0;
-  }
-
- private:
-  OurPipe() = default;
-  std::unique_ptr<BlockNode> node_;
-  std::unique_ptr<BlockRouter> router_;
-  std::optional<BlockChannel> channel_;
-  NodeAddress to_;
-  std::atomic<bool> stop_{false};
-  Thread thread_;
+  BareRing to_peer;
+  BareRing to_bench;
 };
 
 /// All ways of one side. iceoryx is left out where it is not installed.
@@ -128,17 +56,22 @@ struct Pipes {
   std::unique_ptr<BlocksPipe> ours;
   std::unique_ptr<BlocksPipe> iceoryx;
   std::unique_ptr<BlocksPipe> socket;
+  std::unique_ptr<BlocksPipe> bare;
 
-  static Result<Pipes> open(const std::string& pool, BlocksSide side, int socket, bool with_iceoryx) {
+  static Result<Pipes> open(const std::string& pool, Board& board, BlocksSide side, int socket,
+                            bool with_iceoryx) {
     Pipes pipes;
-    auto ours = OurPipe::open(pool, side);
+    auto ours = make_our_pipe(pool, side);
     if (!ours) return std::unexpected(std::move(ours).error());
     pipes.ours = *std::move(ours);
-    pipes.socket = std::make_unique<SocketPipe>(socket);
+    pipes.socket = make_socket_pipe(socket);
+    const bool here = side == BlocksSide::bench;
+    pipes.bare = make_bare_pipe(here ? board.to_peer : board.to_bench, here ? board.to_bench : board.to_peer);
     if (with_iceoryx) pipes.iceoryx = make_iceoryx_pipe(pool, side);
     return pipes;
   }
   [[nodiscard]] BlocksPipe* of(Way way) const {
+    if (way == Way::bare) return bare.get();
     return way == Way::ours ? ours.get() : way == Way::iceoryx ? iceoryx.get() : socket.get();
   }
 };
@@ -162,7 +95,7 @@ void answer(BlocksPipe& pipe, Board& board) {
 int run_peer(const Plan& plan, Board& board, const std::string& pool, int socket, bool with_iceoryx) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (!bind_thread({plan.poster_core})) return 1;
-  const auto pipes = Pipes::open(pool, BlocksSide::peer, socket, with_iceoryx);
+  const auto pipes = Pipes::open(pool, board, BlocksSide::peer, socket, with_iceoryx);
   if (!pipes) return 1;
   board.ready.store(true);
   for (std::uint32_t done = 0; !board.quit.load();) {
@@ -268,38 +201,6 @@ class Pair {
   const Pipes& pipes_;
 };
 
-/// iceoryx's daemon. It is killed at the end: asked to end, it would first end its clients, which this is one
-/// of.
-class RouDi {
- public:
-  RouDi() noexcept = default;
-  RouDi(const RouDi&) = delete;
-  RouDi& operator=(const RouDi&) = delete;
-  ~RouDi() {
-    if (pid_ == 0) return;
-    ::kill(pid_, SIGKILL);
-    int status = 0;
-    ::waitpid(pid_, &status, 0);
-    for (const char* left : {"/iceoryx_mgmt", "/root"}) ::shm_unlink(left);
-  }
-  [[nodiscard]] Result<void> start() {
-    // Without monitoring: a process that measures keeps its other threads waiting.
-    std::array<std::string, 5> words{"iox-roudi", "-m", "off", "-l", "off"};
-    std::array<char*, 6> arguments{};
-    std::ranges::transform(words, arguments.begin(), [](std::string& word) { return word.data(); });
-    posix_spawn_file_actions_t files;
-    posix_spawn_file_actions_init(&files);
-    posix_spawn_file_actions_addopen(&files, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-    posix_spawn_file_actions_addopen(&files, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
-    const int error = ::posix_spawnp(&pid_, words[0].c_str(), &files, nullptr, arguments.data(), environ);
-    posix_spawn_file_actions_destroy(&files);
-    return check_returned(error, "start iox-roudi");
-  }
-
- private:
-  pid_t pid_ = 0;
-};
-
 std::string size_text(std::size_t size) {
   return size < 1024 ? fmt::format("{}B", size) : fmt::format("{}KiB", size / 1024);
 }
@@ -309,8 +210,10 @@ constexpr const char* kNoIceoryx = "iceoryx is not installed: the floor is the U
 Result<Row> measure_latency(const Plan& plan, Pair& pair, std::size_t size, bool with_iceoryx) {
   Row row{.name = fmt::format("blocks/latency/{}", size_text(size))};
   Samples socket;
+  Samples bare;
   std::vector<Subject> subjects{
       [&](Duration slice) { return pair.latency(Way::ours, size, slice, row.ours); },
+      [&](Duration slice) { return pair.latency(Way::bare, size, slice, bare); },
       [&](Duration slice) { return pair.latency(Way::socket, size, slice, socket); }};
   if (with_iceoryx) {
     subjects.emplace_back([&](Duration slice) { return pair.latency(Way::iceoryx, size, slice, row.floor); });
@@ -318,7 +221,10 @@ Result<Row> measure_latency(const Plan& plan, Pair& pair, std::size_t size, bool
   if (auto done = alternate(plan, subjects, kBlocksSlice); !done) {
     return std::unexpected(std::move(done).error());
   }
-  row.extra = {{"socket_p50_us", summarise(socket).p50}, {"socket_p99_us", summarise(socket).p99}};
+  row.extra = {{"socket_p50_us", summarise(socket).p50},
+               {"socket_p99_us", summarise(socket).p99},
+               {"bare_p50_us", summarise(bare).p50},
+               {"bare_p99_us", summarise(bare).p99}};
   if (!with_iceoryx) {
     row.floor = socket;
     row.note = kNoIceoryx;
@@ -337,20 +243,28 @@ Result<Row> measure_throughput(const Plan& plan, Pair& pair, std::size_t size, b
   Row row{.name = fmt::format("blocks/throughput/{}", size_text(size))};
   Samples iceoryx;
   Samples socket;
+  Samples bare;
   const auto subject = [&](Way way, Samples& into) -> Subject {
     return [&pair, size, way, &into](Duration slice) { return pair.throughput(way, size, slice, into); };
   };
   std::vector<Subject> subjects{subject(Way::ours, row.ours), subject(Way::memcpy, row.floor),
-                                subject(Way::socket, socket)};
+                                subject(Way::bare, bare), subject(Way::socket, socket)};
   if (with_iceoryx) subjects.push_back(subject(Way::iceoryx, iceoryx));
   if (auto done = alternate(plan, subjects, kBlocksSlice); !done) {
     return std::unexpected(std::move(done).error());
   }
   const double ours = gigabytes_per_second(size, row.ours);
   const double memcpy = gigabytes_per_second(size, row.floor);
-  row.extra = {{"gb_s", ours}, {"memcpy_gb_s", memcpy}, {"socket_gb_s", gigabytes_per_second(size, socket)}};
+  const double across = gigabytes_per_second(size, bare);
+  row.extra = {{"gb_s", ours},
+               {"memcpy_gb_s", memcpy},
+               {"memcpy_across_gb_s", across},
+               {"socket_gb_s", gigabytes_per_second(size, socket)}};
   if (with_iceoryx) row.extra.emplace_back("iceoryx_gb_s", gigabytes_per_second(size, iceoryx));
-  if (size == kLargest) row.targets = {{"half of memcpy's GB/s below ours", memcpy / 2, ours}};
+  if (size == kLargest) {
+    row.targets = {{"half of memcpy's GB/s, from core to core, below ours", across / 2, ours},
+                   {"half of memcpy's GB/s, within one core's caches, below ours", memcpy / 2, ours}};
+  }
   row.note = with_iceoryx ? "floor: memcpy in one thread" : kNoIceoryx;
   return row;
 }
@@ -359,7 +273,7 @@ Result<std::vector<Row>> measure_all(const Plan& plan, Board& board, const std::
                                      bool with_iceoryx) {
   const auto pipes = [&] {
     const OnCore routers_inherit_it(plan.task_core);
-    return Pipes::open(pool, BlocksSide::bench, socket, with_iceoryx);
+    return Pipes::open(pool, board, BlocksSide::bench, socket, with_iceoryx);
   }();
   if (!pipes) return std::unexpected(pipes.error());
   while (!board.ready.load()) pause_for(std::chrono::milliseconds(1));
