@@ -41,14 +41,17 @@ ListedObject with_holder(ObjectInfo info) {
 
 }  // namespace
 
-void ObjectLister::look() {
+Result<void> ObjectLister::look() {
   const TimePoint begin = MonotonicClock::now();
   wanted_ = begin;
-  if (begin < seen_until_) return;
-  seen_ = pool_->list();
+  if (begin < seen_until_) return {};
+  auto seen = pool_->list();
+  if (!seen) return std::unexpected(std::move(seen).error());
+  seen_ = *std::move(seen);
   std::ranges::sort(seen_, {}, &ObjectInfo::name);
   const TimePoint end = MonotonicClock::now();
   seen_until_ = end + kLookShare * (end - begin);
+  return {};
 }
 
 void ObjectLister::forget_old(TimePoint now) {
@@ -59,8 +62,7 @@ void ObjectLister::forget_old(TimePoint now) {
 }
 
 std::string ObjectLister::like(std::string_view name) {
-  look();
-  if (seen_.size() > kMostCompared) return "";
+  if (!look() || seen_.size() > kMostCompared) return "";
   std::vector<std::string_view> names;
   names.reserve(seen_.size());
   for (const ObjectInfo& object : seen_) names.emplace_back(object.name);
@@ -82,7 +84,7 @@ Result<ObjectListing> ObjectLister::one(const std::string& name) {
 
 Result<ObjectListing> ObjectLister::page(const ObjectQuery& query, TimePoint until) {
   if (!query.name.empty()) return one(query.name);
-  look();
+  if (auto looked = look(); !looked) return std::unexpected(std::move(looked).error());
   constexpr std::size_t kClockEvery = 64;
   ObjectListing listing;
   std::size_t references = 0;

@@ -35,7 +35,7 @@ class ObjectLister {
  private:
   [[nodiscard]] Result<ObjectListing> one(const std::string& name);
   [[nodiscard]] std::string like(std::string_view name);
-  void look();
+  [[nodiscard]] Result<void> look();
 
   const ObjectPool* pool_;
   std::vector<ObjectInfo> seen_;  // by name

@@ -115,22 +115,25 @@ bool StatusPublisher::look_at_instances(TimePoint now) {
 }
 
 // A topic with a sample for each of 100,000 objects would drown every client; see OPERATION_LIST_OBJECTS.
-std::vector<ObjectInfo> StatusPublisher::published_objects() const {
-  std::vector<ObjectInfo> objects = source_.pool->list();
-  if (objects.size() <= kMostPublished) return objects;
+Result<std::vector<ObjectInfo>> StatusPublisher::published_objects() const {
+  auto listed = source_.pool->list();
+  if (!listed || listed->size() <= kMostPublished) return listed;
+  std::vector<ObjectInfo>& objects = *listed;
   const auto order = [](const ObjectInfo& object) {
     return std::pair(!object.registered && object.bound_tasks == 0, std::string_view(object.name));
   };
   std::ranges::nth_element(objects, objects.begin() + kMostPublished, {}, order);
   objects.resize(kMostPublished);
-  return objects;
+  return listed;
 }
 
 bool StatusPublisher::look_at_objects(TimePoint now) {
   bool changed = false;
+  const auto published = published_objects();
+  if (!published) return changed;  // what was told last holds until they can be looked at
   events_.begin_round();
   objects_.begin_round();
-  for (const ObjectInfo& object : published_objects()) {
+  for (const ObjectInfo& object : *published) {
     plc_ObjectStatus sample{};
     dds::copy_text(sample.host, source_.host);
     dds::copy_text(sample.object_name, object.name);

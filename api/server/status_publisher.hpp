@@ -59,7 +59,7 @@ class StatusPublisher {
   bool look_at_instances(TimePoint now);
   bool look_at_objects(TimePoint now);
   bool update_event(const ObjectInfo& object);
-  [[nodiscard]] std::vector<ObjectInfo> published_objects() const;
+  [[nodiscard]] Result<std::vector<ObjectInfo>> published_objects() const;
   void write_host(bool changed);
 
   Source source_;

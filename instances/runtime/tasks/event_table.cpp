@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "instances/runtime/tasks/handle.hpp"
+#include "shm/base/log.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
@@ -12,7 +13,10 @@ namespace plchost {
 void EventTable::clear_own() {
   if (pool_ == nullptr) return;
   const std::string prefix = instance_ + "/";
-  for (const ObjectInfo& object : pool_->list()) {
+  const auto objects = pool_->list();
+  if (!objects)
+    return spdlog::warn("events of the process before are not cleared: {}", objects.error().describe());
+  for (const ObjectInfo& object : *objects) {
     if (object.type != ObjectType::event || !object.name.starts_with(prefix)) continue;
     if (const auto event = pool_->open_event(object.name)) {
       (void)event->set_bound_tasks(0);
