@@ -2,6 +2,7 @@
 #include <utility>
 
 #include "api/cli/cli_session.hpp"
+#include "api/cli/node_verbs.hpp"
 #include "api/cli/object_verbs.hpp"
 #include "api/cli/rows.hpp"
 #include "api/cli/task_rows.hpp"
@@ -59,8 +60,8 @@ bool has_happened(const plc_ExceptionStatus& exception) {
 }  // namespace
 
 void add_list_verbs(const Command& plcctl, CliSession& session) {
-  const Command verb =
-      plcctl.verb("list", "Show all hosts, instances, tasks, events, objects, exceptions or transitions");
+  const Command verb = plcctl.verb(
+      "list", "Show all hosts, instances, tasks, events, objects, nodes, exceptions or transitions");
   verb.noun("hosts", "The controllers of the DDS domain", [&session] { return list_hosts(session); });
   verb.noun("instances", "The PLC instances",
             [&session] { return list(session, &ControlClient::instances, instance_columns()); });
@@ -71,6 +72,7 @@ void add_list_verbs(const Command& plcctl, CliSession& session) {
   verb.noun("events", "The external events",
             [&session] { return list(session, &ControlClient::events, event_columns()); });
   add_list_objects(verb, session);
+  add_list_nodes(verb, session);
   verb.noun("exceptions", "The last exception of each instance that had any", [&session] {
     return list(session, &ControlClient::exceptions, exception_columns(), has_happened);
   });

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "api/cli/cli_session.hpp"
+#include "api/cli/node_verbs.hpp"
 #include "api/cli/object_verbs.hpp"
 #include "api/cli/rows.hpp"
 #include "api/cli/statistics_rows.hpp"
@@ -102,7 +103,8 @@ int show_exception(CliSession& session, const std::string& name) {
 
 void add_show_verbs(const Command& plcctl, CliSession& session) {
   const Command verb = plcctl.verb(
-      "show", "Show all that is known of one instance, its last exception, one task or one object");
+      "show",
+      "Show all that is known of one instance, its last exception, one task or one object, or how blocks go");
   const auto add = [&](const char* noun, const char* form, const char* text,
                        int (*run)(CliSession&, const std::string&)) {
     const auto name = std::make_shared<std::string>();
@@ -112,6 +114,7 @@ void add_show_verbs(const Command& plcctl, CliSession& session) {
   add("exception", "INSTANCE", "The last exception of one PLC instance", show_exception);
   add("task", "INSTANCE/TASK", "One task", show_task);
   add_show_object(verb, session);
+  add_show_routes(verb, session);
 }
 
 }  // namespace plchost

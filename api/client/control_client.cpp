@@ -16,7 +16,7 @@ namespace plchost {
 namespace {
 
 bool is_engineering(std::int32_t operation) {
-  return operation >= plc_OPERATION_LOAD_APPLICATION;
+  return operation >= plc_OPERATION_LOAD_APPLICATION && operation <= plc_OPERATION_UNREGISTER_EVENT;
 }
 
 auto order(const plc_InstanceStatus& s) {

@@ -19,6 +19,7 @@
 #include "api/client/transition_log.hpp"
 #include "api/client/wait_set.hpp"
 #include "api/dds/domain.hpp"
+#include "api/dds/node_page.hpp"
 #include "api/dds/object_page.hpp"
 #include "api/dds/object_query.hpp"
 #include "api/dds/topics.hpp"
@@ -69,6 +70,12 @@ class ControlClient {
   /// not_found: no object of the query's name.
   [[nodiscard]] Result<ObjectListing> list_objects(const std::string& host, const ObjectQuery& query,
                                                    TimePoint deadline);
+  /// The nodes of a host that send blocks, or a part of the ways between them, with what they count. Not
+  /// complete: go on with query.after = next_after. not_found: no node of the query's name.
+  [[nodiscard]] Result<NodeListing> list_nodes(const std::string& host, const NodeQuery& query,
+                                               TimePoint deadline);
+  [[nodiscard]] Result<NodeListing> list_routes(const std::string& host, const NodeQuery& query,
+                                                TimePoint deadline);
   /// One for each instance; count 0: it never had an exception.
   [[nodiscard]] Result<std::vector<plc_ExceptionStatus>> exceptions(const std::string& host,
                                                                     TimePoint deadline);
@@ -127,7 +134,13 @@ class ControlClient {
   [[nodiscard]] Result<RequestCaller*> caller(const std::string& host, bool engineering);
   [[nodiscard]] Result<EventPoster*> poster(const std::string& host);
   bool take_acks(TimePoint now);
-  [[nodiscard]] std::optional<ObjectListing> take_page(const plc_SampleIdentity& identity);
+  struct PageReader {
+    dds::Entity topic;
+    dds::Entity reader;
+  };
+  template <class Page, class Listing>
+  [[nodiscard]] Result<Listing> ask_for_page(PageReader& pages, const dds::TopicInfo& topic,
+                                             const ApiRequest& request, TimePoint deadline);
 
   std::shared_ptr<dds::Entity> domain_;
   dds::Entity participant_;
@@ -148,8 +161,8 @@ class ControlClient {
   TimePoint last_news_;
   dds::Entity reply_topic_;
   dds::Entity reply_reader_;
-  dds::Entity page_topic_;
-  dds::Entity page_reader_;
+  PageReader object_pages_;
+  PageReader node_pages_;
   dds::Entity ack_topic_;
   dds::Entity ack_reader_;
   dds::Entity event_topic_;

@@ -81,7 +81,7 @@ Result<std::string> domain_configuration(Role role, const DomainOptions& options
       "ms</AckDelay>"
       "<PreEmptiveAckDelay>1 ms</PreEmptiveAckDelay>"
       "<HeartbeatInterval min=\"1 ms\" minsched=\"5 ms\" max=\"100 ms\">10 ms</HeartbeatInterval>"
-      "<SocketReceiveBufferSize min=\"128 KiB\" max=\"4 MiB\"/><MaxSampleSize>64 KiB</MaxSampleSize>"
+      "<SocketReceiveBufferSize min=\"128 KiB\" max=\"4 MiB\"/><MaxSampleSize>256 KiB</MaxSampleSize>"
       "<Watermarks><WhcHigh>32 MB</WhcHigh><WhcHighInit>32 MB</WhcHighInit><WhcAdaptive>false</WhcAdaptive>"
       "</Watermarks></Internal>{}</Domain></CycloneDDS>",
       interfaces, role == Role::server ? "auto" : "none", kMaxServersPerMachine - 1, peers,

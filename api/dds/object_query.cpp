@@ -1,13 +1,11 @@
 #include "api/dds/object_query.hpp"
 
-#include <algorithm>
 #include <array>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "api/dds/entries.hpp"
-#include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
@@ -85,15 +83,7 @@ Result<ObjectQuery> parse_object_query(std::span<const plc_KeyValue> entries) {
   std::string type;
   const std::array<std::pair<std::string_view, std::string*>, 4> known{
       {{kName, &query.name}, {kType, &type}, {kMatch, &query.match}, {kAfter, &query.after}}};
-  for (const plc_KeyValue& entry : entries) {
-    const auto* const found =
-        std::ranges::find(known, dds::text_of(entry.name), &std::pair<std::string_view, std::string*>::first);
-    if (found == known.end()) continue;
-    if (!found->second->empty()) {
-      return failure(ErrorCode::invalid_argument, fmt::format("'{}' is there twice", found->first));
-    }
-    *found->second = dds::text_of(entry.value);
-  }
+  if (auto read = dds::read_entries(entries, known); !read) return std::unexpected(std::move(read).error());
   if (!type.empty()) {
     const auto parsed = parse_object_type(type);
     if (!parsed) return std::unexpected(parsed.error());

@@ -24,9 +24,9 @@ Qos reply_qos() {
   return qos;
 }
 
-Qos object_page_qos() {
+Qos page_qos() {
   Qos qos;
-  qos.reliable(kServerBlocking).keep_last(kObjectPageDepth).transient_local();
+  qos.reliable(kServerBlocking).keep_last(kPageDepth).transient_local();
   return qos;
 }
 

@@ -32,6 +32,7 @@ inline constexpr TopicInfo kTaskStatistics{"plc/v1/status/task_statistics", &plc
 inline constexpr TopicInfo kEventStatus{"plc/v1/status/event", &plc_EventStatus_desc};
 inline constexpr TopicInfo kObjectStatus{"plc/v1/status/object", &plc_ObjectStatus_desc};
 inline constexpr TopicInfo kObjectPage{"plc/v1/objects", &plc_ObjectPage_desc};
+inline constexpr TopicInfo kNodePage{"plc/v1/nodes", &plc_NodePage_desc};
 inline constexpr TopicInfo kHostFinding{"plc/v1/status/host_finding", &plc_HostFinding_desc};
 inline constexpr TopicInfo kExceptionStatus{"plc/v1/status/exception", &plc_ExceptionStatus_desc};
 inline constexpr TopicInfo kTransition{"plc/v1/transition", &plc_Transition_desc};
@@ -41,7 +42,7 @@ inline constexpr TopicInfo kTransition{"plc/v1/transition", &plc_Transition_desc
 inline constexpr std::int32_t kRequestReaderDepth = 256;
 inline constexpr std::int32_t kEventReaderDepth = 4096;
 inline constexpr std::int32_t kReplyDepth = 16;
-inline constexpr std::int32_t kObjectPageDepth = 4;
+inline constexpr std::int32_t kPageDepth = 4;  ///< of objects, and of nodes
 inline constexpr std::int32_t kTransitionDepth = 64;  ///< of each instance; as many as its ring holds
 /// Entry of InstanceStatus.ext: the number of the last transition of this instance that its host has written;
 /// 0: none yet.
@@ -56,7 +57,7 @@ inline constexpr Duration kPresenceDeadline = std::chrono::milliseconds(100);
 [[nodiscard]] Qos request_qos();
 [[nodiscard]] Qos event_qos();
 [[nodiscard]] Qos reply_qos();
-[[nodiscard]] Qos object_page_qos();
+[[nodiscard]] Qos page_qos();
 [[nodiscard]] Qos ack_qos();
 [[nodiscard]] Qos status_qos();
 [[nodiscard]] Qos presence_qos();

@@ -149,6 +149,9 @@ void ControlServer::Parts::on_request(ApiRole role, const dds::Guid& writer, con
   auto checked = check_request(request, role, options.host, instances);
   if (!checked) return answer(client, identity, checked.error().code, checked.error().describe());
   if (checked->verb == ControlVerb::list_objects) return list_objects(client, request);
+  if (checked->verb == ControlVerb::list_nodes || checked->verb == ControlVerb::list_routes) {
+    return list_nodes(checked->verb, client, request);
+  }
   const PendingCommand command{
       client,        identity, checked->instance, MonotonicClock::now() + ManagerLink::kCommandLimit,
       checked->verb, {}};
@@ -164,12 +167,30 @@ void ControlServer::Parts::list_objects(const dds::Guid& client, const plc_Reque
   const auto listing = query ? lister.page(*query) : Result<ObjectListing>(std::unexpected(query.error()));
   if (!listing) return answer(client, identity, listing.error().code, listing.error().describe());
   ObjectPageSample sample(*listing);
-  plc_ObjectPage& page = sample.page();
-  page.related_identity = identity;
+  send_page(client, request, sample.page());
+}
+
+void ControlServer::Parts::list_nodes(ControlVerb verb, const dds::Guid& client, const plc_Request& request) {
+  const auto look = [&]() -> Result<NodeListing> {
+    const auto query = parse_node_query(std::span(request.ext._buffer, request.ext._length));
+    if (!query) return std::unexpected(query.error());
+    return verb == ControlVerb::list_nodes ? nodes.nodes(*query) : nodes.routes(*query);
+  };
+  const auto listing = look();
+  if (!listing) {
+    return answer(client, request.header.request_identity, listing.error().code, listing.error().describe());
+  }
+  NodePageSample sample(*listing);
+  send_page(client, request, sample.page());
+}
+
+template <class Page>
+void ControlServer::Parts::send_page(const dds::Guid& client, const plc_Request& request, Page& page) {
+  page.related_identity = request.header.request_identity;
   dds::copy_text(page.host, options.host);
   page.epoch = epoch;
   const bool written = sessions->write_page(client, page);
-  answer(client, identity, written ? ErrorCode::ok : ErrorCode::busy,
+  answer(client, request.header.request_identity, written ? ErrorCode::ok : ErrorCode::busy,
          written ? "" : "the client does not take what it asked for; ask again");
 }
 

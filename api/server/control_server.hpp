@@ -8,6 +8,7 @@
 
 #include "api/dds/domain.hpp"
 #include "shm/base/result.hpp"
+#include "shm/block_driver/node_directory.hpp"
 
 namespace plchost {
 
@@ -17,6 +18,7 @@ struct ServerOptions {
   std::string pool;
   std::string run_directory;
   dds::DomainOptions dds;
+  std::string blocks_base = std::string(kDefaultBlockBase);  ///< of the nodes that are listed
 };
 
 /// The server's end of the DDS API. Posts are done in DDS's receiving thread (on_event_post); everything else

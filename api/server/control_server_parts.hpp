@@ -11,6 +11,7 @@
 #include "api/server/control_server.hpp"
 #include "api/server/event_intake.hpp"
 #include "api/server/manager_link.hpp"
+#include "api/server/node_lister.hpp"
 #include "api/server/object_lister.hpp"
 #include "api/server/request_check.hpp"
 #include "api/server/session_table.hpp"
@@ -29,7 +30,11 @@ struct ControlServer::Parts {
   };
 
   Parts(ServerOptions given, ObjectPool attached, std::uint64_t started)
-      : options(std::move(given)), pool(std::move(attached)), lister(pool), epoch(started) {}
+      : options(std::move(given)),
+        pool(std::move(attached)),
+        lister(pool),
+        nodes(options.pool, options.blocks_base),
+        epoch(started) {}
 
   Result<void> open(PostLedger ledger);
   Result<void> make_loop();
@@ -47,6 +52,9 @@ struct ControlServer::Parts {
   void finish(std::vector<FinishedCommand> commands);
   void ask_for_findings();
   void list_objects(const dds::Guid& client, const plc_Request& request);
+  void list_nodes(ControlVerb verb, const dds::Guid& client, const plc_Request& request);
+  template <class Page>
+  void send_page(const dds::Guid& client, const plc_Request& request, Page& page);
   [[nodiscard]] bool collect_findings(FinishedCommand& finished);
 
   static void on_event_post(dds_entity_t reader, void* server);
@@ -55,6 +63,7 @@ struct ControlServer::Parts {
   ServerOptions options;
   ObjectPool pool;
   ObjectLister lister;
+  NodeLister nodes;
   std::uint64_t epoch;
   UniqueFd epoll;
   UniqueFd wake;

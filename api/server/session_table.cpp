@@ -12,23 +12,30 @@
 
 namespace plchost {
 
+namespace {
+
+// By SessionTable::Stream.
+constexpr std::array kStreamTopics{dds::kReply, dds::kEventAck, dds::kObjectPage, dds::kNodePage};
+
+}  // namespace
+
 Result<SessionTable> SessionTable::create(dds_entity_t participant) {
+  static_assert(kStreamTopics.size() == kStreams);
   SessionTable table;
   table.participant_ = participant;
-  auto reply = dds::make_topic(participant, dds::kReply);
-  auto ack = dds::make_topic(participant, dds::kEventAck);
-  auto page = dds::make_topic(participant, dds::kObjectPage);
+  for (std::size_t i = 0; i < kStreams; ++i) {
+    auto topic = dds::make_topic(participant, kStreamTopics[i]);
+    if (!topic) return std::unexpected(std::move(topic).error());
+    table.topics_[i] = std::move(*topic);
+  }
   auto participants =
       dds::check_entity(dds_create_reader(participant, DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr, nullptr),
                         "watch participants");
   auto subscriptions = dds::check_entity(
       dds_create_reader(participant, DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION, nullptr, nullptr), "watch readers");
-  for (auto* made : {&reply, &ack, &page, &participants, &subscriptions}) {
+  for (auto* made : {&participants, &subscriptions}) {
     if (!*made) return std::unexpected(made->error());
   }
-  table.reply_topic_ = std::move(*reply);
-  table.ack_topic_ = std::move(*ack);
-  table.page_topic_ = std::move(*page);
   table.participants_ = std::move(*participants);
   table.subscriptions_ = std::move(*subscriptions);
   return table;
@@ -60,28 +67,24 @@ void SessionTable::follow_readers() {
   using Reader = dds_builtintopic_endpoint_t;
   dds::take_valid<Reader>(subscriptions_.get(), [this](const Reader& reader, const auto& info) {
     if (info.instance_state != DDS_IST_ALIVE) return;
-    const std::string_view topic = reader.topic_name;
-    const bool replies = topic == dds::kReply.name;
-    const bool pages = topic == dds::kObjectPage.name;
-    if (!replies && !pages && topic != dds::kEventAck.name) return;
+    const auto* const topic =
+        std::ranges::find(kStreamTopics, std::string_view(reader.topic_name), &dds::TopicInfo::name);
+    if (topic == kStreamTopics.end()) return;
     Session* const session = session_of(dds::Guid::from(reader.participant_key.v));
-    if (session == nullptr) return;
     // The writer exists before the first request: it has met its reader when the answer comes. One that
     // nobody reads is not made: each is announced to every client.
-    if (replies) {
-      (void)open_writer(*session, session->reply_writer, reply_topic_, dds::reply_qos());
-    } else if (pages) {
-      (void)open_writer(*session, session->page_writer, page_topic_, dds::object_page_qos());
-    } else {
-      (void)open_writer(*session, session->ack_writer, ack_topic_, dds::ack_qos());
-    }
+    if (session != nullptr) (void)open_writer(*session, static_cast<Stream>(topic - kStreamTopics.begin()));
   });
 }
 
-bool SessionTable::open_writer(const Session& session, dds::Entity& writer, const dds::Entity& topic,
-                               const dds::Qos& qos) {
+bool SessionTable::open_writer(Session& session, Stream stream) {
+  dds::Entity& writer = session.writers[std::to_underlying(stream)];
   if (writer) return true;
-  auto made = dds::make_writer(session.publisher.get(), topic.get(), qos);
+  const auto qos = [stream] {
+    if (stream == Stream::replies) return dds::reply_qos();
+    return stream == Stream::acks ? dds::ack_qos() : dds::page_qos();
+  };
+  auto made = dds::make_writer(session.publisher.get(), topics_[std::to_underlying(stream)].get(), qos());
   if (made) {
     writer = std::move(*made);
   } else {
@@ -102,7 +105,7 @@ SessionTable::Session* SessionTable::session_of(const dds::Guid& client) {
     spdlog::error("client {}: {}", client.hex(), publisher.error().describe());
     return nullptr;
   }
-  return &sessions_.emplace(client, Session{std::move(*publisher), {}, {}, {}, {}}).first->second;
+  return &sessions_.emplace(client, Session{.publisher = std::move(*publisher)}).first->second;
 }
 
 void SessionTable::write_reply(const dds::Guid& client, const plc_Reply& reply) {
@@ -115,22 +118,25 @@ void SessionTable::write_reply(const dds::Guid& client, const plc_Reply& reply) 
     session->answers.push_back(reply);
     if (session->answers.size() > kRemembered) session->answers.pop_front();
   }
-  if (!open_writer(*session, session->reply_writer, reply_topic_, dds::reply_qos())) return;
-  (void)dds_write(session->reply_writer.get(), &reply);  // not read: the client asks again and gets it then
+  (void)write(client, Stream::replies, &reply);  // not read: the client asks again and gets it then
 }
 
 void SessionTable::write_ack(const dds::Guid& client, const plc_EventAck& ack) {
-  Session* const session = session_of(client);
-  if (session == nullptr) return;
-  if (!open_writer(*session, session->ack_writer, ack_topic_, dds::ack_qos())) return;
-  (void)dds_write(session->ack_writer.get(), &ack);
+  (void)write(client, Stream::acks, &ack);
 }
 
 bool SessionTable::write_page(const dds::Guid& client, const plc_ObjectPage& page) {
+  return write(client, Stream::objects, &page);
+}
+
+bool SessionTable::write_page(const dds::Guid& client, const plc_NodePage& page) {
+  return write(client, Stream::nodes, &page);
+}
+
+bool SessionTable::write(const dds::Guid& client, Stream stream, const void* sample) {
   Session* const session = session_of(client);
-  if (session == nullptr) return false;
-  if (!open_writer(*session, session->page_writer, page_topic_, dds::object_page_qos())) return false;
-  return dds_write(session->page_writer.get(), &page) == DDS_RETCODE_OK;
+  if (session == nullptr || !open_writer(*session, stream)) return false;
+  return dds_write(session->writers[std::to_underlying(stream)].get(), sample) == DDS_RETCODE_OK;
 }
 
 std::optional<plc_Reply> SessionTable::remembered(const dds::Guid& client,

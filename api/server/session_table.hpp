@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -12,7 +13,6 @@
 
 #include "api/dds/entity.hpp"
 #include "api/dds/guid.hpp"
-#include "api/dds/qos.hpp"
 #include "shm/base/result.hpp"
 
 namespace plchost {
@@ -37,6 +37,7 @@ class SessionTable {
   void write_ack(const dds::Guid& client, const plc_EventAck& ack);
   /// False: the client has not got it, nor will.
   [[nodiscard]] bool write_page(const dds::Guid& client, const plc_ObjectPage& page);
+  [[nodiscard]] bool write_page(const dds::Guid& client, const plc_NodePage& page);
   [[nodiscard]] std::optional<plc_Reply> remembered(const dds::Guid& client,
                                                     const plc_SampleIdentity& identity) const;
 
@@ -46,12 +47,13 @@ class SessionTable {
   [[nodiscard]] std::vector<dds_entity_t> discovery_readers() const;
 
  private:
+  /// What goes to each client over a writer of its own.
+  enum class Stream : std::uint8_t { replies, acks, objects, nodes };
+  static constexpr std::size_t kStreams = 4;
   struct Session {
     dds::Entity publisher;
-    dds::Entity reply_writer;
-    dds::Entity ack_writer;
-    dds::Entity page_writer;
-    std::deque<plc_Reply> answers;
+    std::array<dds::Entity, kStreams> writers = {};
+    std::deque<plc_Reply> answers = {};
   };
 
   SessionTable() = default;
@@ -59,13 +61,11 @@ class SessionTable {
   void follow_readers();
   /// Made if it is not there. None for a client that is not (or no longer) in the domain.
   [[nodiscard]] Session* session_of(const dds::Guid& client);
-  [[nodiscard]] static bool open_writer(const Session& session, dds::Entity& writer, const dds::Entity& topic,
-                                        const dds::Qos& qos);
+  bool open_writer(Session& session, Stream stream);
+  bool write(const dds::Guid& client, Stream stream, const void* sample);
 
   dds_entity_t participant_ = 0;
-  dds::Entity reply_topic_;
-  dds::Entity ack_topic_;
-  dds::Entity page_topic_;
+  std::array<dds::Entity, kStreams> topics_;
   dds::Entity participants_;
   dds::Entity subscriptions_;
   std::unordered_set<dds::Guid, dds::GuidHash> alive_;

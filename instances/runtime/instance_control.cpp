@@ -67,6 +67,8 @@ Result<std::string> Instance::obey(const ControlRequest& request) {
     case ControlVerb::load_application:
     case ControlVerb::check_host:
     case ControlVerb::list_objects:
+    case ControlVerb::list_nodes:
+    case ControlVerb::list_routes:
       break;
   }
   return failure(ErrorCode::unsupported,

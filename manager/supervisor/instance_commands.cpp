@@ -46,6 +46,8 @@ void ManagedInstance::handle(const ControlRequest& request, ControlReplyFunction
       return begin_forwarded();
     case ControlVerb::check_host:
     case ControlVerb::list_objects:
+    case ControlVerb::list_nodes:
+    case ControlVerb::list_routes:
     case ControlVerb::shutdown:
     case ControlVerb::status:
       return;  // refused by check_argument
@@ -58,6 +60,8 @@ Result<void> ManagedInstance::check_argument(ControlRequest& request) const {
     case ControlVerb::check_host:
       return failure(ErrorCode::invalid_argument, "'check host' is for the whole host: name no instance");
     case ControlVerb::list_objects:
+    case ControlVerb::list_nodes:
+    case ControlVerb::list_routes:
       return failure(ErrorCode::unsupported, "'list objects' is answered by the API server, from the pool");
     case ControlVerb::shutdown:
     case ControlVerb::status:

@@ -26,6 +26,8 @@ constexpr std::array kVerbs = {
     std::pair{ControlVerb::unregister_event, std::string_view("unregister event")},
     std::pair{ControlVerb::check_host, std::string_view("check host")},
     std::pair{ControlVerb::list_objects, std::string_view("list objects")},
+    std::pair{ControlVerb::list_nodes, std::string_view("list nodes")},
+    std::pair{ControlVerb::list_routes, std::string_view("list routes")},
     std::pair{ControlVerb::shutdown, std::string_view("shutdown")},
     std::pair{ControlVerb::status, std::string_view("status")},
 };

@@ -27,6 +27,8 @@ enum class ControlVerb : std::uint8_t {
   unregister_event,  ///< argument: name of an external event
   check_host,        ///< of the manager, no instance: look at the host; see api/control/host_finding.hpp
   list_objects,      ///< answered by the API server itself, from the pool
+  list_nodes,        ///< the same, from the directory of the nodes that send blocks
+  list_routes,       ///< the same
   shutdown,          ///< (manager to instance only) stop the application and end the process
   status,            ///< (manager to instance only) the reply's text is the InstanceReport
 };

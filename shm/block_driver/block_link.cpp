@@ -9,7 +9,7 @@ namespace plchost {
 namespace {
 
 constexpr std::uint64_t kLinkMagic = 0x6b6e696c'6b6c6270;  // "pblklink"
-constexpr std::uint32_t kLinkVersion = 1;
+constexpr std::uint32_t kLinkVersion = 2;
 
 LinkLayout& layout_of(const MemoryFile& file) noexcept {
   return *reinterpret_cast<LinkLayout*>(file.bytes().data());
@@ -86,6 +86,20 @@ RingMemory LinkMemory::ring(std::size_t priority) const noexcept {
           .slots = slots_};
 }
 
+LinkCounts LinkMemory::counts() const noexcept {
+  const LinkLayout& link = layout();
+  LinkCounts counts{.sent_bytes = link.sent_bytes.load(std::memory_order_relaxed),
+                    .received = link.received.load(std::memory_order_relaxed),
+                    .damaged = link.damaged.load(std::memory_order_relaxed),
+                    .expired = link.expired.load(std::memory_order_relaxed)};
+  for (std::size_t priority = 0; priority < kBlockPriorities; ++priority) {
+    counts.sent += link.published[priority].load(std::memory_order_relaxed);
+    counts.congested += link.congested[priority].load(std::memory_order_relaxed);
+    counts.waiting += count_waiting(ring(priority));
+  }
+  return counts;
+}
+
 OutLink::OutLink(LinkMemory memory, const NodeLife& to) noexcept
     : memory_(std::move(memory)),
       to_(to),
@@ -94,7 +108,9 @@ OutLink::OutLink(LinkMemory memory, const NodeLife& to) noexcept
 
 PutResult OutLink::put(const BlockHeader& header, std::span<const std::byte> contents) noexcept {
   const PutResult result = rings_[header.priority].put(header, contents);
-  if (result == PutResult::full) {
+  if (result == PutResult::put) {
+    memory_.layout().sent_bytes.fetch_add(contents.size(), std::memory_order_relaxed);
+  } else if (result == PutResult::full) {
     memory_.layout().congested[header.priority].fetch_add(1, std::memory_order_relaxed);
   } else if (result == PutResult::broken) {
     refused_.store(true, std::memory_order_relaxed);

@@ -37,7 +37,8 @@ struct LinkLayout {
 
   // Written by the sender. One for each priority.
   alignas(64) std::array<std::atomic<std::uint64_t>, kBlockPriorities> published;
-  std::array<std::atomic<std::uint64_t>, kBlockPriorities> congested;  ///< blocks that had no room
+  std::atomic<std::uint64_t> sent_bytes;                                           ///< of contents
+  alignas(64) std::array<std::atomic<std::uint64_t>, kBlockPriorities> congested;  ///< blocks without room
 
   // Written by the receiver.
   alignas(64) std::array<std::atomic<std::uint64_t>, kBlockPriorities> heads;
@@ -48,8 +49,20 @@ struct LinkLayout {
   std::atomic<std::uint64_t> expired;  ///< blocks that nobody has taken in time
   // SlotDescriptor descriptors[kBlockPriorities][slots] and then the slots' bytes follow.
 };
-static_assert(sizeof(LinkLayout) == 256 && offsetof(LinkLayout, published) == 64);
-static_assert(offsetof(LinkLayout, heads) == 128 && offsetof(LinkLayout, received) == 192);
+static_assert(sizeof(LinkLayout) == 320 && offsetof(LinkLayout, published) == 64);
+static_assert(offsetof(LinkLayout, heads) == 192 && offsetof(LinkLayout, received) == 256);
+
+/// What a link has counted, of all priorities, since it was made. What the receiver counts is told ten times
+/// in the time that a block may wait.
+struct LinkCounts {
+  std::uint64_t sent = 0;
+  std::uint64_t sent_bytes = 0;
+  std::uint64_t waiting = 0;    ///< blocks that lie in the queues now
+  std::uint64_t congested = 0;  ///< could not be sent: no room
+  std::uint64_t received = 0;
+  std::uint64_t damaged = 0;
+  std::uint64_t expired = 0;
+};
 
 [[nodiscard]] constexpr std::size_t link_size(std::uint32_t slots) noexcept {
   return sizeof(LinkLayout) + kBlockPriorities * std::size_t{slots} * (sizeof(SlotDescriptor) + kSlotSize);
@@ -74,6 +87,8 @@ class LinkMemory {
 
   [[nodiscard]] LinkLayout& layout() const noexcept;
   [[nodiscard]] RingMemory ring(std::size_t priority) const noexcept;
+  /// Any context; looks at each block that waits.
+  [[nodiscard]] LinkCounts counts() const noexcept;
   /// The file was cut short by a stranger, and what is read has been zeros since. Any context.
   [[nodiscard]] bool lost() const noexcept { return guard_.lost(); }
 

@@ -15,7 +15,7 @@
 #include "shm/block_driver/block_link.hpp"
 #include "shm/block_driver/link_gate.hpp"
 #include "shm/block_driver/node_directory.hpp"
-#include "shm/block_driver/topology.hpp"
+#include "shm/block_driver/routes.hpp"
 
 namespace plchost {
 
@@ -93,9 +93,6 @@ class BlockNode {
 
  private:
   friend class BlockRouter;
-  /// A host range and the neighbour that leads there, in one word: [ first : 16 ][ last : 16 ][ node : 16 ].
-  static constexpr std::size_t kMaxHostRoutes = 16;
-
   BlockNode(NodeOptions options, NodeDirectory directory, const NodeLife& life);
   [[nodiscard]] NodeSlot& own_slot() const noexcept { return directory_.slot(life_.node); }
   [[nodiscard]] bool is_local(NodeAddress address) const noexcept;
@@ -114,6 +111,7 @@ class BlockNode {
   std::array<LinkGate<InLink>, kMaxNodes> in_;
   std::array<std::atomic<std::uint64_t>, kMaxNodes / 64> open_in_{};  // bit of each in_ that is not closed
   std::array<std::atomic<std::uint16_t>, kMaxNodes> next_hops_{};
+  // A host range and the neighbour that leads there, in one word: [ first : 16 ][ last : 16 ][ node : 16 ].
   std::array<std::atomic<std::uint64_t>, kMaxHostRoutes> host_routes_{};
   std::array<std::atomic<std::uint64_t>, kMaxNodes / 64> wanted_{};
   std::array<std::atomic<std::uint32_t>, kBlockPriorities> sequences_{};

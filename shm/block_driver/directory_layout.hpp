@@ -17,7 +17,7 @@
 namespace plchost {
 
 inline constexpr std::uint64_t kDirectoryMagic = 0x65646f6e'6b6c6270;  // "pblknode"
-inline constexpr std::uint32_t kDirectoryVersion = 1;
+inline constexpr std::uint32_t kDirectoryVersion = 2;
 
 /// Other hosts that are reached through a node: from first to last. first 0: none.
 struct HostRange {
@@ -25,7 +25,7 @@ struct HostRange {
   std::uint16_t last = 0;
   bool operator==(const HostRange&) const = default;
 };
-inline constexpr std::size_t kMaxHostRanges = 4;
+inline constexpr std::size_t kMaxHostRanges = 16;
 
 /// Who has an address.
 struct NodeRecord {
@@ -47,6 +47,8 @@ struct NodeCounters {
   std::atomic<std::uint64_t> congested;    ///< had to be dropped: the next queue was full
   std::atomic<std::uint64_t> expired;      ///< nobody took them in time
   std::atomic<std::uint64_t> unconnected;  ///< sent when there was no link yet
+  std::atomic<std::uint64_t> refused;      ///< a gateway's: came from another host and were not valid
+  std::atomic<std::uint64_t> lost;         ///< a gateway's: were on their way between hosts and never came
 };
 
 struct NodeSlot {

@@ -8,6 +8,7 @@
 #include "shm/base/log.hpp"
 #include "shm/base/process_start.hpp"
 #include "shm/block_driver/block_router.hpp"
+#include "shm/block_driver/routes.hpp"
 
 namespace plchost {
 
@@ -83,19 +84,12 @@ void BlockRouter::refresh() {
     for (std::size_t bit = 0; bit < 64; ++bit) bits |= std::uint64_t{ours[word * 64 + bit]} << bit;
     changed = own.neighbours[word].exchange(bits, std::memory_order_acq_rel) != bits || changed;
   }
-  topology_ = Topology();
   for (std::uint16_t node = 1; node <= kMaxNodes; ++node) {
     const auto record = directory.record(node);
     lives_[node - 1U] = {.node = node, .generation = record ? record->generation : 0};
     pids_[node - 1U] = record ? record->pid : 0;
-    if (!record) continue;
-    NodeSet theirs;
-    for (std::size_t bit = 0; bit < kMaxNodes; ++bit) {
-      const std::uint64_t word = directory.slot(node).neighbours[bit / 64].load(std::memory_order_acquire);
-      theirs.set(bit, (word >> (bit % 64) & 1) != 0);
-    }
-    topology_.add(node, theirs, record->forwards != 0);
   }
+  topology_ = topology_of(directory);
   publish_routes();
   drop_stale_links();
   if (changed) directory.announce();
@@ -108,29 +102,14 @@ void BlockRouter::publish_routes() {
 }
 
 void BlockRouter::publish_host_routes() {
-  const auto distances = topology_.distances(node_.life_.node);
-  std::vector<std::uint16_t> gateways;
-  for (std::uint16_t node = 1; node <= kMaxNodes; ++node) {
-    const bool reached = distances[node - 1U] != 0 || node == node_.life_.node;
-    if (lives_[node - 1U].generation != 0 && reached) gateways.push_back(node);
-  }
-  std::ranges::sort(gateways, {}, [&](std::uint16_t node) { return std::pair(distances[node - 1U], node); });
-  std::size_t count = 0;
-  for (const std::uint16_t gateway : gateways) {
-    const auto record = node_.directory_.record(gateway);
-    for (const HostRange& hosts : record.value_or(NodeRecord{}).hosts) {
-      if (hosts.first == 0 || count == node_.host_routes_.size()) continue;
-      // A gateway gives its own blocks for others to its router, which lies behind its link to itself.
-      const std::uint16_t hop = gateway == node_.life_.node
-                                    ? gateway
-                                    : node_.next_hops_[gateway - 1U].load(std::memory_order_relaxed);
-      node_.host_routes_[count++].store(
-          std::uint64_t{hosts.first} << 32 | std::uint64_t{hosts.last} << 16 | hop,
-          std::memory_order_relaxed);
+  const auto routes = host_routes(node_.directory_, topology_, node_.life_.node);
+  for (std::size_t i = 0; i < node_.host_routes_.size(); ++i) {
+    std::uint64_t word = 0;
+    if (i < routes.size()) {
+      const HostRange& hosts = routes[i].hosts;
+      word = std::uint64_t{hosts.first} << 32 | std::uint64_t{hosts.last} << 16 | routes[i].next_hop;
     }
-  }
-  for (; count < node_.host_routes_.size(); ++count) {
-    node_.host_routes_[count].store(0, std::memory_order_relaxed);
+    node_.host_routes_[i].store(word, std::memory_order_relaxed);
   }
 }
 

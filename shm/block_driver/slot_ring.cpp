@@ -38,7 +38,25 @@ constexpr std::uint32_t slots_of_mark(std::uint64_t mark) noexcept {
   return static_cast<std::uint32_t>(mark >> kStateBits & kSlotsMask);
 }
 
+// Slots of the block that begins there; 0: none does, or what is written there is not the writer's.
+std::uint32_t slots_at(const RingMemory& ring, std::uint64_t at) noexcept {
+  const std::uint64_t word = ring.descriptors[at & (ring.slots - 1)].position.load(std::memory_order_acquire);
+  const auto slots = static_cast<std::uint32_t>(word & kSlotsMask);
+  return slots <= kMaxSlotsPerBlock && word == position_word(at, slots) ? slots : 0;
+}
+
 }  // namespace
+
+std::uint64_t count_waiting(const RingMemory& ring) noexcept {
+  const std::uint64_t begin = ring.head->load(std::memory_order_acquire);
+  std::uint64_t count = 0;
+  for (std::uint64_t at = begin; at - begin < ring.slots; ++count) {
+    const std::uint32_t slots = slots_at(ring, at);
+    if (slots == 0) break;
+    at += slots;
+  }
+  return count;
+}
 
 // Whether the slots from `tail` on are free. The reader's word is looked at only if what is known of it does
 // not suffice: it lies in a cache line that the reader writes.
@@ -108,14 +126,12 @@ RingReader::Found RingReader::look(std::uint64_t at) const noexcept {
     found.step = slots_of_mark(found.mark);
     return found;
   }
-  const SlotDescriptor& descriptor = memory_.descriptors[index];
-  const std::uint64_t word = descriptor.position.load(std::memory_order_acquire);
-  const auto slots = static_cast<std::uint32_t>(word & kSlotsMask);
+  const std::uint32_t slots = slots_at(memory_, at);
   // Not written yet, or by somebody who is not the writer. A block may begin at any slot behind it.
-  if (slots == 0 || slots > kMaxSlotsPerBlock || word != position_word(at, slots)) return found;
+  if (slots == 0) return found;
   found.step = slots;
   found.published = true;
-  found.tag = BlockTag::from_word(descriptor.tag.load(std::memory_order_relaxed));
+  found.tag = BlockTag::from_word(memory_.descriptors[index].tag.load(std::memory_order_relaxed));
   return found;
 }
 

@@ -56,6 +56,9 @@ struct RingMemory {
   std::uint32_t slots = 0;     ///< is_ring_size()
 };
 
+/// Blocks that lie in a row from the head on, as one who only looks sees them. Any context.
+[[nodiscard]] std::uint64_t count_waiting(const RingMemory& ring) noexcept;
+
 enum class PutResult : std::uint8_t {
   put,
   full,    ///< no room; nothing was put

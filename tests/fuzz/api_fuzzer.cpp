@@ -38,7 +38,8 @@ Sample sample_from(const std::uint8_t* data, std::size_t size) {
 }
 
 bool names_what_is_there(const ControlRequest& request) {
-  const bool of_host = request.verb == ControlVerb::check_host || request.verb == ControlVerb::list_objects;
+  const bool of_host = request.verb == ControlVerb::check_host || request.verb == ControlVerb::list_objects ||
+                       request.verb == ControlVerb::list_nodes || request.verb == ControlVerb::list_routes;
   return request.instance == (of_host ? "" : "line1");
 }
 

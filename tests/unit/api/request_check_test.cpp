@@ -44,6 +44,8 @@ TEST(RequestCheck, TurnsEachOperationIntoItsVerb) {
             ControlVerb::unregister_event);
   EXPECT_EQ(check(make(plc_OPERATION_CHECK_HOST, ""), ApiRole::operating)->verb, ControlVerb::check_host);
   EXPECT_EQ(check(make(plc_OPERATION_LIST_OBJECTS, ""), ApiRole::operating)->verb, ControlVerb::list_objects);
+  EXPECT_EQ(check(make(plc_OPERATION_LIST_NODES, ""), ApiRole::operating)->verb, ControlVerb::list_nodes);
+  EXPECT_EQ(check(make(plc_OPERATION_LIST_ROUTES, ""), ApiRole::operating)->verb, ControlVerb::list_routes);
   for (const char* task : {"", "Main"}) {
     const auto reset = check(make(plc_OPERATION_RESET_STATISTICS, "line1", task), ApiRole::operating);
     EXPECT_EQ(reset->verb, ControlVerb::reset_statistics);

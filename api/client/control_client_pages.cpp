@@ -1,0 +1,86 @@
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "api/client/check_names.hpp"
+#include "api/client/control_client.hpp"
+#include "api/dds/samples.hpp"
+
+namespace plchost {
+
+namespace {
+
+// A page that has not come so long after the answer will not: it is asked for again.
+constexpr Duration kPagePatience = std::chrono::milliseconds(500);
+constexpr Duration kBusyPause = std::chrono::milliseconds(50);
+
+template <class Page, class Listing>
+std::optional<Listing> take_page(dds_entity_t reader, const plc_SampleIdentity& identity) {
+  std::optional<Listing> found;
+  dds::take_valid<Page, dds::kPageDepth>(reader, [&](const Page& page, const auto& /*info*/) {
+    const plc_SampleIdentity& related = page.related_identity;
+    const bool ours = related.sequence_number == identity.sequence_number &&
+                      std::ranges::equal(related.writer_guid, identity.writer_guid);
+    if (ours) found = listing_of(page);  // others answer calls that were given up
+  });
+  return found;
+}
+
+}  // namespace
+
+template <class Page, class Listing>
+Result<Listing> ControlClient::ask_for_page(PageReader& pages, const dds::TopicInfo& topic,
+                                            const ApiRequest& request, TimePoint deadline) {
+  if (auto good = check_host_name(request.host); !good) return std::unexpected(std::move(good).error());
+  dds::Qos qos = dds::page_qos();
+  qos.keep_all().max_samples(dds::kPageDepth * dds::kMaxServersPerMachine);
+  if (auto opened = open_own_reader(pages.topic, pages.reader, topic, qos); !opened) {
+    return std::unexpected(opened.error());
+  }
+  for (;;) {
+    const auto reply = call(request, deadline);
+    if (!reply) return std::unexpected(reply.error());
+    if (reply->code != ErrorCode::ok && reply->code != ErrorCode::busy)
+      return failure(reply->code, reply->text);
+    const TimePoint patience =
+        MonotonicClock::now() + (reply->code == ErrorCode::ok ? kPagePatience : kBusyPause);
+    const TimePoint until = std::min(deadline, patience);
+    for (;;) {
+      if (auto listing = take_page<Page, Listing>(pages.reader.get(), reply->identity))
+        return *std::move(listing);
+      if (MonotonicClock::now() >= until) break;
+      update();  // or what has come on other topics would keep the wait from waiting
+      wait_set_.wait(until);
+    }
+    if (MonotonicClock::now() >= deadline) break;
+  }
+  return failure(ErrorCode::timed_out,
+                 fmt::format("what was asked of host '{}' has not come ({})", request.host, topic.name));
+}
+
+Result<ObjectListing> ControlClient::list_objects(const std::string& host, const ObjectQuery& query,
+                                                  TimePoint deadline) {
+  auto entries = entries_of(query);
+  if (!entries) return std::unexpected(std::move(entries).error());
+  return ask_for_page<plc_ObjectPage, ObjectListing>(
+      object_pages_, dds::kObjectPage, {host, plc_OPERATION_LIST_OBJECTS, "", "", *std::move(entries)},
+      deadline);
+}
+
+Result<NodeListing> ControlClient::list_nodes(const std::string& host, const NodeQuery& query,
+                                              TimePoint deadline) {
+  auto entries = entries_of(query);
+  if (!entries) return std::unexpected(std::move(entries).error());
+  return ask_for_page<plc_NodePage, NodeListing>(
+      node_pages_, dds::kNodePage, {host, plc_OPERATION_LIST_NODES, "", "", *std::move(entries)}, deadline);
+}
+
+Result<NodeListing> ControlClient::list_routes(const std::string& host, const NodeQuery& query,
+                                               TimePoint deadline) {
+  auto entries = entries_of(query);
+  if (!entries) return std::unexpected(std::move(entries).error());
+  return ask_for_page<plc_NodePage, NodeListing>(
+      node_pages_, dds::kNodePage, {host, plc_OPERATION_LIST_ROUTES, "", "", *std::move(entries)}, deadline);
+}
+
+}  // namespace plchost

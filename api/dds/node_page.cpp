@@ -1,0 +1,187 @@
+#include "api/dds/node_page.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "api/dds/entries.hpp"
+#include "api/dds/text.hpp"
+#include "shm/base/names.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr std::string_view kBaseEntry = "base";
+constexpr std::string_view kNodeEntry = "node";
+constexpr std::string_view kAfterNode = "after";
+
+static_assert(sizeof(plc_NodeRecord::name) == kMaxInstanceName + 1);
+static_assert(sizeof(plc_NodePage::base) == kMaxBlockBase + 1);
+
+Result<void> check_nodes(const NodeQuery& query) {
+  if (!query.base.empty()) {
+    if (auto good = check_name("base name", query.base, kMaxBlockBase); !good) return good;
+  }
+  if (query.node.empty()) return {};
+  return check_name("node", query.node, kMaxInstanceName);
+}
+
+Result<std::uint16_t> parse_after(std::string_view text) {
+  std::uint16_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error == std::errc{} && end == text.data() + text.size() && number >= 1 && number <= kMaxNodes) {
+    return number;
+  }
+  return failure(ErrorCode::invalid_argument,
+                 fmt::format("after '{}': allowed are 1 to {}", shown(text), kMaxNodes));
+}
+
+// The counters that travel, each under the same name.
+template <class To, class From>
+void copy_counters(To& to, const From& from) {
+  to.arrivals = from.arrivals;
+  to.forwarded = from.forwarded;
+  to.no_route = from.no_route;
+  to.loops = from.loops;
+  to.duplicates = from.duplicates;
+  to.congested = from.congested;
+  to.expired = from.expired;
+  to.unconnected = from.unconnected;
+  to.refused = from.refused;
+  to.lost = from.lost;
+}
+template <class To, class From>
+void copy_counts(To& to, const From& from) {
+  to.sent = from.sent;
+  to.sent_bytes = from.sent_bytes;
+  to.waiting = from.waiting;
+  to.congested = from.congested;
+  to.received = from.received;
+  to.damaged = from.damaged;
+  to.expired = from.expired;
+}
+
+plc_NodeRecord sample_of(const ListedNode& listed, std::vector<plc_HostRange>& hosts) {
+  const NodeInfo& info = listed.info;
+  plc_NodeRecord sample{};
+  sample.node = info.node;
+  dds::copy_text(sample.name, info.record.name.view());
+  sample.pid = info.record.pid;
+  const bool good = is_printable_utf8(listed.program);
+  dds::copy_text(sample.program, good ? cut(listed.program, sizeof sample.program - 1) : "?");
+  sample.generation = info.record.generation;
+  sample.forwards = info.record.forwards != 0;
+  sample.queue_slots = info.record.queue_slots;
+  copy_counters(sample, info);
+  for (const HostRange& range : info.record.hosts) {
+    if (range.first != 0) hosts.push_back({.first = range.first, .last = range.last});
+  }
+  sample.hosts._buffer = hosts.data();
+  sample.hosts._length = sample.hosts._maximum = static_cast<std::uint32_t>(hosts.size());
+  return sample;
+}
+
+ListedNode node_of(const plc_NodeRecord& sample) {
+  ListedNode listed;
+  listed.program = dds::text_of(sample.program);
+  listed.info.node = sample.node;
+  NodeRecord& record = listed.info.record;
+  record.name.assign(dds::text_of(sample.name));
+  record.pid = sample.pid;
+  record.generation = sample.generation;
+  record.forwards = sample.forwards ? 1 : 0;
+  record.queue_slots = sample.queue_slots;
+  const std::size_t ranges = std::min<std::size_t>(sample.hosts._length, kMaxHostRanges);
+  for (std::size_t i = 0; i < ranges; ++i) {
+    record.hosts[i] = {.first = sample.hosts._buffer[i].first, .last = sample.hosts._buffer[i].last};
+  }
+  copy_counters(listed.info, sample);
+  return listed;
+}
+
+plc_RouteRecord sample_of(const RouteInfo& route) {
+  plc_RouteRecord sample{};
+  sample.from_node = route.from;
+  sample.to_node = route.to;
+  sample.hosts = {.first = route.hosts.first, .last = route.hosts.last};
+  sample.next_hop = route.next_hop;
+  sample.links = route.links;
+  sample.linked = route.first.has_value();
+  if (route.first) copy_counts(sample, *route.first);
+  return sample;
+}
+
+RouteInfo route_of(const plc_RouteRecord& sample) {
+  RouteInfo route{.from = sample.from_node,
+                  .to = sample.to_node,
+                  .hosts = {.first = sample.hosts.first, .last = sample.hosts.last},
+                  .next_hop = sample.next_hop,
+                  .links = static_cast<std::uint8_t>(sample.links),
+                  .first = std::nullopt};
+  if (sample.linked) copy_counts(route.first.emplace(), sample);
+  return route;
+}
+
+}  // namespace
+
+Result<std::vector<plc_KeyValue>> entries_of(const NodeQuery& query) {
+  if (auto good = check_nodes(query); !good) return std::unexpected(std::move(good).error());
+  std::vector<plc_KeyValue> entries;
+  dds::add_entry(entries, kBaseEntry, query.base);
+  dds::add_entry(entries, kNodeEntry, query.node);
+  if (query.after != 0) dds::add_entry(entries, kAfterNode, fmt::format("{}", query.after));
+  return entries;
+}
+
+Result<NodeQuery> parse_node_query(std::span<const plc_KeyValue> entries) {
+  NodeQuery query;
+  std::string after;
+  const std::array<std::pair<std::string_view, std::string*>, 3> known{
+      {{kBaseEntry, &query.base}, {kNodeEntry, &query.node}, {kAfterNode, &after}}};
+  if (auto read = dds::read_entries(entries, known); !read) return std::unexpected(std::move(read).error());
+  if (!after.empty()) {
+    const auto parsed = parse_after(after);
+    if (!parsed) return std::unexpected(parsed.error());
+    query.after = *parsed;
+  }
+  if (auto good = check_nodes(query); !good) return std::unexpected(std::move(good).error());
+  return query;
+}
+
+NodePageSample::NodePageSample(const NodeListing& listing) {
+  const std::size_t nodes = std::min<std::size_t>(listing.nodes.size(), kMaxNodes);
+  hosts_.resize(nodes);
+  for (std::size_t i = 0; i < nodes; ++i) nodes_.push_back(sample_of(listing.nodes[i], hosts_[i]));
+  const std::size_t routes = std::min(listing.routes.size(), kPageRoutes);
+  for (std::size_t i = 0; i < routes; ++i) routes_.push_back(sample_of(listing.routes[i]));
+  dds::copy_text(page_.base, listing.base);
+  page_.host_number = listing.host_number;
+  page_.complete = listing.complete;
+  page_.next_after = listing.next_after;
+  page_.nodes._buffer = nodes_.data();
+  page_.nodes._length = page_.nodes._maximum = static_cast<std::uint32_t>(nodes_.size());
+  page_.routes._buffer = routes_.data();
+  page_.routes._length = page_.routes._maximum = static_cast<std::uint32_t>(routes_.size());
+}
+
+NodeListing listing_of(const plc_NodePage& page) {
+  NodeListing listing{.base = std::string(dds::text_of(page.base)),
+                      .host_number = page.host_number,
+                      .nodes = {},
+                      .routes = {},
+                      .complete = page.complete,
+                      .next_after = page.next_after};
+  for (const plc_NodeRecord& node : std::span(page.nodes._buffer, page.nodes._length)) {
+    listing.nodes.push_back(node_of(node));
+  }
+  for (const plc_RouteRecord& route : std::span(page.routes._buffer, page.routes._length)) {
+    listing.routes.push_back(route_of(route));
+  }
+  return listing;
+}
+
+}  // namespace plchost

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <control.h>
+
+#include "shm/base/result.hpp"
+#include "shm/block_driver/routes.hpp"
+
+namespace plchost {
+
+/// Which nodes, or the ways of which nodes, are asked for. What is empty asks for nothing.
+struct NodeQuery {
+  std::string base = {};    ///< empty: what the host's configuration says
+  std::string node = {};    ///< this one alone, by name or address
+  std::uint16_t after = 0;  ///< greater addresses only
+};
+
+/// The query as it travels: entries of plc_Request.ext. invalid_argument: what can be no name.
+[[nodiscard]] Result<std::vector<plc_KeyValue>> entries_of(const NodeQuery& query);
+/// And back. invalid_argument: a value that cannot be, or an entry twice. Entries of other names are of a
+/// newer client, who can do without.
+[[nodiscard]] Result<NodeQuery> parse_node_query(std::span<const plc_KeyValue> entries);
+
+/// A node as it is shown to clients.
+struct ListedNode {
+  NodeInfo info;
+  std::string program;  ///< of its process; empty: it has ended
+};
+
+/// A part of what was asked for, by address.
+struct NodeListing {
+  std::string base;
+  std::uint16_t host_number = 0;
+  std::vector<ListedNode> nodes = {};
+  std::vector<RouteInfo> routes = {};
+  bool complete = true;
+  std::uint16_t next_after = 0;  ///< not complete: the next part is what comes after this address
+};
+
+/// The bound of a page.
+inline constexpr std::size_t kPageRoutes = 512;
+static_assert(kPageRoutes >= kMaxRoutes);
+
+/// A listing as it travels.
+class NodePageSample {
+ public:
+  /// At most kMaxNodes and kPageRoutes. What the page shall say besides is for the caller to fill in.
+  explicit NodePageSample(const NodeListing& listing);
+  NodePageSample(const NodePageSample&) = delete;
+  NodePageSample& operator=(const NodePageSample&) = delete;
+  ~NodePageSample() = default;
+
+  [[nodiscard]] plc_NodePage& page() noexcept { return page_; }
+
+ private:
+  plc_NodePage page_{};
+  std::vector<plc_NodeRecord> nodes_;
+  std::vector<std::vector<plc_HostRange>> hosts_;
+  std::vector<plc_RouteRecord> routes_;
+};
+
+[[nodiscard]] NodeListing listing_of(const plc_NodePage& page);
+
+}  // namespace plchost
