@@ -55,12 +55,12 @@ int check_host(CliSession& session, bool all) {
   auto findings = session.client().value()->check_host(*host, session.deadline());
   if (!findings) return CliSession::fail(findings.error());
   std::ranges::stable_sort(*findings, std::ranges::greater(), &plc_HostFinding::level);
-  if (session.options.json) {
+  if (session.options.json || session.options.csv) {
     std::vector<Row> rows;
     for (const plc_HostFinding& finding : *findings) {
       if (all || finding.level != kOk) rows.push_back(row_of(finding));
     }
-    fmt::print("{}", format_json(rows));
+    session.show(rows, {});
   } else {
     print_all(*findings, all);
   }

@@ -72,7 +72,11 @@ Result<void> CliSession::check_instance(const std::string& instance) {
 }
 
 void CliSession::show(const std::vector<Row>& rows, const std::vector<Column>& columns) const {
-  fmt::print("{}", options.json ? format_json(rows) : format_table(rows, columns));
+  if (options.csv) {
+    fmt::print("{}", format_csv(rows));
+  } else {
+    fmt::print("{}", options.json ? format_json(rows) : format_table(rows, columns, options.coloured));
+  }
   std::fflush(stdout);
 }
 

@@ -26,6 +26,11 @@ struct CliOptions {
   double timeout_s = 3.0;
   bool timeout_given = false;
   bool json = false;
+  bool csv = false;
+  std::string colour = "auto";  ///< as --color says it
+  bool coloured = false;        ///< what comes of it
+  bool watch = false;
+  double every_s = 2.0;
 };
 
 /// One run of plcctl: its options, its connection, and how it says what went wrong.
@@ -48,7 +53,7 @@ class CliSession {
   /// not_found: none of the hosts that are shown has an instance of that name.
   [[nodiscard]] Result<void> check_instance(const std::string& instance);
 
-  /// Prints rows as table or JSON.
+  /// Prints rows as a table, JSON or CSV.
   void show(const std::vector<Row>& rows, const std::vector<Column>& columns) const;
 
   /// Prints the error; returns the exit code for it.
@@ -68,6 +73,7 @@ void add_command_verbs(const Command& plcctl, CliSession& session);
 void add_check_verb(const Command& plcctl, CliSession& session);
 void add_post_verb(const Command& plcctl, CliSession& session);
 void add_watch_verb(const Command& plcctl, CliSession& session);
+void add_completion_verb(const Command& plcctl);
 
 /// "I/T" split at the first slash. invalid_argument: no slash, or nothing on one side of it.
 [[nodiscard]] Result<std::pair<std::string, std::string>> split_name(std::string_view what,

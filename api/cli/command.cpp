@@ -6,6 +6,34 @@
 
 namespace plchost {
 
+namespace {
+
+void add_option(const CLI::Option& option, Syntax& to) {
+  if (option.get_positional()) {
+    to.arguments.push_back({option.get_name(true), option.get_description(), option.get_required()});
+    return;
+  }
+  std::vector<std::string> names;
+  for (const std::string& name : option.get_snames()) names.push_back("-" + name);
+  for (const std::string& name : option.get_lnames()) names.push_back("--" + name);
+  // "FLOAT:FLOAT in [0.1 - 3600]" names the type twice.
+  std::string value = option.get_items_expected_max() == 0 ? "" : option.get_type_name();
+  if (const auto colon = value.find(':'); colon != std::string::npos) value.erase(0, colon + 1);
+  to.options.push_back({std::move(names), value, option.get_description(), option.get_envname()});
+}
+
+}  // namespace
+
+Syntax syntax_of(const CLI::App& app) {
+  Syntax syntax{
+      .name = app.get_name(), .text = app.get_description(), .options = {}, .arguments = {}, .words = {}};
+  for (const CLI::Option* option : app.get_options()) add_option(*option, syntax);
+  for (const CLI::App* word : app.get_subcommands([](const CLI::App*) { return true; })) {
+    syntax.words.push_back(syntax_of(*word));
+  }
+  return syntax;
+}
+
 Command Command::verb(const char* name, const char* text) const {
   const auto known = app_->get_subcommands([name](CLI::App* other) { return other->get_name() == name; });
   CLI::App* const verb = known.empty() ? app_->add_subcommand(name, text) : known.front();

@@ -4,6 +4,8 @@
 #include <functional>
 #include <string>
 
+#include "api/cli/syntax.hpp"
+
 namespace CLI {
 class App;
 }
@@ -12,6 +14,9 @@ namespace plchost {
 
 /// The most that an option counts to: what is larger is a slip of the hand.
 inline constexpr std::uint64_t kMaxCount = 1'000'000'000'000;
+
+/// All that can be said on the command line.
+[[nodiscard]] Syntax syntax_of(const CLI::App& app);
 
 /// What plcctl does when all options are read; gives its exit code.
 using Action = std::function<int()>;

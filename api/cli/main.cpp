@@ -1,11 +1,18 @@
 #include <cmath>
+#include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "api/cli/cli_session.hpp"
+#include "api/cli/completion.hpp"
+#include "api/cli/live_names.hpp"
+#include "api/cli/man_page.hpp"
+#include "api/cli/repeat.hpp"
+#include "api/cli/terminal.hpp"
 #include "shm/base/log.hpp"
 
 namespace {
@@ -24,7 +31,24 @@ void add_options(CLI::App& app, plchost::CliOptions& options) {
                  "seconds to wait for an answer (default 3; what ends a cycle or a process: 80)")
       ->check(CLI::Range(kMinTimeout, kMaxTimeout))
       ->take_last();
-  app.add_flag("--json", options.json, "an array of flat objects, for programs");
+  app.add_option_function<std::string>(
+         "-o,--output",
+         [&options](const std::string& form) {
+           options.json = form == "json";
+           options.csv = form == "csv";
+         },
+         "table, json (an array of flat objects) or csv (default table)")
+      ->check(CLI::IsMember({"table", "json", "csv"}))
+      ->type_name("FORM");
+  app.add_flag("--json", options.json, "the same as --output json");
+  app.add_flag("-w,--watch", options.watch, "list and show: again and again, until Ctrl-C");
+  app.add_option("--every", options.every_s, "seconds between two looks of --watch (default 2)")
+      ->check(CLI::Range(kMinTimeout, kMaxTimeout))
+      ->take_last();
+  app.add_option("--color", options.colour,
+                 "states in colours: auto (on a terminal, unless NO_COLOR is set), always, never")
+      ->check(CLI::IsMember({"auto", "always", "never"}))
+      ->type_name("WHEN");
   app.add_option("--interface", options.dds.interfaces, "network interface (default lo); may be repeated")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
@@ -34,25 +58,43 @@ void add_options(CLI::App& app, plchost::CliOptions& options) {
 }
 
 // What follows a wrong word is not the mistake: only the first word that no command knows is looked at.
-std::string word_hint(const CLI::App& app, int argc, char** argv) {
-  const CLI::App* level = &app;
-  for (int i = 1; i < argc; ++i) {
-    const std::string word = argv[i];
-    if (word.starts_with('-')) return "";
-    std::vector<std::string> known;
-    const CLI::App* next = nullptr;
-    for (const CLI::App* sub : level->get_subcommands([](const CLI::App*) { return true; })) {
-      known.push_back(sub->get_name());
-      if (sub->get_name() == word) next = sub;
-    }
-    if (known.empty()) return "";
+std::string word_hint(const plchost::Syntax& plcctl, std::span<const std::string> words) {
+  const plchost::Syntax* level = &plcctl;
+  for (const std::string& word : words) {
+    if (word.starts_with('-') || level->words.empty()) return "";
+    const plchost::Syntax* const next = level->word(word);
     if (next == nullptr) {
+      std::vector<std::string> known;
+      for (const plchost::Syntax& one : level->words) known.push_back(one.name);
       return fmt::format("plcctl: unknown word '{}'{}; known here: {}\n", word, plchost::hint(word, known),
                          fmt::join(known, ", "));
     }
     level = next;
   }
   return "";
+}
+
+constexpr const char* kExitCodes =
+    "Exit codes: 0 done, 1 refused, failed or a problem found, 2 usage, 3 no answer, 4 warnings found.";
+
+// What the shells' scripts call: a candidate in each line, a tabulator, what it is.
+int offer(CLI::App& app, plchost::CliSession& session, std::span<const std::string> words) {
+  const plchost::Completion completion = plchost::complete(plchost::syntax_of(app), words);
+  constexpr double kPatienceOnTab = 1;
+  session.options.timeout_s = kPatienceOnTab;
+  try {
+    app.parse(std::vector<std::string>(completion.options.rbegin(), completion.options.rend()));
+  } catch (const CLI::ParseError&) {
+    // There is no verb yet; the options in front of it are read all the same.
+  }
+  if (completion.value == "FILE") fmt::print(":files\n");
+  auto candidates = completion.candidates;
+  for (plchost::Candidate& name : plchost::live_names(session, completion.value)) {
+    if (name.word.starts_with(words.back())) candidates.push_back(std::move(name));
+  }
+  for (const auto& [word, text] : candidates)
+    fmt::print("{}\t{}\n", plchost::printable(word), plchost::printable(text));
+  return plchost::kExitDone;
 }
 
 }  // namespace
@@ -62,8 +104,7 @@ int main(int argc, char** argv) {
   plchost::Action action;
   CLI::App app("plcctl: control of plchost over DDS", "plcctl");
   app.require_subcommand(1);
-  app.footer(
-      "Exit codes: 0 done, 1 refused, failed or a problem found, 2 usage, 3 no answer, 4 warnings found.");
+  app.footer(kExitCodes);
   add_options(app, session.options);
   const plchost::Command plcctl(app, action);
   plchost::add_list_verbs(plcctl, session);
@@ -72,11 +113,21 @@ int main(int argc, char** argv) {
   plchost::add_check_verb(plcctl, session);
   plchost::add_post_verb(plcctl, session);
   plchost::add_watch_verb(plcctl, session);
+  plchost::add_completion_verb(plcctl);
+  const std::vector<std::string> words(argv + 1, argv + argc);
+  plchost::start_log("plcctl", "warning");
+  // For programs: what completes the command line, and what makes the manual page.
+  if (words.size() > 1 && words.front() == "__complete")
+    return offer(app, session, std::span(words).subspan(1));
+  if (words.size() == 1 && words.front() == "__man") {
+    fmt::print("{}", plchost::man_page(plchost::syntax_of(app), kExitCodes));
+    return plchost::kExitDone;
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() != 0) {
-      if (const std::string text = word_hint(app, argc, argv); !text.empty()) {
+      if (const std::string text = word_hint(plchost::syntax_of(app), words); !text.empty()) {
         fmt::print(stderr, "{}", text);
         return plchost::kExitUsage;
       }
@@ -84,6 +135,12 @@ int main(int argc, char** argv) {
     return app.exit(error) == 0 ? plchost::kExitDone : plchost::kExitUsage;
   }
   session.options.timeout_given = app.count("--timeout") > 0;
-  plchost::start_log("plcctl", "warning");
-  return action();
+  const std::string& colour = session.options.colour;
+  session.options.coloured = colour == "always" || (colour == "auto" && plchost::shows_colours());
+  if (!session.options.watch) return action();
+  if (!app.got_subcommand("list") && !app.got_subcommand("show")) {
+    fmt::print(stderr, "plcctl: --watch goes with list and show\n");
+    return plchost::kExitUsage;
+  }
+  return plchost::repeat(session.options.every_s, action);
 }

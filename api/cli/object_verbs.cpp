@@ -76,6 +76,14 @@ void print_json(const std::vector<HostObjects>& hosts) {
   fmt::print("{}\n", separator.starts_with('[') ? "[]" : "\n]");
 }
 
+std::vector<Row> all_rows(const std::vector<HostObjects>& hosts) {
+  std::vector<Row> rows;
+  for (const HostObjects& of : hosts) {
+    for (const ListedObject& object : of.objects) rows.push_back(to_row(of.host, object));
+  }
+  return rows;
+}
+
 void print_table(const std::vector<HostObjects>& hosts) {
   std::vector<Row> rows;
   for (const HostObjects& of : hosts) {
@@ -95,7 +103,11 @@ int list_objects(CliSession& session, const ListArguments& arguments) {
     if (!objects) return CliSession::fail(objects.error());
     found.push_back({host.name, *std::move(objects)});
   }
-  session.options.json ? print_json(found) : print_table(found);
+  if (session.options.csv) {
+    session.show(all_rows(found), {});
+  } else {
+    session.options.json ? print_json(found) : print_table(found);
+  }
   return kExitDone;
 }
 

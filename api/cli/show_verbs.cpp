@@ -15,7 +15,11 @@ namespace plchost {
 namespace {
 
 int show_row(const CliSession& session, const Row& row) {
-  fmt::print("{}", session.options.json ? format_json({row}) : format_fields(row));
+  if (session.options.csv) {
+    fmt::print("{}", format_csv({row}));
+  } else {
+    fmt::print("{}", session.options.json ? format_json({row}) : format_fields(row));
+  }
   return kExitDone;
 }
 

@@ -33,6 +33,33 @@ std::size_t width_of(const std::string& text) {
       std::ranges::count_if(text, [](char c) { return (static_cast<unsigned char>(c) & 0xC0U) != 0x80U; }));
 }
 
+/// The colour of a state, as terminals number them; 0: that of all other text.
+int colour_of(std::string_view field, std::string_view text) {
+  constexpr int kRed = 31;
+  constexpr int kGreen = 32;
+  constexpr int kYellow = 33;
+  if (field != "state" && field != "to") return 0;
+  if (text == "running") return kGreen;
+  if (text == "exception" || text == "failed") return kRed;
+  if (text == "safe_mode" || text == "waiting" || text == "starting" || text == "stopping") return kYellow;
+  return 0;
+}
+
+std::string coloured_cell(std::string_view field, std::string text) {
+  const int colour = colour_of(field, text);
+  return colour == 0 ? text : fmt::format("\x1b[{}m{}\x1b[0m", colour, text);
+}
+
+std::string csv_field(const Row& value) {
+  if (value.is_null()) return "";
+  const std::string text = value.is_string() ? value.get<std::string>()
+                                             : value.dump(-1, ' ', false, Row::error_handler_t::replace);
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
+  return quoted + "\"";
+}
+
 }  // namespace
 
 std::string printable(std::string text) {
@@ -41,7 +68,7 @@ std::string printable(std::string text) {
   return text;
 }
 
-std::string format_table(const std::vector<Row>& rows, const std::vector<Column>& columns) {
+std::string format_table(const std::vector<Row>& rows, const std::vector<Column>& columns, bool coloured) {
   std::vector<std::string> lines(rows.size() + 1);
   for (const Column& column : columns) {
     const bool last = &column == &columns.back();
@@ -52,7 +79,7 @@ std::string format_table(const std::vector<Row>& rows, const std::vector<Column>
     for (std::size_t i = 0; i < cells.size(); ++i) {
       const std::string padding(width - width_of(cells[i]), ' ');
       if (right) lines[i] += padding;
-      lines[i] += cells[i];
+      lines[i] += coloured && i > 0 ? coloured_cell(column.field, cells[i]) : cells[i];
       if (!right && !last) lines[i] += padding;
       if (!last) lines[i] += "  ";
     }
@@ -79,6 +106,25 @@ std::string format_json(const std::vector<Row>& rows) {
     text += row.dump(-1, ' ', false, Row::error_handler_t::replace);
   }
   return text + (rows.empty() ? "]\n" : "\n]\n");
+}
+
+std::string format_csv(const std::vector<Row>& rows) {
+  if (rows.empty()) return "";
+  std::string text;
+  std::string separator;
+  for (const auto& [field, value] : rows.front().items()) {
+    text += separator + csv_field(field);
+    separator = ",";
+  }
+  for (const Row& row : rows) {
+    separator = "\n";
+    for (const auto& [field, unused] : rows.front().items()) {
+      const auto value = row.find(field);
+      text += separator + (value != row.end() ? csv_field(*value) : "");
+      separator = ",";
+    }
+  }
+  return text + "\n";
 }
 
 }  // namespace plchost

@@ -23,13 +23,19 @@ struct Column {
 [[nodiscard]] std::string printable(std::string text);
 
 /// An aligned table with a header line: texts to the left, numbers to the right. An empty text is shown as
-/// "-". Characters that could drive a terminal are shown as '?'.
-[[nodiscard]] std::string format_table(const std::vector<Row>& rows, const std::vector<Column>& columns);
+/// "-". Characters that could drive a terminal are shown as '?'. `coloured`: states are, by how well they
+/// are.
+[[nodiscard]] std::string format_table(const std::vector<Row>& rows, const std::vector<Column>& columns,
+                                       bool coloured = false);
 
 /// One "field  value" line for each field.
 [[nodiscard]] std::string format_fields(const Row& row);
 
 /// An array of objects, one on each line.
 [[nodiscard]] std::string format_json(const std::vector<Row>& rows);
+
+/// Comma-separated values as in RFC 4180, but with plain line ends: a header with the names of all fields of
+/// the first row, then a line for each row. What is no plain value stands as JSON in its field.
+[[nodiscard]] std::string format_csv(const std::vector<Row>& rows);
 
 }  // namespace plchost

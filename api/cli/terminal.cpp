@@ -44,4 +44,8 @@ PlotStyle terminal_style() {
   return {.width = std::clamp(width(), kLeastWidth, kGreatestWidth), .unicode = speaks_utf8()};
 }
 
+bool shows_colours() {
+  return ::isatty(STDOUT_FILENO) != 0 && variable("NO_COLOR").empty() && variable("TERM") != "dumb";
+}
+
 }  // namespace plchost

@@ -8,4 +8,7 @@ namespace plchost {
 /// locale (LC_ALL, LC_CTYPE, LANG: the first that is set) is one of UTF-8.
 [[nodiscard]] PlotStyle terminal_style();
 
+/// Whether standard output is a terminal that shows colours, and nobody has said NO_COLOR.
+[[nodiscard]] bool shows_colours();
+
 }  // namespace plchost

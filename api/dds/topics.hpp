@@ -42,7 +42,7 @@ inline constexpr TopicInfo kTransition{"plc/v1/transition", &plc_Transition_desc
 inline constexpr std::int32_t kRequestReaderDepth = 256;
 inline constexpr std::int32_t kEventReaderDepth = 4096;
 inline constexpr std::int32_t kReplyDepth = 16;
-inline constexpr std::int32_t kPageDepth = 4;  ///< of objects, and of nodes
+inline constexpr std::int32_t kPageDepth = 4;         ///< of objects, and of nodes
 inline constexpr std::int32_t kTransitionDepth = 64;  ///< of each instance; as many as its ring holds
 /// Entry of InstanceStatus.ext: the number of the last transition of this instance that its host has written;
 /// 0: none yet.

@@ -55,16 +55,20 @@ std::string read_and_remove(const std::string& path) {
 
 }  // namespace
 
-RunResult run_plcctl(std::uint32_t domain, std::vector<std::string> arguments) {
+RunResult run_program(const std::string& program, const std::vector<std::string>& arguments) {
   static int counter = 0;
   const std::string file = std::filesystem::temp_directory_path() /
                            ("plcctl-test-" + std::to_string(::getpid()) + "-" + std::to_string(counter++));
-  arguments.insert(arguments.begin(), {"--domain", std::to_string(domain), "--timeout", "10"});
   RunResult result;
-  result.code = Child(PLCCTL_PROGRAM, arguments, file).wait();
+  result.code = Child(program, arguments, file).wait();
   result.output = read_and_remove(file);
   result.errors = read_and_remove(file + ".errors");
   return result;
+}
+
+RunResult run_plcctl(std::uint32_t domain, std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), {"--domain", std::to_string(domain), "--timeout", "10"});
+  return run_program(PLCCTL_PROGRAM, arguments);
 }
 
 }  // namespace plchost

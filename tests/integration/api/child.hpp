@@ -39,6 +39,8 @@ struct RunResult {
   std::string errors;  ///< standard error
 };
 
+/// Runs a program and waits for its end.
+RunResult run_program(const std::string& program, const std::vector<std::string>& arguments);
 /// Runs plcctl in a domain and waits for its end.
 RunResult run_plcctl(std::uint32_t domain, std::vector<std::string> arguments);
 

@@ -1,3 +1,7 @@
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
@@ -59,6 +63,60 @@ TEST_F(Plcctl, ListsHostsEventsAndObjects) {
   EXPECT_THAT(run({"list", "hosts"}).output, HasSubstr("hosta"));
   EXPECT_THAT(run({"list", "events"}).output, HasSubstr("ready"));
   EXPECT_THAT(run({"list", "objects"}).output, HasSubstr("line1/ready"));
+}
+
+TEST_F(Plcctl, PrintsCommaSeparatedValues) {
+  const auto result = run({"list", "instances", "-o", "csv"});
+  ASSERT_EQ(result.code, 0) << result.errors;
+  EXPECT_THAT(result.output, testing::StartsWith("host,name,state,pid,"));
+  EXPECT_THAT(result.output, HasSubstr("\nhosta,line1,running,4711,"));
+  EXPECT_EQ(run({"list", "instances", "-o", "xml"}).code, 2);
+}
+
+TEST_F(Plcctl, CompletesTheNamesThatThereAre) {
+  const auto offered = [&](std::vector<std::string> words) {
+    words.insert(words.begin(), {"__complete", "--domain", std::to_string(domain_.number())});
+    return run_program(PLCCTL_PROGRAM, words).output;
+  };
+  EXPECT_EQ(offered({"show", "instance", ""}), "line1\trunning\n");
+  EXPECT_EQ(offered({"post", "event", "l"}), "line1/ready\t0 posts\n");
+  EXPECT_EQ(offered({"post", "event", "x"}), "");
+  EXPECT_EQ(offered({"show", "task", ""}), "line1/Main\tcyclic, created\n");
+  EXPECT_EQ(offered({"--host", ""}), "hosta\t1 instances\n");
+  EXPECT_THAT(offered({"show", "object", ""}), HasSubstr("line1/ready\t"));
+  EXPECT_EQ(offered({"load", "application", "line1", ""}), ":files\n");
+}
+
+TEST_F(Plcctl, CompletesInBash) {
+  const std::string folder = std::filesystem::path(PLCCTL_PROGRAM).parent_path();
+  const std::string script =
+      "PATH=" + folder + ":$PATH PLCHOST_DOMAIN=" + std::to_string(domain_.number()) +
+      "; export PLCHOST_DOMAIN; source <(plcctl completion bash); COMP_WORDS=(plcctl show instance l); "
+      "COMP_CWORD=3; _plcctl; echo \"${COMPREPLY[@]}\"";
+  EXPECT_EQ(run_program("/bin/bash", {"-c", script}).output, "line1\n");
+}
+
+TEST_F(Plcctl, WatchesAListUntilItIsAskedToEnd) {
+  EXPECT_EQ(run({"check", "host", "--watch"}).code, 2) << "that is no list";
+  const std::string seen = testing::TempDir() + "plcctl-watch-" + std::to_string(::getpid());
+  Child watch(PLCCTL_PROGRAM,
+              {"--domain", std::to_string(domain_.number()), "list", "instances", "-w", "--every", "0.1"},
+              seen);
+  const auto looks = [&] {
+    std::ifstream file(seen);
+    const std::string text{std::istreambuf_iterator<char>(file), {}};
+    std::size_t count = 0;
+    for (auto at = text.find("line1"); at != std::string::npos; at = text.find("line1", at + 1)) ++count;
+    return count;
+  };
+  for (const TimePoint end = soon(); looks() < 3 && MonotonicClock::now() < end;) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  EXPECT_GE(looks(), 3U);
+  watch.signal(SIGINT);
+  EXPECT_EQ(watch.wait(), 0);
+  std::filesystem::remove(seen);
+  std::filesystem::remove(seen + ".errors");
 }
 
 TEST_F(Plcctl, PostsAsOftenAsAsked) {

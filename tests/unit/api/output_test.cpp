@@ -36,6 +36,26 @@ TEST(Table, LetsNoNameDriveTheTerminal) {
   EXPECT_THAT(format_table({{{"name", "a\x1b[2J"}}}, {{"name", "NAME"}}), testing::Not(HasSubstr("\x1b")));
 }
 
+TEST(Table, ColoursStatesOnlyWhereItIsAskedTo) {
+  const std::vector<Row> rows{{{"state", "running"}, {"name", "running"}},
+                              {{"state", "failed"}, {"name", "b"}}};
+  const std::vector<Column> columns{{"state", "STATE"}, {"name", "NAME"}};
+  EXPECT_EQ(format_table(rows, columns, true),
+            "STATE    NAME\n"
+            "\x1b[32mrunning\x1b[0m  running\n"
+            "\x1b[31mfailed\x1b[0m   b\n");
+  EXPECT_THAT(format_table(rows, columns), testing::Not(HasSubstr("\x1b")));
+}
+
+TEST(Csv, QuotesWhatWouldBeTwoFields) {
+  EXPECT_EQ(format_csv({}), "");
+  EXPECT_EQ(format_csv({{{"name", "a,b"}, {"text", "he said \"no\""}, {"n", 1.5}},
+                        {{"n", nullptr}, {"name", "two\nlines"}, {"more", "is not shown"}}}),
+            "name,text,n\n"
+            "\"a,b\",\"he said \"\"no\"\"\",1.5\n"
+            "\"two\nlines\",,\n");
+}
+
 TEST(Json, IsAnArrayOfFlatObjects) {
   EXPECT_EQ(format_json({}), "[]\n");
   EXPECT_EQ(format_json({{{"b", 1}, {"a", "x"}}}), "[\n  {\"b\":1,\"a\":\"x\"}\n]\n");

@@ -1,0 +1,92 @@
+#include <array>
+
+#include <gmock/gmock.h>
+
+#include "api/cli/completion.hpp"
+#include "api/cli/man_page.hpp"
+
+namespace plchost {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+Syntax small_program() {
+  const Syntax::Option help{.names = {"-h", "--help"}, .value = "", .text = "help", .variable = ""};
+  const Syntax::Option host{
+      .names = {"--host"}, .value = "TEXT", .text = "which", .variable = "PLCHOST_HOST"};
+  const Syntax::Option count{.names = {"--count"}, .value = "UINT", .text = "how often", .variable = ""};
+  const Syntax event{.name = "event",
+                     .text = "Post it",
+                     .options = {help, count},
+                     .arguments = {{.form = "INSTANCE/EVENT", .text = "which one", .required = true}},
+                     .words = {}};
+  const Syntax post{.name = "post", .text = "Post", .options = {help}, .arguments = {}, .words = {event}};
+  const Syntax list{.name = "list", .text = "List", .options = {help}, .arguments = {}, .words = {}};
+  return {.name = "small",
+          .text = "small: does little",
+          .options = {help, host},
+          .arguments = {},
+          .words = {list, post}};
+}
+
+std::vector<std::string> offered(const std::vector<std::string>& words) {
+  std::vector<std::string> names;
+  for (const Candidate& one : complete(small_program(), words).candidates) names.push_back(one.word);
+  return names;
+}
+
+std::string value_at(const std::vector<std::string>& words) {
+  return complete(small_program(), words).value;
+}
+
+TEST(Completion, OffersTheWordsThatMayStandThere) {
+  EXPECT_THAT(offered({""}), ElementsAre("list", "post"));
+  EXPECT_THAT(offered({"p"}), ElementsAre("post"));
+  EXPECT_THAT(offered({"post", ""}), ElementsAre("event"));
+  EXPECT_THAT(offered({"x"}), IsEmpty());
+}
+
+TEST(Completion, OffersTheOptionsOfAllWordsSoFar) {
+  EXPECT_THAT(offered({"--h"}), ElementsAre("--help", "--host"));
+  EXPECT_THAT(offered({"post", "event", "--c"}), ElementsAre("--count"));
+  EXPECT_THAT(offered({"post", "--c"}), IsEmpty()) << "it is not known there yet";
+}
+
+TEST(Completion, SaysWhichKindOfValueIsWanted) {
+  EXPECT_EQ(value_at({"post", "event", ""}), "INSTANCE/EVENT");
+  EXPECT_EQ(value_at({"post", "event", "--count", "3", ""}), "INSTANCE/EVENT") << "an option is no argument";
+  EXPECT_EQ(value_at({"post", "event", "a/b", ""}), "") << "there is only one";
+  EXPECT_EQ(value_at({"--host", ""}), "--host");
+  EXPECT_EQ(value_at({"post", "event", "--count", ""}), "--count");
+}
+
+TEST(Completion, KeepsTheOptionsThatSayWhereToAsk) {
+  const std::vector<std::string> words{"--host", "north", "post", "event", "--count", "2", ""};
+  EXPECT_THAT(complete(small_program(), words).options, ElementsAre("--host", "north"));
+  EXPECT_THAT(complete(small_program(), std::vector<std::string>{"--host", "n"}).options, IsEmpty());
+  const std::vector<std::string> joined{"--host=north", "post", "event", ""};
+  EXPECT_THAT(complete(small_program(), joined).options, ElementsAre("--host=north"));
+}
+
+TEST(Completion, OfNothingIsThatOfAnEmptyWord) {
+  EXPECT_EQ(complete(small_program(), {}).candidates.size(), 2U);
+}
+
+TEST(ManPage, HasAllThatTheHelpHas) {
+  const std::string page = man_page(small_program(), "0 done");
+  for (const char* part : {".TH SMALL 1", "does little", "\\-\\-host", "\\fITEXT\\fR", "post event",
+                           "INSTANCE/EVENT", "how often", "0 done", "PLCHOST_HOST"}) {
+    EXPECT_THAT(page, HasSubstr(part));
+  }
+}
+
+TEST(ManPage, TakesNoTextForARequest) {
+  Syntax program = small_program();
+  program.options[1].text = ".so /etc/passwd";
+  EXPECT_THAT(man_page(program, ""), HasSubstr("\\&.so"));
+}
+
+}  // namespace
+}  // namespace plchost
