@@ -171,7 +171,9 @@ void plc_mutex_close(plc_mutex* mutex);
 /* ---- Memories --------------------------------------------------------------------------------------------
  */
 
-/* `size` bytes, zero when made. What users write at once into one memory they order themselves. */
+/* `size` bytes, zero when made. An image or a reference record that firmware has made with a header alone is
+ * there already. PLC_POOL_REFUSED: also if a file is in the way that only another user or root can remove. What
+ * users write at once into one memory they order themselves. */
 int plc_memory_create(plc_pool* pool, const char* name, size_t size, const plc_object_options* options,
                       plc_memory** memory);
 /* With PLC_POOL_READ a write to it is a SIGSEGV. */

@@ -22,6 +22,9 @@
  * was published: firmware that sees an old one (the instance was stopped, or is gone) brings its outputs into
  * a safe state.
  *
+ * The file is a memory of the pool: an object like all others once anybody opens it by name there, or the
+ * manager has looked, provided that its owner may write the pool.
+ *
  * Who removes the file has it made anew, by an instance's next start or by the next plc_image_open: see
  * plc_image_gone().
  */

@@ -188,6 +188,7 @@ Result<std::string> Instance::place_areas() {
                                .retain = {.directory = directory.empty() ? launch.state_directory : directory,
                                           .interval = settings_.retain.interval,
                                           .mismatch = settings_.retain.mismatch,
+                                          .postpone = settings_.retain.postpone,
                                           .cold = launch.start_kind == StartKind::cold}},
                               application_->tasks_to_change());
 }

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <charconv>
 #include <filesystem>
 #include <iterator>
 #include <utility>
@@ -15,6 +16,7 @@
 #include "shm/base/names.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/unique_fd.hpp"
+#include "shm/pool/object_type.hpp"
 
 namespace plchost {
 
@@ -22,9 +24,22 @@ namespace {
 
 constexpr std::size_t kMaxFileName = 255;  // NAME_MAX
 
+bool is_plain_in_file_names(char c) noexcept {
+  return is_name_character(c) || static_cast<unsigned char>(c) >= 0x80;
+}
+
 Result<std::string> path_of(const std::string& name) {
-  std::string plain = name;  // as pool_memory_name() writes bytes that a name cannot have
-  std::ranges::replace(plain, '%', '_');
+  if (name.size() > kMaxFileName) {
+    return failure(
+        ErrorCode::invalid_argument,
+        fmt::format("shared memory '{}' would have a file name of {} bytes, {} are allowed; choose a "
+                    "shorter name, or one with fewer characters that are not letters, digits, '_', "
+                    "'-' or '.': each takes three bytes",
+                    shown(name), name.size(), kMaxFileName));
+  }
+  std::string plain = name;  // as pool_memory_name() writes it
+  std::ranges::replace_if(
+      plain, [](char c) { return c == '%' || static_cast<unsigned char>(c) >= 0x80; }, '_');
   if (auto valid = check_name("shared memory name", plain, kMaxFileName); !valid) {
     return std::unexpected(valid.error());
   }
@@ -124,22 +139,43 @@ Result<UnnamedMemory> UnnamedMemory::make(const std::string& name, std::size_t s
   return UnnamedMemory(*std::move(path), *std::move(fd), MemoryFile(*bytes));
 }
 
-Result<MemoryFile> UnnamedMemory::give_name(bool take_over) && {
+namespace {
+
+// In a sticky folder only its owner, the folder's or root may remove a file.
+Result<void> make_room(const std::string& path) {
+  if (::unlink(path.c_str()) == 0 || errno == ENOENT) return {};
+  const int error = errno;
+  struct stat status{};
+  const bool seen = ::lstat(path.c_str(), &status) == 0;
+  return failure(
+      error == EPERM || error == EACCES ? ErrorCode::refused : ErrorCode::system,
+      fmt::format(
+          "{} is in the way, a file {}of another user ({} is sticky): only that user or root "
+          "can remove it; do that, or choose another name",
+          path,
+          seen ? fmt::format("({}) ", describe_rights(status.st_uid, status.st_gid, status.st_mode)) : "",
+          MemoryFile::kDirectory),
+      error);
+}
+
+}  // namespace
+
+Result<MemoryFile> UnnamedMemory::give_name(const TakeOver& take_over) && {
   constexpr int kAttempts = 10;  // each one fails only if another process makes the name anew in between
   for (int attempt = 1;; ++attempt) {
     const auto named = link_to(fd_, path_);
     if (named) return std::move(memory_);
-    if (!take_over || named.error().code != ErrorCode::already_exists || attempt == kAttempts) {
+    if (named.error().code != ErrorCode::already_exists || attempt == kAttempts || !take_over(path_)) {
       return std::unexpected(named.error());
     }
-    ::unlink(path_.c_str());
+    if (auto room = make_room(path_); !room) return std::unexpected(std::move(room).error());
   }
 }
 
 namespace {
 
 Result<MemoryFile> make_filled(const std::string& name, std::size_t size, const MemoryFile::Fill& fill,
-                               const MemoryRights& rights, bool take_over) {
+                               const MemoryRights& rights, const UnnamedMemory::TakeOver& take_over) {
   auto memory = UnnamedMemory::make(name, size, rights);
   if (!memory) return std::unexpected(memory.error());
   if (fill) {
@@ -152,12 +188,12 @@ Result<MemoryFile> make_filled(const std::string& name, std::size_t size, const 
 
 Result<MemoryFile> MemoryFile::create(const std::string& name, std::size_t size, const Fill& fill,
                                       const MemoryRights& rights) {
-  return make_filled(name, size, fill, rights, false);
+  return make_filled(name, size, fill, rights, [](const std::string&) { return false; });
 }
 
 Result<MemoryFile> MemoryFile::replace(const std::string& name, std::size_t size, const Fill& fill,
                                        const MemoryRights& rights) {
-  return make_filled(name, size, fill, rights, true);
+  return make_filled(name, size, fill, rights, [](const std::string&) { return true; });
 }
 
 Result<MemoryFile> MemoryFile::open(const std::string& name, std::size_t at_least, Access access) {
@@ -184,8 +220,9 @@ Result<void> MemoryFile::fill_empty(const std::string& name, std::size_t size) {
   return allocate(opened->fd, size, *path);
 }
 
-void MemoryFile::remove(const std::string& name) noexcept {
-  if (const auto path = path_of(name)) ::unlink(path->c_str());
+bool MemoryFile::remove(const std::string& name) noexcept {
+  const auto path = path_of(name);
+  return !path || ::unlink(path->c_str()) == 0 || errno == ENOENT;
 }
 
 MemoryFile::MemoryFile(MemoryFile&& other) noexcept : bytes_(std::exchange(other.bytes_, {})) {}
@@ -204,13 +241,36 @@ MemoryFile::~MemoryFile() {
 std::string pool_memory_name(std::string_view pool, std::string_view name) {
   std::string file = fmt::format("{}.memory.", pool);
   for (const char c : name) {
-    if (is_name_character(c)) {
+    if (is_plain_in_file_names(c)) {
       file += c;
     } else {
       fmt::format_to(std::back_inserter(file), "%{:02X}", static_cast<unsigned char>(c));
     }
   }
   return file;
+}
+
+std::optional<std::string> memory_of_file(std::string_view pool, std::string_view file) {
+  const std::string prefix = pool_memory_name(pool, "");
+  if (!file.starts_with(prefix)) return std::nullopt;
+  std::string name;
+  for (std::size_t at = prefix.size(); at < file.size(); ++at) {
+    if (file[at] != '%') {
+      name += file[at];
+      continue;
+    }
+    unsigned byte = 0;
+    constexpr int kHexadecimal = 16;
+    const std::string_view digits = file.substr(at + 1, 2);
+    if (std::from_chars(digits.begin(), digits.end(), byte, kHexadecimal).ptr != file.data() + at + 3) {
+      return std::nullopt;
+    }
+    name += static_cast<char>(byte);
+    at += 2;
+  }
+  // Written in another way it is another file.
+  const bool same = is_object_name(name) && pool_memory_name(pool, name) == file;
+  return same ? std::optional(std::move(name)) : std::nullopt;
 }
 
 void remove_pool_memories(std::string_view pool) noexcept {

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -48,8 +49,9 @@ class MemoryFile {
   /// stranger has emptied. not_found: no such name.
   [[nodiscard]] static Result<void> fill_empty(const std::string& name, std::size_t size);
 
-  /// Removes the name if it is there; who has it mapped keeps it.
-  static void remove(const std::string& name) noexcept;
+  /// Removes the name if it is there; who has it mapped keeps it. False: it is another user's, and the folder
+  /// is sticky.
+  static bool remove(const std::string& name) noexcept;
 
   [[nodiscard]] std::span<std::byte> bytes() const noexcept { return bytes_; }
   [[nodiscard]] explicit operator bool() const noexcept { return !bytes_.empty(); }
@@ -66,8 +68,10 @@ class UnnamedMemory {
   [[nodiscard]] static Result<UnnamedMemory> make(const std::string& name, std::size_t size,
                                                   const MemoryRights& rights);
   [[nodiscard]] std::span<std::byte> bytes() const noexcept { return memory_.bytes(); }
-  /// already_exists: the name is taken, and `take_over` does not allow to put this one in its place.
-  [[nodiscard]] Result<MemoryFile> give_name(bool take_over) &&;
+  /// Of the file that has the name: whether this one takes its place.
+  using TakeOver = std::function<bool(const std::string& path)>;
+  /// already_exists: the name is taken, and `take_over` says no. refused: it is another user's file.
+  [[nodiscard]] Result<MemoryFile> give_name(const TakeOver& take_over) &&;
 
  private:
   UnnamedMemory(std::string path, UniqueFd fd, MemoryFile memory) noexcept
@@ -77,9 +81,11 @@ class UnnamedMemory {
   MemoryFile memory_;
 };
 
-/// The file of a shared memory of the pool: "POOL.memory.NAME"; bytes of the name that a check_name() would
-/// not allow are there as %XX.
+/// The file of a shared memory of the pool: "POOL.memory.NAME"; of the ASCII characters of the name those
+/// that check_name() would not allow are there as %XX.
 [[nodiscard]] std::string pool_memory_name(std::string_view pool, std::string_view name);
+/// The other way round. Nothing: it is no such file.
+[[nodiscard]] std::optional<std::string> memory_of_file(std::string_view pool, std::string_view file);
 
 /// Removes the names of all shared memories of the pool; who has one mapped keeps it. Set-up.
 void remove_pool_memories(std::string_view pool) noexcept;

@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "shm/pool/object_listing.hpp"
+#include "shm/pool/pool_adoption.hpp"
 #include "shm/pool/pool_segment.hpp"
 #include "shm/pool/pool_table.hpp"
 
@@ -100,6 +101,8 @@ const std::string& ObjectPool::name() const noexcept {
 bool ObjectPool::tidy() noexcept {
   constexpr auto kPatience = std::chrono::milliseconds(20);
   (void)segment_->lock(true, kPatience);
+  if (!adoption_) adoption_ = std::make_shared<PoolAdoption>(segment_);
+  if (!segment_->lost()) adoption_->look();
   return !segment_->lost();
 }
 
@@ -188,8 +191,10 @@ Result<ObjectEntry*> ObjectPool::make_entry(const Wanted& wanted, const MemoryRi
   if (wanted.type == ObjectType::event) entry->binding.fetch_or(Binding::kRegistered);
   if (memory) {
     entry->size.store(wanted.size, kRelaxed);
-    // A file of that name without an object is what is left of another pool of the name.
-    const auto named = (*std::move(memory)).give_name(true);
+    // A file of that name that is no object, nor to be one, is what is left of another pool of the name.
+    const auto named = (*std::move(memory)).give_name([&](const std::string& path) {
+      return !PoolAdoption::is_for_adoption(path, name());
+    });
     if (!named) {
       objects.erase(*entry);
       return std::unexpected(named.error());
@@ -205,8 +210,14 @@ Result<Created<T>> ObjectPool::create_locked(const Wanted& wanted, const MemoryR
   const auto held = segment_->lock();
   if (!held) return std::unexpected(held.error());
   ObjectEntry* entry = PoolTable(segment_->view()).find(wanted.name);
-  const bool made = entry == nullptr;
-  if (made) {
+  bool made = entry == nullptr;
+  if (entry != nullptr && wanted.type == ObjectType::memory && PoolAdoption::is_left_over(*entry)) {
+    const auto left = PoolAdoption::use_again(*segment_, *entry, wanted.size, rights, attributes);
+    if (!left) return std::unexpected(left.error());
+    made = true;
+    entry = *left;
+  }
+  if (entry == nullptr) {
     const auto fresh = make_entry(wanted, rights, attributes, std::move(memory));
     if (!fresh) return std::unexpected(fresh.error());
     entry = *fresh;
@@ -225,7 +236,7 @@ Result<Created<T>> ObjectPool::create_object(const Wanted& wanted, const ObjectO
       (options.keep ? kKept : 0) | (wanted.type == ObjectType::event ? kDirect : 0);
   std::optional<UnnamedMemory> memory;
   if constexpr (std::is_same_v<T, SharedMemory>) {
-    auto there = open_object<T>(wanted, Access::read_write);
+    auto there = open_memory(wanted, Access::read_write);
     if (there) return Created<T>{.object = *std::move(there), .made = false};
     if (there.error().code != ErrorCode::not_found) return std::unexpected(std::move(there).error());
     // The host takes its time to find so many bytes: not with the lock held.
@@ -235,6 +246,11 @@ Result<Created<T>> ObjectPool::create_object(const Wanted& wanted, const ObjectO
   }
   auto created = create_locked<T>(wanted, rights, attributes, std::move(memory));
   if constexpr (std::is_same_v<T, SharedMemory>) {
+    if (!created && created.error().code == ErrorCode::already_exists) {
+      // Firmware has just made it.
+      auto there = open_memory(wanted, Access::read_write);
+      if (there) return Created<T>{.object = *std::move(there), .made = false};
+    }
     if (!created) return created;
     if (auto mapped = map(created->object, wanted, Access::read_write); !mapped) {
       return std::unexpected(std::move(mapped).error());
@@ -262,7 +278,9 @@ auto ObjectPool::look_only(Look look) const {
 template <class T>
 Result<T> ObjectPool::find_and_refer(const Wanted& wanted, Access access) const {
   const auto refer_to = [&](ObjectEntry* entry) -> Result<T> {
-    if (entry == nullptr) return nothing_of_that_name(wanted.name, name());
+    if (entry == nullptr || PoolAdoption::is_left_over(*entry)) {
+      return nothing_of_that_name(wanted.name, name());
+    }
     return refer<T>(*entry, wanted, access);
   };
   PoolTable objects(segment_->view());
@@ -330,7 +348,40 @@ Result<SharedMutex> ObjectPool::open_mutex(std::string_view name) const {
 }
 
 Result<SharedMemory> ObjectPool::open_memory(std::string_view name, Access access) const {
-  return open_object<SharedMemory>({.name = name, .type = ObjectType::memory}, access);
+  return open_memory(Wanted{.name = name, .type = ObjectType::memory}, access);
+}
+
+// A second time, if table and file disagreed.
+Result<SharedMemory> ObjectPool::open_memory(const Wanted& wanted, Access access) const {
+  auto memory = open_object<SharedMemory>(wanted, access);
+  const bool missed =
+      !memory && (memory.error().code == ErrorCode::not_found || memory.error().code == ErrorCode::corrupt);
+  if (!missed || !PoolAdoption::reconcile(*segment_, wanted.name)) return memory;
+  return open_object<SharedMemory>(wanted, access);
+}
+
+// The entry of the old one goes first: a death in between leaves no half of either.
+Result<SharedMemory> ObjectPool::replace_memory(std::string_view name, std::size_t size,
+                                                const MemoryFile::Fill& fill) {
+  if (auto valid = check_object_name(name); !valid) return std::unexpected(valid.error());
+  const Wanted wanted{.name = name, .type = ObjectType::memory, .size = size};
+  const MemoryRights rights = rights_for({}, this->name());
+  auto unnamed = UnnamedMemory::make(pool_memory_name(this->name(), name), size, rights);
+  if (!unnamed) return std::unexpected(std::move(unnamed).error());
+  if (auto filled = fill(unnamed->bytes()); !filled) return std::unexpected(std::move(filled).error());
+  {
+    const auto held = segment_->lock();
+    if (!held) return std::unexpected(held.error());
+    if (ObjectEntry* const old = PoolTable(segment_->view()).find(name); old != nullptr) {
+      if (auto same = check_is(*old, ObjectType::memory, name); !same) return std::unexpected(same.error());
+      if (auto may = check_permitted(*old, Access::read_write, name); !may)
+        return std::unexpected(may.error());
+      PoolTable(segment_->view()).erase(*old);
+    }
+    const auto made = make_entry(wanted, rights, kKept, *std::move(unnamed));
+    if (!made) return std::unexpected(made.error());
+  }
+  return open_memory(wanted, Access::read_write);
 }
 
 Result<void> ObjectPool::remove_object(std::string_view name) {

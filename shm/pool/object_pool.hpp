@@ -17,6 +17,8 @@
 
 namespace plchost {
 
+class PoolAdoption;
+
 inline constexpr std::uint32_t kMinObjects = 16;
 inline constexpr std::uint32_t kMaxObjects = 1'000'000;
 
@@ -92,6 +94,11 @@ class ObjectPool {
   [[nodiscard]] Result<SharedMemory> open_memory(std::string_view name,
                                                  Access access = Access::read_write) const;
 
+  /// A kept memory that `fill` has written, in the place of an old one of the name, which is gone for who has
+  /// it open (and stays mapped). It has the name only when it is whole. wrong_type, refused, full.
+  [[nodiscard]] Result<SharedMemory> replace_memory(std::string_view name, std::size_t size,
+                                                    const MemoryFile::Fill& fill);
+
   /// Keeps the object no longer: it goes now, or with its last reference. not_found, refused.
   [[nodiscard]] Result<void> remove_object(std::string_view name);
 
@@ -100,8 +107,9 @@ class ObjectPool {
   /// One of them. not_found.
   [[nodiscard]] Result<ObjectInfo> look_at(std::string_view name) const;
 
-  /// Releases what dead clients held, and mends what a stranger wrote over, without waiting for the next call
-  /// of anyone. Gives up after 20 ms if another one holds the lock. For whoever watches over the host. False:
+  /// Releases what dead clients held, mends what a stranger wrote over, and makes objects of the memories
+  /// that firmware has made with a header alone (see PoolAdoption), without waiting for the next call of
+  /// anyone. Gives up after 20 ms if another one holds the lock. For whoever watches over the host. False:
   /// the pool's file was cut short by a stranger, and this process is alone with what it has (see
   /// MemoryGuard).
   bool tidy() noexcept;
@@ -130,12 +138,14 @@ class ObjectPool {
   [[nodiscard]] Result<ObjectEntry*> make_entry(const Wanted& wanted, const MemoryRights& rights,
                                                 std::uint32_t attributes,
                                                 std::optional<UnnamedMemory> memory);
+  [[nodiscard]] Result<SharedMemory> open_memory(const Wanted& wanted, Access access) const;
   [[nodiscard]] Result<void> map(SharedMemory& memory, const Wanted& wanted, Access access) const;
   [[nodiscard]] std::unexpected<Error> no_room(const Wanted& wanted) const;
   template <class Look>
   auto look_only(Look look) const;
 
   std::shared_ptr<PoolSegment> segment_;
+  std::shared_ptr<PoolAdoption> adoption_;  // made by tidy()
 };
 
 }  // namespace plchost

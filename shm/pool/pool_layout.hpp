@@ -69,8 +69,9 @@ static_assert(offsetof(ObjectEntry, size) == 40 && offsetof(ObjectEntry, name) =
 static_assert(offsetof(ObjectEntry, first_count) == 160 && offsetof(ObjectEntry, made_unix_ns) == 184);
 
 /// ObjectEntry::attributes.
-inline constexpr std::uint32_t kKept = 1;    ///< lives without references, until it is removed
-inline constexpr std::uint32_t kDirect = 2;  ///< event: lives by its references, not by registration
+inline constexpr std::uint32_t kKept = 1;     ///< lives without references, until it is removed
+inline constexpr std::uint32_t kDirect = 2;   ///< event: lives by its references, not by registration
+inline constexpr std::uint32_t kAdopted = 4;  ///< memory: its file was there first, and outlives a repair
 
 /// One user of the pool: an ObjectPool in a process.
 struct alignas(64) ClientSlot {

@@ -133,6 +133,9 @@ class SharedMemory : public PoolObject {
  public:
   /// Written only if writable(): else the first write is a SIGSEGV.
   [[nodiscard]] std::span<std::byte> bytes() const noexcept { return memory_.bytes(); }
+  /// It is zeros if its file is cut short; false: there are too many such memories (MemoryGuard::kMost), and
+  /// that would be a SIGBUS.
+  [[nodiscard]] bool guarded() const noexcept { return static_cast<bool>(guard_); }
 
  private:
   friend class ObjectPool;

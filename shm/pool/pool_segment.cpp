@@ -181,7 +181,8 @@ void PoolSegment::mend_header() noexcept {
 void PoolSegment::repair() noexcept {
   for (const ObjectEntry& entry : view_.entries()) {
     const bool half_made = entry.state.load(kRelaxed) == static_cast<std::uint32_t>(EntryState::changing);
-    if (half_made && entry.type.load(kRelaxed) == static_cast<std::uint32_t>(ObjectType::memory)) {
+    if (half_made && entry.type.load(kRelaxed) == static_cast<std::uint32_t>(ObjectType::memory) &&
+        (entry.attributes.load(kRelaxed) & kAdopted) == 0) {
       MemoryFile::remove(pool_memory_name(name_, entry.name.view()));
     }
   }
@@ -269,7 +270,12 @@ void PoolSegment::drop_if_idle(ObjectEntry& object) noexcept {
 void PoolSegment::destroy(ObjectEntry& object) noexcept {
   if (object.type.load(kRelaxed) == static_cast<std::uint32_t>(ObjectType::memory)) {
     object.state.store(static_cast<std::uint32_t>(EntryState::changing), std::memory_order_release);
-    MemoryFile::remove(pool_memory_name(name_, object.name.view()));
+    if (!MemoryFile::remove(pool_memory_name(name_, object.name.view()))) {
+      // Another user's: see PoolAdoption::is_left_over().
+      object.attributes.store(0, kRelaxed);
+      object.state.store(static_cast<std::uint32_t>(EntryState::used), std::memory_order_release);
+      return;
+    }
   }
   PoolTable(view_).erase(object);
 }

@@ -39,19 +39,6 @@ Result<UniqueFd> open_device(const AreaSettings& settings) {
   return fd;
 }
 
-Result<MemoryFile> open_file(const std::string& file, std::size_t bytes) {
-  // Firmware that makes one gives it its name first and its size then.
-  if (auto filled = MemoryFile::fill_empty(file, bytes); !filled) return std::unexpected(filled.error());
-  return MemoryFile::open(file, 1, MemoryFile::Access::read_write);
-}
-
-std::unexpected<Error> wrong_size(const std::string& file, std::size_t has, std::size_t needed) {
-  return failure(
-      ErrorCode::wrong_size,
-      fmt::format("shared memory {} has {} bytes, {} are needed; remove it, or choose another name", file,
-                  has, needed));
-}
-
 // The kernel takes it back when the process ends, however it ends.
 Result<UniqueFd> lock_file_of(const std::string& file) {
   const std::string path = fmt::format("{}/{}", MemoryFile::kDirectory, file);
@@ -68,7 +55,6 @@ Result<UniqueFd> lock_file_of(const std::string& file) {
 AreaMemory::AreaMemory(AreaMemory&& other) noexcept
     : mapping_(std::exchange(other.mapping_, {})),
       bytes_(std::exchange(other.bytes_, {})),
-      file_(std::move(other.file_)),
       shared_(std::move(other.shared_)),
       lock_(std::move(other.lock_)),
       guard_(std::move(other.guard_)),
@@ -77,7 +63,6 @@ AreaMemory::AreaMemory(AreaMemory&& other) noexcept
 AreaMemory& AreaMemory::operator=(AreaMemory&& other) noexcept {
   std::swap(mapping_, other.mapping_);
   std::swap(bytes_, other.bytes_);
-  std::swap(file_, other.file_);
   std::swap(shared_, other.shared_);
   std::swap(lock_, other.lock_);
   std::swap(guard_, other.guard_);
@@ -125,61 +110,22 @@ Result<AreaMemory> AreaMemory::of_device(const AreaSettings& settings) {
 
 Result<AreaMemory> AreaMemory::of_pool(ObjectPool& pool, const std::string& name, std::size_t bytes,
                                        bool exclusive) {
-  const std::string file = pool_memory_name(pool.name(), name);
+  auto created = pool.create_memory(name, bytes, {.keep = true});
+  if (!created) return std::unexpected(std::move(created).error());
   AreaMemory memory;
-  auto shared = pool.open_memory(name);
-  const bool none = !shared && shared.error().code == ErrorCode::not_found;
-  if (!shared && !none) return std::unexpected(std::move(shared).error());
-  auto alone = none ? of_file(file, bytes) : Result<AreaMemory>();
-  if (none && alone) {
-    memory = *std::move(alone);
-  } else if (none && alone.error().code != ErrorCode::not_found) {
-    return alone;
-  } else {
-    if (none) {
-      auto created = pool.create_memory(name, bytes, {.keep = true});
-      if (!created) return std::unexpected(std::move(created).error());
-      memory.existed_ = !created->made;
-      shared = std::move(created->object);
-    } else {
-      memory.existed_ = true;
-    }
-    memory.shared_ = *std::move(shared);
-    memory.bytes_ = memory.shared_.bytes();
-    if (memory.bytes_.size() != bytes) return wrong_size(file, memory.bytes_.size(), bytes);
+  memory.existed_ = !created->made;
+  memory.shared_ = std::move(created->object);
+  memory.bytes_ = memory.shared_.bytes();
+  if (!memory.shared_.guarded()) {
+    return failure(ErrorCode::full, fmt::format("shared memory '{}': more than {} memories of others", name,
+                                                MemoryGuard::kMost));
   }
   if (exclusive) {
-    auto lock = lock_file_of(file);
+    auto lock = lock_file_of(pool_memory_name(pool.name(), name));
     if (!lock) return std::unexpected(std::move(lock).error());
     memory.lock_ = *std::move(lock);
   }
   return memory;
-}
-
-Result<AreaMemory> AreaMemory::of_file(const std::string& file, std::size_t bytes) {
-  auto opened = open_file(file, bytes);
-  if (!opened) return std::unexpected(std::move(opened).error());
-  auto memory = of(*std::move(opened), file, bytes);
-  if (memory) memory->existed_ = true;
-  return memory;
-}
-
-Result<AreaMemory> AreaMemory::new_file(const std::string& file, std::size_t bytes,
-                                        const MemoryFile::Fill& fill) {
-  auto made = MemoryFile::replace(file, bytes, fill);
-  if (!made) return std::unexpected(std::move(made).error());
-  return of(*std::move(made), file, bytes);
-}
-
-Result<AreaMemory> AreaMemory::of(MemoryFile opened, const std::string& file, std::size_t bytes) {
-  AreaMemory memory;
-  memory.file_ = std::move(opened);
-  memory.bytes_ = memory.file_.bytes();
-  if (memory.bytes_.size() != bytes) return wrong_size(file, memory.bytes_.size(), bytes);
-  memory.guard_ = MemoryGuard(memory.bytes_);
-  if (memory.guard_) return memory;
-  return failure(ErrorCode::full,
-                 fmt::format("shared memory {}: more than {} memories of others", file, MemoryGuard::kMost));
 }
 
 }  // namespace plchost

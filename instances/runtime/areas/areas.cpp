@@ -53,6 +53,7 @@ void TaskCycle::run(const std::function<void()>& entry) {
   for (OutputView* const view : outputs_) view->end_cycle();
   if (counter_ != nullptr) {
     counter_->store(counter_->load(std::memory_order_relaxed) + 1, std::memory_order_release);
+    group_->answer(may_wait_);
   }
 }
 

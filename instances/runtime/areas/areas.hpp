@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <utility>
@@ -25,8 +26,12 @@ class TaskCycle {
  public:
   void add(InputView& view) { inputs_.push_back(&view); }
   void add(OutputView& view) { outputs_.push_back(&view); }
-  /// The task may change kept areas.
-  void count_into(CycleCounter& counter) noexcept { counter_ = &counter; }
+  /// The task may change kept areas, those of `group`; `may_wait`: it is not real-time.
+  void count_into(CycleCounter& counter, KeptGroup& group, bool may_wait) noexcept {
+    counter_ = &counter;
+    group_ = &group;
+    may_wait_ = may_wait;
+  }
   /// Where it has area number `area`.
   void set_address(std::size_t area, void* address);
   [[nodiscard]] void* address(std::size_t area) const noexcept {
@@ -45,6 +50,8 @@ class TaskCycle {
   std::vector<OutputView*> outputs_;
   std::vector<void*> addresses_;  // by area
   CycleCounter* counter_ = nullptr;
+  KeptGroup* group_ = nullptr;  // with counter_
+  bool may_wait_ = false;
 };
 
 /// The memory areas of one application.
@@ -89,6 +96,11 @@ class Areas {
     std::optional<plc_image> inputs;       ///< nothing: no image is read
     std::vector<std::byte> initial;
   };
+  /// Kept areas that tasks have in common.
+  struct KeptShare {
+    std::set<std::size_t> tasks;
+    std::vector<std::size_t> areas;
+  };
   /// A task's view of a block.
   template <class View>
   struct Of {
@@ -111,7 +123,8 @@ class Areas {
   [[nodiscard]] OutputView::Writes writes_of(std::size_t index, std::size_t task) const;
   [[nodiscard]] std::vector<std::size_t> users_of(std::size_t index) const;
   void tell_view(std::size_t index, std::size_t task, std::byte* bytes);
-  void count_cycles();
+  void count_cycles(std::span<const TaskConfig> tasks);
+  [[nodiscard]] std::vector<KeptShare> shares_of_kept() const;
   void wrap(std::span<TaskConfig> tasks);
   [[nodiscard]] const DeclaredArea& first_of(const AreaBlock& planned) const {
     return declared_[planned.areas.front()];

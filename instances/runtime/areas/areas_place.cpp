@@ -42,7 +42,7 @@ Result<std::string> Areas::place(const Environment& environment, std::span<TaskC
   if (auto made = make_keeper(environment); !made) return std::unexpected(made.error());
   tell_plain_addresses();
   for (std::size_t block = 0; block < plan_.blocks.size(); ++block) make_views(block);
-  count_cycles();
+  count_cycles(tasks);
   wrap(tasks);
   placed_ = true;
   if (!keeper_) return std::string();
@@ -128,8 +128,7 @@ Result<void> Areas::make_keeper(const Environment& environment) {
                    fmt::format("the retain and persistent areas have {} bytes, {} are allowed",
                                initial.layout.bytes, kMaxRetainBytes));
   }
-  auto keeper =
-      RetainKeeper::make(environment.pool.name(), environment.instance, initial, environment.retain);
+  auto keeper = RetainKeeper::make(environment.pool, environment.instance, initial, environment.retain);
   if (!keeper) return std::unexpected(std::move(keeper).error());
   keeper_ = *std::move(keeper);
   return {};
@@ -236,14 +235,42 @@ void Areas::tell_view(std::size_t index, std::size_t task, std::byte* bytes) {
 }
 
 // Tasks that may change what is kept are seen to be within a cycle.
-void Areas::count_cycles() {
-  for (const DeclaredArea& area : declared_) {
-    if (!area.is_kept()) continue;
-    for (const AreaUse& use : area.uses) {
-      const std::size_t task = task_number(use.task);
-      cycles_[task].count_into(keeper_->memory().counter(task));
+void Areas::count_cycles(std::span<const TaskConfig> tasks) {
+  if (!keeper_) return;
+  KeptMemory& memory = keeper_->memory();
+  for (const KeptShare& share : shares_of_kept()) {
+    std::vector<std::pair<std::size_t, std::size_t>> stretches;
+    for (const std::size_t area : share.areas) {
+      stretches.emplace_back(kept_.areas[kept_number(area)].offset, declared_[area].bytes);
+    }
+    memory.add_group({share.tasks.begin(), share.tasks.end()}, stretches);
+    for (const std::size_t task : share.tasks) {
+      cycles_[task].count_into(memory.counter(task), memory.groups().back(),
+                               tasks[task].iec_priority > kLowestRealTimeIecPriority);
     }
   }
+}
+
+// Kept areas and the tasks that may change them, so that no two shares have a task in common.
+std::vector<Areas::KeptShare> Areas::shares_of_kept() const {
+  std::vector<KeptShare> shares;
+  for (std::size_t area = 0; area < declared_.size(); ++area) {
+    if (!declared_[area].is_kept()) continue;
+    KeptShare share{.tasks = {}, .areas = {area}};
+    for (const AreaUse& use : declared_[area].uses) share.tasks.insert(task_number(use.task));
+    const auto common = [&](const KeptShare& other) {
+      return std::ranges::any_of(other.tasks, [&](std::size_t task) { return share.tasks.contains(task); });
+    };
+    const auto [first, last] =
+        std::ranges::partition(shares, [&](const auto& other) { return !common(other); });
+    for (const KeptShare& other : std::ranges::subrange(first, last)) {
+      share.tasks.insert(other.tasks.begin(), other.tasks.end());
+      share.areas.insert(share.areas.end(), other.areas.begin(), other.areas.end());
+    }
+    shares.erase(first, last);
+    shares.push_back(std::move(share));
+  }
+  return shares;
 }
 
 void Areas::wrap(std::span<TaskConfig> tasks) {

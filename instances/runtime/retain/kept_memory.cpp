@@ -17,17 +17,6 @@ namespace {
 // "plckept1", as bytes in memory.
 constexpr std::uint64_t kKeptMagic = 0x317470656b636c70;
 
-// Tasks write what is read here: a copy that they were in the way of is thrown away.
-__attribute__((no_sanitize("thread"))) void copy_moving(std::byte* to, const std::byte* from,
-                                                        std::size_t bytes) noexcept {
-  std::size_t at = 0;
-  for (; at + sizeof(std::uint64_t) <= bytes; at += sizeof(std::uint64_t)) {
-    const std::uint64_t word = *reinterpret_cast<const volatile std::uint64_t*>(from + at);
-    *reinterpret_cast<std::uint64_t*>(to + at) = word;
-  }
-  for (; at < bytes; ++at) to[at] = *const_cast<const volatile std::byte*>(from + at);
-}
-
 }  // namespace
 
 struct KeptMemory::Header {
@@ -86,17 +75,29 @@ std::optional<KeptMemory::Left> KeptMemory::left_behind(const std::string& pool,
   return guard.lost() ? std::nullopt : std::optional(std::move(left));
 }
 
-Result<KeptMemory> KeptMemory::take_over(const std::string& pool, const std::string& name,
+Result<KeptMemory> KeptMemory::of(Result<SharedMemory> opened, std::size_t bytes) {
+  if (!opened) return failure_in("retain variables", std::move(opened).error());
+  if (opened->bytes().size() != bytes) {
+    return failure(ErrorCode::wrong_size,
+                   fmt::format("retain variables: their memory has {} bytes, {} are needed",
+                               opened->bytes().size(), bytes));
+  }
+  if (!opened->guarded()) {
+    return failure(ErrorCode::full,
+                   fmt::format("retain variables: more than {} memories of others", MemoryGuard::kMost));
+  }
+  return KeptMemory(*std::move(opened));
+}
+
+Result<KeptMemory> KeptMemory::take_over(ObjectPool& pool, const std::string& name,
                                          const RetainLayout& layout) {
-  auto memory = AreaMemory::of_file(pool_memory_name(pool, name), bytes_for(layout.bytes));
-  if (!memory) return std::unexpected(std::move(memory).error());
-  KeptMemory kept(*std::move(memory));
-  for (CycleCounter& counter : kept.header().counters) counter.store(0, std::memory_order_relaxed);
+  auto kept = of(pool.open_memory(name), bytes_for(layout.bytes));
+  if (!kept) return kept;
+  for (CycleCounter& counter : kept->header().counters) counter.store(0, std::memory_order_relaxed);
   return kept;
 }
 
-Result<KeptMemory> KeptMemory::make(const std::string& pool, const std::string& name,
-                                    const RetainImage& image) {
+Result<KeptMemory> KeptMemory::make(ObjectPool& pool, const std::string& name, const RetainImage& image) {
   const auto fill = [&](std::span<std::byte> bytes) -> Result<void> {
     auto& header = *reinterpret_cast<Header*>(bytes.data());
     header.magic = kKeptMagic;
@@ -110,9 +111,8 @@ Result<KeptMemory> KeptMemory::make(const std::string& pool, const std::string& 
     std::ranges::copy(image.data, bytes.begin() + sizeof(Header));
     return {};
   };
-  auto memory = AreaMemory::new_file(pool_memory_name(pool, name), bytes_for(image.layout.bytes), fill);
-  if (!memory) return std::unexpected(std::move(memory).error());
-  return KeptMemory(*std::move(memory));
+  const std::size_t bytes = bytes_for(image.layout.bytes);
+  return of(pool.replace_memory(name, bytes, fill), bytes);
 }
 
 std::span<std::byte> KeptMemory::data() const noexcept {
@@ -130,6 +130,26 @@ void KeptMemory::set_generation(std::uint64_t generation) const noexcept {
 void KeptMemory::live_elsewhere(std::size_t offset, std::span<std::byte> live) {
   std::ranges::copy(data().subspan(offset, live.size()), live.begin());
   elsewhere_.push_back({.offset = offset, .live = live});
+}
+
+void KeptMemory::add_group(const std::vector<std::size_t>& tasks,
+                           const std::vector<std::pair<std::size_t, std::size_t>>& stretches) {
+  std::vector<const CycleCounter*> counters;
+  for (const std::size_t task : tasks) counters.push_back(&counter(task));
+  std::vector<KeptGroup::Part> parts;
+  for (const auto& [offset, bytes] : stretches) {
+    const auto other = std::ranges::find(elsewhere_, offset, &Elsewhere::offset);
+    parts.push_back(
+        {.offset = offset, .live = other != elsewhere_.end() ? other->live : data().subspan(offset, bytes)});
+  }
+  groups_.emplace_back(std::move(counters), std::move(parts));
+}
+
+void KeptMemory::copy_elsewhere(std::span<const std::byte> taken) const noexcept {
+  for (const auto& [offset, live] : elsewhere_) {
+    std::ranges::copy(taken.subspan(offset, live.size()),
+                      data().begin() + static_cast<std::ptrdiff_t>(offset));
+  }
 }
 
 bool KeptMemory::snapshot(std::span<std::byte> copy) const noexcept {

@@ -3,16 +3,19 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "instances/plc_app.h"
-#include "instances/runtime/areas/area_memory.hpp"
 #include "instances/runtime/areas/task_areas.hpp"
+#include "instances/runtime/retain/kept_group.hpp"
 #include "instances/runtime/retain/retain_image.hpp"
 #include "shm/base/result.hpp"
+#include "shm/pool/object_pool.hpp"
 
 namespace plchost {
 
@@ -31,11 +34,11 @@ class KeptMemory {
   [[nodiscard]] static std::optional<Left> left_behind(const std::string& pool, const std::string& name);
 
   /// The one that was left behind, with all that was written into it until now; it has this layout. Set-up.
-  [[nodiscard]] static Result<KeptMemory> take_over(const std::string& pool, const std::string& name,
+  [[nodiscard]] static Result<KeptMemory> take_over(ObjectPool& pool, const std::string& name,
                                                     const RetainLayout& layout);
   /// A new one with these data; what was there under the name goes. It has its name only when it is whole.
   /// Set-up.
-  [[nodiscard]] static Result<KeptMemory> make(const std::string& pool, const std::string& name,
+  [[nodiscard]] static Result<KeptMemory> make(ObjectPool& pool, const std::string& name,
                                                const RetainImage& image);
 
   [[nodiscard]] std::span<std::byte> data() const noexcept;
@@ -48,13 +51,23 @@ class KeptMemory {
   /// them now, and they are taken from there. Set-up.
   void live_elsewhere(std::size_t offset, std::span<std::byte> live);
 
+  /// Data that these tasks may change, and no others: stretches of offset and bytes, one for each area.
+  /// Set-up, after live_elsewhere().
+  void add_group(const std::vector<std::size_t>& tasks,
+                 const std::vector<std::pair<std::size_t, std::size_t>>& stretches);
+  /// Each stretch of the data is in one of them.
+  [[nodiscard]] std::deque<KeptGroup>& groups() noexcept { return groups_; }
+  /// What lives elsewhere is in the memory as it was taken. Soft thread.
+  void copy_elsewhere(std::span<const std::byte> taken) const noexcept;
+
   /// Copies the data as they are at the end of cycles: no task was within one meanwhile. false: one was, and
   /// the copy is worth nothing. Soft thread.
   [[nodiscard]] bool snapshot(std::span<std::byte> copy) const noexcept;
 
  private:
   struct Header;
-  explicit KeptMemory(AreaMemory memory) : memory_(std::move(memory)) {}
+  explicit KeptMemory(SharedMemory memory) noexcept : memory_(std::move(memory)) {}
+  [[nodiscard]] static Result<KeptMemory> of(Result<SharedMemory> opened, std::size_t bytes);
   [[nodiscard]] Header& header() const noexcept;
   static std::size_t bytes_for(std::uint64_t data) noexcept;
 
@@ -62,8 +75,9 @@ class KeptMemory {
     std::size_t offset;
     std::span<std::byte> live;
   };
-  AreaMemory memory_;
+  SharedMemory memory_;
   std::vector<Elsewhere> elsewhere_;
+  std::deque<KeptGroup> groups_;
 };
 
 }  // namespace plchost

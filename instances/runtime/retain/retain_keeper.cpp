@@ -123,18 +123,20 @@ struct RetainKeeper::Start {
   }
 };
 
-Result<std::unique_ptr<RetainKeeper>> RetainKeeper::make(const std::string& pool, const std::string& instance,
+Result<std::unique_ptr<RetainKeeper>> RetainKeeper::make(ObjectPool& pool, const std::string& instance,
                                                          const RetainImage& initial, const Options& options) {
   const std::string name = KeptMemory::name_for(instance);
   Start start;
   if (auto opened = start.open_files(options, instance); !opened) return std::unexpected(opened.error());
-  start.find_source(pool, name);
+  start.find_source(pool.name(), name);
   if (auto judged = start.judge(initial.layout, options.mismatch); !judged)
     return std::unexpected(judged.error());
   start.fill(initial, options.cold);
   auto memory = start.goes_on_in_place(initial, options.cold)
                     ? KeptMemory::take_over(pool, name, initial.layout)
                     : KeptMemory::make(pool, name, start.image);
+  // What was left may be a file without an object: then its values go on in a new one.
+  if (!memory) memory = KeptMemory::make(pool, name, start.image);
   if (!memory) return std::unexpected(std::move(memory).error());
   return std::unique_ptr<RetainKeeper>(new RetainKeeper(*std::move(memory), std::move(start), options));
 }
@@ -155,7 +157,9 @@ RetainKeeper::RetainKeeper(KeptMemory memory, Start start, const Options& option
       origins_(std::move(start.origins)),
       remarks_(std::move(start.remarks)),
       interval_(options.interval),
+      postpone_(options.postpone),
       image_(std::move(start.image)),
+      scratch_(image_.data.size()),
       written_(std::move(start.written)) {}
 
 void RetainKeeper::save_soon() {
@@ -185,21 +189,65 @@ void RetainKeeper::run() {
   }
 }
 
-// Cycles are short and rest in between: a moment without one comes soon, if it comes at all.
-bool RetainKeeper::take_snapshot() {
-  constexpr int kAttempts = 400;
+// Cycles are short and rest in between: a moment without any comes soon, if it comes at all.
+bool RetainKeeper::take_whole() {
   constexpr auto kPause = std::chrono::microseconds(250);
-  for (int attempt = 0; attempt < kAttempts; ++attempt) {
-    if (memory_.snapshot(image_.data)) return true;
+  const TimePoint deadline = MonotonicClock::now() + postpone_;
+  while (!memory_.snapshot(scratch_)) {
+    if (MonotonicClock::now() >= deadline) return false;
     std::this_thread::sleep_for(kPause);
   }
-  return false;
+  image_.data.swap(scratch_);
+  return true;
+}
+
+bool RetainKeeper::rest() {
+  constexpr auto kPause = std::chrono::milliseconds(1);
+  std::unique_lock lock(mutex_);
+  return !wake_.wait_for(lock, kPause, [this] { return ending_; });
+}
+
+// Tasks copy what they alone change, each at the end of a cycle. Nobody waits for the others: what one of
+// them has not given until then stays as it was.
+RetainKeeper::Taken RetainKeeper::take_groups() {
+  constexpr auto kPatience = std::chrono::seconds(2);
+  std::deque<KeptGroup>& groups = memory_.groups();
+  if (groups.empty()) return Taken::none;
+  for (KeptGroup& group : groups) group.ask(scratch_);
+  const auto all_answered = [&] {
+    const auto count = std::ranges::count_if(groups, [](KeptGroup& group) { return group.is_answered(); });
+    return static_cast<std::size_t>(count) == groups.size();
+  };
+  const TimePoint deadline = MonotonicClock::now() + kPatience;
+  while (!all_answered() && MonotonicClock::now() < deadline && rest()) {
+  }
+  std::size_t answered = 0;
+  for (KeptGroup& group : groups) {
+    if (!group.withdraw()) continue;
+    ++answered;
+    for (const auto& [offset, live] : group.parts()) {
+      std::copy_n(scratch_.begin() + static_cast<std::ptrdiff_t>(offset), live.size(),
+                  image_.data.begin() + static_cast<std::ptrdiff_t>(offset));
+    }
+  }
+  if (answered == 0) return Taken::none;
+  memory_.copy_elsewhere(image_.data);
+  return answered == groups.size() ? Taken::all : Taken::some;
+}
+
+RetainKeeper::Taken RetainKeeper::take_snapshot() {
+  return take_whole() ? Taken::all : take_groups();
 }
 
 void RetainKeeper::save() {
   if (!files_) return;
-  if (!take_snapshot()) return not_saved("a task was within a cycle each time");
-  if (image_.data == written_ && saves() > 0) return;
+  const Taken taken = take_snapshot();
+  if (taken != Taken::all) {
+    not_saved(taken == Taken::none
+                  ? "tasks were within a cycle each time"
+                  : "tasks of some areas were within a cycle each time; those of the others are");
+  }
+  if (taken == Taken::none || (image_.data == written_ && saves() > 0)) return;
   ++image_.generation;
   image_.unix_ns = unix_time_ns();
   // Before the file: memory that says less than a file would be taken for older.
@@ -207,6 +255,7 @@ void RetainKeeper::save() {
   if (auto done = files_->write(image_); !done) return not_saved(done.error().describe());
   written_ = image_.data;
   saves_.store(saves() + 1, std::memory_order_relaxed);
+  if (taken != Taken::all) return;
   if (!std::exchange(problem_, {}).empty()) spdlog::info("retain variables are written again");
 }
 

@@ -25,6 +25,8 @@ class RetainKeeper {
     std::string directory{};  ///< of the files; empty: they live as long as the pool
     Duration interval = std::chrono::seconds(1);
     RetainMismatch mismatch = RetainMismatch::initialise;
+    /// How long a moment without any cycle is looked for, before tasks are asked at the ends of theirs.
+    Duration postpone = std::chrono::milliseconds(100);
     bool cold = false;  ///< retain areas begin with initial values
   };
   /// Where an area's values come from: PLC_AREA_INITIAL, PLC_AREA_KEPT, PLC_AREA_RESTORED.
@@ -32,7 +34,7 @@ class RetainKeeper {
 
   /// `initial`: the layout with its initial values. Goes on with what is left in memory, else with the newest
   /// file that is whole. refused: that has another layout and the settings say so. Set-up.
-  [[nodiscard]] static Result<std::unique_ptr<RetainKeeper>> make(const std::string& pool,
+  [[nodiscard]] static Result<std::unique_ptr<RetainKeeper>> make(ObjectPool& pool,
                                                                   const std::string& instance,
                                                                   const RetainImage& initial,
                                                                   const Options& options);
@@ -60,7 +62,14 @@ class RetainKeeper {
   RetainKeeper(KeptMemory memory, Start start, const Options& options);
   void run();
   void save();
-  [[nodiscard]] bool take_snapshot();
+  /// What image_ has then: all as it is between cycles now; so of some areas, the others as before; nothing
+  /// new.
+  enum class Taken : std::uint8_t { all, some, none };
+  [[nodiscard]] Taken take_snapshot();
+  [[nodiscard]] bool take_whole();
+  [[nodiscard]] Taken take_groups();
+  /// False: it was woken to end.
+  [[nodiscard]] bool rest();
   void not_saved(std::string why);
 
   KeptMemory memory_;
@@ -68,7 +77,9 @@ class RetainKeeper {
   std::vector<Origin> origins_;
   std::vector<std::string> remarks_;
   Duration interval_;
+  Duration postpone_;
   RetainImage image_;               // the soft thread's: as it was taken last
+  std::vector<std::byte> scratch_;  // the same thread's, and that of tasks that it asks
   std::vector<std::byte> written_;  // the same thread's: what is in the newest file
   std::string problem_;             // the same thread's
   std::atomic<std::uint64_t> saves_{0};

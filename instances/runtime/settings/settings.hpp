@@ -56,6 +56,7 @@ struct RetainSettings {
   std::string directory;  ///< empty: the one that the instance was started with
   Duration interval = std::chrono::seconds(1);
   RetainMismatch mismatch = RetainMismatch::initialise;
+  Duration postpone = std::chrono::milliseconds(100);
   bool operator==(const RetainSettings&) const = default;
 };
 

@@ -140,6 +140,14 @@ constexpr std::array kKeys = {
                                         to.settings.retain.interval = std::chrono::milliseconds(number);
                                       }}},
     SettingKey{.section = kRetain,
+               .name = "PostponeMs",
+               .unit = "ms",
+               .initial = "100",
+               .value = NumberSetting{1, 60'000,
+                                      [](const SettingsTarget& to, std::int64_t number) {
+                                        to.settings.retain.postpone = std::chrono::milliseconds(number);
+                                      }}},
+    SettingKey{.section = kRetain,
                .name = "Mismatch",
                .initial = "Initialise",
                .value = WordSetting{kMismatches,

@@ -2,8 +2,11 @@
 #include "instances/runtime/areas/areas.hpp"
 
 #include <array>
+#include <chrono>
+#include <filesystem>
 #include <stdexcept>
 #include <string>
+#include <thread>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -49,13 +52,14 @@ class AreasUnderTest : public ::testing::Test {
                       .instance = "line1",
                       .application = "Test",
                       .settings = settings_.areas,
-                      .retain = {}},
+                      .retain = retain_},
                      tasks);
   }
 
   std::string pool_ = "areas-test-" + std::to_string(::getpid());
   ObjectPool shared_ = ObjectPool::create(pool_).value();
   InstanceSettings settings_;
+  RetainKeeper::Options retain_;
   Areas sut;
   std::vector<TaskConfig> tasks;
   RTS_RESULT result = ERR_OK;
@@ -98,6 +102,33 @@ TEST_F(AreasUnderTest, HaveInitialValuesAndAddresses) {
     EXPECT_EQ(std::memcmp(at, initial.data(), 8), 0);
     EXPECT_EQ(reinterpret_cast<std::uintptr_t>(at) % 8, 0U);
   }
+}
+
+TEST_F(AreasUnderTest, ThatAreKeptAreSavedByTheTaskItselfIfItsCyclesHaveNoPause) {
+  const std::string folder = ::testing::TempDir() + pool_;
+  retain_ = {.directory = folder,
+             .interval = std::chrono::milliseconds(10),
+             .postpone = std::chrono::milliseconds(2)};
+  void* kept = nullptr;
+  task("Busy", [&] { std::this_thread::sleep_for(std::chrono::milliseconds(2)); });
+  tasks.back().iec_priority = 5;
+  task("Stuck", [] {});
+  Plc_Area_Use busy{};
+  busy.pszTask = "Busy";
+  Plc_Area_Use stuck{};
+  stuck.pszTask = "Stuck";
+  const RTS_HANDLE handle = declare("count", PLC_AREA_RETAIN, 8, {busy}, &kept);
+  declare("other", PLC_AREA_RETAIN, 8, {stuck});
+  ASSERT_TRUE(place());
+  Plc_Area_State state{};
+  state.dwSize = sizeof state;
+  while (sut.state(handle, state) == ERR_OK && state.qwSaves < 4) {
+    ++*static_cast<std::uint64_t*>(kept);
+    tasks[0].entry();
+  }
+  EXPECT_EQ(state.qwUnsaved, 0U);
+  sut.finish();
+  std::filesystem::remove_all(folder);
 }
 
 TEST_F(AreasUnderTest, OfACycleThatThrowsAreNotPutOut) {

@@ -1,6 +1,7 @@
 // Where retain and persistent variables come from at a start, and when they are written.
 #include "instances/runtime/retain/retain_keeper.hpp"
 
+#include <array>
 #include <atomic>
 #include <cstring>
 #include <filesystem>
@@ -8,6 +9,8 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
+#include <vector>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,6 +18,8 @@
 
 #include "instances/plc_app.h"
 #include "shm/pool/memory_file.hpp"
+#include "shm/pool/object_pool.hpp"
+#include "tests/unit/pool/unique_pool_name.hpp"
 
 namespace plchost {
 namespace {
@@ -69,7 +74,9 @@ class Retain : public ::testing::Test {
     std::memcpy(sut->memory().data().data() + 8 * area, &value, 8);
   }
   /// As a power cut does.
-  void forget_memory() const { MemoryFile::remove(pool_memory_name(pool_, KeptMemory::name_for("line1"))); }
+  void forget_memory() const {
+    MemoryFile::remove(pool_memory_name(name_.get(), KeptMemory::name_for("line1")));
+  }
   /// As a kill does: nothing is written at the end. The lock of the files goes with the process.
   void lose_files_of_the_end() {
     const fs::path aside = folder_.string() + ".aside";
@@ -82,7 +89,8 @@ class Retain : public ::testing::Test {
   fs::path folder_ =
       fs::path(::testing::TempDir()) / ("keeper-" + std::to_string(::getpid()) +
                                         ::testing::UnitTest::GetInstance()->current_test_info()->name());
-  std::string pool_ = "retain-test-" + std::to_string(::getpid());
+  UniquePoolName name_;
+  ObjectPool pool_ = ObjectPool::create(name_.get(), {.max_objects = 16}).value();
   std::unique_ptr<RetainKeeper> sut;
 };
 
@@ -101,6 +109,31 @@ TEST_F(Retain, LosesNothingWithItsProcess) {
   start_well();
   EXPECT_EQ(value(0), 42U);
   EXPECT_EQ(sut->origin(0), PLC_AREA_KEPT);
+}
+
+TEST_F(Retain, TheirMemoryIsAKeptObjectOfThePool) {
+  start_well();
+  const auto object = pool_.look_at("line1.retain");
+  ASSERT_TRUE(object) << object.error().describe();
+  EXPECT_TRUE(object->kept);
+  EXPECT_GT(object->size, sut->memory().data().size());
+  EXPECT_EQ(object->reference_count, 1U);
+  EXPECT_EQ(pool_.create_memory("line1.retain", 10).error().code, ErrorCode::wrong_size)
+      << "nobody else gets another one under its name";
+  sut.reset();
+  EXPECT_EQ(pool_.look_at("line1.retain")->reference_count, 0U);
+}
+
+TEST_F(Retain, GoOnWhenThePoolWasMadeAnewAroundTheirFile) {
+  start_well({.interval = std::chrono::hours(1)});
+  set(0, 42);
+  lose_files_of_the_end();
+  MemoryFile::remove(name_.get());
+  pool_ = ObjectPool::create(name_.get(), {.max_objects = 16}).value();
+  start_well();
+  EXPECT_EQ(value(0), 42U);
+  EXPECT_EQ(sut->origin(0), PLC_AREA_KEPT);
+  EXPECT_TRUE(pool_.look_at("line1.retain"));
 }
 
 TEST_F(Retain, HasWhatWasWrittenLastAfterAPowerCut) {
@@ -200,13 +233,13 @@ TEST_F(Retain, TakesAFileThatIsNewerThanTheMemory) {
   set(0, 42);
   sut.reset();
   // The same instance ran in another pool meanwhile.
-  const std::string here = std::exchange(pool_, pool_ + "-other");
+  const UniquePoolName other;
+  ObjectPool here = std::exchange(pool_, ObjectPool::create(other.get(), {.max_objects = 16}).value());
   start_well();
   EXPECT_EQ(value(0), 42U);
   set(0, 43);
   sut.reset();
-  forget_memory();
-  pool_ = here;
+  pool_ = std::move(here);
   start_well();
   EXPECT_EQ(value(0), 43U);
   EXPECT_EQ(sut->origin(0), PLC_AREA_RESTORED);
@@ -261,6 +294,125 @@ TEST_F(Retain, OfOneFileIsOfTheEndOfOneCycle) {
   task.join();
 }
 
+/// A task whose cycles follow each other without a pause, until the end of its life. Each writes its number
+/// to the areas, one at its beginning, the other at its end.
+class BusyTask {
+ public:
+  BusyTask(RetainKeeper& keeper, std::size_t task, KeptGroup& group, std::vector<std::uint64_t*> areas,
+           bool may_wait = false)
+      : thread_([this, &group, areas, may_wait, &counter = keeper.memory().counter(task)] {
+          for (std::uint64_t cycle = 2; !stop_; ++cycle) {
+            counter.store(counter.load() + 1, std::memory_order_relaxed);
+            std::atomic_thread_fence(std::memory_order_release);
+            for (std::uint64_t* const area : areas) {
+              std::this_thread::sleep_for(std::chrono::milliseconds(1));
+              std::atomic_ref(*area).store(cycle, std::memory_order_relaxed);
+            }
+            counter.store(counter.load() + 1, std::memory_order_release);
+            group.answer(may_wait);
+          }
+        }) {}
+  ~BusyTask() {
+    stop_ = true;
+    thread_.join();
+  }
+  BusyTask(const BusyTask&) = delete;
+  BusyTask& operator=(const BusyTask&) = delete;
+
+ private:
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+};
+
+class RetainOfBusyTasks : public Retain {
+ protected:
+  RetainOfBusyTasks() {
+    sut = RetainKeeper::make(pool_, "line1", initial(),
+                             {.directory = folder_,
+                              .interval = std::chrono::milliseconds(10),
+                              .postpone = std::chrono::milliseconds(2)})
+              .value();
+  }
+  KeptGroup& group(const std::vector<std::size_t>& tasks,
+                   const std::vector<std::pair<std::size_t, std::size_t>>& stretches) {
+    sut->memory().add_group(tasks, stretches);
+    return sut->memory().groups().back();
+  }
+  std::uint64_t* area(std::size_t number) {
+    return reinterpret_cast<std::uint64_t*>(sut->memory().data().data()) + number;
+  }
+  /// The numbers in the newer of the two files.
+  [[nodiscard]] std::array<std::uint64_t, 2> saved() const {
+    std::array<std::uint64_t, 2> numbers{};
+    std::uint64_t newest = 0;
+    for (const char* name : {"line1.retain.0", "line1.retain.1"}) {
+      std::ifstream stream(folder_ / name, std::ios::binary);
+      const std::string text{std::istreambuf_iterator<char>(stream), {}};
+      const auto image = decode_retain(text);
+      if (!image || image->generation < newest) continue;
+      newest = image->generation;
+      std::memcpy(numbers.data(), image->data.data(), sizeof(numbers));
+    }
+    return numbers;
+  }
+};
+
+TEST_F(RetainOfBusyTasks, IsSavedAtTheEndOfACycleIfOneFollowsTheOtherWithoutAPause) {
+  KeptGroup& both = group({0}, {{0, 8}, {8, 8}});
+  ASSERT_TRUE(sut->start());
+  const BusyTask task(*sut, 0, both, {area(0), area(1)});
+  for (std::uint64_t seen = 1; seen < 12;) {
+    const auto [count, hours] = saved();
+    ASSERT_EQ(count, hours);
+    seen = sut->saves();
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  EXPECT_EQ(sut->unsaved(), 0U);
+  EXPECT_GT(saved()[0], kInitial);
+}
+
+TEST_F(RetainOfBusyTasks, IsSavedWhenTwoOfThemShareAnAreaAndOneMayWait) {
+  KeptGroup& both = group({0, 1}, {{0, 8}, {8, 8}});
+  ASSERT_TRUE(sut->start());
+  const BusyTask one(*sut, 0, both, {area(0), area(0)}, true);
+  const BusyTask other(*sut, 1, both, {area(1), area(1)}, true);
+  while (sut->saves() < 5) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  EXPECT_GT(saved()[0], kInitial);
+  EXPECT_GT(saved()[1], kInitial);
+}
+
+TEST_F(RetainOfBusyTasks, IsSavedThoughAnotherTaskIsStuckWithinACycle) {
+  (void)group({7}, {{0, 8}});
+  KeptGroup& other = group({1}, {{8, 8}});
+  ASSERT_TRUE(sut->start());
+  sut->memory().counter(7) = 1;
+  *area(0) = 13;
+  {
+    const BusyTask task(*sut, 1, other, {area(1)});
+    while (saved()[1] == kInitial) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  EXPECT_EQ(saved()[0], kInitial) << "half a cycle's variables are never saved";
+  EXPECT_GT(sut->unsaved(), 0U);
+  sut->finish();
+  EXPECT_EQ(saved()[0], kInitial);
+  EXPECT_EQ(saved()[1], *area(1)) << "also at the end";
+}
+
+TEST_F(RetainOfBusyTasks, IsTakenFromWhereAnAreaLives) {
+  alignas(8) std::uint64_t registers = 0;
+  sut->memory().live_elsewhere(0, std::as_writable_bytes(std::span(&registers, 1)));
+  KeptGroup& both = group({0}, {{0, 8}, {8, 8}});
+  ASSERT_TRUE(sut->start());
+  {
+    const BusyTask task(*sut, 0, both, {&registers, area(1)});
+    while (sut->saves() < 5) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    const auto [count, hours] = saved();
+    EXPECT_EQ(count, hours);
+  }
+  sut->finish();
+  EXPECT_EQ(*area(0), registers) << "for the next process, the memory has it, too";
+}
+
 TEST_F(Retain, WithoutAFolderLivesInMemoryAndSaysSo) {
   sut = RetainKeeper::make(pool_, "line1", initial(), {}).value();
   ASSERT_TRUE(sut->start());
@@ -288,7 +440,7 @@ TEST_F(Retain, LivesWhereTheSettingsHaveIt) {
 TEST_F(Retain, MemoryWithAnyByteOfItsHeaderSpoiledIsTakenOrLeftAsAWhole) {
   start_well();
   sut.reset();
-  const std::string name = pool_memory_name(pool_, KeptMemory::name_for("line1"));
+  const std::string name = pool_memory_name(name_.get(), KeptMemory::name_for("line1"));
   constexpr std::size_t kHeader = 96 + 3 * 80;
   for (std::size_t at = 0; at < kHeader; ++at) {
     for (const unsigned char spoil : {0x01, 0x80, 0xff}) {
@@ -297,7 +449,7 @@ TEST_F(Retain, MemoryWithAnyByteOfItsHeaderSpoiledIsTakenOrLeftAsAWhole) {
         ASSERT_TRUE(memory);
         memory->bytes()[at] ^= static_cast<std::byte>(spoil);
       }
-      const auto left = KeptMemory::left_behind(pool_, KeptMemory::name_for("line1"));
+      const auto left = KeptMemory::left_behind(name_.get(), KeptMemory::name_for("line1"));
       if (left) {
         EXPECT_TRUE(check_layout(left->image.layout));
         EXPECT_EQ(left->image.data.size(), left->image.layout.bytes);

@@ -1,0 +1,265 @@
+#include "shm/pool/pool_adoption.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <thread>
+#include <vector>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <grp.h>
+#include <pwd.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "shm/base/unique_fd.hpp"
+#include "shm/plc_process_image.h"
+#include "shm/plc_reference_clock.h"
+#include "shm/pool/pool_table.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr auto kRelaxed = std::memory_order_relaxed;
+
+/// What the file of a memory is.
+struct MemoryFileState {
+  enum class Kind : std::uint8_t {
+    none,        ///< nothing, or nothing to be read
+    empty,       ///< just being made, or emptied by a stranger
+    unfinished,  ///< just being made: it does not say yet what it is
+    described,   ///< says what it is, and has the size for it
+    other,
+  };
+  Kind kind = Kind::none;
+  struct stat status{};
+};
+using Kind = MemoryFileState::Kind;
+
+std::string path_in_memory(std::string_view file) {
+  return fmt::format("{}/{}", MemoryFile::kDirectory, file);
+}
+
+bool is_image(const plc_image_header& header, std::uint64_t file_size) noexcept {
+  return header.magic == PLC_IMAGE_MAGIC && header.version == PLC_IMAGE_VERSION &&
+         header.slots == PLC_IMAGE_SLOTS && header.size > 0 && header.size <= PLC_IMAGE_MAX_SIZE &&
+         file_size == plc_image_bytes(static_cast<unsigned>(header.size));
+}
+
+bool is_reference_clock(const plc_reference_clock& record, std::uint64_t file_size) noexcept {
+  return record.magic == PLC_REFERENCE_CLOCK_MAGIC && record.version == PLC_REFERENCE_CLOCK_VERSION &&
+         record.size == sizeof(record) && file_size == sizeof(record);
+}
+
+// Read, not mapped: it may be cut short meanwhile.
+MemoryFileState examine(const std::string& path) {
+  MemoryFileState state;
+  const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+  if (!fd) {
+    if (errno != ENOENT && ::lstat(path.c_str(), &state.status) == 0) state.kind = Kind::other;
+    return state;
+  }
+  if (::fstat(fd.get(), &state.status) != 0) return state;
+  state.kind = Kind::other;
+  if (!S_ISREG(state.status.st_mode)) return state;
+  std::array<char, std::max(sizeof(plc_image_header), sizeof(plc_reference_clock))> begin{};
+  if (::pread(fd.get(), begin.data(), begin.size(), 0) < 0) return state;
+  plc_image_header image{};
+  plc_reference_clock clock{};
+  std::memcpy(&image, begin.data(), sizeof(image));
+  std::memcpy(&clock, begin.data(), sizeof(clock));
+  const auto size = static_cast<std::uint64_t>(state.status.st_size);
+  if (size == 0) {
+    state.kind = Kind::empty;
+  } else if (image.magic == 0) {
+    state.kind = Kind::unfinished;
+  } else if (is_image(image, size) || is_reference_clock(clock, size)) {
+    state.kind = Kind::described;
+  }
+  return state;
+}
+
+MemoryFileState examine_patiently(const std::string& path) {
+  constexpr auto kPatience = std::chrono::milliseconds(20);
+  const TimePoint deadline = MonotonicClock::now() + kPatience;
+  for (;;) {
+    MemoryFileState state = examine(path);
+    const bool on_its_way = state.kind == Kind::empty || state.kind == Kind::unfinished;
+    if (!on_its_way || MonotonicClock::now() >= deadline) return state;
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+}
+
+bool is_member(uid_t user, gid_t group) {
+  std::vector<char> text(16384);
+  passwd entry{};
+  passwd* found = nullptr;
+  if (::getpwuid_r(user, &entry, text.data(), text.size(), &found) != 0 || found == nullptr) return false;
+  std::vector<gid_t> groups(256);
+  int count = static_cast<int>(groups.size());
+  if (::getgrouplist(found->pw_name, found->pw_gid, groups.data(), &count) < 0) return false;
+  groups.resize(static_cast<std::size_t>(count));
+  return std::ranges::find(groups, group) != groups.end();
+}
+
+// Who may not write the pool could not have made an object of it either.
+bool may_write_pool(const std::string& pool, uid_t user) {
+  struct stat status{};
+  if (::stat(path_in_memory(pool).c_str(), &status) != 0) return false;
+  if (user == 0 || user == status.st_uid || user == ::geteuid() || (status.st_mode & S_IWOTH) != 0)
+    return true;
+  return (status.st_mode & S_IWGRP) != 0 && is_member(user, status.st_gid);
+}
+
+bool can_be_adopted(const MemoryFileState& state, const std::string& pool) {
+  return state.kind == Kind::described && may_write_pool(pool, state.status.st_uid);
+}
+
+bool is_memory(const ObjectEntry& entry) noexcept {
+  return entry.type.load(kRelaxed) == static_cast<std::uint32_t>(ObjectType::memory);
+}
+
+constexpr mode_t kPermissions = 0777;
+
+void describe_as(ObjectEntry& entry, const struct stat& status, std::uint32_t attributes) noexcept {
+  entry.attributes.store(attributes, kRelaxed);
+  entry.size.store(static_cast<std::uint64_t>(status.st_size), kRelaxed);
+  entry.owner.store(status.st_uid, kRelaxed);
+  entry.group.store(status.st_gid, kRelaxed);
+  entry.mode.store(status.st_mode & kPermissions, kRelaxed);
+}
+
+// Only its last steps make a memory of the entry: if we die before, a repair would remove the file.
+bool adopt(PoolSegment& segment, std::string_view name, const MemoryFileState& state) {
+  ObjectEntry* const entry = PoolTable(segment.view()).insert(name, ObjectType::event);
+  if (entry == nullptr) return false;
+  describe_as(*entry, state.status, kKept | kAdopted);
+  entry->type.store(static_cast<std::uint32_t>(ObjectType::memory), kRelaxed);
+  PoolTable::publish(*entry);
+  return true;
+}
+
+// With the lock held.
+bool set_right(PoolSegment& segment, std::string_view name, const MemoryFileState& state, bool adoptable) {
+  PoolTable objects(segment.view());
+  ObjectEntry* const entry = objects.find(name);
+  if (entry == nullptr) return adoptable && adopt(segment, name, state);
+  if (!is_memory(*entry)) return false;
+  if (PoolAdoption::is_left_over(*entry)) return false;
+  if (state.kind == Kind::none || state.kind == Kind::empty) {
+    segment.destroy(*entry);
+    return true;
+  }
+  if (!adoptable || entry->size.load(kRelaxed) == static_cast<std::uint64_t>(state.status.st_size))
+    return false;
+  objects.erase(*entry);
+  return adopt(segment, name, state);
+}
+
+}  // namespace
+
+bool PoolAdoption::is_left_over(const ObjectEntry& entry) noexcept {
+  return PoolTable::is_valid(entry) && is_memory(entry) && PoolTable::is_idle(entry);
+}
+
+bool PoolAdoption::is_for_adoption(const std::string& path, const std::string& pool) {
+  return can_be_adopted(examine(path), pool);
+}
+
+bool PoolAdoption::reconcile(PoolSegment& segment, std::string_view name) {
+  if (!segment.writable()) return false;
+  const std::string path = path_in_memory(pool_memory_name(segment.name(), name));
+  const MemoryFileState before = examine_patiently(path);
+  const ObjectEntry* const known = PoolTable(segment.view()).peek(name);
+  const bool adoptable = can_be_adopted(before, segment.name());
+  if (known == nullptr && !adoptable) return false;
+  const auto held = segment.lock();
+  if (!held) return false;
+  const MemoryFileState now = examine(path);
+  return set_right(segment, name, now,
+                   adoptable && now.kind == Kind::described && now.status.st_uid == before.status.st_uid);
+}
+
+Result<ObjectEntry*> PoolAdoption::use_again(PoolSegment& segment, ObjectEntry& entry, std::size_t size,
+                                             const MemoryRights& rights, std::uint32_t attributes) {
+  const std::string name(entry.name.view());
+  segment.destroy(entry);
+  PoolTable objects(segment.view());
+  ObjectEntry* const left = objects.find(name);
+  if (left == nullptr) return left;
+  const std::string path = path_in_memory(pool_memory_name(segment.name(), name));
+  const UniqueFd fd(::open(path.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+  struct stat status{};
+  const bool same_rights = fd && ::fstat(fd.get(), &status) == 0 && S_ISREG(status.st_mode) &&
+                           (status.st_mode & kPermissions) == rights.mode &&
+                           status.st_gid == rights.group.value_or(::getegid());
+  if (!same_rights) {
+    return failure(
+        ErrorCode::refused,
+        fmt::format("memory '{}': {} is left of user {}, and {} is sticky: only that user, root, or a "
+                    "manager that runs as root (within a second) can remove it; choose another name, or "
+                    "wait for that",
+                    name, path, left->owner.load(kRelaxed), MemoryFile::kDirectory));
+  }
+  if (::ftruncate(fd.get(), 0) != 0) return failure(ErrorCode::system, "empty " + path, errno);
+  if (const int error = ::posix_fallocate(fd.get(), 0, static_cast<off_t>(size)); error != 0) {
+    return failure(ErrorCode::full, fmt::format("{} bytes of shared memory for {}", size, path), error);
+  }
+  if (::fstat(fd.get(), &status) != 0) return failure(ErrorCode::system, "fstat " + path, errno);
+  describe_as(*left, status, attributes);
+  return left;
+}
+
+void PoolAdoption::look() {
+  look_at_files();
+  look_at_entries();
+}
+
+// A folder that has not changed is not looked at again; the time of a change is exact only to some ms, and a
+// file is complete only some time after its name is there.
+void PoolAdoption::look_at_files() {
+  constexpr int kNamesAtOnce = 10'000;
+  constexpr std::int64_t kSettledAfterS = 2;
+  if (!folder_) {
+    struct stat status{};
+    timespec now{};
+    if (::stat(MemoryFile::kDirectory, &status) != 0) return;
+    ::clock_gettime(CLOCK_REALTIME_COARSE, &now);
+    const bool seen = status.st_mtim.tv_sec == changed_.tv_sec && status.st_mtim.tv_nsec == changed_.tv_nsec;
+    if (seen && now.tv_sec - changed_.tv_sec > kSettledAfterS) return;
+    changed_ = status.st_mtim;
+    folder_.reset(::opendir(MemoryFile::kDirectory));
+    if (!folder_) return;
+  }
+  for (int i = 0; i < kNamesAtOnce; ++i) {
+    // NOLINTNEXTLINE(concurrency-mt-unsafe): nobody else reads this stream
+    const dirent* const file = ::readdir(folder_.get());
+    if (file == nullptr) {
+      folder_.reset();
+      return;
+    }
+    const auto name = memory_of_file(segment_->name(), static_cast<const char*>(file->d_name));
+    if (!name || PoolTable(segment_->view()).peek(*name) != nullptr) continue;
+    if (is_for_adoption(path_in_memory(static_cast<const char*>(file->d_name)), segment_->name())) {
+      (void)reconcile(*segment_, *name);
+    }
+  }
+}
+
+void PoolAdoption::look_at_entries() {
+  constexpr std::size_t kEntriesAtOnce = 20'000;
+  const auto used = segment_->view().used_entries();
+  if (next_entry_ >= used.size()) next_entry_ = 0;
+  const std::size_t end = std::min(used.size(), next_entry_ + kEntriesAtOnce);
+  for (; next_entry_ < end; ++next_entry_) {
+    if (!is_left_over(used[next_entry_])) continue;
+    const auto held = segment_->lock();
+    if (held && is_left_over(used[next_entry_])) segment_->destroy(used[next_entry_]);
+  }
+}
+
+}  // namespace plchost

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include <dirent.h>
+#include <time.h>
+
+#include "shm/base/result.hpp"
+#include "shm/pool/memory_rights.hpp"
+#include "shm/pool/pool_segment.hpp"
+
+namespace plchost {
+
+/// Where the pool's table and the files of its memories disagree. Firmware that knows only a C header
+/// (shm/plc_process_image.h, shm/plc_reference_clock.h) makes a file without an entry: it becomes a kept
+/// object, with the rights of the file. Somebody removes a file: its entry goes. A file of another user
+/// cannot be removed from the sticky folder: its entry stays, unseen, until somebody can, or it is used
+/// again.
+///
+/// Only a file that says what it is, and whose owner may write the pool, is taken. Set-up.
+class PoolAdoption {
+ public:
+  explicit PoolAdoption(std::shared_ptr<PoolSegment> segment) noexcept : segment_(std::move(segment)) {}
+
+  /// For who has not found a memory, or not its file: sets right what is wrong with it. True: look again.
+  /// Waits up to 20 ms for a file that is just being made.
+  [[nodiscard]] static bool reconcile(PoolSegment& segment, std::string_view name);
+
+  /// Of a file: whether one becomes an object, so that no other may take its name.
+  [[nodiscard]] static bool is_for_adoption(const std::string& path, const std::string& pool);
+
+  /// The entry is that of a memory that has gone, whose file could not be removed.
+  [[nodiscard]] static bool is_left_over(const ObjectEntry& entry) noexcept;
+  /// With the lock held. Removes it, or makes its file one of `size` zeros again, with `attributes`; null: it
+  /// was removed. refused: neither is possible; says who can do what.
+  [[nodiscard]] static Result<ObjectEntry*> use_again(PoolSegment& segment, ObjectEntry& entry,
+                                                      std::size_t size, const MemoryRights& rights,
+                                                      std::uint32_t attributes);
+
+  /// Looks at some files and entries of the pool; each call goes on where the one before ended. For whoever
+  /// watches over the host.
+  void look();
+
+ private:
+  struct Close {
+    void operator()(DIR* folder) const noexcept { ::closedir(folder); }
+  };
+  void look_at_files();
+  void look_at_entries();
+
+  std::shared_ptr<PoolSegment> segment_;
+  std::unique_ptr<DIR, Close> folder_;  // null: all was looked at
+  timespec changed_{};                  // the folder, before it was looked at last
+  std::size_t next_entry_ = 0;
+};
+
+}  // namespace plchost
