@@ -87,7 +87,8 @@ typedef struct {
   unsigned int size;  /* sizeof(plc_object_options) */
   unsigned int flags; /* PLC_POOL_KEEP */
   unsigned int mode;  /* permission bits as those of a file, 0660 say; 0: those of the pool */
-  unsigned int group; /* number of the group that the mode speaks of; 0: that of the pool */
+  unsigned int group; /* number of the group that the mode speaks of, one that the caller is in; 0: that of
+                         the pool, or the caller's own if he is not in it */
 } plc_object_options;
 
 /* The object is kept no longer: it goes now, or with its last reference. Set-up. */
@@ -172,8 +173,8 @@ void plc_mutex_close(plc_mutex* mutex);
  */
 
 /* `size` bytes, zero when made. An image or a reference record that firmware has made with a header alone is
- * there already. PLC_POOL_REFUSED: also if a file is in the way that only another user or root can remove. What
- * users write at once into one memory they order themselves. */
+ * there already. PLC_POOL_REFUSED: also if a file is in the way that only another user or root can remove.
+ * What users write at once into one memory they order themselves. */
 int plc_memory_create(plc_pool* pool, const char* name, size_t size, const plc_object_options* options,
                       plc_memory** memory);
 /* With PLC_POOL_READ a write to it is a SIGSEGV. */

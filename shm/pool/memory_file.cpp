@@ -102,6 +102,21 @@ ErrorCode code_of_open(int error) noexcept {
   return error == EACCES ? ErrorCode::refused : ErrorCode::system;
 }
 
+std::string_view kind_of(mode_t mode) noexcept {
+  if (S_ISDIR(mode)) return "folder";
+  if (S_ISFIFO(mode)) return "FIFO";
+  if (S_ISLNK(mode)) return "symbolic link";
+  if (S_ISSOCK(mode)) return "socket";
+  return "device";
+}
+
+std::unexpected<Error> not_a_plain_file(const std::string& path, mode_t mode) {
+  return failure(ErrorCode::wrong_type,
+                 fmt::format("{} is a {} where shared memory, a plain file, is expected; "
+                             "remove it, or choose another name",
+                             path, kind_of(mode)));
+}
+
 /// An existing file, and what it is.
 struct Opened {
   UniqueFd fd;
@@ -115,13 +130,17 @@ Result<Opened> open_existing(const std::string& path, MemoryFile::Access access)
   Opened opened{.fd = UniqueFd(::open(path.c_str(), flags))};
   if (!opened.fd) {
     const int error = errno;
+    // What cannot be opened so: a folder to write, a link at all, a socket.
+    if (::lstat(path.c_str(), &opened.status) == 0 && !S_ISREG(opened.status.st_mode)) {
+      return not_a_plain_file(path, opened.status.st_mode);
+    }
     return failure(code_of_open(error), fmt::format("open {}", path), error);
   }
   if (auto got = check_errno(::fstat(opened.fd.get(), &opened.status), "fstat " + path); !got) {
     return std::unexpected(got.error());
   }
   if (!S_ISREG(opened.status.st_mode)) {
-    return failure(ErrorCode::corrupt, fmt::format("{} is not a plain file", path));
+    return not_a_plain_file(path, opened.status.st_mode);
   }
   return opened;
 }

@@ -42,7 +42,7 @@ class MemoryFile {
                                                  const Fill& fill = {}, const MemoryRights& rights = {});
 
   /// Maps an existing one, whole. not_found: no such name. refused: its rights do not allow it. corrupt:
-  /// smaller than `at_least` bytes, or not a plain file.
+  /// smaller than `at_least` bytes. wrong_type: not a plain file.
   [[nodiscard]] static Result<MemoryFile> open(const std::string& name, std::size_t at_least, Access access);
 
   /// Gives the file of that name `size` bytes if it is empty, as one is that was only just made, or that a

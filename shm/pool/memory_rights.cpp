@@ -38,6 +38,10 @@ Permission permission_for_caller(uid_t owner, gid_t group, mode_t mode) {
   return {.read = (bits & kRead) != 0, .write = (bits & kWrite) != 0};
 }
 
+bool may_give_to(gid_t group) {
+  return ::geteuid() == 0 || caller_is_in(group);
+}
+
 std::string describe_rights(uid_t owner, gid_t group, mode_t mode) {
   return fmt::format("owner {}, group {}, mode {:04o}", owner, group, mode & 07777U);
 }

@@ -24,6 +24,10 @@ struct Permission {
 };
 [[nodiscard]] Permission permission_for_caller(uid_t owner, gid_t group, mode_t mode);
 
+/// Whether the calling process may make a file, or an object, that belongs to the group: it is in it, or
+/// root.
+[[nodiscard]] bool may_give_to(gid_t group);
+
 /// "owner 0, group 1000, mode 0660", for errors.
 [[nodiscard]] std::string describe_rights(uid_t owner, gid_t group, mode_t mode);
 

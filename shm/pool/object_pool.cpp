@@ -63,14 +63,21 @@ std::unexpected<Error> nothing_of_that_name(std::string_view name, const std::st
   return failure(ErrorCode::not_found, fmt::format("no object '{}' in pool '{}'", name, pool));
 }
 
-// What options leave open is as with the pool.
-MemoryRights rights_for(const ObjectOptions& options, const std::string& pool) {
+// What options leave open is as with the pool, but for the group of who is not in the pool's: it is his own.
+// As with files, nobody gives an object to a group that he is not in.
+Result<MemoryRights> rights_for(const ObjectOptions& options, const std::string& pool) {
+  if (options.group && !may_give_to(*options.group)) {
+    return failure(ErrorCode::refused,
+                   fmt::format("user {} is not in group {}, and can make no object for it", ::geteuid(),
+                               *options.group));
+  }
   struct stat status{};
   const std::string path = fmt::format("{}/{}", MemoryFile::kDirectory, pool);
-  if (::stat(path.c_str(), &status) != 0) return {.group = options.group, .mode = options.mode};
+  if (::stat(path.c_str(), &status) != 0) return MemoryRights{.group = options.group, .mode = options.mode};
   constexpr mode_t kPermissions = 0666;
-  return {.group = options.group.value_or(status.st_gid),
-          .mode = options.mode != 0 ? options.mode : status.st_mode & kPermissions};
+  const gid_t usual = may_give_to(status.st_gid) ? status.st_gid : ::getegid();
+  return MemoryRights{.group = options.group.value_or(usual),
+                      .mode = options.mode != 0 ? options.mode : status.st_mode & kPermissions};
 }
 
 void describe_new(ObjectEntry& entry, const MemoryRights& rights, std::uint32_t attributes) noexcept {
@@ -124,7 +131,7 @@ Result<PoolEvent> ObjectPool::create_event(std::string_view name) {
   if (entry == nullptr) {
     entry = objects.insert(name, ObjectType::event);
     if (entry == nullptr) return no_room(wanted);
-    describe_new(*entry, rights_for({}, this->name()), 0);
+    describe_new(*entry, *rights_for({}, this->name()), 0);
     PoolTable::publish(*entry);
   }
   if (auto event = check_is(*entry, ObjectType::event, name); !event) return std::unexpected(event.error());
@@ -231,7 +238,8 @@ Result<Created<T>> ObjectPool::create_locked(const Wanted& wanted, const MemoryR
 template <class T>
 Result<Created<T>> ObjectPool::create_object(const Wanted& wanted, const ObjectOptions& options) {
   if (auto valid = check_object_name(wanted.name); !valid) return std::unexpected(valid.error());
-  const MemoryRights rights = rights_for(options, name());
+  const auto rights = rights_for(options, name());
+  if (!rights) return std::unexpected(rights.error());
   const std::uint32_t attributes =
       (options.keep ? kKept : 0) | (wanted.type == ObjectType::event ? kDirect : 0);
   std::optional<UnnamedMemory> memory;
@@ -240,11 +248,11 @@ Result<Created<T>> ObjectPool::create_object(const Wanted& wanted, const ObjectO
     if (there) return Created<T>{.object = *std::move(there), .made = false};
     if (there.error().code != ErrorCode::not_found) return std::unexpected(std::move(there).error());
     // The host takes its time to find so many bytes: not with the lock held.
-    auto unnamed = UnnamedMemory::make(pool_memory_name(name(), wanted.name), wanted.size, rights);
+    auto unnamed = UnnamedMemory::make(pool_memory_name(name(), wanted.name), wanted.size, *rights);
     if (!unnamed) return std::unexpected(std::move(unnamed).error());
     memory = *std::move(unnamed);
   }
-  auto created = create_locked<T>(wanted, rights, attributes, std::move(memory));
+  auto created = create_locked<T>(wanted, *rights, attributes, std::move(memory));
   if constexpr (std::is_same_v<T, SharedMemory>) {
     if (!created && created.error().code == ErrorCode::already_exists) {
       // Firmware has just made it.
@@ -365,7 +373,7 @@ Result<SharedMemory> ObjectPool::replace_memory(std::string_view name, std::size
                                                 const MemoryFile::Fill& fill) {
   if (auto valid = check_object_name(name); !valid) return std::unexpected(valid.error());
   const Wanted wanted{.name = name, .type = ObjectType::memory, .size = size};
-  const MemoryRights rights = rights_for({}, this->name());
+  const MemoryRights rights = *rights_for({}, this->name());
   auto unnamed = UnnamedMemory::make(pool_memory_name(this->name(), name), size, rights);
   if (!unnamed) return std::unexpected(std::move(unnamed).error());
   if (auto filled = fill(unnamed->bytes()); !filled) return std::unexpected(std::move(filled).error());

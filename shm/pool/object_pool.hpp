@@ -33,8 +33,9 @@ struct PoolOptions {
 struct ObjectOptions {
   /// It lives on without a reference, also across the ends of all processes, until it is removed.
   bool keep = false;
-  /// Who may use it: nothing is the caller and the pool's group. Permission bits as those of a file, 0 are
-  /// the pool's. Of a memory the kernel watches over them; of the others, which lie in the pool itself, this
+  /// Who may use it: nothing is the caller and the pool's group (if he is not in that, his own). Another
+  /// group than one of the caller's is refused, as with files. Permission bits as those of a file, 0 are the
+  /// pool's. Of a memory the kernel watches over them; of the others, which lie in the pool itself, this
   /// library does, for all who have the right to write the pool.
   std::optional<gid_t> group = std::nullopt;
   mode_t mode = 0;

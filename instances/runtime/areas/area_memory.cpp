@@ -24,10 +24,18 @@ std::unexpected<Error> not_mapped(const AreaSettings& settings, std::string_view
                  error);
 }
 
-Result<UniqueFd> open_device(const AreaSettings& settings) {
+// `status` is that of an open file.
+FileRange range_in(const struct stat& status, std::uint64_t begin, std::uint64_t end) noexcept {
+  const bool device = S_ISCHR(status.st_mode);
+  return {.device = device ? status.st_rdev : status.st_dev,
+          .inode = device ? 0 : status.st_ino,
+          .begin = begin,
+          .end = end};
+}
+
+Result<UniqueFd> open_device(const AreaSettings& settings, struct stat& status) {
   UniqueFd fd(::open(settings.device.c_str(), O_RDWR | O_SYNC | O_CLOEXEC | O_NONBLOCK));
   if (!fd) return not_mapped(settings, "cannot be opened", errno);
-  struct stat status{};
   if (::fstat(fd.get(), &status) != 0) return not_mapped(settings, "fstat", errno);
   if (!S_ISREG(status.st_mode) && !S_ISCHR(status.st_mode)) {
     return not_mapped(settings, "allowed is a character device or a plain file");
@@ -52,12 +60,20 @@ Result<UniqueFd> lock_file_of(const std::string& file) {
 
 }  // namespace
 
+std::optional<FileRange> range_of_memory(const std::string& pool, const std::string& name) {
+  const std::string path = fmt::format("{}/{}", MemoryFile::kDirectory, pool_memory_name(pool, name));
+  struct stat status{};
+  if (::stat(path.c_str(), &status) != 0) return std::nullopt;
+  return range_in(status, 0, static_cast<std::uint64_t>(status.st_size));
+}
+
 AreaMemory::AreaMemory(AreaMemory&& other) noexcept
     : mapping_(std::exchange(other.mapping_, {})),
       bytes_(std::exchange(other.bytes_, {})),
       shared_(std::move(other.shared_)),
       lock_(std::move(other.lock_)),
       guard_(std::move(other.guard_)),
+      range_(other.range_),
       existed_(other.existed_) {}
 
 AreaMemory& AreaMemory::operator=(AreaMemory&& other) noexcept {
@@ -66,6 +82,7 @@ AreaMemory& AreaMemory::operator=(AreaMemory&& other) noexcept {
   std::swap(shared_, other.shared_);
   std::swap(lock_, other.lock_);
   std::swap(guard_, other.guard_);
+  std::swap(range_, other.range_);
   std::swap(existed_, other.existed_);
   return *this;
 }
@@ -89,7 +106,8 @@ Result<AreaMemory> AreaMemory::of_process(std::size_t bytes) {
 }
 
 Result<AreaMemory> AreaMemory::of_device(const AreaSettings& settings) {
-  const auto fd = open_device(settings);
+  struct stat status{};
+  const auto fd = open_device(settings, status);
   if (!fd) return std::unexpected(fd.error());
   // Memory 0 of an uio device is mapped from its beginning, whatever is wanted of it.
   const bool uio = settings.device.starts_with("/dev/uio");
@@ -102,6 +120,8 @@ Result<AreaMemory> AreaMemory::of_device(const AreaSettings& settings) {
   AreaMemory memory;
   memory.mapping_ = std::span(static_cast<std::byte*>(address), size);
   memory.bytes_ = memory.mapping_.subspan(settings.address - begin, settings.size);
+  memory.existed_ = true;
+  memory.range_ = range_in(status, settings.address, settings.address + settings.size);
   memory.guard_ = MemoryGuard(memory.mapping_);
   if (!memory.guard_)
     return not_mapped(settings, fmt::format("more than {} memories of others", MemoryGuard::kMost));

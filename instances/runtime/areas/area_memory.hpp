@@ -1,8 +1,12 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
+
+#include <sys/types.h>
 
 #include "instances/runtime/settings/settings.hpp"
 #include "shm/base/memory_guard.hpp"
@@ -11,6 +15,20 @@
 #include "shm/pool/object_pool.hpp"
 
 namespace plchost {
+
+/// A stretch of a file or device, whatever path leads to it.
+struct FileRange {
+  dev_t device = 0;  ///< of a character device itself
+  ino_t inode = 0;   ///< 0: a character device
+  std::uint64_t begin = 0;
+  std::uint64_t end = 0;
+
+  [[nodiscard]] bool overlaps(const FileRange& other) const noexcept {
+    return device == other.device && inode == other.inode && begin < other.end && other.begin < end;
+  }
+};
+/// The whole file of a memory of the pool. Set-up.
+[[nodiscard]] std::optional<FileRange> range_of_memory(const std::string& pool, const std::string& name);
 
 /// The memory behind one block of areas, mapped, locked and touched, so that no cycle has a page fault. If
 /// others cut its file short, it is zeros from then on.
@@ -33,7 +51,9 @@ class AreaMemory {
   [[nodiscard]] static Result<AreaMemory> of_pool(ObjectPool& pool, const std::string& name,
                                                   std::size_t bytes, bool exclusive);
   [[nodiscard]] std::span<std::byte> bytes() const noexcept { return bytes_; }
-  /// of_pool: it was there already.
+  /// of_device: which bytes they are. A page-wise mapping may have more.
+  [[nodiscard]] const std::optional<FileRange>& range() const noexcept { return range_; }
+  /// It was there already, with what others have written: a device always was.
   [[nodiscard]] bool existed() const noexcept { return existed_; }
 
  private:
@@ -42,6 +62,7 @@ class AreaMemory {
   SharedMemory shared_;
   UniqueFd lock_;
   MemoryGuard guard_;
+  std::optional<FileRange> range_;
   bool existed_ = false;
 };
 

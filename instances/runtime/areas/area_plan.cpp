@@ -31,12 +31,16 @@ class Planner {
   explicit Planner(std::span<const DeclaredArea> areas) : areas_(areas) {}
 
   Result<void> put_into(const AreaSettings& settings, std::size_t area) {
-    const auto found = std::ranges::find(plan.blocks, &settings, &AreaBlock::settings);
+    const std::uint64_t offset = end_of(settings);
+    if (auto fits = check(settings, offset, area); !fits) return fits;
+    const auto found = std::ranges::find_if(plan.blocks, [&](const AreaBlock& block) {
+      return block.settings == &settings &&
+             content_of(areas_[block.areas.front()]) == content_of(areas_[area]);
+    });
     const std::size_t block = found == plan.blocks.end()
                                   ? add({.settings = &settings, .bytes = settings.size, .areas = {}})
                                   : static_cast<std::size_t>(found - plan.blocks.begin());
-    if (auto fits = check(settings, plan.blocks[block], area); !fits) return fits;
-    put(block, end_of(plan.blocks[block]), area);
+    put(block, offset, area);
     return {};
   }
 
@@ -57,9 +61,8 @@ class Planner {
   AreaPlan plan;
 
  private:
-  Result<void> check(const AreaSettings& settings, const AreaBlock& block, std::size_t area) const {
+  Result<void> check(const AreaSettings& settings, std::uint64_t offset, std::size_t area) const {
     const DeclaredArea& wanted = areas_[area];
-    const std::uint64_t offset = end_of(block);
     const std::uint64_t left = offset > settings.size ? 0 : settings.size - offset;
     if (wanted.bytes > left) {
       return refused(settings, wanted.name,
@@ -68,11 +71,13 @@ class Planner {
                                  wanted.bytes, left, settings.size, wanted.flags));
     }
     if (settings.object.empty()) return {};
-    if (!block.areas.empty() && content_of(areas_[block.areas.front()]) != content_of(wanted)) {
+    const auto first = std::ranges::find(plan.blocks, &settings, &AreaBlock::settings);
+    const DeclaredArea* const other = first == plan.blocks.end() ? nullptr : &areas_[first->areas.front()];
+    if (other != nullptr && content_of(*other) != content_of(wanted)) {
       return refused(
           settings, wanted.name,
           fmt::format("cannot lie in one Object with '{}': one holds inputs, or outputs, or others",
-                      areas_[block.areas.front()].name));
+                      other->name));
     }
     if (wanted.has_image() && settings.size > PLC_MAX_IMAGE) {
       return refused(
@@ -86,6 +91,15 @@ class Planner {
     if (block.areas.empty()) return 0;
     const std::size_t last = block.areas.back();
     return aligned(plan.places[last].offset + areas_[last].bytes);
+  }
+
+  // Behind all areas that lie there.
+  [[nodiscard]] std::uint64_t end_of(const AreaSettings& settings) const {
+    std::uint64_t end = 0;
+    for (const AreaBlock& block : plan.blocks) {
+      if (block.settings == &settings) end = std::max(end, end_of(block));
+    }
+    return end;
   }
 
   std::size_t add(AreaBlock block) {

@@ -11,7 +11,8 @@
 
 namespace plchost {
 
-/// A stretch of memory that holds one area, or several one behind the other.
+/// A stretch of memory that holds one area, or several one behind the other: inputs, or outputs, or others.
+/// In a device or file there may be a block of each kind in the same stretch.
 struct AreaBlock {
   const AreaSettings* settings =
       nullptr;  ///< null: memory of the process; retain and persistent: kept memory

@@ -115,6 +115,7 @@ class Areas {
   [[nodiscard]] Result<void> make_blocks(const Environment& environment);
   [[nodiscard]] Result<void> make_memory(const Environment& environment, Block& block,
                                          const AreaBlock& planned);
+  [[nodiscard]] Result<void> check_distinct(const Environment& environment) const;
   void make_image(Block& block, const AreaBlock& planned);
   [[nodiscard]] Result<void> make_keeper(const Environment& environment);
   void tell_plain_addresses();

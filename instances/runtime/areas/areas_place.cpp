@@ -39,6 +39,10 @@ Result<std::string> Areas::place(const Environment& environment, std::span<TaskC
   cycles_.resize(tasks.size());
   plain_.resize(declared_.size(), nullptr);
   if (auto made = make_blocks(environment); !made) return std::unexpected(made.error());
+  if (auto distinct = check_distinct(environment); !distinct) return std::unexpected(distinct.error());
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    if (first_of(plan_.blocks[i]).has_image()) make_image(blocks_[i], plan_.blocks[i]);
+  }
   if (auto made = make_keeper(environment); !made) return std::unexpected(made.error());
   tell_plain_addresses();
   for (std::size_t block = 0; block < plan_.blocks.size(); ++block) make_views(block);
@@ -60,7 +64,6 @@ Result<void> Areas::make_blocks(const Environment& environment) {
                         block.initial.begin() + static_cast<std::ptrdiff_t>(plan_.places[area].offset));
     }
     if (auto made = make_memory(environment, block, planned); !made) return made;
-    if (first_of(planned).has_image()) make_image(block, planned);
   }
   return {};
 }
@@ -87,6 +90,44 @@ Result<void> Areas::make_memory(const Environment& environment, Block& block, co
                       std::move(made).error());
   }
   return take(std::move(made));
+}
+
+// The settings are checked by their texts; but a file has many: symbolic and hard links, and that of a memory
+// of the pool, one of which holds what is kept.
+Result<void> Areas::check_distinct(const Environment& environment) const {
+  struct Taken {
+    const AreaSettings* settings;
+    std::string by;
+    FileRange range;
+  };
+  std::vector<Taken> taken;
+  const std::string kept = KeptMemory::name_for(environment.instance);
+  if (const auto range = range_of_memory(environment.pool.name(), kept);
+      range && std::ranges::any_of(declared_, &DeclaredArea::is_kept)) {
+    taken.push_back({.settings = nullptr,
+                     .by = fmt::format("the retain variables of the instance, memory '{}' of the pool", kept),
+                     .range = *range});
+  }
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    const AreaSettings* const settings = plan_.blocks[i].settings;
+    if (settings == nullptr) continue;
+    const auto range = settings->object.empty() ? blocks_[i].memory.range()
+                                                : range_of_memory(environment.pool.name(), settings->object);
+    if (!range) continue;
+    for (const Taken& other : taken) {
+      if (other.settings == settings || !range->overlaps(other.range)) continue;
+      return failure(
+          ErrorCode::invalid_argument,
+          fmt::format("{}: [SysMem] Area.{}: {} is the same file as that of {}, and they overlap; each "
+                      "needs bytes of its own",
+                      settings->where, settings->number,
+                      settings->object.empty() ? settings->device : settings->object, other.by));
+    }
+    taken.push_back({.settings = settings,
+                     .by = fmt::format("Area.{} of {}", settings->number, settings->where),
+                     .range = *range});
+  }
+  return {};
 }
 
 // Several areas of a block are one image: a task sees all of them as they were at one time.

@@ -111,7 +111,9 @@ std::unexpected<Error> unknown_key(std::string_view section, std::string_view na
   for (const SettingKey& key : all_setting_keys()) {
     if (key.section != table_section(section) || std::holds_alternative<UnusedSetting>(key.value)) continue;
     names.push_back(key.name);
-    allowed.push_back(written_name(key));
+    const auto* const numbered = std::get_if<NumberedSetting>(&key.value);
+    allowed.push_back(written_name(key) +
+                      (numbered != nullptr ? fmt::format(" (N 0 to {})", numbered->highest) : ""));
   }
   const std::string_view nearest = nearest_name(without_platform(shown(name)), names);
   const auto meant = std::ranges::find(names, nearest) - names.begin();

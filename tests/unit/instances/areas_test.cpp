@@ -3,7 +3,10 @@
 
 #include <array>
 #include <chrono>
+#include <cstdio>
+#include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -19,6 +22,18 @@ namespace plchost {
 namespace {
 
 using ::testing::HasSubstr;
+
+bool is_mapped_from(const void* address, const std::string& file) {
+  std::ifstream maps("/proc/self/maps");
+  for (std::string line; std::getline(maps, line);) {
+    std::uintptr_t begin = 0;
+    std::uintptr_t end = 0;
+    if (std::sscanf(line.c_str(), "%lx-%lx", &begin, &end) != 2) continue;
+    const auto at = reinterpret_cast<std::uintptr_t>(address);
+    if (at >= begin && at < end) return line.contains(file);
+  }
+  return false;
+}
 
 class AreasUnderTest : public ::testing::Test {
  protected:
@@ -213,6 +228,124 @@ TEST_F(AreasUnderTest, SayHowTheyAre) {
   state.dwSize = 1;
   EXPECT_EQ(sut.state(kept, state), ERR_PARAMETER);
   EXPECT_EQ(sut.state(RTS_INVALID_HANDLE, state), ERR_PARAMETER);
+}
+
+/// Areas in files.
+class AreasInFiles : public AreasUnderTest {
+ protected:
+  AreasInFiles() {
+    std::filesystem::create_directories(folder_);
+    std::ofstream(file_) << std::string(8192, 'x');
+    task("Main", [] {});
+  }
+  ~AreasInFiles() override { std::filesystem::remove_all(folder_); }
+  static std::string area(int number, const char* flags, const std::string& where) {
+    return fmt::format("Linux.Area.{0}.Flags={1}\nLinux.Area.{0}.Size=0x1000\nLinux.Area.{0}.{2}\n", number,
+                       flags, where);
+  }
+  static std::string device(int number, const char* flags, const std::string& path, unsigned address = 0) {
+    return area(number, flags, fmt::format("Device={}\nLinux.Area.{}.Address={:#x}", path, number, address));
+  }
+  void expect_overlap(const std::string& settings, const std::string& with) {
+    const auto placed = place("[SysMem]\n" + settings);
+    ASSERT_FALSE(placed);
+    EXPECT_THAT(placed.error().message, ::testing::AllOf(HasSubstr("l.cfg:6: [SysMem] Area.1"),
+                                                         HasSubstr("same file"), HasSubstr(with)));
+  }
+  std::string folder_ = ::testing::TempDir() + pool_;
+  std::string file_ = folder_ + "/registers";
+};
+
+TEST_F(AreasInFiles, ThatLieOnEachOtherThroughASymbolicLinkAreRefused) {
+  std::filesystem::create_symlink(file_, folder_ + "/link");
+  declare("data", PLC_AREA_DATA, 8);
+  declare("memory", PLC_AREA_MEMORY, 8);
+  expect_overlap(device(0, "1", file_) + device(1, "0x10", folder_ + "/link"), "Area.0 of l.cfg:2");
+}
+
+TEST_F(AreasInFiles, ThatLieOnEachOtherThroughAHardLinkAreRefused) {
+  std::filesystem::create_hard_link(file_, folder_ + "/link");
+  declare("data", PLC_AREA_DATA, 8);
+  declare("memory", PLC_AREA_MEMORY, 8);
+  expect_overlap(device(0, "1", file_) + device(1, "0x10", folder_ + "/link", 0xff8), "Area.0 of l.cfg:2");
+}
+
+TEST_F(AreasInFiles, ThatLieBesideEachOtherInOneFileAreNot) {
+  std::filesystem::create_hard_link(file_, folder_ + "/link");
+  declare("data", PLC_AREA_DATA, 8);
+  declare("memory", PLC_AREA_MEMORY, 8);
+  EXPECT_TRUE(place("[SysMem]\n" + device(0, "1", file_) + device(1, "0x10", folder_ + "/link", 0x1000)));
+}
+
+TEST_F(AreasInFiles, AnObjectGivenAsADeviceTooIsRefused) {
+  declare("data", PLC_AREA_DATA, 8);
+  declare("memory", PLC_AREA_MEMORY, 8);
+  const auto settings = device(1, "1", "/dev/shm/" + pool_memory_name(pool_, "registers"));
+  ASSERT_TRUE(shared_.create_memory("registers", 0x1000, {.keep = true}));
+  const auto placed = place("[SysMem]\n" + area(0, "0x10", "Object=registers") + settings);
+  ASSERT_FALSE(placed);
+  EXPECT_THAT(placed.error().message, ::testing::AllOf(HasSubstr("same file"), HasSubstr("l.cfg:")));
+}
+
+TEST_F(AreasInFiles, TheRetainVariablesOfTheInstanceAreNoDevice) {
+  std::filesystem::create_directories(folder_);
+  ASSERT_TRUE(shared_.create_memory("line1.retain", 0x2000, {.keep = true}));
+  declare("kept", PLC_AREA_RETAIN, 8);
+  declare("data", PLC_AREA_DATA, 8);
+  const auto placed =
+      place("[SysMem]\n" + device(0, "1", "/dev/shm/" + pool_memory_name(pool_, "line1.retain")));
+  ASSERT_FALSE(placed);
+  EXPECT_THAT(placed.error().message, HasSubstr("the retain variables"));
+}
+
+TEST_F(AreasInFiles, OfAllKindsMayLieInOneFileOneBehindTheOther) {
+  void* data = nullptr;
+  void* input = nullptr;
+  void* output = nullptr;
+  declare("data", PLC_AREA_DATA, 8, {}, &data);
+  declare("out", PLC_AREA_OUTPUT, 12, {}, &output);
+  declare("in", PLC_AREA_INPUT, 8, {}, &input);
+  tasks.clear();
+  task("Main", [&] { std::memcpy(output, input, 8); });
+  const auto placed = place("[SysMem]\n" + device(0, "0x0EFF", file_));
+  ASSERT_TRUE(placed) << placed.error().describe();
+  ASSERT_TRUE(data != nullptr && output != nullptr && input != nullptr);
+  std::memcpy(data, "data....", 8);
+  std::fstream(file_).seekp(24).write("12345678", 8);
+  tasks[0].entry();
+  std::string bytes(40, '\0');
+  std::ifstream(file_).read(bytes.data(), 40);
+  EXPECT_EQ(bytes.substr(0, 16), "data....12345678");
+  EXPECT_EQ(bytes.substr(20, 20), "xxxx12345678xxxxxxxx") << "nothing else is written";
+}
+
+// The one character device of every host that can be mapped: as firmware's registers are, if there were any
+// here.
+TEST_F(AreasInFiles, InACharacterDeviceAreMappedFromIt) {
+  void* data = nullptr;
+  void* input = nullptr;
+  void* output = nullptr;
+  const std::array<unsigned char, 8> initial{1, 2, 3, 4, 5, 6, 7, 8};
+  declare("data", PLC_AREA_DATA, 8, {}, &data, initial.data());
+  declare("in", PLC_AREA_INPUT, 8, {}, &input, initial.data());
+  declare("out", PLC_AREA_OUTPUT, 8, {}, &output);
+  tasks.clear();
+  task("Main", [&] { std::memset(output, 0x5a, 8); });
+  const auto placed = place("[SysMem]\n" + device(0, "0xf", "/dev/zero"));
+  ASSERT_TRUE(placed) << placed.error().describe();
+  ASSERT_TRUE(data != nullptr && input != nullptr && output != nullptr);
+  EXPECT_TRUE(is_mapped_from(data, "/dev/zero")) << "and no memory of the process";
+  EXPECT_EQ(*static_cast<std::uint64_t*>(data), 0U) << "what is in a device stays";
+  EXPECT_EQ(std::memcmp(input, initial.data(), 8), 0);
+  tasks[0].entry();
+  EXPECT_EQ(*static_cast<std::uint64_t*>(input), 0U) << "inputs are read from it at the start of a cycle";
+}
+
+TEST_F(AreasInFiles, ACharacterDeviceThatCannotBeMappedIsRefusedWithTheLine) {
+  declare("data", PLC_AREA_DATA, 8);
+  const auto placed = place("[SysMem]\n" + device(0, "1", "/dev/null"));
+  ASSERT_FALSE(placed);
+  EXPECT_THAT(placed.error().message, ::testing::AllOf(HasSubstr("l.cfg:2"), HasSubstr("/dev/null")));
 }
 
 }  // namespace

@@ -94,7 +94,7 @@ TEST_F(MemoryFileTest, OpenDoesNotFollowALinkNorWaitAtAFifo) {
   EXPECT_FALSE(MemoryFile::open(name_.get(), 0, Access::read_write));
   MemoryFile::remove(name_.get());
   ASSERT_EQ(::mkfifo(path().c_str(), 0600), 0);
-  EXPECT_EQ(MemoryFile::open(name_.get(), 0, Access::read_only).error().code, ErrorCode::corrupt);
+  EXPECT_EQ(MemoryFile::open(name_.get(), 0, Access::read_only).error().code, ErrorCode::wrong_type);
 }
 
 TEST_F(MemoryFileTest, SaysThatThereIsNoRoom) {

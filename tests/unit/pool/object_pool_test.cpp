@@ -1,11 +1,14 @@
 #include "shm/pool/object_pool.hpp"
 
 #include <chrono>
+#include <filesystem>
 #include <set>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include <gmock/gmock.h>
+#include <sys/stat.h>
 
 #include "shm/pool/memory_file.hpp"
 #include "tests/unit/pool/unique_pool_name.hpp"
@@ -121,6 +124,25 @@ TEST_F(ObjectPoolTest, AnEmptyHandleIsNotValid) {
   EXPECT_EQ(sut.post(), PostResult::not_registered);
   EXPECT_FALSE(sut.set_registered(true));
   EXPECT_FALSE(sut.set_bound_tasks(1));
+}
+
+TEST_F(ObjectPoolTest, WhatIsNoPlainFileIsNamedAndLeftAlone) {
+  const UniquePoolName fifo;
+  const UniquePoolName folder;
+  ASSERT_EQ(::mkfifo(("/dev/shm/" + fifo.get()).c_str(), 0600), 0);
+  ASSERT_EQ(::mkdir(("/dev/shm/" + folder.get()).c_str(), 0700), 0);
+  for (const auto& [name, kind] :
+       {std::pair(fifo.get(), "is a FIFO"), std::pair(folder.get(), "is a folder")}) {
+    const auto expect_refused = [&kind = kind](const Result<ObjectPool>& sut) {
+      ASSERT_FALSE(sut);
+      EXPECT_EQ(sut.error().code, ErrorCode::wrong_type);
+      EXPECT_THAT(sut.error().message, HasSubstr(kind));
+    };
+    expect_refused(ObjectPool::create(name));
+    expect_refused(ObjectPool::attach(name));
+    expect_refused(ObjectPool::attach(name, MemoryFile::Access::read_only));
+    EXPECT_TRUE(std::filesystem::remove("/dev/shm/" + name)) << "it is still there";
+  }
 }
 
 TEST_F(ObjectPoolTest, ListsWhatIsRegisteredOrBound) {

@@ -319,6 +319,25 @@ TEST_F(OtherUsers, MayReadWhereTheModeSaysSo) {
   }));
 }
 
+TEST_F(OtherUsers, MakeObjectsOfAllTypesForGroupsThatTheyAreInAndForNoOthers) {
+  const auto pool = create(0666);
+  constexpr gid_t kNobodys = 65534;
+  EXPECT_TRUE(holds_for_a_stranger([&] {
+    auto sut = ObjectPool::attach(name_.get());
+    if (!sut) return false;
+    const auto memory = sut->create_memory("m", 10);
+    const auto event = sut->create_shared_event("e");
+    return memory && event && sut->look_at("m")->group == kNobodys && sut->look_at("e")->group == kNobodys;
+  })) << "not being in the pool's group, for their own";
+  EXPECT_TRUE(holds_for_a_stranger([&] {
+    auto sut = ObjectPool::attach(name_.get());
+    const ObjectOptions of_root{.group = 0};
+    return sut && sut->create_memory("m", 10, of_root).error().code == ErrorCode::refused &&
+           sut->create_shared_event("e", of_root).error().code == ErrorCode::refused &&
+           sut->create_mutex("x", of_root).error().code == ErrorCode::refused;
+  }));
+}
+
 TEST_F(OtherUsers, AreKeptFromObjectsThatAreNotForThem) {
   auto pool = create(0666);
   const auto memory = pool.create_memory("m", 10, {.mode = 0664});
