@@ -34,6 +34,10 @@ std::vector<std::string> ApiServer::arguments() const {
                                         host.run_directory,
                                         "--interface",
                                         config_.dds.interface,
+                                        "--blocks-base",
+                                        config_.blocks.base,
+                                        "--host-number",
+                                        fmt::format("{}", config_.blocks.host_number),
                                         "--log-level",
                                         host.log_level};
   for (const std::string& peer : config_.dds.peers) {

@@ -48,6 +48,13 @@ Qos presence_qos() {
   return qos;
 }
 
+// Never waits: how much may be under way is the business of BlockWindow.
+Qos block_qos() {
+  Qos qos;
+  qos.reliable(Duration::zero()).keep_all();
+  return qos;
+}
+
 Qos transition_qos() {
   Qos qos;
   qos.reliable(kServerBlocking).keep_last(kTransitionDepth).transient_local().no_autodispose();
@@ -60,6 +67,10 @@ std::string host_partition(std::string_view host) {
 
 std::string client_partition(std::string_view guid_hex) {
   return fmt::format("c.{}", guid_hex);
+}
+
+std::string block_partition(std::uint16_t host_number) {
+  return fmt::format("b.{}", host_number);
 }
 
 Result<Entity> make_topic(dds_entity_t participant, const TopicInfo& topic) {

@@ -33,6 +33,9 @@ inline constexpr TopicInfo kEventStatus{"plc/v1/status/event", &plc_EventStatus_
 inline constexpr TopicInfo kObjectStatus{"plc/v1/status/object", &plc_ObjectStatus_desc};
 inline constexpr TopicInfo kObjectPage{"plc/v1/objects", &plc_ObjectPage_desc};
 inline constexpr TopicInfo kNodePage{"plc/v1/nodes", &plc_NodePage_desc};
+inline constexpr TopicInfo kBlockHostStatus{"plc/v1/status/block_host", &plc_BlockHostStatus_desc};
+inline constexpr TopicInfo kBlock{"plc/v1/blocks", &plc_Block_desc};
+inline constexpr TopicInfo kBlockAck{"plc/v1/block_ack", &plc_BlockAck_desc};
 inline constexpr TopicInfo kHostFinding{"plc/v1/status/host_finding", &plc_HostFinding_desc};
 inline constexpr TopicInfo kExceptionStatus{"plc/v1/status/exception", &plc_ExceptionStatus_desc};
 inline constexpr TopicInfo kTransition{"plc/v1/transition", &plc_Transition_desc};
@@ -41,6 +44,7 @@ inline constexpr TopicInfo kTransition{"plc/v1/transition", &plc_Transition_desc
 /// loss.
 inline constexpr std::int32_t kRequestReaderDepth = 256;
 inline constexpr std::int32_t kEventReaderDepth = 4096;
+inline constexpr std::int32_t kBlockReaderDepth = 1024;
 inline constexpr std::int32_t kReplyDepth = 16;
 inline constexpr std::int32_t kPageDepth = 4;         ///< of objects, and of nodes
 inline constexpr std::int32_t kTransitionDepth = 64;  ///< of each instance; as many as its ring holds
@@ -62,11 +66,14 @@ inline constexpr Duration kPresenceDeadline = std::chrono::milliseconds(100);
 [[nodiscard]] Qos status_qos();
 [[nodiscard]] Qos presence_qos();
 [[nodiscard]] Qos transition_qos();
+[[nodiscard]] Qos block_qos();
 
 /// Where requests and posts for one host go, and where replies for one client (its participant's GUID in hex)
 /// go.
 [[nodiscard]] std::string host_partition(std::string_view host);
 [[nodiscard]] std::string client_partition(std::string_view guid_hex);
+/// Where blocks for the host of that number go, and acknowledgements of its blocks.
+[[nodiscard]] std::string block_partition(std::uint16_t host_number);
 
 [[nodiscard]] Result<Entity> make_topic(dds_entity_t participant, const TopicInfo& topic);
 /// `parent`: a participant, or a publisher or subscriber that carries the partition.

@@ -18,7 +18,9 @@ struct ServerOptions {
   std::string pool;
   std::string run_directory;
   dds::DomainOptions dds;
-  std::string blocks_base = std::string(kDefaultBlockBase);  ///< of the nodes that are listed
+  std::string blocks_base =
+      std::string(kDefaultBlockBase);  ///< of the nodes that are listed, and the gateway
+  std::uint16_t host_number = 0;       ///< for other hosts; 0: no gateway
 };
 
 /// The server's end of the DDS API. Posts are done in DDS's receiving thread (on_event_post); everything else

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "api/dds/entity.hpp"
+#include "api/gateway/gateway_thread.hpp"
 #include "api/server/control_server.hpp"
 #include "api/server/event_intake.hpp"
 #include "api/server/manager_link.hpp"
@@ -41,6 +42,7 @@ struct ControlServer::Parts {
   Result<void> enter_domain();
   Result<void> make_readers();
   Result<void> listen();
+  Result<void> open_gateway();
   Result<void> run();
   Result<bool> dispatch(int fd);
   void on_wake();
@@ -80,6 +82,7 @@ struct ControlServer::Parts {
   dds::Entity event_topic;
   dds::Entity event_reader;
   std::array<RequestReader, 2> requests;
+  std::unique_ptr<GatewayThread> gateway;  // of a host that has a number
 };
 
 /// Signals an event descriptor. Any thread.

@@ -13,6 +13,7 @@
 #include "api/server/control_server_parts.hpp"
 #include "shm/base/log.hpp"
 #include "shm/base/system_call.hpp"
+#include "shm/pool/host_page.hpp"
 
 namespace plchost {
 
@@ -63,8 +64,24 @@ Result<void> ControlServer::Parts::open(PostLedger ledger) {
   status->tick(MonotonicClock::now());
   if (auto made = make_readers(); !made) return made;
   if (auto listening = listen(); !listening) return listening;
+  if (auto opened = open_gateway(); !opened) return opened;
   status->write_presence();
   ask_for_findings();
+  return {};
+}
+
+Result<void> ControlServer::Parts::open_gateway() {
+  if (options.host_number == 0) return {};
+  const auto page = HostPageReader::open(options.pool);
+  const auto host = page ? page->host() : std::nullopt;
+  auto started = GatewayThread::start(participant.get(), {.pool = options.pool,
+                                                          .base = options.blocks_base,
+                                                          .host = options.host,
+                                                          .number = options.host_number,
+                                                          .since_ns = host ? host->started_unix_ns : 0,
+                                                          .epoch = epoch});
+  if (!started) return std::unexpected(std::move(started).error());
+  gateway = *std::move(started);
   return {};
 }
 

@@ -29,6 +29,9 @@ int main(int argc, char** argv) {
   app.add_option("--run-directory", options.run_directory, "where the manager's socket is")->required();
   app.add_option("--interface", options.dds.interfaces, "network interfaces (default: lo)");
   app.add_option("--peer", options.dds.peers, "addresses to announce this host to");
+  app.add_option("--host-number", options.host_number,
+                 "number of this host for blocks between hosts; 0: none")
+      ->check(CLI::Range(std::uint16_t{0}, plchost::kMaxHostNumber));
   app.add_option("--blocks-base", options.blocks_base, "base name of the nodes that send blocks");
   app.add_option("--log-level", log_level, "trace, debug, info, warning or error")
       ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error"}));

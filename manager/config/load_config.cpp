@@ -40,6 +40,7 @@ struct Loader {
   void read_pool_rights(SectionReader& reader);
   void read_cores(SectionReader& reader);
   void read_dds(const TomlTable& table, unsigned line);
+  void read_blocks(const TomlTable& table, unsigned line);
   void read_instances(const TomlValue& value);
   void read_instance(const TomlTable& table, unsigned line);
   void read_restart(SectionReader& reader, InstanceConfig& instance);
@@ -62,18 +63,20 @@ const TomlTable* Loader::section(const TomlTable& root, std::string_view name) {
 }
 
 void Loader::read(const TomlTable& root) {
-  constexpr std::array kSections = {"host"sv, "dds"sv, "instance"sv};
+  constexpr std::array kSections = {"host"sv, "dds"sv, "blocks"sv, "instance"sv};
   for (const auto& [key, value] : root) {
     if (std::ranges::find(kSections, std::string_view(key)) != kSections.end()) continue;
     constexpr std::size_t kShown = 80;
     problems.push_back({value.line, fmt::format("unknown section or key '{}'; allowed are [host], [dds], "
-                                                "[[instance]]{}",
+                                                "[blocks], [[instance]]{}",
                                                 key.substr(0, kShown), suggestion(key, kSections))});
   }
   const TomlTable none;
   const TomlTable* host = section(root, "host");
   read_host(host != nullptr ? *host : none, host != nullptr ? root.find("host")->second.line : 0);
   if (const TomlTable* dds = section(root, "dds")) read_dds(*dds, root.find("dds")->second.line);
+  if (const TomlTable* blocks = section(root, "blocks"))
+    read_blocks(*blocks, root.find("blocks")->second.line);
   if (const auto found = root.find("instance"); found != root.end()) read_instances(found->second);
 }
 
@@ -183,6 +186,21 @@ void Loader::read_dds(const TomlTable& table, unsigned line) {
   reader.refuse_unknown_keys();
 }
 
+// After [dds], which it needs.
+void Loader::read_blocks(const TomlTable& table, unsigned line) {
+  SectionReader reader(table, line, "[blocks]", problems);
+  BlocksConfig& blocks = config.blocks;
+  std::int64_t number = 0;
+  reader.number("host_number", 0, kMaxHostNumber, number);
+  blocks.host_number = static_cast<std::uint16_t>(number);
+  reader.text("base", blocks.base);
+  check_name_of(reader, "base", blocks.base, kMaxBlockBase);
+  if (number != 0 && !config.dds.enabled) {
+    reader.problem("host_number", "needs [dds] enabled = true: blocks go to other hosts over DDS");
+  }
+  reader.refuse_unknown_keys();
+}
+
 void Loader::read_instances(const TomlValue& value) {
   const auto* array = std::get_if<TomlArray>(&value.value);
   if (array == nullptr) {
@@ -230,6 +248,9 @@ void Loader::read_instance(const TomlTable& table, unsigned line) {
   }
   if (instance.name == "manager") {
     reader.problem("name", "'manager' is taken by the manager's own control socket");
+  }
+  if (instance.name == "gateway" && config.blocks.host_number != 0) {
+    reader.problem("name", "'gateway' is taken by the node that blocks for other hosts go through");
   }
   if (!reader.has("core")) reader.problem("core", "is missing; say which core it runs on");
   lines.push_back({reader.line_of("name"), reader.line_of("core"), reader.line_of("after")});

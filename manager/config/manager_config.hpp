@@ -8,6 +8,7 @@
 #include <sys/types.h>
 
 #include "shm/base/time.hpp"
+#include "shm/block_driver/node_directory.hpp"
 
 namespace plchost {
 
@@ -42,6 +43,12 @@ struct DdsConfig {
   std::vector<std::string> peers;  ///< addresses asked for other hosts where there is no multicast
 };
 
+/// [blocks]: blocks between instances, and to those of other hosts.
+struct BlocksConfig {
+  std::uint16_t host_number = 0;  ///< how other hosts call this one; 0: no blocks to and from other hosts
+  std::string base = std::string(kDefaultBlockBase);  ///< of the nodes that other hosts reach
+};
+
 /// One [[instance]]. Paths are absolute here, whatever the file said.
 struct InstanceConfig {
   std::string name;
@@ -63,6 +70,7 @@ struct InstanceConfig {
 struct ManagerConfig {
   HostConfig host;
   DdsConfig dds;
+  BlocksConfig blocks;
   std::vector<InstanceConfig> instances;
 };
 

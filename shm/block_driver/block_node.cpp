@@ -32,7 +32,7 @@ Result<void> check_channel_name(std::string_view name) {
 }
 
 BlockNode::BlockNode(NodeOptions options, NodeDirectory directory, const NodeLife& life)
-    : options_(std::move(options)), directory_(std::move(directory)), life_(life) {}
+    : options_(std::move(options)), directory_(std::move(directory)), life_(life), entry_(options_.entry) {}
 
 BlockNode::~BlockNode() {
   directory_.leave(life_);
@@ -54,7 +54,8 @@ Result<std::unique_ptr<BlockNode>> BlockNode::join(const NodeOptions& options) {
 }
 
 bool BlockNode::is_local(NodeAddress address) const noexcept {
-  return address.host == 0 || address.host == directory_.layout().host_number.load(std::memory_order_relaxed);
+  return address.host == 0 || address.host == NodeAddress::kAllHosts ||
+         address.host == directory_.layout().host_number.load(std::memory_order_relaxed);
 }
 
 bool BlockNode::is_for_us(NodeAddress address) const noexcept {
@@ -164,7 +165,8 @@ TakeResult BlockNode::receive(std::uint32_t channel, std::span<std::byte> buffer
 }
 
 SendResult BlockNode::inject(BlockHeader header, std::span<const std::byte> contents) noexcept {
-  if (!is_sane(header) || contents.size() > kMaxBlockSize || header.hosts >= kMaxHops) {
+  if (!is_sane(header) || contents.size() > kMaxBlockSize || header.hosts >= kMaxHops ||
+      is_local(NodeAddress::from_number(header.source))) {
     return SendResult::invalid;
   }
   // From here on it is a block of this host that came in at this node.
@@ -175,6 +177,23 @@ SendResult BlockNode::inject(BlockHeader header, std::span<const std::byte> cont
   header.hops = 1;
   header.path = {static_cast<std::uint8_t>(life_.node)};
   return put(header, contents);
+}
+
+void BlockNode::set_hosts(std::vector<HostRange> hosts) {
+  {
+    const std::scoped_lock lock(entry_mutex_);
+    entry_.hosts = std::move(hosts);
+  }
+  keep_record();
+}
+
+// What a stranger has changed is written again.
+void BlockNode::keep_record() {
+  const std::scoped_lock lock(entry_mutex_);
+  directory_.keep(life_, entry_);
+  if (options_.host_number != 0) {
+    directory_.layout().host_number.store(options_.host_number, std::memory_order_relaxed);
+  }
 }
 
 Result<std::uint32_t> BlockNode::open_channel(std::string_view name) {

@@ -19,8 +19,20 @@
 
 namespace plchost {
 
-/// Takes a block that is for another host; false: it cannot now. Called by the router's thread.
-using RemoteSink = std::function<bool(const BlockHeader&, std::span<const std::byte>)>;
+enum class SendResult : std::uint8_t {
+  sent,         ///< it lies in the queue of the next node
+  congested,    ///< that queue is full; nothing was sent
+  connecting,   ///< the link to the next node is being made: again in the next cycle
+  unreachable,  ///< nobody has that address, or no way leads there
+  invalid,      ///< no such address, or larger than kMaxBlockSize
+};
+
+/// Takes a block that is for another host, or for all of them; anything but `sent`: it has not. Called by the
+/// router's thread.
+using RemoteSink = std::function<SendResult(const BlockHeader&, std::span<const std::byte>)>;
+/// Whether a block of so many slots for that address could be taken now. If not it stays where it is, and its
+/// sender meets congestion. Called by the router's thread.
+using RemoteRoom = std::function<bool(NodeAddress to, std::uint32_t slots)>;
 
 /// The longest name of a channel, bytes.
 inline constexpr std::size_t kMaxChannelName = 63;
@@ -34,15 +46,8 @@ struct NodeOptions {
   std::uint8_t hop_limit = kMaxHops;         ///< 1 to kMaxHops
   Duration hold = std::chrono::seconds(1);   ///< what nobody takes is dropped after that time
   std::uint16_t host_number = 0;             ///< a gateway's: how other hosts call this one; 0: it is none
-  RemoteSink remote = {};                    ///< a gateway's: where blocks for entry.hosts go
-};
-
-enum class SendResult : std::uint8_t {
-  sent,         ///< it lies in the queue of the next node
-  congested,    ///< that queue is full; nothing was sent
-  connecting,   ///< the link to the next node is being made: again in the next cycle
-  unreachable,  ///< nobody has that address, or no way leads there
-  invalid,      ///< no such address, or larger than kMaxBlockSize
+  RemoteSink remote = {};                    ///< a gateway's: where blocks for other hosts go
+  RemoteRoom remote_room = {};               ///< a gateway's; none: there always is
 };
 
 /// Of a block, what its sender says.
@@ -76,8 +81,17 @@ class BlockNode {
 
   /// Real-time. Also asks for the link to it. Node 0: there is nobody of that name on this host.
   [[nodiscard]] NodeAddress find(std::string_view name) noexcept;
-  /// A block that another host sent, at the gateway that got it. Any thread.
+  /// A block that another host sent, at the gateway that got it. invalid: also one that says that it is of
+  /// this host. Any thread.
   SendResult inject(BlockHeader header, std::span<const std::byte> contents) noexcept;
+
+  /// A gateway's: the other hosts that are reached at present, at most kMaxHostRanges; the senders of blocks
+  /// for others are told that they are unreachable. Soft threads.
+  void set_hosts(std::vector<HostRange> hosts);
+  /// What the node counts, besides what its links do.
+  [[nodiscard]] NodeCounters& counters() noexcept { return own_slot().counters; }
+  /// Its directory was cut short by a stranger. Any context.
+  [[nodiscard]] bool lost() const noexcept { return directory_.lost(); }
 
   /// The number of a channel of this node, which is then in use until the node goes. already_exists: a
   /// channel of another name has the same number. Set-up.
@@ -103,6 +117,7 @@ class BlockNode {
   SendResult put_to(std::uint16_t node, const BlockHeader& header,
                     std::span<const std::byte> contents) noexcept;
   void want_link(std::uint16_t node) noexcept;
+  void keep_record();
 
   const NodeOptions options_;
   NodeDirectory directory_;
@@ -117,6 +132,8 @@ class BlockNode {
   std::array<std::atomic<std::uint32_t>, kBlockPriorities> sequences_{};
   std::atomic<std::uint32_t> correlations_{1};
   std::atomic<std::uint32_t> turn_{0};  // which link is looked at first
+  std::mutex entry_mutex_;              // soft threads only
+  NodeEntry entry_;                     // as it is now
   std::mutex channels_mutex_;           // set-up only
   std::map<std::uint32_t, std::string> channels_;
 };

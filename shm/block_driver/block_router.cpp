@@ -9,7 +9,6 @@ namespace {
 // How soon to look again after a block that had to stay where it is, because the next queue is full.
 constexpr Duration kRetry = std::chrono::milliseconds(1);
 constexpr Duration kLongestPeriod = std::chrono::milliseconds(100);
-constexpr std::uint16_t kAllHosts = 0xffff;
 
 void count_in(std::atomic<std::uint64_t>& counter) noexcept {
   counter.fetch_add(1, std::memory_order_relaxed);
@@ -79,7 +78,10 @@ bool BlockRouter::relay() {
 
 // A block for a node whose queue is full stays where it is, so that its sender is the one who feels it.
 bool BlockRouter::can_take(const BlockTag& tag, std::size_t priority, std::uint32_t slots) {
-  if (tag.destination.to_all() || is_gateway_for(tag.destination)) return true;
+  if (is_gateway_for(tag.destination)) {
+    return !node_.options_.remote_room || node_.options_.remote_room(tag.destination, slots);
+  }
+  if (tag.destination.to_all()) return true;
   const std::uint16_t hop = tag.destination.valid() ? node_.next_hop(tag.destination) : std::uint16_t{0};
   if (hop == 0 || hop > kMaxNodes || hop == node_.life_.node) return true;  // to be dropped
   if (OutLink* const link = node_.out_[hop - 1U].get()) {
@@ -89,15 +91,12 @@ bool BlockRouter::can_take(const BlockTag& tag, std::size_t priority, std::uint3
 }
 
 bool BlockRouter::is_gateway_for(NodeAddress address) const noexcept {
-  if (!node_.options_.remote || node_.is_local(address)) return false;
-  return std::ranges::any_of(node_.options_.entry.hosts, [&](const HostRange& hosts) {
-    return address.host >= hosts.first && address.host <= hosts.last;
-  });
+  return node_.options_.remote && address.valid() && !node_.is_local(address);
 }
 
 void BlockRouter::handle(const BlockHeader& header, std::span<const std::byte> contents) {
   const NodeAddress to = NodeAddress::from_number(header.destination);
-  if (to.to_all() && (node_.is_local(to) || to.host == kAllHosts)) {
+  if (to.to_all() && node_.is_local(to)) {
     spread(header, contents);
   } else if (is_gateway_for(to)) {
     give_to_remote(header, contents);
@@ -152,7 +151,7 @@ void BlockRouter::spread(const BlockHeader& header, std::span<const std::byte> c
     if (!own) count_in(counters().forwarded);
   }
   const NodeAddress to = NodeAddress::from_number(header.destination);
-  if (to.host == kAllHosts && node_.options_.remote && node_.is_local(source))
+  if (to.host == NodeAddress::kAllHosts && node_.options_.remote && node_.is_local(source))
     give_to_remote(header, contents);
 }
 
@@ -169,15 +168,20 @@ void BlockRouter::give_to(std::uint16_t node, const BlockHeader& header,
 void BlockRouter::give_to_remote(BlockHeader header, std::span<const std::byte> contents) {
   NodeAddress source = NodeAddress::from_number(header.source);
   // Elsewhere, "this host" is another one.
-  if (source.host == 0) {
-    source.host =
-        static_cast<std::uint16_t>(node_.directory_.layout().host_number.load(std::memory_order_relaxed));
-  }
+  if (source.host == 0) source.host = node_.options_.host_number;
   header.source = source.number();
-  if (node_.options_.remote(header, contents)) {
-    count_in(counters().forwarded);
-  } else {
-    count_in(counters().congested);
+  switch (node_.options_.remote(header, contents)) {
+    case SendResult::sent:
+      count_in(counters().forwarded);
+      break;
+    case SendResult::congested:
+    case SendResult::connecting:
+      count_in(counters().congested);
+      break;
+    case SendResult::unreachable:
+    case SendResult::invalid:
+      count_in(counters().no_route);
+      break;
   }
 }
 

@@ -35,9 +35,9 @@ std::optional<NodeAddress> parse_node_address(std::string_view text) {
     return address;
   }
   const auto node = number_in(text);
-  if (!node || *node == 0 || *node > kMaxNodes) return std::nullopt;
+  if (!node) return std::nullopt;
   address.node = *node;
-  return address;
+  return !address.to_all() && address.valid() ? std::optional(address) : std::nullopt;
 }
 
 }  // namespace plchost

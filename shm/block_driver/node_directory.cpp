@@ -209,6 +209,12 @@ NodeRecord record_of(const NodeEntry& entry, std::uint32_t generation) {
   return record;
 }
 
+bool is_same(const NodeRecord& one, const NodeRecord& other) {
+  return one.name.view() == other.name.view() && one.pid == other.pid && one.generation == other.generation &&
+         one.forwards == other.forwards && one.queue_slots == other.queue_slots &&
+         one.process_start == other.process_start && one.hosts == other.hosts;
+}
+
 }  // namespace
 
 Result<NodeLife> NodeDirectory::join(const NodeEntry& entry) {
@@ -248,14 +254,14 @@ void NodeDirectory::leave(const NodeLife& life) {
 }
 
 void NodeDirectory::keep(const NodeLife& life, const NodeEntry& entry) {
+  const NodeRecord wanted = record_of(entry, life.generation);
   const auto is_ours = [&](const std::optional<NodeRecord>& owner) {
-    return owner && owner->pid == ::getpid() && owner->generation == life.generation &&
-           owner->name.view() == entry.name;
+    return owner && is_same(*owner, wanted);
   };
   if (is_ours(record(life.node))) return;
   const auto lock = DirectoryLock::acquire(directory_name(pool_, base_));
   if (!lock || is_ours(record(life.node))) return;
-  write(life.node, record_of(entry, life.generation));
+  write(life.node, wanted);
   announce();
 }
 

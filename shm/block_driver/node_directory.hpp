@@ -45,7 +45,7 @@ class NodeDirectory {
   [[nodiscard]] Result<NodeLife> join(const NodeEntry& entry);
   /// Gives the address back.
   void leave(const NodeLife& life);
-  /// Writes the record of a node of this process again if a stranger has changed it.
+  /// Writes the record of a node of this process again if it is not what it should be.
   void keep(const NodeLife& life, const NodeEntry& entry);
   /// Takes the addresses from nodes whose processes have ended, and removes their links. How many it were.
   std::uint32_t reclaim();

@@ -31,7 +31,7 @@ void BlockRouter::tick(TimePoint now) {
           "the directory of the nodes was cut short by somebody: no other node is reached until this process "
           "is started again"});
   }
-  node_.directory_.keep(node_.life_, node_.options_.entry);
+  node_.keep_record();
   look_for_the_dead();
   if (ticks_ % kTicksPerAudit == 0) {
     refresh();

@@ -106,18 +106,20 @@ InstancePage TestHost::make_page(const std::string& instance, const std::string&
   return page;
 }
 
-void TestHost::start_server() {
+void TestHost::start_server(std::vector<std::string> more) {
+  more_arguments_ = std::move(more);
+  std::vector<std::string> arguments{"--host",      name_,      "--domain",        std::to_string(domain_),
+                                     "--pool",      pool_name_, "--run-directory", run_directory_,
+                                     "--interface", "lo",       "--log-level",     "warning"};
+  arguments.insert(arguments.end(), more_arguments_.begin(), more_arguments_.end());
   while (!std::filesystem::exists(run_directory_ + "/manager.sock")) ::usleep(1000);
-  server_ = std::make_unique<Child>(
-      PLCHOST_DDS_PROGRAM, std::vector<std::string>{"--host", name_, "--domain", std::to_string(domain_),
-                                                    "--pool", pool_name_, "--run-directory", run_directory_,
-                                                    "--interface", "lo", "--log-level", "warning"});
+  server_ = std::make_unique<Child>(PLCHOST_DDS_PROGRAM, arguments);
 }
 
 void TestHost::replace_server() {
   server_->signal(SIGKILL);
   server_->wait();
-  start_server();
+  start_server(more_arguments_);
 }
 
 std::vector<ControlRequest> TestHost::requests() {

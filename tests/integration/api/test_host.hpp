@@ -51,7 +51,8 @@ class TestHost {
   /// An instance page with one task, as the process `pid` would write it.
   InstancePage make_page(const std::string& instance, const std::string& task, std::int32_t pid);
 
-  void start_server();
+  /// `more`: arguments, also of those that replace it.
+  void start_server(std::vector<std::string> more = {});
   /// kill -9, and a new one, as the manager does it.
   void replace_server();
   [[nodiscard]] Child& server() { return *server_; }
@@ -87,6 +88,7 @@ class TestHost {
   ObjectPool pool_;
   HostPageWriter page_;
   std::vector<std::string> instances_;
+  std::vector<std::string> more_arguments_;
   ControlReply answer_;  // guarded by mutex_
   std::mutex mutex_;
   std::vector<HostFinding> findings_;

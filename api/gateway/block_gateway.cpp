@@ -1,0 +1,236 @@
+#include "api/gateway/block_gateway.hpp"
+
+#include <algorithm>
+
+#include "api/dds/error.hpp"
+#include "api/dds/samples.hpp"
+#include "api/dds/topics.hpp"
+#include "api/gateway/block_sample.hpp"
+#include "shm/base/log.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr Duration kRetryPending = std::chrono::milliseconds(1);
+constexpr std::size_t kMostWritersKnown = 1024;
+
+void wake_up(dds_entity_t /*reader*/, void* wake) {
+  static_cast<CountedEvent*>(wake)->post();
+}
+
+Result<void> listen(const dds::Entity& reader, CountedEvent& wake) {
+  dds_listener_t* const listener = dds_create_listener(&wake);
+  dds_lset_data_available(listener, wake_up);
+  const dds_return_t returned = dds_set_listener(reader.get(), listener);
+  dds_delete_listener(listener);
+  return dds::check_code(returned, "listen to a reader");
+}
+
+}  // namespace
+
+BlockGateway::BlockGateway(dds_entity_t participant, GatewayOptions options)
+    : participant_(participant),
+      options_(std::move(options)),
+      numbers_({.host = options_.host,
+                .number = options_.number,
+                .since_ns = options_.since_ns,
+                .epoch = options_.epoch,
+                .participant = {}}) {}
+
+BlockGateway::~BlockGateway() {
+  // First what calls others: listeners, then the router.
+  for (dds::Entity* const reader : {&host_reader_, &block_reader_, &ack_reader_}) reader->reset();
+  stop_.store(true, std::memory_order_release);
+  if (router_thread_.joinable()) router_->wake();
+  router_thread_.join();
+}
+
+Result<std::unique_ptr<BlockGateway>> BlockGateway::create(dds_entity_t participant, GatewayOptions options,
+                                                           CountedEvent& wake) {
+  std::unique_ptr<BlockGateway> gateway(new BlockGateway(participant, std::move(options)));
+  if (auto opened = gateway->open_node(); !opened) return failure_in("gateway", std::move(opened).error());
+  if (auto opened = gateway->open_topics(wake); !opened) {
+    return failure_in("gateway", std::move(opened).error());
+  }
+  gateway->announce();
+  return gateway;
+}
+
+Result<void> BlockGateway::open_node() {
+  NodeOptions options{.pool = options_.pool, .base = options_.base, .entry = {.name = kGatewayName}};
+  options.hold = options_.hold;
+  options.host_number = options_.number;
+  options.remote = [this](const BlockHeader& header, std::span<const std::byte> contents) {
+    return give(header, contents);
+  };
+  options.remote_room = [this](NodeAddress to, std::uint32_t slots) { return has_room(to, slots); };
+  auto node = BlockNode::join(options);
+  if (!node) return std::unexpected(std::move(node).error());
+  node_ = *std::move(node);
+  auto directory = NodeDirectory::open_to_read(options_.pool, options_.base);
+  if (!directory) return std::unexpected(std::move(directory).error());
+  directory_.emplace(*std::move(directory));
+  pending_.emplace([this](const BlockHeader& header,
+                          std::span<const std::byte> contents) { return node_->inject(header, contents); },
+                   options_.hold, node_->counters());
+  auto router = BlockRouter::create(*node_);
+  if (!router) return std::unexpected(std::move(router).error());
+  router_ = *std::move(router);
+  auto thread = Thread::start("blocks", {}, [this] { router_->run(stop_); });
+  if (!thread) return std::unexpected(std::move(thread).error());
+  router_thread_ = *std::move(thread);
+  return {};
+}
+
+Result<void> BlockGateway::open_topics(CountedEvent& wake) {
+  auto hosts = dds::make_topic(participant_, dds::kBlockHostStatus);
+  auto blocks = dds::make_topic(participant_, dds::kBlock);
+  auto acks = dds::make_topic(participant_, dds::kBlockAck);
+  auto subscriber = dds::make_subscriber(participant_, dds::block_partition(options_.number));
+  for (auto* const made : {&hosts, &blocks, &acks, &subscriber}) {
+    if (!*made) return std::unexpected(std::move(*made).error());
+  }
+  block_topic_ = *std::move(blocks);
+  ack_topic_ = *std::move(acks);
+  subscriber_ = *std::move(subscriber);
+  auto host_writer = dds::make_writer(participant_, hosts->get(), dds::status_qos());
+  auto host_reader = dds::make_reader(participant_, hosts->get(), dds::status_qos());
+  dds::Qos block_qos = dds::block_qos();
+  block_qos.max_samples(dds::kBlockReaderDepth);
+  auto block_reader = dds::make_reader(subscriber_.get(), block_topic_.get(), block_qos);
+  auto ack_reader = dds::make_reader(subscriber_.get(), ack_topic_.get(), dds::ack_qos());
+  topics_.push_back(*std::move(hosts));
+  for (auto* const made : {&host_writer, &host_reader, &block_reader, &ack_reader}) {
+    if (!*made) return std::unexpected(std::move(*made).error());
+  }
+  host_writer_ = *std::move(host_writer);
+  host_reader_ = *std::move(host_reader);
+  block_reader_ = *std::move(block_reader);
+  ack_reader_ = *std::move(ack_reader);
+  for (const dds::Entity* const reader : {&host_reader_, &block_reader_, &ack_reader_}) {
+    if (auto listening = listen(*reader, wake); !listening) return listening;
+  }
+  wake.post();  // what came before the listeners were there
+  return {};
+}
+
+TimePoint BlockGateway::serve(TimePoint now) {
+  follow_hosts(now);
+  take_acks(now);
+  take_blocks(now);
+  pending_->retry(now);
+  if (now >= next_beat_) {
+    beat(now);
+    next_beat_ = now + kBeat;
+  }
+  write_acks();
+  return pending_->empty() ? next_beat_ : std::min(next_beat_, now + kRetryPending);
+}
+
+bool BlockGateway::has_room(NodeAddress to, std::uint32_t slots) {
+  const std::scoped_lock lock(mutex_);
+  const auto found = peers_.find(to.host);
+  if (found == peers_.end() || !found->second->reached) return true;  // to be dropped
+  const Peer& peer = *found->second;
+  return peer.window.has_room(slots * kSlotSize) && (to.to_all() || !peer.full[to.node - 1U]);
+}
+
+SendResult BlockGateway::give(const BlockHeader& header, std::span<const std::byte> contents) {
+  const NodeAddress to = NodeAddress::from_number(header.destination);
+  // Each host sends for its own nodes only.
+  if (NodeAddress::from_number(header.source).host != options_.number) return SendResult::invalid;
+  const std::scoped_lock lock(mutex_);
+  if (to.host != NodeAddress::kAllHosts) {
+    const auto found = peers_.find(to.host);
+    return found == peers_.end() ? SendResult::unreachable : give_to(*found->second, header, contents);
+  }
+  bool all = true;
+  for (const auto& [number, peer] : peers_) {
+    if (peer->reached) all = give_to(*peer, header, contents) == SendResult::sent && all;
+  }
+  return all ? SendResult::sent : SendResult::congested;
+}
+
+SendResult BlockGateway::give_to(Peer& peer, const BlockHeader& header, std::span<const std::byte> contents) {
+  if (!peer.reached) return SendResult::unreachable;
+  if (!peer.window.has_room(contents.size())) return SendResult::congested;
+  const plc_Block sample = block_sample(header, contents, peer.window.next());
+  if (dds_write(peer.blocks.get(), &sample) != DDS_RETCODE_OK) return SendResult::congested;
+  peer.window.add(contents.size(), MonotonicClock::now());
+  return SendResult::sent;
+}
+
+// Looked up once for each writer: it costs a copy of all that was discovered of it.
+dds::Guid BlockGateway::writer_behind(const dds_sample_info_t& info) {
+  if (const auto known = writers_.find(info.publication_handle); known != writers_.end())
+    return known->second;
+  const dds::Guid writer = dds::writer_of(block_reader_.get(), info);
+  if (writers_.size() >= kMostWritersKnown) writers_.clear();
+  if (writer != dds::Guid{}) writers_.emplace(info.publication_handle, writer);
+  return writer;
+}
+
+BlockGateway::Peer* BlockGateway::peer_of(const dds::Guid& writer) {
+  const dds::Guid participant = writer.participant();
+  const auto found = std::ranges::find_if(
+      peers_, [&](const auto& peer) { return peer.second->claim.participant == participant; });
+  return found == peers_.end() ? nullptr : found->second.get();
+}
+
+void BlockGateway::take_acks(TimePoint now) {
+  bool news = false;
+  dds::take_valid<plc_BlockAck>(ack_reader_.get(), [&](const plc_BlockAck& ack, const auto& info) {
+    Peer* const peer = peer_of(dds::writer_of(ack_reader_.get(), info));
+    if (peer == nullptr || ack.from_host != peer->claim.number) return;
+    peer->heard = now;
+    const std::scoped_lock lock(mutex_);
+    const NodeSet full = NodeSet(ack.full_nodes[0]) | NodeSet(ack.full_nodes[1]) << 64;
+    news = news || (peer->full & ~full).any();
+    peer->full = full;
+    if (dds::Guid::from(ack.writer_guid) != peer->writer) return;
+    news = peer->window.acknowledge(ack.sequence_number, now) || news;
+  });
+  if (news) router_->wake();
+}
+
+void BlockGateway::take_blocks(TimePoint now) {
+  constexpr std::size_t kAtOnce = 32;
+  dds::take_valid<plc_Block, kAtOnce>(block_reader_.get(), [&](const plc_Block& block, const auto& info) {
+    take(block, writer_behind(info), now);
+  });
+}
+
+void BlockGateway::take(const plc_Block& block, const dds::Guid& writer, TimePoint now) {
+  Peer* const peer = peer_of(writer);
+  if (peer == nullptr) return count(&NodeCounters::refused);  // it has no number, or not that one
+  if (writer != peer->stream) {
+    peer->stream = writer;
+    peer->taken = block.sequence_number - 1;
+  }
+  if (block.sequence_number <= peer->taken) return count(&NodeCounters::duplicates);
+  count(&NodeCounters::lost, block.sequence_number - peer->taken - 1);
+  peer->taken = block.sequence_number;
+  peer->has_news = true;
+  const auto header = block_header(block, peer->claim.number, options_.number);
+  if (!header) return count(&NodeCounters::refused);
+  pending_->take(*header, block_contents(block), now);
+}
+
+void BlockGateway::write_acks() {
+  const NodeSet full = pending_->full();
+  constexpr NodeSet kLow(~std::uint64_t{0});
+  for (const auto& [number, peer] : peers_) {
+    if (!peer->has_news) continue;
+    plc_BlockAck ack{};
+    ack.from_host = options_.number;
+    peer->stream.copy_to(ack.writer_guid);
+    ack.sequence_number = peer->taken;
+    ack.full_nodes[0] = (full & kLow).to_ullong();
+    ack.full_nodes[1] = (full >> 64).to_ullong();
+    // One that cannot be written now is with the next beat.
+    if (dds_write(peer->acks.get(), &ack) == DDS_RETCODE_OK) peer->has_news = false;
+  }
+}
+
+}  // namespace plchost

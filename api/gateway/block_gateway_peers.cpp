@@ -1,0 +1,186 @@
+// Which other hosts there are: see block_gateway.hpp.
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "api/dds/samples.hpp"
+#include "api/dds/text.hpp"
+#include "api/dds/topics.hpp"
+#include "api/gateway/block_gateway.hpp"
+#include "shm/base/log.hpp"
+
+namespace plchost {
+
+void BlockGateway::follow_hosts(TimePoint now) {
+  bool news = false;
+  dds::take_all<plc_BlockHostStatus>(host_reader_.get(),
+                                     [&](const plc_BlockHostStatus& host, const dds_sample_info_t& info) {
+                                       const std::string name(dds::text_of(host.host));
+                                       news = true;
+                                       if (info.instance_state != DDS_IST_ALIVE)
+                                         return numbers_.forget(name, now);
+                                       const dds::Guid writer = dds::writer_of(host_reader_.get(), info);
+                                       if (!info.valid_data || writer == dds::Guid{}) return;
+                                       numbers_.claim({.host = name,
+                                                       .number = host.host_number,
+                                                       .since_ns = host.since_unix_ns,
+                                                       .epoch = host.epoch,
+                                                       .participant = writer.participant()},
+                                                      now);
+                                     });
+  if (news) settle_peers(now);
+}
+
+// The peers that there are become those that there shall be.
+void BlockGateway::settle_peers(TimePoint now) {
+  const auto wanted = numbers_.serves(now) ? numbers_.others() : std::map<std::uint16_t, HostClaim>();
+  for (auto peer = peers_.begin(); peer != peers_.end();) {
+    const auto same = wanted.find(peer->first);
+    const auto next = std::next(peer);
+    if (same == wanted.end() || same->second != peer->second->claim) remove_peer(peer);
+    peer = next;
+  }
+  for (const auto& [number, claim] : wanted) {
+    if (!peers_.contains(number)) add_peer(claim);
+  }
+}
+
+Result<void> BlockGateway::open_block_writer(Peer& peer) const {
+  auto writer = dds::make_writer(peer.publisher.get(), block_topic_.get(), dds::block_qos());
+  if (!writer) return std::unexpected(std::move(writer).error());
+  peer.blocks = *std::move(writer);
+  peer.writer = dds::guid_of(peer.blocks.get());
+  return {};
+}
+
+Result<std::unique_ptr<BlockGateway::Peer>> BlockGateway::open_peer(const HostClaim& claim) const {
+  auto peer = std::make_unique<Peer>();
+  peer->claim = claim;
+  auto publisher = dds::make_publisher(participant_, dds::block_partition(claim.number));
+  if (!publisher) return std::unexpected(std::move(publisher).error());
+  peer->publisher = *std::move(publisher);
+  auto acks = dds::make_writer(peer->publisher.get(), ack_topic_.get(), dds::ack_qos());
+  if (!acks) return std::unexpected(std::move(acks).error());
+  peer->acks = *std::move(acks);
+  if (auto opened = open_block_writer(*peer); !opened) return std::unexpected(std::move(opened).error());
+  peer->has_news = true;  // it waits to hear of this host
+  return peer;
+}
+
+void BlockGateway::add_peer(const HostClaim& claim) {
+  if (peers_.size() >= kMostPeers) {
+    spdlog::warn("blocks: host '{}' is one too many: {} are served", claim.host, kMostPeers);
+    return;
+  }
+  auto peer = open_peer(claim);
+  if (!peer) return spdlog::error("blocks: host '{}': {}", claim.host, peer.error().describe());
+  const std::scoped_lock lock(mutex_);
+  peers_.emplace(claim.number, *std::move(peer));
+}
+
+void BlockGateway::remove_peer(Peers::iterator peer) {
+  std::unique_ptr<Peer> gone;
+  {
+    const std::scoped_lock lock(mutex_);
+    gone = std::move(peer->second);
+    peers_.erase(peer);
+  }
+  count(&NodeCounters::lost, gone->window.under_way());
+}
+
+// Its blocks were sent and never taken, as after a cut that only one side has noticed: a fresh writer begins
+// a fresh sequence.
+void BlockGateway::renew_writer(Peer& peer) {
+  spdlog::warn("blocks: host '{}' is heard, but {} blocks for it are lost", peer.claim.host,
+               peer.window.under_way());
+  count(&NodeCounters::lost, peer.window.under_way());
+  peer.window = BlockWindow();
+  peer.reached = false;  // until the new one has met its reader
+  if (auto opened = open_block_writer(peer); !opened) {
+    spdlog::error("blocks: host '{}': {}", peer.claim.host, opened.error().describe());
+  }
+}
+
+void BlockGateway::look_at(Peer& peer, TimePoint now) {
+  const bool heard = peer.heard && now - *peer.heard <= kSilence;
+  const std::scoped_lock lock(mutex_);
+  dds_publication_matched_status_t matched{};
+  const bool met = dds_get_publication_matched_status(peer.blocks.get(), &matched) == DDS_RETCODE_OK &&
+                   matched.current_count > 0;
+  const bool was_reached = peer.reached;
+  peer.reached = heard && met;
+  if (!heard) peer.full = {};
+  // After a silence what is under way has its time again.
+  if (!was_reached) peer.window.be_patient(now);
+  if (peer.reached && peer.window.stalled(now)) renew_writer(peer);
+  peer.has_news = true;
+}
+
+void BlockGateway::beat(TimePoint now) {
+  settle_peers(now);
+  tell_of_numbers(now);
+  std::vector<std::uint16_t> reached;
+  for (const auto& [number, peer] : peers_) {
+    look_at(*peer, now);
+    if (peer->reached) reached.push_back(number);
+  }
+  if (reached != reached_) {
+    node_->set_hosts(ranges_of(reached));
+    spdlog::info("blocks: {}",
+                 reached.empty() ? std::string("no other host is reached")
+                                 : fmt::format("other hosts that are reached: {}", fmt::join(reached, ", ")));
+    reached_ = std::move(reached);
+  }
+  announce();
+}
+
+// Once for each change.
+void BlockGateway::tell_of_numbers(TimePoint now) {
+  std::string problem;
+  if (const auto other = numbers_.ahead()) {
+    problem = fmt::format(
+        "host '{}' has number {} since longer: this host sends and takes no blocks of other hosts. Give one "
+        "of the two another [blocks] host_number",
+        other->host, options_.number);
+  } else if (!numbers_.serves(now)) {
+    return;  // the grace time
+  } else {
+    for (const HostClaim& late : numbers_.behind()) {
+      problem += fmt::format(
+          "{}host '{}' claims number {}, which this host has: it gets no blocks. Give it another "
+          "[blocks] host_number",
+          problem.empty() ? "" : "; ", late.host, options_.number);
+    }
+  }
+  if (problem == told_) return;
+  if (problem.empty()) {
+    spdlog::info("blocks: number {} is only this host's now", options_.number);
+  } else {
+    spdlog::error("blocks: {}", problem);
+  }
+  told_ = std::move(problem);
+}
+
+void BlockGateway::announce() {
+  std::vector<std::pair<std::uint16_t, std::string>> nodes;
+  for (std::uint16_t node = 1; node <= kMaxNodes; ++node) {
+    if (const auto record = directory_->record(node)) nodes.emplace_back(node, record->name.view());
+  }
+  if (has_announced_ && nodes == announced_) return;
+  plc_BlockHostStatus sample{};
+  dds::copy_text(sample.host, options_.host);
+  sample.epoch = options_.epoch;
+  sample.host_number = options_.number;
+  sample.since_unix_ns = options_.since_ns;
+  std::vector<plc_BlockNode> named(nodes.size());
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    named[i].node = nodes[i].first;
+    dds::copy_text(named[i].name, nodes[i].second);
+  }
+  sample.nodes._buffer = named.data();
+  sample.nodes._length = sample.nodes._maximum = static_cast<std::uint32_t>(named.size());
+  has_announced_ = dds_write(host_writer_.get(), &sample) == DDS_RETCODE_OK;
+  announced_ = std::move(nodes);
+}
+
+}  // namespace plchost

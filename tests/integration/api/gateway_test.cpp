@@ -1,0 +1,277 @@
+#include <algorithm>
+#include <cstddef>
+#include <cstring>
+#include <functional>
+#include <optional>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+#include <unistd.h>
+
+#include "tests/integration/api/running_node.hpp"
+#include "tests/integration/api/test_host.hpp"
+
+namespace plchost {
+namespace {
+
+using testing::HasSubstr;
+using Json = nlohmann::json;
+
+/// A host with a number, and one node on it.
+struct Side {
+  TestHost host;
+  RunningNode node;
+  BlockChannel channel;
+  std::vector<std::byte> buffer = std::vector<std::byte>(kMaxBlockSize);
+  Received received;
+
+  Side(const OwnDomain& domain, const std::string& name, int number, const std::string& node_name)
+      : host(domain, name),
+        node(start(host, number), node_name),
+        channel(BlockChannel::open(node.node(), "test").value()) {}
+  ~Side() { NodeDirectory::remove(host.pool_name()); }
+  Side(const Side&) = delete;
+  Side& operator=(const Side&) = delete;
+
+  static TestHost& start(TestHost& host, int number) {
+    host.start_server({"--host-number", std::to_string(number), "--peer", "127.0.0.1"});
+    return host;
+  }
+  [[nodiscard]] NodeAddress address_at(std::uint16_t number) {
+    return {.host = number, .node = node.node().address().node};
+  }
+  /// What comes next; nothing if nothing does.
+  [[nodiscard]] std::optional<std::vector<std::byte>> next(Duration patience = kPatience) {
+    for (const TimePoint end = MonotonicClock::now() + patience;; ::usleep(200)) {
+      if (channel.receive(buffer, received) == TakeResult::taken) {
+        return std::vector(buffer.begin(), buffer.begin() + static_cast<std::ptrdiff_t>(received.size));
+      }
+      if (MonotonicClock::now() >= end) return std::nullopt;
+    }
+  }
+};
+
+std::vector<std::byte> pattern(std::size_t size, std::size_t seed = 0) {
+  std::vector<std::byte> bytes(size);
+  for (std::size_t i = 0; i < size; ++i) bytes[i] = static_cast<std::byte>(i * 31 + i / 257 + seed);
+  return bytes;
+}
+
+bool becomes(const std::function<bool()>& true_at_last) {
+  for (const TimePoint end = soon(); MonotonicClock::now() < end; ::usleep(1000)) {
+    if (true_at_last()) return true;
+  }
+  return false;
+}
+
+class Gateway : public testing::Test {
+ protected:
+  SendResult send(Side& from, NodeAddress to, std::span<const std::byte> contents) {
+    SendResult result = SendResult::unreachable;
+    EXPECT_TRUE(becomes([&] {
+      result = from.channel.send(to, contents);
+      return result == SendResult::sent;
+    })) << static_cast<int>(result);
+    return result;
+  }
+  /// Until blocks go from one to the other, and back.
+  void meet(Side& one, std::uint16_t number, Side& other, std::uint16_t other_number) {
+    send(one, other.address_at(other_number), {});
+    ASSERT_TRUE(other.next());
+    send(other, one.address_at(number), {});
+    ASSERT_TRUE(one.next());
+  }
+  [[nodiscard]] Json nodes(const std::string& host) const {
+    const auto result = run_plcctl(domain_.number(), {"--host", host, "list", "nodes", "--json"});
+    EXPECT_EQ(result.code, 0) << result.errors;
+    return Json::parse(result.output);
+  }
+  [[nodiscard]] std::string hosts_of_gateway(const std::string& host) const {
+    for (const Json& node : nodes(host)) {
+      if (node["name"] == "gateway") return node["hosts"];
+    }
+    return "no gateway";
+  }
+
+  OwnDomain domain_;
+};
+
+TEST_F(Gateway, BlocksOfAllSizesGoToANodeOfAnotherHostAndRepliesComeBack) {
+  Side south(domain_, "south", 2, "packer");
+  Side north(domain_, "north", 1, "press");
+  for (const std::size_t size : {0U, 1U, 512U, 5000U, 65536U}) {
+    const auto contents = pattern(size, size);
+    std::uint32_t correlation = 0;
+    ASSERT_TRUE(becomes([&] {
+      return north.channel.request(south.address_at(2), contents, correlation) == SendResult::sent;
+    }));
+    const auto request = south.next();
+    ASSERT_TRUE(request);
+    EXPECT_TRUE(*request == contents) << size;
+    EXPECT_EQ(south.received.from, north.address_at(1));
+    EXPECT_EQ(south.received.kind, BlockKind::request);
+    const Received asked = south.received;
+    ASSERT_TRUE(becomes([&] { return south.channel.reply(asked, contents) == SendResult::sent; }));
+    const auto reply = north.next();
+    ASSERT_TRUE(reply);
+    EXPECT_TRUE(*reply == contents) << size;
+    EXPECT_EQ(north.received.from, south.address_at(2));
+    EXPECT_EQ(north.received.correlation, correlation);
+  }
+  EXPECT_EQ(hosts_of_gateway("north"), "2");
+  EXPECT_EQ(hosts_of_gateway("south"), "1");
+  for (const Json& node : nodes("north")) EXPECT_EQ(node["host_number"], 1);
+}
+
+TEST_F(Gateway, ManyBlocksComeOnceEachAndInOrderHoweverFastTheyAreSent) {
+  Side south(domain_, "south", 2, "packer");
+  Side north(domain_, "north", 1, "press");
+  meet(north, 1, south, 2);
+  constexpr std::uint32_t kMany = 20'000;
+  std::uint32_t sent = 0;
+  std::uint32_t congested = 0;
+  std::vector<std::byte> contents(200);
+  for (std::uint32_t received = 0; received < kMany;) {
+    for (int burst = 0; burst < 100 && sent < kMany; ++burst) {
+      std::memcpy(contents.data(), &sent, sizeof sent);
+      const auto result = north.channel.send(south.address_at(2), contents);
+      if (result == SendResult::sent) {
+        ++sent;
+      } else {
+        ASSERT_EQ(result, SendResult::congested);
+        ++congested;
+      }
+    }
+    for (;;) {
+      const auto block = south.next(sent < kMany ? Duration::zero() : kPatience);
+      if (!block) break;
+      std::uint32_t number = 0;
+      std::memcpy(&number, block->data(), sizeof number);
+      ASSERT_EQ(number, received);
+      if (++received == kMany) break;
+    }
+    ASSERT_TRUE(sent < kMany || received == kMany) << received;
+  }
+  for (const char* host : {"north", "south"}) {
+    for (const Json& node : nodes(host)) {
+      for (const char* counter : {"lost", "refused", "congested", "expired"}) {
+        EXPECT_EQ(node[counter], 0) << host << " " << counter;
+      }
+    }
+  }
+}
+
+TEST_F(Gateway, ABlockForAllNodesOfAllHostsComesToEachOnce) {
+  Side south(domain_, "south", 2, "packer");
+  Side north(domain_, "north", 1, "press");
+  Side west(domain_, "west", 3, "filler");
+  RunningNode second(south.host, "second");
+  BlockChannel at_second = BlockChannel::open(second.node(), "test").value();
+  meet(north, 1, south, 2);
+  meet(north, 1, west, 3);
+  ASSERT_TRUE(becomes([&] { return second.node().find("packer").node != 0; }));
+  const auto contents = pattern(3000);
+  send(north, {.host = NodeAddress::kAllHosts, .node = NodeAddress::kAllNodes}, contents);
+  for (Side* side : {&south, &west}) {
+    const auto block = side->next();
+    ASSERT_TRUE(block);
+    EXPECT_TRUE(*block == contents);
+    EXPECT_EQ(side->received.from, north.address_at(1));
+  }
+  Received received;
+  std::vector<std::byte> buffer(kMaxBlockSize);
+  EXPECT_TRUE(becomes([&] { return at_second.receive(buffer, received) == TakeResult::taken; }));
+  send(north, {.host = 2, .node = NodeAddress::kAllNodes}, contents);
+  EXPECT_TRUE(south.next());
+  constexpr Duration kWhile = std::chrono::milliseconds(300);
+  EXPECT_FALSE(south.next(kWhile));
+  EXPECT_FALSE(west.next(kWhile)) << "only the first was for all hosts";
+  EXPECT_FALSE(north.next(Duration::zero())) << "nothing comes back";
+}
+
+TEST_F(Gateway, IsBackByItselfAfterItsServerWasKilled) {
+  Side south(domain_, "south", 2, "packer");
+  Side north(domain_, "north", 1, "press");
+  meet(north, 1, south, 2);
+  RunningNode neighbour(south.host, "neighbour");
+  BlockChannel at_neighbour = BlockChannel::open(neighbour.node(), "test").value();
+  const auto within_the_host = [&] {
+    return becomes([&] { return at_neighbour.send(south.node.node().address(), {}) == SendResult::sent; }) &&
+           south.next().has_value();
+  };
+  ASSERT_TRUE(within_the_host());
+  south.host.replace_server();
+  EXPECT_TRUE(within_the_host());
+  // What is sent until both know of each other again may be lost, and is never sent twice.
+  bool there = false;
+  ASSERT_TRUE(becomes([&] {
+    (void)north.channel.send(south.address_at(2), {});
+    there = south.next(std::chrono::milliseconds(50)).has_value();
+    return there;
+  }));
+  while (south.next(std::chrono::milliseconds(300))) {
+  }
+  north.host.replace_server();
+  EXPECT_TRUE(becomes([&] {
+    (void)south.channel.send(north.address_at(1), {});
+    return north.next(std::chrono::milliseconds(50)).has_value();
+  }));
+  EXPECT_TRUE(within_the_host());
+}
+
+TEST_F(Gateway, SendersAreToldWhenAHostIsGone) {
+  Side north(domain_, "north", 1, "press");
+  {
+    Side south(domain_, "south", 2, "packer");
+    meet(north, 1, south, 2);
+    EXPECT_EQ(north.channel.send({.host = 7, .node = 1}, {}), SendResult::unreachable);
+    south.host.server().signal(SIGSTOP);
+    EXPECT_TRUE(becomes(
+        [&] { return north.channel.send(south.address_at(2), pattern(60000)) == SendResult::unreachable; }));
+    south.host.server().signal(SIGCONT);
+    EXPECT_TRUE(becomes([&] { return north.channel.send(south.address_at(2), {}) == SendResult::sent; }));
+  }
+  EXPECT_TRUE(
+      becomes([&] { return north.channel.send({.host = 2, .node = 1}, {}) == SendResult::unreachable; }));
+}
+
+TEST_F(Gateway, ANodeThatTakesNothingIsFeltByWhoSendsToItAndByNobodyElse) {
+  Side south(domain_, "south", 2, "packer");
+  Side north(domain_, "north", 1, "press");
+  RunningNode idle(south.host, "idle");
+  meet(north, 1, south, 2);
+  const NodeAddress to_idle{.host = 2, .node = idle.node().address().node};
+  const auto large = pattern(60000);
+  bool felt = false;
+  for (int i = 0; i < 2000 && !felt; ++i) {
+    felt = north.channel.send(to_idle, large) == SendResult::congested;
+    if (i % 10 == 0) {
+      ASSERT_TRUE(becomes([&] {
+        const auto result = north.channel.send(south.address_at(2), {}, BlockPriority::high);
+        return result == SendResult::sent;
+      }));
+      ASSERT_TRUE(south.next());
+    }
+  }
+  EXPECT_TRUE(felt);
+}
+
+TEST_F(Gateway, OfTwoHostsOfOneNumberTheLaterOneDoesNotServeAndSaysSo) {
+  Side north(domain_, "north", 1, "press");
+  Side south(domain_, "south", 2, "packer");
+  meet(north, 1, south, 2);
+  Side west(domain_, "west", 2, "filler");  // of equal age, and the greater name
+  EXPECT_EQ(hosts_of_gateway("west"), "");
+  for (int i = 0; i < 20; ++i) {
+    send(north, south.address_at(2), {});
+    ASSERT_TRUE(south.next());
+    (void)west.channel.send(north.address_at(1), {});
+    EXPECT_FALSE(north.next(std::chrono::milliseconds(20)));
+  }
+  EXPECT_FALSE(west.next(Duration::zero()));
+  EXPECT_EQ(west.channel.send(north.address_at(1), {}), SendResult::unreachable);
+}
+
+}  // namespace
+}  // namespace plchost
