@@ -376,9 +376,11 @@ RTS_RESULT CDECL CAL_SysEventSet(RTS_HANDLE hEvent);
 #define PLC_MAX_CHANNELS 256
 #define PLC_MAX_CHANNEL_NAME 63
 
-/* An address: the node in the lower 16 bits, its host in the upper ones; host 0 is this host. */
+/* An address: the node in the lower 16 bits, its host in the upper ones; host 0 is this host, others have the
+ * number that their configuration says ([blocks] host_number). */
 #define PLC_NO_NODE 0u
-#define PLC_ALL_NODES 0xFFFFu /* every other node of this host */
+#define PLC_ALL_NODES 0xFFFFu /* every other node of this host; (host << 16) | PLC_ALL_NODES: of that one */
+#define PLC_ALL_HOSTS 0xFFFFFFFFu /* every other node of this and all other hosts */
 
 /* What has the higher priority is received first; each priority has queues of its own. */
 #define PLC_BLOCK_EMERGENCY 0

@@ -22,6 +22,8 @@ static_assert(PLC_BLOCK_EMERGENCY == std::to_underlying(BlockPriority::emergency
               PLC_BLOCK_REQUEST == std::to_underlying(BlockKind::request) &&
               PLC_BLOCK_REPLY == std::to_underlying(BlockKind::reply));
 static_assert(PLC_ALL_NODES == NodeAddress{.host = 0, .node = NodeAddress::kAllNodes}.number());
+static_assert(PLC_ALL_HOSTS ==
+              NodeAddress{.host = NodeAddress::kAllHosts, .node = NodeAddress::kAllNodes}.number());
 
 namespace {
 
