@@ -79,7 +79,7 @@ tidy() {
 
 fuzz() {
   configure .build/fuzz -DCMAKE_C_COMPILER=clang-19 -DCMAKE_CXX_COMPILER=clang++-19 -DPLCHOST_FUZZ=ON \
-    -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF &&
+    -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF "${unity[@]}" &&
     cmake --build .build/fuzz -j "$jobs" --target fuzzers || return 1
   local fuzzer corpus
   for fuzzer in .build/fuzz/bin/fuzz_*; do
