@@ -1,8 +1,13 @@
 #include "api/dds/object_page.hpp"
 
 #include <algorithm>
+#include <functional>
+#include <map>
 #include <span>
 
+#include <fmt/format.h>
+
+#include "api/dds/entries.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
 
@@ -77,6 +82,15 @@ ListedObject object_of(const plc_ObjectRecord& record) {
   return listed;
 }
 
+// Entries of ObjectPage.ext: names of the users and groups of its objects.
+std::string user_entry(uid_t user) {
+  return fmt::format("user.{}", user);
+}
+std::string group_entry(gid_t group) {
+  return fmt::format("group.{}", group);
+}
+constexpr std::size_t kMostPageEntries = 16;
+
 }  // namespace
 
 ObjectPageSample::ObjectPageSample(const ObjectListing& listing) {
@@ -88,17 +102,45 @@ ObjectPageSample::ObjectPageSample(const ObjectListing& listing) {
     records_[i].references._length = records_[i].references._maximum =
         static_cast<std::uint32_t>(references.size());
   }
+  add_names(listing);
   page_.complete = listing.complete;
   dds::copy_text(page_.next_after, listing.next_after);
   page_.objects._buffer = records_.data();
   page_.objects._length = page_.objects._maximum = static_cast<std::uint32_t>(records_.size());
 }
 
+// Each name once. A page of objects of more users and groups than there is room for shows the rest as
+// numbers.
+void ObjectPageSample::add_names(const ObjectListing& listing) {
+  std::map<std::string, std::string_view> names;
+  for (const ListedObject& object : std::span(listing.objects).first(records_.size())) {
+    names.emplace(user_entry(object.info.owner), object.owner_name);
+    names.emplace(group_entry(object.info.group), object.group_name);
+  }
+  for (const auto& [entry, name] : names) {
+    if (entries_.size() == kMostPageEntries) break;
+    if (is_printable_utf8(name) && name.size() < sizeof(plc_KeyValue::value))
+      dds::add_entry(entries_, entry, name);
+  }
+  page_.ext._buffer = entries_.data();
+  page_.ext._length = page_.ext._maximum = static_cast<std::uint32_t>(entries_.size());
+}
+
 ObjectListing listing_of(const plc_ObjectPage& page) {
   ObjectListing listing{
       .objects = {}, .complete = page.complete, .next_after = std::string(dds::text_of(page.next_after))};
+  std::map<std::string, std::string, std::less<>> names;
+  for (const plc_KeyValue& entry : std::span(page.ext._buffer, page.ext._length)) {
+    names.emplace(dds::text_of(entry.name), dds::text_of(entry.value));
+  }
+  const auto name_of = [&](const std::string& entry) {
+    const auto found = names.find(entry);
+    return found == names.end() ? std::string() : found->second;
+  };
   for (const plc_ObjectRecord& record : std::span(page.objects._buffer, page.objects._length)) {
-    listing.objects.push_back(object_of(record));
+    ListedObject& object = listing.objects.emplace_back(object_of(record));
+    object.owner_name = name_of(user_entry(object.info.owner));
+    object.group_name = name_of(group_entry(object.info.group));
   }
   return listing;
 }

@@ -17,6 +17,8 @@ struct ListedObject {
   ObjectInfo info;
   std::uint32_t holder_pid = 0;  ///< mutex: process of the thread that holds it; 0: none, or it has ended
   std::string holder_program;
+  std::string owner_name;  ///< of the user, as the host knows it; empty: it knows none
+  std::string group_name;
 };
 
 /// A part of what was asked for, by name in the order of bytes.
@@ -42,7 +44,10 @@ class ObjectPageSample {
   [[nodiscard]] plc_ObjectPage& page() noexcept { return page_; }
 
  private:
+  void add_names(const ObjectListing& listing);
+
   plc_ObjectPage page_{};
+  std::vector<plc_KeyValue> entries_;
   std::vector<plc_ObjectRecord> records_;
   std::deque<std::vector<plc_ObjectReference>> references_;
 };

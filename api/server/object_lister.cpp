@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "api/server/account_names.hpp"
 #include "api/server/thread_owner.hpp"
 #include "shm/base/names.hpp"
 
@@ -29,8 +30,11 @@ bool may_hold(const ObjectInfo& mutex, std::uint32_t pid) {
          std::ranges::find(mutex.references, pid, &ReferenceInfo::pid) != mutex.references.end();
 }
 
-ListedObject with_holder(ObjectInfo info) {
-  ListedObject listed{.info = std::move(info), .holder_pid = 0, .holder_program = {}};
+ListedObject listed_of(ObjectInfo info) {
+  ListedObject listed{
+      .info = std::move(info), .holder_pid = 0, .holder_program = {}, .owner_name = {}, .group_name = {}};
+  listed.owner_name = user_name(listed.info.owner);
+  listed.group_name = group_name(listed.info.group);
   if (listed.info.type != ObjectType::mutex || listed.info.value == 0) return listed;
   auto owner = owner_of_thread(static_cast<std::uint32_t>(listed.info.value));
   if (!owner || !may_hold(listed.info, owner->pid)) return listed;
@@ -74,7 +78,7 @@ Result<ObjectListing> ObjectLister::one(const std::string& name) {
   auto found = pool_->look_at(name);
   if (found) {
     ObjectListing listing;
-    listing.objects.push_back(with_holder(*std::move(found)));
+    listing.objects.push_back(listed_of(*std::move(found)));
     return listing;
   }
   Error error = std::move(found).error();
@@ -98,7 +102,7 @@ Result<ObjectListing> ObjectLister::page(const ObjectQuery& query, TimePoint unt
     listing.next_after = at->name;
     if (wanted) {
       references += at->references.size();
-      listing.objects.push_back(with_holder(*at));
+      listing.objects.push_back(listed_of(*at));
     }
     if (step % kClockEvery == 0 && MonotonicClock::now() >= until) {
       ++at;

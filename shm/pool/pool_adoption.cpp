@@ -222,7 +222,7 @@ void PoolAdoption::look() {
 // A folder that has not changed is not looked at again; the time of a change is exact only to some ms, and a
 // file is complete only some time after its name is there.
 void PoolAdoption::look_at_files() {
-  constexpr int kNamesAtOnce = 10'000;
+  constexpr int kNamesAtOnce = 4000;
   constexpr std::int64_t kSettledAfterS = 2;
   if (!folder_) {
     struct stat status{};

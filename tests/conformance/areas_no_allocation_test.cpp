@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include "instances/runtime/areas/areas.hpp"
+#include "instances/runtime/retain/kept_group.hpp"
 #include "tests/conformance/malloc_count.hpp"
 
 namespace plchost {
@@ -43,6 +44,23 @@ TEST(NoAllocation, InCyclesWithAreasOfEachKind) {
   }
   ObjectPool::remove(name);
   remove_pool_memories(name);
+}
+
+TEST(NoAllocation, WhenATaskGivesItsKeptVariablesAtTheEndOfACycle) {
+  CycleCounter counter{2};
+  const std::vector<std::byte> live(4096, std::byte{1});
+  std::vector<std::byte> copy(4096);
+  KeptGroup sut({&counter}, {{.offset = 0, .live = live}});
+  int given = 0;
+  MallocCount::begin();
+  for (int cycle = 0; cycle < 1000; ++cycle) {
+    sut.ask(copy);
+    sut.answer(false);
+    if (sut.withdraw()) ++given;
+  }
+  EXPECT_EQ(MallocCount::end(), 0U);
+  EXPECT_EQ(given, 1000);
+  EXPECT_EQ(copy, live);
 }
 
 }  // namespace

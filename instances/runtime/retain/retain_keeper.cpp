@@ -254,8 +254,8 @@ void RetainKeeper::save() {
   memory_.set_generation(image_.generation);
   if (auto done = files_->write(image_); !done) return not_saved(done.error().describe());
   written_ = image_.data;
-  saves_.store(saves() + 1, std::memory_order_relaxed);
   if (taken != Taken::all) return;
+  saves_.store(saves() + 1, std::memory_order_relaxed);
   if (!std::exchange(problem_, {}).empty()) spdlog::info("retain variables are written again");
 }
 

@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 
+#include "shm/plc_process_image.h"
 #include "shm/pool/object_pool.hpp"
 #include "tests/integration/manager/plant.hpp"
 
@@ -50,6 +51,20 @@ TEST_F(RetainUnderAManager, IsThereAfterItsProcessWasKilledAndAfterAWarmReset) {
   EXPECT_EQ(plant.ask(ControlVerb::reset, "packer1").code, ErrorCode::ok);
   EXPECT_EQ(plant.ask(ControlVerb::start, "packer1").code, ErrorCode::ok);
   EXPECT_TRUE(has_counted("24"));
+}
+
+TEST_F(RetainUnderAManager, IsAnObjectOfThePoolAsIsAnImageThatFirmwareMadeWithAHeaderAlone) {
+  plc_image image{};
+  ASSERT_EQ(plc_image_open(plant.pool().c_str(), "terminal9.in", 64, PLC_IMAGE_WRITE, &image), 0);
+  const auto pool = ObjectPool::attach(plant.pool(), MemoryFile::Access::read_only).value();
+  EXPECT_TRUE(Plant::eventually([&] { return pool.look_at("terminal9.in").has_value(); }))
+      << "the manager looks for it";
+  EXPECT_EQ(pool.look_at("terminal9.in")->size, plc_image_bytes(64));
+  const auto kept = pool.look_at("packer1.retain");
+  ASSERT_TRUE(kept) << kept.error().describe();
+  EXPECT_TRUE(kept->kept);
+  EXPECT_EQ(kept->reference_count, 1U);
+  plc_image_close(&image);
 }
 
 TEST_F(RetainUnderAManager, BeginsAnewAfterAColdReset) {

@@ -6,10 +6,13 @@
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <grp.h>
+#include <pwd.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
 #include "api/cli/object_rows.hpp"
+#include "api/server/account_names.hpp"
 #include "api/server/thread_owner.hpp"
 #include "shm/base/names.hpp"
 
@@ -153,6 +156,12 @@ TEST_F(ObjectListerTest, ASampleCarriesAllThatIsKnown) {
   EXPECT_EQ(row["size_bytes"], 4096);
   EXPECT_EQ(row["mode"], "0640");
   EXPECT_EQ(row["owner"], ::geteuid());
+  if (const passwd* const user = ::getpwuid(::geteuid()); user != nullptr) {
+    EXPECT_EQ(row["owner_name"], user->pw_name);
+  }
+  if (const group* const of_file = ::getgrgid(::getegid()); of_file != nullptr) {
+    EXPECT_EQ(row["group_name"], of_file->gr_name);
+  }
   EXPECT_EQ(row["kept"], true);
   EXPECT_TRUE(row["value"].is_null());
   EXPECT_TRUE(row["registered"].is_null());
@@ -160,6 +169,35 @@ TEST_F(ObjectListerTest, ASampleCarriesAllThatIsKnown) {
   EXPECT_EQ(row["references"][0]["program"], "unit_api");
   EXPECT_EQ(row["references"][0]["writable"], true);
   EXPECT_TRUE(pool_.remove_object("line1/F\u00fclldruck")) << "a kept one would outlive the test";
+}
+
+TEST(ObjectRows, ShowUsersWithoutANameAsNumbers) {
+  ListedObject object;
+  object.info.owner = 4'000'000'000;
+  EXPECT_EQ(to_row("hosta", object)["owner"], 4'000'000'000);
+  EXPECT_TRUE(to_row("hosta", object)["owner_name"].is_null());
+  EXPECT_EQ(user_name(4'000'000'000), "");
+}
+
+TEST(ObjectPageSample, NamesAsManyUsersAsThereIsRoomForAndShowsTheOthersAsNumbers) {
+  ObjectListing sent;
+  for (unsigned user = 0; user < 40; ++user) {
+    ListedObject& object = sent.objects.emplace_back();
+    object.info.name = fmt::format("object{}", user);
+    object.info.owner = user;
+    object.info.group = 7;
+    object.owner_name = fmt::format("user {}", user);
+    object.group_name = "seven";
+  }
+  ObjectPageSample sample(sent);
+  std::size_t named = 0;
+  for (const ListedObject& object : listing_of(sample.page()).objects) {
+    EXPECT_EQ(object.group_name, "seven");
+    if (object.owner_name.empty()) continue;
+    EXPECT_EQ(object.owner_name, fmt::format("user {}", object.info.owner));
+    ++named;
+  }
+  EXPECT_EQ(named, 15U);
 }
 
 TEST(ObjectRows, CutTheListOfHolders) {
