@@ -407,8 +407,9 @@ typedef struct {
  * node; the log says why. Control. */
 RTS_HANDLE CDECL plc_channel_open(const char* pszName, RTS_RESULT* pResult);
 
-/* The address of the instance of that name, NULL: of this one. PLC_NO_NODE: there is none (yet). Looks at up
- * to 128 names: in a cycle keep the address, which an instance has again after a restart. Any. */
+/* The address of the instance of that name, "packer", or of one of another host, "packer@south"; NULL: of
+ * this one. PLC_NO_NODE: there is none (yet). Looks at up to 128 names: in a cycle keep the address, which an
+ * instance has again after a restart. Any. */
 unsigned int CDECL plc_node_address(const char* pszInstance);
 
 /* Sends a block. Never waits. ERR_OK: it is in the queue of the next node on the way; ERR_NOBUFFER;

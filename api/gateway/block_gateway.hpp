@@ -89,6 +89,7 @@ class BlockGateway {
 
   // The serving thread; block_gateway_peers.cpp: who is there
   void follow_hosts(TimePoint now);
+  void follow(const plc_BlockHostStatus& host, const dds_sample_info_t& info, TimePoint now);
   void settle_peers(TimePoint now);
   void add_peer(const HostClaim& claim);
   [[nodiscard]] Result<std::unique_ptr<Peer>> open_peer(const HostClaim& claim) const;
@@ -99,6 +100,7 @@ class BlockGateway {
   void renew_writer(Peer& peer);
   void tell_of_numbers(TimePoint now);
   void announce();
+  void publish_names();
 
   // block_gateway.cpp: what they send
   void take_acks(TimePoint now);
@@ -130,7 +132,8 @@ class BlockGateway {
   std::optional<PendingBlocks> pending_;
   std::vector<std::pair<std::uint16_t, std::string>> announced_;
   bool has_announced_ = false;
-  std::string told_;  // of the numbers
+  std::map<std::string, std::vector<std::pair<std::uint16_t, std::string>>> names_;  // of each other host
+  std::string told_;                                                                 // of the numbers
   std::vector<std::uint16_t> reached_;
   TimePoint next_beat_{};
   std::unique_ptr<BlockRouter> router_;

@@ -1,5 +1,6 @@
 // Which other hosts there are: see block_gateway.hpp.
 #include <algorithm>
+#include <span>
 
 #include <fmt/format.h>
 
@@ -8,41 +9,77 @@
 #include "api/dds/topics.hpp"
 #include "api/gateway/block_gateway.hpp"
 #include "shm/base/log.hpp"
+#include "shm/base/names.hpp"
 
 namespace plchost {
 
 void BlockGateway::follow_hosts(TimePoint now) {
   bool news = false;
-  dds::take_all<plc_BlockHostStatus>(host_reader_.get(),
-                                     [&](const plc_BlockHostStatus& host, const dds_sample_info_t& info) {
-                                       const std::string name(dds::text_of(host.host));
-                                       news = true;
-                                       if (info.instance_state != DDS_IST_ALIVE)
-                                         return numbers_.forget(name, now);
-                                       const dds::Guid writer = dds::writer_of(host_reader_.get(), info);
-                                       if (!info.valid_data || writer == dds::Guid{}) return;
-                                       numbers_.claim({.host = name,
-                                                       .number = host.host_number,
-                                                       .since_ns = host.since_unix_ns,
-                                                       .epoch = host.epoch,
-                                                       .participant = writer.participant()},
-                                                      now);
-                                     });
-  if (news) settle_peers(now);
+  dds::take_all<plc_BlockHostStatus>(host_reader_.get(), [&](const auto& host, const auto& info) {
+    follow(host, info, now);
+    news = true;
+  });
+  if (!news) return;
+  settle_peers(now);
+  publish_names();
+}
+
+void BlockGateway::follow(const plc_BlockHostStatus& host, const dds_sample_info_t& info, TimePoint now) {
+  const std::string name(dds::text_of(host.host));
+  if (info.instance_state != DDS_IST_ALIVE) {
+    names_.erase(name);
+    return numbers_.forget(name, now);
+  }
+  const dds::Guid writer = dds::writer_of(host_reader_.get(), info);
+  if (!info.valid_data || writer == dds::Guid{}) return;
+  numbers_.claim({.host = name,
+                  .number = host.host_number,
+                  .since_ns = host.since_unix_ns,
+                  .epoch = host.epoch,
+                  .participant = writer.participant()},
+                 now);
+  auto& names = names_[name];
+  names.clear();
+  for (const plc_BlockNode& node : std::span(host.nodes._buffer, host.nodes._length)) {
+    names.emplace_back(node.node, dds::text_of(node.name));
+  }
+}
+
+// Of the hosts that have their numbers.
+void BlockGateway::publish_names() {
+  std::vector<RemoteNode> nodes;
+  for (const auto& [number, peer] : peers_) {
+    for (const auto& [node, name] : names_[peer->claim.host]) {
+      const NodeAddress address{.host = number, .node = node};
+      if (!address.valid() || !check_name("node name", name, kMaxInstanceName)) continue;
+      nodes.push_back(RemoteNode::of(peer->claim.host, name, address));
+    }
+  }
+  if (nodes.size() > RemoteNames::kMost) {
+    spdlog::warn("blocks: of {} nodes of other hosts {} are found by name", nodes.size(), RemoteNames::kMost);
+  }
+  node_->set_remote_nodes(nodes);
 }
 
 // The peers that there are become those that there shall be.
 void BlockGateway::settle_peers(TimePoint now) {
   const auto wanted = numbers_.serves(now) ? numbers_.others() : std::map<std::uint16_t, HostClaim>();
+  bool changed = false;
   for (auto peer = peers_.begin(); peer != peers_.end();) {
     const auto same = wanted.find(peer->first);
     const auto next = std::next(peer);
-    if (same == wanted.end() || same->second != peer->second->claim) remove_peer(peer);
+    if (same == wanted.end() || same->second != peer->second->claim) {
+      remove_peer(peer);
+      changed = true;
+    }
     peer = next;
   }
   for (const auto& [number, claim] : wanted) {
-    if (!peers_.contains(number)) add_peer(claim);
+    if (peers_.contains(number)) continue;
+    add_peer(claim);
+    changed = true;
   }
+  if (changed) publish_names();
 }
 
 Result<void> BlockGateway::open_block_writer(Peer& peer) const {

@@ -31,8 +31,13 @@ Result<void> check_channel_name(std::string_view name) {
   return check_name("channel name", name, kMaxChannelName);
 }
 
-BlockNode::BlockNode(NodeOptions options, NodeDirectory directory, const NodeLife& life)
-    : options_(std::move(options)), directory_(std::move(directory)), life_(life), entry_(options_.entry) {}
+BlockNode::BlockNode(NodeOptions options, NodeDirectory directory, RemoteNames remote_names,
+                     const NodeLife& life)
+    : options_(std::move(options)),
+      directory_(std::move(directory)),
+      remote_names_(std::move(remote_names)),
+      life_(life),
+      entry_(options_.entry) {}
 
 BlockNode::~BlockNode() {
   directory_.leave(life_);
@@ -45,12 +50,15 @@ Result<std::unique_ptr<BlockNode>> BlockNode::join(const NodeOptions& options) {
   }
   auto directory = NodeDirectory::open(options.pool, options.base);
   if (!directory) return std::unexpected(std::move(directory).error());
+  auto remote_names = RemoteNames::open(options.pool, options.base);
+  if (!remote_names) return std::unexpected(std::move(remote_names).error());
   const auto life = directory->join(options.entry);
   if (!life) return std::unexpected(life.error());
   if (options.host_number != 0) {
     directory->layout().host_number.store(options.host_number, std::memory_order_relaxed);
   }
-  return std::unique_ptr<BlockNode>(new BlockNode(options, *std::move(directory), *life));
+  return std::unique_ptr<BlockNode>(
+      new BlockNode(options, *std::move(directory), *std::move(remote_names), *life));
 }
 
 bool BlockNode::is_local(NodeAddress address) const noexcept {
@@ -187,6 +195,10 @@ void BlockNode::set_hosts(std::vector<HostRange> hosts) {
   keep_record();
 }
 
+void BlockNode::set_remote_nodes(std::span<const RemoteNode> nodes) noexcept {
+  remote_names_.write(nodes);
+}
+
 // What a stranger has changed is written again.
 void BlockNode::keep_record() {
   const std::scoped_lock lock(entry_mutex_);
@@ -208,9 +220,14 @@ Result<std::uint32_t> BlockNode::open_channel(std::string_view name) {
 }
 
 NodeAddress BlockNode::find(std::string_view name) noexcept {
-  const auto node = directory_.find(name);
-  if (!node) return {};
-  const NodeAddress found{.host = 0, .node = *node};
+  NodeAddress found;
+  if (const auto remote = remote_names_.find(name)) {
+    found = *remote;
+  } else if (const auto node = directory_.find(name)) {
+    found.node = *node;
+  } else {
+    return {};
+  }
   const std::uint16_t hop = next_hop(found);
   if (hop != 0 && hop <= kMaxNodes && out_[hop - 1U].closed()) want_link(hop);
   return found;

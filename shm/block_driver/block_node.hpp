@@ -15,6 +15,7 @@
 #include "shm/block_driver/block_link.hpp"
 #include "shm/block_driver/link_gate.hpp"
 #include "shm/block_driver/node_directory.hpp"
+#include "shm/block_driver/remote_names.hpp"
 #include "shm/block_driver/routes.hpp"
 
 namespace plchost {
@@ -79,7 +80,8 @@ class BlockNode {
   /// Grows with each block for this node: to poll cheaply, and for soft threads to wait on.
   [[nodiscard]] CountedEvent& arrivals() noexcept { return own_slot().arrivals; }
 
-  /// Real-time. Also asks for the link to it. Node 0: there is nobody of that name on this host.
+  /// "packer": on this host; "packer@south": on another one. Real-time. Also asks for the link that leads
+  /// there. Node 0: there is nobody of that name.
   [[nodiscard]] NodeAddress find(std::string_view name) noexcept;
   /// A block that another host sent, at the gateway that got it. invalid: also one that says that it is of
   /// this host. Any thread.
@@ -88,6 +90,8 @@ class BlockNode {
   /// A gateway's: the other hosts that are reached at present, at most kMaxHostRanges; the senders of blocks
   /// for others are told that they are unreachable. Soft threads.
   void set_hosts(std::vector<HostRange> hosts);
+  /// A gateway's: the nodes of other hosts, for find(); see RemoteNames::write(). One soft thread.
+  void set_remote_nodes(std::span<const RemoteNode> nodes) noexcept;
   /// What the node counts, besides what its links do.
   [[nodiscard]] NodeCounters& counters() noexcept { return own_slot().counters; }
   /// Its directory was cut short by a stranger. Any context.
@@ -107,7 +111,7 @@ class BlockNode {
 
  private:
   friend class BlockRouter;
-  BlockNode(NodeOptions options, NodeDirectory directory, const NodeLife& life);
+  BlockNode(NodeOptions options, NodeDirectory directory, RemoteNames remote_names, const NodeLife& life);
   [[nodiscard]] NodeSlot& own_slot() const noexcept { return directory_.slot(life_.node); }
   [[nodiscard]] bool is_local(NodeAddress address) const noexcept;
   [[nodiscard]] bool is_for_us(NodeAddress address) const noexcept;
@@ -121,6 +125,7 @@ class BlockNode {
 
   const NodeOptions options_;
   NodeDirectory directory_;
+  RemoteNames remote_names_;
   const NodeLife life_;
   std::array<LinkGate<OutLink>, kMaxNodes> out_;
   std::array<LinkGate<InLink>, kMaxNodes> in_;

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include "api/dds/text.hpp"
+#include "api/gateway/block_sample.hpp"
 #include "api/server/event_intake.hpp"
 #include "api/server/request_check.hpp"
 
@@ -43,6 +44,24 @@ bool names_what_is_there(const ControlRequest& request) {
   return request.instance == (of_host ? "" : "line1");
 }
 
+// What another host writes goes in only as a block of that host's own nodes, for this one.
+void take_block(const std::uint8_t* data, std::size_t size) {
+  constexpr std::uint16_t kSender = 2;
+  constexpr std::uint16_t kOwn = 1;
+  auto block = sample_from<plc_Block>(data, size);
+  block.contents = {};
+  if (size % 2 == 0) block.source_host = kSender;
+  if (size % 4 == 0) block.destination_host = kOwn;
+  const auto header = block_header(block, kSender, kOwn);
+  if (!header) return;
+  const NodeAddress source = NodeAddress::from_number(header->source);
+  const NodeAddress destination = NodeAddress::from_number(header->destination);
+  const bool for_us = destination.host == kOwn || destination.host == NodeAddress::kAllHosts;
+  if (source.host != kSender || source.to_all() || !for_us || !is_sane(*header)) std::abort();
+  const plc_Block again = block_sample(*header, block_contents(block), block.sequence_number);
+  if (block_header(again, kSender, kOwn) != header) std::abort();
+}
+
 }  // namespace
 
 // Whatever a client writes: a request is refused with a reason or is one that the manager can be given, and a
@@ -58,6 +77,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       std::abort();
     }
   }
+  take_block(data, size);
   auto post = sample_from<plc_EventPost>(data, size);
   // Half of the runs get as far as the event's name.
   if (size % 2 == 0) {

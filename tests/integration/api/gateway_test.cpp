@@ -124,6 +124,25 @@ TEST_F(Gateway, BlocksOfAllSizesGoToANodeOfAnotherHostAndRepliesComeBack) {
   for (const Json& node : nodes("north")) EXPECT_EQ(node["host_number"], 1);
 }
 
+TEST_F(Gateway, NodesOfOtherHostsAreFoundByName) {
+  Side south(domain_, "south", 2, "packer");
+  Side north(domain_, "north", 1, "press");
+  NodeAddress found;
+  ASSERT_TRUE(becomes([&] {
+    found = north.node.node().find("packer@south");
+    return found.node != 0;
+  }));
+  EXPECT_EQ(found, south.address_at(2));
+  send(north, found, pattern(10));
+  EXPECT_TRUE(south.next());
+  for (const char* nobody :
+       {"packer", "paker@south", "packer@east", "packer@", "@south", "@", "press@south"}) {
+    EXPECT_EQ(north.node.node().find(nobody).node, 0) << nobody;
+  }
+  RunningNode late(south.host, "late");
+  EXPECT_TRUE(becomes([&] { return north.node.node().find("late@south").node != 0; }));
+}
+
 TEST_F(Gateway, ManyBlocksComeOnceEachAndInOrderHoweverFastTheyAreSent) {
   Side south(domain_, "south", 2, "packer");
   Side north(domain_, "north", 1, "press");

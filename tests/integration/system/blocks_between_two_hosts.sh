@@ -44,13 +44,13 @@ EOF
 write_side north 1 10.77.0.2 11
 write_side south 2 10.77.0.1 12
 
-# Each sends requests to the other by address, and answers those of the other.
-start_side() { # HOST SPACE PEER_ADDRESS
-  TALKER_ADDRESS=$3 ip netns exec "$2" "$BIN/plchostd" --config "$cell/$1.toml" 2>>"$cell/$1.log" &
+# Each sends requests to the other, one by address and one by name, and answers those of the other.
+start_side() { # HOST SPACE VARIABLE=PEER
+  env "$3" ip netns exec "$2" "$BIN/plchostd" --config "$cell/$1.toml" 2>>"$cell/$1.log" &
   managers+=($!)
 }
-start_side north "$north_space" $((2 << 16 | 12))
-start_side south "$south_space" $((1 << 16 | 11))
+start_side north "$north_space" TALKER_ADDRESS=$((2 << 16 | 12))
+start_side south "$south_space" TALKER_PEER=talker@north
 at() { # HOST COMMAND...: plcctl beside that host
   local host=$1
   shift
@@ -70,7 +70,7 @@ both_go_on() {
 }
 none_wrong() { ! grep -h 'wrong reply' "$cell"/*.log || fail "a reply was wrong"; }
 
-echo "- requests and replies by address, both ways"
+echo "- requests and replies, both ways"
 both_go_on
 none_wrong
 hosts_of_gateway() { at "$1" list nodes --json | jq -r '.[] | select(.name == "gateway") | .hosts'; }

@@ -137,7 +137,7 @@ INSTANTIATE_TEST_SUITE_P(
         WrongConfig{"syntax", "[host]\nname = \n", "2", ""},
         WrongConfig{"section", "[hots]\n", "1",
                     "unknown section or key 'hots'; allowed are [host], [dds], "
-                    "[[instance]]; did you mean 'host'?"},
+                    "[blocks], [[instance]]; did you mean 'host'?"},
         WrongConfig{"section_type", "host = 1\n", "1", "'host' must be a section: [host]"},
         WrongConfig{"key", "[host]\nnmae = \"x\"\n", "2", "[host] unknown key 'nmae'; allowed are name, "},
         WrongConfig{"suggestion", "[host]\nnmae = \"x\"\n", "2", "did you mean 'name'?"},
@@ -192,6 +192,18 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& test) { return test.param.name; });
 
 INSTANTIATE_TEST_SUITE_P(
+    Blocks, ConfigRefuses,
+    testing::Values(WrongConfig{"number", "[blocks]\nhost_number = 65535\n", "2", "0 to 65534"},
+                    WrongConfig{"base", "[blocks]\nbase = \"a/b\"\n", "2", "name 'a/b' is not valid"},
+                    WrongConfig{"key", "[blocks]\nnumber = 1\n", "2", "allowed are host_number, base"},
+                    WrongConfig{"without_dds", "[dds]\nenabled = false\n[blocks]\nhost_number = 1\n", "4",
+                                "needs [dds] enabled = true"},
+                    WrongConfig{"taken_name",
+                                "[blocks]\nhost_number = 1\n[[instance]]\nname = \"gateway\"\ncore = 1\n",
+                                "4", "'gateway' is taken"}),
+    [](const auto& test) { return test.param.name; });
+
+INSTANTIATE_TEST_SUITE_P(
     Instance, ConfigRefuses,
     testing::Values(
         WrongConfig{"single_brackets", "[instance]\n", "1", "double brackets: [[instance]]"},
@@ -235,6 +247,15 @@ TEST(Config, ReportsAllErrorsInTheOrderOfTheirLines) {
   ASSERT_FALSE(sut.has_value());
   EXPECT_THAT(sut.error(), ElementsAre(HasSubstr("toml:2: "), HasSubstr("toml:3: "), HasSubstr("toml:6: "),
                                        HasSubstr("toml:7: ")));
+}
+
+TEST(Config, ReadsTheNumberOfTheHostForBlocks) {
+  EXPECT_EQ(parse("")->blocks.host_number, 0);
+  EXPECT_EQ(parse("")->blocks.base, "blocks");
+  const auto sut = parse("[blocks]\nhost_number = 65534\nbase = \"line\"\n");
+  ASSERT_TRUE(sut.has_value());
+  EXPECT_EQ(sut->blocks.host_number, 65534);
+  EXPECT_EQ(sut->blocks.base, "line");
 }
 
 TEST(Config, RefusesASharedCoreUnlessAllSayIt) {

@@ -1,8 +1,9 @@
 /*
  * Answers each request on the channel "talk" with the same contents. With TALKER_PEER=NAME it sends requests
  * of changing size to that instance, one at a time, and says what came of it: "N replies", "N lost",
- * "wrong ...". With TALKER_ADDRESS=NUMBER it sends them to that address, and also says "N not sent", "N
- * cycles". With TALKER_CALL=1 it also calls all nodes now and then; who hears it says "called by N".
+ * "wrong ...". With TALKER_ADDRESS=NUMBER it sends them to that address, and also says (as for a NAME@HOST)
+ * "N not sent", "N cycles". With TALKER_CALL=1 it also calls all nodes now and then; who hears it says
+ * "called by N".
  */
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,7 +23,7 @@ static unsigned int out_size;
 static unsigned int correlation;
 static unsigned int waiting; /* cycles since the request; 0: none is under way */
 static unsigned int number, replies, lost, not_sent, cycles;
-static int by_address;
+static int says_more;
 
 static void say(const char* before, unsigned int value, const char* behind) {
   char text[PLC_LOG_MAX_TEXT];
@@ -37,7 +38,7 @@ static void ask(void) {
   out_size = number * 7919u % (PLC_MAX_BLOCK + 1u);
   for (i = 0; i < out_size; i += 61u) out[i] = (unsigned char)(number + i);
   if (plc_channel_request(channel, peer, (int)(number % 4u), out, out_size, &correlation) != ERR_OK) {
-    if (++not_sent % 100u == 0u && by_address) say("", not_sent, " not sent");
+    if (++not_sent % 100u == 0u && says_more) say("", not_sent, " not sent");
     return;
   }
   ++number;
@@ -66,9 +67,9 @@ static void cycle(void) {
     waiting = 0;
     say("", ++lost, " lost");
   }
-  if ((peer_name != NULL || by_address) && waiting == 0u) ask();
+  if ((peer_name != NULL || peer != PLC_NO_NODE) && waiting == 0u) ask();
   ++cycles;
-  if (by_address && cycles % 1000u == 0u) say("", cycles, " cycles");
+  if (says_more && cycles % 1000u == 0u) say("", cycles, " cycles");
   if (calls && cycles % 100u == 0u)
     (void)plc_channel_send(channel, PLC_ALL_NODES, PLC_BLOCK_HIGH, "hello", 5u);
 }
@@ -80,10 +81,12 @@ PLC_EXPORT_ABI;
 
 int plc_app_init(void) {
   RTS_RESULT result;
+  const char* address;
   peer_name = getenv("TALKER_PEER");
   calls = getenv("TALKER_CALL") != NULL;
-  by_address = getenv("TALKER_ADDRESS") != NULL;
-  if (by_address) peer = (unsigned int)strtoul(getenv("TALKER_ADDRESS"), NULL, 10);
+  address = getenv("TALKER_ADDRESS");
+  if (address != NULL) peer = (unsigned int)strtoul(address, NULL, 10);
+  says_more = address != NULL || (peer_name != NULL && strchr(peer_name, '@') != NULL);
   channel = plc_channel_open("talk", &result);
   if (result != ERR_OK) return 1;
   say("talks from address ", plc_node_address(NULL), "");
