@@ -12,7 +12,8 @@
  *
  * The record is a shared memory of the pool, the file /dev/shm/POOL.memory.NAME; an instance follows it with
  * [DistributedClock] Reference=NAME in its settings. Whoever comes first makes it, firmware or instance; it
- * outlives both. One writer at a time, any number of readers; nobody ever waits.
+ * outlives both, and is an object of the pool like all others once anybody opens it there by name, or the
+ * manager has looked. One writer at a time, any number of readers; nobody ever waits.
  *
  * What makes a pair good is that both stamps are of the same instant. A pair whose stamps were torn apart
  * (the writer lost the processor between them) is left out by the reader, as long as it is not the rule. Best
