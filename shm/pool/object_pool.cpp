@@ -200,7 +200,7 @@ Result<ObjectEntry*> ObjectPool::make_entry(const Wanted& wanted, const MemoryRi
     entry->size.store(wanted.size, kRelaxed);
     // A file of that name that is no object, nor to be one, is what is left of another pool of the name.
     const auto named = (*std::move(memory)).give_name([&](const std::string& path) {
-      return !PoolAdoption::is_for_adoption(path, name());
+      return !PoolAdoption::is_in_use(path, name());
     });
     if (!named) {
       objects.erase(*entry);
@@ -258,6 +258,9 @@ Result<Created<T>> ObjectPool::create_object(const Wanted& wanted, const ObjectO
       // Firmware has just made it.
       auto there = open_memory(wanted, Access::read_write);
       if (there) return Created<T>{.object = *std::move(there), .made = false};
+      return failure(ErrorCode::refused,
+                     fmt::format("memory '{}': {}, and is in use by the runtime; choose another name",
+                                 wanted.name, created.error().message));
     }
     if (!created) return created;
     if (auto mapped = map(created->object, wanted, Access::read_write); !mapped) {

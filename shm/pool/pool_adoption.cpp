@@ -33,6 +33,7 @@ struct MemoryFileState {
     empty,       ///< just being made, or emptied by a stranger
     unfinished,  ///< just being made: it does not say yet what it is
     described,   ///< says what it is, and has the size for it
+    of_blocks,   ///< of CmpBlkDrvShm, which keeps it without an entry
     other,
   };
   Kind kind = Kind::none;
@@ -73,8 +74,12 @@ MemoryFileState examine(const std::string& path) {
   std::memcpy(&image, begin.data(), sizeof(image));
   std::memcpy(&clock, begin.data(), sizeof(clock));
   const auto size = static_cast<std::uint64_t>(state.status.st_size);
+  // What its magic numbers begin with.
+  constexpr std::string_view kOfBlocks = "pblk";
   if (size == 0) {
     state.kind = Kind::empty;
+  } else if (std::string_view(begin.data(), kOfBlocks.size()) == kOfBlocks) {
+    state.kind = Kind::of_blocks;
   } else if (image.magic == 0) {
     state.kind = Kind::unfinished;
   } else if (is_image(image, size) || is_reference_clock(clock, size)) {
@@ -168,6 +173,11 @@ bool PoolAdoption::is_left_over(const ObjectEntry& entry) noexcept {
 
 bool PoolAdoption::is_for_adoption(const std::string& path, const std::string& pool) {
   return can_be_adopted(examine(path), pool);
+}
+
+bool PoolAdoption::is_in_use(const std::string& path, const std::string& pool) {
+  const MemoryFileState state = examine(path);
+  return state.kind == Kind::of_blocks || can_be_adopted(state, pool);
 }
 
 bool PoolAdoption::reconcile(PoolSegment& segment, std::string_view name) {

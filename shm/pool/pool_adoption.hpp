@@ -30,8 +30,10 @@ class PoolAdoption {
   /// Waits up to 20 ms for a file that is just being made.
   [[nodiscard]] static bool reconcile(PoolSegment& segment, std::string_view name);
 
-  /// Of a file: whether one becomes an object, so that no other may take its name.
+  /// Of a file: whether it becomes an object.
   [[nodiscard]] static bool is_for_adoption(const std::string& path, const std::string& pool);
+  /// The same, or it belongs to CmpBlkDrvShm: no memory may take its name.
+  [[nodiscard]] static bool is_in_use(const std::string& path, const std::string& pool);
 
   /// The entry is that of a memory that has gone, whose file could not be removed.
   [[nodiscard]] static bool is_left_over(const ObjectEntry& entry) noexcept;

@@ -7,6 +7,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "shm/pool/object_pool.hpp"
 #include "tests/unit/pool/unique_pool_name.hpp"
 
 namespace plchost {
@@ -119,6 +120,15 @@ TEST_F(NodeDirectoryTest, ARecordThatAStrangerChangedIsWrittenAgain) {
     ASSERT_TRUE(sut_.record(life.node));
     EXPECT_EQ(sut_.record(life.node)->name.view(), "a");
   }
+}
+
+TEST_F(NodeDirectoryTest, IsNotReplacedByAMemoryOfItsName) {
+  auto pool = ObjectPool::create(pool_.get()).value();
+  const auto memory = pool.create_memory("blocks", 5000);
+  ASSERT_FALSE(memory);
+  EXPECT_EQ(memory.error().code, ErrorCode::refused);
+  EXPECT_THAT(memory.error().message, HasSubstr("in use"));
+  EXPECT_TRUE(NodeDirectory::open_to_read(pool_.get()));
 }
 
 TEST_F(NodeDirectoryTest, RefusesAFileThatIsNoDirectory) {
