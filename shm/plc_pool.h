@@ -117,7 +117,7 @@ int plc_pool_list(plc_pool* pool, plc_pool_visitor visitor, void* user);
 /* ---- Time-outs -------------------------------------------------------------------------------------------
  */
 
-/* In nanoseconds from now. */
+/* In nanoseconds from now; less than PLC_POOL_FOREVER, as "deadline - now" may be: the time is over. */
 #define PLC_POOL_NO_WAIT 0L
 #define PLC_POOL_FOREVER (-1L)
 

@@ -13,10 +13,11 @@
  *
  * An image is a shared memory of the pool, the file /dev/shm/POOL.memory.NAME; an instance has its inputs or
  * outputs in it with [SysMem] Linux.Area.n.Object=NAME in its settings. Whoever comes first makes it,
- * firmware or instance; it outlives both. It has one writer at a time and any number of readers; nobody ever
- * waits for anybody, also if the other one is pre-empted or killed within. The writer fills a slot that is
- * not the latest and then publishes it; the reader copies the latest and looks whether it was overtaken
- * meanwhile, which takes the writer PLC_IMAGE_SLOTS - 2 publications.
+ * firmware or instance; it outlives both (one that was a memory of plc_pool.h before lives as long as that:
+ * make it with PLC_POOL_KEEP). It has one writer at a time and any number of readers; nobody ever waits for
+ * anybody, also if the other one is pre-empted or killed within. The writer fills a slot that is not the
+ * latest and then publishes it; the reader copies the latest and looks whether it was overtaken meanwhile,
+ * which takes the writer PLC_IMAGE_SLOTS - 2 publications.
  *
  * Inputs are copied in at the start of a task's cycle, outputs out at its end. The stamp tells when an image
  * was published: firmware that sees an old one (the instance was stopped, or is gone) brings its outputs into
@@ -55,7 +56,9 @@ typedef char plc_image_needs_64_bit_long[sizeof(long) == 8 ? 1 : -1];
 
 #define PLC_IMAGE_MAGIC 0x6567616d69636c70UL /* "plcimage", as bytes in memory */
 #define PLC_IMAGE_VERSION 1u
-#define PLC_IMAGE_PATH "/dev/shm/%s.memory.%s" /* pool, name */
+#define PLC_IMAGE_PATH "/dev/shm/%s.memory." /* pool; then the name, see plc_image_path() */
+#define PLC_IMAGE_PATH_SIZE 265              /* of the longest path, with its end */
+#define PLC_IMAGE_MAX_NAME 95u               /* bytes of UTF-8 */
 #define PLC_IMAGE_SLOTS 16u
 #define PLC_IMAGE_MAX_SIZE 1048576u /* bytes of inputs or outputs in one image */
 
@@ -216,11 +219,34 @@ static __inline__ int plc_image_is_one(const plc_image_header* header, unsigned 
          __atomic_load_n(&header->size, __ATOMIC_RELAXED) == size;
 }
 
+/* The file of an image, `path` having PLC_IMAGE_PATH_SIZE bytes: what no file name should have in it stands
+ * there as % and two hexadecimal digits. EINVAL: no name, or control characters in it; ENAMETOOLONG. Set-up.
+ */
+static __inline__ int plc_image_path(const char* pool, const char* name, char* path) {
+  static const char plain[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._-";
+  int end;
+  if (pool[0] == '\0' || name[0] == '\0') return EINVAL;
+  if (strlen(name) > PLC_IMAGE_MAX_NAME) return ENAMETOOLONG;
+  end = snprintf(path, PLC_IMAGE_PATH_SIZE, PLC_IMAGE_PATH, pool);
+  for (; *name != '\0'; ++name) {
+    const unsigned char c = (unsigned char)*name;
+    if (end + 4 > PLC_IMAGE_PATH_SIZE) return ENAMETOOLONG;
+    if (c < 0x20 || c == 0x7f) return EINVAL;
+    if (c >= 0x80 || strchr(plain, c) != NULL) {
+      path[end++] = *name;
+      path[end] = '\0';
+    } else {
+      end += snprintf(path + end, 4, "%%%02X", (unsigned int)c);
+    }
+  }
+  return 0;
+}
+
 /* The file is not what the name leads to any more: open it again. Set-up. */
 static __inline__ int plc_image_gone(const plc_image* image, const char* pool, const char* name) {
-  char path[256];
+  char path[PLC_IMAGE_PATH_SIZE];
   struct stat status;
-  if (snprintf(path, sizeof path, PLC_IMAGE_PATH, pool, name) >= (int)sizeof path) return 1;
+  if (plc_image_path(pool, name, path) != 0) return 1;
   return stat(path, &status) != 0 || status.st_dev != image->device || status.st_ino != image->inode ||
          (unsigned long)status.st_size != image->mapped;
 }
@@ -266,12 +292,12 @@ static __inline__ int plc_image_map(plc_image* image) {
  */
 static __inline__ int plc_image_open(const char* pool, const char* name, unsigned int size, int access,
                                      plc_image* image) {
-  char path[256];
-  int error = 0;
+  char path[PLC_IMAGE_PATH_SIZE];
+  int error = plc_image_path(pool, name, path);
   memset(image, 0, sizeof *image);
   image->descriptor = -1;
-  if (pool[0] == '\0' || name[0] == '\0' || size == 0 || size > PLC_IMAGE_MAX_SIZE) return EINVAL;
-  if (snprintf(path, sizeof path, PLC_IMAGE_PATH, pool, name) >= (int)sizeof path) return ENAMETOOLONG;
+  if (error != 0) return error;
+  if (size == 0 || size > PLC_IMAGE_MAX_SIZE) return EINVAL;
   image->size = size;
   image->mapped = plc_image_bytes(size);
   image->descriptor = open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0660);

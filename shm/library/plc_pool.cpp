@@ -37,8 +37,9 @@ static_assert(PLC_POOL_EVENT == static_cast<unsigned>(ObjectType::event));
 static_assert(PLC_POOL_MUTEX == static_cast<unsigned>(ObjectType::mutex));
 
 TimePoint deadline_of(long timeout_ns) noexcept {
-  if (timeout_ns < 0) return kNoDeadline;
+  if (timeout_ns == PLC_POOL_FOREVER) return kNoDeadline;
   const TimePoint now = MonotonicClock::now();
+  if (timeout_ns < 0) return now;
   return kNoDeadline - now > Duration(timeout_ns) ? now + Duration(timeout_ns) : kNoDeadline;
 }
 

@@ -397,6 +397,8 @@ Result<SharedMemory> ObjectPool::replace_memory(std::string_view name, std::size
 
 Result<void> ObjectPool::remove_object(std::string_view name) {
   if (auto valid = check_object_name(name); !valid) return valid;
+  // Firmware may have made it with a header alone.
+  if (PoolTable(segment_->view()).peek(name) == nullptr) (void)PoolAdoption::reconcile(*segment_, name);
   const auto held = segment_->lock();
   if (!held) return std::unexpected(held.error());
   ObjectEntry* const entry = PoolTable(segment_->view()).find(name);

@@ -102,6 +102,29 @@ TEST_F(PoolAdoptionTest, ToCreateWhatFirmwareHasMadeOpensIt) {
   EXPECT_EQ(plc_image_gone(&image.get(), name_.get().c_str(), "in"), 0);
 }
 
+TEST_F(PoolAdoptionTest, ToRemoveWhatFirmwareHasMadeNeedsNoLookBefore) {
+  const FirmwareImage image(name_.get(), "in", 16);
+  EXPECT_TRUE(pool_.remove_object("in"));
+  EXPECT_NE(plc_image_gone(&image.get(), name_.get().c_str(), "in"), 0);
+  EXPECT_EQ(pool_.remove_object("in").error().code, ErrorCode::not_found);
+}
+
+TEST_F(PoolAdoptionTest, FirmwareAndPoolMeanTheSameFileByEachName) {
+  for (const std::string name : {"a b", "line1/in", "100%", "F\u00fcller", "...", "*"}) {
+    const FirmwareImage image(name_.get(), name, 16);
+    const auto memory = pool_.open_memory(name);
+    ASSERT_TRUE(memory) << memory.error().describe();
+    EXPECT_EQ(memory->bytes().size(), plc_image_bytes(16));
+  }
+  plc_image none;
+  EXPECT_EQ(plc_image_open(name_.get().c_str(), "a\nb", 16, PLC_IMAGE_READ, &none), EINVAL);
+  const std::string longest(PLC_IMAGE_MAX_NAME, 'x');
+  const FirmwareImage image(name_.get(), longest, 16);
+  EXPECT_TRUE(pool_.open_memory(longest));
+  EXPECT_EQ(plc_image_open(name_.get().c_str(), (longest + "x").c_str(), 16, PLC_IMAGE_READ, &none),
+            ENAMETOOLONG);
+}
+
 TEST_F(PoolAdoptionTest, ToOpenWhatFirmwareHasMadeNeedsNoLookBefore) {
   const FirmwareImage image(name_.get(), "in", 16);
   EXPECT_EQ(pool_.open_memory("in")->bytes().size(), plc_image_bytes(16));

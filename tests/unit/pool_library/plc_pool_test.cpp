@@ -82,6 +82,8 @@ TEST_F(PlcPool, EventsAreCounted) {
   ASSERT_EQ(plc_event_create(pool_, "e", nullptr, &event), PLC_POOL_OK);
   plc_pool_u64 cursor = plc_event_count(event);
   EXPECT_EQ(plc_event_wait(event, &cursor, PLC_POOL_NO_WAIT), PLC_POOL_TIMED_OUT);
+  EXPECT_EQ(plc_event_wait(event, &cursor, PLC_POOL_FOREVER - 1), PLC_POOL_TIMED_OUT)
+      << "a time that is over";
   EXPECT_EQ(plc_event_wait(event, &cursor, 1'000'000), PLC_POOL_TIMED_OUT);
   std::thread poster([&] {
     for (int i = 0; i < 3; ++i) plc_event_post(event);
