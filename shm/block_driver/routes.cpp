@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <map>
-#include <utility>
+#include <tuple>
 
 namespace plchost {
 
@@ -63,7 +63,9 @@ std::vector<HostRoute> host_routes(const NodeDirectory& directory, const Topolog
                         .links = distances[node - 1U]});
     }
   }
-  std::ranges::stable_sort(routes, {}, &HostRoute::links);
+  std::ranges::sort(routes, {}, [](const HostRoute& route) {
+    return std::tuple(route.links, route.gateway, route.hosts.first);
+  });
   if (routes.size() > kMaxHostRoutes) routes.resize(kMaxHostRoutes);
   return routes;
 }
