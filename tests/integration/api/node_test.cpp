@@ -12,9 +12,7 @@
 namespace plchost {
 namespace {
 
-using testing::ElementsAre;
 using testing::HasSubstr;
-using testing::Not;
 using Json = nlohmann::json;
 
 class Nodes : public testing::Test {
@@ -111,7 +109,7 @@ TEST_F(Nodes, BlocksThatNobodyReceivesAreSeenWaiting) {
 }
 
 TEST_F(Nodes, ThatAreNotThereAreNamed) {
-  RunningNode packer(host_, "packer");
+  const RunningNode packer(host_, "packer");
   const auto wrong = run({"show", "routes", "paker"});
   EXPECT_EQ(wrong.code, 1);
   EXPECT_THAT(wrong.errors, testing::AllOf(HasSubstr("paker"), HasSubstr("did you mean 'packer'?")));
