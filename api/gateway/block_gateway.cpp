@@ -209,7 +209,9 @@ void BlockGateway::take(const plc_Block& block, const dds::Guid& writer, TimePoi
     peer->taken = block.sequence_number - 1;
   }
   if (block.sequence_number <= peer->taken) return count(&NodeCounters::duplicates);
-  count(&NodeCounters::lost, block.sequence_number - peer->taken - 1);
+  // No more can be on their way: a larger gap is a stranger's.
+  const std::uint64_t gap = block.sequence_number - peer->taken - 1;
+  count(&NodeCounters::lost, std::min<std::uint64_t>(gap, BlockWindow::kMostBlocks));
   peer->taken = block.sequence_number;
   peer->has_news = true;
   const auto header = block_header(block, peer->claim.number, options_.number);

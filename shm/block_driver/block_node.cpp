@@ -213,6 +213,7 @@ Result<std::uint32_t> BlockNode::open_channel(std::string_view name) {
   const std::uint32_t number = channel_number(name);
   const std::scoped_lock lock(channels_mutex_);
   const auto [known, is_new] = channels_.try_emplace(number, name);
+  has_channels_.store(true, std::memory_order_release);
   if (is_new || known->second == name) return number;
   return failure(ErrorCode::already_exists,
                  fmt::format("channel '{}' has the same number as '{}', which is open: choose another name",

@@ -141,6 +141,7 @@ class BlockNode {
   NodeEntry entry_;                     // as it is now
   std::mutex channels_mutex_;           // set-up only
   std::map<std::uint32_t, std::string> channels_;
+  std::atomic<bool> has_channels_{false};  // so that somebody may take what is for all nodes
 };
 
 }  // namespace plchost

@@ -132,7 +132,7 @@ void BlockRouter::spread(const BlockHeader& header, std::span<const std::byte> c
     count_in(counters().duplicates);
     return;
   }
-  if (!own) {
+  if (!own && node_.has_channels_.load(std::memory_order_acquire)) {
     BlockHeader copy = header;
     copy.destination = node_.address().number();
     give_to(self, copy, contents);

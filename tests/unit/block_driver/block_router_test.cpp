@@ -149,6 +149,7 @@ TEST_F(BlockRouterTest, ABlockForAllComesToEachNodeOnceAndNotBack) {
   TestNode b = join("b");
   TestNode c = join("c");
   TestNode d = join("d");
+  for (TestNode* node : {&b, &c, &d}) (void)node->channel();
   settle(a, b, c, d);
   BlockChannel from = a.channel();
   ASSERT_EQ(from.send(kAll, bytes_of("all")), SendResult::sent);
@@ -167,6 +168,7 @@ TEST_F(BlockRouterTest, ABlockForAllComesToEachNodeOfARingOnce) {
   TestNode b = join("b", {"a", "c"});
   TestNode c = join("c", {"b", "d"});
   TestNode d = join("d", {"a", "c"});
+  for (TestNode* node : {&a, &b, &c, &d}) (void)node->channel();
   settle(a, b, c, d);
   for (TestNode* sender : {&a, &b, &c, &d}) {
     BlockChannel from = sender->channel();
@@ -182,9 +184,26 @@ TEST_F(BlockRouterTest, ABlockForAllComesToEachNodeOfARingOnce) {
   }
 }
 
+TEST_F(BlockRouterTest, ANodeWithoutAChannelIsGivenNoBlockForAll) {
+  TestNode a = join("a");
+  TestNode b = join("b");
+  settle(a, b);
+  ASSERT_EQ(a.channel().send(kAll, bytes_of("which makes the link")), SendResult::sent);
+  settle(a, b);
+  const auto before = b.node->arrivals().count();
+  ASSERT_EQ(a.channel().send(kAll, bytes_of("all")), SendResult::sent);
+  settle(a, b);
+  EXPECT_EQ(b.node->arrivals().count(), before) << "nobody would ever take it";
+  BlockChannel late = b.channel();
+  ASSERT_EQ(a.channel().send(kAll, bytes_of("again")), SendResult::sent);
+  settle(a, b);
+  EXPECT_EQ(b.next(late), "again");
+}
+
 TEST_F(BlockRouterTest, ASecondCopyOfABlockForAllIsDroppedAndCounted) {
   TestNode a = join("a");
   TestNode b = join("b");
+  for (TestNode* node : {&a, &b}) (void)node->channel();
   settle(a, b);
   BlockHeader header;
   header.source = NodeAddress{.host = 3, .node = 9}.number();
