@@ -83,7 +83,9 @@ _plcctl() {
       compopt -o filenames 2>/dev/null
       mapfile -t COMPREPLY < <(compgen -f -- "${COMP_WORDS[COMP_CWORD]}")
     else
-      COMPREPLY+=("${line%%$'\t'*}")
+      # Names may hold what a shell would run.
+      printf -v line %q "${line%%$'\t'*}"
+      COMPREPLY+=("$line")
     fi
   done < <(plcctl __complete "${COMP_WORDS[@]:1:COMP_CWORD}" 2>/dev/null)
 }

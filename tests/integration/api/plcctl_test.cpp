@@ -96,6 +96,14 @@ TEST_F(Plcctl, CompletesInBash) {
   EXPECT_EQ(run_program("/bin/bash", {"-c", script}).output, "line1\n");
 }
 
+TEST(Completion, LetsNoNameBeRunByTheShell) {
+  const std::string script =
+      "source <(" PLCCTL_PROGRAM
+      " completion bash); plcctl() { printf 'x$(touch y);z\\tan object\\na b\\t\\n'; }; "
+      "COMP_WORDS=(plcctl show object x); COMP_CWORD=3; _plcctl; printf '%s\\n' \"${COMPREPLY[@]}\"";
+  EXPECT_EQ(run_program("/bin/bash", {"-c", script}).output, "x\\$\\(touch\\ y\\)\\;z\na\\ b\n");
+}
+
 TEST_F(Plcctl, WatchesAListUntilItIsAskedToEnd) {
   EXPECT_EQ(run({"check", "host", "--watch"}).code, 2) << "that is no list";
   const std::string seen = testing::TempDir() + "plcctl-watch-" + std::to_string(::getpid());
