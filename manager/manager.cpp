@@ -215,7 +215,14 @@ void Manager::tick() {
 }
 
 void Manager::look_after_pool() {
-  if (pool_->tidy() || pool_lost_) return;
+  const PoolFindings found = pool_->tidy();
+  if (!found.lost && found.headers_mended + found.rebuilds + found.lost_objects != 0) {
+    spdlog::warn(
+        "pool '{}': another program has written over it: header written anew {} times, damaged lists made "
+        "anew {} times, {} objects lost",
+        config_.host.pool, found.headers_mended, found.rebuilds, found.lost_objects);
+  }
+  if (!found.lost || pool_lost_) return;
   pool_lost_ = true;
   spdlog::error(
       "pool '{}': another program has cut its file in {} short; what instances share is lost: stop this "

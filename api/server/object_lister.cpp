@@ -6,8 +6,8 @@
 #include <fmt/format.h>
 
 #include "api/server/account_names.hpp"
-#include "api/server/thread_owner.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/thread_owner.hpp"
 
 namespace plchost {
 

@@ -2,6 +2,13 @@
 
 namespace plchost {
 
+namespace {
+
+/// A backlog of so many times its bound is none, and nor is a count that went back.
+constexpr std::uint64_t kImplausible = 16;
+
+}  // namespace
+
 std::optional<Activation> ExternalEventSource::wait() noexcept {
   EventCursor& cursor = task_.cursor();
   for (;;) {
@@ -17,6 +24,12 @@ std::optional<Activation> ExternalEventSource::wait() noexcept {
       continue;
     }
     const std::uint64_t backlog = count - cursor.next;
+    if (backlog / kImplausible >= max_backlog_) {
+      // Somebody wrote over the counter: what was posted nobody knows.
+      cursor = {.next = count, .seen = count, .seen_at = clock_.now()};
+      const bool back = backlog > CountedEvent::kCountMask;
+      return Activation{.release = cursor.seen_at, .lost_events = back ? 1 : backlog - 1};
+    }
     const std::uint64_t lost = backlog > max_backlog_ ? backlog - max_backlog_ : 0;
     cursor.next += lost + 1;
     if (cursor.next > cursor.seen) {

@@ -20,6 +20,7 @@ namespace {
 
 constinit thread_local FaultTrap* armed = nullptr;
 constinit thread_local pid_t own_thread = 0;
+constinit std::atomic<bool> installed{false};
 
 constexpr std::array kFaults = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGABRT};
 
@@ -217,7 +218,13 @@ Result<void> install_fault_handlers() {
           check_errno(::sigaction(watchdog_signal(), &action, nullptr), "catch the watchdog's signal");
       !set)
     return std::unexpected(set.error());
+  installed.store(true, std::memory_order_release);
   return {};
+}
+
+// The watchdog's signal without its order does nothing but that.
+void rouse(const Thread& thread) noexcept {
+  if (installed.load(std::memory_order_acquire)) thread.send(watchdog_signal());
 }
 
 }  // namespace plchost

@@ -7,6 +7,7 @@
 
 #include "schedulers/faults/task_fault.hpp"
 #include "shm/base/result.hpp"
+#include "shm/base/thread.hpp"
 
 namespace plchost {
 
@@ -56,5 +57,9 @@ class FaultTrap {
 /// trap; anywhere else they do what they did. A SIGBUS in memory under a MemoryGuard is mended. Takes
 /// SIGRTMAX - 1, too, with which a watchdog stops a cycle. Once, before there are other threads. Set-up.
 [[nodiscard]] Result<void> install_fault_handlers();
+
+/// Makes the thread leave its sleep on a futex and look at the word again. Nothing happens if the handlers
+/// are not installed. Set-up.
+void rouse(const Thread& thread) noexcept;
 
 }  // namespace plchost

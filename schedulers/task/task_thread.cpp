@@ -4,7 +4,9 @@
 #include <utility>
 
 #include "schedulers/clock_thread.hpp"
+#include "schedulers/faults/fault_trap.hpp"
 #include "shm/base/futex.hpp"
+#include "shm/base/memory_guard.hpp"
 
 namespace plchost {
 
@@ -32,7 +34,10 @@ void TaskThread::use(ActivationSource* source) noexcept {
   ActivationSource* const before = wanted_.exchange(source);
   order_.fetch_add(1);
   clock_.wake(order_);
-  if (before != nullptr) before->interrupt();
+  if (before == nullptr) return;
+  before->interrupt();
+  // The word that it sleeps on may have been in memory that is lost: no wake reaches it there.
+  if (MemoryGuard::any_lost()) rouse(thread_);
 }
 
 bool TaskThread::settled(TimePoint deadline) noexcept {

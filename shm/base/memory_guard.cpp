@@ -1,12 +1,17 @@
 #include "shm/base/memory_guard.hpp"
 
+#include <mutex>
+
 #include <signal.h>
 #include <sys/mman.h>
+#include <sys/syscall.h>
+#include <unistd.h>
 
 namespace plchost {
 
 // Static, so that a signal handler finds it whatever the process is at.
 constinit std::array<MemoryGuard::Slot, MemoryGuard::kMost> MemoryGuard::slots;
+constinit std::atomic<bool> MemoryGuard::lost_any{false};
 
 MemoryGuard::MemoryGuard(std::span<std::byte> memory) noexcept {
   const auto begin = reinterpret_cast<std::uintptr_t>(memory.data());
@@ -25,14 +30,37 @@ void MemoryGuard::Release::operator()(Slot* slot) const noexcept {
   slot->begin.store(0, std::memory_order_release);
 }
 
+namespace {
+
+struct sigaction handler_before{};  // written before ours is there
+
+// As if there were no handler of ours. A fault comes back by itself; a signal that was sent is sent again.
+void hand_on(int signal, siginfo_t* info, void* context) noexcept {
+  if ((handler_before.sa_flags & SA_SIGINFO) != 0) return handler_before.sa_sigaction(signal, info, context);
+  const bool sent = info->si_code <= 0;
+  if (handler_before.sa_handler == SIG_IGN && sent) return;
+  if (handler_before.sa_handler != SIG_DFL && handler_before.sa_handler != SIG_IGN) {
+    return handler_before.sa_handler(signal);
+  }
+  ::signal(signal, SIG_DFL);
+  if (sent) ::syscall(SYS_tgkill, ::getpid(), ::gettid(), signal);
+}
+
+void on_bus_error(int signal, siginfo_t* info, void* context) noexcept {
+  if (info->si_code <= 0 || !MemoryGuard::mend(info->si_addr)) hand_on(signal, info, context);
+}
+
+}  // namespace
+
 void MemoryGuard::watch_process() noexcept {
-  struct sigaction action{};
-  action.sa_flags = SA_SIGINFO;
-  action.sa_sigaction = [](int signal, siginfo_t* info, void*) {
-    // Of what is not guarded the next touch is the end.
-    if (info->si_code <= 0 || !mend(info->si_addr)) ::signal(signal, SIG_DFL);
-  };
-  ::sigaction(SIGBUS, &action, nullptr);
+  static std::once_flag once;
+  std::call_once(once, [] {
+    struct sigaction action{};
+    action.sa_flags = SA_SIGINFO | SA_ONSTACK | SA_RESTART;
+    action.sa_sigaction = on_bus_error;
+    ::sigaction(SIGBUS, nullptr, &handler_before);
+    ::sigaction(SIGBUS, &action, nullptr);
+  });
 }
 
 bool MemoryGuard::mend(const void* address) noexcept {
@@ -47,6 +75,7 @@ bool MemoryGuard::mend(const void* address) noexcept {
         ::mmap(memory, end - begin, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_FIXED, -1, 0);
     if (zeros == MAP_FAILED) return false;
     slot.lost.store(true, std::memory_order_relaxed);
+    lost_any.store(true, std::memory_order_release);
     return true;
   }
   return false;

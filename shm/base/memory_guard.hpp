@@ -29,8 +29,12 @@ class MemoryGuard {
     return slot_ != nullptr && slot_->lost.load(std::memory_order_relaxed);
   }
 
-  /// Installs a handler of SIGBUS that does so, for a process that has no other one. What is not guarded ends
-  /// the process as ever. Set-up.
+  /// Some memory of this process was: a futex in it is another one since, and who slept on it before is not
+  /// woken by a wake. Any context.
+  [[nodiscard]] static bool any_lost() noexcept { return lost_any.load(std::memory_order_acquire); }
+
+  /// Installs a handler of SIGBUS that does so, once for the process. What is not guarded goes to the handler
+  /// that was there before, or ends the process as ever. Set-up.
   static void watch_process() noexcept;
   /// For the handler of SIGBUS: whether `address` is guarded, and can be touched now. Any context.
   [[nodiscard]] static bool mend(const void* address) noexcept;
@@ -45,6 +49,7 @@ class MemoryGuard {
     void operator()(Slot* slot) const noexcept;
   };
   static std::array<Slot, kMost> slots;
+  static std::atomic<bool> lost_any;
 
   std::unique_ptr<Slot, Release> slot_;
 };

@@ -21,15 +21,30 @@ namespace {
 
 constexpr std::size_t kStatBytes = 1024;  // some 50 numbers and a name of 16 bytes
 constexpr int kStateField = 3;
+constexpr int kFlagsField = 9;
 constexpr int kThreadsField = 20;
 constexpr int kStartField = 22;
+constexpr int kCodeField = 26;
+constexpr int kStackField = 28;
+constexpr std::uint64_t kEnding = 4;        // PF_EXITING of the kernel
 constexpr std::uint64_t kUnknownStart = 1;  // without /proc; no thread of ours is as old as the first tick
 
 struct Stat {
   char state = '?';
   std::uint64_t threads = 0;
   std::uint64_t start = 0;
+  std::uint64_t flags = 0;
+  std::uint64_t code = 0;
+  std::uint64_t stack = 0;
 };
+
+// 0 or 1 for the place of the code is the host's way to say that it does not tell.
+std::uint32_t image_of(const Stat& stat) noexcept {
+  if (stat.code <= 1 || stat.stack <= 1) return 0;
+  constexpr std::uint64_t kMix = 0x9e3779b97f4a7c15;
+  const std::uint64_t mixed = ((stat.code * kMix) ^ stat.stack) * kMix;
+  return static_cast<std::uint32_t>(mixed >> 32U) | 1U;
+}
 
 // The second field is the program's name in brackets, which may hold brackets and blanks itself.
 std::optional<Stat> parse(std::string_view text) noexcept {
@@ -37,14 +52,18 @@ std::optional<Stat> parse(std::string_view text) noexcept {
   if (bracket == std::string_view::npos) return std::nullopt;
   Stat stat;
   std::string_view rest = text.substr(bracket + 1);
-  for (int field = kStateField; field <= kStartField; ++field) {
+  for (int field = kStateField; field <= kStackField; ++field) {
     const std::size_t begin = rest.find_first_not_of(' ');
     if (begin == std::string_view::npos) return std::nullopt;
     rest.remove_prefix(begin);
     const std::string_view word = rest.substr(0, rest.find(' '));
     if (field == kStateField) stat.state = word.front();
-    if (field == kThreadsField) std::from_chars(word.data(), word.data() + word.size(), stat.threads);
-    if (field == kStartField) std::from_chars(word.data(), word.data() + word.size(), stat.start);
+    const auto read = [&](std::uint64_t& to) { std::from_chars(word.data(), word.data() + word.size(), to); };
+    if (field == kFlagsField) read(stat.flags);
+    if (field == kThreadsField) read(stat.threads);
+    if (field == kStartField) read(stat.start);
+    if (field == kCodeField) read(stat.code);
+    if (field == kStackField) read(stat.stack);
     rest.remove_prefix(word.size());
   }
   return stat;
@@ -83,17 +102,28 @@ std::optional<std::uint64_t> start_of(pid_t process) noexcept {
   return stat->start;
 }
 
-bool process_has_ended(pid_t process, std::uint64_t start) noexcept {
-  if (process <= 0 || !exists(process)) return true;
-  const auto stat = read_stat(process);
-  return stat && (stat->start != start || process_is_over(*stat));
+ProcessIdentity this_process() noexcept {
+  const pid_t self = ::getpid();
+  const auto stat = read_stat(self);
+  if (!stat) return {.pid = self};
+  return {.pid = self, .start = stat->start, .image = image_of(*stat)};
 }
 
-std::optional<std::uint64_t> start_of_thread(pid_t thread) noexcept {
+bool process_has_ended(const ProcessIdentity& process) noexcept {
+  if (process.pid <= 0 || !exists(process.pid)) return true;
+  const auto stat = read_stat(process.pid);
+  if (!stat) return false;
+  const std::uint32_t image = image_of(*stat);
+  const bool another = image != 0 && process.image != 0 && image != process.image;
+  return stat->start != process.start || another || process_is_over(*stat);
+}
+
+std::optional<ThreadLook> look_at_thread(pid_t thread) noexcept {
   if (thread <= 0 || !exists(thread)) return std::nullopt;
   const auto stat = read_stat(thread);
-  if (!stat) return 0;
-  return thread_is_over(*stat) ? std::nullopt : std::optional(stat->start);
+  if (!stat) return ThreadLook{};
+  if (thread_is_over(*stat)) return std::nullopt;
+  return ThreadLook{.start = stat->start, .image = image_of(*stat), .ending = (stat->flags & kEnding) != 0};
 }
 
 const ThreadIdentity& this_thread() noexcept {
@@ -102,7 +132,9 @@ const ThreadIdentity& this_thread() noexcept {
         ::pthread_atfork(nullptr, nullptr, [] { identity = {}; });
     const pid_t self = ::gettid();
     const auto stat = read_stat(self);
-    identity = {.id = static_cast<std::uint32_t>(self), .start = stat ? stat->start : kUnknownStart};
+    identity = {.id = static_cast<std::uint32_t>(self),
+                .start = stat ? stat->start : kUnknownStart,
+                .image = stat ? image_of(*stat) : 0};
   }
   return identity;
 }

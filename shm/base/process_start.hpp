@@ -12,17 +12,40 @@ namespace plchost {
 /// is in the same PID namespace. Nothing: it has ended (a zombie has, too). Set-up: reads a file.
 [[nodiscard]] std::optional<std::uint64_t> start_of(pid_t process) noexcept;
 
-/// Whether the process that began at `start` has ended. In doubt (the host hides it) it has not. Set-up.
-[[nodiscard]] bool process_has_ended(pid_t process, std::uint64_t start) noexcept;
-/// When a thread began; nothing: it has ended, which it can do before its process does. In doubt it is there,
-/// with the start 0. Set-up.
-[[nodiscard]] std::optional<std::uint64_t> start_of_thread(pid_t thread) noexcept;
+/// What names a process for good, and the program in it: exec() leaves number and start as they are.
+struct ProcessIdentity {
+  pid_t pid = 0;
+  std::uint64_t start = 0;
+  /// Made from where the host has put the program's code and stack; 0: not known. Two programs that follow
+  /// one another in a process have the same if the host puts all at the same place (no address
+  /// randomisation).
+  std::uint32_t image = 0;
+};
+/// The calling process. Set-up: reads a file.
+[[nodiscard]] ProcessIdentity this_process() noexcept;
+
+/// Whether the process that began at `start` has ended, or has another program by now. In doubt (the host
+/// hides it, as it does the image of other users' processes) it has not. Set-up.
+[[nodiscard]] bool process_has_ended(const ProcessIdentity& process) noexcept;
+[[nodiscard]] inline bool process_has_ended(pid_t process, std::uint64_t start) noexcept {
+  return process_has_ended({.pid = process, .start = start});
+}
+
+/// A thread as others see it.
+struct ThreadLook {
+  std::uint64_t start = 0;  ///< 0: not known
+  std::uint32_t image = 0;  ///< of its process, as above
+  bool ending = false;      ///< it does not come back from the kernel any more
+};
+/// Nothing: it has ended, which it can do before its process does. Set-up.
+[[nodiscard]] std::optional<ThreadLook> look_at_thread(pid_t thread) noexcept;
 
 /// The calling thread. The first call of a thread reads a file, later ones cost nothing; a child of fork()
 /// reads it anew.
 struct ThreadIdentity {
   std::uint32_t id = 0;
   std::uint64_t start = 0;
+  std::uint32_t image = 0;
 };
 [[nodiscard]] const ThreadIdentity& this_thread() noexcept;
 

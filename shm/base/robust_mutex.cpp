@@ -44,15 +44,23 @@ void pause_until(TimePoint until) noexcept {
 
 }  // namespace
 
+void RobustMutex::record() noexcept {
+  const ThreadIdentity& self = this_thread();
+  image_.store(self.image, std::memory_order_relaxed);
+  record_.store(record_of(self), std::memory_order_release);
+}
+
 LockResult RobustMutex::try_lock() noexcept {
   std::uint32_t found = 0;
   const ThreadIdentity& self = this_thread();
   if (word_.compare_exchange_strong(found, self.id, std::memory_order_acquire, std::memory_order_relaxed)) {
-    record_.store(record_of(self), std::memory_order_relaxed);
+    record();
     return LockResult::locked;
   }
-  // One that died may have had our number.
-  const bool ours = number_of(found) == self.id && record_.load(std::memory_order_relaxed) == record_of(self);
+  // One that died may have had our number, or this program may have come by exec() into the owner's place.
+  const bool ours = number_of(found) == self.id &&
+                    record_.load(std::memory_order_acquire) == record_of(self) &&
+                    image_.load(std::memory_order_relaxed) == self.image;
   return ours ? LockResult::deadlock : LockResult::timed_out;
 }
 
@@ -64,22 +72,31 @@ LockResult RobustMutex::lock(TimePoint deadline) noexcept {
 LockResult RobustMutex::lock_slowly(TimePoint deadline) noexcept {
   TimePoint now = MonotonicClock::now();
   TimePoint doubtful_since = kNoDeadline;
+  std::uint32_t ending = 0;  // an owner that was seen to end before the kernel was asked
   for (;;) {
-    const std::uint32_t before = word_.load(std::memory_order_relaxed);
+    const std::uint32_t before = word_.load(std::memory_order_acquire);
     const int error = lock_in_kernel(word_, std::min(deadline, now + kLook));
     now = MonotonicClock::now();
     doubtful_since = error == EINVAL ? std::min(doubtful_since, now) : kNoDeadline;
+    bool again = error == EINTR || error == ETIMEDOUT;
     switch (error) {
       case 0:
         return taken();
       case EDEADLK:  // one that died had our number
         if (number_of(before) == this_thread().id && take_over(before)) return LockResult::owner_died;
         break;
-      case ESRCH:
+      case ESRCH:  // there is no such thread, or it is past what it does about its futexes when it ends
+        if (ending != 0 && ending == number_of(before) && take_over(before)) return LockResult::owner_died;
+        [[fallthrough]];
       case EPERM:  // its number belongs to a thread of the kernel now
-      case ETIMEDOUT:
-        if (take_over_from_the_dead(error == ESRCH)) return LockResult::owner_died;
+      case ETIMEDOUT: {
+        const std::uint32_t word = word_.load(std::memory_order_acquire);
+        const OwnerState owner = look_at_owner(word, error == ESRCH);
+        if (owner == OwnerState::gone && take_over(word)) return LockResult::owner_died;
+        ending = owner == OwnerState::ending ? number_of(word) : 0;
+        again = again || ending != 0;
         break;
+      }
       case EINVAL:  // others still wait for a dead owner that it was taken over from, or it was scribbled
                     // over
         if (now - doubtful_since > kDoubt) return LockResult::corrupt;
@@ -88,22 +105,30 @@ LockResult RobustMutex::lock_slowly(TimePoint deadline) noexcept {
         break;
     }
     if (now >= deadline) return LockResult::timed_out;
-    if (error != EINTR && error != ETIMEDOUT) pause_until(std::min(deadline, now + kPause));
+    if (!again) pause_until(std::min(deadline, now + kPause));
   }
 }
 
-// From a thread that is not there, or that has the number of the one that took it and began later. A record
-// of another number says nothing: each owner clears its own before it unlocks, and the kernel hands over what
-// a dead one has left. A living owner is never taken from, however long it takes to write its record.
-bool RobustMutex::take_over_from_the_dead(bool nobody_waits) noexcept {
-  const std::uint32_t word = word_.load(std::memory_order_acquire);
+// Gone is a thread that is not there, or that has the number of the one that took it and began later, or that
+// runs another program now. A record of another number says nothing: each owner clears its own before it
+// unlocks, and the kernel hands over what a dead one has left. A living owner is never taken from, however
+// long it takes to write its record.
+//
+// One that is ending, which takes a large process long, is as good as gone if the kernel, asked after that
+// was seen, knows of nobody to hand the mutex to.
+RobustMutex::OwnerState RobustMutex::look_at_owner(std::uint32_t word, bool nobody_waits) const noexcept {
   const std::uint64_t record = record_.load(std::memory_order_acquire);
+  const std::uint32_t image = image_.load(std::memory_order_relaxed);
   const std::uint32_t owner = number_of(word);
-  if (owner == 0) return false;
-  const auto start = start_of_thread(static_cast<pid_t>(owner));
-  const bool told = number_of(record) == owner;
-  const bool gone = start ? told && record != record_of({.id = owner, .start = *start}) : nobody_waits;
-  return gone && record_.load(std::memory_order_acquire) == record && take_over(word);
+  if (owner == 0) return OwnerState::alive;
+  const auto look = look_at_thread(static_cast<pid_t>(owner));
+  const bool same = record_.load(std::memory_order_acquire) == record;
+  if (!look) return nobody_waits && same ? OwnerState::gone : OwnerState::alive;
+  const bool told = number_of(record) == owner && same;
+  const bool later = look->start != 0 && record != record_of({.id = owner, .start = look->start});
+  const bool another = look->image != 0 && image != 0 && look->image != image;
+  if (told && (later || another)) return OwnerState::gone;
+  return look->ending ? OwnerState::ending : OwnerState::alive;
 }
 
 // Only if it is still as it was seen. Who waits in the kernel for the dead one wakes at its next look.
@@ -112,14 +137,14 @@ bool RobustMutex::take_over(std::uint32_t word) noexcept {
   if (!word_.compare_exchange_strong(word, mine, std::memory_order_acquire, std::memory_order_relaxed)) {
     return false;
   }
-  record_.store(record_of(this_thread()), std::memory_order_relaxed);
+  record();
   return true;
 }
 
 // By the kernel, which leaves the mark of a dead owner in the word for us to take off.
 LockResult RobustMutex::taken() noexcept {
   const std::uint32_t before = word_.fetch_and(~std::uint32_t{FUTEX_OWNER_DIED}, std::memory_order_acquire);
-  record_.store(record_of(this_thread()), std::memory_order_relaxed);
+  record();
   return (before & FUTEX_OWNER_DIED) != 0 ? LockResult::owner_died : LockResult::locked;
 }
 
@@ -141,6 +166,12 @@ bool RobustMutex::unlock() noexcept {
 
 std::uint32_t RobustMutex::owner() const noexcept {
   return number_of(word_.load(std::memory_order_relaxed));
+}
+
+bool RobustMutex::owner_has_ended() const noexcept {
+  const std::uint32_t word = word_.load(std::memory_order_acquire);
+  if (number_of(word) == 0) return false;
+  return (word & FUTEX_OWNER_DIED) != 0 || look_at_owner(word, true) != OwnerState::alive;
 }
 
 }  // namespace plchost

@@ -22,8 +22,8 @@ enum class LockResult : std::uint8_t {
 ///
 /// The word is a PI futex: the owner's thread id, and flags that the kernel sets. If the owner ends while
 /// others wait, the kernel hands the lock on and says so; if nobody waits, the next one finds a thread that
-/// is not there. `owner_start_` tells a thread that was given the same number later from the owner: who waits
-/// looks at it every kLook.
+/// is not there. The record tells a thread that was given the same number later from the owner, and a program
+/// that exec() has put in the place of the owner's: who waits looks at it every kLook.
 class RobustMutex {
  public:
   /// Not taken and not busy: no system call (a thread's first one reads a file). Any context; the deadline
@@ -35,17 +35,21 @@ class RobustMutex {
   bool unlock() noexcept;
   /// The thread that holds it; 0: none. It may have ended since. Any context.
   [[nodiscard]] std::uint32_t owner() const noexcept;
+  /// The thread that holds it has ended since, or will not come back from the kernel. Set-up; only reads.
+  [[nodiscard]] bool owner_has_ended() const noexcept;
   /// How long one that was left by a dead thread can look as if it were held.
   static constexpr Duration kLook = std::chrono::milliseconds(40);
 
  private:
   [[nodiscard]] LockResult lock_slowly(TimePoint deadline) noexcept;
-  [[nodiscard]] bool take_over_from_the_dead(bool nobody_waits) noexcept;
+  enum class OwnerState : std::uint8_t { alive, ending, gone };
+  [[nodiscard]] OwnerState look_at_owner(std::uint32_t word, bool nobody_waits) const noexcept;
+  void record() noexcept;
   [[nodiscard]] bool take_over(std::uint32_t word) noexcept;
   [[nodiscard]] LockResult taken() noexcept;
 
   std::atomic<std::uint32_t> word_{0};
-  [[maybe_unused]] std::uint32_t reserved_ = 0;
+  std::atomic<std::uint32_t> image_{0};  ///< of the owner's program; 0: not known. Written before the record
   /// [ start of the owner, its lower 34 bits ][ its number : 30 ]; 0: not held, or not told yet.
   std::atomic<std::uint64_t> record_{0};
 };

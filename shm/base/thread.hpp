@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <pthread.h>
@@ -41,6 +42,14 @@ class Thread {
   /// beyond `deadline` (real time). false: it has not ended, and can be joined later.
   [[nodiscard]] bool join_until(TimePoint deadline, const std::function<bool()>& abandoned) noexcept;
   [[nodiscard]] bool joinable() const noexcept { return running_; }
+  /// It ends when its body returns, or with the process.
+  void detach() noexcept {
+    if (std::exchange(running_, false)) pthread_detach(handle_);
+  }
+  /// To a thread that was not joined yet.
+  void send(int signal) const noexcept {
+    if (running_) pthread_kill(handle_, signal);
+  }
 
  private:
   pthread_t handle_{};

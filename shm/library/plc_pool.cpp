@@ -7,6 +7,7 @@
 #include <string>
 
 #include "shm/base/counting_semaphore.hpp"
+#include "shm/base/memory_guard.hpp"
 #include "shm/library/pool_result.hpp"
 #include "shm/pool/object_pool.hpp"
 
@@ -112,6 +113,7 @@ using namespace plchost;  // NOLINT(google-build-using-namespace): the functions
 int plc_pool_open(const char* name, int access, plc_pool** pool) {
   return guarded([&]() -> int {
     if (pool == nullptr) return argument("pool is null");
+    MemoryGuard::watch_process();
     const std::string wanted = pool_name_of(name);
     if (access == PLC_POOL_MAKE) {
       auto made = ObjectPool::create(wanted);

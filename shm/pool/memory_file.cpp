@@ -179,7 +179,7 @@ Result<void> make_room(const std::string& path) {
 
 }  // namespace
 
-Result<MemoryFile> UnnamedMemory::give_name(const TakeOver& take_over) && {
+Result<MemoryFile> UnnamedMemory::give_name(const TakeOver& take_over) {
   constexpr int kAttempts = 10;  // each one fails only if another process makes the name anew in between
   for (int attempt = 1;; ++attempt) {
     const auto named = link_to(fd_, path_);
@@ -187,6 +187,7 @@ Result<MemoryFile> UnnamedMemory::give_name(const TakeOver& take_over) && {
     if (named.error().code != ErrorCode::already_exists || attempt == kAttempts || !take_over(path_)) {
       return std::unexpected(named.error());
     }
+    replaced_.reset(::open(path_.c_str(), O_PATH | O_NOFOLLOW | O_CLOEXEC));
     if (auto room = make_room(path_); !room) return std::unexpected(std::move(room).error());
   }
 }
@@ -200,7 +201,7 @@ Result<MemoryFile> make_filled(const std::string& name, std::size_t size, const 
   if (fill) {
     if (auto filled = fill(memory->bytes()); !filled) return std::unexpected(filled.error());
   }
-  return (*std::move(memory)).give_name(take_over);
+  return memory->give_name(take_over);
 }
 
 }  // namespace

@@ -70,14 +70,16 @@ class UnnamedMemory {
   [[nodiscard]] std::span<std::byte> bytes() const noexcept { return memory_.bytes(); }
   /// Of the file that has the name: whether this one takes its place.
   using TakeOver = std::function<bool(const std::string& path)>;
-  /// already_exists: the name is taken, and `take_over` says no. refused: it is another user's file.
-  [[nodiscard]] Result<MemoryFile> give_name(const TakeOver& take_over) &&;
+  /// already_exists: the name is taken, and `take_over` says no. refused: it is another user's file. What has
+  /// lost its name by that is freed when this goes. Once.
+  [[nodiscard]] Result<MemoryFile> give_name(const TakeOver& take_over);
 
  private:
   UnnamedMemory(std::string path, UniqueFd fd, MemoryFile memory) noexcept
       : path_(std::move(path)), fd_(std::move(fd)), memory_(std::move(memory)) {}
   std::string path_;
   UniqueFd fd_;
+  UniqueFd replaced_;
   MemoryFile memory_;
 };
 

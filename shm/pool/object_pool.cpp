@@ -63,21 +63,31 @@ std::unexpected<Error> nothing_of_that_name(std::string_view name, const std::st
   return failure(ErrorCode::not_found, fmt::format("no object '{}' in pool '{}'", name, pool));
 }
 
-// What options leave open is as with the pool, but for the group of who is not in the pool's: it is his own.
 // As with files, nobody gives an object to a group that he is not in.
-Result<MemoryRights> rights_for(const ObjectOptions& options, const std::string& pool) {
-  if (options.group && !may_give_to(*options.group)) {
-    return failure(ErrorCode::refused,
-                   fmt::format("user {} is not in group {}, and can make no object for it", ::geteuid(),
-                               *options.group));
-  }
+Result<void> check_group(const ObjectOptions& options) {
+  if (!options.group || may_give_to(*options.group)) return {};
+  return failure(ErrorCode::refused, fmt::format("user {} is not in group {}, and can make no object for it",
+                                                 ::geteuid(), *options.group));
+}
+
+// What options leave open is as with the pool, but for the group of who is not in the pool's: it is his own.
+MemoryRights rights_for(const ObjectOptions& options, const std::string& pool) {
   struct stat status{};
   const std::string path = fmt::format("{}/{}", MemoryFile::kDirectory, pool);
-  if (::stat(path.c_str(), &status) != 0) return MemoryRights{.group = options.group, .mode = options.mode};
+  if (::stat(path.c_str(), &status) != 0) return {.group = options.group, .mode = options.mode};
   constexpr mode_t kPermissions = 0666;
   const gid_t usual = may_give_to(status.st_gid) ? status.st_gid : ::getegid();
-  return MemoryRights{.group = options.group.value_or(usual),
-                      .mode = options.mode != 0 ? options.mode : status.st_mode & kPermissions};
+  return {.group = options.group.value_or(usual),
+          .mode = options.mode != 0 ? options.mode : status.st_mode & kPermissions};
+}
+
+std::uint32_t attributes_for(const ObjectOptions& options, ObjectType type) noexcept {
+  return (options.keep ? kKept : 0) | (type == ObjectType::event ? kDirect : 0);
+}
+
+// How long one without the right to write waits for a moment in which nobody changes anything.
+TimePoint look_until() noexcept {
+  return MonotonicClock::now() + std::chrono::milliseconds(50);
 }
 
 void describe_new(ObjectEntry& entry, const MemoryRights& rights, std::uint32_t attributes) noexcept {
@@ -105,12 +115,13 @@ const std::string& ObjectPool::name() const noexcept {
   return segment_->name();
 }
 
-bool ObjectPool::tidy() noexcept {
+PoolFindings ObjectPool::tidy() noexcept {
   constexpr auto kPatience = std::chrono::milliseconds(20);
   (void)segment_->lock(true, kPatience);
+  const bool held = segment_->lock(true, kPatience).has_value();
   if (!adoption_) adoption_ = std::make_shared<PoolAdoption>(segment_);
-  if (!segment_->lost()) adoption_->look();
-  return !segment_->lost();
+  if (held) adoption_->look();
+  return segment_->take_findings();
 }
 
 std::uint32_t ObjectPool::capacity() const noexcept {
@@ -121,28 +132,28 @@ std::uint64_t ObjectPool::changes() const noexcept {
   return segment_->view().header().changes.load(std::memory_order_acquire);
 }
 
-Result<PoolEvent> ObjectPool::create_event(std::string_view name) {
+Result<PoolEvent> ObjectPool::create_event(std::string_view name) & {
   if (auto valid = check_object_name(name); !valid) return std::unexpected(valid.error());
   const Wanted wanted{.name = name};
-  const auto held = segment_->lock();
+  auto held = segment_->lock();
   if (!held) return std::unexpected(held.error());
-  PoolTable objects(segment_->view());
-  ObjectEntry* entry = objects.find(name);
+  ObjectEntry* entry = segment_->find(*held, name);
   if (entry == nullptr) {
+    PoolTable objects = segment_->table(*held);
     entry = objects.insert(name, ObjectType::event);
     if (entry == nullptr) return no_room(wanted);
-    describe_new(*entry, *rights_for({}, this->name()), 0);
-    PoolTable::publish(*entry);
+    describe_new(*entry, rights_for({}, this->name()), 0);
+    objects.publish(*entry);
   }
   if (auto event = check_is(*entry, ObjectType::event, name); !event) return std::unexpected(event.error());
   return PoolEvent(*entry);
 }
 
-Result<PoolEvent> ObjectPool::open_event(std::string_view name) const {
+Result<PoolEvent> ObjectPool::open_event(std::string_view name) const& {
   if (auto valid = check_object_name(name); !valid) return std::unexpected(valid.error());
-  const auto held = segment_->lock();
+  auto held = segment_->lock();
   if (!held) return std::unexpected(held.error());
-  ObjectEntry* const entry = PoolTable(segment_->view()).find(name);
+  ObjectEntry* const entry = segment_->find(*held, name);
   if (entry == nullptr) return nothing_of_that_name(name, this->name());
   if (auto event = check_is(*entry, ObjectType::event, name); !event) return std::unexpected(event.error());
   return PoolEvent(*entry);
@@ -154,9 +165,9 @@ std::unexpected<Error> ObjectPool::no_room(const Wanted& wanted) const {
                              to_string(wanted.type), wanted.name, name(), segment_->view().entries().size()));
 }
 
-// With the lock held.
+// `held` is null if the pool is mapped to read only.
 template <class T>
-Result<T> ObjectPool::refer(ObjectEntry& entry, const Wanted& wanted, Access access) const {
+Result<T> ObjectPool::refer(PoolLock* held, ObjectEntry& entry, const Wanted& wanted, Access access) const {
   if (auto same = check_is(entry, wanted.type, wanted.name); !same) return std::unexpected(same.error());
   if (auto same = check_size(entry, wanted.size, wanted.name); !same) return std::unexpected(same.error());
   if (auto may = check_permitted(entry, access, wanted.name); !may) return std::unexpected(may.error());
@@ -164,8 +175,8 @@ Result<T> ObjectPool::refer(ObjectEntry& entry, const Wanted& wanted, Access acc
   object.entry_ = &entry;
   object.generation_ = Binding::generation(entry.binding.load(std::memory_order_acquire));
   object.writable_ = access == Access::read_write && segment_->writable();
-  if (segment_->writable()) {
-    const auto reference = segment_->add_reference(entry, object.writable_);
+  if (held != nullptr) {
+    const auto reference = segment_->add_reference(*held, entry, object.writable_);
     if (!reference) return std::unexpected(reference.error());
     object.reference_ = *reference;
     object.reference_generation_ = (*reference)->generation.load(kRelaxed);
@@ -187,72 +198,71 @@ Result<void> ObjectPool::map(SharedMemory& memory, const Wanted& wanted, Access 
   return {};
 }
 
-// With the lock held; the object is not there.
-Result<ObjectEntry*> ObjectPool::make_entry(const Wanted& wanted, const MemoryRights& rights,
-                                            std::uint32_t attributes, std::optional<UnnamedMemory> memory) {
-  PoolTable objects(segment_->view());
+// The object is not there.
+Result<ObjectEntry*> ObjectPool::make_entry(PoolLock& held, const Wanted& wanted,
+                                            const ObjectOptions& options, UnnamedMemory* memory) {
+  PoolTable objects = segment_->table(held);
   ObjectEntry* const entry = objects.insert(wanted.name, wanted.type);
   if (entry == nullptr) return no_room(wanted);
-  describe_new(*entry, rights, attributes);
+  describe_new(*entry, rights_for(options, name()), attributes_for(options, wanted.type));
   if (wanted.type == ObjectType::semaphore) new (&entry->semaphore) CountingSemaphore(wanted.value);
   if (wanted.type == ObjectType::event) entry->binding.fetch_or(Binding::kRegistered);
-  if (memory) {
+  if (memory != nullptr) {
     entry->size.store(wanted.size, kRelaxed);
     // A file of that name that is no object, nor to be one, is what is left of another pool of the name.
-    const auto named = (*std::move(memory)).give_name([&](const std::string& path) {
-      return !PoolAdoption::is_in_use(path, name());
-    });
+    const auto named =
+        memory->give_name([&](const std::string& path) { return !PoolAdoption::is_in_use(path, name()); });
     if (!named) {
       objects.erase(*entry);
       return std::unexpected(named.error());
     }
   }
-  PoolTable::publish(*entry);
+  objects.publish(*entry);
   return entry;
 }
 
 template <class T>
-Result<Created<T>> ObjectPool::create_locked(const Wanted& wanted, const MemoryRights& rights,
-                                             std::uint32_t attributes, std::optional<UnnamedMemory> memory) {
-  const auto held = segment_->lock();
+Result<Created<T>> ObjectPool::create_locked(const Wanted& wanted, const ObjectOptions& options,
+                                             UnnamedMemory* memory) {
+  auto held = segment_->lock();
   if (!held) return std::unexpected(held.error());
-  ObjectEntry* entry = PoolTable(segment_->view()).find(wanted.name);
+  ObjectEntry* entry = segment_->find(*held, wanted.name);
   bool made = entry == nullptr;
   if (entry != nullptr && wanted.type == ObjectType::memory && PoolAdoption::is_left_over(*entry)) {
-    const auto left = PoolAdoption::use_again(*segment_, *entry, wanted.size, rights, attributes);
+    const auto left =
+        PoolAdoption::use_again(*segment_, *held, *entry, wanted.size, rights_for(options, name()),
+                                attributes_for(options, wanted.type));
     if (!left) return std::unexpected(left.error());
     made = true;
     entry = *left;
   }
   if (entry == nullptr) {
-    const auto fresh = make_entry(wanted, rights, attributes, std::move(memory));
+    const auto fresh = make_entry(*held, wanted, options, memory);
     if (!fresh) return std::unexpected(fresh.error());
     entry = *fresh;
   }
-  auto object = refer<T>(*entry, wanted, Access::read_write);
+  auto object = refer<T>(&*held, *entry, wanted, Access::read_write);
   if (object) return Created<T>{.object = *std::move(object), .made = made};
-  if (made) segment_->destroy(*entry);
+  if (made) segment_->destroy(*held, *entry);
   return std::unexpected(std::move(object).error());
 }
 
 template <class T>
 Result<Created<T>> ObjectPool::create_object(const Wanted& wanted, const ObjectOptions& options) {
   if (auto valid = check_object_name(wanted.name); !valid) return std::unexpected(valid.error());
-  const auto rights = rights_for(options, name());
-  if (!rights) return std::unexpected(rights.error());
-  const std::uint32_t attributes =
-      (options.keep ? kKept : 0) | (wanted.type == ObjectType::event ? kDirect : 0);
+  if (auto may = check_group(options); !may) return std::unexpected(may.error());
   std::optional<UnnamedMemory> memory;
   if constexpr (std::is_same_v<T, SharedMemory>) {
     auto there = open_memory(wanted, Access::read_write);
     if (there) return Created<T>{.object = *std::move(there), .made = false};
     if (there.error().code != ErrorCode::not_found) return std::unexpected(std::move(there).error());
     // The host takes its time to find so many bytes: not with the lock held.
-    auto unnamed = UnnamedMemory::make(pool_memory_name(name(), wanted.name), wanted.size, *rights);
+    auto unnamed =
+        UnnamedMemory::make(pool_memory_name(name(), wanted.name), wanted.size, rights_for(options, name()));
     if (!unnamed) return std::unexpected(std::move(unnamed).error());
     memory = *std::move(unnamed);
   }
-  auto created = create_locked<T>(wanted, *rights, attributes, std::move(memory));
+  auto created = create_locked<T>(wanted, options, memory ? &*memory : nullptr);
   if constexpr (std::is_same_v<T, SharedMemory>) {
     if (!created && created.error().code == ErrorCode::already_exists) {
       // Firmware has just made it.
@@ -270,38 +280,40 @@ Result<Created<T>> ObjectPool::create_object(const Wanted& wanted, const ObjectO
   return created;
 }
 
-// Without the lock, whose word it may not write. What it sees while somebody changes the table it sees again.
+// Without the lock, whose word it may not write. What it sees while somebody changes the table it sees again,
+// until `until`; then, and if that one has died over it, what is seen has to do: each single change leaves
+// lists that can be read.
 template <class Look>
-auto ObjectPool::look_only(Look look) const {
-  constexpr int kAttempts = 100;
+auto ObjectPool::look_only(TimePoint until, Look look) const {
   constexpr auto kPause = std::chrono::milliseconds(1);
   const std::atomic<std::uint64_t>& changes = segment_->view().header().changes;
-  for (int attempt = 1;; ++attempt) {
+  for (bool again = false;; again = true) {
     const std::uint64_t before = changes.load();
     auto seen = look();
     std::atomic_thread_fence(std::memory_order_acquire);
-    // One that died with the lock held has left it odd: then what is seen has to do.
-    if (((before & 1) == 0 && changes.load() == before) || attempt == kAttempts) return seen;
+    const bool changing = (before & 1) != 0;
+    if (!changing && changes.load() == before) return seen;
+    if (changing && again && segment_->holder_has_ended()) return seen;
+    if (MonotonicClock::now() >= until) return seen;
     std::this_thread::sleep_for(kPause);
   }
 }
 
 template <class T>
 Result<T> ObjectPool::find_and_refer(const Wanted& wanted, Access access) const {
-  const auto refer_to = [&](ObjectEntry* entry) -> Result<T> {
+  const auto refer_to = [&](PoolLock* held, ObjectEntry* entry) -> Result<T> {
     if (entry == nullptr || PoolAdoption::is_left_over(*entry)) {
       return nothing_of_that_name(wanted.name, name());
     }
-    return refer<T>(*entry, wanted, access);
+    return refer<T>(held, *entry, wanted, access);
   };
-  PoolTable objects(segment_->view());
   if (!segment_->writable()) {
     if (access == Access::read_write) return std::unexpected(segment_->lock().error());
-    return look_only([&] { return refer_to(objects.peek(wanted.name)); });
+    return look_only(look_until(), [&] { return refer_to(nullptr, segment_->peek(wanted.name)); });
   }
-  const auto held = segment_->lock();
+  auto held = segment_->lock();
   if (!held) return std::unexpected(held.error());
-  return refer_to(objects.find(wanted.name));
+  return refer_to(&*held, segment_->find(*held, wanted.name));
 }
 
 template <class T>
@@ -376,20 +388,20 @@ Result<SharedMemory> ObjectPool::replace_memory(std::string_view name, std::size
                                                 const MemoryFile::Fill& fill) {
   if (auto valid = check_object_name(name); !valid) return std::unexpected(valid.error());
   const Wanted wanted{.name = name, .type = ObjectType::memory, .size = size};
-  const MemoryRights rights = *rights_for({}, this->name());
-  auto unnamed = UnnamedMemory::make(pool_memory_name(this->name(), name), size, rights);
+  auto unnamed =
+      UnnamedMemory::make(pool_memory_name(this->name(), name), size, rights_for({}, this->name()));
   if (!unnamed) return std::unexpected(std::move(unnamed).error());
   if (auto filled = fill(unnamed->bytes()); !filled) return std::unexpected(std::move(filled).error());
   {
-    const auto held = segment_->lock();
+    auto held = segment_->lock();
     if (!held) return std::unexpected(held.error());
-    if (ObjectEntry* const old = PoolTable(segment_->view()).find(name); old != nullptr) {
+    if (ObjectEntry* const old = segment_->find(*held, name); old != nullptr) {
       if (auto same = check_is(*old, ObjectType::memory, name); !same) return std::unexpected(same.error());
       if (auto may = check_permitted(*old, Access::read_write, name); !may)
         return std::unexpected(may.error());
-      PoolTable(segment_->view()).erase(*old);
+      segment_->table(*held).erase(*old);
     }
-    const auto made = make_entry(wanted, rights, kKept, *std::move(unnamed));
+    const auto made = make_entry(*held, wanted, {.keep = true}, &*unnamed);
     if (!made) return std::unexpected(made.error());
   }
   return open_memory(wanted, Access::read_write);
@@ -398,14 +410,13 @@ Result<SharedMemory> ObjectPool::replace_memory(std::string_view name, std::size
 Result<void> ObjectPool::remove_object(std::string_view name) {
   if (auto valid = check_object_name(name); !valid) return valid;
   // Firmware may have made it with a header alone.
-  if (PoolTable(segment_->view()).peek(name) == nullptr) (void)PoolAdoption::reconcile(*segment_, name);
-  const auto held = segment_->lock();
+  if (segment_->peek(name) == nullptr) (void)PoolAdoption::reconcile(*segment_, name);
+  auto held = segment_->lock();
   if (!held) return std::unexpected(held.error());
-  ObjectEntry* const entry = PoolTable(segment_->view()).find(name);
+  ObjectEntry* const entry = segment_->find(*held, name);
   if (entry == nullptr) return nothing_of_that_name(name, this->name());
   if (auto may = check_permitted(*entry, Access::read_write, name); !may) return may;
-  entry->attributes.fetch_and(~kKept, kRelaxed);
-  segment_->drop_if_idle(*entry);
+  segment_->let_go(*held, *entry);
   return {};
 }
 
@@ -414,6 +425,7 @@ Result<std::vector<ObjectInfo>> ObjectPool::list() const {
   constexpr std::size_t kPart = 256;
   const PoolView& view = segment_->view();
   std::vector<ObjectInfo> all;
+  const TimePoint until = look_until();
   for (std::size_t at = 0; at == 0 || at < view.used_entries().size(); at += kPart) {
     const auto part = [&] {
       std::vector<ObjectInfo> infos;
@@ -426,7 +438,7 @@ Result<std::vector<ObjectInfo>> ObjectPool::list() const {
       return infos;
     };
     if (!segment_->writable()) {
-      std::ranges::move(look_only(part), std::back_inserter(all));
+      std::ranges::move(look_only(until, part), std::back_inserter(all));
       continue;
     }
     const auto held = segment_->lock(at == 0);
@@ -443,11 +455,10 @@ Result<ObjectInfo> ObjectPool::look_at(std::string_view name) const {
     if (entry == nullptr || PoolTable::is_idle(*entry)) return nothing_of_that_name(name, this->name());
     return describe_object(view, *entry);
   };
-  PoolTable objects(view);
-  if (!segment_->writable()) return look_only([&] { return describe(objects.peek(name)); });
-  const auto held = segment_->lock(true);
+  if (!segment_->writable()) return look_only(look_until(), [&] { return describe(segment_->peek(name)); });
+  auto held = segment_->lock(true);
   if (!held) return std::unexpected(held.error());
-  return describe(objects.find(name));
+  return describe(segment_->find(*held, name));
 }
 
 }  // namespace plchost

@@ -48,6 +48,16 @@ struct Created {
   bool made = false;
 };
 
+class PoolLock;
+
+/// What became of a pool since tidy() was called last.
+struct PoolFindings {
+  bool lost = false;  ///< its file was cut short by a stranger, and this process is alone with what it has
+  std::uint32_t headers_mended = 0;  ///< so often had a stranger written over its header
+  std::uint32_t rebuilds = 0;        ///< so often were lists found damaged, and made anew
+  std::uint32_t lost_objects = 0;    ///< so many objects were not valid any more then
+};
+
 /// The global table of named objects in shared memory (vxworks_specific, "Global object pools"). Made by the
 /// manager, or by the first instance that runs alone; found by name; survives every process that uses it.
 ///
@@ -69,9 +79,12 @@ class ObjectPool {
 
   /// The event of that name, made if it is not there, then neither registered nor bound. When the table is
   /// full, it takes the place of one that is neither; full: there is none. wrong_type: the name is taken.
-  [[nodiscard]] Result<PoolEvent> create_event(std::string_view name);
+  [[nodiscard]] Result<PoolEvent> create_event(std::string_view name) &;
   /// not_found: no such object. wrong_type: it is not an event.
-  [[nodiscard]] Result<PoolEvent> open_event(std::string_view name) const;
+  [[nodiscard]] Result<PoolEvent> open_event(std::string_view name) const&;
+  // Of a pool that ends before the handle does.
+  Result<PoolEvent> create_event(std::string_view name) && = delete;
+  Result<PoolEvent> open_event(std::string_view name) const&& = delete;
 
   // The object of that name, made if it is not there. It goes with its last reference, unless it is kept.
   // full: no room. wrong_type, wrong_size: what is there is another one. refused: its rights do not allow it.
@@ -104,16 +117,16 @@ class ObjectPool {
   [[nodiscard]] Result<void> remove_object(std::string_view name);
 
   /// All objects that are in use: referenced, kept, registered or bound. Unordered.
+  /// timed_out, corrupt: the pool cannot be locked.
   [[nodiscard]] Result<std::vector<ObjectInfo>> list() const;
   /// One of them. not_found.
   [[nodiscard]] Result<ObjectInfo> look_at(std::string_view name) const;
 
   /// Releases what dead clients held, mends what a stranger wrote over, and makes objects of the memories
   /// that firmware has made with a header alone (see PoolAdoption), without waiting for the next call of
-  /// anyone. Gives up after 20 ms if another one holds the lock. For whoever watches over the host. False:
-  /// the pool's file was cut short by a stranger, and this process is alone with what it has (see
-  /// MemoryGuard).
-  bool tidy() noexcept;
+  /// anyone. Ends after some 20 ms if there is much to release, or another one holds the lock: what is left
+  /// is for the next time. For whoever watches over the host, from one thread.
+  PoolFindings tidy() noexcept;
 
   [[nodiscard]] const std::string& name() const noexcept;
   /// How many objects it can hold.
@@ -127,23 +140,22 @@ class ObjectPool {
   template <class T>
   [[nodiscard]] Result<Created<T>> create_object(const Wanted& wanted, const ObjectOptions& options);
   template <class T>
-  [[nodiscard]] Result<Created<T>> create_locked(const Wanted& wanted, const MemoryRights& rights,
-                                                 std::uint32_t attributes,
-                                                 std::optional<UnnamedMemory> memory);
+  [[nodiscard]] Result<Created<T>> create_locked(const Wanted& wanted, const ObjectOptions& options,
+                                                 UnnamedMemory* memory);
   template <class T>
   [[nodiscard]] Result<T> open_object(const Wanted& wanted, Access access) const;
   template <class T>
   [[nodiscard]] Result<T> find_and_refer(const Wanted& wanted, Access access) const;
   template <class T>
-  [[nodiscard]] Result<T> refer(ObjectEntry& entry, const Wanted& wanted, Access access) const;
-  [[nodiscard]] Result<ObjectEntry*> make_entry(const Wanted& wanted, const MemoryRights& rights,
-                                                std::uint32_t attributes,
-                                                std::optional<UnnamedMemory> memory);
+  [[nodiscard]] Result<T> refer(PoolLock* held, ObjectEntry& entry, const Wanted& wanted,
+                                Access access) const;
+  [[nodiscard]] Result<ObjectEntry*> make_entry(PoolLock& held, const Wanted& wanted,
+                                                const ObjectOptions& options, UnnamedMemory* memory);
   [[nodiscard]] Result<SharedMemory> open_memory(const Wanted& wanted, Access access) const;
   [[nodiscard]] Result<void> map(SharedMemory& memory, const Wanted& wanted, Access access) const;
   [[nodiscard]] std::unexpected<Error> no_room(const Wanted& wanted) const;
   template <class Look>
-  auto look_only(Look look) const;
+  auto look_only(TimePoint until, Look look) const;
 
   std::shared_ptr<PoolSegment> segment_;
   std::shared_ptr<PoolAdoption> adoption_;  // made by tidy()

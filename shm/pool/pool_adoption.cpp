@@ -139,31 +139,31 @@ void describe_as(ObjectEntry& entry, const struct stat& status, std::uint32_t at
   entry.mode.store(status.st_mode & kPermissions, kRelaxed);
 }
 
-// Only its last steps make a memory of the entry: if we die before, a repair would remove the file.
-bool adopt(PoolSegment& segment, std::string_view name, const MemoryFileState& state) {
-  ObjectEntry* const entry = PoolTable(segment.view()).insert(name, ObjectType::event);
+// As adopted from its first steps: of a memory that is half made a repair would remove the file.
+bool adopt(PoolSegment& segment, PoolLock& held, std::string_view name, const MemoryFileState& state) {
+  PoolTable objects = segment.table(held);
+  ObjectEntry* const entry = objects.insert(name, ObjectType::event);
   if (entry == nullptr) return false;
   describe_as(*entry, state.status, kKept | kAdopted);
   entry->type.store(static_cast<std::uint32_t>(ObjectType::memory), kRelaxed);
-  PoolTable::publish(*entry);
+  objects.publish(*entry);
   return true;
 }
 
-// With the lock held.
-bool set_right(PoolSegment& segment, std::string_view name, const MemoryFileState& state, bool adoptable) {
-  PoolTable objects(segment.view());
-  ObjectEntry* const entry = objects.find(name);
-  if (entry == nullptr) return adoptable && adopt(segment, name, state);
+bool set_right(PoolSegment& segment, PoolLock& held, std::string_view name, const MemoryFileState& state,
+               bool adoptable) {
+  ObjectEntry* const entry = segment.find(held, name);
+  if (entry == nullptr) return adoptable && adopt(segment, held, name, state);
   if (!is_memory(*entry)) return false;
   if (PoolAdoption::is_left_over(*entry)) return false;
   if (state.kind == Kind::none || state.kind == Kind::empty) {
-    segment.destroy(*entry);
+    segment.destroy(held, *entry);
     return true;
   }
   if (!adoptable || entry->size.load(kRelaxed) == static_cast<std::uint64_t>(state.status.st_size))
     return false;
-  objects.erase(*entry);
-  return adopt(segment, name, state);
+  segment.table(held).erase(*entry);
+  return adopt(segment, held, name, state);
 }
 
 }  // namespace
@@ -185,22 +185,22 @@ bool PoolAdoption::reconcile(PoolSegment& segment, std::string_view name) {
   if (!segment.writable()) return false;
   const std::string path = path_in_memory(pool_memory_name(segment.name(), name));
   const MemoryFileState before = examine_patiently(path);
-  const ObjectEntry* const known = PoolTable(segment.view()).peek(name);
+  const ObjectEntry* const known = segment.peek(name);
   const bool adoptable = can_be_adopted(before, segment.name());
   if (known == nullptr && !adoptable) return false;
-  const auto held = segment.lock();
+  auto held = segment.lock();
   if (!held) return false;
   const MemoryFileState now = examine(path);
-  return set_right(segment, name, now,
+  return set_right(segment, *held, name, now,
                    adoptable && now.kind == Kind::described && now.status.st_uid == before.status.st_uid);
 }
 
-Result<ObjectEntry*> PoolAdoption::use_again(PoolSegment& segment, ObjectEntry& entry, std::size_t size,
-                                             const MemoryRights& rights, std::uint32_t attributes) {
+Result<ObjectEntry*> PoolAdoption::use_again(PoolSegment& segment, PoolLock& held, ObjectEntry& entry,
+                                             std::size_t size, const MemoryRights& rights,
+                                             std::uint32_t attributes) {
   const std::string name(entry.name.view());
-  segment.destroy(entry);
-  PoolTable objects(segment.view());
-  ObjectEntry* const left = objects.find(name);
+  segment.destroy(held, entry);
+  ObjectEntry* const left = segment.find(held, name);
   if (left == nullptr) return left;
   const std::string path = path_in_memory(pool_memory_name(segment.name(), name));
   const UniqueFd fd(::open(path.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
@@ -254,7 +254,7 @@ void PoolAdoption::look_at_files() {
       return;
     }
     const auto name = memory_of_file(segment_->name(), static_cast<const char*>(file->d_name));
-    if (!name || PoolTable(segment_->view()).peek(*name) != nullptr) continue;
+    if (!name || segment_->peek(*name) != nullptr) continue;
     if (is_for_adoption(path_in_memory(static_cast<const char*>(file->d_name)), segment_->name())) {
       (void)reconcile(*segment_, *name);
     }
@@ -268,8 +268,9 @@ void PoolAdoption::look_at_entries() {
   const std::size_t end = std::min(used.size(), next_entry_ + kEntriesAtOnce);
   for (; next_entry_ < end; ++next_entry_) {
     if (!is_left_over(used[next_entry_])) continue;
-    const auto held = segment_->lock();
-    if (held && is_left_over(used[next_entry_])) segment_->destroy(used[next_entry_]);
+    auto held = segment_->lock();
+    if (!held) return;
+    if (is_left_over(used[next_entry_])) segment_->destroy(*held, used[next_entry_]);
   }
 }
 

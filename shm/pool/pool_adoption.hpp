@@ -37,11 +37,11 @@ class PoolAdoption {
 
   /// The entry is that of a memory that has gone, whose file could not be removed.
   [[nodiscard]] static bool is_left_over(const ObjectEntry& entry) noexcept;
-  /// With the lock held. Removes it, or makes its file one of `size` zeros again, with `attributes`; null: it
+  /// Removes it, or makes its file one of `size` zeros again, with `attributes`; null: it
   /// was removed. refused: neither is possible; says who can do what.
-  [[nodiscard]] static Result<ObjectEntry*> use_again(PoolSegment& segment, ObjectEntry& entry,
-                                                      std::size_t size, const MemoryRights& rights,
-                                                      std::uint32_t attributes);
+  [[nodiscard]] static Result<ObjectEntry*> use_again(PoolSegment& segment, PoolLock& held,
+                                                      ObjectEntry& entry, std::size_t size,
+                                                      const MemoryRights& rights, std::uint32_t attributes);
 
   /// Looks at some files and entries of the pool; each call goes on where the one before ended. For whoever
   /// watches over the host.

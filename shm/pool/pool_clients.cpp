@@ -13,6 +13,7 @@ namespace {
 constexpr auto kRelaxed = std::memory_order_relaxed;  // the mutex orders what it guards
 
 bool is_gone(ClientSlot& client, TimePoint now, bool thoroughly) noexcept {
+  if (client.ended.load(kRelaxed) != 0) return true;
   const auto pid = static_cast<pid_t>(client.pid.load(kRelaxed));
   if (pid < 0) return true;  // no number that the kernel gives
   const std::int64_t age = now.time_since_epoch().count() - client.looked_ns.load(kRelaxed);
@@ -20,37 +21,47 @@ bool is_gone(ClientSlot& client, TimePoint now, bool thoroughly) noexcept {
     return ::kill(pid, 0) != 0 && errno == ESRCH;
   }
   client.looked_ns.store(now.time_since_epoch().count(), kRelaxed);
-  return process_has_ended(pid, client.start.load(kRelaxed));
+  return process_has_ended(
+      {.pid = pid, .start = client.start.load(kRelaxed), .image = client.image.load(kRelaxed)});
 }
 
 }  // namespace
 
-ClientSlot* PoolClients::join(std::uint32_t pid, std::uint64_t start, std::string_view name) noexcept {
+ClientSlot* PoolClients::join(const ProcessIdentity& self, std::string_view name) noexcept {
   for (ClientSlot& client : view_.clients()) {
     if (client.pid.load(kRelaxed) != 0) continue;
     client.generation.fetch_add(1, kRelaxed);
-    client.start.store(start, kRelaxed);
+    client.start.store(self.start, kRelaxed);
+    client.image.store(self.image, kRelaxed);
+    client.ended.store(0, kRelaxed);
     client.looked_ns.store(MonotonicClock::now().time_since_epoch().count(), kRelaxed);
     client.first_reference.store(0, kRelaxed);
     client.reference_count.store(0, kRelaxed);
     client.name.assign(name);
-    client.pid.store(pid, std::memory_order_release);
+    journal_.set(client.pid, static_cast<std::uint32_t>(self.pid));
     const std::uint32_t link = view_.link_to(client);
     Link& high_water = view_.header().client_high_water;
-    if (high_water.load(kRelaxed) < link) high_water.store(link, kRelaxed);
+    if (high_water.load(kRelaxed) < link) journal_.set(high_water, link);
     return &client;
   }
   return nullptr;
 }
 
-void PoolClients::sweep(TimePoint now, bool thoroughly, const std::function<void(ClientSlot&)>& bury) {
+bool PoolClients::sweep(TimePoint now, bool thoroughly, const std::function<bool(ClientSlot&)>& bury) {
+  bool all = true;
   for (ClientSlot& client : view_.used_clients()) {
     if (client.pid.load(kRelaxed) == 0) continue;
     if (!is_gone(client, now, thoroughly)) continue;
-    bury(client);
-    leave(client);
+    client.ended.store(1, kRelaxed);
+    if (!bury(client)) {
+      all = false;
+      continue;
+    }
+    journal_.set(client.pid, 0);
+    journal_.commit();
     view_.header().departed.fetch_add(1, kRelaxed);
   }
+  return all;
 }
 
 std::string_view program_name() noexcept {

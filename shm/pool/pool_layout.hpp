@@ -19,14 +19,15 @@
 //
 // Objects hang in chains by the hash of their name: bucket -> entry.next -> ... References hang in two lists,
 // that of their object and that of their client. A link is the index of an entry plus one, so that
-// zero-filled memory is a valid empty table. All lists can be made anew from the entries themselves: who is
-// killed while he changes them leaves that to the next one.
+// zero-filled memory is a valid empty table. What somebody had begun who is killed, the next one undoes (see
+// PoolJournal). All lists can be made anew from the entries themselves: that is for what strangers do to
+// them.
 
 namespace plchost {
 
 inline constexpr std::uint64_t kPoolMagic = 0x6c6f6f70'74736f68;  // "hostpool"
-/// 1: first. 2: semaphores, mutexes, memories, clients and their references.
-inline constexpr std::uint32_t kPoolVersion = 2;
+/// 1: first. 2: semaphores, mutexes, memories, clients and their references. 3: notes of what is changed.
+inline constexpr std::uint32_t kPoolVersion = 3;
 
 using Link = std::atomic<std::uint32_t>;
 
@@ -81,9 +82,11 @@ struct alignas(64) ClientSlot {
   std::atomic<std::int64_t> looked_ns;    ///< CLOCK_MONOTONIC when it was last seen alive
   Link first_reference;
   std::atomic<std::uint32_t> reference_count;
-  FixedText<31> name;  ///< of the program
+  std::atomic<std::uint32_t> ended;  ///< 1: what it holds is being released
+  std::atomic<std::uint32_t> image;  ///< of the process, see image_of()
+  FixedText<23> name;                ///< of the program
 };
-static_assert(sizeof(ClientSlot) == 64 && offsetof(ClientSlot, name) == 32);
+static_assert(sizeof(ClientSlot) == 64 && offsetof(ClientSlot, name) == 40);
 
 /// One client's hold on one object.
 struct alignas(64) ReferenceEntry {
@@ -117,19 +120,30 @@ struct alignas(64) PoolHeader {
   std::atomic<std::uint64_t> changes;
   std::array<std::uint32_t, 10> reserved1;
 
-  // Guarded by the mutex.
+  // Guarded by the mutex. Those that count only grow.
   std::atomic<std::uint32_t> high_water;    ///< entries from here on were never used
   Link first_free;                          ///< of the entries
   std::atomic<std::uint32_t> reclaim_hand;  ///< where the search for one to reclaim goes on
-  std::atomic<std::uint32_t> repairs;       ///< how often the lists were made anew
+  std::atomic<std::uint32_t> repairs;       ///< how often an owner of the mutex had died
   std::atomic<std::uint32_t> reference_high_water;
   Link first_free_reference;
   std::atomic<std::uint32_t> client_high_water;
   std::atomic<std::uint32_t> departed;  ///< clients that ended without releasing what they held
-  std::array<std::uint32_t, 8> reserved2;
+  Link unsettled;  ///< the object that is being made or taken away, with its file if it is a memory
+  std::atomic<std::uint32_t> rebuilding;     ///< 1: the lists are being made anew
+  std::atomic<std::uint32_t> rebuilds;       ///< how often they were, because a stranger had damaged them
+  std::atomic<std::uint32_t> lost_objects;   ///< objects that were not valid then
+  std::atomic<std::uint32_t> header_mended;  ///< how often its first 64 bytes were written anew
+  std::array<std::uint32_t, 3> reserved2;
+
+  alignas(64) std::atomic<std::uint32_t> noted;  ///< of the notes, those that count
+  std::uint32_t reserved3;
+  /// Of words that were changed since `noted` was 0: [ place, in words from the header's begin ][ value ].
+  std::array<std::atomic<std::uint64_t>, 63> notes;
 };
-static_assert(sizeof(PoolHeader) == 192 && offsetof(PoolHeader, version) == 8);
+static_assert(sizeof(PoolHeader) == 704 && offsetof(PoolHeader, version) == 8);
 static_assert(offsetof(PoolHeader, mutex) == 64 && offsetof(PoolHeader, high_water) == 128);
+static_assert(offsetof(PoolHeader, noted) == 192 && offsetof(PoolHeader, notes) == 200);
 static_assert(std::atomic<std::uint32_t>::is_always_lock_free);
 
 inline constexpr std::uint32_t kMaxClients = 512;

@@ -2,30 +2,46 @@
 
 #include <fmt/format.h>
 
+#include "shm/base/thread_owner.hpp"
+
 namespace plchost {
+
+namespace {
+
+std::string describe_holder(std::uint32_t thread) {
+  const auto owner = owner_of_thread(thread);
+  if (!owner) return fmt::format("thread {}", thread);
+  return fmt::format("process {} ({})", owner->pid, owner->program);
+}
+
+}  // namespace
 
 // Only who holds the mutex writes `changes`; one that died has left it odd. Sequentially consistent, so that
 // what follows is not seen before it.
-PoolLock::PoolLock(PoolHeader& header, bool owner_died) noexcept : header_(&header), owner_died_(owner_died) {
+PoolLock::PoolLock(PoolHeader& header, PoolJournal& journal, bool owner_died) noexcept
+    : header_(&header), journal_(&journal), owner_died_(owner_died) {
   header.changes.fetch_or(1);
 }
 
 PoolLock::~PoolLock() {
   if (header_ == nullptr) return;
+  journal_->commit();
   header_->changes.fetch_add(1);
   header_->mutex.unlock();
 }
 
-Result<PoolLock> PoolLock::acquire(PoolHeader& header, const std::string& pool, Duration patience) {
+Result<PoolLock> PoolLock::acquire(PoolHeader& header, PoolJournal& journal, const std::string& pool,
+                                   Duration patience) {
   switch (header.mutex.lock(MonotonicClock::now() + patience)) {
     case LockResult::locked:
-      return PoolLock(header, (header.changes.load(std::memory_order_relaxed) & 1) != 0);
+      return PoolLock(header, journal, (header.changes.load(std::memory_order_relaxed) & 1) != 0);
     case LockResult::owner_died:
-      return PoolLock(header, true);
+      return PoolLock(header, journal, true);
     case LockResult::timed_out:
-      return failure(ErrorCode::timed_out,
-                     fmt::format("pool '{}': thread {} holds its mutex for more than {} ms", pool,
-                                 header.mutex.owner(), patience / std::chrono::milliseconds(1)));
+      return failure(
+          ErrorCode::timed_out,
+          fmt::format("pool '{}': {} holds its lock for more than {} ms; is it stopped?", pool,
+                      describe_holder(header.mutex.owner()), patience / std::chrono::milliseconds(1)));
     case LockResult::deadlock:
     case LockResult::corrupt:
       break;

@@ -5,6 +5,8 @@
 
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
+#include "shm/pool/memory_trash.hpp"
+#include "shm/pool/pool_journal.hpp"
 #include "shm/pool/pool_layout.hpp"
 
 namespace plchost {
@@ -13,23 +15,35 @@ namespace plchost {
 /// process dies. Readers without the right to write see by the header's `changes` whether it is held.
 class PoolLock {
  public:
-  /// Set-up under the mutex takes microseconds, a repair of the largest pool some 100 ms.
-  static constexpr Duration kPatience = std::chrono::seconds(5);
+  /// Set-up under the mutex takes microseconds. It is only held for longer by a process that was stopped, or
+  /// that makes the lists of a large pool anew which a stranger has damaged.
+  static constexpr Duration kPatience = std::chrono::milliseconds(100);
 
   /// timed_out: another one holds it for longer than `patience`. corrupt: it was scribbled over.
-  static Result<PoolLock> acquire(PoolHeader& header, const std::string& pool, Duration patience = kPatience);
+  static Result<PoolLock> acquire(PoolHeader& header, PoolJournal& journal, const std::string& pool,
+                                  Duration patience = kPatience);
 
   PoolLock(PoolLock&& other) noexcept
-      : header_(std::exchange(other.header_, nullptr)), owner_died_(other.owner_died_) {}
+      : trash(std::move(other.trash)),
+        burying(other.burying),
+        header_(std::exchange(other.header_, nullptr)),
+        journal_(other.journal_),
+        owner_died_(other.owner_died_) {}
   PoolLock& operator=(PoolLock&&) = delete;
   ~PoolLock();
 
-  /// The last owner died while it held the mutex: what it guards must be repaired.
+  /// The last owner died while it held the mutex: what it had begun must be undone.
   [[nodiscard]] bool owner_died() const noexcept { return owner_died_; }
 
+  /// What is taken away with the lock held, and goes after its release.
+  MemoryTrash trash;
+  /// Dead clients still hold something.
+  bool burying = false;
+
  private:
-  PoolLock(PoolHeader& header, bool owner_died) noexcept;
+  PoolLock(PoolHeader& header, PoolJournal& journal, bool owner_died) noexcept;
   PoolHeader* header_;
+  PoolJournal* journal_;
   bool owner_died_;
 };
 

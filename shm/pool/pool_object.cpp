@@ -62,6 +62,10 @@ void PoolObject::close() noexcept {
   segment_.reset();
 }
 
+ObjectStatus PoolObject::why_not_valid() const noexcept {
+  return segment_ != nullptr && segment_->lost() ? ObjectStatus::corrupt : ObjectStatus::gone;
+}
+
 std::uint64_t SharedEvent::count() const noexcept {
   if (!valid()) return 0;
   const std::uint64_t since = entry().event.count() - entry().first_count.load(std::memory_order_relaxed);
@@ -75,10 +79,10 @@ ObjectStatus SharedEvent::wait(std::uint64_t& cursor, TimePoint deadline) const 
   if (before > CountedEvent::kCountMask) return ObjectStatus::bad_cursor;
   const Waiting waiting(*this);
   for (;;) {
-    if (!valid()) return ObjectStatus::gone;
+    if (!valid()) return why_not_valid();
     const auto seen = entry().event.snapshot();
     const std::uint64_t posts = count();
-    if (!valid()) return ObjectStatus::gone;
+    if (!valid()) return why_not_valid();
     // The count goes round.
     const std::uint64_t missed = (posts - before) & CountedEvent::kCountMask;
     if (missed > CountedEvent::kCountMask / 2) return ObjectStatus::bad_cursor;
@@ -116,7 +120,7 @@ ObjectStatus SharedSemaphore::wait(TimePoint deadline) const noexcept {
   for (;;) {
     const TimePoint until = next_look(deadline);
     if (entry().semaphore.wait(until)) return ObjectStatus::done;
-    if (!valid()) return ObjectStatus::gone;
+    if (!valid()) return why_not_valid();
     if (until == deadline) return ObjectStatus::timed_out;
   }
 }
@@ -137,7 +141,7 @@ ObjectStatus SharedMutex::lock(TimePoint deadline) const noexcept {
     const TimePoint until = next_look(deadline);
     const LockResult result = entry().mutex.lock(until);
     if (result != LockResult::timed_out) return status_of(result);
-    if (!valid()) return ObjectStatus::gone;
+    if (!valid()) return why_not_valid();
     if (until == deadline) return ObjectStatus::timed_out;
   }
 }

@@ -26,7 +26,7 @@ enum class ObjectStatus : std::uint8_t {
   full,           ///< semaphore: at its greatest value
   not_permitted,  ///< opened to read only
   gone,           ///< closed, or the pool was damaged and the object lost
-  corrupt,        ///< a stranger has written into it
+  corrupt,        ///< a stranger has written into it, or cut the pool's file short
   bad_cursor,     ///< event: the cursor is ahead of the posts that were made
 };
 
@@ -70,9 +70,10 @@ class PoolObject {
   };
 
   [[nodiscard]] ObjectStatus usable() const noexcept {
-    if (!valid()) return ObjectStatus::gone;
+    if (!valid()) return why_not_valid();
     return writable_ ? ObjectStatus::done : ObjectStatus::not_permitted;
   }
+  [[nodiscard]] ObjectStatus why_not_valid() const noexcept;
   [[nodiscard]] ObjectEntry& entry() const noexcept { return *entry_; }
   /// Somebody who waits can be marked in it, so that who posts wakes him.
   [[nodiscard]] bool can_be_marked() const noexcept { return reference_ != nullptr; }

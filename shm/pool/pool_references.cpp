@@ -10,11 +10,11 @@ std::uint32_t generation_of(const ObjectEntry& object) noexcept {
   return Binding::generation(object.binding.load(kRelaxed));
 }
 
-void count_down(std::atomic<std::uint32_t>& count) noexcept {
-  if (const std::uint32_t before = count.load(kRelaxed); before > 0) count.store(before - 1, kRelaxed);
-}
-
 }  // namespace
+
+void PoolReferences::count_down(std::atomic<std::uint32_t>& count) noexcept {
+  if (const std::uint32_t before = count.load(kRelaxed); before > 0) journal_.set(count, before - 1);
+}
 
 ObjectEntry* PoolReferences::object_of(const ReferenceEntry& reference) const noexcept {
   ObjectEntry* const object = view_.entry(reference.object);
@@ -30,8 +30,7 @@ ReferenceEntry* PoolReferences::add(ObjectEntry& object, ClientSlot& client, boo
   reference->object_generation.store(generation_of(object), kRelaxed);
   reference->writable.store(writable ? 1 : 0, kRelaxed);
   reference->waiting.store(0, kRelaxed);
-  // From here on a rebuild finds it, whether or not this process lives to put it into its lists.
-  reference->object.store(view_.link_to(object), std::memory_order_release);
+  journal_.set(reference->object, view_.link_to(object));
   link(*reference, object, client);
   return reference;
 }
@@ -41,11 +40,11 @@ void PoolReferences::link(ReferenceEntry& reference, ObjectEntry& object, Client
   const auto put_first = [&](Link& first, std::atomic<std::uint32_t>& count, Link ReferenceEntry::* next,
                              Link ReferenceEntry::* previous) {
     ReferenceEntry* const second = view_.reference(first);
-    (reference.*next).store(second == nullptr ? 0 : view_.link_to(*second), kRelaxed);
-    (reference.*previous).store(0, kRelaxed);
-    if (second != nullptr) (second->*previous).store(self, kRelaxed);
-    first.store(self, kRelaxed);
-    count.fetch_add(1, kRelaxed);
+    journal_.set(reference.*next, second == nullptr ? 0 : view_.link_to(*second));
+    journal_.set(reference.*previous, 0);
+    if (second != nullptr) journal_.set(second->*previous, self);
+    journal_.set(first, self);
+    journal_.set(count, count.load(kRelaxed) + 1);
   };
   put_first(object.first_reference, object.reference_count, &ReferenceEntry::next_of_object,
             &ReferenceEntry::previous_of_object);
@@ -63,21 +62,23 @@ bool PoolReferences::unlink(ReferenceEntry& reference, Link& first, Link Referen
       from.load(kRelaxed) == self &&
       (after == nullptr ? (reference.*next).load(kRelaxed) == 0 : (after->*previous).load(kRelaxed) == self);
   if (!sound) return false;
-  from.store((reference.*next).load(kRelaxed), kRelaxed);
-  if (after != nullptr) (after->*previous).store((reference.*previous).load(kRelaxed), kRelaxed);
+  journal_.set(from, (reference.*next).load(kRelaxed));
+  if (after != nullptr) journal_.set(after->*previous, (reference.*previous).load(kRelaxed));
   return true;
 }
 
 ObjectEntry* PoolReferences::release(ReferenceEntry& reference) noexcept {
   ObjectEntry* const object = object_of(reference);
   ClientSlot* const client = view_.client(reference.client);
-  const bool sound = object != nullptr && client != nullptr &&
-                     unlink(reference, object->first_reference, &ReferenceEntry::next_of_object,
-                            &ReferenceEntry::previous_of_object) &&
-                     unlink(reference, client->first_reference, &ReferenceEntry::next_of_client,
-                            &ReferenceEntry::previous_of_client);
+  // Of an object that was taken away under its users nobody has a list any more.
+  const bool sound =
+      client != nullptr &&
+      (object == nullptr || unlink(reference, object->first_reference, &ReferenceEntry::next_of_object,
+                                   &ReferenceEntry::previous_of_object)) &&
+      unlink(reference, client->first_reference, &ReferenceEntry::next_of_client,
+             &ReferenceEntry::previous_of_client);
   if (sound) {
-    count_down(object->reference_count);
+    if (object != nullptr) count_down(object->reference_count);
     count_down(client->reference_count);
     free(reference);
   } else {
@@ -91,7 +92,7 @@ ReferenceEntry* PoolReferences::allocate() noexcept {
   PoolHeader& header = view_.header();
   for (int attempt = 0; attempt < 2; ++attempt) {
     if (ReferenceEntry* const free = view_.reference(header.first_free_reference); free != nullptr) {
-      header.first_free_reference.store(free->next_of_object.load(kRelaxed), kRelaxed);
+      journal_.set(header.first_free_reference, free->next_of_object.load(kRelaxed));
       if (free->object.load(kRelaxed) == 0) return free;
       rebuild();  // the free list is damaged
       continue;
@@ -100,7 +101,7 @@ ReferenceEntry* PoolReferences::allocate() noexcept {
     if (high_water >= view_.references().size()) return nullptr;
     ReferenceEntry& unused = view_.references()[high_water];
     if (unused.object.load(kRelaxed) == 0) {
-      header.reference_high_water.store(high_water + 1, kRelaxed);
+      journal_.set(header.reference_high_water, high_water + 1);
       return &unused;
     }
     rebuild();
@@ -110,12 +111,15 @@ ReferenceEntry* PoolReferences::allocate() noexcept {
 
 void PoolReferences::free(ReferenceEntry& reference) noexcept {
   Link& first_free = view_.header().first_free_reference;
-  reference.object.store(0, kRelaxed);
-  reference.next_of_object.store(first_free.load(kRelaxed), kRelaxed);
-  first_free.store(view_.link_to(reference), kRelaxed);
+  journal_.set(reference.object, 0);
+  journal_.set(reference.next_of_object, first_free.load(kRelaxed));
+  journal_.set(first_free, view_.link_to(reference));
 }
 
 void PoolReferences::rebuild() noexcept {
+  PoolHeader& header = view_.header();
+  journal_.commit();
+  const std::uint32_t before = header.rebuilding.exchange(1, kRelaxed);
   for (ObjectEntry& object : view_.entries()) {
     object.first_reference.store(0, kRelaxed);
     object.reference_count.store(0, kRelaxed);
@@ -124,7 +128,6 @@ void PoolReferences::rebuild() noexcept {
     client.first_reference.store(0, kRelaxed);
     client.reference_count.store(0, kRelaxed);
   }
-  PoolHeader& header = view_.header();
   const auto all = view_.references();
   header.first_free_reference.store(0, kRelaxed);
   header.reference_high_water.store(0, kRelaxed);
@@ -145,6 +148,9 @@ void PoolReferences::rebuild() noexcept {
       reference.object.store(0, kRelaxed);
     }
   }
+  journal_.commit();
+  header.rebuilds.fetch_add(1, kRelaxed);
+  header.rebuilding.store(before, std::memory_order_release);
 }
 
 }  // namespace plchost

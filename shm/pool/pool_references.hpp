@@ -1,5 +1,6 @@
 #pragma once
 
+#include "shm/pool/pool_journal.hpp"
 #include "shm/pool/pool_view.hpp"
 
 namespace plchost {
@@ -8,7 +9,7 @@ namespace plchost {
 /// wrote into it: a list that is damaged is made anew.
 class PoolReferences {
  public:
-  explicit PoolReferences(const PoolView& view) noexcept : view_(view) {}
+  PoolReferences(const PoolView& view, PoolJournal& journal) noexcept : view_(view), journal_(journal) {}
 
   /// Null: there are max_references already.
   [[nodiscard]] ReferenceEntry* add(ObjectEntry& object, ClientSlot& client, bool writable) noexcept;
@@ -26,7 +27,10 @@ class PoolReferences {
   [[nodiscard]] bool unlink(ReferenceEntry& reference, Link& first, Link ReferenceEntry::* next,
                             Link ReferenceEntry::* previous) noexcept;
 
+  void count_down(std::atomic<std::uint32_t>& count) noexcept;
+
   PoolView view_;
+  PoolJournal& journal_;
 };
 
 }  // namespace plchost

@@ -1,5 +1,6 @@
 #include "shm/pool/pool_segment.hpp"
 
+#include <algorithm>
 #include <new>
 #include <thread>
 
@@ -8,7 +9,6 @@
 
 #include "shm/base/process_start.hpp"
 #include "shm/base/time.hpp"
-#include "shm/pool/object_pool.hpp"
 #include "shm/pool/pool_clients.hpp"
 #include "shm/pool/pool_references.hpp"
 #include "shm/pool/pool_table.hpp"
@@ -69,16 +69,17 @@ PoolSegment::PoolSegment(std::string name, MemoryFile memory, std::uint32_t max_
       guard_(memory_.bytes()),
       view_(memory_.bytes(), max_objects),
       access_(access),
-      pid_(::getpid()),
-      start_(start_of(pid_).value_or(0)) {}
+      process_(this_process()),
+      journal_(view_.header(), memory_.bytes().size()),
+      told_(counted()) {}
 
+// As if this client had ended: if the lock is not to be had, or it holds very much, others release the rest.
 PoolSegment::~PoolSegment() {
-  if (client_ == nullptr || pid_ != ::getpid()) return;
-  const auto held = lock();
-  ClientSlot* const slot = held ? own_client() : nullptr;
-  if (slot == nullptr) return;
-  release_all(*slot);
-  PoolClients::leave(*slot);
+  if (client_ == nullptr || process_.pid != ::getpid()) return;
+  if (ClientSlot* const slot = own_client(); slot != nullptr) slot->ended.store(1, kRelaxed);
+  constexpr int kAttempts = 50;
+  for (int i = 0; i < kAttempts && own_client() != nullptr && lock(); ++i) {
+  }
 }
 
 // busy: somebody has begun to make it and has not ended yet.
@@ -148,61 +149,136 @@ Result<std::shared_ptr<PoolSegment>> PoolSegment::create(const std::string& name
   }
 }
 
+Result<PoolLock> PoolSegment::acquire(Duration patience) {
+  // Who was waited for in vain just now is waited for once more only for a moment.
+  constexpr Duration kMoment = std::chrono::milliseconds(5);
+  PoolHeader& header = view_.header();
+  const std::uint32_t stuck = stuck_.load(kRelaxed);
+  if (stuck != 0 && header.mutex.owner() == stuck) patience = std::min(patience, kMoment);
+  auto held = PoolLock::acquire(header, journal_, name_, patience);
+  if (lost()) {
+    return failure(ErrorCode::corrupt,
+                   fmt::format("pool '{}': another program has cut its file in {} short; what is in it is "
+                               "lost to this process, which must open it anew",
+                               name_, MemoryFile::kDirectory));
+  }
+  const bool in_vain = !held && held.error().code == ErrorCode::timed_out;
+  stuck_.store(in_vain ? header.mutex.owner() : 0, kRelaxed);
+  if (!held) return held;
+  mend_header();
+  if (held->owner_died()) repair(*held);
+  return held;
+}
+
 Result<PoolLock> PoolSegment::lock(bool look_thoroughly, Duration patience) {
   if (!writable()) {
     return failure(ErrorCode::refused,
                    fmt::format("pool '{}' was attached to read only; nothing can be changed in it", name_));
   }
-  if (pid_ != ::getpid()) {
+  if (process_.pid != ::getpid()) {
     return failure(
         ErrorCode::wrong_state,
-        fmt::format("pool '{}' was attached by process {}; a child attaches it anew", name_, pid_));
+        fmt::format("pool '{}' was attached by process {}; a child attaches it anew", name_, process_.pid));
   }
-  auto held = PoolLock::acquire(view_.header(), name_, patience);
-  if (!held) return held;
-  mend_header();
-  if (held->owner_died()) repair();
-  PoolClients(view_).sweep(MonotonicClock::now(), look_thoroughly || held->owner_died(),
-                           [this](ClientSlot& client) { release_all(client); });
-  return held;
+  constexpr std::size_t kPiece = 256;  // references
+  const TimePoint until = MonotonicClock::now() + std::min(patience, kBurial);
+  for (;;) {
+    auto held = acquire(patience);
+    if (!held) return held;
+    release_late(*held);
+    const TimePoint now = MonotonicClock::now();
+    struct Burial {  // so that the function below has room for what it needs without the heap
+      PoolSegment& segment;
+      PoolLock& held;
+      std::size_t left = kPiece;
+    } burial{.segment = *this, .held = *held};
+    const bool all = PoolClients(view_, journal_)
+                         .sweep(now, look_thoroughly || held->owner_died(), [&burial](ClientSlot& client) {
+                           return burial.segment.bury(burial.held, client, burial.left);
+                         });
+    held->burying = !all;
+    if (all || now >= until) return held;
+  }
 }
 
 // If a stranger wrote over it, those who come later could not attach.
 void PoolSegment::mend_header() noexcept {
   const auto max_objects = static_cast<std::uint32_t>(view_.entries().size());
-  const PoolHeader& header = view_.header();
+  PoolHeader& header = view_.header();
   const bool sound = header.magic.load(kRelaxed) == kPoolMagic &&
                      check_header(header, header.max_objects, pool_size(max_objects), name_).has_value();
-  if (!sound) write_constants(view_.header(), max_objects);
+  if (sound) return;
+  write_constants(header, max_objects);
+  header.header_mended.fetch_add(1, kRelaxed);
 }
 
-// What was half-made when its maker died: a memory whose file may have its name already, an object that
-// nobody has a reference to yet.
-void PoolSegment::repair() noexcept {
+PoolFindings PoolSegment::counted() const noexcept {
+  const PoolHeader& header = view_.header();
+  return {.lost = lost(),
+          .headers_mended = header.header_mended.load(kRelaxed),
+          .rebuilds = header.rebuilds.load(kRelaxed),
+          .lost_objects = header.lost_objects.load(kRelaxed)};
+}
+
+PoolFindings PoolSegment::take_findings() noexcept {
+  const PoolFindings now = counted();
+  const PoolFindings before = std::exchange(told_, now);
+  return {.lost = now.lost,
+          .headers_mended = now.headers_mended - before.headers_mended,
+          .rebuilds = now.rebuilds - before.rebuilds,
+          .lost_objects = now.lost_objects - before.lost_objects};
+}
+
+// What an owner that died had begun is undone; an object that it was making or taking away goes.
+void PoolSegment::repair(PoolLock& held) noexcept {
+  PoolHeader& header = view_.header();
+  header.repairs.fetch_add(1, kRelaxed);
+  const bool undone = header.rebuilding.load(kRelaxed) == 0 && journal_.roll_back();
+  if (!undone) return rebuild(held);
+  ObjectEntry* const entry = view_.entry(header.unsettled);
+  journal_.set(header.unsettled, 0);
+  if (entry == nullptr) return;
+  if (entry->state.load(kRelaxed) == static_cast<std::uint32_t>(EntryState::changing)) {
+    // The file of one that was being adopted is another's.
+    const bool adopted = (entry->attributes.load(kRelaxed) & kAdopted) != 0;
+    adopted ? table(held).erase(*entry) : destroy(held, *entry);
+  } else if (PoolTable::is_valid(*entry)) {
+    drop_if_idle(held, *entry);
+  }
+}
+
+// All lists, from the entries. That takes as long as the pool is large.
+void PoolSegment::rebuild(PoolLock& held) noexcept {
+  PoolHeader& header = view_.header();
+  journal_.commit();
+  header.rebuilding.store(1, kRelaxed);
   for (const ObjectEntry& entry : view_.entries()) {
     const bool half_made = entry.state.load(kRelaxed) == static_cast<std::uint32_t>(EntryState::changing);
     if (half_made && entry.type.load(kRelaxed) == static_cast<std::uint32_t>(ObjectType::memory) &&
         (entry.attributes.load(kRelaxed) & kAdopted) == 0) {
-      MemoryFile::remove(pool_memory_name(name_, entry.name.view()));
+      (void)held.trash.take(pool_memory_name(name_, entry.name.view()));
     }
   }
-  PoolTable(view_).rebuild();
-  view_.header().client_high_water.store(kMaxClients, kRelaxed);
-  PoolReferences(view_).rebuild();
+  table(held).rebuild();
+  header.client_high_water.store(kMaxClients, kRelaxed);
+  PoolReferences(view_, journal_).rebuild();
+  header.unsettled.store(0, kRelaxed);
+  header.rebuilding.store(0, kRelaxed);
   for (ObjectEntry& entry : view_.used_entries()) {
-    if (PoolTable::is_valid(entry)) drop_if_idle(entry);
+    if (PoolTable::is_valid(entry)) drop_if_idle(held, entry);
   }
 }
 
 ClientSlot* PoolSegment::own_client() const noexcept {
-  const bool ours = client_ != nullptr && client_->pid.load(kRelaxed) == static_cast<std::uint32_t>(pid_) &&
+  const bool ours = client_ != nullptr &&
+                    client_->pid.load(kRelaxed) == static_cast<std::uint32_t>(process_.pid) &&
                     client_->generation.load(kRelaxed) == client_generation_;
   return ours ? client_ : nullptr;
 }
 
 Result<ClientSlot*> PoolSegment::client() {
   if (ClientSlot* const slot = own_client(); slot != nullptr) return slot;
-  client_ = PoolClients(view_).join(static_cast<std::uint32_t>(pid_), start_, program_name());
+  client_ = PoolClients(view_, journal_).join(process_, program_name());
   if (client_ == nullptr) {
     return failure(ErrorCode::full,
                    fmt::format("pool '{}' has {} users, no more are possible", name_, kMaxClients));
@@ -211,10 +287,29 @@ Result<ClientSlot*> PoolSegment::client() {
   return client_;
 }
 
-Result<ReferenceEntry*> PoolSegment::add_reference(ObjectEntry& object, bool writable) {
+ObjectEntry* PoolSegment::peek(std::string_view name) const noexcept {
+  return PoolTable::peek(view_, name);
+}
+
+// Where there was no time yet to release all that dead clients held, this object is looked at.
+ObjectEntry* PoolSegment::find(PoolLock& held, std::string_view name) noexcept {
+  PoolTable objects = table(held);
+  ObjectEntry* const object = objects.find(name);
+  if (object == nullptr || !held.burying) return object;
+  ReferenceEntry* reference = view_.reference(object->first_reference);
+  for (std::size_t step = 0; reference != nullptr && step < view_.references().size(); ++step) {
+    ReferenceEntry* const next = view_.reference(reference->next_of_object);
+    const ClientSlot* const client = view_.client(reference->client);
+    if (client == nullptr || client->ended.load(kRelaxed) != 0) release_one(held, *reference);
+    reference = next;
+  }
+  return objects.find(name);
+}
+
+Result<ReferenceEntry*> PoolSegment::add_reference(PoolLock& /*held*/, ObjectEntry& object, bool writable) {
   const auto slot = client();
   if (!slot) return std::unexpected(slot.error());
-  ReferenceEntry* const reference = PoolReferences(view_).add(object, **slot, writable);
+  ReferenceEntry* const reference = PoolReferences(view_, journal_).add(object, **slot, writable);
   if (reference == nullptr) {
     return failure(ErrorCode::full, fmt::format("pool '{}' has {} references, no more are possible", name_,
                                                 view_.references().size()));
@@ -223,61 +318,91 @@ Result<ReferenceEntry*> PoolSegment::add_reference(ObjectEntry& object, bool wri
 }
 
 void PoolSegment::release(ReferenceEntry& reference, std::uint32_t generation) noexcept {
-  const auto held = lock();
-  const ClientSlot* const slot = held ? own_client() : nullptr;
+  auto held = lock();
+  if (held) return release_own(*held, reference, generation);
+  if (held.error().code != ErrorCode::timed_out) return;
+  const std::lock_guard guard(late_guard_);
+  late_.emplace_back(&reference, generation);
+}
+
+void PoolSegment::release_late(PoolLock& held) noexcept {
+  const std::lock_guard guard(late_guard_);
+  for (const auto& [reference, generation] : late_) release_own(held, *reference, generation);
+  late_.clear();
+}
+
+void PoolSegment::release_own(PoolLock& held, ReferenceEntry& reference, std::uint32_t generation) noexcept {
+  const ClientSlot* const slot = own_client();
   const bool ours = slot != nullptr && reference.object.load(kRelaxed) != 0 &&
                     reference.generation.load(kRelaxed) == generation &&
                     view_.client(reference.client) == slot;
-  if (ours) release_one(reference);
+  if (ours) release_one(held, reference);
 }
 
-void PoolSegment::release_one(ReferenceEntry& reference) noexcept {
-  if (ObjectEntry* const object = PoolReferences(view_).release(reference)) drop_if_idle(*object);
+void PoolSegment::release_one(PoolLock& held, ReferenceEntry& reference) noexcept {
+  if (ObjectEntry* const object = PoolReferences(view_, journal_).release(reference)) {
+    drop_if_idle(held, *object);
+  }
+  journal_.commit();
 }
 
-void PoolSegment::release_all(ClientSlot& client) noexcept {
+// False: there is more, and it is the turn of others.
+bool PoolSegment::bury(PoolLock& held, ClientSlot& client, std::size_t& left) noexcept {
   bool mended = false;
-  for (std::size_t step = 0; step < view_.references().size(); ++step) {
+  for (;;) {
     ReferenceEntry* const reference = view_.reference(client.first_reference);
-    if (reference == nullptr) break;
+    if (reference == nullptr) return true;
+    if (left == 0 || held.trash.full()) return false;
+    --left;
     const bool listed = view_.client(reference->client) == &client && reference->object.load(kRelaxed) != 0;
     if (listed) {
-      release_one(*reference);
+      release_one(held, *reference);
     } else if (!mended) {
-      PoolReferences(view_).rebuild();  // the list is damaged
+      PoolReferences(view_, journal_).rebuild();  // the list is damaged
       mended = true;
     } else {
-      break;  // a stranger goes on writing
+      return true;  // a stranger goes on writing
     }
   }
 }
 
 // An event that was made by who posts and binds stays in its place until that is needed for another one.
-void PoolSegment::drop_if_idle(ObjectEntry& object) noexcept {
+void PoolSegment::drop_if_idle(PoolLock& held, ObjectEntry& object) noexcept {
   const bool reclaimed_later = object.type.load(kRelaxed) == static_cast<std::uint32_t>(ObjectType::event) &&
                                (object.attributes.load(kRelaxed) & kDirect) == 0;
   if (reclaimed_later) return;
   std::uint64_t binding = object.binding.load(std::memory_order_acquire);
+  if (!PoolTable::is_idle(object)) return;
+  // References that were put back would be of an old generation.
+  journal_.set(view_.header().unsettled, view_.link_to(object));
+  journal_.commit();
   // Fails if a task is being bound to it at this moment.
-  if (!PoolTable::is_idle(object) ||
-      !object.binding.compare_exchange_strong(binding, Binding::next_generation(binding),
-                                              std::memory_order_acq_rel, kRelaxed)) {
-    return;
+  if (object.binding.compare_exchange_strong(binding, Binding::next_generation(binding),
+                                             std::memory_order_acq_rel, kRelaxed)) {
+    destroy(held, object);
+  } else {
+    journal_.set(view_.header().unsettled, 0);
   }
-  destroy(object);
 }
 
-void PoolSegment::destroy(ObjectEntry& object) noexcept {
+void PoolSegment::destroy(PoolLock& held, ObjectEntry& object) noexcept {
+  PoolTable objects = table(held);
+  objects.withdraw(object);
   if (object.type.load(kRelaxed) == static_cast<std::uint32_t>(ObjectType::memory)) {
-    object.state.store(static_cast<std::uint32_t>(EntryState::changing), std::memory_order_release);
-    if (!MemoryFile::remove(pool_memory_name(name_, object.name.view()))) {
+    if (!held.trash.take(pool_memory_name(name_, object.name.view()))) {
       // Another user's: see PoolAdoption::is_left_over().
       object.attributes.store(0, kRelaxed);
-      object.state.store(static_cast<std::uint32_t>(EntryState::used), std::memory_order_release);
+      objects.publish(object);
+      journal_.commit();
       return;
     }
   }
-  PoolTable(view_).erase(object);
+  objects.erase(object);
+}
+
+void PoolSegment::let_go(PoolLock& held, ObjectEntry& object) noexcept {
+  journal_.set(object.attributes, object.attributes.load(kRelaxed) & ~(kKept | kAdopted));
+  drop_if_idle(held, object);
 }
 
 }  // namespace plchost

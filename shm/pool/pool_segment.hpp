@@ -1,21 +1,28 @@
 #pragma once
 
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include <sys/types.h>
 
 #include "shm/base/memory_guard.hpp"
+#include "shm/base/process_start.hpp"
 #include "shm/base/result.hpp"
 #include "shm/pool/memory_file.hpp"
+#include "shm/pool/object_pool.hpp"
+#include "shm/pool/pool_journal.hpp"
 #include "shm/pool/pool_lock.hpp"
+#include "shm/pool/pool_table.hpp"
 #include "shm/pool/pool_view.hpp"
 
 namespace plchost {
-
-struct PoolOptions;
 
 /// A pool as one process has it mapped: where it comes from, its lock, its repair, and what this client
 /// holds. Lives as long as anything that was opened through it.
@@ -36,42 +43,75 @@ class PoolSegment {
 
   /// The file was cut short by a stranger.
   [[nodiscard]] bool lost() const noexcept { return guard_.lost(); }
+  /// Who changes the pool now has died over it, and nobody has come since. Set-up; only reads.
+  [[nodiscard]] bool holder_has_ended() const noexcept { return view_.header().mutex.owner_has_ended(); }
 
-  /// Who holds it finds all lists repaired, and what dead clients held released.
-  /// refused: mapped to read only. wrong_state: this process is a child of the one that attached.
+  /// Who holds it finds nothing half-done, and what dead clients held released: as much as can be released in
+  /// `kBurial` (others have their turn meanwhile), the rest is for the next one.
+  /// refused: mapped to read only. wrong_state: this process is a child of the one that attached. timed_out:
+  /// another one holds it for longer than `patience`. corrupt: lost, or the lock is.
   [[nodiscard]] Result<PoolLock> lock(bool look_thoroughly = false, Duration patience = PoolLock::kPatience);
+  static constexpr Duration kBurial = std::chrono::milliseconds(20);
 
-  /// With the lock held. full: too many clients, or too many references.
-  [[nodiscard]] Result<ReferenceEntry*> add_reference(ObjectEntry& object, bool writable);
-  /// Takes the lock. Nothing is done if it is another's by now.
+  /// Since it was called last, or since the pool was attached. From one thread.
+  [[nodiscard]] PoolFindings take_findings() noexcept;
+
+  // With the lock held, which is given as a proof.
+
+  [[nodiscard]] PoolTable table(const PoolLock& /*held*/) noexcept { return {view_, journal_}; }
+  /// Null: there is none of that name, or only one that dead clients held.
+  [[nodiscard]] ObjectEntry* find(PoolLock& held, std::string_view name) noexcept;
+  /// full: too many clients, or too many references.
+  [[nodiscard]] Result<ReferenceEntry*> add_reference(PoolLock& held, ObjectEntry& object, bool writable);
+  /// Frees the object if nobody needs it any more.
+  void drop_if_idle(PoolLock& held, ObjectEntry& object) noexcept;
+  /// Frees it, whoever needs it.
+  void destroy(PoolLock& held, ObjectEntry& object) noexcept;
+  /// Keeps it no longer.
+  void let_go(PoolLock& held, ObjectEntry& object) noexcept;
+
+  /// Without the lock, and without the right to write: null if there is none, or the index is damaged.
+  [[nodiscard]] ObjectEntry* peek(std::string_view name) const noexcept;
+
+  /// Takes the lock; if that is not to be had, the next one who gets it in this process does it. Nothing is
+  /// done if the reference is another's by now.
   void release(ReferenceEntry& reference, std::uint32_t generation) noexcept;
-  /// With the lock held. Frees the object if nobody needs it any more.
-  void drop_if_idle(ObjectEntry& object) noexcept;
-  /// With the lock held. Frees it, whoever needs it.
-  void destroy(ObjectEntry& object) noexcept;
 
  private:
   PoolSegment(std::string name, MemoryFile memory, std::uint32_t max_objects, Access access);
   static Result<std::shared_ptr<PoolSegment>> attach_now(const std::string& name, Access access);
   static Result<std::shared_ptr<PoolSegment>> attach_patiently(const std::string& name, Access access);
 
+  [[nodiscard]] Result<PoolLock> acquire(Duration patience);
   [[nodiscard]] Result<ClientSlot*> client();
   [[nodiscard]] ClientSlot* own_client() const noexcept;
-  void repair() noexcept;
+  void repair(PoolLock& held) noexcept;
+  void rebuild(PoolLock& held) noexcept;
   void mend_header() noexcept;
-  void release_all(ClientSlot& client) noexcept;
-  void release_one(ReferenceEntry& reference) noexcept;
+  [[nodiscard]] bool bury(PoolLock& held, ClientSlot& client, std::size_t& left) noexcept;
+  void release_late(PoolLock& held) noexcept;
+  void release_own(PoolLock& held, ReferenceEntry& reference, std::uint32_t generation) noexcept;
+  void release_one(PoolLock& held, ReferenceEntry& reference) noexcept;
+
+  [[nodiscard]] PoolFindings counted() const noexcept;
 
   std::string name_;
   MemoryFile memory_;
   MemoryGuard guard_;  // below the memory, so that it goes first
   PoolView view_;
   Access access_;
-  pid_t pid_;
-  std::uint64_t start_;
-  // Of the slot that this client has; guarded by the pool's mutex.
-  ClientSlot* client_ = nullptr;
+  ProcessIdentity process_;
+  // Guarded by the pool's mutex.
+  PoolJournal journal_;
+  ClientSlot* client_ = nullptr;  // that this client has
   std::uint32_t client_generation_ = 0;
+  /// Who held the lock when somebody of this process has waited for it in vain: it is not waited for again as
+  /// long. 0: nobody.
+  std::atomic<std::uint32_t> stuck_{0};
+  PoolFindings told_;
+  /// What could not be released, since the lock was not to be had.
+  std::mutex late_guard_;
+  std::vector<std::pair<ReferenceEntry*, std::uint32_t>> late_;
 };
 
 }  // namespace plchost

@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "shm/pool/object_type.hpp"
+#include "shm/pool/pool_journal.hpp"
 #include "shm/pool/pool_view.hpp"
 
 namespace plchost {
@@ -15,19 +16,22 @@ namespace plchost {
 /// the segment.
 class PoolTable {
  public:
-  explicit PoolTable(const PoolView& view) noexcept : view_(view) {}
+  PoolTable(const PoolView& view, PoolJournal& journal) noexcept : view_(view), journal_(journal) {}
 
   /// Null if there is none; makes the index anew if it is damaged.
   [[nodiscard]] ObjectEntry* find(std::string_view name) noexcept;
   /// The same, only looking; null, too, if the index is damaged.
-  [[nodiscard]] ObjectEntry* peek(std::string_view name) const noexcept;
-  /// `name` is not in the table. The entry has no references and is there for others, and after the end of
-  /// this process, only when it is published. Null if the table is full and nothing can be reclaimed.
+  [[nodiscard]] static ObjectEntry* peek(const PoolView& view, std::string_view name) noexcept;
+  /// `name` is not in the table. The entry is unsettled, has no references and is there for others only when
+  /// it is published. Null if the table is full and nothing can be reclaimed.
   [[nodiscard]] ObjectEntry* insert(std::string_view name, ObjectType type) noexcept;
-  static void publish(ObjectEntry& entry) noexcept;
+  void publish(ObjectEntry& entry) noexcept;
+  /// From here on nobody finds it, and it is erased by whoever comes next if this process ends.
+  void withdraw(ObjectEntry& entry) noexcept;
   /// Frees it; handles on it are invalid from here on.
   void erase(ObjectEntry& entry) noexcept;
-  /// Makes the index and the free list anew from the entries, and frees those that are not valid.
+  /// Makes the index and the free list anew from the entries, and frees those that are not valid. Who dies in
+  /// here leaves `rebuilding` behind.
   void rebuild() noexcept;
 
   [[nodiscard]] static bool is_valid(const ObjectEntry& entry) noexcept;
@@ -35,17 +39,15 @@ class PoolTable {
   [[nodiscard]] static bool is_idle(const ObjectEntry& entry) noexcept;
 
  private:
-  [[nodiscard]] Link& bucket_of(std::string_view name) const noexcept;
-  /// The link that leads to the entry, or the last one (that holds 0) of the chain. Null: the chain is
-  /// damaged.
-  [[nodiscard]] Link* walk(std::string_view name) const noexcept;
   [[nodiscard]] ObjectEntry* allocate() noexcept;
   [[nodiscard]] bool free_places_are_sane() const noexcept;
-  [[nodiscard]] ObjectEntry* reclaim() noexcept;
-  /// Takes it out of its chain. False: it was not in it.
-  bool unlink(ObjectEntry& entry) noexcept;
+  /// Makes a free place of one that nobody needs. False: there is none.
+  bool reclaim() noexcept;
+  void set_state(ObjectEntry& entry, EntryState state) noexcept;
+  void put(ObjectEntry& entry, Link& first) noexcept;
 
   PoolView view_;
+  PoolJournal& journal_;
 };
 
 }  // namespace plchost

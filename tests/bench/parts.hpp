@@ -33,6 +33,7 @@ struct Part {
 [[nodiscard]] Result<std::vector<Row>> measure_poll(const Plan& plan);
 [[nodiscard]] Result<std::vector<Row>> measure_distributed_clock(const Plan& plan);
 [[nodiscard]] Result<std::vector<Row>> measure_pool(const Plan& plan);
+[[nodiscard]] Result<std::vector<Row>> measure_pool_deaths(const Plan& plan);
 [[nodiscard]] Result<std::vector<Row>> measure_blocks(const Plan& plan);
 [[nodiscard]] Result<std::vector<Row>> measure_start(const Plan& plan);
 

@@ -13,6 +13,11 @@ class ExternalEventTasks : public testing::TestWithParam<std::string_view>, publ
   void post(std::string_view name, int count) {
     for (int i = 0; i < count; ++i) event_named(name).post();
   }
+  void write_over(std::string_view name, std::uint64_t count) {
+    CountedEvent& event = event_named(name);
+    reinterpret_cast<std::atomic<std::uint64_t>&>(event).store(count << 16);
+    event.nudge();
+  }
   std::atomic<bool> entered{false};
   std::atomic<bool> go{false};
 
@@ -95,6 +100,27 @@ TEST_P(ExternalEventTasks, BacklogUpToItsBoundIsRunAndWhatIsBeyondIsCountedAsLos
   wait_for_cycles(0, 11);
   expect_no_further_cycle(0, 11);
   EXPECT_EQ(counters(0).lost_events, 15U);
+}
+
+TEST_P(ExternalEventTasks, ACountThatAStrangerWroteOverIsOneRunAndCountedAsLost) {
+  add(external("on_ready", "ready", [] {}));
+  ASSERT_TRUE(create());
+  SchedulerSettings settings;
+  settings.max_event_backlog = 10;
+  start(GetParam(), settings);
+  for (int i = 1; i <= 100; ++i) {
+    post("ready", 1);
+    wait_for_cycles(0, static_cast<std::uint64_t>(i));
+  }
+  write_over("ready", 1'000'000);
+  wait_for_cycles(0, 101);
+  EXPECT_EQ(counters(0).lost_events, 1'000'000U - 100 - 1);
+  write_over("ready", 3);
+  wait_for_cycles(0, 102);
+  EXPECT_EQ(counters(0).lost_events, 1'000'000U - 100);
+  post("ready", 1);
+  wait_for_cycles(0, 103);
+  expect_no_further_cycle(0, 103);
 }
 
 TEST_P(ExternalEventTasks, PostsWhileTheyWereStoppedAreNotRun) {

@@ -16,7 +16,7 @@ import mmap, random, sys, time
 path, seed = sys.argv[1], int(sys.argv[2])
 chance = random.Random(seed)
 with open(path, "r+b") as file, mmap.mmap(file.fileno(), 0) as pool:
-    header, clients, references = 192, 512 * 64, 4096
+    header, clients, references = 704, 512 * 64, 4096
     hot = [(0, header), (header, header + 512), (header + clients, header + clients + references)]
     end, count = time.time() + 2, 0
     while time.time() < end:

@@ -13,8 +13,8 @@
 
 #include "api/cli/object_rows.hpp"
 #include "api/server/account_names.hpp"
-#include "api/server/thread_owner.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/thread_owner.hpp"
 
 namespace plchost {
 namespace {

@@ -177,6 +177,29 @@ TEST_F(RobustMutexTest, DeadOwnerThatHadTheNumberOfTheCallerIsNotTheCaller) {
   EXPECT_TRUE(shared_.mutex.unlock());
 }
 
+TEST_F(RobustMutexTest, OwnerWhoseProgramWasReplacedIsDead) {
+  const pid_t child = in_child([this] {
+    (void)shared_.mutex.lock();
+    shared_.step = 1;
+    ::execlp("sleep", "sleep", "60", static_cast<char*>(nullptr));
+  });
+  await_step(1);
+  EXPECT_EQ(shared_.mutex.lock(in(milliseconds(20'000))), LockResult::owner_died);
+  EXPECT_TRUE(shared_.mutex.unlock());
+  reap(child);
+}
+
+TEST_F(RobustMutexTest, SaysWhetherItsOwnerHasEnded) {
+  EXPECT_FALSE(shared_.mutex.owner_has_ended());
+  const pid_t child = hold_in_child();
+  EXPECT_FALSE(shared_.mutex.owner_has_ended());
+  reap(child);
+  EXPECT_TRUE(shared_.mutex.owner_has_ended());
+  EXPECT_EQ(shared_.mutex.lock(), LockResult::owner_died);
+  EXPECT_FALSE(shared_.mutex.owner_has_ended());
+  EXPECT_TRUE(shared_.mutex.unlock());
+}
+
 TEST_F(RobustMutexTest, LivingOwnerThatHasNotToldItsStartYetIsWaitedFor) {
   const pid_t owner = in_child([] { ::pause(); });
   pretend(shared_.mutex, static_cast<std::uint32_t>(owner), 0);

@@ -8,13 +8,16 @@
 #include <thread>
 #include <vector>
 
-#include <gtest/gtest.h>
+#include <fcntl.h>
+#include <gmock/gmock.h>
 #include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "shm/base/process_start.hpp"
 #include "shm/pool/object_pool.hpp"
 #include "shm/pool/pool_layout.hpp"
+#include "tests/unit/pool/pool_invariants.hpp"
 #include "tests/unit/pool/unique_pool_name.hpp"
 
 namespace plchost {
@@ -22,9 +25,11 @@ namespace {
 
 using std::chrono::milliseconds;
 
+constexpr std::uint32_t kObjects = 256;
+
 class ClientDeath : public testing::Test {
  protected:
-  ClientDeath() : pool_(std::move(ObjectPool::create(name_.get(), {.max_objects = 256}).value())) {}
+  ClientDeath() : pool_(std::move(ObjectPool::create(name_.get(), {.max_objects = kObjects}).value())) {}
   [[nodiscard]] ObjectPool another() const { return std::move(ObjectPool::attach(name_.get()).value()); }
 
   /// A child that does `body` with a pool of its own and then waits to be killed.
@@ -115,6 +120,58 @@ TEST_F(ClientDeath, ChildOfAForkIsToldToAttachAnew) {
   EXPECT_TRUE(pool_.open_mutex("m")) << "the child's end took nothing of its parent's";
 }
 
+TEST_F(ClientDeath, OfAProgramThatExecReplacedIsNoticed) {
+  std::array<int, 2> ready{};
+  ASSERT_EQ(::pipe2(ready.data(), O_CLOEXEC), 0);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    auto pool = another();
+    auto made = pool.create_semaphore("s", 3);
+    ::execlp("sleep", "sleep", "60", static_cast<char*>(nullptr));
+    ::_exit(1);
+  }
+  ::close(ready[1]);
+  char byte = 0;
+  EXPECT_EQ(::read(ready[0], &byte, 1), 0) << "closed by exec()";
+  ::close(ready[0]);
+  while (look_at_thread(child)->image == 0) std::this_thread::sleep_for(milliseconds(1));
+  EXPECT_TRUE(pool_.list()->empty());
+  kill_and_reap(child);
+}
+
+TEST_F(ClientDeath, WhoIsStoppedWithTheLockIsNamedAndWhatIsClosedMeanwhileIsReleasedLater) {
+  auto mine = pool_.create_semaphore("mine", 3);
+  ASSERT_TRUE(mine);
+  const auto memory = MemoryFile::open(name_.get(), 1, MemoryFile::Access::read_write);
+  const pid_t child =
+      client([&](ObjectPool&) { (void)reinterpret_cast<PoolHeader*>(memory->bytes().data())->mutex.lock(); });
+  ::kill(child, SIGSTOP);
+  const auto refused = pool_.create_semaphore("s", 3);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::timed_out);
+  EXPECT_THAT(refused.error().describe(),
+              testing::HasSubstr("process " + std::to_string(child) + " (unit_pool) holds its lock"));
+  EXPECT_EQ(pool_.list().error().code, ErrorCode::timed_out);
+  mine->object.close();
+  (void)pool_.tidy();
+  kill_and_reap(child);
+  EXPECT_TRUE(pool_.list()->empty());
+}
+
+TEST_F(ClientDeath, OfOneThatHeldMoreThanIsReleasedAtOnceLeavesNothingToBeFound) {
+  constexpr int kMemories = 200;
+  const pid_t child = client([](ObjectPool& pool) {
+    static std::vector<SharedMemory> held;
+    for (int i = 0; i < kMemories; ++i) {
+      held.push_back(std::move(pool.create_memory(std::to_string(i), 4096)->object));
+    }
+  });
+  kill_and_reap(child);
+  EXPECT_EQ(pool_.open_memory(std::to_string(kMemories - 1)).error().code, ErrorCode::not_found);
+  EXPECT_TRUE(pool_.create_memory("0", 8192)->made);
+  EXPECT_EQ(pool_.open_memory("1").error().code, ErrorCode::not_found);
+}
+
 TEST_F(ClientDeath, SlotsOfManyDeadClientsAreUsedAgain) {
   for (int i = 0; i < 40; ++i) {
     std::vector<pid_t> children;
@@ -156,6 +213,8 @@ TEST_F(ClientDeath, SlotsOfManyDeadClientsAreUsedAgain) {
 TEST_F(ClientDeath, AtAnyInstructionLeavesAPoolThatTheNextCallRepairs) {
   const auto common = pool_.create_mutex("mutex0", {.keep = true});
   ASSERT_TRUE(common);
+  const auto segment = MemoryFile::open(name_.get(), 1, MemoryFile::Access::read_write);
+  const PoolView view(segment->bytes(), kObjects);
   constexpr unsigned kRounds = 500;
   for (unsigned round = 0; round < kRounds; ++round) {
     std::array<pid_t, 3> children{};
@@ -177,6 +236,7 @@ TEST_F(ClientDeath, AtAnyInstructionLeavesAPoolThatTheNextCallRepairs) {
       ++memories;
       ASSERT_TRUE(pool_.open_memory(info.name)) << info.name;
     }
+    ASSERT_EQ(damage_of(view), "");
     std::size_t files = 0;
     for (const auto& file : std::filesystem::directory_iterator("/dev/shm")) {
       if (file.path().filename().string().starts_with(name_.get() + ".memory.")) ++files;
@@ -190,10 +250,9 @@ TEST_F(ClientDeath, AtAnyInstructionLeavesAPoolThatTheNextCallRepairs) {
       ASSERT_TRUE(pool_.create_shared_event("event" + std::to_string(i))->made);
     }
   }
-  const auto memory = MemoryFile::open(name_.get(), sizeof(PoolHeader), MemoryFile::Access::read_only);
-  const auto& header = *reinterpret_cast<const PoolHeader*>(memory->bytes().data());
-  EXPECT_GT(header.repairs.load(), 0U) << "none of them died with the pool's lock held";
-  EXPECT_GT(header.departed.load(), kRounds);
+  EXPECT_GT(view.header().repairs.load(), 0U) << "none of them died with the pool's lock held";
+  EXPECT_EQ(view.header().rebuilds.load(), 0U) << "what one of them had begun was not undone";
+  EXPECT_GT(view.header().departed.load(), kRounds);
 }
 
 }  // namespace

@@ -52,7 +52,8 @@ TEST_F(ObjectPoolTest, CreateOpensAnExistingPool) {
 
 TEST_F(ObjectPoolTest, SurvivesItsCreator) {
   {
-    ASSERT_TRUE(create().create_event("a"));
+    auto sut = create();
+    ASSERT_TRUE(sut.create_event("a"));
   }
   EXPECT_TRUE(ObjectPool::attach(name_.get())->open_event("a"));
 }

@@ -71,7 +71,7 @@ TEST_F(PoolAdoptionTest, WhatFirmwareMadeWithAHeaderAloneIsAnObjectAtTheNextLook
   ASSERT_EQ(plc_reference_clock_open(name_.get().c_str(), "bus1", &clock), 0);
   std::ofstream(file("other")) << std::string(5000, 'x');
   EXPECT_TRUE(pool_.list()->empty());
-  EXPECT_TRUE(pool_.tidy());
+  EXPECT_FALSE(pool_.tidy().lost);
   const auto object = pool_.look_at("terminal1.in");
   ASSERT_TRUE(object) << object.error().describe();
   EXPECT_EQ(object->type, ObjectType::memory);
@@ -84,9 +84,9 @@ TEST_F(PoolAdoptionTest, WhatFirmwareMadeWithAHeaderAloneIsAnObjectAtTheNextLook
 }
 
 TEST_F(PoolAdoptionTest, AnImageThatComesLaterIsFoundByALaterLook) {
-  EXPECT_TRUE(pool_.tidy());
+  EXPECT_FALSE(pool_.tidy().lost);
   const FirmwareImage image(name_.get(), "late", 16);
-  EXPECT_TRUE(pool_.tidy());
+  EXPECT_FALSE(pool_.tidy().lost);
   EXPECT_TRUE(pool_.look_at("late"));
 }
 
@@ -284,7 +284,7 @@ TEST_F(MemoriesOfOtherUsers, WhoMayNotWriteTheFileOfADeadOneIsToldWhatToDo) {
                     }),
             to_string(ErrorCode::not_found));
   EXPECT_TRUE(pool_->list()->empty()) << "it is nobody's object";
-  EXPECT_TRUE(pool_->tidy()) << "root may remove it";
+  EXPECT_FALSE(pool_->tidy().lost) << "root may remove it";
   EXPECT_EQ(sut(), "");
 }
 
@@ -295,7 +295,7 @@ TEST_F(MemoriesOfOtherUsers, AnImageOfWhoMayNotWriteThePoolIsNotTaken) {
                       return std::string();
                     }),
             "");
-  EXPECT_TRUE(pool_->tidy());
+  EXPECT_FALSE(pool_->tidy().lost);
   EXPECT_FALSE(pool_->look_at("in"));
   const auto sut = pool_->create_memory("in", plc_image_bytes(16));
   ASSERT_TRUE(sut) << sut.error().describe();

@@ -9,6 +9,9 @@
 #include <thread>
 
 #include <gmock/gmock.h>
+#include <signal.h>
+#include <sys/mman.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -18,6 +21,8 @@
 namespace {
 
 using testing::HasSubstr;
+
+constexpr rlimit kNoCore{};
 
 class PlcPool : public LibraryFixture {};
 
@@ -115,6 +120,77 @@ TEST_F(PlcPool, SemaphoresAndMutexesSayWhatHappened) {
   EXPECT_EQ(plc_mutex_lock(mutex, PLC_POOL_FOREVER), PLC_POOL_OWNER_DIED);
   plc_mutex_close(mutex);
   plc_semaphore_close(semaphore);
+}
+
+TEST_F(PlcPool, WhoseFileIsCutShortIsCorruptInEachCallAndNotTheEnd) {
+  plc_event* event = nullptr;
+  plc_semaphore* semaphore = nullptr;
+  plc_mutex* mutex = nullptr;
+  plc_memory* memory = nullptr;
+  ASSERT_EQ(plc_event_create(pool_, "e", nullptr, &event), PLC_POOL_OK);
+  ASSERT_EQ(plc_semaphore_create(pool_, "s", 5, nullptr, &semaphore), PLC_POOL_OK);
+  ASSERT_EQ(plc_mutex_create(pool_, "m", nullptr, &mutex), PLC_POOL_OK);
+  ASSERT_EQ(plc_memory_create(pool_, "b", 8192, nullptr, &memory), PLC_POOL_OK);
+  std::filesystem::resize_file("/dev/shm/" + name_, 0);
+  std::filesystem::resize_file("/dev/shm/" + name_ + ".memory.b", 0);
+  plc_pool_u64 cursor = 0;
+  plc_memory* other = nullptr;
+  EXPECT_EQ(plc_event_post(event), PLC_POOL_CORRUPT);
+  EXPECT_EQ(plc_event_wait(event, &cursor, PLC_POOL_FOREVER), PLC_POOL_CORRUPT);
+  EXPECT_EQ(plc_event_count(event), 0U);
+  EXPECT_EQ(plc_semaphore_post(semaphore), PLC_POOL_CORRUPT);
+  EXPECT_EQ(plc_semaphore_wait(semaphore, PLC_POOL_FOREVER), PLC_POOL_CORRUPT);
+  EXPECT_EQ(plc_mutex_lock(mutex, PLC_POOL_FOREVER), PLC_POOL_CORRUPT);
+  EXPECT_EQ(plc_mutex_unlock(mutex), PLC_POOL_CORRUPT);
+  EXPECT_EQ(static_cast<char*>(plc_memory_address(memory))[8191], 0);
+  EXPECT_EQ(plc_memory_open(pool_, "b", PLC_POOL_READ_WRITE, &other), PLC_POOL_CORRUPT);
+  EXPECT_THAT(plc_pool_error(), HasSubstr("cut its file in /dev/shm short"));
+  EXPECT_EQ(plc_memory_create(pool_, "c", 10, nullptr, &other), PLC_POOL_CORRUPT);
+  EXPECT_EQ(plc_pool_remove(pool_, "b"), PLC_POOL_CORRUPT);
+  EXPECT_EQ(plc_pool_list(pool_, [](const plc_object_info*, void*) { return 0; }, nullptr), PLC_POOL_CORRUPT);
+  plc_event_close(event);
+  plc_semaphore_close(semaphore);
+  plc_mutex_close(mutex);
+  plc_memory_close(memory);
+}
+
+TEST_F(PlcPool, ASigbusThatIsNotOfItsMemoryGoesToTheHandlerThatWasThere) {
+  const auto in_a_child = [&](bool with_handler) {
+    const pid_t child = ::fork();
+    if (child == 0) {
+      ::alarm(20);
+      // In a program of its own: the library sets its handler once for each process.
+      ::execl("/proc/self/exe", "bus", "--gtest_also_run_disabled_tests",
+              with_handler ? "--gtest_filter=*DISABLED_BusOfOthersWithAHandler"
+                           : "--gtest_filter=*DISABLED_BusOfOthers",
+              static_cast<char*>(nullptr));
+      ::_exit(1);
+    }
+    int status = -1;
+    ::waitpid(child, &status, 0);
+    return status;
+  };
+  const int handled = in_a_child(true);
+  EXPECT_TRUE(WIFEXITED(handled) && WEXITSTATUS(handled) == 7) << handled;
+  const int ended = in_a_child(false);
+  EXPECT_TRUE(WIFSIGNALED(ended) && WTERMSIG(ended) == SIGBUS) << ended;
+}
+
+// Touches a page of a file of its own that is not there.
+void touch_beyond_the_end() {
+  plc_pool* pool = nullptr;
+  (void)plc_pool_open("plchost-test-none", PLC_POOL_READ_WRITE, &pool);
+  const int file = ::memfd_create("short", 0);
+  void* const address = ::mmap(nullptr, 4096, PROT_READ, MAP_SHARED, file, 0);
+  (void)*static_cast<const volatile char*>(address);
+}
+TEST(PlcPoolChild, DISABLED_BusOfOthers) {
+  ::setrlimit(RLIMIT_CORE, &kNoCore);
+  touch_beyond_the_end();
+}
+TEST(PlcPoolChild, DISABLED_BusOfOthersWithAHandler) {
+  ::signal(SIGBUS, [](int) { ::_exit(7); });
+  touch_beyond_the_end();
 }
 
 TEST_F(PlcPool, ToReadOnlyIsToLookOnly) {

@@ -1,4 +1,4 @@
-#include "api/server/thread_owner.hpp"
+#include "shm/base/thread_owner.hpp"
 
 #include <charconv>
 #include <fstream>
