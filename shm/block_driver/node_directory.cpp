@@ -1,7 +1,9 @@
 #include "shm/block_driver/node_directory.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
+#include <thread>
 
 #include <fmt/format.h>
 #include <unistd.h>
@@ -37,12 +39,31 @@ Result<MemoryFile> open_or_make_directory(const std::string& name) {
   }
 }
 
+// No check_name(): its error is a text, and this is read in cycles.
+bool is_sane(const NodeRecord& record) noexcept {
+  const std::string_view name = record.name.view();
+  const bool printable = std::ranges::all_of(name, [](char c) { return c > ' ' && c <= '~'; });
+  return record.pid > 0 && record.generation != 0 && !name.empty() && printable;
+}
+
+DirectoryLayout& layout_of(const MemoryFile& file) noexcept {
+  return *reinterpret_cast<DirectoryLayout*>(file.bytes().data());
+}
+
+bool has_good_header(const DirectoryLayout& layout) noexcept {
+  return layout.magic == kDirectoryMagic && layout.version == kDirectoryVersion &&
+         layout.slot_count == kMaxNodes;
+}
+
+bool has_live_node(const DirectoryLayout& layout) noexcept {
+  return std::ranges::any_of(layout.slots, [](const NodeSlot& slot) {
+    const auto record = slot.record.read();
+    return record && is_sane(*record) && !process_has_ended(record->pid, record->process_start);
+  });
+}
+
 Result<void> check_directory(const MemoryFile& file, const std::string& name) {
-  const auto& layout = *reinterpret_cast<const DirectoryLayout*>(file.bytes().data());
-  if (layout.magic == kDirectoryMagic && layout.version == kDirectoryVersion &&
-      layout.slot_count == kMaxNodes && file.bytes().size() == sizeof(DirectoryLayout)) {
-    return {};
-  }
+  if (has_good_header(layout_of(file)) && file.bytes().size() == sizeof(DirectoryLayout)) return {};
   return failure(
       ErrorCode::corrupt,
       fmt::format("shared memory '{}' is no directory of nodes of version {}; stop who uses it and "
@@ -50,15 +71,24 @@ Result<void> check_directory(const MemoryFile& file, const std::string& name) {
                   name, kDirectoryVersion));
 }
 
-Result<void> check_base(std::string_view base) {
-  return check_name("[CmpBlkDrvShm] BaseName", base, kMaxBlockBase);
+// A stranger may have written over it. Nodes that run write it again within a second; without them it is
+// nobody's, and we do. Nodes that do not are of another version.
+Result<void> mend_header(const MemoryFile& file, const std::string& name) {
+  constexpr auto kPatience = std::chrono::milliseconds(1500);
+  if (file.bytes().size() != sizeof(DirectoryLayout)) return check_directory(file, name);
+  const TimePoint deadline = MonotonicClock::now() + kPatience;
+  while (!has_good_header(layout_of(file))) {
+    const auto lock = DirectoryLock::acquire(name);
+    if (!lock) return std::unexpected(lock.error());
+    if (!has_live_node(layout_of(file))) return fill_directory(file.bytes());
+    if (MonotonicClock::now() >= deadline) return check_directory(file, name);
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  return {};
 }
 
-// No check_name(): its error is a text, and this is read in cycles.
-bool is_sane(const NodeRecord& record) noexcept {
-  const std::string_view name = record.name.view();
-  const bool printable = std::ranges::all_of(name, [](char c) { return c > ' ' && c <= '~'; });
-  return record.pid > 0 && record.generation != 0 && !name.empty() && printable;
+Result<void> check_base(std::string_view base) {
+  return check_name("[CmpBlkDrvShm] BaseName", base, kMaxBlockBase);
 }
 
 }  // namespace
@@ -68,7 +98,7 @@ Result<NodeDirectory> NodeDirectory::open(std::string_view pool, std::string_vie
   const std::string name = directory_name(pool, base);
   auto file = open_or_make_directory(name);
   if (!file) return failure_in("directory of nodes", std::move(file).error());
-  if (auto valid = check_directory(*file, name); !valid) return std::unexpected(std::move(valid).error());
+  if (auto mended = mend_header(*file, name); !mended) return std::unexpected(std::move(mended).error());
   return NodeDirectory(std::string(pool), std::string(base), *std::move(file));
 }
 
@@ -94,7 +124,7 @@ void NodeDirectory::remove(std::string_view pool, std::string_view base) noexcep
 }
 
 DirectoryLayout& NodeDirectory::layout() const noexcept {
-  return *reinterpret_cast<DirectoryLayout*>(file_.bytes().data());
+  return layout_of(file_);
 }
 
 std::optional<NodeRecord> NodeDirectory::record(std::uint16_t node) const noexcept {
@@ -254,6 +284,7 @@ void NodeDirectory::leave(const NodeLife& life) {
 }
 
 void NodeDirectory::keep(const NodeLife& life, const NodeEntry& entry) {
+  if (!has_good_header(layout())) (void)fill_directory(file_.bytes());
   const NodeRecord wanted = record_of(entry, life.generation);
   const auto is_ours = [&](const std::optional<NodeRecord>& owner) {
     return owner && is_same(*owner, wanted);

@@ -30,7 +30,8 @@ struct NodeEntry {
 /// otherwise.
 class NodeDirectory {
  public:
-  /// Makes it if it is not there. corrupt: there is something else of that name.
+  /// Makes it if it is not there, and mends what it says of itself. corrupt: there is something else of that
+  /// name, or a directory that is in use by nodes of another version.
   [[nodiscard]] static Result<NodeDirectory> open(std::string_view pool,
                                                   std::string_view base = kDefaultBlockBase);
   /// Only to look at. not_found: no node has ever joined.
@@ -45,7 +46,8 @@ class NodeDirectory {
   [[nodiscard]] Result<NodeLife> join(const NodeEntry& entry);
   /// Gives the address back.
   void leave(const NodeLife& life);
-  /// Writes the record of a node of this process again if it is not what it should be.
+  /// Writes the record of a node of this process again if it is not what it should be, and what the directory
+  /// says of itself.
   void keep(const NodeLife& life, const NodeEntry& entry);
   /// Takes the addresses from nodes whose processes have ended, and removes their links. How many it were.
   std::uint32_t reclaim();

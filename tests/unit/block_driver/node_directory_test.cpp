@@ -131,6 +131,24 @@ TEST_F(NodeDirectoryTest, IsNotReplacedByAMemoryOfItsName) {
   EXPECT_TRUE(NodeDirectory::open_to_read(pool_.get()));
 }
 
+TEST_F(NodeDirectoryTest, OverWhichAStrangerHasWrittenIsMended) {
+  const NodeEntry entry{.name = "a"};
+  const auto life = sut_.join(entry);
+  ASSERT_TRUE(life);
+  sut_.layout().magic ^= 0x40;
+  sut_.layout().version = 99;
+  EXPECT_FALSE(NodeDirectory::open_to_read(pool_.get()));
+  sut_.keep(*life, entry);
+  EXPECT_TRUE(NodeDirectory::open_to_read(pool_.get())) << "by who uses it";
+  sut_.layout().magic ^= 0x40;
+  EXPECT_EQ(NodeDirectory::open(pool_.get()).error().code, ErrorCode::corrupt)
+      << "it is used by who does not mend it: of another version";
+  sut_.leave(*life);
+  const auto again = NodeDirectory::open(pool_.get());
+  ASSERT_TRUE(again) << again.error().describe();
+  EXPECT_TRUE(NodeDirectory::open_to_read(pool_.get())) << "by who comes when nobody uses it";
+}
+
 TEST_F(NodeDirectoryTest, RefusesAFileThatIsNoDirectory) {
   const std::string other = pool_.get() + "x";
   ASSERT_TRUE(MemoryFile::create(other + ".memory.blocks", 100'000));
