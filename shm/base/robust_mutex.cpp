@@ -54,7 +54,8 @@ LockResult RobustMutex::try_lock() noexcept {
   std::uint32_t found = 0;
   const ThreadIdentity& self = this_thread();
   if (word_.compare_exchange_strong(found, self.id, std::memory_order_acquire, std::memory_order_relaxed)) {
-    record();
+    image_.store(self.image, std::memory_order_relaxed);
+    record_.store(record_of(self), std::memory_order_release);
     return LockResult::locked;
   }
   // One that died may have had our number, or this program may have come by exec() into the owner's place.
