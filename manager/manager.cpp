@@ -215,6 +215,10 @@ void Manager::tick() {
 }
 
 void Manager::look_after_pool() {
+  if (page_->keep()) {
+    spdlog::warn("host page of pool '{}': another program has written over it; it is written anew",
+                 config_.host.pool);
+  }
   const PoolFindings found = pool_->tidy();
   if (!found.lost && found.headers_mended + found.rebuilds + found.lost_objects != 0) {
     spdlog::warn(

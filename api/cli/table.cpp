@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include "shm/base/names.hpp"
+
 namespace plchost {
 
 namespace {
@@ -52,7 +54,7 @@ std::string coloured_cell(std::string_view field, std::string text) {
 
 std::string csv_field(const Row& value) {
   if (value.is_null()) return "";
-  const std::string text = value.is_string() ? value.get<std::string>()
+  const std::string text = value.is_string() ? printable(value.get<std::string>())
                                              : value.dump(-1, ' ', false, Row::error_handler_t::replace);
   if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
   std::string quoted = "\"";
@@ -63,8 +65,8 @@ std::string csv_field(const Row& value) {
 }  // namespace
 
 std::string printable(std::string text) {
-  std::ranges::replace_if(
-      text, [](char c) { return static_cast<unsigned char>(c) < ' ' || c == '\x7f'; }, '?');
+  if (is_printable_utf8(text)) return text;
+  std::ranges::replace_if(text, [](char c) { return c < ' ' || c > '~'; }, '?');
   return text;
 }
 

@@ -1,8 +1,11 @@
 #include "shm/pool/host_page.hpp"
 
+#include <algorithm>
 #include <cassert>
 #include <cstddef>
+#include <cstring>
 #include <new>
+#include <type_traits>
 
 #include <fmt/format.h>
 
@@ -27,12 +30,40 @@ Result<MemoryFile> open_page(const std::string& name, MemoryFile::Access access)
   return open_fixed_page<HostPageLayout>(name, kKind, access);
 }
 
+void describe(HostPageLayout& page) noexcept {
+  page.version = kKind.version;
+  page.size = sizeof(HostPageLayout);
+  page.magic = kKind.magic;
+}
+
 Result<void> fill(std::span<std::byte> bytes) {
-  auto* const page = new (bytes.data()) HostPageLayout;
-  page->version = kKind.version;
-  page->size = sizeof(HostPageLayout);
-  page->magic = kKind.magic;
+  describe(*new (bytes.data()) HostPageLayout);
   return {};
+}
+
+template <class Status>
+bool holds(const Seqlock<Status>& place, const Status& status) noexcept {
+  static_assert(std::has_unique_object_representations_v<Status>);
+  const auto seen = place.read();
+  return seen && std::memcmp(&*seen, &status, sizeof status) == 0;
+}
+
+// Readers refuse a status with other texts: a path may be of any bytes, and a long text is cut within a
+// letter.
+template <std::size_t Max>
+void make_printable(FixedText<Max>& text) noexcept {
+  if (is_printable_utf8(text.view())) return;
+  const auto strange = [](char c) { return c != '\0' && (c < ' ' || c > '~'); };
+  std::ranges::replace_if(text.bytes, strange, '?');
+}
+
+bool is_printable(const HostStatus& status) noexcept {
+  return is_printable_utf8(status.name.view()) && is_printable_utf8(status.version.view());
+}
+
+bool is_printable(const InstanceStatus& status) noexcept {
+  return is_printable_utf8(status.name.view()) && is_printable_utf8(status.scheduler.view()) &&
+         is_printable_utf8(status.application.view()) && is_printable_utf8(status.problem.view());
 }
 
 }  // namespace
@@ -83,16 +114,43 @@ void HostPageWriter::remove(std::string_view pool) noexcept {
 }
 
 void HostPageWriter::write_host(const HostStatus& status) noexcept {
+  host_ = status;
+  make_printable(host_.name);
+  make_printable(host_.version);
   HostPageLayout& page = layout_of(memory_);
-  page.host.write(status);
+  page.host.write(host_);
   page.changes.fetch_add(1, std::memory_order_release);
 }
 
 void HostPageWriter::write_instance(std::uint32_t index, const InstanceStatus& status) noexcept {
   assert(index < kMaxInstances);
+  InstanceStatus& kept = instances_[index];
+  kept = status;
+  make_printable(kept.name);
+  make_printable(kept.scheduler);
+  make_printable(kept.application);
+  make_printable(kept.problem);
   HostPageLayout& page = layout_of(memory_);
-  page.instances[index].write(status);
+  page.instances[index].write(kept);
   page.changes.fetch_add(1, std::memory_order_release);
+}
+
+bool HostPageWriter::keep() noexcept {
+  HostPageLayout& page = layout_of(memory_);
+  bool changed = page.magic != kKind.magic || page.version != kKind.version || page.size != sizeof(page);
+  if (changed) describe(page);
+  if (!holds(page.host, host_)) {
+    page.host.recover();
+    write_host(host_);
+    changed = true;
+  }
+  for (std::uint32_t index = 0; index < std::min(host_.instance_count, kMaxInstances); ++index) {
+    if (holds(page.instances[index], instances_[index])) continue;
+    page.instances[index].recover();
+    write_instance(index, instances_[index]);
+    changed = true;
+  }
+  return changed;
 }
 
 Result<HostPageReader> HostPageReader::open(std::string_view pool) {
@@ -107,13 +165,15 @@ std::uint64_t HostPageReader::changes() const noexcept {
 
 std::optional<HostStatus> HostPageReader::host() const noexcept {
   auto status = layout_of(memory_).host.read();
-  if (status && status->instance_count > kMaxInstances) return std::nullopt;
+  if (status && (status->instance_count > kMaxInstances || !is_printable(*status))) return std::nullopt;
   return status;
 }
 
 std::optional<InstanceStatus> HostPageReader::instance(std::uint32_t index) const noexcept {
   if (index >= kMaxInstances) return std::nullopt;
-  return layout_of(memory_).instances[index].read();
+  auto status = layout_of(memory_).instances[index].read();
+  if (status && !is_printable(*status)) return std::nullopt;
+  return status;
 }
 
 }  // namespace plchost

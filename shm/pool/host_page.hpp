@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "shm/base/names.hpp"
 #include "shm/base/seqlock.hpp"
@@ -69,10 +70,14 @@ class HostPageWriter {
   void write_host(const HostStatus& status) noexcept;
   /// `index` < the instance_count written with the host, which is at most kMaxInstances.
   void write_instance(std::uint32_t index, const InstanceStatus& status) noexcept;
+  /// Writes again what is not as it was written last: by a stranger. Whether there was such a thing.
+  bool keep() noexcept;
 
  private:
-  explicit HostPageWriter(MemoryFile memory) noexcept : memory_(std::move(memory)) {}
+  explicit HostPageWriter(MemoryFile memory) : memory_(std::move(memory)), instances_(kMaxInstances) {}
   MemoryFile memory_;
+  HostStatus host_;  // as written last, here and below
+  std::vector<InstanceStatus> instances_;
 };
 
 /// A reader's end, in any process.
@@ -81,7 +86,8 @@ class HostPageReader {
   /// not_found: no manager has made it yet. corrupt: not such a page.
   [[nodiscard]] static Result<HostPageReader> open(std::string_view pool);
   [[nodiscard]] std::uint64_t changes() const noexcept;
-  /// Nothing if the writer was in the way (try again later), or nothing valid was written yet.
+  /// Nothing if the writer was in the way (try again later), or nothing valid was written yet: names and texts
+  /// are what they may be, without control characters.
   [[nodiscard]] std::optional<HostStatus> host() const noexcept;
   [[nodiscard]] std::optional<InstanceStatus> instance(std::uint32_t index) const noexcept;
 

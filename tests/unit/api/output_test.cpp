@@ -53,7 +53,8 @@ TEST(Csv, QuotesWhatWouldBeTwoFields) {
                         {{"n", nullptr}, {"name", "two\nlines"}, {"more", "is not shown"}}}),
             "name,text,n\n"
             "\"a,b\",\"he said \"\"no\"\"\",1.5\n"
-            "\"two\nlines\",,\n");
+            "two?lines,,\n");
+  EXPECT_EQ(format_csv({{{"name", "a\xff\x1b[2J"}}}), "name\na??[2J\n") << "no file is spoiled by a name";
 }
 
 TEST(Json, IsAnArrayOfFlatObjects) {

@@ -2,6 +2,7 @@
 #include <array>
 #include <cstring>
 #include <random>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -34,6 +35,47 @@ std::vector<TaskIdentity> tasks_of(std::size_t count) {
   std::vector<TaskIdentity> tasks(count);
   for (std::size_t i = 0; i < count; ++i) tasks[i].name.assign("task" + std::to_string(i));
   return tasks;
+}
+
+TEST_F(Pages, HostPageOverWhichAStrangerHasWrittenIsWrittenAnew) {
+  auto writer = HostPageWriter::create(pool());
+  ASSERT_TRUE(writer);
+  HostStatus host;
+  host.name.assign("controller");
+  host.instance_count = 1;
+  writer->write_host(host);
+  InstanceStatus instance;
+  instance.name.assign("line1");
+  writer->write_instance(0, instance);
+  EXPECT_FALSE(writer->keep()) << "nothing has happened";
+  const auto sut = HostPageReader::open(pool());
+  const MemoryFile memory = map(host_page_name(pool()));
+  std::mt19937 random(1);  // NOLINT(cert-msc51-cpp): the same each time
+  for (int round = 0; round < 200; ++round) {
+    const std::size_t at = random() % 900;
+    memory.bytes()[at] ^= static_cast<std::byte>(1 + random() % 255);
+    writer->keep();
+    ASSERT_EQ(sut->host().value_or(HostStatus{}).name.view(), "controller") << at;
+    ASSERT_EQ(sut->instance(0).value_or(InstanceStatus{}).name.view(), "line1") << at;
+    ASSERT_TRUE(HostPageReader::open(pool())) << at;
+  }
+}
+
+TEST_F(Pages, HostPageTellsNoNameThatCouldDriveATerminal) {
+  auto writer = HostPageWriter::create(pool());
+  ASSERT_TRUE(writer);
+  InstanceStatus instance;
+  instance.name.assign("line1");
+  instance.problem.assign("no file '/tmp/\x1b[2J\xff'");
+  writer->write_instance(0, instance);
+  const auto sut = HostPageReader::open(pool());
+  ASSERT_TRUE(sut->instance(0)) << "a path may be of any bytes";
+  EXPECT_EQ(sut->instance(0)->problem.view(), "no file '/tmp/?[2J?'");
+  const MemoryFile memory = map(host_page_name(pool()));
+  const auto found = std::ranges::search(memory.bytes(), std::as_bytes(std::span("line1", 5)));
+  ASSERT_FALSE(found.empty());
+  found.front() = std::byte{0x1b};
+  EXPECT_FALSE(sut->instance(0)) << "written by a stranger";
 }
 
 TEST_F(Pages, HostPageCarriesWhatTheManagerWrites) {
