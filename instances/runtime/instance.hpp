@@ -138,6 +138,7 @@ class Instance {
   Components components_;
   std::optional<Application> application_;
   std::optional<InstancePage> page_;
+  bool page_told_ = false;  // that it is lost
   ReferenceMemory reference_;
   LinuxClock clock_;
   std::unique_ptr<TaskSet> tasks_;  // uses all of the above: destroyed before them

@@ -142,6 +142,11 @@ bool RobustMutex::take_over(std::uint32_t word) noexcept {
   return true;
 }
 
+bool RobustMutex::take_from(std::uint32_t thread) noexcept {
+  const std::uint32_t word = word_.load(std::memory_order_acquire);
+  return number_of(word) == thread && take_over(word);
+}
+
 // By the kernel, which leaves the mark of a dead owner in the word for us to take off.
 LockResult RobustMutex::taken() noexcept {
   const std::uint32_t before = word_.fetch_and(~std::uint32_t{FUTEX_OWNER_DIED}, std::memory_order_acquire);

@@ -37,6 +37,9 @@ class RobustMutex {
   [[nodiscard]] std::uint32_t owner() const noexcept;
   /// The thread that holds it has ended since, or will not come back from the kernel. Set-up; only reads.
   [[nodiscard]] bool owner_has_ended() const noexcept;
+  /// Takes it from `thread`, which a stranger must have written there: it cannot reach this memory. False: it
+  /// is not held by that thread (any more). Set-up.
+  [[nodiscard]] bool take_from(std::uint32_t thread) noexcept;
   /// How long one that was left by a dead thread can look as if it were held.
   static constexpr Duration kLook = std::chrono::milliseconds(40);
 

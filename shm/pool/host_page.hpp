@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "shm/base/memory_guard.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/seqlock.hpp"
 #include "shm/pool/memory_file.hpp"
@@ -74,9 +75,11 @@ class HostPageWriter {
   bool keep() noexcept;
 
  private:
-  explicit HostPageWriter(MemoryFile memory) : memory_(std::move(memory)), instances_(kMaxInstances) {}
+  explicit HostPageWriter(MemoryFile memory)
+      : memory_(std::move(memory)), guard_(memory_.bytes()), instances_(kMaxInstances) {}
   MemoryFile memory_;
-  HostStatus host_;  // as written last, here and below
+  MemoryGuard guard_;  // below the memory, so that it goes first
+  HostStatus host_;    // as written last, here and below
   std::vector<InstanceStatus> instances_;
 };
 
@@ -86,14 +89,15 @@ class HostPageReader {
   /// not_found: no manager has made it yet. corrupt: not such a page.
   [[nodiscard]] static Result<HostPageReader> open(std::string_view pool);
   [[nodiscard]] std::uint64_t changes() const noexcept;
-  /// Nothing if the writer was in the way (try again later), or nothing valid was written yet: names and texts
-  /// are what they may be, without control characters.
+  /// Nothing if the writer was in the way (try again later), or nothing valid was written yet: names and
+  /// texts are what they may be, without control characters.
   [[nodiscard]] std::optional<HostStatus> host() const noexcept;
   [[nodiscard]] std::optional<InstanceStatus> instance(std::uint32_t index) const noexcept;
 
  private:
-  explicit HostPageReader(MemoryFile memory) noexcept : memory_(std::move(memory)) {}
+  explicit HostPageReader(MemoryFile memory) noexcept : memory_(std::move(memory)), guard_(memory_.bytes()) {}
   MemoryFile memory_;
+  MemoryGuard guard_;
 };
 
 }  // namespace plchost

@@ -1,8 +1,11 @@
 #include "shm/pool/pool_lock.hpp"
 
+#include <fstream>
+
 #include <fmt/format.h>
 
 #include "shm/base/thread_owner.hpp"
+#include "shm/pool/memory_file.hpp"
 
 namespace plchost {
 
@@ -12,6 +15,17 @@ std::string describe_holder(std::uint32_t thread) {
   const auto owner = owner_of_thread(thread);
   if (!owner) return fmt::format("thread {}", thread);
   return fmt::format("process {} ({})", owner->pid, owner->program);
+}
+
+// Who holds the lock has the pool mapped. Where that cannot be seen it is taken for granted.
+bool has_mapped(std::uint32_t thread, const std::string& pool) {
+  std::ifstream mappings(fmt::format("/proc/{}/maps", thread));
+  if (!mappings) return true;
+  const std::string path = fmt::format("{}/{}", MemoryFile::kDirectory, pool);
+  for (std::string line; std::getline(mappings, line);) {
+    if (line.ends_with(path) || line.ends_with(path + " (deleted)")) return true;
+  }
+  return mappings.bad();
 }
 
 }  // namespace
@@ -37,11 +51,15 @@ Result<PoolLock> PoolLock::acquire(PoolHeader& header, PoolJournal& journal, con
       return PoolLock(header, journal, (header.changes.load(std::memory_order_relaxed) & 1) != 0);
     case LockResult::owner_died:
       return PoolLock(header, journal, true);
-    case LockResult::timed_out:
-      return failure(
-          ErrorCode::timed_out,
-          fmt::format("pool '{}': {} holds its lock for more than {} ms; is it stopped?", pool,
-                      describe_holder(header.mutex.owner()), patience / std::chrono::milliseconds(1)));
+    case LockResult::timed_out: {
+      const std::uint32_t holder = header.mutex.owner();
+      if (holder != 0 && !has_mapped(holder, pool) && header.mutex.take_from(holder)) {
+        return PoolLock(header, journal, true);
+      }
+      return failure(ErrorCode::timed_out,
+                     fmt::format("pool '{}': {} holds its lock for more than {} ms; is it stopped?", pool,
+                                 describe_holder(holder), patience / std::chrono::milliseconds(1)));
+    }
     case LockResult::deadlock:
     case LockResult::corrupt:
       break;

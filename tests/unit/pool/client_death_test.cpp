@@ -2,7 +2,9 @@
 #include <array>
 #include <atomic>
 #include <chrono>
+#include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <string>
 #include <thread>
@@ -156,6 +158,27 @@ TEST_F(ClientDeath, WhoIsStoppedWithTheLockIsNamedAndWhatIsClosedMeanwhileIsRele
   (void)pool_.tidy();
   kill_and_reap(child);
   EXPECT_TRUE(pool_.list()->empty());
+}
+
+TEST_F(ClientDeath, AHolderThatAStrangerHasWrittenAndThatHasNoPoolIsNone) {
+  const pid_t other = ::fork();
+  if (other == 0) {
+    ::execlp("sleep", "sleep", "60", nullptr);
+    ::_exit(1);
+  }
+  // Until it runs another program it has the pool.
+  const auto is_sleep = [&] {
+    std::ifstream name("/proc/" + std::to_string(other) + "/comm");
+    std::string text;
+    return std::getline(name, text) && text == "sleep";
+  };
+  while (!is_sleep()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  const auto memory = MemoryFile::open(name_.get(), 1, MemoryFile::Access::read_write);
+  const auto word = static_cast<std::uint32_t>(other);
+  std::memcpy(memory->bytes().data() + offsetof(PoolHeader, mutex), &word, sizeof word);
+  const auto made = pool_.create_semaphore("s", 3);
+  EXPECT_TRUE(made) << made.error().describe();
+  kill_and_reap(other);
 }
 
 TEST_F(ClientDeath, OfOneThatHeldMoreThanIsReleasedAtOnceLeavesNothingToBeFound) {
