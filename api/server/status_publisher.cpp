@@ -73,6 +73,10 @@ bool StatusPublisher::look_at_instances(TimePoint now) {
     page_ = std::move(*opened);
   }
   const auto host = page_->host();
+  if (page_->lost()) {  // the manager makes it anew
+    page_.reset();
+    return false;
+  }
   if (!host) return false;
   bool changed = false;
   instances_.begin_round();

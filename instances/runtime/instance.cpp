@@ -294,8 +294,9 @@ void Instance::beat() {
   runtime.clock.problem.assign(reference_.problem());
   page_->write_runtime(runtime);
   if (page_->lost() && !std::exchange(page_told_, true)) {
-    spdlog::warn("the page of this instance was cut short by another program: nobody sees its figures any more "
-                 "until it is started again");
+    spdlog::warn(
+        "the page of this instance was cut short by another program: nobody sees its figures any more "
+        "until it is started again");
   }
 }
 

@@ -102,11 +102,11 @@ Result<HostPageWriter> HostPageWriter::create(std::string_view pool) {
     HostPageLayout& page = layout_of(*found);
     page.host.recover();
     for (auto& instance : page.instances) instance.recover();
-    return HostPageWriter(std::move(*found));
+    return HostPageWriter(name, std::move(*found));
   }
   auto memory = MemoryFile::replace(name, sizeof(HostPageLayout), fill);
   if (!memory) return std::unexpected(memory.error());
-  return HostPageWriter(std::move(*memory));
+  return HostPageWriter(name, std::move(*memory));
 }
 
 void HostPageWriter::remove(std::string_view pool) noexcept {
@@ -135,7 +135,13 @@ void HostPageWriter::write_instance(std::uint32_t index, const InstanceStatus& s
   page.changes.fetch_add(1, std::memory_order_release);
 }
 
-bool HostPageWriter::keep() noexcept {
+bool HostPageWriter::keep() {
+  if (!holds(layout_of(memory_).host, host_) && guard_.lost()) {
+    auto fresh = MemoryFile::replace(name_, sizeof(HostPageLayout), fill);
+    if (!fresh) return true;
+    memory_ = std::move(*fresh);
+    guard_ = MemoryGuard(memory_.bytes());
+  }
   HostPageLayout& page = layout_of(memory_);
   bool changed = page.magic != kKind.magic || page.version != kKind.version || page.size != sizeof(page);
   if (changed) describe(page);

@@ -71,12 +71,17 @@ class HostPageWriter {
   void write_host(const HostStatus& status) noexcept;
   /// `index` < the instance_count written with the host, which is at most kMaxInstances.
   void write_instance(std::uint32_t index, const InstanceStatus& status) noexcept;
-  /// Writes again what is not as it was written last: by a stranger. Whether there was such a thing.
-  bool keep() noexcept;
+  /// Writes again what is not as it was written last: by a stranger. A page that was cut short is made anew.
+  /// Whether there was such a thing.
+  bool keep();
 
  private:
-  explicit HostPageWriter(MemoryFile memory)
-      : memory_(std::move(memory)), guard_(memory_.bytes()), instances_(kMaxInstances) {}
+  HostPageWriter(std::string name, MemoryFile memory)
+      : name_(std::move(name)),
+        memory_(std::move(memory)),
+        guard_(memory_.bytes()),
+        instances_(kMaxInstances) {}
+  std::string name_;
   MemoryFile memory_;
   MemoryGuard guard_;  // below the memory, so that it goes first
   HostStatus host_;    // as written last, here and below
@@ -89,6 +94,8 @@ class HostPageReader {
   /// not_found: no manager has made it yet. corrupt: not such a page.
   [[nodiscard]] static Result<HostPageReader> open(std::string_view pool);
   [[nodiscard]] std::uint64_t changes() const noexcept;
+  /// It was cut short, and tells nothing since: open it anew.
+  [[nodiscard]] bool lost() const noexcept { return guard_.lost(); }
   /// Nothing if the writer was in the way (try again later), or nothing valid was written yet: names and
   /// texts are what they may be, without control characters.
   [[nodiscard]] std::optional<HostStatus> host() const noexcept;

@@ -14,6 +14,14 @@ for file in instance.line1 transitions.line1; do
   sleep 1.5
   kill -0 "$pid" || fail "it has ended"
 done
+echo "- host: manager and API server go on"
+post() { plcctl post event line1/stop >/dev/null; }
+post || fail "no post before"
+for file in host; do
+  truncate -s 0 "/dev/shm/$pool-cell.$file"
+  until_true 10 post
+done
+until_true 10 state_is line1 running
 grep -q "page of this instance was cut short" "$cell/cell.log" || fail "nobody says so"
 [ "$(plcctl list instances --json | jq length)" = 1 ] || fail "the manager does not show it any more"
 

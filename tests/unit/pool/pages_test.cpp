@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <filesystem>
 #include <random>
 #include <span>
 #include <string>
@@ -59,6 +60,24 @@ TEST_F(Pages, HostPageOverWhichAStrangerHasWrittenIsWrittenAnew) {
     ASSERT_EQ(sut->instance(0).value_or(InstanceStatus{}).name.view(), "line1") << at;
     ASSERT_TRUE(HostPageReader::open(pool())) << at;
   }
+}
+
+TEST_F(Pages, HostPageThatWasCutShortIsMadeAnew) {
+  MemoryGuard::watch_process();
+  auto writer = HostPageWriter::create(pool());
+  ASSERT_TRUE(writer);
+  HostStatus host;
+  host.name.assign("controller");
+  writer->write_host(host);
+  const auto before = HostPageReader::open(pool());
+  std::filesystem::resize_file("/dev/shm/" + host_page_name(pool()), 0);
+  EXPECT_EQ(before->host().value_or(HostStatus{}).name.view(), "");
+  EXPECT_TRUE(before->lost());
+  EXPECT_TRUE(writer->keep());
+  const auto after = HostPageReader::open(pool());
+  ASSERT_TRUE(after) << after.error().describe();
+  EXPECT_EQ(after->host()->name.view(), "controller");
+  EXPECT_FALSE(writer->keep());
 }
 
 TEST_F(Pages, HostPageTellsNoNameThatCouldDriveATerminal) {
