@@ -14,6 +14,7 @@
 #include "api/dds/text.hpp"
 #include "api/server/control_server_parts.hpp"
 #include "shm/base/log.hpp"
+#include "shm/base/memory_guard.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/time.hpp"
 
@@ -62,6 +63,7 @@ Result<void> ControlServer::run() {
 }
 
 void ControlServer::Parts::on_event_post(dds_entity_t reader, void* server) {
+  MemoryGuard::watch_thread();
   auto& self = *static_cast<Parts*>(server);
   if (self.intake->take(reader)) raise_event(self.wake.get());
 }

@@ -63,6 +63,16 @@ void MemoryGuard::watch_process() noexcept {
   });
 }
 
+void MemoryGuard::watch_thread() noexcept {
+  thread_local bool watched = false;
+  if (watched) return;
+  sigset_t signals;
+  ::sigemptyset(&signals);
+  ::sigaddset(&signals, SIGBUS);
+  ::pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
+  watched = true;
+}
+
 bool MemoryGuard::mend(const void* address) noexcept {
   const auto at = reinterpret_cast<std::uintptr_t>(address);
   for (Slot& slot : slots) {

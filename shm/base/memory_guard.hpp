@@ -36,6 +36,9 @@ class MemoryGuard {
   /// Installs a handler of SIGBUS that does so, once for the process. What is not guarded goes to the handler
   /// that was there before, or ends the process as ever. Set-up.
   static void watch_process() noexcept;
+  /// For a thread of others that has all signals blocked, as DDS's own: there a fault would end the process,
+  /// handler or not. Costs a system call once for each thread. Any context.
+  static void watch_thread() noexcept;
   /// For the handler of SIGBUS: whether `address` is guarded, and can be touched now. Any context.
   [[nodiscard]] static bool mend(const void* address) noexcept;
 

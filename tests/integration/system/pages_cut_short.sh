@@ -14,10 +14,10 @@ for file in instance.line1 transitions.line1; do
   sleep 1.5
   kill -0 "$pid" || fail "it has ended"
 done
-echo "- host: manager and API server go on"
+echo "- host and posts: manager and API server go on"
 post() { plcctl post event line1/stop >/dev/null; }
 post || fail "no post before"
-for file in host; do
+for file in host posts; do
   truncate -s 0 "/dev/shm/$pool-cell.$file"
   until_true 10 post
 done

@@ -3,6 +3,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <span>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -84,6 +85,20 @@ TEST_F(GuardedMemory, GuardsThatGoMakeRoomForOthers) {
   EXPECT_TRUE(sut);
   resize(0);
   EXPECT_EQ(look(), std::byte{0});
+  EXPECT_TRUE(sut.lost());
+}
+
+// As the threads of Cyclone DDS, in which the listeners of its readers run.
+TEST_F(GuardedMemory, IsGuardedAlsoInAThreadThatHasAllSignalsBlocked) {
+  const MemoryGuard sut(memory);
+  resize(0);
+  std::thread([&] {
+    sigset_t all;
+    sigfillset(&all);
+    pthread_sigmask(SIG_BLOCK, &all, nullptr);
+    MemoryGuard::watch_thread();
+    EXPECT_EQ(look(), std::byte{0});
+  }).join();
   EXPECT_TRUE(sut.lost());
 }
 
