@@ -48,9 +48,9 @@ PLCHOST_FOLDING inline __m512i wide(const Distance& distance) noexcept {
 }
 
 PLCHOST_FOLDING inline __m512i folded(__m512i sum, __m512i distance, __m512i next) noexcept {
-  constexpr int kXorOfThree = 0x96;
-  return _mm512_ternarylogic_epi64(_mm512_clmulepi64_epi128(sum, distance, 0x00),
-                                   _mm512_clmulepi64_epi128(sum, distance, 0x11), next, kXorOfThree);
+  const __m512i lower = _mm512_clmulepi64_epi128(sum, distance, 0x00);
+  const __m512i upper = _mm512_clmulepi64_epi128(sum, distance, 0x11);
+  return _mm512_xor_si512(_mm512_xor_si512(lower, upper), next);
 }
 
 PLCHOST_FOLDING inline __m128i folded(__m128i sum, __m128i distance, __m128i next) noexcept {
