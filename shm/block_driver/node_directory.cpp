@@ -46,7 +46,7 @@ bool is_sane(const NodeRecord& record) noexcept {
   return record.pid > 0 && record.generation != 0 && !name.empty() && printable;
 }
 
-DirectoryLayout& layout_of(const MemoryFile& file) noexcept {
+DirectoryLayout& directory_in(const MemoryFile& file) noexcept {
   return *reinterpret_cast<DirectoryLayout*>(file.bytes().data());
 }
 
@@ -63,7 +63,7 @@ bool has_live_node(const DirectoryLayout& layout) noexcept {
 }
 
 Result<void> check_directory(const MemoryFile& file, const std::string& name) {
-  if (has_good_header(layout_of(file)) && file.bytes().size() == sizeof(DirectoryLayout)) return {};
+  if (has_good_header(directory_in(file)) && file.bytes().size() == sizeof(DirectoryLayout)) return {};
   return failure(
       ErrorCode::corrupt,
       fmt::format("shared memory '{}' is no directory of nodes of version {}; stop who uses it and "
@@ -74,13 +74,13 @@ Result<void> check_directory(const MemoryFile& file, const std::string& name) {
 // A stranger may have written over it. Nodes that run write it again within a second; without them it is
 // nobody's, and we do. Nodes that do not are of another version.
 Result<void> mend_header(const MemoryFile& file, const std::string& name) {
-  constexpr auto kPatience = std::chrono::milliseconds(1500);
+  constexpr auto kMendPatience = std::chrono::milliseconds(1500);
   if (file.bytes().size() != sizeof(DirectoryLayout)) return check_directory(file, name);
-  const TimePoint deadline = MonotonicClock::now() + kPatience;
-  while (!has_good_header(layout_of(file))) {
+  const TimePoint deadline = MonotonicClock::now() + kMendPatience;
+  while (!has_good_header(directory_in(file))) {
     const auto lock = DirectoryLock::acquire(name);
     if (!lock) return std::unexpected(lock.error());
-    if (!has_live_node(layout_of(file))) return fill_directory(file.bytes());
+    if (!has_live_node(directory_in(file))) return fill_directory(file.bytes());
     if (MonotonicClock::now() >= deadline) return check_directory(file, name);
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
@@ -124,7 +124,7 @@ void NodeDirectory::remove(std::string_view pool, std::string_view base) noexcep
 }
 
 DirectoryLayout& NodeDirectory::layout() const noexcept {
-  return layout_of(file_);
+  return directory_in(file_);
 }
 
 std::optional<NodeRecord> NodeDirectory::record(std::uint16_t node) const noexcept {
