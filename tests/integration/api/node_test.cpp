@@ -138,9 +138,13 @@ TEST_F(Nodes, AStrangerWhoScribblesIsNoNodeAndDoesNotEndTheServer) {
     }
   }
   std::ranges::fill(directory->bytes(), std::byte{0x5a});
-  const auto refused = run({"list", "nodes"});
-  EXPECT_EQ(refused.code, 1);
-  EXPECT_THAT(refused.errors, HasSubstr("no directory of nodes"));
+  // Those who use it write again what it says of itself, and of them.
+  RunResult nodes = run({"list", "nodes"});
+  for (const TimePoint end = soon(); nodes.code != 0 && MonotonicClock::now() < end;) {
+    EXPECT_THAT(nodes.errors, HasSubstr("no directory of nodes"));
+    nodes = run({"list", "nodes"});
+  }
+  EXPECT_EQ(nodes.code, 0) << nodes.errors;
   EXPECT_EQ(host_.server().pid(), server);
   EXPECT_EQ(run({"list", "hosts"}).code, 0);
 }
