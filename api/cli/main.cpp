@@ -77,16 +77,22 @@ std::string word_hint(const plchost::Syntax& plcctl, std::span<const std::string
 constexpr const char* kExitCodes =
     "Exit codes: 0 done, 1 refused, failed or a problem found, 2 usage, 3 no answer, 4 warnings found.";
 
+bool parses(CLI::App& app, const std::vector<std::string>& words) {
+  try {
+    app.parse(std::vector<std::string>(words.rbegin(), words.rend()));
+    return true;
+  } catch (const CLI::ParseError&) {
+    return false;
+  }
+}
+
 // What the shells' scripts call: a candidate in each line, a tabulator, what it is.
 int offer(CLI::App& app, plchost::CliSession& session, std::span<const std::string> words) {
   const plchost::Completion completion = plchost::complete(plchost::syntax_of(app), words);
   constexpr double kPatienceOnTab = 1;
   session.options.timeout_s = kPatienceOnTab;
-  try {
-    app.parse(std::vector<std::string>(completion.options.rbegin(), completion.options.rend()));
-  } catch (const CLI::ParseError&) {
-    // There is no verb yet; the options in front of it are read all the same.
-  }
+  // There is no verb yet; the options in front of it are read all the same.
+  (void)parses(app, completion.options);
   if (completion.value == "FILE") fmt::print(":files\n");
   auto candidates = completion.candidates;
   for (plchost::Candidate& name : plchost::live_names(session, completion.value)) {

@@ -54,8 +54,8 @@ std::string coloured_cell(std::string_view field, std::string text) {
 
 std::string csv_field(const Row& value) {
   if (value.is_null()) return "";
-  const std::string text = value.is_string() ? printable(value.get<std::string>())
-                                             : value.dump(-1, ' ', false, Row::error_handler_t::replace);
+  std::string text = value.is_string() ? printable(value.get<std::string>())
+                                       : value.dump(-1, ' ', false, Row::error_handler_t::replace);
   if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
   std::string quoted = "\"";
   for (const char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
