@@ -13,7 +13,7 @@ steps=10
 # Programs that the tests crash on purpose must end by their signal, not by a sanitizer's report.
 # One of them is preloaded with a clock device, before the sanitizer's own library. Each control program has a
 # plc_app_abi, also where one is loaded for all others to see.
-export ASAN_OPTIONS=handle_segv=0:verify_asan_link_order=0:detect_odr_violation=0 UBSAN_OPTIONS=print_stacktrace=1 TSAN_OPTIONS=handle_segv=0
+export ASAN_OPTIONS=handle_segv=0:handle_sigbus=0:verify_asan_link_order=0:detect_odr_violation=0 UBSAN_OPTIONS=print_stacktrace=1 TSAN_OPTIONS=handle_segv=0:handle_sigbus=0
 log=$(mktemp)
 trap 'rm -f "$log"' EXIT
 

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <set>
 #include <string>
+#include <string_view>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -265,6 +266,9 @@ TEST_F(PlcPool, AChildOfForkIsToldThatItCannotList) {
 }
 
 TEST_F(PlcPool, AChildOfForkHasATableOfItsOwn) {
+  // Its library does not see pthread_mutex_clocklock(), and so an unlock without a lock.
+  if (std::string_view(SANITIZERS) == "thread")
+    GTEST_SKIP() << "the thread sanitizer misunderstands a timed mutex";
   plc_semaphore* semaphore = nullptr;
   ASSERT_EQ(plc_semaphore_create(pool_, "s", 1, nullptr, &semaphore), PLC_POOL_OK);
   // The table belongs to the whole process: one that has another pool is none of this one's.
