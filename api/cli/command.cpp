@@ -62,6 +62,12 @@ const Command& Command::flag(const char* name, bool& value, const char* text) co
   return *this;
 }
 
+const Command& Command::option(const char* name, std::string& value, const char* text,
+                               const char* variable) const {
+  app_->add_option(name, value, text)->envname(variable)->take_last();
+  return *this;
+}
+
 template <class Number>
 const Command& Command::option(const char* name, Number& value, const char* text, Number least,
                                Number most) const {

@@ -39,6 +39,8 @@ class Command {
   /// What may follow.
   const Command& optional(const char* form, std::string& value, const char* text) const;
   const Command& flag(const char* name, bool& value, const char* text) const;
+  /// A text, which a variable of the environment can stand for.
+  const Command& option(const char* name, std::string& value, const char* text, const char* variable) const;
   /// A number from `least` to `most`; anything else is an error that names both.
   template <class Number>
   const Command& option(const char* name, Number& value, const char* text, Number least, Number most) const;

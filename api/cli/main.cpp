@@ -12,6 +12,7 @@
 #include "api/cli/live_names.hpp"
 #include "api/cli/man_page.hpp"
 #include "api/cli/repeat.hpp"
+#include "api/cli/security/security_verbs.hpp"
 #include "api/cli/terminal.hpp"
 #include "shm/base/log.hpp"
 
@@ -119,6 +120,7 @@ int main(int argc, char** argv) {
   plchost::add_check_verb(plcctl, session);
   plchost::add_post_verb(plcctl, session);
   plchost::add_watch_verb(plcctl, session);
+  plchost::add_security_verb(plcctl, session);
   plchost::add_completion_verb(plcctl);
   const std::vector<std::string> words(argv + 1, argv + argc);
   plchost::start_log("plcctl", "warning");

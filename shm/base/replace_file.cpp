@@ -12,8 +12,11 @@ namespace plchost {
 
 namespace {
 
-Result<void> write_all(const std::string& path, std::string_view text) {
-  const UniqueFd fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+Result<void> write_all(const std::string& path, std::string_view text, mode_t mode) {
+  // What a run before this one has left may have other rights.
+  if (::unlink(path.c_str()) != 0 && errno != ENOENT)
+    return failure(ErrorCode::system, "remove " + path, errno);
+  const UniqueFd fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode));
   if (!fd) return failure(ErrorCode::system, "open " + path, errno);
   while (!text.empty()) {
     const auto written = check_errno(::write(fd.get(), text.data(), text.size()), "write " + path);
@@ -37,9 +40,9 @@ Result<void> sync_directory(const std::string& path) {
   return {};
 }
 
-Result<void> replace_file(const std::string& path, std::string_view text) {
+Result<void> replace_file(const std::string& path, std::string_view text, mode_t mode) {
   const std::string fresh = path + ".new";
-  if (auto written = write_all(fresh, text); !written) return written;
+  if (auto written = write_all(fresh, text, mode); !written) return written;
   std::error_code error;
   std::filesystem::rename(fresh, path, error);
   if (error) return failure(ErrorCode::system, "rename " + fresh, error.value());

@@ -32,6 +32,14 @@ TEST_F(ReplaceFile, MakesAndReplacesAndLeavesNothingBeside) {
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(directory), {}), 1);
 }
 
+TEST_F(ReplaceFile, ASecretIsItsOwnersOnlyWhateverWasLeftBefore) {
+  std::ofstream(path + ".new") << "left";
+  std::ofstream(path) << "read by all";
+  ASSERT_TRUE(replace_file(path, "secret", 0600));
+  EXPECT_EQ(std::filesystem::status(path).permissions(), std::filesystem::perms(0600));
+  EXPECT_EQ(contents(), "secret");
+}
+
 TEST_F(ReplaceFile, WhatCannotBeWrittenLeavesTheOldContents) {
   ASSERT_TRUE(replace_file(path, "kept"));
   std::filesystem::create_directory(path + ".new");

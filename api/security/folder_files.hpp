@@ -1,0 +1,27 @@
+#pragma once
+
+#include <array>
+#include <string>
+#include <string_view>
+
+#include <sys/types.h>
+
+#include "api/security/identity.hpp"
+
+namespace plchost::security {
+
+/// The folder of the authorities, below the security folder.
+inline constexpr std::string_view kAuthoritiesFolder = "authorities";
+inline constexpr mode_t kPublicFile = 0644;
+inline constexpr mode_t kSecretFile = 0600;
+
+/// Files that are the same for all identities.
+inline constexpr std::array kCommonFiles{kIdentityAuthorityFile, kPermissionsAuthorityFile, kGovernanceFile,
+                                         kRevocationsFile};
+
+/// Passes on why there is no text, else replaces the file.
+[[nodiscard]] Result<void> write_text(const std::string& path, const Result<std::string>& text, mode_t mode);
+/// A folder of which others see nothing.
+[[nodiscard]] Result<void> make_folder(const std::string& path);
+
+}  // namespace plchost::security

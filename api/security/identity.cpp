@@ -1,0 +1,88 @@
+#include "api/security/identity.hpp"
+
+#include <filesystem>
+
+#include <fmt/format.h>
+#include <openssl/err.h>
+
+#include "api/security/pem.hpp"
+#include "api/security/signed_document.hpp"
+
+namespace plchost::security {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+Result<void> check_key(const std::string& path, const Certificate& certificate) {
+  std::error_code error;
+  const fs::perms mode = fs::status(path, error).permissions();
+  constexpr fs::perms kOthers = fs::perms::group_all | fs::perms::others_all;
+  if (!error && (mode & kOthers) != fs::perms::none) {
+    return failure(ErrorCode::refused,
+                   fmt::format("{} can be read or written by others than its owner: chmod 600 it", path));
+  }
+  const auto key = read_key(path);
+  if (!key) return std::unexpected(key.error());
+  if (X509_check_private_key(certificate.get(), key->get()) == 1) return {};
+  ERR_clear_error();
+  return failure(ErrorCode::corrupt,
+                 fmt::format("{} is not the key of {} beside it", path, kCertificateFile));
+}
+
+Result<void> check_documents(const std::string& folder, const Certificate& certificate) {
+  const auto authority = read_certificate(file_in(folder, kPermissionsAuthorityFile));
+  if (!authority) return std::unexpected(authority.error());
+  std::string permissions;
+  for (const std::string_view file : {kGovernanceFile, kPermissionsFile}) {
+    const std::string path = file_in(folder, file);
+    const auto document = read_file(path);
+    if (!document) return std::unexpected(document.error());
+    auto text = open_document(path, *document, *authority);
+    if (!text) return std::unexpected(text.error());
+    permissions = std::move(*text);
+  }
+  const auto subject = subject_text(certificate);
+  if (!subject) return std::unexpected(subject.error());
+  if (permissions.contains(fmt::format("<subject_name>{}</subject_name>", *subject))) return {};
+  return failure(ErrorCode::refused, fmt::format("{} are the permissions of another identity than '{}'",
+                                                 file_in(folder, kPermissionsFile), *subject));
+}
+
+}  // namespace
+
+std::string file_in(const std::string& folder, std::string_view file) {
+  return folder + "/" + std::string(file);
+}
+
+Result<OwnIdentity> check_identity(const std::string& folder) {
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) {
+    return failure(
+        ErrorCode::not_found,
+        fmt::format("'{}' is no folder of an identity; 'plcctl security add-identity' makes one", folder),
+        error.value());
+  }
+  const auto certificate = read_certificate(file_in(folder, kCertificateFile));
+  if (!certificate) return std::unexpected(certificate.error());
+  const auto authority = read_certificate(file_in(folder, kIdentityAuthorityFile));
+  if (!authority) return std::unexpected(authority.error());
+  const auto revocations = read_revocations(file_in(folder, kRevocationsFile));
+  if (!revocations) return std::unexpected(revocations.error());
+  if (auto good = verify_revocations(*revocations, *authority); !good)
+    return failure_in(folder, good.error());
+  if (auto good = verify_certificate(*certificate, *authority, *revocations); !good) {
+    return failure_in(folder, good.error());
+  }
+  if (auto good = check_key(file_in(folder, kKeyFile), *certificate); !good) {
+    return std::unexpected(good.error());
+  }
+  if (auto good = check_documents(folder, *certificate); !good) return std::unexpected(good.error());
+  auto subject = subject_of(*certificate);
+  if (!subject) return failure_in(folder, subject.error());
+  const auto validity = validity_of(*certificate);
+  if (!validity) return failure_in(folder, validity.error());
+  return OwnIdentity{std::move(*subject), *validity};
+}
+
+}  // namespace plchost::security

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <ctime>
+#include <string>
+#include <string_view>
+
+#include "api/security/certificates.hpp"
+
+namespace plchost::security {
+
+/// The files in the folder of one identity: all that its process needs, so the folder can be copied to where
+/// that runs.
+inline constexpr std::string_view kIdentityAuthorityFile = "identity_ca.pem";
+inline constexpr std::string_view kPermissionsAuthorityFile = "permissions_ca.pem";
+inline constexpr std::string_view kGovernanceFile = "governance.p7s";
+inline constexpr std::string_view kPermissionsFile = "permissions.p7s";
+inline constexpr std::string_view kCertificateFile = "certificate.pem";
+inline constexpr std::string_view kKeyFile = "key.pem";
+inline constexpr std::string_view kRevocationsFile = "revoked.pem";
+/// Of a host: the certificates of all identities, NAME.pem.
+inline constexpr std::string_view kKnownFolder = "known";
+
+/// A certificate that ends sooner is worth a word.
+inline constexpr std::time_t kExpiresSoon = 30 * 86'400;
+
+/// An identity that a process can show.
+struct OwnIdentity {
+  Subject subject;
+  Validity validity;
+};
+
+/// Whether the folder holds an identity that will be accepted: each file is there and what it should be, the
+/// key is the certificate's and its owner's only, the certificate is valid now, signed by the authority and
+/// not revoked, governance and permissions are signed. The error names the file and what to do.
+[[nodiscard]] Result<OwnIdentity> check_identity(const std::string& folder);
+
+/// "folder/file".
+[[nodiscard]] std::string file_in(const std::string& folder, std::string_view file);
+
+}  // namespace plchost::security

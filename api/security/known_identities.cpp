@@ -1,0 +1,74 @@
+#include "api/security/known_identities.hpp"
+
+#include <algorithm>
+#include <filesystem>
+
+#include <fmt/format.h>
+
+#include "api/security/identity.hpp"
+#include "api/security/pem.hpp"
+
+namespace plchost::security {
+
+namespace {
+
+struct Known {
+  GuidPrefix prefix;
+  Subject subject;
+};
+
+Result<Known> read_known(const std::string& path, const Certificate& authority,
+                         const RevocationList& revocations) {
+  const auto certificate = read_certificate(path);
+  if (!certificate) return std::unexpected(certificate.error());
+  if (auto good = verify_certificate(*certificate, authority, revocations); !good) {
+    return failure_in(path, good.error());
+  }
+  auto subject = subject_of(*certificate);
+  if (!subject) return failure_in(path, subject.error());
+  const auto prefix = guid_prefix(*certificate);
+  if (!prefix) return failure_in(path, prefix.error());
+  return Known{*prefix, std::move(*subject)};
+}
+
+}  // namespace
+
+Result<KnownIdentities> KnownIdentities::load(const std::string& folder) {
+  const auto authority = read_certificate(file_in(folder, kIdentityAuthorityFile));
+  if (!authority) return std::unexpected(authority.error());
+  const auto revocations = read_revocations(file_in(folder, kRevocationsFile));
+  if (!revocations) return std::unexpected(revocations.error());
+  const std::string known = file_in(folder, kKnownFolder);
+  KnownIdentities identities;
+  std::error_code error;
+  auto entry = std::filesystem::directory_iterator(known, error);
+  for (; !error && entry != std::filesystem::directory_iterator(); entry.increment(error)) {
+    if (entry->path().extension() != ".pem") continue;
+    if (identities.size() >= kMost) {
+      return failure(ErrorCode::full, fmt::format("{} holds more than {} certificates", known, kMost));
+    }
+    auto one = read_known(entry->path(), *authority, *revocations);
+    if (!one) {
+      identities.problems_.push_back(one.error().describe());
+    } else if (!identities.subjects_.emplace(one->prefix, std::move(one->subject)).second) {
+      identities.problems_.push_back(
+          fmt::format("{}: an identity with the same GUID prefix is known", entry->path().string()));
+    }
+  }
+  if (error) {
+    return failure(ErrorCode::system, fmt::format("read {}: only the folder of a host has it", known),
+                   error.value());
+  }
+  return identities;
+}
+
+std::optional<Subject> KnownIdentities::find(std::span<const std::uint8_t> guid) const {
+  GuidPrefix prefix{};
+  if (guid.size() < prefix.size()) return std::nullopt;
+  std::ranges::copy(guid.first(prefix.size()), prefix.begin());
+  const auto found = subjects_.find(prefix);
+  if (found == subjects_.end()) return std::nullopt;
+  return found->second;
+}
+
+}  // namespace plchost::security

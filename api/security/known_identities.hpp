@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "api/security/certificates.hpp"
+
+namespace plchost::security {
+
+/// Who is behind which GUID: computed from the certificates of all identities that the folder of a host
+/// knows. A participant cannot choose another prefix than that of the subject that its handshake has proved.
+class KnownIdentities {
+ public:
+  /// Reads "folder/known". What is not signed by the authority, revoked or expired is left out, and told of
+  /// in problems().
+  [[nodiscard]] static Result<KnownIdentities> load(const std::string& folder);
+
+  /// Of the participant, or of any entity of it, whose GUID begins so (at least 6 bytes). None: nobody that
+  /// is known.
+  [[nodiscard]] std::optional<Subject> find(std::span<const std::uint8_t> guid) const;
+
+  [[nodiscard]] std::size_t size() const noexcept { return subjects_.size(); }
+  [[nodiscard]] const std::vector<std::string>& problems() const noexcept { return problems_; }
+
+  /// No folder holds more.
+  static constexpr std::size_t kMost = 4096;
+
+ private:
+  std::map<GuidPrefix, Subject> subjects_;
+  std::vector<std::string> problems_;
+};
+
+}  // namespace plchost::security

@@ -1,0 +1,133 @@
+#include "api/security/policy.hpp"
+
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include <fmt/format.h>
+
+namespace plchost::security {
+
+namespace {
+
+using Topics = std::vector<std::string_view>;
+
+/// Some topics in some partitions; no partition: the default one.
+struct Grant {
+  Topics topics;
+  std::string partition = {};
+};
+
+constexpr std::string_view kDocument =
+    "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
+    "<dds xmlns:xsi=\"http://www.w3.org/2001/XMLSchema-instance\" "
+    "xsi:noNamespaceSchemaLocation=\"https://www.omg.org/spec/DDS-SECURITY/20170901/{}.xsd\">\n{}</dds>\n";
+
+constexpr std::string_view kDomains = "<domains><id_range><min>0</min><max>230</max></id_range></domains>";
+
+const Topics kStatusTopics{"plc/v1/presence", "plc/v1/status/*", "plc/v1/transition"};
+// What a host tells one client only.
+const Topics kAnswerTopics{"plc/v1/reply", "plc/v1/event_ack", "plc/v1/objects", "plc/v1/nodes"};
+const Topics kBlockTopics{"plc/v1/blocks", "plc/v1/block_ack"};
+
+std::vector<Grant> may_write(Role role) {
+  switch (role) {
+    case Role::viewer:
+      return {};
+    case Role::operating:
+      return {{{"plc/v1/event", "plc/v1/op/request"}, "h.*"}};
+    case Role::engineer:
+      return {{{"plc/v1/event", "plc/v1/op/request", "plc/v1/eng/request"}, "h.*"}};
+    case Role::admin:
+      return {{{"plc/v1/event", "plc/v1/*/request"}, "h.*"}};
+    case Role::host:
+      return {{kStatusTopics}, {kAnswerTopics, "c.*"}, {kBlockTopics, "b.*"}};
+  }
+  return {};
+}
+
+std::vector<Grant> may_read(Role role, const GuidPrefix& prefix) {
+  if (role == Role::viewer) return {{kStatusTopics}};
+  if (role == Role::host) {
+    return {
+        {{"plc/v1/status/block_host"}}, {{"plc/v1/event", "plc/v1/*/request"}, "h.*"}, {kBlockTopics, "b.*"}};
+  }
+  return {{kStatusTopics}, {kAnswerTopics, fmt::format("c.{:02x}*", fmt::join(prefix, ""))}};
+}
+
+std::string criteria(std::string_view what, const std::vector<Grant>& grants) {
+  std::string text;
+  for (const Grant& grant : grants) {
+    text += fmt::format("<{}><topics>", what);
+    for (const std::string_view topic : grant.topics) text += fmt::format("<topic>{}</topic>", topic);
+    text += "</topics>";
+    if (!grant.partition.empty()) {
+      text += fmt::format("<partitions><partition>{}</partition></partitions>", grant.partition);
+    }
+    text += fmt::format("</{}>\n", what);
+  }
+  return text;
+}
+
+std::string escaped(std::string_view text) {
+  std::string made;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        made += "&amp;";
+        break;
+      case '<':
+        made += "&lt;";
+        break;
+      case '>':
+        made += "&gt;";
+        break;
+      default:
+        made += c;
+    }
+  }
+  return made;
+}
+
+std::string time_text(std::time_t time) {
+  std::tm parts{};
+  ::gmtime_r(&time, &parts);
+  return fmt::format("{:04}-{:02}-{:02}T{:02}:{:02}:{:02}", parts.tm_year + 1900, parts.tm_mon + 1,
+                     parts.tm_mday, parts.tm_hour, parts.tm_min, parts.tm_sec);
+}
+
+}  // namespace
+
+std::string governance_text() {
+  const std::string rule = fmt::format(
+      "<domain_access_rules><domain_rule>{}\n"
+      "<allow_unauthenticated_participants>false</allow_unauthenticated_participants>\n"
+      "<enable_join_access_control>true</enable_join_access_control>\n"
+      "<discovery_protection_kind>ENCRYPT</discovery_protection_kind>\n"
+      "<liveliness_protection_kind>ENCRYPT</liveliness_protection_kind>\n"
+      "<rtps_protection_kind>SIGN</rtps_protection_kind>\n"
+      "<topic_access_rules><topic_rule><topic_expression>*</topic_expression>\n"
+      "<enable_discovery_protection>true</enable_discovery_protection>\n"
+      "<enable_liveliness_protection>true</enable_liveliness_protection>\n"
+      "<enable_read_access_control>true</enable_read_access_control>\n"
+      "<enable_write_access_control>true</enable_write_access_control>\n"
+      "<metadata_protection_kind>ENCRYPT</metadata_protection_kind>\n"
+      "<data_protection_kind>NONE</data_protection_kind>\n"
+      "</topic_rule></topic_access_rules></domain_rule></domain_access_rules>\n",
+      kDomains);
+  return fmt::format(kDocument, "omg_shared_ca_governance", rule);
+}
+
+std::string permissions_text(const Subject& subject, const std::string& subject_text,
+                             const GuidPrefix& prefix, const Validity& validity) {
+  const std::string grant = fmt::format(
+      "<permissions><grant name=\"{}\"><subject_name>{}</subject_name>\n"
+      "<validity><not_before>{}</not_before><not_after>{}</not_after></validity>\n"
+      "<allow_rule>{}\n{}{}</allow_rule>\n<default>DENY</default></grant></permissions>\n",
+      subject.name, escaped(subject_text), time_text(validity.not_before), time_text(validity.not_after),
+      kDomains, criteria("publish", may_write(subject.role)),
+      criteria("subscribe", may_read(subject.role, prefix)));
+  return fmt::format(kDocument, "omg_shared_ca_permissions", grant);
+}
+
+}  // namespace plchost::security

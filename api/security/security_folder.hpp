@@ -1,0 +1,74 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "api/security/certificates.hpp"
+#include "shm/base/unique_fd.hpp"
+
+namespace plchost::security {
+
+inline constexpr int kDaysOfAuthority = 7300;
+inline constexpr int kDaysOfIdentity = 825;
+/// What init() calls the identity of the first host.
+inline constexpr std::string_view kFirstHost = "host";
+
+/// One identity of the folder.
+struct IdentityView {
+  Subject subject;
+  Validity validity;
+  bool revoked = false;
+  GuidPrefix prefix{};
+};
+
+/// The folder of `plcctl security`: DIR/authorities holds the two authorities and their keys and belongs to
+/// whom manages the plant; DIR/NAME is the folder of the identity NAME, to be copied to where it is used.
+/// Whoever has an object of this has the folder for himself. Files are replaced as a whole.
+class SecurityFolder {
+ public:
+  /// A fresh folder with its authorities and the identity kFirstHost. All or nothing. already_exists: there
+  /// is something in it.
+  [[nodiscard]] static Result<void> init(const std::string& folder);
+  /// not_found: init() has not made it.
+  [[nodiscard]] static Result<SecurityFolder> open(const std::string& folder);
+
+  /// A key, certificate and permissions for a name that is new, or revoked. already_exists: it is neither.
+  [[nodiscard]] Result<void> add(Role role, const std::string& name, int days = kDaysOfIdentity);
+  /// The same role and name with a fresh key and certificate; the old one stays valid until it ends.
+  /// wrong_state: it is revoked.
+  [[nodiscard]] Result<void> renew(const std::string& name, int days = kDaysOfIdentity);
+  /// The certificate is worth nothing from now on, in every folder that is brought up to date.
+  [[nodiscard]] Result<void> revoke(const std::string& name);
+  /// All identities, by name.
+  [[nodiscard]] Result<std::vector<IdentityView>> identities() const;
+
+  /// For any time, also one that is over: what add() does.
+  [[nodiscard]] Result<void> add_valid(const Subject& subject, const Validity& validity);
+
+ private:
+  SecurityFolder(std::string folder, UniqueFd lock, Authority identity, Authority permissions)
+      : folder_(std::move(folder)),
+        lock_(std::move(lock)),
+        identity_(std::move(identity)),
+        permissions_(std::move(permissions)) {}
+
+  [[nodiscard]] std::string path(std::string_view name) const;
+  [[nodiscard]] std::string authority_file(std::string_view name) const;
+  [[nodiscard]] Result<IdentityView> view(const std::string& name) const;
+  [[nodiscard]] Result<std::vector<std::string>> names() const;
+  [[nodiscard]] Result<void> write_identity(const std::string& to, const Subject& subject,
+                                            const Validity& validity) const;
+  [[nodiscard]] Result<void> copy_common(const std::string& to) const;
+  [[nodiscard]] Result<void> tell_hosts(const Subject& subject) const;
+  [[nodiscard]] Result<void> know_all(const std::string& host) const;
+
+  std::string folder_;
+  UniqueFd lock_;
+  Authority identity_;
+  Authority permissions_;
+};
+
+/// From a day ago, so that clocks that differ a little do not matter, for that many days.
+[[nodiscard]] Validity validity_for(int days);
+
+}  // namespace plchost::security

@@ -1,0 +1,105 @@
+// What lies in the security folder: see security_folder.hpp.
+#include <algorithm>
+#include <cerrno>
+#include <filesystem>
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+
+#include "api/security/folder_files.hpp"
+#include "api/security/pem.hpp"
+#include "api/security/policy.hpp"
+#include "api/security/security_folder.hpp"
+#include "api/security/signed_document.hpp"
+#include "shm/base/names.hpp"
+#include "shm/base/replace_file.hpp"
+
+namespace plchost::security {
+
+namespace fs = std::filesystem;
+
+Result<void> write_text(const std::string& path, const Result<std::string>& text, mode_t mode) {
+  if (!text) return std::unexpected(text.error());
+  return replace_file(path, *text, mode);
+}
+
+Result<void> make_folder(const std::string& path) {
+  if (::mkdir(path.c_str(), 0700) == 0) return {};
+  return failure(errno == EEXIST ? ErrorCode::already_exists : ErrorCode::system, "make the folder " + path,
+                 errno);
+}
+
+Result<IdentityView> SecurityFolder::view(const std::string& name) const {
+  if (auto good = check_name("identity", name, kMaxIdentityName); !good) return std::unexpected(good.error());
+  const auto certificate = read_certificate(file_in(path(name), kCertificateFile));
+  if (!certificate) {
+    if (certificate.error().code != ErrorCode::not_found) return std::unexpected(certificate.error());
+    const auto all = names();
+    if (!all) return std::unexpected(all.error());
+    const std::vector<std::string_view> known(all->begin(), all->end());
+    return failure(ErrorCode::not_found,
+                   fmt::format("no identity '{}' in {}; there are: {}", name, folder_, join_names(known)));
+  }
+  const auto revocations = read_revocations(authority_file(kRevocationsFile));
+  if (!revocations) return std::unexpected(revocations.error());
+  auto subject = subject_of(*certificate);
+  if (!subject) return failure_in(path(name), subject.error());
+  const auto validity = validity_of(*certificate);
+  if (!validity) return std::unexpected(validity.error());
+  const auto prefix = guid_prefix(*certificate);
+  if (!prefix) return std::unexpected(prefix.error());
+  return IdentityView{std::move(*subject), *validity, is_revoked(*certificate, *revocations), *prefix};
+}
+
+Result<void> SecurityFolder::write_identity(const std::string& to, const Subject& subject,
+                                            const Validity& validity) const {
+  const auto key = make_key();
+  if (!key) return std::unexpected(key.error());
+  const auto certificate = issue_certificate(subject, validity, *key, identity_);
+  if (!certificate) return std::unexpected(certificate.error());
+  const auto text = subject_text(*certificate);
+  if (!text) return std::unexpected(text.error());
+  const auto prefix = guid_prefix(*certificate);
+  if (!prefix) return std::unexpected(prefix.error());
+  const auto permissions = sign_document(permissions_text(subject, *text, *prefix, validity), permissions_);
+  if (auto done = write_text(file_in(to, kPermissionsFile), permissions, kPublicFile); !done) return done;
+  if (auto done = write_text(file_in(to, kKeyFile), to_pem(*key), kSecretFile); !done) return done;
+  return write_text(file_in(to, kCertificateFile), to_pem(*certificate), kPublicFile);
+}
+
+Result<void> SecurityFolder::copy_common(const std::string& to) const {
+  for (const std::string_view file : kCommonFiles) {
+    if (auto done = write_text(file_in(to, file), read_file(authority_file(file)), kPublicFile); !done)
+      return done;
+  }
+  return {};
+}
+
+// Hosts know the certificates of all, to know who is behind what was written.
+Result<void> SecurityFolder::tell_hosts(const Subject& subject) const {
+  const auto all = names();
+  if (!all) return std::unexpected(all.error());
+  const auto certificate = read_file(file_in(path(subject.name), kCertificateFile));
+  for (const std::string& name : *all) {
+    const std::string known = file_in(path(name), kKnownFolder);
+    std::error_code ignored;
+    if (!fs::is_directory(known, ignored)) continue;
+    if (auto done = write_text(file_in(known, subject.name + ".pem"), certificate, kPublicFile); !done)
+      return done;
+  }
+  return {};
+}
+
+Result<void> SecurityFolder::know_all(const std::string& host) const {
+  const std::string known = file_in(path(host), kKnownFolder);
+  if (auto made = make_folder(known); !made) return made;
+  const auto all = names();
+  if (!all) return std::unexpected(all.error());
+  for (const std::string& name : *all) {
+    const auto certificate = read_file(file_in(path(name), kCertificateFile));
+    if (auto done = write_text(file_in(known, name + ".pem"), certificate, kPublicFile); !done) return done;
+  }
+  return {};
+}
+
+}  // namespace plchost::security
