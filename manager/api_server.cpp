@@ -44,6 +44,11 @@ std::vector<std::string> ApiServer::arguments() const {
     arguments.emplace_back("--peer");
     arguments.push_back(peer);
   }
+  if (!config_.dds.identity.empty()) {
+    arguments.emplace_back("--identity");
+    arguments.push_back(config_.dds.identity);
+  }
+  if (config_.dds.allow_unsecured) arguments.emplace_back("--allow-unsecured");
   return arguments;
 }
 

@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
+#include "api/security/identity.hpp"
 #include "manager/config/load_config.hpp"
 #include "manager/manager.hpp"
 #include "manager/system/child_process.hpp"
@@ -40,9 +41,23 @@ void describe(CLI::App& app, Options& options) {
                  "Folder of plc-instance and plchost-dds; default: that of plchostd");
 }
 
+Result<void> check_identity(const DdsConfig& dds) {
+  if (dds.identity.empty()) return {};
+  const auto identity = security::check_identity(dds.identity);
+  if (!identity) return std::unexpected(identity.error());
+  if (identity->subject.role == security::Role::host) return {};
+  return failure(ErrorCode::refused, fmt::format("'{}' has the role {}; a host's is needed",
+                                                 identity->subject.name, to_string(identity->subject.role)));
+}
+
 int check_only(const std::string& file) {
   const auto config = load_config(file, config_surroundings());
   if (config) {
+    // Not when it runs: its instances are worth more than the way to them.
+    if (const auto good = check_identity(config->dds); !good) {
+      fmt::print("{}: [dds] identity: {}\n", file, good.error().describe());
+      return kExitFailed;
+    }
     fmt::print("{}: ok, {} instances\n", file, config->instances.size());
     return kExitDone;
   }

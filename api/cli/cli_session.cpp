@@ -44,8 +44,10 @@ Result<std::vector<HostView>> CliSession::shown_hosts() {
   return failure(
       ErrorCode::unavailable,
       fmt::format("no host answers in DDS domain {} within {} s: start one with 'plchostd --config FILE', "
-                  "or choose its domain with --domain",
-                  options.dds.domain, options.timeout_s));
+                  "or choose its domain with --domain{}",
+                  options.dds.domain, options.timeout_s,
+                  options.dds.identity.empty() ? "; a secured one wants an --identity"
+                                               : "; one that does not accept this identity is silent"));
 }
 
 Result<std::string> CliSession::target_host() {

@@ -56,6 +56,11 @@ void add_options(CLI::App& app, plchost::CliOptions& options) {
   app.add_option("--peer", options.dds.peers, "address of a controller (default 127.0.0.1); may be repeated")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  app.add_option("--identity", options.dds.identity,
+                 "folder of the identity to show, where controllers are secured ('plcctl security')")
+      ->envname("PLCHOST_IDENTITY")
+      ->type_name("FOLDER")
+      ->take_last();
 }
 
 // What follows a wrong word is not the mistake: only the first word that no command knows is looked at.

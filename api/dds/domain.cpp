@@ -13,6 +13,8 @@
 #include <sys/socket.h>
 
 #include "api/dds/error.hpp"
+#include "api/dds/security_section.hpp"
+#include "api/security/identity.hpp"
 #include "shm/base/thread.hpp"
 
 namespace plchost::dds {
@@ -69,6 +71,8 @@ Result<std::string> domain_configuration(Role role, const DomainOptions& options
     peers += fmt::format("<Peer Address=\"{}\"/>", address);
   }
   if (!peers.empty()) peers = fmt::format("<Peers>{}</Peers>", peers);
+  const auto security = security_section(options.identity);
+  if (!security) return std::unexpected(security.error());
   // The watermarks are high because all writers of ours are bounded by their own history or window: none may
   // be stopped because one client does not read.
   return fmt::format(
@@ -83,9 +87,9 @@ Result<std::string> domain_configuration(Role role, const DomainOptions& options
       "<HeartbeatInterval min=\"1 ms\" minsched=\"5 ms\" max=\"100 ms\">10 ms</HeartbeatInterval>"
       "<SocketReceiveBufferSize min=\"128 KiB\" max=\"4 MiB\"/><MaxSampleSize>256 KiB</MaxSampleSize>"
       "<Watermarks><WhcHigh>32 MB</WhcHigh><WhcHighInit>32 MB</WhcHighInit><WhcAdaptive>false</WhcAdaptive>"
-      "</Watermarks></Internal>{}</Domain></CycloneDDS>",
+      "</Watermarks></Internal>{}{}</Domain></CycloneDDS>",
       interfaces, role == Role::server ? "auto" : "none", kMaxServersPerMachine - 1, peers,
-      threads_section(options.receive_fifo));
+      threads_section(options.receive_fifo), *security);
 }
 
 bool can_use_fifo(int priority) {
@@ -99,6 +103,12 @@ Result<std::shared_ptr<Entity>> open_domain(Role role, const DomainOptions& opti
   static std::map<std::uint32_t, std::weak_ptr<Entity>> domains;
   const std::lock_guard lock(registry_mutex());
   if (auto known = domains[options.domain].lock()) return known;
+  if (!options.identity.empty()) {
+    // Cyclone would say why in its log only.
+    if (const auto good = security::check_identity(options.identity); !good) {
+      return failure_in("identity", good.error());
+    }
+  }
   auto made = check_entity(
       dds_create_domain(options.domain, configuration->c_str()),
       fmt::format("make DDS domain {} on interface {}", options.domain, fmt::join(options.interfaces, ", ")));

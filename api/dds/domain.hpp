@@ -26,16 +26,20 @@ struct DomainOptions {
   /// SCHED_FIFO priority of the threads that receive, 0: SCHED_OTHER. Only if can_use_fifo() said yes:
   /// Cyclone aborts the process when it may not.
   int receive_fifo = 0;
+  /// The folder of the identity that this process shows (see api/security/identity.hpp). Empty: unsecured.
+  std::string identity = {};
 };
 
-/// The configuration as Cyclone wants it. Every value in it that is not a default was measured.
+/// The configuration as Cyclone wants it. Does not look into the folder of the identity. Every value in it
+/// that is not a default was measured.
 [[nodiscard]] Result<std::string> domain_configuration(Role role, const DomainOptions& options);
 
 /// Whether this process may make a SCHED_FIFO thread of that priority: tried, not guessed.
 [[nodiscard]] bool can_use_fifo(int priority);
 
 /// A domain of this process, and with it its configuration. One process can have a domain once: who asks for
-/// one that is there already gets that one, as it is configured. Thread-safe.
+/// one that is there already gets that one, as it is configured. An identity that others would not accept is
+/// an error that says why. Thread-safe.
 [[nodiscard]] Result<std::shared_ptr<Entity>> open_domain(Role role, const DomainOptions& options);
 
 /// Ties all UDP sockets of this process to the loopback device. Cyclone binds its receive sockets to any

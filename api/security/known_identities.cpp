@@ -17,10 +17,12 @@ struct Known {
   Subject subject;
 };
 
-Result<Known> read_known(const std::string& path, const Certificate& authority,
-                         const RevocationList& revocations) {
+/// None: revoked, as it may well be.
+Result<std::optional<Known>> read_known(const std::string& path, const Certificate& authority,
+                                        const RevocationList& revocations) {
   const auto certificate = read_certificate(path);
   if (!certificate) return std::unexpected(certificate.error());
+  if (is_revoked(*certificate, revocations)) return std::nullopt;
   if (auto good = verify_certificate(*certificate, authority, revocations); !good) {
     return failure_in(path, good.error());
   }
@@ -28,7 +30,7 @@ Result<Known> read_known(const std::string& path, const Certificate& authority,
   if (!subject) return failure_in(path, subject.error());
   const auto prefix = guid_prefix(*certificate);
   if (!prefix) return failure_in(path, prefix.error());
-  return Known{*prefix, std::move(*subject)};
+  return std::optional(Known{*prefix, std::move(*subject)});
 }
 
 }  // namespace
@@ -50,7 +52,7 @@ Result<KnownIdentities> KnownIdentities::load(const std::string& folder) {
     auto one = read_known(entry->path(), *authority, *revocations);
     if (!one) {
       identities.problems_.push_back(one.error().describe());
-    } else if (!identities.subjects_.emplace(one->prefix, std::move(one->subject)).second) {
+    } else if (*one && !identities.subjects_.emplace((*one)->prefix, std::move((*one)->subject)).second) {
       identities.problems_.push_back(
           fmt::format("{}: an identity with the same GUID prefix is known", entry->path().string()));
     }

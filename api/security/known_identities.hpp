@@ -15,8 +15,8 @@ namespace plchost::security {
 /// knows. A participant cannot choose another prefix than that of the subject that its handshake has proved.
 class KnownIdentities {
  public:
-  /// Reads "folder/known". What is not signed by the authority, revoked or expired is left out, and told of
-  /// in problems().
+  /// Reads "folder/known". Revoked ones are left out; so are those not signed by the authority or
+  /// expired, and told of in problems().
   [[nodiscard]] static Result<KnownIdentities> load(const std::string& folder);
 
   /// Of the participant, or of any entity of it, whose GUID begins so (at least 6 bytes). None: nobody that

@@ -12,6 +12,7 @@
 
 #include "api/dds/samples.hpp"
 #include "api/dds/text.hpp"
+#include "api/security/identity.hpp"
 #include "api/server/control_server_parts.hpp"
 #include "shm/base/log.hpp"
 #include "shm/base/memory_guard.hpp"
@@ -73,7 +74,8 @@ void ControlServer::Parts::on_wake_listener(dds_entity_t /*reader*/, void* serve
 }
 
 Result<void> ControlServer::Parts::run() {
-  for (const int fd : {wake.get(), signals.get(), status_timer.get(), presence_timer.get(), manager->fd()}) {
+  for (const int fd : {wake.get(), signals.get(), status_timer.get(), presence_timer.get(),
+                       identity_timer.get(), manager->fd()}) {
     epoll_event event{.events = EPOLLIN, .data = {.fd = fd}};
     if (auto added = check_errno(::epoll_ctl(epoll.get(), EPOLL_CTL_ADD, fd, &event), "watch a descriptor");
         !added) {
@@ -112,11 +114,40 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
     finish(manager->expire(now));
   } else if (fd == presence_timer.get()) {
     status->write_presence();
+  } else if (fd == identity_timer.get()) {
+    return !identity_changed();
   } else if (fd == signals.get()) {
     spdlog::info("asked to end");
     return false;
   }
   return true;
+}
+
+// Whether what DDS has loaded is not what counts any more, so that a fresh process must load it.
+bool ControlServer::Parts::identity_changed() {
+  if (!identity_watch) return false;
+  const std::string& folder = options.dds.identity;
+  const auto change = identity_watch->look();
+  if (change == IdentityWatch::Change::none) return false;
+  if (change == IdentityWatch::Change::identity) {
+    const auto good = security::check_identity(folder);
+    if (good) {
+      spdlog::info("the files of this host's identity have changed: ending, to begin with them");
+      return true;
+    }
+    spdlog::error("the files of this host's identity have changed and are not used: {}",
+                  good.error().describe());
+    return false;
+  }
+  auto known = security::KnownIdentities::load(folder);
+  if (!known) {
+    spdlog::error("identity: {}", known.error().describe());
+    return false;
+  }
+  for (const std::string& problem : known->problems()) spdlog::warn("identity: {}", problem);
+  spdlog::info("{} identities are known", known->size());
+  guard.replace(std::move(*known));
+  return false;
 }
 
 void ControlServer::Parts::on_wake() {
@@ -133,12 +164,17 @@ void ControlServer::Parts::on_requests(const RequestReader& source) {
     const dds::Guid writer = dds::writer_of(reader, info);
     // Gone meanwhile, or pretending to be another: nobody to answer.
     if (writer == dds::Guid{}) return;
-    if (writer == dds::Guid::from(request.header.request_identity.writer_guid)) {
-      on_request(source.role, writer, request);
-    } else {
-      answer(writer.participant(), request.header.request_identity, ErrorCode::refused,
-             "the request's identity is not that of its writer");
+    const plc_SampleIdentity& identity = request.header.request_identity;
+    if (writer != dds::Guid::from(identity.writer_guid)) {
+      return answer(writer.participant(), identity, ErrorCode::refused,
+                    "the request's identity is not that of its writer");
     }
+    const auto needed =
+        source.role == ApiRole::operating ? security::Role::operating : security::Role::engineer;
+    if (const auto may = guard.check(writer, needed); !may) {
+      return answer(writer.participant(), identity, may.error().code, may.error().message);
+    }
+    on_request(source.role, writer, request);
   });
 }
 

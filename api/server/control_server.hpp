@@ -18,6 +18,7 @@ struct ServerOptions {
   std::string pool;
   std::string run_directory;
   dds::DomainOptions dds;
+  bool allow_unsecured = false;  ///< without an identity: may be on other interfaces than "lo"
   std::string blocks_base =
       std::string(kDefaultBlockBase);  ///< of the nodes that are listed, and the gateway
   std::uint16_t host_number = 0;       ///< for other hosts; 0: no gateway
@@ -33,7 +34,8 @@ class ControlServer {
   ControlServer& operator=(const ControlServer&) = delete;
   ~ControlServer();
 
-  /// Serves until SIGTERM or SIGINT, or until the manager is gone: all three are orderly ends.
+  /// Serves until SIGTERM or SIGINT, until the manager is gone, or until the files of the host's identity
+  /// have changed, which takes a fresh process: all four are orderly ends.
   [[nodiscard]] Result<void> run();
 
  private:

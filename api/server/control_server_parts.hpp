@@ -9,8 +9,10 @@
 
 #include "api/dds/entity.hpp"
 #include "api/gateway/gateway_thread.hpp"
+#include "api/server/access_guard.hpp"
 #include "api/server/control_server.hpp"
 #include "api/server/event_intake.hpp"
+#include "api/server/identity_watch.hpp"
 #include "api/server/manager_link.hpp"
 #include "api/server/node_lister.hpp"
 #include "api/server/object_lister.hpp"
@@ -39,6 +41,7 @@ struct ControlServer::Parts {
 
   Result<void> open(PostLedger ledger);
   Result<void> make_loop();
+  Result<void> make_guard();
   Result<void> enter_domain();
   Result<void> make_readers();
   Result<void> listen();
@@ -49,6 +52,7 @@ struct ControlServer::Parts {
   void on_requests(const RequestReader& source);
   void on_request(ApiRole role, const dds::Guid& writer, const plc_Request& request);
   Result<void> on_manager();
+  [[nodiscard]] bool identity_changed();
   void answer(const dds::Guid& client, const plc_SampleIdentity& identity, ErrorCode code,
               std::string_view text);
   void finish(std::vector<FinishedCommand> commands);
@@ -72,6 +76,9 @@ struct ControlServer::Parts {
   UniqueFd signals;
   UniqueFd status_timer;
   UniqueFd presence_timer;
+  UniqueFd identity_timer;
+  AccessGuard guard;
+  std::optional<IdentityWatch> identity_watch;  // of a secured host
   std::optional<ManagerLink> manager;
   std::optional<EventIntake> intake;
   std::shared_ptr<dds::Entity> domain;

@@ -1,8 +1,10 @@
 #include <csignal>
+#include <ctime>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
 #include <sys/epoll.h>
 #include <sys/eventfd.h>
 #include <sys/signalfd.h>
@@ -10,6 +12,7 @@
 
 #include "api/dds/error.hpp"
 #include "api/dds/log_sink.hpp"
+#include "api/security/identity.hpp"
 #include "api/server/control_server_parts.hpp"
 #include "shm/base/log.hpp"
 #include "shm/base/system_call.hpp"
@@ -18,6 +21,9 @@
 namespace plchost {
 
 namespace {
+
+/// How often the files of the host's identity are looked at.
+constexpr Duration kIdentityLook = std::chrono::milliseconds(500);
 
 Result<UniqueFd> make_timer(Duration period) {
   const auto fd = check_errno(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK), "make a timer");
@@ -51,7 +57,8 @@ Result<void> ControlServer::Parts::open(PostLedger ledger) {
   auto linked = ManagerLink::connect(options.run_directory);
   if (!linked) return std::unexpected(linked.error());
   manager = std::move(*linked);
-  intake.emplace(options.host, pool, std::move(ledger), epoch);
+  if (auto made = make_guard(); !made) return made;
+  intake.emplace(options.host, pool, std::move(ledger), epoch, guard);
   if (auto entered = enter_domain(); !entered) return entered;
   auto made_sessions = SessionTable::create(participant.get());
   if (!made_sessions) return std::unexpected(made_sessions.error());
@@ -95,12 +102,46 @@ Result<void> ControlServer::Parts::make_loop() {
   auto made_presence = make_timer(dds::kPresencePeriod);
   if (!made_presence) return std::unexpected(made_presence.error());
   presence_timer = std::move(*made_presence);
+  auto made_identity = make_timer(kIdentityLook);
+  if (!made_identity) return std::unexpected(made_identity.error());
+  identity_timer = std::move(*made_identity);
   const auto event = check_errno(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "make an event descriptor");
   if (!event) return std::unexpected(event.error());
   wake.reset(*event);
   const auto loop = check_errno(::epoll_create1(EPOLL_CLOEXEC), "make an epoll descriptor");
   if (!loop) return std::unexpected(loop.error());
   epoll.reset(*loop);
+  return {};
+}
+
+Result<void> ControlServer::Parts::make_guard() {
+  const std::string& folder = options.dds.identity;
+  const bool only_loopback = options.dds.interfaces == std::vector<std::string>{"lo"};
+  if (folder.empty()) {
+    if (only_loopback || options.allow_unsecured) return {};
+    return failure(ErrorCode::refused,
+                   fmt::format("without an identity this host would be open to all who reach interface {}: "
+                               "give it one ([dds] identity), or allow that ([dds] allow_unsecured = true)",
+                               fmt::join(options.dds.interfaces, ", ")));
+  }
+  // Before what is watched is read: no change is missed.
+  identity_watch.emplace(folder);
+  const auto own = security::check_identity(folder);
+  if (!own) return failure_in("identity", own.error());
+  if (own->subject.role != security::Role::host) {
+    return failure(ErrorCode::refused, fmt::format("identity '{}' of {} has the role {}; a host's is needed",
+                                                   own->subject.name, folder, to_string(own->subject.role)));
+  }
+  auto known = security::KnownIdentities::load(folder);
+  if (!known) return failure_in("identity", known.error());
+  for (const std::string& problem : known->problems()) spdlog::warn("identity: {}", problem);
+  spdlog::info("secured: identity '{}', {} identities are known", own->subject.name, known->size());
+  const std::time_t left = own->validity.not_after - std::time(nullptr);
+  if (left < security::kExpiresSoon) {
+    spdlog::warn("identity '{}' expires in {} days: 'plcctl security renew {}'", own->subject.name,
+                 left / std::time_t{86'400}, own->subject.name);
+  }
+  guard.replace(std::move(*known));
   return {};
 }
 
@@ -116,10 +157,10 @@ Result<void> ControlServer::Parts::enter_domain() {
   participant = std::move(*made);
   if (options.dds.interfaces == std::vector<std::string>{"lo"}) {
     if (const auto tied = dds::tie_sockets_to_loopback(); !tied) {
-      spdlog::warn("packets from outside reach this unsecured server: {}", tied.error().describe());
+      spdlog::warn("packets from outside reach the parser of this server: {}", tied.error().describe());
     }
-    spdlog::info("unsecured, therefore on the loopback interface only");
-  } else {
+    if (!identity_watch) spdlog::info("unsecured, therefore on the loopback interface only");
+  } else if (!identity_watch) {
     spdlog::warn("unsecured, and not on the loopback interface only: who reaches it controls this host");
   }
   return {};

@@ -79,6 +79,9 @@ void EventIntake::post_next(const plc_EventPost& post, LedgerEntry& entry) {
 }
 
 Result<PostResult> EventIntake::try_post(const plc_EventPost& post) {
+  if (auto may = guard_->check(dds::Guid::from(post.source), security::Role::operating); !may) {
+    return std::unexpected(may.error());
+  }
   const auto host = text_of(post.host);
   if (host != host_) {
     return failure(ErrorCode::not_found, fmt::format("this is host '{}', not '{}'", host_, host));

@@ -10,6 +10,7 @@
 #include <control.h>
 
 #include "api/dds/guid.hpp"
+#include "api/server/access_guard.hpp"
 #include "api/server/event_directory.hpp"
 #include "api/server/post_ledger.hpp"
 
@@ -23,8 +24,10 @@ inline constexpr std::uint32_t kPostCredits = 64;
 /// is held by that thread, and by the control loop for the copying of acknowledgements.
 class EventIntake {
  public:
-  EventIntake(std::string host, const ObjectPool& pool, PostLedger ledger, std::uint64_t epoch)
-      : host_(std::move(host)), epoch_(epoch), directory_(pool), ledger_(std::move(ledger)) {}
+  /// `guard` says who may post; it must outlive this.
+  EventIntake(std::string host, const ObjectPool& pool, PostLedger ledger, std::uint64_t epoch,
+              const AccessGuard& guard)
+      : host_(std::move(host)), epoch_(epoch), guard_(&guard), directory_(pool), ledger_(std::move(ledger)) {}
 
   /// Takes all that the reader has. Returns true if acknowledgements are owed now and none were before.
   bool take(dds_entity_t reader);
@@ -47,6 +50,7 @@ class EventIntake {
 
   const std::string host_;
   const std::uint64_t epoch_;
+  const AccessGuard* const guard_;
   mutable std::mutex mutex_;
   EventDirectory directory_;
   PostLedger ledger_;

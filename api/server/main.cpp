@@ -29,6 +29,10 @@ int main(int argc, char** argv) {
   app.add_option("--run-directory", options.run_directory, "where the manager's socket is")->required();
   app.add_option("--interface", options.dds.interfaces, "network interfaces (default: lo)");
   app.add_option("--peer", options.dds.peers, "addresses to announce this host to");
+  app.add_option("--identity", options.dds.identity,
+                 "folder of this host's identity (default: none, and no security)");
+  app.add_flag("--allow-unsecured", options.allow_unsecured,
+               "without --identity: allow interfaces that others reach");
   app.add_option("--host-number", options.host_number,
                  "number of this host for blocks between hosts; 0: none")
       ->check(CLI::Range(std::uint16_t{0}, plchost::kMaxHostNumber));

@@ -40,6 +40,7 @@ struct Loader {
   void read_pool_rights(SectionReader& reader);
   void read_cores(SectionReader& reader);
   void read_dds(const TomlTable& table, unsigned line);
+  void read_identity(SectionReader& reader);
   void read_blocks(const TomlTable& table, unsigned line);
   void read_instances(const TomlValue& value);
   void read_instance(const TomlTable& table, unsigned line);
@@ -171,6 +172,8 @@ void Loader::read_dds(const TomlTable& table, unsigned line) {
   if (const auto good = check_name("interface", dds.interface, kMaxInterfaceName); !good) {
     reader.problem("interface", good.error().message);
   }
+  reader.truth("allow_unsecured", dds.allow_unsecured);
+  read_identity(reader);
   for (const std::string& peer : dds.peers) {
     constexpr std::string_view kAddress =
         "0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ.:-_%[]";
@@ -184,6 +187,28 @@ void Loader::read_dds(const TomlTable& table, unsigned line) {
                                         peer.substr(0, kMaxPath)));
   }
   reader.refuse_unknown_keys();
+}
+
+void Loader::read_identity(SectionReader& reader) {
+  DdsConfig& dds = config.dds;
+  reader.text("identity", dds.identity);
+  if (dds.identity.empty()) {
+    if (reader.has("identity")) reader.problem("identity", "is no path; leave the key out for no security");
+    if (dds.enabled && dds.interface != "lo" && !dds.allow_unsecured) {
+      reader.problem("interface",
+                     fmt::format("\"{}\" without an identity opens this controller to all who reach it; set "
+                                 "identity = \"FOLDER\" ('plcctl security init' makes it), or "
+                                 "allow_unsecured = true",
+                                 dds.interface));
+    }
+    return;
+  }
+  dds.identity = resolve_path(folder, dds.identity);
+  std::error_code error;
+  if (surroundings.check_files && !std::filesystem::is_directory(dds.identity, error)) {
+    reader.problem("identity",
+                   fmt::format("'{}' is no folder; 'plcctl security init' makes one", shown(dds.identity)));
+  }
 }
 
 // After [dds], which it needs.

@@ -41,6 +41,8 @@ struct DdsConfig {
   bool enabled = true;  ///< false: no API server
   std::string interface = "lo";
   std::vector<std::string> peers;  ///< addresses asked for other hosts where there is no multicast
+  std::string identity;            ///< folder of the host's identity; empty: no security
+  bool allow_unsecured = false;    ///< without an identity: on another interface than lo all the same
 };
 
 /// [blocks]: blocks between instances, and to those of other hosts.

@@ -14,15 +14,16 @@ allowed() {
     instances/launch) echo "shm/base" ;;
     instances) echo "instances/launch schedulers shm/block_driver shm/pool shm/base" ;;
     api/control) echo "shm/base" ;;
-    api) echo "api/control shm/block_driver shm/pool shm/base" ;;
-    manager) echo "api/control instances/launch shm/block_driver shm/pool shm/base" ;;
+    api/security) echo "shm/base" ;;
+    api) echo "api/control api/security shm/block_driver shm/pool shm/base" ;;
+    manager) echo "api/control api/security instances/launch shm/block_driver shm/pool shm/base" ;;
   esac
 }
 
 # the longest layer that a path lies in
 layer_of() {
   local layer
-  for layer in shm/base shm/pool shm/block_driver shm/library schedulers instances/launch instances api/control api manager; do
+  for layer in shm/base shm/pool shm/block_driver shm/library schedulers instances/launch instances api/control api/security api manager; do
     case "$1" in "$layer"/*) echo "$layer"; return ;; esac
   done
   echo none

@@ -34,6 +34,7 @@ write_side() {
   cat >>"$cell/$1.toml" <<EOF
 [dds]
 interface = "cable"
+allow_unsecured = true
 peers = ["$3"]
 [blocks]
 host_number = $2

@@ -24,7 +24,9 @@ class EventIntakeTest : public testing::Test {
     static int counter = 0;
     return "plchost-intake-" + std::to_string(::getpid()) + "-" + std::to_string(counter++);
   }
-  [[nodiscard]] EventIntake make() const { return {"hosta", pool_, PostLedger::open(name_).value(), 7}; }
+  [[nodiscard]] EventIntake make() const {
+    return {"hosta", pool_, PostLedger::open(name_).value(), 7, guard_};
+  }
 
   static plc_EventPost make_post(std::uint64_t sequence, std::uint64_t base = 1, std::uint8_t source = 1) {
     plc_EventPost post{};
@@ -44,6 +46,7 @@ class EventIntakeTest : public testing::Test {
 
   std::string name_ = unique_name();
   ObjectPool pool_ = ObjectPool::create(name_, {.max_objects = 64}).value();
+  AccessGuard guard_;
   PoolEvent event_;
 };
 

@@ -39,6 +39,15 @@ TEST(Config, TakesDefaultsFromTheSystem) {
   EXPECT_TRUE(sut->instances.empty());
 }
 
+TEST(Config, WithAnIdentityOrIfToldSoTheApiMayBeOnANetwork) {
+  const auto secured = parse("[dds]\ninterface = \"eth0\"\nidentity = \"security/host\"\n");
+  ASSERT_TRUE(secured.has_value());
+  EXPECT_EQ(secured->dds.identity, "/etc/plchost/security/host");
+  const auto open = parse("[dds]\ninterface = \"eth0\"\nallow_unsecured = true\n");
+  ASSERT_TRUE(open.has_value());
+  EXPECT_TRUE(open->dds.allow_unsecured);
+}
+
 TEST(Config, PrefersTheIsolatedCoresAndKeepsHouseOnTheOthers) {
   auto surroundings = four_cores();
   surroundings.isolated_cores = {2, 3};
@@ -184,9 +193,14 @@ INSTANTIATE_TEST_SUITE_P(
                     "660 is a whole number; allowed is a text"},
         WrongConfig{"keep", "[host]\nkeep_pool = 1\n", "2", "1 is a whole number; allowed is true or false"},
         WrongConfig{"date", "[host]\nname = 1979-05-27\n", "2", "is a date or time; allowed is a text"},
-        WrongConfig{"dds_key", "[dds]\nport = 1\n", "2",
-                    "[dds] unknown key 'port'; allowed are enabled, interface, peers"},
+        WrongConfig{
+            "dds_key", "[dds]\nport = 1\n", "2",
+            "[dds] unknown key 'port'; allowed are enabled, interface, peers, allow_unsecured, identity"},
         WrongConfig{"interface", "[dds]\ninterface = \"\"\n", "2", "interface '' is not valid"},
+        WrongConfig{"open_to_network", "[dds]\ninterface = \"eth0\"\n", "2",
+                    "interface: \"eth0\" without an identity opens this controller to all who reach it"},
+        WrongConfig{"identity_empty", "[dds]\nidentity = \"\"\n", "2", "identity: is no path"},
+        WrongConfig{"identity_type", "[dds]\nidentity = true\n", "2", "allowed is a text in quotes"},
         WrongConfig{"peers", "[dds]\npeers = [\"-x\"]\n", "2", "\"-x\" is not an address"},
         WrongConfig{"peers_type", "[dds]\npeers = [1]\n", "2", "allowed is an array of texts"}),
     [](const auto& test) { return test.param.name; });

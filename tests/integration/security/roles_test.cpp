@@ -1,0 +1,125 @@
+// What each role may, and what is refused: with real processes over loopback.
+#include <filesystem>
+#include <fstream>
+
+#include "api/security/pem.hpp"
+#include "api/security/policy.hpp"
+#include "api/security/signed_document.hpp"
+#include "tests/integration/security/secured_host.hpp"
+
+namespace plchost {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+class Roles : public SecuredHost {
+ protected:
+  Roles() { start(); }
+};
+
+TEST_F(Roles, AViewerReadsStatus) {
+  const auto listed = run("viewer", {"list", "instances"});
+  EXPECT_EQ(listed.code, 0) << listed.errors;
+  EXPECT_THAT(listed.output, HasSubstr("line1"));
+}
+
+TEST_F(Roles, AViewerThatPostsOrStopsIsRefused) {
+  for (const std::vector<std::string>& words :
+       {std::vector<std::string>{"post", "event", "line1/ready"}, {"stop", "instance", "line1"}}) {
+    const auto refused = run("viewer", words);
+    EXPECT_EQ(refused.code, 1);
+    EXPECT_THAT(refused.errors, HasSubstr("the permissions of this identity do not allow it"));
+  }
+  EXPECT_EQ(event_.counted().count(), 0U);
+  EXPECT_THAT(host_.requests(), IsEmpty());
+}
+
+TEST_F(Roles, AnOperatorPostsAndStops) {
+  const auto posted = run("operator", {"post", "event", "line1/ready", "--count", "100"});
+  EXPECT_EQ(posted.code, 0) << posted.errors;
+  EXPECT_EQ(event_.counted().count(), 100U);
+  const auto stopped = run("operator", {"stop", "instance", "line1"});
+  EXPECT_EQ(stopped.code, 0) << stopped.errors;
+  EXPECT_THAT(host_.requests(), SizeIs(1));
+}
+
+TEST_F(Roles, AnOperatorThatLoadsIsRefused) {
+  const auto refused = run("operator", {"load", "application", "line1", "/tmp/other.so"});
+  EXPECT_EQ(refused.code, 1);
+  EXPECT_THAT(refused.errors, HasSubstr("plc/v1/eng/request: the permissions of this identity"));
+  EXPECT_THAT(host_.requests(), IsEmpty());
+}
+
+TEST_F(Roles, AnEngineerAndAnAdminDoAll) {
+  for (const char* const who : {"engineer", "admin"}) {
+    const auto posted = run(who, {"post", "event", "line1/ready"});
+    EXPECT_EQ(posted.code, 0) << posted.errors;
+    const auto loaded = run(who, {"load", "application", "line1", "/tmp/other.so"});
+    EXPECT_EQ(loaded.code, 0) << loaded.errors;
+  }
+  EXPECT_EQ(event_.counted().count(), 2U);
+  EXPECT_THAT(host_.requests(), SizeIs(2));
+}
+
+TEST_F(Roles, AParticipantsGuidBeginsAsItsIdentityHasIt) {
+  const RawClient client(domain_, folder("operator"));
+  const auto certificate = security::read_certificate(folder("operator") + "/certificate.pem").value();
+  const auto prefix = security::guid_prefix(certificate).value();
+  EXPECT_TRUE(std::equal(prefix.begin(), prefix.end(), client.guid().bytes.begin()));
+}
+
+TEST_F(Roles, APatchedClientMeetsNobodyWhereItsRoleDoesNotReach) {
+  RawClient client(domain_, folder("operator"), /*patched=*/true);
+  ASSERT_TRUE(client.is_in_domain());
+  const auto own = client.write(dds::kOperatorRequest, "h.cell");
+  const auto forbidden = client.write(dds::kEngineerRequest, "h.cell");
+  const auto presence = client.write(dds::kPresence, "");
+  const auto others = client.read(dds::kReply, "c.*");
+  const auto own_replies = client.read(dds::kReply, dds::client_partition(client.guid().hex()));
+  ASSERT_TRUE(own > 0 && forbidden > 0 && presence > 0 && others > 0) << "it is not patched enough";
+  EXPECT_TRUE(RawClient::meets_reader(own)) << "what it may write does not work either";
+  EXPECT_TRUE(RawClient::meets_writer(own_replies));
+  EXPECT_FALSE(RawClient::meets_reader(forbidden, std::chrono::seconds(1)));
+  EXPECT_FALSE(RawClient::meets_reader(presence, std::chrono::seconds(0)));
+  EXPECT_FALSE(RawClient::meets_writer(others, std::chrono::seconds(0)));
+}
+
+// Permissions that say too much, as a mistake of who signs them would be: the server looks at the role
+// itself.
+class PermissionsThatSayTooMuch : public SecuredHost {
+ protected:
+  PermissionsThatSayTooMuch() {
+    const auto certificate = security::read_certificate(folder("viewer") + "/certificate.pem").value();
+    const auto text = security::permissions_text(
+        {.role = security::Role::admin, .name = "viewer"}, security::subject_text(certificate).value(),
+        security::guid_prefix(certificate).value(), security::validity_of(certificate).value());
+    const std::string authorities = plant_folder_ + "/authorities/";
+    const security::Authority authority{
+        security::read_certificate(authorities + "permissions_ca.pem").value(),
+        security::read_key(authorities + "permissions_ca_key.pem").value()};
+    std::ofstream(folder("viewer") + "/permissions.p7s") << security::sign_document(text, authority).value();
+    start();
+  }
+};
+
+TEST_F(PermissionsThatSayTooMuch, StillPostNothing) {
+  const auto posted = run("viewer", {"post", "event", "line1/ready"});
+  EXPECT_EQ(posted.code, 1);
+  EXPECT_THAT(posted.errors, HasSubstr("'viewer' is viewer; this takes the role operator"));
+  EXPECT_EQ(event_.counted().count(), 0U);
+}
+
+TEST_F(PermissionsThatSayTooMuch, StillCommandNothing) {
+  const auto stopped = run("viewer", {"stop", "instance", "line1"});
+  EXPECT_EQ(stopped.code, 1);
+  EXPECT_THAT(stopped.errors, HasSubstr("'viewer' is viewer; this takes the role operator"));
+  const auto loaded = run("viewer", {"load", "application", "line1", "/tmp/other.so"});
+  EXPECT_EQ(loaded.code, 1);
+  EXPECT_THAT(loaded.errors, HasSubstr("this takes the role engineer"));
+  EXPECT_THAT(host_.requests(), IsEmpty());
+}
+
+}  // namespace
+}  // namespace plchost

@@ -1,0 +1,148 @@
+// Who is not let in at all.
+#include <filesystem>
+#include <fstream>
+#include <thread>
+
+#include "tests/integration/security/secured_host.hpp"
+
+namespace plchost {
+namespace {
+
+using security::SecurityFolder;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+class Strangers : public SecuredHost {
+ protected:
+  /// Once an operator is served, who was not would have been.
+  void operator_is_served() { EXPECT_TRUE(sees_host(folder("operator"))); }
+};
+
+TEST_F(Strangers, WithoutACertificateSeeNobody) {
+  start();
+  EXPECT_FALSE(sees_host("", "2"));
+  operator_is_served();
+}
+
+TEST_F(Strangers, WithACertificateOfAnotherAuthoritySeeNobody) {
+  start();
+  const std::string other = base_ + "/other";
+  ASSERT_TRUE(SecurityFolder::init(other));
+  ASSERT_TRUE(SecurityFolder::open(other)->add(security::Role::admin, "admin"));
+  EXPECT_FALSE(sees_host(other + "/admin", "2"));
+  operator_is_served();
+}
+
+// It trusts this plant's authority, and has a certificate that another signed for the same subject.
+TEST_F(Strangers, WithAForgedSubjectMeetNobody) {
+  start();
+  const std::string other = base_ + "/other";
+  ASSERT_TRUE(SecurityFolder::init(other));
+  ASSERT_TRUE(SecurityFolder::open(other)->add(security::Role::operating, "operator"));
+  for (const char* const file : {"permissions_ca.pem", "governance.p7s", "permissions.p7s"}) {
+    std::filesystem::copy_file(folder("operator") + "/" + file, other + "/operator/" + file,
+                               std::filesystem::copy_options::overwrite_existing);
+  }
+  {
+    RawClient client(domain_, other + "/operator", /*patched=*/true);
+    ASSERT_TRUE(client.is_in_domain());
+    EXPECT_FALSE(
+        RawClient::meets_reader(client.write(dds::kOperatorRequest, "h.cell"), std::chrono::seconds(2)));
+  }
+  operator_is_served();
+}
+
+// The same client as below, so that it is known what it fails for.
+TEST_F(Strangers, ThatWereThereBeforeTheHostMeetItIfTheirCertificateIsValid) {
+  RawClient client(domain_, folder("operator"));
+  const auto writer = client.write(dds::kOperatorRequest, "h.cell");
+  start();
+  EXPECT_TRUE(RawClient::meets_reader(writer));
+}
+
+TEST_F(Strangers, WhoseCertificateHasExpiredMeetNobody) {
+  const std::time_t now = std::time(nullptr);
+  constexpr int kSeconds = 2;
+  ASSERT_TRUE(
+      plant().add_valid({.role = security::Role::operating, .name = "late"}, {now - 10, now + kSeconds}));
+  // Made while it was valid: its own side has nothing against it.
+  RawClient client(domain_, folder("late"));
+  ASSERT_TRUE(client.is_in_domain());
+  const auto writer = client.write(dds::kOperatorRequest, "h.cell");
+  std::this_thread::sleep_for(std::chrono::seconds(kSeconds + 1));
+  start();
+  operator_is_served();
+  EXPECT_FALSE(RawClient::meets_reader(writer, std::chrono::seconds(2)));
+  EXPECT_THAT(run("late", {"list", "hosts"}).errors, HasSubstr("certificate has expired"));
+}
+
+TEST_F(Strangers, WithThePermissionsOfAnotherAreRefused) {
+  start();
+  std::filesystem::copy_file(folder("admin") + "/permissions.p7s", folder("operator") + "/permissions.p7s",
+                             std::filesystem::copy_options::overwrite_existing);
+  EXPECT_THAT(run("operator", {"list", "hosts"}).errors, HasSubstr("permissions of another identity"));
+  {
+    RawClient client(domain_, folder("operator"), /*patched=*/true);
+    const bool met =
+        client.is_in_domain() &&
+        RawClient::meets_reader(client.write(dds::kEngineerRequest, "h.cell"), std::chrono::seconds(2));
+    EXPECT_FALSE(met);
+  }
+  EXPECT_TRUE(sees_host(folder("viewer")));
+}
+
+TEST_F(Strangers, ThatWereRevokedSeeNobodyAfterTheServerBeganWithTheNewList) {
+  const std::string copy = base_ + "/kept";
+  std::filesystem::copy(folder("operator"), copy);
+  start();
+  ASSERT_TRUE(sees_host(copy));
+  ASSERT_TRUE(plant().revoke("operator"));
+  EXPECT_EQ(host_.server().wait(), 0) << "it ends in order, and its manager starts it again";
+  start();
+  EXPECT_TRUE(sees_host(folder("viewer")));
+  EXPECT_FALSE(sees_host(copy, "2"));
+  EXPECT_THAT(run("operator", {"list", "hosts"}).errors, HasSubstr("certificate revoked"));
+}
+
+TEST_F(Strangers, ThatTheHostsFolderDoesNotKnowAreToldSoUntilItDoes) {
+  const std::string known = folder("host") + "/known/operator.pem";
+  std::filesystem::rename(known, base_ + "/operator.pem");
+  start();
+  const pid_t server = host_.server().pid();
+  const auto refused = run("operator", {"stop", "instance", "line1"});
+  EXPECT_EQ(refused.code, 1);
+  EXPECT_THAT(refused.errors, HasSubstr("does not know your identity"));
+  EXPECT_THAT(host_.requests(), IsEmpty());
+  std::filesystem::rename(base_ + "/operator.pem", known);
+  const TimePoint end = soon();
+  while (run("operator", {"stop", "instance", "line1"}).code != 0 && MonotonicClock::now() < end) continue;
+  EXPECT_EQ(host_.requests().size(), 1U);
+  EXPECT_EQ(::kill(server, 0), 0) << "it takes no fresh process";
+}
+
+TEST_F(Strangers, ABrokenFileInTheHostsFolderChangesNothing) {
+  start();
+  operator_is_served();
+  std::ofstream(folder("host") + "/certificate.pem") << "broken\n";
+  std::this_thread::sleep_for(std::chrono::seconds(2));
+  operator_is_served();
+}
+
+TEST_F(Strangers, AClientsIdentityMakesNoHost) {
+  host_.start_server({"--identity", folder("admin")});
+  EXPECT_EQ(host_.server().wait(), 1);
+}
+
+TEST_F(Strangers, FromANetworkAreLetInUnsecuredOnlyIfThatWasSaid) {
+  const std::vector<std::string> arguments{"--host",          "cell",
+                                           "--domain",        std::to_string(domain_.number()),
+                                           "--pool",          host_.pool_name(),
+                                           "--run-directory", host_.run_directory(),
+                                           "--interface",     "nowhere0"};
+  const auto refused = run_program(PLCHOST_DDS_PROGRAM, arguments);
+  EXPECT_EQ(refused.code, 1);
+  EXPECT_THAT(refused.errors, HasSubstr("open to all who reach interface nowhere0"));
+}
+
+}  // namespace
+}  // namespace plchost

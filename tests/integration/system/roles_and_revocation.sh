@@ -1,0 +1,59 @@
+#!/usr/bin/env bash
+# A plant's identities from the first command to a revocation: who may do what, and a PLC that runs on through it all.
+. "$(dirname "$0")/common.sh"
+
+plant=$cell/plant
+export PLCHOST_SECURITY=$plant
+as() { plcctl --identity "$plant/$1" "${@:2}"; }
+
+plcctl security init "$plant" >/dev/null
+plcctl security add-identity viewer panel >/dev/null
+plcctl security add-identity operator anna >/dev/null
+plcctl security add-identity engineer otto >/dev/null
+is "$(plcctl security show --json | jq -r 'map(.name + " " + .role + " " + .state) | join(",")')" \
+  "anna operator valid,host host valid,otto engineer valid,panel viewer valid" || fail "what show shows"
+
+write_host cell1 "$first_core"
+printf '[dds]\nidentity = "plant/host"\n' >>"$cell/cell1.toml"
+write_instance cell1 packer1 "$first_core" packer 'scheduler = "CmpScheduleTimer"'
+"$BIN/plchostd" --check-config "$cell/cell1.toml" >/dev/null || fail "the configuration is not accepted"
+start_manager cell1
+
+running() { is "$(as panel list instances --json | jq -r '.[0].state')" running; }
+until_true 20 running
+pid=$(as panel list instances --json | jq -r '.[0].pid')
+
+echo "- each role may do its own and no more"
+refused "the permissions of this identity do not allow it" as panel post event packer1/product
+as anna post event packer1/product --count 20
+refused "the permissions of this identity do not allow it" as anna set scheduler packer1 CmpSchedule
+as otto set scheduler packer1 CmpSchedule
+code=0
+plcctl --timeout 2 list hosts 2>"$cell/unknown.txt" || code=$?
+is "$code" 3 || fail "exit code $code without an identity"
+grep -q "wants an --identity" "$cell/unknown.txt" || fail "it is not said that an identity is missing"
+
+echo "- a revoked identity, a renewed host and a fresh client: the PLC runs on"
+report() { as panel list tasks --json | jq -r '.[] | select(.task == "Report") | .cycles'; }
+cycles=$(report)
+cp -r "$plant/anna" "$cell/kept"
+plcctl security revoke anna >/dev/null
+left() { ! plcctl --identity "$cell/kept" --timeout 1 list hosts; }
+until_true 20 left
+plcctl security renew host >/dev/null
+plcctl security add-identity operator anna >/dev/null
+started() { as anna post event packer1/product; }
+until_true 20 started
+is "$(as panel list instances --json | jq -r '.[0].pid')" "$pid" || fail "the instance is another process"
+is "$(as panel list instances --json | jq -r '.[0].restarts')" 0 || fail "the instance was started again"
+more() { [ "$(report)" -gt "$cycles" ]; }
+until_true 10 more
+
+echo "- a key that others read is refused where the configuration is checked"
+chmod 644 "$plant/host/key.pem"
+refused_config() { "$BIN/plchostd" --check-config "$cell/cell1.toml"; }
+refused "chmod 600" refused_config
+
+kill -TERM "${managers[0]}"
+wait "${managers[0]}" || fail "the manager ended with $?"
+nothing_left
