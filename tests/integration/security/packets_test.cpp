@@ -1,0 +1,90 @@
+// Somebody on the wire who has no key: he sends again what he saw, and what he made of it.
+#include "tests/integration/security/packets.hpp"
+
+#include <thread>
+
+#include "tests/integration/security/secured_host.hpp"
+
+namespace plchost {
+namespace {
+
+class Packets : public SecuredHost {
+ protected:
+  void SetUp() override {
+    capture_ = PacketCapture::open(domain_.number());
+    if (!capture_) GTEST_SKIP() << capture_.error().describe();
+    start();
+    dds::DomainOptions options;
+    options.domain = domain_.number();
+    options.identity = folder("operator");
+    client_ = ControlClient::connect(options).value();
+    post(kPosts);
+    seen_ = capture_->take();
+    ASSERT_GT(seen_.size(), 10U);
+  }
+  /// By the client that has the right; each is acknowledged.
+  void post(std::uint64_t count) {
+    const auto report = client_->post_event({"cell", 0, "line1", "ready"}, count, {}, kPatience);
+    ASSERT_TRUE(report) << report.error().describe();
+    ASSERT_EQ(report->accepted, count);
+    expected_ += count;
+  }
+  /// All of them have counted, and nothing else has.
+  void only_those_have_counted() {
+    post(1);
+    EXPECT_EQ(event_.counted().count(), expected_);
+    EXPECT_EQ(::kill(host_.server().pid(), 0), 0);
+    EXPECT_TRUE(host_.requests().empty());
+  }
+
+  static constexpr std::uint64_t kPosts = 100;
+  Result<PacketCapture> capture_ = failure(ErrorCode::unavailable, "not opened");
+  std::unique_ptr<ControlClient> client_;
+  std::uint64_t expected_ = 0;
+  std::vector<Packet> seen_;
+};
+
+TEST_F(Packets, SentAgainPostNothing) {
+  const PacketSender sender(domain_.number());
+  for (int i = 0; i < 20; ++i) {
+    sender.send(seen_);
+    only_those_have_counted();
+  }
+}
+
+TEST_F(Packets, AlteredPostNothing) {
+  const PacketSender sender(domain_.number());
+  std::mt19937 random(1);
+  for (int i = 0; i < 20; ++i) {
+    std::vector<Packet> altered = seen_;
+    for (Packet& packet : altered) {
+      const auto at = std::uniform_int_distribution<std::size_t>(4, packet.size() - 1)(random);
+      packet[at] ^= std::byte{1} << std::uniform_int_distribution<unsigned>(0, 7)(random);
+    }
+    sender.send(altered);
+    only_those_have_counted();
+  }
+}
+
+TEST_F(Packets, MutatedInAFloodHarmNobody) {
+  std::atomic<bool> stop{false};
+  std::jthread flood([&] {
+    const PacketSender sender(domain_.number());
+    std::mt19937 random(2);
+    while (!stop) {
+      std::vector<Packet> batch(200);
+      for (Packet& packet : batch) packet = mutated(seen_, random);
+      sender.send(batch);
+    }
+  });
+  for (int i = 0; i < 20; ++i) {
+    only_those_have_counted();
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  stop = true;
+  flood.join();
+  only_those_have_counted();
+}
+
+}  // namespace
+}  // namespace plchost
