@@ -50,7 +50,7 @@ build_sanitized() { # build_sanitized DIR SANITIZERS TARGET OPTIONS...
     -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O0 -g1" -DCMAKE_C_FLAGS_DEBUG="-O0 -g1" "$@" &&
     cmake --build "$dir" -j "$jobs" --target "$target"
 }
-gates() { tests/gates/layers.sh && tests/gates/house.sh && tests/gates/format.sh && tests/gates/prove.sh; }
+gates() { tests/gates/layers.sh && tests/gates/house.sh && tests/gates/format.sh && tests/gates/contract.sh && tests/gates/prove.sh; }
 
 # ctest's own lines, and at the end what CI reads
 passed=0

@@ -49,6 +49,25 @@ new_tree
 echo '// /ho''me/somebody/x' >"$plot/tree/shm/base/path.cpp" && commit_tree
 must_be_red "house: path" "$gates/house.sh" "$plot/tree"
 
+# plant_in_contract NAME EXPRESSION [--write]: the contract with that change (of sed), and with a reference made anew
+plant_in_contract() {
+  new_tree
+  cp api/control.idl api/README.md "$plot/tree/api/"
+  sed -i -E "$2" "$plot/tree/api/control.idl"
+  cmp -s api/control.idl "$plot/tree/api/control.idl" && { echo "nothing was planted for '$1'"; failed=1; }
+  [ "${3:-}" != --write ] || api/reference.py --root "$plot/tree/api" --write
+  must_be_red "$1" "$gates/contract.sh" "$plot/tree"
+}
+plant_in_contract "contract: old reference" 's,// of plchost-dds,// of the server,'
+plant_in_contract "contract: no comment" 's,^( *long pid;) *// of plchost-dds,\1,'
+plant_in_contract "contract: no QoS" '/qos: as ObjectPage/d'
+plant_in_contract "contract: text without a bound" 's/string<191> reason/string reason/'
+plant_in_contract "contract: version 1 has another type" 's/string<191> reason/string<192> reason/' --write
+plant_in_contract "contract: version 1 has another member" 's/unsigned long credits;/unsigned long credit;/' --write
+plant_in_contract "contract: version 1 has one more member" 's,^( *)unsigned long credits;.*,&\n\1long more; // more,' --write
+plant_in_contract "contract: version 1 has another code" 's/(OPERATION_STOP +=) 2;/\1 102;/' --write
+plant_in_contract "contract: version 1 has another topic" 's,topic: plc/v1/reply,topic: plc/v1/answer,' --write
+
 new_tree
 echo 'int planted(int* p) { return p == 0 ? 1 : 2; }' >"$plot/tree/shm/base/planted.cpp"
 must_be_red clang-tidy clang-tidy-19 --quiet "$plot/tree/shm/base/planted.cpp" -- -std=c++23

@@ -1,0 +1,274 @@
+#!/usr/bin/env python3
+"""Makes the reference in README.md from control.idl, and holds control.idl to its own rules.
+
+  reference.py --write               writes the reference into README.md
+  reference.py --check               says what is wrong: no comment, no QoS, a type that others would not
+                                     understand, or a README.md that is not up to date
+  reference.py --compatible OLD.idl  says which types and constants of OLD.idl are not the same in control.idl
+Each exits with 1 if something is wrong. --root DIR: the folder of control.idl and README.md, instead of its own.
+"""
+
+import argparse
+import dataclasses
+import pathlib
+import re
+import sys
+
+BEGIN = "<!-- The reference begins here. It is made: api/reference.py --write -->"
+END = "<!-- The reference ends here. -->"
+TAGS = ("topic", "writer", "reader", "qos")
+
+
+@dataclasses.dataclass
+class Member:
+    """A member of a struct, or a constant; then `name` is what stands left of the `=`."""
+
+    name: str
+    type: str
+    line: int
+    key: bool = False
+    value: str = ""
+    comment: str = ""
+
+
+@dataclasses.dataclass
+class Type:
+    name: str
+    line: int
+    annotations: str
+    comment: str
+    tags: dict
+    members: list = dataclasses.field(default_factory=list)
+
+    @property
+    def is_topic(self):
+        return "@topic" in self.annotations
+
+
+@dataclasses.dataclass
+class Contract:
+    head: str
+    common: dict  # fields that mean the same everywhere: name -> meaning
+    constants: list
+    constants_comment: str
+    types: list
+
+
+class Fault(Exception):
+    pass
+
+
+def split_tags(lines):
+    """A comment's text, and what stands behind `topic:` and the like."""
+    text, tags, current = [], {}, None
+    for line in lines:
+        tag = re.match(r"(%s):\s+(.*)" % "|".join(TAGS), line)
+        if tag:
+            current = tag[1]
+            tags[current] = tag[2]
+        elif current:
+            tags[current] += " " + line.strip()
+        else:
+            text.append(line.strip())
+    return " ".join(text), tags
+
+
+def common_fields(head):
+    """The table of fields at the end of the head: `  name  meaning`, longer meanings go on below."""
+    fields, current = {}, None
+    for line in head:
+        entry = re.match(r"  (\w+)\s{2,}(\S.*)", line)
+        if entry:
+            current = entry[1]
+            fields[current] = entry[2]
+        elif current and line.startswith("   "):
+            fields[current] += " " + line.strip()
+    return fields
+
+
+def parse(path):
+    """Reads the part of IDL that control.idl uses; anything else is a Fault."""
+    contract = Contract("", {}, [], "", [])
+    comment, annotations, current, last = [], "", None, None
+    for number, line in enumerate(path.read_text().splitlines(), 1):
+        code, _, remark = line.partition("//")
+        code, remark = code.strip(), remark.removeprefix(" ").rstrip()
+        if not code:
+            if not remark and "//" not in line:  # an empty line
+                if comment and not contract.head:
+                    contract.head = "\n".join(comment)
+                    contract.common = common_fields(comment)
+                comment, last = [], None
+            elif last is not None:
+                last.comment = (last.comment + " " + remark.strip()).strip()
+            else:
+                comment.append(remark)
+            continue
+        constant = re.fullmatch(r"const (.+?)\s+(\w+)\s*=\s*(\S+);", code)
+        member = re.fullmatch(r"(@key )?(.+?)\s+(\w+)(\[\d+\])?;", code)
+        if constant and not current:
+            if comment:
+                contract.constants_comment = " ".join(comment)
+            last = Member(constant[2], constant[1], number, value=constant[3], comment=remark.strip())
+            contract.constants.append(last)
+            comment = []
+        elif code.startswith("@") and not current:
+            annotations = code
+        elif re.fullmatch(r"struct \w+ \{", code):
+            text, tags = split_tags(comment)
+            current = Type(code.split()[1], number, annotations, text, tags)
+            contract.types.append(current)
+            comment, annotations, last = [], "", None
+        elif current and member:
+            kind = member[2] + (member[4] or "")
+            last = Member(member[3], kind, number, key=bool(member[1]), comment=remark.strip())
+            current.members.append(last)
+        elif code == "};":
+            current, last, comment = None, None, []
+        elif not re.fullmatch(r"module \w+ \{", code):
+            raise Fault(f"{path.name}:{number}: not understood: {code}")
+    return contract
+
+
+def meaning(contract, member):
+    return member.comment or contract.common.get(member.name, "")
+
+
+def faults_of(contract, name):
+    """What breaks the rules that the head of control.idl states."""
+    seen = {}
+    for constant in contract.constants:
+        if not constant.comment:
+            yield f"{name}:{constant.line}: {constant.name} has no comment"
+        number = (constant.name.split("_")[0], constant.value)
+        if number in seen:
+            yield f"{name}:{constant.line}: {constant.name} has the value of {seen[number]}"
+        seen[number] = constant.name
+    for kind in contract.types:
+        where = f"{name}:{kind.line}: {kind.name}"
+        if not kind.comment:
+            yield f"{where} has no comment"
+        if "@final" not in kind.annotations:
+            yield f"{where} is not @final"
+        if kind.is_topic == ("@nested" in kind.annotations):
+            yield f"{where} is neither @topic nor @nested"
+        for tag in TAGS if kind.is_topic else ():
+            if not kind.tags.get(tag):
+                yield f"{where} has no '{tag}:'"
+        if kind.is_topic and (not kind.members or kind.members[-1].name != "ext"):
+            yield f"{where} does not end with ext"
+        for member in kind.members:
+            where = f"{name}:{member.line}: {kind.name}.{member.name}"
+            if not meaning(contract, member):
+                yield f"{where} has no comment"
+            if re.match(r"(string|sequence<\s*\w+\s*>)($|\s|\[)", member.type):
+                yield f"{where} has no bound"
+            if re.search(r"@optional|@id|wstring|map<|union|enum", member.type):
+                yield f"{where}: not every vendor understands {member.type}"
+    for first in contract.types:
+        names = [member.name.lower() for member in first.members]
+        for twice in sorted({n for n in names if names.count(n) > 1}):
+            yield f"{name}:{first.line}: {first.name} has two members called {twice}"
+
+
+def changes_since(old, new):
+    """What an old program would not find as it was."""
+    constants = {c.name: (c.type, c.value) for c in new.constants}
+    types = {t.name: t for t in new.types}
+    for constant in old.constants:
+        if constants.get(constant.name) != (constant.type, constant.value):
+            yield f"constant {constant.name} = {constant.value} is not what it was"
+    for kind in old.types:
+        now = types.get(kind.name)
+        if now is None:
+            yield f"type {kind.name} is gone"
+            continue
+        if kind.annotations != now.annotations:
+            yield f"type {kind.name} is {now.annotations}, was {kind.annotations}"
+        was = [(m.key, m.type, m.name) for m in kind.members]
+        has = [(m.key, m.type, m.name) for m in now.members]
+        for before, after in zip(was, has):
+            if before != after:
+                yield f"type {kind.name}: member {before[1]} {before[2]} is now {after[1]} {after[2]}"
+                break
+        else:
+            if len(was) != len(has):
+                yield f"type {kind.name} has {len(has)} members, had {len(was)}"
+        if kind.tags.get("topic") != now.tags.get("topic"):
+            yield f"type {kind.name} is of topic {now.tags.get('topic')}, was of {kind.tags.get('topic')}"
+
+
+def text_of(text):
+    return re.sub(r"([|<*])", r"\\\1", re.sub(r"\s+", " ", text))
+
+
+def quality(contract, kind):
+    """The QoS of a topic; `as OTHER` is written out."""
+    told = kind.tags["qos"]
+    other = re.fullmatch(r"as (\w+)", told)
+    return quality(contract, next(t for t in contract.types if t.name == other[1])) if other else told
+
+
+def reference(contract):
+    lines = [BEGIN, "", "## Reference"]
+    for paragraph in contract.head.split("\n\n")[1:-1]:  # but for what this file is, and the fields of all types
+        lines += ["", text_of(paragraph)]
+    lines += ["", "### Topics", "", "| topic | type | key | from | to | QoS |", "| --- | --- | --- | --- | --- | --- |"]
+    for kind in (t for t in contract.types if t.is_topic):
+        topics = ", ".join(f"`{t.strip()}`" for t in kind.tags["topic"].split(","))
+        keys = ", ".join(m.name for m in kind.members if m.key) or "none"
+        cells = [topics, f"[{kind.name}](#{kind.name.lower()})", keys]
+        cells += [text_of(kind.tags["writer"]), text_of(kind.tags["reader"]), text_of(quality(contract, kind))]
+        lines.append("| " + " | ".join(cells) + " |")
+    lines += ["", "### Fields of all types", "", "| member | meaning |", "| --- | --- |"]
+    lines += [f"| `{name}` | {text_of(text)} |" for name, text in contract.common.items()]
+    lines += ["", "### Operations", "", text_of(contract.constants_comment), ""]
+    lines += ["| constant | value | meaning |", "| --- | --- | --- |"]
+    lines += [f"| `{c.name}` | {c.value} | {text_of(c.comment)} |" for c in contract.constants]
+    for kind in contract.types:
+        lines += ["", f"### {kind.name}", "", text_of(kind.comment), ""]
+        lines += ["| member | type | meaning |", "| --- | --- | --- |"]
+        for member in kind.members:
+            key = "key; " if member.key else ""
+            row = f"| `{member.name}` | `{member.type}` | {key}{text_of(meaning(contract, member))} |"
+            lines.append(row)
+    return "\n".join(lines + ["", END])
+
+
+def with_reference(readme, made):
+    before, begin, rest = readme.partition(BEGIN)
+    _, end, after = rest.partition(END)
+    if not begin or not end:
+        raise Fault("README.md has no place for the reference: the two lines that begin with <!-- The reference")
+    return before + made + after
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    what = parser.add_mutually_exclusive_group(required=True)
+    what.add_argument("--write", action="store_true")
+    what.add_argument("--check", action="store_true")
+    what.add_argument("--compatible", type=pathlib.Path, metavar="OLD.idl")
+    parser.add_argument("--root", type=pathlib.Path, default=pathlib.Path(__file__).parent)
+    options = parser.parse_args()
+    idl, readme = options.root / "control.idl", options.root / "README.md"
+    try:
+        contract = parse(idl)
+        if options.compatible:
+            found = [f"{idl.name}: {f}" for f in changes_since(parse(options.compatible), contract)]
+        else:
+            found = list(faults_of(contract, idl.name))
+            if not found:
+                told = readme.read_text()
+                new = with_reference(told, reference(contract))
+                if options.write:
+                    readme.write_text(new)
+                elif told != new:
+                    found = ["README.md: the reference is not up to date: run api/reference.py --write"]
+    except Fault as fault:
+        found = [str(fault)]
+    print("\n".join(found), end="\n" if found else "")
+    return 1 if found else 0
+
+
+sys.exit(main())
