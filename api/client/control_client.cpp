@@ -57,24 +57,32 @@ Result<void> ControlClient::open(const dds::DomainOptions& options) {
   if (!wait_set) return std::unexpected(wait_set.error());
   wait_set_ = std::move(*wait_set);
   last_news_ = MonotonicClock::now();
-  if (auto opened = open_cache(presence_, dds::kPresence); !opened) return opened;
+  if (auto opened = open_cache(presence_, dds::kPresence, dds::presence_qos(),
+                               DDS_DATA_AVAILABLE_STATUS | DDS_REQUESTED_DEADLINE_MISSED_STATUS);
+      !opened) {
+    return opened;
+  }
   return open_cache(host_status_, dds::kHostStatus);
 }
 
 template <class Cache>
-Result<void> ControlClient::open_cache(Cache& cache, const dds::TopicInfo& info) {
+Result<void> ControlClient::open_cache(Cache& cache, const dds::TopicInfo& info, const dds::Qos& qos,
+                                       std::uint32_t statuses) {
   if (cache) return {};
   auto topic = dds::make_topic(participant_.get(), info);
   if (!topic) return std::unexpected(topic.error());
-  auto reader = dds::make_reader(participant_.get(), topic->get(), dds::status_qos());
+  auto reader = dds::make_reader(participant_.get(), topic->get(), qos);
   if (!reader) return std::unexpected(reader.error());
-  if (auto added = wait_set_.add(reader->get(), DDS_DATA_AVAILABLE_STATUS); !added) return added;
+  if (auto added = wait_set_.add(reader->get(), statuses); !added) return added;
   cache = Cache(std::move(*topic), std::move(*reader));
   return {};
 }
 
 void ControlClient::update() {
   const TimePoint now = MonotonicClock::now();
+  // Looked at, it is over; else no wait would wait any more.
+  dds_requested_deadline_missed_status_t missed{};
+  (void)dds_get_requested_deadline_missed_status(presence_.reader(), &missed);
   presence_.update([&](const plc_Presence& presence) {
     Seen& seen = seen_[std::string(dds::text_of(presence.host))];
     if (presence.epoch < seen.epoch) return;  // the last word of a server that was replaced
@@ -92,7 +100,7 @@ void ControlClient::update() {
 }
 
 std::optional<HostView> ControlClient::present(std::string_view name) const {
-  const auto seen = seen_.find(std::string(name));
+  const auto seen = seen_.find(name);
   if (seen == seen_.end() || MonotonicClock::now() - seen->second.last > kHostGone) return std::nullopt;
   const auto status = host_status_.of_host(name, seen->second.epoch);
   if (status.empty()) return std::nullopt;
@@ -105,6 +113,12 @@ std::vector<HostView> ControlClient::present() const {
     if (auto view = present(name)) found.push_back(std::move(*view));
   }
   return found;
+}
+
+bool ControlClient::is_silent(std::string_view host) {
+  update();
+  const auto seen = seen_.find(host);
+  return seen != seen_.end() && MonotonicClock::now() - seen->second.last >= kSilent;
 }
 
 std::vector<HostView> ControlClient::hosts(TimePoint deadline) {
@@ -134,7 +148,8 @@ Result<HostView> ControlClient::host(std::string_view name, TimePoint deadline) 
                  fmt::format("no host '{}' answers; those that do: {}", name, join_names(names)));
 }
 
-template Result<void> ControlClient::open_cache(StatusCache<plc_HostFinding>&, const dds::TopicInfo&);
+template Result<void> ControlClient::open_cache(StatusCache<plc_HostFinding>&, const dds::TopicInfo&,
+                                                const dds::Qos&, std::uint32_t);
 
 template <class Sample>
 Result<std::vector<Sample>> ControlClient::snapshot(StatusCache<Sample>& cache, const dds::TopicInfo& topic,

@@ -43,6 +43,9 @@ class ControlClient {
  public:
   /// A host that has not shown its presence for so long is gone.
   static constexpr Duration kHostGone = std::chrono::milliseconds(500);
+  /// A host is silent after so long: a little less than the deadline of its presence, so that who is woken by
+  /// that sees it.
+  static constexpr Duration kSilent = dds::kPresenceDeadline - std::chrono::milliseconds(5);
   /// All hosts are known when none was news for so long.
   static constexpr Duration kQuiet = std::chrono::milliseconds(200);
 
@@ -53,6 +56,11 @@ class ControlClient {
   [[nodiscard]] std::vector<HostView> hosts(TimePoint deadline);
   /// That host, as soon as it is seen. not_found: it does not answer; the text lists who does.
   [[nodiscard]] Result<HostView> host(std::string_view name, TimePoint deadline);
+
+  /// Whether a host that was seen does not show its presence at present: its server is dead, or hangs, or
+  /// cannot be reached. Known within 100 ms, also if threads of DDS live on there; wait_for_change() returns
+  /// when it begins and when it ends. A host that stays silent is gone after kHostGone.
+  [[nodiscard]] bool is_silent(std::string_view host);
 
   /// All that a host shows, complete: waits until as much has come as the host says there is. Sorted by name.
   /// timed_out: not complete at the deadline.
@@ -124,7 +132,9 @@ class ControlClient {
   [[nodiscard]] std::vector<HostView> present() const;
   [[nodiscard]] std::optional<HostView> present(std::string_view name) const;
   template <class Cache>
-  [[nodiscard]] Result<void> open_cache(Cache& cache, const dds::TopicInfo& topic);
+  [[nodiscard]] Result<void> open_cache(Cache& cache, const dds::TopicInfo& topic,
+                                        const dds::Qos& qos = dds::status_qos(),
+                                        std::uint32_t statuses = DDS_DATA_AVAILABLE_STATUS);
   template <class Sample>
   [[nodiscard]] Result<std::vector<Sample>> snapshot(StatusCache<Sample>& cache, const dds::TopicInfo& topic,
                                                      std::uint32_t plc_HostStatus::* expected,
@@ -156,7 +166,7 @@ class ControlClient {
   StatusCache<plc_ObjectStatus> object_status_;
   StatusCache<plc_ExceptionStatus> exceptions_;
   StatusCache<plc_HostFinding> host_findings_;
-  std::map<std::string, Seen> seen_;
+  std::map<std::string, Seen, std::less<>> seen_;
   TransitionLog transition_log_;
   TimePoint last_news_;
   dds::Entity reply_topic_;

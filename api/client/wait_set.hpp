@@ -11,7 +11,8 @@ class WaitSet {
  public:
   WaitSet() noexcept = default;
   [[nodiscard]] static Result<WaitSet> create(dds_entity_t participant);
-  /// `statuses`: DDS_DATA_AVAILABLE_STATUS of a reader, DDS_PUBLICATION_MATCHED_STATUS of a writer.
+  /// `statuses`: DDS_DATA_AVAILABLE_STATUS and others of a reader, DDS_PUBLICATION_MATCHED_STATUS of a
+  /// writer.
   [[nodiscard]] Result<void> add(dds_entity_t entity, std::uint32_t statuses);
   /// Returns at the deadline at the latest, and earlier without cause: look again.
   void wait(TimePoint deadline) const noexcept;

@@ -56,7 +56,7 @@ inline constexpr Duration kServerBlocking = std::chrono::milliseconds(1);
 inline constexpr Duration kRequestBlocking = std::chrono::milliseconds(100);
 inline constexpr Duration kEventBlocking = std::chrono::milliseconds(20);
 inline constexpr Duration kPresencePeriod = std::chrono::milliseconds(25);
-inline constexpr Duration kPresenceDeadline = std::chrono::milliseconds(100);
+inline constexpr Duration kPresenceDeadline = std::chrono::milliseconds(75);
 
 [[nodiscard]] Qos request_qos();
 [[nodiscard]] Qos event_qos();

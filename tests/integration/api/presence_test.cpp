@@ -1,0 +1,99 @@
+#include <functional>
+#include <thread>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <sys/ptrace.h>
+#include <sys/wait.h>
+
+#include "api/client/control_client.hpp"
+#include "tests/integration/api/test_host.hpp"
+
+namespace plchost {
+namespace {
+
+using std::chrono::milliseconds;
+
+/// One thread of a child process, standing still while this object lives; the other threads of it run on.
+class StoppedThread {
+ public:
+  explicit StoppedThread(pid_t thread) : thread_(thread) {
+    stopped_ = ::ptrace(PTRACE_SEIZE, thread_, nullptr, nullptr) == 0 &&
+               ::ptrace(PTRACE_INTERRUPT, thread_, nullptr, nullptr) == 0 &&
+               ::waitpid(thread_, nullptr, __WALL) == thread_;
+  }
+  StoppedThread(const StoppedThread&) = delete;
+  StoppedThread& operator=(const StoppedThread&) = delete;
+  ~StoppedThread() { ::ptrace(PTRACE_DETACH, thread_, nullptr, nullptr); }
+  [[nodiscard]] bool stopped() const { return stopped_; }
+
+ private:
+  pid_t thread_;
+  bool stopped_ = false;
+};
+
+class Presence : public testing::Test {
+ protected:
+  Presence() {
+    event_ = host_.add_event("line1", "ready");
+    host_.start_server();
+    sut_ = connect(domain_);
+    EXPECT_TRUE(sut_->host("hosta", soon()));
+    EXPECT_TRUE(sut_->prepare_posts("hosta", soon()));
+    until([this] { return !sut_->is_silent("hosta"); });
+  }
+
+  void until(const std::function<bool()>& happened) {
+    const TimePoint end = soon();
+    while (!happened() && MonotonicClock::now() < end) sut_->wait_for_change(end);
+    ASSERT_TRUE(happened());
+  }
+  /// Waits until the client knows, and says how long that took.
+  void expect_silence(const std::string& why) {
+    const TimePoint start = MonotonicClock::now();
+    until([this] { return sut_->is_silent("hosta"); });
+    const auto took = std::chrono::duration<double, std::milli>(MonotonicClock::now() - start).count();
+    fmt::print("{}: known after {:.1f} ms\n", why, took);
+    RecordProperty("known_after_ms", fmt::format("{:.1f}", took));
+  }
+
+  OwnDomain domain_;
+  TestHost host_{domain_, "hosta"};
+  PoolEvent event_;
+  std::unique_ptr<ControlClient> sut_;
+};
+
+TEST_F(Presence, OfAKilledServerEnds) {
+  host_.server().signal(SIGKILL);
+  expect_silence("killed");
+}
+
+TEST_F(Presence, OfAStoppedServerEndsAndComesBack) {
+  host_.server().signal(SIGSTOP);
+  expect_silence("stopped");
+
+  host_.server().signal(SIGCONT);
+  until([this] { return !sut_->is_silent("hosta"); });
+}
+
+// What only DDS's own threads keep alive looks alive to leases and to automatic liveliness.
+TEST_F(Presence, OfAServerWhoseLoopHangsEndsAlthoughDdsGoesOn) {
+  {
+    const StoppedThread loop(host_.server().pid());
+    ASSERT_TRUE(loop.stopped());
+    expect_silence("loop hangs");
+
+    const std::uint64_t before = event_.counted().count();
+    ASSERT_TRUE(sut_->post_one("hosta", "line1", "ready"));
+    while (event_.counted().count() == before) std::this_thread::sleep_for(milliseconds(1));
+    EXPECT_TRUE(sut_->is_silent("hosta"));
+  }
+  until([this] { return !sut_->is_silent("hosta"); });
+}
+
+TEST_F(Presence, OfAHostThatWasNeverSeenIsNotMissed) {
+  EXPECT_FALSE(sut_->is_silent("hostb"));
+}
+
+}  // namespace
+}  // namespace plchost
