@@ -55,7 +55,7 @@ plant_in_contract() {
   cp api/control.idl api/README.md "$plot/tree/api/"
   sed -i -E "$2" "$plot/tree/api/control.idl"
   cmp -s api/control.idl "$plot/tree/api/control.idl" && { echo "nothing was planted for '$1'"; failed=1; }
-  [ "${3:-}" != --write ] || api/reference.py --root "$plot/tree/api" --write
+  [ "${3:-}" != --write ] || api/reference.py --root "$plot/tree/api" --write >/dev/null || true
   must_be_red "$1" "$gates/contract.sh" "$plot/tree"
 }
 plant_in_contract "contract: old reference" 's,// of plchost-dds,// of the server,'

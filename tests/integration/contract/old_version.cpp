@@ -18,9 +18,8 @@
 #include <string_view>
 #include <thread>
 
-#include <unistd.h>
-
 #include <dds/dds.h>
+#include <unistd.h>
 
 #include "control_v1.h"
 
