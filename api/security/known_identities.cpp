@@ -12,14 +12,15 @@ namespace plchost::security {
 
 namespace {
 
-struct Known {
+struct Certified {
   GuidPrefix prefix;
   Subject subject;
+  Validity validity;
 };
 
 /// None: revoked, as it may well be.
-Result<std::optional<Known>> read_known(const std::string& path, const Certificate& authority,
-                                        const RevocationList& revocations) {
+Result<std::optional<Certified>> read_known(const std::string& path, const Certificate& authority,
+                                            const RevocationList& revocations) {
   const auto certificate = read_certificate(path);
   if (!certificate) return std::unexpected(certificate.error());
   if (is_revoked(*certificate, revocations)) return std::nullopt;
@@ -30,7 +31,9 @@ Result<std::optional<Known>> read_known(const std::string& path, const Certifica
   if (!subject) return failure_in(path, subject.error());
   const auto prefix = guid_prefix(*certificate);
   if (!prefix) return failure_in(path, prefix.error());
-  return std::optional(Known{*prefix, std::move(*subject)});
+  const auto validity = validity_of(*certificate);
+  if (!validity) return failure_in(path, validity.error());
+  return std::optional(Certified{*prefix, std::move(*subject), *validity});
 }
 
 }  // namespace
@@ -52,7 +55,11 @@ Result<KnownIdentities> KnownIdentities::load(const std::string& folder) {
     auto one = read_known(entry->path(), *authority, *revocations);
     if (!one) {
       identities.problems_.push_back(one.error().describe());
-    } else if (*one && !identities.subjects_.emplace((*one)->prefix, std::move((*one)->subject)).second) {
+      continue;
+    }
+    if (!*one) continue;
+    Known of_one{.subject = std::move((*one)->subject), .not_after = (*one)->validity.not_after};
+    if (!identities.known_.emplace((*one)->prefix, std::move(of_one)).second) {
       identities.problems_.push_back(
           fmt::format("{}: an identity with the same GUID prefix is known", entry->path().string()));
     }
@@ -68,9 +75,9 @@ std::optional<Subject> KnownIdentities::find(std::span<const std::uint8_t> guid)
   GuidPrefix prefix{};
   if (guid.size() < prefix.size()) return std::nullopt;
   std::ranges::copy(guid.first(prefix.size()), prefix.begin());
-  const auto found = subjects_.find(prefix);
-  if (found == subjects_.end()) return std::nullopt;
-  return found->second;
+  const auto found = known_.find(prefix);
+  if (found == known_.end() || found->second.not_after < std::time(nullptr)) return std::nullopt;
+  return found->second.subject;
 }
 
 }  // namespace plchost::security

@@ -20,17 +20,21 @@ class KnownIdentities {
   [[nodiscard]] static Result<KnownIdentities> load(const std::string& folder);
 
   /// Of the participant, or of any entity of it, whose GUID begins so (at least 6 bytes). None: nobody that
-  /// is known.
+  /// is known and whose certificate is valid now.
   [[nodiscard]] std::optional<Subject> find(std::span<const std::uint8_t> guid) const;
 
-  [[nodiscard]] std::size_t size() const noexcept { return subjects_.size(); }
+  [[nodiscard]] std::size_t size() const noexcept { return known_.size(); }
   [[nodiscard]] const std::vector<std::string>& problems() const noexcept { return problems_; }
 
   /// No folder holds more.
   static constexpr std::size_t kMost = 4096;
 
  private:
-  std::map<GuidPrefix, Subject> subjects_;
+  struct Known {
+    Subject subject;
+    std::time_t not_after = 0;
+  };
+  std::map<GuidPrefix, Known> known_;
   std::vector<std::string> problems_;
 };
 

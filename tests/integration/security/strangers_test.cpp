@@ -76,6 +76,24 @@ TEST_F(Strangers, WhoseCertificateHasExpiredMeetNobody) {
   EXPECT_THAT(run("late", {"list", "hosts"}).errors, HasSubstr("certificate has expired"));
 }
 
+TEST_F(Strangers, WhoseCertificateEndsWhileTheyAreServedAreServedNoMore) {
+  const std::time_t now = std::time(nullptr);
+  constexpr int kSeconds = 3;
+  ASSERT_TRUE(
+      plant().add_valid({.role = security::Role::operating, .name = "brief"}, {now - 10, now + kSeconds}));
+  start();
+  dds::DomainOptions options;
+  options.domain = domain_.number();
+  options.identity = folder("brief");
+  const auto client = ControlClient::connect(options).value();
+  const auto served = client->post_event({"cell", 0, "line1", "ready"}, 1, {}, kPatience);
+  ASSERT_TRUE(served) << served.error().describe();
+  while (std::time(nullptr) <= now + kSeconds) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  const auto refused = client->post_event({"cell", 0, "line1", "ready"}, 1, {}, std::chrono::seconds(1));
+  EXPECT_TRUE(!refused || refused->accepted == 0);
+  EXPECT_EQ(event_.counted().count(), 1U);
+}
+
 TEST_F(Strangers, WithThePermissionsOfAnotherAreRefused) {
   start();
   std::filesystem::copy_file(folder("admin") + "/permissions.p7s", folder("operator") + "/permissions.p7s",

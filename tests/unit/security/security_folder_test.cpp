@@ -124,6 +124,17 @@ TEST_F(TheSecurityFolder, HostsKnowWhoIsBehindAGuid) {
   EXPECT_FALSE(KnownIdentities::load(folder("host"))->find(prefix));
 }
 
+TEST_F(TheSecurityFolder, AnIdentityIsKnownUntilItsCertificateEnds) {
+  const std::time_t now = std::time(nullptr);
+  ASSERT_TRUE(open().add_valid({.role = Role::viewer, .name = "brief"}, {now - 10, now + 2}));
+  const auto prefix = guid_prefix(read_certificate(file("brief", kCertificateFile)).value()).value();
+  const auto known = KnownIdentities::load(folder("host"));
+  ASSERT_TRUE(known);
+  EXPECT_EQ(known->size(), 2U);
+  while (std::time(nullptr) <= now + 2) ::usleep(10'000);
+  EXPECT_FALSE(known->find(prefix));
+}
+
 TEST_F(TheSecurityFolder, AStrangersCertificateIsNotKnown) {
   const std::string other = base + "/other";
   ASSERT_TRUE(SecurityFolder::init(other));
