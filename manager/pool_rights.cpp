@@ -43,7 +43,7 @@ Result<MemoryRights> pool_rights(const HostConfig& host) {
 }
 
 Result<void> check_pool_owner(const std::string& pool, const MemoryRights& rights) {
-  const std::string path = fmt::format("{}/{}", MemoryFile::kDirectory, pool);
+  const std::string path = MemoryFile::path(pool);
   struct stat status{};
   if (::lstat(path.c_str(), &status) != 0) return {};
   const uid_t owner = status.st_uid;
@@ -56,7 +56,7 @@ Result<void> check_pool_owner(const std::string& pool, const MemoryRights& right
 }
 
 void renew_pool_rights(const std::string& pool, const MemoryRights& rights) {
-  const std::string path = fmt::format("{}/{}", MemoryFile::kDirectory, pool);
+  const std::string path = MemoryFile::path(pool);
   const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
   struct stat before{};
   if (!fd || ::fstat(fd.get(), &before) != 0) {

@@ -155,5 +155,5 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "plcctl: --watch goes with list and show\n");
     return plchost::kExitUsage;
   }
-  return plchost::repeat(session.options.every_s, action);
+  return plchost::repeat({.every_s = session.options.every_s}, action);
 }

@@ -1,12 +1,8 @@
-#include <algorithm>
 #include <memory>
 
-#include <fmt/format.h>
-#include <unistd.h>
-
 #include "api/cli/cli_session.hpp"
-#include "api/cli/interrupt.hpp"
 #include "api/cli/object_verbs.hpp"
+#include "api/cli/repeat.hpp"
 #include "api/cli/rows.hpp"
 #include "api/cli/task_rows.hpp"
 #include "api/cli/transition_verbs.hpp"
@@ -21,32 +17,16 @@ struct WatchArguments {
   std::uint64_t count = 0;  // 0: until Ctrl-C
 };
 
-void print_block(const CliSession& session, const std::vector<Row>& rows, bool first) {
-  if (session.options.json) return session.show(rows, task_columns());
-  if (::isatty(STDOUT_FILENO) != 0) {
-    fmt::print("\x1b[H\x1b[2J");
-  } else if (!first) {
-    fmt::print("\n");
-  }
-  session.show(rows, task_columns());
-}
-
 int watch(CliSession& session, const WatchArguments& arguments) {
-  catch_interrupts();
-  const auto interval =
-      std::chrono::duration_cast<Duration>(std::chrono::duration<double>(arguments.interval_s));
-  TimePoint next = MonotonicClock::now();
-  for (std::uint64_t i = 0; !interrupted() && (arguments.count == 0 || i < arguments.count); ++i) {
-    if (i > 0) {
-      sleep_until_interrupted(next);
-      if (interrupted()) break;
-    }
+  const Repetition repetition{.every_s = arguments.interval_s,
+                              .count = arguments.count,
+                              .for_programs = session.options.json || session.options.csv};
+  return repeat(repetition, [&] {
     const auto rows = task_rows(session, arguments.instance);
     if (!rows) return CliSession::fail(rows.error());
-    print_block(session, *rows, i == 0);
-    next = std::max(next + interval, MonotonicClock::now());
-  }
-  return kExitDone;
+    session.show(*rows, task_columns());
+    return kExitDone;
+  });
 }
 
 }  // namespace

@@ -47,7 +47,7 @@ Result<PostLedger> PostLedger::open(std::string_view pool) {
   return PostLedger(std::move(*made));
 }
 
-PostLedger::PostLedger(MemoryFile memory) : memory_(std::move(memory)), guard_(memory_.bytes()) {
+PostLedger::PostLedger(MemoryFile memory) : memory_(std::move(memory)) {
   const std::span all(entries(), kLedgerEntries);
   for (std::uint32_t i = 0; i < kLedgerEntries; ++i) {
     if (all[i].in_use.load(std::memory_order_acquire) == 0) continue;

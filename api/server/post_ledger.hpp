@@ -8,7 +8,6 @@
 #include <unordered_map>
 
 #include "api/dds/guid.hpp"
-#include "shm/base/memory_guard.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/result.hpp"
 #include "shm/pool/memory_file.hpp"
@@ -64,7 +63,6 @@ class PostLedger {
   [[nodiscard]] LedgerEntry* entries() const noexcept;
 
   MemoryFile memory_;
-  MemoryGuard guard_;  // below the memory, so that it goes first
   std::unordered_map<dds::Guid, std::uint32_t, dds::GuidHash> index_;
   std::uint32_t next_free_ = 0;  // all from here on are free
   std::uint64_t reused_ = 0;

@@ -298,6 +298,7 @@ void Instance::beat() {
         "the page of this instance was cut short by another program: nobody sees its figures any more "
         "until it is started again");
   }
+  for (const std::string& loss : host_->areas().look_for_losses()) spdlog::warn("{}", loss);
 }
 
 }  // namespace plchost

@@ -143,7 +143,7 @@ struct FaultHandlers {
   static void on_fault(int signal, siginfo_t* info, void* context) noexcept {
     const int saved = errno;
     // What strangers do to a shared memory is not the application's fault, and no cause of death.
-    if (signal == SIGBUS && info->si_code > 0 && MemoryGuard::mend(info->si_addr)) {
+    if (signal == SIGBUS && info->si_code == BUS_ADRERR && MemoryGuard::mend(info->si_addr)) {
       errno = saved;
       return;
     }

@@ -47,7 +47,7 @@ void hand_on(int signal, siginfo_t* info, void* context) noexcept {
 }
 
 void on_bus_error(int signal, siginfo_t* info, void* context) noexcept {
-  if (info->si_code <= 0 || !MemoryGuard::mend(info->si_addr)) hand_on(signal, info, context);
+  if (info->si_code != BUS_ADRERR || !MemoryGuard::mend(info->si_addr)) hand_on(signal, info, context);
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ namespace plchost {
 class MemoryGuard {
  public:
   /// So many mappings of a process can be guarded.
-  static constexpr std::size_t kMost = 512;
+  static constexpr std::size_t kMost = 4096;
 
   MemoryGuard() noexcept = default;
   /// `memory` is mapped and stays so until the guard is gone. Set-up.

@@ -8,7 +8,6 @@
 #include <string_view>
 #include <utility>
 
-#include "shm/base/memory_guard.hpp"
 #include "shm/base/time.hpp"
 #include "shm/block_driver/slot_ring.hpp"
 #include "shm/pool/memory_file.hpp"
@@ -90,16 +89,14 @@ class LinkMemory {
   /// Any context; looks at each block that waits.
   [[nodiscard]] LinkCounts counts() const noexcept;
   /// The file was cut short by a stranger, and what is read has been zeros since. Any context.
-  [[nodiscard]] bool lost() const noexcept { return guard_.lost(); }
+  [[nodiscard]] bool lost() const noexcept { return file_.lost(); }
 
  private:
   static Result<LinkMemory> open(const std::string& name, MemoryFile::Access access);
-  LinkMemory(MemoryFile file, std::uint32_t slots) noexcept
-      : file_(std::move(file)), slots_(slots), guard_(file_.bytes()) {}
+  LinkMemory(MemoryFile file, std::uint32_t slots) noexcept : file_(std::move(file)), slots_(slots) {}
 
   MemoryFile file_;
   std::uint32_t slots_;  // as validated: a stranger may change the link's own
-  MemoryGuard guard_;    // below the memory, so that it goes first
 };
 
 /// The sender's end of a link.

@@ -22,7 +22,7 @@ constexpr timespec kPause{.tv_sec = 0, .tv_nsec = 200'000};
 }  // namespace
 
 Result<DirectoryLock> DirectoryLock::acquire(const std::string& name) {
-  const std::string path = fmt::format("{}/{}", MemoryFile::kDirectory, name);
+  const std::string path = MemoryFile::path(name);
   UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
   if (!fd) {
     const int error = errno;

@@ -5,7 +5,6 @@
 #include <string_view>
 #include <vector>
 
-#include "shm/base/memory_guard.hpp"
 #include "shm/base/result.hpp"
 #include "shm/block_driver/block_link.hpp"
 #include "shm/block_driver/directory_layout.hpp"
@@ -65,11 +64,11 @@ class NodeDirectory {
     return link_name(pool_, base_, from, to);
   }
   /// Its file was cut short or removed by a stranger.
-  [[nodiscard]] bool lost() const noexcept { return guard_.lost(); }
+  [[nodiscard]] bool lost() const noexcept { return file_.lost(); }
 
  private:
   NodeDirectory(std::string pool, std::string base, MemoryFile file) noexcept
-      : pool_(std::move(pool)), base_(std::move(base)), file_(std::move(file)), guard_(file_.bytes()) {}
+      : pool_(std::move(pool)), base_(std::move(base)), file_(std::move(file)) {}
   Result<std::uint16_t> choose(const NodeEntry& entry) const;
   Result<std::uint16_t> choose_free(std::string_view name) const;
   void write(std::uint16_t node, const NodeRecord& record) noexcept;
@@ -80,7 +79,6 @@ class NodeDirectory {
   std::string pool_;
   std::string base_;
   MemoryFile file_;
-  MemoryGuard guard_;
 };
 
 }  // namespace plchost

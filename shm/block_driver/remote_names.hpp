@@ -7,7 +7,6 @@
 #include <string>
 #include <string_view>
 
-#include "shm/base/memory_guard.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/result.hpp"
 #include "shm/block_driver/node_address.hpp"
@@ -43,11 +42,10 @@ class RemoteNames {
   [[nodiscard]] std::optional<NodeAddress> find(std::string_view text) const noexcept;
 
  private:
-  explicit RemoteNames(MemoryFile file) noexcept : file_(std::move(file)), guard_(file_.bytes()) {}
+  explicit RemoteNames(MemoryFile file) noexcept : file_(std::move(file)) {}
   [[nodiscard]] RemoteNamesLayout& layout() const noexcept;
 
   MemoryFile file_;
-  MemoryGuard guard_;  // below the memory, so that it goes first
 };
 
 }  // namespace plchost

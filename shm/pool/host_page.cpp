@@ -136,11 +136,10 @@ void HostPageWriter::write_instance(std::uint32_t index, const InstanceStatus& s
 }
 
 bool HostPageWriter::keep() {
-  if (!holds(layout_of(memory_).host, host_) && guard_.lost()) {
+  if (!holds(layout_of(memory_).host, host_) && memory_.lost()) {
     auto fresh = MemoryFile::replace(name_, sizeof(HostPageLayout), fill);
     if (!fresh) return true;
     memory_ = std::move(*fresh);
-    guard_ = MemoryGuard(memory_.bytes());
   }
   HostPageLayout& page = layout_of(memory_);
   bool changed = page.magic != kKind.magic || page.version != kKind.version || page.size != sizeof(page);

@@ -7,7 +7,6 @@
 #include <string_view>
 #include <vector>
 
-#include "shm/base/memory_guard.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/seqlock.hpp"
 #include "shm/pool/memory_file.hpp"
@@ -77,14 +76,10 @@ class HostPageWriter {
 
  private:
   HostPageWriter(std::string name, MemoryFile memory)
-      : name_(std::move(name)),
-        memory_(std::move(memory)),
-        guard_(memory_.bytes()),
-        instances_(kMaxInstances) {}
+      : name_(std::move(name)), memory_(std::move(memory)), instances_(kMaxInstances) {}
   std::string name_;
   MemoryFile memory_;
-  MemoryGuard guard_;  // below the memory, so that it goes first
-  HostStatus host_;    // as written last, here and below
+  HostStatus host_;  // as written last, here and below
   std::vector<InstanceStatus> instances_;
 };
 
@@ -95,16 +90,15 @@ class HostPageReader {
   [[nodiscard]] static Result<HostPageReader> open(std::string_view pool);
   [[nodiscard]] std::uint64_t changes() const noexcept;
   /// It was cut short, and tells nothing since: open it anew.
-  [[nodiscard]] bool lost() const noexcept { return guard_.lost(); }
+  [[nodiscard]] bool lost() const noexcept { return memory_.lost(); }
   /// Nothing if the writer was in the way (try again later), or nothing valid was written yet: names and
   /// texts are what they may be, without control characters.
   [[nodiscard]] std::optional<HostStatus> host() const noexcept;
   [[nodiscard]] std::optional<InstanceStatus> instance(std::uint32_t index) const noexcept;
 
  private:
-  explicit HostPageReader(MemoryFile memory) noexcept : memory_(std::move(memory)), guard_(memory_.bytes()) {}
+  explicit HostPageReader(MemoryFile memory) noexcept : memory_(std::move(memory)) {}
   MemoryFile memory_;
-  MemoryGuard guard_;
 };
 
 }  // namespace plchost

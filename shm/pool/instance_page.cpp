@@ -133,7 +133,7 @@ Result<InstancePage> InstancePage::create(std::string_view pool, std::string_vie
 }
 
 InstancePage::InstancePage(MemoryFile memory, std::uint32_t count, HistogramShape shape)
-    : memory_(std::move(memory)), guard_(memory_.bytes()), task_count_(count) {
+    : memory_(std::move(memory)), task_count_(count) {
   statistics_.reserve(count);
   for (std::uint32_t i = 0; i < count; ++i) {
     statistics_.emplace_back(shape, slot_of(memory_, i).counters, buckets_of(memory_, count, i, shape));

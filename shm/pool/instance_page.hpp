@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "shm/base/fault_record.hpp"
-#include "shm/base/memory_guard.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/seqlock.hpp"
 #include "shm/base/task_statistics.hpp"
@@ -122,12 +121,11 @@ class InstancePage {
   [[nodiscard]] TaskStatistics& statistics(std::uint32_t index) noexcept { return statistics_[index]; }
   [[nodiscard]] std::uint32_t task_count() const noexcept { return task_count_; }
   /// Its file was cut short by a stranger: nobody sees what is written any more. Any context.
-  [[nodiscard]] bool lost() const noexcept { return guard_.lost(); }
+  [[nodiscard]] bool lost() const noexcept { return memory_.lost(); }
 
  private:
   InstancePage(MemoryFile memory, std::uint32_t count, HistogramShape shape);
   MemoryFile memory_;
-  MemoryGuard guard_;                       // below the memory, so that it goes first
   std::uint32_t task_count_;                // a stranger may change the page's own
   std::vector<TaskStatistics> statistics_;  // they refer into the memory
 };
@@ -159,9 +157,8 @@ class InstancePageReader {
 
  private:
   InstancePageReader(MemoryFile memory, std::uint32_t count, HistogramShape shape) noexcept
-      : memory_(std::move(memory)), guard_(memory_.bytes()), task_count_(count), shape_(shape) {}
+      : memory_(std::move(memory)), task_count_(count), shape_(shape) {}
   MemoryFile memory_;
-  MemoryGuard guard_;
   // As validated at open: a stranger may change the page's own.
   std::uint32_t task_count_ = 0;
   HistogramShape shape_;

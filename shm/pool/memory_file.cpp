@@ -43,18 +43,18 @@ Result<std::string> path_of(const std::string& name) {
   if (auto valid = check_name("shared memory name", plain, kMaxFileName); !valid) {
     return std::unexpected(valid.error());
   }
-  return fmt::format("{}/{}", MemoryFile::kDirectory, name);
+  return MemoryFile::path(name);
 }
 
-Result<std::span<std::byte>> map(const UniqueFd& fd, std::size_t size, MemoryFile::Access access,
-                                 const std::string& path) {
+Result<GuardedMapping> map(const UniqueFd& fd, std::size_t size, MemoryFile::Access access,
+                           const std::string& path) {
   const int protection = access == MemoryFile::Access::read_write ? PROT_READ | PROT_WRITE : PROT_READ;
   void* const address = ::mmap(nullptr, size, protection, MAP_SHARED, fd.get(), 0);
   if (address == MAP_FAILED) {
     const int error = errno;
     return failure(ErrorCode::system, fmt::format("map {} bytes of {}", size, path), error);
   }
-  return std::span(static_cast<std::byte*>(address), size);
+  return GuardedMapping(std::span(static_cast<std::byte*>(address), size));
 }
 
 Result<void> allocate(const UniqueFd& fd, std::size_t size, const std::string& path) {
@@ -153,9 +153,9 @@ Result<UnnamedMemory> UnnamedMemory::make(const std::string& name, std::size_t s
   if (!path) return std::unexpected(path.error());
   auto fd = make_nameless(size, rights, *path);
   if (!fd) return std::unexpected(fd.error());
-  const auto bytes = map(*fd, size, MemoryFile::Access::read_write, *path);
-  if (!bytes) return std::unexpected(bytes.error());
-  return UnnamedMemory(*std::move(path), *std::move(fd), MemoryFile(*bytes));
+  auto mapping = map(*fd, size, MemoryFile::Access::read_write, *path);
+  if (!mapping) return std::unexpected(std::move(mapping).error());
+  return UnnamedMemory(*std::move(path), *std::move(fd), MemoryFile(*std::move(mapping)));
 }
 
 namespace {
@@ -226,9 +226,9 @@ Result<MemoryFile> MemoryFile::open(const std::string& name, std::size_t at_leas
     return failure(ErrorCode::corrupt,
                    fmt::format("{} has {} bytes, at least {} are needed", *path, size, at_least));
   }
-  const auto bytes = map(opened->fd, size, access, *path);
-  if (!bytes) return std::unexpected(bytes.error());
-  return MemoryFile(*bytes);
+  auto mapping = map(opened->fd, size, access, *path);
+  if (!mapping) return std::unexpected(std::move(mapping).error());
+  return MemoryFile(*std::move(mapping));
 }
 
 Result<void> MemoryFile::fill_empty(const std::string& name, std::size_t size) {
@@ -245,17 +245,8 @@ bool MemoryFile::remove(const std::string& name) noexcept {
   return !path || ::unlink(path->c_str()) == 0 || errno == ENOENT;
 }
 
-MemoryFile::MemoryFile(MemoryFile&& other) noexcept : bytes_(std::exchange(other.bytes_, {})) {}
-
-MemoryFile& MemoryFile::operator=(MemoryFile&& other) noexcept {
-  if (this != &other) {
-    const MemoryFile old(std::exchange(bytes_, std::exchange(other.bytes_, {})));
-  }
-  return *this;
-}
-
-MemoryFile::~MemoryFile() {
-  if (!bytes_.empty()) ::munmap(bytes_.data(), bytes_.size());
+std::string MemoryFile::path(std::string_view name) {
+  return fmt::format("{}/{}", kDirectory, name);
 }
 
 std::string pool_memory_name(std::string_view pool, std::string_view name) {

@@ -8,16 +8,21 @@
 #include <string_view>
 #include <utility>
 
+#include "shm/base/guarded_mapping.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/unique_fd.hpp"
 #include "shm/pool/memory_rights.hpp"
 
 namespace plchost {
 
-/// A named shared memory, mapped into this process. The name outlives the process; the mapping does not.
+/// A named shared memory, mapped into this process. The name outlives the process; the mapping does not. If
+/// others cut its file short, it is zeros from then on in a process that watches for it (see MemoryGuard).
 class MemoryFile {
  public:
   static constexpr const char* kDirectory = "/dev/shm";  ///< where all of them lie
+
+  /// Of the file behind a name.
+  [[nodiscard]] static std::string path(std::string_view name);
 
   enum class Access : bool { read_only, read_write };
   /// Writes the first contents. Nobody else sees the memory before it has returned: the name is given last,
@@ -25,11 +30,6 @@ class MemoryFile {
   using Fill = std::function<Result<void>(std::span<std::byte>)>;
 
   MemoryFile() noexcept = default;
-  MemoryFile(MemoryFile&& other) noexcept;
-  MemoryFile& operator=(MemoryFile&& other) noexcept;
-  MemoryFile(const MemoryFile&) = delete;
-  MemoryFile& operator=(const MemoryFile&) = delete;
-  ~MemoryFile();
 
   /// Makes a new one, zero-filled and with its memory really there (a host without memory says so now and not
   /// with SIGBUS in a cycle). Takes the place of an old one of that name, whose users keep their mapping.
@@ -53,13 +53,17 @@ class MemoryFile {
   /// is sticky.
   static bool remove(const std::string& name) noexcept;
 
-  [[nodiscard]] std::span<std::byte> bytes() const noexcept { return bytes_; }
-  [[nodiscard]] explicit operator bool() const noexcept { return !bytes_.empty(); }
+  [[nodiscard]] std::span<std::byte> bytes() const noexcept { return mapping_.bytes(); }
+  [[nodiscard]] explicit operator bool() const noexcept { return !bytes().empty(); }
+  /// False: the process has MemoryGuard::kMost others, and a cut is a SIGBUS in this one. Any context.
+  [[nodiscard]] bool guarded() const noexcept { return mapping_.guarded(); }
+  /// It was cut short, and its bytes are zeros of this process alone. Any context.
+  [[nodiscard]] bool lost() const noexcept { return mapping_.lost(); }
 
  private:
   friend class UnnamedMemory;
-  explicit MemoryFile(std::span<std::byte> bytes) noexcept : bytes_(bytes) {}
-  std::span<std::byte> bytes_;
+  explicit MemoryFile(GuardedMapping mapping) noexcept : mapping_(std::move(mapping)) {}
+  GuardedMapping mapping_;
 };
 
 /// A shared memory on its way: nobody else can find it before it has its name.

@@ -20,8 +20,7 @@ constexpr int kBlock = 512;                                 // of st_blocks
 }  // namespace
 
 bool MemoryTrash::take(const std::string& name) noexcept {
-  UniqueFd fd(
-      ::open((std::string(MemoryFile::kDirectory) + "/" + name).c_str(), O_PATH | O_NOFOLLOW | O_CLOEXEC));
+  UniqueFd fd(::open(MemoryFile::path(name).c_str(), O_PATH | O_NOFOLLOW | O_CLOEXEC));
   if (!MemoryFile::remove(name)) return false;
   struct stat status{};
   if (!fd || ::fstat(fd.get(), &status) != 0 || status.st_nlink != 0) return true;

@@ -73,7 +73,7 @@ Result<void> check_group(const ObjectOptions& options) {
 // What options leave open is as with the pool, but for the group of who is not in the pool's: it is his own.
 MemoryRights rights_for(const ObjectOptions& options, const std::string& pool) {
   struct stat status{};
-  const std::string path = fmt::format("{}/{}", MemoryFile::kDirectory, pool);
+  const std::string path = MemoryFile::path(pool);
   if (::stat(path.c_str(), &status) != 0) return {.group = options.group, .mode = options.mode};
   constexpr mode_t kPermissions = 0666;
   const gid_t usual = may_give_to(status.st_gid) ? status.st_gid : ::getegid();
@@ -194,7 +194,6 @@ Result<void> ObjectPool::map(SharedMemory& memory, const Wanted& wanted, Access 
                                                    wanted.name, size, file->bytes().size()));
   }
   memory.memory_ = *std::move(file);
-  memory.guard_ = MemoryGuard(memory.memory_.bytes());
   return {};
 }
 

@@ -43,7 +43,7 @@ struct MemoryFileState {
 using Kind = MemoryFileState::Kind;
 
 std::string path_in_memory(std::string_view file) {
-  return fmt::format("{}/{}", MemoryFile::kDirectory, file);
+  return MemoryFile::path(file);
 }
 
 bool is_image(const plc_image_header& header, std::uint64_t file_size) noexcept {

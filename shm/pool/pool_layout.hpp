@@ -118,7 +118,12 @@ struct alignas(64) PoolHeader {
   alignas(64) RobustMutex mutex;  ///< guards set-up only
   /// Odd while somebody changes what the mutex guards: for readers without the right to write.
   std::atomic<std::uint64_t> changes;
-  std::array<std::uint32_t, 10> reserved1;
+  std::array<std::uint32_t, 2> reserved1;
+  /// For who attaches when a stranger has written over the first line.
+  std::atomic<std::uint64_t> magic_again;
+  std::uint32_t version_again;
+  std::uint32_t max_objects_again;
+  std::array<std::uint32_t, 4> reserved2;
 
   // Guarded by the mutex. Those that count only grow.
   std::atomic<std::uint32_t> high_water;    ///< entries from here on were never used
@@ -133,11 +138,11 @@ struct alignas(64) PoolHeader {
   std::atomic<std::uint32_t> rebuilding;     ///< 1: the lists are being made anew
   std::atomic<std::uint32_t> rebuilds;       ///< how often they were, because a stranger had damaged them
   std::atomic<std::uint32_t> lost_objects;   ///< objects that were not valid then
-  std::atomic<std::uint32_t> header_mended;  ///< how often its first 64 bytes were written anew
-  std::array<std::uint32_t, 3> reserved2;
+  std::atomic<std::uint32_t> header_mended;  ///< how often what write_constants() writes was written anew
+  std::array<std::uint32_t, 3> reserved3;
 
   alignas(64) std::atomic<std::uint32_t> noted;  ///< of the notes, those that count
-  std::uint32_t reserved3;
+  std::uint32_t reserved4;
   /// Of words that were changed since `noted` was 0: [ place, in words from the header's begin ][ value ].
   std::array<std::atomic<std::uint64_t>, 63> notes;
 };

@@ -21,7 +21,7 @@ std::string describe_holder(std::uint32_t thread) {
 bool has_mapped(std::uint32_t thread, const std::string& pool) {
   std::ifstream mappings(fmt::format("/proc/{}/maps", thread));
   if (!mappings) return true;
-  const std::string path = fmt::format("{}/{}", MemoryFile::kDirectory, pool);
+  const std::string path = MemoryFile::path(pool);
   for (std::string line; std::getline(mappings, line);) {
     if (line.ends_with(path) || line.ends_with(path + " (deleted)")) return true;
   }

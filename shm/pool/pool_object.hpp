@@ -6,7 +6,6 @@
 #include <span>
 #include <utility>
 
-#include "shm/base/memory_guard.hpp"
 #include "shm/base/time.hpp"
 #include "shm/pool/memory_file.hpp"
 #include "shm/pool/pool_event.hpp"
@@ -134,14 +133,13 @@ class SharedMemory : public PoolObject {
  public:
   /// Written only if writable(): else the first write is a SIGSEGV.
   [[nodiscard]] std::span<std::byte> bytes() const noexcept { return memory_.bytes(); }
-  /// It is zeros if its file is cut short; false: there are too many such memories (MemoryGuard::kMost), and
-  /// that would be a SIGBUS.
-  [[nodiscard]] bool guarded() const noexcept { return static_cast<bool>(guard_); }
+  /// See MemoryFile.
+  [[nodiscard]] bool guarded() const noexcept { return memory_.guarded(); }
+  [[nodiscard]] bool lost() const noexcept { return memory_.lost(); }
 
  private:
   friend class ObjectPool;
   MemoryFile memory_;
-  MemoryGuard guard_;  // below the memory, so that it goes first
 };
 
 }  // namespace plchost

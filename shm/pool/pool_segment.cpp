@@ -17,7 +17,7 @@ namespace plchost {
 
 namespace {
 
-constexpr auto kPatience = std::chrono::seconds(1);
+constexpr auto kPatience = std::chrono::milliseconds(100);
 constexpr auto kLookInterval = std::chrono::milliseconds(1);
 constexpr auto kRelaxed = std::memory_order_relaxed;
 
@@ -34,6 +34,9 @@ void write_constants(PoolHeader& header, std::uint32_t max_objects) noexcept {
   header.bucket_count = bucket_count_for(max_objects);
   header.max_clients = kMaxClients;
   header.max_references = max_references_for(max_objects);
+  header.version_again = kPoolVersion;
+  header.max_objects_again = max_objects;
+  header.magic_again.store(kPoolMagic, kRelaxed);
   header.magic.store(kPoolMagic, std::memory_order_release);
 }
 
@@ -61,12 +64,17 @@ Result<void> check_header(const PoolHeader& header, std::uint32_t max_objects, s
                  fmt::format("pool '{}': its header does not fit its size of {} bytes", name, file_size));
 }
 
+// A stranger who writes over one of both seldom does over the other.
+bool is_sound_again(const PoolHeader& header, std::uint32_t max_objects, std::size_t file_size) noexcept {
+  return header.magic_again.load(kRelaxed) == kPoolMagic && header.version_again == kPoolVersion &&
+         max_objects >= kMinObjects && max_objects <= kMaxObjects && file_size == pool_size(max_objects);
+}
+
 }  // namespace
 
 PoolSegment::PoolSegment(std::string name, MemoryFile memory, std::uint32_t max_objects, Access access)
     : name_(std::move(name)),
       memory_(std::move(memory)),
-      guard_(memory_.bytes()),
       view_(memory_.bytes(), max_objects),
       access_(access),
       process_(this_process()),
@@ -94,12 +102,16 @@ Result<std::shared_ptr<PoolSegment>> PoolSegment::attach_now(const std::string& 
   const std::size_t file_size = memory->bytes().size();
   const PoolHeader& header = header_of(*memory);
   const std::uint64_t magic = header.magic.load(std::memory_order_acquire);
+  std::uint32_t max_objects = header.max_objects_again;
+  if (is_sound_again(header, max_objects, file_size)) {
+    return std::shared_ptr<PoolSegment>(new PoolSegment(name, std::move(*memory), max_objects, access));
+  }
   if (magic == 0) return unfinished();
   if (magic != kPoolMagic) {
     return failure(ErrorCode::corrupt,
                    fmt::format("shared memory '{}' is not a pool; choose another name", name));
   }
-  const std::uint32_t max_objects = header.max_objects;
+  max_objects = header.max_objects;
   if (auto sound = check_header(header, max_objects, file_size, name); !sound) {
     return std::unexpected(sound.error());
   }
@@ -205,8 +217,10 @@ Result<PoolLock> PoolSegment::lock(bool look_thoroughly, Duration patience) {
 void PoolSegment::mend_header() noexcept {
   const auto max_objects = static_cast<std::uint32_t>(view_.entries().size());
   PoolHeader& header = view_.header();
+  const std::size_t size = pool_size(max_objects);
   const bool sound = header.magic.load(kRelaxed) == kPoolMagic &&
-                     check_header(header, header.max_objects, pool_size(max_objects), name_).has_value();
+                     check_header(header, header.max_objects, size, name_).has_value() &&
+                     is_sound_again(header, header.max_objects_again, size);
   if (sound) return;
   write_constants(header, max_objects);
   header.header_mended.fetch_add(1, kRelaxed);

@@ -12,7 +12,6 @@
 
 #include <sys/types.h>
 
-#include "shm/base/memory_guard.hpp"
 #include "shm/base/process_start.hpp"
 #include "shm/base/result.hpp"
 #include "shm/pool/memory_file.hpp"
@@ -42,7 +41,7 @@ class PoolSegment {
   [[nodiscard]] bool writable() const noexcept { return access_ == Access::read_write; }
 
   /// The file was cut short by a stranger.
-  [[nodiscard]] bool lost() const noexcept { return guard_.lost(); }
+  [[nodiscard]] bool lost() const noexcept { return memory_.lost(); }
   /// Who changes the pool now has died over it, and nobody has come since. Set-up; only reads.
   [[nodiscard]] bool holder_has_ended() const noexcept { return view_.header().mutex.owner_has_ended(); }
 
@@ -97,7 +96,6 @@ class PoolSegment {
 
   std::string name_;
   MemoryFile memory_;
-  MemoryGuard guard_;  // below the memory, so that it goes first
   PoolView view_;
   Access access_;
   ProcessIdentity process_;

@@ -81,13 +81,13 @@ plc_reference_clock& ReferenceClockRecord::record() const noexcept {
 }
 
 bool ReferenceClockRecord::gone() const noexcept {
-  if (guard_.lost() || plc_reference_clock_is_one(&record()) == 0) return true;
+  if (memory_.lost() || plc_reference_clock_is_one(&record()) == 0) return true;
   return identity_ == Identity{} || identity_of(file_) != identity_;
 }
 
 auto ReferenceClockRecord::identity_of(const std::string& file) noexcept -> Identity {
   struct stat status{};
-  if (::stat(fmt::format("{}/{}", MemoryFile::kDirectory, file).c_str(), &status) != 0) return {};
+  if (::stat(MemoryFile::path(file).c_str(), &status) != 0) return {};
   return {.device = status.st_dev, .inode = status.st_ino, .size = status.st_size};
 }
 

@@ -5,7 +5,6 @@
 
 #include <sys/types.h>
 
-#include "shm/base/memory_guard.hpp"
 #include "shm/base/result.hpp"
 #include "shm/plc_reference_clock.h"
 #include "shm/pool/memory_file.hpp"
@@ -39,11 +38,10 @@ class ReferenceClockRecord {
     bool operator==(const Identity&) const = default;
   };
   ReferenceClockRecord(MemoryFile memory, std::string file, Identity identity) noexcept
-      : memory_(std::move(memory)), guard_(memory_.bytes()), file_(std::move(file)), identity_(identity) {}
+      : memory_(std::move(memory)), file_(std::move(file)), identity_(identity) {}
   [[nodiscard]] static Identity identity_of(const std::string& file) noexcept;
 
   MemoryFile memory_;
-  MemoryGuard guard_;  // below the memory, so that it goes first
   std::string file_;
   Identity identity_;
 };

@@ -7,7 +7,6 @@
 #include <string>
 #include <string_view>
 
-#include "shm/base/memory_guard.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/seqlock.hpp"
 #include "shm/base/time.hpp"
@@ -61,9 +60,8 @@ class TransitionRing {
            std::string_view reason) noexcept;
 
  private:
-  explicit TransitionRing(MemoryFile memory) noexcept : memory_(std::move(memory)), guard_(memory_.bytes()) {}
+  explicit TransitionRing(MemoryFile memory) noexcept : memory_(std::move(memory)) {}
   MemoryFile memory_;
-  MemoryGuard guard_;  // below the memory, so that it goes first
 };
 
 /// A reader's end, in any process: what was written since it looked last, in order.
@@ -80,10 +78,8 @@ class TransitionRingReader {
   [[nodiscard]] std::optional<Transition> next(TimePoint now) noexcept;
 
  private:
-  explicit TransitionRingReader(MemoryFile memory) noexcept
-      : memory_(std::move(memory)), guard_(memory_.bytes()) {}
+  explicit TransitionRingReader(MemoryFile memory) noexcept : memory_(std::move(memory)) {}
   MemoryFile memory_;
-  MemoryGuard guard_;
   std::uint64_t next_ = 1;
   std::optional<TimePoint> waits_since_;
 };

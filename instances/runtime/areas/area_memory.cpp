@@ -1,6 +1,7 @@
 #include "instances/runtime/areas/area_memory.hpp"
 
 #include <cerrno>
+#include <filesystem>
 #include <utility>
 
 #include <fcntl.h>
@@ -49,7 +50,7 @@ Result<UniqueFd> open_device(const AreaSettings& settings, struct stat& status) 
 
 // The kernel takes it back when the process ends, however it ends.
 Result<UniqueFd> lock_file_of(const std::string& file) {
-  const std::string path = fmt::format("{}/{}", MemoryFile::kDirectory, file);
+  const std::string path = MemoryFile::path(file);
   UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
   if (!fd) return failure(ErrorCode::system, "open " + path, errno);
   if (::flock(fd.get(), LOCK_EX | LOCK_NB) == 0) return fd;
@@ -60,36 +61,24 @@ Result<UniqueFd> lock_file_of(const std::string& file) {
 
 }  // namespace
 
+std::optional<std::string> own_file_of_pool(const std::string& pool, const FileRange& range) {
+  std::error_code error;
+  for (std::filesystem::directory_iterator at(MemoryFile::kDirectory, error), end; !error && at != end;
+       at.increment(error)) {
+    const std::string file = at->path().filename();
+    const bool own = file == pool || (file.starts_with(pool + ".") && !memory_of_file(pool, file));
+    struct stat status{};
+    if (!own || ::stat(at->path().c_str(), &status) != 0) continue;
+    if (status.st_dev == range.device && status.st_ino == range.inode) return at->path();
+  }
+  return std::nullopt;
+}
+
 std::optional<FileRange> range_of_memory(const std::string& pool, const std::string& name) {
-  const std::string path = fmt::format("{}/{}", MemoryFile::kDirectory, pool_memory_name(pool, name));
+  const std::string path = MemoryFile::path(pool_memory_name(pool, name));
   struct stat status{};
   if (::stat(path.c_str(), &status) != 0) return std::nullopt;
   return range_in(status, 0, static_cast<std::uint64_t>(status.st_size));
-}
-
-AreaMemory::AreaMemory(AreaMemory&& other) noexcept
-    : mapping_(std::exchange(other.mapping_, {})),
-      bytes_(std::exchange(other.bytes_, {})),
-      shared_(std::move(other.shared_)),
-      lock_(std::move(other.lock_)),
-      guard_(std::move(other.guard_)),
-      range_(other.range_),
-      existed_(other.existed_) {}
-
-AreaMemory& AreaMemory::operator=(AreaMemory&& other) noexcept {
-  std::swap(mapping_, other.mapping_);
-  std::swap(bytes_, other.bytes_);
-  std::swap(shared_, other.shared_);
-  std::swap(lock_, other.lock_);
-  std::swap(guard_, other.guard_);
-  std::swap(range_, other.range_);
-  std::swap(existed_, other.existed_);
-  return *this;
-}
-
-AreaMemory::~AreaMemory() {
-  guard_ = MemoryGuard();
-  if (!mapping_.empty()) ::munmap(mapping_.data(), mapping_.size());
 }
 
 Result<AreaMemory> AreaMemory::of_process(std::size_t bytes) {
@@ -100,8 +89,8 @@ Result<AreaMemory> AreaMemory::of_process(std::size_t bytes) {
     const int error = errno;
     return failure(ErrorCode::full, fmt::format("{} bytes of memory for areas", bytes), error);
   }
-  memory.mapping_ = std::span(static_cast<std::byte*>(address), bytes);
-  memory.bytes_ = memory.mapping_;
+  memory.mapping_ = GuardedMapping(std::span(static_cast<std::byte*>(address), bytes));
+  memory.bytes_ = memory.mapping_.bytes();
   return memory;
 }
 
@@ -118,13 +107,13 @@ Result<AreaMemory> AreaMemory::of_device(const AreaSettings& settings) {
                                static_cast<off_t>(begin));
   if (address == MAP_FAILED) return not_mapped(settings, "cannot be mapped", errno);
   AreaMemory memory;
-  memory.mapping_ = std::span(static_cast<std::byte*>(address), size);
-  memory.bytes_ = memory.mapping_.subspan(settings.address - begin, settings.size);
+  memory.mapping_ = GuardedMapping(std::span(static_cast<std::byte*>(address), size));
+  memory.bytes_ = memory.mapping_.bytes().subspan(settings.address - begin, settings.size);
   memory.existed_ = true;
   memory.range_ = range_in(status, settings.address, settings.address + settings.size);
-  memory.guard_ = MemoryGuard(memory.mapping_);
-  if (!memory.guard_)
+  if (!memory.mapping_.guarded()) {
     return not_mapped(settings, fmt::format("more than {} memories of others", MemoryGuard::kMost));
+  }
   return memory;
 }
 

@@ -9,7 +9,7 @@
 #include <sys/types.h>
 
 #include "instances/runtime/settings/settings.hpp"
-#include "shm/base/memory_guard.hpp"
+#include "shm/base/guarded_mapping.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/unique_fd.hpp"
 #include "shm/pool/object_pool.hpp"
@@ -27,6 +27,9 @@ struct FileRange {
     return device == other.device && inode == other.inode && begin < other.end && other.begin < end;
   }
 };
+/// The file that `range` is in, if it is the pool itself or one in which its manager and instances tell of
+/// themselves. Nothing: another one, or a memory of the pool. Set-up.
+[[nodiscard]] std::optional<std::string> own_file_of_pool(const std::string& pool, const FileRange& range);
 /// The whole file of a memory of the pool. Set-up.
 [[nodiscard]] std::optional<FileRange> range_of_memory(const std::string& pool, const std::string& name);
 
@@ -35,11 +38,6 @@ struct FileRange {
 class AreaMemory {
  public:
   AreaMemory() noexcept = default;
-  AreaMemory(AreaMemory&& other) noexcept;
-  AreaMemory& operator=(AreaMemory&& other) noexcept;
-  AreaMemory(const AreaMemory&) = delete;
-  AreaMemory& operator=(const AreaMemory&) = delete;
-  ~AreaMemory();
 
   /// Memory of the process, zeroed. Set-up.
   [[nodiscard]] static Result<AreaMemory> of_process(std::size_t bytes);
@@ -53,15 +51,16 @@ class AreaMemory {
   [[nodiscard]] std::span<std::byte> bytes() const noexcept { return bytes_; }
   /// of_device: which bytes they are. A page-wise mapping may have more.
   [[nodiscard]] const std::optional<FileRange>& range() const noexcept { return range_; }
+  /// Its file was cut short: what is written reaches nobody. Any context.
+  [[nodiscard]] bool lost() const noexcept { return mapping_.lost() || shared_.lost(); }
   /// It was there already, with what others have written: a device always was.
   [[nodiscard]] bool existed() const noexcept { return existed_; }
 
  private:
-  std::span<std::byte> mapping_;  // whole pages; empty: shared_ holds it
+  GuardedMapping mapping_;  // whole pages; empty: shared_ holds it
   std::span<std::byte> bytes_;
   SharedMemory shared_;
   UniqueFd lock_;
-  MemoryGuard guard_;
   std::optional<FileRange> range_;
   bool existed_ = false;
 };

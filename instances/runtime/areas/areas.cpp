@@ -91,6 +91,18 @@ std::size_t Areas::kept_number(std::size_t area) const noexcept {
       std::span(declared_).first(area), [](const DeclaredArea& one) { return one.is_kept(); }));
 }
 
+std::vector<std::string> Areas::look_for_losses() {
+  std::vector<std::string> losses;
+  for (Block& block : blocks_) {
+    if (!block.memory.lost() || std::exchange(block.loss_told, true)) continue;
+    losses.push_back(fmt::format(
+        "{} was cut short by another program: what is in these areas is seen by this instance only, "
+        "and is gone when it ends; give it its size again, and restart the instance",
+        block.source));
+  }
+  return losses;
+}
+
 RTS_RESULT Areas::state(RTS_HANDLE area, Plc_Area_State& state) const noexcept {
   const std::size_t number = number_of(area);
   if (number >= declared_.size() || state.dwSize != sizeof(Plc_Area_State)) return ERR_PARAMETER;

@@ -84,6 +84,10 @@ class Areas {
     if (keeper_) keeper_->finish();
   }
 
+  /// What is to be told of memories that were cut short since it was asked last; empty: nothing. Control
+  /// thread.
+  [[nodiscard]] std::vector<std::string> look_for_losses();
+
   /// plc_area_address, plc_get_area_state. Any context.
   [[nodiscard]] void* address(RTS_HANDLE area) const noexcept;
   [[nodiscard]] RTS_RESULT state(RTS_HANDLE area, Plc_Area_State& state) const noexcept;
@@ -95,6 +99,8 @@ class Areas {
     std::unique_ptr<OutputImage> outputs;  ///< null: no image is published
     std::optional<plc_image> inputs;       ///< nothing: no image is read
     std::vector<std::byte> initial;
+    std::string source;  ///< the setting that placed it, and what it names
+    bool loss_told = false;
   };
   /// Kept areas that tasks have in common.
   struct KeptShare {

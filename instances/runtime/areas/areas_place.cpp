@@ -81,6 +81,8 @@ Result<void> Areas::make_memory(const Environment& environment, Block& block, co
     return take(AreaMemory::of_process(first.is_output() ? plc_image_bytes(first.bytes) : planned.bytes));
   }
   const AreaSettings& settings = *planned.settings;
+  block.source = fmt::format("{}: [SysMem] Area.{}: {}", settings.where, settings.number,
+                             settings.object.empty() ? settings.device : settings.object);
   if (settings.object.empty()) return take(AreaMemory::of_device(settings));
   const auto size = static_cast<std::uint32_t>(settings.size);
   const std::size_t bytes = first.has_image() ? plc_image_bytes(size) : settings.size;
@@ -114,6 +116,12 @@ Result<void> Areas::check_distinct(const Environment& environment) const {
     const auto range = settings->object.empty() ? blocks_[i].memory.range()
                                                 : range_of_memory(environment.pool.name(), settings->object);
     if (!range) continue;
+    if (const auto own = own_file_of_pool(environment.pool.name(), *range)) {
+      return failure(ErrorCode::invalid_argument,
+                     fmt::format("{}: [SysMem] Area.{}: {} is {}, in which the host manages its pool; choose "
+                                 "another file, or Object=NAME for a memory of the pool",
+                                 settings->where, settings->number, settings->device, *own));
+    }
     for (const Taken& other : taken) {
       if (other.settings == settings || !range->overlaps(other.range)) continue;
       return failure(

@@ -48,7 +48,6 @@ std::optional<KeptMemory::Left> KeptMemory::left_behind(const std::string& pool,
   const auto file =
       MemoryFile::open(pool_memory_name(pool, name), sizeof(Header), MemoryFile::Access::read_only);
   if (!file) return std::nullopt;
-  const MemoryGuard guard(file->bytes());  // it may be cut short now
   const Header& header = *reinterpret_cast<const Header*>(file->bytes().data());
   Left left;
   RetainLayout& layout = left.image.layout;
@@ -72,7 +71,7 @@ std::optional<KeptMemory::Left> KeptMemory::left_behind(const std::string& pool,
       static_cast<std::size_t>(std::ranges::count_if(header.counters, [](const CycleCounter& counter) {
         return counter.load(std::memory_order_relaxed) % 2 != 0;
       }));
-  return guard.lost() ? std::nullopt : std::optional(std::move(left));
+  return file->lost() ? std::nullopt : std::optional(std::move(left));
 }
 
 Result<KeptMemory> KeptMemory::of(Result<SharedMemory> opened, std::size_t bytes) {

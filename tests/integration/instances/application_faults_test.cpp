@@ -14,12 +14,12 @@ namespace {
 
 using ::testing::HasSubstr;
 
-struct Fault {
+struct CrashingProgram {
   const char* application;
   const char* text;
 };
 
-class ApplicationWith : public ::testing::TestWithParam<Fault> {};
+class ApplicationWith : public ::testing::TestWithParam<CrashingProgram> {};
 
 TEST_P(ApplicationWith, IsRefusedByTheCheck) {
   const Sandbox sandbox;
@@ -38,14 +38,15 @@ TEST_P(ApplicationWith, IsRefusedAtStart) {
 
 INSTANTIATE_TEST_SUITE_P(
     Faults, ApplicationWith,
-    ::testing::Values(Fault{"fault_init_fails", "plc_app_init returned 7"},
-                      Fault{"fault_throws", "plc_app_init threw: no valve is connected"},
-                      Fault{"fault_no_tasks", "did not call __sys__setup__tasks"},
-                      Fault{"fault_two_setups", "called __sys__setup__tasks more than once"},
-                      Fault{"fault_bad_interval", "task 'Only': dwInterval of a cyclic task must be above 0"},
-                      Fault{"fault_wrong_version", "built against version 42 of plc_app.h"},
-                      Fault{"fault_missing_init", "does not export plc_app_init"},
-                      Fault{"fault_undefined_symbol", "function_of_another_runtime"}),
+    ::testing::Values(CrashingProgram{"fault_init_fails", "plc_app_init returned 7"},
+                      CrashingProgram{"fault_throws", "plc_app_init threw: no valve is connected"},
+                      CrashingProgram{"fault_no_tasks", "did not call __sys__setup__tasks"},
+                      CrashingProgram{"fault_two_setups", "called __sys__setup__tasks more than once"},
+                      CrashingProgram{"fault_bad_interval",
+                                      "task 'Only': dwInterval of a cyclic task must be above 0"},
+                      CrashingProgram{"fault_wrong_version", "built against version 42 of plc_app.h"},
+                      CrashingProgram{"fault_missing_init", "does not export plc_app_init"},
+                      CrashingProgram{"fault_undefined_symbol", "function_of_another_runtime"}),
     [](const auto& test) { return std::string(test.param.application); });
 
 TEST(ApplicationExit, ThatThrowsDoesNotKeepTheProcessFromItsOrderlyEnd) {

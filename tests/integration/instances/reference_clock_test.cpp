@@ -28,9 +28,9 @@ constexpr const char* kRecord = "bus1";
 enum State : std::uint32_t { free_running = 1, acquiring = 2, locked = 3, hold_over = 4, measuring = 5 };
 
 /// The example's firmware. Killed when it goes, as if its power were cut.
-class Firmware {
+class ClockFirmware {
  public:
-  Firmware(const Sandbox& sandbox, std::vector<std::string> options) {
+  ClockFirmware(const Sandbox& sandbox, std::vector<std::string> options) {
     std::vector<std::string> all{REFERENCE_CLOCK, "--pool", sandbox.pool(), "--name", kRecord};
     all.insert(all.end(), options.begin(), options.end());
     std::vector<char*> argv;
@@ -38,13 +38,13 @@ class Firmware {
     argv.push_back(nullptr);
     EXPECT_EQ(posix_spawn(&pid_, REFERENCE_CLOCK, nullptr, nullptr, argv.data(), environ), 0);
   }
-  ~Firmware() {
+  ~ClockFirmware() {
     ::kill(pid_, SIGKILL);
     int status = 0;
     ::waitpid(pid_, &status, 0);
   }
-  Firmware(const Firmware&) = delete;
-  Firmware& operator=(const Firmware&) = delete;
+  ClockFirmware(const ClockFirmware&) = delete;
+  ClockFirmware& operator=(const ClockFirmware&) = delete;
 
  private:
   pid_t pid_ = -1;
@@ -94,7 +94,7 @@ TEST_F(FollowingFirmware, LocksHoldsOverAndLocksAgain) {
   EXPECT_TRUE(becomes(free_running)) << "the record is there, but nobody writes it";
   EXPECT_EQ(clock().reference.view(), kRecord);
   {
-    const Firmware firmware(sandbox_, {"--drift", "100", "--noise", "0", "--offset", "700"});
+    const ClockFirmware firmware(sandbox_, {"--drift", "100", "--noise", "0", "--offset", "700"});
     EXPECT_TRUE(becomes(locked)) << sut->log();
     EXPECT_TRUE(eventually([&] { return std::abs(clock().drift_ppb - 100'000) < 1000; }));
     EXPECT_TRUE(eventually([&] { return std::abs(deviation_ns(100e-6)) < 1000; }));
@@ -103,7 +103,7 @@ TEST_F(FollowingFirmware, LocksHoldsOverAndLocksAgain) {
   EXPECT_TRUE(becomes(hold_over));
   EXPECT_EQ(clock().in_sync, 1U) << "the last drift is good for a while";
   const auto pairs = clock().pairs;
-  const Firmware again(sandbox_, {"--drift", "-150", "--noise", "200", "--offset", "-300"});
+  const ClockFirmware again(sandbox_, {"--drift", "-150", "--noise", "200", "--offset", "-300"});
   EXPECT_TRUE(eventually([&] { return clock().pairs > pairs + 500; }));
   EXPECT_TRUE(becomes(locked));
   EXPECT_TRUE(eventually([&] { return std::abs(clock().drift_ppb + 150'000) < 2000; }));
@@ -114,7 +114,7 @@ TEST_F(FollowingFirmware, LocksHoldsOverAndLocksAgain) {
 
 TEST_F(FollowingFirmware, HoldsTheClockThoughPairsAreWildAndItSteps) {
   start("MaxCorrectionNs=5000\n");
-  const Firmware firmware(sandbox_, {"--wild", "5", "--step", "400", "--step-every", "1"});
+  const ClockFirmware firmware(sandbox_, {"--wild", "5", "--step", "400", "--step-every", "1"});
   EXPECT_TRUE(becomes(locked));
   EXPECT_TRUE(eventually([&] { return clock().steps >= 2 && clock().rejected > 20; }));
   EXPECT_TRUE(becomes(locked));
@@ -123,7 +123,7 @@ TEST_F(FollowingFirmware, HoldsTheClockThoughPairsAreWildAndItSteps) {
 
 TEST_F(FollowingFirmware, MeasuresOnlyUnderASchedulerThatMovesNoRelease) {
   start();
-  const Firmware firmware(sandbox_, {"--drift", "60"});
+  const ClockFirmware firmware(sandbox_, {"--drift", "60"});
   EXPECT_TRUE(becomes(locked));
   EXPECT_EQ(sut->ask(ControlVerb::set_scheduler, "CmpScheduleTimer").code, ErrorCode::ok);
   EXPECT_TRUE(becomes(measuring));
@@ -136,14 +136,14 @@ TEST_F(FollowingFirmware, FollowsARecordThatWasMadeAnew) {
   start();
   EXPECT_TRUE(becomes(free_running));
   ReferenceClockRecord::remove(sandbox_.pool(), kRecord);
-  const Firmware firmware(sandbox_, {});
+  const ClockFirmware firmware(sandbox_, {});
   EXPECT_TRUE(becomes(locked)) << sut->log();
 }
 
 TEST_F(FollowingFirmware, EmptiedRecordIsNoCauseOfDeath) {
   start();
   for (int i = 0; i < 3; ++i) {
-    const Firmware firmware(sandbox_, {});  // which may die of it: it has no guard
+    const ClockFirmware firmware(sandbox_, {});  // which may die of it: it has no guard
     EXPECT_TRUE(becomes(locked)) << sut->log();
     std::filesystem::resize_file(record_file(), 0);
     EXPECT_TRUE(eventually([&] { return std::filesystem::file_size(record_file()) == 64; }))
@@ -151,7 +151,7 @@ TEST_F(FollowingFirmware, EmptiedRecordIsNoCauseOfDeath) {
   }
   EXPECT_TRUE(becomes(hold_over)) << sut->log();
   EXPECT_EQ(clock().problem.view(), "");
-  const Firmware again(sandbox_, {});
+  const ClockFirmware again(sandbox_, {});
   EXPECT_TRUE(becomes(locked)) << sut->log();
 }
 
@@ -160,7 +160,7 @@ TEST_F(FollowingFirmware, RecordThatWasEmptiedBeforeTheStartIsBegunAnew) {
   start();
   EXPECT_TRUE(becomes(free_running));
   EXPECT_EQ(clock().problem.view(), "");
-  const Firmware firmware(sandbox_, {});
+  const ClockFirmware firmware(sandbox_, {});
   EXPECT_TRUE(becomes(locked)) << sut->log();
 }
 
@@ -172,7 +172,7 @@ TEST_F(FollowingFirmware, RunsFreelyBesideAMemoryThatIsNoRecordUntilThereIsOne) 
     EXPECT_THAT(std::string(clock().problem.view()), HasSubstr("is no reference record of version 1"));
     EXPECT_THAT(sut->log(), HasSubstr("the clock runs freely"));
     ReferenceClockRecord::remove(sandbox_.pool(), kRecord);
-    const Firmware firmware(sandbox_, {});
+    const ClockFirmware firmware(sandbox_, {});
     EXPECT_TRUE(becomes(locked)) << sut->log();
     EXPECT_EQ(clock().problem.view(), "");
   }
@@ -181,14 +181,14 @@ TEST_F(FollowingFirmware, RunsFreelyBesideAMemoryThatIsNoRecordUntilThereIsOne) 
 TEST_F(FollowingFirmware, RecordThatIsOverwrittenIsLetGo) {
   start();
   {
-    const Firmware firmware(sandbox_, {});
+    const ClockFirmware firmware(sandbox_, {});
     EXPECT_TRUE(becomes(locked)) << sut->log();
   }
   std::fstream(record_file()) << std::string(64, '\xa5');
   EXPECT_TRUE(becomes(hold_over));
   EXPECT_TRUE(eventually([&] { return !clock().problem.view().empty(); }));
   ReferenceClockRecord::remove(sandbox_.pool(), kRecord);
-  const Firmware again(sandbox_, {});
+  const ClockFirmware again(sandbox_, {});
   EXPECT_TRUE(becomes(locked)) << sut->log();
 }
 

@@ -9,7 +9,7 @@
 namespace plchost {
 namespace {
 
-TimePoint in(std::chrono::milliseconds time) {
+TimePoint soon(std::chrono::milliseconds time) {
   return MonotonicClock::now() + time;
 }
 
@@ -18,7 +18,7 @@ TEST(CountingSemaphore, GivesAsManyAsItHas) {
   EXPECT_TRUE(sut.try_wait());
   EXPECT_TRUE(sut.wait());
   EXPECT_FALSE(sut.try_wait());
-  EXPECT_FALSE(sut.wait(in(std::chrono::milliseconds(1))));
+  EXPECT_FALSE(sut.wait(soon(std::chrono::milliseconds(1))));
   EXPECT_TRUE(sut.post());
   EXPECT_EQ(sut.value(), 1U);
   EXPECT_TRUE(sut.wait());
@@ -52,7 +52,7 @@ TEST(CountingSemaphore, EachPostLetsOneWaiterGoOn) {
 
 TEST(CountingSemaphore, UnitThatAKilledPosterAddedWithoutAWakeIsFound) {
   alignas(4) CountingSemaphore sut;
-  std::thread waiter([&] { EXPECT_TRUE(sut.wait(in(std::chrono::seconds(20)))); });
+  std::thread waiter([&] { EXPECT_TRUE(sut.wait(soon(std::chrono::seconds(20)))); });
   std::this_thread::sleep_for(std::chrono::milliseconds(5));
   // As post() leaves it between its two steps.
   reinterpret_cast<std::atomic<std::uint32_t>&>(sut).fetch_add(2);

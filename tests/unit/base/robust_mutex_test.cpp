@@ -22,7 +22,7 @@ namespace {
 using std::chrono::milliseconds;
 
 /// Memory that children of fork() share.
-struct Shared {
+struct SharedLock {
   RobustMutex mutex;
   std::atomic<std::uint32_t> step{0};
   std::uint64_t a = 0;
@@ -32,9 +32,9 @@ struct Shared {
 class RobustMutexTest : public testing::Test {
  protected:
   RobustMutexTest()
-      : shared_(*new(::mmap(nullptr, sizeof(Shared), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1,
-                            0)) Shared) {}
-  ~RobustMutexTest() override { ::munmap(&shared_, sizeof(Shared)); }
+      : shared_(*new(::mmap(nullptr, sizeof(SharedLock), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS,
+                            -1, 0)) SharedLock) {}
+  ~RobustMutexTest() override { ::munmap(&shared_, sizeof(SharedLock)); }
 
   template <class Body>
   static pid_t in_child(Body body) {
@@ -62,7 +62,7 @@ class RobustMutexTest : public testing::Test {
   }
   static TimePoint in(milliseconds time) { return MonotonicClock::now() + time; }
 
-  Shared& shared_;
+  SharedLock& shared_;
 };
 
 TEST_F(RobustMutexTest, LocksAndUnlocks) {

@@ -287,6 +287,28 @@ TEST_F(AreasInFiles, AnObjectGivenAsADeviceTooIsRefused) {
   EXPECT_THAT(placed.error().message, ::testing::AllOf(HasSubstr("same file"), HasSubstr("l.cfg:")));
 }
 
+TEST_F(AreasInFiles, ThePoolItselfIsNoDevice) {
+  declare("data", PLC_AREA_DATA, 8);
+  std::filesystem::create_symlink("/dev/shm/" + pool_, folder_ + "/link");
+  const auto placed = place("[SysMem]\n" + device(0, "1", folder_ + "/link"));
+  ASSERT_FALSE(placed);
+  EXPECT_THAT(placed.error().message, ::testing::AllOf(HasSubstr("l.cfg:2: [SysMem] Area.0: " + folder_),
+                                                       HasSubstr("choose another file")));
+}
+
+TEST_F(AreasInFiles, ThatAreCutShortAreToldOnce) {
+  MemoryGuard::watch_process();
+  void* data = nullptr;
+  declare("data", PLC_AREA_DATA, 8, {}, &data);
+  ASSERT_TRUE(place("[SysMem]\n" + device(0, "1", file_)));
+  EXPECT_THAT(sut.look_for_losses(), ::testing::IsEmpty());
+  std::filesystem::resize_file(file_, 0);
+  EXPECT_EQ(*static_cast<volatile char*>(data), 0);
+  EXPECT_THAT(sut.look_for_losses(), ::testing::ElementsAre(::testing::AllOf(
+                                         HasSubstr("l.cfg:2: [SysMem] Area.0"), HasSubstr(file_))));
+  EXPECT_THAT(sut.look_for_losses(), ::testing::IsEmpty());
+}
+
 TEST_F(AreasInFiles, TheRetainVariablesOfTheInstanceAreNoDevice) {
   std::filesystem::create_directories(folder_);
   ASSERT_TRUE(shared_.create_memory("line1.retain", 0x2000, {.keep = true}));

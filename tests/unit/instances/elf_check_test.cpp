@@ -29,27 +29,27 @@ void put(std::vector<std::byte>& file, std::size_t offset, T value) {
   std::memcpy(file.data() + offset, &value, sizeof value);
 }
 
-std::string complaint(const std::vector<std::byte>& file) {
+std::string complaint_about(const std::vector<std::byte>& file) {
   const auto checked = check_elf(file, kInit);
   return checked ? std::string() : checked.error().message;
 }
 
 TEST(ElfCheck, AcceptsAGoodApplication) {
-  EXPECT_EQ(complaint(sample()), "");
+  EXPECT_EQ(complaint_about(sample()), "");
 }
 
 TEST(ElfCheck, RefusesTextAndNothing) {
-  EXPECT_THAT(complaint({}), HasSubstr("is not a shared object"));
+  EXPECT_THAT(complaint_about({}), HasSubstr("is not a shared object"));
   const std::string text = "int main() {}\n";
   const auto bytes = std::as_bytes(std::span(text));
-  EXPECT_THAT(complaint({bytes.begin(), bytes.end()}), HasSubstr("is not a shared object"));
+  EXPECT_THAT(complaint_about({bytes.begin(), bytes.end()}), HasSubstr("is not a shared object"));
 }
 
 TEST(ElfCheck, RefusesACopyCutShortAnywhere) {
   const auto whole = sample();
   for (std::size_t size = 0; size < whole.size(); ++size) {
     std::vector<std::byte> cut(whole.begin(), whole.begin() + static_cast<std::ptrdiff_t>(size));
-    ASSERT_NE(complaint(cut), "") << "cut to " << size << " bytes";
+    ASSERT_NE(complaint_about(cut), "") << "cut to " << size << " bytes";
   }
 }
 
@@ -68,21 +68,21 @@ TEST(ElfCheck, SurvivesAnyByteOfTheHeadersBeingWrong) {
 TEST(ElfCheck, NamesTheOtherMachine) {
   auto file = sample();
   put<Elf64_Half>(file, offsetof(Elf64_Ehdr, e_machine), EM_ARM);
-  EXPECT_THAT(complaint(file), HasSubstr("is built for 32-bit ARM; this machine is"));
+  EXPECT_THAT(complaint_about(file), HasSubstr("is built for 32-bit ARM; this machine is"));
   put<Elf64_Half>(file, offsetof(Elf64_Ehdr, e_machine), EM_RISCV);
-  EXPECT_THAT(complaint(file), HasSubstr("RISC-V"));
+  EXPECT_THAT(complaint_about(file), HasSubstr("RISC-V"));
 }
 
 TEST(ElfCheck, Refuses32BitBigEndianAndOtherTypes) {
   auto narrow = sample();
   narrow[EI_CLASS] = std::byte{ELFCLASS32};
-  EXPECT_THAT(complaint(narrow), HasSubstr("32 bit"));
+  EXPECT_THAT(complaint_about(narrow), HasSubstr("32 bit"));
   auto big = sample();
   big[EI_DATA] = std::byte{ELFDATA2MSB};
-  EXPECT_THAT(complaint(big), HasSubstr("big-endian"));
+  EXPECT_THAT(complaint_about(big), HasSubstr("big-endian"));
   auto object = sample();
   put<Elf64_Half>(object, offsetof(Elf64_Ehdr, e_type), ET_REL);
-  EXPECT_THAT(complaint(object), HasSubstr("-shared -fPIC"));
+  EXPECT_THAT(complaint_about(object), HasSubstr("-shared -fPIC"));
 }
 
 TEST(ElfCheck, NamesTheSymbolsThatAreMissing) {

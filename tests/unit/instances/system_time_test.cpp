@@ -71,31 +71,31 @@ RTS_RESULT late_us_as_ns(RTS_SYSTIME* time) {
   return late(us_as_ns, time);
 }
 
-std::string complaint(PF_SYSTIME us, PF_SYSTIME ns) {
+std::string refusal(PF_SYSTIME us, PF_SYSTIME ns) {
   const auto checked = check_system_time({"MyUs", us}, {"MyNs", ns});
   return checked ? "" : checked.error().message;
 }
 
 TEST(SystemTime, TakesTwoFunctionsOfOneBase) {
-  EXPECT_EQ(complaint(good_us, good_ns), "");
+  EXPECT_EQ(refusal(good_us, good_ns), "");
 }
 
 TEST(SystemTime, TakesARightClockWhateverTakesTheProcessorAway) {
   late_calls = 0;
-  EXPECT_EQ(complaint(good_us, late_good_ns), "");
+  EXPECT_EQ(refusal(good_us, late_good_ns), "");
 }
 
 TEST(SystemTime, FindsAWrongPaceWhateverTakesTheProcessorAway) {
   late_calls = 0;
-  EXPECT_THAT(complaint(ms_as_us, late_us_as_ns), HasSubstr("MyNs advanced by"));
+  EXPECT_THAT(refusal(ms_as_us, late_us_as_ns), HasSubstr("MyNs advanced by"));
 }
 
 TEST(SystemTime, RefusesWhatApplicationsCouldNotRelyOn) {
-  EXPECT_THAT(complaint(other_base, good_ns), HasSubstr("MyUs and MyNs have no common base"));
-  EXPECT_THAT(complaint(failing, good_ns), HasSubstr("MyUs returned 0x0001, not ERR_OK"));
-  EXPECT_THAT(complaint(good_us, backwards), HasSubstr("MyNs went back from"));
-  EXPECT_THAT(complaint(still_us, still), HasSubstr("MyNs stays at 7000000"));
-  EXPECT_THAT(complaint(ms_as_us, us_as_ns), HasSubstr("MyNs advanced by"));
+  EXPECT_THAT(refusal(other_base, good_ns), HasSubstr("MyUs and MyNs have no common base"));
+  EXPECT_THAT(refusal(failing, good_ns), HasSubstr("MyUs returned 0x0001, not ERR_OK"));
+  EXPECT_THAT(refusal(good_us, backwards), HasSubstr("MyNs went back from"));
+  EXPECT_THAT(refusal(still_us, still), HasSubstr("MyNs stays at 7000000"));
+  EXPECT_THAT(refusal(ms_as_us, us_as_ns), HasSubstr("MyNs advanced by"));
 }
 
 TEST(SystemTime, IsClockMonotonicInAllThreeUnitsByDefault) {

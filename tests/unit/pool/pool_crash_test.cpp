@@ -112,6 +112,7 @@ TEST_F(PoolCrash, AttachWaitsForAPoolThatIsBeingMade) {
   create(64);
   const MemoryFile memory = map();
   header_of(memory).magic.store(0);
+  header_of(memory).magic_again.store(0);
   std::thread maker([&] {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
     header_of(memory).magic.store(kPoolMagic, std::memory_order_release);
@@ -235,6 +236,7 @@ TEST_F(PoolCrash, RefusesWhatIsNotAPoolOfThisVersionAndSize) {
   create(64);
   const MemoryFile memory = map();
   PoolHeader& header = header_of(memory);
+  header.magic_again.store(0);
   const auto refused = [&] { return ObjectPool::attach(name_.get()).error().code == ErrorCode::corrupt; };
   for (std::uint32_t* field :
        {&header.version, &header.entry_size, &header.max_objects, &header.bucket_count}) {
@@ -259,10 +261,25 @@ TEST_F(PoolCrash, AHeaderThatAStrangerWroteOverIsMendedByWhoHasItOpen) {
   auto sut = create(64);
   const MemoryFile memory = map();
   std::ranges::fill(memory.bytes().first(offsetof(PoolHeader, mutex)), std::byte{0x5a});
+  header_of(memory).max_objects_again = 0;
   EXPECT_EQ(ObjectPool::attach(name_.get()).error().code, ErrorCode::corrupt);
   EXPECT_EQ(sut.tidy().headers_mended, 1U);
   EXPECT_TRUE(ObjectPool::attach(name_.get()));
   EXPECT_EQ(sut.tidy().headers_mended, 0U) << "it is told once";
+}
+
+TEST_F(PoolCrash, AHeaderThatAStrangerWroteOverKeepsNobodyFromAttaching) {
+  auto first = create(64);
+  first.create_event("kept")->set_registered(true);
+  const MemoryFile memory = map();
+  for (const std::uint8_t byte : {0x5a, 0x00, 0xff}) {
+    std::ranges::fill(memory.bytes().first(offsetof(PoolHeader, mutex)), std::byte{byte});
+    EXPECT_TRUE(ObjectPool::attach(name_.get(), ObjectPool::Access::read_only));
+    auto sut = ObjectPool::attach(name_.get());
+    ASSERT_TRUE(sut) << sut.error().describe();
+    EXPECT_TRUE(sut->create_event("new"));
+    EXPECT_EQ(header_of(memory).magic.load(), kPoolMagic) << "and it is mended";
+  }
 }
 
 TEST_F(PoolCrash, RefusesAFileThatIsShorterThanItsHeaderSays) {

@@ -23,7 +23,7 @@
 namespace plchost {
 namespace {
 
-constexpr std::uint32_t kObjects = 16;
+constexpr std::uint32_t kPlaces = 16;
 
 using Work = std::function<void(ObjectPool&)>;
 
@@ -35,7 +35,7 @@ class EachInstruction : public testing::Test {
 #endif
   }
   EachInstruction()
-      : pool_(std::move(ObjectPool::create(name_.get(), {.max_objects = kObjects}).value())),
+      : pool_(std::move(ObjectPool::create(name_.get(), {.max_objects = kPlaces}).value())),
         memory_(std::move(MemoryFile::open(name_.get(), 1, MemoryFile::Access::read_write).value())) {}
 
   /// Where the pool's file is mapped in this process.
@@ -112,7 +112,7 @@ class EachInstruction : public testing::Test {
 
   void campaign(const Work& before, const Work& call) {
     constexpr int kSteps = 24;  // more than there are between two notes
-    const PoolView view(memory_.bytes(), kObjects);
+    const PoolView view(memory_.bytes(), kPlaces);
     int writes = 1;
     for (int steps = 0; kill_within(before, call, writes, steps); ++steps) {
       const std::string where = fmt::format("{} instructions after note {}", steps, writes);
@@ -182,7 +182,7 @@ TEST_F(EachInstruction, OfTheReleaseOfWhatADeadOneHeld) {
 }
 
 TEST_F(EachInstruction, OfMakingAnEventInThePlaceOfOneThatNobodyNeeds) {
-  for (std::uint32_t i = 0; i < kObjects; ++i) ASSERT_TRUE(pool_.create_event("event" + std::to_string(i)));
+  for (std::uint32_t i = 0; i < kPlaces; ++i) ASSERT_TRUE(pool_.create_event("event" + std::to_string(i)));
   campaign([](ObjectPool&) {},
            [made = 0](ObjectPool& pool) mutable { (void)pool.create_event("new" + std::to_string(made++)); });
 }

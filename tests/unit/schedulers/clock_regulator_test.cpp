@@ -20,8 +20,8 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 using Verdict = ClockRegulator::Verdict;
 
-constexpr TimePoint kOrigin{seconds(5000)};
-constexpr double kPpm = 1e-6;
+constexpr TimePoint kPowerOn{seconds(5000)};
+constexpr double kMillionth = 1e-6;
 constexpr double kNoiseNs = 200;
 
 class Regulator : public testing::Test {
@@ -46,25 +46,25 @@ class Regulator : public testing::Test {
 
   DistributedClockSettings settings;
   ClockRegulator sut{settings};
-  SimulatedReference reference{kOrigin, 100 * kPpm, kNoiseNs};
-  TimePoint now = kOrigin;
+  SimulatedReference reference{kPowerOn, 100 * kMillionth, kNoiseNs};
+  TimePoint now = kPowerOn;
   Duration spacing = milliseconds(1);
   Verdict last = Verdict::taken;
 };
 
 TEST_F(Regulator, IsUsableAfterAFewPairsAndKnowsDriftAndPhase) {
-  feed_until(kOrigin + 7 * spacing);
+  feed_until(kPowerOn + 7 * spacing);
   EXPECT_FALSE(sut.usable());
-  feed_until(kOrigin + 8 * spacing);
+  feed_until(kPowerOn + 8 * spacing);
   EXPECT_TRUE(sut.usable());
-  feed_until(kOrigin + milliseconds(500));
-  EXPECT_NEAR(sut.model().drift, 100 * kPpm, 0.5 * kPpm);
+  feed_until(kPowerOn + milliseconds(500));
+  EXPECT_NEAR(sut.model().drift, 100 * kMillionth, 0.5 * kMillionth);
   EXPECT_LT(std::abs(error_at(now)), 100);
 }
 
 TEST_F(Regulator, HoldsTheLineTenTimesTighterThanTheNoise) {
-  feed_until(kOrigin + seconds(2));
-  const auto errors = feed_until(kOrigin + seconds(60));
+  feed_until(kPowerOn + seconds(2));
+  const auto errors = feed_until(kPowerOn + seconds(60));
   EXPECT_LT(percentile(errors, 0.5), 20);
   EXPECT_LT(percentile(errors, 0.99), 60);
 }
@@ -75,17 +75,17 @@ TEST_F(Regulator, HoldsItAtAnyRateOfPairs) {
     sut = ClockRegulator(settings);
     spacing = rate;
     const TimePoint begin = now;
-    reference.set_drift(100 * kPpm, begin);
+    reference.set_drift(100 * kMillionth, begin);
     feed_until(begin + 200 * rate);
     EXPECT_LT(percentile(feed_until(begin + 5000 * rate), 0.99), 60) << rate.count();
   }
 }
 
 TEST_F(Regulator, HoldsItWhenAWriterIsLateAndCatchesUpInBursts) {
-  feed_until(kOrigin + seconds(2));
+  feed_until(kPowerOn + seconds(2));
   std::mt19937_64 random(5);
   std::vector<double> errors;
-  while (now < kOrigin + seconds(60)) {
+  while (now < kPowerOn + seconds(60)) {
     const Duration gap = milliseconds(1 + static_cast<int>(random() % 30));
     const TimePoint late = now + gap;
     for (int i = 0; i < gap / milliseconds(1); ++i) sut.feed(reference.stamp(late + i * microseconds(25)));
@@ -96,16 +96,16 @@ TEST_F(Regulator, HoldsItWhenAWriterIsLateAndCatchesUpInBursts) {
 }
 
 TEST_F(Regulator, FollowsADriftThatChangesSuddenly) {
-  feed_until(kOrigin + seconds(5));
-  reference.set_drift(-200 * kPpm, now);
+  feed_until(kPowerOn + seconds(5));
+  reference.set_drift(-200 * kMillionth, now);
   feed_until(now + milliseconds(500));
   EXPECT_EQ(last, Verdict::taken);
   EXPECT_LT(percentile(feed_until(now + seconds(5)), 0.99), 60);
-  EXPECT_NEAR(sut.model().drift, -200 * kPpm, 1 * kPpm);
+  EXPECT_NEAR(sut.model().drift, -200 * kMillionth, 1 * kMillionth);
 }
 
 TEST_F(Regulator, LeavesASingleWildPairOut) {
-  feed_until(kOrigin + seconds(3));
+  feed_until(kPowerOn + seconds(3));
   for (const Duration wild :
        {Duration(microseconds(50)), Duration(milliseconds(-3)), Duration(seconds(90'000))}) {
     ReferencePair pair = reference.stamp(now);
@@ -121,7 +121,7 @@ TEST_F(Regulator, LeavesASingleWildPairOut) {
 TEST_F(Regulator, KeepsTheLineThoughEveryTenthPairIsWild) {
   std::mt19937_64 random(7);
   std::uniform_int_distribution<std::int64_t> wild(-1'000'000, 1'000'000);
-  feed_until(kOrigin + seconds(2));
+  feed_until(kPowerOn + seconds(2));
   std::vector<double> errors;
   for (int i = 0; i < 30'000; ++i, now += spacing) {
     ReferencePair pair = reference.stamp(now);
@@ -133,21 +133,21 @@ TEST_F(Regulator, KeepsTheLineThoughEveryTenthPairIsWild) {
 }
 
 TEST_F(Regulator, FollowsAStepAfterPairsThatAgreeAndKeepsTheDrift) {
-  feed_until(kOrigin + seconds(3));
+  feed_until(kPowerOn + seconds(3));
   reference.step(milliseconds(7));
   for (std::uint32_t i = 1; i < ClockRegulator::kStepPairs; ++i, now += spacing) {
     EXPECT_EQ(sut.feed(reference.stamp(now)), Verdict::outlier);
   }
   EXPECT_EQ(sut.feed(reference.stamp(now)), Verdict::stepped);
   EXPECT_LT(std::abs(error_at(now)), 2 * kNoiseNs);
-  EXPECT_NEAR(sut.model().drift, 100 * kPpm, 1 * kPpm);
+  EXPECT_NEAR(sut.model().drift, 100 * kMillionth, 1 * kMillionth);
   now += spacing;
   feed_until(now + milliseconds(300));
   EXPECT_LT(percentile(feed_until(now + seconds(5)), 0.99), 60);
 }
 
 TEST_F(Regulator, FollowsATimeThatRunsBackwardsAsAStep) {
-  feed_until(kOrigin + seconds(3));
+  feed_until(kPowerOn + seconds(3));
   reference.step(-seconds(86'400));
   feed_until(now + milliseconds(300));
   EXPECT_EQ(last, Verdict::taken);
@@ -164,41 +164,41 @@ TEST_F(Regulator, RecoversFromAWildFirstPair) {
 }
 
 TEST_F(Regulator, WidensItsToleranceForANoisyReference) {
-  reference = SimulatedReference(kOrigin, 100 * kPpm, 20'000);
-  feed_until(kOrigin + seconds(5));
-  EXPECT_LT(percentile(feed_until(kOrigin + seconds(30)), 0.99), 6'000);
+  reference = SimulatedReference(kPowerOn, 100 * kMillionth, 20'000);
+  feed_until(kPowerOn + seconds(5));
+  EXPECT_LT(percentile(feed_until(kPowerOn + seconds(30)), 0.99), 6'000);
 }
 
 TEST_F(Regulator, FollowsANoiseThatGrows) {
   for (const double noise_ns : {1'000.0, 5'000.0, 50'000.0}) {
     sut = ClockRegulator(settings);
     const TimePoint begin = now;
-    reference = SimulatedReference(begin, 100 * kPpm, kNoiseNs);
+    reference = SimulatedReference(begin, 100 * kMillionth, kNoiseNs);
     feed_until(begin + seconds(3));
-    reference = SimulatedReference(begin, 100 * kPpm, noise_ns, 2);
+    reference = SimulatedReference(begin, 100 * kMillionth, noise_ns, 2);
     feed_until(begin + seconds(8));
     EXPECT_LT(percentile(feed_until(begin + seconds(30)), 0.99), 0.3 * noise_ns);
     EXPECT_EQ(last, Verdict::taken);
-    EXPECT_NEAR(sut.model().drift, 100 * kPpm, 20 * kPpm);
+    EXPECT_NEAR(sut.model().drift, 100 * kMillionth, 20 * kMillionth);
   }
 }
 
 TEST_F(Regulator, StepsInNoiseAreFollowed) {
-  reference = SimulatedReference(kOrigin, 100 * kPpm, 20'000);
-  feed_until(kOrigin + seconds(5));
+  reference = SimulatedReference(kPowerOn, 100 * kMillionth, 20'000);
+  feed_until(kPowerOn + seconds(5));
   reference.step(milliseconds(1));
   feed_until(now + milliseconds(100));
   EXPECT_LT(percentile(feed_until(now + seconds(5)), 0.99), 8'000);
 }
 
 TEST_F(Regulator, StepOntoALineOfAnotherDriftIsFollowed) {
-  for (const double drift : {3000 * kPpm, -4000 * kPpm, 100 * kPpm}) {
+  for (const double drift : {3000 * kMillionth, -4000 * kMillionth, 100 * kMillionth}) {
     feed_until(now + seconds(3));
     reference.step(milliseconds(3));
     reference.set_drift(drift, now);
     feed_until(now + milliseconds(300));
     EXPECT_LT(percentile(feed_until(now + seconds(5)), 0.99), 60);
-    EXPECT_NEAR(sut.model().drift, drift, 1 * kPpm);
+    EXPECT_NEAR(sut.model().drift, drift, 1 * kMillionth);
   }
 }
 
@@ -232,10 +232,10 @@ class BrokenReference : public Regulator, public testing::WithParamInterface<std
 
 TEST_P(BrokenReference, IsNeverFollowedAndTheRightOneAtOnce) {
   spacing = std::get<Duration>(GetParam());
-  feed_until(kOrigin + 4000 * spacing);
+  feed_until(kPowerOn + 4000 * spacing);
   const double drift = sut.model().drift;
   EXPECT_LE(taken_of(6000), 3);
-  EXPECT_NEAR(sut.model().drift, drift, 20 * kPpm) << "what hold-over goes on with";
+  EXPECT_NEAR(sut.model().drift, drift, 20 * kMillionth) << "what hold-over goes on with";
   feed_until(now + 200 * spacing);
   EXPECT_EQ(last, Verdict::taken);
   EXPECT_LT(percentile(feed_until(now + 4000 * spacing), 0.99), 100);
@@ -251,11 +251,11 @@ TEST_P(BrokenReference, IsNotFollowedFromTheStart) {
 
 TEST_P(BrokenReference, IsNotFollowedAfterANoisyOne) {
   spacing = std::get<Duration>(GetParam());
-  reference = SimulatedReference(kOrigin, 100 * kPpm, 5'000);
-  feed_until(kOrigin + 4000 * spacing);
+  reference = SimulatedReference(kPowerOn, 100 * kMillionth, 5'000);
+  feed_until(kPowerOn + 4000 * spacing);
   const double drift = sut.model().drift;
   EXPECT_LE(taken_of(6000), 3);
-  EXPECT_NEAR(sut.model().drift, drift, 20 * kPpm);
+  EXPECT_NEAR(sut.model().drift, drift, 20 * kMillionth);
 }
 
 constexpr std::array kBroken = {
@@ -281,7 +281,7 @@ INSTANTIATE_TEST_SUITE_P(Kinds, BrokenReference,
                          });
 
 TEST_F(Regulator, KeepsTheDriftOverASilenceAndFindsBackQuickly) {
-  feed_until(kOrigin + seconds(5));
+  feed_until(kPowerOn + seconds(5));
   now += seconds(60);
   EXPECT_LT(std::abs(error_at(now)), 60'000) << "1 ppm of a minute";
   feed_until(now + milliseconds(200));
@@ -289,7 +289,7 @@ TEST_F(Regulator, KeepsTheDriftOverASilenceAndFindsBackQuickly) {
 }
 
 TEST_F(Regulator, RefusesStampsOutOfOrderAndOutOfRange) {
-  feed_until(kOrigin + seconds(1));
+  feed_until(kPowerOn + seconds(1));
   const ClockModel before = sut.model();
   ReferencePair pair = reference.stamp(before.local);
   EXPECT_EQ(sut.feed(pair), Verdict::out_of_order);
@@ -322,7 +322,7 @@ TEST_F(Regulator, StaysFiniteAndBoundedWhateverItIsFed) {
     ASSERT_TRUE(std::isfinite(sut.bias_ns()));
     ASSERT_LE(std::abs(sut.model().drift), ClockRegulator::kMaxDrift);
   }
-  reference.set_drift(50 * kPpm, now);
+  reference.set_drift(50 * kMillionth, now);
   feed_until(now + seconds(3));
   EXPECT_LT(percentile(feed_until(now + seconds(3)), 0.99), 100) << "and finds back to a good reference";
 }

@@ -8,22 +8,22 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::nanoseconds;
 
-constexpr TimePoint kOrigin{std::chrono::seconds(5)};
+constexpr TimePoint kGridOrigin{std::chrono::seconds(5)};
 constexpr Duration kInterval = milliseconds(10);
 
 TimePoint at(Duration since_origin) {
-  return kOrigin + since_origin;
+  return kGridOrigin + since_origin;
 }
 
 TEST(ReleaseGrid, BeginsAtItsOrigin) {
-  const ReleaseGrid sut(kOrigin, kInterval, LatePolicy::next);
-  EXPECT_EQ(sut.plan(at(-milliseconds(7))).release, kOrigin);
-  EXPECT_EQ(sut.plan(kOrigin).release, kOrigin);
-  EXPECT_EQ(sut.plan(kOrigin).lost_cycles, 0U);
+  const ReleaseGrid sut(kGridOrigin, kInterval, LatePolicy::next);
+  EXPECT_EQ(sut.plan(at(-milliseconds(7))).release, kGridOrigin);
+  EXPECT_EQ(sut.plan(kGridOrigin).release, kGridOrigin);
+  EXPECT_EQ(sut.plan(kGridOrigin).lost_cycles, 0U);
 }
 
 TEST(ReleaseGrid, PlansFromTheReleaseBeforeNotFromNow) {
-  ReleaseGrid sut(kOrigin, kInterval, LatePolicy::next);
+  ReleaseGrid sut(kGridOrigin, kInterval, LatePolicy::next);
   for (int i = 0; i < 1000; ++i) {
     const TimePoint planned = at(i * kInterval);
     const auto plan = sut.plan(planned - kInterval + milliseconds(i % 9));
@@ -33,22 +33,22 @@ TEST(ReleaseGrid, PlansFromTheReleaseBeforeNotFromNow) {
 }
 
 TEST(ReleaseGrid, GivesTheSameAnswerUntilACycleRan) {
-  const ReleaseGrid sut(kOrigin, kInterval, LatePolicy::next);
+  const ReleaseGrid sut(kGridOrigin, kInterval, LatePolicy::next);
   EXPECT_EQ(sut.plan(at(milliseconds(25))).lost_cycles, 3U);
   EXPECT_EQ(sut.plan(at(milliseconds(25))).lost_cycles, 3U);
 }
 
 TEST(ReleaseGrid, NextSkipsWholePeriodsAndStaysOnTheGrid) {
-  ReleaseGrid sut(kOrigin, kInterval, LatePolicy::next);
-  sut.ran(kOrigin);
+  ReleaseGrid sut(kGridOrigin, kInterval, LatePolicy::next);
+  sut.ran(kGridOrigin);
   const auto plan = sut.plan(at(milliseconds(35)));
   EXPECT_EQ(plan.release, at(milliseconds(40)));
   EXPECT_EQ(plan.lost_cycles, 3U);
 }
 
 TEST(ReleaseGrid, NextRunsAReleaseThatComesJustWhenTheTaskIsBack) {
-  ReleaseGrid sut(kOrigin, kInterval, LatePolicy::next);
-  sut.ran(kOrigin);
+  ReleaseGrid sut(kGridOrigin, kInterval, LatePolicy::next);
+  sut.ran(kGridOrigin);
   EXPECT_EQ(sut.plan(at(milliseconds(10))).lost_cycles, 0U);
   EXPECT_EQ(sut.plan(at(milliseconds(10))).release, at(milliseconds(10)));
   EXPECT_EQ(sut.plan(at(milliseconds(10) + nanoseconds(1))).release, at(milliseconds(20)));
@@ -56,8 +56,8 @@ TEST(ReleaseGrid, NextRunsAReleaseThatComesJustWhenTheTaskIsBack) {
 }
 
 TEST(ReleaseGrid, AsapRunsTheLastMissedReleaseAtOnce) {
-  ReleaseGrid sut(kOrigin, kInterval, LatePolicy::asap);
-  sut.ran(kOrigin);
+  ReleaseGrid sut(kGridOrigin, kInterval, LatePolicy::asap);
+  sut.ran(kGridOrigin);
   const auto plan = sut.plan(at(milliseconds(35)));
   EXPECT_EQ(plan.release, at(milliseconds(30)));
   EXPECT_EQ(plan.lost_cycles, 2U);
@@ -66,15 +66,15 @@ TEST(ReleaseGrid, AsapRunsTheLastMissedReleaseAtOnce) {
 }
 
 TEST(ReleaseGrid, AsapThatIsNotLateWaitsForItsRelease) {
-  const ReleaseGrid sut(kOrigin, kInterval, LatePolicy::asap);
-  EXPECT_EQ(sut.plan(at(-milliseconds(1))).release, kOrigin);
+  const ReleaseGrid sut(kGridOrigin, kInterval, LatePolicy::asap);
+  EXPECT_EQ(sut.plan(at(-milliseconds(1))).release, kGridOrigin);
   EXPECT_EQ(sut.plan(at(-milliseconds(1))).lost_cycles, 0U);
 }
 
 TEST(ReleaseGrid, RunsAndLossesAddUpToAllReleases) {
   for (const LatePolicy late : {LatePolicy::next, LatePolicy::asap}) {
-    ReleaseGrid sut(kOrigin, kInterval, late);
-    TimePoint ready = kOrigin;
+    ReleaseGrid sut(kGridOrigin, kInterval, late);
+    TimePoint ready = kGridOrigin;
     std::uint64_t all = 0;
     for (int i = 1; i < 500; ++i) {
       const auto plan = sut.plan(ready);
@@ -87,19 +87,19 @@ TEST(ReleaseGrid, RunsAndLossesAddUpToAllReleases) {
 }
 
 TEST(ReleaseGrid, TakesTheLongestIntervalAndTheShortest) {
-  ReleaseGrid longest(kOrigin, kMaxInterval, LatePolicy::next);
-  longest.ran(kOrigin);
+  ReleaseGrid longest(kGridOrigin, kMaxInterval, LatePolicy::next);
+  longest.ran(kGridOrigin);
   EXPECT_EQ(longest.plan(at(3 * kMaxInterval)).release, at(3 * kMaxInterval));
-  ReleaseGrid shortest(kOrigin, nanoseconds(1), LatePolicy::next);
-  shortest.ran(kOrigin);
+  ReleaseGrid shortest(kGridOrigin, nanoseconds(1), LatePolicy::next);
+  shortest.ran(kGridOrigin);
   EXPECT_EQ(shortest.plan(at(kMaxInterval)).release, at(kMaxInterval));
 }
 
 TEST(ReleaseGrid, NewIntervalBeginsBehindTheReleaseThatIsPlanned) {
-  ReleaseGrid sut(kOrigin, kInterval, LatePolicy::next);
-  sut.ran(kOrigin);
+  ReleaseGrid sut(kGridOrigin, kInterval, LatePolicy::next);
+  sut.ran(kGridOrigin);
   sut.set_interval(nanoseconds(2'500'001));
-  EXPECT_EQ(sut.plan(kOrigin).release, at(kInterval));
+  EXPECT_EQ(sut.plan(kGridOrigin).release, at(kInterval));
   sut.ran(at(kInterval));
   EXPECT_EQ(sut.plan(at(kInterval)).release, at(kInterval + nanoseconds(2'500'001)));
   EXPECT_EQ(sut.plan(at(2 * kInterval)).lost_cycles, 3U);

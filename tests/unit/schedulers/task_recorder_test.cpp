@@ -13,7 +13,7 @@ using std::chrono::microseconds;
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-constexpr TimePoint kOrigin{seconds(100)};
+constexpr TimePoint kFirstRelease{seconds(100)};
 
 class Recorder : public testing::Test {
  protected:
@@ -29,7 +29,7 @@ class Recorder : public testing::Test {
   /// The cycle of release number `n`.
   static RecordedCycle cycle(int n, Duration latency = {}, Duration execution = milliseconds(1)) {
     RecordedCycle made;
-    made.release = kOrigin + n * kInterval;
+    made.release = kFirstRelease + n * kInterval;
     made.start = made.release + latency;
     made.end = made.start + execution;
     made.interval = kInterval;
@@ -37,11 +37,11 @@ class Recorder : public testing::Test {
   }
 
   TaskStatistics statistics_{HistogramShape::kFine};
-  TaskRecorder sut_{statistics_, kOrigin};
+  TaskRecorder sut_{statistics_, kFirstRelease};
 };
 
 TEST_F(Recorder, ShowsSinceWhenItCountsBeforeTheFirstCycle) {
-  EXPECT_EQ(read().since_ns, kOrigin.time_since_epoch().count());
+  EXPECT_EQ(read().since_ns, kFirstRelease.time_since_epoch().count());
   EXPECT_GT(read().since_unix_ns, 0);
   EXPECT_EQ(read().cycles, 0U);
 }
@@ -136,7 +136,7 @@ TEST_F(Recorder, ResetBeginsAllAnewButTheCycleCountAndTheInterval) {
     one.spun = microseconds(7);
     sut_.record(one);
   }
-  const TimePoint later = kOrigin + seconds(1);
+  const TimePoint later = kFirstRelease + seconds(1);
   ASSERT_TRUE(sut_.reset(later));
   const auto is_fresh = [&](std::uint64_t cycles) {
     TaskCounters expected{};
@@ -179,7 +179,7 @@ TEST_F(Recorder, ResetWhileItRecordsLeavesNothingOfBefore) {
     number = i;
     // A cycle that has read the number before is done when two more are.
     for (const std::uint64_t now = read().cycles; read().cycles < now + 2;) std::this_thread::yield();
-    while (!sut_.reset(kOrigin + seconds(i))) std::this_thread::yield();
+    while (!sut_.reset(kFirstRelease + seconds(i))) std::this_thread::yield();
     for (const std::uint64_t now = read().cycles; read().cycles < now + 2;) std::this_thread::yield();
     EXPECT_EQ(read().latency_min_ns, 100'000 * (i + 1));
     EXPECT_EQ(statistics_.latency.percentile(0), statistics_.latency.percentile(1.0));
@@ -192,7 +192,7 @@ TEST_F(Recorder, ResetWhileItRecordsLeavesNothingOfBefore) {
   EXPECT_EQ(statistics_.jitter_negative.total() + statistics_.jitter_positive.total(), read().periods);
   EXPECT_EQ(read().cycles, sut_.counters().cycles);
   EXPECT_EQ(sut_.counters().cycles,
-            static_cast<std::uint64_t>(read().release_ns - kOrigin.time_since_epoch().count()) /
+            static_cast<std::uint64_t>(read().release_ns - kFirstRelease.time_since_epoch().count()) /
                     static_cast<std::uint64_t>(kInterval.count()) +
                 1)
       << "none is missing in the cycle count";

@@ -13,7 +13,7 @@ namespace {
 
 using std::chrono::milliseconds;
 using std::chrono::seconds;
-using Verdict = OverrunRule::Verdict;
+using Answer = OverrunRule::Verdict;
 
 TaskConfig task_with(Duration interval, TaskWatchdog watchdog = {}) {
   TaskConfig task;
@@ -68,36 +68,36 @@ TEST(CycleLimit, IsNoneIfTheGuardIsOff) {
 
 TEST(OverrunRule, WithoutTimeAllowsEverything) {
   OverrunRule sut({});
-  for (int i = 0; i < 10; ++i) EXPECT_EQ(sut.ended(seconds(100)), Verdict::fine);
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(sut.ended(seconds(100)), Answer::fine);
 }
 
 TEST(OverrunRule, HitsWhenOneCycleIsLongerThanTimeTimesSensitivityEvenTheFirst) {
   OverrunRule sut({.time = milliseconds(2), .sensitivity = 4});
-  EXPECT_EQ(sut.ended(milliseconds(8)), Verdict::fine);
+  EXPECT_EQ(sut.ended(milliseconds(8)), Answer::fine);
   sut.forgive_next();
-  EXPECT_EQ(sut.ended(milliseconds(8) + Duration(1)), Verdict::too_long);
+  EXPECT_EQ(sut.ended(milliseconds(8) + Duration(1)), Answer::too_long);
 }
 
 TEST(OverrunRule, HitsAtTheNthInARowAndNotBefore) {
   OverrunRule sut({.time = milliseconds(2), .sensitivity = 3});
-  EXPECT_EQ(sut.ended(milliseconds(1)), Verdict::fine);
-  EXPECT_EQ(sut.ended(milliseconds(3)), Verdict::fine);
-  EXPECT_EQ(sut.ended(milliseconds(3)), Verdict::fine);
-  EXPECT_EQ(sut.ended(milliseconds(2)), Verdict::fine);  // exactly the time is no overrun
-  EXPECT_EQ(sut.ended(milliseconds(3)), Verdict::fine);
-  EXPECT_EQ(sut.ended(milliseconds(3)), Verdict::fine);
-  EXPECT_EQ(sut.ended(milliseconds(3)), Verdict::too_many_in_a_row);
+  EXPECT_EQ(sut.ended(milliseconds(1)), Answer::fine);
+  EXPECT_EQ(sut.ended(milliseconds(3)), Answer::fine);
+  EXPECT_EQ(sut.ended(milliseconds(3)), Answer::fine);
+  EXPECT_EQ(sut.ended(milliseconds(2)), Answer::fine);  // exactly the time is no overrun
+  EXPECT_EQ(sut.ended(milliseconds(3)), Answer::fine);
+  EXPECT_EQ(sut.ended(milliseconds(3)), Answer::fine);
+  EXPECT_EQ(sut.ended(milliseconds(3)), Answer::too_many_in_a_row);
   EXPECT_EQ(sut.in_a_row(), 3U);
 }
 
 TEST(OverrunRule, FirstCycleAfterAnExchangeOfTheSchedulerIsNotCounted) {
   OverrunRule sut({.time = milliseconds(2), .sensitivity = 2});
-  EXPECT_EQ(sut.ended(milliseconds(3)), Verdict::fine);  // the first of all
-  EXPECT_EQ(sut.ended(milliseconds(3)), Verdict::fine);
+  EXPECT_EQ(sut.ended(milliseconds(3)), Answer::fine);  // the first of all
+  EXPECT_EQ(sut.ended(milliseconds(3)), Answer::fine);
   sut.forgive_next();
-  EXPECT_EQ(sut.ended(milliseconds(3)), Verdict::fine);
-  EXPECT_EQ(sut.ended(milliseconds(3)), Verdict::fine);
-  EXPECT_EQ(sut.ended(milliseconds(3)), Verdict::too_many_in_a_row);
+  EXPECT_EQ(sut.ended(milliseconds(3)), Answer::fine);
+  EXPECT_EQ(sut.ended(milliseconds(3)), Answer::fine);
+  EXPECT_EQ(sut.ended(milliseconds(3)), Answer::too_many_in_a_row);
 }
 
 class LoadRuleTest : public testing::Test {
