@@ -38,6 +38,8 @@ std::vector<std::string> ApiServer::arguments() const {
                                         config_.blocks.base,
                                         "--host-number",
                                         fmt::format("{}", config_.blocks.host_number),
+                                        "--audit-folder",
+                                        fmt::format("{}/audit.{}", host.state_directory, host.name),
                                         "--log-level",
                                         host.log_level};
   for (const std::string& peer : config_.dds.peers) {

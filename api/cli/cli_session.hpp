@@ -73,6 +73,7 @@ void add_command_verbs(const Command& plcctl, CliSession& session);
 void add_check_verb(const Command& plcctl, CliSession& session);
 void add_post_verb(const Command& plcctl, CliSession& session);
 void add_watch_verb(const Command& plcctl, CliSession& session);
+void add_verify_verb(const Command& plcctl, CliSession& session);
 void add_completion_verb(const Command& plcctl);
 
 /// "I/T" split at the first slash. invalid_argument: no slash, or nothing on one side of it.

@@ -126,6 +126,7 @@ int main(int argc, char** argv) {
   plchost::add_post_verb(plcctl, session);
   plchost::add_watch_verb(plcctl, session);
   plchost::add_security_verb(plcctl, session);
+  plchost::add_verify_verb(plcctl, session);
   plchost::add_completion_verb(plcctl);
   const std::vector<std::string> words(argv + 1, argv + argc);
   plchost::start_log("plcctl", "warning");

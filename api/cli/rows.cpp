@@ -56,7 +56,7 @@ std::string time_text(std::int64_t unix_ns) {
 }
 
 Row to_row(const HostView& host) {
-  return {{"host", host.name},
+  Row row{{"host", host.name},
           {"version", text_of(host.status.version)},
           {"manager_pid", host.status.manager_pid},
           {"server_pid", host.server_pid},
@@ -65,6 +65,8 @@ Row to_row(const HostView& host) {
           {"events", host.status.event_count},
           {"objects", host.status.object_count},
           {"started_unix_s", to_seconds(host.status.started_unix_ns)}};
+  add_extension(row, host.status.ext);
+  return row;
 }
 
 Row to_row(const plc_InstanceStatus& status) {

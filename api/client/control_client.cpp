@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "api/client/check_names.hpp"
+#include "api/dds/claim.hpp"
 #include "api/dds/error.hpp"
 #include "api/dds/log_sink.hpp"
 #include "api/dds/samples.hpp"
@@ -48,8 +49,9 @@ Result<void> ControlClient::open(const dds::DomainOptions& options) {
   auto domain = dds::open_domain(dds::Role::client, options);
   if (!domain) return std::unexpected(domain.error());
   domain_ = std::move(*domain);
-  auto participant = dds::check_entity(dds_create_participant(options.domain, nullptr, nullptr),
-                                       fmt::format("enter DDS domain {}", options.domain));
+  auto participant =
+      dds::check_entity(dds_create_participant(options.domain, dds::client_participant_qos().get(), nullptr),
+                        fmt::format("enter DDS domain {}", options.domain));
   if (!participant) return std::unexpected(participant.error());
   participant_ = std::move(*participant);
   partition_ = dds::client_partition(dds::guid_of(participant_.get()).hex());

@@ -40,6 +40,11 @@ Qos& Qos::partition(const std::string& name) {
   return *this;
 }
 
+Qos& Qos::user_data(std::string_view text) {
+  dds_qset_userdata(qos_.get(), text.data(), text.size());
+  return *this;
+}
+
 Qos& Qos::no_autodispose() {
   dds_qset_writer_data_lifecycle(qos_.get(), false);
   return *this;

@@ -22,6 +22,7 @@ class Qos {
   Qos& max_samples(std::int32_t samples);
   Qos& deadline(Duration period);
   Qos& partition(const std::string& name);
+  Qos& user_data(std::string_view text);
   /// A writer that ends says nothing of its instances: "deleted" and "server gone" stay apart.
   Qos& no_autodispose();
 

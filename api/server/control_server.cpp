@@ -111,6 +111,8 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
     const TimePoint now = MonotonicClock::now();
     status->tick(now);
     lister.forget_old(now);
+    audit->tick(now);
+    status->set_audit_head(audit->head());
     finish(manager->expire(now));
   } else if (fd == presence_timer.get()) {
     status->write_presence();
@@ -153,6 +155,7 @@ bool ControlServer::Parts::identity_changed() {
 void ControlServer::Parts::on_wake() {
   sessions->follow_discovery();
   for (const plc_EventAck& ack : intake->collect_acks()) {
+    audit->posted(ack, MonotonicClock::now());
     sessions->write_ack(dds::Guid::from(ack.source).participant(), ack);
   }
   for (const RequestReader& request : requests) on_requests(request);
@@ -166,12 +169,14 @@ void ControlServer::Parts::on_requests(const RequestReader& source) {
     if (writer == dds::Guid{}) return;
     const plc_SampleIdentity& identity = request.header.request_identity;
     if (writer != dds::Guid::from(identity.writer_guid)) {
+      audit->asked(writer.participant(), request);
       return answer(writer.participant(), identity, ErrorCode::refused,
                     "the request's identity is not that of its writer");
     }
     const auto needed =
         source.role == ApiRole::operating ? security::Role::operating : security::Role::engineer;
     if (const auto may = guard.check(writer, needed); !may) {
+      audit->asked(writer.participant(), request);
       return answer(writer.participant(), identity, may.error().code, may.error().message);
     }
     on_request(source.role, writer, request);
@@ -183,6 +188,7 @@ void ControlServer::Parts::on_request(ApiRole role, const dds::Guid& writer, con
   const dds::Guid client = writer.participant();
   if (const auto known = sessions->remembered(client, identity)) return sessions->write_reply(client, *known);
   if (manager->is_pending(identity)) return;
+  audit->asked(client, request);
   const std::vector<std::string_view> instances(status->instances().begin(), status->instances().end());
   auto checked = check_request(request, role, options.host, instances);
   if (!checked) return answer(client, identity, checked.error().code, checked.error().describe());
@@ -284,6 +290,7 @@ bool ControlServer::Parts::collect_findings(FinishedCommand& finished) {
 
 void ControlServer::Parts::answer(const dds::Guid& client, const plc_SampleIdentity& identity, ErrorCode code,
                                   std::string_view text) {
+  audit->answered(identity, code, text);
   plc_Reply reply{};
   reply.header.related_identity = identity;
   reply.header.remote_ex = remote_exception(code);

@@ -21,6 +21,7 @@ struct ServerOptions {
   bool allow_unsecured = false;  ///< without an identity: may be on other interfaces than "lo"
   std::string blocks_base =
       std::string(kDefaultBlockBase);  ///< of the nodes that are listed, and the gateway
+  std::string audit_folder;            ///< of the log of what clients change; empty: there is none
   std::uint16_t host_number = 0;       ///< for other hosts; 0: no gateway
 };
 

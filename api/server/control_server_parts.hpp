@@ -16,6 +16,7 @@
 #include "api/server/manager_link.hpp"
 #include "api/server/node_lister.hpp"
 #include "api/server/object_lister.hpp"
+#include "api/server/request_audit.hpp"
 #include "api/server/request_check.hpp"
 #include "api/server/session_table.hpp"
 #include "api/server/status_publisher.hpp"
@@ -46,6 +47,7 @@ struct ControlServer::Parts {
   Result<void> make_readers();
   Result<void> listen();
   Result<void> open_gateway();
+  void open_audit();
   Result<void> run();
   Result<bool> dispatch(int fd);
   void on_wake();
@@ -84,6 +86,7 @@ struct ControlServer::Parts {
   std::shared_ptr<dds::Entity> domain;
   dds::Entity participant;
   std::optional<SessionTable> sessions;
+  std::optional<RequestAudit> audit;
   std::optional<StatusPublisher> status;
   dds::Entity subscriber;
   dds::Entity event_topic;

@@ -63,6 +63,7 @@ Result<void> ControlServer::Parts::open(PostLedger ledger) {
   auto made_sessions = SessionTable::create(participant.get());
   if (!made_sessions) return std::unexpected(made_sessions.error());
   sessions = std::move(*made_sessions);
+  open_audit();
   auto made_status =
       StatusPublisher::create(participant.get(), {options.host, &pool, epoch, options.run_directory});
   if (!made_status) return std::unexpected(made_status.error());
@@ -75,6 +76,25 @@ Result<void> ControlServer::Parts::open(PostLedger ledger) {
   status->write_presence();
   ask_for_findings();
   return {};
+}
+
+// Without a log the plant can be stopped, too.
+void ControlServer::Parts::open_audit() {
+  std::unique_ptr<AuditLog> log;
+  if (!options.audit_folder.empty()) {
+    auto opened = AuditLog::open({.folder = options.audit_folder});
+    if (opened) {
+      log = *std::move(opened);
+    } else {
+      spdlog::error("changes are not recorded: {}", opened.error().describe());
+    }
+  }
+  audit.emplace(std::move(log), [this](const dds::Guid& client, AuditRecord& record) {
+    if (const auto subject = guard.identity_of(client)) {
+      record.who = fmt::format("{} {}", security::to_string(subject->role), subject->name);
+    }
+    record.from = sessions->describe(client);
+  });
 }
 
 Result<void> ControlServer::Parts::open_gateway() {

@@ -119,6 +119,17 @@ Result<ControlRequest> check_request(const plc_Request& request, ApiRole role, s
   return ControlRequest{0, operation->verb, std::string(instance), std::string(argument)};
 }
 
+bool only_reads(std::int32_t operation) noexcept {
+  return operation == plc_OPERATION_CHECK_HOST || operation == plc_OPERATION_LIST_OBJECTS ||
+         operation == plc_OPERATION_LIST_NODES || operation == plc_OPERATION_LIST_ROUTES;
+}
+
+std::string operation_name(std::int32_t operation) {
+  const auto* const known = std::ranges::find(kOperations, operation, &Operation::number);
+  return known != kOperations.end() ? std::string(to_string(known->verb))
+                                    : fmt::format("operation {}", operation);
+}
+
 std::int32_t remote_exception(ErrorCode code) noexcept {
   constexpr std::int32_t kOk = 0;
   constexpr std::int32_t kInvalidArgument = 2;

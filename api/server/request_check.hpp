@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstdint>
 #include <span>
+#include <string>
 #include <string_view>
 
 #include <control.h>
@@ -19,6 +21,11 @@ enum class ApiRole : std::uint8_t { operating, engineering };
 [[nodiscard]] Result<ControlRequest> check_request(const plc_Request& request, ApiRole role,
                                                    std::string_view host,
                                                    std::span<const std::string_view> instances);
+
+/// An operation that changes nothing, by its number.
+[[nodiscard]] bool only_reads(std::int32_t operation) noexcept;
+/// Its name; "operation N" if there is none of that number.
+[[nodiscard]] std::string operation_name(std::int32_t operation);
 
 /// DDS-RPC's own code for the reply's header.
 [[nodiscard]] std::int32_t remote_exception(ErrorCode code) noexcept;

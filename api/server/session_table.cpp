@@ -4,6 +4,7 @@
 #include <string_view>
 #include <utility>
 
+#include "api/dds/claim.hpp"
 #include "api/dds/error.hpp"
 #include "api/dds/samples.hpp"
 #include "api/dds/topics.hpp"
@@ -55,7 +56,7 @@ void SessionTable::follow_participants() {
   dds::take_all<Participant>(participants_.get(), [this](const Participant& participant, const auto& info) {
     const dds::Guid client = dds::Guid::from(participant.key.v);
     if (info.instance_state == DDS_IST_ALIVE) {
-      alive_.insert(client);
+      alive_[client] = info.valid_data ? dds::claim_of(participant.qos) : std::string();
     } else {
       alive_.erase(client);
       sessions_.erase(client);
@@ -106,6 +107,12 @@ SessionTable::Session* SessionTable::session_of(const dds::Guid& client) {
     return nullptr;
   }
   return &sessions_.emplace(client, Session{.publisher = std::move(*publisher)}).first->second;
+}
+
+std::string SessionTable::describe(const dds::Guid& client) const {
+  const auto known = alive_.find(client);
+  if (known == alive_.end() || known->second.empty()) return "client " + client.hex();
+  return known->second + ", client " + client.hex();
 }
 
 void SessionTable::write_reply(const dds::Guid& client, const plc_Reply& reply) {

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <deque>
 #include <optional>
+#include <string>
 #include <unordered_map>
-#include <unordered_set>
 #include <vector>
 
 #include <control.h>
@@ -41,6 +41,9 @@ class SessionTable {
   [[nodiscard]] std::optional<plc_Reply> remembered(const dds::Guid& client,
                                                     const plc_SampleIdentity& identity) const;
 
+  /// What the client says of itself, and its GUID.
+  [[nodiscard]] std::string describe(const dds::Guid& client) const;
+
   [[nodiscard]] std::size_t size() const noexcept { return sessions_.size(); }
   [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }
   /// The readers that follow_discovery() looks at, to be listened to.
@@ -68,7 +71,7 @@ class SessionTable {
   std::array<dds::Entity, kStreams> topics_;
   dds::Entity participants_;
   dds::Entity subscriptions_;
-  std::unordered_set<dds::Guid, dds::GuidHash> alive_;
+  std::unordered_map<dds::Guid, std::string, dds::GuidHash> alive_;  // and what each claims to be
   std::unordered_map<dds::Guid, Session, dds::GuidHash> sessions_;
   std::uint64_t dropped_ = 0;
 };

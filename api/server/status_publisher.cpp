@@ -5,6 +5,7 @@
 
 #include <unistd.h>
 
+#include "api/dds/entries.hpp"
 #include "api/dds/text.hpp"
 #include "api/server/instance_extension.hpp"
 
@@ -211,8 +212,16 @@ void StatusPublisher::write_host(bool changed) {
     sample.manager_pid = host->manager_pid;
     sample.started_unix_ns = host->started_unix_ns;
   }
-  (void)hosts_.update(source_.host, sample);
+  std::vector<plc_KeyValue> ext;
+  if (!audit_head_.empty()) dds::add_entry(ext, "audit", audit_head_);
+  (void)hosts_.update(source_.host, sample, ext);
   hosts_.write();
+}
+
+void StatusPublisher::set_audit_head(std::string head) {
+  if (head == audit_head_) return;
+  audit_head_ = std::move(head);
+  write_host(true);
 }
 
 void StatusPublisher::write_presence() {

@@ -39,6 +39,9 @@ class StatusPublisher {
   /// All findings of one check of the host, in place of those of the one before.
   void publish_findings(const std::vector<HostFinding>& findings);
 
+  /// For who wants to know later that nothing was cut off the audit log.
+  void set_audit_head(std::string head);
+
   /// HostStatus.round as last written.
   [[nodiscard]] std::uint64_t round() const noexcept { return round_; }
   /// The instances that the manager has at present.
@@ -63,6 +66,7 @@ class StatusPublisher {
   void write_host(bool changed);
 
   Source source_;
+  std::string audit_head_;
   TaskWatch tasks_;
   ExceptionWatch exceptions_;
   TransitionPublisher transitions_;

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+
+#include "api/audit/audit_record.hpp"
+#include "shm/base/result.hpp"
+#include "shm/base/unique_fd.hpp"
+
+namespace plchost {
+
+/// Who changed what, in files that are only appended to; each record carries the hash of the one before, so
+/// that a change of any of them shows (see check_audit). What append() has returned from survives the death
+/// of this process, and within kSyncPeriod a loss of power. One thread; one log for each folder.
+class AuditLog {
+ public:
+  struct Options {
+    std::string folder;                              ///< made if it is not there, for its owner only
+    std::size_t file_bytes = std::size_t{16} << 20;  ///< then the next file is begun
+    std::size_t most_files = 64;                     ///< then the oldest is removed
+  };
+  static constexpr auto kSyncPeriod = std::chrono::seconds(1);
+
+  /// Goes on where the log ends. busy: another process writes it. system: it cannot be written.
+  [[nodiscard]] static Result<std::unique_ptr<AuditLog>> open(Options options);
+  ~AuditLog();
+  AuditLog(const AuditLog&) = delete;
+  AuditLog& operator=(const AuditLog&) = delete;
+
+  /// Writes one record. What cannot be written (a full disk) is counted, and the count written as soon as
+  /// something can be: until then the error is returned.
+  Result<void> append(const AuditRecord& record);
+  [[nodiscard]] const AuditHead& head() const noexcept { return head_; }
+
+ private:
+  AuditLog(Options options, UniqueFd lock) noexcept;
+  Result<void> go_on();
+  Result<void> open_file(const std::string& path);
+  Result<void> find_end(const std::string& path);
+  Result<void> next_file();
+  Result<void> write(const AuditRecord& record);
+  void sync_until_stopped(const std::stop_token& stop);
+
+  Options options_;
+  UniqueFd lock_;
+  AuditHead head_;
+  std::size_t bytes_ = 0;     // of the file
+  std::uint64_t missed_ = 0;  // records that could not be written
+  std::mutex guard_;          // of what follows
+  UniqueFd file_;
+  bool dirty_ = false;
+  std::jthread syncer_;
+};
+
+}  // namespace plchost

@@ -1,0 +1,19 @@
+#include "api/audit/sha256.hpp"
+
+#include <array>
+#include <iterator>
+
+#include <fmt/format.h>
+#include <openssl/sha.h>
+
+namespace plchost {
+
+std::string sha256(std::string_view text) {
+  std::array<unsigned char, SHA256_DIGEST_LENGTH> digest{};
+  ::SHA256(reinterpret_cast<const unsigned char*>(text.data()), text.size(), digest.data());
+  std::string hex;
+  for (const unsigned char byte : digest) fmt::format_to(std::back_inserter(hex), "{:02x}", byte);
+  return hex;
+}
+
+}  // namespace plchost

@@ -1,0 +1,106 @@
+#include <chrono>
+#include <fstream>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
+#include <unistd.h>
+
+#include "tests/integration/api/test_host.hpp"
+
+namespace plchost {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+using Records = std::vector<nlohmann::json>;
+
+class Audit : public testing::Test {
+ protected:
+  Audit() {
+    host_.write_instance(0, "line1", InstanceState::running);
+    host_.write_count(1);
+    host_.start_server({"--audit-folder", folder_});
+  }
+  [[nodiscard]] RunResult run(std::vector<std::string> arguments) const {
+    return run_plcctl(domain_.number(), std::move(arguments));
+  }
+  [[nodiscard]] Records records(const std::string& what) const {
+    Records found;
+    std::ifstream file(folder_ + "/audit.0000000001.log");
+    for (std::string line; std::getline(file, line);) {
+      auto record = nlohmann::json::parse(line);
+      if (record["what"] == what) found.push_back(std::move(record));
+    }
+    return found;
+  }
+  /// Posts are recorded a moment after they were acknowledged.
+  [[nodiscard]] Records wait_for(const std::string& what) const {
+    for (int i = 0; i < 2000 && records(what).empty(); ++i)
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    return records(what);
+  }
+
+  OwnDomain domain_;
+  TestHost host_{domain_, "hosta"};
+  std::string folder_ = host_.run_directory() + "/audit";
+};
+
+TEST_F(Audit, AnAcknowledgedChangeIsRecordedWithItsClient) {
+  ASSERT_EQ(run({"stop", "instance", "line1"}).code, 0);
+  const Records stops = records("stop");
+  ASSERT_EQ(stops.size(), 1U);
+  EXPECT_EQ(stops[0]["on"], "line1");
+  EXPECT_EQ(stops[0]["result"], "ok");
+  EXPECT_THAT(
+      stops[0]["from"].get<std::string>(),
+      AllOf(HasSubstr("plcctl "), HasSubstr(", user " + std::to_string(::getuid())), HasSubstr("client ")));
+}
+
+TEST_F(Audit, ARefusedChangeIsRecordedWithTheReason) {
+  const auto client = connect(domain_);
+  const auto reply = client->call({"hosta", plc_OPERATION_LOAD_APPLICATION, "line1", "relative.so"}, soon());
+  ASSERT_TRUE(reply) << reply.error().describe();
+  const Records loads = records("load application");
+  ASSERT_EQ(loads.size(), 1U);
+  EXPECT_EQ(loads[0]["argument"], "relative.so");
+  EXPECT_EQ(loads[0]["result"], to_string(ErrorCode::invalid_argument));
+  EXPECT_EQ(loads[0]["text"], reply->text);
+}
+
+TEST_F(Audit, LookingIsNotRecorded) {
+  ASSERT_EQ(run({"list", "instances"}).code, 0);
+  ASSERT_EQ(run({"list", "objects"}).code, 0);
+  EXPECT_TRUE(records("list objects").empty());
+}
+
+TEST_F(Audit, PostsAreCountedForEachSource) {
+  const PoolEvent ready = host_.add_event("line1", "ready");
+  ASSERT_EQ(run({"post", "event", "line1/ready", "--count", "5"}).code, 0);
+  ASSERT_NE(run({"post", "event", "line1/unknown"}).code, 0);
+  const Records posts = wait_for("post");
+  ASSERT_FALSE(posts.empty());
+  EXPECT_THAT(posts[0]["text"].get<std::string>(), HasSubstr("5 taken and 0 refused"));
+}
+
+TEST_F(Audit, IsVerifiedAndAChangeFound) {
+  for (int i = 0; i < 3; ++i) ASSERT_EQ(run({"stop", "instance", "line1"}).code, 0);
+  host_.replace_server();
+  ASSERT_EQ(run({"stop", "instance", "line1"}).code, 0);
+  const RunResult whole = run({"verify", "audit", folder_});
+  EXPECT_EQ(whole.code, 0) << whole.output;
+  EXPECT_THAT(whole.output, HasSubstr("5 records, 1 to 5"));
+  {
+    std::fstream file(folder_ + "/audit.0000000001.log");
+    file.seekp(200);
+    file << 'X';
+  }
+  const RunResult changed = run({"verify", "audit", folder_});
+  EXPECT_EQ(changed.code, 1);
+  EXPECT_THAT(changed.output, AllOf(HasSubstr("problem"), HasSubstr("audit.0000000001.log:1")));
+}
+
+}  // namespace
+}  // namespace plchost
