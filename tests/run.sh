@@ -5,6 +5,7 @@
 #   tests/run.sh NAME...   only tests whose name matches (ctest -R), in the plain build
 set -uo pipefail
 cd "$(dirname "$0")/.."
+self=tests/run.sh
 build=.build/tests
 export CCACHE_SLOPPINESS=pch_defines,time_macros  # or it would not cache what uses precompiled headers
 jobs=$(nproc)
@@ -15,22 +16,46 @@ steps=10
 # plc_app_abi, also where one is loaded for all others to see.
 export ASAN_OPTIONS=handle_segv=0:handle_sigbus=0:verify_asan_link_order=0:detect_odr_violation=0 UBSAN_OPTIONS=print_stacktrace=1 TSAN_OPTIONS=handle_segv=0:handle_sigbus=0
 log=$(mktemp)
-trap 'rm -f "$log"' EXIT
+ahead_log=$(mktemp)
+ahead=  # process group of what runs ahead
+trap '[ -z "$ahead" ] || kill -- "-$ahead" 2>/dev/null; rm -f "$log" "$ahead_log"' EXIT
+trap 'exit 130' INT TERM
 
-# run WHAT COMMAND...: one line while it runs and when it is done; the whole output only if it failed
-run() {
-  local what=$1 began=$SECONDS
-  shift
+say() { # say WHAT: the line of a step, before its result
   step=$((step + 1))
-  printf '[%d/%d] %s ...' "$step" "$steps" "$what"
-  if "$@" >"$log" 2>&1; then
-    printf ' ok (%d s)\n' $((SECONDS - began))
+  printf '[%d/%d] %s ...' "$step" "$steps" "$1"
+}
+end_step() { # end_step WHAT CODE SECONDS LOG: the whole output only if it failed
+  if [ "$2" -eq 0 ]; then
+    printf ' ok (%d s)\n' "$3"
   else
     printf ' FAILED\n'
-    tail -n 300 "$log"
-    echo "failed: $what"
+    tail -n 300 "$4"
+    echo "failed: $1"
     exit 1
   fi
+}
+# run WHAT COMMAND...
+run() {
+  local what=$1 began=$SECONDS code=0
+  shift
+  say "$what"
+  "$@" >"$log" 2>&1 || code=$?
+  end_step "$what" "$code" $((SECONDS - began)) "$log"
+}
+# Tests wait most of the time: what is built next is built meanwhile. run_ahead COMMAND..., later join WHAT.
+run_ahead() {
+  set -m  # as a process group, which can be ended as one
+  (began=$SECONDS; nice -n 10 "$BASH" "$self" --step "$@"; code=$?; echo "$((SECONDS - began))"; exit "$code") >"$ahead_log" 2>&1 &
+  ahead=$!
+  set +m
+}
+join() {
+  local code=0
+  say "$1"
+  wait "$ahead" || code=$?
+  ahead=
+  end_step "$1" "$code" "$(tail -n 1 "$ahead_log")" "$ahead_log"
 }
 
 configure() { # configure DIR OPTIONS...
@@ -40,8 +65,8 @@ configure() { # configure DIR OPTIONS...
   command -v ccache >/dev/null && launcher=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DCMAKE_C_COMPILER_LAUNCHER=ccache)
   cmake -S . -B "$dir" -G Ninja "${launcher[@]}" "$@"
 }
-# Ten files at a time, as most of the work is the headers of others. The plain build shows that each stands alone.
-unity=(-DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=10)
+# Twenty files at a time, as most of the work is the headers of others. The plain build shows that each stands alone.
+unity=(-DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=20)
 build_plain() { configure "$build" && cmake --build "$build" -j "$jobs"; }
 build_sanitized() { # build_sanitized DIR SANITIZERS TARGET OPTIONS...
   local dir=$1 sanitizers=$2 target=$3
@@ -50,6 +75,8 @@ build_sanitized() { # build_sanitized DIR SANITIZERS TARGET OPTIONS...
     -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O0 -g1" -DCMAKE_C_FLAGS_DEBUG="-O0 -g1" "$@" &&
     cmake --build "$dir" -j "$jobs" --target "$target"
 }
+build_asan() { build_sanitized .build/asan "address;undefined" all; }
+build_tsan() { build_sanitized .build/tsan thread plchost_tests -DPLCHOST_INTEGRATION=OFF; }
 gates() { tests/gates/layers.sh && tests/gates/house.sh && tests/gates/format.sh && tests/gates/contract.sh && tests/gates/prove.sh; }
 
 # ctest's own lines, and at the end what CI reads
@@ -81,16 +108,25 @@ fuzz() {
   configure .build/fuzz -DCMAKE_C_COMPILER=clang-19 -DCMAKE_CXX_COMPILER=clang++-19 -DPLCHOST_FUZZ=ON \
     -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF "${unity[@]}" &&
     cmake --build .build/fuzz -j "$jobs" --target fuzzers || return 1
-  local fuzzer corpus
-  for fuzzer in .build/fuzz/bin/fuzz_*; do
-    corpus=$(mktemp -d)
-    "$fuzzer" -max_total_time="${FUZZ_SECONDS:-8}" -rss_limit_mb=2048 -print_final_stats=1 "$corpus" \
-      || { rm -rf "$corpus"; return 1; }
-    rm -rf "$corpus"
-  done
+  printf '%s\0' .build/fuzz/bin/fuzz_* | xargs -0 -n 1 -P "$jobs" "$BASH" "$self" --fuzz
+}
+fuzz_one() {
+  local corpus code=0
+  corpus=$(mktemp -d)
+  "$1" -max_total_time="${FUZZ_SECONDS:-8}" -rss_limit_mb=2048 -print_final_stats=1 "$corpus" || code=1
+  rm -rf "$corpus"
+  return "$code"
 }
 
 case "${1:-}" in
+  --step)  # of this script itself
+    "$2"
+    exit
+    ;;
+  --fuzz)
+    fuzz_one "$2"
+    exit
+    ;;
   --quick)
     steps=2
     run "build" build_plain
@@ -101,16 +137,19 @@ case "${1:-}" in
     run "packages" .ci/packages test
     run "gates, each proven by a planted fault" gates
     run "build" build_plain
+    run_ahead build_asan
     run "tests" tests "$build"
     count
-    run "clang-tidy" tidy
-    run "address and undefined sanitizers: build" build_sanitized .build/asan "address;undefined" all
+    join "address and undefined sanitizers: build"
+    # Without the processes: Debian's Cyclone is not compiled for it, and reports from real-time threads stand still.
+    run_ahead build_tsan
     run "address and undefined sanitizers: tests" tests .build/asan
     count
-    # Without the processes: Debian's Cyclone is not compiled for it, and reports from real-time threads stand still.
-    run "thread sanitizer: build" build_sanitized .build/tsan thread plchost_tests -DPLCHOST_INTEGRATION=OFF
+    join "thread sanitizer: build"
+    run_ahead tidy
     run "thread sanitizer: tests" tests .build/tsan
     count
+    join "clang-tidy"
     run "fuzzers" fuzz
     ;;
   *)

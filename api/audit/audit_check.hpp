@@ -1,7 +1,9 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "api/audit/audit_record.hpp"
@@ -18,6 +20,23 @@ struct AuditFindings {
   std::vector<std::string> remarks;   ///< where the log itself says that something is missing
 
   static constexpr std::size_t kMostProblems = 100;
+};
+
+/// The check from line to line; `findings` must outlive it.
+class AuditWalk {
+ public:
+  explicit AuditWalk(AuditFindings& findings) : findings_(findings) {}
+  /// The next line, without its newline. `where` is said of what is wrong in it.
+  void take(const std::string& where, std::string_view line);
+  /// There are no more.
+  void end();
+
+ private:
+  void compare(const std::string& where, const AuditLink& link);
+  void problem(const std::string& text);
+
+  AuditFindings& findings_;
+  std::optional<std::string> unexplained_;  // a problem, unless the next record explains it
 };
 
 /// Goes through the whole chain. not_found: no log is in the folder. system: it cannot be read.
