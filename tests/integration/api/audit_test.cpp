@@ -77,7 +77,7 @@ TEST_F(Audit, LookingIsNotRecorded) {
 }
 
 TEST_F(Audit, PostsAreCountedForEachSource) {
-  const PoolEvent ready = host_.add_event("line1", "ready");
+  (void)host_.add_event("line1", "ready");
   ASSERT_EQ(run({"post", "event", "line1/ready", "--count", "5"}).code, 0);
   ASSERT_NE(run({"post", "event", "line1/unknown"}).code, 0);
   const Records posts = wait_for("post");
