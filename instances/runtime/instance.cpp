@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "instances/runtime/device/device_events.hpp"
 #include "instances/runtime/tasks/operator_events.hpp"
 #include "instances/runtime/tasks/task_builder.hpp"
 #include "instances/runtime/time/system_time.hpp"
@@ -94,6 +95,11 @@ Result<std::string> Instance::read_settings_file() {
   if (!settings) return std::unexpected(std::move(settings).error());
   settings_ = *std::move(settings);
   log_what_is_left_alone(settings_);
+  if (!settings_.device_description.empty()) {
+    auto device = read_device_description(settings_.device_description);
+    if (!device) return std::unexpected(std::move(device).error());
+    device_ = *std::move(device);
+  }
   choose_scheduler();
   return hold_idle_states();
 }
@@ -127,6 +133,10 @@ Result<std::string> Instance::attach_pool() {
   host_.emplace(options_.launch.name, &*pool_);
   host_->set_start_kind(static_cast<int>(options_.launch.start_kind));
   host_->events().clear_own();
+  if (device_) {
+    if (auto done = register_device_events(*device_, host_->events()); !done)
+      return std::unexpected(done.error());
+  }
   if (auto joined = host_->blocks().configure(settings_.blocks); !joined) {
     return std::unexpected(std::move(joined).error());
   }
@@ -171,6 +181,10 @@ Result<std::string> Instance::load_application() {
   if (options_.launch.application.empty()) return "no application is given: there is nothing to run";
   auto application = Application::load(options_.launch.application, *host_);
   if (!application) return std::unexpected(std::move(application).error());
+  if (device_) {
+    if (auto known = check_device_events(*device_, application->tasks()); !known)
+      return std::unexpected(known.error());
+  }
   if (auto applied = application->apply(settings_.tasks); !applied) {
     return std::unexpected(std::move(applied).error());
   }

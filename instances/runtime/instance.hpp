@@ -10,6 +10,7 @@
 #include "instances/runtime/application/application_host.hpp"
 #include "instances/runtime/application/components.hpp"
 #include "instances/runtime/application_state.hpp"
+#include "instances/runtime/device/device_description.hpp"
 #include "instances/runtime/idle_states.hpp"
 #include "instances/runtime/instance_socket.hpp"
 #include "instances/runtime/options.hpp"
@@ -138,7 +139,8 @@ class Instance {
   Components components_;
   std::optional<Application> application_;
   std::optional<InstancePage> page_;
-  bool page_told_ = false;  // that it is lost
+  std::optional<DeviceDescription> device_;  // nothing: any external event is allowed
+  bool page_told_ = false;                   // that it is lost
   ReferenceMemory reference_;
   LinuxClock clock_;
   std::unique_ptr<TaskSet> tasks_;  // uses all of the above: destroyed before them

@@ -68,6 +68,7 @@ struct InstanceSettings {
   IdleStates idle_states = IdleStates::hold;
   SysTimeSettings sys_time;
   BlockSettings blocks;
+  std::string device_description;   ///< file; empty: none, and any external event is allowed
   std::vector<TaskSettings> tasks;  ///< one for each [Task.NAME]
   std::vector<AreaSettings> areas;  ///< [SysMem], in the order of their numbers: 0, 1, ...
   RetainSettings retain;

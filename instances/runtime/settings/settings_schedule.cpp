@@ -84,6 +84,12 @@ constexpr std::array kKeys = {
             NumberSetting{0, 1000,
                           [](const SettingsTarget& to,
                              std::int64_t us) { to.settings.scheduler.spin_ahead_max = microseconds(us); }}},
+    SettingKey{.section = kSection,
+               .name = "ExternalEvent.DeviceDescription",
+               .value = TextSetting{"an XML file", [](std::string_view text) { return !text.empty(); },
+                                    [](const SettingsTarget& to, std::string_view file) {
+                                      to.settings.device_description = in_folder(to, file);
+                                    }}},
     SettingKey{
         .section = kSection,
         .name = "ExternalEvent.MaxBacklog",

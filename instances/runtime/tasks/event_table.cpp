@@ -79,7 +79,7 @@ Result<EventTable::Slot*> EventTable::open_own(std::string_view event) {
 
 Result<void> EventTable::publish_registered(Slot& slot) {
   if (pool_ == nullptr) return {};
-  const bool registered = slot.by_application || slot.by_operator;
+  const bool registered = slot.registered();
   if (!slot.event.load(std::memory_order_relaxed)->set_registered(registered)) {
     // It lost its place in the pool while nobody used it; a task that was bound to it notices in
     // check_bound().
@@ -93,7 +93,7 @@ Result<void> EventTable::publish_registered(Slot& slot) {
 // So that others see who uses it, and so that it keeps its place in the pool while the tasks are stopped. It
 // works without, so no right and no room for a reference are no error.
 void EventTable::show_use(Slot& slot) {
-  const bool used = slot.by_application || slot.by_operator || slot.tasks > 0;
+  const bool used = slot.registered() || slot.tasks > 0;
   if (!used) {
     slot.reference.close();
   } else if (pool_ != nullptr && !slot.reference.valid()) {
@@ -123,10 +123,17 @@ Result<void> EventTable::unregister_by_application(RTS_HANDLE handle) {
   return publish_registered(*slot);
 }
 
+Result<void> EventTable::register_by_device(std::string_view event) {
+  const auto slot = open_own(event);
+  if (!slot) return std::unexpected(slot.error());
+  (*slot)->by_device = true;
+  return publish_registered(**slot);
+}
+
 Result<void> EventTable::register_by_operator(std::string_view event) {
   const auto slot = open_own(event);
   if (!slot) return std::unexpected(slot.error());
-  if ((*slot)->by_application || (*slot)->by_operator) {
+  if ((*slot)->registered()) {
     return failure(ErrorCode::already_exists,
                    fmt::format("external event '{}' is registered already", event));
   }
@@ -137,11 +144,16 @@ Result<void> EventTable::register_by_operator(std::string_view event) {
 Result<void> EventTable::unregister_by_operator(std::string_view event) {
   const auto slot = open_own(event);
   if (!slot) return std::unexpected(slot.error());
-  if (!(*slot)->by_application && !(*slot)->by_operator) {
+  if ((*slot)->by_device) {
+    return failure(
+        ErrorCode::refused,
+        fmt::format("external event '{}' is one of the device description: it stays registered", event));
+  }
+  if (!(*slot)->registered()) {
     std::vector<std::string_view> known;
     for (std::size_t i = 0; i < count_.load(std::memory_order_relaxed); ++i) {
       const Slot& other = *slots_[i];
-      if (other.by_application || other.by_operator) known.push_back(other.name);
+      if (other.registered()) known.push_back(other.name);
     }
     return failure(
         ErrorCode::not_found,

@@ -34,9 +34,11 @@ class EventTable {
   /// Registration by the application or a component. already_exists: by one of them before.
   [[nodiscard]] Result<void> register_by_application(RTS_HANDLE handle);
   [[nodiscard]] Result<void> unregister_by_application(RTS_HANDLE handle);
+  /// Registration by the device description, of an own event: for the life of the process.
+  [[nodiscard]] Result<void> register_by_device(std::string_view event);
   /// Registration by the operator, of an own event. already_exists: by anyone before.
   [[nodiscard]] Result<void> register_by_operator(std::string_view event);
-  /// Ends any registration of an own event. not_found: it has none.
+  /// Ends any registration of an own event. not_found: it has none. refused: the device description has it.
   [[nodiscard]] Result<void> unregister_by_operator(std::string_view event);
   /// The own events that the operator has registered.
   [[nodiscard]] std::vector<std::string> registered_by_operator() const;
@@ -66,12 +68,15 @@ class EventTable {
     bool own = false;
     bool by_application = false;
     bool by_operator = false;
+    bool by_device = false;
     std::uint32_t tasks = 0;                         // bound to it
     std::uint32_t taking = 0;                        // of these, as posters are told: will run what is posted
     const PoolEvent* bound = nullptr;                // what they wait on, for the life of the process
     std::atomic<const PoolEvent*> event{nullptr};    // one of events; null without a pool
     std::vector<std::unique_ptr<PoolEvent>> events;  // old ones stay: a poster may be looking at one
     SharedEvent reference;                           // while it is registered or tasks are bound to it
+
+    [[nodiscard]] bool registered() const noexcept { return by_application || by_operator || by_device; }
   };
 
   [[nodiscard]] Slot* find(RTS_HANDLE handle) const noexcept;
