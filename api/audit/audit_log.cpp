@@ -101,22 +101,23 @@ Result<void> AuditLog::find_end(const std::string& path) {
   const auto got = ::pread(file_.get(), tail.data(), tail.size(), begin);
   if (got < 0) return failure(ErrorCode::system, "read " + path, errno);
   tail.resize(static_cast<std::size_t>(got));
-  const std::size_t size = tail.size();
-  std::size_t end = size;
-  while (end > 0) {
-    const std::size_t newline = tail.rfind('\n', end - 1);
-    if (newline == std::string::npos) break;
-    const std::size_t before = newline == 0 ? std::string::npos : tail.rfind('\n', newline - 1);
-    const std::size_t from = before == std::string::npos ? 0 : before + 1;
-    if (const auto link = read_link(std::string_view(tail).substr(from, newline - from))) {
+  if (tail.empty()) return write(of_the_log("repair", "this file was empty"));
+  if (tail.back() != '\n') {
+    if (::write(file_.get(), "\n", 1) != 1) return failure(ErrorCode::system, "write " + path, errno);
+    ++bytes_;
+    tail += '\n';
+  }
+  for (std::size_t end = tail.size() - 1;;) {  // of a line: its newline
+    const std::size_t before = end == 0 ? std::string::npos : tail.rfind('\n', end - 1);
+    const std::size_t begin_of_line = before + 1;  // npos + 1: the first one
+    if (const auto link = read_link(std::string_view(tail).substr(begin_of_line, end - begin_of_line))) {
       head_ = {.number = link->number, .hash = link->hash};
-      if (newline + 1 == size) return {};
+      if (end == tail.size() - 1) return {};
       break;
     }
-    end = newline;
+    if (before == std::string::npos) break;
+    end = before;
   }
-  if (size == 0) return write(of_the_log("repair", "this file was empty"));
-  if (tail.back() != '\n' && ::write(file_.get(), "\n", 1) == 1) ++bytes_;
   return write(
       of_the_log("repair", fmt::format("what stands before was not complete, or changed; goes on after "
                                        "record {}",

@@ -135,7 +135,7 @@ Result<DeviceDescription> parse_device_description(std::string_view text, std::s
   const xml_node section = child_called(at, "section", "taskconfiguration");
   const auto supported = supports_external(child_called(section, "setting", "supportexternal"), place);
   if (!supported) return std::unexpected(supported.error());
-  DeviceDescription device{.supports_external = *supported};
+  DeviceDescription device{.supports_external = *supported, .events = {}};
   const xml_node setting = child_called(section, "setting", "externalevents");
   if (!device.supports_external || !setting) return device;
   auto events = events_of(child_called(setting, "value"), place);

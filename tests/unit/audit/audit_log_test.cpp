@@ -141,7 +141,8 @@ TEST_F(AuditLogTest, AWriterKilledWithinARecordCostsThatRecordOnlyWhereverItWas)
     ASSERT_TRUE(open()->append(stop_of("line9")));
     const AuditFindings found = check();
     ASSERT_THAT(found.problems, IsEmpty()) << "cut at " << cut;
-    ASSERT_THAT(found.remarks, ElementsAre(HasSubstr("was not completed"))) << "cut at " << cut;
+    const bool lost = cut + 1 < whole.size();  // else only its newline is
+    ASSERT_EQ(found.remarks.size(), lost ? 1U : 0U) << "cut at " << cut;
     ASSERT_EQ(found.head.number, 4U);
   }
 }
