@@ -124,7 +124,7 @@ std::string entry_of(const X509_NAME* name, int what) {
 }  // namespace
 
 Result<Key> make_key() {
-  Key key(EVP_EC_gen("P-256"));
+  Key key(EVP_PKEY_Q_keygen(nullptr, nullptr, "EC", "P-256"));
   if (!key) return openssl_failure("make a private key");
   return key;
 }

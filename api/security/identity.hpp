@@ -21,7 +21,7 @@ inline constexpr std::string_view kRevocationsFile = "revoked.pem";
 inline constexpr std::string_view kKnownFolder = "known";
 
 /// A certificate that ends sooner is worth a word.
-inline constexpr std::time_t kExpiresSoon = 30 * 86'400;
+inline constexpr std::time_t kExpiresSoon = std::time_t{30} * 86'400;
 
 /// An identity that a process can show.
 struct OwnIdentity {

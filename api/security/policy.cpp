@@ -25,34 +25,41 @@ constexpr std::string_view kDocument =
 
 constexpr std::string_view kDomains = "<domains><id_range><min>0</min><max>230</max></id_range></domains>";
 
-const Topics kStatusTopics{"plc/v1/presence", "plc/v1/status/*", "plc/v1/transition"};
+Topics status_topics() {
+  return {"plc/v1/presence", "plc/v1/status/*", "plc/v1/transition"};
+}
 // What a host tells one client only.
-const Topics kAnswerTopics{"plc/v1/reply", "plc/v1/event_ack", "plc/v1/objects", "plc/v1/nodes"};
-const Topics kBlockTopics{"plc/v1/blocks", "plc/v1/block_ack"};
+Topics answer_topics() {
+  return {"plc/v1/reply", "plc/v1/event_ack", "plc/v1/event_run", "plc/v1/objects", "plc/v1/nodes"};
+}
+Topics block_topics() {
+  return {"plc/v1/blocks", "plc/v1/block_ack"};
+}
 
 std::vector<Grant> may_write(Role role) {
   switch (role) {
     case Role::viewer:
       return {};
     case Role::operating:
-      return {{{"plc/v1/event", "plc/v1/op/request"}, "h.*"}};
+      return {{{"plc/v1/event", "plc/v1/event_batch", "plc/v1/op/request"}, "h.*"}};
     case Role::engineer:
-      return {{{"plc/v1/event", "plc/v1/op/request", "plc/v1/eng/request"}, "h.*"}};
+      return {{{"plc/v1/event", "plc/v1/event_batch", "plc/v1/op/request", "plc/v1/eng/request"}, "h.*"}};
     case Role::admin:
-      return {{{"plc/v1/event", "plc/v1/*/request"}, "h.*"}};
+      return {{{"plc/v1/event", "plc/v1/event_batch", "plc/v1/*/request"}, "h.*"}};
     case Role::host:
-      return {{kStatusTopics}, {kAnswerTopics, "c.*"}, {kBlockTopics, "b.*"}};
+      return {{status_topics()}, {answer_topics(), "c.*"}, {block_topics(), "b.*"}};
   }
   return {};
 }
 
 std::vector<Grant> may_read(Role role, const GuidPrefix& prefix) {
-  if (role == Role::viewer) return {{kStatusTopics}};
+  if (role == Role::viewer) return {{status_topics()}};
   if (role == Role::host) {
-    return {
-        {{"plc/v1/status/block_host"}}, {{"plc/v1/event", "plc/v1/*/request"}, "h.*"}, {kBlockTopics, "b.*"}};
+    return {{{"plc/v1/status/block_host"}},
+            {{"plc/v1/event", "plc/v1/event_batch", "plc/v1/*/request"}, "h.*"},
+            {block_topics(), "b.*"}};
   }
-  return {{kStatusTopics}, {kAnswerTopics, fmt::format("c.{:02x}*", fmt::join(prefix, ""))}};
+  return {{status_topics()}, {answer_topics(), fmt::format("c.{:02x}*", fmt::join(prefix, ""))}};
 }
 
 std::string criteria(std::string_view what, const std::vector<Grant>& grants) {

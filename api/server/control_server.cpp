@@ -117,12 +117,23 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
   } else if (fd == presence_timer.get()) {
     status->write_presence();
   } else if (fd == identity_timer.get()) {
+    tell_of_refused(MonotonicClock::now());
     return !identity_changed();
   } else if (fd == signals.get()) {
     spdlog::info("asked to end");
     return false;
   }
   return true;
+}
+
+void ControlServer::Parts::tell_of_refused(TimePoint now) {
+  constexpr Duration kAtMostEvery = std::chrono::seconds(10);
+  const std::uint64_t refused = options.refused_datagrams == nullptr ? 0 : options.refused_datagrams();
+  if (refused == refused_told || now - refused_told_at < kAtMostEvery) return;
+  spdlog::warn("{} datagrams were refused before DDS has read them: no RTPS, or not as it must be",
+               refused - refused_told);
+  refused_told = refused;
+  refused_told_at = now;
 }
 
 // Whether what DDS has loaded is not what counts any more, so that a fresh process must load it.

@@ -19,6 +19,8 @@ struct ServerOptions {
   std::string run_directory;
   dds::DomainOptions dds;
   bool allow_unsecured = false;  ///< without an identity: may be on other interfaces than "lo"
+  /// How many datagrams were refused so far, for the log; null: nobody counts.
+  std::uint64_t (*refused_datagrams)() noexcept = nullptr;
   std::string blocks_base =
       std::string(kDefaultBlockBase);  ///< of the nodes that are listed, and the gateway
   std::string audit_folder;            ///< of the log of what clients change; empty: there is none

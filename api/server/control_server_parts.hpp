@@ -55,6 +55,7 @@ struct ControlServer::Parts {
   void on_request(ApiRole role, const dds::Guid& writer, const plc_Request& request);
   Result<void> on_manager();
   [[nodiscard]] bool identity_changed();
+  void tell_of_refused(TimePoint now);
   void answer(const dds::Guid& client, const plc_SampleIdentity& identity, ErrorCode code,
               std::string_view text);
   void finish(std::vector<FinishedCommand> commands);
@@ -81,6 +82,8 @@ struct ControlServer::Parts {
   UniqueFd identity_timer;
   AccessGuard guard;
   std::optional<IdentityWatch> identity_watch;  // of a secured host
+  std::uint64_t refused_told = 0;
+  TimePoint refused_told_at;
   std::optional<ManagerLink> manager;
   std::optional<EventIntake> intake;
   std::shared_ptr<dds::Entity> domain;

@@ -4,6 +4,7 @@
 #include <CLI/CLI.hpp>
 
 #include "api/server/control_server.hpp"
+#include "api/server/receive_gate.hpp"
 #include "shm/base/log.hpp"
 #include "shm/base/memory_guard.hpp"
 
@@ -48,6 +49,8 @@ int main(int argc, char** argv) {
   plchost::start_log("plchost-dds", log_level);
   (void)std::signal(SIGPIPE, SIG_IGN);
   options.dds.receive_fifo = plchost::dds::can_use_fifo(kReceiveFifo) ? kReceiveFifo : 0;
+  plchost::close_receive_gate(!options.dds.identity.empty());
+  options.refused_datagrams = plchost::datagrams_refused;
   const auto server = plchost::ControlServer::create(std::move(options));
   if (!server) {
     spdlog::error("{}", server.error().describe());

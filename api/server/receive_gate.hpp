@@ -1,0 +1,15 @@
+#pragma once
+
+#include <cstdint>
+
+namespace plchost {
+
+/// Puts dds::is_acceptable() in front of DDS: all datagrams that this process receives over IP with recvmsg()
+/// go through it, and those it refuses are made so short that DDS drops them without a look. Only the program
+/// plchost-dds has it. Before the domain is made.
+void close_receive_gate(bool secured) noexcept;
+
+/// How many datagrams it has refused.
+[[nodiscard]] std::uint64_t datagrams_refused() noexcept;
+
+}  // namespace plchost

@@ -1,0 +1,108 @@
+#include "api/dds/packet_gate.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <initializer_list>
+#include <random>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+namespace plchost::dds {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+constexpr std::array<std::uint8_t, 4> kHandshake{0x00, 0x02, 0x01, 0xc3};
+constexpr std::array<std::uint8_t, 4> kParticipant{0x00, 0x01, 0x00, 0xc2};
+constexpr std::array<std::uint8_t, 4> kUser{0x00, 0x00, 0x01, 0x03};
+
+Bytes header() {
+  return {'R', 'T', 'P', 'S', 2, 1, 1, 16, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12};
+}
+
+/// With so many bytes behind its header.
+Bytes submessage(std::uint8_t kind, std::uint8_t flags, std::uint16_t size) {
+  Bytes made{kind, flags, static_cast<std::uint8_t>(size), static_cast<std::uint8_t>(size >> 8U)};
+  made.resize(4U + size);
+  return made;
+}
+
+Bytes sample(std::uint8_t kind, std::uint8_t flags, const std::array<std::uint8_t, 4>& writer) {
+  Bytes made = submessage(kind, flags, 32);
+  std::ranges::copy(writer, made.begin() + 12);
+  return made;
+}
+
+bool passes(std::initializer_list<Bytes> parts, bool secured = true) {
+  Bytes datagram = header();
+  for (const Bytes& part : parts) datagram.insert(datagram.end(), part.begin(), part.end());
+  return is_acceptable(std::as_bytes(std::span(datagram)), secured);
+}
+
+TEST(PacketGate, PassesWhatIsWellFormed) {
+  EXPECT_TRUE(passes({}));
+  EXPECT_TRUE(passes({submessage(0x09, 1, 8), sample(0x15, 5, kParticipant)}));
+  EXPECT_TRUE(passes({submessage(0x09, 1, 0), submessage(0x01, 1, 0)}));
+  EXPECT_TRUE(passes({sample(0x15, 5, kHandshake)}));
+  EXPECT_TRUE(passes({sample(0x16, 1, kHandshake)}));
+}
+
+TEST(PacketGate, RefusesWhatIsNoRtps2) {
+  for (std::size_t i = 0; i < 5; ++i) {
+    Bytes datagram = header();
+    datagram[i] ^= 1;
+    EXPECT_FALSE(is_acceptable(std::as_bytes(std::span(datagram)), false));
+  }
+  const Bytes whole = header();
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    EXPECT_FALSE(is_acceptable(std::as_bytes(std::span(whole)).first(size), false));
+  }
+}
+
+TEST(PacketGate, RefusesSubmessagesThatDoNotFillTheDatagram) {
+  EXPECT_FALSE(passes({{0x09, 1}}));
+  Bytes longer = submessage(0x07, 1, 8);
+  longer[2] = 12;
+  EXPECT_FALSE(passes({longer}));
+  EXPECT_FALSE(passes({submessage(0x07, 1, 6)}));
+  EXPECT_FALSE(passes({submessage(0x07, 1, 8), {0, 0}}));
+  Bytes big_endian = submessage(0x07, 0, 8);
+  EXPECT_FALSE(passes({big_endian}));
+  std::swap(big_endian[2], big_endian[3]);
+  EXPECT_TRUE(passes({big_endian}));
+}
+
+TEST(PacketGate, RefusesAKeyWhereTheHandshakesContentsMustBe) {
+  constexpr std::uint8_t kKey = 0x08;
+  EXPECT_FALSE(passes({sample(0x15, 1 | kKey, kHandshake)}));
+  EXPECT_FALSE(passes({sample(0x15, 5 | kKey, kHandshake)}));
+  EXPECT_FALSE(passes({sample(0x15, 1, kHandshake)}));
+  EXPECT_FALSE(passes({sample(0x16, 5, kHandshake)}));
+  EXPECT_TRUE(passes({sample(0x15, 1 | kKey, kParticipant)})) << "a participant that goes says so by its key";
+}
+
+TEST(PacketGate, RefusesPlainSamplesOfASecuredHostOnly) {
+  EXPECT_FALSE(passes({sample(0x15, 5, kUser)}, true));
+  EXPECT_TRUE(passes({sample(0x15, 5, kUser)}, false));
+  EXPECT_TRUE(passes({submessage(0x33, 1, 16), sample(0x15, 5, kUser)}, true)) << "signed as a whole";
+}
+
+TEST(PacketGate, ReadsNothingBehindTheEnd) {
+  std::mt19937 random(1);
+  for (int i = 0; i < 200'000; ++i) {
+    // Of exactly that size on the heap, for the address sanitizer.
+    Bytes datagram = header();
+    datagram.resize(20 + random() % 60);
+    for (std::size_t at = 20; at < datagram.size(); ++at)
+      datagram[at] = static_cast<std::uint8_t>(random() % 40);
+    datagram.shrink_to_fit();
+    (void)is_acceptable(std::as_bytes(std::span(datagram)), (i & 1) != 0);
+  }
+}
+
+}  // namespace
+}  // namespace plchost::dds
