@@ -9,8 +9,9 @@ namespace plchost::dds {
 /// authenticate; this knows the ways that were found by floods of mutated packets:
 /// - submessages that do not fill the datagram exactly are refused, whatever is in them;
 /// - in the handshake's messages a key stands where contents must be (a null pointer in Cyclone);
-/// - of a secured host: any sample in plain text that is not of the two writers that speak before there
-///   are keys. It would be refused later, by more code.
+/// - samples of the two writers that speak before there are keys, whose fields are not where they must be or
+///   that neither have contents nor are a key (Cyclone takes an offset from them unchecked);
+/// - of a secured host: any other sample in plain text. It would be refused later, by more code.
 /// A message that is signed or encrypted as a whole is judged by its outer form only.
 [[nodiscard]] bool is_acceptable(std::span<const std::byte> datagram, bool secured) noexcept;
 

@@ -32,7 +32,8 @@ Bytes submessage(std::uint8_t kind, std::uint8_t flags, std::uint16_t size) {
 }
 
 Bytes sample(std::uint8_t kind, std::uint8_t flags, const std::array<std::uint8_t, 4>& writer) {
-  Bytes made = submessage(kind, flags, 32);
+  Bytes made = submessage(kind, flags, 40);
+  made[6] = kind == 0x15 ? 16 : 28;  // octets to the inline QoS
   std::ranges::copy(writer, made.begin() + 12);
   return made;
 }
@@ -83,6 +84,38 @@ TEST(PacketGate, RefusesAKeyWhereTheHandshakesContentsMustBe) {
   EXPECT_FALSE(passes({sample(0x15, 1, kHandshake)}));
   EXPECT_FALSE(passes({sample(0x16, 5, kHandshake)}));
   EXPECT_TRUE(passes({sample(0x15, 1 | kKey, kParticipant)})) << "a participant that goes says so by its key";
+}
+
+TEST(PacketGate, RefusesSamplesOfTheFirstWritersWhoseFieldsAreNotInPlace) {
+  for (const auto& writer : {kHandshake, kParticipant}) {
+    EXPECT_FALSE(passes({sample(0x15, 1, writer)})) << "neither contents nor key";
+    EXPECT_FALSE(passes({sample(0x15, 13, writer)})) << "both";
+    for (const std::uint8_t kind : {0x15, 0x16}) {
+      const std::uint8_t flags = kind == 0x15 ? 5 : 1;
+      Bytes elsewhere = sample(kind, flags, writer);
+      elsewhere[6] = 36;
+      EXPECT_FALSE(passes({elsewhere}));
+      Bytes shorter = submessage(kind, flags, kind == 0x15 ? 20 : 32);
+      std::ranges::copy(writer, shorter.begin() + 12);
+      shorter[6] = kind == 0x15 ? 16 : 28;
+      EXPECT_FALSE(passes({shorter})) << "no room for contents";
+    }
+  }
+}
+
+TEST(PacketGate, FollowsTheInlineQosToItsEnd) {
+  Bytes with_qos = sample(0x15, 7, kParticipant);
+  with_qos[24] = 0x70;  // a parameter of 4 bytes, then the end, then contents
+  with_qos[26] = 4;
+  with_qos[32] = 1;
+  EXPECT_TRUE(passes({with_qos}));
+  with_qos[26] = 16;
+  EXPECT_FALSE(passes({with_qos})) << "it does not fit";
+  with_qos[26] = 3;
+  EXPECT_FALSE(passes({with_qos}));
+  with_qos[26] = 4;
+  with_qos[32] = 2;
+  EXPECT_FALSE(passes({with_qos})) << "it does not end";
 }
 
 TEST(PacketGate, RefusesPlainSamplesOfASecuredHostOnly) {
