@@ -42,6 +42,10 @@ std::vector<std::string> ApiServer::arguments() const {
                                         fmt::format("{}/audit.{}", host.state_directory, host.name),
                                         "--log-level",
                                         host.log_level};
+  for (const std::string& label : host.labels) {
+    arguments.emplace_back("--label");
+    arguments.push_back(label);
+  }
   for (const std::string& peer : config_.dds.peers) {
     arguments.emplace_back("--peer");
     arguments.push_back(peer);

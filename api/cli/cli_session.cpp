@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <iterator>
 
 #include <fmt/format.h>
 
@@ -31,16 +32,36 @@ TimePoint CliSession::deadline(Duration least) const {
   return MonotonicClock::now() + (options.timeout_given ? timeout() : std::max(timeout(), least));
 }
 
+namespace {
+
+std::unexpected<Error> none_selected(const std::vector<HostView>& hosts) {
+  std::vector<std::string> names;
+  for (const HostView& host : hosts) {
+    const auto labels = host.labels();
+    names.push_back(labels.empty() ? host.name : fmt::format("{} ({})", host.name, fmt::join(labels, ", ")));
+  }
+  return failure(ErrorCode::not_found, fmt::format("no host is so called and labelled; those that answer: {}",
+                                                   fmt::join(names, ", ")));
+}
+
+}  // namespace
+
 Result<std::vector<HostView>> CliSession::shown_hosts() {
   const auto connected = client();
   if (!connected) return std::unexpected(connected.error());
-  if (!options.host.empty()) {
-    auto one = (*connected)->host(options.host, deadline());
+  const HostSelection& selection = options.hosts;
+  if (selection.names_one()) {
+    auto one = (*connected)->host(selection.host, deadline());
     if (!one) return failure(ErrorCode::unavailable, one.error().message);
-    return std::vector{std::move(*one)};
+    if (selection.selects(*one)) return std::vector{std::move(*one)};
+    return none_selected({*std::move(one)});
   }
-  auto all = (*connected)->hosts(deadline());
-  if (!all.empty()) return all;
+  const auto all = (*connected)->hosts(deadline());
+  std::vector<HostView> selected;
+  std::ranges::copy_if(all, std::back_inserter(selected),
+                       [&](const HostView& host) { return selection.selects(host); });
+  if (!selected.empty()) return selected;
+  if (!all.empty()) return none_selected(all);
   return failure(
       ErrorCode::unavailable,
       fmt::format("no host answers in DDS domain {} within {} s: start one with 'plchostd --config FILE', "
@@ -56,8 +77,22 @@ Result<std::string> CliSession::target_host() {
   if (hosts->size() == 1) return hosts->front().name;
   std::vector<std::string_view> names;
   for (const HostView& host : *hosts) names.emplace_back(host.name);
-  return failure(ErrorCode::invalid_argument,
-                 fmt::format("several hosts answer; say which one with --host: {}", join_names(names)));
+  return failure(
+      ErrorCode::invalid_argument,
+      fmt::format("several hosts answer, and this is for one; say which with --host: {}", join_names(names)));
+}
+
+Result<std::vector<std::string>> CliSession::target_hosts() {
+  if (!options.hosts.means_many()) {
+    auto one = target_host();
+    if (!one) return std::unexpected(std::move(one).error());
+    return std::vector{*std::move(one)};
+  }
+  const auto hosts = shown_hosts();
+  if (!hosts) return std::unexpected(hosts.error());
+  std::vector<std::string> names;
+  for (const HostView& host : *hosts) names.push_back(host.name);
+  return names;
 }
 
 Result<void> CliSession::check_instance(const std::string& instance) {

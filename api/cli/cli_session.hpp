@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "api/cli/command.hpp"
+#include "api/cli/host_selection.hpp"
 #include "api/cli/table.hpp"
 #include "api/client/control_client.hpp"
 
@@ -22,7 +23,7 @@ inline constexpr int kExitWarnings = 4;  ///< `check` has found warnings, and no
 /// The options of every command.
 struct CliOptions {
   dds::DomainOptions dds;
-  std::string host;
+  HostSelection hosts;
   double timeout_s = 3.0;
   bool timeout_given = false;
   bool json = false;
@@ -48,7 +49,10 @@ class CliSession {
 
   /// The host of --host, or the only one there is. Several and no --host: an error that lists them.
   [[nodiscard]] Result<std::string> target_host();
-  /// The host of --host, or all.
+  /// All that --host and --label select: at least one. Neither is said, and several answer: an error, as
+  /// above.
+  [[nodiscard]] Result<std::vector<std::string>> target_hosts();
+  /// All that --host and --label select, or all that answer: at least one.
   [[nodiscard]] Result<std::vector<HostView>> shown_hosts();
   /// not_found: none of the hosts that are shown has an instance of that name.
   [[nodiscard]] Result<void> check_instance(const std::string& instance);

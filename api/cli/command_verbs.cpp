@@ -1,6 +1,8 @@
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -29,36 +31,65 @@ bool takes_long(std::int32_t operation) {
   }
 }
 
-/// Sends a command to the host and says what became of it.
-int command(CliSession& session, ApiRequest request) {
-  auto host = session.target_host();
-  if (!host) return CliSession::fail(host.error());
-  request.host = std::move(*host);
-  ControlClient& client = *session.client().value();
-  const auto reply =
-      client.call(request, session.deadline(takes_long(request.operation) ? kLongCommand : Duration::zero()));
-  if (!reply) return CliSession::fail(reply.error());
-  if (reply->code == ErrorCode::ok) {
-    if (session.options.json) {
-      fmt::print("{}", format_json({Row{{"host", request.host},
-                                        {"instance", request.instance},
-                                        {"done", true},
-                                        {"remark", reply->text}}}));
-    } else if (!reply->text.empty()) {
-      fmt::print("{}\n", reply->text);
-    }
-    return kExitDone;
+// What a refusal does not say itself: the instance that was meant.
+std::string advice(CliSession& session, const HostOutcome& outcome, const std::string& instance) {
+  if (outcome.reply->code != ErrorCode::not_found) return "";
+  std::vector<std::string> names;
+  if (const auto all = session.client().value()->instances(outcome.host, session.deadline())) {
+    for (const auto& known : *all) names.emplace_back(dds::text_of(known.instance));
   }
-  std::string text = reply->text;
-  if (reply->code == ErrorCode::not_found) {
-    std::vector<std::string> names;
-    if (const auto all = client.instances(request.host, session.deadline())) {
-      for (const auto& instance : *all) names.emplace_back(dds::text_of(instance.instance));
-    }
-    text += hint(request.instance, names);
+  return hint(instance, names);
+}
+
+/// Says what became of it at one of `count` hosts; its exit code.
+int tell(CliSession& session, const HostOutcome& outcome, const std::string& instance, std::size_t count) {
+  const std::string where = count > 1 ? outcome.host + ": " : "";
+  if (!outcome.reply) {
+    Error error = outcome.reply.error();
+    error.message = where + error.message;
+    return CliSession::fail(error);
   }
-  fmt::print(stderr, "plcctl: {}\n", text);
-  return kExitFailed;
+  if (outcome.reply->code != ErrorCode::ok) {
+    fmt::print(stderr, "plcctl: {}{}{}\n", where, outcome.reply->text, advice(session, outcome, instance));
+    return kExitFailed;
+  }
+  if (session.options.json || session.options.csv) return kExitDone;
+  if (count > 1 || !outcome.reply->text.empty()) {
+    fmt::print("{}{}\n", where, outcome.reply->text.empty() ? "done" : outcome.reply->text);
+  }
+  return kExitDone;
+}
+
+Row row_of(const HostOutcome& outcome, const std::string& instance) {
+  const bool done = outcome.reply && outcome.reply->code == ErrorCode::ok;
+  return {{"host", outcome.host},
+          {"instance", instance},
+          {"done", done},
+          {"remark", outcome.reply ? outcome.reply->text : outcome.reply.error().describe()}};
+}
+
+/// Sends a command to the hosts that are meant and says what became of it.
+int command(CliSession& session, const ApiRequest& request) {
+  const auto hosts = session.target_hosts();
+  if (!hosts) return CliSession::fail(hosts.error());
+  const TimePoint deadline =
+      session.deadline(takes_long(request.operation) ? kLongCommand : Duration::zero());
+  std::vector<HostOutcome> outcomes;
+  if (hosts->size() == 1) {  // over the connection that is there
+    ApiRequest own = request;
+    own.host = hosts->front();
+    outcomes.push_back({.host = own.host, .reply = session.client().value()->call(own, deadline)});
+  } else {
+    outcomes = call_each(session.options.dds, *hosts, request, deadline);
+  }
+  int code = kExitDone;
+  std::vector<Row> done;
+  for (const HostOutcome& outcome : outcomes) {
+    code = std::max(code, tell(session, outcome, request.instance, outcomes.size()));
+    if (outcomes.size() > 1 || code == kExitDone) done.push_back(row_of(outcome, request.instance));
+  }
+  if ((session.options.json || session.options.csv) && !done.empty()) session.show(done, {});
+  return code;
 }
 
 int command_event(CliSession& session, std::int32_t operation, const std::string& name) {

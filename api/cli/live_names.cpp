@@ -104,7 +104,7 @@ std::vector<Candidate> live_names(CliSession& session, std::string_view form) {
   Names names;
   const auto [first, last] = sources().equal_range(form);
   if (first == last) return names;
-  if (form == "--host") session.options.host.clear();
+  if (form == "--host") session.options.hosts = {};
   const auto hosts = session.shown_hosts();
   if (!hosts) return names;
   for (const HostView& host : *hosts) {

@@ -19,9 +19,14 @@
 namespace {
 
 void add_options(CLI::App& app, plchost::CliOptions& options) {
-  app.add_option("--host", options.host, "which controller; not needed when there is only one")
+  app.add_option("--host", options.hosts.host,
+                 "which controller: a name, a pattern ('*', '?') or all; not needed when there is only one")
       ->envname("PLCHOST_HOST")
       ->take_last();
+  app.add_option("--label", options.hosts.labels,
+                 "controllers that have this label; may be repeated: all of them")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   app.add_option("--domain", options.dds.domain, "DDS domain (default 0)")
       ->envname("PLCHOST_DOMAIN")
       ->check(CLI::Range(0U, plchost::dds::kMaxDomain))

@@ -35,8 +35,8 @@ std::string name_of(std::span<const std::string_view> names, std::uint32_t numbe
 }
 
 // What the host tells beyond the fields that this program knows. A name that is taken stays what it is.
-void add_extension(Row& row, const dds_sequence_plc_KeyValue& entries) {
-  for (const plc_KeyValue& entry : std::span(entries._buffer, entries._length)) {
+void add_extension(Row& row, std::span<const plc_KeyValue> entries) {
+  for (const plc_KeyValue& entry : entries) {
     const std::string name(text_of(entry.name));
     if (!row.contains(name)) row[name] = text_of(entry.value);
   }
@@ -65,7 +65,8 @@ Row to_row(const HostView& host) {
           {"events", host.status.event_count},
           {"objects", host.status.object_count},
           {"started_unix_s", to_seconds(host.status.started_unix_ns)}};
-  add_extension(row, host.status.ext);
+  add_extension(row, host.ext);
+  row["labels"] = fmt::format("{}", fmt::join(host.labels(), ","));
   return row;
 }
 
@@ -80,7 +81,7 @@ Row to_row(const plc_InstanceStatus& status) {
           {"restarts", status.restarts},
           {"state_since_unix_s", to_seconds(status.state_since_unix_ns)},
           {"problem", text_of(status.problem)}};
-  add_extension(row, status.ext);
+  add_extension(row, std::span(status.ext._buffer, status.ext._length));
   return row;
 }
 
@@ -132,10 +133,10 @@ const std::vector<Column>& transition_columns() {
 }
 
 const std::vector<Column>& host_columns() {
-  static const std::vector<Column> columns{{"host", "HOST"},           {"version", "VERSION"},
-                                           {"manager_pid", "MANAGER"}, {"server_pid", "SERVER"},
-                                           {"instances", "INSTANCES"}, {"tasks", "TASKS"},
-                                           {"events", "EVENTS"},       {"objects", "OBJECTS"}};
+  static const std::vector<Column> columns{
+      {"host", "HOST"},         {"version", "VERSION"},     {"manager_pid", "MANAGER"},
+      {"server_pid", "SERVER"}, {"instances", "INSTANCES"}, {"tasks", "TASKS"},
+      {"events", "EVENTS"},     {"objects", "OBJECTS"},     {"labels", "LABELS"}};
   return columns;
 }
 

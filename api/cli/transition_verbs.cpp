@@ -19,10 +19,26 @@ struct TransitionArguments {
   std::uint64_t count = 0;  // watch: 0 is until Ctrl-C
 };
 
-bool is_wanted(const CliSession& session, const TransitionArguments& arguments,
-               const plc_Transition& transition) {
-  const bool instance = arguments.instance.empty() || dds::text_of(transition.instance) == arguments.instance;
-  return instance && (session.options.host.empty() || dds::text_of(transition.host) == session.options.host);
+/// Of which hosts and instance.
+struct Wanted {
+  std::vector<HostView> hosts;
+  bool of_others = false;  // of hosts that come later, too
+  std::string instance;
+
+  [[nodiscard]] bool operator()(const plc_Transition& transition) const {
+    const auto is_it = [&](const HostView& host) { return dds::text_of(transition.host) == host.name; };
+    return (instance.empty() || dds::text_of(transition.instance) == instance) &&
+           (of_others || std::ranges::any_of(hosts, is_it));
+  }
+};
+
+Result<Wanted> wanted(CliSession& session, const TransitionArguments& arguments) {
+  auto hosts = session.shown_hosts();
+  if (!hosts) return std::unexpected(std::move(hosts).error());
+  const HostSelection& selection = session.options.hosts;
+  return Wanted{.hosts = *std::move(hosts),
+                .of_others = selection.host.empty() && selection.labels.empty(),
+                .instance = arguments.instance};
 }
 
 // DDS itself cannot tell: Cyclone's dds_reader_wait_for_historical_data() waits for nothing.
@@ -36,13 +52,13 @@ Result<bool> has_all(ControlClient& client, const std::vector<HostView>& hosts, 
 
 // All that the hosts have told of, and what came meanwhile.
 Result<std::vector<plc_Transition>> collect(CliSession& session, const TransitionArguments& arguments) {
-  const auto hosts = session.shown_hosts();
-  if (!hosts) return std::unexpected(hosts.error());
+  const auto is_wanted = wanted(session, arguments);
+  if (!is_wanted) return std::unexpected(is_wanted.error());
   ControlClient& client = *session.client().value();
   const TimePoint deadline = session.deadline();
   std::vector<plc_Transition> found;
   for (;;) {
-    const auto complete = has_all(client, *hosts, deadline);
+    const auto complete = has_all(client, is_wanted->hosts, deadline);
     if (!complete) return std::unexpected(complete.error());
     if (*complete) return found;
     if (MonotonicClock::now() >= deadline) {
@@ -51,7 +67,7 @@ Result<std::vector<plc_Transition>> collect(CliSession& session, const Transitio
     const auto news = client.transitions();
     if (!news) return std::unexpected(news.error());
     for (const TransitionView& view : *news) {
-      if (is_wanted(session, arguments, view.sample)) found.push_back(view.sample);
+      if ((*is_wanted)(view.sample)) found.push_back(view.sample);
     }
     if (news->empty()) client.wait_for_change(deadline);
   }
@@ -86,15 +102,15 @@ void print(const CliSession& session, const TransitionView& view) {
 
 int watch_transitions(CliSession& session, const TransitionArguments& arguments) {
   catch_interrupts();
-  const auto hosts = session.shown_hosts();
-  if (!hosts) return CliSession::fail(hosts.error());
+  const auto is_wanted = wanted(session, arguments);
+  if (!is_wanted) return CliSession::fail(is_wanted.error());
   ControlClient& client = *session.client().value();
   std::uint64_t shown = 0;
   while (!interrupted()) {
     const auto news = client.transitions();
     if (!news) return CliSession::fail(news.error());
     for (const TransitionView& view : *news) {
-      if (!is_wanted(session, arguments, view.sample)) continue;
+      if (!(*is_wanted)(view.sample)) continue;
       print(session, view);
       std::fflush(stdout);
       if (++shown == arguments.count) return kExitDone;

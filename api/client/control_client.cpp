@@ -7,6 +7,7 @@
 
 #include "api/client/check_names.hpp"
 #include "api/dds/claim.hpp"
+#include "api/dds/entries.hpp"
 #include "api/dds/error.hpp"
 #include "api/dds/log_sink.hpp"
 #include "api/dds/samples.hpp"
@@ -101,12 +102,29 @@ void ControlClient::update() {
   host_findings_.update();
 }
 
+std::vector<std::string> HostView::labels() const {
+  std::string all;
+  const std::pair<std::string_view, std::string*> known{dds::kLabelsEntry, &all};
+  if (!dds::read_entries(ext, std::span(&known, 1))) return {};
+  std::vector<std::string> labels;
+  for (std::string_view rest = all; !rest.empty();) {
+    const std::size_t comma = rest.find(',');
+    labels.emplace_back(rest.substr(0, comma));
+    rest = comma == std::string_view::npos ? std::string_view() : rest.substr(comma + 1);
+  }
+  return labels;
+}
+
 std::optional<HostView> ControlClient::present(std::string_view name) const {
   const auto seen = seen_.find(name);
   if (seen == seen_.end() || MonotonicClock::now() - seen->second.last > kHostGone) return std::nullopt;
   const auto status = host_status_.of_host(name, seen->second.epoch);
   if (status.empty()) return std::nullopt;
-  return HostView{std::string(name), seen->second.epoch, seen->second.pid, status.front()};
+  HostView view{std::string(name), seen->second.epoch, seen->second.pid, status.front(), {}};
+  const auto& ext = view.status.ext;
+  view.ext.assign(ext._buffer, ext._buffer + ext._length);
+  view.status.ext = {};
+  return view;
 }
 
 std::vector<HostView> ControlClient::present() const {

@@ -32,8 +32,12 @@ namespace plchost {
 struct HostView {
   std::string name;
   std::uint64_t epoch = 0;
-  std::int32_t server_pid = 0;  ///< of plchost-dds
-  plc_HostStatus status{};
+  std::int32_t server_pid = 0;    ///< of plchost-dds
+  plc_HostStatus status{};        ///< but for its ext
+  std::vector<plc_KeyValue> ext;  ///< of the status
+
+  /// What its configuration calls it, beside its name.
+  [[nodiscard]] std::vector<std::string> labels() const;
 };
 
 /// The client's end of the DDS API: sees all hosts of a domain and addresses any. One thread at a time.

@@ -51,6 +51,8 @@ inline constexpr std::int32_t kTransitionDepth = 64;  ///< of each instance; as 
 /// Entry of InstanceStatus.ext: the number of the last transition of this instance that its host has written;
 /// 0: none yet.
 inline constexpr std::string_view kTransitionsEntry = "transitions";
+/// Entry of HostStatus.ext: its labels, with commas between.
+inline constexpr std::string_view kLabelsEntry = "labels";
 /// No writer of the server waits longer.
 inline constexpr Duration kServerBlocking = std::chrono::milliseconds(1);
 inline constexpr Duration kRequestBlocking = std::chrono::milliseconds(100);

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include <control.h>
 
@@ -23,6 +24,7 @@ struct ServerOptions {
   std::uint64_t (*refused_datagrams)() noexcept = nullptr;
   std::string blocks_base =
       std::string(kDefaultBlockBase);  ///< of the nodes that are listed, and the gateway
+  std::vector<std::string> labels;     ///< by which clients choose hosts
   std::string audit_folder;            ///< of the log of what clients change; empty: there is none
   std::uint16_t host_number = 0;       ///< for other hosts; 0: no gateway
 };

@@ -64,8 +64,9 @@ Result<void> ControlServer::Parts::open(PostLedger ledger) {
   if (!made_sessions) return std::unexpected(made_sessions.error());
   sessions = std::move(*made_sessions);
   open_audit();
-  auto made_status =
-      StatusPublisher::create(participant.get(), {options.host, &pool, epoch, options.run_directory});
+  auto made_status = StatusPublisher::create(
+      participant.get(),
+      {options.host, &pool, epoch, options.run_directory, fmt::format("{}", fmt::join(options.labels, ","))});
   if (!made_status) return std::unexpected(made_status.error());
   status.emplace(std::move(*made_status));
   // Everything is there before a client can see that this host is: presence comes last.

@@ -38,6 +38,7 @@ int main(int argc, char** argv) {
                  "number of this host for blocks between hosts; 0: none")
       ->check(CLI::Range(std::uint16_t{0}, plchost::kMaxHostNumber));
   app.add_option("--blocks-base", options.blocks_base, "base name of the nodes that send blocks");
+  app.add_option("--label", options.labels, "by which clients choose hosts");
   app.add_option("--audit-folder", options.audit_folder, "where the log of what clients change is kept");
   app.add_option("--log-level", log_level, "trace, debug, info, warning or error")
       ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error"}));

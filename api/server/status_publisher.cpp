@@ -213,6 +213,7 @@ void StatusPublisher::write_host(bool changed) {
     sample.started_unix_ns = host->started_unix_ns;
   }
   std::vector<plc_KeyValue> ext;
+  dds::add_entry(ext, dds::kLabelsEntry, source_.labels);
   if (!audit_head_.empty()) dds::add_entry(ext, "audit", audit_head_);
   (void)hosts_.update(source_.host, sample, ext);
   hosts_.write();

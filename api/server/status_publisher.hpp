@@ -28,6 +28,7 @@ class StatusPublisher {
     const ObjectPool* pool = nullptr;
     std::uint64_t epoch = 0;
     std::string run_directory;
+    std::string labels;  ///< with commas between
   };
   [[nodiscard]] static Result<StatusPublisher> create(dds_entity_t participant, const Source& source);
 

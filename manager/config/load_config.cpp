@@ -109,6 +109,8 @@ void Loader::read_host(const TomlTable& table, unsigned line) {
                    fmt::format("\"{}\" is not allowed; allowed is an absolute path of up to {} characters",
                                host.state_directory.substr(0, kMaxPath), kMaxPath));
   }
+  reader.texts("labels", kMaxLabels, host.labels);
+  for (const std::string& label : host.labels) check_name_of(reader, "labels", label, kMaxLabel);
   read_pool_rights(reader);
   read_cores(reader);
   reader.refuse_unknown_keys();

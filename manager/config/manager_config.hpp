@@ -21,7 +21,8 @@ enum class RestartPolicy : std::uint8_t {
 
 /// [host]: what concerns the controller as a whole.
 struct HostConfig {
-  std::string name;  ///< default: the system's host name
+  std::string name;                 ///< default: the system's host name
+  std::vector<std::string> labels;  ///< by which clients choose hosts
   int dds_domain = 0;
   std::string run_directory = "/run/plchost";
   std::string state_directory = "/var/lib/plchost";  ///< what instances keep over a power cut
@@ -77,6 +78,8 @@ struct ManagerConfig {
 };
 
 /// Bounds of what a file may say.
+inline constexpr std::size_t kMaxLabels = 4;  // what an entry of a sample holds
+inline constexpr std::size_t kMaxLabel = 30;
 inline constexpr std::size_t kMaxConfigBytes = std::size_t{1} << 20;
 inline constexpr int kMaxDdsDomain = 230;  // its UDP ports must stay below 65536
 inline constexpr std::int64_t kMinPoolObjects = 16;

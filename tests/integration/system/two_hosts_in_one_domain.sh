@@ -1,9 +1,10 @@
 #!/usr/bin/env bash
-# Two managers, one DDS domain: both are seen, each is addressed by name.
+# Two managers, one DDS domain: both are seen, each is addressed by name, both by a pattern or a label.
 . "$(dirname "$0")/common.sh"
 
 for host in north south; do
   write_host "$host" "$first_core"
+  echo "labels = [\"hall1\", \"$host-wing\"]" >>"$cell/$host.toml"
   write_instance "$host" packer1 "$first_core" packer 'scheduler = "CmpScheduleTimer"'
   start_manager "$host"
 done
@@ -26,6 +27,23 @@ is "$(cycles north)" "$before_north" || fail "the post reached the wrong host"
 plcctl --host north stop instance packer1
 is "$(plcctl list instances --json | jq -r '.[] | select(.host == "north") | .state')" stopped || fail "north runs"
 is "$(plcctl list instances --json | jq -r '.[] | select(.host == "south") | .state')" running || fail "south was stopped"
+
+state() { plcctl list instances --json | jq -r ".[] | select(.host == \"$1\") | .state"; }
+echo "- several at once: all, by pattern, by label"
+is "$(plcctl --host all restart instance packer1)" $'north: done\nsouth: done' || fail "not both"
+is "$(state north),$(state south)" running,running || fail "$(plcctl list instances)"
+plcctl --host 'n?rth' stop instance packer1
+is "$(state north),$(state south)" stopped,running || fail "a pattern: $(plcctl list instances)"
+plcctl --label hall1 --label south-wing stop instance packer1
+is "$(state north),$(state south)" stopped,stopped || fail "two labels: $(plcctl list instances)"
+is "$(plcctl --label hall1 start instance packer1 --json | jq -r 'map(.host + " " + (.done | tostring)) | join(",")')" "north true,south true" ||
+  fail "a label"
+is "$(plcctl --label north-wing list hosts --json | jq -r '.[].labels')" hall1,north-wing || fail "$(plcctl list hosts)"
+if said=$(plcctl --label cellar stop instance packer1 2>&1); then fail "a label that no host has"; fi
+grep -qF "north (hall1, north-wing), south (hall1, south-wing)" <<<"$said" || fail "$said"
+code=0
+plcctl --host all stop instance nowhere >/dev/null 2>&1 || code=$?
+is "$code" 1 || fail "exit code $code where no host has the instance"
 
 kill -TERM "${managers[0]}"
 wait "${managers[0]}" || fail "north ended with $?"
