@@ -1,12 +1,36 @@
 // Somebody on the wire who has no key: he sends again what he saw, and what he made of it.
 #include "tests/integration/security/packets.hpp"
 
+#include <algorithm>
+#include <array>
 #include <thread>
 
 #include "tests/integration/security/secured_host.hpp"
 
 namespace plchost {
 namespace {
+
+/// The message with "contents" turned into "key" in each sample of the writer that the handshake uses; empty:
+/// it has none.
+Packet with_key_for_contents(Packet packet) {
+  constexpr std::array kHandshakeWriter{std::byte{0x00}, std::byte{0x02}, std::byte{0x01}, std::byte{0xc3}};
+  bool found = false;
+  for (std::size_t at = 20; at + 16 <= packet.size();) {
+    const auto size =
+        std::to_integer<std::size_t>(packet[at + 2]) | std::to_integer<std::size_t>(packet[at + 3]) << 8U;
+    const auto writer = packet.begin() + static_cast<std::ptrdiff_t>(at) + 12;
+    const bool is_data = packet[at] == std::byte{0x15};
+    if ((is_data || packet[at] == std::byte{0x16}) &&
+        std::equal(kHandshakeWriter.begin(), kHandshakeWriter.end(), writer)) {
+      packet[at + 1] =
+          is_data ? (packet[at + 1] & ~std::byte{0x04}) | std::byte{0x08} : packet[at + 1] | std::byte{0x04};
+      found = true;
+    }
+    if (size == 0) break;
+    at += 4 + size;
+  }
+  return found ? packet : Packet();
+}
 
 class Packets : public SecuredHost {
  protected:
@@ -61,6 +85,20 @@ TEST_F(Packets, AlteredPostNothing) {
       const auto at = std::uniform_int_distribution<std::size_t>(4, packet.size() - 1)(random);
       packet[at] ^= std::byte{1} << std::uniform_int_distribution<unsigned>(0, 7)(random);
     }
+    sender.send(altered);
+    only_those_have_counted();
+  }
+}
+
+// Cyclone 0.10.2 follows a null pointer there.
+TEST_F(Packets, OfTheHandshakeWithAKeyForContentsHarmNobody) {
+  std::vector<Packet> altered;
+  for (const Packet& packet : seen_) {
+    if (Packet made = with_key_for_contents(packet); !made.empty()) altered.push_back(std::move(made));
+  }
+  ASSERT_FALSE(altered.empty()) << "no message of a handshake was seen";
+  const PacketSender sender(domain_.number());
+  for (int i = 0; i < 20; ++i) {
     sender.send(altered);
     only_those_have_counted();
   }
