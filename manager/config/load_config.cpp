@@ -193,10 +193,12 @@ void Loader::read_dds(const TomlTable& table, unsigned line) {
 
 void Loader::read_identity(SectionReader& reader) {
   DdsConfig& dds = config.dds;
+  const std::size_t before = problems.size();
   reader.text("identity", dds.identity);
+  if (problems.size() > before) return;  // it was meant to have one
   if (dds.identity.empty()) {
     if (reader.has("identity")) reader.problem("identity", "is no path; leave the key out for no security");
-    if (dds.enabled && dds.interface != "lo" && !dds.allow_unsecured) {
+    if (dds.enabled && !dds.interface.empty() && dds.interface != "lo" && !dds.allow_unsecured) {
       reader.problem("interface",
                      fmt::format("\"{}\" without an identity opens this controller to all who reach it; set "
                                  "identity = \"FOLDER\" ('plcctl security init' makes it), or "

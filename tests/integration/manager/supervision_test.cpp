@@ -159,7 +159,7 @@ TEST(Manager, KeepsTheApiServerAliveAndEndsItWithItself) {
   const auto lines = [&] { return plant.lines_of("api.log"); };
   ASSERT_TRUE(Plant::eventually([&] { return lines().size() == 1; }));
   EXPECT_THAT(lines()[0], HasSubstr("--host cell --domain 0 --pool " + plant.pool() + " --run-directory "));
-  EXPECT_THAT(lines()[0], HasSubstr("--interface lo --blocks-base blocks --host-number 0 --log-level info"));
+  EXPECT_THAT(lines()[0], HasSubstr("--interface lo --blocks-base blocks --host-number 0 --audit-folder "));
   kill_process(std::stoi(lines()[0]));
   ASSERT_TRUE(Plant::eventually([&] { return lines().size() == 2; }));
   const int second = std::stoi(lines()[1]);

@@ -121,9 +121,11 @@ TEST_F(MemoryFileTest, MovesItsMapping) {
   auto first = MemoryFile::create(name_.get(), 1);
   auto second = MemoryFile::replace(name_.get(), 2);
   ASSERT_TRUE(first && second);
-  *first = std::move(*second);
-  EXPECT_EQ(first->bytes().size(), 2U);
+  const MemoryFile third = std::move(*second);
   EXPECT_FALSE(*second);
+  EXPECT_EQ(third.bytes().size(), 2U);
+  *first = MemoryFile::open(name_.get(), 1, MemoryFile::Access::read_write).value();
+  EXPECT_EQ(first->bytes().size(), 2U);
   first->bytes()[1] = std::byte{1};
 }
 
