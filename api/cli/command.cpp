@@ -52,6 +52,18 @@ const Command& Command::argument(const char* form, std::string& value, const cha
   return *this;
 }
 
+const Command& Command::arguments(const char* form, std::vector<std::string>& values,
+                                  const char* text) const {
+  app_->add_option(form, values, text)->required();
+  return *this;
+}
+
+const Command& Command::choice(const char* name, std::string& value, const char* text,
+                               const std::vector<std::string>& words) const {
+  app_->add_flag(name, value, text)->check(CLI::IsMember(words));
+  return *this;
+}
+
 const Command& Command::optional(const char* form, std::string& value, const char* text) const {
   app_->add_option(form, value, text);
   return *this;

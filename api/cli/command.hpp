@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "api/cli/syntax.hpp"
 
@@ -36,11 +37,17 @@ class Command {
 
   /// What must follow; `form` is how the help shows it.
   const Command& argument(const char* form, std::string& value, const char* text = "") const;
+  /// One or more of what must follow.
+  const Command& arguments(const char* form, std::vector<std::string>& values, const char* text = "") const;
   /// What may follow.
   const Command& optional(const char* form, std::string& value, const char* text) const;
   const Command& flag(const char* name, bool& value, const char* text) const;
   /// A text, which a variable of the environment can stand for.
   const Command& option(const char* name, std::string& value, const char* text, const char* variable) const;
+  /// One of several words, "--name=WORD". `name`: "--name{WORD}", where WORD is what "--name" alone stands
+  /// for.
+  const Command& choice(const char* name, std::string& value, const char* text,
+                        const std::vector<std::string>& words) const;
   /// A number from `least` to `most`; anything else is an error that names both.
   template <class Number>
   const Command& option(const char* name, Number& value, const char* text, Number least, Number most) const;

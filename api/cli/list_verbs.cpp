@@ -61,7 +61,7 @@ bool has_happened(const plc_ExceptionStatus& exception) {
 
 void add_list_verbs(const Command& plcctl, CliSession& session) {
   const Command verb = plcctl.verb(
-      "list", "Show all hosts, instances, tasks, events, objects, nodes, exceptions or transitions");
+      "list", "Show all hosts, instances, tasks, events, writers, objects, nodes, exceptions or transitions");
   verb.noun("hosts", "The controllers of the DDS domain", [&session] { return list_hosts(session); });
   verb.noun("instances", "The PLC instances",
             [&session] { return list(session, &ControlClient::instances, instance_columns()); });
@@ -71,6 +71,8 @@ void add_list_verbs(const Command& plcctl, CliSession& session) {
       .optional("INSTANCE", *instance, "only of this instance");
   verb.noun("events", "The external events",
             [&session] { return list(session, &ControlClient::events, event_columns()); });
+  verb.noun("writers", "The clients that post events, and what became of their posts",
+            [&session] { return list(session, &ControlClient::writers, writer_columns()); });
   add_list_objects(verb, session);
   add_list_nodes(verb, session);
   verb.noun("exceptions", "The last exception of each instance that had any", [&session] {

@@ -14,6 +14,7 @@ namespace plchost {
 [[nodiscard]] Row to_row(const plc_InstanceStatus& status);
 [[nodiscard]] Row to_row(const plc_TaskStatus& status);
 [[nodiscard]] Row to_row(const plc_EventStatus& status);
+[[nodiscard]] Row to_row(const plc_WriterStatus& status);
 [[nodiscard]] Row to_row(const plc_ExceptionStatus& status);
 [[nodiscard]] Row to_row(const plc_Transition& transition);
 
@@ -31,6 +32,7 @@ namespace plchost {
 [[nodiscard]] const std::vector<Column>& instance_columns();
 [[nodiscard]] const std::vector<Column>& task_columns();
 [[nodiscard]] const std::vector<Column>& event_columns();
+[[nodiscard]] const std::vector<Column>& writer_columns();
 [[nodiscard]] const std::vector<Column>& exception_columns();
 [[nodiscard]] const std::vector<Column>& transition_columns();
 

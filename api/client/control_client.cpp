@@ -36,6 +36,9 @@ auto order(const plc_EventStatus& s) {
 auto order(const plc_ObjectStatus& s) {
   return std::string_view(s.object_name);
 }
+auto order(const plc_WriterStatus& s) {
+  return dds::Guid::from(s.source);
+}
 
 }  // namespace
 
@@ -97,6 +100,7 @@ void ControlClient::update() {
   task_status_.update();
   statistics_.update();
   event_status_.update();
+  writer_status_.update();
   object_status_.update();
   exceptions_.update();
   host_findings_.update();
@@ -222,6 +226,10 @@ Result<StatisticsReport> ControlClient::statistics(const std::string& host, std:
 
 Result<std::vector<plc_EventStatus>> ControlClient::events(const std::string& host, TimePoint deadline) {
   return snapshot(event_status_, dds::kEventStatus, &plc_HostStatus::event_count, host, deadline);
+}
+
+Result<std::vector<plc_WriterStatus>> ControlClient::writers(const std::string& host, TimePoint deadline) {
+  return snapshot(writer_status_, dds::kWriterStatus, &plc_HostStatus::writer_count, host, deadline);
 }
 
 Result<std::vector<plc_ObjectStatus>> ControlClient::objects(const std::string& host, TimePoint deadline) {

@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -12,6 +13,7 @@
 
 #include <control.h>
 
+#include "api/client/batch_poster.hpp"
 #include "api/client/event_poster.hpp"
 #include "api/client/request_caller.hpp"
 #include "api/client/statistics_cache.hpp"
@@ -38,6 +40,15 @@ struct HostView {
 
   /// What its configuration calls it, beside its name.
   [[nodiscard]] std::vector<std::string> labels() const;
+};
+
+/// A post that was run.
+struct RunReport {
+  std::uint32_t tasks = 0;  ///< that were bound
+  std::string last_task;    ///< "INSTANCE/TASK" that ended its cycle last
+  Duration to_start{};      ///< on the host: from the post's arrival to the start of that cycle
+  Duration to_end{};        ///< and to its end
+  Duration round_trip{};    ///< here: from before the post to after the news
 };
 
 /// The client's end of the DDS API: sees all hosts of a domain and addresses any. One thread at a time.
@@ -76,6 +87,9 @@ class ControlClient {
   [[nodiscard]] Result<StatisticsReport> statistics(const std::string& host, std::string_view instance,
                                                     std::string_view task, TimePoint deadline);
   [[nodiscard]] Result<std::vector<plc_EventStatus>> events(const std::string& host, TimePoint deadline);
+  /// What became of the posts of each client, as the host counts them; first (source all zero) of all
+  /// together.
+  [[nodiscard]] Result<std::vector<plc_WriterStatus>> writers(const std::string& host, TimePoint deadline);
   [[nodiscard]] Result<std::vector<plc_ObjectStatus>> objects(const std::string& host, TimePoint deadline);
   /// A part of the objects of a host's pool, as the query asks, with all that is known of them; complete: the
   /// last one. Else go on with query.after = next_after. The code of the failure is the host's own:
@@ -116,6 +130,17 @@ class ControlClient {
   [[nodiscard]] Result<PostReport> post_event(const ApiRequest& event, std::uint64_t count, Duration interval,
                                               Duration patience);
 
+  /// Posts an event once and waits until the tasks that are bound to it have ended their cycles for it.
+  /// The code of the failure is the host's own: not_found: no such event, or no task is bound to it;
+  /// wrong_state: a task was stopped before it ran. timed_out: nothing has come for `patience`, or the task
+  /// has not run within 10 s; the post may be in the pool.
+  [[nodiscard]] Result<RunReport> post_and_await(const ApiRequest& event, Duration patience);
+
+  /// Posts several events, at most kMaxBatch, at once: all of them, or none. The report counts the batch as
+  /// one post.
+  [[nodiscard]] Result<PostReport> post_batch(const std::string& host, std::span<const EventId> events,
+                                              Duration patience);
+
   /// One post with the least latency: one dds_write, not repeated, not waited for. prepare_posts() first.
   [[nodiscard]] Result<void> post_one(const std::string& host, std::string_view instance,
                                       std::string_view event);
@@ -147,6 +172,10 @@ class ControlClient {
                                              const dds::TopicInfo& info, const dds::Qos& qos);
   [[nodiscard]] Result<RequestCaller*> caller(const std::string& host, bool engineering);
   [[nodiscard]] Result<EventPoster*> poster(const std::string& host);
+  [[nodiscard]] Result<BatchPoster*> batch_poster(const std::string& host);
+  [[nodiscard]] Result<void> prepare_runs(const std::string& host, TimePoint deadline);
+  [[nodiscard]] std::optional<Result<RunReport>> take_run(const dds::Guid& source, std::uint64_t number,
+                                                          TimePoint start);
   bool take_acks(TimePoint now);
   struct PageReader {
     dds::Entity topic;
@@ -167,6 +196,7 @@ class ControlClient {
   StatusCache<plc_TaskStatus> task_status_;
   StatisticsCache statistics_;
   StatusCache<plc_EventStatus> event_status_;
+  StatusCache<plc_WriterStatus> writer_status_;
   StatusCache<plc_ObjectStatus> object_status_;
   StatusCache<plc_ExceptionStatus> exceptions_;
   StatusCache<plc_HostFinding> host_findings_;
@@ -180,9 +210,12 @@ class ControlClient {
   dds::Entity ack_topic_;
   dds::Entity ack_reader_;
   dds::Entity event_topic_;
+  dds::Entity batch_topic_;
+  PageReader runs_;
   std::array<dds::Entity, 2> request_topics_;
   std::map<std::pair<std::string, bool>, RequestCaller> callers_;
   std::map<std::string, EventPoster, std::less<>> posters_;
+  std::map<std::string, BatchPoster, std::less<>> batch_posters_;
 };
 
 }  // namespace plchost

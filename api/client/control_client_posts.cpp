@@ -46,8 +46,9 @@ Result<void> ControlClient::prepare_posts(const std::string& host, TimePoint dea
 bool ControlClient::take_acks(TimePoint now) {
   bool progress = false;
   dds::take_valid<plc_EventAck>(ack_reader_.get(), [&](const plc_EventAck& ack, const auto& /*info*/) {
-    const auto way = posters_.find(dds::text_of(ack.host));
-    if (way != posters_.end()) progress |= way->second.on_ack(ack, now);
+    const auto host = dds::text_of(ack.host);
+    if (const auto way = posters_.find(host); way != posters_.end()) progress |= way->second.on_ack(ack, now);
+    if (const auto way = batch_posters_.find(host); way != batch_posters_.end()) way->second.on_ack(ack);
   });
   return progress;
 }

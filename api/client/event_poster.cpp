@@ -24,10 +24,9 @@ Result<EventPoster> EventPoster::create(dds_entity_t participant, dds_entity_t t
   return poster;
 }
 
-bool EventPoster::matched() const noexcept {
+bool has_reader(dds_entity_t writer) noexcept {
   dds_publication_matched_status_t status{};
-  return dds_get_publication_matched_status(writer_.get(), &status) == DDS_RETCODE_OK &&
-         status.current_count > 0;
+  return dds_get_publication_matched_status(writer, &status) == DDS_RETCODE_OK && status.current_count > 0;
 }
 
 dds_return_t EventPoster::write(std::uint64_t sequence) noexcept {
@@ -36,13 +35,31 @@ dds_return_t EventPoster::write(std::uint64_t sequence) noexcept {
   return dds_write(writer_.get(), &sample_);
 }
 
-void EventPoster::post(std::string_view instance, std::string_view event, TimePoint now) {
+dds_return_t EventPoster::write(const Unacknowledged& post) noexcept {
+  dds::copy_text(sample_.instance, post.instance);
+  dds::copy_text(sample_.event, post.event);
+  plc_KeyValue entry{};
+  if (post.awaited) {
+    dds::copy_text(entry.name, dds::kWaitEntry);
+    dds::copy_text(entry.value, dds::kWaitForRun);
+    sample_.ext = {._maximum = 1, ._length = 1, ._buffer = &entry, ._release = false};
+  }
+  const dds_return_t written = write(post.sequence);
+  sample_.ext = {};
+  return written;
+}
+
+std::uint64_t EventPoster::post(std::string_view instance, std::string_view event, TimePoint now,
+                                bool awaited) {
   if (unacknowledged_.empty()) last_progress_ = now;
-  unacknowledged_.push_back({++last_sequence_, std::string(instance), std::string(event)});
-  dds::copy_text(sample_.instance, instance);
-  dds::copy_text(sample_.event, event);
-  (void)write(last_sequence_);  // one that DDS did not take is repeated like a lost one
+  unacknowledged_.push_back({++last_sequence_, std::string(instance), std::string(event), awaited});
+  (void)write(unacknowledged_.back());  // one that DDS did not take is repeated like a lost one
   last_write_ = now;
+  return last_sequence_;
+}
+
+void EventPoster::ask_again(std::uint64_t number, std::string_view instance, std::string_view event) {
+  (void)write({number, std::string(instance), std::string(event), /*awaited=*/true});
 }
 
 Result<void> EventPoster::post_once(std::string_view instance, std::string_view event) noexcept {
@@ -74,9 +91,7 @@ TimePoint EventPoster::repeat(TimePoint now) {
   const bool at_once = last_write_ == TimePoint{};
   if (!at_once && now < due) return due;
   for (const Unacknowledged& post : unacknowledged_) {
-    dds::copy_text(sample_.instance, post.instance);
-    dds::copy_text(sample_.event, post.event);
-    if (write(post.sequence) != DDS_RETCODE_OK) break;
+    if (write(post) != DDS_RETCODE_OK) break;
   }
   last_write_ = now;
   return now + patience;
@@ -89,14 +104,20 @@ void EventPoster::begin_report(TimePoint now) {
 }
 
 PostReport EventPoster::report() const {
-  PostReport report;
-  report.accepted = newest_.accepted - base_.accepted;
-  report.no_task = newest_.no_task - base_.no_task;
-  report.rejected = newest_.rejected - base_.rejected;
+  PostReport report = report_between(base_, newest_);
   report.unacknowledged = unacknowledged_.size();
+  return report;
+}
+
+PostReport report_between(const plc_EventAck& before, const plc_EventAck& now) {
+  PostReport report;
+  report.accepted = now.accepted - before.accepted;
+  report.no_task = now.no_task - before.no_task;
+  report.rejected = now.rejected - before.rejected;
+  report.lost = now.lost - before.lost;
   if (report.rejected > 0) {
-    report.rejected_code = static_cast<ErrorCode>(newest_.rejected_code);
-    report.rejected_text = dds::text_of(newest_.rejected_text);
+    report.rejected_code = static_cast<ErrorCode>(now.rejected_code);
+    report.rejected_text = dds::text_of(now.rejected_text);
   }
   return report;
 }

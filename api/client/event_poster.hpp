@@ -20,9 +20,15 @@ struct PostReport {
   std::uint64_t no_task = 0;   ///< counted, but no task was bound to the event at that time
   std::uint64_t rejected = 0;  ///< not counted
   ErrorCode rejected_code = ErrorCode::ok;
+  std::uint64_t lost = 0;            ///< not counted: one-way posts that never came
   std::string rejected_text;         ///< why the last rejected one was
   std::uint64_t unacknowledged = 0;  ///< nothing is known of these; 0 unless the host stopped answering
 };
+
+/// What happened between two acknowledgements of one source.
+[[nodiscard]] PostReport report_between(const plc_EventAck& before, const plc_EventAck& now);
+/// Whether a writer has met a reader.
+[[nodiscard]] bool has_reader(dds_entity_t writer) noexcept;
 
 /// The posts to one host: numbers them, keeps those that are not acknowledged, and repeats them.
 class EventPoster {
@@ -36,12 +42,16 @@ class EventPoster {
   [[nodiscard]] static Result<EventPoster> create(dds_entity_t participant, dds_entity_t topic,
                                                   const std::string& host);
 
+  [[nodiscard]] const dds::Guid& source() const noexcept { return source_; }
   [[nodiscard]] dds_entity_t writer() const noexcept { return writer_.get(); }
   /// Whether the host's reader is there.
-  [[nodiscard]] bool matched() const noexcept;
+  [[nodiscard]] bool matched() const noexcept { return has_reader(writer_.get()); }
 
-  /// One post that is repeated until it is acknowledged. Only while has_room().
-  void post(std::string_view instance, std::string_view event, TimePoint now);
+  /// One post that is repeated until it is acknowledged. Only while has_room(). `awaited`: the host shall
+  /// tell when it was run. Returns its number.
+  std::uint64_t post(std::string_view instance, std::string_view event, TimePoint now, bool awaited = false);
+  /// The same post again, which was acknowledged: the host that is there now shall tell when it was run.
+  void ask_again(std::uint64_t number, std::string_view instance, std::string_view event);
   [[nodiscard]] bool has_room() const noexcept { return unacknowledged_.size() < window_; }
   [[nodiscard]] std::size_t unacknowledged() const noexcept { return unacknowledged_.size(); }
 
@@ -65,7 +75,9 @@ class EventPoster {
     std::uint64_t sequence = 0;
     std::string instance;
     std::string event;
+    bool awaited = false;
   };
+  dds_return_t write(const Unacknowledged& post) noexcept;
 
   dds::Entity publisher_;
   dds::Entity writer_;

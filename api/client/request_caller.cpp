@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "api/client/event_poster.hpp"
 #include "api/dds/samples.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"
@@ -27,11 +28,6 @@ std::optional<ApiReply> take_reply(dds_entity_t reader, const plc_SampleIdentity
                      reply.status_round, identity};
   });
   return found;
-}
-
-bool is_matched(dds_entity_t writer) {
-  dds_publication_matched_status_t status{};
-  return dds_get_publication_matched_status(writer, &status) == DDS_RETCODE_OK && status.current_count > 0;
 }
 
 }  // namespace
@@ -66,7 +62,7 @@ Result<ApiReply> RequestCaller::call(const ApiRequest& request, dds_entity_t rep
   while (MonotonicClock::now() < deadline) {
     if (auto reply = take_reply(reply_reader, sample.header.request_identity)) return *reply;
     const TimePoint now = MonotonicClock::now();
-    if (now >= next_write && is_matched(writer_.get())) {
+    if (now >= next_write && has_reader(writer_.get())) {
       (void)dds_write(writer_.get(), &sample);  // a refusal of DDS is mended by the repetition
       next_write = now + (written ? kRepeat : kFirstRepeat);
       written = true;

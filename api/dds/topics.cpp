@@ -36,6 +36,12 @@ Qos ack_qos() {
   return qos;
 }
 
+Qos run_qos() {
+  Qos qos;
+  qos.reliable(kServerBlocking).keep_last(kRunDepth).transient_local();
+  return qos;
+}
+
 Qos status_qos() {
   Qos qos;
   qos.reliable(kServerBlocking).keep_last(1).transient_local().no_autodispose();

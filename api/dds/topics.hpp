@@ -23,6 +23,8 @@ inline constexpr TopicInfo kOperatorRequest{"plc/v1/op/request", &plc_Request_de
 inline constexpr TopicInfo kEngineerRequest{"plc/v1/eng/request", &plc_Request_desc};
 inline constexpr TopicInfo kReply{"plc/v1/reply", &plc_Reply_desc};
 inline constexpr TopicInfo kEvent{"plc/v1/event", &plc_EventPost_desc};
+inline constexpr TopicInfo kEventBatch{"plc/v1/event_batch", &plc_EventBatch_desc};
+inline constexpr TopicInfo kEventRun{"plc/v1/event_run", &plc_EventRun_desc};
 inline constexpr TopicInfo kEventAck{"plc/v1/event_ack", &plc_EventAck_desc};
 inline constexpr TopicInfo kPresence{"plc/v1/presence", &plc_Presence_desc};
 inline constexpr TopicInfo kHostStatus{"plc/v1/status/host", &plc_HostStatus_desc};
@@ -31,6 +33,7 @@ inline constexpr TopicInfo kTaskStatus{"plc/v1/status/task", &plc_TaskStatus_des
 inline constexpr TopicInfo kTaskStatistics{"plc/v1/status/task_statistics", &plc_TaskStatistics_desc};
 inline constexpr TopicInfo kEventStatus{"plc/v1/status/event", &plc_EventStatus_desc};
 inline constexpr TopicInfo kObjectStatus{"plc/v1/status/object", &plc_ObjectStatus_desc};
+inline constexpr TopicInfo kWriterStatus{"plc/v1/status/writer", &plc_WriterStatus_desc};
 inline constexpr TopicInfo kObjectPage{"plc/v1/objects", &plc_ObjectPage_desc};
 inline constexpr TopicInfo kNodePage{"plc/v1/nodes", &plc_NodePage_desc};
 inline constexpr TopicInfo kBlockHostStatus{"plc/v1/status/block_host", &plc_BlockHostStatus_desc};
@@ -44,6 +47,8 @@ inline constexpr TopicInfo kTransition{"plc/v1/transition", &plc_Transition_desc
 /// loss.
 inline constexpr std::int32_t kRequestReaderDepth = 256;
 inline constexpr std::int32_t kEventReaderDepth = 4096;
+inline constexpr std::int32_t kBatchReaderDepth = 256;
+inline constexpr std::int32_t kRunDepth = 64;
 inline constexpr std::int32_t kBlockReaderDepth = 1024;
 inline constexpr std::int32_t kReplyDepth = 16;
 inline constexpr std::int32_t kPageDepth = 4;         ///< of objects, and of nodes
@@ -53,6 +58,9 @@ inline constexpr std::int32_t kTransitionDepth = 64;  ///< of each instance; as 
 inline constexpr std::string_view kTransitionsEntry = "transitions";
 /// Entry of HostStatus.ext: its labels, with commas between.
 inline constexpr std::string_view kLabelsEntry = "labels";
+/// Entry of EventPost.ext and its value: an EventRun is wanted.
+inline constexpr std::string_view kWaitEntry = "wait";
+inline constexpr std::string_view kWaitForRun = "run";
 /// No writer of the server waits longer.
 inline constexpr Duration kServerBlocking = std::chrono::milliseconds(1);
 inline constexpr Duration kRequestBlocking = std::chrono::milliseconds(100);
@@ -65,6 +73,7 @@ inline constexpr Duration kPresenceDeadline = std::chrono::milliseconds(75);
 [[nodiscard]] Qos reply_qos();
 [[nodiscard]] Qos page_qos();
 [[nodiscard]] Qos ack_qos();
+[[nodiscard]] Qos run_qos();
 [[nodiscard]] Qos status_qos();
 [[nodiscard]] Qos presence_qos();
 [[nodiscard]] Qos transition_qos();

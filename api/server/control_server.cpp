@@ -6,8 +6,10 @@
 #include <utility>
 #include <vector>
 
+#include <pthread.h>
 #include <sys/epoll.h>
 #include <sys/signalfd.h>
+#include <sys/timerfd.h>
 #include <unistd.h>
 
 #include "api/dds/samples.hpp"
@@ -54,6 +56,7 @@ ControlServer::~ControlServer() {
   // No listener may run while what it uses is taken apart.
   for (auto& request : parts_->requests) request.reader.reset();
   parts_->event_reader.reset();
+  parts_->batch_reader.reset();
   if (parts_->sessions) {
     for (const dds_entity_t reader : parts_->sessions->discovery_readers()) dds_set_listener(reader, nullptr);
   }
@@ -66,15 +69,31 @@ Result<void> ControlServer::run() {
 void ControlServer::Parts::on_event_post(dds_entity_t reader, void* server) {
   MemoryGuard::watch_thread();
   auto& self = *static_cast<Parts*>(server);
-  if (self.intake->take(reader)) raise_event(self.wake.get());
+  if (self.intake->take_posts(reader)) raise_event(self.wake.get());
+}
+
+void ControlServer::Parts::on_event_batch(dds_entity_t reader, void* server) {
+  MemoryGuard::watch_thread();
+  auto& self = *static_cast<Parts*>(server);
+  if (self.intake->take_batches(reader)) raise_event(self.wake.get());
 }
 
 void ControlServer::Parts::on_wake_listener(dds_entity_t /*reader*/, void* server) {
   raise_event(static_cast<Parts*>(server)->wake.get());
 }
 
+// Above the threads that receive: a flood of posts shall not keep requests, acknowledgements and the presence
+// waiting. What the loop does at a time is bounded.
+Result<void> ControlServer::Parts::raise_loop() const {
+  if (options.dds.receive_fifo == 0) return {};
+  const sched_param priority{.sched_priority = options.dds.receive_fifo + 1};
+  return check_returned(::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &priority),
+                        "raise the control loop");
+}
+
 Result<void> ControlServer::Parts::run() {
-  for (const int fd : {wake.get(), signals.get(), status_timer.get(), presence_timer.get(),
+  if (auto raised = raise_loop(); !raised) return raised;
+  for (const int fd : {wake.get(), signals.get(), status_timer.get(), presence_timer.get(), run_timer.get(),
                        identity_timer.get(), manager->fd()}) {
     epoll_event event{.events = EPOLLIN, .data = {.fd = fd}};
     if (auto added = check_errno(::epoll_ctl(epoll.get(), EPOLL_CTL_ADD, fd, &event), "watch a descriptor");
@@ -109,11 +128,14 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
     on_wake();
   } else if (fd == status_timer.get()) {
     const TimePoint now = MonotonicClock::now();
+    status->look_at_writers(*intake, *sessions, now);
     status->tick(now);
     lister.forget_old(now);
     audit->tick(now);
     status->set_audit_head(audit->head());
     finish(manager->expire(now));
+  } else if (fd == run_timer.get()) {
+    look_at_runs();
   } else if (fd == presence_timer.get()) {
     status->write_presence();
   } else if (fd == identity_timer.get()) {
@@ -169,7 +191,18 @@ void ControlServer::Parts::on_wake() {
     audit->posted(ack, MonotonicClock::now());
     sessions->write_ack(dds::Guid::from(ack.source).participant(), ack);
   }
+  for (const AwaitedPost& post : intake->collect_awaited()) runs.add(post, status->tasks());
+  if (!runs.empty()) look_at_runs();
   for (const RequestReader& request : requests) on_requests(request);
+}
+
+void ControlServer::Parts::look_at_runs() {
+  for (const plc_EventRun& run : runs.look(status->tasks(), MonotonicClock::now())) {
+    sessions->write_run(dds::Guid::from(run.source).participant(), run);
+  }
+  const timespec period = to_timespec(runs.empty() ? Duration::zero() : RunWatch::kPeriod);
+  const itimerspec times{.it_interval = period, .it_value = period};
+  (void)::timerfd_settime(run_timer.get(), 0, &times, nullptr);
 }
 
 void ControlServer::Parts::on_requests(const RequestReader& source) {

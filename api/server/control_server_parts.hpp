@@ -18,6 +18,7 @@
 #include "api/server/object_lister.hpp"
 #include "api/server/request_audit.hpp"
 #include "api/server/request_check.hpp"
+#include "api/server/run_watch.hpp"
 #include "api/server/session_table.hpp"
 #include "api/server/status_publisher.hpp"
 #include "shm/base/unique_fd.hpp"
@@ -38,7 +39,8 @@ struct ControlServer::Parts {
         pool(std::move(attached)),
         lister(pool),
         nodes(options.pool, options.blocks_base),
-        epoch(started) {}
+        epoch(started),
+        runs(options.host, started) {}
 
   Result<void> open(PostLedger ledger);
   Result<void> make_loop();
@@ -48,6 +50,7 @@ struct ControlServer::Parts {
   Result<void> listen();
   Result<void> open_gateway();
   void open_audit();
+  [[nodiscard]] Result<void> raise_loop() const;
   Result<void> run();
   Result<bool> dispatch(int fd);
   void on_wake();
@@ -66,7 +69,10 @@ struct ControlServer::Parts {
   void send_page(const dds::Guid& client, const plc_Request& request, Page& page);
   [[nodiscard]] bool collect_findings(FinishedCommand& finished);
 
+  void look_at_runs();
+
   static void on_event_post(dds_entity_t reader, void* server);
+  static void on_event_batch(dds_entity_t reader, void* server);
   static void on_wake_listener(dds_entity_t reader, void* server);
 
   ServerOptions options;
@@ -84,6 +90,7 @@ struct ControlServer::Parts {
   std::optional<IdentityWatch> identity_watch;  // of a secured host
   std::uint64_t refused_told = 0;
   TimePoint refused_told_at;
+  UniqueFd run_timer;  // set while runs are waited for
   std::optional<ManagerLink> manager;
   std::optional<EventIntake> intake;
   std::shared_ptr<dds::Entity> domain;
@@ -94,6 +101,9 @@ struct ControlServer::Parts {
   dds::Entity subscriber;
   dds::Entity event_topic;
   dds::Entity event_reader;
+  dds::Entity batch_topic;
+  dds::Entity batch_reader;
+  RunWatch runs;
   std::array<RequestReader, 2> requests;
   std::unique_ptr<GatewayThread> gateway;  // of a host that has a number
 };

@@ -25,6 +25,7 @@ namespace {
 /// How often the files of the host's identity are looked at.
 constexpr Duration kIdentityLook = std::chrono::milliseconds(500);
 
+/// A period of 0: it is not set.
 Result<UniqueFd> make_timer(Duration period) {
   const auto fd = check_errno(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK), "make a timer");
   if (!fd) return std::unexpected(fd.error());
@@ -70,6 +71,7 @@ Result<void> ControlServer::Parts::open(PostLedger ledger) {
   if (!made_status) return std::unexpected(made_status.error());
   status.emplace(std::move(*made_status));
   // Everything is there before a client can see that this host is: presence comes last.
+  status->look_at_writers(*intake, *sessions, MonotonicClock::now());
   status->tick(MonotonicClock::now());
   if (auto made = make_readers(); !made) return made;
   if (auto listening = listen(); !listening) return listening;
@@ -126,6 +128,9 @@ Result<void> ControlServer::Parts::make_loop() {
   auto made_identity = make_timer(kIdentityLook);
   if (!made_identity) return std::unexpected(made_identity.error());
   identity_timer = std::move(*made_identity);
+  auto made_run = make_timer(Duration::zero());
+  if (!made_run) return std::unexpected(made_run.error());
+  run_timer = std::move(*made_run);
   const auto event = check_errno(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "make an event descriptor");
   if (!event) return std::unexpected(event.error());
   wake.reset(*event);
@@ -207,7 +212,10 @@ Result<void> ControlServer::Parts::make_readers() {
   request_qos.max_samples(dds::kRequestReaderDepth);
   auto event_qos = dds::event_qos();
   event_qos.max_samples(dds::kEventReaderDepth);
+  auto batch_qos = dds::event_qos();
+  batch_qos.max_samples(dds::kBatchReaderDepth);
   if (auto made = make(dds::kEvent, event_qos, event_topic, event_reader); !made) return made;
+  if (auto made = make(dds::kEventBatch, batch_qos, batch_topic, batch_reader); !made) return made;
   if (auto made = make(dds::kOperatorRequest, request_qos, requests[0].topic, requests[0].reader); !made)
     return made;
   return make(dds::kEngineerRequest, request_qos, requests[1].topic, requests[1].reader);
@@ -228,8 +236,10 @@ Result<void> ControlServer::Parts::listen() {
     if (auto done = set(request.reader.get(), on_wake_listener); !done) return done;
   }
   if (auto done = set(event_reader.get(), on_event_post); !done) return done;
+  if (auto done = set(batch_reader.get(), on_event_batch); !done) return done;
   // What came before the listener was there does not call it.
   on_event_post(event_reader.get(), this);
+  on_event_batch(batch_reader.get(), this);
   raise_event(wake.get());
   return {};
 }

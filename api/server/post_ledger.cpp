@@ -14,11 +14,12 @@ struct LedgerLayout {
   std::uint64_t magic;  // written last
   std::uint32_t version;
   std::uint32_t entry_size;
+  PostCounters forgotten;  // of the sources whose entries were given away
   std::array<LedgerEntry, kLedgerEntries> entries;
 };
 
 constexpr std::uint64_t kMagic = 0x31'74'73'6f'70'63'6c'70;  // "plcpost1"
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 
 LedgerLayout& layout_of(const MemoryFile& memory) {
   return *reinterpret_cast<LedgerLayout*>(memory.bytes().data());  // made with this layout
@@ -29,6 +30,16 @@ bool is_ours(const LedgerLayout& layout) {
 }
 
 }  // namespace
+
+void PostCounters::add(const PostCounters& other) noexcept {
+  received += other.received;
+  accepted += other.accepted;
+  no_task += other.no_task;
+  rejected += other.rejected;
+  duplicate += other.duplicate;
+  early += other.early;
+  lost += other.lost;
+}
 
 std::string PostLedger::file_name(std::string_view pool) {
   return fmt::format("{}.posts", pool);
@@ -60,6 +71,12 @@ LedgerEntry* PostLedger::entries() const noexcept {
   return layout_of(memory_).entries.data();
 }
 
+PostCounters PostLedger::total() const noexcept {
+  PostCounters sum = layout_of(memory_).forgotten;
+  for_each([&sum](const LedgerEntry& entry) { sum.add(entry.counters); });
+  return sum;
+}
+
 LedgerEntry& PostLedger::entry_for(const dds::Guid& source, std::int64_t now_ns) {
   if (const auto known = index_.find(source); known != index_.end()) {
     LedgerEntry& entry = entries()[known->second];
@@ -74,6 +91,7 @@ LedgerEntry& PostLedger::entry_for(const dds::Guid& source, std::int64_t now_ns)
     for (std::uint32_t i = 1; i < kLedgerEntries; ++i) {
       if (entries()[i].used_ns < entries()[chosen].used_ns) chosen = i;
     }
+    layout_of(memory_).forgotten.add(entries()[chosen].counters);
     index_.erase(dds::Guid{entries()[chosen].source});
     ++reused_;
   }

@@ -6,6 +6,7 @@
 #include <string>
 #include <string_view>
 #include <unordered_map>
+#include <utility>
 
 #include "api/dds/guid.hpp"
 #include "shm/base/names.hpp"
@@ -14,16 +15,29 @@
 
 namespace plchost {
 
+/// What became of posts. received = accepted + rejected + duplicate + early.
+struct PostCounters {
+  std::uint64_t received = 0;
+  std::uint64_t accepted = 0;
+  std::uint64_t no_task = 0;  ///< of those accepted
+  std::uint64_t rejected = 0;
+  std::uint64_t duplicate = 0;
+  std::uint64_t early = 0;  ///< not taken, because one before it was missing
+  std::uint64_t lost = 0;   ///< never came, and its source went on without it
+
+  void add(const PostCounters& other) noexcept;
+};
+
 /// What is kept of one source of posts. In shared memory; all zero is a free entry.
 struct LedgerEntry {
   std::array<std::uint8_t, 16> source{};
   std::atomic<std::uint32_t> in_use{0};  ///< written last
   std::int32_t rejected_code = 0;
   std::int64_t used_ns = 0;  ///< CLOCK_MONOTONIC of the last post: the oldest entry is given away first
-  std::atomic<std::uint64_t> last{0};  ///< all posts up to this number are done
-  std::uint64_t accepted = 0;
-  std::uint64_t no_task = 0;
-  std::uint64_t rejected = 0;
+  std::atomic<std::uint64_t> last{0};        ///< all posts up to this number are done
+  std::atomic<std::uint64_t> batch{0};       ///< number of the batch whose events are being posted
+  std::atomic<std::uint32_t> batch_done{0};  ///< as many of them are posted: the next server goes on there
+  PostCounters counters;
   std::uint64_t rejected_sequence = 0;
   FixedText<255> rejected_text;
 };
@@ -54,6 +68,14 @@ class PostLedger {
   /// The entry of that source. A source that is not known gets a free entry, or that of the source that
   /// posted least recently: if it lives on, it starts anew at the base that its posts carry.
   [[nodiscard]] LedgerEntry& entry_for(const dds::Guid& source, std::int64_t now_ns);
+
+  /// Each source that is known: `use(entry)`.
+  template <class Function>
+  void for_each(Function use) const {
+    for (const auto& [source, index] : index_) use(std::as_const(entries()[index]));
+  }
+  /// Of all sources, those that were forgotten included.
+  [[nodiscard]] PostCounters total() const noexcept;
 
   /// How many entries were given away while their source may have lived.
   [[nodiscard]] std::uint64_t reused() const noexcept { return reused_; }

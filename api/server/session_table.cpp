@@ -16,7 +16,8 @@ namespace plchost {
 namespace {
 
 // By SessionTable::Stream.
-constexpr std::array kStreamTopics{dds::kReply, dds::kEventAck, dds::kObjectPage, dds::kNodePage};
+constexpr std::array kStreamTopics{dds::kReply, dds::kEventAck, dds::kObjectPage, dds::kNodePage,
+                                   dds::kEventRun};
 
 }  // namespace
 
@@ -83,6 +84,7 @@ bool SessionTable::open_writer(Session& session, Stream stream) {
   if (writer) return true;
   const auto qos = [stream] {
     if (stream == Stream::replies) return dds::reply_qos();
+    if (stream == Stream::runs) return dds::run_qos();
     return stream == Stream::acks ? dds::ack_qos() : dds::page_qos();
   };
   auto made = dds::make_writer(session.publisher.get(), topics_[std::to_underlying(stream)].get(), qos());
@@ -130,6 +132,10 @@ void SessionTable::write_reply(const dds::Guid& client, const plc_Reply& reply) 
 
 void SessionTable::write_ack(const dds::Guid& client, const plc_EventAck& ack) {
   (void)write(client, Stream::acks, &ack);
+}
+
+void SessionTable::write_run(const dds::Guid& client, const plc_EventRun& run) {
+  (void)write(client, Stream::runs, &run);
 }
 
 bool SessionTable::write_page(const dds::Guid& client, const plc_ObjectPage& page) {

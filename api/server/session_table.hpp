@@ -35,6 +35,7 @@ class SessionTable {
   /// counted.
   void write_reply(const dds::Guid& client, const plc_Reply& reply);
   void write_ack(const dds::Guid& client, const plc_EventAck& ack);
+  void write_run(const dds::Guid& client, const plc_EventRun& run);
   /// False: the client has not got it, nor will.
   [[nodiscard]] bool write_page(const dds::Guid& client, const plc_ObjectPage& page);
   [[nodiscard]] bool write_page(const dds::Guid& client, const plc_NodePage& page);
@@ -43,6 +44,8 @@ class SessionTable {
 
   /// What the client says of itself, and its GUID.
   [[nodiscard]] std::string describe(const dds::Guid& client) const;
+  /// Whether that participant is in the domain.
+  [[nodiscard]] bool is_alive(const dds::Guid& client) const { return alive_.contains(client); }
 
   [[nodiscard]] std::size_t size() const noexcept { return sessions_.size(); }
   [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }
@@ -51,8 +54,8 @@ class SessionTable {
 
  private:
   /// What goes to each client over a writer of its own.
-  enum class Stream : std::uint8_t { replies, acks, objects, nodes };
-  static constexpr std::size_t kStreams = 4;
+  enum class Stream : std::uint8_t { replies, acks, objects, nodes, runs };
+  static constexpr std::size_t kStreams = 5;
   struct Session {
     dds::Entity publisher;
     std::array<dds::Entity, kStreams> writers = {};

@@ -27,9 +27,10 @@ Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const 
   auto findings = make(dds::kHostFinding, dds::status_qos());
   auto exceptions = make(dds::kExceptionStatus, dds::status_qos());
   auto hosts = make(dds::kHostStatus, dds::status_qos());
+  auto writers = make(dds::kWriterStatus, dds::status_qos());
   auto presence = make(dds::kPresence, dds::presence_qos());
-  for (auto* made :
-       {&tasks, &statistics, &instances, &events, &objects, &findings, &exceptions, &hosts, &presence}) {
+  for (auto* made : {&tasks, &statistics, &instances, &events, &objects, &findings, &exceptions, &hosts,
+                     &writers, &presence}) {
     if (!*made) return failure_in("publish status", made->error());
   }
   auto transitions =
@@ -47,17 +48,25 @@ Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const 
   publisher.objects_ = StatusTable<plc_ObjectStatus>(std::move(*objects));
   publisher.findings_ = StatusTable<plc_HostFinding>(std::move(*findings));
   publisher.hosts_ = StatusTable<plc_HostStatus>(std::move(*hosts));
+  publisher.writers_ =
+      WriterWatch(source.host, source.epoch, StatusTable<plc_WriterStatus>(std::move(*writers)));
   publisher.presence_ = std::move(*presence);
   publisher.topics_ = std::move(topics);
   return publisher;
 }
 
 void StatusPublisher::tick(TimePoint now) {
-  bool changed = look_at_instances(now);
+  bool changed = std::exchange(writers_changed_, false);
+  changed |= look_at_instances(now);
   if (now >= next_objects_) changed |= look_at_objects(now);
   tasks_.look(now);
   findings_.write();
   write_host(changed);
+}
+
+void StatusPublisher::look_at_writers(const EventIntake& intake, const SessionTable& sessions,
+                                      TimePoint now) {
+  writers_changed_ |= writers_.look(intake, sessions, now);
 }
 
 void StatusPublisher::flush(const std::string& instance, TimePoint now) {
@@ -207,6 +216,7 @@ void StatusPublisher::write_host(bool changed) {
   sample.task_count = tasks_.size();
   sample.event_count = events_.size();
   sample.object_count = objects_.size();
+  sample.writer_count = writers_.size();
   if (host) {
     dds::copy_text(sample.version, host->version.view());
     sample.manager_pid = host->manager_pid;

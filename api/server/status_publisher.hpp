@@ -14,6 +14,7 @@
 #include "api/server/status_table.hpp"
 #include "api/server/task_watch.hpp"
 #include "api/server/transition_publisher.hpp"
+#include "api/server/writer_watch.hpp"
 #include "shm/pool/host_page.hpp"
 #include "shm/pool/object_pool.hpp"
 
@@ -37,12 +38,15 @@ class StatusPublisher {
   /// Writes all that concerns an instance at once: before the answer to a command that changed it.
   void flush(const std::string& instance, TimePoint now);
   void write_presence();
+  /// What became of each client's posts, if it is time to look at that. Comes before tick().
+  void look_at_writers(const EventIntake& intake, const SessionTable& sessions, TimePoint now);
   /// All findings of one check of the host, in place of those of the one before.
   void publish_findings(const std::vector<HostFinding>& findings);
 
   /// For who wants to know later that nothing was cut off the audit log.
   void set_audit_head(std::string head);
 
+  [[nodiscard]] const TaskWatch& tasks() const noexcept { return tasks_; }
   /// HostStatus.round as last written.
   [[nodiscard]] std::uint64_t round() const noexcept { return round_; }
   /// The instances that the manager has at present.
@@ -78,6 +82,8 @@ class StatusPublisher {
   StatusTable<plc_ObjectStatus> objects_;
   StatusTable<plc_HostFinding> findings_;
   StatusTable<plc_HostStatus> hosts_;
+  WriterWatch writers_;
+  bool writers_changed_ = false;
   dds::Entity presence_;
   std::vector<dds::Entity> topics_;
   TimePoint next_objects_;

@@ -100,6 +100,28 @@ bool TaskWatch::in_exception(const std::string& instance, std::string_view task)
   return false;
 }
 
+std::vector<TaskWatch::BoundTask> TaskWatch::bound_tasks(std::string_view instance,
+                                                         std::string_view event) const {
+  const std::string full = event_object_name(instance, event);
+  std::vector<BoundTask> found;
+  for (const auto& [name, watched] : instances_) {
+    if (!watched.page) continue;
+    for (std::uint32_t i = 0; i < watched.page->task_count(); ++i) {
+      const auto task = watched.page->task(i);
+      if (!task || task->identity.kind != PageTaskKind::external) continue;
+      const std::string_view bound = task->identity.external_event.view();
+      if ((name == instance && bound == event) || bound == full) found.push_back({name, watched.pid, i});
+    }
+  }
+  return found;
+}
+
+const InstancePageReader* TaskWatch::page_of(const BoundTask& task) const {
+  const auto found = instances_.find(task.instance);
+  if (found == instances_.end() || found->second.pid != task.pid || !found->second.page) return nullptr;
+  return &*found->second.page;
+}
+
 void TaskWatch::publish(const std::string& instance, Watched& watched, std::uint32_t index) {
   const auto task = watched.page->task(index);
   if (!task) return;

@@ -49,6 +49,17 @@ class TaskWatch {
   /// All tasks of one instance, at once.
   void look_at(const std::string& instance, TimePoint now);
 
+  /// A task of a process that is bound to an external event.
+  struct BoundTask {
+    std::string instance;
+    std::int32_t pid = 0;
+    std::uint32_t index = 0;
+  };
+  /// Those that run for a post of this event: tasks of its instance, and of others that name it in full.
+  [[nodiscard]] std::vector<BoundTask> bound_tasks(std::string_view instance, std::string_view event) const;
+  /// Null: its process is gone.
+  [[nodiscard]] const InstancePageReader* page_of(const BoundTask& task) const;
+
   [[nodiscard]] std::uint32_t size() const noexcept { return table_.size(); }
   /// What the process itself says, if its page is open.
   [[nodiscard]] std::optional<InstanceRuntime> runtime(const std::string& instance) const;

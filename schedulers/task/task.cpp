@@ -139,7 +139,8 @@ void Task::record(const Activation& activation, TimePoint start, TimePoint end) 
                     .lost_cycles = activation.lost_cycles,
                     .lost_events = activation.lost_events,
                     .timer_expirations = activation.timer_expirations,
-                    .spun = activation.spun});
+                    .spun = activation.spun,
+                    .posts_done = cursor_.next});
 }
 
 }  // namespace plchost

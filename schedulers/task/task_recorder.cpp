@@ -65,8 +65,10 @@ void TaskRecorder::record(const RecordedCycle& cycle) noexcept {
 
 void TaskRecorder::begin_anew() noexcept {
   const std::int64_t interval_ns = counters_.interval_ns;
+  const std::uint64_t posts_done = counters_.posts_done;
   counters_ = TaskCounters{};
   counters_.interval_ns = interval_ns;
+  counters_.posts_done = posts_done;
   counters_.since_ns = since_ns_;
   counters_.since_unix_ns = since_unix_ns_;
   obeyed_resets_ = resets_;
@@ -92,6 +94,7 @@ void TaskRecorder::count(const RecordedCycle& cycle) noexcept {
   now.lost_consecutive = cycle.lost_cycles;
   now.lost_consecutive_max = std::max(now.lost_consecutive_max, cycle.lost_cycles);
   now.lost_events += cycle.lost_events;
+  now.posts_done = cycle.posts_done;
   now.timer_expirations += cycle.timer_expirations;
   now.slots_last = slots(cycle);
   now.slots_max = std::max(now.slots_max, now.slots_last);
@@ -111,7 +114,10 @@ bool TaskRecorder::reset(TimePoint now) noexcept {
   since_unix_ns_ = unix_time_ns();
   TaskCounters fresh{};
   fresh.cycles = cycles_.load(std::memory_order_relaxed);
-  if (const auto before = statistics_.counters.read()) fresh.interval_ns = before->interval_ns;
+  if (const auto before = statistics_.counters.read()) {
+    fresh.interval_ns = before->interval_ns;
+    fresh.posts_done = before->posts_done;
+  }
   fresh.since_ns = since_ns_;
   fresh.since_unix_ns = since_unix_ns_;
   statistics_.counters.write(fresh);

@@ -18,6 +18,7 @@ struct RecordedCycle {
   std::uint64_t lost_events = 0;
   std::uint64_t timer_expirations = 0;
   Duration spun{};
+  std::uint64_t posts_done = 0;  ///< external events: the event's count that it was for
 };
 
 /// Writes the statistics of one task. The task's own thread records and never waits for anybody; who resets

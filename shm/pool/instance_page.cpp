@@ -14,7 +14,7 @@ constexpr std::uint64_t kMagic = 0x67617074'736e6970;  // "pinstpag"
 /// 1: first. 2: the interval in force. 3: the tick source. 4: histograms behind the tasks, in two
 /// shapes. 5: the idle states. 6: the distributed clock. 7: state and problem of the application.
 /// 8: why a reference record is not followed. 9: faults.
-constexpr std::uint32_t kVersion = 9;
+constexpr std::uint32_t kVersion = 10;
 constexpr std::size_t kTasksOffset = (sizeof(InstancePageLayout) + 63) / 64 * 64;
 
 static_assert(offsetof(InstancePageLayout, version) == 8 && offsetof(InstancePageLayout, size) == 16);

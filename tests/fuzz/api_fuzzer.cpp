@@ -21,7 +21,8 @@ struct Host {
   std::string name = "plchost-fuzz-" + std::to_string(::getpid());
   ObjectPool pool = ObjectPool::create(name, {.max_objects = 16}).value();
   PoolEvent event = pool.create_event("line1/ready").value();
-  EventIntake intake{"hosta", pool, PostLedger::open(name).value(), 1};
+  AccessGuard guard;
+  EventIntake intake{"hosta", pool, PostLedger::open(name).value(), 1, guard};
 
   Host() {
     event.set_registered(true);

@@ -165,6 +165,91 @@ TEST(RemotePost, WithoutAcknowledgementReachesTheEvent) {
   EXPECT_EQ(event.counted().count(), 101U);
 }
 
+TEST(RemotePost, OfABatchPostsAllOrNone) {
+  const OwnDomain domain;
+  TestHost host(domain, "hosta");
+  const PoolEvent one = host.add_event("line1", "one");
+  const PoolEvent two = host.add_event("line2", "two");
+  host.start_server();
+  const auto sut = connect(domain);
+
+  const std::vector<EventId> good{{"line1", "one"}, {"line2", "two"}};
+  const std::vector<EventId> bad{{"line1", "one"}, {"line2", "three"}};
+  const auto all = sut->post_batch("hosta", good, kPatience);
+  const auto none = sut->post_batch("hosta", bad, kPatience);
+  const auto again = sut->post_batch("hosta", good, kPatience);
+
+  ASSERT_TRUE(all) << all.error().describe();
+  EXPECT_EQ(all->accepted, 1U);
+  ASSERT_TRUE(none);
+  EXPECT_EQ(none->rejected, 1U);
+  EXPECT_THAT(none->rejected_text, testing::HasSubstr("line2/three"));
+  ASSERT_TRUE(again);
+  EXPECT_EQ(again->accepted, 1U);
+  EXPECT_EQ(one.counted().count(), 2U);
+  EXPECT_EQ(two.counted().count(), 2U);
+}
+
+TEST(RemotePost, OfABatchThatIsTooLargeIsRefusedAtOnce) {
+  const OwnDomain domain;
+  const auto sut = connect(domain);
+  const std::vector<EventId> events(kMaxBatch + 1, EventId{"line1", "one"});
+  EXPECT_EQ(sut->post_batch("hosta", events, kPatience).error().code, ErrorCode::invalid_argument);
+  EXPECT_EQ(sut->post_batch("hosta", {}, kPatience).error().code, ErrorCode::invalid_argument);
+}
+
+TEST(RemotePost, WhoseRunIsAwaitedFailsWhenNoTaskIsBoundOrNoEventIsThere) {
+  const OwnDomain domain;
+  TestHost host(domain, "hosta");
+  const PoolEvent event = host.add_event("line1", "ready");
+  host.start_server();
+  const auto sut = connect(domain);
+
+  const auto no_task = sut->post_and_await({"hosta", 0, "line1", "ready"}, kPatience);
+  const auto no_event = sut->post_and_await({"hosta", 0, "line1", "redy"}, kPatience);
+
+  ASSERT_FALSE(no_task);
+  EXPECT_EQ(no_task.error().code, ErrorCode::not_found);
+  EXPECT_THAT(no_task.error().message, testing::HasSubstr("no task"));
+  EXPECT_EQ(event.counted().count(), 1U);
+  ASSERT_FALSE(no_event);
+  EXPECT_THAT(no_event.error().message, testing::HasSubstr("line1/redy"));
+}
+
+// Waits until what the host tells of the writers is so, and returns it.
+template <class Condition>
+std::vector<plc_WriterStatus> writers_when(ControlClient& client, Condition condition) {
+  for (;;) {
+    auto writers = client.writers("hosta", soon()).value();
+    if (condition(writers)) return writers;
+    client.wait_for_change(soon());
+  }
+}
+
+TEST(RemotePost, IsCountedForItsWriterAndForAllTogether) {
+  const OwnDomain domain;
+  TestHost host(domain, "hosta");
+  host.add_event("line1", "ready").set_bound_tasks(1);
+  host.start_server();
+  const auto one = connect(domain);
+  ASSERT_TRUE(one->post_event({"hosta", 0, "line1", "ready"}, 30, Duration::zero(), kPatience));
+  {
+    const auto other = connect(domain);
+    ASSERT_TRUE(other->post_event({"hosta", 0, "line1", "redy"}, 5, Duration::zero(), kPatience));
+    const auto writers = writers_when(*one, [](const std::vector<plc_WriterStatus>& told) {
+      return told.size() == 3 && told[0].received == 35 && told[1].received + told[2].received == 35;
+    });
+    EXPECT_EQ(writers[0].delivered, 30U);
+    EXPECT_EQ(writers[0].rejected, 5U);
+    EXPECT_EQ(writers[1].delivered + writers[2].delivered, 30U);
+    EXPECT_TRUE(writers[1].present && writers[2].present);
+  }
+  const auto left = writers_when(*one, [](const std::vector<plc_WriterStatus>& writers) {
+    return std::ranges::count_if(writers, [](const auto& writer) { return writer.present; }) == 1;
+  });
+  EXPECT_EQ(left.size(), 3U) << "it is still shown";
+}
+
 TEST(RemotePost, ToAHostThatIsNotThereEndsWithNoAnswer) {
   const OwnDomain domain;
   const auto sut = connect(domain);

@@ -171,6 +171,184 @@ TEST_F(EventIntakeTest, SaysWhichPostsFoundNoTask) {
   EXPECT_EQ(only_ack(sut).no_task, 1U);
 }
 
+std::vector<std::uint64_t> figures(const PostCounters& counters) {
+  return {counters.received,  counters.accepted, counters.no_task, counters.rejected,
+          counters.duplicate, counters.early,    counters.lost};
+}
+
+TEST_F(EventIntakeTest, CountsForEachSourceWhatBecameOfItsPosts) {
+  EventIntake sut = make();
+  sut.process(make_post(1));
+  sut.process(make_post(1));  // again
+  sut.process(make_post(3));  // 2 is missing
+  sut.process(make_post(2));
+  auto unknown = make_post(3);
+  dds::copy_text(unknown.event, "redy");
+  sut.process(unknown);
+  sut.process(make_post(8, 8));  // 4 to 7 were given up
+  sut.process(make_post(1, 1, 2));
+
+  const auto writers = sut.writers();
+
+  ASSERT_EQ(writers.size(), 3U);
+  const std::size_t first = writers[1].source.bytes[0] == 1 ? 1 : 2;
+  EXPECT_EQ(writers[0].source, dds::Guid{});
+  EXPECT_THAT(figures(writers[0].counters), testing::ElementsAre(7, 4, 0, 1, 1, 1, 4));
+  EXPECT_THAT(figures(writers[first].counters), testing::ElementsAre(6, 3, 0, 1, 1, 1, 4));
+  EXPECT_EQ(writers[first].last, 8U);
+  EXPECT_THAT(figures(writers[3 - first].counters), testing::ElementsAre(1, 1, 0, 0, 0, 0, 0));
+}
+
+TEST_F(EventIntakeTest, TellsASourceWhatItHasLost) {
+  EventIntake sut = make();
+  sut.process(make_post(1));
+  sut.process(make_post(5, 4));
+  EXPECT_EQ(only_ack(sut).lost, 2U);
+}
+
+TEST_F(EventIntakeTest, DoesNotCallLostWhatCameBeforeItKnewTheSource) {
+  EventIntake sut = make();
+  sut.process(make_post(100, 100));
+  EXPECT_EQ(only_ack(sut).lost, 0U);
+}
+
+TEST_F(EventIntakeTest, GoesOnCountingAfterTheServerWasReplaced) {
+  {
+    EventIntake before = make();
+    before.process(make_post(1));
+  }
+  EventIntake sut = make();
+  sut.process(make_post(2));
+  EXPECT_EQ(sut.writers().at(0).counters.accepted, 2U);
+}
+
+TEST_F(EventIntakeTest, KeepsInTheTotalWhatSourcesDidThatWereForgotten) {
+  PostLedger sut = PostLedger::open(name_).value();
+  for (std::uint32_t i = 0; i <= kLedgerEntries; ++i) {
+    dds::Guid source;
+    std::memcpy(source.bytes.data(), &i, sizeof i);
+    source.bytes[15] = 1;
+    ++sut.entry_for(source, i).counters.received;
+  }
+  EXPECT_EQ(sut.reused(), 1U);
+  EXPECT_EQ(sut.total().received, kLedgerEntries + 1U);
+}
+
+/// A batch of the events "line1/NAME".
+class Batch {
+ public:
+  Batch(std::uint64_t sequence, const std::vector<std::string>& events) {
+    sample_.source[0] = 9;
+    sample_.sequence_number = sequence;
+    sample_.base_sequence = sequence;
+    dds::copy_text(sample_.host, "hosta");
+    for (const std::string& event : events) {
+      plc_EventName& name = names_.emplace_back();
+      dds::copy_text(name.instance, "line1");
+      dds::copy_text(name.event, event);
+    }
+    sample_.events._buffer = names_.data();
+    sample_.events._length = static_cast<std::uint32_t>(names_.size());
+  }
+  [[nodiscard]] const plc_EventBatch& sample() const { return sample_; }
+
+ private:
+  plc_EventBatch sample_{};
+  std::vector<plc_EventName> names_;
+};
+
+TEST_F(EventIntakeTest, PostsAllEventsOfABatch) {
+  const PoolEvent other = pool_.create_event("line1/other").value();
+  other.set_registered(true);
+  EventIntake sut = make();
+  sut.process(Batch(1, {"ready", "other", "ready"}).sample());
+  EXPECT_EQ(event_.counted().count(), 2U);
+  EXPECT_EQ(other.counted().count(), 1U);
+  const auto ack = only_ack(sut);
+  EXPECT_EQ(ack.sequence_number, 1U);
+  EXPECT_EQ(ack.accepted, 1U);
+  EXPECT_EQ(ack.no_task, 1U) << "of one of them";
+}
+
+TEST_F(EventIntakeTest, PostsNoneOfABatchOfWhichOneCannotBePosted) {
+  EventIntake sut = make();
+  sut.process(Batch(1, {"ready", "ready", "redy"}).sample());
+  EXPECT_EQ(event_.counted().count(), 0U);
+  const auto ack = only_ack(sut);
+  EXPECT_EQ(ack.rejected, 1U);
+  EXPECT_THAT(std::string(dds::text_of(ack.rejected_text)),
+              testing::AllOf(testing::HasSubstr("line1/redy"), testing::HasSubstr("3 of the 3")));
+}
+
+TEST_F(EventIntakeTest, RejectsABatchOfNoEvents) {
+  EventIntake sut = make();
+  sut.process(Batch(1, {}).sample());
+  EXPECT_EQ(only_ack(sut).rejected, 1U);
+}
+
+TEST_F(EventIntakeTest, DoesARepeatedBatchOnce) {
+  EventIntake sut = make();
+  sut.process(Batch(1, {"ready", "ready"}).sample());
+  sut.process(Batch(1, {"ready", "ready"}).sample());
+  EXPECT_EQ(event_.counted().count(), 2U);
+}
+
+// A server that was killed between the two posts has left this behind.
+TEST_F(EventIntakeTest, GoesOnWithinABatchWhereTheServerBeforeItWasKilled) {
+  {
+    PostLedger ledger = PostLedger::open(name_).value();
+    dds::Guid source;
+    source.bytes[0] = 9;
+    LedgerEntry& entry = ledger.entry_for(source, 1);
+    entry.batch.store(1);
+    entry.batch_done.store(2);
+  }
+  EventIntake sut = make();
+  sut.process(Batch(1, {"ready", "ready", "ready"}).sample());
+  EXPECT_EQ(event_.counted().count(), 1U);
+  sut.process(Batch(2, {"ready", "ready", "ready"}).sample());
+  EXPECT_EQ(event_.counted().count(), 4U);
+}
+
+TEST_F(EventIntakeTest, NotesThePostsWhoseRunsAreAwaited) {
+  EventIntake sut = make();
+  plc_KeyValue entry{};
+  dds::copy_text(entry.name, "wait");
+  dds::copy_text(entry.value, "run");
+  sut.process(make_post(1));
+  auto post = make_post(2);
+  post.ext = {._maximum = 1, ._length = 1, ._buffer = &entry, ._release = false};
+  sut.process(post);
+  const auto awaited = sut.collect_awaited();
+  ASSERT_EQ(awaited.size(), 1U);
+  EXPECT_EQ(awaited[0].sequence, 2U);
+  ASSERT_EQ(awaited[0].targets.size(), 1U);
+  EXPECT_EQ(awaited[0].targets[0].count, 2U);
+  EXPECT_TRUE(sut.collect_awaited().empty());
+
+  dds::copy_text(entry.value, "walk");
+  post.sequence_number = 3;
+  sut.process(post);
+  EXPECT_THAT(std::string(dds::text_of(only_ack(sut).rejected_text)), testing::HasSubstr("run"));
+  EXPECT_EQ(event_.counted().count(), 2U);
+}
+
+TEST_F(EventIntakeTest, AwaitsABoundedNumberOfRunsAndRejectsTheRest) {
+  EventIntake sut = make();
+  plc_KeyValue entry{};
+  dds::copy_text(entry.name, "wait");
+  dds::copy_text(entry.value, "run");
+  for (std::uint64_t i = 1; i <= EventIntake::kMaxAwaited + 1; ++i) {
+    auto post = make_post(i);
+    post.ext = {._maximum = 1, ._length = 1, ._buffer = &entry, ._release = false};
+    sut.process(post);
+  }
+  EXPECT_EQ(event_.counted().count(), EventIntake::kMaxAwaited);
+  const auto ack = only_ack(sut);
+  EXPECT_EQ(ack.rejected, 1U);
+  EXPECT_EQ(ack.rejected_code, static_cast<int>(ErrorCode::full));
+}
+
 TEST_F(EventIntakeTest, LooksUpEventsBeyondTheDirectorysBound) {
   EventDirectory sut(pool_);
   for (std::size_t i = 0; i < 3; ++i) EXPECT_TRUE(sut.find("line1", "ready"));

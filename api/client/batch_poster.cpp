@@ -1,0 +1,57 @@
+#include "api/client/batch_poster.hpp"
+
+#include <utility>
+
+#include "api/dds/text.hpp"
+#include "api/dds/topics.hpp"
+
+namespace plchost {
+
+Result<BatchPoster> BatchPoster::create(dds_entity_t participant, dds_entity_t topic,
+                                        const std::string& host) {
+  BatchPoster poster;
+  auto publisher = dds::make_publisher(participant, dds::host_partition(host));
+  if (!publisher) return std::unexpected(publisher.error());
+  poster.publisher_ = std::move(*publisher);
+  auto writer = dds::make_writer(poster.publisher_.get(), topic, dds::event_qos());
+  if (!writer) return std::unexpected(writer.error());
+  poster.writer_ = std::move(*writer);
+  poster.source_ = dds::guid_of(poster.writer_.get());
+  poster.source_.copy_to(poster.sample_.source);
+  dds::copy_text(poster.sample_.host, host);
+  return poster;
+}
+
+void BatchPoster::post(std::span<const EventId> events, TimePoint now) {
+  names_.clear();
+  for (const EventId& event : events) {
+    plc_EventName& name = names_.emplace_back();
+    dds::copy_text(name.instance, event.instance);
+    dds::copy_text(name.event, event.event);
+  }
+  base_ = newest_;
+  sample_.sequence_number = sample_.base_sequence = ++last_sequence_;
+  write(now);
+}
+
+void BatchPoster::write(TimePoint now) {
+  sample_.events._buffer = names_.data();
+  sample_.events._length = sample_.events._maximum = static_cast<std::uint32_t>(names_.size());
+  (void)dds_write(writer_.get(), &sample_);  // one that DDS did not take is repeated like a lost one
+  last_write_ = now;
+}
+
+void BatchPoster::on_ack(const plc_EventAck& ack) {
+  if (dds::Guid::from(ack.source) != source_ || ack.epoch < newest_.epoch) return;
+  newest_ = ack;
+  newest_.ext = {};
+}
+
+TimePoint BatchPoster::repeat(TimePoint now) {
+  const TimePoint due = last_write_ + (newest_.epoch == 0 ? EventPoster::kFirstResend : EventPoster::kResend);
+  if (acknowledged() || now < due) return due;
+  write(now);
+  return now + EventPoster::kResend;
+}
+
+}  // namespace plchost

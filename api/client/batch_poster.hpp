@@ -1,0 +1,62 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <control.h>
+
+#include "api/client/event_poster.hpp"
+#include "api/dds/entity.hpp"
+#include "api/dds/guid.hpp"
+#include "shm/base/result.hpp"
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+/// An external event by its two names.
+struct EventId {
+  std::string instance;
+  std::string event;
+};
+
+/// How many events a batch may have.
+inline constexpr std::size_t kMaxBatch = 64;
+
+/// The batches of posts to one host, one after the other: each is repeated until it is acknowledged.
+class BatchPoster {
+ public:
+  [[nodiscard]] static Result<BatchPoster> create(dds_entity_t participant, dds_entity_t topic,
+                                                  const std::string& host);
+
+  [[nodiscard]] dds_entity_t writer() const noexcept { return writer_.get(); }
+  /// Whether the host's reader is there.
+  [[nodiscard]] bool matched() const noexcept { return has_reader(writer_.get()); }
+
+  /// At most kMaxBatch, whose names fit.
+  void post(std::span<const EventId> events, TimePoint now);
+  void on_ack(const plc_EventAck& ack);
+  [[nodiscard]] bool acknowledged() const noexcept { return newest_.sequence_number >= last_sequence_; }
+  /// Repeats what is due to be repeated. Returns when it has to be called again.
+  TimePoint repeat(TimePoint now);
+  /// Of the last batch.
+  [[nodiscard]] PostReport report() const { return report_between(base_, newest_); }
+
+ private:
+  BatchPoster() = default;
+  void write(TimePoint now);
+
+  dds::Entity publisher_;
+  dds::Entity writer_;
+  plc_EventBatch sample_{};
+  std::vector<plc_EventName> names_;
+  dds::Guid source_;
+  std::uint64_t last_sequence_ = 0;
+  TimePoint last_write_;
+  plc_EventAck newest_{};
+  plc_EventAck base_{};
+};
+
+}  // namespace plchost
