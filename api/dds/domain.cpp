@@ -73,8 +73,11 @@ Result<std::string> domain_configuration(Role role, const DomainOptions& options
   if (!peers.empty()) peers = fmt::format("<Peers>{}</Peers>", peers);
   const auto security = security_section(options.identity);
   if (!security) return std::unexpected(security.error());
-  // The watermarks are high because all writers of ours are bounded by their own history or window: none may
-  // be stopped because one client does not read.
+  // High at servers, because all writers of theirs are bounded by their own history or window: none may be
+  // stopped because one client does not read. A client's is as much as it may have under way: some 500 posts,
+  // far less than the server's sockets hold, so that several clients that post as fast as they can lose
+  // nothing and hold up nobody.
+  const std::string_view watermark = role == Role::server ? "32 MB" : "128 kB";
   return fmt::format(
       "<CycloneDDS><Domain "
       "Id=\"any\"><General><Interfaces>{}</Interfaces><AllowMulticast>false</AllowMulticast>"
@@ -86,10 +89,10 @@ Result<std::string> domain_configuration(Role role, const DomainOptions& options
       "<PreEmptiveAckDelay>1 ms</PreEmptiveAckDelay>"
       "<HeartbeatInterval min=\"1 ms\" minsched=\"5 ms\" max=\"100 ms\">10 ms</HeartbeatInterval>"
       "<SocketReceiveBufferSize min=\"128 KiB\" max=\"4 MiB\"/><MaxSampleSize>256 KiB</MaxSampleSize>"
-      "<Watermarks><WhcHigh>32 MB</WhcHigh><WhcHighInit>32 MB</WhcHighInit><WhcAdaptive>false</WhcAdaptive>"
+      "<Watermarks><WhcHigh>{}</WhcHigh><WhcHighInit>{}</WhcHighInit><WhcAdaptive>false</WhcAdaptive>"
       "</Watermarks></Internal>{}{}</Domain></CycloneDDS>",
-      interfaces, role == Role::server ? "auto" : "none", kMaxServersPerMachine - 1, peers,
-      threads_section(options.receive_fifo), *security);
+      interfaces, role == Role::server ? "auto" : "none", kMaxServersPerMachine - 1, peers, watermark,
+      watermark, threads_section(options.receive_fifo), *security);
 }
 
 bool can_use_fifo(int priority) {

@@ -1,6 +1,6 @@
 // A client of another vendor: eProsima's Fast DDS, and nothing of plchost but types that fastddsgen made from
 // api/control.idl. It is the proof that the contract is enough; so it shares no code with plchost.
-//   fastdds_client [--domain N] [--host HOST] [--property NAME=VALUE]... VERB
+//   fastdds_client [--domain N] [--host HOST] [--patience SECONDS] [--property NAME=VALUE]... VERB
 //   hosts | instances | task INSTANCE/TASK | start INSTANCE | stop INSTANCE | post INSTANCE/EVENT [COUNT]
 // --property: of the participant; those of DDS Security make it a secured one.
 
@@ -38,7 +38,7 @@ using eprosima::fastrtps::rtps::GUID_t;
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
-constexpr auto kPatience = std::chrono::seconds(15);
+std::chrono::seconds patience{15};  // as --patience says
 constexpr std::uint32_t kServersPerMachine = 16;
 
 struct Options {
@@ -56,7 +56,7 @@ Thing* made(Thing* thing, const std::string& what) {
 }
 
 void wait_until(const std::function<bool()>& happened, const std::string& what) {
-  const auto end = Clock::now() + kPatience;
+  const auto end = Clock::now() + patience;
   while (!happened()) {
     if (Clock::now() > end) throw std::runtime_error("in vain waited for " + what);
     std::this_thread::sleep_for(milliseconds(1));
@@ -342,6 +342,8 @@ Options parse(int argc, char** argv) {
       options.domain = static_cast<std::uint32_t>(std::stoul(argv[++i]));
     } else if (word == "--host" && has_value) {
       options.host = argv[++i];
+    } else if (word == "--patience" && has_value) {
+      patience = std::chrono::seconds(std::stoul(argv[++i]));
     } else if (word == "--property" && has_value) {
       const std::string property = argv[++i];
       const auto equals = property.find('=');
