@@ -13,7 +13,7 @@ namespace {
 constexpr std::uint64_t kMagic = 0x67617074'736e6970;  // "pinstpag"
 /// 1: first. 2: the interval in force. 3: the tick source. 4: histograms behind the tasks, in two
 /// shapes. 5: the idle states. 6: the distributed clock. 7: state and problem of the application.
-/// 8: why a reference record is not followed. 9: faults.
+/// 8: why a reference record is not followed. 9: faults. 10: the post that was run.
 constexpr std::uint32_t kVersion = 10;
 constexpr std::size_t kTasksOffset = (sizeof(InstancePageLayout) + 63) / 64 * 64;
 

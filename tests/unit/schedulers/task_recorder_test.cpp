@@ -82,6 +82,15 @@ TEST_F(Recorder, PeriodJitterLiesInOneHistogramForEachSign) {
   EXPECT_EQ(statistics_.jitter_positive.count(0), 1U) << "no deviation";
 }
 
+TEST_F(Recorder, TellsForWhichPostTheLastCycleWasAlsoAfterAReset) {
+  RecordedCycle one = cycle(0);
+  one.posts_done = 7;
+  sut_.record(one);
+  EXPECT_EQ(read().posts_done, 7U);
+  ASSERT_TRUE(sut_.reset(TimePoint(milliseconds(5))));
+  EXPECT_EQ(read().posts_done, 7U);
+}
+
 TEST_F(Recorder, OnlyCyclicTasksHaveJitterAndSlots) {
   for (int n = 0; n < 3; ++n) {
     RecordedCycle one = cycle(n, microseconds(n), milliseconds(50));

@@ -1,0 +1,137 @@
+#include "api/server/run_watch.hpp"
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include "api/dds/text.hpp"
+
+namespace plchost {
+namespace {
+
+using std::chrono::microseconds;
+
+class RunWatchTest : public testing::Test {
+ protected:
+  static constexpr std::int32_t kPid = 77;
+
+  RunWatchTest() {
+    write_running(1);
+    InstanceStatus instance;
+    instance.name.assign("line1");
+    instance.pid = kPid;
+    (void)tasks_.follow(instance, now_);
+  }
+  ~RunWatchTest() override { InstancePage::remove(pool_, "line1"); }
+
+  static InstancePage make_page(const std::string& pool) {
+    TaskIdentity task;
+    task.name.assign("Fill");
+    task.external_event.assign("ready");
+    task.kind = PageTaskKind::external;
+    return InstancePage::create(pool, "line1", std::array{task}).value();
+  }
+  void write_running(std::uint32_t running) {
+    InstanceRuntime runtime;
+    runtime.pid = kPid;
+    runtime.running = running;
+    page_.write_runtime(runtime);
+  }
+  /// The task's last cycle: for which post, and how long after now_ it began; it took 3 us.
+  void write_cycle(std::uint64_t post, microseconds start) {
+    TaskCounters counters{};
+    counters.posts_done = post;
+    counters.release_ns = (now_ + start - microseconds(2)).time_since_epoch().count();
+    counters.latency_last_ns = 2000;
+    counters.exec_last_ns = 3000;
+    page_.statistics(0).counters.write(counters);
+  }
+  [[nodiscard]] AwaitedPost post(std::uint64_t sequence, const std::string& event,
+                                 std::uint64_t count) const {
+    AwaitedPost awaited;
+    awaited.source.bytes[0] = 1;
+    awaited.sequence = sequence;
+    awaited.targets.push_back({"line1", event, count});
+    awaited.received = now_;
+    return awaited;
+  }
+
+  std::string pool_ = "plchost-runs-" + std::to_string(::getpid()) + "-" +
+                      testing::UnitTest::GetInstance()->current_test_info()->name();
+  TimePoint now_ = MonotonicClock::now();
+  InstancePage page_ = make_page(pool_);
+  TaskWatch tasks_{pool_, "hosta", 7, StatusTable<plc_TaskStatus>(),
+                   StatisticsWriter("hosta", 7, dds::Entity())};
+  RunWatch sut_{"hosta", 7};
+};
+
+TEST_F(RunWatchTest, TellsWhenTheTaskHasRunForThePost) {
+  sut_.add(post(5, "ready", 3), tasks_);
+  write_cycle(2, microseconds(4));
+  EXPECT_TRUE(sut_.look(tasks_, now_).empty());
+  write_cycle(3, microseconds(10));
+
+  const auto told = sut_.look(tasks_, now_);
+
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0].code, 0);
+  EXPECT_EQ(told[0].sequence_number, 5U);
+  EXPECT_EQ(told[0].epoch, 7U);
+  EXPECT_EQ(told[0].tasks, 1U);
+  EXPECT_EQ(dds::text_of(told[0].last_task), "line1/Fill");
+  EXPECT_EQ(told[0].start_ns, 10'000);
+  EXPECT_EQ(told[0].end_ns, 13'000);
+  EXPECT_TRUE(sut_.empty());
+}
+
+TEST_F(RunWatchTest, KnowsAnEventOfTheSameNameOfAnotherInstanceForAnother) {
+  EXPECT_EQ(tasks_.bound_tasks("line1", "ready").size(), 1U);
+  EXPECT_TRUE(tasks_.bound_tasks("line2", "ready").empty());
+}
+
+TEST_F(RunWatchTest, TellsAtOnceThatNoTaskIsBound) {
+  sut_.add(post(1, "other", 1), tasks_);
+  const auto told = sut_.look(tasks_, now_);
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0].code, static_cast<int>(ErrorCode::not_found));
+}
+
+TEST_F(RunWatchTest, TellsThatTheTaskWasStopped) {
+  sut_.add(post(1, "ready", 1), tasks_);
+  write_running(0);
+  const auto told = sut_.look(tasks_, now_);
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0].code, static_cast<int>(ErrorCode::wrong_state));
+  EXPECT_THAT(std::string(dds::text_of(told[0].text)), testing::HasSubstr("line1/Fill"));
+}
+
+TEST_F(RunWatchTest, TellsThatTheProcessIsGone) {
+  sut_.add(post(1, "ready", 1), tasks_);
+  (void)tasks_.forget("line1");
+  const auto told = sut_.look(tasks_, now_);
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0].code, static_cast<int>(ErrorCode::wrong_state));
+}
+
+TEST_F(RunWatchTest, WaitsNoLongerThanItsLimit) {
+  sut_.add(post(1, "ready", 1), tasks_);
+  EXPECT_TRUE(sut_.look(tasks_, now_ + RunWatch::kLimit - microseconds(1)).empty());
+  const auto told = sut_.look(tasks_, now_ + RunWatch::kLimit);
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0].code, static_cast<int>(ErrorCode::timed_out));
+}
+
+TEST_F(RunWatchTest, WaitsForABoundedNumberOfPostsOfOneSource) {
+  for (std::uint64_t i = 1; i <= RunWatch::kMaxOfSource + 1; ++i) sut_.add(post(i, "ready", 1), tasks_);
+  const auto told = sut_.look(tasks_, now_);
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0].sequence_number, RunWatch::kMaxOfSource + 1);
+  EXPECT_EQ(told[0].code, static_cast<int>(ErrorCode::full));
+
+  AwaitedPost other = post(1, "ready", 1);
+  other.source.bytes[0] = 2;
+  sut_.add(other, tasks_);
+  EXPECT_TRUE(sut_.look(tasks_, now_).empty());
+}
+
+}  // namespace
+}  // namespace plchost
