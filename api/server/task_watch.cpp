@@ -107,9 +107,9 @@ std::vector<TaskWatch::BoundTask> TaskWatch::bound_tasks(std::string_view instan
   for (const auto& [name, watched] : instances_) {
     if (!watched.page) continue;
     for (std::uint32_t i = 0; i < watched.page->task_count(); ++i) {
-      const auto task = watched.page->task(i);
-      if (!task || task->identity.kind != PageTaskKind::external) continue;
-      const std::string_view bound = task->identity.external_event.view();
+      const auto task = watched.page->identity(i);
+      if (!task || task->kind != PageTaskKind::external) continue;
+      const std::string_view bound = task->external_event.view();
       if ((name == instance && bound == event) || bound == full) found.push_back({name, watched.pid, i});
     }
   }

@@ -186,6 +186,13 @@ std::optional<InstanceRuntime> InstancePageReader::runtime() const noexcept {
   return layout_of(memory_).runtime.read();
 }
 
+std::optional<TaskIdentity> InstancePageReader::identity(std::uint32_t index) const noexcept {
+  if (index >= task_count_) return std::nullopt;
+  const TaskIdentity identity = slot_of(memory_, index).identity;
+  if (identity.kind > PageTaskKind::freewheeling) return std::nullopt;
+  return identity;
+}
+
 std::optional<TaskSnapshot> InstancePageReader::task(std::uint32_t index) const noexcept {
   if (index >= task_count_) return std::nullopt;
   const TaskSlot& slot = slot_of(memory_, index);

@@ -145,6 +145,8 @@ class InstancePageReader {
   [[nodiscard]] static Result<InstancePageReader> open(std::string_view pool, std::string_view instance);
   [[nodiscard]] std::optional<InstanceRuntime> runtime() const noexcept;
   [[nodiscard]] std::uint32_t task_count() const noexcept { return task_count_; }
+  /// What does not change of a task, so no writer is in the way. Nothing: a stranger has written over it.
+  [[nodiscard]] std::optional<TaskIdentity> identity(std::uint32_t index) const noexcept;
   /// Nothing if the writer was in the way; try again later.
   [[nodiscard]] std::optional<TaskSnapshot> task(std::uint32_t index) const noexcept;
   /// The histogram as it is now and goes on growing; `index` < task_count().
