@@ -30,9 +30,9 @@ constexpr std::size_t kFragmentFields = 28;
 constexpr std::size_t kEncapsulation = 4;
 constexpr std::size_t kEndOfParameters = 1;
 
-using Entity = std::array<std::uint8_t, 4>;
-constexpr Entity kParticipantWriter{0x00, 0x01, 0x00, 0xc2};
-constexpr Entity kHandshakeWriter{0x00, 0x02, 0x01, 0xc3};
+using EntityId = std::array<std::uint8_t, 4>;
+constexpr EntityId kParticipantWriter{0x00, 0x01, 0x00, 0xc2};
+constexpr EntityId kHandshakeWriter{0x00, 0x02, 0x01, 0xc3};
 
 std::uint8_t byte_at(std::span<const std::byte> bytes, std::size_t at) noexcept {
   return std::to_integer<std::uint8_t>(bytes[at]);
@@ -70,8 +70,8 @@ bool is_well_formed_sample(std::span<const std::byte> submessage, bool little) n
 }
 
 bool is_acceptable_sample(std::span<const std::byte> submessage, bool secured) noexcept {
-  if (submessage.size() < kWriterEntity + sizeof(Entity)) return false;
-  Entity writer{};
+  if (submessage.size() < kWriterEntity + sizeof(EntityId)) return false;
+  EntityId writer{};
   for (std::size_t i = 0; i < writer.size(); ++i) writer[i] = byte_at(submessage, kWriterEntity + i);
   const bool is_handshake = writer == kHandshakeWriter;
   if (!is_handshake && writer != kParticipantWriter) return !secured;

@@ -47,7 +47,7 @@ std::uint32_t image_of(const Stat& stat) noexcept {
 }
 
 // The second field is the program's name in brackets, which may hold brackets and blanks itself.
-std::optional<Stat> parse(std::string_view text) noexcept {
+std::optional<Stat> parse_stat(std::string_view text) noexcept {
   const std::size_t bracket = text.rfind(')');
   if (bracket == std::string_view::npos) return std::nullopt;
   Stat stat;
@@ -76,7 +76,7 @@ std::optional<Stat> read_stat(pid_t task) noexcept {
   if (!fd) return std::nullopt;
   std::array<char, kStatBytes> text{};
   const ssize_t got = ::read(fd.get(), text.data(), text.size());
-  return got > 0 ? parse({text.data(), static_cast<std::size_t>(got)}) : std::nullopt;
+  return got > 0 ? parse_stat({text.data(), static_cast<std::size_t>(got)}) : std::nullopt;
 }
 
 bool thread_is_over(const Stat& stat) noexcept {

@@ -24,7 +24,7 @@ static_assert(Cyclic == std::to_underlying(TaskKind::cyclic) &&
 
 namespace {
 
-std::unexpected<Error> invalid(std::string text) {
+std::unexpected<Error> invalid_task(std::string text) {
   return failure(ErrorCode::invalid_argument, std::move(text));
 }
 
@@ -32,7 +32,7 @@ std::unexpected<Error> invalid(std::string text) {
 template <std::size_t Size>
 Result<std::string> text_of(const char (&field)[Size], std::string_view what) {
   const char* const end = std::find(std::begin(field), std::end(field), '\0');
-  if (end == std::end(field)) return invalid(fmt::format("{} has no terminating zero", what));
+  if (end == std::end(field)) return invalid_task(fmt::format("{} has no terminating zero", what));
   return std::string(std::begin(field), end);
 }
 
@@ -46,12 +46,13 @@ Result<void> fill_kind(Task_Info& task, TaskConfig& config) {
   switch (config.kind) {
     case TaskKind::cyclic:
       config.interval = interval_of(task);
-      if (config.interval <= Duration::zero()) return invalid("dwInterval of a cyclic task must be above 0");
-      if (config.interval > kMaxInterval) return invalid("dwInterval must be at most 50 days");
+      if (config.interval <= Duration::zero())
+        return invalid_task("dwInterval of a cyclic task must be above 0");
+      if (config.interval > kMaxInterval) return invalid_task("dwInterval must be at most 50 days");
       return {};
     case TaskKind::event:
       if (task.dwEventFunctionPointer == nullptr)
-        return invalid("dwEventFunctionPointer of an event task is null");
+        return invalid_task("dwEventFunctionPointer of an event task is null");
       config.event_variable = [&task, read = task.dwEventFunctionPointer] {
         const CurrentTask current(&task);
         return read() != 0;
@@ -71,15 +72,15 @@ Result<void> fill_kind(Task_Info& task, TaskConfig& config) {
 
 Result<TaskConfig> build_task(Task_Info& task) {
   if (task.nPriority < 0 || task.nPriority > kLowestIecPriority) {
-    return invalid(
+    return invalid_task(
         fmt::format("nPriority {} is not allowed: 0 (highest) to {} is", task.nPriority, kLowestIecPriority));
   }
   if (task.KindOfTask < Cyclic || task.KindOfTask > Freewheeling) {
-    return invalid(fmt::format(
+    return invalid_task(fmt::format(
         "KindOfTask {} is not allowed: Cyclic (0), Event (1), External (2) and Freewheeling (3) are",
         task.KindOfTask));
   }
-  if (task.dwTaskEntryFunctionPointer == nullptr) return invalid("dwTaskEntryFunctionPointer is null");
+  if (task.dwTaskEntryFunctionPointer == nullptr) return invalid_task("dwTaskEntryFunctionPointer is null");
   TaskConfig config;
   config.kind = static_cast<TaskKind>(task.KindOfTask);
   config.iec_priority = task.nPriority;
@@ -96,9 +97,9 @@ Result<TaskConfig> build_task(Task_Info& task) {
 
 Result<std::vector<TaskConfig>> build_tasks(const sys_setup_tasks_struct& setup) {
   if (setup.nTasks < 1 || setup.nTasks > PLC_MAX_TASKS) {
-    return invalid(fmt::format("nTasks {} is not allowed: 1 to {} is", setup.nTasks, PLC_MAX_TASKS));
+    return invalid_task(fmt::format("nTasks {} is not allowed: 1 to {} is", setup.nTasks, PLC_MAX_TASKS));
   }
-  if (setup.ptaskinfo == nullptr) return invalid("ptaskinfo is null");
+  if (setup.ptaskinfo == nullptr) return invalid_task("ptaskinfo is null");
   if (auto name = text_of(setup.stApplicationName, "stApplicationName"); !name) {
     return std::unexpected(name.error());
   }
@@ -111,7 +112,7 @@ Result<std::vector<TaskConfig>> build_tasks(const sys_setup_tasks_struct& setup)
     if (auto valid = check_name("stName", *name, kMaxTaskName); !valid) {
       return failure_in(fmt::format("task number {}", i), valid.error());
     }
-    if (!names.insert(*name).second) return invalid(fmt::format("two tasks are called '{}'", *name));
+    if (!names.insert(*name).second) return invalid_task(fmt::format("two tasks are called '{}'", *name));
     auto config = build_task(task);
     if (!config) return failure_in(fmt::format("task '{}'", *name), config.error());
     config->name = *name;

@@ -28,8 +28,9 @@ TEST(ObjectQuery, TravelsAsItIs) {
   EXPECT_EQ(got.match, sent.match);
   EXPECT_EQ(got.after, sent.after);
   EXPECT_EQ(got.name, "");
-  EXPECT_TRUE(entries_of({}).value().empty());
-  EXPECT_EQ(parse_object_query(entries_of({.name = "line1/ready"}).value()).value().name, "line1/ready");
+  EXPECT_TRUE(entries_of(ObjectQuery{}).value().empty());
+  EXPECT_EQ(parse_object_query(entries_of(ObjectQuery{.name = "line1/ready"}).value()).value().name,
+            "line1/ready");
 }
 
 TEST(ObjectQuery, RefusesWhatCannotBe) {
@@ -45,7 +46,7 @@ TEST(ObjectQuery, RefusesWhatCannotBe) {
   EXPECT_THAT(error({entry("match", "\xff")}), HasSubstr("UTF-8"));
   EXPECT_THAT(error({entry("name", "a\x1b[2J")}), testing::Not(HasSubstr("\x1b")));
   EXPECT_EQ(error({entry("later", "than this server")}), "none");
-  EXPECT_EQ(entries_of({.name = std::string(kMaxObjectName + 1, 'a')}).error().code,
+  EXPECT_EQ(entries_of(ObjectQuery{.name = std::string(kMaxObjectName + 1, 'a')}).error().code,
             ErrorCode::invalid_argument);
 }
 

@@ -27,11 +27,11 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr std::uint32_t kObjects = 256;
+constexpr std::uint32_t kRoom = 256;
 
 class ClientDeath : public testing::Test {
  protected:
-  ClientDeath() : pool_(std::move(ObjectPool::create(name_.get(), {.max_objects = kObjects}).value())) {}
+  ClientDeath() : pool_(std::move(ObjectPool::create(name_.get(), {.max_objects = kRoom}).value())) {}
   [[nodiscard]] ObjectPool another() const { return std::move(ObjectPool::attach(name_.get()).value()); }
 
   /// A child that does `body` with a pool of its own and then waits to be killed.
@@ -237,7 +237,7 @@ TEST_F(ClientDeath, AtAnyInstructionLeavesAPoolThatTheNextCallRepairs) {
   const auto common = pool_.create_mutex("mutex0", {.keep = true});
   ASSERT_TRUE(common);
   const auto segment = MemoryFile::open(name_.get(), 1, MemoryFile::Access::read_write);
-  const PoolView view(segment->bytes(), kObjects);
+  const PoolView view(segment->bytes(), kRoom);
   constexpr unsigned kRounds = 500;
   for (unsigned round = 0; round < kRounds; ++round) {
     std::array<pid_t, 3> children{};
