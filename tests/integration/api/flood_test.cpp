@@ -96,10 +96,10 @@ TEST(PostFlood, OfSomeClientsStarvesNeitherAnotherNorItsCommands) {
     ASSERT_TRUE(reply) << reply.error().describe();
   });
 
-  const double seconds = to_ms(MonotonicClock::now() - start) / 1000;
+  const double elapsed_s = to_ms(MonotonicClock::now() - start) / 1000;
   const std::uint64_t flooded = flood.counted().count() - at_start;
   fmt::print("{} floods, {:.0f} posts a second: a post and its acknowledgement {}; a command {}\n", kFloods,
-             static_cast<double>(flooded) / seconds, posts, commands);
+             static_cast<double>(flooded) / elapsed_s, posts, commands);
   EXPECT_EQ(calm.counted().count(), static_cast<std::uint64_t>(kCalm));
   EXPECT_GT(flooded, 0U) << "the flood was over";
   EXPECT_TRUE(sut->host("hosta", soon()));
