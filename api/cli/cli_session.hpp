@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "api/cli/command.hpp"
 #include "api/cli/host_selection.hpp"
-#include "api/cli/table.hpp"
+#include "api/cli/rows/table.hpp"
+#include "api/cli/words/command.hpp"
 #include "api/client/control_client.hpp"
 
 namespace plchost {

@@ -8,12 +8,12 @@
 #include <fmt/format.h>
 
 #include "api/cli/cli_session.hpp"
-#include "api/cli/completion.hpp"
-#include "api/cli/live_names.hpp"
-#include "api/cli/man_page.hpp"
 #include "api/cli/repeat.hpp"
-#include "api/cli/security/security_verbs.hpp"
 #include "api/cli/terminal.hpp"
+#include "api/cli/verbs/security_verbs.hpp"
+#include "api/cli/words/completion.hpp"
+#include "api/cli/words/live_names.hpp"
+#include "api/cli/words/man_page.hpp"
 #include "shm/base/log.hpp"
 
 namespace {

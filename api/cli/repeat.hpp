@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "api/cli/command.hpp"
+#include "api/cli/words/command.hpp"
 
 namespace plchost {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "api/cli/histogram_plot.hpp"
+#include "api/cli/rows/histogram_plot.hpp"
 
 namespace plchost {
 

@@ -3,8 +3,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "api/server/access/receive_gate.hpp"
 #include "api/server/control_server.hpp"
-#include "api/server/receive_gate.hpp"
 #include "shm/base/log.hpp"
 #include "shm/base/memory_guard.hpp"
 

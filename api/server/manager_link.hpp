@@ -8,7 +8,7 @@
 #include <control.h>
 
 #include "api/dds/guid.hpp"
-#include "api/server/findings_collector.hpp"
+#include "api/server/status/findings_collector.hpp"
 #include "shm/base/control_message.hpp"
 #include "shm/base/packet_socket.hpp"
 #include "shm/base/time.hpp"

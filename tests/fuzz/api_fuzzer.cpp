@@ -9,8 +9,8 @@
 
 #include "api/dds/text.hpp"
 #include "api/gateway/block_sample.hpp"
-#include "api/server/event_intake.hpp"
-#include "api/server/request_check.hpp"
+#include "api/server/access/request_check.hpp"
+#include "api/server/posts/event_intake.hpp"
 
 namespace {
 

@@ -2,8 +2,8 @@
 
 #include <gmock/gmock.h>
 
-#include "api/cli/completion.hpp"
-#include "api/cli/man_page.hpp"
+#include "api/cli/words/completion.hpp"
+#include "api/cli/words/man_page.hpp"
 
 namespace plchost {
 namespace {

@@ -1,4 +1,4 @@
-#include "api/server/event_intake.hpp"
+#include "api/server/posts/event_intake.hpp"
 
 #include <gmock/gmock.h>
 #include <unistd.h>

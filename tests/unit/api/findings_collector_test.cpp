@@ -1,4 +1,4 @@
-#include "api/server/findings_collector.hpp"
+#include "api/server/status/findings_collector.hpp"
 
 #include <gmock/gmock.h>
 

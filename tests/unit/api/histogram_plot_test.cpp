@@ -1,4 +1,4 @@
-#include "api/cli/histogram_plot.hpp"
+#include "api/cli/rows/histogram_plot.hpp"
 
 #include <algorithm>
 #include <array>
@@ -6,7 +6,7 @@
 
 #include <gmock/gmock.h>
 
-#include "api/cli/statistics_rows.hpp"
+#include "api/cli/rows/statistics_rows.hpp"
 #include "shm/base/duration_histogram.hpp"
 
 namespace plchost {

@@ -1,9 +1,9 @@
-#include "api/server/instance_extension.hpp"
+#include "api/server/status/instance_extension.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "api/cli/rows.hpp"
+#include "api/cli/rows/rows.hpp"
 #include "api/dds/text.hpp"
 
 namespace plchost {

@@ -1,4 +1,4 @@
-#include "api/server/object_lister.hpp"
+#include "api/server/lists/object_lister.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -11,8 +11,8 @@
 #include <sys/syscall.h>
 #include <unistd.h>
 
-#include "api/cli/object_rows.hpp"
-#include "api/server/account_names.hpp"
+#include "api/cli/rows/object_rows.hpp"
+#include "api/server/lists/account_names.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/thread_owner.hpp"
 

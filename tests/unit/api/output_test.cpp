@@ -1,8 +1,8 @@
 #include <gmock/gmock.h>
 
 #include "api/cli/cli_session.hpp"
-#include "api/cli/rows.hpp"
-#include "api/cli/table.hpp"
+#include "api/cli/rows/rows.hpp"
+#include "api/cli/rows/table.hpp"
 #include "api/dds/domain.hpp"
 #include "api/dds/text.hpp"
 

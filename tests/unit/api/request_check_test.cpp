@@ -1,4 +1,4 @@
-#include "api/server/request_check.hpp"
+#include "api/server/access/request_check.hpp"
 
 #include <array>
 

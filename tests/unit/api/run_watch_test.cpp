@@ -1,4 +1,4 @@
-#include "api/server/run_watch.hpp"
+#include "api/server/posts/run_watch.hpp"
 
 #include <gmock/gmock.h>
 #include <unistd.h>

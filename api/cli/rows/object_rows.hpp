@@ -1,0 +1,28 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "api/cli/rows/table.hpp"
+#include "api/dds/object_page.hpp"
+
+namespace plchost {
+
+/// One object of a host's pool, for programs: the same fields for all types, null where a type has none. The
+/// field names are a promise.
+[[nodiscard]] Row to_row(std::string_view host, const ListedObject& object);
+
+/// For the table: a line of few cells, see object_columns().
+[[nodiscard]] Row to_short_row(std::string_view host, const ListedObject& object);
+[[nodiscard]] const std::vector<Column>& object_columns();
+
+/// What changes of an object, in words: "12 posts, registered, 1 tasks", "held by demo(4711), thread 4713".
+[[nodiscard]] std::string state_text(const ListedObject& object);
+/// Who has references on it: "plc-instance(4711), python3(88) and 5 more".
+[[nodiscard]] std::string holders_text(const ObjectInfo& object, std::size_t most);
+
+/// All that is known of it, for people.
+[[nodiscard]] std::string format_object(std::string_view host, const ListedObject& object);
+
+}  // namespace plchost

@@ -1,0 +1,179 @@
+#include "api/cli/rows/rows.hpp"
+
+#include <array>
+#include <cstdint>
+#include <ctime>
+#include <span>
+#include <string_view>
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+
+#include "api/dds/text.hpp"
+
+namespace plchost {
+
+using dds::text_of;
+
+namespace {
+
+constexpr std::array kInstanceStates{
+    std::string_view("offline"),   std::string_view("starting"), std::string_view("running"),
+    std::string_view("stopped"),   std::string_view("stopping"), std::string_view("waiting"),
+    std::string_view("safe_mode"), std::string_view("failed"),   std::string_view("exception")};
+constexpr std::array kApplicationStates{std::string_view("none"),     std::string_view("stopped"),
+                                        std::string_view("running"),  std::string_view("single_cycle"),
+                                        std::string_view("stopping"), std::string_view("exception")};
+constexpr std::array kTaskKinds{std::string_view("cyclic"), std::string_view("event"),
+                                std::string_view("external"), std::string_view("freewheeling")};
+constexpr std::array kTaskStates{std::string_view("created"), std::string_view("running"),
+                                 std::string_view("stopped"), std::string_view("exception")};
+
+// A newer host may know more: its number is shown.
+std::string name_of(std::span<const std::string_view> names, std::uint32_t number) {
+  return number < names.size() ? std::string(names[number]) : fmt::format("{}", number);
+}
+
+// What the host tells beyond the fields that this program knows. A name that is taken stays what it is.
+void add_extension(Row& row, std::span<const plc_KeyValue> entries) {
+  for (const plc_KeyValue& entry : entries) {
+    const std::string name(text_of(entry.name));
+    if (!row.contains(name)) row[name] = text_of(entry.value);
+  }
+}
+
+std::int64_t to_seconds(std::int64_t nanoseconds) {
+  return nanoseconds / 1'000'000'000;
+}
+
+}  // namespace
+
+std::string time_text(std::int64_t unix_ns) {
+  if (unix_ns <= 0) return {};
+  constexpr std::int64_t kPerMillisecond = 1'000'000;
+  const auto seconds = static_cast<std::time_t>(to_seconds(unix_ns));
+  return fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z", fmt::gmtime(seconds), unix_ns / kPerMillisecond % 1000);
+}
+
+Row to_row(const HostView& host) {
+  Row row{{"host", host.name},
+          {"version", text_of(host.status.version)},
+          {"manager_pid", host.status.manager_pid},
+          {"server_pid", host.server_pid},
+          {"instances", host.status.instance_count},
+          {"tasks", host.status.task_count},
+          {"events", host.status.event_count},
+          {"objects", host.status.object_count},
+          {"started_unix_s", to_seconds(host.status.started_unix_ns)}};
+  add_extension(row, host.ext);
+  row["labels"] = fmt::format("{}", fmt::join(host.labels(), ","));
+  return row;
+}
+
+Row to_row(const plc_InstanceStatus& status) {
+  Row row{{"host", text_of(status.host)},
+          {"name", text_of(status.instance)},
+          {"state", name_of(kInstanceStates, status.state)},
+          {"pid", status.pid},
+          {"core", status.core},
+          {"scheduler", text_of(status.scheduler)},
+          {"application", text_of(status.application)},
+          {"restarts", status.restarts},
+          {"state_since_unix_s", to_seconds(status.state_since_unix_ns)},
+          {"problem", text_of(status.problem)}};
+  add_extension(row, std::span(status.ext._buffer, status.ext._length));
+  return row;
+}
+
+Row to_row(const plc_TaskStatus& status) {
+  return {{"host", text_of(status.host)},
+          {"instance", text_of(status.instance)},
+          {"task", text_of(status.task)},
+          {"kind", name_of(kTaskKinds, status.kind)},
+          {"priority", status.priority},
+          {"interval_us", to_us(status.interval_ns)},
+          {"state", name_of(kTaskStates, status.state)},
+          {"cycles", status.cycles},
+          {"lost_cycles", status.lost_cycles},
+          {"lost_events", status.lost_events},
+          {"exec_last_us", to_us(status.exec_last_ns)},
+          {"exec_avg_us", to_us(status.exec_avg_ns)},
+          {"exec_min_us", to_us(status.exec_min_ns)},
+          {"exec_max_us", to_us(status.exec_max_ns)},
+          {"latency_p50_us", to_us(status.latency_p50_ns)},
+          {"latency_p99_us", to_us(status.latency_p99_ns)},
+          {"latency_max_us", to_us(status.latency_max_ns)},
+          {"jitter_max_us", to_us(status.jitter_max_ns)},
+          {"external_event", text_of(status.external_event)}};
+}
+
+Row to_row(const plc_EventStatus& status) {
+  return {{"host", text_of(status.host)},      {"instance", text_of(status.instance)},
+          {"event", text_of(status.event)},    {"registered", status.registered},
+          {"bound_tasks", status.bound_tasks}, {"posts", status.posts}};
+}
+
+Row to_row(const plc_Transition& transition) {
+  const bool process = transition.source != 0;
+  const std::span<const std::string_view> names =
+      process ? std::span<const std::string_view>(kInstanceStates) : kApplicationStates;
+  return {{"host", text_of(transition.host)},          {"instance", text_of(transition.instance)},
+          {"sequence", transition.sequence_number},    {"time", time_text(transition.time_unix_ns)},
+          {"of", process ? "process" : "application"}, {"from", name_of(names, transition.from_state)},
+          {"to", name_of(names, transition.to_state)}, {"pid", transition.pid},
+          {"time_unix_ns", transition.time_unix_ns},   {"time_monotonic_ns", transition.time_monotonic_ns},
+          {"reason", text_of(transition.reason)}};
+}
+
+const std::vector<Column>& transition_columns() {
+  static const std::vector<Column> columns{{"time", "TIME"},       {"host", "HOST"}, {"instance", "INSTANCE"},
+                                           {"sequence", "NUMBER"}, {"of", "OF"},     {"from", "FROM"},
+                                           {"to", "TO"},           {"pid", "PID"},   {"reason", "REASON"}};
+  return columns;
+}
+
+const std::vector<Column>& host_columns() {
+  static const std::vector<Column> columns{
+      {"host", "HOST"},         {"version", "VERSION"},     {"manager_pid", "MANAGER"},
+      {"server_pid", "SERVER"}, {"instances", "INSTANCES"}, {"tasks", "TASKS"},
+      {"events", "EVENTS"},     {"objects", "OBJECTS"},     {"labels", "LABELS"}};
+  return columns;
+}
+
+const std::vector<Column>& instance_columns() {
+  static const std::vector<Column> columns{{"host", "HOST"},         {"name", "NAME"},
+                                           {"state", "STATE"},       {"pid", "PID"},
+                                           {"core", "CORE"},         {"scheduler", "SCHEDULER"},
+                                           {"restarts", "RESTARTS"}, {"application", "APPLICATION"},
+                                           {"problem", "PROBLEM"}};
+  return columns;
+}
+
+const std::vector<Column>& task_columns() {
+  static const std::vector<Column> columns{{"host", "HOST"},
+                                           {"instance", "INSTANCE"},
+                                           {"task", "TASK"},
+                                           {"kind", "KIND"},
+                                           {"priority", "PRIO"},
+                                           {"interval_us", "INTERVAL(us)", 0},
+                                           {"state", "STATE"},
+                                           {"cycles", "CYCLES"},
+                                           {"lost_cycles", "LOST"},
+                                           {"lost_events", "LOST-EV"},
+                                           {"exec_avg_us", "EXEC-AVG(us)"},
+                                           {"exec_max_us", "EXEC-MAX(us)"},
+                                           {"latency_p50_us", "LAT-P50(us)"},
+                                           {"latency_p99_us", "LAT-P99(us)"},
+                                           {"latency_max_us", "LAT-MAX(us)"},
+                                           {"jitter_max_us", "JITTER-MAX(us)"}};
+  return columns;
+}
+
+const std::vector<Column>& event_columns() {
+  static const std::vector<Column> columns{{"host", "HOST"},         {"instance", "INSTANCE"},
+                                           {"event", "EVENT"},       {"registered", "REGISTERED"},
+                                           {"bound_tasks", "TASKS"}, {"posts", "POSTS"}};
+  return columns;
+}
+
+}  // namespace plchost

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "api/cli/rows/table.hpp"
+#include "api/client/control_client.hpp"
+
+namespace plchost {
+
+/// From samples of status topics to rows of output. The field names are a promise to programs.
+[[nodiscard]] Row to_row(const HostView& host);
+[[nodiscard]] Row to_row(const plc_InstanceStatus& status);
+[[nodiscard]] Row to_row(const plc_TaskStatus& status);
+[[nodiscard]] Row to_row(const plc_EventStatus& status);
+[[nodiscard]] Row to_row(const plc_WriterStatus& status);
+[[nodiscard]] Row to_row(const plc_ExceptionStatus& status);
+[[nodiscard]] Row to_row(const plc_Transition& transition);
+
+/// A time of a host in these rows, ISO 8601, UTC, to the millisecond: "2026-11-21T10:48:59.502Z". Empty for
+/// none (0).
+[[nodiscard]] std::string time_text(std::int64_t unix_ns);
+
+/// Durations are in microseconds in all rows.
+[[nodiscard]] constexpr double to_us(std::int64_t nanoseconds) noexcept {
+  return static_cast<double>(nanoseconds) / 1000.0;
+}
+
+/// What the tables show of them.
+[[nodiscard]] const std::vector<Column>& host_columns();
+[[nodiscard]] const std::vector<Column>& instance_columns();
+[[nodiscard]] const std::vector<Column>& task_columns();
+[[nodiscard]] const std::vector<Column>& event_columns();
+[[nodiscard]] const std::vector<Column>& writer_columns();
+[[nodiscard]] const std::vector<Column>& exception_columns();
+[[nodiscard]] const std::vector<Column>& transition_columns();
+
+}  // namespace plchost

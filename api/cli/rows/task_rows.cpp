@@ -1,0 +1,25 @@
+#include "api/cli/rows/task_rows.hpp"
+
+#include "api/cli/rows/rows.hpp"
+#include "api/dds/text.hpp"
+
+namespace plchost {
+
+Result<std::vector<Row>> task_rows(CliSession& session, const std::string& instance) {
+  const auto hosts = session.shown_hosts();
+  if (!hosts) return std::unexpected(hosts.error());
+  std::vector<Row> rows;
+  ControlClient& client = *session.client().value();
+  for (const HostView& host : *hosts) {
+    const auto tasks = client.tasks(host.name, session.deadline());
+    if (!tasks) return std::unexpected(tasks.error());
+    for (const auto& task : *tasks) {
+      if (instance.empty() || dds::text_of(task.instance) == instance) rows.push_back(to_row(task));
+    }
+  }
+  if (instance.empty()) return rows;
+  if (auto known = session.check_instance(instance); !known) return std::unexpected(known.error());
+  return rows;
+}
+
+}  // namespace plchost

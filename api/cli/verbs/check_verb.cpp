@@ -1,0 +1,82 @@
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "api/cli/cli_session.hpp"
+#include "api/cli/rows/rows.hpp"
+#include "api/dds/text.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr std::array kLevels{std::string_view("ok"), std::string_view("note"), std::string_view("warning"),
+                             std::string_view("problem")};
+enum Level : std::uint32_t { kOk, kNote, kWarning, kProblem };
+
+std::string level_name(std::uint32_t level) {
+  return level < kLevels.size() ? std::string(kLevels.at(level)) : fmt::format("level {}", level);
+}
+
+Row row_of(const plc_HostFinding& finding) {
+  using dds::text_of;
+  return {{"host", text_of(finding.host)},      {"id", text_of(finding.id)},
+          {"level", level_name(finding.level)}, {"subject", text_of(finding.subject)},
+          {"found", text_of(finding.found)},    {"why", text_of(finding.why)},
+          {"advice", text_of(finding.advice)}};
+}
+
+// The sentences of a finding are too long for the columns of a table.
+void print(const plc_HostFinding& finding) {
+  const auto text = [](const auto& member) { return printable(std::string(dds::text_of(member))); };
+  fmt::print("{:<8} {:<19} {}: {}\n", level_name(finding.level), text(finding.id), text(finding.subject),
+             text(finding.found));
+  if (finding.level == kOk) return;
+  if (const auto why = text(finding.why); !why.empty()) fmt::print("{:<8} why:    {}\n", "", why);
+  if (const auto advice = text(finding.advice); !advice.empty()) fmt::print("{:<8} change: {}\n", "", advice);
+}
+
+void print_all(const std::vector<plc_HostFinding>& findings, bool all) {
+  std::array<std::size_t, kLevels.size()> count{};
+  for (const plc_HostFinding& finding : findings) {
+    ++count.at(std::min<std::size_t>(finding.level, kProblem));
+    if (all || finding.level != kOk) print(finding);
+  }
+  fmt::print("{} problems, {} warnings, {} notes, {} ok{}\n", count[kProblem], count[kWarning], count[kNote],
+             count[kOk], all || count[kOk] == 0 ? "" : " (--all shows them)");
+}
+
+int check_host(CliSession& session, bool all) {
+  const auto host = session.target_host();
+  if (!host) return CliSession::fail(host.error());
+  auto findings = session.client().value()->check_host(*host, session.deadline());
+  if (!findings) return CliSession::fail(findings.error());
+  std::ranges::stable_sort(*findings, std::ranges::greater(), &plc_HostFinding::level);
+  if (session.options.json || session.options.csv) {
+    std::vector<Row> rows;
+    for (const plc_HostFinding& finding : *findings) {
+      if (all || finding.level != kOk) rows.push_back(row_of(finding));
+    }
+    session.show(rows, {});
+  } else {
+    print_all(*findings, all);
+  }
+  const std::uint32_t worst = findings->empty() ? kOk : findings->front().level;
+  if (worst >= kProblem) return kExitFailed;
+  return worst == kWarning ? kExitWarnings : kExitDone;
+}
+
+}  // namespace
+
+void add_check_verb(const Command& plcctl, CliSession& session) {
+  const auto all = std::make_shared<bool>(false);
+  plcctl.verb("check", "Look for what stands between a controller and its best")
+      .noun("host", "What to change at the controller, the worst first",
+            [&session, all] { return check_host(session, *all); })
+      .flag("--all", *all, "also what is as it should be");
+}
+
+}  // namespace plchost

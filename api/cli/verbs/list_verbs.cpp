@@ -1,0 +1,84 @@
+#include <memory>
+#include <utility>
+
+#include "api/cli/cli_session.hpp"
+#include "api/cli/rows/rows.hpp"
+#include "api/cli/rows/task_rows.hpp"
+#include "api/cli/verbs/node_verbs.hpp"
+#include "api/cli/verbs/object_verbs.hpp"
+#include "api/cli/verbs/transition_verbs.hpp"
+
+namespace plchost {
+
+namespace {
+
+int list_hosts(CliSession& session) {
+  const auto hosts = session.shown_hosts();
+  if (!hosts) return CliSession::fail(hosts.error());
+  std::vector<Row> rows;
+  for (const HostView& host : *hosts) rows.push_back(to_row(host));
+  session.show(rows, host_columns());
+  return kExitDone;
+}
+
+int list_tasks(CliSession& session, const std::string& instance) {
+  const auto rows = task_rows(session, instance);
+  if (!rows) return CliSession::fail(rows.error());
+  session.show(*rows, task_columns());
+  return kExitDone;
+}
+
+template <class Sample>
+bool always(const Sample& /*sample*/) {
+  return true;
+}
+
+template <class Sample>
+int list(CliSession& session, Snapshot<Sample> snapshot, const std::vector<Column>& columns,
+         bool (*is_shown)(const Sample&) = always<Sample>) {
+  const auto hosts = session.shown_hosts();
+  if (!hosts) return CliSession::fail(hosts.error());
+  const auto client = session.client();
+  if (!client) return CliSession::fail(client.error());
+  std::vector<Row> rows;
+  for (const HostView& host : *hosts) {
+    const auto samples = ((*client)->*snapshot)(host.name, session.deadline());
+    if (!samples) return CliSession::fail(samples.error());
+    for (const Sample& sample : *samples) {
+      if (is_shown(sample)) rows.push_back(to_row(sample));
+    }
+  }
+  session.show(rows, columns);
+  return kExitDone;
+}
+
+// Instances that never had one have nothing to show.
+bool has_happened(const plc_ExceptionStatus& exception) {
+  return exception.count > 0;
+}
+
+}  // namespace
+
+void add_list_verbs(const Command& plcctl, CliSession& session) {
+  const Command verb = plcctl.verb(
+      "list", "Show all hosts, instances, tasks, events, writers, objects, nodes, exceptions or transitions");
+  verb.noun("hosts", "The controllers of the DDS domain", [&session] { return list_hosts(session); });
+  verb.noun("instances", "The PLC instances",
+            [&session] { return list(session, &ControlClient::instances, instance_columns()); });
+  const auto instance = std::make_shared<std::string>();
+  verb.noun("tasks", "The tasks of all applications, with their figures",
+            [&session, instance] { return list_tasks(session, *instance); })
+      .optional("INSTANCE", *instance, "only of this instance");
+  verb.noun("events", "The external events",
+            [&session] { return list(session, &ControlClient::events, event_columns()); });
+  verb.noun("writers", "The clients that post events, and what became of their posts",
+            [&session] { return list(session, &ControlClient::writers, writer_columns()); });
+  add_list_objects(verb, session);
+  add_list_nodes(verb, session);
+  verb.noun("exceptions", "The last exception of each instance that had any", [&session] {
+    return list(session, &ControlClient::exceptions, exception_columns(), has_happened);
+  });
+  add_list_transitions(verb, session);
+}
+
+}  // namespace plchost

@@ -1,0 +1,91 @@
+#include "api/cli/verbs/node_verbs.hpp"
+
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "api/cli/rows/node_rows.hpp"
+
+namespace plchost {
+
+namespace {
+
+// All pages of one host. The time-out is that of one page.
+Result<std::vector<NodeListing>> route_pages(CliSession& session, const std::string& host, NodeQuery query) {
+  std::vector<NodeListing> pages;
+  for (;;) {
+    auto page = session.client().value()->list_routes(host, query, session.deadline());
+    if (!page) return std::unexpected(std::move(page).error());
+    pages.push_back(*std::move(page));
+    if (pages.back().complete) return pages;
+    if (pages.back().next_after <= query.after) {
+      return failure(ErrorCode::corrupt,
+                     fmt::format("host '{}' lists no routes after node {}", host, query.after));
+    }
+    query.after = pages.back().next_after;
+  }
+}
+
+int list_nodes(CliSession& session, const std::string& base) {
+  const auto hosts = session.shown_hosts();
+  if (!hosts) return CliSession::fail(hosts.error());
+  std::vector<Row> rows;
+  for (const HostView& host : *hosts) {
+    const auto listing = session.client().value()->list_nodes(host.name, {.base = base}, session.deadline());
+    if (!listing) return CliSession::fail(listing.error());
+    for (const ListedNode& node : listing->nodes) rows.push_back(to_row(host.name, *listing, node));
+  }
+  session.show(rows, node_columns());
+  return kExitDone;
+}
+
+int show_routes(CliSession& session, const std::string& node, const std::string& base) {
+  // Of one node: of the host that is meant; without: of all hosts that are shown.
+  std::vector<std::string> hosts;
+  if (node.empty()) {
+    const auto shown = session.shown_hosts();
+    if (!shown) return CliSession::fail(shown.error());
+    for (const HostView& host : *shown) hosts.push_back(host.name);
+  } else {
+    auto host = session.target_host();
+    if (!host) return CliSession::fail(host.error());
+    hosts.push_back(*std::move(host));
+  }
+  std::vector<Row> rows;
+  for (const std::string& host : hosts) {
+    const auto pages = route_pages(session, host, {.base = base, .node = node});
+    if (!pages) return CliSession::fail(pages.error());
+    const auto names = session.client().value()->list_nodes(host, {.base = base}, session.deadline());
+    if (!names) return CliSession::fail(names.error());
+    for (const NodeListing& page : *pages) {
+      for (const RouteInfo& route : page.routes) rows.push_back(to_row(host, page, route, names->nodes));
+    }
+  }
+  session.show(rows, route_columns());
+  return kExitDone;
+}
+
+constexpr const char* kBaseText = "nodes of this base name (default: [blocks] base of the host)";
+
+}  // namespace
+
+void add_list_nodes(const Command& verb, CliSession& session) {
+  const auto base = std::make_shared<std::string>();
+  verb.noun("nodes", "The nodes that send each other blocks, and what they count",
+            [&session, base] { return list_nodes(session, *base); })
+      .optional("--base", *base, kBaseText);
+}
+
+void add_show_routes(const Command& verb, CliSession& session) {
+  const auto node = std::make_shared<std::string>();
+  const auto base = std::make_shared<std::string>();
+  verb.noun(
+          "routes",
+          "How blocks go from each node to all others: the next node, the links that it takes, and what the "
+          "first of them counts",
+          [&session, node, base] { return show_routes(session, *node, *base); })
+      .optional("NODE", *node, "only from this one, by name or address")
+      .optional("--base", *base, kBaseText);
+}
+
+}  // namespace plchost

@@ -1,0 +1,221 @@
+#include "api/cli/verbs/object_verbs.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <iterator>
+#include <memory>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "api/cli/interrupt.hpp"
+#include "api/cli/rows/object_rows.hpp"
+#include "api/cli/rows/rows.hpp"
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+namespace {
+
+struct ListArguments {
+  std::string pattern;
+  std::string type;
+};
+
+struct WatchObjectArguments {
+  std::string name;
+  double interval_s = 0.2;
+  std::uint64_t count = 0;  // 0: until Ctrl-C
+};
+
+std::string dump(const Row& row) {
+  return row.dump(-1, ' ', false, Row::error_handler_t::replace);
+}
+
+Result<ObjectQuery> query_of(const ListArguments& arguments) {
+  ObjectQuery query{.name = {}, .type = std::nullopt, .match = arguments.pattern, .after = {}};
+  if (arguments.type.empty()) return query;
+  const auto type = parse_object_type(arguments.type);
+  if (!type) return std::unexpected(type.error());
+  query.type = *type;
+  return query;
+}
+
+// All pages of one host. The time-out is that of one page.
+Result<std::vector<ListedObject>> all_pages(CliSession& session, const std::string& host, ObjectQuery query) {
+  std::vector<ListedObject> objects;
+  for (;;) {
+    auto listing = session.client().value()->list_objects(host, query, session.deadline());
+    if (!listing) return std::unexpected(std::move(listing).error());
+    objects.insert(objects.end(), std::make_move_iterator(listing->objects.begin()),
+                   std::make_move_iterator(listing->objects.end()));
+    if (listing->complete) return objects;
+    if (listing->next_after <= query.after) {
+      return failure(ErrorCode::corrupt,
+                     fmt::format("host '{}' lists no objects after '{}'", host, query.after));
+    }
+    query.after = std::move(listing->next_after);
+  }
+}
+
+struct HostObjects {
+  std::string host;
+  std::vector<ListedObject> objects;
+};
+
+// Row by row: as rows, 100,000 objects would fill the memory.
+void print_json(const std::vector<HostObjects>& hosts) {
+  std::string separator = "[\n  ";
+  for (const HostObjects& of : hosts) {
+    for (const ListedObject& object : of.objects) {
+      fmt::print("{}{}", separator, dump(to_row(of.host, object)));
+      separator = ",\n  ";
+    }
+  }
+  fmt::print("{}\n", separator.starts_with('[') ? "[]" : "\n]");
+}
+
+std::vector<Row> all_rows(const std::vector<HostObjects>& hosts) {
+  std::vector<Row> rows;
+  for (const HostObjects& of : hosts) {
+    for (const ListedObject& object : of.objects) rows.push_back(to_row(of.host, object));
+  }
+  return rows;
+}
+
+void print_table(const std::vector<HostObjects>& hosts) {
+  std::vector<Row> rows;
+  for (const HostObjects& of : hosts) {
+    for (const ListedObject& object : of.objects) rows.push_back(to_short_row(of.host, object));
+  }
+  fmt::print("{}", format_table(rows, object_columns()));
+}
+
+int list_objects(CliSession& session, const ListArguments& arguments) {
+  const auto query = query_of(arguments);
+  if (!query) return CliSession::fail(query.error());
+  const auto hosts = session.shown_hosts();
+  if (!hosts) return CliSession::fail(hosts.error());
+  std::vector<HostObjects> found;
+  for (const HostView& host : *hosts) {
+    auto objects = all_pages(session, host.name, *query);
+    if (!objects) return CliSession::fail(objects.error());
+    found.push_back({host.name, *std::move(objects)});
+  }
+  if (session.options.csv) {
+    session.show(all_rows(found), {});
+  } else {
+    session.options.json ? print_json(found) : print_table(found);
+  }
+  return kExitDone;
+}
+
+Result<ListedObject> look_at(CliSession& session, const std::string& host, const std::string& name) {
+  auto listing = session.client().value()->list_objects(
+      host, {.name = name, .type = std::nullopt, .match = {}, .after = {}}, session.deadline());
+  if (!listing) return std::unexpected(std::move(listing).error());
+  if (listing->objects.size() == 1) return std::move(listing->objects.front());
+  return failure(ErrorCode::corrupt, fmt::format("host '{}' tells of {} objects where one was asked for",
+                                                 host, listing->objects.size()));
+}
+
+int show_object(CliSession& session, const std::string& name) {
+  const auto host = session.target_host();
+  if (!host) return CliSession::fail(host.error());
+  const auto object = look_at(session, *host, name);
+  if (!object) return CliSession::fail(object.error());
+  fmt::print("{}",
+             session.options.json ? format_json({to_row(*host, *object)}) : format_object(*host, *object));
+  return kExitDone;
+}
+
+// One look of a watch: what is printed when it differs from the look before.
+struct ObjectLook {
+  Row row;  // as JSON, without the time
+  std::string text;
+};
+
+ObjectLook look_of(const std::string& host, const ListedObject& object) {
+  const ObjectInfo& info = object.info;
+  constexpr std::size_t kHoldersInLine = 8;
+  const std::string by = holders_text(info, kHoldersInLine);
+  ObjectLook look{.row = to_row(host, object),
+                  .text = fmt::format("{}, {} waiters, {} references{}{}", state_text(object), info.waiters,
+                                      info.reference_count, by.empty() ? "" : ": ", by)};
+  look.row["present"] = true;
+  return look;
+}
+
+ObjectLook look_of_nothing(const std::string& host, const std::string& name) {
+  return {.row = {{"host", host}, {"object", name}, {"present", false}}, .text = "is not there"};
+}
+
+void print_look(const CliSession& session, const std::string& name, const ObjectLook& look) {
+  const std::int64_t now = unix_time_ns();
+  if (session.options.json) {
+    Row row{{"time", time_text(now)}, {"time_unix_ns", now}};
+    row.update(look.row);
+    fmt::print("{}\n", dump(row));
+  } else {
+    fmt::print("{}  {}  {}\n", time_text(now), printable(name), printable(look.text));
+  }
+  std::fflush(stdout);
+}
+
+int watch_object(CliSession& session, const WatchObjectArguments& arguments) {
+  catch_interrupts();
+  const auto host = session.target_host();
+  if (!host) return CliSession::fail(host.error());
+  const auto interval =
+      std::chrono::duration_cast<Duration>(std::chrono::duration<double>(arguments.interval_s));
+  Row last;
+  std::uint64_t shown = 0;
+  for (TimePoint next = MonotonicClock::now(); !interrupted();) {
+    const auto object = look_at(session, *host, arguments.name);
+    // One that goes may come again; one that was never there is a slip of the pen.
+    const bool gone = !object && object.error().code == ErrorCode::not_found && shown > 0;
+    if (!object && !gone) return CliSession::fail(object.error());
+    const ObjectLook look = object ? look_of(*host, *object) : look_of_nothing(*host, arguments.name);
+    if (look.row != last) {
+      print_look(session, arguments.name, look);
+      last = look.row;
+      if (++shown == arguments.count) break;
+    }
+    next = std::max(next + interval, MonotonicClock::now());
+    sleep_until_interrupted(next);
+  }
+  return kExitDone;
+}
+
+}  // namespace
+
+void add_list_objects(const Command& verb, CliSession& session) {
+  const auto arguments = std::make_shared<ListArguments>();
+  verb.noun("objects", "The objects of the global pool: what they are, what they hold, and who holds them",
+            [&session, arguments] { return list_objects(session, *arguments); })
+      .optional("PATTERN", arguments->pattern, "only names like this: '*' any characters, '?' one")
+      .optional("--type", arguments->type, "only memory, semaphore, event or mutex");
+}
+
+void add_show_object(const Command& verb, CliSession& session) {
+  const auto name = std::make_shared<std::string>();
+  verb.noun("object", "One object of the global pool, with all who hold it",
+            [&session, name] { return show_object(session, *name); })
+      .argument("NAME", *name);
+}
+
+void add_watch_object(const Command& verb, CliSession& session) {
+  const auto arguments = std::make_shared<WatchObjectArguments>();
+  constexpr double kMinInterval = 0.02;
+  constexpr double kMaxInterval = 3600;
+  verb.noun("object",
+            "One object of the global pool: a line (with --json an object) for each change, until Ctrl-C",
+            [&session, arguments] { return watch_object(session, *arguments); })
+      .argument("NAME", arguments->name)
+      .option("--interval", arguments->interval_s, "seconds between two looks (default 0.2)", kMinInterval,
+              kMaxInterval)
+      .option("--count", arguments->count, "end after so many lines", std::uint64_t{0}, kMaxCount);
+}
+
+}  // namespace plchost

@@ -1,0 +1,124 @@
+#include <memory>
+
+#include <fmt/format.h>
+
+#include "api/cli/cli_session.hpp"
+#include "api/cli/rows/rows.hpp"
+#include "api/cli/rows/statistics_rows.hpp"
+#include "api/cli/terminal.hpp"
+#include "api/cli/verbs/node_verbs.hpp"
+#include "api/cli/verbs/object_verbs.hpp"
+#include "api/dds/text.hpp"
+
+namespace plchost {
+
+namespace {
+
+int show_row(const CliSession& session, const Row& row) {
+  if (session.options.csv) {
+    fmt::print("{}", format_csv({row}));
+  } else {
+    fmt::print("{}", session.options.json ? format_json({row}) : format_fields(row));
+  }
+  return kExitDone;
+}
+
+template <class Sample>
+std::string name_of(const Sample& sample) {
+  return std::string(dds::text_of(sample.instance));
+}
+std::string name_of(const plc_TaskStatus& task) {
+  return fmt::format("{}/{}", task.instance, task.task);
+}
+
+/// The sample of that name, of the host that is meant. not_found: lists the names that there are.
+template <class Sample>
+Result<Sample> find(CliSession& session, Snapshot<Sample> snapshot, std::string_view what,
+                    const std::string& name) {
+  const auto host = session.target_host();
+  if (!host) return std::unexpected(host.error());
+  const auto all = (session.client().value()->*snapshot)(*host, session.deadline());
+  if (!all) return std::unexpected(all.error());
+  std::vector<std::string> names;
+  for (const Sample& sample : *all) {
+    names.push_back(name_of(sample));
+    if (names.back() == name) return sample;
+  }
+  return unknown_name(what, name, names, *host);
+}
+
+int show_instance(CliSession& session, const std::string& name) {
+  const auto instance = find(session, &ControlClient::instances, "instance", name);
+  return instance ? show_row(session, to_row(*instance)) : CliSession::fail(instance.error());
+}
+
+int show_statistics(CliSession& session, const plc_TaskStatus& task) {
+  const std::string host(dds::text_of(task.host));
+  const auto report = session.client().value()->statistics(host, dds::text_of(task.instance),
+                                                           dds::text_of(task.task), session.deadline());
+  if (!report) return CliSession::fail(report.error());
+  Row row = to_row(task);
+  if (session.options.json) {
+    add_statistics(row, *report);
+    return show_row(session, row);
+  }
+  // What the statistics tell in more detail is left to them.
+  Row identity;
+  for (const char* field :
+       {"host", "instance", "task", "kind", "priority", "interval_us", "state", "external_event"}) {
+    identity[field] = row[field];
+  }
+  fmt::print("{}{}", format_fields(identity), format_statistics(*report, terminal_style()));
+  return kExitDone;
+}
+
+int show_task(CliSession& session, const std::string& name) {
+  const auto parts = split_name("TASK", name);
+  if (!parts) return CliSession::fail(parts.error());
+  const auto task = find(session, &ControlClient::tasks, "task", name);
+  return task ? show_statistics(session, *task) : CliSession::fail(task.error());
+}
+
+// For people: no field that says nothing, addresses as tools print them.
+std::string format_exception(Row row) {
+  for (const char* field : {"address", "memory_address"}) {
+    const auto address = row[field].get<std::uint64_t>();
+    row[field] = address != 0 ? fmt::format("{:#x}", address) : "";
+  }
+  row.erase("time_unix_ns");
+  Row said;
+  for (const auto& [field, value] : row.items()) {
+    if (!value.is_string() || !value.get_ref<const std::string&>().empty()) said[field] = value;
+  }
+  return format_fields(said);
+}
+
+int show_exception(CliSession& session, const std::string& name) {
+  const auto exception = find(session, &ControlClient::exceptions, "instance", name);
+  if (!exception) return CliSession::fail(exception.error());
+  const Row row = to_row(*exception);
+  if (session.options.json) return show_row(session, row);
+  fmt::print("{}", exception->count > 0 ? format_exception(row)
+                                        : fmt::format("instance '{}' has had no exception\n", name));
+  return kExitDone;
+}
+
+}  // namespace
+
+void add_show_verbs(const Command& plcctl, CliSession& session) {
+  const Command verb = plcctl.verb(
+      "show",
+      "Show all that is known of one instance, its last exception, one task or one object, or how blocks go");
+  const auto add = [&](const char* noun, const char* form, const char* text,
+                       int (*run)(CliSession&, const std::string&)) {
+    const auto name = std::make_shared<std::string>();
+    verb.noun(noun, text, [&session, name, run] { return run(session, *name); }).argument(form, *name);
+  };
+  add("instance", "INSTANCE", "One PLC instance", show_instance);
+  add("exception", "INSTANCE", "The last exception of one PLC instance", show_exception);
+  add("task", "INSTANCE/TASK", "One task", show_task);
+  add_show_object(verb, session);
+  add_show_routes(verb, session);
+}
+
+}  // namespace plchost

@@ -1,0 +1,101 @@
+#include "api/server/access/request_audit.hpp"
+
+#include <array>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "api/dds/text.hpp"
+#include "api/server/access/request_check.hpp"
+#include "shm/base/log.hpp"
+#include "shm/base/names.hpp"
+
+namespace plchost {
+
+namespace {
+
+// As many requests can be under way at the manager, many times over: what is not answered is forgotten.
+constexpr std::size_t kMostUnderWay = 1024;
+constexpr std::size_t kMostSources = 4096;
+
+std::string key_of(const plc_SampleIdentity& identity) {
+  return fmt::format("{}.{}", dds::Guid::from(identity.writer_guid).hex(), identity.sequence_number);
+}
+
+}  // namespace
+
+RequestAudit::~RequestAudit() {
+  for (auto& [source, posts] : posts_) tell(source, posts, TimePoint::max());
+}
+
+void RequestAudit::asked(const dds::Guid& client, const plc_Request& request) {
+  if (!log_ || only_reads(request.operation)) return;
+  if (under_way_.size() >= kMostUnderWay) under_way_.clear();
+  AuditRecord record;
+  describe_(client, record);
+  record.what = operation_name(request.operation);
+  record.on = dds::text_of(request.instance);
+  record.argument = dds::text_of(request.argument);
+  under_way_[key_of(request.header.request_identity)] = std::move(record);
+}
+
+void RequestAudit::answered(const plc_SampleIdentity& identity, ErrorCode code, std::string_view text) {
+  auto found = under_way_.extract(key_of(identity));
+  if (found.empty()) return;
+  AuditRecord& record = found.mapped();
+  record.time_unix_ns = unix_time_ns();
+  record.result = to_string(code);
+  record.text = text;
+  write(record);
+}
+
+void RequestAudit::posted(const plc_EventAck& ack, TimePoint now) {
+  if (!log_) return;
+  if (posts_.size() >= kMostSources) {
+    for (auto& [source, posts] : posts_) tell(source, posts, TimePoint::max());
+    posts_.clear();
+  }
+  Posts& posts = posts_[dds::Guid::from(ack.source)];
+  posts.accepted = ack.accepted;
+  posts.rejected = ack.rejected;
+  posts.rejected_text = dds::text_of(ack.rejected_text);
+  posts.last = now;
+}
+
+void RequestAudit::tick(TimePoint now) {
+  constexpr Duration kForgotten = 2 * kPostPeriod;
+  for (auto& [source, posts] : posts_) tell(source, posts, now);
+  std::erase_if(posts_, [&](const auto& one) { return now - one.second.last > kForgotten; });
+}
+
+void RequestAudit::tell(const dds::Guid& source, Posts& posts, TimePoint now) {
+  const bool accepted = posts.accepted != posts.accepted_told && now >= posts.next_accepted;
+  const bool rejected = posts.rejected != posts.rejected_told && now >= posts.next_rejected;
+  if (!accepted && !rejected) return;
+  AuditRecord record;
+  describe_(source.participant(), record);
+  record.time_unix_ns = unix_time_ns();
+  record.what = "post";
+  record.result = to_string(rejected ? ErrorCode::refused : ErrorCode::ok);
+  record.text = fmt::format("{} taken and {} refused so far{}{}", posts.accepted, posts.rejected,
+                            rejected ? "; the last of these: " : "", rejected ? posts.rejected_text : "");
+  write(record);
+  posts.accepted_told = posts.accepted;
+  posts.rejected_told = posts.rejected;
+  if (now == TimePoint::max()) return;
+  posts.next_accepted = now + kPostPeriod;
+  posts.next_rejected = now + kRefusedPeriod;
+}
+
+void RequestAudit::write(const AuditRecord& record) {
+  const auto written = log_->append(record);
+  if (!written && !failing_) spdlog::error("changes are not recorded: {}", written.error().describe());
+  if (written && failing_) spdlog::info("changes are recorded again");
+  failing_ = !written;
+}
+
+std::string RequestAudit::head() const {
+  return log_ ? fmt::format("{} {}", log_->head().number, log_->head().hash) : std::string();
+}
+
+}  // namespace plchost

@@ -1,0 +1,141 @@
+#include "api/server/access/request_check.hpp"
+
+#include <algorithm>
+#include <array>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "api/dds/text.hpp"
+#include "shm/base/names.hpp"
+
+namespace plchost {
+
+namespace {
+
+enum class Argument : std::uint8_t { none, path, scheduler, event, task_or_none };
+
+struct Operation {
+  std::int32_t number;
+  ControlVerb verb;
+  ApiRole role;
+  Argument argument;
+  bool of_host = false;  // names no instance
+};
+
+constexpr std::array kOperations = {
+    Operation{plc_OPERATION_START, ControlVerb::start, ApiRole::operating, Argument::none},
+    Operation{plc_OPERATION_STOP, ControlVerb::stop, ApiRole::operating, Argument::none},
+    Operation{plc_OPERATION_RESET, ControlVerb::reset, ApiRole::operating, Argument::none},
+    Operation{plc_OPERATION_RESET_COLD, ControlVerb::reset_cold, ApiRole::operating, Argument::none},
+    Operation{plc_OPERATION_SINGLE_CYCLE, ControlVerb::single_cycle, ApiRole::operating, Argument::none},
+    Operation{plc_OPERATION_RESTART, ControlVerb::restart, ApiRole::operating, Argument::none},
+    Operation{plc_OPERATION_RESET_STATISTICS, ControlVerb::reset_statistics, ApiRole::operating,
+              Argument::task_or_none},
+    Operation{plc_OPERATION_CHECK_HOST, ControlVerb::check_host, ApiRole::operating, Argument::none,
+              /*of_host=*/true},
+    Operation{plc_OPERATION_LIST_OBJECTS, ControlVerb::list_objects, ApiRole::operating, Argument::none,
+              /*of_host=*/true},
+    Operation{plc_OPERATION_LIST_NODES, ControlVerb::list_nodes, ApiRole::operating, Argument::none,
+              /*of_host=*/true},
+    Operation{plc_OPERATION_LIST_ROUTES, ControlVerb::list_routes, ApiRole::operating, Argument::none,
+              /*of_host=*/true},
+    Operation{plc_OPERATION_LOAD_APPLICATION, ControlVerb::load_application, ApiRole::engineering,
+              Argument::path},
+    Operation{plc_OPERATION_SET_SCHEDULER, ControlVerb::set_scheduler, ApiRole::engineering,
+              Argument::scheduler},
+    Operation{plc_OPERATION_REGISTER_EVENT, ControlVerb::register_event, ApiRole::engineering,
+              Argument::event},
+    Operation{plc_OPERATION_UNREGISTER_EVENT, ControlVerb::unregister_event, ApiRole::engineering,
+              Argument::event},
+};
+
+std::string known_operations() {
+  std::string list;
+  for (const Operation& operation : kOperations) {
+    list += fmt::format("{}{} {}", list.empty() ? "" : ", ", operation.number, to_string(operation.verb));
+  }
+  return list;
+}
+
+Result<void> check_argument(const Operation& operation, std::string_view argument) {
+  switch (operation.argument) {
+    case Argument::none:
+      if (argument.empty()) return {};
+      return failure(ErrorCode::invalid_argument,
+                     fmt::format("{} takes no argument", to_string(operation.verb)));
+    case Argument::path:
+      if (argument.starts_with('/') && argument.size() <= kMaxPath) return {};
+      return failure(ErrorCode::invalid_argument,
+                     fmt::format("application '{}' is not an absolute path on the host", argument));
+    case Argument::scheduler:
+      return check_name("scheduler", argument, 31);
+    case Argument::event:
+      return check_name("event", argument, kMaxEventName);
+    case Argument::task_or_none:
+      return argument.empty() ? Result<void>() : check_name("task", argument, kMaxTaskName);
+  }
+  return {};
+}
+
+Result<void> check_instance(const Operation& operation, std::string_view instance, std::string_view host,
+                            std::span<const std::string_view> instances) {
+  if (operation.of_host) {
+    if (instance.empty()) return {};
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("{} is for the whole host: name no instance", to_string(operation.verb)));
+  }
+  if (auto good = check_name("instance", instance, kMaxInstanceName); !good) return good;
+  if (std::ranges::find(instances, instance) != instances.end()) return {};
+  return failure(ErrorCode::not_found, fmt::format("no instance '{}' on host '{}'; there are: {}", instance,
+                                                   host, join_names(instances)));
+}
+
+}  // namespace
+
+Result<ControlRequest> check_request(const plc_Request& request, ApiRole role, std::string_view host,
+                                     std::span<const std::string_view> instances) {
+  const auto addressed = dds::text_of(request.header.instance_name);
+  if (addressed != host) {
+    return failure(ErrorCode::not_found, fmt::format("this is host '{}', not '{}'", host, addressed));
+  }
+  const auto* const operation = std::ranges::find(kOperations, request.operation, &Operation::number);
+  if (operation == kOperations.end()) {
+    return failure(ErrorCode::unsupported, fmt::format("unknown operation {}; this host knows: {}",
+                                                       request.operation, known_operations()));
+  }
+  if (operation->role != role) {
+    return failure(
+        ErrorCode::refused,
+        fmt::format("'{}' is not for the {} role: write it to the other request topic",
+                    to_string(operation->verb), role == ApiRole::operating ? "operator" : "engineer"));
+  }
+  const auto instance = dds::text_of(request.instance);
+  if (auto good = check_instance(*operation, instance, host, instances); !good)
+    return std::unexpected(good.error());
+  const auto argument = dds::text_of(request.argument);
+  if (auto good = check_argument(*operation, argument); !good) return std::unexpected(good.error());
+  return ControlRequest{0, operation->verb, std::string(instance), std::string(argument)};
+}
+
+bool only_reads(std::int32_t operation) noexcept {
+  return operation == plc_OPERATION_CHECK_HOST || operation == plc_OPERATION_LIST_OBJECTS ||
+         operation == plc_OPERATION_LIST_NODES || operation == plc_OPERATION_LIST_ROUTES;
+}
+
+std::string operation_name(std::int32_t operation) {
+  const auto* const known = std::ranges::find(kOperations, operation, &Operation::number);
+  return known != kOperations.end() ? std::string(to_string(known->verb))
+                                    : fmt::format("operation {}", operation);
+}
+
+std::int32_t remote_exception(ErrorCode code) noexcept {
+  constexpr std::int32_t kOk = 0;
+  constexpr std::int32_t kInvalidArgument = 2;
+  constexpr std::int32_t kUnknownOperation = 5;
+  if (code == ErrorCode::unsupported) return kUnknownOperation;
+  return code == ErrorCode::invalid_argument ? kInvalidArgument : kOk;
+}
+
+}  // namespace plchost

@@ -1,0 +1,117 @@
+#include "api/server/lists/object_lister.hpp"
+
+#include <algorithm>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#include "api/server/lists/account_names.hpp"
+#include "shm/base/names.hpp"
+#include "shm/base/thread_owner.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr int kLookShare = 4;  // a look is used for so many times as long as it took
+constexpr Duration kForgotten = std::chrono::seconds(2);
+// The names of a larger pool are not compared, to say which one may have been meant.
+constexpr std::size_t kMostCompared = 4096;
+
+bool is_wanted(const ObjectQuery& query, const ObjectInfo& object) {
+  return (!query.type || object.type == *query.type) &&
+         (query.match.empty() || matches_pattern(query.match, object.name));
+}
+
+// The word in shared memory is a stranger's: a thread of nobody who holds a reference does not hold the
+// mutex.
+bool may_hold(const ObjectInfo& mutex, std::uint32_t pid) {
+  return mutex.reference_count > mutex.references.size() ||
+         std::ranges::find(mutex.references, pid, &ReferenceInfo::pid) != mutex.references.end();
+}
+
+ListedObject listed_of(ObjectInfo info) {
+  ListedObject listed{
+      .info = std::move(info), .holder_pid = 0, .holder_program = {}, .owner_name = {}, .group_name = {}};
+  listed.owner_name = user_name(listed.info.owner);
+  listed.group_name = group_name(listed.info.group);
+  if (listed.info.type != ObjectType::mutex || listed.info.value == 0) return listed;
+  auto owner = owner_of_thread(static_cast<std::uint32_t>(listed.info.value));
+  if (!owner || !may_hold(listed.info, owner->pid)) return listed;
+  listed.holder_pid = owner->pid;
+  listed.holder_program = std::move(owner->program);
+  return listed;
+}
+
+}  // namespace
+
+Result<void> ObjectLister::look() {
+  const TimePoint begin = MonotonicClock::now();
+  wanted_ = begin;
+  if (begin < seen_until_) return {};
+  auto seen = pool_->list();
+  if (!seen) return std::unexpected(std::move(seen).error());
+  seen_ = *std::move(seen);
+  std::ranges::sort(seen_, {}, &ObjectInfo::name);
+  const TimePoint end = MonotonicClock::now();
+  seen_until_ = end + kLookShare * (end - begin);
+  return {};
+}
+
+void ObjectLister::forget_old(TimePoint now) {
+  if (!seen_.empty() && now - wanted_ > kForgotten) {
+    seen_ = {};
+    seen_until_ = {};
+  }
+}
+
+std::string ObjectLister::like(std::string_view name) {
+  if (!look() || seen_.size() > kMostCompared) return "";
+  std::vector<std::string_view> names;
+  names.reserve(seen_.size());
+  for (const ObjectInfo& object : seen_) names.emplace_back(object.name);
+  const auto near = nearest_name(name, names);
+  return near.empty() ? "" : fmt::format(" (did you mean '{}'?)", near);
+}
+
+Result<ObjectListing> ObjectLister::one(const std::string& name) {
+  auto found = pool_->look_at(name);
+  if (found) {
+    ObjectListing listing;
+    listing.objects.push_back(listed_of(*std::move(found)));
+    return listing;
+  }
+  Error error = std::move(found).error();
+  if (error.code == ErrorCode::not_found) error.message += like(name);
+  return std::unexpected(std::move(error));
+}
+
+Result<ObjectListing> ObjectLister::page(const ObjectQuery& query, TimePoint until) {
+  if (!query.name.empty()) return one(query.name);
+  if (auto looked = look(); !looked) return std::unexpected(std::move(looked).error());
+  constexpr std::size_t kClockEvery = 64;
+  ObjectListing listing;
+  std::size_t references = 0;
+  auto at = query.after.empty() ? seen_.begin()
+                                : std::ranges::upper_bound(seen_, query.after, {}, &ObjectInfo::name);
+  for (std::size_t step = 1; at != seen_.end(); ++at, ++step) {
+    const bool wanted = is_wanted(query, *at);
+    const bool fits = listing.objects.empty() || (listing.objects.size() < kPageObjects &&
+                                                  references + at->references.size() <= kPageReferences);
+    if (wanted && !fits) break;
+    listing.next_after = at->name;
+    if (wanted) {
+      references += at->references.size();
+      listing.objects.push_back(listed_of(*at));
+    }
+    if (step % kClockEvery == 0 && MonotonicClock::now() >= until) {
+      ++at;
+      break;
+    }
+  }
+  listing.complete = at == seen_.end();
+  if (listing.complete) listing.next_after.clear();
+  return listing;
+}
+
+}  // namespace plchost

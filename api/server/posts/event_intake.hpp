@@ -1,0 +1,106 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <mutex>
+#include <string>
+#include <unordered_map>
+#include <unordered_set>
+#include <vector>
+
+#include <control.h>
+
+#include "api/dds/guid.hpp"
+#include "api/server/access/access_guard.hpp"
+#include "api/server/posts/event_directory.hpp"
+#include "api/server/posts/post_ledger.hpp"
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+/// How many posts a client may have unacknowledged.
+inline constexpr std::uint32_t kPostCredits = 64;
+
+/// A post whose client wants to know when the tasks have run for it.
+struct AwaitedPost {
+  struct Target {
+    std::string instance;
+    std::string event;
+    std::uint64_t count = 0;  ///< of the event, with this post
+  };
+  dds::Guid source;
+  std::uint64_t sequence = 0;
+  std::vector<Target> targets = {};
+  TimePoint received;
+};
+
+/// The way of a remote post from DDS into the pool: checks it, finds the event, posts, and notes that its
+/// source is owed an acknowledgement. Runs in DDS's receiving thread; nothing in it writes to DDS. The lock
+/// is held by that thread, and by the control loop for the copying of acknowledgements.
+class EventIntake {
+ public:
+  /// `guard` says who may post; it must outlive this.
+  EventIntake(std::string host, const ObjectPool& pool, PostLedger ledger, std::uint64_t epoch,
+              const AccessGuard& guard)
+      : host_(std::move(host)), epoch_(epoch), guard_(&guard), directory_(pool), ledger_(std::move(ledger)) {}
+
+  /// Takes all that the reader has. Returns true if acknowledgements are owed now and none were before.
+  bool take_posts(dds_entity_t reader);
+  bool take_batches(dds_entity_t reader);
+
+  /// One post, or one batch of them, whose `source` was checked. Public for tests.
+  void process(const plc_EventPost& post);
+  void process(const plc_EventBatch& batch);
+
+  /// The acknowledgements that are owed, one for each source; then none is.
+  [[nodiscard]] std::vector<plc_EventAck> collect_acks();
+  /// The posts since the last call whose runs are waited for.
+  [[nodiscard]] std::vector<AwaitedPost> collect_awaited();
+
+  /// What became of the posts of one source.
+  struct Writer {
+    dds::Guid source;  ///< all zero: of all sources together
+    PostCounters counters;
+    std::uint64_t last = 0;
+    TimePoint used;  ///< when its last post came
+  };
+  /// All together first, then each source that is known.
+  [[nodiscard]] std::vector<Writer> writers() const;
+
+  /// Samples that were no valid post: source not the writer's, or impossible numbers.
+  [[nodiscard]] std::uint64_t malformed() const;
+
+  /// How many awaited posts there may be between two calls of collect_awaited().
+  static constexpr std::size_t kMaxAwaited = 1024;
+
+ private:
+  template <class Post>
+  bool take(dds_entity_t reader);
+  template <class Post>
+  void process_locked(const Post& post);
+  template <class Post>
+  void post_next(const Post& post, LedgerEntry& entry);
+  [[nodiscard]] Result<PostResult> try_post(const plc_EventPost& post, LedgerEntry& entry);
+  [[nodiscard]] Result<PostResult> try_post(const plc_EventBatch& batch, LedgerEntry& entry);
+  template <class Post>
+  [[nodiscard]] Result<void> check(const Post& post) const;
+  template <class Post>
+  void await(const Post& post);
+  [[nodiscard]] Result<PoolEvent> event_of(std::string_view instance, std::string_view event);
+  [[nodiscard]] bool source_is_writer(dds_entity_t reader, const dds_sample_info_t& info,
+                                      const dds::Guid& source);
+
+  const std::string host_;
+  const std::uint64_t epoch_;
+  const AccessGuard* const guard_;
+  mutable std::mutex mutex_;
+  EventDirectory directory_;
+  PostLedger ledger_;
+  std::unordered_set<dds::Guid, dds::GuidHash> owed_;
+  std::unordered_map<dds_instance_handle_t, dds::Guid> writers_;  // asking DDS costs an allocation
+  std::vector<AwaitedPost> awaited_;
+  TimePoint now_;  // when the post that is processed came
+  std::uint64_t malformed_ = 0;
+};
+
+}  // namespace plchost

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <list>
+#include <string>
+#include <vector>
+
+#include <control.h>
+
+#include "api/server/posts/event_intake.hpp"
+#include "api/server/status/task_watch.hpp"
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+/// Waits for the tasks that run for a post to come to the ends of their cycles: looks at the instances'
+/// pages, so that neither the task nor who posts has anything to do for it. Control loop only.
+class RunWatch {
+ public:
+  static constexpr std::size_t kMaxOfSource = 64;
+  static constexpr std::size_t kMaxWaits = 1024;
+  /// A task that has not run by then is not waited for.
+  static constexpr Duration kLimit = std::chrono::seconds(10);
+  /// While something is waited for it is looked so often.
+  static constexpr Duration kPeriod = std::chrono::microseconds(200);
+
+  RunWatch(std::string host, std::uint64_t epoch) : host_(std::move(host)), epoch_(epoch) {}
+
+  void add(const AwaitedPost& post, const TaskWatch& tasks);
+  /// What is decided by now.
+  [[nodiscard]] std::vector<plc_EventRun> look(const TaskWatch& tasks, TimePoint now);
+  [[nodiscard]] bool empty() const noexcept { return waits_.empty(); }
+
+ private:
+  struct Run {
+    TaskWatch::BoundTask task;
+    std::uint64_t count = 0;  ///< the post that it has to have run for
+    bool done = false;
+  };
+  struct Wait {
+    plc_EventRun result{};
+    TimePoint received;
+    std::vector<Run> runs;
+    bool decided = false;
+  };
+  static void decide(Wait& wait, ErrorCode code, const std::string& text);
+  static void look_at(Wait& wait, Run& run, const TaskWatch& tasks);
+
+  std::string host_;
+  std::uint64_t epoch_;
+  std::list<Wait> waits_;
+};
+
+}  // namespace plchost

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include <control.h>
+
+#include "api/server/posts/event_intake.hpp"
+#include "api/server/session_table.hpp"
+#include "api/server/status/status_table.hpp"
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+/// Shows what became of the posts of each client's writer. Control loop only.
+class WriterWatch {
+ public:
+  static constexpr Duration kPeriod = std::chrono::milliseconds(200);
+  /// A writer whose client is gone is shown for so long after its last post.
+  static constexpr Duration kKept = std::chrono::minutes(1);
+
+  WriterWatch() = default;
+  WriterWatch(std::string host, std::uint64_t epoch, StatusTable<plc_WriterStatus> table)
+      : host_(std::move(host)), epoch_(epoch), table_(std::move(table)) {}
+
+  /// Looks if it is time to. Returns true if something has changed.
+  bool look(const EventIntake& intake, const SessionTable& sessions, TimePoint now);
+  [[nodiscard]] std::uint32_t size() const noexcept { return table_.size(); }
+
+ private:
+  std::string host_;
+  std::uint64_t epoch_ = 0;
+  StatusTable<plc_WriterStatus> table_;
+  Duration to_unix_{unix_time_ns() - MonotonicClock::now().time_since_epoch().count()};
+  TimePoint next_look_;
+};
+
+}  // namespace plchost

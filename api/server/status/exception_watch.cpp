@@ -1,0 +1,79 @@
+#include "api/server/status/exception_watch.hpp"
+
+#include <algorithm>
+
+#include <sys/stat.h>
+
+#include "api/dds/text.hpp"
+#include "shm/base/log.hpp"
+
+namespace plchost {
+
+bool ExceptionWatch::follow(const InstanceStatus& instance, const TaskWatch& tasks, TimePoint now) {
+  const std::string name(instance.name.view());
+  Watched& watched = instances_[name];
+  watched.followed = true;
+  const bool changed = watched.pid != instance.pid || watched.state != instance.state;
+  if (changed || now >= watched.next_look) {
+    watched.pid = instance.pid;
+    watched.state = instance.state;
+    watched.next_look = now + kPeriod;
+    look(watched, name);
+    watched.sample.present = watched.sample.count > 0 && watched.pid != 0 &&
+                             tasks.in_exception(name, dds::text_of(watched.sample.task));
+  }
+  return table_.update(name, watched.sample);
+}
+
+bool ExceptionWatch::end_round() {
+  std::erase_if(instances_, [](const auto& entry) { return !entry.second.followed; });
+  for (auto& [name, watched] : instances_) watched.followed = false;
+  const bool changed = table_.dispose_rest();
+  table_.write();
+  return changed;
+}
+
+ExceptionWatch::Version ExceptionWatch::version_of(const std::string& path) {
+  struct stat status{};
+  if (::stat(path.c_str(), &status) != 0) return {};
+  constexpr std::int64_t kPerSecond = 1'000'000'000;
+  return {.inode = status.st_ino,
+          .size = status.st_size,
+          .changed_ns = status.st_mtim.tv_sec * kPerSecond + status.st_mtim.tv_nsec};
+}
+
+void ExceptionWatch::look(Watched& watched, const std::string& name) {
+  const std::string path = exception_path(run_directory_, name);
+  // Before it is read: a file that is replaced meanwhile is another version at the next look.
+  const Version version = version_of(path);
+  const bool is_new = dds::text_of(watched.sample.instance).empty();
+  if (!is_new && version == watched.version) return;
+  watched.version = version;
+  dds::copy_text(watched.sample.host, host_);
+  dds::copy_text(watched.sample.instance, name);
+  watched.sample.epoch = epoch_;
+  const auto history = read_exceptions(path);
+  if (history) {
+    show(watched.sample, *history);
+  } else {
+    spdlog::warn("the exceptions of instance '{}' cannot be read, what was known is shown: {}", name,
+                 history.error().describe());
+  }
+}
+
+void ExceptionWatch::show(plc_ExceptionStatus& sample, const ExceptionHistory& history) const {
+  const ExceptionEntry last = history.entries.empty() ? ExceptionEntry{} : history.entries.back();
+  sample.count = std::max<std::uint64_t>(history.count, history.entries.size());
+  sample.whole_application = !history.entries.empty() && last.whole_application;
+  sample.time_unix_ns = last.unix_ns;
+  dds::copy_text(sample.task, last.task);
+  dds::copy_text(sample.kind, last.kind);
+  dds::copy_text(sample.signal, last.signal);
+  sample.address = last.address;
+  dds::copy_text(sample.symbol, last.symbol);
+  sample.memory_address = last.memory_address;
+  dds::copy_text(sample.text, last.text);
+  dds::copy_text(sample.application, last.application);
+}
+
+}  // namespace plchost

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <utility>
+
+#include <control.h>
+#include <sys/types.h>
+
+#include "api/server/status/status_table.hpp"
+#include "api/server/status/task_watch.hpp"
+#include "shm/base/exception_history.hpp"
+#include "shm/base/time.hpp"
+#include "shm/pool/host_page.hpp"
+
+namespace plchost {
+
+/// Shows the last exception of each instance, from the file in which the instance keeps them. Control loop
+/// only.
+class ExceptionWatch {
+ public:
+  /// A file is looked at so often, and at once when its instance has changed; read when it is another one.
+  static constexpr Duration kPeriod = std::chrono::milliseconds(100);
+
+  ExceptionWatch(std::string run_directory, std::string host, std::uint64_t epoch,
+                 StatusTable<plc_ExceptionStatus> table)
+      : run_directory_(std::move(run_directory)),
+        host_(std::move(host)),
+        epoch_(epoch),
+        table_(std::move(table)) {}
+
+  /// A round: follow() for each instance that the manager has; end_round() disposes what is left of others
+  /// and writes what is news. All return true if something changed. `tasks` follows the same instance
+  /// already.
+  void begin_round() { table_.begin_round(); }
+  bool follow(const InstanceStatus& instance, const TaskWatch& tasks, TimePoint now);
+  bool end_round();
+
+ private:
+  /// Tells one version of a file from another: it is replaced as a whole.
+  struct Version {
+    ino_t inode = 0;  // 0: no file
+    off_t size = 0;
+    std::int64_t changed_ns = 0;
+    bool operator==(const Version&) const = default;
+  };
+  struct Watched {
+    std::int32_t pid = 0;
+    InstanceState state = InstanceState::offline;
+    TimePoint next_look;
+    Version version;
+    plc_ExceptionStatus sample{};
+    bool followed = true;  // in this round
+  };
+  [[nodiscard]] static Version version_of(const std::string& path);
+  void look(Watched& watched, const std::string& name);
+  void show(plc_ExceptionStatus& sample, const ExceptionHistory& history) const;
+
+  std::string run_directory_;
+  std::string host_;
+  std::uint64_t epoch_;
+  StatusTable<plc_ExceptionStatus> table_;
+  std::map<std::string, Watched> instances_;
+};
+
+}  // namespace plchost

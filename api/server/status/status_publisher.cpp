@@ -1,0 +1,247 @@
+#include "api/server/status/status_publisher.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include <unistd.h>
+
+#include "api/dds/entries.hpp"
+#include "api/dds/text.hpp"
+#include "api/server/status/instance_extension.hpp"
+
+namespace plchost {
+
+Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const Source& source) {
+  std::vector<dds::Entity> topics;
+  const auto make = [&](const dds::TopicInfo& info, const dds::Qos& qos) -> Result<dds::Entity> {
+    auto topic = dds::make_topic(participant, info);
+    if (!topic) return std::unexpected(topic.error());
+    topics.push_back(std::move(*topic));
+    return dds::make_writer(participant, topics.back().get(), qos);
+  };
+  auto tasks = make(dds::kTaskStatus, dds::status_qos());
+  auto statistics = make(dds::kTaskStatistics, dds::status_qos());
+  auto instances = make(dds::kInstanceStatus, dds::status_qos());
+  auto events = make(dds::kEventStatus, dds::status_qos());
+  auto objects = make(dds::kObjectStatus, dds::status_qos());
+  auto findings = make(dds::kHostFinding, dds::status_qos());
+  auto exceptions = make(dds::kExceptionStatus, dds::status_qos());
+  auto hosts = make(dds::kHostStatus, dds::status_qos());
+  auto writers = make(dds::kWriterStatus, dds::status_qos());
+  auto presence = make(dds::kPresence, dds::presence_qos());
+  for (auto* made : {&tasks, &statistics, &instances, &events, &objects, &findings, &exceptions, &hosts,
+                     &writers, &presence}) {
+    if (!*made) return failure_in("publish status", made->error());
+  }
+  auto transitions =
+      TransitionPublisher::create(participant, {source.host, source.pool->name(), source.epoch});
+  if (!transitions) return std::unexpected(transitions.error());
+  StatusPublisher publisher(source,
+                            TaskWatch(source.pool->name(), source.host, source.epoch,
+                                      StatusTable<plc_TaskStatus>(std::move(*tasks)),
+                                      StatisticsWriter(source.host, source.epoch, std::move(*statistics))),
+                            ExceptionWatch(source.run_directory, source.host, source.epoch,
+                                           StatusTable<plc_ExceptionStatus>(std::move(*exceptions))),
+                            *std::move(transitions));
+  publisher.instances_ = StatusTable<plc_InstanceStatus>(std::move(*instances));
+  publisher.events_ = StatusTable<plc_EventStatus>(std::move(*events));
+  publisher.objects_ = StatusTable<plc_ObjectStatus>(std::move(*objects));
+  publisher.findings_ = StatusTable<plc_HostFinding>(std::move(*findings));
+  publisher.hosts_ = StatusTable<plc_HostStatus>(std::move(*hosts));
+  publisher.writers_ =
+      WriterWatch(source.host, source.epoch, StatusTable<plc_WriterStatus>(std::move(*writers)));
+  publisher.presence_ = std::move(*presence);
+  publisher.topics_ = std::move(topics);
+  return publisher;
+}
+
+void StatusPublisher::tick(TimePoint now) {
+  bool changed = std::exchange(writers_changed_, false);
+  changed |= look_at_instances(now);
+  if (now >= next_objects_) changed |= look_at_objects(now);
+  tasks_.look(now);
+  findings_.write();
+  write_host(changed);
+}
+
+void StatusPublisher::look_at_writers(const EventIntake& intake, const SessionTable& sessions,
+                                      TimePoint now) {
+  writers_changed_ |= writers_.look(intake, sessions, now);
+}
+
+void StatusPublisher::flush(const std::string& instance, TimePoint now) {
+  bool changed = look_at_instances(now);
+  changed |= look_at_objects(now);
+  tasks_.look_at(instance, now);
+  write_host(changed);
+}
+
+bool StatusPublisher::look_at_instances(TimePoint now) {
+  if (!page_) {
+    auto opened = HostPageReader::open(source_.pool->name());
+    if (!opened) return false;
+    page_ = std::move(*opened);
+  }
+  const auto host = page_->host();
+  if (page_->lost()) {  // the manager makes it anew
+    page_.reset();
+    return false;
+  }
+  if (!host) return false;
+  bool changed = false;
+  instances_.begin_round();
+  exceptions_.begin_round();
+  std::vector<std::string> names;
+  for (std::uint32_t i = 0; i < std::min(host->instance_count, kMaxInstances); ++i) {
+    const auto status = page_->instance(i);
+    if (!status || status->name.view().empty()) continue;
+    const std::string name(status->name.view());
+    names.push_back(name);
+    changed |= tasks_.follow(*status, now);
+    changed |= exceptions_.follow(*status, tasks_, now);
+    plc_InstanceStatus sample{};
+    dds::copy_text(sample.host, source_.host);
+    dds::copy_text(sample.instance, name);
+    sample.epoch = source_.epoch;
+    sample.state = static_cast<std::uint32_t>(status->state);
+    sample.pid = status->pid;
+    sample.core = status->core;
+    sample.restarts = status->restarts;
+    sample.state_since_unix_ns = status->state_since_unix_ns;
+    // The process knows best what it runs; the manager knows what it will run.
+    const auto runtime = tasks_.runtime(name);
+    const bool says = runtime && !runtime->scheduler.view().empty();
+    dds::copy_text(sample.scheduler, says ? runtime->scheduler.view() : status->scheduler.view());
+    dds::copy_text(sample.application, status->application.view());
+    dds::copy_text(sample.problem, status->problem.view());
+    auto extension = runtime ? extension_of(*runtime) : std::vector<plc_KeyValue>();
+    extension.push_back(transitions_entry(transitions_.publish(name, now)));
+    changed |= instances_.update(name, sample, extension);
+  }
+  changed |= instances_.dispose_rest();
+  changed |= exceptions_.end_round();
+  for (const std::string& gone : instance_names_) {
+    if (std::ranges::find(names, gone) == names.end()) changed |= tasks_.forget(gone);
+  }
+  instance_names_ = std::move(names);
+  instances_.write();
+  return changed;
+}
+
+// A topic with a sample for each of 100,000 objects would drown every client; see OPERATION_LIST_OBJECTS.
+Result<std::vector<ObjectInfo>> StatusPublisher::published_objects() const {
+  auto listed = source_.pool->list();
+  if (!listed || listed->size() <= kMostPublished) return listed;
+  std::vector<ObjectInfo>& objects = *listed;
+  const auto order = [](const ObjectInfo& object) {
+    return std::pair(!object.registered && object.bound_tasks == 0, std::string_view(object.name));
+  };
+  std::ranges::nth_element(objects, objects.begin() + kMostPublished, {}, order);
+  objects.resize(kMostPublished);
+  return listed;
+}
+
+bool StatusPublisher::look_at_objects(TimePoint now) {
+  bool changed = false;
+  const auto published = published_objects();
+  if (!published) return changed;  // what was told last holds until they can be looked at
+  events_.begin_round();
+  objects_.begin_round();
+  for (const ObjectInfo& object : *published) {
+    plc_ObjectStatus sample{};
+    dds::copy_text(sample.host, source_.host);
+    dds::copy_text(sample.object_name, object.name);
+    sample.epoch = source_.epoch;
+    sample.type = static_cast<std::uint32_t>(object.type);
+    sample.value = object.value;
+    changed |= objects_.update(object.name, sample);
+    if (object.type == ObjectType::event) changed |= update_event(object);
+  }
+  changed |= events_.dispose_rest();
+  changed |= objects_.dispose_rest();
+  events_.write();
+  objects_.write();
+  // Of a large pool it takes its time: most of the time is for others.
+  constexpr int kRest = 10;
+  next_objects_ = std::max(now + kObjectPeriod, now + kRest * (MonotonicClock::now() - now));
+  return changed;
+}
+
+bool StatusPublisher::update_event(const ObjectInfo& object) {
+  const auto slash = object.name.find('/');
+  if (slash == std::string::npos) return false;
+  const std::string_view name(object.name);
+  plc_EventStatus sample{};
+  dds::copy_text(sample.host, source_.host);
+  dds::copy_text(sample.instance, name.substr(0, slash));
+  dds::copy_text(sample.event, name.substr(slash + 1));
+  sample.epoch = source_.epoch;
+  sample.registered = object.registered;
+  sample.bound_tasks = object.bound_tasks;
+  sample.posts = object.value;
+  return events_.update(object.name, sample);
+}
+
+void StatusPublisher::publish_findings(const std::vector<HostFinding>& findings) {
+  findings_.begin_round();
+  for (std::size_t i = 0; i < findings.size(); ++i) {
+    const HostFinding& finding = findings[i];
+    plc_HostFinding sample{};
+    dds::copy_text(sample.host, source_.host);
+    dds::copy_text(sample.id, finding.id);
+    sample.epoch = source_.epoch;
+    sample.round = round_ + 1;
+    sample.finding_count = static_cast<std::uint32_t>(findings.size());
+    sample.position = static_cast<std::uint32_t>(i);
+    sample.level = static_cast<std::uint32_t>(finding.level);
+    dds::copy_text(sample.subject, finding.subject);
+    dds::copy_text(sample.found, finding.found);
+    dds::copy_text(sample.why, finding.why);
+    dds::copy_text(sample.advice, finding.advice);
+    (void)findings_.update(finding.id, sample);
+  }
+  (void)findings_.dispose_rest();
+  findings_.write();
+  write_host(true);
+}
+
+void StatusPublisher::write_host(bool changed) {
+  const auto host = page_ ? page_->host() : std::nullopt;
+  if (changed || round_ == 0) ++round_;
+  plc_HostStatus sample{};
+  dds::copy_text(sample.host, source_.host);
+  sample.epoch = source_.epoch;
+  sample.round = round_;
+  sample.instance_count = instances_.size();
+  sample.task_count = tasks_.size();
+  sample.event_count = events_.size();
+  sample.object_count = objects_.size();
+  sample.writer_count = writers_.size();
+  if (host) {
+    dds::copy_text(sample.version, host->version.view());
+    sample.manager_pid = host->manager_pid;
+    sample.started_unix_ns = host->started_unix_ns;
+  }
+  std::vector<plc_KeyValue> ext;
+  dds::add_entry(ext, dds::kLabelsEntry, source_.labels);
+  if (!audit_head_.empty()) dds::add_entry(ext, "audit", audit_head_);
+  (void)hosts_.update(source_.host, sample, ext);
+  hosts_.write();
+}
+
+void StatusPublisher::set_audit_head(std::string head) {
+  if (head == audit_head_) return;
+  audit_head_ = std::move(head);
+  write_host(true);
+}
+
+void StatusPublisher::write_presence() {
+  plc_Presence sample{};
+  dds::copy_text(sample.host, source_.host);
+  sample.epoch = source_.epoch;
+  sample.pid = ::getpid();
+  sample.api_version = dds::kApiVersion;
+  (void)dds_write(presence_.get(), &sample);
+}
+
+}  // namespace plchost

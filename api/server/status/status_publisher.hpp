@@ -1,0 +1,93 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <control.h>
+
+#include "api/control/host_finding.hpp"
+#include "api/dds/topics.hpp"
+#include "api/server/posts/writer_watch.hpp"
+#include "api/server/status/exception_watch.hpp"
+#include "api/server/status/status_table.hpp"
+#include "api/server/status/task_watch.hpp"
+#include "api/server/status/transition_publisher.hpp"
+#include "shm/pool/host_page.hpp"
+#include "shm/pool/object_pool.hpp"
+
+namespace plchost {
+
+/// Shows the pool's pages as status topics: written when something changed, disposed when it is gone. And
+/// each change of state of an instance, before the status that tells how many there were. Control loop only.
+class StatusPublisher {
+ public:
+  struct Source {
+    std::string host;
+    const ObjectPool* pool = nullptr;
+    std::uint64_t epoch = 0;
+    std::string run_directory;
+    std::string labels;  ///< with commas between
+  };
+  [[nodiscard]] static Result<StatusPublisher> create(dds_entity_t participant, const Source& source);
+
+  /// Writes what is due; to be called every kTick.
+  void tick(TimePoint now);
+  /// Writes all that concerns an instance at once: before the answer to a command that changed it.
+  void flush(const std::string& instance, TimePoint now);
+  void write_presence();
+  /// What became of each client's posts, if it is time to look at that. Comes before tick().
+  void look_at_writers(const EventIntake& intake, const SessionTable& sessions, TimePoint now);
+  /// All findings of one check of the host, in place of those of the one before.
+  void publish_findings(const std::vector<HostFinding>& findings);
+
+  /// For who wants to know later that nothing was cut off the audit log.
+  void set_audit_head(std::string head);
+
+  [[nodiscard]] const TaskWatch& tasks() const noexcept { return tasks_; }
+  /// HostStatus.round as last written.
+  [[nodiscard]] std::uint64_t round() const noexcept { return round_; }
+  /// The instances that the manager has at present.
+  [[nodiscard]] const std::vector<std::string>& instances() const noexcept { return instance_names_; }
+
+  static constexpr Duration kTick = std::chrono::milliseconds(10);
+  /// Events and objects are looked at so often.
+  static constexpr Duration kObjectPeriod = std::chrono::milliseconds(200);
+  /// Of a larger pool as many are published: those first that are events in use, then by name.
+  static constexpr std::size_t kMostPublished = 4096;
+
+ private:
+  StatusPublisher(Source source, TaskWatch tasks, ExceptionWatch exceptions, TransitionPublisher transitions)
+      : source_(std::move(source)),
+        tasks_(std::move(tasks)),
+        exceptions_(std::move(exceptions)),
+        transitions_(std::move(transitions)) {}
+  bool look_at_instances(TimePoint now);
+  bool look_at_objects(TimePoint now);
+  bool update_event(const ObjectInfo& object);
+  [[nodiscard]] Result<std::vector<ObjectInfo>> published_objects() const;
+  void write_host(bool changed);
+
+  Source source_;
+  std::string audit_head_;
+  TaskWatch tasks_;
+  ExceptionWatch exceptions_;
+  TransitionPublisher transitions_;
+  std::optional<HostPageReader> page_;
+  std::vector<std::string> instance_names_;
+  StatusTable<plc_InstanceStatus> instances_;
+  StatusTable<plc_EventStatus> events_;
+  StatusTable<plc_ObjectStatus> objects_;
+  StatusTable<plc_HostFinding> findings_;
+  StatusTable<plc_HostStatus> hosts_;
+  WriterWatch writers_;
+  bool writers_changed_ = false;
+  dds::Entity presence_;
+  std::vector<dds::Entity> topics_;
+  TimePoint next_objects_;
+  std::uint64_t round_ = 0;
+};
+
+}  // namespace plchost
