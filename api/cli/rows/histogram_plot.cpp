@@ -14,10 +14,10 @@ namespace plchost {
 
 namespace {
 
-constexpr HistogramShape kBars = HistogramShape::bars();
+constexpr HistogramShape kPlotBars = HistogramShape::bars();
 constexpr std::size_t kHeight = 8;
 constexpr std::size_t kMargin = 10;  // of the shares
-constexpr std::size_t kLeastWidth = 16;
+constexpr std::size_t kLeastPlotWidth = 16;
 constexpr std::size_t kWidestColumn = 2;
 constexpr std::array<std::string_view, 9> kEighths{" ", "▁", "▂", "▃", "▄", "▅", "▆", "▇", "█"};
 
@@ -36,15 +36,15 @@ struct Range {
 
 Range range_of(const HistogramReport& histogram) {
   if (histogram.bars.empty()) return {};
-  return {kBars.index_of(Duration(histogram.bars.front().lower_ns)),
-          kBars.index_of(Duration(histogram.bars.back().lower_ns)) + 1};
+  return {kPlotBars.index_of(Duration(histogram.bars.front().lower_ns)),
+          kPlotBars.index_of(Duration(histogram.bars.back().lower_ns)) + 1};
 }
 
 /// The power of ten in bars [begin, end); 0: none.
 std::int64_t decade_in(std::size_t begin, std::size_t end) {
   constexpr std::int64_t kLast = 1'000'000'000;
   for (std::int64_t decade = 1; decade <= kLast; decade *= 10) {
-    const std::size_t index = kBars.index_of(Duration(decade));
+    const std::size_t index = kPlotBars.index_of(Duration(decade));
     if (index >= begin && index < end) return decade;
   }
   return 0;
@@ -60,7 +60,7 @@ std::string decade_name(std::int64_t decade) {
 std::vector<PlotColumn> columns_of(const HistogramReport& histogram, Range range, std::size_t bars_each) {
   std::vector<PlotColumn> columns((range.size() + bars_each - 1) / bars_each);
   for (const auto& bar : histogram.bars) {
-    const std::size_t index = kBars.index_of(Duration(bar.lower_ns));
+    const std::size_t index = kPlotBars.index_of(Duration(bar.lower_ns));
     // What comes from the network may be in any order.
     if (index >= range.begin && index < range.end)
       columns[(index - range.begin) / bars_each].count += bar.count;
@@ -72,7 +72,7 @@ std::vector<PlotColumn> columns_of(const HistogramReport& histogram, Range range
     }
   }
   if (!columns.empty() && columns.front().label.empty()) {
-    columns.front().label = short_duration(kBars.lower_edge(range.begin).count());
+    columns.front().label = short_duration(kPlotBars.lower_edge(range.begin).count());
   }
   return columns;
 }
@@ -107,7 +107,7 @@ std::string labels_of(const std::vector<PlotColumn>& columns, std::size_t column
 
 std::string draw(const std::vector<PlotColumn>& columns, std::uint64_t total, PlotStyle style) {
   const std::uint64_t highest = std::ranges::max(columns, {}, &PlotColumn::count).count;
-  const std::size_t room = std::max(style.width, kMargin + kLeastWidth) - kMargin;
+  const std::size_t room = std::max(style.width, kMargin + kLeastPlotWidth) - kMargin;
   const std::size_t column_width = std::clamp<std::size_t>(room / columns.size(), 1, kWidestColumn);
   const std::string_view side = style.unicode ? "│" : "|";
   std::string text;
@@ -125,7 +125,7 @@ std::string draw(const std::vector<PlotColumn>& columns, std::uint64_t total, Pl
 
 /// How many bars go into one column, so that `bars` of them fit.
 std::size_t bars_each(std::size_t bars, PlotStyle style) {
-  const std::size_t room = std::max(style.width, kMargin + kLeastWidth) - kMargin - 2;
+  const std::size_t room = std::max(style.width, kMargin + kLeastPlotWidth) - kMargin - 2;
   return (bars + room - 1) / room;
 }
 
