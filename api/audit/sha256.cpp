@@ -1,7 +1,6 @@
 #include "api/audit/sha256.hpp"
 
 #include <array>
-#include <iterator>
 
 #include <fmt/format.h>
 #include <openssl/sha.h>
@@ -11,9 +10,7 @@ namespace plchost {
 std::string sha256(std::string_view text) {
   std::array<unsigned char, SHA256_DIGEST_LENGTH> digest{};
   ::SHA256(reinterpret_cast<const unsigned char*>(text.data()), text.size(), digest.data());
-  std::string hex;
-  for (const unsigned char byte : digest) fmt::format_to(std::back_inserter(hex), "{:02x}", byte);
-  return hex;
+  return fmt::format("{:02x}", fmt::join(digest, ""));
 }
 
 }  // namespace plchost

@@ -7,30 +7,11 @@
 #include <fmt/format.h>
 
 #include "api/security/identity.hpp"
+#include "api/security/xml_text.hpp"
 
 namespace plchost::dds {
 
 namespace {
-
-std::string escaped(std::string_view text) {
-  std::string made;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        made += "&amp;";
-        break;
-      case '<':
-        made += "&lt;";
-        break;
-      case '>':
-        made += "&gt;";
-        break;
-      default:
-        made += c;
-    }
-  }
-  return made;
-}
 
 // A plugin by its bare name: the system's, wherever its package has put it.
 std::string library(std::string_view plugin, std::string_view functions) {
@@ -53,7 +34,7 @@ Result<std::string> security_section(const std::string& folder) {
                                folder.substr(0, 100)));
   }
   const auto file = [&](std::string_view element, std::string_view name) {
-    return fmt::format("<{0}>file:{1}</{0}>", element, escaped(security::file_in(path, name)));
+    return fmt::format("<{0}>file:{1}</{0}>", element, security::escaped(security::file_in(path, name)));
   };
   return fmt::format(
       "<Security><Authentication>{}{}{}{}{}</Authentication><AccessControl>{}{}{}{}</AccessControl>"

@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "api/security/xml_text.hpp"
+
 namespace plchost::security {
 
 namespace {
@@ -74,26 +76,6 @@ std::string criteria(std::string_view what, const std::vector<Grant>& grants) {
     text += fmt::format("</{}>\n", what);
   }
   return text;
-}
-
-std::string escaped(std::string_view text) {
-  std::string made;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        made += "&amp;";
-        break;
-      case '<':
-        made += "&lt;";
-        break;
-      case '>':
-        made += "&gt;";
-        break;
-      default:
-        made += c;
-    }
-  }
-  return made;
 }
 
 std::string time_text(std::time_t time) {
