@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "api/dds/log_sink.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
 
@@ -13,6 +14,7 @@ namespace plchost {
 
 Result<ControlClient*> CliSession::client() {
   if (!client_) {
+    dds::install_log_sink();
     auto connected = ControlClient::connect(options.dds);
     if (!connected) return std::unexpected(connected.error());
     client_ = std::move(*connected);

@@ -9,7 +9,6 @@
 #include "api/dds/claim.hpp"
 #include "api/dds/entries.hpp"
 #include "api/dds/error.hpp"
-#include "api/dds/log_sink.hpp"
 #include "api/dds/samples.hpp"
 #include "shm/base/names.hpp"
 
@@ -49,7 +48,6 @@ Result<std::unique_ptr<ControlClient>> ControlClient::connect(const dds::DomainO
 }
 
 Result<void> ControlClient::open(const dds::DomainOptions& options) {
-  dds::install_log_sink();
   auto domain = dds::open_domain(dds::Role::client, options);
   if (!domain) return std::unexpected(domain.error());
   domain_ = std::move(*domain);

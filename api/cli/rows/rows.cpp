@@ -1,6 +1,5 @@
 #include "api/cli/rows/rows.hpp"
 
-#include <array>
 #include <cstdint>
 #include <ctime>
 #include <span>
@@ -9,6 +8,7 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include "api/dds/code_names.hpp"
 #include "api/dds/text.hpp"
 
 namespace plchost {
@@ -16,23 +16,6 @@ namespace plchost {
 using dds::text_of;
 
 namespace {
-
-constexpr std::array kInstanceStates{
-    std::string_view("offline"),   std::string_view("starting"), std::string_view("running"),
-    std::string_view("stopped"),   std::string_view("stopping"), std::string_view("waiting"),
-    std::string_view("safe_mode"), std::string_view("failed"),   std::string_view("exception")};
-constexpr std::array kApplicationStates{std::string_view("none"),     std::string_view("stopped"),
-                                        std::string_view("running"),  std::string_view("single_cycle"),
-                                        std::string_view("stopping"), std::string_view("exception")};
-constexpr std::array kTaskKinds{std::string_view("cyclic"), std::string_view("event"),
-                                std::string_view("external"), std::string_view("freewheeling")};
-constexpr std::array kTaskStates{std::string_view("created"), std::string_view("running"),
-                                 std::string_view("stopped"), std::string_view("exception")};
-
-// A newer host may know more: its number is shown.
-std::string name_of(std::span<const std::string_view> names, std::uint32_t number) {
-  return number < names.size() ? std::string(names[number]) : fmt::format("{}", number);
-}
 
 // What the host tells beyond the fields that this program knows. A name that is taken stays what it is.
 void add_extension(Row& row, std::span<const plc_KeyValue> entries) {
@@ -73,7 +56,7 @@ Row to_row(const HostView& host) {
 Row to_row(const plc_InstanceStatus& status) {
   Row row{{"host", text_of(status.host)},
           {"name", text_of(status.instance)},
-          {"state", name_of(kInstanceStates, status.state)},
+          {"state", dds::instance_state_name(status.state)},
           {"pid", status.pid},
           {"core", status.core},
           {"scheduler", text_of(status.scheduler)},
@@ -89,10 +72,10 @@ Row to_row(const plc_TaskStatus& status) {
   return {{"host", text_of(status.host)},
           {"instance", text_of(status.instance)},
           {"task", text_of(status.task)},
-          {"kind", name_of(kTaskKinds, status.kind)},
+          {"kind", dds::task_kind_name(status.kind)},
           {"priority", status.priority},
           {"interval_us", to_us(status.interval_ns)},
-          {"state", name_of(kTaskStates, status.state)},
+          {"state", dds::task_state_name(status.state)},
           {"cycles", status.cycles},
           {"lost_cycles", status.lost_cycles},
           {"lost_events", status.lost_events},
@@ -115,13 +98,16 @@ Row to_row(const plc_EventStatus& status) {
 
 Row to_row(const plc_Transition& transition) {
   const bool process = transition.source != 0;
-  const std::span<const std::string_view> names =
-      process ? std::span<const std::string_view>(kInstanceStates) : kApplicationStates;
-  return {{"host", text_of(transition.host)},          {"instance", text_of(transition.instance)},
-          {"sequence", transition.sequence_number},    {"time", time_text(transition.time_unix_ns)},
-          {"of", process ? "process" : "application"}, {"from", name_of(names, transition.from_state)},
-          {"to", name_of(names, transition.to_state)}, {"pid", transition.pid},
-          {"time_unix_ns", transition.time_unix_ns},   {"time_monotonic_ns", transition.time_monotonic_ns},
+  return {{"host", text_of(transition.host)},
+          {"instance", text_of(transition.instance)},
+          {"sequence", transition.sequence_number},
+          {"time", time_text(transition.time_unix_ns)},
+          {"of", process ? "process" : "application"},
+          {"from", dds::transition_state_name(transition.source, transition.from_state)},
+          {"to", dds::transition_state_name(transition.source, transition.to_state)},
+          {"pid", transition.pid},
+          {"time_unix_ns", transition.time_unix_ns},
+          {"time_monotonic_ns", transition.time_monotonic_ns},
           {"reason", text_of(transition.reason)}};
 }
 

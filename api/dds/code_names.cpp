@@ -1,0 +1,45 @@
+#include "api/dds/code_names.hpp"
+
+#include <array>
+#include <span>
+#include <string_view>
+
+namespace plchost::dds {
+
+namespace {
+
+constexpr std::array kInstanceStates{
+    std::string_view("offline"),   std::string_view("starting"), std::string_view("running"),
+    std::string_view("stopped"),   std::string_view("stopping"), std::string_view("waiting"),
+    std::string_view("safe_mode"), std::string_view("failed"),   std::string_view("exception")};
+constexpr std::array kApplicationStates{std::string_view("none"),     std::string_view("stopped"),
+                                        std::string_view("running"),  std::string_view("single_cycle"),
+                                        std::string_view("stopping"), std::string_view("exception")};
+constexpr std::array kTaskKinds{std::string_view("cyclic"), std::string_view("event"),
+                                std::string_view("external"), std::string_view("freewheeling")};
+constexpr std::array kTaskStates{std::string_view("created"), std::string_view("running"),
+                                 std::string_view("stopped"), std::string_view("exception")};
+
+std::string code_name(std::span<const std::string_view> names, std::uint32_t number) {
+  return number < names.size() ? std::string(names[number]) : std::to_string(number);
+}
+
+}  // namespace
+
+std::string instance_state_name(std::uint32_t state) {
+  return code_name(kInstanceStates, state);
+}
+
+std::string transition_state_name(std::uint32_t source, std::uint32_t state) {
+  return source == 0 ? code_name(kApplicationStates, state) : instance_state_name(state);
+}
+
+std::string task_kind_name(std::uint32_t kind) {
+  return code_name(kTaskKinds, kind);
+}
+
+std::string task_state_name(std::uint32_t state) {
+  return code_name(kTaskStates, state);
+}
+
+}  // namespace plchost::dds

@@ -1,0 +1,204 @@
+// The calls of a Client.
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "api/library/convert.hpp"
+#include "api/library/watcher.hpp"
+#include "api/library/worker.hpp"
+#include "shm/base/names.hpp"
+
+namespace plchost {
+
+namespace {
+
+template <class T>
+T value_or_throw(Result<T> result) {
+  if (!result) throw_client_error(result.error());
+  return *std::move(result);
+}
+
+Result<EventId> event_of(const std::string& name) {
+  const auto slash = name.find('/');
+  if (slash == std::string::npos || slash == 0 || slash + 1 == name.size()) {
+    return failure(ErrorCode::invalid_argument, fmt::format("'{}' is not of the form INSTANCE/EVENT", name));
+  }
+  return EventId{name.substr(0, slash), name.substr(slash + 1)};
+}
+
+/// That host, once it answers; no name: the only one.
+Result<std::string> host_of(ControlClient& client, const std::string& name, TimePoint deadline) {
+  if (!name.empty()) {
+    auto found = client.host(name, deadline);
+    if (!found) return std::unexpected(std::move(found).error());
+    return std::move(found->name);
+  }
+  const auto all = client.hosts(deadline);
+  if (all.size() == 1) return all.front().name;
+  if (all.empty()) return failure(ErrorCode::unavailable, "no host answers");
+  std::vector<std::string_view> names;
+  for (const HostView& host : all) names.emplace_back(host.name);
+  return failure(ErrorCode::invalid_argument,
+                 fmt::format("several hosts answer, and none was named: {}", join_names(names)));
+}
+
+template <class Item, class Sample>
+Result<std::vector<Item>> list(ControlClient& client, const std::string& name, TimePoint deadline,
+                               Result<std::vector<Sample>> (ControlClient::*look)(const std::string&,
+                                                                                  TimePoint)) {
+  const auto host = host_of(client, name, deadline);
+  if (!host) return std::unexpected(host.error());
+  const auto samples = (client.*look)(*host, deadline);
+  if (!samples) return std::unexpected(samples.error());
+  std::vector<Item> items;
+  for (const Sample& sample : *samples) items.push_back(to_public(sample));
+  return items;
+}
+
+Result<PostReport> post_to(ControlClient& client, const std::string& name, const std::string& event,
+                           std::uint64_t count, Duration timeout) {
+  auto id = event_of(event);
+  if (!id) return std::unexpected(std::move(id).error());
+  const auto host = host_of(client, name, MonotonicClock::now() + timeout);
+  if (!host) return std::unexpected(host.error());
+  return client.post_event({*host, 0, std::move(id->instance), std::move(id->event)}, count, Duration{},
+                           timeout);
+}
+
+Client::Outcome outcome_of(const Result<PostReport>& report) {
+  if (report) return to_public(*report);
+  return {.code = static_cast<int>(report.error().code), .text = report.error().describe(), .posted = {}};
+}
+
+Client::Posted posted_or_throw(const Client::Outcome& outcome) {
+  if (!outcome) throw ClientError(outcome.code, outcome.text);
+  return outcome.posted;
+}
+
+}  // namespace
+
+ClientError::~ClientError() = default;
+
+Client::Client() : Client(Options{}) {}
+Client::Client(const Options& options)
+    : worker_(std::make_unique<Worker>(options)), watcher_(std::make_unique<Watcher>(options)) {}
+Client::~Client() = default;
+
+std::vector<Client::Host> Client::hosts() {
+  return value_or_throw(worker_->run<std::vector<Host>>([this](ControlClient& client) {
+    std::vector<Host> hosts;
+    for (const HostView& view : client.hosts(worker_->deadline())) {
+      hosts.push_back(to_public(view, !client.is_silent(view.name)));
+    }
+    return Result<std::vector<Host>>(std::move(hosts));
+  }));
+}
+
+std::vector<Client::Instance> Client::instances(const std::string& host) {
+  return value_or_throw(worker_->run<std::vector<Instance>>([&](ControlClient& client) {
+    return list<Instance>(client, host, worker_->deadline(), &ControlClient::instances);
+  }));
+}
+
+std::vector<Client::Task> Client::tasks(const std::string& host) {
+  return value_or_throw(worker_->run<std::vector<Task>>([&](ControlClient& client) {
+    return list<Task>(client, host, worker_->deadline(), &ControlClient::tasks);
+  }));
+}
+
+std::vector<Client::Event> Client::events(const std::string& host) {
+  return value_or_throw(worker_->run<std::vector<Event>>([&](ControlClient& client) {
+    return list<Event>(client, host, worker_->deadline(), &ControlClient::events);
+  }));
+}
+
+Client::Posted Client::post(const std::string& host, const std::string& event, unsigned long long count) {
+  return posted_or_throw(outcome_of(worker_->run<PostReport>(
+      [&](ControlClient& client) { return post_to(client, host, event, count, worker_->timeout()); })));
+}
+
+void Client::post(const std::string& host, const std::string& event,
+                  std::function<void(const Outcome&)> done) {
+  worker_->begin([this, host, event, done = std::move(done)](const Result<ControlClient*>& client) {
+    done(outcome_of(client ? post_to(**client, host, event, 1, worker_->timeout())
+                           : Result<PostReport>(std::unexpected(client.error()))));
+  });
+}
+
+Client::Posted Client::post_all(const std::string& host, const std::vector<std::string>& events) {
+  std::vector<EventId> ids;
+  for (const std::string& event : events) ids.push_back(value_or_throw(event_of(event)));
+  return posted_or_throw(
+      outcome_of(worker_->run<PostReport>([&](ControlClient& client) -> Result<PostReport> {
+        const auto found = host_of(client, host, worker_->deadline());
+        if (!found) return std::unexpected(found.error());
+        return client.post_batch(*found, ids, worker_->timeout());
+      })));
+}
+
+Client::Run Client::post_and_wait(const std::string& host, const std::string& event) {
+  auto id = value_or_throw(event_of(event));
+  const auto run = value_or_throw(worker_->run<RunReport>([&](ControlClient& client) -> Result<RunReport> {
+    const auto found = host_of(client, host, worker_->deadline());
+    if (!found) return std::unexpected(found.error());
+    return client.post_and_await({*found, 0, id.instance, id.event}, worker_->timeout());
+  }));
+  return {.tasks = run.tasks,
+          .last_task = run.last_task,
+          .to_start = run.to_start,
+          .to_end = run.to_end,
+          .round_trip = run.round_trip};
+}
+
+std::string Client::command(int operation, const std::string& host, const std::string& instance,
+                            const std::string& argument) {
+  const auto reply = value_or_throw(worker_->run<ApiReply>([&](ControlClient& client) -> Result<ApiReply> {
+    const auto found = host_of(client, host, worker_->deadline());
+    if (!found) return std::unexpected(found.error());
+    return client.call({*found, operation, instance, argument}, worker_->deadline());
+  }));
+  if (reply.code != ErrorCode::ok) throw ClientError(static_cast<int>(reply.code), reply.text);
+  return reply.text;
+}
+
+std::string Client::start(const std::string& host, const std::string& instance) {
+  return command(plc_OPERATION_START, host, instance, {});
+}
+
+std::string Client::stop(const std::string& host, const std::string& instance) {
+  return command(plc_OPERATION_STOP, host, instance, {});
+}
+
+std::string Client::restart(const std::string& host, const std::string& instance) {
+  return command(plc_OPERATION_RESTART, host, instance, {});
+}
+
+std::string Client::reset(const std::string& host, const std::string& instance, bool cold) {
+  return command(cold ? plc_OPERATION_RESET_COLD : plc_OPERATION_RESET, host, instance, {});
+}
+
+std::string Client::single_cycle(const std::string& host, const std::string& instance) {
+  return command(plc_OPERATION_SINGLE_CYCLE, host, instance, {});
+}
+
+std::string Client::load_application(const std::string& host, const std::string& instance,
+                                     const std::string& path) {
+  return command(plc_OPERATION_LOAD_APPLICATION, host, instance, path);
+}
+
+std::string Client::set_scheduler(const std::string& host, const std::string& instance,
+                                  const std::string& scheduler) {
+  return command(plc_OPERATION_SET_SCHEDULER, host, instance, scheduler);
+}
+
+std::string Client::register_event(const std::string& host, const std::string& event) {
+  const auto id = value_or_throw(event_of(event));
+  return command(plc_OPERATION_REGISTER_EVENT, host, id.instance, id.event);
+}
+
+std::string Client::unregister_event(const std::string& host, const std::string& event) {
+  const auto id = value_or_throw(event_of(event));
+  return command(plc_OPERATION_UNREGISTER_EVENT, host, id.instance, id.event);
+}
+
+}  // namespace plchost

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <thread>
+#include <utility>
+
+#include "api/client/control_client.hpp"
+#include "api/dds/domain.hpp"
+#include "api/plchost_client.hpp"
+#include "shm/base/result.hpp"
+
+namespace plchost {
+
+/// A ControlClient that is made when it is first wanted, and again as long as that fails: a network interface
+/// may come later. One thread.
+class Connection {
+ public:
+  explicit Connection(dds::DomainOptions options) : options_(std::move(options)) {}
+  [[nodiscard]] Result<ControlClient*> client();
+
+ private:
+  dds::DomainOptions options_;
+  std::unique_ptr<ControlClient> client_;
+};
+
+[[nodiscard]] dds::DomainOptions domain_options(const Client::Options& options);
+
+/// A thread that takes no signal of the program that it lives in; neither do the threads of DDS that it
+/// makes.
+[[nodiscard]] std::thread quiet_thread(std::function<void()> body);
+
+}  // namespace plchost

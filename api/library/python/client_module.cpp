@@ -1,0 +1,252 @@
+// The client library for Python: module plchost_client. Names are those of plchost_client.hpp; times are
+// floats in seconds, wall-clock times are datetime. Calls let other threads of Python run; callbacks come on
+// a thread of the library.
+#include <exception>
+#include <memory>
+#include <utility>
+
+#include <pybind11/chrono.h>
+#include <pybind11/functional.h>
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include "api/plchost_client.hpp"
+
+namespace py = pybind11;
+using plchost::Client;
+using plchost::ClientError;
+
+namespace {
+
+using NoGil = py::call_guard<py::gil_scoped_release>;
+
+// What waits for a callback when it ends must let that callback have Python.
+struct DeleteWithoutGil {
+  template <class T>
+  void operator()(T* object) const {
+    const py::gil_scoped_release release;
+    delete object;
+  }
+};
+template <class T>
+using Holder = std::unique_ptr<T, DeleteWithoutGil>;
+
+double seconds(std::chrono::nanoseconds duration) {
+  return std::chrono::duration<double>(duration).count();
+}
+
+// What a callback raises cannot go to anyone: Python writes it to stderr, as for threads.
+template <class Item>
+std::function<void(const Item&)> guarded(py::function callback) {
+  // The last reference may go on a thread of the library.
+  const std::shared_ptr<py::function> kept(new py::function(std::move(callback)), [](py::function* function) {
+    const py::gil_scoped_acquire gil;
+    delete function;
+  });
+  return [kept](const Item& item) {
+    const py::gil_scoped_acquire gil;
+    try {
+      (*kept)(item);
+    } catch (py::error_already_set& raised) {
+      raised.discard_as_unraisable("a callback of plchost_client");
+    }
+  };
+}
+
+template <class Item>
+Client::Watch begin(Client& client,
+                    Client::Watch (Client::*watch)(const std::string&, std::function<void(const Item&)>),
+                    const std::string& host, py::function callback) {
+  return (client.*watch)(host, guarded<Item>(std::move(callback)));
+}
+
+template <class Item>
+auto member_seconds(std::chrono::nanoseconds Item::* member) {
+  return [member](const Item& item) { return seconds(item.*member); };
+}
+
+void define_states(py::module_& module) {
+  py::class_<Client::Host>(module, "Host")
+      .def_readonly("name", &Client::Host::name)
+      .def_readonly("answers", &Client::Host::answers)
+      .def_readonly("version", &Client::Host::version)
+      .def_readonly("labels", &Client::Host::labels)
+      .def_readonly("instances", &Client::Host::instances)
+      .def_readonly("manager_pid", &Client::Host::manager_pid)
+      .def_readonly("started", &Client::Host::started);
+  py::class_<Client::Instance>(module, "Instance")
+      .def_readonly("host", &Client::Instance::host)
+      .def_readonly("name", &Client::Instance::name)
+      .def_readonly("state", &Client::Instance::state)
+      .def_readonly("pid", &Client::Instance::pid)
+      .def_readonly("core", &Client::Instance::core)
+      .def_readonly("restarts", &Client::Instance::restarts)
+      .def_readonly("scheduler", &Client::Instance::scheduler)
+      .def_readonly("application", &Client::Instance::application)
+      .def_readonly("problem", &Client::Instance::problem);
+  using Task = Client::Task;
+  py::class_<Task>(module, "Task")
+      .def_readonly("host", &Task::host)
+      .def_readonly("instance", &Task::instance)
+      .def_readonly("name", &Task::name)
+      .def_readonly("kind", &Task::kind)
+      .def_readonly("priority", &Task::priority)
+      .def_readonly("state", &Task::state)
+      .def_property_readonly("interval", member_seconds(&Task::interval))
+      .def_readonly("external_event", &Task::external_event)
+      .def_readonly("cycles", &Task::cycles)
+      .def_readonly("lost_cycles", &Task::lost_cycles)
+      .def_readonly("lost_events", &Task::lost_events)
+      .def_property_readonly("execution_last", member_seconds(&Task::execution_last))
+      .def_property_readonly("execution_average", member_seconds(&Task::execution_average))
+      .def_property_readonly("execution_max", member_seconds(&Task::execution_max))
+      .def_property_readonly("latency_median", member_seconds(&Task::latency_median))
+      .def_property_readonly("latency_max", member_seconds(&Task::latency_max))
+      .def_property_readonly("jitter_max", member_seconds(&Task::jitter_max));
+  py::class_<Client::Event>(module, "Event")
+      .def_readonly("host", &Client::Event::host)
+      .def_readonly("instance", &Client::Event::instance)
+      .def_readonly("name", &Client::Event::name)
+      .def_readonly("registered", &Client::Event::registered)
+      .def_readonly("bound_tasks", &Client::Event::bound_tasks)
+      .def_readonly("posts", &Client::Event::posts);
+  py::class_<Client::Transition>(module, "Transition")
+      .def_readonly("host", &Client::Transition::host)
+      .def_readonly("instance", &Client::Transition::instance)
+      .def_readonly("of", &Client::Transition::of)
+      .def_readonly("from_state", &Client::Transition::from)  // "from" is a word of Python
+      .def_readonly("to_state", &Client::Transition::to)
+      .def_readonly("reason", &Client::Transition::reason)
+      .def_readonly("pid", &Client::Transition::pid)
+      .def_readonly("time", &Client::Transition::time)
+      .def_readonly("number", &Client::Transition::number)
+      .def_readonly("missed", &Client::Transition::missed);
+}
+
+void define_results(py::module_& module) {
+  py::class_<Client::Posted>(module, "Posted")
+      .def_readonly("accepted", &Client::Posted::accepted)
+      .def_readonly("no_task", &Client::Posted::no_task);
+  py::class_<Client::Outcome>(module, "Outcome")
+      .def_readonly("code", &Client::Outcome::code)
+      .def_readonly("text", &Client::Outcome::text)
+      .def_readonly("posted", &Client::Outcome::posted)
+      .def("__bool__", [](const Client::Outcome& outcome) { return static_cast<bool>(outcome); });
+  py::class_<Client::Run>(module, "Run")
+      .def_readonly("tasks", &Client::Run::tasks)
+      .def_readonly("last_task", &Client::Run::last_task)
+      .def_property_readonly("to_start", member_seconds(&Client::Run::to_start))
+      .def_property_readonly("to_end", member_seconds(&Client::Run::to_end))
+      .def_property_readonly("round_trip", member_seconds(&Client::Run::round_trip));
+  py::class_<Client::Watch, Holder<Client::Watch>>(module, "Watch",
+                                                   "Calls back until stop(), or the end of its `with`.")
+      .def("stop", &Client::Watch::stop, NoGil())
+      .def("__enter__", [](Client::Watch& watch) -> Client::Watch& { return watch; })
+      .def("__exit__", [](Client::Watch& watch, const py::args&) {
+        const py::gil_scoped_release release;
+        watch.stop();
+      });
+}
+
+// ClientError with its code, which pybind11's own way of exceptions has no place for.
+void define_error(py::module_& module) {
+  static const py::handle type =
+      py::exception<ClientError>(module, "ClientError", PyExc_RuntimeError).release();
+  py::register_exception_translator([](std::exception_ptr thrown) {
+    try {
+      if (thrown) std::rethrow_exception(std::move(thrown));
+    } catch (const ClientError& error) {
+      py::object raised = py::reinterpret_borrow<py::object>(type)(error.what());
+      raised.attr("code") = error.code();
+      PyErr_SetObject(type.ptr(), raised.ptr());
+    }
+  });
+}
+
+Client::Options options_of(unsigned domain, std::vector<std::string> interfaces,
+                           std::vector<std::string> peers, std::string identity, double timeout) {
+  constexpr double kPerSecond = 1000;
+  constexpr double kMost = 1e9;
+  const double ms = timeout > 0 && timeout < kMost ? timeout * kPerSecond : 0;  // 0 is refused with a text
+  return {.domain = domain,
+          .interfaces = std::move(interfaces),
+          .peers = std::move(peers),
+          .identity = std::move(identity),
+          .timeout = std::chrono::milliseconds(static_cast<std::int64_t>(ms))};
+}
+
+using ClientClass = py::class_<Client, Holder<Client>>;
+
+void define_calls(ClientClass& client) {
+  client.def("hosts", &Client::hosts, NoGil())
+      .def("instances", &Client::instances, py::arg("host") = "", NoGil())
+      .def("tasks", &Client::tasks, py::arg("host") = "", NoGil())
+      .def("events", &Client::events, py::arg("host") = "", NoGil())
+      .def("post",
+           py::overload_cast<const std::string&, const std::string&, unsigned long long>(&Client::post),
+           py::arg("host"), py::arg("event"), py::arg("count") = 1, NoGil())
+      .def(
+          "post_and_tell",
+          [](Client& self, const std::string& host, const std::string& event, py::function done) {
+            self.post(host, event, guarded<Client::Outcome>(std::move(done)));
+          },
+          py::arg("host"), py::arg("event"), py::arg("done"),
+          "Returns at once; done(outcome) is called once.")
+      .def("post_all", &Client::post_all, py::arg("host"), py::arg("events"), NoGil())
+      .def("post_and_wait", &Client::post_and_wait, py::arg("host"), py::arg("event"), NoGil())
+      .def("start", &Client::start, py::arg("host"), py::arg("instance"), NoGil())
+      .def("stop", &Client::stop, py::arg("host"), py::arg("instance"), NoGil())
+      .def("restart", &Client::restart, py::arg("host"), py::arg("instance"), NoGil())
+      .def("reset", &Client::reset, py::arg("host"), py::arg("instance"), py::arg("cold") = false, NoGil())
+      .def("single_cycle", &Client::single_cycle, py::arg("host"), py::arg("instance"), NoGil())
+      .def("load_application", &Client::load_application, py::arg("host"), py::arg("instance"),
+           py::arg("path"), NoGil())
+      .def("set_scheduler", &Client::set_scheduler, py::arg("host"), py::arg("instance"),
+           py::arg("scheduler"), NoGil())
+      .def("register_event", &Client::register_event, py::arg("host"), py::arg("event"), NoGil())
+      .def("unregister_event", &Client::unregister_event, py::arg("host"), py::arg("event"), NoGil());
+}
+
+void define_watches(ClientClass& client) {
+  client
+      .def("watch_hosts",
+           [](Client& self, py::function callback) {
+             return self.watch_hosts(guarded<Client::Host>(std::move(callback)));
+           })
+      .def("watch_instances",
+           [](Client& self, const std::string& host, py::function callback) {
+             return begin(self, &Client::watch_instances, host, std::move(callback));
+           })
+      .def("watch_tasks",
+           [](Client& self, const std::string& host, py::function callback) {
+             return begin(self, &Client::watch_tasks, host, std::move(callback));
+           })
+      .def("watch_events",
+           [](Client& self, const std::string& host, py::function callback) {
+             return begin(self, &Client::watch_events, host, std::move(callback));
+           })
+      .def("watch_transitions", [](Client& self, const std::string& host, py::function callback) {
+        return begin(self, &Client::watch_transitions, host, std::move(callback));
+      });
+}
+
+}  // namespace
+
+PYBIND11_MODULE(plchost_client, module) {
+  module.doc() = "Sees and commands PLC hosts from anywhere over DDS.";
+  define_error(module);
+  define_states(module);
+  define_results(module);
+  ClientClass client(module, "Client",
+                     "One connection to all hosts of a DDS domain. timeout: seconds, of each call.");
+  client.def(py::init([](unsigned domain, std::vector<std::string> interfaces, std::vector<std::string> peers,
+                         std::string identity, double timeout) {
+               return Holder<Client>(new Client(options_of(domain, std::move(interfaces), std::move(peers),
+                                                           std::move(identity), timeout)));
+             }),
+             py::arg("domain") = 0U, py::arg("interfaces") = std::vector<std::string>{"lo"},
+             py::arg("peers") = std::vector<std::string>{}, py::arg("identity") = "",
+             py::arg("timeout") = 3.0);
+  define_calls(client);
+  define_watches(client);
+}

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <atomic>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "api/library/connection.hpp"
+
+namespace plchost {
+
+/// What a Watcher has to tell.
+struct News {
+  ControlClient& client;
+  const std::vector<TransitionView>& fresh;  ///< changes of state since the last time
+  const std::vector<TransitionView>& kept;   ///< the last ones, those included
+};
+
+/// What one Watch wants.
+class __attribute__((visibility("hidden"))) Client::Watch::Subscription {
+ public:
+  Subscription() = default;
+  virtual ~Subscription() = default;
+  Subscription(const Subscription&) = delete;
+  Subscription& operator=(const Subscription&) = delete;
+
+  [[nodiscard]] virtual bool wants_transitions() const noexcept { return false; }
+  /// Watcher's thread.
+  void look(const News& news);
+  /// No callback after this. Any thread.
+  void stop() noexcept;
+  [[nodiscard]] bool stopped() const noexcept { return stopped_.load(); }
+
+ protected:
+  virtual void tell(const News& news) = 0;
+
+ private:
+  std::recursive_mutex calling_;  // a callback may stop its own watch
+  std::atomic<bool> stopped_{false};
+};
+
+/// Looks for what watches want to be told, on a thread and with a connection of its own: a call that waits
+/// holds up no watch.
+class __attribute__((visibility("hidden"))) Client::Watcher {
+ public:
+  explicit Watcher(const Options& options) : connection_(domain_options(options)) {}
+  ~Watcher();
+  Watcher(const Watcher&) = delete;
+  Watcher& operator=(const Watcher&) = delete;
+
+  /// Its thread starts with the first.
+  void add(std::shared_ptr<Watch::Subscription> subscription);
+
+ private:
+  void watch();
+  [[nodiscard]] std::vector<std::shared_ptr<Watch::Subscription>> wait_for_live();
+  void look(ControlClient& client, const std::vector<std::shared_ptr<Watch::Subscription>>& subscriptions);
+  void keep(const std::vector<TransitionView>& fresh);
+
+  Connection connection_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::vector<std::shared_ptr<Watch::Subscription>> subscriptions_;
+  std::vector<TransitionView> transitions_;  // for watches that come later: what hosts keep comes only once
+  bool ending_ = false;
+  std::thread thread_;
+};
+
+}  // namespace plchost

@@ -1,0 +1,164 @@
+// What the watches of a Client tell: each remembers what it told last.
+#include <map>
+#include <tuple>
+#include <utility>
+
+#include "api/library/convert.hpp"
+#include "api/library/watcher.hpp"
+#include "api/library/worker.hpp"
+
+namespace plchost {
+
+namespace {
+
+std::vector<std::string> hosts_of(ControlClient& client, const std::string& host) {
+  if (!host.empty()) return {host};
+  std::vector<std::string> names;
+  for (const HostView& view : client.hosts(MonotonicClock::now())) names.push_back(view.name);
+  return names;
+}
+
+std::tuple<std::string, std::string, std::string> key_of(const Client::Instance& instance) {
+  return {instance.host, instance.name, {}};
+}
+std::tuple<std::string, std::string, std::string> key_of(const Client::Task& task) {
+  return {task.host, task.instance, task.name};
+}
+std::tuple<std::string, std::string, std::string> key_of(const Client::Event& event) {
+  return {event.host, event.instance, event.name};
+}
+
+}  // namespace
+
+class __attribute__((visibility("hidden"))) Client::HostsWatch final : public Client::Watch::Subscription {
+ public:
+  explicit HostsWatch(std::function<void(const Host&)> callback) : callback_(std::move(callback)) {}
+
+ private:
+  void tell(const News& news) override {
+    std::map<std::string, Host> now;
+    for (const HostView& view : news.client.hosts(MonotonicClock::now())) {
+      now.emplace(view.name, to_public(view, !news.client.is_silent(view.name)));
+    }
+    for (auto& [name, told] : told_) {
+      if (now.contains(name)) continue;
+      Host gone = told;
+      gone.answers = false;
+      now.emplace(name, std::move(gone));
+    }
+    for (const auto& [name, host] : now) {
+      const auto before = told_.find(name);
+      if (before != told_.end() && is_same(before->second, host)) continue;
+      told_[name] = host;
+      if (!stopped()) callback_(host);
+    }
+  }
+
+  std::function<void(const Host&)> callback_;
+  std::map<std::string, Host> told_;
+};
+
+/// Of one status topic.
+template <class Sample, class Item>
+class __attribute__((visibility("hidden"))) Client::StatusWatch final : public Client::Watch::Subscription {
+ public:
+  using Look = Result<std::vector<Sample>> (ControlClient::*)(const std::string&, TimePoint);
+
+  StatusWatch(std::string host, Look snapshot, std::function<void(const Item&)> callback)
+      : host_(std::move(host)), snapshot_(snapshot), callback_(std::move(callback)) {}
+
+ private:
+  void tell(const News& news) override {
+    for (const std::string& host : hosts_of(news.client, host_)) {
+      const auto samples = (news.client.*snapshot_)(host, MonotonicClock::now());
+      if (!samples) continue;  // not complete yet: soon
+      for (const Sample& sample : *samples) tell_one(to_public(sample));
+    }
+  }
+
+  void tell_one(Item item) {
+    const auto [told, is_new] = told_.try_emplace(key_of(item));
+    if (!is_new && is_same(told->second, item)) return;
+    told->second = std::move(item);
+    if (!stopped()) callback_(told->second);
+  }
+
+  std::string host_;
+  Look snapshot_;
+  std::function<void(const Item&)> callback_;
+  std::map<std::tuple<std::string, std::string, std::string>, Item> told_;
+};
+
+class __attribute__((visibility("hidden"))) Client::TransitionsWatch final
+    : public Client::Watch::Subscription {
+ public:
+  TransitionsWatch(std::string host, std::function<void(const Transition&)> callback)
+      : host_(std::move(host)), callback_(std::move(callback)) {}
+  [[nodiscard]] bool wants_transitions() const noexcept override { return true; }
+
+ private:
+  void tell(const News& news) override {
+    for (const TransitionView& view : std::exchange(began_, true) ? news.fresh : news.kept) {
+      const Transition transition = to_public(view);
+      if (!host_.empty() && transition.host != host_) continue;
+      if (!stopped()) callback_(transition);
+    }
+  }
+
+  std::string host_;
+  std::function<void(const Transition&)> callback_;
+  bool began_ = false;
+};
+
+Client::Watch::Watch() noexcept = default;
+Client::Watch::Watch(std::shared_ptr<Subscription> subscription) noexcept
+    : subscription_(std::move(subscription)) {}
+Client::Watch::Watch(Watch&& other) noexcept = default;
+
+Client::Watch& Client::Watch::operator=(Watch&& other) noexcept {
+  if (this != &other) {
+    stop();
+    subscription_ = std::move(other.subscription_);
+  }
+  return *this;
+}
+
+Client::Watch::~Watch() {
+  stop();
+}
+
+void Client::Watch::stop() noexcept {
+  if (const auto subscription = std::move(subscription_)) subscription->stop();
+}
+
+Client::Watch Client::begin_watch(std::shared_ptr<Watch::Subscription> subscription) {
+  watcher_->add(subscription);
+  return Watch(std::move(subscription));
+}
+
+Client::Watch Client::watch_hosts(std::function<void(const Host&)> callback) {
+  return begin_watch(std::make_shared<HostsWatch>(std::move(callback)));
+}
+
+Client::Watch Client::watch_instances(const std::string& host,
+                                      std::function<void(const Instance&)> callback) {
+  return begin_watch(std::make_shared<StatusWatch<plc_InstanceStatus, Instance>>(
+      host, &ControlClient::instances, std::move(callback)));
+}
+
+Client::Watch Client::watch_tasks(const std::string& host, std::function<void(const Task&)> callback) {
+  return begin_watch(
+      std::make_shared<StatusWatch<plc_TaskStatus, Task>>(host, &ControlClient::tasks, std::move(callback)));
+}
+
+Client::Watch Client::watch_events(const std::string& host, std::function<void(const Event&)> callback) {
+  return begin_watch(std::make_shared<StatusWatch<plc_EventStatus, Event>>(host, &ControlClient::events,
+                                                                           std::move(callback)));
+}
+
+Client::Watch Client::watch_transitions(const std::string& host,
+                                        std::function<void(const Transition&)> callback) {
+  return begin_watch(std::make_shared<TransitionsWatch>(host, std::move(callback)));
+}
+
+}  // namespace plchost

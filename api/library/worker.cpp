@@ -1,0 +1,66 @@
+#include "api/library/worker.hpp"
+
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "api/library/convert.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr std::chrono::milliseconds kMaxTimeout = std::chrono::hours(1);
+
+Duration checked_timeout(std::chrono::milliseconds timeout) {
+  if (timeout >= std::chrono::milliseconds(1) && timeout <= kMaxTimeout) return timeout;
+  throw_client_error(
+      {ErrorCode::invalid_argument, 0,
+       fmt::format("time-out {} ms: allowed are 1 to {}", timeout.count(), kMaxTimeout.count())});
+}
+
+}  // namespace
+
+Client::Worker::Worker(const Options& options)
+    : connection_(domain_options(options)), timeout_(checked_timeout(options.timeout)) {
+  // Here, where it can be said at once.
+  if (const auto good = dds::domain_configuration(dds::Role::client, domain_options(options)); !good) {
+    throw_client_error(good.error());
+  }
+  thread_ = quiet_thread([this] { work(); });
+}
+
+Client::Worker::~Worker() {
+  {
+    const std::lock_guard lock(mutex_);
+    ending_ = true;
+  }
+  changed_.notify_all();
+  thread_.join();
+}
+
+void Client::Worker::begin(Job job) {
+  {
+    const std::lock_guard lock(mutex_);
+    jobs_.push_back(std::move(job));
+  }
+  changed_.notify_all();
+}
+
+void Client::Worker::work() {
+  for (;;) {
+    Job job;
+    bool ending = false;
+    {
+      std::unique_lock lock(mutex_);
+      changed_.wait(lock, [this] { return ending_ || !jobs_.empty(); });
+      if (jobs_.empty()) return;
+      job = std::move(jobs_.front());
+      jobs_.pop_front();
+      ending = ending_;
+    }
+    job(ending ? failure(ErrorCode::unavailable, "the client has ended") : connection_.client());
+  }
+}
+
+}  // namespace plchost

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <functional>
+#include <future>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "api/library/connection.hpp"
+
+namespace plchost {
+
+/// Does the calls of one Client, one after the other, on a thread of its own.
+class __attribute__((visibility("hidden"))) Client::Worker {
+ public:
+  /// A call: with the connection, or with why there is none.
+  using Job = std::function<void(const Result<ControlClient*>&)>;
+
+  explicit Worker(const Options& options);
+  /// Jobs that were not begun are called with `unavailable`.
+  ~Worker();
+  Worker(const Worker&) = delete;
+  Worker& operator=(const Worker&) = delete;
+
+  [[nodiscard]] Duration timeout() const noexcept { return timeout_; }
+  [[nodiscard]] TimePoint deadline() const { return MonotonicClock::now() + timeout_; }
+
+  void begin(Job job);
+  /// Returns what `call(client)` returns. From a callback: at once, it is this thread's turn.
+  template <class T>
+  [[nodiscard]] Result<T> run(const std::function<Result<T>(ControlClient&)>& call) {
+    std::promise<Result<T>> promise;
+    const Job job = [&](const Result<ControlClient*>& client) {
+      promise.set_value(client ? call(**client) : Result<T>(std::unexpected(client.error())));
+    };
+    if (std::this_thread::get_id() == thread_.get_id()) {
+      job(connection_.client());
+    } else {
+      begin(job);
+    }
+    return promise.get_future().get();
+  }
+
+ private:
+  void work();
+
+  Connection connection_;
+  Duration timeout_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Job> jobs_;
+  bool ending_ = false;
+  std::thread thread_;
+};
+
+}  // namespace plchost

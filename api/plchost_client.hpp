@@ -1,0 +1,251 @@
+// The client library of plchost: sees and commands PLC hosts from anywhere over DDS, by api/control.idl.
+//
+//     #include <plchost/plchost_client.hpp>                  g++ x.cpp $(pkg-config --cflags --libs
+//     plchost-client)
+//
+//     int main() {
+//       plchost::Client client;
+//       client.post("south", "line1/product");                // returns when it is in the host's pool
+//       const auto watch = client.watch_tasks("south", [](const plchost::Client::Task& task) {
+//         std::printf("%s/%s: %llu cycles\n", task.instance.c_str(), task.name.c_str(), task.cycles);
+//       });
+//       std::this_thread::sleep_for(std::chrono::minutes(1));
+//     }
+//
+// Everywhere: `host` is the name of a host; empty: the only one that answers (an error if several do). An
+// event is "INSTANCE/EVENT". Times are in the unit that their type says; wall-clock times are the host's.
+//
+// Connections make and mend themselves: a host may come later, end and come back, and so may the network. A
+// call waits for its host as long as Options::timeout says; a watch goes on when its host does.
+//
+// All functions may be called from any thread; none is for real-time threads. The calls of one Client are
+// done one after the other: make another one for what must not wait (post_and_wait() waits for a task). A
+// callback runs on a thread of the library and may use the Client; it must not throw: the program would end.
+#ifndef PLCHOST_CLIENT_HPP
+#define PLCHOST_CLIENT_HPP
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#define PLCHOST_CLIENT_API __attribute__((visibility("default")))
+
+namespace plchost {
+
+/// What went wrong. what() says on what, and what to do.
+class PLCHOST_CLIENT_API ClientError : public std::runtime_error {
+ public:
+  /// The numbers are those of Reply.code in api/control.idl; there may be more some day.
+  enum Code {
+    invalid_argument = 1,  ///< a name or value is not of the allowed form; nothing was sent
+    not_found = 2,         ///< no such host, instance, event ...
+    already_exists = 3,    ///< an event that is registered
+    wrong_state = 4,       ///< cannot be done now (stop what is stopped)
+    refused = 5,           ///< not permitted
+    busy = 6,              ///< too much at once: again later
+    timed_out = 7,         ///< no answer; whether it was done is not known
+    unavailable = 8,       ///< DDS or the manager of the host is not there
+    failed = 9,            ///< a system call of the host, or here
+    unsupported = 10,      ///< not by that host
+    full = 11,             ///< a table or the pool of the host
+    corrupt = 12           ///< a file or memory of the host is not valid
+  };
+
+  ClientError(int code, const std::string& text) : std::runtime_error(text), code_(code) {}
+  ~ClientError() override;
+  int code() const noexcept { return code_; }
+
+ private:
+  int code_;
+};
+
+class PLCHOST_CLIENT_API Client {
+ public:
+  struct Options {
+    unsigned domain = 0;                        ///< DDS domain, 0 to 230
+    std::vector<std::string> interfaces{"lo"};  ///< network interfaces
+    std::vector<std::string> peers{};           ///< addresses of hosts; none: 127.0.0.1
+    std::string identity{};                   ///< folder of `plcctl security add-identity`; empty: unsecured
+    std::chrono::milliseconds timeout{3000};  ///< of each call, 1 ms to an hour
+  };
+
+  struct Host {
+    std::string name;
+    bool answers = false;  ///< false: silent for more than 70 ms, or gone
+    std::string version;
+    std::vector<std::string> labels;
+    unsigned instances = 0;
+    int manager_pid = 0;
+    std::chrono::system_clock::time_point started;
+  };
+
+  struct Instance {
+    std::string host;
+    std::string name;
+    std::string
+        state;      ///< offline, starting, running, stopped, stopping, waiting, safe_mode, failed, exception
+    int pid = 0;    ///< 0: there is no process
+    int core = -1;  ///< -1: none, or several
+    unsigned restarts = 0;
+    std::string scheduler;
+    std::string application;  ///< path on the host
+    std::string problem;      ///< why it is not running; empty: all is well
+  };
+
+  struct Task {
+    std::string host;
+    std::string instance;
+    std::string name;
+    std::string kind;                     ///< cyclic, event, external, freewheeling
+    int priority = 0;                     ///< 0 (highest) to 31
+    std::string state;                    ///< created, running, stopped, exception
+    std::chrono::nanoseconds interval{};  ///< 0 unless cyclic
+    std::string external_event;           ///< empty unless external
+    unsigned long long cycles = 0;
+    unsigned long long lost_cycles = 0;  ///< releases that were skipped
+    unsigned long long lost_events = 0;  ///< posts beyond its backlog
+    std::chrono::nanoseconds execution_last{};
+    std::chrono::nanoseconds execution_average{};
+    std::chrono::nanoseconds execution_max{};
+    std::chrono::nanoseconds latency_median{};  ///< planned release to start
+    std::chrono::nanoseconds latency_max{};
+    std::chrono::nanoseconds jitter_max{};
+  };
+
+  struct Event {
+    std::string host;
+    std::string instance;
+    std::string name;
+    bool registered = false;  ///< may be posted to
+    unsigned bound_tasks = 0;
+    unsigned long long posts = 0;  ///< since it was made
+  };
+
+  /// A change of state.
+  struct Transition {
+    std::string host;
+    std::string instance;
+    std::string of;  ///< "application" or "process"
+    std::string from;
+    std::string to;
+    std::string reason;
+    int pid = 0;
+    std::chrono::system_clock::time_point time;
+    unsigned long long number = 0;  ///< within its instance
+    unsigned long long missed = 0;  ///< how many before it will never come
+  };
+
+  /// Posts that are in the pool of the host.
+  struct Posted {
+    unsigned long long accepted = 0;
+    unsigned long long no_task = 0;  ///< of these, while no task was bound to the event
+  };
+
+  /// A post that was run.
+  struct Run {
+    unsigned tasks = 0;                   ///< that were bound to the event
+    std::string last_task;                ///< "INSTANCE/TASK" that ended its cycle last
+    std::chrono::nanoseconds to_start{};  ///< on the host: from the post's arrival to the start of that cycle
+    std::chrono::nanoseconds to_end{};    ///< and to its end
+    std::chrono::nanoseconds round_trip{};  ///< here: from before the post to after the news
+  };
+
+  /// What became of a call with a callback.
+  struct Outcome {
+    int code = 0;      ///< 0: done; else ClientError::Code
+    std::string text;  ///< why not
+    Posted posted;
+    explicit operator bool() const noexcept { return code == 0; }
+  };
+
+  /// Calls its callback until it is destroyed or stop() returns; after that never again (stop() waits for a
+  /// callback that is running, unless it is called by that). It may outlive its Client.
+  class PLCHOST_CLIENT_API Watch {
+   public:
+    Watch() noexcept;
+    Watch(Watch&& other) noexcept;
+    Watch& operator=(Watch&& other) noexcept;
+    ~Watch();
+    void stop() noexcept;
+
+   private:
+    friend class Client;
+    class Subscription;
+    explicit Watch(std::shared_ptr<Subscription> subscription) noexcept;
+    std::shared_ptr<Subscription> subscription_;
+  };
+
+  /// Connects at the first call. ClientError: invalid_argument: an option.
+  Client();
+  explicit Client(const Options& options);
+  /// Waits for the call that is under way; those that were not begun get their callback with unavailable.
+  /// Not from a callback.
+  ~Client();
+  Client(const Client&) = delete;
+  Client& operator=(const Client&) = delete;
+
+  /// All that answer, by name. None: an empty list, after the time-out.
+  std::vector<Host> hosts();
+  /// All of one host, as it is within 20 ms (instances) or 200 ms (others). These and all that follow throw
+  /// ClientError.
+  std::vector<Instance> instances(const std::string& host = {});
+  std::vector<Task> tasks(const std::string& host = {});
+  std::vector<Event> events(const std::string& host = {});
+
+  /// Posts an event `count` times, each counted exactly once, also if the server of the host dies meanwhile.
+  /// Returns when all are in the pool. ClientError: a post was rejected; timed_out: of some nothing is known.
+  Posted post(const std::string& host, const std::string& event, unsigned long long count = 1);
+  /// The same; returns at once. `done` is called once.
+  void post(const std::string& host, const std::string& event, std::function<void(const Outcome&)> done);
+  /// Posts several events, at most 64, at once: all of them, or none.
+  Posted post_all(const std::string& host, const std::vector<std::string>& events);
+  /// Posts once and waits until the tasks that are bound to the event have ended their cycles for it.
+  Run post_and_wait(const std::string& host, const std::string& event);
+
+  /// Commands. Each returns when it is done; the next look at the status shows its effect. The text that is
+  /// returned is the host's remark, mostly empty.
+  std::string start(const std::string& host, const std::string& instance);
+  std::string stop(const std::string& host, const std::string& instance);
+  std::string restart(const std::string& host, const std::string& instance);
+  /// Warm: retain memory is kept; cold: only persistent memory is.
+  std::string reset(const std::string& host, const std::string& instance, bool cold = false);
+  std::string single_cycle(const std::string& host, const std::string& instance);
+  /// `path`: of a file on the host.
+  std::string load_application(const std::string& host, const std::string& instance, const std::string& path);
+  std::string set_scheduler(const std::string& host, const std::string& instance,
+                            const std::string& scheduler);
+  std::string register_event(const std::string& host, const std::string& event);
+  std::string unregister_event(const std::string& host, const std::string& event);
+
+  /// Calls back for each host that is there, and whenever one comes, falls silent, answers again, or has
+  /// changed. Known within 100 ms.
+  Watch watch_hosts(std::function<void(const Host&)> callback);
+  /// For each that is there, and whenever something in it has changed. Empty host: of all.
+  Watch watch_instances(const std::string& host, std::function<void(const Instance&)> callback);
+  Watch watch_tasks(const std::string& host, std::function<void(const Task&)> callback);
+  Watch watch_events(const std::string& host, std::function<void(const Event&)> callback);
+  /// For the last 64 of each instance, and each that comes. Empty host: of all.
+  Watch watch_transitions(const std::string& host, std::function<void(const Transition&)> callback);
+
+ private:
+  class Worker;
+  class Watcher;
+  class HostsWatch;
+  template <class Sample, class Item>
+  class StatusWatch;
+  class TransitionsWatch;
+  Watch begin_watch(std::shared_ptr<Watch::Subscription> subscription);
+  std::string command(int operation, const std::string& host, const std::string& instance,
+                      const std::string& argument);
+
+  std::unique_ptr<Worker> worker_;
+  std::unique_ptr<Watcher> watcher_;
+};
+
+}  // namespace plchost
+
+#endif

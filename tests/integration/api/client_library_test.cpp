@@ -1,0 +1,194 @@
+// The client library as its users see it: by plchost_client.hpp, from libplchost-client.so.
+#include <atomic>
+#include <condition_variable>
+#include <future>
+#include <thread>
+
+#include <gmock/gmock.h>
+
+#include "api/plchost_client.hpp"
+#include "tests/integration/api/test_host.hpp"
+
+namespace plchost {
+namespace {
+
+using testing::HasSubstr;
+
+class ClientLibrary : public testing::Test {
+ protected:
+  ClientLibrary() {
+    event_ = host_.add_event("line1", "ready");
+    event_.set_bound_tasks(1);
+    host_.write_instance(0, "line1", InstanceState::running, 4711);
+    host_.write_count(1);
+    host_.start_server();
+  }
+
+  [[nodiscard]] Client::Options options(std::chrono::milliseconds timeout = std::chrono::seconds(20)) const {
+    Client::Options options;
+    options.domain = domain_.number();
+    options.timeout = timeout;
+    return options;
+  }
+
+  template <class Call>
+  static ClientError error_of(Call call) {
+    try {
+      call();
+    } catch (const ClientError& error) {
+      return error;
+    }
+    return {0, "nothing was thrown"};
+  }
+
+  OwnDomain domain_;
+  TestHost host_{domain_, "hosta"};
+  PoolEvent event_;
+};
+
+TEST_F(ClientLibrary, CountsThePostsOfManyThreadsExactlyOnce) {
+  constexpr unsigned kThreads = 4;
+  constexpr unsigned kPosts = 50;
+  Client sut(options());
+  std::atomic<unsigned> told{0};
+  {
+    std::vector<std::jthread> threads;
+    for (unsigned i = 0; i < kThreads; ++i) {
+      threads.emplace_back([&] {
+        for (unsigned post = 0; post < kPosts; ++post) {
+          EXPECT_EQ(sut.post("hosta", "line1/ready").accepted, 1U);
+          sut.post("hosta", "line1/ready", [&](const Client::Outcome& outcome) { told += outcome ? 1 : 0; });
+        }
+      });
+    }
+  }
+  EXPECT_EQ(sut.post({}, "line1/ready", 7).accepted, 7U);  // the only host; behind all that came before
+  EXPECT_EQ(told, kThreads * kPosts);
+  EXPECT_EQ(event_.counted().count(), 2U * kThreads * kPosts + 7U);
+}
+
+TEST_F(ClientLibrary, LetsACallbackUseTheClient) {
+  Client sut(options());
+  std::promise<std::size_t> hosts;
+  sut.post("hosta", "line1/ready", [&](const Client::Outcome&) { hosts.set_value(sut.hosts().size()); });
+  EXPECT_EQ(hosts.get_future().get(), 1U);
+
+  std::promise<unsigned long long> posted;
+  Client::Watch watch;
+  watch = sut.watch_instances("hosta", [&](const Client::Instance& instance) {
+    if (instance.pid == 4711) posted.set_value(sut.post(instance.host, "line1/ready").accepted);
+  });
+  EXPECT_EQ(posted.get_future().get(), 1U);
+}
+
+TEST_F(ClientLibrary, TellsEachChangeAndNothingAfterStop) {
+  Client sut(options());
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::vector<std::string> states;
+  auto watch = sut.watch_instances({}, [&](const Client::Instance& instance) {
+    const std::lock_guard lock(mutex);
+    states.push_back(instance.name + " " + instance.state);
+    changed.notify_all();
+  });
+  const auto until = [&](std::size_t count) {
+    std::unique_lock lock(mutex);
+    return changed.wait_for(lock, kPatience, [&] { return states.size() >= count; });
+  };
+  ASSERT_TRUE(until(1));
+  host_.write_instance(0, "line1", InstanceState::exception, 4711);
+  ASSERT_TRUE(until(2));
+  watch.stop();
+  host_.write_instance(0, "line1", InstanceState::running, 4711);
+  while (sut.instances("hosta").front().state != "running") continue;
+  EXPECT_THAT(states, testing::ElementsAre("line1 running", "line1 exception"));
+}
+
+TEST_F(ClientLibrary, LetsACallbackStopItsOwnWatch) {
+  Client sut(options());
+  std::promise<void> called;
+  Client::Watch watch;
+  std::promise<void> ready;
+  watch = sut.watch_hosts([&, go = ready.get_future().share()](const Client::Host& host) {
+    go.wait();
+    EXPECT_EQ(host.name, "hosta");
+    watch.stop();
+    called.set_value();  // twice would throw
+  });
+  ready.set_value();
+  called.get_future().get();
+  host_.server().signal(SIGKILL);
+  Client other(options(std::chrono::milliseconds(100)));
+  while (!other.hosts().empty()) continue;
+}
+
+TEST_F(ClientLibrary, TellsWhenAHostFallsSilentAndAnswersAgain) {
+  Client sut(options());
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::vector<bool> answers;
+  const auto watch = sut.watch_hosts([&](const Client::Host& host) {
+    const std::lock_guard lock(mutex);
+    if (answers.empty() || answers.back() != host.answers) answers.push_back(host.answers);
+    changed.notify_all();
+  });
+  const auto until = [&](std::size_t count) {
+    std::unique_lock lock(mutex);
+    return changed.wait_for(lock, kPatience, [&] { return answers.size() >= count; });
+  };
+  ASSERT_TRUE(until(1));
+  host_.replace_server();
+  ASSERT_TRUE(until(3));
+  EXPECT_TRUE(answers[0]);
+  EXPECT_FALSE(answers[1]);
+  EXPECT_TRUE(answers[2]);
+}
+
+TEST_F(ClientLibrary, TellsCallsThatWereNotBegunThatItHasEnded) {
+  std::vector<int> codes;
+  {
+    Client sut(options(std::chrono::milliseconds(300)));
+    for (int i = 0; i < 3; ++i) {
+      sut.post("nowhere", "line1/ready",
+               [&codes](const Client::Outcome& outcome) { codes.push_back(outcome.code); });
+    }
+  }
+  ASSERT_EQ(codes.size(), 3U);
+  EXPECT_EQ(codes.back(), ClientError::unavailable);
+}
+
+TEST_F(ClientLibrary, ThrowsWithTheCodeAndTextOfTheHost) {
+  Client sut(options());
+  const ClientError rejected = error_of([&] { sut.post("hosta", "line1/redy"); });
+  EXPECT_EQ(rejected.code(), ClientError::not_found);
+  EXPECT_THAT(rejected.what(), HasSubstr("line1/redy"));
+
+  host_.answer_with({.number = 0, .code = ErrorCode::wrong_state, .text = "is stopped already"});
+  const ClientError refused = error_of([&] { sut.stop("hosta", "line1"); });
+  EXPECT_EQ(refused.code(), ClientError::wrong_state);
+  EXPECT_THAT(refused.what(), HasSubstr("is stopped already"));
+}
+
+TEST_F(ClientLibrary, RefusesAtOnceWhatCannotBe) {
+  Client::Options wrong = options();
+  wrong.domain = 1000;
+  EXPECT_EQ(error_of([&] { const Client sut(wrong); }).code(), ClientError::invalid_argument);
+  wrong = options(std::chrono::milliseconds(0));
+  EXPECT_THAT(error_of([&] { const Client sut(wrong); }).what(), HasSubstr("allowed are 1 to"));
+
+  Client sut(options());
+  EXPECT_EQ(error_of([&] { sut.post("hosta", "ready"); }).code(), ClientError::invalid_argument);
+  EXPECT_EQ(error_of([&] { sut.post("ho sta", "line1/ready"); }).code(), ClientError::invalid_argument);
+  EXPECT_EQ(error_of([&] { sut.start("hosta", "li/ne"); }).code(), ClientError::invalid_argument);
+  EXPECT_EQ(event_.counted().count(), 0U);
+}
+
+TEST_F(ClientLibrary, NamesTheHostsThatAnswerWhenTheWantedOneDoesNot) {
+  Client sut(options(std::chrono::milliseconds(500)));
+  const ClientError error = error_of([&] { (void)sut.tasks("hostb"); });
+  EXPECT_EQ(error.code(), ClientError::not_found);
+  EXPECT_THAT(error.what(), HasSubstr("hosta"));
+}
+
+}  // namespace
+}  // namespace plchost

@@ -1,0 +1,73 @@
+#!/usr/bin/env bash
+# Programs of others, in C++ and in Python, built with what `cmake --install` puts there.
+. "$(dirname "$0")/common.sh"
+source=$(cd "$(dirname "$0")/../../.." && pwd)
+
+write_host north "$first_core"
+write_instance north packer1 "$first_core" packer 'scheduler = "CmpScheduleTimer"'
+start_manager north
+until_true 20 state_is packer1 running
+
+echo "- installed: found by pkg-config and by CMake"
+cmake --install "$BIN/.." --component plchost-client --prefix "$cell/usr" >"$cell/install.log" || fail "not installed"
+library=$(dirname "$(find "$cell/usr" -name 'libplchost-client.so')")
+export PKG_CONFIG_PATH=$library/pkgconfig LD_LIBRARY_PATH=$library
+# shellcheck disable=SC2046  # flags are words
+g++ -std=c++17 -Wall -Wextra -Werror "$source/api/library/examples/post_event.cpp" -o "$cell/post_event" \
+  $(pkg-config --cflags --libs plchost-client) 2>"$cell/g++.log" || fail "not built by pkg-config"
+mkdir "$cell/project"
+cat >"$cell/project/CMakeLists.txt" <<EOF
+cmake_minimum_required(VERSION 3.25)
+project(line CXX)
+find_package(plchost-client 0.1 REQUIRED)
+add_executable(watch_line $source/api/library/examples/watch_line.cpp)
+target_link_libraries(watch_line plchost::plchost-client)
+EOF
+{ cmake -S "$cell/project" -B "$cell/project/build" -DCMAKE_PREFIX_PATH="$cell/usr" && cmake --build "$cell/project/build"; } \
+  >"$cell/project.log" 2>&1 || fail "not built by CMake"
+
+echo "- a post that is run, and one that is refused"
+said=$("$cell/post_event" north packer1/product) || fail "not posted"
+grep -q "^run by packer1/Product, there and back in [0-9]* us" <<<"$said" || fail "$said"
+if said=$("$cell/post_event" north packer1/nothing 2>&1); then fail "posted to nothing"; fi
+grep -q "packer1/nothing" <<<"$said" || fail "$said"
+if said=$("$cell/post_event" north nothing 2>&1); then fail "no event"; fi
+grep -q "'nothing' is not of the form INSTANCE/EVENT" <<<"$said" || fail "$said"
+
+echo "- Python"
+PYTHONPATH=$BIN/../python python3 "$source/api/library/examples/line.py" north packer1/product >"$cell/line.log" 2>&1 ||
+  fail "line.py"
+for line in "packer1: running under CmpScheduleTimer" "posted: 1" "a task ran" "refused with code 2: "; do
+  grep -q "^$line" "$cell/line.log" || fail "'$line' is not in: $(cat "$cell/line.log")"
+done
+
+echo "- watches go on when the server is killed, and when the host comes again"
+"$cell/project/build/watch_line" 120 >"$cell/watch.log" 2>&1 &
+watcher=$!
+others+=("$watcher")
+saw() { [ "$(grep -c "$1" "$cell/watch.log")" -ge "$2" ]; }
+until_true 20 saw "^host north answers" 1
+until_true 20 saw "^north/packer1/Product: " 1
+until_true 20 saw "^north/packer1: application stopped -> running" 1
+kill -KILL "$(plcctl list hosts --json | jq '.[0].server_pid')"
+until_true 20 saw "^host north is silent" 1
+until_true 20 saw "^host north answers" 2
+plcctl stop instance packer1
+until_true 20 saw "^north/packer1: application stopping -> stopped" 1
+kill -TERM "${managers[0]}"
+wait "${managers[0]}" || fail "the manager ended with $?"
+until_true 20 saw "^host north is silent" 2
+before=$(grep -c "^north/packer1/Product: " "$cell/watch.log")
+"$cell/post_event" north packer1/product >"$cell/late.log" 2>&1 &
+late=$!
+others+=("$late")
+start_manager north
+wait "$late" || fail "a post does not wait for its host: $(cat "$cell/late.log")"
+until_true 20 saw "^host north answers" 3
+until_true 20 saw "^north/packer1/Product: " $((before + 1))
+kill -TERM "$watcher"
+wait "$watcher" || true
+
+kill -TERM "${managers[1]}"
+wait "${managers[1]}" || fail "the manager ended with $?"
+nothing_left
