@@ -55,9 +55,9 @@ function(plchost_program name)
 endfunction()
 
 # plchost_command_line(FILE...): files that include CLI11, which compiles in ten seconds, half of them to make fast what
-# runs once. Where ten files are one, they are not optimised anyway.
+# runs once. Without optimisation anyway they are compiled together with others.
 function(plchost_command_line)
-  if(NOT CMAKE_UNITY_BUILD)
+  if(NOT CMAKE_BUILD_TYPE STREQUAL "Debug")
     set_source_files_properties(${ARGN} PROPERTIES COMPILE_OPTIONS -O0 SKIP_PRECOMPILE_HEADERS ON)
   endif()
 endfunction()

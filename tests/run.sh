@@ -65,9 +65,10 @@ configure() { # configure DIR OPTIONS...
   command -v ccache >/dev/null && launcher=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DCMAKE_C_COMPILER_LAUNCHER=ccache)
   cmake -S . -B "$dir" -G Ninja "${launcher[@]}" "$@"
 }
-# Twenty files at a time, as most of the work is the headers of others. The plain build shows that each stands alone.
+# Several files at a time, as most of the work is the headers of others; fewer where each of them is optimised, so that
+# the round after an edit is short.
 unity=(-DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=20)
-build_plain() { configure "$build" && cmake --build "$build" -j "$jobs"; }
+build_plain() { configure "$build" "${unity[@]}" -DCMAKE_UNITY_BUILD_BATCH_SIZE=10 && cmake --build "$build" -j "$jobs"; }
 build_sanitized() { # build_sanitized DIR SANITIZERS TARGET OPTIONS...
   local dir=$1 sanitizers=$2 target=$3
   shift 3
@@ -99,8 +100,8 @@ count() { # adds up the summary of the step that just ran
 
 # Over the product's code; the tests are compiled with all warnings as errors like everything else.
 tidy() {
-  configure .build/tidy -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON \
-    "${unity[@]}" &&
+  configure .build/tidy -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF -DCMAKE_BUILD_TYPE=Debug \
+    -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON "${unity[@]}" &&
     cmake --build .build/tidy --target plchost_idl_generate && tests/gates/tidy.sh "$PWD/.build/tidy"
 }
 
