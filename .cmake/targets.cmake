@@ -62,6 +62,16 @@ function(plchost_command_line)
   endif()
 endfunction()
 
+# plchost_manual(PROGRAM WHAT): its manual page in section 8, from what its --help says, where man(1) looks: beside the folders
+# in PATH.
+function(plchost_manual program what)
+  find_program(HELP2MAN help2man REQUIRED)
+  set(folder ${CMAKE_BINARY_DIR}/share/man/man8)
+  add_custom_command(TARGET ${program} POST_BUILD COMMAND ${CMAKE_COMMAND} -E make_directory ${folder}
+    COMMAND ${HELP2MAN} --no-info --section 8 --source plchost --name ${what} --output ${folder}/${program}.8
+            $<TARGET_FILE:${program}> VERBATIM)
+endfunction()
+
 # A control program: a shared object that plc-instance loads. Unique symbols would survive dlclose
 # and be shared between programs, so they are off; the runtime's functions are found at load.
 function(plchost_application name)

@@ -120,6 +120,7 @@ int main(int argc, char** argv) {
   plchost::CliSession session;
   plchost::Action action;
   CLI::App app("plcctl: control of plchost over DDS", "plcctl");
+  app.set_version_flag("--version", PLCHOST_VERSION);
   app.require_subcommand(1);
   app.footer(kExitCodes);
   add_options(app, session.options);
