@@ -9,7 +9,7 @@ CmpSchedule::CmpSchedule(const SchedulerContext& context)
     : clock_(context.clock),
       settings_(context.settings),
       table_(context.clock, context.tick_device ? context.tick_device->frequency() : 0),
-      poller_(context.clock, context.settings.max_event_backlog, context.poll_trap),
+      poller_(context.clock, context.settings.max_event_backlog, context.poll_trap, context.gate),
       ticker_(context, "tick", poller_, [this](TimePoint tick) { on_tick(tick); }) {}
 
 Result<std::unique_ptr<ActivationSource>> CmpSchedule::source_for(Task& task) {

@@ -14,8 +14,9 @@
 
 namespace plchost {
 
-class Task;
+class CycleGate;
 class FaultTrap;
+class Task;
 class TickDevice;
 
 /// 100: a freewheeling task sleeps no longer than it must.
@@ -61,6 +62,7 @@ struct SchedulerContext {
   SchedulerSettings settings;
   ThreadPriority tick;                        ///< of its own threads: above all tasks
   FaultTrap* poll_trap = nullptr;             ///< of the thread that reads event variables; null: not caught
+  CycleGate* gate = nullptr;                  ///< that this thread passes for it; null: none
   std::shared_ptr<TickDevice> tick_device{};  ///< of TickSourceKind::auxiliary, its period set
 };
 

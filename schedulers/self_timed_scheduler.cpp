@@ -8,7 +8,7 @@ namespace plchost {
 SelfTimedScheduler::SelfTimedScheduler(const SchedulerContext& context)
     : clock_(context.clock),
       settings_(context.settings),
-      poller_(context.clock, context.settings.max_event_backlog, context.poll_trap),
+      poller_(context.clock, context.settings.max_event_backlog, context.poll_trap, context.gate),
       ticker_(context, "event-poll", poller_, [this](TimePoint tick) { poller_.poll(tick); }) {}
 
 Result<std::unique_ptr<ActivationSource>> SelfTimedScheduler::source_for(Task& task) {

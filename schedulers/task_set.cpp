@@ -61,6 +61,7 @@ Result<void> TaskSet::add(TaskConfig config) {
       environment_.allow_unprivileged ? ThreadPriority{} : task_priority(band_, config.iec_priority);
   tasks_.push_back(std::make_unique<Task>(clock_, std::move(config), environment_.statistics(tasks_.size()),
                                           event, &fault_board_));
+  tasks_.back()->pass(gate_);
   if (environment_.fault_record) {
     tasks_.back()->fault().show_in(&environment_.fault_record(tasks_.size() - 1));
   }
@@ -86,6 +87,7 @@ auto TaskSet::arrange(std::string_view name, const SchedulerSettings& settings)
                            .settings = settings,
                            .tick = environment_.allow_unprivileged ? ThreadPriority{} : tick_priority(band_),
                            .poll_trap = &poll_trap_,
+                           .gate = &gate_,
                            .tick_device = arrangement->tick.device};
   context.settings.tick_source = arrangement->tick.kind;
   arrangement->scheduler = (*entry)->make(context);

@@ -12,6 +12,7 @@
 #include "schedulers/distributed_clock/distributed_clock.hpp"
 #include "schedulers/faults/supervision.hpp"
 #include "schedulers/scheduler.hpp"
+#include "schedulers/task/cycle_gate.hpp"
 #include "schedulers/task/task.hpp"
 #include "schedulers/task/task_config.hpp"
 #include "schedulers/task/task_thread.hpp"
@@ -114,6 +115,14 @@ class TaskSet {
   /// does not return, which puts its task, and all, into exception.
   [[nodiscard]] Result<void> switch_to(std::string_view scheduler, const SchedulerSettings& settings);
 
+  /// Has `action` done in a moment in which no task is in a cycle and no event variable is read, whatever the
+  /// scheduler; what would begin meanwhile begins after it, and no release is lost unless the action takes
+  /// longer than a period. For how long that was. Nothing: there was no such moment now, nothing was done and
+  /// nobody had to wait; try again. `action` is short, and does nothing that waits.
+  [[nodiscard]] std::optional<Duration> between_cycles(const std::function<void()>& action);
+  /// Those that are within a cycle just now, or in their event variables.
+  [[nodiscard]] std::vector<std::string_view> tasks_in_cycle() const;
+
   /// In the order in which they were given. What may be called on a task from which context: see Task.
   [[nodiscard]] std::size_t size() const noexcept { return tasks_.size(); }
   [[nodiscard]] Task& task(std::size_t index) noexcept { return *tasks_[index]; }
@@ -205,6 +214,7 @@ class TaskSet {
   UniqueFd fault_fd_;
   FaultBoard fault_board_;
   FaultTrap poll_trap_;  // of the thread that reads event variables
+  CycleGate gate_;
   TickChoice tick_;
   bool running_ = false;
   DistributedClock distributed_clock_;

@@ -34,6 +34,8 @@ std::unique_ptr<ActivationSource> EventPoller::add(Task& task) {
 template <class Use>
 void EventPoller::read_all(TimePoint now, Use use) noexcept {
   if (polled_.empty()) return;
+  std::optional<CycleGate::Stay> within;
+  if (gate_ != nullptr) within.emplace(gate_, gate_->variables(), clock_);
   trap_.arm(*polled_.front().fault, now, true);
   for (const Polled& polled : polled_) {
     if (polled.fault->raised()) continue;

@@ -105,6 +105,7 @@ void Task::look_at_overrun(Duration execution) noexcept {
 }
 
 void Task::run_cycle(const Activation& activation) noexcept {
+  const CycleGate::Stay within(gate_, seat_, clock_);
   // Only a freewheeling task sleeps by what it used itself, so only there it is worth the system calls.
   const bool by_own_time = config_.kind == TaskKind::freewheeling;
   const Duration used_before = by_own_time ? clock_.thread_time() : Duration::zero();

@@ -9,6 +9,7 @@
 #include "schedulers/distributed_clock/distributed_clock.hpp"
 #include "schedulers/faults/fault_trap.hpp"
 #include "schedulers/faults/watchdog_rules.hpp"
+#include "schedulers/task/cycle_gate.hpp"
 #include "schedulers/task/freewheel_rule.hpp"
 #include "schedulers/task/release_grid.hpp"
 #include "schedulers/task/task_config.hpp"
@@ -32,6 +33,10 @@ class Task {
   /// Cyclic tasks: from now on each release that is planned is moved as `follower` says; it outlives the
   /// task. Set-up, before the first begin().
   void follow(ClockFollower& follower) noexcept { follower_ = &follower; }
+  /// Its cycles pass `gate`, which outlives the task. Set-up, before the first begin().
+  void pass(CycleGate& gate) noexcept { gate_ = &gate; }
+  /// A cycle runs, with all that belongs to it, if it passes a gate. Any thread.
+  [[nodiscard]] bool in_cycle() const noexcept { return seat_.taken(); }
   /// Null: it follows no clock. Any context.
   [[nodiscard]] const ClockFollower* follower() const noexcept { return follower_; }
 
@@ -91,6 +96,8 @@ class Task {
   Clock& clock_;
   TaskConfig config_;
   CountedEvent* event_;
+  CycleGate* gate_ = nullptr;
+  CycleGate::Seat seat_;
   TaskRecorder recorder_;
 
   ReleaseGrid grid_;                            // cyclic
