@@ -4,7 +4,8 @@
  *
  *     plc_app_abi          PLC_APP_ABI_VERSION, checked before anything of it runs: write PLC_EXPORT_ABI;
  *     int plc_app_init(void)    called once after loading; calls __sys__setup__tasks(); 0 means success
- *     void plc_app_exit(void)   optional; called once when all tasks have ended
+ *     void plc_app_exit(void)   optional; called once when all tasks have ended, or when another version of
+ *                          the program has taken over from this one (see "Online change" below)
  *
  * and calls the functions of the runtime that are declared below; they are found when it is loaded.
  *
@@ -276,6 +277,10 @@ typedef struct {
 /* ERR_OK; ERR_PARAMETER: not such a handle, or dwSize; ERR_NOTINITIALIZED: not placed yet. Any. */
 RTS_RESULT CDECL plc_get_area_state(RTS_HANDLE hArea, Plc_Area_State* pState);
 
+/* ---- Online change --------------------------------------------------------------------------------------
+ */
+#include "plc_online_change.h"
+
 /* ---- Distributed clock ----------------------------------------------------------------------------------
  */
 
@@ -340,7 +345,7 @@ RTS_RESULT CDECL SchedPostExternalEvent(RTS_HANDLE hEvent);
 
 /* The other way of the seed: be told when a task is there that waits for an external event, keep its hEvent,
  * and set that. It works without a registration, and runs every task that is bound to the same event. */
-#define EVT_ExternalEventTaskCreateDone 0x0001u    /* tasks are made, not yet started */
+#define EVT_ExternalEventTaskCreateDone 0x0001u    /* tasks are made, not yet started; or changed online */
 #define EVT_PrepareExternalEventTaskDelete 0x0002u /* forget the hEvent now */
 
 typedef struct {

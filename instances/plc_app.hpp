@@ -187,6 +187,12 @@ class Area {
   RTS_HANDLE handle_ = RTS_INVALID_HANDLE;
 };
 
+/// Whether plc_app_init or plc_app_exit, as which the setup and on_exit run, are part of an online change:
+/// see plc_online_change. Control context.
+inline bool online_change() noexcept {
+  return plc_online_change() != 0;
+}
+
 /// Both stamps in nanoseconds and of the same instant: see SchedReportReferenceTime. Any context.
 inline RTS_RESULT report_reference_time(std::chrono::nanoseconds reference,
                                         std::chrono::nanoseconds local) noexcept {
@@ -288,6 +294,19 @@ class Application {
     return Area<T>(handle);
   }
 
+  /// Variables that an online change carries over, copied byte by byte to where the next version of the
+  /// program has those of this name: a struct with the state of the machine, say. `layout`: another number
+  /// when T's members mean something else. Nothing in it points into the program.
+  template <class T>
+  void keep(const std::string& name, T& variables, unsigned long layout = 0) {
+    static_assert(std::is_trivially_copyable_v<T>, "variables are copied byte by byte");
+    static_assert(!std::is_const_v<T>, "variables are written by an online change");
+    const RTS_RESULT result = plc_keep_variables(name.c_str(), &variables, sizeof variables, layout);
+    if (result != ERR_OK) {
+      throw std::runtime_error("variables '" + name + "' are refused: result " + std::to_string(result));
+    }
+  }
+
   /// Registers an own event ("ready"), or gives access to one of another instance ("packer1/product").
   ExternalEvent open_event(const std::string& name) {
     RTS_RESULT result = ERR_OK;
@@ -299,7 +318,8 @@ class Application {
     return ExternalEvent(handle);
   }
 
-  /// Runs once when all tasks have ended.
+  /// Runs once when all tasks have ended, or after an online change when another version has taken over from
+  /// this one: then online_change() is true, and the machine runs on.
   void on_exit(std::function<void()> action) { exit_ = std::move(action); }
 
   /// Called by the code of PLC_APPLICATION.
@@ -332,7 +352,8 @@ class Application {
   static std::size_t index_of_current() noexcept {
     return static_cast<std::size_t>(plc_current_task() - current()->tasks_.data());
   }
-  static Application*& current() noexcept {
+  // Each program's own, also if it is built with symbols that exist once in a process: hidden.
+  __attribute__((visibility("hidden"))) static Application*& current() noexcept {
     static Application* application = nullptr;
     return application;
   }

@@ -21,7 +21,7 @@ constexpr std::array kArrows = {
 
 bool is_of_life(ControlVerb verb) noexcept {
   return verb == ControlVerb::start || verb == ControlVerb::stop || verb == ControlVerb::single_cycle ||
-         verb == ControlVerb::set_scheduler;
+         verb == ControlVerb::set_scheduler || verb == ControlVerb::change_application;
 }
 
 Result<std::string> wrong_state(std::string text) {
@@ -33,9 +33,11 @@ Result<std::string> wrong_state(std::string text) {
 Result<std::string> ApplicationLife::admit(ControlVerb verb) const {
   if (!is_of_life(verb)) return {};
   const bool chooses_scheduler = verb == ControlVerb::set_scheduler;
+  const bool changes = verb == ControlVerb::change_application;
   switch (state_) {
     case none:
       if (chooses_scheduler) return {};
+      if (changes) return wrong_state("there is no application to change online: load one");
       return wrong_state(
           fmt::format("there is no application to {}: load one", verb == ControlVerb::stop ? "stop" : "run"));
     case stopped:
@@ -44,7 +46,7 @@ Result<std::string> ApplicationLife::admit(ControlVerb verb) const {
       }
       return {};
     case running:
-      if (verb == ControlVerb::stop || chooses_scheduler) return {};
+      if (verb == ControlVerb::stop || chooses_scheduler || changes) return {};
       return wrong_state(verb == ControlVerb::start
                              ? "the application runs; stop is possible"
                              : "the application runs: stop it first, a single cycle begins from stopped");

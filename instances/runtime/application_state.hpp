@@ -57,6 +57,9 @@ class ApplicationLife {
   /// wrong_state, busy: no; the text says what is possible. Verbs that are not in the table: always.
   [[nodiscard]] Result<std::string> admit(ControlVerb verb) const;
 
+  /// Something has happened to the application that leaves it in its state.
+  void stay(std::string_view reason) { record_(state_, state_, reason); }
+
   /// Goes there, if the picture above has an arrow. False: it has none; nothing has changed.
   bool go_to(ApplicationState to, std::string_view reason);
 

@@ -9,6 +9,7 @@
 #include "instances/runtime/application/application.hpp"
 #include "instances/runtime/application/application_host.hpp"
 #include "instances/runtime/application/components.hpp"
+#include "instances/runtime/application/online_change.hpp"
 #include "instances/runtime/application_state.hpp"
 #include "instances/runtime/device/device_description.hpp"
 #include "instances/runtime/idle_states.hpp"
@@ -56,7 +57,8 @@ class Instance {
   void beat();
   static constexpr auto kHeartbeat = std::chrono::milliseconds(100);
 
-  /// Goes on with a stop or a single cycle that is under way. Never waits. To be called now and then.
+  /// Goes on with a stop, a single cycle or an online change that is under way. Never waits. To be called now
+  /// and then.
   void advance();
   /// How soon advance() wants to be called; nothing: no need.
   [[nodiscard]] std::optional<Duration> wants_advance_in() const noexcept;
@@ -92,7 +94,7 @@ class Instance {
   [[nodiscard]] Result<std::string> make_tasks();
   [[nodiscard]] Result<std::string> start_scheduler();
 
-  /// Who waits for the end of a stop or of a single cycle.
+  /// Who waits for the end of a stop, of a single cycle or of an online change.
   struct Waiting {
     InstanceSocket::Asker asker;
     ControlVerb verb = ControlVerb::stop;
@@ -106,6 +108,12 @@ class Instance {
   [[nodiscard]] Result<std::string> change_registration(const ControlRequest& request);
   [[nodiscard]] Result<std::string> reset_statistics(const std::string& task);
   [[nodiscard]] std::string status() const;
+
+  // Another version of the application: instance_change.cpp
+  [[nodiscard]] Result<std::string> begin_change(const std::string& path);
+  void advance_change();
+  [[nodiscard]] std::string finish_change(Duration held);
+  void drop_change(const std::string& why);
 
   // The life of the application: instance_life.cpp
   [[nodiscard]] ApplicationLife::Record recorder();
@@ -143,7 +151,9 @@ class Instance {
   bool page_told_ = false;                   // that it is lost
   ReferenceMemory reference_;
   LinuxClock clock_;
-  std::unique_ptr<TaskSet> tasks_;  // uses all of the above: destroyed before them
+  std::unique_ptr<TaskSet> tasks_;        // uses all of the above: destroyed before them
+  std::unique_ptr<OnlineChange> change_;  // waits for a moment between all cycles
+  TimePoint change_ends_;                 // at the latest
   std::optional<InstanceSocket> control_;
   std::optional<TransitionRing> transitions_;
   ApplicationLife life_;

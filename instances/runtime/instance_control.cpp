@@ -15,6 +15,10 @@ std::optional<ControlReply> Instance::handle(const ControlRequest& request,
                                              const InstanceSocket::Asker& asker) {
   auto done = obey(request);
   const bool takes_time = request.verb == ControlVerb::stop || request.verb == ControlVerb::single_cycle;
+  if (done && request.verb == ControlVerb::change_application && change_) {
+    waiting_ = Waiting{.asker = asker, .verb = request.verb};
+    return std::nullopt;
+  }
   if (done && takes_time && in_transition()) {
     answer_waiting(ErrorCode::wrong_state,
                    "stopped before it was over");  // a single cycle that is broken off
@@ -41,6 +45,9 @@ Result<std::string> Instance::obey(const ControlRequest& request) {
     return admitted ? admitted
                     : failure_in(fmt::format("instance '{}'", options_.launch.name), admitted.error());
   }
+  const bool ends_change = request.verb == ControlVerb::start || request.verb == ControlVerb::stop ||
+                           request.verb == ControlVerb::single_cycle || request.verb == ControlVerb::shutdown;
+  if (ends_change) drop_change(fmt::format("'{}' came first", to_string(request.verb)));
   switch (request.verb) {
     case ControlVerb::start:
       return start("asked to start");
@@ -51,6 +58,8 @@ Result<std::string> Instance::obey(const ControlRequest& request) {
       return begin_single_cycle();
     case ControlVerb::set_scheduler:
       return set_scheduler(request.argument);
+    case ControlVerb::change_application:
+      return begin_change(request.argument);
     case ControlVerb::register_event:
     case ControlVerb::unregister_event:
       return change_registration(request);

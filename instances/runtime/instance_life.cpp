@@ -77,6 +77,7 @@ bool Instance::in_transition() const noexcept {
 }
 
 void Instance::advance() {
+  if (change_) advance_change();
   if (!in_transition()) return;
   if (life_.state() == ApplicationState::single_cycle && !tasks_->stop_begun()) {
     const bool done = tasks_->single_cycle_done();
@@ -118,6 +119,7 @@ std::string Instance::time_out(std::size_t task) {
 
 void Instance::enter_exception(const std::string& reason) {
   if (!life_.go_to(ApplicationState::exception, reason)) return;
+  drop_change("the application that runs is in exception");
   (void)host_->events().publish_bound(false);
   tasks_->park_all();
   beat();
@@ -136,6 +138,7 @@ void Instance::begin_shutdown(std::string_view why) {
     hurried_ = true;  // asked twice: whoever asks does not want to wait for cycles
     return;
   }
+  drop_change(std::string(why));
   const ApplicationState state = life_.state();
   if (state == ApplicationState::running || state == ApplicationState::single_cycle) begin_stop(why);
   advance();
@@ -146,12 +149,13 @@ bool Instance::ended() const noexcept {
 }
 
 std::optional<Duration> Instance::wants_advance_in() const noexcept {
-  if (!in_transition()) return std::nullopt;
+  if (!in_transition() && !change_) return std::nullopt;
   return kSoon;
 }
 
 Result<void> Instance::shut_down() {
   is_down_ = true;
+  drop_change("the process ends");
   Result<void> stopped;
   if (tasks_) {
     (void)host_->events().publish_bound(false);

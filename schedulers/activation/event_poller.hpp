@@ -13,14 +13,11 @@ namespace plchost {
 class EventPoller {
  public:
   /// `max_backlog` >= 1: of edges that are raised by call, the runs that a task may lag behind. `trap`:
-  /// catches what is faulty in the variables' code; null: one of its own. `gate`: that each look passes; null:
-  /// none.
+  /// catches what is faulty in the variables' code; null: one of its own. `gate`: that each look passes;
+  /// null: none.
   EventPoller(Clock& clock, std::uint64_t max_backlog, FaultTrap* trap = nullptr,
               CycleGate* gate = nullptr) noexcept
-      : clock_(clock),
-        max_backlog_(max_backlog),
-        trap_(trap != nullptr ? *trap : own_trap_),
-        gate_(gate) {}
+      : clock_(clock), max_backlog_(max_backlog), trap_(trap != nullptr ? *trap : own_trap_), gate_(gate) {}
 
   /// The source of an event task, which is polled from now on. Set-up.
   [[nodiscard]] std::unique_ptr<ActivationSource> add(Task& task);

@@ -21,6 +21,7 @@ constexpr std::array kVerbs = {
     std::pair{ControlVerb::restart, std::string_view("restart")},
     std::pair{ControlVerb::reset_statistics, std::string_view("reset statistics")},
     std::pair{ControlVerb::load_application, std::string_view("load application")},
+    std::pair{ControlVerb::change_application, std::string_view("change application")},
     std::pair{ControlVerb::set_scheduler, std::string_view("set scheduler")},
     std::pair{ControlVerb::register_event, std::string_view("register event")},
     std::pair{ControlVerb::unregister_event, std::string_view("unregister event")},

@@ -34,41 +34,88 @@ Result<void> call_init(const SharedObject& object) {
   }
 }
 
+void call_exit(const SharedObject& object) {
+  using Exit = void (*)();
+  const auto exit = std::bit_cast<Exit>(object.find("plc_app_exit"));
+  if (exit == nullptr) return;
+  try {
+    exit();
+  } catch (const std::exception& error) {
+    spdlog::error("{}: plc_app_exit threw: {}", object.path(), error.what());
+  } catch (...) {
+    spdlog::error("{}: plc_app_exit threw an exception", object.path());
+  }
+}
+
+// While the machine runs on.
+void leave_online(SharedObject& object, ApplicationHost& host) {
+  host.set_online_change(true);
+  call_exit(object);
+  host.set_online_change(false);
+  host.write_messages();
+  object.unload();
+}
+
 }  // namespace
 
 Result<Application> Application::load(const std::string& path, ApplicationHost& host) {
   auto object = SharedObject::load(path, kExports);
   if (!object) return std::unexpected(object.error());
+  host.begin_init();
   auto called = call_init(*object);
+  host.end_init();
   host.write_messages();  // what it said about itself goes before what we say
   if (!called) return std::unexpected(called.error());
-  if (host.tasks() == nullptr) {
+  return built(*object, host.declaration());
+}
+
+Result<Application> Application::load_beside(const std::string& path, ApplicationHost& host,
+                                             ApplicationDeclaration& declaration) {
+  auto object = SharedObject::load_copy(path, kExports);
+  if (!object) return std::unexpected(object.error());
+  host.begin_init(&declaration);
+  auto called = call_init(*object);
+  host.end_init();
+  host.write_messages();
+  if (!called) {
+    object->unload();
+    return std::unexpected(called.error());
+  }
+  auto made = built(*object, declaration);
+  if (!made) leave_online(*object, host);
+  return made;
+}
+
+Result<Application> Application::built(SharedObject& object, const ApplicationDeclaration& declaration) {
+  const std::string path = object.path();
+  if (declaration.tasks == nullptr) {
     return failure(ErrorCode::invalid_argument,
                    fmt::format("{}: plc_app_init did not call __sys__setup__tasks: it has no tasks", path));
   }
-  if (host.tasks_given_twice()) {
+  if (declaration.tasks_given_twice) {
     return failure(ErrorCode::invalid_argument,
                    fmt::format("{}: plc_app_init called __sys__setup__tasks more than once", path));
   }
-  auto tasks = build_tasks(*host.tasks());
+  TaskCodes codes;
+  auto tasks = build_tasks(*declaration.tasks, codes);
   if (!tasks) return failure_in(path, std::move(tasks).error());
-  if (auto applied = apply_task_settings(host.task_options(), *tasks); !applied) {
+  if (auto applied = apply_task_settings(declaration.task_options, *tasks); !applied) {
     return failure_in(path, std::move(applied).error());
   }
-  return Application(*std::move(object), *host.tasks(), *std::move(tasks));
+  return Application(std::move(object), *declaration.tasks, *std::move(tasks), std::move(codes));
+}
+
+void Application::exchange(Application& next) noexcept {
+  std::swap(object_, next.object_);
+  std::swap(setup_, next.setup_);
 }
 
 void Application::exit() {
-  using Exit = void (*)();
-  const auto exit = std::bit_cast<Exit>(object_.find("plc_app_exit"));
-  if (exit == nullptr) return;
-  try {
-    exit();
-  } catch (const std::exception& error) {
-    spdlog::error("{}: plc_app_exit threw: {}", object_.path(), error.what());
-  } catch (...) {
-    spdlog::error("{}: plc_app_exit threw an exception", object_.path());
-  }
+  call_exit(object_);
+}
+
+void Application::leave(ApplicationHost& host) {
+  leave_online(object_, host);
 }
 
 std::string Application::name() const {

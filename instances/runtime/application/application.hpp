@@ -7,6 +7,7 @@
 #include "instances/plc_app.h"
 #include "instances/runtime/application/application_host.hpp"
 #include "instances/runtime/application/shared_object.hpp"
+#include "instances/runtime/tasks/task_builder.hpp"
 #include "schedulers/task/task_config.hpp"
 #include "shm/base/result.hpp"
 
@@ -19,13 +20,27 @@ class Application {
   /// says what is wrong with the file or with which task. Control thread.
   [[nodiscard]] static Result<Application> load(const std::string& path, ApplicationHost& host);
 
+  /// The same for another version of the one that runs, which can lie beside that: what it says is collected
+  /// in `declaration`, and changes nothing of what runs.
+  [[nodiscard]] static Result<Application> load_beside(const std::string& path, ApplicationHost& host,
+                                                       ApplicationDeclaration& declaration);
+
   /// What the settings say about its tasks: wins over what it said itself.
   [[nodiscard]] Result<void> apply(std::span<const TaskSettings> settings) {
     return apply_task_settings(settings, tasks_);
   }
 
-  /// Calls plc_app_exit, if it has one. Once, when its tasks have ended.
+  /// Calls plc_app_exit, if it has one. Once, when its tasks have ended, or run the code of another version.
   void exit();
+
+  /// What its tasks run, in their order: to be exchanged.
+  [[nodiscard]] const TaskCodes& codes() const noexcept { return codes_; }
+  /// The tasks, whose code was exchanged, are from now on those of `next`; that is then the version before.
+  void exchange(Application& next) noexcept;
+  /// Ends a version whose code no task runs, while the machine runs on: its plc_app_exit, and it is unloaded.
+  /// Control thread.
+  void leave(ApplicationHost& host);
+  [[nodiscard]] bool contains(const void* address) const noexcept { return object_.contains(address); }
 
   [[nodiscard]] const std::string& path() const noexcept { return object_.path(); }
   [[nodiscard]] std::string name() const;
@@ -33,15 +48,19 @@ class Application {
   [[nodiscard]] const std::vector<TaskConfig>& tasks() const noexcept { return tasks_; }
   /// For those that put something around the cycles. Before the tasks are made.
   [[nodiscard]] std::span<TaskConfig> tasks_to_change() noexcept { return tasks_; }
-  [[nodiscard]] const Task_Info& info(std::size_t index) const noexcept { return setup_->ptaskinfo[index]; }
+  [[nodiscard]] const Task_Info& info(std::size_t index) const noexcept { return *codes_[index]->info; }
 
  private:
-  Application(SharedObject object, const sys_setup_tasks_struct& setup, std::vector<TaskConfig> tasks)
-      : object_(std::move(object)), setup_(&setup), tasks_(std::move(tasks)) {}
+  Application(SharedObject object, const sys_setup_tasks_struct& setup, std::vector<TaskConfig> tasks,
+              TaskCodes codes)
+      : object_(std::move(object)), setup_(&setup), tasks_(std::move(tasks)), codes_(std::move(codes)) {}
+  [[nodiscard]] static Result<Application> built(SharedObject& object,
+                                                 const ApplicationDeclaration& declaration);
 
   SharedObject object_;
   const sys_setup_tasks_struct* setup_;  // in the application
   std::vector<TaskConfig> tasks_;
+  TaskCodes codes_;  // in the order of tasks_
 };
 
 }  // namespace plchost

@@ -1,10 +1,14 @@
 #include "instances/runtime/application/application_host.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <exception>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "shm/base/log.hpp"
+#include "shm/base/names.hpp"
 
 namespace plchost {
 
@@ -35,10 +39,119 @@ ApplicationHost* ApplicationHost::current_for_control() noexcept {
   return nullptr;
 }
 
+void ApplicationHost::begin_init(ApplicationDeclaration* online) noexcept {
+  in_init_ = true;
+  online_declaration_ = online;
+  online_ = online != nullptr;
+}
+
+void ApplicationHost::end_init() noexcept {
+  in_init_ = online_ = false;
+  online_declaration_ = nullptr;
+}
+
+bool ApplicationHost::in_online_init() const noexcept {
+  return std::this_thread::get_id() == control_thread_ && online_declaration_ != nullptr;
+}
+
+void ApplicationHost::take_over(ApplicationDeclaration online,
+                                const std::function<bool(const void*)>& is_code) {
+  for (const RTS_HANDLE event : declaration_.events) {
+    if (std::ranges::find(online.events, event) == online.events.end())
+      (void)events_.unregister_by_application(event);
+  }
+  std::erase_if(callbacks_, [&](const Callback& known) {
+    return known.of_init || is_code(std::bit_cast<const void*>(known.callback.function));
+  });
+  for (const EventCallback& callback : online.callbacks) {
+    callbacks_.push_back({.callback = callback, .of_init = true});
+  }
+  declaration_ = std::move(online);
+}
+
+Result<void> ApplicationHost::register_more(const ApplicationDeclaration& online) {
+  for (const RTS_HANDLE event : online.events) {
+    if (std::ranges::find(declaration_.events, event) != declaration_.events.end()) continue;
+    if (auto done = events_.register_by_application(event); !done) {
+      unregister_more(online);
+      return done;
+    }
+  }
+  return {};
+}
+
+void ApplicationHost::unregister_more(const ApplicationDeclaration& online) {
+  for (const RTS_HANDLE event : online.events) {
+    if (std::ranges::find(declaration_.events, event) == declaration_.events.end())
+      (void)events_.unregister_by_application(event);
+  }
+}
+
 void ApplicationHost::set_up_tasks(sys_setup_tasks_struct* tasks) noexcept {
-  given_twice_ = given_twice_ || tasks_ != nullptr;
-  tasks_ = tasks;
-  task_table_.set_up(tasks);
+  ApplicationDeclaration& said = online_declaration_ != nullptr ? *online_declaration_ : declaration_;
+  said.tasks_given_twice = said.tasks_given_twice || said.tasks != nullptr;
+  said.tasks = tasks;
+  if (online_declaration_ == nullptr) task_table_.set_up(tasks);
+}
+
+RTS_RESULT ApplicationHost::keep_variables(const KeptVariables& variables) {
+  const auto refuse = [&](RTS_RESULT why, std::string_view text) {
+    spdlog::error("plc_keep_variables: variables '{}': {}", shown(variables.name), text);
+    return why;
+  };
+  if (!in_init_) return refuse(ERR_NOTINITIALIZED, "they are named in plc_app_init only");
+  if (auto valid = check_name("variables", variables.name, PLC_MAX_VARIABLE_NAME); !valid)
+    return refuse(ERR_PARAMETER, valid.error().message);
+  if (variables.address == nullptr || variables.bytes == 0)
+    return refuse(ERR_PARAMETER, "pAddress is null or dwBytes is 0");
+  ApplicationDeclaration& said = online_declaration_ != nullptr ? *online_declaration_ : declaration_;
+  std::uint64_t bytes = variables.bytes;
+  for (const KeptVariables& known : said.variables) {
+    if (known.name == variables.name) return refuse(ERR_DUPLICATE, "are named twice");
+    bytes += known.bytes;
+  }
+  if (said.variables.size() == PLC_MAX_VARIABLES || bytes > PLC_MAX_VARIABLE_BYTES) {
+    return refuse(ERR_NOMEMORY, fmt::format("at most {} with {} bytes in all can be named", PLC_MAX_VARIABLES,
+                                            PLC_MAX_VARIABLE_BYTES));
+  }
+  said.variables.push_back(variables);
+  return ERR_OK;
+}
+
+RTS_HANDLE ApplicationHost::declare_area(const Plc_Area* area, RTS_RESULT& result) {
+  if (online_declaration_ == nullptr) return areas_.declare(area, result);
+  return areas_.declare_again(online_declaration_->areas, area, result);
+}
+
+RTS_RESULT ApplicationHost::register_event(RTS_HANDLE event) {
+  if (online_declaration_ != nullptr) {
+    // By the program that runs it is no obstacle; by a component it is.
+    const auto has = [&](const std::vector<RTS_HANDLE>& events) {
+      return std::ranges::find(events, event) != events.end();
+    };
+    const bool by_component = events_.is_by_application(event) && !has(declaration_.events);
+    if (by_component || has(online_declaration_->events)) return ERR_DUPLICATE;
+    online_declaration_->events.push_back(event);
+    return ERR_OK;
+  }
+  const auto registered = events_.register_by_application(event);
+  if (registered) {
+    if (in_init_) declaration_.events.push_back(event);
+    return ERR_OK;
+  }
+  if (registered.error().code == ErrorCode::already_exists) return ERR_DUPLICATE;
+  spdlog::error("SchedRegisterExternalEvent: {}", registered.error().describe());
+  return ERR_NOMEMORY;
+}
+
+RTS_RESULT ApplicationHost::unregister_event(RTS_HANDLE event) {
+  if (online_declaration_ != nullptr) {
+    return std::erase(online_declaration_->events, event) == 0 ? ERR_NO_OBJECT : ERR_OK;
+  }
+  const auto done = events_.unregister_by_application(event);
+  if (!done) return done.error().code == ErrorCode::not_found ? ERR_NO_OBJECT : ERR_PARAMETER;
+  std::erase(declaration_.events, event);
+  return ERR_OK;
 }
 
 RTS_RESULT ApplicationHost::set_task_options(const char* task, const Task_Options* options) {
@@ -47,30 +160,44 @@ RTS_RESULT ApplicationHost::set_task_options(const char* task, const Task_Option
     spdlog::error("plc_set_task_options: {}", settings.error().describe());
     return ERR_PARAMETER;
   }
-  if (std::ranges::find(task_options_, settings->task, &TaskSettings::task) != task_options_.end()) {
+  ApplicationDeclaration& said = online_declaration_ != nullptr ? *online_declaration_ : declaration_;
+  if (std::ranges::find(said.task_options, settings->task, &TaskSettings::task) != said.task_options.end()) {
     return ERR_DUPLICATE;
   }
-  task_options_.push_back(*std::move(settings));
+  said.task_options.push_back(*std::move(settings));
   return ERR_OK;
 }
 
 RTS_RESULT ApplicationHost::add_callback(unsigned event, PF_EVENT_CALLBACK callback, void* user) {
   const bool known = event == EVT_ExternalEventTaskCreateDone || event == EVT_PrepareExternalEventTaskDelete;
   if (!known || callback == nullptr) return ERR_PARAMETER;
-  const Callback wanted{event, callback, user};
-  if (std::ranges::find(callbacks_, wanted) != callbacks_.end()) return ERR_DUPLICATE;
+  const EventCallback wanted{event, callback, user};
+  if (online_declaration_ != nullptr) {
+    auto& said = online_declaration_->callbacks;
+    if (std::ranges::find(said, wanted) != said.end()) return ERR_DUPLICATE;
+    const auto others = std::ranges::count(callbacks_, false, &Callback::of_init);
+    if (said.size() + static_cast<std::size_t>(others) == PLC_MAX_EVENT_CALLBACKS) return ERR_NOMEMORY;
+    said.push_back(wanted);
+    return ERR_OK;
+  }
+  if (std::ranges::find(callbacks_, wanted, &Callback::callback) != callbacks_.end()) return ERR_DUPLICATE;
   if (callbacks_.size() == PLC_MAX_EVENT_CALLBACKS) return ERR_NOMEMORY;
-  callbacks_.push_back(wanted);
+  callbacks_.push_back({.callback = wanted, .of_init = in_init_});
   return ERR_OK;
 }
 
 RTS_RESULT ApplicationHost::remove_callback(unsigned event, PF_EVENT_CALLBACK callback, void* user) {
-  return std::erase(callbacks_, Callback{event, callback, user}) == 0 ? ERR_NO_OBJECT : ERR_OK;
+  const EventCallback wanted{event, callback, user};
+  const bool removed =
+      online_declaration_ != nullptr
+          ? std::erase(online_declaration_->callbacks, wanted) != 0
+          : std::erase_if(callbacks_, [&](const Callback& known) { return known.callback == wanted; }) != 0;
+  return removed ? ERR_OK : ERR_NO_OBJECT;
 }
 
 void ApplicationHost::notify(unsigned event, const EVTPARAM_ExternalEventTask& parameter) const {
   const auto now = callbacks_;  // a callback may register or unregister
-  for (const Callback& callback : now) {
+  for (const auto& [callback, of_init] : now) {
     if (callback.event != event) continue;
     try {
       callback.function(event, &parameter, callback.user);
@@ -135,19 +262,13 @@ RTS_HANDLE SchedRegisterExternalEvent(const char* pszEvent, RTS_RESULT* pResult)
     const bool name = handle.error().code == plchost::ErrorCode::invalid_argument;
     return finish(name ? ERR_PARAMETER : ERR_NOMEMORY, RTS_INVALID_HANDLE);
   }
-  const auto registered = host->events().register_by_application(*handle);
-  if (registered) return finish(ERR_OK, *handle);
-  if (registered.error().code == plchost::ErrorCode::already_exists) return finish(ERR_DUPLICATE, *handle);
-  spdlog::error("SchedRegisterExternalEvent: {}", registered.error().describe());
-  return finish(ERR_NOMEMORY, RTS_INVALID_HANDLE);
+  const RTS_RESULT registered = host->register_event(*handle);
+  return finish(registered, registered == ERR_NOMEMORY ? RTS_INVALID_HANDLE : *handle);
 }
 
 RTS_RESULT SchedUnregisterExternalEvent(RTS_HANDLE hEvent) {
   ApplicationHost* const host = ApplicationHost::current_for_control();
-  if (host == nullptr) return ERR_NOTINITIALIZED;
-  const auto done = host->events().unregister_by_application(hEvent);
-  if (done) return ERR_OK;
-  return done.error().code == plchost::ErrorCode::not_found ? ERR_NO_OBJECT : ERR_PARAMETER;
+  return host == nullptr ? ERR_NOTINITIALIZED : host->unregister_event(hEvent);
 }
 
 RTS_RESULT SchedPostExternalEvent(RTS_HANDLE hEvent) {
@@ -168,6 +289,22 @@ RTS_RESULT EventUnregisterCallbackFunction(unsigned int EventId, PF_EVENT_CALLBA
 RTS_RESULT CAL_SysEventSet(RTS_HANDLE hEvent) {
   ApplicationHost* const host = ApplicationHost::current();
   return host == nullptr ? ERR_NOTINITIALIZED : host->events().set(hEvent);
+}
+
+RTS_RESULT plc_keep_variables(const char* pszName, void* pAddress, unsigned int dwBytes, RTS_UI64 qwLayout) {
+  ApplicationHost* const host = ApplicationHost::current_for_control();
+  if (host == nullptr) return ERR_NOTINITIALIZED;
+  return host->keep_variables({.name = pszName == nullptr
+                                           ? std::string()
+                                           : std::string(plchost::cut(pszName, PLC_MAX_VARIABLE_NAME + 1)),
+                               .address = pAddress,
+                               .bytes = dwBytes,
+                               .layout = qwLayout});
+}
+
+int plc_online_change() {
+  const ApplicationHost* const host = ApplicationHost::current_for_control();
+  return host != nullptr && host->online_change() ? 1 : 0;
 }
 
 int plc_start_kind() {

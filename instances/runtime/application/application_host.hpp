@@ -1,14 +1,15 @@
 #pragma once
 
+#include <functional>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include "instances/plc_app.h"
+#include "instances/runtime/application/application_declaration.hpp"
 #include "instances/runtime/areas/areas.hpp"
 #include "instances/runtime/blocks/block_service.hpp"
 #include "instances/runtime/message_queue.hpp"
-#include "instances/runtime/settings/task_settings.hpp"
 #include "instances/runtime/tasks/event_table.hpp"
 #include "instances/runtime/tasks/task_table.hpp"
 #include "shm/base/result.hpp"
@@ -40,15 +41,31 @@ class ApplicationHost {
   [[nodiscard]] Areas& areas() noexcept { return areas_; }
   [[nodiscard]] const Areas& areas() const noexcept { return areas_; }
 
-  /// What the application handed over; null if nothing yet.
-  [[nodiscard]] sys_setup_tasks_struct* tasks() const noexcept { return tasks_; }
-  [[nodiscard]] bool tasks_given_twice() const noexcept { return given_twice_; }
+  /// What the application that runs has said of itself.
+  [[nodiscard]] const ApplicationDeclaration& declaration() const noexcept { return declaration_; }
 
-  /// What the application said with plc_set_task_options().
-  [[nodiscard]] const std::vector<TaskSettings>& task_options() const noexcept { return task_options_; }
+  /// From here to end_init() a plc_app_init runs. `online`: of a program that is to take over from the one
+  /// that runs: what it says is collected there, and changes nothing else.
+  void begin_init(ApplicationDeclaration* online = nullptr) noexcept;
+  void end_init() noexcept;
+  /// The caller is in the plc_app_init of a program that is to take over. Any context.
+  [[nodiscard]] bool in_online_init() const noexcept;
+  /// The answer of plc_online_change().
+  [[nodiscard]] bool online_change() const noexcept { return online_; }
+  void set_online_change(bool online) noexcept { online_ = online; }
+  /// What `online` has said holds from now on. Callbacks of the program before, and others in its code as
+  /// `is_code` says, are forgotten.
+  void take_over(ApplicationDeclaration online, const std::function<bool(const void*)>& is_code);
+  /// Registers the events of `online` that the program before has not registered; all, or none.
+  [[nodiscard]] Result<void> register_more(const ApplicationDeclaration& online);
+  void unregister_more(const ApplicationDeclaration& online);
 
   void set_up_tasks(sys_setup_tasks_struct* tasks) noexcept;
   [[nodiscard]] RTS_RESULT set_task_options(const char* task, const Task_Options* options);
+  [[nodiscard]] RTS_RESULT keep_variables(const KeptVariables& variables);
+  [[nodiscard]] RTS_HANDLE declare_area(const Plc_Area* area, RTS_RESULT& result);
+  [[nodiscard]] RTS_RESULT register_event(RTS_HANDLE event);
+  [[nodiscard]] RTS_RESULT unregister_event(RTS_HANDLE event);
   [[nodiscard]] RTS_RESULT add_callback(unsigned event, PF_EVENT_CALLBACK callback, void* user);
   [[nodiscard]] RTS_RESULT remove_callback(unsigned event, PF_EVENT_CALLBACK callback, void* user);
   /// Calls the callbacks of `event` for one task.
@@ -59,10 +76,8 @@ class ApplicationHost {
 
  private:
   struct Callback {
-    unsigned event;
-    PF_EVENT_CALLBACK function;
-    void* user;
-    bool operator==(const Callback&) const = default;
+    EventCallback callback;
+    bool of_init;  // registered by the application in its plc_app_init
   };
 
   std::thread::id control_thread_ = std::this_thread::get_id();
@@ -71,10 +86,11 @@ class ApplicationHost {
   MessageQueue messages_;
   TaskTable task_table_;
   Areas areas_;
-  sys_setup_tasks_struct* tasks_ = nullptr;
-  bool given_twice_ = false;
   int start_kind_ = PLC_START_FIRST;
-  std::vector<TaskSettings> task_options_;
+  ApplicationDeclaration declaration_;
+  bool in_init_ = false;
+  ApplicationDeclaration* online_declaration_ = nullptr;  // while its plc_app_init runs
+  bool online_ = false;
   std::vector<Callback> callbacks_;
 };
 

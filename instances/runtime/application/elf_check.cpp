@@ -145,31 +145,6 @@ std::optional<unsigned> read_version(ElfBytes file, ElfBytes segments, const Elf
   return std::nullopt;
 }
 
-Result<std::vector<std::byte>> read_file(const std::string& path) {
-  const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-  if (!fd) {
-    const int error = errno;
-    return failure(error == ENOENT ? ErrorCode::not_found : ErrorCode::refused, "cannot be opened", error);
-  }
-  struct stat status{};
-  if (::fstat(fd.get(), &status) != 0) return failure(ErrorCode::system, "fstat", errno);
-  if (!S_ISREG(status.st_mode)) return invalid("is not a file");
-  if (static_cast<std::uint64_t>(status.st_size) > kMaxProgramFile) {
-    return invalid(fmt::format("is larger than {} bytes", kMaxProgramFile));
-  }
-  std::vector<std::byte> bytes(static_cast<std::size_t>(status.st_size));
-  std::size_t filled = 0;
-  while (filled < bytes.size()) {
-    const ssize_t got = ::read(fd.get(), bytes.data() + filled, bytes.size() - filled);
-    if (got < 0 && errno == EINTR) continue;
-    if (got < 0) return failure(ErrorCode::system, "cannot be read", errno);
-    if (got == 0) break;
-    filled += static_cast<std::size_t>(got);
-  }
-  bytes.resize(filled);
-  return bytes;
-}
-
 }  // namespace
 
 Result<void> check_elf(ElfBytes file, std::span<const std::string_view> symbols) {
@@ -198,8 +173,53 @@ Result<void> check_elf(ElfBytes file, std::span<const std::string_view> symbols)
   return {};
 }
 
+Result<std::vector<std::byte>> read_program(const std::string& path) {
+  const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  if (!fd) {
+    const int error = errno;
+    return failure(error == ENOENT ? ErrorCode::not_found : ErrorCode::refused, "cannot be opened", error);
+  }
+  struct stat status{};
+  if (::fstat(fd.get(), &status) != 0) return failure(ErrorCode::system, "fstat", errno);
+  if (!S_ISREG(status.st_mode)) return invalid("is not a file");
+  if (static_cast<std::uint64_t>(status.st_size) > kMaxProgramFile) {
+    return invalid(fmt::format("is larger than {} bytes", kMaxProgramFile));
+  }
+  std::vector<std::byte> bytes(static_cast<std::size_t>(status.st_size));
+  std::size_t filled = 0;
+  while (filled < bytes.size()) {
+    const ssize_t got = ::read(fd.get(), bytes.data() + filled, bytes.size() - filled);
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) return failure(ErrorCode::system, "cannot be read", errno);
+    if (got == 0) break;
+    filled += static_cast<std::size_t>(got);
+  }
+  bytes.resize(filled);
+  return bytes;
+}
+
+Result<void> check_elf_can_leave(ElfBytes file) {
+  const auto header = check_header(file);
+  if (!header) return std::unexpected(header.error());
+  const auto tables = find_tables(file, *header);
+  if (!tables) return std::unexpected(tables.error());
+  const auto exported = find_symbols(file, tables->sections);
+  if (!exported) return std::unexpected(exported.error());
+  for (std::uint64_t i = 0; const auto symbol = elf_item<Elf64_Sym>(exported->entries, i); ++i) {
+    if (symbol->st_shndx == SHN_UNDEF || ELF64_ST_BIND(symbol->st_info) != STB_GNU_UNIQUE) continue;
+    const ElfBytes rest =
+        exported->names.subspan(std::min<std::size_t>(symbol->st_name, exported->names.size()));
+    const auto* const name = reinterpret_cast<const char*>(rest.data());
+    return failure(ErrorCode::unsupported,
+                   fmt::format("has symbols that exist once in a process ('{}'), so that it would share them "
+                               "with the version that runs: build it with -fno-gnu-unique",
+                               shown({name, ::strnlen(name, rest.size())})));
+  }
+  return {};
+}
+
 Result<void> check_elf_file(const std::string& path, std::span<const std::string_view> symbols) {
-  const auto bytes = read_file(path);
+  const auto bytes = read_program(path);
   auto checked = bytes ? check_elf(*bytes, symbols) : Result<void>(std::unexpected(bytes.error()));
   if (!checked) checked.error().message = fmt::format("{} {}", path, checked.error().message);
   return checked;

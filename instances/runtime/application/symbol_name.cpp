@@ -66,6 +66,19 @@ std::optional<Function> function_at(ElfBytes file, std::uint64_t address) {
   return std::nullopt;
 }
 
+// How people call it. A copy in memory has the name of the file that was copied.
+std::string file_name(const char* path) {
+  std::error_code error;
+  const std::filesystem::path given(path);
+  if (!given.string().starts_with("/proc/self/fd/")) return given.filename();
+  std::string name = std::filesystem::read_symlink(given, error).filename();  // "/memfd:NAME (deleted)"
+  constexpr std::string_view kBefore = "memfd:";
+  constexpr std::string_view kBehind = " (deleted)";
+  if (name.starts_with(kBefore)) name.erase(0, kBefore.size());
+  if (name.ends_with(kBehind)) name.resize(name.size() - kBehind.size());
+  return name;
+}
+
 std::vector<char> contents_of(const char* path) {
   std::ifstream file(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
@@ -79,7 +92,7 @@ std::string symbol_name(std::uintptr_t address) {
   if (address == 0 || ::dladdr(reinterpret_cast<const void*>(address), &info) == 0 ||
       info.dli_fname == nullptr)
     return {};
-  const std::string file = std::filesystem::path(info.dli_fname).filename();
+  const std::string file = file_name(info.dli_fname);
   const auto in_file = address - reinterpret_cast<std::uintptr_t>(info.dli_fbase);
   const std::vector<char> bytes = contents_of(info.dli_fname);
   if (const auto function = function_at(std::as_bytes(std::span(bytes)), in_file)) {

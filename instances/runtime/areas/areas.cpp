@@ -22,6 +22,26 @@ std::size_t number_of(RTS_HANDLE handle) noexcept {
   return reinterpret_cast<std::uintptr_t>(handle) - 1;
 }
 
+RTS_RESULT refuse_area(RTS_RESULT why, std::string_view text) {
+  spdlog::error("plc_declare_area: {}", text);
+  return why;
+}
+
+RTS_RESULT add_area(std::vector<DeclaredArea>& areas, const Plc_Area* area) {
+  if (area == nullptr) return refuse_area(ERR_PARAMETER, "pArea is null");
+  auto taken = from_declaration(*area);
+  if (!taken) return refuse_area(ERR_PARAMETER, taken.error().message);
+  if (std::ranges::find(areas, taken->name, &DeclaredArea::name) != areas.end()) {
+    return refuse_area(ERR_DUPLICATE, fmt::format("area '{}' is declared twice", taken->name));
+  }
+  if (areas.size() == PLC_MAX_AREAS) {
+    return refuse_area(ERR_NOMEMORY,
+                       fmt::format("area '{}' is one too many: {} can be", taken->name, PLC_MAX_AREAS));
+  }
+  areas.push_back(*std::move(taken));
+  return ERR_OK;
+}
+
 // Says on this thread whose cycle it runs: also if that ends with an exception.
 class CycleHere {
  public:
@@ -58,25 +78,34 @@ void TaskCycle::run(const std::function<void()>& entry) {
 }
 
 RTS_HANDLE Areas::declare(const Plc_Area* area, RTS_RESULT& result) {
-  const auto refuse = [&](RTS_RESULT why, std::string_view text) {
-    spdlog::error("plc_declare_area: {}", text);
-    result = why;
+  if (!open_) {
+    result = refuse_area(ERR_NOTINITIALIZED, "areas are declared from plc_app_init only");
     return RTS_INVALID_HANDLE;
-  };
-  if (!open_) return refuse(ERR_NOTINITIALIZED, "areas are declared from plc_app_init only");
-  if (area == nullptr) return refuse(ERR_PARAMETER, "pArea is null");
-  auto taken = from_declaration(*area);
-  if (!taken) return refuse(ERR_PARAMETER, taken.error().message);
-  if (std::ranges::find(declared_, taken->name, &DeclaredArea::name) != declared_.end()) {
-    return refuse(ERR_DUPLICATE, fmt::format("area '{}' is declared twice", taken->name));
   }
-  if (declared_.size() == PLC_MAX_AREAS) {
-    return refuse(ERR_NOMEMORY,
-                  fmt::format("area '{}' is one too many: {} can be", taken->name, PLC_MAX_AREAS));
+  result = add_area(declared_, area);
+  return result == ERR_OK ? handle_of(declared_.size() - 1) : RTS_INVALID_HANDLE;
+}
+
+RTS_HANDLE Areas::declare_again(std::vector<DeclaredArea>& areas, const Plc_Area* area,
+                                RTS_RESULT& result) const {
+  result = add_area(areas, area);
+  if (result != ERR_OK) return RTS_INVALID_HANDLE;
+  const auto known = std::ranges::find(declared_, areas.back().name, &DeclaredArea::name);
+  return handle_of(static_cast<std::size_t>(known - declared_.begin()));
+}
+
+void Areas::tell_addresses(const std::vector<DeclaredArea>& areas) const {
+  for (const DeclaredArea& area : areas) {
+    const auto known = std::ranges::find(declared_, area.name, &DeclaredArea::name);
+    if (!placed_ || known == declared_.end()) continue;
+    const auto number = static_cast<std::size_t>(known - declared_.begin());
+    for (const AreaUse& use : area.uses) {
+      void* const address =
+          area.has_image() ? cycles_[task_number(use.task)].address(number) : plain_[number];
+      if (use.address != nullptr) *use.address = address;
+      if ((!area.has_image() || area.uses.size() == 1) && area.address != nullptr) *area.address = address;
+    }
   }
-  declared_.push_back(*std::move(taken));
-  result = ERR_OK;
-  return handle_of(declared_.size() - 1);
 }
 
 void* Areas::address(RTS_HANDLE area) const noexcept {

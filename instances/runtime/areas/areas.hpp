@@ -68,6 +68,15 @@ class Areas {
 
   /// plc_declare_area. Control thread, while the application is loaded.
   [[nodiscard]] RTS_HANDLE declare(const Plc_Area* area, RTS_RESULT& result);
+  /// The same, for another version of the application that is to take over: collected in `areas`. The handle
+  /// is that of the area of this name.
+  [[nodiscard]] RTS_HANDLE declare_again(std::vector<DeclaredArea>& areas, const Plc_Area* area,
+                                         RTS_RESULT& result) const;
+  /// All that is declared, with the tasks that use it.
+  [[nodiscard]] const std::vector<DeclaredArea>& declared() const noexcept { return declared_; }
+  /// Tells another version of the application, which has declared the same areas, the addresses. Control
+  /// thread, before its first cycle.
+  void tell_addresses(const std::vector<DeclaredArea>& areas) const;
   /// Places all that is declared, fills it with what was kept or with initial values, tells the application
   /// the addresses, and puts the exchange of inputs and outputs around the cycles of the tasks that use them:
   /// the others stay as they are. A text: remarks. Once, after the application was loaded; set-up.

@@ -112,6 +112,11 @@ Result<void> EventTable::register_by_application(RTS_HANDLE handle) {
   return publish_registered(*slot);
 }
 
+bool EventTable::is_by_application(RTS_HANDLE handle) const noexcept {
+  const Slot* const slot = find(handle);
+  return slot != nullptr && slot->by_application;
+}
+
 Result<void> EventTable::unregister_by_application(RTS_HANDLE handle) {
   Slot* const slot = find(handle);
   if (slot == nullptr) return failure(ErrorCode::invalid_argument, "not the handle of an external event");

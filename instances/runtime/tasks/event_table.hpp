@@ -34,6 +34,8 @@ class EventTable {
   /// Registration by the application or a component. already_exists: by one of them before.
   [[nodiscard]] Result<void> register_by_application(RTS_HANDLE handle);
   [[nodiscard]] Result<void> unregister_by_application(RTS_HANDLE handle);
+  /// One of them has registered it.
+  [[nodiscard]] bool is_by_application(RTS_HANDLE handle) const noexcept;
   /// Registration by the device description, of an own event: for the life of the process.
   [[nodiscard]] Result<void> register_by_device(std::string_view event);
   /// Registration by the operator, of an own event. already_exists: by anyone before.

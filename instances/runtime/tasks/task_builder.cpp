@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <memory>
 #include <set>
 #include <span>
 #include <string>
@@ -42,7 +43,7 @@ Duration interval_of(const Task_Info& task) {
 }
 
 // What only one kind of task has.
-Result<void> fill_kind(Task_Info& task, TaskConfig& config) {
+Result<void> fill_kind(const Task_Info& task, const std::shared_ptr<TaskCode>& code, TaskConfig& config) {
   switch (config.kind) {
     case TaskKind::cyclic:
       config.interval = interval_of(task);
@@ -53,9 +54,10 @@ Result<void> fill_kind(Task_Info& task, TaskConfig& config) {
     case TaskKind::event:
       if (task.dwEventFunctionPointer == nullptr)
         return invalid_task("dwEventFunctionPointer of an event task is null");
-      config.event_variable = [&task, read = task.dwEventFunctionPointer] {
-        const CurrentTask current(&task);
-        return read() != 0;
+      code->read = task.dwEventFunctionPointer;
+      config.event_variable = [code] {
+        const CurrentTask current(code->info);
+        return code->read() != 0;
       };
       return {};
     case TaskKind::external: {
@@ -70,7 +72,7 @@ Result<void> fill_kind(Task_Info& task, TaskConfig& config) {
   return {};
 }
 
-Result<TaskConfig> build_task(Task_Info& task) {
+Result<TaskConfig> build_task(Task_Info& task, const std::shared_ptr<TaskCode>& code) {
   if (task.nPriority < 0 || task.nPriority > kLowestIecPriority) {
     return invalid_task(
         fmt::format("nPriority {} is not allowed: 0 (highest) to {} is", task.nPriority, kLowestIecPriority));
@@ -84,18 +86,24 @@ Result<TaskConfig> build_task(Task_Info& task) {
   TaskConfig config;
   config.kind = static_cast<TaskKind>(task.KindOfTask);
   config.iec_priority = task.nPriority;
-  config.entry = [&task, run = task.dwTaskEntryFunctionPointer] {
-    const CurrentTask current(&task);
-    run();
+  *code = {.info = &task, .run = task.dwTaskEntryFunctionPointer};
+  config.entry = [code] {
+    const CurrentTask current(code->info);
+    code->run();
   };
-  config.after_cycle = [&task](const TaskCounters& counters) { write_back(counters, task); };
-  if (auto filled = fill_kind(task, config); !filled) return std::unexpected(filled.error());
+  config.after_cycle = [code](const TaskCounters& counters) { write_back(counters, *code->info); };
+  if (auto filled = fill_kind(task, code, config); !filled) return std::unexpected(filled.error());
   return config;
 }
 
 }  // namespace
 
 Result<std::vector<TaskConfig>> build_tasks(const sys_setup_tasks_struct& setup) {
+  TaskCodes codes;
+  return build_tasks(setup, codes);
+}
+
+Result<std::vector<TaskConfig>> build_tasks(const sys_setup_tasks_struct& setup, TaskCodes& codes) {
   if (setup.nTasks < 1 || setup.nTasks > PLC_MAX_TASKS) {
     return invalid_task(fmt::format("nTasks {} is not allowed: 1 to {} is", setup.nTasks, PLC_MAX_TASKS));
   }
@@ -113,7 +121,7 @@ Result<std::vector<TaskConfig>> build_tasks(const sys_setup_tasks_struct& setup)
       return failure_in(fmt::format("task number {}", i), valid.error());
     }
     if (!names.insert(*name).second) return invalid_task(fmt::format("two tasks are called '{}'", *name));
-    auto config = build_task(task);
+    auto config = build_task(task, codes.emplace_back(std::make_shared<TaskCode>()));
     if (!config) return failure_in(fmt::format("task '{}'", *name), config.error());
     config->name = *name;
     configs.push_back(*std::move(config));

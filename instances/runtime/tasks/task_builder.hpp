@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "instances/plc_app.h"
@@ -9,9 +10,21 @@
 
 namespace plchost {
 
+/// What a task runs of its application. Another version of that may be put in its place while no task is in a
+/// cycle and no event variable is read.
+struct TaskCode {
+  Task_Info* info = nullptr;  ///< where its figures are written
+  PLC_TASK_FUNCTION run = nullptr;
+  PLC_EVENT_FUNCTION read = nullptr;  ///< event tasks
+};
+using TaskCodes = std::vector<std::shared_ptr<TaskCode>>;
+
 /// Checks the whole task configuration of an application and translates it for the schedulers. The tasks'
 /// functions are called with plc_current_task() set, and their figures are written back. `setup` outlives the
-/// tasks. invalid_argument: the text names the task, the field, and what is allowed. Set-up.
+/// tasks, unless `codes`, which gets what each of them runs, is given others. invalid_argument: the text
+/// names the task, the field, and what is allowed. Set-up.
+[[nodiscard]] Result<std::vector<TaskConfig>> build_tasks(const sys_setup_tasks_struct& setup,
+                                                          TaskCodes& codes);
 [[nodiscard]] Result<std::vector<TaskConfig>> build_tasks(const sys_setup_tasks_struct& setup);
 
 /// Writes the cycle times and the jitter, in us, into the application's own memory. Real-time.

@@ -1,6 +1,5 @@
 #include "instances/runtime/tasks/task_table.hpp"
 
-#include <algorithm>
 #include <cstring>
 #include <iterator>
 #include <span>
@@ -25,17 +24,35 @@ std::string_view name_of(const Task_Info& task) noexcept {
 
 }  // namespace
 
+void TaskTable::set_up(const sys_setup_tasks_struct* setup) {
+  std::deque<Row>& rows = made_.emplace_back();
+  for (const Task_Info& task : tasks_of(setup)) {
+    Row& row = rows.emplace_back();
+    row.name = name_of(task);
+    row.info.store(&task, std::memory_order_relaxed);
+  }
+  rows_.store(&rows, std::memory_order_release);
+}
+
+void TaskTable::exchange(std::span<Task_Info* const> infos) noexcept {
+  std::deque<Row>& rows = made_.back();
+  for (std::size_t i = 0; i < rows.size() && i < infos.size(); ++i) {
+    rows[i].info.store(infos[i], std::memory_order_relaxed);
+  }
+}
+
 RTS_HANDLE TaskTable::find(std::string_view name) const noexcept {
-  const auto tasks = tasks_of(setup_.load(std::memory_order_acquire));
-  const auto found = std::ranges::find(tasks, name, name_of);
-  if (found == tasks.end()) return RTS_INVALID_HANDLE;
-  return to_handle(static_cast<std::size_t>(found - tasks.begin()));
+  const std::deque<Row>* const rows = rows_.load(std::memory_order_acquire);
+  for (std::size_t i = 0; rows != nullptr && i < rows->size(); ++i) {
+    if ((*rows)[i].name == name) return to_handle(i);
+  }
+  return RTS_INVALID_HANDLE;
 }
 
 RTS_HANDLE TaskTable::find(const Task_Info* info) const noexcept {
-  const auto tasks = tasks_of(setup_.load(std::memory_order_acquire));
-  for (std::size_t i = 0; i < tasks.size(); ++i) {
-    if (&tasks[i] == info) return to_handle(i);
+  const std::deque<Row>* const rows = rows_.load(std::memory_order_acquire);
+  for (std::size_t i = 0; rows != nullptr && i < rows->size(); ++i) {
+    if ((*rows)[i].info.load(std::memory_order_relaxed) == info) return to_handle(i);
   }
   return RTS_INVALID_HANDLE;
 }
@@ -59,7 +76,8 @@ namespace {
 // The task behind the handle, or why there is none.
 RTS_RESULT find_task(RTS_HANDLE handle, Task*& task) noexcept {
   ApplicationHost* const host = ApplicationHost::current();
-  if (host == nullptr || host->task_table().tasks() == nullptr) return ERR_NOTINITIALIZED;
+  if (host == nullptr || host->in_online_init() || host->task_table().tasks() == nullptr)
+    return ERR_NOTINITIALIZED;
   task = host->task_table().task(handle);
   return task == nullptr ? ERR_PARAMETER : ERR_OK;
 }

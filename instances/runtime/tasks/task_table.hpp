@@ -2,7 +2,11 @@
 
 #include <atomic>
 #include <cstddef>
+#include <deque>
+#include <span>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "instances/plc_app.h"
 #include "schedulers/task_set.hpp"
@@ -15,9 +19,9 @@ namespace plchost {
 class TaskTable {
  public:
   /// What the application handed over, once. Control thread.
-  void set_up(const sys_setup_tasks_struct* setup) noexcept {
-    setup_.store(setup, std::memory_order_release);
-  }
+  void set_up(const sys_setup_tasks_struct* setup);
+  /// The same tasks in the same order, as another version of the application has them. While no cycle runs.
+  void exchange(std::span<Task_Info* const> infos) noexcept;
   /// The tasks behind the handles, in the same order; null: none any more, nor does anybody use them. Control
   /// thread.
   void attach(TaskSet* tasks) noexcept { tasks_.store(tasks, std::memory_order_release); }
@@ -32,7 +36,13 @@ class TaskTable {
   [[nodiscard]] TaskSet* tasks() const noexcept { return tasks_.load(std::memory_order_acquire); }
 
  private:
-  std::atomic<const sys_setup_tasks_struct*> setup_{nullptr};
+  /// Names of our own: those of an application go with it.
+  struct Row {
+    std::string name;
+    std::atomic<const Task_Info*> info{nullptr};
+  };
+  std::deque<std::deque<Row>> made_;  // those of a second call, too: it is refused later
+  std::atomic<const std::deque<Row>*> rows_{nullptr};
   std::atomic<TaskSet*> tasks_{nullptr};
 };
 

@@ -11,6 +11,8 @@ const any_function every_call[] = {
     (any_function)plc_declare_area,
     (any_function)plc_area_address,
     (any_function)plc_get_area_state,
+    (any_function)plc_keep_variables,
+    (any_function)plc_online_change,
     (any_function)SchedRegisterExternalEvent,
     (any_function)SchedUnregisterExternalEvent,
     (any_function)SchedPostExternalEvent,

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "instances/plc_app.h"
+#include "instances/runtime/areas/declared_area.hpp"
+#include "instances/runtime/settings/task_settings.hpp"
+
+namespace plchost {
+
+/// What plc_keep_variables() names.
+struct KeptVariables {
+  std::string name;
+  void* address = nullptr;  ///< in the application
+  std::uint32_t bytes = 0;
+  std::uint64_t layout = 0;
+};
+
+struct EventCallback {
+  unsigned event = 0;
+  PF_EVENT_CALLBACK function = nullptr;
+  void* user = nullptr;
+  bool operator==(const EventCallback&) const = default;
+};
+
+/// What an application says of itself in its plc_app_init.
+struct ApplicationDeclaration {
+  sys_setup_tasks_struct* tasks = nullptr;  ///< in the application; null: nothing yet
+  bool tasks_given_twice = false;
+  std::vector<TaskSettings> task_options;
+  std::vector<KeptVariables> variables;
+  std::vector<RTS_HANDLE> events;        ///< that it registers
+  std::vector<EventCallback> callbacks;  ///< of one that is to take over: the others' are called already
+  std::vector<DeclaredArea> areas;       ///< the same: those of the one that runs are in Areas
+};
+
+}  // namespace plchost

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "instances/runtime/application/application_declaration.hpp"
+#include "schedulers/task/task_config.hpp"
+
+namespace plchost {
+
+// What keeps another version of an application from taking over while it runs: a line for each, "task 'Fill':
+// nPriority is 2, of the one that runs it is 1". Empty: nothing. Set-up.
+
+/// The same tasks, in any order; all that the application or the settings say of them.
+[[nodiscard]] std::vector<std::string> compare_tasks(std::span<const TaskConfig> running,
+                                                     std::span<const TaskConfig> next);
+/// The same areas, in any order, with the tasks that use them.
+[[nodiscard]] std::vector<std::string> compare_areas(std::span<const DeclaredArea> running,
+                                                     std::span<const DeclaredArea> next);
+/// Variables that both name. Others may come and go.
+[[nodiscard]] std::vector<std::string> compare_variables(std::span<const KeptVariables> running,
+                                                         std::span<const KeptVariables> next);
+
+}  // namespace plchost

@@ -1,0 +1,120 @@
+#include "instances/runtime/application/online_change.hpp"
+
+#include <algorithm>
+#include <cstring>
+#include <iterator>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "instances/runtime/application/compare_versions.hpp"
+
+namespace plchost {
+
+namespace {
+
+// As many reasons as a reply has room for.
+std::string first_of(const std::vector<std::string>& lines) {
+  constexpr std::size_t kMost = 8;
+  std::string text = fmt::format(
+      "{}", fmt::join(lines.begin(),
+                      lines.begin() + static_cast<std::ptrdiff_t>(std::min(lines.size(), kMost)), "; "));
+  if (lines.size() > kMost) text += fmt::format("; and {} more", lines.size() - kMost);
+  return text;
+}
+
+void copy_figures(const Task_Info& from, Task_Info& to) noexcept {
+  to.tLastCycleTime = from.tLastCycleTime;
+  to.tAverageCycleTime = from.tAverageCycleTime;
+  to.tMaxCycleTime = from.tMaxCycleTime;
+  to.tMinCycleTime = from.tMinCycleTime;
+  to.tJitterMax = from.tJitterMax;
+  to.tJitterLast = from.tJitterLast;
+}
+
+}  // namespace
+
+Result<std::unique_ptr<OnlineChange>> OnlineChange::prepare(const std::string& path, Application& running,
+                                                            ApplicationHost& host,
+                                                            std::span<const TaskSettings> settings) {
+  ApplicationDeclaration declaration;
+  auto next = Application::load_beside(path, host, declaration);
+  if (!next) return std::unexpected(std::move(next).error());
+  // From here on its destructor ends the new version.
+  std::unique_ptr<OnlineChange> change(
+      new OnlineChange(running, *std::move(next), std::move(declaration), host));
+  if (auto checked = change->check(settings); !checked) return std::unexpected(std::move(checked).error());
+  if (auto connected = change->connect(); !connected) return std::unexpected(std::move(connected).error());
+  return change;
+}
+
+OnlineChange::~OnlineChange() {
+  if (connected_ && !taken_over_) host_.unregister_more(declaration_);
+  next_.leave(host_);  // or the version before
+}
+
+Result<void> OnlineChange::check(std::span<const TaskSettings> settings) {
+  if (auto applied = next_.apply(settings); !applied) return applied;
+  std::vector<std::string> names;
+  for (const TaskConfig& task : next_.tasks()) names.push_back(task.name);
+  if (auto done = complete_uses(declaration_.areas, names); !done) return done;
+  std::vector<std::string> lines;
+  if (next_.name() != running_.name()) {
+    lines.push_back(fmt::format("it is the application '{}', '{}' runs", next_.name(), running_.name()));
+  }
+  const auto add = [&](std::vector<std::string> more) { std::ranges::move(more, std::back_inserter(lines)); };
+  add(compare_tasks(running_.tasks(), next_.tasks()));
+  add(compare_areas(host_.areas().declared(), declaration_.areas));
+  add(compare_variables(host_.declaration().variables, declaration_.variables));
+  if (lines.empty()) return {};
+  return failure(ErrorCode::refused,
+                 fmt::format("{} cannot take over online: {}; nothing is changed; load it without --online",
+                             next_.path(), first_of(lines)));
+}
+
+Result<void> OnlineChange::connect() {
+  if (auto registered = host_.register_more(declaration_); !registered) return registered;
+  connected_ = true;
+  host_.areas().tell_addresses(declaration_.areas);
+  for (const TaskConfig& task : running_.tasks()) {
+    const auto same = std::ranges::find(next_.tasks(), task.name, &TaskConfig::name);
+    codes_.push_back(next_.codes()[static_cast<std::size_t>(same - next_.tasks().begin())]);
+    infos_.push_back(codes_.back()->info);
+  }
+  for (const KeptVariables& kept : host_.declaration().variables) {
+    const auto same = std::ranges::find(declaration_.variables, kept.name, &KeptVariables::name);
+    if (same == declaration_.variables.end()) continue;
+    copies_.push_back({.to = same->address, .from = kept.address, .bytes = kept.bytes});
+    copied_.push_back(kept.name);
+  }
+  return {};
+}
+
+void OnlineChange::take_over() noexcept {
+  for (const Copy& copy : copies_) std::memcpy(copy.to, copy.from, copy.bytes);
+  for (std::size_t i = 0; i < codes_.size(); ++i) {
+    TaskCode& code = *running_.codes()[i];
+    copy_figures(*code.info, *codes_[i]->info);
+    code = *codes_[i];
+  }
+  host_.task_table().exchange(infos_);
+  running_.exchange(next_);
+  taken_over_ = true;
+}
+
+void OnlineChange::finish(const std::function<void()>& notify) {
+  // next_ is the version before now.
+  host_.take_over(std::move(declaration_), [this](const void* code) { return next_.contains(code); });
+  notify();
+}
+
+std::string OnlineChange::describe() const {
+  std::size_t bytes = 0;
+  for (const Copy& copy : copies_) bytes += copy.bytes;
+  return fmt::format("{} areas go on, {}", host_.areas().declared().size(),
+                     copied_.empty() ? std::string("no variables were carried over")
+                                     : fmt::format("variables {} were carried over ({} bytes)",
+                                                   fmt::join(copied_, ", "), bytes));
+}
+
+}  // namespace plchost

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "instances/runtime/application/application.hpp"
+#include "instances/runtime/application/application_declaration.hpp"
+#include "instances/runtime/application/application_host.hpp"
+#include "shm/base/result.hpp"
+
+namespace plchost {
+
+/// Another version of the application that runs, loaded beside it and ready to take over. Control thread.
+class OnlineChange {
+ public:
+  /// Loads it, has its plc_app_init called, and compares it with what runs, of which nothing is changed.
+  /// refused: it cannot take over; the text lists the reasons. Else: what is wrong with the file.
+  [[nodiscard]] static Result<std::unique_ptr<OnlineChange>> prepare(const std::string& path,
+                                                                     Application& running,
+                                                                     ApplicationHost& host,
+                                                                     std::span<const TaskSettings> settings);
+  /// Without take_over() the new version ends, and nothing is left of it.
+  ~OnlineChange();
+  OnlineChange(const OnlineChange&) = delete;
+  OnlineChange& operator=(const OnlineChange&) = delete;
+
+  /// Copies the variables and gives the tasks the new functions. Once, while no task is in a cycle and no
+  /// event variable is read; as long as the copying takes.
+  void take_over() noexcept;
+  /// What is left to do then: callbacks, registrations, and the end of the version before. The callbacks for
+  /// external-event tasks are `notify`'s.
+  void finish(const std::function<void()>& notify);
+
+  [[nodiscard]] const std::string& path() const noexcept { return next_.path(); }
+  /// "2 areas, variables machine, recipe (312 bytes)": for the operator.
+  [[nodiscard]] std::string describe() const;
+
+ private:
+  OnlineChange(Application& running, Application next, ApplicationDeclaration declaration,
+               ApplicationHost& host)
+      : running_(running), next_(std::move(next)), declaration_(std::move(declaration)), host_(host) {}
+  [[nodiscard]] Result<void> check(std::span<const TaskSettings> settings);
+  [[nodiscard]] Result<void> connect();
+
+  struct Copy {
+    void* to;
+    const void* from;
+    std::size_t bytes;
+  };
+
+  Application& running_;
+  Application next_;
+  ApplicationDeclaration declaration_;
+  ApplicationHost& host_;
+  TaskCodes codes_;                // of next_, in the order of running_'s tasks
+  std::vector<Task_Info*> infos_;  // the same
+  std::vector<Copy> copies_;
+  std::vector<std::string> copied_;  // names
+  bool connected_ = false;
+  bool taken_over_ = false;
+};
+
+}  // namespace plchost
