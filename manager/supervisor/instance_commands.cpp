@@ -48,6 +48,7 @@ void ManagedInstance::handle(const ControlRequest& request, ControlReplyFunction
     case ControlVerb::list_objects:
     case ControlVerb::list_nodes:
     case ControlVerb::list_routes:
+    case ControlVerb::change_application:
     case ControlVerb::shutdown:
     case ControlVerb::status:
       return;  // refused by check_argument
@@ -63,6 +64,7 @@ Result<void> ManagedInstance::check_argument(ControlRequest& request) const {
     case ControlVerb::list_nodes:
     case ControlVerb::list_routes:
       return failure(ErrorCode::unsupported, "'list objects' is answered by the API server, from the pool");
+    case ControlVerb::change_application:
     case ControlVerb::shutdown:
     case ControlVerb::status:
       return failure(ErrorCode::unsupported, fmt::format("'{}' is between the manager and an instance only",

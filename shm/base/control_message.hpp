@@ -22,7 +22,7 @@ enum class ControlVerb : std::uint8_t {
   restart,             ///< fresh process, application running
   reset_statistics,    ///< argument: name of a task; empty: all tasks
   load_application,    ///< argument: path of the application on the host
-  change_application,  ///< argument: the same; it takes over while the application runs (online change)
+  change_application,  ///< (manager to instance only) argument: the same; it takes over while tasks run
   set_scheduler,       ///< argument: name of a scheduler
   register_event,      ///< argument: name of an external event
   unregister_event,    ///< argument: name of an external event
