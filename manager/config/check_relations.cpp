@@ -9,8 +9,8 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "manager/config/section_reader.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/toml/section_reader.hpp"
 
 namespace plchost {
 

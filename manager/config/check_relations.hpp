@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "manager/config/manager_config.hpp"
-#include "manager/config/toml_document.hpp"
 #include "shm/base/result.hpp"
+#include "shm/base/toml/toml_document.hpp"
 
 namespace plchost {
 

@@ -1,4 +1,4 @@
-#include "manager/config/toml_document.hpp"
+#include "shm/base/toml/toml_document.hpp"
 
 #include <array>
 #include <cstddef>

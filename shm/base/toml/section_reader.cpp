@@ -1,4 +1,4 @@
-#include "manager/config/section_reader.hpp"
+#include "shm/base/toml/section_reader.hpp"
 
 #include <algorithm>
 

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "manager/config/toml_document.hpp"
+#include "shm/base/toml/toml_document.hpp"
 
 namespace plchost {
 
@@ -29,6 +29,8 @@ class SectionReader {
   void numbers(std::string_view key, std::int64_t least, std::int64_t most,
                std::optional<std::vector<int>>& target);
 
+  /// A key that is read by somebody else.
+  void know(std::string_view key) { known_.push_back(key); }
   /// After all keys: reports those that nobody asked for.
   void refuse_unknown_keys();
 
