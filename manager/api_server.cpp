@@ -7,6 +7,8 @@
 #include <fmt/format.h>
 #include <sys/epoll.h>
 
+#include "api/control/exit_codes.hpp"
+#include "manager/system/lock_file.hpp"
 #include "shm/base/log.hpp"
 
 namespace plchost {
@@ -55,11 +57,16 @@ std::vector<std::string> ApiServer::arguments() const {
     arguments.push_back(config_.dds.identity);
   }
   if (config_.dds.allow_unsecured) arguments.emplace_back("--allow-unsecured");
+  if (!config_.dds.multicast) arguments.emplace_back("--no-multicast");
+  arguments.emplace_back("--name-since");
+  arguments.push_back(fmt::format("{}", name_since_ns_));
+  if (name_held_) arguments.emplace_back("--name-held");
   return arguments;
 }
 
 void ApiServer::spawn() {
   spawned_ = MonotonicClock::now();
+  if (name_since_ns_ == 0) name_since_ns_ = unix_time_ns();
   auto process = spawn_process({.arguments = arguments()});
   if (process) {
     auto watch = reactor_.watch(process->pidfd.get(), EPOLLIN, [this](std::uint32_t) { ended(); });
@@ -67,6 +74,7 @@ void ApiServer::spawn() {
       process_ = std::move(*process);
       exit_watch_ = std::move(*watch);
       spdlog::info("API server: process {}", process_->pid);
+      if (name_delay_ != Duration::zero()) timer_.set(spawned_ + kNameAsked);
       return;
     }
     (void)signal_process(*process, SIGKILL);
@@ -84,6 +92,8 @@ void ApiServer::ended() {
   timer_.cancel();
   if (shut_down_) return std::exchange(shut_down_, nullptr)();
   const TimePoint now = MonotonicClock::now();
+  if (status.exited_with(kExitNameTaken)) return name_is_taken(now);
+  name_held_ = name_held_ || now - spawned_ >= kNameAsked;
   if (now - spawned_ >= kApiSettled) delay_ = Duration::zero();
   spdlog::warn("API server: {}; starts again after {} ms", status.describe(),
                std::chrono::duration_cast<std::chrono::milliseconds>(delay_).count());
@@ -91,7 +101,24 @@ void ApiServer::ended() {
   delay_ = std::clamp(2 * delay_, kApiRestartDelay, kApiRestartDelayMax);
 }
 
+void ApiServer::name_is_taken(TimePoint now) {
+  name_since_ns_ = 0;
+  name_held_ = false;
+  name_delay_ = std::clamp(2 * name_delay_, kNameDelay, kNameDelayMax);
+  spdlog::error("API server: another host has the name '{}'; asks for it again after {} s", config_.host.name,
+                std::chrono::duration_cast<std::chrono::seconds>(name_delay_).count());
+  notify_service_manager(
+      fmt::format("STATUS=not served over DDS: another host has the name '{}'", config_.host.name).c_str());
+  timer_.set(now + name_delay_);
+}
+
 void ApiServer::on_timer() {
+  if (!shut_down_ && process_) {  // and was not refused the name
+    spdlog::info("API server: the name '{}' is this host's now", config_.host.name);
+    notify_service_manager("STATUS=");
+    name_delay_ = Duration::zero();
+    return;
+  }
   if (!shut_down_) return spawn();
   spdlog::warn("API server: does not end; it is killed");
   if (process_) (void)signal_process(*process_, SIGKILL);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
@@ -12,7 +13,8 @@
 namespace plchost {
 
 /// Keeps `plchost-dds` alive: started again at once when it ends, and with back-off when it keeps ending. It
-/// finds the manager by its control socket, and ends by itself when that closes.
+/// finds the manager by its control socket, and ends by itself when that closes. When another host of the
+/// domain has this host's name, it is started again from time to time only, to see whether it still has.
 class ApiServer {
  public:
   ApiServer(Reactor& reactor, const ManagerConfig& config, std::string program);
@@ -25,6 +27,7 @@ class ApiServer {
   void spawn();
   void ended();
   void on_timer();
+  void name_is_taken(TimePoint now);
   [[nodiscard]] std::vector<std::string> arguments() const;
 
   Reactor& reactor_;
@@ -35,12 +38,20 @@ class ApiServer {
   Reactor::Timer timer_;
   TimePoint spawned_{};
   Duration delay_{};
+  std::int64_t name_since_ns_ = 0;  ///< 0: nobody has asked for the name yet
+  bool name_held_ = false;          ///< a server that has ended had it
+  Duration name_delay_{};           ///< not 0: another host has the name
   std::function<void()> shut_down_;
 };
 
 /// Of the second and later restarts in a row: doubles from the first to the second.
 inline constexpr Duration kApiRestartDelay = std::chrono::milliseconds(100);
 inline constexpr Duration kApiRestartDelayMax = std::chrono::seconds(5);
+/// Of those that were refused the name: doubles from the first to the second.
+inline constexpr Duration kNameDelay = std::chrono::seconds(5);
+inline constexpr Duration kNameDelayMax = std::chrono::seconds(60);
+/// Who lived that long has the name of the host: it has asked for it for less than that.
+inline constexpr Duration kNameAsked = std::chrono::seconds(1);
 /// Who lived that long has recovered: its next restart is at once.
 inline constexpr Duration kApiSettled = std::chrono::seconds(10);
 

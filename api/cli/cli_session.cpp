@@ -58,10 +58,19 @@ Result<std::vector<HostView>> CliSession::shown_hosts() {
     if (selection.selects(*one)) return std::vector{std::move(*one)};
     return none_selected({*std::move(one)});
   }
-  const auto all = (*connected)->hosts(deadline());
+  return select((*connected)->hosts(deadline()));
+}
+
+Result<std::vector<HostView>> CliSession::known_hosts() {
+  const auto connected = client();
+  if (!connected) return std::unexpected(connected.error());
+  return select((*connected)->known_hosts(deadline()));
+}
+
+Result<std::vector<HostView>> CliSession::select(const std::vector<HostView>& all) const {
   std::vector<HostView> selected;
   std::ranges::copy_if(all, std::back_inserter(selected),
-                       [&](const HostView& host) { return selection.selects(host); });
+                       [&](const HostView& host) { return options.hosts.selects(host); });
   if (!selected.empty()) return selected;
   if (!all.empty()) return none_selected(all);
   return failure(

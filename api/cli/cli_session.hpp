@@ -54,6 +54,8 @@ class CliSession {
   [[nodiscard]] Result<std::vector<std::string>> target_hosts();
   /// All that --host and --label select, or all that answer: at least one.
   [[nodiscard]] Result<std::vector<HostView>> shown_hosts();
+  /// The same, and those that were seen before and are silent now.
+  [[nodiscard]] Result<std::vector<HostView>> known_hosts();
   /// not_found: none of the hosts that are shown has an instance of that name.
   [[nodiscard]] Result<void> check_instance(const std::string& instance);
 
@@ -64,6 +66,7 @@ class CliSession {
   static int fail(const Error& error);
 
  private:
+  [[nodiscard]] Result<std::vector<HostView>> select(const std::vector<HostView>& hosts) const;
   std::unique_ptr<ControlClient> client_;
 };
 
@@ -77,6 +80,7 @@ void add_command_verbs(const Command& plcctl, CliSession& session);
 void add_check_verb(const Command& plcctl, CliSession& session);
 void add_post_verb(const Command& plcctl, CliSession& session);
 void add_watch_verb(const Command& plcctl, CliSession& session);
+void add_plant_verbs(const Command& plcctl, CliSession& session);
 void add_verify_verb(const Command& plcctl, CliSession& session);
 void add_completion_verb(const Command& plcctl);
 

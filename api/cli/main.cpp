@@ -58,9 +58,12 @@ void add_options(CLI::App& app, plchost::CliOptions& options) {
   app.add_option("--interface", options.dds.interfaces, "network interface (default lo); may be repeated")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
-  app.add_option("--peer", options.dds.peers, "address of a controller (default 127.0.0.1); may be repeated")
+  app.add_option("--peer", options.dds.peers,
+                 "address of a controller (default on lo: 127.0.0.1); may be repeated")
       ->expected(1)
       ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  app.add_flag("--no-multicast{false}", options.dds.multicast,
+               "look for controllers at --peer only, where an --interface has multicast");
   app.add_option("--identity", options.dds.identity,
                  "folder of the identity to show, where controllers are secured ('plcctl security')")
       ->envname("PLCHOST_IDENTITY")
@@ -132,6 +135,7 @@ int main(int argc, char** argv) {
   plchost::add_post_verb(plcctl, session);
   plchost::add_watch_verb(plcctl, session);
   plchost::add_security_verb(plcctl, session);
+  plchost::add_plant_verbs(plcctl, session);
   plchost::add_verify_verb(plcctl, session);
   plchost::add_completion_verb(plcctl);
   const std::vector<std::string> words(argv + 1, argv + argc);

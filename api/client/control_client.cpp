@@ -61,6 +61,7 @@ Result<void> ControlClient::open(const dds::DomainOptions& options) {
   if (!wait_set) return std::unexpected(wait_set.error());
   wait_set_ = std::move(*wait_set);
   last_news_ = MonotonicClock::now();
+  if (options.interfaces != std::vector<std::string>{"lo"}) quiet_ = kQuietOnNetworks;
   if (auto opened = open_cache(presence_, dds::kPresence, dds::presence_qos(),
                                DDS_DATA_AVAILABLE_STATUS | DDS_REQUESTED_DEADLINE_MISSED_STATUS);
       !opened) {
@@ -83,17 +84,7 @@ Result<void> ControlClient::open_cache(Cache& cache, const dds::TopicInfo& info,
 }
 
 void ControlClient::update() {
-  const TimePoint now = MonotonicClock::now();
-  // Looked at, it is over; else no wait would wait any more.
-  dds_requested_deadline_missed_status_t missed{};
-  (void)dds_get_requested_deadline_missed_status(presence_.reader(), &missed);
-  presence_.update([&](const plc_Presence& presence) {
-    Seen& seen = seen_[std::string(dds::text_of(presence.host))];
-    if (presence.epoch < seen.epoch) return;  // the last word of a server that was replaced
-    if (seen.epoch != presence.epoch || now - seen.last > kHostGone) last_news_ = now;
-    seen = Seen{presence.epoch, presence.pid, now};
-  });
-  host_status_.update();
+  update_hosts();
   instance_status_.update();
   task_status_.update();
   statistics_.update();
@@ -102,72 +93,6 @@ void ControlClient::update() {
   object_status_.update();
   exceptions_.update();
   host_findings_.update();
-}
-
-std::vector<std::string> HostView::labels() const {
-  std::string all;
-  const std::pair<std::string_view, std::string*> known{dds::kLabelsEntry, &all};
-  if (!dds::read_entries(ext, std::span(&known, 1))) return {};
-  std::vector<std::string> labels;
-  for (std::string_view rest = all; !rest.empty();) {
-    const std::size_t comma = rest.find(',');
-    labels.emplace_back(rest.substr(0, comma));
-    rest = comma == std::string_view::npos ? std::string_view() : rest.substr(comma + 1);
-  }
-  return labels;
-}
-
-std::optional<HostView> ControlClient::present(std::string_view name) const {
-  const auto seen = seen_.find(name);
-  if (seen == seen_.end() || MonotonicClock::now() - seen->second.last > kHostGone) return std::nullopt;
-  const auto status = host_status_.of_host(name, seen->second.epoch);
-  if (status.empty()) return std::nullopt;
-  HostView view{std::string(name), seen->second.epoch, seen->second.pid, status.front(), {}};
-  const auto& ext = view.status.ext;
-  view.ext.assign(ext._buffer, ext._buffer + ext._length);
-  view.status.ext = {};
-  return view;
-}
-
-std::vector<HostView> ControlClient::present() const {
-  std::vector<HostView> found;
-  for (const auto& [name, seen] : seen_) {
-    if (auto view = present(name)) found.push_back(std::move(*view));
-  }
-  return found;
-}
-
-bool ControlClient::is_silent(std::string_view host) {
-  update();
-  const auto seen = seen_.find(host);
-  return seen != seen_.end() && MonotonicClock::now() - seen->second.last >= kSilent;
-}
-
-std::vector<HostView> ControlClient::hosts(TimePoint deadline) {
-  for (;;) {
-    update();
-    const TimePoint now = MonotonicClock::now();
-    auto found = present();
-    const bool settled = !found.empty() && now - last_news_ >= kQuiet;
-    if (settled || now >= deadline) return found;
-    wait_set_.wait(found.empty() ? deadline : std::min(deadline, last_news_ + kQuiet));
-  }
-}
-
-Result<HostView> ControlClient::host(std::string_view name, TimePoint deadline) {
-  if (auto good = check_host_name(name); !good) return std::unexpected(std::move(good).error());
-  for (;;) {
-    update();
-    if (auto found = present(name)) return *found;
-    if (MonotonicClock::now() >= deadline) break;
-    wait_set_.wait(deadline);
-  }
-  const auto others = present();
-  std::vector<std::string_view> names;
-  names.reserve(others.size());
-  for (const HostView& other : others) names.emplace_back(other.name);
-  return failure(ErrorCode::not_found,
-                 fmt::format("no host '{}' answers; those that do: {}", name, join_names(names)));
 }
 
 template Result<void> ControlClient::open_cache(StatusCache<plc_HostFinding>&, const dds::TopicInfo&,

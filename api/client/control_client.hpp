@@ -30,16 +30,26 @@
 
 namespace plchost {
 
-/// One host that answers at present.
+/// One host, as it was seen last.
 struct HostView {
   std::string name;
   std::uint64_t epoch = 0;
   std::int32_t server_pid = 0;    ///< of plchost-dds
   plc_HostStatus status{};        ///< but for its ext
   std::vector<plc_KeyValue> ext;  ///< of the status
+  bool silent = false;            ///< it does not show its presence any more; the rest is what it said last
+  bool contested = false;         ///< two servers show their presence under that name at the same time
 
   /// What its configuration calls it, beside its name.
   [[nodiscard]] std::vector<std::string> labels() const;
+  /// An entry of its ext; empty: it is not there.
+  [[nodiscard]] std::string entry(std::string_view key) const;
+};
+
+/// How far a host's CLOCK_REALTIME is ahead of the one here, and how wrong that can be.
+struct ClockOffset {
+  Duration offset{};
+  Duration uncertainty{};
 };
 
 /// A post that was run.
@@ -61,14 +71,20 @@ class ControlClient {
   /// A host is silent after so long: a little less than the deadline of its presence, so that who is woken by
   /// that sees it.
   static constexpr Duration kSilent = dds::kPresenceDeadline - std::chrono::milliseconds(5);
-  /// All hosts are known when none was news for so long.
+  /// All hosts are known when none was news for so long; where packets can be lost, longer than it takes
+  /// until each host tells again that it is there (SPDPInterval).
   static constexpr Duration kQuiet = std::chrono::milliseconds(200);
+  static constexpr Duration kQuietOnNetworks = std::chrono::milliseconds(1200);
 
   [[nodiscard]] static Result<std::unique_ptr<ControlClient>> connect(const dds::DomainOptions& options);
 
   /// The hosts that answer, by name: waits for the first one until the deadline, then until none is news any
   /// more. Empty: none answers.
   [[nodiscard]] std::vector<HostView> hosts(TimePoint deadline);
+  /// The same, and those that were seen before and are silent now.
+  [[nodiscard]] std::vector<HostView> known_hosts(TimePoint deadline);
+  /// Asks a host for its time, several times: the best of them counts. refused: only operators may ask.
+  [[nodiscard]] Result<ClockOffset> clock_offset(const std::string& host, TimePoint deadline);
   /// That host, as soon as it is seen. not_found: it does not answer; the text lists who does.
   [[nodiscard]] Result<HostView> host(std::string_view name, TimePoint deadline);
 
@@ -153,13 +169,17 @@ class ControlClient {
     std::uint64_t epoch = 0;
     std::int32_t pid = 0;
     TimePoint last;
+    std::uint32_t others = 0;  // presences of an older server while this one lives
+    TimePoint other_last;
   };
 
   ControlClient() = default;
   Result<void> open(const dds::DomainOptions& options);
   void update();
+  void update_hosts();
   [[nodiscard]] std::vector<HostView> present() const;
   [[nodiscard]] std::optional<HostView> present(std::string_view name) const;
+  [[nodiscard]] std::optional<HostView> view_of(std::string_view name, const Seen& seen) const;
   template <class Cache>
   [[nodiscard]] Result<void> open_cache(Cache& cache, const dds::TopicInfo& topic,
                                         const dds::Qos& qos = dds::status_qos(),
@@ -203,6 +223,7 @@ class ControlClient {
   std::map<std::string, Seen, std::less<>> seen_;
   TransitionLog transition_log_;
   TimePoint last_news_;
+  Duration quiet_ = kQuiet;
   dds::Entity reply_topic_;
   dds::Entity reply_reader_;
   PageReader object_pages_;

@@ -17,7 +17,7 @@ namespace {
 
 std::optional<ApiReply> take_reply(dds_entity_t reader, const plc_SampleIdentity& identity) {
   std::optional<ApiReply> found;
-  dds::take_valid<plc_Reply, 16>(reader, [&](const plc_Reply& reply, const auto& /*info*/) {
+  dds::take_valid<plc_Reply, 16>(reader, [&](const plc_Reply& reply, const dds_sample_info_t& info) {
     const plc_SampleIdentity& related = reply.header.related_identity;
     // Others are answers to calls that were given up.
     if (related.sequence_number != identity.sequence_number ||
@@ -25,7 +25,7 @@ std::optional<ApiReply> take_reply(dds_entity_t reader, const plc_SampleIdentity
       return;
     }
     found = ApiReply{static_cast<ErrorCode>(reply.code), std::string(dds::text_of(reply.text)),
-                     reply.status_round, identity};
+                     reply.status_round, identity, info.source_timestamp};
   });
   return found;
 }
@@ -58,11 +58,17 @@ Result<ApiReply> RequestCaller::call(const ApiRequest& request, dds_entity_t rep
   sample.ext._buffer = ext.data();
   sample.ext._length = sample.ext._maximum = static_cast<std::uint32_t>(ext.size());
   TimePoint next_write{};
+  std::int64_t asked_unix_ns = 0;
   bool written = false;
   while (MonotonicClock::now() < deadline) {
-    if (auto reply = take_reply(reply_reader, sample.header.request_identity)) return *reply;
+    if (auto reply = take_reply(reply_reader, sample.header.request_identity)) {
+      reply->asked_unix_ns = asked_unix_ns;
+      reply->heard_unix_ns = unix_time_ns();
+      return *reply;
+    }
     const TimePoint now = MonotonicClock::now();
     if (now >= next_write && has_reader(writer_.get())) {
+      if (!written) asked_unix_ns = unix_time_ns();
       (void)dds_write(writer_.get(), &sample);  // a refusal of DDS is mended by the repetition
       next_write = now + (written ? kRepeat : kFirstRepeat);
       written = true;

@@ -29,6 +29,9 @@ struct ApiReply {
   std::string text;                ///< why not; or a remark
   std::uint64_t status_round = 0;  ///< the host's status from this round on shows the effect
   plc_SampleIdentity identity{};   ///< of the request
+  std::int64_t host_unix_ns = 0;   ///< when the host wrote it, by its clock
+  std::int64_t asked_unix_ns = 0;  ///< by the clock here: before the request was written for the first time
+  std::int64_t heard_unix_ns = 0;  ///< and when the answer was taken
 };
 
 /// The requests of one role to one host: writes, repeats under the same identity, waits for the answer.

@@ -59,12 +59,19 @@ Result<std::string> domain_configuration(Role role, const DomainOptions& options
                    fmt::format("domain {} is not valid: allowed are 0 to {}", options.domain, kMaxDomain));
   }
   std::string interfaces;
+  bool loopback = false;
+  bool multicast = false;
   for (const std::string& name : options.interfaces) {
     if (const auto good = check_address("interface", name); !good) return std::unexpected(good.error());
-    interfaces += fmt::format("<NetworkInterface name=\"{}\" multicast=\"false\"/>", name);
+    // Where a device has no multicast, Cyclone sees that itself.
+    const bool by_multicast = options.multicast && name != "lo";
+    interfaces += fmt::format("<NetworkInterface name=\"{}\" multicast=\"{}\"/>", name,
+                              by_multicast ? "default" : "false");
+    loopback |= name == "lo";
+    multicast |= by_multicast;
   }
   std::vector<std::string> addresses = options.peers;
-  if (addresses.empty() && role == Role::client) addresses.emplace_back("127.0.0.1");
+  if (addresses.empty() && loopback) addresses.emplace_back("127.0.0.1");
   std::string peers;
   for (const std::string& address : addresses) {
     if (const auto good = check_address("peer", address); !good) return std::unexpected(good.error());
@@ -80,7 +87,7 @@ Result<std::string> domain_configuration(Role role, const DomainOptions& options
   const std::string_view watermark = role == Role::server ? "32 MB" : "128 kB";
   return fmt::format(
       "<CycloneDDS><Domain "
-      "Id=\"any\"><General><Interfaces>{}</Interfaces><AllowMulticast>false</AllowMulticast>"
+      "Id=\"any\"><General><Interfaces>{}</Interfaces><AllowMulticast>{}</AllowMulticast>"
       "</General><Discovery><ParticipantIndex>{}</ParticipantIndex>"
       "<MaxAutoParticipantIndex>{}</MaxAutoParticipantIndex>{}<SPDPInterval>1 s</SPDPInterval>"
       "<LeaseDuration>3 s</LeaseDuration></Discovery><Internal>"
@@ -91,8 +98,9 @@ Result<std::string> domain_configuration(Role role, const DomainOptions& options
       "<SocketReceiveBufferSize min=\"128 KiB\" max=\"4 MiB\"/><MaxSampleSize>256 KiB</MaxSampleSize>"
       "<Watermarks><WhcHigh>{}</WhcHigh><WhcHighInit>{}</WhcHighInit><WhcAdaptive>false</WhcAdaptive>"
       "</Watermarks></Internal>{}{}</Domain></CycloneDDS>",
-      interfaces, role == Role::server ? "auto" : "none", kMaxServersPerMachine - 1, peers, watermark,
-      watermark, threads_section(options.receive_fifo), *security);
+      interfaces, multicast ? "spdp" : "false", role == Role::server ? "auto" : "none",
+      kMaxServersPerMachine - 1, peers, watermark, watermark, threads_section(options.receive_fifo),
+      *security);
 }
 
 bool can_use_fifo(int priority) {

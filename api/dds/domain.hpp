@@ -21,8 +21,11 @@ enum class Role : std::uint8_t { server, client };
 
 struct DomainOptions {
   std::uint32_t domain = 0;
-  std::vector<std::string> interfaces{"lo"};  ///< network interfaces; no multicast on any
-  std::vector<std::string> peers;             ///< where servers are looked for; empty for clients: 127.0.0.1
+  std::vector<std::string> interfaces{"lo"};  ///< network interfaces
+  /// Where servers are looked for. Empty, and on "lo": 127.0.0.1.
+  std::vector<std::string> peers;
+  /// Look for others by multicast, too, on all interfaces but "lo"; samples never go by multicast.
+  bool multicast = true;
   /// SCHED_FIFO priority of the threads that receive, 0: SCHED_OTHER. Only if can_use_fifo() said yes:
   /// Cyclone aborts the process when it may not.
   int receive_fifo = 0;

@@ -67,6 +67,10 @@ Qos transition_qos() {
   return qos;
 }
 
+std::string name_partition(std::string_view host) {
+  return fmt::format("n.{}", host);
+}
+
 std::string host_partition(std::string_view host) {
   return fmt::format("h.{}", host);
 }

@@ -39,6 +39,7 @@ inline constexpr TopicInfo kNodePage{"plc/v1/nodes", &plc_NodePage_desc};
 inline constexpr TopicInfo kBlockHostStatus{"plc/v1/status/block_host", &plc_BlockHostStatus_desc};
 inline constexpr TopicInfo kBlock{"plc/v1/blocks", &plc_Block_desc};
 inline constexpr TopicInfo kBlockAck{"plc/v1/block_ack", &plc_BlockAck_desc};
+inline constexpr TopicInfo kNameClaim{"plc/v1/name_claim", &plc_NameClaim_desc};
 inline constexpr TopicInfo kHostFinding{"plc/v1/status/host_finding", &plc_HostFinding_desc};
 inline constexpr TopicInfo kExceptionStatus{"plc/v1/status/exception", &plc_ExceptionStatus_desc};
 inline constexpr TopicInfo kTransition{"plc/v1/transition", &plc_Transition_desc};
@@ -58,6 +59,14 @@ inline constexpr std::int32_t kTransitionDepth = 64;  ///< of each instance; as 
 inline constexpr std::string_view kTransitionsEntry = "transitions";
 /// Entry of HostStatus.ext: its labels, with commas between.
 inline constexpr std::string_view kLabelsEntry = "labels";
+/// More of them: see control.idl.
+inline constexpr std::string_view kRunningEntry = "running";
+inline constexpr std::string_view kSecuredEntry = "secured";
+inline constexpr std::string_view kLoadEntry = "load";
+inline constexpr std::string_view kCoresEntry = "cores";
+inline constexpr std::string_view kMemoryEntry = "memory_mib";
+inline constexpr std::string_view kAvailableEntry = "available_mib";
+inline constexpr std::string_view kRivalEntry = "rival";
 /// Entry of EventPost.ext and its value: an EventRun is wanted.
 inline constexpr std::string_view kWaitEntry = "wait";
 inline constexpr std::string_view kWaitForRun = "run";
@@ -83,6 +92,8 @@ inline constexpr Duration kPresenceDeadline = std::chrono::milliseconds(75);
 /// go.
 [[nodiscard]] std::string host_partition(std::string_view host);
 [[nodiscard]] std::string client_partition(std::string_view guid_hex);
+/// Where hosts meet that claim the same name.
+[[nodiscard]] std::string name_partition(std::string_view host);
 /// Where blocks for the host of that number go, and acknowledgements of its blocks.
 [[nodiscard]] std::string block_partition(std::uint16_t host_number);
 

@@ -38,6 +38,10 @@ Topics block_topics() {
   return {"plc/v1/blocks", "plc/v1/block_ack"};
 }
 
+Topics name_topics() {
+  return {"plc/v1/name_claim"};
+}
+
 std::vector<Grant> may_write(Role role) {
   switch (role) {
     case Role::viewer:
@@ -49,7 +53,7 @@ std::vector<Grant> may_write(Role role) {
     case Role::admin:
       return {{{"plc/v1/event", "plc/v1/event_batch", "plc/v1/*/request"}, "h.*"}};
     case Role::host:
-      return {{status_topics()}, {answer_topics(), "c.*"}, {block_topics(), "b.*"}};
+      return {{status_topics()}, {answer_topics(), "c.*"}, {block_topics(), "b.*"}, {name_topics(), "n.*"}};
   }
   return {};
 }
@@ -59,7 +63,8 @@ std::vector<Grant> may_read(Role role, const GuidPrefix& prefix) {
   if (role == Role::host) {
     return {{{"plc/v1/status/block_host"}},
             {{"plc/v1/event", "plc/v1/event_batch", "plc/v1/*/request"}, "h.*"},
-            {block_topics(), "b.*"}};
+            {block_topics(), "b.*"},
+            {name_topics(), "n.*"}};
   }
   return {{status_topics()}, {answer_topics(), fmt::format("c.{:02x}*", fmt::join(prefix, ""))}};
 }

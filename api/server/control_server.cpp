@@ -57,6 +57,7 @@ ControlServer::~ControlServer() {
   for (auto& request : parts_->requests) request.reader.reset();
   parts_->event_reader.reset();
   parts_->batch_reader.reset();
+  parts_->name.reset();
   if (parts_->sessions) {
     for (const dds_entity_t reader : parts_->sessions->discovery_readers()) dds_set_listener(reader, nullptr);
   }
@@ -126,6 +127,7 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
   drain(fd);
   if (fd == wake.get()) {
     on_wake();
+    return keeps_name();
   } else if (fd == status_timer.get()) {
     const TimePoint now = MonotonicClock::now();
     status->look_at_writers(*intake, *sessions, now);
@@ -140,7 +142,8 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
     status->write_presence();
   } else if (fd == identity_timer.get()) {
     tell_of_refused(MonotonicClock::now());
-    return !identity_changed();
+    if (identity_changed()) return false;
+    return keeps_name();
   } else if (fd == signals.get()) {
     spdlog::info("asked to end");
     return false;
@@ -182,6 +185,16 @@ bool ControlServer::Parts::identity_changed() {
   for (const std::string& problem : known->problems()) spdlog::warn("identity: {}", problem);
   spdlog::info("{} identities are known", known->size());
   guard.replace(std::move(*known));
+  return false;
+}
+
+// Whether this host goes on under its name; false: it does, with a fresh process.
+Result<bool> ControlServer::Parts::keeps_name() {
+  const NameClaim::State state = name->look(MonotonicClock::now());
+  if (state == NameClaim::State::taken) return std::unexpected(name->taken());
+  status->set_rival(name->rival());
+  if (state == NameClaim::State::ours) return true;
+  spdlog::warn("the other host of the name '{}' is gone: ending, to tell all status anew", options.host);
   return false;
 }
 
@@ -236,6 +249,7 @@ void ControlServer::Parts::on_request(ApiRole role, const dds::Guid& writer, con
   const std::vector<std::string_view> instances(status->instances().begin(), status->instances().end());
   auto checked = check_request(request, role, options.host, instances);
   if (!checked) return answer(client, identity, checked.error().code, checked.error().describe());
+  if (checked->verb == ControlVerb::read_clock) return answer(client, identity, ErrorCode::ok, "");
   if (checked->verb == ControlVerb::list_objects) return list_objects(client, request);
   if (checked->verb == ControlVerb::list_nodes || checked->verb == ControlVerb::list_routes) {
     return list_nodes(checked->verb, client, request);

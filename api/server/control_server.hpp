@@ -27,20 +27,24 @@ struct ServerOptions {
   std::vector<std::string> labels;     ///< by which clients choose hosts
   std::string audit_folder;            ///< of the log of what clients change; empty: there is none
   std::uint16_t host_number = 0;       ///< for other hosts; 0: no gateway
+  std::int64_t name_since_ns = 0;      ///< from when on this host has its name; 0: from now on
+  bool name_held = false;              ///< a server before this one had the name: nobody is asked
 };
 
 /// The server's end of the DDS API. Posts are done in DDS's receiving thread (on_event_post); everything else
 /// in one loop: requests, the manager's answers, acknowledgements, status, presence.
 class ControlServer {
  public:
-  /// Attaches the pool, reaches the manager and enters the domain.
+  /// Attaches the pool, reaches the manager and enters the domain. already_exists: another host of the domain
+  /// has the name.
   [[nodiscard]] static Result<std::unique_ptr<ControlServer>> create(ServerOptions options);
   ControlServer(const ControlServer&) = delete;
   ControlServer& operator=(const ControlServer&) = delete;
   ~ControlServer();
 
   /// Serves until SIGTERM or SIGINT, until the manager is gone, or until the files of the host's identity
-  /// have changed, which takes a fresh process: all four are orderly ends.
+  /// have changed, or another host that had this name as well is gone, which both take a fresh process: all
+  /// of these are orderly ends. already_exists: another host of the domain has the name.
   [[nodiscard]] Result<void> run();
 
  private:

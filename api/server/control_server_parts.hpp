@@ -17,6 +17,7 @@
 #include "api/server/lists/node_lister.hpp"
 #include "api/server/lists/object_lister.hpp"
 #include "api/server/manager_link.hpp"
+#include "api/server/name_claim.hpp"
 #include "api/server/posts/event_intake.hpp"
 #include "api/server/posts/run_watch.hpp"
 #include "api/server/session_table.hpp"
@@ -46,6 +47,7 @@ struct ControlServer::Parts {
   Result<void> make_loop();
   Result<void> make_guard();
   Result<void> enter_domain();
+  Result<void> claim_name();
   Result<void> make_readers();
   Result<void> listen();
   Result<void> open_gateway();
@@ -58,6 +60,7 @@ struct ControlServer::Parts {
   void on_request(ApiRole role, const dds::Guid& writer, const plc_Request& request);
   Result<void> on_manager();
   [[nodiscard]] bool identity_changed();
+  [[nodiscard]] Result<bool> keeps_name();
   void tell_of_refused(TimePoint now);
   void answer(const dds::Guid& client, const plc_SampleIdentity& identity, ErrorCode code,
               std::string_view text);
@@ -95,6 +98,7 @@ struct ControlServer::Parts {
   std::optional<EventIntake> intake;
   std::shared_ptr<dds::Entity> domain;
   dds::Entity participant;
+  std::optional<NameClaim> name;
   std::optional<SessionTable> sessions;
   std::optional<RequestAudit> audit;
   std::optional<StatusPublisher> status;

@@ -61,13 +61,14 @@ Result<void> ControlServer::Parts::open(PostLedger ledger) {
   if (auto made = make_guard(); !made) return made;
   intake.emplace(options.host, pool, std::move(ledger), epoch, guard);
   if (auto entered = enter_domain(); !entered) return entered;
+  if (auto claimed = claim_name(); !claimed) return claimed;
   auto made_sessions = SessionTable::create(participant.get());
   if (!made_sessions) return std::unexpected(made_sessions.error());
   sessions = std::move(*made_sessions);
   open_audit();
   auto made_status = StatusPublisher::create(
-      participant.get(),
-      {options.host, &pool, epoch, options.run_directory, fmt::format("{}", fmt::join(options.labels, ","))});
+      participant.get(), {options.host, &pool, epoch, options.run_directory,
+                          fmt::format("{}", fmt::join(options.labels, ",")), identity_watch.has_value()});
   if (!made_status) return std::unexpected(made_status.error());
   status.emplace(std::move(*made_status));
   // Everything is there before a client can see that this host is: presence comes last.
@@ -192,6 +193,21 @@ Result<void> ControlServer::Parts::enter_domain() {
   return {};
 }
 
+// Before anything is shown under the name. Who had it a moment ago has no time to ask.
+Result<void> ControlServer::Parts::claim_name() {
+  const TimePoint entered = MonotonicClock::now();
+  auto claimed = NameClaim::create(
+      participant.get(),
+      {.host = options.host,
+       .run_directory = options.run_directory,
+       .epoch = epoch,
+       .since_ns = options.name_since_ns != 0 ? options.name_since_ns : static_cast<std::int64_t>(epoch),
+       .serving = options.name_held});
+  if (!claimed) return std::unexpected(claimed.error());
+  name = *std::move(claimed);
+  return name->ask(entered + NameClaim::kAsking);
+}
+
 Result<void> ControlServer::Parts::make_readers() {
   auto made_subscriber = dds::make_subscriber(participant.get(), dds::host_partition(options.host));
   if (!made_subscriber) return std::unexpected(made_subscriber.error());
@@ -232,6 +248,7 @@ Result<void> ControlServer::Parts::listen() {
   for (const dds_entity_t reader : sessions->discovery_readers()) {
     if (auto done = set(reader, on_wake_listener); !done) return done;
   }
+  if (auto done = set(name->reader(), on_wake_listener); !done) return done;
   for (const RequestReader& request : requests) {
     if (auto done = set(request.reader.get(), on_wake_listener); !done) return done;
   }

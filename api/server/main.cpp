@@ -3,6 +3,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include "api/control/exit_codes.hpp"
 #include "api/server/access/receive_gate.hpp"
 #include "api/server/control_server.hpp"
 #include "shm/base/log.hpp"
@@ -14,6 +15,11 @@ namespace {
 constexpr int kReceiveFifo = 20;
 constexpr int kExitFailed = 1;
 constexpr int kExitUsage = 2;
+
+int fail(const plchost::Error& error) {
+  spdlog::error("{}", error.describe());
+  return error.code == plchost::ErrorCode::already_exists ? plchost::kExitNameTaken : kExitFailed;
+}
 
 }  // namespace
 
@@ -41,6 +47,10 @@ int main(int argc, char** argv) {
   app.add_option("--blocks-base", options.blocks_base, "base name of the nodes that send blocks");
   app.add_option("--label", options.labels, "by which clients choose hosts");
   app.add_option("--audit-folder", options.audit_folder, "where the log of what clients change is kept");
+  app.add_option("--name-since", options.name_since_ns,
+                 "since when this host has its name (CLOCK_REALTIME, ns; default: now)");
+  app.add_flag("--name-held", options.name_held, "a server before this one had the name: do not ask for it");
+  app.add_flag("--no-multicast{false}", options.dds.multicast, "look for others at --peer only");
   app.add_option("--log-level", log_level, "trace, debug, info, warning or error")
       ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error"}));
   try {
@@ -54,13 +64,7 @@ int main(int argc, char** argv) {
   plchost::close_receive_gate(!options.dds.identity.empty());
   options.refused_datagrams = plchost::datagrams_refused;
   const auto server = plchost::ControlServer::create(std::move(options));
-  if (!server) {
-    spdlog::error("{}", server.error().describe());
-    return kExitFailed;
-  }
-  if (const auto done = (*server)->run(); !done) {
-    spdlog::error("{}", done.error().describe());
-    return kExitFailed;
-  }
-  return 0;
+  if (!server) return fail(server.error());
+  const auto done = (*server)->run();
+  return done ? 0 : fail(done.error());
 }

@@ -78,6 +78,7 @@ Result<std::string> Instance::obey(const ControlRequest& request) {
     case ControlVerb::list_objects:
     case ControlVerb::list_nodes:
     case ControlVerb::list_routes:
+    case ControlVerb::read_clock:
       break;
   }
   return failure(ErrorCode::unsupported,

@@ -12,9 +12,9 @@
 
 #include "manager/config/accounts.hpp"
 #include "manager/config/check_relations.hpp"
-#include "manager/config/section_reader.hpp"
-#include "manager/config/toml_document.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/toml/section_reader.hpp"
+#include "shm/base/toml/toml_document.hpp"
 #include "shm/pool/host_page.hpp"
 
 namespace plchost {
@@ -170,6 +170,7 @@ void Loader::read_dds(const TomlTable& table, unsigned line) {
   reader.truth("enabled", dds.enabled);
   reader.text("interface", dds.interface);
   reader.texts("peers", kMaxPeers, dds.peers);
+  reader.truth("multicast", dds.multicast);
   constexpr std::size_t kMaxInterfaceName = 15;  // IFNAMSIZ
   if (const auto good = check_name("interface", dds.interface, kMaxInterfaceName); !good) {
     reader.problem("interface", good.error().message);

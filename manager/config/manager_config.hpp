@@ -42,6 +42,7 @@ struct DdsConfig {
   bool enabled = true;  ///< false: no API server
   std::string interface = "lo";
   std::vector<std::string> peers;  ///< addresses asked for other hosts where there is no multicast
+  bool multicast = true;           ///< look for others by multicast, too; never on lo
   std::string identity;            ///< folder of the host's identity; empty: no security
   bool allow_unsecured = false;    ///< without an identity: on another interface than lo all the same
 };

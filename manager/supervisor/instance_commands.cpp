@@ -4,10 +4,10 @@
 #include <fmt/format.h>
 
 #include "manager/config/load_config.hpp"
-#include "manager/config/section_reader.hpp"
 #include "manager/supervisor/managed_instance.hpp"
 #include "shm/base/log.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/toml/section_reader.hpp"
 
 namespace plchost {
 
@@ -48,6 +48,7 @@ void ManagedInstance::handle(const ControlRequest& request, ControlReplyFunction
     case ControlVerb::list_objects:
     case ControlVerb::list_nodes:
     case ControlVerb::list_routes:
+    case ControlVerb::read_clock:
     case ControlVerb::change_application:
     case ControlVerb::shutdown:
     case ControlVerb::status:
@@ -63,7 +64,9 @@ Result<void> ManagedInstance::check_argument(ControlRequest& request) const {
     case ControlVerb::list_objects:
     case ControlVerb::list_nodes:
     case ControlVerb::list_routes:
-      return failure(ErrorCode::unsupported, "'list objects' is answered by the API server, from the pool");
+    case ControlVerb::read_clock:
+      return failure(ErrorCode::unsupported,
+                     fmt::format("'{}' is answered by the API server", to_string(request.verb)));
     case ControlVerb::change_application:
     case ControlVerb::shutdown:
     case ControlVerb::status:

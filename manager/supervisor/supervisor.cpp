@@ -5,9 +5,9 @@
 
 #include <fmt/format.h>
 
-#include "manager/config/section_reader.hpp"
 #include "manager/supervisor/lost_faults.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/toml/section_reader.hpp"
 
 namespace plchost {
 

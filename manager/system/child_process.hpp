@@ -17,7 +17,10 @@ struct ExitStatus {
   Kind kind = Kind::exited;
   int value = 0;      ///< exit code, or number of the signal
   bool known = true;  ///< false: it was no child of this manager
-  [[nodiscard]] bool success() const noexcept { return known && kind == Kind::exited && value == 0; }
+  [[nodiscard]] bool exited_with(int code) const noexcept {
+    return known && kind == Kind::exited && value == code;
+  }
+  [[nodiscard]] bool success() const noexcept { return exited_with(0); }
   /// "exit code 3", "killed by SIGSEGV"
   [[nodiscard]] std::string describe() const;
 };

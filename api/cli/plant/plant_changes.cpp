@@ -6,7 +6,7 @@
 #include <control.h>
 #include <fmt/format.h>
 
-#include "api/cli/rows/rows.hpp"
+#include "api/dds/code_names.hpp"
 
 namespace plchost {
 
@@ -54,7 +54,7 @@ std::vector<PlantChange> changes_to(const WantedInstance& wanted, const PresentI
   std::optional<PlantChange> state;
   if (wanted.running) {
     if (const auto way = way_to(*wanted.running, present.state)) {
-      state = PlantChange{"state", instance_state_name(present.state),
+      state = PlantChange{"state", dds::instance_state_name(present.state),
                           *wanted.running ? "running" : "stopped", *way, ""};
     }
   }

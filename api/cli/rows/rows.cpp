@@ -17,14 +17,6 @@ using dds::text_of;
 
 namespace {
 
-// What the host tells beyond the fields that this program knows. A name that is taken stays what it is.
-void add_extension(Row& row, std::span<const plc_KeyValue> entries) {
-  for (const plc_KeyValue& entry : entries) {
-    const std::string name(text_of(entry.name));
-    if (!row.contains(name)) row[name] = text_of(entry.value);
-  }
-}
-
 std::int64_t to_seconds(std::int64_t nanoseconds) {
   return nanoseconds / 1'000'000'000;
 }
@@ -38,19 +30,11 @@ std::string time_text(std::int64_t unix_ns) {
   return fmt::format("{:%Y-%m-%dT%H:%M:%S}.{:03}Z", fmt::gmtime(seconds), unix_ns / kPerMillisecond % 1000);
 }
 
-Row to_row(const HostView& host) {
-  Row row{{"host", host.name},
-          {"version", text_of(host.status.version)},
-          {"manager_pid", host.status.manager_pid},
-          {"server_pid", host.server_pid},
-          {"instances", host.status.instance_count},
-          {"tasks", host.status.task_count},
-          {"events", host.status.event_count},
-          {"objects", host.status.object_count},
-          {"started_unix_s", to_seconds(host.status.started_unix_ns)}};
-  add_extension(row, host.ext);
-  row["labels"] = fmt::format("{}", fmt::join(host.labels(), ","));
-  return row;
+void add_extension(Row& row, std::span<const plc_KeyValue> entries) {
+  for (const plc_KeyValue& entry : entries) {
+    const std::string name(text_of(entry.name));
+    if (!row.contains(name)) row[name] = text_of(entry.value);
+  }
 }
 
 Row to_row(const plc_InstanceStatus& status) {
@@ -115,14 +99,6 @@ const std::vector<Column>& transition_columns() {
   static const std::vector<Column> columns{{"time", "TIME"},       {"host", "HOST"}, {"instance", "INSTANCE"},
                                            {"sequence", "NUMBER"}, {"of", "OF"},     {"from", "FROM"},
                                            {"to", "TO"},           {"pid", "PID"},   {"reason", "REASON"}};
-  return columns;
-}
-
-const std::vector<Column>& host_columns() {
-  static const std::vector<Column> columns{
-      {"host", "HOST"},         {"version", "VERSION"},     {"manager_pid", "MANAGER"},
-      {"server_pid", "SERVER"}, {"instances", "INSTANCES"}, {"tasks", "TASKS"},
-      {"events", "EVENTS"},     {"objects", "OBJECTS"},     {"labels", "LABELS"}};
   return columns;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -10,13 +11,15 @@
 namespace plchost {
 
 /// From samples of status topics to rows of output. The field names are a promise to programs.
-[[nodiscard]] Row to_row(const HostView& host);
 [[nodiscard]] Row to_row(const plc_InstanceStatus& status);
 [[nodiscard]] Row to_row(const plc_TaskStatus& status);
 [[nodiscard]] Row to_row(const plc_EventStatus& status);
 [[nodiscard]] Row to_row(const plc_WriterStatus& status);
 [[nodiscard]] Row to_row(const plc_ExceptionStatus& status);
 [[nodiscard]] Row to_row(const plc_Transition& transition);
+
+/// What a host tells beyond the fields that this program knows. A name that is taken stays what it is.
+void add_extension(Row& row, std::span<const plc_KeyValue> entries);
 
 /// A time of a host in these rows, ISO 8601, UTC, to the millisecond: "2026-11-21T10:48:59.502Z". Empty for
 /// none (0).
@@ -28,7 +31,6 @@ namespace plchost {
 }
 
 /// What the tables show of them.
-[[nodiscard]] const std::vector<Column>& host_columns();
 [[nodiscard]] const std::vector<Column>& instance_columns();
 [[nodiscard]] const std::vector<Column>& task_columns();
 [[nodiscard]] const std::vector<Column>& event_columns();

@@ -41,8 +41,8 @@ int colour_of(std::string_view field, std::string_view text) {
   constexpr int kGreen = 32;
   constexpr int kYellow = 33;
   if (field != "state" && field != "to") return 0;
-  if (text == "running") return kGreen;
-  if (text == "exception" || text == "failed") return kRed;
+  if (text == "running" || text == "alive") return kGreen;
+  if (text == "exception" || text == "failed" || text == "silent") return kRed;
   if (text == "safe_mode" || text == "waiting" || text == "starting" || text == "stopping") return kYellow;
   return 0;
 }

@@ -4,6 +4,7 @@
 #include "api/cli/cli_session.hpp"
 #include "api/cli/rows/rows.hpp"
 #include "api/cli/rows/task_rows.hpp"
+#include "api/cli/verbs/host_verbs.hpp"
 #include "api/cli/verbs/node_verbs.hpp"
 #include "api/cli/verbs/object_verbs.hpp"
 #include "api/cli/verbs/transition_verbs.hpp"
@@ -11,15 +12,6 @@
 namespace plchost {
 
 namespace {
-
-int list_hosts(CliSession& session) {
-  const auto hosts = session.shown_hosts();
-  if (!hosts) return CliSession::fail(hosts.error());
-  std::vector<Row> rows;
-  for (const HostView& host : *hosts) rows.push_back(to_row(host));
-  session.show(rows, host_columns());
-  return kExitDone;
-}
 
 int list_tasks(CliSession& session, const std::string& instance) {
   const auto rows = task_rows(session, instance);
@@ -62,7 +54,7 @@ bool has_happened(const plc_ExceptionStatus& exception) {
 void add_list_verbs(const Command& plcctl, CliSession& session) {
   const Command verb = plcctl.verb(
       "list", "Show all hosts, instances, tasks, events, writers, objects, nodes, exceptions or transitions");
-  verb.noun("hosts", "The controllers of the DDS domain", [&session] { return list_hosts(session); });
+  add_list_hosts(verb, session);
   verb.noun("instances", "The PLC instances",
             [&session] { return list(session, &ControlClient::instances, instance_columns()); });
   const auto instance = std::make_shared<std::string>();

@@ -74,6 +74,11 @@ const Command& Command::flag(const char* name, bool& value, const char* text) co
   return *this;
 }
 
+const Command& Command::file(const char* name, std::string& value, const char* text) const {
+  app_->add_option(name, value, text)->required()->type_name("FILE");
+  return *this;
+}
+
 const Command& Command::option(const char* name, std::string& value, const char* text,
                                const char* variable) const {
   app_->add_option(name, value, text)->envname(variable)->take_last();

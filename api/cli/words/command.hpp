@@ -42,6 +42,8 @@ class Command {
   /// What may follow.
   const Command& optional(const char* form, std::string& value, const char* text) const;
   const Command& flag(const char* name, bool& value, const char* text) const;
+  /// A file that must be named, "-f,--file".
+  const Command& file(const char* name, std::string& value, const char* text) const;
   /// A text, which a variable of the environment can stand for.
   const Command& option(const char* name, std::string& value, const char* text, const char* variable) const;
   /// One of several words, "--name=WORD". `name`: "--name{WORD}", where WORD is what "--name" alone stands

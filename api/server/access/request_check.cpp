@@ -41,6 +41,8 @@ constexpr std::array kOperations = {
               /*of_host=*/true},
     Operation{plc_OPERATION_LIST_ROUTES, ControlVerb::list_routes, ApiRole::operating, Argument::none,
               /*of_host=*/true},
+    Operation{plc_OPERATION_READ_CLOCK, ControlVerb::read_clock, ApiRole::operating, Argument::none,
+              /*of_host=*/true},
     Operation{plc_OPERATION_LOAD_APPLICATION, ControlVerb::load_application, ApiRole::engineering,
               Argument::path},
     Operation{plc_OPERATION_SET_SCHEDULER, ControlVerb::set_scheduler, ApiRole::engineering,
@@ -121,7 +123,8 @@ Result<ControlRequest> check_request(const plc_Request& request, ApiRole role, s
 
 bool only_reads(std::int32_t operation) noexcept {
   return operation == plc_OPERATION_CHECK_HOST || operation == plc_OPERATION_LIST_OBJECTS ||
-         operation == plc_OPERATION_LIST_NODES || operation == plc_OPERATION_LIST_ROUTES;
+         operation == plc_OPERATION_LIST_NODES || operation == plc_OPERATION_LIST_ROUTES ||
+         operation == plc_OPERATION_READ_CLOCK;
 }
 
 std::string operation_name(std::int32_t operation) {

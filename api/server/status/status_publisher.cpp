@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include "api/dds/entries.hpp"
@@ -61,6 +62,7 @@ void StatusPublisher::tick(TimePoint now) {
   if (now >= next_objects_) changed |= look_at_objects(now);
   tasks_.look(now);
   findings_.write();
+  load_.look(now);
   write_host(changed);
 }
 
@@ -89,6 +91,7 @@ bool StatusPublisher::look_at_instances(TimePoint now) {
   }
   if (!host) return false;
   bool changed = false;
+  running_ = 0;
   instances_.begin_round();
   exceptions_.begin_round();
   std::vector<std::string> names;
@@ -104,6 +107,7 @@ bool StatusPublisher::look_at_instances(TimePoint now) {
     dds::copy_text(sample.instance, name);
     sample.epoch = source_.epoch;
     sample.state = static_cast<std::uint32_t>(status->state);
+    if (status->state == InstanceState::running) ++running_;
     sample.pid = status->pid;
     sample.core = status->core;
     sample.restarts = status->restarts;
@@ -224,7 +228,11 @@ void StatusPublisher::write_host(bool changed) {
   }
   std::vector<plc_KeyValue> ext;
   dds::add_entry(ext, dds::kLabelsEntry, source_.labels);
-  if (!audit_head_.empty()) dds::add_entry(ext, "audit", audit_head_);
+  dds::add_entry(ext, "audit", audit_head_);
+  dds::add_entry(ext, dds::kRunningEntry, fmt::format("{}", running_));
+  dds::add_entry(ext, dds::kSecuredEntry, source_.secured ? "yes" : "no");
+  load_.add_to(ext);
+  dds::add_entry(ext, dds::kRivalEntry, rival_);
   (void)hosts_.update(source_.host, sample, ext);
   hosts_.write();
 }
@@ -232,6 +240,12 @@ void StatusPublisher::write_host(bool changed) {
 void StatusPublisher::set_audit_head(std::string head) {
   if (head == audit_head_) return;
   audit_head_ = std::move(head);
+  write_host(true);
+}
+
+void StatusPublisher::set_rival(std::string rival) {
+  if (rival == rival_) return;
+  rival_ = std::move(rival);
   write_host(true);
 }
 

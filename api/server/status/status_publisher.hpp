@@ -12,6 +12,7 @@
 #include "api/dds/topics.hpp"
 #include "api/server/posts/writer_watch.hpp"
 #include "api/server/status/exception_watch.hpp"
+#include "api/server/status/host_load.hpp"
 #include "api/server/status/status_table.hpp"
 #include "api/server/status/task_watch.hpp"
 #include "api/server/status/transition_publisher.hpp"
@@ -30,6 +31,7 @@ class StatusPublisher {
     std::uint64_t epoch = 0;
     std::string run_directory;
     std::string labels;  ///< with commas between
+    bool secured = false;
   };
   [[nodiscard]] static Result<StatusPublisher> create(dds_entity_t participant, const Source& source);
 
@@ -45,6 +47,8 @@ class StatusPublisher {
 
   /// For who wants to know later that nothing was cut off the audit log.
   void set_audit_head(std::string head);
+  /// Who else uses the name of this host, for people; empty: nobody.
+  void set_rival(std::string rival);
 
   [[nodiscard]] const TaskWatch& tasks() const noexcept { return tasks_; }
   /// HostStatus.round as last written.
@@ -72,6 +76,9 @@ class StatusPublisher {
 
   Source source_;
   std::string audit_head_;
+  std::string rival_;
+  HostLoad load_;
+  std::uint32_t running_ = 0;  ///< instances
   TaskWatch tasks_;
   ExceptionWatch exceptions_;
   TransitionPublisher transitions_;

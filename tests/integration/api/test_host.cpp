@@ -1,8 +1,10 @@
 #include "tests/integration/api/test_host.hpp"
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
 #include <optional>
+#include <utility>
 
 #include <netinet/in.h>
 #include <poll.h>
@@ -119,7 +121,9 @@ void TestHost::start_server(std::vector<std::string> more) {
 void TestHost::replace_server() {
   server_->signal(SIGKILL);
   server_->wait();
-  start_server(more_arguments_);
+  std::vector<std::string> arguments = more_arguments_;
+  if (std::ranges::find(arguments, "--name-held") == arguments.end()) arguments.emplace_back("--name-held");
+  start_server(std::move(arguments));
 }
 
 std::vector<ControlRequest> TestHost::requests() {

@@ -1,32 +1,9 @@
 #!/usr/bin/env bash
 # Two managers in two network namespaces with a cable between: their instances talk by address; a plchost-dds is
 # killed, the cable is cut and mended; nobody waits for anybody.
-. "$(dirname "$0")/common.sh"
-
-# The names of namespaces and interfaces are of the whole machine.
-north_space=plchost-n-$$
-south_space=plchost-s-$$
-ip netns add "$north_space" 2>/dev/null || {
-  echo "skipped: this process may make no network namespaces (it needs CAP_SYS_ADMIN and CAP_NET_ADMIN)"
-  exit 77
-}
-end_all() {
-  clean_up
-  ip netns delete "$north_space" 2>/dev/null || true
-  ip netns delete "$south_space" 2>/dev/null || true
-}
-trap end_all EXIT
-ip netns add "$south_space"
-ip -n "$north_space" link add cable type veth peer name cable netns "$south_space" || {
-  echo "skipped: there are no veth pairs here"
-  exit 77
-}
-for side in "$north_space 10.77.0.1" "$south_space 10.77.0.2"; do
-  set -- $side
-  ip -n "$1" link set lo up
-  ip -n "$1" address add "$2/24" dev cable
-  ip -n "$1" link set cable up
-done
+. "$(dirname "$0")/spaces.sh"
+make_spaces north south
+cable north 10.77.0.1 south 10.77.0.2
 
 # write_side HOST NUMBER PEER NODE_ADDRESS: a host with one instance that talks
 write_side() {
@@ -46,18 +23,14 @@ write_side north 1 10.77.0.2 11
 write_side south 2 10.77.0.1 12
 
 # Each sends requests to the other, one by address and one by name, and answers those of the other.
-start_side() { # HOST SPACE VARIABLE=PEER
-  env "$3" ip netns exec "$2" "$BIN/plchostd" --config "$cell/$1.toml" 2>>"$cell/$1.log" &
-  managers+=($!)
-}
-start_side north "$north_space" TALKER_ADDRESS=$((2 << 16 | 12))
-start_side south "$south_space" TALKER_PEER=talker@north
+TALKER_ADDRESS=$((2 << 16 | 12)) start_manager_within north
+TALKER_PEER=talker@north start_manager_within south
 at() { # HOST COMMAND...: plcctl beside that host
   local host=$1
   shift
-  local space=$north_space address=10.77.0.1
-  if [ "$host" = south ]; then space=$south_space address=10.77.0.2; fi
-  ip netns exec "$space" "$BIN/plcctl" --timeout 10 --interface cable --peer "$address" --host "$host" "$@"
+  local address=10.77.0.1
+  if [ "$host" = south ]; then address=10.77.0.2; fi
+  within "$host" "$BIN/plcctl" --timeout 10 --interface cable --peer "$address" --host "$host" "$@"
 }
 # The highest number that the instance of HOST has said before "WORD".
 count_of() { grep -oE "[0-9]+ $2" "$cell/$1.log" | tail -n 1 | grep -oE '^[0-9]+' || echo 0; }
@@ -81,7 +54,7 @@ at north show routes talker --json |
   jq -e '.[] | select(.to_hosts == "2") | .to_name == "gateway" and .sent > 0 and .sent_bytes > 0' >/dev/null ||
   fail "no way to host 2: $(at north show routes talker)"
 echo "- nobody from outside is served who was not let in: on the loopback interface there is no host"
-if ip netns exec "$north_space" "$BIN/plcctl" --timeout 1 list hosts 2>&1 | grep -q north; then
+if within north "$BIN/plcctl" --timeout 1 list hosts 2>&1 | grep -q north; then
   fail "north answers on an interface that it was not told to use"
 fi
 
@@ -100,20 +73,20 @@ refused_so_far() { count_of "$1" "not sent"; }
 before_north=$(refused_so_far north)
 before_south=$(refused_so_far south)
 before_cycles=$(count_of north cycles)
-ip -n "$north_space" link set cable down
+ip -n "$(space north)" link set cable down
 until_true 30 has_more north "not sent" "$before_north"
 until_true 30 has_more south "not sent" "$before_south"
 until_true 30 has_more north cycles "$before_cycles"
 sleep 4 # longer than DDS remembers a host that is silent
-ip -n "$north_space" link set cable up
+ip -n "$(space north)" link set cable up
 both_go_on
 none_wrong
 is "$(talker_of 0)" "$north_talker" || fail "the instance was started anew"
 
 echo "- a short cut"
-ip -n "$south_space" link set cable down
+ip -n "$(space south)" link set cable down
 sleep 0.5
-ip -n "$south_space" link set cable up
+ip -n "$(space south)" link set cable up
 both_go_on
 none_wrong
 

@@ -1,36 +1,13 @@
 #!/usr/bin/env bash
 # An unsecured host is for the loopback interface only, really: what comes from another machine reaches no socket, so no
 # parser. With an explicit setting it does, and the log says what that means.
-. "$(dirname "$0")/common.sh"
-
-# The names of namespaces and interfaces are of the whole machine.
-inside=plchost-i-$$
-outside=plchost-o-$$
-ip netns add "$inside" 2>/dev/null || {
-  echo "skipped: this process may make no network namespaces (it needs CAP_SYS_ADMIN and CAP_NET_ADMIN)"
-  exit 77
-}
-end_all() {
-  clean_up
-  ip netns delete "$inside" 2>/dev/null || true
-  ip netns delete "$outside" 2>/dev/null || true
-}
-trap end_all EXIT
-ip netns add "$outside"
-ip -n "$inside" link add cable type veth peer name cable netns "$outside" || {
-  echo "skipped: there are no veth pairs here"
-  exit 77
-}
-for side in "$inside 10.78.0.1" "$outside 10.78.0.2"; do
-  set -- $side
-  ip -n "$1" link set lo up
-  ip -n "$1" address add "$2/24" dev cable
-  ip -n "$1" link set cable up
-done
+. "$(dirname "$0")/spaces.sh"
+make_spaces inside outside
+cable inside 10.78.0.1 outside 10.78.0.2
 
 # junk SPACE ADDRESS: no RTPS, but looks like it, to all ports of the host; says which ones took it
 junk() {
-  ip netns exec "$1" python3 - "$2" "$PLCHOST_DOMAIN" <<'EOF'
+  within "$1" python3 - "$2" "$PLCHOST_DOMAIN" <<'EOF'
 import socket, sys, time
 address, first = sys.argv[1], 7400 + 250 * int(sys.argv[2])
 for port in (first, first + 1, first + 10, first + 11):
@@ -49,8 +26,8 @@ for port in (first, first + 1, first + 10, first + 11):
 EOF
 }
 start() {
-  ip netns exec "$inside" "$BIN/plchostd" --config "$cell/cell1.toml" 2>>"$cell/cell1.log" &
-  managers=($!)
+  managers=()
+  start_manager_within cell1 inside
   until_true 20 grep -q "is served in DDS domain" "$cell/cell1.log"
 }
 stop() {
@@ -63,10 +40,10 @@ looked_at() { grep -qE "datagrams were refused|malformed packet" "$cell/cell1.lo
 write_host cell1 "$first_core"
 start
 grep -q "unsecured, therefore on the loopback interface only" "$cell/cell1.log" || fail "it does not say that it is unsecured"
-taken=$(junk "$outside" 10.78.0.1)
+taken=$(junk outside 10.78.0.1)
 is "$taken" "" || fail "these ports take packets from another machine: $taken"
 looked_at && fail "a packet from another machine was looked at"
-taken=$(junk "$inside" 127.0.0.1)
+taken=$(junk inside 127.0.0.1)
 is "$taken" "10 11 " || fail "from lo these ports take packets: $taken; the test looks at the wrong ones"
 until_true 10 looked_at
 stop
@@ -74,12 +51,20 @@ stop
 printf '[dds]\ninterface = "cable"\n' >>"$cell/cell1.toml"
 refused_config() { "$BIN/plchostd" --check-config "$cell/cell1.toml"; }
 refused "without an identity opens this controller to all who reach it" refused_config
-printf 'allow_unsecured = true\n' >>"$cell/cell1.toml"
+printf 'allow_unsecured = true\nmulticast = false\n' >>"$cell/cell1.toml"
 : >"$cell/cell1.log"
 start
 grep -q "who reaches it controls this host" "$cell/cell1.log" || fail "it does not say what that means"
-taken=$(junk "$outside" 10.78.0.1)
+taken=$(junk outside 10.78.0.1)
 is "$taken" "10 11 " || fail "it was told to be open, and takes on ports: $taken"
 until_true 10 looked_at
+stop
+
+# Discovery by multicast takes two ports more.
+sed -i '/multicast/d' "$cell/cell1.toml"
+: >"$cell/cell1.log"
+start
+taken=$(junk outside 10.78.0.1)
+is "$taken" "0 1 10 11 " || fail "it looks for others by multicast, and takes on ports: $taken"
 stop
 nothing_left

@@ -1,0 +1,156 @@
+#include <algorithm>
+#include <span>
+#include <string_view>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "api/client/check_names.hpp"
+#include "api/client/control_client.hpp"
+#include "api/dds/entries.hpp"
+#include "shm/base/names.hpp"
+
+namespace plchost {
+
+std::vector<std::string> HostView::labels() const {
+  const std::string all = entry(dds::kLabelsEntry);
+  std::vector<std::string> labels;
+  for (std::string_view rest = all; !rest.empty();) {
+    const std::size_t comma = rest.find(',');
+    labels.emplace_back(rest.substr(0, comma));
+    rest = comma == std::string_view::npos ? std::string_view() : rest.substr(comma + 1);
+  }
+  return labels;
+}
+
+std::string HostView::entry(std::string_view key) const {
+  std::string value;
+  const std::pair<std::string_view, std::string*> known{key, &value};
+  return dds::read_entries(ext, std::span(&known, 1)) ? value : "";
+}
+
+void ControlClient::update_hosts() {
+  const TimePoint now = MonotonicClock::now();
+  // Looked at, it is over; else no wait would wait any more.
+  dds_requested_deadline_missed_status_t missed{};
+  (void)dds_get_requested_deadline_missed_status(presence_.reader(), &missed);
+  presence_.update([&](const plc_Presence& presence) {
+    Seen& seen = seen_[std::string(dds::text_of(presence.host))];
+    const bool is_gone = now - seen.last > kHostGone;
+    // The last word of a server that was replaced; or another host that has the same name.
+    if (presence.epoch < seen.epoch && !is_gone) {
+      seen.others = now - seen.other_last > kHostGone ? 1 : seen.others + 1;
+      seen.other_last = now;
+      return;
+    }
+    if (seen.epoch != presence.epoch || is_gone) last_news_ = now;
+    seen.epoch = presence.epoch;
+    seen.pid = presence.pid;
+    seen.last = now;
+  });
+  host_status_.update();
+}
+
+std::optional<HostView> ControlClient::view_of(std::string_view name, const Seen& seen) const {
+  const auto status = host_status_.of_host(name, seen.epoch);
+  if (status.empty()) return std::nullopt;
+  constexpr std::uint32_t kMoreThanLastWords = 3;
+  const TimePoint now = MonotonicClock::now();
+  HostView view{.name = std::string(name),
+                .epoch = seen.epoch,
+                .server_pid = seen.pid,
+                .status = status.front(),
+                .ext = {},
+                .silent = now - seen.last >= kSilent,
+                .contested = seen.others >= kMoreThanLastWords && now - seen.other_last <= kHostGone};
+  const auto& ext = view.status.ext;
+  view.ext.assign(ext._buffer, ext._buffer + ext._length);
+  view.status.ext = {};
+  return view;
+}
+
+std::optional<HostView> ControlClient::present(std::string_view name) const {
+  const auto seen = seen_.find(name);
+  if (seen == seen_.end() || MonotonicClock::now() - seen->second.last > kHostGone) return std::nullopt;
+  return view_of(name, seen->second);
+}
+
+std::vector<HostView> ControlClient::present() const {
+  std::vector<HostView> found;
+  for (const auto& [name, seen] : seen_) {
+    if (auto view = present(name)) found.push_back(std::move(*view));
+  }
+  return found;
+}
+
+bool ControlClient::is_silent(std::string_view host) {
+  update();
+  const auto seen = seen_.find(host);
+  return seen != seen_.end() && MonotonicClock::now() - seen->second.last >= kSilent;
+}
+
+std::vector<HostView> ControlClient::hosts(TimePoint deadline) {
+  for (;;) {
+    update();
+    const TimePoint now = MonotonicClock::now();
+    auto found = present();
+    const bool settled = !found.empty() && now - last_news_ >= quiet_;
+    if (settled || now >= deadline) return found;
+    wait_set_.wait(found.empty() ? deadline : std::min(deadline, last_news_ + quiet_));
+  }
+}
+
+Result<HostView> ControlClient::host(std::string_view name, TimePoint deadline) {
+  if (auto good = check_host_name(name); !good) return std::unexpected(std::move(good).error());
+  for (;;) {
+    update();
+    if (auto found = present(name)) return *found;
+    if (MonotonicClock::now() >= deadline) break;
+    wait_set_.wait(deadline);
+  }
+  const auto others = present();
+  std::vector<std::string_view> names;
+  names.reserve(others.size());
+  for (const HostView& other : others) names.emplace_back(other.name);
+  return failure(ErrorCode::not_found,
+                 fmt::format("no host '{}' answers; those that do: {}", name, join_names(names)));
+}
+
+std::vector<HostView> ControlClient::known_hosts(TimePoint deadline) {
+  (void)hosts(deadline);
+  const auto is_in_doubt = [](const auto& entry) {
+    const Duration silence = MonotonicClock::now() - entry.second.last;
+    return silence >= kSilent && silence <= kHostGone;
+  };
+  // A moment of silence is not the end of a host.
+  const TimePoint end = MonotonicClock::now() + 2 * kHostGone;
+  while (std::ranges::any_of(seen_, is_in_doubt) && MonotonicClock::now() < end) {
+    wait_set_.wait(MonotonicClock::now() + dds::kPresencePeriod);
+    update();
+  }
+  std::vector<HostView> found;
+  for (const auto& [name, seen] : seen_) {
+    if (auto view = view_of(name, seen)) found.push_back(std::move(*view));
+  }
+  return found;
+}
+
+Result<ClockOffset> ControlClient::clock_offset(const std::string& host, TimePoint deadline) {
+  constexpr int kTries = 5;
+  std::optional<ClockOffset> best;
+  for (int i = 0; i < kTries; ++i) {
+    const auto reply =
+        call({.host = host, .operation = plc_OPERATION_READ_CLOCK, .instance = "", .argument = ""}, deadline);
+    if (!reply && best) break;
+    if (!reply) return std::unexpected(reply.error());
+    if (reply->code != ErrorCode::ok) return failure(reply->code, reply->text);
+    // It was written somewhere between.
+    const std::int64_t way = reply->heard_unix_ns - reply->asked_unix_ns;
+    const ClockOffset measured{.offset = Duration(reply->host_unix_ns - reply->asked_unix_ns - way / 2),
+                               .uncertainty = Duration((way + 1) / 2)};
+    if (!best || measured.uncertainty < best->uncertainty) best = measured;
+  }
+  return *best;
+}
+
+}  // namespace plchost

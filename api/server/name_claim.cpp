@@ -1,0 +1,167 @@
+#include "api/server/name_claim.hpp"
+
+#include <algorithm>
+#include <array>
+#include <fstream>
+#include <thread>
+#include <tuple>
+#include <utility>
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "api/dds/error.hpp"
+#include "api/dds/samples.hpp"
+#include "api/dds/text.hpp"
+#include "api/dds/topics.hpp"
+#include "shm/base/log.hpp"
+#include "shm/base/names.hpp"
+
+namespace plchost {
+
+namespace {
+
+std::string machine_name() {
+  std::array<char, 65> name{};
+  (void)::gethostname(name.data(), name.size() - 1);
+  return name.data();
+}
+
+// A run directory has one manager at a time, and what was before the last boot is no more: all servers of one
+// place are one after the other. Containers share a boot, but no folder of one number.
+std::string place_of(const std::string& run_directory) {
+  std::string boot;
+  std::getline(std::ifstream("/proc/sys/kernel/random/boot_id"), boot);
+  struct stat folder{};
+  (void)::stat(run_directory.c_str(), &folder);
+  return fmt::format("{} {}:{}", boot.empty() ? machine_name() : boot, folder.st_dev, folder.st_ino);
+}
+
+NameHolder holder_of(const plc_NameClaim& sample) {
+  const auto machine = dds::text_of(sample.machine);
+  return {.server = dds::Guid::from(sample.server),
+          .epoch = sample.epoch,
+          .since_ns = sample.since_unix_ns,
+          .serving = sample.serving,
+          .place = std::string(dds::text_of(sample.place)),
+          .machine = is_printable_utf8(machine) ? std::string(machine) : "unknown"};
+}
+
+}  // namespace
+
+bool yields(const NameHolder& own, const NameHolder& other) noexcept {
+  if (own.place == other.place) return false;  // left-overs of a server that was replaced
+  if (own.serving != other.serving) return other.serving;
+  return std::tie(other.since_ns, other.place) < std::tie(own.since_ns, own.place);
+}
+
+Result<NameClaim> NameClaim::create(dds_entity_t participant, const Options& options) {
+  NameClaim claim;
+  claim.host_ = options.host;
+  claim.own_ = {
+      .server = dds::guid_of(participant),
+      .epoch = options.epoch,
+      .since_ns = options.since_ns,
+      .serving = options.serving,
+      .place = place_of(options.run_directory),
+      .machine = fmt::format("{}, process {}, {}", machine_name(), ::getpid(), options.run_directory)};
+  const std::string partition = dds::name_partition(options.host);
+  const auto keep = [](Result<dds::Entity> made, dds::Entity& entity) -> Result<void> {
+    if (!made) return failure_in("claim the host's name", made.error());
+    entity = *std::move(made);
+    return {};
+  };
+  if (auto done = keep(dds::make_topic(participant, dds::kNameClaim), claim.topic_); !done)
+    return std::unexpected(done.error());
+  if (auto done = keep(dds::make_publisher(participant, partition), claim.publisher_); !done)
+    return std::unexpected(done.error());
+  if (auto done = keep(dds::make_subscriber(participant, partition), claim.subscriber_); !done)
+    return std::unexpected(done.error());
+  const dds_entity_t topic = claim.topic_.get();
+  if (auto done = keep(dds::make_writer(claim.publisher_.get(), topic, dds::ack_qos()), claim.writer_); !done)
+    return std::unexpected(done.error());
+  if (auto done = keep(dds::make_reader(claim.subscriber_.get(), topic, dds::ack_qos()), claim.reader_);
+      !done)
+    return std::unexpected(done.error());
+  if (auto done = claim.write(); !done) return std::unexpected(done.error());
+  return claim;
+}
+
+Result<void> NameClaim::write() {
+  plc_NameClaim sample{};
+  own_.server.copy_to(sample.server);
+  dds::copy_text(sample.host, host_);
+  sample.epoch = own_.epoch;
+  sample.since_unix_ns = own_.since_ns;
+  sample.serving = own_.serving;
+  dds::copy_text(sample.place, own_.place);
+  dds::copy_text(sample.machine, own_.machine);
+  return dds::check_code(dds_write(writer_.get(), &sample), "claim the host's name");
+}
+
+Result<void> NameClaim::ask(TimePoint deadline) {
+  constexpr Duration kLook = std::chrono::milliseconds(2);
+  while (!own_.serving) {
+    if (look(MonotonicClock::now()) == State::taken) return std::unexpected(taken());
+    if (MonotonicClock::now() >= deadline) {
+      own_.serving = true;
+      return write();
+    }
+    std::this_thread::sleep_for(kLook);
+  }
+  return {};
+}
+
+void NameClaim::meet(const NameHolder& other, TimePoint now) {
+  rival_ = other.machine;
+  rival_seen_ = now;
+  if (told_.insert(other.server).second) {
+    spdlog::warn("another host {} the name '{}': {}; it came later and has to end",
+                 other.serving ? "serves under" : "asks for", host_, other.machine);
+  }
+  constexpr std::size_t kMostTold = 1024;
+  if (told_.size() > kMostTold) told_.clear();
+}
+
+NameClaim::State NameClaim::look(TimePoint now) {
+  State state = State::ours;
+  dds::take_all<plc_NameClaim>(reader_.get(),
+                               [&](const plc_NameClaim& sample, const dds_sample_info_t& info) {
+                                 const dds::Guid server = dds::Guid::from(sample.server);
+                                 if (info.instance_state != DDS_IST_ALIVE) {
+                                   const auto gone = others_.extract(server);
+                                   if (!gone.empty() && gone.mapped().serving && own_.serving)
+                                     state = State::left;
+                                   return;
+                                 }
+                                 if (!info.valid_data || server == own_.server) return;
+                                 const NameHolder other = holder_of(sample);
+                                 // Gone meanwhile, or in the name of another.
+                                 if (dds::writer_of(reader_.get(), info).participant() != server) return;
+                                 if (other.place != own_.place) others_[server] = other;
+                               });
+  for (const auto& [server, other] : others_) {
+    if (yields(own_, other)) {
+      winner_ = other;
+      return State::taken;
+    }
+    meet(other, now);
+  }
+  if (others_.empty() && now - rival_seen_ > kRivalShown) rival_.clear();
+  return state;
+}
+
+Error NameClaim::taken() const {
+  constexpr std::int64_t kSecond = 1'000'000'000;
+  return failure(
+             ErrorCode::already_exists,
+             fmt::format(
+                 "another host of this DDS domain has the name '{}', since {:%Y-%m-%d %H:%M:%S} UTC: {}. "
+                 "This one is not served, its PLCs run on: give one of the two another [host] name",
+                 host_, fmt::gmtime(static_cast<std::time_t>(winner_.since_ns / kSecond)), winner_.machine))
+      .error();
+}
+
+}  // namespace plchost

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <set>
+#include <string>
+
+#include "api/dds/entity.hpp"
+#include "api/dds/guid.hpp"
+#include "shm/base/result.hpp"
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+/// Who claims the name of a host.
+struct NameHolder {
+  dds::Guid server;  ///< the participant of its plchost-dds
+  std::uint64_t epoch = 0;
+  std::int64_t since_ns = 0;  ///< from when on it has had the name
+  bool serving = false;       ///< false: it asks
+  std::string place;          ///< the same for all servers of one host
+  std::string machine;        ///< for people
+};
+
+/// Whether `own` must leave the name to `other`. Of two hosts that claim one name exactly one must.
+[[nodiscard]] bool yields(const NameHolder& own, const NameHolder& other) noexcept;
+
+/// The name of this host in the DDS domain: two hosts that have one name see each other, and one of them
+/// ends. Control loop only.
+class NameClaim {
+ public:
+  struct Options {
+    std::string host;
+    std::string run_directory;
+    std::uint64_t epoch = 0;
+    std::int64_t since_ns = 0;
+    bool serving = false;
+  };
+  /// So long a host that comes asks before it serves: who lives nearby has answered by then.
+  static constexpr Duration kAsking = std::chrono::milliseconds(100);
+  /// So long a rival is told of after it was seen.
+  static constexpr Duration kRivalShown = std::chrono::seconds(90);
+
+  [[nodiscard]] static Result<NameClaim> create(dds_entity_t participant, const Options& options);
+
+  /// Waits until the deadline whether somebody else has the name, then serves. already_exists: somebody has.
+  [[nodiscard]] Result<void> ask(TimePoint deadline);
+
+  enum class State : std::uint8_t {
+    ours,
+    taken,  ///< another host has it: this one must end
+    left,   ///< another host has served under it and has gone: what it told must be told anew
+  };
+  /// Reads what has come; to be called when something has, and from time to time.
+  [[nodiscard]] State look(TimePoint now);
+
+  /// After State::taken: who has it, and what to do.
+  [[nodiscard]] Error taken() const;
+  /// Who else wants the name, or wanted it a short time ago; empty: nobody.
+  [[nodiscard]] const std::string& rival() const noexcept { return rival_; }
+  /// To be listened to.
+  [[nodiscard]] dds_entity_t reader() const noexcept { return reader_.get(); }
+
+ private:
+  NameClaim() = default;
+  [[nodiscard]] Result<void> write();
+  void meet(const NameHolder& other, TimePoint now);
+
+  std::string host_;
+  NameHolder own_;
+  NameHolder winner_;
+  std::map<dds::Guid, NameHolder> others_;
+  std::set<dds::Guid> told_;
+  std::string rival_;
+  TimePoint rival_seen_;
+  dds::Entity topic_;
+  dds::Entity publisher_;
+  dds::Entity subscriber_;
+  dds::Entity writer_;
+  dds::Entity reader_;
+};
+
+}  // namespace plchost

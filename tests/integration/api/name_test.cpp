@@ -1,0 +1,116 @@
+#include <algorithm>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+#include "api/client/control_client.hpp"
+#include "api/control/exit_codes.hpp"
+#include "tests/integration/api/test_host.hpp"
+
+namespace plchost {
+namespace {
+
+// Two hosts that have one name, in one domain: each has a pool, a run directory and a plchost-dds of its own.
+class HostName : public testing::Test {
+ protected:
+  void until(const std::function<bool()>& happened) {
+    const TimePoint end = soon();
+    while (!happened() && MonotonicClock::now() < end) sut_->wait_for_change(MonotonicClock::now() + kLook);
+    ASSERT_TRUE(happened());
+  }
+  /// Which of the two the clients see: the number of its instances.
+  [[nodiscard]] std::uint32_t instances_seen() {
+    const auto host = sut_->host("hosta", MonotonicClock::now());
+    return host ? host->status.instance_count : 0;
+  }
+
+  static constexpr Duration kLook = std::chrono::milliseconds(10);
+  OwnDomain domain_;
+  TestHost first_{domain_, "hosta"};
+  TestHost second_{domain_, "hosta"};
+  std::unique_ptr<ControlClient> sut_ = connect(domain_);
+};
+
+void write_instances(TestHost& host, std::uint32_t count) {
+  for (std::uint32_t i = 0; i < count; ++i) {
+    host.write_instance(i, "line" + std::to_string(i), InstanceState::running);
+  }
+  host.write_count(count);
+}
+
+TEST_F(HostName, IsRefusedToWhoComesLaterWhoThenShowsNothing) {
+  write_instances(first_, 1);
+  write_instances(second_, 2);
+  first_.start_server();
+  until([&] { return instances_seen() == 1; });
+  const std::uint64_t epoch = sut_->host("hosta", soon())->epoch;
+
+  second_.start_server();
+  EXPECT_EQ(second_.server().wait(), kExitNameTaken);
+  EXPECT_EQ(instances_seen(), 1U);
+  EXPECT_EQ(sut_->host("hosta", soon())->epoch, epoch) << "the first one goes on";
+  until([&] { return !sut_->host("hosta", soon())->entry(dds::kRivalEntry).empty(); });
+}
+
+TEST_F(HostName, IsNotLostToAnOlderOneThatOnlyAsks) {
+  write_instances(first_, 1);
+  first_.start_server({"--name-since", "2000"});
+  until([&] { return instances_seen() == 1; });
+
+  second_.start_server({"--name-since", "1000"});
+  EXPECT_EQ(second_.server().wait(), kExitNameTaken);
+  EXPECT_EQ(instances_seen(), 1U);
+}
+
+// As when a network that was divided becomes one again.
+TEST_F(HostName, OfTwoThatServeBelongsToTheOlderWhoTellsAllAnew) {
+  write_instances(first_, 1);
+  write_instances(second_, 2);
+  first_.start_server({"--name-since", "1000", "--name-held"});
+  until([&] { return instances_seen() == 1; });
+  second_.start_server({"--name-since", "2000", "--name-held"});
+
+  EXPECT_EQ(second_.server().wait(), kExitNameTaken);
+  EXPECT_EQ(first_.server().wait(), 0) << "its manager starts it again";
+  first_.start_server({"--name-since", "1000", "--name-held"});
+  until([&] { return instances_seen() == 1; });
+  EXPECT_TRUE(sut_->instances("hosta", soon()));
+}
+
+TEST_F(HostName, IsFreeAgainWhenItsHostHasGone) {
+  write_instances(second_, 2);
+  first_.start_server();
+  until([&] { return sut_->host("hosta", MonotonicClock::now()).has_value(); });
+  first_.server().signal(SIGTERM);
+  EXPECT_EQ(first_.server().wait(), 0);
+
+  second_.start_server();
+  until([&] { return instances_seen() == 2; });
+}
+
+TEST_F(HostName, IsItsOwnAfterACrash) {
+  write_instances(first_, 1);
+  first_.start_server();
+  until([&] { return instances_seen() == 1; });
+  const std::uint64_t before = sut_->host("hosta", soon())->epoch;
+  first_.server().signal(SIGKILL);
+  // With what is left of the killed one still in the domain, and without any word of it on the command line.
+  first_.server().wait();
+  first_.start_server();
+  until([&] {
+    const auto host = sut_->host("hosta", MonotonicClock::now());
+    return host && host->epoch > before;
+  });
+}
+
+TEST_F(HostName, OfTwoThatAskAtOnceBelongsToOne) {
+  first_.start_server({"--name-since", "1000"});
+  second_.start_server({"--name-since", "2000"});
+  EXPECT_EQ(second_.server().wait(), kExitNameTaken);
+  until([&] { return sut_->host("hosta", MonotonicClock::now()).has_value(); });
+}
+
+}  // namespace
+}  // namespace plchost
