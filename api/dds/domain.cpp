@@ -9,13 +9,16 @@
 #include <system_error>
 
 #include <fmt/format.h>
+#include <net/if.h>
 #include <netinet/in.h>
+#include <sys/ioctl.h>
 #include <sys/socket.h>
 
 #include "api/dds/error.hpp"
 #include "api/dds/security_section.hpp"
 #include "api/security/identity.hpp"
 #include "shm/base/thread.hpp"
+#include "shm/base/unique_fd.hpp"
 
 namespace plchost::dds {
 
@@ -30,6 +33,14 @@ Result<void> check_address(std::string_view what, std::string_view text) {
   };
   if (!text.empty() && text.size() <= kMaxAddress && std::ranges::all_of(text, allowed)) return {};
   return failure(ErrorCode::invalid_argument, fmt::format("{} '{}' is not valid", what, text.substr(0, 100)));
+}
+
+// Whether the device says so; Cyclone warns of one that has none, in vain for who has named addresses.
+bool has_multicast(const std::string& interface) {
+  const UniqueFd socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  ifreq request{};
+  interface.copy(request.ifr_name, sizeof request.ifr_name - 1);
+  return ::ioctl(socket.get(), SIOCGIFFLAGS, &request) != 0 || (request.ifr_flags & IFF_MULTICAST) != 0;
 }
 
 std::string threads_section(int fifo) {
@@ -63,8 +74,8 @@ Result<std::string> domain_configuration(Role role, const DomainOptions& options
   bool multicast = false;
   for (const std::string& name : options.interfaces) {
     if (const auto good = check_address("interface", name); !good) return std::unexpected(good.error());
-    // Where a device has no multicast, Cyclone sees that itself.
-    const bool by_multicast = options.multicast && name != "lo";
+    const bool by_multicast =
+        options.multicast && name != "lo" && (options.peers.empty() || has_multicast(name));
     interfaces += fmt::format("<NetworkInterface name=\"{}\" multicast=\"{}\"/>", name,
                               by_multicast ? "default" : "false");
     loopback |= name == "lo";

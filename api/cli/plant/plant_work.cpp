@@ -176,7 +176,9 @@ bool HostWork::change(const WantedInstance& wanted, const PlantChange& change) {
 bool may_be_selected(const WantedHost& host, const HostSelection& selection) {
   HostSelection by_name = selection;
   by_name.labels.clear();
-  return by_name.selects(HostView{.name = host.name});
+  HostView view;
+  view.name = host.name;
+  return by_name.selects(view);
 }
 
 }  // namespace

@@ -27,7 +27,7 @@ desk list hosts --json | jq -e 'all(.[];
 is "$(of cell7 list hosts -o csv | tail -n 1 | cut -d, -f1,2)" cell7,alive || fail "one host as CSV"
 
 echo "- one vanishes: a watch says so, a fresh look does not show it; it comes back as it was"
-within desk "$BIN/plcctl" --timeout 10 --interface cable --watch --every 0.5 list hosts --json >"$cell/watch.log" 2>&1 &
+ip netns exec "$(space desk)" "$BIN/plcctl" --timeout 10 --interface cable --watch --every 0.5 list hosts --json >"$cell/watch.log" 2>&1 &
 others+=($!)
 watch_says() { jq -s -e ".[-1] | any(.[]; .host == \"$1\" and .state == \"$2\")" "$cell/watch.log"; }
 until_true 30 watch_says cell3 alive
