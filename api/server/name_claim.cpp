@@ -125,22 +125,28 @@ void NameClaim::meet(const NameHolder& other, TimePoint now) {
   if (told_.size() > kMostTold) told_.clear();
 }
 
+bool NameClaim::take(const plc_NameClaim& sample, const dds_sample_info_t& info, TimePoint now) {
+  const dds::Guid server = dds::Guid::from(sample.server);
+  if (server == own_.server) return false;
+  const bool alive = info.instance_state == DDS_IST_ALIVE;
+  if (info.valid_data) {
+    NameHolder other = holder_of(sample);
+    // In the name of another; of one that is gone that cannot be known any more.
+    if (alive && dds::writer_of(reader_.get(), info).participant() != server) return false;
+    if (other.place == own_.place) return false;
+    if (!alive) meet(other, now);
+    others_[server] = std::move(other);
+  }
+  if (alive) return false;
+  const auto gone = others_.extract(server);
+  return !gone.empty() && gone.mapped().serving && own_.serving;
+}
+
 NameClaim::State NameClaim::look(TimePoint now) {
   State state = State::ours;
   dds::take_all<plc_NameClaim>(reader_.get(),
                                [&](const plc_NameClaim& sample, const dds_sample_info_t& info) {
-                                 const dds::Guid server = dds::Guid::from(sample.server);
-                                 if (info.instance_state != DDS_IST_ALIVE) {
-                                   const auto gone = others_.extract(server);
-                                   if (!gone.empty() && gone.mapped().serving && own_.serving)
-                                     state = State::left;
-                                   return;
-                                 }
-                                 if (!info.valid_data || server == own_.server) return;
-                                 const NameHolder other = holder_of(sample);
-                                 // Gone meanwhile, or in the name of another.
-                                 if (dds::writer_of(reader_.get(), info).participant() != server) return;
-                                 if (other.place != own_.place) others_[server] = other;
+                                 if (take(sample, info, now)) state = State::left;
                                });
   for (const auto& [server, other] : others_) {
     if (yields(own_, other)) {

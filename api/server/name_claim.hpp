@@ -5,6 +5,8 @@
 #include <set>
 #include <string>
 
+#include <control.h>
+
 #include "api/dds/entity.hpp"
 #include "api/dds/guid.hpp"
 #include "shm/base/result.hpp"
@@ -64,6 +66,8 @@ class NameClaim {
  private:
   NameClaim() = default;
   [[nodiscard]] Result<void> write();
+  /// True: that was the end of another host that has served under the name.
+  bool take(const plc_NameClaim& sample, const dds_sample_info_t& info, TimePoint now);
   void meet(const NameHolder& other, TimePoint now);
 
   std::string host_;

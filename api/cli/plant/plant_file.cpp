@@ -42,7 +42,10 @@ class PlantReader {
   std::set<std::string, std::less<>> hosts_;
 };
 
-void check(SectionReader& reader, std::string_view key, const std::string& name, std::size_t most) {
+/// A text that can be a name; what is no text was told already.
+void read_name(SectionReader& reader, std::string_view key, std::string& name, std::size_t most) {
+  reader.text(key, name);
+  if (!reader.has_text(key)) return;
   if (const auto good = check_name(key, name, most); !good) reader.problem(key, good.error().message);
 }
 
@@ -89,11 +92,10 @@ void PlantReader::read_host(const TomlValue& value) {
   const auto& table = std::get<TomlTable>(value.value);
   SectionReader reader(table, value.line, title_of(table, "[[host]]"), problems);
   WantedHost host{.name = "", .line = value.line, .instances = {}};
-  reader.text("name", host.name);
+  read_name(reader, "name", host.name, kMaxHostName);
   if (!reader.has("name")) {
     reader.problem("name", "is missing");
-  } else {
-    check(reader, "name", host.name, kMaxHostName);
+  } else if (reader.has_text("name")) {
     if (!hosts_.insert(host.name).second)
       reader.problem("name", fmt::format("'{}' is there twice", shown(host.name)));
   }
@@ -117,20 +119,15 @@ WantedInstance PlantReader::read_instance(const TomlValue& value, const std::str
                        title_of(table, fmt::format("[[host.instance]] of '{}'", shown(host))), problems);
   WantedInstance instance;
   instance.line = value.line;
-  reader.text("name", instance.name);
-  reader.text("scheduler", instance.scheduler);
+  read_name(reader, "name", instance.name, kMaxInstanceName);
+  read_name(reader, "scheduler", instance.scheduler, kMaxSchedulerName);
   reader.text("application", instance.application);
   std::string state;
   reader.choice("state", kStates, state);
   reader.texts("events", kMaxInstanceEvents, instance.events);
   reader.refuse_unknown_keys();
-  if (reader.has("name")) {
-    check(reader, "name", instance.name, kMaxInstanceName);
-  } else {
-    reader.problem("name", "is missing");
-  }
-  if (reader.has("scheduler")) check(reader, "scheduler", instance.scheduler, kMaxSchedulerName);
-  if (reader.has("application") &&
+  if (!reader.has("name")) reader.problem("name", "is missing");
+  if (reader.has_text("application") &&
       (!instance.application.starts_with('/') || instance.application.size() > kMaxPath)) {
     reader.problem(
         "application",
@@ -140,7 +137,8 @@ WantedInstance PlantReader::read_instance(const TomlValue& value, const std::str
   if (!state.empty()) instance.running = state == kStates.front();
   std::set<std::string> events;
   for (const std::string& event : instance.events) {
-    check(reader, "events", event, kMaxEventName);
+    if (const auto good = check_name("event", event, kMaxEventName); !good)
+      reader.problem("events", good.error().message);
     if (!events.insert(event).second)
       reader.problem("events", fmt::format("'{}' is there twice", shown(event)));
   }

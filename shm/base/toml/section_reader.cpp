@@ -21,6 +21,11 @@ const TomlValue* SectionReader::find(std::string_view key) {
   return found == table_.end() ? nullptr : &found->second;
 }
 
+bool SectionReader::has_text(std::string_view key) const {
+  const auto found = table_.find(key);
+  return found != table_.end() && std::holds_alternative<std::string>(found->second.value);
+}
+
 unsigned SectionReader::line_of(std::string_view key) const {
   const auto found = table_.find(key);
   return found == table_.end() ? line_ : found->second.line;

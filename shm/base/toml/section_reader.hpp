@@ -35,6 +35,8 @@ class SectionReader {
   void refuse_unknown_keys();
 
   [[nodiscard]] bool has(std::string_view key) const { return table_.contains(key); }
+  /// It is there and a text.
+  [[nodiscard]] bool has_text(std::string_view key) const;
   /// Line of the key if it is there, else of the table.
   [[nodiscard]] unsigned line_of(std::string_view key) const;
   /// Reports something wrong with the value of `key`.

@@ -99,6 +99,23 @@ TEST(DomainConfiguration, LetsNoOptionIntoTheXml) {
   EXPECT_TRUE(dds::domain_configuration(dds::Role::client, options));
 }
 
+TEST(DomainConfiguration, LooksForOthersByMulticastOnNetworksOnly) {
+  dds::DomainOptions options;
+  const auto configuration = [&] { return dds::domain_configuration(dds::Role::server, options).value(); };
+  EXPECT_THAT(configuration(), HasSubstr("<AllowMulticast>false<"));
+  EXPECT_THAT(configuration(), HasSubstr("<Peer Address=\"127.0.0.1\"/>"));
+  options.interfaces = {"eth0"};
+  EXPECT_THAT(configuration(), HasSubstr("<AllowMulticast>spdp<"));
+  EXPECT_THAT(configuration(), testing::Not(HasSubstr("<Peer ")));
+  options.multicast = false;
+  options.peers = {"10.0.0.1"};
+  EXPECT_THAT(configuration(), HasSubstr("<AllowMulticast>false<"));
+  EXPECT_THAT(configuration(), HasSubstr("<Peer Address=\"10.0.0.1\"/>"));
+  options.interfaces = {"lo"};
+  options.multicast = true;
+  EXPECT_THAT(configuration(), HasSubstr("<AllowMulticast>false<"));
+}
+
 TEST(DomainConfiguration, AsksForRealTimeThreadsOnlyWhenTheyWereGranted) {
   dds::DomainOptions options;
   EXPECT_THAT(dds::domain_configuration(dds::Role::server, options).value(),
