@@ -61,6 +61,7 @@ std::vector<std::string> ApiServer::arguments() const {
   arguments.emplace_back("--name-since");
   arguments.push_back(fmt::format("{}", name_since_ns_));
   if (name_held_) arguments.emplace_back("--name-held");
+  if (name_delay_ != Duration::zero()) arguments.emplace_back("--name-refused");
   return arguments;
 }
 

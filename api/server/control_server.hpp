@@ -29,6 +29,7 @@ struct ServerOptions {
   std::uint16_t host_number = 0;       ///< for other hosts; 0: no gateway
   std::int64_t name_since_ns = 0;      ///< from when on this host has its name; 0: from now on
   bool name_held = false;              ///< a server before this one had the name: nobody is asked
+  bool name_refused = false;           ///< a server before this one was refused the name: ask for longer
 };
 
 /// The server's end of the DDS API. Posts are done in DDS's receiving thread (on_event_post); everything else

@@ -205,7 +205,8 @@ Result<void> ControlServer::Parts::claim_name() {
        .serving = options.name_held});
   if (!claimed) return std::unexpected(claimed.error());
   name = *std::move(claimed);
-  return name->ask(entered + NameClaim::kAsking);
+  return name->ask(entered + (options.name_refused ? NameClaim::kAskingAgain : NameClaim::kAsking),
+                   signals.get());
 }
 
 Result<void> ControlServer::Parts::make_readers() {

@@ -50,6 +50,8 @@ int main(int argc, char** argv) {
   app.add_option("--name-since", options.name_since_ns,
                  "since when this host has its name (CLOCK_REALTIME, ns; default: now)");
   app.add_flag("--name-held", options.name_held, "a server before this one had the name: do not ask for it");
+  app.add_flag("--name-refused", options.name_refused,
+               "a server before this one was refused the name: ask for it longer");
   app.add_flag("--no-multicast{false}", options.dds.multicast, "look for others at --peer only");
   app.add_option("--log-level", log_level, "trace, debug, info, warning or error")
       ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error"}));

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <fstream>
-#include <thread>
 #include <tuple>
 #include <utility>
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <poll.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -101,15 +101,18 @@ Result<void> NameClaim::write() {
   return dds::check_code(dds_write(writer_.get(), &sample), "claim the host's name");
 }
 
-Result<void> NameClaim::ask(TimePoint deadline) {
-  constexpr Duration kLook = std::chrono::milliseconds(2);
+Result<void> NameClaim::ask(TimePoint deadline, int stop_fd) {
+  constexpr int kLookMs = 2;
   while (!own_.serving) {
     if (look(MonotonicClock::now()) == State::taken) return std::unexpected(taken());
     if (MonotonicClock::now() >= deadline) {
       own_.serving = true;
       return write();
     }
-    std::this_thread::sleep_for(kLook);
+    pollfd stop{.fd = stop_fd, .events = POLLIN, .revents = 0};
+    if (::poll(&stop, 1, kLookMs) > 0) {
+      return failure(ErrorCode::unavailable, "asked to end before it was known whether the name is free");
+    }
   }
   return {};
 }

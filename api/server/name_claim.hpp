@@ -40,13 +40,17 @@ class NameClaim {
   };
   /// So long a host that comes asks before it serves: who lives nearby has answered by then.
   static constexpr Duration kAsking = std::chrono::milliseconds(100);
+  /// One that was refused the name takes its time: also who lives behind a slow link, or speaks DDS Security,
+  /// has.
+  static constexpr Duration kAskingAgain = std::chrono::seconds(2);
   /// So long a rival is told of after it was seen.
   static constexpr Duration kRivalShown = std::chrono::seconds(90);
 
   [[nodiscard]] static Result<NameClaim> create(dds_entity_t participant, const Options& options);
 
   /// Waits until the deadline whether somebody else has the name, then serves. already_exists: somebody has.
-  [[nodiscard]] Result<void> ask(TimePoint deadline);
+  /// unavailable: there is something to be read from `stop_fd`, before the deadline.
+  [[nodiscard]] Result<void> ask(TimePoint deadline, int stop_fd);
 
   enum class State : std::uint8_t {
     ours,
