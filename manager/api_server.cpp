@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <sys/epoll.h>
 
+#include "api/control/application_versions.hpp"
 #include "api/control/exit_codes.hpp"
 #include "manager/system/lock_file.hpp"
 #include "shm/base/log.hpp"
@@ -42,6 +43,10 @@ std::vector<std::string> ApiServer::arguments() const {
                                         fmt::format("{}", config_.blocks.host_number),
                                         "--audit-folder",
                                         fmt::format("{}/audit.{}", host.state_directory, host.name),
+                                        "--applications-folder",
+                                        applications_folder(host.state_directory, host.name),
+                                        "--application-limit",
+                                        fmt::format("{}", host.application_limit_mib),
                                         "--log-level",
                                         host.log_level};
   for (const std::string& label : host.labels) {

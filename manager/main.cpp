@@ -2,7 +2,9 @@
 #include <cstdio>
 #include <filesystem>
 #include <iostream>
+#include <span>
 #include <string>
+#include <string_view>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -10,6 +12,8 @@
 #include "api/security/identity.hpp"
 #include "manager/config/load_config.hpp"
 #include "manager/manager.hpp"
+#include "manager/store/store_application.hpp"
+#include "manager/store/store_process.hpp"
 #include "manager/system/child_process.hpp"
 #include "shm/base/log.hpp"
 #include "shm/base/memory_guard.hpp"
@@ -92,6 +96,10 @@ int run(const Options& options) {
 }
 
 int plchostd_main(int argc, const char* const* argv) {
+  const std::span arguments(argv, static_cast<std::size_t>(argc));
+  // Not for people: the manager calls it.
+  if (arguments.size() == 3 && std::string_view(arguments[1]) == kStoreOption)
+    return store_main(arguments[2]);
   Options options;
   CLI::App app("The manager of this host's PLC runtimes.", "plchostd");
   describe(app, options);

@@ -14,6 +14,7 @@
 #include "instances/launch/core_latency.hpp"
 #include "manager/host_check/host_check.hpp"
 #include "manager/pool_rights.hpp"
+#include "manager/store/store_process.hpp"
 #include "manager/supervisor/process_host.hpp"
 #include "manager/system/child_process.hpp"
 #include "shm/base/log.hpp"
@@ -144,8 +145,19 @@ void Manager::make_supervisor() {
                                          .pool = config_.host.pool,
                                          .run_directory = config_.host.run_directory});
     ProcessHost& made = *host;
+    const HostConfig& own = config_.host;
+    auto applications = std::make_unique<StoreProcess>(
+        *reactor_,
+        StoreProcess::Settings{
+            .pool = own.pool,
+            .folder = versions_folder(applications_folder(own.state_directory, own.name), instance.name),
+            .keep = own.application_versions,
+            .helper = "/proc/self/exe",
+            .plc_instance = options_.programs + "/plc-instance"});
     return Supervisor::HostedInstance{
-        .host = std::move(host), .connect = [&made](InstanceEvents& events) { made.connect_events(events); }};
+        .host = std::move(host),
+        .applications = std::move(applications),
+        .connect = [&made](InstanceEvents& events) { made.connect_events(events); }};
   };
   supervisor_ = std::make_unique<Supervisor>(
       config_,
@@ -270,6 +282,7 @@ void Manager::clean_up() {
     if (!kept && is_ours(config_, at->path())) ::unlink(at->path().c_str());
   }
   ::unlink(manager_socket_path(config_.host.run_directory).c_str());
+  remove_downloads(config_.host.pool);
   MemoryFile::remove(host_page_name(config_.host.pool));
   if (!config_.host.keep_pool) {
     ObjectPool::remove(config_.host.pool);

@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "api/audit/sha256.hpp"
+#include "api/security/sha256.hpp"
 #include "shm/base/time.hpp"
 
 namespace plchost {

@@ -14,10 +14,10 @@ namespace {
 
 constexpr std::string_view kAll = "all";
 
-Result<ApiReply> call_one(const dds::DomainOptions& options, const ApiRequest& request, TimePoint deadline) {
+Result<ApiReply> ask_one(const dds::DomainOptions& options, const std::string& host, const HostCall& call) {
   const auto client = ControlClient::connect(options);
   if (!client) return std::unexpected(client.error());
-  return (*client)->call(request, deadline);
+  return call(**client, host);
 }
 
 }  // namespace
@@ -33,8 +33,8 @@ bool HostSelection::selects(const HostView& view) const {
       labels, [&](const std::string& label) { return std::ranges::find(has, label) != has.end(); });
 }
 
-std::vector<HostOutcome> call_each(const dds::DomainOptions& options, const std::vector<std::string>& hosts,
-                                   const ApiRequest& request, TimePoint deadline) {
+std::vector<HostOutcome> ask_each(const dds::DomainOptions& options, const std::vector<std::string>& hosts,
+                                  const HostCall& call) {
   // Each connection is a participant of the domain, which all others have to get to know.
   constexpr std::size_t kAtOnce = 16;
   std::vector<HostOutcome> outcomes;
@@ -44,9 +44,7 @@ std::vector<HostOutcome> call_each(const dds::DomainOptions& options, const std:
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
     for (std::size_t i = next++; i < outcomes.size(); i = next++) {
-      ApiRequest own = request;
-      own.host = outcomes[i].host;
-      outcomes[i].reply = call_one(options, own, deadline);
+      outcomes[i].reply = ask_one(options, outcomes[i].host, call);
     }
   };
   std::vector<std::jthread> threads;

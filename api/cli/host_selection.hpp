@@ -28,9 +28,10 @@ struct HostOutcome {
   std::string host;
   Result<ApiReply> reply;
 };
-/// Calls all hosts at the same time, each over a connection of its own. In the order of the hosts.
-[[nodiscard]] std::vector<HostOutcome> call_each(const dds::DomainOptions& options,
-                                                 const std::vector<std::string>& hosts,
-                                                 const ApiRequest& request, TimePoint deadline);
+/// What is asked of one host, over that connection.
+using HostCall = std::function<Result<ApiReply>(ControlClient& client, const std::string& host)>;
+/// Asks all hosts at the same time, each over a connection of its own. In the order of the hosts.
+[[nodiscard]] std::vector<HostOutcome> ask_each(const dds::DomainOptions& options,
+                                                const std::vector<std::string>& hosts, const HostCall& call);
 
 }  // namespace plchost

@@ -17,7 +17,8 @@ namespace plchost {
 namespace {
 
 bool is_engineering(std::int32_t operation) {
-  return operation >= plc_OPERATION_LOAD_APPLICATION && operation <= plc_OPERATION_UNREGISTER_EVENT;
+  return (operation >= plc_OPERATION_LOAD_APPLICATION && operation <= plc_OPERATION_UNREGISTER_EVENT) ||
+         operation == plc_OPERATION_DOWNLOAD_APPLICATION || operation == plc_OPERATION_ROLLBACK_APPLICATION;
 }
 
 auto order(const plc_InstanceStatus& s) {
@@ -25,6 +26,9 @@ auto order(const plc_InstanceStatus& s) {
 }
 auto order(const plc_ExceptionStatus& s) {
   return std::string_view(s.instance);
+}
+auto order(const plc_ApplicationStatus& s) {
+  return std::pair(std::string_view(s.instance), s.version);
 }
 auto order(const plc_TaskStatus& s) {
   return std::tuple(std::string_view(s.instance), s.priority, std::string_view(s.task));
@@ -92,6 +96,7 @@ void ControlClient::update() {
   writer_status_.update();
   object_status_.update();
   exceptions_.update();
+  applications_.update();
   host_findings_.update();
 }
 
@@ -186,6 +191,11 @@ Result<std::vector<plc_ExceptionStatus>> ControlClient::exceptions(const std::st
   return snapshot(exceptions_, dds::kExceptionStatus, &plc_HostStatus::instance_count, host, deadline);
 }
 
+Result<std::vector<plc_ApplicationStatus>> ControlClient::applications(const std::string& host,
+                                                                       TimePoint deadline) {
+  return snapshot(applications_, dds::kApplicationStatus, &plc_HostStatus::application_count, host, deadline);
+}
+
 Result<void> ControlClient::open_own_reader(dds::Entity& topic, dds::Entity& reader,
                                             const dds::TopicInfo& info, const dds::Qos& qos) {
   if (reader) return {};
@@ -231,11 +241,15 @@ Result<ApiReply> ControlClient::call(const ApiRequest& request, TimePoint deadli
   const auto asked = caller(request.host, is_engineering(request.operation));
   if (!asked) return std::unexpected(asked.error());
   auto reply = (*asked)->call(request, reply_reader_.get(), wait_set_, deadline);
-  if (!reply) return reply;
+  if (reply) await_status(request.host, *reply, deadline);
+  return reply;
+}
+
+void ControlClient::await_status(const std::string& host, const ApiReply& reply, TimePoint deadline) {
   for (;;) {
     update();
-    const auto view = present(request.host);
-    if (!view || view->status.round >= reply->status_round || MonotonicClock::now() >= deadline) return reply;
+    const auto view = present(host);
+    if (!view || view->status.round >= reply.status_round || MonotonicClock::now() >= deadline) return;
     wait_set_.wait(deadline);
   }
 }

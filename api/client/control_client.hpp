@@ -1,7 +1,9 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -60,6 +62,17 @@ struct RunReport {
   Duration to_end{};        ///< and to its end
   Duration round_trip{};    ///< here: from before the post to after the news
 };
+
+/// An application that is to be sent to an instance.
+struct Download {
+  std::string host;
+  std::string instance;
+  std::string name;  ///< of the file, for people
+  std::span<const std::byte> contents;
+  bool boot = false;  ///< it becomes the boot application
+};
+/// Told how many bytes have arrived: again from the beginning, when plchost-dds had to be started again.
+using DownloadProgressFunction = std::function<void(std::uint64_t received)>;
 
 /// The client's end of the DDS API: sees all hosts of a domain and addresses any. One thread at a time.
 /// Nothing here waits beyond the deadline it was given; deadlines are of MonotonicClock. invalid_argument, at
@@ -137,6 +150,15 @@ class ControlClient {
   /// timed_out: no answer; whether it was done is not known.
   [[nodiscard]] Result<ApiReply> call(const ApiRequest& request, TimePoint deadline);
 
+  /// Sends an application to an instance, where it is checked, kept and loaded; the answer is that to the
+  /// load. Goes on when plchost-dds dies meanwhile. `deadline`: for the host to begin; then as long as it
+  /// moves. timed_out: it has not begun, or nothing has moved for 10 s.
+  [[nodiscard]] Result<ApiReply> download(const Download& download, const DownloadProgressFunction& progress,
+                                          TimePoint deadline);
+  /// What was sent to the instances of a host and is kept there.
+  [[nodiscard]] Result<std::vector<plc_ApplicationStatus>> applications(const std::string& host,
+                                                                        TimePoint deadline);
+
   /// Makes the way to a host's events, so that the first post finds it open.
   [[nodiscard]] Result<void> prepare_posts(const std::string& host, TimePoint deadline);
 
@@ -197,6 +219,9 @@ class ControlClient {
   [[nodiscard]] std::optional<Result<RunReport>> take_run(const dds::Guid& source, std::uint64_t number,
                                                           TimePoint start);
   bool take_acks(TimePoint now);
+  /// Until the status shows the effect of what was answered.
+  void await_status(const std::string& host, const ApiReply& reply, TimePoint deadline);
+  static constexpr Duration kStatusPatience = std::chrono::seconds(2);
   struct PageReader {
     dds::Entity topic;
     dds::Entity reader;
@@ -219,6 +244,7 @@ class ControlClient {
   StatusCache<plc_WriterStatus> writer_status_;
   StatusCache<plc_ObjectStatus> object_status_;
   StatusCache<plc_ExceptionStatus> exceptions_;
+  StatusCache<plc_ApplicationStatus> applications_;
   StatusCache<plc_HostFinding> host_findings_;
   std::map<std::string, Seen, std::less<>> seen_;
   TransitionLog transition_log_;
@@ -233,6 +259,8 @@ class ControlClient {
   dds::Entity event_topic_;
   dds::Entity batch_topic_;
   PageReader runs_;
+  PageReader download_acks_;
+  dds::Entity chunk_topic_;
   std::array<dds::Entity, 2> request_topics_;
   std::map<std::pair<std::string, bool>, RequestCaller> callers_;
   std::map<std::string, EventPoster, std::less<>> posters_;

@@ -4,6 +4,7 @@
 
 #include "api/client/check_names.hpp"
 #include "api/client/control_client.hpp"
+#include "api/dds/sample_identity.hpp"
 #include "api/dds/samples.hpp"
 
 namespace plchost {
@@ -18,10 +19,8 @@ template <class Page, class Listing>
 std::optional<Listing> take_page(dds_entity_t reader, const plc_SampleIdentity& identity) {
   std::optional<Listing> found;
   dds::take_valid<Page, dds::kPageDepth>(reader, [&](const Page& page, const auto& /*info*/) {
-    const plc_SampleIdentity& related = page.related_identity;
-    const bool ours = related.sequence_number == identity.sequence_number &&
-                      std::ranges::equal(related.writer_guid, identity.writer_guid);
-    if (ours) found = listing_of(page);  // others answer calls that were given up
+    // Others answer calls that were given up.
+    if (same_identity(page.related_identity, identity)) found = listing_of(page);
   });
   return found;
 }

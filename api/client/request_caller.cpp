@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "api/client/event_poster.hpp"
+#include "api/dds/sample_identity.hpp"
 #include "api/dds/samples.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"
@@ -18,12 +19,8 @@ namespace {
 std::optional<ApiReply> take_reply(dds_entity_t reader, const plc_SampleIdentity& identity) {
   std::optional<ApiReply> found;
   dds::take_valid<plc_Reply, 16>(reader, [&](const plc_Reply& reply, const dds_sample_info_t& info) {
-    const plc_SampleIdentity& related = reply.header.related_identity;
     // Others are answers to calls that were given up.
-    if (related.sequence_number != identity.sequence_number ||
-        !std::ranges::equal(related.writer_guid, identity.writer_guid)) {
-      return;
-    }
+    if (!same_identity(reply.header.related_identity, identity)) return;
     found = ApiReply{static_cast<ErrorCode>(reply.code), std::string(dds::text_of(reply.text)),
                      reply.status_round, identity, info.source_timestamp};
   });
@@ -46,7 +43,8 @@ Result<RequestCaller> RequestCaller::create(dds_entity_t participant, dds_entity
 }
 
 Result<ApiReply> RequestCaller::call(const ApiRequest& request, dds_entity_t reply_reader,
-                                     const WaitSet& wait_set, TimePoint deadline) {
+                                     const WaitSet& wait_set, TimePoint deadline,
+                                     const Meanwhile& meanwhile) {
   plc_Request sample{};
   guid_.copy_to(sample.header.request_identity.writer_guid);
   sample.header.request_identity.sequence_number = ++last_number_;
@@ -60,20 +58,21 @@ Result<ApiReply> RequestCaller::call(const ApiRequest& request, dds_entity_t rep
   TimePoint next_write{};
   std::int64_t asked_unix_ns = 0;
   bool written = false;
-  while (MonotonicClock::now() < deadline) {
+  Wait wait{.deadline = deadline};
+  for (TimePoint now = MonotonicClock::now(); now < wait.deadline; now = MonotonicClock::now()) {
     if (auto reply = take_reply(reply_reader, sample.header.request_identity)) {
       reply->asked_unix_ns = asked_unix_ns;
       reply->heard_unix_ns = unix_time_ns();
       return *reply;
     }
-    const TimePoint now = MonotonicClock::now();
     if (now >= next_write && has_reader(writer_.get())) {
       if (!written) asked_unix_ns = unix_time_ns();
       (void)dds_write(writer_.get(), &sample);  // a refusal of DDS is mended by the repetition
       next_write = now + (written ? kRepeat : kFirstRepeat);
       written = true;
     }
-    wait_set.wait(std::min(deadline, std::max(next_write, now + kFirstRepeat)));
+    if (meanwhile) wait = meanwhile(sample.header.request_identity, now);
+    wait_set.wait(std::min({wait.deadline, wait.next, std::max(next_write, now + kFirstRepeat)}));
   }
   return failure(ErrorCode::timed_out, fmt::format("host '{}' has not answered", request.host));
 }

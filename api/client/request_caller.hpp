@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -44,9 +45,18 @@ class RequestCaller {
                                                     const std::string& host);
   [[nodiscard]] dds_entity_t writer() const noexcept { return writer_.get(); }
 
-  /// timed_out: no answer until the deadline; whether it was done is not known.
+  /// How long a call goes on waiting.
+  struct Wait {
+    TimePoint next = TimePoint::max();  ///< there is something to do meanwhile
+    TimePoint deadline;
+  };
+  /// What there is to do while the answer is waited for: called whenever something may have changed.
+  using Meanwhile = std::function<Wait(const plc_SampleIdentity& request, TimePoint now)>;
+
+  /// timed_out: no answer until the deadline, which `meanwhile` can move; whether it was done is not known.
   [[nodiscard]] Result<ApiReply> call(const ApiRequest& request, dds_entity_t reply_reader,
-                                      const WaitSet& wait_set, TimePoint deadline);
+                                      const WaitSet& wait_set, TimePoint deadline,
+                                      const Meanwhile& meanwhile = {});
 
  private:
   RequestCaller() = default;

@@ -34,6 +34,9 @@ inline constexpr TopicInfo kTaskStatistics{"plc/v1/status/task_statistics", &plc
 inline constexpr TopicInfo kEventStatus{"plc/v1/status/event", &plc_EventStatus_desc};
 inline constexpr TopicInfo kObjectStatus{"plc/v1/status/object", &plc_ObjectStatus_desc};
 inline constexpr TopicInfo kWriterStatus{"plc/v1/status/writer", &plc_WriterStatus_desc};
+inline constexpr TopicInfo kApplicationStatus{"plc/v1/status/application", &plc_ApplicationStatus_desc};
+inline constexpr TopicInfo kDownloadChunk{"plc/v1/eng/download_chunk", &plc_DownloadChunk_desc};
+inline constexpr TopicInfo kDownloadAck{"plc/v1/download_ack", &plc_DownloadAck_desc};
 inline constexpr TopicInfo kObjectPage{"plc/v1/objects", &plc_ObjectPage_desc};
 inline constexpr TopicInfo kNodePage{"plc/v1/nodes", &plc_NodePage_desc};
 inline constexpr TopicInfo kBlockHostStatus{"plc/v1/status/block_host", &plc_BlockHostStatus_desc};
@@ -49,6 +52,7 @@ inline constexpr TopicInfo kTransition{"plc/v1/transition", &plc_Transition_desc
 inline constexpr std::int32_t kRequestReaderDepth = 256;
 inline constexpr std::int32_t kEventReaderDepth = 4096;
 inline constexpr std::int32_t kBatchReaderDepth = 256;
+inline constexpr std::int32_t kChunkReaderDepth = 64;
 inline constexpr std::int32_t kRunDepth = 64;
 inline constexpr std::int32_t kBlockReaderDepth = 1024;
 inline constexpr std::int32_t kReplyDepth = 16;
@@ -70,6 +74,8 @@ inline constexpr std::string_view kRivalEntry = "rival";
 /// Entry of EventPost.ext and its value: an EventRun is wanted.
 inline constexpr std::string_view kWaitEntry = "wait";
 inline constexpr std::string_view kWaitForRun = "run";
+/// The largest piece of a download: as in control.idl.
+inline constexpr std::size_t kMaxChunk = 32768;
 /// No writer of the server waits longer.
 inline constexpr Duration kServerBlocking = std::chrono::milliseconds(1);
 inline constexpr Duration kRequestBlocking = std::chrono::milliseconds(100);

@@ -32,7 +32,8 @@ Topics status_topics() {
 }
 // What a host tells one client only.
 Topics answer_topics() {
-  return {"plc/v1/reply", "plc/v1/event_ack", "plc/v1/event_run", "plc/v1/objects", "plc/v1/nodes"};
+  return {"plc/v1/reply",   "plc/v1/event_ack", "plc/v1/event_run",
+          "plc/v1/objects", "plc/v1/nodes",     "plc/v1/download_ack"};
 }
 Topics block_topics() {
   return {"plc/v1/blocks", "plc/v1/block_ack"};
@@ -49,9 +50,9 @@ std::vector<Grant> may_write(Role role) {
     case Role::operating:
       return {{{"plc/v1/event", "plc/v1/event_batch", "plc/v1/op/request"}, "h.*"}};
     case Role::engineer:
-      return {{{"plc/v1/event", "plc/v1/event_batch", "plc/v1/op/request", "plc/v1/eng/request"}, "h.*"}};
+      return {{{"plc/v1/event", "plc/v1/event_batch", "plc/v1/op/request", "plc/v1/eng/*"}, "h.*"}};
     case Role::admin:
-      return {{{"plc/v1/event", "plc/v1/event_batch", "plc/v1/*/request"}, "h.*"}};
+      return {{{"plc/v1/event", "plc/v1/event_batch", "plc/v1/*/request", "plc/v1/eng/*"}, "h.*"}};
     case Role::host:
       return {{status_topics()}, {answer_topics(), "c.*"}, {block_topics(), "b.*"}, {name_topics(), "n.*"}};
   }
@@ -62,7 +63,7 @@ std::vector<Grant> may_read(Role role, const GuidPrefix& prefix) {
   if (role == Role::viewer) return {{status_topics()}};
   if (role == Role::host) {
     return {{{"plc/v1/status/block_host"}},
-            {{"plc/v1/event", "plc/v1/event_batch", "plc/v1/*/request"}, "h.*"},
+            {{"plc/v1/event", "plc/v1/event_batch", "plc/v1/*/request", "plc/v1/eng/*"}, "h.*"},
             {block_topics(), "b.*"},
             {name_topics(), "n.*"}};
   }

@@ -57,6 +57,7 @@ ControlServer::~ControlServer() {
   for (auto& request : parts_->requests) request.reader.reset();
   parts_->event_reader.reset();
   parts_->batch_reader.reset();
+  parts_->chunk_reader.reset();
   parts_->name.reset();
   if (parts_->sessions) {
     for (const dds_entity_t reader : parts_->sessions->discovery_readers()) dds_set_listener(reader, nullptr);
@@ -136,6 +137,7 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
     audit->tick(now);
     status->set_audit_head(audit->head());
     finish(manager->expire(now));
+    serve_downloads(now);
   } else if (fd == run_timer.get()) {
     look_at_runs();
   } else if (fd == presence_timer.get()) {
@@ -207,6 +209,7 @@ void ControlServer::Parts::on_wake() {
   for (const AwaitedPost& post : intake->collect_awaited()) runs.add(post, status->tasks());
   if (!runs.empty()) look_at_runs();
   for (const RequestReader& request : requests) on_requests(request);
+  on_chunks();
 }
 
 void ControlServer::Parts::look_at_runs() {
@@ -244,7 +247,7 @@ void ControlServer::Parts::on_request(ApiRole role, const dds::Guid& writer, con
   const plc_SampleIdentity& identity = request.header.request_identity;
   const dds::Guid client = writer.participant();
   if (const auto known = sessions->remembered(client, identity)) return sessions->write_reply(client, *known);
-  if (manager->is_pending(identity)) return;
+  if (manager->is_pending(identity) || downloads.repeat(identity)) return;
   audit->asked(client, request);
   const std::vector<std::string_view> instances(status->instances().begin(), status->instances().end());
   auto checked = check_request(request, role, options.host, instances);
@@ -253,6 +256,9 @@ void ControlServer::Parts::on_request(ApiRole role, const dds::Guid& writer, con
   if (checked->verb == ControlVerb::list_objects) return list_objects(client, request);
   if (checked->verb == ControlVerb::list_nodes || checked->verb == ControlVerb::list_routes) {
     return list_nodes(checked->verb, client, request);
+  }
+  if (checked->verb == ControlVerb::download_application) {
+    return begin_download(client, identity, *std::move(checked));
   }
   const PendingCommand command{
       client,        identity, checked->instance, MonotonicClock::now() + ManagerLink::kCommandLimit,
@@ -308,6 +314,7 @@ void ControlServer::Parts::finish(std::vector<FinishedCommand> commands) {
     if (finished.command.verb == ControlVerb::check_host && !collect_findings(finished)) continue;
     // Who looks at the status after the answer sees what the command did.
     status->flush(finished.command.instance, MonotonicClock::now());
+    downloads.end(finished.command.identity);
     answer(finished.command.client, finished.command.identity, finished.code, finished.text);
   }
 }

@@ -23,13 +23,15 @@ struct ServerOptions {
   /// How many datagrams were refused so far, for the log; null: nobody counts.
   std::uint64_t (*refused_datagrams)() noexcept = nullptr;
   std::string blocks_base =
-      std::string(kDefaultBlockBase);  ///< of the nodes that are listed, and the gateway
-  std::vector<std::string> labels;     ///< by which clients choose hosts
-  std::string audit_folder;            ///< of the log of what clients change; empty: there is none
-  std::uint16_t host_number = 0;       ///< for other hosts; 0: no gateway
-  std::int64_t name_since_ns = 0;      ///< from when on this host has its name; 0: from now on
-  bool name_held = false;              ///< a server before this one had the name: nobody is asked
-  bool name_refused = false;           ///< a server before this one was refused the name: ask for longer
+      std::string(kDefaultBlockBase);        ///< of the nodes that are listed, and the gateway
+  std::vector<std::string> labels;           ///< by which clients choose hosts
+  std::string audit_folder;                  ///< of the log of what clients change; empty: there is none
+  std::string applications_folder;           ///< of the applications that were sent; empty: there is none
+  std::uint32_t application_limit_mib = 64;  ///< of a file that is sent
+  std::uint16_t host_number = 0;             ///< for other hosts; 0: no gateway
+  std::int64_t name_since_ns = 0;            ///< from when on this host has its name; 0: from now on
+  bool name_held = false;                    ///< a server before this one had the name: nobody is asked
+  bool name_refused = false;  ///< a server before this one was refused the name: ask for longer
 };
 
 /// The server's end of the DDS API. Posts are done in DDS's receiving thread (on_event_post); everything else

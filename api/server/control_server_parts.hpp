@@ -14,6 +14,7 @@
 #include "api/server/access/request_audit.hpp"
 #include "api/server/access/request_check.hpp"
 #include "api/server/control_server.hpp"
+#include "api/server/downloads/download_table.hpp"
 #include "api/server/lists/node_lister.hpp"
 #include "api/server/lists/object_lister.hpp"
 #include "api/server/manager_link.hpp"
@@ -41,6 +42,7 @@ struct ControlServer::Parts {
         lister(pool),
         nodes(options.pool, options.blocks_base),
         epoch(started),
+        downloads(options.pool, std::uint64_t{options.application_limit_mib} << 20U),
         runs(options.host, started) {}
 
   Result<void> open(PostLedger ledger);
@@ -71,6 +73,11 @@ struct ControlServer::Parts {
   template <class Page>
   void send_page(const dds::Guid& client, const plc_Request& request, Page& page);
   [[nodiscard]] bool collect_findings(FinishedCommand& finished);
+
+  // Downloads: control_server_downloads.cpp
+  void begin_download(const dds::Guid& client, const plc_SampleIdentity& identity, ControlRequest request);
+  void on_chunks();
+  void serve_downloads(TimePoint now);
 
   void look_at_runs();
 
@@ -107,6 +114,9 @@ struct ControlServer::Parts {
   dds::Entity event_reader;
   dds::Entity batch_topic;
   dds::Entity batch_reader;
+  dds::Entity chunk_topic;
+  dds::Entity chunk_reader;
+  DownloadTable downloads;
   RunWatch runs;
   std::array<RequestReader, 2> requests;
   std::unique_ptr<GatewayThread> gateway;  // of a host that has a number

@@ -66,9 +66,10 @@ Result<void> ControlServer::Parts::open(PostLedger ledger) {
   if (!made_sessions) return std::unexpected(made_sessions.error());
   sessions = std::move(*made_sessions);
   open_audit();
-  auto made_status = StatusPublisher::create(
-      participant.get(), {options.host, &pool, epoch, options.run_directory,
-                          fmt::format("{}", fmt::join(options.labels, ",")), identity_watch.has_value()});
+  auto made_status =
+      StatusPublisher::create(participant.get(), {options.host, &pool, epoch, options.run_directory,
+                                                  fmt::format("{}", fmt::join(options.labels, ",")),
+                                                  identity_watch.has_value(), options.applications_folder});
   if (!made_status) return std::unexpected(made_status.error());
   status.emplace(std::move(*made_status));
   // Everything is there before a client can see that this host is: presence comes last.
@@ -231,6 +232,9 @@ Result<void> ControlServer::Parts::make_readers() {
   event_qos.max_samples(dds::kEventReaderDepth);
   auto batch_qos = dds::event_qos();
   batch_qos.max_samples(dds::kBatchReaderDepth);
+  auto chunk_qos = dds::event_qos();
+  chunk_qos.max_samples(dds::kChunkReaderDepth);
+  if (auto made = make(dds::kDownloadChunk, chunk_qos, chunk_topic, chunk_reader); !made) return made;
   if (auto made = make(dds::kEvent, event_qos, event_topic, event_reader); !made) return made;
   if (auto made = make(dds::kEventBatch, batch_qos, batch_topic, batch_reader); !made) return made;
   if (auto made = make(dds::kOperatorRequest, request_qos, requests[0].topic, requests[0].reader); !made)
@@ -253,6 +257,7 @@ Result<void> ControlServer::Parts::listen() {
   for (const RequestReader& request : requests) {
     if (auto done = set(request.reader.get(), on_wake_listener); !done) return done;
   }
+  if (auto done = set(chunk_reader.get(), on_wake_listener); !done) return done;
   if (auto done = set(event_reader.get(), on_event_post); !done) return done;
   if (auto done = set(batch_reader.get(), on_event_batch); !done) return done;
   // What came before the listener was there does not call it.

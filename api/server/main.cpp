@@ -53,6 +53,10 @@ int main(int argc, char** argv) {
   app.add_flag("--name-refused", options.name_refused,
                "a server before this one was refused the name: ask for it longer");
   app.add_flag("--no-multicast{false}", options.dds.multicast, "look for others at --peer only");
+  app.add_option("--applications-folder", options.applications_folder,
+                 "where the manager keeps the applications that were sent");
+  app.add_option("--application-limit", options.application_limit_mib, "the largest of them, MiB")
+      ->check(CLI::Range(1U, 1024U));
   app.add_option("--log-level", log_level, "trace, debug, info, warning or error")
       ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error"}));
   try {

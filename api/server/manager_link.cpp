@@ -5,11 +5,9 @@
 
 #include <fmt/format.h>
 
-namespace plchost {
+#include "api/dds/sample_identity.hpp"
 
-bool same_identity(const plc_SampleIdentity& a, const plc_SampleIdentity& b) noexcept {
-  return a.sequence_number == b.sequence_number && std::ranges::equal(a.writer_guid, b.writer_guid);
-}
+namespace plchost {
 
 Result<ManagerLink> ManagerLink::connect(const std::string& run_directory) {
   auto socket = PacketSocket::connect(run_directory + "/manager.sock");
@@ -59,9 +57,7 @@ std::vector<FinishedCommand> ManagerLink::expire(TimePoint now) {
       ++it;
       continue;
     }
-    late.push_back({std::move(it->second), ErrorCode::timed_out,
-                    fmt::format("the manager has not answered within {} s",
-                                std::chrono::duration_cast<std::chrono::seconds>(kCommandLimit).count())});
+    late.push_back({std::move(it->second), ErrorCode::timed_out, "the manager has not answered in time"});
     it = pending_.erase(it);
   }
   return late;

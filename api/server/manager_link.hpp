@@ -62,6 +62,4 @@ class ManagerLink {
   std::map<std::uint64_t, PendingCommand> pending_;
 };
 
-[[nodiscard]] bool same_identity(const plc_SampleIdentity& a, const plc_SampleIdentity& b) noexcept;
-
 }  // namespace plchost

@@ -6,9 +6,9 @@
 
 #include "api/dds/claim.hpp"
 #include "api/dds/error.hpp"
+#include "api/dds/sample_identity.hpp"
 #include "api/dds/samples.hpp"
 #include "api/dds/topics.hpp"
-#include "api/server/manager_link.hpp"
 #include "shm/base/log.hpp"
 
 namespace plchost {
@@ -16,8 +16,8 @@ namespace plchost {
 namespace {
 
 // By SessionTable::Stream.
-constexpr std::array kStreamTopics{dds::kReply, dds::kEventAck, dds::kObjectPage, dds::kNodePage,
-                                   dds::kEventRun};
+constexpr std::array kStreamTopics{dds::kReply,    dds::kEventAck, dds::kObjectPage,
+                                   dds::kNodePage, dds::kEventRun, dds::kDownloadAck};
 
 }  // namespace
 
@@ -85,7 +85,7 @@ bool SessionTable::open_writer(Session& session, Stream stream) {
   const auto qos = [stream] {
     if (stream == Stream::replies) return dds::reply_qos();
     if (stream == Stream::runs) return dds::run_qos();
-    return stream == Stream::acks ? dds::ack_qos() : dds::page_qos();
+    return stream == Stream::acks || stream == Stream::downloads ? dds::ack_qos() : dds::page_qos();
   };
   auto made = dds::make_writer(session.publisher.get(), topics_[std::to_underlying(stream)].get(), qos());
   if (made) {
@@ -132,6 +132,10 @@ void SessionTable::write_reply(const dds::Guid& client, const plc_Reply& reply) 
 
 void SessionTable::write_ack(const dds::Guid& client, const plc_EventAck& ack) {
   (void)write(client, Stream::acks, &ack);
+}
+
+void SessionTable::write_ack(const dds::Guid& client, const plc_DownloadAck& ack) {
+  (void)write(client, Stream::downloads, &ack);
 }
 
 void SessionTable::write_run(const dds::Guid& client, const plc_EventRun& run) {

@@ -36,6 +36,7 @@ class SessionTable {
   void write_reply(const dds::Guid& client, const plc_Reply& reply);
   void write_ack(const dds::Guid& client, const plc_EventAck& ack);
   void write_run(const dds::Guid& client, const plc_EventRun& run);
+  void write_ack(const dds::Guid& client, const plc_DownloadAck& ack);
   /// False: the client has not got it, nor will.
   [[nodiscard]] bool write_page(const dds::Guid& client, const plc_ObjectPage& page);
   [[nodiscard]] bool write_page(const dds::Guid& client, const plc_NodePage& page);
@@ -54,8 +55,8 @@ class SessionTable {
 
  private:
   /// What goes to each client over a writer of its own.
-  enum class Stream : std::uint8_t { replies, acks, objects, nodes, runs };
-  static constexpr std::size_t kStreams = 5;
+  enum class Stream : std::uint8_t { replies, acks, objects, nodes, runs, downloads };
+  static constexpr std::size_t kStreams = 6;
   struct Session {
     dds::Entity publisher;
     std::array<dds::Entity, kStreams> writers = {};

@@ -74,6 +74,8 @@ Result<std::string> Instance::obey(const ControlRequest& request) {
     case ControlVerb::reset_cold:
     case ControlVerb::restart:
     case ControlVerb::load_application:
+    case ControlVerb::download_application:
+    case ControlVerb::rollback_application:
     case ControlVerb::check_host:
     case ControlVerb::list_objects:
     case ControlVerb::list_nodes:

@@ -92,6 +92,12 @@ void Loader::read_host(const TomlTable& table, unsigned line) {
   reader.text("run_directory", host.run_directory);
   reader.text("state_directory", host.state_directory);
   reader.text("pool", host.pool);
+  std::int64_t limit = host.application_limit_mib;
+  std::int64_t versions = host.application_versions;
+  reader.number("application_limit_mib", 1, kMaxApplicationMib, limit);
+  reader.number("application_versions", 1, kMaxApplicationVersions, versions);
+  host.application_limit_mib = static_cast<std::uint32_t>(limit);
+  host.application_versions = static_cast<std::uint32_t>(versions);
   reader.number("pool_objects", kMinPoolObjects, kMaxPoolObjects, objects);
   reader.choice("log_level", kLogLevels, host.log_level);
   reader.truth("keep_pool", host.keep_pool);

@@ -26,6 +26,8 @@ struct HostConfig {
   int dds_domain = 0;
   std::string run_directory = "/run/plchost";
   std::string state_directory = "/var/lib/plchost";  ///< what instances keep over a power cut
+  std::uint32_t application_limit_mib = 64;          ///< of a file that is sent
+  std::uint32_t application_versions = 5;            ///< of those that are kept, for each instance
   std::string pool = "plchost";
   std::uint32_t pool_objects = 4096;
   std::string pool_owner;   ///< user's name or number; empty: who starts the manager
@@ -88,6 +90,8 @@ inline constexpr std::int64_t kMaxPoolObjects = 1'000'000;
 inline constexpr std::size_t kMaxPoolName = 31;
 /// So that "RUN_DIRECTORY/NAME.sock" fits in the 107 characters of a socket path.
 inline constexpr std::size_t kMaxRunDirectory = 70;
+inline constexpr std::int64_t kMaxApplicationMib = 1024;
+inline constexpr std::int64_t kMaxApplicationVersions = 100;
 inline constexpr std::size_t kMaxPeers = 32;
 inline constexpr std::int64_t kMaxRestartDelayMs = 3'600'000;
 inline constexpr std::int64_t kMaxCrashLimit = 100;

@@ -38,6 +38,10 @@ void ManagedInstance::handle(const ControlRequest& request, ControlReplyFunction
       return fresh_process(Next::run, StartKind::warm);
     case ControlVerb::load_application:
       return begin_load();
+    case ControlVerb::download_application:
+      return begin_download();
+    case ControlVerb::rollback_application:
+      return begin_rollback();
     case ControlVerb::single_cycle:
     case ControlVerb::set_scheduler:
     case ControlVerb::register_event:
@@ -95,12 +99,15 @@ Result<void> ManagedInstance::check_argument(ControlRequest& request) const {
       request.argument = std::move(path);
       return {};
     }
+    case ControlVerb::download_application:
+      return check_file_name(request.argument);
     case ControlVerb::start:
     case ControlVerb::stop:
     case ControlVerb::single_cycle:
     case ControlVerb::reset:
     case ControlVerb::reset_cold:
     case ControlVerb::restart:
+    case ControlVerb::rollback_application:
       return {};
   }
   return {};
@@ -234,6 +241,7 @@ Duration ManagedInstance::limit_of(ControlVerb verb) noexcept {
 }
 
 void ManagedInstance::finish(ErrorCode code, const std::string& text) {
+  if (sets_boot(code)) return set_boot(text);
   // Emptied first: whoever gets the reply may ask for the next thing at once.
   const Operation done = std::move(*operation_);
   operation_.reset();

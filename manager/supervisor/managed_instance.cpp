@@ -37,8 +37,9 @@ ManagedInstance::ManagedInstance(const InstanceConfig& config, Surroundings surr
       surroundings_(std::move(surroundings)),
       host_(host),
       history_(config),
-      application_(config.application),
+      application_(surroundings_.applications.boot()),
       scheduler_(config.scheduler) {
+  if (application_.empty()) application_ = config.application;
   status_.name.assign(config.name);
   status_.scheduler.assign(scheduler_);
   status_.application.assign(application_);
@@ -113,7 +114,7 @@ void ManagedInstance::come_up() {
   start_kind_ = StartKind::warm;
   if (!operation_) return;
   if (operation_->step == Step::fresh_process) {
-    finish(ErrorCode::ok, application_.empty() ? "it is up without an application: load one" : "");
+    finish(ErrorCode::ok, application_.empty() ? "it is up without an application: load one" : loaded_text());
   } else if (operation_->step == Step::until_up) {
     forward_or_wait();
   }
@@ -141,7 +142,7 @@ void ManagedInstance::finish_adoption(const std::string& problem) {
   if (known) {
     wants_running_ = runtime->running != 0;
     if (!runtime->scheduler.view().empty()) scheduler_ = runtime->scheduler.view();
-    safe_mode_ = runtime->application.view().empty() && !config_.application.empty();
+    safe_mode_ = runtime->application.view().empty() && !application_.empty();
     if (!safe_mode_) application_ = runtime->application.view();
   }
   come_up();
@@ -203,7 +204,7 @@ void ManagedInstance::back_off_or_give_up(bool again, InstanceState otherwise, c
   } else {
     go_down(cancelled ? InstanceState::offline : otherwise, why);
   }
-  if (!operation_ || operation_->step == Step::checking) return;
+  if (!operation_ || loading_aside()) return;
   if (cancelled) {
     finish(ErrorCode::ok, fmt::format("its process ended meanwhile: {}; it is not started again", why));
   } else {

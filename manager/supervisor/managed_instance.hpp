@@ -9,6 +9,7 @@
 
 #include "api/control/control_handler.hpp"
 #include "manager/config/manager_config.hpp"
+#include "manager/store/application_keeper.hpp"
 #include "manager/supervisor/heartbeat_watch.hpp"
 #include "manager/supervisor/instance_host.hpp"
 #include "manager/supervisor/restart_policy.hpp"
@@ -76,6 +77,11 @@ namespace plchost {
 //     failed,
 //                waiting or without application; as reset if it was stopped; only remembered if it was
 //                offline.
+//     download_application   kept and checked by a helper process, then as load_application.
+//     rollback_application   load_application of what was loaded before what is loaded; that must have been
+//     sent.
+//                With the option "boot", of all three: when all is done the path becomes the boot
+//                application, which is what the first process begins with, instead of the configuration's.
 //     set_scheduler      up: forwarded, and remembered for the next process if it was accepted. Else
 //     remembered. register_event, unregister_event   the same; registrations are repeated in each fresh
 //     process.
@@ -84,6 +90,7 @@ class ManagedInstance : public InstanceEvents {
  public:
   struct Surroundings {
     const HostConfig& host;
+    ApplicationKeeper& applications;           ///< of this instance
     std::string folder;                        ///< that relative application paths start in
     std::vector<std::string_view> schedulers;  ///< names that there are
     std::function<TimePoint()> now;
@@ -130,7 +137,7 @@ class ManagedInstance : public InstanceEvents {
   enum class Phase : std::uint8_t { down, held, backing_off, setting_up, adopting, up, ending };
   enum class Ending : std::uint8_t { asked, terminated, killed };
   enum class Next : std::uint8_t { nothing, run, stay_stopped };
-  enum class Step : std::uint8_t { checking, fresh_process, until_up, forwarded };
+  enum class Step : std::uint8_t { storing, checking, fresh_process, until_up, forwarded, setting_boot };
   struct Operation {
     ControlRequest request;
     ControlReplyFunction reply;
@@ -138,11 +145,17 @@ class ManagedInstance : public InstanceEvents {
     std::uint64_t forwarded_number = 0;
   };
 
-  // Commands: instance_commands.cpp
+  // Commands: instance_commands.cpp, application_commands.cpp
   void begin(Operation operation);
   void begin_start();
   void begin_stop();
   void begin_load();
+  void begin_download();
+  void begin_rollback();
+  void on_application_kept(const Result<std::string>& path);
+  [[nodiscard]] bool sets_boot(ErrorCode code) const;
+  void set_boot(const std::string& text);
+  [[nodiscard]] std::string loaded_text() const;
   void begin_forwarded();
   void apply_loaded_application();
   void forward_or_wait();
@@ -154,6 +167,11 @@ class ManagedInstance : public InstanceEvents {
   [[nodiscard]] static Duration limit_of(ControlVerb verb) noexcept;
   [[nodiscard]] bool idle_phase() const noexcept {
     return phase_ == Phase::down || phase_ == Phase::held || phase_ == Phase::backing_off;
+  }
+
+  [[nodiscard]] bool loading_aside() const noexcept {  // whatever becomes of the process meanwhile
+    return operation_->step == Step::storing || operation_->step == Step::checking ||
+           operation_->step == Step::setting_boot;
   }
 
   // A process that does not answer: instance_watch.cpp

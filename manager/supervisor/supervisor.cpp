@@ -17,10 +17,12 @@ Supervisor::Supervisor(const ManagerConfig& config, Surroundings surroundings, c
     const InstanceConfig& instance = config.instances[i];
     HostedInstance hosted = make_host(instance);
     units_[i].host = std::move(hosted.host);
+    units_[i].applications = std::move(hosted.applications);
     units_[i].instance = std::make_unique<ManagedInstance>(
         instance,
         ManagedInstance::Surroundings{
             .host = config.host,
+            .applications = *units_[i].applications,
             .folder = surroundings_.folder,
             .schedulers = surroundings_.schedulers,
             .now = surroundings_.now,

@@ -31,6 +31,7 @@ class Supervisor : public ControlHandler {
   /// Makes the host of one instance, and is told where its events go.
   struct HostedInstance {
     std::unique_ptr<InstanceHost> host;
+    std::unique_ptr<ApplicationKeeper> applications;
     std::function<void(InstanceEvents&)> connect;
   };
   using HostFactory = std::function<HostedInstance(const InstanceConfig&)>;
@@ -52,6 +53,7 @@ class Supervisor : public ControlHandler {
  private:
   struct Unit {
     std::unique_ptr<InstanceHost> host;
+    std::unique_ptr<ApplicationKeeper> applications;
     std::unique_ptr<ManagedInstance> instance;
     std::vector<std::size_t> after;   // start first
     std::vector<std::size_t> before;  // end first

@@ -21,6 +21,8 @@ constexpr std::array kVerbs = {
     std::pair{ControlVerb::restart, std::string_view("restart")},
     std::pair{ControlVerb::reset_statistics, std::string_view("reset statistics")},
     std::pair{ControlVerb::load_application, std::string_view("load application")},
+    std::pair{ControlVerb::download_application, std::string_view("download application")},
+    std::pair{ControlVerb::rollback_application, std::string_view("rollback application")},
     std::pair{ControlVerb::change_application, std::string_view("change application")},
     std::pair{ControlVerb::set_scheduler, std::string_view("set scheduler")},
     std::pair{ControlVerb::register_event, std::string_view("register event")},
@@ -65,6 +67,22 @@ Result<std::string> text_of(const Json& json, const char* key) {
   return found->get<std::string>();
 }
 
+// None: a peer that knows of no options.
+Result<std::map<std::string, std::string>> options_of(const Json& json) {
+  std::map<std::string, std::string> options;
+  const auto found = json.find("options");
+  if (found == json.end()) return options;
+  if (!found->is_object())
+    return failure(ErrorCode::corrupt, "control message has 'options' of a wrong kind");
+  for (const auto& [name, value] : found->items()) {
+    if (!value.is_string()) {
+      return failure(ErrorCode::corrupt, "control message has an option that is no text");
+    }
+    options.emplace(name, value.get<std::string>());
+  }
+  return options;
+}
+
 }  // namespace
 
 std::string_view to_string(ControlVerb verb) noexcept {
@@ -75,11 +93,13 @@ std::string_view to_string(ControlVerb verb) noexcept {
 }
 
 std::string encode(const ControlRequest& request) {
-  return dump(Json{{"version", kControlVersion},
-                   {"number", request.number},
-                   {"verb", to_string(request.verb)},
-                   {"instance", request.instance},
-                   {"argument", request.argument}});
+  Json json{{"version", kControlVersion},
+            {"number", request.number},
+            {"verb", to_string(request.verb)},
+            {"instance", request.instance},
+            {"argument", request.argument}};
+  if (!request.options.empty()) json["options"] = request.options;
+  return dump(json);
 }
 
 std::string encode(const ControlReply& reply) {
@@ -98,9 +118,13 @@ Result<ControlRequest> decode_request(std::string_view packet) {
   for (const auto* text : {&verb, &instance, &argument}) {
     if (!*text) return std::unexpected(text->error());
   }
+  auto options = options_of(*json);
+  if (!options) return std::unexpected(std::move(options).error());
   for (const auto& [known, name] : kVerbs) {
-    if (name == *verb)
-      return ControlRequest{(*json)["number"].get<std::uint64_t>(), known, *instance, *argument};
+    if (name == *verb) {
+      return ControlRequest{(*json)["number"].get<std::uint64_t>(), known, *instance, *argument,
+                            *std::move(options)};
+    }
   }
   return failure(ErrorCode::corrupt, fmt::format("control message has the unknown verb '{}'", *verb));
 }

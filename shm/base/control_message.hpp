@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <string_view>
 
@@ -14,34 +15,41 @@ inline constexpr int kControlVersion = 1;
 
 /// What can be asked of an instance, by the API server of the manager and by the manager of the instance.
 enum class ControlVerb : std::uint8_t {
-  start,               ///< run the application
-  stop,                ///< stop the application; the process stays
-  reset,               ///< warm reset: fresh process, application loaded anew and stopped
-  reset_cold,          ///< the same, and the application is told so: it starts with initial values
-  single_cycle,        ///< one cycle of each cyclic and freewheeling task, from stopped
-  restart,             ///< fresh process, application running
-  reset_statistics,    ///< argument: name of a task; empty: all tasks
-  load_application,    ///< argument: path of the application on the host
-  change_application,  ///< (manager to instance only) argument: the same; it takes over while tasks run
-  set_scheduler,       ///< argument: name of a scheduler
-  register_event,      ///< argument: name of an external event
-  unregister_event,    ///< argument: name of an external event
-  check_host,          ///< of the manager, no instance: look at the host; see api/control/host_finding.hpp
-  list_objects,        ///< answered by the API server itself, from the pool
-  list_nodes,          ///< the same, from the directory of the nodes that send blocks
-  list_routes,         ///< the same
-  read_clock,          ///< answered by the API server itself
-  shutdown,            ///< (manager to instance only) stop the application and end the process
-  status,              ///< (manager to instance only) the reply's text is the InstanceReport
+  start,                 ///< run the application
+  stop,                  ///< stop the application; the process stays
+  reset,                 ///< warm reset: fresh process, application loaded anew and stopped
+  reset_cold,            ///< the same, and the application is told so: it starts with initial values
+  single_cycle,          ///< one cycle of each cyclic and freewheeling task, from stopped
+  restart,               ///< fresh process, application running
+  reset_statistics,      ///< argument: name of a task; empty: all tasks
+  load_application,      ///< argument: path of the application on the host; options: see kBootOption
+  download_application,  ///< argument: name of what was sent; options: see api/control/application_order.hpp
+  rollback_application,  ///< load what was loaded before; options: see kBootOption
+  change_application,    ///< (manager to instance only) argument: a path; it takes over while tasks run
+  set_scheduler,         ///< argument: name of a scheduler
+  register_event,        ///< argument: name of an external event
+  unregister_event,      ///< argument: name of an external event
+  check_host,            ///< of the manager, no instance: look at the host; see api/control/host_finding.hpp
+  list_objects,          ///< answered by the API server itself, from the pool
+  list_nodes,            ///< the same, from the directory of the nodes that send blocks
+  list_routes,           ///< the same
+  read_clock,            ///< answered by the API server itself
+  shutdown,              ///< (manager to instance only) stop the application and end the process
+  status,                ///< (manager to instance only) the reply's text is the InstanceReport
 };
 
 [[nodiscard]] std::string_view to_string(ControlVerb verb) noexcept;
+
+/// Option of what loads an application, and its value: the instance starts with it from now on.
+inline constexpr std::string_view kBootOption = "boot";
+inline constexpr std::string_view kYes = "yes";
 
 struct ControlRequest {
   std::uint64_t number = 0;  ///< chosen by the sender, comes back in the reply
   ControlVerb verb = ControlVerb::status;
   std::string instance;
   std::string argument;
+  std::map<std::string, std::string> options = {};  ///< further arguments, by name
 };
 
 struct ControlReply {

@@ -7,9 +7,11 @@
 
 #include <unistd.h>
 
+#include "api/control/application_order.hpp"
 #include "api/dds/text.hpp"
 #include "api/gateway/block_sample.hpp"
 #include "api/server/access/request_check.hpp"
+#include "api/server/downloads/download_table.hpp"
 #include "api/server/posts/event_intake.hpp"
 
 namespace {
@@ -37,6 +39,49 @@ Sample sample_from(const std::uint8_t* data, std::size_t size) {
   std::memcpy(&sample, data, std::min(size, sizeof sample));
   sample.ext = {};
   return sample;
+}
+
+/// Half of the runs have entries in their ext: of all that is there, and those that a download needs.
+struct Entries {
+  explicit Entries(const std::uint8_t* data, std::size_t size) {
+    if (size % 2 == 0) return;
+    std::memcpy(entries.data(), data, std::min(size, sizeof entries));
+    if (size % 4 == 1) dds::copy_text(entries[0].name, kSizeOption);
+    if (size % 4 == 1) dds::copy_text(entries[1].name, kDigestOption);
+    if (size % 8 == 1) dds::copy_text(entries[1].value, std::string(64, 'a'));
+  }
+  std::array<plc_KeyValue, 3> entries{};
+};
+
+// Pieces of a download: it never has more than was announced, and is complete with exactly that.
+void take_chunks(const std::uint8_t* data, std::size_t size) {
+  constexpr std::uint64_t kSize = 64;
+  static DownloadTable table("plchost-fuzz-dl-" + std::to_string(::getpid()), kSize);
+  const TimePoint now = MonotonicClock::now();
+  dds::Guid client;
+  const plc_SampleIdentity identity{};
+  const ControlRequest request{.number = 0,
+                               .verb = ControlVerb::download_application,
+                               .instance = "line1",
+                               .argument = "a.so",
+                               .options = {{"size", "64"}, {"sha256", std::string(64, 'a')}}};
+  if (!table.begin(client, identity, request, now)) std::abort();
+  for (std::size_t at = 0; at + 2 <= size; at += 2) {
+    std::array<std::uint8_t, 80> bytes{};
+    plc_DownloadChunk chunk{};
+    chunk.offset = data[at] % 80U;
+    chunk.contents._buffer = bytes.data();
+    chunk.contents._length = data[at + 1] % 80U;
+    if (data[at] % 8 == 7) client.bytes[0] ^= 1U;
+    table.take(chunk, client, now);
+    for (const DownloadProgress& progress : table.progress()) {
+      if (progress.received > kSize) std::abort();
+    }
+    if (!table.complete().empty()) break;
+    if (!table.given_up(now, [](const dds::Guid&) { return true; }).empty()) break;
+  }
+  table.end(identity);
+  if (table.size() != 0) std::abort();
 }
 
 bool names_what_is_there(const ControlRequest& request) {
@@ -70,7 +115,11 @@ void take_block(const std::uint8_t* data, std::size_t size) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static Host host;
   constexpr std::array<std::string_view, 1> kInstances{"line1"};
-  const auto request = sample_from<plc_Request>(data, size);
+  auto request = sample_from<plc_Request>(data, size);
+  Entries entries(data, size);
+  request.ext._buffer = entries.entries.data();
+  request.ext._length = request.ext._maximum = static_cast<std::uint32_t>(entries.entries.size());
+  take_chunks(data, size);
   for (const ApiRole role : {ApiRole::operating, ApiRole::engineering}) {
     const auto checked = check_request(request, role, "hosta", kInstances);
     if (checked ? !decode_request(encode(*checked)) || !names_what_is_there(*checked)

@@ -17,6 +17,8 @@ namespace plchost {
 [[nodiscard]] Row to_row(const plc_WriterStatus& status);
 [[nodiscard]] Row to_row(const plc_ExceptionStatus& status);
 [[nodiscard]] Row to_row(const plc_Transition& transition);
+/// `loaded`: it is what the instance has loaded.
+[[nodiscard]] Row to_row(const plc_ApplicationStatus& status, bool loaded);
 
 /// What a host tells beyond the fields that this program knows. A name that is taken stays what it is.
 void add_extension(Row& row, std::span<const plc_KeyValue> entries);
@@ -37,5 +39,6 @@ void add_extension(Row& row, std::span<const plc_KeyValue> entries);
 [[nodiscard]] const std::vector<Column>& writer_columns();
 [[nodiscard]] const std::vector<Column>& exception_columns();
 [[nodiscard]] const std::vector<Column>& transition_columns();
+[[nodiscard]] const std::vector<Column>& application_columns();
 
 }  // namespace plchost

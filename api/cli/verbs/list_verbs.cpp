@@ -4,6 +4,7 @@
 #include "api/cli/cli_session.hpp"
 #include "api/cli/rows/rows.hpp"
 #include "api/cli/rows/task_rows.hpp"
+#include "api/cli/verbs/application_verbs.hpp"
 #include "api/cli/verbs/host_verbs.hpp"
 #include "api/cli/verbs/node_verbs.hpp"
 #include "api/cli/verbs/object_verbs.hpp"
@@ -52,8 +53,9 @@ bool has_happened(const plc_ExceptionStatus& exception) {
 }  // namespace
 
 void add_list_verbs(const Command& plcctl, CliSession& session) {
-  const Command verb = plcctl.verb(
-      "list", "Show all hosts, instances, tasks, events, writers, objects, nodes, exceptions or transitions");
+  const Command verb = plcctl.verb("list",
+                                   "Show all hosts, instances, tasks, events, writers, objects, nodes, "
+                                   "exceptions, applications or transitions");
   add_list_hosts(verb, session);
   verb.noun("instances", "The PLC instances",
             [&session] { return list(session, &ControlClient::instances, instance_columns()); });
@@ -70,6 +72,7 @@ void add_list_verbs(const Command& plcctl, CliSession& session) {
   verb.noun("exceptions", "The last exception of each instance that had any", [&session] {
     return list(session, &ControlClient::exceptions, exception_columns(), has_happened);
   });
+  add_list_applications(verb, session);
   add_list_transitions(verb, session);
 }
 

@@ -1,10 +1,13 @@
 #include "api/server/access/request_audit.hpp"
 
 #include <array>
+#include <span>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "api/control/application_order.hpp"
+#include "api/dds/entries.hpp"
 #include "api/dds/text.hpp"
 #include "api/server/access/request_check.hpp"
 #include "shm/base/log.hpp"
@@ -22,6 +25,19 @@ std::string key_of(const plc_SampleIdentity& identity) {
   return fmt::format("{}.{}", dds::Guid::from(identity.writer_guid).hex(), identity.sequence_number);
 }
 
+// Of what was sent, its digest says what it was.
+std::string argument_of(const plc_Request& request) {
+  std::string argument(dds::text_of(request.argument));
+  std::string digest;
+  std::string boot;
+  const std::array<std::pair<std::string_view, std::string*>, 2> known{
+      {{kDigestOption, &digest}, {kBootOption, &boot}}};
+  (void)dds::read_entries(std::span(request.ext._buffer, request.ext._length), known);
+  if (!digest.empty()) argument += fmt::format(" sha256 {}", digest);
+  if (!boot.empty()) argument += " boot";
+  return argument;
+}
+
 }  // namespace
 
 RequestAudit::~RequestAudit() {
@@ -35,7 +51,7 @@ void RequestAudit::asked(const dds::Guid& client, const plc_Request& request) {
   describe_(client, record);
   record.what = operation_name(request.operation);
   record.on = dds::text_of(request.instance);
-  record.argument = dds::text_of(request.argument);
+  record.argument = argument_of(request);
   under_way_[key_of(request.header.request_identity)] = std::move(record);
 }
 

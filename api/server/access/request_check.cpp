@@ -2,11 +2,15 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 
+#include "api/control/application_order.hpp"
+#include "api/dds/entries.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
 
@@ -14,7 +18,9 @@ namespace plchost {
 
 namespace {
 
-enum class Argument : std::uint8_t { none, path, scheduler, event, task_or_none };
+enum class Argument : std::uint8_t { none, path, file, scheduler, event, task_or_none };
+/// What `ext` may say beside the argument.
+enum class Options : std::uint8_t { none, loading, download };
 
 struct Operation {
   std::int32_t number;
@@ -22,6 +28,7 @@ struct Operation {
   ApiRole role;
   Argument argument;
   bool of_host = false;  // names no instance
+  Options options = Options::none;
 };
 
 constexpr std::array kOperations = {
@@ -44,7 +51,11 @@ constexpr std::array kOperations = {
     Operation{plc_OPERATION_READ_CLOCK, ControlVerb::read_clock, ApiRole::operating, Argument::none,
               /*of_host=*/true},
     Operation{plc_OPERATION_LOAD_APPLICATION, ControlVerb::load_application, ApiRole::engineering,
-              Argument::path},
+              Argument::path, /*of_host=*/false, Options::loading},
+    Operation{plc_OPERATION_DOWNLOAD_APPLICATION, ControlVerb::download_application, ApiRole::engineering,
+              Argument::file, /*of_host=*/false, Options::download},
+    Operation{plc_OPERATION_ROLLBACK_APPLICATION, ControlVerb::rollback_application, ApiRole::engineering,
+              Argument::none, /*of_host=*/false, Options::loading},
     Operation{plc_OPERATION_SET_SCHEDULER, ControlVerb::set_scheduler, ApiRole::engineering,
               Argument::scheduler},
     Operation{plc_OPERATION_REGISTER_EVENT, ControlVerb::register_event, ApiRole::engineering,
@@ -71,6 +82,8 @@ Result<void> check_argument(const Operation& operation, std::string_view argumen
       if (argument.starts_with('/') && argument.size() <= kMaxPath) return {};
       return failure(ErrorCode::invalid_argument,
                      fmt::format("application '{}' is not an absolute path on the host", argument));
+    case Argument::file:
+      return check_file_name(argument);
     case Argument::scheduler:
       return check_name("scheduler", argument, 31);
     case Argument::event:
@@ -92,6 +105,31 @@ Result<void> check_instance(const Operation& operation, std::string_view instanc
   if (std::ranges::find(instances, instance) != instances.end()) return {};
   return failure(ErrorCode::not_found, fmt::format("no instance '{}' on host '{}'; there are: {}", instance,
                                                    host, join_names(instances)));
+}
+
+using OptionValues = std::map<std::string, std::string>;
+
+Result<OptionValues> check_options(const Operation& operation, std::span<const plc_KeyValue> ext) {
+  OptionValues options;
+  if (operation.options == Options::none) return options;
+  std::string boot;
+  std::string size;
+  std::string digest;
+  const bool download = operation.options == Options::download;
+  std::vector<std::pair<std::string_view, std::string*>> known{{kBootOption, &boot}};
+  if (download) known.insert(known.end(), {{kSizeOption, &size}, {kDigestOption, &digest}});
+  if (const auto read = dds::read_entries(ext, known); !read) return std::unexpected(read.error());
+  if (!boot.empty() && boot != kYes) {
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("'{}' is '{}'; only '{}' is allowed", kBootOption, shown(boot), kYes));
+  }
+  for (const auto& [name, value] : known) {
+    if (!value->empty()) options.emplace(name, *value);
+  }
+  if (!download) return options;
+  if (const auto order = ApplicationOrder::from_options(options); !order)
+    return std::unexpected(order.error());
+  return options;
 }
 
 }  // namespace
@@ -118,7 +156,9 @@ Result<ControlRequest> check_request(const plc_Request& request, ApiRole role, s
     return std::unexpected(good.error());
   const auto argument = dds::text_of(request.argument);
   if (auto good = check_argument(*operation, argument); !good) return std::unexpected(good.error());
-  return ControlRequest{0, operation->verb, std::string(instance), std::string(argument)};
+  auto ext = check_options(*operation, std::span(request.ext._buffer, request.ext._length));
+  if (!ext) return std::unexpected(std::move(ext).error());
+  return ControlRequest{0, operation->verb, std::string(instance), std::string(argument), *std::move(ext)};
 }
 
 bool only_reads(std::int32_t operation) noexcept {

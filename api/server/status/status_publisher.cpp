@@ -29,9 +29,10 @@ Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const 
   auto exceptions = make(dds::kExceptionStatus, dds::status_qos());
   auto hosts = make(dds::kHostStatus, dds::status_qos());
   auto writers = make(dds::kWriterStatus, dds::status_qos());
+  auto applications = make(dds::kApplicationStatus, dds::status_qos());
   auto presence = make(dds::kPresence, dds::presence_qos());
   for (auto* made : {&tasks, &statistics, &instances, &events, &objects, &findings, &exceptions, &hosts,
-                     &writers, &presence}) {
+                     &writers, &applications, &presence}) {
     if (!*made) return failure_in("publish status", made->error());
   }
   auto transitions =
@@ -51,6 +52,8 @@ Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const 
   publisher.hosts_ = StatusTable<plc_HostStatus>(std::move(*hosts));
   publisher.writers_ =
       WriterWatch(source.host, source.epoch, StatusTable<plc_WriterStatus>(std::move(*writers)));
+  publisher.applications_ = ApplicationWatch(source.applications_folder, source.host, source.epoch,
+                                             StatusTable<plc_ApplicationStatus>(std::move(*applications)));
   publisher.presence_ = std::move(*presence);
   publisher.topics_ = std::move(topics);
   return publisher;
@@ -60,6 +63,7 @@ void StatusPublisher::tick(TimePoint now) {
   bool changed = std::exchange(writers_changed_, false);
   changed |= look_at_instances(now);
   if (now >= next_objects_) changed |= look_at_objects(now);
+  changed |= applications_.look(instance_names_, now);
   tasks_.look(now);
   findings_.write();
   load_.look(now);
@@ -74,6 +78,7 @@ void StatusPublisher::look_at_writers(const EventIntake& intake, const SessionTa
 void StatusPublisher::flush(const std::string& instance, TimePoint now) {
   bool changed = look_at_instances(now);
   changed |= look_at_objects(now);
+  changed |= applications_.look_at(instance);
   tasks_.look_at(instance, now);
   write_host(changed);
 }
@@ -221,6 +226,7 @@ void StatusPublisher::write_host(bool changed) {
   sample.event_count = events_.size();
   sample.object_count = objects_.size();
   sample.writer_count = writers_.size();
+  sample.application_count = applications_.size();
   if (host) {
     dds::copy_text(sample.version, host->version.view());
     sample.manager_pid = host->manager_pid;

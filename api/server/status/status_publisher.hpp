@@ -11,6 +11,7 @@
 #include "api/control/host_finding.hpp"
 #include "api/dds/topics.hpp"
 #include "api/server/posts/writer_watch.hpp"
+#include "api/server/status/application_watch.hpp"
 #include "api/server/status/exception_watch.hpp"
 #include "api/server/status/host_load.hpp"
 #include "api/server/status/status_table.hpp"
@@ -32,6 +33,7 @@ class StatusPublisher {
     std::string run_directory;
     std::string labels;  ///< with commas between
     bool secured = false;
+    std::string applications_folder;  ///< of those that were sent; empty: there is none
   };
   [[nodiscard]] static Result<StatusPublisher> create(dds_entity_t participant, const Source& source);
 
@@ -89,6 +91,7 @@ class StatusPublisher {
   StatusTable<plc_ObjectStatus> objects_;
   StatusTable<plc_HostFinding> findings_;
   StatusTable<plc_HostStatus> hosts_;
+  ApplicationWatch applications_;
   WriterWatch writers_;
   bool writers_changed_ = false;
   dds::Entity presence_;

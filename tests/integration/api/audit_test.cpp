@@ -70,6 +70,17 @@ TEST_F(Audit, ARefusedChangeIsRecordedWithTheReason) {
   EXPECT_EQ(loads[0]["text"], reply->text);
 }
 
+TEST_F(Audit, WhatWasSentIsRecordedWithItsDigest) {
+  const std::string file = host_.run_directory() + "/sent.so";
+  std::ofstream(file) << "contents";
+  ASSERT_EQ(run({"load", "application", "line1", file, "--boot"}).code, 0);
+  const Records sent = records("download application");
+  ASSERT_EQ(sent.size(), 1U);
+  EXPECT_EQ(sent[0]["argument"],
+            "sent.so sha256 d1b2a59fbea7e20077af9f91b27e95e865061b270be03ff539ab3b73587882e8 boot");
+  EXPECT_EQ(sent[0]["result"], "ok");
+}
+
 TEST_F(Audit, LookingIsNotRecorded) {
   ASSERT_EQ(run({"list", "instances"}).code, 0);
   ASSERT_EQ(run({"list", "objects"}).code, 0);

@@ -182,8 +182,42 @@ TEST_F(Plcctl, ResetsTheStatisticsOfOneTaskOrOfAll) {
   EXPECT_EQ(requests[1].argument, "");
 }
 
-TEST_F(Plcctl, MakesTheFileOfAnApplicationAbsolute) {
-  EXPECT_EQ(run({"load", "application", "line1", "some/app.so"}).code, 0);
+TEST_F(Plcctl, SendsTheFileOfAnApplication) {
+  const std::string file = host_.run_directory() + "/sent.so";
+  std::ofstream(file) << "contents";
+  const auto sent = run({"load", "application", "line1", file});
+  EXPECT_EQ(sent.code, 0) << sent.errors;
+  EXPECT_EQ(sent.errors, "") << "progress is for terminals only";
+  ASSERT_EQ(host_.requests().size(), 1U);
+  const ControlRequest request = host_.requests()[0];
+  EXPECT_EQ(request.verb, ControlVerb::download_application);
+  EXPECT_EQ(request.argument, "sent.so");
+  EXPECT_EQ(request.options.at("size"), "8");
+  EXPECT_EQ(request.options.at("sha256"), "d1b2a59fbea7e20077af9f91b27e95e865061b270be03ff539ab3b73587882e8");
+  EXPECT_THAT(request.options.at("from"), HasSubstr("plcctl "));
+  EXPECT_FALSE(request.options.contains("boot"));
+}
+
+TEST_F(Plcctl, SaysWhichFileItCannotSend) {
+  const auto missing = run({"load", "application", "line1", "some/app.so"});
+  EXPECT_EQ(missing.code, 1);
+  EXPECT_THAT(missing.errors, testing::AllOf(HasSubstr("some/app.so"), HasSubstr("--on-host")));
+  EXPECT_THAT(run({"load", "application", "line1", host_.run_directory()}).errors, HasSubstr("is a folder"));
+}
+
+TEST_F(Plcctl, RollsBackAndChoosesTheBootApplication) {
+  EXPECT_EQ(run({"rollback", "application", "line1", "--boot"}).code, 0);
+  EXPECT_EQ(run({"load", "application", "line1", "/opt/a.so", "--on-host", "--boot"}).code, 0);
+  const auto requests = host_.requests();
+  ASSERT_EQ(requests.size(), 2U);
+  EXPECT_EQ(requests[0].verb, ControlVerb::rollback_application);
+  EXPECT_EQ(requests[0].options.at("boot"), "yes");
+  EXPECT_EQ(requests[1].verb, ControlVerb::load_application);
+  EXPECT_EQ(requests[1].options.at("boot"), "yes");
+}
+
+TEST_F(Plcctl, MakesAFileOnTheHostAbsolute) {
+  EXPECT_EQ(run({"load", "application", "line1", "some/app.so", "--on-host"}).code, 0);
   ASSERT_EQ(host_.requests().size(), 1U);
   EXPECT_EQ(host_.requests()[0].argument.front(), '/');
   EXPECT_THAT(host_.requests()[0].argument, testing::EndsWith("/some/app.so"));

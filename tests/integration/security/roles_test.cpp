@@ -46,8 +46,12 @@ TEST_F(Roles, AnOperatorPostsAndStops) {
 }
 
 TEST_F(Roles, AnOperatorThatLoadsIsRefused) {
-  const auto refused = run("operator", {"load", "application", "line1", "/tmp/other.so"});
+  const auto refused = run("operator", {"load", "application", "line1", "/tmp/other.so", "--on-host"});
   EXPECT_EQ(refused.code, 1);
+  const auto sent =
+      run("operator", {"load", "application", "line1", folder("operator") + "/certificate.pem"});
+  EXPECT_EQ(sent.code, 1);
+  EXPECT_THAT(sent.errors, HasSubstr("plc/v1/eng/download_chunk: the permissions of this identity"));
   EXPECT_THAT(refused.errors, HasSubstr("plc/v1/eng/request: the permissions of this identity"));
   EXPECT_THAT(host_.requests(), IsEmpty());
 }
@@ -56,11 +60,14 @@ TEST_F(Roles, AnEngineerAndAnAdminDoAll) {
   for (const char* const who : {"engineer", "admin"}) {
     const auto posted = run(who, {"post", "event", "line1/ready"});
     EXPECT_EQ(posted.code, 0) << posted.errors;
-    const auto loaded = run(who, {"load", "application", "line1", "/tmp/other.so"});
+    const auto loaded = run(who, {"load", "application", "line1", "/tmp/other.so", "--on-host"});
     EXPECT_EQ(loaded.code, 0) << loaded.errors;
+    const auto sent = run(who, {"load", "application", "line1", folder(who) + "/certificate.pem"});
+    EXPECT_EQ(sent.code, 0) << sent.errors;
   }
   EXPECT_EQ(event_.counted().count(), 2U);
-  EXPECT_THAT(host_.requests(), SizeIs(2));
+  ASSERT_THAT(host_.requests(), SizeIs(4));
+  EXPECT_EQ(host_.requests()[1].options.at("by"), "engineer engineer");
 }
 
 TEST_F(Roles, AParticipantsGuidBeginsAsItsIdentityHasIt) {
@@ -75,13 +82,16 @@ TEST_F(Roles, APatchedClientMeetsNobodyWhereItsRoleDoesNotReach) {
   ASSERT_TRUE(client.is_in_domain());
   const auto own = client.write(dds::kOperatorRequest, "h.cell");
   const auto forbidden = client.write(dds::kEngineerRequest, "h.cell");
+  const auto chunks = client.write(dds::kDownloadChunk, "h.cell");
   const auto presence = client.write(dds::kPresence, "");
   const auto others = client.read(dds::kReply, "c.*");
   const auto own_replies = client.read(dds::kReply, dds::client_partition(client.guid().hex()));
-  ASSERT_TRUE(own > 0 && forbidden > 0 && presence > 0 && others > 0) << "it is not patched enough";
+  ASSERT_TRUE(own > 0 && forbidden > 0 && chunks > 0 && presence > 0 && others > 0)
+      << "it is not patched enough";
   EXPECT_TRUE(RawClient::meets_reader(own)) << "what it may write does not work either";
   EXPECT_TRUE(RawClient::meets_writer(own_replies));
   EXPECT_FALSE(RawClient::meets_reader(forbidden, std::chrono::seconds(1)));
+  EXPECT_FALSE(RawClient::meets_reader(chunks, std::chrono::seconds(0)));
   EXPECT_FALSE(RawClient::meets_reader(presence, std::chrono::seconds(0)));
   EXPECT_FALSE(RawClient::meets_writer(others, std::chrono::seconds(0)));
 }
@@ -115,7 +125,7 @@ TEST_F(PermissionsThatSayTooMuch, StillCommandNothing) {
   const auto stopped = run("viewer", {"stop", "instance", "line1"});
   EXPECT_EQ(stopped.code, 1);
   EXPECT_THAT(stopped.errors, HasSubstr("'viewer' is viewer; this takes the role operator"));
-  const auto loaded = run("viewer", {"load", "application", "line1", "/tmp/other.so"});
+  const auto loaded = run("viewer", {"load", "application", "line1", "/tmp/other.so", "--on-host"});
   EXPECT_EQ(loaded.code, 1);
   EXPECT_THAT(loaded.errors, HasSubstr("this takes the role engineer"));
   EXPECT_THAT(host_.requests(), IsEmpty());

@@ -28,6 +28,11 @@ refused "the permissions of this identity do not allow it" as panel post event p
 as anna post event packer1/product --count 20
 refused "the permissions of this identity do not allow it" as anna set scheduler packer1 CmpSchedule
 as otto set scheduler packer1 CmpSchedule
+refused "the permissions of this identity do not allow it" as anna load application packer1 "$APPLICATIONS/packer.so"
+refused "the permissions of this identity do not allow it" as anna rollback application packer1
+as otto load application packer1 "$APPLICATIONS/packer.so" >/dev/null || fail "an engineer may send an application"
+is "$(as panel list applications --json | jq -r '.[0].by')" "engineer otto" || fail "$(as panel list applications)"
+pid=$(as panel list instances --json | jq -r '.[0].pid')
 code=0
 plcctl --timeout 2 list hosts 2>"$cell/unknown.txt" || code=$?
 is "$code" 3 || fail "exit code $code without an identity"

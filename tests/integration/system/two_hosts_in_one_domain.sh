@@ -41,6 +41,11 @@ is "$(plcctl --label hall1 start instance packer1 --json | jq -r 'map(.host + " 
 is "$(plcctl --label north-wing list hosts --json | jq -r '.[].labels')" hall1,north-wing || fail "$(plcctl list hosts)"
 if said=$(plcctl --label cellar stop instance packer1 2>&1); then fail "a label that no host has"; fi
 grep -qF "north (hall1, north-wing), south (hall1, south-wing)" <<<"$said" || fail "$said"
+is "$(plcctl --host all load application packer1 "$APPLICATIONS/drive_axis.so" | sort)" \
+  $'north: version 1 (drive_axis.so) is loaded\nsouth: version 1 (drive_axis.so) is loaded' || fail "$(plcctl list applications)"
+is "$(plcctl list applications --json | jq -r 'map(.host + " " + .loaded) | join(",")')" "north loaded,south loaded" ||
+  fail "not on both: $(plcctl list applications)"
+is "$(plcctl --host all rollback application packer1 --json | jq -r 'map(.done | tostring) | join(",")')" true,true || fail "rollback"
 code=0
 plcctl --host all stop instance nowhere >/dev/null 2>&1 || code=$?
 is "$code" 1 || fail "exit code $code where no host has the instance"

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 
 #include "api/cli/cli_session.hpp"
+#include "api/cli/progress_board.hpp"
 #include "api/cli/rows/rows.hpp"
 #include "api/cli/rows/table.hpp"
 #include "api/dds/domain.hpp"
@@ -122,6 +123,17 @@ TEST(DomainConfiguration, AsksForRealTimeThreadsOnlyWhenTheyWereGranted) {
               testing::Not(HasSubstr("Realtime")));
   options.receive_fifo = 20;
   EXPECT_THAT(dds::domain_configuration(dds::Role::server, options).value(), HasSubstr("Realtime"));
+}
+
+TEST(ProgressLine, ShowsHowMuchHasArrived) {
+  EXPECT_EQ(progress_line("cell1", 6, 0, 4 << 20U),
+            "cell1   [                              ]   0 %  0.0 of 4.0 MiB");
+  EXPECT_EQ(progress_line("cell1", 5, 1 << 20U, 4 << 20U),
+            "cell1  [#######                       ]  25 %  1.0 of 4.0 MiB");
+  EXPECT_EQ(progress_line("cell1", 5, 4 << 20U, 4 << 20U),
+            "cell1  [##############################] 100 %  4.0 of 4.0 MiB, loading");
+  EXPECT_EQ(progress_line("a", 1, 9, 4),
+            "a  [##############################] 100 %  0.0 of 0.0 MiB, loading");
 }
 
 }  // namespace

@@ -1,6 +1,10 @@
 #include "api/server/access/request_check.hpp"
 
 #include <array>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include <gmock/gmock.h>
 
@@ -75,6 +79,66 @@ TEST(RequestCheck, NamesWhatDoesNotExist) {
   const auto operation = check(make(99), ApiRole::operating);
   EXPECT_EQ(operation.error().code, ErrorCode::unsupported);
   EXPECT_THAT(operation.error().message, testing::AllOf(HasSubstr("5"), HasSubstr("set scheduler")));
+}
+
+/// A request with these entries in its ext.
+class WithEntries {
+ public:
+  WithEntries(std::int32_t operation, std::string_view argument,
+              const std::vector<std::pair<std::string, std::string>>& entries)
+      : request_(make(operation, "line1", argument)) {
+    for (const auto& [name, value] : entries) {
+      plc_KeyValue& entry = entries_.emplace_back();
+      dds::copy_text(entry.name, name);
+      dds::copy_text(entry.value, value);
+    }
+    request_.ext._buffer = entries_.data();
+    request_.ext._length = request_.ext._maximum = static_cast<std::uint32_t>(entries_.size());
+  }
+  [[nodiscard]] Result<ControlRequest> checked() const { return check(request_, ApiRole::engineering); }
+
+ private:
+  plc_Request request_;
+  std::vector<plc_KeyValue> entries_;
+};
+
+TEST(RequestCheck, TakesWhatAnApplicationIsLoadedWith) {
+  const auto load =
+      WithEntries(plc_OPERATION_LOAD_APPLICATION, "/a.so", {{"boot", "yes"}, {"new", "x"}}).checked();
+  ASSERT_TRUE(load) << load.error().message;
+  EXPECT_EQ(load->options, (std::map<std::string, std::string>{{"boot", "yes"}}));
+  EXPECT_EQ(WithEntries(plc_OPERATION_ROLLBACK_APPLICATION, "", {{"boot", "yes"}}).checked()->verb,
+            ControlVerb::rollback_application);
+  const auto wrong = WithEntries(plc_OPERATION_LOAD_APPLICATION, "/a.so", {{"boot", "true"}}).checked();
+  EXPECT_EQ(wrong.error().code, ErrorCode::invalid_argument);
+  EXPECT_THAT(wrong.error().message, HasSubstr("only 'yes'"));
+}
+
+TEST(RequestCheck, TakesADownloadWithItsSizeAndDigestOnly) {
+  const std::string digest(64, 'f');
+  const auto sent = WithEntries(plc_OPERATION_DOWNLOAD_APPLICATION, "a b.so",
+                                {{"size", "12"}, {"sha256", digest}, {"source", "7"}, {"by", "admin eve"}})
+                        .checked();
+  ASSERT_TRUE(sent) << sent.error().message;
+  EXPECT_EQ(sent->options, (std::map<std::string, std::string>{{"size", "12"}, {"sha256", digest}}));
+  using Entries = std::vector<std::pair<std::string, std::string>>;
+  for (const Entries& wrong :
+       {Entries{}, Entries{{"size", "12"}}, Entries{{"sha256", digest}},
+        Entries{{"size", "0"}, {"sha256", digest}}, Entries{{"size", "-1"}, {"sha256", digest}},
+        Entries{{"size", "12x"}, {"sha256", digest}},
+        Entries{{"size", "99999999999999999999"}, {"sha256", digest}},
+        Entries{{"size", "12"}, {"sha256", std::string(64, 'F')}},
+        Entries{{"size", "12"}, {"sha256", std::string(63, 'f')}},
+        Entries{{"size", "12"}, {"size", "13"}, {"sha256", digest}}}) {
+    const auto refused = WithEntries(plc_OPERATION_DOWNLOAD_APPLICATION, "a.so", wrong).checked();
+    ASSERT_FALSE(refused);
+    EXPECT_EQ(refused.error().code, ErrorCode::invalid_argument);
+  }
+  for (const char* name : {"", "a/b.so", "a\nb", "\xff"}) {
+    EXPECT_FALSE(
+        WithEntries(plc_OPERATION_DOWNLOAD_APPLICATION, name, {{"size", "12"}, {"sha256", digest}}).checked())
+        << name;
+  }
 }
 
 TEST(RequestCheck, RefusesImpossibleArguments) {

@@ -15,7 +15,7 @@
 
 #include "api/audit/audit_check.hpp"
 #include "api/audit/audit_file.hpp"
-#include "api/audit/sha256.hpp"
+#include "api/security/sha256.hpp"
 
 namespace plchost {
 namespace {

@@ -15,18 +15,21 @@ TEST_P(Verb, SurvivesTheRoundTrip) {
   const ControlRequest request{.number = std::numeric_limits<std::uint64_t>::max(),
                                .verb = GetParam(),
                                .instance = "line1",
-                               .argument = "quo\"te\n\\ \xc3\xa4"};
+                               .argument = "quo\"te\n\\ \xc3\xa4",
+                               .options = {{"boot", "yes"}, {"by", "quo\"te"}}};
   const auto decoded = decode_request(encode(request));
   ASSERT_TRUE(decoded) << decoded.error().message;
   EXPECT_EQ(decoded->number, request.number);
   EXPECT_EQ(decoded->verb, request.verb);
   EXPECT_EQ(decoded->instance, request.instance);
   EXPECT_EQ(decoded->argument, request.argument);
+  EXPECT_EQ(decoded->options, request.options);
 }
 
 INSTANTIATE_TEST_SUITE_P(ControlMessage, Verb,
                          testing::Values(ControlVerb::start, ControlVerb::stop, ControlVerb::reset,
                                          ControlVerb::restart, ControlVerb::load_application,
+                                         ControlVerb::download_application, ControlVerb::rollback_application,
                                          ControlVerb::set_scheduler, ControlVerb::register_event,
                                          ControlVerb::unregister_event, ControlVerb::check_host,
                                          ControlVerb::reset_statistics, ControlVerb::shutdown,
@@ -75,6 +78,8 @@ INSTANTIATE_TEST_SUITE_P(
         R"({"version":1,"number":1,"verb":"start","instance":null,"argument":""})",
         R"({"version":1,"number":1,"verb":"start","instance":"a"})",
         R"({"version":1,"number":1,"verb":"start","instance":"a","argument":[]})",
+        R"({"version":1,"number":1,"verb":"start","instance":"a","argument":"","options":[]})",
+        R"({"version":1,"number":1,"verb":"start","instance":"a","argument":"","options":{"boot":true}})",
         R"({"version":1,"number":1,"verb":"start","instance":"a","argument":""} trailing)",
         "{\"version\":" + std::string(8000, '[') + std::string(8000, ']') + "}", std::string(16384, '[')));
 

@@ -65,6 +65,8 @@ dds_domain = 7
 run_directory = "/tmp/cell1"
 pool = "cell1"
 pool_objects = 128
+application_limit_mib = 8
+application_versions = 9
 pool_owner = "root"
 pool_group = "1000"
 pool_mode = "0640"
@@ -98,6 +100,8 @@ share_core = true
   ASSERT_TRUE(sut.has_value());
   EXPECT_EQ(sut->host.dds_domain, 7);
   EXPECT_EQ(sut->host.pool_objects, 128U);
+  EXPECT_EQ(sut->host.application_limit_mib, 8U);
+  EXPECT_EQ(sut->host.application_versions, 9U);
   EXPECT_EQ(sut->host.pool_owner, "root");
   EXPECT_EQ(sut->host.pool_group, "1000");
   EXPECT_EQ(sut->host.pool_mode, 0640U);
@@ -164,6 +168,8 @@ INSTANTIATE_TEST_SUITE_P(
         WrongConfig{"run_long", "[host]\nrun_directory = \"/" + std::string(70, 'x') + "\"\n", "2",
                     "of up to 70 characters"},
         WrongConfig{"pool", "[host]\npool = \"a/b\"\n", "2", "'a/b' is not valid"},
+        WrongConfig{"limit", "[host]\napplication_limit_mib = 0\n", "2", "allowed is 1 to 1024"},
+        WrongConfig{"versions", "[host]\napplication_versions = 101\n", "2", "allowed is 1 to 100"},
         WrongConfig{"objects", "[host]\npool_objects = 15\n", "2", "allowed is 16 to 1000000"},
         WrongConfig{"objects_high", "[host]\npool_objects = 1000001\n", "2", "allowed is 16 to 1000000"},
         WrongConfig{"cores_type", "[host]\ncores = 1\n", "2", "allowed is an array of whole numbers"},

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -10,6 +11,7 @@
 
 #include "manager/supervisor/managed_instance.hpp"
 #include "tests/unit/manager/fake_host.hpp"
+#include "tests/unit/manager/fake_keeper.hpp"
 
 namespace plchost {
 
@@ -31,6 +33,7 @@ class ManagedInstanceTest : public testing::Test {
         config_,
         ManagedInstance::Surroundings{
             .host = host_config_,
+            .applications = applications_,
             .folder = "/etc/plchost",
             .schedulers = {"CmpSchedule", "CmpScheduleTimer"},
             .now = [this] { return now_; },
@@ -64,8 +67,9 @@ class ManagedInstanceTest : public testing::Test {
     take_reply();
     ASSERT_EQ(state(), InstanceState::stopped);
   }
-  void ask(ControlVerb verb, const std::string& argument = "") {
-    sut().handle({.number = 7, .verb = verb, .instance = "line1", .argument = argument},
+  void ask(ControlVerb verb, const std::string& argument = "",
+           const std::map<std::string, std::string>& options = {}) {
+    sut().handle({.number = 7, .verb = verb, .instance = "line1", .argument = argument, .options = options},
                  [this](const ControlReply& reply) { replies_.push_back(reply); });
   }
   /// The one reply that came; there must be one.
@@ -95,6 +99,7 @@ class ManagedInstanceTest : public testing::Test {
   InstanceConfig config_;
   HostConfig host_config_;
   FakeHost host_;
+  FakeKeeper applications_;
   TimePoint now_{std::chrono::seconds(1000)};
   int changes_ = 0;
   std::string lost_fault_;

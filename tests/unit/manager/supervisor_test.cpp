@@ -8,6 +8,7 @@
 #include <gmock/gmock.h>
 
 #include "tests/unit/manager/fake_host.hpp"
+#include "tests/unit/manager/fake_keeper.hpp"
 
 namespace plchost {
 namespace {
@@ -45,6 +46,7 @@ class SupervisorTest : public testing::Test {
                    auto host = std::make_unique<FakeHost>();
                    hosts_[config.name] = host.get();
                    return Supervisor::HostedInstance{.host = std::move(host),
+                                                     .applications = std::make_unique<FakeKeeper>(),
                                                      .connect = [](InstanceEvents&) {}};
                  });
   }

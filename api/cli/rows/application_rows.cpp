@@ -1,0 +1,35 @@
+#include "api/cli/rows/rows.hpp"
+#include "api/dds/text.hpp"
+
+namespace plchost {
+
+Row to_row(const plc_ApplicationStatus& status, bool loaded) {
+  constexpr std::size_t kShownDigits = 12;
+  const std::string_view digest = dds::text_of(status.sha256);
+  const bool sent = status.version > 0;
+  return {{"host", dds::text_of(status.host)},
+          {"instance", dds::text_of(status.instance)},
+          {"version", sent ? Row(status.version) : Row("")},
+          {"file", sent ? dds::text_of(status.file_name) : dds::text_of(status.path)},
+          {"size", sent ? Row(status.size) : Row("")},
+          {"sent", time_text(status.stored_unix_ns)},
+          {"sent_unix_ns", status.stored_unix_ns},
+          {"by", dds::text_of(status.by)},
+          {"from", dds::text_of(status.from)},
+          {"sha256", digest},
+          {"digest", digest.substr(0, kShownDigits)},
+          {"loaded", loaded ? "loaded" : ""},
+          {"boot", status.boot ? "boot" : ""},
+          {"path", dds::text_of(status.path)},
+          {"before", dds::text_of(status.before)}};
+}
+
+const std::vector<Column>& application_columns() {
+  static const std::vector<Column> columns{{"host", "HOST"}, {"instance", "INSTANCE"}, {"version", "VERSION"},
+                                           {"file", "FILE"}, {"size", "SIZE"},         {"sent", "SENT"},
+                                           {"by", "BY"},     {"digest", "SHA256"},     {"loaded", "LOADED"},
+                                           {"boot", "BOOT"}};
+  return columns;
+}
+
+}  // namespace plchost

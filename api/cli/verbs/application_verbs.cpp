@@ -1,0 +1,148 @@
+#include "api/cli/verbs/application_verbs.hpp"
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <memory>
+#include <span>
+
+#include <fmt/format.h>
+
+#include "api/cli/progress_board.hpp"
+#include "api/cli/rows/rows.hpp"
+#include "api/cli/verbs/host_commands.hpp"
+#include "api/control/application_order.hpp"
+#include "api/dds/entries.hpp"
+#include "api/dds/text.hpp"
+
+namespace plchost {
+
+namespace {
+
+struct LoadArguments {
+  std::string instance;
+  std::string file;
+  bool on_host = false;
+  bool boot = false;
+};
+
+std::vector<plc_KeyValue> options_of(bool boot) {
+  std::vector<plc_KeyValue> ext;
+  if (boot) dds::add_entry(ext, kBootOption, kYes);
+  return ext;
+}
+
+Result<std::string> read_application(const std::string& path) {
+  std::error_code error;
+  if (std::filesystem::is_directory(path, error)) {
+    return failure(ErrorCode::wrong_type, path + " is a folder");
+  }
+  std::ifstream file(path, std::ios::binary);
+  if (!file) {
+    return failure(ErrorCode::system,
+                   fmt::format("{} cannot be opened here (a file on the host: --on-host)", path), errno);
+  }
+  std::string contents(std::istreambuf_iterator<char>(file), {});
+  if (file.bad()) return failure(ErrorCode::system, "read " + path, errno);
+  if (contents.empty()) return failure(ErrorCode::wrong_size, path + " is empty");
+  return contents;
+}
+
+int send(CliSession& session, const LoadArguments& arguments) {
+  const auto contents = read_application(arguments.file);
+  if (!contents) return CliSession::fail(contents.error());
+  const auto hosts = session.target_hosts();
+  if (!hosts) return CliSession::fail(hosts.error());
+  ProgressBoard board(*hosts, contents->size());
+  const std::string name = std::filesystem::path(arguments.file).filename().string();
+  const TimePoint deadline = session.deadline();
+  return ask_hosts(session, *hosts, arguments.instance, [&](ControlClient& client, const std::string& host) {
+    const Download download{.host = host,
+                            .instance = arguments.instance,
+                            .name = name,
+                            .contents = std::as_bytes(std::span(*contents)),
+                            .boot = arguments.boot};
+    auto reply =
+        client.download(download, [&](std::uint64_t received) { board.show(host, received); }, deadline);
+    board.end(host);
+    return reply;
+  });
+}
+
+int load(CliSession& session, const LoadArguments& arguments) {
+  if (!arguments.on_host) return send(session, arguments);
+  const std::string path = std::filesystem::absolute(arguments.file).lexically_normal();
+  return command(session,
+                 {"", plc_OPERATION_LOAD_APPLICATION, arguments.instance, path, options_of(arguments.boot)});
+}
+
+/// INSTANCE/PATH of what is loaded on a host.
+Result<std::map<std::string, std::string>> loaded_on(CliSession& session, const std::string& host) {
+  const auto instances = session.client().value()->instances(host, session.deadline());
+  if (!instances) return std::unexpected(instances.error());
+  std::map<std::string, std::string> loaded;
+  for (const plc_InstanceStatus& status : *instances) {
+    loaded.emplace(dds::text_of(status.instance), dds::text_of(status.application));
+  }
+  return loaded;
+}
+
+int list_applications(CliSession& session, const std::string& instance) {
+  if (!instance.empty()) {
+    if (const auto known = session.check_instance(instance); !known) return CliSession::fail(known.error());
+  }
+  const auto hosts = session.shown_hosts();
+  if (!hosts) return CliSession::fail(hosts.error());
+  std::vector<Row> rows;
+  for (const HostView& host : *hosts) {
+    const auto kept = session.client().value()->applications(host.name, session.deadline());
+    if (!kept) return CliSession::fail(kept.error());
+    const auto loaded = loaded_on(session, host.name);
+    if (!loaded) return CliSession::fail(loaded.error());
+    for (const plc_ApplicationStatus& status : *kept) {
+      if (!instance.empty() && dds::text_of(status.instance) != instance) continue;
+      const auto of_instance = loaded->find(std::string(dds::text_of(status.instance)));
+      const bool is_loaded = of_instance != loaded->end() && of_instance->second == dds::text_of(status.path);
+      rows.push_back(to_row(status, is_loaded));
+    }
+  }
+  session.show(rows, application_columns());
+  return kExitDone;
+}
+
+}  // namespace
+
+void add_application_verbs(const Command& plcctl, CliSession& session) {
+  const auto arguments = std::make_shared<LoadArguments>();
+  const char* const text = "Load another application into an instance";
+  plcctl.verb("load", text)
+      .noun("application", text, [&session, arguments] { return load(session, *arguments); })
+      .argument("INSTANCE", arguments->instance)
+      .argument(
+          "FILE", arguments->file,
+          "the application: a file of this machine, which is sent; a relative path starts at the current "
+          "directory")
+      .flag("--on-host", arguments->on_host, "FILE is on the host already, and is loaded from there")
+      .flag("--boot", arguments->boot,
+            "the instance starts with it from now on, also after a restart of the host");
+  const auto name = std::make_shared<std::string>();
+  const auto boot = std::make_shared<bool>(false);
+  const char* const back = "Load again what was loaded before the version that is loaded";
+  plcctl.verb("rollback", back)
+      .noun("application", back,
+            [&session, name, boot] {
+              return command(session, {"", plc_OPERATION_ROLLBACK_APPLICATION, *name, "", options_of(*boot)});
+            })
+      .argument("INSTANCE", *name)
+      .flag("--boot", *boot, "the instance starts with it from now on, also after a restart of the host");
+}
+
+void add_list_applications(const Command& verb, CliSession& session) {
+  const auto instance = std::make_shared<std::string>();
+  verb.noun("applications", "The applications that were sent, as they are kept for each instance",
+            [&session, instance] { return list_applications(session, *instance); })
+      .optional("INSTANCE", *instance, "only of this instance");
+}
+
+}  // namespace plchost

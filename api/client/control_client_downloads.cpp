@@ -1,0 +1,81 @@
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "api/client/check_names.hpp"
+#include "api/client/control_client.hpp"
+#include "api/client/file_sender.hpp"
+#include "api/control/application_order.hpp"
+#include "api/dds/entries.hpp"
+#include "api/dds/samples.hpp"
+#include "api/security/sha256.hpp"
+
+namespace plchost {
+
+namespace {
+
+// A host that is started again needs a second, and its manager up to 5 s if it fails again and again.
+constexpr Duration kDownloadStall = std::chrono::seconds(10);
+// The host keeps it, tries it and loads it: longer than the server waits for the manager.
+constexpr Duration kDownloadLoad = std::chrono::seconds(130);
+
+ApiRequest request_for(const Download& download) {
+  ApiRequest request{download.host, plc_OPERATION_DOWNLOAD_APPLICATION, download.instance, download.name};
+  const std::string_view text(reinterpret_cast<const char*>(download.contents.data()),
+                              download.contents.size());
+  dds::add_entry(request.ext, kSizeOption, fmt::format("{}", text.size()));
+  dds::add_entry(request.ext, kDigestOption, sha256(text));
+  if (download.boot) dds::add_entry(request.ext, kBootOption, kYes);
+  return request;
+}
+
+}  // namespace
+
+Result<ApiReply> ControlClient::download(const Download& download, const DownloadProgressFunction& progress,
+                                         TimePoint deadline) {
+  const ApiRequest request = request_for(download);
+  if (auto good = check_api_request(request); !good) return std::unexpected(std::move(good).error());
+  if (auto good = check_file_name(download.name); !good) return std::unexpected(std::move(good).error());
+  if (download.contents.empty()) return failure(ErrorCode::invalid_argument, download.name + " is empty");
+  dds::Qos qos = dds::ack_qos();
+  qos.keep_all().max_samples(dds::kReplyDepth * dds::kMaxServersPerMachine);
+  if (auto opened = open_own_reader(download_acks_.topic, download_acks_.reader, dds::kDownloadAck, qos);
+      !opened) {
+    return std::unexpected(opened.error());
+  }
+  if (!chunk_topic_) {
+    auto topic = dds::make_topic(participant_.get(), dds::kDownloadChunk);
+    if (!topic) return std::unexpected(topic.error());
+    chunk_topic_ = std::move(*topic);
+  }
+  const auto asked = caller(download.host, /*engineering=*/true);
+  if (!asked) return std::unexpected(asked.error());
+  auto sender = FileSender::create(participant_.get(), chunk_topic_.get(), download.host, download.contents);
+  if (!sender) return std::unexpected(sender.error());
+  std::uint64_t told = 0;
+  const auto go_on = [&](const plc_SampleIdentity& identity, TimePoint now) -> RequestCaller::Wait {
+    update();  // or what has come on other topics would keep the wait from waiting
+    dds::take_valid<plc_DownloadAck>(
+        download_acks_.reader.get(),
+        [&](const plc_DownloadAck& ack, const auto& /*info*/) { sender->on_ack(ack, identity, now); });
+    const TimePoint next = sender->complete() ? now + FileSender::kRepeat : sender->send(identity, now);
+    if (progress && sender->received() != told) progress(told = sender->received());
+    const bool begun = sender->last_news() != TimePoint{};
+    const Duration patience = sender->complete() ? kDownloadLoad : kDownloadStall;
+    return {.next = next, .deadline = begun ? std::max(deadline, sender->last_news() + patience) : deadline};
+  };
+  auto reply = (*asked)->call(request, reply_reader_.get(), wait_set_, deadline, go_on);
+  if (!reply && reply.error().code == ErrorCode::timed_out && sender->last_news() != TimePoint{}) {
+    return failure(
+        ErrorCode::timed_out,
+        sender->complete()
+            ? fmt::format("host '{}' has got {} and has not said what became of it", download.host,
+                          download.name)
+            : fmt::format("host '{}' has stopped answering: {} of {} bytes of {} are there", download.host,
+                          sender->received(), download.contents.size(), download.name));
+  }
+  if (reply) await_status(request.host, *reply, MonotonicClock::now() + kStatusPatience);
+  return reply;
+}
+
+}  // namespace plchost

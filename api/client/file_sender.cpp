@@ -1,0 +1,65 @@
+#include "api/client/file_sender.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "api/client/event_poster.hpp"
+#include "api/dds/sample_identity.hpp"
+#include "api/dds/text.hpp"
+#include "api/dds/topics.hpp"
+
+namespace plchost {
+
+Result<FileSender> FileSender::create(dds_entity_t participant, dds_entity_t topic, const std::string& host,
+                                      std::span<const std::byte> contents) {
+  FileSender sender;
+  auto publisher = dds::make_publisher(participant, dds::host_partition(host));
+  if (!publisher) return std::unexpected(publisher.error());
+  sender.publisher_ = std::move(*publisher);
+  auto writer = dds::make_writer(sender.publisher_.get(), topic, dds::event_qos());
+  if (!writer) return std::unexpected(writer.error());
+  sender.writer_ = std::move(*writer);
+  sender.host_ = host;
+  sender.contents_ = contents;
+  return sender;
+}
+
+void FileSender::on_ack(const plc_DownloadAck& ack, const plc_SampleIdentity& download, TimePoint now) {
+  const bool ours = same_identity(ack.download, download) && dds::text_of(ack.host) == host_;
+  if (!ours || ack.epoch < epoch_ || ack.received > contents_.size()) return;
+  const bool anew = ack.epoch != epoch_;
+  if (!anew && ack.received <= received_) return;
+  epoch_ = ack.epoch;
+  received_ = ack.received;
+  window_ = ack.window;
+  next_ = anew ? received_ : std::max(next_, received_);
+  last_news_ = last_try_ = now;
+}
+
+TimePoint FileSender::send(const plc_SampleIdentity& download, TimePoint now) {
+  if (epoch_ == 0 || !has_reader(writer_.get())) return now + kLook;
+  if (next_ > received_ && now - last_try_ >= kRepeat) {
+    next_ = received_;
+    last_try_ = now;
+  }
+  plc_DownloadChunk chunk{};
+  chunk.download = download;
+  dds::copy_text(chunk.host, host_);
+  const std::uint64_t end = std::min<std::uint64_t>(contents_.size(), received_ + window_);
+  while (next_ < end) {
+    const auto size = std::min<std::uint64_t>(dds::kMaxChunk, end - next_);
+    const auto piece = contents_.subspan(next_, size);
+    chunk.offset = next_;
+    // DDS only reads it.
+    auto* const bytes = const_cast<std::uint8_t*>(reinterpret_cast<const std::uint8_t*>(piece.data()));
+    chunk.contents = {._maximum = static_cast<std::uint32_t>(size),
+                      ._length = static_cast<std::uint32_t>(size),
+                      ._buffer = bytes,
+                      ._release = false};
+    if (dds_write(writer_.get(), &chunk) != DDS_RETCODE_OK) break;  // goes again as one that was lost
+    next_ += size;
+  }
+  return std::min(last_try_ + kRepeat, now + kRepeat);
+}
+
+}  // namespace plchost

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include <control.h>
+
+#include "api/dds/entity.hpp"
+#include "api/dds/guid.hpp"
+#include "shm/base/result.hpp"
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+/// The pieces of one download to one host: at most a window of them under way, and again from where the host
+/// is when nothing moves, or when a new plchost-dds begins anew.
+class FileSender {
+ public:
+  static constexpr Duration kRepeat = std::chrono::milliseconds(200);
+  /// A host is looked for so often while it does not read.
+  static constexpr Duration kLook = std::chrono::milliseconds(50);
+
+  /// `contents` outlives it. `topic` is that of pieces.
+  [[nodiscard]] static Result<FileSender> create(dds_entity_t participant, dds_entity_t topic,
+                                                 const std::string& host,
+                                                 std::span<const std::byte> contents);
+
+  /// `download`: the identity of the request that began it.
+  void on_ack(const plc_DownloadAck& ack, const plc_SampleIdentity& download, TimePoint now);
+  /// Writes what may be written; returns when there is more to do.
+  TimePoint send(const plc_SampleIdentity& download, TimePoint now);
+
+  /// So many bytes are at the host.
+  [[nodiscard]] std::uint64_t received() const noexcept { return received_; }
+  [[nodiscard]] bool complete() const noexcept { return received_ == contents_.size(); }
+  /// When the host last told something new.
+  [[nodiscard]] TimePoint last_news() const noexcept { return last_news_; }
+
+ private:
+  FileSender() = default;
+
+  dds::Entity publisher_;
+  dds::Entity writer_;
+  std::string host_;
+  std::span<const std::byte> contents_;
+  std::uint64_t epoch_ = 0;     // of the host's newest acknowledgement; 0: none has come
+  std::uint64_t received_ = 0;  // acknowledged
+  std::uint64_t next_ = 0;      // to be written
+  std::uint64_t window_ = 0;
+  TimePoint last_news_;
+  TimePoint last_try_;
+};
+
+}  // namespace plchost

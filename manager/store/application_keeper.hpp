@@ -1,0 +1,31 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "api/control/application_order.hpp"
+#include "api/control/application_versions.hpp"
+#include "shm/base/result.hpp"
+
+namespace plchost {
+
+/// The applications that were sent to one instance and are kept for it. Nothing in it waits; what takes time
+/// is told by `done`, never from inside the call. One thing at a time.
+class ApplicationKeeper {
+ public:
+  using Done = std::function<void(const Result<std::string>& path)>;
+
+  virtual ~ApplicationKeeper() = default;
+  /// Checks what was sent, keeps it and gives its path. `before`: what is loaded now.
+  [[nodiscard]] virtual Result<void> keep(const ApplicationOrder& order, const std::string& name,
+                                          const std::string& before, Done done) = 0;
+  /// The instance starts with the application at that path from now on.
+  [[nodiscard]] virtual Result<void> set_boot(const std::string& path, Done done) = 0;
+  /// Its path; empty: as the configuration says.
+  [[nodiscard]] virtual std::string boot() = 0;
+  /// The version that lies there; nothing: it is none of this instance.
+  [[nodiscard]] virtual std::optional<ApplicationVersion> version_at(const std::string& path) = 0;
+};
+
+}  // namespace plchost

@@ -1,0 +1,242 @@
+#include "manager/store/store_application.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <filesystem>
+#include <set>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "api/control/application_versions.hpp"
+#include "api/security/sha256.hpp"
+#include "manager/system/child_process.hpp"
+#include "shm/base/names.hpp"
+#include "shm/base/replace_file.hpp"
+#include "shm/base/system_call.hpp"
+#include "shm/base/unique_fd.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr mode_t kFileMode = 0600;
+constexpr std::string_view kUnfinished = ".part";
+
+Result<void> make_folder(const std::string& folder) {
+  std::error_code error;
+  const std::filesystem::path path(folder);
+  if (std::filesystem::is_directory(path, error)) return {};
+  std::filesystem::create_directories(path, error);
+  if (error) return failure(ErrorCode::system, "make folder " + folder, error.value());
+  for (const auto& made : {path, path.parent_path()}) {
+    std::filesystem::permissions(made, std::filesystem::perms::owner_all, error);
+    if (error) return failure(ErrorCode::system, "set the rights of " + made.string(), error.value());
+    if (auto synced = sync_directory(made.parent_path()); !synced) return synced;
+  }
+  return {};
+}
+
+// What a helper before this one has not brought to its end.
+void remove_unfinished(const std::string& folder, const std::set<std::string>& used) {
+  const ApplicationVersions versions = read_versions(folder);
+  std::vector<std::filesystem::path> unfinished;
+  std::error_code error;
+  for (std::filesystem::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+    const std::string path = at->path().string();
+    const bool version =
+        std::ranges::find(versions.kept, path, &ApplicationVersion::path) != versions.kept.end();
+    const bool half = path.ends_with(kUnfinished) || (path.ends_with(".so") && !version);
+    if (half && !used.contains(path)) unfinished.push_back(at->path());
+  }
+  for (const auto& path : unfinished) std::filesystem::remove(path, error);
+}
+
+Result<void> write_fully(int fd, std::span<const std::byte> bytes, const std::string& path) {
+  while (!bytes.empty()) {
+    const auto written = check_errno(::write(fd, bytes.data(), bytes.size()), "write " + path);
+    if (!written) return std::unexpected(written.error());
+    bytes = bytes.subspan(static_cast<std::size_t>(*written));
+  }
+  return {};
+}
+
+Result<void> copy_checked(const StoreOrder& order, int from, int to, const std::string& path) {
+  Sha256 hash;
+  std::vector<std::byte> buffer(std::size_t{1} << 20);
+  for (std::uint64_t left = order.size; left > 0;) {
+    const auto wanted = static_cast<std::size_t>(std::min<std::uint64_t>(left, buffer.size()));
+    const auto got = check_errno(::read(from, buffer.data(), wanted), "read " + order.source);
+    if (!got) return std::unexpected(got.error());
+    if (*got == 0) {
+      return failure(ErrorCode::corrupt, fmt::format("only {} of {} bytes of {} have come", order.size - left,
+                                                     order.size, order.name));
+    }
+    const auto bytes = std::span<const std::byte>(buffer).first(static_cast<std::size_t>(*got));
+    hash.add(bytes);
+    if (auto written = write_fully(to, bytes, path); !written) return written;
+    left -= bytes.size();
+  }
+  const std::string digest = hash.digest();
+  if (digest == order.digest) return {};
+  return failure(ErrorCode::corrupt, fmt::format("what came of {} has the SHA-256 {} where {} was announced",
+                                                 order.name, digest, order.digest));
+}
+
+Result<void> copy_file(const StoreOrder& order, const std::string& path) {
+  const UniqueFd from(::open(order.source.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+  if (!from) return failure(ErrorCode::system, "open " + order.source, errno);
+  struct stat status{};
+  if (auto known = check_errno(::fstat(from.get(), &status), "look at " + order.source); !known) {
+    return std::unexpected(known.error());
+  }
+  if (!S_ISREG(status.st_mode)) return failure(ErrorCode::wrong_type, order.source + " is no plain file");
+  const UniqueFd to(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, kFileMode));
+  if (!to) return failure(ErrorCode::system, "open " + path, errno);
+  if (auto copied = copy_checked(order, from.get(), to.get(), path); !copied) return copied;
+  const auto synced = check_errno(::fsync(to.get()), "fsync " + path);
+  return synced ? Result<void>() : std::unexpected(synced.error());
+}
+
+/// In place, for good, but not a version before it has its description.
+Result<void> put_in_place(const StoreOrder& order, const std::string& path) {
+  const std::string fresh = path + std::string(kUnfinished);
+  std::error_code error;
+  auto done = copy_file(order, fresh);
+  if (done) {
+    std::filesystem::rename(fresh, path, error);
+    if (error) done = failure(ErrorCode::system, "rename " + fresh, error.value());
+  }
+  if (done) done = sync_directory(order.folder);
+  if (!done) std::filesystem::remove(fresh, error);
+  return done;
+}
+
+// The trial knows the file by the name of its copy; who sent it does not.
+std::string in_senders_words(std::string text, const std::string& path, const std::string& name) {
+  for (std::size_t at = text.find(path); at != std::string::npos; at = text.find(path, at + name.size())) {
+    text.replace(at, path.size(), name);
+  }
+  return text;
+}
+
+Result<void> try_application(const StoreOrder& order, const std::string& path) {
+  constexpr std::size_t kShown = 2000;
+  auto pipe = make_output_pipe();
+  if (!pipe) return std::unexpected(pipe.error());
+  const auto process = spawn_process(
+      {.arguments = {order.plc_instance, "--check-application", path}, .output_fd = pipe->write_end.get()});
+  if (!process) return std::unexpected(process.error());
+  pollfd end{.fd = process->pidfd.get(), .events = POLLIN, .revents = 0};
+  constexpr auto kWait = std::chrono::duration_cast<std::chrono::milliseconds>(kTrialLimit).count();
+  const bool ended = ::poll(&end, 1, static_cast<int>(kWait)) == 1;
+  if (!ended) (void)signal_process(*process, SIGKILL);
+  const ExitStatus status = reap_process(*process);
+  std::string output = read_available(pipe->read_end.get(), kShown);
+  while (output.ends_with('\n')) output.pop_back();
+  if (status.success()) return {};
+  if (!ended) {
+    return failure(
+        ErrorCode::timed_out,
+        fmt::format("{} is refused: trying it took longer than {} s: does it return from its set-up?",
+                    order.name, kWait / 1000));
+  }
+  return failure(ErrorCode::invalid_argument,
+                 fmt::format("{} is refused: {}", order.name,
+                             output.empty() ? fmt::format("trying it ended with {}", status.describe())
+                                            : in_senders_words(output, path, order.name)));
+}
+
+Result<void> describe_version(const StoreOrder& order, const std::string& path) {
+  const ApplicationVersion version{.number = 0,
+                                   .path = {},
+                                   .name = order.name,
+                                   .digest = order.digest,
+                                   .size = order.size,
+                                   .stored_unix_ns = unix_time_ns(),
+                                   .by = order.by,
+                                   .from = order.from,
+                                   .before = order.before};
+  if (auto written = replace_file(description_path(path), encode(version), kFileMode); !written)
+    return written;
+  return sync_directory(order.folder);
+}
+
+// The description first: what has none is no version, and is removed by the next helper.
+void remove_oldest(const StoreOrder& order, const std::set<std::string>& used) {
+  const ApplicationVersions versions = read_versions(order.folder);
+  std::size_t count = versions.kept.size();
+  std::error_code error;
+  for (const ApplicationVersion& version : versions.kept) {
+    if (count <= order.keep) return;
+    if (used.contains(version.path)) continue;
+    std::filesystem::remove(description_path(version.path), error);
+    std::filesystem::remove(version.path, error);
+    --count;
+  }
+}
+
+Result<std::string> keep_file(const StoreOrder& order) {
+  if (auto made = make_folder(order.folder); !made) return std::unexpected(made.error());
+  const ApplicationVersions versions = read_versions(order.folder);
+  std::set<std::string> used{order.before, versions.boot};
+  remove_unfinished(order.folder, used);
+  const auto loaded = version_at(order.folder, order.before);
+  const std::uint32_t number = versions.kept.empty() ? 1 : versions.kept.back().number + 1;
+  const std::string path = version_path(order.folder, number);
+  if (path.size() > kMaxPath) {
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("{}: {} characters; allowed are up to {}: a shorter [host] state_directory is "
+                               "needed",
+                               path, path.size(), kMaxPath));
+  }
+  if (auto placed = put_in_place(order, path); !placed) return std::unexpected(placed.error());
+  std::error_code error;
+  if (auto good = try_application(order, path); !good) {
+    std::filesystem::remove(path, error);
+    return std::unexpected(good.error());
+  }
+  if (loaded && loaded->digest == order.digest) {  // not once more: it would push out an older one
+    std::filesystem::remove(path, error);
+    return loaded->path;
+  }
+  if (auto described = describe_version(order, path); !described) {
+    std::filesystem::remove(path, error);
+    return std::unexpected(described.error());
+  }
+  used.insert(path);
+  remove_oldest(order, used);
+  return path;
+}
+
+Result<std::string> set_boot(const StoreOrder& order) {
+  if (auto made = make_folder(order.folder); !made) return std::unexpected(made.error());
+  if (auto written = replace_file(boot_path(order.folder), order.boot, kFileMode); !written) {
+    return std::unexpected(written.error());
+  }
+  if (auto synced = sync_directory(order.folder); !synced) return std::unexpected(synced.error());
+  return order.boot;
+}
+
+}  // namespace
+
+Result<std::string> carry_out(const StoreOrder& order) {
+  return order.boot.empty() ? keep_file(order) : set_boot(order);
+}
+
+int store_main(std::string_view order) {
+  const auto read = decode_store_order(order);
+  const auto done = read ? carry_out(*read) : Result<std::string>(std::unexpected(read.error()));
+  fmt::print("{}", done ? *done : done.error().describe());
+  return done ? 0 : static_cast<int>(done.error().code);
+}
+
+}  // namespace plchost

@@ -1,0 +1,65 @@
+#include "manager/store/store_order.hpp"
+
+#include <array>
+#include <limits>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+namespace plchost {
+
+namespace {
+
+using Json = nlohmann::json;
+
+struct OrderText {
+  const char* key;
+  std::string StoreOrder::* member;
+};
+constexpr std::array kOrderTexts = {OrderText{"folder", &StoreOrder::folder},
+                                    OrderText{"boot", &StoreOrder::boot},
+                                    OrderText{"source", &StoreOrder::source},
+                                    OrderText{"sha256", &StoreOrder::digest},
+                                    OrderText{"name", &StoreOrder::name},
+                                    OrderText{"by", &StoreOrder::by},
+                                    OrderText{"from", &StoreOrder::from},
+                                    OrderText{"before", &StoreOrder::before},
+                                    OrderText{"plc_instance", &StoreOrder::plc_instance}};
+
+Result<std::uint64_t> order_number(const Json& json, const char* key, std::uint64_t most) {
+  const auto found = json.find(key);
+  if (found == json.end() || !found->is_number_unsigned() || found->get<std::uint64_t>() > most) {
+    return failure(ErrorCode::corrupt, fmt::format("the order has no number '{}'", key));
+  }
+  return found->get<std::uint64_t>();
+}
+
+}  // namespace
+
+std::string encode(const StoreOrder& order) {
+  Json json{{"size", order.size}, {"keep", order.keep}};
+  for (const OrderText& text : kOrderTexts) json[text.key] = order.*text.member;
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+Result<StoreOrder> decode_store_order(std::string_view text) {
+  const Json json = Json::parse(text, nullptr, false);
+  if (!json.is_object()) return failure(ErrorCode::corrupt, "the order is not a JSON object");
+  StoreOrder order;
+  for (const OrderText& member : kOrderTexts) {
+    const auto found = json.find(member.key);
+    if (found == json.end() || !found->is_string()) {
+      return failure(ErrorCode::corrupt, fmt::format("the order has no text '{}'", member.key));
+    }
+    order.*member.member = found->get<std::string>();
+  }
+  const auto size = order_number(json, "size", std::numeric_limits<std::uint64_t>::max());
+  const auto keep = order_number(json, "keep", std::numeric_limits<std::uint32_t>::max());
+  if (!size) return std::unexpected(size.error());
+  if (!keep) return std::unexpected(keep.error());
+  order.size = *size;
+  order.keep = static_cast<std::uint32_t>(*keep);
+  return order;
+}
+
+}  // namespace plchost

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+#include "shm/base/result.hpp"
+
+namespace plchost {
+
+/// What the manager has its helper do to the kept applications of one instance: the helper may wait for a
+/// disk and read foreign files, the manager must not. One of two things: keep a file that was sent, or, if
+/// `boot` is not empty, make that path the boot application.
+struct StoreOrder {
+  std::string folder;  ///< of the instance, see api/control/application_versions.hpp; made if it is missing
+  std::string boot;    ///< absolute path
+  std::string source;  ///< what was sent; the sender may still write to it
+  std::uint64_t size = 0;  ///< that it must have
+  std::string digest;      ///< and its SHA-256
+  std::string name;        ///< how it is called
+  std::string by;
+  std::string from;
+  std::string before;        ///< path of what is loaded now; empty: nothing
+  std::uint32_t keep = 0;    ///< so many versions stay, and what is loaded and the boot application
+  std::string plc_instance;  ///< program that tries it
+};
+
+/// In one argument of a command line, and back. corrupt: it is none.
+[[nodiscard]] std::string encode(const StoreOrder& order);
+[[nodiscard]] Result<StoreOrder> decode_store_order(std::string_view text);
+
+}  // namespace plchost

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "manager/store/application_keeper.hpp"
+#include "manager/store/store_order.hpp"
+#include "manager/system/child_process.hpp"
+#include "manager/system/reactor.hpp"
+
+namespace plchost {
+
+/// The real ApplicationKeeper: a helper process for each thing to do, which may wait for the disk.
+class StoreProcess : public ApplicationKeeper {
+ public:
+  struct Settings {
+    std::string pool;          ///< whose shared memory holds what was sent
+    std::string folder;        ///< of the versions of the instance
+    std::uint32_t keep = 5;    ///< versions
+    std::string helper;        ///< program: plchostd
+    std::string plc_instance;  ///< program that tries an application
+  };
+
+  StoreProcess(Reactor& reactor, Settings settings);
+
+  [[nodiscard]] Result<void> keep(const ApplicationOrder& order, const std::string& name,
+                                  const std::string& before, Done done) override;
+  [[nodiscard]] Result<void> set_boot(const std::string& path, Done done) override;
+  [[nodiscard]] std::string boot() override;
+  [[nodiscard]] std::optional<ApplicationVersion> version_at(const std::string& path) override;
+
+ private:
+  [[nodiscard]] Result<void> start(const StoreOrder& order, Done done);
+  void ended();
+
+  Reactor& reactor_;
+  Settings settings_;
+  Done done_;
+  std::optional<ChildProcess> process_;
+  Reactor::Watch watch_;
+  UniqueFd output_;
+  Reactor::Timer timer_;
+  bool timed_out_ = false;
+};
+
+/// The command line that makes plchostd the helper.
+inline constexpr const char* kStoreOption = "--store";
+/// How long the helper may take: a slow disk, and a trial.
+inline constexpr Duration kStoreLimit = std::chrono::seconds(45);
+
+}  // namespace plchost

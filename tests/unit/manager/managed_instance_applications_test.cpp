@@ -1,0 +1,227 @@
+#include "tests/unit/manager/managed_instance_fixture.hpp"
+
+namespace plchost {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+constexpr const char* kFirst = "/state/000001.so";
+constexpr const char* kSecond = "/state/000002.so";
+
+class SentApplication : public ManagedInstanceTest {
+ protected:
+  static std::map<std::string, std::string> options(bool boot = false) {
+    std::map<std::string, std::string> all{{"size", "7"}, {"sha256", std::string(64, 'a')}, {"source", "3"}};
+    if (boot) all["boot"] = "yes";
+    return all;
+  }
+  void add_version(std::uint32_t number, const std::string& path, const std::string& before) {
+    ApplicationVersion& version = applications_.versions[path];
+    version.number = number;
+    version.path = path;
+    version.name = "new.so";
+    version.before = before;
+  }
+  /// It is kept, and the fresh process comes up with it.
+  void load(std::uint32_t number, const std::string& path, const std::string& before) {
+    ask(ControlVerb::download_application, "new.so", options());
+    add_version(number, path, before);
+    applications_.end(path);
+    sut().on_exit(exited_with(0));
+    report_ready();
+    ASSERT_EQ(take_reply().code, ErrorCode::ok);
+  }
+};
+
+TEST_F(SentApplication, IsKeptWithWhatWasLoadedBeforeItAndThenLoaded) {
+  bring_up();
+  ask(ControlVerb::download_application, "new.so", options());
+  ASSERT_EQ(applications_.kept.size(), 1U);
+  EXPECT_EQ(applications_.kept[0].name, "new.so");
+  EXPECT_EQ(applications_.kept[0].order.size, 7U);
+  EXPECT_EQ(applications_.kept[0].order.source, 3U);
+  EXPECT_EQ(applications_.kept[0].before, "/opt/line.so");
+  EXPECT_EQ(state(), InstanceState::running);
+  EXPECT_THAT(host_.requests, IsEmpty());
+  add_version(1, kFirst, "/opt/line.so");
+  applications_.end(std::string(kFirst));
+  sut().on_exit(exited_with(0));
+  EXPECT_EQ(host_.spawned.back().application, kFirst);
+  report_ready();
+  const auto reply = take_reply();
+  EXPECT_EQ(reply.code, ErrorCode::ok);
+  EXPECT_THAT(reply.text, HasSubstr("version 1 (new.so)"));
+  EXPECT_THAT(applications_.booted, IsEmpty());
+}
+
+TEST_F(SentApplication, ThatIsRefusedDisturbsNothing) {
+  bring_up();
+  ask(ControlVerb::download_application, "new.so", options(/*boot=*/true));
+  applications_.end(failure(ErrorCode::invalid_argument, "new.so is refused: not an ELF file"));
+  const auto reply = take_reply();
+  EXPECT_EQ(reply.code, ErrorCode::invalid_argument);
+  EXPECT_EQ(reply.text, "new.so is refused: not an ELF file");
+  EXPECT_EQ(state(), InstanceState::running);
+  EXPECT_THAT(host_.requests, IsEmpty());
+  EXPECT_THAT(applications_.booted, IsEmpty());
+  EXPECT_EQ(sut().status().application.view(), "/opt/line.so");
+}
+
+TEST_F(SentApplication, ThatCannotBeStoredIsToldAtOnce) {
+  bring_up();
+  applications_.can_start = false;
+  ask(ControlVerb::download_application, "new.so", options());
+  EXPECT_EQ(take_reply().code, ErrorCode::system);
+  EXPECT_EQ(state(), InstanceState::running);
+}
+
+TEST_F(SentApplication, WithoutItsSizeOrDigestIsRefused) {
+  bring_up();
+  for (const char* missing : {"size", "sha256"}) {
+    auto left = options();
+    left.erase(missing);
+    ask(ControlVerb::download_application, "new.so", left);
+    const auto reply = take_reply();
+    EXPECT_EQ(reply.code, ErrorCode::invalid_argument);
+    EXPECT_THAT(reply.text, HasSubstr(missing));
+  }
+  EXPECT_THAT(applications_.kept, IsEmpty());
+}
+
+TEST_F(SentApplication, WithTheNameOfAFolderIsRefused) {
+  bring_up();
+  ask(ControlVerb::download_application, "../new.so", options());
+  EXPECT_EQ(take_reply().code, ErrorCode::invalid_argument);
+}
+
+TEST_F(SentApplication, OutlivesACrashWhileItIsStored) {
+  bring_up();
+  ask(ControlVerb::download_application, "new.so", options());
+  sut().on_exit(killed_by(SIGSEGV));
+  EXPECT_THAT(replies_, IsEmpty());
+  applications_.end(std::string(kFirst));
+  EXPECT_EQ(host_.spawned.back().application, kFirst);
+  report_ready();
+  EXPECT_EQ(take_reply().code, ErrorCode::ok);
+}
+
+TEST_F(SentApplication, IsTheOnlyThingThatAnInstanceDoes) {
+  bring_up();
+  ask(ControlVerb::download_application, "new.so", options());
+  ask(ControlVerb::stop);
+  EXPECT_EQ(take_reply().code, ErrorCode::busy);
+}
+
+TEST_F(SentApplication, IsForgottenWhenTheManagerEndsMeanwhile) {
+  bring_up();
+  ask(ControlVerb::download_application, "new.so", options());
+  sut().shut_down();
+  EXPECT_EQ(take_reply().code, ErrorCode::unavailable);
+  applications_.end(std::string(kFirst));
+  EXPECT_EQ(sut().status().application.view(), "/opt/line.so");
+}
+
+TEST_F(SentApplication, BecomesTheBootApplicationOnlyWhenItIsUp) {
+  bring_up();
+  ask(ControlVerb::download_application, "new.so", options(/*boot=*/true));
+  applications_.end(std::string(kFirst));
+  sut().on_exit(exited_with(0));
+  EXPECT_THAT(applications_.booted, IsEmpty());
+  report_ready();
+  EXPECT_THAT(applications_.booted, ElementsAre(kFirst));
+  EXPECT_THAT(replies_, IsEmpty());
+  applications_.end(std::string(kFirst));
+  EXPECT_EQ(take_reply().code, ErrorCode::ok);
+}
+
+TEST_F(SentApplication, ThatDoesNotComeUpIsNoBootApplication) {
+  bring_up();
+  ask(ControlVerb::download_application, "new.so", options(/*boot=*/true));
+  applications_.end(std::string(kFirst));
+  sut().on_exit(exited_with(0));
+  sut().on_exit(killed_by(SIGSEGV));
+  EXPECT_EQ(take_reply().code, ErrorCode::unavailable);
+  EXPECT_THAT(applications_.booted, IsEmpty());
+}
+
+TEST_F(SentApplication, TellsWhenItIsLoadedAndCouldNotBecomeTheBootApplication) {
+  bring_up();
+  ask(ControlVerb::load_application, "/opt/new.so", {{"boot", "yes"}});
+  sut().on_application_checked({});
+  sut().on_exit(exited_with(0));
+  report_ready();
+  EXPECT_THAT(applications_.booted, ElementsAre("/opt/new.so"));
+  applications_.end(failure(ErrorCode::system, "write /state/boot"));
+  const auto reply = take_reply();
+  EXPECT_EQ(reply.code, ErrorCode::system);
+  EXPECT_THAT(reply.text, HasSubstr("it is loaded, but not the boot application"));
+}
+
+TEST_F(SentApplication, GoesBackOneVersionWithEachRollback) {
+  bring_up();
+  load(1, kFirst, "/opt/line.so");
+  load(2, kSecond, kFirst);
+  for (const char* path : {kFirst, "/opt/line.so"}) {
+    ask(ControlVerb::rollback_application);
+    EXPECT_EQ(host_.checked.back(), path);
+    sut().on_application_checked({});
+    sut().on_exit(exited_with(0));
+    EXPECT_EQ(host_.spawned.back().application, path);
+    report_ready();
+    EXPECT_EQ(take_reply().code, ErrorCode::ok);
+  }
+  ask(ControlVerb::rollback_application);
+  const auto reply = take_reply();
+  EXPECT_EQ(reply.code, ErrorCode::wrong_state);
+  EXPECT_THAT(reply.text, HasSubstr("/opt/line.so was not sent to 'line1'"));
+}
+
+TEST_F(SentApplication, ThatWasTheFirstOneOfAllHasNoneBeforeIt) {
+  config_.application.clear();
+  make();
+  bring_up_stopped();
+  load(1, kFirst, "");
+  ask(ControlVerb::rollback_application);
+  EXPECT_EQ(take_reply().code, ErrorCode::not_found);
+}
+
+TEST_F(SentApplication, ThatIsGoneIsNotRolledBackTo) {
+  bring_up();
+  load(1, kFirst, "/opt/line.so");
+  ask(ControlVerb::rollback_application);
+  sut().on_application_checked(failure(ErrorCode::invalid_argument, "cannot be opened"));
+  const auto reply = take_reply();
+  EXPECT_EQ(reply.text, "/opt/line.so is refused: cannot be opened");
+  EXPECT_EQ(state(), InstanceState::running);
+  EXPECT_EQ(sut().status().application.view(), kFirst);
+}
+
+TEST_F(SentApplication, OfTheBootFolderIsWhatTheFirstProcessBeginsWith) {
+  applications_.boot_path = kSecond;
+  make();
+  EXPECT_EQ(sut().status().application.view(), kSecond);
+  bring_up();
+  EXPECT_EQ(host_.spawned.back().application, kSecond);
+}
+
+TEST_F(SentApplication, IsNotTakenForSafeModeWhenItsProcessIsAdopted) {
+  config_.application.clear();
+  applications_.boot_path = kSecond;
+  make();
+  host_.adoptable = 4711;
+  InstanceRuntime runtime;
+  runtime.pid = 4711;
+  runtime.running = 1;
+  runtime.state = ApplicationState::running;
+  runtime.application.assign(kFirst);
+  host_.page = runtime;
+  ASSERT_TRUE(sut().adopt());
+  answer();
+  EXPECT_EQ(state(), InstanceState::running);
+  EXPECT_EQ(sut().status().application.view(), kFirst);
+}
+
+}  // namespace
+}  // namespace plchost
