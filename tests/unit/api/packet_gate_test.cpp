@@ -1,4 +1,4 @@
-#include "api/dds/packet_gate.hpp"
+#include "api/dds/gate/packet_gate.hpp"
 
 #include <algorithm>
 #include <array>
@@ -65,16 +65,16 @@ TEST(PacketGate, RefusesWhatIsNoRtps2) {
 }
 
 TEST(PacketGate, RefusesSubmessagesThatDoNotFillTheDatagram) {
-  EXPECT_FALSE(passes({{0x09, 1}}));
+  EXPECT_FALSE(passes({{0x09, 1}}, false));
   Bytes longer = submessage(0x07, 1, 8);
   longer[2] = 12;
-  EXPECT_FALSE(passes({longer}));
-  EXPECT_FALSE(passes({submessage(0x07, 1, 6)}));
-  EXPECT_FALSE(passes({submessage(0x07, 1, 8), {0, 0}}));
+  EXPECT_FALSE(passes({longer}, false));
+  EXPECT_FALSE(passes({submessage(0x07, 1, 6)}, false));
+  EXPECT_FALSE(passes({submessage(0x07, 1, 8), {0, 0}}, false));
   Bytes big_endian = submessage(0x07, 0, 8);
-  EXPECT_FALSE(passes({big_endian}));
+  EXPECT_FALSE(passes({big_endian}, false));
   std::swap(big_endian[2], big_endian[3]);
-  EXPECT_TRUE(passes({big_endian}));
+  EXPECT_TRUE(passes({big_endian}, false));
 }
 
 TEST(PacketGate, RefusesAKeyWhereTheHandshakesContentsMustBe) {
@@ -122,6 +122,17 @@ TEST(PacketGate, RefusesPlainSamplesOfASecuredHostOnly) {
   EXPECT_FALSE(passes({sample(0x15, 5, kUser)}, true));
   EXPECT_TRUE(passes({sample(0x15, 5, kUser)}, false));
   EXPECT_TRUE(passes({submessage(0x33, 1, 16), sample(0x15, 5, kUser)}, true)) << "signed as a whole";
+}
+
+TEST(PacketGate, RefusesOfASecuredHostKindsThatNobodySaysBeforeThereAreKeys) {
+  for (const std::uint8_t kind : {0x0c, 0x0d, 0x0f, 0x14, 0x80, 0xff}) {
+    EXPECT_FALSE(passes({submessage(kind, 1, 24)}, true)) << int{kind};
+    EXPECT_TRUE(passes({submessage(kind, 1, 24)}, false)) << int{kind};
+    EXPECT_TRUE(passes({submessage(0x33, 1, 16), submessage(kind, 1, 24)}, true)) << int{kind};
+  }
+  EXPECT_TRUE(passes(
+      {submessage(0x0e, 1, 12), submessage(0x31, 1, 24), submessage(0x30, 1, 40), submessage(0x32, 1, 24)}));
+  EXPECT_FALSE(passes({sample(0x16, 1, kParticipant)})) << "Cyclone does not put these together";
 }
 
 TEST(PacketGate, ReadsNothingBehindTheEnd) {

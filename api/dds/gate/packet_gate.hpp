@@ -11,8 +11,10 @@ namespace plchost::dds {
 /// - in the handshake's messages a key stands where contents must be (a null pointer in Cyclone);
 /// - samples of the two writers that speak before there are keys, whose fields are not where they must be or
 ///   that neither have contents nor are a key (Cyclone takes an offset from them unchecked);
-/// - of a secured host: any other sample in plain text. It would be refused later, by more code.
-/// A message that is signed or encrypted as a whole is judged by its outer form only.
+/// - of a secured host: all that is in plain text and is not what is said before there are keys. It would be
+///   refused later, by more code.
+/// A message that is signed or encrypted as a whole is judged by its outer form only. What passes in
+/// fragments goes through HandshakeAssembly.
 [[nodiscard]] bool is_acceptable(std::span<const std::byte> datagram, bool secured) noexcept;
 
 }  // namespace plchost::dds

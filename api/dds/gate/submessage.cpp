@@ -1,0 +1,46 @@
+#include "api/dds/gate/submessage.hpp"
+
+namespace plchost::dds {
+
+namespace {
+
+constexpr std::size_t kEndOfParameters = 1;
+
+/// What is behind a list of parameters; nothing: it does not end, or has a part that does not fit.
+std::span<const std::byte> behind_parameters(std::span<const std::byte> rest, bool little) noexcept {
+  constexpr std::size_t kParameterHeader = 4;
+  while (rest.size() >= kParameterHeader) {
+    const std::size_t size = number_at<std::uint16_t>(rest, 2, little);
+    if (number_at<std::uint16_t>(rest, 0, little) == kEndOfParameters) return rest.subspan(kParameterHeader);
+    if (size % 4 != 0 || size > rest.size() - kParameterHeader) break;
+    rest = rest.subspan(kParameterHeader + size);
+  }
+  return {};
+}
+
+}  // namespace
+
+std::optional<Submessage> first_submessage(std::span<const std::byte> rest) noexcept {
+  if (rest.size() < kSubmessageHeader) return std::nullopt;
+  const Submessage submessage{rest};
+  const std::size_t length = number_at<std::uint16_t>(rest, 2, submessage.little());
+  // Zero: up to the end.
+  const bool to_end = length == 0 && submessage.kind() != submessage_kind::kPad &&
+                      submessage.kind() != submessage_kind::kInfoTimestamp;
+  const std::size_t size = to_end ? rest.size() : kSubmessageHeader + length;
+  if (size > rest.size() || size % 4 != 0) return std::nullopt;
+  return Submessage{rest.first(size)};
+}
+
+std::span<const std::byte> contents_of_sample(const Submessage& sample) noexcept {
+  const std::size_t fields = sample.kind() == submessage_kind::kData ? kDataFields : kFragmentFields;
+  const std::size_t begin = kInlineQosCount + 2 + fields;
+  if (sample.bytes.size() < begin ||
+      number_at<std::uint16_t>(sample.bytes, kInlineQosCount, sample.little()) != fields) {
+    return {};
+  }
+  const auto rest = sample.bytes.subspan(begin);
+  return (sample.flags() & kHasInlineQos) != 0 ? behind_parameters(rest, sample.little()) : rest;
+}
+
+}  // namespace plchost::dds
