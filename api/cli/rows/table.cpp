@@ -17,7 +17,10 @@ std::string cell_of(const Row& row, const char* field, int decimals) {
     auto text = printable(found->get<std::string>());
     return text.empty() ? "-" : text;
   }
-  if (found->is_number_float()) return fmt::format("{:.{}f}", found->get<double>(), decimals);
+  if (found->is_number_float()) {
+    const std::string text = fmt::format("{:.{}f}", found->get<double>(), decimals);
+    return text == "-0" ? "0" : text;
+  }
   if (found->is_boolean()) return found->get<bool>() ? "yes" : "no";
   return found->dump();
 }
