@@ -201,7 +201,8 @@ INSTANTIATE_TEST_SUITE_P(
         WrongConfig{"date", "[host]\nname = 1979-05-27\n", "2", "is a date or time; allowed is a text"},
         WrongConfig{
             "dds_key", "[dds]\nport = 1\n", "2",
-            "[dds] unknown key 'port'; allowed are enabled, interface, peers, allow_unsecured, identity"},
+            "[dds] unknown key 'port'; allowed are enabled, interface, peers, multicast, allow_unsecured, "
+            "identity"},
         WrongConfig{"interface", "[dds]\ninterface = \"\"\n", "2", "interface '' is not valid"},
         WrongConfig{"open_to_network", "[dds]\ninterface = \"eth0\"\n", "2",
                     "interface: \"eth0\" without an identity opens this controller to all who reach it"},
