@@ -21,6 +21,7 @@ constexpr std::uint64_t kLimit = 1000;
 class Downloads : public testing::Test {
  protected:
   Downloads() : pool_("plchost-dl-" + std::to_string(::getpid())) { sut_.emplace(pool_, kLimit); }
+  ~Downloads() override { remove_downloads(pool_); }
 
   static plc_SampleIdentity identity(std::int64_t number, std::uint8_t client = 1) {
     plc_SampleIdentity made{};
