@@ -69,7 +69,8 @@ struct Download {
   std::string instance;
   std::string name;  ///< of the file, for people
   std::span<const std::byte> contents;
-  bool boot = false;  ///< it becomes the boot application
+  bool boot = false;    ///< it becomes the boot application
+  bool online = false;  ///< it takes over while the tasks run; see kOnlineOption
 };
 /// Told how many bytes have arrived: again from the beginning, when plchost-dds had to be started again.
 using DownloadProgressFunction = std::function<void(std::uint64_t received)>;

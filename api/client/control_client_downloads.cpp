@@ -26,6 +26,7 @@ ApiRequest request_for(const Download& download) {
   dds::add_entry(request.ext, kSizeOption, fmt::format("{}", text.size()));
   dds::add_entry(request.ext, kDigestOption, sha256(text));
   if (download.boot) dds::add_entry(request.ext, kBootOption, kYes);
+  if (download.online) dds::add_entry(request.ext, kOnlineOption, kYes);
   return request;
 }
 

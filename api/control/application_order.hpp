@@ -10,6 +10,10 @@
 
 namespace plchost {
 
+/// Option of what loads an application, beside kBootOption: it takes over from what is loaded, in the same
+/// process, while the tasks run; or is refused.
+inline constexpr std::string_view kOnlineOption = "online";
+
 /// Options of ControlVerb::download_application, beside kBootOption. Those of the API server's own: which
 /// file of shared memory holds what was sent, and for whom.
 inline constexpr std::string_view kSizeOption = "size";      ///< bytes

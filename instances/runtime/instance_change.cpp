@@ -49,7 +49,7 @@ void Instance::advance_change() {
 }
 
 std::string Instance::finish_change(Duration held) {
-  const std::string before = application_->path();
+  const std::string before = change_->path();  // it holds the version before now
   const std::string carried = change_->describe();
   // The callbacks find the new version in application_.
   change_->finish([this] { notify_tasks(EVT_ExternalEventTaskCreateDone); });

@@ -52,9 +52,38 @@ void ManagedInstance::begin_rollback() {
 
 bool ManagedInstance::sets_boot(ErrorCode code) const {
   if (code != ErrorCode::ok || operation_->step == Step::setting_boot) return false;
+  return has_option(kBootOption);
+}
+
+bool ManagedInstance::has_option(std::string_view name) const {
   const ControlRequest& request = operation_->request;
-  const auto boot = request.options.find(std::string(kBootOption));
-  return loads(request.verb) && boot != request.options.end() && boot->second == kYes;
+  const auto option = request.options.find(std::string(name));
+  return loads(request.verb) && option != request.options.end() && option->second == kYes;
+}
+
+bool ManagedInstance::loads_online() const {
+  return has_option(kOnlineOption);
+}
+
+// Whether there is a process that another version could take over in.
+Result<void> ManagedInstance::check_online() const {
+  const bool runs = status_.state == InstanceState::running || status_.state == InstanceState::stopped;
+  if (phase_ == Phase::up && !silent_ && runs && !application_.empty()) return {};
+  return failure(ErrorCode::wrong_state,
+                 fmt::format("'{}' is {}: an application takes over online from one that runs or is stopped; "
+                             "load it without --online",
+                             config_.name,
+                             phase_ == Phase::up && application_.empty() ? "without application"
+                                                                         : to_string(status_.state)));
+}
+
+void ManagedInstance::begin_change() {
+  if (auto good = check_online(); !good) return finish(good.error().code, good.error().message);
+  operation_->step = Step::forwarded;
+  const auto number = send(ControlVerb::change_application, operation_->request.argument);
+  if (!number) return finish(number.error().code, number.error().describe());
+  operation_->forwarded_number = *number;
+  host_.set_timer(after(limit_of(ControlVerb::change_application)));
 }
 
 // Last of all: what does not come up does not become the boot application.

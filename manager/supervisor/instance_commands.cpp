@@ -25,6 +25,9 @@ void ManagedInstance::handle(const ControlRequest& request, ControlReplyFunction
   }
   spdlog::info("instance {}: {} {}", config_.name, to_string(checked.verb), checked.argument);
   operation_ = Operation{.request = std::move(checked), .reply = std::move(reply)};
+  if (loads_online()) {
+    if (auto good = check_online(); !good) return finish(good.error().code, good.error().message);
+  }
   switch (operation_->request.verb) {
     case ControlVerb::start:
       return begin_start();
@@ -147,6 +150,7 @@ void ManagedInstance::on_application_checked(const Result<void>& result) {
 }
 
 void ManagedInstance::apply_loaded_application() {
+  if (loads_online()) return begin_change();
   const bool stays_stopped =
       phase_ == Phase::up && status_.state == InstanceState::stopped && !application_.empty();
   application_ = operation_->request.argument;
@@ -212,6 +216,7 @@ void ManagedInstance::finish_forwarded(const ControlReply& reply) {
   const ControlRequest request = operation_->request;
   if (reply.code == ErrorCode::ok) {
     if (request.verb == ControlVerb::set_scheduler) scheduler_ = request.argument;
+    if (loads_online()) application_ = request.argument;
     if (request.verb == ControlVerb::start || request.verb == ControlVerb::stop) {
       wants_running_ = request.verb == ControlVerb::start;
       last_end_.clear();
@@ -221,7 +226,8 @@ void ManagedInstance::finish_forwarded(const ControlReply& reply) {
       publish();
     }
   }
-  finish(reply.code, reply.text);
+  const std::string version = reply.code == ErrorCode::ok ? loaded_text() : std::string();
+  finish(reply.code, version.empty() ? reply.text : fmt::format("{}, {}", version, reply.text));
   if (reply.code != ErrorCode::ok) look_again();
 }
 

@@ -82,6 +82,9 @@ namespace plchost {
 //     sent.
 //                With the option "boot", of all three: when all is done the path becomes the boot
 //                application, which is what the first process begins with, instead of the configuration's.
+//                With the option "online", of all three: the process that is up takes it in
+//                (change_application) and goes on; refused if there is none, or by it, and then nothing is
+//                changed.
 //     set_scheduler      up: forwarded, and remembered for the next process if it was accepted. Else
 //     remembered. register_event, unregister_event   the same; registrations are repeated in each fresh
 //     process.
@@ -156,6 +159,10 @@ class ManagedInstance : public InstanceEvents {
   [[nodiscard]] bool sets_boot(ErrorCode code) const;
   void set_boot(const std::string& text);
   [[nodiscard]] std::string loaded_text() const;
+  [[nodiscard]] bool has_option(std::string_view name) const;
+  [[nodiscard]] bool loads_online() const;
+  [[nodiscard]] Result<void> check_online() const;
+  void begin_change();
   void begin_forwarded();
   void apply_loaded_application();
   void forward_or_wait();

@@ -25,11 +25,17 @@ struct LoadArguments {
   std::string file;
   bool on_host = false;
   bool boot = false;
+  bool online = false;
 };
 
-std::vector<plc_KeyValue> options_of(bool boot) {
+constexpr const char* kBootHelp = "the instance starts with it from now on, also after a restart of the host";
+constexpr const char* kOnlineHelp =
+    "it takes over while the tasks run: no cycle is lost, variables go on; refused where it does not fit";
+
+std::vector<plc_KeyValue> options_of(bool boot, bool online) {
   std::vector<plc_KeyValue> ext;
   if (boot) dds::add_entry(ext, kBootOption, kYes);
+  if (online) dds::add_entry(ext, kOnlineOption, kYes);
   return ext;
 }
 
@@ -62,7 +68,8 @@ int send(CliSession& session, const LoadArguments& arguments) {
                             .instance = arguments.instance,
                             .name = name,
                             .contents = std::as_bytes(std::span(*contents)),
-                            .boot = arguments.boot};
+                            .boot = arguments.boot,
+                            .online = arguments.online};
     auto reply =
         client.download(download, [&](std::uint64_t received) { board.show(host, received); }, deadline);
     board.end(host);
@@ -73,8 +80,8 @@ int send(CliSession& session, const LoadArguments& arguments) {
 int load(CliSession& session, const LoadArguments& arguments) {
   if (!arguments.on_host) return send(session, arguments);
   const std::string path = std::filesystem::absolute(arguments.file).lexically_normal();
-  return command(session,
-                 {"", plc_OPERATION_LOAD_APPLICATION, arguments.instance, path, options_of(arguments.boot)});
+  return command(session, {"", plc_OPERATION_LOAD_APPLICATION, arguments.instance, path,
+                           options_of(arguments.boot, arguments.online)});
 }
 
 /// INSTANCE/PATH of what is loaded on a host.
@@ -124,18 +131,19 @@ void add_application_verbs(const Command& plcctl, CliSession& session) {
           "the application: a file of this machine, which is sent; a relative path starts at the current "
           "directory")
       .flag("--on-host", arguments->on_host, "FILE is on the host already, and is loaded from there")
-      .flag("--boot", arguments->boot,
-            "the instance starts with it from now on, also after a restart of the host");
-  const auto name = std::make_shared<std::string>();
-  const auto boot = std::make_shared<bool>(false);
+      .flag("--boot", arguments->boot, kBootHelp)
+      .flag("--online", arguments->online, kOnlineHelp);
+  const auto back_to = std::make_shared<LoadArguments>();
   const char* const back = "Load again what was loaded before the version that is loaded";
   plcctl.verb("rollback", back)
       .noun("application", back,
-            [&session, name, boot] {
-              return command(session, {"", plc_OPERATION_ROLLBACK_APPLICATION, *name, "", options_of(*boot)});
+            [&session, back_to] {
+              return command(session, {"", plc_OPERATION_ROLLBACK_APPLICATION, back_to->instance, "",
+                                       options_of(back_to->boot, back_to->online)});
             })
-      .argument("INSTANCE", *name)
-      .flag("--boot", *boot, "the instance starts with it from now on, also after a restart of the host");
+      .argument("INSTANCE", back_to->instance)
+      .flag("--boot", back_to->boot, kBootHelp)
+      .flag("--online", back_to->online, kOnlineHelp);
 }
 
 void add_list_applications(const Command& verb, CliSession& session) {

@@ -30,11 +30,13 @@ std::string argument_of(const plc_Request& request) {
   std::string argument(dds::text_of(request.argument));
   std::string digest;
   std::string boot;
-  const std::array<std::pair<std::string_view, std::string*>, 2> known{
-      {{kDigestOption, &digest}, {kBootOption, &boot}}};
+  std::string online;
+  const std::array<std::pair<std::string_view, std::string*>, 3> known{
+      {{kDigestOption, &digest}, {kBootOption, &boot}, {kOnlineOption, &online}}};
   (void)dds::read_entries(std::span(request.ext._buffer, request.ext._length), known);
   if (!digest.empty()) argument += fmt::format(" sha256 {}", digest);
   if (!boot.empty()) argument += " boot";
+  if (!online.empty()) argument += " online";
   return argument;
 }
 

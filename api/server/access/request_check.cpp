@@ -113,15 +113,18 @@ Result<OptionValues> check_options(const Operation& operation, std::span<const p
   OptionValues options;
   if (operation.options == Options::none) return options;
   std::string boot;
+  std::string online;
   std::string size;
   std::string digest;
   const bool download = operation.options == Options::download;
-  std::vector<std::pair<std::string_view, std::string*>> known{{kBootOption, &boot}};
+  std::vector<std::pair<std::string_view, std::string*>> known{{kBootOption, &boot},
+                                                               {kOnlineOption, &online}};
   if (download) known.insert(known.end(), {{kSizeOption, &size}, {kDigestOption, &digest}});
   if (const auto read = dds::read_entries(ext, known); !read) return std::unexpected(read.error());
-  if (!boot.empty() && boot != kYes) {
+  for (const auto& [name, value] : std::span(known).first(2)) {
+    if (value->empty() || *value == kYes) continue;
     return failure(ErrorCode::invalid_argument,
-                   fmt::format("'{}' is '{}'; only '{}' is allowed", kBootOption, shown(boot), kYes));
+                   fmt::format("'{}' is '{}'; only '{}' is allowed", name, shown(*value), kYes));
   }
   for (const auto& [name, value] : known) {
     if (!value->empty()) options.emplace(name, *value);

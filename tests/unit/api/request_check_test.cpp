@@ -114,6 +114,17 @@ TEST(RequestCheck, TakesWhatAnApplicationIsLoadedWith) {
   EXPECT_THAT(wrong.error().message, HasSubstr("only 'yes'"));
 }
 
+TEST(RequestCheck, TakesWhatTakesOverOnline) {
+  const std::map<std::string, std::string> online{{"online", "yes"}};
+  const auto load = WithEntries(plc_OPERATION_LOAD_APPLICATION, "/a.so", {{"online", "yes"}}).checked();
+  ASSERT_TRUE(load) << load.error().message;
+  EXPECT_EQ(load->options, online);
+  EXPECT_EQ(WithEntries(plc_OPERATION_ROLLBACK_APPLICATION, "", {{"online", "yes"}}).checked()->options,
+            online);
+  const auto wrong = WithEntries(plc_OPERATION_ROLLBACK_APPLICATION, "", {{"online", "no"}}).checked();
+  EXPECT_THAT(wrong.error().message, HasSubstr("only 'yes'"));
+}
+
 TEST(RequestCheck, TakesADownloadWithItsSizeAndDigestOnly) {
   const std::string digest(64, 'f');
   const auto sent = WithEntries(plc_OPERATION_DOWNLOAD_APPLICATION, "a b.so",

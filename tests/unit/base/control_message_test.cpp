@@ -30,10 +30,10 @@ INSTANTIATE_TEST_SUITE_P(ControlMessage, Verb,
                          testing::Values(ControlVerb::start, ControlVerb::stop, ControlVerb::reset,
                                          ControlVerb::restart, ControlVerb::load_application,
                                          ControlVerb::download_application, ControlVerb::rollback_application,
-                                         ControlVerb::set_scheduler, ControlVerb::register_event,
-                                         ControlVerb::unregister_event, ControlVerb::check_host,
-                                         ControlVerb::reset_statistics, ControlVerb::shutdown,
-                                         ControlVerb::status));
+                                         ControlVerb::change_application, ControlVerb::set_scheduler,
+                                         ControlVerb::register_event, ControlVerb::unregister_event,
+                                         ControlVerb::check_host, ControlVerb::reset_statistics,
+                                         ControlVerb::shutdown, ControlVerb::status));
 
 TEST(ControlMessage, RepliesOfEachCodeSurviveTheRoundTrip) {
   for (unsigned code = 0; code <= static_cast<unsigned>(ErrorCode::corrupt); ++code) {

@@ -69,6 +69,7 @@ INSTANTIATE_TEST_SUITE_P(
                     Admission{ControlVerb::stop, {kWrong, kWrong, kOk, kOk, kBusy, kOk}},
                     Admission{ControlVerb::single_cycle, {kWrong, kOk, kWrong, kBusy, kBusy, kWrong}},
                     Admission{ControlVerb::set_scheduler, {kOk, kOk, kOk, kBusy, kBusy, kWrong}},
+                    Admission{ControlVerb::change_application, {kWrong, kOk, kOk, kBusy, kBusy, kWrong}},
                     Admission{ControlVerb::status, {kOk, kOk, kOk, kOk, kOk, kOk}},
                     Admission{ControlVerb::register_event, {kOk, kOk, kOk, kOk, kOk, kOk}}));
 
@@ -81,6 +82,14 @@ TEST_F(Life, RecordsEachChangeOnce) {
   EXPECT_THAT(recorded_,
               ElementsAre(std::tuple(none, stopped, "loaded"), std::tuple(stopped, running, "start"),
                           std::tuple(running, exception, "division by zero")));
+}
+
+TEST_F(Life, RecordsWhatLeavesItInItsState) {
+  lead_to(running);
+  recorded_.clear();
+  sut_.stay("online change");
+  EXPECT_EQ(sut_.state(), running);
+  EXPECT_THAT(recorded_, ElementsAre(std::tuple(running, running, "online change")));
 }
 
 TEST_F(Life, LeavesAnExceptionByNoWay) {

@@ -34,6 +34,35 @@ std::string complaint_about(const std::vector<std::byte>& file) {
   return checked ? std::string() : checked.error().message;
 }
 
+// The first of its symbols that it defines becomes one that exists once in a process.
+TEST(ElfCheck, FindsWhatExistsOnceInAProcess) {
+  auto file = sample();
+  EXPECT_TRUE(check_elf_can_leave(file));
+  Elf64_Ehdr header{};
+  std::memcpy(&header, file.data(), sizeof header);
+  bool changed = false;
+  for (std::size_t i = 0; i < header.e_shnum; ++i) {
+    Elf64_Shdr section{};
+    std::memcpy(&section, file.data() + header.e_shoff + i * sizeof section, sizeof section);
+    if (section.sh_type != SHT_DYNSYM) continue;
+    for (std::size_t at = section.sh_offset; at < section.sh_offset + section.sh_size;
+         at += sizeof(Elf64_Sym)) {
+      Elf64_Sym symbol{};
+      std::memcpy(&symbol, file.data() + at, sizeof symbol);
+      if (symbol.st_shndx == SHN_UNDEF) continue;
+      symbol.st_info = ELF64_ST_INFO(STB_GNU_UNIQUE, ELF64_ST_TYPE(symbol.st_info));
+      put(file, at, symbol);
+      changed = true;
+      break;
+    }
+  }
+  ASSERT_TRUE(changed);
+  const auto refused = check_elf_can_leave(file);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, HasSubstr("-fno-gnu-unique"));
+  EXPECT_THAT(refused.error().message, HasSubstr("plc_app_"));
+}
+
 TEST(ElfCheck, AcceptsAGoodApplication) {
   EXPECT_EQ(complaint_about(sample()), "");
 }

@@ -223,5 +223,106 @@ TEST_F(SentApplication, IsNotTakenForSafeModeWhenItsProcessIsAdopted) {
   EXPECT_EQ(sut().status().application.view(), kFirst);
 }
 
+// --- online
+
+class OnlineApplication : public SentApplication {
+ protected:
+  const std::map<std::string, std::string> online_{{"online", "yes"}};
+  void change(const ControlReply& answer) {
+    ask(ControlVerb::load_application, "/opt/new.so", online_);
+    sut().on_application_checked({});
+    ASSERT_EQ(host_.requests.size(), 1U);
+    EXPECT_EQ(host_.requests.back().verb, ControlVerb::change_application);
+    EXPECT_EQ(host_.requests.back().argument, "/opt/new.so");
+    ControlReply numbered = answer;
+    numbered.number = host_.requests.back().number;
+    sut().on_reply(numbered);
+  }
+};
+
+TEST_F(OnlineApplication, IsTriedFirstAndThenTakenInByTheProcessThatIsUp) {
+  bring_up();
+  change({.number = 0, .code = ErrorCode::ok, .text = "taken over"});
+  const auto reply = take_reply();
+  EXPECT_EQ(reply.code, ErrorCode::ok);
+  EXPECT_EQ(reply.text, "taken over");
+  EXPECT_THAT(host_.checked, ElementsAre("/opt/new.so"));
+  EXPECT_EQ(host_.spawned.size(), 1U) << "no fresh process";
+  EXPECT_EQ(sut().status().application.view(), "/opt/new.so");
+  EXPECT_EQ(state(), InstanceState::running);
+  sut().on_exit(killed_by(SIGSEGV));
+  expire_timer();
+  EXPECT_EQ(host_.spawned.back().application, "/opt/new.so") << "what comes after a crash";
+}
+
+TEST_F(OnlineApplication, ThatDoesNotFitChangesNothing) {
+  bring_up();
+  change({.number = 0, .code = ErrorCode::refused, .text = "task 'Main' is gone"});
+  const auto reply = take_reply();
+  EXPECT_EQ(reply.code, ErrorCode::refused);
+  EXPECT_EQ(reply.text, "task 'Main' is gone");
+  EXPECT_EQ(sut().status().application.view(), "/opt/line.so");
+  sut().on_exit(killed_by(SIGSEGV));
+  expire_timer();
+  EXPECT_EQ(host_.spawned.back().application, "/opt/line.so");
+}
+
+TEST_F(OnlineApplication, ThatIsWrongDoesNotReachTheProcess) {
+  bring_up();
+  ask(ControlVerb::load_application, "/opt/new.so", online_);
+  sut().on_application_checked(failure(ErrorCode::invalid_argument, "killed by SIGSEGV"));
+  EXPECT_EQ(take_reply().code, ErrorCode::invalid_argument);
+  EXPECT_THAT(host_.requests, IsEmpty());
+}
+
+TEST_F(OnlineApplication, NeedsAProcessWithAnApplication) {
+  ask(ControlVerb::load_application, "/opt/new.so", online_);
+  const auto offline = take_reply();
+  EXPECT_EQ(offline.code, ErrorCode::wrong_state);
+  EXPECT_THAT(offline.text, HasSubstr("'line1' is offline"));
+  EXPECT_THAT(offline.text, HasSubstr("load it without --online"));
+  EXPECT_THAT(host_.checked, IsEmpty());
+  EXPECT_EQ(sut().status().application.view(), "/opt/line.so");
+  reach_safe_mode();
+  ask(ControlVerb::load_application, "/opt/new.so", online_);
+  EXPECT_THAT(take_reply().text, HasSubstr("'line1' is safe mode"));
+}
+
+TEST_F(OnlineApplication, FindsThatTheProcessHasEndedWhileItWasTried) {
+  bring_up();
+  ask(ControlVerb::load_application, "/opt/new.so", online_);
+  sut().on_exit(killed_by(SIGSEGV));
+  sut().on_application_checked({});
+  EXPECT_EQ(take_reply().code, ErrorCode::wrong_state);
+  expire_timer();
+  EXPECT_EQ(host_.spawned.back().application, "/opt/line.so");
+}
+
+TEST_F(OnlineApplication, ThatEndsTheProcessIsNotWhatComesAfter) {
+  bring_up();
+  ask(ControlVerb::load_application, "/opt/new.so", online_);
+  sut().on_application_checked({});
+  sut().on_exit(killed_by(SIGSEGV));
+  EXPECT_EQ(take_reply().code, ErrorCode::unavailable);
+  expire_timer();
+  EXPECT_EQ(host_.spawned.back().application, "/opt/line.so");
+}
+
+TEST_F(OnlineApplication, MayBeSentAndBecomesTheBootApplicationWhenItHasTakenOver) {
+  bring_up();
+  auto all = options(/*boot=*/true);
+  all["online"] = "yes";
+  ask(ControlVerb::download_application, "new.so", all);
+  add_version(1, kFirst, "/opt/line.so");
+  applications_.end(std::string(kFirst));
+  ASSERT_EQ(host_.requests.size(), 1U);
+  EXPECT_EQ(host_.requests.back().argument, kFirst);
+  EXPECT_THAT(applications_.booted, IsEmpty());
+  sut().on_reply({.number = host_.requests.back().number, .code = ErrorCode::ok, .text = "taken over"});
+  ASSERT_THAT(applications_.booted, ElementsAre(kFirst));
+  applications_.end(std::string(kFirst));
+  EXPECT_EQ(take_reply().text, "version 1 (new.so) is loaded, taken over");
+}
+
 }  // namespace
 }  // namespace plchost

@@ -1,6 +1,7 @@
 // A program in versions of which some can take over from the first one while it runs, and others cannot: see
 // CMakeLists.txt for what each is made with.
 #include <atomic>
+#include <cstdlib>
 #include <ctime>
 
 #include "../../../../instances/plc_app.hpp"
@@ -95,6 +96,9 @@ __attribute__((noinline)) void fault_of_version() {
 
 void setup(plc::Application& app) {
   INIT;
+#ifdef INIT_CRASHES
+  std::abort();
+#endif
 #ifdef UNIQUE
   fresh = use_shared();
 #endif
