@@ -33,12 +33,14 @@ bool is_acceptable_sample(const Submessage& sample, bool secured) noexcept {
   return is_well_formed_sample(sample) && (sample.flags() & is_key) == 0;
 }
 
-// All but samples that a secured host is told in messages that are not signed as a whole.
+// All but samples that a secured host is told in messages that are not signed as a whole. What is a vendor's
+// own is skipped by all others.
 bool is_said_before_keys(std::uint8_t kind) noexcept {
   constexpr std::array kKinds{kPad,           kAckNack,         kHeartbeat,     kGap,
                               kInfoTimestamp, kInfoDestination, kNackFragment,  kHeartbeatFragment,
                               kSecuredBody,   kSecuredPrefix,   kSecuredPostfix};
-  return std::ranges::find(kKinds, kind) != kKinds.end();
+  constexpr std::uint8_t kVendors = 0x80;
+  return kind >= kVendors || std::ranges::find(kKinds, kind) != kKinds.end();
 }
 
 }  // namespace
