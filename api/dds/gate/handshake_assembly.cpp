@@ -15,7 +15,6 @@ constexpr std::size_t kFirst = kNumber + 8;
 constexpr std::size_t kCount = kFirst + 4;
 constexpr std::size_t kSize = kCount + 2;
 constexpr std::size_t kSampleSize = kSize + 2;
-constexpr std::size_t kEncapsulation = 4;
 
 bool says_nothing(std::uint8_t kind) {
   return kind == kPad || kind == kInfoTimestamp || kind == kInfoDestination;

@@ -12,8 +12,6 @@ namespace {
 
 using namespace submessage_kind;
 
-constexpr std::size_t kEncapsulation = 4;
-
 // A sample of one of the two writers that speak in plain text: fields as all vendors lay them out, then what
 // it says.
 bool is_well_formed_sample(const Submessage& sample) noexcept {

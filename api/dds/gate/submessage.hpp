@@ -41,6 +41,8 @@ inline constexpr std::size_t kWriterEntity = kSubmessageHeader + 8;
 /// All that stands between that count and the inline QoS.
 inline constexpr std::size_t kDataFields = 16;
 inline constexpr std::size_t kFragmentFields = 28;
+/// What contents begin with.
+inline constexpr std::size_t kEncapsulation = 4;
 
 using EntityId = std::array<std::uint8_t, 4>;
 inline constexpr EntityId kParticipantWriter{0x00, 0x01, 0x00, 0xc2};
