@@ -25,7 +25,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 
 /// What the program says of itself.
-struct Report {
+struct VersionReport {
   int version = 0;
   unsigned long counter = 0;  ///< a variable that it keeps
   unsigned long area = 0;
@@ -49,7 +49,7 @@ class Online {
   const Sandbox& sandbox() { return sandbox_; }
 
   ControlReply change(const std::string& file) { return process_.ask(ControlVerb::change_application, file); }
-  Report report() {
+  VersionReport report() {
     const std::string key = "application: version ";
     const std::size_t before = process_.log().size();
     EXPECT_EQ(process_.event("report").post(), PostResult::posted);
@@ -60,7 +60,7 @@ class Online {
       return at != std::string::npos && fresh.find('\n', at) != std::string::npos;
     });
     EXPECT_TRUE(seen) << process_.log();
-    Report report;
+    VersionReport report;
     if (!seen) return report;
     EXPECT_EQ(std::sscanf(fresh.c_str() + fresh.find(key),
                           "application: version %d counter %lu area %lu kept %lu fresh %lu works %lu own "
@@ -108,7 +108,7 @@ class OnlineChange : public ::testing::TestWithParam<std::string> {};
 TEST_P(OnlineChange, GoesOnWithTheVariablesAndTheNewCodeWithoutALostCycle) {
   Online sut(GetParam());
   ASSERT_TRUE(sut.runs());
-  const Report before = sut.report();
+  const VersionReport before = sut.report();
   EXPECT_EQ(before.version, 1);
   const TaskCounters counters = sut.main();
   const auto pid = sut.process().pid();
@@ -118,12 +118,12 @@ TEST_P(OnlineChange, GoesOnWithTheVariablesAndTheNewCodeWithoutALostCycle) {
   ASSERT_EQ(changed.code, ErrorCode::ok) << changed.text << sut.process().log();
   EXPECT_THAT(changed.text, AllOf(HasSubstr("taken over between two cycles"), HasSubstr("2 areas go on"),
                                   HasSubstr("variables machine were carried over (16 bytes)")));
-  const Report after = sut.report();
+  const VersionReport after = sut.report();
   EXPECT_EQ(after.version, 2);
   EXPECT_GE(after.counter, before.counter);
   ASSERT_TRUE(sut.runs());
-  const Report later = sut.report();
-  for (const auto value : {&Report::counter, &Report::area, &Report::kept}) {
+  const VersionReport later = sut.report();
+  for (const auto value : {&VersionReport::counter, &VersionReport::area, &VersionReport::kept}) {
     // By ones until the change, by thousands from then on: nothing in between was lost or counted twice.
     EXPECT_GT(later.*value, after.*value);
     EXPECT_EQ((later.*value - after.*value) % 1000, 0U);
@@ -156,7 +156,7 @@ TEST(OnlineChangeOfAnInstance, FindsTheTasksByNameAlsoInAnotherOrder) {
   ASSERT_EQ(changed.code, ErrorCode::ok) << changed.text;
   ASSERT_TRUE(sut.runs());
   EXPECT_EQ(sut.report().version, 2);
-  EXPECT_GT(sut.process().task("Report")->counters.cycles, 0U);
+  EXPECT_GT(sut.process().task("VersionReport")->counters.cycles, 0U);
 }
 
 struct Refusal {
@@ -173,9 +173,9 @@ TEST_P(RefusedOnlineChange, TellsTheReasonAndChangesNothing) {
   const auto refused = sut.change(application(GetParam().file));
   EXPECT_NE(refused.code, ErrorCode::ok);
   EXPECT_THAT(refused.text, AllOf(HasSubstr(GetParam().reason), HasSubstr(GetParam().file)));
-  const Report before = sut.report();
+  const VersionReport before = sut.report();
   ASSERT_TRUE(sut.runs());
-  const Report after = sut.report();
+  const VersionReport after = sut.report();
   EXPECT_EQ(after.version, 1);
   EXPECT_GT(after.counter, before.counter);
   EXPECT_EQ(after.counter, after.fresh) << "nobody else has counted";
@@ -225,7 +225,7 @@ TEST(OnlineChangeOfAnInstance, AHundredTimesLeavesNothingBehindAndCountsEveryCyc
   }
   EXPECT_TRUE(eventually([&] { return sut.held() == held; })) << "but the connections of this test";
   ASSERT_TRUE(sut.runs());
-  const Report report = sut.report();
+  const VersionReport report = sut.report();
   EXPECT_EQ(report.version, 2);
   EXPECT_EQ(report.area, report.counter + 7);
   EXPECT_EQ(report.kept, report.counter);
@@ -297,7 +297,7 @@ TEST(OnlineChangeOfAnInstance, IsDoneWhileItIsStoppedToo) {
   EXPECT_EQ(sut.main().cycles, cycles);
   ASSERT_EQ(sut.process().ask(ControlVerb::start).code, ErrorCode::ok);
   ASSERT_TRUE(sut.runs());
-  const Report report = sut.report();
+  const VersionReport report = sut.report();
   EXPECT_EQ(report.version, 2);
   EXPECT_EQ(report.counter, cycles + report.fresh * 1000);
 }
