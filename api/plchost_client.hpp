@@ -182,11 +182,14 @@ class PLCHOST_CLIENT_API Client {
   /// Connects at the first call. ClientError: invalid_argument: an option.
   Client();
   explicit Client(const Options& options);
-  /// Waits for the call that is under way; those that were not begun get their callback with unavailable.
-  /// Not from a callback.
+  /// As close().
   ~Client();
   Client(const Client&) = delete;
   Client& operator=(const Client&) = delete;
+
+  /// Ends all watches, and waits for the call that is under way; those that were not begun, and all that
+  /// come, end with unavailable. Not from a callback.
+  void close();
 
   /// All that answer, by name. None: an empty list, after the time-out.
   std::vector<Host> hosts();

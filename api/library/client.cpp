@@ -84,6 +84,11 @@ Client::Client(const Options& options)
     : worker_(std::make_unique<Worker>(options)), watcher_(std::make_unique<Watcher>(options)) {}
 Client::~Client() = default;
 
+void Client::close() {
+  watcher_->end();
+  worker_->end();
+}
+
 std::vector<Client::Host> Client::hosts() {
   return value_or_throw(worker_->run<std::vector<Host>>([this](ControlClient& client) {
     std::vector<Host> hosts;

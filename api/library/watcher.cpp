@@ -31,7 +31,7 @@ void Client::Watch::Subscription::stop() noexcept {
   const std::lock_guard lock(calling_);
 }
 
-Client::Watcher::~Watcher() {
+void Client::Watcher::end() {
   {
     const std::lock_guard lock(mutex_);
     ending_ = true;
@@ -43,6 +43,7 @@ Client::Watcher::~Watcher() {
 void Client::Watcher::add(std::shared_ptr<Watch::Subscription> subscription) {
   {
     const std::lock_guard lock(mutex_);
+    if (ending_) return;
     subscriptions_.push_back(std::move(subscription));
     if (!thread_.joinable()) thread_ = quiet_thread([this] { watch(); });
   }

@@ -47,10 +47,12 @@ class __attribute__((visibility("hidden"))) Client::Watch::Subscription {
 class __attribute__((visibility("hidden"))) Client::Watcher {
  public:
   explicit Watcher(const Options& options) : connection_(domain_options(options)) {}
-  ~Watcher();
+  ~Watcher() { end(); }
   Watcher(const Watcher&) = delete;
   Watcher& operator=(const Watcher&) = delete;
 
+  /// Nothing is told after this. Not from a callback.
+  void end();
   /// Its thread starts with the first.
   void add(std::shared_ptr<Watch::Subscription> subscription);
 

@@ -19,6 +19,10 @@ Duration checked_timeout(std::chrono::milliseconds timeout) {
        fmt::format("time-out {} ms: allowed are 1 to {}", timeout.count(), kMaxTimeout.count())});
 }
 
+Result<ControlClient*> ended() {
+  return failure(ErrorCode::unavailable, "the client has ended");
+}
+
 }  // namespace
 
 Client::Worker::Worker(const Options& options)
@@ -30,20 +34,24 @@ Client::Worker::Worker(const Options& options)
   thread_ = quiet_thread([this] { work(); });
 }
 
-Client::Worker::~Worker() {
+void Client::Worker::end() {
   {
     const std::lock_guard lock(mutex_);
     ending_ = true;
   }
   changed_.notify_all();
-  thread_.join();
+  if (thread_.joinable()) thread_.join();
 }
 
 void Client::Worker::begin(Job job) {
   {
     const std::lock_guard lock(mutex_);
-    jobs_.push_back(std::move(job));
+    if (!ending_) {
+      jobs_.push_back(std::move(job));
+      job = nullptr;
+    }
   }
+  if (job) return job(ended());
   changed_.notify_all();
 }
 
@@ -59,7 +67,7 @@ void Client::Worker::work() {
       jobs_.pop_front();
       ending = ending_;
     }
-    job(ending ? failure(ErrorCode::unavailable, "the client has ended") : connection_.client());
+    job(ending ? ended() : connection_.client());
   }
 }
 

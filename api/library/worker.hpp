@@ -19,14 +19,16 @@ class __attribute__((visibility("hidden"))) Client::Worker {
   using Job = std::function<void(const Result<ControlClient*>&)>;
 
   explicit Worker(const Options& options);
-  /// Jobs that were not begun are called with `unavailable`.
-  ~Worker();
+  ~Worker() { end(); }
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
   [[nodiscard]] Duration timeout() const noexcept { return timeout_; }
   [[nodiscard]] TimePoint deadline() const { return MonotonicClock::now() + timeout_; }
 
+  /// Waits for the job that is under way; those that were not begun, and all that come, are called with
+  /// `unavailable`. Not from a job.
+  void end();
   void begin(Job job);
   /// Returns what `call(client)` returns. From a callback: at once, it is this thread's turn.
   template <class T>

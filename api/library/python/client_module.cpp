@@ -3,6 +3,9 @@
 // a thread of the library.
 #include <exception>
 #include <memory>
+#include <mutex>
+#include <set>
+#include <type_traits>
 #include <utility>
 
 #include <pybind11/chrono.h>
@@ -20,11 +23,39 @@ namespace {
 
 using NoGil = py::call_guard<py::gil_scoped_release>;
 
+// Those that are there. When Python ends they are closed before: a thread that waits for Python then would be
+// ended where it stands.
+class Clients {
+ public:
+  void add(Client* client) {
+    const std::lock_guard lock(mutex_);
+    clients_.insert(client);
+  }
+  void remove(Client* client) {
+    const std::lock_guard lock(mutex_);
+    clients_.erase(client);
+  }
+  void close() {
+    const std::lock_guard lock(mutex_);
+    for (Client* client : clients_) client->close();
+  }
+
+ private:
+  std::mutex mutex_;
+  std::set<Client*> clients_;
+};
+
+Clients& clients() {
+  static Clients all;
+  return all;
+}
+
 // What waits for a callback when it ends must let that callback have Python.
 struct DeleteWithoutGil {
   template <class T>
   void operator()(T* object) const {
     const py::gil_scoped_release release;
+    if constexpr (std::is_same_v<T, Client>) clients().remove(object);
     delete object;
   }
 };
@@ -178,7 +209,14 @@ Client::Options options_of(unsigned domain, std::vector<std::string> interfaces,
 using ClientClass = py::class_<Client, Holder<Client>>;
 
 void define_calls(ClientClass& client) {
-  client.def("hosts", &Client::hosts, NoGil())
+  client.def("close", &Client::close, NoGil())
+      .def("__enter__", [](Client& self) -> Client& { return self; })
+      .def("__exit__",
+           [](Client& self, const py::args&) {
+             const py::gil_scoped_release release;
+             self.close();
+           })
+      .def("hosts", &Client::hosts, NoGil())
       .def("instances", &Client::instances, py::arg("host") = "", NoGil())
       .def("tasks", &Client::tasks, py::arg("host") = "", NoGil())
       .def("events", &Client::events, py::arg("host") = "", NoGil())
@@ -241,12 +279,15 @@ PYBIND11_MODULE(plchost_client, module) {
                      "One connection to all hosts of a DDS domain. timeout: seconds, of each call.");
   client.def(py::init([](unsigned domain, std::vector<std::string> interfaces, std::vector<std::string> peers,
                          std::string identity, double timeout) {
-               return Holder<Client>(new Client(options_of(domain, std::move(interfaces), std::move(peers),
-                                                           std::move(identity), timeout)));
+               Holder<Client> made(new Client(options_of(domain, std::move(interfaces), std::move(peers),
+                                                         std::move(identity), timeout)));
+               clients().add(made.get());
+               return made;
              }),
              py::arg("domain") = 0U, py::arg("interfaces") = std::vector<std::string>{"lo"},
              py::arg("peers") = std::vector<std::string>{}, py::arg("identity") = "",
              py::arg("timeout") = 3.0);
   define_calls(client);
   define_watches(client);
+  py::module_::import("atexit").attr("register")(py::cpp_function([] { clients().close(); }, NoGil()));
 }

@@ -157,6 +157,18 @@ TEST_F(ClientLibrary, TellsCallsThatWereNotBegunThatItHasEnded) {
   EXPECT_EQ(codes.back(), ClientError::unavailable);
 }
 
+TEST_F(ClientLibrary, DoesNothingAfterItWasClosed) {
+  Client sut(options());
+  sut.close();
+  EXPECT_EQ(error_of([&] { sut.post("hosta", "line1/ready"); }).code(), ClientError::unavailable);
+  std::atomic<int> code{0};
+  sut.post("hosta", "line1/ready", [&](const Client::Outcome& outcome) { code = outcome.code; });
+  EXPECT_EQ(code, ClientError::unavailable);
+  const auto watch = sut.watch_hosts([](const Client::Host&) { ADD_FAILURE(); });
+  sut.close();
+  EXPECT_EQ(event_.counted().count(), 0U);
+}
+
 TEST_F(ClientLibrary, ThrowsWithTheCodeAndTextOfTheHost) {
   Client sut(options());
   const ClientError rejected = error_of([&] { sut.post("hosta", "line1/redy"); });

@@ -41,6 +41,23 @@ for line in "packer1: running under CmpScheduleTimer" "posted: 1" "a task ran" "
   grep -q "^$line" "$cell/line.log" || fail "'$line' is not in: $(cat "$cell/line.log")"
 done
 
+echo "- Python ends in peace while a client watches, and a callback that raises is told"
+cat >"$cell/ends.py" <<'EOF'
+import os, time, plchost_client
+client = plchost_client.Client(domain=int(os.environ["PLCHOST_DOMAIN"]), timeout=10.0)
+client.hosts()
+def raises(item):
+    raise ValueError("mine")
+watch = client.watch_tasks("", raises)
+other = client.watch_hosts(print)
+time.sleep(0.5)
+del other
+EOF
+for _ in $(seq 10); do
+  PYTHONPATH=$BIN/../python python3 "$cell/ends.py" >"$cell/ends.log" 2>&1 || fail "it ended with $?"
+done
+grep -q "ValueError: mine" "$cell/ends.log" || fail "a callback has failed without a word"
+
 echo "- watches go on when the server is killed, and when the host comes again"
 "$cell/project/build/watch_line" 120 >"$cell/watch.log" 2>&1 &
 watcher=$!
