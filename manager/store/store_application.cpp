@@ -191,7 +191,7 @@ Result<std::string> keep_file(const StoreOrder& order) {
   remove_unfinished(order.folder, used);
   const auto loaded = version_at(order.folder, order.before);
   const std::uint32_t number = versions.kept.empty() ? 1 : versions.kept.back().number + 1;
-  const std::string path = version_path(order.folder, number);
+  std::string path = version_path(order.folder, number);
   if (path.size() > kMaxPath) {
     return failure(ErrorCode::invalid_argument,
                    fmt::format("{}: {} characters; allowed are up to {}: a shorter [host] state_directory is "

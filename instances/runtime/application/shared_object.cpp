@@ -78,7 +78,7 @@ void* SharedObject::find(const char* symbol) const noexcept {
 bool SharedObject::contains(const void* address) const noexcept {
   Dl_info info{};
   link_map* map = nullptr;
-  if (handle_ == nullptr || ::dlinfo(handle_, RTLD_DI_LINKMAP, &map) != 0) return false;
+  if (handle_ == nullptr || ::dlinfo(handle_, RTLD_DI_LINKMAP, static_cast<void*>(&map)) != 0) return false;
   void* of_address = nullptr;
   return ::dladdr1(address, &info, &of_address, RTLD_DL_LINKMAP) != 0 && of_address == map;
 }
