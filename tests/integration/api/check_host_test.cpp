@@ -88,6 +88,7 @@ TEST_F(CheckHost, SaysThatTheManagerDoesNotAnswer) {
   start({kNote});
   host_.silent = true;
   const auto client = connect(domain_);
+  ASSERT_TRUE(client->host("hosta", soon()));
   const auto asked = client->check_host("hosta", MonotonicClock::now() + std::chrono::seconds(1));
   ASSERT_FALSE(asked);
   EXPECT_EQ(asked.error().code, ErrorCode::timed_out);

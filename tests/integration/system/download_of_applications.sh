@@ -15,7 +15,12 @@ kept=$cell/cell1.state/applications.cell1/line1
 version() { plcctl list applications line1 --json | jq -r ".[] | select(.$1 == \"$2\") | .$3"; }
 numbers() { plcctl list applications --json | jq -r 'map(.version | tostring) | join(",")'; }
 application_is() { [ "$(instance line1 application)" = "$1" ]; }
-in_shm() { ls /dev/shm | grep -q "^$pool-cell1\.download\."; }
+in_shm() { compgen -G "/dev/shm/$pool-cell1.download.*" >/dev/null; }
+# A download takes half a second: looked for without a pause.
+until_in_shm() {
+  local end=$((SECONDS + 60))
+  until in_shm; do [ "$SECONDS" -lt "$end" ] || fail "no download has begun"; done
+}
 
 echo "- what is broken is refused before what runs is touched"
 good=$APPLICATIONS/packer.so
@@ -93,7 +98,7 @@ pid=$(instance line1 pid)
 "$BIN/plcctl" load application line1 "$cell/large.so" >"$cell/killed.log" 2>&1 &
 client=$!
 others+=("$client")
-until_true 20 in_shm
+until_in_shm
 kill -STOP "$client"
 in_shm || fail "it was too fast to be stopped"
 refused "is just being sent another one, large.so" plcctl load application line1 "$good"
@@ -107,7 +112,7 @@ echo "- a plchost-dds that is killed in the midst: its client begins anew with t
 "$BIN/plcctl" load application line1 "$cell/large.so" >"$cell/client.log" 2>&1 &
 client=$!
 others+=("$client")
-until_true 20 in_shm
+until_in_shm
 kill -KILL "$(pgrep -P "$manager" -x plchost-dds)"
 wait "$client" || fail "the client gave up: $(cat "$cell/client.log")"
 application_is "$kept/000008.so" || fail "$(plcctl list instances)"
