@@ -60,7 +60,8 @@ trap 'exit 130' INT TERM
 .ci/packages build
 printf 'building (a few minutes the first time) ...'
 began=$SECONDS
-if ! { cmake -S . -B "$build" -G Ninja -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF -DPLCHOST_PYTHON=OFF &&
+if ! { cmake -S . -B "$build" -G Ninja -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF -DPLCHOST_PYTHON=OFF -DCMAKE_UNITY_BUILD=ON \
+    -DCMAKE_UNITY_BUILD_BATCH_SIZE=10 &&
   cmake --build "$build"; } >"$work/build.log" 2>&1; then
   echo " FAILED"
   tail -n 60 "$work/build.log"

@@ -68,7 +68,7 @@ class HandshakeAssemblyTest : public testing::Test {
     for (const Octets& one : submessages) datagram.insert(datagram.end(), one.begin(), one.end());
     if (!is_acceptable(std::as_bytes(std::span(datagram)), true)) return {};  // comes no further
     const std::size_t size = datagram.size();
-    datagram.resize(65536);
+    datagram.resize(8192);
     datagram.resize(sut_.rewrite(std::as_writable_bytes(std::span(datagram)), size));
     EXPECT_TRUE(datagram.empty() || is_acceptable(std::as_bytes(std::span(datagram)), true));
     return datagram;
@@ -156,7 +156,7 @@ TEST_F(HandshakeAssemblyTest, LeavesAllElseAsItIs) {
 
 TEST_F(HandshakeAssemblyTest, StaysWithinItsBoundsWhateverComes) {
   std::mt19937 random(1);
-  for (int i = 0; i < 100'000; ++i) {
+  for (int i = 0; i < 20'000; ++i) {
     FragmentOf of{.number = static_cast<std::uint32_t>(random() % 3),
                   .first = static_cast<std::uint32_t>(random() % 5),
                   .count = static_cast<std::uint16_t>(random() % 4),
