@@ -134,15 +134,6 @@ int CliSession::fail(const Error& error) {
   return error.code == ErrorCode::invalid_argument ? kExitUsage : kExitFailed;
 }
 
-Result<std::pair<std::string, std::string>> split_name(std::string_view what, std::string_view text) {
-  const auto slash = text.find('/');
-  if (slash == std::string_view::npos || slash == 0 || slash + 1 == text.size()) {
-    return failure(ErrorCode::invalid_argument,
-                   fmt::format("'{}' is not of the form INSTANCE/{}", text, what));
-  }
-  return std::pair{std::string(text.substr(0, slash)), std::string(text.substr(slash + 1))};
-}
-
 std::string hint(std::string_view unknown, const std::vector<std::string>& known) {
   const std::vector<std::string_view> views(known.begin(), known.end());
   const auto near = nearest_name(unknown, views);

@@ -9,6 +9,7 @@
 #include "api/cli/host_selection.hpp"
 #include "api/cli/rows/table.hpp"
 #include "api/cli/words/command.hpp"
+#include "api/client/check_names.hpp"
 #include "api/client/control_client.hpp"
 
 namespace plchost {
@@ -83,10 +84,6 @@ void add_watch_verb(const Command& plcctl, CliSession& session);
 void add_plant_verbs(const Command& plcctl, CliSession& session);
 void add_verify_verb(const Command& plcctl, CliSession& session);
 void add_completion_verb(const Command& plcctl);
-
-/// "I/T" split at the first slash. invalid_argument: no slash, or nothing on one side of it.
-[[nodiscard]] Result<std::pair<std::string, std::string>> split_name(std::string_view what,
-                                                                     std::string_view text);
 
 /// " (did you mean 'x'?)", or nothing if no name is near.
 [[nodiscard]] std::string hint(std::string_view unknown, const std::vector<std::string>& known);

@@ -47,4 +47,13 @@ Result<void> check_api_request(const ApiRequest& request) {
                              shown(request.argument), request.argument.size(), kMaxPath));
 }
 
+Result<std::pair<std::string, std::string>> split_name(std::string_view what, std::string_view text) {
+  const auto slash = text.find('/');
+  if (slash == std::string_view::npos || slash == 0 || slash + 1 == text.size()) {
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("'{}' is not of the form INSTANCE/{}", text, what));
+  }
+  return std::pair{std::string(text.substr(0, slash)), std::string(text.substr(slash + 1))};
+}
+
 }  // namespace plchost

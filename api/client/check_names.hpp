@@ -1,6 +1,8 @@
 #pragma once
 
+#include <string>
 #include <string_view>
+#include <utility>
 
 #include "api/client/request_caller.hpp"
 #include "shm/base/result.hpp"
@@ -14,5 +16,9 @@ namespace plchost {
 [[nodiscard]] Result<void> check_task_name(std::string_view instance, std::string_view task);
 /// No instance: a request for the whole host. What the argument means is the host's business.
 [[nodiscard]] Result<void> check_api_request(const ApiRequest& request);
+
+/// "I/T" split at the first slash. invalid_argument: no slash, or nothing on one side of it.
+[[nodiscard]] Result<std::pair<std::string, std::string>> split_name(std::string_view what,
+                                                                     std::string_view text);
 
 }  // namespace plchost

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include "api/client/check_names.hpp"
 #include "api/library/convert.hpp"
 #include "api/library/watcher.hpp"
 #include "api/library/worker.hpp"
@@ -19,11 +20,9 @@ T value_or_throw(Result<T> result) {
 }
 
 Result<EventId> event_of(const std::string& name) {
-  const auto slash = name.find('/');
-  if (slash == std::string::npos || slash == 0 || slash + 1 == name.size()) {
-    return failure(ErrorCode::invalid_argument, fmt::format("'{}' is not of the form INSTANCE/EVENT", name));
-  }
-  return EventId{name.substr(0, slash), name.substr(slash + 1)};
+  auto parts = split_name("EVENT", name);
+  if (!parts) return std::unexpected(std::move(parts).error());
+  return EventId{std::move(parts->first), std::move(parts->second)};
 }
 
 /// That host, once it answers; no name: the only one.

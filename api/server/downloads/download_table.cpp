@@ -72,15 +72,15 @@ Result<void> DownloadTable::begin(const dds::Guid& client, const plc_SampleIdent
 }
 
 bool DownloadTable::repeat(const plc_SampleIdentity& identity) {
-  Download* const download = find(identity);
-  if (download == nullptr) return false;
+  const auto download = find(identity);
+  if (download == downloads_.end()) return false;
   download->told = false;
   return true;
 }
 
 void DownloadTable::take(const plc_DownloadChunk& chunk, const dds::Guid& client, TimePoint now) {
-  Download* const download = find(chunk.download);
-  if (download == nullptr || download->client != client || download->failed) return;
+  const auto download = find(chunk.download);
+  if (download == downloads_.end() || download->client != client || download->failed) return;
   download->told = false;  // also of one that came twice or too early: its client knows then where to go on
   const std::uint64_t left = download->size - download->received;
   if (chunk.offset != download->received || chunk.contents._length == 0) return;
@@ -151,15 +151,12 @@ std::vector<DownloadEnd> DownloadTable::given_up(TimePoint now,
 }
 
 void DownloadTable::end(const plc_SampleIdentity& identity) {
-  const auto found = std::ranges::find_if(
-      downloads_, [&](const Download& download) { return same_identity(download.identity, identity); });
-  if (found != downloads_.end()) remove(found);
+  if (const auto found = find(identity); found != downloads_.end()) remove(found);
 }
 
-DownloadTable::Download* DownloadTable::find(const plc_SampleIdentity& identity) {
-  const auto found = std::ranges::find_if(
+std::list<DownloadTable::Download>::iterator DownloadTable::find(const plc_SampleIdentity& identity) {
+  return std::ranges::find_if(
       downloads_, [&](const Download& download) { return same_identity(download.identity, identity); });
-  return found == downloads_.end() ? nullptr : &*found;
 }
 
 void DownloadTable::remove(std::list<Download>::iterator download) {

@@ -91,7 +91,7 @@ class DownloadTable {
     bool handed_over = false;
     std::optional<Error> failed = {};
   };
-  [[nodiscard]] Download* find(const plc_SampleIdentity& identity);
+  [[nodiscard]] std::list<Download>::iterator find(const plc_SampleIdentity& identity);
   [[nodiscard]] Result<void> check_room(const std::string& instance, std::uint64_t size) const;
   static void write(Download& download, const plc_DownloadChunk& chunk);
   void remove(std::list<Download>::iterator download);
