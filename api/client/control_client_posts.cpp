@@ -66,9 +66,11 @@ Result<PostReport> ControlClient::post_event(const ApiRequest& event, std::uint6
   posts.begin_report(start);
   const TimePoint first = MonotonicClock::now();
   std::uint64_t sent = 0;
-  for (;;) {
+  for (bool woken = false;; woken = true) {
     TimePoint now = MonotonicClock::now();
-    (void)take_acks(now);
+    // What else may have come is looked at when it was no acknowledgement that has woken this: nothing stands
+    // between one and the next post, or the end.
+    if (!take_acks(now) && woken) update();
     TimePoint next = kNoDeadline;
     while (sent < count && posts.has_room()) {
       next = first + interval * static_cast<Duration::rep>(sent);
@@ -83,7 +85,6 @@ Result<PostReport> ControlClient::post_event(const ApiRequest& event, std::uint6
       report.unacknowledged += count - sent;
       return report;
     }
-    update();
     wait_set_.wait(std::min(posts.has_room() && sent < count ? next : kNoDeadline, posts.repeat(now)));
   }
 }

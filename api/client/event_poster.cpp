@@ -65,7 +65,16 @@ void EventPoster::ask_again(std::uint64_t number, std::string_view instance, std
 Result<void> EventPoster::post_once(std::string_view instance, std::string_view event) noexcept {
   dds::copy_text(sample_.instance, instance);
   dds::copy_text(sample_.event, event);
-  return dds::check_code(write(++last_sequence_), "post an event");
+  static plc_KeyValue late = [] {
+    plc_KeyValue entry{};
+    dds::copy_text(entry.name, dds::kAckEntry);
+    dds::copy_text(entry.value, dds::kAckLate);
+    return entry;
+  }();
+  sample_.ext = {._maximum = 1, ._length = 1, ._buffer = &late, ._release = false};
+  const dds_return_t written = write(++last_sequence_);
+  sample_.ext = {};
+  return dds::check_code(written, "post an event");
 }
 
 bool EventPoster::on_ack(const plc_EventAck& ack, TimePoint now) {

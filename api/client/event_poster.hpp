@@ -55,7 +55,8 @@ class EventPoster {
   [[nodiscard]] bool has_room() const noexcept { return unacknowledged_.size() < window_; }
   [[nodiscard]] std::size_t unacknowledged() const noexcept { return unacknowledged_.size(); }
 
-  /// One post that is not repeated: as fast as DDS is. One call of dds_write.
+  /// One post that is not repeated, and whose acknowledgement nobody waits for: as fast as DDS is. One call
+  /// of dds_write.
   [[nodiscard]] Result<void> post_once(std::string_view instance, std::string_view event) noexcept;
 
   /// Returns true if that acknowledged something.

@@ -74,6 +74,9 @@ inline constexpr std::string_view kRivalEntry = "rival";
 /// Entry of EventPost.ext and its value: an EventRun is wanted.
 inline constexpr std::string_view kWaitEntry = "wait";
 inline constexpr std::string_view kWaitForRun = "run";
+/// Another one: nobody waits for the acknowledgement.
+inline constexpr std::string_view kAckEntry = "ack";
+inline constexpr std::string_view kAckLate = "late";
 /// The largest piece of a download: as in control.idl.
 inline constexpr std::size_t kMaxChunk = 32768;
 /// No writer of the server waits longer.

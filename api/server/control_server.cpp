@@ -62,6 +62,7 @@ ControlServer::~ControlServer() {
   if (parts_->sessions) {
     for (const dds_entity_t reader : parts_->sessions->discovery_readers()) dds_set_listener(reader, nullptr);
   }
+  if (parts_->audit) parts_->record_posts();
 }
 
 Result<void> ControlServer::run() {
@@ -131,6 +132,8 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
     return keeps_name();
   } else if (fd == status_timer.get()) {
     const TimePoint now = MonotonicClock::now();
+    write_acks();
+    record_posts();
     status->look_at_writers(*intake, *sessions, now);
     status->tick(now);
     lister.forget_old(now);
@@ -202,14 +205,22 @@ Result<bool> ControlServer::Parts::keeps_name() {
 
 void ControlServer::Parts::on_wake() {
   sessions->follow_discovery();
-  for (const plc_EventAck& ack : intake->collect_acks()) {
-    audit->posted(ack, MonotonicClock::now());
-    sessions->write_ack(dds::Guid::from(ack.source).participant(), ack);
-  }
+  write_acks();
   for (const AwaitedPost& post : intake->collect_awaited()) runs.add(post, status->tasks());
   if (!runs.empty()) look_at_runs();
   for (const RequestReader& request : requests) on_requests(request);
   on_chunks();
+}
+
+// Those that the receiving thread has left.
+void ControlServer::Parts::write_acks() {
+  for (const plc_EventAck& ack : intake->collect_acks()) {
+    sessions->write_ack(dds::Guid::from(ack.source).participant(), ack);
+  }
+}
+
+void ControlServer::Parts::record_posts() {
+  for (const plc_EventAck& ack : intake->collect_written_acks()) audit->posted(ack, MonotonicClock::now());
 }
 
 void ControlServer::Parts::look_at_runs() {

@@ -79,6 +79,8 @@ struct ControlServer::Parts {
   void on_chunks();
   void serve_downloads(TimePoint now);
 
+  void write_acks();
+  void record_posts();
   void look_at_runs();
 
   static void on_event_post(dds_entity_t reader, void* server);

@@ -65,6 +65,7 @@ Result<void> ControlServer::Parts::open(PostLedger ledger) {
   auto made_sessions = SessionTable::create(participant.get());
   if (!made_sessions) return std::unexpected(made_sessions.error());
   sessions = std::move(*made_sessions);
+  intake->acknowledge_by(sessions->ack_writers());
   open_audit();
   auto made_status =
       StatusPublisher::create(participant.get(), {options.host, &pool, epoch, options.run_directory,

@@ -60,6 +60,7 @@ void SessionTable::follow_participants() {
       alive_[client] = info.valid_data ? dds::claim_of(participant.qos) : std::string();
     } else {
       alive_.erase(client);
+      ack_writers_->remove(client);
       sessions_.erase(client);
     }
   });
@@ -72,14 +73,17 @@ void SessionTable::follow_readers() {
     const auto* const topic =
         std::ranges::find(kStreamTopics, std::string_view(reader.topic_name), &dds::TopicInfo::name);
     if (topic == kStreamTopics.end()) return;
-    Session* const session = session_of(dds::Guid::from(reader.participant_key.v));
+    const dds::Guid client = dds::Guid::from(reader.participant_key.v);
+    Session* const session = session_of(client);
     // The writer exists before the first request: it has met its reader when the answer comes. One that
     // nobody reads is not made: each is announced to every client.
-    if (session != nullptr) (void)open_writer(*session, static_cast<Stream>(topic - kStreamTopics.begin()));
+    if (session != nullptr) {
+      (void)open_writer(client, *session, static_cast<Stream>(topic - kStreamTopics.begin()));
+    }
   });
 }
 
-bool SessionTable::open_writer(Session& session, Stream stream) {
+bool SessionTable::open_writer(const dds::Guid& client, Session& session, Stream stream) {
   dds::Entity& writer = session.writers[std::to_underlying(stream)];
   if (writer) return true;
   const auto qos = [stream] {
@@ -90,6 +94,7 @@ bool SessionTable::open_writer(Session& session, Stream stream) {
   auto made = dds::make_writer(session.publisher.get(), topics_[std::to_underlying(stream)].get(), qos());
   if (made) {
     writer = std::move(*made);
+    if (stream == Stream::acks) ack_writers_->add(client, writer.get());
   } else {
     spdlog::error("{}", made.error().describe());
   }
@@ -152,7 +157,7 @@ bool SessionTable::write_page(const dds::Guid& client, const plc_NodePage& page)
 
 bool SessionTable::write(const dds::Guid& client, Stream stream, const void* sample) {
   Session* const session = session_of(client);
-  if (session == nullptr || !open_writer(*session, stream)) return false;
+  if (session == nullptr || !open_writer(client, *session, stream)) return false;
   return dds_write(session->writers[std::to_underlying(stream)].get(), sample) == DDS_RETCODE_OK;
 }
 

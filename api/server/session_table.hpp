@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <memory>
 #include <optional>
 #include <string>
 #include <unordered_map>
@@ -13,6 +14,7 @@
 
 #include "api/dds/entity.hpp"
 #include "api/dds/guid.hpp"
+#include "api/server/posts/ack_writers.hpp"
 #include "shm/base/result.hpp"
 
 namespace plchost {
@@ -35,6 +37,8 @@ class SessionTable {
   /// counted.
   void write_reply(const dds::Guid& client, const plc_Reply& reply);
   void write_ack(const dds::Guid& client, const plc_EventAck& ack);
+  /// Those of the clients whose acknowledgement reader was discovered: any thread, as long as this lives.
+  [[nodiscard]] AckWriters& ack_writers() noexcept { return *ack_writers_; }
   void write_run(const dds::Guid& client, const plc_EventRun& run);
   void write_ack(const dds::Guid& client, const plc_DownloadAck& ack);
   /// False: the client has not got it, nor will.
@@ -68,7 +72,7 @@ class SessionTable {
   void follow_readers();
   /// Made if it is not there. None for a client that is not (or no longer) in the domain.
   [[nodiscard]] Session* session_of(const dds::Guid& client);
-  bool open_writer(Session& session, Stream stream);
+  bool open_writer(const dds::Guid& client, Session& session, Stream stream);
   bool write(const dds::Guid& client, Stream stream, const void* sample);
 
   dds_entity_t participant_ = 0;
@@ -77,6 +81,7 @@ class SessionTable {
   dds::Entity subscriptions_;
   std::unordered_map<dds::Guid, std::string, dds::GuidHash> alive_;  // and what each claims to be
   std::unordered_map<dds::Guid, Session, dds::GuidHash> sessions_;
+  std::unique_ptr<AckWriters> ack_writers_ = std::make_unique<AckWriters>();
   std::uint64_t dropped_ = 0;
 };
 

@@ -8,10 +8,12 @@
 
 #include <fmt/format.h>
 
+#include "api/client/control_client.hpp"
 #include "shm/pool/instance_page.hpp"
 #include "tests/bench/bench.hpp"
 #include "tests/bench/child.hpp"
 #include "tests/bench/dds_poster.hpp"
+#include "tests/bench/samples.hpp"
 
 namespace plchost::bench {
 
@@ -25,6 +27,22 @@ template <class Condition>
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   return {};
+}
+
+/// Calls for a slice, and notes how long each call took.
+template <class Call>
+void time_calls(Duration slice, Samples& into, Call call) {
+  const TimePoint end = MonotonicClock::now() + slice;
+  while (MonotonicClock::now() < end) {
+    const TimePoint start = MonotonicClock::now();
+    call();
+    into.push(MonotonicClock::now() - start);
+  }
+}
+
+/// The event of the cell.
+[[nodiscard]] inline ApiRequest ping_event() {
+  return {kBenchHost, 0, "probe", "ping"};
 }
 
 /// plchostd with one instance that runs the probe, "probe", whose external event is "ping".

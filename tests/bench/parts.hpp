@@ -28,6 +28,7 @@ struct Part {
 [[nodiscard]] Result<std::vector<Row>> measure_burst(const Plan& plan);
 [[nodiscard]] Result<std::vector<Row>> measure_post_process(const Plan& plan);
 [[nodiscard]] Result<std::vector<Row>> measure_post_dds(const Plan& plan);
+[[nodiscard]] Result<std::vector<Row>> measure_post_rate(const Plan& plan);
 [[nodiscard]] Result<std::vector<Row>> measure_post_many(const Plan& plan);
 [[nodiscard]] Result<std::vector<Row>> measure_cost(const Plan& plan);
 [[nodiscard]] Result<std::vector<Row>> measure_scale(const Plan& plan);

@@ -17,19 +17,6 @@ using dds::text_of;
 
 namespace {
 
-/// Whether the client wants to know of the run. Of most posts there is nothing to read.
-Result<bool> wants_run(const dds_sequence_plc_KeyValue& ext) {
-  if (ext._length == 0) return false;
-  std::string wait;
-  const std::array known{std::pair(dds::kWaitEntry, &wait)};
-  if (auto read = dds::read_entries(std::span(ext._buffer, ext._length), known); !read) {
-    return std::unexpected(read.error());
-  }
-  if (wait.empty() || wait == dds::kWaitForRun) return !wait.empty();
-  return failure(ErrorCode::invalid_argument, fmt::format("{} = '{}' is not valid; allowed is: {}",
-                                                          dds::kWaitEntry, wait, dds::kWaitForRun));
-}
-
 /// The events that a post is for.
 template <class Use>
 void for_each_event(const plc_EventPost& post, Use use) {
@@ -44,6 +31,28 @@ void for_each_event(const plc_EventBatch& batch, Use use) {
 
 }  // namespace
 
+Result<EventIntake::Wanted> EventIntake::read_wanted(const dds_sequence_plc_KeyValue& ext) {
+  Wanted wanted;
+  if (ext._length == 0) return wanted;
+  std::string wait;
+  std::string ack;
+  const std::array known{std::pair(dds::kWaitEntry, &wait), std::pair(dds::kAckEntry, &ack)};
+  if (auto read = dds::read_entries(std::span(ext._buffer, ext._length), known); !read) {
+    return std::unexpected(read.error());
+  }
+  const auto is = [](std::string_view entry, std::string_view value,
+                     std::string_view allowed) -> Result<bool> {
+    if (value.empty() || value == allowed) return !value.empty();
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("{} = '{}' is not valid; allowed is: {}", entry, value, allowed));
+  };
+  const auto run = is(dds::kWaitEntry, wait, dds::kWaitForRun);
+  if (!run) return std::unexpected(run.error());
+  const auto late = is(dds::kAckEntry, ack, dds::kAckLate);
+  if (!late) return std::unexpected(late.error());
+  return Wanted{.run = *run, .late_ack = *late};
+}
+
 bool EventIntake::take_posts(dds_entity_t reader) {
   return take<plc_EventPost>(reader);
 }
@@ -52,10 +61,15 @@ bool EventIntake::take_batches(dds_entity_t reader) {
   return take<plc_EventBatch>(reader);
 }
 
+void EventIntake::acknowledge_by(AckWriters& writers) {
+  const std::lock_guard lock(mutex_);
+  ack_writers_ = &writers;
+}
+
 template <class Post>
 bool EventIntake::take(dds_entity_t reader) {
   const std::lock_guard lock(mutex_);
-  const bool owed_before = !owed_.empty();
+  const bool collected_soon = cannot_wait();
   dds::take_valid<Post>(reader, [&](const Post& post, const dds_sample_info_t& info) {
     if (source_is_writer(reader, info, dds::Guid::from(post.source))) {
       process_locked(post);
@@ -63,7 +77,8 @@ bool EventIntake::take(dds_entity_t reader) {
       ++malformed_;
     }
   });
-  return !owed_before && !owed_.empty();
+  write_acks();
+  return !collected_soon && cannot_wait();
 }
 
 bool EventIntake::source_is_writer(dds_entity_t reader, const dds_sample_info_t& info,
@@ -106,27 +121,27 @@ void EventIntake::process_locked(const Post& post) {
     entry.last.store(post.base_sequence - 1, std::memory_order_release);
   }
   ++entry.counters.received;
+  const auto wanted = read_wanted(post.ext);
   switch (order_of(post.sequence_number, entry.last.load(std::memory_order_relaxed))) {
     case PostOrder::next:
-      post_next(post, entry);
+      post_next(post, wanted, entry);
       break;
     case PostOrder::duplicate:
       ++entry.counters.duplicate;
       // The server before this one may have been asked and be gone.
-      if (wants_run(post.ext).value_or(false)) await(post);
+      if (wanted && wanted->run) await(post);
       break;
     case PostOrder::gap:
       ++entry.counters.early;
       break;
   }
-  owed_.insert(source);
+  (wanted && wanted->late_ack ? owed_late_ : owed_).insert(source);
 }
 
 template <class Post>
-void EventIntake::post_next(const Post& post, LedgerEntry& entry) {
-  const auto awaited = wants_run(post.ext);
-  auto good = awaited ? check(post) : std::unexpected(awaited.error());
-  if (good && *awaited && awaited_.size() >= kMaxAwaited) {
+void EventIntake::post_next(const Post& post, const Result<Wanted>& wanted, LedgerEntry& entry) {
+  auto good = wanted ? check(post) : std::unexpected(wanted.error());
+  if (good && wanted->run && awaited_.size() >= kMaxAwaited) {
     good = failure(ErrorCode::full, "too many posts at once are to be told of their runs");
   }
   const auto done = good ? try_post(post, entry) : std::unexpected(good.error());
@@ -135,7 +150,7 @@ void EventIntake::post_next(const Post& post, LedgerEntry& entry) {
   if (done) {
     ++entry.counters.accepted;
     if (*done == PostResult::no_task) ++entry.counters.no_task;
-    if (*awaited) await(post);
+    if (wanted->run) await(post);
     return;
   }
   ++entry.counters.rejected;
@@ -219,28 +234,55 @@ std::vector<AwaitedPost> EventIntake::collect_awaited() {
   return std::exchange(awaited_, {});
 }
 
+// Those that have no writer yet are left for the control loop, which makes it.
+void EventIntake::write_acks() {
+  if (ack_writers_ == nullptr) return;
+  std::erase_if(owed_, [this](const dds::Guid& source) {
+    const LedgerEntry* const entry = ledger_.find(source);
+    if (entry == nullptr || !ack_writers_->write(source.participant(), make_ack(*entry))) return false;
+    owed_late_.erase(source);
+    written_.insert(source);
+    return true;
+  });
+}
+
+plc_EventAck EventIntake::make_ack(const LedgerEntry& entry) const {
+  plc_EventAck ack{};
+  dds::Guid{entry.source}.copy_to(ack.source);
+  dds::copy_text(ack.host, host_);
+  ack.epoch = epoch_;
+  ack.sequence_number = entry.last.load(std::memory_order_relaxed);
+  ack.accepted = entry.counters.accepted;
+  ack.no_task = entry.counters.no_task;
+  ack.rejected = entry.counters.rejected;
+  ack.lost = entry.counters.lost;
+  ack.rejected_sequence = entry.rejected_sequence;
+  ack.rejected_code = entry.rejected_code;
+  dds::copy_text(ack.rejected_text, entry.rejected_text.view());
+  ack.credits = kPostCredits;
+  return ack;
+}
+
+std::vector<plc_EventAck> EventIntake::make_acks(const Sources& sources) const {
+  std::vector<plc_EventAck> acks;
+  acks.reserve(sources.size());
+  for (const dds::Guid& source : sources) {
+    if (const LedgerEntry* const entry = ledger_.find(source)) acks.push_back(make_ack(*entry));
+  }
+  return acks;
+}
+
 std::vector<plc_EventAck> EventIntake::collect_acks() {
   const std::lock_guard lock(mutex_);
-  std::vector<plc_EventAck> acks;
-  acks.reserve(owed_.size());
-  for (const dds::Guid& source : owed_) {
-    const LedgerEntry& entry = ledger_.entry_for(source, MonotonicClock::now().time_since_epoch().count());
-    plc_EventAck& ack = acks.emplace_back();
-    source.copy_to(ack.source);
-    dds::copy_text(ack.host, host_);
-    ack.epoch = epoch_;
-    ack.sequence_number = entry.last.load(std::memory_order_relaxed);
-    ack.accepted = entry.counters.accepted;
-    ack.no_task = entry.counters.no_task;
-    ack.rejected = entry.counters.rejected;
-    ack.lost = entry.counters.lost;
-    ack.rejected_sequence = entry.rejected_sequence;
-    ack.rejected_code = entry.rejected_code;
-    dds::copy_text(ack.rejected_text, entry.rejected_text.view());
-    ack.credits = kPostCredits;
-  }
-  owed_.clear();
+  owed_.merge(std::exchange(owed_late_, {}));
+  auto acks = make_acks(owed_);
+  written_.merge(std::exchange(owed_, {}));
   return acks;
+}
+
+std::vector<plc_EventAck> EventIntake::collect_written_acks() {
+  const std::lock_guard lock(mutex_);
+  return make_acks(std::exchange(written_, {}));
 }
 
 std::vector<EventIntake::Writer> EventIntake::writers() const {

@@ -12,6 +12,7 @@
 
 #include "api/dds/guid.hpp"
 #include "api/server/access/access_guard.hpp"
+#include "api/server/posts/ack_writers.hpp"
 #include "api/server/posts/event_directory.hpp"
 #include "api/server/posts/post_ledger.hpp"
 #include "shm/base/time.hpp"
@@ -34,9 +35,9 @@ struct AwaitedPost {
   TimePoint received;
 };
 
-/// The way of a remote post from DDS into the pool: checks it, finds the event, posts, and notes that its
-/// source is owed an acknowledgement. Runs in DDS's receiving thread; nothing in it writes to DDS. The lock
-/// is held by that thread, and by the control loop for the copying of acknowledgements.
+/// The way of a remote post from DDS into the pool: checks it, finds the event, posts, and acknowledges it or
+/// notes that its source is owed an acknowledgement. Runs in DDS's receiving thread. The lock is held by that
+/// thread, and by the control loop for the copying of acknowledgements.
 class EventIntake {
  public:
   /// `guard` says who may post; it must outlive this.
@@ -44,7 +45,12 @@ class EventIntake {
               const AccessGuard& guard)
       : host_(std::move(host)), epoch_(epoch), guard_(&guard), directory_(pool), ledger_(std::move(ledger)) {}
 
-  /// Takes all that the reader has. Returns true if acknowledgements are owed now and none were before.
+  /// From now on posts are acknowledged at once where `writers` has a writer for their client; it must
+  /// outlive this.
+  void acknowledge_by(AckWriters& writers);
+
+  /// Takes all that the reader has. Returns true if there is something to collect now that cannot wait, and
+  /// there was not before.
   bool take_posts(dds_entity_t reader);
   bool take_batches(dds_entity_t reader);
 
@@ -52,8 +58,11 @@ class EventIntake {
   void process(const plc_EventPost& post);
   void process(const plc_EventBatch& batch);
 
-  /// The acknowledgements that are owed, one for each source; then none is.
+  /// The acknowledgements that are owed, one for each source; then none is. Those for sources that do not
+  /// wait for them make nobody collect.
   [[nodiscard]] std::vector<plc_EventAck> collect_acks();
+  /// The last acknowledgement of each source that was written since the last call, for the records.
+  [[nodiscard]] std::vector<plc_EventAck> collect_written_acks();
   /// The posts since the last call whose runs are waited for.
   [[nodiscard]] std::vector<AwaitedPost> collect_awaited();
 
@@ -74,12 +83,23 @@ class EventIntake {
   static constexpr std::size_t kMaxAwaited = 1024;
 
  private:
+  /// What the client wants to know of its post.
+  struct Wanted {
+    bool run = false;       ///< its end
+    bool late_ack = false;  ///< its acknowledgement, but not at once
+  };
+  [[nodiscard]] static Result<Wanted> read_wanted(const dds_sequence_plc_KeyValue& ext);
+  using Sources = std::unordered_set<dds::Guid, dds::GuidHash>;
   template <class Post>
   bool take(dds_entity_t reader);
+  void write_acks();
+  [[nodiscard]] plc_EventAck make_ack(const LedgerEntry& entry) const;
+  [[nodiscard]] std::vector<plc_EventAck> make_acks(const Sources& sources) const;
+  [[nodiscard]] bool cannot_wait() const noexcept { return !owed_.empty() || !awaited_.empty(); }
   template <class Post>
   void process_locked(const Post& post);
   template <class Post>
-  void post_next(const Post& post, LedgerEntry& entry);
+  void post_next(const Post& post, const Result<Wanted>& wanted, LedgerEntry& entry);
   [[nodiscard]] Result<PostResult> try_post(const plc_EventPost& post, LedgerEntry& entry);
   [[nodiscard]] Result<PostResult> try_post(const plc_EventBatch& batch, LedgerEntry& entry);
   template <class Post>
@@ -96,7 +116,10 @@ class EventIntake {
   mutable std::mutex mutex_;
   EventDirectory directory_;
   PostLedger ledger_;
-  std::unordered_set<dds::Guid, dds::GuidHash> owed_;
+  AckWriters* ack_writers_ = nullptr;
+  Sources owed_;
+  Sources owed_late_;                                             // to those that do not wait for it
+  Sources written_;                                               // and not collected for the records
   std::unordered_map<dds_instance_handle_t, dds::Guid> writers_;  // asking DDS costs an allocation
   std::vector<AwaitedPost> awaited_;
   TimePoint now_;  // when the post that is processed came

@@ -77,6 +77,11 @@ PostCounters PostLedger::total() const noexcept {
   return sum;
 }
 
+const LedgerEntry* PostLedger::find(const dds::Guid& source) const {
+  const auto known = index_.find(source);
+  return known == index_.end() ? nullptr : &entries()[known->second];
+}
+
 LedgerEntry& PostLedger::entry_for(const dds::Guid& source, std::int64_t now_ns) {
   if (const auto known = index_.find(source); known != index_.end()) {
     LedgerEntry& entry = entries()[known->second];

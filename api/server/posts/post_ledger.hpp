@@ -69,6 +69,9 @@ class PostLedger {
   /// posted least recently: if it lives on, it starts anew at the base that its posts carry.
   [[nodiscard]] LedgerEntry& entry_for(const dds::Guid& source, std::int64_t now_ns);
 
+  /// The same, of a source that is known; null: it is not.
+  [[nodiscard]] const LedgerEntry* find(const dds::Guid& source) const;
+
   /// Each source that is known: `use(entry)`.
   template <class Function>
   void for_each(Function use) const {

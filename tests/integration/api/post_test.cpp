@@ -3,7 +3,11 @@
 #include <gmock/gmock.h>
 
 #include "api/client/control_client.hpp"
+#include "api/client/event_poster.hpp"
+#include "api/dds/domain.hpp"
+#include "api/dds/samples.hpp"
 #include "api/dds/text.hpp"
+#include "api/dds/topics.hpp"
 #include "tests/integration/api/test_host.hpp"
 
 namespace plchost {
@@ -163,6 +167,35 @@ TEST(RemotePost, WithoutAcknowledgementReachesTheEvent) {
 
   while (event.counted().count() < 101) std::this_thread::sleep_for(milliseconds(1));
   EXPECT_EQ(event.counted().count(), 101U);
+}
+
+TEST(RemotePost, ThatNobodyWaitsForIsAcknowledgedNevertheless) {
+  const OwnDomain domain;
+  TestHost host(domain, "hosta");
+  host.start_server();
+  dds::DomainOptions options;
+  options.domain = domain.number();
+  const auto opened = dds::open_domain(dds::Role::client, options).value();
+  const dds::Entity participant(dds_create_participant(domain.number(), nullptr, nullptr));
+  const auto events = dds::make_topic(participant.get(), dds::kEvent).value();
+  const auto acks = dds::make_topic(participant.get(), dds::kEventAck).value();
+  const auto own =
+      dds::make_subscriber(participant.get(), dds::client_partition(dds::guid_of(participant.get()).hex()))
+          .value();
+  const auto reader = dds::make_reader(own.get(), acks.get(), dds::ack_qos()).value();
+  auto sut = EventPoster::create(participant.get(), events.get(), "hosta").value();
+  while (!sut.matched()) std::this_thread::sleep_for(milliseconds(1));
+
+  for (int i = 0; i < 100; ++i) ASSERT_TRUE(sut.post_once("line1", "redy"));
+
+  plc_EventAck told{};
+  for (const TimePoint end = soon(); told.rejected < 100 && MonotonicClock::now() < end;) {
+    dds::take_valid<plc_EventAck>(reader.get(), [&](const plc_EventAck& ack, const auto&) { told = ack; });
+    std::this_thread::sleep_for(milliseconds(1));
+  }
+  EXPECT_EQ(dds::Guid::from(told.source), sut.source());
+  EXPECT_EQ(told.rejected, 100U);
+  EXPECT_EQ(told.sequence_number, 100U);
 }
 
 TEST(RemotePost, OfABatchPostsAllOrNone) {

@@ -333,6 +333,37 @@ TEST_F(EventIntakeTest, NotesThePostsWhoseRunsAreAwaited) {
   EXPECT_EQ(event_.counted().count(), 2U);
 }
 
+TEST_F(EventIntakeTest, OwesAnAcknowledgementAlsoToASourceThatDoesNotWaitForIt) {
+  EventIntake sut = make();
+  plc_KeyValue entry{};
+  dds::copy_text(entry.name, "ack");
+  dds::copy_text(entry.value, "late");
+  auto post = make_post(1);
+  post.ext = {._maximum = 1, ._length = 1, ._buffer = &entry, ._release = false};
+  sut.process(post);
+  EXPECT_EQ(event_.counted().count(), 1U);
+  EXPECT_EQ(only_ack(sut).sequence_number, 1U);
+  EXPECT_TRUE(sut.collect_acks().empty());
+
+  dds::copy_text(entry.value, "never");
+  post.sequence_number = 2;
+  sut.process(post);
+  EXPECT_EQ(event_.counted().count(), 1U);
+  const auto ack = only_ack(sut);
+  EXPECT_EQ(ack.rejected, 1U);
+  EXPECT_THAT(std::string(dds::text_of(ack.rejected_text)), testing::HasSubstr("ack = 'never'"));
+}
+
+TEST_F(EventIntakeTest, GivesEachSourceThatWasAcknowledgedOnceForTheRecords) {
+  EventIntake sut = make();
+  sut.process(make_post(1, 1, 1));
+  sut.process(make_post(1, 1, 2));
+  EXPECT_TRUE(sut.collect_written_acks().empty());
+  EXPECT_EQ(sut.collect_acks().size(), 2U);
+  EXPECT_EQ(sut.collect_written_acks().size(), 2U);
+  EXPECT_TRUE(sut.collect_written_acks().empty());
+}
+
 TEST_F(EventIntakeTest, AwaitsABoundedNumberOfRunsAndRejectsTheRest) {
   EventIntake sut = make();
   plc_KeyValue entry{};

@@ -1,0 +1,176 @@
+// External events over DDS at speed: a post and its acknowledgement beside a bare Cyclone DDS round trip, and
+// posts one way as fast as they go beside a bare writer and a reader that takes and counts.
+
+#include <array>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include <fmt/format.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include "api/client/control_client.hpp"
+#include "shm/pool/object_pool.hpp"
+#include "tests/bench/bare_ends.hpp"
+#include "tests/bench/cell.hpp"
+#include "tests/bench/parts.hpp"
+#include "tests/bench/processes.hpp"
+#include "tests/bench/shared_board.hpp"
+
+namespace plchost::bench {
+
+namespace {
+
+constexpr Duration kRateSlice = std::chrono::seconds(1);
+constexpr Duration kRatePatience = std::chrono::seconds(20);
+constexpr const char* kWithoutTask = "counted";
+
+/// By BareDuty: what the ends of the floor have taken.
+using TakenBoard = std::array<std::atomic<std::uint64_t>, 3>;
+
+std::uint32_t bare_domain(const DdsDomains& domains, BareDuty duty) {
+  return domains.bare + std::to_underlying(duty);
+}
+
+/// Posts as fast as they go for a slice, and waits until as many have arrived as were taken.
+template <class Post, class Count>
+Result<void> run_fast(Duration slice, double& posts, double& seconds, Post post, Count count) {
+  const std::uint64_t before = count();
+  const TimePoint start = MonotonicClock::now();
+  std::uint64_t taken = 0;
+  while (MonotonicClock::now() < start + slice) {
+    if (post()) ++taken;
+  }
+  auto all = wait_until([&] { return count() - before >= taken; }, "the arrival of all posts");
+  posts += static_cast<double>(taken);
+  seconds += std::chrono::duration<double>(MonotonicClock::now() - start).count();
+  return all;
+}
+
+/// One measurement after the other, each with clients of its own.
+class RateMeasurement {
+ public:
+  RateMeasurement(const Plan& plan, const DdsDomains& domains, TakenBoard& board)
+      : plan_(plan), domains_(domains), board_(board) {}
+
+  /// From a client on the core of plchost-dds, or on the task's.
+  Result<Row> round_trip(const std::string& name, int core) {
+    const OnCore threads_inherit_it(core);
+    if (auto opened = open(BareDuty::acknowledge); !opened) return std::unexpected(opened.error());
+    Row row{.name = name};
+    const auto post = [&] { (void)client_->post_event(ping_event(), 1, Duration::zero(), kRatePatience); };
+    const auto measure_floor = [&](Duration slice) -> Result<void> {
+      time_calls(slice, row.floor, [&] { bare_->round_trip(); });
+      return {};
+    };
+    const auto measure_ours = [&](Duration slice) -> Result<void> {
+      time_calls(slice, row.ours, post);
+      return {};
+    };
+    if (auto done = alternate(plan_, {measure_floor, measure_ours}, kRateSlice); !done)
+      return std::unexpected(done.error());
+    const double p50 = ratio(summarise(row.ours).p50, summarise(row.floor).p50);
+    row.targets = {{"median below 1.15 x a bare Cyclone DDS round trip", p50, 1.15}};
+    return row;
+  }
+
+  Result<Row> rate(const std::string& name, BareDuty duty, const std::string& event_name,
+                   const PoolEvent& event) {
+    if (auto opened = open(duty); !opened) return std::unexpected(opened.error());
+    Row row{.name = name};
+    double ours = 0, our_seconds = 0, bare = 0, bare_seconds = 0;
+    const auto post_one = [&] { return client_->post_one(kBenchHost, "probe", event_name).has_value(); };
+    const auto measure_floor = [&](Duration slice) {
+      const auto& taken = board_[std::to_underlying(duty)];
+      return run_fast(slice, bare, bare_seconds, [&] { return bare_->post(); }, [&] { return taken.load(); });
+    };
+    const auto measure_ours = [&](Duration slice) {
+      return run_fast(slice, ours, our_seconds, post_one, [&] { return event.counted().count(); });
+    };
+    if (auto done = alternate(plan_, {measure_floor, measure_ours}, kRateSlice); !done)
+      return std::unexpected(done.error());
+    const double per_second = ours / our_seconds;
+    const double floor = bare / bare_seconds;
+    row.extra = {{"posts_per_second", per_second}, {"floor_posts_per_second", floor}};
+    row.targets = {
+        {"above 0.8 x the bare maximum, nothing lost (shown: bare by ours)", floor / per_second, 1.25}};
+    return row;
+  }
+
+ private:
+  // DDS's threads inherit the core of who opens a domain: each measurement has domains and clients anew.
+  Result<void> open(BareDuty duty) {
+    client_.reset();
+    bare_.reset();
+    dds::DomainOptions options;
+    options.domain = domains_.plchost;
+    auto client = ControlClient::connect(options);
+    if (!client) return std::unexpected(client.error());
+    const auto first = (*client)->post_event(ping_event(), 1, Duration::zero(), kRatePatience);
+    if (!first) return std::unexpected(first.error());
+    client_ = std::move(*client);
+    return bare_.emplace().open(bare_domain(domains_, duty));
+  }
+
+  const Plan& plan_;
+  const DdsDomains& domains_;
+  TakenBoard& board_;
+  std::unique_ptr<ControlClient> client_;
+  std::optional<BareClient> bare_;
+};
+
+Result<std::vector<Row>> measure_rate(const Plan& plan, const DdsDomains& domains, TakenBoard& board) {
+  Cell cell(plan, domains, fmt::format("plchost-bench-{}", ::getpid()));
+  if (auto started = cell.start(plan); !started) return std::unexpected(started.error());
+  auto pool = ObjectPool::attach(cell.pool());
+  if (!pool) return std::unexpected(pool.error());
+  const auto ping = pool->open_event("probe/ping");
+  if (!ping) return std::unexpected(ping.error());
+  const auto counted = pool->create_event(fmt::format("probe/{}", kWithoutTask));
+  if (!counted) return std::unexpected(counted.error());
+  (void)counted->set_registered(true);
+  RateMeasurement measurement(plan, domains, board);
+  std::vector<Row> rows;
+  for (auto row : {measurement.round_trip("post/acknowledged/same-core", plan.poster_core),
+                   measurement.round_trip("post/acknowledged/other-core", plan.task_core),
+                   measurement.rate("post/rate", BareDuty::nothing, kWithoutTask, *counted),
+                   measurement.rate("post/rate/a task runs", BareDuty::wake, "ping", *ping)}) {
+    if (!row) return std::unexpected(row.error());
+    rows.push_back(std::move(*row));
+  }
+  return rows;
+}
+
+}  // namespace
+
+Result<std::vector<Row>> measure_post_rate(const Plan& plan) {
+  constexpr std::uint32_t kFirstDomain = 20;
+  const auto salt = static_cast<std::uint32_t>(::getpid()) % 40U;
+  const DdsDomains domains{.plchost = kFirstDomain + 4 * salt, .bare = kFirstDomain + 4 * salt + 1};
+  void* const memory =
+      ::mmap(nullptr, sizeof(TakenBoard), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (memory == MAP_FAILED) return failure(ErrorCode::system, "map the board", errno);
+  TakenBoard& board = *new (memory) TakenBoard{};
+  // What the program in the instance stamps is not looked at here, but it wants a place for it.
+  const std::string stamps = fmt::format("plchost-bench-{}.board", ::getpid());
+  if (const auto made = MemoryFile::replace(stamps, sizeof(DdsBoard)); !made)
+    return std::unexpected(made.error());
+  ::setenv(kBoardVariable, ("/dev/shm/" + stamps).c_str(), 1);
+  Result<std::vector<Row>> rows;
+  {
+    // Forked before this process has any thread of DDS.
+    Processes processes;
+    for (const auto duty : {BareDuty::nothing, BareDuty::acknowledge, BareDuty::wake}) {
+      processes.fork([&, duty] {
+        run_bare_end(plan, bare_domain(domains, duty), duty, board[std::to_underlying(duty)]);
+      });
+    }
+    rows = measure_rate(plan, domains, board);
+  }
+  MemoryFile::remove(stamps);
+  ::munmap(memory, sizeof(TakenBoard));
+  return rows;
+}
+
+}  // namespace plchost::bench
