@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <tuple>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -240,7 +241,12 @@ Result<ApiReply> ControlClient::call(const ApiRequest& request, TimePoint deadli
   if (auto good = check_api_request(request); !good) return std::unexpected(std::move(good).error());
   const auto asked = caller(request.host, is_engineering(request.operation));
   if (!asked) return std::unexpected(asked.error());
-  auto reply = (*asked)->call(request, reply_reader_.get(), wait_set_, deadline);
+  // What has come on other topics would keep the wait from waiting.
+  const auto look = [&, woken = false](const auto& /*identity*/, TimePoint /*now*/) mutable {
+    if (std::exchange(woken, true)) update();
+    return RequestCaller::Wait{.deadline = deadline};
+  };
+  auto reply = (*asked)->call(request, reply_reader_.get(), wait_set_, deadline, look);
   if (reply) await_status(request.host, *reply, deadline);
   return reply;
 }

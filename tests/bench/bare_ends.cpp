@@ -67,8 +67,8 @@ class WokenThread {
     thread_ = std::move(*thread);
     return {};
   }
-  void wake(std::uint32_t posts) {
-    word_.fetch_add(posts);
+  void wake() {
+    word_.fetch_add(1);
     if (waits_.load()) futex_wake(&word_);
   }
 
@@ -103,15 +103,15 @@ void run_bare_end(const Plan& plan, std::uint32_t domain, BareDuty duty, std::at
   plc_EventAck ack{};
   for (;;) {
     end.wait();
-    std::uint32_t count = 0;
+    std::uint64_t count = 0;
     dds::take_valid<plc_EventPost>(end.reader.get(), [&](const plc_EventPost& post, const auto& /*info*/) {
       ack.sequence_number = post.sequence_number;
       ++count;
+      if (duty == BareDuty::wake) task.wake();
     });
     if (count == 0) continue;
     taken.fetch_add(count);
     if (duty == BareDuty::acknowledge) (void)dds_write(end.writer.get(), &ack);
-    if (duty == BareDuty::wake) task.wake(count);
   }
 }
 

@@ -28,11 +28,12 @@ struct BareEnd {
   [[nodiscard]] bool matched() const;
 };
 
-/// What the end that receives does with a batch of samples, besides counting them.
+/// What the end that receives does besides taking and counting.
 enum class BareDuty : std::uint8_t {
   nothing,      ///< its threads have normal priority, on any core
-  acknowledge,  ///< its threads have the core and the priorities of those of plchost-dds
-  wake,         ///< a thread of a task's core and priority, which goes through its loop once for each sample
+  acknowledge,  ///< each batch; its threads have the core and the priorities of those of plchost-dds
+  wake,         ///< at each sample, if it waits, a thread of a task's core and priority, which goes through
+                ///< its loop as often as there are samples; else as `nothing`
 };
 
 /// For a process that does nothing else. `taken` counts the samples. Returns only if it cannot begin.

@@ -51,8 +51,9 @@ void run_client(const DdsDomains& domains, Board& board, std::uint32_t index) {
   for (Job job = Job::connect; job != Job::end; job = board.job.load()) {
     if (job == Job::post && index < kClients) {
       for (std::uint32_t i = 0; i < kPostsOfEach; ++i) board.latency_ns[index * kPostsOfEach + i] = post();
+      client->reset();  // not in the way of what comes next
       board.done.fetch_add(1);
-      index = kClients;  // only once
+      return;
     } else if (job == Job::flood && index >= kClients + 1) {
       (void)(*client)->post_one(kBenchHost, "probe", "ping");
     } else {

@@ -1,3 +1,4 @@
+#include <ctime>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -79,6 +80,23 @@ TEST_F(RemoteCommand, IsDoneOnceHoweverOftenItIsRepeated) {
 
   EXPECT_FALSE(reply);
   EXPECT_EQ(host_.requests().size(), 1U);
+}
+
+TEST_F(RemoteCommand, SleepsWhileItsAnswerIsWaitedFor) {
+  host_.silent = true;
+  host_.start_server();
+  const auto sut = connect(domain_);
+  ASSERT_TRUE(sut->host("hosta", soon()));
+  const auto used = [] {
+    timespec time{};
+    ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+    return seconds(time.tv_sec) + std::chrono::nanoseconds(time.tv_nsec);
+  };
+
+  const auto before = used();
+  const TimePoint start = MonotonicClock::now();
+  EXPECT_FALSE(sut->call({"hosta", plc_OPERATION_RESET, "line1", ""}, start + seconds(1)));
+  EXPECT_LT(used() - before, (MonotonicClock::now() - start) / 4) << "what the host shows keeps it awake";
 }
 
 TEST_F(RemoteCommand, OfAKilledClientDisturbsNoOther) {
