@@ -39,6 +39,10 @@ struct LaunchOptions {
   std::string log_level = "info";  ///< --log-level
 };
 
+/// What `plc-instance --check-application` says of a valid one, behind its path: the proof that the trial
+/// came to its end.
+inline constexpr std::string_view kValidApplication = " is a valid application: ";
+
 /// argv for posix_spawn, argv[0] included.
 [[nodiscard]] std::vector<std::string> to_arguments(const std::string& program, const LaunchOptions& options);
 

@@ -18,7 +18,7 @@
 
 #include "api/control/application_versions.hpp"
 #include "api/security/sha256.hpp"
-#include "manager/system/child_process.hpp"
+#include "manager/system/application_trial.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/replace_file.hpp"
 #include "shm/base/system_call.hpp"
@@ -129,30 +129,18 @@ std::string in_senders_words(std::string text, const std::string& path, const st
 }
 
 Result<void> try_application(const StoreOrder& order, const std::string& path) {
-  constexpr std::size_t kShown = 2000;
-  auto pipe = make_output_pipe();
-  if (!pipe) return std::unexpected(pipe.error());
-  const auto process = spawn_process(
-      {.arguments = {order.plc_instance, "--check-application", path}, .output_fd = pipe->write_end.get()});
-  if (!process) return std::unexpected(process.error());
-  pollfd end{.fd = process->pidfd.get(), .events = POLLIN, .revents = 0};
+  auto trial = ApplicationTrial::start(order.plc_instance, path);
+  if (!trial) return std::unexpected(trial.error());
+  pollfd end{.fd = trial->fd(), .events = POLLIN, .revents = 0};
   constexpr auto kWait = std::chrono::duration_cast<std::chrono::milliseconds>(kTrialLimit).count();
-  const bool ended = ::poll(&end, 1, static_cast<int>(kWait)) == 1;
-  if (!ended) (void)signal_process(*process, SIGKILL);
-  const ExitStatus status = reap_process(*process);
-  std::string output = read_available(pipe->read_end.get(), kShown);
-  while (output.ends_with('\n')) output.pop_back();
-  if (status.success()) return {};
-  if (!ended) {
-    return failure(
-        ErrorCode::timed_out,
-        fmt::format("{} is refused: trying it took longer than {} s: does it return from its set-up?",
-                    order.name, kWait / 1000));
+  if (::poll(&end, 1, static_cast<int>(kWait)) != 1) {
+    trial->give_up();
+    (void)::poll(&end, 1, -1);
   }
-  return failure(ErrorCode::invalid_argument,
-                 fmt::format("{} is refused: {}", order.name,
-                             output.empty() ? fmt::format("trying it ended with {}", status.describe())
-                                            : in_senders_words(output, path, order.name)));
+  const auto valid = trial->verdict();
+  if (valid) return {};
+  return failure(valid.error().code, fmt::format("{} is refused: {}", order.name,
+                                                 in_senders_words(valid.error().message, path, order.name)));
 }
 
 Result<void> describe_version(const StoreOrder& order, const std::string& path) {

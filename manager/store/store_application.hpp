@@ -24,7 +24,4 @@ namespace plchost {
 /// main() of the helper: the result on standard output, the error's code as the exit code.
 [[nodiscard]] int store_main(std::string_view order);
 
-/// How long a trial may take.
-inline constexpr Duration kTrialLimit = std::chrono::seconds(10);
-
 }  // namespace plchost

@@ -127,6 +127,7 @@ void ProcessHost::read_replies() {
 void ProcessHost::process_ended() {
   read_reports();
   read_replies();
+  end_session(*process_);
   const ExitStatus status = reap_process(*process_);
   spdlog::info("instance {}: process {}: {}", settings_.name, process_->pid, status.describe());
   forget_process();
@@ -144,46 +145,29 @@ void ProcessHost::forget_process() {
 }
 
 Result<void> ProcessHost::check_application(const std::string& path) {
-  auto pipe = make_output_pipe();
-  if (!pipe) return std::unexpected(pipe.error());
-  auto process = spawn_process(
-      {.arguments = {settings_.program, "--check-application", path}, .output_fd = pipe->write_end.get()});
-  if (!process) return std::unexpected(process.error());
-  auto watch = reactor_.watch(process->pidfd.get(), EPOLLIN, [this](std::uint32_t) { check_ended(); });
+  auto trial = ApplicationTrial::start(settings_.program, path);
+  if (!trial) return std::unexpected(trial.error());
+  auto watch = reactor_.watch(trial->fd(), EPOLLIN, [this](std::uint32_t) { check_ended(); });
   if (!watch) {
-    (void)signal_process(*process, SIGKILL);
+    trial->give_up();
     return std::unexpected(watch.error());
   }
-  check_ = std::move(*process);
+  check_ = std::move(*trial);
   check_watch_ = std::move(*watch);
-  check_output_ = std::move(pipe->read_end);
-  check_timed_out_ = false;
-  check_timer_.set(MonotonicClock::now() + kCheckLimit);
+  check_timer_.set(MonotonicClock::now() + kTrialLimit);
   return {};
 }
 
 void ProcessHost::check_timed_out() {
-  check_timed_out_ = true;
-  if (check_) (void)signal_process(*check_, SIGKILL);  // check_ended() says the rest
+  if (check_) check_->give_up();  // check_ended() says the rest
 }
 
 void ProcessHost::check_ended() {
-  constexpr std::size_t kShown = 2000;
-  const ExitStatus status = reap_process(*check_);
-  std::string output = read_available(check_output_.get(), kShown);
-  while (output.ends_with('\n')) output.pop_back();
+  const auto verdict = check_->verdict();
   check_timer_.cancel();
   check_watch_.reset();
-  check_output_.reset();
   check_.reset();
-  if (status.success()) return events_->on_application_checked({});
-  if (check_timed_out_) {
-    return events_->on_application_checked(
-        failure(ErrorCode::timed_out, "trying it took longer than 10 s: does it return from its set-up?"));
-  }
-  events_->on_application_checked(
-      failure(ErrorCode::invalid_argument,
-              output.empty() ? fmt::format("trying it ended with {}", status.describe()) : output));
+  events_->on_application_checked(verdict);
 }
 
 std::optional<InstanceRuntime> ProcessHost::runtime() {

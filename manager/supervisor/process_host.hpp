@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "manager/supervisor/instance_host.hpp"
+#include "manager/system/application_trial.hpp"
 #include "manager/system/child_process.hpp"
 #include "manager/system/reactor.hpp"
 #include "shm/base/packet_socket.hpp"
@@ -59,14 +60,9 @@ class ProcessHost : public InstanceHost {
   Reactor::Watch link_watch_;
   std::optional<InstancePageReader> page_;
 
-  std::optional<ChildProcess> check_;
+  std::optional<ApplicationTrial> check_;
   Reactor::Watch check_watch_;
-  UniqueFd check_output_;
   Reactor::Timer check_timer_;
-  bool check_timed_out_ = false;
 };
-
-/// How long an application may take to be tried.
-inline constexpr Duration kCheckLimit = std::chrono::seconds(10);
 
 }  // namespace plchost

@@ -116,6 +116,14 @@ ExitStatus reap_process(const ChildProcess& process) {
                     .value = info.si_status};
 }
 
+void end_session(const ChildProcess& leader) noexcept {
+  siginfo_t info{};
+  // Of a child that is not reaped yet the number is still its own, as that of its group, too.
+  const int waited =
+      ::waitid(P_PIDFD, static_cast<id_t>(leader.pidfd.get()), &info, WEXITED | WNOHANG | WNOWAIT);
+  if (waited == 0 && info.si_pid == leader.pid) ::kill(-leader.pid, SIGKILL);
+}
+
 Result<void> signal_process(const ChildProcess& process, int signal) {
   const long sent = ::syscall(SYS_pidfd_send_signal, process.pidfd.get(), signal, nullptr, 0);
   if (sent != 0 && errno == ESRCH) return {};

@@ -51,6 +51,9 @@ struct SpawnRequest {
 /// The end of a process whose pidfd is readable.
 [[nodiscard]] ExitStatus reap_process(const ChildProcess& process);
 
+/// Of a child that has ended and was not reaped: SIGKILL to what it has left in its process group.
+void end_session(const ChildProcess& leader) noexcept;
+
 /// A process that is gone already is no error.
 [[nodiscard]] Result<void> signal_process(const ChildProcess& process, int signal);
 

@@ -28,6 +28,9 @@ struct LoadArguments {
   bool online = false;
 };
 
+/// The most that [host] application_limit_mib can allow.
+constexpr std::uintmax_t kLargest = std::uintmax_t{1024} << 20U;
+
 constexpr const char* kBootHelp = "the instance starts with it from now on, also after a restart of the host";
 constexpr const char* kOnlineHelp =
     "it takes over while the tasks run: no cycle is lost, variables go on; refused where it does not fit";
@@ -43,6 +46,13 @@ Result<std::string> read_application(const std::string& path) {
   std::error_code error;
   if (std::filesystem::is_directory(path, error)) {
     return failure(ErrorCode::wrong_type, path + " is a folder");
+  }
+  if (std::filesystem::exists(path, error) && !std::filesystem::is_regular_file(path, error)) {
+    return failure(ErrorCode::wrong_type, path + " is no plain file");
+  }
+  if (const auto size = std::filesystem::file_size(path, error); !error && size > kLargest) {
+    return failure(ErrorCode::wrong_size,
+                   fmt::format("{} has {} bytes; no host takes more than {}", path, size, kLargest));
   }
   std::ifstream file(path, std::ios::binary);
   if (!file) {

@@ -35,12 +35,13 @@ int check_application(const std::string& path) {
     fmt::print(stderr, "{}\n", application.error().describe());
     return kExitSetupFailed;
   }
-  fmt::print("{} is a valid application: {}, {} tasks\n", path, application->name(),
-             application->tasks().size());
+  fmt::print("{}{}{}, {} tasks\n", path, kValidApplication, application->name(), application->tasks().size());
   for (const TaskConfig& task : application->tasks()) {
     fmt::print("  {}: {}, priority {}{}\n", task.name, to_string(static_cast<PageTaskKind>(task.kind)),
                task.iec_priority, detail_of(task));
   }
+  // Destructors of the application may end the process without.
+  (void)std::fflush(stdout);
   return 0;
 }
 

@@ -60,6 +60,19 @@ TEST(Manager, BringsAKilledInstanceBackWhileTheOthersGoOn) {
   EXPECT_TRUE(plant.wait_for_cycles("line1"));
 }
 
+TEST(Manager, BringsAnInstanceBackWhoseApplicationHasLeftAProcessBehind) {
+  Plant plant;
+  plant.add("line1", "fault_forks");
+  plant.start_manager();
+  ASSERT_TRUE(plant.wait_for("line1", InstanceState::running));
+  kill_process(plant.status("line1").pid);
+  ASSERT_TRUE(Plant::eventually([&] { return plant.status("line1").restarts > 0; }));
+  ASSERT_TRUE(plant.wait_for("line1", InstanceState::running));
+  EXPECT_EQ(plant.status("line1").restarts, 1U);
+  EXPECT_EQ(plant.stop_manager().describe(), "exit code 0");
+  EXPECT_THAT(plant.leftovers(), IsEmpty());
+}
+
 TEST(Manager, PutsACrashLoopIntoSafeModeUntilAnotherApplicationIsLoaded) {
   Plant plant;
   plant.add("line1", "manager_crash_soon", "restart_delay_ms = 1\ncrash_limit = 3");
@@ -111,6 +124,19 @@ TEST(Manager, RefusesAWrongApplicationAndLeavesTheOldOneRunning) {
   }
   EXPECT_EQ(plant.status("line1").pid, pid);
   EXPECT_TRUE(plant.wait_for_cycles("line1"));
+}
+
+TEST(Manager, RefusesAnApplicationThatEndsItsTrialAsIfAllWereWell) {
+  Plant plant;
+  plant.add("line1", "bottling_line");
+  plant.start_manager();
+  ASSERT_TRUE(plant.wait_for("line1", InstanceState::running));
+  const int pid = plant.status("line1").pid;
+  const ControlReply reply =
+      plant.ask(ControlVerb::load_application, "line1", Plant::application("fault_exits"));
+  EXPECT_EQ(reply.code, ErrorCode::invalid_argument);
+  EXPECT_THAT(reply.text, HasSubstr("it ends its process in its set-up"));
+  EXPECT_EQ(plant.status("line1").pid, pid);
 }
 
 TEST(Manager, SaysWhyAnInstanceCouldNotBeSetUp) {

@@ -38,6 +38,12 @@ refused "fault_undefined_symbol.so is refused" plcctl load application line1 "$A
 refused "common.sh is refused" plcctl load application line1 "$(dirname "$0")/common.sh"
 refused "empty.so is empty" plcctl load application line1 "$cell/empty.so"
 refused "nowhere.so cannot be opened here" plcctl load application line1 "$cell/nowhere.so"
+mkfifo "$cell/fifo.so"
+truncate -s 2G "$cell/huge.so"
+refused "fifo.so is no plain file" timeout 20 "$BIN/plcctl" load application line1 "$cell/fifo.so"
+refused "no host takes more than" timeout 20 "$BIN/plcctl" load application line1 "$cell/huge.so"
+refused "fault_exits.so is refused: it ends its process" plcctl load application line1 "$APPLICATIONS/fault_exits.so"
+refused "fault_exits.so is refused: it ends its process" plcctl load application line1 "$APPLICATIONS/fault_exits.so" --on-host
 refused "no instance 'line7'" plcctl load application line7 "$good"
 more_cycles() { [ "$(task line1/Fill cycles)" -gt "$cycles" ]; }
 until_true 10 more_cycles

@@ -18,6 +18,8 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
+constexpr const char* kValid = "echo \"$2 is a valid application: Lamp, 1 tasks\"";
+
 class StoreApplication : public testing::Test {
  protected:
   StoreApplication() {
@@ -31,7 +33,7 @@ class StoreApplication : public testing::Test {
     order_.by = "engineer otto";
     order_.keep = 3;
     order_.before = "/opt/lamp.so";
-    set_trial("exit 0");
+    set_trial(kValid);
     send("contents");
   }
   ~StoreApplication() override { std::filesystem::remove_all(root_); }
@@ -134,6 +136,33 @@ TEST_F(StoreApplication, TellsTheTrialsWordsWithTheNameThatTheSenderKnows) {
 TEST_F(StoreApplication, TellsHowATrialEndedThatSaidNothing) {
   set_trial("kill -SEGV $$");
   EXPECT_THAT(carry_out(order_).error().message, HasSubstr("killed by SIGSEGV"));
+}
+
+TEST_F(StoreApplication, RefusesWhatEndsItsTrialAsIfAllWereWell) {
+  set_trial("exit 0");
+  const auto path = carry_out(order_);
+  ASSERT_FALSE(path);
+  EXPECT_EQ(path.error().message, "lamp.so is refused: it ends its process in its set-up (exit code 0)");
+  EXPECT_THAT(files(), IsEmpty());
+}
+
+TEST_F(StoreApplication, EndsWhatATrialLeavesBehind) {
+  const std::string left = root_ / "left";
+  set_trial("sleep 600 & echo $! >" + left + "; " + kValid);
+  ASSERT_TRUE(carry_out(order_));
+  const pid_t pid = std::stoi(text_of(left));
+  const auto lives = [pid] {  // a zombie does not
+    const std::string status = text_of("/proc/" + std::to_string(pid) + "/status");
+    return !status.empty() && status.find("State:\tZ") == std::string::npos;
+  };
+  for (int i = 0; i < 1000 && lives(); ++i) ::usleep(10'000);
+  EXPECT_FALSE(lives());
+}
+
+TEST_F(StoreApplication, TakesAnApplicationThatSaysALotAtItsStart) {
+  set_trial("head -c 200000 /dev/zero | tr '\\0' x; " + std::string(kValid));
+  const auto path = carry_out(order_);
+  EXPECT_TRUE(path) << path.error().describe();
 }
 
 TEST_F(StoreApplication, GivesTheNextNumberAndRemovesTheOldestBeyondTheBound) {

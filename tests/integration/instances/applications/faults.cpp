@@ -2,6 +2,8 @@
 #include <cstdlib>
 #include <stdexcept>
 
+#include <unistd.h>
+
 #include "../../../../instances/plc_app.h"
 
 namespace {
@@ -59,6 +61,14 @@ void plc_app_exit() {
 int plc_app_init() {
 #ifdef FAULT_UNDEFINED_SYMBOL
   function_of_another_runtime();
+#endif
+#ifdef FAULT_EXITS
+  std::_Exit(0);
+#endif
+#ifdef FAULT_FORKS
+  if (::fork() == 0) {
+    for (;;) ::pause();
+  }
 #endif
 #ifdef FAULT_THROWS
   throw std::runtime_error("no valve is connected");

@@ -1,0 +1,58 @@
+#include "manager/system/application_trial.hpp"
+
+#include <algorithm>
+#include <csignal>
+#include <utility>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+
+#include "instances/launch/launch_contract.hpp"
+
+namespace plchost {
+
+namespace {
+
+// Nobody reads before the end: what an application says at its start has to fit.
+constexpr int kOutputRoom = 1 << 20;
+constexpr std::size_t kShown = 2000;
+
+}  // namespace
+
+Result<ApplicationTrial> ApplicationTrial::start(const std::string& plc_instance, const std::string& path) {
+  auto pipe = make_output_pipe();
+  if (!pipe) return std::unexpected(pipe.error());
+  (void)::fcntl(pipe->write_end.get(), F_SETPIPE_SZ, kOutputRoom);
+  auto process = spawn_process(
+      {.arguments = {plc_instance, "--check-application", path}, .output_fd = pipe->write_end.get()});
+  if (!process) return std::unexpected(process.error());
+  return ApplicationTrial(std::move(*process), std::move(pipe->read_end));
+}
+
+void ApplicationTrial::give_up() {
+  gave_up_ = true;
+  (void)signal_process(process_, SIGKILL);
+}
+
+Result<void> ApplicationTrial::verdict() {
+  end_session(process_);
+  const ExitStatus status = reap_process(process_);
+  std::string output = read_available(output_.get(), kOutputRoom);
+  // The exit code alone says nothing: the application can end the process.
+  const bool valid = status.success() && output.find(kValidApplication) != std::string::npos;
+  if (valid) return {};
+  if (gave_up_) {
+    return failure(ErrorCode::timed_out,
+                   fmt::format("trying it took longer than {} s: does it return from its set-up?",
+                               std::chrono::duration_cast<std::chrono::seconds>(kTrialLimit).count()));
+  }
+  if (status.success()) {
+    return failure(ErrorCode::invalid_argument, "it ends its process in its set-up (exit code 0)");
+  }
+  output.resize(std::min(output.size(), kShown));
+  while (output.ends_with('\n')) output.pop_back();
+  return failure(ErrorCode::invalid_argument,
+                 output.empty() ? fmt::format("trying it ended with {}", status.describe()) : output);
+}
+
+}  // namespace plchost
