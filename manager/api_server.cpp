@@ -48,7 +48,8 @@ std::vector<std::string> ApiServer::arguments() const {
                                         "--application-limit",
                                         fmt::format("{}", host.application_limit_mib),
                                         "--log-level",
-                                        host.log_level};
+                                        host.log_level,
+                                        "--end-with-parent"};
   for (const std::string& label : host.labels) {
     arguments.emplace_back("--label");
     arguments.push_back(label);

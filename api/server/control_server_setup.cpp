@@ -1,6 +1,7 @@
 #include <csignal>
 #include <ctime>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -24,6 +25,9 @@ namespace {
 
 /// How often the files of the host's identity are looked at.
 constexpr Duration kIdentityLook = std::chrono::milliseconds(500);
+/// How long a server before this one may take to end, and how often that is looked at.
+constexpr Duration kAuditWait = std::chrono::seconds(5);
+constexpr Duration kAuditLook = std::chrono::milliseconds(5);
 
 /// A period of 0: it is not set.
 Result<UniqueFd> make_timer(Duration period) {
@@ -62,11 +66,11 @@ Result<void> ControlServer::Parts::open(PostLedger ledger) {
   intake.emplace(options.host, pool, std::move(ledger), epoch, guard);
   if (auto entered = enter_domain(); !entered) return entered;
   if (auto claimed = claim_name(); !claimed) return claimed;
+  if (auto opened = open_audit(); !opened) return opened;
   auto made_sessions = SessionTable::create(participant.get());
   if (!made_sessions) return std::unexpected(made_sessions.error());
   sessions = std::move(*made_sessions);
   intake->acknowledge_by(sessions->ack_writers());
-  open_audit();
   auto made_status =
       StatusPublisher::create(participant.get(), {options.host, &pool, epoch, options.run_directory,
                                                   fmt::format("{}", fmt::join(options.labels, ",")),
@@ -84,11 +88,18 @@ Result<void> ControlServer::Parts::open(PostLedger ledger) {
   return {};
 }
 
-// Without a log the plant can be stopped, too.
-void ControlServer::Parts::open_audit() {
+// Without a log the plant can be stopped, too; but while another server of this host writes it, that one
+// still ends.
+Result<void> ControlServer::Parts::open_audit() {
   std::unique_ptr<AuditLog> log;
   if (!options.audit_folder.empty()) {
     auto opened = AuditLog::open({.folder = options.audit_folder});
+    const TimePoint deadline = MonotonicClock::now() + kAuditWait;
+    while (!opened && opened.error().code == ErrorCode::busy) {
+      if (MonotonicClock::now() > deadline) return std::unexpected(opened.error());
+      std::this_thread::sleep_for(kAuditLook);
+      opened = AuditLog::open({.folder = options.audit_folder});
+    }
     if (opened) {
       log = *std::move(opened);
     } else {
@@ -101,6 +112,7 @@ void ControlServer::Parts::open_audit() {
     }
     record.from = sessions->describe(client);
   });
+  return {};
 }
 
 Result<void> ControlServer::Parts::open_gateway() {

@@ -2,6 +2,7 @@
 #include <string>
 
 #include <CLI/CLI.hpp>
+#include <sys/prctl.h>
 
 #include "api/control/exit_codes.hpp"
 #include "api/server/access/receive_gate.hpp"
@@ -28,6 +29,7 @@ int main(int argc, char** argv) {
   plchost::ServerOptions options;
   options.pool = "plchost";
   std::string log_level = "info";
+  bool end_with_parent = false;
   CLI::App app("plchost-dds: the DDS server of plchost, started by plchostd");
   app.set_version_flag("--version", PLCHOST_VERSION);
   app.add_option("--host", options.host, "name of this host in the DDS domain")->required();
@@ -57,6 +59,8 @@ int main(int argc, char** argv) {
                  "where the manager keeps the applications that were sent");
   app.add_option("--application-limit", options.application_limit_mib, "the largest of them, MiB")
       ->check(CLI::Range(1U, 1024U));
+  app.add_flag("--end-with-parent", end_with_parent,
+               "be killed when the process that has started this one ends");
   app.add_option("--log-level", log_level, "trace, debug, info, warning or error")
       ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error"}));
   try {
@@ -64,6 +68,8 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : kExitUsage;
   }
+  // Also one that hangs or is stopped: two of one host would write over each other's status.
+  if (end_with_parent) (void)::prctl(PR_SET_PDEATHSIG, SIGKILL);
   plchost::start_log("plchost-dds", log_level);
   (void)std::signal(SIGPIPE, SIG_IGN);
   options.dds.receive_fifo = plchost::dds::can_use_fifo(kReceiveFifo) ? kReceiveFifo : 0;
