@@ -21,6 +21,7 @@ constexpr std::time_t kDay = 86'400;
 /// What is said behind the words, shared by the actions.
 struct Said {
   std::string directory = "/etc/plchost/security";
+  std::string new_directory;  // of init: no variable of the environment stands for it
   std::string role;
   std::string name;
   std::int64_t days = security::kDaysOfIdentity;
@@ -128,8 +129,8 @@ void add_security_verb(const Command& plcctl, CliSession& session) {
   const auto said = std::make_shared<Said>();
   const Command verb = plcctl.verb("security", "Who may do what: identities, their roles and certificates");
   verb.noun("init", "Make the authorities of a plant and the identity of its first host",
-            [said] { return init(said->directory); })
-      .argument("DIR", said->directory, "a folder that is not there yet, or empty");
+            [said] { return init(said->new_directory); })
+      .argument("DIR", said->new_directory, "a folder that is not there yet, or empty");
   const auto with_directory = [&](const Command& noun) -> const Command& {
     return noun.option("--directory", said->directory, kDirectory, kDirectoryVariable);
   };

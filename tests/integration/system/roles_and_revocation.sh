@@ -6,7 +6,8 @@ plant=$cell/plant
 export PLCHOST_SECURITY=$plant
 as() { plcctl --identity "$plant/$1" "${@:2}"; }
 
-plcctl security init "$plant" >/dev/null
+PLCHOST_SECURITY=$cell/elsewhere plcctl security init "$plant" >/dev/null
+[ ! -e "$cell/elsewhere" ] || fail "the environment goes before the argument"
 plcctl security add-identity viewer panel >/dev/null
 plcctl security add-identity operator anna >/dev/null
 plcctl security add-identity engineer otto >/dev/null
