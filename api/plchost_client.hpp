@@ -21,6 +21,7 @@
 // All functions may be called from any thread; none is for real-time threads. The calls of one Client are
 // done one after the other: make another one for what must not wait (post_and_wait() waits for a task). A
 // callback runs on a thread of the library and may use the Client; it must not throw: the program would end.
+// In a child of fork() a Client of the parent throws `unavailable`: make another one.
 #ifndef PLCHOST_CLIENT_HPP
 #define PLCHOST_CLIENT_HPP
 

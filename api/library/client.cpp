@@ -81,9 +81,14 @@ ClientError::~ClientError() = default;
 Client::Client() : Client(Options{}) {}
 Client::Client(const Options& options)
     : worker_(std::make_unique<Worker>(options)), watcher_(std::make_unique<Watcher>(options)) {}
-Client::~Client() = default;
+Client::~Client() {
+  if (worker_->maker().is_this()) return;
+  (void)worker_.release();
+  (void)watcher_.release();
+}
 
 void Client::close() {
+  if (!worker_->maker().is_this()) return;
   watcher_->end();
   worker_->end();
 }
@@ -123,6 +128,7 @@ Client::Posted Client::post(const std::string& host, const std::string& event, u
 
 void Client::post(const std::string& host, const std::string& event,
                   std::function<void(const Outcome&)> done) {
+  check_callback(static_cast<bool>(done));
   worker_->begin([this, host, event, done = std::move(done)](const Result<ControlClient*>& client) {
     done(outcome_of(client ? post_to(**client, host, event, 1, worker_->timeout())
                            : Result<PostReport>(std::unexpected(client.error()))));

@@ -149,6 +149,10 @@ bool is_same(const Client::Event& a, const Client::Event& b) {
   return all_of(a) == all_of(b);
 }
 
+void check_callback(bool given) {
+  if (!given) throw_client_error({ErrorCode::invalid_argument, 0, "no callback is given"});
+}
+
 void throw_client_error(const Error& error) {
   throw ClientError(static_cast<int>(error.code), error.describe());
 }

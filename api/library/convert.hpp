@@ -19,6 +19,8 @@ namespace plchost {
 [[nodiscard]] bool is_same(const Client::Task& a, const Client::Task& b);
 [[nodiscard]] bool is_same(const Client::Event& a, const Client::Event& b);
 
+/// Throws invalid_argument if there is none.
+void check_callback(bool given);
 [[noreturn]] void throw_client_error(const Error& error);
 
 }  // namespace plchost

@@ -28,6 +28,7 @@ void Client::Watch::Subscription::look(const News& news) {
 
 void Client::Watch::Subscription::stop() noexcept {
   stopped_.store(true);
+  if (!maker_.is_this()) return;  // who held it is not here
   const std::lock_guard lock(calling_);
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "api/library/connection.hpp"
+#include "api/library/maker_process.hpp"
 
 namespace plchost {
 
@@ -38,6 +39,7 @@ class __attribute__((visibility("hidden"))) Client::Watch::Subscription {
   virtual void tell(const News& news) = 0;
 
  private:
+  MakerProcess maker_;
   std::recursive_mutex calling_;  // a callback may stop its own watch
   std::atomic<bool> stopped_{false};
 };

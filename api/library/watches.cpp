@@ -132,32 +132,38 @@ void Client::Watch::stop() noexcept {
 }
 
 Client::Watch Client::begin_watch(std::shared_ptr<Watch::Subscription> subscription) {
+  if (const auto ours = worker_->maker().check(); !ours) throw_client_error(ours.error());
   watcher_->add(subscription);
   return Watch(std::move(subscription));
 }
 
 Client::Watch Client::watch_hosts(std::function<void(const Host&)> callback) {
+  check_callback(static_cast<bool>(callback));
   return begin_watch(std::make_shared<HostsWatch>(std::move(callback)));
 }
 
 Client::Watch Client::watch_instances(const std::string& host,
                                       std::function<void(const Instance&)> callback) {
+  check_callback(static_cast<bool>(callback));
   return begin_watch(std::make_shared<StatusWatch<plc_InstanceStatus, Instance>>(
       host, &ControlClient::instances, std::move(callback)));
 }
 
 Client::Watch Client::watch_tasks(const std::string& host, std::function<void(const Task&)> callback) {
+  check_callback(static_cast<bool>(callback));
   return begin_watch(
       std::make_shared<StatusWatch<plc_TaskStatus, Task>>(host, &ControlClient::tasks, std::move(callback)));
 }
 
 Client::Watch Client::watch_events(const std::string& host, std::function<void(const Event&)> callback) {
+  check_callback(static_cast<bool>(callback));
   return begin_watch(std::make_shared<StatusWatch<plc_EventStatus, Event>>(host, &ControlClient::events,
                                                                            std::move(callback)));
 }
 
 Client::Watch Client::watch_transitions(const std::string& host,
                                         std::function<void(const Transition&)> callback) {
+  check_callback(static_cast<bool>(callback));
   return begin_watch(std::make_shared<TransitionsWatch>(host, std::move(callback)));
 }
 

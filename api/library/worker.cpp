@@ -44,6 +44,7 @@ void Client::Worker::end() {
 }
 
 void Client::Worker::begin(Job job) {
+  if (const auto ours = maker_.check(); !ours) return job(std::unexpected(ours.error()));
   {
     const std::lock_guard lock(mutex_);
     if (!ending_) {

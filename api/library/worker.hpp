@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "api/library/connection.hpp"
+#include "api/library/maker_process.hpp"
 
 namespace plchost {
 
@@ -23,6 +24,8 @@ class __attribute__((visibility("hidden"))) Client::Worker {
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
+  /// In a child of fork() nothing of it may be touched, not even destroyed.
+  [[nodiscard]] const MakerProcess& maker() const noexcept { return maker_; }
   [[nodiscard]] Duration timeout() const noexcept { return timeout_; }
   [[nodiscard]] TimePoint deadline() const { return MonotonicClock::now() + timeout_; }
 
@@ -48,6 +51,7 @@ class __attribute__((visibility("hidden"))) Client::Worker {
  private:
   void work();
 
+  MakerProcess maker_;
   Connection connection_;
   Duration timeout_;
   std::mutex mutex_;

@@ -2,9 +2,12 @@
 #include <atomic>
 #include <condition_variable>
 #include <future>
+#include <memory>
 #include <thread>
 
 #include <gmock/gmock.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "api/plchost_client.hpp"
 #include "tests/integration/api/test_host.hpp"
@@ -169,6 +172,29 @@ TEST_F(ClientLibrary, DoesNothingAfterItWasClosed) {
   EXPECT_EQ(event_.counted().count(), 0U);
 }
 
+// Without any of its threads: who waited for them would wait for ever.
+TEST_F(ClientLibrary, IsNeitherUsedNorWaitedForInAChildOfFork) {
+  auto sut = std::make_unique<Client>(options());
+  auto watch = sut->watch_hosts([](const Client::Host&) {});
+  EXPECT_EQ(sut->post("hosta", "line1/ready").accepted, 1U);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    ::alarm(20);
+    const bool refused =
+        error_of([&] { sut->post("hosta", "line1/ready"); }).code() == ClientError::unavailable &&
+        error_of([&] { (void)sut->watch_hosts([](const Client::Host&) {}); }).code() ==
+            ClientError::unavailable;
+    watch.stop();
+    sut->close();
+    sut.reset();
+    ::_exit(refused ? 0 : 1);
+  }
+  int status = -1;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  EXPECT_EQ(status, 0);
+  EXPECT_EQ(sut->post("hosta", "line1/ready").accepted, 1U);
+}
+
 TEST_F(ClientLibrary, ThrowsWithTheCodeAndTextOfTheHost) {
   Client sut(options());
   const ClientError rejected = error_of([&] { sut.post("hosta", "line1/redy"); });
@@ -192,6 +218,10 @@ TEST_F(ClientLibrary, RefusesAtOnceWhatCannotBe) {
   EXPECT_EQ(error_of([&] { sut.post("hosta", "ready"); }).code(), ClientError::invalid_argument);
   EXPECT_EQ(error_of([&] { sut.post("ho sta", "line1/ready"); }).code(), ClientError::invalid_argument);
   EXPECT_EQ(error_of([&] { sut.start("hosta", "li/ne"); }).code(), ClientError::invalid_argument);
+  EXPECT_EQ(error_of([&] { sut.post("hosta", "line1/ready", nullptr); }).code(),
+            ClientError::invalid_argument);
+  EXPECT_EQ(error_of([&] { (void)sut.watch_hosts(nullptr); }).code(), ClientError::invalid_argument);
+  EXPECT_EQ(error_of([&] { (void)sut.watch_tasks("hosta", nullptr); }).code(), ClientError::invalid_argument);
   EXPECT_EQ(event_.counted().count(), 0U);
 }
 
