@@ -73,14 +73,12 @@ void ControlServer::Parts::on_event_post(dds_entity_t reader, void* server) {
   MemoryGuard::watch_thread();
   auto& self = *static_cast<Parts*>(server);
   if (self.intake->take_posts(reader)) raise_event(self.wake.get());
-  self.receiving_share.rest_if_due();
 }
 
 void ControlServer::Parts::on_event_batch(dds_entity_t reader, void* server) {
   MemoryGuard::watch_thread();
   auto& self = *static_cast<Parts*>(server);
   if (self.intake->take_batches(reader)) raise_event(self.wake.get());
-  self.receiving_share.rest_if_due();
 }
 
 void ControlServer::Parts::on_wake_listener(dds_entity_t /*reader*/, void* server) {

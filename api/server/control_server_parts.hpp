@@ -19,7 +19,6 @@
 #include "api/server/lists/object_lister.hpp"
 #include "api/server/manager_link.hpp"
 #include "api/server/name_claim.hpp"
-#include "api/server/posts/core_share.hpp"
 #include "api/server/posts/event_intake.hpp"
 #include "api/server/posts/run_watch.hpp"
 #include "api/server/session_table.hpp"
@@ -115,7 +114,6 @@ struct ControlServer::Parts {
   dds::Entity subscriber;
   dds::Entity event_topic;
   dds::Entity event_reader;
-  CoreShare receiving_share;  // of DDS's receiving thread
   dds::Entity batch_topic;
   dds::Entity batch_reader;
   dds::Entity chunk_topic;
