@@ -19,10 +19,15 @@ endfunction()
 
 function(plchost_options name)
   target_compile_options(${name} PRIVATE ${PLCHOST_WARNINGS} $<$<COMPILE_LANGUAGE:CXX>:${PLCHOST_CXX_WARNINGS}>)
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+    # libstdc++ 12 uses what it has itself declared deprecated; g++ does not mind in its own headers, clang does.
+    target_compile_options(${name} PRIVATE -Wno-deprecated-declarations)
+  endif()
   target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR})
   if(SANITIZER)
     list(JOIN SANITIZER "," sanitizers)
-    target_compile_options(${name} PRIVATE -fsanitize=${sanitizers} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+    target_compile_options(${name} PRIVATE -fsanitize=${sanitizers} -fno-sanitize=vptr -fno-sanitize-recover=all -fno-omit-frame-pointer)
+    # vptr: it needs the C++ library, which programs in C do not have.
     target_link_options(${name} PUBLIC -fsanitize=${sanitizers})
     if("thread" IN_LIST SANITIZER AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
       # The seqlock's fences: every access beside them is atomic, so nothing is hidden by this.

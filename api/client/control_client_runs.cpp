@@ -40,6 +40,7 @@ std::optional<Result<RunReport>> ControlClient::take_run(const dds::Guid& source
   std::optional<Result<RunReport>> found;
   dds::take_valid<plc_EventRun>(runs_.reader.get(), [&](const plc_EventRun& run, const auto& /*info*/) {
     if (dds::Guid::from(run.source) != source || run.sequence_number != number) return;  // was given up
+    if (found) return;  // told again for a repetition
     if (run.code != 0) {
       found = failure(static_cast<ErrorCode>(run.code), std::string(dds::text_of(run.text)));
       return;

@@ -21,6 +21,10 @@ void RunWatch::add(const AwaitedPost& post, const TaskWatch& tasks) {
   const auto is_same_source = [&post](const Wait& wait) {
     return dds::Guid::from(wait.result.source) == post.source;
   };
+  const auto is_same = [&](const Wait& wait) {
+    return is_same_source(wait) && wait.result.sequence_number == post.sequence;
+  };
+  if (std::ranges::any_of(waits_, is_same)) return;  // a post that came again: the first one counts
   const bool full = waits_.size() >= kMaxWaits ||
                     static_cast<std::size_t>(std::ranges::count_if(waits_, is_same_source)) >= kMaxOfSource;
   Wait& wait = waits_.emplace_back();
@@ -56,9 +60,10 @@ void RunWatch::look_at(Wait& wait, Run& run, const TaskWatch& tasks) {
     const std::int64_t start = wrapping_sum(counters.release_ns, counters.latency_last_ns);
     const std::int64_t end = wrapping_sum(start, counters.exec_last_ns);
     const std::int64_t received = wait.received.time_since_epoch().count();
-    const std::int64_t end_ns = wrapping_difference(end, received);
+    // Below 0: of a post that came again, and whose task ran for it before.
+    const std::int64_t end_ns = std::max<std::int64_t>(wrapping_difference(end, received), 0);
     if (end_ns < wait.result.end_ns) return;
-    wait.result.start_ns = wrapping_difference(start, received);
+    wait.result.start_ns = std::max<std::int64_t>(wrapping_difference(start, received), 0);
     wait.result.end_ns = end_ns;
     dds::copy_text(wait.result.last_task, name);
   } else if (!runtime || runtime->running == 0) {

@@ -83,6 +83,33 @@ TEST_F(RunWatchTest, TellsWhenTheTaskHasRunForThePost) {
   EXPECT_TRUE(sut_.empty());
 }
 
+TEST_F(RunWatchTest, TellsOfAPostThatCameAgainOnceAndFromItsFirstArrival) {
+  sut_.add(post(5, "ready", 3), tasks_);
+  AwaitedPost again = post(5, "ready", 3);
+  again.received += microseconds(500);
+  sut_.add(again, tasks_);
+  write_cycle(3, microseconds(10));
+
+  const auto told = sut_.look(tasks_, now_);
+
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0].end_ns, 13'000);
+}
+
+TEST_F(RunWatchTest, NamesTheTaskAlsoIfItRanBeforeThePostCameAgain) {
+  write_cycle(3, microseconds(10));
+  AwaitedPost again = post(5, "ready", 3);
+  again.received += microseconds(500);
+  sut_.add(again, tasks_);
+
+  const auto told = sut_.look(tasks_, now_);
+
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(dds::text_of(told[0].last_task), "line1/Fill");
+  EXPECT_EQ(told[0].start_ns, 0);
+  EXPECT_EQ(told[0].end_ns, 0);
+}
+
 TEST_F(RunWatchTest, KnowsAnEventOfTheSameNameOfAnotherInstanceForAnother) {
   EXPECT_EQ(tasks_.bound_tasks("line1", "ready").size(), 1U);
   EXPECT_TRUE(tasks_.bound_tasks("line2", "ready").empty());

@@ -15,9 +15,9 @@ namespace {
 using namespace std::chrono_literals;
 using ::testing::HasSubstr;
 
-const Task_Info* seen = nullptr;
+const Task_Info* seen_task = nullptr;
 void cycle() {
-  seen = plc_current_task();
+  seen_task = plc_current_task();
 }
 unsigned char variable() {
   return 2;
@@ -74,7 +74,7 @@ TEST_F(TaskBuilder, TakesTheIntervalInTheUnitItIsGiven) {
 TEST_F(TaskBuilder, TellsACycleWhoseItIs) {
   const auto sut = build_tasks(setup_);
   (*sut)[2].entry();
-  EXPECT_EQ(seen, &tasks_[2]);
+  EXPECT_EQ(seen_task, &tasks_[2]);
   EXPECT_EQ(plc_current_task(), nullptr);
 }
 

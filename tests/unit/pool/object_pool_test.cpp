@@ -134,10 +134,10 @@ TEST_F(ObjectPoolTest, WhatIsNoPlainFileIsNamedAndLeftAlone) {
   ASSERT_EQ(::mkdir(("/dev/shm/" + folder.get()).c_str(), 0700), 0);
   for (const auto& [name, kind] :
        {std::pair(fifo.get(), "is a FIFO"), std::pair(folder.get(), "is a folder")}) {
-    const auto expect_refused = [&kind = kind](const Result<ObjectPool>& sut) {
+    const auto expect_refused = [&what = kind](const Result<ObjectPool>& sut) {
       ASSERT_FALSE(sut);
       EXPECT_EQ(sut.error().code, ErrorCode::wrong_type);
-      EXPECT_THAT(sut.error().message, HasSubstr(kind));
+      EXPECT_THAT(sut.error().message, HasSubstr(what));
     };
     expect_refused(ObjectPool::create(name));
     expect_refused(ObjectPool::attach(name));
