@@ -26,8 +26,15 @@ function(plchost_options name)
   target_include_directories(${name} PUBLIC ${PROJECT_SOURCE_DIR})
   if(SANITIZER)
     list(JOIN SANITIZER "," sanitizers)
-    target_compile_options(${name} PRIVATE -fsanitize=${sanitizers} -fno-sanitize=vptr -fno-sanitize-recover=all -fno-omit-frame-pointer)
-    # vptr: it needs the C++ library, which programs in C do not have.
+    # g++ and clang have different ways to ask for it.
+    foreach(kind address thread)
+      string(TOUPPER ${kind} macro)
+      if(kind IN_LIST SANITIZER)
+        target_compile_definitions(${name} PRIVATE PLCHOST_${macro}_SANITIZER)
+      endif()
+    endforeach()
+    target_compile_options(${name} PRIVATE -fsanitize=${sanitizers} -fno-sanitize-recover=all -fno-omit-frame-pointer
+      -fno-sanitize=vptr)  # needs the C++ library, which programs in C do not have
     target_link_options(${name} PUBLIC -fsanitize=${sanitizers})
     if("thread" IN_LIST SANITIZER AND CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
       # The seqlock's fences: every access beside them is atomic, so nothing is hidden by this.

@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 #include <sys/epoll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
 
 #include "api/control/application_versions.hpp"
 #include "api/control/exit_codes.hpp"
@@ -18,7 +20,8 @@ ApiServer::ApiServer(Reactor& reactor, const ManagerConfig& config, std::string 
     : reactor_(reactor),
       config_(config),
       program_(std::move(program)),
-      timer_(reactor, [this] { on_timer(); }) {}
+      timer_(reactor, [this] { on_timer(); }),
+      beat_timer_(reactor, [this] { look_at_beats(); }) {}
 
 void ApiServer::start() {
   spawn();
@@ -64,6 +67,8 @@ std::vector<std::string> ApiServer::arguments() const {
   }
   if (config_.dds.allow_unsecured) arguments.emplace_back("--allow-unsecured");
   if (!config_.dds.multicast) arguments.emplace_back("--no-multicast");
+  arguments.emplace_back("--beat-fd");
+  arguments.push_back(fmt::format("{}", kChildReportFd));
   arguments.emplace_back("--name-since");
   arguments.push_back(fmt::format("{}", name_since_ns_));
   if (name_held_) arguments.emplace_back("--name-held");
@@ -74,7 +79,8 @@ std::vector<std::string> ApiServer::arguments() const {
 void ApiServer::spawn() {
   spawned_ = MonotonicClock::now();
   if (name_since_ns_ == 0) name_since_ns_ = unix_time_ns();
-  auto process = spawn_process({.arguments = arguments()});
+  beats_.reset(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
+  auto process = spawn_process({.arguments = arguments(), .report_fd = beats_.get()});
   if (process) {
     auto watch = reactor_.watch(process->pidfd.get(), EPOLLIN, [this](std::uint32_t) { ended(); });
     if (watch) {
@@ -82,6 +88,8 @@ void ApiServer::spawn() {
       exit_watch_ = std::move(*watch);
       spdlog::info("API server: process {}", process_->pid);
       if (name_delay_ != Duration::zero()) timer_.set(spawned_ + kNameAsked);
+      heartbeat_ = HeartbeatWatch(kApiSilence);
+      look_at_beats();
       return;
     }
     (void)signal_process(*process, SIGKILL);
@@ -97,6 +105,7 @@ void ApiServer::ended() {
   exit_watch_.reset();
   process_.reset();
   timer_.cancel();
+  beat_timer_.cancel();
   if (shut_down_) return std::exchange(shut_down_, nullptr)();
   const TimePoint now = MonotonicClock::now();
   if (status.exited_with(kExitNameTaken)) return name_is_taken(now);
@@ -131,8 +140,20 @@ void ApiServer::on_timer() {
   if (process_) (void)signal_process(*process_, SIGKILL);
 }
 
+void ApiServer::look_at_beats() {
+  std::uint64_t more = 0;
+  if (::read(beats_.get(), &more, sizeof more) == sizeof more) ++beats_counted_;
+  const TimePoint now = MonotonicClock::now();
+  heartbeat_.look(now, beats_counted_);
+  if (!heartbeat_.silent()) return beat_timer_.set(now + HeartbeatWatch::kLongestGap);
+  spdlog::error("API server: stands still since {} s; it is killed",
+                std::chrono::duration_cast<std::chrono::seconds>(kApiSilence).count());
+  (void)signal_process(*process_, SIGKILL);
+}
+
 void ApiServer::shut_down(std::function<void()> done) {
   timer_.cancel();
+  beat_timer_.cancel();
   if (!process_) return done();
   shut_down_ = std::move(done);
   (void)signal_process(*process_, SIGTERM);

@@ -7,13 +7,14 @@
 #include <vector>
 
 #include "manager/config/manager_config.hpp"
+#include "manager/supervisor/heartbeat_watch.hpp"
 #include "manager/system/child_process.hpp"
 #include "manager/system/reactor.hpp"
 
 namespace plchost {
 
-/// Keeps `plchost-dds` alive: started again at once when it ends, and with back-off when it keeps ending. It
-/// finds the manager by its control socket, and ends by itself when that closes. When another host of the
+/// Keeps `plchost-dds` alive: started again at once when it ends, and with back-off when it keeps ending;
+/// killed when its loop stands still. It finds the manager by its control socket, and ends by itself when that closes. When another host of the
 /// domain has this host's name, it is started again from time to time only, to see whether it still has.
 class ApiServer {
  public:
@@ -28,6 +29,7 @@ class ApiServer {
   void ended();
   void on_timer();
   void name_is_taken(TimePoint now);
+  void look_at_beats();
   [[nodiscard]] std::vector<std::string> arguments() const;
 
   Reactor& reactor_;
@@ -36,6 +38,10 @@ class ApiServer {
   std::optional<ChildProcess> process_;
   Reactor::Watch exit_watch_;
   Reactor::Timer timer_;
+  Reactor::Timer beat_timer_;
+  UniqueFd beats_;  ///< an eventfd that its loop counts up
+  std::int64_t beats_counted_ = 0;
+  HeartbeatWatch heartbeat_;
   TimePoint spawned_{};
   Duration delay_{};
   std::int64_t name_since_ns_ = 0;  ///< 0: nobody has asked for the name yet
@@ -47,6 +53,8 @@ class ApiServer {
 /// Of the second and later restarts in a row: doubles from the first to the second.
 inline constexpr Duration kApiRestartDelay = std::chrono::milliseconds(100);
 inline constexpr Duration kApiRestartDelayMax = std::chrono::seconds(5);
+/// Whose loop stands still for so long is killed. A flood of requests keeps it busy for some seconds.
+inline constexpr Duration kApiSilence = std::chrono::seconds(10);
 /// Of those that were refused the name: doubles from the first to the second.
 inline constexpr Duration kNameDelay = std::chrono::seconds(5);
 inline constexpr Duration kNameDelayMax = std::chrono::seconds(60);

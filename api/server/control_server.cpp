@@ -145,6 +145,7 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
     look_at_runs();
   } else if (fd == presence_timer.get()) {
     status->write_presence();
+    if (options.beat_fd >= 0) raise_event(options.beat_fd);
   } else if (fd == identity_timer.get()) {
     tell_of_refused(MonotonicClock::now());
     if (identity_changed()) return false;

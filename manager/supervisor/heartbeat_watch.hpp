@@ -17,14 +17,18 @@ class HeartbeatWatch {
   static constexpr Duration kLimit = std::chrono::seconds(3);
   static constexpr Duration kLongestGap = std::chrono::milliseconds(200);
 
+  HeartbeatWatch() noexcept = default;
+  explicit HeartbeatWatch(Duration limit) noexcept : limit_(limit) {}
+
   void look(TimePoint now, std::int64_t beat) noexcept {
     silence_ = beat_ == beat ? silence_ + std::min(now - looked_, kLongestGap) : Duration::zero();
     beat_ = beat;
     looked_ = now;
   }
-  [[nodiscard]] bool silent() const noexcept { return silence_ >= kLimit; }
+  [[nodiscard]] bool silent() const noexcept { return silence_ >= limit_; }
 
  private:
+  Duration limit_ = kLimit;
   std::optional<std::int64_t> beat_;
   TimePoint looked_;
   Duration silence_{};

@@ -116,8 +116,9 @@ Result<void> Reactor::run() {
     const int count = ::epoll_wait(epoll_.get(), events.data(), kEventsPerRound, wait_milliseconds());
     if (count < 0 && errno != EINTR) return failure(ErrorCode::system, "epoll_wait", errno);
     for (int i = 0; i < count; ++i) {
-      const epoll_event& event = events[static_cast<std::size_t>(i)];
-      const auto found = watches_.find(event.data.u64);
+      const epoll_event event = events[static_cast<std::size_t>(i)];
+      const std::uint64_t id = event.data.u64;  // packed: no reference to it
+      const auto found = watches_.find(id);
       if (found != watches_.end()) (*found->second)(event.events);
     }
     run_timers();

@@ -17,7 +17,7 @@ std::size_t page() noexcept {
 
 // What the kernel stores of the processor, and room for the handler.
 std::size_t usable_size() noexcept {
-#if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
+#if defined(PLCHOST_THREAD_SANITIZER) || defined(PLCHOST_ADDRESS_SANITIZER)
   constexpr std::size_t kHandler = std::size_t{128} << 10;
 #else
   constexpr std::size_t kHandler = std::size_t{16} << 10;

@@ -23,7 +23,7 @@ namespace plchost {
 
 namespace {
 
-#if defined(__SANITIZE_THREAD__)
+#if defined(PLCHOST_THREAD_SANITIZER)
 constexpr std::size_t kStackSize = std::size_t{4} << 20;  // the sanitizer takes 1 MiB of it for itself
 #else
 constexpr std::size_t kStackSize = std::size_t{1} << 20;

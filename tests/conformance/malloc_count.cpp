@@ -5,7 +5,7 @@
 
 // Counts every allocation of the program while it is told to. The sanitizers have a malloc of their own, with
 // hooks.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if defined(PLCHOST_ADDRESS_SANITIZER) || defined(PLCHOST_THREAD_SANITIZER)
 // g++ has the function, not the header.
 extern "C" int
 __sanitizer_install_malloc_and_free_hooks(  // NOLINT(bugprone-reserved-identifier): the sanitizer's own

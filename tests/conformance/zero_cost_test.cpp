@@ -10,7 +10,7 @@
 #include "tests/conformance/malloc_count.hpp"
 #include "tests/conformance/scheduler_fixture.hpp"
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if defined(PLCHOST_ADDRESS_SANITIZER) || defined(PLCHOST_THREAD_SANITIZER)
 #define PLCHOST_SANITIZED 1  // their shadow memory faults
 #else
 #define PLCHOST_SANITIZED 0

@@ -1,8 +1,10 @@
 #include <csignal>
 #include <string>
+#include <thread>
 
 #include <gmock/gmock.h>
 
+#include "manager/api_server.hpp"
 #include "manager/supervisor/managed_instance.hpp"
 #include "shm/base/exception_history.hpp"
 #include "tests/integration/manager/plant.hpp"
@@ -86,7 +88,7 @@ TEST(Manager, PutsACrashLoopIntoSafeModeUntilAnotherApplicationIsLoaded) {
 }
 
 TEST(Manager, LeadsOutOfAFaultThatHoldsTheHeapAsOutOfAnyOther) {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if defined(PLCHOST_ADDRESS_SANITIZER) || defined(PLCHOST_THREAD_SANITIZER)
   GTEST_SKIP() << "the sanitizer's own heap ends the process";
 #endif
   Plant plant;
@@ -191,6 +193,21 @@ TEST(Manager, KeepsTheApiServerAliveAndEndsItWithItself) {
   const int second = std::stoi(lines()[1]);
   EXPECT_EQ(plant.stop_manager().describe(), "exit code 0");
   EXPECT_FALSE(open_process(second));
+}
+
+TEST(Manager, KillsAnApiServerWhoseLoopStandsStillAndNoOther) {
+  Plant plant;
+  plant.use_api_server(
+      "echo $$ >> api.log\n"
+      "until [ -e stands_still ]; do printf '\\001\\0\\0\\0\\0\\0\\0\\0' >&3; sleep 0.1; done\n"
+      "exec sleep 1000\n");
+  plant.start_manager();
+  const auto lines = [&] { return plant.lines_of("api.log"); };
+  ASSERT_TRUE(Plant::eventually([&] { return lines().size() == 1; }));
+  std::this_thread::sleep_for(kApiSilence + std::chrono::seconds(1));
+  EXPECT_EQ(lines().size(), 1U);
+  plant.write_file("stands_still", "");
+  EXPECT_TRUE(Plant::eventually([&] { return lines().size() == 2; }));
 }
 
 }  // namespace

@@ -34,7 +34,7 @@ std::string complaint_about(const std::vector<std::byte>& file) {
   return checked ? std::string() : checked.error().message;
 }
 
-// The first of its symbols that it defines becomes one that exists once in a process.
+// The first of the functions that it defines becomes one that exists once in a process.
 TEST(ElfCheck, FindsWhatExistsOnceInAProcess) {
   auto file = sample();
   EXPECT_TRUE(check_elf_can_leave(file));
@@ -49,7 +49,7 @@ TEST(ElfCheck, FindsWhatExistsOnceInAProcess) {
          at += sizeof(Elf64_Sym)) {
       Elf64_Sym symbol{};
       std::memcpy(&symbol, file.data() + at, sizeof symbol);
-      if (symbol.st_shndx == SHN_UNDEF) continue;
+      if (symbol.st_shndx == SHN_UNDEF || ELF64_ST_TYPE(symbol.st_info) != STT_FUNC) continue;
       symbol.st_info = ELF64_ST_INFO(STB_GNU_UNIQUE, ELF64_ST_TYPE(symbol.st_info));
       put(file, at, symbol);
       changed = true;

@@ -48,7 +48,7 @@ int signal_of(const std::function<void()>& work) {
 class NoSystemCall : public testing::Test {
  protected:
   void SetUp() override {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if defined(PLCHOST_ADDRESS_SANITIZER) || defined(PLCHOST_THREAD_SANITIZER)
     GTEST_SKIP() << "sanitizers call the system themselves";
 #endif
   }

@@ -30,7 +30,7 @@ using Work = std::function<void(ObjectPool&)>;
 class EachInstruction : public testing::Test {
  protected:
   void SetUp() override {
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if defined(PLCHOST_ADDRESS_SANITIZER) || defined(PLCHOST_THREAD_SANITIZER)
     GTEST_SKIP() << "too many instructions";
 #endif
   }

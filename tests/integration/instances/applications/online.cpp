@@ -90,7 +90,7 @@ unsigned long use_shared() {
 #endif
 
 // Its signal, not a sanitizer's report, is what the runtime is to see.
-__attribute__((noinline, no_sanitize_address, no_sanitize_undefined)) void fault_of_version() {
+__attribute__((noinline, no_sanitize_address, no_sanitize("undefined"))) void fault_of_version() {
   volatile int* const nowhere = nullptr;
   *nowhere = VERSION;
 }
