@@ -156,7 +156,7 @@ TEST(OnlineChangeOfAnInstance, FindsTheTasksByNameAlsoInAnotherOrder) {
   ASSERT_EQ(changed.code, ErrorCode::ok) << changed.text;
   ASSERT_TRUE(sut.runs());
   EXPECT_EQ(sut.report().version, 2);
-  EXPECT_GT(sut.process().task("VersionReport")->counters.cycles, 0U);
+  EXPECT_TRUE(eventually([&] { return sut.process().task("VersionReport")->counters.cycles > 0; }));
 }
 
 struct Refusal {
@@ -201,7 +201,9 @@ INSTANTIATE_TEST_SUITE_P(
         Refusal{"online_area_flags", "area 'plain': dwFlags is 0x1, of the one that runs it is 0x10"},
         Refusal{"online_variables", "variables 'machine': dwBytes is 24, of the one that runs it is 16"},
         Refusal{"online_layout", "variables 'machine': qwLayout is 2, of the one that runs it is 1"},
+#ifndef __clang__  // makes no such symbols
         Refusal{"online_unique", "build it with -fno-gnu-unique"},
+#endif
         Refusal{"online_init_throws", "plc_app_init returned 1"},
         Refusal{"fault_no_tasks", "it has no tasks"}, Refusal{"fault_wrong_version", "version"},
         Refusal{"fault_missing_init", "does not export plc_app_init"},
