@@ -39,7 +39,7 @@ class NameClaim {
     bool serving = false;
   };
   /// So long a host that comes asks before it serves: who lives nearby has answered by then.
-  static constexpr Duration kAsking = std::chrono::milliseconds(100);
+  static constexpr Duration kAsking = std::chrono::milliseconds(300);
   /// One that was refused the name takes its time: also who lives behind a slow link, or speaks DDS Security,
   /// has.
   static constexpr Duration kAskingAgain = std::chrono::seconds(2);
