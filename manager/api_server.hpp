@@ -14,8 +14,9 @@
 namespace plchost {
 
 /// Keeps `plchost-dds` alive: started again at once when it ends, and with back-off when it keeps ending;
-/// killed when its loop stands still. It finds the manager by its control socket, and ends by itself when that closes. When another host of the
-/// domain has this host's name, it is started again from time to time only, to see whether it still has.
+/// killed when its loop stands still. It finds the manager by its control socket, and ends by itself when
+/// that closes. When another host of the domain has this host's name, it is started again from time to time
+/// only, to see whether it still has.
 class ApiServer {
  public:
   ApiServer(Reactor& reactor, const ManagerConfig& config, std::string program);
