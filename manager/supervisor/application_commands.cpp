@@ -65,6 +65,10 @@ bool ManagedInstance::loads_online() const {
   return has_option(kOnlineOption);
 }
 
+bool ManagedInstance::takes_over() const {
+  return operation_ && operation_->step == Step::forwarded && loads_online();
+}
+
 // Whether there is a process that another version could take over in.
 Result<void> ManagedInstance::check_online() const {
   const bool runs = status_.state == InstanceState::running || status_.state == InstanceState::stopped;

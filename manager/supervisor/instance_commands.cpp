@@ -243,6 +243,7 @@ void ManagedInstance::look_again() {
 
 Duration ManagedInstance::limit_of(ControlVerb verb) noexcept {
   if (verb == ControlVerb::stop) return kStopLimit;
+  if (verb == ControlVerb::change_application) return kChangeLimit;
   return verb == ControlVerb::single_cycle ? kSingleCycleLimit : kCommandLimit;
 }
 

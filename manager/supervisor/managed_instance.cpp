@@ -225,11 +225,11 @@ void ManagedInstance::on_timer() {
       return finish_adoption("no answer");
     case Phase::up:
       if (operation_ && operation_->step == Step::forwarded) {
-        finish(
-            ErrorCode::timed_out,
-            fmt::format("'{}' did not answer within {} s", config_.name,
-                        std::chrono::duration_cast<std::chrono::seconds>(limit_of(operation_->request.verb))
-                            .count()));
+        const Duration limit =
+            limit_of(takes_over() ? ControlVerb::change_application : operation_->request.verb);
+        finish(ErrorCode::timed_out,
+               fmt::format("'{}' did not answer within {} s", config_.name,
+                           std::chrono::duration_cast<std::chrono::seconds>(limit).count()));
         look_again();
       }
       return;

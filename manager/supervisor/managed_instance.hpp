@@ -161,6 +161,7 @@ class ManagedInstance : public InstanceEvents {
   [[nodiscard]] std::string loaded_text() const;
   [[nodiscard]] bool has_option(std::string_view name) const;
   [[nodiscard]] bool loads_online() const;
+  [[nodiscard]] bool takes_over() const;
   [[nodiscard]] Result<void> check_online() const;
   void begin_change();
   void begin_forwarded();
@@ -243,6 +244,8 @@ inline constexpr Duration kStopLimit = std::chrono::seconds(38);
 inline constexpr Duration kSingleCycleLimit = std::chrono::seconds(28);  ///< 25 s for all tasks
 inline constexpr Duration kTerminateLimit = std::chrono::seconds(2);
 inline constexpr Duration kCommandLimit = std::chrono::seconds(10);
+/// 8 s for the set-up of the new version, 6 s for a moment in which no task is in a cycle.
+inline constexpr Duration kChangeLimit = std::chrono::seconds(18);
 /// The process's page is believed only this long after its own answer: it is written now and then.
 inline constexpr Duration kPageLag = std::chrono::seconds(1);
 

@@ -38,11 +38,19 @@ Result<std::unique_ptr<OnlineChange>> OnlineChange::prepare(const std::string& p
                                                             ApplicationHost& host,
                                                             std::span<const TaskSettings> settings) {
   ApplicationDeclaration declaration;
+  const TimePoint begin = MonotonicClock::now();
   auto next = Application::load_beside(path, host, declaration);
   if (!next) return std::unexpected(std::move(next).error());
   // From here on its destructor ends the new version.
   std::unique_ptr<OnlineChange> change(
       new OnlineChange(running, *std::move(next), std::move(declaration), host));
+  if (const Duration took = MonotonicClock::now() - begin; took > kLongestSetup) {
+    return failure(ErrorCode::timed_out,
+                   fmt::format("{} cannot take over online: its set-up took {:.1f} s, allowed are {:.0f} s; "
+                               "nothing is changed; load it without --online",
+                               path, std::chrono::duration<double>(took).count(),
+                               std::chrono::duration<double>(kLongestSetup).count()));
+  }
   if (auto checked = change->check(settings); !checked) return std::unexpected(std::move(checked).error());
   if (auto connected = change->connect(); !connected) return std::unexpected(std::move(connected).error());
   return change;

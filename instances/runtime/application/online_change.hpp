@@ -10,14 +10,19 @@
 #include "instances/runtime/application/application_declaration.hpp"
 #include "instances/runtime/application/application_host.hpp"
 #include "shm/base/result.hpp"
+#include "shm/base/time.hpp"
 
 namespace plchost {
 
 /// Another version of the application that runs, loaded beside it and ready to take over. Control thread.
 class OnlineChange {
  public:
+  /// So long may the new version's set-up take. The manager waits longer.
+  static constexpr Duration kLongestSetup = std::chrono::seconds(8);
+
   /// Loads it, has its plc_app_init called, and compares it with what runs, of which nothing is changed.
-  /// refused: it cannot take over; the text lists the reasons. Else: what is wrong with the file.
+  /// refused: it cannot take over; the text lists the reasons. timed_out: its set-up took too long. Else:
+  /// what is wrong with the file.
   [[nodiscard]] static Result<std::unique_ptr<OnlineChange>> prepare(const std::string& path,
                                                                      Application& running,
                                                                      ApplicationHost& host,

@@ -204,6 +204,7 @@ INSTANTIATE_TEST_SUITE_P(
 #ifndef __clang__  // makes no such symbols
         Refusal{"online_unique", "build it with -fno-gnu-unique"},
 #endif
+        Refusal{"online_slow", "its set-up took 9."},
         Refusal{"online_init_throws", "plc_app_init returned 1"},
         Refusal{"fault_no_tasks", "it has no tasks"}, Refusal{"fault_wrong_version", "version"},
         Refusal{"fault_missing_init", "does not export plc_app_init"},

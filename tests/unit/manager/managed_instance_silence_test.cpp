@@ -79,6 +79,29 @@ TEST_F(SilentProcess, IsWhatItWasWhenItAnswersAgain) {
   EXPECT_EQ(host_.requests.back().verb, ControlVerb::stop);
 }
 
+TEST_F(SilentProcess, IsInNoExceptionWhileItTakesOverAnotherVersion) {
+  bring_up();
+  beat();
+  ask(ControlVerb::load_application, "/opt/new.so", {{"online", "yes"}});
+  sut().on_application_checked({});
+  fall_silent();
+  EXPECT_EQ(state(), InstanceState::running);
+  sut().on_reply({.number = host_.requests.back().number, .code = ErrorCode::ok, .text = "taken over"});
+  EXPECT_EQ(take_reply().code, ErrorCode::ok);
+}
+
+TEST_F(SilentProcess, IsInExceptionWhenItsTakeOverHasNotComeToAnEnd) {
+  bring_up();
+  beat();
+  ask(ControlVerb::load_application, "/opt/new.so", {{"online", "yes"}});
+  sut().on_application_checked({});
+  fall_silent();
+  expire_timer();
+  EXPECT_EQ(take_reply().code, ErrorCode::timed_out);
+  sut().refresh();
+  EXPECT_EQ(state(), InstanceState::exception);
+}
+
 TEST_F(SilentProcess, IsNotAsked) {
   bring_up_and_fall_silent();
   for (const ControlVerb verb :

@@ -97,6 +97,10 @@ __attribute__((noinline, no_sanitize_address, no_sanitize("undefined"))) void fa
 
 void setup(plc::Application& app) {
   INIT;
+#ifdef SLOW_INIT
+  const timespec pause{.tv_sec = SLOW_INIT, .tv_nsec = 0};
+  ::nanosleep(&pause, nullptr);
+#endif
 #ifdef INIT_CRASHES
   std::abort();
 #endif
