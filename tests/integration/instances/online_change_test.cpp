@@ -186,7 +186,7 @@ TEST_P(RefusedOnlineChange, TellsTheReasonAndChangesNothing) {
   EXPECT_EQ(sut.report().version, 2);
 }
 
-std::string name_of_file(const testing::TestParamInfo<Refusal>& tested) {
+std::string name_of_file(const ::testing::TestParamInfo<Refusal>& tested) {
   return tested.param.file;
 }
 
