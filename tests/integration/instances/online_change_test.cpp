@@ -156,7 +156,7 @@ TEST(OnlineChangeOfAnInstance, FindsTheTasksByNameAlsoInAnotherOrder) {
   ASSERT_EQ(changed.code, ErrorCode::ok) << changed.text;
   ASSERT_TRUE(sut.runs());
   EXPECT_EQ(sut.report().version, 2);
-  EXPECT_TRUE(eventually([&] { return sut.process().task("VersionReport")->counters.cycles > 0; }));
+  EXPECT_TRUE(eventually([&] { return sut.process().task("Report")->counters.cycles > 0; }));
 }
 
 struct Refusal {
