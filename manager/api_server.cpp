@@ -67,8 +67,10 @@ std::vector<std::string> ApiServer::arguments() const {
   }
   if (config_.dds.allow_unsecured) arguments.emplace_back("--allow-unsecured");
   if (!config_.dds.multicast) arguments.emplace_back("--no-multicast");
-  arguments.emplace_back("--beat-fd");
-  arguments.push_back(fmt::format("{}", kChildReportFd));
+  if (beats_) {
+    arguments.emplace_back("--beat-fd");
+    arguments.push_back(fmt::format("{}", kChildReportFd));
+  }
   arguments.emplace_back("--name-since");
   arguments.push_back(fmt::format("{}", name_since_ns_));
   if (name_held_) arguments.emplace_back("--name-held");
@@ -88,8 +90,9 @@ void ApiServer::spawn() {
       exit_watch_ = std::move(*watch);
       spdlog::info("API server: process {}", process_->pid);
       if (name_delay_ != Duration::zero()) timer_.set(spawned_ + kNameAsked);
-      heartbeat_ = HeartbeatWatch(kApiSilence);
-      look_at_beats();
+      beats_counted_ = 0;
+      heartbeat_ = HeartbeatWatch(kApiStart);
+      if (beats_) look_at_beats();
       return;
     }
     (void)signal_process(*process, SIGKILL);
@@ -142,12 +145,12 @@ void ApiServer::on_timer() {
 
 void ApiServer::look_at_beats() {
   std::uint64_t more = 0;
-  if (::read(beats_.get(), &more, sizeof more) == sizeof more) ++beats_counted_;
+  const bool beats = ::read(beats_.get(), &more, sizeof more) == sizeof more;
+  if (beats && beats_counted_++ == 0) heartbeat_ = HeartbeatWatch(kApiSilence);
   const TimePoint now = MonotonicClock::now();
   heartbeat_.look(now, beats_counted_);
   if (!heartbeat_.silent()) return beat_timer_.set(now + HeartbeatWatch::kLongestGap);
-  spdlog::error("API server: stands still since {} s; it is killed",
-                std::chrono::duration_cast<std::chrono::seconds>(kApiSilence).count());
+  spdlog::error("API server: {}; it is killed", beats_counted_ == 0 ? "does not come up" : "stands still");
   (void)signal_process(*process_, SIGKILL);
 }
 

@@ -56,6 +56,8 @@ inline constexpr Duration kApiRestartDelay = std::chrono::milliseconds(100);
 inline constexpr Duration kApiRestartDelayMax = std::chrono::seconds(5);
 /// Whose loop stands still for so long is killed. A flood of requests keeps it busy for some seconds.
 inline constexpr Duration kApiSilence = std::chrono::seconds(10);
+/// So long may its start take: it may have to wait for the end of the one before, and for its name.
+inline constexpr Duration kApiStart = std::chrono::seconds(30);
 /// Of those that were refused the name: doubles from the first to the second.
 inline constexpr Duration kNameDelay = std::chrono::seconds(5);
 inline constexpr Duration kNameDelayMax = std::chrono::seconds(60);

@@ -10,8 +10,8 @@ namespace plchost {
 
 void ManagedInstance::watch_heartbeat(const InstanceRuntime& runtime) {
   heartbeat_.look(surroundings_.now(), runtime.heartbeat_ns);
-  if (takes_over())
-    return;  // the control thread is in the set-up of the new version; the command's limit counts
+  // The control thread is in the set-up of the new version: the command's limit counts.
+  if (takes_over()) return;
   if (heartbeat_.silent() == silent_) return;
   if (silent_) {
     answers_again(runtime);
