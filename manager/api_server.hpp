@@ -64,6 +64,6 @@ inline constexpr Duration kNameDelayMax = std::chrono::seconds(60);
 /// Who lived that long has the name of the host: it has asked for it for less than that.
 inline constexpr Duration kNameAsked = std::chrono::seconds(3);
 /// Who lived that long has recovered: its next restart is at once.
-inline constexpr Duration kApiSettled = std::chrono::seconds(10);
+inline constexpr Duration kApiSettled = std::chrono::seconds(1);
 
 }  // namespace plchost
