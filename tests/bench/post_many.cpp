@@ -4,15 +4,13 @@
 #include <thread>
 
 #include <fmt/format.h>
-#include <sys/mman.h>
 #include <unistd.h>
 
 #include "api/client/control_client.hpp"
 #include "shm/pool/object_pool.hpp"
 #include "tests/bench/cell.hpp"
+#include "tests/bench/measure_beside.hpp"
 #include "tests/bench/parts.hpp"
-#include "tests/bench/processes.hpp"
-#include "tests/bench/shared_board.hpp"
 
 namespace plchost::bench {
 
@@ -153,27 +151,14 @@ Result<std::vector<Row>> measure_post_many(const Plan& plan) {
   constexpr std::uint32_t kFirstDomain = 20;
   const auto salt = static_cast<std::uint32_t>(::getpid()) % 40U;
   const DdsDomains domains{.plchost = kFirstDomain + 2 * salt, .bare = kFirstDomain + 2 * salt + 1};
-  void* const memory =
-      ::mmap(nullptr, sizeof(Board), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-  if (memory == MAP_FAILED) return failure(ErrorCode::system, "map the board", errno);
-  Board& board = *new (memory) Board{};
-  // What the program in the instance stamps is not looked at here, but it wants a place for it.
-  const std::string stamps = fmt::format("plchost-bench-{}.board", ::getpid());
-  if (const auto made = MemoryFile::replace(stamps, sizeof(DdsBoard)); !made)
-    return std::unexpected(made.error());
-  ::setenv(kBoardVariable, ("/dev/shm/" + stamps).c_str(), 1);
-  Result<std::vector<Row>> rows;
-  {
-    // Forked before this process has any thread of DDS.
-    Processes processes;
-    for (std::uint32_t i = 0; i < kClients; ++i) processes.fork([&, i] { run_client(domains, board, i); });
-    for (std::uint32_t i = 1; i <= kFloods; ++i)
-      processes.fork([&, i] { run_client(domains, board, kClients + i); });
-    rows = measure(plan, domains, board);
-  }
-  MemoryFile::remove(stamps);
-  ::munmap(memory, sizeof(Board));
-  return rows;
+  return measure_beside<Board>(
+      [&](Processes& processes, Board& board) {
+        for (std::uint32_t i = 0; i < kClients; ++i)
+          processes.fork([&, i] { run_client(domains, board, i); });
+        for (std::uint32_t i = 1; i <= kFloods; ++i)
+          processes.fork([&, i] { run_client(domains, board, kClients + i); });
+      },
+      [&](Board& board) { return measure(plan, domains, board); });
 }
 
 }  // namespace plchost::bench

@@ -7,16 +7,14 @@
 #include <utility>
 
 #include <fmt/format.h>
-#include <sys/mman.h>
 #include <unistd.h>
 
 #include "api/client/control_client.hpp"
 #include "shm/pool/object_pool.hpp"
 #include "tests/bench/bare_ends.hpp"
 #include "tests/bench/cell.hpp"
+#include "tests/bench/measure_beside.hpp"
 #include "tests/bench/parts.hpp"
-#include "tests/bench/processes.hpp"
-#include "tests/bench/shared_board.hpp"
 
 namespace plchost::bench {
 
@@ -148,29 +146,15 @@ Result<std::vector<Row>> measure_post_rate(const Plan& plan) {
   constexpr std::uint32_t kFirstDomain = 20;
   const auto salt = static_cast<std::uint32_t>(::getpid()) % 40U;
   const DdsDomains domains{.plchost = kFirstDomain + 4 * salt, .bare = kFirstDomain + 4 * salt + 1};
-  void* const memory =
-      ::mmap(nullptr, sizeof(TakenBoard), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-  if (memory == MAP_FAILED) return failure(ErrorCode::system, "map the board", errno);
-  TakenBoard& board = *new (memory) TakenBoard{};
-  // What the program in the instance stamps is not looked at here, but it wants a place for it.
-  const std::string stamps = fmt::format("plchost-bench-{}.board", ::getpid());
-  if (const auto made = MemoryFile::replace(stamps, sizeof(DdsBoard)); !made)
-    return std::unexpected(made.error());
-  ::setenv(kBoardVariable, ("/dev/shm/" + stamps).c_str(), 1);
-  Result<std::vector<Row>> rows;
-  {
-    // Forked before this process has any thread of DDS.
-    Processes processes;
-    for (const auto duty : {BareDuty::nothing, BareDuty::acknowledge, BareDuty::wake}) {
-      processes.fork([&, duty] {
-        run_bare_end(plan, bare_domain(domains, duty), duty, board[std::to_underlying(duty)]);
-      });
-    }
-    rows = measure_rate(plan, domains, board);
-  }
-  MemoryFile::remove(stamps);
-  ::munmap(memory, sizeof(TakenBoard));
-  return rows;
+  return measure_beside<TakenBoard>(
+      [&](Processes& processes, TakenBoard& board) {
+        for (const auto duty : {BareDuty::nothing, BareDuty::acknowledge, BareDuty::wake}) {
+          processes.fork([&, duty] {
+            run_bare_end(plan, bare_domain(domains, duty), duty, board[std::to_underlying(duty)]);
+          });
+        }
+      },
+      [&](TakenBoard& board) { return measure_rate(plan, domains, board); });
 }
 
 }  // namespace plchost::bench

@@ -53,6 +53,13 @@ class SilentProcess : public ManagedInstanceTest {
     fall_silent();
     ASSERT_EQ(state(), InstanceState::exception);
   }
+  void fall_silent_in_a_take_over() {
+    bring_up();
+    beat();
+    ask(ControlVerb::load_application, "/opt/new.so", {{"online", "yes"}});
+    sut().on_application_checked({});
+    fall_silent();
+  }
 };
 
 TEST_F(SilentProcess, IsInExceptionAndLeftAlone) {
@@ -80,22 +87,14 @@ TEST_F(SilentProcess, IsWhatItWasWhenItAnswersAgain) {
 }
 
 TEST_F(SilentProcess, IsInNoExceptionWhileItTakesOverAnotherVersion) {
-  bring_up();
-  beat();
-  ask(ControlVerb::load_application, "/opt/new.so", {{"online", "yes"}});
-  sut().on_application_checked({});
-  fall_silent();
+  fall_silent_in_a_take_over();
   EXPECT_EQ(state(), InstanceState::running);
   sut().on_reply({.number = host_.requests.back().number, .code = ErrorCode::ok, .text = "taken over"});
   EXPECT_EQ(take_reply().code, ErrorCode::ok);
 }
 
 TEST_F(SilentProcess, IsInExceptionWhenItsTakeOverHasNotComeToAnEnd) {
-  bring_up();
-  beat();
-  ask(ControlVerb::load_application, "/opt/new.so", {{"online", "yes"}});
-  sut().on_application_checked({});
-  fall_silent();
+  fall_silent_in_a_take_over();
   expire_timer();
   EXPECT_EQ(take_reply().code, ErrorCode::timed_out);
   sut().refresh();

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cerrno>
+#include <cstdlib>
+#include <new>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include "shm/base/result.hpp"
+#include "shm/pool/memory_file.hpp"
+#include "tests/bench/dds_board.hpp"
+#include "tests/bench/processes.hpp"
+#include "tests/bench/row.hpp"
+#include "tests/bench/shared_board.hpp"
+
+namespace plchost::bench {
+
+/// Measures beside processes of this program that share a `Board` with it: `fork(processes, board)` makes
+/// them, before this process has any thread of DDS; then `measure(board)`.
+template <class Board, class Fork, class Measure>
+[[nodiscard]] Result<std::vector<Row>> measure_beside(Fork fork, Measure measure) {
+  void* const memory =
+      ::mmap(nullptr, sizeof(Board), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (memory == MAP_FAILED) return failure(ErrorCode::system, "map the board", errno);
+  Board& board = *new (memory) Board{};
+  // What the program in the instance stamps is not looked at here, but it wants a place for it.
+  const std::string stamps = fmt::format("plchost-bench-{}.board", ::getpid());
+  if (const auto made = MemoryFile::replace(stamps, sizeof(DdsBoard)); !made)
+    return std::unexpected(made.error());
+  ::setenv(kBoardVariable, ("/dev/shm/" + stamps).c_str(), 1);
+  Result<std::vector<Row>> rows;
+  {
+    Processes processes;
+    fork(processes, board);
+    rows = measure(board);
+  }
+  MemoryFile::remove(stamps);
+  ::munmap(memory, sizeof(Board));
+  return rows;
+}
+
+}  // namespace plchost::bench
