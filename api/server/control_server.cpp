@@ -221,7 +221,11 @@ void ControlServer::Parts::write_acks() {
 }
 
 void ControlServer::Parts::record_posts() {
-  for (const plc_EventAck& ack : intake->collect_written_acks()) audit->posted(ack, MonotonicClock::now());
+  const TimePoint now = MonotonicClock::now();
+  for (const plc_EventAck& ack : intake->collect_written_acks()) {
+    sessions->was_answered(dds::Guid::from(ack.source).participant(), now);
+    audit->posted(ack, now);
+  }
 }
 
 void ControlServer::Parts::look_at_runs() {
@@ -239,6 +243,8 @@ void ControlServer::Parts::on_requests(const RequestReader& source) {
     const dds::Guid writer = dds::writer_of(reader, info);
     // Gone meanwhile, or pretending to be another: nobody to answer.
     if (writer == dds::Guid{}) return;
+    // Where no answer could be remembered, its repetition would be done once more.
+    if (!sessions->serves(writer.participant())) return;
     const plc_SampleIdentity& identity = request.header.request_identity;
     if (writer != dds::Guid::from(identity.writer_guid)) {
       audit->asked(writer.participant(), request);

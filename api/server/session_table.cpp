@@ -60,8 +60,7 @@ void SessionTable::follow_participants() {
       alive_[client] = info.valid_data ? dds::claim_of(participant.qos) : std::string();
     } else {
       alive_.erase(client);
-      ack_writers_->remove(client);
-      sessions_.erase(client);
+      end_session(client);
     }
   });
 }
@@ -102,10 +101,14 @@ bool SessionTable::open_writer(const dds::Guid& client, Session& session, Stream
 }
 
 SessionTable::Session* SessionTable::session_of(const dds::Guid& client) {
-  if (const auto known = sessions_.find(client); known != sessions_.end()) return &known->second;
+  const TimePoint now = MonotonicClock::now();
+  if (const auto known = sessions_.find(client); known != sessions_.end()) {
+    known->second.used = now;
+    return &known->second;
+  }
   if (!alive_.contains(client)) return nullptr;
-  if (sessions_.size() >= kMaxSessions) {
-    if (dropped_++ % 1000 == 0) spdlog::warn("{} clients are served, one more is not", kMaxSessions);
+  if (sessions_.size() >= kMaxSessions && !make_room(now)) {
+    if (dropped_++ % 1000 == 0) spdlog::warn("{} busy clients are served, one more is not", kMaxSessions);
     return nullptr;
   }
   auto publisher = dds::make_publisher(participant_, dds::client_partition(client.hex()));
@@ -113,7 +116,20 @@ SessionTable::Session* SessionTable::session_of(const dds::Guid& client) {
     spdlog::error("client {}: {}", client.hex(), publisher.error().describe());
     return nullptr;
   }
-  return &sessions_.emplace(client, Session{.publisher = std::move(*publisher)}).first->second;
+  return &sessions_.emplace(client, Session{.publisher = std::move(*publisher), .used = now}).first->second;
+}
+
+bool SessionTable::make_room(TimePoint now) {
+  const auto longest =
+      std::ranges::min_element(sessions_, {}, [](const auto& known) { return known.second.used; });
+  if (longest == sessions_.end() || now - longest->second.used < kIdle) return false;
+  end_session(dds::Guid(longest->first));
+  return true;
+}
+
+void SessionTable::end_session(const dds::Guid& client) {
+  ack_writers_->remove(client);
+  sessions_.erase(client);
 }
 
 std::string SessionTable::describe(const dds::Guid& client) const {
@@ -141,6 +157,10 @@ void SessionTable::write_ack(const dds::Guid& client, const plc_EventAck& ack) {
 
 void SessionTable::write_ack(const dds::Guid& client, const plc_DownloadAck& ack) {
   (void)write(client, Stream::downloads, &ack);
+}
+
+void SessionTable::was_answered(const dds::Guid& client, TimePoint now) {
+  if (const auto known = sessions_.find(client); known != sessions_.end()) known->second.used = now;
 }
 
 void SessionTable::write_run(const dds::Guid& client, const plc_EventRun& run) {

@@ -16,6 +16,7 @@
 #include "api/dds/guid.hpp"
 #include "api/server/posts/ack_writers.hpp"
 #include "shm/base/result.hpp"
+#include "shm/base/time.hpp"
 
 namespace plchost {
 
@@ -25,6 +26,9 @@ namespace plchost {
 class SessionTable {
  public:
   static constexpr std::size_t kMaxSessions = 256;
+  /// When there are more, one that got nothing for so long makes room: it is made again when that client asks
+  /// again. Longer than a client repeats a request: an answer that it may still need is never forgotten.
+  static constexpr Duration kIdle = std::chrono::seconds(10);
   /// As many answers are remembered for each client.
   static constexpr std::size_t kRemembered = 32;
 
@@ -33,12 +37,16 @@ class SessionTable {
   /// Follows which clients came (their reply or acknowledgement reader was discovered) and went.
   void follow_discovery();
 
-  /// `client` is a participant. Answers without a session, because the table is full, are dropped and
-  /// counted.
+  /// `client` is a participant. Answers without a session, because the table is full of clients that are all
+  /// busy, are dropped and counted.
+  /// What a client asks is only done if this is true. The client is not idle.
+  [[nodiscard]] bool serves(const dds::Guid& client) { return session_of(client) != nullptr; }
   void write_reply(const dds::Guid& client, const plc_Reply& reply);
   void write_ack(const dds::Guid& client, const plc_EventAck& ack);
   /// Those of the clients whose acknowledgement reader was discovered: any thread, as long as this lives.
   [[nodiscard]] AckWriters& ack_writers() noexcept { return *ack_writers_; }
+  /// By one of them: the client is not idle.
+  void was_answered(const dds::Guid& client, TimePoint now);
   void write_run(const dds::Guid& client, const plc_EventRun& run);
   void write_ack(const dds::Guid& client, const plc_DownloadAck& ack);
   /// False: the client has not got it, nor will.
@@ -65,6 +73,7 @@ class SessionTable {
     dds::Entity publisher;
     std::array<dds::Entity, kStreams> writers = {};
     std::deque<plc_Reply> answers = {};
+    TimePoint used = {};
   };
 
   SessionTable() = default;
@@ -72,6 +81,8 @@ class SessionTable {
   void follow_readers();
   /// Made if it is not there. None for a client that is not (or no longer) in the domain.
   [[nodiscard]] Session* session_of(const dds::Guid& client);
+  bool make_room(TimePoint now);
+  void end_session(const dds::Guid& client);
   bool open_writer(const dds::Guid& client, Session& session, Stream stream);
   bool write(const dds::Guid& client, Stream stream, const void* sample);
 

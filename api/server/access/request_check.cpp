@@ -81,7 +81,7 @@ Result<void> check_argument(const Operation& operation, std::string_view argumen
     case Argument::path:
       if (argument.starts_with('/') && argument.size() <= kMaxPath) return {};
       return failure(ErrorCode::invalid_argument,
-                     fmt::format("application '{}' is not an absolute path on the host", argument));
+                     fmt::format("application '{}' is not an absolute path on the host", shown(argument)));
     case Argument::file:
       return check_file_name(argument);
     case Argument::scheduler:
@@ -141,7 +141,7 @@ Result<ControlRequest> check_request(const plc_Request& request, ApiRole role, s
                                      std::span<const std::string_view> instances) {
   const auto addressed = dds::text_of(request.header.instance_name);
   if (addressed != host) {
-    return failure(ErrorCode::not_found, fmt::format("this is host '{}', not '{}'", host, addressed));
+    return failure(ErrorCode::not_found, fmt::format("this is host '{}', not '{}'", host, shown(addressed)));
   }
   const auto* const operation = std::ranges::find(kOperations, request.operation, &Operation::number);
   if (operation == kOperations.end()) {

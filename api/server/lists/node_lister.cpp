@@ -24,7 +24,7 @@ std::unexpected<Error> unknown_node(const std::string& name, const std::vector<N
   for (const NodeInfo& node : nodes) names.push_back(node.record.name.view());
   const auto near = nearest_name(name, names);
   return failure(ErrorCode::not_found,
-                 fmt::format("no node '{}'{}; there are: {}", name,
+                 fmt::format("no node '{}'{}; there are: {}", shown(name),
                              near.empty() ? "" : fmt::format(" (did you mean '{}'?)", near),
                              names.empty() ? "none" : join_names(names)));
 }

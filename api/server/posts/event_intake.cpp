@@ -44,7 +44,7 @@ Result<EventIntake::Wanted> EventIntake::read_wanted(const dds_sequence_plc_KeyV
                      std::string_view allowed) -> Result<bool> {
     if (value.empty() || value == allowed) return !value.empty();
     return failure(ErrorCode::invalid_argument,
-                   fmt::format("{} = '{}' is not valid; allowed is: {}", entry, value, allowed));
+                   fmt::format("{} = '{}' is not valid; allowed is: {}", entry, shown(value), allowed));
   };
   const auto run = is(dds::kWaitEntry, wait, dds::kWaitForRun);
   if (!run) return std::unexpected(run.error());
@@ -164,7 +164,7 @@ Result<void> EventIntake::check(const Post& post) const {
   if (auto may = guard_->check(dds::Guid::from(post.source), security::Role::operating); !may) return may;
   const auto host = text_of(post.host);
   if (host == host_) return {};
-  return failure(ErrorCode::not_found, fmt::format("this is host '{}', not '{}'", host_, host));
+  return failure(ErrorCode::not_found, fmt::format("this is host '{}', not '{}'", host_, shown(host)));
 }
 
 Result<PoolEvent> EventIntake::event_of(std::string_view instance, std::string_view event) {

@@ -1,4 +1,6 @@
+#include <algorithm>
 #include <ctime>
+#include <memory>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -7,6 +9,7 @@
 #include "api/dds/samples.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"
+#include "api/server/session_table.hpp"
 #include "tests/integration/api/test_host.hpp"
 
 namespace plchost {
@@ -14,6 +17,26 @@ namespace {
 
 using std::chrono::milliseconds;
 using std::chrono::seconds;
+
+/// One that asks for nothing: it only has a reader of answers.
+struct IdleClient {
+  explicit IdleClient(std::uint32_t domain)
+      : participant(dds_create_participant(domain, nullptr, nullptr)),
+        topic(dds::make_topic(participant.get(), dds::kReply).value()),
+        own(dds::make_subscriber(participant.get(),
+                                 dds::client_partition(dds::guid_of(participant.get()).hex()))
+                .value()),
+        reader(dds::make_reader(own.get(), topic.get(), dds::reply_qos()).value()) {}
+  [[nodiscard]] bool is_served() const {
+    dds_subscription_matched_status_t matched{};
+    return dds_get_subscription_matched_status(reader.get(), &matched) == 0 && matched.current_count > 0;
+  }
+
+  dds::Entity participant;
+  dds::Entity topic;
+  dds::Entity own;
+  dds::Entity reader;
+};
 
 class RemoteCommand : public testing::Test {
  protected:
@@ -141,6 +164,26 @@ TEST_F(RemoteCommand, WorksForTwentyClientsAtOnce) {
   }
   for (Child& client : clients) EXPECT_EQ(client.wait(), 0);
   EXPECT_EQ(host_.requests().size(), 20U);
+}
+
+TEST_F(RemoteCommand, OfOneMoreThanAreServedIsAnsweredInPlaceOfOneThatIsIdle) {
+  host_.start_server();
+  const auto client = connect(domain_);
+  ASSERT_TRUE(client->host("hosta", soon()));
+  std::vector<std::unique_ptr<IdleClient>> idle;
+  for (std::size_t i = 0; i < SessionTable::kMaxSessions; ++i)
+    idle.push_back(std::make_unique<IdleClient>(domain_.number()));
+  const auto served = [&] {
+    return std::ranges::count_if(idle, [](const auto& one) { return one->is_served(); });
+  };
+  for (const TimePoint end = soon(); served() + 1 < std::ssize(idle) && MonotonicClock::now() < end;)
+    std::this_thread::sleep_for(milliseconds(10));
+
+  const auto late = connect(domain_);
+  const auto reply = late->call({"hosta", plc_OPERATION_STOP, "line1", ""}, soon() + SessionTable::kIdle);
+
+  EXPECT_TRUE(reply) << reply.error().describe();
+  EXPECT_EQ(host_.requests().size(), 1U) << "it was repeated, and done once";
 }
 
 TEST_F(RemoteCommand, WithAnotherWritersIdentityIsRefused) {
