@@ -64,7 +64,6 @@ void ManagedInstance::handle(const ControlRequest& request, ControlReplyFunction
 }
 
 Result<void> ManagedInstance::check_argument(ControlRequest& request) const {
-  const std::string shown = request.argument.substr(0, kMaxPath);
   switch (request.verb) {
     case ControlVerb::check_host:
       return failure(ErrorCode::invalid_argument, "'check host' is for the whole host: name no instance");
@@ -82,8 +81,9 @@ Result<void> ManagedInstance::check_argument(ControlRequest& request) const {
     case ControlVerb::set_scheduler: {
       const std::vector<std::string_view>& known = surroundings_.schedulers;
       if (std::ranges::find(known, request.argument) != known.end()) return {};
-      return failure(ErrorCode::invalid_argument, fmt::format("no scheduler '{}'; there are {}{}", shown,
-                                                              join_names(known), suggestion(shown, known)));
+      return failure(ErrorCode::invalid_argument,
+                     fmt::format("no scheduler '{}'; there are {}{}", shown(request.argument),
+                                 join_names(known), suggestion(cut(request.argument, kShownBytes), known)));
     }
     case ControlVerb::register_event:
     case ControlVerb::unregister_event:

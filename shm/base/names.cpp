@@ -1,6 +1,8 @@
 #include "shm/base/names.hpp"
 
+#include <algorithm>
 #include <numeric>
+#include <ranges>
 #include <vector>
 
 #include <fmt/format.h>
@@ -66,6 +68,12 @@ bool is_printable_utf8(std::string_view text) noexcept {
   return true;
 }
 
+std::string printable(std::string text) {
+  if (is_printable_utf8(text)) return text;
+  std::ranges::replace_if(text, [](char c) { return c < ' ' || c > '~'; }, '?');
+  return text;
+}
+
 std::string event_object_name(std::string_view instance, std::string_view event) {
   return fmt::format("{}/{}", instance, event);
 }
@@ -105,17 +113,16 @@ std::string_view cut(std::string_view text, std::size_t most) noexcept {
   return text.substr(0, end);
 }
 
-std::string_view shown(std::string_view text) noexcept {
-  return cut(text, kShownBytes);
+std::string shown(std::string_view text) {
+  return printable(std::string(cut(text, kShownBytes)));
 }
 
 std::string join_some(std::span<const std::string> names) {
-  std::vector<std::string_view> first;
-  for (const std::string& name : names.first(std::min(names.size(), kShownNames)))
-    first.push_back(shown(name));
+  if (names.empty()) return join_names({});
   const std::string more =
       names.size() > kShownNames ? fmt::format(" and {} more", names.size() - kShownNames) : "";
-  return join_names(first) + more;
+  const auto first = names.first(std::min(names.size(), kShownNames)) | std::views::transform(shown);
+  return fmt::format("{}{}", fmt::join(first, ", "), more);
 }
 
 }  // namespace plchost

@@ -30,6 +30,9 @@ inline constexpr std::size_t kMaxPath = 255;
 /// Whether it is well-formed UTF-8 without control characters.
 [[nodiscard]] bool is_printable_utf8(std::string_view text) noexcept;
 
+/// The text with '?' in place of characters that could drive a terminal or make two lines of one.
+[[nodiscard]] std::string printable(std::string text);
+
 /// The object that holds the external event `event` of `instance` in the pool: "instance/event".
 [[nodiscard]] std::string event_object_name(std::string_view instance, std::string_view event);
 
@@ -46,9 +49,9 @@ inline constexpr std::size_t kMaxPath = 255;
 /// The first `most` bytes, without a torn character of UTF-8 at the end.
 [[nodiscard]] std::string_view cut(std::string_view text, std::size_t most) noexcept;
 
-/// Of a stranger's name or value, this much is told.
+/// Of a stranger's name or value, this much is told, and as printable() has it.
 inline constexpr std::size_t kShownBytes = 80;
-[[nodiscard]] std::string_view shown(std::string_view text) noexcept;
+[[nodiscard]] std::string shown(std::string_view text);
 
 /// "a, b, c and 7 more", for lists that a stranger wrote: the first kShownNames, each as shown() cuts it.
 inline constexpr std::size_t kShownNames = 20;

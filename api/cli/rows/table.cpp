@@ -67,12 +67,6 @@ std::string csv_field(const Row& value) {
 
 }  // namespace
 
-std::string printable(std::string text) {
-  if (is_printable_utf8(text)) return text;
-  std::ranges::replace_if(text, [](char c) { return c < ' ' || c > '~'; }, '?');
-  return text;
-}
-
 std::string format_table(const std::vector<Row>& rows, const std::vector<Column>& columns, bool coloured) {
   std::vector<std::string> lines(rows.size() + 1);
   for (const Column& column : columns) {

@@ -19,9 +19,6 @@ struct Column {
   int decimals = 1;
 };
 
-/// The text with '?' in place of characters that could drive a terminal.
-[[nodiscard]] std::string printable(std::string text);
-
 /// An aligned table with a header line: texts to the left, numbers to the right. An empty text is shown as
 /// "-". Characters that could drive a terminal are shown as '?'. `coloured`: states are, by how well they
 /// are.

@@ -8,6 +8,7 @@
 #include "api/cli/cli_session.hpp"
 #include "api/cli/rows/rows.hpp"
 #include "api/dds/text.hpp"
+#include "shm/base/names.hpp"
 
 namespace plchost {
 

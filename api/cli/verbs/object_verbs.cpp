@@ -12,6 +12,7 @@
 #include "api/cli/interrupt.hpp"
 #include "api/cli/rows/object_rows.hpp"
 #include "api/cli/rows/rows.hpp"
+#include "shm/base/names.hpp"
 #include "shm/base/time.hpp"
 
 namespace plchost {

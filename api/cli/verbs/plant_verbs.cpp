@@ -10,6 +10,7 @@
 #include "api/cli/cli_session.hpp"
 #include "api/cli/plant/plant_file.hpp"
 #include "api/cli/plant/plant_work.hpp"
+#include "shm/base/names.hpp"
 
 namespace plchost {
 

@@ -6,6 +6,7 @@
 #include "api/audit/audit_check.hpp"
 #include "api/cli/cli_session.hpp"
 #include "api/cli/rows/rows.hpp"
+#include "shm/base/names.hpp"
 
 namespace plchost {
 

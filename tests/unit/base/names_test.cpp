@@ -61,6 +61,12 @@ TEST(Names, CutsBetweenCharacters) {
   EXPECT_EQ(shown(std::string(1000, 'x')).size(), kShownBytes);
 }
 
+TEST(Names, OfAStrangerAreShownWithoutWhatCouldDriveATerminalOrBreakALine) {
+  EXPECT_EQ(shown("\x1b[31mline1\n"), "?[31mline1?");
+  EXPECT_EQ(shown("\xc3\xa4 1"), "\xc3\xa4 1") << "what is printable stays";
+  EXPECT_EQ(join_some(std::vector<std::string>{"a\tb", "c"}), "a?b, c");
+}
+
 TEST(Names, JoinsTheFirstOfALongList) {
   std::vector<std::string> names(kShownNames, "a");
   EXPECT_THAT(join_some(names), testing::Not(HasSubstr("more")));
