@@ -201,7 +201,8 @@ class PLCHOST_CLIENT_API Client {
   std::vector<Event> events(const std::string& host = {});
 
   /// Posts an event `count` times, each counted exactly once, also if the server of the host dies meanwhile.
-  /// Returns when all are in the pool. ClientError: a post was rejected; timed_out: of some nothing is known.
+  /// Returns when all are in the pool: the time-out is for each acknowledgement, so many take as long as they
+  /// take. ClientError: a post was rejected; timed_out: of some nothing is known.
   Posted post(const std::string& host, const std::string& event, unsigned long long count = 1);
   /// The same; returns at once. `done` is called once.
   void post(const std::string& host, const std::string& event, std::function<void(const Outcome&)> done);

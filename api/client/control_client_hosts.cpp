@@ -102,16 +102,18 @@ std::vector<HostView> ControlClient::hosts(TimePoint deadline) {
 
 Result<HostView> ControlClient::host(std::string_view name, TimePoint deadline) {
   if (auto good = check_host_name(name); !good) return std::unexpected(std::move(good).error());
+  const TimePoint began = MonotonicClock::now();
   for (;;) {
     update();
     if (auto found = present(name)) return *found;
     if (MonotonicClock::now() >= deadline) break;
     wait_set_.wait(deadline);
   }
-  const auto others = present();
+  // Those too that are late at this very moment.
   std::vector<std::string_view> names;
-  names.reserve(others.size());
-  for (const HostView& other : others) names.emplace_back(other.name);
+  for (const auto& [other, seen] : seen_) {
+    if (seen.last >= began - kHostGone) names.emplace_back(other);
+  }
   return failure(ErrorCode::not_found,
                  fmt::format("no host '{}' answers; those that do: {}", name, join_names(names)));
 }
