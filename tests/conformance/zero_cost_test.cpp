@@ -9,20 +9,16 @@
 
 #include "tests/conformance/malloc_count.hpp"
 #include "tests/conformance/scheduler_fixture.hpp"
-
-#if defined(PLCHOST_ADDRESS_SANITIZER) || defined(PLCHOST_THREAD_SANITIZER)
-#define PLCHOST_SANITIZED 1  // their shadow memory faults
-#else
-#define PLCHOST_SANITIZED 0
-#endif
+#include "tests/support/sanitized.hpp"
 
 namespace plchost {
 namespace {
 
-// PLCHOST_CYCLES=1000000 for the whole proof.
+// PLCHOST_CYCLES=1000000 for as many under each scheduler.
 std::uint64_t cycles_to_run() {
   const char* const given = std::getenv("PLCHOST_CYCLES");
-  return given != nullptr ? std::strtoull(given, nullptr, 10) : 100'000;
+  if (given != nullptr) return std::strtoull(given, nullptr, 10);
+  return kSanitized ? 10'000 : 100'000;
 }
 
 struct Usage {
@@ -77,7 +73,7 @@ TEST_P(ZeroCost, OfAnEmptyTaskBesideItsWaits) {
   ASSERT_TRUE(set->stop(std::chrono::seconds(30)));
   ::munlockall();
   EXPECT_EQ(allocations, 0U);
-  if (PLCHOST_SANITIZED == 0) {
+  if (!kSanitized) {
     EXPECT_EQ(after.thread.ru_minflt - before.thread.ru_minflt, 0);
     EXPECT_EQ(after.process.ru_majflt - before.process.ru_majflt, 0);
   }

@@ -8,6 +8,7 @@
 #include "manager/supervisor/managed_instance.hpp"
 #include "shm/base/exception_history.hpp"
 #include "tests/integration/manager/plant.hpp"
+#include "tests/support/sanitized.hpp"
 
 namespace plchost {
 namespace {
@@ -88,9 +89,7 @@ TEST(Manager, PutsACrashLoopIntoSafeModeUntilAnotherApplicationIsLoaded) {
 }
 
 TEST(Manager, LeadsOutOfAFaultThatHoldsTheHeapAsOutOfAnyOther) {
-#if defined(PLCHOST_ADDRESS_SANITIZER) || defined(PLCHOST_THREAD_SANITIZER)
-  GTEST_SKIP() << "the sanitizer's own heap ends the process";
-#endif
+  if (kSanitized) GTEST_SKIP() << "the sanitizer's own heap ends the process";
   Plant plant;
   plant.add("line1", "manager_double_free");
   plant.start_manager();

@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "shm/pool/object_pool.hpp"
+#include "tests/support/sanitized.hpp"
 #include "tests/unit/pool/unique_pool_name.hpp"
 
 namespace plchost {
@@ -48,9 +49,7 @@ int signal_of(const std::function<void()>& work) {
 class NoSystemCall : public testing::Test {
  protected:
   void SetUp() override {
-#if defined(PLCHOST_ADDRESS_SANITIZER) || defined(PLCHOST_THREAD_SANITIZER)
-    GTEST_SKIP() << "sanitizers call the system themselves";
-#endif
+    if (kSanitized) GTEST_SKIP() << "sanitizers call the system themselves";
   }
   NoSystemCall() : pool_(std::move(ObjectPool::create(name_.get(), {.max_objects = 64}).value())) {}
   UniquePoolName name_;

@@ -17,6 +17,7 @@
 #include <unistd.h>
 
 #include "shm/pool/object_pool.hpp"
+#include "tests/support/sanitized.hpp"
 #include "tests/unit/pool/pool_invariants.hpp"
 #include "tests/unit/pool/unique_pool_name.hpp"
 
@@ -30,9 +31,7 @@ using Work = std::function<void(ObjectPool&)>;
 class EachInstruction : public testing::Test {
  protected:
   void SetUp() override {
-#if defined(PLCHOST_ADDRESS_SANITIZER) || defined(PLCHOST_THREAD_SANITIZER)
-    GTEST_SKIP() << "too many instructions";
-#endif
+    if (kSanitized) GTEST_SKIP() << "too many instructions";
   }
   EachInstruction()
       : pool_(std::move(ObjectPool::create(name_.get(), {.max_objects = kPlaces}).value())),
