@@ -15,25 +15,25 @@ namespace plchost {
 
 namespace {
 
-constexpr PageKind kKind{.what = "host page",
-                         .magic = 0x65676170'74736f68,  // "hostpage"
-                         .version = 1};                 // 1: first
+constexpr PageKind kHostPageKind{.what = "host page",
+                                 .magic = 0x65676170'74736f68,  // "hostpage"
+                                 .version = 1};                 // 1: first
 
 static_assert(offsetof(HostPageLayout, version) == 8 && offsetof(HostPageLayout, changes) == 16);
 static_assert(sizeof(InstanceStatus) == 600 && sizeof(HostStatus) == 112);
 
-HostPageLayout& layout_of(const MemoryFile& memory) noexcept {
+HostPageLayout& host_layout_of(const MemoryFile& memory) noexcept {
   return *reinterpret_cast<HostPageLayout*>(memory.bytes().data());
 }
 
 Result<MemoryFile> open_page(const std::string& name, MemoryFile::Access access) {
-  return open_fixed_page<HostPageLayout>(name, kKind, access);
+  return open_fixed_page<HostPageLayout>(name, kHostPageKind, access);
 }
 
 void describe(HostPageLayout& page) noexcept {
-  page.version = kKind.version;
+  page.version = kHostPageKind.version;
   page.size = sizeof(HostPageLayout);
-  page.magic = kKind.magic;
+  page.magic = kHostPageKind.magic;
 }
 
 Result<void> fill(std::span<std::byte> bytes) {
@@ -99,7 +99,7 @@ std::string host_page_name(std::string_view pool) {
 Result<HostPageWriter> HostPageWriter::create(std::string_view pool) {
   const std::string name = host_page_name(pool);
   if (auto found = open_page(name, MemoryFile::Access::read_write)) {
-    HostPageLayout& page = layout_of(*found);
+    HostPageLayout& page = host_layout_of(*found);
     page.host.recover();
     for (auto& instance : page.instances) instance.recover();
     return HostPageWriter(name, std::move(*found));
@@ -117,7 +117,7 @@ void HostPageWriter::write_host(const HostStatus& status) noexcept {
   host_ = status;
   make_printable(host_.name);
   make_printable(host_.version);
-  HostPageLayout& page = layout_of(memory_);
+  HostPageLayout& page = host_layout_of(memory_);
   page.host.write(host_);
   page.changes.fetch_add(1, std::memory_order_release);
 }
@@ -130,19 +130,20 @@ void HostPageWriter::write_instance(std::uint32_t index, const InstanceStatus& s
   make_printable(kept.scheduler);
   make_printable(kept.application);
   make_printable(kept.problem);
-  HostPageLayout& page = layout_of(memory_);
+  HostPageLayout& page = host_layout_of(memory_);
   page.instances[index].write(kept);
   page.changes.fetch_add(1, std::memory_order_release);
 }
 
 bool HostPageWriter::keep() {
-  if (!holds(layout_of(memory_).host, host_) && memory_.lost()) {
+  if (!holds(host_layout_of(memory_).host, host_) && memory_.lost()) {
     auto fresh = MemoryFile::replace(name_, sizeof(HostPageLayout), fill);
     if (!fresh) return true;
     memory_ = std::move(*fresh);
   }
-  HostPageLayout& page = layout_of(memory_);
-  bool changed = page.magic != kKind.magic || page.version != kKind.version || page.size != sizeof(page);
+  HostPageLayout& page = host_layout_of(memory_);
+  bool changed =
+      page.magic != kHostPageKind.magic || page.version != kHostPageKind.version || page.size != sizeof(page);
   if (changed) describe(page);
   if (!holds(page.host, host_)) {
     page.host.recover();
@@ -165,18 +166,18 @@ Result<HostPageReader> HostPageReader::open(std::string_view pool) {
 }
 
 std::uint64_t HostPageReader::changes() const noexcept {
-  return layout_of(memory_).changes.load(std::memory_order_acquire);
+  return host_layout_of(memory_).changes.load(std::memory_order_acquire);
 }
 
 std::optional<HostStatus> HostPageReader::host() const noexcept {
-  auto status = layout_of(memory_).host.read();
+  auto status = host_layout_of(memory_).host.read();
   if (status && (status->instance_count > kMaxInstances || !is_printable(*status))) return std::nullopt;
   return status;
 }
 
 std::optional<InstanceStatus> HostPageReader::instance(std::uint32_t index) const noexcept {
   if (index >= kMaxInstances) return std::nullopt;
-  auto status = layout_of(memory_).instances[index].read();
+  auto status = host_layout_of(memory_).instances[index].read();
   if (status && !is_printable(*status)) return std::nullopt;
   return status;
 }

@@ -32,7 +32,7 @@ std::size_t size_for(std::size_t task_count, HistogramShape shape) noexcept {
   return buckets_offset(task_count) + task_count * task_bucket_count(shape) * sizeof(std::uint32_t);
 }
 
-InstancePageLayout& layout_of(const MemoryFile& memory) noexcept {
+InstancePageLayout& instance_layout_of(const MemoryFile& memory) noexcept {
   return *reinterpret_cast<InstancePageLayout*>(memory.bytes().data());
 }
 
@@ -145,7 +145,7 @@ void InstancePage::remove(std::string_view pool, std::string_view instance) noex
 }
 
 void InstancePage::write_runtime(const InstanceRuntime& runtime) noexcept {
-  layout_of(memory_).runtime.write(runtime);
+  instance_layout_of(memory_).runtime.write(runtime);
 }
 
 TaskSlot& InstancePage::task(std::uint32_t index) noexcept {
@@ -157,7 +157,7 @@ Result<InstancePageReader> InstancePageReader::open(std::string_view pool, std::
   const std::string name = instance_page_name(pool, instance);
   auto memory = MemoryFile::open(name, sizeof(InstancePageLayout), MemoryFile::Access::read_only);
   if (!memory) return std::unexpected(memory.error());
-  const InstancePageLayout& page = layout_of(*memory);
+  const InstancePageLayout& page = instance_layout_of(*memory);
   // The name is given to complete pages only, so the magic is there from the start.
   if (page.magic != kMagic) {
     return failure(ErrorCode::corrupt,
@@ -183,7 +183,7 @@ Result<InstancePageReader> InstancePageReader::open(std::string_view pool, std::
 }
 
 std::optional<InstanceRuntime> InstancePageReader::runtime() const noexcept {
-  return layout_of(memory_).runtime.read();
+  return instance_layout_of(memory_).runtime.read();
 }
 
 std::optional<TaskIdentity> InstancePageReader::identity(std::uint32_t index) const noexcept {

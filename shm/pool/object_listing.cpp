@@ -6,8 +6,6 @@ namespace plchost {
 
 namespace {
 
-constexpr auto kRelaxed = std::memory_order_relaxed;
-
 std::uint64_t value_of(const ObjectEntry& entry, ObjectType type) {
   switch (type) {
     case ObjectType::event:

@@ -29,8 +29,6 @@ struct ObjectPool::Wanted {
 
 namespace {
 
-constexpr auto kRelaxed = std::memory_order_relaxed;
-
 ObjectType type_of(const ObjectEntry& entry) noexcept {
   return static_cast<ObjectType>(entry.type.load(kRelaxed));
 }

@@ -24,7 +24,6 @@ namespace plchost {
 
 namespace {
 
-constexpr auto kRelaxed = std::memory_order_relaxed;
 static_assert(PLC_IMAGE_MAX_NAME == kMaxObjectName);
 
 /// What the file of a memory is.

@@ -10,8 +10,6 @@ namespace plchost {
 
 namespace {
 
-constexpr auto kRelaxed = std::memory_order_relaxed;  // the mutex orders what it guards
-
 bool is_gone(ClientSlot& client, TimePoint now, bool thoroughly) noexcept {
   if (client.ended.load(kRelaxed) != 0) return true;
   const auto pid = static_cast<pid_t>(client.pid.load(kRelaxed));

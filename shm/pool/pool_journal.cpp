@@ -6,7 +6,6 @@ namespace plchost {
 
 namespace {
 
-constexpr auto kRelaxed = std::memory_order_relaxed;
 constexpr unsigned kPlaceShift = 32;
 
 // A thread that is killed has done all that stands before the instruction which it did not come to, and the

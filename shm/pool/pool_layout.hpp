@@ -29,6 +29,9 @@ inline constexpr std::uint64_t kPoolMagic = 0x6c6f6f70'74736f68;  // "hostpool"
 /// 1: first. 2: semaphores, mutexes, memories, clients and their references. 3: notes of what is changed.
 inline constexpr std::uint32_t kPoolVersion = 3;
 
+/// Of what the pool's mutex orders, or what is checked after it was read without it.
+inline constexpr auto kRelaxed = std::memory_order_relaxed;
+
 using Link = std::atomic<std::uint32_t>;
 
 /// Free memory is all zero, so that 0 is free.

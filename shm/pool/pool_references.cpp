@@ -4,8 +4,6 @@ namespace plchost {
 
 namespace {
 
-constexpr auto kRelaxed = std::memory_order_relaxed;  // the mutex orders what it guards
-
 std::uint32_t generation_of(const ObjectEntry& object) noexcept {
   return Binding::generation(object.binding.load(kRelaxed));
 }

@@ -19,7 +19,6 @@ namespace {
 
 constexpr auto kPatience = std::chrono::milliseconds(100);
 constexpr auto kLookInterval = std::chrono::milliseconds(1);
-constexpr auto kRelaxed = std::memory_order_relaxed;
 
 PoolHeader& header_of(const MemoryFile& memory) noexcept {
   return *reinterpret_cast<PoolHeader*>(memory.bytes().data());

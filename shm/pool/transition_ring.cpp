@@ -12,26 +12,26 @@ namespace plchost {
 
 namespace {
 
-constexpr PageKind kKind{.what = "ring of transitions",
-                         .magic = 0x676e6972'6e617274,  // "tranring"
-                         .version = 1};                 // 1: first
+constexpr PageKind kTransitionsKind{.what = "ring of transitions",
+                                    .magic = 0x676e6972'6e617274,  // "tranring"
+                                    .version = 1};                 // 1: first
 
 static_assert(offsetof(TransitionRingLayout, version) == 8 && sizeof(Transition) == 232);
 
-TransitionRingLayout& layout_of(const MemoryFile& memory) noexcept {
+TransitionRingLayout& ring_layout_of(const MemoryFile& memory) noexcept {
   return *reinterpret_cast<TransitionRingLayout*>(memory.bytes().data());
 }
 
 Result<MemoryFile> open_ring(const std::string& name, MemoryFile::Access access) {
-  return open_fixed_page<TransitionRingLayout>(name, kKind, access);
+  return open_fixed_page<TransitionRingLayout>(name, kTransitionsKind, access);
 }
 
 Result<void> fill(std::span<std::byte> bytes) {
   auto* const ring = new (bytes.data()) TransitionRingLayout;
-  ring->version = kKind.version;
+  ring->version = kTransitionsKind.version;
   ring->size = sizeof(TransitionRingLayout);
   ring->stream_unix_ns = unix_time_ns();
-  ring->magic = kKind.magic;
+  ring->magic = kTransitionsKind.magic;
   return {};
 }
 
@@ -75,7 +75,7 @@ void TransitionRing::remove(std::string_view pool, std::string_view instance) no
 // while the other goes through the whole ring: then a reader sees a number that is not the slot's.
 void TransitionRing::add(TransitionSource source, std::uint32_t from, std::uint32_t to, std::int32_t pid,
                          std::string_view reason) noexcept {
-  TransitionRingLayout& ring = layout_of(memory_);
+  TransitionRingLayout& ring = ring_layout_of(memory_);
   Transition transition{.sequence = ring.last.fetch_add(1, std::memory_order_acq_rel) + 1,
                         .time_unix_ns = unix_time_ns(),
                         .time_monotonic_ns = MonotonicClock::now().time_since_epoch().count(),
@@ -97,11 +97,11 @@ Result<TransitionRingReader> TransitionRingReader::open(std::string_view pool, s
 }
 
 std::int64_t TransitionRingReader::stream_unix_ns() const noexcept {
-  return layout_of(memory_).stream_unix_ns;
+  return ring_layout_of(memory_).stream_unix_ns;
 }
 
 std::optional<Transition> TransitionRingReader::next(TimePoint now) noexcept {
-  const TransitionRingLayout& ring = layout_of(memory_);
+  const TransitionRingLayout& ring = ring_layout_of(memory_);
   for (;;) {
     const std::uint64_t last = ring.last.load(std::memory_order_acquire);
     if (next_ > last) return std::nullopt;

@@ -44,7 +44,7 @@ bool are_node_names(std::string_view text) {
   });
 }
 
-constexpr std::array kKeys = {
+constexpr std::array kBlockKeys = {
     SettingKey{.section = kDriver,
                .name = "Enable",
                .unit = "1 is a node also without a channel",
@@ -116,7 +116,7 @@ constexpr std::array kKeys = {
 }  // namespace
 
 std::span<const SettingKey> block_keys() noexcept {
-  return kKeys;
+  return kBlockKeys;
 }
 
 }  // namespace plchost

@@ -21,7 +21,7 @@ bool is_memory_name(std::string_view text) {
   return check_reference_name(text).has_value();
 }
 
-constexpr std::array kKeys = {
+constexpr std::array kClockKeys = {
     SettingKey{.section = kClock,
                .name = "Reference",
                .value = TextSetting{"name of a shared memory of the pool, 1 to 95 letters, digits, _ - .",
@@ -90,7 +90,7 @@ constexpr std::array kKeys = {
 }  // namespace
 
 std::span<const SettingKey> clock_keys() noexcept {
-  return kKeys;
+  return kClockKeys;
 }
 
 }  // namespace plchost

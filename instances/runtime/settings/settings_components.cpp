@@ -7,7 +7,7 @@ namespace plchost {
 
 namespace {
 
-constexpr std::string_view kSection = "ComponentManager";
+constexpr std::string_view kComponentSection = "ComponentManager";
 
 bool add_component(const SettingsTarget& to, std::size_t number, std::string_view component) {
   to.components.insert_or_assign(
@@ -15,18 +15,18 @@ bool add_component(const SettingsTarget& to, std::size_t number, std::string_vie
   return true;
 }
 
-constexpr std::array kKeys = {
+constexpr std::array kComponentKeys = {
     SettingKey{
-        .section = kSection,
+        .section = kComponentSection,
         .name = "Component.N",
         .value = NumberedSetting{"file of a shared object, with a '/' or a '.' in its name", add_component}},
-    SettingKey{.section = kSection, .name = "DisablingOperations"},
-    SettingKey{.section = kSection, .name = "MinimalCommCycleHookInterval"},
-    SettingKey{.section = kSection, .name = "OverloadableFunctions"},
-    SettingKey{.section = kSection, .name = "Profiler.ComponentID"},
-    SettingKey{.section = kSection, .name = "WinCE.CommCycleInterval"},
-    SettingKey{.section = kSection, .name = "WinCE.CommCycleThreadPriority"},
-    SettingKey{.section = kSection, .name = "WindowHided"},
+    SettingKey{.section = kComponentSection, .name = "DisablingOperations"},
+    SettingKey{.section = kComponentSection, .name = "MinimalCommCycleHookInterval"},
+    SettingKey{.section = kComponentSection, .name = "OverloadableFunctions"},
+    SettingKey{.section = kComponentSection, .name = "Profiler.ComponentID"},
+    SettingKey{.section = kComponentSection, .name = "WinCE.CommCycleInterval"},
+    SettingKey{.section = kComponentSection, .name = "WinCE.CommCycleThreadPriority"},
+    SettingKey{.section = kComponentSection, .name = "WindowHided"},
 };
 
 }  // namespace
@@ -37,7 +37,7 @@ bool is_foreign_component(std::string_view component) {
 }
 
 std::span<const SettingKey> component_keys() noexcept {
-  return kKeys;
+  return kComponentKeys;
 }
 
 }  // namespace plchost

@@ -99,7 +99,7 @@ bool overlap(const AreaSettings& a, const AreaSettings& b) {
   return a.device == b.device && a.address < b.address + b.size && b.address < a.address + a.size;
 }
 
-constexpr std::array kKeys = {
+constexpr std::array kMemoryKeys = {
     SettingKey{.section = kMemory,
                .name = "Area.N.Flags",
                .prefixed = true,
@@ -159,7 +159,7 @@ constexpr std::array kKeys = {
 }  // namespace
 
 std::span<const SettingKey> memory_keys() noexcept {
-  return kKeys;
+  return kMemoryKeys;
 }
 
 Result<std::vector<AreaSettings>> check_areas(const std::map<std::size_t, AreaDraft>& drafts) {

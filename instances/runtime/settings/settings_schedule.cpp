@@ -10,10 +10,10 @@ namespace {
 using std::chrono::microseconds;
 using std::chrono::milliseconds;
 
-constexpr std::string_view kSection = "CmpSchedule";
+constexpr std::string_view kScheduleSection = "CmpSchedule";
 
-constexpr std::array kKeys = {
-    SettingKey{.section = kSection,
+constexpr std::array kScheduleKeys = {
+    SettingKey{.section = kScheduleSection,
                .name = "SchedulerInterval",
                .unit = "us",
                .initial = "1000",
@@ -21,7 +21,7 @@ constexpr std::array kKeys = {
                                            [](const SettingsTarget& to, Duration interval) {
                                              to.settings.scheduler.scheduler_interval = interval;
                                            }}},
-    SettingKey{.section = kSection,
+    SettingKey{.section = kScheduleSection,
                .name = "Task.Freewheeling.Cycletime",
                .unit = "ms",
                .initial = "-1",
@@ -30,7 +30,7 @@ constexpr std::array kKeys = {
                                                 to.settings.scheduler.freewheeling_cycletime =
                                                     milliseconds(ms < 0 ? 0 : ms);
                                               }}},
-    SettingKey{.section = kSection,
+    SettingKey{.section = kScheduleSection,
                .name = "ProcessorLoad.Maximum",
                .unit = "percent, 0 is not set",
                .initial = "0",
@@ -40,7 +40,7 @@ constexpr std::array kKeys = {
                                             static_cast<int>(percent);
                                       },
                                       true}},
-    SettingKey{.section = kSection,
+    SettingKey{.section = kScheduleSection,
                .name = "ProcessorLoad.Enable",
                .unit = "1 is on",
                .initial = "1",
@@ -48,7 +48,7 @@ constexpr std::array kKeys = {
                                       [](const SettingsTarget& to, std::int64_t on) {
                                         to.settings.scheduler.watchdog.load = on != 0;
                                       }}},
-    SettingKey{.section = kSection,
+    SettingKey{.section = kScheduleSection,
                .name = "ProcessorLoad.Interval",
                .unit = "ms",
                .initial = "1000",
@@ -56,7 +56,7 @@ constexpr std::array kKeys = {
                                       [](const SettingsTarget& to, std::int64_t ms) {
                                         to.settings.scheduler.watchdog.load_interval = milliseconds(ms);
                                       }}},
-    SettingKey{.section = kSection,
+    SettingKey{.section = kScheduleSection,
                .name = "DisableOmittedCycleWatchdog",
                .unit = "1 is disabled",
                .initial = "0",
@@ -65,7 +65,7 @@ constexpr std::array kKeys = {
                                         to.settings.scheduler.watchdog.omitted_cycles = disabled == 0;
                                       }}},
     SettingKey{
-        .section = kSection,
+        .section = kScheduleSection,
         .name = "Watchdog.DefaultTimeMs",
         .unit = "ms, 0 is off",
         .initial = "2000",
@@ -76,7 +76,7 @@ constexpr std::array kKeys = {
                 [](const SettingsTarget& to,
                    std::int64_t ms) { to.settings.scheduler.watchdog.default_time = milliseconds(ms); }}},
     SettingKey{
-        .section = kSection,
+        .section = kScheduleSection,
         .name = "SpinAhead.MaxUs",
         .unit = "us, 0 is off",
         .initial = "100",
@@ -84,14 +84,14 @@ constexpr std::array kKeys = {
             NumberSetting{0, 1000,
                           [](const SettingsTarget& to,
                              std::int64_t us) { to.settings.scheduler.spin_ahead_max = microseconds(us); }}},
-    SettingKey{.section = kSection,
+    SettingKey{.section = kScheduleSection,
                .name = "ExternalEvent.DeviceDescription",
                .value = TextSetting{"an XML file", [](std::string_view text) { return !text.empty(); },
                                     [](const SettingsTarget& to, std::string_view file) {
                                       to.settings.device_description = in_folder(to, file);
                                     }}},
     SettingKey{
-        .section = kSection,
+        .section = kScheduleSection,
         .name = "ExternalEvent.MaxBacklog",
         .unit = "events",
         .initial = "1048576",
@@ -103,14 +103,14 @@ constexpr std::array kKeys = {
                   to.settings.scheduler.max_event_backlog = static_cast<std::uint64_t>(events);
                 }}},
     // The manager waits as long as the highest of them allow.
-    SettingKey{.section = kSection,
+    SettingKey{.section = kScheduleSection,
                .name = "Stop.OutputsLimitMs",
                .unit = "ms",
                .initial = "10000",
                .value = NumberSetting{1, 10'000,
                                       [](const SettingsTarget& to,
                                          std::int64_t ms) { to.settings.stop.outputs = milliseconds(ms); }}},
-    SettingKey{.section = kSection,
+    SettingKey{.section = kScheduleSection,
                .name = "Stop.OthersLimitMs",
                .unit = "ms",
                .initial = "25000",
@@ -118,24 +118,24 @@ constexpr std::array kKeys = {
                                       [](const SettingsTarget& to,
                                          std::int64_t ms) { to.settings.stop.others = milliseconds(ms); }}},
     // Here every scheduler times its tasks itself, without slices, and reports through the instance's log.
-    SettingKey{.section = kSection, .name = "DontUseMicrosecondTiming"},
-    SettingKey{.section = kSection, .name = "EnableLogger"},
-    SettingKey{.section = kSection, .name = "OmittedCycleWatchdog.OnlineChangeUs"},
-    SettingKey{.section = kSection, .name = "SchedulerPriority"},
-    SettingKey{.section = kSection, .name = "Scheduling.Mode"},
-    SettingKey{.section = kSection, .name = "Scheduling.TaskSupervisor"},
-    SettingKey{.section = kSection, .name = "SupervisorTimeoutMultiplier"},
-    SettingKey{.section = kSection, .name = "Timeslicing.Mode"},
-    SettingKey{.section = kSection, .name = "Timeslicing.PlcSlicePercent"},
-    SettingKey{.section = kSection, .name = "Timeslicing.PlcSliceUs"},
-    SettingKey{.section = kSection, .name = "Timeslicing.StartOnProcessorLoad"},
-    SettingKey{.section = kSection, .name = "UseWatchdogTimer"},
+    SettingKey{.section = kScheduleSection, .name = "DontUseMicrosecondTiming"},
+    SettingKey{.section = kScheduleSection, .name = "EnableLogger"},
+    SettingKey{.section = kScheduleSection, .name = "OmittedCycleWatchdog.OnlineChangeUs"},
+    SettingKey{.section = kScheduleSection, .name = "SchedulerPriority"},
+    SettingKey{.section = kScheduleSection, .name = "Scheduling.Mode"},
+    SettingKey{.section = kScheduleSection, .name = "Scheduling.TaskSupervisor"},
+    SettingKey{.section = kScheduleSection, .name = "SupervisorTimeoutMultiplier"},
+    SettingKey{.section = kScheduleSection, .name = "Timeslicing.Mode"},
+    SettingKey{.section = kScheduleSection, .name = "Timeslicing.PlcSlicePercent"},
+    SettingKey{.section = kScheduleSection, .name = "Timeslicing.PlcSliceUs"},
+    SettingKey{.section = kScheduleSection, .name = "Timeslicing.StartOnProcessorLoad"},
+    SettingKey{.section = kScheduleSection, .name = "UseWatchdogTimer"},
 };
 
 }  // namespace
 
 std::span<const SettingKey> schedule_keys() noexcept {
-  return kKeys;
+  return kScheduleKeys;
 }
 
 }  // namespace plchost

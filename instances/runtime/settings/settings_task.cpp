@@ -14,7 +14,7 @@ constexpr std::array<std::string_view, 2> kWatchdogPolicies = {"Application", "T
 static_assert(std::to_underlying(LatePolicy::asap) == 1);
 static_assert(std::to_underlying(WatchdogPolicy::task) == 1);
 
-constexpr std::array kKeys = {
+constexpr std::array kTaskKeys = {
     SettingKey{.section = kTaskSections,
                .name = "LatePolicy",
                .initial = "Next",
@@ -76,7 +76,7 @@ constexpr std::array kKeys = {
 }  // namespace
 
 std::span<const SettingKey> task_keys() noexcept {
-  return kKeys;
+  return kTaskKeys;
 }
 
 }  // namespace plchost

@@ -41,7 +41,7 @@ bool is_path_or_nothing(std::string_view text) {
   return text.size() <= kMaxPath;
 }
 
-constexpr std::array kKeys = {
+constexpr std::array kTimerKeys = {
     SettingKey{.section = kTimer,
                .name = "TimerSource",
                .prefixed = true,
@@ -107,7 +107,7 @@ constexpr std::array kKeys = {
 }  // namespace
 
 std::span<const SettingKey> timer_keys() noexcept {
-  return kKeys;
+  return kTimerKeys;
 }
 
 }  // namespace plchost
