@@ -36,7 +36,7 @@ void describe(HostPageLayout& page) noexcept {
   page.magic = kHostPageKind.magic;
 }
 
-Result<void> fill(std::span<std::byte> bytes) {
+Result<void> fill_host_page(std::span<std::byte> bytes) {
   describe(*new (bytes.data()) HostPageLayout);
   return {};
 }
@@ -104,7 +104,7 @@ Result<HostPageWriter> HostPageWriter::create(std::string_view pool) {
     for (auto& instance : page.instances) instance.recover();
     return HostPageWriter(name, std::move(*found));
   }
-  auto memory = MemoryFile::replace(name, sizeof(HostPageLayout), fill);
+  auto memory = MemoryFile::replace(name, sizeof(HostPageLayout), fill_host_page);
   if (!memory) return std::unexpected(memory.error());
   return HostPageWriter(name, std::move(*memory));
 }
@@ -137,7 +137,7 @@ void HostPageWriter::write_instance(std::uint32_t index, const InstanceStatus& s
 
 bool HostPageWriter::keep() {
   if (!holds(host_layout_of(memory_).host, host_) && memory_.lost()) {
-    auto fresh = MemoryFile::replace(name_, sizeof(HostPageLayout), fill);
+    auto fresh = MemoryFile::replace(name_, sizeof(HostPageLayout), fill_host_page);
     if (!fresh) return true;
     memory_ = std::move(*fresh);
   }

@@ -50,7 +50,8 @@ HistogramBuckets buckets_of(const MemoryFile& memory, std::uint32_t task_count, 
 }
 
 // The memory is zero, as the buckets are at first.
-Result<void> fill(std::span<std::byte> bytes, std::span<const TaskIdentity> tasks, HistogramShape shape) {
+Result<void> fill_instance_page(std::span<std::byte> bytes, std::span<const TaskIdentity> tasks,
+                                HistogramShape shape) {
   auto* const page = new (bytes.data()) InstancePageLayout;
   page->version = kVersion;
   page->digits = shape.digits();
@@ -126,8 +127,9 @@ Result<InstancePage> InstancePage::create(std::string_view pool, std::string_vie
         fmt::format("instance '{}' has {} tasks; at most {} are allowed", instance, tasks.size(), kMaxTasks));
   }
   const HistogramShape shape = shape_for(tasks.size());
-  auto memory = MemoryFile::replace(instance_page_name(pool, instance), size_for(tasks.size(), shape),
-                                    [&](std::span<std::byte> bytes) { return fill(bytes, tasks, shape); });
+  auto memory = MemoryFile::replace(
+      instance_page_name(pool, instance), size_for(tasks.size(), shape),
+      [&](std::span<std::byte> bytes) { return fill_instance_page(bytes, tasks, shape); });
   if (!memory) return std::unexpected(memory.error());
   return InstancePage(std::move(*memory), static_cast<std::uint32_t>(tasks.size()), shape);
 }

@@ -14,7 +14,7 @@ namespace plchost {
 
 namespace {
 
-constexpr std::uint64_t kMoment = std::uint64_t{16} << 20;  // bytes that are free within some 2 ms
+constexpr std::uint64_t kAtOnce = std::uint64_t{16} << 20;  // bytes that are free within some 2 ms
 constexpr int kBlock = 512;                                 // of st_blocks
 
 }  // namespace
@@ -30,7 +30,7 @@ bool MemoryTrash::take(const std::string& name) noexcept {
 }
 
 MemoryTrash::~MemoryTrash() {
-  if (bytes_ < kMoment) return;
+  if (bytes_ < kAtOnce) return;
   auto held = std::make_shared<std::vector<UniqueFd>>(std::move(held_));
   auto thread = Thread::start("pool-trash", {}, [held] {
     sigset_t all;

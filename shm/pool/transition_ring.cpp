@@ -26,7 +26,7 @@ Result<MemoryFile> open_ring(const std::string& name, MemoryFile::Access access)
   return open_fixed_page<TransitionRingLayout>(name, kTransitionsKind, access);
 }
 
-Result<void> fill(std::span<std::byte> bytes) {
+Result<void> fill_ring(std::span<std::byte> bytes) {
   auto* const ring = new (bytes.data()) TransitionRingLayout;
   ring->version = kTransitionsKind.version;
   ring->size = sizeof(TransitionRingLayout);
@@ -55,13 +55,13 @@ Result<TransitionRing> TransitionRing::open(std::string_view pool, std::string_v
   const std::string name = transition_ring_name(pool, instance);
   auto memory = open_ring(name, MemoryFile::Access::read_write);
   if (!memory && memory.error().code == ErrorCode::not_found) {
-    memory = MemoryFile::create(name, sizeof(TransitionRingLayout), fill);
+    memory = MemoryFile::create(name, sizeof(TransitionRingLayout), fill_ring);
     // Another process was faster.
     if (!memory && memory.error().code == ErrorCode::already_exists) {
       memory = open_ring(name, MemoryFile::Access::read_write);
     }
   } else if (!memory && memory.error().code == ErrorCode::corrupt) {
-    memory = MemoryFile::replace(name, sizeof(TransitionRingLayout), fill);
+    memory = MemoryFile::replace(name, sizeof(TransitionRingLayout), fill_ring);
   }
   if (!memory) return std::unexpected(std::move(memory).error());
   return TransitionRing(*std::move(memory));

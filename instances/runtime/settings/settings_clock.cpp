@@ -9,9 +9,9 @@ namespace plchost {
 namespace {
 
 constexpr std::string_view kClock = "DistributedClock";
-constexpr std::int64_t kNsPerMs = 1'000'000;
+constexpr std::int64_t kNsInMs = 1'000'000;
 
-using Clock = DistributedClockSettings;
+using ClockSettings = DistributedClockSettings;
 
 DistributedClockSettings& clock_of(const SettingsTarget& target) {
   return target.settings.scheduler.distributed_clock;
@@ -33,7 +33,7 @@ constexpr std::array kClockKeys = {
                .name = "KpPpm",
                .unit = "ppm",
                .initial = "30000",
-               .value = NumberSetting{1, Clock::kMaxGainPpm,
+               .value = NumberSetting{1, ClockSettings::kMaxGainPpm,
                                       [](const SettingsTarget& to, std::int64_t ppm) {
                                         clock_of(to).kp_ppm = static_cast<int>(ppm);
                                       }}},
@@ -41,7 +41,7 @@ constexpr std::array kClockKeys = {
                .name = "KiPpm",
                .unit = "ppm",
                .initial = "200",
-               .value = NumberSetting{0, Clock::kMaxGainPpm,
+               .value = NumberSetting{0, ClockSettings::kMaxGainPpm,
                                       [](const SettingsTarget& to, std::int64_t ppm) {
                                         clock_of(to).ki_ppm = static_cast<int>(ppm);
                                       }}},
@@ -49,7 +49,7 @@ constexpr std::array kClockKeys = {
                .name = "MaxCorrectionNs",
                .unit = "ns",
                .initial = "0",  // 1 % of the interval
-               .value = NumberSetting{0, Clock::kMaxCorrection.count(),
+               .value = NumberSetting{0, ClockSettings::kMaxCorrection.count(),
                                       [](const SettingsTarget& to, std::int64_t ns) {
                                         clock_of(to).max_correction = Duration(ns);
                                       }}},
@@ -57,7 +57,7 @@ constexpr std::array kClockKeys = {
                .name = "SyncWindowNs",
                .unit = "ns",
                .initial = "50000",
-               .value = NumberSetting{1, Clock::kMaxWindow.count(),
+               .value = NumberSetting{1, ClockSettings::kMaxWindow.count(),
                                       [](const SettingsTarget& to, std::int64_t ns) {
                                         clock_of(to).sync_window = Duration(ns);
                                       }}},
@@ -65,7 +65,7 @@ constexpr std::array kClockKeys = {
                .name = "PairToleranceNs",
                .unit = "ns",
                .initial = "2000",
-               .value = NumberSetting{1, Clock::kMaxWindow.count(),
+               .value = NumberSetting{1, ClockSettings::kMaxWindow.count(),
                                       [](const SettingsTarget& to, std::int64_t ns) {
                                         clock_of(to).pair_tolerance = Duration(ns);
                                       }}},
@@ -73,7 +73,7 @@ constexpr std::array kClockKeys = {
                .name = "ReferenceTimeoutMs",
                .unit = "ms",
                .initial = "300",
-               .value = NumberSetting{1, Clock::kMaxTimeout.count() / kNsPerMs,
+               .value = NumberSetting{1, ClockSettings::kMaxTimeout.count() / kNsInMs,
                                       [](const SettingsTarget& to, std::int64_t ms) {
                                         clock_of(to).reference_timeout = std::chrono::milliseconds(ms);
                                       }}},
@@ -81,7 +81,7 @@ constexpr std::array kClockKeys = {
                .name = "HoldOverMs",
                .unit = "ms",
                .initial = "10000",
-               .value = NumberSetting{0, Clock::kMaxTimeout.count() / kNsPerMs,
+               .value = NumberSetting{0, ClockSettings::kMaxTimeout.count() / kNsInMs,
                                       [](const SettingsTarget& to, std::int64_t ms) {
                                         clock_of(to).hold_over_limit = std::chrono::milliseconds(ms);
                                       }}},
