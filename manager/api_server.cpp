@@ -114,6 +114,7 @@ void ApiServer::ended() {
   if (status.exited_with(kExitNameTaken)) return name_is_taken(now);
   name_held_ = name_held_ || now - spawned_ >= kNameAsked;
   if (now - spawned_ >= kApiSettled) delay_ = Duration::zero();
+  if (has_served()) delay_ = std::min(delay_, kApiServedDelay);
   spdlog::warn("API server: {}; starts again after {} ms", status.describe(),
                std::chrono::duration_cast<std::chrono::milliseconds>(delay_).count());
   timer_.set(now + delay_);
@@ -143,9 +144,17 @@ void ApiServer::on_timer() {
   if (process_) (void)signal_process(*process_, SIGKILL);
 }
 
-void ApiServer::look_at_beats() {
+bool ApiServer::beats_since() const {
   std::uint64_t more = 0;
-  const bool beats = ::read(beats_.get(), &more, sizeof more) == sizeof more;
+  return ::read(beats_.get(), &more, sizeof more) == sizeof more;
+}
+
+bool ApiServer::has_served() const {
+  return beats_counted_ > 0 || beats_since();
+}
+
+void ApiServer::look_at_beats() {
+  const bool beats = beats_since();
   if (beats && beats_counted_++ == 0) heartbeat_ = HeartbeatWatch(kApiSilence);
   const TimePoint now = MonotonicClock::now();
   heartbeat_.look(now, beats_counted_);

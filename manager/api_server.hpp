@@ -31,6 +31,9 @@ class ApiServer {
   void on_timer();
   void name_is_taken(TimePoint now);
   void look_at_beats();
+  /// Whether it has beaten since the last look.
+  [[nodiscard]] bool beats_since() const;
+  [[nodiscard]] bool has_served() const;
   [[nodiscard]] std::vector<std::string> arguments() const;
 
   Reactor& reactor_;
@@ -54,7 +57,7 @@ class ApiServer {
 /// Of the second and later restarts in a row: doubles from the first to the second.
 inline constexpr Duration kApiRestartDelay = std::chrono::milliseconds(100);
 inline constexpr Duration kApiRestartDelayMax = std::chrono::seconds(5);
-/// Whose loop stands still for so long is killed. A flood of requests keeps it busy for some seconds.
+/// Whose loop stands still for so long is killed. It beats every 25 ms.
 inline constexpr Duration kApiSilence = std::chrono::seconds(10);
 /// So long may its start take: it may have to wait for the end of the one before, and for its name.
 inline constexpr Duration kApiStart = std::chrono::seconds(30);
@@ -65,5 +68,8 @@ inline constexpr Duration kNameDelayMax = std::chrono::seconds(60);
 inline constexpr Duration kNameAsked = std::chrono::seconds(3);
 /// Who lived that long has recovered: its next restart is at once.
 inline constexpr Duration kApiSettled = std::chrono::seconds(1);
+/// And who has served at all, after so long at most: what ends each one again and again (packets) shall not
+/// keep the host away for longer than that.
+inline constexpr Duration kApiServedDelay = std::chrono::milliseconds(50);
 
 }  // namespace plchost

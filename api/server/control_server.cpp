@@ -148,6 +148,7 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
     if (options.beat_fd >= 0) raise_event(options.beat_fd);
   } else if (fd == identity_timer.get()) {
     tell_of_refused(MonotonicClock::now());
+    tell_of_malformed(MonotonicClock::now());
     if (identity_changed()) return false;
     return keeps_name();
   } else if (fd == signals.get()) {
@@ -165,6 +166,17 @@ void ControlServer::Parts::tell_of_refused(TimePoint now) {
                refused - refused_told);
   refused_told = refused;
   refused_told_at = now;
+}
+
+// They name no source that could be told.
+void ControlServer::Parts::tell_of_malformed(TimePoint now) {
+  constexpr Duration kAtMostEvery = std::chrono::seconds(10);
+  const std::uint64_t malformed = intake->malformed();
+  if (malformed == malformed_told || now - malformed_told_at < kAtMostEvery) return;
+  spdlog::warn("{} posts were refused: of another source than their writer, or numbered as none can be",
+               malformed - malformed_told);
+  malformed_told = malformed;
+  malformed_told_at = now;
 }
 
 // Whether what DDS has loaded is not what counts any more, so that a fresh process must load it.
@@ -237,34 +249,47 @@ void ControlServer::Parts::look_at_runs() {
   (void)::timerfd_settime(run_timer.get(), 0, &times, nullptr);
 }
 
+// So many at a time: a flood of requests shall not keep acknowledgements and the presence waiting.
 void ControlServer::Parts::on_requests(const RequestReader& source) {
-  const dds_entity_t reader = source.reader.get();
-  dds::take_valid<plc_Request>(reader, [&](const plc_Request& request, const dds_sample_info_t& info) {
-    const dds::Guid writer = dds::writer_of(reader, info);
-    // Gone meanwhile, or pretending to be another: nobody to answer.
-    if (writer == dds::Guid{}) return;
-    // Where no answer could be remembered, its repetition would be done once more.
-    if (!sessions->serves(writer.participant())) return;
-    const plc_SampleIdentity& identity = request.header.request_identity;
-    if (writer != dds::Guid::from(identity.writer_guid)) {
-      audit->asked(writer.participant(), request);
-      return answer(writer.participant(), identity, ErrorCode::refused,
-                    "the request's identity is not that of its writer");
-    }
-    const auto needed =
-        source.role == ApiRole::operating ? security::Role::operating : security::Role::engineer;
-    if (const auto may = guard.check(writer, needed); !may) {
-      audit->asked(writer.participant(), request);
-      return answer(writer.participant(), identity, may.error().code, may.error().message);
-    }
-    on_request(source.role, writer, request);
-  });
+  constexpr std::size_t kAtOnce = 16;
+  const dds::Samples<plc_Request, kAtOnce> batch(source.reader.get());
+  for (std::size_t i = 0; i < batch.size(); ++i) {
+    if (batch.valid(i)) on_request(source, batch[i], batch.info(i));
+  }
+  if (batch.full()) raise_event(wake.get());
 }
 
-void ControlServer::Parts::on_request(ApiRole role, const dds::Guid& writer, const plc_Request& request) {
+void ControlServer::Parts::on_request(const RequestReader& source, const plc_Request& request,
+                                      const dds_sample_info_t& info) {
+  const dds::Guid writer = dds::writer_of(source.reader.get(), info);
+  // Gone meanwhile, or pretending to be another: nobody to answer.
+  if (writer == dds::Guid{}) return;
+  const dds::Guid client = writer.participant();
+  // Where nothing can be answered, nothing is done: it is asked again.
+  if (!sessions->serves(client)) return;
+  if (writer != dds::Guid::from(request.header.request_identity.writer_guid)) {
+    return refuse(client, request,
+                  {.code = ErrorCode::refused,
+                   .system_errno = 0,
+                   .message = "the request's identity is not that of its writer"});
+  }
+  const auto needed =
+      source.role == ApiRole::operating ? security::Role::operating : security::Role::engineer;
+  if (const auto may = guard.check(writer, needed); !may) return refuse(client, request, may.error());
+  do_request(source.role, writer, request);
+}
+
+// Not by its identity: that may be of another's request that is under way.
+void ControlServer::Parts::refuse(const dds::Guid& client, const plc_Request& request, const Error& error) {
+  audit->refused(client, request, error);
+  send_answer(client, request.header.request_identity, error.code, error.message);
+}
+
+void ControlServer::Parts::do_request(ApiRole role, const dds::Guid& writer, const plc_Request& request) {
   const plc_SampleIdentity& identity = request.header.request_identity;
   const dds::Guid client = writer.participant();
-  if (const auto known = sessions->remembered(client, identity)) return sessions->write_reply(client, *known);
+  if (const plc_Reply* const known = answers.find(client, identity))
+    return sessions->write_reply(client, *known);
   if (manager->is_pending(identity) || downloads.repeat(identity)) return;
   audit->asked(client, request);
   const std::vector<std::string_view> instances(status->instances().begin(), status->instances().end());
@@ -275,6 +300,7 @@ void ControlServer::Parts::on_request(ApiRole role, const dds::Guid& writer, con
   if (checked->verb == ControlVerb::list_nodes || checked->verb == ControlVerb::list_routes) {
     return list_nodes(checked->verb, client, request);
   }
+  audit->handed_on(identity);
   if (checked->verb == ControlVerb::download_application) {
     return begin_download(client, identity, *std::move(checked));
   }
@@ -374,6 +400,11 @@ bool ControlServer::Parts::collect_findings(FinishedCommand& finished) {
 void ControlServer::Parts::answer(const dds::Guid& client, const plc_SampleIdentity& identity, ErrorCode code,
                                   std::string_view text) {
   audit->answered(identity, code, text);
+  send_answer(client, identity, code, text);
+}
+
+void ControlServer::Parts::send_answer(const dds::Guid& client, const plc_SampleIdentity& identity,
+                                       ErrorCode code, std::string_view text) {
   plc_Reply reply{};
   reply.header.related_identity = identity;
   reply.header.remote_ex = remote_exception(code);
@@ -381,6 +412,7 @@ void ControlServer::Parts::answer(const dds::Guid& client, const plc_SampleIdent
   reply.code = static_cast<std::int32_t>(code);
   reply.status_round = status->round();
   dds::copy_text(reply.text, text);
+  answers.remember(client, reply, MonotonicClock::now());
   sessions->write_reply(client, reply);
 }
 

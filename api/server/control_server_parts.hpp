@@ -13,6 +13,7 @@
 #include "api/server/access/identity_watch.hpp"
 #include "api/server/access/request_audit.hpp"
 #include "api/server/access/request_check.hpp"
+#include "api/server/answer_memory.hpp"
 #include "api/server/control_server.hpp"
 #include "api/server/downloads/download_table.hpp"
 #include "api/server/lists/node_lister.hpp"
@@ -59,13 +60,18 @@ struct ControlServer::Parts {
   Result<bool> dispatch(int fd);
   void on_wake();
   void on_requests(const RequestReader& source);
-  void on_request(ApiRole role, const dds::Guid& writer, const plc_Request& request);
+  void on_request(const RequestReader& source, const plc_Request& request, const dds_sample_info_t& info);
+  void do_request(ApiRole role, const dds::Guid& writer, const plc_Request& request);
   Result<void> on_manager();
   [[nodiscard]] bool identity_changed();
   [[nodiscard]] Result<bool> keeps_name();
   void tell_of_refused(TimePoint now);
+  void tell_of_malformed(TimePoint now);
+  void refuse(const dds::Guid& client, const plc_Request& request, const Error& error);
   void answer(const dds::Guid& client, const plc_SampleIdentity& identity, ErrorCode code,
               std::string_view text);
+  void send_answer(const dds::Guid& client, const plc_SampleIdentity& identity, ErrorCode code,
+                   std::string_view text);
   void finish(std::vector<FinishedCommand> commands);
   void ask_for_findings();
   void list_objects(const dds::Guid& client, const plc_Request& request);
@@ -102,6 +108,8 @@ struct ControlServer::Parts {
   std::optional<IdentityWatch> identity_watch;  // of a secured host
   std::uint64_t refused_told = 0;
   TimePoint refused_told_at;
+  std::uint64_t malformed_told = 0;
+  TimePoint malformed_told_at;
   UniqueFd run_timer;  // set while runs are waited for
   std::optional<ManagerLink> manager;
   std::optional<EventIntake> intake;
@@ -109,6 +117,7 @@ struct ControlServer::Parts {
   dds::Entity participant;
   std::optional<NameClaim> name;
   std::optional<SessionTable> sessions;
+  AnswerMemory answers;
   std::optional<RequestAudit> audit;
   std::optional<StatusPublisher> status;
   dds::Entity subscriber;

@@ -106,12 +106,22 @@ Result<void> ControlServer::Parts::open_audit() {
       spdlog::error("changes are not recorded: {}", opened.error().describe());
     }
   }
-  audit.emplace(std::move(log), [this](const dds::Guid& client, AuditRecord& record) {
+  std::optional<PendingRecords> pending;
+  if (log) {
+    auto opened = PendingRecords::open(options.audit_folder + "/under_way");
+    if (opened) {
+      pending = *std::move(opened);
+    } else {
+      spdlog::error("what is under way is not recorded: {}", opened.error().describe());
+    }
+  }
+  audit.emplace(std::move(log), std::move(pending), [this](const dds::Guid& client, AuditRecord& record) {
     if (const auto subject = guard.identity_of(client)) {
       record.who = fmt::format("{} {}", security::to_string(subject->role), subject->name);
     }
     record.from = sessions->describe(client);
   });
+  intake->note_sources_since(MonotonicClock::now() - 2 * RequestAudit::kPostPeriod);
   return {};
 }
 

@@ -6,7 +6,6 @@
 
 #include "api/dds/claim.hpp"
 #include "api/dds/error.hpp"
-#include "api/dds/sample_identity.hpp"
 #include "api/dds/samples.hpp"
 #include "api/dds/topics.hpp"
 #include "shm/base/log.hpp"
@@ -24,6 +23,9 @@ constexpr std::array kStreamTopics{dds::kReply,    dds::kEventAck, dds::kObjectP
 Result<SessionTable> SessionTable::create(dds_entity_t participant) {
   static_assert(kStreamTopics.size() == kStreams);
   SessionTable table;
+  auto reaper = dds::EntityReaper::create();
+  if (!reaper) return std::unexpected(std::move(reaper).error());
+  table.reaper_ = std::move(*reaper);
   table.participant_ = participant;
   for (std::size_t i = 0; i < kStreams; ++i) {
     auto topic = dds::make_topic(participant, kStreamTopics[i]);
@@ -129,7 +131,12 @@ bool SessionTable::make_room(TimePoint now) {
 
 void SessionTable::end_session(const dds::Guid& client) {
   ack_writers_->remove(client);
-  sessions_.erase(client);
+  auto ended = sessions_.extract(client);
+  if (ended.empty()) return;
+  std::vector<dds::Entity> entities;
+  for (dds::Entity& writer : ended.mapped().writers) entities.push_back(std::move(writer));
+  entities.push_back(std::move(ended.mapped().publisher));
+  reaper_->take(std::move(entities));
 }
 
 std::string SessionTable::describe(const dds::Guid& client) const {
@@ -139,15 +146,6 @@ std::string SessionTable::describe(const dds::Guid& client) const {
 }
 
 void SessionTable::write_reply(const dds::Guid& client, const plc_Reply& reply) {
-  Session* const session = session_of(client);
-  if (session == nullptr) return;
-  const auto known = std::ranges::find_if(session->answers, [&](const plc_Reply& answer) {
-    return same_identity(answer.header.related_identity, reply.header.related_identity);
-  });
-  if (known == session->answers.end()) {
-    session->answers.push_back(reply);
-    if (session->answers.size() > kRemembered) session->answers.pop_front();
-  }
   (void)write(client, Stream::replies, &reply);  // not read: the client asks again and gets it then
 }
 
@@ -179,16 +177,6 @@ bool SessionTable::write(const dds::Guid& client, Stream stream, const void* sam
   Session* const session = session_of(client);
   if (session == nullptr || !open_writer(client, *session, stream)) return false;
   return dds_write(session->writers[std::to_underlying(stream)].get(), sample) == DDS_RETCODE_OK;
-}
-
-std::optional<plc_Reply> SessionTable::remembered(const dds::Guid& client,
-                                                  const plc_SampleIdentity& identity) const {
-  const auto session = sessions_.find(client);
-  if (session == sessions_.end()) return std::nullopt;
-  for (const plc_Reply& answer : session->second.answers) {
-    if (same_identity(answer.header.related_identity, identity)) return answer;
-  }
-  return std::nullopt;
 }
 
 }  // namespace plchost

@@ -3,9 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <memory>
-#include <optional>
 #include <string>
 #include <unordered_map>
 #include <vector>
@@ -13,6 +11,7 @@
 #include <control.h>
 
 #include "api/dds/entity.hpp"
+#include "api/dds/entity_reaper.hpp"
 #include "api/dds/guid.hpp"
 #include "api/server/posts/ack_writers.hpp"
 #include "shm/base/result.hpp"
@@ -21,16 +20,13 @@
 namespace plchost {
 
 /// The clients that were heard of, each with writers of its own in its own partition, so that one that does
-/// not read holds up nobody else, and with the answers it got, so that a repeated request is not done twice.
-/// Control loop only.
+/// not read holds up nobody else. Control loop only.
 class SessionTable {
  public:
   static constexpr std::size_t kMaxSessions = 256;
   /// When there are more, one that got nothing for so long makes room: it is made again when that client asks
-  /// again. Longer than a client repeats a request: an answer that it may still need is never forgotten.
+  /// again.
   static constexpr Duration kIdle = std::chrono::seconds(10);
-  /// As many answers are remembered for each client.
-  static constexpr std::size_t kRemembered = 32;
 
   [[nodiscard]] static Result<SessionTable> create(dds_entity_t participant);
 
@@ -39,7 +35,7 @@ class SessionTable {
 
   /// `client` is a participant. Answers without a session, because the table is full of clients that are all
   /// busy, are dropped and counted.
-  /// What a client asks is only done if this is true. The client is not idle.
+  /// What a client asks is only done if this is true: it could not be answered. The client is not idle.
   [[nodiscard]] bool serves(const dds::Guid& client) { return session_of(client) != nullptr; }
   void write_reply(const dds::Guid& client, const plc_Reply& reply);
   void write_ack(const dds::Guid& client, const plc_EventAck& ack);
@@ -52,8 +48,6 @@ class SessionTable {
   /// False: the client has not got it, nor will.
   [[nodiscard]] bool write_page(const dds::Guid& client, const plc_ObjectPage& page);
   [[nodiscard]] bool write_page(const dds::Guid& client, const plc_NodePage& page);
-  [[nodiscard]] std::optional<plc_Reply> remembered(const dds::Guid& client,
-                                                    const plc_SampleIdentity& identity) const;
 
   /// What the client says of itself, and its GUID.
   [[nodiscard]] std::string describe(const dds::Guid& client) const;
@@ -72,7 +66,6 @@ class SessionTable {
   struct Session {
     dds::Entity publisher;
     std::array<dds::Entity, kStreams> writers = {};
-    std::deque<plc_Reply> answers = {};
     TimePoint used = {};
   };
 
@@ -86,6 +79,7 @@ class SessionTable {
   bool open_writer(const dds::Guid& client, Session& session, Stream stream);
   bool write(const dds::Guid& client, Stream stream, const void* sample);
 
+  std::unique_ptr<dds::EntityReaper> reaper_;
   dds_entity_t participant_ = 0;
   std::array<dds::Entity, kStreams> topics_;
   dds::Entity participants_;

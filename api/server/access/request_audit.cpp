@@ -1,9 +1,11 @@
 #include "api/server/access/request_audit.hpp"
 
 #include <array>
+#include <chrono>
 #include <span>
 #include <utility>
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 
 #include "api/control/application_order.hpp"
@@ -42,6 +44,25 @@ std::string argument_of(const plc_Request& request) {
 
 }  // namespace
 
+RequestAudit::RequestAudit(std::unique_ptr<AuditLog> log, std::optional<PendingRecords> pending,
+                           Describe describe)
+    : log_(std::move(log)), describe_(std::move(describe)), pending_(std::move(pending)) {
+  if (log_ && pending_) tell_of_unanswered();
+}
+
+// Of a server that was killed: whether it was done nobody knows here.
+void RequestAudit::tell_of_unanswered() {
+  for (AuditRecord& record : pending_->take_all()) {
+    const std::chrono::sys_time<std::chrono::nanoseconds> asked{
+        std::chrono::nanoseconds(record.time_unix_ns)};
+    record.time_unix_ns = unix_time_ns();
+    record.result = "unknown";
+    record.text = fmt::format("asked at {:%Y-%m-%d %H:%M:%S} UTC; the API server ended before the answer",
+                              std::chrono::time_point_cast<std::chrono::milliseconds>(asked));
+    write(record);
+  }
+}
+
 RequestAudit::~RequestAudit() {
   for (auto& [source, posts] : posts_) tell(source, posts, TimePoint::max());
 }
@@ -49,18 +70,41 @@ RequestAudit::~RequestAudit() {
 void RequestAudit::asked(const dds::Guid& client, const plc_Request& request) {
   if (!log_ || only_reads(request.operation)) return;
   if (under_way_.size() >= kMostUnderWay) under_way_.clear();
+  under_way_[key_of(request.header.request_identity)] = {.record = record_of(client, request)};
+}
+
+void RequestAudit::handed_on(const plc_SampleIdentity& identity) {
+  const auto found = under_way_.find(key_of(identity));
+  if (!pending_ || found == under_way_.end()) return;
+  found->second.record.time_unix_ns = unix_time_ns();
+  const auto written = pending_->add(found->first, found->second.record);
+  found->second.handed_on = true;
+  if (!written) spdlog::error("what is under way is not recorded: {}", written.error().describe());
+}
+
+void RequestAudit::refused(const dds::Guid& client, const plc_Request& request, const Error& error) {
+  if (!log_ || only_reads(request.operation)) return;
+  AuditRecord record = record_of(client, request);
+  write_answered(record, error.code, error.message);
+}
+
+AuditRecord RequestAudit::record_of(const dds::Guid& client, const plc_Request& request) const {
   AuditRecord record;
   describe_(client, record);
   record.what = operation_name(request.operation);
   record.on = dds::text_of(request.instance);
   record.argument = argument_of(request);
-  under_way_[key_of(request.header.request_identity)] = std::move(record);
+  return record;
 }
 
 void RequestAudit::answered(const plc_SampleIdentity& identity, ErrorCode code, std::string_view text) {
   auto found = under_way_.extract(key_of(identity));
   if (found.empty()) return;
-  AuditRecord& record = found.mapped();
+  write_answered(found.mapped().record, code, text);
+  if (found.mapped().handed_on) pending_->remove(found.key());
+}
+
+void RequestAudit::write_answered(AuditRecord& record, ErrorCode code, std::string_view text) {
   record.time_unix_ns = unix_time_ns();
   record.result = to_string(code);
   record.text = text;

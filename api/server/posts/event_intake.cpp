@@ -61,6 +61,13 @@ bool EventIntake::take_batches(dds_entity_t reader) {
   return take<plc_EventBatch>(reader);
 }
 
+void EventIntake::note_sources_since(TimePoint then) {
+  const std::lock_guard lock(mutex_);
+  ledger_.for_each([&](const LedgerEntry& entry) {
+    if (entry.used_ns >= then.time_since_epoch().count()) written_.insert(dds::Guid{entry.source});
+  });
+}
+
 void EventIntake::acknowledge_by(AckWriters& writers) {
   const std::lock_guard lock(mutex_);
   ack_writers_ = &writers;
@@ -206,13 +213,19 @@ Result<PostResult> EventIntake::try_post(const plc_EventBatch& batch, LedgerEntr
   }
   auto result = PostResult::posted;
   std::uint32_t position = 0;
+  std::uint32_t gone = 0;
   for_each_event(batch, [&](std::string_view instance, std::string_view event) {
     if (position++ < entry.batch_done.load(std::memory_order_relaxed)) return;
     const auto found = event_of(instance, event);
-    if (found && found->post() == PostResult::no_task) result = PostResult::no_task;
+    const PostResult done = found ? found->post() : PostResult::not_registered;
+    if (done == PostResult::not_registered) ++gone;
+    if (done == PostResult::no_task) result = PostResult::no_task;
     entry.batch_done.store(position, std::memory_order_release);
   });
-  return result;
+  if (gone == 0) return result;
+  return failure(ErrorCode::not_found,
+                 fmt::format("{} of the {} events of the batch went at that moment; the others were posted",
+                             gone, count));
 }
 
 template <class Post>
@@ -288,6 +301,8 @@ std::vector<plc_EventAck> EventIntake::collect_written_acks() {
 std::vector<EventIntake::Writer> EventIntake::writers() const {
   const std::lock_guard lock(mutex_);
   std::vector<Writer> found{{.source = {}, .counters = ledger_.total(), .last = 0, .used = {}}};
+  found.front().counters.received += malformed_;
+  found.front().counters.rejected += malformed_;
   ledger_.for_each([&](const LedgerEntry& entry) {
     const TimePoint used{Duration(entry.used_ns)};
     found.front().used = std::max(found.front().used, used);

@@ -45,6 +45,10 @@ class EventIntake {
               const AccessGuard& guard)
       : host_(std::move(host)), epoch_(epoch), guard_(&guard), directory_(pool), ledger_(std::move(ledger)) {}
 
+  /// The sources that posted since then are among the next collect_written_acks(): a server that was killed
+  /// may not have told of their last posts.
+  void note_sources_since(TimePoint then);
+
   /// From now on posts are acknowledged at once where `writers` has a writer for their client; it must
   /// outlive this.
   void acknowledge_by(AckWriters& writers);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <numeric>
 #include <utility>
 
 #include <fmt/format.h>
@@ -18,15 +19,15 @@ void RunWatch::decide(Wait& wait, ErrorCode code, const std::string& text) {
 }
 
 void RunWatch::add(const AwaitedPost& post, const TaskWatch& tasks) {
-  const auto is_same_source = [&post](const Wait& wait) {
-    return dds::Guid::from(wait.result.source) == post.source;
-  };
   const auto is_same = [&](const Wait& wait) {
-    return is_same_source(wait) && wait.result.sequence_number == post.sequence;
+    return wait.result.sequence_number == post.sequence && dds::Guid::from(wait.result.source) == post.source;
   };
   if (std::ranges::any_of(waits_, is_same)) return;  // a post that came again: the first one counts
-  const bool full = waits_.size() >= kMaxWaits ||
-                    static_cast<std::size_t>(std::ranges::count_if(waits_, is_same_source)) >= kMaxOfSource;
+  const auto of_client = std::ranges::count_if(waits_, [&](const Wait& wait) {
+    return dds::Guid::from(wait.result.source).participant() == post.source.participant();
+  });
+  const bool full =
+      waits_.size() >= kMaxWaits || runs() >= kMaxRuns || static_cast<std::size_t>(of_client) >= kMaxOfClient;
   Wait& wait = waits_.emplace_back();
   post.source.copy_to(wait.result.source);
   wait.result.sequence_number = post.sequence;
@@ -34,9 +35,10 @@ void RunWatch::add(const AwaitedPost& post, const TaskWatch& tasks) {
   wait.result.epoch = epoch_;
   wait.received = post.received;
   if (full) {
-    return decide(wait, ErrorCode::full,
-                  fmt::format("the host waits for at most {} runs at once ({} of one client)", kMaxWaits,
-                              kMaxOfSource));
+    return decide(
+        wait, ErrorCode::full,
+        fmt::format("the host waits for the runs of at most {} posts at once ({} of one client, {} tasks)",
+                    kMaxWaits, kMaxOfClient, kMaxRuns));
   }
   for (const AwaitedPost::Target& target : post.targets) {
     for (auto& task : tasks.bound_tasks(target.instance, target.event)) {
@@ -47,13 +49,19 @@ void RunWatch::add(const AwaitedPost& post, const TaskWatch& tasks) {
   if (wait.runs.empty()) decide(wait, ErrorCode::not_found, "no task is bound to the event");
 }
 
+std::size_t RunWatch::runs() const {
+  return std::accumulate(waits_.begin(), waits_.end(), std::size_t{0},
+                         [](std::size_t sum, const Wait& wait) { return sum + wait.runs.size(); });
+}
+
 void RunWatch::look_at(Wait& wait, Run& run, const TaskWatch& tasks) {
   const InstancePageReader* const page = tasks.page_of(run.task);
   const auto runtime = page != nullptr ? page->runtime() : std::nullopt;
   const auto task = page != nullptr ? page->task(run.task.index) : std::nullopt;
   if (page != nullptr && (!runtime || !task)) return;  // is being written
-  const std::string name =
-      task ? fmt::format("{}/{}", run.task.instance, task->identity.name.view()) : run.task.instance;
+  const auto name = [&] {
+    return task ? fmt::format("{}/{}", run.task.instance, task->identity.name.view()) : run.task.instance;
+  };
   if (task && task->counters.posts_done >= run.count) {
     run.done = true;
     const TaskCounters& counters = task->counters;
@@ -65,11 +73,11 @@ void RunWatch::look_at(Wait& wait, Run& run, const TaskWatch& tasks) {
     if (end_ns < wait.result.end_ns) return;
     wait.result.start_ns = std::max<std::int64_t>(wrapping_difference(start, received), 0);
     wait.result.end_ns = end_ns;
-    dds::copy_text(wait.result.last_task, name);
+    dds::copy_text(wait.result.last_task, name());
   } else if (!runtime || runtime->running == 0) {
-    decide(wait, ErrorCode::wrong_state, fmt::format("'{}' was stopped before it ran for the post", name));
+    decide(wait, ErrorCode::wrong_state, fmt::format("'{}' was stopped before it ran for the post", name()));
   } else if (task->state == PageTaskState::exception) {
-    decide(wait, ErrorCode::wrong_state, fmt::format("task '{}' is in exception", name));
+    decide(wait, ErrorCode::wrong_state, fmt::format("task '{}' is in exception", name()));
   }
 }
 

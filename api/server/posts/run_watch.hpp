@@ -18,8 +18,10 @@ namespace plchost {
 /// pages, so that neither the task nor who posts has anything to do for it. Control loop only.
 class RunWatch {
  public:
-  static constexpr std::size_t kMaxOfSource = 64;
+  static constexpr std::size_t kMaxOfClient = 64;
   static constexpr std::size_t kMaxWaits = 1024;
+  /// A batch waits for the tasks of all of its events.
+  static constexpr std::size_t kMaxRuns = 4096;
   /// A task that has not run by then is not waited for.
   static constexpr Duration kLimit = std::chrono::seconds(10);
   /// While something is waited for it is looked so often.
@@ -44,6 +46,7 @@ class RunWatch {
     std::vector<Run> runs;
     bool decided = false;
   };
+  [[nodiscard]] std::size_t runs() const;
   static void decide(Wait& wait, ErrorCode code, const std::string& text);
   static void look_at(Wait& wait, Run& run, const TaskWatch& tasks);
 

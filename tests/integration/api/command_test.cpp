@@ -166,6 +166,23 @@ TEST_F(RemoteCommand, WorksForTwentyClientsAtOnce) {
   EXPECT_EQ(host_.requests().size(), 20U);
 }
 
+// Longer away than DDS waits for a participant: to the server it has gone, and it does not know.
+TEST_F(RemoteCommand, OfAClientThatWasOutOfReachMeanwhileIsDoneOnce) {
+  host_.start_server();
+  host_.hold = true;
+  Child client(PLCCTL_PROGRAM, {"--domain", std::to_string(domain_.number()), "--timeout", "30", "stop",
+                                "instance", "line1"});
+  while (host_.requests().empty()) std::this_thread::sleep_for(milliseconds(1));
+  client.signal(SIGSTOP);
+  std::this_thread::sleep_for(seconds(5));
+  host_.hold = false;
+  std::this_thread::sleep_for(seconds(1));  // it is answered while nobody is there
+  client.signal(SIGCONT);
+
+  EXPECT_EQ(client.wait(), 0);
+  EXPECT_EQ(host_.requests().size(), 1U);
+}
+
 TEST_F(RemoteCommand, OfOneMoreThanAreServedIsAnsweredInPlaceOfOneThatIsIdle) {
   host_.start_server();
   const auto client = connect(domain_);

@@ -1,14 +1,19 @@
 #include <algorithm>
+#include <atomic>
 #include <fstream>
 #include <thread>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "api/client/control_client.hpp"
+#include "api/dds/domain.hpp"
+#include "api/dds/text.hpp"
+#include "api/dds/topics.hpp"
 #include "tests/integration/api/test_host.hpp"
 
 namespace plchost {
@@ -132,6 +137,72 @@ TEST(PostFlood, IsCountedToTheLastPost) {
   EXPECT_EQ(writer.received, writer.delivered + writer.rejected + writer.duplicate + writer.early);
   EXPECT_EQ(writer.delivered, flood.counted().count());
   EXPECT_EQ(writer.last_sequence, writer.delivered + writer.rejected + writer.lost);
+}
+
+/// Requests as fast as they can be written, to be answered by nobody: a process of its own.
+[[noreturn]] void flood_with_requests(const OwnDomain& domain, std::atomic<std::uint64_t>& written) {
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  dds::DomainOptions options;
+  options.domain = domain.number();
+  const auto opened = dds::open_domain(dds::Role::client, options).value();
+  const dds::Entity participant(dds_create_participant(domain.number(), nullptr, nullptr));
+  const auto topic = dds::make_topic(participant.get(), dds::kOperatorRequest).value();
+  const auto publisher = dds::make_publisher(participant.get(), dds::host_partition("hosta")).value();
+  const auto writer = dds::make_writer(publisher.get(), topic.get(), dds::request_qos()).value();
+  plc_Request request{};
+  dds::guid_of(writer.get()).copy_to(request.header.request_identity.writer_guid);
+  dds::copy_text(request.header.instance_name, "hosta");
+  request.operation = plc_OPERATION_READ_CLOCK;
+  dds_publication_matched_status_t matched{};
+  while (matched.current_count == 0) (void)dds_get_publication_matched_status(writer.get(), &matched);
+  for (;;) {
+    ++request.header.request_identity.sequence_number;
+    if (dds_write(writer.get(), &request) == DDS_RETCODE_OK) ++written;
+  }
+}
+
+TEST(RequestFlood, OfSomeClientsKeepsNeitherThePresenceNorAnotherClientWaiting) {
+  const OwnDomain domain;
+  void* const shared = ::mmap(nullptr, sizeof(std::atomic<std::uint64_t>), PROT_READ | PROT_WRITE,
+                              MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  ASSERT_NE(shared, MAP_FAILED);
+  auto& written = *new (shared) std::atomic<std::uint64_t>(0);
+  std::vector<pid_t> floods;
+  for (int i = 0; i < 2; ++i) {
+    floods.push_back(::fork());
+    if (floods.back() == 0) flood_with_requests(domain, written);
+  }
+  TestHost host(domain, "hosta");
+  host.write_instance(0, "line1", InstanceState::running, 4711);
+  host.write_count(1);
+  const PoolEvent calm = host.add_event("line1", "calm");
+  host.start_server();
+  const auto sut = connect(domain);
+  ASSERT_TRUE(sut->prepare_posts("hosta", soon()));
+  const std::uint64_t epoch = sut->host("hosta", soon()).value().epoch;
+
+  while (written < 1000) std::this_thread::sleep_for(milliseconds(1));
+  const std::uint64_t before = written;
+  const TimePoint start = MonotonicClock::now();
+
+  const std::string posts = figures(100, [&] {
+    ASSERT_TRUE(sut->post_event({"hosta", 0, "line1", "calm"}, 1, Duration::zero(), kPatience));
+  });
+  const std::string commands =
+      figures(20, [&] { ASSERT_TRUE(sut->call({"hosta", plc_OPERATION_STOP, "line1", ""}, soon())); });
+
+  const double rate = static_cast<double>(written - before) / to_ms(MonotonicClock::now() - start) * 1000;
+  fmt::print("{} floods, {:.0f} requests a second: a post and its acknowledgement {}; a command {}\n",
+             floods.size(), rate, posts, commands);
+  EXPECT_GT(written, before) << "the flood was over";
+  EXPECT_EQ(calm.counted().count(), 100U);
+  const auto now = sut->host("hosta", soon());
+  ASSERT_TRUE(now);
+  EXPECT_EQ(now->epoch, epoch) << "it is still the same server";
+  for (const pid_t flood : floods) {
+    ::kill(flood, SIGKILL);
+    ::waitpid(flood, nullptr, 0);
+  }
 }
 
 }  // namespace

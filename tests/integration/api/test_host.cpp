@@ -164,6 +164,8 @@ void TestHost::serve(const std::stop_token& stop) {
       reply = answer_;
     }
     if (silent) continue;
+    while (hold && request.verb == ControlVerb::stop && !stop.stop_requested())
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
     if (request.verb == ControlVerb::stop) write_instance(0, request.instance, InstanceState::stopped, 4711);
     reply.number = request.number;
     (void)peer->send(encode(reply));

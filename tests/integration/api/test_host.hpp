@@ -75,6 +75,7 @@ class TestHost {
     return checks_;
   }
   std::atomic<bool> silent{false};      ///< the manager answers nothing
+  std::atomic<bool> hold{false};        ///< the manager answers "stop" once this is false again
   std::atomic<bool> close_peer{false};  ///< the manager hangs up
 
  private:

@@ -149,6 +149,7 @@ TEST_F(EventIntakeTest, IgnoresImpossibleNumbers) {
   sut.process(make_post(1, 0));
   sut.process(make_post(1, 2));
   EXPECT_EQ(sut.malformed(), 3U);
+  EXPECT_EQ(sut.writers().front().counters.rejected, 3U) << "of all together, as they name nobody";
   EXPECT_TRUE(sut.collect_acks().empty());
 }
 
@@ -308,6 +309,35 @@ TEST_F(EventIntakeTest, GoesOnWithinABatchWhereTheServerBeforeItWasKilled) {
   EXPECT_EQ(event_.counted().count(), 1U);
   sut.process(Batch(2, {"ready", "ready", "ready"}).sample());
   EXPECT_EQ(event_.counted().count(), 4U);
+}
+
+TEST_F(EventIntakeTest, TellsWhatOfABatchCouldNotBePostedAnyMore) {
+  {
+    PostLedger ledger = PostLedger::open(name_).value();
+    dds::Guid source;
+    source.bytes[0] = 9;
+    LedgerEntry& entry = ledger.entry_for(source, 1);
+    entry.batch.store(1);
+    entry.batch_done.store(1);
+  }
+  EventIntake sut = make();
+  sut.process(Batch(1, {"ready", "ready", "redy"}).sample());
+  const auto ack = only_ack(sut);
+  EXPECT_EQ(ack.rejected, 1U);
+  EXPECT_THAT(std::string(dds::text_of(ack.rejected_text)), testing::HasSubstr("1 of the 3 events"));
+}
+
+TEST_F(EventIntakeTest, TellsTheNextServersLogOfWhoPostedLast) {
+  {
+    make().process(make_post(1));
+  }
+  EventIntake sut = make();
+  sut.note_sources_since(MonotonicClock::now());
+  EXPECT_TRUE(sut.collect_written_acks().empty());
+  sut.note_sources_since(MonotonicClock::now() - std::chrono::minutes(1));
+  const auto acks = sut.collect_written_acks();
+  ASSERT_EQ(acks.size(), 1U);
+  EXPECT_EQ(acks[0].accepted, 1U);
 }
 
 TEST_F(EventIntakeTest, NotesThePostsWhoseRunsAreAwaited) {

@@ -147,12 +147,16 @@ TEST_F(RunWatchTest, WaitsNoLongerThanItsLimit) {
   EXPECT_EQ(told[0].code, static_cast<int>(ErrorCode::timed_out));
 }
 
-TEST_F(RunWatchTest, WaitsForABoundedNumberOfPostsOfOneSource) {
-  for (std::uint64_t i = 1; i <= RunWatch::kMaxOfSource + 1; ++i) sut_.add(post(i, "ready", 1), tasks_);
+TEST_F(RunWatchTest, WaitsForABoundedNumberOfPostsOfOneClient) {
+  for (std::uint64_t i = 1; i <= RunWatch::kMaxOfClient + 1; ++i) sut_.add(post(i, "ready", 1), tasks_);
   const auto told = sut_.look(tasks_, now_);
   ASSERT_EQ(told.size(), 1U);
-  EXPECT_EQ(told[0].sequence_number, RunWatch::kMaxOfSource + 1);
+  EXPECT_EQ(told[0].sequence_number, RunWatch::kMaxOfClient + 1);
   EXPECT_EQ(told[0].code, static_cast<int>(ErrorCode::full));
+  AwaitedPost by_another_writer = post(1, "ready", 1);
+  by_another_writer.source.bytes.back() ^= 0xff;
+  sut_.add(by_another_writer, tasks_);
+  EXPECT_EQ(sut_.look(tasks_, now_).size(), 1U) << "a client with more writers has no more of them";
 
   AwaitedPost other = post(1, "ready", 1);
   other.source.bytes[0] = 2;

@@ -1,0 +1,47 @@
+#include "api/dds/entity_reaper.hpp"
+
+#include <iterator>
+#include <utility>
+
+namespace plchost::dds {
+
+Result<std::unique_ptr<EntityReaper>> EntityReaper::create() {
+  std::unique_ptr<EntityReaper> reaper(new EntityReaper());
+  auto thread = Thread::start("dds-reaper", {}, [&self = *reaper] { self.run(); });
+  if (!thread) return std::unexpected(std::move(thread).error());
+  reaper->thread_ = std::move(*thread);
+  return reaper;
+}
+
+EntityReaper::~EntityReaper() {
+  {
+    const std::lock_guard lock(mutex_);
+    stopping_ = true;
+  }
+  changed_.notify_one();
+  thread_.join();
+}
+
+void EntityReaper::take(std::vector<Entity> entities) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (waiting_.size() >= kMost) return;
+    waiting_.insert(waiting_.end(), std::make_move_iterator(entities.begin()),
+                    std::make_move_iterator(entities.end()));
+  }
+  changed_.notify_one();
+}
+
+void EntityReaper::run() {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    changed_.wait(lock, [this] { return stopping_ || !waiting_.empty(); });
+    if (waiting_.empty()) return;
+    std::vector<Entity> entities = std::exchange(waiting_, {});
+    lock.unlock();
+    for (Entity& entity : entities) entity.reset();
+    lock.lock();
+  }
+}
+
+}  // namespace plchost::dds
