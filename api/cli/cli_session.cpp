@@ -129,7 +129,7 @@ void CliSession::show(const std::vector<Row>& rows, const std::vector<Column>& c
 }
 
 int CliSession::fail(const Error& error) {
-  fmt::print(stderr, "plcctl: {}\n", error.describe());
+  fmt::print(stderr, "plcctl: {}\n", printable(error.describe()));
   if (error.code == ErrorCode::timed_out || error.code == ErrorCode::unavailable) return kExitNoAnswer;
   return error.code == ErrorCode::invalid_argument ? kExitUsage : kExitFailed;
 }

@@ -6,6 +6,8 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "shm/base/names.hpp"
+
 namespace plchost {
 
 std::string progress_line(std::string_view name, std::size_t width, std::uint64_t received,
@@ -56,7 +58,7 @@ void ProgressBoard::draw() {
   std::string text;
   for (const Line& line : lines_) {
     if (line.ended) continue;
-    text += progress_line(line.host, width, line.received, size_) + "\n";
+    text += progress_line(printable(line.host), width, line.received, size_) + "\n";
     ++drawn_;
   }
   fmt::print(stderr, "{}", text);

@@ -41,8 +41,8 @@ void BatchPoster::write(TimePoint now) {
   last_write_ = now;
 }
 
-void BatchPoster::on_ack(const plc_EventAck& ack) {
-  if (dds::Guid::from(ack.source) != source_ || ack.epoch < newest_.epoch) return;
+void BatchPoster::on_ack(const plc_EventAck& ack, TimePoint now) {
+  if (dds::Guid::from(ack.source) != source_ || !epoch_.accept(ack.epoch, now)) return;
   newest_ = ack;
   newest_.ext = {};
 }

@@ -9,6 +9,7 @@
 #include <control.h>
 
 #include "api/client/event_poster.hpp"
+#include "api/client/newest_epoch.hpp"
 #include "api/dds/entity.hpp"
 #include "api/dds/guid.hpp"
 #include "shm/base/result.hpp"
@@ -37,7 +38,7 @@ class BatchPoster {
 
   /// At most kMaxBatch, whose names fit.
   void post(std::span<const EventId> events, TimePoint now);
-  void on_ack(const plc_EventAck& ack);
+  void on_ack(const plc_EventAck& ack, TimePoint now);
   [[nodiscard]] bool acknowledged() const noexcept { return newest_.sequence_number >= last_sequence_; }
   /// Repeats what is due to be repeated. Returns when it has to be called again.
   TimePoint repeat(TimePoint now);
@@ -55,6 +56,7 @@ class BatchPoster {
   dds::Guid source_;
   std::uint64_t last_sequence_ = 0;
   TimePoint last_write_;
+  NewestEpoch epoch_;
   plc_EventAck newest_{};
   plc_EventAck base_{};
 };

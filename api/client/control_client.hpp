@@ -18,6 +18,7 @@
 #include "api/client/batch_poster.hpp"
 #include "api/client/event_poster.hpp"
 #include "api/client/request_caller.hpp"
+#include "api/client/seen_hosts.hpp"
 #include "api/client/statistics_cache.hpp"
 #include "api/client/status_cache.hpp"
 #include "api/client/transition_log.hpp"
@@ -75,13 +76,14 @@ struct Download {
 /// Told how many bytes have arrived: again from the beginning, when plchost-dds had to be started again.
 using DownloadProgressFunction = std::function<void(std::uint64_t received)>;
 
-/// The client's end of the DDS API: sees all hosts of a domain and addresses any. One thread at a time.
+/// The client's end of the DDS API: sees all hosts of a domain (of names, at most SeenHosts::kMost) and
+/// addresses any. One thread at a time.
 /// Nothing here waits beyond the deadline it was given; deadlines are of MonotonicClock. invalid_argument, at
 /// once and with nothing sent: a name that no host, instance, event or task can have, or a text too long.
 class ControlClient {
  public:
   /// A host that has not shown its presence for so long is gone.
-  static constexpr Duration kHostGone = std::chrono::milliseconds(500);
+  static constexpr Duration kHostGone = kServerGone;
   /// A host is silent after so long: a little less than the deadline of its presence, so that who is woken by
   /// that sees it.
   static constexpr Duration kSilent = dds::kPresenceDeadline - std::chrono::milliseconds(5);
@@ -95,11 +97,13 @@ class ControlClient {
   /// The hosts that answer, by name: waits for the first one until the deadline, then until none is news any
   /// more. Empty: none answers.
   [[nodiscard]] std::vector<HostView> hosts(TimePoint deadline);
-  /// The same, and those that were seen before and are silent now.
+  /// The same, and those that were seen before and are silent now; of more than SeenHosts::kMost, those that
+  /// have been gone for a minute are forgotten.
   [[nodiscard]] std::vector<HostView> known_hosts(TimePoint deadline);
   /// Asks a host for its time, several times: the best of them counts. refused: only operators may ask.
   [[nodiscard]] Result<ClockOffset> clock_offset(const std::string& host, TimePoint deadline);
-  /// That host, as soon as it is seen. not_found: it does not answer; the text lists who does.
+  /// That host, as soon as it is seen. not_found: it does not answer; the text lists who does, and which of
+  /// them may be meant.
   [[nodiscard]] Result<HostView> host(std::string_view name, TimePoint deadline);
 
   /// Whether a host that was seen does not show its presence at present: its server is dead, or hangs, or
@@ -188,21 +192,13 @@ class ControlClient {
   void wait_for_change(TimePoint deadline) { wait_set_.wait(deadline); }
 
  private:
-  struct Seen {
-    std::uint64_t epoch = 0;
-    std::int32_t pid = 0;
-    TimePoint last;
-    std::uint32_t others = 0;  // presences of an older server while this one lives
-    TimePoint other_last;
-  };
-
   ControlClient() = default;
   Result<void> open(const dds::DomainOptions& options);
   void update();
   void update_hosts();
   [[nodiscard]] std::vector<HostView> present() const;
   [[nodiscard]] std::optional<HostView> present(std::string_view name) const;
-  [[nodiscard]] std::optional<HostView> view_of(std::string_view name, const Seen& seen) const;
+  [[nodiscard]] std::optional<HostView> view_of(std::string_view name, const SeenHost& seen) const;
   template <class Cache>
   [[nodiscard]] Result<void> open_cache(Cache& cache, const dds::TopicInfo& topic,
                                         const dds::Qos& qos = dds::status_qos(),
@@ -247,7 +243,7 @@ class ControlClient {
   StatusCache<plc_ExceptionStatus> exceptions_;
   StatusCache<plc_ApplicationStatus> applications_;
   StatusCache<plc_HostFinding> host_findings_;
-  std::map<std::string, Seen, std::less<>> seen_;
+  SeenHosts seen_;
   TransitionLog transition_log_;
   TimePoint last_news_;
   Duration quiet_ = kQuiet;

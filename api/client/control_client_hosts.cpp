@@ -8,9 +8,24 @@
 #include "api/client/check_names.hpp"
 #include "api/client/control_client.hpp"
 #include "api/dds/entries.hpp"
+#include "api/dds/samples.hpp"
+#include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
+
+namespace {
+
+// Who answers is a stranger's text.
+std::string no_such_host(std::string_view name, const std::vector<std::string>& answering) {
+  const std::vector<std::string_view> views(answering.begin(), answering.end());
+  const std::string_view near = nearest_name(name, views);
+  return fmt::format("no host '{}' answers{}; those that do: {}", name,
+                     near.empty() || near == name ? "" : fmt::format(" (did you mean '{}'?)", shown(near)),
+                     join_some(answering));
+}
+
+}  // namespace
 
 std::vector<std::string> HostView::labels() const {
   const std::string all = entry(dds::kLabelsEntry);
@@ -34,24 +49,20 @@ void ControlClient::update_hosts() {
   // Looked at, it is over; else no wait would wait any more.
   dds_requested_deadline_missed_status_t missed{};
   (void)dds_get_requested_deadline_missed_status(presence_.reader(), &missed);
-  presence_.update([&](const plc_Presence& presence) {
-    Seen& seen = seen_[std::string(dds::text_of(presence.host))];
-    const bool is_gone = now - seen.last > kHostGone;
-    // The last word of a server that was replaced; or another host that has the same name.
-    if (presence.epoch < seen.epoch && !is_gone) {
-      seen.others = now - seen.other_last > kHostGone ? 1 : seen.others + 1;
-      seen.other_last = now;
-      return;
-    }
-    if (seen.epoch != presence.epoch || is_gone) last_news_ = now;
-    seen.epoch = presence.epoch;
-    seen.pid = presence.pid;
-    seen.last = now;
-  });
+  // None is kept beside what seen_ has of it: that is bounded.
+  dds::take_changes<plc_Presence>(
+      presence_.reader(),
+      [&](auto /*handle*/, const plc_Presence& presence) {
+        if (seen_.take(presence, now)) last_news_ = now;
+      },
+      [](auto /*handle*/) {});
   host_status_.update();
+  if (host_status_.size() <= SeenHosts::kMost) return;
+  host_status_.erase_if(
+      [this](const plc_HostStatus& status) { return seen_.find(dds::text_of(status.host)) == nullptr; });
 }
 
-std::optional<HostView> ControlClient::view_of(std::string_view name, const Seen& seen) const {
+std::optional<HostView> ControlClient::view_of(std::string_view name, const SeenHost& seen) const {
   const auto status = host_status_.of_host(name, seen.epoch);
   if (status.empty()) return std::nullopt;
   constexpr std::uint32_t kMoreThanLastWords = 3;
@@ -70,14 +81,14 @@ std::optional<HostView> ControlClient::view_of(std::string_view name, const Seen
 }
 
 std::optional<HostView> ControlClient::present(std::string_view name) const {
-  const auto seen = seen_.find(name);
-  if (seen == seen_.end() || MonotonicClock::now() - seen->second.last > kHostGone) return std::nullopt;
-  return view_of(name, seen->second);
+  const SeenHost* const seen = seen_.find(name);
+  if (seen == nullptr || MonotonicClock::now() - seen->last > kHostGone) return std::nullopt;
+  return view_of(name, *seen);
 }
 
 std::vector<HostView> ControlClient::present() const {
   std::vector<HostView> found;
-  for (const auto& [name, seen] : seen_) {
+  for (const auto& [name, seen] : seen_.all()) {
     if (auto view = present(name)) found.push_back(std::move(*view));
   }
   return found;
@@ -85,8 +96,8 @@ std::vector<HostView> ControlClient::present() const {
 
 bool ControlClient::is_silent(std::string_view host) {
   update();
-  const auto seen = seen_.find(host);
-  return seen != seen_.end() && MonotonicClock::now() - seen->second.last >= kSilent;
+  const SeenHost* const seen = seen_.find(host);
+  return seen != nullptr && MonotonicClock::now() - seen->last >= kSilent;
 }
 
 std::vector<HostView> ControlClient::hosts(TimePoint deadline) {
@@ -110,12 +121,11 @@ Result<HostView> ControlClient::host(std::string_view name, TimePoint deadline) 
     wait_set_.wait(deadline);
   }
   // Those too that are late at this very moment.
-  std::vector<std::string_view> names;
-  for (const auto& [other, seen] : seen_) {
-    if (seen.last >= began - kHostGone) names.emplace_back(other);
+  std::vector<std::string> names;
+  for (const auto& [other, seen] : seen_.all()) {
+    if (seen.last >= began - kHostGone) names.push_back(other);
   }
-  return failure(ErrorCode::not_found,
-                 fmt::format("no host '{}' answers; those that do: {}", name, join_names(names)));
+  return failure(ErrorCode::not_found, no_such_host(name, names));
 }
 
 std::vector<HostView> ControlClient::known_hosts(TimePoint deadline) {
@@ -126,12 +136,12 @@ std::vector<HostView> ControlClient::known_hosts(TimePoint deadline) {
   };
   // A moment of silence is not the end of a host.
   const TimePoint end = MonotonicClock::now() + 2 * kHostGone;
-  while (std::ranges::any_of(seen_, is_in_doubt) && MonotonicClock::now() < end) {
+  while (std::ranges::any_of(seen_.all(), is_in_doubt) && MonotonicClock::now() < end) {
     wait_set_.wait(MonotonicClock::now() + dds::kPresencePeriod);
     update();
   }
   std::vector<HostView> found;
-  for (const auto& [name, seen] : seen_) {
+  for (const auto& [name, seen] : seen_.all()) {
     if (auto view = view_of(name, seen)) found.push_back(std::move(*view));
   }
   return found;

@@ -48,7 +48,7 @@ bool ControlClient::take_acks(TimePoint now) {
   dds::take_valid<plc_EventAck>(ack_reader_.get(), [&](const plc_EventAck& ack, const auto& /*info*/) {
     const auto host = dds::text_of(ack.host);
     if (const auto way = posters_.find(host); way != posters_.end()) progress |= way->second.on_ack(ack, now);
-    if (const auto way = batch_posters_.find(host); way != batch_posters_.end()) way->second.on_ack(ack);
+    if (const auto way = batch_posters_.find(host); way != batch_posters_.end()) way->second.on_ack(ack, now);
   });
   return progress;
 }

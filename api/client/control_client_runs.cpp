@@ -61,7 +61,10 @@ Result<RunReport> ControlClient::post_and_await(const ApiRequest& event, Duratio
   const TimePoint deadline = MonotonicClock::now() + patience;
   if (auto ready = prepare_runs(event.host, deadline); !ready) return std::unexpected(ready.error());
   EventPoster& posts = **poster(event.host);
-  const auto epoch = [&] { return seen_.contains(event.host) ? seen_.at(event.host).epoch : 0; };
+  const auto epoch = [&] {
+    const SeenHost* const seen = seen_.find(event.host);
+    return seen != nullptr ? seen->epoch : 0;
+  };
   std::uint64_t asked = epoch();
   const TimePoint start = MonotonicClock::now();
   posts.begin_report(start);

@@ -78,7 +78,7 @@ Result<void> EventPoster::post_once(std::string_view instance, std::string_view 
 }
 
 bool EventPoster::on_ack(const plc_EventAck& ack, TimePoint now) {
-  if (dds::Guid::from(ack.source) != source_ || ack.epoch < newest_.epoch) return false;
+  if (dds::Guid::from(ack.source) != source_ || !epoch_.accept(ack.epoch, now)) return false;
   const bool new_server = newest_.epoch != 0 && ack.epoch != newest_.epoch;
   newest_ = ack;
   newest_.ext = {};

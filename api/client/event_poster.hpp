@@ -7,6 +7,7 @@
 
 #include <control.h>
 
+#include "api/client/newest_epoch.hpp"
 #include "api/dds/entity.hpp"
 #include "api/dds/guid.hpp"
 #include "shm/base/result.hpp"
@@ -89,6 +90,7 @@ class EventPoster {
   std::uint64_t last_sequence_ = 0;
   TimePoint last_progress_;
   TimePoint last_write_;
+  NewestEpoch epoch_;
   plc_EventAck newest_{};  // epoch 0: none yet
   plc_EventAck base_{};    // where the report counts from
 };

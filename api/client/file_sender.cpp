@@ -26,10 +26,11 @@ Result<FileSender> FileSender::create(dds_entity_t participant, dds_entity_t top
 
 void FileSender::on_ack(const plc_DownloadAck& ack, const plc_SampleIdentity& download, TimePoint now) {
   const bool ours = same_identity(ack.download, download) && dds::text_of(ack.host) == host_;
-  if (!ours || ack.epoch < epoch_ || ack.received > contents_.size()) return;
-  const bool anew = ack.epoch != epoch_;
+  if (!ours || ack.received > contents_.size()) return;
+  const std::uint64_t before = epoch_.value();
+  if (!epoch_.accept(ack.epoch, now)) return;
+  const bool anew = ack.epoch != before;
   if (!anew && ack.received <= received_) return;
-  epoch_ = ack.epoch;
   received_ = ack.received;
   window_ = ack.window;
   next_ = anew ? received_ : std::max(next_, received_);
@@ -37,7 +38,7 @@ void FileSender::on_ack(const plc_DownloadAck& ack, const plc_SampleIdentity& do
 }
 
 TimePoint FileSender::send(const plc_SampleIdentity& download, TimePoint now) {
-  if (epoch_ == 0 || !has_reader(writer_.get())) return now + kLook;
+  if (epoch_.value() == 0 || !has_reader(writer_.get())) return now + kLook;
   if (next_ > received_ && now - last_try_ >= kRepeat) {
     next_ = received_;
     last_try_ = now;

@@ -7,6 +7,7 @@
 
 #include <control.h>
 
+#include "api/client/newest_epoch.hpp"
 #include "api/dds/entity.hpp"
 #include "api/dds/guid.hpp"
 #include "shm/base/result.hpp"
@@ -45,7 +46,7 @@ class FileSender {
   dds::Entity writer_;
   std::string host_;
   std::span<const std::byte> contents_;
-  std::uint64_t epoch_ = 0;     // of the host's newest acknowledgement; 0: none has come
+  NewestEpoch epoch_;           // of the host's acknowledgements
   std::uint64_t received_ = 0;  // acknowledged
   std::uint64_t next_ = 0;      // to be written
   std::uint64_t window_ = 0;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -53,6 +54,13 @@ class StatusCache {
   [[nodiscard]] std::uint32_t count(std::string_view host, std::uint64_t epoch) const {
     return static_cast<std::uint32_t>(std::ranges::count_if(
         samples_, [&](const auto& entry) { return is_of(entry.second.sample, host, epoch); }));
+  }
+
+  [[nodiscard]] std::size_t size() const noexcept { return samples_.size(); }
+  /// Forgets those of which `is_gone(sample)` says so.
+  template <class Predicate>
+  void erase_if(Predicate is_gone) {
+    std::erase_if(samples_, [&](const auto& entry) { return is_gone(entry.second.sample); });
   }
 
  private:

@@ -1,12 +1,14 @@
 #include "api/dds/log_sink.hpp"
 
 #include <mutex>
+#include <string>
 #include <string_view>
 
 #include <dds/dds.h>
 #include <dds/ddsrt/log.h>
 
 #include "shm/base/log.hpp"
+#include "shm/base/names.hpp"
 #include "shm/base/time.hpp"
 
 namespace plchost::dds {
@@ -47,7 +49,7 @@ void write_line(void* /*context*/, const dds_log_data_t* line) {
   std::string_view text(line->message, line->size);
   while (!text.empty() && text.back() == '\n') text.remove_suffix(1);
   const bool severe = (line->priority & (DDS_LC_FATAL | DDS_LC_ERROR)) != 0;
-  spdlog::log(severe ? spdlog::level::err : spdlog::level::warn, "DDS: {}", text);
+  spdlog::log(severe ? spdlog::level::err : spdlog::level::warn, "DDS: {}", printable(std::string(text)));
   if (dropped > 0) spdlog::warn("DDS: {} more lines were not shown", dropped);
 }
 

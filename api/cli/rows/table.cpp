@@ -93,16 +93,32 @@ std::string format_fields(const Row& row) {
   for (const auto& [field, value] : row.items()) width = std::max(width, field.size());
   std::string text;
   for (const auto& [field, value] : row.items()) {
-    text += fmt::format("{:<{}}  {}\n", field, width, cell_of(row, field.c_str(), 3));
+    text += fmt::format("{:<{}}  {}\n", printable(field), width, cell_of(row, field.c_str(), 3));
   }
   return text;
+}
+
+std::string json_text(const Row& row) {
+  const std::string text = row.dump(-1, ' ', false, Row::error_handler_t::replace);
+  std::string escaped;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto code = [&](std::size_t at) { return static_cast<unsigned char>(text[at]); };
+    const bool above_ascii = code(i) == 0xc2 && i + 1 < text.size() && code(i + 1) < 0xa0;
+    if (above_ascii) ++i;
+    if (above_ascii || code(i) == 0x7f) {
+      escaped += fmt::format("\\u{:04x}", code(i));
+    } else {
+      escaped += text[i];
+    }
+  }
+  return escaped;
 }
 
 std::string format_json(const std::vector<Row>& rows) {
   std::string text = "[";
   for (const Row& row : rows) {
     text += &row == &rows.front() ? "\n  " : ",\n  ";
-    text += row.dump(-1, ' ', false, Row::error_handler_t::replace);
+    text += json_text(row);
   }
   return text + (rows.empty() ? "]\n" : "\n]\n");
 }

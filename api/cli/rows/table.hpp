@@ -25,8 +25,11 @@ struct Column {
 [[nodiscard]] std::string format_table(const std::vector<Row>& rows, const std::vector<Column>& columns,
                                        bool coloured = false);
 
-/// One "field  value" line for each field.
+/// One "field  value" line for each field, in characters as above.
 [[nodiscard]] std::string format_fields(const Row& row);
+
+/// JSON in one line, with its control characters escaped, those above ASCII too.
+[[nodiscard]] std::string json_text(const Row& row);
 
 /// An array of objects, one on each line.
 [[nodiscard]] std::string format_json(const std::vector<Row>& rows);

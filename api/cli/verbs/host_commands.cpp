@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "api/dds/text.hpp"
+#include "shm/base/names.hpp"
 
 namespace plchost {
 
@@ -45,12 +46,13 @@ int tell(CliSession& session, const HostOutcome& outcome, const std::string& ins
     return CliSession::fail(error);
   }
   if (outcome.reply->code != ErrorCode::ok) {
-    fmt::print(stderr, "plcctl: {}{}{}\n", where, outcome.reply->text, advice(session, outcome, instance));
+    const std::string said = where + outcome.reply->text + advice(session, outcome, instance);
+    fmt::print(stderr, "plcctl: {}\n", printable(said));
     return kExitFailed;
   }
   if (session.options.json || session.options.csv) return kExitDone;
   if (count > 1 || !outcome.reply->text.empty()) {
-    fmt::print("{}{}\n", where, outcome.reply->text.empty() ? "done" : outcome.reply->text);
+    fmt::print("{}\n", printable(where + (outcome.reply->text.empty() ? "done" : outcome.reply->text)));
   }
   return kExitDone;
 }

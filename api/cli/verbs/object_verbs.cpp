@@ -30,10 +30,6 @@ struct WatchObjectArguments {
   std::uint64_t count = 0;  // 0: until Ctrl-C
 };
 
-std::string dump(const Row& row) {
-  return row.dump(-1, ' ', false, Row::error_handler_t::replace);
-}
-
 Result<ObjectQuery> query_of(const ListArguments& arguments) {
   ObjectQuery query{.name = {}, .type = std::nullopt, .match = arguments.pattern, .after = {}};
   if (arguments.type.empty()) return query;
@@ -70,7 +66,7 @@ void print_json(const std::vector<HostObjects>& hosts) {
   std::string separator = "[\n  ";
   for (const HostObjects& of : hosts) {
     for (const ListedObject& object : of.objects) {
-      fmt::print("{}{}", separator, dump(to_row(of.host, object)));
+      fmt::print("{}{}", separator, json_text(to_row(of.host, object)));
       separator = ",\n  ";
     }
   }
@@ -157,7 +153,7 @@ void print_look(const CliSession& session, const std::string& name, const Object
   if (session.options.json) {
     Row row{{"time", time_text(now)}, {"time_unix_ns", now}};
     row.update(look.row);
-    fmt::print("{}\n", dump(row));
+    fmt::print("{}\n", json_text(row));
   } else {
     fmt::print("{}  {}  {}\n", time_text(now), printable(name), printable(look.text));
   }

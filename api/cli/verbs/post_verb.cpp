@@ -6,6 +6,7 @@
 
 #include "api/cli/cli_session.hpp"
 #include "api/cli/rows/rows.hpp"
+#include "shm/base/names.hpp"
 
 namespace plchost {
 
@@ -53,7 +54,7 @@ int tell(CliSession& session, const std::string& host, const PostArguments& argu
   if (report.rejected == 0) return kExitDone;
   std::string text = fmt::format("{} rejected: {}", report.rejected, report.rejected_text);
   if (report.rejected_code == ErrorCode::not_found) text += event_hint(session, host, arguments.name);
-  fmt::print(stderr, "plcctl: {}\n", text);
+  fmt::print(stderr, "plcctl: {}\n", printable(std::move(text)));
   return kExitFailed;
 }
 
@@ -90,7 +91,7 @@ int tell_runs(const CliSession& session, const std::string& host, const PostArgu
   fmt::print(
       "{} posted and run, last by {}: {:.1f} us from here and back{}; on the host {:.1f} us to the start of "
       "its cycle, {:.1f} us to the end\n",
-      runs.size(), runs.back().last_task, median_us(round_trips),
+      runs.size(), printable(runs.back().last_task), median_us(round_trips),
       runs.size() > 1 ? fmt::format(" (median; {:.1f} to {:.1f})", least, most) : "",
       median_us(of(&RunReport::to_start)), median_us(of(&RunReport::to_end)));
   return kExitDone;

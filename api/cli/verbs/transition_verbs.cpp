@@ -9,6 +9,7 @@
 #include "api/cli/interrupt.hpp"
 #include "api/cli/rows/rows.hpp"
 #include "api/dds/text.hpp"
+#include "shm/base/names.hpp"
 
 namespace plchost {
 
@@ -91,13 +92,13 @@ int list_transitions(CliSession& session, const TransitionArguments& arguments) 
 void print(const CliSession& session, const TransitionView& view) {
   const Row row = to_row(view.sample);
   if (session.options.json) {
-    fmt::print("{}\n", row.dump(-1, ' ', false, Row::error_handler_t::replace));
+    fmt::print("{}\n", json_text(row));
     return;
   }
   if (view.missed > 0) fmt::print("({} were overtaken and are not shown)\n", view.missed);
-  fmt::print("{}  {}/{}  {}  {} -> {}  {}\n", row["time"].get<std::string>(), row["host"].get<std::string>(),
-             row["instance"].get<std::string>(), row["of"].get<std::string>(), row["from"].get<std::string>(),
-             row["to"].get<std::string>(), row["reason"].get<std::string>());
+  const auto text = [&row](const char* field) { return printable(row[field].get<std::string>()); };
+  fmt::print("{}  {}/{}  {}  {} -> {}  {}\n", text("time"), text("host"), text("instance"), text("of"),
+             text("from"), text("to"), text("reason"));
 }
 
 int watch_transitions(CliSession& session, const TransitionArguments& arguments) {

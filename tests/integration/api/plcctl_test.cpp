@@ -141,6 +141,10 @@ TEST_F(Plcctl, SuggestsTheNameThatWasMeant) {
   const auto show = run({"show", "instance", "lin1"});
   EXPECT_EQ(show.code, 1);
   EXPECT_THAT(show.errors, HasSubstr("did you mean 'line1'?"));
+  const auto host = run({"--host", "hosat", "--timeout", "1", "list", "tasks"});
+  EXPECT_EQ(host.code, 3);
+  EXPECT_THAT(host.errors,
+              HasSubstr("no host 'hosat' answers (did you mean 'hosta'?); those that do: hosta"));
   const auto stop = run({"stop", "instance", "lin1"});
   EXPECT_EQ(stop.code, 1);
   EXPECT_THAT(stop.errors, HasSubstr("did you mean 'line1'?"));

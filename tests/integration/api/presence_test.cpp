@@ -14,6 +14,11 @@ namespace {
 
 using std::chrono::milliseconds;
 
+// How soon a client knows of a dead server is what these say, and no test measures it on a shared machine.
+static_assert(dds::kPresenceDeadline <= milliseconds(100) &&
+              ControlClient::kSilent <= dds::kPresenceDeadline);
+static_assert(2 * dds::kPresencePeriod < dds::kPresenceDeadline, "one that is late is no death");
+
 /// One thread of a child process, standing still while this object lives; the other threads of it run on.
 class StoppedThread {
  public:

@@ -37,6 +37,18 @@ TEST(Table, LetsNoNameDriveTheTerminal) {
   EXPECT_THAT(format_table({{{"name", "a\x1b[2J"}}}, {{"name", "NAME"}}), testing::Not(HasSubstr("\x1b")));
 }
 
+TEST(Fields, LetNoNameDriveTheTerminal) {
+  Row row;
+  row["a\x1b[2J"] = "b";
+  EXPECT_THAT(format_fields(row), testing::Not(HasSubstr("\x1b")));
+}
+
+TEST(Failure, LetsNoTextOfAHostDriveTheTerminal) {
+  testing::internal::CaptureStderr();
+  EXPECT_EQ(CliSession::fail({ErrorCode::refused, 0, "no\x1b]0;title\x07"}), kExitFailed);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "plcctl: no?]0;title?\n");
+}
+
 TEST(Table, ColoursStatesOnlyWhereItIsAskedTo) {
   const std::vector<Row> rows{{{"state", "running"}, {"name", "running"}},
                               {{"state", "failed"}, {"name", "b"}}};
@@ -61,6 +73,12 @@ TEST(Csv, QuotesWhatWouldBeTwoFields) {
 TEST(Json, IsAnArrayOfFlatObjects) {
   EXPECT_EQ(format_json({}), "[]\n");
   EXPECT_EQ(format_json({{{"b", 1}, {"a", "x"}}}), "[\n  {\"b\":1,\"a\":\"x\"}\n]\n");
+}
+
+TEST(Json, HasNoControlCharacters) {
+  const Row row{{"name", "F\u00fcll\x1b\x7f\u009b2J"}};
+  EXPECT_EQ(json_text(row), "{\"name\":\"F\u00fcll\\u001b\\u007f\\u009b2J\"}");
+  EXPECT_EQ(Row::parse(json_text(row)), row);
 }
 
 TEST(Rows, GiveDurationsInMicroseconds) {

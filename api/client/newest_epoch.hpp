@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+/// Who has not been heard of for so long is gone.
+inline constexpr Duration kServerGone = std::chrono::milliseconds(500);
+
+/// Which server of a host counts: the one of the greatest epoch, as long as it is heard of. The last words of
+/// one that was replaced do not; one whose clock was set back does, once the one before it is gone.
+class NewestEpoch {
+ public:
+  /// Whether what has come with this epoch counts.
+  [[nodiscard]] bool accept(std::uint64_t epoch, TimePoint now) noexcept {
+    if (epoch < value_ && now - last_ <= kServerGone) return false;
+    value_ = epoch;
+    last_ = now;
+    return true;
+  }
+  /// 0: none yet.
+  [[nodiscard]] std::uint64_t value() const noexcept { return value_; }
+
+ private:
+  std::uint64_t value_ = 0;
+  TimePoint last_;
+};
+
+}  // namespace plchost

@@ -1,0 +1,94 @@
+// A host whose clock was set back: the epoch of its next plchost-dds is below that of the one before.
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "api/client/batch_poster.hpp"
+#include "api/client/event_poster.hpp"
+#include "api/client/file_sender.hpp"
+#include "api/dds/domain.hpp"
+#include "api/dds/text.hpp"
+#include "api/dds/topics.hpp"
+#include "tests/integration/api/test_host.hpp"
+
+namespace plchost {
+namespace {
+
+class ClockSetBack : public testing::Test {
+ protected:
+  [[nodiscard]] dds::DomainOptions options() const {
+    dds::DomainOptions options;
+    options.domain = domain_.number();
+    return options;
+  }
+  [[nodiscard]] static plc_EventAck ack(const dds::Guid& source, std::uint64_t epoch, std::uint64_t number) {
+    plc_EventAck ack{};
+    source.copy_to(ack.source);
+    ack.epoch = epoch;
+    ack.sequence_number = number;
+    ack.accepted = number;
+    ack.credits = EventPoster::kWindow;
+    return ack;
+  }
+
+  static constexpr std::uint64_t kNewer = 9;
+  static constexpr std::uint64_t kOlder = 7;
+  OwnDomain domain_;
+  std::shared_ptr<dds::Entity> opened_ = dds::open_domain(dds::Role::client, options()).value();
+  dds::Entity participant_{dds_create_participant(domain_.number(), nullptr, nullptr)};
+  TimePoint now_ = MonotonicClock::now();
+};
+
+TEST_F(ClockSetBack, LetsPostsBeAcknowledgedAgain) {
+  const auto topic = dds::make_topic(participant_.get(), dds::kEvent).value();
+  auto sut = EventPoster::create(participant_.get(), topic.get(), "hosta").value();
+  sut.post("line1", "ready", now_);
+  EXPECT_TRUE(sut.on_ack(ack(sut.source(), kNewer, 1), now_));
+
+  sut.post("line1", "ready", now_);
+  EXPECT_FALSE(sut.on_ack(ack(sut.source(), kOlder, 2), now_)) << "it may be a late last word";
+  EXPECT_EQ(sut.unacknowledged(), 1U);
+  EXPECT_TRUE(sut.on_ack(ack(sut.source(), kOlder, 2), now_ + 2 * kServerGone));
+  EXPECT_EQ(sut.unacknowledged(), 0U);
+  EXPECT_EQ(sut.report().accepted, 2U);
+}
+
+TEST_F(ClockSetBack, LetsBatchesBeAcknowledgedAgain) {
+  const auto topic = dds::make_topic(participant_.get(), dds::kEventBatch).value();
+  auto sut = BatchPoster::create(participant_.get(), topic.get(), "hosta").value();
+  const dds::Guid source = dds::guid_of(sut.writer());
+  const std::vector<EventId> batch{{"line1", "ready"}};
+  sut.post(batch, now_);
+  sut.on_ack(ack(source, kNewer, 1), now_);
+  EXPECT_TRUE(sut.acknowledged());
+
+  sut.post(batch, now_);
+  sut.on_ack(ack(source, kOlder, 2), now_);
+  EXPECT_FALSE(sut.acknowledged());
+  sut.on_ack(ack(source, kOlder, 2), now_ + 2 * kServerGone);
+  EXPECT_TRUE(sut.acknowledged());
+}
+
+TEST_F(ClockSetBack, LetsADownloadBeginAnew) {
+  const auto topic = dds::make_topic(participant_.get(), dds::kDownloadChunk).value();
+  const std::vector<std::byte> contents(1000);
+  auto sut = FileSender::create(participant_.get(), topic.get(), "hosta", contents).value();
+  plc_DownloadAck ack{};
+  dds::copy_text(ack.host, "hosta");
+  ack.epoch = kNewer;
+  ack.received = 500;
+  sut.on_ack(ack, ack.download, now_);
+  EXPECT_EQ(sut.received(), 500U);
+
+  ack.epoch = kOlder;
+  ack.received = 0;
+  sut.on_ack(ack, ack.download, now_);
+  EXPECT_EQ(sut.received(), 500U);
+  sut.on_ack(ack, ack.download, now_ + 2 * kServerGone);
+  EXPECT_EQ(sut.received(), 0U);
+}
+
+}  // namespace
+}  // namespace plchost
