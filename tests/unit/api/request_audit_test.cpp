@@ -90,6 +90,23 @@ TEST_F(RequestAuditTest, WhatIsAnsweredIsNotUnderWayAnyMore) {
   EXPECT_THAT(records(), AllOf(HasSubstr("line1"), Not(HasSubstr("unknown"))));
 }
 
+TEST_F(RequestAuditTest, PostsOfASourceAreToldAtItsFirstAndThenOnceInAPeriod) {
+  const auto sut = make();
+  const TimePoint start{std::chrono::hours(1)};
+  plc_EventAck ack{};
+  client(1).copy_to(ack.source);
+  ack.accepted = 5;
+  sut->posted(ack, start);
+  sut->tick(start);
+  EXPECT_THAT(records(), HasSubstr("5 taken and 0 refused"));
+  ack.accepted = 7;
+  sut->posted(ack, start + std::chrono::seconds(1));
+  sut->tick(start + RequestAudit::kPostPeriod - std::chrono::milliseconds(1));
+  EXPECT_THAT(records(), Not(HasSubstr("7 taken")));
+  sut->tick(start + RequestAudit::kPostPeriod);
+  EXPECT_THAT(records(), HasSubstr("7 taken and 0 refused"));
+}
+
 TEST_F(RequestAuditTest, JunkLeftUnderWayIsNoRecord) {
   EXPECT_TRUE(make());
   std::ofstream(folder_ + "/under_way/1") << "{\"who\": 5, ";
