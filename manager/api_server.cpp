@@ -112,9 +112,10 @@ void ApiServer::ended() {
   if (shut_down_) return std::exchange(shut_down_, nullptr)();
   const TimePoint now = MonotonicClock::now();
   if (status.exited_with(kExitNameTaken)) return name_is_taken(now);
-  name_held_ = name_held_ || now - spawned_ >= kNameAsked;
+  const bool served = has_served();
+  name_held_ = name_held_ || served;
   if (now - spawned_ >= kApiSettled) delay_ = Duration::zero();
-  if (has_served()) delay_ = std::min(delay_, kApiServedDelay);
+  if (served) delay_ = std::min(delay_, kApiServedDelay);
   spdlog::warn("API server: {}; starts again after {} ms", status.describe(),
                std::chrono::duration_cast<std::chrono::milliseconds>(delay_).count());
   timer_.set(now + delay_);

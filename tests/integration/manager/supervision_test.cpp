@@ -194,6 +194,26 @@ TEST(Manager, KeepsTheApiServerAliveAndEndsItWithItself) {
   EXPECT_FALSE(open_process(second));
 }
 
+TEST(Manager, StartsAnApiServerThatHasServedAgainWithItsNameAndAlmostAtOnceHoweverOftenItDies) {
+  Plant plant;
+  plant.use_api_server(
+      "arguments=\"$$ $*\"\nwhile [ \"$1\" != --beat-fd ]; do shift; done\n"
+      "printf '\\1\\0\\0\\0\\0\\0\\0\\0' >&\"$2\"\necho \"$arguments\" >> api.log\nexec sleep 1000\n");
+  plant.start_manager();
+  const auto lines = [&] { return plant.lines_of("api.log"); };
+  constexpr std::size_t kDeaths = 4;
+  for (std::size_t i = 0; i < kDeaths; ++i) {
+    ASSERT_TRUE(Plant::eventually([&] { return lines().size() == i + 1; }));
+    kill_process(std::stoi(lines()[i]));
+  }
+  ASSERT_TRUE(Plant::eventually([&] { return lines().size() == kDeaths + 1; }));
+  EXPECT_THAT(lines()[0], testing::Not(HasSubstr("--name-held")));
+  for (std::size_t i = 1; i <= kDeaths; ++i) EXPECT_THAT(lines()[i], HasSubstr("--name-held"));
+  EXPECT_THAT(plant.log(), HasSubstr("starts again after 50 ms"));
+  EXPECT_THAT(plant.log(), testing::Not(HasSubstr("starts again after 100 ms")));
+  EXPECT_EQ(plant.stop_manager().describe(), "exit code 0");
+}
+
 TEST(Manager, KillsAnApiServerWhoseLoopStandsStillAndNoOther) {
   Plant plant;
   plant.use_api_server(
