@@ -86,7 +86,10 @@ class Tasks {
   }
 
   [[nodiscard]] TaskCounters counters(std::size_t task) const {
-    return statistics_[task].counters.read(1'000'000).value();
+    // Who writes them may get no core for a while in the midst of it.
+    for (;; std::this_thread::sleep_for(std::chrono::milliseconds(1))) {
+      if (const auto counters = statistics_[task].counters.read(1000)) return *counters;
+    }
   }
 
   /// Waits for cycles that no clock tells of. The number is exact if nothing more is to come.

@@ -76,12 +76,14 @@ TEST_F(CheckHost, LooksAnewEachTimeAndForgetsWhatHasGone) {
   start({kWarning, kNote});
   const auto client = connect(domain_);
   EXPECT_EQ(client->check_host("hosta", soon()).value().size(), 2U);
-  EXPECT_EQ(host_.checks(), 2U) << "once at the start, once for this client";
+  // Once at the start, once for this client; once more where the second has begun before the first was read.
+  const std::uint64_t before = host_.checks();
+  EXPECT_GE(before, 2U);
   host_.find({kNote});
   const auto findings = client->check_host("hosta", soon()).value();
   ASSERT_EQ(findings.size(), 1U);
   EXPECT_STREQ(findings[0].id, "swap");
-  EXPECT_EQ(host_.checks(), 3U);
+  EXPECT_EQ(host_.checks(), before + 1);
 }
 
 TEST_F(CheckHost, SaysThatTheManagerDoesNotAnswer) {
