@@ -148,7 +148,6 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
     if (options.beat_fd >= 0) raise_event(options.beat_fd);
   } else if (fd == identity_timer.get()) {
     tell_of_refused(MonotonicClock::now());
-    tell_of_malformed(MonotonicClock::now());
     if (identity_changed()) return false;
     return keeps_name();
   } else if (fd == signals.get()) {
@@ -158,25 +157,16 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
   return true;
 }
 
+// They name no client that could be told.
 void ControlServer::Parts::tell_of_refused(TimePoint now) {
-  constexpr Duration kAtMostEvery = std::chrono::seconds(10);
-  const std::uint64_t refused = options.refused_datagrams == nullptr ? 0 : options.refused_datagrams();
-  if (refused == refused_told || now - refused_told_at < kAtMostEvery) return;
-  spdlog::warn("{} datagrams were refused before DDS has read them: no RTPS, or not as it must be",
-               refused - refused_told);
-  refused_told = refused;
-  refused_told_at = now;
-}
-
-// They name no source that could be told.
-void ControlServer::Parts::tell_of_malformed(TimePoint now) {
-  constexpr Duration kAtMostEvery = std::chrono::seconds(10);
-  const std::uint64_t malformed = intake->malformed();
-  if (malformed == malformed_told || now - malformed_told_at < kAtMostEvery) return;
-  spdlog::warn("{} posts were refused: of another source than their writer, or numbered as none can be",
-               malformed - malformed_told);
-  malformed_told = malformed;
-  malformed_told_at = now;
+  const std::uint64_t datagrams = options.refused_datagrams == nullptr ? 0 : options.refused_datagrams();
+  if (const auto more = refused_datagrams.take(datagrams, now)) {
+    spdlog::warn("{} datagrams were refused before DDS has read them: no RTPS, or not as it must be", more);
+  }
+  if (const auto more = malformed_posts.take(intake->malformed(), now)) {
+    spdlog::warn("{} posts were refused: of another source than their writer, or numbered as none can be",
+                 more);
+  }
 }
 
 // Whether what DDS has loaded is not what counts any more, so that a fresh process must load it.

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "api/dds/entity.hpp"
@@ -66,7 +67,6 @@ struct ControlServer::Parts {
   [[nodiscard]] bool identity_changed();
   [[nodiscard]] Result<bool> keeps_name();
   void tell_of_refused(TimePoint now);
-  void tell_of_malformed(TimePoint now);
   void refuse(const dds::Guid& client, const plc_Request& request, const Error& error);
   void answer(const dds::Guid& client, const plc_SampleIdentity& identity, ErrorCode code,
               std::string_view text);
@@ -106,10 +106,20 @@ struct ControlServer::Parts {
   UniqueFd identity_timer;
   AccessGuard guard;
   std::optional<IdentityWatch> identity_watch;  // of a secured host
-  std::uint64_t refused_told = 0;
-  TimePoint refused_told_at;
-  std::uint64_t malformed_told = 0;
-  TimePoint malformed_told_at;
+  /// A count of which the log is told how much it has grown, at most every 10 s.
+  struct ToldCount {
+    /// What is to be told now.
+    std::uint64_t take(std::uint64_t count, TimePoint now) noexcept {
+      constexpr Duration kAtMostEvery = std::chrono::seconds(10);
+      if (now - at < kAtMostEvery) return 0;
+      if (count != told) at = now;
+      return count - std::exchange(told, count);
+    }
+    std::uint64_t told = 0;
+    TimePoint at;
+  };
+  ToldCount refused_datagrams;
+  ToldCount malformed_posts;
   UniqueFd run_timer;  // set while runs are waited for
   std::optional<ManagerLink> manager;
   std::optional<EventIntake> intake;

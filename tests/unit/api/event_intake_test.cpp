@@ -24,6 +24,15 @@ class EventIntakeTest : public testing::Test {
     static int counter = 0;
     return "plchost-intake-" + std::to_string(::getpid()) + "-" + std::to_string(counter++);
   }
+  /// As a server leaves it that was killed when so many events of it were posted.
+  void leave_first_batch_at(std::uint32_t posted) const {
+    PostLedger ledger = PostLedger::open(name_).value();
+    dds::Guid source;
+    source.bytes[0] = 9;
+    LedgerEntry& entry = ledger.entry_for(source, 1);
+    entry.batch.store(1);
+    entry.batch_done.store(posted);
+  }
   [[nodiscard]] EventIntake make() const {
     return {"hosta", pool_, PostLedger::open(name_).value(), 7, guard_};
   }
@@ -294,16 +303,8 @@ TEST_F(EventIntakeTest, DoesARepeatedBatchOnce) {
   EXPECT_EQ(event_.counted().count(), 2U);
 }
 
-// A server that was killed between the two posts has left this behind.
 TEST_F(EventIntakeTest, GoesOnWithinABatchWhereTheServerBeforeItWasKilled) {
-  {
-    PostLedger ledger = PostLedger::open(name_).value();
-    dds::Guid source;
-    source.bytes[0] = 9;
-    LedgerEntry& entry = ledger.entry_for(source, 1);
-    entry.batch.store(1);
-    entry.batch_done.store(2);
-  }
+  leave_first_batch_at(2);
   EventIntake sut = make();
   sut.process(Batch(1, {"ready", "ready", "ready"}).sample());
   EXPECT_EQ(event_.counted().count(), 1U);
@@ -312,14 +313,7 @@ TEST_F(EventIntakeTest, GoesOnWithinABatchWhereTheServerBeforeItWasKilled) {
 }
 
 TEST_F(EventIntakeTest, TellsWhatOfABatchCouldNotBePostedAnyMore) {
-  {
-    PostLedger ledger = PostLedger::open(name_).value();
-    dds::Guid source;
-    source.bytes[0] = 9;
-    LedgerEntry& entry = ledger.entry_for(source, 1);
-    entry.batch.store(1);
-    entry.batch_done.store(1);
-  }
+  leave_first_batch_at(1);
   EventIntake sut = make();
   sut.process(Batch(1, {"ready", "ready", "redy"}).sample());
   const auto ack = only_ack(sut);
