@@ -132,7 +132,8 @@ case "${1:-}" in
     exit
     ;;
   --quick)
-    steps=2
+    steps=3
+    run "packages" .ci/packages test
     run "build" build_plain
     run "fast tests" tests "$build" -LE slow
     count
@@ -157,7 +158,8 @@ case "${1:-}" in
     run "fuzzers" fuzz
     ;;
   *)
-    steps=2
+    steps=3
+    run "packages" .ci/packages test
     run "build" build_plain
     run "tests matching $1" tests "$build" -R "$1"
     count
