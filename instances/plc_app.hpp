@@ -208,6 +208,22 @@ inline RTS_RESULT report_reference_time(std::chrono::nanoseconds reference,
   return state;
 }
 
+/// Why a call of the set-up was refused, in words.
+inline std::string reason_of(RTS_RESULT result) {
+  switch (result) {
+    case ERR_PARAMETER:
+      return "a name or a value is not allowed (the log names it)";
+    case ERR_DUPLICATE:
+      return "it is there already";
+    case ERR_NOMEMORY:
+      return "there is no room for one more";
+    case ERR_NOTINITIALIZED:
+      return "this is for the setup function only";
+    default:
+      return "result " + std::to_string(result);
+  }
+}
+
 /// The tasks of one application. Filled by the setup function, which runs once on the control thread before
 /// any task. Faults (a text too long) are exceptions there: they refuse the application with their text.
 class Application {
@@ -230,6 +246,8 @@ class Application {
   /// Once each time `variable` goes from false to true. `variable` is called by the scheduler and only reads:
   /// what other tasks write and it reads should be std::atomic.
   void event(const std::string& name, int priority, Variable variable, Cycle cycle) {
+    if (!variable)
+      throw std::invalid_argument("task '" + name + "': its event variable is an empty function");
     Task_Info& task = add(name, priority, Event, std::move(cycle));
     task.dwEventFunctionPointer = &read_current;
     variables_.back() = std::move(variable);
@@ -265,8 +283,7 @@ class Application {
     options.nWatchdogPolicy = wanted.watchdog_stops_task_only ? PLC_WATCHDOG_TASK : PLC_WATCHDOG_APPLICATION;
     const RTS_RESULT result = plc_set_task_options(task.c_str(), &options);
     if (result != ERR_OK) {
-      throw std::runtime_error("options of task '" + task + "' are refused: result " +
-                               std::to_string(result));
+      throw std::runtime_error("options of task '" + task + "' are refused: " + reason_of(result));
     }
   }
 
@@ -289,7 +306,7 @@ class Application {
     RTS_RESULT result = ERR_OK;
     const RTS_HANDLE handle = plc_declare_area(&area, &result);
     if (handle == RTS_INVALID_HANDLE) {
-      throw std::runtime_error("area '" + name + "' is refused: result " + std::to_string(result));
+      throw std::runtime_error("area '" + name + "' is refused: " + reason_of(result));
     }
     return Area<T>(handle);
   }
@@ -303,7 +320,7 @@ class Application {
     static_assert(!std::is_const_v<T>, "variables are written by an online change");
     const RTS_RESULT result = plc_keep_variables(name.c_str(), &variables, sizeof variables, layout);
     if (result != ERR_OK) {
-      throw std::runtime_error("variables '" + name + "' are refused: result " + std::to_string(result));
+      throw std::runtime_error("variables '" + name + "' are refused: " + reason_of(result));
     }
   }
 
@@ -312,8 +329,7 @@ class Application {
     RTS_RESULT result = ERR_OK;
     const RTS_HANDLE handle = SchedRegisterExternalEvent(name.c_str(), &result);
     if (handle == RTS_INVALID_HANDLE) {
-      throw std::runtime_error("external event '" + name + "' cannot be had: result " +
-                               std::to_string(result));
+      throw std::runtime_error("external event '" + name + "' cannot be had: " + reason_of(result));
     }
     return ExternalEvent(handle);
   }
@@ -328,6 +344,7 @@ class Application {
     try {
       current() = this;
       std::forward<Setup>(setup)(*this);
+      if (tasks_.empty()) throw std::invalid_argument("the setup function makes no task");
       setup_.nTasks = static_cast<short>(tasks_.size());
       setup_.ptaskinfo = tasks_.data();
       __sys__setup__tasks(&setup_);
@@ -372,6 +389,7 @@ class Application {
     if (priority < 0 || priority > 31) {
       throw std::invalid_argument("task '" + name + "': priority must be 0 (highest) to 31");
     }
+    if (!cycle) throw std::invalid_argument("task '" + name + "': its cycle is an empty function");
     Task_Info task{};
     copy(task.stName, name, "task");
     task.nPriority = static_cast<short>(priority);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "shm/base/result.hpp"
+#include "shm/base/time.hpp"
 
 namespace plchost {
 
@@ -42,6 +43,9 @@ struct LaunchOptions {
 /// What `plc-instance --check-application` says of a valid one, behind its path: the proof that the trial
 /// came to its end.
 inline constexpr std::string_view kValidApplication = " is a valid application: ";
+
+/// How long the set-up of an application may take in a trial.
+inline constexpr Duration kSetUpLimit = std::chrono::seconds(10);
 
 /// argv for posix_spawn, argv[0] included.
 [[nodiscard]] std::vector<std::string> to_arguments(const std::string& program, const LaunchOptions& options);

@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "instances/runtime/application/application_check.hpp"
+#include "instances/runtime/application/trial_process.hpp"
 #include "instances/runtime/instance.hpp"
 #include "instances/runtime/options.hpp"
 #include "shm/base/log.hpp"
@@ -83,7 +84,11 @@ int run(const Options& options) {
     spdlog::error("{}", signals.error().describe());
     return kExitSetupFailed;
   }
-  if (!options.check_application.empty()) return check_application(options.check_application);
+  if (!options.check_application.empty()) {
+    spdlog::set_pattern("%l: %v");  // read by people and told in answers
+    return run_trial(options.check_application, signals->get(),
+                     [&] { return check_application(options.check_application); });
+  }
 
   std::unique_ptr<Instance> instance;
   {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <csignal>
+#include <string_view>
 #include <utility>
 
 #include <fcntl.h>
@@ -17,6 +18,19 @@ namespace {
 constexpr int kOutputRoom = 1 << 20;
 constexpr std::size_t kShown = 2000;
 
+// In an answer a line break would be shown as a damaged character.
+std::string one_line(std::string_view text) {
+  std::string line;
+  for (const char c : text) {
+    if (c == '\n') {
+      line += "; ";
+    } else {
+      line += c;
+    }
+  }
+  return line;
+}
+
 }  // namespace
 
 Result<ApplicationTrial> ApplicationTrial::start(const std::string& plc_instance, const std::string& path) {
@@ -26,7 +40,7 @@ Result<ApplicationTrial> ApplicationTrial::start(const std::string& plc_instance
   auto process = spawn_process(
       {.arguments = {plc_instance, "--check-application", path}, .output_fd = pipe->write_end.get()});
   if (!process) return std::unexpected(process.error());
-  return ApplicationTrial(std::move(*process), std::move(pipe->read_end));
+  return ApplicationTrial(path, std::move(*process), std::move(pipe->read_end));
 }
 
 void ApplicationTrial::give_up() {
@@ -51,6 +65,8 @@ Result<void> ApplicationTrial::verdict() {
   }
   output.resize(std::min(output.size(), kShown));
   while (output.ends_with('\n')) output.pop_back();
+  output = one_line(output);
+  if (const std::string name = path_ + ": "; output.starts_with(name)) output.erase(0, name.size());
   return failure(ErrorCode::invalid_argument,
                  output.empty() ? fmt::format("trying it ended with {}", status.describe()) : output);
 }

@@ -3,13 +3,14 @@
 #include <string>
 #include <utility>
 
+#include "instances/launch/launch_contract.hpp"
 #include "manager/system/child_process.hpp"
 #include "shm/base/time.hpp"
 
 namespace plchost {
 
-/// How long an application may take to be tried.
-inline constexpr Duration kTrialLimit = std::chrono::seconds(10);
+/// How long a trial may take. It ends by itself after kSetUpLimit and says so; this is for one that cannot.
+inline constexpr Duration kTrialLimit = kSetUpLimit + std::chrono::seconds(2);
 
 /// A process that tries an application, so that nothing else is at stake: `plc-instance --check-application`.
 class ApplicationTrial {
@@ -21,14 +22,16 @@ class ApplicationTrial {
   [[nodiscard]] int fd() const noexcept { return process_.pidfd.get(); }
   /// It took too long: ends it.
   void give_up();
-  /// Of one that has ended: ok, or why the application is not valid, in its trial's words. What the
+  /// Of one that has ended: ok, or why the application is not valid, in its trial's words, without the
+  /// file's name in front. What the
   /// application has left in the trial's session ends, too.
   [[nodiscard]] Result<void> verdict();
 
  private:
-  ApplicationTrial(ChildProcess process, UniqueFd output) noexcept
-      : process_(std::move(process)), output_(std::move(output)) {}
+  ApplicationTrial(std::string path, ChildProcess process, UniqueFd output) noexcept
+      : path_(std::move(path)), process_(std::move(process)), output_(std::move(output)) {}
 
+  std::string path_;
   ChildProcess process_;
   UniqueFd output_;
   bool gave_up_ = false;

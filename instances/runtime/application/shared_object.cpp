@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "instances/runtime/application/elf_check.hpp"
+#include "instances/runtime/application/symbol_name.hpp"
 
 namespace plchost {
 
@@ -23,7 +24,8 @@ std::string absolute_of(const std::string& path) {
 }
 
 std::unexpected<Error> not_loaded(const std::string& path) {
-  return failure(ErrorCode::invalid_argument, fmt::format("{} cannot be loaded: {}", path, ::dlerror()));
+  return failure(ErrorCode::invalid_argument,
+                 fmt::format("{} cannot be loaded: {}", path, with_readable_symbols(::dlerror())));
 }
 
 // A file without a name that nobody can change any more.

@@ -1,5 +1,6 @@
 #include "instances/runtime/application/symbol_name.hpp"
 
+#include <algorithm>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
@@ -103,6 +104,21 @@ std::string symbol_name(std::uintptr_t address) {
     return fmt::format("{}+{:#x} in {}", demangled(info.dli_sname), offset, file);
   }
   return fmt::format("{}+{:#x}", file, in_file);
+}
+
+std::string with_readable_symbols(std::string_view text) {
+  constexpr std::string_view kMangled = "_Z";
+  constexpr std::string_view kSymbol = "0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_$.";
+  std::string readable;
+  while (!text.empty()) {
+    const std::size_t begin = std::min(text.find(kMangled), text.size());
+    readable += text.substr(0, begin);
+    text.remove_prefix(begin);
+    const std::size_t end = std::min(text.find_first_not_of(kSymbol), text.size());
+    if (end != 0) readable += demangled(std::string(text.substr(0, end)).c_str());
+    text.remove_prefix(end);
+  }
+  return readable;
 }
 
 }  // namespace plchost

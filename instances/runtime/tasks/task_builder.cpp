@@ -33,7 +33,10 @@ std::unexpected<Error> invalid_task(std::string text) {
 template <std::size_t Size>
 Result<std::string> text_of(const char (&field)[Size], std::string_view what) {
   const char* const end = std::find(std::begin(field), std::end(field), '\0');
-  if (end == std::end(field)) return invalid_task(fmt::format("{} has no terminating zero", what));
+  if (end == std::end(field)) {
+    return invalid_task(
+        fmt::format("{} is longer than {} characters: it has no terminating zero", what, Size - 1));
+  }
   return std::string(std::begin(field), end);
 }
 
@@ -105,7 +108,8 @@ Result<std::vector<TaskConfig>> build_tasks(const sys_setup_tasks_struct& setup)
 
 Result<std::vector<TaskConfig>> build_tasks(const sys_setup_tasks_struct& setup, TaskCodes& codes) {
   if (setup.nTasks < 1 || setup.nTasks > PLC_MAX_TASKS) {
-    return invalid_task(fmt::format("nTasks {} is not allowed: 1 to {} is", setup.nTasks, PLC_MAX_TASKS));
+    return invalid_task(fmt::format("the application has {} tasks (nTasks); allowed are 1 to {}",
+                                    setup.nTasks, PLC_MAX_TASKS));
   }
   if (setup.ptaskinfo == nullptr) return invalid_task("ptaskinfo is null");
   if (auto name = text_of(setup.stApplicationName, "stApplicationName"); !name) {

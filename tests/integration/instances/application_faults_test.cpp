@@ -1,9 +1,13 @@
 // Applications that cannot run: refused with a text that says why, by --check-application and at start alike.
 #include <csignal>
 #include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
+#include <string>
+#include <vector>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -13,6 +17,19 @@ namespace plchost::testing {
 namespace {
 
 using ::testing::HasSubstr;
+
+using ::testing::Not;
+
+// Processes that have this in their environment, but not this one.
+std::vector<std::string> processes_with(const std::string& mark) {
+  std::vector<std::string> found;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc")) {
+    std::ostringstream environment;
+    environment << std::ifstream(entry.path() / "environ", std::ios::binary).rdbuf();
+    if (environment.str().contains(mark)) found.push_back(entry.path().filename());
+  }
+  return found;
+}
 
 struct CrashingProgram {
   const char* application;
@@ -38,15 +55,20 @@ TEST_P(ApplicationWith, IsRefusedAtStart) {
 
 INSTANTIATE_TEST_SUITE_P(
     Faults, ApplicationWith,
-    ::testing::Values(CrashingProgram{"fault_init_fails", "plc_app_init returned 7"},
-                      CrashingProgram{"fault_throws", "plc_app_init threw: no valve is connected"},
-                      CrashingProgram{"fault_no_tasks", "did not call __sys__setup__tasks"},
-                      CrashingProgram{"fault_two_setups", "called __sys__setup__tasks more than once"},
-                      CrashingProgram{"fault_bad_interval",
-                                      "task 'Only': dwInterval of a cyclic task must be above 0"},
-                      CrashingProgram{"fault_wrong_version", "built against version 42 of plc_app.h"},
-                      CrashingProgram{"fault_missing_init", "does not export plc_app_init"},
-                      CrashingProgram{"fault_undefined_symbol", "function_of_another_runtime"}),
+    ::testing::Values(
+        CrashingProgram{"fault_init_fails", "plc_app_init returned 7"},
+        CrashingProgram{"fault_throws", "plc_app_init threw: no valve is connected"},
+        CrashingProgram{"fault_no_tasks", "did not call __sys__setup__tasks"},
+        CrashingProgram{"fault_two_setups", "called __sys__setup__tasks more than once"},
+        CrashingProgram{"fault_bad_interval", "task 'Only': dwInterval of a cyclic task must be above 0"},
+        CrashingProgram{"fault_wrong_version", "built against version 42 of plc_app.h"},
+        CrashingProgram{"fault_missing_init", "does not export plc_app_init"},
+        CrashingProgram{"fault_undefined_symbol", "function_of_another_runtime"},
+        CrashingProgram{"fault_undefined_method", "undefined symbol: other::method_of_another_library(int)"},
+        CrashingProgram{"fault_empty_cycle", "task 'Fill': its cycle is an empty function"},
+        CrashingProgram{"fault_empty_variable", "task 'Cap': its event variable is an empty function"},
+        CrashingProgram{"fault_two_areas", "area 'level' is refused: it is there already"},
+        CrashingProgram{"fault_empty_setup", "the setup function makes no task"}),
     [](const auto& test) { return std::string(test.param.application); });
 
 TEST(ApplicationExit, ThatThrowsDoesNotKeepTheProcessFromItsOrderlyEnd) {
@@ -66,6 +88,54 @@ TEST(ApplicationExit, ThatCrashesLeavesNoPageBehind) {
   EXPECT_EQ(sut.end(SIGTERM), -SIGABRT);
   EXPECT_FALSE(InstancePageReader::open(sandbox.pool(), "line1"));
   EXPECT_FALSE(TransitionRingReader::open(sandbox.pool(), "line1"));
+}
+
+struct EndingProgram {
+  const char* application;
+  const char* text;
+};
+
+// What does not come back from its set-up, or not as it should.
+class TrialOf : public ::testing::TestWithParam<EndingProgram> {};
+
+TEST_P(TrialOf, SaysHowTheSetUpEnded) {
+  const Sandbox sandbox;
+  InstanceProcess sut(sandbox, {"--check-application", application(GetParam().application)});
+  EXPECT_EQ(sut.end(), 3);
+  EXPECT_THAT(sut.log(), HasSubstr(GetParam().text));
+  EXPECT_THAT(sut.log(), Not(HasSubstr("is a valid application")));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Ends, TrialOf,
+    ::testing::Values(EndingProgram{"fault_exits", "it ends its process in its set-up (exit code 0)"},
+                      EndingProgram{"fault_exits_refused", "it ends its process in its set-up (exit code 3)"},
+                      EndingProgram{"fault_loops", "took longer than 10 s: does it return from its set-up?"},
+                      EndingProgram{"fault_crashes",
+                                    "it crashes in its set-up: SIGSEGV in open_valve(int volatile*)"},
+                      EndingProgram{"fault_overflows", "it crashes in its set-up: SIGSEGV in deeper(int)"}),
+    [](const auto& test) { return std::string(test.param.application); });
+
+class SignalEndsATrial : public ::testing::TestWithParam<int> {};
+
+TEST_P(SignalEndsATrial, WhoseSetUpDoesNotReturn) {
+  const Sandbox sandbox;
+  InstanceProcess sut(sandbox, {"--check-application", application("fault_loops")});
+  const std::string children = fmt::format("/proc/{0}/task/{0}/children", sut.pid());
+  pid_t child = 0;
+  ASSERT_TRUE(eventually([&] { return static_cast<bool>(std::ifstream(children) >> child); }));
+  EXPECT_EQ(sut.end(GetParam()), -GetParam());
+  EXPECT_EQ(::kill(child, 0), -1) << "the process that tries it is still there";
+}
+
+INSTANTIATE_TEST_SUITE_P(Signals, SignalEndsATrial, ::testing::Values(SIGINT, SIGTERM));
+
+TEST(ApplicationCheck, EndsWhatTheApplicationHasForked) {
+  const Sandbox sandbox;
+  const std::string mark = fmt::format("PLCHOST_TRIAL_OF={}", sandbox.pool());
+  InstanceProcess sut(sandbox, {"--check-application", application("fault_forks")}, {mark});
+  EXPECT_EQ(sut.end(), 0);
+  EXPECT_THAT(processes_with(mark), ::testing::IsEmpty());
 }
 
 TEST(ApplicationCheck, ListsTheTasksOfAValidApplication) {

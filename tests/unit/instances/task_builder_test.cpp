@@ -102,7 +102,7 @@ TEST_F(TaskBuilder, RefusesBadNames) {
   set(tasks_[1].stName, "Task0");
   EXPECT_THAT(complaint(), HasSubstr("two tasks are called 'Task0'"));
   std::ranges::fill(tasks_[1].stName, 'x');
-  EXPECT_THAT(complaint(), HasSubstr("task number 1: stName has no terminating zero"));
+  EXPECT_THAT(complaint(), HasSubstr("task number 1: stName is longer than 50 characters"));
   set(tasks_[1].stName, "no spaces");
   EXPECT_THAT(complaint(), HasSubstr("task number 1: stName 'no spaces' is not valid"));
 }
@@ -110,7 +110,7 @@ TEST_F(TaskBuilder, RefusesBadNames) {
 TEST_F(TaskBuilder, RefusesACountOutOfRange) {
   for (const short count : {-1, 0, PLC_MAX_TASKS + 1}) {
     setup_.nTasks = count;
-    EXPECT_THAT(complaint(), HasSubstr("1 to 1024 is"));
+    EXPECT_THAT(complaint(), HasSubstr("tasks (nTasks); allowed are 1 to 1024"));
   }
   setup_.nTasks = 4;
   setup_.ptaskinfo = nullptr;

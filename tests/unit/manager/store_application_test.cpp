@@ -133,6 +133,14 @@ TEST_F(StoreApplication, TellsTheTrialsWordsWithTheNameThatTheSenderKnows) {
   EXPECT_THAT(files(), IsEmpty());
 }
 
+TEST_F(StoreApplication, NamesTheFileOnceAndTellsItAllInOneLine) {
+  set_trial("echo 'error: application: no valve'; echo \"$2: it crashes\"; exit 3");
+  EXPECT_EQ(carry_out(order_).error().message,
+            "lamp.so is refused: error: application: no valve; lamp.so: it crashes");
+  set_trial("echo \"$2: it crashes\"; exit 3");
+  EXPECT_EQ(carry_out(order_).error().message, "lamp.so is refused: it crashes");
+}
+
 TEST_F(StoreApplication, TellsHowATrialEndedThatSaidNothing) {
   set_trial("kill -SEGV $$");
   EXPECT_THAT(carry_out(order_).error().message, HasSubstr("killed by SIGSEGV"));

@@ -45,6 +45,26 @@ PLC_EXPORT_ABI;
 extern "C" void function_of_another_runtime();
 #endif
 
+#ifdef FAULT_UNDEFINED_METHOD
+namespace other {
+void method_of_another_library(int number);
+}
+#endif
+
+#ifdef FAULT_CRASHES
+[[gnu::noinline]] void open_valve(volatile int* valve) {
+  *valve = 1;
+}
+#endif
+
+#ifdef FAULT_OVERFLOWS
+[[gnu::noinline]] int deeper(int level) {
+  volatile char room[4096];  // NOLINT(modernize-avoid-c-arrays): the stack is what it fills
+  room[0] = static_cast<char>(level);
+  return level == 0 ? 0 : deeper(level + 1) + room[0];
+}
+#endif
+
 #ifdef FAULT_EXIT_THROWS
 void plc_app_exit() {
   throw std::runtime_error("the valve does not close");
@@ -62,8 +82,23 @@ int plc_app_init() {
 #ifdef FAULT_UNDEFINED_SYMBOL
   function_of_another_runtime();
 #endif
+#ifdef FAULT_UNDEFINED_METHOD
+  other::method_of_another_library(1);
+#endif
 #ifdef FAULT_EXITS
   std::_Exit(0);
+#endif
+#ifdef FAULT_EXITS_REFUSED
+  std::_Exit(3);
+#endif
+#ifdef FAULT_LOOPS
+  for (volatile bool again = true; again;) ::usleep(1000);
+#endif
+#ifdef FAULT_CRASHES
+  open_valve(nullptr);
+#endif
+#ifdef FAULT_OVERFLOWS
+  return deeper(1);
 #endif
 #ifdef FAULT_FORKS
   if (::fork() == 0) {
