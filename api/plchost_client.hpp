@@ -108,7 +108,7 @@ class PLCHOST_CLIENT_API Client {
     std::string external_event;           ///< empty unless external
     unsigned long long cycles = 0;
     unsigned long long lost_cycles = 0;  ///< releases that were skipped
-    unsigned long long lost_events = 0;  ///< posts beyond its backlog
+    unsigned long long lost_events = 0;  ///< posts that no cycle was run for
     std::chrono::nanoseconds execution_last{};
     std::chrono::nanoseconds execution_average{};
     std::chrono::nanoseconds execution_max{};

@@ -287,6 +287,16 @@ std::optional<TaskSet::Fault> TaskSet::take_fault() {
   return std::nullopt;
 }
 
+void TaskSet::look_after_posts() noexcept {
+  for (std::size_t i = 0; i < tasks_.size(); ++i) {
+    if (threads_[i]->rests()) {
+      tasks_[i]->lose_posts();
+    } else {
+      tasks_[i]->rouse();
+    }
+  }
+}
+
 std::vector<std::string_view> TaskSet::tasks_in_exception() const {
   std::vector<std::string_view> names;
   for (const auto& task : tasks_) {

@@ -79,8 +79,9 @@ class TaskSet {
 
   /// Releases the tasks under the scheduler of that name. wrong_state: they run already, or one of them has
   /// not come back since stop(), or is in exception. External events posted while the tasks were stopped are
-  /// not run, nor are edges of event variables: the level at the start counts as seen. An event variable that
-  /// does not return from being read for the first time puts its task into exception.
+  /// not run but counted as lost. Edges of event variables are not run: the level at the start counts as
+  /// seen. An event variable that does not return from being read for the first time puts its task into
+  /// exception.
   [[nodiscard]] Result<void> start(std::string_view scheduler, const SchedulerSettings& settings);
   /// Parks all tasks at the end of their cycles, those that drive outputs first. Waits, at most `limit` (real
   /// time, from when all were asked to) for each of the two phases; longer only for a task in no cycle.
@@ -142,6 +143,10 @@ class TaskSet {
   /// never runs again. If it is one of the whole application, no task begins another cycle: what is left to
   /// do is stop(), and then a fresh process.
   [[nodiscard]] std::optional<Fault> take_fault();
+  /// Of tasks of external events. Those that are stopped or in exception: what was posted since is counted as
+  /// lost. Those that run: one that sleeps although it was posted to is woken; its poster was ended in
+  /// between. To be called now and then.
+  void look_after_posts() noexcept;
   /// The names of the tasks that are in exception, and so keep start() from it.
   [[nodiscard]] std::vector<std::string_view> tasks_in_exception() const;
   /// A thread was caught in the application's code and is parked there for good. Nothing waits for it, and

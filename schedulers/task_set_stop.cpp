@@ -111,6 +111,7 @@ std::optional<std::vector<std::size_t>> TaskSet::advance_stop() {
   retired_.push_back(std::move(active_));
   running_ = false;
   if (stuck.empty() && let_retired_go() && supervision_) supervision_->end();
+  look_after_posts();
   return stuck;
 }
 

@@ -288,6 +288,7 @@ void Instance::beat() {
   host_->write_messages();
   report_tick();
   if (life_.state() == ApplicationState::exception) (void)tasks_->still_busy(TimePoint{});
+  if (tasks_) tasks_->look_after_posts();
   host_->events().refresh();
   reference_.refresh();
   InstanceRuntime runtime;

@@ -20,6 +20,7 @@ std::optional<Activation> ExternalEventSource::wait() noexcept {
     }
     const std::uint64_t count = snapshot.count();
     if (count == cursor.next) {
+      task_.awaits_post_after(count);
       clock_.wait(task_.event(), snapshot);
       continue;
     }

@@ -24,7 +24,9 @@ Task::Task(Clock& clock, TaskConfig config, TaskStatistics& statistics, CountedE
       grid_(TimePoint{}, grid_interval(config_), config_.late),
       wanted_interval_(grid_.interval().count()),
       overruns_(config_.watchdog),
-      fault_(board, config_.watchdog.policy) {}
+      fault_(board, config_.watchdog.policy) {
+  if (event_ != nullptr) recorder_.begin_posts(event_->count());
+}
 
 void Task::begin(TimePoint origin) {
   grid_ = ReleaseGrid(origin + config_.start_offset,
@@ -36,6 +38,7 @@ void Task::begin(TimePoint origin) {
   recorder_.begin();
   if (event_ != nullptr) {
     const std::uint64_t count = event_->count();
+    recorder_.lose_posts(count);
     cursor_ = {.next = count, .seen = count, .seen_at = origin};
   }
   latch_.forget();

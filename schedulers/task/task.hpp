@@ -40,8 +40,8 @@ class Task {
   /// Null: it follows no clock. Any context.
   [[nodiscard]] const ClockFollower* follower() const noexcept { return follower_; }
 
-  /// Set-up, while the task is parked: a new grid from `origin` on; what happened while it was parked does
-  /// not count.
+  /// Set-up, while the task is parked: a new grid from `origin` on. Releases and edges of the time in which
+  /// it was parked do not count; posts of that time are lost events.
   void begin(TimePoint origin);
 
   /// What a cyclic or freewheeling task runs next: the same answer until a cycle has run. The task's thread.
@@ -83,6 +83,18 @@ class Task {
   [[nodiscard]] EventLatch& latch() noexcept { return latch_; }
   [[nodiscard]] EventCursor& cursor() noexcept { return cursor_; }
   [[nodiscard]] CountedEvent& event() noexcept { return *event_; }
+  /// The task sleeps until its event has another count than this. The task's thread.
+  void awaits_post_after(std::uint64_t count) noexcept { slept_at_.store(count, std::memory_order_relaxed); }
+  /// External events: wakes the task if it may sleep although its event was posted, because the poster ended
+  /// before it woke anybody. Now and then. Control thread.
+  void rouse() noexcept {
+    if (event_ != nullptr && event_->count() != slept_at_.load(std::memory_order_relaxed)) event_->rouse();
+  }
+  /// External events: counts the posts that were not run as lost. Control thread, while the task's thread
+  /// rests.
+  void lose_posts() noexcept {
+    if (event_ != nullptr) recorder_.lose_posts(event_->count());
+  }
 
   /// All but the cycle count begins anew. False: a record is under way; try again. Set-up.
   [[nodiscard]] bool reset_statistics() noexcept { return recorder_.reset(clock_.now()); }
@@ -103,11 +115,12 @@ class Task {
   ReleaseGrid grid_;                            // cyclic
   std::atomic<Duration::rep> wanted_interval_;  // of the grid, from the end of the next cycle on
   ClockFollower* follower_ = nullptr;
-  EventLatch latch_;           // event
-  EventCursor cursor_;         // external
-  TimePoint ready_;            // since when it could run: the end of its last cycle
-  Duration last_execution_{};  // freewheeling: processor time of its last cycle
-  bool begun_ = false;         // has run since begin()
+  EventLatch latch_;                        // event
+  EventCursor cursor_;                      // external
+  std::atomic<std::uint64_t> slept_at_{0};  // external: the event's count when it last went to sleep
+  TimePoint ready_;                         // since when it could run: the end of its last cycle
+  Duration last_execution_{};               // freewheeling: processor time of its last cycle
+  bool begun_ = false;                      // has run since begin()
   OverrunRule overruns_;
   TaskFault fault_;
   FaultTrap trap_;

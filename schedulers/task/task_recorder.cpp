@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "shm/base/counted_event.hpp"
+
 namespace plchost {
 
 namespace {
@@ -58,9 +60,23 @@ void TaskRecorder::record(const RecordedCycle& cycle) noexcept {
     statistics_.counters.write(counters_);
     release();
   }
+  accounted_ = cycle.posts_done;
   last_start_ = cycle.start;
   last_release_ = cycle.release;
   has_start_ = true;
+}
+
+void TaskRecorder::lose_posts(std::uint64_t count) noexcept {
+  const std::uint64_t missing = count - accounted_;
+  if (missing == 0) return;
+  accounted_ = count;
+  // A cycle that did not come to its end holds nothing: who resets is the only other owner.
+  const bool owns = acquire(Owner::task);
+  if (owns && resets_ != obeyed_resets_) begin_anew();
+  counters_.lost_events += missing > CountedEvent::kCountMask ? 1 : missing;
+  if (!owns) return;
+  statistics_.counters.write(counters_);
+  release();
 }
 
 void TaskRecorder::begin_anew() noexcept {
@@ -69,6 +85,7 @@ void TaskRecorder::begin_anew() noexcept {
   counters_ = TaskCounters{};
   counters_.interval_ns = interval_ns;
   counters_.posts_done = posts_done;
+  counters_.cycles = cycles_.load(std::memory_order_relaxed);
   counters_.since_ns = since_ns_;
   counters_.since_unix_ns = since_unix_ns_;
   obeyed_resets_ = resets_;

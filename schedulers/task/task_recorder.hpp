@@ -35,6 +35,14 @@ class TaskRecorder {
   /// The task's thread, real-time.
   void record(const RecordedCycle& cycle) noexcept;
 
+  /// Set-up, before the first cycle: the account of posts begins at this count of the event.
+  void begin_posts(std::uint64_t count) noexcept { accounted_ = count; }
+
+  /// The posts up to this count of the event are not run any more: those that were neither run nor counted as
+  /// lost are lost events. A count that went back, which a stranger wrote, is one. Control thread, while the
+  /// task's thread rests.
+  void lose_posts(std::uint64_t count) noexcept;
+
   /// As of the last record(). The task's thread, real-time.
   [[nodiscard]] const TaskCounters& counters() const noexcept { return counters_; }
 
@@ -59,8 +67,9 @@ class TaskRecorder {
   std::int64_t since_ns_;
   std::int64_t since_unix_ns_;
 
-  // Only the task's thread.
+  // Only the task's thread; the control thread while that rests.
   TaskCounters counters_{};
+  std::uint64_t accounted_ = 0;  // posts that were run or lost
   std::uint64_t obeyed_resets_ = 0;
   bool has_start_ = false;
   TimePoint last_start_;

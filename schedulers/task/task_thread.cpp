@@ -50,6 +50,12 @@ bool TaskThread::settled(TimePoint deadline) noexcept {
   }
 }
 
+bool TaskThread::rests() const noexcept {
+  if (task_.trap().parked()) return true;
+  // A thread that has obeyed leaves its rest only for the next order, and says so before it has obeyed that.
+  return done_.load(std::memory_order_acquire) == order_.load() && resting_.load(std::memory_order_acquire);
+}
+
 void TaskThread::run() noexcept {
   std::uint32_t obeyed = 0;
   ActivationSource* source = nullptr;
@@ -58,9 +64,11 @@ void TaskThread::run() noexcept {
       source = wanted_.load(std::memory_order_acquire);
       obeyed = order;
       task_.source_changed();
+      resting_.store(source == nullptr, std::memory_order_relaxed);
       done_.store(order, std::memory_order_release);
       futex_wake(&done_);
     } else if (source == nullptr || task_.fault().halts()) {
+      resting_.store(true, std::memory_order_release);
       clock_.wait(order_, obeyed, kNoDeadline);
     } else if (const auto activation = source->wait(); activation && !task_.fault().halts()) {
       task_.run_cycle(*activation);

@@ -28,6 +28,9 @@ class TaskThread {
   /// Waits until the thread does what was asked for last, at most until `deadline`, which is real time. A
   /// thread that is parked by its trap does nothing any more: it is settled.
   [[nodiscard]] bool settled(TimePoint deadline) noexcept;
+  /// The thread has done what was asked for last, and touches nothing of its task until it is asked again:
+  /// it is parked, or its task is in exception.
+  [[nodiscard]] bool rests() const noexcept;
 
  private:
   TaskThread(Clock& clock, Task& task) noexcept : clock_(clock), task_(task) {}
@@ -39,6 +42,7 @@ class TaskThread {
   std::atomic<bool> ending_{false};
   std::atomic<std::uint32_t> order_{0};  // changes with each demand; a parked thread sleeps on it
   std::atomic<std::uint32_t> done_{0};   // the last order that was obeyed; who demands sleeps on it
+  std::atomic<bool> resting_{false};
   Thread thread_;
 };
 

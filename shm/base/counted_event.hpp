@@ -64,6 +64,13 @@ class CountedEvent {
   /// Wakes all waiters without counting a post. Set-up and soft threads.
   void nudge() noexcept;
 
+  /// Wakes the waiters that may be asleep, if there are any; changes neither count nor turns. A poster that
+  /// ended between its add and its wake leaves a waiter asleep beside its post: this wakes it. Any context.
+  void rouse() noexcept {
+    const std::uint64_t state = state_.load(std::memory_order_acquire);
+    if ((state & kWaiter) != 0) wake(state);
+  }
+
  private:
   static constexpr std::uint64_t kWaiter = 1;
   static constexpr std::uint64_t kOneTurn = 2;

@@ -25,7 +25,7 @@ struct TaskCounters {
   std::uint64_t lost_cycles;  ///< releases on the grid that passed without a cycle
   std::uint64_t lost_consecutive;      ///< those in a row right before the last cycle
   std::uint64_t lost_consecutive_max;  ///< the longest such row
-  std::uint64_t lost_events;           ///< external events dropped because the backlog was beyond its bound
+  std::uint64_t lost_events;           ///< external events that no cycle was run for
   std::int64_t exec_last_ns;           ///< start of the task's code to its end
   std::int64_t exec_sum_ns;
   std::int64_t exec_min_ns;

@@ -1,3 +1,5 @@
+#include <stdexcept>
+
 #include "tests/conformance/scheduler_fixture.hpp"
 
 namespace plchost {
@@ -17,6 +19,10 @@ class ExternalEventTasks : public testing::TestWithParam<std::string_view>, publ
     CountedEvent& event = event_named(name);
     reinterpret_cast<std::atomic<std::uint64_t>&>(event).store(count << 16);
     event.nudge();
+  }
+  /// What a poster does that is killed before it wakes anybody.
+  void add_without_wake(std::string_view name, std::uint64_t count) {
+    reinterpret_cast<std::atomic<std::uint64_t>&>(event_named(name)).fetch_add(count << 16);
   }
   std::atomic<bool> entered{false};
   std::atomic<bool> go{false};
@@ -123,20 +129,82 @@ TEST_P(ExternalEventTasks, ACountThatAStrangerWroteOverIsOneRunAndCountedAsLost)
   expect_no_further_cycle(0, 103);
 }
 
-TEST_P(ExternalEventTasks, PostsWhileTheyWereStoppedAreNotRun) {
+TEST_P(ExternalEventTasks, PostsWhileTheyWereStoppedAreNotRunButLost) {
   add(external("on_ready", "ready", [] {}));
   ASSERT_TRUE(create());
   post("ready", 7);
   start(GetParam());
+  EXPECT_EQ(counters(0).lost_events, 7U);
   post("ready", 1);
   wait_for_cycles(0, 1);
   ASSERT_TRUE(set->stop(seconds(10)));
   post("ready", 9);
+  set->look_after_posts();
+  EXPECT_EQ(counters(0).lost_events, 16U) << "counted while it is stopped";
+  post("ready", 1);
   start(GetParam());
   post("ready", 2);
   wait_for_cycles(0, 3);
   expect_no_further_cycle(0, 3);
+  EXPECT_EQ(counters(0).lost_events, 17U);
+}
+
+TEST_P(ExternalEventTasks, ABacklogThatAStopLeavesIsLost) {
+  add(external("slow", "ready", [this] {
+    entered = true;
+    while (!go) std::this_thread::yield();
+  }));
+  ASSERT_TRUE(create());
+  start(GetParam());
+  post("ready", 1000);
+  while (!entered) std::this_thread::yield();
+  ASSERT_TRUE(set->begin_stop({}));
+  go = true;
+  while (!set->advance_stop()) std::this_thread::yield();
+  EXPECT_EQ(counters(0).cycles, 1U);
+  EXPECT_EQ(counters(0).lost_events, 999U);
+  ASSERT_TRUE(set->reset_statistics("slow"));
   EXPECT_EQ(counters(0).lost_events, 0U);
+  post("ready", 5);
+  set->look_after_posts();
+  EXPECT_EQ(counters(0).cycles, 1U);
+  EXPECT_EQ(counters(0).lost_events, 5U);
+}
+
+TEST_P(ExternalEventTasks, ATaskWhosePosterEndedBeforeTheWakeIsWoken) {
+  add(external("on_ready", "ready", [] {}));
+  ASSERT_TRUE(create());
+  start(GetParam());
+  post("ready", 1);
+  wait_for_cycles(0, 1);
+  clock.settle();
+  std::this_thread::sleep_for(milliseconds(20));  // it sleeps in the kernel
+  add_without_wake("ready", 2);
+  expect_no_further_cycle(0, 1);
+  set->look_after_posts();
+  wait_for_cycles(0, 3);
+  expect_no_further_cycle(0, 3);
+  EXPECT_EQ(counters(0).lost_events, 0U);
+}
+
+TEST_P(ExternalEventTasks, PostsToATaskInExceptionAreLost) {
+  TaskConfig task = external("faulty", "ready", [this] {
+    if (go) throw std::runtime_error("no more");
+  });
+  task.watchdog.policy = WatchdogPolicy::task;
+  add(std::move(task));
+  add(external("sound", "ready", [] {}));
+  ASSERT_TRUE(create());
+  start(GetParam());
+  post("ready", 3);
+  wait_for_cycles(0, 3);
+  go = true;
+  post("ready", 4);
+  wait_for_cycles(1, 7);
+  while (counters(0).lost_events < 4) set->look_after_posts();
+  EXPECT_EQ(counters(0).cycles, 3U);
+  EXPECT_EQ(counters(0).lost_events, 4U) << "the one whose cycle did not come to its end is among them";
+  EXPECT_EQ(counters(1).lost_events, 0U);
 }
 
 TEST_P(ExternalEventTasks, StopAtTheEndOfACycleHoweverLongTheBacklogIs) {
@@ -151,6 +219,46 @@ TEST_P(ExternalEventTasks, StopAtTheEndOfACycleHoweverLongTheBacklogIs) {
   wait_for_cycles(0, 3);
   EXPECT_TRUE(set->stop(seconds(10)));
   EXPECT_LT(counters(0).cycles, 100'000U);
+}
+
+// What was posted by several at once is run or lost, whatever starts, stops and exchanges of the scheduler
+// there are meanwhile.
+TEST_P(ExternalEventTasks, EachPostIsRunOrLostAcrossStopsAndExchanges) {
+  constexpr int kPosters = 3;
+  constexpr int kRounds = 60;
+  Tasks<LinuxClock> tasks;
+  std::atomic<std::uint64_t> runs{0};
+  tasks.add(tasks.external("on_ready", "ready", [&] { ++runs; }));
+  ASSERT_TRUE(tasks.create());
+  SchedulerSettings settings;
+  settings.max_event_backlog = 50;
+  CountedEvent& event = tasks.event_named("ready");
+  std::atomic<bool> enough{false};
+  {
+    std::vector<std::jthread> posters;
+    for (int i = 0; i < kPosters; ++i) {
+      posters.emplace_back([&] {
+        while (!enough) {
+          event.post();
+          std::this_thread::sleep_for(std::chrono::microseconds(20));
+        }
+      });
+    }
+    const auto names = every_scheduler();
+    for (std::size_t round = 0; round < kRounds; ++round) {
+      ASSERT_TRUE(tasks.set->start(GetParam(), settings));
+      std::this_thread::sleep_for(milliseconds(2));
+      ASSERT_TRUE(tasks.set->switch_to(names[round % names.size()], settings));
+      std::this_thread::sleep_for(milliseconds(2));
+      ASSERT_TRUE(tasks.set->stop(seconds(10)));
+      std::this_thread::sleep_for(milliseconds(1));
+    }
+    enough = true;
+  }
+  tasks.set->look_after_posts();
+  EXPECT_EQ(tasks.counters(0).cycles, runs);
+  EXPECT_GT(tasks.counters(0).lost_events, 0U);
+  EXPECT_EQ(tasks.counters(0).cycles + tasks.counters(0).lost_events, event.count());
 }
 
 INSTANTIATE_TEST_SUITE_P(Each, ExternalEventTasks, testing::ValuesIn(every_scheduler()), scheduler_test_name);

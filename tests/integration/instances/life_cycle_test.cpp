@@ -1,7 +1,9 @@
 // The real plc-instance with real applications: what it promises over its life.
+#include <atomic>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
+#include <thread>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -55,6 +57,50 @@ TEST(Instance, WritesCycleTimesAndJitterBackIntoTaskInfo) {
   EXPECT_GE(max, min);
   EXPECT_GE(min, 0);
   EXPECT_NE(jitter, 0);  // hundreds of cycles without a microsecond of deviation are not of this world
+}
+
+TEST(Instance, PostsAreRunOrLostAlsoThoseWhileItIsStopped) {
+  const Sandbox sandbox;
+  InstanceProcess sut(sandbox, {"--application", application("all_kinds")});
+  sut.wait_until_up();
+  PoolEvent event = sut.event("work");
+  std::atomic<bool> enough{false};
+  std::jthread poster([&] {
+    while (!enough) {
+      (void)event.post();
+      std::this_thread::sleep_for(std::chrono::microseconds(50));
+    }
+  });
+  for (int round = 0; round < 10; ++round) {
+    EXPECT_EQ(sut.ask(ControlVerb::stop).code, ErrorCode::ok);
+    EXPECT_EQ(sut.ask(ControlVerb::start).code, ErrorCode::ok);
+  }
+  enough = true;
+  poster.join();
+  EXPECT_EQ(sut.ask(ControlVerb::stop).code, ErrorCode::ok);
+  for (int i = 0; i < 1000; ++i) (void)event.post();
+  const std::uint64_t posts = event.counted().count();
+  EXPECT_GT(posts, 1000U);
+  EXPECT_TRUE(eventually([&] {
+    const auto work = sut.task("Work");
+    return work && work->counters.cycles + work->counters.lost_events == posts;
+  }));
+  const TaskCounters counters = sut.task("Work")->counters;
+  EXPECT_EQ(counters.cycles + counters.lost_events, posts);
+  EXPECT_GE(counters.lost_events, 1000U);
+}
+
+TEST(Instance, APostWhoseMakerEndedBeforeTheWakeIsRunWithoutAnother) {
+  const Sandbox sandbox;
+  InstanceProcess sut(sandbox, {"--application", application("all_kinds")});
+  sut.wait_until_up();
+  ASSERT_EQ(sut.event("work").post(), PostResult::posted);
+  ASSERT_TRUE(eventually([&] { return sut.task("Work")->counters.cycles == 1; }));
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  constexpr std::uint64_t kOnePost = std::uint64_t{1} << 16;
+  CountedEvent& event = sut.event("work").counted();
+  reinterpret_cast<std::atomic<std::uint64_t>&>(event).fetch_add(kOnePost);
+  EXPECT_TRUE(eventually([&] { return sut.task("Work")->counters.cycles == 2; }));
 }
 
 TEST(Instance, SwitchOfSchedulerKeepsVariablesCountersAndEvents) {

@@ -47,6 +47,25 @@ class Shared {
   T* value_;
 };
 
+TEST(CountedEvent, AWaiterBesideAPostThatWokeNobodyIsRoused) {
+  CountedEvent sut;
+  std::atomic<bool> woken{false};
+  std::jthread waiter([&] {
+    follow(sut, 1);
+    woken = true;
+  });
+  std::this_thread::sleep_for(milliseconds(20));
+  // What a poster does that is killed between its two steps.
+  reinterpret_cast<std::atomic<std::uint64_t>&>(sut).fetch_add(std::uint64_t{1} << 16);
+  std::this_thread::sleep_for(milliseconds(20));
+  EXPECT_FALSE(woken);
+  while (!woken) {  // the first time, unless the waiter had not come to its sleep
+    sut.rouse();
+    std::this_thread::sleep_for(milliseconds(1));
+  }
+  EXPECT_EQ(sut.count(), 1U);
+}
+
 TEST(CountedEvent, EveryCursorSeesEachPost) {
   CountedEvent sut;
   const auto first = sut.snapshot();
