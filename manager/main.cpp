@@ -5,6 +5,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -17,6 +18,7 @@
 #include "manager/system/child_process.hpp"
 #include "shm/base/log.hpp"
 #include "shm/base/memory_guard.hpp"
+#include "shm/base/names.hpp"
 
 namespace plchost {
 
@@ -36,13 +38,23 @@ struct Options {
 void describe(CLI::App& app, Options& options) {
   app.set_version_flag("--version", PLCHOST_VERSION);
   auto* config = app.add_option("--config", options.config, "Run with this configuration file");
-  auto* check = app.add_option("--check-config", options.check_config, "Only check this configuration file");
+  auto* check = app.add_option("--check-config", options.check_config,
+                               "Only check this configuration file, and all that a start needs");
   config->excludes(check);
   app.add_option("--log-level", options.log_level,
                  "Instead of the file's: trace, debug, info, warning, error")
       ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error"}));
   app.add_option("--programs", options.programs,
                  "Folder of plc-instance and plchost-dds; default: that of plchostd");
+}
+
+std::vector<std::string> option_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : app.get_options()) {
+    for (const std::string& name : option->get_snames()) names.push_back("-" + name);
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  }
+  return names;
 }
 
 Result<void> check_identity(const DdsConfig& dds) {
@@ -54,15 +66,20 @@ Result<void> check_identity(const DdsConfig& dds) {
                                                  identity->subject.name, to_string(identity->subject.role)));
 }
 
-int check_only(const std::string& file) {
-  const auto config = load_config(file, config_surroundings());
+std::string programs_of(const Options& options) {
+  return options.programs.empty() ? program_directory() : options.programs;
+}
+
+int check_only(const std::string& file, const std::string& programs) {
+  const auto config = load_config(file, start_surroundings(programs));
   if (config) {
     // Not when it runs: its instances are worth more than the way to them.
     if (const auto good = check_identity(config->dds); !good) {
       fmt::print("{}: [dds] identity: {}\n", file, good.error().describe());
       return kExitFailed;
     }
-    fmt::print("{}: ok, {} instances\n", file, config->instances.size());
+    const std::size_t count = config->instances.size();
+    fmt::print("{}: ok, {} instance{}\n", file, count, count == 1 ? "" : "s");
     return kExitDone;
   }
   for (const std::string& error : config.error()) fmt::print("{}\n", error);
@@ -80,10 +97,9 @@ int run(const Options& options) {
   start_log("plchostd", config->host.log_level);
   std::error_code ignored;
   const auto file = std::filesystem::absolute(options.config, ignored);
-  auto manager =
-      Manager::create(*config, {.folder = file.parent_path().string(),
-                                .programs = options.programs.empty() ? program_directory() : options.programs,
-                                .schedulers = surroundings.schedulers});
+  auto manager = Manager::create(*config, {.folder = file.parent_path().string(),
+                                           .programs = programs_of(options),
+                                           .schedulers = surroundings.schedulers});
   if (!manager) {
     spdlog::error("{}", manager.error().describe());
     return kExitFailed;
@@ -109,9 +125,14 @@ int plchostd_main(int argc, const char* const* argv) {
       throw CLI::RequiredError("--config FILE or --check-config FILE");
     }
   } catch (const CLI::ParseError& error) {
+    const std::vector<std::string> words(arguments.begin() + 1, arguments.end());
+    if (const std::string hint = unknown_option(words, option_names(app)); !hint.empty()) {
+      fmt::print(stderr, "plchostd: {}\n", hint);
+      return kExitUsage;
+    }
     return app.exit(error) == 0 ? kExitDone : kExitUsage;
   }
-  return options.config.empty() ? check_only(options.check_config) : run(options);
+  return options.config.empty() ? check_only(options.check_config, programs_of(options)) : run(options);
 }
 
 }  // namespace

@@ -15,6 +15,7 @@
 #include "instances/runtime/application/trial_process.hpp"
 #include "instances/runtime/instance.hpp"
 #include "instances/runtime/options.hpp"
+#include "instances/runtime/settings/settings.hpp"
 #include "shm/base/log.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/unique_fd.hpp"
@@ -77,7 +78,19 @@ Result<void> serve(Instance& instance, const UniqueFd& signals) {
   return {};
 }
 
+int check_settings(const std::string& file) {
+  const auto settings = read_settings(file);
+  if (!settings) {
+    fmt::print(stderr, "{}\n", settings.error().describe());
+    return kExitSetupFailed;
+  }
+  for (const std::string& remark : settings->remarks) fmt::print("{}\n", remark);
+  fmt::print("{}: ok\n", file);
+  return EXIT_SUCCESS;
+}
+
 int run(const Options& options) {
+  if (!options.check_settings.empty()) return check_settings(options.check_settings);
   start_log("plc-instance/" + options.launch.name, options.launch.log_level);
   const auto signals = take_signals();
   if (!signals) {

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdio>
+#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -54,6 +56,15 @@ std::string check_log_level(const std::string& name) {
   return known ? std::string() : fmt::format("'{}' is no log level: {} are", name, join_names(kLogLevels));
 }
 
+std::vector<std::string> option_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : app.get_options()) {
+    for (const std::string& name : option->get_snames()) names.push_back("-" + name);
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  }
+  return names;
+}
+
 void describe(CLI::App& app, Options& options) {
   LaunchOptions& launch = options.launch;
   app.set_version_flag("--version", PLCHOST_VERSION);
@@ -94,6 +105,7 @@ void describe(CLI::App& app, Options& options) {
       ->capture_default_str();
   app.add_option("--check-application", options.check_application,
                  "Only check this file, and say what is in it");
+  app.add_option("--check-settings", options.check_settings, "Only check this settings file");
 }
 
 }  // namespace
@@ -107,6 +119,11 @@ ParsedOptions parse_options(int argc, const char* const* argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
+    const std::vector<std::string> words(argv + 1, argv + argc);
+    if (const std::string hint = unknown_option(words, option_names(app)); !hint.empty()) {
+      fmt::print(stderr, "plc-instance: {}\n", hint);
+      return {.options = std::nullopt, .exit_code = kExitUsage};
+    }
     const int code = app.exit(error);
     return {.options = std::nullopt, .exit_code = code == 0 ? 0 : kExitUsage};
   }

@@ -14,6 +14,7 @@ struct Options {
   std::string start_kind = "first";          ///< launch.start_kind in words
   PriorityBand band = PriorityBand::normal;  ///< launch.priority_band, translated
   std::string check_application;             ///< not empty: only check this file
+  std::string check_settings;                ///< the same for a settings file
 };
 
 /// What came of the command line: options, or the exit code of a program that has nothing more to do (help,

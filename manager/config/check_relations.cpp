@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdint>
+#include <cstring>
 #include <filesystem>
 #include <string_view>
 
@@ -47,6 +48,7 @@ void Relations::check_names() const {
 
 void Relations::check_cores(const std::vector<int>& online) const {
   const auto& allowed = config.host.cores;
+  if (allowed.empty()) return;  // reported where it was read
   for (std::size_t i = 0; i < config.instances.size(); ++i) {
     const int core = config.instances[i].core;
     if (core < 0) continue;  // reported where it was read
@@ -144,6 +146,20 @@ Result<void> check_readable_file(const std::string& path) {
   }
   if (::access(path.c_str(), R_OK) != 0) {
     return failure(ErrorCode::refused, fmt::format("{} cannot be read", path), errno);
+  }
+  return {};
+}
+
+Result<void> check_directory_can_be_made(const std::string& path) {
+  std::error_code error;
+  std::filesystem::path there = path;
+  while (!std::filesystem::exists(there, error) && there.has_relative_path()) there = there.parent_path();
+  if (!std::filesystem::is_directory(there, error)) {
+    return failure(ErrorCode::wrong_type, fmt::format("{} is not a folder", there.native()));
+  }
+  if (::access(there.c_str(), W_OK | X_OK) != 0) {
+    return failure(ErrorCode::refused,
+                   fmt::format("{} cannot be written: {}", there.native(), std::strerror(errno)));
   }
   return {};
 }

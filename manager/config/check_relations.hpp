@@ -25,4 +25,7 @@ void check_relations(const ManagerConfig& config, const ConfigLines& lines, cons
 /// The error says what is wrong with the file.
 [[nodiscard]] Result<void> check_readable_file(const std::string& path);
 
+/// The folder is there and can be written, or its nearest parent that is there can. The error names which.
+[[nodiscard]] Result<void> check_directory_can_be_made(const std::string& path);
+
 }  // namespace plchost

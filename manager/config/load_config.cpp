@@ -27,6 +27,7 @@ constexpr std::array kLogLevels = {"trace"sv, "debug"sv, "info"sv, "warning"sv, 
 constexpr std::array kPriorityBands = {"high"sv, "normal"sv, "low"sv};
 constexpr std::array kRestartPolicies = {"never"sv, "on-failure"sv, "always"sv};
 constexpr std::int64_t kMaxCoreNumber = 1023;  // CPU_SETSIZE
+constexpr std::string_view kAllHosts = "all";  // a word of plcctl --host
 
 struct Loader {
   const ConfigSurroundings& surroundings;
@@ -45,6 +46,8 @@ struct Loader {
   void read_instances(const TomlValue& value);
   void read_instance(const TomlTable& table, unsigned line);
   void read_restart(SectionReader& reader, InstanceConfig& instance);
+  void check_directory(SectionReader& reader, std::string_view key, const std::string& path);
+  void check_interface(SectionReader& reader);
   void read_file(SectionReader& reader, std::string_view key, std::string& target);
   const TomlTable* section(const TomlTable& root, std::string_view name);
 };
@@ -115,11 +118,20 @@ void Loader::read_host(const TomlTable& table, unsigned line) {
                    fmt::format("\"{}\" is not allowed; allowed is an absolute path of up to {} characters",
                                host.state_directory.substr(0, kMaxPath), kMaxPath));
   }
+  if (host.name == kAllHosts) reader.problem("name", "'all' stands for all hosts; choose another name");
+  check_directory(reader, "run_directory", host.run_directory);
+  check_directory(reader, "state_directory", host.state_directory);
   reader.texts("labels", kMaxLabels, host.labels);
   for (const std::string& label : host.labels) check_name_of(reader, "labels", label, kMaxLabel);
   read_pool_rights(reader);
   read_cores(reader);
   reader.refuse_unknown_keys();
+}
+
+void Loader::check_directory(SectionReader& reader, std::string_view key, const std::string& path) {
+  if (!surroundings.check_directories || !path.starts_with('/')) return;
+  if (const auto good = check_directory_can_be_made(path); !good)
+    reader.problem(key, good.error().describe());
 }
 
 void Loader::read_pool_rights(SectionReader& reader) {
@@ -180,6 +192,8 @@ void Loader::read_dds(const TomlTable& table, unsigned line) {
   constexpr std::size_t kMaxInterfaceName = 15;  // IFNAMSIZ
   if (const auto good = check_name("interface", dds.interface, kMaxInterfaceName); !good) {
     reader.problem("interface", good.error().message);
+  } else {
+    check_interface(reader);
   }
   reader.truth("allow_unsecured", dds.allow_unsecured);
   read_identity(reader);
@@ -196,6 +210,15 @@ void Loader::read_dds(const TomlTable& table, unsigned line) {
                                         peer.substr(0, kMaxPath)));
   }
   reader.refuse_unknown_keys();
+}
+
+void Loader::check_interface(SectionReader& reader) {
+  const auto& there = surroundings.interfaces;
+  const std::string& name = config.dds.interface;
+  if (!config.dds.enabled || there.empty() || std::ranges::find(there, name) != there.end()) return;
+  const std::vector<std::string_view> names(there.begin(), there.end());
+  reader.problem("interface", fmt::format("there is no interface '{}'; there are {}{}", shown(name),
+                                          join_names(names), suggestion(name, names)));
 }
 
 void Loader::read_identity(SectionReader& reader) {
@@ -332,9 +355,10 @@ void Loader::read_file(SectionReader& reader, std::string_view key, std::string&
     return;
   }
   if (surroundings.check_files) {
-    if (const auto readable = check_readable_file(path); !readable) {
-      reader.problem(key, readable.error().describe());
-    }
+    auto good = check_readable_file(path);
+    const auto& check = key == "settings" ? surroundings.check_settings : surroundings.check_application;
+    if (good && check) good = check(path);
+    if (!good) reader.problem(key, good.error().describe());
   }
   target = path;
 }
@@ -364,8 +388,7 @@ std::expected<ManagerConfig, ConfigErrors> parse_config(std::string_view text, c
   std::ranges::stable_sort(loader.problems, {}, &ConfigProblem::line);
   ConfigErrors errors;
   for (const ConfigProblem& problem : loader.problems) {
-    errors.push_back(problem.line == 0 ? fmt::format("{}: {}", file, problem.text)
-                                       : fmt::format("{}:{}: {}", file, problem.line, problem.text));
+    errors.push_back(describe(file, problem));
   }
   return std::unexpected(std::move(errors));
 }

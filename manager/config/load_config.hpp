@@ -1,11 +1,13 @@
 #pragma once
 
 #include <expected>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "manager/config/manager_config.hpp"
+#include "shm/base/result.hpp"
 
 namespace plchost {
 
@@ -16,10 +18,18 @@ struct ConfigSurroundings {
   std::vector<int> isolated_cores;  ///< by the kernel; may be empty
   std::vector<std::string_view> schedulers;
   bool check_files = true;  ///< that settings and applications are there and readable
+  /// For --check-config only: what a start finds out later, when it concerns one instance or may still
+  /// change.
+  bool check_directories = false;       ///< that they are there or can be made
+  std::vector<std::string> interfaces;  ///< of the system; empty: not checked
+  std::function<Result<void>(const std::string& file)> check_application;  ///< null: not checked
+  std::function<Result<void>(const std::string& file)> check_settings;     ///< null: not checked
 };
 
 /// As the system is now.
 [[nodiscard]] ConfigSurroundings config_surroundings();
+/// The same with all that a start needs. `programs`: the folder of plc-instance.
+[[nodiscard]] ConfigSurroundings start_surroundings(const std::string& programs);
 
 /// All that is wrong, one line of text each: "FILE:LINE: [[instance]] 'line1' core: ...".
 using ConfigErrors = std::vector<std::string>;

@@ -102,6 +102,23 @@ std::string join_names(std::span<const std::string_view> names) {
   return names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "));
 }
 
+std::string unknown_option(std::span<const std::string> words, std::span<const std::string> options) {
+  const std::vector<std::string_view> known(options.begin(), options.end());
+  for (const std::string& word : words) {
+    if (word == "--") break;  // arguments only
+    const std::string_view name = std::string_view(word).substr(0, word.find('='));
+    if (name.size() < 2 || !name.starts_with('-')) continue;
+    // "-ojson": the value of a short option can follow at once.
+    const std::string_view shortened = name.starts_with("--") ? name : name.substr(0, 2);
+    if (std::ranges::find(known, name) != known.end() || std::ranges::find(known, shortened) != known.end())
+      continue;
+    const std::string_view near = nearest_name(name, known);
+    return fmt::format("unknown option '{}'{}; known are {}", shown(name),
+                       near.empty() ? "" : fmt::format(" (did you mean '{}'?)", near), join_names(known));
+  }
+  return {};
+}
+
 std::string_view cut(std::string_view text, std::size_t most) noexcept {
   if (text.size() <= most) return text;
   const auto goes_on = [&](std::size_t at) {

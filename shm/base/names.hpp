@@ -46,6 +46,11 @@ inline constexpr std::size_t kMaxPath = 255;
 /// "a, b, c", for messages that list what is allowed; "none" if there is nothing.
 [[nodiscard]] std::string join_names(std::span<const std::string_view> names);
 
+/// What is told of the first word that looks like an option and is none of `options` ("--config", "-o"):
+/// "unknown option '--confg' (did you mean '--config'?); known are --config, -o". Empty: there is none.
+[[nodiscard]] std::string unknown_option(std::span<const std::string> words,
+                                         std::span<const std::string> options);
+
 /// The first `most` bytes, without a torn character of UTF-8 at the end.
 [[nodiscard]] std::string_view cut(std::string_view text, std::size_t most) noexcept;
 

@@ -159,8 +159,7 @@ std::expected<Plant, PlantErrors> parse_plant(std::string_view text, const std::
   std::ranges::stable_sort(reader.problems, {}, &ConfigProblem::line);
   PlantErrors errors;
   for (const ConfigProblem& problem : reader.problems) {
-    errors.push_back(problem.line == 0 ? fmt::format("{}: {}", file, problem.text)
-                                       : fmt::format("{}:{}: {}", file, problem.line, problem.text));
+    errors.push_back(describe(file, problem));
   }
   return std::unexpected(std::move(errors));
 }

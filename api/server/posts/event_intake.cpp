@@ -202,9 +202,9 @@ Result<PostResult> EventIntake::try_post(const plc_EventBatch& batch, LedgerEntr
       ++position;
       if (!good) return;
       if (const auto found = event_of(instance, event); !found) {
-        good =
-            failure(found.error().code, fmt::format("{} ({} of the {} events of the batch; none was posted)",
-                                                    found.error().message, position, count));
+        good = failure(found.error().code,
+                       fmt::format("{} (event number {} of the batch of {}; none was posted)",
+                                   found.error().message, position, count));
       }
     });
     if (!good) return std::unexpected(good.error());

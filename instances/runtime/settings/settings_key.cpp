@@ -14,7 +14,7 @@ namespace plchost {
 
 namespace {
 
-constexpr std::array<std::string_view, 2> kPlatforms = {"VxWorks.", "Linux."};
+constexpr std::array<std::string_view, 2> kPlatforms = {"Linux.", "VxWorks."};
 
 template <class... Cases>
 struct Overloaded : Cases... {

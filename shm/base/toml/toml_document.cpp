@@ -1,11 +1,14 @@
 #include "shm/base/toml/toml_document.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <utility>
 
 #include <fmt/format.h>
 #include <toml++/toml.h>
+
+#include "shm/base/toml/toml_advice.hpp"
 
 namespace plchost {
 
@@ -45,7 +48,22 @@ TomlValue convert(const toml::node& node) {
   return converted;
 }
 
+// Lines are counted from 1; nothing: there is no such line.
+std::string_view line_of(std::string_view text, unsigned line) {
+  for (; line > 1; --line) {
+    const std::size_t end = text.find('\n');
+    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+  }
+  return text.substr(0, text.find('\n'));
+}
+
 }  // namespace
+
+std::string describe(const std::string& file, const ConfigProblem& problem) {
+  if (problem.line == 0) return fmt::format("{}: {}", file, problem.text);
+  if (problem.column == 0) return fmt::format("{}:{}: {}", file, problem.line, problem.text);
+  return fmt::format("{}:{}:{}: {}", file, problem.line, problem.column, problem.text);
+}
 
 std::string_view TomlValue::type_name() const noexcept {
   constexpr std::array<std::string_view, 7> kNames = {
@@ -58,7 +76,10 @@ std::string TomlValue::shown() const {
   if (const auto* text = std::get_if<std::string>(&value))
     return fmt::format("\"{}\"", text->substr(0, kShown));
   if (const auto* number = std::get_if<std::int64_t>(&value)) return fmt::format("{}", *number);
-  if (const auto* real = std::get_if<double>(&value)) return fmt::format("{}", *real);
+  if (const auto* real = std::get_if<double>(&value)) {
+    const std::string number = fmt::format("{}", *real);
+    return number.find_first_not_of("-0123456789") == std::string::npos ? number + ".0" : number;
+  }
   if (const auto* boolean = std::get_if<bool>(&value)) return *boolean ? "true" : "false";
   return std::string(type_name());
 }
@@ -67,7 +88,10 @@ std::expected<TomlTable, ConfigProblem> parse_toml(std::string_view text) {
   try {
     return convert_table(toml::parse(text));
   } catch (const toml::parse_error& error) {  // the library is built to say it so
-    return std::unexpected(ConfigProblem{error.source().begin.line, std::string(error.description())});
+    const auto at = error.source().begin;
+    return std::unexpected(ConfigProblem{.line = at.line,
+                                         .text = toml_advice(line_of(text, at.line), error.description()),
+                                         .column = at.column});
   }
 }
 

@@ -30,7 +30,11 @@ struct TomlValue {
 struct ConfigProblem {
   unsigned line = 0;  ///< 0: the file as a whole
   std::string text;
+  unsigned column = 0;  ///< 0: the line as a whole
 };
+
+/// "FILE:LINE:COLUMN: TEXT", as far as they are known.
+[[nodiscard]] std::string describe(const std::string& file, const ConfigProblem& problem);
 
 /// Any text, hostile ones included: never throws, bounded depth.
 [[nodiscard]] std::expected<TomlTable, ConfigProblem> parse_toml(std::string_view text);

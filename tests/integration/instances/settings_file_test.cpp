@@ -251,5 +251,18 @@ TEST_F(SettingsFile, FileOfAnotherRuntimeIsUsedAsItIs) {
   EXPECT_EQ(sut.end(SIGTERM), 0);
 }
 
+TEST(SettingsCheck, SaysWhatIsWrongOrThatAllIsWell) {
+  const Sandbox sandbox;
+  const std::string good = sandbox.write("good.cfg", "[CmpSchedule]\nSchedulerInterval=1000\n");
+  InstanceProcess sut(sandbox, {"--check-settings", good});
+  EXPECT_EQ(sut.end(), 0);
+  EXPECT_EQ(sut.log(), good + ": ok\n");
+  const std::string bad = sandbox.write("bad.cfg", "[SysTimer]\nTimerMode=OneShot\n");
+  InstanceProcess refused(sandbox, {"--check-settings", bad});
+  EXPECT_EQ(refused.end(), 3);
+  EXPECT_THAT(refused.log(), ::testing::StartsWith(bad + ":2: [SysTimer] has no key 'TimerMode'"));
+  EXPECT_THAT(refused.log(), ::testing::HasSubstr("did you mean 'Linux.TimerMode'?"));
+}
+
 }  // namespace
 }  // namespace plchost::testing

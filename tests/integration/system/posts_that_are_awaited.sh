@@ -37,7 +37,7 @@ before=$(cycles packer2)
 is "$(plcctl post events packer1/product packer2/product packer2/product)" "3 posted" || fail "post events"
 two_more() { is "$(cycles packer2)" $((before + 2)); }
 until_true 20 two_more
-refused "packer2/produkt' (2 of the 2 events of the batch; none was posted)" plcctl post events packer2/product packer2/produkt
+refused "packer2/produkt' (event number 2 of the batch of 2; none was posted)" plcctl post events packer2/product packer2/produkt
 sleep 0.5
 is "$(cycles packer2)" $((before + 2)) || fail "$(cycles packer2) cycles of packer2"
 

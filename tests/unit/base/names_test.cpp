@@ -91,5 +91,14 @@ TEST(FixedText, NeverReadsPastItsEnd) {
   EXPECT_EQ(sut.view(), "xxxx");
 }
 
+TEST(UnknownOption, IsNamedWithTheOneThatIsMeantAndAllThatThereAre) {
+  const std::vector<std::string> options = {"-o", "--output", "--config"};
+  const auto hint = [&](const std::vector<std::string>& words) { return unknown_option(words, options); };
+  EXPECT_EQ(hint({"list", "--confg=x"}),
+            "unknown option '--confg' (did you mean '--config'?); known are -o, --output, --config");
+  EXPECT_EQ(hint({"-x"}), "unknown option '-x' (did you mean '-o'?); known are -o, --output, --config");
+  EXPECT_EQ(hint({"list", "-ojson", "--output=json", "--", "--confg"}), "");
+}
+
 }  // namespace
 }  // namespace plchost

@@ -137,7 +137,7 @@ INSTANTIATE_TEST_SUITE_P(
         Bad{"Linux.Area.0.Size=0x40000001\n", "allowed is: bytes, 1 to 0x40000000"},
         Bad{"Linux.Area.0.Object=a/b\n", "name of a shared memory"},
         Bad{"Linux.Area.64.Size=1\n",
-            "has no key 'Linux.Area.64.Size', did you mean 'VxWorks.Area.N.Size (N 0 to 63)'?"},
+            "has no key 'Linux.Area.64.Size', did you mean 'Linux.Area.N.Size (N 0 to 63)'?"},
         Bad{"Area.0.Size=1\n", "has no key 'Area.0.Size'"}, Bad{"Linux.Area.0.Sise=1\n", "did you mean"},
         Bad{"Linux.Area.0.Flags=1\nLinux.Area.0.Size=8\n", "l.cfg:2: [SysMem] Area.0: needs an Address"},
         Bad{"Linux.Area.0.Flags=1\nLinux.Area.0.Object=a\n",

@@ -21,7 +21,11 @@ ConfigSurroundings four_cores() {
           .online_cores = {0, 1, 2, 3},
           .isolated_cores = {},
           .schedulers = {"CmpSchedule", "CmpScheduleTimer", "CmpScheduleOneShot"},
-          .check_files = false};
+          .check_files = false,
+          .check_directories = false,
+          .interfaces = {},
+          .check_application = nullptr,
+          .check_settings = nullptr};
 }
 
 auto parse(std::string_view text, const ConfigSurroundings& surroundings = four_cores()) {
@@ -147,7 +151,7 @@ std::string instance(std::string_view keys, std::string_view name = "a", int cor
 INSTANTIATE_TEST_SUITE_P(
     Host, ConfigRefuses,
     testing::Values(
-        WrongConfig{"syntax", "[host]\nname = \n", "2", ""},
+        WrongConfig{"syntax", "[host]\nname = \n", "2:8", "the value of name is missing"},
         WrongConfig{"section", "[hots]\n", "1",
                     "unknown section or key 'hots'; allowed are [host], [dds], "
                     "[blocks], [[instance]]; did you mean 'host'?"},
@@ -158,6 +162,9 @@ INSTANTIATE_TEST_SUITE_P(
                     "[host] name: name 'a b' is not valid: allowed are 1 to 63"},
         WrongConfig{"name_type", "[host]\nname = 5\n", "2",
                     "[host] name: 5 is a whole number; allowed is a text"},
+        WrongConfig{"name_all", "[host]\nname = \"all\"\n", "2", "'all' stands for all hosts"},
+        WrongConfig{"fraction", "[host]\ndds_domain = 1.0\n", "2",
+                    "1.0 is a fraction; allowed is a whole number"},
         WrongConfig{"domain", "[host]\n\ndds_domain = 233\n", "3",
                     "dds_domain: 233 is out of range; allowed is 0 to 230"},
         WrongConfig{"domain_low", "[host]\ndds_domain = -1\n", "2", "dds_domain: -1 is out of range"},
@@ -210,6 +217,25 @@ INSTANTIATE_TEST_SUITE_P(
         WrongConfig{"identity_type", "[dds]\nidentity = true\n", "2", "allowed is a text in quotes"},
         WrongConfig{"peers", "[dds]\npeers = [\"-x\"]\n", "2", "\"-x\" is not an address"},
         WrongConfig{"peers_type", "[dds]\npeers = [1]\n", "2", "allowed is an array of texts"}),
+    [](const auto& test) { return test.param.name; });
+
+INSTANTIATE_TEST_SUITE_P(
+    Syntax, ConfigRefuses,
+    testing::Values(
+        WrongConfig{"word", "[host]\nname = a\n", "2:8", "put texts in quotes: name = \"a\""},
+        WrongConfig{"word_like_infinity", "[host]\nlog_level = info\n", "2:16", "log_level = \"info\""},
+        WrongConfig{"path", "[host]\nrun_directory = /tmp/x # here\n", "2:17", "run_directory = \"/tmp/x\""},
+        WrongConfig{"mode", "[host]\npool_mode = 0660\n", "2:17",
+                    "the number 0660 begins with 0; put a mode in quotes (pool_mode = \"0660\")"},
+        WrongConfig{"truth", "[host]\nkeep_pool = True\n", "2:13", "keep_pool = true"},
+        WrongConfig{"no", "[host]\nkeep_pool = no\n", "2:14", "keep_pool = false"},
+        WrongConfig{"open_quote", "[host]\nname = \"a\n", "2:10", "the closing quote of name is missing"},
+        WrongConfig{"backslash", "[host]\nname = \"C:\\x\"\n", "2:12", "name = 'C:\\x'"},
+        WrongConfig{"behind", "[host]\nname = \"a\" b\n", "2:12", "'b' stands behind the value of name"},
+        WrongConfig{"bracket", "[host\nname = \"a\"\n", "1:6", "the closing ] of '[host' is missing"},
+        WrongConfig{"twice", "[host]\nname = \"a\"\nname = \"b\"\n", "3:8", "name is given twice"},
+        WrongConfig{"no_equals", "[host]\nname \"a\"\n", "2:6", "a line is KEY = VALUE or [SECTION]"},
+        WrongConfig{"list", "[host]\ncores = [0 1]\n", "2:12", "separate its values by commas"}),
     [](const auto& test) { return test.param.name; });
 
 INSTANTIATE_TEST_SUITE_P(
@@ -301,6 +327,38 @@ TEST(Config, TakesAsManyInstancesAsTheHostPageHas) {
   const auto more = parse(many_instances(kMaxInstances + 1));
   ASSERT_FALSE(more.has_value());
   EXPECT_THAT(more.error(), ElementsAre(HasSubstr("65 instances; allowed are up to 64")));
+}
+
+TEST(Config, SaysOnceThatThereAreNoCores) {
+  const auto sut = parse("[host]\ncores = []\n" + instance(""));
+  ASSERT_FALSE(sut.has_value());
+  EXPECT_THAT(sut.error(), ElementsAre(HasSubstr("cores: is empty; online are 0, 1, 2, 3")));
+}
+
+TEST(Config, ListsTheInterfacesThatThereAre) {
+  auto surroundings = four_cores();
+  surroundings.interfaces = {"lo", "eth0"};
+  const std::string open = "\nallow_unsecured = true\n";
+  EXPECT_TRUE(parse("[dds]\ninterface = \"eth0\"" + open, surroundings).has_value());
+  const auto sut = parse("[dds]\ninterface = \"eth1\"" + open, surroundings);
+  ASSERT_FALSE(sut.has_value());
+  EXPECT_THAT(sut.error(),
+              ElementsAre(HasSubstr("cell.toml:2: [dds] interface: there is no interface 'eth1'; "
+                                    "there are lo, eth0; did you mean 'eth0'?")));
+  EXPECT_TRUE(parse("[dds]\nenabled = false\ninterface = \"eth1\"" + open, surroundings).has_value());
+}
+
+TEST(Config, ChecksTheFoldersThatAStartMakes) {
+  auto surroundings = four_cores();
+  surroundings.check_directories = true;
+  EXPECT_TRUE(
+      parse("[host]\nrun_directory = \"/tmp/there/is/none\"\nstate_directory = \"/tmp\"\n", surroundings)
+          .has_value());
+  const auto sut = parse("[host]\nrun_directory = \"/etc/hostname/run\"\nstate_directory = \"/dev/null/x\"\n",
+                         surroundings);
+  ASSERT_FALSE(sut.has_value());
+  EXPECT_THAT(sut.error(), ElementsAre(HasSubstr(":2: [host] run_directory: /etc/hostname is not a folder"),
+                                       HasSubstr(":3: [host] state_directory: /dev/null is not a folder")));
 }
 
 TEST(Config, SaysWhichFileIsMissing) {

@@ -1,0 +1,83 @@
+// plchostd --check-config finds what a start would find.
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include "tests/integration/manager/plant.hpp"
+
+namespace plchost {
+namespace {
+
+using testing::HasSubstr;
+
+class CheckConfig : public testing::Test {
+ protected:
+  CheckConfig() { std::filesystem::create_directories(folder_); }
+  ~CheckConfig() override { std::filesystem::remove_all(folder_); }
+  CheckConfig(const CheckConfig&) = delete;
+  CheckConfig& operator=(const CheckConfig&) = delete;
+
+  // What it prints, its exit code at the end.
+  std::string check(const std::string& text) {
+    write("cell.toml", fmt::format("[host]\nname = \"cell1\"\nrun_directory = \"{0}/run\"\n"
+                                   "state_directory = \"{0}/state\"\n{1}",
+                                   folder_.native(), text));
+    const std::string command =
+        fmt::format("cd {} && {}/bin/plchostd --check-config cell.toml 2>&1; echo exit $?", folder_.native(),
+                    PLCHOST_BUILD_DIRECTORY);
+    std::FILE* const output = ::popen(command.c_str(), "r");
+    std::string all;
+    std::array<char, 256> part{};
+    while (std::fgets(part.data(), part.size(), output) != nullptr) all += part.data();
+    ::pclose(output);
+    return all;
+  }
+  void write(const std::string& name, const std::string& text) const {
+    std::ofstream(folder_ / name) << text;
+  }
+  static std::string instance(const std::string& keys) {
+    return "[[instance]]\nname = \"line1\"\ncore = 0\n" + keys;
+  }
+  static std::string application(const std::string& name) {
+    return fmt::format("application = \"{}\"\n", Plant::application(name));
+  }
+
+ private:
+  std::filesystem::path folder_ =
+      std::filesystem::temp_directory_path() / fmt::format("plchost-check-{}", ::getpid());
+};
+
+TEST_F(CheckConfig, SaysThatAllIsWell) {
+  write("line1.cfg", "[CmpSchedule]\nSchedulerInterval=1000\n");
+  EXPECT_EQ(check(instance(application("bottling_line") + "settings = \"line1.cfg\"\n")),
+            "cell.toml: ok, 1 instance\nexit 0\n");
+}
+
+TEST_F(CheckConfig, TriesTheApplication) {
+  const std::string output = check(instance(application("fault_crashes")));
+  EXPECT_THAT(output, HasSubstr("cell.toml:8: [[instance]] 'line1' application: "));
+  EXPECT_THAT(output, HasSubstr("it crashes in its set-up: SIGSEGV in open_valve"));
+  EXPECT_THAT(output, HasSubstr("exit 1"));
+}
+
+TEST_F(CheckConfig, ReadsTheSettings) {
+  write("line1.cfg", "[CmpSchedule]\nSchedulerInterval=soon\n");
+  const std::string output = check(instance(application("bottling_line") + "settings = \"line1.cfg\"\n"));
+  EXPECT_THAT(output, HasSubstr("cell.toml:9: [[instance]] 'line1' settings: "));
+  EXPECT_THAT(output, HasSubstr("line1.cfg:2: [CmpSchedule] SchedulerInterval: 'soon' is not allowed"));
+}
+
+TEST_F(CheckConfig, KnowsTheInterfacesOfTheHost) {
+  const std::string output = check("[dds]\ninterface = \"none0\"\nallow_unsecured = true\n");
+  EXPECT_THAT(output, HasSubstr("cell.toml:6: [dds] interface: there is no interface 'none0'; there are "));
+  EXPECT_THAT(output, HasSubstr("lo"));
+}
+
+}  // namespace
+}  // namespace plchost
