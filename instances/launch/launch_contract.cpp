@@ -123,7 +123,8 @@ Result<SetupReport> decode_report(std::string_view packet) {
 
 std::string encode(const InstanceReport& report) {
   const Json json{{"pid", report.pid},
-                  {"running", report.running},
+                  {"state", report.state},
+                  {"problem", report.problem},
                   {"application", report.application},
                   {"scheduler", report.scheduler},
                   {"cores", report.cores},
@@ -144,15 +145,20 @@ Result<InstanceReport> decode_instance_report(std::string_view text) {
   };
   const auto is_text = [](const Json& value) { return value.is_string(); };
   const auto is_bool = [](const Json& value) { return value.is_boolean(); };
+  const auto is_state = [](const Json& value) {
+    return value.is_number_unsigned() && value.get<std::uint64_t>() <= kLastApplicationState;
+  };
   const auto is_ints = [&](const Json& value) {
     return value.is_array() && std::all_of(value.begin(), value.end(), is_int);
   };
-  if (!has("pid", is_int) || !has("running", is_bool) || !has("application", is_text) ||
-      !has("scheduler", is_text) || !has("cores", is_ints) || !has("memory_locked", is_bool)) {
+  if (!has("pid", is_int) || !has("state", is_state) || !has("problem", is_text) ||
+      !has("application", is_text) || !has("scheduler", is_text) || !has("cores", is_ints) ||
+      !has("memory_locked", is_bool)) {
     return failure(ErrorCode::corrupt, "instance report lacks a field, or one is of another type");
   }
   return InstanceReport{.pid = json["pid"].get<int>(),
-                        .running = json["running"].get<bool>(),
+                        .state = json["state"].get<unsigned>(),
+                        .problem = json["problem"].get<std::string>(),
                         .application = json["application"].get<std::string>(),
                         .scheduler = json["scheduler"].get<std::string>(),
                         .cores = json["cores"].get<std::vector<int>>(),

@@ -79,10 +79,14 @@ struct SetupReport {
 [[nodiscard]] std::string encode(const SetupReport& report);
 [[nodiscard]] Result<SetupReport> decode_report(std::string_view packet);
 
+/// The number of the last ApplicationState.
+inline constexpr unsigned kLastApplicationState = 5;
+
 /// What an instance says of itself when it is asked for its status on its control socket.
 struct InstanceReport {
   int pid = 0;
-  bool running = false;     ///< the application runs
+  unsigned state = 0;       ///< ApplicationState
+  std::string problem;      ///< why it is in exception; else empty
   std::string application;  ///< path; empty: none
   std::string scheduler;    ///< in use, or what the next start will use
   std::vector<int> cores;   ///< read back from the kernel

@@ -19,6 +19,8 @@ namespace plchost {
 
 namespace {
 
+constexpr auto kTellAgain = std::chrono::seconds(10);
+
 // As many as anybody reads: the file is a stranger's.
 void log_what_is_left_alone(const InstanceSettings& settings) {
   if (!settings.foreign_sections.empty()) {
@@ -234,10 +236,9 @@ Result<std::string> Instance::make_tasks() {
       .state_changed =
           [this](std::size_t index, bool running) {
             const auto state = running ? PageTaskState::running : PageTaskState::stopped;
-            auto& shown = page_->task(static_cast<std::uint32_t>(index)).state;
+            const auto task = static_cast<std::uint32_t>(index);
             // A task that comes back too late has been in exception all the same.
-            if (shown.load(std::memory_order_relaxed) == std::to_underlying(PageTaskState::exception)) return;
-            shown.store(std::to_underlying(state), std::memory_order_relaxed);
+            if (page_->task_state(task) != PageTaskState::exception) page_->set_task_state(task, state);
           },
       // Not before: in the first phase of a stop the others run what is posted. Nor later: a task in its last
       // cycle does not, so no poster may be told that it will.
@@ -308,12 +309,33 @@ void Instance::beat() {
   runtime.clock.reference.assign(settings_.scheduler.distributed_clock.reference);
   runtime.clock.problem.assign(reference_.problem());
   page_->write_runtime(runtime);
-  if (page_->lost() && !std::exchange(page_told_, true)) {
+  look_after_page();
+  for (const std::string& loss : host_->areas().look_for_losses()) spdlog::warn("{}", loss);
+}
+
+// The manager hears of state and heartbeat over the control socket as long as the page cannot tell them.
+void Instance::look_after_page() {
+  if (page_->lost()) {
+    if (std::exchange(page_lost_told_, true)) return;
     spdlog::warn(
         "the page of this instance was cut short by another program: nobody sees its figures any more "
         "until it is started again");
+    return;
   }
-  for (const std::string& loss : host_->areas().look_for_losses()) spdlog::warn("{}", loss);
+  const bool written_over = page_->keep([this](std::uint32_t index) {
+    if (!tasks_) return KnownFault{};
+    const TaskFault& fault = tasks_->task(index).fault();
+    return KnownFault{.raised = fault.raised(), .record = fault.published()};
+  });
+  if (!written_over) return;
+  const TimePoint now = MonotonicClock::now();
+  ++page_damages_;
+  if (page_damages_ > 1 && now < page_told_ + kTellAgain) return;
+  page_told_ = now;
+  spdlog::warn(
+      "the page of this instance was written over by another program ({} times so far) and is written anew; "
+      "statistics of tasks may be wrong: reset them",
+      page_damages_);
 }
 
 }  // namespace plchost

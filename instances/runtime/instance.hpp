@@ -133,6 +133,7 @@ class Instance {
   void keep_exception(const ExceptionEntry& entry) const;
   void restore_operator_events();
   void notify_tasks(unsigned event);
+  void look_after_page();
 
   Options options_;
   std::string scheduler_;
@@ -148,7 +149,9 @@ class Instance {
   std::optional<Application> application_;
   std::optional<InstancePage> page_;
   std::optional<DeviceDescription> device_;  // nothing: any external event is allowed
-  bool page_told_ = false;                   // that it is lost
+  bool page_lost_told_ = false;
+  TimePoint page_told_;             // when it was told last that the page was written over
+  std::uint64_t page_damages_ = 0;  // how often it was
   ReferenceMemory reference_;
   LinuxClock clock_;
   std::unique_ptr<TaskSet> tasks_;        // uses all of the above: destroyed before them

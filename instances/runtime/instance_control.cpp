@@ -121,9 +121,12 @@ Result<std::string> Instance::reset_statistics(const std::string& task) {
   return {};
 }
 
+static_assert(std::to_underlying(ApplicationState::exception) == kLastApplicationState);
+
 std::string Instance::status() const {
   return encode(InstanceReport{.pid = ::getpid(),
-                               .running = life_.state() == ApplicationState::running,
+                               .state = std::to_underlying(life_.state()),
+                               .problem = life_.problem(),
                                .application = application_ ? application_->path() : std::string(),
                                .scheduler = scheduler_,
                                .cores = cores_,

@@ -40,8 +40,7 @@ std::string Instance::keep_fault(const TaskSet::Fault& fault) {
   const std::string where = entry.symbol.empty() ? std::string() : fmt::format(" at {}", entry.symbol);
   std::string reason = fmt::format("task '{}': {}{}", entry.task, entry.text, where);
   spdlog::error("exception: {}", reason);
-  page_->task(static_cast<std::uint32_t>(fault.task))
-      .state.store(std::to_underlying(PageTaskState::exception), std::memory_order_relaxed);
+  page_->set_task_state(static_cast<std::uint32_t>(fault.task), PageTaskState::exception);
   keep_exception(entry);
   return reason;
 }

@@ -8,8 +8,9 @@
 
 namespace plchost {
 
-/// For how long a process's control thread has written no beat. A gap between two looks counts for a little
-/// only: while the whole host or the manager stood still, nothing is known of the process. Pure.
+/// For how long a process's control thread has given no sign of itself: any number that changes is one. A gap
+/// between two looks counts for a little only: while the whole host or the manager stood still, nothing is
+/// known of the process. Pure.
 class HeartbeatWatch {
  public:
   /// Longer than the guard against endless loops takes by default: until it hits, a loop above the control

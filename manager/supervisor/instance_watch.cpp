@@ -1,22 +1,108 @@
-// What a ManagedInstance does when the control thread of its process stands still.
+// What a ManagedInstance knows of a process whose control thread stands still, or whose page is damaged.
 
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "manager/supervisor/managed_instance.hpp"
+#include "shm/base/log.hpp"
 
 namespace plchost {
 
-void ManagedInstance::watch_heartbeat(const InstanceRuntime& runtime) {
-  heartbeat_.look(surroundings_.now(), runtime.heartbeat_ns);
+namespace {
+
+InstanceRuntime runtime_of(const InstanceReport& report) {
+  InstanceRuntime runtime;
+  runtime.pid = report.pid;
+  runtime.state = static_cast<ApplicationState>(report.state);
+  runtime.running = runtime.state == ApplicationState::running ? 1 : 0;
+  runtime.problem.assign(report.problem);
+  runtime.scheduler.assign(report.scheduler);
+  runtime.application.assign(report.application);
+  return runtime;
+}
+
+}  // namespace
+
+void ManagedInstance::forget_signs() {
+  silent_ = false;
+  heartbeat_ = {};
+  page_beat_ = HeartbeatWatch(kPageLimit);
+  heard_of_ = false;
+  page_damaged_ = false;
+  asked_number_ = 0;
+  answers_ = 0;
+  said_.reset();
+}
+
+// What the process says of itself now; nothing: it does not.
+std::optional<InstanceRuntime> ManagedInstance::watch_process() {
+  auto page = host_.runtime();
+  if (page && page->pid != status_.pid) page.reset();
+  if (page && page->heartbeat_ns != last_beat_) {
+    last_beat_ = page->heartbeat_ns;
+    ++signs_;
+    heard_of_ = true;
+    answers_ = 0;
+  }
+  page_beat_.look(surroundings_.now(), page ? last_beat_ : 0);
+  // Whether the page is damaged or the process stands still, the process itself can tell.
+  const bool believed = page && !page_beat_.silent();
+  if (believed) {
+    said_ = page;
+  } else if (page_beat_.silent() && !takes_over()) {
+    ask_for_status();
+  }
+  if (heard_of_) watch_heartbeat();
+  if (page_damaged_ && believed) {
+    page_damaged_ = false;
+    tell_page_problem();
+  }
+  return said_;
+}
+
+void ManagedInstance::ask_for_status() {
+  const TimePoint now = surroundings_.now();
+  if (now - asked_at_ < (asked_number_ != 0 ? kAskAgain : kAskInterval)) return;
+  asked_at_ = now;
+  if (const auto number = send(ControlVerb::status)) asked_number_ = *number;
+}
+
+// false: it is no answer to the question for its status.
+bool ManagedInstance::hear(const ControlReply& reply) {
+  const auto report = decode_instance_report(reply.text);
+  if (reply.code != ErrorCode::ok || !report || report->pid != status_.pid) return false;
+  ++signs_;
+  heard_of_ = true;
+  if (reply.number == asked_number_) asked_number_ = 0;
+  // A process that was only busy answers once before its page beats again.
+  constexpr int kAnswers = 2;
+  if (++answers_ >= kAnswers && phase_ == Phase::up && !page_damaged_) {
+    page_damaged_ = true;
+    spdlog::warn(
+        "instance {}: its status page does not tell what it says itself: another program has damaged "
+        "it; restart the instance to have its figures again",
+        config_.name);
+    tell_page_problem();
+  }
+  said_ = runtime_of(*report);
+  return true;
+}
+
+void ManagedInstance::tell_page_problem() {
+  if (silent_ || operation_ || status_.state == InstanceState::exception) return;
+  set_state(phase_, status_.state, problem_when_up());
+}
+
+void ManagedInstance::watch_heartbeat() {
+  heartbeat_.look(surroundings_.now(), signs_);
   // The control thread is in the set-up of the new version: the command's limit counts.
   if (takes_over()) return;
   if (heartbeat_.silent() == silent_) return;
   if (silent_) {
-    answers_again(runtime);
+    answers_again();
   } else {
-    fall_silent(runtime.problem.view());
+    fall_silent(said_ ? said_->problem.view() : std::string_view());
   }
 }
 
@@ -36,11 +122,11 @@ void ManagedInstance::fall_silent(std::string_view known) {
 }
 
 // It was kept from answering, and has missed nothing: what it says holds again.
-void ManagedInstance::answers_again(const InstanceRuntime& runtime) {
+void ManagedInstance::answers_again() {
   if (safe_mode_) {
     set_state(Phase::up, InstanceState::safe_mode, problem_when_up());
-  } else {
-    show_application(runtime);
+  } else if (said_) {
+    show_application(*said_);
   }
   silent_ = false;  // only now, so that the transition is told
 }

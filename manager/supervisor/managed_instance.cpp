@@ -98,13 +98,18 @@ void ManagedInstance::on_reply(const ControlReply& reply) {
   if (operation_ && operation_->step == Step::forwarded && reply.number == operation_->forwarded_number) {
     finish_forwarded(reply);
   } else if (phase_ == Phase::adopting && reply.number == awaited_number_) {
+    (void)hear(reply);
     finish_adoption("");
-  }  // else an answer that came too late
+  } else {
+    (void)hear(reply);  // or an answer that came too late
+  }
 }
 
 void ManagedInstance::come_up() {
   host_.set_timer(std::nullopt);
   up_since_ = settled_ = surroundings_.now();
+  // An adopted one may be in its set-up still, in which it answers to nobody.
+  if (phase_ == Phase::setting_up) heard_of_ = true;
   if (safe_mode_) {
     set_state(Phase::up, InstanceState::safe_mode, problem_when_up());
   } else {
@@ -133,12 +138,16 @@ std::string ManagedInstance::problem_when_up() {
   } else if (!last_end_.empty()) {
     add("ended last: " + last_end_);
   }
+  if (page_damaged_) {
+    add("another program has damaged its status page: figures of its tasks are missing or old; restart it");
+  }
   return problem;
 }
 
 void ManagedInstance::finish_adoption(const std::string& problem) {
-  const auto runtime = host_.runtime();
-  const bool known = runtime && runtime->pid == status_.pid;
+  auto runtime = host_.runtime();
+  if (!runtime || runtime->pid != status_.pid) runtime = said_;
+  const bool known = runtime.has_value();
   if (known) {
     wants_running_ = runtime->running != 0;
     if (!runtime->scheduler.view().empty()) scheduler_ = runtime->scheduler.view();
@@ -158,8 +167,7 @@ void ManagedInstance::finish_adoption(const std::string& problem) {
 void ManagedInstance::on_exit(const ExitStatus& status) {
   status_.pid = 0;
   status_.core = -1;
-  silent_ = false;
-  heartbeat_ = {};
+  forget_signs();
   host_.set_timer(std::nullopt);
   const bool set_up = phase_ == Phase::setting_up;
   const bool exit_of_set_up = status.known && status.kind == ExitStatus::Kind::exited &&
@@ -324,10 +332,8 @@ void ManagedInstance::go_down(InstanceState state, const std::string& problem) {
 
 void ManagedInstance::refresh() {
   if (phase_ != Phase::up) return;
-  const auto runtime = host_.runtime();
-  if (!runtime || runtime->pid != status_.pid) return;
-  watch_heartbeat(*runtime);
-  if (operation_ || silent_) return;
+  const auto runtime = watch_process();
+  if (!runtime || operation_ || silent_) return;
   // There is no way out of an exception, so this is never too early to be believed.
   const bool excepted = runtime->state == ApplicationState::exception;
   if (excepted && status_.state != InstanceState::exception) return show_application(*runtime);

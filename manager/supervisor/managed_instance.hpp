@@ -17,6 +17,12 @@
 
 namespace plchost {
 
+/// A page that does not beat for so long is not believed: the process is asked over its control socket.
+inline constexpr Duration kPageLimit = std::chrono::seconds(1);
+/// How often it is asked, and how often again if it does not answer.
+inline constexpr Duration kAskInterval = std::chrono::milliseconds(500);
+inline constexpr Duration kAskAgain = std::chrono::seconds(2);
+
 // The life of one instance
 // ========================
 //
@@ -63,6 +69,9 @@ namespace plchost {
 //   again. Nothing can be asked of it: a command that it was to answer fails, others than reset, restart,
 //   load and stop are refused, and stop is what reset is. Its end begins with SIGTERM, SIGKILL follows 2 s
 //   later.
+// * State and heartbeat are read from the process's page. If another program has damaged it or cut it short,
+//   the process is asked for them over its control socket; the problem text says so. The page alone is no
+//   reason for an exception, nor for a signal.
 // * Commands: one at a time; another is answered with busy. What changes a process that is still setting_up
 // waits until
 //   it is up. The reply comes when the thing is done, or when the process ended instead, or at the limit.
@@ -182,10 +191,15 @@ class ManagedInstance : public InstanceEvents {
            operation_->step == Step::setting_boot;
   }
 
-  // A process that does not answer: instance_watch.cpp
-  void watch_heartbeat(const InstanceRuntime& runtime);
+  // A process that does not answer, or whose page is damaged: instance_watch.cpp
+  [[nodiscard]] std::optional<InstanceRuntime> watch_process();
+  void ask_for_status();
+  bool hear(const ControlReply& reply);
+  void watch_heartbeat();
   void fall_silent(std::string_view known);
-  void answers_again(const InstanceRuntime& runtime);
+  void answers_again();
+  void tell_page_problem();
+  void forget_signs();
 
   // Life: managed_instance.cpp
   void fresh_process(Next next, StartKind kind);
@@ -222,6 +236,15 @@ class ManagedInstance : public InstanceEvents {
   bool name_taken_ = false;  // another process of that name kept this one from being set up
   bool silent_ = false;      // its process does not beat
   HeartbeatWatch heartbeat_;
+  HeartbeatWatch page_beat_{kPageLimit};  // of the page alone
+  std::int64_t signs_ = 0;                // of its control thread, from the page or over the socket
+  std::int64_t last_beat_ = 0;            // in the page
+  bool heard_of_ = false;                 // this process has given a sign
+  bool page_damaged_ = false;             // the page does not tell what the process says itself
+  TimePoint asked_at_;                    // for its status, last
+  std::uint64_t asked_number_ = 0;        // of the answer that is awaited; 0: none is
+  int answers_ = 0;                       // to that, since the page has beaten last
+  std::optional<InstanceRuntime> said_;   // by itself last: in its page, or when it was asked
   TimePoint up_since_{};
   TimePoint settled_{};         // when the state was last known from the process's own answer
   std::string setup_failure_;   // why the set-up failed; empty: it did not

@@ -21,7 +21,8 @@ class Seqlock {
   void write(const T& value) noexcept {
     std::array<std::uint64_t, kWords> words{};
     std::memcpy(words.data(), &value, sizeof(T));
-    const std::uint64_t sequence = sequence_.load(std::memory_order_relaxed);
+    // Odd if a stranger has written over it: then readers would take every second write for a whole one.
+    const std::uint64_t sequence = (sequence_.load(std::memory_order_relaxed) + 1) & ~std::uint64_t{1};
     sequence_.store(sequence + 1, std::memory_order_relaxed);
     // Pairs with the acquire fence in read(): who sees a new word sees the odd sequence.
     std::atomic_thread_fence(std::memory_order_release);

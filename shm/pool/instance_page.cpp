@@ -2,7 +2,10 @@
 
 #include <cassert>
 #include <cstddef>
+#include <cstring>
 #include <new>
+#include <type_traits>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -49,14 +52,31 @@ HistogramBuckets buckets_of(const MemoryFile& memory, std::uint32_t task_count, 
   return {all + index * task_bucket_count(shape), task_bucket_count(shape)};
 }
 
+// All of the header but the magic.
+void describe(InstancePageLayout& page, std::size_t tasks, HistogramShape shape) noexcept {
+  page.version = kVersion;
+  page.digits = shape.digits();
+  page.task_count = static_cast<std::uint32_t>(tasks);
+  page.size = size_for(tasks, shape);
+}
+
+bool is_described(const InstancePageLayout& page, std::size_t tasks, HistogramShape shape) noexcept {
+  return page.magic == kMagic && page.version == kVersion && page.digits == shape.digits() &&
+         page.task_count == tasks && page.size == size_for(tasks, shape);
+}
+
+// As a whole: who has written over it may have changed any byte.
+template <class Value>
+bool is_same(const Value& one, const Value& other) noexcept {
+  static_assert(std::is_trivially_copyable_v<Value>);
+  return std::memcmp(static_cast<const void*>(&one), static_cast<const void*>(&other), sizeof one) == 0;
+}
+
 // The memory is zero, as the buckets are at first.
 Result<void> fill_instance_page(std::span<std::byte> bytes, std::span<const TaskIdentity> tasks,
                                 HistogramShape shape) {
   auto* const page = new (bytes.data()) InstancePageLayout;
-  page->version = kVersion;
-  page->digits = shape.digits();
-  page->task_count = static_cast<std::uint32_t>(tasks.size());
-  page->size = bytes.size();
+  describe(*page, tasks.size(), shape);
   auto* place = bytes.data() + kTasksOffset;
   for (const TaskIdentity& identity : tasks) {
     auto* const slot = new (place) TaskSlot;
@@ -131,15 +151,61 @@ Result<InstancePage> InstancePage::create(std::string_view pool, std::string_vie
       instance_page_name(pool, instance), size_for(tasks.size(), shape),
       [&](std::span<std::byte> bytes) { return fill_instance_page(bytes, tasks, shape); });
   if (!memory) return std::unexpected(memory.error());
-  return InstancePage(std::move(*memory), static_cast<std::uint32_t>(tasks.size()), shape);
+  return InstancePage(std::move(*memory), tasks, shape);
 }
 
-InstancePage::InstancePage(MemoryFile memory, std::uint32_t count, HistogramShape shape)
-    : memory_(std::move(memory)), task_count_(count) {
-  statistics_.reserve(count);
-  for (std::uint32_t i = 0; i < count; ++i) {
-    statistics_.emplace_back(shape, slot_of(memory_, i).counters, buckets_of(memory_, count, i, shape));
+InstancePage::InstancePage(MemoryFile memory, std::span<const TaskIdentity> tasks, HistogramShape shape)
+    : memory_(std::move(memory)),
+      task_count_(static_cast<std::uint32_t>(tasks.size())),
+      shape_(shape),
+      identities_(tasks.begin(), tasks.end()),
+      states_(tasks.size(), PageTaskState::created) {
+  statistics_.reserve(task_count_);
+  for (std::uint32_t i = 0; i < task_count_; ++i) {
+    statistics_.emplace_back(shape, slot_of(memory_, i).counters, buckets_of(memory_, task_count_, i, shape));
   }
+}
+
+void InstancePage::set_task_state(std::uint32_t index, PageTaskState state) noexcept {
+  states_[index] = state;
+  slot_of(memory_, index).state.store(std::to_underlying(state), std::memory_order_relaxed);
+}
+
+bool InstancePage::keep(const std::function<KnownFault(std::uint32_t)>& fault) {
+  InstancePageLayout& page = instance_layout_of(memory_);
+  bool changed = !is_described(page, task_count_, shape_);
+  if (changed) {
+    describe(page, task_count_, shape_);
+    page.magic = kMagic;
+  }
+  for (std::uint32_t i = 0; i < task_count_; ++i) {
+    if (keep_task(i, fault(i))) changed = true;
+  }
+  return changed;
+}
+
+bool InstancePage::keep_task(std::uint32_t index, const KnownFault& fault) noexcept {
+  TaskSlot& slot = slot_of(memory_, index);
+  bool changed = false;
+  if (!is_same(slot.identity, identities_[index])) {
+    slot.identity = identities_[index];
+    changed = true;
+  }
+  if (slot.state.load(std::memory_order_relaxed) != std::to_underlying(states_[index])) {
+    set_task_state(index, states_[index]);
+    changed = true;
+  }
+  if (!fault.raised) {
+    if (slot.fault.sequence() == 0) return changed;
+    // If it is raised just now, its record is written again by the next call.
+    new (&slot.fault) Seqlock<FaultRecord>;
+    return true;
+  }
+  if (fault.record == nullptr) return changed;  // its finder is about to write it
+  const auto shown = slot.fault.read();
+  if (shown && slot.fault.sequence() != 0 && is_same(*shown, *fault.record)) return changed;
+  slot.fault.write(*fault.record);
+  return true;
 }
 
 void InstancePage::remove(std::string_view pool, std::string_view instance) noexcept {

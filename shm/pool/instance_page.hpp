@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
@@ -106,6 +107,12 @@ struct InstancePageLayout {
 
 [[nodiscard]] std::string instance_page_name(std::string_view pool, std::string_view instance);
 
+/// What the process knows of the fault of a task.
+struct KnownFault {
+  bool raised = false;                  ///< its record may be written at any time
+  const FaultRecord* record = nullptr;  ///< null: not complete yet
+};
+
 /// The instance's end: a fresh page for each life of the process, made when its tasks are known.
 class InstancePage {
  public:
@@ -117,6 +124,12 @@ class InstancePage {
   void write_runtime(const InstanceRuntime& runtime) noexcept;
   /// `index` < task_count().
   [[nodiscard]] TaskSlot& task(std::uint32_t index) noexcept;
+  /// The state of task `index` < task_count(). Control thread.
+  void set_task_state(std::uint32_t index, PageTaskState state) noexcept;
+  [[nodiscard]] PageTaskState task_state(std::uint32_t index) const noexcept { return states_[index]; }
+  /// Writes the header, what tasks are, their states and their faults anew where another program has written
+  /// over them. true: one had. What a task counts is written anew by its next cycle. Control thread.
+  [[nodiscard]] bool keep(const std::function<KnownFault(std::uint32_t)>& fault);
   /// Where task `index` < task_count() writes its statistics. As long as the page.
   [[nodiscard]] TaskStatistics& statistics(std::uint32_t index) noexcept { return statistics_[index]; }
   [[nodiscard]] std::uint32_t task_count() const noexcept { return task_count_; }
@@ -124,9 +137,14 @@ class InstancePage {
   [[nodiscard]] bool lost() const noexcept { return memory_.lost(); }
 
  private:
-  InstancePage(MemoryFile memory, std::uint32_t count, HistogramShape shape);
+  InstancePage(MemoryFile memory, std::span<const TaskIdentity> tasks, HistogramShape shape);
+  [[nodiscard]] bool keep_task(std::uint32_t index, const KnownFault& fault) noexcept;
   MemoryFile memory_;
-  std::uint32_t task_count_;                // a stranger may change the page's own
+  // A stranger may change the page's own.
+  std::uint32_t task_count_;
+  HistogramShape shape_;
+  std::vector<TaskIdentity> identities_;
+  std::vector<PageTaskState> states_;
   std::vector<TaskStatistics> statistics_;  // they refer into the memory
 };
 

@@ -1,4 +1,6 @@
 #include <csignal>
+#include <filesystem>
+#include <fstream>
 #include <string>
 #include <thread>
 
@@ -111,6 +113,49 @@ TEST(Manager, LeadsOutOfAFaultThatHoldsTheHeapAsOutOfAnyOther) {
   EXPECT_EQ(plant.status("line1").state, InstanceState::stopped);
   EXPECT_NE(plant.status("line1").pid, pid);
 }
+
+// Another program with the right to write the pool, and a process that stands still afterwards.
+class DamagedPage : public testing::TestWithParam<bool> {};
+
+TEST_P(DamagedPage, IsNoFaultOfTheInstanceAndHidesNone) {
+  const bool cut = GetParam();
+  Plant plant;
+  plant.add("line1", "bottling_line");
+  plant.start_manager();
+  ASSERT_TRUE(plant.wait_for("line1", InstanceState::running));
+  const int pid = plant.status("line1").pid;
+  const std::string page = MemoryFile::path(instance_page_name(plant.pool(), "line1"));
+  if (cut) {
+    std::filesystem::resize_file(page, std::filesystem::file_size(page) / 2);
+  } else {
+    std::fstream(page, std::ios::in | std::ios::out | std::ios::binary) << std::string(4096, '\xa5');
+  }
+  EXPECT_TRUE(
+      Plant::eventually([&] { return plant.log().find("page of this instance was") != std::string::npos; }));
+  if (cut) {
+    EXPECT_TRUE(Plant::eventually([&] {
+      return plant.status("line1").problem.view().find("damaged its status page") != std::string_view::npos;
+    }));
+  }
+  std::this_thread::sleep_for(HeartbeatWatch::kLimit + std::chrono::seconds(2));
+  EXPECT_EQ(plant.status("line1").state, InstanceState::running);
+  EXPECT_EQ(plant.status("line1").pid, pid);
+  if (!cut) {
+    EXPECT_TRUE(plant.wait_for_cycles("line1")) << "the page is whole again";
+  }
+  ASSERT_EQ(::kill(pid, SIGSTOP), 0);
+  EXPECT_TRUE(plant.wait_for("line1", InstanceState::exception));
+  EXPECT_THAT(std::string(plant.status("line1").problem.view()), HasSubstr("has not answered"));
+  ASSERT_EQ(::kill(pid, SIGCONT), 0);
+  EXPECT_TRUE(plant.wait_for("line1", InstanceState::running));
+  EXPECT_EQ(plant.ask(ControlVerb::restart, "line1").code, ErrorCode::ok);
+  EXPECT_NE(plant.status("line1").pid, pid);
+  EXPECT_TRUE(plant.wait_for_cycles("line1"));
+  EXPECT_EQ(plant.stop_manager().describe(), "exit code 0");
+  EXPECT_THAT(plant.leftovers(), IsEmpty());
+}
+
+INSTANTIATE_TEST_SUITE_P(OverwrittenAndCut, DamagedPage, testing::Bool());
 
 TEST(Manager, RefusesAWrongApplicationAndLeavesTheOldOneRunning) {
   Plant plant;

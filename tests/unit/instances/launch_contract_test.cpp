@@ -96,14 +96,16 @@ INSTANTIATE_TEST_SUITE_P(Packets, BadReport,
 
 TEST(InstanceReport, ComesBackAsItWasSent) {
   const auto sut = decode_instance_report(encode(InstanceReport{.pid = 12,
-                                                                .running = true,
+                                                                .state = 5,
+                                                                .problem = "task 'A'",
                                                                 .application = "/a.so",
                                                                 .scheduler = "CmpSchedule",
                                                                 .cores = {1, 2},
                                                                 .memory_locked = true}));
   ASSERT_TRUE(sut);
   EXPECT_EQ(sut->pid, 12);
-  EXPECT_TRUE(sut->running);
+  EXPECT_EQ(sut->state, 5U);
+  EXPECT_EQ(sut->problem, "task 'A'");
   EXPECT_EQ(sut->application, "/a.so");
   EXPECT_EQ(sut->scheduler, "CmpSchedule");
   EXPECT_THAT(sut->cores, ElementsAre(1, 2));
@@ -112,12 +114,16 @@ TEST(InstanceReport, ComesBackAsItWasSent) {
 
 TEST(InstanceReport, WithAFieldMissingOrOfAnotherTypeIsCorrupt) {
   EXPECT_FALSE(decode_instance_report("{}"));
+  EXPECT_FALSE(decode_instance_report(
+      R"({"pid":"x","state":1,"problem":"","application":"","scheduler":"","cores":[],)"
+      R"("memory_locked":true})"));
+  EXPECT_FALSE(decode_instance_report(
+      R"({"pid":1,"state":1,"problem":"","application":"","scheduler":"","cores":["a"],)"
+      R"("memory_locked":true})"));
   EXPECT_FALSE(
-      decode_instance_report(R"({"pid":"x","running":true,"application":"","scheduler":"","cores":[],)"
-                             R"("memory_locked":true})"));
-  EXPECT_FALSE(
-      decode_instance_report(R"({"pid":1,"running":true,"application":"","scheduler":"","cores":["a"],)"
-                             R"("memory_locked":true})"));
+      decode_instance_report(R"({"pid":1,"state":6,"problem":"","application":"","scheduler":"","cores":[],)"
+                             R"("memory_locked":true})"))
+      << "no such state";
 }
 
 TEST(LaunchContract, ControlSocketLiesInTheRunDirectory) {

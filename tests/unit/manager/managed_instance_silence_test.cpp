@@ -1,5 +1,7 @@
 // A process whose control thread beats no more: what is shown, and what each command does.
+#include <algorithm>
 #include <csignal>
+#include <utility>
 
 #include "tests/unit/manager/managed_instance_fixture.hpp"
 
@@ -47,6 +49,29 @@ class SilentProcess : public ManagedInstanceTest {
       advance(milliseconds(50));
     }
   }
+  [[nodiscard]] bool is_only_asked_for_its_status() const {
+    return std::ranges::all_of(host_.requests,
+                               [](const auto& request) { return request.verb == ControlVerb::status; });
+  }
+  /// The control thread answers what it is asked, whatever the page says.
+  void answer_status(ApplicationState said) {
+    if (host_.requests.empty() || host_.requests.back().verb != ControlVerb::status) return;
+    answer(ErrorCode::ok,
+           encode(InstanceReport{.pid = sut().status().pid,
+                                 .state = std::to_underlying(said),
+                                 .problem = said == ApplicationState::exception ? "task 'A'" : "",
+                                 .application = config_.application,
+                                 .scheduler = "CmpSchedule",
+                                 .cores = {1},
+                                 .memory_locked = true}));
+  }
+  void go_on_for(Duration duration, std::optional<ApplicationState> said = std::nullopt) {
+    for (Duration passed{}; passed <= duration; passed += milliseconds(50)) {
+      sut().refresh();
+      if (said) answer_status(*said);
+      advance(milliseconds(50));
+    }
+  }
   void bring_up_and_fall_silent() {
     bring_up();
     beat();
@@ -67,7 +92,7 @@ TEST_F(SilentProcess, IsInExceptionAndLeftAlone) {
   EXPECT_THAT(problem(), HasSubstr("its control thread has not answered for 3 s"));
   EXPECT_EQ(std::get<1>(transitions_.back()), InstanceState::exception) << "it cannot tell this itself";
   EXPECT_TRUE(host_.signals.empty());
-  EXPECT_TRUE(host_.requests.empty());
+  EXPECT_TRUE(is_only_asked_for_its_status());
 }
 
 TEST_F(SilentProcess, SaysTheFaultThatTheProcessCouldNotTell) {
@@ -84,6 +109,54 @@ TEST_F(SilentProcess, IsWhatItWasWhenItAnswersAgain) {
   EXPECT_EQ(std::get<1>(transitions_.back()), InstanceState::running);
   ask(ControlVerb::stop);
   EXPECT_EQ(host_.requests.back().verb, ControlVerb::stop);
+}
+
+TEST_F(SilentProcess, IsAskedItselfIfItsPageIsDamaged) {
+  for (const bool readable : {true, false}) {
+    bring_up();
+    beat();
+    if (!readable) host_.page.reset();
+    go_on_for(seconds(20), ApplicationState::running);
+    EXPECT_EQ(state(), InstanceState::running) << readable;
+    EXPECT_THAT(problem(), HasSubstr("damaged its status page")) << readable;
+    EXPECT_TRUE(host_.signals.empty());
+    sut().on_exit(killed_by(SIGKILL));
+    make();
+    host_.requests.clear();
+  }
+}
+
+TEST_F(SilentProcess, IsInExceptionAlsoIfItsPageIsDamaged) {
+  bring_up();
+  beat();
+  host_.page.reset();
+  go_on_for(seconds(5), ApplicationState::running);
+  ASSERT_EQ(state(), InstanceState::running);
+  go_on_for(HeartbeatWatch::kLimit + milliseconds(600));
+  EXPECT_EQ(state(), InstanceState::exception);
+  EXPECT_THAT(problem(), HasSubstr("has not answered for 3 s"));
+  go_on_for(seconds(3), ApplicationState::running);
+  EXPECT_EQ(state(), InstanceState::running);
+}
+
+TEST_F(SilentProcess, TellsItsExceptionOverTheSocketIfItsPageIsDamaged) {
+  bring_up();
+  beat();
+  host_.page.reset();
+  go_on_for(seconds(3), ApplicationState::exception);
+  EXPECT_EQ(state(), InstanceState::exception);
+  EXPECT_EQ(problem(), "task 'A'");
+}
+
+TEST_F(SilentProcess, IsBelievedAgainWhenItsPageBeats) {
+  bring_up();
+  beat();
+  host_.page.reset();
+  go_on_for(seconds(5), ApplicationState::running);
+  ASSERT_NE(problem(), "");
+  beat();
+  EXPECT_EQ(problem(), "");
+  EXPECT_EQ(state(), InstanceState::running);
 }
 
 TEST_F(SilentProcess, IsInNoExceptionWhileItTakesOverAnotherVersion) {
@@ -108,7 +181,7 @@ TEST_F(SilentProcess, IsNotAsked) {
     ask(verb);
     EXPECT_EQ(take_reply().code, ErrorCode::wrong_state) << to_string(verb);
   }
-  EXPECT_TRUE(host_.requests.empty());
+  EXPECT_TRUE(is_only_asked_for_its_status());
 }
 
 TEST_F(SilentProcess, IsEndedByForceAndStartedAnewByAReset) {
@@ -118,7 +191,7 @@ TEST_F(SilentProcess, IsEndedByForceAndStartedAnewByAReset) {
   EXPECT_EQ(*host_.timer - now_, kTerminateLimit);
   expire_timer();
   EXPECT_THAT(host_.signals, ElementsAre(SIGTERM, SIGKILL));
-  EXPECT_TRUE(host_.requests.empty());
+  EXPECT_TRUE(is_only_asked_for_its_status());
   sut().on_exit(killed_by(SIGKILL));
   report_ready();
   EXPECT_EQ(take_reply().code, ErrorCode::ok);

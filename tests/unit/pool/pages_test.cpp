@@ -210,6 +210,53 @@ TEST_F(Pages, InstancePageShowsATaskWithAFaultInException) {
   EXPECT_FALSE(sut->fault(2));
 }
 
+TEST_F(Pages, InstancePageOverWhichAStrangerHasWrittenIsWrittenAnew) {
+  auto writer = InstancePage::create(pool(), "line1", tasks_of(3));
+  ASSERT_TRUE(writer);
+  FaultRecord record;
+  record.kind = FaultKind::signal;
+  record.signal = 11;
+  const auto fault = [&](std::uint32_t task) {
+    return task == 1 ? KnownFault{.raised = true, .record = &record} : KnownFault{};
+  };
+  for (std::uint32_t i = 0; i < 3; ++i) writer->set_task_state(i, PageTaskState::running);
+  writer->set_task_state(1, PageTaskState::exception);
+  writer->task(1).fault.write(record);
+  InstanceRuntime runtime;
+  runtime.pid = 7;
+  TaskCounters counters{};
+  counters.cycles = 5;
+  EXPECT_FALSE(writer->keep(fault)) << "nothing has happened";
+  const MemoryFile memory = map(instance_page_name(pool(), "line1"));
+  const std::size_t most = sizeof(InstancePageLayout) + 3 * sizeof(TaskSlot);
+  std::mt19937 random(1);  // NOLINT(cert-msc51-cpp): the same each time
+  for (int round = 0; round < 300; ++round) {
+    const auto bytes = memory.bytes().first(most);
+    if (round % 3 == 0) {
+      std::ranges::generate(bytes, [&] { return static_cast<std::byte>(random()); });
+      EXPECT_TRUE(writer->keep(fault));
+    } else {
+      bytes[random() % most] ^= static_cast<std::byte>(1 + random() % 255);
+      (void)writer->keep(fault);
+    }
+    writer->write_runtime(runtime);
+    for (std::uint32_t i = 0; i < 3; ++i) writer->statistics(i).counters.write(counters);
+    EXPECT_FALSE(writer->keep(fault));
+    const auto sut = InstancePageReader::open(pool(), "line1");
+    ASSERT_TRUE(sut) << sut.error().describe();
+    ASSERT_EQ(sut->runtime().value_or(InstanceRuntime{}).pid, 7);
+    for (std::uint32_t i = 0; i < 3; ++i) {
+      const auto task = sut->task(i);
+      ASSERT_TRUE(task);
+      ASSERT_EQ(task->identity.name.view(), "task" + std::to_string(i));
+      ASSERT_EQ(task->state, i == 1 ? PageTaskState::exception : PageTaskState::running);
+      ASSERT_EQ(task->counters.cycles, 5U);
+    }
+    ASSERT_FALSE(sut->fault(0));
+    ASSERT_EQ(sut->fault(1).value_or(FaultRecord{}).signal, 11);
+  }
+}
+
 TEST_F(Pages, InstancePageHoldsNoneAndTheMostTasksAndRefusesMore) {
   EXPECT_TRUE(InstancePage::create(pool(), "line1", {}));
   EXPECT_EQ(InstancePageReader::open(pool(), "line1")->task_count(), 0U);
