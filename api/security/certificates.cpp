@@ -200,6 +200,16 @@ Result<std::string> subject_text(const Certificate& certificate) {
   return text_of(bio);
 }
 
+Result<std::string> serial_text(const Certificate& certificate) {
+  const std::unique_ptr<BIGNUM, OpensslFree<BN_free>> number(
+      ASN1_INTEGER_to_BN(X509_get0_serialNumber(certificate.get()), nullptr));
+  char* const digits = number ? BN_bn2hex(number.get()) : nullptr;
+  if (digits == nullptr) return openssl_failure("read the serial number of a certificate");
+  std::string text = digits;
+  OPENSSL_free(digits);
+  return text;
+}
+
 Result<GuidPrefix> guid_prefix(const Certificate& certificate) {
   return prefix_of(X509_get_subject_name(certificate.get()));
 }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <ctime>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "api/security/openssl.hpp"
@@ -54,8 +55,12 @@ inline constexpr std::size_t kMaxIdentityName = 63;
 [[nodiscard]] Result<std::string> subject_text(const Certificate& certificate);
 [[nodiscard]] Result<GuidPrefix> guid_prefix(const Certificate& certificate);
 
-/// The same list with one more certificate, if there is one to add; a fresh one if `known` is null.
-[[nodiscard]] Result<RevocationList> make_revocations(const RevocationList& known, const Certificate* added,
+/// The serial number, in hexadecimal digits.
+[[nodiscard]] Result<std::string> serial_text(const Certificate& certificate);
+
+/// The same list with more certificates, each once; a fresh one if `known` is null.
+[[nodiscard]] Result<RevocationList> make_revocations(const RevocationList& known,
+                                                      std::span<const Certificate> added,
                                                       const Validity& validity, const Authority& authority);
 [[nodiscard]] bool is_revoked(const Certificate& certificate, const RevocationList& revocations);
 

@@ -12,6 +12,8 @@ namespace plchost::security {
 
 /// The folder of the authorities, below the security folder.
 inline constexpr std::string_view kAuthoritiesFolder = "authorities";
+/// In it: NAME/SERIAL.pem, each certificate that was ever made.
+inline constexpr std::string_view kIssuedFolder = "issued";
 inline constexpr mode_t kPublicFile = 0644;
 inline constexpr mode_t kSecretFile = 0600;
 

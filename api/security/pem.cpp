@@ -1,10 +1,14 @@
 #include "api/security/pem.hpp"
 
 #include <cerrno>
-#include <fstream>
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <openssl/pem.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "shm/base/unique_fd.hpp"
 
 namespace plchost::security {
 
@@ -34,16 +38,26 @@ Result<std::string> write_pem(std::string_view what, Write write) {
 
 }  // namespace
 
+// What is no file, as a FIFO, could make whoever opens or reads it wait for ever.
 Result<std::string> read_file(const std::string& path) {
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) {
+  const UniqueFd file(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC | O_NOCTTY));
+  if (!file) {
     const int reason = errno;
     return failure(reason == ENOENT ? ErrorCode::not_found : ErrorCode::system, "read " + path, reason);
   }
+  struct stat status{};
+  if (::fstat(file.get(), &status) != 0) return failure(ErrorCode::system, "read " + path, errno);
+  if (!S_ISREG(status.st_mode)) return failure(ErrorCode::corrupt, path + " is no regular file");
   std::string text(kMaxSecurityFile + 1, '\0');
-  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (stream.bad()) return failure(ErrorCode::system, "read " + path, errno);
-  text.resize(static_cast<std::size_t>(stream.gcount()));
+  std::size_t size = 0;
+  while (size < text.size()) {
+    const ssize_t count = ::read(file.get(), text.data() + size, text.size() - size);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) return failure(ErrorCode::system, "read " + path, errno);
+    if (count == 0) break;
+    size += static_cast<std::size_t>(count);
+  }
+  text.resize(size);
   if (text.size() > kMaxSecurityFile) {
     return failure(ErrorCode::corrupt, fmt::format("{} is larger than {} bytes", path, kMaxSecurityFile));
   }

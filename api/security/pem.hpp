@@ -9,7 +9,8 @@ namespace plchost::security {
 /// The largest file of the security folder that is read.
 inline constexpr std::size_t kMaxSecurityFile = std::size_t{1} << 20;
 
-/// The whole file. not_found, system: it cannot be read; corrupt: larger than kMaxSecurityFile.
+/// The whole file. not_found, system: it cannot be read; corrupt: no regular file, or larger
+/// than kMaxSecurityFile.
 [[nodiscard]] Result<std::string> read_file(const std::string& path);
 
 /// What a PEM file holds. corrupt: something else, or of a key: it is encrypted.

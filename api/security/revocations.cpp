@@ -1,4 +1,6 @@
 // Lists of revoked certificates, and the check of a certificate against them: see certificates.hpp.
+#include <algorithm>
+
 #include <fmt/format.h>
 #include <openssl/err.h>
 #include <openssl/x509_vfy.h>
@@ -40,6 +42,15 @@ bool add_entry(X509_CRL* to, const X509* certificate, std::time_t now) {
   return true;
 }
 
+// Those that it has already stay as they are.
+bool add_entries(X509_CRL* to, std::span<const Certificate> certificates, std::time_t now) {
+  return std::ranges::all_of(certificates, [&](const Certificate& certificate) {
+    X509_REVOKED* known = nullptr;
+    return X509_CRL_get0_by_serial(to, &known, X509_get_serialNumber(certificate.get())) != 0 ||
+           add_entry(to, certificate.get(), now);
+  });
+}
+
 // Each list has a higher number than the one before.
 bool add_number(X509_CRL* to, X509_CRL* before) {
   long number = 1;
@@ -62,16 +73,15 @@ bool set_times(X509_CRL* list, const Validity& validity) {
 
 }  // namespace
 
-Result<RevocationList> make_revocations(const RevocationList& known, const Certificate* added,
+Result<RevocationList> make_revocations(const RevocationList& known, std::span<const Certificate> added,
                                         const Validity& validity, const Authority& authority) {
   RevocationList made(X509_CRL_new());
   constexpr long kVersion2 = 1;
   if (!made || X509_CRL_set_version(made.get(), kVersion2) != 1 ||
       X509_CRL_set_issuer_name(made.get(), X509_get_subject_name(authority.certificate.get())) != 1 ||
       !set_times(made.get(), validity) || (known && !copy_entries(known.get(), made.get())) ||
-      (added != nullptr && !add_entry(made.get(), added->get(), std::time(nullptr))) ||
-      !add_number(made.get(), known.get()) || X509_CRL_sort(made.get()) != 1 ||
-      X509_CRL_sign(made.get(), authority.key.get(), EVP_sha256()) == 0) {
+      !add_entries(made.get(), added, std::time(nullptr)) || !add_number(made.get(), known.get()) ||
+      X509_CRL_sort(made.get()) != 1 || X509_CRL_sign(made.get(), authority.key.get(), EVP_sha256()) == 0) {
     return openssl_failure("make the list of revoked certificates");
   }
   return made;

@@ -60,7 +60,7 @@ Result<void> write_authorities(const std::string& to) {
       !done) {
     return done;
   }
-  const auto revocations = make_revocations(nullptr, nullptr, validity, *identity);
+  const auto revocations = make_revocations(nullptr, {}, validity, *identity);
   if (!revocations) return std::unexpected(revocations.error());
   if (auto done = write_text(file_in(to, kRevocationsFile), to_pem(*revocations), kPublicFile); !done)
     return done;
@@ -201,11 +201,14 @@ Result<void> SecurityFolder::revoke(const std::string& name) {
   const auto known = view(name);
   if (!known) return std::unexpected(known.error());
   if (known->revoked) return failure(ErrorCode::wrong_state, fmt::format("'{}' is revoked already", name));
-  const auto certificate = read_certificate(file_in(path(name), kCertificateFile));
-  if (!certificate) return std::unexpected(certificate.error());
+  auto certificates = issued(name);
+  if (!certificates) return std::unexpected(certificates.error());
+  auto newest = read_certificate(file_in(path(name), kCertificateFile));
+  if (!newest) return std::unexpected(newest.error());
+  certificates->push_back(*std::move(newest));
   const auto revocations = read_revocations(authority_file(kRevocationsFile));
   if (!revocations) return std::unexpected(revocations.error());
-  const auto more = make_revocations(*revocations, &*certificate, validity_for(kDaysOfAuthority), identity_);
+  const auto more = make_revocations(*revocations, *certificates, validity_for(kDaysOfAuthority), identity_);
   if (!more) return std::unexpected(more.error());
   if (auto done = write_text(authority_file(kRevocationsFile), to_pem(*more), kPublicFile); !done)
     return done;

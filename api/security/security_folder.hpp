@@ -34,10 +34,12 @@ class SecurityFolder {
 
   /// A key, certificate and permissions for a name that is new, or revoked. already_exists: it is neither.
   [[nodiscard]] Result<void> add(Role role, const std::string& name, int days = kDaysOfIdentity);
-  /// The same role and name with a fresh key and certificate; the old one stays valid until it ends.
+  /// The same role and name with a fresh key and certificate; the old one stays valid until it ends, or until
+  /// the name is revoked.
   /// wrong_state: it is revoked.
   [[nodiscard]] Result<void> renew(const std::string& name, int days = kDaysOfIdentity);
-  /// The certificate is worth nothing from now on, in every folder that is brought up to date.
+  /// All certificates that were ever made for that name are worth nothing from now on, in every folder that
+  /// is brought up to date.
   [[nodiscard]] Result<void> revoke(const std::string& name);
   /// All identities, by name.
   [[nodiscard]] Result<std::vector<IdentityView>> identities() const;
@@ -58,6 +60,10 @@ class SecurityFolder {
   [[nodiscard]] Result<std::vector<std::string>> names() const;
   [[nodiscard]] Result<void> write_identity(const std::string& to, const Subject& subject,
                                             const Validity& validity) const;
+  /// So that it can be revoked when the identity has another one.
+  [[nodiscard]] Result<void> keep_issued(const std::string& name, const Certificate& certificate) const;
+  /// All that were made for that name.
+  [[nodiscard]] Result<std::vector<Certificate>> issued(const std::string& name) const;
   [[nodiscard]] Result<void> copy_common(const std::string& to) const;
   [[nodiscard]] Result<void> tell_hosts(const Subject& subject) const;
   [[nodiscard]] Result<void> know_all(const std::string& host) const;

@@ -61,10 +61,39 @@ Result<void> SecurityFolder::write_identity(const std::string& to, const Subject
   if (!text) return std::unexpected(text.error());
   const auto prefix = guid_prefix(*certificate);
   if (!prefix) return std::unexpected(prefix.error());
+  if (auto kept = keep_issued(subject.name, *certificate); !kept) return kept;
   const auto permissions = sign_document(permissions_text(subject, *text, *prefix, validity), permissions_);
   if (auto done = write_text(file_in(to, kPermissionsFile), permissions, kPublicFile); !done) return done;
   if (auto done = write_text(file_in(to, kKeyFile), to_pem(*key), kSecretFile); !done) return done;
   return write_text(file_in(to, kCertificateFile), to_pem(*certificate), kPublicFile);
+}
+
+// First of all: no certificate is anywhere that is not kept here.
+Result<void> SecurityFolder::keep_issued(const std::string& name, const Certificate& certificate) const {
+  const auto serial = serial_text(certificate);
+  if (!serial) return std::unexpected(serial.error());
+  const std::string all = authority_file(kIssuedFolder);
+  const std::string of_name = file_in(all, name);
+  for (const std::string& folder : {all, of_name}) {
+    if (auto made = make_folder(folder); !made && made.error().code != ErrorCode::already_exists) return made;
+  }
+  return write_text(file_in(of_name, *serial + ".pem"), to_pem(certificate), kPublicFile);
+}
+
+Result<std::vector<Certificate>> SecurityFolder::issued(const std::string& name) const {
+  const std::string folder = file_in(authority_file(kIssuedFolder), name);
+  std::vector<Certificate> found;
+  std::error_code error;
+  auto entry = fs::directory_iterator(folder, error);
+  if (error == std::errc::no_such_file_or_directory) return found;
+  for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
+    if (entry->path().extension() != ".pem") continue;
+    auto certificate = read_certificate(entry->path());
+    if (!certificate) return std::unexpected(certificate.error());
+    found.push_back(*std::move(certificate));
+  }
+  if (error) return failure(ErrorCode::system, "read " + folder, error.value());
+  return found;
 }
 
 Result<void> SecurityFolder::copy_common(const std::string& to) const {

@@ -95,6 +95,46 @@ TEST_F(TheSecurityFolder, ARenewedIdentityHasAFreshKeyAndTheSameGuidPrefix) {
   EXPECT_EQ(guid_prefix(read_certificate(file("anna", kCertificateFile)).value()).value(), prefix);
 }
 
+TEST_F(TheSecurityFolder, ARevokedNameTakesAllItsCertificatesWithItAlsoAfterItIsAddedAnew) {
+  add(Role::operating, "anna");
+  add(Role::operating, "otto");
+  ASSERT_TRUE(open().renew("otto"));
+  const auto keep = [&](const std::string& as) {
+    std::filesystem::copy(folder("anna"), folder(as));
+    return as;
+  };
+  std::vector<std::string> old{keep("first")};
+  ASSERT_TRUE(open().renew("anna"));
+  old.push_back(keep("second"));
+  ASSERT_TRUE(open().renew("anna"));
+  for (const std::string& each : old) EXPECT_THAT(fault(each), IsEmpty()) << "until the name is revoked";
+  ASSERT_TRUE(open().revoke("anna"));
+  ASSERT_TRUE(open().add(Role::viewer, "anna"));
+  EXPECT_THAT(fault("anna"), IsEmpty());
+  EXPECT_THAT(fault("otto"), IsEmpty());
+  for (const std::string& each : old) {
+    std::filesystem::copy_file(file("anna", kRevocationsFile), file(each, kRevocationsFile),
+                               std::filesystem::copy_options::overwrite_existing);
+    EXPECT_THAT(fault(each), HasSubstr("revoked")) << each;
+  }
+}
+
+TEST_F(TheSecurityFolder, AFileThatIsNoneMakesNobodyWait) {
+  add(Role::operating, "anna");
+  for (const std::string_view each : {kCertificateFile, kKeyFile, kRevocationsFile, kPermissionsFile}) {
+    const std::string path = file("anna", each);
+    const std::string before = contents(path);
+    std::filesystem::remove(path);
+    ASSERT_EQ(::mkfifo(path.c_str(), 0600), 0);
+    EXPECT_THAT(fault("anna"), HasSubstr("is no regular file"));
+    std::filesystem::remove(path);
+    write(path, before);
+    std::filesystem::permissions(path,
+                                 std::filesystem::perms::owner_read | std::filesystem::perms::owner_write);
+  }
+  EXPECT_THAT(fault("anna"), IsEmpty());
+}
+
 TEST_F(TheSecurityFolder, AHostBeginsTheHandshakeWithEveryClient) {
   add(Role::host, "south");
   add(Role::admin, "anna");
