@@ -1,6 +1,7 @@
 // The control socket of a real plc-instance.
 #include <csignal>
 #include <cstdlib>
+#include <utility>
 #include <vector>
 
 #include <gmock/gmock.h>
@@ -68,7 +69,7 @@ TEST_F(ControlSocket, TellsItsStatus) {
   const auto report = decode_instance_report(sut_.ask(ControlVerb::status).text);
   ASSERT_TRUE(report);
   EXPECT_EQ(report->pid, sut_.pid());
-  EXPECT_TRUE(report->running);
+  EXPECT_EQ(report->state, std::to_underlying(ApplicationState::running));
   EXPECT_EQ(report->scheduler, "CmpSchedule");
   EXPECT_THAT(report->application, HasSubstr("all_kinds.so"));
 }
