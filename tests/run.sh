@@ -68,7 +68,7 @@ configure() { # configure DIR OPTIONS...
 # Several files at a time, as most of the work is the headers of others; fewer where each of them is optimised, so that
 # the round after an edit is short.
 unity=(-DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=20)
-build_plain() { configure "$build" "${unity[@]}" -DCMAKE_UNITY_BUILD_BATCH_SIZE=10 -DCMAKE_CXX_FLAGS_RELWITHDEBINFO="-O2 -g1 -DNDEBUG" && cmake --build "$build" -j "$jobs"; }
+build_plain() { configure "$build" -DPLCHOST_TESTS=ON -DPLCHOST_PYTHON=ON "${unity[@]}" -DCMAKE_UNITY_BUILD_BATCH_SIZE=10 -DCMAKE_CXX_FLAGS_RELWITHDEBINFO="-O2 -g1 -DNDEBUG" && cmake --build "$build" -j "$jobs"; }
 # By clang, which takes half of g++'s time for it; so a second compiler has seen everything.
 build_sanitized() { # build_sanitized DIR SANITIZERS TARGET OPTIONS...
   local dir=$1 sanitizers=$2 target=$3
