@@ -15,6 +15,7 @@
 #include "manager/manager.hpp"
 #include "manager/store/store_application.hpp"
 #include "manager/store/store_process.hpp"
+#include "manager/store/wish_writer.hpp"
 #include "manager/system/child_process.hpp"
 #include "shm/base/log.hpp"
 #include "shm/base/memory_guard.hpp"
@@ -116,6 +117,7 @@ int plchostd_main(int argc, const char* const* argv) {
   // Not for people: the manager calls it.
   if (arguments.size() == 3 && std::string_view(arguments[1]) == kStoreOption)
     return store_main(arguments[2]);
+  if (arguments.size() == 2 && std::string_view(arguments[1]) == kWishWriterOption) return wish_writer_main();
   Options options;
   CLI::App app("The manager of this host's PLC runtimes.", "plchostd");
   describe(app, options);

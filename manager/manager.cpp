@@ -84,6 +84,7 @@ Manager::Manager(const ManagerConfig& config, Options options, LockFile lock,
       options_(std::move(options)),
       lock_(std::move(lock)),
       reactor_(std::move(reactor)),
+      wish_writer_(*reactor_, "/proc/self/exe"),
       api_server_(*reactor_, config, options_.programs + "/plchost-dds"),
       tick_(*reactor_, [this] { tick(); }) {}
 
@@ -113,7 +114,6 @@ Result<void> Manager::set_up() {
   if (!pool) return std::unexpected(pool.error());
   renew_pool_rights(host.pool, *rights);
   pool_ = std::move(*pool);
-  if (auto earlier = HostPageReader::open(host.pool)) earlier_page_ = std::move(*earlier);
   auto page = HostPageWriter::create(host.pool);
   if (!page) return std::unexpected(page.error());
   page_ = std::move(*page);
@@ -154,9 +154,17 @@ void Manager::make_supervisor() {
             .keep = own.application_versions,
             .helper = "/proc/self/exe",
             .plc_instance = options_.programs + "/plc-instance"});
+    auto wishes = std::make_unique<WishStore>(
+        *reactor_, wish_writer_,
+        WishStore::Settings{.pool = own.pool,
+                            .instance = instance.name,
+                            .folder = wishes_folder(own.state_directory, own.name),
+                            .run_directory = own.run_directory});
+    wishes_.push_back(wishes.get());
     return Supervisor::HostedInstance{
         .host = std::move(host),
         .applications = std::move(applications),
+        .wishes = std::move(wishes),
         .connect = [&made](InstanceEvents& events) { made.connect_events(events); }};
   };
   supervisor_ = std::make_unique<Supervisor>(
@@ -186,25 +194,10 @@ void Manager::write_host() {
   status.manager_pid = ::getpid();
   status.instance_count = static_cast<std::uint32_t>(config_.instances.size());
   status.started_unix_ns = unix_time_ns();
-  take_over_restarts();
   for (std::size_t i = 0; i < supervisor_->size(); ++i) {
     page_->write_instance(static_cast<std::uint32_t>(i), supervisor_->instance(i).status());
   }
   page_->write_host(status);
-}
-
-// The counters of restarts go on over the end of a manager, as the instances do.
-void Manager::take_over_restarts() {
-  const auto host = earlier_page_ ? earlier_page_->host() : std::nullopt;
-  if (!host) return;
-  for (std::uint32_t i = 0; i < std::min(host->instance_count, kMaxInstances); ++i) {
-    const auto earlier = earlier_page_->instance(i);
-    for (std::size_t k = 0; earlier && k < supervisor_->size(); ++k) {
-      ManagedInstance& instance = supervisor_->instance(k);
-      if (instance.config().name == earlier->name.view()) instance.set_restarts(earlier->restarts);
-    }
-  }
-  earlier_page_.reset();
 }
 
 Result<void> Manager::run() {
@@ -261,14 +254,17 @@ void Manager::shut_down() {
   // The API server last, so that it can still tell the world how the instances end.
   supervisor_->shut_down([this] {
     api_server_.shut_down([this] {
-      clean_up();
-      reactor_->stop();
+      supervisor_->when_kept([this] {
+        clean_up();
+        reactor_->stop();
+      });
     });
   });
 }
 
 void Manager::clean_up() {
   restore_latency();
+  for (WishStore* const wishes : wishes_) wishes->end();
   for (const InstanceConfig& instance : config_.instances) {
     InstancePage::remove(config_.host.pool, instance.name);
     TransitionRing::remove(config_.host.pool, instance.name);

@@ -10,6 +10,7 @@
 #include "manager/config/manager_config.hpp"
 #include "manager/control/command_server.hpp"
 #include "manager/host_check/host_check_handler.hpp"
+#include "manager/store/wish_store.hpp"
 #include "manager/supervisor/supervisor.hpp"
 #include "manager/system/lock_file.hpp"
 #include "manager/system/reactor.hpp"
@@ -40,7 +41,6 @@ class Manager {
   Manager(const ManagerConfig& config, Options options, LockFile lock, std::unique_ptr<Reactor> reactor);
   [[nodiscard]] Result<void> set_up();
   void make_supervisor();
-  void take_over_restarts();
   void write_host();
   void shut_down();
   void clean_up();
@@ -54,9 +54,10 @@ class Manager {
   LockFile lock_;
   std::unique_ptr<Reactor> reactor_;
   std::optional<ObjectPool> pool_;
-  std::optional<HostPageReader> earlier_page_;
   std::optional<HostPageWriter> page_;
   std::vector<TransitionRing> transitions_;  // in the order of the instances
+  WishWriter wish_writer_;
+  std::vector<WishStore*> wishes_;  // the supervisor's
   std::unique_ptr<Supervisor> supervisor_;
   std::unique_ptr<HostCheckHandler> host_check_;
   std::unique_ptr<CommandServer> command_server_;

@@ -25,6 +25,7 @@ void ManagedInstance::handle(const ControlRequest& request, ControlReplyFunction
   }
   spdlog::info("instance {}: {} {}", config_.name, to_string(checked.verb), checked.argument);
   operation_ = Operation{.request = std::move(checked), .reply = std::move(reply)};
+  follow_command(operation_->request.verb);
   if (loads_online()) {
     if (auto good = check_online(); !good) return finish(good.error().code, good.error().message);
   }
@@ -151,15 +152,13 @@ void ManagedInstance::on_application_checked(const Result<void>& result) {
 
 void ManagedInstance::apply_loaded_application() {
   if (loads_online()) return begin_change();
-  const bool stays_stopped =
-      phase_ == Phase::up && status_.state == InstanceState::stopped && !application_.empty();
   application_ = operation_->request.argument;
   if (phase_ == Phase::down && status_.state == InstanceState::offline) {
     publish();
     return finish(ErrorCode::ok,
                   fmt::format("'{}' has no process: remembered for its next start", config_.name));
   }
-  fresh_process(stays_stopped ? Next::stay_stopped : Next::run, StartKind::first);
+  fresh_process(wants_running_ ? Next::run : Next::stay_stopped, StartKind::first);
 }
 
 void ManagedInstance::begin_forwarded() {
@@ -191,6 +190,7 @@ void ManagedInstance::forward_or_wait() {
     finish(ErrorCode::wrong_state,
            fmt::format("'{}' is in safe mode; load an application, or reset it", config_.name));
   } else if (verb == ControlVerb::start && running) {
+    commanded_ = wants_running_ = true;
     finish(ErrorCode::ok, fmt::format("'{}' is running already", config_.name));
   } else if (verb == ControlVerb::stop && !running && status_.state != InstanceState::stopping) {
     finish(ErrorCode::ok, fmt::format("'{}' is stopped already", config_.name));
@@ -218,6 +218,7 @@ void ManagedInstance::finish_forwarded(const ControlReply& reply) {
     if (request.verb == ControlVerb::set_scheduler) scheduler_ = request.argument;
     if (loads_online()) application_ = request.argument;
     if (request.verb == ControlVerb::start || request.verb == ControlVerb::stop) {
+      commanded_ = true;
       wants_running_ = request.verb == ControlVerb::start;
       last_end_.clear();
       set_state(Phase::up, wants_running_ ? InstanceState::running : InstanceState::stopped,
@@ -237,7 +238,7 @@ void ManagedInstance::look_again() {
   settled_ = {};
   refresh();
   if (status_.state == InstanceState::stopping && !host_.runtime()) {
-    set_state(Phase::up, wants_running_ ? InstanceState::running : InstanceState::stopped, problem_when_up());
+    set_state(Phase::up, InstanceState::running, problem_when_up());
   }
 }
 
@@ -255,6 +256,8 @@ void ManagedInstance::finish(ErrorCode code, const std::string& text) {
   if (code != ErrorCode::ok) {
     spdlog::warn("instance {}: {} failed: {}", config_.name, to_string(done.request.verb), text);
   }
+  remember();
+  if (code == ErrorCode::ok) return tell_when_kept(done, text);
   done.reply(ControlReply{.number = done.request.number, .code = code, .text = text});
 }
 

@@ -40,6 +40,8 @@ ManagedInstance::ManagedInstance(const InstanceConfig& config, Surroundings surr
       application_(surroundings_.applications.boot()),
       scheduler_(config.scheduler) {
   if (application_.empty()) application_ = config.application;
+  unix_offset_ns_ = unix_time_ns() - surroundings_.now().time_since_epoch().count();
+  restore();
   status_.name.assign(config.name);
   status_.scheduler.assign(scheduler_);
   status_.application.assign(application_);
@@ -49,6 +51,16 @@ bool ManagedInstance::adopt() {
   const auto pid = host_.adopt();
   if (!pid) return false;
   status_.pid = *pid;
+  adopt_until_.reset();
+  unreadable_.clear();
+  if (earlier_ &&
+      std::exchange(earlier_->process, InstanceWish::Process::none) == InstanceWish::Process::ending) {
+    next_ = wants_running_ ? Next::run : Next::stay_stopped;
+    ending_ = Ending::asked;
+    host_.set_timer(after(kShutdownLimit));
+    set_state(Phase::ending, InstanceState::stopping, "");
+    return true;
+  }
   set_state(Phase::adopting, InstanceState::starting, "is being adopted");
   const auto number = send(ControlVerb::status);
   if (!number) {
@@ -66,7 +78,7 @@ void ManagedInstance::hold(const std::string& why) {
 }
 
 void ManagedInstance::release() {
-  if (phase_ == Phase::held) spawn(Next::run);
+  if (phase_ == Phase::held) spawn(wants_running_ ? Next::run : Next::stay_stopped);
 }
 
 void ManagedInstance::shut_down() {
@@ -108,15 +120,15 @@ void ManagedInstance::on_reply(const ControlReply& reply) {
 void ManagedInstance::come_up() {
   host_.set_timer(std::nullopt);
   up_since_ = settled_ = surroundings_.now();
+  start_kind_ = StartKind::warm;
   // An adopted one may be in its set-up still, in which it answers to nobody.
   if (phase_ == Phase::setting_up) heard_of_ = true;
   if (safe_mode_) {
     set_state(Phase::up, InstanceState::safe_mode, problem_when_up());
   } else {
-    const bool runs = wants_running_ && !application_.empty();
+    const bool runs = begins_running_ && !application_.empty();
     set_state(Phase::up, runs ? InstanceState::running : InstanceState::stopped, problem_when_up());
   }
-  start_kind_ = StartKind::warm;
   if (!operation_) return;
   if (operation_->step == Step::fresh_process) {
     finish(ErrorCode::ok, application_.empty() ? "it is up without an application: load one" : loaded_text());
@@ -149,11 +161,12 @@ void ManagedInstance::finish_adoption(const std::string& problem) {
   if (!runtime || runtime->pid != status_.pid) runtime = said_;
   const bool known = runtime.has_value();
   if (known) {
-    wants_running_ = runtime->running != 0;
+    if (!wish_known_) wants_running_ = runtime->running != 0;
     if (!runtime->scheduler.view().empty()) scheduler_ = runtime->scheduler.view();
     safe_mode_ = runtime->application.view().empty() && !application_.empty();
     if (!safe_mode_) application_ = runtime->application.view();
   }
+  begins_running_ = known ? runtime->running != 0 : wants_running_;
   come_up();
   if (known && !safe_mode_ && shown_state(*runtime) != status_.state) show_application(*runtime);
   std::string text(status_.problem.view());
@@ -200,7 +213,6 @@ void ManagedInstance::ended_by_itself(const ExitStatus& status) {
 void ManagedInstance::back_off_or_give_up(bool again, InstanceState otherwise, const std::string& why) {
   last_end_ = why;
   const bool stops = operation_ && operation_->request.verb == ControlVerb::stop;
-  if (stops) wants_running_ = false;
   // A stop that came while it was starting has its wish already.
   const bool cancelled = stops && operation_->step == Step::until_up;
   if (again && !cancelled) {
@@ -223,6 +235,7 @@ void ManagedInstance::back_off_or_give_up(bool again, InstanceState otherwise, c
 void ManagedInstance::on_timer() {
   switch (phase_) {
     case Phase::backing_off:
+      if (adopt_until_) return look_for_process();
       if (name_taken_ && adopt()) return;
       ++status_.restarts;
       return spawn(wants_running_ ? Next::run : Next::stay_stopped);
@@ -265,6 +278,9 @@ void ManagedInstance::set_up_failed(const std::string& why) {
 }
 
 void ManagedInstance::fresh_process(Next next, StartKind kind) {
+  commanded_ = wish_known_ = true;
+  unreadable_.clear();
+  if (next == Next::stay_stopped) wants_running_ = false;
   // The first process is the first one, however it was asked for.
   if (start_kind_ != StartKind::first || kind == StartKind::cold) start_kind_ = kind;
   history_.forget();
@@ -297,7 +313,8 @@ LaunchOptions ManagedInstance::launch_options(Next next) const {
 }
 
 void ManagedInstance::spawn(Next next) {
-  wants_running_ = next == Next::run;
+  wants_running_ = begins_running_ = next == Next::run;
+  wish_known_ = true;
   setup_failure_.clear();
   said_scheduler_.clear();
   name_taken_ = false;
@@ -403,6 +420,7 @@ void ManagedInstance::learn_scheduler(std::string_view name) {
 void ManagedInstance::publish() {
   status_.scheduler.assign(scheduler_.empty() ? said_scheduler_ : scheduler_);
   status_.application.assign(application_);
+  remember();
   surroundings_.changed();
 }
 

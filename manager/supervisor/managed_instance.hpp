@@ -10,6 +10,7 @@
 #include "api/control/control_handler.hpp"
 #include "manager/config/manager_config.hpp"
 #include "manager/store/application_keeper.hpp"
+#include "manager/store/wish_keeper.hpp"
 #include "manager/supervisor/heartbeat_watch.hpp"
 #include "manager/supervisor/instance_host.hpp"
 #include "manager/supervisor/restart_policy.hpp"
@@ -98,11 +99,28 @@ inline constexpr Duration kAskAgain = std::chrono::seconds(2);
 //     remembered. register_event, unregister_event   the same; registrations are repeated in each fresh
 //     process.
 // * An adopted process is no child of this manager: how it ended is unknown, and counts as a failure.
+//
+// What an instance is to be outlives the manager and the host's power (InstanceWish)
+// * Written down whenever it changes, before the command is answered. A stop, also that of a reset, is
+// written
+//   before it is carried out: whatever ends meanwhile, the machine stays stopped.
+// * The next manager, of an instance without process:
+//     failed, or without process by an operator's stop   stays so, whatever `autostart` says.
+//     its process ended while no manager ran             as a crash, by the policy; never: failed.
+//     the host ended, in order or by a power cut         starts again, running or stopped as it was to be; in
+//                safe mode, with its scheduler, with its application (the boot application, if one was
+//                chosen). Under the policy never only if `autostart` says so; else failed.
+//     never started or stopped by an operator            as `autostart` says.
+// * A configuration that names another application or another scheduler than when the wish was written takes
+//   effect, as a load or a change of the scheduler would: another application also ends safe mode and failed.
+//   It starts nothing that an operator stopped.
+// * A wish that was kept and cannot be read: failed. The machine is not started on a guess.
 class ManagedInstance : public InstanceEvents {
  public:
   struct Surroundings {
     const HostConfig& host;
     ApplicationKeeper& applications;           ///< of this instance
+    WishKeeper& wishes;                        ///< of this instance
     std::string folder;                        ///< that relative application paths start in
     std::vector<std::string_view> schedulers;  ///< names that there are
     std::function<TimePoint()> now;
@@ -119,6 +137,8 @@ class ManagedInstance : public InstanceEvents {
 
   /// First of all: takes over a process that is there. False: there is none.
   bool adopt();
+  /// There is no process to take over: goes on as an earlier manager left it, or begins.
+  void resume();
   /// Waits for what it comes after; `why` is the problem text.
   void hold(const std::string& why);
   /// What it comes after is up.
@@ -137,8 +157,6 @@ class ManagedInstance : public InstanceEvents {
     return phase_ == Phase::up && status_.state != InstanceState::safe_mode;
   }
   [[nodiscard]] bool has_process() const noexcept { return status_.pid != 0; }
-  void set_restarts(std::uint32_t restarts) { status_.restarts = restarts; }
-
   void on_report(const SetupReport& report) override;
   void on_reply(const ControlReply& reply) override;
   void on_exit(const ExitStatus& status) override;
@@ -191,6 +209,19 @@ class ManagedInstance : public InstanceEvents {
            operation_->step == Step::setting_boot;
   }
 
+  // What it is to be, over the ends of managers: instance_wishes.cpp
+  void restore();
+  void apply_configuration();
+  void remember();
+  [[nodiscard]] InstanceWish wish() const;
+  void ended_unwatched();
+  void look_for_process();
+  void follow_command(ControlVerb verb);
+  [[nodiscard]] std::int64_t unix_of(TimePoint time) const noexcept {
+    return time.time_since_epoch().count() + unix_offset_ns_;
+  }
+  void tell_when_kept(const Operation& done, const std::string& text);
+
   // A process that does not answer, or whose page is damaged: instance_watch.cpp
   [[nodiscard]] std::optional<InstanceRuntime> watch_process();
   void ask_for_status();
@@ -231,7 +262,10 @@ class ManagedInstance : public InstanceEvents {
   Next next_ = Next::nothing;                // after ending
   StartKind start_kind_ = StartKind::first;  // of the next process
   bool safe_mode_ = false;
-  bool wants_running_ = true;  // what an operator, or the start, wanted last
+  bool wants_running_ = true;   // what an operator, or the start, wanted last
+  bool begins_running_ = true;  // the process starts its application by itself
+  bool commanded_ = false;      // an operator has
+  bool wish_known_ = false;     // wants_running_ is no guess
   bool shutting_down_ = false;
   bool name_taken_ = false;  // another process of that name kept this one from being set up
   bool silent_ = false;      // its process does not beat
@@ -255,6 +289,11 @@ class ManagedInstance : public InstanceEvents {
   std::uint64_t next_number_ = 1;
   std::uint64_t awaited_number_ = 0;  // of the reply in adopting
   std::optional<Operation> operation_;
+  std::int64_t unix_offset_ns_ = 0;       // of the manager's time, taken once
+  std::optional<InstanceWish> earlier_;   // as the manager before left it
+  std::string unreadable_;                // why it is not known; empty: it is
+  std::optional<InstanceWish> kept_;      // as it was written down last
+  std::optional<TimePoint> adopt_until_;  // a process that was being set up may still come up
   InstanceStatus status_;
 };
 

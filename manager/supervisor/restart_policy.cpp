@@ -13,6 +13,16 @@ void RestartHistory::record_end(TimePoint now, Duration lasted, bool crash) {
   while (crashes_.size() > config_.crash_limit) crashes_.pop_front();
 }
 
+void RestartHistory::restore(TimePoint now, const std::vector<Duration>& ages, std::uint32_t in_a_row) {
+  in_a_row_ = in_a_row;
+  crashes_.clear();
+  for (const Duration age : ages) {
+    // A clock that was set back makes an age negative: then the crash is a young one.
+    if (age <= config_.crash_window) crashes_.push_back(now - std::max(age, Duration::zero()));
+  }
+  while (crashes_.size() > config_.crash_limit) crashes_.pop_front();
+}
+
 void RestartHistory::forget() noexcept {
   crashes_.clear();
   in_a_row_ = 0;

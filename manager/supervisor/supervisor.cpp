@@ -18,11 +18,13 @@ Supervisor::Supervisor(const ManagerConfig& config, Surroundings surroundings, c
     HostedInstance hosted = make_host(instance);
     units_[i].host = std::move(hosted.host);
     units_[i].applications = std::move(hosted.applications);
+    units_[i].wishes = std::move(hosted.wishes);
     units_[i].instance = std::make_unique<ManagedInstance>(
         instance,
         ManagedInstance::Surroundings{
             .host = config.host,
             .applications = *units_[i].applications,
+            .wishes = *units_[i].wishes,
             .folder = surroundings_.folder,
             .schedulers = surroundings_.schedulers,
             .now = surroundings_.now,
@@ -54,7 +56,7 @@ void Supervisor::start() {
   for (std::size_t i = 0; i < units_.size(); ++i) {
     ManagedInstance& instance = *units_[i].instance;
     surroundings_.publish(i, instance.status());
-    if (!adopted[i] && instance.config().autostart) instance.hold("is to be started");
+    if (!adopted[i]) instance.resume();
   }
   advance();
 }
@@ -85,6 +87,15 @@ void Supervisor::shut_down(std::function<void()> done) {
     }
   }
   advance();
+}
+
+void Supervisor::when_kept(const std::function<void()>& done) {
+  const auto left = std::make_shared<std::size_t>(units_.size() + 1);
+  const auto one_less = [left, done](const std::string& /*problem*/) {
+    if (--*left == 0) done();
+  };
+  for (Unit& unit : units_) unit.wishes->when_kept(one_less);
+  one_less("");
 }
 
 void Supervisor::refresh() {

@@ -32,6 +32,7 @@ class Supervisor : public ControlHandler {
   struct HostedInstance {
     std::unique_ptr<InstanceHost> host;
     std::unique_ptr<ApplicationKeeper> applications;
+    std::unique_ptr<WishKeeper> wishes;
     std::function<void(InstanceEvents&)> connect;
   };
   using HostFactory = std::function<HostedInstance(const InstanceConfig&)>;
@@ -39,11 +40,13 @@ class Supervisor : public ControlHandler {
   /// `config` outlives it.
   Supervisor(const ManagerConfig& config, Surroundings surroundings, const HostFactory& make_host);
 
-  /// Takes over what is there, then starts what shall start by itself, in order.
+  /// Takes over what is there, then goes on with the others as an earlier manager left them, in order.
   void start();
   void handle(const ControlRequest& request, ControlReplyFunction reply) override;
   /// Ends all instances in reverse order; calls `done` when none is left, possibly at once.
   void shut_down(std::function<void()> done);
+  /// Calls `done` when what all instances are to be is on the disk, or cannot be; possibly at once.
+  void when_kept(const std::function<void()>& done);
   /// To be called now and then: see ManagedInstance::refresh.
   void refresh();
 
@@ -54,6 +57,7 @@ class Supervisor : public ControlHandler {
   struct Unit {
     std::unique_ptr<InstanceHost> host;
     std::unique_ptr<ApplicationKeeper> applications;
+    std::unique_ptr<WishKeeper> wishes;
     std::unique_ptr<ManagedInstance> instance;
     std::vector<std::size_t> after;   // start first
     std::vector<std::size_t> before;  // end first

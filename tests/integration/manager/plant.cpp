@@ -34,10 +34,11 @@ Plant::Plant() {
 Plant::~Plant() {
   if (testing::Test::HasFailure()) fmt::print("{}\n", log());
   if (manager_.pid != 0) kill_manager();
-  end_instances();
+  kill_instances();
   for (const std::string& name : names_) {
     InstancePage::remove(pool_, name);
     TransitionRing::remove(pool_, name);
+    MemoryFile::remove(pool_ + ".wish." + name);
   }
   MemoryFile::remove(host_page_name(pool_));
   ObjectPool::remove(pool_);
@@ -47,7 +48,7 @@ Plant::~Plant() {
 }
 
 // Those that outlived their manager: found by their sockets, as a manager would.
-void Plant::end_instances() {
+void Plant::kill_instances() {
   for (const std::string& name : names_) {
     const auto link = PacketSocket::connect((folder_ / "run" / (name + ".sock")).string());
     if (!link) continue;
@@ -56,6 +57,11 @@ void Plant::end_instances() {
       wait_for_end(*process, kPatience);
     }
   }
+}
+
+void Plant::lose_memory() const {
+  std::error_code ignored;
+  for (const std::string& path : leftovers()) std::filesystem::remove_all(path, ignored);
 }
 
 std::string Plant::application(const std::string& name) {
@@ -163,7 +169,11 @@ InstanceStatus Plant::status(const std::string& instance) {
 }
 
 bool Plant::eventually(const std::function<bool()>& condition) {
-  const TimePoint end = MonotonicClock::now() + kPatience;
+  return within(kPatience, condition);
+}
+
+bool Plant::within(Duration limit, const std::function<bool()>& condition) {
+  const TimePoint end = MonotonicClock::now() + limit;
   while (!condition()) {
     if (MonotonicClock::now() > end) return false;
     std::this_thread::sleep_for(std::chrono::milliseconds(5));

@@ -39,6 +39,12 @@ class Plant {
   /// SIGTERM, and how it ended.
   ExitStatus stop_manager();
   void kill_manager();
+  /// All that are there, as the kernel does when memory is short.
+  void kill_instances();
+  /// What a power cut takes, when all processes have ended: shared memory and the run directory.
+  void lose_memory() const;
+  /// Takes back each add().
+  void clear_instances() { instances_.clear(); }
   /// A second one with the same configuration, and what it said before it ended.
   std::string start_refused_manager();
 
@@ -51,6 +57,7 @@ class Plant {
   std::uint64_t cycles(const std::string& instance);
   bool wait_for_cycles(const std::string& instance, std::uint64_t more = 5);
   static bool eventually(const std::function<bool()>& condition);
+  static bool within(Duration limit, const std::function<bool()>& condition);
   static std::string application(const std::string& name);
 
   /// Names of ours in /dev/shm and in the run directory.
@@ -61,8 +68,6 @@ class Plant {
 
  private:
   ExitStatus wait_for_end(ChildProcess& process, Duration limit);
-  void end_instances();
-
   std::filesystem::path folder_;
   std::string pool_;
   std::string host_keys_;

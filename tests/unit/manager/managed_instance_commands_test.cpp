@@ -29,7 +29,9 @@ TEST_F(ManagedInstanceTest, StopsAndStartsTheApplicationInItsProcess) {
 TEST_F(ManagedInstanceTest, AnswersAtOnceWhenThereIsNothingToDo) {
   ask(ControlVerb::stop);
   EXPECT_EQ(take_reply().text, "'line1' has no process: nothing to stop");
-  bring_up();
+  ask(ControlVerb::start);
+  report_ready();
+  take_reply();
   ask(ControlVerb::start);
   const auto reply = take_reply();
   EXPECT_EQ(reply.code, ErrorCode::ok);
@@ -45,6 +47,29 @@ TEST_F(ManagedInstanceTest, PassesOnWhatTheInstanceRefuses) {
   EXPECT_EQ(reply.code, ErrorCode::timed_out);
   EXPECT_EQ(reply.text, "task Main does not return");
   EXPECT_EQ(state(), InstanceState::running);
+}
+
+// An operator who tried to stop a machine and ends its process does not want it to start again.
+TEST_F(ManagedInstanceTest, ComesUpStoppedAfterAStopThatFailedUntilItIsStarted) {
+  bring_up();
+  ask(ControlVerb::stop);
+  answer(ErrorCode::timed_out, "task Main does not return");
+  take_reply();
+  sut().on_exit(killed_by(SIGKILL));
+  expire_timer();
+  EXPECT_TRUE(host_.spawned.back().stopped);
+}
+
+TEST_F(ManagedInstanceTest, RunsAgainAfterAStopThatFailedAndAStart) {
+  bring_up();
+  ask(ControlVerb::stop);
+  answer(ErrorCode::timed_out, "task Main does not return");
+  take_reply();
+  ask(ControlVerb::start);
+  EXPECT_EQ(take_reply().text, "'line1' is running already");
+  sut().on_exit(killed_by(SIGKILL));
+  expire_timer();
+  EXPECT_FALSE(host_.spawned.back().stopped);
 }
 
 TEST_F(ManagedInstanceTest, PassesTheResetOfStatisticsOnAndNeedsAProcessForIt) {

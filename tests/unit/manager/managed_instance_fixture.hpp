@@ -12,6 +12,7 @@
 #include "manager/supervisor/managed_instance.hpp"
 #include "tests/unit/manager/fake_host.hpp"
 #include "tests/unit/manager/fake_keeper.hpp"
+#include "tests/unit/manager/fake_wishes.hpp"
 
 namespace plchost {
 
@@ -34,6 +35,7 @@ class ManagedInstanceTest : public testing::Test {
         ManagedInstance::Surroundings{
             .host = host_config_,
             .applications = applications_,
+            .wishes = wishes_,
             .folder = "/etc/plchost",
             .schedulers = {"CmpSchedule", "CmpScheduleTimer"},
             .now = [this] { return now_; },
@@ -100,6 +102,7 @@ class ManagedInstanceTest : public testing::Test {
   HostConfig host_config_;
   FakeHost host_;
   FakeKeeper applications_;
+  FakeWishes wishes_;
   TimePoint now_{std::chrono::seconds(1000)};
   int changes_ = 0;
   std::string lost_fault_;

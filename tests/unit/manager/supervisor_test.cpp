@@ -9,6 +9,7 @@
 
 #include "tests/unit/manager/fake_host.hpp"
 #include "tests/unit/manager/fake_keeper.hpp"
+#include "tests/unit/manager/fake_wishes.hpp"
 
 namespace plchost {
 namespace {
@@ -47,6 +48,7 @@ class SupervisorTest : public testing::Test {
                    hosts_[config.name] = host.get();
                    return Supervisor::HostedInstance{.host = std::move(host),
                                                      .applications = std::make_unique<FakeKeeper>(),
+                                                     .wishes = std::make_unique<FakeWishes>(),
                                                      .connect = [](InstanceEvents&) {}};
                  });
   }

@@ -1,0 +1,104 @@
+#include "manager/store/wish_memory.hpp"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cstddef>
+#include <new>
+#include <span>
+
+#include <fmt/format.h>
+
+#include "shm/pool/fixed_page.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr PageKind kWishKind{.what = "memory of what an instance is to be",
+                             .magic = 0x68736977'6e616c70,  // "planwish"
+                             .version = 1};                 // 1: first
+
+std::string wish_memory_name(std::string_view pool, std::string_view instance) {
+  return fmt::format("{}.wish.{}", pool, instance);
+}
+
+}  // namespace
+
+struct WishMemory::Layout {
+  struct Place {
+    std::uint64_t generation = 0;  // written last
+    std::uint64_t length = 0;
+    std::array<char, kMaxWishBytes> text{};
+  };
+  std::uint64_t magic = 0;
+  std::uint32_t version = 0;
+  std::uint32_t size = 0;
+  std::array<Place, 2> places;
+
+  [[nodiscard]] static Result<void> fill(std::span<std::byte> bytes) {
+    auto* const layout = new (bytes.data()) Layout;
+    layout->version = kWishKind.version;
+    layout->size = sizeof(Layout);
+    layout->magic = kWishKind.magic;
+    return {};
+  }
+};
+
+WishMemory::Layout& WishMemory::layout() const noexcept {
+  return *reinterpret_cast<Layout*>(memory_.bytes().data());
+}
+
+Result<WishMemory> WishMemory::open(std::string_view pool, std::string_view instance) {
+  const std::string name = wish_memory_name(pool, instance);
+  auto memory = open_fixed_page<Layout>(name, kWishKind, MemoryFile::Access::read_write);
+  if (!memory && memory.error().code == ErrorCode::not_found) {
+    memory = MemoryFile::create(name, sizeof(Layout), Layout::fill);
+  } else if (!memory && memory.error().code == ErrorCode::corrupt) {
+    memory = MemoryFile::replace(name, sizeof(Layout), Layout::fill);
+  }
+  if (!memory) return std::unexpected(std::move(memory).error());
+  WishMemory opened(*std::move(memory));
+  for (const Layout::Place& place : opened.layout().places) {
+    opened.generation_ = std::max(opened.generation_, place.generation);
+  }
+  return opened;
+}
+
+void WishMemory::remove(std::string_view pool, std::string_view instance) noexcept {
+  MemoryFile::remove(wish_memory_name(pool, instance));
+}
+
+std::optional<InstanceWish> WishMemory::read() const {
+  std::optional<InstanceWish> newest;
+  std::uint64_t generation = 0;
+  for (const Layout::Place& place : layout().places) {
+    const std::uint64_t length = place.length;
+    if (place.generation <= generation || length > place.text.size()) continue;
+    // A copy: the checksum is of what is read, whoever writes to it meanwhile.
+    const std::string text(place.text.data(), length);
+    if (auto wish = decode_wish(text)) {
+      newest = *std::move(wish);
+      generation = place.generation;
+    }
+  }
+  return newest;
+}
+
+Result<void> WishMemory::write(const InstanceWish& wish) {
+  const std::string text = encode(wish);
+  if (text.size() > kMaxWishBytes) {
+    return failure(ErrorCode::full, fmt::format("{} bytes; {} have room", text.size(), kMaxWishBytes));
+  }
+  ++generation_;
+  Layout::Place& place = layout().places[generation_ % 2];
+  place.generation = 0;
+  std::atomic_signal_fence(std::memory_order_seq_cst);  // a kill sees the order of the program
+  place.length = text.size();
+  std::ranges::copy(text, place.text.begin());
+  std::atomic_signal_fence(std::memory_order_seq_cst);
+  place.generation = generation_;
+  return {};
+}
+
+}  // namespace plchost

@@ -1,0 +1,182 @@
+#include "manager/store/wish_store.hpp"
+
+#include <cerrno>
+#include <filesystem>
+#include <utility>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "instances/launch/launch_contract.hpp"
+#include "shm/base/log.hpp"
+#include "shm/base/replace_file.hpp"
+#include "shm/base/system_call.hpp"
+#include "shm/base/unique_fd.hpp"
+
+namespace plchost {
+
+namespace {
+
+// not_found: there is none, or no folder of ours. refused: it is another user's.
+Result<std::string> read_wish_file(const std::string& path, std::size_t most) {
+  const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
+  if (!fd) {
+    const int error = errno;
+    const std::string folder = std::filesystem::path(path).parent_path();
+    // A folder that this user may not even look into was never one of his manager's.
+    const bool none =
+        error == ENOENT || error == ENOTDIR || (error == EACCES && ::access(folder.c_str(), X_OK) != 0);
+    return failure(none ? ErrorCode::not_found : ErrorCode::system, "open " + path, error);
+  }
+  struct stat status{};
+  if (auto known = check_errno(::fstat(fd.get(), &status), "look at " + path); !known) {
+    return std::unexpected(known.error());
+  }
+  if (!S_ISREG(status.st_mode) || (status.st_uid != ::geteuid() && status.st_uid != 0)) {
+    return failure(ErrorCode::refused,
+                   fmt::format("{} is no file of this user, but of user {}", path, status.st_uid));
+  }
+  std::string text(most + 1, '\0');
+  const auto got = check_errno(::read(fd.get(), text.data(), text.size()), "read " + path);
+  if (!got) return std::unexpected(got.error());
+  text.resize(static_cast<std::size_t>(*got));
+  return text;
+}
+
+std::string registered_events_path(const std::string& run_directory, const std::string& instance) {
+  return fmt::format("{}/{}.events", run_directory, instance);
+}
+
+}  // namespace
+
+std::string wishes_folder(std::string_view state_directory, std::string_view host) {
+  return fmt::format("{}/wishes.{}", state_directory, host);
+}
+
+WishStore::WishStore(Reactor& reactor, WishWriter& writer, Settings settings)
+    : writer_(writer),
+      settings_(std::move(settings)),
+      limit_(reactor,
+             [this] {
+               tell(fmt::format("the disk has not taken it within {} s",
+                                std::chrono::duration_cast<std::chrono::seconds>(kWishLimit).count()));
+             }),
+      retry_(reactor, [this] { write(); }) {}
+
+Result<std::optional<InstanceWish>> WishStore::find() {
+  auto memory = WishMemory::open(settings_.pool, settings_.instance);
+  if (memory) {
+    memory_ = *std::move(memory);
+  } else {
+    spdlog::error("instance {}: what it is to be is not kept for the next manager: {}", settings_.instance,
+                  memory.error().describe());
+  }
+  auto file = read_wish_file(path(), kMaxWishBytes);
+  if (file) wanted_ = written_ = *file;
+  if (auto remembered = memory_ ? memory_->read() : std::nullopt) {
+    if (remembered->host_ended) restore_events();
+    return remembered;
+  }
+  if (!file && file.error().code == ErrorCode::not_found) return std::nullopt;
+  auto wish = file ? decode_wish(*file) : Result<InstanceWish>(std::unexpected(file.error()));
+  if (!wish) {
+    return failure(ErrorCode::corrupt, fmt::format("{}: {}", path(), wish.error().describe()));
+  }
+  restore_events();
+  return wish->after_power_cut();
+}
+
+// What instances read is in the run directory, which a power cut empties.
+void WishStore::restore_events() const {
+  constexpr std::size_t kMostBytes = std::size_t{1} << 18;  // 4096 names
+  const std::string registered = registered_events_path(settings_.run_directory, settings_.instance);
+  std::error_code error;
+  if (std::filesystem::exists(registered, error)) return;
+  const auto kept = read_wish_file(events_path(), kMostBytes);
+  if (!kept && kept.error().code == ErrorCode::not_found) return;
+  const auto restored = kept ? replace_file(registered, *kept) : std::unexpected(kept.error());
+  if (!restored) {
+    spdlog::error("instance {}: the events that operators registered are not restored: {}",
+                  settings_.instance, restored.error().describe());
+  }
+}
+
+void WishStore::keep(const InstanceWish& wish) {
+  const auto remembered = memory_ ? memory_->write(wish) : Result<void>();
+  if (!remembered) {
+    spdlog::error("instance {}: what it is to be is not kept for the next manager: {}", settings_.instance,
+                  remembered.error().describe());
+  }
+  std::string text = encode(wish.after_power_cut());
+  if (text == wanted_ || text.size() > kMaxWishBytes) return;
+  wanted_ = std::move(text);
+  write();
+}
+
+void WishStore::keep_events() {
+  events_wanted_ = true;
+  write();
+}
+
+void WishStore::when_kept(Kept kept) {
+  if (on_disk()) return kept("");
+  waiting_.push_back(std::move(kept));
+  limit_.set(MonotonicClock::now() + kWishLimit);
+  write();
+}
+
+void WishStore::write() {
+  if (writing_ || on_disk()) return;
+  const bool events = wanted_ == written_;
+  const WishOrder order =
+      events ? WishOrder{.path = events_path(),
+                         .text = {},
+                         .from = registered_events_path(settings_.run_directory, settings_.instance)}
+             : WishOrder{.path = path(), .text = wanted_, .from = {}};
+  if (events) events_wanted_ = false;
+  writing_ = true;
+  const auto begun = writer_.write(order, [this, events, text = order.text](const Result<void>& result) {
+    if (events && !result) events_wanted_ = true;
+    written(result, events ? written_ : text);
+  });
+  if (begun) return;
+  writing_ = false;
+  events_wanted_ = events_wanted_ || events;
+  fail(begun.error().describe());
+}
+
+void WishStore::written(const Result<void>& result, const std::string& text) {
+  writing_ = false;
+  if (!result) return fail(result.error().describe());
+  written_ = text;
+  if (!on_disk()) return write();
+  if (!problem_.empty()) {
+    spdlog::info("instance {}: what it is to be is on the disk again", settings_.instance);
+    problem_.clear();
+  }
+  retry_.cancel();
+  tell("");
+}
+
+void WishStore::fail(const std::string& problem) {
+  if (problem != problem_) {
+    spdlog::error("instance {}: a power cut would undo what operators asked for: {}", settings_.instance,
+                  problem);
+    problem_ = problem;
+  }
+  retry_.set(MonotonicClock::now() + kWishRetry);
+  tell(problem);
+}
+
+void WishStore::tell(const std::string& problem) {
+  limit_.cancel();
+  for (const Kept& kept : std::exchange(waiting_, {})) kept(problem);
+}
+
+void WishStore::end() noexcept {
+  if (on_disk()) WishMemory::remove(settings_.pool, settings_.instance);
+}
+
+}  // namespace plchost

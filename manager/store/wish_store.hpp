@@ -1,0 +1,67 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "manager/store/wish_keeper.hpp"
+#include "manager/store/wish_memory.hpp"
+#include "manager/store/wish_writer.hpp"
+#include "manager/system/reactor.hpp"
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+/// How long an operator's command waits for the disk before it is answered without.
+inline constexpr Duration kWishLimit = std::chrono::seconds(2);
+/// What could not be written is tried again after so long.
+inline constexpr Duration kWishRetry = std::chrono::seconds(10);
+
+/// The folder of the files: "STATE_DIRECTORY/wishes.HOST".
+[[nodiscard]] std::string wishes_folder(std::string_view state_directory, std::string_view host);
+
+/// The real WishKeeper: a WishMemory, and the files INSTANCE and INSTANCE.events of wishes_folder(). Only
+/// what a power cut leaves of a wish goes to the disk, and only if it is another than before.
+class WishStore : public WishKeeper {
+ public:
+  struct Settings {
+    std::string pool;
+    std::string instance;
+    std::string folder;         ///< see wishes_folder()
+    std::string run_directory;  ///< where instances keep what operators registered
+  };
+
+  /// `writer` outlives it.
+  WishStore(Reactor& reactor, WishWriter& writer, Settings settings);
+
+  [[nodiscard]] Result<std::optional<InstanceWish>> find() override;
+  void keep(const InstanceWish& wish) override;
+  void keep_events() override;
+  void when_kept(Kept kept) override;
+  /// The end of the manager in order: nothing stays in memory that is on the disk.
+  void end() noexcept;
+
+ private:
+  [[nodiscard]] bool on_disk() const { return wanted_ == written_ && !events_wanted_ && !writing_; }
+  [[nodiscard]] std::string path() const { return settings_.folder + "/" + settings_.instance; }
+  [[nodiscard]] std::string events_path() const { return path() + ".events"; }
+  void restore_events() const;
+  void write();
+  void written(const Result<void>& result, const std::string& text);
+  void fail(const std::string& problem);
+  void tell(const std::string& problem);
+
+  WishWriter& writer_;
+  Settings settings_;
+  Reactor::Timer limit_;
+  Reactor::Timer retry_;
+  std::optional<WishMemory> memory_;
+  std::string wanted_;   // on the disk
+  std::string written_;  // there
+  bool events_wanted_ = false;
+  bool writing_ = false;
+  std::string problem_;  // as it was logged last; empty: none
+  std::vector<Kept> waiting_;
+};
+
+}  // namespace plchost

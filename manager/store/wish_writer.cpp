@@ -1,0 +1,157 @@
+#include "manager/store/wish_writer.hpp"
+
+#include <array>
+#include <charconv>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <utility>
+#include <vector>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/epoll.h>
+
+#include "shm/base/replace_file.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr char kBetween = '\0';  // no path has it
+constexpr mode_t kWishMode = 0600;
+
+std::uint64_t number_of(std::string_view text) {
+  std::uint64_t number = 0;
+  (void)std::from_chars(text.data(), text.data() + text.size(), number);
+  return number;
+}
+
+// The first three parts, and the rest.
+std::array<std::string, 4> parts_of(std::string_view packet) {
+  std::array<std::string, 4> parts;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const std::size_t end = i + 1 < parts.size() ? packet.find(kBetween) : std::string_view::npos;
+    parts[i] = packet.substr(0, end);
+    packet.remove_prefix(end == std::string_view::npos ? packet.size() : end + 1);
+  }
+  return parts;
+}
+
+Result<void> make_wish_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  if (std::filesystem::is_directory(folder, error)) return {};
+  std::filesystem::create_directories(folder, error);
+  if (error) return failure(ErrorCode::system, "make folder " + folder.string(), error.value());
+  std::filesystem::permissions(folder, std::filesystem::perms::owner_all, error);
+  if (error) return failure(ErrorCode::system, "set the rights of " + folder.string(), error.value());
+  return sync_directory(folder.parent_path());
+}
+
+Result<void> carry_out_order(const WishOrder& order) {
+  const std::filesystem::path path(order.path);
+  if (auto made = make_wish_folder(path.parent_path()); !made) return made;
+  std::error_code error;
+  if (!order.from.empty() && !std::filesystem::exists(order.from, error)) {
+    std::filesystem::remove(path, error);
+    if (error) return failure(ErrorCode::system, "remove " + order.path, error.value());
+    return sync_directory(path.parent_path());
+  }
+  std::string text = order.text;
+  if (!order.from.empty()) {
+    std::ostringstream copy;
+    copy << std::ifstream(order.from).rdbuf();
+    text = std::move(copy).str();
+  }
+  if (auto written = replace_file(order.path, text, kWishMode); !written) return written;
+  return sync_directory(path.parent_path());
+}
+
+}  // namespace
+
+Result<void> WishWriter::write(const WishOrder& order, Done done) {
+  if (!link_) {
+    if (auto started = start(); !started) return started;
+  }
+  const std::uint64_t number = ++last_number_;
+  if (auto sent = link_.send(fmt::format("{}{}{}{}{}{}{}", number, kBetween, order.path, kBetween, order.from,
+                                         kBetween, order.text));
+      !sent) {
+    return sent;
+  }
+  waiting_.emplace(number, std::move(done));
+  return {};
+}
+
+Result<void> WishWriter::start() {
+  if (process_) return failure(ErrorCode::busy, "the helper that writes to the disk is ending");
+  auto channel = make_report_channel();
+  if (!channel) return std::unexpected(channel.error());
+  auto process =
+      spawn_process({.arguments = {helper_, kWishWriterOption}, .report_fd = channel->childs.get()});
+  if (!process) return std::unexpected(process.error());
+  auto exit_watch = reactor_.watch(process->pidfd.get(), EPOLLIN, [this](std::uint32_t) { ended(); });
+  auto link_watch = reactor_.watch(channel->ours.fd(), EPOLLIN, [this](std::uint32_t) { read_answers(); });
+  if (!exit_watch || !link_watch) {
+    (void)signal_process(*process, SIGKILL);
+    return std::unexpected(exit_watch ? link_watch.error() : exit_watch.error());
+  }
+  process_ = std::move(*process);
+  exit_watch_ = std::move(*exit_watch);
+  link_ = std::move(channel->ours);
+  link_watch_ = std::move(*link_watch);
+  return {};
+}
+
+void WishWriter::read_answers() {
+  for (;;) {
+    auto packet = link_ ? link_.receive() : Result<std::optional<std::string>>(std::nullopt);
+    if (!packet) {
+      link_watch_.reset();
+      link_.close();
+      return;
+    }
+    if (!*packet) return;
+    const std::size_t end = (*packet)->find(' ');
+    const auto found = waiting_.find(number_of((*packet)->substr(0, end)));
+    if (found == waiting_.end()) continue;
+    const Done done = std::move(found->second);
+    waiting_.erase(found);
+    const std::string problem = end == std::string::npos ? std::string() : (*packet)->substr(end + 1);
+    done(problem.empty() ? Result<void>() : failure(ErrorCode::system, problem));
+  }
+}
+
+void WishWriter::ended() {
+  read_answers();
+  const ExitStatus status = reap_process(*process_);
+  exit_watch_.reset();
+  link_watch_.reset();
+  link_.close();
+  process_.reset();
+  for (const auto& [number, done] : std::exchange(waiting_, {})) {
+    done(failure(ErrorCode::unavailable, "the helper that writes to the disk: " + status.describe()));
+  }
+}
+
+int wish_writer_main() {
+  PacketSocket link{UniqueFd(kChildReportFd)};
+  (void)::fcntl(kChildReportFd, F_SETFL, O_NONBLOCK);
+  for (;;) {
+    pollfd ready{.fd = kChildReportFd, .events = POLLIN, .revents = 0};
+    (void)::poll(&ready, 1, -1);
+    const auto packet = link.receive();
+    if (!packet) return 0;
+    if (!*packet) continue;
+    const auto [number, path, from, text] = parts_of(**packet);
+    const auto done = carry_out_order({.path = path, .text = text, .from = from});
+    constexpr std::size_t kMost = 1000;
+    if (!link.send(done ? number : fmt::format("{} {}", number, done.error().describe().substr(0, kMost)))) {
+      return 0;
+    }
+  }
+}
+
+}  // namespace plchost

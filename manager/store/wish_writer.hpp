@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "manager/system/child_process.hpp"
+#include "manager/system/reactor.hpp"
+#include "shm/base/packet_socket.hpp"
+#include "shm/base/result.hpp"
+
+namespace plchost {
+
+/// One file to be written as a whole, for good.
+struct WishOrder {
+  std::string path;  ///< its folder is made if it is missing
+  std::string text;  ///< what it is to hold
+  std::string from;  ///< not empty: it is to be a copy of this file instead, and is removed if there is none
+};
+
+/// Writes small files from a helper process, because a disk may keep a writer waiting for minutes and the
+/// manager must not wait. The helper starts with the first order and ends with the manager.
+class WishWriter {
+ public:
+  using Done = std::function<void(const Result<void>& written)>;
+
+  /// `helper`: path of plchostd.
+  WishWriter(Reactor& reactor, std::string helper) : reactor_(reactor), helper_(std::move(helper)) {}
+
+  /// `done` is called later, once; not if this returns an error.
+  [[nodiscard]] Result<void> write(const WishOrder& order, Done done);
+
+ private:
+  [[nodiscard]] Result<void> start();
+  void read_answers();
+  void ended();
+
+  Reactor& reactor_;
+  std::string helper_;
+  std::optional<ChildProcess> process_;
+  Reactor::Watch exit_watch_;
+  PacketSocket link_;
+  Reactor::Watch link_watch_;
+  std::uint64_t last_number_ = 0;
+  std::map<std::uint64_t, Done> waiting_;
+};
+
+/// The command line that makes plchostd the helper.
+inline constexpr const char* kWishWriterOption = "--write-wishes";
+
+/// main() of the helper: takes orders from kChildReportFd until the manager is gone.
+[[nodiscard]] int wish_writer_main();
+
+}  // namespace plchost

@@ -1,0 +1,164 @@
+// What a ManagedInstance is to be, beyond the end of the manager: see the rules in managed_instance.hpp.
+
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "manager/supervisor/managed_instance.hpp"
+#include "shm/base/log.hpp"
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+void ManagedInstance::restore() {
+  auto found = surroundings_.wishes.find();
+  if (!found) {
+    unreadable_ = found.error().describe();
+    spdlog::error("instance {}: what it is to be is not known, so it is not started: {}", config_.name,
+                  unreadable_);
+    return;
+  }
+  earlier_ = *std::move(found);
+  if (!earlier_) return;
+  wish_known_ = true;
+  const InstanceWish& earlier = *earlier_;
+  commanded_ = earlier.commanded;
+  wants_running_ = earlier.commanded ? earlier.running : true;
+  safe_mode_ = earlier.safe_mode;
+  if (!earlier.host_ended || earlier.safe_mode) last_end_ = earlier.last_end;
+  status_.restarts = earlier.restarts;
+  // What begins with the host begins for the first time; but a cold start that was asked for and never came
+  // about is still due.
+  const bool begins = earlier.host_ended && earlier.start_kind != StartKind::cold;
+  start_kind_ = begins ? StartKind::first : earlier.start_kind;
+  std::vector<Duration> ages;
+  for (const std::int64_t crash : earlier.crashes_unix_ns) {
+    ages.emplace_back(unix_of(surroundings_.now()) - crash);
+  }
+  history_.restore(surroundings_.now(), ages, earlier.ends_in_a_row);
+  apply_configuration();
+}
+
+// A configuration that was changed meanwhile is younger than the commands before.
+void ManagedInstance::apply_configuration() {
+  if (earlier_->configured_scheduler == config_.scheduler) {
+    scheduler_ = earlier_->scheduler;
+  } else {
+    spdlog::info("instance {}: the configuration names another scheduler now; it takes the place of '{}'",
+                 config_.name, earlier_->scheduler);
+  }
+  if (earlier_->configured_application == config_.application) {
+    const bool boots = earlier_->host_ended && !surroundings_.applications.boot().empty();
+    if (!boots) application_ = earlier_->application;
+    return;
+  }
+  spdlog::info("instance {}: the configuration names another application now; it takes the place of '{}'",
+               config_.name, earlier_->application);
+  earlier_->failed = false;
+  safe_mode_ = false;
+  last_end_.clear();
+  history_.forget();
+}
+
+void ManagedInstance::resume() {
+  if (!unreadable_.empty()) {
+    return go_down(InstanceState::failed,
+                   fmt::format("what it is to be is not known: {}; start it or stop it", unreadable_));
+  }
+  if (!earlier_) {
+    if (config_.autostart) hold("is to be started");
+    return;
+  }
+  if (earlier_->failed) return go_down(InstanceState::failed, earlier_->problem);
+  if (commanded_ ? earlier_->offline : !config_.autostart) return go_down(InstanceState::offline, last_end_);
+  const auto process = std::exchange(earlier_->process, InstanceWish::Process::none);
+  if (!earlier_->host_ended && process == InstanceWish::Process::up) return ended_unwatched();
+  const bool never = config_.restart == RestartPolicy::never;
+  if (never && !earlier_->host_ended && process == InstanceWish::Process::setting_up) {
+    adopt_until_ = after(kSetupLimit);
+    set_state(Phase::backing_off, InstanceState::waiting, "was being set up when its manager ended");
+    return host_.set_timer(after(config_.restart_delay));
+  }
+  if (never && earlier_->host_ended && !config_.autostart) {
+    return go_down(InstanceState::failed, "ended with the host, and its policy is never to start it again");
+  }
+  hold("is to be started");
+}
+
+void ManagedInstance::ended_unwatched() {
+  start_kind_ = StartKind::after_fault;
+  history_.record_end(surroundings_.now(), Duration::zero(), true);
+  const bool again = config_.restart != RestartPolicy::never;
+  if (again && history_.too_many_crashes()) safe_mode_ = true;
+  back_off_or_give_up(again, InstanceState::failed, "ended while no manager ran");
+}
+
+// Its policy is never to start it again, so a process that is still being set up is waited for instead.
+void ManagedInstance::look_for_process() {
+  if (adopt()) return;
+  if (surroundings_.now() < *adopt_until_) return host_.set_timer(after(config_.restart_delay));
+  adopt_until_.reset();
+  ended_unwatched();
+}
+
+// What an operator's stop says holds from here on, whatever becomes of the process meanwhile.
+void ManagedInstance::follow_command(ControlVerb verb) {
+  if (verb == ControlVerb::stop) {
+    commanded_ = true;
+    wants_running_ = false;
+  }
+  if (verb == ControlVerb::stop) unreadable_.clear();
+  remember();
+}
+
+InstanceWish ManagedInstance::wish() const {
+  InstanceWish wish;
+  wish.commanded = commanded_;
+  wish.running = wants_running_;
+  wish.failed = phase_ == Phase::down && status_.state == InstanceState::failed;
+  wish.offline = phase_ == Phase::down && !wish.failed;
+  if (wish.failed) wish.problem = status_.problem.view();
+  wish.last_end = last_end_.substr(0, kMaxWishText);
+  wish.application = application_;
+  wish.scheduler = scheduler_;
+  wish.configured_application = config_.application;
+  wish.configured_scheduler = config_.scheduler;
+  wish.safe_mode = safe_mode_;
+  wish.start_kind = start_kind_;
+  wish.restarts = status_.restarts;
+  wish.ends_in_a_row = history_.in_a_row();
+  for (const TimePoint crash : history_.crashes()) wish.crashes_unix_ns.push_back(unix_of(crash));
+  if (status_.pid == 0) return wish;
+  wish.process = phase_ == Phase::setting_up ? InstanceWish::Process::setting_up
+                 : phase_ == Phase::ending   ? InstanceWish::Process::ending
+                                             : InstanceWish::Process::up;
+  return wish;
+}
+
+void ManagedInstance::remember() {
+  if (!unreadable_.empty()) return;  // it stays as it is until an operator says what is to be
+  InstanceWish now = wish();
+  if (shutting_down_) {  // in order: that all processes end is nobody's wish
+    if (!kept_) return;
+    now = *kept_;
+    now.host_ended = true;
+    if (status_.pid == 0) now.process = InstanceWish::Process::none;
+  }
+  if (kept_ && now == *kept_) return;
+  kept_ = now;
+  surroundings_.wishes.keep(now);
+}
+
+void ManagedInstance::tell_when_kept(const Operation& done, const std::string& text) {
+  const bool events =
+      done.request.verb == ControlVerb::register_event || done.request.verb == ControlVerb::unregister_event;
+  if (events) surroundings_.wishes.keep_events();
+  surroundings_.wishes.when_kept(
+      [reply = done.reply, number = done.request.number, text](const std::string& problem) {
+        const std::string undone = fmt::format("a power cut would undo it: {}", problem);
+        const std::string all = text.empty() ? undone : fmt::format("{}; {}", text, undone);
+        reply(ControlReply{.number = number, .code = ErrorCode::ok, .text = problem.empty() ? text : all});
+      });
+}
+
+}  // namespace plchost

@@ -1,0 +1,137 @@
+// A stopped machine does not start: over the end of the manager, of the instance and of the host's power.
+
+#include <string>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+
+#include "tests/integration/manager/plant.hpp"
+
+namespace plchost {
+namespace {
+
+using testing::HasSubstr;
+
+enum class End : bool { processes, power };
+
+class Wishes : public testing::TestWithParam<End> {
+ protected:
+  /// Ends the manager, and then the instances, which nobody sees.
+  void end_all() {
+    plant_.kill_manager();
+    plant_.kill_instances();
+    if (GetParam() == End::power) plant_.lose_memory();
+  }
+  void next_manager() {
+    end_all();
+    plant_.start_manager();
+  }
+  void start(const std::string& keys = "") {
+    plant_.add("line1", "bottling_line", keys);
+    plant_.start_manager();
+    ASSERT_TRUE(plant_.wait_for("line1", InstanceState::running));
+  }
+  /// Long enough for a start that nobody asked for.
+  void stays(InstanceState state) {
+    ASSERT_TRUE(plant_.wait_for("line1", state));
+    EXPECT_FALSE(Plant::within(std::chrono::seconds(1), [&] {
+      return plant_.status("line1").state != state;
+    })) << to_string(plant_.status("line1").state);
+  }
+
+  Plant plant_;
+};
+
+TEST_P(Wishes, RunsAgain) {
+  start();
+  next_manager();
+  ASSERT_TRUE(plant_.wait_for("line1", InstanceState::running));
+  EXPECT_TRUE(plant_.wait_for_cycles("line1"));
+}
+
+TEST_P(Wishes, StaysStopped) {
+  start();
+  ASSERT_EQ(plant_.ask(ControlVerb::stop, "line1").code, ErrorCode::ok);
+  next_manager();
+  stays(InstanceState::stopped);
+  ASSERT_EQ(plant_.ask(ControlVerb::start, "line1").code, ErrorCode::ok);
+  EXPECT_TRUE(plant_.wait_for_cycles("line1"));
+}
+
+TEST_P(Wishes, StaysFailed) {
+  start("restart = \"never\"");
+  plant_.kill_instances();
+  ASSERT_TRUE(plant_.wait_for("line1", InstanceState::failed));
+  next_manager();
+  stays(InstanceState::failed);
+}
+
+TEST_P(Wishes, IsNotStartedAgainUnderThePolicyNever) {
+  start("restart = \"never\"\nautostart = true");
+  next_manager();
+  if (GetParam() == End::power) {  // as a host that is switched on does
+    ASSERT_TRUE(plant_.wait_for("line1", InstanceState::running));
+  } else {
+    stays(InstanceState::failed);
+  }
+}
+
+TEST_P(Wishes, StaysInSafeMode) {
+  start("crash_limit = 1\nrestart_delay_ms = 10");
+  plant_.kill_instances();
+  ASSERT_TRUE(plant_.wait_for("line1", InstanceState::safe_mode));
+  next_manager();
+  stays(InstanceState::safe_mode);
+}
+
+TEST_P(Wishes, KeepsSchedulerApplicationAndEvents) {
+  start();
+  ASSERT_EQ(plant_.ask(ControlVerb::set_scheduler, "line1", "CmpScheduleTimer").code, ErrorCode::ok);
+  const std::string axis = Plant::application("drive_axis");
+  ASSERT_EQ(plant_.ask(ControlVerb::load_application, "line1", axis).code, ErrorCode::ok);
+  ASSERT_EQ(plant_.ask(ControlVerb::register_event, "line1", "door").code, ErrorCode::ok);
+  next_manager();
+  ASSERT_TRUE(plant_.wait_for("line1", InstanceState::running));
+  EXPECT_EQ(plant_.status("line1").scheduler.view(), "CmpScheduleTimer");
+  EXPECT_EQ(plant_.status("line1").application.view(), axis);
+  EXPECT_EQ(plant_.lines_of("run/line1.events"), std::vector<std::string>{"door"});
+}
+
+TEST_P(Wishes, KeepsItsRestarts) {
+  start();
+  plant_.kill_instances();
+  ASSERT_TRUE(Plant::eventually([&] { return plant_.status("line1").restarts == 1; }));
+  ASSERT_TRUE(plant_.wait_for("line1", InstanceState::running));
+  // The disk has it when a command is answered.
+  ASSERT_EQ(plant_.ask(ControlVerb::reset_statistics, "line1").code, ErrorCode::ok);
+  next_manager();
+  ASSERT_TRUE(plant_.wait_for("line1", InstanceState::running));
+  EXPECT_EQ(plant_.status("line1").restarts, GetParam() == End::power ? 1U : 2U);
+}
+
+TEST_P(Wishes, AreOlderThanAChangedConfiguration) {
+  start();
+  ASSERT_EQ(plant_.ask(ControlVerb::stop, "line1").code, ErrorCode::ok);
+  end_all();
+  plant_.clear_instances();
+  plant_.add("line1", "drive_axis");
+  plant_.start_manager();
+  stays(InstanceState::stopped);
+  EXPECT_EQ(plant_.status("line1").application.view(), Plant::application("drive_axis"));
+}
+
+TEST_P(Wishes, DoNotEndWithTheManagerInOrder) {
+  start();
+  ASSERT_EQ(plant_.ask(ControlVerb::stop, "line1").code, ErrorCode::ok);
+  EXPECT_EQ(plant_.stop_manager().describe(), "exit code 0");
+  if (GetParam() == End::power) plant_.lose_memory();
+  plant_.start_manager();
+  stays(InstanceState::stopped);
+}
+
+INSTANTIATE_TEST_SUITE_P(Ends, Wishes, testing::Values(End::processes, End::power), [](const auto& end) {
+  return end.param == End::power ? "PowerCut" : "ProcessesKilled";
+});
+
+}  // namespace
+}  // namespace plchost

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "manager/store/wish_keeper.hpp"
+
+namespace plchost {
+
+/// What one instance is to be, in the hands of a test: it outlives the instance, as a manager's memory does.
+class FakeWishes : public WishKeeper {
+ public:
+  [[nodiscard]] Result<std::optional<InstanceWish>> find() override {
+    if (damaged) return failure(ErrorCode::corrupt, "/state/line1: its checksum does not fit its contents");
+    return wish;
+  }
+  void keep(const InstanceWish& now) override {
+    wish = now;
+    ++writes;
+  }
+  void keep_events() override { ++kept_events; }
+  void when_kept(Kept kept) override {
+    if (disk_is_slow) {
+      waiting.push_back(std::move(kept));
+    } else {
+      kept(problem);
+    }
+  }
+
+  std::optional<InstanceWish> wish;
+  bool damaged = false;
+  bool disk_is_slow = false;
+  std::string problem;
+  std::vector<Kept> waiting;
+  int writes = 0;
+  int kept_events = 0;
+};
+
+}  // namespace plchost
