@@ -96,8 +96,10 @@ std::string instance_socket_path(std::string_view run_directory, std::string_vie
 }
 
 std::string encode(const SetupReport& report) {
-  const Json json{
-      {"step", to_string(report.step)}, {"code", static_cast<unsigned>(report.code)}, {"text", report.text}};
+  const Json json{{"step", to_string(report.step)},
+                  {"code", static_cast<unsigned>(report.code)},
+                  {"text", report.text},
+                  {"transient", report.transient}};
   // Bytes that are not UTF-8 (a hostile file name in an error text) are replaced, never thrown about.
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
@@ -113,9 +115,14 @@ Result<SetupReport> decode_report(std::string_view packet) {
   if (code == json.end() || !code->is_number_unsigned() || code->get<std::uint64_t>() > kLastCode) {
     return failure(ErrorCode::corrupt, "set-up report has no valid 'code'");
   }
+  const auto transient = json.find("transient");
+  if (transient == json.end() || !transient->is_boolean()) {
+    return failure(ErrorCode::corrupt, "set-up report has no valid 'transient'");
+  }
   for (const auto& [known, name] : kSteps) {
     if (name == *step) {
-      return SetupReport{known, static_cast<ErrorCode>(code->get<unsigned>()), *std::move(text)};
+      return SetupReport{known, static_cast<ErrorCode>(code->get<unsigned>()), *std::move(text),
+                         transient->get<bool>()};
     }
   }
   return failure(ErrorCode::corrupt, fmt::format("set-up report has the unknown step '{}'", *step));

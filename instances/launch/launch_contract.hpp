@@ -75,6 +75,7 @@ struct SetupReport {
   SetupStep step = SetupStep::bind_core;
   ErrorCode code = ErrorCode::ok;
   std::string text;
+  bool transient = false;  ///< of a failed one: see is_transient()
 };
 [[nodiscard]] std::string encode(const SetupReport& report);
 [[nodiscard]] Result<SetupReport> decode_report(std::string_view packet);

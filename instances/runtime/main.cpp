@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 #include <poll.h>
+#include <sys/prctl.h>
 #include <sys/signalfd.h>
 #include <sys/timerfd.h>
 #include <unistd.h>
@@ -98,6 +99,9 @@ int run(const Options& options) {
     return kExitSetupFailed;
   }
   if (!options.check_application.empty()) {
+    // SIGTERM and not SIGKILL: what the application has forked ends, too.
+    if (options.parent != 0) ::prctl(PR_SET_PDEATHSIG, SIGTERM);
+    if (options.parent != 0 && ::getppid() != options.parent) return kExitSetupFailed;
     spdlog::set_pattern("%l: %v");  // read by people and told in answers
     return run_trial(options.check_application, signals->get(),
                      [&] { return check_application(options.check_application); });

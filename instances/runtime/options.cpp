@@ -103,6 +103,8 @@ void describe(CLI::App& app, Options& options) {
   app.add_option("--log-level", launch.log_level, join_names(kLogLevels))
       ->check(check_log_level)
       ->capture_default_str();
+  app.add_option("--parent", options.parent, "Process that asked for the check: its end ends the check")
+      ->check(CLI::NonNegativeNumber);
   app.add_option("--check-application", options.check_application,
                  "Only check this file, and say what is in it");
   app.add_option("--check-settings", options.check_settings, "Only check this settings file");

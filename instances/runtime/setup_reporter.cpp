@@ -4,6 +4,7 @@
 
 #include "shm/base/log.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/transient.hpp"
 
 namespace plchost {
 
@@ -43,7 +44,7 @@ void SetupReporter::done(SetupStep step, std::string_view remark) {
 }
 
 void SetupReporter::failed(SetupStep step, const Error& error) {
-  report({.step = step, .code = error.code, .text = error.describe()});
+  report({.step = step, .code = error.code, .text = error.describe(), .transient = is_transient(error)});
 }
 
 }  // namespace plchost

@@ -13,6 +13,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
+#include <sys/prctl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -221,6 +222,8 @@ Result<std::string> carry_out(const StoreOrder& order) {
 }
 
 int store_main(std::string_view order) {
+  // Nobody would hear of what it has kept: its manager is gone, or has given it up.
+  (void)::prctl(PR_SET_PDEATHSIG, SIGKILL);
   const auto read = decode_store_order(order);
   const auto done = read ? carry_out(*read) : Result<std::string>(std::unexpected(read.error()));
   fmt::print("{}", done ? *done : done.error().describe());

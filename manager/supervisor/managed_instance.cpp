@@ -8,6 +8,7 @@
 
 #include "shm/base/log.hpp"
 #include "shm/base/time.hpp"
+#include "shm/base/transient.hpp"
 
 namespace plchost {
 
@@ -97,6 +98,7 @@ void ManagedInstance::on_report(const SetupReport& report) {
   if (report.code != ErrorCode::ok) {
     setup_failure_ = fmt::format("{}: {}", to_string(report.step), report.text);
     name_taken_ = report.code == ErrorCode::already_exists;
+    transient_ = report.transient;
     return;  // the process ends by itself now, or the timer sees to it
   }
   if (!report.text.empty()) {
@@ -191,7 +193,7 @@ void ManagedInstance::on_exit(const ExitStatus& status) {
     spawn(next);  // of the kind that was asked for
   } else if (set_up && (exit_of_set_up || !setup_failure_.empty())) {
     history_.record_end(surroundings_.now(), Duration::zero(), false);
-    back_off_or_give_up(config_.restart == RestartPolicy::always || name_taken_, InstanceState::failed,
+    back_off_or_give_up(retries(), InstanceState::failed,
                         setup_failure_.empty() ? status.describe()
                                                : fmt::format("{}: {}", status.describe(), setup_failure_));
   } else if (set_up || phase_ == Phase::up || phase_ == Phase::adopting) {
@@ -317,12 +319,12 @@ void ManagedInstance::spawn(Next next) {
   wish_known_ = true;
   setup_failure_.clear();
   said_scheduler_.clear();
-  name_taken_ = false;
+  name_taken_ = transient_ = false;
   const auto pid = host_.spawn(launch_options(next));
   if (!pid) {
     history_.record_end(surroundings_.now(), Duration::zero(), false);
-    return back_off_or_give_up(config_.restart == RestartPolicy::always, InstanceState::failed,
-                               pid.error().describe());
+    transient_ = is_transient(pid.error());
+    return back_off_or_give_up(retries(), InstanceState::failed, pid.error().describe());
   }
   status_.pid = *pid;
   host_.set_timer(after(kSetupLimit));

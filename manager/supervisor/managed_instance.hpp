@@ -56,6 +56,8 @@ inline constexpr Duration kAskAgain = std::chrono::seconds(2);
 //   never: failed. on_failure, always: restarted. A set-up that failed
 //   (kExitSetupFailed, wrong usage) is not retried under on_failure, because the same files would fail again:
 //   failed. Under always it is, with back-off, but it does not count as a crash.
+//   A start that failed because the host was short of processes, descriptors or memory, or because the pool's
+//   lock was held, is retried under on_failure, too.
 //   So it is when a process of that name is there already: one that was still being set up when its manager
 //   died. After the back-off it is adopted.
 // * crash_limit crashes within crash_window: the next process is spawned without the application (safe_mode).
@@ -241,6 +243,10 @@ class ManagedInstance : public InstanceEvents {
   void finish_adoption(const std::string& problem);
   void show_application(const InstanceRuntime& runtime);
   void ended_by_itself(const ExitStatus& status);
+  [[nodiscard]] bool retries() const noexcept {  // a start that failed
+    return config_.restart == RestartPolicy::always || name_taken_ ||
+           (transient_ && config_.restart != RestartPolicy::never);
+  }
   void back_off_or_give_up(bool again, InstanceState otherwise, const std::string& why);
   void go_down(InstanceState state, const std::string& problem);
   void set_state(Phase phase, InstanceState state, const std::string& problem);
@@ -267,6 +273,7 @@ class ManagedInstance : public InstanceEvents {
   bool commanded_ = false;      // an operator has
   bool wish_known_ = false;     // wants_running_ is no guess
   bool shutting_down_ = false;
+  bool transient_ = false;   // this process could not be set up, but the next one may
   bool name_taken_ = false;  // another process of that name kept this one from being set up
   bool silent_ = false;      // its process does not beat
   HeartbeatWatch heartbeat_;

@@ -23,34 +23,39 @@ Result<int> ProcessHost::spawn(const LaunchOptions& options) {
       {.arguments = to_arguments(settings_.program, options), .report_fd = channel->childs.get()});
   if (!process) return std::unexpected(process.error());
   const int pid = process->pid;
-  if (auto followed = follow(std::move(*process)); !followed) return std::unexpected(followed.error());
-  report_ = std::move(channel->ours);
-  auto watch = reactor_.watch(report_.fd(), EPOLLIN, [this](std::uint32_t) { read_reports(); });
-  if (!watch) {
-    signal(SIGKILL);
-    return std::unexpected(watch.error());
+  auto watch = reactor_.watch(channel->ours.fd(), EPOLLIN, [this](std::uint32_t) { read_reports(); });
+  auto followed = watch ? follow(*process) : Result<void>(std::unexpected(watch.error()));
+  if (!followed) {  // it cannot be supervised, so it must not go on
+    kill_and_reap(*process);
+    return std::unexpected(followed.error());
   }
+  report_ = std::move(channel->ours);
   report_watch_ = std::move(*watch);
   return pid;
 }
 
 Result<int> ProcessHost::adopt() {
   if (auto connected = connect(); !connected) return std::unexpected(connected.error());
+  const auto pid = adopt_peer();
+  if (!pid) {  // whoever holds the other end is not the instance: a link to it would stay silent
+    link_watch_.reset();
+    link_.close();
+  }
+  return pid;
+}
+
+Result<int> ProcessHost::adopt_peer() {
   const auto pid = link_.peer_pid();
   if (!pid) return std::unexpected(pid.error());
   auto process = open_process(*pid);
   if (!process) return std::unexpected(process.error());
-  if (auto followed = follow(std::move(*process)); !followed) return std::unexpected(followed.error());
+  if (auto followed = follow(*process); !followed) return std::unexpected(followed.error());
   return *pid;
 }
 
-Result<void> ProcessHost::follow(ChildProcess process) {
+Result<void> ProcessHost::follow(ChildProcess& process) {
   auto watch = reactor_.watch(process.pidfd.get(), EPOLLIN, [this](std::uint32_t) { process_ended(); });
-  if (!watch) {
-    // Cannot be supervised, so it must not go on.
-    (void)signal_process(process, SIGKILL);
-    return std::unexpected(watch.error());
-  }
+  if (!watch) return std::unexpected(watch.error());
   process_ = std::move(process);
   exit_watch_ = std::move(*watch);
   return {};

@@ -38,7 +38,9 @@ class ProcessHost : public InstanceHost {
   [[nodiscard]] std::vector<int> granted_cores() override;
 
  private:
-  [[nodiscard]] Result<void> follow(ChildProcess process);
+  /// Takes the process over if it can be watched.
+  [[nodiscard]] Result<void> follow(ChildProcess& process);
+  [[nodiscard]] Result<int> adopt_peer();
   [[nodiscard]] Result<void> connect();
   void read_reports();
   void read_replies();

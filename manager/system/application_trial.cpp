@@ -7,6 +7,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "instances/launch/launch_contract.hpp"
 
@@ -38,7 +39,8 @@ Result<ApplicationTrial> ApplicationTrial::start(const std::string& plc_instance
   if (!pipe) return std::unexpected(pipe.error());
   (void)::fcntl(pipe->write_end.get(), F_SETPIPE_SZ, kOutputRoom);
   auto process = spawn_process(
-      {.arguments = {plc_instance, "--check-application", path}, .output_fd = pipe->write_end.get()});
+      {.arguments = {plc_instance, "--check-application", path, "--parent", fmt::format("{}", ::getpid())},
+       .output_fd = pipe->write_end.get()});
   if (!process) return std::unexpected(process.error());
   return ApplicationTrial(path, std::move(*process), std::move(pipe->read_end));
 }

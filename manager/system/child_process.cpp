@@ -16,6 +16,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "shm/base/process_start.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/thread.hpp"
 
@@ -64,6 +65,19 @@ Result<void> prepare(SpawnActions& actions, const SpawnRequest& request) {
   constexpr int kFlags = POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETSID;
   if (error == 0) error = posix_spawnattr_setflags(&actions.attributes, static_cast<short>(kFlags));
   return check_returned(error, "prepare to start " + request.arguments.front());
+}
+
+// The number of the session stays that of its leader while anybody is in it.
+void kill_session(pid_t leader) noexcept {
+  std::error_code error;
+  for (std::filesystem::directory_iterator at("/proc", error), end; !error && at != end;
+       at.increment(error)) {
+    const auto pid = static_cast<pid_t>(std::strtol(at->path().filename().c_str(), nullptr, 10));
+    if (pid <= 0 || pid == leader || ::getsid(pid) != leader) continue;
+    const auto member = open_process(pid);
+    // Looked at again: only now the number cannot come to mean another process.
+    if (member && ::getsid(pid) == leader) (void)signal_process(*member, SIGKILL);
+  }
 }
 
 }  // namespace
@@ -118,10 +132,22 @@ ExitStatus reap_process(const ChildProcess& process) {
 
 void end_session(const ChildProcess& leader) noexcept {
   siginfo_t info{};
-  // Of a child that is not reaped yet the number is still its own, as that of its group, too.
+  // Of a child that is not reaped yet the number is still its own, as that of its group and its session, too.
   const int waited =
       ::waitid(P_PIDFD, static_cast<id_t>(leader.pidfd.get()), &info, WEXITED | WNOHANG | WNOWAIT);
-  if (waited == 0 && info.si_pid == leader.pid) ::kill(-leader.pid, SIGKILL);
+  if (waited == 0 && info.si_pid == leader.pid) {
+    ::kill(-leader.pid, SIGKILL);
+    return kill_session(leader.pid);
+  }
+  // Another's child: if a younger process has the number by now, it may lead a session of its own.
+  if (!start_of(leader.pid)) kill_session(leader.pid);
+}
+
+void kill_and_reap(const ChildProcess& process) noexcept {
+  (void)signal_process(process, SIGKILL);
+  siginfo_t info{};
+  while (::waitid(P_PIDFD, static_cast<id_t>(process.pidfd.get()), &info, WEXITED) != 0 && errno == EINTR) {
+  }
 }
 
 Result<void> signal_process(const ChildProcess& process, int signal) {

@@ -51,11 +51,15 @@ struct SpawnRequest {
 /// The end of a process whose pidfd is readable.
 [[nodiscard]] ExitStatus reap_process(const ChildProcess& process);
 
-/// Of a child that has ended and was not reaped: SIGKILL to what it has left in its process group.
+/// Of a process that has ended, and, if it was a child, was not reaped: SIGKILL to what it has left in its
+/// process group and in its session.
 void end_session(const ChildProcess& leader) noexcept;
 
 /// A process that is gone already is no error.
 [[nodiscard]] Result<void> signal_process(const ChildProcess& process, int signal);
+
+/// SIGKILL, waits for the end, and reaps it: of a child that cannot be supervised.
+void kill_and_reap(const ChildProcess& process) noexcept;
 
 struct ReportChannel {
   PacketSocket ours;

@@ -1,8 +1,11 @@
 #include <csignal>
+#include <filesystem>
 #include <string>
+#include <string_view>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <sys/resource.h>
 
 #include "tests/integration/manager/plant.hpp"
 
@@ -46,6 +49,54 @@ TEST(Manager, StopsNoInstanceWhenItIsKilledAndTheNextOneAdoptsThem) {
               HasSubstr("status unknown: it was adopted"));
   EXPECT_EQ(plant.stop_manager().describe(), "exit code 0");
   EXPECT_THAT(plant.leftovers(), IsEmpty());
+}
+
+// The forked process has the instance's name and its control socket.
+TEST(Manager, BringsAnAdoptedInstanceBackWhoseApplicationHasLeftAProcessBehind) {
+  Plant plant;
+  plant.add("line1", "fault_forks", "restart_delay_ms = 10");
+  plant.start_manager();
+  ASSERT_TRUE(plant.wait_for("line1", InstanceState::running));
+  plant.kill_manager();
+  plant.start_manager();
+  ASSERT_TRUE(plant.wait_for("line1", InstanceState::running));
+  plant.kill_instances();
+  ASSERT_TRUE(Plant::eventually([&] { return plant.status("line1").restarts > 0; }));
+  ASSERT_TRUE(plant.wait_for("line1", InstanceState::running));
+  EXPECT_EQ(plant.ask(ControlVerb::stop, "line1").code, ErrorCode::ok);
+}
+
+TEST(Manager, TriesAgainWhileItHasNoDescriptorsForAStart) {
+  Plant plant;
+  plant.add("line1", "bottling_line", "restart_delay_ms = 10");
+  plant.start_manager();
+  ASSERT_TRUE(plant.wait_for("line1", InstanceState::running));
+  const int manager = plant.manager_pid();
+  rlimit before{};
+  ASSERT_EQ(::prlimit(manager, RLIMIT_NOFILE, nullptr, &before), 0);
+  const rlimit none{.rlim_cur = 3, .rlim_max = before.rlim_max};
+  ASSERT_EQ(::prlimit(manager, RLIMIT_NOFILE, &none, nullptr), 0);
+  plant.kill_instances();
+  EXPECT_TRUE(Plant::eventually(
+      [&] { return plant.status("line1").problem.view().find("EMFILE") != std::string_view::npos; }));
+  EXPECT_EQ(plant.status("line1").state, InstanceState::waiting) << plant.status("line1").problem.view();
+  ASSERT_EQ(::prlimit(manager, RLIMIT_NOFILE, &before, nullptr), 0);
+  EXPECT_TRUE(plant.wait_for("line1", InstanceState::running));
+}
+
+TEST(Manager, LeavesNoTrialOfAnApplicationBehind) {
+  Plant plant;
+  plant.add("line1", "bottling_line");
+  plant.start_manager();
+  ASSERT_TRUE(plant.wait_for("line1", InstanceState::running));
+  const std::string endless = plant.run_directory() + "/endless.so";
+  std::filesystem::copy_file(Plant::application("fault_loops"), endless);
+  auto link = plant.connect();
+  ASSERT_TRUE(link.send(encode(ControlRequest{
+      .number = 1, .verb = ControlVerb::load_application, .instance = "line1", .argument = endless})));
+  ASSERT_TRUE(Plant::eventually([&] { return Plant::processes_about(endless) > 0; }));
+  plant.kill_manager();
+  EXPECT_TRUE(Plant::within(std::chrono::seconds(5), [&] { return Plant::processes_about(endless) == 0; }));
 }
 
 TEST(Manager, IsRefusedWhileAnotherOneRuns) {

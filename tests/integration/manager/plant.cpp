@@ -202,6 +202,16 @@ bool Plant::wait_for_cycles(const std::string& instance, std::uint64_t more) {
   return eventually([&] { return cycles(instance) >= before + more; });
 }
 
+int Plant::processes_about(const std::string& text) {
+  int count = 0;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc")) {
+    std::ostringstream line;
+    line << std::ifstream(entry.path() / "cmdline").rdbuf();
+    if (line.str().find(text) != std::string::npos) ++count;
+  }
+  return count;
+}
+
 std::vector<std::string> Plant::leftovers() const {
   std::vector<std::string> found;
   for (const auto& entry : std::filesystem::directory_iterator("/dev/shm")) {

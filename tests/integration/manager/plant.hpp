@@ -58,6 +58,9 @@ class Plant {
   bool wait_for_cycles(const std::string& instance, std::uint64_t more = 5);
   static bool eventually(const std::function<bool()>& condition);
   static bool within(Duration limit, const std::function<bool()>& condition);
+  /// Whose command lines have this text.
+  static int processes_about(const std::string& text);
+  [[nodiscard]] int manager_pid() const noexcept { return manager_.pid; }
   static std::string application(const std::string& name);
 
   /// Names of ours in /dev/shm and in the run directory.

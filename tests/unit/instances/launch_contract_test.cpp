@@ -66,12 +66,13 @@ TEST(LaunchContract, WrongArgumentsAreAUsageError) {
 }
 
 TEST(SetupReport, ComesBackAsItWasSent) {
-  const auto sut =
-      decode_report(encode(SetupReport{SetupStep::load_application, ErrorCode::not_found, "no \"x.so\"\n"}));
+  const auto sut = decode_report(
+      encode(SetupReport{SetupStep::load_application, ErrorCode::not_found, "no \"x.so\"\n", true}));
   ASSERT_TRUE(sut);
   EXPECT_EQ(sut->step, SetupStep::load_application);
   EXPECT_EQ(sut->code, ErrorCode::not_found);
   EXPECT_EQ(sut->text, "no \"x.so\"\n");
+  EXPECT_TRUE(sut->transient);
 }
 
 TEST(SetupReport, WithBytesThatAreNotTextIsStillSent) {

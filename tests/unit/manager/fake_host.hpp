@@ -13,7 +13,7 @@ namespace plchost {
 class FakeHost : public InstanceHost {
  public:
   [[nodiscard]] Result<int> spawn(const LaunchOptions& options) override {
-    if (!can_spawn) return failure(ErrorCode::system, "start plc-instance");
+    if (!can_spawn) return failure(ErrorCode::system, "start plc-instance", spawn_errno);
     spawned.push_back(options);
     return next_pid++;
   }
@@ -44,6 +44,7 @@ class FakeHost : public InstanceHost {
   std::optional<int> adoptable;
   std::vector<int> cores = {1};
   bool can_spawn = true;
+  int spawn_errno = 0;
   bool can_send = true;
   int next_pid = 100;
 };

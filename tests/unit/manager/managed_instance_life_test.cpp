@@ -169,5 +169,65 @@ TEST_F(ManagedLife, AdoptsAnInstanceThatIsStoppingAndSeesItStopped) {
   EXPECT_EQ(state(), InstanceState::stopped);
 }
 
+// A host that is short of something for a moment is no fault of the instance.
+class ShortOfSomething : public ManagedInstanceTest {
+ protected:
+  void fail_set_up() {
+    sut().on_report({.step = SetupStep::attach_pool,
+                     .code = ErrorCode::timed_out,
+                     .text = "the pool is locked by process 7",
+                     .transient = true});
+    sut().on_exit(exited_with(kExitSetupFailed));
+  }
+};
+
+TEST_F(ShortOfSomething, IsTriedAgainWithBackOffAndIsNoCrash) {
+  sut().hold("is to be started");
+  sut().release();
+  constexpr int kMoreThanTheCrashLimit = 10;
+  Duration before{};
+  for (int i = 0; i < kMoreThanTheCrashLimit; ++i) {
+    fail_set_up();
+    ASSERT_EQ(state(), InstanceState::waiting) << problem();
+    EXPECT_THAT(problem(), HasSubstr("locked by process 7"));
+    EXPECT_GE(*host_.timer - now_, before);
+    before = *host_.timer - now_;
+    expire_timer();
+  }
+  EXPECT_EQ(before, config_.restart_delay_max);
+  report_ready();
+  EXPECT_EQ(state(), InstanceState::running);
+}
+
+TEST_F(ShortOfSomething, OfProcessesIsTriedAgain) {
+  host_.can_spawn = false;
+  host_.spawn_errno = EAGAIN;
+  sut().hold("is to be started");
+  sut().release();
+  ASSERT_EQ(state(), InstanceState::waiting);
+  host_.can_spawn = true;
+  expire_timer();
+  EXPECT_EQ(state(), InstanceState::starting);
+}
+
+TEST_F(ShortOfSomething, UnderThePolicyNeverFails) {
+  config_.restart = RestartPolicy::never;
+  make();
+  sut().hold("is to be started");
+  sut().release();
+  fail_set_up();
+  EXPECT_EQ(state(), InstanceState::failed);
+}
+
+TEST_F(ShortOfSomething, IsForgottenWhenTheNextStartFailsForGood) {
+  sut().hold("is to be started");
+  sut().release();
+  fail_set_up();
+  expire_timer();
+  sut().on_report({.step = SetupStep::read_settings, .code = ErrorCode::not_found, .text = "no line.cfg"});
+  sut().on_exit(exited_with(kExitSetupFailed));
+  EXPECT_EQ(state(), InstanceState::failed);
+}
+
 }  // namespace
 }  // namespace plchost

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cerrno>
+
+#include "shm/base/result.hpp"
+
+namespace plchost {
+
+/// What failed may succeed later with nothing changed: the host was short of processes, descriptors or
+/// memory, or somebody held a lock for too long.
+[[nodiscard]] inline bool is_transient(const Error& error) noexcept {
+  switch (error.system_errno) {
+    case EAGAIN:
+    case EMFILE:
+    case ENFILE:
+    case ENOMEM:
+    case ENOBUFS:
+    case EINTR:
+      return true;
+    default:
+      return error.code == ErrorCode::busy || error.code == ErrorCode::timed_out;
+  }
+}
+
+}  // namespace plchost
