@@ -143,7 +143,8 @@ void Manager::make_supervisor() {
         *reactor_, ProcessHost::Settings{.program = options_.programs + "/plc-instance",
                                          .name = instance.name,
                                          .pool = config_.host.pool,
-                                         .run_directory = config_.host.run_directory});
+                                         .run_directory = config_.host.run_directory,
+                                         .settings = instance.settings});
     ProcessHost& made = *host;
     const HostConfig& own = config_.host;
     auto applications = std::make_unique<StoreProcess>(
@@ -153,7 +154,8 @@ void Manager::make_supervisor() {
             .folder = versions_folder(applications_folder(own.state_directory, own.name), instance.name),
             .keep = own.application_versions,
             .helper = "/proc/self/exe",
-            .plc_instance = options_.programs + "/plc-instance"});
+            .plc_instance = options_.programs + "/plc-instance",
+            .settings = instance.settings});
     auto wishes = std::make_unique<WishStore>(
         *reactor_, wish_writer_,
         WishStore::Settings{.pool = own.pool,

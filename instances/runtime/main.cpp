@@ -104,7 +104,7 @@ int run(const Options& options) {
     if (options.parent != 0 && ::getppid() != options.parent) return kExitSetupFailed;
     spdlog::set_pattern("%l: %v");  // read by people and told in answers
     return run_trial(options.check_application, signals->get(),
-                     [&] { return check_application(options.check_application); });
+                     [&] { return check_application(options.check_application, options.launch.settings); });
   }
 
   std::unique_ptr<Instance> instance;

@@ -106,7 +106,7 @@ void describe(CLI::App& app, Options& options) {
   app.add_option("--parent", options.parent, "Process that asked for the check: its end ends the check")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--check-application", options.check_application,
-                 "Only check this file, and say what is in it");
+                 "Only check this file, with --settings under these, and say what is in it");
   app.add_option("--check-settings", options.check_settings, "Only check this settings file");
 }
 

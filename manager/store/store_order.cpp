@@ -24,7 +24,8 @@ constexpr std::array kOrderTexts = {OrderText{"folder", &StoreOrder::folder},
                                     OrderText{"by", &StoreOrder::by},
                                     OrderText{"from", &StoreOrder::from},
                                     OrderText{"before", &StoreOrder::before},
-                                    OrderText{"plc_instance", &StoreOrder::plc_instance}};
+                                    OrderText{"plc_instance", &StoreOrder::plc_instance},
+                                    OrderText{"settings", &StoreOrder::settings}};
 
 Result<std::uint64_t> order_number(const Json& json, const char* key, std::uint64_t most) {
   const auto found = json.find(key);

@@ -23,6 +23,7 @@ struct StoreOrder {
   std::string before;        ///< path of what is loaded now; empty: nothing
   std::uint32_t keep = 0;    ///< so many versions stay, and what is loaded and the boot application
   std::string plc_instance;  ///< program that tries it
+  std::string settings;      ///< file of the settings under which it is tried; empty: none
 };
 
 /// In one argument of a command line, and back. corrupt: it is none.

@@ -29,6 +29,7 @@ Result<void> StoreProcess::keep(const ApplicationOrder& order, const std::string
   store.before = before;
   store.keep = settings_.keep;
   store.plc_instance = settings_.plc_instance;
+  store.settings = settings_.settings;
   return start(store, std::move(done));
 }
 

@@ -20,6 +20,7 @@ class StoreProcess : public ApplicationKeeper {
     std::uint32_t keep = 5;    ///< versions
     std::string helper;        ///< program: plchostd
     std::string plc_instance;  ///< program that tries an application
+    std::string settings;      ///< under which it is tried; empty: none
   };
 
   StoreProcess(Reactor& reactor, Settings settings);

@@ -1,3 +1,6 @@
+#include <optional>
+#include <utility>
+
 #include <fmt/format.h>
 
 #include "manager/supervisor/managed_instance.hpp"
@@ -88,6 +91,19 @@ void ManagedInstance::begin_change() {
   if (!number) return finish(number.error().code, number.error().describe());
   operation_->forwarded_number = *number;
   host_.set_timer(after(limit_of(ControlVerb::change_application)));
+}
+
+// What was loaded has not come up. Whether the one before is being started instead.
+bool ManagedInstance::take_back_application(const std::string& why) {
+  const bool can = operation_ && operation_->step == Step::fresh_process && operation_->before &&
+                   !transient_ && !name_taken_;
+  if (!can) return false;
+  operation_->refused = fmt::format("{} does not come up: {}", operation_->request.argument, why);
+  application_ = *std::exchange(operation_->before, std::nullopt);
+  start_kind_ = StartKind::warm;
+  spdlog::warn("instance {}: {}; {} is started again", config_.name, operation_->refused, application_);
+  spawn(wants_running_ ? Next::run : Next::stay_stopped);
+  return true;
 }
 
 // Last of all: what does not come up does not become the boot application.

@@ -152,6 +152,8 @@ void ManagedInstance::on_application_checked(const Result<void>& result) {
 
 void ManagedInstance::apply_loaded_application() {
   if (loads_online()) return begin_change();
+  const bool works = phase_ == Phase::up && !safe_mode_ && !silent_ && !application_.empty();
+  if (works) operation_->before = application_;
   application_ = operation_->request.argument;
   if (phase_ == Phase::down && status_.state == InstanceState::offline) {
     publish();

@@ -132,7 +132,10 @@ void ManagedInstance::come_up() {
     set_state(Phase::up, runs ? InstanceState::running : InstanceState::stopped, problem_when_up());
   }
   if (!operation_) return;
-  if (operation_->step == Step::fresh_process) {
+  if (operation_->step == Step::fresh_process && !operation_->refused.empty()) {
+    finish(ErrorCode::unavailable, fmt::format("{}; {}, which was loaded before, is started again",
+                                               operation_->refused, application_));
+  } else if (operation_->step == Step::fresh_process) {
     finish(ErrorCode::ok, application_.empty() ? "it is up without an application: load one" : loaded_text());
   } else if (operation_->step == Step::until_up) {
     forward_or_wait();
@@ -192,11 +195,13 @@ void ManagedInstance::on_exit(const ExitStatus& status) {
     if (next == Next::nothing) return go_down(InstanceState::offline, "");
     spawn(next);  // of the kind that was asked for
   } else if (set_up && (exit_of_set_up || !setup_failure_.empty())) {
+    const std::string why =
+        setup_failure_.empty() ? status.describe() : fmt::format("{}: {}", status.describe(), setup_failure_);
+    if (take_back_application(why)) return;
     history_.record_end(surroundings_.now(), Duration::zero(), false);
-    back_off_or_give_up(retries(), InstanceState::failed,
-                        setup_failure_.empty() ? status.describe()
-                                               : fmt::format("{}: {}", status.describe(), setup_failure_));
+    back_off_or_give_up(retries(), InstanceState::failed, why);
   } else if (set_up || phase_ == Phase::up || phase_ == Phase::adopting) {
+    if (set_up && take_back_application(status.describe())) return;
     ended_by_itself(status);
   }
 }

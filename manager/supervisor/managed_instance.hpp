@@ -90,6 +90,8 @@ inline constexpr Duration kAskAgain = std::chrono::seconds(2);
 //                waiting or without application; as reset if it was stopped; only remembered if it was
 //                offline.
 //     download_application   kept and checked by a helper process, then as load_application.
+//                What the trial finds wrong ends nothing. If the new one still does not come up, the one
+//                before is started again as it was, and the reply tells both.
 //     rollback_application   load_application of what was loaded before what is loaded; that must have been
 //     sent.
 //                With the option "boot", of all three: when all is done the path becomes the boot
@@ -175,6 +177,8 @@ class ManagedInstance : public InstanceEvents {
     ControlReplyFunction reply;
     Step step = Step::until_up;
     std::uint64_t forwarded_number = 0;
+    std::optional<std::string> before{};  // path of what ran until then, while it can be taken back
+    std::string refused{};                // why what was to be loaded did not come up; empty: it did
   };
 
   // Commands: instance_commands.cpp, application_commands.cpp
@@ -195,6 +199,7 @@ class ManagedInstance : public InstanceEvents {
   void begin_change();
   void begin_forwarded();
   void apply_loaded_application();
+  bool take_back_application(const std::string& why);
   void forward_or_wait();
   void forward();
   void finish(ErrorCode code, const std::string& text);

@@ -150,7 +150,7 @@ void ProcessHost::forget_process() {
 }
 
 Result<void> ProcessHost::check_application(const std::string& path) {
-  auto trial = ApplicationTrial::start(settings_.program, path);
+  auto trial = ApplicationTrial::start(settings_.program, path, settings_.settings);
   if (!trial) return std::unexpected(trial.error());
   auto watch = reactor_.watch(trial->fd(), EPOLLIN, [this](std::uint32_t) { check_ended(); });
   if (!watch) {

@@ -22,6 +22,7 @@ class ProcessHost : public InstanceHost {
     std::string name;
     std::string pool;
     std::string run_directory;
+    std::string settings;  ///< file; empty: the runtime's defaults
   };
 
   ProcessHost(Reactor& reactor, Settings settings);

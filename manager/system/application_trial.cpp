@@ -34,13 +34,16 @@ std::string one_line(std::string_view text) {
 
 }  // namespace
 
-Result<ApplicationTrial> ApplicationTrial::start(const std::string& plc_instance, const std::string& path) {
+Result<ApplicationTrial> ApplicationTrial::start(const std::string& plc_instance, const std::string& path,
+                                                 const std::string& settings) {
   auto pipe = make_output_pipe();
   if (!pipe) return std::unexpected(pipe.error());
   (void)::fcntl(pipe->write_end.get(), F_SETPIPE_SZ, kOutputRoom);
-  auto process = spawn_process(
-      {.arguments = {plc_instance, "--check-application", path, "--parent", fmt::format("{}", ::getpid())},
-       .output_fd = pipe->write_end.get()});
+  SpawnRequest request{
+      .arguments = {plc_instance, "--check-application", path, "--parent", fmt::format("{}", ::getpid())},
+      .output_fd = pipe->write_end.get()};
+  if (!settings.empty()) request.arguments.insert(request.arguments.end(), {"--settings", settings});
+  auto process = spawn_process(request);
   if (!process) return std::unexpected(process.error());
   return ApplicationTrial(path, std::move(*process), std::move(pipe->read_end));
 }

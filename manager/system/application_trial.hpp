@@ -12,11 +12,13 @@ namespace plchost {
 /// How long a trial may take. It ends by itself after kSetUpLimit and says so; this is for one that cannot.
 inline constexpr Duration kTrialLimit = kSetUpLimit + std::chrono::seconds(2);
 
-/// A process that tries an application, so that nothing else is at stake: `plc-instance --check-application`.
+/// A process that tries an application, so that nothing else is at stake: `plc-instance --check-application`,
+/// under the settings of the instance that it is for; empty: none.
 class ApplicationTrial {
  public:
   [[nodiscard]] static Result<ApplicationTrial> start(const std::string& plc_instance,
-                                                      const std::string& path);
+                                                      const std::string& path,
+                                                      const std::string& settings = {});
 
   /// Readable when it has ended.
   [[nodiscard]] int fd() const noexcept { return process_.pidfd.get(); }

@@ -6,6 +6,9 @@
 
 #include "instances/launch/launch_contract.hpp"
 #include "instances/runtime/application/application.hpp"
+#include "instances/runtime/device/device_description.hpp"
+#include "instances/runtime/device/device_events.hpp"
+#include "instances/runtime/settings/settings.hpp"
 #include "shm/pool/instance_page.hpp"
 
 namespace plchost {
@@ -26,11 +29,31 @@ std::string detail_of(const TaskConfig& task) {
   return {};
 }
 
+// The same as at a start, in the same order: what is found here would end the instance there.
+Result<void> check_under(const InstanceSettings& settings, Application& application, ApplicationHost& host) {
+  if (!settings.device_description.empty()) {
+    const auto device = read_device_description(settings.device_description);
+    if (!device) return std::unexpected(device.error());
+    if (auto known = check_device_events(*device, application.tasks()); !known) return known;
+  }
+  if (auto applied = application.apply(settings.tasks); !applied) return applied;
+  return host.areas().check(settings.areas, application.tasks());
+}
+
+Result<Application> load_under(const std::string& path, const std::string& file, ApplicationHost& host) {
+  auto settings = file.empty() ? Result<InstanceSettings>() : read_settings(file);
+  if (!settings) return std::unexpected(std::move(settings).error());
+  auto application = Application::load(path, host);
+  if (!application) return application;
+  if (auto good = check_under(*settings, *application, host); !good) return std::unexpected(good.error());
+  return application;
+}
+
 }  // namespace
 
-int check_application(const std::string& path) {
+int check_application(const std::string& path, const std::string& settings) {
   ApplicationHost host("check", nullptr);
-  const auto application = Application::load(path, host);
+  const auto application = load_under(path, settings, host);
   if (!application) {
     fmt::print(stderr, "{}\n", application.error().describe());
     return kExitSetupFailed;

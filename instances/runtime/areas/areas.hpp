@@ -77,6 +77,10 @@ class Areas {
   /// Tells another version of the application, which has declared the same areas, the addresses. Control
   /// thread, before its first cycle.
   void tell_addresses(const std::vector<DeclaredArea>& areas) const;
+  /// Whether place() would find fault with what is declared, as far as that can be told without any memory.
+  /// Set-up.
+  [[nodiscard]] Result<void> check(std::span<const AreaSettings> settings,
+                                   std::span<const TaskConfig> tasks) const;
   /// Places all that is declared, fills it with what was kept or with initial values, tells the application
   /// the addresses, and puts the exchange of inputs and outputs around the cycles of the tasks that use them:
   /// the others stay as they are. A text: remarks. Once, after the application was loaded; set-up.

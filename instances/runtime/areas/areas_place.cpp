@@ -26,7 +26,33 @@ std::vector<ByteRange> rest_of(ByteRange all, std::vector<ByteRange> ranges) {
   return rest;
 }
 
+// Where the next kept area lies behind one that ends at `bytes`.
+std::size_t behind_kept(std::size_t bytes) noexcept {
+  return (bytes + kRetainAlignment - 1) / kRetainAlignment * kRetainAlignment;
+}
+
+Result<void> check_kept_bytes(std::uint64_t bytes) {
+  if (bytes <= kMaxRetainBytes) return {};
+  return failure(
+      ErrorCode::invalid_argument,
+      fmt::format("the retain and persistent areas have {} bytes, {} are allowed", bytes, kMaxRetainBytes));
+}
+
 }  // namespace
+
+Result<void> Areas::check(std::span<const AreaSettings> settings, std::span<const TaskConfig> tasks) const {
+  if (declared_.empty()) return {};
+  std::vector<DeclaredArea> areas = declared_;
+  std::vector<std::string> names;
+  for (const TaskConfig& task : tasks) names.push_back(task.name);
+  if (auto done = complete_uses(areas, names); !done) return done;
+  if (const auto plan = plan_areas(areas, settings); !plan) return std::unexpected(plan.error());
+  std::size_t kept = 0;
+  for (const DeclaredArea& area : areas) {
+    if (area.is_kept()) kept = behind_kept(kept + area.bytes);
+  }
+  return check_kept_bytes(kept);
+}
 
 Result<std::string> Areas::place(const Environment& environment, std::span<TaskConfig> tasks) {
   open_ = false;
@@ -167,16 +193,12 @@ Result<void> Areas::make_keeper(const Environment& environment) {
                                     .layout = area.layout,
                                     .offset = initial.data.size()});
     initial.data.insert(initial.data.end(), area.initial.begin(), area.initial.end());
-    initial.data.resize((initial.data.size() + kRetainAlignment - 1) / kRetainAlignment * kRetainAlignment);
+    initial.data.resize(behind_kept(initial.data.size()));
   }
   if (initial.layout.areas.empty()) return {};
   initial.layout.bytes = initial.data.size();
   kept_ = initial.layout;
-  if (initial.layout.bytes > kMaxRetainBytes) {
-    return failure(ErrorCode::invalid_argument,
-                   fmt::format("the retain and persistent areas have {} bytes, {} are allowed",
-                               initial.layout.bytes, kMaxRetainBytes));
-  }
+  if (auto good = check_kept_bytes(initial.layout.bytes); !good) return good;
   auto keeper = RetainKeeper::make(environment.pool, environment.instance, initial, environment.retain);
   if (!keeper) return std::unexpected(std::move(keeper).error());
   keeper_ = *std::move(keeper);

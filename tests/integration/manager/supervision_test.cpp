@@ -9,6 +9,7 @@
 #include "manager/api_server.hpp"
 #include "manager/supervisor/managed_instance.hpp"
 #include "shm/base/exception_history.hpp"
+#include "shm/pool/object_pool.hpp"
 #include "tests/integration/manager/plant.hpp"
 #include "tests/support/sanitized.hpp"
 
@@ -87,6 +88,45 @@ TEST(Manager, PutsACrashLoopIntoSafeModeUntilAnotherApplicationIsLoaded) {
   const auto loaded = plant.ask(ControlVerb::load_application, "line1", Plant::application("bottling_line"));
   EXPECT_EQ(loaded.code, ErrorCode::ok) << loaded.text;
   EXPECT_EQ(plant.status("line1").state, InstanceState::running);
+  EXPECT_TRUE(plant.wait_for_cycles("line1"));
+}
+
+// What the instance's settings do not allow, its trial finds: the machine runs on.
+TEST(Manager, RefusesAnApplicationThatTheSettingsDoNotAllowBeforeItEndsTheOneThatRuns) {
+  Plant plant;
+  plant.add("line1", "bottling_line", "settings = \"line1.cfg\"");
+  plant.write_file("line1.cfg", "[Task.Conveyor]\nLatePolicy=Asap\n");
+  plant.start_manager();
+  ASSERT_TRUE(plant.wait_for("line1", InstanceState::running));
+  const int pid = plant.status("line1").pid;
+  const auto reply = plant.ask(ControlVerb::load_application, "line1", Plant::application("drive_axis"));
+  EXPECT_EQ(reply.code, ErrorCode::invalid_argument);
+  EXPECT_THAT(reply.text, HasSubstr("the application has no task 'Conveyor'"));
+  EXPECT_EQ(plant.status("line1").pid, pid);
+  EXPECT_TRUE(plant.wait_for_cycles("line1"));
+}
+
+// A memory of the pool that others have made in another size is found at the start only.
+TEST(Manager, StartsTheApplicationBeforeAgainWhenTheNewOneDoesNotComeUp) {
+  Plant plant;
+  plant.add("line1", "bottling_line", "settings = \"line1.cfg\"");
+  plant.write_file("line1.cfg",
+                   "[SysMem]\nLinux.Area.0.Flags=0x4\nLinux.Area.0.Object=io.in\nLinux.Area.0.Size=128\n");
+  plant.start_manager();
+  ASSERT_TRUE(plant.wait_for("line1", InstanceState::running));
+  auto pool = ObjectPool::create(plant.pool());
+  ASSERT_TRUE(pool);
+  constexpr std::size_t kOther = 100;
+  const auto memory = pool->create_memory("io.in", kOther);
+  ASSERT_TRUE(memory);
+  const int pid = plant.status("line1").pid;
+  const auto reply = plant.ask(ControlVerb::load_application, "line1", Plant::application("packer"));
+  EXPECT_EQ(reply.code, ErrorCode::unavailable);
+  EXPECT_THAT(reply.text, HasSubstr("io.in"));
+  EXPECT_THAT(reply.text, HasSubstr("which was loaded before, is started again"));
+  ASSERT_TRUE(plant.wait_for("line1", InstanceState::running));
+  EXPECT_NE(plant.status("line1").pid, pid);
+  EXPECT_EQ(plant.status("line1").application.view(), Plant::application("bottling_line"));
   EXPECT_TRUE(plant.wait_for_cycles("line1"));
 }
 

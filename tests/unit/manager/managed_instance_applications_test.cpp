@@ -142,8 +142,53 @@ TEST_F(SentApplication, ThatDoesNotComeUpIsNoBootApplication) {
   applications_.end(std::string(kFirst));
   sut().on_exit(exited_with(0));
   sut().on_exit(killed_by(SIGSEGV));
+  report_ready();  // the one before
   EXPECT_EQ(take_reply().code, ErrorCode::unavailable);
   EXPECT_THAT(applications_.booted, IsEmpty());
+}
+
+TEST_F(SentApplication, ThatDoesNotComeUpMakesRoomForTheOneBefore) {
+  bring_up();
+  ask(ControlVerb::download_application, "new.so", options());
+  applications_.end(std::string(kFirst));
+  sut().on_exit(exited_with(0));
+  sut().on_report(
+      {.step = SetupStep::load_application, .code = ErrorCode::wrong_size, .text = "io.in is larger"});
+  sut().on_exit(exited_with(kExitSetupFailed));
+  EXPECT_THAT(replies_, IsEmpty());
+  ASSERT_EQ(host_.spawned.size(), 3U);
+  EXPECT_EQ(host_.spawned.back().application, "/opt/line.so");
+  EXPECT_FALSE(host_.spawned.back().stopped);
+  report_ready();
+  const ControlReply reply = take_reply();
+  EXPECT_EQ(reply.code, ErrorCode::unavailable);
+  EXPECT_THAT(reply.text, HasSubstr("io.in is larger"));
+  EXPECT_THAT(reply.text, HasSubstr("/opt/line.so, which was loaded before, is started again"));
+  EXPECT_EQ(state(), InstanceState::running);
+  EXPECT_EQ(wishes_.wish->application, "/opt/line.so");
+  EXPECT_TRUE(wishes_.wish->crashes_unix_ns.empty());
+}
+
+TEST_F(SentApplication, ThatDoesNotComeUpLeavesAStoppedMachineStopped) {
+  bring_up_stopped();
+  ask(ControlVerb::load_application, "/opt/new.so");
+  sut().on_application_checked({});
+  sut().on_exit(exited_with(0));
+  sut().on_exit(killed_by(SIGSEGV));
+  EXPECT_EQ(host_.spawned.back().application, "/opt/line.so");
+  EXPECT_TRUE(host_.spawned.back().stopped);
+}
+
+TEST_F(SentApplication, ThatDoesNotComeUpFailsWhereTheOneBeforeDoesNotEither) {
+  bring_up();
+  ask(ControlVerb::load_application, "/opt/new.so");
+  sut().on_application_checked({});
+  sut().on_exit(exited_with(0));
+  sut().on_exit(exited_with(kExitSetupFailed));
+  sut().on_exit(exited_with(kExitSetupFailed));
+  EXPECT_EQ(take_reply().code, ErrorCode::unavailable);
+  EXPECT_EQ(state(), InstanceState::failed);
+  EXPECT_EQ(host_.spawned.size(), 3U);
 }
 
 TEST_F(SentApplication, TellsWhenItIsLoadedAndCouldNotBecomeTheBootApplication) {
