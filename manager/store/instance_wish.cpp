@@ -28,7 +28,8 @@ constexpr std::array kWishTexts = {
     WishMember<std::string>{"application", &InstanceWish::application},
     WishMember<std::string>{"scheduler", &InstanceWish::scheduler},
     WishMember<std::string>{"configured_application", &InstanceWish::configured_application},
-    WishMember<std::string>{"configured_scheduler", &InstanceWish::configured_scheduler}};
+    WishMember<std::string>{"configured_scheduler", &InstanceWish::configured_scheduler},
+    WishMember<std::string>{"configured_process", &InstanceWish::configured_process}};
 constexpr std::array kWishFlags = {WishMember<bool>{"commanded", &InstanceWish::commanded},
                                    WishMember<bool>{"running", &InstanceWish::running},
                                    WishMember<bool>{"offline", &InstanceWish::offline},

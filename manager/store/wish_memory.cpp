@@ -59,9 +59,7 @@ Result<WishMemory> WishMemory::open(std::string_view pool, std::string_view inst
   }
   if (!memory) return std::unexpected(std::move(memory).error());
   WishMemory opened(*std::move(memory));
-  for (const Layout::Place& place : opened.layout().places) {
-    opened.generation_ = std::max(opened.generation_, place.generation);
-  }
+  opened.generation_ = opened.newest().generation;
   return opened;
 }
 
@@ -69,20 +67,21 @@ void WishMemory::remove(std::string_view pool, std::string_view instance) noexce
   MemoryFile::remove(wish_memory_name(pool, instance));
 }
 
-std::optional<InstanceWish> WishMemory::read() const {
-  std::optional<InstanceWish> newest;
-  std::uint64_t generation = 0;
+WishMemory::Found WishMemory::newest() const {
+  Found found;
   for (const Layout::Place& place : layout().places) {
+    const std::uint64_t generation = place.generation;
     const std::uint64_t length = place.length;
-    if (place.generation <= generation || length > place.text.size()) continue;
+    found.any = found.any || generation != 0;
+    if (generation <= found.generation || length > place.text.size()) continue;
     // A copy: the checksum is of what is read, whoever writes to it meanwhile.
     const std::string text(place.text.data(), length);
     if (auto wish = decode_wish(text)) {
-      newest = *std::move(wish);
-      generation = place.generation;
+      found.wish = *std::move(wish);
+      found.generation = generation;
     }
   }
-  return newest;
+  return found;
 }
 
 Result<void> WishMemory::write(const InstanceWish& wish) {

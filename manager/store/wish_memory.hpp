@@ -19,13 +19,24 @@ class WishMemory {
   [[nodiscard]] static Result<WishMemory> open(std::string_view pool, std::string_view instance);
   static void remove(std::string_view pool, std::string_view instance) noexcept;
 
-  /// The newest whole one; nothing: none was written.
-  [[nodiscard]] std::optional<InstanceWish> read() const;
+  /// The newest whole one; nothing: none was written, or it is damaged.
+  [[nodiscard]] std::optional<InstanceWish> read() const { return newest().wish; }
+  /// Something was written, and none of it is whole: another program has written over it.
+  [[nodiscard]] bool damaged() const {
+    const Found found = newest();
+    return found.any && !found.wish;
+  }
   /// full: the text has more than kMaxWishBytes.
   [[nodiscard]] Result<void> write(const InstanceWish& wish);
 
  private:
   struct Layout;
+  struct Found {
+    std::optional<InstanceWish> wish;
+    std::uint64_t generation = 0;  ///< of `wish`
+    bool any = false;              ///< something was written
+  };
+  [[nodiscard]] Found newest() const;
   explicit WishMemory(MemoryFile memory) noexcept : memory_(std::move(memory)) {}
   [[nodiscard]] Layout& layout() const noexcept;
 

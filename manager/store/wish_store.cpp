@@ -79,7 +79,11 @@ Result<std::optional<InstanceWish>> WishStore::find() {
     if (remembered->host_ended) restore_events();
     return remembered;
   }
-  if (!file && file.error().code == ErrorCode::not_found) return std::nullopt;
+  const bool none = !file && file.error().code == ErrorCode::not_found;
+  if (none && memory_ && memory_->damaged()) {
+    return failure(ErrorCode::corrupt, "another program has written over the memory that holds it");
+  }
+  if (none) return std::nullopt;
   auto wish = file ? decode_wish(*file) : Result<InstanceWish>(std::unexpected(file.error()));
   if (!wish) {
     return failure(ErrorCode::corrupt, fmt::format("{}: {}", path(), wish.error().describe()));

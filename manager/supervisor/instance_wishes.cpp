@@ -10,6 +10,14 @@
 
 namespace plchost {
 
+namespace {
+
+std::string configured_process(const InstanceConfig& config) {
+  return fmt::format("{} {} {}", config.core, config.priority_band, config.settings).substr(0, kMaxWishText);
+}
+
+}  // namespace
+
 void ManagedInstance::restore() {
   auto found = surroundings_.wishes.find();
   if (!found) {
@@ -47,6 +55,8 @@ void ManagedInstance::apply_configuration() {
     spdlog::info("instance {}: the configuration names another scheduler now; it takes the place of '{}'",
                  config_.name, earlier_->scheduler);
   }
+  // What failed may be what was mended.
+  if (earlier_->configured_process != configured_process(config_)) earlier_->failed = false;
   if (earlier_->configured_application == config_.application) {
     const bool boots = earlier_->host_ended && !surroundings_.applications.boot().empty();
     if (!boots) application_ = earlier_->application;
@@ -123,6 +133,7 @@ InstanceWish ManagedInstance::wish() const {
   wish.scheduler = scheduler_;
   wish.configured_application = config_.application;
   wish.configured_scheduler = config_.scheduler;
+  wish.configured_process = configured_process(config_);
   wish.safe_mode = safe_mode_;
   wish.start_kind = start_kind_;
   wish.restarts = status_.restarts;

@@ -117,6 +117,7 @@ inline constexpr Duration kAskAgain = std::chrono::seconds(2);
 //     never started or stopped by an operator            as `autostart` says.
 // * A configuration that names another application or another scheduler than when the wish was written takes
 //   effect, as a load or a change of the scheduler would: another application also ends safe mode and failed.
+//   Another core, priority band or settings file ends failed, too.
 //   It starts nothing that an operator stopped.
 // * A wish that was kept and cannot be read: failed. The machine is not started on a guess.
 class ManagedInstance : public InstanceEvents {

@@ -205,6 +205,17 @@ TEST_P(InstanceWishes, ThatFailedBeginsAnewWithAnotherConfiguredApplication) {
   EXPECT_EQ(only_start().application, "/opt/newer.so");
 }
 
+TEST_P(InstanceWishes, ThatFailedBeginsAnewWithOtherSettings) {
+  bring_up();
+  ask(ControlVerb::restart);
+  sut().on_exit(exited_with(0));
+  sut().on_exit(exited_with(kExitSetupFailed));
+  ASSERT_EQ(state(), InstanceState::failed);
+  config_.settings = "/etc/plchost/mended.cfg";
+  next_manager();
+  EXPECT_EQ(only_start().settings, "/etc/plchost/mended.cfg");
+}
+
 TEST_P(InstanceWishes, KeepsItsCrashesAndItsRestarts) {
   bring_up();
   crash_once();

@@ -1,5 +1,6 @@
 #include "manager/store/wish_store.hpp"
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -156,6 +157,20 @@ TEST_F(WishStoreTest, LeavesTheOneBeforeWholeWhenItIsKilledInAWrite) {
   bytes[kInTheText] = std::byte{0xff};
   make();
   EXPECT_EQ(sut_->find().value()->restarts, 7U);
+}
+
+TEST_F(WishStoreTest, RefusesADamagedMemoryWhereTheDiskHasNothing) {
+  ASSERT_TRUE(sut_->find());
+  ASSERT_EQ(keep(some_wish()), "");
+  auto memory = MemoryFile::open(pool_ + ".wish.line1", 1, MemoryFile::Access::read_write);
+  ASSERT_TRUE(memory);
+  constexpr std::size_t kHeader = 32;
+  std::ranges::fill(memory->bytes().subspan(kHeader), std::byte{0xff});
+  make();
+  EXPECT_TRUE(sut_->find().value());  // the disk has it
+  std::filesystem::remove(file());
+  make();
+  EXPECT_FALSE(sut_->find());
 }
 
 TEST_F(WishStoreTest, RefusesADamagedFile) {
