@@ -152,6 +152,7 @@ void Manager::make_supervisor() {
         StoreProcess::Settings{
             .pool = own.pool,
             .folder = versions_folder(applications_folder(own.state_directory, own.name), instance.name),
+            .configured = instance.application,
             .keep = own.application_versions,
             .helper = "/proc/self/exe",
             .plc_instance = options_.programs + "/plc-instance",

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cstdio>
 #include <iterator>
+#include <utility>
 
 #include <fmt/format.h>
 
+#include "api/cli/terminal.hpp"
 #include "api/dds/log_sink.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
@@ -35,6 +37,17 @@ TimePoint CliSession::deadline(Duration least) const {
 }
 
 namespace {
+
+std::vector<Row> only(const std::vector<Row>& rows, const std::vector<Column>& columns) {
+  std::vector<Row> chosen;
+  for (const Row& row : rows) {
+    Row one = Row::object();
+    for (const Column& column : columns)
+      one[column.field] = row.contains(column.field) ? row.at(column.field) : Row();
+    chosen.push_back(std::move(one));
+  }
+  return chosen;
+}
 
 std::unexpected<Error> none_selected(const std::vector<HostView>& hosts) {
   std::vector<std::string> names;
@@ -119,12 +132,32 @@ Result<void> CliSession::check_instance(const std::string& instance) {
   return unknown_name("instance", instance, names);
 }
 
-void CliSession::show(const std::vector<Row>& rows, const std::vector<Column>& columns) const {
+int CliSession::show(std::vector<Row> rows, std::vector<Column> columns) const {
+  if (!options.sort_by.empty()) {
+    if (const auto sorted = sort_rows(rows, options.sort_by); !sorted) return fail(sorted.error());
+  }
+  if (!options.columns.empty()) {
+    auto chosen = choose_columns(options.columns, rows, columns);
+    if (!chosen) return fail(chosen.error());
+    columns = *std::move(chosen);
+    if (options.json || options.csv) rows = only(rows, columns);
+  }
   if (options.csv) {
     fmt::print("{}", format_csv(rows));
+  } else if (options.json) {
+    fmt::print("{}", format_json(rows));
   } else {
-    fmt::print("{}", options.json ? format_json(rows) : format_table(rows, columns, options.coloured));
+    const bool all = options.wide || !options.columns.empty();
+    fmt::print("{}", format_table(rows, columns,
+                                  {.coloured = options.coloured, .width = all ? 0 : terminal_width()}));
   }
+  std::fflush(stdout);
+  return kExitDone;
+}
+
+void CliSession::say(std::string_view text) const {
+  if (options.quiet || options.json || options.csv) return;
+  fmt::print("{}\n", printable(std::string(text)));
   std::fflush(stdout);
 }
 

@@ -29,8 +29,12 @@ struct CliOptions {
   bool timeout_given = false;
   bool json = false;
   bool csv = false;
-  std::string colour = "auto";  ///< as --color says it
-  bool coloured = false;        ///< what comes of it
+  std::string colour = "auto";       ///< as --color says it
+  bool coloured = false;             ///< what comes of it
+  bool wide = false;                 ///< tables are not fitted to the terminal
+  bool quiet = false;                ///< nothing is said of what is done
+  std::vector<std::string> columns;  ///< the fields that are shown; empty: as usual
+  std::string sort_by;               ///< a field, "-" before it: the greatest first; empty: as they come
   bool watch = false;
   double every_s = 2.0;
 };
@@ -60,8 +64,10 @@ class CliSession {
   /// not_found: none of the hosts that are shown has an instance of that name.
   [[nodiscard]] Result<void> check_instance(const std::string& instance);
 
-  /// Prints rows as a table, JSON or CSV.
-  void show(const std::vector<Row>& rows, const std::vector<Column>& columns) const;
+  /// Prints rows as a table, JSON or CSV, as the options say; the exit code.
+  [[nodiscard]] int show(std::vector<Row> rows, std::vector<Column> columns) const;
+  /// Says in one line what was done, unless --quiet, --json or --csv.
+  void say(std::string_view text) const;
 
   /// Prints the error; returns the exit code for it.
   static int fail(const Error& error);
@@ -80,6 +86,7 @@ void add_show_verbs(const Command& plcctl, CliSession& session);
 void add_command_verbs(const Command& plcctl, CliSession& session);
 void add_check_verb(const Command& plcctl, CliSession& session);
 void add_post_verb(const Command& plcctl, CliSession& session);
+void add_wait_verb(const Command& plcctl, CliSession& session);
 void add_watch_verb(const Command& plcctl, CliSession& session);
 void add_plant_verbs(const Command& plcctl, CliSession& session);
 void add_verify_verb(const Command& plcctl, CliSession& session);

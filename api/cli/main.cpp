@@ -1,4 +1,5 @@
-#include <cmath>
+#include <algorithm>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -14,7 +15,10 @@
 #include "api/cli/words/completion.hpp"
 #include "api/cli/words/live_names.hpp"
 #include "api/cli/words/man_page.hpp"
+#include "api/cli/words/overview.hpp"
+#include "api/cli/words/short_form.hpp"
 #include "shm/base/log.hpp"
+#include "shm/base/names.hpp"
 
 namespace {
 
@@ -42,11 +46,21 @@ void add_options(CLI::App& app, plchost::CliOptions& options) {
          [&options](const std::string& form) {
            options.json = form == "json";
            options.csv = form == "csv";
+           options.wide = form == "wide";
          },
-         "table, json (an array of flat objects) or csv (default table)")
-      ->check(CLI::IsMember({"table", "json", "csv"}))
+         "table, wide (a table with all columns), json (an array of flat objects) or csv (default table)")
+      ->check(CLI::IsMember({"table", "wide", "json", "csv"}))
       ->type_name("FORM");
   app.add_flag("--json", options.json, "the same as --output json");
+  app.add_option("--columns", options.columns,
+                 "only these fields, by their names in JSON, separated by commas: name,state")
+      ->delimiter(',')
+      ->expected(1)
+      ->type_name("FIELDS");
+  app.add_option("--sort-by", options.sort_by, "sort by this field; -FIELD: the greatest first")
+      ->type_name("FIELD")
+      ->take_last();
+  app.add_flag("-q,--quiet", options.quiet, "say nothing of what is done; errors are told all the same");
   app.add_flag("-w,--watch", options.watch, "list and show: again and again, until Ctrl-C");
   app.add_option("--every", options.every_s, "seconds between two looks of --watch (default 2)")
       ->check(CLI::Range(kMinTimeout, kMaxTimeout))
@@ -86,6 +100,50 @@ std::string word_hint(const plchost::Syntax& plcctl, std::span<const std::string
     level = next;
   }
   return "";
+}
+
+std::vector<std::string> options_along(const plchost::Syntax& plcctl, std::span<const std::string> words) {
+  std::vector<std::string> names;
+  const auto add = [&](const plchost::Syntax& level) {
+    for (const auto& option : level.options) {
+      for (const std::string& name : option.names) {
+        if (std::ranges::find(names, name) == names.end()) names.push_back(name);
+      }
+    }
+  };
+  const plchost::Syntax* level = &plcctl;
+  add(*level);
+  for (const std::string& word : words) {
+    if (const plchost::Syntax* const next = level->word(word)) {
+      level = next;
+      add(*level);
+    }
+  }
+  return names;
+}
+
+std::string hint_of(const plchost::Syntax& plcctl, std::span<const std::string> words) {
+  const std::string word = word_hint(plcctl, words);
+  if (!word.empty()) return word;
+  const std::string option = plchost::unknown_option(words, options_along(plcctl, words));
+  return option.empty() ? "" : fmt::format("plcctl: {}\n", option);
+}
+
+/// 'plcctl', 'plcctl help', 'plcctl help list' and 'plcctl list' list what there is. The exit code; nothing:
+/// a command is there.
+std::optional<int> overview_wanted(const plchost::Syntax& plcctl, std::span<const std::string> words) {
+  const bool asked = !words.empty() && words.front() == "help";
+  if (asked) words = words.subspan(1);
+  const plchost::Syntax* level = &plcctl;
+  std::string said = "plcctl";
+  for (const std::string& word : words) {
+    level = level->word(word);
+    if (level == nullptr) return std::nullopt;
+    said += " " + word;
+  }
+  if (level->words.empty()) return std::nullopt;
+  fmt::print("{}", plchost::overview(*level, said));
+  return asked ? plchost::kExitDone : plchost::kExitUsage;
 }
 
 constexpr const char* kExitCodes =
@@ -133,6 +191,7 @@ int main(int argc, char** argv) {
   plchost::add_command_verbs(plcctl, session);
   plchost::add_check_verb(plcctl, session);
   plchost::add_post_verb(plcctl, session);
+  plchost::add_wait_verb(plcctl, session);
   plchost::add_watch_verb(plcctl, session);
   plchost::add_security_verb(plcctl, session);
   plchost::add_plant_verbs(plcctl, session);
@@ -147,11 +206,13 @@ int main(int argc, char** argv) {
     fmt::print("{}", plchost::man_page(plchost::syntax_of(app), kExitCodes));
     return plchost::kExitDone;
   }
+  if (const auto code = overview_wanted(plchost::syntax_of(app), words)) return *code;
   try {
-    app.parse(argc, argv);
+    const std::vector<std::string> whole = plchost::with_noun(plchost::syntax_of(app), words);
+    app.parse(std::vector<std::string>(whole.rbegin(), whole.rend()));
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() != 0) {
-      if (const std::string text = word_hint(plchost::syntax_of(app), words); !text.empty()) {
+      if (const std::string text = hint_of(plchost::syntax_of(app), words); !text.empty()) {
         fmt::print(stderr, "{}", text);
         return plchost::kExitUsage;
       }

@@ -44,6 +44,10 @@ PlotStyle terminal_style() {
   return {.width = std::clamp(width(), kLeastWidth, kGreatestWidth), .unicode = speaks_utf8()};
 }
 
+std::size_t terminal_width() {
+  return ::isatty(STDOUT_FILENO) != 0 ? std::clamp(width(), kLeastWidth, kGreatestWidth) : 0;
+}
+
 bool shows_colours() {
   return ::isatty(STDOUT_FILENO) != 0 && variable("NO_COLOR").empty() && variable("TERM") != "dumb";
 }

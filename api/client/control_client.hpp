@@ -169,9 +169,10 @@ class ControlClient {
 
   /// Posts an event `count` times, `interval` apart (0: as fast as acknowledgements come), each counted
   /// exactly once, also if plchost-dds dies meanwhile. Ends early when the host has acknowledged nothing for
-  /// `patience`: then the report says how many are not known.
+  /// `patience`: then the report says how many are not known. `stop` is asked at least every 50 ms; when it
+  /// says true, no more are posted, and the report is about those that were.
   [[nodiscard]] Result<PostReport> post_event(const ApiRequest& event, std::uint64_t count, Duration interval,
-                                              Duration patience);
+                                              Duration patience, const std::function<bool()>& stop = {});
 
   /// Posts an event once and waits until the tasks that are bound to it have ended their cycles for it.
   /// The code of the failure is the host's own: not_found: no such event, or no task is bound to it;

@@ -54,7 +54,7 @@ bool ControlClient::take_acks(TimePoint now) {
 }
 
 Result<PostReport> ControlClient::post_event(const ApiRequest& event, std::uint64_t count, Duration interval,
-                                             Duration patience) {
+                                             Duration patience, const std::function<bool()>& stop) {
   if (auto good = check_event_name(event.instance, event.argument); !good) {
     return std::unexpected(std::move(good).error());
   }
@@ -72,6 +72,7 @@ Result<PostReport> ControlClient::post_event(const ApiRequest& event, std::uint6
     // between one and the next post, or the end.
     if (!take_acks(now) && woken) update();
     TimePoint next = kNoDeadline;
+    if (stop && stop()) count = sent;
     while (sent < count && posts.has_room()) {
       next = first + interval * static_cast<Duration::rep>(sent);
       if (next > now) break;
@@ -85,7 +86,10 @@ Result<PostReport> ControlClient::post_event(const ApiRequest& event, std::uint6
       report.unacknowledged += count - sent;
       return report;
     }
-    wait_set_.wait(std::min(posts.has_room() && sent < count ? next : kNoDeadline, posts.repeat(now)));
+    constexpr Duration kStopLook = std::chrono::milliseconds(50);
+    const TimePoint look = stop ? now + kStopLook : kNoDeadline;
+    wait_set_.wait(
+        std::min({posts.has_room() && sent < count ? next : kNoDeadline, posts.repeat(now), look}));
   }
 }
 

@@ -208,7 +208,11 @@ Result<std::string> keep_file(const StoreOrder& order) {
 
 Result<std::string> set_boot(const StoreOrder& order) {
   if (auto made = make_folder(order.folder); !made) return std::unexpected(made.error());
-  if (auto written = replace_file(boot_path(order.folder), order.boot, kFileMode); !written) {
+  if (order.boot == order.configured) {
+    std::error_code error;
+    std::filesystem::remove(boot_path(order.folder), error);
+    if (error) return failure(ErrorCode::system, "remove " + boot_path(order.folder), error.value());
+  } else if (auto written = replace_file(boot_path(order.folder), order.boot, kFileMode); !written) {
     return std::unexpected(written.error());
   }
   if (auto synced = sync_directory(order.folder); !synced) return std::unexpected(synced.error());

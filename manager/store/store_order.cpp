@@ -18,6 +18,7 @@ struct OrderText {
 };
 constexpr std::array kOrderTexts = {OrderText{"folder", &StoreOrder::folder},
                                     OrderText{"boot", &StoreOrder::boot},
+                                    OrderText{"configured", &StoreOrder::configured},
                                     OrderText{"source", &StoreOrder::source},
                                     OrderText{"sha256", &StoreOrder::digest},
                                     OrderText{"name", &StoreOrder::name},

@@ -14,6 +14,8 @@ namespace plchost {
 struct StoreOrder {
   std::string folder;  ///< of the instance, see api/control/application_versions.hpp; made if it is missing
   std::string boot;    ///< absolute path
+  std::string
+      configured;      ///< that of the configuration: as `boot` it takes back what was the boot application
   std::string source;  ///< what was sent; the sender may still write to it
   std::uint64_t size = 0;  ///< that it must have
   std::string digest;      ///< and its SHA-256

@@ -37,6 +37,7 @@ Result<void> StoreProcess::set_boot(const std::string& path, Done done) {
   StoreOrder store;
   store.folder = settings_.folder;
   store.boot = path;
+  store.configured = settings_.configured;
   return start(store, std::move(done));
 }
 

@@ -17,6 +17,7 @@ class StoreProcess : public ApplicationKeeper {
   struct Settings {
     std::string pool;          ///< whose shared memory holds what was sent
     std::string folder;        ///< of the versions of the instance
+    std::string configured;    ///< application of the configuration
     std::uint32_t keep = 5;    ///< versions
     std::string helper;        ///< program: plchostd
     std::string plc_instance;  ///< program that tries an application

@@ -119,6 +119,23 @@ void ManagedInstance::set_boot(const std::string& text) {
   if (!started) tell(std::unexpected(started.error()));
 }
 
+// What was loaded long ago must not win without a word.
+void ManagedInstance::tell_boot_application() const {
+  const auto version = surroundings_.applications.version_at(application_);
+  const std::string what =
+      version ? fmt::format("version {} ({}, {})", version->number, version->name,
+                            version->by.empty() ? "sent by an unsecured client" : "sent by " + version->by)
+              : application_;
+  const bool boot = application_ == surroundings_.applications.boot();
+  spdlog::info("instance {}: {} {}, in the place of {} of the configuration{}", config_.name,
+               boot ? "its boot application is" : "what was loaded last is", what,
+               config_.application.empty() ? "none" : config_.application,
+               config_.application.empty()
+                   ? ""
+                   : fmt::format("; 'plcctl load application {} {} --on-host --boot' takes that back",
+                                 config_.name, config_.application));
+}
+
 // What a client is told when it has worked: which version is in the instance now.
 std::string ManagedInstance::loaded_text() const {
   if (!operation_ || operation_->request.verb == ControlVerb::load_application) return "";

@@ -43,6 +43,7 @@ ManagedInstance::ManagedInstance(const InstanceConfig& config, Surroundings surr
   if (application_.empty()) application_ = config.application;
   unix_offset_ns_ = unix_time_ns() - surroundings_.now().time_since_epoch().count();
   restore();
+  if (application_ != config.application) tell_boot_application();
   status_.name.assign(config.name);
   status_.scheduler.assign(scheduler_);
   status_.application.assign(application_);

@@ -192,6 +192,7 @@ class ManagedInstance : public InstanceEvents {
   void on_application_kept(const Result<std::string>& path);
   [[nodiscard]] bool sets_boot(ErrorCode code) const;
   void set_boot(const std::string& text);
+  void tell_boot_application() const;
   [[nodiscard]] std::string loaded_text() const;
   [[nodiscard]] bool has_option(std::string_view name) const;
   [[nodiscard]] bool loads_online() const;

@@ -9,9 +9,9 @@ Row to_row(const plc_ApplicationStatus& status, bool loaded) {
   const bool sent = status.version > 0;
   return {{"host", dds::text_of(status.host)},
           {"instance", dds::text_of(status.instance)},
-          {"version", sent ? Row(status.version) : Row("")},
+          {"version", sent ? Row(status.version) : Row()},
           {"file", sent ? dds::text_of(status.file_name) : dds::text_of(status.path)},
-          {"size", sent ? Row(status.size) : Row("")},
+          {"size", sent ? Row(status.size) : Row()},
           {"sent", time_text(status.stored_unix_ns)},
           {"sent_unix_ns", status.stored_unix_ns},
           {"by", dds::text_of(status.by)},

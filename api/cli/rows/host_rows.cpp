@@ -70,20 +70,21 @@ Row to_row(const HostView& host, const std::optional<ClockOffset>& clock) {
 }
 
 const std::vector<Column>& host_columns() {
-  static const std::vector<Column> columns{{"host", "HOST"},
-                                           {"state", "STATE"},
-                                           {"version", "VERSION"},
-                                           {"uptime_s", "UP(s)"},
-                                           {"running", "RUNNING"},
-                                           {"instances", "INSTANCES"},
-                                           {"load", "LOAD", 2},
-                                           {"cores", "CORES"},
-                                           {"available_mib", "FREE(MiB)"},
-                                           {"clock_offset_us", "CLOCK(us)", 0},
-                                           {"clock_uncertainty_us", "+-(us)", 0},
-                                           {"secured", "SECURED"},
-                                           {"labels", "LABELS"},
-                                           {"problem", "PROBLEM"}};
+  static const std::vector<Column> columns{
+      {"host", "HOST"},
+      {"state", "STATE"},
+      {.field = "version", .header = "VERSION", .rank = 3},
+      {.field = "uptime_s", .header = "UP(s)", .rank = 1},
+      {"running", "RUNNING"},
+      {"instances", "INSTANCES"},
+      {.field = "load", .header = "LOAD", .decimals = 2, .rank = 2},
+      {.field = "cores", .header = "CORES", .rank = 5},
+      {.field = "available_mib", .header = "FREE(MiB)", .rank = 4},
+      {.field = "clock_offset_us", .header = "CLOCK(us)", .decimals = 0, .rank = 6},
+      {.field = "clock_uncertainty_us", .header = "+-(us)", .decimals = 0, .rank = 7},
+      {.field = "secured", .header = "SECURED", .rank = 4},
+      {"labels", "LABELS"},
+      {"problem", "PROBLEM"}};
   return columns;
 }
 

@@ -107,7 +107,7 @@ Row to_short_row(std::string_view host, const ListedObject& object) {
   if (info.type == ObjectType::mutex) {
     row["value"] = holder_text(object);
   } else if (!memory) {
-    row["value"] = fmt::format("{}", info.value);
+    row["value"] = info.value;
   }
   row["waiters"] = info.waiters;
   row["references"] = info.reference_count;

@@ -1,9 +1,11 @@
 #include "api/cli/rows/rows.hpp"
 
+#include <charconv>
 #include <cstdint>
 #include <ctime>
 #include <span>
 #include <string_view>
+#include <system_error>
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
@@ -21,6 +23,17 @@ std::int64_t to_seconds(std::int64_t nanoseconds) {
   return nanoseconds / 1'000'000'000;
 }
 
+// Entries are texts; a whole number in one is a number for programs.
+Row value_of(std::string_view text) {
+  std::int64_t number = 0;
+  const char* const end = text.data() + text.size();
+  // NOLINTNEXTLINE(bugprone-suspicious-stringview-data-usage): `end` is the size
+  const auto read = std::from_chars(text.data(), end, number);
+  // "007" is a name, not 7.
+  const bool whole = read.ec == std::errc() && read.ptr == end && fmt::format("{}", number) == text;
+  return whole ? Row(number) : Row(text);
+}
+
 }  // namespace
 
 std::string time_text(std::int64_t unix_ns) {
@@ -33,7 +46,7 @@ std::string time_text(std::int64_t unix_ns) {
 void add_extension(Row& row, std::span<const plc_KeyValue> entries) {
   for (const plc_KeyValue& entry : entries) {
     const std::string name(text_of(entry.name));
-    if (!row.contains(name)) row[name] = text_of(entry.value);
+    if (!row.contains(name)) row[name] = value_of(text_of(entry.value));
   }
 }
 
@@ -96,38 +109,49 @@ Row to_row(const plc_Transition& transition) {
 }
 
 const std::vector<Column>& transition_columns() {
-  static const std::vector<Column> columns{{"time", "TIME"},       {"host", "HOST"}, {"instance", "INSTANCE"},
-                                           {"sequence", "NUMBER"}, {"of", "OF"},     {"from", "FROM"},
-                                           {"to", "TO"},           {"pid", "PID"},   {"reason", "REASON"}};
+  static const std::vector<Column> columns{{"time", "TIME"},
+                                           {"host", "HOST"},
+                                           {"instance", "INSTANCE"},
+                                           {.field = "sequence", .header = "NUMBER", .rank = 3},
+                                           {.field = "of", .header = "OF", .rank = 1},
+                                           {"from", "FROM"},
+                                           {"to", "TO"},
+                                           {.field = "pid", .header = "PID", .rank = 2, .none = 0},
+                                           {"reason", "REASON"}};
   return columns;
 }
 
 const std::vector<Column>& instance_columns() {
-  static const std::vector<Column> columns{{"host", "HOST"},         {"name", "NAME"},
-                                           {"state", "STATE"},       {"pid", "PID"},
-                                           {"core", "CORE"},         {"scheduler", "SCHEDULER"},
-                                           {"restarts", "RESTARTS"}, {"application", "APPLICATION"},
-                                           {"problem", "PROBLEM"}};
+  static const std::vector<Column> columns{{.field = "host", .header = "HOST", .rank = 1},
+                                           {.field = "name", .header = "NAME"},
+                                           {.field = "state", .header = "STATE"},
+                                           {.field = "pid", .header = "PID", .rank = 5, .none = 0},
+                                           {.field = "core", .header = "CORE", .rank = 3, .none = -1},
+                                           {.field = "scheduler", .header = "SCHEDULER", .rank = 4},
+                                           {.field = "restarts", .header = "RESTARTS", .rank = 2},
+                                           {.field = "application", .header = "APPLICATION", .rank = 6},
+                                           {.field = "problem", .header = "PROBLEM"}};
   return columns;
 }
 
 const std::vector<Column>& task_columns() {
-  static const std::vector<Column> columns{{"host", "HOST"},
-                                           {"instance", "INSTANCE"},
-                                           {"task", "TASK"},
-                                           {"kind", "KIND"},
-                                           {"priority", "PRIO"},
-                                           {"interval_us", "INTERVAL(us)", 0},
-                                           {"state", "STATE"},
-                                           {"cycles", "CYCLES"},
-                                           {"lost_cycles", "LOST"},
-                                           {"lost_events", "LOST-EV"},
-                                           {"exec_avg_us", "EXEC-AVG(us)"},
-                                           {"exec_max_us", "EXEC-MAX(us)"},
-                                           {"latency_p50_us", "LAT-P50(us)"},
-                                           {"latency_p99_us", "LAT-P99(us)"},
-                                           {"latency_max_us", "LAT-MAX(us)"},
-                                           {"jitter_max_us", "JITTER-MAX(us)"}};
+  static const std::vector<Column> columns{
+      {.field = "host", .header = "HOST", .rank = 2},
+      {.field = "instance", .header = "INSTANCE"},
+      {.field = "task", .header = "TASK"},
+      {.field = "kind", .header = "KIND", .rank = 3},
+      {.field = "priority", .header = "PRIO", .rank = 4},
+      {.field = "interval_us", .header = "INTERVAL(us)", .decimals = 0, .rank = 5},
+      {.field = "state", .header = "STATE"},
+      {.field = "cycles", .header = "CYCLES"},
+      {.field = "lost_cycles", .header = "LOST"},
+      {.field = "lost_events", .header = "LOST-EV", .rank = 1},
+      {.field = "exec_avg_us", .header = "EXEC-AVG(us)", .rank = 7},
+      {.field = "exec_max_us", .header = "EXEC-MAX(us)", .rank = 4},
+      {.field = "latency_p50_us", .header = "LAT-P50(us)", .rank = 6},
+      {.field = "latency_p99_us", .header = "LAT-P99(us)", .rank = 7},
+      {.field = "latency_max_us", .header = "LAT-MAX(us)", .rank = 3},
+      {.field = "jitter_max_us", .header = "JITTER-MAX(us)", .rank = 8}};
   return columns;
 }
 

@@ -10,15 +10,16 @@ namespace plchost {
 
 namespace {
 
-std::string cell_of(const Row& row, const char* field, int decimals) {
-  const auto found = row.find(field);
+std::string cell_of(const Row& row, const Column& column) {
+  const auto found = row.find(column.field);
   if (found == row.end() || found->is_null()) return "-";
+  if (found->is_number_integer() && found->get<std::int64_t>() == column.none) return "-";
   if (found->is_string()) {
     auto text = printable(found->get<std::string>());
     return text.empty() ? "-" : text;
   }
   if (found->is_number_float()) {
-    const std::string text = fmt::format("{:.{}f}", found->get<double>(), decimals);
+    const std::string text = fmt::format("{:.{}f}", found->get<double>(), column.decimals);
     return text == "-0" ? "0" : text;
   }
   if (found->is_boolean()) return found->get<bool>() ? "yes" : "no";
@@ -55,6 +56,58 @@ std::string coloured_cell(std::string_view field, std::string text) {
   return colour == 0 ? text : fmt::format("\x1b[{}m{}\x1b[0m", colour, text);
 }
 
+/// A column as it stands in the table.
+struct PrintedColumn {
+  Column column;
+  std::vector<std::string> cells;  ///< the header first
+  std::size_t width = 0;
+  bool right = false;
+};
+
+PrintedColumn print_column(const std::vector<Row>& rows, const Column& column) {
+  PrintedColumn printed{.column = column, .cells = {column.header}, .width = 0, .right = false};
+  for (const Row& row : rows) printed.cells.push_back(cell_of(row, column));
+  printed.width = width_of(std::ranges::max(printed.cells, {}, width_of));
+  printed.right = is_number(rows, column.field);
+  return printed;
+}
+
+std::size_t width_of_all(const std::vector<PrintedColumn>& columns) {
+  std::size_t width = 0;
+  for (const PrintedColumn& one : columns) width += one.width + (width > 0 ? 2 : 0);
+  return width;
+}
+
+// Columns of the greatest rank go first, the right one of equals. What stays may be wider all the same.
+void fit(std::vector<PrintedColumn>& columns, std::size_t width) {
+  while (width_of_all(columns) > width) {
+    auto least = columns.end();
+    for (auto at = columns.begin(); at != columns.end(); ++at) {
+      if (at->column.rank > 0 && (least == columns.end() || at->column.rank >= least->column.rank))
+        least = at;
+    }
+    if (least == columns.end()) return;
+    columns.erase(least);
+  }
+}
+
+// The rows' own names come first; they live as long as the rows.
+std::vector<std::string_view> fields_of(const std::vector<Row>& rows, const std::vector<Column>& columns) {
+  std::vector<std::string_view> fields;
+  if (!rows.empty()) {
+    for (const auto& [field, value] : rows.front().items()) fields.push_back(field);
+  }
+  for (const Column& column : columns) {
+    if (std::ranges::find(fields, column.field) == fields.end()) fields.emplace_back(column.field);
+  }
+  return fields;
+}
+
+std::unexpected<Error> unknown_field(std::string_view field, const std::vector<std::string_view>& all) {
+  return failure(ErrorCode::invalid_argument,
+                 fmt::format("there is no column '{}'; there are {}", shown(field), join_names(all)));
+}
+
 std::string csv_field(const Row& value) {
   if (value.is_null()) return "";
   std::string text = value.is_string() ? printable(value.get<std::string>())
@@ -67,19 +120,19 @@ std::string csv_field(const Row& value) {
 
 }  // namespace
 
-std::string format_table(const std::vector<Row>& rows, const std::vector<Column>& columns, bool coloured) {
+std::string format_table(const std::vector<Row>& rows, const std::vector<Column>& columns,
+                         const TableStyle& style) {
+  std::vector<PrintedColumn> printed;
+  for (const Column& column : columns) printed.push_back(print_column(rows, column));
+  if (style.width > 0) fit(printed, style.width);
   std::vector<std::string> lines(rows.size() + 1);
-  for (const Column& column : columns) {
-    const bool last = &column == &columns.back();
-    std::vector<std::string> cells{column.header};
-    for (const Row& row : rows) cells.push_back(cell_of(row, column.field, column.decimals));
-    const std::size_t width = width_of(std::ranges::max(cells, {}, width_of));
-    const bool right = is_number(rows, column.field);
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      const std::string padding(width - width_of(cells[i]), ' ');
-      if (right) lines[i] += padding;
-      lines[i] += coloured && i > 0 ? coloured_cell(column.field, cells[i]) : cells[i];
-      if (!right && !last) lines[i] += padding;
+  for (const PrintedColumn& one : printed) {
+    const bool last = &one == &printed.back();
+    for (std::size_t i = 0; i < one.cells.size(); ++i) {
+      const std::string padding(one.width - width_of(one.cells[i]), ' ');
+      if (one.right) lines[i] += padding;
+      lines[i] += style.coloured && i > 0 ? coloured_cell(one.column.field, one.cells[i]) : one.cells[i];
+      if (!one.right && !last) lines[i] += padding;
       if (!last) lines[i] += "  ";
     }
   }
@@ -88,12 +141,46 @@ std::string format_table(const std::vector<Row>& rows, const std::vector<Column>
   return text;
 }
 
+Result<std::vector<Column>> choose_columns(const std::vector<std::string>& fields,
+                                           const std::vector<Row>& rows, const std::vector<Column>& columns) {
+  const auto all = fields_of(rows, columns);
+  std::vector<Column> chosen;
+  for (const std::string& field : fields) {
+    const auto known = std::ranges::find(columns, field, &Column::field);
+    if (known != columns.end()) {
+      chosen.push_back(*known);
+      chosen.back().rank = 0;
+      continue;
+    }
+    const auto of_rows = std::ranges::find(all, field);
+    if (of_rows == all.end()) return unknown_field(field, all);
+    chosen.push_back({.field = of_rows->data(), .header = of_rows->data(), .decimals = 3});
+  }
+  return chosen;
+}
+
+Result<void> sort_rows(std::vector<Row>& rows, std::string_view field) {
+  const bool down = field.starts_with('-');
+  if (down) field.remove_prefix(1);
+  const auto all = fields_of(rows, {});
+  if (!rows.empty() && std::ranges::find(all, field) == all.end()) return unknown_field(field, all);
+  const std::string name(field);
+  const auto before = [&](const Row& left, const Row& right) {
+    const Row& a = left.contains(name) ? left.at(name) : Row();
+    const Row& b = right.contains(name) ? right.at(name) : Row();
+    return down ? b < a : a < b;
+  };
+  std::ranges::stable_sort(rows, before);
+  return {};
+}
+
 std::string format_fields(const Row& row) {
   std::size_t width = 0;
   for (const auto& [field, value] : row.items()) width = std::max(width, field.size());
   std::string text;
   for (const auto& [field, value] : row.items()) {
-    text += fmt::format("{:<{}}  {}\n", printable(field), width, cell_of(row, field.c_str(), 3));
+    text += fmt::format("{:<{}}  {}\n", printable(field), width,
+                        cell_of(row, {.field = field.c_str(), .header = "", .decimals = 3}));
   }
   return text;
 }

@@ -1,9 +1,15 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <nlohmann/json.hpp>
+
+#include "shm/base/result.hpp"
 
 namespace plchost {
 
@@ -17,13 +23,31 @@ struct Column {
   const char* field;
   const char* header;
   int decimals = 1;
+  /// Where the table is wider than the terminal, columns of the greatest rank are left out first; 0: never.
+  int rank = 0;
+  /// This number means that there is none; a table shows "-".
+  std::int64_t none = std::numeric_limits<std::int64_t>::min();
+};
+
+struct TableStyle {
+  bool coloured = false;  ///< states are, by how well they are
+  std::size_t width = 0;  ///< characters of the terminal; 0: the table is as wide as it is
 };
 
 /// An aligned table with a header line: texts to the left, numbers to the right. An empty text is shown as
-/// "-". Characters that could drive a terminal are shown as '?'. `coloured`: states are, by how well they
-/// are.
+/// "-". Characters that could drive a terminal are shown as '?'.
 [[nodiscard]] std::string format_table(const std::vector<Row>& rows, const std::vector<Column>& columns,
-                                       bool coloured = false);
+                                       const TableStyle& style = {});
+
+/// The columns that the user names ("host,state"): of `columns`, or of a field that rows have and no column.
+/// invalid_argument: an unknown one; lists those that there are.
+[[nodiscard]] Result<std::vector<Column>> choose_columns(const std::vector<std::string>& fields,
+                                                         const std::vector<Row>& rows,
+                                                         const std::vector<Column>& columns);
+
+/// Sorts by a field: numbers by size, texts by their letters; "-pid": the greatest first. Equal ones stay in
+/// their order. invalid_argument: no row has it; lists those that there are.
+[[nodiscard]] Result<void> sort_rows(std::vector<Row>& rows, std::string_view field);
 
 /// One "field  value" line for each field, in characters as above.
 [[nodiscard]] std::string format_fields(const Row& row);

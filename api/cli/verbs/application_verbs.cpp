@@ -90,8 +90,10 @@ int send(CliSession& session, const LoadArguments& arguments) {
 int load(CliSession& session, const LoadArguments& arguments) {
   if (!arguments.on_host) return send(session, arguments);
   const std::string path = std::filesystem::absolute(arguments.file).lexically_normal();
-  return command(session, {"", plc_OPERATION_LOAD_APPLICATION, arguments.instance, path,
-                           options_of(arguments.boot, arguments.online)});
+  return command(session,
+                 {"", plc_OPERATION_LOAD_APPLICATION, arguments.instance, path,
+                  options_of(arguments.boot, arguments.online)},
+                 fmt::format("{} is loaded", path));
 }
 
 /// INSTANCE/PATH of what is loaded on a host.
@@ -124,8 +126,7 @@ int list_applications(CliSession& session, const std::string& instance) {
       rows.push_back(to_row(status, is_loaded));
     }
   }
-  session.show(rows, application_columns());
-  return kExitDone;
+  return session.show(rows, application_columns());
 }
 
 }  // namespace
@@ -148,8 +149,10 @@ void add_application_verbs(const Command& plcctl, CliSession& session) {
   plcctl.verb("rollback", back)
       .noun("application", back,
             [&session, back_to] {
-              return command(session, {"", plc_OPERATION_ROLLBACK_APPLICATION, back_to->instance, "",
-                                       options_of(back_to->boot, back_to->online)});
+              return command(session,
+                             {"", plc_OPERATION_ROLLBACK_APPLICATION, back_to->instance, "",
+                              options_of(back_to->boot, back_to->online)},
+                             "what was loaded before is loaded");
             })
       .argument("INSTANCE", back_to->instance)
       .flag("--boot", back_to->boot, kBootHelp)

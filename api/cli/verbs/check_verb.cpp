@@ -61,7 +61,7 @@ int check_host(CliSession& session, bool all) {
     for (const plc_HostFinding& finding : *findings) {
       if (all || finding.level != kOk) rows.push_back(row_of(finding));
     }
-    session.show(rows, {});
+    if (const int shown = session.show(rows, {}); shown != kExitDone) return shown;
   } else {
     print_all(*findings, all);
   }

@@ -17,38 +17,52 @@ namespace {
 int command_event(CliSession& session, std::int32_t operation, const std::string& name) {
   const auto parts = split_name("EVENT", name);
   if (!parts) return CliSession::fail(parts.error());
-  return command(session, {"", operation, parts->first, parts->second});
+  return command(session, {"", operation, parts->first, parts->second},
+                 fmt::format("event {} is {}", parts->second,
+                             operation == plc_OPERATION_REGISTER_EVENT ? "registered" : "unregistered"));
 }
 
 /// "INSTANCE/TASK", or "INSTANCE" for all of its tasks.
 int reset_statistics(CliSession& session, const std::string& name) {
+  constexpr std::string_view kStatistics = "its statistics begin anew";
   if (name.find('/') == std::string::npos) {
-    return command(session, {"", plc_OPERATION_RESET_STATISTICS, name, ""});
+    return command(session, {"", plc_OPERATION_RESET_STATISTICS, name, ""}, kStatistics);
   }
   const auto parts = split_name("TASK", name);
   if (!parts) return CliSession::fail(parts.error());
-  return command(session, {"", plc_OPERATION_RESET_STATISTICS, parts->first, parts->second});
+  return command(session, {"", plc_OPERATION_RESET_STATISTICS, parts->first, parts->second}, kStatistics);
 }
 
-void add_plain(const Command& plcctl, CliSession& session, const char* verb, std::int32_t operation,
-               const char* text) {
-  const auto name = std::make_shared<std::string>();
-  plcctl.verb(verb, text)
-      .noun("instance", text,
-            [&session, name, operation] { return command(session, {"", operation, *name, ""}); })
-      .argument("INSTANCE", *name);
+struct Plain {
+  const char* verb;
+  std::int32_t operation;
+  const char* text;
+  const char* done;  ///< what is said of the instance then
+};
+
+constexpr const char* kSeveral = "one or more; 'line*' stands for all that begin with line";
+
+void add_plain(const Command& plcctl, CliSession& session, const Plain& plain) {
+  const auto names = std::make_shared<std::vector<std::string>>();
+  plcctl.verb(plain.verb, plain.text)
+      .noun("instance", plain.text,
+            [&session, names, plain] {
+              return command_each(session, *names, {"", plain.operation, "", ""}, plain.done);
+            })
+      .arguments("INSTANCE", *names, kSeveral);
 }
 
 void add_reset(const Command& plcctl, CliSession& session) {
   const Command verb = plcctl.verb("reset", "Begin anew: an instance, or its statistics");
   const auto name = std::make_shared<std::string>();
+  const auto names = std::make_shared<std::vector<std::string>>();
   const auto cold = std::make_shared<bool>(false);
   verb.noun("instance", "Load the application anew, in a fresh process, stopped",
-            [&session, name, cold] {
-              return command(session,
-                             {"", *cold ? plc_OPERATION_RESET_COLD : plc_OPERATION_RESET, *name, ""});
+            [&session, names, cold] {
+              const auto operation = *cold ? plc_OPERATION_RESET_COLD : plc_OPERATION_RESET;
+              return command_each(session, *names, {"", operation, "", ""}, "reset, and stopped");
             })
-      .argument("INSTANCE", *name)
+      .arguments("INSTANCE", *names, kSeveral)
       .flag("--cold", *cold, "tell the application to begin with initial values");
   verb.noun("statistics", "Begin the statistics of a task, or of all of an instance, anew",
             [&session, name] { return reset_statistics(session, *name); })
@@ -70,7 +84,8 @@ void add_set(const Command& plcctl, CliSession& session) {
   plcctl.verb("set", text)
       .noun("scheduler", text,
             [&session, instance, scheduler] {
-              return command(session, {"", plc_OPERATION_SET_SCHEDULER, *instance, *scheduler});
+              return command(session, {"", plc_OPERATION_SET_SCHEDULER, *instance, *scheduler},
+                             fmt::format("runs under {}", *scheduler));
             })
       .argument("INSTANCE", *instance)
       .argument("SCHEDULER", *scheduler);
@@ -79,12 +94,15 @@ void add_set(const Command& plcctl, CliSession& session) {
 }  // namespace
 
 void add_command_verbs(const Command& plcctl, CliSession& session) {
-  add_plain(plcctl, session, "start", plc_OPERATION_START, "Run the application of an instance");
-  add_plain(plcctl, session, "stop", plc_OPERATION_STOP, "Stop the application of an instance");
-  add_plain(plcctl, session, "single-cycle", plc_OPERATION_SINGLE_CYCLE,
-            "Run one cycle of each cyclic and freewheeling task of a stopped application");
+  add_plain(plcctl, session, {"start", plc_OPERATION_START, "Run the application of an instance", "started"});
+  add_plain(plcctl, session, {"stop", plc_OPERATION_STOP, "Stop the application of an instance", "stopped"});
+  add_plain(
+      plcctl, session,
+      {"single-cycle", plc_OPERATION_SINGLE_CYCLE,
+       "Run one cycle of each cyclic and freewheeling task of a stopped application", "has run one cycle"});
   add_reset(plcctl, session);
-  add_plain(plcctl, session, "restart", plc_OPERATION_RESTART, "Load the application anew and run it");
+  add_plain(plcctl, session,
+            {"restart", plc_OPERATION_RESTART, "Load the application anew and run it", "restarted"});
   add_event(plcctl, session, "register", plc_OPERATION_REGISTER_EVENT, "Register an external event");
   add_event(plcctl, session, "unregister", plc_OPERATION_UNREGISTER_EVENT, "Unregister an external event");
   add_application_verbs(plcctl, session);

@@ -1,10 +1,13 @@
 #include "api/cli/verbs/host_commands.hpp"
 
 #include <algorithm>
+#include <iterator>
+#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "api/dds/object_query.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
 
@@ -38,7 +41,8 @@ std::string advice(CliSession& session, const HostOutcome& outcome, const std::s
 }
 
 /// Says what became of it at one of `count` hosts; its exit code.
-int tell(CliSession& session, const HostOutcome& outcome, const std::string& instance, std::size_t count) {
+int tell(CliSession& session, const HostOutcome& outcome, const std::string& instance, std::size_t count,
+         std::string_view done) {
   const std::string where = count > 1 ? outcome.host + ": " : "";
   if (!outcome.reply) {
     Error error = outcome.reply.error();
@@ -50,10 +54,8 @@ int tell(CliSession& session, const HostOutcome& outcome, const std::string& ins
     fmt::print(stderr, "plcctl: {}\n", printable(said));
     return kExitFailed;
   }
-  if (session.options.json || session.options.csv) return kExitDone;
-  if (count > 1 || !outcome.reply->text.empty()) {
-    fmt::print("{}\n", printable(where + (outcome.reply->text.empty() ? "done" : outcome.reply->text)));
-  }
+  session.say(outcome.reply->text.empty() ? fmt::format("{}{}: {}", where, instance, done)
+                                          : where + outcome.reply->text);
   return kExitDone;
 }
 
@@ -67,20 +69,93 @@ Row row_of(const HostOutcome& outcome, const std::string& instance) {
 
 }  // namespace
 
-int command(CliSession& session, const ApiRequest& request) {
-  const auto hosts = session.target_hosts();
-  if (!hosts) return CliSession::fail(hosts.error());
+namespace {
+
+int command_on(CliSession& session, const std::vector<std::string>& hosts, const ApiRequest& request,
+               std::string_view done) {
   const TimePoint deadline =
       session.deadline(takes_long(request.operation) ? kLongCommand : Duration::zero());
-  return ask_hosts(session, *hosts, request.instance, [&](ControlClient& client, const std::string& host) {
+  return ask_hosts(
+      session, hosts, request.instance,
+      [&](ControlClient& client, const std::string& host) {
+        ApiRequest own = request;
+        own.host = host;
+        return client.call(own, deadline);
+      },
+      done);
+}
+
+bool is_pattern(std::string_view name) {
+  return name.find_first_of("*?") != std::string_view::npos;
+}
+
+/// All instances of the hosts that are shown, in the order of their hosts.
+Result<std::vector<NamedInstance>> all_instances(CliSession& session) {
+  const auto hosts = session.shown_hosts();
+  if (!hosts) return std::unexpected(hosts.error());
+  std::vector<NamedInstance> all;
+  for (const HostView& host : *hosts) {
+    const auto samples = session.client().value()->instances(host.name, session.deadline());
+    if (!samples) return std::unexpected(samples.error());
+    for (const plc_InstanceStatus& sample : *samples) {
+      const std::string name(dds::text_of(sample.instance));
+      auto known = std::ranges::find(all, name, &NamedInstance::name);
+      if (known == all.end()) known = all.insert(all.end(), {.name = name, .hosts = {}});
+      known->hosts.push_back(host.name);
+    }
+  }
+  return all;
+}
+
+}  // namespace
+
+int command(CliSession& session, const ApiRequest& request, std::string_view done) {
+  const auto hosts = session.target_hosts();
+  if (!hosts) return CliSession::fail(hosts.error());
+  return command_on(session, *hosts, request, done);
+}
+
+Result<std::vector<NamedInstance>> expand(CliSession& session, const std::vector<std::string>& names) {
+  std::vector<NamedInstance> expanded;
+  std::optional<std::vector<NamedInstance>> all;
+  for (const std::string& name : names) {
+    if (!is_pattern(name)) {
+      expanded.push_back({.name = name, .hosts = {}});
+      continue;
+    }
+    if (!all) {
+      auto known = all_instances(session);
+      if (!known) return std::unexpected(std::move(known).error());
+      all = *std::move(known);
+    }
+    const std::size_t before = expanded.size();
+    std::ranges::copy_if(*all, std::back_inserter(expanded),
+                         [&](const NamedInstance& one) { return matches_pattern(name, one.name); });
+    if (expanded.size() > before) continue;
+    std::vector<std::string> known;
+    for (const NamedInstance& one : *all) known.push_back(one.name);
+    return unknown_name("instance", name, known);
+  }
+  return expanded;
+}
+
+int command_each(CliSession& session, const std::vector<std::string>& names, const ApiRequest& request,
+                 std::string_view done) {
+  const auto instances = expand(session, names);
+  if (!instances) return CliSession::fail(instances.error());
+  const auto hosts = session.target_hosts();
+  if (!hosts) return CliSession::fail(hosts.error());
+  int code = kExitDone;
+  for (const NamedInstance& one : *instances) {
     ApiRequest own = request;
-    own.host = host;
-    return client.call(own, deadline);
-  });
+    own.instance = one.name;
+    code = std::max(code, command_on(session, one.hosts.empty() ? *hosts : one.hosts, own, done));
+  }
+  return code;
 }
 
 int ask_hosts(CliSession& session, const std::vector<std::string>& hosts, const std::string& instance,
-              const HostCall& call) {
+              const HostCall& call, std::string_view done) {
   std::vector<HostOutcome> outcomes;
   if (hosts.size() == 1) {  // over the connection that is there
     outcomes.push_back({.host = hosts.front(), .reply = call(*session.client().value(), hosts.front())});
@@ -88,12 +163,13 @@ int ask_hosts(CliSession& session, const std::vector<std::string>& hosts, const 
     outcomes = ask_each(session.options.dds, hosts, call);
   }
   int code = kExitDone;
-  std::vector<Row> done;
+  std::vector<Row> rows;
   for (const HostOutcome& outcome : outcomes) {
-    code = std::max(code, tell(session, outcome, instance, outcomes.size()));
-    if (outcomes.size() > 1 || code == kExitDone) done.push_back(row_of(outcome, instance));
+    code = std::max(code, tell(session, outcome, instance, outcomes.size(), done));
+    if (outcomes.size() > 1 || code == kExitDone) rows.push_back(row_of(outcome, instance));
   }
-  if ((session.options.json || session.options.csv) && !done.empty()) session.show(done, {});
+  if ((session.options.json || session.options.csv) && !rows.empty())
+    code = std::max(code, session.show(rows, {}));
   return code;
 }
 

@@ -25,8 +25,7 @@ int list_hosts(CliSession& session) {
   if (!hosts) return CliSession::fail(hosts.error());
   std::vector<Row> rows;
   for (const HostView& host : *hosts) rows.push_back(to_row(host, clock_of(session, host)));
-  session.show(rows, host_columns());
-  return kExitDone;
+  return session.show(rows, host_columns());
 }
 
 }  // namespace

@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <functional>
 #include <memory>
 #include <utility>
 
@@ -5,10 +7,12 @@
 #include "api/cli/rows/rows.hpp"
 #include "api/cli/rows/task_rows.hpp"
 #include "api/cli/verbs/application_verbs.hpp"
+#include "api/cli/verbs/host_commands.hpp"
 #include "api/cli/verbs/host_verbs.hpp"
 #include "api/cli/verbs/node_verbs.hpp"
 #include "api/cli/verbs/object_verbs.hpp"
 #include "api/cli/verbs/transition_verbs.hpp"
+#include "api/dds/text.hpp"
 
 namespace plchost {
 
@@ -17,18 +21,13 @@ namespace {
 int list_tasks(CliSession& session, const std::string& instance) {
   const auto rows = task_rows(session, instance);
   if (!rows) return CliSession::fail(rows.error());
-  session.show(*rows, task_columns());
-  return kExitDone;
+  return session.show(*rows, task_columns());
 }
 
 template <class Sample>
-bool always(const Sample& /*sample*/) {
-  return true;
-}
-
-template <class Sample>
-int list(CliSession& session, Snapshot<Sample> snapshot, const std::vector<Column>& columns,
-         bool (*is_shown)(const Sample&) = always<Sample>) {
+int list(
+    CliSession& session, Snapshot<Sample> snapshot, const std::vector<Column>& columns,
+    const std::function<bool(const Sample&)>& is_shown = [](const Sample&) { return true; }) {
   const auto hosts = session.shown_hosts();
   if (!hosts) return CliSession::fail(hosts.error());
   const auto client = session.client();
@@ -41,8 +40,21 @@ int list(CliSession& session, Snapshot<Sample> snapshot, const std::vector<Colum
       if (is_shown(sample)) rows.push_back(to_row(sample));
     }
   }
-  session.show(rows, columns);
-  return kExitDone;
+  return session.show(rows, columns);
+}
+
+int list_instances(CliSession& session, const std::vector<std::string>& names) {
+  if (names.empty()) return list(session, &ControlClient::instances, instance_columns());
+  const auto wanted = expand(session, names);
+  if (!wanted) return CliSession::fail(wanted.error());
+  for (const NamedInstance& one : *wanted) {
+    if (!one.hosts.empty()) continue;
+    if (const auto known = session.check_instance(one.name); !known) return CliSession::fail(known.error());
+  }
+  const std::function is_wanted = [&](const plc_InstanceStatus& sample) {
+    return std::ranges::find(*wanted, dds::text_of(sample.instance), &NamedInstance::name) != wanted->end();
+  };
+  return list(session, &ControlClient::instances, instance_columns(), is_wanted);
 }
 
 // Instances that never had one have nothing to show.
@@ -57,8 +69,9 @@ void add_list_verbs(const Command& plcctl, CliSession& session) {
                                    "Show all hosts, instances, tasks, events, writers, objects, nodes, "
                                    "exceptions, applications or transitions");
   add_list_hosts(verb, session);
-  verb.noun("instances", "The PLC instances",
-            [&session] { return list(session, &ControlClient::instances, instance_columns()); });
+  const auto names = std::make_shared<std::vector<std::string>>();
+  verb.noun("instances", "The PLC instances", [&session, names] { return list_instances(session, *names); })
+      .optional("INSTANCE", *names, "only these; 'line*' stands for all that begin with line");
   const auto instance = std::make_shared<std::string>();
   verb.noun("tasks", "The tasks of all applications, with their figures",
             [&session, instance] { return list_tasks(session, *instance); })
@@ -70,7 +83,8 @@ void add_list_verbs(const Command& plcctl, CliSession& session) {
   add_list_objects(verb, session);
   add_list_nodes(verb, session);
   verb.noun("exceptions", "The last exception of each instance that had any", [&session] {
-    return list(session, &ControlClient::exceptions, exception_columns(), has_happened);
+    return list(session, &ControlClient::exceptions, exception_columns(),
+                std::function<bool(const plc_ExceptionStatus&)>(has_happened));
   });
   add_list_applications(verb, session);
   add_list_transitions(verb, session);

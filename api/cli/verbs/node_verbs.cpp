@@ -35,8 +35,7 @@ int list_nodes(CliSession& session, const std::string& base) {
     if (!listing) return CliSession::fail(listing.error());
     for (const ListedNode& node : listing->nodes) rows.push_back(to_row(host.name, *listing, node));
   }
-  session.show(rows, node_columns());
-  return kExitDone;
+  return session.show(rows, node_columns());
 }
 
 int show_routes(CliSession& session, const std::string& node, const std::string& base) {
@@ -61,8 +60,7 @@ int show_routes(CliSession& session, const std::string& node, const std::string&
       for (const RouteInfo& route : page.routes) rows.push_back(to_row(host, page, route, names->nodes));
     }
   }
-  session.show(rows, route_columns());
-  return kExitDone;
+  return session.show(rows, route_columns());
 }
 
 constexpr const char* kBaseText = "nodes of this base name (default: [blocks] base of the host)";

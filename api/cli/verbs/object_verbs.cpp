@@ -100,11 +100,10 @@ int list_objects(CliSession& session, const ListArguments& arguments) {
     if (!objects) return CliSession::fail(objects.error());
     found.push_back({host.name, *std::move(objects)});
   }
-  if (session.options.csv) {
-    session.show(all_rows(found), {});
-  } else {
-    session.options.json ? print_json(found) : print_table(found);
+  if (session.options.csv || !session.options.columns.empty() || !session.options.sort_by.empty()) {
+    return session.show(all_rows(found), object_columns());
   }
+  session.options.json ? print_json(found) : print_table(found);
   return kExitDone;
 }
 

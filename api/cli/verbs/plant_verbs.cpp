@@ -84,7 +84,7 @@ int work(const CliSession& session, const std::string& file, bool apply) {
   if (session.options.json || session.options.csv) {
     std::vector<Row> rows;
     for (const PlantFinding& finding : findings) rows.push_back(row_of(finding));
-    session.show(rows, {});
+    if (const int shown = session.show(rows, {}); shown != kExitDone) return shown;
   } else {
     for (const PlantFinding& finding : findings) tell(finding, plant->file);
     if (apply && findings.empty()) fmt::print("nothing to change\n");

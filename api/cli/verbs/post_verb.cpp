@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "api/cli/cli_session.hpp"
+#include "api/cli/interrupt.hpp"
 #include "api/cli/rows/rows.hpp"
 #include "shm/base/names.hpp"
 
@@ -41,10 +42,10 @@ int tell(CliSession& session, const std::string& host, const PostArguments& argu
                                       {"unacknowledged", report.unacknowledged},
                                       {"problem", report.rejected_text}}}));
   } else if (report.accepted > 0) {
-    fmt::print("{} posted{}\n", report.accepted,
-               report.no_task > 0
-                   ? fmt::format(", {} of them while no task was bound to the event", report.no_task)
-                   : "");
+    session.say(fmt::format(
+        "{} posted{}", report.accepted,
+        report.no_task > 0 ? fmt::format(", {} of them while no task was bound to the event", report.no_task)
+                           : ""));
   }
   if (report.unacknowledged > 0) {
     return CliSession::fail({ErrorCode::timed_out, 0,
@@ -99,11 +100,15 @@ int tell_runs(const CliSession& session, const std::string& host, const PostArgu
 
 int post_and_await(CliSession& session, const PostArguments& arguments, const ApiRequest& event) {
   std::vector<RunReport> runs;
+  if (arguments.count > 1) catch_interrupts();
   const TimePoint first = MonotonicClock::now();
   for (std::uint64_t i = 0; i < arguments.count; ++i) {
     const TimePoint next =
         first + std::chrono::microseconds(arguments.interval_us) * static_cast<std::int64_t>(i);
-    while (MonotonicClock::now() < next) session.client().value()->wait_for_change(next);
+    while (MonotonicClock::now() < next && !interrupted()) {
+      session.client().value()->wait_for_change(std::min(next, MonotonicClock::now() + kInterruptLook));
+    }
+    if (interrupted()) break;
     const auto run = session.client().value()->post_and_await(event, session.timeout());
     if (!run) {
       Error error = run.error();
@@ -115,7 +120,11 @@ int post_and_await(CliSession& session, const PostArguments& arguments, const Ap
     }
     runs.push_back(*run);
   }
-  return tell_runs(session, event.host, arguments, runs);
+  const int code = runs.empty() ? kExitDone : tell_runs(session, event.host, arguments, runs);
+  if (runs.size() == arguments.count) return code;
+  fmt::print(stderr, "plcctl: interrupted: {} of {} were not posted\n", arguments.count - runs.size(),
+             arguments.count);
+  return kExitFailed;
 }
 
 int post(CliSession& session, const PostArguments& arguments) {
@@ -125,10 +134,17 @@ int post(CliSession& session, const PostArguments& arguments) {
   if (!host) return CliSession::fail(host.error());
   const ApiRequest event{*host, 0, std::move(parts->first), std::move(parts->second)};
   if (arguments.wait == "run") return post_and_await(session, arguments, event);
-  const auto report = session.client().value()->post_event(
-      event, arguments.count, std::chrono::microseconds(arguments.interval_us), session.timeout());
+  if (arguments.count > 1) catch_interrupts();
+  const auto report = session.client().value()->post_event(event, arguments.count,
+                                                           std::chrono::microseconds(arguments.interval_us),
+                                                           session.timeout(), interrupted);
   if (!report) return CliSession::fail(report.error());
-  return tell(session, *host, arguments, *report);
+  const int code = tell(session, *host, arguments, *report);
+  if (!interrupted()) return code;
+  const std::uint64_t done = report->accepted + report->rejected + report->unacknowledged;
+  fmt::print(stderr, "plcctl: interrupted: {} of {} were not posted\n", arguments.count - done,
+             arguments.count);
+  return std::max(code, kExitFailed);
 }
 
 int post_batch(CliSession& session, const std::vector<std::string>& names) {
@@ -147,8 +163,9 @@ int post_batch(CliSession& session, const std::vector<std::string>& names) {
     fmt::print("{}",
                format_json({Row{{"host", *host}, {"events", names}, {"no_task", report->no_task > 0}}}));
   } else {
-    fmt::print("{} posted{}\n", names.size(),
-               report->no_task > 0 ? ", at least one of them while no task was bound to it" : "");
+    session.say(
+        fmt::format("{} posted{}", names.size(),
+                    report->no_task > 0 ? ", at least one of them while no task was bound to it" : ""));
   }
   return kExitDone;
 }

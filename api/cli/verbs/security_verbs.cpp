@@ -108,7 +108,7 @@ int show(CliSession& session, const Said& said) {
                                              {"valid_until", "VALID UNTIL"},
                                              {"days_left", "DAYS LEFT"},
                                              {"guid_prefix", "GUID PREFIX"}};
-    session.show(rows, columns);
+    if (const int shown = session.show(rows, columns); shown != kExitDone) return shown;
     for (const Row& row : rows) {
       if (row["state"] != "expires soon" && row["state"] != "expired") continue;
       fmt::print(stderr, "plcctl: '{0}' {1} {2}: 'plcctl security renew {0}'\n",

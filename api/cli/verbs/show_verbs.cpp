@@ -47,9 +47,28 @@ Result<Sample> find(CliSession& session, Snapshot<Sample> snapshot, std::string_
   return unknown_name(what, name, names, *host);
 }
 
+// Times as people write them, and nothing where there is no process.
+Row for_people(Row row, std::int64_t state_since_unix_ns) {
+  Row said;
+  for (const auto& [field, value] : row.items()) {
+    if (field == "state_since_unix_s") {
+      said["state_since"] = time_text(state_since_unix_ns);
+    } else {
+      said[field] = value;
+    }
+  }
+  if (row.at("pid") == 0) said["pid"] = Row();
+  if (row.at("core") == -1) said["core"] = Row();
+  return said;
+}
+
 int show_instance(CliSession& session, const std::string& name) {
   const auto instance = find(session, &ControlClient::instances, "instance", name);
-  return instance ? show_row(session, to_row(*instance)) : CliSession::fail(instance.error());
+  if (!instance) return CliSession::fail(instance.error());
+  const Row row = to_row(*instance);
+  if (session.options.json || session.options.csv) return show_row(session, row);
+  fmt::print("{}", format_fields(for_people(row, instance->state_since_unix_ns)));
+  return kExitDone;
 }
 
 int show_statistics(CliSession& session, const plc_TaskStatus& task) {

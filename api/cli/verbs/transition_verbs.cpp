@@ -85,8 +85,7 @@ int list_transitions(CliSession& session, const TransitionArguments& arguments) 
   std::ranges::stable_sort(found, {}, [](const plc_Transition& sample) { return sample.time_unix_ns; });
   std::vector<Row> rows;
   for (const plc_Transition& sample : found) rows.push_back(to_row(sample));
-  session.show(rows, transition_columns());
-  return kExitDone;
+  return session.show(rows, transition_columns());
 }
 
 void print(const CliSession& session, const TransitionView& view) {

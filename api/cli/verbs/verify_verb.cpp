@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <memory>
 #include <string>
 
@@ -17,15 +18,15 @@ int verify_audit(const CliSession& session, const std::string& folder) {
   if (!findings) return CliSession::fail(findings.error());
   const int code = findings->problems.empty() ? kExitDone : kExitFailed;
   if (session.options.json || session.options.csv) {
-    session.show({{{"folder", folder},
-                   {"records", findings->records},
-                   {"first", findings->first},
-                   {"last", findings->head.number},
-                   {"hash", findings->head.hash},
-                   {"problems", fmt::format("{}", fmt::join(findings->problems, "; "))},
-                   {"remarks", fmt::format("{}", fmt::join(findings->remarks, "; "))}}},
-                 {});
-    return code;
+    const int shown = session.show({{{"folder", folder},
+                                     {"records", findings->records},
+                                     {"first", findings->first},
+                                     {"last", findings->head.number},
+                                     {"hash", findings->head.hash},
+                                     {"problems", fmt::format("{}", fmt::join(findings->problems, "; "))},
+                                     {"remarks", fmt::format("{}", fmt::join(findings->remarks, "; "))}}},
+                                   {});
+    return std::max(code, shown);
   }
   for (const std::string& problem : findings->problems) fmt::print("problem  {}\n", printable(problem));
   for (const std::string& remark : findings->remarks) fmt::print("note     {}\n", printable(remark));

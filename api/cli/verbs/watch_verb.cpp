@@ -24,8 +24,7 @@ int watch(CliSession& session, const WatchArguments& arguments) {
   return repeat(repetition, [&] {
     const auto rows = task_rows(session, arguments.instance);
     if (!rows) return CliSession::fail(rows.error());
-    session.show(*rows, task_columns());
-    return kExitDone;
+    return session.show(*rows, task_columns());
   });
 }
 

@@ -64,8 +64,19 @@ const Command& Command::choice(const char* name, std::string& value, const char*
   return *this;
 }
 
+const Command& Command::word(const char* name, std::string& value, const char* text,
+                             const std::vector<std::string>& words) const {
+  app_->add_option(name, value, text)->check(CLI::IsMember(words))->type_name("WORD");
+  return *this;
+}
+
 const Command& Command::optional(const char* form, std::string& value, const char* text) const {
   app_->add_option(form, value, text);
+  return *this;
+}
+
+const Command& Command::optional(const char* form, std::vector<std::string>& values, const char* text) const {
+  app_->add_option(form, values, text);
   return *this;
 }
 

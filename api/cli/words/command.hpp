@@ -41,6 +41,8 @@ class Command {
   const Command& arguments(const char* form, std::vector<std::string>& values, const char* text = "") const;
   /// What may follow.
   const Command& optional(const char* form, std::string& value, const char* text) const;
+  /// Any number of what may follow.
+  const Command& optional(const char* form, std::vector<std::string>& values, const char* text) const;
   const Command& flag(const char* name, bool& value, const char* text) const;
   /// A file that must be named, "-f,--file".
   const Command& file(const char* name, std::string& value, const char* text) const;
@@ -50,6 +52,9 @@ class Command {
   /// for.
   const Command& choice(const char* name, std::string& value, const char* text,
                         const std::vector<std::string>& words) const;
+  /// An option whose value is one of several words.
+  const Command& word(const char* name, std::string& value, const char* text,
+                      const std::vector<std::string>& words) const;
   /// A number from `least` to `most`; anything else is an error that names both.
   template <class Number>
   const Command& option(const char* name, Number& value, const char* text, Number least, Number most) const;

@@ -2,6 +2,7 @@
 #include <fstream>
 #include <thread>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
@@ -73,6 +74,46 @@ TEST_F(Plcctl, PrintsCommaSeparatedValues) {
   EXPECT_EQ(run({"list", "instances", "-o", "xml"}).code, 2);
 }
 
+TEST_F(Plcctl, ListsWhatThereIsWhereWordsAreMissing) {
+  for (const std::vector<std::string>& words :
+       {std::vector<std::string>{}, {"list"}, {"help"}, {"help", "list"}}) {
+    const auto result = run_program(PLCCTL_PROGRAM, words);
+    const bool asked = !words.empty() && words.front() == "help";
+    EXPECT_EQ(result.code, asked ? 0 : 2);
+    EXPECT_THAT(result.output, HasSubstr("instances [INSTANCE]"));
+  }
+  const auto option = run_program(PLCCTL_PROGRAM, {"list", "instances", "--colums=name"});
+  EXPECT_EQ(option.code, 2);
+  EXPECT_THAT(option.errors, HasSubstr("unknown option '--colums' (did you mean '--columns'?); known are "));
+}
+
+TEST_F(Plcctl, TakesSeveralNamesAndPatterns) {
+  host_.write_instance(1, "line2", InstanceState::offline, 0);
+  host_.write_instance(2, "press", InstanceState::running, 4712);
+  host_.write_count(3);
+  const auto names_in = [&](std::vector<std::string> arguments) {
+    arguments.insert(arguments.end(), {"--columns", "name", "--sort-by", "-name", "-o", "csv"});
+    return run(std::move(arguments)).output;
+  };
+  EXPECT_EQ(names_in({"list", "instances"}), "name\npress\nline2\nline1\n");
+  EXPECT_EQ(names_in({"list", "instances", "line*"}), "name\nline2\nline1\n");
+  EXPECT_EQ(names_in({"list", "instances", "press", "line1"}), "name\npress\nline1\n");
+  EXPECT_THAT(run({"list", "instances", "prss"}).errors, HasSubstr("did you mean 'press'?"));
+  EXPECT_THAT(run({"list", "instances", "x*"}).errors, HasSubstr("there are: line1, line2, press"));
+  EXPECT_THAT(run({"list", "instances", "line2"}).output, testing::Not(HasSubstr("-1")));
+  EXPECT_THAT(run({"show", "instance", "line2"}).output, testing::Not(HasSubstr("unix_s")));
+  EXPECT_EQ(run({"list", "instances", "--columns", "nmae"}).code, 2);
+}
+
+TEST_F(Plcctl, WaitsForTheStateOfInstances) {
+  EXPECT_EQ(run({"wait", "instance", "line1"}).output, "line1: running\n");
+  EXPECT_EQ(run({"wait", "instance", "line1", "-q"}).output, "");
+  const auto late = run({"wait", "instance", "line1", "--for", "stopped", "--timeout", "0.3"});
+  EXPECT_EQ(late.code, 3);
+  EXPECT_THAT(late.errors, HasSubstr("'line1' is not stopped but running"));
+  EXPECT_EQ(run({"wait", "instance", "line1", "--for", "happy"}).code, 2);
+}
+
 TEST_F(Plcctl, CompletesTheNamesThatThereAre) {
   const auto offered = [&](std::vector<std::string> words) {
     words.insert(words.begin(), {"__complete", "--domain", std::to_string(domain_.number())});
@@ -132,6 +173,29 @@ TEST_F(Plcctl, PostsAsOftenAsAsked) {
   EXPECT_EQ(result.code, 0) << result.errors;
   EXPECT_THAT(result.output, HasSubstr("50 posted"));
   EXPECT_EQ(event_.counted().count(), 50U);
+}
+
+TEST_F(Plcctl, SaysHowManyWerePostedWhenItIsInterrupted) {
+  const std::string seen = testing::TempDir() + "plcctl-post-" + std::to_string(::getpid());
+  Child post(PLCCTL_PROGRAM,
+             {"--domain", std::to_string(domain_.number()), "post", "event", "line1/ready", "--count",
+              "1000000", "--interval-us", "1000"},
+             seen);
+  for (const TimePoint end = soon(); event_.counted().count() < 10 && MonotonicClock::now() < end;) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  }
+  post.signal(SIGINT);
+  EXPECT_EQ(post.wait(), 1);
+  const auto text_of = [](const std::string& path) {
+    std::ifstream file(path);
+    return std::string{std::istreambuf_iterator<char>(file), {}};
+  };
+  const std::uint64_t posted = event_.counted().count();
+  EXPECT_EQ(text_of(seen), fmt::format("{} posted\n", posted));
+  EXPECT_THAT(text_of(seen + ".errors"),
+              HasSubstr(fmt::format("interrupted: {} of 1000000 were not posted", 1'000'000 - posted)));
+  std::filesystem::remove(seen);
+  std::filesystem::remove(seen + ".errors");
 }
 
 TEST_F(Plcctl, SuggestsTheNameThatWasMeant) {

@@ -87,6 +87,10 @@ start_manager cell1
 manager=${managers[1]}
 until_true 20 state_is line1 running
 application_is "$kept/000002.so" || fail "it started with $(instance line1 application)"
+grep -qF "instance line1: its boot application is version 2 (" "$cell/cell1.log" || fail "the log does not tell what won"
+echo "- the application of the configuration takes that back"
+plcctl load application line1 "$APPLICATIONS/bottling_line.so" --on-host --boot
+[ ! -e "$kept/boot" ] || fail "the boot application is still $(cat "$kept/boot")"
 plcctl load application line1 "$APPLICATIONS/packer.so" --on-host --boot
 is "$(version boot boot file)" "$APPLICATIONS/packer.so" || fail "$(plcctl list applications)"
 

@@ -30,7 +30,7 @@ is "$(plcctl list instances --json | jq -r '.[] | select(.host == "south") | .st
 
 state() { plcctl list instances --json | jq -r ".[] | select(.host == \"$1\") | .state"; }
 echo "- several at once: all, by pattern, by label"
-is "$(plcctl --host all restart instance packer1)" $'north: done\nsouth: done' || fail "not both"
+is "$(plcctl --host all restart instance packer1)" $'north: packer1: restarted\nsouth: packer1: restarted' || fail "not both"
 is "$(state north),$(state south)" running,running || fail "$(plcctl list instances)"
 plcctl --host 'n?rth' stop instance packer1
 is "$(state north),$(state south)" stopped,running || fail "a pattern: $(plcctl list instances)"

@@ -4,6 +4,8 @@
 
 #include "api/cli/words/completion.hpp"
 #include "api/cli/words/man_page.hpp"
+#include "api/cli/words/overview.hpp"
+#include "api/cli/words/short_form.hpp"
 
 namespace plchost {
 namespace {
@@ -72,6 +74,26 @@ TEST(Completion, KeepsTheOptionsThatSayWhereToAsk) {
 
 TEST(Completion, OfNothingIsThatOfAnEmptyWord) {
   EXPECT_EQ(complete(small_program(), {}).candidates.size(), 2U);
+}
+
+TEST(ShortForm, NeedsNoNounWhereThereIsOneOnly) {
+  using Words = std::vector<std::string>;
+  const auto whole = [](const Words& words) { return with_noun(small_program(), words); };
+  const Words in_full{"--host", "post", "post", "event", "a/b", "c/d"};
+  EXPECT_EQ(whole({"--host", "post", "post", "a/b", "c/d"}), in_full) << "the value of an option is no verb";
+  EXPECT_EQ(whole(in_full), in_full);
+  EXPECT_EQ(whole({"post", "--count", "3", "a/b"}), (Words{"post", "event", "--count", "3", "a/b"}));
+  for (const Words& kept :
+       {Words{}, Words{"post"}, Words{"post", "evnt", "a/b"}, Words{"list", "a"}, Words{"x"}})
+    EXPECT_EQ(whole(kept), kept);
+}
+
+TEST(Overview, ListsTheCommandsWithWhatTheyWant) {
+  const std::string all = overview(small_program(), "small");
+  EXPECT_THAT(all, HasSubstr("  post event INSTANCE/EVENT  Post it\n"));
+  EXPECT_THAT(all, HasSubstr("  list                       List\n"));
+  EXPECT_THAT(overview(*small_program().word("post"), "small post"),
+              HasSubstr("small post ...\n  event INSTANCE/EVENT  Post it\n"));
 }
 
 TEST(ManPage, HasAllThatTheHelpHas) {

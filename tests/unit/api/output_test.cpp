@@ -1,3 +1,5 @@
+#include <array>
+
 #include <gmock/gmock.h>
 
 #include "api/cli/cli_session.hpp"
@@ -53,11 +55,46 @@ TEST(Table, ColoursStatesOnlyWhereItIsAskedTo) {
   const std::vector<Row> rows{{{"state", "running"}, {"name", "running"}},
                               {{"state", "failed"}, {"name", "b"}}};
   const std::vector<Column> columns{{"state", "STATE"}, {"name", "NAME"}};
-  EXPECT_EQ(format_table(rows, columns, true),
+  EXPECT_EQ(format_table(rows, columns, {.coloured = true}),
             "STATE    NAME\n"
             "\x1b[32mrunning\x1b[0m  running\n"
             "\x1b[31mfailed\x1b[0m   b\n");
   EXPECT_THAT(format_table(rows, columns), testing::Not(HasSubstr("\x1b")));
+}
+
+std::vector<Row> two_instances() {
+  return {{{"name", "b"}, {"pid", 0}, {"text", "long text"}}, {{"name", "a"}, {"pid", 12}, {"text", ""}}};
+}
+const std::vector<Column> kThreeColumns{{.field = "name", .header = "NAME"},
+                                        {.field = "pid", .header = "PID", .rank = 1, .none = 0},
+                                        {.field = "text", .header = "TEXT", .rank = 2}};
+
+TEST(Table, LeavesColumnsOutByTheirRankUntilItFits) {
+  EXPECT_EQ(format_table(two_instances(), kThreeColumns, {.width = 20}),
+            "NAME  PID  TEXT\nb       -  long text\na      12  -\n");
+  EXPECT_EQ(format_table(two_instances(), kThreeColumns, {.width = 19}), "NAME  PID\nb       -\na      12\n");
+  EXPECT_EQ(format_table(two_instances(), kThreeColumns, {.width = 5}), "NAME\nb\na\n");
+}
+
+TEST(Table, ShowsTheColumnsThatAreAskedFor) {
+  const auto rows = two_instances();
+  const auto chosen = choose_columns({"text", "pid"}, rows, kThreeColumns);
+  ASSERT_TRUE(chosen);
+  EXPECT_EQ(format_table(rows, *chosen, {.width = 5}), "TEXT       PID\nlong text    -\n-           12\n");
+  const auto unknown = choose_columns({"pdi"}, rows, kThreeColumns);
+  ASSERT_FALSE(unknown);
+  EXPECT_EQ(unknown.error().message, "there is no column 'pdi'; there are name, pid, text");
+}
+
+TEST(Table, IsSortedByNumbersAndTextsInBothDirections) {
+  auto rows = two_instances();
+  ASSERT_TRUE(sort_rows(rows, "name"));
+  EXPECT_EQ(rows[0]["name"], "a");
+  ASSERT_TRUE(sort_rows(rows, "pid"));
+  EXPECT_EQ(rows[0]["pid"], 0);
+  ASSERT_TRUE(sort_rows(rows, "-pid"));
+  EXPECT_EQ(rows[0]["pid"], 12);
+  EXPECT_EQ(sort_rows(rows, "size").error().code, ErrorCode::invalid_argument);
 }
 
 TEST(Csv, QuotesWhatWouldBeTwoFields) {
@@ -91,6 +128,18 @@ TEST(Rows, GiveDurationsInMicroseconds) {
   EXPECT_EQ(row["interval_us"], 1.5);
   EXPECT_EQ(row["kind"], "external");
   EXPECT_EQ(row["state"], "9") << "what a newer host may say is shown as its number";
+}
+
+TEST(Rows, GiveWholeNumbersOfAHostAsNumbers) {
+  std::array<plc_KeyValue, 3> entries{};
+  const std::array<std::array<const char*, 2>, 3> said{{{"a", "-12"}, {"b", "007"}, {"c", "1 of 2"}}};
+  for (std::size_t i = 0; i < said.size(); ++i) {
+    dds::copy_text(entries[i].name, said[i][0]);
+    dds::copy_text(entries[i].value, said[i][1]);
+  }
+  Row row = Row::object();
+  add_extension(row, entries);
+  EXPECT_EQ(json_text(row), R"({"a":-12,"b":"007","c":"1 of 2"})");
 }
 
 TEST(Rows, GiveTimesInUtcToTheMillisecond) {

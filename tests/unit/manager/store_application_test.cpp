@@ -141,6 +141,18 @@ TEST_F(StoreApplication, NamesTheFileOnceAndTellsItAllInOneLine) {
   EXPECT_EQ(carry_out(order_).error().message, "lamp.so is refused: it crashes");
 }
 
+TEST_F(StoreApplication, TakesTheBootApplicationBackForThatOfTheConfiguration) {
+  order_.configured = "/opt/configured.so";
+  order_.boot = "/opt/other.so";
+  ASSERT_TRUE(carry_out(order_));
+  EXPECT_EQ(read_boot(order_.folder), "/opt/other.so");
+  order_.boot = order_.configured;
+  for (int again = 0; again < 2; ++again) {
+    ASSERT_TRUE(carry_out(order_));
+    EXPECT_EQ(read_boot(order_.folder), "");
+  }
+}
+
 TEST_F(StoreApplication, TellsHowATrialEndedThatSaidNothing) {
   set_trial("kill -SEGV $$");
   EXPECT_THAT(carry_out(order_).error().message, HasSubstr("killed by SIGSEGV"));

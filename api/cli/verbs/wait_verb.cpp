@@ -1,0 +1,99 @@
+#include <algorithm>
+#include <array>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "api/cli/cli_session.hpp"
+#include "api/cli/interrupt.hpp"
+#include "api/cli/verbs/host_commands.hpp"
+#include "api/dds/code_names.hpp"
+#include "api/dds/text.hpp"
+#include "shm/base/names.hpp"
+
+namespace plchost {
+
+namespace {
+
+struct WaitArguments {
+  std::vector<std::string> names;
+  std::string state = "running";
+};
+
+/// What is waited for, and what is there instead.
+struct Awaited {
+  std::string name;
+  std::string state;  ///< as it was seen last; empty: it was not
+  std::string problem;
+};
+
+/// Takes those away that have the state by now. Whether all that were named are there.
+Result<void> look(CliSession& session, const std::string& host, const std::string& state,
+                  std::vector<Awaited>& awaited) {
+  const auto samples = session.client().value()->instances(host, session.deadline());
+  if (!samples) return std::unexpected(samples.error());
+  std::vector<std::string> known;
+  for (const plc_InstanceStatus& sample : *samples) {
+    known.emplace_back(dds::text_of(sample.instance));
+    const auto one = std::ranges::find(awaited, known.back(), &Awaited::name);
+    if (one == awaited.end()) continue;
+    one->state = dds::instance_state_name(sample.state);
+    one->problem = dds::text_of(sample.problem);
+  }
+  for (const Awaited& one : awaited) {
+    if (one.state.empty()) return unknown_name("instance", one.name, known, host);
+  }
+  for (const Awaited& one : awaited) {
+    if (one.state == state) session.say(fmt::format("{}: {}", one.name, state));
+  }
+  std::erase_if(awaited, [&](const Awaited& one) { return one.state == state; });
+  return {};
+}
+
+int wait(CliSession& session, const WaitArguments& arguments) {
+  const auto host = session.target_host();
+  if (!host) return CliSession::fail(host.error());
+  const auto instances = expand(session, arguments.names);
+  if (!instances) return CliSession::fail(instances.error());
+  std::vector<Awaited> awaited;
+  for (const NamedInstance& one : *instances)
+    awaited.push_back({.name = one.name, .state = {}, .problem = {}});
+  constexpr Duration kPatience = std::chrono::seconds(60);
+  const TimePoint end = session.deadline(kPatience);
+  catch_interrupts();
+  for (;;) {
+    if (const auto looked = look(session, *host, arguments.state, awaited); !looked)
+      return CliSession::fail(looked.error());
+    if (awaited.empty()) return kExitDone;
+    const TimePoint now = MonotonicClock::now();
+    if (now >= end || interrupted()) break;
+    session.client().value()->wait_for_change(std::min(end, now + kInterruptLook));
+  }
+  const Awaited& first = awaited.front();
+  return CliSession::fail({ErrorCode::timed_out, 0,
+                           fmt::format("'{}' is not {} but {}{}{}", first.name, arguments.state, first.state,
+                                       first.problem.empty() ? "" : ": ", first.problem)});
+}
+
+}  // namespace
+
+void add_wait_verb(const Command& plcctl, CliSession& session) {
+  const auto arguments = std::make_shared<WaitArguments>();
+  constexpr std::uint32_t kStates = 64;
+  std::vector<std::string> states;
+  // A number stands for a state that this program does not know.
+  for (std::uint32_t state = 0; state < kStates; ++state) {
+    if (std::string name = dds::instance_state_name(state); name != fmt::format("{}", state))
+      states.push_back(std::move(name));
+  }
+  const Command verb = plcctl.verb("wait", "Wait until an instance has a state");
+  verb.noun("instance", "Wait until all of these have the state (60 s, or --timeout)",
+            [&session, arguments] { return wait(session, *arguments); })
+      .arguments("INSTANCE", arguments->names, "one or more; 'line*' stands for all that begin with line")
+      .word("--for", arguments->state, "the state (default running)", states);
+}
+
+}  // namespace plchost
