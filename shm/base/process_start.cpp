@@ -11,6 +11,7 @@
 #include <pthread.h>
 #include <signal.h>
 #include <sys/stat.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "shm/base/unique_fd.hpp"
@@ -26,8 +27,7 @@ constexpr int kThreadsField = 20;
 constexpr int kStartField = 22;
 constexpr int kCodeField = 26;
 constexpr int kStackField = 28;
-constexpr std::uint64_t kEnding = 4;        // PF_EXITING of the kernel
-constexpr std::uint64_t kUnknownStart = 1;  // without /proc; no thread of ours is as old as the first tick
+constexpr std::uint64_t kEnding = 4;  // PF_EXITING of the kernel
 
 struct Stat {
   char state = '?';
@@ -88,6 +88,16 @@ bool process_is_over(const Stat& stat) noexcept {
   return thread_is_over(stat) && stat.threads <= 1;
 }
 
+// Now, in the unit of start_of(): what calls it began before.
+std::uint64_t this_tick() noexcept {
+  timespec now{};
+  ::clock_gettime(CLOCK_BOOTTIME, &now);
+  constexpr std::uint64_t kNanoseconds = 1'000'000'000;
+  const auto ticks = static_cast<std::uint64_t>(::sysconf(_SC_CLK_TCK));
+  return static_cast<std::uint64_t>(now.tv_sec) * ticks +
+         static_cast<std::uint64_t>(now.tv_nsec) * ticks / kNanoseconds;
+}
+
 bool exists(pid_t task) noexcept {
   return ::kill(task, 0) == 0 || errno != ESRCH;
 }
@@ -105,8 +115,13 @@ std::optional<std::uint64_t> start_of(pid_t process) noexcept {
 ProcessIdentity this_process() noexcept {
   const pid_t self = ::getpid();
   const auto stat = read_stat(self);
-  if (!stat) return {.pid = self};
+  if (!stat) return {.pid = self, .start = this_tick()};
   return {.pid = self, .start = stat->start, .image = image_of(*stat)};
+}
+
+std::uint64_t pid_namespace() noexcept {
+  struct stat status{};
+  return ::stat("/proc/self/ns/pid", &status) == 0 ? status.st_ino : 0;
 }
 
 bool process_has_ended(const ProcessIdentity& process) noexcept {
@@ -115,7 +130,7 @@ bool process_has_ended(const ProcessIdentity& process) noexcept {
   if (!stat) return false;
   const std::uint32_t image = image_of(*stat);
   const bool another = image != 0 && process.image != 0 && image != process.image;
-  return stat->start != process.start || another || process_is_over(*stat);
+  return stat->start > process.start || another || process_is_over(*stat);
 }
 
 std::optional<ThreadLook> look_at_thread(pid_t thread) noexcept {
@@ -133,7 +148,7 @@ const ThreadIdentity& this_thread() noexcept {
     const pid_t self = ::gettid();
     const auto stat = read_stat(self);
     identity = {.id = static_cast<std::uint32_t>(self),
-                .start = stat ? stat->start : kUnknownStart,
+                .start = stat ? stat->start : this_tick(),
                 .image = stat ? image_of(*stat) : 0};
   }
   return identity;

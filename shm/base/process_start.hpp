@@ -15,6 +15,7 @@ namespace plchost {
 /// What names a process for good, and the program in it: exec() leaves number and start as they are.
 struct ProcessIdentity {
   pid_t pid = 0;
+  /// It began then or earlier: who has no descriptor left cannot read when it began, and says when it looked.
   std::uint64_t start = 0;
   /// Made from where the host has put the program's code and stack; 0: not known. Two programs that follow
   /// one another in a process have the same if the host puts all at the same place (no address
@@ -24,8 +25,12 @@ struct ProcessIdentity {
 /// The calling process. Set-up: reads a file.
 [[nodiscard]] ProcessIdentity this_process() noexcept;
 
-/// Whether the process that began at `start` has ended, or has another program by now. In doubt (the host
-/// hides it, as it does the image of other users' processes) it has not. Set-up.
+/// The PID namespace of the calling process: the number N that the kernel shows as "pid:[N]". Processes of
+/// another one have other numbers for the same process. 0: not known, there is no /proc. Set-up.
+[[nodiscard]] std::uint64_t pid_namespace() noexcept;
+
+/// Whether the process that began at `start` or earlier has ended, or has another program by now. In doubt
+/// (the host hides it, as it does the image of other users' processes) it has not. Set-up.
 [[nodiscard]] bool process_has_ended(const ProcessIdentity& process) noexcept;
 [[nodiscard]] inline bool process_has_ended(pid_t process, std::uint64_t start) noexcept {
   return process_has_ended({.pid = process, .start = start});
@@ -44,7 +49,7 @@ struct ThreadLook {
 /// reads it anew.
 struct ThreadIdentity {
   std::uint32_t id = 0;
-  std::uint64_t start = 0;
+  std::uint64_t start = 0;  ///< then or earlier, as above
   std::uint32_t image = 0;
 };
 [[nodiscard]] const ThreadIdentity& this_thread() noexcept;

@@ -25,6 +25,15 @@ constexpr std::uint64_t record_of(const ThreadIdentity& thread) noexcept {
   return thread.start << kNumberBits | thread.id;
 }
 
+// Whether a thread that began at `start` began after the one of this record: it has its number only. A record
+// says when its thread began or a time after that, so a living owner is never later. Of the start the record
+// has the lower bits.
+constexpr bool began_later(std::uint64_t start, std::uint64_t record) noexcept {
+  constexpr std::uint64_t kHalf = std::uint64_t{1} << (63 - kNumberBits);
+  const std::uint64_t after = (start - (record >> kNumberBits)) & (2 * kHalf - 1);
+  return after != 0 && after < kHalf;
+}
+
 /// Of a word or a record.
 constexpr std::uint32_t number_of(std::uint64_t value) noexcept {
   return static_cast<std::uint32_t>(value) & FUTEX_TID_MASK;
@@ -126,7 +135,7 @@ RobustMutex::OwnerState RobustMutex::look_at_owner(std::uint32_t word, bool nobo
   const bool same = record_.load(std::memory_order_acquire) == record;
   if (!look) return nobody_waits && same ? OwnerState::gone : OwnerState::alive;
   const bool told = number_of(record) == owner && same;
-  const bool later = look->start != 0 && record != record_of({.id = owner, .start = look->start});
+  const bool later = look->start != 0 && began_later(look->start, record);
   const bool another = look->image != 0 && image != 0 && look->image != image;
   if (told && (later || another)) return OwnerState::gone;
   return look->ending ? OwnerState::ending : OwnerState::alive;

@@ -113,8 +113,8 @@ bool Thread::join_until(TimePoint deadline, const std::function<bool()>& abandon
   constexpr Duration kLook = std::chrono::milliseconds(10);
   while (running_) {
     const Duration left = std::clamp(deadline - MonotonicClock::now(), Duration::zero(), kLook);
-    const timespec until = to_timespec(Duration(unix_time_ns()) + left);
-    if (pthread_timedjoin_np(handle_, nullptr, &until) != ETIMEDOUT) {
+    const timespec until = to_timespec(MonotonicClock::now() + left);
+    if (pthread_clockjoin_np(handle_, nullptr, CLOCK_MONOTONIC, &until) != ETIMEDOUT) {
       running_ = false;
     } else if (abandoned()) {
       pthread_detach(handle_);

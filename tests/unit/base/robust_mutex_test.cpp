@@ -6,11 +6,13 @@
 #include <new>
 #include <random>
 #include <thread>
+#include <type_traits>
 #include <vector>
 
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/mman.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -207,6 +209,61 @@ TEST_F(RobustMutexTest, LivingOwnerThatHasNotToldItsStartYetIsWaitedFor) {
   reap(owner);
   EXPECT_EQ(shared_.mutex.lock(), LockResult::owner_died);
   EXPECT_TRUE(shared_.mutex.unlock());
+}
+
+/// What has no descriptor left cannot read who it is.
+void use_up_descriptors() {
+  rlimit limit{};
+  ::getrlimit(RLIMIT_NOFILE, &limit);
+  limit.rlim_cur = 0;
+  ::setrlimit(RLIMIT_NOFILE, &limit);
+}
+
+TEST_F(RobustMutexTest, LivingOwnerWithoutADescriptorIsNotRobbed) {
+  const pid_t owner = in_child([this] {
+    use_up_descriptors();
+    if (shared_.mutex.lock() != LockResult::locked) ::_exit(1);
+    if (shared_.mutex.lock() != LockResult::deadlock) ::_exit(1);
+    shared_.step = 1;
+    for (;;) ::pause();
+  });
+  await_step(1);
+  EXPECT_EQ(shared_.mutex.lock(in(milliseconds(200))), LockResult::timed_out);
+  EXPECT_FALSE(shared_.mutex.owner_has_ended());
+  reap(owner);
+  EXPECT_EQ(shared_.mutex.lock(), LockResult::owner_died);
+  EXPECT_TRUE(shared_.mutex.unlock());
+}
+
+TEST_F(RobustMutexTest, LivingOwnerIsNotRobbedByWhoHasNoDescriptor) {
+  const pid_t owner = hold_in_child();
+  const pid_t other = in_child([this] {
+    use_up_descriptors();
+    ::_exit(shared_.mutex.lock(in(milliseconds(200))) == LockResult::timed_out ? 0 : 1);
+  });
+  int status = -1;
+  ::waitpid(other, &status, 0);
+  EXPECT_EQ(status, 0);
+  reap(owner);
+}
+
+TEST_F(RobustMutexTest, ProcessWithoutADescriptorIsNotTakenForAnotherOne) {
+  static_assert(std::is_trivially_copyable_v<ProcessIdentity>);
+  auto& said = *new (::mmap(nullptr, sizeof(ProcessIdentity), PROT_READ | PROT_WRITE,
+                            MAP_SHARED | MAP_ANONYMOUS, -1, 0)) ProcessIdentity;
+  const pid_t child = in_child([&] {
+    use_up_descriptors();
+    said = this_process();
+    shared_.step = 1;
+    for (;;) ::pause();
+  });
+  await_step(1);
+  EXPECT_EQ(said.pid, child);
+  EXPECT_FALSE(process_has_ended(said));
+  EXPECT_TRUE(process_has_ended(child, 1)) << "that one began long before";
+  reap(child);
+  EXPECT_TRUE(process_has_ended(said));
+  ::munmap(&said, sizeof(said));
 }
 
 TEST_F(RobustMutexTest, IsNeverTakenFromTheLivingHoweverLongTheyHoldIt) {

@@ -2,13 +2,30 @@
 
 #include <array>
 #include <atomic>
+#include <chrono>
+#include <cstdint>
 #include <string>
+#include <thread>
 #include <utility>
 
 #include <gmock/gmock.h>
 #include <sched.h>
 #include <sys/resource.h>
+#include <sys/syscall.h>
+#include <time.h>
 #include <unistd.h>
+
+namespace {
+std::atomic<std::int64_t> wall_clock_ahead_s{0};
+}
+
+// In place of the C library's, for the whole program: the clock on the wall can be wrong, as when somebody
+// sets it back while a thread waits.
+extern "C" int clock_gettime(clockid_t clock, timespec* time) noexcept {
+  const auto result = ::syscall(SYS_clock_gettime, clock, time);
+  if (clock == CLOCK_REALTIME && result == 0) time->tv_sec += wall_clock_ahead_s.load();
+  return static_cast<int>(result);
+}
 
 namespace plchost {
 namespace {
@@ -40,6 +57,24 @@ TEST(Thread, MovesOwnership) {
   sut.join();
   EXPECT_FALSE(sut.joinable());
   EXPECT_EQ(runs, 2);
+}
+
+TEST(Thread, IsJoinedWhenItEndsOrIsAbandonedWhateverTheClockOnTheWallIs) {
+  std::atomic<bool> end{false};
+  auto sut = Thread::start("waits", {}, [&] {
+    while (!end) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  });
+  ASSERT_TRUE(sut);
+  wall_clock_ahead_s = 3600;
+  int looks = 0;
+  EXPECT_FALSE(sut->join_until(MonotonicClock::now() + std::chrono::milliseconds(50), [&] {
+    ++looks;
+    return false;
+  })) << "by the other clock that is in an hour";
+  EXPECT_GT(looks, 1);
+  wall_clock_ahead_s = 0;
+  end = true;
+  EXPECT_TRUE(sut->join_until(MonotonicClock::now() + std::chrono::seconds(20), [] { return false; }));
 }
 
 TEST(Thread, IsNotFifoUnlessAskedFor) {
