@@ -11,7 +11,7 @@
 
 #include "api/control/application_versions.hpp"
 #include "api/control/exit_codes.hpp"
-#include "manager/system/lock_file.hpp"
+#include "manager/system/service_manager.hpp"
 #include "shm/base/log.hpp"
 
 namespace plchost {

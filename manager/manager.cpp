@@ -17,7 +17,9 @@
 #include "manager/store/store_process.hpp"
 #include "manager/supervisor/process_host.hpp"
 #include "manager/system/child_process.hpp"
+#include "manager/system/service_manager.hpp"
 #include "shm/base/log.hpp"
+#include "shm/base/own_folder.hpp"
 #include "shm/base/thread.hpp"
 #include "shm/base/time.hpp"
 #include "shm/pool/instance_page.hpp"
@@ -36,6 +38,8 @@ Result<void> make_run_directory(const std::string& path) {
   std::error_code error;
   std::filesystem::create_directories(path, error);
   if (error) return failure(ErrorCode::system, "make the run directory " + path, error.value());
+  // Locks, sockets and records in it are believed.
+  if (auto ours = check_own_folder(path); !ours) return failure_in("[host] run_directory", ours.error());
   return {};
 }
 
@@ -91,6 +95,9 @@ Manager::Manager(const ManagerConfig& config, Options options, LockFile lock,
 Result<std::unique_ptr<Manager>> Manager::create(const ManagerConfig& config, Options options) {
   if (auto made = make_run_directory(config.host.run_directory); !made) return std::unexpected(made.error());
   auto lock = LockFile::take(config.host.run_directory + "/manager.lock");
+  if (!lock && lock.error().code == ErrorCode::already_exists) {
+    return failure_in("another manager runs with this run directory", lock.error());
+  }
   if (!lock) return std::unexpected(lock.error());
   auto reactor = Reactor::create();
   if (!reactor) return std::unexpected(reactor.error());
@@ -109,6 +116,7 @@ Result<void> Manager::set_up() {
   }
   const auto rights = pool_rights(host);
   if (!rights) return std::unexpected(rights.error());
+  clear_names(host.pool, *rights);
   if (auto ours = check_pool_owner(host.pool, *rights); !ours) return ours;
   auto pool = ObjectPool::create(host.pool, {.max_objects = host.pool_objects, .rights = *rights});
   if (!pool) return std::unexpected(pool.error());

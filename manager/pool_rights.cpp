@@ -11,6 +11,7 @@
 #include "manager/config/accounts.hpp"
 #include "shm/base/log.hpp"
 #include "shm/base/unique_fd.hpp"
+#include "shm/pool/foreign_files.hpp"
 #include "shm/pool/memory_file.hpp"
 
 namespace plchost {
@@ -53,6 +54,17 @@ Result<void> check_pool_owner(const std::string& pool, const MemoryRights& right
       fmt::format("pool '{}' is there already and belongs to user {}: remove {}, give [host] pool another "
                   "name, or name that user as pool_owner",
                   pool, owner, path));
+}
+
+void clear_names(const std::string& pool, const MemoryRights& rights) {
+  for (const ForeignFile& file : take_away_foreign_files(pool, rights)) {
+    if (file.taken_away) {
+      spdlog::warn("{} was put there by another user ({}); it is removed and not used", file.path,
+                   file.rights);
+    } else {
+      spdlog::warn("{} was put there by another user: {}", file.path, file.taken_away.error().describe());
+    }
+  }
 }
 
 void renew_pool_rights(const std::string& pool, const MemoryRights& rights) {

@@ -15,6 +15,10 @@ namespace plchost {
 /// Who may use the pool, as [host] pool_owner, pool_group and pool_mode say.
 [[nodiscard]] Result<MemoryRights> pool_rights(const HostConfig& host);
 
+/// Takes away what other users have put under the names of this pool, and logs whose it was, or why it
+/// cannot.
+void clear_names(const std::string& pool, const MemoryRights& rights);
+
 /// A pool that was there before this manager may have other rights than its configuration says: gives it
 /// those, and logs that, or why it cannot. Who has it mapped keeps it.
 void renew_pool_rights(const std::string& pool, const MemoryRights& rights);

@@ -95,6 +95,10 @@ std::string instance_socket_path(std::string_view run_directory, std::string_vie
   return fmt::format("{}/{}.sock", run_directory, instance);
 }
 
+std::string kept_memory_name(std::string_view instance) {
+  return fmt::format("{}.retain", instance);
+}
+
 std::string encode(const SetupReport& report) {
   const Json json{{"step", to_string(report.step)},
                   {"code", static_cast<unsigned>(report.code)},

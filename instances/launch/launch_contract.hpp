@@ -47,11 +47,20 @@ inline constexpr std::string_view kValidApplication = " is a valid application: 
 /// How long the set-up of an application may take in a trial.
 inline constexpr Duration kSetUpLimit = std::chrono::seconds(10);
 
+/// `plc-instance --save-retain` writes what the kept memory of an instance holds to its retain files, and
+/// ends with code 0 if they hold all of it. It needs the name, the pool, the settings and the state
+/// directory.
+inline constexpr std::string_view kSaveRetainOption = "--save-retain";
+
 /// argv for posix_spawn, argv[0] included.
 [[nodiscard]] std::vector<std::string> to_arguments(const std::string& program, const LaunchOptions& options);
 
 /// The control socket of an instance: "RUN_DIRECTORY/NAME.sock". ControlRequests in, ControlReplies out.
 [[nodiscard]] std::string instance_socket_path(std::string_view run_directory, std::string_view instance);
+
+/// The shared memory of the pool in which the retain variables of an instance lie: "NAME.retain". It outlives
+/// the process.
+[[nodiscard]] std::string kept_memory_name(std::string_view instance);
 
 /// The steps that an instance takes before it runs, in order. A failed one is reported by name.
 enum class SetupStep : std::uint8_t {

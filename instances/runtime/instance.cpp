@@ -126,10 +126,15 @@ void Instance::choose_scheduler() {
 }
 
 Result<std::string> Instance::attach_pool() {
-  auto claim = claim_name(options_.launch.pool, options_.launch.name);
+  auto claim = claim_name(options_.launch);
   if (!claim) return std::unexpected(std::move(claim).error());
   name_claim_ = *std::move(claim);
-  auto pool = ObjectPool::create(options_.launch.pool);
+  // Of a manager's instance the manager has made sure whose the pool is, and its owner can be a third user.
+  const bool managed = options_.launch.report_fd >= 0;
+  auto pool = managed ? ObjectPool::attach(options_.launch.pool) : ObjectPool::create(options_.launch.pool);
+  if (!pool && managed && pool.error().code == ErrorCode::not_found) {
+    pool = ObjectPool::create(options_.launch.pool);
+  }
   if (!pool) return std::unexpected(std::move(pool).error());
   pool_.emplace(*std::move(pool));
   host_.emplace(options_.launch.name, &*pool_);

@@ -142,7 +142,7 @@ class Instance {
   RealTimeSetup real_time_;
   InstanceSettings settings_;
   IdleHold idle_hold_;
-  UniqueFd name_claim_;
+  NameClaim name_claim_;
   std::optional<ObjectPool> pool_;
   std::optional<ApplicationHost> host_;
   Components components_;

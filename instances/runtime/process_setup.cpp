@@ -1,21 +1,19 @@
 #include "instances/runtime/process_setup.hpp"
 
-#include <algorithm>
-#include <cstddef>
-
 #include <fmt/format.h>
 #include <linux/capability.h>
 #include <malloc.h>
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
-#include <sys/socket.h>
 #include <sys/syscall.h>
-#include <sys/un.h>
 
 #include "shm/base/cpu_list.hpp"
+#include "shm/base/log.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/thread.hpp"
+#include "shm/pool/instance_page.hpp"
+#include "shm/pool/memory_file.hpp"
 
 namespace plchost {
 
@@ -92,21 +90,40 @@ RealTimeSetup set_up_real_time() {
   return setup;
 }
 
-Result<UniqueFd> claim_name(const std::string& pool, const std::string& instance) {
-  // A socket name in the abstract namespace: the kernel takes it back when the process ends, however it ends.
-  UniqueFd fd(::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0));
-  if (!fd) return failure(ErrorCode::system, "socket", errno);
-  sockaddr_un address{};
-  address.sun_family = AF_UNIX;
-  const std::string name = fmt::format("plchost/{}/{}", pool, instance);
-  const std::size_t length = std::min(name.size(), sizeof address.sun_path - 1);
-  std::copy_n(name.begin(), length, address.sun_path + 1);
-  const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + 1 + length);
-  if (::bind(fd.get(), reinterpret_cast<const sockaddr*>(&address), size) == 0) return fd;
-  const int error = errno;
-  if (error != EADDRINUSE) return failure(ErrorCode::system, "claim the instance's name", error);
-  return failure(ErrorCode::already_exists,
-                 fmt::format("an instance '{}' runs already in pool '{}'", instance, pool));
+Result<NameClaim> claim_name(const LaunchOptions& launch) {
+  const auto taken = [&](const Error& error) {
+    return failure(ErrorCode::already_exists, fmt::format("an instance '{}' runs already in pool '{}': {}",
+                                                          launch.name, launch.pool, error.message));
+  };
+  NameClaim claim;
+  if (!launch.run_directory.empty()) {
+    auto here = LockFile::take(fmt::format("{}/{}.claim", launch.run_directory, launch.name));
+    if (!here && here.error().code == ErrorCode::already_exists) return taken(here.error());
+    if (!here) return std::unexpected(here.error());
+    claim.in_run_directory.emplace(*std::move(here));
+  }
+  const std::string path = MemoryFile::path(instance_claim_name(launch.pool, launch.name));
+  auto in_pool = LockFile::take(path);
+  if (!in_pool && in_pool.error().code == ErrorCode::refused) {
+    spdlog::warn("{}; it is removed and not used", in_pool.error().describe());
+    const auto gone = take_away(path);
+    in_pool = gone ? LockFile::take(path) : std::unexpected(gone.error());
+  }
+  if (in_pool) {
+    claim.in_pool.emplace(*std::move(in_pool));
+  } else if (in_pool.error().code == ErrorCode::already_exists) {
+    return taken(in_pool.error());
+  } else if (claim.in_run_directory) {
+    // Nobody else writes into the run directory: the name is ours without the other one.
+    spdlog::warn("{}", in_pool.error().describe());
+  } else {
+    return std::unexpected(in_pool.error());
+  }
+  return claim;
+}
+
+NameClaim::~NameClaim() {
+  if (in_pool) in_pool->remove();
 }
 
 }  // namespace plchost

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "instances/launch/launch_contract.hpp"
+#include "shm/base/lock_file.hpp"
 #include "shm/base/result.hpp"
-#include "shm/base/unique_fd.hpp"
 
 namespace plchost {
 
@@ -20,8 +22,19 @@ struct RealTimeSetup {
 };
 [[nodiscard]] RealTimeSetup set_up_real_time();
 
-/// Takes the instance's name for this process, as long as the descriptor is open. already_exists: another
-/// live process runs under that name in that pool.
-[[nodiscard]] Result<UniqueFd> claim_name(const std::string& pool, const std::string& instance);
+/// The instance's name, taken for this process as long as it is there. It is locks on files that nobody else
+/// can hold: one in the run directory, into which only the manager's user can write, and one beside the pool,
+/// for instances without a run directory.
+struct NameClaim {
+  NameClaim() = default;
+  NameClaim(NameClaim&& other) noexcept = default;
+  NameClaim& operator=(NameClaim&& other) noexcept = default;
+  ~NameClaim();
+  std::optional<LockFile> in_run_directory;
+  std::optional<LockFile> in_pool;
+};
+/// already_exists: another process runs under that name in that pool. refused: another user has put something
+/// in the place of the lock, and it cannot be taken away. Set-up.
+[[nodiscard]] Result<NameClaim> claim_name(const LaunchOptions& launch);
 
 }  // namespace plchost

@@ -54,7 +54,7 @@ Result<WishMemory> WishMemory::open(std::string_view pool, std::string_view inst
   auto memory = open_fixed_page<Layout>(name, kWishKind, MemoryFile::Access::read_write);
   if (!memory && memory.error().code == ErrorCode::not_found) {
     memory = MemoryFile::create(name, sizeof(Layout), Layout::fill);
-  } else if (!memory && memory.error().code == ErrorCode::corrupt) {
+  } else if (!memory) {  // nothing of ours
     memory = MemoryFile::replace(name, sizeof(Layout), Layout::fill);
   }
   if (!memory) return std::unexpected(std::move(memory).error());

@@ -33,7 +33,13 @@ Result<MemoryFile> open_or_make_directory(const std::string& name) {
   constexpr int kAttempts = 10;  // each one fails only if another process makes or removes it in between
   for (int attempt = 1;; ++attempt) {
     auto file = MemoryFile::open(name, sizeof(DirectoryLayout), MemoryFile::Access::read_write);
-    if (file || file.error().code != ErrorCode::not_found) return file;
+    if (file) return file;
+    const auto why = file.error().code;
+    // Not a file of those who run nodes here: a stranger's, or no file at all.
+    if (why == ErrorCode::refused || why == ErrorCode::wrong_type) {
+      return MemoryFile::replace(name, sizeof(DirectoryLayout), fill_directory);
+    }
+    if (why != ErrorCode::not_found) return file;
     file = MemoryFile::create(name, sizeof(DirectoryLayout), fill_directory);
     if (file || file.error().code != ErrorCode::already_exists || attempt == kAttempts) return file;
   }
@@ -234,7 +240,7 @@ NodeRecord record_of(const NodeEntry& entry, std::uint32_t generation) {
   record.generation = generation;
   record.forwards = entry.forwards ? 1 : 0;
   record.queue_slots = entry.queue_slots;
-  record.process_start = start_of(::getpid()).value_or(0);
+  record.process_start = this_process().start;
   std::copy_n(entry.hosts.begin(), std::min(entry.hosts.size(), kMaxHostRanges), record.hosts.begin());
   return record;
 }

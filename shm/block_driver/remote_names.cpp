@@ -59,7 +59,10 @@ Result<RemoteNames> RemoteNames::open(std::string_view pool, std::string_view ba
   constexpr int kAttempts = 10;  // each one fails only if another process makes or removes it in between
   for (int attempt = 1;; ++attempt) {
     auto file = open_fixed_page<RemoteNamesLayout>(name, kRemoteNames, MemoryFile::Access::read_write);
-    if (!file && file.error().code == ErrorCode::not_found) {
+    const auto why = file ? ErrorCode::ok : file.error().code;
+    if (why == ErrorCode::refused || why == ErrorCode::wrong_type) {
+      file = MemoryFile::replace(name, sizeof(RemoteNamesLayout), fill_names);
+    } else if (why == ErrorCode::not_found) {
       file = MemoryFile::create(name, sizeof(RemoteNamesLayout), fill_names);
       if (!file && file.error().code == ErrorCode::already_exists && attempt < kAttempts) continue;
     }

@@ -17,7 +17,8 @@ constexpr std::uint64_t kMagic = 0x67617074'736e6970;  // "pinstpag"
 /// 1: first. 2: the interval in force. 3: the tick source. 4: histograms behind the tasks, in two
 /// shapes. 5: the idle states. 6: the distributed clock. 7: state and problem of the application.
 /// 8: why a reference record is not followed. 9: faults. 10: the post that was run.
-constexpr std::uint32_t kVersion = 10;
+/// 11: why retain variables are not written.
+constexpr std::uint32_t kVersion = 11;
 constexpr std::size_t kTasksOffset = (sizeof(InstancePageLayout) + 63) / 64 * 64;
 
 static_assert(offsetof(InstancePageLayout, version) == 8 && offsetof(InstancePageLayout, size) == 16);
@@ -139,6 +140,10 @@ std::string instance_page_name(std::string_view pool, std::string_view instance)
   return fmt::format("{}.instance.{}", pool, instance);
 }
 
+std::string instance_claim_name(std::string_view pool, std::string_view instance) {
+  return fmt::format("{}.claim.{}", pool, instance);
+}
+
 Result<InstancePage> InstancePage::create(std::string_view pool, std::string_view instance,
                                           std::span<const TaskIdentity> tasks) {
   if (tasks.size() > kMaxTasks) {
@@ -210,6 +215,7 @@ bool InstancePage::keep_task(std::uint32_t index, const KnownFault& fault) noexc
 
 void InstancePage::remove(std::string_view pool, std::string_view instance) noexcept {
   MemoryFile::remove(instance_page_name(pool, instance));
+  MemoryFile::remove(instance_claim_name(pool, instance));
 }
 
 void InstancePage::write_runtime(const InstanceRuntime& runtime) noexcept {

@@ -79,7 +79,8 @@ struct InstanceRuntime {
   FixedText<kMaxTickText> idle_states;    ///< what of the processor's idle states is held off, or why not
   ClockRuntime clock;
   ApplicationState state = ApplicationState::none;
-  FixedText<kMaxPath> problem;  ///< why it is in exception; else empty
+  FixedText<kMaxPath> problem;         ///< why it is in exception; else empty
+  FixedText<kMaxPath> retain_problem;  ///< why its newest retain values are in no file; empty: they are
 };
 
 struct TaskSlot {
@@ -106,6 +107,8 @@ struct InstancePageLayout {
 };
 
 [[nodiscard]] std::string instance_page_name(std::string_view pool, std::string_view instance);
+/// The file whose lock says that a process runs under that name.
+[[nodiscard]] std::string instance_claim_name(std::string_view pool, std::string_view instance);
 
 /// What the process knows of the fault of a task.
 struct KnownFault {
@@ -119,6 +122,7 @@ class InstancePage {
   /// invalid_argument: more than kMaxTasks tasks.
   [[nodiscard]] static Result<InstancePage> create(std::string_view pool, std::string_view instance,
                                                    std::span<const TaskIdentity> tasks);
+  /// And the file that its process holds its name with: it has ended.
   static void remove(std::string_view pool, std::string_view instance) noexcept;
 
   void write_runtime(const InstanceRuntime& runtime) noexcept;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <charconv>
+#include <cstdio>
 #include <filesystem>
 #include <iterator>
 #include <utility>
@@ -123,7 +124,7 @@ struct Opened {
   struct stat status{};
 };
 
-Result<Opened> open_existing(const std::string& path, MemoryFile::Access access) {
+Result<Opened> open_existing(const std::string& path, MemoryFile::Access access, const OwnerCheck& owners) {
   // O_NONBLOCK: were it a FIFO, a plain open would wait for ever.
   const int flags =
       (access == MemoryFile::Access::read_write ? O_RDWR : O_RDONLY) | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK;
@@ -142,7 +143,14 @@ Result<Opened> open_existing(const std::string& path, MemoryFile::Access access)
   if (!S_ISREG(opened.status.st_mode)) {
     return not_a_plain_file(path, opened.status.st_mode);
   }
-  return opened;
+  // Of more than one name: it may have been made under another one, for something else.
+  if (owners(opened.status.st_uid) && opened.status.st_nlink <= 1) return opened;
+  return failure(
+      ErrorCode::refused,
+      fmt::format("{} is not used: it has {} and {} names, and was put there by another program; "
+                  "remove it, or choose another name",
+                  path, describe_rights(opened.status.st_uid, opened.status.st_gid, opened.status.st_mode),
+                  opened.status.st_nlink));
 }
 
 }  // namespace
@@ -160,9 +168,22 @@ Result<UnnamedMemory> UnnamedMemory::make(const std::string& name, std::size_t s
 
 namespace {
 
+// A folder. What is in it is not looked at: it may be a stranger's trap.
+bool put_folder_away(const std::string& path) noexcept {
+  if (::rmdir(path.c_str()) == 0 || errno == ENOENT) return true;
+  if (errno != ENOTEMPTY && errno != EEXIST) return false;
+  struct stat status{};
+  if (::lstat(path.c_str(), &status) != 0) return errno == ENOENT;
+  const std::string aside = fmt::format("{}/.put-aside.{}", MemoryFile::kDirectory, status.st_ino);
+  return ::renameat2(AT_FDCWD, path.c_str(), AT_FDCWD, aside.c_str(), RENAME_NOREPLACE) == 0;
+}
+
+}  // namespace
+
 // In a sticky folder only its owner, the folder's or root may remove a file.
-Result<void> make_room(const std::string& path) {
+Result<void> take_away(const std::string& path) {
   if (::unlink(path.c_str()) == 0 || errno == ENOENT) return {};
+  if (errno == EISDIR && put_folder_away(path)) return {};
   const int error = errno;
   struct stat status{};
   const bool seen = ::lstat(path.c_str(), &status) == 0;
@@ -177,8 +198,6 @@ Result<void> make_room(const std::string& path) {
       error);
 }
 
-}  // namespace
-
 Result<MemoryFile> UnnamedMemory::give_name(const TakeOver& take_over) {
   constexpr int kAttempts = 10;  // each one fails only if another process makes the name anew in between
   for (int attempt = 1;; ++attempt) {
@@ -188,7 +207,7 @@ Result<MemoryFile> UnnamedMemory::give_name(const TakeOver& take_over) {
       return std::unexpected(named.error());
     }
     replaced_.reset(::open(path_.c_str(), O_PATH | O_NOFOLLOW | O_CLOEXEC));
-    if (auto room = make_room(path_); !room) return std::unexpected(std::move(room).error());
+    if (auto gone = take_away(path_); !gone) return std::unexpected(std::move(gone).error());
   }
 }
 
@@ -216,10 +235,11 @@ Result<MemoryFile> MemoryFile::replace(const std::string& name, std::size_t size
   return make_filled(name, size, fill, rights, [](const std::string&) { return true; });
 }
 
-Result<MemoryFile> MemoryFile::open(const std::string& name, std::size_t at_least, Access access) {
+Result<MemoryFile> MemoryFile::open(const std::string& name, std::size_t at_least, Access access,
+                                    const OwnerCheck& owners) {
   const auto path = path_of(name);
   if (!path) return std::unexpected(path.error());
-  const auto opened = open_existing(*path, access);
+  const auto opened = open_existing(*path, access, owners);
   if (!opened) return std::unexpected(opened.error());
   const auto size = static_cast<std::size_t>(opened->status.st_size);
   if (size == 0 || size < at_least) {
@@ -231,10 +251,10 @@ Result<MemoryFile> MemoryFile::open(const std::string& name, std::size_t at_leas
   return MemoryFile(*std::move(mapping));
 }
 
-Result<void> MemoryFile::fill_empty(const std::string& name, std::size_t size) {
+Result<void> MemoryFile::fill_empty(const std::string& name, std::size_t size, const OwnerCheck& owners) {
   const auto path = path_of(name);
   if (!path) return std::unexpected(path.error());
-  const auto opened = open_existing(*path, Access::read_write);
+  const auto opened = open_existing(*path, Access::read_write, owners);
   if (!opened) return std::unexpected(opened.error());
   if (opened->status.st_size != 0) return {};
   return allocate(opened->fd, size, *path);
@@ -284,13 +304,17 @@ std::optional<std::string> memory_of_file(std::string_view pool, std::string_vie
   return same ? std::optional(std::move(name)) : std::nullopt;
 }
 
-void remove_pool_memories(std::string_view pool) noexcept {
+void remove_pool_memories(std::string_view pool, std::span<const std::string> kept) noexcept {
   const std::string prefix = pool_memory_name(pool, "");
+  const auto stays = [&](const std::string& file) {
+    return std::ranges::any_of(kept,
+                               [&](const std::string& name) { return pool_memory_name(pool, name) == file; });
+  };
   std::error_code error;
   for (std::filesystem::directory_iterator at(MemoryFile::kDirectory, error), end; !error && at != end;
        at.increment(error)) {
     const std::string name = at->path().filename();
-    if (name.starts_with(prefix)) ::unlink(at->path().c_str());
+    if (name.starts_with(prefix) && !stays(name)) ::unlink(at->path().c_str());
   }
 }
 

@@ -41,13 +41,16 @@ class MemoryFile {
   [[nodiscard]] static Result<MemoryFile> create(const std::string& name, std::size_t size,
                                                  const Fill& fill = {}, const MemoryRights& rights = {});
 
-  /// Maps an existing one, whole. not_found: no such name. refused: its rights do not allow it. corrupt:
-  /// smaller than `at_least` bytes. wrong_type: not a plain file.
-  [[nodiscard]] static Result<MemoryFile> open(const std::string& name, std::size_t at_least, Access access);
+  /// Maps an existing one, whole. not_found: no such name. refused: its rights do not allow it, or its owner
+  /// is none of those that `owners` allows; the text says whose it is. corrupt: smaller than `at_least`
+  /// bytes. wrong_type: not a plain file.
+  [[nodiscard]] static Result<MemoryFile> open(const std::string& name, std::size_t at_least, Access access,
+                                               const OwnerCheck& owners = is_trusted_owner);
 
   /// Gives the file of that name `size` bytes if it is empty, as one is that was only just made, or that a
-  /// stranger has emptied. not_found: no such name.
-  [[nodiscard]] static Result<void> fill_empty(const std::string& name, std::size_t size);
+  /// stranger has emptied. not_found: no such name. refused: as open().
+  [[nodiscard]] static Result<void> fill_empty(const std::string& name, std::size_t size,
+                                               const OwnerCheck& owners = is_trusted_owner);
 
   /// Removes the name if it is there; who has it mapped keeps it. False: it is another user's, and the folder
   /// is sticky.
@@ -93,7 +96,13 @@ class UnnamedMemory {
 /// The other way round. Nothing: it is no such file.
 [[nodiscard]] std::optional<std::string> memory_of_file(std::string_view pool, std::string_view file);
 
-/// Removes the names of all shared memories of the pool; who has one mapped keeps it. Set-up.
-void remove_pool_memories(std::string_view pool) noexcept;
+/// Takes away what has the name of a shared memory, whatever it is: a folder that is not empty is put aside
+/// under another name. It is well if there is nothing. refused: it is another user's, and only that user or
+/// root can. Set-up.
+[[nodiscard]] Result<void> take_away(const std::string& path);
+
+/// Removes the names of all shared memories of the pool but those in `kept`; who has one mapped keeps it.
+/// Set-up.
+void remove_pool_memories(std::string_view pool, std::span<const std::string> kept = {}) noexcept;
 
 }  // namespace plchost

@@ -5,6 +5,8 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <grp.h>
+#include <pwd.h>
 #include <unistd.h>
 
 #include "shm/base/system_call.hpp"
@@ -21,10 +23,30 @@ bool caller_is_in(gid_t group) {
   return std::ranges::find(groups, group) != groups.end();
 }
 
+bool is_member(uid_t user, gid_t group) {
+  std::vector<char> text(16384);
+  passwd entry{};
+  passwd* found = nullptr;
+  if (::getpwuid_r(user, &entry, text.data(), text.size(), &found) != 0 || found == nullptr) return false;
+  std::vector<gid_t> groups(256);
+  int count = static_cast<int>(groups.size());
+  if (::getgrouplist(found->pw_name, found->pw_gid, groups.data(), &count) < 0) return false;
+  groups.resize(static_cast<std::size_t>(count));
+  return std::ranges::find(groups, group) != groups.end();
+}
+
 constexpr mode_t kRead = 4;
 constexpr mode_t kWrite = 2;
 
 }  // namespace
+
+bool is_trusted_owner(uid_t owner) noexcept {
+  return owner == 0 || owner == ::geteuid();
+}
+
+bool is_any_owner(uid_t /*owner*/) noexcept {
+  return true;
+}
 
 Permission permission_for_caller(uid_t owner, gid_t group, mode_t mode) {
   const uid_t caller = ::geteuid();
@@ -36,6 +58,11 @@ Permission permission_for_caller(uid_t owner, gid_t group, mode_t mode) {
     bits >>= 3U;
   }
   return {.read = (bits & kRead) != 0, .write = (bits & kWrite) != 0};
+}
+
+bool allows_to_write(const MemoryRights& rights, uid_t user) {
+  if (user == 0 || user == rights.owner.value_or(::geteuid()) || (rights.mode & S_IWOTH) != 0) return true;
+  return (rights.mode & S_IWGRP) != 0 && is_member(user, rights.group.value_or(::getegid()));
 }
 
 bool may_give_to(gid_t group) {

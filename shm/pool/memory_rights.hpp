@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -17,12 +18,23 @@ struct MemoryRights {
   mode_t mode = 0660;                         ///< permission bits, whatever the umask
 };
 
+/// Whether a file of that owner may be used. Anybody can make files in /dev/shm, of any name that is not
+/// taken.
+using OwnerCheck = std::function<bool(uid_t owner)>;
+/// root, and the user of the calling process: those who could do all that this process does anyway.
+[[nodiscard]] bool is_trusted_owner(uid_t owner) noexcept;
+/// For a client that joins what another user has set up: the files of a host belong to whoever runs it.
+[[nodiscard]] bool is_any_owner(uid_t owner) noexcept;
+
 /// What an object allows the calling process. Root may do all. Set-up.
 struct Permission {
   bool read = false;
   bool write = false;
 };
 [[nodiscard]] Permission permission_for_caller(uid_t owner, gid_t group, mode_t mode);
+
+/// Whether these rights let a user write: as owner, as a member of the group, or as anybody. Set-up.
+[[nodiscard]] bool allows_to_write(const MemoryRights& rights, uid_t user);
 
 /// Whether the calling process may make a file, or an object, that belongs to the group: it is in it, or
 /// root.

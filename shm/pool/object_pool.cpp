@@ -185,7 +185,10 @@ Result<T> ObjectPool::refer(PoolLock* held, ObjectEntry& entry, const Wanted& wa
 
 Result<void> ObjectPool::map(SharedMemory& memory, const Wanted& wanted, Access access) const {
   const std::uint64_t size = memory.entry().size.load(kRelaxed);
-  auto file = MemoryFile::open(pool_memory_name(name(), wanted.name), 1, access);
+  // The file that the object was made with, or found with, not one that somebody has put in its place.
+  const uid_t owner = memory.entry().owner.load(kRelaxed);
+  auto file = MemoryFile::open(pool_memory_name(name(), wanted.name), 1, access,
+                               [owner](uid_t user) { return user == owner; });
   if (!file) return failure_in(fmt::format("memory '{}'", wanted.name), std::move(file).error());
   if (file->bytes().size() != size) {
     return failure(ErrorCode::corrupt, fmt::format("memory '{}' has {} bytes, and its file {}: remove it",
@@ -374,8 +377,9 @@ Result<SharedMemory> ObjectPool::open_memory(std::string_view name, Access acces
 // A second time, if table and file disagreed.
 Result<SharedMemory> ObjectPool::open_memory(const Wanted& wanted, Access access) const {
   auto memory = open_object<SharedMemory>(wanted, access);
+  const auto code = memory ? ErrorCode::ok : memory.error().code;
   const bool missed =
-      !memory && (memory.error().code == ErrorCode::not_found || memory.error().code == ErrorCode::corrupt);
+      code == ErrorCode::not_found || code == ErrorCode::corrupt || code == ErrorCode::refused;
   if (!missed || !PoolAdoption::reconcile(*segment_, wanted.name)) return memory;
   return open_object<SharedMemory>(wanted, access);
 }

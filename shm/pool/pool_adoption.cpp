@@ -10,8 +10,6 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <grp.h>
-#include <pwd.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -99,25 +97,12 @@ MemoryFileState examine_patiently(const std::string& path) {
   }
 }
 
-bool is_member(uid_t user, gid_t group) {
-  std::vector<char> text(16384);
-  passwd entry{};
-  passwd* found = nullptr;
-  if (::getpwuid_r(user, &entry, text.data(), text.size(), &found) != 0 || found == nullptr) return false;
-  std::vector<gid_t> groups(256);
-  int count = static_cast<int>(groups.size());
-  if (::getgrouplist(found->pw_name, found->pw_gid, groups.data(), &count) < 0) return false;
-  groups.resize(static_cast<std::size_t>(count));
-  return std::ranges::find(groups, group) != groups.end();
-}
-
 // Who may not write the pool could not have made an object of it either.
 bool may_write_pool(const std::string& pool, uid_t user) {
   struct stat status{};
   if (::stat(path_in_memory(pool).c_str(), &status) != 0) return false;
-  if (user == 0 || user == status.st_uid || user == ::geteuid() || (status.st_mode & S_IWOTH) != 0)
-    return true;
-  return (status.st_mode & S_IWGRP) != 0 && is_member(user, status.st_gid);
+  return user == ::geteuid() ||
+         allows_to_write({.owner = status.st_uid, .group = status.st_gid, .mode = status.st_mode}, user);
 }
 
 bool can_be_adopted(const MemoryFileState& state, const std::string& pool) {
@@ -149,18 +134,20 @@ bool adopt(PoolSegment& segment, PoolLock& held, std::string_view name, const Me
   return true;
 }
 
+// `foreign`: it is there, of a user who may not write the pool.
 bool set_right(PoolSegment& segment, PoolLock& held, std::string_view name, const MemoryFileState& state,
-               bool adoptable) {
+               bool adoptable, bool foreign) {
   ObjectEntry* const entry = segment.find(held, name);
   if (entry == nullptr) return adoptable && adopt(segment, held, name, state);
   if (!is_memory(*entry)) return false;
   if (PoolAdoption::is_left_over(*entry)) return false;
-  if (state.kind == Kind::none || state.kind == Kind::empty) {
+  const bool same_owner = entry->owner.load(kRelaxed) == state.status.st_uid;
+  if (state.kind == Kind::none || state.kind == Kind::empty || (foreign && !same_owner)) {
     segment.destroy(held, *entry);
     return true;
   }
-  if (!adoptable || entry->size.load(kRelaxed) == static_cast<std::uint64_t>(state.status.st_size))
-    return false;
+  const bool same_size = entry->size.load(kRelaxed) == static_cast<std::uint64_t>(state.status.st_size);
+  if (!adoptable || (same_size && same_owner)) return false;
   segment.table(held).erase(*entry);
   return adopt(segment, held, name, state);
 }
@@ -171,13 +158,18 @@ bool PoolAdoption::is_left_over(const ObjectEntry& entry) noexcept {
   return PoolTable::is_valid(entry) && is_memory(entry) && PoolTable::is_idle(entry);
 }
 
+bool PoolAdoption::may_own(std::string_view pool, uid_t user) {
+  return is_trusted_owner(user) || may_write_pool(std::string(pool), user);
+}
+
 bool PoolAdoption::is_for_adoption(const std::string& path, const std::string& pool) {
   return can_be_adopted(examine(path), pool);
 }
 
 bool PoolAdoption::is_in_use(const std::string& path, const std::string& pool) {
   const MemoryFileState state = examine(path);
-  return state.kind == Kind::of_blocks || can_be_adopted(state, pool);
+  const bool of_blocks = state.kind == Kind::of_blocks && may_write_pool(pool, state.status.st_uid);
+  return of_blocks || can_be_adopted(state, pool);
 }
 
 bool PoolAdoption::reconcile(PoolSegment& segment, std::string_view name) {
@@ -185,13 +177,16 @@ bool PoolAdoption::reconcile(PoolSegment& segment, std::string_view name) {
   const std::string path = path_in_memory(pool_memory_name(segment.name(), name));
   const MemoryFileState before = examine_patiently(path);
   const ObjectEntry* const known = segment.peek(name);
-  const bool adoptable = can_be_adopted(before, segment.name());
+  const bool there = before.kind != Kind::none;
+  const bool welcome = there && may_write_pool(segment.name(), before.status.st_uid);
+  const bool adoptable = welcome && before.kind == Kind::described;
   if (known == nullptr && !adoptable) return false;
   auto held = segment.lock();
   if (!held) return false;
   const MemoryFileState now = examine(path);
-  return set_right(segment, *held, name, now,
-                   adoptable && now.kind == Kind::described && now.status.st_uid == before.status.st_uid);
+  const bool same_owner = now.status.st_uid == before.status.st_uid;
+  return set_right(segment, *held, name, now, adoptable && same_owner && now.kind == Kind::described,
+                   there && !welcome && same_owner && now.kind != Kind::none);
 }
 
 Result<ObjectEntry*> PoolAdoption::use_again(PoolSegment& segment, PoolLock& held, ObjectEntry& entry,

@@ -26,8 +26,9 @@
 namespace plchost {
 
 inline constexpr std::uint64_t kPoolMagic = 0x6c6f6f70'74736f68;  // "hostpool"
-/// 1: first. 2: semaphores, mutexes, memories, clients and their references. 3: notes of what is changed.
-inline constexpr std::uint32_t kPoolVersion = 3;
+/// 1: first. 2: semaphores, mutexes, memories, clients and their references. 3: notes of what is changed. 4:
+/// the PID namespace.
+inline constexpr std::uint32_t kPoolVersion = 4;
 
 /// Of what the pool's mutex orders, or what is checked after it was read without it.
 inline constexpr auto kRelaxed = std::memory_order_relaxed;
@@ -116,7 +117,9 @@ struct alignas(64) PoolHeader {
   std::uint32_t bucket_count;
   std::uint32_t max_clients;
   std::uint32_t max_references;
-  std::array<std::uint32_t, 6> reserved0;
+  /// Of all clients, see plchost::pid_namespace(). What is here of processes is numbers of that namespace.
+  std::uint64_t pid_namespace;
+  std::array<std::uint32_t, 4> reserved0;
 
   alignas(64) RobustMutex mutex;  ///< guards set-up only
   /// Odd while somebody changes what the mutex guards: for readers without the right to write.
@@ -126,7 +129,8 @@ struct alignas(64) PoolHeader {
   std::atomic<std::uint64_t> magic_again;
   std::uint32_t version_again;
   std::uint32_t max_objects_again;
-  std::array<std::uint32_t, 4> reserved2;
+  std::uint64_t pid_namespace_again;
+  std::array<std::uint32_t, 2> reserved2;
 
   // Guarded by the mutex. Those that count only grow.
   std::atomic<std::uint32_t> high_water;    ///< entries from here on were never used
@@ -150,6 +154,7 @@ struct alignas(64) PoolHeader {
   std::array<std::atomic<std::uint64_t>, 63> notes;
 };
 static_assert(sizeof(PoolHeader) == 704 && offsetof(PoolHeader, version) == 8);
+static_assert(offsetof(PoolHeader, pid_namespace) == 40 && offsetof(PoolHeader, pid_namespace_again) == 112);
 static_assert(offsetof(PoolHeader, mutex) == 64 && offsetof(PoolHeader, high_water) == 128);
 static_assert(offsetof(PoolHeader, noted) == 192 && offsetof(PoolHeader, notes) == 200);
 static_assert(std::atomic<std::uint32_t>::is_always_lock_free);

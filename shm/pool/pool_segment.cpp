@@ -25,7 +25,7 @@ PoolHeader& header_of(const MemoryFile& memory) noexcept {
 }
 
 // What never changes while the pool is there.
-void write_constants(PoolHeader& header, std::uint32_t max_objects) noexcept {
+void write_constants(PoolHeader& header, std::uint32_t max_objects, std::uint64_t pid_namespace) noexcept {
   header.version = kPoolVersion;
   header.entry_size = sizeof(ObjectEntry);
   header.size = pool_size(max_objects);
@@ -33,6 +33,8 @@ void write_constants(PoolHeader& header, std::uint32_t max_objects) noexcept {
   header.bucket_count = bucket_count_for(max_objects);
   header.max_clients = kMaxClients;
   header.max_references = max_references_for(max_objects);
+  header.pid_namespace = pid_namespace;
+  header.pid_namespace_again = pid_namespace;
   header.version_again = kPoolVersion;
   header.max_objects_again = max_objects;
   header.magic_again.store(kPoolMagic, kRelaxed);
@@ -41,7 +43,7 @@ void write_constants(PoolHeader& header, std::uint32_t max_objects) noexcept {
 
 // Zero-filled memory holds an empty table already; only the header has something to say.
 Result<void> fill_header(std::span<std::byte> bytes, std::uint32_t max_objects) {
-  write_constants(*new (bytes.data()) PoolHeader{}, max_objects);
+  write_constants(*new (bytes.data()) PoolHeader{}, max_objects, pid_namespace());
   return {};
 }
 
@@ -69,6 +71,21 @@ bool is_sound_again(const PoolHeader& header, std::uint32_t max_objects, std::si
          max_objects >= kMinObjects && max_objects <= kMaxObjects && file_size == pool_size(max_objects);
 }
 
+// In another namespace each client would look dead to the others, and what it holds would be taken from it.
+Result<void> check_pid_namespace(const PoolHeader& header, const std::string& name) {
+  const std::uint64_t ours = pid_namespace();
+  const std::uint64_t theirs = header.pid_namespace;
+  if (theirs == ours || header.pid_namespace_again == ours) return {};
+  return failure(
+      ErrorCode::refused,
+      fmt::format(
+          "pool '{}' was made in PID namespace {}, this process is in {}: processes of two namespaces cannot "
+          "tell whether the others have ended. Start this one in the namespace of the others (of a "
+          "container: "
+          "--pid=host), or remove {} if nobody uses it any more",
+          name, theirs, ours, MemoryFile::path(name)));
+}
+
 }  // namespace
 
 PoolSegment::PoolSegment(std::string name, MemoryFile memory, std::uint32_t max_objects, Access access)
@@ -77,6 +94,7 @@ PoolSegment::PoolSegment(std::string name, MemoryFile memory, std::uint32_t max_
       view_(memory_.bytes(), max_objects),
       access_(access),
       process_(this_process()),
+      pid_namespace_(pid_namespace()),
       journal_(view_.header(), memory_.bytes().size()),
       told_(counted()) {}
 
@@ -90,11 +108,12 @@ PoolSegment::~PoolSegment() {
 }
 
 // busy: somebody has begun to make it and has not ended yet.
-Result<std::shared_ptr<PoolSegment>> PoolSegment::attach_now(const std::string& name, Access access) {
+Result<std::shared_ptr<PoolSegment>> PoolSegment::attach_now(const std::string& name, Access access,
+                                                             const OwnerCheck& owners) {
   const auto unfinished = [&] {
     return failure(ErrorCode::busy, fmt::format("pool '{}' is not complete; remove it", name));
   };
-  auto memory = MemoryFile::open(name, sizeof(PoolHeader), access);
+  auto memory = MemoryFile::open(name, sizeof(PoolHeader), access, owners);
   if (!memory) {
     return memory.error().code == ErrorCode::corrupt ? unfinished() : std::unexpected(memory.error());
   }
@@ -103,6 +122,7 @@ Result<std::shared_ptr<PoolSegment>> PoolSegment::attach_now(const std::string& 
   const std::uint64_t magic = header.magic.load(std::memory_order_acquire);
   std::uint32_t max_objects = header.max_objects_again;
   if (is_sound_again(header, max_objects, file_size)) {
+    if (auto same = check_pid_namespace(header, name); !same) return std::unexpected(same.error());
     return std::shared_ptr<PoolSegment>(new PoolSegment(name, std::move(*memory), max_objects, access));
   }
   if (magic == 0) return unfinished();
@@ -114,21 +134,24 @@ Result<std::shared_ptr<PoolSegment>> PoolSegment::attach_now(const std::string& 
   if (auto sound = check_header(header, max_objects, file_size, name); !sound) {
     return std::unexpected(sound.error());
   }
+  if (auto same = check_pid_namespace(header, name); !same) return std::unexpected(same.error());
   return std::shared_ptr<PoolSegment>(new PoolSegment(name, std::move(*memory), max_objects, access));
 }
 
 // busy: it was not completed in time, so whoever began is gone.
-Result<std::shared_ptr<PoolSegment>> PoolSegment::attach_patiently(const std::string& name, Access access) {
+Result<std::shared_ptr<PoolSegment>> PoolSegment::attach_patiently(const std::string& name, Access access,
+                                                                   const OwnerCheck& owners) {
   const TimePoint deadline = MonotonicClock::now() + kPatience;
   for (;;) {
-    auto pool = attach_now(name, access);
+    auto pool = attach_now(name, access, owners);
     if (pool || pool.error().code != ErrorCode::busy || MonotonicClock::now() >= deadline) return pool;
     std::this_thread::sleep_for(kLookInterval);
   }
 }
 
 Result<std::shared_ptr<PoolSegment>> PoolSegment::attach(const std::string& name, Access access) {
-  auto pool = attach_patiently(name, access);
+  // A client takes what there is: only who sets a host up can say whose it has to be.
+  auto pool = attach_patiently(name, access, is_any_owner);
   if (!pool && pool.error().code == ErrorCode::busy) pool.error().code = ErrorCode::corrupt;
   return pool;
 }
@@ -140,9 +163,12 @@ Result<std::shared_ptr<PoolSegment>> PoolSegment::create(const std::string& name
                    fmt::format("pool '{}': {} objects; allowed are {} to {}", name, options.max_objects,
                                kMinObjects, kMaxObjects));
   }
+  const auto owners = [&options](uid_t user) {
+    return is_trusted_owner(user) || user == options.rights.owner;
+  };
   constexpr int kAttempts = 10;  // another round is needed only if others make and remove the pool meanwhile
   for (int attempt = 1;; ++attempt) {
-    auto pool = attach_patiently(name, Access::read_write);
+    auto pool = attach_patiently(name, Access::read_write, owners);
     if (pool || attempt == kAttempts) return pool;
     if (pool.error().code == ErrorCode::busy) {
       MemoryFile::remove(name);
@@ -219,9 +245,10 @@ void PoolSegment::mend_header() noexcept {
   const std::size_t size = pool_size(max_objects);
   const bool sound = header.magic.load(kRelaxed) == kPoolMagic &&
                      check_header(header, header.max_objects, size, name_).has_value() &&
-                     is_sound_again(header, header.max_objects_again, size);
+                     is_sound_again(header, header.max_objects_again, size) &&
+                     header.pid_namespace == pid_namespace_ && header.pid_namespace_again == pid_namespace_;
   if (sound) return;
-  write_constants(header, max_objects);
+  write_constants(header, max_objects, pid_namespace_);
   header.header_mended.fetch_add(1, kRelaxed);
 }
 

@@ -78,8 +78,10 @@ class PoolSegment {
 
  private:
   PoolSegment(std::string name, MemoryFile memory, std::uint32_t max_objects, Access access);
-  static Result<std::shared_ptr<PoolSegment>> attach_now(const std::string& name, Access access);
-  static Result<std::shared_ptr<PoolSegment>> attach_patiently(const std::string& name, Access access);
+  static Result<std::shared_ptr<PoolSegment>> attach_now(const std::string& name, Access access,
+                                                         const OwnerCheck& owners);
+  static Result<std::shared_ptr<PoolSegment>> attach_patiently(const std::string& name, Access access,
+                                                               const OwnerCheck& owners);
 
   [[nodiscard]] Result<PoolLock> acquire(Duration patience);
   [[nodiscard]] Result<ClientSlot*> client();
@@ -99,6 +101,7 @@ class PoolSegment {
   PoolView view_;
   Access access_;
   ProcessIdentity process_;
+  std::uint64_t pid_namespace_;
   // Guarded by the pool's mutex.
   PoolJournal journal_;
   ClientSlot* client_ = nullptr;  // that this client has

@@ -60,7 +60,7 @@ Result<TransitionRing> TransitionRing::open(std::string_view pool, std::string_v
     if (!memory && memory.error().code == ErrorCode::already_exists) {
       memory = open_ring(name, MemoryFile::Access::read_write);
     }
-  } else if (!memory && memory.error().code == ErrorCode::corrupt) {
+  } else if (!memory) {  // nothing of ours
     memory = MemoryFile::replace(name, sizeof(TransitionRingLayout), fill_ring);
   }
   if (!memory) return std::unexpected(std::move(memory).error());

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # What the house looks like from outside: its eight entries, small files, nothing unfinished, no path of a
-# developer's machine. Usage: house.sh [ROOT] (a git checkout); prints each fault.
+# developer's machine, no file that is made through a link. Usage: house.sh [ROOT] (a git checkout); prints each fault.
 set -euo pipefail
 cd "${1:-$(dirname "$0")/../..}"
 wrong=0
@@ -22,4 +22,9 @@ marker='TO''DO|FIX''ME|X''XX'
 git grep -nE "\b($marker)\b" -- ':!*.md' && fault "the lines above are unfinished" || true
 home_path='/(work|home|root)/[a-z]'
 git grep -nE "$home_path" -- ':!tests/gates' && fault "the lines above name a path of one machine" || true
+
+# What anybody on the machine can put in a program's way: a link where it makes a file, a name in a space of all.
+sources=(shm schedulers instances manager api)
+git grep -nE '\bO_CREAT\b' -- "${sources[@]}" | grep -vE 'O_NOFOLLOW|O_EXCL' && fault "the lines above make files through links" || true
+git grep -nE 'shm_open|sun_path *(\+ *1\b|\[0\])' -- "${sources[@]}" && fault "the lines above use names that anybody can take" || true
 exit $wrong

@@ -49,6 +49,13 @@ new_tree
 echo '// /ho''me/somebody/x' >"$plot/tree/shm/base/path.cpp" && commit_tree
 must_be_red "house: path" "$gates/house.sh" "$plot/tree"
 
+new_tree
+echo 'int fd = open(path, O_RDWR | O_CR''EAT);' >"$plot/tree/shm/base/link.cpp" && commit_tree
+must_be_red "house: file through a link" "$gates/house.sh" "$plot/tree"
+new_tree
+echo 'std::copy_n(name, n, address.sun_path + 1);' >"$plot/tree/shm/base/name.cpp" && commit_tree
+must_be_red "house: abstract socket" "$gates/house.sh" "$plot/tree"
+
 # plant_in_contract NAME EXPRESSION [--write]: the contract with that change (of sed), and with a reference made anew
 plant_in_contract() {
   new_tree

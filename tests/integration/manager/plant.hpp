@@ -66,6 +66,7 @@ class Plant {
   /// Names of ours in /dev/shm and in the run directory.
   std::vector<std::string> leftovers() const;
   [[nodiscard]] std::string log() const;
+  [[nodiscard]] std::string state_directory() const { return folder_ / "state"; }
   [[nodiscard]] std::string run_directory() const { return folder_ / "run"; }
   [[nodiscard]] const std::string& pool() const { return pool_; }
 

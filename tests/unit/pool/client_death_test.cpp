@@ -12,6 +12,7 @@
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
+#include <sched.h>
 #include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -276,6 +277,41 @@ TEST_F(ClientDeath, AtAnyInstructionLeavesAPoolThatTheNextCallRepairs) {
   EXPECT_GT(view.header().repairs.load(), 0U) << "none of them died with the pool's lock held";
   EXPECT_EQ(view.header().rebuilds.load(), 0U) << "what one of them had begun was not undone";
   EXPECT_GT(view.header().departed.load(), kRounds);
+}
+
+/// What a process of another PID namespace finds that tries to use the pool: 0 is what it should.
+int try_from_another_namespace(const std::string& name) {
+  const auto is_told = [](const auto& pool) {
+    return !pool && pool.error().code == ErrorCode::refused &&
+           pool.error().message.find("PID namespace") != std::string::npos;
+  };
+  if (!is_told(ObjectPool::attach(name))) return 1;
+  if (!is_told(ObjectPool::attach(name, ObjectPool::Access::read_only))) return 2;
+  return is_told(ObjectPool::create(name)) ? 0 : 3;
+}
+
+// It would see no process under the numbers of the others, take all for dead, and release what they hold.
+TEST_F(ClientDeath, IsNotSeenByAProcessOfAnotherPidNamespaceWhichIsRefused) {
+  constexpr int kNotAllowed = 77;
+  const pid_t holder =
+      client([](ObjectPool& pool) { (void)new auto(std::move(pool.create_semaphore("held", 1)->object)); });
+  const pid_t outside = ::fork();
+  if (outside == 0) {
+    if (::unshare(CLONE_NEWPID) != 0) ::_exit(kNotAllowed);
+    const pid_t inside = ::fork();
+    if (inside == 0) ::_exit(try_from_another_namespace(name_.get()));
+    int status = 0;
+    ::waitpid(inside, &status, 0);
+    ::_exit(WEXITSTATUS(status));
+  }
+  int status = 0;
+  ::waitpid(outside, &status, 0);
+  const auto held = pool_.look_at("held");
+  EXPECT_TRUE(held) << "its holder lives";
+  EXPECT_EQ(held ? held->reference_count : 0U, 1U);
+  kill_and_reap(holder);
+  if (WEXITSTATUS(status) == kNotAllowed) GTEST_SKIP() << "a PID namespace needs root";
+  EXPECT_EQ(WEXITSTATUS(status), 0);
 }
 
 }  // namespace
