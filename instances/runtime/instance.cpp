@@ -313,6 +313,7 @@ void Instance::beat() {
   if (tasks_ && tasks_->running()) runtime.clock = clock_runtime(tasks_->distributed_clock());
   runtime.clock.reference.assign(settings_.scheduler.distributed_clock.reference);
   runtime.clock.problem.assign(reference_.problem());
+  runtime.retain_problem.assign(host_->areas().retain_problem());
   page_->write_runtime(runtime);
   look_after_page();
   for (const std::string& loss : host_->areas().look_for_losses()) spdlog::warn("{}", loss);

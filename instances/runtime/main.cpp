@@ -16,8 +16,10 @@
 #include "instances/runtime/application/trial_process.hpp"
 #include "instances/runtime/instance.hpp"
 #include "instances/runtime/options.hpp"
+#include "instances/runtime/retain/save_left_behind.hpp"
 #include "instances/runtime/settings/settings.hpp"
 #include "shm/base/log.hpp"
+#include "shm/base/memory_guard.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/unique_fd.hpp"
 
@@ -106,6 +108,11 @@ int run(const Options& options) {
     return run_trial(options.check_application, signals->get(),
                      [&] { return check_application(options.check_application, options.launch.settings); });
   }
+  if (options.save_retain) {
+    const auto saved = save_left_behind(options.launch);
+    if (!saved) spdlog::error("retain variables are not written: {}", saved.error().describe());
+    return saved ? EXIT_SUCCESS : kExitSetupFailed;
+  }
 
   std::unique_ptr<Instance> instance;
   {
@@ -134,6 +141,7 @@ int run(const Options& options) {
 }  // namespace plchost
 
 int main(int argc, char** argv) {
+  plchost::MemoryGuard::watch_process();
   const auto parsed = plchost::parse_options(argc, argv);
   return parsed.options ? plchost::run(*parsed.options) : parsed.exit_code;
 }

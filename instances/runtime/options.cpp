@@ -108,6 +108,10 @@ void describe(CLI::App& app, Options& options) {
   app.add_option("--check-application", options.check_application,
                  "Only check this file, with --settings under these, and say what is in it");
   app.add_option("--check-settings", options.check_settings, "Only check this settings file");
+  app.add_flag(
+      std::string(kSaveRetainOption), options.save_retain,
+      "Only write the retain variables that an ended instance of this name has left in memory to their "
+      "files");
 }
 
 }  // namespace

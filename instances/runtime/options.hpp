@@ -16,6 +16,7 @@ struct Options {
   std::string check_application;             ///< not empty: only check this file
   std::string check_settings;                ///< the same for a settings file
   int parent = 0;                            ///< whose end is that of the check, too; 0: nobody's
+  bool save_retain = false;                  ///< only write what the kept memory holds to its files
 };
 
 /// What came of the command line: options, or the exit code of a program that has nothing more to do (help,

@@ -1,5 +1,6 @@
 #include "shm/base/memory_guard.hpp"
 
+#include <algorithm>
 #include <mutex>
 
 #include <signal.h>
@@ -71,6 +72,15 @@ void MemoryGuard::watch_thread() noexcept {
   ::sigaddset(&signals, SIGBUS);
   ::pthread_sigmask(SIG_UNBLOCK, &signals, nullptr);
   watched = true;
+}
+
+bool MemoryGuard::is_lost(const void* address) noexcept {
+  const auto at = reinterpret_cast<std::uintptr_t>(address);
+  return std::ranges::any_of(slots, [at](const Slot& slot) {
+    const std::uintptr_t end = slot.end.load(std::memory_order_acquire);
+    const std::uintptr_t begin = slot.begin.load(std::memory_order_relaxed);
+    return at >= begin && at < end && slot.lost.load(std::memory_order_relaxed);
+  });
 }
 
 bool MemoryGuard::mend(const void* address) noexcept {

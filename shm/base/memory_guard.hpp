@@ -29,6 +29,9 @@ class MemoryGuard {
     return slot_ != nullptr && slot_->lost.load(std::memory_order_relaxed);
   }
 
+  /// `address` lies in a guarded mapping that is lost. Any context.
+  [[nodiscard]] static bool is_lost(const void* address) noexcept;
+
   /// Some memory of this process was: a futex in it is another one since, and who slept on it before is not
   /// woken by a wake. Any context.
   [[nodiscard]] static bool any_lost() noexcept { return lost_any.load(std::memory_order_acquire); }

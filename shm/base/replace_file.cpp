@@ -42,7 +42,10 @@ Result<void> sync_directory(const std::string& path) {
 
 Result<void> replace_file(const std::string& path, std::string_view text, mode_t mode) {
   const std::string fresh = path + ".new";
-  if (auto written = write_all(fresh, text, mode); !written) return written;
+  if (auto written = write_all(fresh, text, mode); !written) {
+    ::unlink(fresh.c_str());  // half a file only takes room, of which there may be too little
+    return written;
+  }
   std::error_code error;
   std::filesystem::rename(fresh, path, error);
   if (error) return failure(ErrorCode::system, "rename " + fresh, error.value());

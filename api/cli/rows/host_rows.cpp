@@ -30,7 +30,9 @@ Row number_of(const HostView& host, std::string_view entry) {
 std::string problem_of(const HostView& host) {
   if (host.contested) return "two hosts have this name and show it at the same time";
   const std::string rival = host.entry(dds::kRivalEntry);
-  return rival.empty() ? "" : fmt::format("another host wants this name and is refused: {}", rival);
+  if (!rival.empty()) return fmt::format("another host wants this name and is refused: {}", rival);
+  const std::string unsaved = host.entry(dds::kUnsavedEntry);
+  return unsaved.empty() ? "" : fmt::format("retain variables are not written: {}", unsaved);
 }
 
 /// For how long its manager has run, by its own clock.

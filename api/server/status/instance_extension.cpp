@@ -52,6 +52,13 @@ std::vector<plc_KeyValue> extension_of(const InstanceRuntime& runtime) {
   return entries;
 }
 
+std::string problem_of_instance(const InstanceStatus& status, const InstanceRuntime* runtime) {
+  std::string problem(status.problem.view());
+  if (runtime == nullptr || runtime->pid != status.pid) return problem;
+  const std::string_view retain = runtime->retain_problem.view();
+  return problem.empty() || retain.empty() ? problem.append(retain) : fmt::format("{}; {}", problem, retain);
+}
+
 plc_KeyValue transitions_entry(std::uint64_t last) {
   plc_KeyValue entry{};
   dds::copy_text(entry.name, dds::kTransitionsEntry);

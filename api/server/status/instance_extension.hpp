@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "control.h"
+#include "shm/pool/host_page.hpp"
 #include "shm/pool/instance_page.hpp"
 
 namespace plchost {
@@ -17,7 +19,11 @@ namespace plchost {
 ///   clock_...      the distributed clock as the cyclic task of the highest priority sees it: name of its
 ///                  record, state, in sync, offset and drift (to the nearest hundred), corrections, pairs
 [[nodiscard]] std::vector<plc_KeyValue> extension_of(const InstanceRuntime& runtime);
-/// One more, see dds::kTransitionsEntry.
+/// InstanceStatus.problem: what the manager says, and what only the process knows. `runtime`: of any process
+/// of it, or null.
+[[nodiscard]] std::string problem_of_instance(const InstanceStatus& status, const InstanceRuntime* runtime);
+
+/// One more entry, see dds::kTransitionsEntry.
 [[nodiscard]] plc_KeyValue transitions_entry(std::uint64_t last);
 
 }  // namespace plchost

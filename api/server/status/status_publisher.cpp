@@ -100,6 +100,7 @@ bool StatusPublisher::look_at_instances(TimePoint now) {
   instances_.begin_round();
   exceptions_.begin_round();
   std::vector<std::string> names;
+  std::string unsaved;
   for (std::uint32_t i = 0; i < std::min(host->instance_count, kMaxInstances); ++i) {
     const auto status = page_->instance(i);
     if (!status || status->name.view().empty()) continue;
@@ -122,7 +123,10 @@ bool StatusPublisher::look_at_instances(TimePoint now) {
     const bool says = runtime && !runtime->scheduler.view().empty();
     dds::copy_text(sample.scheduler, says ? runtime->scheduler.view() : status->scheduler.view());
     dds::copy_text(sample.application, status->application.view());
-    dds::copy_text(sample.problem, status->problem.view());
+    dds::copy_text(sample.problem, problem_of_instance(*status, runtime ? &*runtime : nullptr));
+    if (runtime && runtime->pid == status->pid && !runtime->retain_problem.view().empty()) {
+      unsaved += fmt::format("{}{}", unsaved.empty() ? "" : ",", name);
+    }
     auto extension = runtime ? extension_of(*runtime) : std::vector<plc_KeyValue>();
     extension.push_back(transitions_entry(transitions_.publish(name, now)));
     changed |= instances_.update(name, sample, extension);
@@ -134,6 +138,7 @@ bool StatusPublisher::look_at_instances(TimePoint now) {
   }
   instance_names_ = std::move(names);
   instances_.write();
+  changed |= std::exchange(unsaved_, unsaved) != unsaved;
   return changed;
 }
 
@@ -239,6 +244,7 @@ void StatusPublisher::write_host(bool changed) {
   dds::add_entry(ext, dds::kSecuredEntry, source_.secured ? "yes" : "no");
   load_.add_to(ext);
   dds::add_entry(ext, dds::kRivalEntry, rival_);
+  dds::add_entry(ext, dds::kUnsavedEntry, unsaved_);
   (void)hosts_.update(source_.host, sample, ext);
   hosts_.write();
 }

@@ -81,6 +81,7 @@ class StatusPublisher {
   std::string rival_;
   HostLoad load_;
   std::uint32_t running_ = 0;  ///< instances
+  std::string unsaved_;        ///< instances whose newest retain values are in no file, with commas between
   TaskWatch tasks_;
   ExceptionWatch exceptions_;
   TransitionPublisher transitions_;

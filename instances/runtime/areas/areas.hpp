@@ -100,6 +100,8 @@ class Areas {
   /// What is to be told of memories that were cut short since it was asked last; empty: nothing. Control
   /// thread.
   [[nodiscard]] std::vector<std::string> look_for_losses();
+  /// RetainKeeper::problem(). Control thread.
+  [[nodiscard]] std::string retain_problem() const { return keeper_ ? keeper_->problem() : std::string(); }
 
   /// plc_area_address, plc_get_area_state. Any context.
   [[nodiscard]] void* address(RTS_HANDLE area) const noexcept;

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "instances/launch/launch_contract.hpp"
 #include "instances/runtime/areas/areas.hpp"
 
 namespace plchost {
@@ -129,7 +130,7 @@ Result<void> Areas::check_distinct(const Environment& environment) const {
     FileRange range;
   };
   std::vector<Taken> taken;
-  const std::string kept = KeptMemory::name_for(environment.instance);
+  const std::string kept = kept_memory_name(environment.instance);
   if (const auto range = range_of_memory(environment.pool.name(), kept);
       range && std::ranges::any_of(declared_, &DeclaredArea::is_kept)) {
     taken.push_back({.settings = nullptr,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstring>
 #include <utility>
 
 #include <fmt/format.h>
@@ -14,8 +15,16 @@ namespace plchost {
 
 namespace {
 
-// "plckept1", as bytes in memory.
-constexpr std::uint64_t kKeptMagic = 0x317470656b636c70;
+// "plckept2", as bytes in memory.
+constexpr std::uint64_t kKeptMagic = 0x327470656b636c70;
+// The last bytes of the memory. A file that was cut anywhere has lost them, also if it was made longer again.
+constexpr std::uint64_t kKeptEnd = ~kKeptMagic;
+
+// Read after what was copied before.
+bool has_its_end(std::span<const std::byte> memory) noexcept {
+  std::atomic_thread_fence(std::memory_order_acquire);
+  return *reinterpret_cast<const volatile std::uint64_t*>(memory.last(sizeof(kKeptEnd)).data()) == kKeptEnd;
+}
 
 }  // namespace
 
@@ -30,24 +39,24 @@ struct KeptMemory::Header {
   std::array<CycleCounter, PLC_MAX_TASKS> counters;  // each written by its task
 };
 
-std::string KeptMemory::name_for(const std::string& instance) {
-  return instance + ".retain";
-}
-
 std::size_t KeptMemory::bytes_for(std::uint64_t data) noexcept {
   static_assert(sizeof(Header) == 96 + std::size_t{80} * kMaxRetainAreas + std::size_t{8} * PLC_MAX_TASKS &&
                 sizeof(Header) % kRetainAlignment == 0);
-  return sizeof(Header) + data;
+  return sizeof(Header) + (data + kRetainAlignment - 1) / kRetainAlignment * kRetainAlignment +
+         sizeof(kKeptEnd);
 }
 
 KeptMemory::Header& KeptMemory::header() const noexcept {
   return *reinterpret_cast<Header*>(memory_.bytes().data());
 }
 
-std::optional<KeptMemory::Left> KeptMemory::left_behind(const std::string& pool, const std::string& name) {
+Result<KeptMemory::Left> KeptMemory::left_behind(const std::string& pool, const std::string& name) {
+  const auto damaged = [&](std::string_view what) {
+    return failure(ErrorCode::corrupt, fmt::format("memory '{}': {}", name, what));
+  };
   const auto file =
       MemoryFile::open(pool_memory_name(pool, name), sizeof(Header), MemoryFile::Access::read_only);
-  if (!file) return std::nullopt;
+  if (!file) return std::unexpected(file.error());
   const Header& header = *reinterpret_cast<const Header*>(file->bytes().data());
   Left left;
   RetainLayout& layout = left.image.layout;
@@ -55,23 +64,24 @@ std::optional<KeptMemory::Left> KeptMemory::left_behind(const std::string& pool,
   const std::uint64_t areas = header.areas;
   if (header.magic != kKeptMagic || areas > kMaxRetainAreas || layout.bytes > kMaxRetainBytes ||
       file->bytes().size() != bytes_for(layout.bytes)) {
-    return std::nullopt;
+    return damaged("its header is overwritten, or of another version");
   }
   layout.application = header.application.view();
   for (std::uint64_t i = 0; i < areas; ++i) {
     auto area = area_of(AreaRecord(header.entries[i]));  // a copy: a stranger may write it meanwhile
-    if (!area) return std::nullopt;
+    if (!area) return damaged("the name of an area has no end");
     layout.areas.push_back(*std::move(area));
   }
-  if (!check_layout(layout)) return std::nullopt;
+  if (auto valid = check_layout(layout); !valid) return damaged(valid.error().message);
   left.image.generation = header.generation.load(std::memory_order_relaxed);
-  const auto data = file->bytes().subspan(sizeof(Header));
+  const auto data = file->bytes().subspan(sizeof(Header), layout.bytes);
   left.image.data.assign(data.begin(), data.end());
   left.in_cycle =
       static_cast<std::size_t>(std::ranges::count_if(header.counters, [](const CycleCounter& counter) {
         return counter.load(std::memory_order_relaxed) % 2 != 0;
       }));
-  return file->lost() ? std::nullopt : std::optional(std::move(left));
+  if (!has_its_end(file->bytes()) || file->lost()) return damaged("it was cut short");
+  return left;
 }
 
 Result<KeptMemory> KeptMemory::of(Result<SharedMemory> opened, std::size_t bytes) {
@@ -108,6 +118,7 @@ Result<KeptMemory> KeptMemory::make(ObjectPool& pool, const std::string& name, c
       header.entries[i] = record_of(image.layout.areas[i]);
     }
     std::ranges::copy(image.data, bytes.begin() + sizeof(Header));
+    std::memcpy(bytes.last(sizeof(kKeptEnd)).data(), &kKeptEnd, sizeof(kKeptEnd));
     return {};
   };
   const std::size_t bytes = bytes_for(image.layout.bytes);
@@ -115,7 +126,7 @@ Result<KeptMemory> KeptMemory::make(ObjectPool& pool, const std::string& name, c
 }
 
 std::span<std::byte> KeptMemory::data() const noexcept {
-  return memory_.bytes().subspan(sizeof(Header));
+  return memory_.bytes().subspan(sizeof(Header), memory_.bytes().size() - bytes_for(0));
 }
 
 CycleCounter& KeptMemory::counter(std::size_t task) const noexcept {
@@ -142,6 +153,16 @@ void KeptMemory::add_group(const std::vector<std::size_t>& tasks,
         {.offset = offset, .live = other != elsewhere_.end() ? other->live : data().subspan(offset, bytes)});
   }
   groups_.emplace_back(std::move(counters), std::move(parts));
+}
+
+// Whatever a cut has taken from the data, it has taken the end, too.
+bool KeptMemory::is_whole() const noexcept {
+  const bool has_end = has_its_end(memory_.bytes());
+  const Header& kept = header();
+  const bool described = kept.magic == kKeptMagic && bytes_for(kept.bytes) == memory_.bytes().size();
+  const bool elsewhere = std::ranges::none_of(
+      elsewhere_, [](const Elsewhere& part) { return MemoryGuard::is_lost(part.live.data()); });
+  return has_end && described && elsewhere && !memory_.lost();
 }
 
 void KeptMemory::copy_elsewhere(std::span<const std::byte> taken) const noexcept {

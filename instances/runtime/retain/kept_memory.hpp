@@ -23,15 +23,13 @@ namespace plchost {
 /// that it outlives the process. What it says about itself is checked before use: strangers can write to it.
 class KeptMemory {
  public:
-  /// "INSTANCE.retain"
-  [[nodiscard]] static std::string name_for(const std::string& instance);
-
-  /// What the process before left under that name; nothing: there is none, or none that is whole. Set-up.
+  /// What the process before left under that name. not_found: there is none. corrupt: none that is whole.
+  /// Set-up.
   struct Left {
     RetainImage image;         ///< its generation: that of the last one that was written to a file
     std::size_t in_cycle = 0;  ///< tasks that were within a cycle when the process ended
   };
-  [[nodiscard]] static std::optional<Left> left_behind(const std::string& pool, const std::string& name);
+  [[nodiscard]] static Result<Left> left_behind(const std::string& pool, const std::string& name);
 
   /// The one that was left behind, with all that was written into it until now; it has this layout. Set-up.
   [[nodiscard]] static Result<KeptMemory> take_over(ObjectPool& pool, const std::string& name,
@@ -57,6 +55,9 @@ class KeptMemory {
                  const std::vector<std::pair<std::size_t, std::size_t>>& stretches);
   /// Each stretch of the data is in one of them.
   [[nodiscard]] std::deque<KeptGroup>& groups() noexcept { return groups_; }
+  /// False: another program has cut or overwritten the memory, or one in which an area lives elsewhere. What
+  /// is in it is worth nothing, and so is a copy that was made before this was asked. Soft thread.
+  [[nodiscard]] bool is_whole() const noexcept;
   /// What lives elsewhere is in the memory as it was taken. Soft thread.
   void copy_elsewhere(std::span<const std::byte> taken) const noexcept;
 

@@ -5,13 +5,11 @@
 #include <fstream>
 #include <utility>
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 
+#include "shm/base/own_folder.hpp"
 #include "shm/base/replace_file.hpp"
-#include "shm/base/system_call.hpp"
 
 namespace plchost {
 
@@ -33,29 +31,33 @@ Result<std::string> read_whole(const std::string& path) {
   return text;
 }
 
-Result<UniqueFd> lock(const std::string& path) {
-  UniqueFd fd(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0600));
-  if (!fd) return failure(ErrorCode::system, "open " + path, errno);
-  if (::flock(fd.get(), LOCK_EX | LOCK_NB) == 0) return fd;
-  const int error = errno;
-  if (error != EWOULDBLOCK) return failure(ErrorCode::system, "lock " + path, error);
-  return failure(ErrorCode::busy,
-                 fmt::format("{} is held by another process: retain files have one instance", path));
-}
-
 }  // namespace
 
 Result<RetainFiles> RetainFiles::open(const std::string& directory, const std::string& instance) {
+  RetainFiles files(fmt::format("{}/{}.retain", directory, instance), directory);
+  const auto taken = files.take();
+  if (!taken && taken.error().code == ErrorCode::busy) return std::unexpected(taken.error());
+  return files;
+}
+
+Result<void> RetainFiles::take() {
+  if (lock_) return {};
   constexpr mode_t kMode = 0755;
-  const int error = ::mkdir(directory.c_str(), kMode) == 0 ? 0 : errno;
-  if (error != 0 && error != EEXIST) {
-    return failure(ErrorCode::system, fmt::format("make the folder for retain variables {}", directory),
+  const int error = ::mkdir(directory_.c_str(), kMode) == 0 ? 0 : errno;
+  if (error != 0 && error != EEXIST && error != EROFS) {
+    return failure(ErrorCode::system, fmt::format("make the folder for retain variables {}", directory_),
                    error);
   }
-  const std::string stem = fmt::format("{}/{}.retain", directory, instance);
-  auto held = lock(stem + ".lock");
+  if (auto ours = check_own_folder(directory_); !ours) {
+    return failure_in("folder for retain variables", ours.error());
+  }
+  auto held = LockFile::take(stem_ + ".lock");
+  if (!held && held.error().code == ErrorCode::already_exists) {
+    return failure(ErrorCode::busy, fmt::format("{}: retain files have one instance", held.error().message));
+  }
   if (!held) return std::unexpected(std::move(held).error());
-  return RetainFiles(stem, directory, *std::move(held));
+  lock_.emplace(*std::move(held));
+  return {};
 }
 
 std::string RetainFiles::path(std::uint64_t generation) const {
@@ -64,6 +66,11 @@ std::string RetainFiles::path(std::uint64_t generation) const {
 
 auto RetainFiles::read() const -> Found {
   Found found;
+  // What a stranger can put there becomes no value of a machine.
+  if (const auto ours = check_own_folder(directory_); !ours && ours.error().code == ErrorCode::refused) {
+    found.problems.push_back(ours.error().describe());
+    return found;
+  }
   for (std::uint64_t file = 0; file < 2; ++file) {
     const auto text = read_whole(path(file));
     if (!text) {
@@ -80,7 +87,8 @@ auto RetainFiles::read() const -> Found {
   return found;
 }
 
-Result<void> RetainFiles::write(const RetainImage& image) const {
+Result<void> RetainFiles::write(const RetainImage& image) {
+  if (auto taken = take(); !taken) return taken;
   // The file is whole before it gets its name, and has its name for good before it counts as written.
   if (auto written = replace_file(path(image.generation), encode(image)); !written) return written;
   return sync_directory(directory_);

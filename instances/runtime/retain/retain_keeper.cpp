@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "instances/launch/launch_contract.hpp"
 #include "shm/base/log.hpp"
 
 namespace plchost {
@@ -59,6 +60,10 @@ struct RetainKeeper::Start {
   // The memory of a process that was not ended by the power is newer than any file that it wrote.
   void find_source(const std::string& pool, const std::string& name) {
     auto left = KeptMemory::left_behind(pool, name);
+    if (!left && left.error().code != ErrorCode::not_found) {
+      remarks.push_back(
+          fmt::format("what the process before has left in memory is not used: {}", left.error().describe()));
+    }
     auto found = files ? files->read() : RetainFiles::Found{};
     for (std::string& problem : found.problems) remarks.push_back(std::move(problem));
     if (found.newest) {
@@ -125,7 +130,7 @@ struct RetainKeeper::Start {
 
 Result<std::unique_ptr<RetainKeeper>> RetainKeeper::make(ObjectPool& pool, const std::string& instance,
                                                          const RetainImage& initial, const Options& options) {
-  const std::string name = KeptMemory::name_for(instance);
+  const std::string name = kept_memory_name(instance);
   Start start;
   if (auto opened = start.open_files(options, instance); !opened) return std::unexpected(opened.error());
   start.find_source(pool.name(), name);
@@ -143,7 +148,8 @@ Result<std::unique_ptr<RetainKeeper>> RetainKeeper::make(ObjectPool& pool, const
 
 Result<void> RetainKeeper::start() {
   if (!files_) return {};
-  // What was decided for this start holds also if the power is cut before the first cycle.
+  // What was decided for this start holds also if the power is cut before the first cycle. If the disk
+  // refuses it, the machine runs all the same.
   save();
   auto thread = Thread::start("retain", {}, [this] { run(); });
   if (!thread) return std::unexpected(std::move(thread).error());
@@ -241,29 +247,77 @@ RetainKeeper::Taken RetainKeeper::take_snapshot() {
 
 void RetainKeeper::save() {
   if (!files_) return;
+  // What was lost stays so: nobody knows what the memory holds if it looks whole again later.
+  if (lost_) return count_unsaved();
   const Taken taken = take_snapshot();
-  if (taken != Taken::all) {
-    not_saved(taken == Taken::none
-                  ? "tasks were within a cycle each time"
-                  : "tasks of some areas were within a cycle each time; those of the others are");
+  lost_ = !memory_.is_whole();
+  if (lost_) {
+    count_unsaved();
+    return tell(Fault::memory,
+                "another program has cut or overwritten the memory in which they lie; reset the instance, "
+                "which takes them from the file");
   }
+  tell(Fault::cycles, taken == Taken::all ? ""
+                      : taken == Taken::none
+                          ? "tasks were within a cycle each time"
+                          : "tasks of some areas were within a cycle each time; those of the others are");
+  if (taken != Taken::all) count_unsaved();
   if (taken == Taken::none || (image_.data == written_ && saves() > 0)) return;
+  if (const auto done = write(); !done) {
+    count_unsaved();
+    return tell(Fault::files, done.error().describe());
+  }
+  tell(Fault::files, "");
+  written_ = image_.data;
+  if (taken == Taken::all) saves_.store(saves() + 1, std::memory_order_relaxed);
+}
+
+// An attempt that fails is repeated under the same number: so it never takes the place of the last good file.
+Result<void> RetainKeeper::write() {
+  if (!files_->held()) {
+    if (auto taken = files_->take(); !taken) return taken;
+    put_strange_files_aside();
+  }
   ++image_.generation;
   image_.unix_ns = unix_time_ns();
   // Before the file: memory that says less than a file would be taken for older.
   memory_.set_generation(image_.generation);
-  if (auto done = files_->write(image_); !done) return not_saved(done.error().describe());
-  written_ = image_.data;
-  if (taken != Taken::all) return;
-  saves_.store(saves() + 1, std::memory_order_relaxed);
-  if (!std::exchange(problem_, {}).empty()) spdlog::info("retain variables are written again");
+  auto done = files_->write(image_);
+  if (!done) --image_.generation;
+  return done;
 }
 
-void RetainKeeper::not_saved(std::string why) {
+// The folder could not be used at the start, and has come with files whose values were not loaded then.
+void RetainKeeper::put_strange_files_aside() {
+  const auto found = files_->read();
+  if (!found.newest || found.newest->generation <= image_.generation) return;
+  spdlog::warn(
+      "retain variables: files were found that could not be read at the start; they are put aside as .old");
+  files_->put_aside();
+  image_.generation = found.newest->generation;
+}
+
+void RetainKeeper::count_unsaved() noexcept {
   unsaved_.store(unsaved() + 1, std::memory_order_relaxed);
-  if (why == problem_) return;
-  spdlog::warn("retain variables are not written: {}; the file has those before", why);
-  problem_ = std::move(why);
+}
+
+// Each kind of fault by itself, so that two of them at a time are not told in turns for ever.
+void RetainKeeper::tell(Fault fault, std::string why) {
+  const std::lock_guard lock(mutex_);
+  std::string& known = problems_[std::to_underlying(fault)];
+  if (why == known) return;
+  known = std::move(why);
+  if (!known.empty()) {
+    spdlog::warn("retain variables are not written: {}; the file has those before", known);
+  } else if (std::ranges::all_of(problems_, &std::string::empty)) {
+    spdlog::info("retain variables are written again");
+  }
+}
+
+std::string RetainKeeper::problem() const {
+  const std::lock_guard lock(mutex_);
+  const auto worst = std::ranges::find_if_not(problems_, &std::string::empty);
+  return worst == problems_.end() ? std::string() : "retain variables are not written: " + *worst;
 }
 
 }  // namespace plchost

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <condition_variable>
 #include <cstdint>
@@ -54,6 +55,8 @@ class RetainKeeper {
   /// Writes the last state and ends the thread. No cycle runs any more.
   void finish();
 
+  /// Why the newest values are not in the files; empty: they are. Any thread that may take a lock.
+  [[nodiscard]] std::string problem() const;
   [[nodiscard]] std::uint64_t saves() const noexcept { return saves_.load(std::memory_order_relaxed); }
   [[nodiscard]] std::uint64_t unsaved() const noexcept { return unsaved_.load(std::memory_order_relaxed); }
 
@@ -70,7 +73,14 @@ class RetainKeeper {
   [[nodiscard]] Taken take_groups();
   /// False: it was woken to end.
   [[nodiscard]] bool rest();
-  void not_saved(std::string why);
+  [[nodiscard]] Result<void> write();
+  void put_strange_files_aside();
+  /// Why it is not saved; the worst first.
+  enum class Fault : std::uint8_t { memory, files, cycles };
+  static constexpr std::size_t kFaults = 3;
+  /// Logs `why` if it was not so before; empty: there is no such fault any more.
+  void tell(Fault fault, std::string why);
+  void count_unsaved() noexcept;
 
   KeptMemory memory_;
   std::optional<RetainFiles> files_;
@@ -81,11 +91,12 @@ class RetainKeeper {
   RetainImage image_;               // the soft thread's: as it was taken last
   std::vector<std::byte> scratch_;  // the same thread's, and that of tasks that it asks
   std::vector<std::byte> written_;  // the same thread's: what is in the newest file
-  std::string problem_;             // the same thread's
+  bool lost_ = false;               // the same thread's: the memory is
   std::atomic<std::uint64_t> saves_{0};
   std::atomic<std::uint64_t> unsaved_{0};
 
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
+  std::array<std::string, kFaults> problems_;  // guarded by the mutex
   std::condition_variable wake_;
   bool soon_ = false;
   bool ending_ = false;

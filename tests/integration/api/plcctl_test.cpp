@@ -66,6 +66,22 @@ TEST_F(Plcctl, ListsHostsEventsAndObjects) {
   EXPECT_THAT(run({"list", "objects"}).output, HasSubstr("line1/ready"));
 }
 
+TEST_F(Plcctl, ShowsWhatAnInstanceCannotSave) {
+  InstanceRuntime runtime;
+  runtime.pid = 4711;
+  runtime.running = 1;
+  runtime.retain_problem.assign("retain variables are not written: the disk is full");
+  page_->write_runtime(runtime);
+  const auto shows = [&](const char* list, const char* text) {
+    for (const TimePoint end = soon(); MonotonicClock::now() < end;) {
+      if (run({"list", list, "-o", "csv"}).output.find(text) != std::string::npos) return true;
+    }
+    return false;
+  };
+  EXPECT_TRUE(shows("instances", "retain variables are not written: the disk is full"));
+  EXPECT_TRUE(shows("hosts", "retain variables are not written: line1"));
+}
+
 TEST_F(Plcctl, PrintsCommaSeparatedValues) {
   const auto result = run({"list", "instances", "-o", "csv"});
   ASSERT_EQ(result.code, 0) << result.errors;

@@ -355,7 +355,7 @@ TEST_F(AreasOf, TwoProcessesDoNotShareRetainFiles) {
   InstanceProcess second(sandbox, {"--pool", sandbox.pool() + "-2", "--application", application("areas"),
                                    "--state-directory", state_directory(), "--run-directory", ""});
   EXPECT_NE(second.end(), 0);
-  EXPECT_THAT(second.log(), HasSubstr("is held by another process"));
+  EXPECT_THAT(second.log(), HasSubstr("retain files have one instance"));
   ObjectPool::remove(sandbox.pool() + "-2");
   remove_pool_memories(sandbox.pool() + "-2");
 }

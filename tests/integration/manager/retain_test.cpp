@@ -1,5 +1,7 @@
 // What a packer has counted, over the ends of its process, of its manager and of both.
 #include <csignal>
+#include <filesystem>
+#include <optional>
 #include <string>
 
 #include <gmock/gmock.h>
@@ -11,6 +13,9 @@
 namespace plchost {
 namespace {
 
+using testing::ElementsAre;
+using testing::EndsWith;
+using testing::HasSubstr;
 using testing::IsEmpty;
 
 class RetainUnderAManager : public testing::Test {
@@ -101,6 +106,97 @@ TEST_F(RetainUnderAManager, IsThereAfterAnOrderlyEndThatLeavesNoMemory) {
   plant.start_manager();
   up();
   EXPECT_TRUE(has_counted("24"));
+}
+
+/// Its values are written once an hour, so what is there after an orderly end was saved because of the end.
+class RetainThatIsSeldomWritten : public testing::Test {
+ protected:
+  void begin(const std::string& keys) {
+    plant.write_file("packer.cfg",
+                     "[CmpSchedule]\nTask.Freewheeling.Cycletime=10\n[Retain]\nIntervalMs=3600000\n");
+    plant.add("packer1", "packer", "settings = \"packer.cfg\"\n" + keys);
+    plant.start_manager();
+    ASSERT_TRUE(plant.wait_for("packer1", InstanceState::running)) << plant.log();
+    count_to_24();
+  }
+  void count_to_24() {
+    const auto pool = ObjectPool::attach(plant.pool()).value();
+    auto event = pool.open_event("packer1/product").value();
+    for (int i = 0; i < 24; ++i) (void)event.post();
+    ASSERT_TRUE(has_counted_24());
+  }
+  bool has_counted_24() {
+    const std::size_t before = plant.log().size();
+    return Plant::eventually([&] { return plant.log().find("products 24, ", before) != std::string::npos; });
+  }
+  void crash() {
+    const auto process = open_process(plant.status("packer1").pid);
+    ASSERT_TRUE(process);
+    ASSERT_TRUE(signal_process(*process, SIGKILL));
+  }
+  /// Whatever the manager before had to say of it, an operator starts it.
+  void start_again() {
+    plant.start_manager();
+    EXPECT_EQ(plant.ask(ControlVerb::reset, "packer1").code, ErrorCode::ok);
+    EXPECT_EQ(plant.ask(ControlVerb::start, "packer1").code, ErrorCode::ok);
+    ASSERT_TRUE(plant.wait_for("packer1", InstanceState::running)) << plant.log();
+  }
+  void expect_24_after_an_orderly_end() {
+    EXPECT_EQ(plant.stop_manager().describe(), "exit code 0");
+    EXPECT_THAT(plant.leftovers(), IsEmpty()) << "what is in a file needs no memory";
+    start_again();
+    EXPECT_TRUE(has_counted_24()) << plant.log();
+  }
+
+  Plant plant;
+};
+
+TEST_F(RetainThatIsSeldomWritten, IsSavedAtTheEndOfTheHostIfItsInstanceHasFailed) {
+  begin("restart = \"never\"");
+  crash();
+  ASSERT_TRUE(plant.wait_for("packer1", InstanceState::failed));
+  expect_24_after_an_orderly_end();
+}
+
+TEST_F(RetainThatIsSeldomWritten, IsSavedAtTheEndOfTheHostIfItsInstanceIsInBackOff) {
+  begin("restart = \"always\"\nrestart_delay_ms = 60000\nrestart_delay_max_ms = 60000");
+  crash();
+  ASSERT_TRUE(plant.wait_for("packer1", InstanceState::waiting));
+  expect_24_after_an_orderly_end();
+}
+
+TEST_F(RetainThatIsSeldomWritten, IsSavedAtTheEndOfTheHostIfItsInstanceIsInSafeMode) {
+  begin("crash_limit = 1");
+  crash();
+  ASSERT_TRUE(plant.wait_for("packer1", InstanceState::safe_mode));
+  expect_24_after_an_orderly_end();
+}
+
+TEST_F(RetainThatIsSeldomWritten, StaysInMemoryAtTheEndOfTheHostIfNoFolderTakesIt) {
+  begin("");
+  std::filesystem::rename(plant.state_directory(), plant.state_directory() + ".away");
+  plant.write_file("state", "no folder");
+  EXPECT_EQ(plant.stop_manager().describe(), "exit code 0");
+  EXPECT_THAT(plant.leftovers(), ElementsAre(EndsWith(".memory.packer1.retain")));
+  EXPECT_THAT(plant.log(), HasSubstr("are in no file and stay in"));
+  plant.start_manager();
+  ASSERT_TRUE(plant.wait_for("packer1", InstanceState::running)) << "the machine runs; " << plant.log();
+  EXPECT_TRUE(has_counted_24());
+  const auto problem = [&] {
+    const auto page = InstancePageReader::open(plant.pool(), "packer1");
+    const auto runtime = page ? page->runtime() : std::nullopt;
+    return runtime ? std::string(runtime->retain_problem.view()) : std::string();
+  };
+  EXPECT_TRUE(Plant::eventually([&] { return !problem().empty(); }));
+  EXPECT_THAT(problem(), HasSubstr("retain variables are not written: "));
+  // The disk is mended, and what happened meanwhile is in a file after the end.
+  std::filesystem::remove(plant.state_directory());
+  std::filesystem::rename(plant.state_directory() + ".away", plant.state_directory());
+  EXPECT_EQ(plant.stop_manager().describe(), "exit code 0");
+  EXPECT_THAT(plant.leftovers(), IsEmpty());
+  plant.start_manager();
+  ASSERT_TRUE(plant.wait_for("packer1", InstanceState::running)) << plant.log();
+  EXPECT_TRUE(has_counted_24());
 }
 
 }  // namespace

@@ -31,6 +31,21 @@ TEST(InstanceExtension, CarriesWhatTheInstanceSaysAndNothingThatIsEmpty) {
   EXPECT_EQ(dds::text_of(entries[1].name), "tick_fallback");
 }
 
+TEST(InstanceExtension, ItsProblemsAreThoseThatTheManagerAndThisProcessKnow) {
+  InstanceStatus status;
+  status.pid = 7;
+  EXPECT_EQ(problem_of_instance(status, nullptr), "");
+  InstanceRuntime runtime;
+  runtime.pid = 7;
+  EXPECT_EQ(problem_of_instance(status, &runtime), "");
+  runtime.retain_problem.assign("not written");
+  EXPECT_EQ(problem_of_instance(status, &runtime), "not written");
+  status.problem.assign("safe mode");
+  EXPECT_EQ(problem_of_instance(status, &runtime), "safe mode; not written");
+  status.pid = 0;
+  EXPECT_EQ(problem_of_instance(status, &runtime), "safe mode") << "that process has ended";
+}
+
 TEST(InstanceExtension, TellsOfTheDistributedClockOnceThereIsOne) {
   InstanceRuntime runtime;
   runtime.clock.reference.assign("bus1");

@@ -1,6 +1,7 @@
 // The files of retain variables: what is cut, changed or torn is never taken for values.
 #include "instances/runtime/retain/retain_image.hpp"
 
+#include <csignal>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -8,6 +9,8 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include "instances/runtime/retain/retain_files.hpp"
@@ -16,6 +19,7 @@ namespace plchost {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
@@ -108,7 +112,7 @@ TEST_F(RetainFolder, ThatIsNewHasNothingAndNoProblem) {
 }
 
 TEST_F(RetainFolder, GivesTheNewestOfTwoGenerations) {
-  const RetainFiles sut = open();
+  RetainFiles sut = open();
   for (std::uint64_t generation = 1; generation <= 5; ++generation) {
     ASSERT_TRUE(sut.write(image(generation)));
     EXPECT_EQ(sut.read().newest, image(generation));
@@ -118,7 +122,7 @@ TEST_F(RetainFolder, GivesTheNewestOfTwoGenerations) {
 }
 
 TEST_F(RetainFolder, WithTheNewestCutAtAnyByteGivesTheOlderOne) {
-  const RetainFiles sut = open();
+  RetainFiles sut = open();
   ASSERT_TRUE(sut.write(image(1)));
   ASSERT_TRUE(sut.write(image(2)));
   const std::string whole = read(file(0));
@@ -131,7 +135,7 @@ TEST_F(RetainFolder, WithTheNewestCutAtAnyByteGivesTheOlderOne) {
 }
 
 TEST_F(RetainFolder, WithAnyBitOfTheNewestTurnedGivesTheOlderOne) {
-  const RetainFiles sut = open();
+  RetainFiles sut = open();
   ASSERT_TRUE(sut.write(image(1)));
   ASSERT_TRUE(sut.write(image(2)));
   std::string bytes = read(file(0));
@@ -144,7 +148,7 @@ TEST_F(RetainFolder, WithAnyBitOfTheNewestTurnedGivesTheOlderOne) {
 }
 
 TEST_F(RetainFolder, WithBothSpoiledGivesNone) {
-  const RetainFiles sut = open();
+  RetainFiles sut = open();
   ASSERT_TRUE(sut.write(image(1)));
   ASSERT_TRUE(sut.write(image(2)));
   write(file(0), "x");
@@ -157,7 +161,7 @@ TEST_F(RetainFolder, WithBothSpoiledGivesNone) {
 // What the power may leave of a write: nothing of it, any part of the new file under its first name, all of
 // it there, or the new name.
 TEST_F(RetainFolder, LeftInTheMiddleOfAWriteGivesOneOfTheLastTwo) {
-  const RetainFiles sut = open();
+  RetainFiles sut = open();
   ASSERT_TRUE(sut.write(image(1)));
   ASSERT_TRUE(sut.write(image(2)));
   const std::string next = encode(image(3));
@@ -173,18 +177,65 @@ TEST_F(RetainFolder, LeftInTheMiddleOfAWriteGivesOneOfTheLastTwo) {
 
 TEST_F(RetainFolder, IsOneProcesssAtATime) {
   const RetainFiles sut = open();
-  const auto second = RetainFiles::open(folder_, "line1");
-  ASSERT_FALSE(second);
-  EXPECT_EQ(second.error().code, ErrorCode::busy);
-  EXPECT_TRUE(RetainFiles::open(folder_, "line2"));
+  const auto in_another_process = [&](const std::string& instance) {
+    const pid_t child = ::fork();
+    if (child == 0) {
+      const auto files = RetainFiles::open(folder_, instance);
+      ::_exit(files ? 0 : static_cast<int>(files.error().code));
+    }
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    return static_cast<ErrorCode>(WEXITSTATUS(status));
+  };
+  EXPECT_EQ(in_another_process("line1"), ErrorCode::busy);
+  EXPECT_EQ(in_another_process("line2"), ErrorCode::ok);
 }
 
-TEST_F(RetainFolder, ThatCannotBeMadeSaysWhy) {
-  EXPECT_THAT(RetainFiles::open("/proc/none/here", "line1").error().describe(), HasSubstr("/proc/none/here"));
+TEST_F(RetainFolder, ThatCannotBeMadeSaysWhyAtEachWrite) {
+  auto sut = RetainFiles::open("/proc/none/here", "line1").value();
+  EXPECT_FALSE(sut.read().newest);
+  EXPECT_THAT(sut.write(image(1)).error().describe(), HasSubstr("/proc/none/here"));
+}
+
+TEST_F(RetainFolder, ThatOthersCanWriteGivesAndTakesNothing) {
+  RetainFiles sut = open();
+  ASSERT_TRUE(sut.write(image(1)));
+  fs::permissions(folder_, fs::perms::all);
+  const auto found = sut.read();
+  EXPECT_FALSE(found.newest);
+  EXPECT_THAT(found.problems, ElementsAre(HasSubstr("other users can put files into it")));
+  auto later = RetainFiles::open(folder_, "line2").value();
+  EXPECT_EQ(later.write(image(1)).error().code, ErrorCode::refused);
+  fs::permissions(folder_, fs::perms::owner_all);
+  EXPECT_EQ(sut.read().newest, image(1));
+  EXPECT_TRUE(later.write(image(1)));
+}
+
+TEST_F(RetainFolder, ThatIsFullKeepsWhatItHasAndNoHalfFile) {
+  RetainFiles sut = open();
+  ASSERT_TRUE(sut.write(image(1)));
+  ASSERT_TRUE(sut.write(image(2)));
+  const auto refused = [&] {
+    // A limit of the process stands for a full disk.
+    const auto before = std::signal(SIGXFSZ, SIG_IGN);
+    rlimit limit{};
+    ::getrlimit(RLIMIT_FSIZE, &limit);
+    const rlimit small{.rlim_cur = 16, .rlim_max = limit.rlim_max};
+    ::setrlimit(RLIMIT_FSIZE, &small);
+    auto written = sut.write(image(3));
+    ::setrlimit(RLIMIT_FSIZE, &limit);
+    (void)std::signal(SIGXFSZ, before);
+    return written;
+  }();
+  ASSERT_FALSE(refused);
+  EXPECT_FALSE(fs::exists(file(1) + ".new"));
+  EXPECT_EQ(sut.read().newest, image(2));
+  ASSERT_TRUE(sut.write(image(3)));
+  EXPECT_EQ(sut.read().newest, image(3));
 }
 
 TEST_F(RetainFolder, WithAFileOfAnotherSizeThanAnyOfOursIsNotRead) {
-  const RetainFiles sut = open();
+  RetainFiles sut = open();
   write(file(0), "");
   fs::resize_file(file(0), std::uintmax_t{1} << 40U);
   const auto found = sut.read();

@@ -16,10 +16,11 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "instances/launch/launch_contract.hpp"
 #include "instances/plc_app.h"
 #include "shm/pool/memory_file.hpp"
 #include "shm/pool/object_pool.hpp"
-#include "tests/unit/pool/unique_pool_name.hpp"
+#include "tests/unit/instances/retain_fixture.hpp"
 
 namespace plchost {
 namespace {
@@ -28,71 +29,6 @@ namespace fs = std::filesystem;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-
-constexpr std::uint64_t kInitial = 1;
-
-class Retain : public ::testing::Test {
- protected:
-  Retain() { fs::remove_all(folder_); }
-  ~Retain() override {
-    sut.reset();
-    forget_memory();
-    fs::remove_all(folder_);
-  }
-
-  /// One retain and one persistent variable of 8 bytes.
-  static RetainImage initial(std::uint64_t layout = 0) {
-    RetainImage image{
-        .layout =
-            {.application = "Mixer",
-             .areas = {{.name = "count", .flags = PLC_AREA_RETAIN, .bytes = 8, .layout = layout, .offset = 0},
-                       {.name = "hours", .flags = PLC_AREA_PERSISTENT, .bytes = 8, .layout = 0, .offset = 8}},
-             .bytes = 16},
-        .data = std::vector<std::byte>(16)};
-    std::memcpy(image.data.data(), &kInitial, 8);
-    std::memcpy(image.data.data() + 8, &kInitial, 8);
-    return image;
-  }
-  [[nodiscard]] Result<void> start(const RetainImage& image, RetainKeeper::Options options = {}) {
-    sut.reset();
-    if (options.directory.empty()) options.directory = folder_;
-    auto made = RetainKeeper::make(pool_, "line1", image, options);
-    if (!made) return std::unexpected(made.error());
-    sut = *std::move(made);
-    return sut->start();
-  }
-  void start_well(RetainKeeper::Options options = {}) {
-    const auto started = start(initial(), options);
-    ASSERT_TRUE(started) << started.error().describe();
-  }
-  [[nodiscard]] std::uint64_t value(std::size_t area) const {
-    std::uint64_t value = 0;
-    std::memcpy(&value, sut->memory().data().data() + 8 * area, 8);
-    return value;
-  }
-  void set(std::size_t area, std::uint64_t value) const {
-    std::memcpy(sut->memory().data().data() + 8 * area, &value, 8);
-  }
-  /// As a power cut does.
-  void forget_memory() const {
-    MemoryFile::remove(pool_memory_name(name_.get(), KeptMemory::name_for("line1")));
-  }
-  /// As a kill does: nothing is written at the end. The lock of the files goes with the process.
-  void lose_files_of_the_end() {
-    const fs::path aside = folder_.string() + ".aside";
-    fs::copy(folder_, aside);
-    sut.reset();
-    fs::remove_all(folder_);
-    fs::rename(aside, folder_);
-  }
-
-  fs::path folder_ =
-      fs::path(::testing::TempDir()) / ("keeper-" + std::to_string(::getpid()) +
-                                        ::testing::UnitTest::GetInstance()->current_test_info()->name());
-  UniquePoolName name_;
-  ObjectPool pool_ = ObjectPool::create(name_.get(), {.max_objects = 16}).value();
-  std::unique_ptr<RetainKeeper> sut;
-};
 
 TEST_F(Retain, BeginsWithInitialValues) {
   start_well();
@@ -440,7 +376,7 @@ TEST_F(Retain, LivesWhereTheSettingsHaveIt) {
 TEST_F(Retain, MemoryWithAnyByteOfItsHeaderSpoiledIsTakenOrLeftAsAWhole) {
   start_well();
   sut.reset();
-  const std::string name = pool_memory_name(name_.get(), KeptMemory::name_for("line1"));
+  const std::string name = pool_memory_name(name_.get(), kept_memory_name("line1"));
   constexpr std::size_t kHeader = 96 + 3 * 80;
   for (std::size_t at = 0; at < kHeader; ++at) {
     for (const unsigned char spoil : {0x01, 0x80, 0xff}) {
@@ -449,7 +385,7 @@ TEST_F(Retain, MemoryWithAnyByteOfItsHeaderSpoiledIsTakenOrLeftAsAWhole) {
         ASSERT_TRUE(memory);
         memory->bytes()[at] ^= static_cast<std::byte>(spoil);
       }
-      const auto left = KeptMemory::left_behind(name_.get(), KeptMemory::name_for("line1"));
+      const auto left = KeptMemory::left_behind(name_.get(), kept_memory_name("line1"));
       if (left) {
         EXPECT_TRUE(check_layout(left->image.layout));
         EXPECT_EQ(left->image.data.size(), left->image.layout.bytes);
