@@ -8,7 +8,6 @@ namespace {
 
 using namespace submessage_kind;
 
-constexpr std::size_t kPrefixAt = 8;
 // In a fragment: its sample's number, the first fragment, how many, their size, the size of all.
 constexpr std::size_t kNumber = kSubmessageHeader + 12;
 constexpr std::size_t kFirst = kNumber + 8;
@@ -82,7 +81,7 @@ std::optional<HandshakeAssembly::Fragment> HandshakeAssembly::read(std::span<con
                     .count = number_at<std::uint16_t>(bytes, kCount, little),
                     .size = number_at<std::uint16_t>(bytes, kSize, little),
                     .sample_size = number_at<std::uint32_t>(bytes, kSampleSize, little)};
-  std::copy_n(datagram.begin() + kPrefixAt, fragment.from.size(), fragment.from.begin());
+  std::copy_n(datagram.begin() + kGuidPrefixAt, fragment.from.size(), fragment.from.begin());
   for (std::size_t i = 0; i < fragment.reader.size(); ++i)
     fragment.reader[i] = byte_at(bytes, kReaderEntity + i);
   if (fragment.size < kMinFragment || fragment.sample_size < kEncapsulation ||

@@ -25,14 +25,14 @@ class HandshakeAssembly {
 
   HandshakeAssembly();
 
-  /// Takes the fragments out of a datagram, which is_acceptable() has passed, the first `size` bytes of
+  /// Takes the fragments out of a datagram, which admit() has passed, the first `size` bytes of
   /// `buffer`, and puts in each message that is complete with them. Returns the size that it has now; 0:
   /// nothing is left to be said.
   [[nodiscard]] std::size_t rewrite(std::span<std::byte> buffer, std::size_t size);
 
  private:
   static constexpr std::size_t kFragments = kMaxSample / kMinFragment;
-  using Prefix = std::array<std::byte, 12>;
+  using Prefix = std::array<std::byte, kGuidPrefix>;
 
   struct Fragment {
     Prefix from{};

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 
+#include "api/dds/gate/parameter_filter.hpp"
 #include "api/dds/gate/submessage.hpp"
 
 namespace plchost::dds {
@@ -11,6 +12,9 @@ namespace plchost::dds {
 namespace {
 
 using namespace submessage_kind;
+
+// What is a vendor's own is skipped by all others.
+constexpr std::uint8_t kVendors = 0x80;
 
 // A sample of one of the two writers that speak in plain text: fields as all vendors lay them out, then what
 // it says.
@@ -21,45 +25,133 @@ bool is_well_formed_sample(const Submessage& sample) noexcept {
   return contents_of_sample(sample).size() >= kEncapsulation;
 }
 
-bool is_acceptable_sample(const Submessage& sample, bool secured) noexcept {
-  if (sample.bytes.size() < kWriterEntity + sizeof(EntityId)) return false;
-  const bool is_fragment = sample.kind() == kDataFragment;
-  const EntityId writer = sample.writer();
-  if (writer == kParticipantWriter) return is_well_formed_sample(sample) && !(secured && is_fragment);
-  if (writer != kHandshakeWriter) return !secured;
-  const std::uint8_t is_key = is_fragment ? kFragmentIsOfKey : kDataIsKey;
-  return is_well_formed_sample(sample) && (sample.flags() & is_key) == 0;
+// XCDR1 encapsulations, in network order.
+constexpr std::uint16_t kCdr = 0x0000;
+constexpr std::uint16_t kParameters = 0x0002;
+constexpr std::uint16_t kLittleEncapsulation = 0x0001;
+
+bool admit_parameters(std::span<std::byte> contents, ParameterList kind,
+                      std::span<const std::byte> guid_prefix) noexcept {
+  const auto encapsulation = number_at<std::uint16_t>(contents, 0, false);
+  if ((encapsulation & ~kLittleEncapsulation) != kParameters) return false;
+  const bool little = (encapsulation & kLittleEncapsulation) != 0;
+  return filter_parameters(contents.subspan(kEncapsulation), little, kind, guid_prefix) != 0;
 }
 
-// All but samples that a secured host is told in messages that are not signed as a whole. What is a vendor's
-// own is skipped by all others.
+// Of a secured host, in plain text.
+bool admit_sample_before_keys(std::span<std::byte> bytes, std::span<const std::byte> guid_prefix) noexcept {
+  const Submessage sample{bytes};
+  if (!is_well_formed_sample(sample)) return false;
+  const bool is_fragment = sample.kind() == kDataFragment;
+  const EntityId writer = sample.writer();
+  if (writer == kParticipantWriter) {
+    const auto contents = bytes.last(contents_of_sample(sample).size());
+    return !is_fragment && admit_parameters(contents, ParameterList::secured_discovery, guid_prefix);
+  }
+  const std::uint8_t is_key = is_fragment ? kFragmentIsOfKey : kDataIsKey;
+  return writer == kHandshakeWriter && (sample.flags() & is_key) == 0;
+}
+
+// All but samples that a secured host is told in messages that are not signed as a whole.
 bool is_said_before_keys(std::uint8_t kind) noexcept {
   constexpr std::array kKinds{kPad,           kAckNack,         kHeartbeat,     kGap,
                               kInfoTimestamp, kInfoDestination, kNackFragment,  kHeartbeatFragment,
                               kSecuredBody,   kSecuredPrefix,   kSecuredPostfix};
-  constexpr std::uint8_t kVendors = 0x80;
   return kind >= kVendors || std::ranges::find(kKinds, kind) != kKinds.end();
 }
 
-}  // namespace
+// All but samples that an unsecured host is told. Cyclone does not look into the replies.
+bool is_said_without_security(std::uint8_t kind) noexcept {
+  constexpr std::array kKinds{kPad,          kAckNack,           kHeartbeat,    kGap,       kInfoTimestamp,
+                              kNackFragment, kHeartbeatFragment, kInfoReplyIp4, kInfoReply, kInfoDestination};
+  return kind >= kVendors || std::ranges::find(kKinds, kind) != kKinds.end();
+}
 
-bool is_acceptable(std::span<const std::byte> datagram, bool secured) noexcept {
+// A participant's GUID and a kind; then, if it is no key, octets.
+bool is_liveliness(std::span<const std::byte> contents, bool is_key) noexcept {
+  constexpr std::size_t kKey = 16;
+  const auto encapsulation = number_at<std::uint16_t>(contents, 0, false);
+  const auto data = contents.subspan(kEncapsulation);
+  if ((encapsulation & ~kLittleEncapsulation) != kCdr || data.size() < kKey) return false;
+  if (is_key) return true;
+  const bool little = (encapsulation & kLittleEncapsulation) != 0;
+  return data.size() >= kKey + 4 && number_at<std::uint32_t>(data, kKey, little) <= data.size() - kKey - 4;
+}
+
+bool admit_builtin_contents(std::span<std::byte> contents, const Submessage& sample,
+                            std::span<const std::byte> guid_prefix) noexcept {
+  const EntityId writer = sample.writer();
+  if (writer == kLivelinessWriter) return is_liveliness(contents, (sample.flags() & kDataIsKey) != 0);
+  constexpr std::array kWriters{kParticipantWriter, kPublicationsWriter, kSubscriptionsWriter};
+  return std::ranges::find(kWriters, writer) != kWriters.end() &&
+         admit_parameters(contents, ParameterList::discovery, guid_prefix);
+}
+
+// Of an unsecured host.
+bool admit_plain_sample(std::span<std::byte> bytes, std::span<const std::byte> guid_prefix) noexcept {
+  const Submessage sample{bytes};
+  const std::size_t fields = fields_of_sample(sample);
+  if (fields == 0) return false;
+  const bool is_fragment = sample.kind() == kDataFragment;
+  const bool is_builtin = (sample.writer().back() & kBuiltinEntity) == kBuiltinEntity;
+  if (is_builtin && is_fragment) return false;
+  auto rest = bytes.subspan(fields);
+  const bool has_qos = (sample.flags() & kHasInlineQos) != 0;
+  if (has_qos) {
+    const std::size_t size = filter_parameters(rest, sample.little(), ParameterList::inline_qos, guid_prefix);
+    if (size == 0) return false;
+    rest = rest.subspan(size);
+  }
+  if (!is_fragment) {
+    const bool has_contents = (sample.flags() & kDataHasContents) != 0;
+    const bool is_key = (sample.flags() & kDataIsKey) != 0;
+    if (has_contents && is_key) return false;
+    // Which instance is gone stands in the inline QoS.
+    if (!has_contents && !is_key) return has_qos;
+  }
+  if (rest.size() < kEncapsulation) return false;
+  return !is_builtin || admit_builtin_contents(rest, sample, guid_prefix);
+}
+
+bool is_rtps2(std::span<const std::byte> datagram) noexcept {
   constexpr std::array<std::uint8_t, 5> kRtps2{'R', 'T', 'P', 'S', 2};
   if (datagram.size() < kRtpsHeader) return false;
   for (std::size_t i = 0; i < kRtps2.size(); ++i) {
     if (byte_at(datagram, i) != kRtps2[i]) return false;
   }
+  return true;
+}
+
+// Of the same version, and so of the same parser.
+bool is_info_source(const Submessage& submessage) noexcept {
+  constexpr std::uint8_t kMajor = 2;
+  return submessage.bytes.size() == kInfoSourceSize &&
+         byte_at(submessage.bytes, kInfoSourceVersion) == kMajor;
+}
+
+}  // namespace
+
+bool admit(std::span<std::byte> datagram, bool secured) noexcept {
+  if (!is_rtps2(datagram)) return false;
   auto rest = datagram.subspan(kRtpsHeader);
-  const bool whole_is_secured = !rest.empty() && byte_at(rest, 0) == kSecuredMessagePrefix;
+  std::span<const std::byte> guid_prefix = datagram.subspan(kGuidPrefixAt, kGuidPrefix);
+  const bool whole_is_secured = secured && !rest.empty() && byte_at(rest, 0) == kSecuredMessagePrefix;
   while (!rest.empty()) {
     const auto submessage = first_submessage(rest);
     if (!submessage) return false;
-    const bool is_sample = submessage->kind() == kData || submessage->kind() == kDataFragment;
-    if (!whole_is_secured) {
-      if (is_sample && !is_acceptable_sample(*submessage, secured)) return false;
-      if (!is_sample && secured && !is_said_before_keys(submessage->kind())) return false;
+    const auto bytes = rest.first(submessage->bytes.size());
+    rest = rest.subspan(bytes.size());
+    if (whole_is_secured) continue;
+    const std::uint8_t kind = submessage->kind();
+    if (kind == kInfoSource && is_info_source(*submessage)) {
+      guid_prefix = submessage->bytes.subspan(kInfoSourcePrefix, kGuidPrefix);
+      continue;
     }
-    rest = rest.subspan(submessage->bytes.size());
+    const bool is_sample = kind == kData || kind == kDataFragment;
+    const bool good =
+        secured ? (is_sample ? admit_sample_before_keys(bytes, guid_prefix) : is_said_before_keys(kind))
+                : (is_sample ? admit_plain_sample(bytes, guid_prefix) : is_said_without_security(kind));
+    if (!good) return false;
   }
   return true;
 }

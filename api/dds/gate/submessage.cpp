@@ -32,13 +32,19 @@ std::optional<Submessage> first_submessage(std::span<const std::byte> rest) noex
   return Submessage{rest.first(size)};
 }
 
-std::span<const std::byte> contents_of_sample(const Submessage& sample) noexcept {
+std::size_t fields_of_sample(const Submessage& sample) noexcept {
   const std::size_t fields = sample.kind() == submessage_kind::kData ? kDataFields : kFragmentFields;
   const std::size_t begin = kInlineQosCount + 2 + fields;
   if (sample.bytes.size() < begin ||
       number_at<std::uint16_t>(sample.bytes, kInlineQosCount, sample.little()) != fields) {
-    return {};
+    return 0;
   }
+  return begin;
+}
+
+std::span<const std::byte> contents_of_sample(const Submessage& sample) noexcept {
+  const std::size_t begin = fields_of_sample(sample);
+  if (begin == 0) return {};
   const auto rest = sample.bytes.subspan(begin);
   return (sample.flags() & kHasInlineQos) != 0 ? behind_parameters(rest, sample.little()) : rest;
 }

@@ -18,7 +18,10 @@ inline constexpr std::uint8_t kAckNack = 0x06;
 inline constexpr std::uint8_t kHeartbeat = 0x07;
 inline constexpr std::uint8_t kGap = 0x08;
 inline constexpr std::uint8_t kInfoTimestamp = 0x09;
+inline constexpr std::uint8_t kInfoSource = 0x0c;
+inline constexpr std::uint8_t kInfoReplyIp4 = 0x0d;
 inline constexpr std::uint8_t kInfoDestination = 0x0e;
+inline constexpr std::uint8_t kInfoReply = 0x0f;
 inline constexpr std::uint8_t kNackFragment = 0x12;
 inline constexpr std::uint8_t kHeartbeatFragment = 0x13;
 inline constexpr std::uint8_t kData = 0x15;
@@ -47,6 +50,14 @@ inline constexpr std::size_t kEncapsulation = 4;
 using EntityId = std::array<std::uint8_t, 4>;
 inline constexpr EntityId kParticipantWriter{0x00, 0x01, 0x00, 0xc2};
 inline constexpr EntityId kHandshakeWriter{0x00, 0x02, 0x01, 0xc3};
+inline constexpr EntityId kPublicationsWriter{0x00, 0x00, 0x03, 0xc2};
+inline constexpr EntityId kSubscriptionsWriter{0x00, 0x00, 0x04, 0xc2};
+inline constexpr EntityId kLivelinessWriter{0x00, 0x02, 0x00, 0xc2};
+/// In the last octet of an entity of the standard's own.
+inline constexpr std::uint8_t kBuiltinEntity = 0xc0;
+/// In the header of a message: who sends it.
+inline constexpr std::size_t kGuidPrefixAt = 8;
+inline constexpr std::size_t kGuidPrefix = 12;
 
 [[nodiscard]] inline std::uint8_t byte_at(std::span<const std::byte> bytes, std::size_t at) noexcept {
   return std::to_integer<std::uint8_t>(bytes[at]);
@@ -78,8 +89,36 @@ struct Submessage {
   }
 };
 
+/// From here on the message is of another participant, of the same process: Cyclone sends what several of
+/// them say together.
+inline constexpr std::size_t kInfoSourceSize = 24;
+inline constexpr std::size_t kInfoSourceVersion = 8;
+inline constexpr std::size_t kInfoSourcePrefix = 12;
+
 /// The first of what is left of a message, which is not empty. Nothing: it does not fit.
 [[nodiscard]] std::optional<Submessage> first_submessage(std::span<const std::byte> rest) noexcept;
+
+/// Whether `is_good(prefix)` is true for each participant that a message says to be of; false, too, if it is
+/// malformed.
+template <class Predicate>
+[[nodiscard]] bool every_sender(std::span<const std::byte> datagram, Predicate is_good) {
+  if (datagram.size() < kRtpsHeader || !is_good(datagram.subspan<kGuidPrefixAt, kGuidPrefix>())) return false;
+  for (auto rest = datagram.subspan(kRtpsHeader); !rest.empty();) {
+    const auto submessage = first_submessage(rest);
+    if (!submessage) return false;
+    rest = rest.subspan(submessage->bytes.size());
+    if (submessage->kind() != submessage_kind::kInfoSource) continue;
+    if (submessage->bytes.size() != kInfoSourceSize ||
+        !is_good(submessage->bytes.subspan<kInfoSourcePrefix, kGuidPrefix>())) {
+      return false;
+    }
+  }
+  return true;
+}
+
+/// Where the inline QoS of a sample begins, or its contents if it has none. Zero: its fields are not where
+/// all vendors put them.
+[[nodiscard]] std::size_t fields_of_sample(const Submessage& sample) noexcept;
 
 /// What a sample says, behind its inline QoS. Empty: its fields are not where all vendors put them, or there
 /// is nothing.

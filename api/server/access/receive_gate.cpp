@@ -3,12 +3,15 @@
 #include <atomic>
 #include <mutex>
 
+#include <netinet/in.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
 #include "api/dds/gate/handshake_assembly.hpp"
 #include "api/dds/gate/packet_gate.hpp"
+#include "api/dds/gate/source_table.hpp"
+#include "shm/base/time.hpp"
 
 namespace plchost {
 
@@ -25,17 +28,36 @@ bool is_of_network(const msghdr& message) noexcept {
   return family == AF_INET || family == AF_INET6;
 }
 
+// The port of this machine that a datagram comes from; 0: it comes from another one, which may have several
+// addresses and send from each by a port of its own.
+std::uint16_t port_on_this_machine(const msghdr& message) noexcept {
+  if (message.msg_namelen < sizeof(sockaddr_in)) return 0;
+  const auto& from = *static_cast<const sockaddr_in*>(message.msg_name);
+  if (from.sin_family != AF_INET || from.sin_addr.s_addr != htonl(INADDR_LOOPBACK)) return 0;
+  return ntohs(from.sin_port);
+}
+
+bool may_pass(std::span<std::byte> datagram, bool secured, const msghdr& message) noexcept {
+  if (!dds::admit(datagram, secured)) return false;
+  const std::uint16_t port = secured ? std::uint16_t{0} : port_on_this_machine(message);
+  if (port == 0) return true;
+  static dds::SourceTable sources;
+  return dds::every_sender(datagram, [port, now = MonotonicClock::now()](const auto guid_prefix) {
+    return sources.is_its_own(guid_prefix, port, now);
+  });
+}
+
 // What DDS gets instead of a datagram; 0: nothing.
-std::size_t let_pass(std::span<std::byte> buffer, std::size_t size, bool secured) {
-  if (!dds::is_acceptable(buffer.first(size), secured)) {
+std::size_t let_pass(std::span<std::byte> buffer, std::size_t size, bool secured, const msghdr& message) {
+  // DDS receives with one thread, but does not promise it.
+  static std::mutex mutex;
+  const std::lock_guard lock(mutex);
+  if (!may_pass(buffer.first(size), secured, message)) {
     refused.fetch_add(1, std::memory_order_relaxed);
     return 0;
   }
   if (!secured) return size;
-  // DDS receives with one thread, but does not promise it.
-  static std::mutex mutex;
   static dds::HandshakeAssembly assembly;
-  const std::lock_guard lock(mutex);
   return assembly.rewrite(buffer, size);
 }
 
@@ -65,6 +87,6 @@ extern "C" __attribute__((visibility("default"))) ssize_t recvmsg(int socket, ms
   if (size > message->msg_iov->iov_len) return got;
   constexpr ssize_t kDropped = 1;
   const std::span buffer(static_cast<std::byte*>(message->msg_iov->iov_base), message->msg_iov->iov_len);
-  const std::size_t passed = plchost::let_pass(buffer, size, gate == plchost::Gate::secured);
+  const std::size_t passed = plchost::let_pass(buffer, size, gate == plchost::Gate::secured, *message);
   return passed == 0 ? kDropped : static_cast<ssize_t>(passed);
 }

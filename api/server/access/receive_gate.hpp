@@ -4,10 +4,10 @@
 
 namespace plchost {
 
-/// Puts dds::is_acceptable() in front of DDS, and of a secured host's dds::HandshakeAssembly, too: all
-/// datagrams that this process receives over IP with recvmsg() go through them, and those that are refused,
-/// or say nothing any more, are made so short that DDS drops them without a look. Only the program
-/// plchost-dds has it. Before the domain is made.
+/// Puts dds::admit() in front of DDS, of a secured host also dds::HandshakeAssembly, of an unsecured one
+/// dds::SourceTable: all datagrams that this process receives over IP with recvmsg() go through them, and
+/// those that are refused, or say nothing any more, are made so short that DDS drops them without a look.
+/// Only the program plchost-dds has it. Before the domain is made.
 void close_receive_gate(bool secured) noexcept;
 
 /// How many datagrams it has refused.

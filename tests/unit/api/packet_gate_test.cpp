@@ -11,6 +11,8 @@
 
 #include <gtest/gtest.h>
 
+#include "api/dds/gate/submessage.hpp"
+
 namespace plchost::dds {
 namespace {
 
@@ -35,13 +37,17 @@ Bytes sample(std::uint8_t kind, std::uint8_t flags, const std::array<std::uint8_
   Bytes made = submessage(kind, flags, 40);
   made[6] = kind == 0x15 ? 16 : 28;  // octets to the inline QoS
   std::ranges::copy(writer, made.begin() + 12);
+  if (writer == kParticipant && kind == 0x15) {
+    made[25] = 3;  // parameters, little-endian: none
+    made[28] = 1;
+  }
   return made;
 }
 
 bool passes(std::initializer_list<Bytes> parts, bool secured = true) {
   Bytes datagram = header();
   for (const Bytes& part : parts) datagram.insert(datagram.end(), part.begin(), part.end());
-  return is_acceptable(std::as_bytes(std::span(datagram)), secured);
+  return admit(std::as_writable_bytes(std::span(datagram)), secured);
 }
 
 TEST(PacketGate, PassesWhatIsWellFormed) {
@@ -56,11 +62,11 @@ TEST(PacketGate, RefusesWhatIsNoRtps2) {
   for (std::size_t i = 0; i < 5; ++i) {
     Bytes datagram = header();
     datagram[i] ^= 1;
-    EXPECT_FALSE(is_acceptable(std::as_bytes(std::span(datagram)), false));
+    EXPECT_FALSE(admit(std::as_writable_bytes(std::span(datagram)), false));
   }
-  const Bytes whole = header();
+  Bytes whole = header();
   for (std::size_t size = 0; size < whole.size(); ++size) {
-    EXPECT_FALSE(is_acceptable(std::as_bytes(std::span(whole)).first(size), false));
+    EXPECT_FALSE(admit(std::as_writable_bytes(std::span(whole)).first(size), false));
   }
 }
 
@@ -104,7 +110,7 @@ TEST(PacketGate, RefusesSamplesOfTheFirstWritersWhoseFieldsAreNotInPlace) {
 }
 
 TEST(PacketGate, FollowsTheInlineQosToItsEnd) {
-  Bytes with_qos = sample(0x15, 7, kParticipant);
+  Bytes with_qos = sample(0x15, 7, kHandshake);
   with_qos[24] = 0x70;  // a parameter of 4 bytes, then the end, then contents
   with_qos[26] = 4;
   with_qos[32] = 1;
@@ -125,15 +131,88 @@ TEST(PacketGate, RefusesPlainSamplesOfASecuredHostOnly) {
 }
 
 TEST(PacketGate, RefusesOfASecuredHostKindsThatNobodySaysBeforeThereAreKeys) {
-  for (const std::uint8_t kind : {0x0c, 0x0d, 0x0f, 0x14, 0x7f}) {
+  for (const std::uint8_t kind : {0x0d, 0x0f}) {
     EXPECT_FALSE(passes({submessage(kind, 1, 24)}, true)) << int{kind};
     EXPECT_TRUE(passes({submessage(kind, 1, 24)}, false)) << int{kind};
     EXPECT_TRUE(passes({submessage(0x33, 1, 16), submessage(kind, 1, 24)}, true)) << int{kind};
+  }
+  for (const std::uint8_t kind : {0x0c, 0x14, 0x7f}) {
+    EXPECT_FALSE(passes({submessage(kind, 1, 24)}, true)) << int{kind};
+    EXPECT_FALSE(passes({submessage(kind, 1, 24)}, false)) << int{kind};
+  }
+  for (const std::uint8_t kind : {0x30, 0x31, 0x32, 0x33}) {
+    EXPECT_FALSE(passes({submessage(kind, 1, 24)}, false)) << int{kind} << ": there are no keys";
   }
   EXPECT_TRUE(passes(
       {submessage(0x0e, 1, 12), submessage(0x31, 1, 24), submessage(0x30, 1, 40), submessage(0x32, 1, 24)}));
   EXPECT_TRUE(passes({submessage(0x80, 1, 56)})) << "Fast DDS has one of its own beside each announcement";
   EXPECT_FALSE(passes({sample(0x16, 1, kParticipant)})) << "Cyclone does not put these together";
+}
+
+TEST(PacketGate, PassesOfAnUnsecuredHostsBuiltinSamplesDiscoveryAndLivelinessOnly) {
+  constexpr std::array<std::uint8_t, 4> kPublications{0x00, 0x00, 0x03, 0xc2};
+  constexpr std::array<std::uint8_t, 4> kTopics{0x00, 0x00, 0x02, 0xc2};
+  constexpr std::array<std::uint8_t, 4> kTypeLookup{0x00, 0x03, 0x00, 0xc3};
+  for (const auto& writer : {kTopics, kTypeLookup, kHandshake}) {
+    EXPECT_FALSE(passes({sample(0x15, 5, writer)}, false)) << int{writer[1]};
+  }
+  EXPECT_FALSE(passes({sample(0x15, 5, kPublications)}, false)) << "no list of parameters";
+  Bytes publication = sample(0x15, 5, kPublications);
+  publication[25] = 3;
+  publication[28] = 1;
+  EXPECT_TRUE(passes({publication}, false));
+  publication[25] = 4;
+  EXPECT_FALSE(passes({publication}, false)) << "of another encapsulation";
+  EXPECT_FALSE(passes({sample(0x16, 1, kPublications)}, false)) << "in fragments";
+  EXPECT_TRUE(passes({sample(0x16, 1, kUser)}, false));
+  EXPECT_FALSE(passes({sample(0x15, 1, kUser)}, false)) << "says nothing";
+  EXPECT_FALSE(passes({sample(0x15, 13, kUser)}, false)) << "contents and key";
+}
+
+// Cyclone sends in one datagram what several participants of one process say.
+TEST(PacketGate, KnowsEachParticipantOfADatagram) {
+  Bytes source = submessage(0x0c, 1, 20);
+  source[8] = 2;
+  source[12] = 9;
+  Bytes disposal = submessage(0x15, 9, 48);  // fields, encapsulation, its GUID, the end
+  disposal[6] = 16;
+  std::ranges::copy(kParticipant, disposal.begin() + 12);
+  disposal[25] = 3;
+  disposal[28] = 0x50;
+  disposal[30] = 16;
+  disposal[32] = 9;
+  disposal[48] = 1;
+  for (const bool secured : {false, true}) {
+    EXPECT_TRUE(passes({source, disposal}, secured));
+    EXPECT_FALSE(passes({disposal}, secured)) << "of another participant than the header's";
+    Bytes of_version_3 = source;
+    of_version_3[8] = 3;
+    EXPECT_FALSE(passes({of_version_3, disposal}, secured));
+  }
+  Bytes datagram = header();
+  datagram.insert(datagram.end(), source.begin(), source.end());
+  std::vector<int> senders;
+  EXPECT_TRUE(every_sender(std::as_bytes(std::span(datagram)), [&](const auto guid_prefix) {
+    senders.push_back(std::to_integer<int>(guid_prefix[0]));
+    return true;
+  }));
+  EXPECT_EQ(senders, (std::vector{1, 9}));
+  EXPECT_FALSE(every_sender(std::as_bytes(std::span(datagram)),
+                            [](const auto guid_prefix) { return guid_prefix[0] == std::byte{1}; }));
+}
+
+TEST(PacketGate, ChecksTheOctetsOfLiveliness) {
+  constexpr std::array<std::uint8_t, 4> kLiveliness{0x00, 0x02, 0x00, 0xc2};
+  Bytes alive = submessage(0x15, 5, 48);  // fields, encapsulation, GUID and kind, length, 4 octets
+  alive[6] = 16;
+  std::ranges::copy(kLiveliness, alive.begin() + 12);
+  alive[25] = 1;
+  alive[44] = 4;
+  EXPECT_TRUE(passes({alive}, false));
+  alive[44] = 5;
+  EXPECT_FALSE(passes({alive}, false));
+  alive[47] = 0xff;
+  EXPECT_FALSE(passes({alive}, false));
 }
 
 TEST(PacketGate, ReadsNothingBehindTheEnd) {
@@ -145,7 +224,7 @@ TEST(PacketGate, ReadsNothingBehindTheEnd) {
     for (std::size_t at = 20; at < datagram.size(); ++at)
       datagram[at] = static_cast<std::uint8_t>(random() % 40);
     datagram.shrink_to_fit();
-    (void)is_acceptable(std::as_bytes(std::span(datagram)), (i & 1) != 0);
+    (void)admit(std::as_writable_bytes(std::span(datagram)), (i & 1) != 0);
   }
 }
 
