@@ -21,7 +21,8 @@ struct ThreadPriority {
   int nice = 0;  ///< only for SCHED_OTHER
 };
 
-/// A thread with explicit scheduling (never inherited), a name and a pre-faulted stack. Joins in its
+/// A thread with explicit scheduling (never inherited, and never handed on to threads and processes that it
+/// makes), a name and a pre-faulted stack. Joins in its
 /// destructor; the owner makes the body return first.
 class Thread {
  public:

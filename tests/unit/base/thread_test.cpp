@@ -95,11 +95,24 @@ TEST(Thread, IsFifoOrSaysWhatIsMissing) {
   auto sut = Thread::start("hard", {.fifo = 2}, [&] { policy = ::sched_getscheduler(0); });
   if (sut) {
     sut->join();
-    EXPECT_EQ(policy, SCHED_FIFO);
+    EXPECT_EQ(policy & ~SCHED_RESET_ON_FORK, SCHED_FIFO);
   } else {
     EXPECT_EQ(sut.error().code, ErrorCode::refused);
     EXPECT_THAT(sut.error().message, HasSubstr("CAP_SYS_NICE"));
   }
+}
+
+TEST(Thread, HandsItsPriorityToNoThreadThatItMakesUnlessAskedTo) {
+  int inherited = -1;
+  int asked_for = -1;
+  auto sut = Thread::start("hard", {.fifo = 2}, [&] {
+    std::thread([&] { inherited = ::sched_getscheduler(0); }).join();
+    auto explicitly = Thread::start("asked", {.fifo = 1}, [&] { asked_for = ::sched_getscheduler(0); });
+  });
+  if (!sut) GTEST_SKIP() << sut.error().describe();
+  sut->join();
+  EXPECT_EQ(inherited, SCHED_OTHER);
+  EXPECT_EQ(asked_for & ~SCHED_RESET_ON_FORK, SCHED_FIFO);
 }
 
 TEST(Thread, RefusesAPriorityThatDoesNotExist) {
