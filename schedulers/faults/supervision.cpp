@@ -152,9 +152,12 @@ TimePoint Supervision::look_at_releases(Watched& watched, TimePoint now) noexcep
   if (allowed == 0 || !due || task.fault().raised() || !omitted_cycles_.load(std::memory_order_relaxed))
     return kNoDeadline;
   const Duration interval = task.interval();
-  const TimePoint hit = later(std::max(*due, at(forgiven_until_)), allowed, interval);
+  const auto free_since = task.free_since();
+  if (!free_since) return later(now, 1, interval);  // the runtime keeps it from its cycles
+  const TimePoint from = std::max({*due, at(forgiven_until_), *free_since});
+  const TimePoint hit = later(from, allowed, interval);
   if (now < hit) return hit;
-  const std::int64_t omitted = (now - *due) / interval;
+  const std::int64_t omitted = (now - std::max(*due, *free_since)) / interval;
   if (const auto since = watched.trap->running_since()) {
     strike(watched, *since, now, FaultKind::omitted_cycles, omitted, allowed);
     return now + kPatience;

@@ -8,6 +8,8 @@ namespace plchost {
 
 namespace {
 
+constexpr Duration::rep kAtWork = -1;
+
 // Before begin() it is not used; no grid can have an interval of 0.
 Duration grid_interval(const TaskConfig& config) noexcept {
   return std::max(config.interval, Duration(1));
@@ -71,6 +73,12 @@ Duration Task::interval() const noexcept {
   return Duration(wanted_interval_.load(std::memory_order_relaxed));
 }
 
+std::optional<TimePoint> Task::free_since() const noexcept {
+  const auto since = free_since_.load(std::memory_order_relaxed);
+  if (since == kAtWork) return std::nullopt;
+  return TimePoint(Duration(since));
+}
+
 std::optional<TimePoint> Task::due() const noexcept {
   if (config_.kind != TaskKind::cyclic) return std::nullopt;
   return TimePoint(Duration(due_.load(std::memory_order_relaxed)));
@@ -114,11 +122,15 @@ void Task::run_cycle(const Activation& activation) noexcept {
   const Duration used_before = by_own_time ? clock_.thread_time() : Duration::zero();
   const TimePoint start = clock_.now();
   set_due(activation.release + interval());
-  trap_.arm(fault_, start);
+  if (config_.before_entry) config_.before_entry();
+  const TimePoint entered = config_.before_entry ? clock_.now() : start;
+  trap_.arm(fault_, entered);
   const bool ended = run_entry();
   trap_.disarm();
   if (!ended) return;
-  const TimePoint end = clock_.now();
+  const TimePoint left = clock_.now();
+  if (config_.after_entry) config_.after_entry();
+  const TimePoint end = config_.after_entry ? clock_.now() : left;
   if (by_own_time) last_execution_ = clock_.thread_time() - used_before;
   grid_.set_interval(Duration(wanted_interval_.load(std::memory_order_relaxed)));
   grid_.ran(activation.release);
@@ -128,7 +140,15 @@ void Task::run_cycle(const Activation& activation) noexcept {
   ready_ = end;
   record(activation, start, end);
   if (config_.after_cycle) config_.after_cycle(recorder_.counters());
-  look_at_overrun(end - start);
+  look_at_overrun(left - entered);
+  if (config_.between_cycles) work_between_cycles();
+}
+
+void Task::work_between_cycles() noexcept {
+  free_since_.store(kAtWork, std::memory_order_relaxed);
+  // What falls due meanwhile is lost, as during a cycle.
+  if (config_.between_cycles()) ready_ = clock_.now();
+  free_since_.store(ready_.time_since_epoch().count(), std::memory_order_relaxed);
 }
 
 void Task::record(const Activation& activation, TimePoint start, TimePoint end) noexcept {

@@ -56,6 +56,9 @@ class Task {
   [[nodiscard]] TaskFault& fault() noexcept { return fault_; }
   [[nodiscard]] const TaskFault& fault() const noexcept { return fault_; }
   [[nodiscard]] FaultTrap& trap() noexcept { return trap_; }
+  /// Since when the task could run if it was not at work for the runtime between two cycles; nothing: it is
+  /// at that. Releases of that time are no fault of the application. Any thread.
+  [[nodiscard]] std::optional<TimePoint> free_since() const noexcept;
   /// The first release that no cycle has begun for; nothing unless cyclic. Any thread.
   [[nodiscard]] std::optional<TimePoint> due() const noexcept;
 
@@ -102,6 +105,7 @@ class Task {
  private:
   [[nodiscard]] bool run_entry() noexcept;
   void look_at_overrun(Duration execution) noexcept;
+  void work_between_cycles() noexcept;
   void set_due(TimePoint due) noexcept;
   void record(const Activation& activation, TimePoint start, TimePoint end) noexcept;
 
@@ -125,7 +129,8 @@ class Task {
   TaskFault fault_;
   FaultTrap trap_;
   std::atomic<Duration::rep> due_{0};
-  std::atomic<std::uint64_t> lost_{0};  // these two: one writer, the task's thread
+  std::atomic<Duration::rep> free_since_{0};  // kAtWork: it is not
+  std::atomic<std::uint64_t> lost_{0};        // these two: one writer, the task's thread
   std::atomic<std::uint64_t> on_time_{0};
 };
 

@@ -72,6 +72,12 @@ struct TaskConfig {
   std::function<bool()>
       event_variable;  ///< event only: reads the BOOL; called by the scheduler's poller, and by start()
   std::function<void()> entry;  ///< one cycle; real-time
+  // The runtime's own work around it, on the task's thread; real-time, must not throw. Each may be empty. No
+  // watchdog counts or stops it.
+  std::function<void()> before_entry;  ///< belongs to the cycle: takes inputs in
+  std::function<void()> after_entry;   ///< the same, if `entry` came to its end: puts outputs out
+  /// Work that waited for the end of a cycle, after that was recorded. false: there was none.
+  std::function<bool()> between_cycles;
   /// Called on the task's thread after each cycle with the new counters; real-time. May be empty.
   std::function<void(const TaskCounters&)> after_cycle;
 };

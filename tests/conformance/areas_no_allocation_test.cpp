@@ -5,6 +5,7 @@
 #include "instances/runtime/areas/areas.hpp"
 #include "instances/runtime/retain/kept_group.hpp"
 #include "tests/conformance/malloc_count.hpp"
+#include "tests/support/whole_cycle.hpp"
 
 namespace plchost {
 namespace {
@@ -38,7 +39,7 @@ TEST(NoAllocation, InCyclesWithAreasOfEachKind) {
     ASSERT_TRUE(placed) << placed.error().describe();
     MallocCount::begin();
     for (int cycle = 0; cycle < 10'000; ++cycle) {
-      for (const TaskConfig& task : tasks) task.entry();
+      for (const TaskConfig& task : tasks) run_whole_cycle(task);
     }
     EXPECT_EQ(MallocCount::end(), 0U);
   }

@@ -58,7 +58,7 @@ void TaskCycle::set_address(std::size_t area, void* address) {
   addresses_[area] = address;
 }
 
-void TaskCycle::run(const std::function<void()>& entry) {
+void TaskCycle::begin() noexcept {
   if (counter_ != nullptr) {
     counter_->store(counter_->load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
     // Pairs with the acquire fence of KeptMemory::snapshot().
@@ -66,14 +66,17 @@ void TaskCycle::run(const std::function<void()>& entry) {
   }
   for (InputView* const view : inputs_) view->begin_cycle();
   for (OutputView* const view : outputs_) view->begin_cycle();
-  {
-    const CycleHere here(this);
-    entry();
-  }
+}
+
+void TaskCycle::run(const std::function<void()>& entry) const {
+  const CycleHere here(this);
+  entry();
+}
+
+void TaskCycle::end() noexcept {
   for (OutputView* const view : outputs_) view->end_cycle();
   if (counter_ != nullptr) {
     counter_->store(counter_->load(std::memory_order_relaxed) + 1, std::memory_order_release);
-    group_->answer(may_wait_);
   }
 }
 

@@ -42,8 +42,13 @@ class TaskCycle {
     return inputs_.empty() && outputs_.empty() && counter_ == nullptr;
   }
 
-  /// Real-time; the task's thread. What `entry` throws passes through, and then nothing is put out.
-  void run(const std::function<void()>& entry);
+  // The four parts of a cycle, all real-time on the task's thread. What `entry` throws passes through run(),
+  // and then end() is not called: nothing is put out.
+  void begin() noexcept;
+  void run(const std::function<void()>& entry) const;
+  void end() noexcept;
+  /// After the cycle: gives who saves kept variables a copy of them. false: nobody has asked for one.
+  bool give_kept() noexcept { return group_ != nullptr && group_->answer(may_wait_); }
 
  private:
   std::vector<InputView*> inputs_;

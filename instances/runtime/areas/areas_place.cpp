@@ -348,7 +348,11 @@ std::vector<Areas::KeptShare> Areas::shares_of_kept() const {
 void Areas::wrap(std::span<TaskConfig> tasks) {
   for (std::size_t i = 0; i < tasks.size(); ++i) {
     if (cycles_[i].empty()) continue;
-    tasks[i].entry = [cycle = &cycles_[i], entry = std::move(tasks[i].entry)] { cycle->run(entry); };
+    TaskCycle* const cycle = &cycles_[i];
+    tasks[i].entry = [cycle, entry = std::move(tasks[i].entry)] { cycle->run(entry); };
+    tasks[i].before_entry = [cycle] { cycle->begin(); };
+    tasks[i].after_entry = [cycle] { cycle->end(); };
+    tasks[i].between_cycles = [cycle] { return cycle->give_kept(); };
   }
 }
 

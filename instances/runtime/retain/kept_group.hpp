@@ -36,8 +36,11 @@ class KeptGroup {
   /// For a task of the group that has ended its cycle: copies if that was asked for and no other task is
   /// within one. `may_wait`: it is not real-time, and waits up to 20 ms for the others. Else real-time: no
   /// lock, no system call, as long as it takes to copy the parts, at most three times.
-  void answer(bool may_wait) noexcept {
-    if (state_.load(std::memory_order_relaxed) == State::asked) answer_now(may_wait);
+  /// false: nobody has asked.
+  bool answer(bool may_wait) noexcept {
+    if (state_.load(std::memory_order_relaxed) != State::asked) return false;
+    answer_now(may_wait);
+    return true;
   }
 
  private:

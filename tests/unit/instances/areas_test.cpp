@@ -17,6 +17,7 @@
 #include <unistd.h>
 
 #include "shm/pool/memory_file.hpp"
+#include "tests/support/whole_cycle.hpp"
 
 namespace plchost {
 namespace {
@@ -139,7 +140,7 @@ TEST_F(AreasUnderTest, ThatAreKeptAreSavedByTheTaskItselfIfItsCyclesHaveNoPause)
   state.dwSize = sizeof state;
   while (sut.state(handle, state) == ERR_OK && state.qwSaves < 4) {
     ++*static_cast<std::uint64_t*>(kept);
-    tasks[0].entry();
+    run_whole_cycle(tasks[0]);
   }
   EXPECT_EQ(state.qwUnsaved, 0U);
   sut.finish();
@@ -157,12 +158,12 @@ TEST_F(AreasUnderTest, OfACycleThatThrowsAreNotPutOut) {
   task("Low", [&] { seen = *static_cast<int*>(address[1]); });
   declare("out", PLC_AREA_OUTPUT, 8, {{"High", 0, 8, &address[0]}, {"Low", 0, 0, &address[1]}});
   ASSERT_TRUE(place());
-  tasks[0].entry();
-  tasks[1].entry();
+  run_whole_cycle(tasks[0]);
+  run_whole_cycle(tasks[1]);
   EXPECT_EQ(seen, 1);
   fails = true;
-  EXPECT_THROW(tasks[0].entry(), std::runtime_error);
-  tasks[1].entry();
+  EXPECT_THROW(run_whole_cycle(tasks[0]), std::runtime_error);
+  run_whole_cycle(tasks[1]);
   EXPECT_EQ(seen, 1);
 }
 
@@ -174,8 +175,8 @@ TEST_F(AreasUnderTest, HaveTheAddressOfTheTaskThatAsksWithinItsCycle) {
   task("Low", [&] { asked[1] = sut.address(handle); });
   handle = declare("in", PLC_AREA_INPUT, 8, {{"High", 0, 0, &told[0]}, {"Low", 0, 0, &told[1]}});
   ASSERT_TRUE(place());
-  tasks[0].entry();
-  tasks[1].entry();
+  run_whole_cycle(tasks[0]);
+  run_whole_cycle(tasks[1]);
   EXPECT_EQ(asked, told);
   EXPECT_NE(told[0], told[1]);
   EXPECT_EQ(sut.address(handle), nullptr) << "outside of a cycle";
@@ -196,7 +197,7 @@ TEST_F(AreasUnderTest, InOneObjectAreOneImage) {
   ASSERT_EQ(plc_image_open(pool_.c_str(), "io", 24, PLC_IMAGE_READ, &image), 0);
   std::array<std::uint64_t, 3> words{};
   EXPECT_EQ(plc_image_read(&image, words.data(), nullptr), PLC_IMAGE_OK) << "the initial values";
-  tasks[0].entry();
+  run_whole_cycle(tasks[0]);
   ASSERT_EQ(plc_image_read(&image, words.data(), nullptr), PLC_IMAGE_OK);
   EXPECT_EQ(words, (std::array<std::uint64_t, 3>{1, 1, 0}));
   plc_image_close(&image);
@@ -334,7 +335,7 @@ TEST_F(AreasInFiles, OfAllKindsMayLieInOneFileOneBehindTheOther) {
   ASSERT_TRUE(data != nullptr && output != nullptr && input != nullptr);
   std::memcpy(data, "data....", 8);
   std::fstream(file_).seekp(24).write("12345678", 8);
-  tasks[0].entry();
+  run_whole_cycle(tasks[0]);
   std::string bytes(40, '\0');
   std::ifstream(file_).read(bytes.data(), 40);
   EXPECT_EQ(bytes.substr(0, 16), "data....12345678");
@@ -359,7 +360,7 @@ TEST_F(AreasInFiles, InACharacterDeviceAreMappedFromIt) {
   EXPECT_TRUE(is_mapped_from(data, "/dev/zero")) << "and no memory of the process";
   EXPECT_EQ(*static_cast<std::uint64_t*>(data), 0U) << "what is in a device stays";
   EXPECT_EQ(std::memcmp(input, initial.data(), 8), 0);
-  tasks[0].entry();
+  run_whole_cycle(tasks[0]);
   EXPECT_EQ(*static_cast<std::uint64_t*>(input), 0U) << "inputs are read from it at the start of a cycle";
 }
 

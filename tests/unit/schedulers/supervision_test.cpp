@@ -119,6 +119,39 @@ TEST_F(SupervisionTest, CountsNoOmittedCycleInTheGraceAfterTheStart) {
   EXPECT_GE(record->figure, record->limit);
 }
 
+// The runtime copies kept variables at the end of a cycle.
+TEST_F(SupervisionTest, CountsNoReleaseWhileTheTaskWorksForTheRuntime) {
+  TaskConfig config = task_->config();
+  std::optional<FaultKind> hit;
+  bool was_under_watchdog = true;
+  config.watchdog.time = milliseconds(1);
+  config.between_cycles = [&] {
+    was_under_watchdog = task_->trap().running_since().has_value();
+    clock_.run_for(milliseconds(500));
+    (void)look();
+    if (const FaultRecord* const record = task_->fault().published()) hit = record->kind;
+    return true;
+  };
+  sut_.reset();
+  tasks_[0] = std::make_unique<Task>(clock_, std::move(config), statistics_, nullptr, &board_);
+  task_ = tasks_[0].get();
+  sut_.emplace(clock_, tasks_, poller_);
+  begin();
+  clock_.run_for(Supervision::kGrace);
+  task_->run_cycle({.release = clock_.now()});
+  EXPECT_FALSE(was_under_watchdog);
+  EXPECT_FALSE(hit) << to_string(*hit);
+  EXPECT_FALSE(task_->fault().raised()) << "it is in no cycle";
+  const TimePoint free = clock_.now();
+  clock_.run_until(free + 3 * milliseconds(10) - Duration(1));
+  (void)look();
+  EXPECT_FALSE(task_->fault().raised());
+  clock_.run_for(Duration(1));
+  (void)look();
+  EXPECT_TRUE(task_->fault().raised()) << "from then on it counts";
+  EXPECT_GT(task_->next_release(FreewheelRule(settings_)).lost_cycles, 40U) << "what fell due is lost";
+}
+
 TEST_F(SupervisionTest, NeverMissesReleasesThatLieBehindTheEndOfTheClock) {
   TaskConfig config = task_->config();
   config.interval = std::chrono::hours(24 * 49);
