@@ -30,12 +30,16 @@ Result<void> CmpSchedule::prepare() {
   return ticker_.prepare();
 }
 
-bool CmpSchedule::start(TimePoint origin) noexcept {
-  if (!needs_tick()) return true;
+bool CmpSchedule::prime() noexcept {
+  return !needs_tick() || ticker_.prime();
+}
+
+void CmpSchedule::start(TimePoint origin) noexcept {
+  if (!needs_tick()) return;
   // What was due before the first tick, while a switch was under way, is only late and runs at once.
   const TimePoint first = ticker_.first_tick(origin);
   table_.start(first - settings_.scheduler_interval);
-  return ticker_.start(first);
+  ticker_.start(first);
 }
 
 void CmpSchedule::on_tick(TimePoint tick) noexcept {

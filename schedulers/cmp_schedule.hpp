@@ -20,7 +20,8 @@ class CmpSchedule final : public Scheduler {
   }
   [[nodiscard]] Result<std::unique_ptr<ActivationSource>> source_for(Task& task) override;
   [[nodiscard]] Result<void> prepare() override;
-  [[nodiscard]] bool start(TimePoint origin) noexcept override;
+  [[nodiscard]] bool prime() noexcept override;
+  void start(TimePoint origin) noexcept override;
   [[nodiscard]] bool stop(TimePoint deadline) noexcept override { return ticker_.stop(deadline); }
 
  private:

@@ -76,7 +76,7 @@ struct SchedulerCapabilities {
 inline constexpr Duration kVariablePatience = std::chrono::seconds(3);
 
 /// Policy only: decides when which task is activated. Threads, statistics and the switch are TaskSet's.
-/// Life: source_for() for each task, prepare(), start(), stop(); then it is done with.
+/// Life: source_for() for each task, prepare(), prime(), start(), stop(); then it is done with.
 class Scheduler {
  public:
   virtual ~Scheduler() = default;
@@ -87,10 +87,13 @@ class Scheduler {
   /// Set-up, after the last source_for(). Makes everything that can fail to be made, its threads above all;
   /// nothing is released yet. So a switch that cannot succeed fails while the scheduler before still runs.
   [[nodiscard]] virtual Result<void> prepare() = 0;
-  /// Set-up. Ticks and polls lie on the grid origin + n * scheduler_interval. Grids of tasks are the tasks'
-  /// own.
-  /// false: an event variable has not returned from being read for the first time, for kVariablePatience.
-  [[nodiscard]] virtual bool start(TimePoint origin) noexcept = 0;
+  /// Set-up. Reads the event variables that were never read since their task began, on the thread that polls
+  /// them: from these levels the first edges rise. Before the origin is chosen, because it may take long.
+  /// false: one has not returned for kVariablePatience.
+  [[nodiscard]] virtual bool prime() noexcept = 0;
+  /// Set-up, after prime(), whatever that said. Never waits. Ticks and polls lie on the grid origin + n *
+  /// scheduler_interval. Grids of tasks are the tasks' own.
+  virtual void start(TimePoint origin) noexcept = 0;
   /// Ends the scheduler's own threads; waits for that, at most until `deadline` (real time). true: nothing of
   /// a task is touched any more. Sources may still be waited on and are then only left by interrupt(). false:
   /// not yet, as long as an event variable does not return. Set-up; may be called again, and without a

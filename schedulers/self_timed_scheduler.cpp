@@ -31,11 +31,15 @@ Result<void> SelfTimedScheduler::prepare() {
   return ticker_.prepare();
 }
 
-bool SelfTimedScheduler::start(TimePoint origin) noexcept {
-  if (poller_.empty()) return true;
+bool SelfTimedScheduler::prime() noexcept {
+  return poller_.empty() || ticker_.prime();
+}
+
+void SelfTimedScheduler::start(TimePoint origin) noexcept {
+  if (poller_.empty()) return;
   // Between the releases of the cyclic tasks: at the same instant the poll, which goes first, would delay
   // them.
-  return ticker_.start(ticker_.first_tick(origin) + settings_.scheduler_interval / 2);
+  ticker_.start(ticker_.first_tick(origin) + settings_.scheduler_interval / 2);
 }
 
 }  // namespace plchost

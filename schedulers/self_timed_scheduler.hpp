@@ -13,7 +13,8 @@ class SelfTimedScheduler : public Scheduler {
 
   [[nodiscard]] Result<std::unique_ptr<ActivationSource>> source_for(Task& task) final;
   [[nodiscard]] Result<void> prepare() final;
-  [[nodiscard]] bool start(TimePoint origin) noexcept final;
+  [[nodiscard]] bool prime() noexcept final;
+  void start(TimePoint origin) noexcept final;
   [[nodiscard]] bool stop(TimePoint deadline) noexcept final { return ticker_.stop(deadline); }
 
  protected:

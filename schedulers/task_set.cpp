@@ -130,14 +130,22 @@ Result<void> TaskSet::start(std::string_view scheduler, const SchedulerSettings&
   if (!arrangement) return std::unexpected(std::move(arrangement.error()));
   active_ = std::move(*arrangement);
   tick_ = active_->tick;
-  origin_ = clock_.now() + kStartLead;
   distributed_clock_.configure(settings.distributed_clock);
   distributed_clock_.set_steering(active_->scheduler->capabilities().one_shot);
-  for (auto& task : tasks_) task->begin(origin_);
+  for (auto& task : tasks_) task->forget_edges();
   running_ = true;
-  watch(settings);
-  start_scheduler();
-  hand_out_sources();
+  watch_variables(settings);
+  // However long the variables take: what follows their reading is one grid, and loses nothing by it.
+  prime_scheduler();
+  {
+    // Nobody but the tasks may come between the origin and the moment in which the last task has its source.
+    const RaisedPriority raised(environment_.allow_unprivileged ? ThreadPriority{} : switch_priority(band_));
+    origin_ = clock_.now() + kStartLead;
+    for (auto& task : tasks_) task->begin(origin_);
+    watch(settings);
+    active_->scheduler->start(origin_);
+    hand_out_sources();
+  }
   (void)wait_until_settled(MonotonicClock::now() + kSwitchPatience);
   return {};
 }
@@ -158,15 +166,16 @@ Result<void> TaskSet::switch_to(std::string_view scheduler, const SchedulerSetti
     tick_ = active_->tick;
     watch(settings);
     distributed_clock_.set_steering(active_->scheduler->capabilities().one_shot);
-    start_scheduler();
+    prime_scheduler();
+    active_->scheduler->start(origin_);
     hand_out_sources();
   }
   (void)wait_until_settled(MonotonicClock::now() + kSwitchPatience);
   return {};
 }
 
-void TaskSet::start_scheduler() {
-  if (active_->scheduler->start(origin_)) return;
+void TaskSet::prime_scheduler() {
+  if (active_->scheduler->prime()) return;
   if (const auto late = task_in_variable()) raise_late_variable(*late);
 }
 
@@ -205,6 +214,12 @@ void TaskSet::watch(const SchedulerSettings& settings) {
   if (!supervision_) return;
   const auto cores = allowed_cores(0);
   supervision_->begin(settings, cores ? static_cast<int>(cores->size()) : 1);
+}
+
+// No release is due yet, so none is missed.
+void TaskSet::watch_variables(const SchedulerSettings& settings) {
+  watch(settings);
+  if (supervision_) supervision_->tasks_stop();
 }
 
 Result<void> TaskSet::reset_statistics(std::string_view task) {

@@ -207,7 +207,8 @@ class TaskSet {
   [[nodiscard]] bool in_cycle(std::size_t task) const noexcept;
   [[nodiscard]] std::optional<std::vector<std::size_t>> stuck_in_phase(const std::vector<std::size_t>& busy);
   [[nodiscard]] std::optional<std::size_t> task_in_variable() const noexcept;
-  void start_scheduler();
+  void prime_scheduler();
+  void watch_variables(const SchedulerSettings& settings);
   [[nodiscard]] Result<void> end_scheduler();
   void raise_late_variable(std::size_t task);
   [[nodiscard]] bool let_retired_go();

@@ -43,7 +43,6 @@ void Task::begin(TimePoint origin) {
     recorder_.lose_posts(count);
     cursor_ = {.next = count, .seen = count, .seen_at = origin};
   }
-  latch_.forget();
 }
 
 Activation Task::next_release(const FreewheelRule& rule) const noexcept {

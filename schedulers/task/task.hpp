@@ -40,8 +40,11 @@ class Task {
   /// Null: it follows no clock. Any context.
   [[nodiscard]] const ClockFollower* follower() const noexcept { return follower_; }
 
-  /// Set-up, while the task is parked: a new grid from `origin` on. Releases and edges of the time in which
-  /// it was parked do not count; posts of that time are lost events.
+  /// Set-up, while the task is parked, before begin() and before the variables of event tasks are read for
+  /// the first time: edges of the time in which it was parked do not count.
+  void forget_edges() noexcept { latch_.forget(); }
+  /// Set-up, while the task is parked: a new grid from `origin` on. Releases of the time in which it was
+  /// parked do not count; posts of that time are lost events.
   void begin(TimePoint origin);
 
   /// What a cyclic or freewheeling task runs next: the same answer until a cycle has run. The task's thread.

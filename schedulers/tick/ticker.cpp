@@ -31,8 +31,12 @@ TimePoint Ticker::first_tick(TimePoint origin) const noexcept {
   return origin + (since + period_ - Duration(1)) / period_ * period_;
 }
 
-bool Ticker::start(TimePoint first) noexcept {
+void Ticker::start(TimePoint first) noexcept {
   first_ = first;
+  tick_.open(clock_);
+}
+
+bool Ticker::prime() noexcept {
   go_.open(clock_);
   constexpr Duration kLook = std::chrono::milliseconds(10);
   const TimePoint deadline = MonotonicClock::now() + kVariablePatience;
@@ -48,6 +52,7 @@ bool Ticker::stop(TimePoint deadline) noexcept {
   if (!thread_.joinable()) return true;
   if (!stopping_.exchange(true, std::memory_order_acq_rel)) {
     go_.interrupt(clock_);
+    tick_.interrupt(clock_);
     source_->interrupt();
   }
   return thread_.join_until(deadline, [this] { return poller_.parked(); });
@@ -58,6 +63,7 @@ void Ticker::run() noexcept {
   poller_.prime(clock_.now());
   primed_.store(1, std::memory_order_release);
   futex_wake(&primed_);
+  if (tick_.wait(clock_) != ActivationGate::Outcome::opened) return;
   source_->start(first_, period_);
   while (!stopping_.load(std::memory_order_acquire)) {
     if (const auto tick = source_->wait()) on_tick_(*tick);

@@ -31,10 +31,11 @@ class Ticker {
   [[nodiscard]] Result<void> prepare();
   /// The first point of the grid origin + n * scheduler_interval that is not over.
   [[nodiscard]] TimePoint first_tick(TimePoint origin) const noexcept;
-  /// Returns when the event variables have been read for the first time. Ticks at `first` and then every
-  /// scheduler_interval. After prepare(). false: they have not, for kVariablePatience; it ticks once they
-  /// have.
-  [[nodiscard]] bool start(TimePoint first) noexcept;
+  /// Returns when the event variables have been read for the first time. After prepare(). false: they have
+  /// not, for kVariablePatience; it ticks once they have.
+  [[nodiscard]] bool prime() noexcept;
+  /// Ticks at `first` and then every scheduler_interval. After prime().
+  void start(TimePoint first) noexcept;
   /// Ends the thread; true: it has ended before `deadline` (real time), or is parked. May be called again.
   [[nodiscard]] bool stop(TimePoint deadline) noexcept;
 
@@ -48,9 +49,10 @@ class Ticker {
   EventPoller& poller_;
   OnTick on_tick_;
   std::unique_ptr<TickSource> source_;
-  ActivationGate go_;
+  ActivationGate go_;    // to the variables
+  ActivationGate tick_;  // to the first tick
   std::atomic<bool> stopping_{false};
-  TimePoint first_;  // written before go_ opens
+  TimePoint first_;  // written before tick_ opens
   std::atomic<std::uint32_t> primed_{0};
   Thread thread_;
 };

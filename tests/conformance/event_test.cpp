@@ -213,6 +213,35 @@ TEST(TasksOfOtherKinds, HaveNoEventToRaise) {
   EXPECT_FALSE(tasks.set->task(0).raise_event());
 }
 
+// All grids begin after the variables were read for the first time.
+TEST_P(EventTasks, WhoseVariablesTakeLongToReadMakeNobodyLoseACycleAtTheStart) {
+  std::atomic<bool> first_read{true};
+  std::atomic<bool> reading{false};
+  add(event(
+      "on_edge",
+      [&] {
+        if (first_read.exchange(false)) {
+          reading = true;
+          clock.spend(milliseconds(50));
+        }
+        return false;
+      },
+      [] {}));
+  add(cyclic("fast", milliseconds(1), [this] { starts.push_back(clock.now()); }));
+  ASSERT_TRUE(create());
+  const TimePoint asked = clock.now();
+  std::jthread control([this] { start(GetParam()); });
+  while (!reading) std::this_thread::yield();
+  clock.settle();
+  clock.run_until(asked + milliseconds(50));
+  control.join();
+  clock.run_until(asked + milliseconds(80));
+  ASSERT_FALSE(starts.empty());
+  EXPECT_EQ(starts, grid(asked + milliseconds(50) + TaskSet::kStartLead, milliseconds(1),
+                         static_cast<int>(starts.size())));
+  EXPECT_EQ(counters(1).lost_cycles, 0U);
+}
+
 INSTANTIATE_TEST_SUITE_P(Each, EventTasks, testing::ValuesIn(every_scheduler()), scheduler_test_name);
 
 }  // namespace
