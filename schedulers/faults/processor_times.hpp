@@ -14,6 +14,8 @@ class ProcessorTimes {
   [[nodiscard]] virtual Duration of_process() const noexcept = 0;
   /// One thread of this process; 0 if it has ended. Real-time, a system call.
   [[nodiscard]] virtual Duration of_thread(pid_t thread) const noexcept = 0;
+  /// One thread of this process waits for something else than the processor. Real-time, three system calls.
+  [[nodiscard]] virtual bool sleeps(pid_t thread) const noexcept = 0;
 };
 
 /// As the kernel counts them.

@@ -96,17 +96,14 @@ void Supervision::run() noexcept {
   while (!ending_.load(std::memory_order_acquire)) {
     const std::uint32_t order = order_.load(std::memory_order_acquire);
     const bool off = mode_.load(std::memory_order_acquire) == Mode::off;
-    if (off) planned_ = kNoDeadline;
     clock_.wait(order_, order, off ? kNoDeadline : look(clock_.now()));
   }
 }
 
 TimePoint Supervision::look(TimePoint now) noexcept {
-  if (planned_ != TimePoint{} && now - planned_ > kStandstill) standstill_end_ = now;
   TimePoint next = kNoDeadline;
   for (Watched& watched : watched_) next = std::min(next, look_at(watched, now));
   if (mode_.load(std::memory_order_relaxed) == Mode::running) next = std::min(next, look_at_load(now));
-  planned_ = next;
   return next;
 }
 
@@ -118,8 +115,9 @@ TimePoint Supervision::look_at(Watched& watched, TimePoint now) noexcept {
   if (!since) {
     // The next cycle may begin now, or if the task is cyclic at its release.
     const Duration limit(watched.limit.load(std::memory_order_relaxed));
+    const Duration first = watched.lenient.load(std::memory_order_relaxed) ? limit / kLooks : limit;
     const TimePoint due = releases && watched.task->due() ? *watched.task->due() : now;
-    if (limit > Duration::zero()) next = std::max(due, now) + limit;
+    if (limit > Duration::zero()) next = std::max(due, now) + first;
   }
   return releases ? std::min(next, look_at_releases(watched, now)) : next;
 }
@@ -138,9 +136,34 @@ TimePoint Supervision::look_at_cycle(Watched& watched, TimePoint since, TimePoin
   }
   const Duration limit(watched.limit.load(std::memory_order_relaxed));
   if (limit == Duration::zero()) return kNoDeadline;
-  const bool lenient = watched.lenient.load(std::memory_order_relaxed);
-  const TimePoint from = lenient ? std::max(since, standstill_end_) : since;
-  if (now <= from + limit) return from + limit + Duration(1);
+  if (watched.lenient.load(std::memory_order_relaxed)) return look_for_endless_loop(watched, since, now);
+  if (now <= since + limit) return since + limit + Duration(1);
+  strike(watched, since, now, FaultKind::task_watchdog, (now - since).count(), limit.count());
+  return now + kPatience;
+}
+
+// What counts is what the thread has used: a host, a core or a process that stood still, and what others took
+// from it, are no fault of the cycle. A cycle that uses nothing because it waits has the same time, of which
+// only what this thread has seen go by counts.
+TimePoint Supervision::look_for_endless_loop(Watched& watched, TimePoint since, TimePoint now) noexcept {
+  const Duration limit(watched.limit.load(std::memory_order_relaxed));
+  const Duration step = limit / kLooks;
+  const pid_t thread = watched.trap->thread();
+  if (watched.counted_since != since) {
+    if (now < since + step) return since + step;
+    watched.counted_since = since;
+    watched.looked_at = now;
+    watched.used_before = times_.of_thread(thread);
+    watched.waited = Duration::zero();
+    return now + step;
+  }
+  watched.waited += std::min(now - std::exchange(watched.looked_at, now), step + kStandstill);
+  if (watched.waited < limit) return now + step;  // nor can it have used so much
+  const Duration used = times_.of_thread(thread) - watched.used_before;
+  const Duration left = limit - used;
+  if (left > Duration::zero() && !times_.sleeps(thread)) {
+    return now + std::clamp(left, step / kLooks, step);
+  }
   strike(watched, since, now, FaultKind::task_watchdog, (now - since).count(), limit.count());
   return now + kPatience;
 }

@@ -24,6 +24,9 @@ class Supervision {
   static constexpr Duration kGrace = std::chrono::milliseconds(200);
   /// So much later than it wanted to wake, everything on this core stood still.
   static constexpr Duration kStandstill = std::chrono::milliseconds(5);
+  /// The guard against endless loops looks at a cycle so often within its limit: from its first look on it
+  /// counts the processor time of the thread.
+  static constexpr int kLooks = 8;
   /// A thread that was struck has been caught by then, or something keeps it from being caught.
   static constexpr Duration kPatience = std::chrono::milliseconds(10);
 
@@ -54,7 +57,11 @@ class Supervision {
     Task* task = nullptr;                 // null: the poller of event variables
     std::atomic<Duration::rep> limit{0};  // 0: none
     std::atomic<bool> lenient{false};
-    TimePoint struck_since;  // the cycle that was struck
+    TimePoint counted_since;  // the cycle that the guard against endless loops counts, and for that:
+    TimePoint looked_at;      // when it looked last
+    Duration used_before{};   // the thread's processor time at the first look
+    Duration waited{};        // since then, without what stood still
+    TimePoint struck_since;   // the cycle that was struck
     TimePoint struck_at;
     Task::Pace pace;  // when overtaxed() was asked last
   };
@@ -63,6 +70,7 @@ class Supervision {
   void change(Mode mode) noexcept;
   [[nodiscard]] TimePoint look_at(Watched& watched, TimePoint now) noexcept;
   [[nodiscard]] TimePoint look_at_cycle(Watched& watched, TimePoint since, TimePoint now) noexcept;
+  [[nodiscard]] TimePoint look_for_endless_loop(Watched& watched, TimePoint since, TimePoint now) noexcept;
   [[nodiscard]] TimePoint look_at_releases(Watched& watched, TimePoint now) noexcept;
   [[nodiscard]] TimePoint look_at_load(TimePoint now) noexcept;
   void look_at_overload(TimePoint now, bool first) noexcept;
@@ -86,8 +94,6 @@ class Supervision {
   std::atomic<int> cores_{1};
 
   // The thread's own.
-  TimePoint planned_;         // when it wanted to wake
-  TimePoint standstill_end_;  // what ran before stood still
   LoadRule load_;
   LoadRule overload_;
   bool overload_measured_ = false;  // since the window began

@@ -16,8 +16,9 @@ namespace plchost {
 /// How long a cycle may take before it is stopped in its middle; nothing: as long as it likes. Pure.
 struct CycleLimit {
   Duration limit{};
-  /// The guard against endless loops that tasks without a watchdog of their own have: time in which the whole
-  /// process stood still does not count.
+  /// The guard against endless loops that tasks without a watchdog of their own have: the processor time of
+  /// the thread counts, or the time for which the cycle waits. Time in which the process stood still, or
+  /// others had the processor, does not.
   bool lenient = false;
   bool operator==(const CycleLimit&) const = default;
 };

@@ -25,6 +25,7 @@ class FakeTimes final : public ProcessorTimes {
     const auto found = threads.find(thread);
     return found == threads.end() ? Duration::zero() : found->second;
   }
+  [[nodiscard]] bool sleeps(pid_t) const noexcept override { return false; }
   Duration process = std::chrono::seconds(7);  // since its start: only differences count
   std::map<pid_t, Duration> threads;
 };

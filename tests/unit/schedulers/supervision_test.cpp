@@ -1,5 +1,6 @@
 #include "schedulers/faults/supervision.hpp"
 
+#include <algorithm>
 #include <csignal>
 
 #include <gmock/gmock.h>
@@ -12,6 +13,16 @@ namespace {
 
 using std::chrono::milliseconds;
 
+/// What a test says that the one thread that there is has used.
+class FakeUse final : public ProcessorTimes {
+ public:
+  [[nodiscard]] Duration of_process() const noexcept override { return used; }
+  [[nodiscard]] Duration of_thread(pid_t) const noexcept override { return used; }
+  [[nodiscard]] bool sleeps(pid_t) const noexcept override { return asleep; }
+  Duration used = std::chrono::seconds(7);  // since it was made
+  bool asleep = false;
+};
+
 // What a watchdog strikes with is blocked in this thread, as an application's code could block it: so nothing
 // but the record tells of the strike, and the test goes on.
 class SupervisionTest : public testing::Test {
@@ -23,13 +34,19 @@ class SupervisionTest : public testing::Test {
     TaskConfig config;
     config.name = "main";
     config.interval = milliseconds(10);
+    config.watchdog.time = milliseconds(40);
     config.watchdog.omitted_cycles = 3;
     config.entry = [] {};
-    tasks_.push_back(std::make_unique<Task>(clock_, std::move(config), statistics_, nullptr, &board_));
-    task_ = tasks_.back().get();
+    tasks_.resize(1);
     settings_.watchdog.default_time = milliseconds(40);
     settings_.watchdog.omitted_cycles = true;
-    sut_.emplace(clock_, tasks_, poller_);
+    make(std::move(config));
+  }
+  void make(TaskConfig config) {
+    sut_.reset();
+    tasks_[0] = std::make_unique<Task>(clock_, std::move(config), statistics_, nullptr, &board_);
+    task_ = tasks_[0].get();
+    sut_.emplace(clock_, tasks_, poller_, times_);
   }
   ~SupervisionTest() override {
     const timespec at_once{};
@@ -56,6 +73,7 @@ class SupervisionTest : public testing::Test {
   std::vector<std::unique_ptr<Task>> tasks_;
   Task* task_ = nullptr;
   FaultTrap poller_;
+  FakeUse times_;
   SchedulerSettings settings_;
   std::optional<Supervision> sut_;
 };
@@ -132,10 +150,7 @@ TEST_F(SupervisionTest, CountsNoReleaseWhileTheTaskWorksForTheRuntime) {
     if (const FaultRecord* const record = task_->fault().published()) hit = record->kind;
     return true;
   };
-  sut_.reset();
-  tasks_[0] = std::make_unique<Task>(clock_, std::move(config), statistics_, nullptr, &board_);
-  task_ = tasks_[0].get();
-  sut_.emplace(clock_, tasks_, poller_);
+  make(std::move(config));
   begin();
   clock_.run_for(Supervision::kGrace);
   task_->run_cycle({.release = clock_.now()});
@@ -155,11 +170,8 @@ TEST_F(SupervisionTest, CountsNoReleaseWhileTheTaskWorksForTheRuntime) {
 TEST_F(SupervisionTest, NeverMissesReleasesThatLieBehindTheEndOfTheClock) {
   TaskConfig config = task_->config();
   config.interval = std::chrono::hours(24 * 49);
-  config.watchdog.omitted_cycles = 3000;
-  sut_.reset();
-  tasks_[0] = std::make_unique<Task>(clock_, std::move(config), statistics_, nullptr, &board_);
-  task_ = tasks_[0].get();
-  sut_.emplace(clock_, tasks_, poller_);
+  config.watchdog = {.omitted_cycles = 3000};
+  make(std::move(config));
   settings_.watchdog.default_time = {};
   begin();
   clock_.run_for(Supervision::kGrace * 10);
@@ -176,71 +188,106 @@ TEST_F(SupervisionTest, CountsNoOmittedCycleWhileTheTasksStop) {
 }
 
 // The guard against endless loops: its limit is 40 ms.
-class LeniencyTest : public SupervisionTest {
+class EndlessLoopGuard : public SupervisionTest {
  protected:
-  /// A cycle that began now; looked at, as soon as it is.
+  static constexpr Duration kLimit = milliseconds(40);
+  static constexpr Duration kStep = kLimit / Supervision::kLooks;
+
+  EndlessLoopGuard() {
+    TaskConfig config = task_->config();
+    config.watchdog = {};
+    make(std::move(config));
+  }
+  void TearDown() override { task_->trap().disarm(); }
+
+  /// A cycle that began now; looked at for the first time, as soon as it is.
   void begin_cycle() {
     begin();
     start_ = clock_.now();
     task_->trap().arm(task_->fault(), start_);
-    planned_ = look();
-    ASSERT_EQ(planned_, start_ + milliseconds(40)) << "for an event variable, too";
+    next_ = look();
+    ASSERT_EQ(next_, start_ + kStep) << "for an event variable, too";
   }
-  TimePoint look_at(TimePoint time) {
-    clock_.run_until(time);
-    return look();
+  /// Goes on for `duration`, for `percent` of which the thread has the processor, and looks when it is to.
+  void go_on_for(Duration duration, int percent) {
+    const TimePoint end = clock_.now() + duration;
+    while (clock_.now() < end && !is_struck()) {
+      const TimePoint until = std::min(next_, end);
+      times_.used += (until - clock_.now()) * percent / 100;
+      clock_.run_until(until);
+      if (until == next_) next_ = look();
+    }
   }
-  void TearDown() override { task_->trap().disarm(); }
+  /// So long nothing goes on, the supervision neither.
+  void stand_still(Duration duration) {
+    clock_.run_for(duration);
+    if (clock_.now() >= next_) next_ = look();
+  }
 
   TimePoint start_;
-  TimePoint planned_;
+  TimePoint next_;
 };
 
-TEST_F(LeniencyTest, LetsACycleOffForATimeInWhichEverythingStoodStill) {
+TEST_F(EndlessLoopGuard, StrikesALoopThatUsesTheProcessorForItsTime) {
   begin_cycle();
-  const TimePoint end_of_standstill = planned_ + Supervision::kStandstill + Duration(1);
-  EXPECT_EQ(look_at(end_of_standstill), end_of_standstill + milliseconds(40));
+  go_on_for(kLimit, 100);
   EXPECT_FALSE(is_struck());
-  const TimePoint last_allowed = end_of_standstill + milliseconds(40);
-  EXPECT_EQ(look_at(last_allowed), last_allowed + Duration(1));
-  EXPECT_FALSE(is_struck()) << "it has its whole time once more";
-  (void)look_at(last_allowed + Duration(1));
-  EXPECT_TRUE(is_struck()) << "but not more than that";
-}
-
-TEST_F(LeniencyTest, TakesNoOrdinaryDelayForAStandstill) {
-  begin_cycle();
-  (void)look_at(planned_ + Supervision::kStandstill);
+  go_on_for(kStep, 100);
   EXPECT_TRUE(is_struck());
 }
 
-TEST_F(LeniencyTest, HoldsForNoTaskWithAWatchdogOfItsOwn) {
+TEST_F(EndlessLoopGuard, CountsNoStandstillWhateverItsLength) {
+  for (const int tenths : {5, 10, 19, 20, 30, 100}) {
+    for (int before = 0; before < 10; ++before) {
+      begin_cycle();
+      go_on_for(kLimit * before / 10, 100);
+      stand_still(kLimit * tenths / 10);
+      go_on_for(kLimit * (9 - before) / 10, 100);
+      ASSERT_FALSE(is_struck()) << "a standstill of " << tenths << " tenths of the limit, " << before;
+      task_->trap().disarm();
+      clock_.run_for(milliseconds(1));
+    }
+  }
+}
+
+TEST_F(EndlessLoopGuard, CountsOnlyWhatTheThreadUsesWhileOthersHaveTheProcessor) {
+  begin_cycle();
+  go_on_for(kLimit * 9, 10);
+  EXPECT_FALSE(is_struck());
+  go_on_for(kLimit * 3, 10);
+  EXPECT_TRUE(is_struck());
+}
+
+TEST_F(EndlessLoopGuard, StrikesACycleThatWaitsForItsTimeButCountsNoStandstill) {
+  times_.asleep = true;
+  begin_cycle();
+  go_on_for(kLimit / 2, 0);
+  stand_still(kLimit * 5);
+  go_on_for(kLimit / 4, 0);
+  EXPECT_FALSE(is_struck());
+  go_on_for(kLimit / 2, 0);
+  EXPECT_TRUE(is_struck());
+}
+
+TEST_F(EndlessLoopGuard, BeginsToCountAnewWithEachCycle) {
+  for (int cycle = 0; cycle < 5; ++cycle) {
+    begin_cycle();
+    go_on_for(kLimit, 90);
+    ASSERT_FALSE(is_struck()) << cycle;
+    task_->trap().disarm();
+    clock_.run_for(milliseconds(1));
+  }
+}
+
+TEST_F(EndlessLoopGuard, HoldsForNoTaskWithAWatchdogOfItsOwn) {
   TaskConfig config = task_->config();
-  config.watchdog.time = milliseconds(40);
-  sut_.reset();
-  tasks_[0] = std::make_unique<Task>(clock_, std::move(config), statistics_, nullptr, &board_);
-  task_ = tasks_[0].get();
-  sut_.emplace(clock_, tasks_, poller_);
-  begin_cycle();
-  (void)look_at(planned_ + Supervision::kStandstill + Duration(1));
-  EXPECT_TRUE(is_struck());
-}
-
-TEST_F(LeniencyTest, IsItsThreadsWhenItWakesLate) {
-  ASSERT_TRUE(sut_->start_thread({}));
-  clock_.settle();
+  config.watchdog.time = kLimit;
+  make(std::move(config));
   begin();
-  clock_.settle();
-  const TimePoint start = clock_.now();
-  task_->trap().arm(task_->fault(), start);
-  constexpr Duration kLate = Supervision::kStandstill + milliseconds(1);
-  clock_.set_wake_latency(kLate);
-  clock_.run_until(start + milliseconds(40) + kLate);  // it had planned to wake at 40 ms
-  clock_.set_wake_latency(Duration::zero());
-  clock_.run_until(start + kLate + milliseconds(80));
-  EXPECT_FALSE(is_struck());
-  clock_.run_until(start + kLate + milliseconds(80) + Duration(1));
-  EXPECT_TRUE(is_struck());
+  task_->trap().arm(task_->fault(), clock_.now());
+  clock_.run_for(kLimit + Duration(1));
+  (void)look();
+  EXPECT_TRUE(is_struck()) << "its time is that of the clock on the wall";
 }
 
 }  // namespace
