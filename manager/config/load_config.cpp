@@ -48,7 +48,8 @@ struct Loader {
   void read_restart(SectionReader& reader, InstanceConfig& instance);
   void check_directory(SectionReader& reader, std::string_view key, const std::string& path);
   void check_interface(SectionReader& reader);
-  void read_file(SectionReader& reader, std::string_view key, std::string& target);
+  bool read_file(SectionReader& reader, std::string_view key, std::string& target);
+  void check_start(SectionReader& reader, const InstanceConfig& instance);
   const TomlTable* section(const TomlTable& root, std::string_view name);
 };
 
@@ -294,8 +295,9 @@ void Loader::read_instance(const TomlTable& table, unsigned line) {
   reader.truth("share_core", instance.share_core);
   reader.choice("scheduler", surroundings.schedulers, instance.scheduler);
   reader.choice("priority_band", kPriorityBands, instance.priority_band);
-  read_file(reader, "settings", instance.settings);
-  read_file(reader, "application", instance.application);
+  const bool settings = read_file(reader, "settings", instance.settings);
+  const bool application = read_file(reader, "application", instance.application);
+  if (settings && application) check_start(reader, instance);
   reader.truth("autostart", instance.autostart);
   reader.texts("after", kMaxInstances, instance.after);
   read_restart(reader, instance);
@@ -342,25 +344,38 @@ void Loader::read_restart(SectionReader& reader, InstanceConfig& instance) {
   instance.crash_window = seconds(window);
 }
 
-void Loader::read_file(SectionReader& reader, std::string_view key, std::string& target) {
+// With settings that are wrong no application is tried: it would only say the same.
+void Loader::check_start(SectionReader& reader, const InstanceConfig& instance) {
+  if (!instance.settings.empty() && surroundings.check_settings) {
+    if (const auto good = surroundings.check_settings(instance.settings); !good) {
+      reader.problem("settings", good.error().describe());
+      return;
+    }
+  }
+  if (instance.application.empty() || !surroundings.check_application) return;
+  if (const auto good = surroundings.check_application(instance.application, instance.settings); !good)
+    reader.problem("application", good.error().describe());
+}
+
+// Whether all that is said is right, be it nothing.
+bool Loader::read_file(SectionReader& reader, std::string_view key, std::string& target) {
+  const std::size_t before = problems.size();
   std::string path;
   reader.text(key, path);
   if (path.empty()) {
-    if (reader.has(key)) reader.problem(key, "is no path; leave the key out if there is no file");
-    return;
+    if (reader.has_text(key)) reader.problem(key, "is no path; leave the key out if there is no file");
+    return problems.size() == before;
   }
   path = resolve_path(folder, path);
   if (path.size() > kMaxPath) {
     reader.problem(key, fmt::format("path of {} characters; allowed are up to {}", path.size(), kMaxPath));
-    return;
+    return false;
   }
   if (surroundings.check_files) {
-    auto good = check_readable_file(path);
-    const auto& check = key == "settings" ? surroundings.check_settings : surroundings.check_application;
-    if (good && check) good = check(path);
-    if (!good) reader.problem(key, good.error().describe());
+    if (const auto good = check_readable_file(path); !good) reader.problem(key, good.error().describe());
   }
   target = path;
+  return problems.size() == before;
 }
 
 }  // namespace

@@ -20,10 +20,11 @@ struct ConfigSurroundings {
   bool check_files = true;  ///< that settings and applications are there and readable
   /// For --check-config only: what a start finds out later, when it concerns one instance or may still
   /// change.
-  bool check_directories = false;       ///< that they are there or can be made
-  std::vector<std::string> interfaces;  ///< of the system; empty: not checked
-  std::function<Result<void>(const std::string& file)> check_application;  ///< null: not checked
-  std::function<Result<void>(const std::string& file)> check_settings;     ///< null: not checked
+  bool check_directories = false;            ///< that they are there or can be made
+  std::vector<std::string> interfaces = {};  ///< of the system; empty: not checked
+  /// Null: not checked. `settings`: those that the application is to run with; may be empty.
+  std::function<Result<void>(const std::string& file, const std::string& settings)> check_application = {};
+  std::function<Result<void>(const std::string& file)> check_settings = {};  ///< null: not checked
 };
 
 /// As the system is now.

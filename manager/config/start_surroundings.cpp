@@ -32,8 +32,9 @@ bool ends_within(int process, Duration limit) {
   return ::poll(&end, 1, static_cast<int>(wait)) == 1;
 }
 
-Result<void> try_application(const std::string& plc_instance, const std::string& file) {
-  auto trial = ApplicationTrial::start(plc_instance, file);
+Result<void> try_application(const std::string& plc_instance, const std::string& file,
+                             const std::string& settings) {
+  auto trial = ApplicationTrial::start(plc_instance, file, settings);
   if (!trial) return std::unexpected(trial.error());
   if (!ends_within(trial->fd(), kTrialLimit)) {
     trial->give_up();
@@ -65,8 +66,8 @@ ConfigSurroundings start_surroundings(const std::string& programs) {
   ConfigSurroundings surroundings = config_surroundings();
   surroundings.check_directories = true;
   surroundings.interfaces = network_interfaces();
-  surroundings.check_application = [plc_instance](const std::string& file) {
-    return try_application(plc_instance, file);
+  surroundings.check_application = [plc_instance](const std::string& file, const std::string& settings) {
+    return try_application(plc_instance, file, settings);
   };
   surroundings.check_settings = [plc_instance](const std::string& file) {
     return try_settings(plc_instance, file);

@@ -53,29 +53,46 @@ Result<void> look(CliSession& session, const std::string& host, const std::strin
   return {};
 }
 
-int wait(CliSession& session, const WaitArguments& arguments) {
-  const auto host = session.target_host();
-  if (!host) return CliSession::fail(host.error());
+// A host that has just started may not be seen yet, or not whole.
+bool may_come(const Error& error) {
+  return error.code == ErrorCode::timed_out || error.code == ErrorCode::unavailable;
+}
+
+Result<std::string> host_until(CliSession& session, TimePoint end) {
+  for (;;) {
+    auto host = session.target_host();
+    if (host || !may_come(host.error()) || MonotonicClock::now() >= end || interrupted()) return host;
+  }
+}
+
+Result<void> wait_until(CliSession& session, const WaitArguments& arguments, TimePoint end) {
+  const auto host = host_until(session, end);
+  if (!host) return std::unexpected(host.error());
   const auto instances = expand(session, arguments.names);
-  if (!instances) return CliSession::fail(instances.error());
+  if (!instances) return std::unexpected(instances.error());
   std::vector<Awaited> awaited;
   for (const NamedInstance& one : *instances)
     awaited.push_back({.name = one.name, .state = {}, .problem = {}});
-  constexpr Duration kPatience = std::chrono::seconds(60);
-  const TimePoint end = session.deadline(kPatience);
-  catch_interrupts();
   for (;;) {
-    if (const auto looked = look(session, *host, arguments.state, awaited); !looked)
-      return CliSession::fail(looked.error());
-    if (awaited.empty()) return kExitDone;
+    const auto looked = look(session, *host, arguments.state, awaited);
     const TimePoint now = MonotonicClock::now();
-    if (now >= end || interrupted()) break;
+    const bool over = now >= end || interrupted();
+    if (!looked && (over || !may_come(looked.error()))) return looked;
+    if (awaited.empty()) return {};
+    if (over) break;
     session.client().value()->wait_for_change(std::min(end, now + kInterruptLook));
   }
   const Awaited& first = awaited.front();
-  return CliSession::fail({ErrorCode::timed_out, 0,
-                           fmt::format("'{}' is not {} but {}{}{}", first.name, arguments.state, first.state,
-                                       first.problem.empty() ? "" : ": ", first.problem)});
+  return failure(ErrorCode::timed_out,
+                 fmt::format("'{}' is not {} but {}{}{}", first.name, arguments.state, first.state,
+                             first.problem.empty() ? "" : ": ", first.problem));
+}
+
+int wait(CliSession& session, const WaitArguments& arguments) {
+  constexpr Duration kPatience = std::chrono::seconds(60);
+  catch_interrupts();
+  const auto waited = wait_until(session, arguments, session.deadline(kPatience));
+  return waited ? kExitDone : CliSession::fail(waited.error());
 }
 
 }  // namespace

@@ -73,6 +73,13 @@ TEST_F(CheckConfig, ReadsTheSettings) {
   EXPECT_THAT(output, HasSubstr("line1.cfg:2: [CmpSchedule] SchedulerInterval: 'soon' is not allowed"));
 }
 
+TEST_F(CheckConfig, TriesTheApplicationWithItsSettings) {
+  write("line1.cfg", "[Task.Nobody]\nDrivesOutputs=1\n");
+  const std::string output = check(instance(application("bottling_line") + "settings = \"line1.cfg\"\n"));
+  EXPECT_THAT(output, HasSubstr("cell.toml:8: [[instance]] 'line1' application: "));
+  EXPECT_THAT(output, HasSubstr("Nobody"));
+}
+
 TEST_F(CheckConfig, KnowsTheInterfacesOfTheHost) {
   const std::string output = check("[dds]\ninterface = \"none0\"\nallow_unsecured = true\n");
   EXPECT_THAT(output, HasSubstr("cell.toml:6: [dds] interface: there is no interface 'none0'; there are "));

@@ -12,7 +12,7 @@ import sys
 import time
 
 ROOT, BIN, CELL, CORE, POOL = sys.argv[1:6]
-PATIENCE_S = 30
+PATIENCE_S = 75  # what the longest command waits by itself, and more
 PLACES = {
     "$PWD/.build/demo/bin": BIN,
     "$PWD/instances": ROOT + "/instances",
