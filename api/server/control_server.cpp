@@ -278,14 +278,13 @@ void ControlServer::Parts::refuse(const dds::Guid& client, const plc_Request& re
 void ControlServer::Parts::do_request(ApiRole role, const dds::Guid& writer, const plc_Request& request) {
   const plc_SampleIdentity& identity = request.header.request_identity;
   const dds::Guid client = writer.participant();
-  if (const plc_Reply* const known = answers.find(client, identity))
-    return sessions->write_reply(client, *known);
+  if (const Answer* const known = answers.find(client, identity)) return send(client, *known);
   if (manager->is_pending(identity) || downloads.repeat(identity)) return;
   audit->asked(client, request);
   const std::vector<std::string_view> instances(status->instances().begin(), status->instances().end());
   auto checked = check_request(request, role, options.host, instances);
   if (!checked) return answer(client, identity, checked.error().code, checked.error().describe());
-  if (checked->verb == ControlVerb::read_clock) return answer(client, identity, ErrorCode::ok, "");
+  if (checked->verb == ControlVerb::read_clock) return tell(client, identity, ErrorCode::ok, "");
   if (checked->verb == ControlVerb::list_objects) return list_objects(client, request);
   if (checked->verb == ControlVerb::list_nodes || checked->verb == ControlVerb::list_routes) {
     return list_nodes(checked->verb, client, request);
@@ -307,7 +306,7 @@ void ControlServer::Parts::list_objects(const dds::Guid& client, const plc_Reque
   const plc_SampleIdentity& identity = request.header.request_identity;
   const auto query = parse_object_query(std::span(request.ext._buffer, request.ext._length));
   const auto listing = query ? lister.page(*query) : Result<ObjectListing>(std::unexpected(query.error()));
-  if (!listing) return answer(client, identity, listing.error().code, listing.error().describe());
+  if (!listing) return tell(client, identity, listing.error().code, listing.error().describe());
   ObjectPageSample sample(*listing);
   send_page(client, request, sample.page());
 }
@@ -320,7 +319,7 @@ void ControlServer::Parts::list_nodes(ControlVerb verb, const dds::Guid& client,
   };
   const auto listing = look();
   if (!listing) {
-    return answer(client, request.header.request_identity, listing.error().code, listing.error().describe());
+    return tell(client, request.header.request_identity, listing.error().code, listing.error().describe());
   }
   NodePageSample sample(*listing);
   send_page(client, request, sample.page());
@@ -332,8 +331,8 @@ void ControlServer::Parts::send_page(const dds::Guid& client, const plc_Request&
   dds::copy_text(page.host, options.host);
   page.epoch = epoch;
   const bool written = sessions->write_page(client, page);
-  answer(client, request.header.request_identity, written ? ErrorCode::ok : ErrorCode::busy,
-         written ? "" : "the client does not take what it asked for; ask again");
+  tell(client, request.header.request_identity, written ? ErrorCode::ok : ErrorCode::busy,
+       written ? "" : "the client does not take what it asked for; ask again");
 }
 
 Result<void> ControlServer::Parts::on_manager() {
@@ -395,14 +394,27 @@ void ControlServer::Parts::answer(const dds::Guid& client, const plc_SampleIdent
 
 void ControlServer::Parts::send_answer(const dds::Guid& client, const plc_SampleIdentity& identity,
                                        ErrorCode code, std::string_view text) {
+  Answer answer{
+      .identity = identity, .code = code, .status_round = status->round(), .text = std::string(text)};
+  send(client, answer);
+  answers.remember(client, std::move(answer), MonotonicClock::now());
+}
+
+// What only reads is done again when it is asked again.
+void ControlServer::Parts::tell(const dds::Guid& client, const plc_SampleIdentity& identity, ErrorCode code,
+                                std::string_view text) {
+  send(client,
+       {.identity = identity, .code = code, .status_round = status->round(), .text = std::string(text)});
+}
+
+void ControlServer::Parts::send(const dds::Guid& client, const Answer& answer) {
   plc_Reply reply{};
-  reply.header.related_identity = identity;
-  reply.header.remote_ex = remote_exception(code);
+  reply.header.related_identity = answer.identity;
+  reply.header.remote_ex = remote_exception(answer.code);
   dds::copy_text(reply.host, options.host);
-  reply.code = static_cast<std::int32_t>(code);
-  reply.status_round = status->round();
-  dds::copy_text(reply.text, text);
-  answers.remember(client, reply, MonotonicClock::now());
+  reply.code = static_cast<std::int32_t>(answer.code);
+  reply.status_round = answer.status_round;
+  dds::copy_text(reply.text, answer.text);
   sessions->write_reply(client, reply);
 }
 

@@ -72,6 +72,9 @@ struct ControlServer::Parts {
               std::string_view text);
   void send_answer(const dds::Guid& client, const plc_SampleIdentity& identity, ErrorCode code,
                    std::string_view text);
+  void tell(const dds::Guid& client, const plc_SampleIdentity& identity, ErrorCode code,
+            std::string_view text);
+  void send(const dds::Guid& client, const Answer& answer);
   void finish(std::vector<FinishedCommand> commands);
   void ask_for_findings();
   void list_objects(const dds::Guid& client, const plc_Request& request);

@@ -150,7 +150,9 @@ void SessionTable::write_reply(const dds::Guid& client, const plc_Reply& reply) 
 }
 
 void SessionTable::write_ack(const dds::Guid& client, const plc_EventAck& ack) {
-  (void)write(client, Stream::acks, &ack);
+  Session* const session = session_of(client);
+  if (session == nullptr || !open_writer(client, *session, Stream::acks)) return;
+  (void)ack_writers_->write(client, ack);
 }
 
 void SessionTable::write_ack(const dds::Guid& client, const plc_DownloadAck& ack) {

@@ -1,7 +1,10 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <mutex>
 #include <unordered_map>
+#include <vector>
 
 #include <control.h>
 
@@ -13,8 +16,14 @@ namespace plchost {
 /// writes them by itself, since handing them to another thread takes longer than all else that is done for a
 /// post. It may do so within DDS's listener because these writers keep one sample for each source and so
 /// never wait for a reader. Any thread.
+///
+/// DDS keeps the last acknowledgement of each source for readers that come late. Of more than kMostSources of
+/// one client, the one that posted least recently is unregistered, so that a client that makes a writer for
+/// each post takes no more memory than others.
 class AckWriters {
  public:
+  static constexpr std::size_t kMostSources = 64;
+
   void add(const dds::Guid& client, dds_entity_t writer);
   /// Before the writer is deleted: none uses it any more when this returns.
   void remove(const dds::Guid& client);
@@ -23,8 +32,19 @@ class AckWriters {
   [[nodiscard]] bool write(const dds::Guid& client, const plc_EventAck& ack);
 
  private:
+  struct Source {
+    dds::Guid guid;
+    std::uint64_t last_use = 0;
+  };
+  struct Writer {
+    dds_entity_t entity = 0;
+    std::vector<Source> sources = {};
+  };
+  void use(Writer& writer, const plc_EventAck& ack);
+
   std::mutex mutex_;
-  std::unordered_map<dds::Guid, dds_entity_t, dds::GuidHash> writers_;
+  std::unordered_map<dds::Guid, Writer, dds::GuidHash> writers_;
+  std::uint64_t uses_ = 0;
 };
 
 }  // namespace plchost

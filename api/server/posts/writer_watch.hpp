@@ -18,6 +18,8 @@ class WriterWatch {
   static constexpr Duration kPeriod = std::chrono::milliseconds(200);
   /// A writer whose client is gone is shown for so long after its last post.
   static constexpr Duration kKept = std::chrono::minutes(1);
+  /// Of more that are gone, those that posted last.
+  static constexpr std::size_t kMostGone = 64;
 
   WriterWatch() = default;
   WriterWatch(std::string host, std::uint64_t epoch, StatusTable<plc_WriterStatus> table)

@@ -15,15 +15,13 @@ class AnswerMemoryTest : public testing::Test {
     guid.bytes[1] = static_cast<std::uint8_t>(number >> 8);
     return guid;
   }
-  static plc_Reply reply(std::uint64_t number, std::int32_t code = 0) {
-    plc_Reply made{};
-    made.header.related_identity.sequence_number =
-        static_cast<decltype(made.header.related_identity.sequence_number)>(number);
-    made.code = code;
+  static Answer reply(std::uint64_t number, ErrorCode code = ErrorCode::ok) {
+    Answer made{.code = code};
+    made.identity.sequence_number = static_cast<decltype(made.identity.sequence_number)>(number);
     return made;
   }
-  const plc_Reply* find(std::uint16_t of, std::uint64_t number) const {
-    return sut_.find(client(of), reply(number).header.related_identity);
+  const Answer* find(std::uint16_t of, std::uint64_t number) const {
+    return sut_.find(client(of), reply(number).identity);
   }
 
   AnswerMemory sut_;
@@ -31,10 +29,10 @@ class AnswerMemoryTest : public testing::Test {
 };
 
 TEST_F(AnswerMemoryTest, GivesAClientTheAnswerItGotAndNoOther) {
-  sut_.remember(client(1), reply(5, 7), now_);
-  sut_.remember(client(1), reply(5, 8), now_);
+  sut_.remember(client(1), reply(5, ErrorCode::timed_out), now_);
+  sut_.remember(client(1), reply(5, ErrorCode::refused), now_);
   ASSERT_NE(find(1, 5), nullptr);
-  EXPECT_EQ(find(1, 5)->code, 7) << "the first one counts";
+  EXPECT_EQ(find(1, 5)->code, ErrorCode::timed_out) << "the first one counts";
   EXPECT_EQ(find(1, 6), nullptr);
   EXPECT_EQ(find(2, 5), nullptr);
 }
@@ -55,6 +53,17 @@ TEST_F(AnswerMemoryTest, OfMoreClientsForgetsWhoAskedLongestAgo) {
   EXPECT_NE(find(0, 1), nullptr);
   sut_.remember(client(AnswerMemory::kMaxClients + 1), reply(1), now_ + AnswerMemory::kKept + seconds(1));
   EXPECT_LT(sut_.clients(), AnswerMemory::kMaxClients) << "all that is too old goes at once";
+}
+
+TEST_F(AnswerMemoryTest, OfMoreAnswersForgetsWhoAskedLongestAgo) {
+  for (std::uint16_t of = 0; of < 200; ++of) {
+    now_ += seconds(1);
+    for (std::uint64_t i = 1; i <= AnswerMemory::kOfClient; ++i) sut_.remember(client(of), reply(i), now_);
+    ASSERT_LE(sut_.answers(), AnswerMemory::kMost);
+  }
+  EXPECT_EQ(find(0, 1), nullptr);
+  EXPECT_NE(find(199, 1), nullptr);
+  EXPECT_GE(sut_.answers(), AnswerMemory::kMost - AnswerMemory::kOfClient);
 }
 
 }  // namespace
