@@ -95,6 +95,7 @@ class PLCHOST_CLIENT_API Client {
     std::string scheduler;
     std::string application;  ///< path on the host
     std::string problem;      ///< why it is not running; empty: all is well
+    bool removed = false;     ///< told by watches only: the host has it no more
   };
 
   struct Task {
@@ -115,6 +116,7 @@ class PLCHOST_CLIENT_API Client {
     std::chrono::nanoseconds latency_median{};  ///< planned release to start
     std::chrono::nanoseconds latency_max{};
     std::chrono::nanoseconds jitter_max{};
+    bool removed = false;  ///< as Instance::removed
   };
 
   struct Event {
@@ -124,6 +126,7 @@ class PLCHOST_CLIENT_API Client {
     bool registered = false;  ///< may be posted to
     unsigned bound_tasks = 0;
     unsigned long long posts = 0;  ///< since it was made
+    bool removed = false;          ///< as Instance::removed
   };
 
   /// A change of state.
@@ -229,7 +232,8 @@ class PLCHOST_CLIENT_API Client {
   /// Calls back for each host that is there, and whenever one comes, falls silent, answers again, or has
   /// changed. Known within 100 ms.
   Watch watch_hosts(std::function<void(const Host&)> callback);
-  /// For each that is there, and whenever something in it has changed. Empty host: of all.
+  /// For each that is there, whenever something in it has changed, and once with `removed` when the host has
+  /// it no more. Empty host: of all.
   Watch watch_instances(const std::string& host, std::function<void(const Instance&)> callback);
   Watch watch_tasks(const std::string& host, std::function<void(const Task&)> callback);
   Watch watch_events(const std::string& host, std::function<void(const Event&)> callback);

@@ -35,6 +35,8 @@ class AuditLog {
   /// Writes one record. What cannot be written (a full disk) is counted, and the count written as soon as
   /// something can be: until then the error is returned.
   Result<void> append(const AuditRecord& record);
+  /// So many records were lost before they came here: the next one that can be written tells of them, too.
+  void miss(std::uint64_t records) noexcept { missed_ += records; }
   [[nodiscard]] const AuditHead& head() const noexcept { return head_; }
 
  private:

@@ -1,5 +1,6 @@
 // What the watches of a Client tell: each remembers what it told last.
 #include <map>
+#include <set>
 #include <tuple>
 #include <utility>
 
@@ -18,13 +19,15 @@ std::vector<std::string> hosts_of(ControlClient& client, const std::string& host
   return names;
 }
 
-std::tuple<std::string, std::string, std::string> key_of(const Client::Instance& instance) {
+using Key = std::tuple<std::string, std::string, std::string>;
+
+Key key_of(const Client::Instance& instance) {
   return {instance.host, instance.name, {}};
 }
-std::tuple<std::string, std::string, std::string> key_of(const Client::Task& task) {
+Key key_of(const Client::Task& task) {
   return {task.host, task.instance, task.name};
 }
-std::tuple<std::string, std::string, std::string> key_of(const Client::Event& event) {
+Key key_of(const Client::Event& event) {
   return {event.host, event.instance, event.name};
 }
 
@@ -72,7 +75,26 @@ class __attribute__((visibility("hidden"))) Client::StatusWatch final : public C
     for (const std::string& host : hosts_of(news.client, host_)) {
       const auto samples = (news.client.*snapshot_)(host, MonotonicClock::now());
       if (!samples) continue;  // not complete yet: soon
-      for (const Sample& sample : *samples) tell_one(to_public(sample));
+      std::set<Key> there;
+      for (const Sample& sample : *samples) {
+        Item item = to_public(sample);
+        there.insert(key_of(item));
+        tell_one(std::move(item));
+      }
+      tell_removed(host, there);
+    }
+  }
+
+  void tell_removed(const std::string& host, const std::set<Key>& there) {
+    for (auto known = told_.begin(); known != told_.end();) {
+      if (known->second.host != host || there.contains(known->first)) {
+        ++known;
+        continue;
+      }
+      Item item = std::move(known->second);
+      known = told_.erase(known);
+      item.removed = true;
+      if (!stopped()) callback_(item);
     }
   }
 
@@ -86,7 +108,7 @@ class __attribute__((visibility("hidden"))) Client::StatusWatch final : public C
   std::string host_;
   Look snapshot_;
   std::function<void(const Item&)> callback_;
-  std::map<std::tuple<std::string, std::string, std::string>, Item> told_;
+  std::map<Key, Item> told_;
 };
 
 class __attribute__((visibility("hidden"))) Client::TransitionsWatch final

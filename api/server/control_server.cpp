@@ -1,5 +1,6 @@
 #include "api/server/control_server.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <span>
@@ -12,6 +13,7 @@
 #include <sys/timerfd.h>
 #include <unistd.h>
 
+#include "api/dds/sample_identity.hpp"
 #include "api/dds/samples.hpp"
 #include "api/dds/text.hpp"
 #include "api/security/identity.hpp"
@@ -139,6 +141,8 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
     lister.forget_old(now);
     audit->tick(now);
     status->set_audit_head(audit->head());
+    send_late_answers(now);
+    answer_finished(now);
     finish(manager->expire(now));
     serve_downloads(now);
   } else if (fd == run_timer.get()) {
@@ -209,6 +213,7 @@ Result<bool> ControlServer::Parts::keeps_name() {
 void ControlServer::Parts::on_wake() {
   sessions->follow_discovery();
   write_acks();
+  send_late_answers(MonotonicClock::now());
   for (const AwaitedPost& post : intake->collect_awaited()) runs.add(post, status->tasks());
   if (!runs.empty()) look_at_runs();
   for (const RequestReader& request : requests) on_requests(request);
@@ -224,6 +229,7 @@ void ControlServer::Parts::write_acks() {
 
 void ControlServer::Parts::record_posts() {
   const TimePoint now = MonotonicClock::now();
+  audit->posted_to(intake->collect_posted(), now);
   for (const plc_EventAck& ack : intake->collect_written_acks()) {
     sessions->was_answered(dds::Guid::from(ack.source).participant(), now);
     audit->posted(ack, now);
@@ -271,7 +277,7 @@ void ControlServer::Parts::on_request(const RequestReader& source, const plc_Req
 
 // Not by its identity: that may be of another's request that is under way.
 void ControlServer::Parts::refuse(const dds::Guid& client, const plc_Request& request, const Error& error) {
-  audit->refused(client, request, error);
+  audit->refused(client, request, error, MonotonicClock::now());
   send_answer(client, request.header.request_identity, error.code, error.message);
 }
 
@@ -279,7 +285,7 @@ void ControlServer::Parts::do_request(ApiRole role, const dds::Guid& writer, con
   const plc_SampleIdentity& identity = request.header.request_identity;
   const dds::Guid client = writer.participant();
   if (const Answer* const known = answers.find(client, identity)) return send(client, *known);
-  if (manager->is_pending(identity) || downloads.repeat(identity)) return;
+  if (manager->is_pending(identity) || is_late(identity) || downloads.repeat(identity)) return;
   audit->asked(client, request);
   const std::vector<std::string_view> instances(status->instances().begin(), status->instances().end());
   auto checked = check_request(request, role, options.host, instances);
@@ -343,12 +349,23 @@ Result<void> ControlServer::Parts::on_manager() {
 }
 
 void ControlServer::Parts::finish(std::vector<FinishedCommand> commands) {
-  for (FinishedCommand& finished : commands) {
-    if (finished.command.verb == ControlVerb::check_host && !collect_findings(finished)) continue;
-    // Who looks at the status after the answer sees what the command did.
-    status->flush(finished.command.instance, MonotonicClock::now());
-    downloads.end(finished.command.identity);
-    answer(finished.command.client, finished.command.identity, finished.code, finished.text);
+  for (FinishedCommand& command : commands) {
+    if (command.command.verb == ControlVerb::check_host && !collect_findings(command)) continue;
+    unanswered.push_back(std::move(command));
+  }
+  answer_finished(MonotonicClock::now());
+}
+
+// Who looks at the status after the answer sees what the command did. For that the pool is listed, which
+// takes its time if it is large: once for all that have finished meanwhile.
+void ControlServer::Parts::answer_finished(TimePoint now) {
+  if (unanswered.empty() || !status->may_flush(now)) return;
+  std::vector<std::string> instances;
+  for (const FinishedCommand& command : unanswered) instances.push_back(command.command.instance);
+  status->flush(instances, now);
+  for (const FinishedCommand& command : std::exchange(unanswered, {})) {
+    downloads.end(command.command.identity);
+    answer(command.command.client, command.command.identity, command.code, command.text);
   }
 }
 
@@ -388,8 +405,26 @@ bool ControlServer::Parts::collect_findings(FinishedCommand& finished) {
 
 void ControlServer::Parts::answer(const dds::Guid& client, const plc_SampleIdentity& identity, ErrorCode code,
                                   std::string_view text) {
-  audit->answered(identity, code, text);
-  send_answer(client, identity, code, text);
+  const TimePoint now = MonotonicClock::now();
+  const AuditWriter::Ticket ticket = audit->answered(identity, code, text, now);
+  if (audit->is_written(ticket)) return send_answer(client, identity, code, text);
+  late_answers.push_back({client, identity, code, std::string(text), ticket, now + kAuditPatience});
+}
+
+bool ControlServer::Parts::is_late(const plc_SampleIdentity& identity) const {
+  const auto is_its = [&](const plc_SampleIdentity& other) { return same_identity(other, identity); };
+  return std::ranges::any_of(late_answers, is_its, &LateAnswer::identity) ||
+         std::ranges::any_of(unanswered, [&](const auto& one) { return is_its(one.command.identity); });
+}
+
+// A disk that hangs delays an answer; it prevents none.
+void ControlServer::Parts::send_late_answers(TimePoint now) {
+  while (!late_answers.empty()) {
+    const LateAnswer& answer = late_answers.front();
+    if (!audit->is_written(answer.ticket) && now < answer.deadline) return;
+    send_answer(answer.client, answer.identity, answer.code, answer.text);
+    late_answers.pop_front();
+  }
 }
 
 void ControlServer::Parts::send_answer(const dds::Guid& client, const plc_SampleIdentity& identity,

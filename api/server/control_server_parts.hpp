@@ -2,8 +2,10 @@
 
 #include <array>
 #include <cstdint>
+#include <deque>
 #include <memory>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
@@ -75,6 +77,9 @@ struct ControlServer::Parts {
   void tell(const dds::Guid& client, const plc_SampleIdentity& identity, ErrorCode code,
             std::string_view text);
   void send(const dds::Guid& client, const Answer& answer);
+  void send_late_answers(TimePoint now);
+  void answer_finished(TimePoint now);
+  [[nodiscard]] bool is_late(const plc_SampleIdentity& identity) const;
   void finish(std::vector<FinishedCommand> commands);
   void ask_for_findings();
   void list_objects(const dds::Guid& client, const plc_Request& request);
@@ -131,6 +136,19 @@ struct ControlServer::Parts {
   std::optional<NameClaim> name;
   std::optional<SessionTable> sessions;
   AnswerMemory answers;
+  /// Of a request that was done, until it is in the audit log.
+  struct LateAnswer {
+    dds::Guid client;
+    plc_SampleIdentity identity;
+    ErrorCode code;
+    std::string text;
+    AuditWriter::Ticket ticket;
+    TimePoint deadline;
+  };
+  /// So long an answer waits for the log.
+  static constexpr Duration kAuditPatience = std::chrono::milliseconds(500);
+  std::deque<LateAnswer> late_answers;
+  std::vector<FinishedCommand> unanswered;  // that have finished: at most as many as may be under way
   std::optional<RequestAudit> audit;
   std::optional<StatusPublisher> status;
   dds::Entity subscriber;

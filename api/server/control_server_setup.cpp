@@ -106,21 +106,24 @@ Result<void> ControlServer::Parts::open_audit() {
       spdlog::error("changes are not recorded: {}", opened.error().describe());
     }
   }
-  std::optional<PendingRecords> pending;
-  if (log) {
-    auto opened = PendingRecords::open(options.audit_folder + "/under_way");
-    if (opened) {
-      pending = *std::move(opened);
-    } else {
-      spdlog::error("what is under way is not recorded: {}", opened.error().describe());
+  AuditLogs logs{.done = std::move(log), .refused = nullptr, .pending = {}};
+  if (logs.done) {
+    constexpr std::size_t kRefusedFiles = 8;
+    auto refused = AuditLog::open({.folder = options.audit_folder + "/refused", .most_files = kRefusedFiles});
+    auto pending = PendingRecords::open(options.audit_folder + "/under_way");
+    for (const Error* error : {refused ? nullptr : &refused.error(), pending ? nullptr : &pending.error()}) {
+      if (error != nullptr) spdlog::error("a part of what happens is not recorded: {}", error->describe());
     }
+    if (refused) logs.refused = *std::move(refused);
+    if (pending) logs.pending = *std::move(pending);
   }
-  audit.emplace(std::move(log), std::move(pending), [this](const dds::Guid& client, AuditRecord& record) {
+  const auto describe = [this](const dds::Guid& client, AuditRecord& record) {
     if (const auto subject = guard.identity_of(client)) {
       record.who = fmt::format("{} {}", security::to_string(subject->role), subject->name);
     }
     record.from = sessions->describe(client);
-  });
+  };
+  audit.emplace(std::move(logs), describe, [fd = wake.get()] { raise_event(fd); });
   intake->note_sources_since(MonotonicClock::now() - 2 * RequestAudit::kPostPeriod);
   return {};
 }

@@ -114,7 +114,8 @@ void define_states(py::module_& module) {
       .def_readonly("restarts", &Client::Instance::restarts)
       .def_readonly("scheduler", &Client::Instance::scheduler)
       .def_readonly("application", &Client::Instance::application)
-      .def_readonly("problem", &Client::Instance::problem);
+      .def_readonly("problem", &Client::Instance::problem)
+      .def_readonly("removed", &Client::Instance::removed);
   using Task = Client::Task;
   py::class_<Task>(module, "Task")
       .def_readonly("host", &Task::host)
@@ -133,14 +134,16 @@ void define_states(py::module_& module) {
       .def_property_readonly("execution_max", member_seconds(&Task::execution_max))
       .def_property_readonly("latency_median", member_seconds(&Task::latency_median))
       .def_property_readonly("latency_max", member_seconds(&Task::latency_max))
-      .def_property_readonly("jitter_max", member_seconds(&Task::jitter_max));
+      .def_property_readonly("jitter_max", member_seconds(&Task::jitter_max))
+      .def_readonly("removed", &Client::Task::removed);
   py::class_<Client::Event>(module, "Event")
       .def_readonly("host", &Client::Event::host)
       .def_readonly("instance", &Client::Event::instance)
       .def_readonly("name", &Client::Event::name)
       .def_readonly("registered", &Client::Event::registered)
       .def_readonly("bound_tasks", &Client::Event::bound_tasks)
-      .def_readonly("posts", &Client::Event::posts);
+      .def_readonly("posts", &Client::Event::posts)
+      .def_readonly("removed", &Client::Event::removed);
   py::class_<Client::Transition>(module, "Transition")
       .def_readonly("host", &Client::Transition::host)
       .def_readonly("instance", &Client::Transition::instance)

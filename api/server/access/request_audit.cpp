@@ -1,5 +1,6 @@
 #include "api/server/access/request_audit.hpp"
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 #include <span>
@@ -12,7 +13,6 @@
 #include "api/dds/entries.hpp"
 #include "api/dds/text.hpp"
 #include "api/server/access/request_check.hpp"
-#include "shm/base/log.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
@@ -21,10 +21,27 @@ namespace {
 
 // As many requests can be under way at the manager, many times over: what is not answered is forgotten.
 constexpr std::size_t kMostUnderWay = 1024;
-constexpr std::size_t kMostSources = 4096;
+constexpr std::size_t kMostSources = 1024;
 
 std::string key_of(const plc_SampleIdentity& identity) {
   return fmt::format("{}.{}", dds::Guid::from(identity.writer_guid).hex(), identity.sequence_number);
+}
+
+// Whether nothing was done. One that was handed on may have been done when it timed out, or nobody knows.
+bool is_refusal(ErrorCode code) noexcept {
+  constexpr std::array kDoneOrUnknown{ErrorCode::ok, ErrorCode::timed_out, ErrorCode::unavailable,
+                                      ErrorCode::system, ErrorCode::corrupt};
+  return std::ranges::find(kDoneOrUnknown, code) == kDoneOrUnknown.end();
+}
+
+// "line1/ready 3, line1/fast 2 and 5 to others"
+std::string names_of(const PostedEvents::Posts& posts) {
+  std::string names;
+  for (const auto& [instance, event, count] : posts.events) {
+    names += fmt::format("{}{}/{} {}", names.empty() ? "" : ", ", instance, event, count);
+  }
+  if (posts.others > 0) names += fmt::format("{}{} to others", names.empty() ? "" : " and ", posts.others);
+  return names;
 }
 
 // Of what was sent, its digest says what it was.
@@ -44,48 +61,55 @@ std::string argument_of(const plc_Request& request) {
 
 }  // namespace
 
-RequestAudit::RequestAudit(std::unique_ptr<AuditLog> log, std::optional<PendingRecords> pending,
-                           Describe describe)
-    : log_(std::move(log)), describe_(std::move(describe)), pending_(std::move(pending)) {
-  if (log_ && pending_) tell_of_unanswered();
+RequestAudit::RequestAudit(AuditLogs logs, Describe describe, std::function<void()> on_written)
+    : describe_(std::move(describe)) {
+  if (!logs.done) return;
+  tell_of_unanswered(logs);
+  writer_ = std::make_unique<AuditWriter>(std::move(logs), std::move(on_written));
 }
 
 // Of a server that was killed: whether it was done nobody knows here.
-void RequestAudit::tell_of_unanswered() {
-  for (AuditRecord& record : pending_->take_all()) {
+void RequestAudit::tell_of_unanswered(AuditLogs& logs) {
+  if (!logs.pending) return;
+  for (AuditRecord& record : logs.pending->take_all()) {
     const std::chrono::sys_time<std::chrono::nanoseconds> asked{
         std::chrono::nanoseconds(record.time_unix_ns)};
     record.time_unix_ns = unix_time_ns();
     record.result = "unknown";
     record.text = fmt::format("asked at {:%Y-%m-%d %H:%M:%S} UTC; the API server ended before the answer",
                               std::chrono::time_point_cast<std::chrono::milliseconds>(asked));
-    write(record);
+    (void)logs.done->append(record);  // counted if it cannot be written
   }
 }
 
 RequestAudit::~RequestAudit() {
+  if (!writer_) return;
   for (auto& [source, posts] : posts_) tell(source, posts, TimePoint::max());
+  for (auto& [client, refusals] : refusals_) tell_refused(refusals, TimePoint::max());
 }
 
 void RequestAudit::asked(const dds::Guid& client, const plc_Request& request) {
-  if (!log_ || only_reads(request.operation)) return;
+  if (!writer_ || only_reads(request.operation)) return;
   if (under_way_.size() >= kMostUnderWay) under_way_.clear();
-  under_way_[key_of(request.header.request_identity)] = {.record = record_of(client, request)};
+  under_way_[key_of(request.header.request_identity)] = {.client = client,
+                                                         .record = record_of(client, request)};
 }
 
 void RequestAudit::handed_on(const plc_SampleIdentity& identity) {
   const auto found = under_way_.find(key_of(identity));
-  if (!pending_ || found == under_way_.end()) return;
+  if (found == under_way_.end()) return;
   found->second.record.time_unix_ns = unix_time_ns();
-  const auto written = pending_->add(found->first, found->second.record);
   found->second.handed_on = true;
-  if (!written) spdlog::error("what is under way is not recorded: {}", written.error().describe());
+  writer_->add_pending(found->first, found->second.record);
 }
 
-void RequestAudit::refused(const dds::Guid& client, const plc_Request& request, const Error& error) {
-  if (!log_ || only_reads(request.operation)) return;
+void RequestAudit::refused(const dds::Guid& client, const plc_Request& request, const Error& error,
+                           TimePoint now) {
+  if (!writer_ || only_reads(request.operation)) return;
   AuditRecord record = record_of(client, request);
-  write_answered(record, error.code, error.message);
+  record.result = to_string(error.code);
+  record.text = error.message;
+  refuse(client, std::move(record), now);
 }
 
 AuditRecord RequestAudit::record_of(const dds::Guid& client, const plc_Request& request) const {
@@ -97,27 +121,69 @@ AuditRecord RequestAudit::record_of(const dds::Guid& client, const plc_Request& 
   return record;
 }
 
-void RequestAudit::answered(const plc_SampleIdentity& identity, ErrorCode code, std::string_view text) {
+AuditWriter::Ticket RequestAudit::answered(const plc_SampleIdentity& identity, ErrorCode code,
+                                           std::string_view text, TimePoint now) {
   auto found = under_way_.extract(key_of(identity));
-  if (found.empty()) return;
-  write_answered(found.mapped().record, code, text);
-  if (found.mapped().handed_on) pending_->remove(found.key());
+  if (found.empty()) return 0;
+  UnderWay& request = found.mapped();
+  request.record.result = to_string(code);
+  request.record.text = text;
+  AuditWriter::Ticket ticket = 0;
+  if (is_refusal(code)) {
+    refuse(request.client, std::move(request.record), now);
+  } else {
+    request.record.time_unix_ns = unix_time_ns();
+    ticket = writer_->write(std::move(request.record));
+  }
+  if (request.handed_on) writer_->remove_pending(found.key());
+  return ticket;
 }
 
-void RequestAudit::write_answered(AuditRecord& record, ErrorCode code, std::string_view text) {
+// The first one at once.
+void RequestAudit::refuse(const dds::Guid& client, AuditRecord record, TimePoint now) {
   record.time_unix_ns = unix_time_ns();
-  record.result = to_string(code);
-  record.text = text;
-  write(record);
+  const bool is_one_more = refusals_.size() >= kMostRefused && !refusals_.contains(client);
+  Refusals& refusals = refusals_[is_one_more ? dds::Guid{} : client];
+  if (now < refusals.next) {
+    ++refusals.count;
+    refusals.last = std::move(record);
+    return;
+  }
+  tell_refused(refusals, now);
+  refusals.next = now + kRefusedPeriod;
+  (void)writer_->write_refused(std::move(record));
+}
+
+void RequestAudit::tell_refused(Refusals& refusals, TimePoint now) {
+  if (refusals.count == 0 || now < refusals.next) return;
+  refusals.last.text = fmt::format("the last of {} within {} s: {}", refusals.count,
+                                   std::chrono::duration_cast<std::chrono::seconds>(kRefusedPeriod).count(),
+                                   refusals.last.text);
+  (void)writer_->write_refused(std::move(refusals.last));
+  refusals.count = 0;
+  if (now != TimePoint::max()) refusals.next = now + kRefusedPeriod;
+}
+
+RequestAudit::Posts& RequestAudit::posts_of(const dds::Guid& source) {
+  if (posts_.size() >= kMostSources && !posts_.contains(source)) {
+    for (auto& [known, posts] : posts_) tell(known, posts, TimePoint::max());
+    posts_.clear();
+  }
+  return posts_[source];
+}
+
+void RequestAudit::posted_to(const PostedEvents::BySource& events, TimePoint now) {
+  if (!writer_) return;
+  for (const auto& [source, more] : events) {
+    Posts& posts = posts_of(source);
+    posts.events.add(more);
+    posts.last = now;
+  }
 }
 
 void RequestAudit::posted(const plc_EventAck& ack, TimePoint now) {
-  if (!log_) return;
-  if (posts_.size() >= kMostSources) {
-    for (auto& [source, posts] : posts_) tell(source, posts, TimePoint::max());
-    posts_.clear();
-  }
-  Posts& posts = posts_[dds::Guid::from(ack.source)];
+  if (!writer_) return;
+  Posts& posts = posts_of(dds::Guid::from(ack.source));
   posts.accepted = ack.accepted;
   posts.rejected = ack.rejected;
   posts.rejected_text = dds::text_of(ack.rejected_text);
@@ -125,39 +191,57 @@ void RequestAudit::posted(const plc_EventAck& ack, TimePoint now) {
 }
 
 void RequestAudit::tick(TimePoint now) {
+  if (!writer_) return;
   constexpr Duration kForgotten = 2 * kPostPeriod;
   for (auto& [source, posts] : posts_) tell(source, posts, now);
   std::erase_if(posts_, [&](const auto& one) { return now - one.second.last > kForgotten; });
+  for (auto& [client, refusals] : refusals_) tell_refused(refusals, now);
+  std::erase_if(refusals_, [&](const auto& one) {
+    return one.second.count == 0 && now > one.second.next + kPostPeriod;
+  });
 }
 
-void RequestAudit::tell(const dds::Guid& source, Posts& posts, TimePoint now) {
-  const bool accepted = posts.accepted != posts.accepted_told && now >= posts.next_accepted;
-  const bool rejected = posts.rejected != posts.rejected_told && now >= posts.next_rejected;
-  if (!accepted && !rejected) return;
+AuditRecord RequestAudit::record_of(const dds::Guid& source, const Posts& posts) const {
   AuditRecord record;
   describe_(source.participant(), record);
   record.time_unix_ns = unix_time_ns();
   record.what = "post";
-  record.result = to_string(rejected ? ErrorCode::refused : ErrorCode::ok);
-  record.text = fmt::format("{} taken and {} refused so far{}{}", posts.accepted, posts.rejected,
-                            rejected ? "; the last of these: " : "", rejected ? posts.rejected_text : "");
-  write(record);
-  posts.accepted_told = posts.accepted;
-  posts.rejected_told = posts.rejected;
-  if (now == TimePoint::max()) return;
-  posts.next_accepted = now + kPostPeriod;
-  posts.next_rejected = now + kRefusedPeriod;
+  record.text = fmt::format("{} taken and {} refused so far", posts.accepted, posts.rejected);
+  return record;
 }
 
-void RequestAudit::write(const AuditRecord& record) {
-  const auto written = log_->append(record);
-  if (!written && !failing_) spdlog::error("changes are not recorded: {}", written.error().describe());
-  if (written && failing_) spdlog::info("changes are recorded again");
-  failing_ = !written;
+void RequestAudit::tell(const dds::Guid& source, Posts& posts, TimePoint now) {
+  if (posts.accepted != posts.accepted_told && now >= posts.next_accepted) {
+    AuditRecord record = record_of(source, posts);
+    record.result = to_string(ErrorCode::ok);
+    record.argument = names_of(posts.events);
+    (void)writer_->write(std::move(record));
+    posts.accepted_told = posts.accepted;
+    posts.events = {};
+    if (now != TimePoint::max()) posts.next_accepted = now + kPostPeriod;
+  }
+  if (posts.rejected != posts.rejected_told && now >= posts.next_rejected) {
+    AuditRecord record = record_of(source, posts);
+    record.result = to_string(ErrorCode::refused);
+    record.text += "; the last of these: " + posts.rejected_text;
+    (void)writer_->write_refused(std::move(record));
+    posts.rejected_told = posts.rejected;
+    if (now != TimePoint::max()) posts.next_rejected = now + kRefusedPeriod;
+  }
+}
+
+bool RequestAudit::is_written(AuditWriter::Ticket ticket) const noexcept {
+  return !writer_ || writer_->is_written(ticket);
+}
+
+void RequestAudit::flush() {
+  if (writer_) writer_->flush();
 }
 
 std::string RequestAudit::head() const {
-  return log_ ? fmt::format("{} {}", log_->head().number, log_->head().hash) : std::string();
+  if (!writer_) return {};
+  const AuditHead head = writer_->head();
+  return fmt::format("{} {}", head.number, head.hash);
 }
 
 }  // namespace plchost

@@ -4,23 +4,23 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <unordered_map>
 
 #include <control.h>
 
-#include "api/audit/audit_log.hpp"
-#include "api/audit/pending_records.hpp"
+#include "api/audit/audit_writer.hpp"
 #include "api/dds/guid.hpp"
+#include "api/server/posts/posted_events.hpp"
 #include "shm/base/time.hpp"
 
 namespace plchost {
 
-/// What clients change, in the audit log: each request that changes something, refused or done, with its
-/// answer; and for each source of posts how many were taken and refused, at its first, then at most once in
-/// kPostPeriod, and in kRefusedPeriod if any were refused. Control loop only.
+/// What clients change, in the audit log: each request that changes something and was not refused, with its
+/// answer; and for each source of posts to which events how many were taken, at its first, then at most once
+/// in kPostPeriod. Requests and posts that were refused go into a log of their own, so that they never push
+/// out what was done: the first one of a client, then once in kRefusedPeriod how many. Control loop only.
 class RequestAudit {
  public:
   static constexpr Duration kPostPeriod = std::chrono::seconds(60);
@@ -29,9 +29,13 @@ class RequestAudit {
   /// Who a client is, for the record's `who` and `from`. By its participant.
   using Describe = std::function<void(const dds::Guid& client, AuditRecord& record)>;
 
-  /// `log` may be null: then nothing is recorded. Without `pending` a server that is killed leaves nothing of
-  /// what is under way; of what the one before has left is told first.
-  RequestAudit(std::unique_ptr<AuditLog> log, std::optional<PendingRecords> pending, Describe describe);
+  /// Of more clients that are refused at a time, the requests are told together.
+  static constexpr std::size_t kMostRefused = 256;
+
+  /// `logs.done` may be null: then nothing is recorded. Without `logs.pending` a server that is killed leaves
+  /// nothing of what is under way; of what the one before has left is told first. `on_written`: see
+  /// AuditWriter.
+  RequestAudit(AuditLogs logs, Describe describe, std::function<void()> on_written = {});
   /// Writes what is not yet told of posts.
   ~RequestAudit();
   RequestAudit(const RequestAudit&) = delete;
@@ -41,16 +45,22 @@ class RequestAudit {
   void asked(const dds::Guid& client, const plc_Request& request);
   /// Before it is given to who does it, which takes a while.
   void handed_on(const plc_SampleIdentity& identity);
-  /// Before its answer is sent: what was acknowledged is in the log.
-  void answered(const plc_SampleIdentity& identity, ErrorCode code, std::string_view text);
+  /// Before its answer is sent, which is when the ticket is written: what was acknowledged is in the log.
+  [[nodiscard]] AuditWriter::Ticket answered(const plc_SampleIdentity& identity, ErrorCode code,
+                                             std::string_view text, TimePoint now);
   /// Of one that is refused before it is looked at.
-  void refused(const dds::Guid& client, const plc_Request& request, const Error& error);
+  void refused(const dds::Guid& client, const plc_Request& request, const Error& error, TimePoint now);
   /// What the acknowledgement tells of its source.
   void posted(const plc_EventAck& ack, TimePoint now);
+  /// To which events. Before posted().
+  void posted_to(const PostedEvents::BySource& events, TimePoint now);
   /// Tells of posts what is due.
   void tick(TimePoint now);
 
-  /// "N HASH" of the last record; empty: nothing is recorded.
+  [[nodiscard]] bool is_written(AuditWriter::Ticket ticket) const noexcept;
+  /// Waits until all is written.
+  void flush();
+  /// "N HASH" of the last record of what was done; empty: nothing is recorded.
   [[nodiscard]] std::string head() const;
 
  private:
@@ -60,26 +70,35 @@ class RequestAudit {
     std::uint64_t accepted_told = 0;
     std::uint64_t rejected_told = 0;
     std::string rejected_text;
+    PostedEvents::Posts events;  // not told yet
     TimePoint next_accepted{};
     TimePoint next_rejected{};
     TimePoint last{};
   };
-  [[nodiscard]] AuditRecord record_of(const dds::Guid& client, const plc_Request& request) const;
-  void write_answered(AuditRecord& record, ErrorCode code, std::string_view text);
-  void tell_of_unanswered();
-  void tell(const dds::Guid& source, Posts& posts, TimePoint now);
-  void write(const AuditRecord& record);
-
-  std::unique_ptr<AuditLog> log_;
-  Describe describe_;
-  std::optional<PendingRecords> pending_;
+  struct Refusals {
+    AuditRecord last;
+    std::uint64_t count = 0;  // not told yet
+    TimePoint next{};
+  };
   struct UnderWay {
+    dds::Guid client;
     AuditRecord record;
     bool handed_on = false;
   };
+  using Sources = std::unordered_map<dds::Guid, Posts, dds::GuidHash>;
+  [[nodiscard]] AuditRecord record_of(const dds::Guid& client, const plc_Request& request) const;
+  [[nodiscard]] AuditRecord record_of(const dds::Guid& source, const Posts& posts) const;
+  Posts& posts_of(const dds::Guid& source);
+  void refuse(const dds::Guid& client, AuditRecord record, TimePoint now);
+  static void tell_of_unanswered(AuditLogs& logs);
+  void tell(const dds::Guid& source, Posts& posts, TimePoint now);
+  void tell_refused(Refusals& refusals, TimePoint now);
+
+  std::unique_ptr<AuditWriter> writer_;  // null: nothing is recorded
+  Describe describe_;
   std::map<std::string, UnderWay> under_way_;  // by identity
-  std::unordered_map<dds::Guid, Posts, dds::GuidHash> posts_;
-  bool failing_ = false;
+  Sources posts_;
+  std::unordered_map<dds::Guid, Refusals, dds::GuidHash> refusals_;  // by client
 };
 
 }  // namespace plchost

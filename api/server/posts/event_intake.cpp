@@ -156,6 +156,9 @@ void EventIntake::post_next(const Post& post, const Result<Wanted>& wanted, Ledg
   entry.last.store(post.sequence_number, std::memory_order_release);
   if (done) {
     ++entry.counters.accepted;
+    for_each_event(post, [&](std::string_view instance, std::string_view event) {
+      posted_.note(dds::Guid::from(post.source), instance, event);
+    });
     if (*done == PostResult::no_task) ++entry.counters.no_task;
     if (wanted->run) await(post);
     return;
@@ -296,6 +299,11 @@ std::vector<plc_EventAck> EventIntake::collect_acks() {
 std::vector<plc_EventAck> EventIntake::collect_written_acks() {
   const std::lock_guard lock(mutex_);
   return make_acks(std::exchange(written_, {}));
+}
+
+PostedEvents::BySource EventIntake::collect_posted() {
+  const std::lock_guard lock(mutex_);
+  return posted_.take();
 }
 
 std::vector<EventIntake::Writer> EventIntake::writers() const {

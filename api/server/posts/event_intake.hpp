@@ -15,6 +15,7 @@
 #include "api/server/posts/ack_writers.hpp"
 #include "api/server/posts/event_directory.hpp"
 #include "api/server/posts/post_ledger.hpp"
+#include "api/server/posts/posted_events.hpp"
 #include "shm/base/time.hpp"
 
 namespace plchost {
@@ -67,6 +68,8 @@ class EventIntake {
   [[nodiscard]] std::vector<plc_EventAck> collect_acks();
   /// The last acknowledgement of each source that was written since the last call, for the records.
   [[nodiscard]] std::vector<plc_EventAck> collect_written_acks();
+  /// To which events posts were taken since the last call, for the records.
+  [[nodiscard]] PostedEvents::BySource collect_posted();
   /// The posts since the last call whose runs are waited for.
   [[nodiscard]] std::vector<AwaitedPost> collect_awaited();
 
@@ -126,6 +129,7 @@ class EventIntake {
   Sources written_;                                               // and not collected for the records
   std::unordered_map<dds_instance_handle_t, dds::Guid> writers_;  // asking DDS costs an allocation
   std::vector<AwaitedPost> awaited_;
+  PostedEvents posted_;
   TimePoint now_;  // when the post that is processed came
   std::uint64_t malformed_ = 0;
 };

@@ -75,11 +75,13 @@ void StatusPublisher::look_at_writers(const EventIntake& intake, const SessionTa
   writers_changed_ |= writers_.look(intake, sessions, now);
 }
 
-void StatusPublisher::flush(const std::string& instance, TimePoint now) {
+void StatusPublisher::flush(const std::vector<std::string>& instances, TimePoint now) {
   bool changed = look_at_instances(now);
   changed |= look_at_objects(now);
-  changed |= applications_.look_at(instance);
-  tasks_.look_at(instance, now);
+  for (const std::string& instance : instances) {
+    changed |= applications_.look_at(instance);
+    tasks_.look_at(instance, now);
+  }
   write_host(changed);
 }
 
@@ -177,7 +179,8 @@ bool StatusPublisher::look_at_objects(TimePoint now) {
   objects_.write();
   // Of a large pool it takes its time: most of the time is for others.
   constexpr int kRest = 10;
-  next_objects_ = std::max(now + kObjectPeriod, now + kRest * (MonotonicClock::now() - now));
+  rested_ = now + kRest * (MonotonicClock::now() - now);
+  next_objects_ = std::max(now + kObjectPeriod, rested_);
   return changed;
 }
 

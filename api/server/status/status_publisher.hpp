@@ -40,7 +40,10 @@ class StatusPublisher {
   /// Writes what is due; to be called every kTick.
   void tick(TimePoint now);
   /// Writes all that concerns an instance at once: before the answer to a command that changed it.
-  void flush(const std::string& instance, TimePoint now);
+  void flush(const std::vector<std::string>& instances, TimePoint now);
+  /// Whether the objects may be looked at again: of a large pool that takes its time, and most of the time is
+  /// for others.
+  [[nodiscard]] bool may_flush(TimePoint now) const noexcept { return now >= rested_; }
   void write_presence();
   /// What became of each client's posts, if it is time to look at that. Comes before tick().
   void look_at_writers(const EventIntake& intake, const SessionTable& sessions, TimePoint now);
@@ -98,6 +101,7 @@ class StatusPublisher {
   dds::Entity presence_;
   std::vector<dds::Entity> topics_;
   TimePoint next_objects_;
+  TimePoint rested_;
   std::uint64_t round_ = 0;
 };
 

@@ -1,5 +1,7 @@
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <string>
 #include <thread>
@@ -28,9 +30,10 @@ class Audit : public testing::Test {
   [[nodiscard]] RunResult run(std::vector<std::string> arguments) const {
     return run_plcctl(domain_.number(), std::move(arguments));
   }
-  [[nodiscard]] Records records(const std::string& what) const {
+  /// Of what was done, or with "/refused" of what was refused.
+  [[nodiscard]] Records records(const std::string& what, const std::string& log = "") const {
     Records found;
-    std::ifstream file(folder_ + "/audit.0000000001.log");
+    std::ifstream file(folder_ + log + "/audit.0000000001.log");
     for (std::string line; std::getline(file, line);) {
       auto record = nlohmann::json::parse(line);
       if (record["what"] == what) found.push_back(std::move(record));
@@ -58,7 +61,13 @@ TEST_F(Audit, ARefusedChangeIsRecordedWithTheReason) {
   const auto client = connect(domain_);
   const auto reply = client->call({"hosta", plc_OPERATION_LOAD_APPLICATION, "line1", "relative.so"}, soon());
   ASSERT_TRUE(reply) << reply.error().describe();
-  const Records loads = records("load application");
+  // Not before the answer: what was refused nobody has to rely on.
+  const auto refused = [&] { return records("load application", "/refused"); };
+  for (const TimePoint end = soon(); refused().empty() && MonotonicClock::now() < end;) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  EXPECT_TRUE(records("load application").empty());
+  const Records loads = refused();
   ASSERT_EQ(loads.size(), 1U);
   EXPECT_EQ(loads[0]["argument"], "relative.so");
   EXPECT_EQ(loads[0]["result"], to_string(ErrorCode::invalid_argument));
@@ -92,13 +101,48 @@ TEST_F(Audit, PostsAreCountedForEachSource) {
     const Records posts = records("post");
     return std::ranges::any_of(posts, [](const auto& post) {
       const std::string text = post["text"];
-      return text.find(" taken and 0 refused") == 1 && text[0] >= '1' && text[0] <= '5';
+      const std::string argument = post["argument"];
+      return text.find(" taken and 0 refused") == 1 && text[0] >= '1' && text[0] <= '5' &&
+             argument.starts_with("line1/ready ");
     });
   };
   for (const TimePoint end = soon(); !told() && MonotonicClock::now() < end;) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
   EXPECT_TRUE(told());
+}
+
+// write() of the log hangs, as on a disk that is frozen.
+TEST_F(Audit, ADiskThatHangsStopsNeitherPresenceNorPostsNorCommands) {
+  (void)host_.add_event("line1", "ready");
+  const std::string flag = host_.run_directory() + "/disk_hangs";
+  ::setenv("LD_PRELOAD", STUCK_DISK, 1);    // NOLINT(concurrency-mt-unsafe): the children have not started
+  ::setenv("STUCK_DISK", flag.c_str(), 1);  // NOLINT(concurrency-mt-unsafe)
+  host_.replace_server();
+  ::unsetenv("LD_PRELOAD");  // NOLINT(concurrency-mt-unsafe)
+  ::unsetenv("STUCK_DISK");  // NOLINT(concurrency-mt-unsafe)
+  ASSERT_EQ(run({"stop", "instance", "line1"}).code, 0);
+  const std::size_t before = records("stop").size();
+  std::ofstream(flag) << "hangs";
+  const auto client = connect(domain_);
+  const TimePoint begin = MonotonicClock::now();
+  for (int i = 0; i < 3; ++i) {
+    const auto reply = client->call({"hosta", plc_OPERATION_STOP, "line1", ""}, soon());
+    ASSERT_TRUE(reply) << reply.error().describe();
+    EXPECT_EQ(reply->code, ErrorCode::ok);
+    const auto posted = client->post_event({"hosta", 0, "line1", "ready"}, 100, {}, kPatience);
+    ASSERT_TRUE(posted) << posted.error().describe();
+    EXPECT_EQ(posted->accepted, 100U);
+  }
+  std::this_thread::sleep_for(std::chrono::seconds(1));
+  EXPECT_EQ(records("stop").size(), before) << "the disk did not hang: this test says nothing";
+  ASSERT_EQ(run({"list", "instances"}).code, 0);
+  EXPECT_LT(MonotonicClock::now() - begin, kPatience);
+  std::filesystem::remove(flag);
+  for (const TimePoint end = soon(); records("stop").size() < before + 3 && MonotonicClock::now() < end;) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  EXPECT_EQ(records("stop").size(), before + 3) << "what waited is written then";
 }
 
 TEST_F(Audit, IsVerifiedAndAChangeFound) {

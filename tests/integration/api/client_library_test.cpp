@@ -107,6 +107,29 @@ TEST_F(ClientLibrary, TellsEachChangeAndNothingAfterStop) {
   EXPECT_THAT(states, testing::ElementsAre("line1 running", "line1 exception"));
 }
 
+TEST_F(ClientLibrary, TellsOfWhatWasRemovedOnce) {
+  Client sut(options());
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::vector<std::string> told;
+  const auto watch = sut.watch_instances("hosta", [&](const Client::Instance& instance) {
+    const std::lock_guard lock(mutex);
+    told.push_back(instance.name + (instance.removed ? " removed" : " there"));
+    changed.notify_all();
+  });
+  const auto until = [&](const std::string& last) {
+    std::unique_lock lock(mutex);
+    return changed.wait_for(lock, kPatience, [&] { return !told.empty() && told.back() == last; });
+  };
+  ASSERT_TRUE(until("line1 there"));
+  host_.write_count(0);
+  ASSERT_TRUE(until("line1 removed"));
+  host_.write_count(1);
+  ASSERT_TRUE(until("line1 there"));
+  const std::lock_guard lock(mutex);
+  EXPECT_THAT(told, testing::ElementsAre("line1 there", "line1 removed", "line1 there"));
+}
+
 TEST_F(ClientLibrary, LetsACallbackStopItsOwnWatch) {
   Client sut(options());
   std::promise<void> called;

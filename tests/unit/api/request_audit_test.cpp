@@ -1,5 +1,6 @@
 #include "api/server/access/request_audit.hpp"
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
@@ -25,14 +26,19 @@ class RequestAuditTest : public testing::Test {
   ~RequestAuditTest() override { std::filesystem::remove_all(folder_); }
 
   [[nodiscard]] std::unique_ptr<RequestAudit> make() const {
+    AuditLogs logs{.done = AuditLog::open({.folder = folder_}).value(),
+                   .refused = AuditLog::open({.folder = folder_ + "/refused"}).value(),
+                   .pending = PendingRecords::open(folder_ + "/under_way").value()};
     return std::make_unique<RequestAudit>(
-        AuditLog::open({.folder = folder_}).value(), PendingRecords::open(folder_ + "/under_way").value(),
-        [](const dds::Guid& client, AuditRecord& record) { record.from = client.hex(); });
+        std::move(logs), [](const dds::Guid& client, AuditRecord& record) { record.from = client.hex(); });
   }
-  [[nodiscard]] std::string records() const {
-    std::ifstream file(folder_ + "/audit.0000000001.log");
+  [[nodiscard]] static std::string contents(const std::string& folder) {
+    std::ifstream file(folder + "/audit.0000000001.log");
     return {std::istreambuf_iterator<char>(file), {}};
   }
+  /// Of what was done, and of what was refused.
+  [[nodiscard]] std::string records() const { return contents(folder_); }
+  [[nodiscard]] std::string refusals() const { return contents(folder_ + "/refused"); }
   static dds::Guid client(std::uint8_t number) {
     dds::Guid guid;
     guid.bytes[0] = number;
@@ -48,6 +54,7 @@ class RequestAuditTest : public testing::Test {
     return request;
   }
 
+  static constexpr TimePoint kNow{std::chrono::hours(1)};
   std::string folder_;
 };
 
@@ -56,10 +63,11 @@ TEST_F(RequestAuditTest, ARequestThatPretendsToBeAnothersLeavesThatOneItsRecord)
   const plc_Request request = load(1);
   sut->asked(client(1), request);
   sut->refused(client(2), request,
-               {.code = ErrorCode::refused, .system_errno = 0, .message = "not its writer"});
-  sut->answered(request.header.request_identity, ErrorCode::ok, "");
-  EXPECT_THAT(records(),
-              AllOf(HasSubstr("not its writer"), HasSubstr(client(2).hex()), HasSubstr(client(1).hex())));
+               {.code = ErrorCode::refused, .system_errno = 0, .message = "not its writer"}, kNow);
+  (void)sut->answered(request.header.request_identity, ErrorCode::ok, "", kNow);
+  sut->flush();
+  EXPECT_THAT(refusals(), AllOf(HasSubstr("not its writer"), HasSubstr(client(2).hex())));
+  EXPECT_THAT(records(), AllOf(HasSubstr(client(1).hex()), Not(HasSubstr(client(2).hex()))));
 }
 
 TEST_F(RequestAuditTest, WhatWasUnderWayWhenAServerWasKilledIsToldByTheNext) {
@@ -84,7 +92,7 @@ TEST_F(RequestAuditTest, WhatIsAnsweredIsNotUnderWayAnyMore) {
     const auto sut = make();
     sut->asked(client(1), request);
     sut->handed_on(request.header.request_identity);
-    sut->answered(request.header.request_identity, ErrorCode::ok, "");
+    (void)sut->answered(request.header.request_identity, ErrorCode::ok, "", kNow);
   }
   EXPECT_TRUE(make());
   EXPECT_THAT(records(), AllOf(HasSubstr("line1"), Not(HasSubstr("unknown"))));
@@ -92,19 +100,101 @@ TEST_F(RequestAuditTest, WhatIsAnsweredIsNotUnderWayAnyMore) {
 
 TEST_F(RequestAuditTest, PostsOfASourceAreToldAtItsFirstAndThenOnceInAPeriod) {
   const auto sut = make();
-  const TimePoint start{std::chrono::hours(1)};
+  const TimePoint start = kNow;
   plc_EventAck ack{};
   client(1).copy_to(ack.source);
   ack.accepted = 5;
   sut->posted(ack, start);
   sut->tick(start);
+  sut->flush();
   EXPECT_THAT(records(), HasSubstr("5 taken and 0 refused"));
   ack.accepted = 7;
   sut->posted(ack, start + std::chrono::seconds(1));
   sut->tick(start + RequestAudit::kPostPeriod - std::chrono::milliseconds(1));
+  sut->flush();
   EXPECT_THAT(records(), Not(HasSubstr("7 taken")));
   sut->tick(start + RequestAudit::kPostPeriod);
+  sut->flush();
   EXPECT_THAT(records(), HasSubstr("7 taken and 0 refused"));
+}
+
+TEST_F(RequestAuditTest, PostsNameTheirEvents) {
+  PostedEvents events;
+  for (int i = 0; i < 3; ++i) events.note(client(1), "line1", "ready");
+  events.note(client(1), "line2", "fast");
+  const auto sut = make();
+  plc_EventAck ack{};
+  client(1).copy_to(ack.source);
+  ack.accepted = 4;
+  sut->posted_to(events.take(), kNow);
+  sut->posted(ack, kNow);
+  sut->tick(kNow);
+  sut->flush();
+  EXPECT_THAT(records(), AllOf(HasSubstr("line1/ready 3, line2/fast 1"), HasSubstr("4 taken")));
+  EXPECT_TRUE(events.take().empty());
+}
+
+TEST_F(RequestAuditTest, NamesOfEventsHaveABound) {
+  PostedEvents events;
+  for (std::uint32_t i = 0; i < 1000; ++i) events.note(client(1), "line1", std::to_string(i));
+  for (std::uint32_t i = 0; i < 1000; ++i) {
+    dds::Guid source;
+    source.bytes[14] = static_cast<std::uint8_t>(i >> 8U);
+    source.bytes[15] = static_cast<std::uint8_t>(i);
+    events.note(source, "line1", "ready");
+  }
+  const auto taken = events.take();
+  EXPECT_EQ(taken.size(), PostedEvents::kSources);
+  const auto& posts = taken.at(client(1));
+  EXPECT_EQ(posts.events.size(), PostedEvents::kEventsOfSource);
+  EXPECT_EQ(posts.others, 1000 - PostedEvents::kEventsOfSource);
+}
+
+TEST_F(RequestAuditTest, RefusalsOfAClientAreSummedAndPushOutNothingThatWasDone) {
+  const auto sut = make();
+  const plc_Request done = load(1);
+  sut->asked(client(1), done);
+  (void)sut->answered(done.header.request_identity, ErrorCode::ok, "done", kNow);
+  sut->flush();
+  const std::string before = records();
+  constexpr int kSeconds = 10;
+  constexpr int kInSecond = 2000;
+  plc_Request wrong = load(2);
+  for (int i = 0; i < kSeconds * kInSecond; ++i) {
+    const TimePoint now = kNow + i * std::chrono::microseconds(1'000'000 / kInSecond);
+    ++wrong.header.request_identity.sequence_number;
+    sut->asked(client(2), wrong);
+    EXPECT_EQ(sut->answered(wrong.header.request_identity, ErrorCode::not_found, "no such file", now), 0U);
+    sut->tick(now);
+  }
+  sut->flush();
+  EXPECT_EQ(records(), before);
+  const std::string refused = refusals();
+  EXPECT_LE(std::ranges::count(refused, '\n'), 2 + 2 * kSeconds);
+  EXPECT_THAT(refused, AllOf(HasSubstr("no such file"), HasSubstr("within 1 s")));
+}
+
+TEST_F(RequestAuditTest, WhatTimedOutMayHaveBeenDone) {
+  const auto sut = make();
+  const plc_Request request = load(1);
+  sut->asked(client(1), request);
+  EXPECT_NE(sut->answered(request.header.request_identity, ErrorCode::timed_out, "", kNow), 0U);
+  sut->flush();
+  EXPECT_THAT(records(), HasSubstr("line1"));
+}
+
+TEST_F(RequestAuditTest, ClientsThatAreRefusedHaveABound) {
+  const auto sut = make();
+  const Error error{.code = ErrorCode::refused, .system_errno = 0, .message = "no"};
+  for (std::uint32_t i = 0; i < 5000; ++i) {
+    dds::Guid stranger;
+    stranger.bytes[0] = static_cast<std::uint8_t>(i);
+    stranger.bytes[1] = static_cast<std::uint8_t>(i >> 8U);
+    sut->refused(stranger, load(1), error, kNow);
+  }
+  sut->flush();
+  const std::string refused = refusals();
+  EXPECT_LE(std::ranges::count(refused, '\n'), 2 + static_cast<std::ptrdiff_t>(RequestAudit::kMostRefused));
 }
 
 TEST_F(RequestAuditTest, JunkLeftUnderWayIsNoRecord) {
