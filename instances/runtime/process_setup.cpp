@@ -99,7 +99,7 @@ Result<NameClaim> claim_name(const LaunchOptions& launch) {
   if (!launch.run_directory.empty()) {
     auto here = LockFile::take(fmt::format("{}/{}.claim", launch.run_directory, launch.name));
     if (!here && here.error().code == ErrorCode::already_exists) return taken(here.error());
-    if (!here) return std::unexpected(here.error());
+    if (!here) return failure_in("claim the instance's name in the run directory", here.error());
     claim.in_run_directory.emplace(*std::move(here));
   }
   const std::string path = MemoryFile::path(instance_claim_name(launch.pool, launch.name));

@@ -46,7 +46,7 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"RunDirectoryThatIsNotThere",
              {"--run-directory", "/nonexistent"},
              3,
-             "open control socket failed"},
+             "claim the instance's name in the run directory: open /nonexistent/"},
         Case{"MissingApplication",
              {"--application", "/nonexistent.so"},
              3,
@@ -67,7 +67,7 @@ TEST(Setup, RefusesSomethingInThePlaceOfThePool) {
   InstanceProcess sut(sandbox, {"--pool", sandbox.pool() + "-no", "--stopped"});
   const std::string file = "/dev/shm/" + sandbox.pool() + "-broken";
   std::ofstream(file) << std::string(100'000, 'x');
-  InstanceProcess refused(sandbox, {"--pool", sandbox.pool() + "-broken"});
+  InstanceProcess refused(sandbox, {"--name", "line2", "--pool", sandbox.pool() + "-broken"});
   EXPECT_EQ(refused.end(), 3);
   EXPECT_THAT(refused.log(), HasSubstr("attach pool failed"));
   ObjectPool::remove(sandbox.pool() + "-broken");
