@@ -287,7 +287,8 @@ TEST_F(EventIntakeTest, PostsNoneOfABatchOfWhichOneCannotBePosted) {
   const auto ack = only_ack(sut);
   EXPECT_EQ(ack.rejected, 1U);
   EXPECT_THAT(std::string(dds::text_of(ack.rejected_text)),
-              testing::AllOf(testing::HasSubstr("line1/redy"), testing::HasSubstr("3 of the 3")));
+              testing::AllOf(testing::HasSubstr("line1/redy"),
+                             testing::HasSubstr("event number 3 of the batch of 3")));
 }
 
 TEST_F(EventIntakeTest, RejectsABatchOfNoEvents) {

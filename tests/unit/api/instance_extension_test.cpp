@@ -87,7 +87,7 @@ TEST(InstanceExtension, IsShownByTheCliWhateverItsNames) {
   dds::copy_text(entries[1].name, "name");
   dds::copy_text(entries[1].value, "a forged one");
   const Row row = to_row(status_with(entries));
-  EXPECT_EQ(row["of_a_newer_host"], "42");
+  EXPECT_EQ(row["of_a_newer_host"], 42);
   EXPECT_EQ(row["name"], "line1") << "an entry must not hide a field";
   EXPECT_THAT(format_fields(row), testing::HasSubstr("of_a_newer_host"));
 }

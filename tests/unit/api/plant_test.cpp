@@ -67,7 +67,7 @@ TEST_P(PlantFileRefuses, WithFileAndLineAndWhatIsAllowed) {
 INSTANTIATE_TEST_SUITE_P(
     All, PlantFileRefuses,
     testing::Values(
-        BadPlant{"", "describes no [[host]]"}, BadPlant{"x = ", "plant.toml:1: "},
+        BadPlant{"", "describes no [[host]]"}, BadPlant{"x = ", "plant.toml:1:5: the value of x is missing"},
         BadPlant{"hosts = 1", "unknown section or key 'hosts'; allowed is [[host]]; did you mean 'host'?"},
         BadPlant{"[host]\nname = \"a\"", "'host' must be written with double brackets: [[host]]"},
         BadPlant{"host = [1]", "double brackets"}, BadPlant{"[[host]]\n", "[[host]] name: is missing"},
