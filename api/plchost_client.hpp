@@ -48,12 +48,13 @@ class PLCHOST_CLIENT_API ClientError : public std::runtime_error {
     wrong_state = 4,       ///< cannot be done now (stop what is stopped)
     refused = 5,           ///< not permitted
     busy = 6,              ///< too much at once: again later
-    timed_out = 7,         ///< no answer; whether it was done is not known
-    unavailable = 8,       ///< DDS or the manager of the host is not there
-    failed = 9,            ///< a system call of the host, or here
-    unsupported = 10,      ///< not by that host
-    full = 11,             ///< a table or the pool of the host
-    corrupt = 12           ///< a file or memory of the host is not valid
+    timed_out =
+        7,  ///< no answer. The host begins nothing after that time; whether it began before is not known
+    unavailable = 8,   ///< DDS or the manager of the host is not there
+    failed = 9,        ///< a system call of the host, or here
+    unsupported = 10,  ///< not by that host
+    full = 11,         ///< a table or the pool of the host
+    corrupt = 12       ///< a file or memory of the host is not valid
   };
 
   ClientError(int code, const std::string& text) : std::runtime_error(text), code_(code) {}

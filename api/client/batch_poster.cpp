@@ -22,7 +22,14 @@ Result<BatchPoster> BatchPoster::create(dds_entity_t participant, dds_entity_t t
   return poster;
 }
 
-void BatchPoster::post(std::span<const EventId> events, TimePoint now) {
+void BatchPoster::use_clock(const HostClock& clock) noexcept {
+  // What was written by the clock of the server before is not taken by this one.
+  if (clock.epoch() != clock_.epoch()) last_write_ = TimePoint{};
+  clock_ = clock;
+}
+
+void BatchPoster::post(std::span<const EventId> events, TimePoint now, TimePoint deadline) {
+  deadline_ = deadline;
   names_.clear();
   for (const EventId& event : events) {
     plc_EventName& name = names_.emplace_back();
@@ -37,6 +44,7 @@ void BatchPoster::post(std::span<const EventId> events, TimePoint now) {
 void BatchPoster::write(TimePoint now) {
   sample_.events._buffer = names_.data();
   sample_.events._length = sample_.events._maximum = static_cast<std::uint32_t>(names_.size());
+  sample_.limit = clock_.limit_at(deadline_);
   (void)dds_write(writer_.get(), &sample_);  // one that DDS did not take is repeated like a lost one
   last_write_ = now;
 }

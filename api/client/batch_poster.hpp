@@ -9,6 +9,7 @@
 #include <control.h>
 
 #include "api/client/event_poster.hpp"
+#include "api/client/host_clock.hpp"
 #include "api/client/newest_epoch.hpp"
 #include "api/dds/entity.hpp"
 #include "api/dds/guid.hpp"
@@ -36,8 +37,10 @@ class BatchPoster {
   /// Whether the host's reader is there.
   [[nodiscard]] bool matched() const noexcept { return has_reader(writer_.get()); }
 
-  /// At most kMaxBatch, whose names fit.
-  void post(std::span<const EventId> events, TimePoint now);
+  /// At most kMaxBatch, whose names fit. The host rejects it if it comes to it after the deadline.
+  void post(std::span<const EventId> events, TimePoint now, TimePoint deadline);
+  /// The host's clock as it is known now. To be called before post() and whenever it may have changed.
+  void use_clock(const HostClock& clock) noexcept;
   void on_ack(const plc_EventAck& ack, TimePoint now);
   [[nodiscard]] bool acknowledged() const noexcept { return newest_.sequence_number >= last_sequence_; }
   /// Repeats what is due to be repeated. Returns when it has to be called again.
@@ -49,6 +52,8 @@ class BatchPoster {
   BatchPoster() = default;
   void write(TimePoint now);
 
+  HostClock clock_;
+  TimePoint deadline_;
   dds::Entity publisher_;
   dds::Entity writer_;
   plc_EventBatch sample_{};

@@ -237,16 +237,31 @@ Result<RequestCaller*> ControlClient::caller(const std::string& host, bool engin
   return &callers_.emplace(key, std::move(*made)).first->second;
 }
 
+const HostClock* ControlClient::clock_of(const std::string& host) const {
+  const SeenHost* const seen = seen_.find(host);
+  return seen == nullptr || seen->epoch == 0 ? nullptr : &seen->clock;
+}
+
+Result<ApiReply> ControlClient::ask(const ApiRequest& request, TimePoint deadline,
+                                    const RequestCaller::Meanwhile& meanwhile) {
+  const bool engineering = is_engineering(request.operation);
+  const auto asked = caller(request.host, engineering);
+  if (!asked) return std::unexpected(asked.error());
+  update_hosts();  // the limit is by the newest presence
+  const auto clock = [&] { return clock_of(request.host); };
+  auto reply = (*asked)->call(request, reply_reader_.get(), wait_set_, deadline, clock, meanwhile);
+  if (!reply) callers_.erase({request.host, engineering});
+  return reply;
+}
+
 Result<ApiReply> ControlClient::call(const ApiRequest& request, TimePoint deadline) {
   if (auto good = check_api_request(request); !good) return std::unexpected(std::move(good).error());
-  const auto asked = caller(request.host, is_engineering(request.operation));
-  if (!asked) return std::unexpected(asked.error());
   // What has come on other topics would keep the wait from waiting.
   const auto look = [&, woken = false](const auto& /*identity*/, TimePoint /*now*/) mutable {
     if (std::exchange(woken, true)) update();
     return RequestCaller::Wait{.deadline = deadline};
   };
-  auto reply = (*asked)->call(request, reply_reader_.get(), wait_set_, deadline, look);
+  auto reply = ask(request, deadline, look);
   if (reply) await_status(request.host, *reply, deadline);
   return reply;
 }

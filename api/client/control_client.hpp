@@ -152,7 +152,7 @@ class ControlClient {
   [[nodiscard]] Result<bool> has_all_transitions(const std::string& host, TimePoint deadline);
 
   /// A command and its answer. The status that this client shows afterwards has its effect.
-  /// timed_out: no answer; whether it was done is not known.
+  /// timed_out: no answer. The host begins nothing after the deadline; whether it began before is not known.
   [[nodiscard]] Result<ApiReply> call(const ApiRequest& request, TimePoint deadline);
 
   /// Sends an application to an instance, where it is checked, kept and loaded; the answer is that to the
@@ -211,6 +211,12 @@ class ControlClient {
   [[nodiscard]] Result<void> open_own_reader(dds::Entity& topic, dds::Entity& reader,
                                              const dds::TopicInfo& info, const dds::Qos& qos);
   [[nodiscard]] Result<RequestCaller*> caller(const std::string& host, bool engineering);
+  /// Asks, and waits for the answer. What was given up leaves no writer that would still send it.
+  [[nodiscard]] Result<ApiReply> ask(const ApiRequest& request, TimePoint deadline,
+                                     const RequestCaller::Meanwhile& meanwhile);
+  /// nullptr: that host has not been seen.
+  [[nodiscard]] const HostClock* clock_of(const std::string& host) const;
+  void use_clock(EventPoster& posts, const std::string& host, Duration patience) const;
   [[nodiscard]] Result<EventPoster*> poster(const std::string& host);
   [[nodiscard]] Result<BatchPoster*> batch_poster(const std::string& host);
   [[nodiscard]] Result<void> prepare_runs(const std::string& host, TimePoint deadline);

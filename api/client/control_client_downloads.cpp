@@ -49,8 +49,6 @@ Result<ApiReply> ControlClient::download(const Download& download, const Downloa
     if (!topic) return std::unexpected(topic.error());
     chunk_topic_ = std::move(*topic);
   }
-  const auto asked = caller(download.host, /*engineering=*/true);
-  if (!asked) return std::unexpected(asked.error());
   auto sender = FileSender::create(participant_.get(), chunk_topic_.get(), download.host, download.contents);
   if (!sender) return std::unexpected(sender.error());
   std::uint64_t told = 0;
@@ -59,13 +57,17 @@ Result<ApiReply> ControlClient::download(const Download& download, const Downloa
     dds::take_valid<plc_DownloadAck>(
         download_acks_.reader.get(),
         [&](const plc_DownloadAck& ack, const auto& /*info*/) { sender->on_ack(ack, identity, now); });
-    const TimePoint next = sender->complete() ? now + FileSender::kRepeat : sender->send(identity, now);
-    if (progress && sender->received() != told) progress(told = sender->received());
     const bool begun = sender->last_news() != TimePoint{};
     const Duration patience = sender->complete() ? kDownloadLoad : kDownloadStall;
-    return {.next = next, .deadline = begun ? std::max(deadline, sender->last_news() + patience) : deadline};
+    const TimePoint end = begun ? std::max(deadline, sender->last_news() + patience) : deadline;
+    const HostClock* const clock = clock_of(download.host);
+    const bool done = sender->complete() || clock == nullptr;
+    const TimePoint next =
+        done ? now + FileSender::kRepeat : sender->send(identity, clock->limit_at(end), now);
+    if (progress && sender->received() != told) progress(told = sender->received());
+    return {.next = next, .deadline = end};
   };
-  auto reply = (*asked)->call(request, reply_reader_.get(), wait_set_, deadline, go_on);
+  auto reply = ask(request, deadline, go_on);
   if (!reply && reply.error().code == ErrorCode::timed_out && sender->last_news() != TimePoint{}) {
     return failure(
         ErrorCode::timed_out,

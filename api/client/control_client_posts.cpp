@@ -29,11 +29,16 @@ Result<EventPoster*> ControlClient::poster(const std::string& host) {
   return &posters_.emplace(host, std::move(*made)).first->second;
 }
 
+void ControlClient::use_clock(EventPoster& posts, const std::string& host, Duration patience) const {
+  if (const HostClock* const clock = clock_of(host)) posts.wait_for(patience, *clock);
+}
+
 Result<void> ControlClient::prepare_posts(const std::string& host, TimePoint deadline) {
   if (auto good = check_host_name(host); !good) return good;
   const auto way = poster(host);
   if (!way) return std::unexpected(way.error());
-  while (!(*way)->matched()) {
+  update_hosts();  // the limit is by the newest presence
+  while (!(*way)->matched() || clock_of(host) == nullptr) {
     if (MonotonicClock::now() >= deadline) {
       return failure(ErrorCode::timed_out, fmt::format("host '{}' takes no events", host));
     }
@@ -64,13 +69,17 @@ Result<PostReport> ControlClient::post_event(const ApiRequest& event, std::uint6
   if (!way) return std::unexpected(way.error());
   EventPoster& posts = **way;
   posts.begin_report(start);
+  use_clock(posts, event.host, patience);
   const TimePoint first = MonotonicClock::now();
   std::uint64_t sent = 0;
   for (bool woken = false;; woken = true) {
     TimePoint now = MonotonicClock::now();
     // What else may have come is looked at when it was no acknowledgement that has woken this: nothing stands
     // between one and the next post, or the end.
-    if (!take_acks(now) && woken) update();
+    if (!take_acks(now) && woken) {
+      update();
+      use_clock(posts, event.host, patience);
+    }
     TimePoint next = kNoDeadline;
     if (stop && stop()) count = sent;
     while (sent < count && posts.has_room()) {

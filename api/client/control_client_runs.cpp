@@ -68,6 +68,7 @@ Result<RunReport> ControlClient::post_and_await(const ApiRequest& event, Duratio
   std::uint64_t asked = epoch();
   const TimePoint start = MonotonicClock::now();
   posts.begin_report(start);
+  use_clock(posts, event.host, deadline - start);
   const std::uint64_t number = posts.post(event.instance, event.argument, start, /*awaited=*/true);
   for (;;) {
     const TimePoint now = MonotonicClock::now();
@@ -79,6 +80,7 @@ Result<RunReport> ControlClient::post_and_await(const ApiRequest& event, Duratio
     }
     if (now >= deadline) break;
     update();
+    use_clock(posts, event.host, deadline - start);
     // The server that was asked is gone, and with it what it waited for.
     if (acknowledged && epoch() != asked) {
       asked = epoch();
@@ -122,11 +124,16 @@ Result<PostReport> ControlClient::post_batch(const std::string& host, std::span<
   if (!way) return std::unexpected(way.error());
   BatchPoster& posts = **way;
   const TimePoint deadline = MonotonicClock::now() + patience;
+  update_hosts();  // the limit is by the newest presence
   for (bool posted = false;;) {
     const TimePoint now = MonotonicClock::now();
     (void)take_acks(now);
-    if (!posted && posts.matched()) posts.post(events, now);
-    posted |= posts.matched();
+    const HostClock* const clock = clock_of(host);
+    if (clock != nullptr) posts.use_clock(*clock);
+    if (!posted && clock != nullptr && posts.matched()) {
+      posts.post(events, now, deadline);
+      posted = true;
+    }
     if (posted && posts.acknowledged()) return posts.report();
     if (now >= deadline) break;
     update();

@@ -35,6 +35,13 @@ dds_return_t EventPoster::write(std::uint64_t sequence) noexcept {
   return dds_write(writer_.get(), &sample_);
 }
 
+void EventPoster::wait_for(Duration patience, const HostClock& clock) noexcept {
+  patience_ = patience;
+  // What was written by the clock of the server before is not taken by this one.
+  if (clock.epoch() != clock_.epoch() && !unacknowledged_.empty()) last_write_ = TimePoint{};
+  clock_ = clock;
+}
+
 dds_return_t EventPoster::write(const Unacknowledged& post) noexcept {
   dds::copy_text(sample_.instance, post.instance);
   dds::copy_text(sample_.event, post.event);
@@ -44,7 +51,9 @@ dds_return_t EventPoster::write(const Unacknowledged& post) noexcept {
     dds::copy_text(entry.value, dds::kWaitForRun);
     sample_.ext = {._maximum = 1, ._length = 1, ._buffer = &entry, ._release = false};
   }
+  sample_.limit = clock_.limit_at(last_progress_ + patience_);
   const dds_return_t written = write(post.sequence);
+  sample_.limit = {};
   sample_.ext = {};
   return written;
 }

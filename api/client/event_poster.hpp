@@ -7,6 +7,7 @@
 
 #include <control.h>
 
+#include "api/client/host_clock.hpp"
 #include "api/client/newest_epoch.hpp"
 #include "api/dds/entity.hpp"
 #include "api/dds/guid.hpp"
@@ -48,6 +49,11 @@ class EventPoster {
   /// Whether the host's reader is there.
   [[nodiscard]] bool matched() const noexcept { return has_reader(writer_.get()); }
 
+  /// How long posts are waited for, after the last progress, and the host's clock as it is known now: the
+  /// host rejects a post that it comes to later. To be called before posts and whenever the clock may have
+  /// changed.
+  void wait_for(Duration patience, const HostClock& clock) noexcept;
+
   /// One post that is repeated until it is acknowledged. Only while has_room(). `awaited`: the host shall
   /// tell when it was run. Returns its number.
   std::uint64_t post(std::string_view instance, std::string_view event, TimePoint now, bool awaited = false);
@@ -87,6 +93,8 @@ class EventPoster {
   dds::Guid source_;
   std::deque<Unacknowledged> unacknowledged_;
   std::size_t window_ = kWindow;
+  Duration patience_{};
+  HostClock clock_;
   std::uint64_t last_sequence_ = 0;
   TimePoint last_progress_;
   TimePoint last_write_;

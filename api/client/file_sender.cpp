@@ -37,7 +37,7 @@ void FileSender::on_ack(const plc_DownloadAck& ack, const plc_SampleIdentity& do
   last_news_ = last_try_ = now;
 }
 
-TimePoint FileSender::send(const plc_SampleIdentity& download, TimePoint now) {
+TimePoint FileSender::send(const plc_SampleIdentity& download, const plc_TimeLimit& limit, TimePoint now) {
   if (epoch_.value() == 0 || !has_reader(writer_.get())) return now + kLook;
   if (next_ > received_ && now - last_try_ >= kRepeat) {
     next_ = received_;
@@ -45,6 +45,7 @@ TimePoint FileSender::send(const plc_SampleIdentity& download, TimePoint now) {
   }
   plc_DownloadChunk chunk{};
   chunk.download = download;
+  chunk.limit = limit;
   dds::copy_text(chunk.host, host_);
   const std::uint64_t end = std::min<std::uint64_t>(contents_.size(), received_ + window_);
   while (next_ < end) {

@@ -30,8 +30,8 @@ class FileSender {
 
   /// `download`: the identity of the request that began it.
   void on_ack(const plc_DownloadAck& ack, const plc_SampleIdentity& download, TimePoint now);
-  /// Writes what may be written; returns when there is more to do.
-  TimePoint send(const plc_SampleIdentity& download, TimePoint now);
+  /// Writes what may be written; returns when there is more to do. `limit`: later the host takes none of it.
+  TimePoint send(const plc_SampleIdentity& download, const plc_TimeLimit& limit, TimePoint now);
 
   /// So many bytes are at the host.
   [[nodiscard]] std::uint64_t received() const noexcept { return received_; }

@@ -43,7 +43,7 @@ Result<RequestCaller> RequestCaller::create(dds_entity_t participant, dds_entity
 }
 
 Result<ApiReply> RequestCaller::call(const ApiRequest& request, dds_entity_t reply_reader,
-                                     const WaitSet& wait_set, TimePoint deadline,
+                                     const WaitSet& wait_set, TimePoint deadline, const ClockOf& clock,
                                      const Meanwhile& meanwhile) {
   plc_Request sample{};
   guid_.copy_to(sample.header.request_identity.writer_guid);
@@ -65,7 +65,9 @@ Result<ApiReply> RequestCaller::call(const ApiRequest& request, dds_entity_t rep
       reply->heard_unix_ns = unix_time_ns();
       return *reply;
     }
-    if (now >= next_write && has_reader(writer_.get())) {
+    const HostClock* const host_clock = clock();
+    if (now >= next_write && host_clock != nullptr && has_reader(writer_.get())) {
+      sample.limit = host_clock->limit_at(wait.deadline);
       if (!written) asked_unix_ns = unix_time_ns();
       (void)dds_write(writer_.get(), &sample);  // a refusal of DDS is mended by the repetition
       next_write = now + (written ? kRepeat : kFirstRepeat);
@@ -74,7 +76,9 @@ Result<ApiReply> RequestCaller::call(const ApiRequest& request, dds_entity_t rep
     if (meanwhile) wait = meanwhile(sample.header.request_identity, now);
     wait_set.wait(std::min({wait.deadline, wait.next, std::max(next_write, now + kFirstRepeat)}));
   }
-  return failure(ErrorCode::timed_out, fmt::format("host '{}' has not answered", request.host));
+  return failure(
+      ErrorCode::timed_out,
+      fmt::format("host '{}' has not answered; what it has not begun by now it does not do", request.host));
 }
 
 }  // namespace plchost

@@ -7,6 +7,7 @@
 
 #include <control.h>
 
+#include "api/client/host_clock.hpp"
 #include "api/client/wait_set.hpp"
 #include "api/dds/entity.hpp"
 #include "api/dds/guid.hpp"
@@ -53,9 +54,13 @@ class RequestCaller {
   /// What there is to do while the answer is waited for: called whenever something may have changed.
   using Meanwhile = std::function<Wait(const plc_SampleIdentity& request, TimePoint now)>;
 
-  /// timed_out: no answer until the deadline, which `meanwhile` can move; whether it was done is not known.
+  /// The host's clock, as it is known now; nullptr: the host has not been seen yet.
+  using ClockOf = std::function<const HostClock*()>;
+
+  /// timed_out: no answer until the deadline, which `meanwhile` can move. What the host has not begun by then
+  /// it does not do; whether it has begun with it is not known.
   [[nodiscard]] Result<ApiReply> call(const ApiRequest& request, dds_entity_t reply_reader,
-                                      const WaitSet& wait_set, TimePoint deadline,
+                                      const WaitSet& wait_set, TimePoint deadline, const ClockOf& clock,
                                       const Meanwhile& meanwhile = {});
 
  private:

@@ -27,6 +27,7 @@ bool SeenHosts::take(const plc_Presence& presence, TimePoint now) {
   seen->epoch = presence.epoch;
   seen->pid = presence.pid;
   seen->last = now;
+  seen->clock.take(presence, now);
   return is_news;
 }
 

@@ -9,6 +9,7 @@
 
 #include <control.h>
 
+#include "api/client/host_clock.hpp"
 #include "api/client/newest_epoch.hpp"
 #include "shm/base/time.hpp"
 
@@ -19,6 +20,7 @@ struct SeenHost {
   std::uint64_t epoch = 0;
   std::int32_t pid = 0;
   TimePoint last;
+  HostClock clock;
   std::uint32_t others = 0;  ///< presences of an older server while this one lives
   TimePoint other_last;
 };

@@ -16,6 +16,7 @@
 #include "api/dds/sample_identity.hpp"
 #include "api/dds/samples.hpp"
 #include "api/dds/text.hpp"
+#include "api/dds/time_limit.hpp"
 #include "api/security/identity.hpp"
 #include "api/server/control_server_parts.hpp"
 #include "shm/base/log.hpp"
@@ -26,6 +27,15 @@
 namespace plchost {
 
 namespace {
+
+/// Why a request is not done that came late, or does not say until when it may be done.
+Error untimely(const plc_TimeLimit& limit) {
+  auto late = check_in_time(limit.clock_ns);
+  if (limit.epoch != 0 && !late) return std::move(late).error();
+  return {.code = ErrorCode::invalid_argument,
+          .system_errno = 0,
+          .message = "the request has no time limit; fill in Request.limit by the host's newest Presence"};
+}
 
 /// Empties a timer, event or signal descriptor.
 void drain(int fd) noexcept {
@@ -286,6 +296,9 @@ void ControlServer::Parts::do_request(ApiRole role, const dds::Guid& writer, con
   const dds::Guid client = writer.participant();
   if (const Answer* const known = answers.find(client, identity)) return send(client, *known);
   if (manager->is_pending(identity) || is_late(identity) || downloads.repeat(identity)) return;
+  const auto timeliness = dds::timeliness(request.limit, epoch);
+  if (timeliness == dds::Timeliness::other_epoch) return;  // it comes again, with another limit
+  if (timeliness != dds::Timeliness::in_time) return refuse(client, request, untimely(request.limit));
   audit->asked(client, request);
   const std::vector<std::string_view> instances(status->instances().begin(), status->instances().end());
   auto checked = check_request(request, role, options.host, instances);
@@ -299,6 +312,9 @@ void ControlServer::Parts::do_request(ApiRole role, const dds::Guid& writer, con
   if (checked->verb == ControlVerb::download_application) {
     return begin_download(client, identity, *std::move(checked));
   }
+  // What this server gives up is not begun either.
+  checked->limit_ns =
+      std::min<std::int64_t>(request.limit.clock_ns, boot_time_ns() + ManagerLink::kCommandLimit.count());
   const PendingCommand command{
       client,        identity, checked->instance, MonotonicClock::now() + ManagerLink::kCommandLimit,
       checked->verb, {}};

@@ -3,6 +3,7 @@
 #include "api/control/application_order.hpp"
 #include "api/dds/samples.hpp"
 #include "api/dds/text.hpp"
+#include "api/dds/time_limit.hpp"
 #include "api/server/control_server_parts.hpp"
 #include "shm/base/log.hpp"
 
@@ -40,6 +41,7 @@ void ControlServer::Parts::on_chunks() {
     if (batch.size() == 0) return;
     for (std::size_t i = 0; i < batch.size(); ++i) {
       if (!batch.valid(i) || dds::text_of(batch[i].host) != options.host) continue;
+      if (dds::timeliness(batch[i].limit, epoch) != dds::Timeliness::in_time) continue;
       const dds::Guid writer = dds::writer_of(reader, batch.info(i));
       if (writer != dds::Guid{}) downloads.take(batch[i], writer.participant(), now);
     }
@@ -59,9 +61,10 @@ void ControlServer::Parts::serve_downloads(TimePoint now) {
     sessions->write_ack(progress.client, ack);
   }
   for (CompleteDownload& complete : downloads.complete()) {
-    const PendingCommand command{complete.client,           complete.identity,
-                                 complete.request.instance, now + ManagerLink::kCommandLimit + kStoring,
-                                 complete.request.verb,     {}};
+    constexpr Duration kLimit = ManagerLink::kCommandLimit + kStoring;
+    complete.request.limit_ns = boot_time_ns() + kLimit.count();
+    const PendingCommand command{complete.client, complete.identity,     complete.request.instance,
+                                 now + kLimit,    complete.request.verb, {}};
     if (auto sent = manager->send(std::move(complete.request), command); !sent) {
       downloads.end(complete.identity);
       answer(complete.client, complete.identity, sent.error().code, sent.error().describe());

@@ -72,6 +72,11 @@ bool InstanceSocket::serve_one(Connection& connection) {
     if (packet.error().code != ErrorCode::corrupt) return false;  // the peer is gone
     error = packet.error();
   } else if (const auto request = decode_request(**packet)) {
+    if (const auto in_time = check_in_time(request->limit_ns); !in_time) {
+      return send(connection, ControlReply{.number = request->number,
+                                           .code = in_time.error().code,
+                                           .text = in_time.error().message});
+    }
     auto reply = handler_(*request, Asker{.connection = connection.id, .number = request->number});
     if (!reply) return true;
     reply->number = request->number;

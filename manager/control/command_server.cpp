@@ -100,6 +100,11 @@ void CommandServer::take_packet(std::uint64_t id, std::string_view packet) {
                                    .text = fmt::format("{} requests of this peer are not answered yet",
                                                        kMaxPendingRequests)});
   }
+  if (const auto in_time = check_in_time(request->limit_ns); !in_time) {
+    return answer(
+        id, ControlReply{
+                .number = request->number, .code = in_time.error().code, .text = in_time.error().message});
+  }
   ++connection.pending;
   handler_.handle(*request, [this, id](const ControlReply& reply) {
     if (Connection* asker = find(id)) --asker->pending;

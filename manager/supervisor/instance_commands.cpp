@@ -147,6 +147,9 @@ void ManagedInstance::on_application_checked(const Result<void>& result) {
     return finish(result.error().code,
                   fmt::format("{} is refused: {}", operation_->request.argument, result.error().describe()));
   }
+  if (const auto in_time = check_in_time(operation_->request.limit_ns); !in_time) {
+    return finish(in_time.error().code, in_time.error().message);
+  }
   apply_loaded_application();
 }
 
@@ -202,8 +205,12 @@ void ManagedInstance::forward_or_wait() {
 }
 
 void ManagedInstance::forward() {
+  // It may have waited for the process to come up.
+  if (const auto in_time = check_in_time(operation_->request.limit_ns); !in_time) {
+    return finish(in_time.error().code, in_time.error().message);
+  }
   operation_->step = Step::forwarded;
-  const auto number = send(operation_->request.verb, operation_->request.argument);
+  const auto number = send_limited(operation_->request.verb);
   if (!number) return finish(number.error().code, number.error().describe());
   operation_->forwarded_number = *number;
   host_.set_timer(after(limit_of(operation_->request.verb)));

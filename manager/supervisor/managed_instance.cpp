@@ -391,10 +391,17 @@ std::string ManagedInstance::core_problem() {
                      fmt::join(cores, ", "), config_.core);
 }
 
-Result<std::uint64_t> ManagedInstance::send(ControlVerb verb, const std::string& argument) {
+Result<std::uint64_t> ManagedInstance::send_limited(ControlVerb verb) {
+  const ControlRequest& request = operation_->request;
+  const std::int64_t ours = boot_time_ns() + limit_of(verb).count();
+  return send(verb, request.argument, request.limit_ns == 0 ? ours : std::min(ours, request.limit_ns));
+}
+
+Result<std::uint64_t> ManagedInstance::send(ControlVerb verb, const std::string& argument,
+                                            std::int64_t limit_ns) {
   const std::uint64_t number = next_number_++;
-  const auto sent = host_.request(
-      ControlRequest{.number = number, .verb = verb, .instance = config_.name, .argument = argument});
+  const auto sent = host_.request(ControlRequest{
+      .number = number, .verb = verb, .instance = config_.name, .argument = argument, .limit_ns = limit_ns});
   if (!sent) return std::unexpected(sent.error());
   return number;
 }

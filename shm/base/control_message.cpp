@@ -83,7 +83,24 @@ Result<std::map<std::string, std::string>> options_of(const Json& json) {
   return options;
 }
 
+// None: it may be begun at any time.
+Result<std::int64_t> limit_of(const Json& json) {
+  const auto found = json.find("limit_ns");
+  if (found == json.end()) return 0;
+  if (!found->is_number_integer())
+    return failure(ErrorCode::corrupt, "control message has a 'limit_ns' that is no integer");
+  return found->get<std::int64_t>();
+}
+
 }  // namespace
+
+Result<void> check_in_time(std::int64_t limit_ns, std::int64_t now_ns) {
+  if (limit_ns == 0 || now_ns <= limit_ns) return {};
+  constexpr double kNsPerMs = 1e6;
+  return failure(ErrorCode::timed_out,
+                 fmt::format("not done: it came {:.1f} ms after the time limit of the client",
+                             static_cast<double>(now_ns - limit_ns) / kNsPerMs));
+}
 
 std::string_view to_string(ControlVerb verb) noexcept {
   for (const auto& [known, name] : kVerbs) {
@@ -99,6 +116,7 @@ std::string encode(const ControlRequest& request) {
             {"instance", request.instance},
             {"argument", request.argument}};
   if (!request.options.empty()) json["options"] = request.options;
+  if (request.limit_ns != 0) json["limit_ns"] = request.limit_ns;
   return dump(json);
 }
 
@@ -120,10 +138,12 @@ Result<ControlRequest> decode_request(std::string_view packet) {
   }
   auto options = options_of(*json);
   if (!options) return std::unexpected(std::move(options).error());
+  const auto limit = limit_of(*json);
+  if (!limit) return std::unexpected(limit.error());
   for (const auto& [known, name] : kVerbs) {
     if (name == *verb) {
-      return ControlRequest{(*json)["number"].get<std::uint64_t>(), known, *instance, *argument,
-                            *std::move(options)};
+      return ControlRequest{
+          (*json)["number"].get<std::uint64_t>(), known, *instance, *argument, *std::move(options), *limit};
     }
   }
   return failure(ErrorCode::corrupt, fmt::format("control message has the unknown verb '{}'", *verb));

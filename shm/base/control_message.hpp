@@ -6,12 +6,13 @@
 #include <string_view>
 
 #include "shm/base/result.hpp"
+#include "shm/base/time.hpp"
 
 namespace plchost {
 
 /// The version of the messages on control sockets. A peer with another one is refused by name and number.
-/// 1: first.
-inline constexpr int kControlVersion = 1;
+/// 1: first. 2: requests have a time limit.
+inline constexpr int kControlVersion = 2;
 
 /// What can be asked of an instance, by the API server of the manager and by the manager of the instance.
 enum class ControlVerb : std::uint8_t {
@@ -50,7 +51,13 @@ struct ControlRequest {
   std::string instance;
   std::string argument;
   std::map<std::string, std::string> options = {};  ///< further arguments, by name
+  /// Until when it may be begun: boot_time_ns(), 0: at any time. Each process that takes it from a socket
+  /// looks at this first, so that what waited there while that process was stopped is not done.
+  std::int64_t limit_ns = 0;
 };
+
+/// timed_out: that limit of a request is over, so it must not be begun.
+[[nodiscard]] Result<void> check_in_time(std::int64_t limit_ns, std::int64_t now_ns = boot_time_ns());
 
 struct ControlReply {
   std::uint64_t number = 0;

@@ -34,6 +34,14 @@ using TimePoint = MonotonicClock::time_point;
   return Duration(std::chrono::seconds(value.tv_sec) + std::chrono::nanoseconds(value.tv_nsec)).count();
 }
 
+/// CLOCK_BOOTTIME, nanoseconds: as CLOCK_MONOTONIC, but it also counts while the machine is suspended. Time
+/// limits that come from other machines are told by it.
+[[nodiscard]] inline std::int64_t boot_time_ns() noexcept {
+  timespec value{};
+  ::clock_gettime(CLOCK_BOOTTIME, &value);
+  return Duration(std::chrono::seconds(value.tv_sec) + std::chrono::nanoseconds(value.tv_nsec)).count();
+}
+
 [[nodiscard]] constexpr timespec to_timespec(Duration since_epoch) noexcept {
   constexpr std::int64_t kNanosecondsPerSecond = 1'000'000'000;
   return {.tv_sec = since_epoch.count() / kNanosecondsPerSecond,

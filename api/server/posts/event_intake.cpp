@@ -9,7 +9,9 @@
 #include "api/dds/entries.hpp"
 #include "api/dds/samples.hpp"
 #include "api/dds/text.hpp"
+#include "api/dds/time_limit.hpp"
 #include "api/dds/topics.hpp"
+#include "shm/base/control_message.hpp"
 
 namespace plchost {
 
@@ -131,7 +133,11 @@ void EventIntake::process_locked(const Post& post) {
   const auto wanted = read_wanted(post.ext);
   switch (order_of(post.sequence_number, entry.last.load(std::memory_order_relaxed))) {
     case PostOrder::next:
-      post_next(post, wanted, entry);
+      if (dds::timeliness(post.limit, epoch_) == dds::Timeliness::other_epoch) {
+        ++entry.counters.early;  // it comes again, with the limit by this server's clock
+      } else {
+        post_next(post, wanted, entry);
+      }
       break;
     case PostOrder::duplicate:
       ++entry.counters.duplicate;
@@ -172,6 +178,7 @@ void EventIntake::post_next(const Post& post, const Result<Wanted>& wanted, Ledg
 template <class Post>
 Result<void> EventIntake::check(const Post& post) const {
   if (auto may = guard_->check(dds::Guid::from(post.source), security::Role::operating); !may) return may;
+  if (dds::timeliness(post.limit, epoch_) == dds::Timeliness::late) return check_in_time(post.limit.clock_ns);
   const auto host = text_of(post.host);
   if (host == host_) return {};
   return failure(ErrorCode::not_found, fmt::format("this is host '{}', not '{}'", host_, shown(host)));

@@ -270,6 +270,7 @@ void StatusPublisher::write_presence() {
   sample.epoch = source_.epoch;
   sample.pid = ::getpid();
   sample.api_version = dds::kApiVersion;
+  sample.clock_ns = boot_time_ns();
   (void)dds_write(presence_.get(), &sample);
 }
 

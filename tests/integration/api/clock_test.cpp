@@ -60,11 +60,11 @@ TEST_F(ClockSetBack, LetsBatchesBeAcknowledgedAgain) {
   auto sut = BatchPoster::create(participant_.get(), topic.get(), "hosta").value();
   const dds::Guid source = dds::guid_of(sut.writer());
   const std::vector<EventId> batch{{"line1", "ready"}};
-  sut.post(batch, now_);
+  sut.post(batch, now_, now_ + std::chrono::seconds(1));
   sut.on_ack(ack(source, kNewer, 1), now_);
   EXPECT_TRUE(sut.acknowledged());
 
-  sut.post(batch, now_);
+  sut.post(batch, now_, now_ + std::chrono::seconds(1));
   sut.on_ack(ack(source, kOlder, 2), now_);
   EXPECT_FALSE(sut.acknowledged());
   sut.on_ack(ack(source, kOlder, 2), now_ + 2 * kServerGone);

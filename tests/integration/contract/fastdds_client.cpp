@@ -194,11 +194,21 @@ class Hosts {
     return *found;
   }
   [[nodiscard]] std::int32_t pid(const std::string& host) { return pids_[host]; }
+  /// For what is waited for from now on for so long as `patience` says.
+  plc::TimeLimit limit(const std::string& host) {
+    update();
+    const auto& [clock_ns, taken] = clocks_[host];
+    plc::TimeLimit limit;
+    limit.epoch(epochs_[host]);
+    limit.clock_ns(clock_ns + std::chrono::nanoseconds(Clock::now() - taken + patience).count());
+    return limit;
+  }
   void update() {
     take<plc::Presence>(presence_, [this](const plc::Presence& presence) {
       const std::string name = presence.host().to_string();
       epochs_[name] = std::max(epochs_[name], presence.epoch());
       pids_[name] = presence.pid();
+      clocks_[name] = {presence.clock_ns(), Clock::now()};
     });
     take<plc::HostStatus>(
         status_, [this](const plc::HostStatus& status) { statuses_[status.host().to_string()] = status; });
@@ -210,6 +220,7 @@ class Hosts {
   std::string wanted_;
   std::map<std::string, std::uint64_t> epochs_;
   std::map<std::string, std::int32_t> pids_;
+  std::map<std::string, std::pair<std::int64_t, Clock::time_point>> clocks_;  // and when they were taken
   std::map<std::string, plc::HostStatus> statuses_;
 };
 
@@ -272,6 +283,7 @@ int call(Client& client, const Options& options, std::int32_t operation, const s
   request.header().request_identity().writer_guid(bytes_of(writer->guid()));
   request.header().request_identity().sequence_number(1);
   request.header().instance_name(host);
+  request.limit(hosts.limit(host));
   request.operation(operation);
   request.instance(instance);
   std::unique_ptr<plc::Reply> answer;
@@ -302,6 +314,7 @@ int post(Client& client, const Options& options, const std::string& name, std::u
   plc::EventPost sample;
   sample.source(bytes_of(writer->guid()));
   sample.host(host);
+  sample.limit(hosts.limit(host));
   sample.instance(instance);
   sample.event(event);
   plc::EventAck ack;

@@ -135,10 +135,17 @@ void take(dds_entity_t reader, Use use) {
   }
 }
 
+/// By the presence of a host that has just been taken: for as long as wait_until() waits.
+plc_TimeLimit limit_by(const plc_Presence& presence) {
+  constexpr std::int64_t kNanoseconds = 15'000'000'000;
+  return {presence.epoch, presence.clock_ns + kNanoseconds};
+}
+
 /// One request, repeated until it is answered.
-plc_Reply call(const std::string& host, std::int32_t operation, const std::string& instance,
-               std::int64_t number, dds_entity_t writer, dds_entity_t replies) {
+plc_Reply call(const plc_TimeLimit& limit, const std::string& host, std::int32_t operation,
+               const std::string& instance, std::int64_t number, dds_entity_t writer, dds_entity_t replies) {
   plc_Request request{};
+  request.limit = limit;
   const dds_guid_t guid = guid_of(writer);
   std::memcpy(request.header.request_identity.writer_guid, guid.v, sizeof guid.v);
   request.header.request_identity.sequence_number = number;
@@ -198,13 +205,16 @@ int run_client(std::uint32_t domain, const std::string& instance, const std::str
   const auto requests = party.writer(plc_Request_desc, "plc/v1/op/request",
                                      {.transient_local = false, .depth = 0, .partition = theirs});
   const auto pages = party.reader(plc_ObjectPage_desc, "plc/v1/objects", {.depth = 0, .partition = own});
-  const plc_Reply started = call(host.host, plc_OPERATION_START, instance, 1, requests, replies);
+  take<plc_Presence>(presence, [&](const plc_Presence& news, const auto&) { present = news; });
+  const plc_TimeLimit limit = limit_by(present);
+  const plc_Reply started = call(limit, host.host, plc_OPERATION_START, instance, 1, requests, replies);
   std::cout << "start " << started.code << ' ' << started.text << '\n';
 
   const auto acks = party.reader(plc_EventAck_desc, "plc/v1/event_ack", {.partition = own});
   const auto posts = party.writer(plc_EventPost_desc, "plc/v1/event",
                                   {.transient_local = false, .depth = 0, .partition = theirs});
   plc_EventPost post{};
+  post.limit = limit;
   const dds_guid_t source = guid_of(posts);
   std::memcpy(post.source, source.v, sizeof source.v);
   set(post.host, host.host);
@@ -229,7 +239,7 @@ int run_client(std::uint32_t domain, const std::string& instance, const std::str
       "acknowledgements");
   std::cout << "post accepted " << ack.accepted << " rejected " << ack.rejected << '\n';
 
-  (void)call(host.host, plc_OPERATION_LIST_OBJECTS, "", 2, requests, replies);
+  (void)call(limit, host.host, plc_OPERATION_LIST_OBJECTS, "", 2, requests, replies);
   std::uint32_t objects = 0;
   wait_until(
       [&] {

@@ -1,6 +1,7 @@
 // The control socket of a real plc-instance.
 #include <csignal>
 #include <cstdlib>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -39,6 +40,24 @@ TEST_F(ControlSocket, StopsAndStartsTheApplication) {
   EXPECT_EQ(sut_.ask(ControlVerb::start).code, ErrorCode::wrong_state);
   EXPECT_TRUE(eventually([&] { return sut_.task("Fast")->counters.cycles > cycles; }));
   EXPECT_EQ(sut_.task("Work")->counters.cycles, 0U);  // what was posted while it was stopped is not run
+}
+
+TEST_F(ControlSocket, DoesNotStartWhatCameWhileTheProcessStoodStillAndWasGivenUp) {
+  ASSERT_EQ(sut_.ask(ControlVerb::stop).code, ErrorCode::ok);
+  PacketSocket manager = sut_.connect();
+  ::kill(sut_.pid(), SIGSTOP);
+  ControlRequest request{.number = 9, .verb = ControlVerb::start, .instance = "line1", .argument = ""};
+  request.limit_ns = boot_time_ns() + Duration(50ms).count();
+  ASSERT_TRUE(manager.send(encode(request)));
+  std::this_thread::sleep_for(100ms);
+  ::kill(sut_.pid(), SIGCONT);
+  const ControlReply late = reply(manager);
+  EXPECT_EQ(late.number, 9U);
+  EXPECT_EQ(late.code, ErrorCode::timed_out) << late.text;
+  EXPECT_EQ(sut_.task("Fast")->state, PageTaskState::stopped);
+  request.limit_ns = boot_time_ns() + Duration(1h).count();
+  ASSERT_TRUE(manager.send(encode(request)));
+  EXPECT_EQ(reply(manager).code, ErrorCode::ok);
 }
 
 TEST_F(ControlSocket, ResetsTheStatisticsOfOneTaskOrOfAllWhileTheyRun) {

@@ -113,11 +113,11 @@ TEST(Manager, SurvivesGarbageOnItsControlSocket) {
   plant.add("line1", "bottling_line", "autostart = false");
   plant.start_manager();
   auto hostile = plant.connect();
-  for (const std::string_view packet : {"", "x", "{}", "[1,2", "{\"version\":1,\"number\":-1}"}) {
+  for (const std::string_view packet : {"", "x", "{}", "[1,2", "{\"version\":2,\"number\":-1}"}) {
     (void)hostile.send(packet);
     hostile = plant.connect();
   }
-  (void)hostile.send("{\"version\":1}");
+  (void)hostile.send("{\"version\":2}");
   const auto reply = hostile.receive_until(MonotonicClock::now() + std::chrono::seconds(30));
   ASSERT_TRUE(reply) << reply.error().describe();
   EXPECT_EQ(decode_reply(*reply)->code, ErrorCode::corrupt);

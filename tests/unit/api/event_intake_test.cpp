@@ -113,6 +113,37 @@ TEST_F(EventIntakeTest, StartsAtTheBaseOfASourceThatItDoesNotKnow) {
   EXPECT_EQ(event_.counted().count(), 2U);
 }
 
+TEST_F(EventIntakeTest, RejectsAPostThatItsSourceHasGivenUpAndGoesOn) {
+  EventIntake sut = make();
+  auto late = make_post(1);
+  late.limit = {.epoch = 7, .clock_ns = boot_time_ns() - 1};
+  auto in_time = make_post(2);
+  in_time.limit = {.epoch = 7, .clock_ns = boot_time_ns() + Duration(std::chrono::hours(1)).count()};
+  sut.process(late);
+  sut.process(in_time);
+  EXPECT_EQ(event_.counted().count(), 1U);
+  const auto ack = only_ack(sut);
+  EXPECT_EQ(ack.sequence_number, 2U);
+  EXPECT_EQ(ack.rejected_sequence, 1U);
+  EXPECT_EQ(static_cast<ErrorCode>(ack.rejected_code), ErrorCode::timed_out);
+  sut.process(late);
+  EXPECT_EQ(only_ack(sut).rejected, 1U) << "it came again";
+}
+
+TEST_F(EventIntakeTest, TakesAPostByTheClockOfAnotherServerWhenItComesAgainByItsOwn) {
+  EventIntake sut = make();
+  auto post = make_post(1);
+  post.limit = {.epoch = 6, .clock_ns = boot_time_ns() + Duration(std::chrono::hours(1)).count()};
+  sut.process(post);
+  EXPECT_EQ(event_.counted().count(), 0U);
+  const auto ack = only_ack(sut);
+  EXPECT_EQ(ack.sequence_number, 0U) << "its source learns of the new epoch";
+  EXPECT_EQ(ack.rejected, 0U);
+  post.limit.epoch = 7;
+  sut.process(post);
+  EXPECT_EQ(event_.counted().count(), 1U);
+}
+
 TEST_F(EventIntakeTest, KeepsSourcesApart) {
   EventIntake sut = make();
   sut.process(make_post(1, 1, 1));

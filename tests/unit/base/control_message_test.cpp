@@ -16,7 +16,8 @@ TEST_P(Verb, SurvivesTheRoundTrip) {
                                .verb = GetParam(),
                                .instance = "line1",
                                .argument = "quo\"te\n\\ \xc3\xa4",
-                               .options = {{"boot", "yes"}, {"by", "quo\"te"}}};
+                               .options = {{"boot", "yes"}, {"by", "quo\"te"}},
+                               .limit_ns = std::numeric_limits<std::int64_t>::max()};
   const auto decoded = decode_request(encode(request));
   ASSERT_TRUE(decoded) << decoded.error().message;
   EXPECT_EQ(decoded->number, request.number);
@@ -24,6 +25,7 @@ TEST_P(Verb, SurvivesTheRoundTrip) {
   EXPECT_EQ(decoded->instance, request.instance);
   EXPECT_EQ(decoded->argument, request.argument);
   EXPECT_EQ(decoded->options, request.options);
+  EXPECT_EQ(decoded->limit_ns, request.limit_ns);
 }
 
 INSTANTIATE_TEST_SUITE_P(ControlMessage, Verb,
@@ -46,6 +48,15 @@ TEST(ControlMessage, RepliesOfEachCodeSurviveTheRoundTrip) {
   }
 }
 
+TEST(ControlMessage, IsInTimeUntilItsLimitAndWithoutOneAlways) {
+  EXPECT_TRUE(check_in_time(100, 100));
+  EXPECT_TRUE(check_in_time(0, 100));
+  const auto late = check_in_time(100, 2'500'100);
+  ASSERT_FALSE(late);
+  EXPECT_EQ(late.error().code, ErrorCode::timed_out);
+  EXPECT_THAT(late.error().message, HasSubstr("2.5 ms"));
+}
+
 TEST(ControlMessage, EncodesBytesThatAreNoText) {
   const auto decoded = decode_request(encode(ControlRequest{.instance = "a", .argument = "\xff\xfe"}));
   ASSERT_TRUE(decoded);
@@ -63,24 +74,24 @@ TEST_P(MalformedRequest, IsCorrupt) {
 INSTANTIATE_TEST_SUITE_P(
     ControlMessage, MalformedRequest,
     testing::Values(
-        "", "{", "[]", "null", "7", "\"text\"", "\xff", std::string("\0", 1), "{}", R"({"version":1})",
-        R"({"version":2,"number":1,"verb":"start","instance":"a","argument":""})",
-        R"({"version":1.0,"number":1,"verb":"start","instance":"a","argument":""})",
-        R"({"version":"1","number":1,"verb":"start","instance":"a","argument":""})",
-        R"({"version":18446744073709551615,"number":1,"verb":"start","instance":"a","argument":""})",
-        R"({"version":1,"number":-1,"verb":"start","instance":"a","argument":""})",
-        R"({"version":1,"number":1.5,"verb":"start","instance":"a","argument":""})",
-        R"({"version":1,"number":"1","verb":"start","instance":"a","argument":""})",
-        R"({"version":1,"verb":"start","instance":"a","argument":""})",
-        R"({"version":1,"number":1,"verb":"explode","instance":"a","argument":""})",
-        R"({"version":1,"number":1,"verb":7,"instance":"a","argument":""})",
-        R"({"version":1,"number":1,"verb":"start","argument":""})",
-        R"({"version":1,"number":1,"verb":"start","instance":null,"argument":""})",
-        R"({"version":1,"number":1,"verb":"start","instance":"a"})",
-        R"({"version":1,"number":1,"verb":"start","instance":"a","argument":[]})",
-        R"({"version":1,"number":1,"verb":"start","instance":"a","argument":"","options":[]})",
-        R"({"version":1,"number":1,"verb":"start","instance":"a","argument":"","options":{"boot":true}})",
-        R"({"version":1,"number":1,"verb":"start","instance":"a","argument":""} trailing)",
+        "", "{", "[]", "null", "7", "\"text\"", "\xff", std::string("\0", 1), "{}", R"({"version":2})",
+        R"({"version":1,"number":1,"verb":"start","instance":"a","argument":""})",
+        R"({"version":2.0,"number":1,"verb":"start","instance":"a","argument":""})",
+        R"({"version":"2","number":1,"verb":"start","instance":"a","argument":""})",
+        R"({"version":28446744073709551615,"number":1,"verb":"start","instance":"a","argument":""})",
+        R"({"version":2,"number":-1,"verb":"start","instance":"a","argument":""})",
+        R"({"version":2,"number":1.5,"verb":"start","instance":"a","argument":""})",
+        R"({"version":2,"number":"1","verb":"start","instance":"a","argument":""})",
+        R"({"version":2,"verb":"start","instance":"a","argument":""})",
+        R"({"version":2,"number":1,"verb":"explode","instance":"a","argument":""})",
+        R"({"version":2,"number":1,"verb":7,"instance":"a","argument":""})",
+        R"({"version":2,"number":1,"verb":"start","argument":""})",
+        R"({"version":2,"number":1,"verb":"start","instance":null,"argument":""})",
+        R"({"version":2,"number":1,"verb":"start","instance":"a"})",
+        R"({"version":2,"number":1,"verb":"start","instance":"a","argument":[]})",
+        R"({"version":2,"number":1,"verb":"start","instance":"a","argument":"","options":[]})",
+        R"({"version":2,"number":1,"verb":"start","instance":"a","argument":"","options":{"boot":true}})",
+        R"({"version":2,"number":1,"verb":"start","instance":"a","argument":""} trailing)",
         "{\"version\":" + std::string(8000, '[') + std::string(8000, ']') + "}", std::string(16384, '[')));
 
 class MalformedReply : public testing::TestWithParam<std::string> {};
@@ -92,19 +103,19 @@ TEST_P(MalformedReply, IsCorrupt) {
 }
 
 INSTANTIATE_TEST_SUITE_P(ControlMessage, MalformedReply,
-                         testing::Values("", "{}", R"({"version":1,"number":1})",
-                                         R"({"version":1,"number":1,"code":0})",
-                                         R"({"version":1,"number":1,"code":0,"text":1})",
-                                         R"({"version":1,"number":1,"code":15,"text":""})",
-                                         R"({"version":1,"number":1,"code":-1,"text":""})",
-                                         R"({"version":1,"number":1,"code":4294967296,"text":""})",
-                                         R"({"version":1,"number":1,"code":"0","text":""})",
-                                         R"({"version":1,"number":1,"text":""})"));
+                         testing::Values("", "{}", R"({"version":2,"number":1})",
+                                         R"({"version":2,"number":1,"code":0})",
+                                         R"({"version":2,"number":1,"code":0,"text":1})",
+                                         R"({"version":2,"number":1,"code":15,"text":""})",
+                                         R"({"version":2,"number":1,"code":-1,"text":""})",
+                                         R"({"version":2,"number":1,"code":4294967296,"text":""})",
+                                         R"({"version":2,"number":1,"code":"0","text":""})",
+                                         R"({"version":2,"number":1,"text":""})"));
 
 TEST(ControlMessage, NamesTheVersionThatIsSpoken) {
   const auto decoded = decode_reply(R"({"version":9,"number":1,"code":0,"text":""})");
   ASSERT_FALSE(decoded);
-  EXPECT_THAT(decoded.error().message, HasSubstr("version 9 where 1 is spoken"));
+  EXPECT_THAT(decoded.error().message, HasSubstr("version 9 where 2 is spoken"));
 }
 
 }  // namespace

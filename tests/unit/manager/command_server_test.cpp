@@ -84,11 +84,29 @@ TEST_F(CommandServerTest, AnswersGarbageAndClosesAfterTooMuchOfIt) {
   const auto reply = reply_on(client);
   EXPECT_EQ(reply.number, 0U);
   EXPECT_EQ(reply.code, ErrorCode::corrupt);
-  EXPECT_THAT(reply.text, HasSubstr("version 99 where 1 is spoken"));
+  EXPECT_THAT(reply.text, HasSubstr("version 99 where 2 is spoken"));
   for (int i = 0; i < kMaxBadPackets; ++i) ASSERT_TRUE(client.send("\xff\xfe garbage"));
   serve();
   EXPECT_TRUE(is_closed(client));
   EXPECT_FALSE(is_closed(other));
+  EXPECT_TRUE(handler_.asked.empty());
+}
+
+// It waited in the socket while the manager stood still.
+TEST_F(CommandServerTest, DoesNotHandleWhatCameAfterItsTimeLimit) {
+  auto client = connect();
+  const ControlRequest request{.number = 5,
+                               .verb = ControlVerb::start,
+                               .instance = "a",
+                               .argument = "",
+                               .limit_ns = boot_time_ns() + Duration(std::chrono::milliseconds(20)).count()};
+  ASSERT_TRUE(client.send(encode(request)));
+  ::usleep(30'000);
+  serve();
+  const auto reply = reply_on(client);
+  EXPECT_EQ(reply.number, 5U);
+  EXPECT_EQ(reply.code, ErrorCode::timed_out);
+  EXPECT_THAT(reply.text, HasSubstr("not done"));
   EXPECT_TRUE(handler_.asked.empty());
 }
 
