@@ -58,13 +58,11 @@ std::vector<std::string> option_names(const CLI::App& app) {
   return names;
 }
 
-Result<void> check_identity(const DdsConfig& dds) {
-  if (dds.identity.empty()) return {};
-  const auto identity = security::check_identity(dds.identity);
+Result<void> check_identity(const ManagerConfig& config) {
+  if (config.dds.identity.empty()) return {};
+  const auto identity = security::check_identity(config.dds.identity);
   if (!identity) return std::unexpected(identity.error());
-  if (identity->subject.role == security::Role::host) return {};
-  return failure(ErrorCode::refused, fmt::format("'{}' has the role {}; a host's is needed",
-                                                 identity->subject.name, to_string(identity->subject.role)));
+  return security::check_host_identity(identity->subject, config.host.name);
 }
 
 std::string programs_of(const Options& options) {
@@ -75,7 +73,7 @@ int check_only(const std::string& file, const std::string& programs) {
   const auto config = load_config(file, start_surroundings(programs));
   if (config) {
     // Not when it runs: its instances are worth more than the way to them.
-    if (const auto good = check_identity(config->dds); !good) {
+    if (const auto good = check_identity(*config); !good) {
       fmt::print("{}: [dds] identity: {}\n", file, good.error().describe());
       return kExitFailed;
     }

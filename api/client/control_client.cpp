@@ -10,7 +10,6 @@
 #include "api/dds/claim.hpp"
 #include "api/dds/entries.hpp"
 #include "api/dds/error.hpp"
-#include "api/dds/samples.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
@@ -61,7 +60,10 @@ Result<void> ControlClient::open(const dds::DomainOptions& options) {
                         fmt::format("enter DDS domain {}", options.domain));
   if (!participant) return std::unexpected(participant.error());
   participant_ = std::move(*participant);
-  partition_ = dds::client_partition(dds::guid_of(participant_.get()).hex());
+  partition_ = dds::client_partition(dds::guid_of(participant_.get()).hex(), dds::kAllHosts);
+  auto subscriber = dds::make_subscriber(participant_.get(), dds::status_partition(dds::kAllHosts));
+  if (!subscriber) return std::unexpected(subscriber.error());
+  status_subscriber_ = *std::move(subscriber);
   auto wait_set = WaitSet::create(participant_.get());
   if (!wait_set) return std::unexpected(wait_set.error());
   wait_set_ = std::move(*wait_set);
@@ -76,12 +78,14 @@ Result<void> ControlClient::open(const dds::DomainOptions& options) {
 }
 
 template <class Cache>
-Result<void> ControlClient::open_cache(Cache& cache, const dds::TopicInfo& info, const dds::Qos& qos,
+Result<void> ControlClient::open_cache(Cache& cache, const dds::TopicInfo& info, dds::Qos qos,
                                        std::uint32_t statuses) {
   if (cache) return {};
   auto topic = dds::make_topic(participant_.get(), info);
   if (!topic) return std::unexpected(topic.error());
-  auto reader = dds::make_reader(participant_.get(), topic->get(), qos);
+  // What another host writes under a key of this one must not push out what has not been taken yet.
+  auto reader =
+      dds::make_reader(status_subscriber_.get(), topic->get(), qos.keep_last(dds::kStatusReaderDepth));
   if (!reader) return std::unexpected(reader.error());
   if (auto added = wait_set_.add(reader->get(), statuses); !added) return added;
   cache = Cache(std::move(*topic), std::move(*reader));
@@ -102,7 +106,7 @@ void ControlClient::update() {
 }
 
 template Result<void> ControlClient::open_cache(StatusCache<plc_HostFinding>&, const dds::TopicInfo&,
-                                                const dds::Qos&, std::uint32_t);
+                                                dds::Qos, std::uint32_t);
 
 template <class Sample>
 Result<std::vector<Sample>> ControlClient::snapshot(StatusCache<Sample>& cache, const dds::TopicInfo& topic,
@@ -169,7 +173,7 @@ Result<std::vector<TransitionView>> ControlClient::transitions() {
   if (!transition_log_) {
     auto topic = dds::make_topic(participant_.get(), dds::kTransition);
     if (!topic) return std::unexpected(topic.error());
-    auto reader = dds::make_reader(participant_.get(), topic->get(), dds::transition_qos());
+    auto reader = dds::make_reader(status_subscriber_.get(), topic->get(), dds::transition_qos());
     if (!reader) return std::unexpected(reader.error());
     if (auto added = wait_set_.add(reader->get(), DDS_DATA_AVAILABLE_STATUS); !added) {
       return std::unexpected(added.error());
@@ -249,7 +253,8 @@ Result<ApiReply> ControlClient::ask(const ApiRequest& request, TimePoint deadlin
   if (!asked) return std::unexpected(asked.error());
   update_hosts();  // the limit is by the newest presence
   const auto clock = [&] { return clock_of(request.host); };
-  auto reply = (*asked)->call(request, reply_reader_.get(), wait_set_, deadline, clock, meanwhile);
+  auto reply =
+      (*asked)->call(request, reply_reader_.get(), wait_set_, deadline, clock, answering_, meanwhile);
   if (!reply) callers_.erase({request.host, engineering});
   return reply;
 }

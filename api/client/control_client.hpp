@@ -202,7 +202,7 @@ class ControlClient {
   [[nodiscard]] std::optional<HostView> view_of(std::string_view name, const SeenHost& seen) const;
   template <class Cache>
   [[nodiscard]] Result<void> open_cache(Cache& cache, const dds::TopicInfo& topic,
-                                        const dds::Qos& qos = dds::status_qos(),
+                                        dds::Qos qos = dds::status_qos(),
                                         std::uint32_t statuses = DDS_DATA_AVAILABLE_STATUS);
   template <class Sample>
   [[nodiscard]] Result<std::vector<Sample>> snapshot(StatusCache<Sample>& cache, const dds::TopicInfo& topic,
@@ -220,8 +220,8 @@ class ControlClient {
   [[nodiscard]] Result<EventPoster*> poster(const std::string& host);
   [[nodiscard]] Result<BatchPoster*> batch_poster(const std::string& host);
   [[nodiscard]] Result<void> prepare_runs(const std::string& host, TimePoint deadline);
-  [[nodiscard]] std::optional<Result<RunReport>> take_run(const dds::Guid& source, std::uint64_t number,
-                                                          TimePoint start);
+  [[nodiscard]] std::optional<Result<RunReport>> take_run(const EventPoster& posts, std::string_view host,
+                                                          std::uint64_t number, TimePoint start);
   bool take_acks(TimePoint now);
   /// Until the status shows the effect of what was answered.
   void await_status(const std::string& host, const ApiReply& reply, TimePoint deadline);
@@ -239,6 +239,8 @@ class ControlClient {
   WaitSet wait_set_;
   std::string partition_;
   dds::Entity own_subscriber_;
+  dds::Entity status_subscriber_;
+  dds::HostWriters answering_;  // of the readers in its own partition
   StatusCache<plc_Presence> presence_;
   StatusCache<plc_HostStatus> host_status_;
   StatusCache<plc_InstanceStatus> instance_status_;

@@ -7,7 +7,6 @@
 #include "api/client/file_sender.hpp"
 #include "api/control/application_order.hpp"
 #include "api/dds/entries.hpp"
-#include "api/dds/samples.hpp"
 #include "api/security/sha256.hpp"
 
 namespace plchost {
@@ -54,8 +53,8 @@ Result<ApiReply> ControlClient::download(const Download& download, const Downloa
   std::uint64_t told = 0;
   const auto go_on = [&](const plc_SampleIdentity& identity, TimePoint now) -> RequestCaller::Wait {
     update();  // or what has come on other topics would keep the wait from waiting
-    dds::take_valid<plc_DownloadAck>(
-        download_acks_.reader.get(),
+    dds::take_valid_told<plc_DownloadAck>(
+        download_acks_.reader.get(), answering_,
         [&](const plc_DownloadAck& ack, const auto& /*info*/) { sender->on_ack(ack, identity, now); });
     const bool begun = sender->last_news() != TimePoint{};
     const Duration patience = sender->complete() ? kDownloadLoad : kDownloadStall;

@@ -8,7 +8,7 @@
 #include "api/client/check_names.hpp"
 #include "api/client/control_client.hpp"
 #include "api/dds/entries.hpp"
-#include "api/dds/samples.hpp"
+#include "api/dds/host_writers.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
 
@@ -51,7 +51,7 @@ void ControlClient::update_hosts() {
   (void)dds_get_requested_deadline_missed_status(presence_.reader(), &missed);
   // None is kept beside what seen_ has of it: that is bounded.
   dds::take_changes<plc_Presence>(
-      presence_.reader(),
+      presence_.reader(), presence_.writers(),
       [&](auto /*handle*/, const plc_Presence& presence) {
         if (seen_.take(presence, now)) last_news_ = now;
       },

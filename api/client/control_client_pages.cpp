@@ -5,7 +5,6 @@
 #include "api/client/check_names.hpp"
 #include "api/client/control_client.hpp"
 #include "api/dds/sample_identity.hpp"
-#include "api/dds/samples.hpp"
 
 namespace plchost {
 
@@ -16,11 +15,14 @@ constexpr Duration kPagePatience = std::chrono::milliseconds(500);
 constexpr Duration kBusyPause = std::chrono::milliseconds(50);
 
 template <class Page, class Listing>
-std::optional<Listing> take_page(dds_entity_t reader, const plc_SampleIdentity& identity) {
+std::optional<Listing> take_page(dds_entity_t reader, dds::HostWriters& writers, std::string_view host,
+                                 const plc_SampleIdentity& identity) {
   std::optional<Listing> found;
-  dds::take_valid<Page, dds::kPageDepth>(reader, [&](const Page& page, const auto& /*info*/) {
-    // Others answer calls that were given up.
-    if (same_identity(page.related_identity, identity)) found = listing_of(page);
+  dds::take_valid_told<Page, dds::kPageDepth>(reader, writers, [&](const Page& page, const auto& /*info*/) {
+    // Others answer calls that were given up, or are of a host that was not asked.
+    if (same_identity(page.related_identity, identity) && dds::text_of(page.host) == host) {
+      found = listing_of(page);
+    }
   });
   return found;
 }
@@ -45,7 +47,8 @@ Result<Listing> ControlClient::ask_for_page(PageReader& pages, const dds::TopicI
         MonotonicClock::now() + (reply->code == ErrorCode::ok ? kPagePatience : kBusyPause);
     const TimePoint until = std::min(deadline, patience);
     for (;;) {
-      if (auto listing = take_page<Page, Listing>(pages.reader.get(), reply->identity))
+      if (auto listing =
+              take_page<Page, Listing>(pages.reader.get(), answering_, request.host, reply->identity))
         return *std::move(listing);
       if (MonotonicClock::now() >= until) break;
       update();  // or what has come on other topics would keep the wait from waiting

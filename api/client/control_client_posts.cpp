@@ -5,7 +5,6 @@
 
 #include "api/client/check_names.hpp"
 #include "api/client/control_client.hpp"
-#include "api/dds/samples.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/futex.hpp"
 
@@ -50,11 +49,14 @@ Result<void> ControlClient::prepare_posts(const std::string& host, TimePoint dea
 
 bool ControlClient::take_acks(TimePoint now) {
   bool progress = false;
-  dds::take_valid<plc_EventAck>(ack_reader_.get(), [&](const plc_EventAck& ack, const auto& /*info*/) {
-    const auto host = dds::text_of(ack.host);
-    if (const auto way = posters_.find(host); way != posters_.end()) progress |= way->second.on_ack(ack, now);
-    if (const auto way = batch_posters_.find(host); way != batch_posters_.end()) way->second.on_ack(ack, now);
-  });
+  dds::take_valid_told<plc_EventAck>(
+      ack_reader_.get(), answering_, [&](const plc_EventAck& ack, const auto& /*info*/) {
+        const auto host = dds::text_of(ack.host);
+        if (const auto way = posters_.find(host); way != posters_.end())
+          progress |= way->second.on_ack(ack, now);
+        if (const auto way = batch_posters_.find(host); way != batch_posters_.end())
+          way->second.on_ack(ack, now);
+      });
   return progress;
 }
 

@@ -6,7 +6,6 @@
 
 #include "api/client/check_names.hpp"
 #include "api/client/control_client.hpp"
-#include "api/dds/samples.hpp"
 #include "api/dds/text.hpp"
 
 namespace plchost {
@@ -35,22 +34,25 @@ Result<void> ControlClient::prepare_runs(const std::string& host, TimePoint dead
   return {};
 }
 
-std::optional<Result<RunReport>> ControlClient::take_run(const dds::Guid& source, std::uint64_t number,
-                                                         TimePoint start) {
+std::optional<Result<RunReport>> ControlClient::take_run(const EventPoster& posts, std::string_view host,
+                                                         std::uint64_t number, TimePoint start) {
   std::optional<Result<RunReport>> found;
-  dds::take_valid<plc_EventRun>(runs_.reader.get(), [&](const plc_EventRun& run, const auto& /*info*/) {
-    if (dds::Guid::from(run.source) != source || run.sequence_number != number) return;  // was given up
-    if (found) return;  // told again for a repetition
-    if (run.code != 0) {
-      found = failure(static_cast<ErrorCode>(run.code), std::string(dds::text_of(run.text)));
-      return;
-    }
-    found = RunReport{.tasks = run.tasks,
-                      .last_task = std::string(dds::text_of(run.last_task)),
-                      .to_start = Duration(run.start_ns),
-                      .to_end = Duration(run.end_ns),
-                      .round_trip = MonotonicClock::now() - start};
-  });
+  dds::take_valid_told<plc_EventRun>(
+      runs_.reader.get(), answering_, [&](const plc_EventRun& run, const auto& /*info*/) {
+        if (dds::text_of(run.host) != host) return;  // no other host knows
+        if (dds::Guid::from(run.source) != posts.source() || run.sequence_number != number)
+          return;           // was given up
+        if (found) return;  // told again for a repetition
+        if (run.code != 0) {
+          found = failure(static_cast<ErrorCode>(run.code), std::string(dds::text_of(run.text)));
+          return;
+        }
+        found = RunReport{.tasks = run.tasks,
+                          .last_task = std::string(dds::text_of(run.last_task)),
+                          .to_start = Duration(run.start_ns),
+                          .to_end = Duration(run.end_ns),
+                          .round_trip = MonotonicClock::now() - start};
+      });
   return found;
 }
 
@@ -73,7 +75,7 @@ Result<RunReport> ControlClient::post_and_await(const ApiRequest& event, Duratio
   for (;;) {
     const TimePoint now = MonotonicClock::now();
     (void)take_acks(now);
-    if (auto run = take_run(posts.source(), number, start)) return *std::move(run);
+    if (auto run = take_run(posts, event.host, number, start)) return *std::move(run);
     const bool acknowledged = posts.unacknowledged() == 0;
     if (const PostReport report = posts.report(); acknowledged && report.rejected > 0) {
       return failure(report.rejected_code, report.rejected_text);

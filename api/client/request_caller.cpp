@@ -8,7 +8,6 @@
 
 #include "api/client/event_poster.hpp"
 #include "api/dds/sample_identity.hpp"
-#include "api/dds/samples.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"
 
@@ -16,11 +15,12 @@ namespace plchost {
 
 namespace {
 
-std::optional<ApiReply> take_reply(dds_entity_t reader, const plc_SampleIdentity& identity) {
+std::optional<ApiReply> take_reply(dds_entity_t reader, dds::HostWriters& writers, std::string_view host,
+                                   const plc_SampleIdentity& identity) {
   std::optional<ApiReply> found;
-  dds::take_valid<plc_Reply, 16>(reader, [&](const plc_Reply& reply, const dds_sample_info_t& info) {
-    // Others are answers to calls that were given up.
-    if (!same_identity(reply.header.related_identity, identity)) return;
+  dds::take_valid_told<plc_Reply, 16>(reader, writers, [&](const plc_Reply& reply, const auto& info) {
+    // Others are answers to calls that were given up, or of a host that was not asked.
+    if (!same_identity(reply.header.related_identity, identity) || dds::text_of(reply.host) != host) return;
     found = ApiReply{static_cast<ErrorCode>(reply.code), std::string(dds::text_of(reply.text)),
                      reply.status_round, identity, info.source_timestamp};
   });
@@ -44,7 +44,7 @@ Result<RequestCaller> RequestCaller::create(dds_entity_t participant, dds_entity
 
 Result<ApiReply> RequestCaller::call(const ApiRequest& request, dds_entity_t reply_reader,
                                      const WaitSet& wait_set, TimePoint deadline, const ClockOf& clock,
-                                     const Meanwhile& meanwhile) {
+                                     dds::HostWriters& answering, const Meanwhile& meanwhile) {
   plc_Request sample{};
   guid_.copy_to(sample.header.request_identity.writer_guid);
   sample.header.request_identity.sequence_number = ++last_number_;
@@ -60,7 +60,7 @@ Result<ApiReply> RequestCaller::call(const ApiRequest& request, dds_entity_t rep
   bool written = false;
   Wait wait{.deadline = deadline};
   for (TimePoint now = MonotonicClock::now(); now < wait.deadline; now = MonotonicClock::now()) {
-    if (auto reply = take_reply(reply_reader, sample.header.request_identity)) {
+    if (auto reply = take_reply(reply_reader, answering, request.host, sample.header.request_identity)) {
       reply->asked_unix_ns = asked_unix_ns;
       reply->heard_unix_ns = unix_time_ns();
       return *reply;

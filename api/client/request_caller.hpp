@@ -11,6 +11,7 @@
 #include "api/client/wait_set.hpp"
 #include "api/dds/entity.hpp"
 #include "api/dds/guid.hpp"
+#include "api/dds/host_writers.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
 
@@ -57,11 +58,12 @@ class RequestCaller {
   /// The host's clock, as it is known now; nullptr: the host has not been seen yet.
   using ClockOf = std::function<const HostClock*()>;
 
-  /// timed_out: no answer until the deadline, which `meanwhile` can move. What the host has not begun by then
-  /// it does not do; whether it has begun with it is not known.
+  /// `answering`: the writers that reply_reader takes from. timed_out: no answer until the deadline, which
+  /// `meanwhile` can move. What the host has not begun by then it does not do; whether it has begun with it
+  /// is not known.
   [[nodiscard]] Result<ApiReply> call(const ApiRequest& request, dds_entity_t reply_reader,
                                       const WaitSet& wait_set, TimePoint deadline, const ClockOf& clock,
-                                      const Meanwhile& meanwhile = {});
+                                      dds::HostWriters& answering, const Meanwhile& meanwhile = {});
 
  private:
   RequestCaller() = default;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <iterator>
 
-#include "api/dds/samples.hpp"
+#include "api/dds/host_writers.hpp"
 #include "api/dds/text.hpp"
 
 namespace plchost {
@@ -36,7 +36,7 @@ StatisticsReport to_report(const plc_TaskStatistics& sample) {
 void StatisticsCache::update() {
   if (!reader_) return;
   dds::take_changes<plc_TaskStatistics>(
-      reader_.get(),
+      reader_.get(), writers_,
       [this](dds_instance_handle_t handle, const plc_TaskStatistics& sample) {
         reports_[handle] = to_report(sample);
       },

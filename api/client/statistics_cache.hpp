@@ -10,6 +10,7 @@
 #include <control.h>
 
 #include "api/dds/entity.hpp"
+#include "api/dds/host_writers.hpp"
 
 namespace plchost {
 
@@ -48,6 +49,7 @@ class StatisticsCache {
  private:
   dds::Entity topic_;
   dds::Entity reader_;
+  dds::HostWriters writers_;
   std::map<dds_instance_handle_t, StatisticsReport> reports_;
 };
 

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "api/dds/entity.hpp"
-#include "api/dds/samples.hpp"
+#include "api/dds/host_writers.hpp"
 #include "api/dds/text.hpp"
 
 namespace plchost {
@@ -26,13 +26,15 @@ class StatusCache {
 
   [[nodiscard]] explicit operator bool() const noexcept { return static_cast<bool>(reader_); }
   [[nodiscard]] dds_entity_t reader() const noexcept { return reader_.get(); }
+  /// Those of its reader.
+  [[nodiscard]] dds::HostWriters& writers() noexcept { return writers_; }
 
   /// Takes what has come. `on_sample(sample)` is called for each that is there now.
   template <class Function>
   void update(Function on_sample) {
     if (!reader_) return;
     dds::take_changes<Sample>(
-        reader_.get(),
+        reader_.get(), writers_,
         [&](dds_instance_handle_t handle, const Sample& sample) {
           samples_[handle].take(sample);
           on_sample(sample);
@@ -84,6 +86,7 @@ class StatusCache {
 
   dds::Entity topic_;
   dds::Entity reader_;
+  dds::HostWriters writers_;
   std::map<dds_instance_handle_t, Kept> samples_;
 };
 

@@ -4,7 +4,6 @@
 #include <optional>
 #include <span>
 
-#include "api/dds/samples.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"
 
@@ -29,17 +28,18 @@ std::optional<std::uint64_t> last_number(const plc_InstanceStatus& status) {
 std::vector<TransitionView> TransitionLog::take() {
   std::vector<TransitionView> news;
   if (!reader_) return news;
-  dds::take_valid<plc_Transition>(reader_.get(), [&](const plc_Transition& sample, const auto& /*info*/) {
-    if (Seen& server = seen(sample); sample.epoch >= server.epoch) {
-      server.epoch = sample.epoch;
-      server.written = sample.sequence_number;
-    }
-    TransitionView view;
-    if (!is_news(sample, view.missed)) return;
-    view.sample = sample;
-    view.sample.ext = {};  // lives on loan only
-    news.push_back(view);
-  });
+  dds::take_valid_told<plc_Transition>(reader_.get(), writers_,
+                                       [&](const plc_Transition& sample, const auto& /*info*/) {
+                                         if (Seen& server = seen(sample); sample.epoch >= server.epoch) {
+                                           server.epoch = sample.epoch;
+                                           server.written = sample.sequence_number;
+                                         }
+                                         TransitionView view;
+                                         if (!is_news(sample, view.missed)) return;
+                                         view.sample = sample;
+                                         view.sample.ext = {};  // lives on loan only
+                                         news.push_back(view);
+                                       });
   return news;
 }
 

@@ -9,6 +9,7 @@
 #include <control.h>
 
 #include "api/dds/entity.hpp"
+#include "api/dds/host_writers.hpp"
 
 namespace plchost {
 
@@ -47,6 +48,7 @@ class TransitionLog {
 
   dds::Entity topic_;
   dds::Entity reader_;
+  dds::HostWriters writers_;
   std::map<std::pair<std::string, std::string>, Seen> seen_;  // by host and instance
 };
 

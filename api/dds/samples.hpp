@@ -59,17 +59,4 @@ void take_valid(dds_entity_t reader, Function use) {
   });
 }
 
-/// The same, for what is kept of each instance: `update(handle, sample)`, or `forget(handle)` when it was
-/// disposed.
-template <class Sample, class Update, class Forget>
-void take_changes(dds_entity_t reader, Update update, Forget forget) {
-  take_all<Sample>(reader, [&](const Sample& sample, const dds_sample_info_t& info) {
-    if (info.instance_state == DDS_IST_NOT_ALIVE_DISPOSED) {
-      forget(info.instance_handle);
-    } else if (info.valid_data) {
-      update(info.instance_handle, sample);
-    }
-  });
-}
-
 }  // namespace plchost::dds

@@ -75,12 +75,16 @@ std::string host_partition(std::string_view host) {
   return fmt::format("h.{}", host);
 }
 
-std::string client_partition(std::string_view guid_hex) {
-  return fmt::format("c.{}", guid_hex);
+std::string status_partition(std::string_view host) {
+  return fmt::format("s.{}", host);
 }
 
-std::string block_partition(std::uint16_t host_number) {
-  return fmt::format("b.{}", host_number);
+std::string client_partition(std::string_view guid_hex, std::string_view host) {
+  return fmt::format("c.{}/{}", guid_hex, host);
+}
+
+std::string block_partition(std::string_view to_host, std::string_view from_host) {
+  return fmt::format("b.{}/{}", to_host, from_host);
 }
 
 Result<Entity> make_topic(dds_entity_t participant, const TopicInfo& topic) {

@@ -56,6 +56,9 @@ inline constexpr std::int32_t kChunkReaderDepth = 64;
 inline constexpr std::int32_t kRunDepth = 64;
 inline constexpr std::int32_t kBlockReaderDepth = 1024;
 inline constexpr std::int32_t kReplyDepth = 16;
+/// Samples of one key that a client has not taken yet: one of the host itself, and others that have no right
+/// to it.
+inline constexpr std::int32_t kStatusReaderDepth = 8;
 inline constexpr std::int32_t kPageDepth = 4;         ///< of objects, and of nodes
 inline constexpr std::int32_t kTransitionDepth = 64;  ///< of each instance; as many as its ring holds
 /// Entry of InstanceStatus.ext: the number of the last transition of this instance that its host has written;
@@ -98,14 +101,22 @@ inline constexpr Duration kPresenceDeadline = std::chrono::milliseconds(75);
 [[nodiscard]] Qos transition_qos();
 [[nodiscard]] Qos block_qos();
 
-/// Where requests and posts for one host go, and where replies for one client (its participant's GUID in hex)
-/// go.
+// Partitions. Each that a host writes into names that host, after the first '.' or the last '/' (no name has
+// one): the permission of a host's identity allows no other. A reader that takes from all hosts says "*" for
+// the host.
+
+/// For the host that a reader takes from: all of them.
+inline constexpr std::string_view kAllHosts = "*";
+/// Where requests and posts for one host go.
 [[nodiscard]] std::string host_partition(std::string_view host);
-[[nodiscard]] std::string client_partition(std::string_view guid_hex);
+/// What a host tells all.
+[[nodiscard]] std::string status_partition(std::string_view host);
+/// What a host tells one client (its participant's GUID in hex).
+[[nodiscard]] std::string client_partition(std::string_view guid_hex, std::string_view host);
 /// Where hosts meet that claim the same name.
 [[nodiscard]] std::string name_partition(std::string_view host);
-/// Where blocks for the host of that number go, and acknowledgements of its blocks.
-[[nodiscard]] std::string block_partition(std::uint16_t host_number);
+/// Blocks, and acknowledgements of blocks, from one host to another.
+[[nodiscard]] std::string block_partition(std::string_view to_host, std::string_view from_host);
 
 [[nodiscard]] Result<Entity> make_topic(dds_entity_t participant, const TopicInfo& topic);
 /// `parent`: a participant, or a publisher or subscriber that carries the partition.

@@ -87,15 +87,19 @@ Result<void> BlockGateway::open_topics(CountedEvent& wake) {
   auto hosts = dds::make_topic(participant_, dds::kBlockHostStatus);
   auto blocks = dds::make_topic(participant_, dds::kBlock);
   auto acks = dds::make_topic(participant_, dds::kBlockAck);
-  auto subscriber = dds::make_subscriber(participant_, dds::block_partition(options_.number));
-  for (auto* const made : {&hosts, &blocks, &acks, &subscriber}) {
+  auto subscriber = dds::make_subscriber(participant_, dds::block_partition(options_.host, dds::kAllHosts));
+  auto told = dds::make_publisher(participant_, dds::status_partition(options_.host));
+  auto heard = dds::make_subscriber(participant_, dds::status_partition(dds::kAllHosts));
+  for (auto* const made : {&hosts, &blocks, &acks, &subscriber, &told, &heard}) {
     if (!*made) return std::unexpected(std::move(*made).error());
   }
   block_topic_ = *std::move(blocks);
   ack_topic_ = *std::move(acks);
   subscriber_ = *std::move(subscriber);
-  auto host_writer = dds::make_writer(participant_, hosts->get(), dds::status_qos());
-  auto host_reader = dds::make_reader(participant_, hosts->get(), dds::status_qos());
+  host_publisher_ = *std::move(told);
+  host_subscriber_ = *std::move(heard);
+  auto host_writer = dds::make_writer(host_publisher_.get(), hosts->get(), dds::status_qos());
+  auto host_reader = dds::make_reader(host_subscriber_.get(), hosts->get(), dds::status_qos());
   dds::Qos block_qos = dds::block_qos();
   block_qos.max_samples(dds::kBlockReaderDepth);
   auto block_reader = dds::make_reader(subscriber_.get(), block_topic_.get(), block_qos);

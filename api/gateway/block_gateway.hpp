@@ -13,6 +13,7 @@
 #include <control.h>
 
 #include "api/dds/entity.hpp"
+#include "api/dds/host_writers.hpp"
 #include "api/gateway/block_window.hpp"
 #include "api/gateway/host_numbers.hpp"
 #include "api/gateway/pending_blocks.hpp"
@@ -122,6 +123,9 @@ class BlockGateway {
   dds::Entity block_topic_;
   dds::Entity ack_topic_;
   dds::Entity subscriber_;
+  dds::Entity host_publisher_;
+  dds::Entity host_subscriber_;
+  dds::HostWriters host_writers_;
   dds::Entity host_writer_;
   dds::Entity host_reader_;
   dds::Entity block_reader_;

@@ -15,10 +15,11 @@ namespace plchost {
 
 void BlockGateway::follow_hosts(TimePoint now) {
   bool news = false;
-  dds::take_all<plc_BlockHostStatus>(host_reader_.get(), [&](const auto& host, const auto& info) {
-    follow(host, info, now);
-    news = true;
-  });
+  dds::take_told<plc_BlockHostStatus>(host_reader_.get(), host_writers_,
+                                      [&](const auto& host, const auto& info) {
+                                        follow(host, info, now);
+                                        news = true;
+                                      });
   if (!news) return;
   settle_peers(now);
   publish_names();
@@ -93,7 +94,7 @@ Result<void> BlockGateway::open_block_writer(Peer& peer) const {
 Result<std::unique_ptr<BlockGateway::Peer>> BlockGateway::open_peer(const HostClaim& claim) const {
   auto peer = std::make_unique<Peer>();
   peer->claim = claim;
-  auto publisher = dds::make_publisher(participant_, dds::block_partition(claim.number));
+  auto publisher = dds::make_publisher(participant_, dds::block_partition(claim.host, options_.host));
   if (!publisher) return std::unexpected(std::move(publisher).error());
   peer->publisher = *std::move(publisher);
   auto acks = dds::make_writer(peer->publisher.get(), ack_topic_.get(), dds::ack_qos());

@@ -55,6 +55,18 @@ std::string file_in(const std::string& folder, std::string_view file) {
   return folder + "/" + std::string(file);
 }
 
+Result<void> check_host_identity(const Subject& subject, std::string_view host) {
+  if (subject.role == Role::host && subject.name == host) return {};
+  const std::string advice =
+      fmt::format("set [dds] identity to the folder that 'plcctl security add-identity host {}' makes", host);
+  if (subject.role != Role::host) {
+    return failure(ErrorCode::refused, fmt::format("'{}' has the role {}; a host's is needed: {}",
+                                                   subject.name, to_string(subject.role), advice));
+  }
+  return failure(ErrorCode::refused,
+                 fmt::format("'{}' is that of another host than '{}': {}", subject.name, host, advice));
+}
+
 Result<OwnIdentity> check_identity(const std::string& folder) {
   std::error_code error;
   if (!fs::is_directory(folder, error)) {

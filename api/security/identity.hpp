@@ -34,6 +34,9 @@ struct OwnIdentity {
 /// not revoked, governance and permissions are signed. The error names the file and what to do.
 [[nodiscard]] Result<OwnIdentity> check_identity(const std::string& folder);
 
+/// refused: not the identity of the host of that name, so that no other host and no client would believe it.
+[[nodiscard]] Result<void> check_host_identity(const Subject& subject, std::string_view host);
+
 /// "folder/file".
 [[nodiscard]] std::string file_in(const std::string& folder, std::string_view file);
 

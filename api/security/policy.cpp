@@ -43,8 +43,10 @@ Topics name_topics() {
   return {"plc/v1/name_claim"};
 }
 
-std::vector<Grant> may_write(Role role) {
-  switch (role) {
+// What a host says goes into partitions that name it: nobody believes it in the name of another.
+std::vector<Grant> may_write(const Subject& subject) {
+  const std::string& name = subject.name;
+  switch (subject.role) {
     case Role::viewer:
       return {};
     case Role::operating:
@@ -54,20 +56,24 @@ std::vector<Grant> may_write(Role role) {
     case Role::admin:
       return {{{"plc/v1/event", "plc/v1/event_batch", "plc/v1/*/request", "plc/v1/eng/*"}, "h.*"}};
     case Role::host:
-      return {{status_topics()}, {answer_topics(), "c.*"}, {block_topics(), "b.*"}, {name_topics(), "n.*"}};
+      return {{status_topics(), "s." + name},
+              {answer_topics(), "c.*/" + name},
+              {block_topics(), "b.*/" + name},
+              {name_topics(), "n." + name}};
   }
   return {};
 }
 
-std::vector<Grant> may_read(Role role, const GuidPrefix& prefix) {
-  if (role == Role::viewer) return {{status_topics()}};
-  if (role == Role::host) {
-    return {{{"plc/v1/status/block_host"}},
-            {{"plc/v1/event", "plc/v1/event_batch", "plc/v1/*/request", "plc/v1/eng/*"}, "h.*"},
-            {block_topics(), "b.*"},
-            {name_topics(), "n.*"}};
+std::vector<Grant> may_read(const Subject& subject, const GuidPrefix& prefix) {
+  const std::string& name = subject.name;
+  if (subject.role == Role::viewer) return {{status_topics(), "s.*"}};
+  if (subject.role == Role::host) {
+    return {{{"plc/v1/status/block_host"}, "s.*"},
+            {{"plc/v1/event", "plc/v1/event_batch", "plc/v1/*/request", "plc/v1/eng/*"}, "h." + name},
+            {block_topics(), "b." + name + "/*"},
+            {name_topics(), "n." + name}};
   }
-  return {{status_topics()}, {answer_topics(), fmt::format("c.{:02x}*", fmt::join(prefix, ""))}};
+  return {{status_topics(), "s.*"}, {answer_topics(), fmt::format("c.{:02x}*", fmt::join(prefix, ""))}};
 }
 
 std::string criteria(std::string_view what, const std::vector<Grant>& grants) {
@@ -120,8 +126,7 @@ std::string permissions_text(const Subject& subject, const std::string& subject_
       "<validity><not_before>{}</not_before><not_after>{}</not_after></validity>\n"
       "<allow_rule>{}\n{}{}</allow_rule>\n<default>DENY</default></grant></permissions>\n",
       subject.name, escaped(subject_text), time_text(validity.not_before), time_text(validity.not_after),
-      kDomains, criteria("publish", may_write(subject.role)),
-      criteria("subscribe", may_read(subject.role, prefix)));
+      kDomains, criteria("publish", may_write(subject)), criteria("subscribe", may_read(subject, prefix)));
   return fmt::format(kDocument, "omg_shared_ca_permissions", grant);
 }
 

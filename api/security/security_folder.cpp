@@ -97,7 +97,7 @@ Validity validity_for(int days) {
   return {.not_before = now - kDay, .not_after = now + days * kDay};
 }
 
-Result<void> SecurityFolder::init(const std::string& folder) {
+Result<void> SecurityFolder::init(const std::string& folder, const std::string& host) {
   std::error_code error;
   const std::string path = fs::absolute(folder, error).lexically_normal().string();
   if (fs::exists(path, error) && !(fs::is_directory(path, error) && fs::is_empty(path, error))) {
@@ -113,7 +113,7 @@ Result<void> SecurityFolder::init(const std::string& folder) {
   if (auto written = write_authorities(authorities); !written) return written;
   auto opened = open(fresh);
   if (!opened) return std::unexpected(opened.error());
-  if (auto added = opened->add(Role::host, std::string(kFirstHost)); !added) return added;
+  if (auto added = opened->add(Role::host, host); !added) return added;
   if (auto renamed = rename_path(fresh, path); !renamed) return renamed;
   unfinished.finished();
   return sync_directory(fs::path(fresh).parent_path());

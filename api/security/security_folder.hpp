@@ -10,8 +10,6 @@ namespace plchost::security {
 
 inline constexpr int kDaysOfAuthority = 7300;
 inline constexpr int kDaysOfIdentity = 825;
-/// What init() calls the identity of the first host.
-inline constexpr std::string_view kFirstHost = "host";
 
 /// One identity of the folder.
 struct IdentityView {
@@ -26,9 +24,9 @@ struct IdentityView {
 /// Whoever has an object of this has the folder for himself. Files are replaced as a whole.
 class SecurityFolder {
  public:
-  /// A fresh folder with its authorities and the identity kFirstHost. All or nothing. already_exists: there
-  /// is something in it.
-  [[nodiscard]] static Result<void> init(const std::string& folder);
+  /// A fresh folder with its authorities and the identity of the plant's first host, which must be called as
+  /// the host is. All or nothing. already_exists: there is something in it.
+  [[nodiscard]] static Result<void> init(const std::string& folder, const std::string& host);
   /// not_found: init() has not made it.
   [[nodiscard]] static Result<SecurityFolder> open(const std::string& folder);
 

@@ -67,7 +67,7 @@ Result<void> ControlServer::Parts::open(PostLedger ledger) {
   if (auto entered = enter_domain(); !entered) return entered;
   if (auto claimed = claim_name(); !claimed) return claimed;
   if (auto opened = open_audit(); !opened) return opened;
-  auto made_sessions = SessionTable::create(participant.get());
+  auto made_sessions = SessionTable::create(participant.get(), options.host);
   if (!made_sessions) return std::unexpected(made_sessions.error());
   sessions = std::move(*made_sessions);
   intake->acknowledge_by(sessions->ack_writers());
@@ -182,10 +182,8 @@ Result<void> ControlServer::Parts::make_guard() {
   identity_watch.emplace(folder);
   const auto own = security::check_identity(folder);
   if (!own) return failure_in("identity", own.error());
-  if (own->subject.role != security::Role::host) {
-    return failure(ErrorCode::refused, fmt::format("identity '{}' of {} has the role {}; a host's is needed",
-                                                   own->subject.name, folder, to_string(own->subject.role)));
-  }
+  if (auto good = security::check_host_identity(own->subject, options.host); !good)
+    return failure_in("identity", good.error());
   auto known = security::KnownIdentities::load(folder);
   if (!known) return failure_in("identity", known.error());
   for (const std::string& problem : known->problems()) spdlog::warn("identity: {}", problem);

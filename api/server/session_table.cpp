@@ -20,13 +20,14 @@ constexpr std::array kStreamTopics{dds::kReply,    dds::kEventAck, dds::kObjectP
 
 }  // namespace
 
-Result<SessionTable> SessionTable::create(dds_entity_t participant) {
+Result<SessionTable> SessionTable::create(dds_entity_t participant, std::string host) {
   static_assert(kStreamTopics.size() == kStreams);
   SessionTable table;
   auto reaper = dds::EntityReaper::create();
   if (!reaper) return std::unexpected(std::move(reaper).error());
   table.reaper_ = std::move(*reaper);
   table.participant_ = participant;
+  table.host_ = std::move(host);
   for (std::size_t i = 0; i < kStreams; ++i) {
     auto topic = dds::make_topic(participant, kStreamTopics[i]);
     if (!topic) return std::unexpected(std::move(topic).error());
@@ -113,7 +114,7 @@ SessionTable::Session* SessionTable::session_of(const dds::Guid& client) {
     if (dropped_++ % 1000 == 0) spdlog::warn("{} busy clients are served, one more is not", kMaxSessions);
     return nullptr;
   }
-  auto publisher = dds::make_publisher(participant_, dds::client_partition(client.hex()));
+  auto publisher = dds::make_publisher(participant_, dds::client_partition(client.hex(), host_));
   if (!publisher) {
     spdlog::error("client {}: {}", client.hex(), publisher.error().describe());
     return nullptr;

@@ -28,7 +28,7 @@ class SessionTable {
   /// again.
   static constexpr Duration kIdle = std::chrono::seconds(10);
 
-  [[nodiscard]] static Result<SessionTable> create(dds_entity_t participant);
+  [[nodiscard]] static Result<SessionTable> create(dds_entity_t participant, std::string host);
 
   /// Follows which clients came (their reply or acknowledgement reader was discovered) and went.
   void follow_discovery();
@@ -81,6 +81,7 @@ class SessionTable {
 
   std::unique_ptr<dds::EntityReaper> reaper_;
   dds_entity_t participant_ = 0;
+  std::string host_;
   std::array<dds::Entity, kStreams> topics_;
   dds::Entity participants_;
   dds::Entity subscriptions_;

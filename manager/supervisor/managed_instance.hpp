@@ -25,7 +25,8 @@ inline constexpr Duration kAskInterval = std::chrono::milliseconds(500);
 inline constexpr Duration kAskAgain = std::chrono::seconds(2);
 
 // The life of one instance
-// =================//
+// ========================
+//
 //             release()            ready
 //   held ───────────────► setting_up ─────────► up ◄── adopting (a process that outlived a manager)
 //    ▲                      ▲   │ exit          │ │
@@ -74,8 +75,8 @@ inline constexpr Duration kAskAgain = std::chrono::seconds(2);
 // * State and heartbeat are read from the process's page. If another program has damaged it or cut it short,
 //   the process is asked for them over its control socket; the problem text says so. The page alone is no
 //   reason for an exception, nor for a signal.
-// * Time limits: nothing is begun after the limit of its command, also if it waited for the process or for the
-//   trial of a file meanwhile. The process gets the lesser of that limit and limit_of() from now.
+// * Time limits: nothing is begun after the limit of its command, also if it waited for the process, or for
+//   the trial of a file, meanwhile. The process gets the lesser of that limit and limit_of() from now.
 // * Commands: one at a time; another is answered with busy. What changes a process that is still setting_up
 // waits until
 //   it is up. The reply comes when the thing is done, or when the process ended instead, or at the limit.

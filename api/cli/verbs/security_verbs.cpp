@@ -1,10 +1,12 @@
 #include "api/cli/verbs/security_verbs.hpp"
 
+#include <array>
 #include <ctime>
 #include <memory>
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "api/security/identity.hpp"
 #include "api/security/security_folder.hpp"
@@ -22,6 +24,7 @@ constexpr std::time_t kDay = 86'400;
 struct Said {
   std::string directory = "/etc/plchost/security";
   std::string new_directory;  // of init: no variable of the environment stands for it
+  std::string first_host;     // of init
   std::string role;
   std::string name;
   std::int64_t days = security::kDaysOfIdentity;
@@ -41,11 +44,19 @@ int with_folder(const Said& said, Action action) {
   return action(*folder);
 }
 
-int init(const std::string& directory) {
-  return finish(SecurityFolder::init(directory),
-                fmt::format("{0}/{1}: the identity of the host, for [dds] identity\n{0}/authorities: keep it "
-                            "where no controller and no client is",
-                            directory, security::kFirstHost));
+std::string machine_name() {
+  std::array<char, 65> name{};
+  (void)::gethostname(name.data(), name.size() - 1);
+  return name.data();
+}
+
+int init(const std::string& directory, const std::string& said_host) {
+  const std::string host = said_host.empty() ? machine_name() : said_host;
+  return finish(
+      SecurityFolder::init(directory, host),
+      fmt::format("{0}/{1}: the identity of host '{1}', for its [dds] identity\n{0}/authorities: keep it "
+                  "where no controller and no client is",
+                  directory, host));
 }
 
 int add_identity(const Said& said) {
@@ -129,8 +140,10 @@ void add_security_verb(const Command& plcctl, CliSession& session) {
   const auto said = std::make_shared<Said>();
   const Command verb = plcctl.verb("security", "Who may do what: identities, their roles and certificates");
   verb.noun("init", "Make the authorities of a plant and the identity of its first host",
-            [said] { return init(said->new_directory); })
-      .argument("DIR", said->new_directory, "a folder that is not there yet, or empty");
+            [said] { return init(said->new_directory, said->first_host); })
+      .argument("DIR", said->new_directory, "a folder that is not there yet, or empty")
+      .optional("HOST", said->first_host,
+                "its name: [host] name of its configuration (default: this machine's)");
   const auto with_directory = [&](const Command& noun) -> const Command& {
     return noun.option("--directory", said->directory, kDirectory, kDirectoryVariable);
   };

@@ -13,12 +13,15 @@
 namespace plchost {
 
 Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const Source& source) {
+  auto publisher_of_status = dds::make_publisher(participant, dds::status_partition(source.host));
+  if (!publisher_of_status) return failure_in("publish status", publisher_of_status.error());
+  const dds_entity_t parent = publisher_of_status->get();
   std::vector<dds::Entity> topics;
   const auto make = [&](const dds::TopicInfo& info, const dds::Qos& qos) -> Result<dds::Entity> {
     auto topic = dds::make_topic(participant, info);
     if (!topic) return std::unexpected(topic.error());
     topics.push_back(std::move(*topic));
-    return dds::make_writer(participant, topics.back().get(), qos);
+    return dds::make_writer(parent, topics.back().get(), qos);
   };
   auto tasks = make(dds::kTaskStatus, dds::status_qos());
   auto statistics = make(dds::kTaskStatistics, dds::status_qos());
@@ -36,7 +39,7 @@ Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const 
     if (!*made) return failure_in("publish status", made->error());
   }
   auto transitions =
-      TransitionPublisher::create(participant, {source.host, source.pool->name(), source.epoch});
+      TransitionPublisher::create(participant, parent, {source.host, source.pool->name(), source.epoch});
   if (!transitions) return std::unexpected(transitions.error());
   StatusPublisher publisher(source,
                             TaskWatch(source.pool->name(), source.host, source.epoch,
@@ -56,6 +59,7 @@ Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const 
                                              StatusTable<plc_ApplicationStatus>(std::move(*applications)));
   publisher.presence_ = std::move(*presence);
   publisher.topics_ = std::move(topics);
+  publisher.publisher_ = *std::move(publisher_of_status);
   return publisher;
 }
 

@@ -99,6 +99,7 @@ class StatusPublisher {
   WriterWatch writers_;
   bool writers_changed_ = false;
   dds::Entity presence_;
+  dds::Entity publisher_;
   std::vector<dds::Entity> topics_;
   TimePoint next_objects_;
   TimePoint rested_;

@@ -13,10 +13,11 @@ constexpr Duration kRingRetry = std::chrono::milliseconds(100);
 
 }  // namespace
 
-Result<TransitionPublisher> TransitionPublisher::create(dds_entity_t participant, Source source) {
+Result<TransitionPublisher> TransitionPublisher::create(dds_entity_t participant, dds_entity_t publisher,
+                                                        Source source) {
   auto topic = dds::make_topic(participant, dds::kTransition);
   if (!topic) return std::unexpected(topic.error());
-  auto writer = dds::make_writer(participant, topic->get(), dds::transition_qos());
+  auto writer = dds::make_writer(publisher, topic->get(), dds::transition_qos());
   if (!writer) return std::unexpected(writer.error());
   return TransitionPublisher(std::move(source), *std::move(topic), *std::move(writer));
 }

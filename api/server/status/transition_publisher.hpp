@@ -22,7 +22,8 @@ class TransitionPublisher {
     std::string pool;
     std::uint64_t epoch = 0;
   };
-  [[nodiscard]] static Result<TransitionPublisher> create(dds_entity_t participant, Source source);
+  [[nodiscard]] static Result<TransitionPublisher> create(dds_entity_t participant, dds_entity_t publisher,
+                                                          Source source);
 
   /// Writes what is new of this instance; the number of the last one that was written, 0: none. What DDS does
   /// not take comes first the next time.

@@ -24,7 +24,7 @@ struct IdleClient {
       : participant(dds_create_participant(domain, nullptr, nullptr)),
         topic(dds::make_topic(participant.get(), dds::kReply).value()),
         own(dds::make_subscriber(participant.get(),
-                                 dds::client_partition(dds::guid_of(participant.get()).hex()))
+                                 dds::client_partition(dds::guid_of(participant.get()).hex(), dds::kAllHosts))
                 .value()),
         reader(dds::make_reader(own.get(), topic.get(), dds::reply_qos()).value()) {}
   [[nodiscard]] bool is_served() const {
@@ -213,7 +213,8 @@ TEST_F(RemoteCommand, WithAnotherWritersIdentityIsRefused) {
   const auto writer = dds::make_writer(publisher.get(), topic.get(), dds::request_qos()).value();
   const auto reply_topic = dds::make_topic(participant.get(), dds::kReply).value();
   const auto subscriber =
-      dds::make_subscriber(participant.get(), dds::client_partition(dds::guid_of(participant.get()).hex()))
+      dds::make_subscriber(participant.get(),
+                           dds::client_partition(dds::guid_of(participant.get()).hex(), dds::kAllHosts))
           .value();
   const auto reader = dds::make_reader(subscriber.get(), reply_topic.get(), dds::reply_qos()).value();
   plc_Request request{};

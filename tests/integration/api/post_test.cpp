@@ -180,7 +180,8 @@ TEST(RemotePost, ThatNobodyWaitsForIsAcknowledgedNevertheless) {
   const auto events = dds::make_topic(participant.get(), dds::kEvent).value();
   const auto acks = dds::make_topic(participant.get(), dds::kEventAck).value();
   const auto own =
-      dds::make_subscriber(participant.get(), dds::client_partition(dds::guid_of(participant.get()).hex()))
+      dds::make_subscriber(participant.get(),
+                           dds::client_partition(dds::guid_of(participant.get()).hex(), dds::kAllHosts))
           .value();
   const auto reader = dds::make_reader(own.get(), acks.get(), dds::ack_qos()).value();
   auto sut = EventPoster::create(participant.get(), events.get(), "hosta").value();

@@ -113,9 +113,9 @@ class Client {
   }
 
   template <class Type>
-  DataReader* reader(const std::string& topic, const std::string& partition = "") {
+  DataReader* reader(const std::string& topic, const std::string& partition = "s.*") {
     SubscriberQos subscriber_qos = SUBSCRIBER_QOS_DEFAULT;
-    if (!partition.empty()) subscriber_qos.partition().push_back(partition.c_str());
+    subscriber_qos.partition().push_back(partition.c_str());
     auto* const subscriber = made(participant_->create_subscriber(subscriber_qos), "a subscriber");
     DataReaderQos qos = DATAREADER_QOS_DEFAULT;
     qos.reliability().kind = RELIABLE_RELIABILITY_QOS;
@@ -149,7 +149,7 @@ class Client {
   }
 
   /// Where replies to this client go.
-  [[nodiscard]] std::string partition() const { return "c." + hex(bytes_of(participant_->guid())); }
+  [[nodiscard]] std::string partition() const { return "c." + hex(bytes_of(participant_->guid())) + "/*"; }
 
  private:
   template <class Type>

@@ -104,7 +104,7 @@ class Party {
     dds_delete_qos(qos);
     return made(writer, topic);
   }
-  [[nodiscard]] std::string partition() const { return "c." + hex(guid_of(participant_)); }
+  [[nodiscard]] std::string partition() const { return "c." + hex(guid_of(participant_)) + "/*"; }
 
  private:
   [[nodiscard]] dds_entity_t topic_of(const dds_topic_descriptor_t& type, const char* name) const {
@@ -175,9 +175,10 @@ plc_Reply call(const plc_TimeLimit& limit, const std::string& host, std::int32_t
 int run_client(std::uint32_t domain, const std::string& instance, const std::string& event,
                std::uint64_t count) {
   const Party party(domain, false);
-  const auto presence = party.reader(plc_Presence_desc, "plc/v1/presence", {});
-  const auto hosts = party.reader(plc_HostStatus_desc, "plc/v1/status/host", {});
-  const auto instances = party.reader(plc_InstanceStatus_desc, "plc/v1/status/instance", {.depth = 0});
+  const auto presence = party.reader(plc_Presence_desc, "plc/v1/presence", {.partition = "s.*"});
+  const auto hosts = party.reader(plc_HostStatus_desc, "plc/v1/status/host", {.partition = "s.*"});
+  const auto instances =
+      party.reader(plc_InstanceStatus_desc, "plc/v1/status/instance", {.depth = 0, .partition = "s.*"});
   plc_Presence present{};
   plc_HostStatus host{};
   wait_until(
@@ -291,7 +292,7 @@ class OldHost {
   static std::string client_of(dds_entity_t reader, const dds_sample_info_t& info) {
     auto* const writer = dds_get_matched_publication_data(reader, info.publication_handle);
     if (writer == nullptr) return "";
-    const std::string partition = "c." + hex(writer->participant_key);
+    const std::string partition = "c." + hex(writer->participant_key) + "/old";
     dds_builtintopic_free_endpoint(writer);
     return partition;
   }
@@ -335,9 +336,12 @@ class OldHost {
   }
 
   Party party_;
-  dds_entity_t presence_writer_ = party_.writer(plc_Presence_desc, "plc/v1/presence", {.deadline = true});
-  dds_entity_t host_writer_ = party_.writer(plc_HostStatus_desc, "plc/v1/status/host", {});
-  dds_entity_t instance_writer_ = party_.writer(plc_InstanceStatus_desc, "plc/v1/status/instance", {});
+  dds_entity_t presence_writer_ =
+      party_.writer(plc_Presence_desc, "plc/v1/presence", {.partition = "s.old", .deadline = true});
+  dds_entity_t host_writer_ =
+      party_.writer(plc_HostStatus_desc, "plc/v1/status/host", {.partition = "s.old"});
+  dds_entity_t instance_writer_ =
+      party_.writer(plc_InstanceStatus_desc, "plc/v1/status/instance", {.partition = "s.old"});
   dds_entity_t requests_ = party_.reader(plc_Request_desc, "plc/v1/op/request",
                                          {.transient_local = false, .depth = 0, .partition = "h.old"});
   dds_entity_t posts_ = party_.reader(plc_EventPost_desc, "plc/v1/event",

@@ -17,8 +17,9 @@ class SecuredBlocks : public SecuredHost {
 };
 
 TEST_F(SecuredBlocks, GoBetweenHostsOfAPlant) {
+  ASSERT_TRUE(plant().add(security::Role::host, "north"));
   ASSERT_TRUE(plant().add(security::Role::host, "south"));
-  Side north(domain_, "north", 1, "press", {"--identity", folder("host")});
+  Side north(domain_, "north", 1, "press", {"--identity", folder("north")});
   Side south(domain_, "south", 2, "packer", {"--identity", folder("south")});
   EXPECT_TRUE(goes(north, south, south.address_at(2), kPatience));
   EXPECT_TRUE(goes(south, north, north.address_at(1), kPatience));
@@ -26,9 +27,10 @@ TEST_F(SecuredBlocks, GoBetweenHostsOfAPlant) {
 
 TEST_F(SecuredBlocks, DoNotGoToAHostOfAnotherPlant) {
   const std::string other = base_ + "/other";
-  ASSERT_TRUE(security::SecurityFolder::init(other));
-  Side north(domain_, "north", 1, "press", {"--identity", folder("host")});
-  Side south(domain_, "south", 2, "packer", {"--identity", other + "/host"});
+  ASSERT_TRUE(security::SecurityFolder::init(other, "south"));
+  ASSERT_TRUE(plant().add(security::Role::host, "north"));
+  Side north(domain_, "north", 1, "press", {"--identity", folder("north")});
+  Side south(domain_, "south", 2, "packer", {"--identity", other + "/south"});
   EXPECT_FALSE(goes(north, south, south.address_at(2), std::chrono::seconds(3)));
 }
 

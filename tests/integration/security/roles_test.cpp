@@ -83,9 +83,10 @@ TEST_F(Roles, APatchedClientMeetsNobodyWhereItsRoleDoesNotReach) {
   const auto own = client.write(dds::kOperatorRequest, "h.cell");
   const auto forbidden = client.write(dds::kEngineerRequest, "h.cell");
   const auto chunks = client.write(dds::kDownloadChunk, "h.cell");
-  const auto presence = client.write(dds::kPresence, "");
+  const auto presence = client.write(dds::kPresence, "s.cell");
   const auto others = client.read(dds::kReply, "c.*");
-  const auto own_replies = client.read(dds::kReply, dds::client_partition(client.guid().hex()));
+  const auto own_replies =
+      client.read(dds::kReply, dds::client_partition(client.guid().hex(), dds::kAllHosts));
   ASSERT_TRUE(own > 0 && forbidden > 0 && chunks > 0 && presence > 0 && others > 0)
       << "it is not patched enough";
   EXPECT_TRUE(RawClient::meets_reader(own)) << "what it may write does not work either";

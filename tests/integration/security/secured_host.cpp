@@ -28,7 +28,7 @@ SecuredHost::SecuredHost()
       plant_folder_(base_ + "/plant") {
   std::filesystem::remove_all(base_);
   std::filesystem::create_directory(base_);
-  EXPECT_TRUE(security::SecurityFolder::init(plant_folder_));
+  EXPECT_TRUE(security::SecurityFolder::init(plant_folder_, "cell"));
   for (const Role role : {Role::viewer, Role::operating, Role::engineer, Role::admin}) {
     EXPECT_TRUE(plant().add(role, std::string(to_string(role))));
   }
@@ -53,11 +53,12 @@ bool SecuredHost::sees_host(const std::string& identity_folder, const char* seco
   return seen.code == 0 && seen.output.find("cell") != std::string::npos;
 }
 
-RawClient::RawClient(const OwnDomain& domain, const std::string& identity_folder, bool patched) {
+RawClient::RawClient(const OwnDomain& domain, const std::string& identity_folder, bool patched,
+                     dds::Role role) {
   dds::DomainOptions options;
   options.domain = domain.number();
   options.identity = identity_folder;
-  std::string configuration = dds::domain_configuration(dds::Role::client, options).value();
+  std::string configuration = dds::domain_configuration(role, options).value();
   if (patched) {
     const std::string plugin = "path=\"dds_security_ac\"";
     const auto at = configuration.find(plugin);
@@ -74,17 +75,17 @@ dds_entity_t RawClient::keep(Result<dds::Entity> made) {
   return entities_.back().get();
 }
 
-dds_entity_t RawClient::write(const dds::TopicInfo& topic, const std::string& partition) {
+dds_entity_t RawClient::write(const dds::TopicInfo& topic, const std::string& partition,
+                              const dds::Qos& qos) {
   const dds_entity_t made = keep(dds::make_topic(participant(), topic));
   if (made == 0) return 0;
-  return keep(
-      dds::make_writer(keep(dds::make_publisher(participant(), partition)), made, dds::request_qos()));
+  return keep(dds::make_writer(keep(dds::make_publisher(participant(), partition)), made, qos));
 }
 
-dds_entity_t RawClient::read(const dds::TopicInfo& topic, const std::string& partition) {
+dds_entity_t RawClient::read(const dds::TopicInfo& topic, const std::string& partition, const dds::Qos& qos) {
   const dds_entity_t made = keep(dds::make_topic(participant(), topic));
   if (made == 0) return 0;
-  return keep(dds::make_reader(keep(dds::make_subscriber(participant(), partition)), made, dds::reply_qos()));
+  return keep(dds::make_reader(keep(dds::make_subscriber(participant(), partition)), made, qos));
 }
 
 bool RawClient::meets_reader(dds_entity_t writer, Duration within) {

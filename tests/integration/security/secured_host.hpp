@@ -26,7 +26,7 @@ class SecuredHost : public testing::Test {
   [[nodiscard]] std::string folder(const std::string& identity) const {
     return plant_folder_ + "/" + identity;
   }
-  void start() { host_.start_server({"--identity", folder("host")}); }
+  void start() { host_.start_server({"--identity", folder("cell")}); }
   /// plcctl with an identity; empty: with none.
   [[nodiscard]] RunResult run(const std::string& identity, std::vector<std::string> arguments) const {
     return run_with_folder(identity.empty() ? "" : folder(identity), std::move(arguments));
@@ -46,8 +46,10 @@ class SecuredHost : public testing::Test {
 /// A participant that keeps to no rule of ours: it writes and reads what DDS lets it.
 class RawClient {
  public:
-  /// `patched`: with an access control plugin that allows its own process everything.
-  RawClient(const OwnDomain& domain, const std::string& identity_folder, bool patched = false);
+  /// `patched`: with an access control plugin that allows its own process everything. `role`: clients and
+  /// servers see each other, clients do not see clients.
+  RawClient(const OwnDomain& domain, const std::string& identity_folder, bool patched = false,
+            dds::Role role = dds::Role::client);
   RawClient(const RawClient&) = delete;
   RawClient& operator=(const RawClient&) = delete;
 
@@ -56,8 +58,10 @@ class RawClient {
   [[nodiscard]] dds_entity_t participant() const { return participant_.get(); }
   [[nodiscard]] dds::Guid guid() const { return dds::guid_of(participant_.get()); }
   /// A writer or reader in that partition. 0: DDS refused it.
-  dds_entity_t write(const dds::TopicInfo& topic, const std::string& partition);
-  dds_entity_t read(const dds::TopicInfo& topic, const std::string& partition);
+  dds_entity_t write(const dds::TopicInfo& topic, const std::string& partition,
+                     const dds::Qos& qos = dds::request_qos());
+  dds_entity_t read(const dds::TopicInfo& topic, const std::string& partition,
+                    const dds::Qos& qos = dds::reply_qos());
 
   /// Whether it meets its other end within that time.
   static bool meets_reader(dds_entity_t writer, Duration within = kPatience);

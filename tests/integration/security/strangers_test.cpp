@@ -27,7 +27,7 @@ TEST_F(Strangers, WithoutACertificateSeeNobody) {
 TEST_F(Strangers, WithACertificateOfAnotherAuthoritySeeNobody) {
   start();
   const std::string other = base_ + "/other";
-  ASSERT_TRUE(SecurityFolder::init(other));
+  ASSERT_TRUE(SecurityFolder::init(other, "cell"));
   ASSERT_TRUE(SecurityFolder::open(other)->add(security::Role::admin, "admin"));
   EXPECT_FALSE(sees_host(other + "/admin", "2"));
   operator_is_served();
@@ -37,7 +37,7 @@ TEST_F(Strangers, WithACertificateOfAnotherAuthoritySeeNobody) {
 TEST_F(Strangers, WithAForgedSubjectMeetNobody) {
   start();
   const std::string other = base_ + "/other";
-  ASSERT_TRUE(SecurityFolder::init(other));
+  ASSERT_TRUE(SecurityFolder::init(other, "cell"));
   ASSERT_TRUE(SecurityFolder::open(other)->add(security::Role::operating, "operator"));
   for (const char* const file : {"permissions_ca.pem", "governance.p7s", "permissions.p7s"}) {
     std::filesystem::copy_file(folder("operator") + "/" + file, other + "/operator/" + file,
@@ -123,7 +123,7 @@ TEST_F(Strangers, ThatWereRevokedSeeNobodyAfterTheServerBeganWithTheNewList) {
 }
 
 TEST_F(Strangers, ThatTheHostsFolderDoesNotKnowAreToldSoUntilItDoes) {
-  const std::string known = folder("host") + "/known/operator.pem";
+  const std::string known = folder("cell") + "/known/operator.pem";
   std::filesystem::rename(known, base_ + "/operator.pem");
   start();
   const pid_t server = host_.server().pid();
@@ -141,7 +141,7 @@ TEST_F(Strangers, ThatTheHostsFolderDoesNotKnowAreToldSoUntilItDoes) {
 TEST_F(Strangers, ABrokenFileInTheHostsFolderChangesNothing) {
   start();
   operator_is_served();
-  std::ofstream(folder("host") + "/certificate.pem") << "broken\n";
+  std::ofstream(folder("cell") + "/certificate.pem") << "broken\n";
   std::this_thread::sleep_for(std::chrono::seconds(2));
   operator_is_served();
 }

@@ -5,13 +5,13 @@
 
 plant=$cell/plant
 for folder in "$plant" "$cell/other"; do
-  plcctl security init "$folder" >/dev/null
+  plcctl security init "$folder" cell >/dev/null
   PLCHOST_SECURITY=$folder plcctl security add-identity operator anna >/dev/null
 done
 PLCHOST_SECURITY=$plant plcctl security add-identity viewer panel >/dev/null
 
 write_host cell "$first_core"
-printf '[dds]\nidentity = "plant/host"\n' >>"$cell/cell.toml"
+printf '[dds]\nidentity = "plant/cell"\n' >>"$cell/cell.toml"
 write_instance cell packer1 "$first_core" packer 'share_core = true' 'autostart = false'
 start_manager cell
 as() { plcctl --identity "$plant/$1" "${@:2}"; }

@@ -6,16 +6,16 @@ plant=$cell/plant
 export PLCHOST_SECURITY=$plant
 as() { plcctl --identity "$plant/$1" "${@:2}"; }
 
-PLCHOST_SECURITY=$cell/elsewhere plcctl security init "$plant" >/dev/null
+PLCHOST_SECURITY=$cell/elsewhere plcctl security init "$plant" cell1 >/dev/null
 [ ! -e "$cell/elsewhere" ] || fail "the environment goes before the argument"
 plcctl security add-identity viewer panel >/dev/null
 plcctl security add-identity operator anna >/dev/null
 plcctl security add-identity engineer otto >/dev/null
 is "$(plcctl security show --json | jq -r 'map(.name + " " + .role + " " + .state) | join(",")')" \
-  "anna operator valid,host host valid,otto engineer valid,panel viewer valid" || fail "what show shows"
+  "anna operator valid,cell1 host valid,otto engineer valid,panel viewer valid" || fail "what show shows"
 
 write_host cell1 "$first_core"
-printf '[dds]\nidentity = "plant/host"\n' >>"$cell/cell1.toml"
+printf '[dds]\nidentity = "plant/cell1"\n' >>"$cell/cell1.toml"
 write_instance cell1 packer1 "$first_core" packer 'scheduler = "CmpScheduleTimer"'
 "$BIN/plchostd" --check-config "$cell/cell1.toml" >/dev/null || fail "the configuration is not accepted"
 start_manager cell1
@@ -56,7 +56,7 @@ more() { [ "$(report)" -gt "$cycles" ]; }
 until_true 10 more
 
 echo "- a key that others read is refused where the configuration is checked"
-chmod 644 "$plant/host/key.pem"
+chmod 644 "$plant/cell1/key.pem"
 refused_config() { "$BIN/plchostd" --check-config "$cell/cell1.toml"; }
 refused "chmod 600" refused_config
 

@@ -20,7 +20,7 @@ for process in server manager instance; do
     kill -STOP "$pid"
     code=0
     "$BIN/plcctl" --timeout 1 start instance line1 >"$cell/said" 2>&1 || code=$?
-    is "$code" 1 || fail "$process stopped: start ends with $code"
+    is "$code" 3 || fail "$process stood still: start ends with $code"
     sleep "$(awk "BEGIN { print $seconds - 1 }")"
     kill -CONT "$pid"
     # Another request goes the same way, behind it.

@@ -57,7 +57,7 @@ TEST_F(AnIdentity, WithAlteredPermissionsIsRefused) {
 
 TEST_F(AnIdentity, OfAnotherPlantIsRefused) {
   const std::string other = base + "/other";
-  ASSERT_TRUE(SecurityFolder::init(other));
+  ASSERT_TRUE(SecurityFolder::init(other, "host"));
   for (const std::string_view ca : {kIdentityAuthorityFile, kRevocationsFile}) {
     std::filesystem::copy_file(file_in(other + "/host", ca), file("anna", ca),
                                std::filesystem::copy_options::overwrite_existing);

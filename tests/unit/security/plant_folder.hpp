@@ -19,7 +19,7 @@ class PlantFolder : public testing::Test {
   void SetUp() override {
     std::filesystem::remove_all(base);
     std::filesystem::create_directory(base);
-    ASSERT_TRUE(SecurityFolder::init(plant));
+    ASSERT_TRUE(SecurityFolder::init(plant, "host"));
   }
   void TearDown() override { std::filesystem::remove_all(base); }
 

@@ -24,7 +24,7 @@ TEST_F(TheSecurityFolder, IsMadeWithAHostWhoseIdentityIsAccepted) {
 
 TEST_F(TheSecurityFolder, IsNotMadeWhereSomethingIs) {
   const std::string before = contents(file("host", kCertificateFile));
-  const auto made = SecurityFolder::init(plant);
+  const auto made = SecurityFolder::init(plant, "host");
   ASSERT_FALSE(made);
   EXPECT_EQ(made.error().code, ErrorCode::already_exists);
   EXPECT_EQ(contents(file("host", kCertificateFile)), before);
@@ -177,7 +177,7 @@ TEST_F(TheSecurityFolder, AnIdentityIsKnownUntilItsCertificateEnds) {
 
 TEST_F(TheSecurityFolder, AStrangersCertificateIsNotKnown) {
   const std::string other = base + "/other";
-  ASSERT_TRUE(SecurityFolder::init(other));
+  ASSERT_TRUE(SecurityFolder::init(other, "host"));
   ASSERT_TRUE(SecurityFolder::open(other)->add(Role::admin, "mallory"));
   std::filesystem::copy(other + "/mallory/certificate.pem", file("host", "known/mallory.pem"));
   write(file("host", "known/junk.pem"), "-----BEGIN CERTIFICATE-----\nAAAA\n-----END CERTIFICATE-----\n");

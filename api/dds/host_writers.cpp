@@ -1,0 +1,44 @@
+#include "api/dds/host_writers.hpp"
+
+#include <cstdint>
+
+namespace plchost::dds {
+
+namespace {
+
+// One that is in several partitions speaks for nobody.
+std::string host_of(const dds_qos_t* qos) {
+  std::uint32_t count = 0;
+  char** names = nullptr;
+  if (qos == nullptr || !dds_qget_partition(qos, &count, &names)) return "";
+  std::string host;
+  if (count == 1) host = host_in_partition(names[0]);
+  for (std::uint32_t i = 0; i < count; ++i) dds_free(names[i]);
+  dds_free(names);
+  return host;
+}
+
+}  // namespace
+
+std::string_view host_in_partition(std::string_view partition) noexcept {
+  if (const auto slash = partition.rfind('/'); slash != std::string_view::npos) {
+    return partition.substr(slash + 1);
+  }
+  const auto dot = partition.find('.');
+  return dot == std::string_view::npos ? std::string_view() : partition.substr(dot + 1);
+}
+
+bool HostWriters::speaks_for(std::string_view host, dds_entity_t reader, const dds_sample_info_t& info) {
+  auto known = hosts_.find(info.publication_handle);
+  if (known == hosts_.end()) {
+    dds_builtintopic_endpoint_t* const endpoint =
+        dds_get_matched_publication_data(reader, info.publication_handle);
+    if (endpoint == nullptr) return false;
+    if (hosts_.size() >= kMost) hosts_.clear();
+    known = hosts_.emplace(info.publication_handle, host_of(endpoint->qos)).first;
+    dds_builtintopic_free_endpoint(endpoint);
+  }
+  return !host.empty() && known->second == host;
+}
+
+}  // namespace plchost::dds

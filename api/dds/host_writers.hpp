@@ -1,0 +1,64 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <unordered_map>
+
+#include <dds/dds.h>
+
+#include "api/dds/samples.hpp"
+#include "api/dds/text.hpp"
+
+namespace plchost::dds {
+
+/// Which host is behind a writer: the one that the writer's partition names. A writer only gets into a
+/// partition that the permission of its identity allows, which each receiver checks, and the permission of a
+/// host names that host. What one host says in the name of another is therefore found by its partition. One
+/// thread.
+class HostWriters {
+ public:
+  /// Whether the writer of that sample may speak for `host`. False, too, if that writer is gone and was not
+  /// seen before.
+  [[nodiscard]] bool speaks_for(std::string_view host, dds_entity_t reader, const dds_sample_info_t& info);
+
+ private:
+  static constexpr std::size_t kMost = 16384;
+
+  std::unordered_map<dds_instance_handle_t, std::string> hosts_;
+};
+
+/// The host that a writer's partition names; empty: it names none. See topics.hpp.
+[[nodiscard]] std::string_view host_in_partition(std::string_view partition) noexcept;
+
+/// As take_all(), of the samples that the host has written that they speak of.
+template <class Sample, std::size_t Max = 64, class Function>
+void take_told(dds_entity_t reader, HostWriters& writers, Function use) {
+  take_all<Sample, Max>(reader, [&](const Sample& sample, const dds_sample_info_t& info) {
+    // Nobody has written that an instance has no writer any more.
+    const bool untold = info.instance_state == DDS_IST_NOT_ALIVE_NO_WRITERS && !info.valid_data;
+    if (untold || writers.speaks_for(text_of(sample.host), reader, info)) use(sample, info);
+  });
+}
+
+/// The same, of the valid ones only.
+template <class Sample, std::size_t Max = 64, class Function>
+void take_valid_told(dds_entity_t reader, HostWriters& writers, Function use) {
+  take_told<Sample, Max>(reader, writers, [&use](const Sample& sample, const dds_sample_info_t& info) {
+    if (info.valid_data) use(sample, info);
+  });
+}
+
+/// The same, for what is kept of each instance: `update(handle, sample)`, or `forget(handle)` when it was
+/// disposed.
+template <class Sample, class Update, class Forget>
+void take_changes(dds_entity_t reader, HostWriters& writers, Update update, Forget forget) {
+  take_told<Sample>(reader, writers, [&](const Sample& sample, const dds_sample_info_t& info) {
+    if (info.instance_state == DDS_IST_NOT_ALIVE_DISPOSED) {
+      forget(info.instance_handle);
+    } else if (info.valid_data) {
+      update(info.instance_handle, sample);
+    }
+  });
+}
+
+}  // namespace plchost::dds
