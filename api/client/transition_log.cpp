@@ -28,14 +28,11 @@ std::optional<std::uint64_t> last_number(const plc_InstanceStatus& status) {
 std::vector<TransitionView> TransitionLog::take() {
   std::vector<TransitionView> news;
   if (!reader_) return news;
+  const TimePoint now = MonotonicClock::now();
   dds::take_valid_told<plc_Transition>(reader_.get(), writers_,
                                        [&](const plc_Transition& sample, const auto& /*info*/) {
-                                         if (Seen& server = seen(sample); sample.epoch >= server.epoch) {
-                                           server.epoch = sample.epoch;
-                                           server.written = sample.sequence_number;
-                                         }
                                          TransitionView view;
-                                         if (!is_news(sample, view.missed)) return;
+                                         if (!is_news(sample, now, view.missed)) return;
                                          view.sample = sample;
                                          view.sample.ext = {};  // lives on loan only
                                          news.push_back(view);
@@ -47,10 +44,12 @@ TransitionLog::Seen& TransitionLog::seen(const plc_Transition& sample) {
   return seen_[{std::string(dds::text_of(sample.host)), std::string(dds::text_of(sample.instance))}];
 }
 
-bool TransitionLog::is_news(const plc_Transition& sample, std::uint64_t& missed) {
+bool TransitionLog::is_news(const plc_Transition& sample, TimePoint now, std::uint64_t& missed) {
   Seen& before = seen(sample);
-  if (sample.stream < before.stream) return false;
-  const bool first = sample.stream > before.stream;
+  if (!before.epoch.accept(sample.epoch, now)) return false;
+  before.written = sample.sequence_number;
+  // Not a greater one: the host's clock may have been set back.
+  const bool first = sample.stream != before.stream;
   if (!first && sample.sequence_number <= before.last) return false;
   missed = first ? 0 : sample.sequence_number - before.last - 1;
   before.stream = sample.stream;
@@ -63,7 +62,8 @@ bool TransitionLog::has_all(const plc_InstanceStatus& status) const {
   if (!told || *told == 0) return told.has_value();
   const auto found =
       seen_.find({std::string(dds::text_of(status.host)), std::string(dds::text_of(status.instance))});
-  return found != seen_.end() && found->second.epoch == status.epoch && found->second.written >= *told;
+  return found != seen_.end() && found->second.epoch.value() == status.epoch &&
+         found->second.written >= *told;
 }
 
 }  // namespace plchost

@@ -8,6 +8,7 @@
 
 #include <control.h>
 
+#include "api/client/newest_epoch.hpp"
 #include "api/dds/entity.hpp"
 #include "api/dds/host_writers.hpp"
 
@@ -34,14 +35,14 @@ class TransitionLog {
   /// Whether everything has been taken that this instance's host had written when it wrote this status of it.
   [[nodiscard]] bool has_all(const plc_InstanceStatus& status) const;
   /// One more. Nothing: it was there before. Public for tests.
-  [[nodiscard]] bool is_news(const plc_Transition& sample, std::uint64_t& missed);
+  [[nodiscard]] bool is_news(const plc_Transition& sample, TimePoint now, std::uint64_t& missed);
 
  private:
   struct Seen {
     std::uint64_t stream = 0;
     std::uint64_t last = 0;
     // What its present server has written, also if it was no news: it begins with what is kept.
-    std::uint64_t epoch = 0;
+    NewestEpoch epoch;
     std::uint64_t written = 0;
   };
   [[nodiscard]] Seen& seen(const plc_Transition& sample);

@@ -18,15 +18,15 @@ bool comes_before(const HostClaim& one, const HostClaim& other) {
 void HostNumbers::claim(const HostClaim& other, TimePoint now) {
   if (other.host == own_.host || !check_name("host", other.host, kMaxHostName)) return;
   if (other.number == 0 || other.number > kMaxHostNumber) return;
-  HostClaim& known = claims_[other.host];
-  if (other.epoch < known.epoch) return;
-  known = other;
+  if (!epochs_[other.host].accept(other.epoch, now)) return;
+  claims_[other.host] = other;
   if (ahead()) last_ahead_ = now;
 }
 
 void HostNumbers::forget(const std::string& host, TimePoint now) {
   if (ahead()) last_ahead_ = now;
   claims_.erase(host);
+  epochs_.erase(host);
 }
 
 std::map<std::uint16_t, HostClaim> HostNumbers::others() const {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "api/client/newest_epoch.hpp"
 #include "api/dds/guid.hpp"
 #include "shm/base/time.hpp"
 #include "shm/block_driver/directory_layout.hpp"
@@ -33,7 +34,7 @@ class HostNumbers {
 
   explicit HostNumbers(HostClaim own) : own_(std::move(own)) {}
 
-  /// Ignored: of this host, of a number that cannot be, or older than what is known.
+  /// Ignored: of this host, of a number that cannot be, or of a server that was replaced (NewestEpoch).
   void claim(const HostClaim& other, TimePoint now);
   void forget(const std::string& host, TimePoint now);
 
@@ -51,6 +52,7 @@ class HostNumbers {
  private:
   HostClaim own_;
   std::map<std::string, HostClaim> claims_;
+  std::map<std::string, NewestEpoch> epochs_;  // of the same hosts
   std::optional<TimePoint> last_ahead_;
 };
 

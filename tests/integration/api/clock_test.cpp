@@ -8,6 +8,7 @@
 #include "api/client/batch_poster.hpp"
 #include "api/client/event_poster.hpp"
 #include "api/client/file_sender.hpp"
+#include "api/client/transition_log.hpp"
 #include "api/dds/domain.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"
@@ -69,6 +70,38 @@ TEST_F(ClockSetBack, LetsBatchesBeAcknowledgedAgain) {
   EXPECT_FALSE(sut.acknowledged());
   sut.on_ack(ack(source, kOlder, 2), now_ + 2 * kServerGone);
   EXPECT_TRUE(sut.acknowledged());
+}
+
+TEST_F(ClockSetBack, LetsChangesOfStateBeToldAgain) {
+  TransitionLog sut;
+  const auto transition = [](std::uint64_t epoch, std::uint64_t stream, std::uint64_t number) {
+    plc_Transition sample{};
+    dds::copy_text(sample.host, "hosta");
+    dds::copy_text(sample.instance, "line1");
+    sample.epoch = epoch;
+    sample.stream = stream;
+    sample.sequence_number = number;
+    return sample;
+  };
+  std::uint64_t missed = 0;
+  EXPECT_TRUE(sut.is_news(transition(kNewer, kNewer, 5), now_, missed));
+  EXPECT_FALSE(sut.is_news(transition(kNewer, kNewer, 5), now_, missed));
+  EXPECT_FALSE(sut.is_news(transition(kOlder, kOlder, 1), now_, missed)) << "it may be a late last word";
+  now_ += 2 * kServerGone;
+  EXPECT_TRUE(sut.is_news(transition(kOlder, kOlder, 1), now_, missed));
+  EXPECT_EQ(missed, 0U);
+  EXPECT_TRUE(sut.is_news(transition(kOlder, kOlder, 3), now_, missed));
+  EXPECT_EQ(missed, 1U);
+  EXPECT_TRUE(sut.is_news(transition(kOlder, kOlder - 1, 1), now_, missed)) << "its numbers began anew";
+  plc_InstanceStatus status{};
+  dds::copy_text(status.host, "hosta");
+  dds::copy_text(status.instance, "line1");
+  status.epoch = kOlder;
+  plc_KeyValue entry{};
+  dds::copy_text(entry.name, dds::kTransitionsEntry);
+  dds::copy_text(entry.value, "1");
+  status.ext = {._maximum = 1, ._length = 1, ._buffer = &entry, ._release = false};
+  EXPECT_TRUE(sut.has_all(status));
 }
 
 TEST_F(ClockSetBack, LetsADownloadBeginAnew) {

@@ -121,6 +121,9 @@ class Client {
     qos.reliability().kind = RELIABLE_RELIABILITY_QOS;
     qos.durability().kind = TRANSIENT_LOCAL_DURABILITY_QOS;
     qos.history().kind = KEEP_ALL_HISTORY_QOS;
+    qos.resource_limits().max_instances = 4096;
+    qos.resource_limits().max_samples_per_instance = 64;
+    qos.resource_limits().max_samples = 4096 * 64;
     qos.endpoint().history_memory_policy = eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
     return made(subscriber->create_datareader(topic_of<Type>(topic), qos), "a reader of " + topic);
   }

@@ -122,6 +122,20 @@ TEST_F(Strangers, ThatWereRevokedSeeNobodyAfterTheServerBeganWithTheNewList) {
   EXPECT_THAT(run("operator", {"list", "hosts"}).errors, HasSubstr("certificate revoked"));
 }
 
+TEST_F(Strangers, WithAnOlderCertificateOfARevokedNameSeeNobodyAlsoWhenTheNameIsThereAgain) {
+  const std::string copy = base_ + "/kept";
+  std::filesystem::copy(folder("operator"), copy);
+  ASSERT_TRUE(plant().renew("operator"));
+  start();
+  ASSERT_TRUE(sees_host(copy)) << "until the name is revoked";
+  ASSERT_TRUE(plant().revoke("operator"));
+  ASSERT_TRUE(plant().add(security::Role::operating, "operator"));
+  EXPECT_EQ(host_.server().wait(), 0) << "it ends in order, and its manager starts it again";
+  start();
+  operator_is_served();
+  EXPECT_FALSE(sees_host(copy, "2"));
+}
+
 TEST_F(Strangers, ThatTheHostsFolderDoesNotKnowAreToldSoUntilItDoes) {
   const std::string known = folder("cell") + "/known/operator.pem";
   std::filesystem::rename(known, base_ + "/operator.pem");

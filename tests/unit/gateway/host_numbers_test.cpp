@@ -50,6 +50,17 @@ TEST(HostNumbers, AHostWhoseNumberAnotherHasLongerDoesNotServe) {
   EXPECT_TRUE(sut.others().empty()) << "its own number is nobody else's";
 }
 
+TEST(HostNumbers, AHostWhoseClockWasSetBackIsHeardAgain) {
+  HostNumbers sut(claim("north", 1));
+  sut.claim(claim("south", 2, 100, 9), kStart);
+  sut.claim(claim("south", 3, 100, 7), kStart);
+  EXPECT_TRUE(sut.others().contains(2)) << "it may be a late last word";
+  sut.claim(claim("south", 3, 100, 7), kStart + 2 * kServerGone);
+  EXPECT_FALSE(sut.others().contains(2));
+  ASSERT_TRUE(sut.others().contains(3));
+  EXPECT_EQ(sut.others().at(3).epoch, 7U);
+}
+
 TEST(HostNumbers, TheNumberIsFreeSomeTimeAfterItsOwnerHasGone) {
   constexpr Duration kLittle = std::chrono::milliseconds(1);
   HostNumbers sut(claim("north", 1, 100));
