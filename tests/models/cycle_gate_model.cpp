@@ -1,0 +1,75 @@
+// The control thread's moment in which no thread is in code of the application.
+
+#include "schedulers/task/cycle_gate.hpp"
+#include "tests/models/checker/model.hpp"
+#include "tests/models/model_clock.hpp"
+
+namespace plchost::models {
+namespace {
+
+struct Shared {
+  ModelClock clock;
+  CycleGate gate;
+  CycleGate::Seat seat;
+  CycleGate::Seat other_seat;
+  int state = 0;  // plain: of the application, and of who looks while the gate is closed
+  int other_state = 0;
+  bool looked = false;
+};
+
+Shared& make(Scene& scene) {
+  auto& shared = scene.make<Shared>();
+  scene.name(shared.gate, "gate");
+  scene.name(shared.seat, "seat");
+  scene.name(shared.other_seat, "other seat");
+  scene.name(shared.state, "state");
+  return shared;
+}
+
+void run_cycles(Shared& shared, CycleGate::Seat& seat, int& state, int cycles) {
+  for (int i = 0; i < cycles; ++i) {
+    const CycleGate::Stay within(&shared.gate, seat, shared.clock);
+    ++state;
+  }
+}
+
+// A data race on what the cycles use is a cycle in the moment.
+void look(Shared& shared) {
+  shared.gate.close();
+  if (!shared.seat.taken() && !shared.other_seat.taken()) {
+    ++shared.state;
+    ++shared.other_state;
+    shared.looked = true;
+  }
+  shared.gate.open(shared.clock);
+}
+
+void two_tasks_one_look(Scene& scene) {
+  Shared& shared = make(scene);
+  scene.thread("task", [&] { run_cycles(shared, shared.seat, shared.state, 1); });
+  scene.thread("other task", [&] { run_cycles(shared, shared.other_seat, shared.other_state, 1); });
+  scene.thread("control", [&] { look(shared); });
+  scene.at_end([&] {
+    require(shared.state == (shared.looked ? 2 : 1), "a cycle or a look is lost");
+    observe(shared.looked ? 1 : 0);
+  });
+  scene.outcomes(3);  // the look succeeds in some executions, and in some it does not
+}
+
+void two_cycles_two_looks(Scene& scene) {
+  Shared& shared = make(scene);
+  scene.thread("task", [&] { run_cycles(shared, shared.seat, shared.state, 2); });
+  scene.thread("control", [&] {
+    look(shared);
+    look(shared);
+  });
+}
+
+}  // namespace
+}  // namespace plchost::models
+
+int main(int argc, char** argv) {
+  using namespace plchost::models;
+  return run(argc, argv,
+             {{"two_tasks_one_look", two_tasks_one_look}, {"two_cycles_two_looks", two_cycles_two_looks}});
+}

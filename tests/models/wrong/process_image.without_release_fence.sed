@@ -1,0 +1,2 @@
+# shm/plc_process_image.h: a new word can be seen before the slot says that it is being written
+s/__atomic_thread_fence\(__ATOMIC_RELEASE\);//

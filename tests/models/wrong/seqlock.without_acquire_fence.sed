@@ -1,0 +1,2 @@
+# shm/base/seqlock.hpp: the sequence can be looked at again before the words are read
+s/std::atomic_thread_fence\(std::memory_order_acquire\);//

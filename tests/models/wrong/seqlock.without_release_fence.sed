@@ -1,0 +1,2 @@
+# shm/base/seqlock.hpp: a new word can be seen before the odd sequence
+s/std::atomic_thread_fence\(std::memory_order_release\);//
