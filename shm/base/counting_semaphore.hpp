@@ -13,8 +13,13 @@ namespace plchost {
 ///   31        1 0
 ///   [ value   ][ waiter ]
 ///
-/// Nothing in it is lost with a process that is killed: one that was woken and killed before it took its unit
-/// has left the unit, and the others look again every kLook.
+/// `waiter` says that a thread may be asleep. A post takes the mark off in the same step in which it adds its
+/// unit, and then wakes one thread. That thread takes its unit and sets the mark again, because others may be
+/// asleep; if units are left, it wakes the next one. So the mark is never taken off by a thread that looked
+/// at the word earlier.
+///
+/// A process that is killed loses no unit. If it is killed between a unit and the wake for it, the other
+/// threads find the unit within kLook.
 class CountingSemaphore {
  public:
   static constexpr std::uint32_t kMaxValue = 0x3fffffff;
@@ -23,8 +28,8 @@ class CountingSemaphore {
   /// `value` <= kMaxValue.
   explicit CountingSemaphore(std::uint32_t value) noexcept : word_(value << 1) {}
 
-  /// Adds one, and wakes one that waits. False, and nothing is done: it is at kMaxValue. Any context; no
-  /// system call if nobody waits.
+  /// Adds one, and wakes one that waits. False, and nothing is done: it is at kMaxValue. Any context. No
+  /// system call if nobody waits and nobody has slept since the last post.
   bool post() noexcept;
   /// Takes one if there is one. Any context.
   [[nodiscard]] bool try_wait() noexcept;
@@ -37,6 +42,8 @@ class CountingSemaphore {
  private:
   static constexpr std::uint32_t kWaiter = 1;
   static constexpr std::uint32_t kOne = 2;
+
+  [[nodiscard]] bool wait_asleep(TimePoint deadline) noexcept;
 
   std::atomic<std::uint32_t> word_{0};
 };

@@ -166,6 +166,12 @@ std::uint32_t InLink::tidy(TimePoint now, Duration hold) noexcept {
   return dropped;
 }
 
+std::uint32_t InLink::drop_all() noexcept {
+  std::uint32_t dropped = 0;
+  for (RingReader& ring : rings_) dropped += ring.drop_until(ring.end_of_published());
+  return dropped;
+}
+
 // What stands at the head stands in everybody's way. It is a block that nobody takes, then it is dropped
 // with all that came before now; or one that is not there: the sender has reserved its slots and never filled
 // them, or a thread here has taken it and never given it back, or somebody has scribbled.

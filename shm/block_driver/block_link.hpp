@@ -132,6 +132,8 @@ class InLink {
   /// Drops what has waited for longer than `hold`, and asks for a fresh link if one is needed. To be called
   /// in turns of about a tenth of `hold`, by one thread. Blocks dropped.
   std::uint32_t tidy(TimePoint now, Duration hold) noexcept;
+  /// Drops all that nobody has taken: the link is given up. Blocks dropped.
+  std::uint32_t drop_all() noexcept;
   /// Whether there is nothing left to take. Looks at each slot.
   [[nodiscard]] bool empty() const noexcept;
   /// Whether something seems to be there to take. Cheap.

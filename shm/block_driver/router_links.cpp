@@ -170,6 +170,8 @@ bool BlockRouter::open_from(std::uint16_t node) {
     if (memory.error().code == ErrorCode::corrupt) tell(memory.error());
     return true;
   }
+  // A fresh link in the same life replaces a broken one. What lies in that is lost, and counted.
+  if (gate.get() != nullptr) counters().expired.fetch_add(gate.get()->drop_all(), std::memory_order_relaxed);
   if (gate.exchange(std::make_unique<InLink>(*std::move(memory), life))) set_open(node, true);
   node_.own_slot().arrivals.post();  // what came before it was open
   return true;

@@ -179,22 +179,23 @@ void RingReader::release(const Found& found) noexcept {
   const std::uint64_t mask = memory_.slots - 1;
   taken_.fetch_add(1, std::memory_order_relaxed);
   memory_.descriptors[found.at & mask].position.store(0, std::memory_order_relaxed);
-  marks_[found.at & mask].store(mark_word(found.at, found.step, kDone), std::memory_order_release);
-  // Whoever finds the block at the head done moves the head on, over all that are done.
-  std::uint64_t head = head_.load(std::memory_order_acquire);
+  // A thread that finds the block at the head done moves the head on, over all that are done. Of two threads
+  // that are done at the same time, one must see the mark of the other: each stores its own before it loads
+  // the other's. So these four are sequentially consistent.
+  marks_[found.at & mask].store(mark_word(found.at, found.step, kDone), std::memory_order_seq_cst);
+  std::uint64_t head = head_.load(std::memory_order_seq_cst);
   for (;;) {
-    const std::uint64_t mark = marks_[head & mask].load(std::memory_order_acquire);
+    const std::uint64_t mark = marks_[head & mask].load(std::memory_order_seq_cst);
     if (!is_mark_of(mark, head) || (mark & kStateMask) != kDone) break;
     const std::uint64_t next = head + slots_of_mark(mark);
-    if (head_.compare_exchange_strong(head, next, std::memory_order_acq_rel, std::memory_order_acquire)) {
-      head = next;
-    }
+    if (head_.compare_exchange_strong(head, next, std::memory_order_seq_cst)) head = next;
   }
-  // The last one to tell the writer tells it the newest.
-  do {
-    head = head_.load(std::memory_order_acquire);
-    memory_.head->store(head, std::memory_order_release);
-  } while (head_.load(std::memory_order_seq_cst) != head);
+  // The head that the writer sees only grows. A thread that was interrupted before this line has an older
+  // one, and stores nothing.
+  std::uint64_t told = memory_.head->load(std::memory_order_relaxed);
+  while (told < head && !memory_.head->compare_exchange_weak(told, head, std::memory_order_release,
+                                                             std::memory_order_relaxed)) {
+  }
 }
 
 std::uint64_t RingReader::end_of_published() const noexcept {

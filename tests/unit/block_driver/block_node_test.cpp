@@ -245,5 +245,31 @@ TEST_F(BlockNodeTest, ALinkThatAStrangerSpoiltIsMadeAnew) {
   EXPECT_TRUE(arrived);
 }
 
+TEST_F(BlockNodeTest, BlocksThatWaitInALinkThatIsMadeAnewAreCounted) {
+  TestNode a = join("a");
+  TestNode b = join("b");
+  connect(a, b);
+  BlockChannel lost = a.channel("lost");
+  BlockChannel from = a.channel("alive");
+  BlockChannel to = b.channel("alive");
+  const std::string name = link_name(pool(), "blocks", a.address().node, b.address().node);
+  const auto memory = MemoryFile::open(name, sizeof(LinkLayout), MemoryFile::Access::read_write);
+  ASSERT_TRUE(memory);
+  // The writer looks at the head when the ring seems full; a stranger has written there.
+  reinterpret_cast<LinkLayout*>(memory->bytes().data())->heads[std::size_t(BlockPriority::normal)] = 1UL
+                                                                                                     << 60U;
+  std::uint64_t sent = 0;
+  while (lost.send(b.address(), bytes_of("x")) == SendResult::sent) ++sent;
+  ASSERT_EQ(sent, kMinRingSlots);
+  bool arrived = false;
+  for (int i = 0; i < 10 && !arrived; ++i) {
+    pass(std::chrono::milliseconds(10), a, b);
+    (void)from.send(b.address(), bytes_of("again"));
+    arrived = b.next(to) == "again";
+  }
+  EXPECT_TRUE(arrived);
+  EXPECT_EQ(counters(b).expired.load(), sent);
+}
+
 }  // namespace
 }  // namespace plchost

@@ -1,0 +1,2 @@
+# shm/base/counting_semaphore.cpp: units that came without a mark wake nobody
+s/if \(mark != 0 && word - kOne >= kOne\) futex_wake\(&word_, 1\);//
