@@ -61,7 +61,14 @@ void InstanceSocket::answer(const Asker& asker, ControlReply reply) {
   reply.number = asker.number;
   const auto found = std::ranges::find_if(
       connections_, [&](const auto& entry) { return entry.second.id == asker.connection; });
-  if (found != connections_.end() && !send(found->second, reply)) connections_.erase(found);
+  if (found == connections_.end()) return;
+  const bool serving = serving_ == found->second.id;
+  if ((serving && serving_over_) || send(found->second, reply)) return;
+  if (serving) {
+    serving_over_ = true;  // serve() uses it, and closes it
+  } else {
+    connections_.erase(found);
+  }
 }
 
 bool InstanceSocket::serve_one(Connection& connection) {
@@ -78,6 +85,7 @@ bool InstanceSocket::serve_one(Connection& connection) {
                                            .text = in_time.error().message});
     }
     auto reply = handler_(*request, Asker{.connection = connection.id, .number = request->number});
+    if (serving_over_) return false;
     if (!reply) return true;
     reply->number = request->number;
     return send(connection, *reply);
@@ -95,7 +103,10 @@ void InstanceSocket::serve() {
     if (fd == listener_.fd()) {
       accept_all();
     } else if (const auto found = connections_.find(fd); found != connections_.end()) {
+      serving_ = found->second.id;
+      serving_over_ = false;
       if (!serve_one(found->second)) connections_.erase(found);
+      serving_ = 0;
     }
   }
 }

@@ -33,7 +33,8 @@ class InstanceSocket {
   [[nodiscard]] int fd() const noexcept { return epoll_.get(); }
   /// Takes new connections, and at most one request of each connection.
   void serve();
-  /// The reply to a request that was not answered at once. Nobody gets it if the connection is gone.
+  /// The reply to a request that was not answered at once. Nobody gets it if the connection is gone. The
+  /// handler may call it, also for the connection whose request it works on.
   void answer(const Asker& asker, ControlReply reply);
 
  private:
@@ -55,6 +56,8 @@ class InstanceSocket {
   Handler handler_;
   std::map<int, Connection> connections_;  // by descriptor
   std::uint64_t next_id_ = 1;
+  std::uint64_t serving_ = 0;  // the connection whose request the handler works on; 0: none
+  bool serving_over_ = false;  // it is to be closed
 };
 
 }  // namespace plchost
