@@ -1,0 +1,2 @@
+# shm/base/robust_mutex.cpp: a mutex whose owner has not told its record is taken from it
+s/if \(told && \(later \|\| another\)\) return OwnerState::gone;/if (!told) return OwnerState::gone;/
