@@ -12,6 +12,7 @@
 
 #include <fmt/format.h>
 
+#include "api/control/scheduler_names.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/toml/section_reader.hpp"
 #include "shm/base/toml/toml_document.hpp"
@@ -23,7 +24,6 @@ namespace {
 using namespace std::string_view_literals;
 
 constexpr std::array kStates = {"running"sv, "stopped"sv};
-constexpr std::size_t kMaxSchedulerName = 31;
 
 class PlantReader {
  public:
@@ -120,7 +120,7 @@ WantedInstance PlantReader::read_instance(const TomlValue& value, const std::str
   WantedInstance instance;
   instance.line = value.line;
   read_name(reader, "name", instance.name, kMaxInstanceName);
-  read_name(reader, "scheduler", instance.scheduler, kMaxSchedulerName);
+  reader.choice("scheduler", kSchedulerNames, instance.scheduler);
   reader.text("application", instance.application);
   std::string state;
   reader.choice("state", kStates, state);

@@ -24,6 +24,12 @@ Row to_row(const plc_ApplicationStatus& status, bool loaded) {
           {"before", dds::text_of(status.before)}};
 }
 
+Row row_of_loaded(const std::string& host, const std::string& instance, const std::string& path) {
+  return {{"host", host}, {"instance", instance}, {"version", ""}, {"file", path}, {"size", ""},
+          {"sent", ""},   {"sent_unix_ns", 0},    {"by", ""},      {"from", ""},   {"sha256", ""},
+          {"digest", ""}, {"loaded", "loaded"},   {"boot", ""},    {"path", path}, {"before", ""}};
+}
+
 const std::vector<Column>& application_columns() {
   static const std::vector<Column> columns{{"host", "HOST"}, {"instance", "INSTANCE"}, {"version", "VERSION"},
                                            {"file", "FILE"}, {"size", "SIZE"},         {"sent", "SENT"},

@@ -19,6 +19,9 @@ namespace plchost {
 [[nodiscard]] Row to_row(const plc_Transition& transition);
 /// `loaded`: it is what the instance has loaded.
 [[nodiscard]] Row to_row(const plc_ApplicationStatus& status, bool loaded);
+/// Of what is loaded and was never sent: a file of the host.
+[[nodiscard]] Row row_of_loaded(const std::string& host, const std::string& instance,
+                                const std::string& path);
 
 /// What a host tells beyond the fields that this program knows. A name that is taken stays what it is.
 void add_extension(Row& row, std::span<const plc_KeyValue> entries);

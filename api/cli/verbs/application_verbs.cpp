@@ -117,13 +117,19 @@ int list_applications(CliSession& session, const std::string& instance) {
   for (const HostView& host : *hosts) {
     const auto kept = session.client().value()->applications(host.name, session.deadline());
     if (!kept) return CliSession::fail(kept.error());
-    const auto loaded = loaded_on(session, host.name);
+    auto loaded = loaded_on(session, host.name);
     if (!loaded) return CliSession::fail(loaded.error());
     for (const plc_ApplicationStatus& status : *kept) {
       if (!instance.empty() && dds::text_of(status.instance) != instance) continue;
       const auto of_instance = loaded->find(std::string(dds::text_of(status.instance)));
       const bool is_loaded = of_instance != loaded->end() && of_instance->second == dds::text_of(status.path);
       rows.push_back(to_row(status, is_loaded));
+      if (is_loaded) loaded->erase(of_instance);
+    }
+    // A file of the host, which nobody sent.
+    for (const auto& [name, path] : *loaded) {
+      if (path.empty() || (!instance.empty() && name != instance)) continue;
+      rows.push_back(row_of_loaded(host.name, name, path));
     }
   }
   return session.show(rows, application_columns());

@@ -9,6 +9,7 @@
 
 #include "api/cli/rows/object_rows.hpp"
 #include "api/cli/rows/rows.hpp"
+#include "api/control/scheduler_names.hpp"
 
 namespace plchost {
 
@@ -84,8 +85,7 @@ void add_nodes(ControlClient& client, const HostView& host, TimePoint deadline, 
 
 void add_schedulers(ControlClient& /*client*/, const HostView& /*host*/, TimePoint /*deadline*/,
                     Names& names) {
-  for (const char* name : {"CmpSchedule", "CmpScheduleTimer", "CmpScheduleOneShot"})
-    names.push_back({name, ""});
+  for (const std::string_view name : kSchedulerNames) names.push_back({std::string(name), ""});
 }
 
 const std::multimap<std::string_view, Source>& sources() {

@@ -13,7 +13,7 @@ kept=$cell/cell1.state/applications.cell1/line1
 
 # version FIELD VALUE FIELD2: FIELD2 of the kept application whose FIELD is VALUE
 version() { plcctl list applications line1 --json | jq -r ".[] | select(.$1 == \"$2\") | .$3"; }
-numbers() { plcctl list applications --json | jq -r 'map(.version | tostring) | join(",")'; }
+numbers() { plcctl list applications --json | jq -r 'map(.version | numbers | tostring) | join(",")'; }
 application_is() { [ "$(instance line1 application)" = "$1" ]; }
 in_shm() { compgen -G "/dev/shm/$pool-cell1.download.*" >/dev/null; }
 # A download takes half a second: looked for without a pause, and begun again if it was over before it was seen.
@@ -30,7 +30,7 @@ begin_download() { # begin_download FILE: $client sends it
   done
   fail "no download was seen"
 }
-newest() { printf '%s/%06d.so' "$kept" "$(plcctl list applications line1 --json | jq 'map(.version) | max')"; }
+newest() { printf '%s/%06d.so' "$kept" "$(plcctl list applications line1 --json | jq 'map(.version | numbers) | max')"; }
 
 echo "- what is broken is refused before what runs is touched"
 good=$APPLICATIONS/packer.so

@@ -89,6 +89,8 @@ INSTANTIATE_TEST_SUITE_P(
         BadPlant{"[[host]]\nname = \"a\"\n[[host.instance]]\nname = \"i\"\napplication = \"x.so\"",
                  "allowed is an absolute path on the host"},
         BadPlant{"[[host]]\nname = \"a\"\n[[host.instance]]\nname = \"i\"\nscheduler = \"\"", "scheduler"},
+        BadPlant{"[[host]]\nname = \"a\"\n[[host.instance]]\nname = \"i\"\nscheduler = \"CmpShedule\"",
+                 "did you mean 'CmpSchedule'?"},
         BadPlant{"[[host]]\nname = \"a\"\n[[host.instance]]\nname = \"i\"\nevents = [\"e\", \"e\"]",
                  "'e' is there twice"},
         BadPlant{"[[host]]\nname = \"a\"\n[[host.instance]]\nname = \"i\"\nevents = \"e\"",
