@@ -233,7 +233,10 @@ TEST_F(WishStoreTest, RestoresTheEventsThatOperatorsRegistered) {
 }
 
 TEST_F(WishStoreTest, StartsAnotherHelperForOneThatEnded) {
-  WishWriter broken(*reactor_, "/bin/false");
+  const std::string helper = folder_ / "helper";  // takes one order and ends
+  std::ofstream(helper) << "#!/bin/sh\ndd bs=20000 count=1 <&3 >/dev/null 2>&1\nexit 1\n";
+  std::filesystem::permissions(helper, std::filesystem::perms::owner_all);
+  WishWriter broken(*reactor_, helper);
   for (int i = 0; i < 2; ++i) {
     std::string told;
     const auto begun =
