@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include "manager/store/wish_memory.hpp"
@@ -73,6 +74,10 @@ class WishStoreTest : public testing::Test {
   }
   ~WishStoreTest() override {
     sut_.reset();
+    writer_.reset();
+    reactor_.reset();
+    while (::waitpid(-1, nullptr, 0) > 0) {  // helpers that still write into the folder
+    }
     WishMemory::remove(pool_, "line1");
     std::error_code ignored;
     std::filesystem::remove_all(folder_, ignored);
