@@ -208,7 +208,8 @@ class PLCHOST_CLIENT_API Client {
   /// Returns when all are in the pool: the time-out is for each acknowledgement, so many take as long as they
   /// take. ClientError: a post was rejected; timed_out: of some nothing is known.
   Posted post(const std::string& host, const std::string& event, unsigned long long count = 1);
-  /// The same; returns at once. `done` is called once.
+  /// The same; returns at once. `done` is called once. At most 1024 calls may wait for those before them:
+  /// for one more, `done` is called with full (11) before this returns.
   void post(const std::string& host, const std::string& event, std::function<void(const Outcome&)> done);
   /// Posts several events, at most 64, at once: all of them, or none.
   Posted post_all(const std::string& host, const std::vector<std::string>& events);

@@ -141,7 +141,7 @@ Result<void> TaskSet::start(std::string_view scheduler, const SchedulerSettings&
     // Nobody but the tasks may come between the origin and the moment in which the last task has its source.
     const RaisedPriority raised(environment_.allow_unprivileged ? ThreadPriority{} : switch_priority(band_));
     origin_ = clock_.now() + kStartLead;
-    for (auto& task : tasks_) task->begin(origin_);
+    for (auto& task : tasks_) task->begin(origin_, /*takes_posts=*/true);
     watch(settings);
     active_->scheduler->start(origin_);
     hand_out_sources();

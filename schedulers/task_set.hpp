@@ -37,8 +37,8 @@ struct TaskEnvironment {
   /// Tells that a task's thread runs cycles (true) or is parked (false). May be empty. Called by the control
   /// thread, from within start(), stop() and switch_to().
   std::function<void(std::size_t index, bool running)> state_changed;
-  /// Tells that a task is to park: after the cycle that it is in it takes no release any more. Told before it
-  /// is done, in the phase of the stop that the task belongs to. May be empty. Called by the control thread,
+  /// Tells that a task was asked to park: after the cycle that it is in it takes no release any more. Told in
+  /// the phase of the stop that the task belongs to. May be empty. Called by the control thread,
   /// from within begin_stop() and advance_stop().
   std::function<void(std::size_t index)> to_park;
   /// Faults and endless loops in the application's code put their task into exception: handlers for signals

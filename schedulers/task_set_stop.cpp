@@ -37,10 +37,11 @@ void TaskSet::park_tasks(bool that_drive_outputs) {
     return tasks_[i]->config().drives_outputs == that_drive_outputs;
   };
   for (std::size_t i = 0; i < threads_.size(); ++i) {
-    if (is_meant(i) && environment_.to_park) environment_.to_park(i);
-  }
-  for (std::size_t i = 0; i < threads_.size(); ++i) {
     if (is_meant(i)) threads_[i]->park();
+  }
+  // Only now: a post of which the poster is told that no task takes it must not be run.
+  for (std::size_t i = 0; i < threads_.size(); ++i) {
+    if (is_meant(i) && environment_.to_park) environment_.to_park(i);
   }
 }
 

@@ -36,7 +36,7 @@ void BatchPoster::post(std::span<const EventId> events, TimePoint now, TimePoint
     dds::copy_text(name.instance, event.instance);
     dds::copy_text(name.event, event.event);
   }
-  base_ = newest_;
+  base_ = account_.sums();
   sample_.sequence_number = sample_.base_sequence = ++last_sequence_;
   write(now);
 }
@@ -45,19 +45,21 @@ void BatchPoster::write(TimePoint now) {
   sample_.events._buffer = names_.data();
   sample_.events._length = sample_.events._maximum = static_cast<std::uint32_t>(names_.size());
   sample_.limit = clock_.limit_at(deadline_);
-  (void)dds_write(writer_.get(), &sample_);  // one that DDS did not take is repeated like a lost one
+  readers_met_ = readers_met(writer_.get());  // before: one that comes later has not got it
+  (void)dds_write(writer_.get(), &sample_);   // one that DDS did not take is repeated like a lost one
   last_write_ = now;
 }
 
 void BatchPoster::on_ack(const plc_EventAck& ack, TimePoint now) {
   if (dds::Guid::from(ack.source) != source_ || !epoch_.accept(ack.epoch, now)) return;
-  newest_ = ack;
-  newest_.ext = {};
+  account_.take(ack);
 }
 
 TimePoint BatchPoster::repeat(TimePoint now) {
-  const TimePoint due = last_write_ + (newest_.epoch == 0 ? EventPoster::kFirstResend : EventPoster::kResend);
-  if (acknowledged() || now < due) return due;
+  const bool heard = account_.newest().epoch != 0;
+  const TimePoint due = last_write_ + (heard ? EventPoster::kResend : EventPoster::kFirstResend);
+  const bool new_server = readers_met(writer_.get()) != readers_met_;
+  if (acknowledged() || (now < due && !new_server)) return due;
   write(now);
   return now + EventPoster::kResend;
 }

@@ -42,11 +42,14 @@ class BatchPoster {
   /// The host's clock as it is known now. To be called before post() and whenever it may have changed.
   void use_clock(const HostClock& clock) noexcept;
   void on_ack(const plc_EventAck& ack, TimePoint now);
-  [[nodiscard]] bool acknowledged() const noexcept { return newest_.sequence_number >= last_sequence_; }
+  /// The last batch that was posted is done.
+  [[nodiscard]] bool acknowledged() const noexcept {
+    return account_.newest().sequence_number >= last_sequence_;
+  }
   /// Repeats what is due to be repeated. Returns when it has to be called again.
   TimePoint repeat(TimePoint now);
   /// Of the last batch.
-  [[nodiscard]] PostReport report() const { return report_between(base_, newest_); }
+  [[nodiscard]] PostReport report() const { return account_.report_since(base_); }
 
  private:
   BatchPoster() = default;
@@ -62,8 +65,9 @@ class BatchPoster {
   std::uint64_t last_sequence_ = 0;
   TimePoint last_write_;
   NewestEpoch epoch_;
-  plc_EventAck newest_{};
-  plc_EventAck base_{};
+  std::uint32_t readers_met_ = 0;  // when it was written last
+  AckAccount account_;
+  AckAccount::Sums base_;
 };
 
 }  // namespace plchost

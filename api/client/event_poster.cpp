@@ -29,6 +29,11 @@ bool has_reader(dds_entity_t writer) noexcept {
   return dds_get_publication_matched_status(writer, &status) == DDS_RETCODE_OK && status.current_count > 0;
 }
 
+std::uint32_t readers_met(dds_entity_t writer) noexcept {
+  dds_publication_matched_status_t status{};
+  return dds_get_publication_matched_status(writer, &status) == DDS_RETCODE_OK ? status.total_count : 0;
+}
+
 dds_return_t EventPoster::write(std::uint64_t sequence) noexcept {
   sample_.sequence_number = sequence;
   sample_.base_sequence = unacknowledged_.empty() ? sequence : unacknowledged_.front().sequence;
@@ -60,7 +65,10 @@ dds_return_t EventPoster::write(const Unacknowledged& post) noexcept {
 
 std::uint64_t EventPoster::post(std::string_view instance, std::string_view event, TimePoint now,
                                 bool awaited) {
-  if (unacknowledged_.empty()) last_progress_ = now;
+  if (unacknowledged_.empty()) {
+    last_progress_ = now;
+    readers_met_ = readers_met(writer_.get());  // before it is written: one that comes later has not got it
+  }
   unacknowledged_.push_back({++last_sequence_, std::string(instance), std::string(event), awaited});
   (void)write(unacknowledged_.back());  // one that DDS did not take is repeated like a lost one
   last_write_ = now;
@@ -88,9 +96,10 @@ Result<void> EventPoster::post_once(std::string_view instance, std::string_view 
 
 bool EventPoster::on_ack(const plc_EventAck& ack, TimePoint now) {
   if (dds::Guid::from(ack.source) != source_ || !epoch_.accept(ack.epoch, now)) return false;
-  const bool new_server = newest_.epoch != 0 && ack.epoch != newest_.epoch;
-  newest_ = ack;
-  newest_.ext = {};
+  const std::uint64_t before_epoch = account_.newest().epoch;
+  const bool new_server = before_epoch != 0 && ack.epoch != before_epoch;
+  account_.take(ack);
+  answered_ = true;
   window_ = std::clamp<std::size_t>(ack.credits, 1, kWindow);
   const std::size_t before = unacknowledged_.size();
   while (!unacknowledged_.empty() && unacknowledged_.front().sequence <= ack.sequence_number) {
@@ -104,38 +113,67 @@ bool EventPoster::on_ack(const plc_EventAck& ack, TimePoint now) {
 
 TimePoint EventPoster::repeat(TimePoint now) {
   if (unacknowledged_.empty()) return now + kResend;
-  const Duration patience = newest_.epoch == 0 ? kFirstResend : kResend;
+  const Duration patience = account_.newest().epoch == 0 ? kFirstResend : kResend;
   const TimePoint due = std::max(last_progress_, last_write_) + patience;
-  const bool at_once = last_write_ == TimePoint{};
-  if (!at_once && now < due) return due;
+  const std::uint32_t met = readers_met(writer_.get());
+  const bool new_server = last_write_ == TimePoint{} || met != readers_met_;
+  if (!new_server && now < due) return due;
   for (const Unacknowledged& post : unacknowledged_) {
-    if (write(post) != DDS_RETCODE_OK) break;
+    if (write(post) != DDS_RETCODE_OK || !(new_server || answered_)) break;
   }
+  readers_met_ = met;
+  answered_ = false;
   last_write_ = now;
   return now + patience;
 }
 
 void EventPoster::begin_report(TimePoint now) {
   unacknowledged_.clear();
-  base_ = newest_;
+  base_ = account_.sums();
   last_progress_ = now;
 }
 
 PostReport EventPoster::report() const {
-  PostReport report = report_between(base_, newest_);
+  PostReport report = account_.report_since(base_);
   report.unacknowledged = unacknowledged_.size();
   return report;
 }
 
-PostReport report_between(const plc_EventAck& before, const plc_EventAck& now) {
+namespace {
+
+/// The number before the first one that the ledger counts: it is the same as long as the ledger is.
+std::uint64_t origin_of(const plc_EventAck& ack) noexcept {
+  return ack.sequence_number - ack.accepted - ack.rejected - ack.lost;
+}
+
+}  // namespace
+
+void AckAccount::take(const plc_EventAck& ack) {
+  if (newest_.epoch != 0 && origin_of(ack) != origin_of(newest_)) earlier_ = sums();
+  newest_ = ack;
+  newest_.ext = {};
+  if (ack.rejected == 0) return;
+  rejected_code_ = static_cast<ErrorCode>(ack.rejected_code);
+  rejected_text_ = dds::text_of(ack.rejected_text);
+}
+
+AckAccount::Sums AckAccount::sums() const noexcept {
+  return {.accepted = earlier_.accepted + newest_.accepted,
+          .no_task = earlier_.no_task + newest_.no_task,
+          .rejected = earlier_.rejected + newest_.rejected,
+          .lost = earlier_.lost + newest_.lost};
+}
+
+PostReport AckAccount::report_since(const Sums& base) const {
+  const Sums now = sums();
   PostReport report;
-  report.accepted = now.accepted - before.accepted;
-  report.no_task = now.no_task - before.no_task;
-  report.rejected = now.rejected - before.rejected;
-  report.lost = now.lost - before.lost;
+  report.accepted = now.accepted - base.accepted;
+  report.no_task = now.no_task - base.no_task;
+  report.rejected = now.rejected - base.rejected;
+  report.lost = now.lost - base.lost;
   if (report.rejected > 0) {
-    report.rejected_code = static_cast<ErrorCode>(now.rejected_code);
-    report.rejected_text = dds::text_of(now.rejected_text);
+    report.rejected_code = rejected_code_;
+    report.rejected_text = rejected_text_;
   }
   return report;
 }

@@ -27,10 +27,34 @@ struct PostReport {
   std::uint64_t unacknowledged = 0;  ///< nothing is known of these; 0 unless the host stopped answering
 };
 
-/// What happened between two acknowledgements of one source.
-[[nodiscard]] PostReport report_between(const plc_EventAck& before, const plc_EventAck& now);
+/// What the acknowledgements of one source count, also when the host's ledger of posts begins anew (it is
+/// made anew for a new pool, and forgets the source that posted least recently): it counts from 0 then.
+class AckAccount {
+ public:
+  /// Sums since the account was made.
+  struct Sums {
+    std::uint64_t accepted = 0;
+    std::uint64_t no_task = 0;
+    std::uint64_t rejected = 0;
+    std::uint64_t lost = 0;
+  };
+  /// An acknowledgement that is not older than the one before.
+  void take(const plc_EventAck& ack);
+  [[nodiscard]] Sums sums() const noexcept;
+  [[nodiscard]] PostReport report_since(const Sums& base) const;
+  /// Its epoch is 0: none yet.
+  [[nodiscard]] const plc_EventAck& newest() const noexcept { return newest_; }
+
+ private:
+  Sums earlier_;  // of the ledgers before this one
+  plc_EventAck newest_{};
+  ErrorCode rejected_code_ = ErrorCode::ok;
+  std::string rejected_text_;
+};
 /// Whether a writer has met a reader.
 [[nodiscard]] bool has_reader(dds_entity_t writer) noexcept;
+/// How many readers a writer has met so far, those that are gone included.
+[[nodiscard]] std::uint32_t readers_met(dds_entity_t writer) noexcept;
 
 /// The posts to one host: numbers them, keeps those that are not acknowledged, and repeats them.
 class EventPoster {
@@ -68,7 +92,9 @@ class EventPoster {
 
   /// Returns true if that acknowledged something.
   bool on_ack(const plc_EventAck& ack, TimePoint now);
-  /// Repeats what is due to be repeated. Returns when it has to be called again.
+  /// Repeats what is due to be repeated: all when a server is new, else only the oldest until the host
+  /// answers. More would fill the writer, which keeps what a killed server has not confirmed. Returns when it
+  /// has to be called again.
   TimePoint repeat(TimePoint now);
   [[nodiscard]] TimePoint last_progress() const noexcept { return last_progress_; }
   /// From now on report() counts from 0, and nothing before is repeated.
@@ -99,8 +125,10 @@ class EventPoster {
   TimePoint last_progress_;
   TimePoint last_write_;
   NewestEpoch epoch_;
-  plc_EventAck newest_{};  // epoch 0: none yet
-  plc_EventAck base_{};    // where the report counts from
+  bool answered_ = false;          // since the last write
+  std::uint32_t readers_met_ = 0;  // when all was written last
+  AckAccount account_;
+  AckAccount::Sums base_;  // where the report counts from
 };
 
 }  // namespace plchost

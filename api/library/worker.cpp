@@ -23,6 +23,11 @@ Result<ControlClient*> ended() {
   return failure(ErrorCode::unavailable, "the client has ended");
 }
 
+Result<ControlClient*> too_many(std::size_t most) {
+  return failure(ErrorCode::full,
+                 fmt::format("{} calls of this client wait already: wait for some of them to end", most));
+}
+
 }  // namespace
 
 Client::Worker::Worker(const Options& options)
@@ -45,14 +50,16 @@ void Client::Worker::end() {
 
 void Client::Worker::begin(Job job) {
   if (const auto ours = maker_.check(); !ours) return job(std::unexpected(ours.error()));
+  bool ending = false;
   {
     const std::lock_guard lock(mutex_);
-    if (!ending_) {
+    ending = ending_;
+    if (!ending && jobs_.size() < kMaxJobs) {
       jobs_.push_back(std::move(job));
       job = nullptr;
     }
   }
-  if (job) return job(ended());
+  if (job) return job(ending ? ended() : too_many(kMaxJobs));
   changed_.notify_all();
 }
 

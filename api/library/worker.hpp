@@ -29,9 +29,13 @@ class __attribute__((visibility("hidden"))) Client::Worker {
   [[nodiscard]] Duration timeout() const noexcept { return timeout_; }
   [[nodiscard]] TimePoint deadline() const { return MonotonicClock::now() + timeout_; }
 
+  /// How many calls may wait for those before them.
+  static constexpr std::size_t kMaxJobs = 1024;
+
   /// Waits for the job that is under way; those that were not begun, and all that come, are called with
   /// `unavailable`. Not from a job.
   void end();
+  /// `job` is called later, or, if too many wait (full) or the client has ended, within this call.
   void begin(Job job);
   /// Returns what `call(client)` returns. From a callback: at once, it is this thread's turn.
   template <class T>

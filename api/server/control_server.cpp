@@ -54,11 +54,9 @@ Result<std::unique_ptr<ControlServer>> ControlServer::create(ServerOptions optio
   if (auto good = check_name("host", options.host, kMaxHostName); !good) return std::unexpected(good.error());
   auto pool = ObjectPool::attach(options.pool);
   if (!pool) return failure_in("attach the pool", pool.error());
-  auto ledger = PostLedger::open(options.pool);
-  if (!ledger) return std::unexpected(ledger.error());
   const auto epoch = static_cast<std::uint64_t>(unix_time_ns());
   auto parts = std::make_unique<Parts>(std::move(options), std::move(*pool), epoch);
-  if (auto opened = parts->open(std::move(*ledger)); !opened) return std::unexpected(opened.error());
+  if (auto opened = parts->open(); !opened) return std::unexpected(opened.error());
   return std::unique_ptr<ControlServer>(new ControlServer(std::move(parts)));
 }
 

@@ -49,7 +49,7 @@ struct ControlServer::Parts {
         downloads(options.pool, std::uint64_t{options.application_limit_mib} << 20U),
         runs(options.host, started) {}
 
-  Result<void> open(PostLedger ledger);
+  Result<void> open();
   Result<void> make_loop();
   Result<void> make_guard();
   Result<void> enter_domain();

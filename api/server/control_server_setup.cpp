@@ -57,13 +57,15 @@ Result<UniqueFd> make_signal_fd() {
 
 }  // namespace
 
-Result<void> ControlServer::Parts::open(PostLedger ledger) {
+Result<void> ControlServer::Parts::open() {
+  auto ledger = PostLedger::open(pool);
+  if (!ledger) return std::unexpected(ledger.error());
   if (auto made = make_loop(); !made) return made;
   auto linked = ManagerLink::connect(options.run_directory);
   if (!linked) return std::unexpected(linked.error());
   manager = std::move(*linked);
   if (auto made = make_guard(); !made) return made;
-  intake.emplace(options.host, pool, std::move(ledger), epoch, guard);
+  intake.emplace(options.host, pool, std::move(*ledger), epoch, guard);
   if (auto entered = enter_domain(); !entered) return entered;
   if (auto claimed = claim_name(); !claimed) return claimed;
   if (auto opened = open_audit(); !opened) return opened;

@@ -246,7 +246,7 @@ Result<std::string> Instance::make_tasks() {
             if (page_->task_state(task) != PageTaskState::exception) page_->set_task_state(task, state);
           },
       // Not before: in the first phase of a stop the others run what is posted. Nor later: a task in its last
-      // cycle does not, so no poster may be told that it will.
+      // cycle does not.
       .to_park = [this](std::size_t index) { unbind(index); },
       .catch_faults = true,
   };

@@ -40,9 +40,9 @@ Result<std::string> Instance::start(std::string_view why) {
   if (auto started = tasks_->start(scheduler_, settings_.scheduler); !started) {
     return std::unexpected(std::move(started).error());
   }
-  // Only now, so that no poster is told that its event will be run when it came a moment too early.
   if (auto bound = host_->events().publish_bound(true); !bound) {
     tasks_->park_all();
+    (void)host_->events().publish_bound(false);
     return std::unexpected(std::move(bound).error());
   }
   unbound_.assign(application_->tasks().size(), false);
@@ -120,8 +120,8 @@ std::string Instance::time_out(std::size_t task) {
 void Instance::enter_exception(const std::string& reason) {
   if (!life_.go_to(ApplicationState::exception, reason)) return;
   drop_change("the application that runs is in exception");
-  (void)host_->events().publish_bound(false);
   tasks_->park_all();
+  (void)host_->events().publish_bound(false);
   beat();
   answer_waiting(ErrorCode::timed_out, fmt::format("it is in exception now: {}; reset it to go on", reason));
 }
@@ -158,8 +158,8 @@ Result<void> Instance::shut_down() {
   drop_change("the process ends");
   Result<void> stopped;
   if (tasks_) {
-    (void)host_->events().publish_bound(false);
     tasks_->park_all();
+    (void)host_->events().publish_bound(false);
     const auto busy = tasks_->still_busy(MonotonicClock::now() + kParkPatience);
     parked_ = tasks_->has_parked_thread();  // also one that a watchdog caught after its stop had timed out
     if (busy.empty()) {

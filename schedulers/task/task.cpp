@@ -30,7 +30,7 @@ Task::Task(Clock& clock, TaskConfig config, TaskStatistics& statistics, CountedE
   if (event_ != nullptr) recorder_.begin_posts(event_->count());
 }
 
-void Task::begin(TimePoint origin) {
+void Task::begin(TimePoint origin, bool takes_posts) {
   grid_ = ReleaseGrid(origin + config_.start_offset,
                       Duration(wanted_interval_.load(std::memory_order_relaxed)), config_.late);
   ready_ = origin;
@@ -39,7 +39,7 @@ void Task::begin(TimePoint origin) {
   overruns_.forgive_next();
   recorder_.begin();
   if (event_ != nullptr) {
-    const std::uint64_t count = event_->count();
+    const std::uint64_t count = takes_posts ? event_->set_taken(true).count() : event_->count();
     recorder_.lose_posts(count);
     cursor_ = {.next = count, .seen = count, .seen_at = origin};
   }

@@ -44,8 +44,9 @@ class Task {
   /// the first time: edges of the time in which it was parked do not count.
   void forget_edges() noexcept { latch_.forget(); }
   /// Set-up, while the task is parked: a new grid from `origin` on. Releases of the time in which it was
-  /// parked do not count; posts of that time are lost events.
-  void begin(TimePoint origin);
+  /// parked do not count; posts of that time are lost events. `takes_posts`: it runs for the posts from here
+  /// on, and posters are told so from the same moment on.
+  void begin(TimePoint origin, bool takes_posts = false);
 
   /// What a cyclic or freewheeling task runs next: the same answer until a cycle has run. The task's thread.
   [[nodiscard]] Activation next_release(const FreewheelRule& rule) const noexcept;

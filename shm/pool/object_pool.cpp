@@ -157,6 +157,15 @@ Result<PoolEvent> ObjectPool::open_event(std::string_view name) const& {
   return PoolEvent(*entry);
 }
 
+std::uint32_t ObjectPool::place_of(const PoolEvent& event) const noexcept {
+  return static_cast<std::uint32_t>(event.entry_ - segment_->view().entries().data());
+}
+
+CountedEvent* ObjectPool::event_at(std::uint32_t place) const noexcept {
+  const auto all = segment_->view().entries();
+  return place < all.size() ? &all[place].event : nullptr;
+}
+
 std::unexpected<Error> ObjectPool::no_room(const Wanted& wanted) const {
   return failure(ErrorCode::full,
                  fmt::format("no room for {} '{}': pool '{}' holds {} objects, all of them in use",

@@ -82,6 +82,10 @@ class ObjectPool {
   [[nodiscard]] Result<PoolEvent> create_event(std::string_view name) &;
   /// not_found: no such object. wrong_type: it is not an event.
   [[nodiscard]] Result<PoolEvent> open_event(std::string_view name) const&;
+  /// The number of the place that the event has in the pool. Only of a valid handle of this pool.
+  [[nodiscard]] std::uint32_t place_of(const PoolEvent& event) const noexcept;
+  /// The event in that place, whichever it is by now; null: the pool has no such place.
+  [[nodiscard]] CountedEvent* event_at(std::uint32_t place) const noexcept;
   // Of a pool that ends before the handle does.
   Result<PoolEvent> create_event(std::string_view name) && = delete;
   Result<PoolEvent> open_event(std::string_view name) const&& = delete;

@@ -14,8 +14,7 @@ PostResult PoolEvent::post() const noexcept {
   if (Binding::generation(binding) != generation_ || !Binding::registered(binding)) {
     return PostResult::not_registered;
   }
-  entry_->event.post();
-  return Binding::bound(binding) > 0 ? PostResult::posted : PostResult::no_task;
+  return entry_->event.post() ? PostResult::posted : PostResult::no_task;
 }
 
 bool PoolEvent::valid() const noexcept {
@@ -46,7 +45,9 @@ bool PoolEvent::set_registered(bool registered) const noexcept {
 }
 
 bool PoolEvent::set_bound_tasks(std::uint32_t count) const noexcept {
-  return change_binding(Binding::kBoundMask, count & Binding::kBoundMask);
+  if (!change_binding(Binding::kBoundMask, count & Binding::kBoundMask)) return false;
+  entry_->event.set_taken(count > 0);
+  return true;
 }
 
 CountedEvent& PoolEvent::counted() const noexcept {

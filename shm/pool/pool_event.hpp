@@ -10,8 +10,9 @@ struct ObjectEntry;
 
 /// What a post did.
 enum class PostResult : std::uint8_t {
-  posted,          ///< every task that is bound to the event will run for it
-  no_task,         ///< counted, but no task is bound at this time: a soft result
+  posted,          ///< counted, and tasks took posts at that moment: each of them runs for it, or, if it is
+                   ///< stopped before, counts it as lost
+  no_task,         ///< counted, but no task took posts at that moment, and none runs for it: a soft result
   not_registered,  ///< nothing was counted: the event is not (or no longer) registered
 };
 
@@ -32,7 +33,8 @@ class PoolEvent {
 
   /// How many tasks wait for it: kept by their instance, so that a poster can be told.
   [[nodiscard]] std::uint32_t bound_tasks() const noexcept;
-  /// False, and nothing is done, if the handle is not valid (any more).
+  /// False, and nothing is done, if the handle is not valid (any more). From 0 to more: the tasks run for
+  /// the posts after it; back to 0: only for those before it.
   bool set_bound_tasks(std::uint32_t count) const noexcept;
 
   /// The counter itself, for the task that waits on it. Only of a valid handle.

@@ -27,8 +27,8 @@ namespace plchost {
 
 inline constexpr std::uint64_t kPoolMagic = 0x6c6f6f70'74736f68;  // "hostpool"
 /// 1: first. 2: semaphores, mutexes, memories, clients and their references. 3: notes of what is changed. 4:
-/// the PID namespace.
-inline constexpr std::uint32_t kPoolVersion = 4;
+/// the PID namespace. 5: events say whether posts are taken, and are marked.
+inline constexpr std::uint32_t kPoolVersion = 5;
 
 /// Of what the pool's mutex orders, or what is checked after it was read without it.
 inline constexpr auto kRelaxed = std::memory_order_relaxed;

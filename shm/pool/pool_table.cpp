@@ -84,7 +84,8 @@ ObjectEntry* PoolTable::insert(std::string_view name, ObjectType type) noexcept 
   if (entry == nullptr && reclaim()) entry = allocate();
   if (entry == nullptr) return nullptr;
   begin_generation(*entry);
-  entry->first_count.store(entry->event.count(), kRelaxed);
+  // The count and the mark go on: a poster that was killed over the event before is told by them.
+  entry->first_count.store(entry->event.set_taken(false).count(), kRelaxed);
   new (&entry->semaphore) CountingSemaphore();
   new (&entry->mutex) RobustMutex();
   entry->size.store(0, kRelaxed);

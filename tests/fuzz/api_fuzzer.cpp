@@ -24,7 +24,7 @@ struct Host {
   ObjectPool pool = ObjectPool::create(name, {.max_objects = 16}).value();
   PoolEvent event = pool.create_event("line1/ready").value();
   AccessGuard guard;
-  EventIntake intake{"hosta", pool, PostLedger::open(name).value(), 1, guard};
+  EventIntake intake{"hosta", pool, PostLedger::open(pool).value(), 1, guard};
 
   Host() {
     event.set_registered(true);

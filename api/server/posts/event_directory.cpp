@@ -5,18 +5,23 @@
 namespace plchost {
 
 Result<PoolEvent> EventDirectory::find(std::string_view instance, std::string_view event) {
+  auto found = find_any(instance, event);
+  if (found && !found->registered()) {
+    return failure(ErrorCode::not_found, fmt::format("external event '{}' is not registered", name_));
+  }
+  return found;
+}
+
+Result<PoolEvent> EventDirectory::find_any(std::string_view instance, std::string_view event) {
   name_.assign(instance).append("/").append(event);
   if (const auto kept = kept_.find(std::string_view(name_)); kept != kept_.end()) {
-    if (kept->second.valid() && kept->second.registered()) return kept->second;
+    if (kept->second.valid()) return kept->second;
     kept_.erase(kept);
   }
   const auto found = pool_->open_event(name_);
   if (!found) {
     if (found.error().code != ErrorCode::not_found) return std::unexpected(found.error());
     return failure(ErrorCode::not_found, fmt::format("no external event '{}'", name_));
-  }
-  if (!found->registered()) {
-    return failure(ErrorCode::not_found, fmt::format("external event '{}' is not registered", name_));
   }
   if (kept_.size() >= kMaxKept) kept_.clear();
   kept_.emplace(name_, *found);

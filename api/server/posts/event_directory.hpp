@@ -19,6 +19,8 @@ class EventDirectory {
   /// not_found: the pool has no such event, or it is not registered; the text names it. Names must have been
   /// checked.
   [[nodiscard]] Result<PoolEvent> find(std::string_view instance, std::string_view event);
+  /// The same, also of one that is not registered.
+  [[nodiscard]] Result<PoolEvent> find_any(std::string_view instance, std::string_view event);
 
   /// How many handles are kept at most; then all are dropped and looked up anew.
   static constexpr std::size_t kMaxKept = 8192;

@@ -19,6 +19,16 @@ using dds::text_of;
 
 namespace {
 
+/// The source's state when its post of this number is done, one way or another.
+SourceState done_with(SourceState state, std::uint64_t number) {
+  ++state.counters.received;
+  state.last = number;
+  state.batch = state.batch_done = 0;
+  state.batch_no_task = 0;
+  state.last_count = state.last_taken = 0;
+  return state;
+}
+
 /// The events that a post is for.
 template <class Use>
 void for_each_event(const plc_EventPost& post, Use use) {
@@ -80,27 +90,29 @@ bool EventIntake::take(dds_entity_t reader) {
   const std::lock_guard lock(mutex_);
   const bool collected_soon = cannot_wait();
   dds::take_valid<Post>(reader, [&](const Post& post, const dds_sample_info_t& info) {
-    if (source_is_writer(reader, info, dds::Guid::from(post.source))) {
+    const dds::Guid writer = writer_of(reader, info);
+    if (writer == dds::Guid{}) {
+      ++malformed_;  // gone meanwhile: nobody to answer
+    } else if (writer == dds::Guid::from(post.source)) {
       process_locked(post);
     } else {
-      ++malformed_;
+      refuse(writer, post.sequence_number, "the source of a post must be the GUID of its writer");
     }
   });
   write_acks();
   return !collected_soon && cannot_wait();
 }
 
-bool EventIntake::source_is_writer(dds_entity_t reader, const dds_sample_info_t& info,
-                                   const dds::Guid& source) {
+dds::Guid EventIntake::writer_of(dds_entity_t reader, const dds_sample_info_t& info) {
   constexpr std::size_t kMaxKnown = 4096;
   auto known = writers_.find(info.publication_handle);
   if (known == writers_.end()) {
     const dds::Guid writer = dds::writer_of(reader, info);
-    if (writer == dds::Guid{}) return false;
+    if (writer == dds::Guid{}) return writer;
     if (writers_.size() >= kMaxKnown) writers_.clear();
     known = writers_.emplace(info.publication_handle, writer).first;
   }
-  return known->second == source;
+  return known->second;
 }
 
 void EventIntake::process(const plc_EventPost& post) {
@@ -115,64 +127,93 @@ void EventIntake::process(const plc_EventBatch& batch) {
 
 template <class Post>
 void EventIntake::process_locked(const Post& post) {
-  if (post.base_sequence == 0 || post.base_sequence > post.sequence_number) {
-    ++malformed_;
-    return;
+  const dds::Guid source = dds::Guid::from(post.source);
+  const std::uint64_t number = post.sequence_number;
+  if (number == 0 || number > kMaxPostNumber || post.base_sequence == 0 || post.base_sequence > number) {
+    return refuse(source, number,
+                  fmt::format("sequence_number {}, base_sequence {}: allowed are 1 to {}, and a base that is "
+                              "not greater than the number",
+                              number, post.base_sequence, kMaxPostNumber));
   }
   now_ = MonotonicClock::now();
-  const dds::Guid source = dds::Guid::from(post.source);
   LedgerEntry& entry = ledger_.entry_for(source, now_.time_since_epoch().count());
+  SourceState state = entry.state();
   // The source waits for nothing before its base any more: what has not come of that is lost. A ledger that
   // does not know the source starts there.
-  const std::uint64_t last = entry.last.load(std::memory_order_relaxed);
-  if (last < post.base_sequence - 1) {
-    if (entry.counters.received > 0) entry.counters.lost += post.base_sequence - 1 - last;
-    entry.last.store(post.base_sequence - 1, std::memory_order_release);
+  if (const std::uint64_t before = post.base_sequence - 1; state.last < before) {
+    const bool known = state.counters.received > state.counters.malformed;
+    if (known) state.counters.lost += before - state.last;
+    state.last = before;
   }
-  ++entry.counters.received;
   const auto wanted = read_wanted(post.ext);
-  switch (order_of(post.sequence_number, entry.last.load(std::memory_order_relaxed))) {
+  switch (order_of(number, state.last)) {
     case PostOrder::next:
       if (dds::timeliness(post.limit, epoch_) == dds::Timeliness::other_epoch) {
-        ++entry.counters.early;  // it comes again, with the limit by this server's clock
+        ++state.counters.received;
+        ++state.counters.early;  // it comes again, with the limit by this server's clock
+        ledger_.set(entry, state);
       } else {
-        post_next(post, wanted, entry);
+        post_next(post, wanted, entry, state);
       }
       break;
     case PostOrder::duplicate:
-      ++entry.counters.duplicate;
+      ++state.counters.received;
+      ++state.counters.duplicate;
+      ledger_.set(entry, state);
       // The server before this one may have been asked and be gone.
-      if (wanted && wanted->run) await(post);
+      if (wanted && wanted->run) await_again(post, state);
       break;
     case PostOrder::gap:
-      ++entry.counters.early;
+      ++state.counters.received;
+      ++state.counters.early;
+      ledger_.set(entry, state);
       break;
   }
   (wanted && wanted->late_ack ? owed_late_ : owed_).insert(source);
 }
 
+// It has no place in the numbering of its writer, so that `rejected` does not count it; but it is told.
+void EventIntake::refuse(const dds::Guid& writer, std::uint64_t sequence, std::string_view why) {
+  ++malformed_;
+  now_ = MonotonicClock::now();
+  LedgerEntry& entry = ledger_.entry_for(writer, now_.time_since_epoch().count());
+  SourceState state = entry.state();
+  ++state.counters.received;
+  ++state.counters.malformed;
+  state.rejected_sequence = sequence;
+  state.rejected_code = static_cast<std::int32_t>(ErrorCode::invalid_argument);
+  entry.rejected_text.assign(why);
+  ledger_.set(entry, state);
+  owed_.insert(writer);
+}
+
 template <class Post>
-void EventIntake::post_next(const Post& post, const Result<Wanted>& wanted, LedgerEntry& entry) {
-  auto good = wanted ? check(post) : std::unexpected(wanted.error());
-  if (good && wanted->run && awaited_.size() >= kMaxAwaited) {
-    good = failure(ErrorCode::full, "too many posts at once are to be told of their runs");
+void EventIntake::post_next(const Post& post, const Result<Wanted>& wanted, LedgerEntry& entry,
+                            const SourceState& state) {
+  auto done = wanted ? check(post) : std::unexpected(wanted.error());
+  if (done && wanted->run && awaited_.size() >= kMaxAwaited) {
+    done = failure(ErrorCode::full, "too many posts at once are to be told of their runs");
   }
-  const auto done = good ? try_post(post, entry) : std::unexpected(good.error());
-  // The post is in the pool; from here to the store is the window that PostLedger speaks of.
-  entry.last.store(post.sequence_number, std::memory_order_release);
+  Targets targets;
+  if (done) done = try_post(post, entry, state, wanted->run ? &targets : nullptr);
   if (done) {
-    ++entry.counters.accepted;
     for_each_event(post, [&](std::string_view instance, std::string_view event) {
       posted_.note(dds::Guid::from(post.source), instance, event);
     });
-    if (*done == PostResult::no_task) ++entry.counters.no_task;
-    if (wanted->run) await(post);
+    if (wanted->run) {
+      awaited_.push_back({.source = dds::Guid::from(post.source),
+                          .sequence = post.sequence_number,
+                          .targets = std::move(targets),
+                          .received = now_});
+    }
     return;
   }
-  ++entry.counters.rejected;
-  entry.rejected_sequence = post.sequence_number;
-  entry.rejected_code = static_cast<std::int32_t>(done.error().code);
+  SourceState after = done_with(state, post.sequence_number);
+  ++after.counters.rejected;
+  after.rejected_sequence = post.sequence_number;
+  after.rejected_code = static_cast<std::int32_t>(done.error().code);
   entry.rejected_text.assign(done.error().message);
+  ledger_.set(entry, after);
 }
 
 template <class Post>
@@ -184,70 +225,122 @@ Result<void> EventIntake::check(const Post& post) const {
   return failure(ErrorCode::not_found, fmt::format("this is host '{}', not '{}'", host_, shown(host)));
 }
 
-Result<PoolEvent> EventIntake::event_of(std::string_view instance, std::string_view event) {
-  if (auto good = check_name("instance", instance, kMaxInstanceName); !good)
-    return std::unexpected(good.error());
-  if (auto good = check_name("event", event, kMaxEventName); !good) return std::unexpected(good.error());
-  return directory_.find(instance, event);
+Result<void> EventIntake::check_names(std::string_view instance, std::string_view event) {
+  if (auto good = check_name("instance", instance, kMaxInstanceName); !good) return good;
+  return check_name("event", event, kMaxEventName);
 }
 
-Result<PostResult> EventIntake::try_post(const plc_EventPost& post, LedgerEntry& /*entry*/) {
-  const auto found = event_of(text_of(post.instance), text_of(post.event));
+Result<void> EventIntake::try_post(const plc_EventPost& post, LedgerEntry& entry, const SourceState& state,
+                                   Targets* targets) {
+  const auto instance = text_of(post.instance);
+  const auto event = text_of(post.event);
+  if (auto good = check_names(instance, event); !good) return good;
+  const auto found = directory_.find(instance, event);
   if (!found) return std::unexpected(found.error());
-  const PostResult done = found->post();
-  if (done != PostResult::not_registered) return done;
-  return failure(ErrorCode::not_found,
-                 fmt::format("external event '{}/{}' is not registered", post.instance, post.event));
+  const auto made =
+      ledger_.post(entry, *found, PostLedger::Allowed::registered, [&](const CountedEvent::Snapshot& seen) {
+        SourceState after = done_with(state, post.sequence_number);
+        ++after.counters.accepted;
+        if (!seen.taken()) ++after.counters.no_task;
+        after.last_count = (seen.count() + 1) & CountedEvent::kCountMask;
+        after.last_taken = seen.taken() ? 1 : 0;
+        return after;
+      });
+  if (!made) {
+    return failure(ErrorCode::not_found,
+                   fmt::format("external event '{}/{}' is not registered", instance, event));
+  }
+  if (targets != nullptr) {
+    targets->push_back({.instance = std::string(instance),
+                        .event = std::string(event),
+                        .count = made->count(),
+                        .taken = made->taken(),
+                        .handle = *found});
+  }
+  return {};
 }
 
-// All are looked for before the first is posted. Once that is noted, the batch is gone through to its end: by
-// the next server, if need be, which begins behind the last one that was posted.
-Result<PostResult> EventIntake::try_post(const plc_EventBatch& batch, LedgerEntry& entry) {
+// The events of a batch, so that all are found before the first is posted to. Of a batch that was begun those
+// count that are there still.
+Result<void> EventIntake::look_up(const plc_EventBatch& batch, bool begun) {
+  batch_events_.clear();
+  Result<void> good;
+  for_each_event(batch, [&](std::string_view instance, std::string_view event) {
+    if (!good) return;
+    good = check_names(instance, event);
+    if (!good) return;
+    const auto found = begun ? directory_.find_any(instance, event) : directory_.find(instance, event);
+    batch_events_.push_back(found.value_or(PoolEvent()));
+    if (!found && !begun) {
+      good = failure(found.error().code,
+                     fmt::format("{} (event number {} of the batch of {}; none was posted)",
+                                 found.error().message, batch_events_.size(), batch.events._length));
+    }
+  });
+  return good;
+}
+
+// The batch takes effect when all of its events were found. From then on it goes through to its end, by the
+// next server, if need be, which begins behind the last event that was posted. An event that is unregistered
+// in between is posted nevertheless; one that has left the pool has taken its posts with it.
+Result<void> EventIntake::try_post(const plc_EventBatch& batch, LedgerEntry& entry, const SourceState& state,
+                                   Targets* targets) {
   const std::uint32_t count = batch.events._length;
   if (count == 0) return failure(ErrorCode::invalid_argument, "a batch of no events");
-  if (entry.batch.load(std::memory_order_relaxed) != batch.sequence_number) {
-    Result<void> good;
-    std::uint32_t position = 0;
-    for_each_event(batch, [&](std::string_view instance, std::string_view event) {
-      ++position;
-      if (!good) return;
-      if (const auto found = event_of(instance, event); !found) {
-        good = failure(found.error().code,
-                       fmt::format("{} (event number {} of the batch of {}; none was posted)",
-                                   found.error().message, position, count));
-      }
-    });
-    if (!good) return std::unexpected(good.error());
-    entry.batch_done.store(0, std::memory_order_relaxed);
-    entry.batch.store(batch.sequence_number, std::memory_order_release);
-  }
-  auto result = PostResult::posted;
+  const bool begun = state.batch == batch.sequence_number && state.batch_done > 0;
+  if (auto good = look_up(batch, begun); !good) return good;
+  const auto finished = [&](const SourceState& part) {
+    SourceState after = done_with(part, batch.sequence_number);
+    ++after.counters.accepted;
+    after.counters.no_task += part.batch_no_task;
+    return after;
+  };
+  SourceState part = state;
+  if (!begun) part.batch_no_task = 0;
   std::uint32_t position = 0;
-  std::uint32_t gone = 0;
   for_each_event(batch, [&](std::string_view instance, std::string_view event) {
-    if (position++ < entry.batch_done.load(std::memory_order_relaxed)) return;
-    const auto found = event_of(instance, event);
-    const PostResult done = found ? found->post() : PostResult::not_registered;
-    if (done == PostResult::not_registered) ++gone;
-    if (done == PostResult::no_task) result = PostResult::no_task;
-    entry.batch_done.store(position, std::memory_order_release);
+    const std::uint32_t index = position++;
+    if (begun && index < state.batch_done) return;
+    const auto made = ledger_.post(entry, batch_events_[index], PostLedger::Allowed::also_unregistered,
+                                   [&](const CountedEvent::Snapshot& seen) {
+                                     SourceState after = part;
+                                     after.batch = batch.sequence_number;
+                                     after.batch_done = index + 1;
+                                     if (!seen.taken()) after.batch_no_task = 1;
+                                     return index + 1 < count ? after : finished(after);
+                                   });
+    if (!made) return;
+    part = entry.state();
+    if (targets != nullptr) {
+      targets->push_back({.instance = std::string(instance),
+                          .event = std::string(event),
+                          .count = made->count(),
+                          .taken = made->taken(),
+                          .handle = batch_events_[index]});
+    }
   });
-  if (gone == 0) return result;
-  return failure(ErrorCode::not_found,
-                 fmt::format("{} of the {} events of the batch went at that moment; the others were posted",
-                             gone, count));
+  if (part.last != batch.sequence_number) ledger_.set(entry, finished(part));
+  return {};
 }
 
+// Of a post that was done before: by the last one of its source it is known what the event's count was.
 template <class Post>
-void EventIntake::await(const Post& post) {
+void EventIntake::await_again(const Post& post, const SourceState& state) {
   AwaitedPost awaited{.source = dds::Guid::from(post.source),
                       .sequence = post.sequence_number,
                       .targets = {},
                       .received = now_};
+  const bool exact = state.last == post.sequence_number && state.last_count != 0;
   for_each_event(post, [&](std::string_view instance, std::string_view event) {
-    if (const auto found = event_of(instance, event)) {
-      awaited.targets.push_back({std::string(instance), std::string(event), found->counted().count()});
-    }
+    if (!check_names(instance, event)) return;
+    const auto found = directory_.find_any(instance, event);
+    if (!found) return;
+    awaited.targets.push_back({.instance = std::string(instance),
+                               .event = std::string(event),
+                               .count = exact ? state.last_count : found->counted().count(),
+                               .taken = !exact || state.last_taken != 0,
+                               .exact = exact,
+                               .handle = *found});
   });
   if (awaited_.size() < kMaxAwaited) awaited_.push_back(std::move(awaited));
 }
@@ -274,13 +367,14 @@ plc_EventAck EventIntake::make_ack(const LedgerEntry& entry) const {
   dds::Guid{entry.source}.copy_to(ack.source);
   dds::copy_text(ack.host, host_);
   ack.epoch = epoch_;
-  ack.sequence_number = entry.last.load(std::memory_order_relaxed);
-  ack.accepted = entry.counters.accepted;
-  ack.no_task = entry.counters.no_task;
-  ack.rejected = entry.counters.rejected;
-  ack.lost = entry.counters.lost;
-  ack.rejected_sequence = entry.rejected_sequence;
-  ack.rejected_code = entry.rejected_code;
+  const SourceState& state = entry.state();
+  ack.sequence_number = state.last;
+  ack.accepted = state.counters.accepted;
+  ack.no_task = state.counters.no_task;
+  ack.rejected = state.counters.rejected;
+  ack.lost = state.counters.lost;
+  ack.rejected_sequence = state.rejected_sequence;
+  ack.rejected_code = state.rejected_code;
   dds::copy_text(ack.rejected_text, entry.rejected_text.view());
   ack.credits = kPostCredits;
   return ack;
@@ -316,13 +410,10 @@ PostedEvents::BySource EventIntake::collect_posted() {
 std::vector<EventIntake::Writer> EventIntake::writers() const {
   const std::lock_guard lock(mutex_);
   std::vector<Writer> found{{.source = {}, .counters = ledger_.total(), .last = 0, .used = {}}};
-  found.front().counters.received += malformed_;
-  found.front().counters.rejected += malformed_;
   ledger_.for_each([&](const LedgerEntry& entry) {
     const TimePoint used{Duration(entry.used_ns)};
     found.front().used = std::max(found.front().used, used);
-    found.push_back(
-        {dds::Guid{entry.source}, entry.counters, entry.last.load(std::memory_order_relaxed), used});
+    found.push_back({dds::Guid{entry.source}, entry.state().counters, entry.state().last, used});
   });
   return found;
 }

@@ -29,6 +29,9 @@ struct AwaitedPost {
     std::string instance;
     std::string event;
     std::uint64_t count = 0;  ///< of the event, with this post
+    bool taken = true;        ///< tasks took posts then
+    bool exact = true;        ///< false: it came again, and `count` is that of a later post
+    PoolEvent handle = {};
   };
   dds::Guid source;
   std::uint64_t sequence = 0;
@@ -83,7 +86,8 @@ class EventIntake {
   /// All together first, then each source that is known.
   [[nodiscard]] std::vector<Writer> writers() const;
 
-  /// Samples that were no valid post: source not the writer's, or impossible numbers.
+  /// Samples that were no valid post: source not the writer's, or impossible numbers. Their writers are
+  /// answered with the reason.
   [[nodiscard]] std::uint64_t malformed() const;
 
   /// How many awaited posts there may be between two calls of collect_awaited().
@@ -105,17 +109,23 @@ class EventIntake {
   [[nodiscard]] bool cannot_wait() const noexcept { return !owed_.empty() || !awaited_.empty(); }
   template <class Post>
   void process_locked(const Post& post);
+  void refuse(const dds::Guid& writer, std::uint64_t sequence, std::string_view why);
+  using Targets = std::vector<AwaitedPost::Target>;
   template <class Post>
-  void post_next(const Post& post, const Result<Wanted>& wanted, LedgerEntry& entry);
-  [[nodiscard]] Result<PostResult> try_post(const plc_EventPost& post, LedgerEntry& entry);
-  [[nodiscard]] Result<PostResult> try_post(const plc_EventBatch& batch, LedgerEntry& entry);
+  void post_next(const Post& post, const Result<Wanted>& wanted, LedgerEntry& entry,
+                 const SourceState& state);
+  // `targets` is null if nobody waits for the runs.
+  [[nodiscard]] Result<void> try_post(const plc_EventPost& post, LedgerEntry& entry, const SourceState& state,
+                                      Targets* targets);
+  [[nodiscard]] Result<void> try_post(const plc_EventBatch& batch, LedgerEntry& entry,
+                                      const SourceState& state, Targets* targets);
+  [[nodiscard]] Result<void> look_up(const plc_EventBatch& batch, bool begun);
   template <class Post>
   [[nodiscard]] Result<void> check(const Post& post) const;
   template <class Post>
-  void await(const Post& post);
-  [[nodiscard]] Result<PoolEvent> event_of(std::string_view instance, std::string_view event);
-  [[nodiscard]] bool source_is_writer(dds_entity_t reader, const dds_sample_info_t& info,
-                                      const dds::Guid& source);
+  void await_again(const Post& post, const SourceState& state);
+  [[nodiscard]] static Result<void> check_names(std::string_view instance, std::string_view event);
+  [[nodiscard]] dds::Guid writer_of(dds_entity_t reader, const dds_sample_info_t& info);
 
   const std::string host_;
   const std::uint64_t epoch_;
@@ -130,7 +140,8 @@ class EventIntake {
   std::unordered_map<dds_instance_handle_t, dds::Guid> writers_;  // asking DDS costs an allocation
   std::vector<AwaitedPost> awaited_;
   PostedEvents posted_;
-  TimePoint now_;  // when the post that is processed came
+  std::vector<PoolEvent> batch_events_;  // of the batch that is processed
+  TimePoint now_;                        // when the post that is processed came
   std::uint64_t malformed_ = 0;
 };
 

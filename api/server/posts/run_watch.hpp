@@ -3,7 +3,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <list>
+#include <set>
 #include <string>
+#include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include <control.h>
@@ -26,6 +29,8 @@ class RunWatch {
   static constexpr Duration kLimit = std::chrono::seconds(10);
   /// While something is waited for it is looked so often.
   static constexpr Duration kPeriod = std::chrono::microseconds(200);
+  /// So many tasks are looked at in one call of look(), in turns.
+  static constexpr std::size_t kAtOnce = 256;
 
   RunWatch(std::string host, std::uint64_t epoch) : host_(std::move(host)), epoch_(epoch) {}
 
@@ -35,24 +40,31 @@ class RunWatch {
   [[nodiscard]] bool empty() const noexcept { return waits_.empty(); }
 
  private:
+  using Target = AwaitedPost::Target;
   struct Run {
     TaskWatch::BoundTask task;
-    std::uint64_t count = 0;  ///< the post that it has to have run for
+    Target target;
     bool done = false;
   };
   struct Wait {
     plc_EventRun result{};
     TimePoint received;
     std::vector<Run> runs;
+    std::vector<Target> unknown;  // whose tasks are not seen yet
     bool decided = false;
   };
-  [[nodiscard]] std::size_t runs() const;
+  void find_tasks(Wait& wait, const TaskWatch& tasks);
+  [[nodiscard]] std::size_t look_at(Wait& wait, const TaskWatch& tasks);
+  void forget(const Wait& wait);
   static void decide(Wait& wait, ErrorCode code, const std::string& text);
   static void look_at(Wait& wait, Run& run, const TaskWatch& tasks);
 
   std::string host_;
   std::uint64_t epoch_;
-  std::list<Wait> waits_;
+  std::list<Wait> waits_;                                // who was looked at last is last
+  std::set<std::pair<dds::Guid, std::uint64_t>> known_;  // source and number of each
+  std::unordered_map<dds::Guid, std::size_t, dds::GuidHash> of_client_;
+  std::size_t runs_ = 0;  // of all, with targets that are not known yet
 };
 
 }  // namespace plchost

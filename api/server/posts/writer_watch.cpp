@@ -45,7 +45,7 @@ bool WriterWatch::look(const EventIntake& intake, const SessionTable& sessions, 
     sample.received = writer.counters.received;
     sample.delivered = writer.counters.accepted;
     sample.no_task = writer.counters.no_task;
-    sample.rejected = writer.counters.rejected;
+    sample.rejected = writer.counters.rejected + writer.counters.malformed;
     sample.duplicate = writer.counters.duplicate;
     sample.early = writer.counters.early;
     sample.lost = writer.counters.lost;

@@ -67,6 +67,7 @@ bool TaskWatch::open_page(const std::string& instance, Watched& watched) {
   if (!runtime || runtime->pid != watched.pid) return false;
   watched.page = std::move(*page);
   watched.told.assign(watched.page->task_count(), {});
+  bound_is_stale_ = true;
   return true;
 }
 
@@ -79,6 +80,7 @@ bool TaskWatch::forget(const std::string& instance) {
 }
 
 bool TaskWatch::dispose_tasks(const std::string& instance, const Watched& watched) {
+  bound_is_stale_ = true;
   for (const auto& told : watched.told) statistics_.dispose(instance, told);
   return table_.dispose_under(instance + "/");
 }
@@ -100,20 +102,27 @@ bool TaskWatch::in_exception(const std::string& instance, std::string_view task)
   return false;
 }
 
-std::vector<TaskWatch::BoundTask> TaskWatch::bound_tasks(std::string_view instance,
-                                                         std::string_view event) const {
-  const std::string full = event_object_name(instance, event);
-  std::vector<BoundTask> found;
+std::span<const TaskWatch::BoundTask> TaskWatch::bound_tasks(std::string_view instance,
+                                                             std::string_view event) const {
+  if (bound_is_stale_) index_bound_tasks();
+  const auto found = bound_.find(event_object_name(instance, event));
+  if (found == bound_.end()) return {};
+  return found->second;
+}
+
+void TaskWatch::index_bound_tasks() const {
+  bound_is_stale_ = false;
+  bound_.clear();
   for (const auto& [name, watched] : instances_) {
     if (!watched.page) continue;
     for (std::uint32_t i = 0; i < watched.page->task_count(); ++i) {
       const auto task = watched.page->identity(i);
       if (!task || task->kind != PageTaskKind::external) continue;
-      const std::string_view bound = task->external_event.view();
-      if ((name == instance && bound == event) || bound == full) found.push_back({name, watched.pid, i});
+      const std::string_view event = task->external_event.view();
+      const bool in_full = event.contains('/');
+      bound_[in_full ? std::string(event) : event_object_name(name, event)].push_back({name, watched.pid, i});
     }
   }
-  return found;
 }
 
 const InstancePageReader* TaskWatch::page_of(const BoundTask& task) const {

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -56,7 +58,9 @@ class TaskWatch {
     std::uint32_t index = 0;
   };
   /// Those that run for a post of this event: tasks of its instance, and of others that name it in full.
-  [[nodiscard]] std::vector<BoundTask> bound_tasks(std::string_view instance, std::string_view event) const;
+  /// Costs one look into an index, which is made anew after an instance has come or gone.
+  [[nodiscard]] std::span<const BoundTask> bound_tasks(std::string_view instance,
+                                                       std::string_view event) const;
   /// Null: its process is gone.
   [[nodiscard]] const InstancePageReader* page_of(const BoundTask& task) const;
 
@@ -77,6 +81,7 @@ class TaskWatch {
     TimePoint next_statistics_look;
   };
   bool open_page(const std::string& instance, Watched& watched);
+  void index_bound_tasks() const;
   void publish(const std::string& instance, Watched& watched, std::uint32_t index);
   bool dispose_tasks(const std::string& instance, const Watched& watched);
   void look_at_statistics(TimePoint now);
@@ -87,6 +92,8 @@ class TaskWatch {
   StatusTable<plc_TaskStatus> table_;
   StatisticsWriter statistics_;
   std::map<std::string, Watched> instances_;
+  mutable std::map<std::string, std::vector<BoundTask>, std::less<>> bound_;  // by the event, in full
+  mutable bool bound_is_stale_ = false;
   std::string last_told_;  // the instance whose statistics were told last: the next call begins behind it
 };
 

@@ -183,6 +183,32 @@ TEST_F(ClientLibrary, TellsCallsThatWereNotBegunThatItHasEnded) {
   EXPECT_EQ(codes.back(), ClientError::unavailable);
 }
 
+TEST_F(ClientLibrary, LetsABoundedNumberOfPostsWait) {
+  constexpr unsigned kMost = 1024;
+  std::atomic<unsigned> refused{0};
+  std::atomic<unsigned> told{0};
+  std::promise<void> go_on;
+  {
+    Client sut(options());
+    std::promise<void> begun;
+    sut.post("hosta", "line1/ready", [&](const Client::Outcome&) {
+      begun.set_value();
+      go_on.get_future().wait();
+    });
+    begun.get_future().wait();
+    for (unsigned i = 0; i < kMost + 3; ++i) {
+      sut.post("hosta", "line1/ready", [&](const Client::Outcome& outcome) {
+        if (outcome.code == static_cast<int>(ErrorCode::full)) ++refused;
+        ++told;
+      });
+    }
+    EXPECT_EQ(refused, 3U) << "told within the call";
+    EXPECT_EQ(told, 3U);
+    go_on.set_value();
+  }
+  EXPECT_EQ(told, kMost + 3);
+}
+
 TEST_F(ClientLibrary, DoesNothingAfterItWasClosed) {
   Client sut(options());
   sut.close();

@@ -128,9 +128,7 @@ TEST(RemotePost, SurvivesTheDeathOfTheServer) {
   ASSERT_TRUE(report) << report.error().describe();
   EXPECT_EQ(report->unacknowledged, 0U);
   EXPECT_EQ(report->accepted, kPosts);
-  // The window of PostLedger: at most one repeated post for each kill, and none lost.
-  EXPECT_GE(event.counted().count(), kPosts);
-  EXPECT_LE(event.counted().count(), kPosts + kKills);
+  EXPECT_EQ(event.counted().count(), kPosts);
 }
 
 TEST(RemotePost, GoesOnWhileAnotherClientIsStopped) {

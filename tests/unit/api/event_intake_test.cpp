@@ -26,15 +26,13 @@ class EventIntakeTest : public testing::Test {
   }
   /// As a server leaves it that was killed when so many events of it were posted.
   void leave_first_batch_at(std::uint32_t posted) const {
-    PostLedger ledger = PostLedger::open(name_).value();
+    PostLedger ledger = PostLedger::open(pool_).value();
     dds::Guid source;
     source.bytes[0] = 9;
-    LedgerEntry& entry = ledger.entry_for(source, 1);
-    entry.batch.store(1);
-    entry.batch_done.store(posted);
+    ledger.set(ledger.entry_for(source, 1), {.batch = 1, .batch_done = posted});
   }
   [[nodiscard]] EventIntake make() const {
-    return {"hosta", pool_, PostLedger::open(name_).value(), 7, guard_};
+    return {"hosta", pool_, PostLedger::open(pool_).value(), 7, guard_};
   }
 
   static plc_EventPost make_post(std::uint64_t sequence, std::uint64_t base = 1, std::uint8_t source = 1) {
@@ -183,14 +181,28 @@ TEST_F(EventIntakeTest, RejectsAnotherHostAndImpossibleNames) {
   EXPECT_EQ(event_.counted().count(), 0U);
 }
 
-TEST_F(EventIntakeTest, IgnoresImpossibleNumbers) {
+TEST_F(EventIntakeTest, AnswersImpossibleNumbersAndCountsThemApart) {
   EventIntake sut = make();
-  sut.process(make_post(0, 0));
-  sut.process(make_post(1, 0));
-  sut.process(make_post(1, 2));
-  EXPECT_EQ(sut.malformed(), 3U);
-  EXPECT_EQ(sut.writers().front().counters.rejected, 3U) << "of all together, as they name nobody";
-  EXPECT_TRUE(sut.collect_acks().empty());
+  constexpr std::uint64_t kLast = ~std::uint64_t{0};
+  for (const auto& [number, base] : {std::pair<std::uint64_t, std::uint64_t>{0, 0},
+                                     {1, 0},
+                                     {1, 2},
+                                     {kLast, 1},
+                                     {kLast, kLast},
+                                     {kMaxPostNumber + 1, kMaxPostNumber + 1}}) {
+    sut.process(make_post(number, base));
+    const auto ack = only_ack(sut);
+    EXPECT_EQ(ack.rejected_sequence, number);
+    EXPECT_EQ(ack.rejected_code, static_cast<int>(ErrorCode::invalid_argument));
+    EXPECT_THAT(std::string(dds::text_of(ack.rejected_text)), testing::HasSubstr("sequence_number"));
+    EXPECT_EQ(ack.rejected, 0U) << "it has no place among those that are numbered";
+    EXPECT_EQ(ack.sequence_number, 0U);
+  }
+  EXPECT_EQ(sut.malformed(), 6U);
+  EXPECT_EQ(sut.writers().at(1).counters.malformed, 6U);
+  sut.process(make_post(1));
+  EXPECT_EQ(only_ack(sut).accepted, 1U);
+  EXPECT_EQ(event_.counted().count(), 1U) << "what comes after them is done, not only acknowledged";
 }
 
 TEST_F(EventIntakeTest, SeesThatAnEventWasUnregistered) {
@@ -264,12 +276,12 @@ TEST_F(EventIntakeTest, GoesOnCountingAfterTheServerWasReplaced) {
 }
 
 TEST_F(EventIntakeTest, KeepsInTheTotalWhatSourcesDidThatWereForgotten) {
-  PostLedger sut = PostLedger::open(name_).value();
+  PostLedger sut = PostLedger::open(pool_).value();
   for (std::uint32_t i = 0; i <= kLedgerEntries; ++i) {
     dds::Guid source;
     std::memcpy(source.bytes.data(), &i, sizeof i);
     source.bytes[15] = 1;
-    ++sut.entry_for(source, i).counters.received;
+    sut.set(sut.entry_for(source, i), {.counters = {.received = 1}});
   }
   EXPECT_EQ(sut.reused(), 1U);
   EXPECT_EQ(sut.total().received, kLedgerEntries + 1U);
@@ -344,13 +356,18 @@ TEST_F(EventIntakeTest, GoesOnWithinABatchWhereTheServerBeforeItWasKilled) {
   EXPECT_EQ(event_.counted().count(), 4U);
 }
 
-TEST_F(EventIntakeTest, TellsWhatOfABatchCouldNotBePostedAnyMore) {
+TEST_F(EventIntakeTest, PostsABatchThatWasBegunToItsEndAlsoToWhatWasUnregisteredSince) {
   leave_first_batch_at(1);
+  const PoolEvent other = pool_.create_event("line1/other").value();
   EventIntake sut = make();
-  sut.process(Batch(1, {"ready", "ready", "redy"}).sample());
+  sut.process(Batch(1, {"ready", "ready", "other", "gone"}).sample());
+  EXPECT_EQ(event_.counted().count(), 1U);
+  EXPECT_EQ(other.counted().count(), 1U) << "not registered any more";
   const auto ack = only_ack(sut);
-  EXPECT_EQ(ack.rejected, 1U);
-  EXPECT_THAT(std::string(dds::text_of(ack.rejected_text)), testing::HasSubstr("1 of the 3 events"));
+  EXPECT_EQ(ack.accepted, 1U);
+  EXPECT_EQ(ack.rejected, 0U);
+  EXPECT_EQ(ack.no_task, 1U);
+  EXPECT_EQ(ack.sequence_number, 1U);
 }
 
 TEST_F(EventIntakeTest, TellsTheNextServersLogOfWhoPostedLast) {
@@ -445,20 +462,21 @@ TEST_F(EventIntakeTest, LooksUpEventsBeyondTheDirectorysBound) {
 }
 
 TEST_F(EventIntakeTest, LedgerGivesTheOldestEntryAwayAtItsBound) {
-  PostLedger sut = PostLedger::open(name_).value();
+  PostLedger sut = PostLedger::open(pool_).value();
   const auto source = [](std::uint32_t number) {
     dds::Guid guid;
     std::memcpy(guid.bytes.data(), &number, sizeof number);
     guid.bytes[15] = 1;
     return guid;
   };
-  for (std::uint32_t i = 0; i < kLedgerEntries; ++i) sut.entry_for(source(i), i + 10).last.store(i + 1);
+  for (std::uint32_t i = 0; i < kLedgerEntries; ++i)
+    sut.set(sut.entry_for(source(i), i + 10), {.last = i + 1});
   EXPECT_EQ(sut.reused(), 0U);
   (void)sut.entry_for(source(0), 1'000'000);
-  EXPECT_EQ(sut.entry_for(source(kLedgerEntries), 1'000'001).last.load(), 0U);
+  EXPECT_EQ(sut.entry_for(source(kLedgerEntries), 1'000'001).state().last, 0U);
   EXPECT_EQ(sut.reused(), 1U);
-  EXPECT_EQ(sut.entry_for(source(0), 1'000'002).last.load(), 1U) << "used lately, so kept";
-  EXPECT_EQ(sut.entry_for(source(1), 1'000'003).last.load(), 0U) << "was the oldest";
+  EXPECT_EQ(sut.entry_for(source(0), 1'000'002).state().last, 1U) << "used lately, so kept";
+  EXPECT_EQ(sut.entry_for(source(1), 1'000'003).state().last, 0U) << "was the oldest";
 }
 
 TEST_F(EventIntakeTest, LedgerOfAnotherFormIsMadeAnew) {
@@ -467,7 +485,7 @@ TEST_F(EventIntakeTest, LedgerOfAnotherFormIsMadeAnew) {
     ASSERT_TRUE(strange);
     strange->bytes()[0] = std::byte{1};
   }
-  EXPECT_TRUE(PostLedger::open(name_));
+  EXPECT_TRUE(PostLedger::open(pool_));
 }
 
 }  // namespace

@@ -30,10 +30,11 @@ class RunWatchTest : public testing::Test {
     task.kind = PageTaskKind::external;
     return InstancePage::create(pool, "line1", std::array{task}).value();
   }
-  void write_running(std::uint32_t running) {
+  void write_running(std::uint32_t running, ApplicationState state = ApplicationState::none) {
     InstanceRuntime runtime;
     runtime.pid = kPid;
     runtime.running = running;
+    runtime.state = state;
     page_.write_runtime(runtime);
   }
   /// The task's last cycle: for which post, and how long after now_ it began; it took 3 us.
@@ -116,10 +117,68 @@ TEST_F(RunWatchTest, KnowsAnEventOfTheSameNameOfAnotherInstanceForAnother) {
 }
 
 TEST_F(RunWatchTest, TellsAtOnceThatNoTaskIsBound) {
-  sut_.add(post(1, "other", 1), tasks_);
+  AwaitedPost awaited = post(1, "other", 1);
+  awaited.targets.front().taken = false;
+  sut_.add(awaited, tasks_);
   const auto told = sut_.look(tasks_, now_);
   ASSERT_EQ(told.size(), 1U);
   EXPECT_EQ(told[0].code, static_cast<int>(ErrorCode::not_found));
+}
+
+TEST_F(RunWatchTest, WaitsForATaskThatTookThePostAndIsNotSeenYet) {
+  InstanceStatus instance;
+  instance.name.assign("line1");
+  (void)tasks_.forget("line1");
+  sut_.add(post(1, "ready", 1), tasks_);
+  EXPECT_TRUE(sut_.look(tasks_, now_).empty()) << "a server that has just begun has opened no page yet";
+  write_cycle(1, microseconds(10));
+  instance.pid = kPid;
+  (void)tasks_.follow(instance, now_ + std::chrono::seconds(1));
+  const auto told = sut_.look(tasks_, now_);
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0].code, 0);
+  EXPECT_EQ(told[0].tasks, 1U);
+}
+
+TEST_F(RunWatchTest, DoesNotCallATaskStoppedThatIsInItsLastCycle) {
+  sut_.add(post(1, "ready", 1), tasks_);
+  write_running(0, ApplicationState::stopping);
+  EXPECT_TRUE(sut_.look(tasks_, now_).empty());
+  write_cycle(1, microseconds(10));
+  write_running(0, ApplicationState::stopped);
+  const auto told = sut_.look(tasks_, now_);
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0].code, 0);
+}
+
+TEST_F(RunWatchTest, SaysThatItDoesNotKnowOfAPostThatCameAgainLate) {
+  AwaitedPost awaited = post(1, "ready", 5);
+  awaited.targets.front().exact = false;
+  sut_.add(awaited, tasks_);
+  write_running(0);
+  const auto told = sut_.look(tasks_, now_);
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_THAT(std::string(dds::text_of(told[0].text)), testing::HasSubstr("not known"));
+}
+
+TEST_F(RunWatchTest, LooksAtABoundedNumberOfTasksAtATimeInTurns) {
+  constexpr std::size_t kEvents = 64;
+  for (std::uint64_t i = 1; i <= RunWatch::kMaxOfClient; ++i) {
+    AwaitedPost batch = post(i, "ready", i == 1 ? 2 : 1);
+    batch.targets.resize(kEvents, batch.targets.front());
+    sut_.add(batch, tasks_);
+  }
+  write_cycle(1, microseconds(10));
+  std::size_t told = 0;
+  std::size_t calls = 0;
+  for (; told < RunWatch::kMaxOfClient - 1; ++calls) {
+    const auto some = sut_.look(tasks_, now_);
+    ASSERT_LE(some.size() * kEvents, RunWatch::kAtOnce);
+    told += some.size();
+    ASSERT_LT(calls, 1000U);
+  }
+  EXPECT_GE(calls, RunWatch::kMaxOfClient * kEvents / RunWatch::kAtOnce - 1);
+  EXPECT_FALSE(sut_.empty()) << "one is still waited for";
 }
 
 TEST_F(RunWatchTest, TellsThatTheTaskWasStopped) {

@@ -66,6 +66,59 @@ TEST(CountedEvent, AWaiterBesideAPostThatWokeNobodyIsRoused) {
   EXPECT_EQ(sut.count(), 1U);
 }
 
+TEST(CountedEvent, TellsEachPosterOnWhichSideOfAChangeItsPostIs) {
+  CountedEvent sut;
+  EXPECT_FALSE(sut.post());
+  EXPECT_EQ(sut.set_taken(true).count(), 1U);
+  EXPECT_TRUE(sut.post());
+  EXPECT_TRUE(sut.post());
+  EXPECT_EQ(sut.set_taken(false).count(), 3U);
+  EXPECT_FALSE(sut.post());
+  EXPECT_EQ(sut.count(), 4U);
+}
+
+TEST(CountedEvent, CountsAMarkedPostOrNothing) {
+  CountedEvent sut;
+  sut.set_taken(true);
+  auto seen = sut.snapshot();
+  ASSERT_TRUE(sut.post_marked(seen));
+  EXPECT_TRUE(seen.marked() && seen.taken());
+  EXPECT_EQ(seen.count(), 1U);
+  EXPECT_TRUE(sut.snapshot().marked());
+  sut.post();
+  EXPECT_FALSE(sut.post_marked(seen)) << "another post came between";
+  EXPECT_EQ(sut.count(), 2U);
+  seen = sut.snapshot();
+  ASSERT_TRUE(sut.post_marked(seen));
+  EXPECT_FALSE(sut.snapshot().marked());
+  EXPECT_EQ(sut.count(), 3U);
+}
+
+// The bits beside the turns are not theirs, however many waits there are.
+TEST(CountedEvent, KeepsMarkAndTakenOverAllTurns) {
+  CountedEvent sut;
+  auto seen = sut.snapshot();
+  ASSERT_TRUE(sut.post_marked(seen));
+  sut.set_taken(true);
+  for (int i = 0; i < 20'000; ++i) sut.nudge();
+  EXPECT_TRUE(sut.snapshot().marked() && sut.snapshot().taken());
+  EXPECT_EQ(sut.count(), 1U);
+}
+
+// Waiters may come between a marked post and its wake; none of them may be left asleep by it.
+TEST(CountedEvent, AMarkedPostWakesWhoSleeps) {
+  CountedEvent sut;
+  constexpr std::uint64_t kPosts = 20'000;
+  std::thread waiter([&] { follow(sut, kPosts); });
+  for (std::uint64_t i = 0; i < kPosts; ++i) {
+    auto seen = sut.snapshot();
+    while (!sut.post_marked(seen)) seen = sut.snapshot();
+    sut.wake(seen);
+  }
+  waiter.join();
+  EXPECT_EQ(sut.count(), kPosts);
+}
+
 TEST(CountedEvent, EveryCursorSeesEachPost) {
   CountedEvent sut;
   const auto first = sut.snapshot();
