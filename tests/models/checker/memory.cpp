@@ -21,6 +21,8 @@ void poke(std::uintptr_t address, std::size_t size, std::uint64_t value) noexcep
 
 void Memory::reset() {
   threads_ = {};
+  for (std::size_t i = 0; i < kMaxThreads; ++i)
+    threads_[i].now.clock[i] = 1;  // what it does before its first step
   ended_.reset();
   learnable_.reset();
   for (std::size_t i = 0; i < used_; ++i) locations_[i].order.clear();
