@@ -104,7 +104,7 @@ TEST_F(NodeDirectoryTest, WhoJoinsTakesTheForcedAddressOfADeadProcess) {
 TEST_F(NodeDirectoryTest, AnotherProcessOfTheSameNumberIsNotTakenForTheOldOne) {
   const NodeLife life = join("a").value();
   auto record = sut_.record(life.node).value();
-  record.process_start += 1;  // as if this process had got the number of another one
+  record.process_start -= 1;  // as if this process had got the number of one before it
   sut_.slot(life.node).record.write(record);
   EXPECT_EQ(sut_.reclaim(), 1U);
 }
