@@ -58,13 +58,13 @@ Result<UniqueFd> make_signal_fd() {
 }  // namespace
 
 Result<void> ControlServer::Parts::open() {
+  if (auto made = make_loop(); !made) return made;
+  if (auto made = make_guard(); !made) return made;
   auto ledger = PostLedger::open(pool);
   if (!ledger) return std::unexpected(ledger.error());
-  if (auto made = make_loop(); !made) return made;
   auto linked = ManagerLink::connect(options.run_directory);
   if (!linked) return std::unexpected(linked.error());
   manager = std::move(*linked);
-  if (auto made = make_guard(); !made) return made;
   intake.emplace(options.host, pool, std::move(*ledger), epoch, guard);
   if (auto entered = enter_domain(); !entered) return entered;
   if (auto claimed = claim_name(); !claimed) return claimed;

@@ -11,7 +11,7 @@ namespace plchost {
 
 namespace {
 
-constexpr mode_t kMode = 0600;
+constexpr mode_t kOwnersMode = 0600;
 constexpr mode_t kForOthersToWrite = S_IWGRP | S_IWOTH;
 
 Result<void> check_ours(int fd, const std::string& path) {
@@ -57,7 +57,7 @@ std::string holder_of(int fd) {
 Result<LockFile> LockFile::take(const std::string& path) {
   for (;;) {
     // O_NONBLOCK: a FIFO would make the open wait.
-    UniqueFd fd(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, kMode));
+    UniqueFd fd(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, kOwnersMode));
     if (!fd) {
       const int error = errno;
       return failure(code_of(error), "open " + path, error);

@@ -27,7 +27,7 @@ is "$(plcctl post event packer1/product --wait)" "1 posted" || fail "--wait"
 echo "- the answer is no when there is nothing to wait for"
 refused "no external event 'packer1/produkt'" plcctl post event packer1/produkt --wait=run
 plcctl stop instance packer2
-refused "was stopped before it ran" plcctl post event packer2/product --wait=run
+refused "no task was bound to the event" plcctl post event packer2/product --wait=run
 plcctl start instance packer2
 if said=$(plcctl post event packer1/product --wait=walk 2>&1); then fail "--wait=walk: $said"; fi
 grep -q 'pool.*run' <<<"$said" || fail "--wait=walk: $said"

@@ -46,7 +46,7 @@ cp -r "$plant/anna" "$cell/kept"
 plcctl security revoke anna >/dev/null
 left() { ! plcctl --identity "$cell/kept" --timeout 1 list hosts; }
 until_true 20 left
-plcctl security renew host >/dev/null
+plcctl security renew cell1 >/dev/null
 plcctl security add-identity operator anna >/dev/null
 started() { as anna post event packer1/product; }
 until_true 20 started

@@ -1,7 +1,9 @@
 // An API server that is killed at each instruction of a post in turn, by a debugger, while others post.
 
+#include <algorithm>
 #include <array>
 #include <atomic>
+#include <cstdlib>
 #include <string>
 #include <thread>
 
@@ -13,6 +15,7 @@
 
 #include "api/dds/text.hpp"
 #include "api/server/posts/event_intake.hpp"
+#include "tests/support/one_core.hpp"
 #include "tests/support/sanitized.hpp"
 
 namespace plchost {
@@ -48,6 +51,12 @@ class Follower {
   std::atomic<std::uint64_t> seen_{0};
   std::thread thread_;
 };
+
+/// From one kill to the next, in instructions: 1 for all of them, which takes minutes.
+int stride(int usual) {
+  const char* const wanted = std::getenv("PLCHOST_KILL_STRIDE");
+  return wanted != nullptr ? std::max(1, std::atoi(wanted)) : usual;
+}
 
 class EachInstructionOfAPost : public testing::Test {
  protected:
@@ -135,6 +144,7 @@ class EachInstructionOfAPost : public testing::Test {
     EXPECT_EQ(counters.rejected + counters.early + counters.lost + counters.malformed, 0U) << where;
   }
 
+  OneCore core_;  // each step is a change from one process to the other
   std::string name_ = "plchost-post-step-" + std::to_string(::getpid());
   ObjectPool pool_ = ObjectPool::create(name_, {.max_objects = 16}).value();
   AccessGuard guard_;
@@ -198,7 +208,7 @@ TEST_F(EachInstructionOfAPost, CountsItOnceWhereverTheServerIsKilled) {
   };
   const auto call = [&](EventIntake& server) { server.process(post_); };
   int instructions = 0;
-  for (bool within = true; within; instructions += 11) {
+  for (bool within = true; within; instructions += stride(97)) {
     post_.sequence_number = post_.base_sequence = ++number;
     within = kill_within(call, instructions, beside);
     EventIntake next = make();
@@ -217,7 +227,7 @@ TEST_F(EachInstructionOfAPost, LeavesNoTaskAsleep) {
   std::uint64_t number = 0;
   const auto call = [&](EventIntake& server) { server.process(post_); };
   int instructions = 0;
-  for (bool within = true; within; instructions += 23) {
+  for (bool within = true; within; instructions += stride(151)) {
     const Follower task(event_.counted());
     post_.sequence_number = post_.base_sequence = ++number;
     within = kill_within(call, instructions, [] {});
@@ -236,7 +246,7 @@ TEST_F(EachInstructionOfAPost, OfABatchPostsEachEventOnce) {
   };
   const auto call = [&](EventIntake& server) { server.process(batch_); };
   int instructions = 0;
-  for (bool within = true; within; instructions += 37) {
+  for (bool within = true; within; instructions += stride(211)) {
     batch_.sequence_number = batch_.base_sequence = ++number;
     within = kill_within(call, instructions, beside);
     EventIntake next = make();
