@@ -123,8 +123,7 @@ std::vector<std::string> options_along(const plchost::Syntax& plcctl, std::span<
 }
 
 std::string hint_of(const plchost::Syntax& plcctl, std::span<const std::string> words) {
-  const std::string word = word_hint(plcctl, words);
-  if (!word.empty()) return word;
+  if (std::string word = word_hint(plcctl, words); !word.empty()) return word;
   const std::string option = plchost::unknown_option(words, options_along(plcctl, words));
   return option.empty() ? "" : fmt::format("plcctl: {}\n", option);
 }

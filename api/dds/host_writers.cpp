@@ -14,7 +14,7 @@ std::string host_of(const dds_qos_t* qos) {
   std::string host;
   if (count == 1) host = host_in_partition(names[0]);
   for (std::uint32_t i = 0; i < count; ++i) dds_free(names[i]);
-  dds_free(names);
+  dds_free(static_cast<void*>(names));
   return host;
 }
 

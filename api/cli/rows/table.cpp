@@ -152,9 +152,9 @@ Result<std::vector<Column>> choose_columns(const std::vector<std::string>& field
       chosen.back().rank = 0;
       continue;
     }
-    const auto of_rows = std::ranges::find(all, field);
-    if (of_rows == all.end()) return unknown_field(field, all);
-    chosen.push_back({.field = of_rows->data(), .header = of_rows->data(), .decimals = 3});
+    if (rows.empty() || !rows.front().contains(field)) return unknown_field(field, all);
+    const char* const of_rows = rows.front().find(field).key().c_str();
+    chosen.push_back({.field = of_rows, .header = of_rows, .decimals = 3});
   }
   return chosen;
 }

@@ -106,7 +106,7 @@ PostLedger::~PostLedger() {
 // What steps 3 and 4 of a post have to do, if the process before this one was killed over it.
 void PostLedger::finish_intent() noexcept {
   LedgerLayout& layout = layout_of(memory_);
-  PostIntent& intent = layout.intent;
+  const PostIntent& intent = layout.intent;
   struct stat file = {};
   const bool known = ::stat(MemoryFile::path(pool_->name()).c_str(), &file) == 0;
   const bool same_pool = known && layout.pool_file == file.st_ino;
