@@ -17,7 +17,7 @@ namespace {
 
 // What is done under the lock takes a millisecond at most; but its holder may be stopped.
 constexpr auto kPatience = std::chrono::seconds(5);
-constexpr timespec kPause{.tv_sec = 0, .tv_nsec = 200'000};
+constexpr timespec kBetweenLooks{.tv_sec = 0, .tv_nsec = 200'000};
 
 }  // namespace
 
@@ -40,7 +40,7 @@ Result<DirectoryLock> DirectoryLock::acquire(const std::string& name) {
           ErrorCode::timed_out,
           fmt::format("another process holds the lock of {} for more than {} s", path, kPatience.count()));
     }
-    ::clock_nanosleep(CLOCK_MONOTONIC, 0, &kPause, nullptr);
+    ::clock_nanosleep(CLOCK_MONOTONIC, 0, &kBetweenLooks, nullptr);
   }
   return DirectoryLock(std::move(fd));
 }

@@ -97,8 +97,8 @@ std::string toml_advice(std::string_view line, std::string_view parsers_words) {
     const std::string key = shown(trimmed(line.substr(0, line.find('='))));
     return fmt::format("{} is given twice; remove one of them", key);
   }
-  std::string advice = advice_for(trimmed(line));
-  return advice.empty() ? printable(std::string(parsers_words)) : advice;
+  if (std::string advice = advice_for(trimmed(line)); !advice.empty()) return advice;
+  return printable(std::string(parsers_words));
 }
 
 }  // namespace plchost
