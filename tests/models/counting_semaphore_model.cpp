@@ -38,6 +38,24 @@ void what_was_written_is_seen(Scene& scene) {
   });
 }
 
+// The word comes back to what it was while a poster stands between its wake and what it does then. The mark
+// is there at first, and nobody sleeps: a wait that was given up has left it.
+void the_word_comes_back(Scene& scene) {
+  auto& shared = scene.make<Shared>();
+  scene.name(shared.semaphore, "semaphore");
+  scene.limits({.steps = 9, .cut = true});
+  (void)shared.semaphore.wait(TimePoint{});
+  scene.thread("poster", [&] { shared.semaphore.post(); });
+  scene.thread("takes, then posts", [&] {
+    (void)shared.semaphore.try_wait();
+    shared.semaphore.post();
+    shared.semaphore.post();
+  });
+  for (const char* name : {"waiter", "other waiter"}) {
+    scene.thread(name, [&] { require(shared.semaphore.wait(), "a wait without a deadline ends"); });
+  }
+}
+
 // Killed after it was woken, or before: its unit stays, and the other one finds it at its next look.
 void a_waiter_is_killed(Scene& scene) {
   auto& shared = scene.make<Shared>();
@@ -55,6 +73,15 @@ void a_waiter_is_killed(Scene& scene) {
   });
 }
 
+void a_poster_is_killed(Scene& scene) {
+  auto& shared = scene.make<Shared>();
+  scene.name(shared.semaphore, "semaphore");
+  scene.limits({.kills = 1});
+  scene.thread("victim", [&] { shared.semaphore.post(); }, {.may_be_killed = true});
+  scene.thread("poster", [&] { shared.semaphore.post(); });
+  scene.thread("waiter", [&] { require(shared.semaphore.wait(), "a wait without a deadline ends"); });
+}
+
 }  // namespace
 }  // namespace plchost::models
 
@@ -63,5 +90,7 @@ int main(int argc, char** argv) {
   return run(argc, argv,
              {{"two_posts_two_waiters", two_posts_two_waiters},
               {"what_was_written_is_seen", what_was_written_is_seen},
-              {"a_waiter_is_killed", a_waiter_is_killed}});
+              {"the_word_comes_back", the_word_comes_back},
+              {"a_waiter_is_killed", a_waiter_is_killed},
+              {"a_poster_is_killed", a_poster_is_killed}});
 }

@@ -242,7 +242,10 @@ void Explorer::perform(const Action& action) {
       return resume(action.thread);
     case Action::Kind::time_out:
       note("its deadline passes");
-      if (actions_.front().kind == Action::Kind::run) --left_.early_timeouts;
+      if (actions_.front().kind == Action::Kind::run)
+        --left_.early_timeouts;
+      else
+        memory_.catch_up(action.thread);  // nothing else could run, so much time has passed
       thread.timed_out = true;
       thread.state = State::ready;
       return;

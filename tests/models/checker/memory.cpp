@@ -273,6 +273,11 @@ std::size_t Memory::size_of(std::uintptr_t address, std::size_t otherwise) const
   return otherwise;
 }
 
+void Memory::catch_up(unsigned thread) noexcept {
+  for (std::size_t i = 0; i < used_; ++i)
+    threads_[thread].now.rank[i] = static_cast<std::uint8_t>(locations_[i].order.size() - 1);
+}
+
 void Memory::pass_lock(unsigned thread, std::uintptr_t address) {
   ThreadView& self = threads_[thread];
   self.now.clock[thread] = static_cast<std::uint16_t>(2U * ++self.step);

@@ -99,6 +99,8 @@ class Memory {
   }
   /// `thread` has seen that `other` has ended, and knows all that it has done.
   void learn(unsigned thread, unsigned other) { threads_[thread].now.join(threads_[other].now); }
+  /// Time has passed: it sees the newest store of each location, and knows nothing more by that.
+  void catch_up(unsigned thread) noexcept;
   /// It does nothing more: what it could still read is of no interest.
   void end(unsigned thread, bool may_be_learned = false) noexcept {
     ended_.set(thread);
