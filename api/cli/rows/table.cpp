@@ -78,7 +78,7 @@ std::size_t width_of_all(const std::vector<PrintedColumn>& columns) {
   return width;
 }
 
-// Columns of the greatest rank go first, the right one of equals. What stays may be wider all the same.
+// Columns of the greatest rank go first, the right one of equals. The rest may still be too wide.
 void fit(std::vector<PrintedColumn>& columns, std::size_t width) {
   while (width_of_all(columns) > width) {
     auto least = columns.end();

@@ -23,7 +23,7 @@ struct WaitArguments {
   std::string state = "running";
 };
 
-/// What is waited for, and what is there instead.
+/// The state that is waited for, and the one that is there.
 struct Awaited {
   std::string name;
   std::string state;  ///< as it was seen last; empty: it was not
