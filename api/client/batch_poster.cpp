@@ -23,7 +23,7 @@ Result<BatchPoster> BatchPoster::create(dds_entity_t participant, dds_entity_t t
 }
 
 void BatchPoster::use_clock(const HostClock& clock) noexcept {
-  // What was written by the clock of the server before is not taken by this one.
+  // A host takes nothing whose time limit is by the clock of its server before.
   if (clock.epoch() != clock_.epoch()) last_write_ = TimePoint{};
   clock_ = clock;
 }

@@ -42,7 +42,7 @@ dds_return_t EventPoster::write(std::uint64_t sequence) noexcept {
 
 void EventPoster::wait_for(Duration patience, const HostClock& clock) noexcept {
   patience_ = patience;
-  // What was written by the clock of the server before is not taken by this one.
+  // A host takes nothing whose time limit is by the clock of its server before.
   if (clock.epoch() != clock_.epoch() && !unacknowledged_.empty()) last_write_ = TimePoint{};
   clock_ = clock;
 }

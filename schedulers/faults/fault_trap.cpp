@@ -1,6 +1,5 @@
 #include "schedulers/faults/fault_trap.hpp"
 
-#include <array>
 #include <cerrno>
 #include <csignal>
 
@@ -10,6 +9,7 @@
 #include <ucontext.h>
 #include <unistd.h>
 
+#include "schedulers/faults/fault_signals.hpp"
 #include "shm/base/memory_guard.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/time.hpp"
@@ -22,21 +22,8 @@ constinit thread_local FaultTrap* armed = nullptr;
 constinit thread_local pid_t own_thread = 0;
 constinit std::atomic<bool> installed{false};
 
-constexpr std::array kFaults = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGABRT};
-
 int watchdog_signal() noexcept {
   return SIGRTMAX - 1;
-}
-
-std::uintptr_t instruction_of(const ucontext_t& context) noexcept {
-#if defined(__x86_64__)
-  return static_cast<std::uintptr_t>(context.uc_mcontext.gregs[REG_RIP]);
-#elif defined(__aarch64__)
-  return context.uc_mcontext.pc;
-#else
-  (void)context;
-  return 0;
-#endif
 }
 
 // The guard below a stack refuses what comes next to its end: a call, or the first use of an array.
@@ -208,7 +195,7 @@ Result<void> install_fault_handlers() {
   action.sa_flags = SA_SIGINFO | SA_ONSTACK | SA_RESTART;
   ::sigfillset(&action.sa_mask);
   action.sa_sigaction = &FaultHandlers::on_fault;
-  for (const int signal : kFaults) {
+  for (const int signal : kFaultSignals) {
     if (const auto set = check_errno(::sigaction(signal, &action, nullptr), "catch " + signal_name(signal));
         !set)
       return std::unexpected(set.error());

@@ -26,14 +26,13 @@
 
 #include "instances/launch/launch_contract.hpp"
 #include "instances/runtime/application/symbol_name.hpp"
+#include "schedulers/faults/fault_signals.hpp"
 #include "shm/base/thread.hpp"
 #include "shm/base/unique_fd.hpp"
 
 namespace plchost {
 
 namespace {
-
-constexpr std::array kCrashes = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGABRT};
 
 /// What the handler of a crash tells the thread that describes it.
 struct TrialCrash {
@@ -43,23 +42,12 @@ struct TrialCrash {
 
 std::atomic<int> crash_pipe = -1;  // the handler has no argument of ours
 
-std::uintptr_t crashed_at(const ucontext_t& context) noexcept {
-#if defined(__x86_64__)
-  return static_cast<std::uintptr_t>(context.uc_mcontext.gregs[REG_RIP]);
-#elif defined(__aarch64__)
-  return context.uc_mcontext.pc;
-#else
-  (void)context;
-  return 0;
-#endif
-}
-
 // Signal context: the thread stays where it is, the describing thread ends the process.
 void on_trial_crash(int signal, siginfo_t*, void* context) noexcept {
   // abort() is called by the C++ runtime or an assertion, which have said why.
   const TrialCrash crash{
       .signal = signal,
-      .address = signal == SIGABRT ? 0 : crashed_at(*static_cast<const ucontext_t*>(context))};
+      .address = signal == SIGABRT ? 0 : instruction_of(*static_cast<const ucontext_t*>(context))};
   (void)!::write(crash_pipe.load(), &crash, sizeof crash);
   for (;;) ::pause();
 }
@@ -95,7 +83,7 @@ void catch_crashes(const std::string& application, int verdict) {
   struct sigaction action{};
   action.sa_flags = SA_SIGINFO | SA_ONSTACK;
   action.sa_sigaction = &on_trial_crash;
-  for (const int signal : kCrashes) ::sigaction(signal, &action, nullptr);
+  for (const int signal : kFaultSignals) ::sigaction(signal, &action, nullptr);
 }
 
 // The child. The verdict goes to the parent last: an exit code alone could be the application's.
