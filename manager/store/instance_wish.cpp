@@ -15,7 +15,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr std::uint32_t kWishVersion = 1;  // 1: first
+constexpr std::uint32_t kWishVersion = 2;  // 2: number
 
 template <class T>
 struct WishMember {
@@ -37,6 +37,7 @@ constexpr std::array kWishFlags = {WishMember<bool>{"commanded", &InstanceWish::
                                    WishMember<bool>{"safe_mode", &InstanceWish::safe_mode},
                                    WishMember<bool>{"host_ended", &InstanceWish::host_ended}};
 constexpr std::array kWishNumbers = {
+    WishMember<std::uint32_t>{"number", &InstanceWish::number},
     WishMember<std::uint32_t>{"restarts", &InstanceWish::restarts},
     WishMember<std::uint32_t>{"ends_in_a_row", &InstanceWish::ends_in_a_row}};
 

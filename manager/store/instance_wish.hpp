@@ -43,6 +43,8 @@ struct InstanceWish {
   Process process = Process::none;
   /// The manager ended in order, or the host lost its power: processes of that time ended with the host.
   bool host_ended = false;
+  /// Of two wishes of an instance, the one with the higher number is newer. WishStore sets it; elsewhere 0.
+  std::uint32_t number = 0;
 
   bool operator==(const InstanceWish&) const = default;
   /// What of it a power cut leaves: no process.

@@ -73,18 +73,29 @@ Result<std::optional<InstanceWish>> WishStore::find() {
     spdlog::error("instance {}: what it is to be is not kept for the next manager: {}", settings_.instance,
                   memory.error().describe());
   }
-  auto file = read_wish_file(path(), kMaxWishBytes);
+  const auto file = read_wish_file(path(), kMaxWishBytes);
+  auto wish = file ? decode_wish(*file) : Result<InstanceWish>(std::unexpected(file.error()));
   if (file) wanted_ = written_ = *file;
+  if (wish) {
+    number_ = std::exchange(wish->number, 0);
+    contents_ = encode(*wish);
+  }
   if (auto remembered = memory_ ? memory_->read() : std::nullopt) {
-    if (remembered->host_ended) restore_events();
-    return remembered;
+    if (wish && number_ > remembered->number) {
+      wish->process = remembered->process;
+      wish->host_ended = remembered->host_ended;
+    } else {
+      number_ = std::exchange(remembered->number, 0);
+      wish = *std::move(remembered);
+    }
+    if (wish->host_ended) restore_events();
+    return *std::move(wish);
   }
   const bool none = !file && file.error().code == ErrorCode::not_found;
   if (none && memory_ && memory_->damaged()) {
     return failure(ErrorCode::corrupt, "another program has written over the memory that holds it");
   }
   if (none) return std::nullopt;
-  auto wish = file ? decode_wish(*file) : Result<InstanceWish>(std::unexpected(file.error()));
   if (!wish) {
     return failure(ErrorCode::corrupt, fmt::format("{}: {}", path(), wish.error().describe()));
   }
@@ -108,13 +119,17 @@ void WishStore::restore_events() const {
 }
 
 void WishStore::keep(const InstanceWish& wish) {
-  const auto remembered = memory_ ? memory_->write(wish) : Result<void>();
+  InstanceWish numbered = wish;
+  numbered.number = ++number_;
+  const auto remembered = memory_ ? memory_->write(numbered) : Result<void>();
   if (!remembered) {
     spdlog::error("instance {}: what it is to be is not kept for the next manager: {}", settings_.instance,
                   remembered.error().describe());
   }
-  std::string text = encode(wish.after_power_cut());
-  if (text == wanted_ || text.size() > kMaxWishBytes) return;
+  std::string contents = encode(wish.after_power_cut());
+  std::string text = encode(numbered.after_power_cut());
+  if (contents == contents_ || text.size() > kMaxWishBytes) return;
+  contents_ = std::move(contents);
   wanted_ = std::move(text);
   write();
 }

@@ -20,8 +20,10 @@ inline constexpr Duration kWishRetry = std::chrono::seconds(10);
 /// The folder of the files: "STATE_DIRECTORY/wishes.HOST".
 [[nodiscard]] std::string wishes_folder(std::string_view state_directory, std::string_view host);
 
-/// The real WishKeeper: a WishMemory, and the files INSTANCE and INSTANCE.events of wishes_folder(). Only
-/// what a power cut leaves of a wish goes to the disk, and only if it is another than before.
+/// The real WishKeeper: a WishMemory, and the files INSTANCE.wish and INSTANCE.events of wishes_folder().
+/// Only what a power cut leaves of a wish goes to the disk, and only if it is another than before. find()
+/// takes the newer of the two: the memory can be that of an earlier manager with another pool in between, or
+/// damaged.
 class WishStore : public WishKeeper {
  public:
   struct Settings {
@@ -43,8 +45,11 @@ class WishStore : public WishKeeper {
 
  private:
   [[nodiscard]] bool on_disk() const { return wanted_ == written_ && !events_wanted_ && !writing_; }
-  [[nodiscard]] std::string path() const { return settings_.folder + "/" + settings_.instance; }
-  [[nodiscard]] std::string events_path() const { return path() + ".events"; }
+  // Each file has a suffix: without one, "line1.events" would be a file of two instances.
+  [[nodiscard]] std::string path() const { return settings_.folder + "/" + settings_.instance + ".wish"; }
+  [[nodiscard]] std::string events_path() const {
+    return settings_.folder + "/" + settings_.instance + ".events";
+  }
   void restore_events() const;
   void write();
   void written(const Result<void>& result, const std::string& text);
@@ -56,8 +61,10 @@ class WishStore : public WishKeeper {
   Reactor::Timer limit_;
   Reactor::Timer retry_;
   std::optional<WishMemory> memory_;
-  std::string wanted_;   // on the disk
-  std::string written_;  // there
+  std::uint32_t number_ = 0;  // of the newest wish
+  std::string contents_;      // of wanted_, without its number
+  std::string wanted_;        // on the disk
+  std::string written_;       // there
   bool events_wanted_ = false;
   bool writing_ = false;
   std::string problem_;  // as it was logged last; empty: none

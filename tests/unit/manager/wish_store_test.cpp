@@ -5,6 +5,8 @@
 #include <fstream>
 #include <memory>
 #include <sstream>
+#include <string>
+#include <vector>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -78,7 +80,7 @@ class WishStoreTest : public testing::Test {
     reactor_.reset();
     while (::waitpid(-1, nullptr, 0) > 0) {  // helpers that still write into the folder
     }
-    WishMemory::remove(pool_, "line1");
+    for (const std::string& pool : {pool_, pool_ + "b"}) WishMemory::remove(pool, "line1");
     std::error_code ignored;
     std::filesystem::remove_all(folder_, ignored);
   }
@@ -86,7 +88,8 @@ class WishStoreTest : public testing::Test {
   WishStoreTest& operator=(const WishStoreTest&) = delete;
 
   /// The next manager.
-  void make() {
+  void make() { make(pool_); }
+  void make(const std::string& pool, const std::string& instance = "line1") {
     sut_.reset();
     writer_.reset();
     auto reactor = Reactor::create();
@@ -94,8 +97,8 @@ class WishStoreTest : public testing::Test {
     reactor_ = std::move(*reactor);
     writer_ = std::make_unique<WishWriter>(*reactor_, PLCHOST_MANAGER_PROGRAM);
     sut_ = std::make_unique<WishStore>(*reactor_, *writer_,
-                                       WishStore::Settings{.pool = pool_,
-                                                           .instance = "line1",
+                                       WishStore::Settings{.pool = pool,
+                                                           .instance = instance,
                                                            .folder = wishes_folder(state(), "cell"),
                                                            .run_directory = (folder_ / "run").string()});
   }
@@ -119,7 +122,7 @@ class WishStoreTest : public testing::Test {
     return told;
   }
   [[nodiscard]] std::string state() const { return (folder_ / "state").string(); }
-  [[nodiscard]] std::string file() const { return state() + "/wishes.cell/line1"; }
+  [[nodiscard]] std::string file() const { return state() + "/wishes.cell/line1.wish"; }
 
   std::string pool_;
   std::filesystem::path folder_;
@@ -162,6 +165,71 @@ TEST_F(WishStoreTest, LeavesTheOneBeforeWholeWhenItIsKilledInAWrite) {
   bytes[kInTheText] = std::byte{0xff};
   make();
   EXPECT_EQ(sut_->find().value()->restarts, 7U);
+}
+
+TEST_F(WishStoreTest, TakesTheNewerOneOfTheDiskWhereTheMemorysNewestIsDamaged) {
+  ASSERT_TRUE(sut_->find());
+  InstanceWish wish = some_wish();
+  wish.running = true;
+  ASSERT_EQ(keep(wish), "");
+  wish.running = false;
+  ASSERT_EQ(keep(wish), "");
+  auto memory = MemoryFile::open(pool_ + ".wish.line1", 1, MemoryFile::Access::read_write);
+  ASSERT_TRUE(memory);
+  constexpr std::size_t kInTheText = 100;  // of the first place, which the second write went to
+  memory->bytes()[kInTheText] = std::byte{0xff};
+  make();
+  EXPECT_EQ(sut_->find().value(), wish);
+}
+
+TEST_F(WishStoreTest, TakesTheNewerOneOfTheDiskWhereTheHostHadAnotherPoolMeanwhile) {
+  ASSERT_TRUE(sut_->find());
+  InstanceWish wish = some_wish();
+  wish.running = true;
+  ASSERT_EQ(keep(wish), "");
+  make(pool_ + "b");
+  ASSERT_TRUE(sut_->find().value()->running);
+  wish.running = false;
+  ASSERT_EQ(keep(wish), "");
+  make();
+  EXPECT_EQ(sut_->find().value(), wish);
+}
+
+TEST_F(WishStoreTest, WritesNothingThatIsOnTheDiskAlready) {
+  ASSERT_TRUE(sut_->find());
+  ASSERT_EQ(keep(some_wish()), "");
+  make();
+  ASSERT_TRUE(sut_->find());
+  std::filesystem::remove(file());
+  InstanceWish wish = some_wish();
+  wish.process = InstanceWish::Process::none;  // a power cut leaves none anyway
+  EXPECT_EQ(keep(wish), "");
+  EXPECT_FALSE(std::filesystem::exists(file()));
+}
+
+TEST_F(WishStoreTest, KeepsInstancesApartWhateverTheyAreCalled) {
+  const std::vector<std::string> names = {"line1", "line1.new", "line1.events", "line1.wish",
+                                          "line1.wish.new"};
+  InstanceWish wish = some_wish();
+  for (int round = 0; round < 2; ++round) {
+    for (const std::string& name : names) {
+      make(pool_, name);
+      ASSERT_TRUE(sut_->find());
+      wish.application = fmt::format("/opt/{}{}.so", name, round);
+      std::ofstream(folder_ / "run" / (name + ".events")) << name << '\n';
+      sut_->keep_events();
+      ASSERT_EQ(keep(wish), "");
+    }
+  }
+  for (const std::string& name : names) WishMemory::remove(pool_, name);
+  for (const std::string& name : names) {
+    make(pool_, name);
+    const auto found = sut_->find();
+    ASSERT_TRUE(found) << found.error().describe();
+    ASSERT_TRUE(*found) << name;
+    EXPECT_EQ((*found)->application, "/opt/" + name + "1.so");
+    WishMemory::remove(pool_, name);
+  }
 }
 
 TEST_F(WishStoreTest, RefusesADamagedMemoryWhereTheDiskHasNothing) {
