@@ -94,9 +94,20 @@ class PLCHOST_CLIENT_API Client {
     int core = -1;  ///< -1: none, or several
     unsigned restarts = 0;
     std::string scheduler;
-    std::string application;  ///< path on the host
-    std::string problem;      ///< why it is not running; empty: all is well
-    bool removed = false;     ///< told by watches only: the host has it no more
+    std::string application;         ///< path on the host
+    std::string problem;             ///< why it is not running; empty: all is well
+    std::string loaded;              ///< path of what its process has loaded; empty: nothing
+    std::string configured;          ///< path of the application that the configuration names; empty: none
+    std::string settings;            ///< path of its settings file; empty: the runtime's defaults
+    std::string priority_band;       ///< high, normal, low
+    std::vector<std::string> after;  ///< the instances that it waits for when it starts
+    bool autostart = false;          ///< it starts with the manager
+    std::string restart;             ///< when it is started again: never, on-failure, always
+    std::chrono::nanoseconds restart_delay{};  ///< before that; doubles with each failure in a row
+    std::chrono::nanoseconds restart_delay_max{};
+    unsigned crash_limit = 0;  ///< so many crashes within crash_window: safe mode
+    std::chrono::nanoseconds crash_window{};
+    bool removed = false;  ///< told by watches only: the host has it no more
   };
 
   struct Task {

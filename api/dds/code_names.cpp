@@ -4,6 +4,8 @@
 #include <span>
 #include <string_view>
 
+#include "shm/pool/host_page.hpp"
+
 namespace plchost::dds {
 
 namespace {
@@ -36,6 +38,10 @@ std::string transition_state_name(std::uint32_t source, std::uint32_t state) {
 
 std::string task_kind_name(std::uint32_t kind) {
   return code_name(kTaskKinds, kind);
+}
+
+std::string restart_policy_name(std::uint32_t policy) {
+  return code_name(kRestartPolicyNames, policy);
 }
 
 std::string task_state_name(std::uint32_t state) {

@@ -1,6 +1,7 @@
 #include "api/library/convert.hpp"
 
 #include <chrono>
+#include <ranges>
 #include <tuple>
 
 #include <fmt/format.h>
@@ -14,6 +15,13 @@ namespace {
 
 std::string text(std::string_view from) {
   return std::string(from);
+}
+
+// Of "a,b".
+std::vector<std::string> words_of(std::string_view list) {
+  std::vector<std::string> words;
+  for (const auto word : std::views::split(list, ',')) words.emplace_back(std::string_view(word));
+  return words;
 }
 
 std::chrono::system_clock::time_point wall_time(std::int64_t unix_ns) {
@@ -40,7 +48,9 @@ auto all_of(const Client::Host& h) {
 }
 
 auto all_of(const Client::Instance& i) {
-  return std::tie(i.state, i.pid, i.core, i.restarts, i.scheduler, i.application, i.problem);
+  return std::tie(i.state, i.pid, i.core, i.restarts, i.scheduler, i.application, i.problem, i.loaded,
+                  i.configured, i.settings, i.priority_band, i.after, i.autostart, i.restart, i.restart_delay,
+                  i.restart_delay_max, i.crash_limit, i.crash_window);
 }
 
 auto all_of(const Client::Task& t) {
@@ -74,7 +84,18 @@ Client::Instance to_public(const plc_InstanceStatus& status) {
           .restarts = status.restarts,
           .scheduler = text(dds::text_of(status.scheduler)),
           .application = text(dds::text_of(status.application)),
-          .problem = text(dds::text_of(status.problem))};
+          .problem = text(dds::text_of(status.problem)),
+          .loaded = text(dds::text_of(status.loaded)),
+          .configured = text(dds::text_of(status.configured)),
+          .settings = text(dds::text_of(status.settings)),
+          .priority_band = text(dds::text_of(status.priority_band)),
+          .after = words_of(dds::text_of(status.after)),
+          .autostart = status.autostart,
+          .restart = dds::restart_policy_name(status.restart_policy),
+          .restart_delay = std::chrono::nanoseconds(status.restart_delay_ns),
+          .restart_delay_max = std::chrono::nanoseconds(status.restart_delay_max_ns),
+          .crash_limit = status.crash_limit,
+          .crash_window = std::chrono::nanoseconds(status.crash_window_ns)};
 }
 
 Client::Task to_public(const plc_TaskStatus& status) {

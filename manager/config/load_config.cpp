@@ -25,7 +25,6 @@ using namespace std::string_view_literals;
 
 constexpr std::array kLogLevels = {"trace"sv, "debug"sv, "info"sv, "warning"sv, "error"sv};
 constexpr std::array kPriorityBands = {"high"sv, "normal"sv, "low"sv};
-constexpr std::array kRestartPolicies = {"never"sv, "on-failure"sv, "always"sv};
 constexpr std::int64_t kMaxCoreNumber = 1023;  // CPU_SETSIZE
 constexpr std::string_view kAllHosts = "all";  // a word of plcctl --host
 
@@ -320,9 +319,9 @@ void Loader::read_instance(const TomlTable& table, unsigned line) {
 
 void Loader::read_restart(SectionReader& reader, InstanceConfig& instance) {
   std::string policy = "on-failure";
-  reader.choice("restart", kRestartPolicies, policy);
-  const auto found = std::ranges::find(kRestartPolicies, policy);
-  instance.restart = static_cast<RestartPolicy>(found - kRestartPolicies.begin());
+  reader.choice("restart", kRestartPolicyNames, policy);
+  const auto found = std::ranges::find(kRestartPolicyNames, policy);
+  instance.restart = static_cast<RestartPolicy>(found - kRestartPolicyNames.begin());
   using std::chrono::milliseconds;
   using std::chrono::seconds;
   auto delay = std::chrono::duration_cast<milliseconds>(instance.restart_delay).count();

@@ -9,15 +9,9 @@
 
 #include "shm/base/time.hpp"
 #include "shm/block_driver/node_directory.hpp"
+#include "shm/pool/host_page.hpp"
 
 namespace plchost {
-
-/// When an instance that ended is started again.
-enum class RestartPolicy : std::uint8_t {
-  never,
-  on_failure,  ///< ended by a signal or with an exit code other than 0, but not because of its set-up
-  always,
-};
 
 /// [host]: what concerns the controller as a whole.
 struct HostConfig {

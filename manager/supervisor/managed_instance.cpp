@@ -31,6 +31,22 @@ InstanceState shown_state(const InstanceRuntime& runtime) noexcept {
   return InstanceState::stopped;
 }
 
+InstancePlan plan_of(const InstanceConfig& config) {
+  InstancePlan plan{.restart = config.restart,
+                    .crash_limit = config.crash_limit,
+                    .crash_window_ns = config.crash_window.count(),
+                    .restart_delay_ns = config.restart_delay.count(),
+                    .restart_delay_max_ns = config.restart_delay_max.count(),
+                    .autostart = config.autostart ? 1U : 0U,
+                    .share_core = config.share_core ? 1U : 0U,
+                    .priority_band = FixedText<15>(config.priority_band),
+                    .settings = FixedText<kMaxPath>(config.settings),
+                    .application = FixedText<kMaxPath>(config.application),
+                    .after = {}};
+  plan.after.assign(fmt::format("{}", fmt::join(config.after, ",")));
+  return plan;
+}
+
 }  // namespace
 
 ManagedInstance::ManagedInstance(const InstanceConfig& config, Surroundings surroundings, InstanceHost& host)
@@ -47,6 +63,7 @@ ManagedInstance::ManagedInstance(const InstanceConfig& config, Surroundings surr
   status_.name.assign(config.name);
   status_.scheduler.assign(scheduler_);
   status_.application.assign(application_);
+  status_.plan = plan_of(config_);
 }
 
 bool ManagedInstance::adopt() {
@@ -435,6 +452,7 @@ void ManagedInstance::learn_scheduler(std::string_view name) {
 void ManagedInstance::publish() {
   status_.scheduler.assign(scheduler_.empty() ? said_scheduler_ : scheduler_);
   status_.application.assign(application_);
+  status_.plan = plan_of(config_);
   remember();
   surroundings_.changed();
 }

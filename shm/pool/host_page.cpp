@@ -17,10 +17,10 @@ namespace {
 
 constexpr PageKind kHostPageKind{.what = "host page",
                                  .magic = 0x65676170'74736f68,  // "hostpage"
-                                 .version = 1};                 // 1: first
+                                 .version = 2};                 // 1: first; 2: InstancePlan
 
 static_assert(offsetof(HostPageLayout, version) == 8 && offsetof(HostPageLayout, changes) == 16);
-static_assert(sizeof(InstanceStatus) == 600 && sizeof(HostStatus) == 112);
+static_assert(sizeof(InstancePlan) == 2616 && sizeof(InstanceStatus) == 3216 && sizeof(HostStatus) == 112);
 
 HostPageLayout& host_layout_of(const MemoryFile& memory) noexcept {
   return *reinterpret_cast<HostPageLayout*>(memory.bytes().data());
@@ -61,9 +61,15 @@ bool is_printable(const HostStatus& status) noexcept {
   return is_printable_utf8(status.name.view()) && is_printable_utf8(status.version.view());
 }
 
+bool is_printable(const InstancePlan& plan) noexcept {
+  return is_printable_utf8(plan.priority_band.view()) && is_printable_utf8(plan.settings.view()) &&
+         is_printable_utf8(plan.application.view()) && is_printable_utf8(plan.after.view());
+}
+
 bool is_printable(const InstanceStatus& status) noexcept {
   return is_printable_utf8(status.name.view()) && is_printable_utf8(status.scheduler.view()) &&
-         is_printable_utf8(status.application.view()) && is_printable_utf8(status.problem.view());
+         is_printable_utf8(status.application.view()) && is_printable_utf8(status.problem.view()) &&
+         is_printable(status.plan);
 }
 
 }  // namespace
@@ -130,6 +136,10 @@ void HostPageWriter::write_instance(std::uint32_t index, const InstanceStatus& s
   make_printable(kept.scheduler);
   make_printable(kept.application);
   make_printable(kept.problem);
+  make_printable(kept.plan.priority_band);
+  make_printable(kept.plan.settings);
+  make_printable(kept.plan.application);
+  make_printable(kept.plan.after);
   HostPageLayout& page = host_layout_of(memory_);
   page.instances[index].write(kept);
   page.changes.fetch_add(1, std::memory_order_release);

@@ -27,12 +27,41 @@ enum class InstanceState : std::uint32_t {
 };
 [[nodiscard]] std::string_view to_string(InstanceState state) noexcept;
 
+/// When an instance that ended is started again. The numbers are part of the DDS API.
+enum class RestartPolicy : std::uint32_t {
+  never = 0,
+  on_failure = 1,  ///< ended by a signal or with an exit code other than 0, but not because of its set-up
+  always = 2,
+};
+/// As configurations and users write them.
+inline constexpr std::array<std::string_view, 3> kRestartPolicyNames = {"never", "on-failure", "always"};
+
 struct HostStatus {
   FixedText<kMaxHostName> name;
   FixedText<31> version;
   std::int32_t manager_pid = 0;
   std::uint32_t instance_count = 0;
   std::int64_t started_unix_ns = 0;  ///< CLOCK_REALTIME when the manager started
+};
+
+inline constexpr std::uint32_t kMaxInstances = 64;
+/// The names of all instances, with commas between.
+inline constexpr std::size_t kMaxAfter = kMaxInstances * (kMaxInstanceName + 1) - 1;
+
+/// How the manager starts and restarts an instance: its part of the configuration, which may change while
+/// the manager runs.
+struct InstancePlan {
+  RestartPolicy restart = RestartPolicy::on_failure;
+  std::uint32_t crash_limit = 0;  ///< this many crashes within crash_window_ns: safe mode
+  std::int64_t crash_window_ns = 0;
+  std::int64_t restart_delay_ns = 0;  ///< doubles with each failure in a row
+  std::int64_t restart_delay_max_ns = 0;
+  std::uint32_t autostart = 0;
+  std::uint32_t share_core = 0;
+  FixedText<15> priority_band;
+  FixedText<kMaxPath> settings;     ///< path; empty: the runtime's defaults
+  FixedText<kMaxPath> application;  ///< path; empty: none. What is loaded may be another one
+  FixedText<kMaxAfter> after;       ///< names of the instances that it waits for, with commas between
 };
 
 struct InstanceStatus {
@@ -45,9 +74,8 @@ struct InstanceStatus {
   std::int32_t core = -1;  ///< the core the kernel granted; -1 while there is no process
   std::uint32_t restarts = 0;
   std::int64_t state_since_unix_ns = 0;
+  InstancePlan plan;
 };
-
-inline constexpr std::uint32_t kMaxInstances = 64;
 
 /// What the manager knows, for others to read. One writer: the manager's Reactor thread.
 struct HostPageLayout {

@@ -23,6 +23,10 @@ std::int64_t to_seconds(std::int64_t nanoseconds) {
   return nanoseconds / 1'000'000'000;
 }
 
+std::int64_t to_ms(std::int64_t nanoseconds) {
+  return nanoseconds / 1'000'000;
+}
+
 // Entries are texts; a whole number in one is a number for programs.
 Row value_of(std::string_view text) {
   std::int64_t number = 0;
@@ -60,7 +64,18 @@ Row to_row(const plc_InstanceStatus& status) {
           {"application", text_of(status.application)},
           {"restarts", status.restarts},
           {"state_since_unix_s", to_seconds(status.state_since_unix_ns)},
-          {"problem", text_of(status.problem)}};
+          {"problem", text_of(status.problem)},
+          {"loaded", text_of(status.loaded)},
+          {"configured", text_of(status.configured)},
+          {"settings", text_of(status.settings)},
+          {"band", text_of(status.priority_band)},
+          {"after", text_of(status.after)},
+          {"autostart", status.autostart},
+          {"restart", dds::restart_policy_name(status.restart_policy)},
+          {"restart_delay_ms", to_ms(status.restart_delay_ns)},
+          {"restart_delay_max_ms", to_ms(status.restart_delay_max_ns)},
+          {"crash_limit", status.crash_limit},
+          {"crash_window_s", to_seconds(status.crash_window_ns)}};
   add_extension(row, std::span(status.ext._buffer, status.ext._length));
   return row;
 }
@@ -156,9 +171,12 @@ const std::vector<Column>& task_columns() {
 }
 
 const std::vector<Column>& event_columns() {
-  static const std::vector<Column> columns{{"host", "HOST"},         {"instance", "INSTANCE"},
-                                           {"event", "EVENT"},       {"registered", "REGISTERED"},
-                                           {"bound_tasks", "TASKS"}, {"posts", "POSTS"}};
+  static const std::vector<Column> columns{{.field = "host", .header = "HOST", .rank = 1},
+                                           {.field = "instance", .header = "INSTANCE"},
+                                           {.field = "event", .header = "EVENT"},
+                                           {.field = "registered", .header = "REGISTERED", .rank = 3},
+                                           {.field = "bound_tasks", .header = "TASKS", .rank = 2},
+                                           {.field = "posts", .header = "POSTS"}};
   return columns;
 }
 

@@ -62,10 +62,26 @@ Row for_people(Row row, std::int64_t state_since_unix_ns) {
   return said;
 }
 
+/// The number of the version that is loaded; null: it was not sent, but is another file of the host.
+Result<Row> loaded_version(CliSession& session, const plc_InstanceStatus& instance) {
+  const std::string host(dds::text_of(instance.host));
+  const auto kept = session.client().value()->applications(host, session.deadline());
+  if (!kept) return std::unexpected(kept.error());
+  for (const plc_ApplicationStatus& application : *kept) {
+    const bool is_loaded = dds::text_of(application.instance) == dds::text_of(instance.instance) &&
+                           dds::text_of(application.path) == dds::text_of(instance.loaded);
+    if (is_loaded && application.version > 0) return Row(application.version);
+  }
+  return Row();
+}
+
 int show_instance(CliSession& session, const std::string& name) {
   const auto instance = find(session, &ControlClient::instances, "instance", name);
   if (!instance) return CliSession::fail(instance.error());
-  const Row row = to_row(*instance);
+  const auto version = loaded_version(session, *instance);
+  if (!version) return CliSession::fail(version.error());
+  Row row = to_row(*instance);
+  row["loaded_version"] = *version;
   if (session.options.json || session.options.csv) return show_row(session, row);
   fmt::print("{}", format_fields(for_people(row, instance->state_since_unix_ns)));
   return kExitDone;

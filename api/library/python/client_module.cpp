@@ -115,6 +115,17 @@ void define_states(py::module_& module) {
       .def_readonly("scheduler", &Client::Instance::scheduler)
       .def_readonly("application", &Client::Instance::application)
       .def_readonly("problem", &Client::Instance::problem)
+      .def_readonly("loaded", &Client::Instance::loaded)
+      .def_readonly("configured", &Client::Instance::configured)
+      .def_readonly("settings", &Client::Instance::settings)
+      .def_readonly("priority_band", &Client::Instance::priority_band)
+      .def_readonly("after", &Client::Instance::after)
+      .def_readonly("autostart", &Client::Instance::autostart)
+      .def_readonly("restart", &Client::Instance::restart)
+      .def_property_readonly("restart_delay", member_seconds(&Client::Instance::restart_delay))
+      .def_property_readonly("restart_delay_max", member_seconds(&Client::Instance::restart_delay_max))
+      .def_readonly("crash_limit", &Client::Instance::crash_limit)
+      .def_property_readonly("crash_window", member_seconds(&Client::Instance::crash_window))
       .def_readonly("removed", &Client::Instance::removed);
   using Task = Client::Task;
   py::class_<Task>(module, "Task")

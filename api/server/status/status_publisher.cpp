@@ -12,6 +12,23 @@
 
 namespace plchost {
 
+namespace {
+
+void put_plan(const InstancePlan& plan, plc_InstanceStatus& sample) noexcept {
+  dds::copy_text(sample.configured, plan.application.view());
+  dds::copy_text(sample.settings, plan.settings.view());
+  dds::copy_text(sample.priority_band, plan.priority_band.view());
+  dds::copy_text(sample.after, plan.after.view());
+  sample.autostart = plan.autostart != 0;
+  sample.restart_policy = std::to_underlying(plan.restart);
+  sample.restart_delay_ns = plan.restart_delay_ns;
+  sample.restart_delay_max_ns = plan.restart_delay_max_ns;
+  sample.crash_limit = plan.crash_limit;
+  sample.crash_window_ns = plan.crash_window_ns;
+}
+
+}  // namespace
+
 Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const Source& source) {
   auto publisher_of_status = dds::make_publisher(participant, dds::status_partition(source.host));
   if (!publisher_of_status) return failure_in("publish status", publisher_of_status.error());
@@ -130,7 +147,10 @@ bool StatusPublisher::look_at_instances(TimePoint now) {
     dds::copy_text(sample.scheduler, says ? runtime->scheduler.view() : status->scheduler.view());
     dds::copy_text(sample.application, status->application.view());
     dds::copy_text(sample.problem, problem_of_instance(*status, runtime ? &*runtime : nullptr));
-    if (runtime && runtime->pid == status->pid && !runtime->retain_problem.view().empty()) {
+    const bool is_its_own = runtime && status->pid != 0 && runtime->pid == status->pid;
+    if (is_its_own) dds::copy_text(sample.loaded, runtime->application.view());
+    put_plan(status->plan, sample);
+    if (is_its_own && !runtime->retain_problem.view().empty()) {
       unsaved += fmt::format("{}{}", unsaved.empty() ? "" : ",", name);
     }
     auto extension = runtime ? extension_of(*runtime) : std::vector<plc_KeyValue>();

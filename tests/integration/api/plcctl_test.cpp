@@ -46,6 +46,25 @@ TEST_F(Plcctl, ListsInstancesAsFlatObjects) {
   EXPECT_EQ(json[0]["pid"], 4711);
 }
 
+TEST_F(Plcctl, ShowsHowAnInstanceIsStartedAndRestarted) {
+  const auto result = run({"show", "instance", "line1", "--json"});
+  ASSERT_EQ(result.code, 0) << result.errors;
+  const auto json = nlohmann::json::parse(result.output)[0];
+  EXPECT_EQ(json["settings"], "/etc/line1.cfg");
+  EXPECT_EQ(json["configured"], "/opt/line1.so");
+  EXPECT_EQ(json["loaded"], "") << "its process says that it has none";
+  EXPECT_EQ(json["loaded_version"], nullptr);
+  EXPECT_EQ(json["band"], "normal");
+  EXPECT_EQ(json["after"], "io,axis");
+  EXPECT_EQ(json["autostart"], true);
+  EXPECT_EQ(json["restart"], "on-failure");
+  EXPECT_EQ(json["restart_delay_ms"], 100);
+  EXPECT_EQ(json["restart_delay_max_ms"], 5000);
+  EXPECT_EQ(json["crash_limit"], 5);
+  EXPECT_EQ(json["crash_window_s"], 60);
+  EXPECT_THAT(run({"show", "instance", "line1"}).output, testing::HasSubstr("on-failure"));
+}
+
 TEST_F(Plcctl, ListsTasksWithUnitsInTheFieldNames) {
   const auto result = run({"list", "tasks", "--json"});
   ASSERT_EQ(result.code, 0) << result.errors;

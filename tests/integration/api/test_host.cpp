@@ -91,6 +91,17 @@ void TestHost::write_instance(std::uint32_t index, const std::string& name, Inst
   status.state = state;
   status.pid = pid;
   status.core = 1;
+  status.plan = {.restart = RestartPolicy::on_failure,
+                 .crash_limit = 5,
+                 .crash_window_ns = 60'000'000'000,
+                 .restart_delay_ns = 100'000'000,
+                 .restart_delay_max_ns = 5'000'000'000,
+                 .autostart = 1,
+                 .share_core = 0,
+                 .priority_band = FixedText<15>("normal"),
+                 .settings = FixedText<kMaxPath>("/etc/line1.cfg"),
+                 .application = FixedText<kMaxPath>("/opt/line1.so"),
+                 .after = FixedText<kMaxAfter>("io,axis")};
   page_.write_instance(index, status);
 }
 

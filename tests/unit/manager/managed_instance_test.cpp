@@ -33,6 +33,25 @@ TEST_F(ManagedInstanceTest, SpawnsWithWhatTheConfigurationSays) {
   EXPECT_EQ(problem(), "");
 }
 
+TEST_F(ManagedInstanceTest, TellsItsPlanAlsoWhenThatChanges) {
+  config_.settings = "/etc/line.cfg";
+  config_.after = {"line0", "axis.1"};
+  config_.restart = RestartPolicy::always;
+  make();
+  EXPECT_EQ(sut().status().plan.settings.view(), "/etc/line.cfg") << "before it was ever started";
+  EXPECT_EQ(sut().status().plan.after.view(), "line0,axis.1");
+  EXPECT_EQ(sut().status().plan.restart, RestartPolicy::always);
+  EXPECT_EQ(sut().status().plan.application.view(), "/opt/line.so");
+  EXPECT_EQ(sut().status().plan.crash_limit, 3U);
+  EXPECT_EQ(sut().status().plan.crash_window_ns, 10'000'000'000);
+  EXPECT_EQ(sut().status().plan.restart_delay_ns, 100'000'000);
+  config_.restart = RestartPolicy::never;
+  config_.after.clear();
+  bring_up();
+  EXPECT_EQ(sut().status().plan.restart, RestartPolicy::never);
+  EXPECT_EQ(sut().status().plan.after.view(), "");
+}
+
 TEST_F(ManagedInstanceTest, SaysWhatFailedInTheSetUpAndDoesNotTryAgain) {
   sut().hold("");
   sut().release();

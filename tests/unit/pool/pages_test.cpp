@@ -111,6 +111,8 @@ TEST_F(Pages, HostPageCarriesWhatTheManagerWrites) {
   instance.name.assign("line1");
   instance.state = InstanceState::safe_mode;
   instance.core = 3;
+  instance.plan.after.assign(std::string(kMaxAfter, 'a'));
+  instance.plan.settings.assign("/etc/line\x1b[2J.cfg");
   writer->write_instance(kMaxInstances - 1, instance);
   EXPECT_EQ(sut->changes(), before + 2);
   EXPECT_EQ(sut->host()->name.view(), "controller");
@@ -119,6 +121,8 @@ TEST_F(Pages, HostPageCarriesWhatTheManagerWrites) {
   EXPECT_EQ(read->name.view(), "line1");
   EXPECT_EQ(read->state, InstanceState::safe_mode);
   EXPECT_EQ(read->core, 3);
+  EXPECT_EQ(read->plan.after.view().size(), kMaxAfter);
+  EXPECT_EQ(read->plan.settings.view(), "/etc/line?[2J.cfg");
   EXPECT_FALSE(sut->instance(kMaxInstances));
 }
 
