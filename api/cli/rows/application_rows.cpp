@@ -31,10 +31,12 @@ Row row_of_loaded(const std::string& host, const std::string& instance, const st
 }
 
 const std::vector<Column>& application_columns() {
-  static const std::vector<Column> columns{{"host", "HOST"}, {"instance", "INSTANCE"}, {"version", "VERSION"},
-                                           {"file", "FILE"}, {"size", "SIZE"},         {"sent", "SENT"},
-                                           {"by", "BY"},     {"digest", "SHA256"},     {"loaded", "LOADED"},
-                                           {"boot", "BOOT"}};
+  static const std::vector<Column> columns{
+      {.field = "host", .header = "HOST", .rank = 1}, {.field = "instance", .header = "INSTANCE"},
+      {.field = "version", .header = "VERSION"},      {.field = "file", .header = "FILE", .rank = 2},
+      {.field = "size", .header = "SIZE", .rank = 5}, {.field = "sent", .header = "SENT", .rank = 3},
+      {.field = "by", .header = "BY", .rank = 6},     {.field = "digest", .header = "SHA256", .rank = 7},
+      {.field = "loaded", .header = "LOADED"},        {.field = "boot", .header = "BOOT"}};
   return columns;
 }
 

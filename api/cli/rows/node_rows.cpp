@@ -78,21 +78,40 @@ Row to_row(std::string_view host, const NodeListing& listing, const RouteInfo& r
 }
 
 const std::vector<Column>& node_columns() {
-  static const std::vector<Column> columns{
-      {"host", "HOST"},         {"node", "NODE"},           {"name", "NAME"},
-      {"pid", "PID"},           {"base", "BASE"},           {"forwards", "FORWARDS"},
-      {"queue_slots", "SLOTS"}, {"hosts", "HOSTS"},         {"arrivals", "ARRIVED"},
-      {"forwarded", "CARRIED"}, {"congested", "CONGESTED"}, {"expired", "EXPIRED"},
-      {"no_route", "NO ROUTE"}, {"loops", "LOOPS"},         {"lost", "LOST"}};
+  static const std::vector<Column> columns{{.field = "host", .header = "HOST", .rank = 1},
+                                           {.field = "node", .header = "NODE"},
+                                           {.field = "name", .header = "NAME"},
+                                           {.field = "pid", .header = "PID", .rank = 6},
+                                           {.field = "base", .header = "BASE", .rank = 8},
+                                           {.field = "forwards", .header = "FORWARDS", .rank = 7},
+                                           {.field = "queue_slots", .header = "SLOTS", .rank = 9},
+                                           {.field = "hosts", .header = "HOSTS", .rank = 3},
+                                           {.field = "arrivals", .header = "ARRIVED"},
+                                           {.field = "forwarded", .header = "CARRIED", .rank = 4},
+                                           {.field = "congested", .header = "CONGESTED", .rank = 2},
+                                           {.field = "expired", .header = "EXPIRED", .rank = 2},
+                                           {.field = "no_route", .header = "NO ROUTE", .rank = 3},
+                                           {.field = "loops", .header = "LOOPS", .rank = 5},
+                                           {.field = "lost", .header = "LOST"}};
   return columns;
 }
 
 const std::vector<Column>& route_columns() {
-  static const std::vector<Column> columns{
-      {"host", "HOST"},         {"from", "FROM"},        {"from_name", "NAME"},  {"to", "TO"},
-      {"to_name", "NAME"},      {"to_hosts", "HOSTS"},   {"next_hop", "NEXT"},   {"links", "LINKS"},
-      {"sent", "SENT"},         {"sent_bytes", "BYTES"}, {"waiting", "WAITING"}, {"congested", "CONGESTED"},
-      {"received", "RECEIVED"}, {"damaged", "DAMAGED"},  {"expired", "EXPIRED"}};
+  static const std::vector<Column> columns{{.field = "host", .header = "HOST", .rank = 1},
+                                           {.field = "from", .header = "FROM"},
+                                           {.field = "from_name", .header = "NAME", .rank = 3},
+                                           {.field = "to", .header = "TO"},
+                                           {.field = "to_name", .header = "NAME", .rank = 3},
+                                           {.field = "to_hosts", .header = "HOSTS", .rank = 6},
+                                           {.field = "next_hop", .header = "NEXT"},
+                                           {.field = "links", .header = "LINKS", .rank = 7},
+                                           {.field = "sent", .header = "SENT"},
+                                           {.field = "sent_bytes", .header = "BYTES", .rank = 8},
+                                           {.field = "waiting", .header = "WAITING", .rank = 1},
+                                           {.field = "congested", .header = "CONGESTED", .rank = 2},
+                                           {.field = "received", .header = "RECEIVED", .rank = 4},
+                                           {.field = "damaged", .header = "DAMAGED", .rank = 5},
+                                           {.field = "expired", .header = "EXPIRED", .rank = 5}};
   return columns;
 }
 

@@ -116,9 +116,14 @@ Row to_short_row(std::string_view host, const ListedObject& object) {
 }
 
 const std::vector<Column>& object_columns() {
-  static const std::vector<Column> columns{
-      {"host", "HOST"},   {"object", "OBJECT"},   {"type", "TYPE"},       {"size", "SIZE"},
-      {"value", "VALUE"}, {"waiters", "WAITERS"}, {"references", "REFS"}, {"by", "BY"}};
+  static const std::vector<Column> columns{{.field = "host", .header = "HOST", .rank = 1},
+                                           {.field = "object", .header = "OBJECT"},
+                                           {.field = "type", .header = "TYPE", .rank = 2},
+                                           {.field = "size", .header = "SIZE", .rank = 3},
+                                           {.field = "value", .header = "VALUE"},
+                                           {.field = "waiters", .header = "WAITERS", .rank = 4},
+                                           {.field = "references", .header = "REFS", .rank = 5},
+                                           {.field = "by", .header = "BY", .rank = 6}};
   return columns;
 }
 

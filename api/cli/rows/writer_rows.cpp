@@ -22,11 +22,17 @@ Row to_row(const plc_WriterStatus& status) {
 }
 
 const std::vector<Column>& writer_columns() {
-  static const std::vector<Column> columns{
-      {"host", "HOST"},           {"writer", "WRITER"},       {"present", "PRESENT"},
-      {"received", "RECEIVED"},   {"delivered", "DELIVERED"}, {"no_task", "NO-TASK"},
-      {"rejected", "REJECTED"},   {"lost", "LOST"},           {"early", "EARLY"},
-      {"duplicate", "DUPLICATE"}, {"last", "LAST POST"}};
+  static const std::vector<Column> columns{{.field = "host", .header = "HOST", .rank = 1},
+                                           {.field = "writer", .header = "WRITER"},
+                                           {.field = "present", .header = "PRESENT", .rank = 2},
+                                           {.field = "received", .header = "RECEIVED"},
+                                           {.field = "delivered", .header = "DELIVERED", .rank = 3},
+                                           {.field = "no_task", .header = "NO-TASK", .rank = 4},
+                                           {.field = "rejected", .header = "REJECTED", .rank = 2},
+                                           {.field = "lost", .header = "LOST"},
+                                           {.field = "early", .header = "EARLY", .rank = 7},
+                                           {.field = "duplicate", .header = "DUPLICATE", .rank = 6},
+                                           {.field = "last", .header = "LAST POST", .rank = 5}};
   return columns;
 }
 

@@ -81,12 +81,12 @@ std::vector<Row> all_rows(const std::vector<HostObjects>& hosts) {
   return rows;
 }
 
-void print_table(const std::vector<HostObjects>& hosts) {
+std::vector<Row> short_rows(const std::vector<HostObjects>& hosts) {
   std::vector<Row> rows;
   for (const HostObjects& of : hosts) {
     for (const ListedObject& object : of.objects) rows.push_back(to_short_row(of.host, object));
   }
-  fmt::print("{}", format_table(rows, object_columns()));
+  return rows;
 }
 
 int list_objects(CliSession& session, const ListArguments& arguments) {
@@ -103,7 +103,8 @@ int list_objects(CliSession& session, const ListArguments& arguments) {
   if (session.options.csv || !session.options.columns.empty() || !session.options.sort_by.empty()) {
     return session.show(all_rows(found), object_columns());
   }
-  session.options.json ? print_json(found) : print_table(found);
+  if (!session.options.json) return session.show(short_rows(found), object_columns());
+  print_json(found);
   return kExitDone;
 }
 

@@ -1,9 +1,13 @@
+#include <algorithm>
 #include <array>
 
 #include <gmock/gmock.h>
 
 #include "api/cli/cli_session.hpp"
 #include "api/cli/progress_board.hpp"
+#include "api/cli/rows/host_rows.hpp"
+#include "api/cli/rows/node_rows.hpp"
+#include "api/cli/rows/object_rows.hpp"
 #include "api/cli/rows/rows.hpp"
 #include "api/cli/rows/table.hpp"
 #include "api/dds/domain.hpp"
@@ -96,6 +100,24 @@ TEST(Table, IsSortedByNumbersAndTextsInBothDirections) {
   EXPECT_EQ(rows[0]["pid"], 12);
   EXPECT_EQ(sort_rows(rows, "size").error().code, ErrorCode::invalid_argument);
 }
+
+class EveryTable : public testing::TestWithParam<const std::vector<Column>*> {};
+
+TEST_P(EveryTable, FitsIntoATerminalOf80CharactersByItsRanks) {
+  constexpr std::size_t kWidth = 80;
+  Row row;
+  for (const Column& column : *GetParam()) row[column.field] = "ten letters";
+  const std::string table = format_table({row}, *GetParam(), {.width = kWidth});
+  EXPECT_LE(table.find('\n'), kWidth) << table;
+  const auto kept = std::ranges::count(*GetParam(), 0, &Column::rank);
+  EXPECT_GE(kept, 2) << "a table that tells nothing fits, too";
+}
+
+INSTANTIATE_TEST_SUITE_P(All, EveryTable,
+                         testing::Values(&instance_columns(), &task_columns(), &event_columns(),
+                                         &writer_columns(), &exception_columns(), &transition_columns(),
+                                         &application_columns(), &host_columns(), &node_columns(),
+                                         &route_columns(), &object_columns()));
 
 TEST(Csv, QuotesWhatWouldBeTwoFields) {
   EXPECT_EQ(format_csv({}), "");
