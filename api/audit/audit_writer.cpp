@@ -1,13 +1,14 @@
 #include "api/audit/audit_writer.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "shm/base/log.hpp"
 
 namespace plchost {
 
-AuditWriter::AuditWriter(AuditLogs logs, std::function<void()> on_written)
-    : logs_(std::move(logs)), on_written_(std::move(on_written)), head_(logs_.done->head()) {
+AuditWriter::AuditWriter(Open open, std::function<void()> on_written)
+    : open_(std::move(open)), on_written_(std::move(on_written)), at_disk_(MonotonicClock::now()) {
   thread_ = std::thread([this] { work(); });
 }
 
@@ -41,17 +42,16 @@ AuditWriter::Ticket AuditWriter::write_refused(AuditRecord record) {
 }
 
 void AuditWriter::add_pending(std::string key, AuditRecord record) {
-  if (!logs_.pending) return;
   (void)hand_in({.kind = Kind::add_pending, .key = std::move(key), .record = std::move(record)});
 }
 
 void AuditWriter::remove_pending(std::string key) {
-  if (logs_.pending) (void)hand_in({.kind = Kind::remove_pending, .key = std::move(key)});
+  (void)hand_in({.kind = Kind::remove_pending, .key = std::move(key)});
 }
 
 void AuditWriter::flush() {
   std::unique_lock lock(mutex_);
-  changed_.wait(lock, [this] { return written_ >= last_ticket_; });
+  changed_.wait(lock, [this] { return is_written(last_ticket_); });
 }
 
 AuditHead AuditWriter::head() const {
@@ -59,7 +59,53 @@ AuditHead AuditWriter::head() const {
   return head_;
 }
 
+std::string AuditWriter::problem(TimePoint now) const {
+  const std::lock_guard lock(mutex_);
+  if (!failure_.empty()) return failure_;
+  if (!at_disk_ || now - *at_disk_ < kSlow) return {};
+  return head_.number == 0 ? "the disk does not answer; the log is not open yet, changes wait in memory"
+                           : "the disk does not answer; changes wait in memory";
+}
+
+bool AuditWriter::open() {
+  for (;;) {
+    auto logs = open_();
+    if (!logs) {
+      if (!wait_to_open_again(logs.error())) return false;
+      continue;
+    }
+    logs_ = *std::move(logs);
+    const std::lock_guard lock(mutex_);
+    head_ = logs_.done->head();
+    failure_.clear();
+    at_disk_.reset();
+    cannot_open_ = false;
+    return true;
+  }
+}
+
+// A process that ends lets go of the log, so the records wait for it. Nothing waits for any other error.
+bool AuditWriter::wait_to_open_again(const Error& error) {
+  std::unique_lock lock(mutex_);
+  failure_ = error.describe();
+  at_disk_.reset();
+  cannot_open_ = ending_ || error.code != ErrorCode::busy;
+  changed_.notify_all();
+  lock.unlock();
+  if (on_written_) on_written_();
+  lock.lock();
+  if (!changed_.wait_for(lock, kRetry, [this] { return ending_; })) {
+    at_disk_ = MonotonicClock::now();
+    return true;
+  }
+  const auto is_record = [](const Job& job) { return job.kind == Kind::done || job.kind == Kind::refused; };
+  const auto lost = dropped_ + static_cast<std::uint64_t>(std::ranges::count_if(jobs_, is_record));
+  if (lost > 0) spdlog::error("{} records of changes are lost: {}", lost, failure_);
+  return false;
+}
+
 void AuditWriter::work() {
+  if (!open()) return;
   for (;;) {
     std::deque<Job> jobs;
     {
@@ -67,17 +113,23 @@ void AuditWriter::work() {
       changed_.wait(lock, [this] { return ending_ || !jobs_.empty(); });
       if (jobs_.empty()) return;
       jobs = std::exchange(jobs_, {});
+      at_disk_ = MonotonicClock::now();
     }
-    for (const Job& job : jobs) do_job(job);
-    tell_of_dropped();
-    {
-      const std::lock_guard lock(mutex_);
-      head_ = logs_.done->head();
-      written_ = jobs.back().ticket;
-    }
-    changed_.notify_all();
-    if (on_written_) on_written_();
+    write_all(jobs);
   }
+}
+
+void AuditWriter::write_all(const std::deque<Job>& jobs) {
+  for (const Job& job : jobs) do_job(job);
+  tell_of_dropped();
+  {
+    const std::lock_guard lock(mutex_);
+    head_ = logs_.done->head();
+    written_ = jobs.back().ticket;
+    at_disk_.reset();
+  }
+  changed_.notify_all();
+  if (on_written_) on_written_();
 }
 
 void AuditWriter::do_job(const Job& job) {
@@ -87,20 +139,21 @@ void AuditWriter::do_job(const Job& job) {
     case Kind::refused:
       return append(logs_.refused ? *logs_.refused : *logs_.done, job.record);
     case Kind::add_pending:
+      if (!logs_.pending) return;
       if (const auto added = logs_.pending->add(job.key, job.record); !added) {
         spdlog::error("what is under way is not recorded: {}", added.error().describe());
       }
       return;
     case Kind::remove_pending:
-      return logs_.pending->remove(job.key);
+      if (logs_.pending) logs_.pending->remove(job.key);
+      return;
   }
 }
 
 void AuditWriter::append(AuditLog& log, const AuditRecord& record) {
   const auto written = log.append(record);
-  if (!written && !failing_) spdlog::error("changes are not recorded: {}", written.error().describe());
-  if (written && failing_) spdlog::info("changes are recorded again");
-  failing_ = !written;
+  const std::lock_guard lock(mutex_);
+  failure_ = written ? "" : written.error().describe();
 }
 
 // Which of the two logs they were for is not known any more.

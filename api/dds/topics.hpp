@@ -75,6 +75,7 @@ inline constexpr std::string_view kMemoryEntry = "memory_mib";
 inline constexpr std::string_view kAvailableEntry = "available_mib";
 inline constexpr std::string_view kRivalEntry = "rival";
 inline constexpr std::string_view kUnsavedEntry = "unsaved";
+inline constexpr std::string_view kUnrecordedEntry = "unrecorded";
 /// Entry of EventPost.ext and its value: an EventRun is wanted.
 inline constexpr std::string_view kWaitEntry = "wait";
 inline constexpr std::string_view kWaitForRun = "run";

@@ -148,7 +148,7 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
     status->tick(now);
     lister.forget_old(now);
     audit->tick(now);
-    status->set_audit_head(audit->head());
+    status->set_audit(audit->head(), audit->problem());
     send_late_answers(now);
     answer_finished(now);
     finish(manager->expire(now));

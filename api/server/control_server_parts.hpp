@@ -57,7 +57,7 @@ struct ControlServer::Parts {
   Result<void> make_readers();
   Result<void> listen();
   Result<void> open_gateway();
-  [[nodiscard]] Result<void> open_audit();
+  void open_audit();
   [[nodiscard]] Result<void> raise_loop() const;
   Result<void> run();
   Result<bool> dispatch(int fd);

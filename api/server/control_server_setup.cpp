@@ -1,7 +1,6 @@
 #include <csignal>
 #include <ctime>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -25,9 +24,6 @@ namespace {
 
 /// How often the files of the host's identity are looked at.
 constexpr Duration kIdentityLook = std::chrono::milliseconds(500);
-/// How long a server before this one may take to end, and how often that is looked at.
-constexpr Duration kAuditWait = std::chrono::seconds(5);
-constexpr Duration kAuditLook = std::chrono::milliseconds(5);
 
 /// A period of 0: it is not set.
 Result<UniqueFd> make_timer(Duration period) {
@@ -68,7 +64,7 @@ Result<void> ControlServer::Parts::open() {
   intake.emplace(options.host, pool, std::move(*ledger), epoch, guard);
   if (auto entered = enter_domain(); !entered) return entered;
   if (auto claimed = claim_name(); !claimed) return claimed;
-  if (auto opened = open_audit(); !opened) return opened;
+  open_audit();
   auto made_sessions = SessionTable::create(participant.get(), options.host);
   if (!made_sessions) return std::unexpected(made_sessions.error());
   sessions = std::move(*made_sessions);
@@ -90,44 +86,16 @@ Result<void> ControlServer::Parts::open() {
   return {};
 }
 
-// Without a log the plant can be stopped, too; but while another server of this host writes it, that one
-// still ends.
-Result<void> ControlServer::Parts::open_audit() {
-  std::unique_ptr<AuditLog> log;
-  if (!options.audit_folder.empty()) {
-    auto opened = AuditLog::open({.folder = options.audit_folder});
-    const TimePoint deadline = MonotonicClock::now() + kAuditWait;
-    while (!opened && opened.error().code == ErrorCode::busy) {
-      if (MonotonicClock::now() > deadline) return std::unexpected(opened.error());
-      std::this_thread::sleep_for(kAuditLook);
-      opened = AuditLog::open({.folder = options.audit_folder});
-    }
-    if (opened) {
-      log = *std::move(opened);
-    } else {
-      spdlog::error("changes are not recorded: {}", opened.error().describe());
-    }
-  }
-  AuditLogs logs{.done = std::move(log), .refused = nullptr, .pending = {}};
-  if (logs.done) {
-    constexpr std::size_t kRefusedFiles = 8;
-    auto refused = AuditLog::open({.folder = options.audit_folder + "/refused", .most_files = kRefusedFiles});
-    auto pending = PendingRecords::open(options.audit_folder + "/under_way");
-    for (const Error* error : {refused ? nullptr : &refused.error(), pending ? nullptr : &pending.error()}) {
-      if (error != nullptr) spdlog::error("a part of what happens is not recorded: {}", error->describe());
-    }
-    if (refused) logs.refused = *std::move(refused);
-    if (pending) logs.pending = *std::move(pending);
-  }
+// Without a log the plant can be stopped, too: nothing waits for it.
+void ControlServer::Parts::open_audit() {
   const auto describe = [this](const dds::Guid& client, AuditRecord& record) {
     if (const auto subject = guard.identity_of(client)) {
       record.who = fmt::format("{} {}", security::to_string(subject->role), subject->name);
     }
     record.from = sessions->describe(client);
   };
-  audit.emplace(std::move(logs), describe, [fd = wake.get()] { raise_event(fd); });
+  audit.emplace(options.audit_folder, describe, [fd = wake.get()] { raise_event(fd); });
   intake->note_sources_since(MonotonicClock::now() - 2 * RequestAudit::kPostPeriod);
-  return {};
 }
 
 Result<void> ControlServer::Parts::open_gateway() {

@@ -32,7 +32,9 @@ std::string problem_of(const HostView& host) {
   const std::string rival = host.entry(dds::kRivalEntry);
   if (!rival.empty()) return fmt::format("another host wants this name and is refused: {}", rival);
   const std::string unsaved = host.entry(dds::kUnsavedEntry);
-  return unsaved.empty() ? "" : fmt::format("retain variables are not written: {}", unsaved);
+  if (!unsaved.empty()) return fmt::format("retain variables are not written: {}", unsaved);
+  const std::string unrecorded = host.entry(dds::kUnrecordedEntry);
+  return unrecorded.empty() ? "" : fmt::format("changes are not recorded: {}", unrecorded);
 }
 
 /// For how long its manager has run, by its own clock.

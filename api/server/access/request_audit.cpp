@@ -13,6 +13,7 @@
 #include "api/dds/entries.hpp"
 #include "api/dds/text.hpp"
 #include "api/server/access/request_check.hpp"
+#include "shm/base/log.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
@@ -61,11 +62,15 @@ std::string argument_of(const plc_Request& request) {
 
 }  // namespace
 
-RequestAudit::RequestAudit(AuditLogs logs, Describe describe, std::function<void()> on_written)
+RequestAudit::RequestAudit(std::string folder, Describe describe, std::function<void()> on_written)
     : describe_(std::move(describe)) {
-  if (!logs.done) return;
-  tell_of_unanswered(logs);
-  writer_ = std::make_unique<AuditWriter>(std::move(logs), std::move(on_written));
+  if (folder.empty()) return;
+  const auto open = [folder = std::move(folder)] {
+    auto logs = AuditLogs::open(folder);
+    if (logs) tell_of_unanswered(*logs);
+    return logs;
+  };
+  writer_ = std::make_unique<AuditWriter>(open, std::move(on_written));
 }
 
 // Of a server that was killed: whether it was done nobody knows here.
@@ -199,6 +204,11 @@ void RequestAudit::tick(TimePoint now) {
   std::erase_if(refusals_, [&](const auto& one) {
     return one.second.count == 0 && now > one.second.next + kPostPeriod;
   });
+  std::string problem = writer_->problem(now);
+  if (problem == problem_) return;
+  problem_ = std::move(problem);
+  if (problem_.empty()) return spdlog::info("changes are recorded again");
+  spdlog::error("changes are not recorded: {}", problem_);
 }
 
 AuditRecord RequestAudit::record_of(const dds::Guid& source, const Posts& posts) const {
@@ -241,6 +251,7 @@ void RequestAudit::flush() {
 std::string RequestAudit::head() const {
   if (!writer_) return {};
   const AuditHead head = writer_->head();
+  if (head.number == 0) return {};
   return fmt::format("{} {}", head.number, head.hash);
 }
 

@@ -32,10 +32,10 @@ class RequestAudit {
   /// Of more clients that are refused at a time, the requests are told together.
   static constexpr std::size_t kMostRefused = 256;
 
-  /// `logs.done` may be null: then nothing is recorded. Without `logs.pending` a server that is killed leaves
-  /// nothing of what is under way; of what the one before has left is told first. `on_written`: see
+  /// `folder`: see AuditLogs; empty: nothing is recorded. It is opened on the thread that writes it, so this
+  /// never waits for the disk. What a killed server has left under way is told first. `on_written`: see
   /// AuditWriter.
-  RequestAudit(AuditLogs logs, Describe describe, std::function<void()> on_written = {});
+  RequestAudit(std::string folder, Describe describe, std::function<void()> on_written = {});
   /// Writes what is not yet told of posts.
   ~RequestAudit();
   RequestAudit(const RequestAudit&) = delete;
@@ -54,14 +54,16 @@ class RequestAudit {
   void posted(const plc_EventAck& ack, TimePoint now);
   /// To which events. Before posted().
   void posted_to(const PostedEvents::BySource& events, TimePoint now);
-  /// Tells of posts what is due.
+  /// Tells of posts what is due, and the process's log when records do not reach the disk any more, or again.
   void tick(TimePoint now);
 
   [[nodiscard]] bool is_written(AuditWriter::Ticket ticket) const noexcept;
   /// Waits until all is written.
   void flush();
-  /// "N HASH" of the last record of what was done; empty: nothing is recorded.
+  /// "N HASH" of the last record of what was done; empty: nothing is recorded, or not yet.
   [[nodiscard]] std::string head() const;
+  /// As AuditWriter::problem(), at the last tick().
+  [[nodiscard]] const std::string& problem() const noexcept { return problem_; }
 
  private:
   struct Posts {
@@ -99,6 +101,7 @@ class RequestAudit {
   std::map<std::string, UnderWay> under_way_;  // by identity
   Sources posts_;
   std::unordered_map<dds::Guid, Refusals, dds::GuidHash> refusals_;  // by client
+  std::string problem_;
 };
 
 }  // namespace plchost

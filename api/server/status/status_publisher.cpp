@@ -272,13 +272,15 @@ void StatusPublisher::write_host(bool changed) {
   load_.add_to(ext);
   dds::add_entry(ext, dds::kRivalEntry, rival_);
   dds::add_entry(ext, dds::kUnsavedEntry, unsaved_);
+  dds::add_entry(ext, dds::kUnrecordedEntry, audit_problem_);
   (void)hosts_.update(source_.host, sample, ext);
   hosts_.write();
 }
 
-void StatusPublisher::set_audit_head(std::string head) {
-  if (head == audit_head_) return;
+void StatusPublisher::set_audit(std::string head, std::string_view problem) {
+  if (head == audit_head_ && problem == audit_problem_) return;
   audit_head_ = std::move(head);
+  audit_problem_ = problem;
   write_host(true);
 }
 

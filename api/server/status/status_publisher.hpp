@@ -51,7 +51,7 @@ class StatusPublisher {
   void publish_findings(const std::vector<HostFinding>& findings);
 
   /// For who wants to know later that nothing was cut off the audit log.
-  void set_audit_head(std::string head);
+  void set_audit(std::string head, std::string_view problem);
   /// Who else uses the name of this host, for people; empty: nobody.
   void set_rival(std::string rival);
 
@@ -81,6 +81,7 @@ class StatusPublisher {
 
   Source source_;
   std::string audit_head_;
+  std::string audit_problem_;
   std::string rival_;
   HostLoad load_;
   std::uint32_t running_ = 0;  ///< instances

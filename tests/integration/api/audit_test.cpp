@@ -30,15 +30,23 @@ class Audit : public testing::Test {
   [[nodiscard]] RunResult run(std::vector<std::string> arguments) const {
     return run_plcctl(domain_.number(), std::move(arguments));
   }
-  /// Of what was done, or with "/refused" of what was refused.
-  [[nodiscard]] Records records(const std::string& what, const std::string& log = "") const {
+  /// Of what was done, or with "/refused" of what was refused. `what`: of these only.
+  [[nodiscard]] Records records(const std::string& what = "", const std::string& log = "") const {
     Records found;
     std::ifstream file(folder_ + log + "/audit.0000000001.log");
     for (std::string line; std::getline(file, line);) {
       auto record = nlohmann::json::parse(line);
-      if (record["what"] == what) found.push_back(std::move(record));
+      if (what.empty() || record["what"] == what) found.push_back(std::move(record));
     }
     return found;
+  }
+  /// One whose disk hangs while the file `flag` is there.
+  void replace_server_on_stuck_disk(const std::string& flag) {
+    ::setenv("LD_PRELOAD", STUCK_DISK, 1);    // NOLINT(concurrency-mt-unsafe): the children have not started
+    ::setenv("STUCK_DISK", flag.c_str(), 1);  // NOLINT(concurrency-mt-unsafe)
+    host_.replace_server();
+    ::unsetenv("LD_PRELOAD");  // NOLINT(concurrency-mt-unsafe)
+    ::unsetenv("STUCK_DISK");  // NOLINT(concurrency-mt-unsafe)
   }
 
   OwnDomain domain_;
@@ -112,15 +120,52 @@ TEST_F(Audit, PostsAreCountedForEachSource) {
   EXPECT_TRUE(told());
 }
 
+// Opening the log hangs, as on a disk that is frozen.
+TEST_F(Audit, ADiskThatHangsAtTheStartOfTheServerStopsNeitherPresenceNorPostsNorCommands) {
+  (void)host_.add_event("line1", "ready");
+  ASSERT_EQ(run({"stop", "instance", "line1"}).code, 0);
+  const std::string flag = host_.run_directory() + "/disk_hangs";
+  std::ofstream(flag) << "hangs";
+  replace_server_on_stuck_disk(flag);
+  const auto client = connect(domain_);
+  const std::vector operations{plc_OPERATION_STOP, plc_OPERATION_START, plc_OPERATION_RESET,
+                               plc_OPERATION_START};
+  for (const auto operation : operations) {
+    const auto reply = client->call({"hosta", operation, "line1", ""}, soon());
+    ASSERT_TRUE(reply) << reply.error().describe();
+    EXPECT_EQ(reply->code, ErrorCode::ok);
+    const auto posted = client->post_event({"hosta", 0, "line1", "ready"}, 100, {}, kPatience);
+    ASSERT_TRUE(posted) << posted.error().describe();
+    EXPECT_EQ(posted->accepted, 100U);
+  }
+  std::string told;
+  for (const TimePoint end = soon(); told.empty() && MonotonicClock::now() < end;) {
+    const auto host = client->host("hosta", soon());
+    ASSERT_TRUE(host) << host.error().describe();
+    told = host->entry(dds::kUnrecordedEntry);
+    client->wait_for_change(end);
+  }
+  EXPECT_THAT(told, HasSubstr("the log is not open yet"));
+  EXPECT_THAT(run({"list", "hosts", "--json"}).output, HasSubstr("changes are not recorded: the disk"));
+  EXPECT_TRUE(records("start").empty()) << "the disk did not hang: this test says nothing";
+  std::filesystem::remove(flag);
+  for (const TimePoint end = soon(); records("start").size() < 2 && MonotonicClock::now() < end;) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  }
+  std::vector<std::string> found;
+  for (const auto& record : records()) {
+    if (record["on"] == "line1") found.push_back(record["what"]);
+  }
+  EXPECT_THAT(found, testing::ElementsAre("stop", "stop", "start", "reset", "start"));
+  const RunResult whole = run({"verify", "audit", folder_});
+  EXPECT_EQ(whole.code, 0) << whole.output;
+}
+
 // write() of the log hangs, as on a disk that is frozen.
 TEST_F(Audit, ADiskThatHangsStopsNeitherPresenceNorPostsNorCommands) {
   (void)host_.add_event("line1", "ready");
   const std::string flag = host_.run_directory() + "/disk_hangs";
-  ::setenv("LD_PRELOAD", STUCK_DISK, 1);    // NOLINT(concurrency-mt-unsafe): the children have not started
-  ::setenv("STUCK_DISK", flag.c_str(), 1);  // NOLINT(concurrency-mt-unsafe)
-  host_.replace_server();
-  ::unsetenv("LD_PRELOAD");  // NOLINT(concurrency-mt-unsafe)
-  ::unsetenv("STUCK_DISK");  // NOLINT(concurrency-mt-unsafe)
+  replace_server_on_stuck_disk(flag);
   ASSERT_EQ(run({"stop", "instance", "line1"}).code, 0);
   const std::size_t before = records("stop").size();
   std::ofstream(flag) << "hangs";

@@ -4,10 +4,12 @@
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <optional>
 
 #include <gmock/gmock.h>
 #include <unistd.h>
 
+#include "api/audit/audit_check.hpp"
 #include "api/dds/text.hpp"
 
 namespace plchost {
@@ -26,11 +28,8 @@ class RequestAuditTest : public testing::Test {
   ~RequestAuditTest() override { std::filesystem::remove_all(folder_); }
 
   [[nodiscard]] std::unique_ptr<RequestAudit> make() const {
-    AuditLogs logs{.done = AuditLog::open({.folder = folder_}).value(),
-                   .refused = AuditLog::open({.folder = folder_ + "/refused"}).value(),
-                   .pending = PendingRecords::open(folder_ + "/under_way").value()};
     return std::make_unique<RequestAudit>(
-        std::move(logs), [](const dds::Guid& client, AuditRecord& record) { record.from = client.hex(); });
+        folder_, [](const dds::Guid& client, AuditRecord& record) { record.from = client.hex(); });
   }
   [[nodiscard]] static std::string contents(const std::string& folder) {
     std::ifstream file(folder + "/audit.0000000001.log");
@@ -55,6 +54,7 @@ class RequestAuditTest : public testing::Test {
   }
 
   static constexpr TimePoint kNow{std::chrono::hours(1)};
+  static constexpr TimePoint kNoTime{};  // so early that the disk is never slow
   std::string folder_;
 };
 
@@ -195,6 +195,44 @@ TEST_F(RequestAuditTest, ClientsThatAreRefusedHaveABound) {
   sut->flush();
   const std::string refused = refusals();
   EXPECT_LE(std::ranges::count(refused, '\n'), 2 + static_cast<std::ptrdiff_t>(RequestAudit::kMostRefused));
+}
+
+TEST_F(RequestAuditTest, AFolderThatCannotBeOpenedDelaysNoAnswerAndGetsAllInOrderLater) {
+  std::filesystem::remove_all(folder_);
+  std::ofstream(folder_) << "a file where the folder should be";
+  const auto sut = make();
+  while (sut->problem().empty()) sut->tick(kNoTime);
+  plc_Request request = load(1);
+  for (int i = 1; i <= 3; ++i) {
+    request.header.request_identity.sequence_number = i;
+    sut->asked(client(1), request);
+    sut->handed_on(request.header.request_identity);
+    const auto ticket =
+        sut->answered(request.header.request_identity, ErrorCode::ok, "answer " + std::to_string(i), kNow);
+    EXPECT_TRUE(sut->is_written(ticket));
+  }
+  EXPECT_EQ(sut->head(), "");
+  std::filesystem::remove(folder_);
+  while (!sut->problem().empty()) sut->tick(kNoTime);
+  sut->flush();
+  EXPECT_THAT(records(), testing::ContainsRegex("answer 1.*\n.*answer 2.*\n.*answer 3"));
+  EXPECT_TRUE(std::filesystem::is_empty(folder_ + "/under_way"));
+  EXPECT_TRUE(check_audit(folder_).value().problems.empty());
+}
+
+TEST_F(RequestAuditTest, ALogThatAnotherProcessStillWritesIsWaitedFor) {
+  std::optional before(AuditLog::open({.folder = folder_}).value());
+  const auto sut = make();
+  while (sut->problem().empty()) sut->tick(kNoTime);
+  EXPECT_THAT(sut->problem(), HasSubstr("has a writer already"));
+  const plc_Request request = load(1);
+  sut->asked(client(1), request);
+  const auto ticket = sut->answered(request.header.request_identity, ErrorCode::ok, "done", kNow);
+  EXPECT_FALSE(sut->is_written(ticket));
+  before.reset();
+  sut->flush();
+  EXPECT_TRUE(sut->is_written(ticket));
+  EXPECT_THAT(records(), HasSubstr("done"));
 }
 
 TEST_F(RequestAuditTest, JunkLeftUnderWayIsNoRecord) {
