@@ -3,6 +3,7 @@
 // pairs into the reference record. What is measured is held against the reference without its noise.
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <cmath>
 #include <cstdint>
@@ -159,24 +160,57 @@ double largest_correction_us(std::span<const Cycle> cycles) {
   return to_us(largest);
 }
 
-/// The largest deviation of each stretch, so that the picture hides nothing: short ones while it settles.
-Series series_of(std::string name, std::span<const Cycle> cycles, const Reference& reference,
-                 TimePoint Cycle::* which) {
-  constexpr Duration kShort = std::chrono::milliseconds(10);
-  constexpr Duration kLong = std::chrono::milliseconds(250);
-  Series series{.name = std::move(name), .points = {}};
+/// What is drawn of the deviations in a stretch.
+enum class Drawn : std::uint8_t { largest, median };
+
+/// One point for each stretch of that length, of the cycles until `end` after the first one.
+std::vector<std::pair<double, double>> points_of(std::span<const Cycle> cycles, const Reference& reference,
+                                                 TimePoint Cycle::* which, Drawn drawn, Duration length,
+                                                 Duration end) {
+  std::vector<std::pair<double, double>> points;
+  std::vector<double> stretch;
   const TimePoint origin = cycles.front().release;
-  double largest = 0;
-  TimePoint stretch = origin;
+  TimePoint next = origin + length;
   for (const Cycle& cycle : cycles) {
-    largest = std::max(largest, std::abs(reference.deviation(cycle.*which)));
-    const Duration length = cycle.release - origin < kSettling ? kShort : kLong;
-    if (cycle.release - stretch < length) continue;
-    series.points.emplace_back(std::chrono::duration<double>(cycle.release - origin).count(), largest);
-    stretch = cycle.release;
-    largest = 0;
+    if (cycle.release - origin > end) break;
+    stretch.push_back(std::abs(reference.deviation(cycle.*which)));
+    if (cycle.release < next) continue;
+    const auto middle = stretch.begin() + static_cast<std::ptrdiff_t>(stretch.size() / 2);
+    std::ranges::nth_element(stretch, middle);
+    points.emplace_back(std::chrono::duration<double>(cycle.release - origin).count(),
+                        drawn == Drawn::median ? *middle : std::ranges::max(stretch));
+    stretch.clear();
+    while (next <= cycle.release) next += length;
   }
-  return series;
+  return points;
+}
+
+/// Two panels, since the largest deviation of a stretch grows with its length: how the plan settles, and the
+/// whole run.
+std::vector<Series> series_of(std::span<const Cycle> cycles, const Reference& reference) {
+  struct Stretches {
+    const char* panel;
+    Duration length;
+    Duration end;
+  };
+  const std::array panels = {Stretches{.panel = "the first 2 s, in stretches of 10 ms",
+                                       .length = std::chrono::milliseconds(10),
+                                       .end = kSettling},
+                             Stretches{.panel = "the whole run, in stretches of 250 ms",
+                                       .length = std::chrono::milliseconds(250),
+                                       .end = Duration::max()}};
+  std::vector<Series> all;
+  for (const Stretches& of : panels) {
+    const auto add = [&](const char* name, TimePoint Cycle::* which, Drawn drawn) {
+      all.push_back({.name = name,
+                     .panel = of.panel,
+                     .points = points_of(cycles, reference, which, drawn, of.length, of.end)});
+    };
+    add("planned release: the largest of a stretch", &Cycle::release, Drawn::largest);
+    add("start: the largest of a stretch", &Cycle::start, Drawn::largest);
+    add("start: the median of a stretch", &Cycle::start, Drawn::median);
+  }
+  return all;
 }
 
 }  // namespace
@@ -207,8 +241,7 @@ Result<std::vector<Row>> measure_distributed_clock(const Plan& plan) {
   planned.targets = {{"p99 below 0.1 us in steady state", summarise(planned.ours).p99, 0.1},
                      {"settled within 2 s", settled, 2000},
                      {"no correction above its bound", correction, kBoundUs, true}};
-  planned.series = {series_of("planned release", cycles, *reference, &Cycle::release),
-                    series_of("start of the cycle", cycles, *reference, &Cycle::start)};
+  planned.series = series_of(cycles, *reference);
   planned.note = "planned release against the reference grid, magnitude, from 2 s on";
   started.targets = {{"median below 1 us", summarise(started.ours).p50, 1}};
   started.note = "first instruction against the reference grid, magnitude, from 2 s on";

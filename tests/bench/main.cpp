@@ -93,11 +93,10 @@ Result<std::vector<bench::Row>> measure(const Job& job, const bench::Plan& plan)
 
 bool write_plots(const Job& job, const std::string& folder, const std::vector<bench::Row>& rows) {
   const std::string_view condition = job.under_stress ? ", under stress-ng" : "";
-  const std::string title = std::string(job.part->picture) + std::string(condition);
   const std::string path =
       fmt::format("{}/{}{}.svg", folder, job.part->name, job.under_stress ? "_stress" : "");
-  if (job.part->picture.empty()) return true;
-  return write_file(path, bench::to_svg(title, rows));
+  if (job.part->picture.title.empty()) return true;
+  return write_file(path, bench::to_svg(job.part->picture, condition, rows));
 }
 
 int run(const Options& options) {

@@ -5,17 +5,18 @@
 #include <vector>
 
 #include "tests/bench/bench.hpp"
+#include "tests/bench/plot.hpp"
 #include "tests/bench/row.hpp"
 
 namespace plchost::bench {
 
 /// One part of the benchmark: a file of its own with one function, and a line in the table of parts.cpp.
 struct Part {
-  std::string_view name;     ///< for --only, and of its picture
-  std::string_view about;    ///< what is measured beside what
-  std::string_view picture;  ///< title of its picture; empty: none
-  double turns;              ///< about how many times Plan::each it takes
-  bool under_stress;         ///< measured a second time with --stress
+  std::string_view name;   ///< for --only, and of its picture
+  std::string_view about;  ///< what is measured beside what
+  Drawing picture;         ///< the words of its picture; no title: none
+  double turns;            ///< about how many times Plan::each it takes
+  bool under_stress;       ///< measured a second time with --stress
   Result<std::vector<Row>> (*measure)(const Plan&);
 };
 

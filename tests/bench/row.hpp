@@ -23,6 +23,7 @@ struct Target {
 /// A curve over time, for a picture: seconds since the start, nanoseconds.
 struct Series {
   std::string name;
+  std::string panel;  ///< of the picture: series with one name of a panel share it
   std::vector<std::pair<double, double>> points;
 };
 

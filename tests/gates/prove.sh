@@ -75,6 +75,25 @@ plant_in_contract "contract: version 1 has one more member" 's,^( *)unsigned lon
 plant_in_contract "contract: version 1 has another code" 's/(OPERATION_STOP +=) 2;/\1 102;/' --write
 plant_in_contract "contract: version 1 has another topic" 's,topic: plc/v1/reply,topic: plc/v1/answer,' --write
 
+# plant_in_picture NAME FILE EXPRESSION: that picture with that change (of sed)
+plant_in_picture() {
+  new_tree
+  sed -E "$3" "$2" >"$plot/tree/manager/planted.svg"
+  cmp -s "$2" "$plot/tree/manager/planted.svg" && { echo "nothing was planted for '$1'"; failed=1; }
+  commit_tree
+  must_be_red "$1" "$gates/pictures.py" "$plot/tree"
+}
+plant_in_picture "pictures: text wider than its box" manager/system.svg 's,woken early,& by its own guard,'
+plant_in_picture "pictures: texts on each other" manager/system.svg 's,(<text [^>]*y=")70(">plchostd),\194\2,'
+plant_in_picture "pictures: a line crosses a text" manager/system.svg 's,L966\,390,L966\,405,; s,L80\,390,L80\,405,'
+plant_in_picture "pictures: no arrow" manager/system.svg '/M(400\,390|435|470)/d'
+plant_in_picture "pictures: hidden arrow" manager/system.svg '/class="core".*y="422"/d; s,</svg>,<rect class="core" x="40" y="422" width="284" height="166"/>&,'
+plant_in_picture "pictures: no background" manager/system.svg '/<rect width="1000" height="650"/d'
+plant_in_picture "pictures: no general font" manager/system.svg 's/Arial, sans-serif/Arial/'
+plant_in_picture "pictures: axis without a title" tests/bench/cyclic.svg '/class="axis" transform/d'
+plant_in_picture "pictures: curves that only colours tell" tests/bench/corun.svg 's,m-3.6[^"]*,m-4\,0 a4\,4 0 1\,0 8\,0 a4\,4 0 1\,0 -8\,0,'
+plant_in_picture "pictures: outside of the picture" tests/bench/cyclic.svg 's/Start latency of/& each single cycle, one after the other, of this and of that task, and of/'
+
 new_tree
 echo 'int planted(int* p) { return p == 0 ? 1 : 2; }' >"$plot/tree/shm/base/planted.cpp"
 must_be_red clang-tidy clang-tidy-19 --quiet "$plot/tree/shm/base/planted.cpp" -- -std=c++23

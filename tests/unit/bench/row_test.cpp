@@ -1,6 +1,8 @@
 #include "tests/bench/row.hpp"
 
 #include <limits>
+#include <regex>
+#include <set>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
@@ -77,27 +79,62 @@ TEST(Markdown, HasALineForEachRowAndForEachTarget) {
   EXPECT_NE(sut.find("| median below 9 us | 3 | 9 | met |"), std::string::npos);
 }
 
+constexpr Drawing kDrawing{.title = "title", .x = "along (s)", .y = "up", .floor = "bare", .notes = {"note"}};
+
+std::size_t count_of(std::string_view what, const std::string& svg) {
+  std::size_t count = 0;
+  for (auto at = svg.find(what); at != std::string::npos; at = svg.find(what, at + 1)) ++count;
+  return count;
+}
+
 TEST(Plot, DrawsASharedFloorOnce) {
   const std::vector<Row> shared{{.name = "a", .ours = one_to(3), .floor = one_to(2)},
                                 {.name = "b", .ours = one_to(4), .floor = one_to(2)}};
-  const auto curves = [](const std::string& svg) {
-    std::size_t count = 0;
-    for (auto at = svg.find("<polyline"); at != std::string::npos; at = svg.find("<polyline", at + 1))
-      ++count;
-    return count;
-  };
-  EXPECT_EQ(curves(to_svg("t", shared)), 3U);
+  EXPECT_EQ(count_of("<polyline", to_svg(kDrawing, "", shared)), 3U);
+  EXPECT_EQ(count_of(">floor: bare<", to_svg(kDrawing, "", shared)), 1U);
   auto apart = shared;
   apart[1].floor = one_to(3);
-  EXPECT_EQ(curves(to_svg("t", apart)), 4U);
+  EXPECT_EQ(count_of("<polyline", to_svg(kDrawing, "", apart)), 4U);
+  EXPECT_EQ(count_of(">its floor: bare<", to_svg(kDrawing, "", apart)), 2U);
 }
 
 TEST(Plot, DrawsSeriesOverTimeWhereThereAreSome) {
   Row row{.name = "clock"};
-  row.series = {{"offset", {{0, 300000}, {10, -50}}}};
-  const auto svg = to_svg("t", {row});
-  EXPECT_NE(svg.find(">offset<"), std::string::npos);
-  EXPECT_NE(svg.find("10.0 s"), std::string::npos);
+  row.series = {{.name = "offset", .panel = "begin", .points = {{0, 300000}, {2, -50}}},
+                {.name = "offset", .panel = "all", .points = {{0, 300000}, {10, -50}}},
+                {.name = "start", .panel = "all", .points = {{0, 300000}, {10, -50}}}};
+  const auto svg = to_svg(kDrawing, "", {row});
+  EXPECT_EQ(count_of(">offset<", svg), 1U) << "once in the legend";
+  EXPECT_EQ(count_of("<polyline", svg), 3U);
+  EXPECT_EQ(count_of(">all<", svg), 1U);
+  EXPECT_EQ(count_of(">10<", svg), 1U);
+}
+
+TEST(Plot, NamesItsAxes) {
+  const auto svg = to_svg(kDrawing, ", busy", {{.name = "a", .ours = one_to(3), .floor = one_to(2)}});
+  for (const char* const words : {">title, busy<", ">along (s)<", ">up<", ">note<"})
+    EXPECT_EQ(count_of(words, svg), 1U) << words;
+}
+
+TEST(Plot, HidesNoPeakBetweenTwoPoints) {
+  Row row{.name = "clock"};
+  row.series = {{.name = "offset", .panel = "", .points = {}}};
+  for (int i = 0; i < 100'000; ++i) row.series[0].points.emplace_back(i * 1e-3, i == 50'001 ? 1e6 : 10);
+  const auto svg = to_svg(kDrawing, "", {row});
+  const auto begin = svg.find("<polyline");
+  const auto curve = svg.substr(begin, svg.find("/>", begin) - begin);
+  EXPECT_NE(curve.find(",52.0 "), std::string::npos) << "1 ms is at the upper edge";
+}
+
+TEST(Plot, TellsEachCurveByItsMarks) {
+  const std::vector<Row> rows{{.name = "a", .ours = one_to(30), .floor = one_to(20)},
+                              {.name = "b", .ours = one_to(40), .floor = one_to(21)}};
+  const auto svg = to_svg(kDrawing, "", rows);
+  const std::regex mark(R"re(class="mark" d="M[^ ]+ ([^"]+)" fill="([^"]+)")re");
+  std::set<std::pair<std::string, bool>> looks;  // shape, hollow
+  for (std::sregex_iterator at(svg.begin(), svg.end(), mark), end; at != end; ++at)
+    looks.emplace((*at)[1], (*at)[2] == "#ffffff");
+  EXPECT_EQ(looks.size(), 4U);
 }
 
 }  // namespace
