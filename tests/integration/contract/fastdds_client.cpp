@@ -26,15 +26,26 @@
 #include <fastdds/dds/subscriber/DataReader.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
+#if __has_include(<fastdds/utils/IPLocator.hpp>)  // version 3
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.hpp>
+#include <fastdds/utils/IPLocator.hpp>
+
+#include "controlPubSubTypes.hpp"
+namespace rtps = eprosima::fastdds::rtps;
+using eprosima::fastdds::dds::RETCODE_OK;
+#else
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastrtps/utils/IPLocator.h>
 
 #include "controlPubSubTypes.h"
+namespace rtps = eprosima::fastrtps::rtps;
+constexpr auto RETCODE_OK = eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
+#endif
 
 namespace {
 
 using namespace eprosima::fastdds::dds;
-using eprosima::fastrtps::rtps::GUID_t;
+using rtps::GUID_t;
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
 
@@ -80,6 +91,16 @@ std::string hex(const std::array<std::uint8_t, 16>& bytes) {
   return text;
 }
 
+/// By its name in version 3, and in version 2.
+template <class Times>
+auto& heartbeat_period(Times& times) {
+  if constexpr (requires { times.heartbeat_period; }) {
+    return times.heartbeat_period;
+  } else {
+    return times.heartbeatPeriod;
+  }
+}
+
 /// The client of one domain.
 class Client {
  public:
@@ -93,8 +114,8 @@ class Client {
     auto& builtin = qos.wire_protocol().builtin;
     builtin.discovery_config.leaseDuration = {3, 0};
     builtin.discovery_config.leaseDuration_announcementperiod = {1, 0};
-    eprosima::fastrtps::rtps::Locator_t locator;
-    eprosima::fastrtps::rtps::IPLocator::setIPv4(locator, 127, 0, 0, 1);
+    rtps::Locator_t locator;
+    rtps::IPLocator::setIPv4(locator, 127, 0, 0, 1);
     builtin.metatrafficUnicastLocatorList.push_back(locator);  // instead of multicast
     for (std::uint32_t i = 0; i < kServersPerMachine; ++i) {
       locator.port = 7400 + 250 * options.domain + 10 + 2 * i;
@@ -124,7 +145,7 @@ class Client {
     qos.resource_limits().max_instances = 4096;
     qos.resource_limits().max_samples_per_instance = 64;
     qos.resource_limits().max_samples = 4096 * 64;
-    qos.endpoint().history_memory_policy = eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
+    qos.endpoint().history_memory_policy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
     return made(subscriber->create_datareader(topic_of<Type>(topic), qos), "a reader of " + topic);
   }
 
@@ -137,8 +158,8 @@ class Client {
     qos.reliability().kind = RELIABLE_RELIABILITY_QOS;
     qos.durability().kind = VOLATILE_DURABILITY_QOS;
     qos.history().kind = KEEP_ALL_HISTORY_QOS;
-    qos.endpoint().history_memory_policy = eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
-    qos.reliable_writer_qos().times.heartbeatPeriod = {0, 10'000'000};
+    qos.endpoint().history_memory_policy = rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
+    heartbeat_period(qos.reliable_writer_qos().times) = {0, 10'000'000};
     auto* const writer =
         made(publisher->create_datawriter(topic_of<Type>(topic), qos), "a writer of " + topic);
     wait_until(
@@ -170,7 +191,7 @@ template <class Sample, class Use>
 void take(DataReader* reader, Use use) {
   Sample sample;
   SampleInfo info;
-  while (reader->take_next_sample(&sample, &info) == ReturnCode_t::RETCODE_OK) {
+  while (reader->take_next_sample(&sample, &info) == RETCODE_OK) {
     if (info.valid_data) use(sample);
   }
 }
