@@ -118,7 +118,8 @@ class EachInstruction : public testing::Test {
       (void)pool_.tidy();
       ASSERT_EQ(damage_of(view), "") << where;
       std::size_t memories = 0;
-      for (const ObjectInfo& info : pool_.list().value()) {
+      const auto objects = pool_.list().value();
+      for (const ObjectInfo& info : objects) {
         ASSERT_TRUE(info.kept || info.type == ObjectType::event) << info.name << ", " << where;
         ASSERT_EQ(info.reference_count, 0U) << info.name << ", " << where;
         memories += info.type == ObjectType::memory ? 1 : 0;
