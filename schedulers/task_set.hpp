@@ -11,6 +11,7 @@
 #include "schedulers/activation/single_cycle.hpp"
 #include "schedulers/distributed_clock/distributed_clock.hpp"
 #include "schedulers/faults/supervision.hpp"
+#include "schedulers/faults/taker_search.hpp"
 #include "schedulers/scheduler.hpp"
 #include "schedulers/task/cycle_gate.hpp"
 #include "schedulers/task/task.hpp"
@@ -147,6 +148,10 @@ class TaskSet {
   /// lost. Those that run: one that sleeps although it was posted to is woken; its poster was ended in
   /// between. To be called now and then.
   void look_after_posts() noexcept;
+  /// Finds threads of this process that take the processor from the thread that watches the tasks, where
+  /// ProcessorGuard has not: they lose their real-time priority. What is to be logged of those, and of
+  /// programs that keep tasks from the processor. To be called now and then.
+  [[nodiscard]] std::vector<std::string> look_after_processor();
   /// The names of the tasks that are in exception, and so keep start() from it.
   [[nodiscard]] std::vector<std::string_view> tasks_in_exception() const;
   /// A thread was caught in the application's code and is parked there for good. Nothing waits for it, and
@@ -233,6 +238,8 @@ class TaskSet {
   std::vector<std::size_t> single_cycle_order_;  // indices of tasks
   std::vector<bool> fault_taken_;
   std::optional<Supervision> supervision_;  // until all threads have ended
+  TakerSearch takers_{linux_processor_times()};
+  TimePoint starved_told_;  // when a task was told of last that other programs keep from the processor
   std::unique_ptr<Arrangement> active_;
   std::vector<std::unique_ptr<Arrangement>>
       retired_;  // a task in a long cycle may still hold a source of these

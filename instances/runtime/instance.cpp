@@ -295,6 +295,9 @@ void Instance::beat() {
   report_tick();
   if (life_.state() == ApplicationState::exception) (void)tasks_->still_busy(TimePoint{});
   if (tasks_) tasks_->look_after_posts();
+  if (tasks_) {
+    for (const std::string& news : tasks_->look_after_processor()) spdlog::warn("{}", news);
+  }
   host_->events().refresh();
   reference_.refresh();
   InstanceRuntime runtime;

@@ -53,6 +53,8 @@ class EventLatch {
     return edges;
   }
 
+  /// A run is due that has not begun. Any thread.
+  [[nodiscard]] bool is_due() const noexcept { return due_.load(std::memory_order_relaxed) != 0; }
   /// When the edge was seen whose run has begun; nothing: none is due. The task's thread.
   [[nodiscard]] std::optional<TimePoint> take() noexcept {
     if (due_.load(std::memory_order_acquire) == 0) return std::nullopt;

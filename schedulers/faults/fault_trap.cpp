@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "schedulers/faults/fault_signals.hpp"
+#include "schedulers/faults/processor_guard.hpp"
 #include "shm/base/memory_guard.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/time.hpp"
@@ -206,7 +207,7 @@ Result<void> install_fault_handlers() {
       !set)
     return std::unexpected(set.error());
   installed.store(true, std::memory_order_release);
-  return {};
+  return ProcessorGuard::install();
 }
 
 // The watchdog's signal without its order does nothing but that.

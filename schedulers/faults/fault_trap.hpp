@@ -55,7 +55,8 @@ class FaultTrap {
 
 /// Catches SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP and SIGABRT of this process in code under an armed
 /// trap; anywhere else they do what they did. A SIGBUS in memory under a MemoryGuard is mended. Takes
-/// SIGRTMAX - 1, too, with which a watchdog stops a cycle. Once, before there are other threads. Set-up.
+/// SIGRTMAX - 1, too, with which a watchdog stops a cycle, and SIGXCPU: see ProcessorGuard. Once, before
+/// there are other threads. Set-up.
 [[nodiscard]] Result<void> install_fault_handlers();
 
 /// Makes the thread leave its sleep on a futex and look at the word again. Nothing happens if the handlers

@@ -1,12 +1,20 @@
 #pragma once
 
+#include <cstddef>
+#include <span>
+
 #include <sys/types.h>
 
+#include "shm/base/names.hpp"
 #include "shm/base/time.hpp"
 
 namespace plchost {
 
-/// The processor time that this process and its threads have used: tests give figures of their own.
+/// "thread 'hog' (SCHED_FIFO 80)"; empty: none.
+using ThreadText = FixedText<63>;
+
+/// The processor time that this process and its threads have used, and who may take it first: tests give
+/// figures of their own.
 class ProcessorTimes {
  public:
   virtual ~ProcessorTimes() = default;
@@ -16,6 +24,12 @@ class ProcessorTimes {
   [[nodiscard]] virtual Duration of_thread(pid_t thread) const noexcept = 0;
   /// One thread of this process waits for something else than the processor. Real-time, three system calls.
   [[nodiscard]] virtual bool sleeps(pid_t thread) const noexcept = 0;
+  /// The threads of this process with a real-time priority, as many as `found` has room for; how many that
+  /// are. Real-time, a system call for each thread of the process.
+  [[nodiscard]] virtual std::size_t real_time_threads(std::span<pid_t> found) const noexcept = 0;
+  /// Takes its real-time priority from a thread of this process. What it was; empty: it had none, or has
+  /// ended. Real-time, signal handlers included; six system calls.
+  [[nodiscard]] virtual ThreadText demote(pid_t thread) const noexcept = 0;
 };
 
 /// As the kernel counts them.

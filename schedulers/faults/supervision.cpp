@@ -45,6 +45,7 @@ Supervision::Supervision(Clock& clock, const std::vector<std::unique_ptr<Task>>&
     : clock_(clock),
       times_(times),
       watched_(tasks.size() + 1),
+      starvation_(tasks, event_variables, times),
       load_(which(tasks, is_freewheeling)),
       overload_(which(tasks, is_modest)),
       task_times_(tasks.size()) {
@@ -58,6 +59,7 @@ Supervision::Supervision(Clock& clock, const std::vector<std::unique_ptr<Task>>&
 Supervision::~Supervision() {
   ending_.store(true);
   change(Mode::off);
+  if (thread_.joinable()) ProcessorGuard::watch(Duration::zero());
 }
 
 Result<void> Supervision::start_thread(ThreadPriority priority) {
@@ -82,6 +84,8 @@ void Supervision::begin(const SchedulerSettings& settings, int cores) {
                       std::memory_order_relaxed);
   load_interval_.store(settings.watchdog.load ? window.count() : 0, std::memory_order_relaxed);
   cores_.store(cores, std::memory_order_relaxed);
+  starvation_.begin(settings.watchdog.default_time);
+  if (thread_.joinable()) ProcessorGuard::watch(starvation_.limit());
   forgiven_until_.store((clock_.now() + kGrace).time_since_epoch().count(), std::memory_order_relaxed);
   change(Mode::running);
 }
@@ -95,16 +99,26 @@ void Supervision::change(Mode mode) noexcept {
 void Supervision::run() noexcept {
   while (!ending_.load(std::memory_order_acquire)) {
     const std::uint32_t order = order_.load(std::memory_order_acquire);
-    const bool off = mode_.load(std::memory_order_acquire) == Mode::off;
-    clock_.wait(order_, order, off ? kNoDeadline : look(clock_.now()));
+    const bool off = mode_.load(std::memory_order_acquire) == Mode::off && !starvation_.searching();
+    if (!off) ProcessorGuard::alive();
+    const TimePoint next = off ? kNoDeadline : look(clock_.now());
+    next_look_.store(next == kNoDeadline ? 0 : next.time_since_epoch().count(), std::memory_order_relaxed);
+    clock_.wait(order_, order, next);
   }
 }
 
 TimePoint Supervision::look(TimePoint now) noexcept {
   TimePoint next = kNoDeadline;
   for (Watched& watched : watched_) next = std::min(next, look_at(watched, now));
-  if (mode_.load(std::memory_order_relaxed) == Mode::running) next = std::min(next, look_at_load(now));
-  return next;
+  const bool running = mode_.load(std::memory_order_relaxed) == Mode::running;
+  if (running) next = std::min(next, look_at_load(now));
+  return std::min(next, starvation_.look(now, running));
+}
+
+Duration Supervision::overdue(TimePoint now) const noexcept {
+  const auto next = next_look_.load(std::memory_order_relaxed);
+  if (next == 0) return Duration::zero();
+  return std::max(now - TimePoint(Duration(next)), Duration::zero());
 }
 
 TimePoint Supervision::look_at(Watched& watched, TimePoint now) noexcept {

@@ -8,6 +8,7 @@
 #include "schedulers/clock.hpp"
 #include "schedulers/faults/fault_trap.hpp"
 #include "schedulers/faults/processor_times.hpp"
+#include "schedulers/faults/starvation.hpp"
 #include "schedulers/faults/watchdog_rules.hpp"
 #include "schedulers/task/task.hpp"
 #include "shm/base/thread.hpp"
@@ -23,7 +24,7 @@ class Supervision {
   /// no load is measured.
   static constexpr Duration kGrace = std::chrono::milliseconds(200);
   /// So much later than it wanted to wake, everything on this core stood still.
-  static constexpr Duration kStandstill = std::chrono::milliseconds(5);
+  static constexpr Duration kStandstill = Starvation::kStandstill;
   /// The guard against endless loops looks at a cycle so often within its limit: from its first look on it
   /// counts the processor time of the thread.
   static constexpr int kLooks = 8;
@@ -38,6 +39,10 @@ class Supervision {
   ~Supervision();
 
   [[nodiscard]] Result<void> start_thread(ThreadPriority priority);
+
+  /// By how much it is too late to look: threads above it take the processor. Any thread.
+  [[nodiscard]] Duration overdue(TimePoint now) const noexcept;
+  [[nodiscard]] Starvation& starvation() noexcept { return starvation_; }
 
   /// The tasks run from now on, or run under another scheduler. Control thread.
   void begin(const SchedulerSettings& settings, int cores);
@@ -92,6 +97,9 @@ class Supervision {
   std::atomic<int> load_maximum_{0};
   std::atomic<bool> only_overload_{false};  // no maximum was set
   std::atomic<int> cores_{1};
+  std::atomic<Duration::rep> next_look_{0};  // 0: it has not looked, or is off
+
+  Starvation starvation_;
 
   // The thread's own.
   LoadRule load_;

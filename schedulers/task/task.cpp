@@ -72,6 +72,17 @@ Duration Task::interval() const noexcept {
   return Duration(wanted_interval_.load(std::memory_order_relaxed));
 }
 
+std::optional<Task::Demand> Task::demand(TimePoint now) const noexcept {
+  const Demand demand{
+      .cycle_since = trap_.running_since(), .due = due(), .posts = slept_at_.load(std::memory_order_relaxed)};
+  if (fault_.halts() || !free_since()) return std::nullopt;
+  if (demand.cycle_since) return demand;
+  const bool is_due = demand.due && *demand.due < now;
+  const bool is_posted = event_ != nullptr && event_->count() != demand.posts;
+  if (is_due || is_posted || latch_.is_due()) return demand;
+  return std::nullopt;
+}
+
 std::optional<TimePoint> Task::free_since() const noexcept {
   const auto since = free_since_.load(std::memory_order_relaxed);
   if (since == kAtWork) return std::nullopt;

@@ -60,6 +60,16 @@ class Task {
   [[nodiscard]] TaskFault& fault() noexcept { return fault_; }
   [[nodiscard]] const TaskFault& fault() const noexcept { return fault_; }
   [[nodiscard]] FaultTrap& trap() noexcept { return trap_; }
+  /// What a task is ready to run for, as long as it is the same: a cycle that has begun, or something due for
+  /// which none has.
+  struct Demand {
+    std::optional<TimePoint> cycle_since;
+    std::optional<TimePoint> due;
+    std::uint64_t posts = 0;  ///< external events: the event's count when it slept last
+    bool operator==(const Demand&) const = default;
+  };
+  /// Nothing: the task waits for what is to come, or is at work for the runtime. Any thread.
+  [[nodiscard]] std::optional<Demand> demand(TimePoint now) const noexcept;
   /// Since when the task could run if it was not at work for the runtime between two cycles; nothing: it is
   /// at that. Releases of that time are no fault of the application. Any thread.
   [[nodiscard]] std::optional<TimePoint> free_since() const noexcept;

@@ -84,6 +84,8 @@ std::string_view to_string(FaultKind kind) noexcept {
       return "processor load";
     case FaultKind::stop_timeout:
       return "stop timeout";
+    case FaultKind::no_processor:
+      return "no processor";
   }
   return "unknown";
 }
@@ -128,6 +130,11 @@ std::string describe_fault(const FaultRecord& record) {
           "{} after {:.0f} ms, the limit of {}",
           record.in_event_variable ? "its event variable has not returned" : "not at the end of its cycle",
           ms(record.limit), name_of(record.phase));
+    case FaultKind::no_processor:
+      return fmt::format(
+          "ready to run for {:.0f} ms without the processor, which {} of the application took; the limit is "
+          "{:.0f} ms. That thread has no real-time priority any more",
+          ms(record.figure), record.text.view(), ms(record.limit));
   }
   return "unknown";
 }

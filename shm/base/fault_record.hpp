@@ -17,6 +17,7 @@ enum class FaultKind : std::uint8_t {
   omitted_cycles,        ///< so many releases in a row passed without a cycle
   processor_load,        ///< the instance used more of its core than it may
   stop_timeout,          ///< the cycle did not end in the time that a stop allows
+  no_processor,          ///< a thread that the application has made kept the processor from the task
 };
 [[nodiscard]] std::string_view to_string(FaultKind kind) noexcept;
 
@@ -47,7 +48,7 @@ struct FaultRecord {
   std::int64_t count = 0;                ///< consecutive_overruns: how many
   StopPhase phase = StopPhase::outputs;  ///< stop_timeout: what was over
   std::int64_t unix_ns = 0;              ///< CLOCK_REALTIME
-  FixedText<kMaxText> text;              ///< cpp_exception: its what()
+  FixedText<kMaxText> text;              ///< cpp_exception: its what(); no_processor: the thread
   FixedText<kMaxText> type;              ///< cpp_exception: the name of its type as the compiler mangles it
 };
 

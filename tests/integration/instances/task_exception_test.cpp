@@ -192,6 +192,42 @@ INSTANTIATE_TEST_SUITE_P(Each, EachScheduler,
                          [](const auto& test) { return std::string(test.param); });
 
 #if defined(__x86_64__)
+TEST(TaskException, AThreadMadeInACycleHasNotItsPriority) {
+  Faulty sut;
+  sut.process().event("soft_hog").post();
+  EXPECT_TRUE(eventually([&] { return sut.process().task("SoftHog")->counters.cycles == 1; }));
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_TRUE(sut.runs("Fast"));
+    EXPECT_TRUE(sut.runs("Low"));
+  }
+  EXPECT_EQ(sut.process().ask(ControlVerb::stop).code, ErrorCode::ok);
+  EXPECT_EQ(sut.process().end(SIGTERM), EXIT_SUCCESS) << sut.process().log();
+}
+
+// Its thread asks for a priority of its own: below the thread that watches the tasks, above it, above all;
+// one that blocks signals; and two of them.
+class AThreadThatTakesTheProcessor : public ::testing::TestWithParam<const char*> {};
+
+TEST_P(AThreadThatTakesTheProcessor, LosesItAndPutsTheApplicationIntoException) {
+  if (!Thread::start("probe", {.fifo = 1}, [] {})) GTEST_SKIP() << "no right to SCHED_FIFO";
+  Faulty sut("[CmpSchedule]\nWatchdog.DefaultTimeMs=600\n");
+  sut.process().event(GetParam()).post();
+  const ExceptionEntry exception = sut.exceptions().front();
+  EXPECT_EQ(exception.kind, "no processor");
+  EXPECT_THAT(exception.text,
+              AllOf(HasSubstr("thread 'hog' (SCHED_FIFO "), HasSubstr("the limit is 300 ms")));
+  EXPECT_TRUE(exception.whole_application);
+  EXPECT_TRUE(eventually([&] { return sut.state_of("Later") == PageTaskState::stopped; }));
+  EXPECT_EQ(sut.state_of(exception.task), PageTaskState::exception);
+  EXPECT_EQ(sut.process().ask(ControlVerb::status).code, ErrorCode::ok);
+  EXPECT_EQ(sut.process().ask(ControlVerb::start).code, ErrorCode::wrong_state);
+  EXPECT_EQ(sut.process().end(SIGTERM), EXIT_SUCCESS) << sut.process().log();
+}
+
+INSTANTIATE_TEST_SUITE_P(Each, AThreadThatTakesTheProcessor,
+                         ::testing::Values("hog", "high_hog", "highest_hog", "deaf_hog", "two_hogs"),
+                         [](const auto& test) { return std::string(test.param); });
+
 TEST(TaskException, OfAWildPointerDoesNotTakeItForANullPointer) {
   Faulty sut;
   (void)sut.process().event("write_wild").post();

@@ -9,6 +9,7 @@
 #include "manager/api_server.hpp"
 #include "manager/supervisor/managed_instance.hpp"
 #include "shm/base/exception_history.hpp"
+#include "shm/base/thread.hpp"
 #include "shm/pool/object_pool.hpp"
 #include "tests/integration/manager/plant.hpp"
 #include "tests/support/sanitized.hpp"
@@ -152,6 +153,23 @@ TEST(Manager, LeadsOutOfAFaultThatHoldsTheHeapAsOutOfAnyOther) {
   EXPECT_LT(MonotonicClock::now() - before, kShutdownLimit) << "it cannot be asked to end";
   EXPECT_EQ(plant.status("line1").state, InstanceState::stopped);
   EXPECT_NE(plant.status("line1").pid, pid);
+}
+
+// The supervision is below that thread, and no signal reaches it: the instance finds it by itself if the
+// kernel leaves some time to threads without real-time priority. Else it does not answer the manager.
+TEST(Manager, RestartsAnInstanceSoonWhoseApplicationTakesTheProcessor) {
+  if (!Thread::start("probe", {.fifo = 1}, [] {})) GTEST_SKIP() << "no right to SCHED_FIFO";
+  Plant plant;
+  plant.add("line1", "manager_processor_taker");
+  plant.start_manager();
+  ASSERT_TRUE(plant.wait_for("line1", InstanceState::exception));
+  const int pid = plant.status("line1").pid;
+  const TimePoint before = MonotonicClock::now();
+  EXPECT_EQ(plant.ask(ControlVerb::restart, "line1").code, ErrorCode::ok);
+  EXPECT_LT(MonotonicClock::now() - before, kTerminateLimit * 5) << "nobody waits for its cycles";
+  EXPECT_NE(plant.status("line1").pid, pid);
+  ASSERT_TRUE(plant.wait_for("line1", InstanceState::running));
+  EXPECT_TRUE(plant.wait_for_cycles("line1", 50)) << "it runs as it would have";
 }
 
 // Another program with the right to write the pool, and a process that stands still afterwards.

@@ -26,6 +26,8 @@ class FakeTimes final : public ProcessorTimes {
     return found == threads.end() ? Duration::zero() : found->second;
   }
   [[nodiscard]] bool sleeps(pid_t) const noexcept override { return false; }
+  [[nodiscard]] std::size_t real_time_threads(std::span<pid_t>) const noexcept override { return 0; }
+  [[nodiscard]] ThreadText demote(pid_t) const noexcept override { return {}; }
   Duration process = std::chrono::seconds(7);  // since its start: only differences count
   std::map<pid_t, Duration> threads;
 };

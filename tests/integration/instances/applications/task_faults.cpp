@@ -1,6 +1,7 @@
 // One external event for each fault that a task can have, beside a cyclic task that has none. A task whose
 // name stands in PLC_FAULT_AT_START has its fault in its first cycle, without an event.
 #include <atomic>
+#include <csignal>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
@@ -9,6 +10,8 @@
 #include <thread>
 
 #include <alloca.h>
+#include <pthread.h>
+#include <sched.h>
 
 #include "../../../../instances/plc_app.hpp"
 
@@ -61,6 +64,32 @@ __attribute__((noinline)) void sleep_for_ever() {
   while (zero == 0) std::this_thread::sleep_for(1s);
 }
 
+// A thread of the application's own that never ends; priority 0: as it comes.
+void loop_in_a_thread(int priority, const char* name = "hog", bool blocks_signals = false) {
+  pthread_attr_t attributes;
+  pthread_attr_init(&attributes);
+  if (priority > 0) {
+    sched_param wanted{};
+    wanted.sched_priority = priority;
+    pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
+    pthread_attr_setschedpolicy(&attributes, SCHED_FIFO);
+    pthread_attr_setschedparam(&attributes, &wanted);
+  }
+  sigset_t before;
+  sigset_t more;
+  sigemptyset(&more);
+  if (blocks_signals) sigfillset(&more);
+  pthread_sigmask(SIG_BLOCK, &more, &before);  // the thread inherits it
+  pthread_t thread{};
+  const auto body = [](void* own_name) -> void* {
+    pthread_setname_np(pthread_self(), static_cast<const char*>(own_name));
+    loop();
+    return nullptr;
+  };
+  pthread_create(&thread, &attributes, body, const_cast<char*>(name));
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+}
+
 // Faults that only this processor has.
 #if defined(__x86_64__)
 __attribute__((noinline)) void write_wild() {
@@ -107,6 +136,15 @@ void setup(plc::Application& app) {
   app.external("BadLog", 4, "bad_log", [] { plc_log(0, reinterpret_cast<const char*>(8)); });
   app.external("Say", 4, "say", [] { plc::log("said"); });
   app.external("Loop", 4, "loop", loop);
+  app.external("SoftHog", 4, "soft_hog", [] { loop_in_a_thread(0); });
+  app.external("Hog", 4, "hog", [] { loop_in_a_thread(68); });
+  app.external("HighHog", 4, "high_hog", [] { loop_in_a_thread(80); });
+  app.external("HighestHog", 4, "highest_hog", [] { loop_in_a_thread(99); });
+  app.external("DeafHog", 4, "deaf_hog", [] { loop_in_a_thread(60, "hog", true); });
+  app.external("TwoHogs", 4, "two_hogs", [] {
+    loop_in_a_thread(40, "below", true);
+    loop_in_a_thread(68);
+  });
   app.external("Sleep", 4, "sleep", sleep_for_ever);
   app.external("Busy", 4, "busy", [] { busy = true; });
   app.external("Overrun", 4, "overrun", [] { overrun = true; });

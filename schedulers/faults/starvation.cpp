@@ -1,0 +1,145 @@
+#include "schedulers/faults/starvation.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace plchost {
+
+namespace {
+
+// Nobody waits for what has no real-time priority, or takes only what is left.
+bool must_run(const Task& task) noexcept {
+  return task.config().kind != TaskKind::freewheeling &&
+         task.config().iec_priority <= kLowestRealTimeIecPriority;
+}
+
+}  // namespace
+
+Starvation::Starvation(const std::vector<std::unique_ptr<Task>>& tasks, const FaultTrap& event_variables,
+                       const ProcessorTimes& times)
+    : tasks_(tasks),
+      event_variables_(event_variables),
+      times_(times),
+      hunger_(tasks.size()),
+      own_threads_(tasks.size() + 1),
+      search_(times) {}
+
+void Starvation::begin(Duration guard) noexcept {
+  constexpr int kPart = 2;
+  const Duration limit = guard == Duration::zero() ? guard : std::max(guard / kPart, kLeast);
+  limit_.store(limit.count(), std::memory_order_relaxed);
+}
+
+TimePoint Starvation::look(TimePoint now, bool running) noexcept {
+  const Duration step = limit() / kLooks;
+  if (step == Duration::zero()) return kNoDeadline;
+  take_reported(now);
+  if (search_.begun() && now >= search_.ends()) end_search(now);
+  if (now >= next_) {
+    next_ = now + step;
+    for (std::size_t i = 0; running && i < tasks_.size(); ++i) {
+      if (must_run(*tasks_[i])) look_at(i, now);
+    }
+  }
+  return search_.begun() ? std::min(next_, search_.ends()) : next_;
+}
+
+void Starvation::look_at(std::size_t index, TimePoint now) noexcept {
+  Hunger& hunger = hunger_[index];
+  const auto demand = tasks_[index]->demand(now);
+  if (!demand || demand != hunger.demand) {
+    hunger = {.demand = demand, .looked_at = now};
+    return;
+  }
+  const Duration step = limit() / kLooks;
+  const Duration gone = std::min(now - std::exchange(hunger.looked_at, now), step + kStandstill);
+  if (!std::exchange(hunger.measured, true)) {  // most are gone at the second look
+    hunger.used = used_by(tasks_[index]->trap());
+    hunger.by_process = times_.of_process();
+    hunger.by_tasks = used_by_tasks();
+    return;
+  }
+  hunger.lasted += gone;
+  if (hunger.lasted < limit() || search_.begun()) return;
+  constexpr int kNothing = 100;  // less than one part of so many
+  const bool got_none = used_by(tasks_[index]->trap()) - hunger.used <= hunger.lasted / kNothing;
+  // A cycle may wait for something else. What is due may, too, but then because who releases it gets nothing.
+  const bool sleeps = times_.sleeps(tasks_[index]->trap().thread());
+  if (!got_none || (sleeps && hunger.demand->cycle_since)) {
+    hunger = {.demand = demand, .looked_at = now};
+  } else if (is_by_this_process(index)) {
+    searched_for_ = index;
+    search_.begin(now);
+  } else if (!sleeps) {
+    by_others_.store(index + 1, std::memory_order_relaxed);
+    hunger = {.demand = demand, .looked_at = now};
+  }
+}
+
+// What the threads take that run tasks is for the other watchdogs to judge.
+bool Starvation::is_by_this_process(std::size_t index) noexcept {
+  const Hunger& hunger = hunger_[index];
+  const Duration by_process = times_.of_process() - hunger.by_process;
+  const Duration by_tasks = used_by_tasks() - hunger.by_tasks;
+  return by_process - by_tasks >= hunger.lasted / 2;
+}
+
+// The task has its fault as soon as its cause is gone. Then the others are looked for that were below it.
+void Starvation::end_search(TimePoint now) noexcept {
+  (void)used_by_tasks();  // which threads they are
+  const ThreadText who = search_.end(now, own_threads_);
+  const auto index = std::exchange(searched_for_, std::nullopt);
+  if (!who.view().empty()) {
+    if (index) raise(*tasks_[*index], hunger_[*index].lasted, who);
+    search_.begin(now);
+  }
+  if (index) hunger_[*index] = {};
+}
+
+// Of a thread above this one.
+void Starvation::take_reported(TimePoint now) noexcept {
+  const auto taker = ProcessorGuard::take();
+  if (!taker) return;
+  if (Task* const task = hungriest(now)) raise(*task, taker->lasted, taker->who);
+  searched_for_.reset();
+  search_.begin(now);
+}
+
+void Starvation::raise(Task& task, Duration lasted, const ThreadText& who) noexcept {
+  TaskFault& fault = task.fault();
+  if (!fault.claim(true)) return;
+  fault.record().kind = FaultKind::no_processor;
+  fault.record().figure = lasted.count();
+  fault.record().limit = limit().count();
+  fault.record().text.assign(who.view());
+  fault.publish();
+}
+
+Task* Starvation::hungriest(TimePoint now) const noexcept {
+  const auto waits = [&](const auto& task) { return must_run(*task) && task->demand(now).has_value(); };
+  auto found = std::ranges::find_if(tasks_, waits);
+  if (found == tasks_.end()) found = tasks_.begin();
+  return found == tasks_.end() ? nullptr : found->get();
+}
+
+Duration Starvation::used_by(const FaultTrap& trap) const noexcept {
+  return trap.thread() == 0 ? Duration::zero() : times_.of_thread(trap.thread());
+}
+
+Duration Starvation::used_by_tasks() noexcept {
+  Duration used = used_by(event_variables_);
+  own_threads_.back() = event_variables_.thread();
+  for (std::size_t i = 0; i < tasks_.size(); ++i) {
+    used += used_by(tasks_[i]->trap());
+    own_threads_[i] = tasks_[i]->trap().thread();
+  }
+  return used;
+}
+
+std::optional<std::size_t> Starvation::take_starved_by_others() noexcept {
+  const std::size_t found = by_others_.exchange(0, std::memory_order_relaxed);
+  if (found == 0) return std::nullopt;
+  return found - 1;
+}
+
+}  // namespace plchost

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "schedulers/faults/fault_trap.hpp"
+#include "schedulers/faults/processor_guard.hpp"
+#include "schedulers/faults/processor_times.hpp"
+#include "schedulers/faults/taker_search.hpp"
+#include "schedulers/task/task.hpp"
+
+namespace plchost {
+
+/// Real-time tasks that are ready to run and get no processor, because a thread that the application has made
+/// takes it: no other watchdog knows such a thread. It loses its real-time priority, so that everything else
+/// runs again, and the task has a fault. If nothing of this process takes the processor, that is only told.
+class Starvation {
+ public:
+  /// A task is ready to run for so long in vain: half of the time of the guard against endless loops, which
+  /// sees a thread that runs tasks, but no less than this.
+  static constexpr Duration kLeast = std::chrono::milliseconds(200);
+  /// It looks so often within its limit.
+  static constexpr int kLooks = 8;
+  /// So much later than it wanted to look, everything on this core stood still.
+  static constexpr Duration kStandstill = std::chrono::milliseconds(5);
+
+  /// All outlive it. Set-up.
+  Starvation(const std::vector<std::unique_ptr<Task>>& tasks, const FaultTrap& event_variables,
+             const ProcessorTimes& times);
+
+  /// `guard`: the time of the guard against endless loops; 0: nothing is looked for. Control thread.
+  void begin(Duration guard) noexcept;
+  /// 0: nothing is looked for. Any thread.
+  [[nodiscard]] Duration limit() const noexcept { return Duration(limit_.load(std::memory_order_relaxed)); }
+  /// `running`: the tasks are released. When to look again. The supervision's thread, or a test's.
+  [[nodiscard]] TimePoint look(TimePoint now, bool running) noexcept;
+  /// Is to look again also when the tasks have stopped. The supervision's thread.
+  [[nodiscard]] bool searching() const noexcept { return search_.begun(); }
+  /// The number of a task that got no processor, though this process did not take it: once. Any thread.
+  [[nodiscard]] std::optional<std::size_t> take_starved_by_others() noexcept;
+
+ private:
+  /// What a task has been ready to run for and has got no processor for yet.
+  struct Hunger {
+    std::optional<Task::Demand> demand;
+    TimePoint looked_at;    // last
+    bool measured = false;  // what follows
+    Duration lasted{};      // without what stood still
+    Duration used{};        // when that began, by the task's thread,
+    Duration by_process{};
+    Duration by_tasks{};  // and by all that run tasks
+  };
+
+  void look_at(std::size_t index, TimePoint now) noexcept;
+  [[nodiscard]] bool is_by_this_process(std::size_t index) noexcept;
+  void end_search(TimePoint now) noexcept;
+  void take_reported(TimePoint now) noexcept;
+  void raise(Task& task, Duration lasted, const ThreadText& who) noexcept;
+  [[nodiscard]] Task* hungriest(TimePoint now) const noexcept;
+  [[nodiscard]] Duration used_by_tasks() noexcept;
+  [[nodiscard]] Duration used_by(const FaultTrap& trap) const noexcept;
+
+  const std::vector<std::unique_ptr<Task>>& tasks_;
+  const FaultTrap& event_variables_;
+  const ProcessorTimes& times_;
+  std::atomic<Duration::rep> limit_{0};
+  std::atomic<std::size_t> by_others_{0};  // number of the task + 1
+
+  // The supervision's thread's own.
+  std::vector<Hunger> hunger_;
+  std::vector<pid_t> own_threads_;  // that run tasks
+  TimePoint next_;
+  TakerSearch search_;
+  std::optional<std::size_t> searched_for_;  // a task that waits for what the search finds
+};
+
+}  // namespace plchost
