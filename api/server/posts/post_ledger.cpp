@@ -14,15 +14,6 @@ namespace plchost {
 
 namespace {
 
-/// The post that is being made. One for all sources, since posts are made one after the other.
-struct PostIntent {
-  std::atomic<std::uint32_t> pending{0};  // 1: the rest counts; written last
-  std::atomic<std::uint32_t> entry{0};
-  std::atomic<std::uint32_t> next{0};   // of the entry's states: counts once the post is made
-  std::atomic<std::uint32_t> place{0};  // of the event in the pool
-  std::atomic<std::uint32_t> mark{0};   // of the event once the post is made
-};
-
 struct LedgerLayout {
   std::uint64_t magic;  // written last
   std::uint32_t version;
@@ -35,14 +26,9 @@ struct LedgerLayout {
 };
 
 constexpr std::uint64_t kMagic = 0x31'74'73'6f'70'63'6c'70;  // "plcpost1"
-constexpr std::uint32_t kVersion = 3;
+constexpr std::uint32_t kVersion = 4;
 /// A process that was killed takes up to this to end.
 constexpr Duration kLockPatience = std::chrono::seconds(5);
-
-/// What was stored before this is in memory before what is stored after it, at a kill, too.
-void keep_order() noexcept {
-  std::atomic_thread_fence(std::memory_order_release);
-}
 
 LedgerLayout& layout_of(const MemoryFile& memory) {
   return *reinterpret_cast<LedgerLayout*>(memory.bytes().data());  // made with this layout
@@ -103,58 +89,31 @@ PostLedger::~PostLedger() {
   if (memory_) layout_of(memory_).mutex.unlock();
 }
 
-// What steps 3 and 4 of a post have to do, if the process before this one was killed over it.
+// An intent of another pool is about an event that is gone.
 void PostLedger::finish_intent() noexcept {
   LedgerLayout& layout = layout_of(memory_);
-  const PostIntent& intent = layout.intent;
   struct stat file = {};
   const bool known = ::stat(MemoryFile::path(pool_->name()).c_str(), &file) == 0;
-  const bool same_pool = known && layout.pool_file == file.st_ino;
-  const bool pending = intent.pending.load(std::memory_order_acquire) != 0;
-  const std::uint32_t entry = intent.entry.load(std::memory_order_relaxed);
-  CountedEvent* const event = pool_->event_at(intent.place.load(std::memory_order_relaxed));
-  if (pending && same_pool && entry < kLedgerEntries && event != nullptr &&
-      event->snapshot().marked() == (intent.mark.load(std::memory_order_relaxed) != 0)) {
-    layout.entries[entry].current.store(intent.next.load(std::memory_order_relaxed),
-                                        std::memory_order_release);
-    event->nudge();
+  if (known && layout.pool_file == file.st_ino) {
+    layout.intent.finish(
+        [&](std::uint32_t entry) { return entry < kLedgerEntries ? &layout.entries[entry].kept : nullptr; },
+        [&](std::uint32_t event) { return pool_->event_at(event); });
+  } else {
+    layout.intent.drop();
   }
-  drop_intent();
   layout.pool_file = file.st_ino;
 }
 
 void PostLedger::set(LedgerEntry& entry, const SourceState& state) noexcept {
-  const std::uint32_t next = 1U - (entry.current.load(std::memory_order_relaxed) & 1U);
-  keep_order();
-  entry.states[next] = state;
-  entry.current.store(next, std::memory_order_release);
+  entry.kept.set(state);
 }
 
-void PostLedger::begin_post(const LedgerEntry& entry, const PoolEvent& event) noexcept {
-  keep_order();
-  PostIntent& intent = layout_of(memory_).intent;
-  intent.entry.store(static_cast<std::uint32_t>(&entry - entries()), std::memory_order_relaxed);
-  intent.next.store(1U - (entry.current.load(std::memory_order_relaxed) & 1U), std::memory_order_relaxed);
-  intent.place.store(pool_->place_of(event), std::memory_order_relaxed);
+PostIntent& PostLedger::intent() const noexcept {
+  return layout_of(memory_).intent;
 }
 
-void PostLedger::write_intent(LedgerEntry& entry, const SourceState& after,
-                              CountedEvent::Snapshot seen) noexcept {
-  PostIntent& intent = layout_of(memory_).intent;
-  entry.states[intent.next.load(std::memory_order_relaxed) & 1U] = after;
-  intent.mark.store(seen.marked() ? 0 : 1, std::memory_order_relaxed);
-  intent.pending.store(1, std::memory_order_release);
-}
-
-void PostLedger::end_post(LedgerEntry& entry, CountedEvent& event, CountedEvent::Snapshot made) noexcept {
-  entry.current.store(layout_of(memory_).intent.next.load(std::memory_order_relaxed),
-                      std::memory_order_release);
-  event.wake(made);
-  drop_intent();
-}
-
-void PostLedger::drop_intent() noexcept {
-  layout_of(memory_).intent.pending.store(0, std::memory_order_release);
+PostIntent::Place PostLedger::place_of(const LedgerEntry& entry, const PoolEvent& event) const noexcept {
+  return {.entry = static_cast<std::uint32_t>(&entry - entries()), .event = pool_->place_of(event)};
 }
 
 LedgerEntry* PostLedger::entries() const noexcept {

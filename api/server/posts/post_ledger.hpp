@@ -7,9 +7,10 @@
 #include <string>
 #include <string_view>
 #include <unordered_map>
-#include <utility>
 
 #include "api/dds/guid.hpp"
+#include "api/server/posts/post_intent.hpp"
+#include "api/server/posts/source_state.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/result.hpp"
 #include "shm/pool/memory_file.hpp"
@@ -17,45 +18,15 @@
 
 namespace plchost {
 
-/// What became of posts. received = accepted + rejected + duplicate + early + malformed.
-struct PostCounters {
-  std::uint64_t received = 0;
-  std::uint64_t accepted = 0;
-  std::uint64_t no_task = 0;  ///< of those accepted
-  std::uint64_t rejected = 0;
-  std::uint64_t duplicate = 0;
-  std::uint64_t early = 0;      ///< not taken, because one before it was missing
-  std::uint64_t lost = 0;       ///< never came, and its source went on without it
-  std::uint64_t malformed = 0;  ///< with numbers or a source that cannot be: counted nowhere else
-
-  void add(const PostCounters& other) noexcept;
-};
-
-/// How far one source has come.
-struct SourceState {
-  std::uint64_t last = 0;          ///< all posts up to this number are done
-  std::uint64_t batch = 0;         ///< number of the batch whose events are being posted
-  std::uint32_t batch_done = 0;    ///< so many of them are posted: the next server goes on there
-  std::int32_t rejected_code = 0;  ///< of the post `rejected_sequence`
-  std::uint64_t rejected_sequence = 0;
-  std::uint64_t batch_no_task = 0;  ///< 1: one of them was taken by no task
-  std::uint64_t last_count = 0;  ///< the event's count with the post `last`; 0: it was rejected, or a batch
-  std::uint64_t last_taken = 0;  ///< 1: tasks took posts then
-  PostCounters counters = {};
-};
-
 /// What is kept of one source of posts. In shared memory; all zero is a free entry.
 struct LedgerEntry {
   std::array<std::uint8_t, 16> source{};
-  std::atomic<std::uint32_t> in_use{0};   ///< written last
-  std::atomic<std::uint32_t> current{0};  ///< of the two states: the other one is being written
+  std::atomic<std::uint32_t> in_use{0};  ///< written last
   std::int64_t used_ns = 0;  ///< CLOCK_MONOTONIC of the last post: the oldest entry is given away first
-  std::array<SourceState, 2> states{};
+  KeptState kept;
   FixedText<255> rejected_text;
 
-  [[nodiscard]] const SourceState& state() const noexcept {
-    return states[current.load(std::memory_order_acquire) & 1U];
-  }
+  [[nodiscard]] const SourceState& state() const noexcept { return kept.state(); }
 };
 
 /// The greatest number of a post. Beyond it the numbers would come to an end, where no post is the next one.
@@ -75,18 +46,9 @@ enum class PostOrder : std::uint8_t {
 inline constexpr std::uint32_t kLedgerEntries = 1024;
 
 /// How far each source of posts has come, in a shared memory of its own ("POOL.posts"), so that the
-/// plchost-dds after a killed one neither loses nor repeats a post, whichever instruction the kill hits:
-///
-///   1. The new state of the source is written beside the one that counts, then the intent: which source,
-///      which event, and the mark that the event will have.
-///   2. One compare-exchange counts the post and changes the event's mark.
-///   3. One store makes the new state count.
-///   4. Waiting tasks are woken, and the intent is cleared.
-///
-/// If an intent is left, the next server compares the marks. If the post was made, it does 3 and 4; both do
-/// no harm when they were done before. If not, nothing has happened, and the client repeats the post. Other
-/// posters change the count at any time, but never the mark. One process at a time: it holds the ledger's
-/// mutex. Used by one thread at a time; opened and destroyed by the same one.
+/// plchost-dds after a killed one neither loses nor repeats a post, whichever instruction the kill hits
+/// (PostIntent says how). One process at a time: it holds the ledger's mutex. Used by one thread at a time;
+/// opened and destroyed by the same one.
 class PostLedger {
  public:
   /// Opens the ledger of a pool, or makes it anew if there is none or it is of another version. Does what a
@@ -117,18 +79,11 @@ class PostLedger {
   template <class After>
   [[nodiscard]] std::optional<CountedEvent::Snapshot> post(LedgerEntry& entry, const PoolEvent& event,
                                                            Allowed allowed, After after) {
-    begin_post(entry, event);
-    for (;;) {
+    const auto find = [&]() -> CountedEvent* {
       const bool may = allowed == Allowed::registered ? event.registered() : event.valid();
-      if (!may) break;
-      CountedEvent::Snapshot seen = event.counted().snapshot();
-      write_intent(entry, after(std::as_const(seen)), seen);
-      if (!event.counted().post_marked(seen)) continue;
-      end_post(entry, event.counted(), seen);
-      return seen;
-    }
-    drop_intent();
-    return std::nullopt;
+      return may ? &event.counted() : nullptr;
+    };
+    return intent().post(place_of(entry, event), entry.kept, find, after);
   }
 
   /// Each source that is known: `use(entry)`.
@@ -146,10 +101,8 @@ class PostLedger {
   explicit PostLedger(MemoryFile memory, const ObjectPool& pool);
   [[nodiscard]] LedgerEntry* entries() const noexcept;
   void finish_intent() noexcept;
-  void begin_post(const LedgerEntry& entry, const PoolEvent& event) noexcept;
-  void write_intent(LedgerEntry& entry, const SourceState& after, CountedEvent::Snapshot seen) noexcept;
-  void end_post(LedgerEntry& entry, CountedEvent& event, CountedEvent::Snapshot made) noexcept;
-  void drop_intent() noexcept;
+  [[nodiscard]] PostIntent& intent() const noexcept;
+  [[nodiscard]] PostIntent::Place place_of(const LedgerEntry& entry, const PoolEvent& event) const noexcept;
 
   MemoryFile memory_;
   const ObjectPool* pool_;

@@ -1,0 +1,2 @@
+# shm/block_driver/link_gate.hpp: old links go whoever is inside
+s/ && users_\.load\(std::memory_order_seq_cst\) == 0//

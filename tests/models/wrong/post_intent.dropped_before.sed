@@ -1,0 +1,2 @@
+# api/server/posts/post_intent.cpp: the intent is cleared before the new state counts
+s/if \(event\.snapshot\(\)\.marked\(\) != /const bool marked = event.snapshot().marked();\n  drop();\n  if (marked != /

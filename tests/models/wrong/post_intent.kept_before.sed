@@ -1,0 +1,2 @@
+# api/server/posts/post_intent.cpp: the source is told of its post before the post is made
+s/pending_\.store\(1, std::memory_order_release\);/pending_.store(1, std::memory_order_release);\n  kept.choose(next_.load(std::memory_order_relaxed));/

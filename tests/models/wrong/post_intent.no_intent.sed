@@ -1,0 +1,2 @@
+# api/server/posts/post_intent.cpp: the next server does not know of a post that was begun
+s/pending_\.store\(1, std::memory_order_release\);//

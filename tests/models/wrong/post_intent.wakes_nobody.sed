@@ -1,0 +1,2 @@
+# api/server/posts/post_intent.cpp: the next server does not wake the tasks of a post whose server was killed before its wake
+s/event\.nudge\(\);//
