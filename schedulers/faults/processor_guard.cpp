@@ -19,6 +19,7 @@ enum class Mailbox : std::uint8_t { empty, claimed, full };
 constinit std::atomic<bool> guarded{false};  // the handler is installed
 constinit std::atomic<Duration::rep> guard_limit{0};
 constinit std::atomic<Duration::rep> last_sign{0};
+constinit std::atomic<pid_t> signer{0};  // who gave it
 constinit std::atomic<Mailbox> mailbox{Mailbox::empty};
 constinit ProcessorGuard::Taker reported;  // belongs to who has made the mailbox `claimed` or found it `full`
 
@@ -40,7 +41,10 @@ void on_long_run(int) noexcept {
   const Duration silent =
       MonotonicClock::now() - TimePoint(Duration(last_sign.load(std::memory_order_relaxed)));
   constexpr int kSigns = 4;  // at least so many belong into the limit
-  if (limit > Duration::zero() && silent > limit / kSigns) {
+  // A thread that sleeps is kept from its sign by something else.
+  const bool starved = limit > Duration::zero() && silent > limit / kSigns &&
+                       !linux_processor_times().sleeps(signer.load(std::memory_order_relaxed));
+  if (starved) {
     const ThreadText who = linux_processor_times().demote(::gettid());
     if (!who.view().empty()) ProcessorGuard::report(who, silent);
   }
@@ -69,6 +73,7 @@ void ProcessorGuard::watch(Duration limit) noexcept {
 
 void ProcessorGuard::alive() noexcept {
   if (!guarded.load(std::memory_order_acquire)) return;
+  signer.store(::gettid(), std::memory_order_relaxed);
   last_sign.store(MonotonicClock::now().time_since_epoch().count(), std::memory_order_relaxed);
   set_limit(Duration(guard_limit.load(std::memory_order_relaxed)));
 }

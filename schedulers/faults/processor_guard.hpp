@@ -30,8 +30,8 @@ class ProcessorGuard {
   /// `limit`: for how long a thread may run without a pause while nothing of the runtime does; 0: for ever.
   /// That is the beginning of it. Any thread.
   static void watch(Duration limit) noexcept;
-  /// The runtime gets the processor. Called several times within the limit. Any thread, real-time, two system
-  /// calls.
+  /// The calling thread gets the processor: the one of the runtime that must. Called several times within the
+  /// limit. Real-time, three system calls.
   static void alive() noexcept;
   /// A thread was found and has no real-time priority any more. Any context.
   static void report(const ThreadText& who, Duration lasted) noexcept;

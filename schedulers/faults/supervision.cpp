@@ -99,8 +99,10 @@ void Supervision::change(Mode mode) noexcept {
 void Supervision::run() noexcept {
   while (!ending_.load(std::memory_order_acquire)) {
     const std::uint32_t order = order_.load(std::memory_order_acquire);
-    const bool off = mode_.load(std::memory_order_acquire) == Mode::off && !starvation_.searching();
-    if (!off) ProcessorGuard::alive();
+    const Mode mode = mode_.load(std::memory_order_acquire);
+    const bool off = mode == Mode::off && !starvation_.searching();
+    // When no task is released, the control thread is the one that must get the processor.
+    if (mode == Mode::running) ProcessorGuard::alive();
     const TimePoint next = off ? kNoDeadline : look(clock_.now());
     next_look_.store(next == kNoDeadline ? 0 : next.time_since_epoch().count(), std::memory_order_relaxed);
     clock_.wait(order_, order, next);

@@ -228,6 +228,21 @@ INSTANTIATE_TEST_SUITE_P(Each, AThreadThatTakesTheProcessor,
                          ::testing::Values("hog", "high_hog", "highest_hog", "deaf_hog", "two_hogs"),
                          [](const auto& test) { return std::string(test.param); });
 
+TEST(TaskException, IsNoneOfAThreadThatTakesTheProcessorWhileNoTaskRuns) {
+  if (!Thread::start("probe", {.fifo = 1}, [] {})) GTEST_SKIP() << "no right to SCHED_FIFO";
+  Faulty sut("[CmpSchedule]\nWatchdog.DefaultTimeMs=600\n");
+  sut.process().event("late_hog").post();
+  EXPECT_TRUE(eventually([&] { return sut.process().task("LateHog")->counters.cycles == 1; }));
+  EXPECT_EQ(sut.process().ask(ControlVerb::stop).code, ErrorCode::ok);
+  EXPECT_TRUE(eventually([&] {
+    return sut.process().log().find("from all threads of the runtime") != std::string::npos;
+  })) << sut.process().log();
+  EXPECT_THAT(sut.process().log(), HasSubstr("thread 'hog' (SCHED_FIFO 60) took the processor for "));
+  EXPECT_EQ(sut.process().ask(ControlVerb::start).code, ErrorCode::ok) << "it takes nothing any more";
+  EXPECT_TRUE(sut.runs("Low"));
+  EXPECT_EQ(sut.process().end(SIGTERM), EXIT_SUCCESS) << sut.process().log();
+}
+
 TEST(TaskException, OfAWildPointerDoesNotTakeItForANullPointer) {
   Faulty sut;
   (void)sut.process().event("write_wild").post();

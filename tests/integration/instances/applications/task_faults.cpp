@@ -65,6 +65,7 @@ __attribute__((noinline)) void sleep_for_ever() {
 }
 
 // A thread of the application's own that never ends; priority 0: as it comes.
+std::atomic<bool> hog_waits{false};
 void loop_in_a_thread(int priority, const char* name = "hog", bool blocks_signals = false) {
   pthread_attr_t attributes;
   pthread_attr_init(&attributes);
@@ -83,6 +84,7 @@ void loop_in_a_thread(int priority, const char* name = "hog", bool blocks_signal
   pthread_t thread{};
   const auto body = [](void* own_name) -> void* {
     pthread_setname_np(pthread_self(), static_cast<const char*>(own_name));
+    if (hog_waits) std::this_thread::sleep_for(500ms);
     loop();
     return nullptr;
   };
@@ -140,6 +142,10 @@ void setup(plc::Application& app) {
   app.external("Hog", 4, "hog", [] { loop_in_a_thread(68); });
   app.external("HighHog", 4, "high_hog", [] { loop_in_a_thread(80); });
   app.external("HighestHog", 4, "highest_hog", [] { loop_in_a_thread(99); });
+  app.external("LateHog", 4, "late_hog", [] {
+    hog_waits = true;
+    loop_in_a_thread(60);
+  });
   app.external("DeafHog", 4, "deaf_hog", [] { loop_in_a_thread(60, "hog", true); });
   app.external("TwoHogs", 4, "two_hogs", [] {
     loop_in_a_thread(40, "below", true);
