@@ -209,7 +209,7 @@ void ManagedInstance::on_exit(const ExitStatus& status) {
   const bool exit_of_set_up = status.known && status.kind == ExitStatus::Kind::exited &&
                               (status.value == kExitSetupFailed || status.value == kExitUsage);
   if (phase_ == Phase::ending) {
-    const Next next = std::exchange(next_, Next::nothing);
+    const Next next = in_time(std::exchange(next_, Next::nothing));
     if (next == Next::nothing) return go_down(InstanceState::offline, "");
     spawn(next);  // of the kind that was asked for
   } else if (set_up && (exit_of_set_up || !setup_failure_.empty())) {
@@ -222,6 +222,15 @@ void ManagedInstance::on_exit(const ExitStatus& status) {
     if (set_up && take_back_application(status.describe())) return;
     ended_by_itself(status);
   }
+}
+
+// The end of the process can outlast the client, who was told then that the restart has failed.
+ManagedInstance::Next ManagedInstance::in_time(Next next) {
+  if (next != Next::run || wants_running_ || !operation_) return next;
+  const auto in_time = check_in_time(operation_->request.limit_ns);
+  if (in_time) return next;
+  finish(in_time.error().code, fmt::format("{}; its process begins stopped", in_time.error().message));
+  return Next::stay_stopped;
 }
 
 // Nobody asked for this end, so code 0 is no success: it may be exit() in the middle of a cycle.
@@ -240,12 +249,13 @@ void ManagedInstance::back_off_or_give_up(bool again, InstanceState otherwise, c
   const bool stops = operation_ && operation_->request.verb == ControlVerb::stop;
   // A stop that came while it was starting has its wish already.
   const bool cancelled = stops && operation_->step == Step::until_up;
+  std::string later;
   if (again && !cancelled) {
     const Duration delay = history_.delay();
     host_.set_timer(after(delay));
-    set_state(Phase::backing_off, InstanceState::waiting,
-              fmt::format("{}; starts again{} {} ms later", why, safe_mode_ ? " in safe mode" : "",
-                          std::chrono::ceil<std::chrono::milliseconds>(delay).count()));
+    later = fmt::format("; starts again{} {} ms later", safe_mode_ ? " in safe mode" : "",
+                        std::chrono::ceil<std::chrono::milliseconds>(delay).count());
+    set_state(Phase::backing_off, InstanceState::waiting, why + later);
   } else {
     go_down(cancelled ? InstanceState::offline : otherwise, why);
   }
@@ -253,7 +263,7 @@ void ManagedInstance::back_off_or_give_up(bool again, InstanceState otherwise, c
   if (cancelled) {
     finish(ErrorCode::ok, fmt::format("its process ended meanwhile: {}; it is not started again", why));
   } else {
-    finish(ErrorCode::unavailable, fmt::format("the process of '{}' ended: {}", config_.name, why));
+    finish(ErrorCode::unavailable, fmt::format("the process of '{}' ended: {}{}", config_.name, why, later));
   }
 }
 

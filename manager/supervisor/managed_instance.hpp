@@ -247,6 +247,8 @@ class ManagedInstance : public InstanceEvents {
   void fresh_process(Next next, StartKind kind);
   void spawn(Next next);
   void end_process(Next next);
+  /// stay_stopped: its machine stood, and is not to start after the client's time limit.
+  Next in_time(Next next);
   void set_up_failed(const std::string& why);
   void come_up();
   void finish_adoption(const std::string& problem);

@@ -147,6 +147,24 @@ TEST_F(ManagedInstanceTest, ResetMakesAFreshStoppedProcess) {
   EXPECT_EQ(sut().status().restarts, 0U);
 }
 
+TEST_F(ManagedInstanceTest, RestartOfAStoppedOneThatOutlastsItsClientStartsNothing) {
+  bring_up_stopped();
+  ask_until(1, ControlVerb::restart);  // that is long ago when the process has ended
+  sut().on_exit(killed_by(SIGKILL));
+  EXPECT_EQ(take_reply().code, ErrorCode::timed_out);
+  EXPECT_TRUE(host_.spawned.back().stopped);
+  report_ready();
+  EXPECT_EQ(state(), InstanceState::stopped);
+}
+
+TEST_F(ManagedInstanceTest, RestartOfARunningOneThatOutlastsItsClientRunsAgain) {
+  bring_up();
+  ask_until(1, ControlVerb::restart);
+  sut().on_exit(killed_by(SIGKILL));
+  report_ready();
+  EXPECT_EQ(state(), InstanceState::running);
+}
+
 TEST_F(ManagedInstanceTest, RestartEndsAStubbornProcessByForce) {
   bring_up();
   ask(ControlVerb::restart);

@@ -74,6 +74,15 @@ class ManagedInstanceTest : public testing::Test {
     sut().handle({.number = 7, .verb = verb, .instance = "line1", .argument = argument, .options = options},
                  [this](const ControlReply& reply) { replies_.push_back(reply); });
   }
+  /// `limit_ns`: the client's time limit, as ControlRequest has it.
+  void ask_until(std::int64_t limit_ns, ControlVerb verb) {
+    ControlRequest request;
+    request.number = 7;
+    request.verb = verb;
+    request.instance = "line1";
+    request.limit_ns = limit_ns;
+    sut().handle(request, [this](const ControlReply& reply) { replies_.push_back(reply); });
+  }
   /// The one reply that came; there must be one.
   ControlReply take_reply() {
     EXPECT_EQ(replies_.size(), 1U);
