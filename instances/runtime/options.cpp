@@ -56,6 +56,11 @@ std::string check_log_level(const std::string& name) {
   return known ? std::string() : fmt::format("'{}' is no log level: {} are", name, join_names(kLogLevels));
 }
 
+// An empty one, of a variable of the shell that is not set, would start an instance.
+std::string check_path(const std::string& path) {
+  return path.empty() ? "the name of the file is empty" : "";
+}
+
 std::vector<std::string> option_names(const CLI::App& app) {
   std::vector<std::string> names;
   for (const CLI::Option* option : app.get_options()) {
@@ -106,8 +111,10 @@ void describe(CLI::App& app, Options& options) {
   app.add_option("--parent", options.parent, "Process that asked for the check: its end ends the check")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--check-application", options.check_application,
-                 "Only check this file, with --settings under these, and say what is in it");
-  app.add_option("--check-settings", options.check_settings, "Only check this settings file");
+                 "Only check this file, with --settings under these, and say what is in it")
+      ->check(check_path);
+  app.add_option("--check-settings", options.check_settings, "Only check this settings file")
+      ->check(check_path);
   app.add_flag(
       std::string(kSaveRetainOption), options.save_retain,
       "Only write the retain variables that an ended instance of this name has left in memory to their "

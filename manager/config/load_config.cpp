@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <filesystem>
 #include <fstream>
 #include <optional>
@@ -415,6 +416,10 @@ std::expected<ManagerConfig, ConfigErrors> load_config(const std::string& file,
   std::ifstream stream(file, std::ios::binary);
   std::string text(kMaxConfigBytes + 1, '\0');
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (stream.bad()) {  // half a file is another configuration
+    const auto why = failure(ErrorCode::system, "cannot be read", errno);
+    return std::unexpected(ConfigErrors{fmt::format("{}: {}", file, why.error().describe())});
+  }
   text.resize(static_cast<std::size_t>(stream.gcount()));
   if (text.size() > kMaxConfigBytes) {
     return std::unexpected(

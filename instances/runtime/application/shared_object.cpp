@@ -13,6 +13,7 @@
 
 #include "instances/runtime/application/elf_check.hpp"
 #include "instances/runtime/application/symbol_name.hpp"
+#include "shm/base/names.hpp"
 
 namespace plchost {
 
@@ -25,7 +26,7 @@ std::string absolute_of(const std::string& path) {
 
 std::unexpected<Error> not_loaded(const std::string& path) {
   return failure(ErrorCode::invalid_argument,
-                 fmt::format("{} cannot be loaded: {}", path, with_readable_symbols(::dlerror())));
+                 fmt::format("{} cannot be loaded: {}", path, printable(with_readable_symbols(::dlerror()))));
 }
 
 // A file without a name that nobody can change any more.

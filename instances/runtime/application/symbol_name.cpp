@@ -18,6 +18,7 @@
 #include <fmt/format.h>
 
 #include "instances/runtime/application/elf_bytes.hpp"
+#include "shm/base/names.hpp"
 
 namespace plchost {
 
@@ -97,13 +98,13 @@ std::string symbol_name(std::uintptr_t address) {
   const auto in_file = address - reinterpret_cast<std::uintptr_t>(info.dli_fbase);
   const std::vector<char> bytes = contents_of(info.dli_fname);
   if (const auto function = function_at(std::as_bytes(std::span(bytes)), in_file)) {
-    return fmt::format("{}+{:#x} in {}", function->name, function->offset, file);
+    return printable(fmt::format("{}+{:#x} in {}", function->name, function->offset, file));
   }
   if (info.dli_sname != nullptr) {
     const auto offset = address - reinterpret_cast<std::uintptr_t>(info.dli_saddr);
-    return fmt::format("{}+{:#x} in {}", demangled(info.dli_sname), offset, file);
+    return printable(fmt::format("{}+{:#x} in {}", demangled(info.dli_sname), offset, file));
   }
-  return fmt::format("{}+{:#x}", file, in_file);
+  return printable(fmt::format("{}+{:#x}", file, in_file));
 }
 
 std::string with_readable_symbols(std::string_view text) {

@@ -30,6 +30,7 @@ Result<std::string> read_text(const std::string& file) {
   std::string text(kMaxSettingsFile + 1, '\0');
   if (!stream) return failure(ErrorCode::refused, fmt::format("open settings file {}", file), errno);
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
+  if (stream.bad()) return failure(ErrorCode::system, fmt::format("read settings file {}", file), errno);
   text.resize(static_cast<std::size_t>(stream.gcount()));
   if (text.size() > kMaxSettingsFile) {
     return failure(ErrorCode::invalid_argument,

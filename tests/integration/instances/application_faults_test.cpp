@@ -163,6 +163,30 @@ TEST(ApplicationCheck, RefusesATextFileAndAFolder) {
   EXPECT_THAT(folder.log(), HasSubstr("is not a file"));
 }
 
+TEST(ApplicationCheck, RefusesAnEmptyNameInsteadOfStartingAnInstance) {
+  const Sandbox sandbox;
+  for (const std::string option : {"--check-application", "--check-settings"}) {
+    InstanceProcess sut(sandbox, {option, ""});
+    EXPECT_EQ(sut.end(), 2);
+    EXPECT_THAT(sut.log(), HasSubstr("the name of the file is empty"));
+  }
+}
+
+TEST(ApplicationCheck, TellsNoControlCharactersOfAFile) {
+  const Sandbox sandbox;
+  std::ostringstream whole;
+  whole << std::ifstream(application("fault_undefined_symbol"), std::ios::binary).rdbuf();
+  std::string changed = whole.str();
+  const std::string symbol = "function_of_another_runtime";
+  for (std::size_t at = changed.find(symbol); at != std::string::npos; at = changed.find(symbol, at + 1)) {
+    changed[at + 2] = '\x1b';
+    changed[at + 3] = '\xff';
+  }
+  InstanceProcess sut(sandbox, {"--check-application", sandbox.write("mine.so", changed)});
+  EXPECT_EQ(sut.end(), 3);
+  EXPECT_THAT(sut.log(), HasSubstr("fu??tion_of_another_runtime"));
+}
+
 TEST(ApplicationCheck, RefusesACopyThatWasCutShort) {
   const Sandbox sandbox;
   std::ostringstream whole;

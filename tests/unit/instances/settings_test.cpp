@@ -367,6 +367,7 @@ TEST(Settings, ReadmeHasTheWholeTable) {
 TEST(Settings, NamesAFileThatIsNotThereOrNoFile) {
   EXPECT_EQ(read_settings("/nonexistent.cfg").error().code, ErrorCode::not_found);
   EXPECT_EQ(read_settings("/").error().code, ErrorCode::invalid_argument);
+  EXPECT_EQ(read_settings("/proc/self/mem").error().code, ErrorCode::system);  // its first page is not mapped
 }
 
 }  // namespace

@@ -385,5 +385,11 @@ TEST(Config, RefusesAFileThatIsMissingOrTooLarge) {
   std::filesystem::remove(path);
 }
 
+TEST(Config, RefusesAFileThatTheDiskDoesNotGive) {
+  const auto sut = load_config("/proc/self/mem", four_cores());  // its first page is never mapped
+  ASSERT_FALSE(sut.has_value());
+  EXPECT_THAT(sut.error(), ElementsAre(HasSubstr("/proc/self/mem: cannot be read: Input/output error")));
+}
+
 }  // namespace
 }  // namespace plchost
