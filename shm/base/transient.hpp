@@ -6,8 +6,8 @@
 
 namespace plchost {
 
-/// What failed may succeed later with nothing changed: the host was short of processes, descriptors or
-/// memory, or somebody held a lock for too long.
+/// What failed may succeed later with nothing changed: the host was short of processes, descriptors, memory
+/// or room in a file system (shared memory lies in one), or somebody held a lock for too long.
 [[nodiscard]] inline bool is_transient(const Error& error) noexcept {
   switch (error.system_errno) {
     case EAGAIN:
@@ -15,6 +15,8 @@ namespace plchost {
     case ENFILE:
     case ENOMEM:
     case ENOBUFS:
+    case ENOSPC:
+    case EDQUOT:
     case EINTR:
       return true;
     default:
