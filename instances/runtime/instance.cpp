@@ -292,6 +292,7 @@ void Instance::report_tick() {
 
 void Instance::beat() {
   host_->write_messages();
+  if (control_) control_->beat();
   report_tick();
   if (life_.state() == ApplicationState::exception) (void)tasks_->still_busy(TimePoint{});
   if (tasks_) tasks_->look_after_posts();

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <optional>
 #include <utility>
 
 #include <fmt/format.h>
 #include <sys/epoll.h>
+#include <sys/resource.h>
 
 #include "shm/base/log.hpp"
 #include "shm/base/system_call.hpp"
@@ -15,12 +17,35 @@ namespace plchost {
 
 namespace {
 
-Result<void> watch(const UniqueFd& epoll, int fd) {
-  epoll_event event{.events = EPOLLIN, .data = {.fd = fd}};
+Result<void> watch(const UniqueFd& epoll, int fd, std::uint32_t events = EPOLLIN) {
+  epoll_event event{.events = events, .data = {.fd = fd}};
   const auto added = check_errno(::epoll_ctl(epoll.get(), EPOLL_CTL_ADD, fd, &event), "watch control socket");
   if (!added) return std::unexpected(added.error());
   return {};
 }
+
+// For an application that has used up the descriptors of the process: while one of these is there, the
+// process may have as many as the system allows it.
+class MoreDescriptors {
+ public:
+  MoreDescriptors() {
+    known_ = ::getrlimit(RLIMIT_NOFILE, &before_) == 0;
+    rlimit more = before_;
+    more.rlim_cur = more.rlim_max;
+    if (before_.rlim_cur == before_.rlim_max)
+      more.rlim_cur = more.rlim_max += InstanceSocket::kMaxConnections;
+    known_ = known_ && ::setrlimit(RLIMIT_NOFILE, &more) == 0;
+  }
+  ~MoreDescriptors() {
+    if (known_) ::setrlimit(RLIMIT_NOFILE, &before_);
+  }
+  MoreDescriptors(const MoreDescriptors&) = delete;
+  MoreDescriptors& operator=(const MoreDescriptors&) = delete;
+
+ private:
+  rlimit before_{};
+  bool known_ = false;
+};
 
 }  // namespace
 
@@ -29,13 +54,28 @@ Result<InstanceSocket> InstanceSocket::listen(const std::string& path, Handler h
   if (!listener) return std::unexpected(listener.error());
   UniqueFd epoll(::epoll_create1(EPOLL_CLOEXEC));
   if (!epoll) return failure(ErrorCode::system, "epoll_create1", errno);
-  if (auto watched = watch(epoll, listener->fd()); !watched) return std::unexpected(watched.error());
+  // Told once for each new connection: one that cannot be taken must not keep the control thread awake.
+  if (auto watched = watch(epoll, listener->fd(), EPOLLIN | EPOLLET); !watched)
+    return std::unexpected(watched.error());
   return InstanceSocket(*std::move(listener), std::move(epoll), std::move(handler));
 }
 
+Result<std::optional<PacketSocket>> InstanceSocket::accept() {
+  auto accepted = listener_.accept();
+  if (accepted || accepted.error().system_errno != EMFILE) return accepted;
+  const MoreDescriptors more;
+  return listener_.accept();
+}
+
+void InstanceSocket::beat() {
+  if (waiting_) accept_all();
+}
+
 void InstanceSocket::accept_all() {
+  waiting_ = true;
   for (std::size_t i = 0; i <= kMaxConnections; ++i) {
-    auto accepted = listener_.accept();
+    auto accepted = accept();
+    if (accepted && !*accepted) waiting_ = false;
     if (!accepted || !*accepted) return;
     PacketSocket connection = *std::move(*accepted);
     if (connections_.size() == kMaxConnections) {

@@ -33,6 +33,8 @@ class InstanceSocket {
   [[nodiscard]] int fd() const noexcept { return epoll_.get(); }
   /// Takes new connections, and at most one request of each connection.
   void serve();
+  /// Takes the connections that could not be taken yet. To be called every 100 ms.
+  void beat();
   /// The reply to a request that was not answered at once. Nobody gets it if the connection is gone. The
   /// handler may call it, also for the connection whose request it works on.
   void answer(const Asker& asker, ControlReply reply);
@@ -46,6 +48,7 @@ class InstanceSocket {
     PacketSocket socket;
   };
 
+  [[nodiscard]] Result<std::optional<PacketSocket>> accept();
   void accept_all();
   /// False: the connection is over.
   [[nodiscard]] bool serve_one(Connection& connection);
@@ -58,6 +61,7 @@ class InstanceSocket {
   std::uint64_t next_id_ = 1;
   std::uint64_t serving_ = 0;  // the connection whose request the handler works on; 0: none
   bool serving_over_ = false;  // it is to be closed
+  bool waiting_ = false;       // connections may be left that were not taken
 };
 
 }  // namespace plchost

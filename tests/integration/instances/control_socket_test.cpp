@@ -1,12 +1,15 @@
 // The control socket of a real plc-instance.
 #include <csignal>
 #include <cstdlib>
+#include <filesystem>
 #include <thread>
 #include <utility>
 #include <vector>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include "instances/launch/launch_contract.hpp"
 #include "tests/integration/instances/instance_process.hpp"
@@ -58,6 +61,22 @@ TEST_F(ControlSocket, DoesNotStartWhatCameWhileTheProcessStoodStillAndWasGivenUp
   request.limit_ns = boot_time_ns() + Duration(1h).count();
   ASSERT_TRUE(manager.send(encode(request)));
   EXPECT_EQ(reply(manager).code, ErrorCode::ok);
+}
+
+TEST_F(ControlSocket, ServesNewConnectionsWhenTheApplicationHasUsedUpTheDescriptors) {
+  rlimit used{};
+  ASSERT_EQ(::prlimit(sut_.pid(), RLIMIT_NOFILE, nullptr, &used), 0);
+  used.rlim_cur = 0;  // the lowest that is free
+  while (std::filesystem::exists(
+      std::filesystem::symlink_status(fmt::format("/proc/{}/fd/{}", sut_.pid(), used.rlim_cur)))) {
+    ++used.rlim_cur;
+  }
+  ASSERT_EQ(::prlimit(sut_.pid(), RLIMIT_NOFILE, &used, nullptr), 0);
+  EXPECT_EQ(sut_.ask(ControlVerb::status).code, ErrorCode::ok);
+  EXPECT_EQ(sut_.ask(ControlVerb::stop).code, ErrorCode::ok);
+  rlimit after{};
+  ASSERT_EQ(::prlimit(sut_.pid(), RLIMIT_NOFILE, nullptr, &after), 0);
+  EXPECT_EQ(after.rlim_cur, used.rlim_cur);  // the application gets none of it
 }
 
 TEST_F(ControlSocket, ResetsTheStatisticsOfOneTaskOrOfAllWhileTheyRun) {
