@@ -85,20 +85,26 @@ int check_only(const std::string& file, const std::string& programs) {
   return kExitFailed;
 }
 
+std::expected<ManagerConfig, ConfigErrors> read_config(const Options& options) {
+  auto config = load_config(options.config, config_surroundings());
+  if (config && !options.log_level.empty()) config->host.log_level = options.log_level;
+  return config;
+}
+
 int run(const Options& options) {
-  const ConfigSurroundings surroundings = config_surroundings();
-  auto config = load_config(options.config, surroundings);
+  const auto config = read_config(options);
   if (!config) {
     for (const std::string& error : config.error()) fmt::print(stderr, "{}\n", error);
     return kExitFailed;
   }
-  if (!options.log_level.empty()) config->host.log_level = options.log_level;
   start_log("plchostd", config->host.log_level);
   std::error_code ignored;
   const auto file = std::filesystem::absolute(options.config, ignored);
-  auto manager = Manager::create(*config, {.folder = file.parent_path().string(),
+  auto manager = Manager::create(*config, {.file = file.string(),
+                                           .folder = file.parent_path().string(),
                                            .programs = programs_of(options),
-                                           .schedulers = surroundings.schedulers});
+                                           .schedulers = config_surroundings().schedulers,
+                                           .read = [&options] { return read_config(options); }});
   if (!manager) {
     spdlog::error("{}", manager.error().describe());
     return kExitFailed;

@@ -5,6 +5,7 @@
 #include <csignal>
 #include <cstdint>
 #include <filesystem>
+#include <iterator>
 #include <utility>
 
 #include <fmt/format.h>
@@ -63,18 +64,17 @@ Result<void> check_pool_is_free(const std::string& pool) {
 }
 
 // "line1.sock" belongs to line1.
-bool is_ours(const ManagerConfig& config, const std::filesystem::path& file) {
-  const std::string name = file.stem().string();
-  return std::ranges::find(config.instances, name, &InstanceConfig::name) != config.instances.end();
+bool is_ours(const std::vector<InstanceConfig>& instances, const std::filesystem::path& file) {
+  return std::ranges::find(instances, file.stem().string(), &InstanceConfig::name) != instances.end();
 }
 
-// Processes of a manager before us whose instance is no longer in the configuration: not ours to stop.
-void warn_of_strangers(const ManagerConfig& config) {
+// Processes that no manager has started: not ours to stop.
+void warn_of_strangers(const std::string& run_directory, const std::vector<InstanceConfig>& instances) {
   std::error_code error;
-  for (std::filesystem::directory_iterator at(config.host.run_directory, error), end; !error && at != end;
+  for (std::filesystem::directory_iterator at(run_directory, error), end; !error && at != end;
        at.increment(error)) {
     const bool socket = at->path().extension() == ".sock" && at->path().stem() != "manager";
-    if (socket && !is_ours(config, at->path())) {
+    if (socket && !is_ours(instances, at->path())) {
       spdlog::warn("{} belongs to no configured instance; its process, if there is one, is left alone",
                    at->path().string());
     }
@@ -127,95 +127,110 @@ Result<void> Manager::set_up() {
   if (!page) return std::unexpected(page.error());
   page_ = std::move(*page);
   auto signals = reactor_->watch_signals({SIGTERM, SIGINT, SIGHUP}, [this](int signal) {
-    // The log is standard error, which whoever reads it rotates: nothing to do on SIGHUP.
-    if (signal != SIGHUP) shut_down();
+    if (signal != SIGHUP) return shut_down();
+    reload_->reload_by_signal();
   });
   if (!signals) return signals;
   for (const InstanceConfig& instance : config_.instances) {
     auto ring = TransitionRing::open(host.pool, instance.name);
     if (!ring) return std::unexpected(ring.error());
-    transitions_.push_back(*std::move(ring));
+    transitions_.emplace(instance.name, *std::move(ring));
   }
   make_supervisor();
   write_host();
   host_check_ =
       std::make_unique<HostCheckHandler>(*supervisor_, [this] { return check_host(this_host(config_)); });
-  auto server = CommandServer::open(*reactor_, manager_socket_path(host.run_directory), *host_check_);
+  reload_ = std::make_unique<ConfigReload>(
+      *reactor_,
+      ConfigReload::Settings{
+          .file = options_.file, .program = "/proc/self/exe", .programs = options_.programs},
+      *host_check_, [this] { return reload(); });
+  auto server = CommandServer::open(*reactor_, manager_socket_path(host.run_directory), *reload_);
   if (!server) return std::unexpected(server.error());
   command_server_ = std::move(*server);
   return {};
 }
 
+Supervisor::HostedInstance Manager::make_host(const InstanceConfig& instance) {
+  const HostConfig& own = config_.host;
+  const std::string plc_instance = options_.programs + "/plc-instance";
+  auto host =
+      std::make_unique<ProcessHost>(*reactor_, ProcessHost::Settings{.program = plc_instance,
+                                                                     .name = instance.name,
+                                                                     .pool = own.pool,
+                                                                     .run_directory = own.run_directory});
+  ProcessHost& made = *host;
+  auto applications = std::make_unique<StoreProcess>(
+      *reactor_,
+      StoreProcess::Settings{
+          .pool = own.pool,
+          .folder = versions_folder(applications_folder(own.state_directory, own.name), instance.name),
+          .keep = own.application_versions,
+          .helper = "/proc/self/exe",
+          .plc_instance = plc_instance});
+  auto wishes =
+      std::make_unique<WishStore>(*reactor_, wish_writer_,
+                                  WishStore::Settings{.pool = own.pool,
+                                                      .instance = instance.name,
+                                                      .folder = wishes_folder(own.state_directory, own.name),
+                                                      .run_directory = own.run_directory});
+  wishes_[instance.name] = wishes.get();
+  return Supervisor::HostedInstance{
+      .host = std::move(host),
+      .applications = std::move(applications),
+      .wishes = std::move(wishes),
+      .connect = [&made](InstanceEvents& events) { made.connect_events(events); }};
+}
+
 void Manager::make_supervisor() {
-  const auto make_host = [this](const InstanceConfig& instance) {
-    auto host = std::make_unique<ProcessHost>(
-        *reactor_, ProcessHost::Settings{.program = options_.programs + "/plc-instance",
-                                         .name = instance.name,
-                                         .pool = config_.host.pool,
-                                         .run_directory = config_.host.run_directory,
-                                         .settings = instance.settings});
-    ProcessHost& made = *host;
-    const HostConfig& own = config_.host;
-    auto applications = std::make_unique<StoreProcess>(
-        *reactor_,
-        StoreProcess::Settings{
-            .pool = own.pool,
-            .folder = versions_folder(applications_folder(own.state_directory, own.name), instance.name),
-            .configured = instance.application,
-            .keep = own.application_versions,
-            .helper = "/proc/self/exe",
-            .plc_instance = options_.programs + "/plc-instance",
-            .settings = instance.settings});
-    auto wishes = std::make_unique<WishStore>(
-        *reactor_, wish_writer_,
-        WishStore::Settings{.pool = own.pool,
-                            .instance = instance.name,
-                            .folder = wishes_folder(own.state_directory, own.name),
-                            .run_directory = own.run_directory});
-    wishes_.push_back(wishes.get());
-    return Supervisor::HostedInstance{
-        .host = std::move(host),
-        .applications = std::move(applications),
-        .wishes = std::move(wishes),
-        .connect = [&made](InstanceEvents& events) { made.connect_events(events); }};
-  };
   supervisor_ = std::make_unique<Supervisor>(
       config_,
       Supervisor::Surroundings{
           .folder = options_.folder,
           .schedulers = options_.schedulers,
           .now = [] { return MonotonicClock::now(); },
-          .publish =
-              [this](std::size_t index, const InstanceStatus& status) {
-                page_->write_instance(static_cast<std::uint32_t>(index), status);
-                latency_due_ = true;
-              },
+          .publish = [this](std::size_t place,
+                            const InstanceStatus& status) { write_instance(place, status); },
           .transition =
-              [this](std::size_t index, InstanceState from, InstanceState to, std::string_view reason) {
-                transitions_[index].add(TransitionSource::process, std::to_underlying(from),
-                                        std::to_underlying(to), supervisor_->instance(index).status().pid,
-                                        reason);
-              }},
-      make_host);
+              [this](const InstanceStatus& status, InstanceState from, InstanceState to,
+                     std::string_view reason) {
+                const auto ring = transitions_.find(status.name.view());
+                if (ring == transitions_.end()) return;
+                ring->second.add(TransitionSource::process, std::to_underlying(from), std::to_underlying(to),
+                                 status.pid, reason);
+              },
+          .gone = [this](std::size_t place, const InstanceConfig& config) { forget(place, config); }},
+      [this](const InstanceConfig& instance) { return make_host(instance); });
 }
 
 void Manager::write_host() {
-  HostStatus status;
-  status.name.assign(config_.host.name);
-  status.version.assign(PLCHOST_VERSION);
-  status.manager_pid = ::getpid();
-  status.instance_count = static_cast<std::uint32_t>(config_.instances.size());
-  status.started_unix_ns = unix_time_ns();
+  host_status_.name.assign(config_.host.name);
+  host_status_.version.assign(PLCHOST_VERSION);
+  host_status_.manager_pid = ::getpid();
+  host_status_.instance_count = static_cast<std::uint32_t>(config_.instances.size());
+  host_status_.started_unix_ns = unix_time_ns();
   for (std::size_t i = 0; i < supervisor_->size(); ++i) {
-    page_->write_instance(static_cast<std::uint32_t>(i), supervisor_->instance(i).status());
+    page_->write_instance(static_cast<std::uint32_t>(supervisor_->place(i)),
+                          supervisor_->instance(i).status());
   }
-  page_->write_host(status);
+  page_->write_host(host_status_);
+}
+
+// The instance first: whoever reads the number finds it.
+void Manager::write_instance(std::size_t place, const InstanceStatus& status) {
+  const auto index = static_cast<std::uint32_t>(place);
+  page_->write_instance(index, status);
+  latency_due_ = true;
+  if (index < host_status_.instance_count) return;
+  host_status_.instance_count = index + 1;
+  page_->write_host(host_status_);
 }
 
 Result<void> Manager::run() {
   spdlog::info("host '{}': {} instances, pool '{}', run directory {}", config_.host.name,
                config_.instances.size(), config_.host.pool, config_.host.run_directory);
-  warn_of_strangers(config_);
+  adopt_removed();
+  warn_of_strangers(config_.host.run_directory, supervisor_->configs());
   supervisor_->start();
   if (config_.dds.enabled) api_server_.start();
   tick_.set(MonotonicClock::now() + kTick);
@@ -262,6 +277,7 @@ void Manager::restore_latency() {
 void Manager::shut_down() {
   if (std::exchange(ending_, true)) return;
   spdlog::info("ending: all instances in reverse order of their start");
+  reload_->shut_down();
   notify_service_manager("STOPPING=1");
   // The API server last, so that it can still tell the world how the instances end.
   supervisor_->shut_down([this] {
@@ -276,18 +292,21 @@ void Manager::shut_down() {
 
 void Manager::clean_up() {
   restore_latency();
-  for (WishStore* const wishes : wishes_) wishes->end();
-  for (const InstanceConfig& instance : config_.instances) {
-    InstancePage::remove(config_.host.pool, instance.name);
-    TransitionRing::remove(config_.host.pool, instance.name);
-  }
+  for (const auto& [instance, wishes] : wishes_) wishes->end();
+  // Also those that were removed from the configuration.
+  config_.instances = supervisor_->configs();
+  for (const InstanceConfig& instance : config_.instances) remove_pages(instance.name);
+  std::ranges::copy_if(gone_, std::back_inserter(config_.instances), [&](const InstanceConfig& instance) {
+    return std::ranges::find(config_.instances, instance.name, &InstanceConfig::name) ==
+           config_.instances.end();
+  });
   // Whatever is named after an instance of ours: its socket, what it kept for its next process. Its
   // exceptions outlive the manager: that they are still known tomorrow is what they are kept for.
   std::error_code error;
   for (std::filesystem::directory_iterator at(config_.host.run_directory, error), end; !error && at != end;
        at.increment(error)) {
     const bool kept = at->path().extension() == ".exception";
-    if (!kept && is_ours(config_, at->path())) ::unlink(at->path().c_str());
+    if (!kept && is_ours(config_.instances, at->path())) ::unlink(at->path().c_str());
   }
   ::unlink(manager_socket_path(config_.host.run_directory).c_str());
   remove_downloads(config_.host.pool);

@@ -1,5 +1,9 @@
 #pragma once
 
+#include <cstddef>
+#include <expected>
+#include <functional>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -7,8 +11,10 @@
 #include <vector>
 
 #include "manager/api_server.hpp"
+#include "manager/config/load_config.hpp"
 #include "manager/config/manager_config.hpp"
 #include "manager/control/command_server.hpp"
+#include "manager/control/config_reload.hpp"
 #include "manager/host_check/host_check_handler.hpp"
 #include "manager/store/wish_store.hpp"
 #include "manager/supervisor/supervisor.hpp"
@@ -24,9 +30,12 @@ namespace plchost {
 class Manager {
  public:
   struct Options {
+    std::string file;      ///< of the configuration, absolute
     std::string folder;    ///< that relative application paths in commands start in
     std::string programs;  ///< the folder of plc-instance and plchost-dds
     std::vector<std::string_view> schedulers;
+    /// The configuration as it is in the file now.
+    std::function<std::expected<ManagerConfig, ConfigErrors>()> read;
   };
 
   /// Takes the run directory, makes pool, page and control socket. already_exists: another manager has it.
@@ -41,25 +50,34 @@ class Manager {
   Manager(const ManagerConfig& config, Options options, LockFile lock, std::unique_ptr<Reactor> reactor);
   [[nodiscard]] Result<void> set_up();
   void make_supervisor();
+  [[nodiscard]] Supervisor::HostedInstance make_host(const InstanceConfig& instance);
+  void adopt_removed();
+  [[nodiscard]] Result<std::vector<std::string>> reload();
+  void forget(std::size_t place, const InstanceConfig& instance);
+  void remove_pages(const std::string& instance) const;
   void write_host();
+  void write_instance(std::size_t place, const InstanceStatus& status);
   void shut_down();
   void clean_up();
   void tick();
   void look_after_pool();
   void restore_latency();
 
-  const ManagerConfig& config_;
+  ManagerConfig config_;
   Options options_;
   // From here on in the order of making; destroyed in the reverse one.
   LockFile lock_;
   std::unique_ptr<Reactor> reactor_;
   std::optional<ObjectPool> pool_;
   std::optional<HostPageWriter> page_;
-  std::vector<TransitionRing> transitions_;  // in the order of the instances
+  HostStatus host_status_;
+  std::map<std::string, TransitionRing, std::less<>> transitions_;  // by instance
   WishWriter wish_writer_;
-  std::vector<WishStore*> wishes_;  // the supervisor's
+  std::map<std::string, WishStore*> wishes_;  // by instance; the supervisor's
+  std::vector<InstanceConfig> gone_;          // removed and ended; what they kept is still to be saved
   std::unique_ptr<Supervisor> supervisor_;
   std::unique_ptr<HostCheckHandler> host_check_;
+  std::unique_ptr<ConfigReload> reload_;
   std::unique_ptr<CommandServer> command_server_;
   ApiServer api_server_;
   Reactor::Timer tick_;

@@ -18,7 +18,8 @@ namespace {
 
 bool is_engineering(std::int32_t operation) {
   return (operation >= plc_OPERATION_LOAD_APPLICATION && operation <= plc_OPERATION_UNREGISTER_EVENT) ||
-         operation == plc_OPERATION_DOWNLOAD_APPLICATION || operation == plc_OPERATION_ROLLBACK_APPLICATION;
+         operation == plc_OPERATION_DOWNLOAD_APPLICATION || operation == plc_OPERATION_ROLLBACK_APPLICATION ||
+         operation == plc_OPERATION_RELOAD_HOST;
 }
 
 auto order(const plc_InstanceStatus& s) {

@@ -77,6 +77,7 @@ Result<std::string> Instance::obey(const ControlRequest& request) {
     case ControlVerb::download_application:
     case ControlVerb::rollback_application:
     case ControlVerb::check_host:
+    case ControlVerb::reload_host:
     case ControlVerb::list_objects:
     case ControlVerb::list_nodes:
     case ControlVerb::list_routes:

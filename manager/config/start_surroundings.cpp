@@ -34,7 +34,11 @@ bool ends_within(int process, Duration limit) {
 
 Result<void> try_application(const std::string& plc_instance, const std::string& file,
                              const std::string& settings) {
-  auto trial = ApplicationTrial::start(plc_instance, file, settings);
+  LaunchOptions launch;
+  launch.name = "plc";
+  launch.settings = settings;
+  launch.application = file;
+  auto trial = ApplicationTrial::start(plc_instance, launch);
   if (!trial) return std::unexpected(trial.error());
   if (!ends_within(trial->fd(), kTrialLimit)) {
     trial->give_up();

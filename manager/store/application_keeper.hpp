@@ -6,6 +6,7 @@
 
 #include "api/control/application_order.hpp"
 #include "api/control/application_versions.hpp"
+#include "instances/launch/launch_contract.hpp"
 #include "shm/base/result.hpp"
 
 namespace plchost {
@@ -17,11 +18,15 @@ class ApplicationKeeper {
   using Done = std::function<void(const Result<std::string>& path)>;
 
   virtual ~ApplicationKeeper() = default;
-  /// Checks what was sent, keeps it and gives its path. `before`: what is loaded now.
+  /// Checks what was sent as `launch` would start it, keeps it and gives its path. `before`: what is loaded
+  /// now.
   [[nodiscard]] virtual Result<void> keep(const ApplicationOrder& order, const std::string& name,
-                                          const std::string& before, Done done) = 0;
-  /// The instance starts with the application at that path from now on.
-  [[nodiscard]] virtual Result<void> set_boot(const std::string& path, Done done) = 0;
+                                          const std::string& before, const LaunchOptions& launch,
+                                          Done done) = 0;
+  /// The instance starts with the application at that path from now on, or as the configuration says, if that
+  /// names the same one.
+  [[nodiscard]] virtual Result<void> set_boot(const std::string& path, const std::string& configured,
+                                              Done done) = 0;
   /// Its path; empty: as the configuration says.
   [[nodiscard]] virtual std::string boot() = 0;
   /// The version that lies there; nothing: it is none of this instance.

@@ -130,7 +130,7 @@ std::string in_senders_words(std::string text, const std::string& path, const st
 }
 
 Result<void> try_application(const StoreOrder& order, const std::string& path) {
-  auto trial = ApplicationTrial::start(order.plc_instance, path, order.settings);
+  auto trial = ApplicationTrial::start(order.trial, path);
   if (!trial) return std::unexpected(trial.error());
   pollfd end{.fd = trial->fd(), .events = POLLIN, .revents = 0};
   constexpr auto kWait = std::chrono::duration_cast<std::chrono::milliseconds>(kTrialLimit).count();

@@ -1,5 +1,6 @@
 #include "manager/store/store_order.hpp"
 
+#include <algorithm>
 #include <array>
 #include <limits>
 
@@ -24,9 +25,7 @@ constexpr std::array kOrderTexts = {OrderText{"folder", &StoreOrder::folder},
                                     OrderText{"name", &StoreOrder::name},
                                     OrderText{"by", &StoreOrder::by},
                                     OrderText{"from", &StoreOrder::from},
-                                    OrderText{"before", &StoreOrder::before},
-                                    OrderText{"plc_instance", &StoreOrder::plc_instance},
-                                    OrderText{"settings", &StoreOrder::settings}};
+                                    OrderText{"before", &StoreOrder::before}};
 
 Result<std::uint64_t> order_number(const Json& json, const char* key, std::uint64_t most) {
   const auto found = json.find(key);
@@ -39,7 +38,7 @@ Result<std::uint64_t> order_number(const Json& json, const char* key, std::uint6
 }  // namespace
 
 std::string encode(const StoreOrder& order) {
-  Json json{{"size", order.size}, {"keep", order.keep}};
+  Json json{{"size", order.size}, {"keep", order.keep}, {"trial", order.trial}};
   for (const OrderText& text : kOrderTexts) json[text.key] = order.*text.member;
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
@@ -59,6 +58,12 @@ Result<StoreOrder> decode_store_order(std::string_view text) {
   const auto keep = order_number(json, "keep", std::numeric_limits<std::uint32_t>::max());
   if (!size) return std::unexpected(size.error());
   if (!keep) return std::unexpected(keep.error());
+  const auto trial = json.find("trial");
+  if (trial == json.end() || !trial->is_array() ||
+      !std::ranges::all_of(*trial, [](const Json& argument) { return argument.is_string(); })) {
+    return failure(ErrorCode::corrupt, "the order has no command line 'trial'");
+  }
+  order.trial = trial->get<std::vector<std::string>>();
   order.size = *size;
   order.keep = static_cast<std::uint32_t>(*keep);
   return order;

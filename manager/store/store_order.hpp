@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "shm/base/result.hpp"
 
@@ -22,10 +23,9 @@ struct StoreOrder {
   std::string name;        ///< how it is called
   std::string by;
   std::string from;
-  std::string before;        ///< path of what is loaded now; empty: nothing
-  std::uint32_t keep = 0;    ///< so many versions stay, and what is loaded and the boot application
-  std::string plc_instance;  ///< program that tries it
-  std::string settings;      ///< file of the settings under which it is tried; empty: none
+  std::string before;              ///< path of what is loaded now; empty: nothing
+  std::uint32_t keep = 0;          ///< so many versions stay, and what is loaded and the boot application
+  std::vector<std::string> trial;  ///< command line that tries it, its path is added; see trial_arguments()
 };
 
 /// In one argument of a command line, and back. corrupt: it is none.

@@ -7,6 +7,8 @@
 #include <fmt/format.h>
 #include <sys/epoll.h>
 
+#include "manager/system/application_trial.hpp"
+
 namespace plchost {
 
 StoreProcess::StoreProcess(Reactor& reactor, Settings settings)
@@ -16,7 +18,7 @@ StoreProcess::StoreProcess(Reactor& reactor, Settings settings)
       }) {}
 
 Result<void> StoreProcess::keep(const ApplicationOrder& order, const std::string& name,
-                                const std::string& before, Done done) {
+                                const std::string& before, const LaunchOptions& launch, Done done) {
   StoreOrder store;
   store.folder = settings_.folder;
   // A number and no path: what the API server names is a shared memory of ours, whatever it says.
@@ -28,16 +30,15 @@ Result<void> StoreProcess::keep(const ApplicationOrder& order, const std::string
   store.from = order.from;
   store.before = before;
   store.keep = settings_.keep;
-  store.plc_instance = settings_.plc_instance;
-  store.settings = settings_.settings;
+  store.trial = trial_arguments(settings_.plc_instance, launch);
   return start(store, std::move(done));
 }
 
-Result<void> StoreProcess::set_boot(const std::string& path, Done done) {
+Result<void> StoreProcess::set_boot(const std::string& path, const std::string& configured, Done done) {
   StoreOrder store;
   store.folder = settings_.folder;
   store.boot = path;
-  store.configured = settings_.configured;
+  store.configured = configured;
   return start(store, std::move(done));
 }
 

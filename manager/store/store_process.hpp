@@ -17,18 +17,17 @@ class StoreProcess : public ApplicationKeeper {
   struct Settings {
     std::string pool;          ///< whose shared memory holds what was sent
     std::string folder;        ///< of the versions of the instance
-    std::string configured;    ///< application of the configuration
     std::uint32_t keep = 5;    ///< versions
     std::string helper;        ///< program: plchostd
     std::string plc_instance;  ///< program that tries an application
-    std::string settings;      ///< under which it is tried; empty: none
   };
 
   StoreProcess(Reactor& reactor, Settings settings);
 
   [[nodiscard]] Result<void> keep(const ApplicationOrder& order, const std::string& name,
-                                  const std::string& before, Done done) override;
-  [[nodiscard]] Result<void> set_boot(const std::string& path, Done done) override;
+                                  const std::string& before, const LaunchOptions& launch, Done done) override;
+  [[nodiscard]] Result<void> set_boot(const std::string& path, const std::string& configured,
+                                      Done done) override;
   [[nodiscard]] std::string boot() override;
   [[nodiscard]] std::optional<ApplicationVersion> version_at(const std::string& path) override;
 

@@ -26,6 +26,8 @@ class WishKeeper {
   virtual void keep_events() = 0;
   /// Calls `kept` when all that was given so far is on the disk, or cannot be: at once, or later.
   virtual void when_kept(Kept kept) = 0;
+  /// Something is being written: it must not be destroyed yet.
+  [[nodiscard]] virtual bool is_writing() const = 0;
 };
 
 }  // namespace plchost

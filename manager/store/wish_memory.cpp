@@ -4,11 +4,13 @@
 #include <array>
 #include <atomic>
 #include <cstddef>
+#include <filesystem>
 #include <new>
 #include <span>
 
 #include <fmt/format.h>
 
+#include "shm/base/names.hpp"
 #include "shm/pool/fixed_page.hpp"
 
 namespace plchost {
@@ -65,6 +67,20 @@ Result<WishMemory> WishMemory::open(std::string_view pool, std::string_view inst
 
 void WishMemory::remove(std::string_view pool, std::string_view instance) noexcept {
   MemoryFile::remove(wish_memory_name(pool, instance));
+}
+
+std::vector<std::string> WishMemory::instances(std::string_view pool) {
+  const std::string prefix = wish_memory_name(pool, "");
+  std::vector<std::string> names;
+  std::error_code error;
+  for (std::filesystem::directory_iterator at(MemoryFile::kDirectory, error), end; !error && at != end;
+       at.increment(error)) {
+    const std::string file = at->path().filename().string();
+    if (!file.starts_with(prefix)) continue;
+    std::string name = file.substr(prefix.size());
+    if (check_name("instance", name, kMaxInstanceName)) names.push_back(std::move(name));
+  }
+  return names;
 }
 
 WishMemory::Found WishMemory::newest() const {

@@ -18,6 +18,8 @@ class WishMemory {
   /// Goes on with one that is there; makes it anew if it is damaged.
   [[nodiscard]] static Result<WishMemory> open(std::string_view pool, std::string_view instance);
   static void remove(std::string_view pool, std::string_view instance) noexcept;
+  /// Of a pool: the instances that have one.
+  [[nodiscard]] static std::vector<std::string> instances(std::string_view pool);
 
   /// The newest whole one; nothing: none was written, or it is damaged.
   [[nodiscard]] std::optional<InstanceWish> read() const { return newest().wish; }

@@ -40,6 +40,7 @@ class WishStore : public WishKeeper {
   void keep(const InstanceWish& wish) override;
   void keep_events() override;
   void when_kept(Kept kept) override;
+  [[nodiscard]] bool is_writing() const override { return writing_; }
   /// The end of the manager in order: nothing stays in memory that is on the disk.
   void end() noexcept;
 

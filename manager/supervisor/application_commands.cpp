@@ -24,7 +24,7 @@ void ManagedInstance::begin_download() {
   if (!order) return finish(order.error().code, order.error().describe());
   operation_->step = Step::storing;
   const auto started =
-      surroundings_.applications.keep(*order, request.argument, application_,
+      surroundings_.applications.keep(*order, request.argument, application_, launch_options(Next::run),
                                       [this](const Result<std::string>& path) { on_application_kept(path); });
   if (!started) finish(started.error().code, started.error().describe());
 }
@@ -115,7 +115,8 @@ void ManagedInstance::set_boot(const std::string& text) {
     finish(path.error().code,
            fmt::format("it is loaded, but not the boot application: {}", path.error().describe()));
   };
-  const auto started = surroundings_.applications.set_boot(operation_->request.argument, tell);
+  const auto started =
+      surroundings_.applications.set_boot(operation_->request.argument, config_.application, tell);
   if (!started) tell(std::unexpected(started.error()));
 }
 

@@ -23,6 +23,13 @@ void ManagedInstance::handle(const ControlRequest& request, ControlReplyFunction
     return refuse(ErrorCode::busy, fmt::format("instance '{}' is busy with '{}'; try again when it is done",
                                                config_.name, to_string(operation_->request.verb)));
   }
+  if (removed_ && checked.verb != ControlVerb::stop) {
+    return refuse(
+        ErrorCode::wrong_state,
+        fmt::format("'{}' was removed from the configuration: it runs until it is stopped; put it back "
+                    "into the file and reload that for anything else",
+                    config_.name));
+  }
   spdlog::info("instance {}: {} {}", config_.name, to_string(checked.verb), checked.argument);
   operation_ = Operation{.request = std::move(checked), .reply = std::move(reply)};
   follow_command(operation_->request.verb);
@@ -53,6 +60,7 @@ void ManagedInstance::handle(const ControlRequest& request, ControlReplyFunction
     case ControlVerb::reset_statistics:
       return begin_forwarded();
     case ControlVerb::check_host:
+    case ControlVerb::reload_host:
     case ControlVerb::list_objects:
     case ControlVerb::list_nodes:
     case ControlVerb::list_routes:
@@ -67,7 +75,9 @@ void ManagedInstance::handle(const ControlRequest& request, ControlReplyFunction
 Result<void> ManagedInstance::check_argument(ControlRequest& request) const {
   switch (request.verb) {
     case ControlVerb::check_host:
-      return failure(ErrorCode::invalid_argument, "'check host' is for the whole host: name no instance");
+    case ControlVerb::reload_host:
+      return failure(ErrorCode::invalid_argument,
+                     fmt::format("'{}' is for the whole host: name no instance", to_string(request.verb)));
     case ControlVerb::list_objects:
     case ControlVerb::list_nodes:
     case ControlVerb::list_routes:
@@ -123,7 +133,11 @@ void ManagedInstance::begin_start() {
 }
 
 void ManagedInstance::begin_stop() {
-  if (phase_ == Phase::down) {
+  if (removed_ && !idle_phase()) {
+    operation_->step = Step::fresh_process;
+    if (phase_ != Phase::ending) end_process(Next::nothing);
+    next_ = Next::nothing;
+  } else if (phase_ == Phase::down) {
     finish(ErrorCode::ok, fmt::format("'{}' has no process: nothing to stop", config_.name));
   } else if (idle_phase()) {
     go_down(InstanceState::offline, last_end_);
@@ -137,7 +151,9 @@ void ManagedInstance::begin_stop() {
 
 void ManagedInstance::begin_load() {
   operation_->step = Step::checking;
-  const auto started = host_.check_application(operation_->request.argument);
+  LaunchOptions launch = launch_options(Next::run);
+  launch.application = operation_->request.argument;
+  const auto started = host_.check_application(launch);
   if (!started) finish(started.error().code, started.error().describe());
 }
 
@@ -154,10 +170,12 @@ void ManagedInstance::on_application_checked(const Result<void>& result) {
 }
 
 void ManagedInstance::apply_loaded_application() {
+  if (removed_) return finish(ErrorCode::wrong_state, "it was removed from the configuration meanwhile");
   if (loads_online()) return begin_change();
   const bool works = phase_ == Phase::up && !safe_mode_ && !silent_ && !application_.empty();
   if (works) operation_->before = application_;
   application_ = operation_->request.argument;
+  begun_with_.application = config_.application;  // the command is younger
   if (phase_ == Phase::down && status_.state == InstanceState::offline) {
     publish();
     return finish(ErrorCode::ok,
@@ -224,8 +242,14 @@ void ManagedInstance::finish_forwarded(const ControlReply& reply) {
   settled_ = surroundings_.now();
   const ControlRequest request = operation_->request;
   if (reply.code == ErrorCode::ok) {
-    if (request.verb == ControlVerb::set_scheduler) scheduler_ = request.argument;
-    if (loads_online()) application_ = request.argument;
+    if (request.verb == ControlVerb::set_scheduler) {
+      scheduler_ = request.argument;
+      begun_with_.scheduler = config_.scheduler;  // the command is younger
+    }
+    if (loads_online()) {
+      application_ = request.argument;
+      begun_with_.application = config_.application;
+    }
     if (request.verb == ControlVerb::start || request.verb == ControlVerb::stop) {
       commanded_ = true;
       wants_running_ = request.verb == ControlVerb::start;

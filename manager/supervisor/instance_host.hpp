@@ -28,8 +28,9 @@ class InstanceHost {
   virtual void signal(int signal) = 0;
   /// Calls on_timer() at that time instead of any earlier setting; nothing: not at all.
   virtual void set_timer(std::optional<TimePoint> when) = 0;
-  /// Has a file tried by a process of its own, with a time limit; then on_application_checked().
-  [[nodiscard]] virtual Result<void> check_application(const std::string& path) = 0;
+  /// Has an application tried by a process of its own as spawn() would start it, with a time limit; then
+  /// on_application_checked().
+  [[nodiscard]] virtual Result<void> check_application(const LaunchOptions& options) = 0;
   /// What the process says of itself in its page; nothing if it has made none yet.
   [[nodiscard]] virtual std::optional<InstanceRuntime> runtime() = 0;
   /// The cores that the kernel lets the process's threads run on.

@@ -56,7 +56,7 @@ std::optional<InstanceRuntime> ManagedInstance::watch_process() {
   if (heard_of_) watch_heartbeat();
   if (page_damaged_ && believed) {
     page_damaged_ = false;
-    tell_page_problem();
+    tell_problems();
   }
   return said_;
 }
@@ -83,14 +83,14 @@ bool ManagedInstance::hear(const ControlReply& reply) {
         "instance {}: its status page does not tell what it says itself: another program has damaged "
         "it; restart the instance to have its figures again",
         config_.name);
-    tell_page_problem();
+    tell_problems();
   }
   said_ = runtime_of(*report);
   return true;
 }
 
-void ManagedInstance::tell_page_problem() {
-  if (silent_ || operation_ || status_.state == InstanceState::exception) return;
+void ManagedInstance::tell_problems() {
+  if (phase_ != Phase::up || silent_ || operation_ || status_.state == InstanceState::exception) return;
   set_state(phase_, status_.state, problem_when_up());
 }
 

@@ -30,6 +30,12 @@ void ManagedInstance::restore() {
   if (!earlier_) return;
   wish_known_ = true;
   const InstanceWish& earlier = *earlier_;
+  begun_with_ = {.application = earlier.configured_application,
+                 .scheduler = earlier.configured_scheduler,
+                 .process = earlier.configured_process};
+  scheduler_ = earlier.scheduler;
+  const bool boots = earlier.host_ended && !surroundings_.applications.boot().empty();
+  if (!boots) application_ = earlier.application;
   commanded_ = earlier.commanded;
   wants_running_ = earlier.commanded ? earlier.running : true;
   safe_mode_ = earlier.safe_mode;
@@ -44,33 +50,78 @@ void ManagedInstance::restore() {
     ages.emplace_back(unix_of(surroundings_.now()) - crash);
   }
   history_.restore(surroundings_.now(), ages, earlier.ends_in_a_row);
-  apply_configuration();
 }
 
-// A configuration that was changed meanwhile is younger than the commands before.
-void ManagedInstance::apply_configuration() {
-  if (earlier_->configured_scheduler == config_.scheduler) {
-    scheduler_ = earlier_->scheduler;
-  } else {
+ManagedInstance::Configured ManagedInstance::configured() const {
+  return {.application = config_.application,
+          .scheduler = config_.scheduler,
+          .process = configured_process(config_)};
+}
+
+// A configuration that was changed meanwhile is younger than the commands before. Whether it was.
+bool ManagedInstance::use_configuration() {
+  const Configured now = configured();
+  const Configured before = std::exchange(begun_with_, now);
+  if (before.scheduler != now.scheduler) {
     spdlog::info("instance {}: the configuration names another scheduler now; it takes the place of '{}'",
-                 config_.name, earlier_->scheduler);
+                 config_.name, scheduler_);
+    scheduler_ = config_.scheduler;
+  }
+  if (before.application != now.application) {
+    spdlog::info("instance {}: the configuration names another application now; it takes the place of '{}'",
+                 config_.name, application_);
+    application_ = surroundings_.applications.boot();
+    if (application_.empty()) application_ = config_.application;
+    safe_mode_ = false;
+    last_end_.clear();
+    history_.forget();
   }
   // What failed may be what was mended.
-  if (earlier_->configured_process != configured_process(config_)) earlier_->failed = false;
-  if (earlier_->configured_application == config_.application) {
-    const bool boots = earlier_->host_ended && !surroundings_.applications.boot().empty();
-    if (!boots) application_ = earlier_->application;
-    return;
+  return before.application != now.application || before.process != now.process;
+}
+
+// What of the configuration the process was not begun with; empty: nothing.
+std::string ManagedInstance::awaited_changes() const {
+  const Configured now = configured();
+  std::vector<std::string_view> changed;
+  if (begun_with_.application != now.application) changed.emplace_back("application");
+  if (begun_with_.scheduler != now.scheduler) changed.emplace_back("scheduler");
+  if (begun_with_.process != now.process) changed.emplace_back("core, priority band or settings");
+  if (changed.empty() || removed_) return "";
+  return fmt::format("the configuration has changed: {}; restart it to use that", fmt::join(changed, ", "));
+}
+
+void ManagedInstance::reconfigure(const InstanceConfig& config) {
+  const bool returns = std::exchange(removed_, false);
+  status_.removed = 0;
+  config_ = config;
+  if (!idle_phase()) {
+    tell_problems();
+    return publish();
   }
-  spdlog::info("instance {}: the configuration names another application now; it takes the place of '{}'",
-               config_.name, earlier_->application);
-  earlier_->failed = false;
-  safe_mode_ = false;
-  last_end_.clear();
-  history_.forget();
+  const bool failed = phase_ == Phase::down && status_.state == InstanceState::failed && unreadable_.empty();
+  const bool mended = use_configuration();
+  const bool wanted = commanded_ ? wants_running_ : config_.autostart;
+  if (phase_ == Phase::down && wanted && (returns || (failed && mended))) return hold("is to be started");
+  publish();
+}
+
+void ManagedInstance::remove() {
+  removed_ = true;
+  status_.removed = 1;
+  if (config_.core < 0 && earlier_) {  // of an earlier manager: "CORE BAND SETTINGS"
+    const std::string& process = earlier_->configured_process;
+    const auto settings = process.find('/');
+    if (settings != std::string::npos) config_.settings = process.substr(settings);
+  }
+  tell_problems();
+  publish();
+  refresh();
 }
 
 void ManagedInstance::resume() {
+  if (use_configuration() && earlier_) earlier_->failed = false;
+  if (application_ != config_.application) tell_boot_application();
   if (!unreadable_.empty()) {
     return go_down(InstanceState::failed,
                    fmt::format("what it is to be is not known: {}; start it or stop it", unreadable_));
@@ -126,14 +177,15 @@ InstanceWish ManagedInstance::wish() const {
   wish.commanded = commanded_;
   wish.running = wants_running_;
   wish.failed = phase_ == Phase::down && status_.state == InstanceState::failed;
-  wish.offline = phase_ == Phase::down && !wish.failed;
+  // That the configuration has lost it is nobody's stop.
+  wish.offline = phase_ == Phase::down && !wish.failed && !(removed_ && wants_running_);
   if (wish.failed) wish.problem = status_.problem.view();
   wish.last_end = last_end_.substr(0, kMaxWishText);
   wish.application = application_;
   wish.scheduler = scheduler_;
-  wish.configured_application = config_.application;
-  wish.configured_scheduler = config_.scheduler;
-  wish.configured_process = configured_process(config_);
+  wish.configured_application = begun_with_.application;
+  wish.configured_scheduler = begun_with_.scheduler;
+  wish.configured_process = begun_with_.process;
   wish.safe_mode = safe_mode_;
   wish.start_kind = start_kind_;
   wish.restarts = status_.restarts;

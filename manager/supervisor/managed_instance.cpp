@@ -53,13 +53,13 @@ ManagedInstance::ManagedInstance(const InstanceConfig& config, Surroundings surr
     : config_(config),
       surroundings_(std::move(surroundings)),
       host_(host),
-      history_(config),
+      history_(config_),
       application_(surroundings_.applications.boot()),
-      scheduler_(config.scheduler) {
+      scheduler_(config.scheduler),
+      begun_with_(configured()) {
   if (application_.empty()) application_ = config.application;
   unix_offset_ns_ = unix_time_ns() - surroundings_.now().time_since_epoch().count();
   restore();
-  if (application_ != config.application) tell_boot_application();
   status_.name.assign(config.name);
   status_.scheduler.assign(scheduler_);
   status_.application.assign(application_);
@@ -69,6 +69,7 @@ ManagedInstance::ManagedInstance(const InstanceConfig& config, Surroundings surr
 bool ManagedInstance::adopt() {
   const auto pid = host_.adopt();
   if (!pid) return false;
+  if (application_ != config_.application) tell_boot_application();
   status_.pid = *pid;
   adopt_until_.reset();
   unreadable_.clear();
@@ -162,6 +163,7 @@ void ManagedInstance::come_up() {
 
 std::string ManagedInstance::problem_when_up() {
   std::string problem = core_problem();
+  if (removed_) problem = "removed from the configuration: it runs until it is stopped";
   const auto add = [&](const std::string& text) { problem += (problem.empty() ? "" : "; ") + text; };
   if (safe_mode_) {
     add(fmt::format("safe mode after {} crashes within {} s, the last: {}; load an application, or reset it",
@@ -173,6 +175,7 @@ std::string ManagedInstance::problem_when_up() {
   } else if (!last_end_.empty()) {
     add("ended last: " + last_end_);
   }
+  if (const std::string changes = awaited_changes(); !changes.empty()) add(changes);
   if (page_damaged_) {
     add("another program has damaged its status page: figures of its tasks are missing or old; restart it");
   }
@@ -210,7 +213,13 @@ void ManagedInstance::on_exit(const ExitStatus& status) {
                               (status.value == kExitSetupFailed || status.value == kExitUsage);
   if (phase_ == Phase::ending) {
     const Next next = in_time(std::exchange(next_, Next::nothing));
-    if (next == Next::nothing) return go_down(InstanceState::offline, "");
+    if (next == Next::nothing) {
+      go_down(InstanceState::offline, "");
+      if (operation_)
+        finish(ErrorCode::ok,
+               fmt::format("'{}' has ended: it was removed from the configuration", config_.name));
+      return;
+    }
     spawn(next);  // of the kind that was asked for
   } else if (set_up && (exit_of_set_up || !setup_failure_.empty())) {
     const std::string why =
@@ -246,6 +255,7 @@ void ManagedInstance::ended_by_itself(const ExitStatus& status) {
 
 void ManagedInstance::back_off_or_give_up(bool again, InstanceState otherwise, const std::string& why) {
   last_end_ = why;
+  again = again && !removed_;
   const bool stops = operation_ && operation_->request.verb == ControlVerb::stop;
   // A stop that came while it was starting has its wish already.
   const bool cancelled = stops && operation_->step == Step::until_up;
@@ -348,6 +358,7 @@ LaunchOptions ManagedInstance::launch_options(Next next) const {
 }
 
 void ManagedInstance::spawn(Next next) {
+  (void)use_configuration();
   wants_running_ = begins_running_ = next == Next::run;
   wish_known_ = true;
   setup_failure_.clear();
@@ -383,6 +394,12 @@ void ManagedInstance::go_down(InstanceState state, const std::string& problem) {
 }
 
 void ManagedInstance::refresh() {
+  if (removed_ && !operation_ && !shutting_down_) {
+    const bool works = status_.state != InstanceState::stopped && status_.state != InstanceState::safe_mode;
+    if (phase_ == Phase::held || phase_ == Phase::backing_off)
+      return go_down(InstanceState::offline, last_end_);
+    if (phase_ == Phase::up && !works) return end_process(Next::nothing);
+  }
   if (phase_ != Phase::up) return;
   const auto runtime = watch_process();
   if (!runtime || operation_ || silent_) return;

@@ -121,7 +121,16 @@ inline constexpr Duration kAskAgain = std::chrono::seconds(2);
 //   effect, as a load or a change of the scheduler would: another application also ends safe mode and failed.
 //   Another core, priority band or settings file ends failed, too.
 //   It starts nothing that an operator stopped.
+// * While the instance has a process, what differs waits for the next one; the problem text says so. A
+// younger
+//   load or change of the scheduler by an operator takes the place of what the configuration says.
 // * A wish that was kept and cannot be read: failed. The machine is not started on a guess.
+//
+// A configuration that is read again (reconfigure, remove)
+// * An instance that is no longer in it and runs goes on running, and is `removed`. It can only be stopped,
+// which
+//   ends its process. It is not started again. So it ends, too, when its application is stopped.
+// * When a removed instance has no process, it is gone().
 class ManagedInstance : public InstanceEvents {
  public:
   struct Surroundings {
@@ -153,6 +162,17 @@ class ManagedInstance : public InstanceEvents {
   void handle(const ControlRequest& request, ControlReplyFunction reply);
   /// The end of the manager: whatever goes on is broken off, and the process ends.
   void shut_down();
+  /// The configuration says something else of it, or has it again.
+  void reconfigure(const InstanceConfig& config);
+  /// The configuration does not have it any more.
+  void remove();
+  /// What of the configuration waits for the next process; empty: nothing does.
+  [[nodiscard]] std::string awaited_changes() const;
+  [[nodiscard]] bool removed() const noexcept { return removed_; }
+  /// Removed, without process and without command.
+  [[nodiscard]] bool gone() const noexcept { return removed_ && phase_ == Phase::down && !operation_; }
+  /// What an earlier manager left is known.
+  [[nodiscard]] bool known() const noexcept { return earlier_.has_value(); }
   /// Looks at what the process says of itself. To be called now and then.
   void refresh();
 
@@ -175,6 +195,13 @@ class ManagedInstance : public InstanceEvents {
   enum class Ending : std::uint8_t { asked, terminated, killed };
   enum class Next : std::uint8_t { nothing, run, stay_stopped };
   enum class Step : std::uint8_t { storing, checking, fresh_process, until_up, forwarded, setting_boot };
+  /// What the configuration said when the process, or the next one if there is none, was decided on.
+  struct Configured {
+    std::string application;
+    std::string scheduler;
+    std::string process;  // core, priority band and settings file
+    bool operator==(const Configured&) const = default;
+  };
   struct Operation {
     ControlRequest request;
     ControlReplyFunction reply;
@@ -222,7 +249,8 @@ class ManagedInstance : public InstanceEvents {
 
   // What it is to be, over the ends of managers: instance_wishes.cpp
   void restore();
-  void apply_configuration();
+  bool use_configuration();
+  [[nodiscard]] Configured configured() const;
   void remember();
   [[nodiscard]] InstanceWish wish() const;
   void ended_unwatched();
@@ -240,7 +268,7 @@ class ManagedInstance : public InstanceEvents {
   void watch_heartbeat();
   void fall_silent(std::string_view known);
   void answers_again();
-  void tell_page_problem();
+  void tell_problems();
   void forget_signs();
 
   // Life: managed_instance.cpp
@@ -273,7 +301,7 @@ class ManagedInstance : public InstanceEvents {
   /// client, and this manager.
   [[nodiscard]] Result<std::uint64_t> send_limited(ControlVerb verb);
 
-  const InstanceConfig& config_;
+  InstanceConfig config_;
   Surroundings surroundings_;
   InstanceHost& host_;
   RestartHistory history_;
@@ -288,6 +316,7 @@ class ManagedInstance : public InstanceEvents {
   bool commanded_ = false;      // an operator has
   bool wish_known_ = false;     // wants_running_ is no guess
   bool shutting_down_ = false;
+  bool removed_ = false;     // from the configuration
   bool transient_ = false;   // this process could not be set up, but the next one may
   bool name_taken_ = false;  // another process of that name kept this one from being set up
   bool silent_ = false;      // its process does not beat
@@ -302,11 +331,12 @@ class ManagedInstance : public InstanceEvents {
   int answers_ = 0;                       // to that, since the page has beaten last
   std::optional<InstanceRuntime> said_;   // by itself last: in its page, or when it was asked
   TimePoint up_since_{};
-  TimePoint settled_{};         // when the state was last known from the process's own answer
-  std::string setup_failure_;   // why the set-up failed; empty: it did not
-  std::string last_end_;        // how the last process ended by itself; empty: it did not
-  std::string application_;     // of the next process
-  std::string scheduler_;       // of the next process; empty: as its settings say
+  TimePoint settled_{};        // when the state was last known from the process's own answer
+  std::string setup_failure_;  // why the set-up failed; empty: it did not
+  std::string last_end_;       // how the last process ended by itself; empty: it did not
+  std::string application_;    // of the next process
+  std::string scheduler_;      // of the next process; empty: as its settings say
+  Configured begun_with_;
   std::string said_scheduler_;  // by this process
   std::uint64_t next_number_ = 1;
   std::uint64_t awaited_number_ = 0;  // of the reply in adopting

@@ -149,8 +149,8 @@ void ProcessHost::forget_process() {
   process_.reset();
 }
 
-Result<void> ProcessHost::check_application(const std::string& path) {
-  auto trial = ApplicationTrial::start(settings_.program, path, settings_.settings);
+Result<void> ProcessHost::check_application(const LaunchOptions& options) {
+  auto trial = ApplicationTrial::start(settings_.program, options);
   if (!trial) return std::unexpected(trial.error());
   auto watch = reactor_.watch(trial->fd(), EPOLLIN, [this](std::uint32_t) { check_ended(); });
   if (!watch) {

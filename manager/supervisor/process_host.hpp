@@ -22,7 +22,6 @@ class ProcessHost : public InstanceHost {
     std::string name;
     std::string pool;
     std::string run_directory;
-    std::string settings;  ///< file; empty: the runtime's defaults
   };
 
   ProcessHost(Reactor& reactor, Settings settings);
@@ -34,7 +33,7 @@ class ProcessHost : public InstanceHost {
   [[nodiscard]] Result<void> request(const ControlRequest& request) override;
   void signal(int signal) override;
   void set_timer(std::optional<TimePoint> when) override;
-  [[nodiscard]] Result<void> check_application(const std::string& path) override;
+  [[nodiscard]] Result<void> check_application(const LaunchOptions& options) override;
   [[nodiscard]] std::optional<InstanceRuntime> runtime() override;
   [[nodiscard]] std::vector<int> granted_cores() override;
 

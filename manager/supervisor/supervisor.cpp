@@ -11,60 +11,109 @@
 
 namespace plchost {
 
-Supervisor::Supervisor(const ManagerConfig& config, Surroundings surroundings, const HostFactory& make_host)
-    : surroundings_(std::move(surroundings)), units_(config.instances.size()) {
-  for (std::size_t i = 0; i < units_.size(); ++i) {
-    const InstanceConfig& instance = config.instances[i];
-    HostedInstance hosted = make_host(instance);
-    units_[i].host = std::move(hosted.host);
-    units_[i].applications = std::move(hosted.applications);
-    units_[i].wishes = std::move(hosted.wishes);
-    units_[i].instance = std::make_unique<ManagedInstance>(
-        instance,
-        ManagedInstance::Surroundings{
-            .host = config.host,
-            .applications = *units_[i].applications,
-            .wishes = *units_[i].wishes,
-            .folder = surroundings_.folder,
-            .schedulers = surroundings_.schedulers,
-            .now = surroundings_.now,
-            .changed = [this, i] { changed(i); },
-            .keep_lost_faults =
-                [&host = config.host, &instance] {
-                  return keep_lost_faults(host.pool, host.run_directory, instance.name);
-                },
-            .transition =
-                [this, i](InstanceState from, InstanceState to, std::string_view reason) {
-                  if (surroundings_.transition) {
-                    surroundings_.transition(i, from, to, reason);
-                  }
-                }},
-        *units_[i].host);
-    hosted.connect(*units_[i].instance);
-    for (const std::string& name : instance.after) {
-      const auto found = std::ranges::find(config.instances, name, &InstanceConfig::name);
-      const auto other = static_cast<std::size_t>(found - config.instances.begin());
-      units_[i].after.push_back(other);
-      units_[other].before.push_back(i);
+Supervisor::Supervisor(const ManagerConfig& config, Surroundings surroundings, HostFactory make_host)
+    : host_(config.host), surroundings_(std::move(surroundings)), make_host_(std::move(make_host)) {
+  for (const InstanceConfig& instance : config.instances) add(instance);
+  link();
+}
+
+Supervisor::Unit& Supervisor::add(const InstanceConfig& config) {
+  units_.push_back(make_unit(config, free_place()));
+  return *units_.back();
+}
+
+std::unique_ptr<Supervisor::Unit> Supervisor::make_unit(const InstanceConfig& config, std::size_t place) {
+  auto made = std::make_unique<Unit>();
+  Unit* const unit = made.get();
+  HostedInstance hosted = make_host_(config);
+  unit->place = place;
+  unit->host = std::move(hosted.host);
+  unit->applications = std::move(hosted.applications);
+  unit->wishes = std::move(hosted.wishes);
+  unit->instance = std::make_unique<ManagedInstance>(
+      config,
+      ManagedInstance::Surroundings{
+          .host = host_,
+          .applications = *unit->applications,
+          .wishes = *unit->wishes,
+          .folder = surroundings_.folder,
+          .schedulers = surroundings_.schedulers,
+          .now = surroundings_.now,
+          .changed = [this, unit] { changed(*unit); },
+          .keep_lost_faults =
+              [&host = host_, name = config.name] {
+                return keep_lost_faults(host.pool, host.run_directory, name);
+              },
+          .transition =
+              [this, unit](InstanceState from, InstanceState to, std::string_view reason) {
+                if (surroundings_.transition) {
+                  surroundings_.transition(unit->instance->status(), from, to, reason);
+                }
+              }},
+      *unit->host);
+  hosted.connect(*unit->instance);
+  return made;
+}
+
+Supervisor::Unit* Supervisor::find(std::string_view name) const {
+  const auto found =
+      std::ranges::find_if(units_, [&](const auto& unit) { return unit->instance->config().name == name; });
+  return found == units_.end() ? nullptr : found->get();
+}
+
+std::size_t Supervisor::free_place() const {
+  std::size_t place = 0;
+  while (std::ranges::any_of(units_, [&](const auto& unit) { return unit->place == place; })) ++place;
+  return place;
+}
+
+// An instance may come after one that was removed meanwhile and is gone.
+void Supervisor::link() {
+  for (const auto& unit : units_) {
+    unit->after.clear();
+    unit->before.clear();
+  }
+  for (const auto& unit : units_) {
+    for (const std::string& name : unit->instance->config().after) {
+      Unit* const earlier = find(name);
+      if (earlier == nullptr) continue;
+      unit->after.push_back(earlier);
+      earlier->before.push_back(unit.get());
     }
   }
 }
 
+bool Supervisor::adopt_removed(const std::string& name) {
+  if (units_.size() == kMaxInstances || find(name) != nullptr) return false;
+  InstanceConfig config;
+  config.name = name;
+  config.autostart = false;
+  config.restart = RestartPolicy::never;
+  Unit& unit = add(config);
+  if (unit.instance->known() && unit.instance->adopt()) {
+    unit.instance->remove();
+    return true;
+  }
+  units_.pop_back();
+  return false;
+}
+
 void Supervisor::start() {
   std::vector<bool> adopted;
-  for (Unit& unit : units_) adopted.push_back(unit.instance->adopt());
+  for (const auto& unit : units_) {
+    adopted.push_back(unit->instance->has_process() || unit->instance->adopt());
+  }
   for (std::size_t i = 0; i < units_.size(); ++i) {
-    ManagedInstance& instance = *units_[i].instance;
-    surroundings_.publish(i, instance.status());
+    ManagedInstance& instance = *units_[i]->instance;
+    surroundings_.publish(units_[i]->place, instance.status());
     if (!adopted[i]) instance.resume();
   }
   advance();
 }
 
 void Supervisor::handle(const ControlRequest& request, ControlReplyFunction reply) {
-  const auto found = std::ranges::find_if(
-      units_, [&](const Unit& unit) { return unit.instance->config().name == request.instance; });
-  if (found != units_.end()) return found->instance->handle(request, std::move(reply));
+  if (const Unit* const unit = find(request.instance))
+    return unit->instance->handle(request, std::move(reply));
   reply(ControlReply{
       .number = request.number,
       .code = ErrorCode::not_found,
@@ -73,17 +122,23 @@ void Supervisor::handle(const ControlRequest& request, ControlReplyFunction repl
 
 std::string Supervisor::names() const {
   std::vector<std::string_view> names;
-  for (const Unit& unit : units_) names.emplace_back(unit.instance->config().name);
+  for (const auto& unit : units_) names.emplace_back(unit->instance->config().name);
   return join_names(names);
+}
+
+std::vector<InstanceConfig> Supervisor::configs() const {
+  std::vector<InstanceConfig> configs;
+  for (const auto& unit : units_) configs.push_back(unit->instance->config());
+  return configs;
 }
 
 void Supervisor::shut_down(std::function<void()> done) {
   shut_down_ = std::move(done);
   // Those that are held or back off must not come up while others end.
-  for (Unit& unit : units_) {
-    if (!unit.instance->has_process()) {
-      unit.ending = true;
-      unit.instance->shut_down();
+  for (const auto& unit : units_) {
+    if (!unit->instance->has_process()) {
+      unit->ending = true;
+      unit->instance->shut_down();
     }
   }
   advance();
@@ -94,16 +149,18 @@ void Supervisor::when_kept(const std::function<void()>& done) {
   const auto one_less = [left, done](const std::string& /*problem*/) {
     if (--*left == 0) done();
   };
-  for (Unit& unit : units_) unit.wishes->when_kept(one_less);
+  for (const auto& unit : units_) unit->wishes->when_kept(one_less);
   one_less("");
 }
 
 void Supervisor::refresh() {
-  for (Unit& unit : units_) unit.instance->refresh();
+  for (const auto& unit : units_) unit->instance->refresh();
+  if (!shut_down_) forget_gone();
 }
 
-void Supervisor::changed(std::size_t index) {
-  surroundings_.publish(index, units_[index].instance->status());
+void Supervisor::changed(const Unit& unit) {
+  if (!unit.instance) return;  // it is being made
+  surroundings_.publish(unit.place, unit.instance->status());
   advance();
 }
 
@@ -115,22 +172,22 @@ void Supervisor::advance() {
     if (shut_down_) {
       advance_end();
     } else {
-      for (Unit& unit : units_) {
-        if (unit.instance->held()) advance_start(unit);
+      for (const auto& unit : units_) {
+        if (unit->instance->held()) advance_start(*unit);
       }
     }
   }
   advancing_ = false;
-  const bool over = shut_down_ && std::ranges::none_of(units_, [](const Unit& unit) {
-                      return !unit.ending || unit.instance->has_process();
+  const bool over = shut_down_ && std::ranges::none_of(units_, [](const auto& unit) {
+                      return !unit->ending || unit->instance->has_process();
                     });
   if (over) std::exchange(shut_down_, nullptr)();
 }
 
 void Supervisor::advance_start(Unit& unit) {
   std::string missing;
-  for (const std::size_t other : unit.after) {
-    const ManagedInstance& earlier = *units_[other].instance;
+  for (const Unit* const other : unit.after) {
+    const ManagedInstance& earlier = *other->instance;
     if (earlier.ready()) continue;
     missing += fmt::format("{}'{}', which is {}", missing.empty() ? "waits for " : ", ",
                            earlier.config().name, to_string(earlier.status().state));
@@ -146,11 +203,11 @@ void Supervisor::advance_start(Unit& unit) {
 }
 
 void Supervisor::advance_end() {
-  for (Unit& unit : units_) {
-    const bool free = std::ranges::none_of(
-        unit.before, [&](std::size_t later) { return units_[later].instance->has_process(); });
-    if (!free || std::exchange(unit.ending, true)) continue;
-    unit.instance->shut_down();
+  for (const auto& unit : units_) {
+    const bool free =
+        std::ranges::none_of(unit->before, [](const Unit* later) { return later->instance->has_process(); });
+    if (!free || std::exchange(unit->ending, true)) continue;
+    unit->instance->shut_down();
   }
 }
 

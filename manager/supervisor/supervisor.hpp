@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,11 +23,14 @@ class Supervisor : public ControlHandler {
     std::string folder;
     std::vector<std::string_view> schedulers;
     std::function<TimePoint()> now;
-    /// Instance number `index` has changed.
-    std::function<void(std::size_t index, const InstanceStatus& status)> publish;
-    /// The process of instance number `index` has gone from one state to another. May be empty.
-    std::function<void(std::size_t index, InstanceState from, InstanceState to, std::string_view reason)>
+    /// The instance at `place` has changed. It keeps its place as long as there is one of that name.
+    std::function<void(std::size_t place, const InstanceStatus& status)> publish;
+    /// The process of that instance has gone from one state to another. May be empty.
+    std::function<void(const InstanceStatus& status, InstanceState from, InstanceState to,
+                       std::string_view reason)>
         transition = {};
+    /// There is no instance at `place` any more; the last one had this configuration. May be empty.
+    std::function<void(std::size_t place, const InstanceConfig& config)> gone = {};
   };
   /// Makes the host of one instance, and is told where its events go.
   struct HostedInstance {
@@ -37,12 +41,19 @@ class Supervisor : public ControlHandler {
   };
   using HostFactory = std::function<HostedInstance(const InstanceConfig&)>;
 
-  /// `config` outlives it.
-  Supervisor(const ManagerConfig& config, Surroundings surroundings, const HostFactory& make_host);
+  /// The [host] of `config` outlives it.
+  Supervisor(const ManagerConfig& config, Surroundings surroundings, HostFactory make_host);
 
+  /// Before start(): takes over a process that an earlier manager has left and whose instance is not in the
+  /// configuration. False: there is none.
+  bool adopt_removed(const std::string& name);
   /// Takes over what is there, then goes on with the others as an earlier manager left them, in order.
   void start();
   void handle(const ControlRequest& request, ControlReplyFunction reply) override;
+  /// full: with those that were removed and still run there would be more than kMaxInstances.
+  [[nodiscard]] Result<void> check_room(const std::vector<InstanceConfig>& now) const;
+  /// Takes over these instances in place of those before; see managed_instance.hpp. One line for each change.
+  std::vector<std::string> reload(const std::vector<InstanceConfig>& now);
   /// Ends all instances in reverse order; calls `done` when none is left, possibly at once.
   void shut_down(std::function<void()> done);
   /// Calls `done` when what all instances are to be is on the disk, or cannot be; possibly at once.
@@ -50,7 +61,11 @@ class Supervisor : public ControlHandler {
   /// To be called now and then: see ManagedInstance::refresh.
   void refresh();
 
-  [[nodiscard]] ManagedInstance& instance(std::size_t index) { return *units_[index].instance; }
+  /// Of all instances, those that were removed included.
+  [[nodiscard]] std::vector<InstanceConfig> configs() const;
+  [[nodiscard]] ManagedInstance& instance(std::size_t index) { return *units_[index]->instance; }
+  /// Where publish() is told of it.
+  [[nodiscard]] std::size_t place(std::size_t index) const { return units_[index]->place; }
   [[nodiscard]] std::size_t size() const noexcept { return units_.size(); }
 
  private:
@@ -59,21 +74,35 @@ class Supervisor : public ControlHandler {
     std::unique_ptr<ApplicationKeeper> applications;
     std::unique_ptr<WishKeeper> wishes;
     std::unique_ptr<ManagedInstance> instance;
-    std::vector<std::size_t> after;   // start first
-    std::vector<std::size_t> before;  // end first
+    std::size_t place = 0;
+    std::vector<Unit*> after;   // start first
+    std::vector<Unit*> before;  // end first
     bool ending = false;
+    std::optional<TimePoint> gone_since;
   };
-  void changed(std::size_t index);
+  Unit& add(const InstanceConfig& config);
+  [[nodiscard]] std::unique_ptr<Unit> make_unit(const InstanceConfig& config, std::size_t place);
+  [[nodiscard]] Unit* find(std::string_view name) const;
+  [[nodiscard]] std::size_t free_place() const;
+  void link();
+  void forget_gone();
+  void tell_changes(Unit& unit, const InstanceConfig& now, std::vector<std::string>& lines);
+  void changed(const Unit& unit);
   void advance();
   void advance_start(Unit& unit);
   void advance_end();
   [[nodiscard]] std::string names() const;
 
+  const HostConfig& host_;
   Surroundings surroundings_;
-  std::vector<Unit> units_;
+  HostFactory make_host_;
+  std::vector<std::unique_ptr<Unit>> units_;
   std::function<void()> shut_down_;
   bool advancing_ = false;
   bool changed_again_ = false;
 };
+
+/// So long an instance that was removed and has ended is still told, so that clients learn how it ended.
+inline constexpr Duration kGoneShown = std::chrono::milliseconds(500);
 
 }  // namespace plchost

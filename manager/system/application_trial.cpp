@@ -34,16 +34,21 @@ std::string one_line(std::string_view text) {
 
 }  // namespace
 
-Result<ApplicationTrial> ApplicationTrial::start(const std::string& plc_instance, const std::string& path,
-                                                 const std::string& settings) {
+std::vector<std::string> trial_arguments(const std::string& plc_instance, LaunchOptions options) {
+  options.application.clear();
+  options.report_fd = -1;
+  std::vector<std::string> arguments = to_arguments(plc_instance, options);
+  arguments.emplace_back("--check-application");
+  return arguments;
+}
+
+Result<ApplicationTrial> ApplicationTrial::start(std::vector<std::string> arguments,
+                                                 const std::string& path) {
   auto pipe = make_output_pipe();
   if (!pipe) return std::unexpected(pipe.error());
   (void)::fcntl(pipe->write_end.get(), F_SETPIPE_SZ, kOutputRoom);
-  SpawnRequest request{
-      .arguments = {plc_instance, "--check-application", path, "--parent", fmt::format("{}", ::getpid())},
-      .output_fd = pipe->write_end.get()};
-  if (!settings.empty()) request.arguments.insert(request.arguments.end(), {"--settings", settings});
-  auto process = spawn_process(request);
+  arguments.insert(arguments.end(), {path, "--parent", fmt::format("{}", ::getpid())});
+  auto process = spawn_process({.arguments = std::move(arguments), .output_fd = pipe->write_end.get()});
   if (!process) return std::unexpected(process.error());
   return ApplicationTrial(path, std::move(*process), std::move(pipe->read_end));
 }

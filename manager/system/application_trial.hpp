@@ -2,6 +2,7 @@
 
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "instances/launch/launch_contract.hpp"
 #include "manager/system/child_process.hpp"
@@ -12,13 +13,22 @@ namespace plchost {
 /// How long a trial may take. It ends by itself after kSetUpLimit and says so; this is for one that cannot.
 inline constexpr Duration kTrialLimit = kSetUpLimit + std::chrono::seconds(2);
 
+/// The command line that tries an application as `options` would start it; its path comes last and is
+/// missing. The application of `options` itself does not count.
+[[nodiscard]] std::vector<std::string> trial_arguments(const std::string& plc_instance,
+                                                       LaunchOptions options);
+
 /// A process that tries an application, so that nothing else is at stake: `plc-instance --check-application`,
-/// under the settings of the instance that it is for; empty: none.
+/// with all that the process of its instance is started with.
 class ApplicationTrial {
  public:
+  /// `arguments`: see trial_arguments(). `path`: of the application.
+  [[nodiscard]] static Result<ApplicationTrial> start(std::vector<std::string> arguments,
+                                                      const std::string& path);
   [[nodiscard]] static Result<ApplicationTrial> start(const std::string& plc_instance,
-                                                      const std::string& path,
-                                                      const std::string& settings = {});
+                                                      const LaunchOptions& options) {
+    return start(trial_arguments(plc_instance, options), options.application);
+  }
 
   /// Readable when it has ended.
   [[nodiscard]] int fd() const noexcept { return process_.pidfd.get(); }

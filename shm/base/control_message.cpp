@@ -28,6 +28,7 @@ constexpr std::array kVerbs = {
     std::pair{ControlVerb::register_event, std::string_view("register event")},
     std::pair{ControlVerb::unregister_event, std::string_view("unregister event")},
     std::pair{ControlVerb::check_host, std::string_view("check host")},
+    std::pair{ControlVerb::reload_host, std::string_view("reload host")},
     std::pair{ControlVerb::list_objects, std::string_view("list objects")},
     std::pair{ControlVerb::list_nodes, std::string_view("list nodes")},
     std::pair{ControlVerb::list_routes, std::string_view("list routes")},

@@ -31,6 +31,7 @@ enum class ControlVerb : std::uint8_t {
   register_event,        ///< argument: name of an external event
   unregister_event,      ///< argument: name of an external event
   check_host,            ///< of the manager, no instance: look at the host; see api/control/host_finding.hpp
+  reload_host,           ///< of the manager, no instance: take over the configuration file as it is now
   list_objects,          ///< answered by the API server itself, from the pool
   list_nodes,            ///< the same, from the directory of the nodes that send blocks
   list_routes,           ///< the same

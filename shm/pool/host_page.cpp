@@ -17,10 +17,10 @@ namespace {
 
 constexpr PageKind kHostPageKind{.what = "host page",
                                  .magic = 0x65676170'74736f68,  // "hostpage"
-                                 .version = 2};                 // 1: first; 2: InstancePlan
+                                 .version = 3};                 // 1: first; 2: InstancePlan; 3: removed
 
 static_assert(offsetof(HostPageLayout, version) == 8 && offsetof(HostPageLayout, changes) == 16);
-static_assert(sizeof(InstancePlan) == 2616 && sizeof(InstanceStatus) == 3216 && sizeof(HostStatus) == 112);
+static_assert(sizeof(InstancePlan) == 2616 && sizeof(InstanceStatus) == 3224 && sizeof(HostStatus) == 112);
 
 HostPageLayout& host_layout_of(const MemoryFile& memory) noexcept {
   return *reinterpret_cast<HostPageLayout*>(memory.bytes().data());

@@ -74,6 +74,8 @@ struct InstanceStatus {
   std::int32_t core = -1;  ///< the core the kernel granted; -1 while there is no process
   std::uint32_t restarts = 0;
   std::int64_t state_since_unix_ns = 0;
+  std::uint32_t removed = 0;  ///< 1: it is no longer in the configuration, and there until it is stopped
+  std::uint32_t reserved = 0;
   InstancePlan plan;
 };
 
@@ -96,7 +98,8 @@ class HostPageWriter {
   [[nodiscard]] static Result<HostPageWriter> create(std::string_view pool);
   static void remove(std::string_view pool) noexcept;
   void write_host(const HostStatus& status) noexcept;
-  /// `index` < the instance_count written with the host, which is at most kMaxInstances.
+  /// `index` < kMaxInstances; read once the instance_count written with the host is greater. A status
+  /// without name: there is no instance at this place.
   void write_instance(std::uint32_t index, const InstanceStatus& status) noexcept;
   /// Writes again what is not as it was written last: by a stranger. A page that was cut short is made anew.
   /// Whether there was such a thing.

@@ -86,7 +86,8 @@ void take_chunks(const std::uint8_t* data, std::size_t size) {
 
 bool names_what_is_there(const ControlRequest& request) {
   const bool of_host = request.verb == ControlVerb::check_host || request.verb == ControlVerb::list_objects ||
-                       request.verb == ControlVerb::list_nodes || request.verb == ControlVerb::list_routes;
+                       request.verb == ControlVerb::list_nodes || request.verb == ControlVerb::list_routes ||
+                       request.verb == ControlVerb::read_clock || request.verb == ControlVerb::reload_host;
   return request.instance == (of_host ? "" : "line1");
 }
 

@@ -77,6 +77,13 @@ void add_event(const Command& plcctl, CliSession& session, const char* verb, std
       .argument("INSTANCE/EVENT", *name);
 }
 
+void add_reload(const Command& plcctl, CliSession& session) {
+  plcctl.verb("reload", "Have a host read its configuration file again")
+      .noun("host",
+            "Take over what has changed in the configuration file; instances that are unchanged run on",
+            [&session] { return command(session, {"", plc_OPERATION_RELOAD_HOST, "", ""}, "reloaded"); });
+}
+
 void add_set(const Command& plcctl, CliSession& session) {
   const auto instance = std::make_shared<std::string>();
   const auto scheduler = std::make_shared<std::string>();
@@ -106,6 +113,7 @@ void add_command_verbs(const Command& plcctl, CliSession& session) {
   add_event(plcctl, session, "register", plc_OPERATION_REGISTER_EVENT, "Register an external event");
   add_event(plcctl, session, "unregister", plc_OPERATION_UNREGISTER_EVENT, "Unregister an external event");
   add_application_verbs(plcctl, session);
+  add_reload(plcctl, session);
   add_set(plcctl, session);
 }
 

@@ -24,6 +24,7 @@ bool takes_long(std::int32_t operation) {
     case plc_OPERATION_RESTART:
     case plc_OPERATION_LOAD_APPLICATION:
     case plc_OPERATION_ROLLBACK_APPLICATION:
+    case plc_OPERATION_RELOAD_HOST:
       return true;
     default:
       return false;
@@ -40,6 +41,16 @@ std::string advice(CliSession& session, const HostOutcome& outcome, const std::s
   return hint(instance, names);
 }
 
+std::vector<std::string> lines_of(std::string_view text) {
+  std::vector<std::string> lines;
+  while (!text.empty()) {
+    const auto end = std::min(text.find('\n'), text.size());
+    lines.emplace_back(text.substr(0, end));
+    text.remove_prefix(std::min(end + 1, text.size()));
+  }
+  return lines;
+}
+
 /// Says what became of it at one of `count` hosts; its exit code.
 int tell(CliSession& session, const HostOutcome& outcome, const std::string& instance, std::size_t count,
          std::string_view done) {
@@ -50,12 +61,13 @@ int tell(CliSession& session, const HostOutcome& outcome, const std::string& ins
     return CliSession::fail(error);
   }
   if (outcome.reply->code != ErrorCode::ok) {
-    const std::string said = where + outcome.reply->text + advice(session, outcome, instance);
-    fmt::print(stderr, "plcctl: {}\n", printable(said));
+    for (const std::string& line : lines_of(outcome.reply->text + advice(session, outcome, instance))) {
+      fmt::print(stderr, "plcctl: {}\n", printable(where + line));
+    }
     return kExitFailed;
   }
-  session.say(outcome.reply->text.empty() ? fmt::format("{}{}: {}", where, instance, done)
-                                          : where + outcome.reply->text);
+  if (outcome.reply->text.empty()) session.say(fmt::format("{}{}: {}", where, instance, done));
+  for (const std::string& line : lines_of(outcome.reply->text)) session.say(where + line);
   return kExitDone;
 }
 

@@ -56,6 +56,8 @@ constexpr std::array kOperations = {
               Argument::file, /*of_host=*/false, Options::download},
     Operation{plc_OPERATION_ROLLBACK_APPLICATION, ControlVerb::rollback_application, ApiRole::engineering,
               Argument::none, /*of_host=*/false, Options::loading},
+    Operation{plc_OPERATION_RELOAD_HOST, ControlVerb::reload_host, ApiRole::engineering, Argument::none,
+              /*of_host=*/true},
     Operation{plc_OPERATION_SET_SCHEDULER, ControlVerb::set_scheduler, ApiRole::engineering,
               Argument::scheduler},
     Operation{plc_OPERATION_REGISTER_EVENT, ControlVerb::register_event, ApiRole::engineering,

@@ -155,12 +155,15 @@ bool StatusPublisher::look_at_instances(TimePoint now) {
     }
     auto extension = runtime ? extension_of(*runtime) : std::vector<plc_KeyValue>();
     extension.push_back(transitions_entry(transitions_.publish(name, now)));
+    if (status->removed != 0) dds::add_entry(extension, "removed", "yes");
     changed |= instances_.update(name, sample, extension);
   }
   changed |= instances_.dispose_rest();
   changed |= exceptions_.end_round();
   for (const std::string& gone : instance_names_) {
-    if (std::ranges::find(names, gone) == names.end()) changed |= tasks_.forget(gone);
+    if (std::ranges::find(names, gone) != names.end()) continue;
+    changed |= tasks_.forget(gone);
+    transitions_.forget(gone);
   }
   instance_names_ = std::move(names);
   instances_.write();

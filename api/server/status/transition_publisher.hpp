@@ -28,6 +28,8 @@ class TransitionPublisher {
   /// Writes what is new of this instance; the number of the last one that was written, 0: none. What DDS does
   /// not take comes first the next time.
   std::uint64_t publish(const std::string& instance, TimePoint now);
+  /// There is no such instance any more; another one of that name has another ring.
+  void forget(const std::string& instance) { followed_.erase(instance); }
 
  private:
   struct Followed {

@@ -93,12 +93,20 @@ void Plant::use_api_server(const std::string& script) {
   std::filesystem::create_symlink(kBuild + "/bin/plc-instance", folder_ / "plc-instance");
 }
 
-void Plant::start_manager() {
-  const std::string config = (folder_ / "cell.toml").string();
-  std::ofstream(config) << fmt::format(
+std::string Plant::configuration() const {
+  return fmt::format(
       "[host]\nname = \"cell\"\nrun_directory = \"{}\"\nstate_directory = \"{}\"\npool = "
       "\"{}\"\n{}\n[dds]\nenabled = {}\n{}",
       (folder_ / "run").string(), (folder_ / "state").string(), pool_, host_keys_, api_server_, instances_);
+}
+
+void Plant::write_configuration() const {
+  write_configuration(configuration());
+}
+
+void Plant::start_manager() {
+  const std::string config = (folder_ / "cell.toml").string();
+  write_configuration();
   const UniqueFd log(::open((folder_ / "log").c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC,
                             0600));  // NOLINT: variadic
   std::vector<std::string> arguments = {kBuild + "/bin/plchostd", "--config", config};
@@ -161,7 +169,7 @@ ControlReply Plant::ask(ControlVerb verb, const std::string& instance, const std
 InstanceStatus Plant::status(const std::string& instance) {
   const auto page = HostPageReader::open(pool_);
   if (!page) return {};
-  for (std::uint32_t i = 0; i < names_.size(); ++i) {
+  for (std::uint32_t i = 0; i < kMaxInstances; ++i) {
     const auto status = page->instance(i);
     if (status && status->name.view() == instance) return *status;
   }

@@ -34,6 +34,13 @@ class Plant {
   [[nodiscard]] std::vector<std::string> lines_of(const std::string& name) const;
   /// A shell script in place of plchost-dds.
   void use_api_server(const std::string& script);
+  /// The configuration as it is with all add() so far.
+  void write_configuration() const;
+  /// In its place, whatever that is.
+  void write_configuration(const std::string& text) const { write_file("cell.toml", text); }
+  [[nodiscard]] std::string configuration() const;
+  /// A signal to the manager.
+  void signal_manager(int signal) const { (void)signal_process(manager_, signal); }
   /// Writes the configuration and starts a manager.
   void start_manager();
   /// SIGTERM, and how it ended.

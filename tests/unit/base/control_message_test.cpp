@@ -34,8 +34,9 @@ INSTANTIATE_TEST_SUITE_P(ControlMessage, Verb,
                                          ControlVerb::download_application, ControlVerb::rollback_application,
                                          ControlVerb::change_application, ControlVerb::set_scheduler,
                                          ControlVerb::register_event, ControlVerb::unregister_event,
-                                         ControlVerb::check_host, ControlVerb::reset_statistics,
-                                         ControlVerb::shutdown, ControlVerb::status));
+                                         ControlVerb::check_host, ControlVerb::reload_host,
+                                         ControlVerb::reset_statistics, ControlVerb::shutdown,
+                                         ControlVerb::status));
 
 TEST(ControlMessage, RepliesOfEachCodeSurviveTheRoundTrip) {
   for (unsigned code = 0; code <= static_cast<unsigned>(ErrorCode::corrupt); ++code) {

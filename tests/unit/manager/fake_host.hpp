@@ -28,8 +28,8 @@ class FakeHost : public InstanceHost {
   }
   void signal(int signal) override { signals.push_back(signal); }
   void set_timer(std::optional<TimePoint> when) override { timer = when; }
-  [[nodiscard]] Result<void> check_application(const std::string& path) override {
-    checked.push_back(path);
+  [[nodiscard]] Result<void> check_application(const LaunchOptions& options) override {
+    checked.push_back(options.application);
     return {};
   }
   [[nodiscard]] std::optional<InstanceRuntime> runtime() override { return page; }

@@ -17,16 +17,19 @@ class FakeKeeper : public ApplicationKeeper {
     ApplicationOrder order;
     std::string name;
     std::string before;
+    LaunchOptions launch;
   };
 
   [[nodiscard]] Result<void> keep(const ApplicationOrder& order, const std::string& name,
-                                  const std::string& before, Done done) override {
+                                  const std::string& before, const LaunchOptions& launch,
+                                  Done done) override {
     if (!can_start) return failure(ErrorCode::system, "start the helper");
-    kept.push_back({order, name, before});
+    kept.push_back({order, name, before, launch});
     done_ = std::move(done);
     return {};
   }
-  [[nodiscard]] Result<void> set_boot(const std::string& path, Done done) override {
+  [[nodiscard]] Result<void> set_boot(const std::string& path, const std::string& /*configured*/,
+                                      Done done) override {
     if (!can_start) return failure(ErrorCode::system, "start the helper");
     booted.push_back(path);
     done_ = std::move(done);

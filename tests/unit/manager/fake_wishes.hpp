@@ -29,9 +29,12 @@ class FakeWishes : public WishKeeper {
     }
   }
 
+  [[nodiscard]] bool is_writing() const override { return writing; }
+
   std::optional<InstanceWish> wish;
   bool damaged = false;
   bool disk_is_slow = false;
+  bool writing = false;
   std::string problem;
   std::vector<Kept> waiting;
   int writes = 0;

@@ -48,6 +48,8 @@ TEST_F(ManagedInstanceTest, TellsItsPlanAlsoWhenThatChanges) {
   config_.restart = RestartPolicy::never;
   config_.after.clear();
   bring_up();
+  EXPECT_EQ(sut().status().plan.restart, RestartPolicy::always);
+  sut().reconfigure(config_);
   EXPECT_EQ(sut().status().plan.restart, RestartPolicy::never);
   EXPECT_EQ(sut().status().plan.after.view(), "");
 }

@@ -45,9 +45,10 @@ class StoreApplication : public testing::Test {
   }
   /// In the place of plc-instance.
   void set_trial(const std::string& script) {
-    order_.plc_instance = root_ / "trial";
-    std::ofstream(order_.plc_instance) << "#!/bin/sh\n" << script << "\n";
-    std::filesystem::permissions(order_.plc_instance, std::filesystem::perms::owner_all);
+    const std::string program = root_ / "trial";
+    order_.trial = {program, "--check-application"};
+    std::ofstream(program) << "#!/bin/sh\n" << script << "\n";
+    std::filesystem::permissions(program, std::filesystem::perms::owner_all);
   }
   /// Sends and keeps it, as what is loaded from then on.
   std::string keep(const std::string& contents) {
@@ -266,6 +267,7 @@ TEST(StoreOrder, SurvivesTheRoundTrip) {
   order.size = 1ULL << 40U;
   order.keep = 5;
   order.name = "l\xc3\xa4mp.so";
+  order.trial = {"/usr/bin/plc-instance", "--name", "line \"1\""};
   const auto decoded = decode_store_order(encode(order));
   ASSERT_TRUE(decoded);
   EXPECT_EQ(decoded->folder, order.folder);
@@ -273,6 +275,7 @@ TEST(StoreOrder, SurvivesTheRoundTrip) {
   EXPECT_EQ(decoded->size, order.size);
   EXPECT_EQ(decoded->keep, 5U);
   EXPECT_EQ(decoded->name, order.name);
+  EXPECT_EQ(decoded->trial, order.trial);
   for (const char* bad : {"", "{}", "[]", "{\"size\":-1}"}) {
     EXPECT_EQ(decode_store_order(bad).error().code, ErrorCode::corrupt);
   }

@@ -36,21 +36,25 @@ class SupervisorTest : public testing::Test {
   }
 
   void make() {
-    sut_.emplace(config_,
-                 Supervisor::Surroundings{
-                     .folder = "/etc",
-                     .schedulers = {"CmpSchedule"},
-                     .now = [] { return TimePoint(std::chrono::seconds(1)); },
-                     .publish = [this](std::size_t index,
-                                       const InstanceStatus& status) { published_[index] = status; }},
-                 [this](const InstanceConfig& config) {
-                   auto host = std::make_unique<FakeHost>();
-                   hosts_[config.name] = host.get();
-                   return Supervisor::HostedInstance{.host = std::move(host),
-                                                     .applications = std::make_unique<FakeKeeper>(),
-                                                     .wishes = std::make_unique<FakeWishes>(),
-                                                     .connect = [](InstanceEvents&) {}};
-                 });
+    sut_.emplace(
+        config_,
+        Supervisor::Surroundings{
+            .folder = "/etc",
+            .schedulers = {"CmpSchedule"},
+            .now = [this] { return now_; },
+            .publish = [this](std::size_t index,
+                              const InstanceStatus& status) { published_[index] = status; },
+            .gone = [this](std::size_t place, const InstanceConfig& config) { gone_[place] = config.name; }},
+        [this](const InstanceConfig& config) {
+          auto host = std::make_unique<FakeHost>();
+          hosts_[config.name] = host.get();
+          auto wishes = std::make_unique<FakeWishes>();
+          wishes_[config.name] = wishes.get();
+          return Supervisor::HostedInstance{.host = std::move(host),
+                                            .applications = std::make_unique<FakeKeeper>(),
+                                            .wishes = std::move(wishes),
+                                            .connect = [](InstanceEvents&) {}};
+        });
   }
   ManagedInstance& instance(const std::string& name) {
     for (std::size_t i = 0; i < sut_->size(); ++i) {
@@ -70,7 +74,10 @@ class SupervisorTest : public testing::Test {
   }
 
   ManagerConfig config_;
+  TimePoint now_{std::chrono::seconds(1)};
   std::map<std::string, FakeHost*> hosts_;
+  std::map<std::string, FakeWishes*> wishes_;
+  std::map<std::size_t, std::string> gone_;
   std::map<std::size_t, InstanceStatus> published_;
   std::optional<Supervisor> sut_;
 };
@@ -180,6 +187,49 @@ TEST_F(SupervisorTest, NamesTheInstancesThatThereAre) {
   EXPECT_EQ(reply.number, 3U);
   EXPECT_EQ(reply.code, ErrorCode::not_found);
   EXPECT_EQ(reply.text, "no instance 'x'; there are packer1, line1, drive1");
+}
+
+TEST_F(SupervisorTest, KeepsThePlaceOfEachInstanceWhenOthersComeAndGo) {
+  start_all();
+  std::vector<InstanceConfig> now = config_.instances;
+  std::erase_if(now, [](const InstanceConfig& instance) { return instance.name == "packer1"; });
+  InstanceConfig spare;
+  spare.name = "spare";
+  spare.core = 1;
+  spare.after = {"drive1"};
+  now.push_back(spare);
+  EXPECT_THAT(sut_->reload(now), ElementsAre("instance 'packer1': removed; it runs until it is stopped",
+                                             "instance 'spare': new"));
+  EXPECT_EQ(published_.at(3).name.view(), "spare");
+  EXPECT_EQ(state("spare"), InstanceState::starting) << "drive1 is up";
+  instance("packer1").on_exit(killed_by(SIGSEGV));
+  wishes_["packer1"]->writing = true;
+  sut_->refresh();
+  now_ += kGoneShown;
+  sut_->refresh();
+  EXPECT_TRUE(gone_.empty()) << "its wish is being written";
+  wishes_["packer1"]->writing = false;
+  sut_->refresh();
+  now_ += kGoneShown;
+  sut_->refresh();
+  EXPECT_EQ(gone_.at(0), "packer1");
+  spare.name = "next";
+  now.push_back(spare);
+  EXPECT_THAT(sut_->reload(now), ElementsAre("instance 'next': new"));
+  EXPECT_EQ(published_.at(0).name.view(), "next");
+  EXPECT_EQ(published_.at(1).name.view(), "line1");
+}
+
+TEST_F(SupervisorTest, HasRoomForAsManyAsThePageHas) {
+  start_all();
+  std::vector<InstanceConfig> now(kMaxInstances - 2);
+  for (std::size_t i = 0; i < now.size(); ++i) now[i].name = "new" + std::to_string(i);
+  const auto full = sut_->check_room(now);
+  ASSERT_FALSE(full);
+  EXPECT_EQ(full.error().code, ErrorCode::full);
+  EXPECT_THAT(full.error().message, HasSubstr("3 instances are removed and 62 would be configured"));
+  now.pop_back();
+  EXPECT_TRUE(sut_->check_room(now));
 }
 
 }  // namespace
