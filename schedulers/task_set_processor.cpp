@@ -28,7 +28,7 @@ std::vector<std::string> TaskSet::look_after_processor() {
                     "this instance take its core",
                     tasks_[*task]->config().name, in_ms(limit)));
   }
-  if (!running_ || stop_) {
+  if (!supervision_->watches_releases()) {
     ProcessorGuard::alive();
     if (const auto taker = ProcessorGuard::take()) {
       news.push_back(

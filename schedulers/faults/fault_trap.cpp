@@ -106,6 +106,10 @@ void FaultTrap::disarm() noexcept {
   started_.store(0, std::memory_order_release);
 }
 
+bool FaultTrap::armed_here() noexcept {
+  return armed != nullptr;
+}
+
 std::optional<TimePoint> FaultTrap::running_since() const noexcept {
   const auto started = started_.load(std::memory_order_acquire);
   if (started == 0) return std::nullopt;

@@ -22,6 +22,8 @@ class FaultTrap {
   void change(TaskFault& fault) noexcept { fault_.store(&fault, std::memory_order_relaxed); }
   void disarm() noexcept;
 
+  /// The calling thread runs code of a task. Any context.
+  [[nodiscard]] static bool armed_here() noexcept;
   /// Since when the code runs that is running now. Any thread.
   [[nodiscard]] std::optional<TimePoint> running_since() const noexcept;
   [[nodiscard]] TaskFault* fault() const noexcept { return fault_.load(std::memory_order_relaxed); }

@@ -8,6 +8,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include "schedulers/faults/fault_trap.hpp"
 #include "shm/base/system_call.hpp"
 
 namespace plchost {
@@ -44,7 +45,8 @@ void on_long_run(int) noexcept {
   // A thread that sleeps is kept from its sign by something else.
   const bool starved = limit > Duration::zero() && silent > limit / kSigns &&
                        !linux_processor_times().sleeps(signer.load(std::memory_order_relaxed));
-  if (starved) {
+  // How long a cycle may take is for the watchdogs to say.
+  if (starved && !FaultTrap::armed_here()) {
     const ThreadText who = linux_processor_times().demote(::gettid());
     if (!who.view().empty()) ProcessorGuard::report(who, silent);
   }

@@ -65,23 +65,24 @@ void Starvation::look_at(std::size_t index, TimePoint now) noexcept {
   const bool got_none = used_by(tasks_[index]->trap()) - hunger.used <= hunger.lasted / kNothing;
   // A cycle may wait for something else. What is due may, too, but then because who releases it gets nothing.
   const bool sleeps = times_.sleeps(tasks_[index]->trap().thread());
-  if (!got_none || (sleeps && hunger.demand->cycle_since)) {
-    hunger = {.demand = demand, .looked_at = now};
-  } else if (is_by_this_process(index)) {
+  const bool starves = got_none && !(sleeps && hunger.demand->cycle_since);
+  const Takers takers = starves ? takers_from(index) : Takers::threads_of_tasks;
+  if (takers == Takers::other_threads) {
     searched_for_ = index;
     search_.begin(now);
-  } else if (!sleeps) {
-    by_others_.store(index + 1, std::memory_order_relaxed);
-    hunger = {.demand = demand, .looked_at = now};
+    return;
   }
+  if (takers == Takers::other_programs && !sleeps) by_others_.store(index + 1, std::memory_order_relaxed);
+  hunger = {.demand = demand, .looked_at = now};
 }
 
 // What the threads take that run tasks is for the other watchdogs to judge.
-bool Starvation::is_by_this_process(std::size_t index) noexcept {
+Starvation::Takers Starvation::takers_from(std::size_t index) noexcept {
   const Hunger& hunger = hunger_[index];
   const Duration by_process = times_.of_process() - hunger.by_process;
   const Duration by_tasks = used_by_tasks() - hunger.by_tasks;
-  return by_process - by_tasks >= hunger.lasted / 2;
+  if (by_process - by_tasks >= hunger.lasted / 2) return Takers::other_threads;
+  return by_process >= hunger.lasted / 2 ? Takers::threads_of_tasks : Takers::other_programs;
 }
 
 // The task has its fault as soon as its cause is gone. Then the others are looked for that were below it.

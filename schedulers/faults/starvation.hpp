@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -55,7 +56,8 @@ class Starvation {
   };
 
   void look_at(std::size_t index, TimePoint now) noexcept;
-  [[nodiscard]] bool is_by_this_process(std::size_t index) noexcept;
+  enum class Takers : std::uint8_t { threads_of_tasks, other_threads, other_programs };
+  [[nodiscard]] Takers takers_from(std::size_t index) noexcept;
   void end_search(TimePoint now) noexcept;
   void take_reported(TimePoint now) noexcept;
   void raise(Task& task, Duration lasted, const ThreadText& who) noexcept;

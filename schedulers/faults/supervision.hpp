@@ -42,6 +42,10 @@ class Supervision {
 
   /// By how much it is too late to look: threads above it take the processor. Any thread.
   [[nodiscard]] Duration overdue(TimePoint now) const noexcept;
+  /// Tasks are released, and must get the processor. Any thread.
+  [[nodiscard]] bool watches_releases() const noexcept {
+    return mode_.load(std::memory_order_relaxed) == Mode::running;
+  }
   [[nodiscard]] Starvation& starvation() noexcept { return starvation_; }
 
   /// The tasks run from now on, or run under another scheduler. Control thread.

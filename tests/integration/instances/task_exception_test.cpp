@@ -243,6 +243,29 @@ TEST(TaskException, IsNoneOfAThreadThatTakesTheProcessorWhileNoTaskRuns) {
   EXPECT_EQ(sut.process().end(SIGTERM), EXIT_SUCCESS) << sut.process().log();
 }
 
+TEST(TaskException, IsNoneOfALongCycleThatAStopWaitsFor) {
+  Faulty sut("[CmpSchedule]\nWatchdog.DefaultTimeMs=600\n[Task.Compute]\nWatchdog.TimeUs=20000000\n");
+  sut.process().event("compute").post();
+  EXPECT_EQ(sut.process().ask(ControlVerb::stop).code, ErrorCode::ok);
+  EXPECT_EQ(sut.process().task("Compute")->counters.cycles, 1U);
+  EXPECT_EQ(sut.process().log().find("took the processor"), std::string::npos) << sut.process().log();
+  EXPECT_EQ(sut.process().log().find("programs outside"), std::string::npos) << sut.process().log();
+  EXPECT_EQ(sut.process().ask(ControlVerb::start).code, ErrorCode::ok) << sut.process().log();
+  EXPECT_EQ(sut.process().end(SIGTERM), EXIT_SUCCESS) << sut.process().log();
+}
+
+TEST(TaskException, IsNoneOfAThreadThatLoopsOnACoreOfItsOwn) {
+  if (!Thread::start("probe", {.fifo = 1}, [] {})) GTEST_SKIP() << "no right to SCHED_FIFO";
+  const auto cores = allowed_cores(0).value();
+  if (cores.front() != 0 || cores.back() == 0) GTEST_SKIP() << "no two cores, or not the first one";
+  Faulty sut("[CmpSchedule]\nWatchdog.DefaultTimeMs=600\n");
+  sut.process().event("far_hog").post();
+  const TimePoint end = MonotonicClock::now() + 1500ms;
+  while (MonotonicClock::now() < end) EXPECT_TRUE(sut.runs("Fast"));
+  EXPECT_EQ(sut.process().log().find("hog"), std::string::npos) << sut.process().log();
+  EXPECT_EQ(sut.process().end(SIGTERM), EXIT_SUCCESS) << sut.process().log();
+}
+
 TEST(TaskException, OfAWildPointerDoesNotTakeItForANullPointer) {
   Faulty sut;
   (void)sut.process().event("write_wild").post();

@@ -142,6 +142,7 @@ TEST_F(StarvationTest, ByAThreadThatRunsTasksIsForItsOwnWatchdogs) {
       .join();
   go_on_for(kLimit * 3, 100, {poller_.thread()});
   EXPECT_EQ(record(), nullptr);
+  EXPECT_FALSE(sut_->take_starved_by_others());
   EXPECT_TRUE(times_.demoted.empty());
 }
 

@@ -66,6 +66,7 @@ __attribute__((noinline)) void sleep_for_ever() {
 
 // A thread of the application's own that never ends; priority 0: as it comes.
 std::atomic<bool> hog_waits{false};
+std::atomic<bool> hog_goes_away{false};  // to the first core, which the tasks do not have
 void loop_in_a_thread(int priority, const char* name = "hog", bool blocks_signals = false) {
   pthread_attr_t attributes;
   pthread_attr_init(&attributes);
@@ -85,6 +86,12 @@ void loop_in_a_thread(int priority, const char* name = "hog", bool blocks_signal
   const auto body = [](void* own_name) -> void* {
     pthread_setname_np(pthread_self(), static_cast<const char*>(own_name));
     if (hog_waits) std::this_thread::sleep_for(500ms);
+    if (hog_goes_away) {
+      cpu_set_t first;
+      CPU_ZERO(&first);
+      CPU_SET(0, &first);
+      sched_setaffinity(0, sizeof first, &first);
+    }
     loop();
     return nullptr;
   };
@@ -145,6 +152,11 @@ void setup(plc::Application& app) {
   app.external("LateHog", 4, "late_hog", [] {
     hog_waits = true;
     loop_in_a_thread(60);
+  });
+  app.external("Compute", 4, "compute", [] { spin(1500ms); });
+  app.external("FarHog", 4, "far_hog", [] {
+    hog_goes_away = true;
+    loop_in_a_thread(80);
   });
   app.external("DeafHog", 4, "deaf_hog", [] { loop_in_a_thread(60, "hog", true); });
   app.external("TwoHogs", 4, "two_hogs", [] {
