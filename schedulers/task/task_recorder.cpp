@@ -24,6 +24,13 @@ std::uint64_t slots(const RecordedCycle& cycle) noexcept {
   return static_cast<std::uint64_t>((taken + cycle.interval - Duration(1)) / cycle.interval);
 }
 
+/// Which posts were run and lost: a reset of the statistics changes nothing of that.
+void keep_posts(const TaskCounters& from, TaskCounters& to) noexcept {
+  to.posts_done = from.posts_done;
+  to.posts_lost_first = from.posts_lost_first;
+  to.posts_lost_last = from.posts_lost_last;
+}
+
 }  // namespace
 
 TaskRecorder::TaskRecorder(TaskStatistics& statistics, TimePoint now) noexcept
@@ -73,7 +80,10 @@ void TaskRecorder::lose_posts(std::uint64_t count) noexcept {
   // A cycle that did not come to its end holds nothing: who resets is the only other owner.
   const bool owns = acquire(Owner::task);
   if (owns && resets_ != obeyed_resets_) begin_anew();
-  counters_.lost_events += missing > CountedEvent::kCountMask ? 1 : missing;
+  const std::uint64_t lost = missing > CountedEvent::kCountMask ? 1 : missing;
+  counters_.lost_events += lost;
+  counters_.posts_lost_first = count - lost + 1;
+  counters_.posts_lost_last = count;
   if (!owns) return;
   statistics_.counters.write(counters_);
   release();
@@ -81,10 +91,10 @@ void TaskRecorder::lose_posts(std::uint64_t count) noexcept {
 
 void TaskRecorder::begin_anew() noexcept {
   const std::int64_t interval_ns = counters_.interval_ns;
-  const std::uint64_t posts_done = counters_.posts_done;
+  const TaskCounters before = counters_;
   counters_ = TaskCounters{};
   counters_.interval_ns = interval_ns;
-  counters_.posts_done = posts_done;
+  keep_posts(before, counters_);
   counters_.cycles = cycles_.load(std::memory_order_relaxed);
   counters_.since_ns = since_ns_;
   counters_.since_unix_ns = since_unix_ns_;
@@ -111,6 +121,10 @@ void TaskRecorder::count(const RecordedCycle& cycle) noexcept {
   now.lost_consecutive = cycle.lost_cycles;
   now.lost_consecutive_max = std::max(now.lost_consecutive_max, cycle.lost_cycles);
   now.lost_events += cycle.lost_events;
+  if (cycle.lost_events > 0) {
+    now.posts_lost_first = cycle.posts_done - cycle.lost_events;
+    now.posts_lost_last = cycle.posts_done - 1;
+  }
   now.posts_done = cycle.posts_done;
   now.timer_expirations += cycle.timer_expirations;
   now.slots_last = slots(cycle);
@@ -133,7 +147,7 @@ bool TaskRecorder::reset(TimePoint now) noexcept {
   fresh.cycles = cycles_.load(std::memory_order_relaxed);
   if (const auto before = statistics_.counters.read()) {
     fresh.interval_ns = before->interval_ns;
-    fresh.posts_done = before->posts_done;
+    keep_posts(*before, fresh);
   }
   fresh.since_ns = since_ns_;
   fresh.since_unix_ns = since_unix_ns_;

@@ -18,7 +18,7 @@ constexpr std::uint64_t kMagic = 0x67617074'736e6970;  // "pinstpag"
 /// shapes. 5: the idle states. 6: the distributed clock. 7: state and problem of the application.
 /// 8: why a reference record is not followed. 9: faults. 10: the post that was run.
 /// 11: why retain variables are not written.
-constexpr std::uint32_t kVersion = 11;
+constexpr std::uint32_t kVersion = 12;
 constexpr std::size_t kTasksOffset = (sizeof(InstancePageLayout) + 63) / 64 * 64;
 
 static_assert(offsetof(InstancePageLayout, version) == 8 && offsetof(InstancePageLayout, size) == 16);

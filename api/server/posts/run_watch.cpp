@@ -81,6 +81,13 @@ void RunWatch::look_at(Wait& wait, Run& run, const TaskWatch& tasks) {
   if (task && task->counters.posts_done >= run.target.count) {
     run.done = true;
     const TaskCounters& counters = task->counters;
+    if (run.target.count <= counters.posts_lost_last) {
+      // Of losses before the last one nothing is known.
+      const bool lost = run.target.exact && run.target.count >= counters.posts_lost_first;
+      return decide(wait, ErrorCode::wrong_state,
+                    fmt::format("{}: '{}' lost posts, as it was stopped or had too many of them",
+                                lost ? "the post was lost" : "whether it was run is not known", name()));
+    }
     const std::int64_t start = wrapping_sum(counters.release_ns, counters.latency_last_ns);
     const std::int64_t end = wrapping_sum(start, counters.exec_last_ns);
     const std::int64_t received = wait.received.time_since_epoch().count();

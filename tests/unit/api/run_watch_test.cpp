@@ -1,5 +1,8 @@
 #include "api/server/posts/run_watch.hpp"
 
+#include <map>
+#include <string>
+
 #include <gmock/gmock.h>
 #include <unistd.h>
 
@@ -38,9 +41,12 @@ class RunWatchTest : public testing::Test {
     page_.write_runtime(runtime);
   }
   /// The task's last cycle: for which post, and how long after now_ it began; it took 3 us.
-  void write_cycle(std::uint64_t post, microseconds start) {
+  void write_cycle(std::uint64_t post, microseconds start, std::uint64_t lost_first = 0,
+                   std::uint64_t lost_last = 0) {
     TaskCounters counters{};
     counters.posts_done = post;
+    counters.posts_lost_first = lost_first;
+    counters.posts_lost_last = lost_last;
     counters.release_ns = (now_ + start - microseconds(2)).time_since_epoch().count();
     counters.latency_last_ns = 2000;
     counters.exec_last_ns = 3000;
@@ -82,6 +88,21 @@ TEST_F(RunWatchTest, TellsWhenTheTaskHasRunForThePost) {
   EXPECT_EQ(told[0].start_ns, 10'000);
   EXPECT_EQ(told[0].end_ns, 13'000);
   EXPECT_TRUE(sut_.empty());
+}
+
+TEST_F(RunWatchTest, TellsThatThePostWasLostThoughALaterOneWasRun) {
+  for (const std::uint64_t count : {2U, 3U, 5U, 6U}) sut_.add(post(count, "ready", count), tasks_);
+  write_cycle(6, microseconds(10), 3, 5);
+
+  const auto told = sut_.look(tasks_, now_);
+
+  const std::map<std::uint64_t, std::string> expected = {
+      {2, "whether it was run is not known"}, {3, "the post was lost"}, {5, "the post was lost"}, {6, ""}};
+  ASSERT_EQ(told.size(), expected.size());
+  for (const auto& run : told) {
+    EXPECT_EQ(run.code, run.sequence_number == 6 ? 0 : static_cast<int>(ErrorCode::wrong_state));
+    EXPECT_THAT(std::string(dds::text_of(run.text)), testing::StartsWith(expected.at(run.sequence_number)));
+  }
 }
 
 TEST_F(RunWatchTest, TellsOfAPostThatCameAgainOnceAndFromItsFirstArrival) {

@@ -91,6 +91,23 @@ TEST_F(Recorder, TellsForWhichPostTheLastCycleWasAlsoAfterAReset) {
   EXPECT_EQ(read().posts_done, 7U);
 }
 
+TEST_F(Recorder, TellsWhichPostsWereLostLastAlsoAfterAReset) {
+  RecordedCycle one = cycle(0);
+  one.posts_done = 9;
+  one.lost_events = 3;
+  sut_.record(one);
+  EXPECT_EQ(read().posts_lost_first, 6U);
+  EXPECT_EQ(read().posts_lost_last, 8U);
+  one.posts_done = 10;
+  one.lost_events = 0;
+  sut_.record(one);
+  ASSERT_TRUE(sut_.reset(TimePoint(milliseconds(5))));
+  EXPECT_EQ(read().posts_lost_last, 8U);
+  sut_.lose_posts(14);
+  EXPECT_EQ(read().posts_lost_first, 11U);
+  EXPECT_EQ(read().posts_lost_last, 14U);
+}
+
 TEST_F(Recorder, OnlyCyclicTasksHaveJitterAndSlots) {
   for (int n = 0; n < 3; ++n) {
     RecordedCycle one = cycle(n, microseconds(n), milliseconds(50));
