@@ -1,14 +1,66 @@
 #include "shm/base/log.hpp"
 
-#include <spdlog/sinks/stdout_sinks.h>
+#include <algorithm>
+#include <cerrno>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <string_view>
+
+#include <poll.h>
+#include <spdlog/sinks/base_sink.h>
+#include <unistd.h>
+
+#include "shm/base/log_line.hpp"
 
 namespace plchost {
 
+namespace {
+
+// Standard error, which it never waits for: a line that finds a full pipe or socket is counted instead. No
+// process stands still because nobody reads its log.
+class ErrorStreamSink final : public spdlog::sinks::base_sink<std::mutex> {
+ protected:
+  void sink_it_(const spdlog::details::log_msg& message) override {
+    if (lost_ > 0) tell_of_lost(message);
+    spdlog::memory_buf_t line;
+    formatter_->format(message, line);
+    if (!write_all({line.data(), line.size()})) ++lost_;
+  }
+  void flush_() override {}
+
+ private:
+  void tell_of_lost(const spdlog::details::log_msg& next) {
+    const std::string text = fmt::format("{} lines before this one were lost: nobody read them", lost_);
+    const spdlog::details::log_msg message(next.time, {}, next.logger_name, spdlog::level::warn, text);
+    spdlog::memory_buf_t line;
+    formatter_->format(message, line);
+    if (write_all({line.data(), line.size()})) lost_ = 0;
+  }
+
+  static bool write_all(std::string_view text) noexcept {
+    // So much fits into a pipe that takes anything.
+    constexpr std::size_t kAtOnce = 4096;
+    while (!text.empty()) {
+      pollfd poll{.fd = STDERR_FILENO, .events = POLLOUT, .revents = 0};
+      if (::poll(&poll, 1, 0) != 1 || (poll.revents & POLLOUT) == 0) return false;
+      const ssize_t written = ::write(STDERR_FILENO, text.data(), std::min(text.size(), kAtOnce));
+      if (written < 0 && errno == EINTR) continue;
+      if (written <= 0) return false;
+      text.remove_prefix(static_cast<std::size_t>(written));
+    }
+    return true;
+  }
+
+  std::uint64_t lost_ = 0;
+};
+
+}  // namespace
+
 void start_log(const std::string& program, const std::string& level) {
-  auto logger = spdlog::stderr_logger_mt(program);
-  logger->set_pattern("%Y-%m-%d %H:%M:%S.%e %l %n: %v");
+  auto logger = std::make_shared<spdlog::logger>(program, std::make_shared<ErrorStreamSink>());
+  logger->set_pattern(kLogPattern);
   logger->set_level(spdlog::level::from_str(level));
-  logger->flush_on(spdlog::level::trace);
   spdlog::set_default_logger(std::move(logger));
 }
 

@@ -15,6 +15,7 @@ extern template void fmt::detail::vformat_to<char>(fmt::detail::buffer<char>&, f
 namespace plchost {
 
 /// Makes standard error the log of this process: "2026-01-31 12:00:00.000 warning plchostd: text". Set-up.
+/// It never waits for the reader of that: lines that find a full pipe are lost, and counted in a later line.
 /// Never called from a real-time thread; `level` is one of trace, debug, info, warning, error.
 void start_log(const std::string& program, const std::string& level = "info");
 
