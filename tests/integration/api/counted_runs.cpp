@@ -31,7 +31,7 @@ void setup(plc::Application& app) {
   app.cyclic("Main", 1, 2ms, [] {});
   for (std::size_t i = 0; i < kEvents; ++i) {
     const std::string number = std::to_string(i);
-    app.external(("Count" + number).c_str(), 5, ("e" + number).c_str(), [i] {
+    app.external("Count" + number, 5, "e" + number, [i] {
       if (runs != nullptr) runs[i].fetch_add(1);
     });
   }
