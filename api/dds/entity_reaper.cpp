@@ -3,6 +3,8 @@
 #include <iterator>
 #include <utility>
 
+#include "api/dds/instances.hpp"
+
 namespace plchost::dds {
 
 Result<std::unique_ptr<EntityReaper>> EntityReaper::create() {
@@ -25,11 +27,14 @@ EntityReaper::~EntityReaper() {
 void EntityReaper::take(std::vector<Entity> entities) {
   {
     const std::lock_guard lock(mutex_);
-    if (waiting_.size() >= kMost) return;
-    waiting_.insert(waiting_.end(), std::make_move_iterator(entities.begin()),
-                    std::make_move_iterator(entities.end()));
+    if (waiting_.size() < kMost) {
+      waiting_.insert(waiting_.end(), std::make_move_iterator(entities.begin()),
+                      std::make_move_iterator(entities.end()));
+      entities.clear();
+    }
   }
   changed_.notify_one();
+  for (Entity& entity : entities) delete_entity(std::move(entity));
 }
 
 void EntityReaper::run() {
@@ -39,7 +44,7 @@ void EntityReaper::run() {
     if (waiting_.empty()) return;
     std::vector<Entity> entities = std::exchange(waiting_, {});
     lock.unlock();
-    for (Entity& entity : entities) entity.reset();
+    for (Entity& entity : entities) delete_entity(std::move(entity));
     lock.lock();
   }
 }

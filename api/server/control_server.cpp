@@ -160,6 +160,7 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
     if (options.beat_fd >= 0) raise_event(options.beat_fd);
   } else if (fd == identity_timer.get()) {
     tell_of_refused(MonotonicClock::now());
+    (void)heap.look(MonotonicClock::now());
     if (identity_changed()) return false;
     return keeps_name();
   } else if (fd == signals.get()) {
@@ -219,7 +220,7 @@ Result<bool> ControlServer::Parts::keeps_name() {
 }
 
 void ControlServer::Parts::on_wake() {
-  sessions->follow_discovery();
+  heap.worked(sessions->follow_discovery(), MonotonicClock::now());
   write_acks();
   send_late_answers(MonotonicClock::now());
   for (const AwaitedPost& post : intake->collect_awaited()) runs.add(post, status->tasks());
@@ -239,6 +240,7 @@ void ControlServer::Parts::record_posts() {
   const TimePoint now = MonotonicClock::now();
   audit->posted_to(intake->collect_posted(), now);
   for (const plc_EventAck& ack : intake->collect_written_acks()) {
+    heap.worked(1, now);
     sessions->was_answered(dds::Guid::from(ack.source).participant(), now);
     audit->posted(ack, now);
   }
@@ -257,6 +259,7 @@ void ControlServer::Parts::look_at_runs() {
 void ControlServer::Parts::on_requests(const RequestReader& source) {
   constexpr std::size_t kAtOnce = 16;
   const dds::Samples<plc_Request, kAtOnce> batch(source.reader.get());
+  heap.worked(batch.size(), MonotonicClock::now());
   for (std::size_t i = 0; i < batch.size(); ++i) {
     if (batch.valid(i)) on_request(source, batch[i], batch.info(i));
   }

@@ -19,6 +19,7 @@
 #include "api/server/answer_memory.hpp"
 #include "api/server/control_server.hpp"
 #include "api/server/downloads/download_table.hpp"
+#include "api/server/heap_trim.hpp"
 #include "api/server/lists/node_lister.hpp"
 #include "api/server/lists/object_lister.hpp"
 #include "api/server/manager_link.hpp"
@@ -135,6 +136,7 @@ struct ControlServer::Parts {
   dds::Entity participant;
   std::optional<NameClaim> name;
   std::optional<SessionTable> sessions;
+  HeapTrim heap;
   AnswerMemory answers;
   /// Of a request that was done, until it is in the audit log.
   struct LateAnswer {

@@ -27,6 +27,7 @@ Result<SessionTable> SessionTable::create(dds_entity_t participant, std::string 
   if (!reaper) return std::unexpected(std::move(reaper).error());
   table.reaper_ = std::move(*reaper);
   table.participant_ = participant;
+  table.ack_writers_ = std::make_unique<AckWriters>(host);
   table.host_ = std::move(host);
   for (std::size_t i = 0; i < kStreams; ++i) {
     auto topic = dds::make_topic(participant, kStreamTopics[i]);
@@ -50,14 +51,16 @@ std::vector<dds_entity_t> SessionTable::discovery_readers() const {
   return {participants_.get(), subscriptions_.get()};
 }
 
-void SessionTable::follow_discovery() {
-  follow_participants();
+std::uint64_t SessionTable::follow_discovery() {
+  const std::uint64_t changes = follow_participants();
   follow_readers();
+  return changes;
 }
 
-void SessionTable::follow_participants() {
+std::uint64_t SessionTable::follow_participants() {
   using Participant = dds_builtintopic_participant_t;
-  dds::take_all<Participant>(participants_.get(), [this](const Participant& participant, const auto& info) {
+  std::uint64_t changes = 0;
+  dds::take_all<Participant>(participants_.get(), [&](const Participant& participant, const auto& info) {
     const dds::Guid client = dds::Guid::from(participant.key.v);
     if (info.instance_state == DDS_IST_ALIVE) {
       alive_[client] = info.valid_data ? dds::claim_of(participant.qos) : std::string();
@@ -65,7 +68,9 @@ void SessionTable::follow_participants() {
       alive_.erase(client);
       end_session(client);
     }
+    ++changes;
   });
+  return changes;
 }
 
 void SessionTable::follow_readers() {

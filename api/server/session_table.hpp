@@ -31,7 +31,8 @@ class SessionTable {
   [[nodiscard]] static Result<SessionTable> create(dds_entity_t participant, std::string host);
 
   /// Follows which clients came (their reply or acknowledgement reader was discovered) and went.
-  void follow_discovery();
+  /// Returns how many participants have come or gone.
+  [[nodiscard]] std::uint64_t follow_discovery();
 
   /// `client` is a participant. Answers without a session, because the table is full of clients that are all
   /// busy, are dropped and counted.
@@ -70,7 +71,7 @@ class SessionTable {
   };
 
   SessionTable() = default;
-  void follow_participants();
+  std::uint64_t follow_participants();
   void follow_readers();
   /// Made if it is not there. None for a client that is not (or no longer) in the domain.
   [[nodiscard]] Session* session_of(const dds::Guid& client);
@@ -87,7 +88,7 @@ class SessionTable {
   dds::Entity subscriptions_;
   std::unordered_map<dds::Guid, std::string, dds::GuidHash> alive_;  // and what each claims to be
   std::unordered_map<dds::Guid, Session, dds::GuidHash> sessions_;
-  std::unique_ptr<AckWriters> ack_writers_ = std::make_unique<AckWriters>();
+  std::unique_ptr<AckWriters> ack_writers_;
   std::uint64_t dropped_ = 0;
 };
 

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # What the house looks like from outside: its eight entries, small files, nothing unfinished, no path of a
-# developer's machine, no file that is made through a link. Usage: house.sh [ROOT] (a git checkout); prints each fault.
+# developer's machine, no file that is made through a link, no instance of DDS that stays in memory.
+# Usage: house.sh [ROOT] (a git checkout); prints each fault.
 set -euo pipefail
 cd "${1:-$(dirname "$0")/../..}"
 wrong=0
@@ -27,4 +28,6 @@ git grep -nE "$home_path" -- ':!tests/gates' && fault "the lines above name a pa
 sources=(shm schedulers instances manager api)
 git grep -nE '\bO_CREAT\b' -- "${sources[@]}" | grep -vE 'O_NOFOLLOW|O_EXCL' && fault "the lines above make files through links" || true
 git grep -nE 'shm_open|sun_path *(\+ *1\b|\[0\])' -- "${sources[@]}" && fault "the lines above use names that anybody can take" || true
+# DDS alone keeps the keys of unregistered instances in memory.
+git grep -nE '\bdds_unregister_instance' -- '*.cpp' '*.hpp' ':!api/dds/instances.*' ':!tests' && fault "the lines above leak: use dds::unregister_instance" || true
 exit $wrong

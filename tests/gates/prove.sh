@@ -55,6 +55,9 @@ must_be_red "house: file through a link" "$gates/house.sh" "$plot/tree"
 new_tree
 echo 'std::copy_n(name, n, address.sun_path + 1);' >"$plot/tree/shm/base/name.cpp" && commit_tree
 must_be_red "house: abstract socket" "$gates/house.sh" "$plot/tree"
+new_tree
+echo 'void f() { dds_unregister_ins''tance(1, nullptr); }' >"$plot/tree/shm/base/leak.cpp" && commit_tree
+must_be_red "house: leaked instance" "$gates/house.sh" "$plot/tree"
 
 # plant_in_contract NAME EXPRESSION [--write]: the contract with that change (of sed), and with a reference made anew
 plant_in_contract() {

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 
+#include "api/dds/instances.hpp"
+#include "api/dds/text.hpp"
+
 namespace plchost {
 
 void AckWriters::add(const dds::Guid& client, dds_entity_t writer) {
@@ -11,19 +14,21 @@ void AckWriters::add(const dds::Guid& client, dds_entity_t writer) {
 
 void AckWriters::remove(const dds::Guid& client) {
   const std::lock_guard lock(mutex_);
-  writers_.erase(client);
+  const auto removed = writers_.extract(client);
+  if (removed.empty()) return;
+  for (const Source& source : removed.mapped().sources) unregister(removed.mapped().entity, source.guid);
 }
 
 bool AckWriters::write(const dds::Guid& client, const plc_EventAck& ack) {
   const std::lock_guard lock(mutex_);
   const auto known = writers_.find(client);
   if (known == writers_.end()) return false;
-  use(known->second, ack);
-  return dds_write(known->second.entity, &ack) == DDS_RETCODE_OK;
+  if (dds_write(known->second.entity, &ack) != DDS_RETCODE_OK) return false;
+  use(known->second, dds::Guid::from(ack.source));
+  return true;
 }
 
-void AckWriters::use(Writer& writer, const plc_EventAck& ack) {
-  const dds::Guid source = dds::Guid::from(ack.source);
+void AckWriters::use(Writer& writer, const dds::Guid& source) {
   ++uses_;
   if (const auto known = std::ranges::find(writer.sources, source, &Source::guid);
       known != writer.sources.end()) {
@@ -35,10 +40,15 @@ void AckWriters::use(Writer& writer, const plc_EventAck& ack) {
     return;
   }
   Source& oldest = *std::ranges::min_element(writer.sources, {}, &Source::last_use);
-  plc_EventAck key = ack;  // the host is the same
-  oldest.guid.copy_to(key.source);
-  (void)dds_unregister_instance(writer.entity, &key);
+  unregister(writer.entity, oldest.guid);
   oldest = {.guid = source, .last_use = uses_};
+}
+
+void AckWriters::unregister(dds_entity_t writer, const dds::Guid& source) const {
+  plc_EventAck key{};
+  source.copy_to(key.source);
+  dds::copy_text(key.host, host_);
+  dds::unregister_instance(writer, &key);
 }
 
 }  // namespace plchost

@@ -3,7 +3,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <mutex>
+#include <string>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include <control.h>
@@ -24,8 +26,10 @@ class AckWriters {
  public:
   static constexpr std::size_t kMostSources = 64;
 
+  explicit AckWriters(std::string host) : host_(std::move(host)) {}
+
   void add(const dds::Guid& client, dds_entity_t writer);
-  /// Before the writer is deleted: none uses it any more when this returns.
+  /// Before the writer is deleted: none uses it any more when this returns. Its sources are unregistered.
   void remove(const dds::Guid& client);
 
   /// False: there is no writer (yet), or DDS did not take it.
@@ -40,8 +44,10 @@ class AckWriters {
     dds_entity_t entity = 0;
     std::vector<Source> sources = {};
   };
-  void use(Writer& writer, const plc_EventAck& ack);
+  void use(Writer& writer, const dds::Guid& source);
+  void unregister(dds_entity_t writer, const dds::Guid& source) const;
 
+  const std::string host_;
   std::mutex mutex_;
   std::unordered_map<dds::Guid, Writer, dds::GuidHash> writers_;
   std::uint64_t uses_ = 0;

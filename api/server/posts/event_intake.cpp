@@ -104,7 +104,7 @@ bool EventIntake::take(dds_entity_t reader) {
 }
 
 dds::Guid EventIntake::writer_of(dds_entity_t reader, const dds_sample_info_t& info) {
-  constexpr std::size_t kMaxKnown = 4096;
+  constexpr std::size_t kMaxKnown = kLedgerEntries;
   auto known = writers_.find(info.publication_handle);
   if (known == writers_.end()) {
     const dds::Guid writer = dds::writer_of(reader, info);

@@ -4,6 +4,7 @@
 #include <array>
 #include <limits>
 
+#include "api/dds/instances.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/histogram_digest.hpp"
 
@@ -119,7 +120,7 @@ void StatisticsWriter::dispose(const std::string& instance, const Told& told) {
   dds::copy_text(sample.instance, instance);
   dds::copy_text(sample.task, told.task);
   (void)dds_dispose(writer_.get(), &sample);
-  (void)dds_unregister_instance(writer_.get(), &sample);
+  dds::unregister_instance(writer_.get(), &sample);
 }
 
 }  // namespace plchost

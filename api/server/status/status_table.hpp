@@ -12,6 +12,7 @@
 #include <dds/dds.h>
 
 #include "api/dds/entity.hpp"
+#include "api/dds/instances.hpp"
 #include "shm/base/time.hpp"
 
 namespace plchost {
@@ -93,7 +94,7 @@ class StatusTable {
 
   typename Entries::iterator dispose(typename Entries::iterator it) {
     (void)dds_dispose(writer_.get(), &it->second.sample);
-    (void)dds_unregister_instance(writer_.get(), &it->second.sample);
+    dds::unregister_instance(writer_.get(), &it->second.sample);
     return entries_.erase(it);
   }
 
