@@ -24,16 +24,21 @@ Result<void> watch(const UniqueFd& epoll, int fd, std::uint32_t events = EPOLLIN
   return {};
 }
 
-// For an application that has used up the descriptors of the process: while one of these is there, the
-// process may have as many as the system allows it.
+// The application gets fewer descriptors than the system allows the process: the rest is for connections.
+void reserve_descriptors() {
+  constexpr rlim_t kReserve = InstanceSocket::kMaxConnections;
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_NOFILE, &limit) != 0 || limit.rlim_max < 4 * kReserve) return;
+  limit.rlim_cur = std::min(limit.rlim_cur, limit.rlim_max - kReserve);
+  ::setrlimit(RLIMIT_NOFILE, &limit);
+}
+
+// While one of these is there, the reserve can be used.
 class MoreDescriptors {
  public:
   MoreDescriptors() {
     known_ = ::getrlimit(RLIMIT_NOFILE, &before_) == 0;
-    rlimit more = before_;
-    more.rlim_cur = more.rlim_max;
-    if (before_.rlim_cur == before_.rlim_max)
-      more.rlim_cur = more.rlim_max += InstanceSocket::kMaxConnections;
+    const rlimit more{.rlim_cur = before_.rlim_max, .rlim_max = before_.rlim_max};
     known_ = known_ && ::setrlimit(RLIMIT_NOFILE, &more) == 0;
   }
   ~MoreDescriptors() {
@@ -52,6 +57,7 @@ class MoreDescriptors {
 Result<InstanceSocket> InstanceSocket::listen(const std::string& path, Handler handler) {
   auto listener = PacketListener::listen(path);
   if (!listener) return std::unexpected(listener.error());
+  reserve_descriptors();
   UniqueFd epoll(::epoll_create1(EPOLL_CLOEXEC));
   if (!epoll) return failure(ErrorCode::system, "epoll_create1", errno);
   // Told once for each new connection: one that cannot be taken must not keep the control thread awake.

@@ -104,7 +104,7 @@ int run(const Options& options) {
     // SIGTERM and not SIGKILL: what the application has forked ends, too.
     if (options.parent != 0) ::prctl(PR_SET_PDEATHSIG, SIGTERM);
     if (options.parent != 0 && ::getppid() != options.parent) return kExitSetupFailed;
-    spdlog::set_pattern("%l: %v");  // read by people and told in answers
+    set_log_pattern("%l: %v");  // read by people and told in answers
     return run_trial(options.check_application, signals->get(),
                      [&] { return check_application(options.check_application, options.launch.settings); });
   }

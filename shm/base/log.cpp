@@ -6,12 +6,15 @@
 #include <mutex>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include <poll.h>
+#include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/base_sink.h>
 #include <unistd.h>
 
 #include "shm/base/log_line.hpp"
+#include "shm/base/names.hpp"
 
 namespace plchost {
 
@@ -55,13 +58,34 @@ class ErrorStreamSink final : public spdlog::sinks::base_sink<std::mutex> {
   std::uint64_t lost_ = 0;
 };
 
+// Texts of applications can hold anything: it must not be a line of its own, nor reach a terminal.
+class PrintableText final : public spdlog::custom_flag_formatter {
+ public:
+  void format(const spdlog::details::log_msg& message, const std::tm& /*time*/,
+              spdlog::memory_buf_t& line) override {
+    std::string text(message.payload.data(), message.payload.size());
+    std::ranges::replace_if(text, [](char c) { return c == '\n' || c == '\r' || c == '\t'; }, ' ');
+    text = printable(std::move(text));
+    line.append(text.data(), text.data() + text.size());
+  }
+  [[nodiscard]] std::unique_ptr<custom_flag_formatter> clone() const override {
+    return std::make_unique<PrintableText>();
+  }
+};
+
 }  // namespace
+
+void set_log_pattern(const std::string& pattern) {
+  auto formatter = std::make_unique<spdlog::pattern_formatter>();
+  formatter->add_flag<PrintableText>('v').set_pattern(pattern);
+  spdlog::default_logger()->set_formatter(std::move(formatter));
+}
 
 void start_log(const std::string& program, const std::string& level) {
   auto logger = std::make_shared<spdlog::logger>(program, std::make_shared<ErrorStreamSink>());
-  logger->set_pattern(kLogPattern);
   logger->set_level(spdlog::level::from_str(level));
   spdlog::set_default_logger(std::move(logger));
+  set_log_pattern(kLogPattern);
 }
 
 }  // namespace plchost

@@ -19,4 +19,8 @@ namespace plchost {
 /// Never called from a real-time thread; `level` is one of trace, debug, info, warning, error.
 void start_log(const std::string& program, const std::string& level = "info");
 
+/// `pattern`: of a line, as spdlog says it. Its %v is one line of printable UTF-8, whatever was logged.
+/// Set-up, after start_log().
+void set_log_pattern(const std::string& pattern);
+
 }  // namespace plchost

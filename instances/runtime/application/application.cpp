@@ -9,6 +9,7 @@
 
 #include "instances/runtime/tasks/task_builder.hpp"
 #include "shm/base/log.hpp"
+#include "shm/base/names.hpp"
 
 namespace plchost {
 
@@ -28,7 +29,7 @@ Result<void> call_init(const SharedObject& object) {
                     object.path(), result));
   } catch (const std::exception& error) {
     return failure(ErrorCode::refused,
-                   fmt::format("{}: plc_app_init threw: {}", object.path(), error.what()));
+                   fmt::format("{}: plc_app_init threw: {}", object.path(), printable(error.what())));
   } catch (...) {
     return failure(ErrorCode::refused, fmt::format("{}: plc_app_init threw an exception", object.path()));
   }

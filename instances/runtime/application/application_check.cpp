@@ -9,6 +9,7 @@
 #include "instances/runtime/device/device_description.hpp"
 #include "instances/runtime/device/device_events.hpp"
 #include "instances/runtime/settings/settings.hpp"
+#include "shm/base/names.hpp"
 #include "shm/pool/instance_page.hpp"
 
 namespace plchost {
@@ -58,7 +59,8 @@ int check_application(const std::string& path, const std::string& settings) {
     fmt::print(stderr, "{}\n", application.error().describe());
     return kExitSetupFailed;
   }
-  fmt::print("{}{}{}, {} tasks\n", path, kValidApplication, application->name(), application->tasks().size());
+  fmt::print("{}{}{}, {} tasks\n", path, kValidApplication, printable(application->name()),
+             application->tasks().size());
   for (const TaskConfig& task : application->tasks()) {
     fmt::print("  {}: {}, priority {}{}\n", task.name, to_string(static_cast<PageTaskKind>(task.kind)),
                task.iec_priority, detail_of(task));

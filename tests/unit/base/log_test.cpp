@@ -64,5 +64,18 @@ TEST(Log, NeverWaitsForItsReaderAndCountsWhatWasLost) {
   EXPECT_THAT(second, testing::EndsWith("warning log_test: after\n"));
 }
 
+TEST(Log, HasOneLineOfPrintableTextForWhateverWasLogged) {
+  std::string text;
+  {
+    const UnreadErrors errors;
+    start_log("log_test");
+    set_log_pattern("%l: %v");
+    spdlog::info("{}", "\x1b[31mred\n2026-11-22 error plchostd: forged\xff");
+    spdlog::info("{}", "Förderband: {} %s");
+    text = errors.read();
+  }
+  EXPECT_EQ(text, "info: ?[31mred 2026-11-22 error plchostd: forged?\ninfo: Förderband: {} %s\n");
+}
+
 }  // namespace
 }  // namespace plchost
