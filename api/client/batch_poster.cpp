@@ -45,23 +45,33 @@ void BatchPoster::write(TimePoint now) {
   sample_.events._buffer = names_.data();
   sample_.events._length = sample_.events._maximum = static_cast<std::uint32_t>(names_.size());
   sample_.limit = clock_.limit_at(deadline_);
-  readers_met_ = readers_met(writer_.get());  // before: one that comes later has not got it
-  (void)dds_write(writer_.get(), &sample_);   // one that DDS did not take is repeated like a lost one
+  (void)has_met_server();  // before: one that comes later has not got it
+  // One that DDS did not take is repeated like a lost one.
+  has_space_ = dds_write(writer_.get(), &sample_) == DDS_RETCODE_OK;
   last_write_ = now;
 }
 
 void BatchPoster::on_ack(const plc_EventAck& ack, TimePoint now) {
   if (dds::Guid::from(ack.source) != source_ || !epoch_.accept(ack.epoch, now)) return;
   account_.take(ack);
+  heard_ = true;
+}
+
+bool BatchPoster::has_met_server() noexcept {
+  const std::uint32_t met = readers_met(writer_.get());
+  if (met == readers_met_) return false;
+  readers_met_ = met;
+  heard_ = false;
+  return true;
 }
 
 TimePoint BatchPoster::repeat(TimePoint now) {
-  const bool heard = account_.newest().epoch != 0;
-  const TimePoint due = last_write_ + (heard ? EventPoster::kResend : EventPoster::kFirstResend);
-  const bool new_server = readers_met(writer_.get()) != readers_met_;
+  const bool new_server = has_met_server();
+  const Duration patience = heard_ && has_space_ ? EventPoster::kResend : EventPoster::kFirstResend;
+  const TimePoint due = last_write_ + patience;
   if (acknowledged() || (now < due && !new_server)) return due;
   write(now);
-  return now + EventPoster::kResend;
+  return now + patience;
 }
 
 }  // namespace plchost

@@ -54,6 +54,8 @@ class BatchPoster {
  private:
   BatchPoster() = default;
   void write(TimePoint now);
+  /// Whether there is a server that was not there at the last call.
+  bool has_met_server() noexcept;
 
   HostClock clock_;
   TimePoint deadline_;
@@ -65,7 +67,9 @@ class BatchPoster {
   std::uint64_t last_sequence_ = 0;
   TimePoint last_write_;
   NewestEpoch epoch_;
-  std::uint32_t readers_met_ = 0;  // when it was written last
+  std::uint32_t readers_met_ = 0;  // at the last has_met_server()
+  bool heard_ = false;             // of the server that was met last
+  bool has_space_ = true;          // DDS had for the last post
   AckAccount account_;
   AckAccount::Sums base_;
 };

@@ -58,6 +58,7 @@ dds_return_t EventPoster::write(const Unacknowledged& post) noexcept {
   }
   sample_.limit = clock_.limit_at(last_progress_ + patience_);
   const dds_return_t written = write(post.sequence);
+  has_space_ = written == DDS_RETCODE_OK;
   sample_.limit = {};
   sample_.ext = {};
   return written;
@@ -67,7 +68,7 @@ std::uint64_t EventPoster::post(std::string_view instance, std::string_view even
                                 bool awaited) {
   if (unacknowledged_.empty()) {
     last_progress_ = now;
-    readers_met_ = readers_met(writer_.get());  // before it is written: one that comes later has not got it
+    (void)has_met_server();  // before it is written: one that comes later has not got it
   }
   unacknowledged_.push_back({++last_sequence_, std::string(instance), std::string(event), awaited});
   (void)write(unacknowledged_.back());  // one that DDS did not take is repeated like a lost one
@@ -100,6 +101,7 @@ bool EventPoster::on_ack(const plc_EventAck& ack, TimePoint now) {
   const bool new_server = before_epoch != 0 && ack.epoch != before_epoch;
   account_.take(ack);
   answered_ = true;
+  heard_ = true;
   window_ = std::clamp<std::size_t>(ack.credits, 1, kWindow);
   const std::size_t before = unacknowledged_.size();
   while (!unacknowledged_.empty() && unacknowledged_.front().sequence <= ack.sequence_number) {
@@ -113,18 +115,28 @@ bool EventPoster::on_ack(const plc_EventAck& ack, TimePoint now) {
 
 TimePoint EventPoster::repeat(TimePoint now) {
   if (unacknowledged_.empty()) return now + kResend;
-  const Duration patience = account_.newest().epoch == 0 ? kFirstResend : kResend;
-  const TimePoint due = std::max(last_progress_, last_write_) + patience;
-  const std::uint32_t met = readers_met(writer_.get());
-  const bool new_server = last_write_ == TimePoint{} || met != readers_met_;
+  const bool met = has_met_server();
+  const TimePoint due = std::max(last_progress_, last_write_) + patience_until_repeated();
+  const bool new_server = last_write_ == TimePoint{} || met;
   if (!new_server && now < due) return due;
   for (const Unacknowledged& post : unacknowledged_) {
     if (write(post) != DDS_RETCODE_OK || !(new_server || answered_)) break;
   }
-  readers_met_ = met;
   answered_ = false;
   last_write_ = now;
-  return now + patience;
+  return now + patience_until_repeated();
+}
+
+bool EventPoster::has_met_server() noexcept {
+  const std::uint32_t met = readers_met(writer_.get());
+  if (met == readers_met_) return false;
+  readers_met_ = met;
+  heard_ = false;
+  return true;
+}
+
+Duration EventPoster::patience_until_repeated() const noexcept {
+  return heard_ && has_space_ ? kResend : kFirstResend;
 }
 
 void EventPoster::begin_report(TimePoint now) {

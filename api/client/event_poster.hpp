@@ -61,7 +61,8 @@ class EventPoster {
  public:
   /// Unacknowledged posts at most.
   static constexpr std::size_t kWindow = 32;
-  /// Repeats after so long without progress; sooner while the host has not been heard of yet.
+  /// Repeats after so long without progress; sooner while the server that was met last has not acknowledged
+  /// anything yet, since it may not have found this writer, and while DDS has no room for a post.
   static constexpr Duration kResend = std::chrono::milliseconds(200);
   static constexpr Duration kFirstResend = std::chrono::milliseconds(20);
 
@@ -112,6 +113,9 @@ class EventPoster {
     bool awaited = false;
   };
   dds_return_t write(const Unacknowledged& post) noexcept;
+  /// Whether there is a server that was not there at the last call.
+  bool has_met_server() noexcept;
+  [[nodiscard]] Duration patience_until_repeated() const noexcept;
 
   dds::Entity publisher_;
   dds::Entity writer_;
@@ -126,7 +130,9 @@ class EventPoster {
   TimePoint last_write_;
   NewestEpoch epoch_;
   bool answered_ = false;          // since the last write
-  std::uint32_t readers_met_ = 0;  // when all was written last
+  bool heard_ = false;             // of the server that was met last
+  bool has_space_ = true;          // DDS had for the last post
+  std::uint32_t readers_met_ = 0;  // at the last has_met_server()
   AckAccount account_;
   AckAccount::Sums base_;  // where the report counts from
 };

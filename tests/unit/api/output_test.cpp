@@ -206,6 +206,19 @@ TEST(DomainConfiguration, LooksForOthersByMulticastOnNetworksOnly) {
   EXPECT_THAT(configuration(), HasSubstr("<AllowMulticast>false<"));
 }
 
+TEST(DomainConfiguration, AnnouncesAClientOftenWhereANewServerCannotReachIt) {
+  dds::DomainOptions options;
+  const auto client = [&] { return dds::domain_configuration(dds::Role::client, options).value(); };
+  EXPECT_THAT(client(), HasSubstr("<SPDPInterval>200 ms<"));
+  EXPECT_THAT(dds::domain_configuration(dds::Role::server, options).value(),
+              HasSubstr("<LeaseDuration>600 ms<"));
+  options.interfaces = {"eth0"};
+  EXPECT_THAT(client(), HasSubstr("<SPDPInterval>1 s<"));
+  EXPECT_THAT(client(), HasSubstr("<LeaseDuration>3 s<"));
+  options.multicast = false;
+  EXPECT_THAT(client(), HasSubstr("<SPDPInterval>200 ms<"));
+}
+
 TEST(DomainConfiguration, AsksForRealTimeThreadsOnlyWhenTheyWereGranted) {
   dds::DomainOptions options;
   EXPECT_THAT(dds::domain_configuration(dds::Role::server, options).value(),
