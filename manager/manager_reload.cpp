@@ -12,6 +12,7 @@
 #include "manager/store/wish_memory.hpp"
 #include "shm/base/log.hpp"
 #include "shm/pool/instance_page.hpp"
+#include "shm/pool/log_ring.hpp"
 
 namespace plchost {
 
@@ -75,6 +76,7 @@ void Manager::forget(std::size_t place, const InstanceConfig& instance) {
 void Manager::remove_pages(const std::string& instance) const {
   InstancePage::remove(config_.host.pool, instance);
   TransitionRing::remove(config_.host.pool, instance);
+  LogRing::remove(config_.host.pool, instance);
 }
 
 }  // namespace plchost

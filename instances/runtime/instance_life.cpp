@@ -26,7 +26,7 @@ long long in_ms(Duration duration) {
 ApplicationLife::Record Instance::recorder() {
   return [this](ApplicationState from, ApplicationState to, std::string_view reason) {
     const bool bad = to == ApplicationState::exception;
-    spdlog::log(bad ? spdlog::level::err : spdlog::level::info, "application: {} -> {}: {}", to_string(from),
+    spdlog::log(bad ? spdlog::level::err : spdlog::level::info, "application {} -> {}: {}", to_string(from),
                 to_string(to), reason);
     if (transitions_) {
       transitions_->add(TransitionSource::application, std::to_underlying(from), std::to_underlying(to),

@@ -92,6 +92,13 @@ int check_settings(const std::string& file) {
   return EXIT_SUCCESS;
 }
 
+// Line by line, so that what an application says right before it crashes is said; a line of up to 4096 bytes
+// goes into a pipe whole or not at all.
+void print_line_by_line() noexcept {
+  static std::array<char, 4096> buffer;
+  (void)std::setvbuf(stdout, buffer.data(), _IOLBF, buffer.size());
+}
+
 int run(const Options& options) {
   if (!options.check_settings.empty()) return check_settings(options.check_settings);
   start_log("plc-instance/" + options.launch.name, options.launch.log_level);
@@ -114,6 +121,7 @@ int run(const Options& options) {
     return saved ? EXIT_SUCCESS : kExitSetupFailed;
   }
 
+  print_line_by_line();
   std::unique_ptr<Instance> instance;
   {
     SetupReporter reporter(options.launch.report_fd);

@@ -13,16 +13,23 @@ namespace plchost {
 ProcessHost::ProcessHost(Reactor& reactor, Settings settings)
     : reactor_(reactor),
       settings_(std::move(settings)),
+      output_({.pool = settings_.pool, .instance = settings_.name, .run_directory = settings_.run_directory}),
       timer_(reactor, [this] { events_->on_timer(); }),
       check_timer_(reactor, [this] { check_timed_out(); }) {}
 
 Result<int> ProcessHost::spawn(const LaunchOptions& options) {
   auto channel = make_report_channel();
   if (!channel) return std::unexpected(channel.error());
-  auto process = spawn_process(
-      {.arguments = to_arguments(settings_.program, options), .report_fd = channel->childs.get()});
+  const auto output = output_.open_for_process();
+  if (!output) {  // better a PLC whose words are not kept than none
+    spdlog::warn("instance {}: what it says is not kept: {}", settings_.name, output.error().describe());
+  }
+  auto process = spawn_process({.arguments = to_arguments(settings_.program, options),
+                                .report_fd = channel->childs.get(),
+                                .output_fd = output ? output->get() : -1});
   if (!process) return std::unexpected(process.error());
   const int pid = process->pid;
+  output_.say(LogLevel::info, pid, fmt::format("process {} was started", pid));
   auto watch = reactor_.watch(channel->ours.fd(), EPOLLIN, [this](std::uint32_t) { read_reports(); });
   auto followed = watch ? follow(*process) : Result<void>(std::unexpected(watch.error()));
   if (!followed) {  // it cannot be supervised, so it must not go on
@@ -50,6 +57,8 @@ Result<int> ProcessHost::adopt_peer() {
   auto process = open_process(*pid);
   if (!process) return std::unexpected(process.error());
   if (auto followed = follow(*process); !followed) return std::unexpected(followed.error());
+  output_.adopt();
+  output_.say(LogLevel::info, *pid, fmt::format("a new manager has adopted process {}", *pid));
   return *pid;
 }
 
@@ -94,7 +103,9 @@ void ProcessHost::set_timer(std::optional<TimePoint> when) {
   }
 }
 
+// What it said before comes before what the manager says of it.
 void ProcessHost::read_reports() {
+  read_output();
   for (;;) {
     auto packet = report_ ? report_.receive() : Result<std::optional<std::string>>(std::nullopt);
     if (!packet) {  // the process has closed it, or is gone
@@ -133,7 +144,10 @@ void ProcessHost::process_ended() {
   read_reports();
   read_replies();
   end_session(*process_);
+  output_.end(process_->pid);
   const ExitStatus status = reap_process(*process_);
+  output_.say(status.success() ? LogLevel::info : LogLevel::warning, process_->pid,
+              fmt::format("process {}: {}", process_->pid, status.describe()));
   spdlog::info("instance {}: process {}: {}", settings_.name, process_->pid, status.describe());
   forget_process();
   events_->on_exit(status);
@@ -185,6 +199,10 @@ std::optional<InstanceRuntime> ProcessHost::runtime() {
     current = page_->runtime();
   }
   return current;
+}
+
+void ProcessHost::read_output() {
+  if (process_) output_.read(process_->pid);
 }
 
 std::vector<int> ProcessHost::granted_cores() {

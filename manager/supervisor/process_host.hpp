@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "manager/supervisor/instance_host.hpp"
+#include "manager/supervisor/instance_output.hpp"
 #include "manager/system/application_trial.hpp"
 #include "manager/system/child_process.hpp"
 #include "manager/system/reactor.hpp"
@@ -36,6 +37,7 @@ class ProcessHost : public InstanceHost {
   [[nodiscard]] Result<void> check_application(const LaunchOptions& options) override;
   [[nodiscard]] std::optional<InstanceRuntime> runtime() override;
   [[nodiscard]] std::vector<int> granted_cores() override;
+  void read_output() override;
 
  private:
   /// Takes the process over if it can be watched.
@@ -51,6 +53,7 @@ class ProcessHost : public InstanceHost {
 
   Reactor& reactor_;
   Settings settings_;
+  InstanceOutput output_;
   InstanceEvents* events_ = nullptr;
   Reactor::Timer timer_;
 

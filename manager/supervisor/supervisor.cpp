@@ -154,7 +154,10 @@ void Supervisor::when_kept(const std::function<void()>& done) {
 }
 
 void Supervisor::refresh() {
-  for (const auto& unit : units_) unit->instance->refresh();
+  for (const auto& unit : units_) {
+    unit->host->read_output();
+    unit->instance->refresh();
+  }
   if (!shut_down_) forget_gone();
 }
 

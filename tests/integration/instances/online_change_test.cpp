@@ -141,7 +141,7 @@ TEST_P(OnlineChange, GoesOnWithTheVariablesAndTheNewCodeWithoutALostCycle) {
   EXPECT_EQ(sut.path(), application("online_2"));
   const std::string log = sut.process().log();
   EXPECT_THAT(log, AllOf(HasSubstr("init of version 2, online 1"), HasSubstr("exit of version 1, online 1"),
-                         HasSubstr("application: running -> running: online change to")));
+                         HasSubstr("application running -> running: online change to")));
   EXPECT_EQ(sut.process().end(SIGTERM), EXIT_SUCCESS) << sut.process().log();
   EXPECT_THAT(sut.process().log(), HasSubstr("exit of version 2, online 0"));
 }

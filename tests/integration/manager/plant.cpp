@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "api/control/control_handler.hpp"
+#include "shm/pool/log_ring.hpp"
 #include "shm/pool/object_pool.hpp"
 #include "shm/pool/transition_ring.hpp"
 
@@ -38,6 +39,7 @@ Plant::~Plant() {
   for (const std::string& name : names_) {
     InstancePage::remove(pool_, name);
     TransitionRing::remove(pool_, name);
+    LogRing::remove(pool_, name);
     MemoryFile::remove(pool_ + ".wish." + name);
   }
   MemoryFile::remove(host_page_name(pool_));
@@ -104,14 +106,14 @@ void Plant::write_configuration() const {
   write_configuration(configuration());
 }
 
-void Plant::start_manager() {
+void Plant::start_manager(int output_fd) {
   const std::string config = (folder_ / "cell.toml").string();
   write_configuration();
   const UniqueFd log(::open((folder_ / "log").c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC,
                             0600));  // NOLINT: variadic
   std::vector<std::string> arguments = {kBuild + "/bin/plchostd", "--config", config};
   if (api_server_) arguments.insert(arguments.end(), {"--programs", folder_.string()});
-  auto process = spawn_process({.arguments = arguments, .output_fd = log.get()});
+  auto process = spawn_process({.arguments = arguments, .output_fd = output_fd >= 0 ? output_fd : log.get()});
   ASSERT_TRUE(process) << process.error().describe();
   manager_ = std::move(*process);
   ASSERT_TRUE(eventually([&] {

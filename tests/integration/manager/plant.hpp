@@ -41,8 +41,9 @@ class Plant {
   [[nodiscard]] std::string configuration() const;
   /// A signal to the manager.
   void signal_manager(int signal) const { (void)signal_process(manager_, signal); }
-  /// Writes the configuration and starts a manager.
-  void start_manager();
+  /// Writes the configuration and starts a manager. `output_fd`: where it says what it says, instead of
+  /// log().
+  void start_manager(int output_fd = -1);
   /// SIGTERM, and how it ended.
   ExitStatus stop_manager();
   void kill_manager();

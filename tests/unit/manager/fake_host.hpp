@@ -34,6 +34,7 @@ class FakeHost : public InstanceHost {
   }
   [[nodiscard]] std::optional<InstanceRuntime> runtime() override { return page; }
   [[nodiscard]] std::vector<int> granted_cores() override { return cores; }
+  void read_output() override {}
 
   std::vector<LaunchOptions> spawned;
   std::vector<ControlRequest> requests;

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "manager/supervisor/output_lines.hpp"
+#include "shm/base/unique_fd.hpp"
+#include "shm/pool/log_ring.hpp"
+
+namespace plchost {
+
+/// What the processes of one instance write to their standard output and error: a named pipe in the run
+/// directory, which the manager reads into the instance's LogRing and onto its own standard error. No process
+/// waits for the manager: a full pipe takes nothing more. While no manager runs, the pipe keeps up to
+/// kPipeBytes for the next one, as long as the process of the instance runs. Reactor thread.
+class InstanceOutput {
+ public:
+  struct Settings {
+    std::string pool;
+    std::string instance;
+    std::string run_directory;
+  };
+  static constexpr int kPipeBytes = 256 * 1024;
+  /// Of one read(): an instance that says more than this every 50 ms loses lines.
+  static constexpr std::size_t kReadAtOnce = std::size_t{64} * 1024;
+
+  explicit InstanceOutput(Settings settings) : settings_(std::move(settings)) {}
+
+  /// The end that becomes standard output and error of a new process.
+  [[nodiscard]] Result<UniqueFd> open_for_process();
+  /// Takes over the pipe that an adopted process writes to, if that is there.
+  void adopt();
+  /// Reads what has come, up to kReadAtOnce. `pid`: of the process.
+  void read(std::int32_t pid);
+  /// The process has ended: reads all that it has said.
+  void end(std::int32_t pid);
+  /// Writes a line of the manager itself into the ring.
+  void say(LogLevel level, std::int32_t pid, std::string_view text);
+
+ private:
+  [[nodiscard]] std::string path() const {
+    return settings_.run_directory + "/" + settings_.instance + ".output";
+  }
+  [[nodiscard]] Result<void> open_ends();
+  [[nodiscard]] std::size_t read_at_most(std::size_t most, std::int32_t pid);
+  void keep(const LogEntry& entry);
+  void forward(std::string_view bytes);
+
+  Settings settings_;
+  UniqueFd read_end_;
+  UniqueFd write_end_;  // only to see whether the pipe is full
+  OutputLines lines_;
+  std::optional<LogRing> ring_;
+  std::uint64_t not_forwarded_ = 0;  // bytes
+  bool ring_failed_ = false;
+};
+
+}  // namespace plchost
