@@ -86,6 +86,7 @@ void add_show_verbs(const Command& plcctl, CliSession& session);
 void add_command_verbs(const Command& plcctl, CliSession& session);
 void add_check_verb(const Command& plcctl, CliSession& session);
 void add_post_verb(const Command& plcctl, CliSession& session);
+void add_logs_verb(const Command& plcctl, CliSession& session);
 void add_wait_verb(const Command& plcctl, CliSession& session);
 void add_watch_verb(const Command& plcctl, CliSession& session);
 void add_plant_verbs(const Command& plcctl, CliSession& session);

@@ -190,6 +190,7 @@ int main(int argc, char** argv) {
   plchost::add_command_verbs(plcctl, session);
   plchost::add_check_verb(plcctl, session);
   plchost::add_post_verb(plcctl, session);
+  plchost::add_logs_verb(plcctl, session);
   plchost::add_wait_verb(plcctl, session);
   plchost::add_watch_verb(plcctl, session);
   plchost::add_security_verb(plcctl, session);

@@ -24,6 +24,7 @@
 #include "api/client/transition_log.hpp"
 #include "api/client/wait_set.hpp"
 #include "api/dds/domain.hpp"
+#include "api/dds/log_page.hpp"
 #include "api/dds/node_page.hpp"
 #include "api/dds/object_page.hpp"
 #include "api/dds/object_query.hpp"
@@ -136,6 +137,10 @@ class ControlClient {
                                                TimePoint deadline);
   [[nodiscard]] Result<NodeListing> list_routes(const std::string& host, const NodeQuery& query,
                                                 TimePoint deadline);
+  /// A part of what an instance has said. Not complete: go on with query.after = next_after. The code of the
+  /// failure is the host's own: not_found: it has no such instance.
+  [[nodiscard]] Result<LogListing> read_log(const std::string& host, const std::string& instance,
+                                            const LogQuery& query, TimePoint deadline);
   /// One for each instance; count 0: it never had an exception.
   [[nodiscard]] Result<std::vector<plc_ExceptionStatus>> exceptions(const std::string& host,
                                                                     TimePoint deadline);
@@ -260,6 +265,7 @@ class ControlClient {
   dds::Entity reply_reader_;
   PageReader object_pages_;
   PageReader node_pages_;
+  PageReader log_pages_;
   dds::Entity ack_topic_;
   dds::Entity ack_reader_;
   dds::Entity event_topic_;

@@ -85,4 +85,10 @@ Result<NodeListing> ControlClient::list_routes(const std::string& host, const No
       node_pages_, dds::kNodePage, {host, plc_OPERATION_LIST_ROUTES, "", "", *std::move(entries)}, deadline);
 }
 
+Result<LogListing> ControlClient::read_log(const std::string& host, const std::string& instance,
+                                           const LogQuery& query, TimePoint deadline) {
+  return ask_for_page<plc_LogPage, LogListing>(
+      log_pages_, dds::kLogPage, {host, plc_OPERATION_READ_LOG, instance, "", entries_of(query)}, deadline);
+}
+
 }  // namespace plchost

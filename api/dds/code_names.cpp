@@ -22,6 +22,11 @@ constexpr std::array kTaskKinds{std::string_view("cyclic"), std::string_view("ev
 constexpr std::array kTaskStates{std::string_view("created"), std::string_view("running"),
                                  std::string_view("stopped"), std::string_view("exception")};
 
+constexpr std::array kLogLevels{std::string_view("debug"), std::string_view("info"),
+                                std::string_view("warning"), std::string_view("error")};
+constexpr std::array kLogSources{std::string_view("runtime"), std::string_view("application"),
+                                 std::string_view("output"), std::string_view("manager")};
+
 std::string code_name(std::span<const std::string_view> names, std::uint32_t number) {
   return number < names.size() ? std::string(names[number]) : std::to_string(number);
 }
@@ -38,6 +43,14 @@ std::string transition_state_name(std::uint32_t source, std::uint32_t state) {
 
 std::string task_kind_name(std::uint32_t kind) {
   return code_name(kTaskKinds, kind);
+}
+
+std::string log_level_name(std::uint32_t level) {
+  return code_name(kLogLevels, level);
+}
+
+std::string log_source_name(std::uint32_t source) {
+  return code_name(kLogSources, source);
 }
 
 std::string restart_policy_name(std::uint32_t policy) {

@@ -10,6 +10,8 @@ namespace plchost::dds {
 /// A state of Transition: its source says whose.
 [[nodiscard]] std::string transition_state_name(std::uint32_t source, std::uint32_t state);
 [[nodiscard]] std::string task_kind_name(std::uint32_t kind);
+[[nodiscard]] std::string log_level_name(std::uint32_t level);
+[[nodiscard]] std::string log_source_name(std::uint32_t source);
 [[nodiscard]] std::string restart_policy_name(std::uint32_t policy);
 [[nodiscard]] std::string task_state_name(std::uint32_t state);
 

@@ -39,6 +39,7 @@ inline constexpr TopicInfo kDownloadChunk{"plc/v1/eng/download_chunk", &plc_Down
 inline constexpr TopicInfo kDownloadAck{"plc/v1/download_ack", &plc_DownloadAck_desc};
 inline constexpr TopicInfo kObjectPage{"plc/v1/objects", &plc_ObjectPage_desc};
 inline constexpr TopicInfo kNodePage{"plc/v1/nodes", &plc_NodePage_desc};
+inline constexpr TopicInfo kLogPage{"plc/v1/log", &plc_LogPage_desc};
 inline constexpr TopicInfo kBlockHostStatus{"plc/v1/status/block_host", &plc_BlockHostStatus_desc};
 inline constexpr TopicInfo kBlock{"plc/v1/blocks", &plc_Block_desc};
 inline constexpr TopicInfo kBlockAck{"plc/v1/block_ack", &plc_BlockAck_desc};
@@ -59,7 +60,7 @@ inline constexpr std::int32_t kReplyDepth = 16;
 /// Samples of one key that a client has not taken yet: one of the host itself, and others that have no right
 /// to it.
 inline constexpr std::int32_t kStatusReaderDepth = 8;
-inline constexpr std::int32_t kPageDepth = 4;         ///< of objects, and of nodes
+inline constexpr std::int32_t kPageDepth = 4;         ///< of objects, of nodes, and of logs
 inline constexpr std::int32_t kTransitionDepth = 64;  ///< of each instance; as many as its ring holds
 /// Entry of InstanceStatus.ext: the number of the last transition of this instance that its host has written;
 /// 0: none yet.

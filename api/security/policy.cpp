@@ -32,8 +32,8 @@ Topics status_topics() {
 }
 // What a host tells one client only.
 Topics answer_topics() {
-  return {"plc/v1/reply",   "plc/v1/event_ack", "plc/v1/event_run",
-          "plc/v1/objects", "plc/v1/nodes",     "plc/v1/download_ack"};
+  return {"plc/v1/reply", "plc/v1/event_ack",    "plc/v1/event_run", "plc/v1/objects",
+          "plc/v1/nodes", "plc/v1/download_ack", "plc/v1/log"};
 }
 Topics block_topics() {
   return {"plc/v1/blocks", "plc/v1/block_ack"};

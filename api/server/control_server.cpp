@@ -13,6 +13,7 @@
 #include <sys/timerfd.h>
 #include <unistd.h>
 
+#include "api/dds/log_page.hpp"
 #include "api/dds/sample_identity.hpp"
 #include "api/dds/samples.hpp"
 #include "api/dds/text.hpp"
@@ -309,6 +310,7 @@ void ControlServer::Parts::do_request(ApiRole role, const dds::Guid& writer, con
   if (checked->verb == ControlVerb::list_nodes || checked->verb == ControlVerb::list_routes) {
     return list_nodes(checked->verb, client, request);
   }
+  if (checked->verb == ControlVerb::read_log) return read_log(client, request);
   audit->handed_on(identity);
   if (checked->verb == ControlVerb::download_application) {
     return begin_download(client, identity, *std::move(checked));
@@ -345,6 +347,18 @@ void ControlServer::Parts::list_nodes(ControlVerb verb, const dds::Guid& client,
     return tell(client, request.header.request_identity, listing.error().code, listing.error().describe());
   }
   NodePageSample sample(*listing);
+  send_page(client, request, sample.page());
+}
+
+void ControlServer::Parts::read_log(const dds::Guid& client, const plc_Request& request) {
+  const auto query = parse_log_query(std::span(request.ext._buffer, request.ext._length));
+  const auto slice = query ? look_at_log(pool.name(), dds::text_of(request.instance), *query)
+                           : Result<LogListing>(std::unexpected(query.error()));
+  if (!slice) {
+    return tell(client, request.header.request_identity, slice.error().code, slice.error().describe());
+  }
+  LogPageSample sample(*slice);
+  dds::copy_text(sample.page().instance, dds::text_of(request.instance));
   send_page(client, request, sample.page());
 }
 

@@ -85,6 +85,7 @@ struct ControlServer::Parts {
   void ask_for_findings();
   void list_objects(const dds::Guid& client, const plc_Request& request);
   void list_nodes(ControlVerb verb, const dds::Guid& client, const plc_Request& request);
+  void read_log(const dds::Guid& client, const plc_Request& request);
   template <class Page>
   void send_page(const dds::Guid& client, const plc_Request& request, Page& page);
   [[nodiscard]] bool collect_findings(FinishedCommand& finished);

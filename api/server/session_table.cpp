@@ -15,8 +15,8 @@ namespace plchost {
 namespace {
 
 // By SessionTable::Stream.
-constexpr std::array kStreamTopics{dds::kReply,    dds::kEventAck, dds::kObjectPage,
-                                   dds::kNodePage, dds::kEventRun, dds::kDownloadAck};
+constexpr std::array kStreamTopics{dds::kReply,   dds::kEventAck, dds::kObjectPage, dds::kNodePage,
+                                   dds::kLogPage, dds::kEventRun, dds::kDownloadAck};
 
 }  // namespace
 
@@ -179,6 +179,10 @@ bool SessionTable::write_page(const dds::Guid& client, const plc_ObjectPage& pag
 
 bool SessionTable::write_page(const dds::Guid& client, const plc_NodePage& page) {
   return write(client, Stream::nodes, &page);
+}
+
+bool SessionTable::write_page(const dds::Guid& client, const plc_LogPage& page) {
+  return write(client, Stream::logs, &page);
 }
 
 bool SessionTable::write(const dds::Guid& client, Stream stream, const void* sample) {

@@ -49,6 +49,7 @@ class SessionTable {
   /// False: the client has not got it, nor will.
   [[nodiscard]] bool write_page(const dds::Guid& client, const plc_ObjectPage& page);
   [[nodiscard]] bool write_page(const dds::Guid& client, const plc_NodePage& page);
+  [[nodiscard]] bool write_page(const dds::Guid& client, const plc_LogPage& page);
 
   /// What the client says of itself, and its GUID.
   [[nodiscard]] std::string describe(const dds::Guid& client) const;
@@ -62,8 +63,8 @@ class SessionTable {
 
  private:
   /// What goes to each client over a writer of its own.
-  enum class Stream : std::uint8_t { replies, acks, objects, nodes, runs, downloads };
-  static constexpr std::size_t kStreams = 6;
+  enum class Stream : std::uint8_t { replies, acks, objects, nodes, logs, runs, downloads };
+  static constexpr std::size_t kStreams = 7;
   struct Session {
     dds::Entity publisher;
     std::array<dds::Entity, kStreams> writers = {};

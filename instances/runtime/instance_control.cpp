@@ -82,6 +82,7 @@ Result<std::string> Instance::obey(const ControlRequest& request) {
     case ControlVerb::list_nodes:
     case ControlVerb::list_routes:
     case ControlVerb::read_clock:
+    case ControlVerb::read_log:
       break;
   }
   return failure(ErrorCode::unsupported,

@@ -65,6 +65,7 @@ void ManagedInstance::handle(const ControlRequest& request, ControlReplyFunction
     case ControlVerb::list_nodes:
     case ControlVerb::list_routes:
     case ControlVerb::read_clock:
+    case ControlVerb::read_log:
     case ControlVerb::change_application:
     case ControlVerb::shutdown:
     case ControlVerb::status:
@@ -82,6 +83,7 @@ Result<void> ManagedInstance::check_argument(ControlRequest& request) const {
     case ControlVerb::list_nodes:
     case ControlVerb::list_routes:
     case ControlVerb::read_clock:
+    case ControlVerb::read_log:
       return failure(ErrorCode::unsupported,
                      fmt::format("'{}' is answered by the API server", to_string(request.verb)));
     case ControlVerb::change_application:

@@ -33,6 +33,7 @@ constexpr std::array kVerbs = {
     std::pair{ControlVerb::list_nodes, std::string_view("list nodes")},
     std::pair{ControlVerb::list_routes, std::string_view("list routes")},
     std::pair{ControlVerb::read_clock, std::string_view("read clock")},
+    std::pair{ControlVerb::read_log, std::string_view("read log")},
     std::pair{ControlVerb::shutdown, std::string_view("shutdown")},
     std::pair{ControlVerb::status, std::string_view("status")},
 };

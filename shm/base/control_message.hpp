@@ -36,6 +36,7 @@ enum class ControlVerb : std::uint8_t {
   list_nodes,            ///< the same, from the directory of the nodes that send blocks
   list_routes,           ///< the same
   read_clock,            ///< answered by the API server itself
+  read_log,              ///< the same, from the log of the instance
   shutdown,              ///< (manager to instance only) stop the application and end the process
   status,                ///< (manager to instance only) the reply's text is the InstanceReport
 };

@@ -50,6 +50,7 @@ constexpr std::array kOperations = {
               /*of_host=*/true},
     Operation{plc_OPERATION_READ_CLOCK, ControlVerb::read_clock, ApiRole::operating, Argument::none,
               /*of_host=*/true},
+    Operation{plc_OPERATION_READ_LOG, ControlVerb::read_log, ApiRole::operating, Argument::none},
     Operation{plc_OPERATION_LOAD_APPLICATION, ControlVerb::load_application, ApiRole::engineering,
               Argument::path, /*of_host=*/false, Options::loading},
     Operation{plc_OPERATION_DOWNLOAD_APPLICATION, ControlVerb::download_application, ApiRole::engineering,
@@ -169,7 +170,7 @@ Result<ControlRequest> check_request(const plc_Request& request, ApiRole role, s
 bool only_reads(std::int32_t operation) noexcept {
   return operation == plc_OPERATION_CHECK_HOST || operation == plc_OPERATION_LIST_OBJECTS ||
          operation == plc_OPERATION_LIST_NODES || operation == plc_OPERATION_LIST_ROUTES ||
-         operation == plc_OPERATION_READ_CLOCK;
+         operation == plc_OPERATION_READ_CLOCK || operation == plc_OPERATION_READ_LOG;
 }
 
 std::string operation_name(std::int32_t operation) {

@@ -12,6 +12,7 @@
 #include <unistd.h>
 
 #include "shm/base/packet_socket.hpp"
+#include "shm/pool/log_ring.hpp"
 #include "shm/pool/transition_ring.hpp"
 
 namespace plchost {
@@ -61,6 +62,7 @@ TestHost::~TestHost() {
   for (const std::string& instance : instances_) {
     InstancePage::remove(pool_name_, instance);
     TransitionRing::remove(pool_name_, instance);
+    LogRing::remove(pool_name_, instance);
   }
   MemoryFile::remove(host_page_name(pool_name_));
   MemoryFile::remove(pool_name_ + ".posts");

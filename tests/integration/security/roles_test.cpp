@@ -5,6 +5,7 @@
 #include "api/security/pem.hpp"
 #include "api/security/policy.hpp"
 #include "api/security/signed_document.hpp"
+#include "shm/pool/log_ring.hpp"
 #include "tests/integration/security/secured_host.hpp"
 
 namespace plchost {
@@ -26,8 +27,9 @@ TEST_F(Roles, AViewerReadsStatus) {
 }
 
 TEST_F(Roles, AViewerThatPostsOrStopsIsRefused) {
-  for (const std::vector<std::string>& words :
-       {std::vector<std::string>{"post", "event", "line1/ready"}, {"stop", "instance", "line1"}}) {
+  for (const std::vector<std::string>& words : {std::vector<std::string>{"post", "event", "line1/ready"},
+                                                {"stop", "instance", "line1"},
+                                                {"logs", "line1"}}) {
     const auto refused = run("viewer", words);
     EXPECT_EQ(refused.code, 1);
     EXPECT_THAT(refused.errors, HasSubstr("the permissions of this identity do not allow it"));
@@ -43,6 +45,15 @@ TEST_F(Roles, AnOperatorPostsAndStops) {
   const auto stopped = run("operator", {"stop", "instance", "line1"});
   EXPECT_EQ(stopped.code, 0) << stopped.errors;
   EXPECT_THAT(host_.requests(), SizeIs(1));
+}
+
+TEST_F(Roles, AnOperatorReadsWhatAnInstanceSays) {
+  auto ring = LogRing::open(host_.pool_name(), "line1").value();
+  ring.add({.time_unix_ns = 1, .text = "valve 7 is stuck"});
+  const auto read = run("operator", {"logs", "line1"});
+  EXPECT_EQ(read.code, 0) << read.errors;
+  EXPECT_THAT(read.output, HasSubstr("valve 7 is stuck"));
+  LogRing::remove(host_.pool_name(), "line1");
 }
 
 TEST_F(Roles, AnOperatorThatLoadsIsRefused) {
@@ -126,6 +137,9 @@ TEST_F(PermissionsThatSayTooMuch, StillCommandNothing) {
   const auto stopped = run("viewer", {"stop", "instance", "line1"});
   EXPECT_EQ(stopped.code, 1);
   EXPECT_THAT(stopped.errors, HasSubstr("'viewer' is viewer; this takes the role operator"));
+  const auto read = run("viewer", {"logs", "line1"});
+  EXPECT_EQ(read.code, 1);
+  EXPECT_THAT(read.errors, HasSubstr("'viewer' is viewer; this takes the role operator"));
   const auto loaded = run("viewer", {"load", "application", "line1", "/tmp/other.so", "--on-host"});
   EXPECT_EQ(loaded.code, 1);
   EXPECT_THAT(loaded.errors, HasSubstr("this takes the role engineer"));

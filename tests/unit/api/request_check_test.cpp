@@ -50,6 +50,8 @@ TEST(RequestCheck, TurnsEachOperationIntoItsVerb) {
   EXPECT_EQ(check(make(plc_OPERATION_LIST_OBJECTS, ""), ApiRole::operating)->verb, ControlVerb::list_objects);
   EXPECT_EQ(check(make(plc_OPERATION_LIST_NODES, ""), ApiRole::operating)->verb, ControlVerb::list_nodes);
   EXPECT_EQ(check(make(plc_OPERATION_LIST_ROUTES, ""), ApiRole::operating)->verb, ControlVerb::list_routes);
+  EXPECT_EQ(check(make(plc_OPERATION_READ_LOG), ApiRole::operating)->verb, ControlVerb::read_log);
+  EXPECT_FALSE(check(make(plc_OPERATION_READ_LOG, ""), ApiRole::operating)) << "of one instance";
   for (const char* task : {"", "Main"}) {
     const auto reset = check(make(plc_OPERATION_RESET_STATISTICS, "line1", task), ApiRole::operating);
     EXPECT_EQ(reset->verb, ControlVerb::reset_statistics);

@@ -1,0 +1,126 @@
+#include "api/dds/log_page.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <string>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "api/dds/entries.hpp"
+#include "api/dds/text.hpp"
+#include "shm/base/names.hpp"
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr std::string_view kAfterRecord = "after";
+constexpr std::string_view kNewestEntry = "newest";
+
+static_assert(sizeof(plc_LogRecord::text) == kMaxLogText + 1);
+
+Result<std::uint64_t> parse_record_number(std::string_view name, std::string_view text) {
+  if (text.empty()) return 0;
+  std::uint64_t number = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error == std::errc{} && end == text.data() + text.size()) return number;
+  return failure(ErrorCode::invalid_argument, fmt::format("{} '{}' is no number", name, shown(text)));
+}
+
+std::string text_of_number(std::uint64_t number) {
+  return number == 0 ? std::string() : fmt::format("{}", number);
+}
+
+plc_LogRecord sample_of(const LogRecord& record) noexcept {
+  plc_LogRecord sample{.sequence_number = record.sequence,
+                       .time_unix_ns = record.time_unix_ns,
+                       .pid = record.pid,
+                       .level = std::to_underlying(record.level),
+                       .source = std::to_underlying(record.source),
+                       .goes_on = record.goes_on != 0,
+                       .text = {}};
+  dds::copy_text(sample.text, record.text.view());
+  return sample;
+}
+
+// Codes that are not known here are those of a newer host.
+LogRecord record_of(const plc_LogRecord& sample) {
+  return {.sequence = sample.sequence_number,
+          .time_unix_ns = sample.time_unix_ns,
+          .pid = sample.pid,
+          .level = static_cast<LogLevel>(sample.level),
+          .source = static_cast<LogSource>(sample.source),
+          .goes_on = sample.goes_on ? 1U : 0U,
+          .text = FixedText<kMaxLogText>(dds::text_of(sample.text))};
+}
+
+}  // namespace
+
+std::vector<plc_KeyValue> entries_of(const LogQuery& query) {
+  std::vector<plc_KeyValue> entries;
+  dds::add_entry(entries, kAfterRecord, text_of_number(query.after));
+  dds::add_entry(entries, kNewestEntry, text_of_number(query.newest));
+  return entries;
+}
+
+Result<LogQuery> parse_log_query(std::span<const plc_KeyValue> entries) {
+  std::string after;
+  std::string newest;
+  const std::array<std::pair<std::string_view, std::string*>, 2> known{
+      {{kAfterRecord, &after}, {kNewestEntry, &newest}}};
+  if (auto read = dds::read_entries(entries, known); !read) return std::unexpected(std::move(read).error());
+  if (!after.empty() && !newest.empty()) {
+    return failure(ErrorCode::invalid_argument, "'after' and 'newest' exclude each other");
+  }
+  const auto first = parse_record_number(kAfterRecord, after);
+  if (!first) return std::unexpected(first.error());
+  const auto count = parse_record_number(kNewestEntry, newest);
+  if (!count) return std::unexpected(count.error());
+  return LogQuery{.after = *first, .newest = *count};
+}
+
+Result<LogListing> look_at_log(std::string_view pool, std::string_view instance, const LogQuery& query) {
+  LogListing listing{.clock_unix_ns = unix_time_ns(), .next_after = query.after};
+  const auto reader = LogRingReader::open(pool, instance);
+  if (!reader && reader.error().code == ErrorCode::not_found) return listing;
+  if (!reader) return std::unexpected(reader.error());
+  LogSlice slice =
+      query.newest > 0 ? reader->newest(query.newest, kPageRecords) : reader->read(query.after, kPageRecords);
+  listing.stream = static_cast<std::uint64_t>(slice.stream_unix_ns);
+  listing.records = std::move(slice.records);
+  listing.complete = listing.records.size() < kPageRecords || listing.records.back().sequence >= slice.last;
+  if (listing.complete) {
+    listing.next_after = slice.last;
+  } else {
+    listing.next_after = listing.records.back().sequence;
+  }
+  return listing;
+}
+
+LogPageSample::LogPageSample(const LogListing& listing) {
+  const std::size_t count = std::min(listing.records.size(), kPageRecords);
+  for (std::size_t i = 0; i < count; ++i) records_.push_back(sample_of(listing.records[i]));
+  page_.stream = listing.stream;
+  page_.clock_unix_ns = listing.clock_unix_ns;
+  page_.complete = listing.complete;
+  page_.next_after = listing.next_after;
+  page_.records._buffer = records_.data();
+  page_.records._length = page_.records._maximum = static_cast<std::uint32_t>(records_.size());
+}
+
+LogListing listing_of(const plc_LogPage& page) {
+  LogListing listing{.stream = page.stream,
+                     .clock_unix_ns = page.clock_unix_ns,
+                     .complete = page.complete,
+                     .next_after = page.next_after,
+                     .records = {}};
+  for (const plc_LogRecord& record : std::span(page.records._buffer, page.records._length)) {
+    listing.records.push_back(record_of(record));
+  }
+  return listing;
+}
+
+}  // namespace plchost

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include <control.h>
+
+#include "shm/base/result.hpp"
+#include "shm/pool/log_ring.hpp"
+
+namespace plchost {
+
+/// Which part of the log of an instance is asked for: one of both, or neither (all that is kept).
+struct LogQuery {
+  std::uint64_t after = 0;   ///< greater numbers only
+  std::uint64_t newest = 0;  ///< so many of the newest; 0: not asked
+};
+
+/// The query as it travels: entries of plc_Request.ext.
+[[nodiscard]] std::vector<plc_KeyValue> entries_of(const LogQuery& query);
+/// And back. invalid_argument: a value that is no number, an entry twice, or both.
+[[nodiscard]] Result<LogQuery> parse_log_query(std::span<const plc_KeyValue> entries);
+
+/// A part of the log of an instance.
+struct LogListing {
+  std::uint64_t stream = 0;        ///< when the numbering began; 0: it has said nothing yet
+  std::int64_t clock_unix_ns = 0;  ///< of the host
+  bool complete = true;
+  std::uint64_t next_after = 0;  ///< the next part is what comes after this number
+  std::vector<LogRecord> records = {};
+};
+
+/// The bound of a page.
+inline constexpr std::size_t kPageRecords = 256;
+
+/// The part of the log that is asked for, at most kPageRecords. An instance without a log has said nothing.
+[[nodiscard]] Result<LogListing> look_at_log(std::string_view pool, std::string_view instance,
+                                             const LogQuery& query);
+
+/// A listing as it travels.
+class LogPageSample {
+ public:
+  /// At most kPageRecords. What the page shall say besides is for the caller to fill in.
+  explicit LogPageSample(const LogListing& listing);
+  LogPageSample(const LogPageSample&) = delete;
+  LogPageSample& operator=(const LogPageSample&) = delete;
+  ~LogPageSample() = default;
+
+  [[nodiscard]] plc_LogPage& page() noexcept { return page_; }
+
+ private:
+  plc_LogPage page_{};
+  std::vector<plc_LogRecord> records_;
+};
+
+[[nodiscard]] LogListing listing_of(const plc_LogPage& page);
+
+}  // namespace plchost

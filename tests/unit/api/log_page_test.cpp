@@ -1,0 +1,80 @@
+#include "api/dds/log_page.hpp"
+
+#include <gmock/gmock.h>
+
+#include "api/cli/rows/log_rows.hpp"
+#include "api/dds/text.hpp"
+
+namespace plchost {
+namespace {
+
+using testing::HasSubstr;
+
+plc_KeyValue log_entry(std::string_view name, std::string_view value) {
+  plc_KeyValue made{};
+  dds::copy_text(made.name, name);
+  dds::copy_text(made.value, value);
+  return made;
+}
+
+TEST(LogQuery, TravelsAsItIs) {
+  EXPECT_TRUE(entries_of(LogQuery{}).empty());
+  EXPECT_EQ(parse_log_query(entries_of(LogQuery{.after = ~std::uint64_t{0}})).value().after,
+            ~std::uint64_t{0});
+  EXPECT_EQ(parse_log_query(entries_of(LogQuery{.newest = 7})).value().newest, 7U);
+}
+
+TEST(LogQuery, RefusesWhatCannotBe) {
+  const auto error = [](const std::vector<plc_KeyValue>& entries) {
+    const auto query = parse_log_query(entries);
+    return query ? std::string("none") : query.error().message;
+  };
+  EXPECT_THAT(error({log_entry("after", "x")}), HasSubstr("after 'x' is no number"));
+  EXPECT_THAT(error({log_entry("newest", "-1")}), HasSubstr("no number"));
+  EXPECT_THAT(error({log_entry("newest", "99999999999999999999")}), HasSubstr("no number"));
+  EXPECT_THAT(error({log_entry("after", "1"), log_entry("newest", "1")}), HasSubstr("exclude each other"));
+  EXPECT_THAT(error({log_entry("after", "1"), log_entry("after", "1")}), HasSubstr("twice"));
+  EXPECT_EQ(error({log_entry("later", "than this server")}), "none");
+}
+
+LogRecord record(std::uint64_t sequence, std::string_view text, bool goes_on = false) {
+  LogRecord made{.sequence = sequence, .goes_on = goes_on ? 1U : 0U, .text = {}};
+  made.text.assign(text);
+  return made;
+}
+
+TEST(LogLinesOfRecords, ArePutTogetherOverPages) {
+  LogLines sut;
+  EXPECT_TRUE(sut.add({record(1, "a", true)}).empty());
+  const auto lines = sut.add({record(2, "b"), record(3, "c"), record(3, "again")});
+  ASSERT_EQ(lines.size(), 2U);
+  EXPECT_EQ(lines[0].text, "ab");
+  EXPECT_EQ(lines[0].missing, 0U);
+  EXPECT_EQ(lines[1].text, "c");
+}
+
+TEST(LogLinesOfRecords, SayHowManyAreMissing) {
+  LogLines sut;
+  EXPECT_EQ(sut.add({record(500, "first seen")})[0].missing, 0U);
+  EXPECT_TRUE(sut.add({record(501, "torn", true)}).empty());
+  const auto lines = sut.add({record(510, "next")});
+  ASSERT_EQ(lines.size(), 1U);
+  EXPECT_EQ(lines[0].missing, 8U);
+  EXPECT_EQ(lines[0].text, "next");
+  EXPECT_THAT(format_log_line(lines[0]), HasSubstr("(8 lines are missing here)\n"));
+}
+
+TEST(LogLinesOfRecords, HaveABound) {
+  LogLines sut;
+  std::size_t longest = 0;
+  for (std::uint64_t number = 1; number < 2000; ++number) {
+    for (const LogText& line : sut.add({record(number, std::string(kMaxLogText, 'x'), true)})) {
+      longest = std::max(longest, line.text.size());
+    }
+  }
+  EXPECT_GT(longest, 0U);
+  EXPECT_LT(longest, 70'000U);
+}
+
+}  // namespace
+}  // namespace plchost
