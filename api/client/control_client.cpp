@@ -264,12 +264,24 @@ Result<ApiReply> ControlClient::call(const ApiRequest& request, TimePoint deadli
   if (auto good = check_api_request(request); !good) return std::unexpected(std::move(good).error());
   // What has come on other topics would keep the wait from waiting.
   const auto look = [&, woken = false](const auto& /*identity*/, TimePoint /*now*/) mutable {
-    if (std::exchange(woken, true)) update();
+    if (std::exchange(woken, true)) {
+      update();
+      calm_pages();
+    }
     return RequestCaller::Wait{.deadline = deadline};
   };
   auto reply = ask(request, deadline, look);
   if (reply) await_status(request.host, *reply, deadline);
   return reply;
+}
+
+// Pages stay unread until their answer has come, and the end of a host is told by their readers, too: that
+// they woke this client is enough once.
+void ControlClient::calm_pages() const noexcept {
+  for (const PageReader* const pages : {&object_pages_, &node_pages_, &log_pages_}) {
+    std::uint32_t statuses = 0;
+    if (pages->reader) (void)dds_take_status(pages->reader.get(), &statuses, DDS_DATA_AVAILABLE_STATUS);
+  }
 }
 
 void ControlClient::await_status(const std::string& host, const ApiReply& reply, TimePoint deadline) {

@@ -235,6 +235,7 @@ class ControlClient {
     dds::Entity topic;
     dds::Entity reader;
   };
+  void calm_pages() const noexcept;
   template <class Page, class Listing>
   [[nodiscard]] Result<Listing> ask_for_page(PageReader& pages, const dds::TopicInfo& topic,
                                              const ApiRequest& request, TimePoint deadline);

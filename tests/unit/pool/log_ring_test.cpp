@@ -132,7 +132,7 @@ TEST_F(Log, AStrangerWhoScribblesHarmsNobody) {
 
 TEST_F(Log, ANumberThatNobodyCanHaveReachedIsNotGoneOnWith) {
   {
-    LogRing ring = open();
+    const LogRing ring = open();
   }
   const MemoryFile memory = map();
   auto& layout = *reinterpret_cast<LogRingLayout*>(memory.bytes().data());
