@@ -35,6 +35,8 @@ constexpr std::uint16_t kKeyHash = 0x0070;
 constexpr std::uint16_t kStatusInfo = 0x0071;
 /// A reader that does not know the parameter has to refuse the whole list: Cyclone does so without parsing.
 constexpr std::uint16_t kMustBeKnown = 0x4000;
+/// Each vendor gives these numbers a meaning of its own: what is not of Cyclone's form is another vendor's.
+constexpr std::uint16_t kOfAVendor = 0x8000;
 
 constexpr std::array kRules{
     Rule{.parameter = 0x0002, .form = Form::sized, .size = 8},   // lease
@@ -188,9 +190,13 @@ std::size_t filter_parameters(std::span<std::byte> list, bool little, ParameterL
     if (size % 4 != 0 || size > list.size() - at) return 0;
     at += size;
     if (parameter == kPadding) continue;
-    if (const Rule* const rule = rule_of(parameter, kind)) {
-      if (!has_form(rest.subspan(kHeader, size), *rule, little, kind, guid_prefix)) return 0;
+    const Rule* const rule = rule_of(parameter, kind);
+    const bool fits =
+        rule != nullptr && has_form(rest.subspan(kHeader, size), *rule, little, kind, guid_prefix);
+    if (fits) {
       if (rule->form == Form::locator && ++locators > kMostLocators) return 0;
+    } else if (rule != nullptr && (parameter & kOfAVendor) == 0) {
+      return 0;
     } else if ((parameter & kMustBeKnown) == 0) {
       std::ranges::fill(rest.first(sizeof parameter), std::byte{0});
     }

@@ -73,6 +73,13 @@ TEST(ParameterFilter, MakesPaddingOfAllOthers) {
   }
 }
 
+TEST(ParameterFilter, MakesPaddingOfAnotherVendorsMeaningOfANumber) {
+  List of_fast_dds;
+  of_fast_dds.add(0x8007, {1, 0, 0, 0}).end();
+  EXPECT_NE(of_fast_dds.filter(), 0U);
+  EXPECT_EQ(of_fast_dds.first(), 0U);
+}
+
 TEST(ParameterFilter, LeavesItToDdsToRefuseWhatMustBeKnown) {
   List sut;
   sut.add(0x4075, Octets(4)).end();
