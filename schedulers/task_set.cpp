@@ -107,6 +107,11 @@ auto TaskSet::arrange(std::string_view name, const SchedulerSettings& settings)
   return arrangement;
 }
 
+Result<void> TaskSet::check(std::string_view scheduler, const SchedulerSettings& settings) {
+  const auto arrangement = arrange(scheduler, settings);
+  return arrangement ? Result<void>() : std::unexpected(arrangement.error());
+}
+
 Result<void> TaskSet::check_startable() {
   if (running_) return failure(ErrorCode::wrong_state, "the tasks are running already");
   if (const auto busy = wait_until_settled(TimePoint{}); !busy.empty()) {

@@ -78,6 +78,8 @@ class TaskSet {
   /// Stops everything; waits for the cycles that are running, however long they take.
   ~TaskSet();
 
+  /// Whether start() would refuse this scheduler with these settings. Starts nothing.
+  [[nodiscard]] Result<void> check(std::string_view scheduler, const SchedulerSettings& settings);
   /// Releases the tasks under the scheduler of that name. wrong_state: they run already, or one of them has
   /// not come back since stop(), or is in exception. External events posted while the tasks were stopped are
   /// not run but counted as lost. Edges of event variables are not run: the level at the start counts as

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include "instances/runtime/application/declare_application.hpp"
 #include "instances/runtime/device/device_events.hpp"
 #include "instances/runtime/tasks/operator_events.hpp"
 #include "instances/runtime/tasks/task_builder.hpp"
@@ -112,17 +113,14 @@ std::string Instance::hold_idle_states() {
   return idle_hold_.as_wanted() ? std::string() : fmt::format("idle states: {}", idle_hold_.status());
 }
 
-// TimerMode=OneShot is the seed's way to ask for distributed clocks; who names a scheduler gets that.
 void Instance::choose_scheduler() {
-  const bool one_shot = settings_.timer_mode == TimerMode::one_shot;
-  if (scheduler_.empty()) {
-    scheduler_ = one_shot ? "CmpScheduleOneShot" : "CmpSchedule";
-  } else if (one_shot && scheduler_ != "CmpScheduleOneShot") {
-    spdlog::warn(
-        "settings: TimerMode=OneShot asks for CmpScheduleOneShot, but {} was asked for at the start and is "
-        "used",
-        scheduler_);
-  }
+  const std::string asked = std::exchange(scheduler_, scheduler_for(scheduler_, settings_));
+  if (asked.empty() || settings_.timer_mode != TimerMode::one_shot || scheduler_ == "CmpScheduleOneShot")
+    return;
+  spdlog::warn(
+      "settings: TimerMode=OneShot asks for CmpScheduleOneShot, but {} was asked for at the start and is "
+      "used",
+      scheduler_);
 }
 
 Result<std::string> Instance::attach_pool() {
@@ -186,31 +184,10 @@ Result<std::string> Instance::load_components() {
 
 Result<std::string> Instance::load_application() {
   if (options_.launch.application.empty()) return "no application is given: there is nothing to run";
-  auto application = Application::load(options_.launch.application, *host_);
+  auto application = declare_application(options_.launch.application, settings_, device_, *host_);
   if (!application) return std::unexpected(std::move(application).error());
-  if (device_) {
-    if (auto known = check_device_events(*device_, application->tasks()); !known)
-      return std::unexpected(known.error());
-  }
-  if (auto applied = application->apply(settings_.tasks); !applied) {
-    return std::unexpected(std::move(applied).error());
-  }
   application_.emplace(*std::move(application));
-  return place_areas();
-}
-
-Result<std::string> Instance::place_areas() {
-  const LaunchOptions& launch = options_.launch;
-  const std::string& directory = settings_.retain.directory;
-  return host_->areas().place({.pool = *pool_,
-                               .instance = launch.name,
-                               .application = application_->name(),
-                               .settings = settings_.areas,
-                               .retain = {.directory = directory.empty() ? launch.state_directory : directory,
-                                          .interval = settings_.retain.interval,
-                                          .mismatch = settings_.retain.mismatch,
-                                          .postpone = settings_.retain.postpone,
-                                          .cold = launch.start_kind == StartKind::cold}},
+  return host_->areas().place(areas_environment(options_.launch, settings_, *application_, &*pool_),
                               application_->tasks_to_change());
 }
 

@@ -112,8 +112,7 @@ int run(const Options& options) {
     if (options.parent != 0) ::prctl(PR_SET_PDEATHSIG, SIGTERM);
     if (options.parent != 0 && ::getppid() != options.parent) return kExitSetupFailed;
     set_log_pattern("%l: %v");  // read by people and told in answers
-    return run_trial(options.check_application, signals->get(),
-                     [&] { return check_application(options.check_application, options.launch.settings); });
+    return run_trial(options.check_application, signals->get(), [&] { return check_application(options); });
   }
   if (options.save_retain) {
     const auto saved = save_left_behind(options.launch);

@@ -111,7 +111,7 @@ void describe(CLI::App& app, Options& options) {
   app.add_option("--parent", options.parent, "Process that asked for the check: its end ends the check")
       ->check(CLI::NonNegativeNumber);
   app.add_option("--check-application", options.check_application,
-                 "Only check this file, with --settings under these, and say what is in it")
+                 "Only check this file as a start with the other options would, and say what is in it")
       ->check(check_path);
   app.add_option("--check-settings", options.check_settings, "Only check this settings file")
       ->check(check_path);

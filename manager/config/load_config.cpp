@@ -353,7 +353,7 @@ void Loader::check_start(SectionReader& reader, const InstanceConfig& instance) 
     }
   }
   if (instance.application.empty() || !surroundings.check_application) return;
-  if (const auto good = surroundings.check_application(instance.application, instance.settings); !good)
+  if (const auto good = surroundings.check_application(config.host, instance); !good)
     reader.problem("application", good.error().describe());
 }
 

@@ -22,8 +22,8 @@ struct ConfigSurroundings {
   /// change.
   bool check_directories = false;            ///< that they are there or can be made
   std::vector<std::string> interfaces = {};  ///< of the system; empty: not checked
-  /// Null: not checked. `settings`: those that the application is to run with; may be empty.
-  std::function<Result<void>(const std::string& file, const std::string& settings)> check_application = {};
+  /// Of an instance that has one. Null: not checked.
+  std::function<Result<void>(const HostConfig& host, const InstanceConfig& instance)> check_application = {};
   std::function<Result<void>(const std::string& file)> check_settings = {};  ///< null: not checked
 };
 

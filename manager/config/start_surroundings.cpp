@@ -10,6 +10,7 @@
 #include "manager/config/load_config.hpp"
 #include "manager/system/application_trial.hpp"
 #include "manager/system/child_process.hpp"
+#include "shm/base/names.hpp"
 
 namespace plchost {
 
@@ -32,12 +33,16 @@ bool ends_within(int process, Duration limit) {
   return ::poll(&end, 1, static_cast<int>(wait)) == 1;
 }
 
-Result<void> try_application(const std::string& plc_instance, const std::string& file,
-                             const std::string& settings) {
+Result<void> try_application(const std::string& plc_instance, const HostConfig& host,
+                             const InstanceConfig& instance) {
   LaunchOptions launch;
-  launch.name = "plc";
-  launch.settings = settings;
-  launch.application = file;
+  launch.name = check_name("instance", instance.name, kMaxInstanceName) ? instance.name : "plc";
+  launch.scheduler = instance.scheduler;
+  launch.priority_band = instance.priority_band;
+  launch.settings = instance.settings;
+  launch.application = instance.application;
+  launch.pool = host.pool;
+  launch.state_directory = host.state_directory;
   auto trial = ApplicationTrial::start(plc_instance, launch);
   if (!trial) return std::unexpected(trial.error());
   if (!ends_within(trial->fd(), kTrialLimit)) {
@@ -70,8 +75,8 @@ ConfigSurroundings start_surroundings(const std::string& programs) {
   ConfigSurroundings surroundings = config_surroundings();
   surroundings.check_directories = true;
   surroundings.interfaces = network_interfaces();
-  surroundings.check_application = [plc_instance](const std::string& file, const std::string& settings) {
-    return try_application(plc_instance, file, settings);
+  surroundings.check_application = [plc_instance](const HostConfig& host, const InstanceConfig& instance) {
+    return try_application(plc_instance, host, instance);
   };
   surroundings.check_settings = [plc_instance](const std::string& file) {
     return try_settings(plc_instance, file);

@@ -180,6 +180,10 @@ TEST_F(AuxiliaryTicks, OneShotIsRefusedAtTheStartAndAtASwitchWithTheReason) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::unsupported);
   EXPECT_THAT(refused.error().message, HasSubstr("/dev/rtc7 only has frequencies that are powers of two"));
+  const auto checked = set->check("CmpScheduleOneShot", settings(k1024Hertz));
+  ASSERT_FALSE(checked) << "a trial finds what a start does";
+  EXPECT_EQ(checked.error().message, refused.error().message);
+  EXPECT_TRUE(set->check("CmpSchedule", settings(k1024Hertz)));
   const TimePoint origin = start("CmpSchedule", settings(k1024Hertz));
   clock.run_until(origin + milliseconds(20));
   const auto switched = set->switch_to("CmpScheduleOneShot", settings(k1024Hertz));

@@ -1,13 +1,13 @@
 #pragma once
 
-#include <string>
+#include "instances/runtime/options.hpp"
 
 namespace plchost {
 
-/// plc-instance --check-application: loads the file, runs its plc_app_init against a runtime that only
-/// collects, and prints its tasks or what is wrong. `settings`: a settings file under which it is to run;
-/// tasks, areas and events are then checked against it as at a start. Empty: none. Starts no task and touches
-/// no pool. The exit code of the program.
-[[nodiscard]] int check_application(const std::string& path, const std::string& settings);
+/// plc-instance --check-application: does all that a start with these options does, by the same functions,
+/// but takes nothing from an instance of that name that runs; then prints the tasks, or the first thing that
+/// is wrong. It starts no task, calls no hook of a component, opens no device, makes nothing in the pool and
+/// writes no file. A pool that is not there is not looked at. The exit code of the program.
+[[nodiscard]] int check_application(const Options& options);
 
 }  // namespace plchost

@@ -34,10 +34,7 @@ FileRange range_in(const struct stat& status, std::uint64_t begin, std::uint64_t
           .end = end};
 }
 
-Result<UniqueFd> open_device(const AreaSettings& settings, struct stat& status) {
-  UniqueFd fd(::open(settings.device.c_str(), O_RDWR | O_SYNC | O_CLOEXEC | O_NONBLOCK));
-  if (!fd) return not_mapped(settings, "cannot be opened", errno);
-  if (::fstat(fd.get(), &status) != 0) return not_mapped(settings, "fstat", errno);
+Result<void> check_file(const AreaSettings& settings, const struct stat& status) {
   if (!S_ISREG(status.st_mode) && !S_ISCHR(status.st_mode)) {
     return not_mapped(settings, "allowed is a character device or a plain file");
   }
@@ -45,6 +42,15 @@ Result<UniqueFd> open_device(const AreaSettings& settings, struct stat& status) 
   if (S_ISREG(status.st_mode) && (settings.address > size || settings.size > size - settings.address)) {
     return not_mapped(settings, fmt::format("the file ends at {:#x}", size));
   }
+  return {};
+}
+
+Result<UniqueFd> open_device(const AreaSettings& settings) {
+  UniqueFd fd(::open(settings.device.c_str(), O_RDWR | O_SYNC | O_CLOEXEC | O_NONBLOCK));
+  if (!fd) return not_mapped(settings, "cannot be opened", errno);
+  struct stat status{};
+  if (::fstat(fd.get(), &status) != 0) return not_mapped(settings, "fstat", errno);
+  if (auto fits = check_file(settings, status); !fits) return std::unexpected(fits.error());
   return fd;
 }
 
@@ -81,6 +87,33 @@ std::optional<FileRange> range_of_memory(const std::string& pool, const std::str
   return range_in(status, 0, static_cast<std::uint64_t>(status.st_size));
 }
 
+std::optional<FileRange> range_of_device(const AreaSettings& settings) {
+  struct stat status{};
+  if (::stat(settings.device.c_str(), &status) != 0) return std::nullopt;
+  return range_in(status, settings.address, settings.address + settings.size);
+}
+
+Result<void> AreaMemory::check_device(const AreaSettings& settings) {
+  struct stat status{};
+  const bool there = ::stat(settings.device.c_str(), &status) == 0 &&
+                     ::faccessat(AT_FDCWD, settings.device.c_str(), R_OK | W_OK, AT_EACCESS) == 0;
+  if (!there) return not_mapped(settings, "cannot be opened", errno);
+  return check_file(settings, status);
+}
+
+Result<void> AreaMemory::check_pool(const ObjectPool& pool, const std::string& name, std::size_t bytes) {
+  const auto known = pool.look_at(name);
+  if (!known && known.error().code == ErrorCode::not_found) return {};
+  if (!known) return std::unexpected(known.error());
+  if (known->type != ObjectType::memory) {
+    return failure(ErrorCode::wrong_type,
+                   fmt::format("'{}' is no shared memory but a {}", name, to_string(known->type)));
+  }
+  if (known->size == bytes) return {};
+  return failure(ErrorCode::wrong_size,
+                 fmt::format("shared memory '{}' has {} bytes, {} were asked for", name, known->size, bytes));
+}
+
 Result<AreaMemory> AreaMemory::of_process(std::size_t bytes) {
   AreaMemory memory;
   void* const address =
@@ -95,8 +128,7 @@ Result<AreaMemory> AreaMemory::of_process(std::size_t bytes) {
 }
 
 Result<AreaMemory> AreaMemory::of_device(const AreaSettings& settings) {
-  struct stat status{};
-  const auto fd = open_device(settings, status);
+  const auto fd = open_device(settings);
   if (!fd) return std::unexpected(fd.error());
   // Memory 0 of an uio device is mapped from its beginning, whatever is wanted of it.
   const bool uio = settings.device.starts_with("/dev/uio");
@@ -110,7 +142,6 @@ Result<AreaMemory> AreaMemory::of_device(const AreaSettings& settings) {
   memory.mapping_ = GuardedMapping(std::span(static_cast<std::byte*>(address), size));
   memory.bytes_ = memory.mapping_.bytes().subspan(settings.address - begin, settings.size);
   memory.existed_ = true;
-  memory.range_ = range_in(status, settings.address, settings.address + settings.size);
   if (!memory.mapping_.guarded()) {
     return not_mapped(settings, fmt::format("more than {} memories of others", MemoryGuard::kMost));
   }

@@ -32,6 +32,8 @@ struct FileRange {
 [[nodiscard]] std::optional<std::string> own_file_of_pool(const std::string& pool, const FileRange& range);
 /// The whole file of a memory of the pool. Set-up.
 [[nodiscard]] std::optional<FileRange> range_of_memory(const std::string& pool, const std::string& name);
+/// Of the device or file of these settings. Nothing: there is none. Set-up.
+[[nodiscard]] std::optional<FileRange> range_of_device(const AreaSettings& settings);
 
 /// The memory behind one block of areas, mapped, locked and touched, so that no cycle has a page fault. If
 /// others cut its file short, it is zeros from then on.
@@ -48,9 +50,12 @@ class AreaMemory {
   /// busy: somebody has. wrong_size: it has another one. Set-up.
   [[nodiscard]] static Result<AreaMemory> of_pool(ObjectPool& pool, const std::string& name,
                                                   std::size_t bytes, bool exclusive);
+  /// Whether of_device() and of_pool() would find another thing there than they need, as far as that can be
+  /// told without opening or making it. Set-up.
+  [[nodiscard]] static Result<void> check_device(const AreaSettings& settings);
+  [[nodiscard]] static Result<void> check_pool(const ObjectPool& pool, const std::string& name,
+                                               std::size_t bytes);
   [[nodiscard]] std::span<std::byte> bytes() const noexcept { return bytes_; }
-  /// of_device: which bytes they are. A page-wise mapping may have more.
-  [[nodiscard]] const std::optional<FileRange>& range() const noexcept { return range_; }
   /// Its file was cut short: what is written reaches nobody. Any context.
   [[nodiscard]] bool lost() const noexcept { return mapping_.lost() || shared_.lost(); }
   /// It was there already, with what others have written: a device always was.
@@ -61,7 +66,6 @@ class AreaMemory {
   std::span<std::byte> bytes_;
   SharedMemory shared_;
   UniqueFd lock_;
-  std::optional<FileRange> range_;
   bool existed_ = false;
 };
 

@@ -64,7 +64,7 @@ class Areas {
  public:
   /// Who is asked for memory, and where it is kept.
   struct Environment {
-    ObjectPool& pool;
+    ObjectPool* pool = nullptr;  ///< null: check() looks at no pool; place() needs one
     std::string instance;
     std::string application;  ///< its name
     std::span<const AreaSettings> settings;
@@ -82,10 +82,9 @@ class Areas {
   /// Tells another version of the application, which has declared the same areas, the addresses. Control
   /// thread, before its first cycle.
   void tell_addresses(const std::vector<DeclaredArea>& areas) const;
-  /// Whether place() would find fault with what is declared, as far as that can be told without any memory.
-  /// Set-up.
-  [[nodiscard]] Result<void> check(std::span<const AreaSettings> settings,
-                                   std::span<const TaskConfig> tasks) const;
+  /// Whether place() would find fault with what is declared: it begins with this. Makes and changes nothing,
+  /// and opens no device, so that an instance can have all of it meanwhile. Set-up.
+  [[nodiscard]] Result<void> check(const Environment& environment, std::span<const TaskConfig> tasks) const;
   /// Places all that is declared, fills it with what was kept or with initial values, tells the application
   /// the addresses, and puts the exchange of inputs and outputs around the cycles of the tasks that use them:
   /// the others stay as they are. A text: remarks. Once, after the application was loaded; set-up.
@@ -141,7 +140,6 @@ class Areas {
   [[nodiscard]] Result<void> make_blocks(const Environment& environment);
   [[nodiscard]] Result<void> make_memory(const Environment& environment, Block& block,
                                          const AreaBlock& planned);
-  [[nodiscard]] Result<void> check_distinct(const Environment& environment) const;
   void make_image(Block& block, const AreaBlock& planned);
   [[nodiscard]] Result<void> make_keeper(const Environment& environment);
   void tell_plain_addresses();

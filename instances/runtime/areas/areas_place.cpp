@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <numeric>
+#include <set>
 #include <utility>
 
 #include <fmt/format.h>
@@ -39,25 +40,110 @@ Result<void> check_kept_bytes(std::uint64_t bytes) {
       fmt::format("the retain and persistent areas have {} bytes, {} are allowed", bytes, kMaxRetainBytes));
 }
 
+std::string name_of(const AreaSettings& settings) {
+  return fmt::format("{}: [SysMem] Area.{}", settings.where, settings.number);
+}
+
+std::size_t bytes_in_pool(const AreaSettings& settings, const DeclaredArea& first) {
+  return first.has_image() ? plc_image_bytes(static_cast<std::uint32_t>(settings.size)) : settings.size;
+}
+
+// All that is kept, with its initial values.
+RetainImage kept_image(const std::string& application, std::span<const DeclaredArea> areas) {
+  RetainImage image;
+  image.layout.application = application;
+  for (const DeclaredArea& area : areas) {
+    if (!area.is_kept()) continue;
+    image.layout.areas.push_back({.name = area.name,
+                                  .flags = area.flags & (PLC_AREA_RETAIN | PLC_AREA_PERSISTENT),
+                                  .bytes = area.bytes,
+                                  .layout = area.layout,
+                                  .offset = image.data.size()});
+    image.data.insert(image.data.end(), area.initial.begin(), area.initial.end());
+    image.data.resize(behind_kept(image.data.size()));
+  }
+  image.layout.bytes = image.data.size();
+  return image;
+}
+
+Result<void> check_memory(const Areas::Environment& environment, const AreaSettings& settings,
+                          const DeclaredArea& first) {
+  if (settings.object.empty()) return AreaMemory::check_device(settings);
+  if (environment.pool == nullptr) return {};
+  auto good = AreaMemory::check_pool(*environment.pool, settings.object, bytes_in_pool(settings, first));
+  return good ? good : failure_in(name_of(settings), std::move(good).error());
+}
+
+// The settings are checked by their texts; but a file has many: symbolic and hard links, and that of a memory
+// of the pool, one of which holds what is kept.
+Result<void> check_distinct(const Areas::Environment& environment, const AreaPlan& plan,
+                            std::span<const DeclaredArea> areas) {
+  struct Taken {
+    std::string by;
+    FileRange range;
+  };
+  if (environment.pool == nullptr) return {};
+  const std::string& pool = environment.pool->name();
+  std::vector<Taken> taken;
+  const std::string kept = kept_memory_name(environment.instance);
+  if (const auto range = range_of_memory(pool, kept);
+      range && std::ranges::any_of(areas, &DeclaredArea::is_kept)) {
+    taken.push_back({.by = fmt::format("the retain variables of the instance, memory '{}' of the pool", kept),
+                     .range = *range});
+  }
+  std::set<const AreaSettings*> seen;  // a setting has a block for each kind of area
+  for (const AreaBlock& block : plan.blocks) {
+    const AreaSettings* const settings = block.settings;
+    if (settings == nullptr || !seen.insert(settings).second) continue;
+    const bool device = settings->object.empty();
+    const auto range = device ? range_of_device(*settings) : range_of_memory(pool, settings->object);
+    if (!range) continue;
+    if (const auto own = own_file_of_pool(pool, *range)) {
+      return failure(ErrorCode::invalid_argument,
+                     fmt::format("{}: {} is {}, in which the host manages its pool; choose another file, or "
+                                 "Object=NAME for a memory of the pool",
+                                 name_of(*settings), settings->device, *own));
+    }
+    for (const Taken& other : taken) {
+      if (!range->overlaps(other.range)) continue;
+      return failure(
+          ErrorCode::invalid_argument,
+          fmt::format("{}: {} is the same file as that of {}, and they overlap; each needs bytes of "
+                      "its own",
+                      name_of(*settings), device ? settings->device : settings->object, other.by));
+    }
+    taken.push_back({.by = fmt::format("Area.{} of {}", settings->number, settings->where), .range = *range});
+  }
+  return {};
+}
+
 }  // namespace
 
-Result<void> Areas::check(std::span<const AreaSettings> settings, std::span<const TaskConfig> tasks) const {
+Result<void> Areas::check(const Environment& environment, std::span<const TaskConfig> tasks) const {
   if (declared_.empty()) return {};
   std::vector<DeclaredArea> areas = declared_;
   std::vector<std::string> names;
   for (const TaskConfig& task : tasks) names.push_back(task.name);
   if (auto done = complete_uses(areas, names); !done) return done;
-  if (const auto plan = plan_areas(areas, settings); !plan) return std::unexpected(plan.error());
-  std::size_t kept = 0;
-  for (const DeclaredArea& area : areas) {
-    if (area.is_kept()) kept = behind_kept(kept + area.bytes);
+  const auto plan = plan_areas(areas, environment.settings);
+  if (!plan) return std::unexpected(plan.error());
+  for (const AreaBlock& planned : plan->blocks) {
+    if (planned.settings == nullptr) continue;
+    if (auto good = check_memory(environment, *planned.settings, areas[planned.areas.front()]); !good)
+      return good;
   }
-  return check_kept_bytes(kept);
+  if (auto distinct = check_distinct(environment, *plan, areas); !distinct) return distinct;
+  const RetainImage kept = kept_image(environment.application, areas);
+  if (kept.layout.areas.empty()) return {};
+  if (auto good = check_kept_bytes(kept.layout.bytes); !good) return good;
+  const std::string pool = environment.pool == nullptr ? std::string() : environment.pool->name();
+  return RetainKeeper::check(pool, environment.instance, kept.layout, environment.retain);
 }
 
 Result<std::string> Areas::place(const Environment& environment, std::span<TaskConfig> tasks) {
   open_ = false;
   if (declared_.empty()) return std::string();
+  if (auto good = check(environment, tasks); !good) return std::unexpected(std::move(good).error());
   for (const TaskConfig& task : tasks) tasks_.push_back(task.name);
   if (auto done = complete_uses(declared_, tasks_); !done) return std::unexpected(done.error());
   auto plan = plan_areas(declared_, environment.settings);
@@ -66,7 +152,6 @@ Result<std::string> Areas::place(const Environment& environment, std::span<TaskC
   cycles_.resize(tasks.size());
   plain_.resize(declared_.size(), nullptr);
   if (auto made = make_blocks(environment); !made) return std::unexpected(made.error());
-  if (auto distinct = check_distinct(environment); !distinct) return std::unexpected(distinct.error());
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
     if (first_of(plan_.blocks[i]).has_image()) make_image(blocks_[i], plan_.blocks[i]);
   }
@@ -111,58 +196,10 @@ Result<void> Areas::make_memory(const Environment& environment, Block& block, co
   block.source = fmt::format("{}: [SysMem] Area.{}: {}", settings.where, settings.number,
                              settings.object.empty() ? settings.device : settings.object);
   if (settings.object.empty()) return take(AreaMemory::of_device(settings));
-  const auto size = static_cast<std::uint32_t>(settings.size);
-  const std::size_t bytes = first.has_image() ? plc_image_bytes(size) : settings.size;
-  auto made = AreaMemory::of_pool(environment.pool, settings.object, bytes, first.is_output());
-  if (!made) {
-    return failure_in(fmt::format("{}: [SysMem] Area.{}", settings.where, settings.number),
-                      std::move(made).error());
-  }
+  auto made = AreaMemory::of_pool(*environment.pool, settings.object, bytes_in_pool(settings, first),
+                                  first.is_output());
+  if (!made) return failure_in(name_of(settings), std::move(made).error());
   return take(std::move(made));
-}
-
-// The settings are checked by their texts; but a file has many: symbolic and hard links, and that of a memory
-// of the pool, one of which holds what is kept.
-Result<void> Areas::check_distinct(const Environment& environment) const {
-  struct Taken {
-    const AreaSettings* settings;
-    std::string by;
-    FileRange range;
-  };
-  std::vector<Taken> taken;
-  const std::string kept = kept_memory_name(environment.instance);
-  if (const auto range = range_of_memory(environment.pool.name(), kept);
-      range && std::ranges::any_of(declared_, &DeclaredArea::is_kept)) {
-    taken.push_back({.settings = nullptr,
-                     .by = fmt::format("the retain variables of the instance, memory '{}' of the pool", kept),
-                     .range = *range});
-  }
-  for (std::size_t i = 0; i < blocks_.size(); ++i) {
-    const AreaSettings* const settings = plan_.blocks[i].settings;
-    if (settings == nullptr) continue;
-    const auto range = settings->object.empty() ? blocks_[i].memory.range()
-                                                : range_of_memory(environment.pool.name(), settings->object);
-    if (!range) continue;
-    if (const auto own = own_file_of_pool(environment.pool.name(), *range)) {
-      return failure(ErrorCode::invalid_argument,
-                     fmt::format("{}: [SysMem] Area.{}: {} is {}, in which the host manages its pool; choose "
-                                 "another file, or Object=NAME for a memory of the pool",
-                                 settings->where, settings->number, settings->device, *own));
-    }
-    for (const Taken& other : taken) {
-      if (other.settings == settings || !range->overlaps(other.range)) continue;
-      return failure(
-          ErrorCode::invalid_argument,
-          fmt::format("{}: [SysMem] Area.{}: {} is the same file as that of {}, and they overlap; each "
-                      "needs bytes of its own",
-                      settings->where, settings->number,
-                      settings->object.empty() ? settings->device : settings->object, other.by));
-    }
-    taken.push_back({.settings = settings,
-                     .by = fmt::format("Area.{} of {}", settings->number, settings->where),
-                     .range = *range});
-  }
-  return {};
 }
 
 // Several areas of a block are one image: a task sees all of them as they were at one time.
@@ -184,23 +221,10 @@ void Areas::make_image(Block& block, const AreaBlock& planned) {
 }
 
 Result<void> Areas::make_keeper(const Environment& environment) {
-  RetainImage initial;
-  initial.layout.application = environment.application;
-  for (const DeclaredArea& area : declared_) {
-    if (!area.is_kept()) continue;
-    initial.layout.areas.push_back({.name = area.name,
-                                    .flags = area.flags & (PLC_AREA_RETAIN | PLC_AREA_PERSISTENT),
-                                    .bytes = area.bytes,
-                                    .layout = area.layout,
-                                    .offset = initial.data.size()});
-    initial.data.insert(initial.data.end(), area.initial.begin(), area.initial.end());
-    initial.data.resize(behind_kept(initial.data.size()));
-  }
+  const RetainImage initial = kept_image(environment.application, declared_);
   if (initial.layout.areas.empty()) return {};
-  initial.layout.bytes = initial.data.size();
   kept_ = initial.layout;
-  if (auto good = check_kept_bytes(initial.layout.bytes); !good) return good;
-  auto keeper = RetainKeeper::make(environment.pool, environment.instance, initial, environment.retain);
+  auto keeper = RetainKeeper::make(*environment.pool, environment.instance, initial, environment.retain);
   if (!keeper) return std::unexpected(std::move(keeper).error());
   keeper_ = *std::move(keeper);
   return {};

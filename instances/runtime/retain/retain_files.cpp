@@ -31,10 +31,18 @@ Result<std::string> read_whole(const std::string& path) {
   return text;
 }
 
+std::string stem_of(const std::string& directory, const std::string& instance) {
+  return fmt::format("{}/{}.retain", directory, instance);
+}
+
 }  // namespace
 
+auto RetainFiles::look(const std::string& directory, const std::string& instance) -> Found {
+  return RetainFiles(stem_of(directory, instance), directory).read();
+}
+
 Result<RetainFiles> RetainFiles::open(const std::string& directory, const std::string& instance) {
-  RetainFiles files(fmt::format("{}/{}.retain", directory, instance), directory);
+  RetainFiles files(stem_of(directory, instance), directory);
   const auto taken = files.take();
   if (!taken && taken.error().code == ErrorCode::busy) return std::unexpected(taken.error());
   return files;

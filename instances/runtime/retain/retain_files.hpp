@@ -29,6 +29,8 @@ class RetainFiles {
     std::vector<std::string> problems;  ///< files that are there and are not
   };
   [[nodiscard]] Found read() const;
+  /// The same without having the files: another process may write them meanwhile.
+  [[nodiscard]] static Found look(const std::string& directory, const std::string& instance);
 
   /// When it returns well, the image is on the disk. Else the files are as they were. Set-up, or a thread
   /// that may wait for a disk.

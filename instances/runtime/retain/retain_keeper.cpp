@@ -58,13 +58,13 @@ struct RetainKeeper::Start {
   }
 
   // The memory of a process that was not ended by the power is newer than any file that it wrote.
-  void find_source(const std::string& pool, const std::string& name) {
-    auto left = KeptMemory::left_behind(pool, name);
+  void find_source(const std::string& pool, const std::string& name, RetainFiles::Found found) {
+    auto left = pool.empty() ? Result<KeptMemory::Left>(failure(ErrorCode::not_found, name))
+                             : KeptMemory::left_behind(pool, name);
     if (!left && left.error().code != ErrorCode::not_found) {
       remarks.push_back(
           fmt::format("what the process before has left in memory is not used: {}", left.error().describe()));
     }
-    auto found = files ? files->read() : RetainFiles::Found{};
     for (std::string& problem : found.problems) remarks.push_back(std::move(problem));
     if (found.newest) {
       generation = found.newest->generation;
@@ -128,12 +128,21 @@ struct RetainKeeper::Start {
   }
 };
 
+Result<void> RetainKeeper::check(const std::string& pool, const std::string& instance,
+                                 const RetainLayout& layout, const Options& options) {
+  Start start;
+  const bool files = !options.directory.empty();
+  start.find_source(pool, kept_memory_name(instance),
+                    files ? RetainFiles::look(options.directory, instance) : RetainFiles::Found{});
+  return start.judge(layout, options.mismatch);
+}
+
 Result<std::unique_ptr<RetainKeeper>> RetainKeeper::make(ObjectPool& pool, const std::string& instance,
                                                          const RetainImage& initial, const Options& options) {
   const std::string name = kept_memory_name(instance);
   Start start;
   if (auto opened = start.open_files(options, instance); !opened) return std::unexpected(opened.error());
-  start.find_source(pool.name(), name);
+  start.find_source(pool.name(), name, start.files ? start.files->read() : RetainFiles::Found{});
   if (auto judged = start.judge(initial.layout, options.mismatch); !judged)
     return std::unexpected(judged.error());
   start.fill(initial, options.cold);

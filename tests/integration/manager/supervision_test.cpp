@@ -107,23 +107,16 @@ TEST(Manager, RefusesAnApplicationThatTheSettingsDoNotAllowBeforeItEndsTheOneTha
   EXPECT_TRUE(plant.wait_for_cycles("line1"));
 }
 
-// A memory of the pool that others have made in another size is found at the start only.
 TEST(Manager, StartsTheApplicationBeforeAgainWhenTheNewOneDoesNotComeUp) {
   Plant plant;
-  plant.add("line1", "bottling_line", "settings = \"line1.cfg\"");
-  plant.write_file("line1.cfg",
-                   "[SysMem]\nLinux.Area.0.Flags=0x4\nLinux.Area.0.Object=io.in\nLinux.Area.0.Size=128\n");
+  plant.add("line1", "bottling_line");
   plant.start_manager();
   ASSERT_TRUE(plant.wait_for("line1", InstanceState::running));
-  auto pool = ObjectPool::create(plant.pool());
-  ASSERT_TRUE(pool);
-  constexpr std::size_t kOther = 100;
-  const auto memory = pool->create_memory("io.in", kOther);
-  ASSERT_TRUE(memory);
   const int pid = plant.status("line1").pid;
-  const auto reply = plant.ask(ControlVerb::load_application, "line1", Plant::application("packer"));
+  const auto reply =
+      plant.ask(ControlVerb::load_application, "line1", Plant::application("manager_fails_at_start"));
   EXPECT_EQ(reply.code, ErrorCode::unavailable);
-  EXPECT_THAT(reply.text, HasSubstr("io.in"));
+  EXPECT_THAT(reply.text, HasSubstr("plc_app_init returned 1"));
   EXPECT_THAT(reply.text, HasSubstr("which was loaded before, is started again"));
   ASSERT_TRUE(plant.wait_for("line1", InstanceState::running));
   EXPECT_NE(plant.status("line1").pid, pid);

@@ -64,7 +64,7 @@ class AreasUnderTest : public ::testing::Test {
   }
   [[nodiscard]] Result<std::string> place(const std::string& settings = {}) {
     settings_ = parse_settings(settings, "l.cfg").value();
-    return sut.place({.pool = shared_,
+    return sut.place({.pool = &shared_,
                       .instance = "line1",
                       .application = "Test",
                       .settings = settings_.areas,

@@ -1,0 +1,96 @@
+// What a start would find wrong is found by the trial: the machine that runs, runs on, and the answer says
+// why.
+
+#include <filesystem>
+#include <string>
+
+#include <gmock/gmock.h>
+
+#include "shm/pool/object_pool.hpp"
+#include "tests/integration/manager/plant.hpp"
+
+namespace plchost {
+namespace {
+
+using testing::AllOf;
+using testing::HasSubstr;
+
+class Trial : public testing::Test {
+ protected:
+  void start(const std::string& application, const std::string& settings = "") {
+    plant_.write_file("line1.cfg", settings);
+    plant_.add("line1", application, "settings = \"line1.cfg\"");
+    plant_.start_manager();
+    ASSERT_TRUE(plant_.wait_for("line1", InstanceState::running));
+    pid_ = plant_.status("line1").pid;
+  }
+  /// Why `application` is refused; what runs must not be touched.
+  std::string refusal(const std::string& application) {
+    const auto reply = plant_.ask(ControlVerb::load_application, "line1", Plant::application(application));
+    EXPECT_NE(reply.code, ErrorCode::ok);
+    EXPECT_EQ(plant_.status("line1").pid, pid_);
+    EXPECT_EQ(plant_.status("line1").state, InstanceState::running);
+    EXPECT_TRUE(plant_.wait_for_cycles("line1"));
+    return reply.text;
+  }
+
+  Plant plant_;
+  int pid_ = 0;
+};
+
+TEST_F(Trial, FindsAComponentThatIsNotThere) {
+  start("bottling_line");
+  plant_.write_file("line1.cfg", "[ComponentManager]\nComponent.1=gone.so\n");
+  EXPECT_THAT(refusal("packer"), AllOf(HasSubstr("component"), HasSubstr("gone.so")));
+}
+
+TEST_F(Trial, FindsAMemoryOfThePoolThatHasAnotherSize) {
+  start("bottling_line");
+  auto pool = ObjectPool::attach(plant_.pool());
+  ASSERT_TRUE(pool);
+  ASSERT_TRUE(pool->create_memory("io.data", 4, {.keep = true}));
+  plant_.write_file(
+      "line1.cfg", "[SysMem]\nLinux.Area.0.Flags=0x8000\nLinux.Area.0.Object=io.data\nLinux.Area.0.Size=8\n");
+  EXPECT_THAT(refusal("areas"), AllOf(HasSubstr("line1.cfg:2: [SysMem] Area.0"), HasSubstr("io.data"),
+                                      HasSubstr("4 bytes"), HasSubstr("8")));
+  ASSERT_TRUE(pool->create_semaphore("io.other", 1, {.keep = true}));
+  plant_.write_file(
+      "line1.cfg",
+      "[SysMem]\nLinux.Area.0.Flags=0x8000\nLinux.Area.0.Object=io.other\nLinux.Area.0.Size=8\n");
+  EXPECT_THAT(refusal("areas"), HasSubstr("'io.other' is no shared memory"));
+}
+
+TEST_F(Trial, FindsADeviceThatIsNotThereOrTooSmall) {
+  start("bottling_line");
+  const std::string area =
+      "[SysMem]\nLinux.Area.0.Flags=0x8000\nLinux.Area.0.Address=0\nLinux.Area.0.Size=8\n";
+  plant_.write_file("line1.cfg", area + "Linux.Area.0.Device=/dev/none\n");
+  EXPECT_THAT(refusal("areas"), HasSubstr("of /dev/none: cannot be opened"));
+  plant_.write_file("small", "1234");
+  plant_.write_file("line1.cfg", area + "Linux.Area.0.Device=" + plant_.state_directory() + "/../small\n");
+  EXPECT_THAT(refusal("areas"), HasSubstr("the file ends at 0x4"));
+}
+
+TEST_F(Trial, FindsKeptValuesOfAnotherLayoutThatTheSettingsRefuse) {
+  start("areas", "[Retain]\nMismatch=Refuse\n");
+  EXPECT_THAT(refusal("areas_other"), HasSubstr("another layout"));
+  EXPECT_TRUE(std::filesystem::exists(plant_.state_directory()));
+  plant_.write_file("line1.cfg", "[Retain]\nMismatch=Ignore\n");
+  const auto reply = plant_.ask(ControlVerb::load_application, "line1", Plant::application("areas_other"));
+  EXPECT_EQ(reply.code, ErrorCode::ok) << reply.text;
+}
+
+// What it looks at is left as it is: what is right can be loaded, again and again.
+TEST_F(Trial, LeavesNothingBehindAndTakesNothingAway) {
+  start("areas");
+  for (int i = 0; i < 2; ++i) {
+    const auto reply = plant_.ask(ControlVerb::load_application, "line1", Plant::application("areas"));
+    EXPECT_EQ(reply.code, ErrorCode::ok) << reply.text;
+  }
+  EXPECT_EQ(plant_.ask(ControlVerb::stop, "line1").code, ErrorCode::ok);
+  EXPECT_EQ(plant_.stop_manager().describe(), "exit code 0");
+  EXPECT_THAT(plant_.leftovers(), testing::IsEmpty());
+}
+
+}  // namespace
+}  // namespace plchost
