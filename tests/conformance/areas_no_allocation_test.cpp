@@ -34,7 +34,7 @@ TEST(NoAllocation, InCyclesWithAreasOfEachKind) {
       ASSERT_NE(areas.declare(&declared, result), RTS_INVALID_HANDLE);
     }
     const auto placed = areas.place(
-        {.pool = pool, .instance = "line1", .application = "A", .settings = settings->areas, .retain = {}},
+        {.pool = &pool, .instance = "line1", .application = "A", .settings = settings->areas, .retain = {}},
         tasks);
     ASSERT_TRUE(placed) << placed.error().describe();
     MallocCount::begin();
