@@ -96,7 +96,7 @@ void ManagedInstance::begin_change() {
 // What was loaded has not come up. Whether the one before is being started instead.
 bool ManagedInstance::take_back_application(const std::string& why) {
   const bool can = operation_ && operation_->step == Step::fresh_process && operation_->before &&
-                   !transient_ && !name_taken_;
+                   (!transient_ || declaration_taken_) && !name_taken_;
   if (!can) return false;
   operation_->refused = fmt::format("{} does not come up: {}", operation_->request.argument, why);
   application_ = *std::exchange(operation_->before, std::nullopt);

@@ -118,6 +118,7 @@ void ManagedInstance::on_report(const SetupReport& report) {
     setup_failure_ = fmt::format("{}: {}", to_string(report.step), report.text);
     name_taken_ = report.code == ErrorCode::already_exists;
     transient_ = report.transient;
+    declaration_taken_ = report.step == SetupStep::load_application && report.code == ErrorCode::busy;
     return;  // the process ends by itself now, or the timer sees to it
   }
   if (!report.text.empty()) {
@@ -363,7 +364,7 @@ void ManagedInstance::spawn(Next next) {
   wish_known_ = true;
   setup_failure_.clear();
   said_scheduler_.clear();
-  name_taken_ = transient_ = false;
+  name_taken_ = transient_ = declaration_taken_ = false;
   const auto pid = host_.spawn(launch_options(next));
   if (!pid) {
     history_.record_end(surroundings_.now(), Duration::zero(), false);

@@ -316,8 +316,11 @@ class ManagedInstance : public InstanceEvents {
   bool commanded_ = false;      // an operator has
   bool wish_known_ = false;     // wants_running_ is no guess
   bool shutting_down_ = false;
-  bool removed_ = false;     // from the configuration
-  bool transient_ = false;   // this process could not be set up, but the next one may
+  bool removed_ = false;    // from the configuration
+  bool transient_ = false;  // this process could not be set up, but the next one may
+  // What the application declares is another process's. It may let go of it, but the application before may
+  // do without.
+  bool declaration_taken_ = false;
   bool name_taken_ = false;  // another process of that name kept this one from being set up
   bool silent_ = false;      // its process does not beat
   HeartbeatWatch heartbeat_;

@@ -169,6 +169,45 @@ TEST_F(SentApplication, ThatDoesNotComeUpMakesRoomForTheOneBefore) {
   EXPECT_TRUE(wishes_.wish->crashes_unix_ns.empty());
 }
 
+// The other writer may go away, so the start is tried again where there is nothing to take back.
+TEST_F(SentApplication, WhoseOutputsHaveAnotherWriterMakesRoomForTheOneBefore) {
+  const SetupReport taken{.step = SetupStep::load_application,
+                          .code = ErrorCode::busy,
+                          .text = "io.out has a writer already",
+                          .transient = true};
+  bring_up();
+  ask(ControlVerb::download_application, "new.so", options());
+  applications_.end(std::string(kFirst));
+  sut().on_exit(exited_with(0));
+  sut().on_report(taken);
+  sut().on_exit(exited_with(kExitSetupFailed));
+  ASSERT_EQ(host_.spawned.size(), 3U);
+  EXPECT_EQ(host_.spawned.back().application, "/opt/line.so");
+  sut().on_report(taken);
+  sut().on_exit(exited_with(kExitSetupFailed));
+  EXPECT_EQ(state(), InstanceState::waiting);
+  EXPECT_EQ(take_reply().code, ErrorCode::unavailable);
+  expire_timer();
+  EXPECT_EQ(host_.spawned.back().application, "/opt/line.so");
+  report_ready();
+  EXPECT_EQ(state(), InstanceState::running);
+}
+
+TEST_F(SentApplication, IsTriedAgainWhereTheHostIsShortOfSomething) {
+  bring_up();
+  ask(ControlVerb::download_application, "new.so", options());
+  applications_.end(std::string(kFirst));
+  sut().on_exit(exited_with(0));
+  sut().on_report({.step = SetupStep::load_application,
+                   .code = ErrorCode::system,
+                   .text = "no memory",
+                   .transient = true});
+  sut().on_exit(exited_with(kExitSetupFailed));
+  EXPECT_EQ(state(), InstanceState::waiting);
+  expire_timer();
+  EXPECT_EQ(host_.spawned.back().application, kFirst);
+}
+
 TEST_F(SentApplication, ThatDoesNotComeUpLeavesAStoppedMachineStopped) {
   bring_up_stopped();
   ask(ControlVerb::load_application, "/opt/new.so");
