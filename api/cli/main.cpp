@@ -17,6 +17,7 @@
 #include "api/cli/words/man_page.hpp"
 #include "api/cli/words/overview.hpp"
 #include "api/cli/words/short_form.hpp"
+#include "api/cli/words/word_hint.hpp"
 #include "shm/base/log.hpp"
 #include "shm/base/names.hpp"
 
@@ -85,23 +86,6 @@ void add_options(CLI::App& app, plchost::CliOptions& options) {
       ->take_last();
 }
 
-// What follows a wrong word is not the mistake: only the first word that no command knows is looked at.
-std::string word_hint(const plchost::Syntax& plcctl, std::span<const std::string> words) {
-  const plchost::Syntax* level = &plcctl;
-  for (const std::string& word : words) {
-    if (word.starts_with('-') || level->words.empty()) return "";
-    const plchost::Syntax* const next = level->word(word);
-    if (next == nullptr) {
-      std::vector<std::string> known;
-      for (const plchost::Syntax& one : level->words) known.push_back(one.name);
-      return fmt::format("plcctl: unknown word '{}'{}; known here: {}\n", word, plchost::hint(word, known),
-                         fmt::join(known, ", "));
-    }
-    level = next;
-  }
-  return "";
-}
-
 std::vector<std::string> options_along(const plchost::Syntax& plcctl, std::span<const std::string> words) {
   std::vector<std::string> names;
   const auto add = [&](const plchost::Syntax& level) {
@@ -123,7 +107,7 @@ std::vector<std::string> options_along(const plchost::Syntax& plcctl, std::span<
 }
 
 std::string hint_of(const plchost::Syntax& plcctl, std::span<const std::string> words) {
-  if (std::string word = word_hint(plcctl, words); !word.empty()) return word;
+  if (std::string word = plchost::word_hint(plcctl, words); !word.empty()) return word;
   const std::string option = plchost::unknown_option(words, options_along(plcctl, words));
   return option.empty() ? "" : fmt::format("plcctl: {}\n", option);
 }
@@ -207,12 +191,12 @@ int main(int argc, char** argv) {
     return plchost::kExitDone;
   }
   if (const auto code = overview_wanted(plchost::syntax_of(app), words)) return *code;
+  const std::vector<std::string> whole = plchost::with_noun(plchost::syntax_of(app), words);
   try {
-    const std::vector<std::string> whole = plchost::with_noun(plchost::syntax_of(app), words);
     app.parse(std::vector<std::string>(whole.rbegin(), whole.rend()));
   } catch (const CLI::ParseError& error) {
     if (error.get_exit_code() != 0) {
-      if (const std::string text = hint_of(plchost::syntax_of(app), words); !text.empty()) {
+      if (const std::string text = hint_of(plchost::syntax_of(app), whole); !text.empty()) {
         fmt::print(stderr, "{}", text);
         return plchost::kExitUsage;
       }

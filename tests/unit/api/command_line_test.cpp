@@ -6,6 +6,7 @@
 #include "api/cli/words/man_page.hpp"
 #include "api/cli/words/overview.hpp"
 #include "api/cli/words/short_form.hpp"
+#include "api/cli/words/word_hint.hpp"
 
 namespace plchost {
 namespace {
@@ -108,6 +109,26 @@ TEST(ManPage, TakesNoTextForARequest) {
   Syntax program = small_program();
   program.options[1].text = ".so /etc/passwd";
   EXPECT_THAT(man_page(program, ""), HasSubstr("\\&.so"));
+}
+
+std::string hinted(const std::vector<std::string>& words) {
+  return word_hint(small_program(), words);
+}
+
+TEST(WordHint, NamesTheWordsThatMayStandThere) {
+  const std::string unknown = "small: unknown word 'line1'; known here: event\n";
+  EXPECT_EQ(hinted({"post", "line1"}), unknown);
+  EXPECT_EQ(hinted({"--host", "cell", "post", "line1"}), unknown);
+  EXPECT_EQ(hinted({"--host=cell", "post", "line1"}), unknown);
+  EXPECT_EQ(hinted({"post", "--host", "cell", "line1", "--nonsense"}), unknown);
+  EXPECT_EQ(hinted({"--host", "cell", "post"}), "small: 'small post' needs one more word: event\n");
+  EXPECT_EQ(hinted({"--host", "cell"}), "small: 'small' needs one more word: list, post\n");
+}
+
+TEST(WordHint, SaysNothingOfWordsThatAreRight) {
+  EXPECT_EQ(hinted({"post", "event", "line1"}), "");
+  EXPECT_EQ(hinted({"list"}), "");
+  EXPECT_EQ(hinted({"--nonsense", "line1"}), "") << "the option is the mistake";
 }
 
 }  // namespace
