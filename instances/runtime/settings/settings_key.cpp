@@ -30,6 +30,16 @@ std::optional<std::int64_t> integer(std::string_view text, int base = 10) {
   return number;
 }
 
+// Of an IEC literal: a single underscore may stand between two digits.
+std::optional<std::int64_t> iec_digits(std::string_view text, int base) {
+  if (text.starts_with('_') || text.ends_with('_') || text.find("__") != std::string_view::npos) {
+    return std::nullopt;
+  }
+  std::string digits(text);
+  std::erase(digits, '_');
+  return integer(digits, base);
+}
+
 // "976.5625", rounded to nanoseconds.
 std::optional<Duration> decimal_microseconds(std::string_view text) {
   const std::size_t point = text.find('.');
@@ -128,10 +138,15 @@ std::unexpected<Error> unknown_key(std::string_view section, std::string_view na
 }  // namespace
 
 std::optional<std::int64_t> integer_of(std::string_view text) {
-  if (!text.starts_with("0x") && !text.starts_with("0X")) return integer(text);
-  constexpr int kHexadecimal = 16;
-  const std::string_view digits = text.substr(2);
-  return digits.starts_with('-') ? std::nullopt : integer(digits, kHexadecimal);
+  using Base = std::pair<std::string_view, int>;
+  constexpr std::array<Base, 5> kBases = {Base("0x", 16), {"0X", 16}, {"16#", 16}, {"8#", 8}, {"2#", 2}};
+  for (const auto& [prefix, base] : kBases) {
+    if (!text.starts_with(prefix)) continue;
+    const std::string_view digits = text.substr(prefix.size());
+    if (digits.starts_with('-')) return std::nullopt;
+    return prefix.ends_with('#') ? iec_digits(digits, base) : integer(digits, base);
+  }
+  return integer(text);
 }
 
 std::string in_folder(const SettingsTarget& target, std::string_view path) {

@@ -117,7 +117,7 @@ inline constexpr std::string_view kTaskPrefix = "Task.";  ///< what its name beg
 /// error. Empty: it is another program's.
 [[nodiscard]] std::string_view meant_section(std::string_view section);
 
-/// "0x3E8", "1000"; nothing: no number.
+/// "1000", "0x3E8", or a literal of IEC 61131-3: "16#3E8", "8#17", "2#1111_0000". Nothing: no number.
 [[nodiscard]] std::optional<std::int64_t> integer_of(std::string_view text);
 
 /// "VxWorks.TimerSource"

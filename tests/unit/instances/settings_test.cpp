@@ -131,6 +131,14 @@ TEST(Settings, TakesValuesAsTheOtherRuntimesFilesHaveThem) {
   };
   EXPECT_EQ(interval("0x3E8"), 1ms);
   EXPECT_EQ(interval("0X3e8 ; us"), 1ms);
+  EXPECT_EQ(interval("16#3E8"), 1ms);
+  EXPECT_EQ(interval("16#03_e8 # us"), 1ms);
+  EXPECT_EQ(interval("8#1750"), 1ms);
+  EXPECT_EQ(interval("2#11_1110_1000"), 1ms);
+  for (const char* const wrong :
+       {"16#", "16#-1", "2#2", "10#200", "16#_3E8", "16#3E8_", "16#3__E8", "0x3_E8"}) {
+    EXPECT_EQ(interval(wrong), -1ns) << wrong;
+  }
   EXPECT_EQ(interval("200; us"), 200us);
   EXPECT_EQ(interval("200;"), 200us);
   EXPECT_EQ(interval("200 # us"), 200us);
