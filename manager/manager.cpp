@@ -108,9 +108,19 @@ Result<std::unique_ptr<Manager>> Manager::create(const ManagerConfig& config, Op
   return manager;
 }
 
+// Without the lock the manager runs all the same: a disk that fails is no reason to stop a plant.
+Result<void> Manager::lock_wishes() {
+  auto locked = wishes_lock_.take(wishes_folder(config_.host.state_directory, config_.host.name));
+  if (locked || locked.error().code == ErrorCode::already_exists) return locked;
+  spdlog::error("[host] state_directory: the manager cannot see whether another one uses it: {}",
+                locked.error().describe());
+  return {};
+}
+
 Result<void> Manager::set_up() {
   const HostConfig& host = config_.host;
   if (auto free = check_pool_is_free(host.pool); !free) return free;
+  if (auto alone = lock_wishes(); !alone) return alone;
   // Children inherit this: instances then bind themselves to their own cores.
   if (auto bound = bind_process_to_cores(0, host.housekeeping_cores); !bound) {
     spdlog::warn("the manager stays where it is: {}", bound.error().describe());

@@ -16,6 +16,7 @@
 #include "manager/control/command_server.hpp"
 #include "manager/control/config_reload.hpp"
 #include "manager/host_check/host_check_handler.hpp"
+#include "manager/store/wish_folder.hpp"
 #include "manager/store/wish_store.hpp"
 #include "manager/supervisor/supervisor.hpp"
 #include "manager/system/reactor.hpp"
@@ -38,7 +39,8 @@ class Manager {
     std::function<std::expected<ManagerConfig, ConfigErrors>()> read;
   };
 
-  /// Takes the run directory, makes pool, page and control socket. already_exists: another manager has it.
+  /// Takes the run directory, makes pool, page and control socket. already_exists: another manager has it,
+  /// or keeps its wishes in the same folder.
   [[nodiscard]] static Result<std::unique_ptr<Manager>> create(const ManagerConfig& config, Options options);
   Manager(const Manager&) = delete;
   Manager& operator=(const Manager&) = delete;
@@ -49,6 +51,7 @@ class Manager {
  private:
   Manager(const ManagerConfig& config, Options options, LockFile lock, std::unique_ptr<Reactor> reactor);
   [[nodiscard]] Result<void> set_up();
+  [[nodiscard]] Result<void> lock_wishes();
   void make_supervisor();
   [[nodiscard]] Supervisor::HostedInstance make_host(const InstanceConfig& instance);
   void adopt_removed();
@@ -67,6 +70,7 @@ class Manager {
   Options options_;
   // From here on in the order of making; destroyed in the reverse one.
   LockFile lock_;
+  WishFolderLock wishes_lock_;
   std::unique_ptr<Reactor> reactor_;
   std::optional<ObjectPool> pool_;
   std::optional<HostPageWriter> page_;

@@ -51,10 +51,6 @@ std::string registered_events_path(const std::string& run_directory, const std::
 
 }  // namespace
 
-std::string wishes_folder(std::string_view state_directory, std::string_view host) {
-  return fmt::format("{}/wishes.{}", state_directory, host);
-}
-
 WishStore::WishStore(Reactor& reactor, WishWriter& writer, Settings settings)
     : writer_(writer),
       settings_(std::move(settings)),

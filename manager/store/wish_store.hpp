@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "manager/store/wish_folder.hpp"
 #include "manager/store/wish_keeper.hpp"
 #include "manager/store/wish_memory.hpp"
 #include "manager/store/wish_writer.hpp"
@@ -16,9 +17,6 @@ namespace plchost {
 inline constexpr Duration kWishLimit = std::chrono::seconds(2);
 /// What could not be written is tried again after so long.
 inline constexpr Duration kWishRetry = std::chrono::seconds(10);
-
-/// The folder of the files: "STATE_DIRECTORY/wishes.HOST".
-[[nodiscard]] std::string wishes_folder(std::string_view state_directory, std::string_view host);
 
 /// The real WishKeeper: a WishMemory, and the files INSTANCE.wish and INSTANCE.events of wishes_folder().
 /// Only what a power cut leaves of a wish goes to the disk, and only if it is another than before. find()

@@ -14,6 +14,7 @@
 #include <poll.h>
 #include <sys/epoll.h>
 
+#include "manager/store/wish_folder.hpp"
 #include "shm/base/replace_file.hpp"
 
 namespace plchost {
@@ -38,16 +39,6 @@ std::array<std::string, 4> parts_of(std::string_view packet) {
     packet.remove_prefix(end == std::string_view::npos ? packet.size() : end + 1);
   }
   return parts;
-}
-
-Result<void> make_wish_folder(const std::filesystem::path& folder) {
-  std::error_code error;
-  if (std::filesystem::is_directory(folder, error)) return {};
-  std::filesystem::create_directories(folder, error);
-  if (error) return failure(ErrorCode::system, "make folder " + folder.string(), error.value());
-  std::filesystem::permissions(folder, std::filesystem::perms::owner_all, error);
-  if (error) return failure(ErrorCode::system, "set the rights of " + folder.string(), error.value());
-  return sync_directory(folder.parent_path());
 }
 
 Result<void> carry_out_order(const WishOrder& order) {

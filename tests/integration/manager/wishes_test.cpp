@@ -10,6 +10,7 @@
 namespace plchost {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 
 enum class End : bool { processes, power };
@@ -138,6 +139,31 @@ TEST_P(Wishes, DoNotEndWithTheManagerInOrder) {
 INSTANTIATE_TEST_SUITE_P(Ends, Wishes, testing::Values(End::processes, End::power), [](const auto& end) {
   return end.param == End::power ? "PowerCut" : "ProcessesKilled";
 });
+
+TEST(WishesFolder, IsOneManagersOnly) {
+  Plant plant;
+  plant.add("line1", "bottling_line", "autostart = false");
+  plant.start_manager();
+  std::string other = plant.configuration();
+  for (const std::string& own : {plant.run_directory() + '"', plant.pool() + '"'}) {
+    other.replace(other.find(own), own.size(), own.substr(0, own.size() - 1) + "-b\"");
+  }
+  plant.write_configuration(other);
+  EXPECT_THAT(plant.start_refused_manager(),
+              AllOf(HasSubstr("another manager keeps what instances are to be in " + plant.state_directory() +
+                              "/wishes.cell: process " + std::to_string(plant.manager_pid())),
+                    HasSubstr("give [host] state_directory another folder")));
+  EXPECT_EQ(plant.ask(ControlVerb::stop, "line1").code, ErrorCode::ok) << "the first is unharmed";
+}
+
+TEST(WishesFolder, ThatCannotBeWrittenKeepsNoInstanceFromRunning) {
+  Plant plant;
+  plant.add("line1", "bottling_line");
+  plant.write_file("state", "in the way");
+  plant.start_manager();
+  EXPECT_TRUE(plant.wait_for("line1", InstanceState::running));
+  EXPECT_THAT(plant.log(), HasSubstr("the manager cannot see whether another one uses it"));
+}
 
 }  // namespace
 }  // namespace plchost

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <future>
 #include <memory>
 #include <sstream>
 #include <string>
@@ -321,6 +322,74 @@ TEST_F(WishStoreTest, StartsAnotherHelperForOneThatEnded) {
     ASSERT_TRUE(reactor_->run());
     EXPECT_THAT(told, HasSubstr("exit code 1"));
   }
+}
+
+/// In a folder of its own.
+class WishFolderTest : public testing::Test {
+ protected:
+  WishFolderTest() {
+    static int count = 0;
+    top_ = std::filesystem::temp_directory_path() / fmt::format("plchost-wf{}-{}", ::getpid(), ++count);
+    std::filesystem::create_directories(top_);
+  }
+  ~WishFolderTest() override {
+    std::error_code ignored;
+    std::filesystem::remove_all(top_, ignored);
+  }
+  WishFolderTest(const WishFolderTest&) = delete;
+  WishFolderTest& operator=(const WishFolderTest&) = delete;
+
+  [[nodiscard]] std::string folder() const { return wishes_folder(top_.string() + "/state", "cell"); }
+
+  std::filesystem::path top_;
+  WishFolderLock sut_;
+};
+
+TEST_F(WishFolderTest, IsMadeAndHeld) {
+  const auto taken = sut_.take(folder());
+  ASSERT_TRUE(taken) << taken.error().describe();
+  EXPECT_EQ(std::filesystem::status(folder()).permissions(), std::filesystem::perms::owner_all);
+  const auto child = ::fork();
+  if (child == 0) {  // another process
+    WishFolderLock other;
+    const auto refused = other.take(folder());
+    const bool good =
+        !refused && refused.error().code == ErrorCode::already_exists &&
+        refused.error().message.find(folder()) != std::string::npos &&
+        refused.error().message.find(fmt::format("process {} ", ::getppid())) != std::string::npos;
+    ::_exit(good ? 0 : 1);
+  }
+  int status = -1;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  EXPECT_EQ(status, 0);
+}
+
+TEST_F(WishFolderTest, ThatCannotBeMadeIsNoOtherManager) {
+  std::ofstream(top_ / "state") << "in the way";
+  const auto taken = sut_.take(folder());
+  ASSERT_FALSE(taken);
+  EXPECT_EQ(taken.error().code, ErrorCode::system);
+}
+
+TEST_F(WishFolderTest, WithAnotherUsersLockFileIsNoOtherManager) {
+  std::filesystem::create_directories(folder());
+  std::filesystem::create_symlink("/etc/passwd", folder() + "/manager.lock");
+  const auto taken = sut_.take(folder());
+  ASSERT_FALSE(taken);
+  EXPECT_EQ(taken.error().code, ErrorCode::refused);
+}
+
+TEST_F(WishFolderTest, OnADiskThatHangsIsWaitedForNoLongerThanTheLimit) {
+  const auto disk = std::make_shared<std::promise<void>>();
+  const auto answer = disk->get_future().share();
+  const auto taken =
+      sut_.take(folder(), std::chrono::milliseconds(50), [disk, answer](const std::string& path) {
+        answer.wait();
+        return LockFile::take(path);
+      });
+  ASSERT_FALSE(taken);
+  EXPECT_EQ(taken.error().code, ErrorCode::timed_out);
+  disk->set_value();
 }
 
 }  // namespace
