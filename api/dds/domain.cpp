@@ -100,7 +100,7 @@ Result<std::string> domain_configuration(Role role, const DomainOptions& options
   // posts fast is full within 0.1 s and blocks until then. A secured host keeps the longer lease: when its
   // process stands still and its clients drop it, the host still knows them, and may not authenticate them
   // again.
-  const std::string_view lease = role == Role::server && options.identity.empty() ? "600 ms" : "3 s";
+  const std::string_view lease = role == Role::server && options.identity.empty() ? "500 ms" : "3 s";
   // Without multicast the announcement of a new server reaches no client, because clients have no known port.
   // The server finds each client by the client's next announcement.
   const std::string_view announcement = role == Role::server || multicast ? "1 s" : "200 ms";

@@ -211,7 +211,7 @@ TEST(DomainConfiguration, AnnouncesAClientOftenWhereANewServerCannotReachIt) {
   const auto client = [&] { return dds::domain_configuration(dds::Role::client, options).value(); };
   EXPECT_THAT(client(), HasSubstr("<SPDPInterval>200 ms<"));
   EXPECT_THAT(dds::domain_configuration(dds::Role::server, options).value(),
-              HasSubstr("<LeaseDuration>600 ms<"));
+              HasSubstr("<LeaseDuration>500 ms<"));
   options.interfaces = {"eth0"};
   EXPECT_THAT(client(), HasSubstr("<SPDPInterval>1 s<"));
   EXPECT_THAT(client(), HasSubstr("<LeaseDuration>3 s<"));
