@@ -20,7 +20,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-const ApiRequest kReady{"hosta", 0, "line1", "ready"};
+const ApiRequest kStalled{"hosta", 0, "line1", "ready"};
 
 /// The longest time between two signs of life.
 class Stall {
@@ -97,13 +97,13 @@ class StallAtAKill : public testing::Test {
 TEST_F(StallAtAKill, Acknowledged) {
   const auto client = connect(domain_);
   EXPECT_TRUE(goes_on_soon_beside([&] {
-    if (!client->post_event(kReady, 1, {}, kPatience)) std::this_thread::sleep_for(milliseconds(1));
+    if (!client->post_event(kStalled, 1, {}, kPatience)) std::this_thread::sleep_for(milliseconds(1));
   }));
 }
 
 TEST_F(StallAtAKill, Awaited) {
   const auto client = connect(domain_);
-  EXPECT_TRUE(goes_on_soon_beside([&] { (void)client->post_and_await(kReady, kPatience); }));
+  EXPECT_TRUE(goes_on_soon_beside([&] { (void)client->post_and_await(kStalled, kPatience); }));
 }
 
 TEST_F(StallAtAKill, OneWay) {
@@ -129,7 +129,7 @@ TEST_F(StallAtAKill, TwentyClients) {
     clients.emplace_back([&](const std::stop_token& stop) {
       const auto client = connect(domain_);
       while (!stop.stop_requested()) {
-        if (client->post_event(kReady, 1, {}, kPatience)) stall.sign();
+        if (client->post_event(kStalled, 1, {}, kPatience)) stall.sign();
         std::this_thread::sleep_for(milliseconds(1));
       }
     });
