@@ -1,35 +1,10 @@
 #include "api/dds/instance_pin.h"
 
-#include <arpa/inet.h>
-#include <stddef.h>
 #include <string.h>
 
-// In C, because these headers are not valid in C++. In an order in which each has what it needs.
-// clang-format off
-#include <dds/ddsi/ddsi_domaingv.h>
-#include <dds/ddsi/ddsi_entity.h>
-#include <dds/ddsi/q_hbcontrol.h>
-#include <dds/ddsi/ddsi_endpoint.h>
-#include <dds/ddsi/ddsi_entity_index.h>
-#include <dds/ddsi/ddsi_serdata.h>
-#include <dds/ddsi/ddsi_tkmap.h>
-#include <dds/ddsi/q_thread.h>
-// clang-format on
+#include "api/dds/cyclone_internals.h"
 
 static const plc_InstancePin kNoPin = {NULL, NULL, 0};
-
-// Cyclone notes the domain of a thread's last call in its state of the thread.
-static struct ddsi_domaingv* domain_of_last_call(void) {
-  return (struct ddsi_domaingv*)ddsrt_atomic_ldvoidp(&lookup_thread_state()->gv);
-}
-
-static ddsi_guid_t in_host_order(const dds_guid_t* guid) {
-  uint32_t words[4];
-  memcpy(words, guid->v, sizeof words);
-  const ddsi_guid_t result = {.prefix = {.u = {ntohl(words[0]), ntohl(words[1]), ntohl(words[2])}},
-                              .entityid = {.u = ntohl(words[3])}};
-  return result;
-}
 
 // `key` may be null, and is used up.
 static plc_InstancePin pin(struct ddsi_domaingv* domain, struct ddsi_serdata* key) {
@@ -47,9 +22,9 @@ plc_InstancePin plc_pin_instance(dds_entity_t writer, const void* sample) {
       dds_get_guid(writer, &guid) != DDS_RETCODE_OK) {
     return kNoPin;
   }
-  struct ddsi_domaingv* const domain = domain_of_last_call();
+  struct ddsi_domaingv* const domain = plc_domain_of_last_call();
   struct thread_state* const thread = lookup_thread_state();
-  const ddsi_guid_t its_guid = in_host_order(&guid);
+  const ddsi_guid_t its_guid = plc_in_host_order(&guid);
   plc_InstancePin result = kNoPin;
   thread_state_awake(thread, domain);
   const struct ddsi_writer* const known = entidx_lookup_writer_guid(domain->entity_index, &its_guid);
@@ -64,7 +39,7 @@ plc_InstancePin plc_pin_announcement(dds_entity_t entity) {
   if (dds_get_matched_subscriptions(entity, NULL, 0) < 0 || dds_get_guid(entity, &guid) != DDS_RETCODE_OK) {
     return kNoPin;
   }
-  struct ddsi_domaingv* const domain = domain_of_last_call();
+  struct ddsi_domaingv* const domain = plc_domain_of_last_call();
   struct thread_state* const thread = lookup_thread_state();
   ddsi_keyhash_t key;
   memcpy(key.value, guid.v, sizeof key.value);

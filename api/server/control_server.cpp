@@ -18,6 +18,7 @@
 #include "api/dds/samples.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/time_limit.hpp"
+#include "api/dds/told_keys.h"
 #include "api/security/identity.hpp"
 #include "api/server/control_server_parts.hpp"
 #include "shm/base/log.hpp"
@@ -161,6 +162,7 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
     if (options.beat_fd >= 0) raise_event(options.beat_fd);
   } else if (fd == identity_timer.get()) {
     tell_of_refused(MonotonicClock::now());
+    (void)plc_forget_told_keys(event_reader.get());
     (void)heap.look(MonotonicClock::now());
     if (identity_changed()) return false;
     return keeps_name();

@@ -1,43 +1,23 @@
 // What clients leave behind in the API server.
-#include <algorithm>
-#include <atomic>
-#include <cstdlib>
-#include <fstream>
-#include <string>
+#include <chrono>
+#include <memory>
 #include <thread>
-#include <vector>
 
-#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "api/client/event_poster.hpp"
 #include "api/dds/instances.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"
-#include "api/server/heap_trim.hpp"
+#include "tests/integration/api/memory_growth.hpp"
 #include "tests/integration/api/test_host.hpp"
 
 namespace plchost {
 namespace {
 
-/// Heap and stacks of a process that are in memory.
-std::int64_t memory_kib(pid_t pid) {
-  std::ifstream status(fmt::format("/proc/{}/smaps_rollup", pid));
-  std::int64_t sum = 0;
-  for (std::string word; status >> word;) {
-    std::int64_t kib = 0;
-    if (word == "Anonymous:" && status >> kib) sum += kib;
-  }
-  return sum;
-}
-
 /// A domain with a host and a client that stays, whose participant makes those of the others cheap.
 class Memory : public testing::Test {
  protected:
-  static constexpr int kAtOnce = 8;
-  /// The promise, and Cyclone's buffer of received packets, of which more may be in use than before.
-  static constexpr std::int64_t kBoundKib = 1024 + 1024;
-
   Memory() {
     host_.write_instance(0, "line1", InstanceState::running);
     host_.write_count(1);
@@ -45,52 +25,17 @@ class Memory : public testing::Test {
     host_.start_server({"--audit-folder", host_.run_directory() + "/audit"});
     staying_ = connect(domain_);
   }
-  /// After `first` times, which fill all that is bounded, `then` times leave less than the bound. The
-  /// environment may ask for more of them.
   template <class Use>
   void expect_bounded(int first, int then, Use use) {
-    // NOLINTNEXTLINE(concurrency-mt-unsafe): no thread of this test is there yet
-    if (const char* const more = std::getenv("PLCHOST_CLIENTS"); more != nullptr) {
-      then = std::atoi(more);
-      first = std::max(first, then / 5);
-    }
-    repeat(first, use);
-    const std::int64_t before = settled_kib();
-    ASSERT_GT(before, 0);
-    repeat(then, use);
-    const std::int64_t after = settled_kib();
-    fmt::print("{} and {} times: {} to {} KiB\n", first, then, before, after);
-    EXPECT_LT(after - before, kBoundKib);
+    expect_bounded_memory(host_.server().pid(), {.first = first, .then = then, .at_once = 8}, use);
   }
 
   OwnDomain domain_;
   TestHost host_{domain_, "hosta"};
 
  private:
-  template <class Use>
-  static void repeat(int times, Use use) {
-    std::atomic<int> left{times};
-    std::vector<std::jthread> threads;
-    for (int i = 0; i < kAtOnce; ++i) {
-      threads.emplace_back([&left, &use] {
-        while (left.fetch_sub(1) > 0) use();
-      });
-    }
-  }
-  /// When the last clients are forgotten and free memory was given back.
-  [[nodiscard]] std::int64_t settled_kib() {
-    std::this_thread::sleep_for(3 * HeapTrim::kQuiet);
-    return memory_kib(host_.server().pid());
-  }
-
   std::unique_ptr<ControlClient> staying_;
 };
-
-#ifdef PLCHOST_ADDRESS_SANITIZER
-constexpr bool kSanitized = true;  // frees later
-#else
-constexpr bool kSanitized = false;
-#endif
 
 TEST_F(Memory, ClientsThatComeAndGoLeaveNothingBehind) {
   if (kSanitized) GTEST_SKIP() << "a sanitizer keeps what was freed";
