@@ -20,7 +20,7 @@ bool has(const std::vector<InstanceConfig>& instances, std::string_view name) {
 }
 
 std::string removal_text(const ManagedInstance& instance) {
-  const std::string text = fmt::format("instance '{}': removed", instance.config().name);
+  std::string text = fmt::format("instance '{}': removed", instance.config().name);
   if (!instance.has_process()) return text;
   if (instance.status().state == InstanceState::stopping) return text + "; its process ends";
   return text + "; it runs until it is stopped";
@@ -109,8 +109,8 @@ void Supervisor::forget_gone() {
   };
   const auto first = std::ranges::stable_partition(units_, std::not_fn(over)).begin();
   if (first == units_.end()) return;
-  std::vector<std::unique_ptr<Unit>> gone(std::make_move_iterator(first),
-                                          std::make_move_iterator(units_.end()));
+  const std::vector<std::unique_ptr<Unit>> gone(std::make_move_iterator(first),
+                                                std::make_move_iterator(units_.end()));
   units_.erase(first, units_.end());
   link();
   for (const auto& unit : gone) {
