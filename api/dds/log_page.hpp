@@ -42,7 +42,7 @@ inline constexpr std::size_t kPageRecords = 256;
 /// A listing as it travels.
 class LogPageSample {
  public:
-  /// At most kPageRecords. What the page shall say besides is for the caller to fill in.
+  /// At most kPageRecords. The caller fills in the other members.
   explicit LogPageSample(const LogListing& listing);
   LogPageSample(const LogPageSample&) = delete;
   LogPageSample& operator=(const LogPageSample&) = delete;

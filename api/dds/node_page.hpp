@@ -49,7 +49,7 @@ static_assert(kPageRoutes >= kMaxRoutes);
 /// A listing as it travels.
 class NodePageSample {
  public:
-  /// At most kMaxNodes and kPageRoutes. What the page shall say besides is for the caller to fill in.
+  /// At most kMaxNodes and kPageRoutes. The caller fills in the other members.
   explicit NodePageSample(const NodeListing& listing);
   NodePageSample(const NodePageSample&) = delete;
   NodePageSample& operator=(const NodePageSample&) = delete;

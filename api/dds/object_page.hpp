@@ -35,7 +35,7 @@ inline constexpr std::size_t kPageReferences = 1024;
 /// A listing as it travels.
 class ObjectPageSample {
  public:
-  /// At most kPageObjects. What the page shall say besides is for the caller to fill in.
+  /// At most kPageObjects. The caller fills in the other members.
   explicit ObjectPageSample(const ObjectListing& listing);
   ObjectPageSample(const ObjectPageSample&) = delete;
   ObjectPageSample& operator=(const ObjectPageSample&) = delete;

@@ -75,7 +75,7 @@ class LogFollower {
   LogFollower(CliSession& session, std::string host, const LogArguments& arguments, Since since)
       : session_(session), host_(std::move(host)), arguments_(arguments), since_(since) {}
 
-  /// What is new, at the first time what is kept and asked for.
+  /// The new records; the first time, the kept ones that were asked for.
   Result<std::vector<LogText>> read() {
     LogQuery query{.after = after_};
     const bool first = stream_ == 0;

@@ -27,7 +27,7 @@ std::size_t words_of_option(const Syntax& plcctl, const Syntax& level, const std
 
 }  // namespace
 
-// What follows a wrong word is not the mistake: only the first word that no command knows is looked at.
+// The words behind a wrong one are no mistake, so only the first word that no command knows counts.
 std::string word_hint(const Syntax& plcctl, std::span<const std::string> words) {
   const Syntax* level = &plcctl;
   std::string said = plcctl.name;
