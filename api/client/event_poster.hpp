@@ -16,7 +16,7 @@
 
 namespace plchost {
 
-/// What became of posts.
+/// The results of posts.
 struct PostReport {
   std::uint64_t accepted = 0;  ///< counted by the event (no_task included)
   std::uint64_t no_task = 0;   ///< counted, but no task was bound to the event at that time

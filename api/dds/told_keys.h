@@ -15,7 +15,7 @@ extern "C" {
 /// Cyclone DDS 0.10.2 asks only that one. The others acknowledge its number only after a later message for
 /// themselves. So one participant that stays, and is told nothing new, holds what all that come and go were
 /// told: some 13 kB for each client. Here whoever has acknowledged the last message for itself counts as
-/// having acknowledged those for others, too. What is still under way to someone is kept.
+/// having acknowledged those for others, too. Messages that are still under way are kept.
 ///
 /// `reader`: of that participant. Any thread. Takes time with the number of participants that are there, if
 /// messages are kept.

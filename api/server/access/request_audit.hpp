@@ -33,8 +33,8 @@ class RequestAudit {
   static constexpr std::size_t kMostRefused = 256;
 
   /// `folder`: see AuditLogs; empty: nothing is recorded. It is opened on the thread that writes it, so this
-  /// never waits for the disk. What a killed server has left under way is told first. `on_written`: see
-  /// AuditWriter.
+  /// never waits for the disk. Requests that a killed server has left under way are told first. `on_written`:
+  /// see AuditWriter.
   RequestAudit(std::string folder, Describe describe, std::function<void()> on_written = {});
   /// Writes what is not yet told of posts.
   ~RequestAudit();

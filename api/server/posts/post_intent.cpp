@@ -22,7 +22,7 @@ void PostIntent::end(KeptState& kept, CountedEvent& event, CountedEvent::Snapsho
   drop();
 }
 
-// What steps 3 and 4 of a post have to do, if it was made.
+// The work of steps 3 and 4 of a post, if it was made.
 void PostIntent::finish_post(KeptState& kept, CountedEvent& event) noexcept {
   if (event.snapshot().marked() != (mark_.load(std::memory_order_relaxed) != 0)) return;
   kept.choose(next_.load(std::memory_order_relaxed));

@@ -6,7 +6,7 @@
 
 namespace plchost {
 
-/// What became of posts. received = accepted + rejected + duplicate + early + malformed.
+/// The results of posts. received = accepted + rejected + duplicate + early + malformed.
 struct PostCounters {
   std::uint64_t received = 0;
   std::uint64_t accepted = 0;
@@ -54,7 +54,7 @@ class KeptState {
     return 1U - (current_.load(std::memory_order_relaxed) & 1U);
   }
   void write(std::uint32_t place, const SourceState& state) noexcept {
-    // What chose the other place is in memory before this one is written, at a kill, too.
+    // The choice of the other place is in memory before this one is written, at a kill, too.
     std::atomic_thread_fence(std::memory_order_release);
     states_[place & 1U] = state;
   }
