@@ -62,7 +62,7 @@ Result<std::vector<std::string>> Manager::reload() {
   return lines;
 }
 
-// What it has kept in memory and not written to a file stays for the end of this manager.
+// Values that it has kept in memory and not written to a file stay for the end of this manager.
 void Manager::forget(std::size_t place, const InstanceConfig& instance) {
   spdlog::info("instance {}: was removed from the configuration and has ended", instance.name);
   page_->write_instance(static_cast<std::uint32_t>(place), {});

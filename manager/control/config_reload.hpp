@@ -24,7 +24,7 @@ inline constexpr std::size_t kMaxReloadText = 511;
                                      std::size_t most = kMaxReloadText);
 
 /// Answers `reload host`, and does it for SIGHUP; passes all else on. A process of its own checks the file,
-/// as the manager must not wait. What comes meanwhile is answered by a round of its own: the file may be
+/// as the manager must not wait. Requests of that time get a round of their own: the file may be
 /// another one by then.
 class ConfigReload : public ControlHandler {
  public:

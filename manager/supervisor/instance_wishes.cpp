@@ -19,7 +19,7 @@ std::string configured_process(const InstanceConfig& config) {
   return fmt::format("{} {} {}", config.core, config.priority_band, config.settings).substr(0, kMaxWishText);
 }
 
-// What is said of an instance when the command was done.
+// The text for an instance when the command was done.
 std::string_view done_text(ControlVerb verb) noexcept {
   using Done = std::pair<ControlVerb, std::string_view>;
   constexpr std::array kDone = {
@@ -102,7 +102,7 @@ bool ManagedInstance::use_configuration() {
   return before.application != now.application || before.process != now.process;
 }
 
-// What of the configuration the process was not begun with; empty: nothing.
+// The part of the configuration that the process was not begun with; empty: none.
 std::string ManagedInstance::awaited_changes() const {
   const Configured now = configured();
   std::vector<std::string_view> changed;

@@ -11,7 +11,7 @@
 
 namespace plchost {
 
-// What a start and its trial have in common: what an application declares, and the settings it is to run
+// The common part of a start and its trial: what an application declares, and the settings it is to run
 // under.
 
 /// Loads it, has it declare itself to `host`, and applies the settings of its tasks. The error is the first
