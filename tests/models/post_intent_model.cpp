@@ -50,16 +50,25 @@ void require_state(const Shared& shared, std::uint32_t source, std::uint64_t pos
   require(state.counters.accepted == posts, "what is kept of the source is not of its last post");
 }
 
+/// The work of a server: it ends the post of the one before, and makes the first one of source 0.
+auto first_post(Shared& shared) {
+  return [&shared] {
+    finish(shared);
+    post(shared, 0, 1, 0);
+  };
+}
+
+/// A server that may be killed, and the one after it.
+void add_servers(Scene& scene, const std::function<void()>& serve) {
+  const ThreadNumber victim = scene.thread("server", serve, {.may_be_killed = true});
+  scene.thread("next server", serve, {.after = static_cast<int>(victim)});
+}
+
 // The next server does what is left, and the client repeats what it was not told of.
 void a_server_is_killed(Scene& scene) {
   Shared& shared = make(scene);
   scene.limits({.kills = 1});
-  const auto serve = [&] {
-    finish(shared);
-    post(shared, 0, 1, 0);
-  };
-  const ThreadNumber victim = scene.thread("server", serve, {.may_be_killed = true});
-  scene.thread("next server", serve, {.after = static_cast<int>(victim)});
+  add_servers(scene, first_post(shared));
   for (const char* name : {"poster", "other poster"}) scene.thread(name, [&] { shared.events[0].post(); });
   scene.at_end([&] {
     require(shared.events[0].count() == 3, "a post is lost or doubled");
@@ -71,12 +80,7 @@ void a_server_is_killed(Scene& scene) {
 void a_task_waits(Scene& scene) {
   Shared& shared = make(scene);
   scene.limits({.kills = 1});
-  const auto serve = [&] {
-    finish(shared);
-    post(shared, 0, 1, 0);
-  };
-  const ThreadNumber victim = scene.thread("server", serve, {.may_be_killed = true});
-  scene.thread("next server", serve, {.after = static_cast<int>(victim)});
+  add_servers(scene, first_post(shared));
   scene.thread("task", [&] {
     for (;;) {
       const CountedEvent::Snapshot seen = shared.events[0].snapshot();
@@ -91,10 +95,7 @@ void a_task_waits(Scene& scene) {
 void two_servers_are_killed(Scene& scene) {
   Shared& shared = make(scene);
   scene.limits({.kills = 2});
-  const auto serve = [&] {
-    finish(shared);
-    post(shared, 0, 1, 0);
-  };
+  const auto serve = first_post(shared);
   const ThreadNumber first = scene.thread("server", serve, {.may_be_killed = true});
   const ThreadNumber second =
       scene.thread("next server", serve, {.may_be_killed = true, .after = static_cast<int>(first)});
@@ -117,8 +118,7 @@ void posts_of_two_sources(Scene& scene) {
     post(shared, 0, 2, 1);
     post(shared, 0, 3, 0);
   };
-  const ThreadNumber victim = scene.thread("server", serve, {.may_be_killed = true});
-  scene.thread("next server", serve, {.after = static_cast<int>(victim)});
+  add_servers(scene, serve);
   scene.thread("poster", [&] { shared.events[1].post(); });
   scene.at_end([&] {
     require(shared.events[0].count() == 2, "a post is lost or doubled");
@@ -132,12 +132,7 @@ void posts_of_two_sources(Scene& scene) {
 void tasks_begin_to_take_posts(Scene& scene) {
   Shared& shared = make(scene);
   scene.limits({.kills = 1});
-  const auto serve = [&] {
-    finish(shared);
-    post(shared, 0, 1, 0);
-  };
-  const ThreadNumber victim = scene.thread("server", serve, {.may_be_killed = true});
-  scene.thread("next server", serve, {.after = static_cast<int>(victim)});
+  add_servers(scene, first_post(shared));
   scene.thread("instance", [&] { shared.count_when_taken = shared.events[0].set_taken(true).count(); });
   scene.thread("poster", [&] { shared.events[0].post(); });
   scene.at_end([&] {
