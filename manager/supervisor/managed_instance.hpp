@@ -166,12 +166,12 @@ class ManagedInstance : public InstanceEvents {
   void reconfigure(const InstanceConfig& config);
   /// The configuration does not have it any more.
   void remove();
-  /// What of the configuration waits for the next process; empty: nothing does.
+  /// The part of the configuration that waits for the next process; empty: none.
   [[nodiscard]] std::string awaited_changes() const;
   [[nodiscard]] bool removed() const noexcept { return removed_; }
   /// Removed, without process and without command.
   [[nodiscard]] bool gone() const noexcept { return removed_ && phase_ == Phase::down && !operation_; }
-  /// What an earlier manager left is known.
+  /// The remains of an earlier manager are known.
   [[nodiscard]] bool known() const noexcept { return earlier_.has_value(); }
   /// Looks at what the process says of itself. To be called now and then.
   void refresh();
@@ -195,7 +195,7 @@ class ManagedInstance : public InstanceEvents {
   enum class Ending : std::uint8_t { asked, terminated, killed };
   enum class Next : std::uint8_t { nothing, run, stay_stopped };
   enum class Step : std::uint8_t { storing, checking, fresh_process, until_up, forwarded, setting_boot };
-  /// What the configuration said when the process, or the next one if there is none, was decided on.
+  /// The configuration at the decision on the process, or on the next one if there is none.
   struct Configured {
     std::string application;
     std::string scheduler;
@@ -318,8 +318,8 @@ class ManagedInstance : public InstanceEvents {
   bool shutting_down_ = false;
   bool removed_ = false;    // from the configuration
   bool transient_ = false;  // this process could not be set up, but the next one may
-  // What the application declares is another process's. It may let go of it, but the application before may
-  // do without.
+  // Another process has the thing that the application declares. It may let go of it, but the application
+  // before may do without.
   bool declaration_taken_ = false;
   bool name_taken_ = false;  // another process of that name kept this one from being set up
   bool silent_ = false;      // its process does not beat

@@ -103,7 +103,7 @@ void ProcessHost::set_timer(std::optional<TimePoint> when) {
   }
 }
 
-// What it said before comes before what the manager says of it.
+// The lines of the process come before those of the manager about it.
 void ProcessHost::read_reports() {
   read_output();
   for (;;) {
