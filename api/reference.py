@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Makes the reference in README.md from control.idl, and holds control.idl to its own rules.
+"""Makes the reference in reference.md from control.idl, and holds control.idl to its own rules.
 
-  reference.py --write               writes the reference into README.md
+  reference.py --write               writes the reference into reference.md
   reference.py --check               says what is wrong: no comment, no QoS, a type that others would not
-                                     understand, or a README.md that is not up to date
+                                     understand, or a reference.md that is not up to date
   reference.py --compatible OLD.idl  says which types and constants of OLD.idl are not the same in control.idl
-Each exits with 1 if something is wrong. --root DIR: the folder of control.idl and README.md, instead of its own.
+Each exits with 1 if something is wrong. --root DIR: the folder of control.idl and reference.md, instead of its own.
 """
 
 import argparse
@@ -235,11 +235,11 @@ def reference(contract):
     return "\n".join(lines + ["", END])
 
 
-def with_reference(readme, made):
-    before, begin, rest = readme.partition(BEGIN)
+def with_reference(page, made):
+    before, begin, rest = page.partition(BEGIN)
     _, end, after = rest.partition(END)
     if not begin or not end:
-        raise Fault("README.md has no place for the reference: the two lines that begin with <!-- The reference")
+        raise Fault("reference.md has no place for the reference: the two lines that begin with <!-- The reference")
     return before + made + after
 
 
@@ -251,7 +251,7 @@ def main():
     what.add_argument("--compatible", type=pathlib.Path, metavar="OLD.idl")
     parser.add_argument("--root", type=pathlib.Path, default=pathlib.Path(__file__).parent)
     options = parser.parse_args()
-    idl, readme = options.root / "control.idl", options.root / "README.md"
+    idl, page = options.root / "control.idl", options.root / "reference.md"
     try:
         contract = parse(idl)
         if options.compatible:
@@ -259,12 +259,12 @@ def main():
         else:
             found = list(faults_of(contract, idl.name))
             if not found:
-                told = readme.read_text()
+                told = page.read_text()
                 new = with_reference(told, reference(contract))
                 if options.write:
-                    readme.write_text(new)
+                    page.write_text(new)
                 elif told != new:
-                    found = ["README.md: the reference is not up to date: run api/reference.py --write"]
+                    found = ["reference.md: the reference is not up to date: run api/reference.py --write"]
     except Fault as fault:
         found = [str(fault)]
     print("\n".join(found), end="\n" if found else "")

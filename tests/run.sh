@@ -81,7 +81,7 @@ build_asan() { build_sanitized .build/asan "address;undefined" all; }
 # Not by the thread sanitizer, which looks into one process: what kills others, and what has one thread and takes long.
 killing='PoolCrash|BlockCrash|ClientDeath|RobustMutexTest.Killed|AuditLogTest|Settings.ReadsAsMany|HoldsAHundredThousand|EachFlippedBit|ReadsNothingBehindTheEnd|StaysWithinItsBounds|TheSecurityFolder|AnIdentity'
 build_tsan() { build_sanitized .build/tsan thread plchost_tests -DPLCHOST_INTEGRATION=OFF; }
-gates() { tests/gates/layers.sh && tests/gates/house.sh && tests/gates/format.sh && tests/gates/contract.sh && tests/gates/pictures.py && tests/gates/prove.sh; }
+gates() { tests/gates/layers.sh && tests/gates/house.sh && tests/gates/format.sh && tests/gates/contract.sh && tests/gates/pictures.py && tests/gates/documents.py && tests/gates/prove.sh; }
 
 # ctest's own lines, and at the end what CI reads
 passed=0

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# api/control.idl: each type, member and constant is described; the reference in api/README.md is that of today; nothing of
+# api/control.idl: each type, member and constant is described; the reference in api/reference.md is that of today; nothing of
 # the first version has changed. Usage: contract.sh [ROOT]; prints each fault.
 set -euo pipefail
 here=$(cd "$(dirname "$0")/../.." && pwd)

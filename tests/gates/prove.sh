@@ -62,7 +62,7 @@ must_be_red "house: leaked instance" "$gates/house.sh" "$plot/tree"
 # plant_in_contract NAME EXPRESSION [--write]: the contract with that change (of sed), and with a reference made anew
 plant_in_contract() {
   new_tree
-  cp api/control.idl api/README.md "$plot/tree/api/"
+  cp api/control.idl api/reference.md "$plot/tree/api/"
   sed -i -E "$2" "$plot/tree/api/control.idl"
   cmp -s api/control.idl "$plot/tree/api/control.idl" && { echo "nothing was planted for '$1'"; failed=1; }
   [ "${3:-}" != --write ] || api/reference.py --root "$plot/tree/api" --write >/dev/null || true
@@ -96,6 +96,23 @@ plant_in_picture "pictures: no general font" manager/system.svg 's/Arial, sans-s
 plant_in_picture "pictures: axis without a title" tests/bench/cyclic.svg '/class="axis" transform/d'
 plant_in_picture "pictures: curves that only colours tell" tests/bench/corun.svg 's,m-3.6[^"]*,m-4\,0 a4\,4 0 1\,0 8\,0 a4\,4 0 1\,0 -8\,0,'
 plant_in_picture "pictures: outside of the picture" tests/bench/cyclic.svg 's/Start latency of/& each single cycle, one after the other, of this and of that task, and of/'
+
+# plant_in_documents NAME DIAGNOSTIC FILE EXPRESSION: the whole tree, one file of it with that change (of sed)
+new_tree
+git ls-files -z -c -o --exclude-standard | xargs -0 cp --parents -t "$plot/tree" && commit_tree
+plant_in_documents() {
+  sed -i -E "$4" "$plot/tree/$3"
+  cmp -s "$3" "$plot/tree/$3" && { echo "nothing was planted for '$1'"; failed=1; }
+  must_be_red "$1" "$gates/documents.py" "$plot/tree"
+  grep -qF "$2" <<<"$output" || { echo "the gate '$1' does not say '$2'"; failed=1; }
+  cp "$3" "$plot/tree/$3"
+}
+"$gates/documents.py" "$plot/tree" || { echo "the documents do not pass their gate"; failed=1; }
+plant_in_documents "documents: file of a link" "leads to no file" README.md 's,\(api/fleet.md\),(api/float.md),'
+plant_in_documents "documents: heading of a link" "leads to no heading" api/plcctl.md 's,#a-changed-configuration,#a-changed-file,'
+plant_in_documents "documents: page without a link" "no link leads here from README.md" README.md 's,\[models of protocols\]\(tests/models/README.md\),models,'
+plant_in_documents "documents: long README" "lines; at most 250" README.md '1s,$,\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n,'
+plant_in_documents "documents: old figures" "is not up to date" README.md 's,^\| the same beside.*,| the same | 0.1 | 0.2 | 1 | 2 |,'
 
 new_tree
 echo 'int planted(int* p) { return p == 0 ? 1 : 2; }' >"$plot/tree/shm/base/planted.cpp"

@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 """Runs the tour of README.md. Usage: tour_of_the_readme.py ROOT BIN CELL CORE POOL; PLCHOST_DOMAIN is its DDS domain.
 
+Where the tour has "<!-- run here: PAGE ... -->", the console blocks of these pages behind "<!-- run in the tour -->" are run.
+
 The commands are those of the indented lines and those behind "$ " in the console blocks; blocks of code are files, by the name
 in their first line or in the line above. What a console block shows behind a command must come in this order, with any number
 where a number stands, any spaces where spaces stand, and anything where "..." stands.
@@ -31,7 +33,20 @@ def placed(text):
 def tour_lines():
     text = open(ROOT + "/README.md", encoding="utf-8").read()
     begin = text.index("## Ten minutes, by hand")
-    return text[begin:text.index("\n## ", begin)].split("\n")
+    lines = []
+    for line in text[begin:text.index("\n## ", begin)].split("\n"):
+        lines.append(line)
+        also = re.fullmatch(r"<!-- run here: (.*) -->", line)
+        for page in also.group(1).split() if also else []:
+            lines += marked_blocks(page)
+    return lines
+
+
+def marked_blocks(page):
+    lines = open(f"{ROOT}/{page}", encoding="utf-8").read().split("\n")
+    marks = [at for at, line in enumerate(lines) if line == "<!-- run in the tour -->"]
+    assert marks, f"{page} has no block that is to be run in the tour"
+    return [line for at in marks for line in lines[at + 1:lines.index("```", at + 2) + 1]]
 
 
 def steps(lines):
@@ -116,7 +131,7 @@ class Shell:
             if absent is None:
                 return
             if time.monotonic() > end or self.process.poll() is not None:
-                sys.exit(f"$ {command}\nsays:\n{output}\nthe README has:\n{absent}")
+                sys.exit(f"$ {command}\nsays:\n{output}\nthe document has:\n{absent}")
             time.sleep(0.05)
 
     def end(self):

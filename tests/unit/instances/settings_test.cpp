@@ -361,14 +361,14 @@ TEST(Settings, DefaultsOfATaskAreThoseOfTheProgram) {
   EXPECT_EQ(tasks[0].drives_outputs, TaskConfig{}.drives_outputs);
 }
 
-TEST(Settings, ReadmeHasTheWholeTable) {
-  std::stringstream readme;
-  readme << std::ifstream(INSTANCES_README).rdbuf();
+TEST(Settings, PageHasTheWholeTable) {
+  std::stringstream page;
+  page << std::ifstream(INSTANCES_SETTINGS).rdbuf();
   for (const SettingKey& key : all_setting_keys()) {
     if (std::holds_alternative<UnusedSetting>(key.value)) continue;
     const std::string row = fmt::format("| `[{}] {}` | {} | {} |\n", key.section, written_name(key),
                                         allowed_values(key), key.initial.empty() ? "none" : key.initial);
-    EXPECT_THAT(readme.str(), HasSubstr(row)) << "put this line into the table of " INSTANCES_README;
+    EXPECT_THAT(page.str(), HasSubstr(row)) << "put this line into the table of " INSTANCES_SETTINGS;
   }
 }
 
