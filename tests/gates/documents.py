@@ -5,10 +5,14 @@ Usage: documents.py [--write] [ROOT] (a git checkout); prints each fault. --writ
 
 * Each link leads to a file or folder, and its anchor to a heading there.
 * Each document is reached from README.md by links; README.md has at most 250 lines.
-* A table between "<!-- generated: NAME -->" and "<!-- end of generated -->" is that of today (TABLES below).
+* A table between "<!-- generated: NAME -->" and "<!-- end of generated -->" is that of today (TABLES below; the one of the
+  settings is held by instances_unit_test, here only its keys and their meanings).
+* The keys in the tables of manager/configuration.md and instances/settings.md are those of the code, and the code has each
+  key that a document names, as `[Section] Key` or `Section.Key=1`.
 """
 
 import argparse
+import importlib.util
 import re
 import subprocess
 import sys
@@ -116,7 +120,7 @@ class Documents:
                 except Fault as fault:
                     faults.append(f"{name}: the table '{begin.group(1)}': {fault}")
                     return text
-            elif begin:
+            elif begin and begin.group(1) not in MADE_BY_TESTS:
                 faults.append(f"{name}: no table is called '{begin.group(1)}'; there are {', '.join(TABLES)}")
                 return text
         if table is not None:
@@ -158,7 +162,135 @@ def figures(root):
     return rows
 
 
-TABLES = {"figures": figures}
+def contract_of(root):
+    """api/control.idl, read by the script that makes its reference."""
+    tool = importlib.util.spec_from_file_location("reference", Path(__file__).parent.parent.parent / "api/reference.py")
+    reference = importlib.util.module_from_spec(tool)
+    sys.modules["reference"] = reference
+    tool.loader.exec_module(reference)
+    return reference, reference.parse(root / "api/control.idl")
+
+
+def topics(root):
+    reference, contract = contract_of(root)
+    rows = ["| topic | from | to | what |", "| --- | --- | --- | --- |"]
+    for kind in (kind for kind in contract.types if kind.is_topic):
+        names = ", ".join(f"`{name.strip()}`" for name in kind.tags["topic"].split(","))
+        what = reference.text_of(re.split(r"(?<=\.) ", kind.comment)[0])
+        ends = [reference.text_of(kind.tags[end]) for end in ("writer", "reader")]
+        rows.append(f"| [{names}](reference.md#{kind.name.lower()}) | {ends[0]} | {ends[1]} | {what} |")
+    return rows
+
+
+EFFECTS = {
+    "at_once": "immediately",
+    "next_process": "from the instance's next process on; until then its problem text says so",
+    "next_manager": "when the manager starts the next time",
+}
+
+
+def changed_keys(root):
+    """(section, key, effect) of each key of the host's file."""
+    text = (root / "manager/config/config_changes.cpp").read_text(encoding="utf-8")
+    section = None
+    for prefix, key, effect in re.findall(r'KeyChanges changes\("([^"]*)"\)|compare\("(\w+)",\s*TakesEffect::(\w+)', text):
+        if key:
+            yield section, key, effect
+        else:
+            section = prefix.strip() or "[[instance]]"
+
+
+def reload_effects(root):
+    found = {}
+    for section, key, effect in changed_keys(root):
+        if effect not in EFFECTS:
+            raise Fault(f"manager/config/config_changes.cpp: '{effect}' has no text in EFFECTS")
+        found.setdefault(effect, {}).setdefault(section, []).append(f"`{key}`")
+    rows = ["| keys | used |", "| --- | --- |"]
+    for effect, sections in found.items():
+        keys = "; ".join(f"`{section}` {', '.join(names)}" for section, names in sections.items())
+        rows.append(f"| {keys} | {EFFECTS[effect]} |")
+    return rows
+
+
+TABLES = {"figures": figures, "topics": topics, "reload": reload_effects}
+MADE_BY_TESTS = ("settings",)
+
+
+def setting_rows(root):
+    """Each key of an instance's settings: "[Section] Key" -> its meaning; None: known, and without a use here."""
+    keys = {}
+    for source in sorted((root / "instances/runtime/settings").glob("settings_*.cpp")):
+        text = source.read_text(encoding="utf-8")
+        names = dict(re.findall(r'string_view (k\w+) = "([^"]*)"', text)) | {"kTaskSections": "Task.NAME"}
+        rows = re.split(r"SettingKey\{", text)[1:]
+        for row in rows:
+            section = re.match(r"\s*\.section = (\w+)", row)
+            name = re.search(r'\.name = "([^"]+)"', row)
+            if not section or not name:
+                continue
+            prefix = "Linux." if ".prefixed = true" in row else ""
+            meaning = re.search(r'\.meaning =\s*((?:"[^"]*"\s*)+)', row)
+            text_of = "".join(re.findall(r'"([^"]*)"', meaning.group(1))) if meaning else None
+            keys[f"[{names[section.group(1)]}] {prefix}{name.group(1)}"] = text_of if ".value" in row else None
+    return keys
+
+
+def rows_of(text, begin, end):
+    lines = text[text.index(begin):]
+    return [line for line in lines[:lines.index(end)].split("\n") if line.startswith("|")]
+
+
+def settings_faults(root, texts):
+    page = "instances/settings.md"
+    code = {key: meaning for key, meaning in setting_rows(root).items() if meaning is not None}
+    table = {}
+    for row in rows_of(texts[page], "<!-- generated: settings", END)[2:]:
+        cells = [cell.strip() for cell in row.strip("|").split(" | ")]
+        table[cells[0].strip("`")] = cells[-1]
+    faults = [f"{page}: no row for the key {key}" for key in code if key not in table]
+    faults += [f"{page}: the code has no key {key}" for key in table if key not in code]
+    faults += [f"{page}: {key} has another meaning than in the code" for key in code if table.get(key, code[key]) != code[key]]
+    return faults
+
+
+def configuration_faults(root, texts):
+    page = "manager/configuration.md"
+    code = [(section, key) for section, key, _ in changed_keys(root)]
+    table = []
+    section = None
+    for row in rows_of(texts[page], "| key | meaning | default |", "\n\n")[2:]:
+        first = row.strip("|").split(" | ")[0]
+        section = (re.search(r"\*\*(\[+\w+\]+)\*\*", first) or [None, section])[1]
+        table += [(section, key) for key in re.findall(r"`(\w+)`", first)]
+    read = set(re.findall(r'(?:\breader\.(?:text|texts|number|numbers|truth|choice)\(|read_file\(reader, )"(\w+)"',
+                          (root / "manager/config/load_config.cpp").read_text(encoding="utf-8")))
+    faults = [f"{page}: no row for the key {' '.join(key)}" for key in code if key not in table]
+    faults += [f"{page}: the code has no key {' '.join(key)}" for key in table if key not in code]
+    faults += [f"manager/config: the key {key} is read and has no row in config_changes.cpp" for key in
+               sorted(read - {key for _, key in code})]
+    return faults
+
+
+def named_key_faults(root, texts):
+    """Keys that the text of any document names."""
+    settings = setting_rows(root)
+    sections = {key[1:key.index("]")] for key in settings}
+    names = {key.split("] ")[1].removeprefix("Linux.") for key in settings}
+    stems = {name.split(".")[0] for name in names if "." in name} - {"Area", "Component", "Task", "0"}
+    configuration = {(section.strip("[]"), key) for section, key, _ in changed_keys(root)}
+    hosts_sections = {section for section, _ in configuration}
+    for page, text in texts.items():
+        for number, line in enumerate(text.split("\n"), 1):
+            for section, key in re.findall(r"`\[+([\w.]+)\]+ ([A-Za-z][\w.]*)", line):
+                plain = re.sub(r"^(Linux|VxWorks)\.", "", re.sub(r"\.\d+\b", ".N", key))
+                section = "Task.NAME" if section.startswith("Task.") else section
+                known = {key.removeprefix(f"[{section}] ").removeprefix("Linux.") for key in settings if f"[{section}]" in key}
+                if section in sections and plain not in known or section in hosts_sections and (section, key) not in configuration:
+                    yield f"{page}:{number}: the code has no key [{section}] {key}"
+            for key in re.findall(r"`([A-Z]\w+\.\w[\w.]*)(?:=[^`]*)?`", line):
+                if key.split(".")[0] in stems and key not in names:
+                    yield f"{page}:{number}: the code has no key {key}"
 
 
 def main():
@@ -168,6 +300,11 @@ def main():
     options = parser.parse_args()
     documents = Documents(options.root.resolve())
     faults = documents.table_faults(options.write) + documents.size_faults() + documents.link_faults()
+    try:
+        faults += settings_faults(documents.root, documents.texts) + configuration_faults(documents.root, documents.texts)
+        faults += named_key_faults(documents.root, documents.texts)
+    except ValueError as wrong:
+        faults.append(f"a table of keys is not where it is expected: {wrong}")
     print("\n".join(faults), end="\n" if faults else "")
     return 1 if faults else 0
 

@@ -113,6 +113,15 @@ plant_in_documents "documents: heading of a link" "leads to no heading" api/plcc
 plant_in_documents "documents: page without a link" "no link leads here from README.md" README.md 's,\[models of protocols\]\(tests/models/README.md\),models,'
 plant_in_documents "documents: long README" "lines; at most 250" README.md '1s,$,\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n\n,'
 plant_in_documents "documents: old figures" "is not up to date" README.md 's,^\| the same beside.*,| the same | 0.1 | 0.2 | 1 | 2 |,'
+plant_in_documents "documents: old topics" "is not up to date" api/contract.md '/`plc\/v1\/reply`/d'
+plant_in_documents "documents: setting without a row" "no row for the key [Retain] PostponeMs" instances/settings.md '/PostponeMs. \|/d'
+plant_in_documents "documents: unknown setting" "the code has no key [Retain] PostponeUs" instances/settings.md 's,(\[Retain\] Postpone)Ms,\1Us,'
+plant_in_documents "documents: another meaning" "another meaning than in the code" instances/settings.md 's,phase of the task on its grid,phase of the task,'
+plant_in_documents "documents: key without a row" "no row for the key [host] keep_pool" manager/configuration.md '/^. `keep_pool`/d'
+plant_in_documents "documents: unknown key" "the code has no key [dds] unsecured" manager/configuration.md 's,`allow_unsecured`,`unsecured`,'
+plant_in_documents "documents: unknown key in a text" "the code has no key Stop.OutputLimitMs" instances/states.md 's,Stop.OutputsLimitMs,Stop.OutputLimitMs,'
+plant_in_documents "documents: unknown section and key in a text" "the code has no key [dds] peer" shm/blocks.md 's,\[dds\] peers,[dds] peer,'
+plant_in_documents "documents: key that is read and has no row" "has no row in config_changes.cpp" manager/config/load_config.cpp 's,truth\("keep_pool",truth("keep",'
 
 new_tree
 echo 'int planted(int* p) { return p == 0 ? 1 : 2; }' >"$plot/tree/shm/base/planted.cpp"

@@ -60,7 +60,7 @@ struct RetainSettings {
   bool operator==(const RetainSettings&) const = default;
 };
 
-/// What an instance's own settings file says, validated. README.md lists the keys.
+/// What an instance's own settings file says, validated. instances/settings.md lists the keys.
 struct InstanceSettings {
   SchedulerSettings scheduler;
   StopLimits stop;

@@ -49,6 +49,7 @@ constexpr std::array kBlockKeys = {
                .name = "Enable",
                .unit = "1 is a node also without a channel",
                .initial = "0",
+               .meaning = "the instance is a node from its start",
                .value = NumberSetting{0, 1,
                                       [](const SettingsTarget& to, std::int64_t enable) {
                                         blocks_of(to).enable = enable != 0;
@@ -56,19 +57,23 @@ constexpr std::array kBlockKeys = {
     SettingKey{.section = kDriver,
                .name = "BaseName",
                .initial = kDefaultBlockBase,
+               .meaning = "nodes of the same base name in the same pool see each other",
                .value = TextSetting{"1 to 31 letters, digits, _ - .", is_base_name,
                                     [](const SettingsTarget& to, std::string_view name) {
                                       blocks_of(to).base = name;
                                     }}},
-    SettingKey{.section = kDriver,
-               .name = "ForcedAddress",
-               .value = NumberSetting{1, kMaxNodes,
-                                      [](const SettingsTarget& to, std::int64_t address) {
-                                        blocks_of(to).forced_address = static_cast<std::uint16_t>(address);
-                                      }}},
+    SettingKey{
+        .section = kDriver,
+        .name = "ForcedAddress",
+        .meaning = "address of the node; without it any free one. An address that is taken ends the start",
+        .value = NumberSetting{1, kMaxNodes,
+                               [](const SettingsTarget& to, std::int64_t address) {
+                                 blocks_of(to).forced_address = static_cast<std::uint16_t>(address);
+                               }}},
     SettingKey{.section = kDriver,
                .name = "QueueSlots",
                .initial = "1024",
+               .meaning = "slots of 256 bytes in each of the four queues of a link that it makes",
                .value = WordSetting{kQueueSlots,
                                     [](const SettingsTarget& to, std::size_t index) {
                                       const std::string_view word = kQueueSlots[index];
@@ -79,6 +84,7 @@ constexpr std::array kBlockKeys = {
                .name = "HoldMs",
                .unit = "ms",
                .initial = "1000",
+               .meaning = "a block that nobody receives for this time is dropped and counted",
                .value = NumberSetting{100, 60'000,
                                       [](const SettingsTarget& to, std::int64_t ms) {
                                         blocks_of(to).hold = std::chrono::milliseconds(ms);
@@ -86,6 +92,7 @@ constexpr std::array kBlockKeys = {
     SettingKey{
         .section = kRouter,
         .name = "Neighbours",
+        .meaning = "instances that it exchanges blocks with directly",
         .value = TextSetting{"names of instances with commas between; without it all are", are_node_names,
                              [](const SettingsTarget& to, std::string_view names) {
                                blocks_of(to).neighbours = words_of(names);
@@ -94,12 +101,14 @@ constexpr std::array kBlockKeys = {
                .name = "Forward",
                .unit = "1 is on",
                .initial = "1",
+               .meaning = "blocks of other nodes may go through it",
                .value = NumberSetting{0, 1,
                                       [](const SettingsTarget& to,
                                          std::int64_t forward) { blocks_of(to).forward = forward != 0; }}},
     SettingKey{.section = kRouter,
                .name = "HopLimit",
                .initial = "8",
+               .meaning = "nodes that a block may go through",
                .value =
                    NumberSetting{
                        1, kMaxHops,

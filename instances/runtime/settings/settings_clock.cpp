@@ -24,6 +24,8 @@ bool is_memory_name(std::string_view text) {
 constexpr std::array kClockKeys = {
     SettingKey{.section = kClock,
                .name = "Reference",
+               .meaning = "record that the grids of cyclic tasks follow; without it a driver reports pairs "
+                          "(SchedReportReferenceTime)",
                .value = TextSetting{"name of a shared memory of the pool, 1 to 95 letters, digits, _ - .",
                                     is_memory_name,
                                     [](const SettingsTarget& to, std::string_view name) {
@@ -33,6 +35,7 @@ constexpr std::array kClockKeys = {
                .name = "KpPpm",
                .unit = "ppm",
                .initial = "30000",
+               .meaning = "share of a pair's deviation that moves the phase",
                .value = NumberSetting{1, ClockSettings::kMaxGainPpm,
                                       [](const SettingsTarget& to, std::int64_t ppm) {
                                         clock_of(to).kp_ppm = static_cast<int>(ppm);
@@ -41,6 +44,7 @@ constexpr std::array kClockKeys = {
                .name = "KiPpm",
                .unit = "ppm",
                .initial = "200",
+               .meaning = "share of a pair's deviation that moves the drift",
                .value = NumberSetting{0, ClockSettings::kMaxGainPpm,
                                       [](const SettingsTarget& to, std::int64_t ppm) {
                                         clock_of(to).ki_ppm = static_cast<int>(ppm);
@@ -48,7 +52,8 @@ constexpr std::array kClockKeys = {
     SettingKey{.section = kClock,
                .name = "MaxCorrectionNs",
                .unit = "ns",
-               .initial = "0",  // 1 % of the interval
+               .initial = "0",
+               .meaning = "the most that one release is moved; 0: 1 % of the task's interval",
                .value = NumberSetting{0, ClockSettings::kMaxCorrection.count(),
                                       [](const SettingsTarget& to, std::int64_t ns) {
                                         clock_of(to).max_correction = Duration(ns);
@@ -57,6 +62,7 @@ constexpr std::array kClockKeys = {
                .name = "SyncWindowNs",
                .unit = "ns",
                .initial = "50000",
+               .meaning = "releases no further off are in sync",
                .value = NumberSetting{1, ClockSettings::kMaxWindow.count(),
                                       [](const SettingsTarget& to, std::int64_t ns) {
                                         clock_of(to).sync_window = Duration(ns);
@@ -65,6 +71,7 @@ constexpr std::array kClockKeys = {
                .name = "PairToleranceNs",
                .unit = "ns",
                .initial = "2000",
+               .meaning = "a pair no further off is never an outlier",
                .value = NumberSetting{1, ClockSettings::kMaxWindow.count(),
                                       [](const SettingsTarget& to, std::int64_t ns) {
                                         clock_of(to).pair_tolerance = Duration(ns);
@@ -73,6 +80,7 @@ constexpr std::array kClockKeys = {
                .name = "ReferenceTimeoutMs",
                .unit = "ms",
                .initial = "300",
+               .meaning = "hold-over begins after this time without a pair",
                .value = NumberSetting{1, ClockSettings::kMaxTimeout.count() / kNsInMs,
                                       [](const SettingsTarget& to, std::int64_t ms) {
                                         clock_of(to).reference_timeout = std::chrono::milliseconds(ms);
@@ -81,6 +89,7 @@ constexpr std::array kClockKeys = {
                .name = "HoldOverMs",
                .unit = "ms",
                .initial = "10000",
+               .meaning = "how long hold-over counts as in sync",
                .value = NumberSetting{0, ClockSettings::kMaxTimeout.count() / kNsInMs,
                                       [](const SettingsTarget& to, std::int64_t ms) {
                                         clock_of(to).hold_over_limit = std::chrono::milliseconds(ms);

@@ -19,6 +19,7 @@ constexpr std::array kComponentKeys = {
     SettingKey{
         .section = kComponentSection,
         .name = "Component.N",
+        .meaning = "component with HookFunction; loaded in the order of N",
         .value = NumberedSetting{"file of a shared object, with a '/' or a '.' in its name", add_component}},
     SettingKey{.section = kComponentSection, .name = "DisablingOperations"},
     SettingKey{.section = kComponentSection, .name = "MinimalCommCycleHookInterval"},

@@ -79,14 +79,15 @@ struct NumberedSetting {
 /// Documented for CODESYS, without a meaning here: accepted with a remark.
 struct UnusedSetting {};
 
-/// One row of the table of keys. Parsing, errors, lists of what is allowed and the README's table come from
-/// it.
+/// One row of the table of keys. Parsing, errors, lists of what is allowed and the table of
+/// instances/settings.md come from it.
 struct SettingKey {
   std::string_view section;  ///< kTaskSections: any [Task.NAME]
   std::string_view name;
   bool prefixed = false;       ///< written with the name of a platform in front: VxWorks.NAME, or Linux.NAME
   std::string_view unit{};     ///< empty: none
   std::string_view initial{};  ///< the default, as it would be written
+  std::string_view meaning{};  ///< for the table in instances/settings.md
   std::variant<NumberSetting, OptionalNumberSetting, MicrosecondSetting, WordSetting, TextSetting,
                NumberedSetting, UnusedSetting>
       value = UnusedSetting{};
@@ -107,7 +108,7 @@ inline constexpr std::string_view kTaskPrefix = "Task.";  ///< what its name beg
 /// What was said about all areas, checked as a whole. The error names the line of the area.
 [[nodiscard]] Result<std::vector<AreaSettings>> check_areas(const std::map<std::size_t, AreaDraft>& drafts);
 
-/// All rows, in the order of the README.
+/// All rows, in the order of the table in instances/settings.md.
 [[nodiscard]] const std::vector<SettingKey>& all_setting_keys();
 
 /// The key of the table for a section as written: kTaskSections for "Task.Fast".

@@ -103,29 +103,35 @@ constexpr std::array kMemoryKeys = {
     SettingKey{.section = kMemory,
                .name = "Area.N.Flags",
                .prefixed = true,
+               .meaning = "areas of the application with these flags lie here; N begins at 0, without a gap",
                .value = NumberedSetting{"1 to 0xFFFF", set_flags, kLastArea}},
     SettingKey{.section = kMemory,
                .name = "Area.N.Address",
                .prefixed = true,
+               .meaning = "where it begins in the device or file",
                .value = NumberedSetting{"a multiple of 8 up to 2^52", set_address, kLastArea}},
     SettingKey{.section = kMemory,
                .name = "Area.N.Size",
                .prefixed = true,
                .unit = "bytes",
+               .meaning = "size of the memory",
                .value = NumberedSetting{"1 to 0x40000000", set_size, kLastArea}},
     SettingKey{.section = kMemory,
                .name = "Area.N.Device",
                .prefixed = true,
+               .meaning = "device (of /dev/uioN its memory 0) or file that it is in",
                .value = NumberedSetting{"/dev/mem (if there is no Object), /dev/uioN or a file", set_device,
                                         kLastArea}},
     SettingKey{.section = kMemory,
                .name = "Area.N.Object",
                .prefixed = true,
+               .meaning = "shared memory of the pool that it is",
                .value = NumberedSetting{"name of a shared memory of the pool, 1 to 95 letters, digits, _ - .",
                                         set_object, kLastArea}},
     SettingKey{.section = kMemory, .name = "Memlock", .prefixed = true},
     SettingKey{.section = kRetain,
                .name = "Directory",
+               .meaning = "where kept values are written; relative to the settings file",
                .value = TextSetting{"a folder, or nothing for the one of --state-directory",
                                     [](std::string_view path) { return path.size() <= kMaxPath; },
                                     [](const SettingsTarget& to, std::string_view path) {
@@ -135,21 +141,27 @@ constexpr std::array kMemoryKeys = {
                .name = "IntervalMs",
                .unit = "ms",
                .initial = "1000",
+               .meaning = "how often kept values that have changed are written",
                .value = NumberSetting{10, 3'600'000,
                                       [](const SettingsTarget& to, std::int64_t number) {
                                         to.settings.retain.interval = std::chrono::milliseconds(number);
                                       }}},
-    SettingKey{.section = kRetain,
-               .name = "PostponeMs",
-               .unit = "ms",
-               .initial = "100",
-               .value = NumberSetting{1, 60'000,
-                                      [](const SettingsTarget& to, std::int64_t number) {
-                                        to.settings.retain.postpone = std::chrono::milliseconds(number);
-                                      }}},
+    SettingKey{
+        .section = kRetain,
+        .name = "PostponeMs",
+        .unit = "ms",
+        .initial = "100",
+        .meaning =
+            "how long a time without any cycle is looked for, before tasks copy their areas themselves",
+        .value = NumberSetting{1, 60'000,
+                               [](const SettingsTarget& to, std::int64_t number) {
+                                 to.settings.retain.postpone = std::chrono::milliseconds(number);
+                               }}},
     SettingKey{.section = kRetain,
                .name = "Mismatch",
                .initial = "Initialise",
+               .meaning = "kept values of another layout: begin anew, refuse the application, or take areas "
+                          "of the same name",
                .value = WordSetting{kMismatches,
                                     [](const SettingsTarget& to, std::size_t index) {
                                       to.settings.retain.mismatch = static_cast<RetainMismatch>(index);

@@ -18,6 +18,7 @@ constexpr std::array kTaskKeys = {
     SettingKey{.section = kTaskSections,
                .name = "LatePolicy",
                .initial = "Next",
+               .meaning = "a late cycle: at the next release of the grid, or immediately",
                .value = WordSetting{kLatePolicies,
                                     [](const SettingsTarget& to, std::size_t index) {
                                       to.task->late = static_cast<LatePolicy>(index);
@@ -26,6 +27,7 @@ constexpr std::array kTaskKeys = {
                .name = "StartOffsetNs",
                .unit = "ns, below the task's interval",
                .initial = "0",
+               .meaning = "phase of the task on its grid",
                .value = NumberSetting{0, kMaxInterval.count(),
                                       [](const SettingsTarget& to, std::int64_t ns) {
                                         to.task->start_offset = Duration(ns);
@@ -34,6 +36,7 @@ constexpr std::array kTaskKeys = {
                .name = "DrivesOutputs",
                .unit = "1 is yes",
                .initial = "0",
+               .meaning = "its cycles end first in a stop",
                .value = NumberSetting{0, 1,
                                       [](const SettingsTarget& to, std::int64_t yes) {
                                         to.task->drives_outputs = yes != 0;
@@ -42,6 +45,7 @@ constexpr std::array kTaskKeys = {
                .name = "Watchdog.TimeUs",
                .unit = "us, 0 is none",
                .initial = "0",
+               .meaning = "longest time of a cycle",
                .value = NumberSetting{0, kMaxWatchdogTime / std::chrono::microseconds(1),
                                       [](const SettingsTarget& to, std::int64_t us) {
                                         to.task->watchdog_time = std::chrono::microseconds(us);
@@ -50,6 +54,7 @@ constexpr std::array kTaskKeys = {
                .name = "Watchdog.Sensitivity",
                .unit = "cycles",
                .initial = "1",
+               .meaning = "overruns in a row that are a hit; so is one cycle of this many times the time",
                .value = NumberSetting{1, kMaxWatchdogCount,
                                       [](const SettingsTarget& to, std::int64_t cycles) {
                                         to.task->watchdog_sensitivity = static_cast<std::uint32_t>(cycles);
@@ -58,6 +63,7 @@ constexpr std::array kTaskKeys = {
                .name = "Watchdog.OmittedCycles",
                .unit = "cycles, 0 is off",
                .initial = "0",
+               .meaning = "releases in a row without a cycle that are a hit",
                .value = NumberSetting{0, kMaxWatchdogCount,
                                       [](const SettingsTarget& to, std::int64_t cycles) {
                                         to.task->watchdog_omitted_cycles = static_cast<std::uint32_t>(cycles);
@@ -66,6 +72,7 @@ constexpr std::array kTaskKeys = {
         .section = kTaskSections,
         .name = "Watchdog.Policy",
         .initial = "Application",
+        .meaning = "what a fault or a hit stops",
         .value =
             WordSetting{
                 kWatchdogPolicies,

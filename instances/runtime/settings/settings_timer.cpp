@@ -46,6 +46,7 @@ constexpr std::array kTimerKeys = {
                .name = "TimerSource",
                .prefixed = true,
                .initial = "System",
+               .meaning = "where the tick comes from: timerfd, a thread of high priority, a clock device",
                .value = WordSetting{kSources,
                                     [](const SettingsTarget& to, std::size_t index) {
                                       to.settings.scheduler.tick_source = static_cast<TickSourceKind>(index);
@@ -54,6 +55,7 @@ constexpr std::array kTimerKeys = {
                .name = "TimerMode",
                .prefixed = true,
                .initial = "Periodic",
+               .meaning = "OneShot chooses CmpScheduleOneShot, unless a scheduler is named",
                .value = WordSetting{kModes,
                                     [](const SettingsTarget& to, std::size_t index) {
                                       to.settings.timer_mode = static_cast<TimerMode>(index);
@@ -62,6 +64,7 @@ constexpr std::array kTimerKeys = {
                .name = "AuxiliaryDevice",
                .prefixed = true,
                .initial = "/dev/rtc0",
+               .meaning = "RTC or HPET; System replaces a device that cannot make the interval",
                .value = TextSetting{"absolute path of a character device", is_device_path,
                                     [](const SettingsTarget& to, std::string_view path) {
                                       to.settings.scheduler.auxiliary_device = path;
@@ -70,6 +73,8 @@ constexpr std::array kTimerKeys = {
                .name = "IdleStates",
                .prefixed = true,
                .initial = "Hold",
+               .meaning = "Hold: idle states of all cores are off. HoldCore: of the instance's cores, where "
+                          "that is possible",
                .value = WordSetting{kIdleStates,
                                     [](const SettingsTarget& to, std::size_t index) {
                                       to.settings.idle_states = static_cast<IdleStates>(index);
@@ -81,6 +86,7 @@ constexpr std::array kTimerKeys = {
     SettingKey{.section = kTime,
                .name = "CustomSysTimeGetUs",
                .prefixed = true,
+               .meaning = "gives the time in us that applications see; without it CLOCK_MONOTONIC",
                .value = TextSetting{"name of a C function, or nothing", is_symbol_or_nothing,
                                     [](const SettingsTarget& to, std::string_view symbol) {
                                       to.settings.sys_time.get_us = symbol;
@@ -88,6 +94,7 @@ constexpr std::array kTimerKeys = {
     SettingKey{.section = kTime,
                .name = "CustomSysTimeGetNs",
                .prefixed = true,
+               .meaning = "the same in ns; both functions belong together",
                .value = TextSetting{"name of a C function, or nothing", is_symbol_or_nothing,
                                     [](const SettingsTarget& to, std::string_view symbol) {
                                       to.settings.sys_time.get_ns = symbol;
@@ -95,6 +102,7 @@ constexpr std::array kTimerKeys = {
     SettingKey{.section = kTime,
                .name = "CustomSysTimeLibrary",
                .prefixed = true,
+               .meaning = "has both functions; without it components and preloaded libraries are searched",
                .value = TextSetting{"file of a shared object, or nothing", is_path_or_nothing,
                                     [](const SettingsTarget& to, std::string_view path) {
                                       to.settings.sys_time.library = path.empty() ? "" : in_folder(to, path);

@@ -1,5 +1,6 @@
 #include "instances/runtime/settings/settings.hpp"
 
+#include <cstdlib>
 #include <fstream>
 #include <sstream>
 
@@ -361,15 +362,29 @@ TEST(Settings, DefaultsOfATaskAreThoseOfTheProgram) {
   EXPECT_EQ(tasks[0].drives_outputs, TaskConfig{}.drives_outputs);
 }
 
-TEST(Settings, PageHasTheWholeTable) {
-  std::stringstream page;
-  page << std::ifstream(INSTANCES_SETTINGS).rdbuf();
+// PLCHOST_WRITE_TABLES=1 writes the table into the page.
+TEST(Settings, PageHasTheTableOfTheKeys) {
+  constexpr std::string_view kBegin = "<!-- generated: settings, by instances_unit_test -->\n";
+  constexpr std::string_view kEnd = "<!-- end of generated -->";
+  std::string table = "| section and key | unit, range | default | meaning |\n| --- | --- | --- | --- |\n";
   for (const SettingKey& key : all_setting_keys()) {
     if (std::holds_alternative<UnusedSetting>(key.value)) continue;
-    const std::string row = fmt::format("| `[{}] {}` | {} | {} |\n", key.section, written_name(key),
-                                        allowed_values(key), key.initial.empty() ? "none" : key.initial);
-    EXPECT_THAT(page.str(), HasSubstr(row)) << "put this line into the table of " INSTANCES_SETTINGS;
+    EXPECT_FALSE(key.meaning.empty()) << key.section << " " << key.name;
+    table += fmt::format("| `[{}] {}` | {} | {} | {} |\n", key.section, written_name(key),
+                         allowed_values(key), key.initial.empty() ? "none" : key.initial, key.meaning);
   }
+  std::stringstream stream;
+  stream << std::ifstream(INSTANCES_SETTINGS).rdbuf();
+  std::string page = stream.str();
+  const std::size_t begin = page.find(kBegin);
+  ASSERT_NE(begin, std::string::npos) << INSTANCES_SETTINGS " has no line " << kBegin;
+  const std::size_t size = page.find(kEnd, begin) - begin - kBegin.size();
+  ASSERT_LT(size, page.size()) << INSTANCES_SETTINGS " has no line " << kEnd;
+  if (std::getenv("PLCHOST_WRITE_TABLES") != nullptr) {
+    std::ofstream(INSTANCES_SETTINGS) << page.replace(begin + kBegin.size(), size, table);
+    return;
+  }
+  EXPECT_EQ(page.substr(begin + kBegin.size(), size), table) << "write it: PLCHOST_WRITE_TABLES=1";
 }
 
 TEST(Settings, NamesAFileThatIsNotThereOrNoFile) {
