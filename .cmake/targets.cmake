@@ -75,12 +75,14 @@ function(plchost_command_line)
 endfunction()
 
 # plchost_manual(PROGRAM WHAT): its manual page in section 8, from what its --help says, where man(1) looks: beside the folders
-# in PATH.
+# in PATH. Without help2man there is none.
 function(plchost_manual program what)
-  find_program(HELP2MAN help2man REQUIRED)
+  if(NOT PLCHOST_HELP2MAN)
+    return()
+  endif()
   set(folder ${CMAKE_BINARY_DIR}/share/man/man8)
   add_custom_command(TARGET ${program} POST_BUILD COMMAND ${CMAKE_COMMAND} -E make_directory ${folder}
-    COMMAND ${HELP2MAN} --no-info --section 8 --source plchost --name ${what} --output ${folder}/${program}.8
+    COMMAND ${PLCHOST_HELP2MAN} --no-info --section 8 --source plchost --name ${what} --output ${folder}/${program}.8
             $<TARGET_FILE:${program}> VERBATIM)
 endfunction()
 
@@ -94,16 +96,26 @@ function(plchost_application name)
   plchost_options(${name})
 endfunction()
 
-# plchost_optional(OPTION PACKAGE WHAT): an option that is AUTO becomes ON where the package is installed, else OFF, which is said.
-function(plchost_optional option package what)
-  if(NOT ${option} STREQUAL "AUTO")
-    return()
-  endif()
-  find_package(${package} QUIET)
-  if(${package}_FOUND)
-    set(${option} ON PARENT_SCOPE)
+# plchost_optional(OPTION WHAT PACKAGE[/COMPONENT]...): an option that is AUTO becomes ON if all packages are
+# installed, else OFF. Either is said.
+function(plchost_optional option what)
+  if(${option} STREQUAL "AUTO")
+    set(found ON)
+    foreach(wanted ${ARGN})
+      string(REPLACE "/" ";COMPONENTS;" package ${wanted})
+      find_package(${package} QUIET)
+      list(GET package 0 package)
+      if(NOT ${package}_FOUND)
+        message(STATUS "${wanted} is not installed: without ${what} (${option}=ON makes that an error)")
+        set(found OFF)
+        break()
+      endif()
+    endforeach()
+    set(${option} ${found} PARENT_SCOPE)
   else()
-    message(STATUS "${package} is not installed: without ${what} (${option}=ON makes that an error)")
-    set(${option} OFF PARENT_SCOPE)
+    set(found ${${option}})
+  endif()
+  if(found)
+    message(STATUS "With ${what}")
   endif()
 endfunction()

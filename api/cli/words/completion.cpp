@@ -108,6 +108,8 @@ _plcctl() {
   _describe plcctl found
 }
 compdef _plcctl plcctl
+# As a file of $fpath, this is the body of the function _plcctl, and its first call.
+[[ $funcstack[1] != _plcctl ]] || _plcctl
 )";
 
 constexpr std::string_view kFish =

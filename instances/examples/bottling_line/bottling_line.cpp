@@ -12,8 +12,8 @@
 #include <atomic>
 #include <cmath>
 
-#include "../../plc_app.hpp"
 #include "plant.hpp"
+#include "plc_app.hpp"
 
 namespace {
 

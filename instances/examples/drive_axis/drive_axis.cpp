@@ -9,8 +9,8 @@
 #include <atomic>
 #include <cmath>
 
-#include "../../plc_app.hpp"
 #include "axis.hpp"
+#include "plc_app.hpp"
 
 namespace {
 

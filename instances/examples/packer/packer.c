@@ -11,7 +11,7 @@
  */
 #include <stdio.h>
 
-#include "../../plc_app.h"
+#include "plc_app.h"
 
 #define PRODUCTS_PER_CARTON 12ul
 #define CARTONS_PER_LAYER 6ul
