@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """The documents (each .md that git knows) agree with each other and with the code.
 
-Usage: documents.py [--write] [ROOT] (a git checkout); prints each fault. --write makes the generated tables anew.
+Usage: documents.py [--write] [--programs DIR] [ROOT] (a git checkout); prints each fault. --write makes the generated tables
+anew. The table of plcctl's commands is made by plcctl itself: it is held only with --programs, the folder of the programs.
 
 * Each link leads to a file or folder, and its anchor to a heading there.
 * Each document is reached from README.md by links; README.md has at most 250 lines.
@@ -9,6 +10,7 @@ Usage: documents.py [--write] [ROOT] (a git checkout); prints each fault. --writ
   settings is held by instances_unit_test, here only its keys and their meanings).
 * The keys in the tables of manager/configuration.md and instances/settings.md are those of the code, and the code has each
   key that a document names, as `[Section] Key` or `Section.Key=1`.
+* Each command in the tables of api/plcctl.md is one of the generated table.
 """
 
 import argparse
@@ -164,7 +166,7 @@ def figures(root):
 
 def contract_of(root):
     """api/control.idl, read by the script that makes its reference."""
-    tool = importlib.util.spec_from_file_location("reference", Path(__file__).parent.parent.parent / "api/reference.py")
+    tool = importlib.util.spec_from_file_location("reference", Path(__file__).resolve().parent.parent.parent / "api/reference.py")
     reference = importlib.util.module_from_spec(tool)
     sys.modules["reference"] = reference
     tool.loader.exec_module(reference)
@@ -214,7 +216,32 @@ def reload_effects(root):
 
 
 TABLES = {"figures": figures, "topics": topics, "reload": reload_effects}
-MADE_BY_TESTS = ("settings",)
+MADE_BY_TESTS = ("settings", "commands")
+
+
+def commands_of(programs):
+    def commands(_root):
+        told = subprocess.run([programs / "plcctl", "help"], check=True, capture_output=True, text=True).stdout
+        rows = ["| command | does |", "| --- | --- |"]
+        for command, text in re.findall(r"^  (\S.*?)(?:  +(\S.*))?$", told, re.MULTILINE):
+            rows.append(f"| `{command}` | {text} |")
+        if len(rows) < 20:
+            raise Fault("'plcctl help' has no commands")
+        return rows
+
+    return commands
+
+
+def command_faults(texts):
+    page = "api/plcctl.md"
+    text = texts[page]
+    known = [re.findall(r"(?<!\S)[a-z][\w-]*", row.split("`")[1]) for row in rows_of(text, "<!-- generated: commands", END)[2:]]
+    if not known:
+        yield f"{page}: the table of the commands is empty"
+    for row in rows_of(text, "| more about |", "\n\n")[2:]:
+        for command in re.findall(r"`([^`]*)`", row.strip("|").split(" | ")[0]):
+            if command.split() not in known:
+                yield f"{page}: plcctl has no command '{command}'"
 
 
 def setting_rows(root):
@@ -296,13 +323,17 @@ def named_key_faults(root, texts):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--write", action="store_true")
-    parser.add_argument("root", nargs="?", type=Path, default=Path(__file__).parent.parent.parent)
+    parser.add_argument("--programs", type=Path)
+    parser.add_argument("root", nargs="?", type=Path, default=Path(__file__).resolve().parent.parent.parent)
     options = parser.parse_args()
+    if options.programs:
+        TABLES["commands"] = commands_of(options.programs)
     documents = Documents(options.root.resolve())
     faults = documents.table_faults(options.write) + documents.size_faults() + documents.link_faults()
     try:
         faults += settings_faults(documents.root, documents.texts) + configuration_faults(documents.root, documents.texts)
         faults += named_key_faults(documents.root, documents.texts)
+        faults += command_faults(documents.texts)
     except ValueError as wrong:
         faults.append(f"a table of keys is not where it is expected: {wrong}")
     print("\n".join(faults), end="\n" if faults else "")

@@ -122,6 +122,7 @@ plant_in_documents "documents: unknown key" "the code has no key [dds] unsecured
 plant_in_documents "documents: unknown key in a text" "the code has no key Stop.OutputLimitMs" instances/states.md 's,Stop.OutputsLimitMs,Stop.OutputLimitMs,'
 plant_in_documents "documents: unknown section and key in a text" "the code has no key [dds] peer" shm/blocks.md 's,\[dds\] peers,[dds] peer,'
 plant_in_documents "documents: key that is read and has no row" "has no row in config_changes.cpp" manager/config/load_config.cpp 's,truth\("keep_pool",truth("keep",'
+plant_in_documents "documents: unknown command" "plcctl has no command 'list writer'" api/plcctl.md 's,^\| `list writers` \| Posts,| `list writer` | Posts,'
 
 new_tree
 echo 'int planted(int* p) { return p == 0 ? 1 : 2; }' >"$plot/tree/shm/base/planted.cpp"

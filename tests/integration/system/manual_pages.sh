@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# Each program has a manual page that man(1) finds, and it has each option that --help has.
+# Each program has a manual page that man(1) finds, and it has each option that --help has. The table of the commands in
+# api/plcctl.md is that of plcctl.
 . "$(dirname "$0")/common.sh"
 for program in plcctl plchostd plchost-dds plc-instance; do
   page=$(find "$BIN/../share/man" -name "$program.[18]")
@@ -12,3 +13,4 @@ for program in plcctl plchostd plchost-dds plc-instance; do
     grep -qF -- "$option" <<<"$text" || fail "$page does not say $option"
   done
 done
+"$(dirname "$0")/../../gates/documents.py" --programs "$BIN" || fail "the documents are not those of the programs"
