@@ -10,6 +10,7 @@ anew. The table of plcctl's commands is made by plcctl itself: it is held only w
   settings is held by instances_unit_test, here only its keys and their meanings).
 * The keys in the tables of manager/configuration.md and instances/settings.md are those of the code, and the code has each
   key that a document names, as `[Section] Key` or `Section.Key=1`.
+* Each step of manager/walks.md names a function and a file that has it.
 * Each command in the tables of api/plcctl.md is one of the generated table.
 """
 
@@ -320,6 +321,27 @@ def named_key_faults(root, texts):
                     yield f"{page}:{number}: the code has no key {key}"
 
 
+def walk_faults(root, texts):
+    """Steps: "  Class::function   folder/file.cpp   what"."""
+    page = "manager/walks.md"
+    steps = 0
+    for number, line in enumerate(texts[page].split("\n"), 1):
+        step = re.match(r" *([\w:]+) +((?:\w+/)+\w+\.[ch]pp)\b", line)
+        if not step:
+            continue
+        steps += 1
+        file = root / step[2]
+        owner, _, name = step[1].rpartition("::")
+        code = file.read_text(encoding="utf-8") if file.exists() else ""
+        owner = owner.split("::")[-1]
+        defined = rf"\b{owner}::{name}\(" if owner else rf"\b{name}\("
+        in_class = owner and re.search(rf"\b(class|struct) [^;{{]*\b{owner}\b", code) and re.search(rf"\b{name}\(", code)
+        if not re.search(defined, code) and not in_class:
+            yield f"{page}:{number}: {step[2]} has no function {step[1]}"
+    if steps < 50:
+        yield f"{page}: only {steps} steps found"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--write", action="store_true")
@@ -334,6 +356,7 @@ def main():
         faults += settings_faults(documents.root, documents.texts) + configuration_faults(documents.root, documents.texts)
         faults += named_key_faults(documents.root, documents.texts)
         faults += command_faults(documents.texts)
+        faults += walk_faults(documents.root, documents.texts)
     except ValueError as wrong:
         faults.append(f"a table of keys is not where it is expected: {wrong}")
     print("\n".join(faults), end="\n" if faults else "")
