@@ -11,6 +11,7 @@ anew. The table of plcctl's commands is made by plcctl itself: it is held only w
 * The keys in the tables of manager/configuration.md and instances/settings.md are those of the code, and the code has each
   key that a document names, as `[Section] Key` or `Section.Key=1`.
 * Each step of manager/walks.md names a function and a file that has it.
+* Each file that a document names with its folder, as `folder/file.cpp`, is there.
 * Each command in the tables of api/plcctl.md is one of the generated table.
 """
 
@@ -342,6 +343,14 @@ def walk_faults(root, texts):
         yield f"{page}: only {steps} steps found"
 
 
+def file_faults(root, texts):
+    for page, text in texts.items():
+        for number, line in enumerate(text.split("\n"), 1):
+            for name in re.findall(r"`((?:[\w.-]+/)+[\w.-]+\.(?:cpp|hpp|h|c|py|sh|idl|md|svg))`", line):
+                if not (root / name).exists() and not (root / page).parent.joinpath(name).exists():
+                    yield f"{page}:{number}: there is no file {name}"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--write", action="store_true")
@@ -357,6 +366,7 @@ def main():
         faults += named_key_faults(documents.root, documents.texts)
         faults += command_faults(documents.texts)
         faults += walk_faults(documents.root, documents.texts)
+        faults += file_faults(documents.root, documents.texts)
     except ValueError as wrong:
         faults.append(f"a table of keys is not where it is expected: {wrong}")
     print("\n".join(faults), end="\n" if faults else "")
