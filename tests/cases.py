@@ -1,0 +1,210 @@
+#!/usr/bin/env python3
+"""Runs the cases of one test program in as few processes as possible, and names each case that fails.
+
+Usage: cases.py [--share I/N] [--limit SECONDS] [--results FILE] [--retries FILE] [--kind KIND] PROGRAM
+
+One process runs one case after the other. If a case ends the process or exceeds the limit, the case is named, and the
+next process continues with the case after it. If a process fails although none of its cases did (a leak), each of them
+runs again in a process of its own. A process that a case leaves running is a failure, too.
+--share    which cases: each N-th one, from the I-th one on (0 to N-1); GTEST_FILTER chooses among all, as usual
+--results  one line per case: result (passed, failed, skipped or retried), seconds and name, separated by tabs
+--retries  a list of tests that may run a second time if they fail (tests/retries.txt)
+--kind     of the build, for that list: plain, address or thread
+"""
+
+import argparse
+import ctypes
+import os
+import re
+import selectors
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+from expected import Expected
+
+EVENT = re.compile(rb"\[( RUN      |       OK |  FAILED  |  SKIPPED )\] ([\w./]+)")
+RESULTS = {b"       OK ": "passed", b"  FAILED  ": "failed", b"  SKIPPED ": "skipped"}
+PR_SET_PDEATHSIG = 1
+
+
+def list_cases(program):
+    cases, suite = [], ""
+    # A program that is slow to start is one that hangs.
+    said = subprocess.run([program, "--gtest_list_tests"], check=True, capture_output=True, text=True, timeout=120)
+    for line in said.stdout.splitlines():
+        name = line.split("#")[0].rstrip()
+        if name.startswith("  "):
+            cases.append(suite + name.strip())
+        elif name.endswith("."):
+            suite = name
+    return [case for case in cases if "DISABLED_" not in case]
+
+
+def follow_the_parent():
+    os.setsid()
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+
+
+class Run:
+    """One process, and what it has said about its cases."""
+
+    def __init__(self, program, cases, limit):
+        self.cases, self.limit = cases, limit
+        self.results = {}  # case: (result, seconds, output)
+        self.current, self.began = None, time.monotonic()
+        self.output, self.line = [], b""
+        self.trouble = ""
+        with tempfile.NamedTemporaryFile("w", suffix=".flags") as flags:
+            flags.write("--gtest_filter=" + ":".join(cases) + "\n")
+            flags.flush()
+            self.process = subprocess.Popen(
+                [program, "--gtest_flagfile=" + flags.name, "--gtest_brief=0"],
+                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, preexec_fn=follow_the_parent)
+            try:
+                self.watch()
+            finally:
+                self.end_group()
+
+    def watch(self):
+        pipe = self.process.stdout
+        os.set_blocking(pipe.fileno(), False)
+        with selectors.DefaultSelector() as selector:
+            selector.register(pipe, selectors.EVENT_READ)
+            while True:
+                ended = self.process.poll() is not None
+                at_end = False
+                if selector.select(0 if ended else 0.2):
+                    at_end = self.take(pipe)
+                elif ended:
+                    break
+                if at_end:
+                    selector.unregister(pipe)
+                    self.process.wait()
+                    break
+                if time.monotonic() - self.began > self.limit:
+                    self.trouble = f"takes longer than {self.limit} s"
+                    break
+        code = self.process.returncode
+        if not self.trouble and (self.current or code != (1 if self.failed() else 0)):
+            self.trouble = "ended its process " + (f"by signal {-code}" if code < 0 else f"with exit code {code}")
+        if self.current:
+            self.results[self.current] = ("failed", time.monotonic() - self.began, self.text())
+
+    def failed(self):
+        return [case for case, result in self.results.items() if result[0] == "failed"]
+
+    def text(self):
+        return b"".join([*self.output, self.line]).decode(errors="replace")
+
+    def take(self, pipe):
+        """What was written since; true at the end of all that will be."""
+        block = pipe.read(1 << 16)
+        if block == b"":
+            return True
+        *lines, self.line = (self.line + (block or b"")).split(b"\n")
+        for line in lines:
+            self.take_line(line + b"\n")
+        return False
+
+    def take_line(self, line):
+        found = EVENT.search(line)
+        name = found.group(2).decode() if found else ""
+        if found and found.group(1) == b" RUN      " and name in self.cases:
+            self.current, self.began, self.output = name, time.monotonic(), [line]
+            return
+        self.output.append(line)
+        if found and name == self.current and found.group(1) in RESULTS:
+            seconds = time.monotonic() - self.began
+            self.results[name] = (RESULTS[found.group(1)], seconds, self.text())
+            self.current, self.began, self.output = None, time.monotonic(), []
+
+    def end_group(self):
+        """Ends the process and its children. Of one that has ended, none should be left."""
+        children_of = self.process.pid
+        ended_alone = self.process.poll() is not None
+        try:
+            os.killpg(children_of, signal.SIGKILL)
+            if ended_alone and not self.trouble:
+                self.trouble = "left processes running"
+        except ProcessLookupError:
+            pass
+        self.process.wait()
+        self.process.stdout.close()
+
+
+class Share:
+    def __init__(self, program, limit):
+        self.program, self.limit = program, limit
+        self.results = {}
+
+    def run(self, cases):
+        left = list(cases)
+        while left:
+            run = Run(self.program, left, self.limit)
+            self.results.update(run.results)
+            if run.trouble and run.current:
+                print(f"FAILED: {run.current} {run.trouble}")
+            elif run.trouble:
+                sound = [case for case in run.cases if run.results.get(case, ("passed",))[0] != "failed"]
+                print(f"the process {run.trouble}, without a word of which case: each of {len(sound)} runs alone")
+                self.find_the_guilty(sound, run)
+            for case in left if not run.trouble else []:
+                self.results.setdefault(case, ("failed", 0.0, "it did not run"))
+            left = [case for case in left if case not in self.results]
+
+    def find_the_guilty(self, cases, run):
+        guilty = False
+        for case in cases:
+            alone = Run(self.program, [case], self.limit)
+            self.results[case] = alone.results.get(case, ("failed", 0.0, ""))
+            if alone.trouble:
+                guilty = True
+                self.results[case] = ("failed", self.results[case][1], alone.text())
+                print(f"FAILED: {case} {alone.trouble}")
+        if cases and not guilty:
+            print(f"each of them succeeds alone: the last one, {cases[-1]}, stands for them")
+            self.results[cases[-1]] = ("failed", 0.0, run.text())
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--share", default="0/1")
+    parser.add_argument("--limit", type=float, default=180)
+    parser.add_argument("--results")
+    parser.add_argument("--retries")
+    parser.add_argument("--kind", default="plain")
+    parser.add_argument("program")
+    options = parser.parse_args()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+
+    share, of = map(int, options.share.split("/"))
+    cases = list_cases(options.program)[share::of]
+    work = Share(options.program, options.limit)
+    work.run(cases)
+
+    retries = Expected(options.retries, options.kind)
+    for case in [case for case, result in work.results.items() if result[0] == "failed" and retries.reason(case)]:
+        print(f"again: {case}\n{work.results[case][2]}")
+        second = Share(options.program, options.limit)
+        second.run([case])
+        if second.results[case][0] == "passed":
+            work.results[case] = ("retried", *second.results[case][1:])
+
+    if options.results:
+        with open(options.results, "w", encoding="utf-8") as file:
+            for case, (result, seconds, _) in work.results.items():
+                file.write(f"{result}\t{seconds:.3f}\t{case}\n")
+    failed = [case for case, result in work.results.items() if result[0] == "failed"]
+    for case in failed:
+        print(f"---- {case}\n{work.results[case][2]}")
+    for case in failed:
+        print(f"FAILED: {case}")
+    print(f"{len(work.results) - len(failed)} of {len(cases)} cases passed")
+    return 1 if failed or not cases else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,105 @@
+#!/usr/bin/env python3
+"""What a run of the tests leaves behind: processes, files, shared memories, networks and mounts.
+
+Usage: left_behind.py begin FILE   notes what is there already
+       left_behind.py end FILE     prints what has come since; exit code 1 if that is anything
+
+The run's processes inherit PLCHOST_RUN, by which they are found, and TMPDIR, a folder of the run. What another run on the
+same machine makes meanwhile is not counted: its processes have another PLCHOST_RUN, and they hold its memories.
+"""
+
+import json
+import os
+import pathlib
+import sys
+
+SHARED_MEMORY = pathlib.Path("/dev/shm")
+# Names of ours in folders of all.
+FOLDERS = [pathlib.Path(folder) for folder in ("/run", "/var/lib", "/var/log", "/tmp", "/run/netns", "/etc")]
+
+
+def names_in(folder):
+    try:
+        return {entry.name for entry in folder.iterdir()}
+    except OSError:
+        return set()
+
+
+def read(path):
+    try:
+        return path.read_bytes()
+    except OSError:
+        return b""
+
+
+def processes():
+    return [entry for entry in pathlib.Path("/proc").iterdir() if entry.name.isdigit()]
+
+
+def ancestors():
+    """This process and those that wait for it."""
+    found, pid = set(), os.getpid()
+    while pid > 0:
+        found.add(str(pid))
+        pid = int(read(pathlib.Path(f"/proc/{pid}/stat")).rpartition(b")")[2].split()[1] or 0)
+    return found
+
+
+def our_processes(marker):
+    known = ancestors()
+    wanted = b"PLCHOST_RUN=" + marker.encode()
+    for process in processes():
+        if process.name not in known and wanted in read(process / "environ").split(b"\0"):
+            command = read(process / "cmdline").replace(b"\0", b" ").decode(errors="replace").strip()
+            yield f"process {process.name}: {command}"
+
+
+def held_by_others(marker):
+    """The shared memories that processes of another run use."""
+    wanted = b"PLCHOST_RUN=" + marker.encode()
+    held = set()
+    for process in processes():
+        if wanted in read(process / "environ").split(b"\0"):
+            continue
+        for line in read(process / "maps").splitlines():
+            if b" /dev/shm/" in line:
+                held.add(line.split(b" /dev/shm/", 1)[1].decode(errors="replace"))
+    return held
+
+
+def noted():
+    there = {str(folder): sorted(name for name in names_in(folder) if "plc" in name) for folder in FOLDERS}
+    there[str(SHARED_MEMORY)] = sorted(names_in(SHARED_MEMORY))
+    there["links"] = sorted(names_in(pathlib.Path("/sys/class/net")))
+    return there
+
+
+def left(before, marker, folder):
+    yield from our_processes(marker)
+    yield from (f"file {entry}" for entry in sorted(pathlib.Path(folder).rglob("*")))
+    for line in read(pathlib.Path("/proc/self/mounts")).decode(errors="replace").splitlines():
+        if folder in line:
+            yield f"mount {line}"
+    held = held_by_others(marker)
+    for place, now in noted().items():
+        for name in now:
+            inside = os.path.join(place, name)
+            if name not in before[place] and name not in held and inside != folder:
+                yield f"in {place}: {name}"
+
+
+def main():
+    if len(sys.argv) != 3 or sys.argv[1] not in ("begin", "end"):
+        raise SystemExit(__doc__)
+    file = pathlib.Path(sys.argv[2])
+    if sys.argv[1] == "begin":
+        file.write_text(json.dumps(noted()), encoding="utf-8")
+        return 0
+    found = list(left(json.loads(file.read_text(encoding="utf-8")), os.environ["PLCHOST_RUN"], os.environ["TMPDIR"]))
+    for what in found:
+        print(f"left behind: {what}")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
