@@ -7,15 +7,10 @@ pool=plchost-system-$$
 managers=()
 others=()
 
-# A domain that no other test has: above the ports that the kernel gives to clients.
-for domain in $(seq 215 230); do
-  exec {domain_lock}>"${TMPDIR:-/tmp}/plchost-test-domain-$domain.lock"
-  flock -n "$domain_lock" && break
-  exec {domain_lock}>&-
-  domain=
-done
-[ -n "$domain" ] || { echo "no DDS domain is free for this test" >&2; exit 1; }
-export PLCHOST_DOMAIN=$domain
+exec {domain_holder}< <(exec "$(dirname "${BASH_SOURCE[0]}")/hold_domain.py")
+domain_pid=$!
+read -r PLCHOST_DOMAIN <&"$domain_holder" || { rm -rf "$cell"; exit 1; }
+export PLCHOST_DOMAIN
 
 fail() {
   echo "FAILED: $*" >&2
@@ -23,12 +18,16 @@ fail() {
   exit 1
 }
 
+# Instances of a manager that was killed continue to run: only their command lines tell that they belong to this test.
+ours() { grep -lFf <(echo "$cell/") /proc/[0-9]*/cmdline 2>/dev/null | cut -d/ -f3 | grep -vx "$$" || true; }
+
 clean_up() {
   local pid
-  for pid in "${others[@]}"; do kill -KILL "$pid" 2>/dev/null || true; done
+  for pid in "${others[@]}" "$domain_pid"; do kill -KILL "$pid" 2>/dev/null || true; done
   for pid in "${managers[@]}"; do kill -TERM "$pid" 2>/dev/null || true; done
   for pid in "${managers[@]}"; do wait "$pid" 2>/dev/null || true; done
-  rm -rf "$cell"
+  for pid in $(ours); do kill -KILL "$pid" 2>/dev/null || true; done
+  rm -rf "$cell" "/dev/shm/$pool" "/dev/shm/$pool"[-.]*
 }
 trap clean_up EXIT
 
@@ -88,6 +87,10 @@ until_true() {
 is() { [ "$1" = "$2" ]; }
 state_is() { [ "$(instance "$1" state)" = "$2" ]; }
 
+# goes_on TASK: its cycles do
+more_cycles() { [ "$(task "$1" cycles)" -gt "$2" ]; }
+goes_on() { until_true 20 more_cycles "$1" "$(task "$1" cycles)"; }
+
 # refused TEXT COMMAND...: the command fails with exit code 1 and says TEXT
 refused() {
   local text=$1 output code=0
@@ -98,5 +101,13 @@ refused() {
 }
 
 nothing_left() {
-  if ls /dev/shm | grep -q "^$pool"; then fail "left in /dev/shm: $(ls /dev/shm | grep "^$pool")"; fi
+  local left
+  left=$(ls /dev/shm | grep -E "^$pool([-.]|\$)" || true)
+  [ -z "$left" ] || fail "left in /dev/shm: $left"
+  # The API server ends with its manager, but by itself.
+  for _ in $(seq 100); do
+    [ -n "$(ours)" ] || return 0
+    sleep 0.05
+  done
+  fail "processes left: $(ours | xargs -r ps -o pid=,args= -p)"
 }

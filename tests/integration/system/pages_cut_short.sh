@@ -8,10 +8,13 @@ start_manager cell
 until_true 20 state_is line1 running
 pid=$(instance line1 pid)
 
+# The page that tells of its cycles is what is cut: its application says every second how it is.
+reports() { grep -c "application: bottles" "$cell/cell.log"; }
+more_reports() { [ "$(reports)" -ge "$1" ]; }
 for file in instance.line1 transitions.line1; do
-  echo "- $file: the instance goes on"
+  echo "- $file: the cycles of the instance go on"
   truncate -s 0 "/dev/shm/$pool-cell.$file"
-  sleep 1.5
+  until_true 20 more_reports $(($(reports) + 3))
   kill -0 "$pid" || fail "it has ended"
 done
 echo "- host and posts: manager and API server go on"

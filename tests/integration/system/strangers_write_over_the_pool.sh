@@ -9,15 +9,33 @@ start_manager cell
 until_true 20 state_is line1 running
 until_true 20 state_is line2 running
 
+# Where the lists and locks are: the compiler holds the sizes of the parts, and the pool says how many there are of each.
+bounds=$(python3 - "/dev/shm/$pool-cell" "$(dirname "$0")/../../../shm/pool/pool_layout.hpp" <<'PYTHON'
+import re, struct, sys
+with open(sys.argv[2]) as file:
+    sizes = {name: int(size) for name, size in re.findall(r"static_assert\(sizeof\((\w+)\) == (\d+)", file.read())}
+with open(sys.argv[1], "rb") as file:
+    entry, size, objects, buckets, clients, references = struct.unpack("=12xIQIIII", file.read(40))
+ends, end = [], 0
+for part in (sizes["PoolHeader"], clients * sizes["ClientSlot"], references * sizes["ReferenceEntry"], objects * entry, buckets * 4):
+    end += part
+    ends.append(end)
+if entry != sizes["ObjectEntry"] or end != size:
+    sys.exit(f"the pool has another layout: its parts end at {end} of {size}")
+print(*ends[:3])
+PYTHON
+) || fail "where the parts of the pool lie is not known"
+
 # flip SEED: for two seconds, most of it where the lists and locks are
 flip() {
-  python3 - "/dev/shm/$pool-cell" "$1" <<'PYTHON'
+  python3 - "/dev/shm/$pool-cell" "$1" $bounds <<'PYTHON'
 import mmap, random, sys, time
 path, seed = sys.argv[1], int(sys.argv[2])
+header, clients, references = map(int, sys.argv[3:])
 chance = random.Random(seed)
 with open(path, "r+b") as file, mmap.mmap(file.fileno(), 0) as pool:
-    header, clients, references = 704, 512 * 64, 4096
-    hot = [(0, header), (header, header + 512), (header + clients, header + clients + references)]
+    # The first clients and references are those in use.
+    hot = [(0, header), (header, header + 512), (clients, clients + 4096)]
     end, count = time.time() + 2, 0
     while time.time() < end:
         first, last = chance.choice(hot + [(0, len(pool))])
