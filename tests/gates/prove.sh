@@ -8,18 +8,25 @@ plot=$(mktemp -d)
 trap 'rm -rf "$plot"' EXIT
 failed=0
 
-# must_be_red NAME COMMAND...: the command has to fail, and to say so
+# must_be_red NAME DIAGNOSTIC COMMAND...: the command has to fail, and to say DIAGNOSTIC
 must_be_red() {
-  local name=$1
-  shift
+  local name=$1 diagnostic=$2 output
+  shift 2
   if output=$("$@" 2>&1); then
     echo "the gate '$name' did not see the planted fault"
     failed=1
-  elif [ -z "$output" ]; then
-    echo "the gate '$name' failed without a word"
+  elif ! grep -qF -- "$diagnostic" <<<"$output"; then
+    printf "the gate '%s' does not say '%s' but:\n%s\n" "$name" "$diagnostic" "$output"
     failed=1
   fi
 }
+# The proof itself: a gate that fails for another reason, or not at all, proves nothing.
+must_be_red proof "a diagnostic" bash -c 'echo another one; exit 1' >/dev/null
+[ "$failed" -eq 1 ] || { echo "the proof takes any failure for the diagnostic"; exit 1; }
+failed=0
+must_be_red proof "a diagnostic" echo "a diagnostic" >/dev/null
+[ "$failed" -eq 1 ] || { echo "the proof takes a success for a failure"; exit 1; }
+failed=0
 
 new_tree() {
   rm -rf "$plot/tree"
@@ -30,72 +37,72 @@ commit_tree() { git -C "$plot/tree" init -q && git -C "$plot/tree" add -A; }
 
 new_tree
 echo '#include "shm/pool/object_pool.hpp"' >"$plot/tree/schedulers/task.hpp"
-must_be_red layers "$gates/layers.sh" "$plot/tree"
+must_be_red layers "schedulers/task.hpp:1: schedulers may not include shm/pool" "$gates/layers.sh" "$plot/tree"
 
 new_tree
 printf 'int  main( ){return 0;}\n' >"$plot/tree/shm/base/ugly.cpp"
-must_be_red format "$gates/format.sh" "$plot/tree"
+must_be_red format "shm/base/ugly.cpp:1:11: error: code should be clang-formatted" "$gates/format.sh" "$plot/tree"
 
 new_tree
 mkdir "$plot/tree/utilities" && touch "$plot/tree/utilities/x.txt" && commit_tree
-must_be_red "house: top level" "$gates/house.sh" "$plot/tree"
+must_be_red "house: top level" "utilities: not one of the eight entries of the top level" "$gates/house.sh" "$plot/tree"
 new_tree
 seq -f '// %g' 501 >"$plot/tree/shm/base/long.cpp" && commit_tree
-must_be_red "house: long file" "$gates/house.sh" "$plot/tree"
+must_be_red "house: long file" "shm/base/long.cpp: 501 lines" "$gates/house.sh" "$plot/tree"
 new_tree
 echo "// TO""DO" >"$plot/tree/shm/base/later.cpp" && commit_tree
-must_be_red "house: unfinished" "$gates/house.sh" "$plot/tree"
+must_be_red "house: unfinished" "the lines above are unfinished" "$gates/house.sh" "$plot/tree"
 new_tree
 echo '// /ho''me/somebody/x' >"$plot/tree/shm/base/path.cpp" && commit_tree
-must_be_red "house: path" "$gates/house.sh" "$plot/tree"
+must_be_red "house: path" "the lines above name a path of one machine" "$gates/house.sh" "$plot/tree"
 
 new_tree
 echo 'int fd = open(path, O_RDWR | O_CR''EAT);' >"$plot/tree/shm/base/link.cpp" && commit_tree
-must_be_red "house: file through a link" "$gates/house.sh" "$plot/tree"
+must_be_red "house: file through a link" "the lines above make files through links" "$gates/house.sh" "$plot/tree"
 new_tree
 echo 'std::copy_n(name, n, address.sun_path + 1);' >"$plot/tree/shm/base/name.cpp" && commit_tree
-must_be_red "house: abstract socket" "$gates/house.sh" "$plot/tree"
+must_be_red "house: abstract socket" "the lines above use names that anybody can take" "$gates/house.sh" "$plot/tree"
 new_tree
 echo 'void f() { dds_unregister_ins''tance(1, nullptr); }' >"$plot/tree/shm/base/leak.cpp" && commit_tree
-must_be_red "house: leaked instance" "$gates/house.sh" "$plot/tree"
+must_be_red "house: leaked instance" "the lines above leak" "$gates/house.sh" "$plot/tree"
 
-# plant_in_contract NAME EXPRESSION [--write]: the contract with that change (of sed), and with a reference made anew
+# plant_in_contract NAME DIAGNOSTIC EXPRESSION [--write]: the contract with that change (of sed), and with a reference made anew
 plant_in_contract() {
   new_tree
   cp api/control.idl api/reference.md "$plot/tree/api/"
-  sed -i -E "$2" "$plot/tree/api/control.idl"
+  sed -i -E "$3" "$plot/tree/api/control.idl"
   cmp -s api/control.idl "$plot/tree/api/control.idl" && { echo "nothing was planted for '$1'"; failed=1; }
-  [ "${3:-}" != --write ] || api/reference.py --root "$plot/tree/api" --write >/dev/null || true
-  must_be_red "$1" "$gates/contract.sh" "$plot/tree"
+  [ "${4:-}" != --write ] || api/reference.py --root "$plot/tree/api" --write >/dev/null || true
+  must_be_red "$1" "$2" "$gates/contract.sh" "$plot/tree"
 }
-plant_in_contract "contract: old reference" 's,// of plchost-dds,// of the server,'
-plant_in_contract "contract: no comment" 's,^( *long pid;) *// of plchost-dds,\1,'
-plant_in_contract "contract: no QoS" '/qos: as ObjectPage/d'
-plant_in_contract "contract: text without a bound" 's/string<191> reason/string reason/'
-plant_in_contract "contract: version 1 has another type" 's/string<191> reason/string<192> reason/' --write
-plant_in_contract "contract: version 1 has another member" 's/unsigned long credits;/unsigned long credit;/' --write
-plant_in_contract "contract: version 1 has one more member" 's,^( *)unsigned long credits;.*,&\n\1long more; // more,' --write
-plant_in_contract "contract: version 1 has another code" 's/(OPERATION_STOP +=) 2;/\1 102;/' --write
-plant_in_contract "contract: version 1 has another topic" 's,topic: plc/v1/reply,topic: plc/v1/answer,' --write
+plant_in_contract "contract: old reference" "the reference is not up to date" 's,// of plchost-dds,// of the server,'
+plant_in_contract "contract: no comment" "Presence.pid has no comment" 's,^( *long pid;) *// of plchost-dds,\1,'
+plant_in_contract "contract: no QoS" "LogPage has no 'qos:'" '/qos: as ObjectPage/d'
+plant_in_contract "contract: text without a bound" "Transition.reason has no bound" 's/string<191> reason/string reason/'
+plant_in_contract "contract: version 1 has another type" "member string<191> reason is now string<192> reason" 's/string<191> reason/string<192> reason/' --write
+plant_in_contract "contract: version 1 has another member" "member unsigned long credits is now unsigned long credit" 's/unsigned long credits;/unsigned long credit;/' --write
+plant_in_contract "contract: version 1 has one more member" "type EventAck: member sequence<KeyValue, 16> ext is now long more" 's,^( *)unsigned long credits;.*,&\n\1long more; // more,' --write
+plant_in_contract "contract: version 1 has another code" "constant OPERATION_STOP = 2 is not what it was" 's/(OPERATION_STOP +=) 2;/\1 102;/' --write
+plant_in_contract "contract: version 1 has another topic" "type Reply is of topic plc/v1/answer, was of plc/v1/reply" 's,topic: plc/v1/reply,topic: plc/v1/answer,' --write
 
-# plant_in_picture NAME FILE EXPRESSION: that picture with that change (of sed)
+# plant_in_picture NAME DIAGNOSTIC FILE EXPRESSION: that picture with that change (of sed)
 plant_in_picture() {
   new_tree
-  sed -E "$3" "$2" >"$plot/tree/manager/planted.svg"
-  cmp -s "$2" "$plot/tree/manager/planted.svg" && { echo "nothing was planted for '$1'"; failed=1; }
+  sed -E "$4" "$3" >"$plot/tree/manager/planted.svg"
+  cmp -s "$3" "$plot/tree/manager/planted.svg" && { echo "nothing was planted for '$1'"; failed=1; }
   commit_tree
-  must_be_red "$1" "$gates/pictures.py" "$plot/tree"
+  must_be_red "$1" "$2" "$gates/pictures.py" "$plot/tree"
 }
-plant_in_picture "pictures: text wider than its box" manager/system.svg 's,woken early,& by its own guard,'
-plant_in_picture "pictures: texts on each other" manager/system.svg 's,(<text [^>]*y=")70(">plchostd),\194\2,'
-plant_in_picture "pictures: a line crosses a text" manager/system.svg 's,L966\,390,L966\,405,; s,L80\,390,L80\,405,'
-plant_in_picture "pictures: no arrow" manager/system.svg '/M(400\,390|435|470)/d'
-plant_in_picture "pictures: hidden arrow" manager/system.svg '/class="core".*y="422"/d; s,</svg>,<rect class="core" x="40" y="422" width="284" height="166"/>&,'
-plant_in_picture "pictures: no background" manager/system.svg '/<rect width="1000" height="650"/d'
-plant_in_picture "pictures: no general font" manager/system.svg 's/Arial, sans-serif/Arial/'
-plant_in_picture "pictures: axis without a title" tests/bench/cyclic.svg '/class="axis" transform/d'
-plant_in_picture "pictures: curves that only colours tell" tests/bench/corun.svg 's,m-3.6[^"]*,m-4\,0 a4\,4 0 1\,0 8\,0 a4\,4 0 1\,0 -8\,0,'
-plant_in_picture "pictures: outside of the picture" tests/bench/cyclic.svg 's/Start latency of/& each single cycle, one after the other, of this and of that task, and of/'
+plant_in_picture "pictures: text wider than its box" "spins to its time' crosses the edge of a box" manager/system.svg 's,woken early,& by its own guard,'
+plant_in_picture "pictures: texts on each other" "lie on each other" manager/system.svg 's,(<text [^>]*y=")70(">plchostd),\194\2,'
+plant_in_picture "pictures: a line crosses a text" "a line crosses 'plchostd spawns each of them'" manager/system.svg 's,L966\,390,L966\,405,; s,L80\,390,L80\,405,'
+plant_in_picture "pictures: no arrow" "the process at 374,456 has no arrow" manager/system.svg '/M(400\,390|435|470)/d'
+plant_in_picture "pictures: hidden arrow" "a box hides an end of the arrow M115,331 L115,454" manager/system.svg '/class="core".*y="422"/d; s,</svg>,<rect class="core" x="40" y="422" width="284" height="166"/>&,'
+plant_in_picture "pictures: no background" "no rectangle of a colour lies behind everything" manager/system.svg '/<rect width="1000" height="650"/d'
+plant_in_picture "pictures: no general font" "do not end with sans-serif" manager/system.svg 's/Arial, sans-serif/Arial/'
+plant_in_picture "pictures: axis without a title" "an axis has no title" tests/bench/cyclic.svg '/class="axis" transform/d'
+plant_in_picture "pictures: curves that only colours tell" "6 kinds of curves, 6 lines of legend, 4 shapes" tests/bench/corun.svg 's,m-3.6[^"]*,m-4\,0 a4\,4 0 1\,0 8\,0 a4\,4 0 1\,0 -8\,0,'
+plant_in_picture "pictures: outside of the picture" "does not fit into the picture" tests/bench/cyclic.svg 's/Start latency of/& each single cycle, one after the other, of this and of that task, and of/'
 
 # plant_in_documents NAME DIAGNOSTIC FILE EXPRESSION: the whole tree, one file of it with that change (of sed)
 new_tree
@@ -103,8 +110,7 @@ git ls-files -z -c -o --exclude-standard | xargs -0 cp --parents -t "$plot/tree"
 plant_in_documents() {
   sed -i -E "$4" "$plot/tree/$3"
   cmp -s "$3" "$plot/tree/$3" && { echo "nothing was planted for '$1'"; failed=1; }
-  must_be_red "$1" "$gates/documents.py" "$plot/tree"
-  grep -qF "$2" <<<"$output" || { echo "the gate '$1' does not say '$2'"; failed=1; }
+  must_be_red "$1" "$2" "$gates/documents.py" "$plot/tree"
   cp "$3" "$plot/tree/$3"
 }
 "$gates/documents.py" "$plot/tree" || { echo "the documents do not pass their gate"; failed=1; }
@@ -128,7 +134,10 @@ plant_in_documents "documents: step of a walk that the code lacks" "has no funct
 
 new_tree
 echo 'int planted(int* p) { return p == 0 ? 1 : 2; }' >"$plot/tree/shm/base/planted.cpp"
-must_be_red clang-tidy clang-tidy-19 --quiet "$plot/tree/shm/base/planted.cpp" -- -std=c++23
+mkdir "$plot/tidy"
+echo '[{"directory": "'"$plot"'", "command": "g++ -std=c++23 -c '"$plot"'/tree/shm/base/planted.cpp",
+  "file": "'"$plot"'/tree/shm/base/planted.cpp"}]' >"$plot/tidy/compile_commands.json"
+must_be_red clang-tidy "modernize-use-nullptr" "$gates/tidy.sh" "$plot/tidy"
 
 cat >"$plot/CMakeLists.txt" <<EOF
 cmake_minimum_required(VERSION 3.25)
@@ -137,19 +146,19 @@ set(CMAKE_CXX_STANDARD 23)
 include($PWD/.cmake/targets.cmake)
 plchost_program(planted SOURCES planted.cpp)
 EOF
-# build_planted SANITIZERS: builds planted.cpp with the project's own flags and runs it
+# build_planted COMPILER SANITIZERS: builds planted.cpp with the project's own flags and runs it
 build_planted() {
   rm -rf "$plot/build"
-  cmake -S "$plot" -B "$plot/build" -DSANITIZER="$1" >/dev/null && cmake --build "$plot/build" 2>&1 && "$plot/build/planted" 2>&1
+  cmake -S "$plot" -B "$plot/build" -DCMAKE_CXX_COMPILER="$1" -DSANITIZER="$2" >/dev/null && cmake --build "$plot/build" 2>&1 && "$plot/build/planted" 2>&1
 }
 echo 'int main() { return 0; }' >"$plot/planted.cpp"
-build_planted "" >/dev/null || { echo "a clean program does not pass the gates"; failed=1; }
+build_planted g++ "" >/dev/null || { echo "a clean program does not pass the gates"; failed=1; }
 echo 'int main() { int unused; return 0; }' >"$plot/planted.cpp"
-must_be_red "compiler warnings" build_planted ""
+must_be_red "compiler warnings" "unused variable" build_planted g++ ""
 echo 'int main(int n, char**) { int* p = new int[4]; p[n + 3] = 1; const int r = p[n + 3]; delete[] p; return r - 1; }' >"$plot/planted.cpp"
-must_be_red "address sanitizer" build_planted "address;undefined"
+must_be_red "address sanitizer" "AddressSanitizer: heap-buffer-overflow" build_planted clang++-19 "address;undefined"
 echo 'int main(int n, char**) { int big = 2147483647; big += n; return big == 0 ? 1 : 0; }' >"$plot/planted.cpp"
-must_be_red "undefined sanitizer" build_planted "address;undefined"
+must_be_red "undefined sanitizer" "signed integer overflow" build_planted clang++-19 "address;undefined"
 cat >"$plot/planted.cpp" <<'EOF'
 #include <thread>
 int shared = 0;
@@ -160,5 +169,30 @@ int main() {
   return 0;
 }
 EOF
-must_be_red "thread sanitizer" build_planted "thread"
+must_be_red "thread sanitizer" "ThreadSanitizer: data race" build_planted clang++-19 "thread"
+
+# left_behind: the last step of a run, with a run directory of its own
+export PLCHOST_RUN=planted-$$ TMPDIR=$plot/run
+mkdir "$TMPDIR"
+left_behind() { tests/left_behind.py end "$plot/before"; }
+tests/left_behind.py begin "$plot/before"
+left_behind || { echo "something is left behind where nothing was made"; failed=1; }
+sleep 60 &
+must_be_red "left behind: a process" "process $!: sleep 60" left_behind
+kill "$!"
+wait "$!" 2>/dev/null
+touch "$TMPDIR/planted"
+must_be_red "left behind: a file" "file $TMPDIR/planted" left_behind
+rm "$TMPDIR/planted"
+touch "/dev/shm/plchost-planted-$$"
+must_be_red "left behind: a shared memory" "in /dev/shm: plchost-planted-$$" left_behind
+rm "/dev/shm/plchost-planted-$$"
+
+# The lists of tests that may be skipped or run again: what is on none of them is told.
+echo 'thread Planted.* planted' >"$plot/list"
+reason() { PYTHONPATH=tests python3 -c 'import expected, sys; sys.exit(expected.Expected(sys.argv[1], sys.argv[2]).reason(sys.argv[3]))' "$plot/list" "$@"; }
+must_be_red "expected tests" "planted" reason thread Planted.Case
+for other in "plain Planted.Case" "address Planted.Case" "thread Other.Case"; do
+  reason $other || { echo "the list of expected tests takes '$other'"; failed=1; }
+done
 exit $failed
