@@ -16,15 +16,57 @@
 
 namespace plchost {
 
-ApiServer::ApiServer(Reactor& reactor, const ManagerConfig& config, std::string program)
+namespace {
+
+constexpr Duration kRenewLook = std::chrono::milliseconds(50);
+// An answer that has left the manager is on its way to the client for 0.3 s at most.
+constexpr int kQuietLooks = 6;
+constexpr Duration kEndLimit = std::chrono::seconds(2);  // of a process that was asked to end
+
+}  // namespace
+
+ApiServer::ApiServer(Reactor& reactor, const ManagerConfig& config, std::string program,
+                     std::function<bool()> is_asked)
     : reactor_(reactor),
       config_(config),
       program_(std::move(program)),
+      is_asked_(std::move(is_asked)),
       timer_(reactor, [this] { on_timer(); }),
-      beat_timer_(reactor, [this] { look_at_beats(); }) {}
+      beat_timer_(reactor, [this] { look_at_beats(); }),
+      renew_timer_(reactor, [this] { look_whether_answered(); }) {}
 
 void ApiServer::start() {
-  spawn();
+  if (config_.dds.enabled) spawn();
+}
+
+void ApiServer::renew() {
+  const TimePoint now = MonotonicClock::now();
+  renew_until_ = now + kRenewLimit;
+  quiet_looks_ = 0;
+  renew_timer_.set(now + kRenewLook);
+}
+
+void ApiServer::look_whether_answered() {
+  const TimePoint now = MonotonicClock::now();
+  quiet_looks_ = is_asked_() ? 0 : quiet_looks_ + 1;
+  if (quiet_looks_ < kQuietLooks && now < renew_until_) return renew_timer_.set(now + kRenewLook);
+  begin_anew();
+}
+
+void ApiServer::begin_anew() {
+  const bool same_network = network_ == config_.dds && domain_ == config_.host.dds_domain;
+  if (!same_network) {  // where another host may have the name
+    name_since_ns_ = 0;
+    name_held_ = false;
+  }
+  delay_ = name_delay_ = Duration::zero();
+  timer_.cancel();
+  if (!process_) return start();
+  spdlog::info("API server: ends, because its configuration has changed");
+  renewing_ = true;
+  beat_timer_.cancel();
+  (void)signal_process(*process_, SIGTERM);
+  timer_.set(MonotonicClock::now() + kEndLimit);
 }
 
 std::vector<std::string> ApiServer::arguments() const {
@@ -79,6 +121,8 @@ std::vector<std::string> ApiServer::arguments() const {
 }
 
 void ApiServer::spawn() {
+  network_ = config_.dds;
+  domain_ = config_.host.dds_domain;
   spawned_ = MonotonicClock::now();
   if (name_since_ns_ == 0) name_since_ns_ = unix_time_ns();
   beats_.reset(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
@@ -110,6 +154,7 @@ void ApiServer::ended() {
   timer_.cancel();
   beat_timer_.cancel();
   if (shut_down_) return std::exchange(shut_down_, nullptr)();
+  if (std::exchange(renewing_, false)) return start();
   const TimePoint now = MonotonicClock::now();
   if (status.exited_with(kExitNameTaken)) return name_is_taken(now);
   const bool served = has_served();
@@ -134,13 +179,13 @@ void ApiServer::name_is_taken(TimePoint now) {
 }
 
 void ApiServer::on_timer() {
-  if (!shut_down_ && process_) {  // and was not refused the name
+  if (!shut_down_ && !renewing_ && process_) {  // and was not refused the name
     spdlog::info("API server: the name '{}' is this host's now", config_.host.name);
     notify_service_manager("STATUS=");
     name_delay_ = Duration::zero();
     return;
   }
-  if (!shut_down_) return spawn();
+  if (!shut_down_ && !renewing_) return start();
   spdlog::warn("API server: does not end; it is killed");
   if (process_) (void)signal_process(*process_, SIGKILL);
 }
@@ -167,11 +212,11 @@ void ApiServer::look_at_beats() {
 void ApiServer::shut_down(std::function<void()> done) {
   timer_.cancel();
   beat_timer_.cancel();
+  renew_timer_.cancel();
   if (!process_) return done();
   shut_down_ = std::move(done);
   (void)signal_process(*process_, SIGTERM);
-  constexpr Duration kLimit = std::chrono::seconds(2);
-  timer_.set(MonotonicClock::now() + kLimit);
+  timer_.set(MonotonicClock::now() + kEndLimit);
 }
 
 }  // namespace plchost

@@ -19,9 +19,19 @@ namespace plchost {
 /// only, to see whether it still has.
 class ApiServer {
  public:
-  ApiServer(Reactor& reactor, const ManagerConfig& config, std::string program);
+  /// `is_asked`: a command that came over it is not answered yet. All outlive it.
+  ApiServer(Reactor& reactor, const ManagerConfig& config, std::string program,
+            std::function<bool()> is_asked);
 
+  /// If the configuration has enabled it.
   void start();
+  /// The configuration is another one: ends the process and starts one with that, when commands are answered,
+  /// kRenewLimit later at most.
+  void renew();
+  /// Nothing: there is none.
+  [[nodiscard]] std::optional<int> process() const {
+    return process_ ? std::optional(process_->pid) : std::nullopt;
+  }
   /// SIGTERM, SIGKILL after a limit; `done` when it is gone, possibly at once.
   void shut_down(std::function<void()> done);
 
@@ -30,6 +40,8 @@ class ApiServer {
   void ended();
   void on_timer();
   void name_is_taken(TimePoint now);
+  void look_whether_answered();
+  void begin_anew();
   void look_at_beats();
   /// Whether it has beaten since the last look.
   [[nodiscard]] bool beats_since() const;
@@ -39,6 +51,7 @@ class ApiServer {
   Reactor& reactor_;
   const ManagerConfig& config_;
   std::string program_;
+  std::function<bool()> is_asked_;
   std::optional<ChildProcess> process_;
   Reactor::Watch exit_watch_;
   Reactor::Timer timer_;
@@ -51,12 +64,21 @@ class ApiServer {
   std::int64_t name_since_ns_ = 0;  ///< 0: nobody has asked for the name yet
   bool name_held_ = false;          ///< a server that has ended had it
   Duration name_delay_{};           ///< not 0: another host has the name
+  Reactor::Timer renew_timer_;
+  TimePoint renew_until_{};
+  int quiet_looks_ = 0;    ///< of look_whether_answered(), in a row
+  bool renewing_ = false;  ///< the process was asked to end, and another one follows
+  /// Of the network that the last server was started for.
+  DdsConfig network_;
+  int domain_ = 0;
   std::function<void()> shut_down_;
 };
 
 /// Of the second and later restarts in a row: doubles from the first to the second.
 inline constexpr Duration kApiRestartDelay = std::chrono::milliseconds(100);
 inline constexpr Duration kApiRestartDelayMax = std::chrono::seconds(5);
+/// A changed configuration waits so long at most for the answers of commands.
+inline constexpr Duration kRenewLimit = std::chrono::seconds(45);
 /// Whose loop stands still for so long is killed. It beats every 25 ms.
 inline constexpr Duration kApiSilence = std::chrono::seconds(10);
 /// So long may its start take: it may have to wait for the end of the one before, and for its name.

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "api/security/identity.hpp"
+#include "manager/config/config_changes.hpp"
 #include "manager/config/load_config.hpp"
 #include "manager/manager.hpp"
 #include "manager/store/store_application.hpp"
@@ -47,6 +48,10 @@ void describe(CLI::App& app, Options& options) {
       ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error"}));
   app.add_option("--programs", options.programs,
                  "Folder of plc-instance and plchost-dds; default: that of plchostd");
+  std::string footer =
+      "A changed key of the configuration, after 'systemctl reload', SIGHUP or 'plcctl reload host':\n";
+  for (const std::string& row : key_table()) footer += fmt::format("  {}\n", row);
+  app.footer(footer);
 }
 
 std::vector<std::string> option_names(const CLI::App& app) {

@@ -90,7 +90,8 @@ Manager::Manager(const ManagerConfig& config, Options options, LockFile lock,
       lock_(std::move(lock)),
       reactor_(std::move(reactor)),
       wish_writer_(*reactor_, "/proc/self/exe"),
-      api_server_(*reactor_, config, options_.programs + "/plchost-dds"),
+      api_server_(*reactor_, config_, options_.programs + "/plchost-dds",
+                  [this] { return command_server_ && command_server_->waits_for_answers(); }),
       tick_(*reactor_, [this] { tick(); }) {}
 
 Result<std::unique_ptr<Manager>> Manager::create(const ManagerConfig& config, Options options) {
@@ -131,7 +132,9 @@ Result<void> Manager::set_up() {
   if (auto ours = check_pool_owner(host.pool, *rights); !ours) return ours;
   auto pool = ObjectPool::create(host.pool, {.max_objects = host.pool_objects, .rights = *rights});
   if (!pool) return std::unexpected(pool.error());
-  renew_pool_rights(host.pool, *rights);
+  if (auto renewed = renew_pool_rights(host.pool, *rights); !renewed) {
+    spdlog::warn("{}", renewed.error().describe());
+  }
   pool_ = std::move(*pool);
   auto page = HostPageWriter::create(host.pool);
   if (!page) return std::unexpected(page.error());
@@ -175,7 +178,7 @@ Supervisor::HostedInstance Manager::make_host(const InstanceConfig& instance) {
       StoreProcess::Settings{
           .pool = own.pool,
           .folder = versions_folder(applications_folder(own.state_directory, own.name), instance.name),
-          .keep = own.application_versions,
+          .keep = [&own] { return own.application_versions; },
           .helper = "/proc/self/exe",
           .plc_instance = plc_instance});
   auto wishes =
@@ -242,7 +245,7 @@ Result<void> Manager::run() {
   adopt_removed();
   warn_of_strangers(config_.host.run_directory, supervisor_->configs());
   supervisor_->start();
-  if (config_.dds.enabled) api_server_.start();
+  api_server_.start();
   tick_.set(MonotonicClock::now() + kTick);
   notify_service_manager("READY=1");
   log_findings(check_host(this_host(config_)));

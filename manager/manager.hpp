@@ -56,6 +56,9 @@ class Manager {
   [[nodiscard]] Supervisor::HostedInstance make_host(const InstanceConfig& instance);
   void adopt_removed();
   [[nodiscard]] Result<std::vector<std::string>> reload();
+  void take_over_host(const ManagerConfig& now, std::vector<std::string>& lines);
+  void use_housekeeping_cores(std::vector<std::string>& lines) const;
+  void use_pool_rights(std::vector<std::string>& lines) const;
   void forget(std::size_t place, const InstanceConfig& instance);
   void remove_pages(const std::string& instance) const;
   void write_host();

@@ -9,8 +9,10 @@
 
 #include "manager/config/config_changes.hpp"
 #include "manager/manager.hpp"
+#include "manager/pool_rights.hpp"
 #include "manager/store/wish_memory.hpp"
 #include "shm/base/log.hpp"
+#include "shm/base/thread.hpp"
 #include "shm/pool/instance_page.hpp"
 #include "shm/pool/log_ring.hpp"
 
@@ -48,18 +50,51 @@ Result<std::vector<std::string>> Manager::reload() {
     transitions_.emplace(instance.name, *std::move(ring));
   }
   std::vector<std::string> lines;
-  for (const KeyChange& change : changed_keys(config_, now)) {
-    const bool live = change.when == TakesEffect::at_once;
-    lines.push_back(
-        fmt::format("{} changed{}", change.key, live ? "" : ", used when plchostd starts the next time"));
-  }
-  config_.host.cores = now.host.cores;
-  config_.host.log_level = now.host.log_level;
-  config_.host.keep_pool = now.host.keep_pool;
-  spdlog::set_level(spdlog::level::from_str(config_.host.log_level));
+  take_over_host(now, lines);
   config_.instances = std::move(now.instances);
   std::ranges::move(supervisor_->reload(config_.instances), std::back_inserter(lines));
   return lines;
+}
+
+// One line for each key that is another one, or waits since an earlier reload.
+void Manager::take_over_host(const ManagerConfig& now, std::vector<std::string>& lines) {
+  const bool served = config_.dds.enabled;
+  const auto changes = changed_keys(config_, now);
+  for (const KeyChange& change : changes) {
+    std::string_view effect = describe(change.when);
+    if (change.when == TakesEffect::new_server && !now.dds.enabled) {
+      effect = served ? "used at once; plchost-dds ends" : describe(TakesEffect::at_once);
+    }
+    lines.push_back(change_text(change.key, effect, change.why));
+  }
+  plchost::take_over(config_, now);
+  spdlog::set_level(spdlog::level::from_str(config_.host.log_level));
+  supervisor_->use_log_level();
+  const auto has_changed = [&](std::string_view key) {
+    return std::ranges::any_of(changes, [&](const KeyChange& change) { return change.key.starts_with(key); });
+  };
+  if (has_changed("[host] housekeeping_cores")) use_housekeeping_cores(lines);
+  if (has_changed("[host] pool_")) use_pool_rights(lines);
+  const bool served_anew =
+      std::ranges::find(changes, TakesEffect::new_server, &KeyChange::when) != changes.end();
+  if (served_anew) api_server_.renew();
+}
+
+void Manager::use_housekeeping_cores(std::vector<std::string>& lines) const {
+  constexpr int kSelf = 0;
+  for (const std::optional<int> process :
+       {std::optional(kSelf), api_server_.process(), wish_writer_.process()}) {
+    if (!process) continue;
+    const auto bound = bind_process_to_cores(*process, config_.host.housekeeping_cores);
+    if (!bound) lines.push_back(failure_in("[host] housekeeping_cores", bound.error()).error().describe());
+  }
+}
+
+void Manager::use_pool_rights(std::vector<std::string>& lines) const {
+  const auto rights = pool_rights(config_.host);
+  const auto renewed =
+      rights ? renew_pool_rights(config_.host.pool, *rights) : std::unexpected(rights.error());
+  if (!renewed) lines.push_back(renewed.error().describe());
 }
 
 // Values that it has kept in memory and not written to a file stay for the end of this manager.

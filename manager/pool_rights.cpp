@@ -1,7 +1,6 @@
 #include "manager/pool_rights.hpp"
 
 #include <cerrno>
-#include <cstring>
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -67,24 +66,23 @@ void clear_names(const std::string& pool, const MemoryRights& rights) {
   }
 }
 
-void renew_pool_rights(const std::string& pool, const MemoryRights& rights) {
+Result<void> renew_pool_rights(const std::string& pool, const MemoryRights& rights) {
   const std::string path = MemoryFile::path(pool);
   const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
   struct stat before{};
   if (!fd || ::fstat(fd.get(), &before) != 0) {
-    spdlog::warn("the rights of pool '{}' are not known: {}", pool, std::strerror(errno));
-    return;
+    return failure(ErrorCode::system, fmt::format("look at the rights of pool '{}'", pool), errno);
   }
-  if (has(before, rights)) return;
+  if (has(before, rights)) return {};
   const std::string had = describe_rights(before.st_uid, before.st_gid, before.st_mode);
   if (const auto given = give_rights(fd.get(), rights, path); !given) {
-    spdlog::warn("pool '{}' was there already and keeps {}: {}", pool, had, given.error().describe());
-    return;
+    return failure_in(fmt::format("pool '{}' keeps {}", pool, had), given.error());
   }
   struct stat now{};
-  if (::fstat(fd.get(), &now) != 0) return;
-  spdlog::info("pool '{}' was there already with {}; it has {} now", pool, had,
+  if (::fstat(fd.get(), &now) != 0) return {};
+  spdlog::info("pool '{}' had {}; it has {} now", pool, had,
                describe_rights(now.st_uid, now.st_gid, now.st_mode));
+  return {};
 }
 
 }  // namespace plchost

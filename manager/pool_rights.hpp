@@ -19,8 +19,9 @@ namespace plchost {
 /// cannot.
 void clear_names(const std::string& pool, const MemoryRights& rights);
 
-/// A pool that was there before this manager may have other rights than its configuration says: gives it
-/// those, and logs that, or why it cannot. Who has it mapped keeps it.
-void renew_pool_rights(const std::string& pool, const MemoryRights& rights);
+/// Gives a pool that is there the rights that the configuration says, and logs that. What is in it already
+/// keeps its rights; a process that has it mapped keeps it. refused, system: the pool keeps the rights it
+/// has.
+[[nodiscard]] Result<void> renew_pool_rights(const std::string& pool, const MemoryRights& rights);
 
 }  // namespace plchost

@@ -104,6 +104,7 @@ class Instance {
                                                    const InstanceSocket::Asker& asker);
   [[nodiscard]] Result<std::string> obey(const ControlRequest& request);
   [[nodiscard]] Result<std::string> set_scheduler(const std::string& name);
+  [[nodiscard]] static Result<std::string> set_log_level(const std::string& name);
   [[nodiscard]] Result<std::string> change_registration(const ControlRequest& request);
   [[nodiscard]] Result<std::string> reset_statistics(const std::string& task);
   [[nodiscard]] std::string status() const;

@@ -8,6 +8,8 @@
 #include "instances/runtime/instance.hpp"
 #include "instances/runtime/tasks/operator_events.hpp"
 #include "shm/base/log.hpp"
+#include "shm/base/log_levels.hpp"
+#include "shm/base/names.hpp"
 
 namespace plchost {
 
@@ -70,6 +72,8 @@ Result<std::string> Instance::obey(const ControlRequest& request) {
       return {};
     case ControlVerb::status:
       return status();
+    case ControlVerb::set_log_level:
+      return set_log_level(request.argument);
     case ControlVerb::reset:
     case ControlVerb::reset_cold:
     case ControlVerb::restart:
@@ -97,6 +101,15 @@ Result<std::string> Instance::set_scheduler(const std::string& name) {
     }
   }
   scheduler_ = name;
+  return {};
+}
+
+Result<std::string> Instance::set_log_level(const std::string& name) {
+  if (!is_log_level(name)) {
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("no log level '{}'; there are {}", shown(name), join_names(kLogLevels)));
+  }
+  spdlog::set_level(spdlog::level::from_str(name));
   return {};
 }
 

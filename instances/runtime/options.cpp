@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "schedulers/scheduler.hpp"
+#include "shm/base/log_levels.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
@@ -23,9 +24,6 @@ constexpr std::array kBands = {
     std::pair{std::string_view("normal"), PriorityBand::normal},
     std::pair{std::string_view("low"), PriorityBand::low},
 };
-constexpr std::array kLogLevels = {std::string_view("trace"), std::string_view("debug"),
-                                   std::string_view("info"), std::string_view("warning"),
-                                   std::string_view("error")};
 constexpr int kMaxCore = 1023;
 
 // In CLI11 a validator returns the text of what is wrong, or nothing.
@@ -52,8 +50,8 @@ std::string check_band(const std::string& name) {
 }
 
 std::string check_log_level(const std::string& name) {
-  const bool known = std::ranges::find(kLogLevels, name) != kLogLevels.end();
-  return known ? std::string() : fmt::format("'{}' is no log level: {} are", name, join_names(kLogLevels));
+  return is_log_level(name) ? std::string()
+                            : fmt::format("'{}' is no log level: {} are", name, join_names(kLogLevels));
 }
 
 // An empty one, of a variable of the shell that is not set, would start an instance.

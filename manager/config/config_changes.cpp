@@ -1,103 +1,209 @@
 #include "manager/config/config_changes.hpp"
 
-#include <utility>
+#include <array>
+#include <cstddef>
+
+#include <fmt/format.h>
 
 namespace plchost {
 
 namespace {
 
-// Collects the keys whose values differ.
-class KeyChanges {
- public:
-  explicit KeyChanges(std::string section) : section_(std::move(section)) {}
-
-  template <class Value>
-  void compare(const char* key, TakesEffect when, const Value& before, const Value& now) {
-    if (!(before == now)) all_.push_back({.key = section_ + key, .when = when});
-  }
-  [[nodiscard]] std::vector<KeyChange> take() { return std::move(all_); }
-
- private:
-  std::string section_;
-  std::vector<KeyChange> all_;
+// Stands for any member of an aggregate, to count them.
+struct AnyMember {
+  template <class Member>
+  operator Member() const;  // NOLINT: implicit on purpose, and never defined
 };
 
-// In each function the binding names all members, so that a new one does not compile without its row.
-
-std::vector<KeyChange> changed_host(const HostConfig& before, const HostConfig& now) {
-  const auto& [name, labels, domain, run_directory, state_directory, limit, versions, pool, objects, owner,
-               group, mode, cores, housekeeping, log_level, keep_pool] = before;
-  KeyChanges changes("[host] ");
-  changes.compare("name", TakesEffect::next_manager, name, now.name);
-  changes.compare("labels", TakesEffect::next_manager, labels, now.labels);
-  changes.compare("dds_domain", TakesEffect::next_manager, domain, now.dds_domain);
-  changes.compare("run_directory", TakesEffect::next_manager, run_directory, now.run_directory);
-  changes.compare("state_directory", TakesEffect::next_manager, state_directory, now.state_directory);
-  changes.compare("application_limit_mib", TakesEffect::next_manager, limit, now.application_limit_mib);
-  changes.compare("application_versions", TakesEffect::next_manager, versions, now.application_versions);
-  changes.compare("pool", TakesEffect::next_manager, pool, now.pool);
-  changes.compare("pool_objects", TakesEffect::next_manager, objects, now.pool_objects);
-  changes.compare("pool_owner", TakesEffect::next_manager, owner, now.pool_owner);
-  changes.compare("pool_group", TakesEffect::next_manager, group, now.pool_group);
-  changes.compare("pool_mode", TakesEffect::next_manager, mode, now.pool_mode);
-  changes.compare("cores", TakesEffect::at_once, cores, now.cores);
-  changes.compare("housekeeping_cores", TakesEffect::next_manager, housekeeping, now.housekeeping_cores);
-  changes.compare("log_level", TakesEffect::at_once, log_level, now.log_level);
-  changes.compare("keep_pool", TakesEffect::at_once, keep_pool, now.keep_pool);
-  return changes.take();
+template <class Config, class... Members>
+consteval std::size_t count_members() {
+  if constexpr (requires { Config{Members{}..., AnyMember{}}; }) {
+    return count_members<Config, Members..., AnyMember>();
+  } else {
+    return sizeof...(Members);
+  }
 }
 
-std::vector<KeyChange> changed_dds(const DdsConfig& before, const DdsConfig& now) {
-  const auto& [enabled, interface, peers, multicast, identity, allow_unsecured] = before;
-  KeyChanges changes("[dds] ");
-  changes.compare("enabled", TakesEffect::next_manager, enabled, now.enabled);
-  changes.compare("interface", TakesEffect::next_manager, interface, now.interface);
-  changes.compare("peers", TakesEffect::next_manager, peers, now.peers);
-  changes.compare("multicast", TakesEffect::next_manager, multicast, now.multicast);
-  changes.compare("identity", TakesEffect::next_manager, identity, now.identity);
-  changes.compare("allow_unsecured", TakesEffect::next_manager, allow_unsecured, now.allow_unsecured);
-  return changes.take();
+template <class Config>
+struct Row {
+  ConfigKey key;
+  bool (*differs)(const Config&, const Config&);
+  void (*take)(Config&, const Config&);
+};
+
+template <auto Member>
+struct Access;
+
+template <class Config, class Value, Value Config::* Member>
+struct Access<Member> {
+  static bool differs(const Config& before, const Config& now) { return !(before.*Member == now.*Member); }
+  static void take(Config& used, const Config& now) { used.*Member = now.*Member; }
+  static constexpr Row<Config> row(std::string_view section, std::string_view name, TakesEffect when,
+                                   std::string_view why) {
+    return {.key = {.section = section, .name = name, .when = when, .why = why},
+            .differs = &Access::differs,
+            .take = &Access::take};
+  }
+};
+
+template <auto Member>
+constexpr auto host(std::string_view name, TakesEffect when, std::string_view why = {}) {
+  return Access<Member>::row("[host]", name, when, why);
+}
+template <auto Member>
+constexpr auto dds(std::string_view name) {
+  return Access<Member>::row("[dds]", name, TakesEffect::new_server, {});
+}
+template <auto Member>
+constexpr auto blocks(std::string_view name) {
+  return Access<Member>::row("[blocks]", name, TakesEffect::new_server, {});
+}
+template <auto Member>
+constexpr auto instance(std::string_view name, TakesEffect when) {
+  return Access<Member>::row("[[instance]]", name, when, {});
 }
 
-std::vector<KeyChange> changed_blocks(const BlocksConfig& before, const BlocksConfig& now) {
-  const auto& [host_number, base] = before;
-  KeyChanges changes("[blocks] ");
-  changes.compare("host_number", TakesEffect::next_manager, host_number, now.host_number);
-  changes.compare("base", TakesEffect::next_manager, base, now.base);
-  return changes.take();
+using enum TakesEffect;
+
+constexpr std::string_view kOfNewObjects = "by the pool and by new objects; the others keep their rights";
+constexpr std::array kHostRows = {
+    host<&HostConfig::name>("name", next_manager, "folders of the host have this name"),
+    host<&HostConfig::labels>("labels", new_server),
+    host<&HostConfig::dds_domain>("dds_domain", new_server),
+    host<&HostConfig::run_directory>("run_directory", next_manager, "the sockets of its instances are there"),
+    host<&HostConfig::state_directory>("state_directory", next_manager,
+                                       "its instances keep their files there"),
+    host<&HostConfig::application_limit_mib>("application_limit_mib", new_server),
+    host<&HostConfig::application_versions>("application_versions", at_once),
+    host<&HostConfig::pool>("pool", next_manager, "its instances use that pool"),
+    host<&HostConfig::pool_objects>("pool_objects", next_manager, "its instances have the pool mapped"),
+    host<&HostConfig::pool_owner>("pool_owner", at_once, kOfNewObjects),
+    host<&HostConfig::pool_group>("pool_group", at_once, kOfNewObjects),
+    host<&HostConfig::pool_mode>("pool_mode", at_once, kOfNewObjects),
+    host<&HostConfig::cores>("cores", at_once),
+    host<&HostConfig::housekeeping_cores>("housekeeping_cores", at_once),
+    host<&HostConfig::log_level>("log_level", new_server),
+    host<&HostConfig::keep_pool>("keep_pool", at_once),
+};
+constexpr std::array kDdsRows = {
+    dds<&DdsConfig::enabled>("enabled"),   dds<&DdsConfig::interface>("interface"),
+    dds<&DdsConfig::peers>("peers"),       dds<&DdsConfig::multicast>("multicast"),
+    dds<&DdsConfig::identity>("identity"), dds<&DdsConfig::allow_unsecured>("allow_unsecured"),
+};
+constexpr std::array kBlocksRows = {
+    blocks<&BlocksConfig::host_number>("host_number"),
+    blocks<&BlocksConfig::base>("base"),
+};
+constexpr std::array kInstanceRows = {
+    instance<&InstanceConfig::name>("name", at_once),  // another name is another instance
+    instance<&InstanceConfig::core>("core", next_process),
+    instance<&InstanceConfig::share_core>("share_core", at_once),
+    instance<&InstanceConfig::scheduler>("scheduler", next_process),
+    instance<&InstanceConfig::priority_band>("priority_band", next_process),
+    instance<&InstanceConfig::settings>("settings", next_process),
+    instance<&InstanceConfig::application>("application", next_process),
+    instance<&InstanceConfig::autostart>("autostart", next_start),
+    instance<&InstanceConfig::after>("after", at_once),
+    instance<&InstanceConfig::restart>("restart", at_once),
+    instance<&InstanceConfig::restart_delay>("restart_delay_ms", at_once),
+    instance<&InstanceConfig::restart_delay_max>("restart_delay_max_ms", at_once),
+    instance<&InstanceConfig::crash_limit>("crash_limit", at_once),
+    instance<&InstanceConfig::crash_window>("crash_window_s", at_once),
+};
+static_assert(kHostRows.size() == count_members<HostConfig>(), "each key of [host] has its row");
+static_assert(kDdsRows.size() == count_members<DdsConfig>(), "each key of [dds] has its row");
+static_assert(kBlocksRows.size() == count_members<BlocksConfig>(), "each key of [blocks] has its row");
+static_assert(kInstanceRows.size() == count_members<InstanceConfig>(),
+              "each key of [[instance]] has its row");
+
+constexpr auto kAllKeys = [] {
+  std::array<ConfigKey, kHostRows.size() + kDdsRows.size() + kBlocksRows.size() + kInstanceRows.size()> all;
+  std::size_t at = 0;
+  for (const auto& row : kHostRows) all[at++] = row.key;
+  for (const auto& row : kDdsRows) all[at++] = row.key;
+  for (const auto& row : kBlocksRows) all[at++] = row.key;
+  for (const auto& row : kInstanceRows) all[at++] = row.key;
+  return all;
+}();
+
+template <class Rows, class Config>
+void compare(const Rows& rows, const Config& before, const Config& now, bool with_section,
+             std::vector<KeyChange>& changes) {
+  for (const auto& row : rows) {
+    if (!row.differs(before, now)) continue;
+    const std::string section = with_section ? fmt::format("{} ", row.key.section) : "";
+    changes.push_back(
+        {.key = fmt::format("{}{}", section, row.key.name), .when = row.key.when, .why = row.key.why});
+  }
+}
+
+template <class Rows, class Config>
+void take_rows(const Rows& rows, Config& used, const Config& now) {
+  for (const auto& row : rows) {
+    if (row.key.when == at_once || row.key.when == new_server) row.take(used, now);
+  }
 }
 
 }  // namespace
 
-std::vector<KeyChange> changed_keys(const ManagerConfig& before, const ManagerConfig& now) {
-  const auto& [host, dds, blocks, instances] = before;
-  std::vector<KeyChange> all;
-  for (auto&& part :
-       {changed_host(host, now.host), changed_dds(dds, now.dds), changed_blocks(blocks, now.blocks)}) {
-    all.insert(all.end(), part.begin(), part.end());
+std::span<const ConfigKey> all_config_keys() noexcept {
+  return kAllKeys;
+}
+
+std::string_view describe(TakesEffect when) noexcept {
+  switch (when) {
+    case at_once:
+      return "used at once";
+    case new_server:
+      return "used at once; plchost-dds is restarted for it, and the PLCs run on";
+    case next_process:
+      return "used from the next start or restart of the instance";
+    case next_start:
+      return "used when the host starts the next time; until then start and stop decide";
+    case next_manager:
+      return "used when plchostd is restarted, which ends the instances";
   }
-  return all;
+  return "";
+}
+
+std::string change_text(std::string_view keys, std::string_view effect, std::string_view why) {
+  return fmt::format("{} changed, {}{}{}", keys, effect, why.empty() ? "" : ": ", why);
+}
+
+std::vector<std::string> key_table() {
+  std::vector<std::string> rows;
+  for (const TakesEffect when : {at_once, new_server, next_process, next_start, next_manager}) {
+    std::string keys;
+    std::string_view section;
+    for (const ConfigKey& key : kAllKeys) {
+      if (key.when != when) continue;
+      if (key.section != section) keys += fmt::format("{}{}", keys.empty() ? "" : "; ", key.section);
+      keys += fmt::format("{}{}", key.section != section ? " " : ", ", key.name);
+      section = key.section;
+    }
+    rows.push_back(fmt::format("{} | {}", keys, describe(when)));
+  }
+  return rows;
+}
+
+std::vector<KeyChange> changed_keys(const ManagerConfig& before, const ManagerConfig& now) {
+  std::vector<KeyChange> changes;
+  compare(kHostRows, before.host, now.host, true, changes);
+  compare(kDdsRows, before.dds, now.dds, true, changes);
+  compare(kBlocksRows, before.blocks, now.blocks, true, changes);
+  return changes;
 }
 
 std::vector<KeyChange> changed_keys(const InstanceConfig& before, const InstanceConfig& now) {
-  const auto& [name, core, share_core, scheduler, band, settings, application, autostart, after, restart,
-               delay, delay_max, crash_limit, crash_window] = before;
-  KeyChanges changes("");
-  changes.compare("name", TakesEffect::at_once, name, now.name);
-  changes.compare("core", TakesEffect::next_process, core, now.core);
-  changes.compare("share_core", TakesEffect::at_once, share_core, now.share_core);
-  changes.compare("scheduler", TakesEffect::next_process, scheduler, now.scheduler);
-  changes.compare("priority_band", TakesEffect::next_process, band, now.priority_band);
-  changes.compare("settings", TakesEffect::next_process, settings, now.settings);
-  changes.compare("application", TakesEffect::next_process, application, now.application);
-  changes.compare("autostart", TakesEffect::next_manager, autostart, now.autostart);
-  changes.compare("after", TakesEffect::at_once, after, now.after);
-  changes.compare("restart", TakesEffect::at_once, restart, now.restart);
-  changes.compare("restart_delay_ms", TakesEffect::at_once, delay, now.restart_delay);
-  changes.compare("restart_delay_max_ms", TakesEffect::at_once, delay_max, now.restart_delay_max);
-  changes.compare("crash_limit", TakesEffect::at_once, crash_limit, now.crash_limit);
-  changes.compare("crash_window_s", TakesEffect::at_once, crash_window, now.crash_window);
-  return changes.take();
+  std::vector<KeyChange> changes;
+  compare(kInstanceRows, before, now, false, changes);
+  return changes;
+}
+
+void take_over(ManagerConfig& used, const ManagerConfig& now) {
+  take_rows(kHostRows, used.host, now.host);
+  take_rows(kDdsRows, used.dds, now.dds);
+  take_rows(kBlocksRows, used.blocks, now.blocks);
 }
 
 }  // namespace plchost

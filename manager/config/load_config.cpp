@@ -13,6 +13,7 @@
 
 #include "manager/config/accounts.hpp"
 #include "manager/config/check_relations.hpp"
+#include "shm/base/log_levels.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/toml/section_reader.hpp"
 #include "shm/base/toml/toml_document.hpp"
@@ -24,7 +25,6 @@ namespace {
 
 using namespace std::string_view_literals;
 
-constexpr std::array kLogLevels = {"trace"sv, "debug"sv, "info"sv, "warning"sv, "error"sv};
 constexpr std::array kPriorityBands = {"high"sv, "normal"sv, "low"sv};
 constexpr std::int64_t kMaxCoreNumber = 1023;  // CPU_SETSIZE
 constexpr std::string_view kAllHosts = "all";  // a word of plcctl --host

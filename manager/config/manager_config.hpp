@@ -41,6 +41,8 @@ struct DdsConfig {
   bool multicast = true;           ///< look for others by multicast, too; never on lo
   std::string identity;            ///< folder of the host's identity; empty: no security
   bool allow_unsecured = false;    ///< without an identity: on another interface than lo all the same
+
+  bool operator==(const DdsConfig&) const = default;
 };
 
 /// [blocks]: blocks between instances, and to those of other hosts.

@@ -1,5 +1,6 @@
 #include "manager/control/command_server.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include <fmt/format.h>
@@ -135,6 +136,12 @@ bool CommandServer::flush(Connection& connection) {
 void CommandServer::close(std::uint64_t id, std::string_view why) {
   if (!why.empty()) spdlog::warn("control socket: a peer {}; it is disconnected", why);
   connections_.erase(id);
+}
+
+bool CommandServer::waits_for_answers() const noexcept {
+  return std::ranges::any_of(connections_, [](const auto& entry) {
+    return entry.second.pending != 0 || !entry.second.unsent.empty();
+  });
 }
 
 }  // namespace plchost

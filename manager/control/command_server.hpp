@@ -25,6 +25,8 @@ class CommandServer {
  public:
   [[nodiscard]] static Result<std::unique_ptr<CommandServer>> open(Reactor& reactor, const std::string& path,
                                                                    ControlHandler& handler);
+  /// A request is not answered yet, or its answer is not sent.
+  [[nodiscard]] bool waits_for_answers() const noexcept;
   CommandServer(const CommandServer&) = delete;
   CommandServer& operator=(const CommandServer&) = delete;
 

@@ -29,7 +29,7 @@ Result<void> StoreProcess::keep(const ApplicationOrder& order, const std::string
   store.by = order.by;
   store.from = order.from;
   store.before = before;
-  store.keep = settings_.keep;
+  store.keep = settings_.keep();
   store.trial = trial_arguments(settings_.plc_instance, launch);
   return start(store, std::move(done));
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 
@@ -15,11 +16,11 @@ namespace plchost {
 class StoreProcess : public ApplicationKeeper {
  public:
   struct Settings {
-    std::string pool;          ///< whose shared memory holds what was sent
-    std::string folder;        ///< of the versions of the instance
-    std::uint32_t keep = 5;    ///< versions
-    std::string helper;        ///< program: plchostd
-    std::string plc_instance;  ///< program that tries an application
+    std::string pool;                     ///< whose shared memory holds what was sent
+    std::string folder;                   ///< of the versions of the instance
+    std::function<std::uint32_t()> keep;  ///< so many versions
+    std::string helper;                   ///< program: plchostd
+    std::string plc_instance;             ///< program that tries an application
   };
 
   StoreProcess(Reactor& reactor, Settings settings);

@@ -32,6 +32,10 @@ class WishWriter {
 
   /// `done` is called later, once; not if this returns an error.
   [[nodiscard]] Result<void> write(const WishOrder& order, Done done);
+  /// Of the helper; nothing: it does not run.
+  [[nodiscard]] std::optional<int> process() const {
+    return process_ ? std::optional(process_->pid) : std::nullopt;
+  }
 
  private:
   [[nodiscard]] Result<void> start();

@@ -69,6 +69,7 @@ void ManagedInstance::handle(const ControlRequest& request, ControlReplyFunction
     case ControlVerb::change_application:
     case ControlVerb::shutdown:
     case ControlVerb::status:
+    case ControlVerb::set_log_level:
       return;  // refused by check_argument
   }
 }
@@ -89,6 +90,7 @@ Result<void> ManagedInstance::check_argument(ControlRequest& request) const {
     case ControlVerb::change_application:
     case ControlVerb::shutdown:
     case ControlVerb::status:
+    case ControlVerb::set_log_level:
       return failure(ErrorCode::unsupported, fmt::format("'{}' is between the manager and an instance only",
                                                          to_string(request.verb)));
     case ControlVerb::set_scheduler: {

@@ -61,6 +61,13 @@ std::optional<InstanceRuntime> ManagedInstance::watch_process() {
   return said_;
 }
 
+// A process that is being set up does not listen yet: it is told when it is up.
+void ManagedInstance::use_log_level() {
+  const std::string& level = surroundings_.host.log_level;
+  if (phase_ != Phase::up || log_level_ == level) return;
+  if (send(ControlVerb::set_log_level, level)) log_level_ = level;
+}
+
 void ManagedInstance::ask_for_status() {
   const TimePoint now = surroundings_.now();
   if (now - asked_at_ < (asked_number_ != 0 ? kAskAgain : kAskInterval)) return;

@@ -72,6 +72,7 @@ bool ManagedInstance::adopt() {
   if (application_ != config_.application) tell_boot_application();
   status_.pid = *pid;
   adopt_until_.reset();
+  log_level_.clear();
   unreadable_.clear();
   if (earlier_ &&
       std::exchange(earlier_->process, InstanceWish::Process::none) == InstanceWish::Process::ending) {
@@ -151,6 +152,7 @@ void ManagedInstance::come_up() {
     const bool runs = begins_running_ && !application_.empty();
     set_state(Phase::up, runs ? InstanceState::running : InstanceState::stopped, problem_when_up());
   }
+  if (!log_level_.empty()) use_log_level();
   if (!operation_) return;
   if (operation_->step == Step::fresh_process && !operation_->refused.empty()) {
     finish(ErrorCode::unavailable, fmt::format("{}; {}, which was loaded before, is started again",
@@ -372,6 +374,7 @@ void ManagedInstance::spawn(Next next) {
     return back_off_or_give_up(retries(), InstanceState::failed, pid.error().describe());
   }
   status_.pid = *pid;
+  log_level_ = surroundings_.host.log_level;
   host_.set_timer(after(kSetupLimit));
   set_state(Phase::setting_up, InstanceState::starting, last_end_.empty() ? "" : "ended last: " + last_end_);
 }

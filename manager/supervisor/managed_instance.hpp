@@ -164,6 +164,8 @@ class ManagedInstance : public InstanceEvents {
   void shut_down();
   /// The configuration says something else of it, or has it again.
   void reconfigure(const InstanceConfig& config);
+  /// The log level of the host is another one now.
+  void use_log_level();
   /// The configuration does not have it any more.
   void remove();
   /// The part of the configuration that waits for the next process; empty: none.
@@ -341,6 +343,7 @@ class ManagedInstance : public InstanceEvents {
   std::string scheduler_;      // of the next process; empty: as its settings say
   Configured begun_with_;
   std::string said_scheduler_;  // by this process
+  std::string log_level_;       // that this process was given; empty: by an earlier manager
   std::uint64_t next_number_ = 1;
   std::uint64_t awaited_number_ = 0;  // of the reply in adopting
   std::optional<Operation> operation_;

@@ -54,6 +54,8 @@ class Supervisor : public ControlHandler {
   [[nodiscard]] Result<void> check_room(const std::vector<InstanceConfig>& now) const;
   /// Takes over these instances in place of those before; see managed_instance.hpp. One line for each change.
   std::vector<std::string> reload(const std::vector<InstanceConfig>& now);
+  /// The log level of the host is another one now: all instances that are up take it over.
+  void use_log_level();
   /// Ends all instances in reverse order; calls `done` when none is left, possibly at once.
   void shut_down(std::function<void()> done);
   /// Calls `done` when what all instances are to be is on the disk, or cannot be; possibly at once.

@@ -46,6 +46,10 @@ Result<void> Supervisor::check_room(const std::vector<InstanceConfig>& now) cons
                              removed, now.size(), kMaxInstances));
 }
 
+void Supervisor::use_log_level() {
+  for (const auto& unit : units_) unit->instance->use_log_level();
+}
+
 std::vector<std::string> Supervisor::reload(const std::vector<InstanceConfig>& now) {
   std::vector<std::string> lines;
   for (const auto& unit : units_) {
@@ -86,16 +90,15 @@ void Supervisor::tell_changes(Unit& unit, const InstanceConfig& now, std::vector
     return tell("in the configuration again" + (awaited.empty() ? "" : "; " + awaited));
   }
   if (const std::string keys = keys_of(changes, TakesEffect::at_once); !keys.empty()) {
-    tell(keys + " changed");
+    tell(change_text(keys, describe(TakesEffect::at_once)));
   }
   if (const std::string keys = keys_of(changes, TakesEffect::next_process); !keys.empty()) {
     const bool boots = !unit.applications->boot().empty() && keys.find("application") != std::string::npos;
-    tell(fmt::format("{} changed, used from its next {}{}", keys,
-                     instance.has_process() ? "restart" : "start",
-                     boots ? "; its boot application stays in the place of the configuration's" : ""));
+    tell(change_text(keys, describe(TakesEffect::next_process)) +
+         (boots ? "; its boot application stays in the place of the configuration's" : ""));
   }
-  if (const std::string keys = keys_of(changes, TakesEffect::next_manager); !keys.empty()) {
-    tell(keys + " changed, used when plchostd starts the next time");
+  if (const std::string keys = keys_of(changes, TakesEffect::next_start); !keys.empty()) {
+    tell(change_text(keys, describe(TakesEffect::next_start)));
   }
 }
 

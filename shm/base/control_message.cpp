@@ -36,6 +36,7 @@ constexpr std::array kVerbs = {
     std::pair{ControlVerb::read_log, std::string_view("read log")},
     std::pair{ControlVerb::shutdown, std::string_view("shutdown")},
     std::pair{ControlVerb::status, std::string_view("status")},
+    std::pair{ControlVerb::set_log_level, std::string_view("set log level")},
 };
 
 std::string dump(const Json& json) {

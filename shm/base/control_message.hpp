@@ -39,6 +39,7 @@ enum class ControlVerb : std::uint8_t {
   read_log,              ///< the same, from the log of the instance
   shutdown,              ///< (manager to instance only) stop the application and end the process
   status,                ///< (manager to instance only) the reply's text is the InstanceReport
+  set_log_level,         ///< (manager to instance only) argument: one of kLogLevels
 };
 
 [[nodiscard]] std::string_view to_string(ControlVerb verb) noexcept;

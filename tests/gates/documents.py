@@ -186,34 +186,28 @@ def topics(root):
     return rows
 
 
-EFFECTS = {
-    "at_once": "immediately",
-    "next_process": "from the instance's next process on; until then its problem text says so",
-    "next_manager": "when the manager starts the next time",
-}
+SECTIONS = {"host": "[host]", "dds": "[dds]", "blocks": "[blocks]", "instance": "[[instance]]"}
 
 
 def changed_keys(root):
     """(section, key, effect) of each key of the host's file."""
     text = (root / "manager/config/config_changes.cpp").read_text(encoding="utf-8")
-    section = None
-    for prefix, key, effect in re.findall(r'KeyChanges changes\("([^"]*)"\)|compare\("(\w+)",\s*TakesEffect::(\w+)', text):
-        if key:
-            yield section, key, effect
-        else:
-            section = prefix.strip() or "[[instance]]"
+    for section, key, effect in re.findall(r'\b(host|dds|blocks|instance)<&\w+::\w+>\("(\w+)"(?:,\s*(\w+))?', text):
+        yield SECTIONS[section], key, effect or "new_server"
 
 
 def reload_effects(root):
-    found = {}
+    text = (root / "manager/config/config_changes.cpp").read_text(encoding="utf-8")
+    effects = dict(re.findall(r'case (\w+):\s*return "([^"]+)";', text))
+    found = {effect: {} for effect in effects}
     for section, key, effect in changed_keys(root):
-        if effect not in EFFECTS:
-            raise Fault(f"manager/config/config_changes.cpp: '{effect}' has no text in EFFECTS")
-        found.setdefault(effect, {}).setdefault(section, []).append(f"`{key}`")
-    rows = ["| keys | used |", "| --- | --- |"]
+        if effect not in effects:
+            raise Fault(f"manager/config/config_changes.cpp: describe() has no text for '{effect}'")
+        found[effect].setdefault(section, []).append(f"`{key}`")
+    rows = ["| keys | a changed one is |", "| --- | --- |"]
     for effect, sections in found.items():
         keys = "; ".join(f"`{section}` {', '.join(names)}" for section, names in sections.items())
-        rows.append(f"| {keys} | {EFFECTS[effect]} |")
+        rows.append(f"| {keys} | {effects[effect]} |")
     return rows
 
 

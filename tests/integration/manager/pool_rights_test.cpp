@@ -46,7 +46,7 @@ TEST(PoolRights, OfAPoolThatIsThereAlreadyAreRenewedAndThatIsSaid) {
   plant.set_host_keys("pool_mode = \"0600\"");
   plant.start_manager();
   EXPECT_EQ(status_of(plant).st_mode & kPermissions, 0600U);
-  EXPECT_THAT(plant.log(), HasSubstr("was there already with"));
+  EXPECT_THAT(plant.log(), HasSubstr("mode 0600 now"));
 }
 
 TEST(PoolRights, OfAPoolThatAStrangerMadeBeforeAreNotTaken) {

@@ -29,6 +29,15 @@ line2=$(pid_of line2)
 
 [ "$(plcctl reload host)" = "nothing has changed" ] || fail "an unchanged file changes something"
 
+# What concerns plchost-dds only is used by a new one; the answer comes before, and no instance is touched.
+sed -i '/^pool = /a labels = ["hall2"]' "$cell/cell.toml" "$cell/one.toml"
+[ "$(plcctl reload host)" = "[host] labels changed, used at once; plchost-dds is restarted for it, and the PLCs run on" ] ||
+  fail "the answer of another label"
+for _ in $(seq 200); do plcctl --label hall2 list hosts >"$cell/said" 2>&1 && grep -q cell "$cell/said" && break; sleep 0.1; done
+plcctl --label hall2 list hosts | grep -q cell || fail "the label is not told"
+[ "$(pid_of line1)" = "$line1" ] || fail "another label restarts an instance"
+plcctl wait instance line1 line2 --timeout 30
+
 # A faulty file changes nothing, and each fault has its line.
 cp "$cell/cell.toml" "$cell/good.toml"
 printf '[[instance]]\nname = "line3"\ncore = %s\nshare_core = true\nrestart = "now"\nstart = 1\n' "$first_core" >>"$cell/cell.toml"

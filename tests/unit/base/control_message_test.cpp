@@ -36,7 +36,7 @@ INSTANTIATE_TEST_SUITE_P(ControlMessage, Verb,
                                          ControlVerb::register_event, ControlVerb::unregister_event,
                                          ControlVerb::check_host, ControlVerb::reload_host,
                                          ControlVerb::reset_statistics, ControlVerb::shutdown,
-                                         ControlVerb::status));
+                                         ControlVerb::status, ControlVerb::set_log_level));
 
 TEST(ControlMessage, RepliesOfEachCodeSurviveTheRoundTrip) {
   for (unsigned code = 0; code <= static_cast<unsigned>(ErrorCode::corrupt); ++code) {
