@@ -155,6 +155,20 @@ class PLCHOST_CLIENT_API Client {
     unsigned long long missed = 0;  ///< how many before it will never come
   };
 
+  /// A line that an instance has said: its application, its runtime, or the manager about it.
+  struct LogLine {
+    std::string host;
+    std::string instance;
+    std::string text;
+    std::string level;   ///< debug, info, warning, error
+    std::string source;  ///< runtime, application, output, manager
+    int pid = 0;
+    std::chrono::system_clock::time_point time;
+    unsigned long long number = 0;   ///< within its instance; lines may leave numbers out
+    unsigned long long missing = 0;  ///< lines before it that the host has kept no longer
+    unsigned long long stream = 0;   ///< numbers of another stream began anew: the host has lost its memory
+  };
+
   /// Posts that are in the pool of the host.
   struct Posted {
     unsigned long long accepted = 0;
@@ -215,6 +229,13 @@ class PLCHOST_CLIENT_API Client {
   std::vector<Task> tasks(const std::string& host = {});
   std::vector<Event> events(const std::string& host = {});
 
+  /// What an instance has said, oldest first: the `newest` lines of those that the host keeps (256 KiB for
+  /// each instance). ClientError: not_found: no such instance; refused: only operators may ask.
+  std::vector<LogLine> logs(const std::string& host, const std::string& instance,
+                            unsigned long long newest = ~0ULL);
+  /// The lines after one that was returned before, to read on; all that are kept, if the host has begun anew.
+  std::vector<LogLine> logs(const std::string& host, const std::string& instance, const LogLine& after);
+
   /// Posts an event `count` times, each counted exactly once, also if the server of the host dies meanwhile.
   /// Returns when all are in the pool: the time-out is for each acknowledgement, so many take as long as they
   /// take. ClientError: a post was rejected; timed_out: of some nothing is known.
@@ -241,6 +262,11 @@ class PLCHOST_CLIENT_API Client {
                             const std::string& scheduler);
   std::string register_event(const std::string& host, const std::string& event);
   std::string unregister_event(const std::string& host, const std::string& event);
+  /// Has the host read its configuration file again. Instances that are unchanged run on. Returns a line for
+  /// each change, with when it is used; "nothing has changed". ClientError: invalid_argument: the file has
+  /// errors, a line each, and nothing is changed. Give the Client a timeout of 60 s if the file has many
+  /// instances: each application is tried.
+  std::string reload(const std::string& host = {});
 
   /// Calls back for each host that is there, and whenever one comes, falls silent, answers again, or has
   /// changed. Known within 100 ms.

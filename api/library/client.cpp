@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "api/client/check_names.hpp"
+#include "api/client/log_reader.hpp"
 #include "api/library/convert.hpp"
 #include "api/library/watcher.hpp"
 #include "api/library/worker.hpp"
@@ -52,6 +53,24 @@ Result<std::vector<Item>> list(ControlClient& client, const std::string& name, T
   std::vector<Item> items;
   for (const Sample& sample : *samples) items.push_back(to_public(sample));
   return items;
+}
+
+Result<std::vector<Client::LogLine>> read_lines(ControlClient& client, const std::string& name,
+                                                const std::string& instance, LogPlace place,
+                                                std::uint64_t newest, TimePoint deadline) {
+  auto host = host_of(client, name, deadline);
+  if (!host) return std::unexpected(std::move(host).error());
+  LogReader log(*host, instance, place);
+  const auto said = log.read(client, deadline, newest);
+  if (!said) return std::unexpected(said.error());
+  std::vector<Client::LogLine> lines;
+  for (const LogText& text : *said) {
+    lines.push_back(to_public(text));
+    lines.back().host = *host;
+    lines.back().instance = instance;
+    lines.back().stream = log.place().stream;
+  }
+  return lines;
 }
 
 Result<PostReport> post_to(ControlClient& client, const std::string& name, const std::string& event,
@@ -118,6 +137,21 @@ std::vector<Client::Task> Client::tasks(const std::string& host) {
 std::vector<Client::Event> Client::events(const std::string& host) {
   return value_or_throw(worker_->run<std::vector<Event>>([&](ControlClient& client) {
     return list<Event>(client, host, worker_->deadline(), &ControlClient::events);
+  }));
+}
+
+std::vector<Client::LogLine> Client::logs(const std::string& host, const std::string& instance,
+                                          unsigned long long newest) {
+  return value_or_throw(worker_->run<std::vector<LogLine>>([&](ControlClient& client) {
+    return read_lines(client, host, instance, {}, newest, worker_->deadline());
+  }));
+}
+
+std::vector<Client::LogLine> Client::logs(const std::string& host, const std::string& instance,
+                                          const LogLine& after) {
+  return value_or_throw(worker_->run<std::vector<LogLine>>([&](ControlClient& client) {
+    const LogPlace place{.stream = after.stream, .after = after.number};
+    return read_lines(client, host, instance, place, kLogRecordsKept, worker_->deadline());
   }));
 }
 
@@ -209,6 +243,10 @@ std::string Client::register_event(const std::string& host, const std::string& e
 std::string Client::unregister_event(const std::string& host, const std::string& event) {
   const auto id = value_or_throw(event_of(event));
   return command(plc_OPERATION_UNREGISTER_EVENT, host, id.instance, id.event);
+}
+
+std::string Client::reload(const std::string& host) {
+  return command(plc_OPERATION_RELOAD_HOST, host, {}, {});
 }
 
 }  // namespace plchost

@@ -3,6 +3,7 @@
 #include <chrono>
 #include <ranges>
 #include <tuple>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -140,6 +141,19 @@ Client::Transition to_public(const TransitionView& transition) {
           .time = wall_time(sample.time_unix_ns),
           .number = sample.sequence_number,
           .missed = transition.missed};
+}
+
+Client::LogLine to_public(const LogText& line) {
+  return {.host = {},
+          .instance = {},
+          .text = line.text,
+          .level = text(dds::log_level_name(std::to_underlying(line.level))),
+          .source = text(dds::log_source_name(std::to_underlying(line.source))),
+          .pid = line.pid,
+          .time = wall_time(line.time_unix_ns),
+          .number = line.sequence,
+          .missing = line.missing,
+          .stream = 0};
 }
 
 Client::Outcome to_public(const PostReport& report) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "api/client/control_client.hpp"
+#include "api/client/log_reader.hpp"
 #include "api/plchost_client.hpp"
 
 namespace plchost {
@@ -11,6 +12,7 @@ namespace plchost {
 [[nodiscard]] Client::Task to_public(const plc_TaskStatus& status);
 [[nodiscard]] Client::Event to_public(const plc_EventStatus& status);
 [[nodiscard]] Client::Transition to_public(const TransitionView& transition);
+[[nodiscard]] Client::LogLine to_public(const LogText& line);
 [[nodiscard]] Client::Outcome to_public(const PostReport& report);
 
 /// Whether nothing in it has changed. Both are of the same thing.

@@ -10,30 +10,6 @@
 
 namespace plchost {
 
-std::vector<LogText> LogLines::add(const std::vector<LogRecord>& records) {
-  // Of a manager; a stranger may write a line without an end.
-  constexpr std::size_t kLongest = 65'536;
-  std::vector<LogText> lines;
-  for (const LogRecord& record : records) {
-    if (record.sequence <= last_) continue;
-    if (last_ > 0 && record.sequence > last_ + 1) {
-      missing_ += record.sequence - last_ - 1;
-      begun_.clear();
-    }
-    last_ = record.sequence;
-    begun_ += record.text.view();
-    if (record.goes_on != 0 && begun_.size() < kLongest) continue;
-    lines.push_back({.sequence = record.sequence,
-                     .missing = std::exchange(missing_, 0),
-                     .time_unix_ns = record.time_unix_ns,
-                     .pid = record.pid,
-                     .level = record.level,
-                     .source = record.source,
-                     .text = std::exchange(begun_, {})});
-  }
-  return lines;
-}
-
 Row to_row(std::string_view host, std::string_view instance, const LogText& line) {
   return {{"host", host},
           {"instance", instance},

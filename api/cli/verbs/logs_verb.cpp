@@ -69,55 +69,27 @@ Result<Since> parse_since(const std::string& text) {
                              shown(text)));
 }
 
-/// The log of one instance, read on from where it was read to.
+/// What is shown of the log of one instance.
 class LogFollower {
  public:
   LogFollower(CliSession& session, std::string host, const LogArguments& arguments, Since since)
-      : session_(session), host_(std::move(host)), arguments_(arguments), since_(since) {}
+      : session_(session), log_(std::move(host), arguments.instance), arguments_(arguments), since_(since) {}
 
-  /// The new records; the first time, the kept ones that were asked for.
+  /// The new lines; the first time, the kept ones that were asked for.
   Result<std::vector<LogText>> read() {
-    LogQuery query{.after = after_};
-    const bool first = stream_ == 0;
-    if (first && arguments_.count < kLogRecordsKept) {
-      query.newest = std::max<std::uint64_t>(arguments_.count, 1);
-    }
-    std::vector<LogText> lines;
-    for (;;) {
-      const auto page =
-          session_.client().value()->read_log(host_, arguments_.instance, query, session_.deadline());
-      if (!page) return std::unexpected(page.error());
-      if (page->stream != stream_ && stream_ != 0) {  // another numbering
-        stream_ = page->stream;
-        lines_.begin_anew();
-        query = {.after = 0};
-        continue;
-      }
-      stream_ = page->stream;
-      const std::int64_t begin = since_.by_clock(page->clock_unix_ns);
-      for (LogText& line : lines_.add(page->records)) {
-        if (line.time_unix_ns >= begin) lines.push_back(std::move(line));
-      }
-      const bool goes_on = !page->complete && page->next_after > query.after;
-      query = {.after = page->next_after};
-      after_ = page->next_after;
-      if (!goes_on) break;
-    }
-    if (first && lines.size() > arguments_.count) {
-      lines.erase(lines.begin(), lines.end() - static_cast<std::ptrdiff_t>(arguments_.count));
-    }
+    auto lines = log_.read(*session_.client().value(), session_.deadline(), arguments_.count);
+    if (!lines) return lines;
+    const std::int64_t begin = since_.by_clock(log_.clock_unix_ns());
+    std::erase_if(*lines, [&](const LogText& line) { return line.time_unix_ns < begin; });
     return lines;
   }
-  [[nodiscard]] const std::string& host() const noexcept { return host_; }
+  [[nodiscard]] const std::string& host() const noexcept { return log_.host(); }
 
  private:
   CliSession& session_;
-  std::string host_;
+  LogReader log_;
   const LogArguments& arguments_;
   Since since_;
-  std::uint64_t stream_ = 0;
-  std::uint64_t after_ = 0;
-  LogLines lines_;
 };
 
 int show_lines(const CliSession& session, const LogArguments& arguments, const std::string& host,

@@ -169,6 +169,17 @@ void define_states(py::module_& module) {
 }
 
 void define_results(py::module_& module) {
+  py::class_<Client::LogLine>(module, "LogLine", "A line that an instance has said.")
+      .def_readonly("host", &Client::LogLine::host)
+      .def_readonly("instance", &Client::LogLine::instance)
+      .def_readonly("text", &Client::LogLine::text)
+      .def_readonly("level", &Client::LogLine::level)
+      .def_readonly("source", &Client::LogLine::source)
+      .def_readonly("pid", &Client::LogLine::pid)
+      .def_readonly("time", &Client::LogLine::time)
+      .def_readonly("number", &Client::LogLine::number)
+      .def_readonly("missing", &Client::LogLine::missing)
+      .def_readonly("stream", &Client::LogLine::stream);
   py::class_<Client::Posted>(module, "Posted")
       .def_readonly("accepted", &Client::Posted::accepted)
       .def_readonly("no_task", &Client::Posted::no_task);
@@ -234,6 +245,14 @@ void define_calls(ClientClass& client) {
       .def("instances", &Client::instances, py::arg("host") = "", NoGil())
       .def("tasks", &Client::tasks, py::arg("host") = "", NoGil())
       .def("events", &Client::events, py::arg("host") = "", NoGil())
+      .def("logs",
+           py::overload_cast<const std::string&, const std::string&, unsigned long long>(&Client::logs),
+           py::arg("host"), py::arg("instance"), py::arg("newest") = ~0ULL,
+           "What an instance has said, oldest first: the newest lines of those that the host keeps.", NoGil())
+      .def("logs",
+           py::overload_cast<const std::string&, const std::string&, const Client::LogLine&>(&Client::logs),
+           py::arg("host"), py::arg("instance"), py::arg("after"),
+           "The lines after one that logs() has returned before, to read on.", NoGil())
       .def("post",
            py::overload_cast<const std::string&, const std::string&, unsigned long long>(&Client::post),
            py::arg("host"), py::arg("event"), py::arg("count") = 1, NoGil())
@@ -256,7 +275,11 @@ void define_calls(ClientClass& client) {
       .def("set_scheduler", &Client::set_scheduler, py::arg("host"), py::arg("instance"),
            py::arg("scheduler"), NoGil())
       .def("register_event", &Client::register_event, py::arg("host"), py::arg("event"), NoGil())
-      .def("unregister_event", &Client::unregister_event, py::arg("host"), py::arg("event"), NoGil());
+      .def("unregister_event", &Client::unregister_event, py::arg("host"), py::arg("event"), NoGil())
+      .def("reload", &Client::reload, py::arg("host") = "",
+           "Has the host read its configuration file again. Returns a line for each change; a faulty file "
+           "changes nothing and raises ClientError with a line for each error.",
+           NoGil());
 }
 
 void define_watches(ClientClass& client) {

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "api/plchost_client.hpp"
+#include "shm/pool/log_ring.hpp"
 #include "tests/integration/api/test_host.hpp"
 
 namespace plchost {
@@ -128,6 +129,63 @@ TEST_F(ClientLibrary, TellsOfWhatWasRemovedOnce) {
   ASSERT_TRUE(until("line1 there"));
   const std::lock_guard lock(mutex);
   EXPECT_THAT(told, testing::ElementsAre("line1 there", "line1 removed", "line1 there"));
+}
+
+TEST_F(ClientLibrary, HasTheHostReadItsConfigurationAgain) {
+  Client sut(options());
+  host_.answer_with({0, ErrorCode::ok, "[host] log_level changed, used at once\ninstance 'line2': new"});
+  EXPECT_EQ(sut.reload("hosta"), "[host] log_level changed, used at once\ninstance 'line2': new");
+  ASSERT_EQ(host_.requests().size(), 1U);
+  EXPECT_EQ(host_.requests().front().verb, ControlVerb::reload_host);
+  EXPECT_EQ(host_.requests().front().instance, "");
+  host_.answer_with({0, ErrorCode::invalid_argument, "cell.toml:7: core is missing"});
+  const auto refused = error_of([&] { (void)sut.reload(); });
+  EXPECT_EQ(refused.code(), ClientError::invalid_argument);
+  EXPECT_THAT(refused.what(), HasSubstr("cell.toml:7"));
+}
+
+TEST_F(ClientLibrary, ReadsWhatAnInstanceHasSaidAndReadsOn) {
+  Client sut(options());
+  EXPECT_TRUE(sut.logs("hosta", "line1").empty()) << "it has said nothing yet";
+  auto ring = LogRing::open(host_.pool_name(), "line1").value();
+  const auto say = [&](std::string_view text) {
+    ring.add({.time_unix_ns = 1'800'000'000'250'000'000,
+              .pid = 4711,
+              .level = LogLevel::warning,
+              .source = LogSource::application,
+              .text = text});
+  };
+  say("valve 7 is stuck");
+  say(std::string(1000, 'x'));
+  const auto said = sut.logs({}, "line1");
+  ASSERT_EQ(said.size(), 2U);
+  EXPECT_EQ(said[0].host, "hosta");
+  EXPECT_EQ(said[0].instance, "line1");
+  EXPECT_EQ(said[0].text, "valve 7 is stuck");
+  EXPECT_EQ(said[0].level, "warning");
+  EXPECT_EQ(said[0].source, "application");
+  EXPECT_EQ(said[0].pid, 4711);
+  EXPECT_EQ(said[0].number, 1U);
+  EXPECT_EQ(said[0].time.time_since_epoch(), std::chrono::nanoseconds(1'800'000'000'250'000'000));
+  EXPECT_EQ(said[1].text, std::string(1000, 'x')) << "several records, one line";
+  ASSERT_EQ(sut.logs("hosta", "line1", 1).size(), 1U);
+  EXPECT_EQ(sut.logs("hosta", "line1", 1).front().number, said[1].number);
+
+  EXPECT_TRUE(sut.logs("hosta", "line1", said[1]).empty());
+  say("later");
+  const auto later = sut.logs("hosta", "line1", said[1]);
+  ASSERT_EQ(later.size(), 1U);
+  EXPECT_EQ(later[0].text, "later");
+  EXPECT_EQ(later[0].missing, 0U);
+  LogRing::remove(host_.pool_name(), "line1");
+  ring = LogRing::open(host_.pool_name(), "line1").value();
+  say("of a new numbering");
+  const auto anew = sut.logs("hosta", "line1", later[0]);
+  LogRing::remove(host_.pool_name(), "line1");
+  ASSERT_EQ(anew.size(), 1U);
+  EXPECT_EQ(anew[0].text, "of a new numbering");
+  EXPECT_NE(anew[0].stream, later[0].stream);
+  EXPECT_EQ(error_of([&] { (void)sut.logs("hosta", "line9"); }).code(), ClientError::not_found);
 }
 
 TEST_F(ClientLibrary, LetsACallbackStopItsOwnWatch) {

@@ -41,6 +41,23 @@ for line in "packer1: running under CmpScheduleTimer" "posted: 1" "a task ran" "
   grep -q "^$line" "$cell/line.log" || fail "'$line' is not in: $(cat "$cell/line.log")"
 done
 
+echo "- Python reads what an instance has said, and has the host read its configuration"
+cat >"$cell/logs.py" <<'EOF'
+import os, plchost_client
+with plchost_client.Client(domain=int(os.environ["PLCHOST_DOMAIN"]), timeout=20.0) as client:
+    said = client.logs("north", "packer1")
+    assert any(line.source == "manager" for line in said), [line.text for line in said]
+    assert client.logs("north", "packer1", newest=1)[0].number == said[-1].number
+    assert client.logs("north", "packer1", after=said[-1]) == []
+    assert [line.text for line in client.logs("north", "packer1", after=said[0])] == [line.text for line in said[1:]]
+    assert client.reload("north") == "nothing has changed"
+    try:
+        client.logs("north", "nobody")
+    except plchost_client.ClientError as error:
+        assert error.code == 2, error
+EOF
+PYTHONPATH=$BIN/../python python3 "$cell/logs.py" || fail "logs and reload"
+
 echo "- Python ends in peace while a client watches, and a callback that raises is told"
 cat >"$cell/ends.py" <<'EOF'
 import os, time, plchost_client

@@ -1,0 +1,59 @@
+#include "api/client/log_reader.hpp"
+
+#include <algorithm>
+#include <iterator>
+
+namespace plchost {
+
+std::vector<LogText> LogLines::add(const std::vector<LogRecord>& records) {
+  // Of a manager; a stranger may write a line without an end.
+  constexpr std::size_t kLongest = 65'536;
+  std::vector<LogText> lines;
+  for (const LogRecord& record : records) {
+    if (record.sequence <= last_) continue;
+    if (last_ > 0 && record.sequence > last_ + 1) {
+      missing_ += record.sequence - last_ - 1;
+      begun_.clear();
+    }
+    last_ = record.sequence;
+    begun_ += record.text.view();
+    if (record.goes_on != 0 && begun_.size() < kLongest) continue;
+    lines.push_back({.sequence = record.sequence,
+                     .missing = std::exchange(missing_, 0),
+                     .time_unix_ns = record.time_unix_ns,
+                     .pid = record.pid,
+                     .level = record.level,
+                     .source = record.source,
+                     .text = std::exchange(begun_, {})});
+  }
+  return lines;
+}
+
+Result<std::vector<LogText>> LogReader::read(ControlClient& client, TimePoint deadline,
+                                             std::uint64_t newest) {
+  const bool first = place_.stream == 0;
+  LogQuery query{.after = place_.after};
+  if (first && newest < kLogRecordsKept) query.newest = std::max<std::uint64_t>(newest, 1);
+  std::vector<LogText> lines;
+  for (bool goes_on = true; goes_on;) {
+    const auto page = client.read_log(host_, instance_, query, deadline);
+    if (!page) return std::unexpected(page.error());
+    clock_unix_ns_ = page->clock_unix_ns;
+    if (page->stream != place_.stream && place_.stream != 0) {  // another numbering
+      place_ = {.stream = page->stream};
+      lines_ = LogLines();
+      query = {};
+      continue;
+    }
+    auto more = lines_.add(page->records);
+    std::ranges::move(more, std::back_inserter(lines));
+    goes_on = !page->complete && page->next_after > query.after;
+    place_ = {.stream = page->stream, .after = page->next_after};
+    query = {.after = page->next_after};
+  }
+  if (first && lines.size() > newest)
+    lines.erase(lines.begin(), lines.end() - static_cast<std::ptrdiff_t>(newest));
+  return lines;
+}
+
+}  // namespace plchost
