@@ -5,12 +5,14 @@ Usage: left_behind.py begin FILE   notes what is there already
        left_behind.py end FILE     prints what has come since; exit code 1 if that is anything
 
 The run's processes inherit PLCHOST_RUN, by which they are found, and TMPDIR, a folder of the run. What another run on the
-same machine makes meanwhile is not counted: its processes have another PLCHOST_RUN, and they hold its memories.
+same machine makes meanwhile is not counted: its processes have another PLCHOST_RUN, and its memories are mapped by them or
+have the number of one of them in their names.
 """
 
 import json
 import os
 import pathlib
+import re
 import sys
 
 SHARED_MEMORY = pathlib.Path("/dev/shm")
@@ -54,17 +56,18 @@ def our_processes(marker):
             yield f"process {process.name}: {command}"
 
 
-def held_by_others(marker):
-    """The shared memories that processes of another run use."""
+def of_others(marker):
+    """The shared memories that processes of another run use, and the numbers of these processes."""
     wanted = b"PLCHOST_RUN=" + marker.encode()
-    held = set()
+    held, numbers = set(), set()
     for process in processes():
         if wanted in read(process / "environ").split(b"\0"):
             continue
+        numbers.add(process.name)
         for line in read(process / "maps").splitlines():
             if b" /dev/shm/" in line:
                 held.add(line.split(b" /dev/shm/", 1)[1].decode(errors="replace"))
-    return held
+    return held, numbers
 
 
 def noted():
@@ -80,11 +83,12 @@ def left(before, marker, folder):
     for line in read(pathlib.Path("/proc/self/mounts")).decode(errors="replace").splitlines():
         if folder in line:
             yield f"mount {line}"
-    held = held_by_others(marker)
+    held, numbers = of_others(marker)
     for place, now in noted().items():
         for name in now:
             inside = os.path.join(place, name)
-            if name not in before[place] and name not in held and inside != folder:
+            others = name in held or numbers & set(re.findall(r"\d{4,}", name))
+            if name not in before[place] and not others and not folder.startswith(inside):
                 yield f"in {place}: {name}"
 
 

@@ -12,7 +12,7 @@ build=.build/tests
 export CCACHE_SLOPPINESS=pch_defines,time_macros  # or it would not cache what uses precompiled headers
 jobs=$(nproc)
 step=0
-steps=11
+steps=12
 # Programs that the tests crash on purpose must end by their signal, not by a sanitizer's report.
 # One of them is preloaded with a clock device, before the sanitizer's own library. Each control program has a
 # plc_app_abi, also where one is loaded for all others to see.
@@ -23,10 +23,9 @@ if [ "${1:-}" != --step ] && [ "${1:-}" != --fuzz ]; then
   mkdir "$own/t"
   export TMPDIR=$own/t PLCHOST_RUN=${own##*/}
   log=$own/log
-  ahead_log=$own/ahead
   notes=$own/notes
   touch "$notes"
-  ahead=  # process group of what runs ahead
+  ahead=  # process group of the steps that run ahead
   trap '[ -z "$ahead" ] || kill -- "-$ahead" 2>/dev/null; rm -rf "$own"' EXIT
   trap 'exit 130' INT TERM
 fi
@@ -53,19 +52,28 @@ run() {
   "$@" >"$log" 2>&1 || code=$?
   end_step "$what" "$code" $((SECONDS - began)) "$log"
 }
-# Tests wait most of the time: what is built next is built meanwhile. run_ahead COMMAND..., later join WHAT.
+# Tests wait most of the time: all that needs no test is done beside them, one step after the other.
+# run_ahead STEP...: functions of this script, later join STEP WHAT
 run_ahead() {
   set -m  # as a process group, which can be ended as one
-  (began=$SECONDS; nice -n 10 "$BASH" "$self" --step "$@"; code=$?; echo "$((SECONDS - began))"; exit "$code") >"$ahead_log" 2>&1 &
+  (
+    for ahead_step; do
+      began=$SECONDS
+      code=0
+      nice -n 10 "$BASH" "$self" --step "$ahead_step" >"$own/$ahead_step.log" 2>&1 || code=$?
+      echo "$code $((SECONDS - began))" >"$own/$ahead_step.end"
+      [ "$code" -eq 0 ] || exit "$code"
+    done
+  ) &
   ahead=$!
   set +m
 }
 join() {
-  local code=0
-  say "$1"
-  wait "$ahead" || code=$?
-  ahead=
-  end_step "$1" "$code" "$(tail -n 1 "$ahead_log")" "$ahead_log"
+  local code=1 seconds=0
+  say "$2"
+  until [ -s "$own/$1.end" ] || ! kill -0 "$ahead" 2>/dev/null; do sleep 0.2; done
+  read -r code seconds <"$own/$1.end" || code=1
+  end_step "$2" "$code" "$seconds" "$own/$1.log"
 }
 
 configure() { # configure DIR OPTIONS...
@@ -117,10 +125,12 @@ tidy() {
     cmake --build .build/tidy --target plchost_idl_generate && tests/gates/tidy.sh "$PWD/.build/tidy"
 }
 
-fuzz() {
+build_fuzzers() {
   configure .build/fuzz -DCMAKE_C_COMPILER=clang-19 -DCMAKE_CXX_COMPILER=clang++-19 -DPLCHOST_FUZZ=ON \
     -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF "${unity[@]}" &&
-    cmake --build .build/fuzz -j "$jobs" --target fuzzers || return 1
+    cmake --build .build/fuzz -j "$jobs" --target fuzzers
+}
+fuzz() {
   printf '%s\0' .build/fuzz/bin/fuzz_* | xargs -0 -n 1 -P "$jobs" "$BASH" "$self" --fuzz
 }
 fuzz_one() {
@@ -152,19 +162,18 @@ case "${1:-}" in
     tests/left_behind.py begin "$own/before"
     run "gates, each proven by a planted fault" gates
     run "build" build_plain
-    run_ahead build_asan
+    run_ahead build_asan build_tsan tidy build_fuzzers
     run "tests" tests "$build" "${whole[@]}"
     count
-    join "address and undefined sanitizers: build"
-    # Without the processes: Debian's Cyclone is not compiled for it, and reports from real-time threads stand still.
-    run_ahead build_tsan
+    join build_asan "address and undefined sanitizers: build"
     run "address and undefined sanitizers: tests" tests .build/asan "${whole[@]}"
     count
-    join "thread sanitizer: build"
-    run_ahead tidy
+    # Without the processes: Debian's Cyclone is not compiled for it, and reports from real-time threads stand still.
+    join build_tsan "thread sanitizer: build"
     GTEST_FILTER=-$killing run "thread sanitizer: tests" tests .build/tsan "${whole[@]}"
     count
-    join "clang-tidy"
+    join tidy "clang-tidy"
+    join build_fuzzers "fuzzers: build"
     run "fuzzers" fuzz
     run "nothing is left behind" tests/left_behind.py end "$own/before"
     ;;

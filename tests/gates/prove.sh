@@ -184,9 +184,9 @@ wait "$!" 2>/dev/null
 touch "$TMPDIR/planted"
 must_be_red "left behind: a file" "file $TMPDIR/planted" left_behind
 rm "$TMPDIR/planted"
-touch "/dev/shm/plchost-planted-$$"
-must_be_red "left behind: a shared memory" "in /dev/shm: plchost-planted-$$" left_behind
-rm "/dev/shm/plchost-planted-$$"
+touch /dev/shm/plchost-planted
+must_be_red "left behind: a shared memory" "in /dev/shm: plchost-planted" left_behind
+rm /dev/shm/plchost-planted
 
 # The lists of tests that may be skipped or run again: what is on none of them is told.
 echo 'thread Planted.* planted' >"$plot/list"
