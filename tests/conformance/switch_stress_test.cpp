@@ -2,7 +2,10 @@
 #include <atomic>
 #include <cstdio>
 #include <cstdlib>
+#include <map>
 #include <random>
+#include <string_view>
+#include <utility>
 
 #include "tests/conformance/scheduler_fixture.hpp"
 
@@ -68,19 +71,30 @@ class SwitchUnderLoad : public testing::Test, public Tasks<LinuxClock> {
     add(task);
   }
 
-  // Until the time is over; how many there were.
-  int switch_about(const SchedulerSettings& settings) {
+  // Until the time is over: how often from which to which, and how many cycles of the first task each of them
+  // has run.
+  struct Switches {
+    std::map<std::pair<std::string_view, std::string_view>, int> exchanges;
+    std::map<std::string_view, std::uint64_t> cycles;
+  };
+  Switches switch_about(const SchedulerSettings& settings) {
     std::mt19937 random(5);
     const auto schedulers = all_schedulers();
     const TimePoint begin = clock.now();
     Duration longest{};
     Duration sum{};
+    Switches seen;
+    std::uint64_t cycles = counters(0).cycles;
     int switches = 0;
     for (TimePoint next = begin; next < begin + duration(); next += milliseconds(10), ++switches) {
       std::this_thread::sleep_for(std::max(next - clock.now(), Duration::zero()));
       const std::size_t to = std::uniform_int_distribution<std::size_t>(0, schedulers.size() - 1)(random);
+      const std::string_view from = set->scheduler_name();
+      seen.cycles[from] += counters(0).cycles - std::exchange(cycles, counters(0).cycles);
+      ++seen.exchanges[{from, schedulers[to].name}];
       const TimePoint before = clock.now();
       EXPECT_TRUE(set->switch_to(schedulers[to].name, settings));
+      EXPECT_EQ(set->scheduler_name(), schedulers[to].name);
       const Duration took = clock.now() - before;
       longest = std::max(longest, took);
       sum += took;
@@ -89,7 +103,7 @@ class SwitchUnderLoad : public testing::Test, public Tasks<LinuxClock> {
     std::printf("%d switches in %.1f s; one took %.2f ms, the longest %.2f ms\n", switches, elapsed,
                 std::chrono::duration<double, std::milli>(sum).count() / switches,
                 std::chrono::duration<double, std::milli>(longest).count());
-    return switches;
+    return seen;
   }
 
   std::atomic<bool> done_{false};
@@ -149,7 +163,7 @@ TEST_F(SwitchUnderLoad, KeepsEveryGridLosesNoEventAndRunsNoneTwice) {
       wait_for_looks();
     }
   });
-  const int switches = switch_about(settings);
+  const Switches switches = switch_about(settings);
   ending = true;
   poster.join();
   toggler.join();
@@ -159,7 +173,13 @@ TEST_F(SwitchUnderLoad, KeepsEveryGridLosesNoEventAndRunsNoneTwice) {
   ASSERT_TRUE(set->stop(seconds(30)));
   done_ = true;
 
-  EXPECT_GE(switches, 1);
+  for (const SchedulerEntry& from : all_schedulers()) {
+    for (const SchedulerEntry& to : all_schedulers()) {
+      EXPECT_TRUE((switches.exchanges.contains({from.name, to.name}))) << from.name << " to " << to.name;
+    }
+    // A hundred stretches of 10 ms and more: a scheduler that releases nothing has none.
+    EXPECT_GE((switches.cycles.contains(from.name) ? switches.cycles.at(from.name) : 0U), 50U) << from.name;
+  }
   EXPECT_EQ(counters(kPosted).cycles, posts);
   EXPECT_EQ(counters(kPosted).lost_events, 0U);
   EXPECT_EQ(counters(kRaised).cycles, posts);

@@ -152,11 +152,15 @@ TEST_F(AreasOf, AnInstanceAreWholeForAllWhoReadThemUnderKills) {
     ASSERT_TRUE(eventually([&] { return sut->task("Fast")->counters.cycles > fast + 20; }));
     EXPECT_TRUE(reader.kill()) << "it saw half a cycle";
     EXPECT_TRUE(writer.kill()) << "it could not have the image";
+    if (round % 10 == 9) {
+      const std::uint64_t input = report().input;
+      EXPECT_GT(input, before) << "the inputs of these writers have not come";
+      before = input;
+    }
   }
   const Report said = report();
   EXPECT_EQ(said.torn, 0U);
   EXPECT_EQ(said.late, 0U);
-  EXPECT_GT(said.input, before);
   std::printf("input image %lu, %lu cycles kept the one before\n", said.input, said.missed);
 }
 

@@ -45,8 +45,22 @@ Plant::~Plant() {
   MemoryFile::remove(host_page_name(pool_));
   ObjectPool::remove(pool_);
   remove_pool_memories(pool_);
+  // An instance that was still being set up has no socket by which it is found, and makes one.
   std::error_code ignored;
-  std::filesystem::remove_all(folder_, ignored);
+  eventually([&] {
+    kill_processes_about(folder_);
+    std::filesystem::remove_all(folder_, ignored);
+    return !std::filesystem::exists(folder_, ignored);
+  });
+}
+
+void Plant::kill_processes_about(const std::string& text) {
+  for (const auto& entry : std::filesystem::directory_iterator("/proc")) {
+    std::ostringstream line;
+    line << std::ifstream(entry.path() / "cmdline").rdbuf();
+    const int pid = std::atoi(entry.path().filename().c_str());
+    if (pid > 0 && line.str().contains(text)) ::kill(pid, SIGKILL);
+  }
 }
 
 // Those that outlived their manager: found by their sockets, as a manager would.
@@ -198,11 +212,14 @@ bool Plant::wait_for(const std::string& instance, InstanceState state) {
   return reached;
 }
 
-std::uint64_t Plant::cycles(const std::string& instance) {
+TaskCounters Plant::counters(const std::string& instance) {
   const auto page = InstancePageReader::open(pool_, instance);
-  std::uint64_t sum = 0;
+  TaskCounters sum{};
   for (std::uint32_t i = 0; page && i < page->task_count(); ++i) {
-    if (const auto task = page->task(i)) sum += task->counters.cycles;
+    if (const auto task = page->task(i)) {
+      sum.cycles += task->counters.cycles;
+      sum.lost_cycles += task->counters.lost_cycles;
+    }
   }
   return sum;
 }

@@ -62,7 +62,9 @@ class Plant {
   InstanceStatus status(const std::string& instance);
   bool wait_for(const std::string& instance, InstanceState state);
   /// Cycles of all tasks so far.
-  std::uint64_t cycles(const std::string& instance);
+  std::uint64_t cycles(const std::string& instance) { return counters(instance).cycles; }
+  /// Cycles and lost cycles of all tasks so far.
+  TaskCounters counters(const std::string& instance);
   bool wait_for_cycles(const std::string& instance, std::uint64_t more = 5);
   static bool eventually(const std::function<bool()>& condition);
   static bool within(Duration limit, const std::function<bool()>& condition);
@@ -79,6 +81,7 @@ class Plant {
   [[nodiscard]] const std::string& pool() const { return pool_; }
 
  private:
+  static void kill_processes_about(const std::string& text);
   ExitStatus wait_for_end(ChildProcess& process, Duration limit);
   std::filesystem::path folder_;
   std::string pool_;

@@ -37,7 +37,7 @@ void write(const std::string& path, const std::string& text) {
 
 class AuditLogTest : public ::testing::Test {
  protected:
-  ~AuditLogTest() override { std::filesystem::remove_all(folder); }
+  ~AuditLogTest() override { std::filesystem::remove_all(top); }
 
   [[nodiscard]] std::unique_ptr<AuditLog> open(std::size_t file_bytes = 1 << 20,
                                                std::size_t most = 64) const {
@@ -62,7 +62,8 @@ class AuditLogTest : public ::testing::Test {
   [[nodiscard]] AuditFindings check() const { return check_audit(folder).value(); }
   [[nodiscard]] std::string first_file() const { return audit_files(folder)->front().path; }
 
-  std::string folder = ::testing::TempDir() + "audit-" + std::to_string(::getpid()) + "/log";
+  std::string top = ::testing::TempDir() + "audit-" + std::to_string(::getpid());
+  std::string folder = top + "/log";
 };
 
 TEST(Sha256, IsThatOfTheStandard) {
