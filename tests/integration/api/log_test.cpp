@@ -131,6 +131,7 @@ TEST_F(RemoteLog, IsFollowedAlsoOverTheEndOfTheServerAndANewNumbering) {
   follower.signal(SIGINT);
   EXPECT_EQ(follower.wait(), 0);
   ::unlink(seen.c_str());
+  ::unlink((seen + ".errors").c_str());
 }
 
 TEST_F(RemoteLog, OverWhichAStrangerWroteHarmsNobody) {
