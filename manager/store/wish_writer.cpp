@@ -15,6 +15,7 @@
 #include <sys/epoll.h>
 
 #include "manager/store/wish_folder.hpp"
+#include "manager/system/take_packets.hpp"
 #include "shm/base/replace_file.hpp"
 
 namespace plchost {
@@ -97,22 +98,15 @@ Result<void> WishWriter::start() {
 }
 
 void WishWriter::read_answers() {
-  for (;;) {
-    auto packet = link_ ? link_.receive() : Result<std::optional<std::string>>(std::nullopt);
-    if (!packet) {
-      link_watch_.reset();
-      link_.close();
-      return;
-    }
-    if (!*packet) return;
-    const std::size_t end = (*packet)->find(' ');
-    const auto found = waiting_.find(number_of((*packet)->substr(0, end)));
-    if (found == waiting_.end()) continue;
+  take_packets(link_, link_watch_, [this](std::string_view packet) {
+    const std::size_t end = packet.find(' ');
+    const auto found = waiting_.find(number_of(packet.substr(0, end)));
+    if (found == waiting_.end()) return;
     const Done done = std::move(found->second);
     waiting_.erase(found);
-    const std::string problem = end == std::string::npos ? std::string() : (*packet)->substr(end + 1);
+    const std::string problem(end == std::string_view::npos ? std::string_view() : packet.substr(end + 1));
     done(problem.empty() ? Result<void>() : failure(ErrorCode::system, problem));
-  }
+  });
 }
 
 void WishWriter::ended() {

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <sys/epoll.h>
 
+#include "manager/system/take_packets.hpp"
 #include "shm/base/log.hpp"
 
 namespace plchost {
@@ -106,37 +107,23 @@ void ProcessHost::set_timer(std::optional<TimePoint> when) {
 // The lines of the process come before those of the manager about it.
 void ProcessHost::read_reports() {
   read_output();
-  for (;;) {
-    auto packet = report_ ? report_.receive() : Result<std::optional<std::string>>(std::nullopt);
-    if (!packet) {  // the process has closed it, or is gone
-      report_watch_.reset();
-      report_.close();
-      return;
-    }
-    if (!*packet) return;
-    if (const auto report = decode_report(**packet)) {
+  take_packets(report_, report_watch_, [this](std::string_view packet) {
+    if (const auto report = decode_report(packet)) {
       events_->on_report(*report);
     } else {
       spdlog::warn("instance {}: {}", settings_.name, report.error().describe());
     }
-  }
+  });
 }
 
 void ProcessHost::read_replies() {
-  for (;;) {
-    auto packet = link_ ? link_.receive() : Result<std::optional<std::string>>(std::nullopt);
-    if (!packet) {
-      link_watch_.reset();
-      link_.close();
-      return;
-    }
-    if (!*packet) return;
-    if (const auto reply = decode_reply(**packet)) {
+  take_packets(link_, link_watch_, [this](std::string_view packet) {
+    if (const auto reply = decode_reply(packet)) {
       events_->on_reply(*reply);
     } else {
       spdlog::warn("instance {}: {}", settings_.name, reply.error().describe());
     }
-  }
+  });
 }
 
 // The one place where an instance's exit is reaped. What it said last explains the exit, so it comes first.
