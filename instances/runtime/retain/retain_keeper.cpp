@@ -192,10 +192,20 @@ void RetainKeeper::finish() {
   thread_.join();
 }
 
+// Between two saves it looks whether there will be something to save.
 void RetainKeeper::run() {
+  constexpr Duration kLook = std::chrono::seconds(1);
+  const auto awaited = [this] { return soon_ || ending_; };
   std::unique_lock lock(mutex_);
   for (bool last = false; !last;) {
-    wake_.wait_for(lock, interval_, [this] { return soon_ || ending_; });
+    const TimePoint next = MonotonicClock::now() + interval_;
+    for (Duration left = interval_; left > Duration::zero() && !awaited();
+         left = next - MonotonicClock::now()) {
+      wake_.wait_for(lock, std::min(left, kLook), awaited);
+      lock.unlock();
+      (void)notice_loss();
+      lock.lock();
+    }
     soon_ = false;
     last = ending_;
     lock.unlock();
@@ -254,18 +264,23 @@ RetainKeeper::Taken RetainKeeper::take_snapshot() {
   return take_whole() ? Taken::all : take_groups();
 }
 
+bool RetainKeeper::notice_loss() {
+  lost_ = lost_ || !memory_.is_whole();
+  if (lost_) {
+    tell(Fault::memory,
+         "another program has cut or overwritten the memory in which they lie; reset the instance, which "
+         "takes "
+         "them from the file");
+  }
+  return lost_;
+}
+
 void RetainKeeper::save() {
   if (!files_) return;
   // What was lost stays so: nobody knows what the memory holds if it looks whole again later.
   if (lost_) return count_unsaved();
   const Taken taken = take_snapshot();
-  lost_ = !memory_.is_whole();
-  if (lost_) {
-    count_unsaved();
-    return tell(Fault::memory,
-                "another program has cut or overwritten the memory in which they lie; reset the instance, "
-                "which takes them from the file");
-  }
+  if (notice_loss()) return count_unsaved();
   tell(Fault::cycles, taken == Taken::all ? ""
                       : taken == Taken::none
                           ? "tasks were within a cycle each time"

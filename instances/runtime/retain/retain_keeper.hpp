@@ -69,6 +69,8 @@ class RetainKeeper {
   RetainKeeper(KeptMemory memory, Start start, const Options& options);
   void run();
   void save();
+  /// Whether the memory is lost, which is told.
+  [[nodiscard]] bool notice_loss();
   /// What image_ has then: all as it is between cycles now; so of some areas, the others as before; nothing
   /// new.
   enum class Taken : std::uint8_t { all, some, none };

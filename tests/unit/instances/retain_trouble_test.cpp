@@ -1,4 +1,6 @@
 // What becomes of retain variables whose memory was cut, or whose folder takes nothing.
+#include <algorithm>
+#include <chrono>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -62,6 +64,18 @@ TEST_F(RetainInTrouble, MemoryThatWasCutToNothingIsNotSaved) {
   fs::resize_file(memory_path(), 0);
   wait_for_unsaved();
   expect_42_from_the_file();
+}
+
+TEST_F(RetainInTrouble, MemoryThatIsLostIsToldLongBeforeTheNextSave) {
+  start_well({.interval = std::chrono::hours(1)});
+  {
+    const auto memory =
+        MemoryFile::open(pool_memory_name(name_.get(), "line1.retain"), 1, MemoryFile::Access::read_write);
+    std::ranges::fill(memory->bytes(), std::byte{0});
+  }
+  while (sut->problem().empty()) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_THAT(sut->problem(), HasSubstr("cut or overwritten"));
+  EXPECT_EQ(sut->unsaved(), 0U) << "no save was due";
 }
 
 TEST_F(RetainInTrouble, MemoryThatWasCutAndMadeLongAgainIsNotSaved) {
