@@ -111,7 +111,8 @@ Result<std::unique_ptr<Manager>> Manager::create(const ManagerConfig& config, Op
 
 // Without the lock the manager runs all the same: a disk that fails is no reason to stop a plant.
 Result<void> Manager::lock_wishes() {
-  auto locked = wishes_lock_.take(wishes_folder(config_.host.state_directory, config_.host.name));
+  auto locked =
+      wishes_lock_.take(state_disk_, wishes_folder(config_.host.state_directory, config_.host.name));
   if (locked || locked.error().code == ErrorCode::already_exists) return locked;
   spdlog::error("[host] state_directory: the manager cannot see whether another one uses it: {}",
                 locked.error().describe());
@@ -174,7 +175,7 @@ Supervisor::HostedInstance Manager::make_host(const InstanceConfig& instance) {
                                                                      .run_directory = own.run_directory});
   ProcessHost& made = *host;
   auto applications = std::make_unique<StoreProcess>(
-      *reactor_,
+      *reactor_, state_disk_,
       StoreProcess::Settings{
           .pool = own.pool,
           .folder = versions_folder(applications_folder(own.state_directory, own.name), instance.name),
@@ -182,7 +183,7 @@ Supervisor::HostedInstance Manager::make_host(const InstanceConfig& instance) {
           .helper = "/proc/self/exe",
           .plc_instance = plc_instance});
   auto wishes =
-      std::make_unique<WishStore>(*reactor_, wish_writer_,
+      std::make_unique<WishStore>(*reactor_, wish_writer_, state_disk_,
                                   WishStore::Settings{.pool = own.pool,
                                                       .instance = instance.name,
                                                       .folder = wishes_folder(own.state_directory, own.name),

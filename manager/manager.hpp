@@ -19,6 +19,7 @@
 #include "manager/store/wish_folder.hpp"
 #include "manager/store/wish_store.hpp"
 #include "manager/supervisor/supervisor.hpp"
+#include "manager/system/disk_thread.hpp"
 #include "manager/system/reactor.hpp"
 #include "shm/base/lock_file.hpp"
 #include "shm/pool/host_page.hpp"
@@ -73,6 +74,8 @@ class Manager {
   Options options_;
   // From here on in the order of making; destroyed in the reverse one.
   LockFile lock_;
+  DiskThread state_disk_;   // of [host] state_directory
+  DiskThread config_disk_;  // of the configuration
   WishFolderLock wishes_lock_;
   std::unique_ptr<Reactor> reactor_;
   std::optional<ObjectPool> pool_;

@@ -18,6 +18,12 @@
 
 namespace plchost {
 
+namespace {
+
+constexpr Duration kConfigReadLimit = std::chrono::seconds(2);
+
+}  // namespace
+
 // Their processes run on: an edited file ends no machine.
 void Manager::adopt_removed() {
   for (const std::string& name : WishMemory::instances(config_.host.pool)) {
@@ -37,11 +43,13 @@ void Manager::adopt_removed() {
 }
 
 Result<std::vector<std::string>> Manager::reload() {
-  auto read = options_.read();
-  if (!read) {  // changed since it was checked
-    return failure(ErrorCode::invalid_argument, join_lines(read.error(), "plchostd --check-config"));
+  auto read = config_disk_.ask<std::expected<ManagerConfig, ConfigErrors>>(kConfigReadLimit, options_.file,
+                                                                           options_.read);
+  if (!read) return std::unexpected(read.error());
+  if (!*read) {  // changed since it was checked
+    return failure(ErrorCode::invalid_argument, join_lines(read->error(), "plchostd --check-config"));
   }
-  ManagerConfig& now = *read;
+  ManagerConfig& now = **read;
   if (auto room = supervisor_->check_room(now.instances); !room) return std::unexpected(room.error());
   for (const InstanceConfig& instance : now.instances) {
     if (transitions_.contains(instance.name)) continue;

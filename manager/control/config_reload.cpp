@@ -1,12 +1,9 @@
 #include "manager/control/config_reload.hpp"
 
 #include <algorithm>
-#include <csignal>
 #include <utility>
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <sys/epoll.h>
 
 #include "manager/system/service_manager.hpp"
 #include "shm/base/log.hpp"
@@ -15,7 +12,7 @@ namespace plchost {
 
 namespace {
 
-constexpr int kOutputRoom = 1 << 20;  // read at its end only
+constexpr std::size_t kOutputRoom = 1 << 20;  // read at its end only
 
 std::vector<std::string> split_lines(std::string_view text) {
   std::vector<std::string> lines;
@@ -44,13 +41,7 @@ std::string join_lines(const std::vector<std::string>& lines, std::string_view w
 }
 
 ConfigReload::ConfigReload(Reactor& reactor, Settings settings, ControlHandler& next, Apply apply)
-    : reactor_(reactor),
-      settings_(std::move(settings)),
-      next_(next),
-      apply_(std::move(apply)),
-      limit_(reactor, [this] {
-        if (process_) (void)signal_process(*process_, SIGKILL);  // check_ended() says the rest
-      }) {}
+    : settings_(std::move(settings)), next_(next), apply_(std::move(apply)), check_(reactor) {}
 
 void ConfigReload::handle(const ControlRequest& request, ControlReplyFunction reply) {
   if (request.verb != ControlVerb::reload_host || !request.instance.empty()) {
@@ -75,7 +66,7 @@ void ConfigReload::add(Waiting waiting) {
   }
   if (!waiting.reply) notify_reloading();
   later_.push_back(std::move(waiting));
-  if (!process_) begin();
+  if (round_.empty()) begin();
 }
 
 void ConfigReload::begin() {
@@ -85,34 +76,18 @@ void ConfigReload::begin() {
 }
 
 Result<void> ConfigReload::start_check() {
-  auto pipe = make_output_pipe();
-  if (!pipe) return std::unexpected(pipe.error());
-  (void)::fcntl(pipe->write_end.get(), F_SETPIPE_SZ, kOutputRoom);  // NOLINT: variadic
-  auto process = spawn_process(
-      {.arguments = {settings_.program, "--check-config", settings_.file, "--programs", settings_.programs},
-       .output_fd = pipe->write_end.get()});
-  if (!process) return std::unexpected(process.error());
-  auto watch = reactor_.watch(process->pidfd.get(), EPOLLIN, [this](std::uint32_t) { check_ended(); });
-  if (!watch) {
-    kill_and_reap(*process);
-    return std::unexpected(watch.error());
-  }
-  process_ = std::move(*process);
-  output_ = std::move(pipe->read_end);
-  watch_ = std::move(*watch);
-  limit_.set(MonotonicClock::now() + kReloadLimit);
-  return {};
+  return check_.start({settings_.program, "--check-config", settings_.file, "--programs", settings_.programs},
+                      kReloadLimit, kOutputRoom, [this](const HelperEnd& end) { check_ended(end); });
 }
 
-void ConfigReload::check_ended() {
-  end_session(*process_);
-  const ExitStatus status = reap_process(*process_);
-  const std::string output = read_available(output_.get(), kOutputRoom);
-  limit_.cancel();
-  watch_.reset();
-  output_.reset();
-  process_.reset();
-  if (ending_) return;
+void ConfigReload::check_ended(const HelperEnd& end) {
+  const auto& [status, in_time, output] = end;
+  if (!in_time) {
+    return finish(
+        failure(ErrorCode::timed_out,
+                fmt::format("the check of {} took longer than {} s", settings_.file,
+                            std::chrono::duration_cast<std::chrono::seconds>(kReloadLimit).count())));
+  }
   constexpr int kFaulty = 1;
   if (status.exited_with(kFaulty) && !output.empty()) {
     const std::string text = join_lines(split_lines(output), "plchostd --check-config");
@@ -164,10 +139,7 @@ void ConfigReload::finish(const Result<std::string>& result) {
 
 void ConfigReload::shut_down() {
   ending_ = true;
-  limit_.cancel();
-  watch_.reset();
-  if (process_) kill_and_reap(*process_);
-  process_.reset();
+  check_.give_up();
   for (auto* const list : {&round_, &later_}) {
     for (const Waiting& waiting : std::exchange(*list, {})) {
       if (!waiting.reply) continue;

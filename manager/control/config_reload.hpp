@@ -1,13 +1,12 @@
 #pragma once
 
 #include <functional>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "api/control/control_handler.hpp"
-#include "manager/system/child_process.hpp"
+#include "manager/system/helper_process.hpp"
 #include "manager/system/reactor.hpp"
 #include "shm/base/time.hpp"
 
@@ -54,18 +53,14 @@ class ConfigReload : public ControlHandler {
   void add(Waiting waiting);
   void begin();
   [[nodiscard]] Result<void> start_check();
-  void check_ended();
+  void check_ended(const HelperEnd& end);
   void finish(const Result<std::string>& result);
   [[nodiscard]] Result<std::string> take_over();
 
-  Reactor& reactor_;
   Settings settings_;
   ControlHandler& next_;
   Apply apply_;
-  std::optional<ChildProcess> process_;
-  UniqueFd output_;
-  Reactor::Watch watch_;
-  Reactor::Timer limit_;
+  HelperProcess check_;
   std::vector<Waiting> round_;  // of the check that runs
   std::vector<Waiting> later_;
   bool ending_ = false;

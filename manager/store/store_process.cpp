@@ -1,21 +1,17 @@
 #include "manager/store/store_process.hpp"
 
 #include <algorithm>
-#include <csignal>
 #include <utility>
 
 #include <fmt/format.h>
-#include <sys/epoll.h>
 
 #include "manager/system/application_trial.hpp"
+#include "shm/base/log.hpp"
 
 namespace plchost {
 
-StoreProcess::StoreProcess(Reactor& reactor, Settings settings)
-    : reactor_(reactor), settings_(std::move(settings)), timer_(reactor, [this] {
-        timed_out_ = true;
-        if (process_) (void)signal_process(*process_, SIGKILL);  // ended() says the rest
-      }) {}
+StoreProcess::StoreProcess(Reactor& reactor, DiskThread& disk, Settings settings)
+    : disk_(disk), settings_(std::move(settings)), helper_(reactor) {}
 
 Result<void> StoreProcess::keep(const ApplicationOrder& order, const std::string& name,
                                 const std::string& before, const LaunchOptions& launch, Done done) {
@@ -42,46 +38,34 @@ Result<void> StoreProcess::set_boot(const std::string& path, const std::string& 
   return start(store, std::move(done));
 }
 
-std::string StoreProcess::boot() {
-  return read_boot(settings_.folder);
-}
-
-std::optional<ApplicationVersion> StoreProcess::version_at(const std::string& path) {
-  return plchost::version_at(settings_.folder, path);
-}
-
-Result<void> StoreProcess::start(const StoreOrder& order, Done done) {
-  if (process_) return failure(ErrorCode::busy, "another application is being stored");
-  auto pipe = make_output_pipe();
-  if (!pipe) return std::unexpected(pipe.error());
-  auto process = spawn_process(
-      {.arguments = {settings_.helper, kStoreOption, encode(order)}, .output_fd = pipe->write_end.get()});
-  if (!process) return std::unexpected(process.error());
-  auto watch = reactor_.watch(process->pidfd.get(), EPOLLIN, [this](std::uint32_t) { ended(); });
-  if (!watch) {
-    (void)signal_process(*process, SIGKILL);
-    return std::unexpected(watch.error());
-  }
-  process_ = std::move(*process);
-  watch_ = std::move(*watch);
-  output_ = std::move(pipe->read_end);
-  done_ = std::move(done);
-  timed_out_ = false;
-  timer_.set(MonotonicClock::now() + kStoreLimit);
+// As if there was nothing, if the disk does not answer.
+template <class Answer>
+Answer StoreProcess::look(std::function<Answer()> at_folder) const {
+  auto answer = disk_.ask<Answer>(kStoreLookLimit, settings_.folder, std::move(at_folder));
+  if (answer) return *std::move(answer);
+  spdlog::error("what is kept of applications is not known: {}", answer.error().describe());
   return {};
 }
 
-void StoreProcess::ended() {
+std::string StoreProcess::boot() {
+  return look<std::string>([folder = settings_.folder] { return read_boot(folder); });
+}
+
+std::optional<ApplicationVersion> StoreProcess::version_at(const std::string& path) {
+  return look<std::optional<ApplicationVersion>>(
+      [folder = settings_.folder, path] { return plchost::version_at(folder, path); });
+}
+
+Result<void> StoreProcess::start(const StoreOrder& order, Done done) {
   constexpr std::size_t kShown = 4000;
-  const ExitStatus status = reap_process(*process_);
-  const std::string output = read_available(output_.get(), kShown);
-  timer_.cancel();
-  watch_.reset();
-  output_.reset();
-  process_.reset();
-  const Done done = std::exchange(done_, nullptr);
+  return helper_.start({settings_.helper, kStoreOption, encode(order)}, kStoreLimit, kShown,
+                       [done = std::move(done)](const HelperEnd& end) { ended(end, done); });
+}
+
+void StoreProcess::ended(const HelperEnd& end, const Done& done) {
+  const auto& [status, in_time, output] = end;
   if (status.success()) return done(output);
-  if (timed_out_) {
+  if (!in_time) {
     return done(failure(ErrorCode::timed_out,
                         fmt::format("storing it took longer than {} s",
                                     std::chrono::duration_cast<std::chrono::seconds>(kStoreLimit).count())));

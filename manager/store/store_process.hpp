@@ -7,7 +7,8 @@
 
 #include "manager/store/application_keeper.hpp"
 #include "manager/store/store_order.hpp"
-#include "manager/system/child_process.hpp"
+#include "manager/system/disk_thread.hpp"
+#include "manager/system/helper_process.hpp"
 #include "manager/system/reactor.hpp"
 
 namespace plchost {
@@ -23,7 +24,8 @@ class StoreProcess : public ApplicationKeeper {
     std::string plc_instance;             ///< program that tries an application
   };
 
-  StoreProcess(Reactor& reactor, Settings settings);
+  /// `disk` outlives it.
+  StoreProcess(Reactor& reactor, DiskThread& disk, Settings settings);
 
   [[nodiscard]] Result<void> keep(const ApplicationOrder& order, const std::string& name,
                                   const std::string& before, const LaunchOptions& launch, Done done) override;
@@ -33,19 +35,18 @@ class StoreProcess : public ApplicationKeeper {
   [[nodiscard]] std::optional<ApplicationVersion> version_at(const std::string& path) override;
 
  private:
+  template <class Answer>
+  [[nodiscard]] Answer look(std::function<Answer()> at_folder) const;
   [[nodiscard]] Result<void> start(const StoreOrder& order, Done done);
-  void ended();
+  static void ended(const HelperEnd& end, const Done& done);
 
-  Reactor& reactor_;
+  DiskThread& disk_;
   Settings settings_;
-  Done done_;
-  std::optional<ChildProcess> process_;
-  Reactor::Watch watch_;
-  UniqueFd output_;
-  Reactor::Timer timer_;
-  bool timed_out_ = false;
+  HelperProcess helper_;
 };
 
+/// How long the manager waits for the disk when it looks at what is kept.
+inline constexpr Duration kStoreLookLimit = std::chrono::seconds(2);
 /// The command line that makes plchostd the helper.
 inline constexpr const char* kStoreOption = "--store";
 /// How long the helper may take: a slow disk, and a trial.

@@ -2,9 +2,11 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
+#include "manager/system/disk_thread.hpp"
 #include "shm/base/lock_file.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
@@ -29,12 +31,12 @@ class WishFolderLock {
   /// already_exists: another manager holds it; the text names the folder and the process. timed_out: the disk
   /// has not answered within `limit`. refused: the lock file is not this user's. system: the folder cannot be
   /// written. A manager starts without the lock after any of these but the first. Set-up; to be called once.
-  [[nodiscard]] Result<void> take(const std::string& folder, Duration limit = kWishFolderLimit,
-                                  const Take& take_file = LockFile::take);
+  [[nodiscard]] Result<void> take(DiskThread& disk, const std::string& folder,
+                                  Duration limit = kWishFolderLimit, const Take& take_file = LockFile::take);
 
  private:
-  struct Attempt;
-  std::shared_ptr<Attempt> attempt_;  // has the lock, also if it comes after the limit
+  // Of the disk's thread until it has answered; has the lock, also if that comes after the limit.
+  std::shared_ptr<std::optional<Result<LockFile>>> outcome_;
 };
 
 }  // namespace plchost

@@ -10,7 +10,7 @@
 namespace plchost {
 
 /// Keeps what one instance is to be: in shared memory for the next manager, on the disk for a power cut.
-/// Nothing in it waits for the disk, find() apart.
+/// Nothing in it waits for the disk, but for find(), and that within a limit.
 class WishKeeper {
  public:
   /// `problem`: why a power cut would undo it; empty: it would not.
@@ -18,7 +18,7 @@ class WishKeeper {
 
   virtual ~WishKeeper() = default;
   /// What was kept last. Nothing: the instance is new on this host. corrupt: something was, and cannot be
-  /// read. To be called once, before all else; reads a file.
+  /// read. timed_out: the disk that may have it does not answer. To be called once, before all else.
   [[nodiscard]] virtual Result<std::optional<InstanceWish>> find() = 0;
   /// Is in shared memory when it returns, and on the disk later.
   virtual void keep(const InstanceWish& wish) = 0;

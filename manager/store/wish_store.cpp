@@ -1,5 +1,6 @@
 #include "manager/store/wish_store.hpp"
 
+#include <algorithm>
 #include <cerrno>
 #include <filesystem>
 #include <utility>
@@ -45,14 +46,21 @@ Result<std::string> read_wish_file(const std::string& path, std::size_t most) {
   return text;
 }
 
+// Than any that a disk may have: what is asked for from now on is newer.
+std::uint32_t higher_number(std::uint32_t known) {
+  constexpr std::int64_t kNsPerSecond = 1'000'000'000;
+  return std::max(known, static_cast<std::uint32_t>(unix_time_ns() / kNsPerSecond));
+}
+
 std::string registered_events_path(const std::string& run_directory, const std::string& instance) {
   return fmt::format("{}/{}.events", run_directory, instance);
 }
 
 }  // namespace
 
-WishStore::WishStore(Reactor& reactor, WishWriter& writer, Settings settings)
+WishStore::WishStore(Reactor& reactor, WishWriter& writer, DiskThread& disk, Settings settings)
     : writer_(writer),
+      disk_(disk),
       settings_(std::move(settings)),
       limit_(reactor,
              [this] {
@@ -69,23 +77,27 @@ Result<std::optional<InstanceWish>> WishStore::find() {
     spdlog::error("instance {}: what it is to be is not kept for the next manager: {}", settings_.instance,
                   memory.error().describe());
   }
-  const auto file = read_wish_file(path(), kMaxWishBytes);
+  auto remembered = memory_ ? memory_->read() : std::nullopt;
+  const auto file = read_file(path(), kMaxWishBytes, remembered ? kWishReadLimit : kOnlyWishReadLimit);
   auto wish = file ? decode_wish(*file) : Result<InstanceWish>(std::unexpected(file.error()));
   if (file) wanted_ = written_ = *file;
   if (wish) {
     number_ = std::exchange(wish->number, 0);
     contents_ = encode(*wish);
   }
-  if (auto remembered = memory_ ? memory_->read() : std::nullopt) {
-    if (wish && number_ > remembered->number) {
-      wish->process = remembered->process;
-      wish->host_ended = remembered->host_ended;
-    } else {
-      number_ = std::exchange(remembered->number, 0);
-      wish = *std::move(remembered);
-    }
-    if (wish->host_ended) restore_events();
-    return *std::move(wish);
+  const bool silent = !file && file.error().code == ErrorCode::timed_out;
+  // After an end in order the disk may know a boot application, and what a power cut would leave.
+  if (silent && (!remembered || remembered->host_ended)) {
+    number_ = higher_number(0);
+    return std::unexpected(file.error());
+  }
+  if (silent) {
+    remembered->number = higher_number(remembered->number);
+    spdlog::error("instance {}: what it is to be is taken from memory: {}", settings_.instance,
+                  file.error().describe());
+  }
+  if (remembered) {
+    return take_remembered(*std::move(remembered), wish ? std::optional(*std::move(wish)) : std::nullopt);
   }
   const bool none = !file && file.error().code == ErrorCode::not_found;
   if (none && memory_ && memory_->damaged()) {
@@ -99,13 +111,33 @@ Result<std::optional<InstanceWish>> WishStore::find() {
   return wish->after_power_cut();
 }
 
+// `kept`: of the disk, with number_.
+Result<std::optional<InstanceWish>> WishStore::take_remembered(InstanceWish remembered,
+                                                               std::optional<InstanceWish> kept) {
+  if (kept && number_ > remembered.number) {
+    kept->process = remembered.process;
+    kept->host_ended = remembered.host_ended;
+  } else {
+    number_ = std::exchange(remembered.number, 0);
+    kept = std::move(remembered);
+  }
+  if (kept->host_ended) restore_events();
+  return kept;
+}
+
+Result<std::string> WishStore::read_file(const std::string& path, std::size_t most, Duration limit) const {
+  const auto text =
+      disk_.ask<Result<std::string>>(limit, path, [path, most] { return read_wish_file(path, most); });
+  return text ? *text : std::unexpected(text.error());
+}
+
 // What instances read is in the run directory, which a power cut empties.
 void WishStore::restore_events() const {
   constexpr std::size_t kMostBytes = std::size_t{1} << 18;  // 4096 names
   const std::string registered = registered_events_path(settings_.run_directory, settings_.instance);
   std::error_code error;
   if (std::filesystem::exists(registered, error)) return;
-  const auto kept = read_wish_file(events_path(), kMostBytes);
+  const auto kept = read_file(events_path(), kMostBytes, kWishReadLimit);
   if (!kept && kept.error().code == ErrorCode::not_found) return;
   const auto restored = kept ? replace_file(registered, *kept) : std::unexpected(kept.error());
   if (!restored) {

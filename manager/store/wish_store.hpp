@@ -8,6 +8,7 @@
 #include "manager/store/wish_keeper.hpp"
 #include "manager/store/wish_memory.hpp"
 #include "manager/store/wish_writer.hpp"
+#include "manager/system/disk_thread.hpp"
 #include "manager/system/reactor.hpp"
 #include "shm/base/time.hpp"
 
@@ -15,13 +16,17 @@ namespace plchost {
 
 /// How long an operator's command waits for the disk before it is answered without.
 inline constexpr Duration kWishLimit = std::chrono::seconds(2);
+/// How long the manager waits, when it starts, for what the disk has: of an instance that it knows from
+/// memory, and of one that nothing else tells of. The host is starting then, and its disk may be, too.
+inline constexpr Duration kWishReadLimit = std::chrono::seconds(2);
+inline constexpr Duration kOnlyWishReadLimit = std::chrono::seconds(10);
 /// What could not be written is tried again after so long.
 inline constexpr Duration kWishRetry = std::chrono::seconds(10);
 
 /// The real WishKeeper: a WishMemory, and the files INSTANCE.wish and INSTANCE.events of wishes_folder().
 /// Only what a power cut leaves of a wish goes to the disk, and only if it is another than before. find()
 /// takes the newer of the two: the memory can be that of an earlier manager with another pool in between, or
-/// damaged.
+/// damaged. If the disk does not answer, the memory's counts.
 class WishStore : public WishKeeper {
  public:
   struct Settings {
@@ -31,8 +36,8 @@ class WishStore : public WishKeeper {
     std::string run_directory;  ///< where instances keep what operators registered
   };
 
-  /// `writer` outlives it.
-  WishStore(Reactor& reactor, WishWriter& writer, Settings settings);
+  /// `writer` and `disk` outlive it.
+  WishStore(Reactor& reactor, WishWriter& writer, DiskThread& disk, Settings settings);
 
   [[nodiscard]] Result<std::optional<InstanceWish>> find() override;
   void keep(const InstanceWish& wish) override;
@@ -49,6 +54,10 @@ class WishStore : public WishKeeper {
   [[nodiscard]] std::string events_path() const {
     return settings_.folder + "/" + settings_.instance + ".events";
   }
+  [[nodiscard]] Result<std::string> read_file(const std::string& path, std::size_t most,
+                                              Duration limit) const;
+  [[nodiscard]] Result<std::optional<InstanceWish>> take_remembered(InstanceWish remembered,
+                                                                    std::optional<InstanceWish> kept);
   void restore_events() const;
   void write();
   void written(const Result<void>& result, const std::string& text);
@@ -56,6 +65,7 @@ class WishStore : public WishKeeper {
   void tell(const std::string& problem);
 
   WishWriter& writer_;
+  DiskThread& disk_;
   Settings settings_;
   Reactor::Timer limit_;
   Reactor::Timer retry_;

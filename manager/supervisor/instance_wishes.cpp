@@ -42,6 +42,9 @@ std::string_view done_text(ControlVerb verb) noexcept {
 
 void ManagedInstance::restore() {
   auto found = surroundings_.wishes.find();
+  // Afterwards: a disk that was slow to answer has answered then.
+  const std::string boot = surroundings_.applications.boot();
+  application_ = boot.empty() ? config_.application : boot;
   if (!found) {
     unreadable_ = found.error().describe();
     spdlog::error("instance {}: what it is to be is not known, so it is not started: {}", config_.name,
@@ -56,7 +59,7 @@ void ManagedInstance::restore() {
                  .scheduler = earlier.configured_scheduler,
                  .process = earlier.configured_process};
   scheduler_ = earlier.scheduler;
-  const bool boots = earlier.host_ended && !surroundings_.applications.boot().empty();
+  const bool boots = earlier.host_ended && !boot.empty();
   if (!boots) application_ = earlier.application;
   commanded_ = earlier.commanded;
   wants_running_ = earlier.commanded ? earlier.running : true;

@@ -54,10 +54,8 @@ ManagedInstance::ManagedInstance(const InstanceConfig& config, Surroundings surr
       surroundings_(std::move(surroundings)),
       host_(host),
       history_(config_),
-      application_(surroundings_.applications.boot()),
       scheduler_(config.scheduler),
       begun_with_(configured()) {
-  if (application_.empty()) application_ = config.application;
   unix_offset_ns_ = unix_time_ns() - surroundings_.now().time_since_epoch().count();
   restore();
   status_.name.assign(config.name);

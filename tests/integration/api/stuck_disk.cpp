@@ -1,5 +1,6 @@
-// Loaded into plchost-dds with LD_PRELOAD: while the file $STUCK_DISK is there, the audit log can neither be
-// opened nor written: both hang, as on a file system that is frozen.
+// Loaded with LD_PRELOAD: while the file $STUCK_DISK is there, the audit log can neither be opened nor
+// written: both hang, as on a file system that is frozen. With $STUCK_PATH, all paths with that text cannot
+// be opened.
 #include <array>
 #include <cstdarg>
 #include <cstdio>
@@ -34,7 +35,8 @@ extern "C" __attribute__((visibility("default"))) ssize_t write(int fd, const vo
 
 // NOLINTNEXTLINE(cert-dcl50-cpp): the C library's own form
 extern "C" __attribute__((visibility("default"))) int open(const char* path, int flags, ...) {
-  if (std::strstr(path, "/audit") != nullptr) wait_for_disk();
+  const char* const stuck = std::getenv("STUCK_PATH");  // NOLINT(concurrency-mt-unsafe): never changed
+  if (std::strstr(path, stuck != nullptr ? stuck : "/audit") != nullptr) wait_for_disk();
   mode_t mode = 0;
   if ((flags & O_CREAT) != 0) {
     std::va_list rest;

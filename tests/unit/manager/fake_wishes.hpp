@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -13,6 +14,7 @@ namespace plchost {
 class FakeWishes : public WishKeeper {
  public:
   [[nodiscard]] Result<std::optional<InstanceWish>> find() override {
+    if (on_find) on_find();
     if (damaged) return failure(ErrorCode::corrupt, "/state/line1: its checksum does not fit its contents");
     return wish;
   }
@@ -31,6 +33,7 @@ class FakeWishes : public WishKeeper {
 
   [[nodiscard]] bool is_writing() const override { return writing; }
 
+  std::function<void()> on_find;
   std::optional<InstanceWish> wish;
   bool damaged = false;
   bool disk_is_slow = false;

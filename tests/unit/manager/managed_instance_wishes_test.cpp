@@ -184,6 +184,14 @@ TEST_P(InstanceWishes, BeginsWithTheBootApplicationOnlyWithTheHost) {
   EXPECT_EQ(only_start().application, GetParam() == Death::power_cut ? "/opt/boot.so" : "/opt/other.so");
 }
 
+// find() waits for it longer than a look at the applications does.
+TEST_P(InstanceWishes, OfASlowDiskDoNotHideTheBootApplication) {
+  bring_up();
+  wishes_.on_find = [this] { applications_.boot_path = "/opt/boot.so"; };
+  next_manager();
+  EXPECT_EQ(only_start().application, GetParam() == Death::power_cut ? "/opt/boot.so" : "/opt/line.so");
+}
+
 TEST_P(InstanceWishes, OfAChangedConfigurationTakesEffectAndStartsNothing) {
   bring_up();
   stop();

@@ -3,40 +3,20 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
-#include <future>
-#include <memory>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include "manager/store/wish_memory.hpp"
+#include "tests/unit/manager/wish_store_fixture.hpp"
 
 namespace plchost {
 namespace {
 
 using testing::HasSubstr;
-
-InstanceWish some_wish() {
-  InstanceWish wish;
-  wish.commanded = true;
-  wish.running = false;
-  wish.problem = "exit code 3: \"bind\ncore\"";
-  wish.application = "/opt/line.so";
-  wish.scheduler = "CmpScheduleTimer";
-  wish.configured_application = "/opt/first.so";
-  wish.safe_mode = true;
-  wish.start_kind = StartKind::cold;
-  wish.restarts = 7;
-  wish.ends_in_a_row = 2;
-  wish.crashes_unix_ns = {1, -5, 1'700'000'000'000'000'000};
-  wish.process = InstanceWish::Process::up;
-  return wish;
-}
 
 TEST(InstanceWishText, IsReadAsItWasWritten) {
   const auto read = decode_wish(encode(some_wish()));
@@ -65,73 +45,6 @@ TEST(InstanceWishText, OfTheLongestTextsHasRoom) {
   EXPECT_TRUE(decode_wish(encode(wish)));
 }
 
-/// A manager with a real helper, in a folder of its own.
-class WishStoreTest : public testing::Test {
- protected:
-  WishStoreTest() {
-    static int count = 0;
-    pool_ = fmt::format("plchost-w{}-{}", ::getpid(), ++count);
-    folder_ = std::filesystem::temp_directory_path() / pool_;
-    std::filesystem::create_directories(folder_ / "run");
-    make();
-  }
-  ~WishStoreTest() override {
-    sut_.reset();
-    writer_.reset();
-    reactor_.reset();
-    while (::waitpid(-1, nullptr, 0) > 0) {  // helpers that still write into the folder
-    }
-    for (const std::string& pool : {pool_, pool_ + "b"}) WishMemory::remove(pool, "line1");
-    std::error_code ignored;
-    std::filesystem::remove_all(folder_, ignored);
-  }
-  WishStoreTest(const WishStoreTest&) = delete;
-  WishStoreTest& operator=(const WishStoreTest&) = delete;
-
-  /// The next manager.
-  void make() { make(pool_); }
-  void make(const std::string& pool, const std::string& instance = "line1") {
-    sut_.reset();
-    writer_.reset();
-    auto reactor = Reactor::create();
-    ASSERT_TRUE(reactor);
-    reactor_ = std::move(*reactor);
-    writer_ = std::make_unique<WishWriter>(*reactor_, PLCHOST_MANAGER_PROGRAM);
-    sut_ = std::make_unique<WishStore>(*reactor_, *writer_,
-                                       WishStore::Settings{.pool = pool,
-                                                           .instance = instance,
-                                                           .folder = wishes_folder(state(), "cell"),
-                                                           .run_directory = (folder_ / "run").string()});
-  }
-  void cut_power() {
-    WishMemory::remove(pool_, "line1");
-    std::filesystem::remove_all(folder_ / "run");
-    std::filesystem::create_directories(folder_ / "run");
-    make();
-  }
-  std::string keep(const InstanceWish& wish) {
-    sut_->keep(wish);
-    return wait_for_disk();
-  }
-  std::string wait_for_disk() {
-    std::string told = "nothing was told";
-    sut_->when_kept([&](const std::string& problem) {
-      told = problem;
-      reactor_->stop();
-    });
-    if (told == "nothing was told") (void)reactor_->run();
-    return told;
-  }
-  [[nodiscard]] std::string state() const { return (folder_ / "state").string(); }
-  [[nodiscard]] std::string file() const { return state() + "/wishes.cell/line1.wish"; }
-
-  std::string pool_;
-  std::filesystem::path folder_;
-  std::unique_ptr<Reactor> reactor_;
-  std::unique_ptr<WishWriter> writer_;
-  std::unique_ptr<WishStore> sut_;
-};
-
 TEST_F(WishStoreTest, KnowsNothingOfANewInstance) {
   const auto found = sut_->find();
   ASSERT_TRUE(found);
@@ -150,22 +63,6 @@ TEST_F(WishStoreTest, KeepsForAPowerCutWhenItHasSaidSo) {
   EXPECT_EQ(keep(some_wish()), "");
   cut_power();
   EXPECT_EQ(sut_->find().value(), some_wish().after_power_cut());
-}
-
-TEST_F(WishStoreTest, LeavesTheOneBeforeWholeWhenItIsKilledInAWrite) {
-  ASSERT_TRUE(sut_->find());
-  InstanceWish wish = some_wish();
-  sut_->keep(wish);
-  wish.restarts = 8;
-  sut_->keep(wish);
-  auto memory = MemoryFile::open(pool_ + ".wish.line1", 1, MemoryFile::Access::read_write);
-  ASSERT_TRUE(memory);
-  // The first write went to the second place, the second one to the first.
-  const std::span<std::byte> bytes = memory->bytes();
-  constexpr std::size_t kInTheText = 100;
-  bytes[kInTheText] = std::byte{0xff};
-  make();
-  EXPECT_EQ(sut_->find().value()->restarts, 7U);
 }
 
 TEST_F(WishStoreTest, TakesTheNewerOneOfTheDiskWhereTheMemorysNewestIsDamaged) {
@@ -306,6 +203,55 @@ TEST_F(WishStoreTest, RestoresTheEventsThatOperatorsRegistered) {
   EXPECT_FALSE(std::filesystem::exists(registered));
 }
 
+TEST_F(WishStoreTest, TakesTheMemorysWhereTheDiskDoesNotAnswer) {
+  ASSERT_TRUE(sut_->find());
+  ASSERT_EQ(keep(some_wish()), "");
+  make();
+  {
+    const FrozenDisk frozen(*disk_);
+    EXPECT_EQ(sut_->find().value(), some_wish());
+  }
+  InstanceWish wish = some_wish();
+  wish.running = true;
+  EXPECT_EQ(keep(wish), "") << "and goes on with it";
+  make();
+  EXPECT_EQ(sut_->find().value(), wish);
+}
+
+TEST_F(WishStoreTest, KnowsNothingWhereTheDiskThatMayHaveItDoesNotAnswer) {
+  ASSERT_TRUE(sut_->find());
+  ASSERT_EQ(keep(some_wish()), "");
+  cut_power();
+  {
+    const FrozenDisk frozen(*disk_);
+    const auto found = sut_->find();
+    ASSERT_FALSE(found);
+    EXPECT_EQ(found.error().code, ErrorCode::timed_out);
+    EXPECT_THAT(found.error().message, HasSubstr("line1.wish: the disk has not answered within"));
+  }
+  make();
+  EXPECT_EQ(sut_->find().value(), some_wish().after_power_cut());
+}
+
+TEST_F(WishStoreTest, TakesAsNewerWhatIsAskedForWhileTheDiskDoesNotAnswer) {
+  ASSERT_TRUE(sut_->find());
+  InstanceWish wish = some_wish();
+  wish.running = true;
+  for (wish.restarts = 0; wish.restarts < 5; ++wish.restarts) ASSERT_EQ(keep(wish), "");
+  const std::filesystem::path aside = folder_ / "aside";
+  std::filesystem::copy(file(), aside);
+  cut_power();
+  {
+    const FrozenDisk frozen(*disk_);
+    ASSERT_FALSE(sut_->find());
+  }
+  wish.running = false;
+  ASSERT_EQ(keep(wish), "");
+  std::filesystem::copy(aside, file(), std::filesystem::copy_options::overwrite_existing);  // not written yet
+  make();
+  EXPECT_FALSE(sut_->find().value()->running);
+}
+
 TEST_F(WishStoreTest, StartsAnotherHelperForOneThatEnded) {
   const std::string helper = folder_ / "helper";  // takes one order and ends
   std::ofstream(helper) << "#!/bin/sh\ndd bs=20000 count=1 <&3 >/dev/null 2>&1\nexit 1\n";
@@ -322,74 +268,6 @@ TEST_F(WishStoreTest, StartsAnotherHelperForOneThatEnded) {
     ASSERT_TRUE(reactor_->run());
     EXPECT_THAT(told, HasSubstr("exit code 1"));
   }
-}
-
-/// In a folder of its own.
-class WishFolderTest : public testing::Test {
- protected:
-  WishFolderTest() {
-    static int count = 0;
-    top_ = std::filesystem::temp_directory_path() / fmt::format("plchost-wf{}-{}", ::getpid(), ++count);
-    std::filesystem::create_directories(top_);
-  }
-  ~WishFolderTest() override {
-    std::error_code ignored;
-    std::filesystem::remove_all(top_, ignored);
-  }
-  WishFolderTest(const WishFolderTest&) = delete;
-  WishFolderTest& operator=(const WishFolderTest&) = delete;
-
-  [[nodiscard]] std::string folder() const { return wishes_folder(top_.string() + "/state", "cell"); }
-
-  std::filesystem::path top_;
-  WishFolderLock sut_;
-};
-
-TEST_F(WishFolderTest, IsMadeAndHeld) {
-  const auto taken = sut_.take(folder());
-  ASSERT_TRUE(taken) << taken.error().describe();
-  EXPECT_EQ(std::filesystem::status(folder()).permissions(), std::filesystem::perms::owner_all);
-  const auto child = ::fork();
-  if (child == 0) {  // another process
-    WishFolderLock other;
-    const auto refused = other.take(folder());
-    const bool good =
-        !refused && refused.error().code == ErrorCode::already_exists &&
-        refused.error().message.find(folder()) != std::string::npos &&
-        refused.error().message.find(fmt::format("process {} ", ::getppid())) != std::string::npos;
-    ::_exit(good ? 0 : 1);
-  }
-  int status = -1;
-  ASSERT_EQ(::waitpid(child, &status, 0), child);
-  EXPECT_EQ(status, 0);
-}
-
-TEST_F(WishFolderTest, ThatCannotBeMadeIsNoOtherManager) {
-  std::ofstream(top_ / "state") << "in the way";
-  const auto taken = sut_.take(folder());
-  ASSERT_FALSE(taken);
-  EXPECT_EQ(taken.error().code, ErrorCode::system);
-}
-
-TEST_F(WishFolderTest, WithAnotherUsersLockFileIsNoOtherManager) {
-  std::filesystem::create_directories(folder());
-  std::filesystem::create_symlink("/etc/passwd", folder() + "/manager.lock");
-  const auto taken = sut_.take(folder());
-  ASSERT_FALSE(taken);
-  EXPECT_EQ(taken.error().code, ErrorCode::refused);
-}
-
-TEST_F(WishFolderTest, OnADiskThatHangsIsWaitedForNoLongerThanTheLimit) {
-  const auto disk = std::make_shared<std::promise<void>>();
-  const auto answer = disk->get_future().share();
-  const auto taken =
-      sut_.take(folder(), std::chrono::milliseconds(50), [disk, answer](const std::string& path) {
-        answer.wait();
-        return LockFile::take(path);
-      });
-  ASSERT_FALSE(taken);
-  EXPECT_EQ(taken.error().code, ErrorCode::timed_out);
-  disk->set_value();
 }
 
 }  // namespace
