@@ -265,6 +265,7 @@ void Manager::look_after_pool() {
     spdlog::warn("host page of pool '{}': another program has written over it; it is written anew",
                  config_.host.pool);
   }
+  for (const auto& [instance, wishes] : wishes_) wishes->look_after_memory();
   const PoolFindings found = pool_->tidy();
   if (!found.lost && found.headers_mended + found.rebuilds + found.lost_objects != 0) {
     spdlog::warn(

@@ -60,8 +60,10 @@ Result<WishMemory> WishMemory::open(std::string_view pool, std::string_view inst
     memory = MemoryFile::replace(name, sizeof(Layout), Layout::fill);
   }
   if (!memory) return std::unexpected(std::move(memory).error());
-  WishMemory opened(*std::move(memory));
-  opened.generation_ = opened.newest().generation;
+  WishMemory opened(name, *std::move(memory));
+  Found found = opened.newest();
+  opened.generation_ = found.generation;
+  opened.text_ = std::move(found.text);
   return opened;
 }
 
@@ -85,35 +87,75 @@ std::vector<std::string> WishMemory::instances(std::string_view pool) {
 
 WishMemory::Found WishMemory::newest() const {
   Found found;
-  for (const Layout::Place& place : layout().places) {
+  for (std::size_t i = 0; i < layout().places.size(); ++i) {
+    const Layout::Place& place = layout().places[i];
     const std::uint64_t generation = place.generation;
     const std::uint64_t length = place.length;
     found.any = found.any || generation != 0;
     if (generation <= found.generation || length > place.text.size()) continue;
     // A copy: the checksum is of what is read, whoever writes to it meanwhile.
-    const std::string text(place.text.data(), length);
+    std::string text(place.text.data(), length);
     if (auto wish = decode_wish(text)) {
       found.wish = *std::move(wish);
+      found.text = std::move(text);
       found.generation = generation;
+      found.place = i;
     }
   }
   return found;
 }
 
+bool WishMemory::holds(std::size_t place) const {
+  const Layout::Place& at = layout().places[place];
+  return at.generation == generation_ && at.length == text_.size() &&
+         std::string_view(at.text.data(), text_.size()) == text_;
+}
+
+void WishMemory::fill(std::size_t place) {
+  Layout::Place& at = layout().places[place];
+  at.generation = 0;
+  std::atomic_signal_fence(std::memory_order_seq_cst);  // a kill sees the order of the program
+  at.length = text_.size();
+  std::ranges::copy(text_, at.text.begin());
+  std::atomic_signal_fence(std::memory_order_seq_cst);
+  at.generation = generation_;
+}
+
+// The place with the newest whole wish comes last: that wish is there until the other place has the new one.
 Result<void> WishMemory::write(const InstanceWish& wish) {
-  const std::string text = encode(wish);
+  std::string text = encode(wish);
   if (text.size() > kMaxWishBytes) {
     return failure(ErrorCode::full, fmt::format("{} bytes; {} have room", text.size(), kMaxWishBytes));
   }
+  const std::size_t last = newest().place;
+  text_ = std::move(text);
   ++generation_;
-  Layout::Place& place = layout().places[generation_ % 2];
-  place.generation = 0;
-  std::atomic_signal_fence(std::memory_order_seq_cst);  // a kill sees the order of the program
-  place.length = text.size();
-  std::ranges::copy(text, place.text.begin());
-  std::atomic_signal_fence(std::memory_order_seq_cst);
-  place.generation = generation_;
+  fill(1 - last);
+  fill(last);
   return {};
+}
+
+Result<bool> WishMemory::mend() {
+  if (text_.empty()) return false;
+  const auto headed = [this] {
+    const Layout& found = layout();
+    return found.magic == kWishKind.magic && found.version == kWishKind.version &&
+           found.size == sizeof(Layout);
+  };
+  if (headed() && holds(0) && holds(1)) return false;
+  if (memory_.lost()) {  // it has been looked at
+    auto made = MemoryFile::replace(name_, sizeof(Layout), Layout::fill);
+    if (!made) return std::unexpected(std::move(made).error());
+    memory_ = *std::move(made);
+  }
+  const std::size_t whole = holds(0) ? 0 : 1;
+  fill(1 - whole);
+  if (!holds(whole)) fill(whole);
+  Layout& found = layout();
+  found.version = kWishKind.version;
+  found.size = sizeof(Layout);
+  found.magic = kWishKind.magic;
+  return true;
 }
 
 }  // namespace plchost

@@ -1,18 +1,21 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "manager/store/instance_wish.hpp"
 #include "shm/pool/memory_file.hpp"
 
 namespace plchost {
 
-/// An instance's wish in the memory of the host, "POOL.wish.INSTANCE". It has two places, written in turns: a
-/// manager that is killed within a write leaves the one before whole.
+/// An instance's wish in the memory of the host, "POOL.wish.INSTANCE". It has two places, and each write goes
+/// to both, one after the other: a manager that is killed within a write leaves a whole one, and what another
+/// program damages in one place is in the other one.
 class WishMemory {
  public:
   /// Goes on with one that is there; makes it anew if it is damaged.
@@ -28,22 +31,32 @@ class WishMemory {
     const Found found = newest();
     return found.any && !found.wish;
   }
-  /// full: the text has more than kMaxWishBytes.
+  /// It is in both places when this returns. full: the text has more than kMaxWishBytes.
   [[nodiscard]] Result<void> write(const InstanceWish& wish);
+  /// Looks at what this object has found or written last, and writes it anew where another program has
+  /// written over it. Whether one had. system: the memory was cut short, and cannot be made anew.
+  [[nodiscard]] Result<bool> mend();
 
  private:
   struct Layout;
   struct Found {
     std::optional<InstanceWish> wish;
+    std::string text;              ///< of `wish`
     std::uint64_t generation = 0;  ///< of `wish`
+    std::size_t place = 0;         ///< of `wish`
     bool any = false;              ///< something was written
   };
   [[nodiscard]] Found newest() const;
-  explicit WishMemory(MemoryFile memory) noexcept : memory_(std::move(memory)) {}
+  WishMemory(std::string name, MemoryFile memory) noexcept
+      : name_(std::move(name)), memory_(std::move(memory)) {}
   [[nodiscard]] Layout& layout() const noexcept;
+  [[nodiscard]] bool holds(std::size_t place) const;
+  void fill(std::size_t place);
 
+  std::string name_;
   MemoryFile memory_;
   std::uint64_t generation_ = 0;
+  std::string text_;  // as it was found or written last; empty: never
 };
 
 }  // namespace plchost

@@ -222,6 +222,16 @@ void WishStore::tell(const std::string& problem) {
   for (const Kept& kept : std::exchange(waiting_, {})) kept(problem);
 }
 
+void WishStore::look_after_memory() {
+  const auto mended = memory_ ? memory_->mend() : Result<bool>(false);
+  if (!mended || *mended) {
+    spdlog::error("instance {}: another program has written over the memory of what it is to be; {}",
+                  settings_.instance,
+                  mended ? "it is written anew" : "it is lost there: " + mended.error().describe());
+  }
+  if (!mended) memory_.reset();
+}
+
 void WishStore::end() noexcept {
   if (on_disk()) WishMemory::remove(settings_.pool, settings_.instance);
 }

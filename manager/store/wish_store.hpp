@@ -44,6 +44,8 @@ class WishStore : public WishKeeper {
   void keep_events() override;
   void when_kept(Kept kept) override;
   [[nodiscard]] bool is_writing() const override { return writing_; }
+  /// To be called now and then: what another program has written over in memory is written anew, and told.
+  void look_after_memory();
   /// The end of the manager in order: nothing stays in memory that is on the disk.
   void end() noexcept;
 

@@ -1,0 +1,105 @@
+// What an instance is to be, in memory that another program writes over, or whose writer is killed.
+
+#include <algorithm>
+#include <cstddef>
+#include <fstream>
+#include <span>
+#include <vector>
+
+#include "shm/base/memory_guard.hpp"
+#include "tests/unit/manager/wish_store_fixture.hpp"
+
+namespace plchost {
+namespace {
+
+constexpr std::size_t kWishHeader = 16;  // magic, version, size; two places of the same size follow
+
+/// The memory of line1, as a stranger has it.
+class RawWishMemory {
+ public:
+  explicit RawWishMemory(const std::string& pool)
+      : file_(MemoryFile::open(pool + ".wish.line1", 1, MemoryFile::Access::read_write).value()) {}
+  [[nodiscard]] std::span<std::byte> bytes() const { return file_.bytes(); }
+  [[nodiscard]] std::span<std::byte> place(std::size_t number) const {
+    const std::size_t size = (bytes().size() - kWishHeader) / 2;
+    return bytes().subspan(kWishHeader + number * size, size);
+  }
+  [[nodiscard]] std::vector<std::byte> copy() const { return {bytes().begin(), bytes().end()}; }
+
+ private:
+  MemoryFile file_;
+};
+
+TEST_F(WishStoreTest, LeavesAWholeOneWhenItIsKilledInAWrite) {
+  ASSERT_TRUE(sut_->find());
+  InstanceWish wish = some_wish();
+  sut_->keep(wish);
+  const RawWishMemory memory(pool_);
+  const std::vector<std::byte> before = memory.copy();
+  wish.restarts = 8;
+  sut_->keep(wish);
+  const std::vector<std::byte> after = memory.copy();
+  // What a kill leaves: a part of the place that is written first, then that place whole.
+  for (const std::size_t first : {0U, 1U}) {
+    const std::span place = memory.place(first);
+    const auto begin = place.data() - memory.bytes().data();
+    for (const std::size_t written : {std::size_t{0}, std::size_t{8}, std::size_t{100}, place.size()}) {
+      std::ranges::copy(before, memory.bytes().begin());
+      std::ranges::fill(place.first(8), std::byte{0});
+      if (written > 8)
+        std::ranges::copy_n(after.begin() + begin + 8, static_cast<long>(written) - 8, place.begin() + 8);
+      if (written == place.size()) std::ranges::copy_n(after.begin() + begin, 8, place.begin());
+      make();
+      EXPECT_EQ(sut_->find().value()->restarts, written == place.size() ? 8U : 7U) << first << " " << written;
+    }
+  }
+}
+
+// No disk has it yet.
+TEST_F(WishStoreTest, KeepsAnOperatorsStopWhateverByteOfTheMemoryIsAnotherOne) {
+  std::ofstream(state()) << "in the way";
+  ASSERT_TRUE(sut_->find());
+  InstanceWish wish = some_wish();
+  wish.running = true;
+  sut_->keep(wish);
+  wish.running = false;
+  EXPECT_NE(keep(wish), "");
+  const RawWishMemory memory(pool_);
+  const std::vector<std::byte> whole = memory.copy();
+  const std::size_t text = encode(wish).size() + 32;
+  for (const std::size_t place : {0U, 1U}) {
+    for (std::size_t i = 0; i < text; ++i) {
+      memory.place(place)[i] ^= std::byte{0x55};
+      make();
+      const auto found = sut_->find();
+      ASSERT_TRUE(found) << i;
+      ASSERT_TRUE(*found) << i;
+      ASSERT_FALSE((*found)->running) << i;
+      std::ranges::copy(whole, memory.bytes().begin());
+    }
+  }
+}
+
+TEST_F(WishStoreTest, WritesAnewWhatAnotherProgramHasWrittenOver) {
+  MemoryGuard::watch_process();
+  ASSERT_TRUE(sut_->find());
+  sut_->look_after_memory();
+  sut_->keep(some_wish());
+  const RawWishMemory memory(pool_);
+  const std::vector<std::byte> whole = memory.copy();
+  sut_->look_after_memory();
+  EXPECT_EQ(memory.copy(), whole);
+  std::ranges::fill(memory.bytes(), std::byte{0});
+  sut_->look_after_memory();
+  EXPECT_EQ(memory.copy(), whole);
+  std::filesystem::resize_file(MemoryFile::path(pool_ + ".wish.line1"), 0);
+  sut_->look_after_memory();
+  EXPECT_EQ(RawWishMemory(pool_).copy(), whole);
+  make();
+  EXPECT_EQ(sut_->find().value(), some_wish());
+  sut_->look_after_memory();
+  EXPECT_EQ(RawWishMemory(pool_).copy(), whole);
+}
+
+}  // namespace
+}  // namespace plchost
