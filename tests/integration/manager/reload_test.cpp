@@ -338,6 +338,13 @@ TEST_F(ReloadOfTheHost, GivesThePoolOtherRightsAtOnce) {
   expect_nothing_left();
 }
 
+TEST_F(ReloadOfTheHost, LeavesThePoolAtTheEndIfTheFileSaysSoNow) {
+  start();
+  EXPECT_EQ(reload_with({"[dds]\n", "keep_pool = true\n[dds]\n"}).text, line("[host] keep_pool"));
+  EXPECT_EQ(plant_.stop_manager().describe(), "exit code 0");
+  EXPECT_TRUE(std::filesystem::exists(MemoryFile::path(plant_.pool())));
+}
+
 TEST_F(ReloadOfTheHost, MovesTheManagerAndItsServerToOtherCoresAtOnce) {
   const auto online = online_cores();
   if (!online || online->size() < 2) GTEST_SKIP() << "one core only";
