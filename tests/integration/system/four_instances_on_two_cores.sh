@@ -59,15 +59,19 @@ is "$(task packer1/Product cycles)" $((before + 100000)) || fail "$(($(task pack
 echo "- kill -9 of an instance under load: it is back, with a new pid, and the others stay"
 old=$(instance line1 pid)
 drive=$(instance drive1 pid)
+read -r cycles lost <<<"$(totals drive1)"
 kill -KILL "$old"
 line1_is_back() { state_is line1 running && [ "$(instance line1 pid)" != "$old" ] && [ "$(instance line1 restarts)" -ge 1 ]; }
 until_true 20 line1_is_back
-is "$(instance drive1 pid)" "$drive" || fail "drive1 was disturbed"
+is "$(instance drive1 pid)" "$drive" || fail "drive1 is another process"
+undisturbed drive1 "$cycles" "$lost"
 
-echo "- kill -9 of the API server costs a reconnect: pids of the PLCs stay"
+echo "- kill -9 of the API server costs a reconnect: the PLCs lose no cycles"
+read -r cycles lost <<<"$(totals drive1)"
 kill -KILL "$(pgrep -P "$manager" -x plchost-dds)"
 until_true 20 state_is drive1 running
-is "$(instance drive1 pid)" "$drive" || fail "drive1 was disturbed"
+is "$(instance drive1 pid)" "$drive" || fail "drive1 is another process"
+undisturbed drive1 "$cycles" "$lost"
 
 echo "- life cycle: stop, start, reset, restart"
 plcctl stop instance line2 && state_is line2 stopped || fail "line2 is not stopped"

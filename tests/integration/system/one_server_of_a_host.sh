@@ -10,7 +10,9 @@ servers() { pgrep -f "plchost-dds --host cell1 .*$pool-cell1 " || true; }
 served() { plcctl list hosts --json | jq -e 'length == 1 and .[0].state == "alive"'; }
 audit=$cell/cell1.state/audit.cell1
 
+pid=$(instance line1 pid)
 for round in 1 2 3; do
+  read -r cycles lost <<<"$(totals line1)"
   hanging=$(servers)
   others+=("$hanging")
   kill -STOP "$hanging"
@@ -21,6 +23,8 @@ for round in 1 2 3; do
   others=()
   until_true 20 served
   until_true 20 state_is line1 running
+  is "$(instance line1 pid)" "$pid" || fail "line1 is another process"
+  undisturbed line1 "$cycles" "$lost"
   is "$(servers | wc -l)" 1 || fail "servers of the host: $(servers)"
   plcctl stop instance line1
   plcctl start instance line1
