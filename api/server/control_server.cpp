@@ -177,7 +177,10 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
 void ControlServer::Parts::tell_of_refused(TimePoint now) {
   const std::uint64_t datagrams = options.refused_datagrams == nullptr ? 0 : options.refused_datagrams();
   if (const auto more = refused_datagrams.take(datagrams, now)) {
-    spdlog::warn("{} datagrams were refused before DDS has read them: no RTPS, or not as it must be", more);
+    spdlog::warn(
+        "{} datagrams were refused, whole or in part, before DDS has read them: no RTPS, or not as it must "
+        "be",
+        more);
   }
   if (const auto more = malformed_posts.take(intake->malformed(), now)) {
     spdlog::warn("{} posts were refused: of another source than their writer, or numbered as none can be",

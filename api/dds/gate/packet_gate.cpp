@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <limits>
 
 #include "api/dds/gate/parameter_filter.hpp"
 #include "api/dds/gate/submessage.hpp"
@@ -38,6 +39,19 @@ bool admit_parameters(std::span<std::byte> contents, ParameterList kind,
   return filter_parameters(contents.subspan(kEncapsulation), little, kind, guid_prefix) != 0;
 }
 
+// A participant's own GUID prefix and a kind; then, if it is no key, octets.
+bool is_liveliness(std::span<const std::byte> contents, bool is_key,
+                   std::span<const std::byte> guid_prefix) noexcept {
+  constexpr std::size_t kKey = 16;
+  const auto encapsulation = number_at<std::uint16_t>(contents, 0, false);
+  const auto data = contents.subspan(kEncapsulation);
+  if ((encapsulation & ~kLittleEncapsulation) != kCdr || data.size() < kKey) return false;
+  if (!std::ranges::equal(data.first(kGuidPrefix), guid_prefix)) return false;
+  if (is_key) return true;
+  const bool little = (encapsulation & kLittleEncapsulation) != 0;
+  return data.size() >= kKey + 4 && number_at<std::uint32_t>(data, kKey, little) <= data.size() - kKey - 4;
+}
+
 // Of a secured host, in plain text.
 bool admit_sample_before_keys(std::span<std::byte> bytes, std::span<const std::byte> guid_prefix) noexcept {
   const Submessage sample{bytes};
@@ -67,21 +81,12 @@ bool is_said_without_security(std::uint8_t kind) noexcept {
   return kind >= kVendors || std::ranges::find(kKinds, kind) != kKinds.end();
 }
 
-// A participant's GUID and a kind; then, if it is no key, octets.
-bool is_liveliness(std::span<const std::byte> contents, bool is_key) noexcept {
-  constexpr std::size_t kKey = 16;
-  const auto encapsulation = number_at<std::uint16_t>(contents, 0, false);
-  const auto data = contents.subspan(kEncapsulation);
-  if ((encapsulation & ~kLittleEncapsulation) != kCdr || data.size() < kKey) return false;
-  if (is_key) return true;
-  const bool little = (encapsulation & kLittleEncapsulation) != 0;
-  return data.size() >= kKey + 4 && number_at<std::uint32_t>(data, kKey, little) <= data.size() - kKey - 4;
-}
-
 bool admit_builtin_contents(std::span<std::byte> contents, const Submessage& sample,
                             std::span<const std::byte> guid_prefix) noexcept {
   const EntityId writer = sample.writer();
-  if (writer == kLivelinessWriter) return is_liveliness(contents, (sample.flags() & kDataIsKey) != 0);
+  if (writer == kLivelinessWriter) {
+    return is_liveliness(contents, (sample.flags() & kDataIsKey) != 0, guid_prefix);
+  }
   constexpr std::array kWriters{kParticipantWriter, kPublicationsWriter, kSubscriptionsWriter};
   return std::ranges::find(kWriters, writer) != kWriters.end() &&
          admit_parameters(contents, ParameterList::discovery, guid_prefix);
@@ -129,31 +134,97 @@ bool is_info_source(const Submessage& submessage) noexcept {
          byte_at(submessage.bytes, kInfoSourceVersion) == kMajor;
 }
 
+bool admit_submessage(std::span<std::byte> bytes, bool secured,
+                      std::span<const std::byte> guid_prefix) noexcept {
+  const std::uint8_t kind = Submessage{bytes}.kind();
+  if (kind == kData || kind == kDataFragment) {
+    return secured ? admit_sample_before_keys(bytes, guid_prefix) : admit_plain_sample(bytes, guid_prefix);
+  }
+  return secured ? is_said_before_keys(kind) : is_said_without_security(kind);
+}
+
+void begin_submessage(std::span<std::byte> bytes, std::uint8_t kind, bool little) noexcept {
+  bytes[0] = std::byte{kind};
+  bytes[1] = std::byte{little ? kLittleEndian : std::uint8_t{0}};
+  put_number(bytes, 2, static_cast<std::uint16_t>(bytes.size() - kSubmessageHeader), little);
+}
+
+// False: it is too large for that. The length is written anew, because 0 would mean that padding ends here.
+bool turn_into_padding(std::span<std::byte> bytes) noexcept {
+  if (bytes.size() - kSubmessageHeader > std::numeric_limits<std::uint16_t>::max()) return false;
+  begin_submessage(bytes, kPad, true);
+  return true;
+}
+
+// What the clients of a secured host say to it in plain text, too, though it must not believe it: Cyclone
+// 0.10.2 sends liveliness so whatever the governance says, and the end of a reader or writer, of which it has
+// forgotten that it was protected.
+bool is_said_in_vain(const Submessage& submessage) noexcept {
+  constexpr std::array kWriters{kPublicationsWriter, kSubscriptionsWriter, kLivelinessWriter};
+  return submessage.kind() == kData && submessage.bytes.size() >= kInlineQosCount + 2 + kDataFields &&
+         std::ranges::find(kWriters, submessage.writer()) != kWriters.end();
+}
+
+// A gap tells Cyclone that a sample of that number does not come. Without it Cyclone would ask for the
+// sample, and its writer would repeat it, for ever. A stranger can say that anyway. False: no gap can stand
+// for the sample.
+bool turn_into_gap(std::span<std::byte> bytes) noexcept {
+  constexpr std::size_t kGapSize = 32;
+  const Submessage sample{bytes};
+  const bool little = sample.little();
+  const auto high = number_at<std::uint32_t>(bytes, kSampleNumber, little);
+  const auto low = number_at<std::uint32_t>(bytes, kSampleNumber + 4, little);
+  constexpr std::uint32_t kMost = std::numeric_limits<std::uint32_t>::max();
+  const bool is_number = high < kMost / 2 && low < kMost && (high != 0 || low != 0);
+  if (!is_number || bytes.size() < kGapSize) return false;
+  const auto rest = bytes.subspan(kGapSize);
+  if (!rest.empty() && !turn_into_padding(rest)) return false;
+  // Reader and writer, the first number that does not come, the next one that may, no others.
+  std::ranges::copy(bytes.subspan(kReaderEntity, 8), bytes.begin() + kSubmessageHeader);
+  constexpr std::size_t kFirstNumber = kSubmessageHeader + 8;
+  for (const std::size_t at : {kFirstNumber, kFirstNumber + 8}) put_number(bytes, at, high, little);
+  put_number(bytes, kFirstNumber + 4, low, little);
+  put_number(bytes, kFirstNumber + 12, low + 1, little);
+  put_number(bytes, kFirstNumber + 16, std::uint32_t{0}, little);
+  begin_submessage(bytes.first(kGapSize), kGap, little);
+  return true;
+}
+
+// Says nothing by itself.
+bool is_frame(std::uint8_t kind) noexcept {
+  return kind == kPad || kind == kInfoTimestamp || kind == kInfoDestination || kind >= kVendors;
+}
+
 }  // namespace
 
-bool admit(std::span<std::byte> datagram, bool secured) noexcept {
-  if (!is_rtps2(datagram)) return false;
+Admission admit(std::span<std::byte> datagram, bool secured) noexcept {
+  if (!is_rtps2(datagram)) return Admission::refused;
   auto rest = datagram.subspan(kRtpsHeader);
   std::span<const std::byte> guid_prefix = datagram.subspan(kGuidPrefixAt, kGuidPrefix);
   const bool whole_is_secured = secured && !rest.empty() && byte_at(rest, 0) == kSecuredMessagePrefix;
+  bool is_cut = false;
+  bool says_something = false;
   while (!rest.empty()) {
     const auto submessage = first_submessage(rest);
-    if (!submessage) return false;
-    const auto bytes = rest.first(submessage->bytes.size());
-    rest = rest.subspan(bytes.size());
+    if (!submessage) return Admission::refused;
+    const auto part = rest.first(submessage->bytes.size());
+    rest = rest.subspan(part.size());
     if (whole_is_secured) continue;
     const std::uint8_t kind = submessage->kind();
-    if (kind == kInfoSource && is_info_source(*submessage)) {
+    if (kind == kInfoSource) {
+      // Without it, what follows would be of another participant.
+      if (!is_info_source(*submessage)) return Admission::refused;
       guid_prefix = submessage->bytes.subspan(kInfoSourcePrefix, kGuidPrefix);
-      continue;
+    } else if (admit_submessage(part, secured, guid_prefix) ||
+               (secured && is_said_in_vain(*submessage) && turn_into_gap(part))) {
+      says_something |= !is_frame(kind);
+    } else {
+      is_cut = true;
+      if (!turn_into_padding(part)) return Admission::refused;
     }
-    const bool is_sample = kind == kData || kind == kDataFragment;
-    const bool good =
-        secured ? (is_sample ? admit_sample_before_keys(bytes, guid_prefix) : is_said_before_keys(kind))
-                : (is_sample ? admit_plain_sample(bytes, guid_prefix) : is_said_without_security(kind));
-    if (!good) return false;
   }
-  return true;
+  if (!is_cut) return Admission::whole;
+  return says_something ? Admission::cut : Admission::refused;
 }
 
 }  // namespace plchost::dds

@@ -41,6 +41,8 @@ inline constexpr std::uint8_t kFragmentIsOfKey = 0x04;
 inline constexpr std::size_t kInlineQosCount = kSubmessageHeader + 2;
 inline constexpr std::size_t kReaderEntity = kSubmessageHeader + 4;
 inline constexpr std::size_t kWriterEntity = kSubmessageHeader + 8;
+/// Two words, the upper one first.
+inline constexpr std::size_t kSampleNumber = kSubmessageHeader + 12;
 /// All that stands between that count and the inline QoS.
 inline constexpr std::size_t kDataFields = 16;
 inline constexpr std::size_t kFragmentFields = 28;
@@ -72,6 +74,14 @@ template <class Number>
     number |= std::uint32_t{byte_at(bytes, at + i)} << (8 * place);
   }
   return static_cast<Number>(number);
+}
+
+template <class Number>
+void put_number(std::span<std::byte> bytes, std::size_t at, Number number, bool little) noexcept {
+  for (std::size_t i = 0; i < sizeof(Number); ++i) {
+    const std::size_t place = little ? i : sizeof(Number) - 1 - i;
+    bytes[at + i] = static_cast<std::byte>(std::uint32_t{number} >> (8 * place) & 0xffU);
+  }
 }
 
 /// A part of an RTPS message, header included.

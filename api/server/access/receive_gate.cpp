@@ -38,7 +38,9 @@ std::uint16_t port_on_this_machine(const msghdr& message) noexcept {
 }
 
 bool may_pass(std::span<std::byte> datagram, bool secured, const msghdr& message) noexcept {
-  if (!dds::admit(datagram, secured)) return false;
+  const dds::Admission admission = dds::admit(datagram, secured);
+  if (admission == dds::Admission::refused) return false;
+  if (admission == dds::Admission::cut) refused.fetch_add(1, std::memory_order_relaxed);
   const std::uint16_t port = secured ? std::uint16_t{0} : port_on_this_machine(message);
   if (port == 0) return true;
   static dds::SourceTable sources;

@@ -10,7 +10,7 @@ namespace plchost {
 /// Only the program plchost-dds has it. Before the domain is made.
 void close_receive_gate(bool secured) noexcept;
 
-/// How many datagrams it has refused.
+/// How many datagrams it has refused, whole or in part.
 [[nodiscard]] std::uint64_t datagrams_refused() noexcept;
 
 }  // namespace plchost

@@ -128,7 +128,7 @@ void TestHost::start_server(std::vector<std::string> more) {
                                      "--interface", "lo",       "--log-level",     "warning"};
   arguments.insert(arguments.end(), more_arguments_.begin(), more_arguments_.end());
   while (!std::filesystem::exists(run_directory_ + "/manager.sock")) ::usleep(1000);
-  server_ = std::make_unique<Child>(PLCHOST_DDS_PROGRAM, arguments);
+  server_ = std::make_unique<Child>(PLCHOST_DDS_PROGRAM, arguments, log_file_);
 }
 
 void TestHost::replace_server() {

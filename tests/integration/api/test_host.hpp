@@ -53,6 +53,8 @@ class TestHost {
 
   /// `more`: arguments, also of those that replace it.
   void start_server(std::vector<std::string> more = {});
+  /// Where servers that are started from now on log: to this file with ".errors" behind it.
+  void log_to(std::string file) { log_file_ = std::move(file); }
   /// kill -9, and a new one, as the manager does it.
   void replace_server();
   [[nodiscard]] Child& server() { return *server_; }
@@ -90,7 +92,8 @@ class TestHost {
   HostPageWriter page_;
   std::vector<std::string> instances_;
   std::vector<std::string> more_arguments_;
-  ControlReply answer_;  // guarded by mutex_
+  std::string log_file_;  // empty: where the test's output goes
+  ControlReply answer_;   // guarded by mutex_
   std::mutex mutex_;
   std::vector<HostFinding> findings_;
   std::uint64_t checks_ = 0;

@@ -44,10 +44,39 @@ Bytes sample(std::uint8_t kind, std::uint8_t flags, const std::array<std::uint8_
   return made;
 }
 
-bool passes(std::initializer_list<Bytes> parts, bool secured = true) {
+Bytes datagram_of(std::initializer_list<Bytes> parts) {
   Bytes datagram = header();
   for (const Bytes& part : parts) datagram.insert(datagram.end(), part.begin(), part.end());
-  return admit(std::as_writable_bytes(std::span(datagram)), secured);
+  return datagram;
+}
+
+/// Passed or refused, but not cut.
+bool passes(std::initializer_list<Bytes> parts, bool secured = true) {
+  Bytes datagram = datagram_of(parts);
+  const Admission admission = admit(std::as_writable_bytes(std::span(datagram)), secured);
+  EXPECT_NE(admission, Admission::cut);
+  return admission == Admission::whole;
+}
+
+/// What Cyclone gets; empty: nothing.
+Bytes after_gate(std::initializer_list<Bytes> parts, bool secured) {
+  Bytes datagram = datagram_of(parts);
+  if (admit(std::as_writable_bytes(std::span(datagram)), secured) == Admission::refused) return {};
+  return datagram;
+}
+
+constexpr std::array<std::uint8_t, 4> kLiveliness{0x00, 0x02, 0x00, 0xc2};
+
+/// As Cyclone sends it.
+Bytes liveliness() {
+  Bytes alive = submessage(0x15, 5, 48);  // fields, encapsulation, GUID and kind, length, 4 octets
+  alive[6] = 16;
+  std::ranges::copy(kLiveliness, alive.begin() + 12);
+  alive[25] = 1;
+  const Bytes prefix = header();
+  std::copy_n(prefix.begin() + 8, 12, alive.begin() + 28);
+  alive[44] = 4;
+  return alive;
 }
 
 TEST(PacketGate, PassesWhatIsWellFormed) {
@@ -62,11 +91,11 @@ TEST(PacketGate, RefusesWhatIsNoRtps2) {
   for (std::size_t i = 0; i < 5; ++i) {
     Bytes datagram = header();
     datagram[i] ^= 1;
-    EXPECT_FALSE(admit(std::as_writable_bytes(std::span(datagram)), false));
+    EXPECT_EQ(admit(std::as_writable_bytes(std::span(datagram)), false), Admission::refused);
   }
   Bytes whole = header();
   for (std::size_t size = 0; size < whole.size(); ++size) {
-    EXPECT_FALSE(admit(std::as_writable_bytes(std::span(whole)).first(size), false));
+    EXPECT_EQ(admit(std::as_writable_bytes(std::span(whole)).first(size), false), Admission::refused);
   }
 }
 
@@ -202,17 +231,87 @@ TEST(PacketGate, KnowsEachParticipantOfADatagram) {
 }
 
 TEST(PacketGate, ChecksTheOctetsOfLiveliness) {
-  constexpr std::array<std::uint8_t, 4> kLiveliness{0x00, 0x02, 0x00, 0xc2};
-  Bytes alive = submessage(0x15, 5, 48);  // fields, encapsulation, GUID and kind, length, 4 octets
-  alive[6] = 16;
-  std::ranges::copy(kLiveliness, alive.begin() + 12);
-  alive[25] = 1;
-  alive[44] = 4;
+  Bytes alive = liveliness();
   EXPECT_TRUE(passes({alive}, false));
   alive[44] = 5;
   EXPECT_FALSE(passes({alive}, false));
   alive[47] = 0xff;
   EXPECT_FALSE(passes({alive}, false));
+  Bytes of_another = liveliness();
+  of_another[39] ^= 1;
+  EXPECT_FALSE(passes({of_another}, false)) << "in the name of another participant";
+}
+
+// Cyclone sends them though the host must not believe them. What stands beside must come through, and a gap
+// keeps the client from repeating them.
+TEST(PacketGate, ReplacesPlainSamplesOfASecuredHostsClientsByGaps) {
+  constexpr std::array<std::uint8_t, 4> kPublications{0x00, 0x00, 0x03, 0xc2};
+  constexpr std::array<std::uint8_t, 4> kSubscriptions{0x00, 0x00, 0x04, 0xc2};
+  const Bytes heartbeat = submessage(0x07, 1, 28);
+  for (const bool little : {true, false}) {
+    for (const auto& writer : {kLiveliness, kPublications, kSubscriptions}) {
+      for (const std::uint8_t flags : {0x04, 0x0a}) {  // contents; key with an inline QoS
+        Bytes said = submessage(0x15, static_cast<std::uint8_t>(flags | (little ? 1 : 0)), 48);
+        if (!little) std::swap(said[2], said[3]);
+        const Bytes reader{0, 2, 0, 0xc7};
+        std::ranges::copy(reader, said.begin() + 8);
+        std::ranges::copy(writer, said.begin() + 12);
+        said[little ? 20 : 23] = 0xfe;  // its number
+
+        Bytes gap = submessage(0x08, little ? 1 : 0, 28);
+        if (!little) std::swap(gap[2], gap[3]);
+        std::ranges::copy(reader, gap.begin() + 4);
+        std::ranges::copy(writer, gap.begin() + 8);
+        gap[little ? 16 : 19] = 0xfe;
+        gap[little ? 24 : 27] = 0xff;
+        Bytes padding = submessage(0x01, 1, 16);
+        std::ranges::copy(said.end() - 16, said.end(), padding.begin() + 4);
+        EXPECT_EQ(after_gate({heartbeat, said, heartbeat}, true),
+                  datagram_of({heartbeat, gap, padding, heartbeat}));
+        Bytes datagram = datagram_of({said});
+        EXPECT_EQ(admit(std::as_writable_bytes(std::span(datagram)), true), Admission::whole)
+            << "no warning is due";
+      }
+    }
+  }
+}
+
+TEST(PacketGate, TakesOutASampleForWhichNoGapCanStand) {
+  Bytes said = liveliness();
+  said[20] = 7;
+  EXPECT_TRUE(passes({said}, true));
+  said[20] = 0;
+  EXPECT_FALSE(passes({said}, true)) << "there is no sample 0";
+  std::fill_n(said.begin() + 16, 8, std::uint8_t{0xff});
+  EXPECT_FALSE(passes({said}, true));
+  Bytes short_one = submessage(0x15, 9, 24);
+  std::ranges::copy(kLiveliness, short_one.begin() + 12);
+  short_one[20] = 7;
+  EXPECT_FALSE(passes({short_one}, true));
+  EXPECT_FALSE(passes({sample(0x16, 1, kLiveliness)}, true)) << "a fragment";
+}
+
+TEST(PacketGate, TakesOutWhatItDoesNotAdmitAndPassesTheRest) {
+  const Bytes heartbeat = submessage(0x07, 1, 28);
+  for (const bool secured : {false, true}) {
+    const Bytes unwanted = sample(0x15, 5, secured ? kUser : kHandshake);
+    Bytes padding = unwanted;
+    padding[0] = 0x01;
+    padding[1] = 1;
+    EXPECT_EQ(after_gate({heartbeat, unwanted, heartbeat}, secured),
+              datagram_of({heartbeat, padding, heartbeat}));
+    // A length of 0 means "up to the end", but not of padding.
+    Bytes to_the_end = unwanted;
+    to_the_end[2] = 0;
+    EXPECT_EQ(after_gate({heartbeat, to_the_end}, secured), datagram_of({heartbeat, padding}));
+    EXPECT_EQ(after_gate({submessage(0x09, 1, 8), unwanted, submessage(0x0e, 1, 12)}, secured), Bytes{})
+        << "nothing is left";
+    Bytes source = submessage(0x0c, 1, 16);
+    source[8] = 2;
+    EXPECT_EQ(after_gate({heartbeat, source, heartbeat}, secured), Bytes{}) << "whose is the rest?";
+  }
+  const Bytes reply = submessage(0x0f, 1, 24);
+  EXPECT_EQ(after_gate({heartbeat, reply}, true), datagram_of({heartbeat, submessage(0x01, 1, 24)}));
 }
 
 TEST(PacketGate, ReadsNothingBehindTheEnd) {
@@ -224,7 +323,11 @@ TEST(PacketGate, ReadsNothingBehindTheEnd) {
     for (std::size_t at = 20; at < datagram.size(); ++at)
       datagram[at] = static_cast<std::uint8_t>(random() % 40);
     datagram.shrink_to_fit();
-    (void)admit(std::as_writable_bytes(std::span(datagram)), (i & 1) != 0);
+    const auto bytes = std::as_writable_bytes(std::span(datagram));
+    const bool secured = (i & 1) != 0;
+    if (admit(bytes, secured) != Admission::refused) {
+      EXPECT_EQ(admit(bytes, secured), Admission::whole) << "what has passed once passes";
+    }
   }
 }
 
