@@ -7,6 +7,7 @@
 
 #include "api/client/check_names.hpp"
 #include "api/client/control_client.hpp"
+#include "api/dds/ended_participant.h"
 #include "api/dds/entries.hpp"
 #include "api/dds/host_writers.hpp"
 #include "api/dds/text.hpp"
@@ -50,12 +51,15 @@ void ControlClient::update_hosts() {
   dds_requested_deadline_missed_status_t missed{};
   (void)dds_get_requested_deadline_missed_status(presence_.reader(), &missed);
   // None is kept beside what seen_ has of it: that is bounded.
-  dds::take_changes<plc_Presence>(
-      presence_.reader(), presence_.writers(),
-      [&](auto /*handle*/, const plc_Presence& presence) {
-        if (seen_.take(presence, now)) last_news_ = now;
-      },
-      [](auto /*handle*/) {});
+  dds::take_valid_told<plc_Presence>(presence_.reader(), presence_.writers(),
+                                     [&](const plc_Presence& presence, const auto& info) {
+                                       if (seen_.take(presence, now, info.publication_handle))
+                                         last_news_ = now;
+                                     });
+  // Posts that a killed server has not acknowledged would hold up those to its successor.
+  for (const dds_instance_handle_t writer : seen_.take_ended(now)) {
+    (void)plc_forget_participant(presence_.reader(), writer);
+  }
   host_status_.update();
   if (host_status_.size() <= SeenHosts::kMost) return;
   host_status_.erase_if(

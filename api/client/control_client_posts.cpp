@@ -109,7 +109,11 @@ Result<void> ControlClient::post_one(const std::string& host, std::string_view i
   if (auto good = check_event_name(instance, event); !good) return good;
   const auto way = posters_.find(host);
   if (way == posters_.end()) return failure(ErrorCode::wrong_state, "prepare_posts() comes first");
-  return way->second.post_once(instance, event);
+  auto posted = way->second.post_once(instance, event);
+  // Nobody else reads meanwhile that the host has a new server, so that the one before needs no room any
+  // more.
+  if (!posted) update_hosts();
+  return posted;
 }
 
 }  // namespace plchost

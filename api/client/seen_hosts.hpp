@@ -6,8 +6,10 @@
 #include <map>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <control.h>
+#include <dds/dds.h>
 
 #include "api/client/host_clock.hpp"
 #include "api/client/newest_epoch.hpp"
@@ -19,6 +21,7 @@ namespace plchost {
 struct SeenHost {
   std::uint64_t epoch = 0;
   std::int32_t pid = 0;
+  dds_instance_handle_t writer = DDS_HANDLE_NIL;  ///< of the presence
   TimePoint last;
   HostClock clock;
   std::uint32_t others = 0;  ///< presences of an older server while this one lives
@@ -32,8 +35,13 @@ class SeenHosts {
   static constexpr std::size_t kMost = 1024;
   static constexpr Duration kForgotten = std::chrono::minutes(1);
 
-  /// True: news; that host, or that server of it, was not there before.
-  bool take(const plc_Presence& presence, TimePoint now);
+  /// A server that was replaced has ended when it has been silent for so long.
+  static constexpr Duration kEnded = std::chrono::milliseconds(200);
+
+  /// True: news; that host, or that server of it, was not there before. `writer`: of the presence.
+  bool take(const plc_Presence& presence, TimePoint now, dds_instance_handle_t writer = DDS_HANDLE_NIL);
+  /// The writers of servers that were replaced and have ended, each once.
+  [[nodiscard]] std::vector<dds_instance_handle_t> take_ended(TimePoint now);
   /// nullptr: never seen, or forgotten.
   [[nodiscard]] const SeenHost* find(std::string_view name) const;
   [[nodiscard]] const std::map<std::string, SeenHost, std::less<>>& all() const noexcept { return hosts_; }
@@ -41,7 +49,15 @@ class SeenHosts {
  private:
   [[nodiscard]] SeenHost* find_or_add(std::string_view name, TimePoint now);
 
+  /// A server before the present one.
+  struct Replaced {
+    dds_instance_handle_t writer = DDS_HANDLE_NIL;
+    TimePoint last;
+  };
+  static constexpr std::size_t kMostReplaced = 64;
+
   std::map<std::string, SeenHost, std::less<>> hosts_;
+  std::vector<Replaced> replaced_;
 };
 
 }  // namespace plchost

@@ -1,12 +1,15 @@
 #include "api/client/seen_hosts.hpp"
 
 #include <fmt/format.h>
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include "api/dds/text.hpp"
 
 namespace plchost {
 namespace {
+
+using testing::ElementsAre;
+using testing::IsEmpty;
 
 constexpr TimePoint kStart{std::chrono::seconds(1000)};
 
@@ -38,6 +41,28 @@ TEST(SeenHosts, CountTheOlderServerOfAName) {
 
   EXPECT_TRUE(sut.take(presence("a", 7), kStart + 2 * kServerGone));
   EXPECT_EQ(sut.find("a")->epoch, 7U);
+}
+
+TEST(SeenHosts, TellOnceWhichServersHaveEnded) {
+  SeenHosts sut;
+  sut.take(presence("a", 7), kStart, 71);
+  const TimePoint replaced = kStart + SeenHosts::kEnded / 2;
+  sut.take(presence("a", 8), replaced, 81);
+  EXPECT_THAT(sut.take_ended(replaced), IsEmpty()) << "not silent for long enough";
+  EXPECT_THAT(sut.take_ended(kStart + SeenHosts::kEnded), ElementsAre(71));
+  EXPECT_THAT(sut.take_ended(kStart + 2 * SeenHosts::kEnded), IsEmpty());
+  EXPECT_THAT(sut.take_ended(kStart + std::chrono::hours(1)), IsEmpty()) << "the present one is only silent";
+}
+
+TEST(SeenHosts, DoNotTakeAServerForEndedThatShowsItsPresence) {
+  SeenHosts sut;
+  sut.take(presence("a", 7), kStart, 71);
+  sut.take(presence("a", 8), kStart, 81);
+  sut.take(presence("a", 7), kStart + SeenHosts::kEnded, 71);
+  EXPECT_THAT(sut.take_ended(kStart + SeenHosts::kEnded), IsEmpty());
+  const TimePoint later = kStart + 2 * kServerGone;
+  sut.take(presence("a", 7), later, 71);
+  EXPECT_THAT(sut.take_ended(later), ElementsAre(81)) << "the older one has outlasted it";
 }
 
 TEST(SeenHosts, AreBoundedWhoeverWritesNames) {
