@@ -163,6 +163,7 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
   } else if (fd == identity_timer.get()) {
     tell_of_refused(MonotonicClock::now());
     (void)plc_forget_told_keys(event_reader.get());
+    (void)announcements.forget_gone(sessions->participants());
     (void)heap.look(MonotonicClock::now());
     if (identity_changed()) return false;
     return keeps_name();

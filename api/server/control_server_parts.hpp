@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "api/dds/announcements.hpp"
 #include "api/dds/entity.hpp"
 #include "api/gateway/gateway_thread.hpp"
 #include "api/server/access/access_guard.hpp"
@@ -135,6 +136,7 @@ struct ControlServer::Parts {
   std::optional<EventIntake> intake;
   std::shared_ptr<dds::Entity> domain;
   dds::Entity participant;
+  dds::Announcements announcements;
   std::optional<NameClaim> name;
   std::optional<SessionTable> sessions;
   HeapTrim heap;

@@ -177,6 +177,7 @@ Result<void> ControlServer::Parts::enter_domain() {
       "enter DDS domain " + std::to_string(options.dds.domain) + " (at most 16 servers on one machine)");
   if (!made) return std::unexpected(made.error());
   participant = std::move(*made);
+  announcements = dds::Announcements(participant.get());
   if (options.dds.interfaces == std::vector<std::string>{"lo"}) {
     if (const auto tied = dds::tie_sockets_to_loopback(); !tied) {
       spdlog::warn("packets from outside reach the parser of this server: {}", tied.error().describe());

@@ -51,6 +51,13 @@ std::vector<dds_entity_t> SessionTable::discovery_readers() const {
   return {participants_.get(), subscriptions_.get()};
 }
 
+std::vector<dds::Guid> SessionTable::participants() const {
+  std::vector<dds::Guid> all;
+  all.reserve(alive_.size());
+  for (const auto& [guid, claim] : alive_) all.push_back(guid);
+  return all;
+}
+
 std::uint64_t SessionTable::follow_discovery() {
   const std::uint64_t changes = follow_participants();
   follow_readers();

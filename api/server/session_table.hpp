@@ -56,6 +56,9 @@ class SessionTable {
   /// Whether that participant is in the domain.
   [[nodiscard]] bool is_alive(const dds::Guid& client) const { return alive_.contains(client); }
 
+  /// All that are in the domain, as follow_discovery() has found them; this process is one.
+  [[nodiscard]] std::vector<dds::Guid> participants() const;
+
   [[nodiscard]] std::size_t size() const noexcept { return sessions_.size(); }
   [[nodiscard]] std::uint64_t dropped() const noexcept { return dropped_; }
   /// The readers that follow_discovery() looks at, to be listened to.
