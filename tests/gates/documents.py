@@ -11,6 +11,7 @@ anew. The table of plcctl's commands is made by plcctl itself: it is held only w
 * The keys in the tables of manager/configuration.md and instances/settings.md are those of the code, and the code has each
   key that a document names, as `[Section] Key` or `Section.Key=1`.
 * Each step of manager/walks.md names a function and a file that has it.
+* Each text of a message in manager/troubleshooting.md is a part of one in the code.
 * Each file that a document names with its folder, as `folder/file.cpp`, is there.
 * Each command in the tables of api/plcctl.md is one of the generated table.
 """
@@ -345,6 +346,17 @@ def file_faults(root, texts):
                     yield f"{page}:{number}: there is no file {name}"
 
 
+def message_faults(root, texts):
+    page = "manager/troubleshooting.md"
+    sources = [file for folder in ("api", "instances", "manager", "schedulers", "shm") for file in (root / folder).rglob("*.[ch]pp")]
+    # Literals that stand one behind the other are one text.
+    code = "\n".join(re.sub(r'"\s*"', "", file.read_text(encoding="utf-8")) for file in sources)
+    for row in rows_of(texts[page], "| text | cause |", "\n\n")[2:]:
+        text = row.split("`")[1]
+        if text not in code:
+            yield f"{page}: no message has '{text}'"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--write", action="store_true")
@@ -361,6 +373,7 @@ def main():
         faults += command_faults(documents.texts)
         faults += walk_faults(documents.root, documents.texts)
         faults += file_faults(documents.root, documents.texts)
+        faults += message_faults(documents.root, documents.texts)
     except ValueError as wrong:
         faults.append(f"a table of keys is not where it is expected: {wrong}")
     print("\n".join(faults), end="\n" if faults else "")

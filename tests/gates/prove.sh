@@ -128,6 +128,7 @@ plant_in_documents "documents: unknown key" "the code has no key [dds] unsecured
 plant_in_documents "documents: unknown key in a text" "the code has no key Stop.OutputLimitMs" instances/states.md 's,Stop.OutputsLimitMs,Stop.OutputLimitMs,'
 plant_in_documents "documents: unknown section and key in a text" "the code has no key [dds] peer" shm/blocks.md 's,\[dds\] peers,[dds] peer,'
 plant_in_documents "documents: key that is read and has no row" "has no row in config_changes.cpp" manager/config/load_config.cpp 's,truth\("keep_pool",truth("keep",'
+plant_in_documents "documents: message that is gone" "no message has 'needs SCHED_FIFO prio '" manager/troubleshooting.md 's,`needs SCHED_FIFO priority`,`needs SCHED_FIFO prio `,'
 plant_in_documents "documents: file that is gone" "there is no file schedulers/register.cpp" schedulers/README.md 's,`schedulers/registry.cpp`,`schedulers/register.cpp`,'
 plant_in_documents "documents: unknown command" "plcctl has no command 'list writer'" api/plcctl.md 's,^\| `list writers` \| Posts,| `list writer` | Posts,'
 plant_in_documents "documents: step of a walk that the code lacks" "has no function EventIntake::try_posting" manager/walks.md 's,EventIntake::try_post ,EventIntake::try_posting ,'
