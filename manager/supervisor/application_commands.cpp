@@ -93,17 +93,13 @@ void ManagedInstance::begin_change() {
   host_.set_timer(after(limit_of(ControlVerb::change_application)));
 }
 
-// What was loaded has not come up. Whether the one before is being started instead.
-bool ManagedInstance::take_back_application(const std::string& why) {
-  const bool can = operation_ && operation_->step == Step::fresh_process && operation_->before &&
-                   (!transient_ || declaration_taken_) && !name_taken_;
-  if (!can) return false;
+// What was loaded has not come up: the one before is started instead.
+void ManagedInstance::take_back_application(const std::string& why) {
   operation_->refused = fmt::format("{} does not come up: {}", operation_->request.argument, why);
   application_ = *std::exchange(operation_->before, std::nullopt);
   start_kind_ = StartKind::warm;
   spdlog::warn("instance {}: {}; {} is started again", config_.name, operation_->refused, application_);
   spawn(wants_running_ ? Next::run : Next::stay_stopped);
-  return true;
 }
 
 // Last of all: what does not come up does not become the boot application.

@@ -137,15 +137,17 @@ void ManagedInstance::begin_start() {
 }
 
 void ManagedInstance::begin_stop() {
-  if (removed_ && !idle_phase()) {
-    operation_->step = Step::fresh_process;
-    if (phase_ != Phase::ending) end_process(Next::nothing);
-    next_ = Next::nothing;
-  } else if (phase_ == Phase::down) {
-    finish(ErrorCode::ok, fmt::format("'{}' has no process: nothing to stop", config_.name));
-  } else if (idle_phase()) {
-    go_down(InstanceState::offline, last_end_);
+  if (phase_ == Phase::down) {
+    return finish(ErrorCode::ok, fmt::format("'{}' has no process: nothing to stop", config_.name));
+  }
+  const EndCause cause = idle_phase() ? EndCause::stop_of_waiting : EndCause::operators_stop;
+  const Decision decision = decided({.cause = cause, .order = Order::stop});
+  if (decision.action == Decision::Action::bring_down) operation_->step = Step::fresh_process;
+  carry_out(decision, last_end_);
+  if (decision.action == Decision::Action::go_offline) {
     finish(ErrorCode::ok, fmt::format("'{}' was waiting to be started; that is cancelled", config_.name));
+  } else if (decision.action != Decision::Action::leave) {
+    return;  // the reply comes when the process has ended
   } else if (silent_) {
     fresh_process(Next::stay_stopped, StartKind::warm);
   } else {
@@ -176,7 +178,7 @@ void ManagedInstance::on_application_checked(const Result<void>& result) {
 void ManagedInstance::apply_loaded_application() {
   if (removed_) return finish(ErrorCode::wrong_state, "it was removed from the configuration meanwhile");
   if (loads_online()) return begin_change();
-  const bool works = phase_ == Phase::up && !safe_mode_ && !silent_ && !application_.empty();
+  const bool works = phase_ == Phase::up && !history_.safe_mode && !silent_ && !application_.empty();
   if (works) operation_->before = application_;
   application_ = operation_->request.argument;
   begun_with_.application = config_.application;  // the command is younger

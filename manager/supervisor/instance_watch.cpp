@@ -123,6 +123,7 @@ void ManagedInstance::fall_silent(std::string_view known) {
                   "caught with, or tasks leave it no processor time",
                   fault, fault.empty() ? "" : "; ",
                   std::chrono::duration_cast<std::chrono::seconds>(HeartbeatWatch::kLimit).count()));
+  carry_out(decided({.cause = EndCause::silent, .order = order()}), std::string(status_.problem.view()));
   if (!operation_ || operation_->step != Step::forwarded) return;
   host_.set_timer(std::nullopt);
   finish(ErrorCode::timed_out, fmt::format("it is in exception now: {}; reset it", status_.problem.view()));
@@ -130,7 +131,7 @@ void ManagedInstance::fall_silent(std::string_view known) {
 
 // It was kept from answering, and has missed nothing: what it says holds again.
 void ManagedInstance::answers_again() {
-  if (safe_mode_) {
+  if (history_.safe_mode) {
     set_state(Phase::up, InstanceState::safe_mode, problem_when_up());
   } else if (said_) {
     show_application(*said_);

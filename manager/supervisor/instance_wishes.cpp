@@ -63,7 +63,6 @@ void ManagedInstance::restore() {
   if (!boots) application_ = earlier.application;
   commanded_ = earlier.commanded;
   wants_running_ = earlier.commanded ? earlier.running : true;
-  safe_mode_ = earlier.safe_mode;
   if (!earlier.host_ended || earlier.safe_mode) last_end_ = earlier.last_end;
   status_.restarts = earlier.restarts;
   // What begins with the host begins for the first time; but a cold start that was asked for and never came
@@ -74,7 +73,7 @@ void ManagedInstance::restore() {
   for (const std::int64_t crash : earlier.crashes_unix_ns) {
     ages.emplace_back(unix_of(surroundings_.now()) - crash);
   }
-  history_.restore(surroundings_.now(), ages, earlier.ends_in_a_row);
+  history_ = restored_history(surroundings_.now(), ages, earlier.ends_in_a_row, earlier.safe_mode, config_);
 }
 
 ManagedInstance::Configured ManagedInstance::configured() const {
@@ -97,9 +96,8 @@ bool ManagedInstance::use_configuration() {
                  config_.name, application_);
     application_ = surroundings_.applications.boot();
     if (application_.empty()) application_ = config_.application;
-    safe_mode_ = false;
+    history_ = {};
     last_end_.clear();
-    history_.forget();
   }
   // What failed may be what was mended.
   return before.application != now.application || before.process != now.process;
@@ -126,8 +124,12 @@ void ManagedInstance::reconfigure(const InstanceConfig& config) {
   }
   const bool failed = phase_ == Phase::down && status_.state == InstanceState::failed && unreadable_.empty();
   const bool mended = use_configuration();
-  const bool wanted = commanded_ ? wants_running_ : config_.autostart;
-  if (phase_ == Phase::down && wanted && (returns || (failed && mended))) return hold("is to be started");
+  if (phase_ == Phase::down && (returns || (failed && mended))) {
+    const bool stays = commanded_ && !wants_running_;
+    const Decision decision =
+        decided({.cause = EndCause::reconfigured, .order = stays ? Order::no_process : order()});
+    if (decision.action != Decision::Action::leave) return carry_out(decision, "");
+  }
   publish();
 }
 
@@ -147,36 +149,37 @@ void ManagedInstance::remove() {
 void ManagedInstance::resume() {
   if (use_configuration() && earlier_) earlier_->failed = false;
   if (application_ != config_.application) tell_boot_application();
-  if (!unreadable_.empty()) {
-    return go_down(InstanceState::failed,
-                   fmt::format("what it is to be is not known: {}; start it or stop it", unreadable_));
+  const EndCause cause = cause_of_beginning();
+  if (earlier_) earlier_->process = InstanceWish::Process::none;
+  if (cause == EndCause::unwatched) return ended_unwatched();
+  const bool offline = earlier_ && commanded_ && earlier_->offline;
+  const Decision decision = decided({.cause = cause, .order = offline ? Order::no_process : order()});
+  carry_out(decision, decision.action == Decision::Action::go_offline ? last_end_ : text_of_beginning(cause));
+}
+
+// As an earlier manager has left it, and it has no process now.
+EndCause ManagedInstance::cause_of_beginning() const noexcept {
+  using Process = InstanceWish::Process;
+  if (!unreadable_.empty()) return EndCause::wish_unreadable;
+  if (!earlier_) return EndCause::never_begun;
+  if (earlier_->failed) return EndCause::given_up;
+  if (earlier_->host_ended) return EndCause::host_ended;
+  if (earlier_->process == Process::up) return EndCause::unwatched;
+  return earlier_->process == Process::setting_up ? EndCause::setting_up_unknown : EndCause::without_process;
+}
+
+std::string ManagedInstance::text_of_beginning(EndCause cause) const {
+  if (cause == EndCause::wish_unreadable) {
+    return fmt::format("what it is to be is not known: {}; start it or stop it", unreadable_);
   }
-  if (!earlier_) {
-    if (config_.autostart) hold("is to be started");
-    return;
-  }
-  if (earlier_->failed) return go_down(InstanceState::failed, earlier_->problem);
-  if (commanded_ ? earlier_->offline : !config_.autostart) return go_down(InstanceState::offline, last_end_);
-  const auto process = std::exchange(earlier_->process, InstanceWish::Process::none);
-  if (!earlier_->host_ended && process == InstanceWish::Process::up) return ended_unwatched();
-  const bool never = config_.restart == RestartPolicy::never;
-  if (never && !earlier_->host_ended && process == InstanceWish::Process::setting_up) {
-    adopt_until_ = after(kSetupLimit);
-    set_state(Phase::backing_off, InstanceState::waiting, "was being set up when its manager ended");
-    return host_.set_timer(after(config_.restart_delay));
-  }
-  if (never && earlier_->host_ended && !config_.autostart) {
-    return go_down(InstanceState::failed, "ended with the host, and its policy is never to start it again");
-  }
-  hold("is to be started");
+  if (cause == EndCause::given_up) return earlier_->problem;
+  if (cause == EndCause::host_ended) return "ended with the host, and its policy is never to start it again";
+  return cause == EndCause::setting_up_unknown ? "was being set up when its manager ended" : "";
 }
 
 void ManagedInstance::ended_unwatched() {
   start_kind_ = StartKind::after_fault;
-  history_.record_end(surroundings_.now(), Duration::zero(), true);
-  const bool again = config_.restart != RestartPolicy::never;
-  if (again && history_.too_many_crashes()) safe_mode_ = true;
-  back_off_or_give_up(again, InstanceState::failed, "ended while no manager ran");
+  ended({.cause = EndCause::unwatched}, "ended while no manager ran");
 }
 
 // Its policy is never to start it again, so a process that is still being set up is waited for instead.
@@ -211,11 +214,11 @@ InstanceWish ManagedInstance::wish() const {
   wish.configured_application = begun_with_.application;
   wish.configured_scheduler = begun_with_.scheduler;
   wish.configured_process = begun_with_.process;
-  wish.safe_mode = safe_mode_;
+  wish.safe_mode = history_.safe_mode;
   wish.start_kind = start_kind_;
   wish.restarts = status_.restarts;
-  wish.ends_in_a_row = history_.in_a_row();
-  for (const TimePoint crash : history_.crashes()) wish.crashes_unix_ns.push_back(unix_of(crash));
+  wish.ends_in_a_row = history_.in_a_row;
+  for (const TimePoint crash : history_.crashes) wish.crashes_unix_ns.push_back(unix_of(crash));
   if (status_.pid == 0) return wish;
   wish.process = phase_ == Phase::setting_up ? InstanceWish::Process::setting_up
                  : phase_ == Phase::ending   ? InstanceWish::Process::ending

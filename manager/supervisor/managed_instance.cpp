@@ -31,6 +31,11 @@ InstanceState shown_state(const InstanceRuntime& runtime) noexcept {
   return InstanceState::stopped;
 }
 
+// Nobody asked for this end, so code 0 is no success: it may be exit() in the middle of a cycle.
+std::string unasked(const ExitStatus& status) {
+  return status.describe() + (status.success() ? ", which nobody asked for" : "");
+}
+
 InstancePlan plan_of(const InstanceConfig& config) {
   InstancePlan plan{.restart = config.restart,
                     .crash_limit = config.crash_limit,
@@ -53,7 +58,6 @@ ManagedInstance::ManagedInstance(const InstanceConfig& config, Surroundings surr
     : config_(config),
       surroundings_(std::move(surroundings)),
       host_(host),
-      history_(config_),
       scheduler_(config.scheduler),
       begun_with_(configured()) {
   unix_offset_ns_ = unix_time_ns() - surroundings_.now().time_since_epoch().count();
@@ -104,11 +108,7 @@ void ManagedInstance::shut_down() {
   shutting_down_ = true;
   next_ = Next::nothing;
   if (operation_) finish(ErrorCode::unavailable, "the manager is shutting down");
-  if (idle_phase()) {
-    go_down(InstanceState::offline, "");
-  } else if (phase_ != Phase::ending) {
-    end_process(Next::nothing);
-  }
+  carry_out(decided({.cause = EndCause::manager_ends}), "");
 }
 
 void ManagedInstance::on_report(const SetupReport& report) {
@@ -144,7 +144,7 @@ void ManagedInstance::come_up() {
   start_kind_ = StartKind::warm;
   // An adopted one may be in its set-up still, in which it answers to nobody.
   if (phase_ == Phase::setting_up) heard_of_ = true;
-  if (safe_mode_) {
+  if (history_.safe_mode) {
     set_state(Phase::up, InstanceState::safe_mode, problem_when_up());
   } else {
     const bool runs = begins_running_ && !application_.empty();
@@ -166,7 +166,7 @@ std::string ManagedInstance::problem_when_up() {
   std::string problem = core_problem();
   if (removed_) problem = "removed from the configuration: it runs until it is stopped";
   const auto add = [&](const std::string& text) { problem += (problem.empty() ? "" : "; ") + text; };
-  if (safe_mode_) {
+  if (history_.safe_mode) {
     add(fmt::format("safe mode after {} crashes within {} s, the last: {}; load an application, or reset it",
                     config_.crash_limit,
                     std::chrono::ceil<std::chrono::seconds>(config_.crash_window).count(),
@@ -190,15 +190,18 @@ void ManagedInstance::finish_adoption(const std::string& problem) {
   if (known) {
     if (!wish_known_) wants_running_ = runtime->running != 0;
     if (!runtime->scheduler.view().empty()) scheduler_ = runtime->scheduler.view();
-    safe_mode_ = runtime->application.view().empty() && !application_.empty();
-    if (!safe_mode_) application_ = runtime->application.view();
+    history_.safe_mode = runtime->application.view().empty() && !application_.empty();
+    if (!history_.safe_mode) application_ = runtime->application.view();
   }
   begins_running_ = known ? runtime->running != 0 : wants_running_;
   come_up();
-  if (known && !safe_mode_ && shown_state(*runtime) != status_.state) show_application(*runtime);
+  if (known && !history_.safe_mode && shown_state(*runtime) != status_.state) show_application(*runtime);
   std::string text(status_.problem.view());
   const auto add = [&](std::string_view more) { text += (text.empty() ? "" : "; ") + std::string(more); };
-  if (!problem.empty()) add("adopted, but it does not answer on its control socket: " + problem);
+  if (!problem.empty()) {
+    add("adopted, but it does not answer on its control socket: " + problem);
+    carry_out(decided({.cause = EndCause::adoption_unanswered, .order = order()}), text);
+  }
   if (!known) add("adopted, but it has no status page yet");
   if (text != status_.problem.view()) set_state(phase_, status_.state, text);
   spdlog::info("instance {}: adopted process {}", config_.name, status_.pid);
@@ -209,28 +212,35 @@ void ManagedInstance::on_exit(const ExitStatus& status) {
   status_.core = -1;
   forget_signs();
   host_.set_timer(std::nullopt);
-  const bool set_up = phase_ == Phase::setting_up;
-  const bool exit_of_set_up = status.known && status.kind == ExitStatus::Kind::exited &&
-                              (status.value == kExitSetupFailed || status.value == kExitUsage);
-  if (phase_ == Phase::ending) {
-    const Next next = in_time(std::exchange(next_, Next::nothing));
-    if (next == Next::nothing) {
-      go_down(InstanceState::offline, "");
-      if (operation_)
-        finish(ErrorCode::ok,
-               fmt::format("'{}' has ended: it was removed from the configuration", config_.name));
-      return;
-    }
-    spawn(next);  // of the kind that was asked for
-  } else if (set_up && (exit_of_set_up || !setup_failure_.empty())) {
-    const std::string why =
-        setup_failure_.empty() ? status.describe() : fmt::format("{}: {}", status.describe(), setup_failure_);
-    if (take_back_application(why)) return;
-    history_.record_end(surroundings_.now(), Duration::zero(), false);
-    back_off_or_give_up(retries(), InstanceState::failed, why);
-  } else if (set_up || phase_ == Phase::up || phase_ == Phase::adopting) {
-    if (set_up && take_back_application(status.describe())) return;
-    ended_by_itself(status);
+  if (phase_ == Phase::ending) return asked_end();
+  if (phase_ == Phase::setting_up) return set_up_ended(status);
+  if (phase_ != Phase::up && phase_ != Phase::adopting) return;
+  if (phase_ == Phase::up) start_kind_ = StartKind::after_fault;
+  ended({.cause = cause_of(status),
+         .lasted = phase_ == Phase::up ? surroundings_.now() - up_since_ : Duration::zero()},
+        unasked(status));
+}
+
+void ManagedInstance::set_up_ended(const ExitStatus& status) {
+  const bool loaded = operation_ && operation_->step == Step::fresh_process && operation_->before;
+  const bool refused = status.exited_with(kExitSetupFailed) || status.exited_with(kExitUsage);
+  if (!setup_failure_.empty()) {
+    ended({.cause = cause_of_refusal(), .has_earlier = loaded},
+          fmt::format("{}: {}", status.describe(), setup_failure_));
+  } else {
+    ended({.cause = refused ? cause_of_refusal() : cause_of(status), .has_earlier = loaded}, unasked(status));
+  }
+}
+
+// As it was asked to, and the next process is of the kind that was asked for.
+void ManagedInstance::asked_end() {
+  const Next next = in_time(std::exchange(next_, Next::nothing));
+  const bool ends = next == Next::nothing;
+  carry_out(decided({.cause = ends ? EndCause::told_to_end : EndCause::replaced,
+                     .order = next == Next::run ? Order::run : Order::stop}),
+            "");
+  if (ends && operation_) {
+    finish(ErrorCode::ok, fmt::format("'{}' has ended: it was removed from the configuration", config_.name));
   }
 }
 
@@ -243,33 +253,70 @@ ManagedInstance::Next ManagedInstance::in_time(Next next) {
   return Next::stay_stopped;
 }
 
-// Nobody asked for this end, so code 0 is no success: it may be exit() in the middle of a cycle.
-void ManagedInstance::ended_by_itself(const ExitStatus& status) {
-  if (phase_ == Phase::up) start_kind_ = StartKind::after_fault;
-  const TimePoint now = surroundings_.now();
-  history_.record_end(now, phase_ == Phase::up ? now - up_since_ : Duration::zero(), true);
-  const bool again = config_.restart != RestartPolicy::never;
-  if (again && history_.too_many_crashes()) safe_mode_ = true;
-  back_off_or_give_up(again, InstanceState::failed,
-                      status.success() ? status.describe() + ", which nobody asked for" : status.describe());
+Order ManagedInstance::order() const noexcept {
+  if (!wants_running_) return Order::stop;
+  return commanded_ ? Order::run : Order::none;
 }
 
-void ManagedInstance::back_off_or_give_up(bool again, InstanceState otherwise, const std::string& why) {
-  last_end_ = why;
-  again = again && !removed_;
-  const bool stops = operation_ && operation_->request.verb == ControlVerb::stop;
-  // A stop that came while it was starting has its wish already.
-  const bool cancelled = stops && operation_->step == Step::until_up;
-  std::string later;
-  if (again && !cancelled) {
-    const Duration delay = history_.delay();
-    host_.set_timer(after(delay));
-    later = fmt::format("; starts again{} {} ms later", safe_mode_ ? " in safe mode" : "",
-                        std::chrono::ceil<std::chrono::milliseconds>(delay).count());
-    set_state(Phase::backing_off, InstanceState::waiting, why + later);
-  } else {
-    go_down(cancelled ? InstanceState::offline : otherwise, why);
+EndCause ManagedInstance::cause_of_refusal() const noexcept {
+  if (name_taken_) return EndCause::name_taken;
+  if (declaration_taken_) return EndCause::declaration_taken;
+  return transient_ ? EndCause::start_transient : EndCause::start_refused;
+}
+
+Decision ManagedInstance::decided(End end) {
+  end.at = surroundings_.now();
+  end.removed = removed_;
+  Decision made = decide(end, history_, config_);
+  history_ = made.history;
+  return made;
+}
+
+void ManagedInstance::carry_out(const Decision& decision, const std::string& why) {
+  using enum Decision::Action;
+  switch (decision.action) {
+    case leave:
+      return;
+    case start_now:
+      return spawn(decision.runs ? Next::run : Next::stay_stopped);
+    case start_earlier:
+      return take_back_application(why);
+    case start_in_order:
+      return hold("is to be started");
+    case back_off:
+      host_.set_timer(after(decision.delay));
+      return set_state(Phase::backing_off, InstanceState::waiting, why);
+    case await_process:
+      adopt_until_ = after(kSetupLimit);
+      set_state(Phase::backing_off, InstanceState::waiting, why);
+      return host_.set_timer(after(config_.restart_delay));
+    case bring_down:
+      if (idle_phase()) return go_down(InstanceState::offline, why);
+      if (phase_ != Phase::ending) end_process(Next::nothing);
+      next_ = Next::nothing;
+      return;
+    case go_offline:
+      return go_down(InstanceState::offline, why);
+    case fail:
+      return go_down(InstanceState::failed, why);
   }
+}
+
+// By itself, or it could not be started.
+void ManagedInstance::ended(End end, const std::string& why) {
+  // A stop that came while it was starting has its wish already.
+  const bool cancelled =
+      operation_ && operation_->request.verb == ControlVerb::stop && operation_->step == Step::until_up;
+  end.order = cancelled ? Order::no_process : order();
+  const Decision decision = decided(end);
+  if (decision.action == Decision::Action::start_earlier) return carry_out(decision, why);
+  last_end_ = why;
+  std::string later;
+  if (decision.action == Decision::Action::back_off) {
+    later = fmt::format("; starts again{} {} ms later", history_.safe_mode ? " in safe mode" : "",
+                        std::chrono::ceil<std::chrono::milliseconds>(decision.delay).count());
+  }
+  carry_out(decision, why + later);
   if (!operation_ || loading_aside()) return;
   if (cancelled) {
     finish(ErrorCode::ok, fmt::format("its process ended meanwhile: {}; it is not started again", why));
@@ -329,12 +376,12 @@ void ManagedInstance::fresh_process(Next next, StartKind kind) {
   if (next == Next::stay_stopped) wants_running_ = false;
   // The first process is the first one, however it was asked for.
   if (start_kind_ != StartKind::first || kind == StartKind::cold) start_kind_ = kind;
-  history_.forget();
-  safe_mode_ = false;
+  const Decision decision =
+      decided({.cause = EndCause::replaced, .order = next == Next::run ? Order::run : Order::stop});
   last_end_.clear();
   operation_->step = Step::fresh_process;
   if (idle_phase()) {
-    spawn(next);
+    carry_out(decision, "");
   } else {
     end_process(next);
   }
@@ -347,7 +394,7 @@ LaunchOptions ManagedInstance::launch_options(Next next) const {
   options.scheduler = scheduler_;
   options.priority_band = config_.priority_band;
   options.settings = config_.settings;
-  options.application = safe_mode_ ? "" : application_;
+  options.application = history_.safe_mode ? "" : application_;
   options.pool = surroundings_.host.pool;
   options.run_directory = surroundings_.host.run_directory;
   options.state_directory = surroundings_.host.state_directory;
@@ -367,9 +414,8 @@ void ManagedInstance::spawn(Next next) {
   name_taken_ = transient_ = declaration_taken_ = false;
   const auto pid = host_.spawn(launch_options(next));
   if (!pid) {
-    history_.record_end(surroundings_.now(), Duration::zero(), false);
     transient_ = is_transient(pid.error());
-    return back_off_or_give_up(retries(), InstanceState::failed, pid.error().describe());
+    return ended({.cause = cause_of_refusal()}, pid.error().describe());
   }
   status_.pid = *pid;
   log_level_ = surroundings_.host.log_level;
@@ -395,12 +441,18 @@ void ManagedInstance::go_down(InstanceState state, const std::string& problem) {
   set_state(Phase::down, state, problem);
 }
 
+// Nothing of its application is being done.
+bool ManagedInstance::rests() const noexcept {
+  if (phase_ == Phase::held || phase_ == Phase::backing_off) return true;
+  return phase_ == Phase::up &&
+         (status_.state == InstanceState::stopped || status_.state == InstanceState::safe_mode);
+}
+
 void ManagedInstance::refresh() {
-  if (removed_ && !operation_ && !shutting_down_) {
-    const bool works = status_.state != InstanceState::stopped && status_.state != InstanceState::safe_mode;
-    if (phase_ == Phase::held || phase_ == Phase::backing_off)
-      return go_down(InstanceState::offline, last_end_);
-    if (phase_ == Phase::up && !works) return end_process(Next::nothing);
+  if (!operation_ && !shutting_down_ && rests()) {
+    const Decision decision = decided({.cause = EndCause::idle, .order = order()});
+    carry_out(decision, last_end_);
+    if (decision.action != Decision::Action::leave) return;
   }
   if (phase_ != Phase::up) return;
   const auto runtime = watch_process();
@@ -409,20 +461,22 @@ void ManagedInstance::refresh() {
   const bool excepted = runtime->state == ApplicationState::exception;
   if (excepted && status_.state != InstanceState::exception) return show_application(*runtime);
   if (surroundings_.now() - settled_ < kPageLag) return;
-  const bool same_names = safe_mode_ || runtime->application.view() == status_.application.view();
-  const bool same_state = safe_mode_ || status_.state == shown_state(*runtime);
+  const bool same_names = history_.safe_mode || runtime->application.view() == status_.application.view();
+  const bool same_state = history_.safe_mode || status_.state == shown_state(*runtime);
   if (same_state && same_names && runtime->scheduler.view() == status_.scheduler.view()) return;
   learn_scheduler(runtime->scheduler.view());
-  if (!safe_mode_) application_ = runtime->application.view();
+  if (!history_.safe_mode) application_ = runtime->application.view();
   if (same_state) return publish();
   show_application(*runtime);
 }
 
 void ManagedInstance::show_application(const InstanceRuntime& runtime) {
-  if (safe_mode_) return;
+  if (history_.safe_mode) return;
   const InstanceState state = shown_state(runtime);
   if (state == InstanceState::exception) {
-    return set_state(Phase::up, state, std::string(runtime.problem.view()));
+    set_state(Phase::up, state, std::string(runtime.problem.view()));
+    return carry_out(decided({.cause = EndCause::exception, .order = order()}),
+                     std::string(runtime.problem.view()));
   }
   const bool unwanted = state == InstanceState::stopped && wants_running_;
   set_state(Phase::up, state,

@@ -13,7 +13,7 @@
 #include "manager/store/wish_keeper.hpp"
 #include "manager/supervisor/heartbeat_watch.hpp"
 #include "manager/supervisor/instance_host.hpp"
-#include "manager/supervisor/restart_policy.hpp"
+#include "manager/supervisor/restart_decision.hpp"
 #include "shm/pool/host_page.hpp"
 
 namespace plchost {
@@ -51,19 +51,7 @@ inline constexpr Duration kAskAgain = std::chrono::seconds(2);
 // * The order of `after` is for the first start (held) and for the end. A restart does not wait, and an
 // operator's
 //   start of a held instance overrides it.
-// * An end that nobody asked this manager for is a failure, whatever the exit code: exit(0) in a cycle is
-// one. Policy
-//   never: failed. on_failure, always: restarted. A set-up that failed
-//   (kExitSetupFailed, wrong usage) is not retried under on_failure, because the same files would fail again:
-//   failed. Under always it is, with back-off, but it does not count as a crash.
-//   A start that failed because the host was short of processes, descriptors or memory, or because the pool's
-//   lock was held, is retried under on_failure, too.
-//   So it is when a process of that name is there already: one that was still being set up when its manager
-//   died. After the back-off it is adopted.
-// * crash_limit crashes within crash_window: the next process is spawned without the application (safe_mode).
-// It
-//   stays that way until load_application, reset or restart, which also forget the crashes. A process that
-//   crashes even so is restarted without application, with back-off.
+// * What follows from each end, and from each start that fails: restart_decision.hpp.
 // * An exception of the application is no crash: the process stays and answers, nothing is restarted by
 // itself.
 //   It is found in the process's page within 50 ms. start and single cycle are refused, stop has nothing to
@@ -104,19 +92,14 @@ inline constexpr Duration kAskAgain = std::chrono::seconds(2);
 //     set_scheduler      up: forwarded, and remembered for the next process if it was accepted. Else
 //     remembered. register_event, unregister_event   the same; registrations are repeated in each fresh
 //     process.
-// * An adopted process is no child of this manager: how it ended is unknown, and counts as a failure.
 //
 // What an instance is to be outlives the manager and the host's power (InstanceWish)
 // * Written down whenever it changes, before the command is answered. A stop, also that of a reset, is
 // written
 //   before it is carried out: whatever ends meanwhile, the machine stays stopped.
-// * The next manager, of an instance without process:
-//     failed, or without process by an operator's stop   stays so, whatever `autostart` says.
-//     its process ended while no manager ran             as a crash, by the policy; never: failed.
-//     the host ended, in order or by a power cut         starts again, running or stopped as it was to be; in
-//                safe mode, with its scheduler, with its application (the boot application, if one was
-//                chosen). Under the policy never only if `autostart` says so; else failed.
-//     never started or stopped by an operator            as `autostart` says.
+// * The next manager goes on with it, see restart_decision.hpp. An instance that begins with its host keeps
+//   safe mode, scheduler and application; a boot application, if one was chosen, takes the application's
+//   place.
 // * A configuration that names another application or another scheduler than when the wish was written takes
 //   effect, as a load or a change of the scheduler would: another application also ends safe mode and failed.
 //   Another core, priority band or settings file ends failed, too.
@@ -232,7 +215,7 @@ class ManagedInstance : public InstanceEvents {
   void begin_change();
   void begin_forwarded();
   void apply_loaded_application();
-  bool take_back_application(const std::string& why);
+  void take_back_application(const std::string& why);
   void forward_or_wait();
   void forward();
   void finish(ErrorCode code, const std::string& text);
@@ -255,6 +238,8 @@ class ManagedInstance : public InstanceEvents {
   [[nodiscard]] Configured configured() const;
   void remember();
   [[nodiscard]] InstanceWish wish() const;
+  [[nodiscard]] EndCause cause_of_beginning() const noexcept;
+  [[nodiscard]] std::string text_of_beginning(EndCause cause) const;
   void ended_unwatched();
   void look_for_process();
   void follow_command(ControlVerb verb);
@@ -283,12 +268,16 @@ class ManagedInstance : public InstanceEvents {
   void come_up();
   void finish_adoption(const std::string& problem);
   void show_application(const InstanceRuntime& runtime);
-  void ended_by_itself(const ExitStatus& status);
-  [[nodiscard]] bool retries() const noexcept {  // a start that failed
-    return config_.restart == RestartPolicy::always || name_taken_ ||
-           (transient_ && config_.restart != RestartPolicy::never);
-  }
-  void back_off_or_give_up(bool again, InstanceState otherwise, const std::string& why);
+  void set_up_ended(const ExitStatus& status);
+  void asked_end();
+  /// The process has ended by itself, or could not be started.
+  void ended(End end, const std::string& why);
+  [[nodiscard]] EndCause cause_of_refusal() const noexcept;
+  [[nodiscard]] Order order() const noexcept;
+  [[nodiscard]] bool rests() const noexcept;
+  /// What follows, see restart_decision.hpp; the history goes on with it.
+  [[nodiscard]] Decision decided(End end);
+  void carry_out(const Decision& decision, const std::string& why);
   void go_down(InstanceState state, const std::string& problem);
   void set_state(Phase phase, InstanceState state, const std::string& problem);
   void publish();
@@ -312,11 +301,10 @@ class ManagedInstance : public InstanceEvents {
   Ending ending_ = Ending::asked;
   Next next_ = Next::nothing;                // after ending
   StartKind start_kind_ = StartKind::first;  // of the next process
-  bool safe_mode_ = false;
-  bool wants_running_ = true;   // what an operator, or the start, wanted last
-  bool begins_running_ = true;  // the process starts its application by itself
-  bool commanded_ = false;      // an operator has
-  bool wish_known_ = false;     // wants_running_ is no guess
+  bool wants_running_ = true;                // what an operator, or the start, wanted last
+  bool begins_running_ = true;               // the process starts its application by itself
+  bool commanded_ = false;                   // an operator has
+  bool wish_known_ = false;                  // wants_running_ is no guess
   bool shutting_down_ = false;
   bool removed_ = false;    // from the configuration
   bool transient_ = false;  // this process could not be set up, but the next one may
