@@ -197,24 +197,13 @@ Supervisor::HostedInstance Manager::make_host(const InstanceConfig& instance) {
 }
 
 void Manager::make_supervisor() {
-  supervisor_ = std::make_unique<Supervisor>(
-      config_,
-      Supervisor::Surroundings{
-          .folder = options_.folder,
-          .schedulers = options_.schedulers,
-          .now = [] { return MonotonicClock::now(); },
-          .publish = [this](std::size_t place,
-                            const InstanceStatus& status) { write_instance(place, status); },
-          .transition =
-              [this](const InstanceStatus& status, InstanceState from, InstanceState to,
-                     std::string_view reason) {
-                const auto ring = transitions_.find(status.name.view());
-                if (ring == transitions_.end()) return;
-                ring->second.add(TransitionSource::process, std::to_underlying(from), std::to_underlying(to),
-                                 status.pid, reason);
-              },
-          .gone = [this](std::size_t place, const InstanceConfig& config) { forget(place, config); }},
-      [this](const InstanceConfig& instance) { return make_host(instance); });
+  supervisor_ =
+      std::make_unique<Supervisor>(config_,
+                                   Supervisor::Surroundings{.folder = options_.folder,
+                                                            .schedulers = options_.schedulers,
+                                                            .now = [] { return MonotonicClock::now(); },
+                                                            .observer = *this},
+                                   [this](const InstanceConfig& instance) { return make_host(instance); });
 }
 
 void Manager::write_host() {
@@ -230,8 +219,21 @@ void Manager::write_host() {
   page_->write_host(host_status_);
 }
 
+void Manager::transition(const InstanceStatus& status, InstanceState from, InstanceState to,
+                         std::string_view reason) {
+  const auto ring = transitions_.find(status.name.view());
+  if (ring == transitions_.end()) return;
+  ring->second.add(TransitionSource::process, std::to_underlying(from), std::to_underlying(to), status.pid,
+                   reason);
+}
+
+void Manager::wrong_step(const InstanceStatus& status, std::string_view what) {
+  spdlog::error("instance {}: {}; this is a fault of plchostd: report it with its log", status.name.view(),
+                what);
+}
+
 // The instance first: whoever reads the number finds it.
-void Manager::write_instance(std::size_t place, const InstanceStatus& status) {
+void Manager::changed(std::size_t place, const InstanceStatus& status) {
   const auto index = static_cast<std::uint32_t>(place);
   page_->write_instance(index, status);
   latency_due_ = true;

@@ -29,7 +29,7 @@
 namespace plchost {
 
 /// Everything put together: one host, one run directory, one pool, one thread.
-class Manager {
+class Manager : private InstanceObserver {
  public:
   struct Options {
     std::string file;      ///< of the configuration, absolute
@@ -60,10 +60,13 @@ class Manager {
   void take_over_host(const ManagerConfig& now, std::vector<std::string>& lines);
   void use_housekeeping_cores(std::vector<std::string>& lines) const;
   void use_pool_rights(std::vector<std::string>& lines) const;
-  void forget(std::size_t place, const InstanceConfig& instance);
   void remove_pages(const std::string& instance) const;
   void write_host();
-  void write_instance(std::size_t place, const InstanceStatus& status);
+  void changed(std::size_t place, const InstanceStatus& status) override;
+  void transition(const InstanceStatus& status, InstanceState from, InstanceState to,
+                  std::string_view reason) override;
+  void wrong_step(const InstanceStatus& status, std::string_view what) override;
+  void gone(std::size_t place, const InstanceConfig& config) override;
   void shut_down();
   void clean_up();
   void tick();

@@ -106,7 +106,7 @@ void Manager::use_pool_rights(std::vector<std::string>& lines) const {
 }
 
 // Values that it has kept in memory and not written to a file stay for the end of this manager.
-void Manager::forget(std::size_t place, const InstanceConfig& instance) {
+void Manager::gone(std::size_t place, const InstanceConfig& instance) {
   spdlog::info("instance {}: was removed from the configuration and has ended", instance.name);
   page_->write_instance(static_cast<std::uint32_t>(place), {});
   if (const auto wishes = wishes_.extract(instance.name)) wishes.mapped()->end();

@@ -35,6 +35,9 @@ class InstanceHost {
   [[nodiscard]] virtual std::optional<InstanceRuntime> runtime() = 0;
   /// The cores that the kernel lets the process's threads run on.
   [[nodiscard]] virtual std::vector<int> granted_cores() = 0;
+  /// Writes down the faults that the process shows in its page and cannot write down itself. In words the
+  /// last one; empty: it shows none.
+  [[nodiscard]] virtual std::string keep_lost_faults() = 0;
   /// Takes what the process has said into the instance's log. To be called now and then.
   virtual void read_output() = 0;
 };

@@ -115,7 +115,7 @@ void ManagedInstance::watch_heartbeat() {
 
 void ManagedInstance::fall_silent(std::string_view known) {
   silent_ = true;
-  const std::string lost = surroundings_.keep_lost_faults();
+  const std::string lost = host_.keep_lost_faults();
   const std::string_view fault = known.empty() ? lost : known;
   set_state(
       Phase::up, InstanceState::exception,

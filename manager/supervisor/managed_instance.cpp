@@ -508,6 +508,9 @@ Result<std::uint64_t> ManagedInstance::send(ControlVerb verb, const std::string&
 
 void ManagedInstance::set_state(Phase phase, InstanceState state, const std::string& problem) {
   const InstanceState before = status_.state;
+  // The process has taken the step already, so the phase follows it all the same.
+  const std::string wrong = wrong_step(phase_, phase, state);
+  if (!wrong.empty()) surroundings_.observer.wrong_step(status_, wrong);
   const bool was_up = phase_ == Phase::up;
   if (state != before) status_.state_since_unix_ns = unix_time_ns();
   phase_ = phase;
@@ -518,9 +521,7 @@ void ManagedInstance::set_state(Phase phase, InstanceState state, const std::str
   spdlog::log(bad ? spdlog::level::warn : spdlog::level::info, "instance {}: {}{}{}", config_.name,
               to_string(state), problem.empty() ? "" : ": ", problem);
   const bool of_process = !was_up || phase != Phase::up || silent_;
-  if (state != before && of_process && surroundings_.transition) {
-    surroundings_.transition(before, state, problem);
-  }
+  if (state != before && of_process) surroundings_.observer.transition(status_, before, state, problem);
   publish();
 }
 
@@ -537,7 +538,7 @@ void ManagedInstance::publish() {
   status_.application.assign(application_);
   status_.plan = plan_of(config_);
   remember();
-  surroundings_.changed();
+  surroundings_.observer.changed(surroundings_.place, status_);
 }
 
 }  // namespace plchost

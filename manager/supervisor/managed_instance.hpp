@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -13,6 +14,8 @@
 #include "manager/store/wish_keeper.hpp"
 #include "manager/supervisor/heartbeat_watch.hpp"
 #include "manager/supervisor/instance_host.hpp"
+#include "manager/supervisor/instance_observer.hpp"
+#include "manager/supervisor/instance_phase.hpp"
 #include "manager/supervisor/restart_decision.hpp"
 #include "shm/pool/host_page.hpp"
 
@@ -24,30 +27,9 @@ inline constexpr Duration kPageLimit = std::chrono::seconds(1);
 inline constexpr Duration kAskInterval = std::chrono::milliseconds(500);
 inline constexpr Duration kAskAgain = std::chrono::seconds(2);
 
-// The life of one instance
-// ========================
+// The rules of one instance
+// =========================
 //
-//             release()            ready
-//   held ───────────────► setting_up ─────────► up ◄── adopting (a process that outlived a manager)
-//    ▲                      ▲   │ exit          │ │
-//    │ autostart            │   ▼               │ │ stop all, reset, restart, load
-//   down ◄──────────────────┼───┴───────────────┘ ▼
-//    ▲   policy says no     │  policy says yes   ending ── SIGTERM ── SIGKILL
-//    │                      └── backing_off        │
-//    └─────────────────────────────────────────────┴──► setting_up (a fresh process was asked for)
-//
-// Phase is what this class knows; InstanceState is what the world is told:
-//   down         offline, or failed with a problem text
-//   held         waiting: for what it comes after; the problem text says for whom
-//   backing_off  waiting: for the end of the back-off
-//   setting_up, adopting   starting
-//   up           running, stopped, stopping, exception or safe_mode: as the process says
-//   ending       stopping
-//
-// Rules
-// * One timer. Each phase that could last for ever has a limit: setting_up 30 s,
-//   then SIGKILL; ending 38 s (a stop may take 10 s and 25 s), SIGTERM, 2 s, SIGKILL; adopting 5 s, after
-//   which it counts as up with a problem text, because a manager stops no PLC for being unable to talk to it.
 // * The order of `after` is for the first start (held) and for the end. A restart does not wait, and an
 // operator's
 //   start of a held instance overrides it.
@@ -123,13 +105,8 @@ class ManagedInstance : public InstanceEvents {
     std::string folder;                        ///< that relative application paths start in
     std::vector<std::string_view> schedulers;  ///< names that there are
     std::function<TimePoint()> now;
-    std::function<void()> changed;  ///< status() is another now; may call release(), nothing else
-    /// Writes down the faults of a process that cannot do so itself, and says the last; empty: there are
-    /// none.
-    std::function<std::string()> keep_lost_faults;
-    /// The process has gone from one state to another. What only follows the application's state is told by
-    /// the process itself, not here.
-    std::function<void(InstanceState from, InstanceState to, std::string_view reason)> transition;
+    InstanceObserver& observer;  ///< changed() may call release(), nothing else
+    std::size_t place = 0;       ///< as the observer is told it
   };
 
   ManagedInstance(const InstanceConfig& config, Surroundings surroundings, InstanceHost& host);
@@ -176,7 +153,7 @@ class ManagedInstance : public InstanceEvents {
   void on_application_checked(const Result<void>& result) override;
 
  private:
-  enum class Phase : std::uint8_t { down, held, backing_off, setting_up, adopting, up, ending };
+  using Phase = InstancePhase;
   enum class Ending : std::uint8_t { asked, terminated, killed };
   enum class Next : std::uint8_t { nothing, run, stay_stopped };
   enum class Step : std::uint8_t { storing, checking, fresh_process, until_up, forwarded, setting_boot };

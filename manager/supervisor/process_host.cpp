@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <sys/epoll.h>
 
+#include "manager/supervisor/lost_faults.hpp"
 #include "manager/system/take_packets.hpp"
 #include "shm/base/log.hpp"
 
@@ -186,6 +187,10 @@ std::optional<InstanceRuntime> ProcessHost::runtime() {
     current = page_->runtime();
   }
   return current;
+}
+
+std::string ProcessHost::keep_lost_faults() {
+  return plchost::keep_lost_faults(settings_.pool, settings_.run_directory, settings_.name);
 }
 
 void ProcessHost::read_output() {

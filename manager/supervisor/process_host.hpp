@@ -37,6 +37,7 @@ class ProcessHost : public InstanceHost {
   [[nodiscard]] Result<void> check_application(const LaunchOptions& options) override;
   [[nodiscard]] std::optional<InstanceRuntime> runtime() override;
   [[nodiscard]] std::vector<int> granted_cores() override;
+  [[nodiscard]] std::string keep_lost_faults() override;
   void read_output() override;
 
  private:

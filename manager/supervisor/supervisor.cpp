@@ -5,7 +5,6 @@
 
 #include <fmt/format.h>
 
-#include "manager/supervisor/lost_faults.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/toml/section_reader.hpp"
 
@@ -30,27 +29,17 @@ std::unique_ptr<Supervisor::Unit> Supervisor::make_unit(const InstanceConfig& co
   unit->host = std::move(hosted.host);
   unit->applications = std::move(hosted.applications);
   unit->wishes = std::move(hosted.wishes);
-  unit->instance = std::make_unique<ManagedInstance>(
-      config,
-      ManagedInstance::Surroundings{
-          .host = host_,
-          .applications = *unit->applications,
-          .wishes = *unit->wishes,
-          .folder = surroundings_.folder,
-          .schedulers = surroundings_.schedulers,
-          .now = surroundings_.now,
-          .changed = [this, unit] { changed(*unit); },
-          .keep_lost_faults =
-              [&host = host_, name = config.name] {
-                return keep_lost_faults(host.pool, host.run_directory, name);
-              },
-          .transition =
-              [this, unit](InstanceState from, InstanceState to, std::string_view reason) {
-                if (surroundings_.transition) {
-                  surroundings_.transition(unit->instance->status(), from, to, reason);
-                }
-              }},
-      *unit->host);
+  unit->instance =
+      std::make_unique<ManagedInstance>(config,
+                                        ManagedInstance::Surroundings{.host = host_,
+                                                                      .applications = *unit->applications,
+                                                                      .wishes = *unit->wishes,
+                                                                      .folder = surroundings_.folder,
+                                                                      .schedulers = surroundings_.schedulers,
+                                                                      .now = surroundings_.now,
+                                                                      .observer = *this,
+                                                                      .place = place},
+                                        *unit->host);
   hosted.connect(*unit->instance);
   return made;
 }
@@ -105,7 +94,7 @@ void Supervisor::start() {
   }
   for (std::size_t i = 0; i < units_.size(); ++i) {
     ManagedInstance& instance = *units_[i]->instance;
-    surroundings_.publish(units_[i]->place, instance.status());
+    surroundings_.observer.changed(units_[i]->place, instance.status());
     if (!adopted[i]) instance.resume();
   }
   advance();
@@ -161,10 +150,22 @@ void Supervisor::refresh() {
   if (!shut_down_) forget_gone();
 }
 
-void Supervisor::changed(const Unit& unit) {
-  if (!unit.instance) return;  // it is being made
-  surroundings_.publish(unit.place, unit.instance->status());
+void Supervisor::changed(std::size_t place, const InstanceStatus& status) {
+  surroundings_.observer.changed(place, status);
   advance();
+}
+
+void Supervisor::transition(const InstanceStatus& status, InstanceState from, InstanceState to,
+                            std::string_view reason) {
+  surroundings_.observer.transition(status, from, to, reason);
+}
+
+void Supervisor::wrong_step(const InstanceStatus& status, std::string_view what) {
+  surroundings_.observer.wrong_step(status, what);
+}
+
+void Supervisor::gone(std::size_t place, const InstanceConfig& config) {
+  surroundings_.observer.gone(place, config);
 }
 
 // Starting one instance changes it, which comes back here: the outermost call does all the work.

@@ -11,26 +11,20 @@
 #include "api/control/control_handler.hpp"
 #include "manager/config/manager_config.hpp"
 #include "manager/supervisor/instance_host.hpp"
+#include "manager/supervisor/instance_observer.hpp"
 #include "manager/supervisor/managed_instance.hpp"
 
 namespace plchost {
 
 /// All instances: which one a command is for, and in which order they start and end. A later instance of
 /// `after` starts when the earlier ones are up, and ends before them.
-class Supervisor : public ControlHandler {
+class Supervisor : public ControlHandler, private InstanceObserver {
  public:
   struct Surroundings {
     std::string folder;
     std::vector<std::string_view> schedulers;
     std::function<TimePoint()> now;
-    /// The instance at `place` has changed. It keeps its place as long as there is one of that name.
-    std::function<void(std::size_t place, const InstanceStatus& status)> publish;
-    /// The process of that instance has gone from one state to another. May be empty.
-    std::function<void(const InstanceStatus& status, InstanceState from, InstanceState to,
-                       std::string_view reason)>
-        transition = {};
-    /// There is no instance at `place` any more; the last one had this configuration. May be empty.
-    std::function<void(std::size_t place, const InstanceConfig& config)> gone = {};
+    InstanceObserver& observer;
   };
   /// Makes the host of one instance, and is told where its events go.
   struct HostedInstance {
@@ -66,7 +60,7 @@ class Supervisor : public ControlHandler {
   /// Of all instances, those that were removed included.
   [[nodiscard]] std::vector<InstanceConfig> configs() const;
   [[nodiscard]] ManagedInstance& instance(std::size_t index) { return *units_[index]->instance; }
-  /// Where publish() is told of it.
+  /// As the observer is told it.
   [[nodiscard]] std::size_t place(std::size_t index) const { return units_[index]->place; }
   [[nodiscard]] std::size_t size() const noexcept { return units_.size(); }
 
@@ -89,7 +83,11 @@ class Supervisor : public ControlHandler {
   void link();
   void forget_gone();
   void tell_changes(Unit& unit, const InstanceConfig& now, std::vector<std::string>& lines);
-  void changed(const Unit& unit);
+  void changed(std::size_t place, const InstanceStatus& status) override;
+  void transition(const InstanceStatus& status, InstanceState from, InstanceState to,
+                  std::string_view reason) override;
+  void wrong_step(const InstanceStatus& status, std::string_view what) override;
+  void gone(std::size_t place, const InstanceConfig& config) override;
   void advance();
   void advance_start(Unit& unit);
   void advance_end();

@@ -68,7 +68,7 @@ std::vector<std::string> Supervisor::reload(const std::vector<InstanceConfig>& n
   }
   link();
   for (const Unit* const unit : fresh) {
-    surroundings_.publish(unit->place, unit->instance->status());
+    surroundings_.observer.changed(unit->place, unit->instance->status());
     if (!unit->instance->adopt()) unit->instance->resume();
     lines.push_back(fmt::format("instance '{}': new", unit->instance->config().name));
   }
@@ -112,12 +112,12 @@ void Supervisor::forget_gone() {
   };
   const auto first = std::ranges::stable_partition(units_, std::not_fn(over)).begin();
   if (first == units_.end()) return;
-  const std::vector<std::unique_ptr<Unit>> gone(std::make_move_iterator(first),
-                                                std::make_move_iterator(units_.end()));
+  const std::vector<std::unique_ptr<Unit>> ended(std::make_move_iterator(first),
+                                                 std::make_move_iterator(units_.end()));
   units_.erase(first, units_.end());
   link();
-  for (const auto& unit : gone) {
-    if (surroundings_.gone) surroundings_.gone(unit->place, unit->instance->config());
+  for (const auto& unit : ended) {
+    gone(unit->place, unit->instance->config());
   }
   advance();
 }

@@ -34,6 +34,7 @@ class FakeHost : public InstanceHost {
   }
   [[nodiscard]] std::optional<InstanceRuntime> runtime() override { return page; }
   [[nodiscard]] std::vector<int> granted_cores() override { return cores; }
+  [[nodiscard]] std::string keep_lost_faults() override { return lost_fault; }
   void read_output() override {}
 
   std::vector<LaunchOptions> spawned;
@@ -47,6 +48,7 @@ class FakeHost : public InstanceHost {
   bool can_spawn = true;
   int spawn_errno = 0;
   bool can_send = true;
+  std::string lost_fault;
   int next_pid = 100;
 };
 

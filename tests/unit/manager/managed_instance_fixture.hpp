@@ -12,6 +12,7 @@
 #include "manager/supervisor/managed_instance.hpp"
 #include "tests/unit/manager/fake_host.hpp"
 #include "tests/unit/manager/fake_keeper.hpp"
+#include "tests/unit/manager/fake_observer.hpp"
 #include "tests/unit/manager/fake_wishes.hpp"
 
 namespace plchost {
@@ -30,20 +31,15 @@ class ManagedInstanceTest : public testing::Test {
   }
 
   void make() {
-    sut_.emplace(
-        config_,
-        ManagedInstance::Surroundings{
-            .host = host_config_,
-            .applications = applications_,
-            .wishes = wishes_,
-            .folder = "/etc/plchost",
-            .schedulers = {"CmpSchedule", "CmpScheduleTimer"},
-            .now = [this] { return now_; },
-            .changed = [this] { ++changes_; },
-            .keep_lost_faults = [this] { return lost_fault_; },
-            .transition = [this](InstanceState from, InstanceState to,
-                                 std::string_view reason) { transitions_.emplace_back(from, to, reason); }},
-        host_);
+    sut_.emplace(config_,
+                 ManagedInstance::Surroundings{.host = host_config_,
+                                               .applications = applications_,
+                                               .wishes = wishes_,
+                                               .folder = "/etc/plchost",
+                                               .schedulers = {"CmpSchedule", "CmpScheduleTimer"},
+                                               .now = [this] { return now_; },
+                                               .observer = observer_},
+                 host_);
   }
 
   ManagedInstance& sut() { return *sut_; }
@@ -113,9 +109,7 @@ class ManagedInstanceTest : public testing::Test {
   FakeKeeper applications_;
   FakeWishes wishes_;
   TimePoint now_{std::chrono::seconds(1000)};
-  int changes_ = 0;
-  std::string lost_fault_;
-  std::vector<std::tuple<InstanceState, InstanceState, std::string>> transitions_;
+  FakeObserver observer_;
   std::vector<ControlReply> replies_;
   std::optional<ManagedInstance> sut_;
 };

@@ -1,5 +1,6 @@
 // The life of the application as the manager sees it: exception, single cycle, cold reset, kinds of start.
 #include <csignal>
+#include <utility>
 
 #include "tests/unit/manager/managed_instance_fixture.hpp"
 
@@ -132,6 +133,12 @@ TEST_F(ManagedLife, TellsTheApplicationWhyItStarts) {
   EXPECT_FALSE(host_.spawned.back().stopped);
 }
 
+TEST_F(ManagedLife, TellsAStepThatItsTableHasNot) {
+  bring_up();
+  sut().hold("as no supervisor does it");
+  EXPECT_THAT(std::exchange(observer_.wrong, {}), ElementsAre("'up' does not lead to 'held'"));
+}
+
 TEST_F(ManagedLife, TellsOfEachChangeOfTheProcessOnceAndOfNoneOfTheApplication) {
   bring_up();
   ask(ControlVerb::stop);
@@ -142,7 +149,7 @@ TEST_F(ManagedLife, TellsOfEachChangeOfTheProcessOnceAndOfNoneOfTheApplication) 
   report_ready();
   using enum InstanceState;
   std::vector<std::pair<InstanceState, InstanceState>> told;
-  for (const auto& [from, to, reason] : transitions_) told.emplace_back(from, to);
+  for (const auto& [from, to, reason] : observer_.transitions) told.emplace_back(from, to);
   EXPECT_THAT(told, ElementsAre(std::pair(offline, waiting), std::pair(waiting, starting),
                                 std::pair(starting, running), std::pair(InstanceState::stopped, stopping),
                                 std::pair(stopping, starting), std::pair(starting, InstanceState::stopped)));

@@ -90,13 +90,14 @@ class SilentProcess : public ManagedInstanceTest {
 TEST_F(SilentProcess, IsInExceptionAndLeftAlone) {
   bring_up_and_fall_silent();
   EXPECT_THAT(problem(), HasSubstr("its control thread has not answered for 3 s"));
-  EXPECT_EQ(std::get<1>(transitions_.back()), InstanceState::exception) << "it cannot tell this itself";
+  EXPECT_EQ(std::get<1>(observer_.transitions.back()), InstanceState::exception)
+      << "it cannot tell this itself";
   EXPECT_TRUE(host_.signals.empty());
   EXPECT_TRUE(is_only_asked_for_its_status());
 }
 
 TEST_F(SilentProcess, SaysTheFaultThatTheProcessCouldNotTell) {
-  lost_fault_ = "task 'Main': SIGABRT: abort";
+  host_.lost_fault = "task 'Main': SIGABRT: abort";
   bring_up_and_fall_silent();
   EXPECT_THAT(problem(), StartsWith("task 'Main': SIGABRT: abort; its control thread has not"));
 }
@@ -106,7 +107,7 @@ TEST_F(SilentProcess, IsWhatItWasWhenItAnswersAgain) {
   beat();
   EXPECT_EQ(state(), InstanceState::running);
   EXPECT_EQ(problem(), "");
-  EXPECT_EQ(std::get<1>(transitions_.back()), InstanceState::running);
+  EXPECT_EQ(std::get<1>(observer_.transitions.back()), InstanceState::running);
   ask(ControlVerb::stop);
   EXPECT_EQ(host_.requests.back().verb, ControlVerb::stop);
 }

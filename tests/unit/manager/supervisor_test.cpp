@@ -9,6 +9,7 @@
 
 #include "tests/unit/manager/fake_host.hpp"
 #include "tests/unit/manager/fake_keeper.hpp"
+#include "tests/unit/manager/fake_observer.hpp"
 #include "tests/unit/manager/fake_wishes.hpp"
 
 namespace plchost {
@@ -36,25 +37,21 @@ class SupervisorTest : public testing::Test {
   }
 
   void make() {
-    sut_.emplace(
-        config_,
-        Supervisor::Surroundings{
-            .folder = "/etc",
-            .schedulers = {"CmpSchedule"},
-            .now = [this] { return now_; },
-            .publish = [this](std::size_t index,
-                              const InstanceStatus& status) { published_[index] = status; },
-            .gone = [this](std::size_t place, const InstanceConfig& config) { gone_[place] = config.name; }},
-        [this](const InstanceConfig& config) {
-          auto host = std::make_unique<FakeHost>();
-          hosts_[config.name] = host.get();
-          auto wishes = std::make_unique<FakeWishes>();
-          wishes_[config.name] = wishes.get();
-          return Supervisor::HostedInstance{.host = std::move(host),
-                                            .applications = std::make_unique<FakeKeeper>(),
-                                            .wishes = std::move(wishes),
-                                            .connect = [](InstanceEvents&) {}};
-        });
+    sut_.emplace(config_,
+                 Supervisor::Surroundings{.folder = "/etc",
+                                          .schedulers = {"CmpSchedule"},
+                                          .now = [this] { return now_; },
+                                          .observer = observer_},
+                 [this](const InstanceConfig& config) {
+                   auto host = std::make_unique<FakeHost>();
+                   hosts_[config.name] = host.get();
+                   auto wishes = std::make_unique<FakeWishes>();
+                   wishes_[config.name] = wishes.get();
+                   return Supervisor::HostedInstance{.host = std::move(host),
+                                                     .applications = std::make_unique<FakeKeeper>(),
+                                                     .wishes = std::move(wishes),
+                                                     .connect = [](InstanceEvents&) {}};
+                 });
   }
   ManagedInstance& instance(const std::string& name) {
     for (std::size_t i = 0; i < sut_->size(); ++i) {
@@ -77,8 +74,7 @@ class SupervisorTest : public testing::Test {
   TimePoint now_{std::chrono::seconds(1)};
   std::map<std::string, FakeHost*> hosts_;
   std::map<std::string, FakeWishes*> wishes_;
-  std::map<std::size_t, std::string> gone_;
-  std::map<std::size_t, InstanceStatus> published_;
+  FakeObserver observer_;
   std::optional<Supervisor> sut_;
 };
 
@@ -95,7 +91,7 @@ TEST_F(SupervisorTest, StartsEachWhenWhatItComesAfterIsUp) {
   ready("line1");
   EXPECT_EQ(state("packer1"), InstanceState::starting);
   ready("packer1");
-  EXPECT_EQ(published_.at(0).state, InstanceState::running);
+  EXPECT_EQ(observer_.shown.at(0).state, InstanceState::running);
 }
 
 TEST_F(SupervisorTest, LeavesTheOthersWaitingWhenOneFails) {
@@ -200,24 +196,24 @@ TEST_F(SupervisorTest, KeepsThePlaceOfEachInstanceWhenOthersComeAndGo) {
   now.push_back(spare);
   EXPECT_THAT(sut_->reload(now), ElementsAre("instance 'packer1': removed; it runs until it is stopped",
                                              "instance 'spare': new"));
-  EXPECT_EQ(published_.at(3).name.view(), "spare");
+  EXPECT_EQ(observer_.shown.at(3).name.view(), "spare");
   EXPECT_EQ(state("spare"), InstanceState::starting) << "drive1 is up";
   instance("packer1").on_exit(killed_by(SIGSEGV));
   wishes_["packer1"]->writing = true;
   sut_->refresh();
   now_ += kGoneShown;
   sut_->refresh();
-  EXPECT_TRUE(gone_.empty()) << "its wish is being written";
+  EXPECT_TRUE(observer_.ended.empty()) << "its wish is being written";
   wishes_["packer1"]->writing = false;
   sut_->refresh();
   now_ += kGoneShown;
   sut_->refresh();
-  EXPECT_EQ(gone_.at(0), "packer1");
+  EXPECT_EQ(observer_.ended.at(0), "packer1");
   spare.name = "next";
   now.push_back(spare);
   EXPECT_THAT(sut_->reload(now), ElementsAre("instance 'next': new"));
-  EXPECT_EQ(published_.at(0).name.view(), "next");
-  EXPECT_EQ(published_.at(1).name.view(), "line1");
+  EXPECT_EQ(observer_.shown.at(0).name.view(), "next");
+  EXPECT_EQ(observer_.shown.at(1).name.view(), "line1");
 }
 
 TEST_F(SupervisorTest, HasRoomForAsManyAsThePageHas) {

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstddef>
+#include <string_view>
+
+#include "manager/config/manager_config.hpp"
+#include "shm/pool/host_page.hpp"
+
+namespace plchost {
+
+/// Is told what happens to the instances. A ManagedInstance tells its Supervisor, and that tells the Manager.
+/// All calls come on the Reactor's thread.
+class InstanceObserver {
+ public:
+  virtual ~InstanceObserver() = default;
+  /// The instance at `place` shows `status` now. It keeps its place as long as there is one of that name.
+  virtual void changed(std::size_t place, const InstanceStatus& status) = 0;
+  /// The process has gone from one state to another. The process itself tells what only follows the state of
+  /// its application.
+  virtual void transition(const InstanceStatus& status, InstanceState from, InstanceState to,
+                          std::string_view reason) = 0;
+  /// A step was taken that the table of instance_phase.hpp has not: a fault of the manager.
+  virtual void wrong_step(const InstanceStatus& status, std::string_view what) = 0;
+  /// There is no instance at `place` any more; the last one had this configuration.
+  virtual void gone(std::size_t place, const InstanceConfig& config) = 0;
+};
+
+}  // namespace plchost
