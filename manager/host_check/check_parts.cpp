@@ -40,7 +40,25 @@ std::vector<int> plc_cores(const CheckedHost& host) {
   return each_once(std::move(cores));
 }
 
+std::string join_some(const std::vector<std::string>& parts, std::string_view separator, std::size_t most) {
+  const std::size_t shown = std::min(parts.size(), most);
+  const auto end = parts.begin() + static_cast<std::ptrdiff_t>(shown);
+  std::string text = fmt::format("{}", fmt::join(parts.begin(), end, separator));
+  if (shown < parts.size()) text += fmt::format("{}and {} more", separator, parts.size() - shown);
+  return text;
+}
+
 std::string name_cores(const CheckedHost& host, const std::vector<int>& cores) {
+  constexpr std::size_t kEachNamed = 8;  // instances; of more of them the first ones
+  constexpr std::size_t kNamed = 3;
+  std::vector<std::string> all;
+  for (const CheckedHost::Instance& instance : host.instances) {
+    if (std::ranges::binary_search(cores, instance.core)) all.push_back(instance.name);
+  }
+  if (all.size() > kEachNamed) {
+    return fmt::format("{} instances on core{} {} ({})", all.size(), cores.size() == 1 ? "" : "s",
+                       format_cpu_list(cores), join_some(all, ", ", kNamed));
+  }
   std::string text;
   for (const int core : cores) {
     std::string names;

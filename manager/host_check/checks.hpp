@@ -62,7 +62,11 @@ HostFinding machine(const CheckedHost& host);
 
 /// The cores of the instances, sorted, each once.
 [[nodiscard]] std::vector<int> plc_cores(const CheckedHost& host);
-/// "core 1 (line1, line2), core 2 (line3)": those of `cores` that instances have.
+/// `parts` one after the other, at most `most` of them: "a, b, and 62 more".
+[[nodiscard]] std::string join_some(const std::vector<std::string>& parts, std::string_view separator,
+                                    std::size_t most);
+/// "core 1 (line1, line2), core 2 (line3)", with the instances on each. Of more than eight instances:
+/// "64 instances on cores 2-65 (line1, line2, line3, and 61 more)". `cores` are sorted.
 [[nodiscard]] std::string name_cores(const CheckedHost& host, const std::vector<int>& cores);
 
 /// The cores that the kernel's scheduler leaves alone: isolcpus= and isolated cpusets.

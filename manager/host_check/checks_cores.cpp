@@ -74,10 +74,11 @@ HostFinding siblings(const CheckedHost& host) {
   constexpr auto kSubject = "hyper-thread siblings";
   constexpr auto kWhy =
       "both share one core's arithmetic units and caches: what one runs slows the other down";
+  constexpr std::size_t kPairsShown = 3;
   const auto cores = plc_cores(host);
   const auto quiet = isolated(host.files);
   const auto online = host.files.cores("/sys/devices/system/cpu/online");
-  std::string busy;
+  std::vector<std::string> busy;
   std::vector<int> victims;
   for (const int core : cores) {
     const auto together =
@@ -90,8 +91,8 @@ HostFinding siblings(const CheckedHost& host) {
       if (off || (left_alone && !plc)) continue;
       if (plc && sibling < core) continue;  // said already, from the other side
       victims.push_back(core);
-      busy += fmt::format("{}core {} is one with {}{}", busy.empty() ? "" : "; ", core,
-                          name_cores(host, {sibling}), plc ? "" : ", which works for all programs");
+      busy.push_back(fmt::format("core {} is one with {}{}", core, name_cores(host, {sibling}),
+                                 plc ? "" : ", which works for all programs"));
     }
   }
   if (victims.empty()) {
@@ -100,7 +101,7 @@ HostFinding siblings(const CheckedHost& host) {
   }
   victims.erase(std::ranges::unique(victims).begin(), victims.end());
   return finding(
-      FindingLevel::warning, name_cores(host, victims), busy, kWhy,
+      FindingLevel::warning, name_cores(host, victims), join_some(busy, "; ", kPairsShown), kWhy,
       "leave the sibling idle: isolate it too, echo 0 > /sys/devices/system/cpu/cpuN/online, or boot with "
       "nosmt; give two instances cores of their own");
 }

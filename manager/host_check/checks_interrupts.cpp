@@ -54,11 +54,7 @@ HostFinding interrupts(const CheckedHost& host) {
   }
   if (hits.empty() && unreadable) return unknown(kSubject, *unreadable, kWhy);
   if (hits.empty()) return finding(FindingLevel::ok, kSubject, "none comes to an instance's core", kWhy);
-  const std::size_t shown = std::min(hits.size(), kShown);
-  std::string found =
-      fmt::format("{} interrupts: {}", hits.size(),
-                  fmt::join(hits.begin(), hits.begin() + static_cast<std::ptrdiff_t>(shown), "; "));
-  if (shown < hits.size()) found += fmt::format("; and {} more", hits.size() - shown);
+  const std::string found = fmt::format("{} interrupts: {}", hits.size(), join_some(hits, "; ", kShown));
   return finding(FindingLevel::warning, name_cores(host, each_once(std::move(hit_cores))), found, kWhy,
                  "boot with irqaffinity= and isolcpus=managed_irq, or write the housekeeping cores to "
                  "/proc/irq/N/smp_affinity_list; keep irqbalance away (IRQBALANCE_BANNED_CPULIST)");

@@ -5,6 +5,7 @@
 namespace plchost {
 namespace {
 
+using testing::EndsWith;
 using testing::HasSubstr;
 using testing::StartsWith;
 
@@ -93,6 +94,26 @@ TEST(HostCheckCores, WarnOnceOfTwoInstancesOnSiblings) {
   const auto found = tree.look("siblings");
   EXPECT_EQ(found.level, FindingLevel::warning);
   EXPECT_EQ(found.found, "core 2 is one with core 3 (line2)");
+}
+
+TEST(HostCheckCores, CountsManyInstancesAndNamesTheFirstOnes) {
+  FakeTree tree;
+  tree.host.instances.clear();
+  for (int i = 1; i <= 64; ++i) {
+    tree.host.instances.push_back({fmt::format("line{}", i), i + 1});
+    tree.write(fmt::format("/sys/devices/system/cpu/cpu{}/topology/thread_siblings_list", i + 1),
+               fmt::format("{},{}\n", i + 1, i + 101));
+  }
+  tree.write(kIsolated, "\n");
+  tree.write("/sys/devices/system/cpu/online", "0-255\n");
+  EXPECT_EQ(tree.look("isolated_cores").subject,
+            "64 instances on cores 2-65 (line1, line2, line3, and 61 more)");
+  const auto found = tree.look("siblings");
+  EXPECT_EQ(found.subject, "64 instances on cores 2-65 (line1, line2, line3, and 61 more)");
+  EXPECT_THAT(found.found, StartsWith("core 2 is one with core 102, which works for all programs; core 3"));
+  EXPECT_THAT(found.found, EndsWith("; and 61 more"));
+  for (auto& instance : tree.host.instances) instance.core = 2;
+  EXPECT_EQ(tree.look("isolated_cores").subject, "64 instances on core 2 (line1, line2, line3, and 61 more)");
 }
 
 TEST(HostCheckCores, KeepOneCoreForTheHost) {
