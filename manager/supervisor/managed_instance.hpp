@@ -27,75 +27,71 @@ inline constexpr Duration kPageLimit = std::chrono::seconds(1);
 inline constexpr Duration kAskInterval = std::chrono::milliseconds(500);
 inline constexpr Duration kAskAgain = std::chrono::seconds(2);
 
+// clang-format off
 // The rules of one instance
 // =========================
 //
-// * The order of `after` is for the first start (held) and for the end. A restart does not wait, and an
-// operator's
-//   start of a held instance overrides it.
-// * What follows from each end, and from each start that fails: restart_decision.hpp.
-// * An exception of the application is no crash: the process stays and answers, nothing is restarted by
-// itself.
-//   It is found in the process's page within 50 ms. start and single cycle are refused, stop has nothing to
-//   do; reset, restart and load lead out of it.
-// * A process whose heartbeat stands still for HeartbeatWatch::kLimit is in exception, too, until it beats
-//   again. Nothing can be asked of it: a command that it was to answer fails, others than reset, restart,
-//   load and stop are refused, and stop is what reset is. Its end begins with SIGTERM, SIGKILL follows 2 s
-//   later.
-// * State and heartbeat are read from the process's page. If another program has damaged it or cut it short,
-//   the process is asked for them over its control socket; the problem text says so. The page alone is no
-//   reason for an exception, nor for a signal.
-// * Time limits: nothing is begun after the limit of its command, also if it waited for the process, or for
-//   the trial of a file, meanwhile. The process gets the lesser of that limit and limit_of() from now.
-// * Commands: one at a time; another is answered with busy. What changes a process that is still setting_up
-// waits until
-//   it is up. The reply comes when the thing is done, or when the process ended instead, or at the limit.
-//     start      up: forwarded (running: done already; safe_mode: refused). Down, held, backing_off: spawns.
-//     stop       up: forwarded (stopped, exception: done already); stopping until the answer comes. held,
-//                backing_off: cancels, offline. Down: done already.
-//     single_cycle       up: forwarded. Else refused.
-//     reset, reset_cold, restart   ends the process if there is one, and spawns another one, stopped or
-//     running.
-//                The application can ask why it starts (StartKind).
-//     load_application   checked first by a process of its own; then as restart if it ran, was in safe mode,
-//     failed,
-//                waiting or without application; as reset if it was stopped; only remembered if it was
-//                offline.
-//     download_application   kept and checked by a helper process, then as load_application.
-//                What the trial finds wrong ends nothing. If the new one still does not come up, the one
-//                before is started again as it was, and the reply tells both.
-//     rollback_application   load_application of what was loaded before what is loaded; that must have been
-//     sent.
-//                With the option "boot", of all three: when all is done the path becomes the boot
-//                application, which is what the first process begins with, instead of the configuration's.
-//                With the option "online", of all three: the process that is up takes it in
-//                (change_application) and goes on; refused if there is none, or by it, and then nothing is
-//                changed.
-//     set_scheduler      up: forwarded, and remembered for the next process if it was accepted. Else
-//     remembered. register_event, unregister_event   the same; registrations are repeated in each fresh
-//     process.
+// The phases of an instance, and the steps between them: instance_phase.hpp.
+// What follows from each end, and from each start that fails: restart_decision.hpp.
+//
+// * The order of `after` is for the first start (held) and for the end. A restart does not wait. An operator's start of
+//   a held instance overrides the order.
+// * An exception of the application is no crash. The process stays and answers; nothing restarts it. The manager finds
+//   it in the process's page within 50 ms. start and single cycle are refused, stop has nothing to do; reset, restart
+//   and load lead out of it.
+// * A process whose heartbeat stands still for HeartbeatWatch::kLimit is in exception, too, until it beats again.
+//   Nothing can be asked of it. A command that it was to answer fails. Commands other than reset, restart, load and
+//   stop are refused, and stop is what reset is. Its end begins with SIGTERM; SIGKILL follows 2 s later.
+// * The manager reads state and heartbeat from the process's page. If another program has damaged the page or cut it
+//   short, the manager asks the process over its control socket; the problem text says so. The page alone is no reason
+//   for an exception, nor for a signal.
+// * Nothing is begun after the time limit of its command, also if it waited for the process or for the trial of a file
+//   meanwhile. The process gets the lesser of that limit and limit_of() from now.
+//
+// Commands: one at a time; another one is answered with busy. A command that changes a process waits until the process
+// is up. The reply comes when the thing is done, when the process ended instead, or at the limit.
+//
+//   command                  process is up                                held, backing off     down
+//   start                    forwarded; running: done already;            spawns                spawns
+//                            safe mode: refused
+//   stop                     forwarded, stopping until the answer;        cancelled, offline    done already
+//                            stopped, exception: done already
+//   single_cycle             forwarded                                    refused               refused
+//   reset, reset_cold        ends it, spawns another one, stopped         spawns, stopped       spawns, stopped
+//   restart                  ends it, spawns another one, running         spawns                spawns
+//   load_application         after a trial: as restart if it ran, was     as restart            failed: as restart;
+//                            in safe mode or had no application;                                offline: remembered
+//                            as reset if it was stopped
+//   set_scheduler            forwarded; remembered if accepted            remembered            remembered
+//   register_event,          forwarded; repeated in each fresh process    refused               refused
+//   unregister_event
+//
+//   download_application     a helper keeps and checks the file; then as load_application. What the trial finds wrong
+//                            ends nothing. If the new application does not come up, the one before starts again as it
+//                            was, and the reply tells both.
+//   rollback_application     load_application of what was loaded before. That must have been sent.
+//   option "boot"            of all three: when all is done, the path becomes the boot application. The first process
+//                            begins with that instead of the configuration's.
+//   option "online"          of all three: the process that is up takes the application in (change_application) and
+//                            goes on. Refused if there is no such process, or by it; then nothing is changed.
 //
 // What an instance is to be outlives the manager and the host's power (InstanceWish)
-// * Written down whenever it changes, before the command is answered. A stop, also that of a reset, is
-// written
+// * It is written down whenever it changes, before the command is answered. A stop, also that of a reset, is written
 //   before it is carried out: whatever ends meanwhile, the machine stays stopped.
-// * The next manager goes on with it, see restart_decision.hpp. An instance that begins with its host keeps
-//   safe mode, scheduler and application; a boot application, if one was chosen, takes the application's
-//   place.
-// * A configuration that names another application or another scheduler than when the wish was written takes
-//   effect, as a load or a change of the scheduler would: another application also ends safe mode and failed.
-//   Another core, priority band or settings file ends failed, too.
-//   It starts nothing that an operator stopped.
-// * While the instance has a process, what differs waits for the next one; the problem text says so. A
-// younger
-//   load or change of the scheduler by an operator takes the place of what the configuration says.
-// * A wish that was kept and cannot be read: failed. The machine is not started on a guess.
+// * The next manager goes on with it. An instance that begins with its host keeps safe mode, scheduler and application.
+//   A boot application, if one was chosen, takes the application's place.
+// * A configuration that names another application or scheduler than when the wish was written takes effect, as a load
+//   or a change of the scheduler would. Another application also ends safe mode and failed. Another core, priority band
+//   or settings file ends failed, too. It starts nothing that an operator stopped.
+// * While the instance has a process, what differs waits for the next one; the problem text says so. A younger load or
+//   change of the scheduler by an operator takes the place of what the configuration says.
+// * If a wish was kept and cannot be read, the instance is failed: no machine starts on a guess.
 //
 // A configuration that is read again (reconfigure, remove)
-// * An instance that is no longer in it and runs goes on running, and is `removed`. It can only be stopped,
-// which
-//   ends its process. It is not started again. So it ends, too, when its application is stopped.
+// * An instance that is no longer in it and runs goes on running, and is `removed`. It can only be stopped, which ends
+//   its process. It also ends when its application stops. It is not started again.
 // * When a removed instance has no process, it is gone().
+// clang-format on
 class ManagedInstance : public InstanceEvents {
  public:
   struct Surroundings {
@@ -245,6 +241,7 @@ class ManagedInstance : public InstanceEvents {
   void come_up();
   void finish_adoption(const std::string& problem);
   void show_application(const InstanceRuntime& runtime);
+  // Ends: instance_ends.cpp
   void set_up_ended(const ExitStatus& status);
   void asked_end();
   /// The process has ended by itself, or could not be started.
