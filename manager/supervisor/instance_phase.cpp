@@ -10,7 +10,7 @@ namespace plchost {
 
 namespace {
 
-constexpr auto kSteps = [] {
+constexpr auto kPhaseSteps = [] {
   using enum InstancePhase;
   return std::array{
       std::pair{down, held},
@@ -42,7 +42,7 @@ constexpr auto kSteps = [] {
   };
 }();
 
-constexpr auto kShown = [] {
+constexpr auto kShownStates = [] {
   using enum InstancePhase;
   return std::array{
       std::pair{down, InstanceState::offline},        std::pair{down, InstanceState::failed},
@@ -77,11 +77,11 @@ std::string_view to_string(InstancePhase phase) noexcept {
 }
 
 bool leads(InstancePhase from, InstancePhase to) noexcept {
-  return from == to || std::ranges::find(kSteps, std::pair(from, to)) != kSteps.end();
+  return from == to || std::ranges::find(kPhaseSteps, std::pair(from, to)) != kPhaseSteps.end();
 }
 
 bool shows(InstancePhase phase, InstanceState state) noexcept {
-  return std::ranges::find(kShown, std::pair(phase, state)) != kShown.end();
+  return std::ranges::find(kShownStates, std::pair(phase, state)) != kShownStates.end();
 }
 
 std::string wrong_step(InstancePhase from, InstancePhase to, InstanceState shown) {

@@ -21,7 +21,7 @@ struct DecisionRow {
   Action removed;  // from the configuration
 };
 
-constexpr auto kRows = [] {
+constexpr auto kDecisionRows = [] {
   using enum Decision::Action;
   using enum EndCause;
   using Counts = DecisionRow::Counts;
@@ -57,8 +57,8 @@ constexpr auto kRows = [] {
 }();
 
 constexpr bool in_order_of_causes() {
-  for (std::size_t i = 0; i < kRows.size(); ++i) {
-    if (static_cast<std::size_t>(kRows[i].cause) != i) return false;
+  for (std::size_t i = 0; i < kDecisionRows.size(); ++i) {
+    if (static_cast<std::size_t>(kDecisionRows[i].cause) != i) return false;
   }
   return true;
 }
@@ -122,7 +122,7 @@ Duration delay_after(const RestartHistory& history, const InstanceConfig& policy
 }  // namespace
 
 Decision decide(const End& end, const RestartHistory& history, const InstanceConfig& policy) {
-  const DecisionRow& row = kRows.at(static_cast<std::size_t>(end.cause));
+  const DecisionRow& row = kDecisionRows.at(static_cast<std::size_t>(end.cause));
   Decision made{.action = action_of(row, end, policy),
                 .runs = end.order == Order::none || end.order == Order::run,
                 .delay = Duration::zero(),

@@ -69,7 +69,7 @@ constexpr std::string_view kFailure = "back off 100 ms, back off 200 ms, back of
 constexpr std::string_view kOffline = "offline, offline, offline safe";
 constexpr std::string_view kFail = "fail, fail, fail safe";
 
-struct Case {
+struct DecisionCase {
   EndCause cause;
   std::string_view never;
   std::string_view on_failure;
@@ -81,7 +81,7 @@ struct Case {
 };
 
 // clang-format off
-constexpr std::array<Case, kEndCauses> kTable = {{
+constexpr std::array<DecisionCase, kEndCauses> kDecisionCases = {{
     {EndCause::exited, "fail", kCrash, kCrash, kOffline, kFail, kCrash, "start earlier"},
     {EndCause::killed, "fail", kCrash, kCrash, kOffline, kFail, kCrash, "start earlier"},
     {EndCause::unknown, "fail", kCrash, kCrash, kOffline, kFail, kCrash, "start earlier"},
@@ -114,8 +114,8 @@ TEST(Decide, FollowsTheTable) {
   const InstanceConfig on_failure = policy_of(RestartPolicy::on_failure);
   const InstanceConfig always = policy_of(RestartPolicy::always);
   const InstanceConfig no_autostart = policy_of(RestartPolicy::on_failure, false);
-  for (std::size_t i = 0; i < kTable.size(); ++i) {
-    const Case& wanted = kTable.at(i);
+  for (std::size_t i = 0; i < kDecisionCases.size(); ++i) {
+    const DecisionCase& wanted = kDecisionCases.at(i);
     SCOPED_TRACE(fmt::format("row {}", i));
     ASSERT_EQ(static_cast<std::size_t>(wanted.cause), i);
     const End end{.cause = wanted.cause, .at = kNow};
