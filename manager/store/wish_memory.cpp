@@ -5,8 +5,6 @@
 #include <atomic>
 #include <cstddef>
 #include <filesystem>
-#include <new>
-#include <span>
 
 #include <fmt/format.h>
 
@@ -37,14 +35,6 @@ struct WishMemory::Layout {
   std::uint32_t version = 0;
   std::uint32_t size = 0;
   std::array<Place, 2> places;
-
-  [[nodiscard]] static Result<void> fill(std::span<std::byte> bytes) {
-    auto* const layout = new (bytes.data()) Layout;
-    layout->version = kWishKind.version;
-    layout->size = sizeof(Layout);
-    layout->magic = kWishKind.magic;
-    return {};
-  }
 };
 
 WishMemory::Layout& WishMemory::layout() const noexcept {
@@ -53,12 +43,7 @@ WishMemory::Layout& WishMemory::layout() const noexcept {
 
 Result<WishMemory> WishMemory::open(std::string_view pool, std::string_view instance) {
   const std::string name = wish_memory_name(pool, instance);
-  auto memory = open_fixed_page<Layout>(name, kWishKind, MemoryFile::Access::read_write);
-  if (!memory && memory.error().code == ErrorCode::not_found) {
-    memory = MemoryFile::create(name, sizeof(Layout), Layout::fill);
-  } else if (!memory) {  // nothing of ours
-    memory = MemoryFile::replace(name, sizeof(Layout), Layout::fill);
-  }
+  auto memory = open_or_make_page<Layout>(name, kWishKind, Replaces::anything);
   if (!memory) return std::unexpected(std::move(memory).error());
   WishMemory opened(name, *std::move(memory));
   Found found = opened.newest();
@@ -137,24 +122,17 @@ Result<void> WishMemory::write(const InstanceWish& wish) {
 
 Result<bool> WishMemory::mend() {
   if (text_.empty()) return false;
-  const auto headed = [this] {
-    const Layout& found = layout();
-    return found.magic == kWishKind.magic && found.version == kWishKind.version &&
-           found.size == sizeof(Layout);
-  };
-  if (headed() && holds(0) && holds(1)) return false;
+  const bool headed = is_of_kind(layout(), kWishKind) && layout().size == sizeof(Layout);
+  if (headed && holds(0) && holds(1)) return false;
   if (memory_.lost()) {  // it has been looked at
-    auto made = MemoryFile::replace(name_, sizeof(Layout), Layout::fill);
+    auto made = MemoryFile::replace(name_, sizeof(Layout), new_page<Layout>(kWishKind));
     if (!made) return std::unexpected(std::move(made).error());
     memory_ = *std::move(made);
   }
   const std::size_t whole = holds(0) ? 0 : 1;
   fill(1 - whole);
   if (!holds(whole)) fill(whole);
-  Layout& found = layout();
-  found.version = kWishKind.version;
-  found.size = sizeof(Layout);
-  found.magic = kWishKind.magic;
+  describe_page(layout(), kWishKind);
   return true;
 }
 

@@ -2,14 +2,14 @@
 
 #include <fmt/format.h>
 
-#include "shm/pool/memory_file.hpp"
+#include "shm/pool/fixed_page.hpp"
 
 namespace plchost {
 
 namespace {
 
-constexpr std::uint64_t kLinkMagic = 0x6b6e696c'6b6c6270;  // "pblklink"
-constexpr std::uint32_t kLinkVersion = 2;
+constexpr PageKind kLinkKind{
+    .what = "link between nodes", .magic = 0x6b6e696c'6b6c6270, .version = 2};  // "pblklink"
 
 LinkLayout& layout_of(const MemoryFile& file) noexcept {
   return *reinterpret_cast<LinkLayout*>(file.bytes().data());
@@ -25,8 +25,8 @@ Result<LinkMemory> LinkMemory::make(const std::string& name, const NodeLife& fro
                                     std::uint32_t slots) {
   const auto fill = [&](std::span<std::byte> bytes) -> Result<void> {
     auto& layout = *reinterpret_cast<LinkLayout*>(bytes.data());
-    layout.magic = kLinkMagic;
-    layout.version = kLinkVersion;
+    layout.magic = kLinkKind.magic;
+    layout.version = kLinkKind.version;
     layout.slots = slots;
     layout.size = bytes.size();
     layout.from = from.node;
@@ -41,15 +41,14 @@ Result<LinkMemory> LinkMemory::make(const std::string& name, const NodeLife& fro
 }
 
 Result<LinkMemory> LinkMemory::open(const std::string& name, MemoryFile::Access access) {
-  auto file = MemoryFile::open(name, sizeof(LinkLayout), access);
+  auto file = open_page<LinkLayout>(name, kLinkKind, access);
   if (!file) return failure_in("link between nodes", std::move(file).error());
   const LinkLayout& layout = layout_of(*file);
   const std::uint32_t slots = layout.slots;
-  if (layout.magic != kLinkMagic || layout.version != kLinkVersion || !is_ring_size(slots) ||
-      file->bytes().size() != link_size(slots)) {
-    return failure(
-        ErrorCode::corrupt,
-        fmt::format("shared memory '{}' is no link between nodes of version {}", name, kLinkVersion));
+  if (!is_ring_size(slots) || file->bytes().size() != link_size(slots)) {
+    return failure(ErrorCode::corrupt, fmt::format("link between nodes '{}' says {} slots; this does not fit "
+                                                   "its size of {} bytes",
+                                                   name, slots, file->bytes().size()));
   }
   return LinkMemory(*std::move(file), slots);
 }

@@ -9,6 +9,7 @@
 #include "shm/base/names.hpp"
 #include "shm/base/seqlock.hpp"
 #include "shm/block_driver/node_address.hpp"
+#include "shm/pool/fixed_page.hpp"
 
 // The directory of the nodes of a pool as it lies in shared memory. What is read here is checked before it is
 // used: strangers may have scribbled in it. It is written under a lock of its file, which the kernel gives
@@ -16,8 +17,9 @@
 
 namespace plchost {
 
-inline constexpr std::uint64_t kDirectoryMagic = 0x65646f6e'6b6c6270;  // "pblknode"
-inline constexpr std::uint32_t kDirectoryVersion = 2;
+inline constexpr PageKind kDirectoryKind{.what = "directory of nodes",
+                                         .magic = 0x65646f6e'6b6c6270,  // "pblknode"
+                                         .version = 2};
 
 /// Other hosts that are reached through a node: from first to last. first 0: none.
 struct HostRange {

@@ -10,7 +10,7 @@
 
 #include "shm/base/process_start.hpp"
 #include "shm/block_driver/directory_lock.hpp"
-#include "shm/pool/memory_file.hpp"
+#include "shm/pool/fixed_page.hpp"
 
 namespace plchost {
 
@@ -22,27 +22,23 @@ std::string directory_name(std::string_view pool, std::string_view base) {
 
 Result<void> fill_directory(std::span<std::byte> bytes) {
   auto& layout = *reinterpret_cast<DirectoryLayout*>(bytes.data());
-  layout.magic = kDirectoryMagic;
-  layout.version = kDirectoryVersion;
+  layout.magic = kDirectoryKind.magic;
+  layout.version = kDirectoryKind.version;
   layout.slot_count = kMaxNodes;
   layout.size = sizeof(DirectoryLayout);
   return {};
 }
 
 Result<MemoryFile> open_or_make_directory(const std::string& name) {
-  constexpr int kAttempts = 10;  // each one fails only if another process makes or removes it in between
-  for (int attempt = 1;; ++attempt) {
-    auto file = MemoryFile::open(name, sizeof(DirectoryLayout), MemoryFile::Access::read_write);
-    if (file) return file;
-    const auto why = file.error().code;
-    // Not a file of those who run nodes here: a stranger's, or no file at all.
-    if (why == ErrorCode::refused || why == ErrorCode::wrong_type) {
-      return MemoryFile::replace(name, sizeof(DirectoryLayout), fill_directory);
-    }
-    if (why != ErrorCode::not_found) return file;
-    file = MemoryFile::create(name, sizeof(DirectoryLayout), fill_directory);
-    if (file || file.error().code != ErrorCode::already_exists || attempt == kAttempts) return file;
-  }
+  const auto open = [&] {
+    return MemoryFile::open(name, sizeof(DirectoryLayout), MemoryFile::Access::read_write);
+  };
+  const auto make = [&](bool replace) {
+    return replace ? MemoryFile::replace(name, sizeof(DirectoryLayout), fill_directory)
+                   : MemoryFile::create(name, sizeof(DirectoryLayout), fill_directory);
+  };
+  // Not a file of those who run nodes here, or no file at all, gives way. A header is mended below.
+  return open_or_make(open, make, Replaces::foreign);
 }
 
 // No check_name(): its error is a text, and this is read in cycles.
@@ -57,8 +53,7 @@ DirectoryLayout& directory_in(const MemoryFile& file) noexcept {
 }
 
 bool has_good_header(const DirectoryLayout& layout) noexcept {
-  return layout.magic == kDirectoryMagic && layout.version == kDirectoryVersion &&
-         layout.slot_count == kMaxNodes;
+  return is_of_kind(layout, kDirectoryKind) && layout.slot_count == kMaxNodes;
 }
 
 bool has_live_node(const DirectoryLayout& layout) noexcept {
@@ -74,7 +69,7 @@ Result<void> check_directory(const MemoryFile& file, const std::string& name) {
       ErrorCode::corrupt,
       fmt::format("shared memory '{}' is no directory of nodes of version {}; stop who uses it and "
                   "remove it, or choose another [CmpBlkDrvShm] BaseName",
-                  name, kDirectoryVersion));
+                  name, kDirectoryKind.version));
 }
 
 // A stranger may have written over it. Nodes that run write it again within a second; without them it is

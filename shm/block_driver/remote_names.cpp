@@ -32,14 +32,6 @@ std::uint32_t number_of(std::string_view name, std::string_view host) noexcept {
   return number == 0 ? 1 : number;
 }
 
-Result<void> fill_names(std::span<std::byte> bytes) {
-  auto& layout = *reinterpret_cast<RemoteNamesLayout*>(bytes.data());
-  layout.magic = kRemoteNames.magic;
-  layout.version = kRemoteNames.version;
-  layout.size = sizeof(RemoteNamesLayout);
-  return {};
-}
-
 }  // namespace
 
 RemoteNode RemoteNode::of(std::string_view host, std::string_view name, NodeAddress address) {
@@ -56,19 +48,9 @@ RemoteNamesLayout& RemoteNames::layout() const noexcept {
 
 Result<RemoteNames> RemoteNames::open(std::string_view pool, std::string_view base) {
   const std::string name = pool_memory_name(pool, fmt::format("{}.hosts", base));
-  constexpr int kAttempts = 10;  // each one fails only if another process makes or removes it in between
-  for (int attempt = 1;; ++attempt) {
-    auto file = open_fixed_page<RemoteNamesLayout>(name, kRemoteNames, MemoryFile::Access::read_write);
-    const auto why = file ? ErrorCode::ok : file.error().code;
-    if (why == ErrorCode::refused || why == ErrorCode::wrong_type) {
-      file = MemoryFile::replace(name, sizeof(RemoteNamesLayout), fill_names);
-    } else if (why == ErrorCode::not_found) {
-      file = MemoryFile::create(name, sizeof(RemoteNamesLayout), fill_names);
-      if (!file && file.error().code == ErrorCode::already_exists && attempt < kAttempts) continue;
-    }
-    if (!file) return failure_in("nodes of other hosts", std::move(file).error());
-    return RemoteNames(*std::move(file));
-  }
+  auto file = open_or_make_page<RemoteNamesLayout>(name, kRemoteNames, Replaces::foreign);
+  if (!file) return failure_in("nodes of other hosts", std::move(file).error());
+  return RemoteNames(*std::move(file));
 }
 
 void RemoteNames::write(std::span<const RemoteNode> nodes) noexcept {

@@ -4,7 +4,6 @@
 #include <cassert>
 #include <cstddef>
 #include <cstring>
-#include <new>
 #include <type_traits>
 
 #include <fmt/format.h>
@@ -24,21 +23,6 @@ static_assert(sizeof(InstancePlan) == 2616 && sizeof(InstanceStatus) == 3224 && 
 
 HostPageLayout& host_layout_of(const MemoryFile& memory) noexcept {
   return *reinterpret_cast<HostPageLayout*>(memory.bytes().data());
-}
-
-Result<MemoryFile> open_page(const std::string& name, MemoryFile::Access access) {
-  return open_fixed_page<HostPageLayout>(name, kHostPageKind, access);
-}
-
-void describe(HostPageLayout& page) noexcept {
-  page.version = kHostPageKind.version;
-  page.size = sizeof(HostPageLayout);
-  page.magic = kHostPageKind.magic;
-}
-
-Result<void> fill_host_page(std::span<std::byte> bytes) {
-  describe(*new (bytes.data()) HostPageLayout);
-  return {};
 }
 
 template <class Status>
@@ -104,14 +88,11 @@ std::string host_page_name(std::string_view pool) {
 
 Result<HostPageWriter> HostPageWriter::create(std::string_view pool) {
   const std::string name = host_page_name(pool);
-  if (auto found = open_page(name, MemoryFile::Access::read_write)) {
-    HostPageLayout& page = host_layout_of(*found);
-    page.host.recover();
-    for (auto& instance : page.instances) instance.recover();
-    return HostPageWriter(name, std::move(*found));
-  }
-  auto memory = MemoryFile::replace(name, sizeof(HostPageLayout), fill_host_page);
+  auto memory = open_or_make_page<HostPageLayout>(name, kHostPageKind, Replaces::anything);
   if (!memory) return std::unexpected(memory.error());
+  HostPageLayout& page = host_layout_of(*memory);  // of a manager that ended while it wrote, perhaps
+  page.host.recover();
+  for (auto& instance : page.instances) instance.recover();
   return HostPageWriter(name, std::move(*memory));
 }
 
@@ -147,14 +128,13 @@ void HostPageWriter::write_instance(std::uint32_t index, const InstanceStatus& s
 
 bool HostPageWriter::keep() {
   if (!holds(host_layout_of(memory_).host, host_) && memory_.lost()) {
-    auto fresh = MemoryFile::replace(name_, sizeof(HostPageLayout), fill_host_page);
+    auto fresh = MemoryFile::replace(name_, sizeof(HostPageLayout), new_page<HostPageLayout>(kHostPageKind));
     if (!fresh) return true;
     memory_ = std::move(*fresh);
   }
   HostPageLayout& page = host_layout_of(memory_);
-  bool changed =
-      page.magic != kHostPageKind.magic || page.version != kHostPageKind.version || page.size != sizeof(page);
-  if (changed) describe(page);
+  bool changed = !is_of_kind(page, kHostPageKind) || page.size != sizeof(page);
+  if (changed) describe_page(page, kHostPageKind);
   if (!holds(page.host, host_)) {
     page.host.recover();
     write_host(host_);
@@ -170,7 +150,8 @@ bool HostPageWriter::keep() {
 }
 
 Result<HostPageReader> HostPageReader::open(std::string_view pool) {
-  auto memory = open_page(host_page_name(pool), MemoryFile::Access::read_only);
+  auto memory =
+      open_fixed_page<HostPageLayout>(host_page_name(pool), kHostPageKind, MemoryFile::Access::read_only);
   if (!memory) return std::unexpected(memory.error());
   return HostPageReader(std::move(*memory));
 }

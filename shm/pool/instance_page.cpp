@@ -9,16 +9,19 @@
 
 #include <fmt/format.h>
 
+#include "shm/pool/fixed_page.hpp"
+
 namespace plchost {
 
 namespace {
 
-constexpr std::uint64_t kMagic = 0x67617074'736e6970;  // "pinstpag"
 /// 1: first. 2: the interval in force. 3: the tick source. 4: histograms behind the tasks, in two
 /// shapes. 5: the idle states. 6: the distributed clock. 7: state and problem of the application.
 /// 8: why a reference record is not followed. 9: faults. 10: the post that was run.
 /// 11: why retain variables are not written.
-constexpr std::uint32_t kVersion = 12;
+constexpr PageKind kInstancePageKind{.what = "page of an instance",
+                                     .magic = 0x67617074'736e6970,  // "pinstpag"
+                                     .version = 12};
 constexpr std::size_t kTasksOffset = (sizeof(InstancePageLayout) + 63) / 64 * 64;
 
 static_assert(offsetof(InstancePageLayout, version) == 8 && offsetof(InstancePageLayout, size) == 16);
@@ -55,15 +58,15 @@ HistogramBuckets buckets_of(const MemoryFile& memory, std::uint32_t task_count, 
 
 // All of the header but the magic.
 void describe(InstancePageLayout& page, std::size_t tasks, HistogramShape shape) noexcept {
-  page.version = kVersion;
+  page.version = kInstancePageKind.version;
   page.digits = shape.digits();
   page.task_count = static_cast<std::uint32_t>(tasks);
   page.size = size_for(tasks, shape);
 }
 
 bool is_described(const InstancePageLayout& page, std::size_t tasks, HistogramShape shape) noexcept {
-  return page.magic == kMagic && page.version == kVersion && page.digits == shape.digits() &&
-         page.task_count == tasks && page.size == size_for(tasks, shape);
+  return is_of_kind(page, kInstancePageKind) && page.digits == shape.digits() && page.task_count == tasks &&
+         page.size == size_for(tasks, shape);
 }
 
 // As a whole: who has written over it may have changed any byte.
@@ -84,7 +87,7 @@ Result<void> fill_instance_page(std::span<std::byte> bytes, std::span<const Task
     slot->identity = identity;
     place += sizeof(TaskSlot);
   }
-  page->magic = kMagic;
+  page->magic = kInstancePageKind.magic;
   return {};
 }
 
@@ -181,7 +184,7 @@ bool InstancePage::keep(const std::function<KnownFault(std::uint32_t)>& fault) {
   bool changed = !is_described(page, task_count_, shape_);
   if (changed) {
     describe(page, task_count_, shape_);
-    page.magic = kMagic;
+    page.magic = kInstancePageKind.magic;
   }
   for (std::uint32_t i = 0; i < task_count_; ++i) {
     if (keep_task(i, fault(i))) changed = true;
@@ -229,18 +232,9 @@ TaskSlot& InstancePage::task(std::uint32_t index) noexcept {
 
 Result<InstancePageReader> InstancePageReader::open(std::string_view pool, std::string_view instance) {
   const std::string name = instance_page_name(pool, instance);
-  auto memory = MemoryFile::open(name, sizeof(InstancePageLayout), MemoryFile::Access::read_only);
+  auto memory = open_page<InstancePageLayout>(name, kInstancePageKind, MemoryFile::Access::read_only);
   if (!memory) return std::unexpected(memory.error());
   const InstancePageLayout& page = instance_layout_of(*memory);
-  // The name is given to complete pages only, so the magic is there from the start.
-  if (page.magic != kMagic) {
-    return failure(ErrorCode::corrupt,
-                   fmt::format("shared memory '{}' is not the page of an instance", name));
-  }
-  if (page.version != kVersion) {
-    return failure(ErrorCode::corrupt, fmt::format("page '{}' has version {}; version {} is needed", name,
-                                                   page.version, kVersion));
-  }
   // Read once: a stranger may write to the page at any time.
   const std::uint32_t count = page.task_count;
   const std::uint32_t digits = page.digits;

@@ -1,16 +1,15 @@
 #pragma once
 
-#include <array>
-#include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "shm/base/log_line.hpp"
 #include "shm/base/names.hpp"
-#include "shm/base/seqlock.hpp"
-#include "shm/pool/memory_file.hpp"
+#include "shm/pool/ring_page.hpp"
 
 namespace plchost {
 
@@ -47,14 +46,11 @@ struct LogRecord {
 /// How many records are kept: 256 KiB.
 inline constexpr std::size_t kLogRecordsKept = 1024;
 
-struct LogRingLayout {
-  std::uint64_t magic = 0;  ///< written last
-  std::uint32_t version = 0;
-  std::uint32_t size = 0;
-  std::int64_t stream_unix_ns = 0;     ///< when the numbering began
-  std::atomic<std::uint64_t> last{0};  ///< number of the newest record
-  std::array<Seqlock<LogRecord>, kLogRecordsKept> slots;
-};
+inline constexpr PageKind kLogRingKind{.what = "log",
+                                       .magic = 0x676e6972'2d676f6c,  // "log-ring"
+                                       .version = 1};                 // 1: first
+using LogRingPage = RingPage<LogRecord, kLogRecordsKept, kLogRingKind>;
+using LogRingLayout = LogRingPage::Layout;
 
 [[nodiscard]] std::string log_ring_name(std::string_view pool, std::string_view instance);
 
@@ -71,10 +67,10 @@ class LogRing {
   void add(const LogEntry& entry);
 
  private:
-  LogRing(std::string name, MemoryFile memory) noexcept;
+  LogRing(std::string name, LogRingPage page) noexcept;
   void add_record(const LogRecord& record) noexcept;
   std::string name_;
-  MemoryFile memory_;
+  LogRingPage page_;
   // As it was written last: a stranger may change the memory's own.
   std::uint64_t last_ = 0;
   std::int64_t stream_ = 0;
@@ -100,8 +96,8 @@ class LogRingReader {
   [[nodiscard]] LogSlice newest(std::size_t count, std::size_t most) const;
 
  private:
-  explicit LogRingReader(MemoryFile memory) noexcept : memory_(std::move(memory)) {}
-  MemoryFile memory_;
+  explicit LogRingReader(LogRingPage page) noexcept : page_(std::move(page)) {}
+  LogRingPage page_;
 };
 
 }  // namespace plchost

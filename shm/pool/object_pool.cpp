@@ -115,7 +115,6 @@ const std::string& ObjectPool::name() const noexcept {
 
 PoolFindings ObjectPool::tidy() noexcept {
   constexpr auto kPatience = std::chrono::milliseconds(20);
-  (void)segment_->lock(true, kPatience);
   const bool held = segment_->lock(true, kPatience).has_value();
   if (!adoption_) adoption_ = std::make_shared<PoolAdoption>(segment_);
   if (held) adoption_->look();

@@ -9,6 +9,7 @@
 
 #include "shm/base/process_start.hpp"
 #include "shm/base/time.hpp"
+#include "shm/pool/open_or_make.hpp"
 #include "shm/pool/pool_clients.hpp"
 #include "shm/pool/pool_references.hpp"
 #include "shm/pool/pool_table.hpp"
@@ -166,24 +167,23 @@ Result<std::shared_ptr<PoolSegment>> PoolSegment::create(const std::string& name
   const auto owners = [&options](uid_t user) {
     return is_trusted_owner(user) || user == options.rights.owner;
   };
-  constexpr int kAttempts = 10;  // another round is needed only if others make and remove the pool meanwhile
-  for (int attempt = 1;; ++attempt) {
+  const auto open = [&] {
     auto pool = attach_patiently(name, Access::read_write, owners);
-    if (pool || attempt == kAttempts) return pool;
-    if (pool.error().code == ErrorCode::busy) {
+    if (!pool && pool.error().code == ErrorCode::busy) {
       MemoryFile::remove(name);
-    } else if (pool.error().code != ErrorCode::not_found) {
-      return pool;
+      pool.error().code = ErrorCode::not_found;
     }
+    return pool;
+  };
+  const auto make = [&](bool /*replace*/) -> Result<std::shared_ptr<PoolSegment>> {
     auto memory = MemoryFile::create(
         name, pool_size(options.max_objects),
         [&](std::span<std::byte> bytes) { return fill_header(bytes, options.max_objects); }, options.rights);
-    if (memory) {
-      return std::shared_ptr<PoolSegment>(
-          new PoolSegment(name, std::move(*memory), options.max_objects, Access::read_write));
-    }
-    if (memory.error().code != ErrorCode::already_exists) return std::unexpected(memory.error());
-  }
+    if (!memory) return std::unexpected(std::move(memory).error());
+    return std::shared_ptr<PoolSegment>(
+        new PoolSegment(name, std::move(*memory), options.max_objects, Access::read_write));
+  };
+  return open_or_make(open, make, Replaces::nothing);
 }
 
 Result<PoolLock> PoolSegment::acquire(Duration patience) {

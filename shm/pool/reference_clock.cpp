@@ -7,6 +7,7 @@
 #include <sys/stat.h>
 
 #include "shm/base/names.hpp"
+#include "shm/pool/open_or_make.hpp"
 #include "shm/pool/pool_adoption.hpp"
 
 namespace plchost {
@@ -28,22 +29,17 @@ Result<void> begin(std::span<std::byte> bytes) {
 
 // Firmware that makes the record gives it its name first and its size then; two who do so at once do the
 // same. A stranger who has emptied the file has made such a one.
-Result<MemoryFile> open_or_make(const std::string& name, const OwnerCheck& owners) {
-  constexpr int kAttempts = 10;  // each one fails only if another process makes or removes it in between
-  for (int attempt = 1;; ++attempt) {
-    auto memory = [&]() -> Result<MemoryFile> {
-      if (auto filled = MemoryFile::fill_empty(name, sizeof(plc_reference_clock), owners); !filled) {
-        return std::unexpected(std::move(filled).error());
-      }
-      return MemoryFile::open(name, 1, MemoryFile::Access::read_write, owners);
-    }();
-    if (!memory && memory.error().code == ErrorCode::not_found) {
-      memory = MemoryFile::create(name, sizeof(plc_reference_clock), begin);
+Result<MemoryFile> open_or_make_record(const std::string& name, const OwnerCheck& owners) {
+  const auto open = [&]() -> Result<MemoryFile> {
+    if (auto filled = MemoryFile::fill_empty(name, sizeof(plc_reference_clock), owners); !filled) {
+      return std::unexpected(std::move(filled).error());
     }
-    const bool again = !memory && (memory.error().code == ErrorCode::already_exists ||
-                                   memory.error().code == ErrorCode::not_found);
-    if (!again || attempt == kAttempts) return memory;
-  }
+    return MemoryFile::open(name, 1, MemoryFile::Access::read_write, owners);
+  };
+  const auto make = [&](bool /*replace*/) {
+    return MemoryFile::create(name, sizeof(plc_reference_clock), begin);
+  };
+  return open_or_make(open, make, Replaces::nothing);
 }
 
 }  // namespace
@@ -55,7 +51,7 @@ Result<void> check_reference_name(std::string_view name) {
 Result<ReferenceClockRecord> ReferenceClockRecord::open(std::string_view pool, std::string_view name) {
   if (auto valid = check_reference_name(name); !valid) return std::unexpected(std::move(valid).error());
   const std::string file = pool_memory_name(pool, name);
-  auto memory = open_or_make(file, [&](uid_t user) { return PoolAdoption::may_own(pool, user); });
+  auto memory = open_or_make_record(file, [&](uid_t user) { return PoolAdoption::may_own(pool, user); });
   if (!memory) return failure_in(fmt::format("reference clock '{}'", name), std::move(memory).error());
   const auto refused = [&] {
     return failure(ErrorCode::corrupt,

@@ -1,16 +1,15 @@
 #pragma once
 
-#include <array>
-#include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "shm/base/names.hpp"
-#include "shm/base/seqlock.hpp"
 #include "shm/base/time.hpp"
-#include "shm/pool/memory_file.hpp"
+#include "shm/pool/ring_page.hpp"
 
 namespace plchost {
 
@@ -36,14 +35,11 @@ struct Transition {
 /// How many transitions are kept for who looks late.
 inline constexpr std::size_t kTransitionsKept = 64;
 
-struct TransitionRingLayout {
-  std::uint64_t magic = 0;  ///< written last
-  std::uint32_t version = 0;
-  std::uint32_t size = 0;
-  std::int64_t stream_unix_ns = 0;     ///< when the numbering began
-  std::atomic<std::uint64_t> last{0};  ///< the last number that was given
-  std::array<Seqlock<Transition>, kTransitionsKept> slots;
-};
+inline constexpr PageKind kTransitionsKind{.what = "ring of transitions",
+                                           .magic = 0x676e6972'6e617274,  // "tranring"
+                                           .version = 1};                 // 1: first
+using TransitionRingPage = RingPage<Transition, kTransitionsKept, kTransitionsKind>;
+using TransitionRingLayout = TransitionRingPage::Layout;
 
 [[nodiscard]] std::string transition_ring_name(std::string_view pool, std::string_view instance);
 
@@ -60,8 +56,8 @@ class TransitionRing {
            std::string_view reason) noexcept;
 
  private:
-  explicit TransitionRing(MemoryFile memory) noexcept : memory_(std::move(memory)) {}
-  MemoryFile memory_;
+  explicit TransitionRing(TransitionRingPage page) noexcept : page_(std::move(page)) {}
+  TransitionRingPage page_;
 };
 
 /// A reader's end, in any process: what was written since it looked last, in order.
@@ -78,8 +74,8 @@ class TransitionRingReader {
   [[nodiscard]] std::optional<Transition> next(TimePoint now) noexcept;
 
  private:
-  explicit TransitionRingReader(MemoryFile memory) noexcept : memory_(std::move(memory)) {}
-  MemoryFile memory_;
+  explicit TransitionRingReader(TransitionRingPage page) noexcept : page_(std::move(page)) {}
+  TransitionRingPage page_;
   std::uint64_t next_ = 1;
   std::optional<TimePoint> waits_since_;
 };

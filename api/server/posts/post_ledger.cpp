@@ -9,6 +9,7 @@
 
 #include "shm/base/robust_mutex.hpp"
 #include "shm/base/time.hpp"
+#include "shm/pool/fixed_page.hpp"
 
 namespace plchost {
 
@@ -17,7 +18,7 @@ namespace {
 struct LedgerLayout {
   std::uint64_t magic;  // written last
   std::uint32_t version;
-  std::uint32_t entry_size;
+  std::uint32_t size;
   std::uint64_t pool_file;  // the number of the pool's file: an intent is of that pool
   RobustMutex mutex;        // held by the process that has the ledger, as long as it has it
   PostIntent intent;
@@ -25,17 +26,14 @@ struct LedgerLayout {
   std::array<LedgerEntry, kLedgerEntries> entries;
 };
 
-constexpr std::uint64_t kMagic = 0x31'74'73'6f'70'63'6c'70;  // "plcpost1"
-constexpr std::uint32_t kVersion = 4;
+constexpr PageKind kLedgerKind{.what = "ledger of posts",
+                               .magic = 0x31'74'73'6f'70'63'6c'70,  // "plcpost1"
+                               .version = 5};                       // 5: its whole size in the head
 /// A process that was killed takes up to this to end.
 constexpr Duration kLockPatience = std::chrono::seconds(5);
 
 LedgerLayout& layout_of(const MemoryFile& memory) {
   return *reinterpret_cast<LedgerLayout*>(memory.bytes().data());  // made with this layout
-}
-
-bool is_ours(const LedgerLayout& layout) {
-  return layout.magic == kMagic && layout.version == kVersion && layout.entry_size == sizeof(LedgerEntry);
 }
 
 }  // namespace
@@ -57,15 +55,8 @@ std::string PostLedger::file_name(std::string_view pool) {
 
 Result<PostLedger> PostLedger::open(const ObjectPool& pool) {
   const std::string name = file_name(pool.name());
-  auto memory = MemoryFile::open(name, sizeof(LedgerLayout), MemoryFile::Access::read_write);
-  if (!memory || !is_ours(layout_of(*memory))) {
-    memory = MemoryFile::replace(name, sizeof(LedgerLayout));
-    if (!memory) return failure_in("open the ledger of posts", memory.error());
-    LedgerLayout& layout = layout_of(*memory);
-    layout.version = kVersion;
-    layout.entry_size = sizeof(LedgerEntry);
-    std::atomic_ref(layout.magic).store(kMagic, std::memory_order_release);
-  }
+  auto memory = open_or_make_page<LedgerLayout>(name, kLedgerKind, Replaces::anything);
+  if (!memory) return failure_in("open the ledger of posts", memory.error());
   const LockResult locked = layout_of(*memory).mutex.lock(MonotonicClock::now() + kLockPatience);
   if (locked != LockResult::locked && locked != LockResult::owner_died) {
     return failure(ErrorCode::busy, fmt::format("the ledger of posts '{}' is in use by thread {}; end the "
