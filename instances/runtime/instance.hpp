@@ -20,7 +20,6 @@
 #include "instances/runtime/setup_reporter.hpp"
 #include "instances/runtime/time/reference_memory.hpp"
 #include "schedulers/task_set.hpp"
-#include "shm/base/exception_history.hpp"
 #include "shm/pool/instance_page.hpp"
 #include "shm/pool/object_pool.hpp"
 #include "shm/pool/transition_ring.hpp"
@@ -130,7 +129,6 @@ class Instance {
   void choose_scheduler();
   void report_tick();
   [[nodiscard]] std::string keep_fault(const TaskSet::Fault& fault);
-  void keep_exception(const ExceptionEntry& entry) const;
   void restore_operator_events();
   void notify_tasks(unsigned event);
   void look_after_page();

@@ -1,9 +1,12 @@
 // What an Instance does when one of its tasks has a fault.
 
+#include <span>
+
 #include <fmt/format.h>
 
 #include "instances/runtime/application/symbol_name.hpp"
 #include "instances/runtime/instance.hpp"
+#include "shm/base/exception_history.hpp"
 #include "shm/base/log.hpp"
 
 namespace plchost {
@@ -41,19 +44,11 @@ std::string Instance::keep_fault(const TaskSet::Fault& fault) {
   std::string reason = fmt::format("task '{}': {}{}", entry.task, entry.text, where);
   spdlog::error("exception: {}", reason);
   page_->set_task_state(static_cast<std::uint32_t>(fault.task), PageTaskState::exception);
-  keep_exception(entry);
-  return reason;
-}
-
-void Instance::keep_exception(const ExceptionEntry& entry) const {
-  if (options_.launch.run_directory.empty()) return;
-  const auto kept = keep_exceptions(exception_path(options_.launch.run_directory, options_.launch.name),
-                                    std::span(&entry, 1));
-  if (!kept) {
-    spdlog::error("this exception is not kept: {}", kept.error().describe());
-  } else if (!kept->empty()) {
-    spdlog::warn("{}", *kept);
+  const LaunchOptions& launch = options_.launch;
+  if (!launch.run_directory.empty()) {
+    keep_exceptions_of(launch.run_directory, launch.name, std::span(&entry, 1));
   }
+  return reason;
 }
 
 }  // namespace plchost

@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 
 #include "shm/base/exception_history.hpp"
-#include "shm/base/log.hpp"
 #include "shm/pool/instance_page.hpp"
 
 namespace plchost {
@@ -35,12 +34,7 @@ std::string keep_lost_faults(std::string_view pool, std::string_view run_directo
   if (!page) return {};
   const std::vector<ExceptionEntry> faults = faults_of(*page);
   if (faults.empty()) return {};
-  const auto kept = keep_exceptions(exception_path(run_directory, instance), faults);
-  if (!kept) {
-    spdlog::error("instance {}: its exception is not kept: {}", instance, kept.error().describe());
-  } else if (!kept->empty()) {
-    spdlog::warn("instance {}: {}", instance, *kept);
-  }
+  keep_exceptions_of(run_directory, instance, faults);
   return fmt::format("task '{}': {}", faults.back().task, faults.back().text);
 }
 

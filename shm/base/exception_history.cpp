@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "shm/base/log.hpp"
 #include "shm/base/replace_file.hpp"
 
 namespace plchost {
@@ -143,6 +144,16 @@ Result<std::string> keep_exceptions(const std::string& path, std::span<const Exc
     return std::unexpected(std::move(written).error());
   }
   return remark;
+}
+
+void keep_exceptions_of(std::string_view run_directory, std::string_view instance,
+                        std::span<const ExceptionEntry> found) {
+  const auto kept = keep_exceptions(exception_path(run_directory, instance), found);
+  if (!kept) {
+    spdlog::error("instance {}: its exception is not kept: {}", instance, kept.error().describe());
+  } else if (!kept->empty()) {
+    spdlog::warn("instance {}: {}", instance, *kept);
+  }
 }
 
 }  // namespace plchost
