@@ -55,7 +55,8 @@ struct ExceptionHistory {
 /// lost; else it is empty. Set-up.
 [[nodiscard]] Result<std::string> keep_exceptions(const std::string& path,
                                                   std::span<const ExceptionEntry> found);
-/// The same for an instance, whether it says so itself or its manager does. The log says what is lost. Set-up.
+/// The same for an instance, whether it says so itself or its manager does. The log says what is lost.
+/// Set-up.
 void keep_exceptions_of(std::string_view run_directory, std::string_view instance,
                         std::span<const ExceptionEntry> found);
 
