@@ -34,8 +34,15 @@ Explorer::Explorer(void (*set_up)(Scene&)) : set_up_(set_up), memory_(*this) {
 
 unsigned Explorer::choose(unsigned count) {
   if (count < 2) return 0;
-  if (decided_ == decisions_.size()) decisions_.push_back({.chosen = 0, .of = count});
+  if (decided_ == decisions_.size()) decisions_.push_back({.chosen = by_chance(count), .of = count});
   return decisions_[decided_++].chosen;
+}
+
+// The first one in a search in depth.
+unsigned Explorer::by_chance(unsigned count) noexcept {
+  if (!walking_) return 0;
+  chance_ = mix(chance_, count);
+  return static_cast<unsigned>((chance_ >> 16U) % count);
 }
 
 // The next list of decisions in the order of a search in depth.
@@ -59,14 +66,32 @@ Report Explorer::explore() {
   report.states = states_.size();
   if (fault_.empty() && expected_ != 0 && expected_ != observed_)
     report.fault = "the outcomes are " + text_of(observed_) + ", not " + text_of(expected_);
-  if (!fault_.empty()) {
-    report.fault = fault_;
-    tracing_ = true;
-    run_once();
-    report.trace = trace_;
-  }
+  tell_fault(report);
   explorer() = nullptr;
   return report;
+}
+
+Report Explorer::walk(std::uint64_t executions) {
+  explorer() = this;
+  walking_ = true;
+  Report report;
+  while (fault_.empty() && report.executions < executions) {
+    ++report.executions;
+    decisions_.clear();
+    run_once();
+    report.longest = std::max(report.longest, static_cast<unsigned>(decisions_.size()));
+  }
+  tell_fault(report);
+  explorer() = nullptr;
+  return report;
+}
+
+void Explorer::tell_fault(Report& report) {
+  if (fault_.empty()) return;
+  report.fault = fault_;
+  tracing_ = true;
+  run_once();
+  report.trace = trace_;
 }
 
 ThreadNumber Explorer::thread(const char* name, std::function<void()> body, ThreadOptions options) {
@@ -206,10 +231,10 @@ bool Explorer::decide(Action& action) {
       return false;
   } else {
     if (decided_ == decisions_.size()) {
-      worth = worth_running();
+      worth = walking_ ? (1U << actions_.size()) - 1 : worth_running();
       if (worth == 0) return false;
-      decisions_.push_back(
-          {.chosen = 0, .of = static_cast<unsigned>(std::popcount(worth)), .actions = worth});
+      const auto of = static_cast<unsigned>(std::popcount(worth));
+      decisions_.push_back({.chosen = by_chance(of), .of = of, .actions = worth});
     }
     worth = decisions_[decided_].actions;
     chosen = decisions_[decided_++].chosen;
@@ -223,7 +248,7 @@ bool Explorer::decide(Action& action) {
   }
   action = actions_[static_cast<std::size_t>(std::countr_zero(bits))];
   asleep_ = 0;
-  for (unsigned i = 0; i < count_; ++i) {
+  for (unsigned i = 0; i < count_ && !walking_; ++i) {
     if (action.kind == Action::Kind::run && i != action.thread && (before & 1U << i) != 0 &&
         !depend(i, action.thread))
       asleep_ = static_cast<std::uint8_t>(asleep_ | 1U << i);
@@ -324,7 +349,8 @@ void Explorer::step(std::uintptr_t address, bool writes) {
   threads_[self()].next_at = address;
   threads_[self()].next_writes = writes;
   if (memory_.steps(self()) > limits_.steps) {
-    cut_ = limits_.cut;
+    // A search ends a thread that goes round in circles where its states come again; chance does not.
+    cut_ = limits_.cut || walking_;
     if (cut_) leave();
     fail(std::string(threads_[self()].name) + " does not come to its end");
   }

@@ -37,6 +37,9 @@ class Explorer final : public Scene, private Chooser {
  public:
   explicit Explorer(void (*set_up)(Scene&));
   Report explore();
+  /// So many executions with decisions by chance, until one of them has a fault. Finds most faults long
+  /// before a search in depth comes to them; proves nothing if it finds none.
+  Report walk(std::uint64_t executions);
 
   ThreadNumber thread(const char* name, std::function<void()> body, ThreadOptions options) override;
   void at_end(std::function<void()> check) override { check_ = std::move(check); }
@@ -112,6 +115,8 @@ class Explorer final : public Scene, private Chooser {
   void back_to_scheduler();
   void end_of(unsigned number, State how);
   bool next();
+  [[nodiscard]] unsigned by_chance(unsigned count) noexcept;
+  void tell_fault(Report& report);
   [[nodiscard]] std::string place(std::uintptr_t address) const;
   static void fiber_entry();
 
@@ -137,6 +142,8 @@ class Explorer final : public Scene, private Chooser {
   std::uint64_t expected_ = 0;  // 0: the scene does not say
   std::uint64_t observed_ = 0;
   bool tracing_ = false;
+  bool walking_ = false;
+  std::uint64_t chance_ = 1;
   bool any_killed_ = false;
   bool cut_ = false;
   std::vector<std::string> trace_;
