@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <vector>
@@ -16,7 +17,8 @@ struct Plan {
   Duration each = std::chrono::seconds(60);  ///< of each thing that is measured, all slices together
   Duration slice = std::chrono::seconds(5);  ///< at most; things take turns
   Duration post_gap = std::chrono::milliseconds(1);
-  int starts = 100;  ///< of a program
+  int starts = 100;                 ///< of a program
+  std::uint32_t objects = 100'000;  ///< that are made, opened and closed
   int task_core = 1;
   int poster_core = 0;
   std::filesystem::path programs;  ///< where plchostd and its helpers are

@@ -11,7 +11,6 @@
 #include <fmt/format.h>
 #include <signal.h>
 #include <sys/mman.h>
-#include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -19,6 +18,7 @@
 #include "shm/base/system_call.hpp"
 #include "shm/base/unique_fd.hpp"
 #include "shm/block_driver/node_directory.hpp"
+#include "tests/bench/apart.hpp"
 #include "tests/bench/blocks_pipe.hpp"
 #include "tests/bench/blocks_roudi.hpp"
 #include "tests/bench/blocks_ways.hpp"
@@ -30,6 +30,7 @@ namespace plchost::bench {
 namespace {
 
 constexpr Duration kBlocksSlice = std::chrono::milliseconds(500);
+constexpr std::size_t kMostSamples = 1'000'000;  // of a row, or half as many more
 constexpr std::size_t kLargest = kMaxBlockSize;
 constexpr std::array<std::size_t, 3> kSizes = {64, 512, kLargest};
 
@@ -93,7 +94,6 @@ void answer(BlocksPipe& pipe, Board& board) {
 }
 
 int run_peer(const Plan& plan, Board& board, const std::string& pool, int socket, bool with_iceoryx) {
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (!bind_thread({plan.poster_core})) return 1;
   const auto pipes = Pipes::open(pool, board, BlocksSide::peer, socket, with_iceoryx);
   if (!pipes) return 1;
@@ -119,7 +119,7 @@ class Pair {
 
   /// Half the time there and back.
   Result<void> latency(Way way, std::size_t size, Duration slice, Samples& into) {
-    Samples samples(static_cast<std::size_t>(slice / std::chrono::nanoseconds(100)));
+    Samples samples(kMostSamples / 2);
     auto done = with_peer(way, Mode::echo, [&](BlocksPipe& pipe) {
       std::vector<std::byte> out(size, std::byte{1});
       std::vector<std::byte> in(kLargest);
@@ -134,7 +134,7 @@ class Pair {
         now = after;
       }
     });
-    into.append(samples);
+    if (into.size() < kMostSamples) into.append(samples);
     return done;
   }
 
@@ -208,7 +208,7 @@ std::string size_text(std::size_t size) {
 constexpr const char* kNoIceoryx = "iceoryx is not installed: the floor is the Unix datagram socket";
 
 Result<Row> measure_latency(const Plan& plan, Pair& pair, std::size_t size, bool with_iceoryx) {
-  Row row{.name = fmt::format("blocks/latency/{}", size_text(size))};
+  Row row{.name = fmt::format("blocks/latency/{}", size_text(size)), .sample = "a block, one way"};
   Samples socket;
   Samples bare;
   std::vector<Subject> subjects{
@@ -229,18 +229,19 @@ Result<Row> measure_latency(const Plan& plan, Pair& pair, std::size_t size, bool
     row.floor = socket;
     row.note = kNoIceoryx;
   } else {
-    row.targets = {{"median below iceoryx's", summarise(row.ours).p50, summarise(row.floor).p50}};
+    row.targets = {{"median below iceoryx's", "us", summarise(row.ours).p50, summarise(row.floor).p50}};
   }
   return row;
 }
 
 double gigabytes_per_second(std::size_t size, const Samples& times) {
   const double us = summarise(times).p50;
-  return us > 0 ? static_cast<double>(size) / us / 1e3 : 0;
+  return ratio(static_cast<double>(size), us) / 1e3;
 }
 
 Result<Row> measure_throughput(const Plan& plan, Pair& pair, std::size_t size, bool with_iceoryx) {
-  Row row{.name = fmt::format("blocks/throughput/{}", size_text(size))};
+  Row row{.name = fmt::format("blocks/throughput/{}", size_text(size)),
+          .sample = "a slice's mean of a block"};
   Samples iceoryx;
   Samples socket;
   Samples bare;
@@ -262,8 +263,8 @@ Result<Row> measure_throughput(const Plan& plan, Pair& pair, std::size_t size, b
                {"socket_gb_s", gigabytes_per_second(size, socket)}};
   if (with_iceoryx) row.extra.emplace_back("iceoryx_gb_s", gigabytes_per_second(size, iceoryx));
   if (size == kLargest) {
-    row.targets = {{"half of memcpy's GB/s, from core to core, below ours", across / 2, ours},
-                   {"half of memcpy's GB/s, within one core's caches, below ours", memcpy / 2, ours}};
+    row.targets = {{"half of memcpy's GB/s, from core to core, below ours", "GB/s", across / 2, ours},
+                   {"half of memcpy's GB/s, within one core's caches, below ours", "GB/s", memcpy / 2, ours}};
   }
   row.note = with_iceoryx ? "floor: memcpy in one thread" : kNoIceoryx;
   return row;
@@ -290,9 +291,7 @@ Result<std::vector<Row>> measure_all(const Plan& plan, Board& board, const std::
   return rows;
 }
 
-}  // namespace
-
-Result<std::vector<Row>> measure_blocks(const Plan& plan) {
+Result<std::vector<Row>> measure_pair(const Plan& plan, const std::string& pool) {
   void* memory = ::mmap(nullptr, sizeof(Board), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (memory == MAP_FAILED) return failure(ErrorCode::system, "mmap", errno);
   auto* const board = new (memory) Board;
@@ -302,15 +301,18 @@ Result<std::vector<Row>> measure_blocks(const Plan& plan) {
   }
   const UniqueFd mine(ends[0]);
   const UniqueFd theirs(ends[1]);
-  const std::string pool = fmt::format("plchost-bench-{}", ::getpid());
   const bool with_iceoryx = has_iceoryx() && is_installed("iox-roudi");
-  RouDi roudi;
+  RouDi roudi(pool);
   if (with_iceoryx) {
     if (auto started = roudi.start(); !started) return std::unexpected(std::move(started).error());
   }
+  const pid_t parent = ::getpid();
   const pid_t peer = ::fork();
   if (peer < 0) return failure(ErrorCode::system, "fork", errno);
-  if (peer == 0) ::_exit(run_peer(plan, *board, pool, theirs.get(), with_iceoryx));
+  if (peer == 0) {
+    end_with(parent, SIGKILL);
+    ::_exit(run_peer(plan, *board, pool, theirs.get(), with_iceoryx));
+  }
   auto rows = measure_all(plan, *board, pool, mine.get(), with_iceoryx);
   if (!rows) ::kill(peer, SIGKILL);
   int status = 0;
@@ -318,6 +320,14 @@ Result<std::vector<Row>> measure_blocks(const Plan& plan) {
   NodeDirectory::remove(pool);
   ::munmap(memory, sizeof(Board));
   return rows;
+}
+
+}  // namespace
+
+Result<std::vector<Row>> measure_blocks(const Plan& plan) {
+  // iceoryx can be used once in a process: it does not part from its daemon.
+  const std::string pool = fmt::format("plchost-bench-{}", ::getpid());
+  return measure_apart([&] { return measure_pair(plan, pool); });
 }
 
 }  // namespace plchost::bench

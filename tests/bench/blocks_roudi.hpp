@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <string>
+#include <utility>
 
 #include <fcntl.h>
 #include <signal.h>
@@ -17,10 +18,10 @@
 namespace plchost::bench {
 
 /// iceoryx's daemon. It is killed at the end: asked to end, it would first end its clients, which this is one
-/// of.
+/// of. So its files, and those of its clients, whose names begin with `clients`, are removed here.
 class RouDi {
  public:
-  RouDi() noexcept = default;
+  explicit RouDi(std::string clients) : clients_(std::move(clients)) {}
   RouDi(const RouDi&) = delete;
   RouDi& operator=(const RouDi&) = delete;
   ~RouDi() {
@@ -29,6 +30,11 @@ class RouDi {
     int status = 0;
     ::waitpid(pid_, &status, 0);
     for (const char* left : {"/iceoryx_mgmt", "/root"}) ::shm_unlink(left);
+    for (const std::string& left : {std::string("roudi"), clients_ + "-bench", clients_ + "-peer"}) {
+      ::unlink(("/tmp/" + left).c_str());
+      ::unlink(("/tmp/" + left + ".lock").c_str());
+    }
+    ::unlink("/tmp/iox-unique-roudi.lock");
   }
   [[nodiscard]] Result<void> start() {
     // Without monitoring: a process that measures keeps its other threads waiting.
@@ -45,6 +51,7 @@ class RouDi {
   }
 
  private:
+  std::string clients_;
   pid_t pid_ = 0;
 };
 

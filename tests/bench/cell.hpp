@@ -52,11 +52,13 @@ class Cell {
       : pool_(name), folder_(std::filesystem::temp_directory_path() / name) {
     std::filesystem::create_directories(folder_);
     std::ofstream(folder_ / "bench.toml") << fmt::format(
-        "[host]\nname = \"{}\"\ndds_domain = {}\nrun_directory = \"{}\"\npool = \"{}\"\ncores = [{}]\n"
-        "housekeeping_cores = [{}]\nlog_level = \"warning\"\n"
+        "[host]\nname = \"{}\"\ndds_domain = {}\nrun_directory = \"{}\"\nstate_directory = \"{}\"\npool = "
+        "\"{}\"\ncores = [{}]\n"
+        "housekeeping_cores = [{}]\nlog_level = \"error\"\n"
         "[[instance]]\nname = \"probe\"\ncore = {}\nscheduler = \"CmpSchedule\"\napplication = \"{}\"\n",
-        kBenchHost, domains.plchost, (folder_ / "run").string(), pool_, plan.task_core, plan.poster_core,
-        plan.task_core, (plan.programs.parent_path() / "applications" / "bench_probe.so").string());
+        kBenchHost, domains.plchost, (folder_ / "run").string(), (folder_ / "state").string(), pool_,
+        plan.task_core, plan.poster_core, plan.task_core,
+        (plan.programs.parent_path() / "applications" / "bench_probe.so").string());
   }
   Cell(const Cell&) = delete;
   Cell& operator=(const Cell&) = delete;

@@ -8,6 +8,7 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <spawn.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -67,6 +68,11 @@ Result<std::string> output_of(const std::vector<std::string>& arguments) {
     text.append(block.data(), static_cast<std::size_t>(got));
   if (auto ended = child->wait(); !ended) return failure_in(arguments.front(), std::move(ended.error()));
   return text;
+}
+
+void end_with(pid_t parent, int signal) noexcept {
+  ::prctl(PR_SET_PDEATHSIG, signal);
+  if (::getppid() != parent) ::_exit(1);
 }
 
 bool is_installed(const std::string& program) {

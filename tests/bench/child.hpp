@@ -34,6 +34,10 @@ class Child {
   pid_t pid_ = 0;
 };
 
+/// Called by a process that was forked: it gets `signal` when `parent` ends, also if that was so before this
+/// call.
+void end_with(pid_t parent, int signal) noexcept;
+
 /// A program's standard output, once it has ended. system: it failed.
 [[nodiscard]] Result<std::string> output_of(const std::vector<std::string>& arguments);
 

@@ -107,12 +107,12 @@ struct CyclicFigures {
   Duration spun{};
   Samples cpu_per_cycle;  ///< one per slice
 
-  [[nodiscard]] double cpu_us() const noexcept { return cycles > 0 ? to_us(usage.cpu) / per_cycle() : 0; }
+  [[nodiscard]] double cpu_us() const noexcept { return ratio(to_us(usage.cpu), per_cycle()); }
   [[nodiscard]] double switches() const noexcept {
-    return cycles > 0 ? static_cast<double>(usage.switches()) / per_cycle() : 0;
+    return ratio(static_cast<double>(usage.switches()), per_cycle());
   }
   [[nodiscard]] double lost_per_million() const noexcept {
-    return cycles > 0 ? 1e6 * static_cast<double>(lost) / static_cast<double>(cycles + lost) : 0;
+    return 1e6 * ratio(static_cast<double>(lost), static_cast<double>(cycles + lost));
   }
   [[nodiscard]] double spin_share() const noexcept { return ratio(to_us(spun), to_us(measured)); }
 

@@ -51,7 +51,7 @@ Result<void> run_cyclictest(const Plan& plan, Duration slice, Samples& into) {
 }  // namespace
 
 Result<std::vector<Row>> measure_cyclictest(const Plan& plan) {
-  Row row{.name = "cyclictest/1ms"};
+  Row row{.name = "cyclictest/1ms", .sample = "a cycle"};
   if (!is_installed("cyclictest")) {
     row.note = "skipped: cyclictest (Debian: rt-tests) is not installed";
     return std::vector{row};

@@ -224,8 +224,8 @@ Result<std::vector<Row>> measure_distributed_clock(const Plan& plan) {
   }
   const auto cycles = run.log.between(TimePoint::min(), TimePoint::max());
   const auto steady = run.log.between(cycles.front().release + kSettling, TimePoint::max());
-  Row planned{.name = "distributed_clock/planned", .ours = Samples(steady.size())};
-  Row started{.name = "distributed_clock/start", .ours = Samples(steady.size())};
+  Row planned{.name = "distributed_clock/planned", .sample = "a cycle", .ours = Samples(steady.size())};
+  Row started{.name = "distributed_clock/start", .sample = "a cycle", .ours = Samples(steady.size())};
   for (const Cycle& cycle : steady) {
     planned.ours.add(magnitude(reference->deviation(cycle.release)));
     started.ours.add(magnitude(reference->deviation(cycle.start)));
@@ -238,12 +238,12 @@ Result<std::vector<Row>> measure_distributed_clock(const Plan& plan) {
                    {"drift_ppb", static_cast<double>(run.status.drift_ppb)},
                    {"pairs", static_cast<double>(run.status.pairs)},
                    {"rejected_pairs", static_cast<double>(run.status.rejected)}};
-  planned.targets = {{"p99 below 0.1 us in steady state", summarise(planned.ours).p99, 0.1},
-                     {"settled within 2 s", settled, 2000},
-                     {"no correction above its bound", correction, kBoundUs, true}};
+  planned.targets = {{"p99 below 0.1 us in steady state", "us", summarise(planned.ours).p99, 0.1},
+                     {"settled within 2 s", "ms", settled, 2000},
+                     {"no correction above its bound", "us", correction, kBoundUs, true}};
   planned.series = series_of(cycles, *reference);
   planned.note = "planned release against the reference grid, magnitude, from 2 s on";
-  started.targets = {{"median below 1 us", summarise(started.ours).p50, 1}};
+  started.targets = {{"median below 1 us", "us", summarise(started.ours).p50, 1}};
   started.note = "first instruction against the reference grid, magnitude, from 2 s on";
   return std::vector<Row>{std::move(planned), std::move(started)};
 }

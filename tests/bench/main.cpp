@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "tests/bench/child.hpp"
+#include "tests/bench/machine_watch.hpp"
 #include "tests/bench/parts.hpp"
 #include "tests/bench/plot.hpp"
 
@@ -18,24 +19,31 @@ namespace {
 
 using namespace plchost;  // NOLINT(google-build-using-namespace): a program's main file
 
+/// With --quick: the whole run, with all that it starts and ends, takes less than four minutes.
+constexpr double kSetUpSeconds = 1;  // of a part, about
+constexpr Duration kQuickEach = std::chrono::milliseconds(1200);
+
 struct Options {
   std::string json;
-  std::string markdown;
   std::string plots;
   bool quick = false;
   bool stress = false;
-  int seconds = 0;
+  int seconds = 60;
+  int rounds = 3;
   std::vector<std::string> only;
 };
 
+/// Of one round.
 bench::Plan make_plan(const Options& options) {
   bench::Plan plan;
+  plan.each = std::chrono::seconds(options.seconds);
   if (options.quick) {
-    plan.each = std::chrono::seconds(5);
-    plan.slice = std::chrono::milliseconds(2500);
-    plan.starts = 20;
+    plan.each = kQuickEach;
+    plan.starts = 30;
+    plan.objects = 10'000;
   }
-  if (options.seconds > 0) plan.each = std::chrono::seconds(options.seconds);
+  plan.each /= options.rounds;
+  plan.starts = std::max(plan.starts / options.rounds, 1);
   const auto cores = online_cores();
   // Two different cores where there are two; else everything shares the one.
   plan.task_core = cores && !cores->empty() ? cores->back() : 0;
@@ -85,9 +93,14 @@ Result<std::vector<bench::Row>> measure(const Job& job, const bench::Plan& plan)
     if (!started) return std::unexpected(std::move(started.error()));
     stress = std::move(*started);
   }
+  const bench::MachineWatch machine;
   auto rows = job.part->measure(plan);
   if (!rows) return rows;
-  for (bench::Row& row : *rows) row.condition = job.under_stress ? "stress" : "idle";
+  for (bench::Row& row : *rows) {
+    row.condition = job.under_stress ? "stress" : "idle";
+    row.conditions = machine.conditions();
+    row.conditions.emplace_back("each_s", std::chrono::duration<double>(plan.each).count());
+  }
   return rows;
 }
 
@@ -99,6 +112,50 @@ bool write_plots(const Job& job, const std::string& folder, const std::vector<be
   return write_file(path, bench::to_svg(job.part->picture, condition, rows));
 }
 
+/// All that was measured so far, by job.
+class Figures {
+ public:
+  Figures(const Options& options, std::vector<Job> jobs)
+      : options_(options), jobs_(std::move(jobs)), rows_(jobs_.size()) {}
+
+  [[nodiscard]] bool add(std::size_t job, std::vector<bench::Row> round) {
+    bench::add_round(rows_[job], std::move(round));
+    if (!options_.plots.empty() && !write_plots(jobs_[job], options_.plots, rows_[job])) return false;
+    return options_.json.empty() || write_file(options_.json, bench::to_json(all()));
+  }
+  [[nodiscard]] std::vector<bench::Row> all() const {
+    std::vector<bench::Row> all;
+    for (const auto& rows : rows_) all.insert(all.end(), rows.begin(), rows.end());
+    return all;
+  }
+
+ private:
+  const Options& options_;
+  std::vector<Job> jobs_;
+  std::vector<std::vector<bench::Row>> rows_;
+};
+
+/// One turn of all jobs.
+bool run_round(const std::vector<Job>& jobs, int round, const bench::Plan& plan, Figures& figures) {
+  bool complete = true;
+  for (std::size_t i = 0; i < jobs.size(); ++i) {
+    const bench::Part& part = *jobs[i].part;
+    const TimePoint began = MonotonicClock::now();
+    fmt::print(stderr, "round {}, [{}/{}] {} ({}): {} ...", round + 1, i + 1, jobs.size(), part.name,
+               jobs[i].under_stress ? "stress" : "idle", part.about);
+    auto measured = measure(jobs[i], plan);
+    fmt::print(stderr, " {:.1f} s\n", std::chrono::duration<double>(MonotonicClock::now() - began).count());
+    if (!measured) {
+      // The others are measured all the same: an hour is not given away for one of them.
+      fmt::print(stderr, "plchost-bench: {}: {}\n", part.name, measured.error().describe());
+      complete = false;
+    } else if (!figures.add(i, std::move(*measured))) {
+      return false;
+    }
+  }
+  return complete;
+}
+
 int run(const Options& options) {
   const bench::Plan plan = make_plan(options);
   if (auto prepared = bench::prepare_process(); !prepared) {
@@ -108,31 +165,21 @@ int run(const Options& options) {
   std::error_code cannot_be_made;
   if (!options.plots.empty()) std::filesystem::create_directories(options.plots, cannot_be_made);
   const std::vector<Job> jobs = make_jobs(options);
-  const auto seconds_of = [&](const Job& job) {
-    return job.part->turns * std::chrono::duration<double>(plan.each).count();
-  };
   double total = 0;
-  for (const Job& job : jobs) total += seconds_of(job);
-  fmt::print(stderr, "{} parts, about {:.0f} minutes\n", jobs.size(), total / 60 + 0.5);
-  std::vector<bench::Row> rows;
-  bool complete = true;
-  for (std::size_t i = 0; i < jobs.size(); ++i) {
-    const bench::Part& part = *jobs[i].part;
-    fmt::print(stderr, "[{}/{}] {} ({}): {}, about {:.0f} s ...\n", i + 1, jobs.size(), part.name,
-               jobs[i].under_stress ? "stress" : "idle", part.about, seconds_of(jobs[i]));
-    auto measured = measure(jobs[i], plan);
-    if (!measured) {
-      // The others are measured all the same: an hour is not given away for one of them.
-      fmt::print(stderr, "plchost-bench: {}: {}\n", part.name, measured.error().describe());
-      complete = false;
-      continue;
-    }
-    if (!options.plots.empty() && !write_plots(jobs[i], options.plots, *measured)) return 1;
-    std::ranges::move(*measured, std::back_inserter(rows));
-    if (!options.json.empty() && !write_file(options.json, bench::to_json(rows))) return 1;
-    if (!options.markdown.empty() && !write_file(options.markdown, bench::to_markdown(rows))) return 1;
+  for (const Job& job : jobs) {
+    total +=
+        options.rounds * (kSetUpSeconds + job.part->turns * std::chrono::duration<double>(plan.each).count());
   }
-  fmt::print("{}", bench::to_table(rows));
+  fmt::print(stderr, "{} parts in {} rounds, about {:.0f} minutes\n", jobs.size(), options.rounds,
+             total / 60 + 0.5);
+  Figures figures(options, jobs);
+  bool complete = true;
+  for (int round = 0; round < options.rounds; ++round) {
+    complete = run_round(jobs, round, plan, figures) && complete;
+  }
+  fmt::print("{}", bench::to_json(figures.all()));
+  (void)std::fflush(stdout);
+  fmt::print(stderr, "{}", bench::to_table(figures.all()));
   return complete ? 0 : 1;
 }
 
@@ -143,13 +190,18 @@ int main(int argc, char** argv) {
   for (const bench::Part& part : bench::all_parts()) names.emplace_back(part.name);
   CLI::App app("Measures plchost beside the floor of this machine", "plchost-bench");
   Options options;
-  app.add_option("--json", options.json, "write the figures to this file");
-  app.add_option("--markdown", options.markdown, "write them to this file as tables");
+  app.footer("Standard output is a JSON array; what people read is on standard error.");
+  app.add_option("--json", options.json, "write the array to this file, too, after each part");
   app.add_option("--plots", options.plots, "draw the figures into this folder, as SVG");
-  app.add_flag("--quick", options.quick,
-               "minutes instead of most of an hour: 5 s of each thing instead of 60");
+  app.add_flag("--quick", options.quick, "four minutes instead of most of two hours: 1.2 s of each thing");
   app.add_flag("--stress", options.stress, "then the same again beside stress-ng --cpu 2 --vm 1 --io 1");
-  app.add_option("--seconds", options.seconds, "so many seconds of each thing")->check(CLI::Range(1, 3600));
+  app.add_option("--seconds", options.seconds, "so many seconds of each thing, all rounds together")
+      ->check(CLI::Range(1, 3600))
+      ->capture_default_str()
+      ->excludes("--quick");
+  app.add_option("--rounds", options.rounds, "all parts are measured so often, one after the other")
+      ->check(CLI::Range(1, 100))
+      ->capture_default_str();
   app.add_option("--only", options.only, fmt::format("only these parts: {}", fmt::join(names, ", ")))
       ->check(CLI::IsMember(names))
       ->delimiter(',');

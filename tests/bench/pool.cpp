@@ -1,6 +1,7 @@
 // The object pool: what an operation costs that needs no system call, beside the cheapest thing that does the
 // same, and what it costs to make, open and close 100,000 objects, beside sem_open and shm_open.
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <string>
@@ -22,7 +23,6 @@ namespace {
 
 constexpr int kCalls = 1000;  // a sample is so many of them
 constexpr Duration kSlice = std::chrono::milliseconds(500);
-constexpr std::uint32_t kObjects = 100'000;
 constexpr std::uint32_t kMostMappings = 50'000;  // sem_open maps a page for each; a process may have 65,530
 constexpr std::size_t kMemory = 4096;
 
@@ -40,19 +40,23 @@ Subject calls(Samples& samples, Call call) {
   };
 }
 
-constexpr std::size_t kMostSamples = 4'000'000;
+constexpr std::size_t kMostSamples = 1'000'000;
 
 template <class Ours, class Floor>
 Result<Row> measure_calls(const Plan& plan, const char* name, const char* note, std::vector<Target> targets,
                           Ours ours, Floor floor) {
-  Row row{.name = name, .ours = Samples(kMostSamples), .floor = Samples(kMostSamples), .note = note};
+  Row row{.name = name,
+          .sample = "1,000 calls",
+          .ours = Samples(kMostSamples),
+          .floor = Samples(kMostSamples),
+          .note = note};
   const OnCore here(plan.task_core);
   if (auto done = alternate(plan, {calls(row.floor, floor), calls(row.ours, ours)}, kSlice); !done) {
     return std::unexpected(std::move(done.error()));
   }
   row.targets = std::move(targets);
   for (Target& target : row.targets) {
-    target.measured = ratio(summarise(row.ours).p50, summarise(row.floor).p50);
+    target.measured = ratio_of_times(summarise(row.ours).p50, summarise(row.floor).p50);
   }
   return row;
 }
@@ -67,7 +71,7 @@ Result<Row> measure_post(const Plan& plan, ObjectPool& pool) {
   auto& other = *reinterpret_cast<std::atomic<std::uint64_t>*>(memory->object.bytes().data() + sizeof(word));
   return measure_calls(
       plan, "pool/post", "1,000 posts that nobody waits for; floor: a relaxed atomic add and a load",
-      {{"at most 1.3 of an add and a load", 0, 1.3, true}}, [&] { (void)event->object.post(); },
+      {{"at most 1.3 of an add and a load", "ratio", 0, 1.3, true}}, [&] { (void)event->object.post(); },
       [&] {
         if (other.load(std::memory_order_relaxed) == 0) word.fetch_add(1, std::memory_order_relaxed);
       });
@@ -219,6 +223,7 @@ Result<std::vector<Row>> measure_steps(const char* what, std::uint32_t count, st
   constexpr std::array kSteps = {"create", "open", "close"};
   for (std::size_t step = 0; step < kSteps.size(); ++step) {
     Row row{.name = fmt::format("pool/{}/{}", what, kSteps[step]),
+            .sample = "the mean of 1,000 objects",
             .ours = our_times.samples[step],
             .floor = floor_times.samples[step],
             .note = note};
@@ -234,7 +239,7 @@ Result<std::vector<Row>> measure_steps(const char* what, std::uint32_t count, st
 
 Result<std::vector<Row>> measure_pool(const Plan& plan) {
   const std::string name = fmt::format("plchost-bench-{}-pool", ::getpid());
-  auto pool = ObjectPool::create(name, {.max_objects = kObjects});
+  auto pool = ObjectPool::create(name, {.max_objects = plan.objects});
   if (!pool) return std::unexpected(pool.error());
   struct Removed {
     ~Removed() {
@@ -251,11 +256,11 @@ Result<std::vector<Row>> measure_pool(const Plan& plan) {
   }
   std::vector<SharedSemaphore> held;
   std::vector<sem_t*> floor_held;
-  constexpr std::uint32_t kMemories = 10'000;
-  for (auto steps : {measure_steps("semaphore", kObjects, kMostMappings,
+  const std::uint32_t memories = plan.objects / 10;
+  for (auto steps : {measure_steps("semaphore", plan.objects, std::min(plan.objects, kMostMappings),
                                    "per object, a sample is 1,000; floor: sem_open, sem_close",
                                    pool_semaphores(*pool, held), host_semaphores(floor_held)),
-                     measure_steps("memory", kMemories, kMemories,
+                     measure_steps("memory", memories, memories,
                                    "of 4 KiB; floor: shm_open, posix_fallocate, mmap, shm_unlink",
                                    pool_memories(*pool), host_memories())}) {
     if (!steps) return std::unexpected(std::move(steps.error()));

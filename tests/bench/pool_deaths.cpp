@@ -7,30 +7,31 @@
 
 #include <fmt/format.h>
 #include <signal.h>
-#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include "shm/base/system_call.hpp"
 #include "shm/pool/object_pool.hpp"
+#include "tests/bench/child.hpp"
 #include "tests/bench/parts.hpp"
 
 namespace plchost::bench {
 
 namespace {
 
-constexpr std::uint32_t kRoom = 1'000'000;
-constexpr std::uint32_t kObjects = 900'000;
-constexpr std::uint32_t kMemoriesOfOne = 20'000;
+constexpr std::uint32_t kObjectsOfPlan =
+    9;  // times as many as Plan::objects, in a pool for ten times as many
 constexpr std::size_t kLarge = std::size_t{4} << 30;
 constexpr Duration kBound = std::chrono::milliseconds(100);
 
 /// A process of its own that does `body`; killed when this goes, or with its parent.
 class Killed {
  public:
-  explicit Killed(const std::function<void()>& body) : pid_(::fork()) {
+  explicit Killed(const std::function<void()>& body) {
+    const pid_t parent = ::getpid();
+    pid_ = ::fork();
     if (pid_ != 0) return;
-    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+    end_with(parent, SIGKILL);
     body();
     ::_exit(0);
   }
@@ -45,38 +46,39 @@ class Killed {
   }
 
  private:
-  pid_t pid_;
+  pid_t pid_ = 0;
 };
 
-[[noreturn]] void storm(const std::string& name) {
+[[noreturn]] void storm(const std::string& name, std::uint32_t objects) {
   auto pool = ObjectPool::attach(name);
   for (unsigned i = 0; pool; ++i) {
     (void)pool->create_semaphore("storm" + std::to_string(i % 7), 1);
     (void)pool->create_memory("memory" + std::to_string(i % 3), 4096);
-    (void)pool->open_semaphore(std::to_string(i % kObjects));
+    (void)pool->open_semaphore(std::to_string(i % objects));
   }
   ::_exit(1);
 }
 
 /// Kills one after the other, each at another moment.
-[[noreturn]] void kill_many(const std::string& name) {
+[[noreturn]] void kill_many(const std::string& name, std::uint32_t objects) {
   for (unsigned i = 0;; ++i) {
-    const Killed victim([&] { storm(name); });
+    const Killed victim([&] { storm(name, objects); });
     ::usleep(500 + 37 * (i % 61));
   }
 }
 
 Row row_of(std::string name, Samples waits, std::string note, bool to_hold = true) {
-  Row row{.name = std::move(name), .ours = std::move(waits), .note = std::move(note)};
+  Row row{.name = std::move(name), .sample = "a call", .ours = std::move(waits), .note = std::move(note)};
+  if (row.ours.size() == 0) row.note += "; not measured: it could not be made";
   if (to_hold) {
-    row.targets = {{"no wait above 100 ms", summarise(row.ours).max, to_us(kBound), true}};
+    row.targets = {{"no wait above 100 ms", "us", summarise(row.ours).max, to_us(kBound), true}};
   }
   return row;
 }
 
 template <class Call>
 Result<Samples> wait_for(Duration time, Call call) {
-  Samples samples(4'000'000);
+  Samples samples(1'000'000);
   const TimePoint end = MonotonicClock::now() + time;
   for (TimePoint now = MonotonicClock::now(); now < end;) {
     const TimePoint began = now;
@@ -87,20 +89,21 @@ Result<Samples> wait_for(Duration time, Call call) {
   return samples;
 }
 
-/// While a child that has done `hold` is killed, and for a second more.
-Result<Samples> wait_for_the_end_of(ObjectPool& pool, const std::function<void(ObjectPool&)>& hold) {
+/// While a child that holds what `hold` made is killed, and for a second more. Nothing if it could not make
+/// it.
+Result<Samples> wait_for_the_end_of(ObjectPool& pool, const std::function<bool(ObjectPool&)>& hold) {
   std::array<int, 2> ready{};
   if (auto made = check_errno(::pipe(ready.data()), "pipe"); !made) return std::unexpected(made.error());
   Killed victim([&] {
     auto own = ObjectPool::attach(pool.name());
-    if (own) hold(*own);
-    (void)!::write(ready[1], "x", 1);
+    (void)!::write(ready[1], own && hold(*own) ? "y" : "n", 1);
     for (;;) ::pause();
   });
-  char byte = 0;
-  (void)!::read(ready[0], &byte, 1);
+  char held = 'n';
+  (void)!::read(ready[0], &held, 1);
   ::close(ready[0]);
   ::close(ready[1]);
+  if (held != 'y') return Samples();
   std::atomic<bool> killed{false};
   auto killer = Thread::start("killer", {}, [&] {
     victim.end();
@@ -111,7 +114,8 @@ Result<Samples> wait_for_the_end_of(ObjectPool& pool, const std::function<void(O
 }
 
 Result<std::vector<Row>> measure_all(const Plan& plan, ObjectPool& pool) {
-  for (std::uint32_t i = 0; i < kObjects; ++i) {
+  const std::uint32_t objects = kObjectsOfPlan * plan.objects;
+  for (std::uint32_t i = 0; i < objects; ++i) {
     const auto made = pool.create_semaphore(std::to_string(i), 1, {.keep = true});
     if (!made) return std::unexpected(made.error());
   }
@@ -119,31 +123,38 @@ Result<std::vector<Row>> measure_all(const Plan& plan, ObjectPool& pool) {
   if (!reader) return std::unexpected(reader.error());
   std::vector<Row> rows;
   std::uint32_t at = 0;
-  const auto next = [&at] { return std::to_string((at += 7919) % kObjects); };
+  const auto next = [&at, objects] { return std::to_string((at += 7919) % objects); };
   {
-    const Killed killer([&] { kill_many(pool.name()); });
+    const Killed killer([&] { kill_many(pool.name(), objects); });
     auto opens = wait_for(plan.each / 2, [&] { return pool.open_semaphore(next()).has_value(); });
     if (!opens) return std::unexpected(opens.error());
-    rows.push_back(
-        row_of("pool_deaths/open", *std::move(opens),
-               "open and close of one of 900,000 objects, while others are killed in the midst of calls"));
+    rows.push_back(row_of(
+        "pool_deaths/open", *std::move(opens),
+        fmt::format("open and close of one of {} objects, while others are killed in the midst of calls",
+                    objects)));
     auto looks = wait_for(plan.each / 2, [&] { return reader->look_at(next()).has_value(); });
     if (!looks) return std::unexpected(looks.error());
     rows.push_back(
         row_of("pool_deaths/look", *std::move(looks), "a look at one, with the right to read only"));
   }
-  auto many = wait_for_the_end_of(pool, [](ObjectPool& own) {
+  const std::uint32_t memories = plan.objects / 5;
+  auto many = wait_for_the_end_of(pool, [memories](ObjectPool& own) {
     static std::vector<SharedMemory> held;
-    for (std::uint32_t i = 0; i < kMemoriesOfOne; ++i) {
-      if (auto made = own.create_memory("held" + std::to_string(i), 4096))
-        held.push_back(std::move(made->object));
+    for (std::uint32_t i = 0; i < memories; ++i) {
+      auto made = own.create_memory("held" + std::to_string(i), 4096);
+      if (!made) return false;
+      held.push_back(std::move(made->object));
     }
+    return true;
   });
   if (!many) return std::unexpected(many.error());
-  rows.push_back(row_of("pool_deaths/20000_memories", *std::move(many),
-                        "open and close, while one that held them is killed"));
-  auto large = wait_for_the_end_of(
-      pool, [](ObjectPool& own) { static auto held = own.create_memory("large", kLarge); });
+  rows.push_back(
+      row_of("pool_deaths/many_memories", *std::move(many),
+             fmt::format("open and close, while one that held {} memories of 4 KiB is killed", memories)));
+  auto large = wait_for_the_end_of(pool, [](ObjectPool& own) {
+    static auto held = own.create_memory("large", kLarge);
+    return held.has_value();
+  });
   if (!large) return std::unexpected(large.error());
   rows.push_back(row_of("pool_deaths/4_GiB", *std::move(large), "the same, of one memory of 4 GiB"));
   return rows;
@@ -153,7 +164,7 @@ Result<std::vector<Row>> measure_all(const Plan& plan, ObjectPool& pool) {
 
 Result<std::vector<Row>> measure_pool_deaths(const Plan& plan) {
   const std::string name = fmt::format("plchost-bench-{}-deaths", ::getpid());
-  auto pool = ObjectPool::create(name, {.max_objects = kRoom});
+  auto pool = ObjectPool::create(name, {.max_objects = 10 * plan.objects});
   if (!pool) return std::unexpected(pool.error());
   auto rows = measure_all(plan, *pool);
   const PoolFindings found = pool->tidy();

@@ -109,6 +109,7 @@ Result<std::vector<Row>> measure(const Plan& plan, const DdsDomains& domains, Dd
   if (auto started = reader.start(plan, domains, board); !started) return std::unexpected(started.error());
   std::vector<Row> rows(1);
   rows[0].name = "post/dds";
+  rows[0].sample = "a post";
   auto done = wait_until([&] { return board.poster_ready.load() != 0; }, "the poster's start");
   if (done && board.poster_ready.load() != 1)
     done = failure(ErrorCode::unavailable, "the poster cannot post");

@@ -67,7 +67,7 @@ class Measurement {
       : plan_(plan), board_(board), client_(client), event_(event) {}
 
   Result<Row> many() {
-    Row row{.name = "post/50 clients"};
+    Row row{.name = "post/50 clients", .sample = "a post and its acknowledgement"};
     const TimePoint start = MonotonicClock::now();
     board_.job.store(Job::post);
     if (auto done = wait_until([&] { return board_.done.load() == kClients; }, "the posts of 50 clients");
@@ -82,12 +82,12 @@ class Measurement {
         row.ours.push(Duration(latency));
     }
     row.extra = {{"posts_per_second", kClients * kPostsOfEach / took}, {"failed", failed}};
-    row.targets.push_back({"none of the acknowledged posts failed", failed, 0, /*or_equal=*/true});
+    row.targets.push_back({"none of the acknowledged posts failed", "posts", failed, 0, /*or_equal=*/true});
     return row;
   }
 
   Result<Row> flood() {
-    Row row{.name = "post/beside floods"};
+    Row row{.name = "post/beside floods", .sample = "a post and its acknowledgement"};
     row.note = "floor: the same without floods";
     time_calls(kSlice, row.floor, [&] { post(); });
     const std::uint64_t before = event_.counted().count();

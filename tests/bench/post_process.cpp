@@ -136,7 +136,7 @@ Result<void> run_ours(const Setting& setting, Duration slice, Samples& into) {
 }
 
 Result<Row> measure(const Setting& setting, std::string name) {
-  Row row{.name = std::move(name)};
+  Row row{.name = std::move(name), .sample = "a post"};
   // The process's other thread sleeps meanwhile; the measured ones inherit this core.
   const OnCore threads_inherit_it(setting.plan.task_core);
   auto done = alternate(setting.plan,
@@ -144,8 +144,8 @@ Result<Row> measure(const Setting& setting, std::string name) {
                          [&](Duration slice) { return run_ours(setting, slice, row.ours); }},
                         kSlice);
   if (!done) return std::unexpected(std::move(done.error()));
-  row.targets = {
-      {"median below 1.15 x a raw futex wake", summarise(row.ours).p50, 1.15 * summarise(row.floor).p50}};
+  row.targets = {{"median below 1.15 x a raw futex wake", "us", summarise(row.ours).p50,
+                  1.15 * summarise(row.floor).p50}};
   return row;
 }
 

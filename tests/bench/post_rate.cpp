@@ -56,7 +56,7 @@ class RateMeasurement {
   Result<Row> round_trip(const std::string& name, int core) {
     const OnCore threads_inherit_it(core);
     if (auto opened = open(BareDuty::acknowledge); !opened) return std::unexpected(opened.error());
-    Row row{.name = name};
+    Row row{.name = name, .sample = "a post and its acknowledgement"};
     const auto post = [&] { (void)client_->post_event(ping_event(), 1, Duration::zero(), kRatePatience); };
     const auto measure_floor = [&](Duration slice) -> Result<void> {
       time_calls(slice, row.floor, [&] { bare_->round_trip(); });
@@ -69,14 +69,14 @@ class RateMeasurement {
     if (auto done = alternate(plan_, {measure_floor, measure_ours}, kRateSlice); !done)
       return std::unexpected(done.error());
     const double p50 = ratio(summarise(row.ours).p50, summarise(row.floor).p50);
-    row.targets = {{"median below 1.15 x a bare Cyclone DDS round trip", p50, 1.15}};
+    row.targets = {{"median below 1.15 x a bare Cyclone DDS round trip", "ratio", p50, 1.15}};
     return row;
   }
 
   Result<Row> rate(const std::string& name, BareDuty duty, const std::string& event_name,
                    const PoolEvent& event) {
     if (auto opened = open(duty); !opened) return std::unexpected(opened.error());
-    Row row{.name = name};
+    Row row{.name = name, .sample = "none: rates"};
     double ours = 0, our_seconds = 0, bare = 0, bare_seconds = 0;
     const auto post_one = [&] { return client_->post_one(kBenchHost, "probe", event_name).has_value(); };
     const auto measure_floor = [&](Duration slice) {
@@ -91,8 +91,8 @@ class RateMeasurement {
     const double per_second = ours / our_seconds;
     const double floor = bare / bare_seconds;
     row.extra = {{"posts_per_second", per_second}, {"floor_posts_per_second", floor}};
-    row.targets = {
-        {"above 0.8 x the bare maximum, nothing lost (shown: bare by ours)", floor / per_second, 1.25}};
+    row.targets = {{"above 0.8 x the bare maximum, nothing lost (shown: bare by ours)", "ratio",
+                    floor / per_second, 1.25}};
     return row;
   }
 

@@ -3,9 +3,10 @@
 #include <csignal>
 #include <vector>
 
-#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
+
+#include "tests/bench/child.hpp"
 
 namespace plchost::bench {
 
@@ -23,9 +24,10 @@ class Processes {
   }
   template <class Run>
   void fork(Run run) {
+    const pid_t parent = ::getpid();
     const pid_t pid = ::fork();
     if (pid == 0) {
-      ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+      end_with(parent, SIGKILL);
       run();
       ::_exit(0);
     }

@@ -1,6 +1,9 @@
 #include "tests/bench/row.hpp"
 
+#include <algorithm>
 #include <fstream>
+#include <iterator>
+#include <string_view>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -31,93 +34,227 @@ ordered_json machine() {
           {"cores", ::sysconf(_SC_NPROCESSORS_ONLN)}};
 }
 
-void put(ordered_json& into, const std::string& prefix, const Summary& summary) {
-  into[prefix + "p50_us"] = summary.p50;
-  into[prefix + "p90_us"] = summary.p90;
-  into[prefix + "p99_us"] = summary.p99;
-  into[prefix + "p999_us"] = summary.p999;
-  into[prefix + "max_us"] = summary.max;
+/// Four digits say all that such a figure is worth; null if it is none.
+ordered_json figure(double value) {
+  if (std::isnan(value)) return nullptr;
+  return ordered_json::parse(fmt::format("{:.4g}", value));
+}
+
+template <class Range, class Get>
+ordered_json figures(const Range& range, Get get) {
+  ordered_json array = ordered_json::array();
+  for (const auto& one : range) array.push_back(figure(get(one)));
+  return array;
+}
+
+/// Of what is a number.
+double median(std::vector<double> values) {
+  std::erase_if(values, [](double value) { return std::isnan(value); });
+  if (values.empty()) return kNotMeasured;
+  std::ranges::sort(values);
+  const std::size_t half = values.size() / 2;
+  return values.size() % 2 == 1 ? values[half] : (values[half - 1] + values[half]) / 2;
+}
+
+/// A row that was measured once is one round.
+std::vector<Round> rounds_of(const Row& row) {
+  if (!row.rounds.empty()) return row.rounds;
+  return {{summarise(row.ours), summarise(row.floor), row.extra, row.targets}};
+}
+
+double value_of(const Extra& extra, std::string_view key) {
+  const auto found = std::ranges::find(extra, key, &Extra::value_type::first);
+  return found != extra.end() ? found->second : kNotMeasured;
+}
+
+/// A percentile, and the names of what is said about it.
+struct Percentile {
+  double Summary::* value;
+  const char* name;
+};
+constexpr Percentile kPercentiles[] = {{&Summary::p50, "p50"},  // NOLINT(modernize-avoid-c-arrays)
+                                       {&Summary::p90, "p90"},
+                                       {&Summary::p99, "p99"},
+                                       {&Summary::p999, "p999"},
+                                       {&Summary::max, "max"}};
+
+void put_percentiles(ordered_json& object, const Row& row, const std::vector<Round>& rounds) {
+  const Summary ours = summarise(row.ours);
+  const Summary floor = summarise(row.floor);
+  for (const auto& [value, name] : kPercentiles) object[fmt::format("{}_us", name)] = figure(ours.*value);
+  for (const auto& [value, name] : kPercentiles) {
+    object[fmt::format("floor_{}_us", name)] = figure(floor.*value);
+  }
+  for (const auto& [value, name] : kPercentiles) {
+    if (value == &Summary::max) continue;
+    object[fmt::format("ratio_{}", name)] = figure(ratio_of_times(ours.*value, floor.*value));
+  }
+  object["samples"] = row.ours.size();
+  object["floor_samples"] = row.floor.size();
+  object["rounds"] = rounds.size();
+  for (const auto& [value, name] : kPercentiles) {
+    if (value == &Summary::p90 || value == &Summary::max) continue;
+    object[fmt::format("{}_us_rounds", name)] =
+        figures(rounds, [&](const Round& round) { return round.ours.*value; });
+    object[fmt::format("ratio_{}_rounds", name)] = figures(
+        rounds, [&](const Round& round) { return ratio_of_times(round.ours.*value, round.floor.*value); });
+  }
 }
 
 ordered_json to_object(const Row& row) {
-  const Summary ours = summarise(row.ours);
-  const Summary floor = summarise(row.floor);
-  ordered_json object{{"name", row.name}, {"condition", row.condition}};
-  put(object, "", ours);
-  put(object, "floor_", floor);
-  object["ratio_p50"] = ratio(ours.p50, floor.p50);
-  object["ratio_p99"] = ratio(ours.p99, floor.p99);
-  object["ratio_p999"] = ratio(ours.p999, floor.p999);
-  object["samples"] = row.ours.size();
-  object["floor_samples"] = row.floor.size();
-  for (const auto& [key, value] : row.extra) object["extra"][key] = value;
-  bool met = true;
-  for (const Target& target : row.targets) {
-    object["targets"].push_back({{"target", target.text},
-                                 {"measured", target.measured},
-                                 {"bound", target.bound},
-                                 {"met", target.met()}});
-    met = met && target.met();
+  const std::vector<Round> rounds = rounds_of(row);
+  ordered_json object{{"name", row.name}, {"condition", row.condition}, {"sample", row.sample}};
+  put_percentiles(object, row, rounds);
+  for (const auto& [key, value] : row.extra) {
+    object["extra"][key] = figure(value);
+    object["extra_rounds"][key] =
+        figures(rounds, [&](const Round& round) { return value_of(round.extra, key); });
   }
-  if (!row.targets.empty()) object["met"] = met;
+  for (std::size_t i = 0; i < row.targets.size(); ++i) {
+    const Verdict verdict = verdict_of(row, i);
+    object["targets"].push_back(
+        {{"target", row.targets[i].text},
+         {"unit", row.targets[i].unit},
+         {"measured", figure(row.targets[i].measured)},
+         {"bound", figure(row.targets[i].bound)},
+         {"measured_rounds", figures(rounds, [&](const Round& round) { return round.targets[i].measured; })},
+         {"bound_rounds", figures(rounds, [&](const Round& round) { return round.targets[i].bound; })},
+         {"verdict", verdict.text()}});
+  }
   if (!row.note.empty()) object["note"] = row.note;
+  object["conditions"] = machine();
+  for (const auto& [key, value] : row.conditions) object["conditions"][key].push_back(figure(value));
   return object;
+}
+
+std::string text_of(double value, int width, int digits) {
+  if (std::isnan(value)) return fmt::format("{:>{}}", "-", width);
+  return fmt::format("{:>{}.{}f}", value, width, digits);
+}
+
+/// "0.95..1.02": the least and the most of all rounds.
+std::string spread(const std::vector<double>& values, int digits) {
+  std::vector<double> known;
+  std::ranges::copy_if(values, std::back_inserter(known), [](double value) { return !std::isnan(value); });
+  if (known.empty()) return "-";
+  const auto [least, most] = std::ranges::minmax(known);
+  if (known.size() == 1) return fmt::format("{:.{}f}", least, digits);
+  return fmt::format("{:.{}f}..{:.{}f}", least, digits, most, digits);
 }
 
 std::string details(const Row& row) {
   if (row.extra.empty() && row.targets.empty() && row.note.empty()) return {};
-  std::string text = fmt::format("\n{} ({})\n", row.name, row.condition);
-  for (const auto& [key, value] : row.extra) text += fmt::format("    {:<36} {:>14.3f}\n", key, value);
-  for (const Target& target : row.targets) {
-    text += fmt::format("  {} {}: {:.3f}, bound {:.3f}\n", target.met() ? "met    " : "NOT MET", target.text,
-                        target.measured, target.bound);
+  const std::vector<Round> rounds = rounds_of(row);
+  const auto of_all = [&](auto get) {
+    std::vector<double> values;
+    std::ranges::transform(rounds, std::back_inserter(values), get);
+    return values;
+  };
+  std::string text = fmt::format("\n{} ({}; a sample is {})\n", row.name, row.condition,
+                                 row.sample.empty() ? "not said" : row.sample);
+  for (const auto& [key, value] : row.extra) {
+    text += fmt::format("    {:<36} {}  ({})\n", key, text_of(value, 14, 3),
+                        spread(of_all([&](const Round& round) { return value_of(round.extra, key); }), 3));
+  }
+  for (std::size_t i = 0; i < row.targets.size(); ++i) {
+    const Target& target = row.targets[i];
+    text += fmt::format("  {}: {}: {} {} ({}), bound {}\n", verdict_of(row, i).text(), target.text,
+                        text_of(target.measured, 0, 3), target.unit,
+                        spread(of_all([&](const Round& round) { return round.targets[i].measured; }), 3),
+                        text_of(target.bound, 0, 3));
   }
   if (!row.note.empty()) text += fmt::format("  note: {}\n", row.note);
   return text;
 }
 
-}  // namespace
-
-std::string to_json(const std::vector<Row>& rows) {
-  ordered_json array = ordered_json::array();
-  for (const Row& row : rows) array.push_back(to_object(row));
-  return ordered_json{{"machine", machine()}, {"rows", array}}.dump(2) + "\n";
+void add_figures(Row& row, Row round) {
+  row.rounds.push_back({summarise(round.ours), summarise(round.floor), round.extra, round.targets});
+  row.ours.append(round.ours);
+  row.floor.append(round.floor);
+  std::ranges::move(round.conditions, std::back_inserter(row.conditions));
+  if (row.note.empty()) row.note = std::move(round.note);
 }
 
-std::string to_markdown(const std::vector<Row>& rows) {
-  std::string text =
-      "| | | p50 µs | p99 | p99.9 | floor p50 | p99 | p99.9 | ratio p50 | p99 | p99.9 |\n"
-      "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n";
-  std::string verdicts = "\n| | | to show | measured | bound | |\n| --- | --- | --- | --- | --- | --- |\n";
-  for (const Row& row : rows) {
-    const Summary ours = summarise(row.ours);
-    const Summary floor = summarise(row.floor);
-    text += fmt::format(
-        "| `{}` | {} | {:.2f} | {:.1f} | {:.1f} | {:.2f} | {:.1f} | {:.1f} | {:.2f} | {:.2f} | {:.2f} |\n",
-        row.name, row.condition, ours.p50, ours.p99, ours.p999, floor.p50, floor.p99, floor.p999,
-        ratio(ours.p50, floor.p50), ratio(ours.p99, floor.p99), ratio(ours.p999, floor.p999));
-    for (const Target& target : row.targets) {
-      verdicts +=
-          fmt::format("| `{}` | {} | {} | {:.3g} | {:.3g} | {} |\n", row.name, row.condition, target.text,
-                      target.measured, target.bound, target.met() ? "met" : "**not met**");
-    }
+/// The figures of all rounds together.
+void take_medians(Row& row) {
+  const auto over = [&](auto get) {
+    std::vector<double> values;
+    std::ranges::transform(row.rounds, std::back_inserter(values), get);
+    return median(std::move(values));
+  };
+  for (auto& [key, value] : row.extra)
+    value = over([&](const Round& round) { return value_of(round.extra, key); });
+  for (std::size_t i = 0; i < row.targets.size(); ++i) {
+    row.targets[i].measured = over([&](const Round& round) { return round.targets[i].measured; });
+    row.targets[i].bound = over([&](const Round& round) { return round.targets[i].bound; });
   }
-  return text + verdicts;
+}
+
+}  // namespace
+
+void add_round(std::vector<Row>& all, std::vector<Row> round) {
+  for (Row& one : round) {
+    auto row = std::ranges::find_if(
+        all, [&](const Row& known) { return known.name == one.name && known.condition == one.condition; });
+    // A part that finds another machine than before (a tool that was removed) gives rows with other targets.
+    const bool same = row != all.end() && row->targets.size() == one.targets.size();
+    if (!same) {
+      row = all.insert(all.end(), Row{.name = one.name,
+                                      .sample = one.sample,
+                                      .condition = one.condition,
+                                      .extra = one.extra,
+                                      .targets = one.targets,
+                                      .series = std::move(one.series)});
+    }
+    add_figures(*row, std::move(one));
+    take_medians(*row);
+  }
+}
+
+Verdict verdict_of(const Row& row, std::size_t index) {
+  Verdict verdict;
+  for (const Round& round : rounds_of(row)) {
+    if (round.targets[index].decided()) ++verdict.decided;
+    if (round.targets[index].met()) ++verdict.met;
+  }
+  return verdict;
+}
+
+std::string Verdict::text() const {
+  if (decided == 0) return "not measured";
+  if (met == decided) return "met";
+  if (met == 0) return "not met";
+  return fmt::format("met in {} of {} rounds", met, decided);
+}
+
+std::string to_json(const std::vector<Row>& rows) {
+  std::string text = "[";  // a line for each row
+  for (const Row& row : rows) {
+    text += text == "[" ? "\n" : ",\n";
+    text += to_object(row).dump();
+  }
+  return text + "\n]\n";
 }
 
 std::string to_table(const std::vector<Row>& rows) {
-  std::string text = fmt::format("{:<34} {:<6} {:>9} {:>9} {:>10} {:>10} {:>10} {:>7} {:>7} {:>7} {:>8}\n",
-                                 "name", "", "p50 us", "p99 us", "p99.9 us", "floor p50", "floor p99",
-                                 "x p50", "x p99", "x p99.9", "samples");
+  std::string text = fmt::format(
+      "{:<34} {:<6} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9} {:>8} {:>8}  {:<12} {:<12} {}\n", "times in us", "",
+      "p50", "p99", "p99.9", "floor p50", "p99", "p99.9", "samples", "of floor", "ratio p50", "p99", "p99.9");
   std::string below;
   for (const Row& row : rows) {
     const Summary ours = summarise(row.ours);
     const Summary floor = summarise(row.floor);
-    text += fmt::format(
-        "{:<34} {:<6} {:>9.2f} {:>9.2f} {:>10.2f} {:>10.2f} {:>10.2f} {:>7.2f} {:>7.2f} {:>7.2f} {:>8}\n",
-        row.name, row.condition, ours.p50, ours.p99, ours.p999, floor.p50, floor.p99,
-        ratio(ours.p50, floor.p50), ratio(ours.p99, floor.p99), ratio(ours.p999, floor.p999),
-        row.ours.size());
+    const std::vector<Round> rounds = rounds_of(row);
+    const auto ratios = [&](double Summary::* value) {
+      std::vector<double> all;
+      for (const Round& round : rounds) all.push_back(ratio_of_times(round.ours.*value, round.floor.*value));
+      return spread(all, 2);
+    };
+    text += fmt::format("{:<34} {:<6} {} {} {} {} {} {} {:>8} {:>8}  {:<12} {:<12} {}\n", row.name,
+                        row.condition, text_of(ours.p50, 9, 2), text_of(ours.p99, 9, 2),
+                        text_of(ours.p999, 9, 2), text_of(floor.p50, 9, 2), text_of(floor.p99, 9, 2),
+                        text_of(floor.p999, 9, 2), row.ours.size(), row.floor.size(), ratios(&Summary::p50),
+                        ratios(&Summary::p99), ratios(&Summary::p999));
     below += details(row);
   }
   return text + below;

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cmath>
+#include <cstddef>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,9 +14,12 @@ namespace plchost::bench {
 /// `or_equal`).
 struct Target {
   std::string text;  ///< as the benchmark's documentation says it, "median below F + 2 us"
+  std::string unit;  ///< of `measured` and `bound`
   double measured = 0;
   double bound = 0;
   bool or_equal = false;
+  /// False if one of them is kNotMeasured.
+  [[nodiscard]] bool decided() const noexcept { return !std::isnan(measured) && !std::isnan(bound); }
   [[nodiscard]] bool met() const noexcept {
     return or_equal ? measured <= bound : measured < bound;  // neither, if one of them is not a number
   }
@@ -27,23 +32,49 @@ struct Series {
   std::vector<std::pair<double, double>> points;
 };
 
+/// Further figures by name. The end of a name is its unit: _us, _ms, _ns, _gb_s, _per_second, _per_million,
+/// _per_cycle, _percent, _ppb; "share" and "load" are of a core. All others are counts.
+using Extra = std::vector<std::pair<std::string, double>>;
+
+/// What one round gave, of a row that was measured in several.
+struct Round {
+  Summary ours;
+  Summary floor;
+  Extra extra;
+  std::vector<Target> targets;
+};
+
 /// What was measured, beside the floor that was measured in the same run.
 struct Row {
   std::string name;                ///< "cyclic/CmpScheduleTimer/1ms": part, who, what
+  std::string sample = "";         ///< what one sample is: "a cycle"
   std::string condition = "idle";  ///< or "stress"; filled by whoever runs the part
   Samples ours = {};               ///< what it is stands in the README: mostly release to first instruction
-  Samples floor = {};
-  std::vector<std::pair<std::string, double>> extra =
-      {};  ///< "lost_cycles": further figures, in JSON as they are
+  Samples floor = {};              ///< empty: there is none
+  Extra extra = {};
   std::vector<Target> targets = {};
   std::vector<Series> series = {};
-  std::string note = {};  ///< what a reader must know about these figures
+  std::string note = {};           ///< what a reader must know about these figures
+  std::vector<Round> rounds = {};  ///< filled by add_round
+  Extra conditions = {};           ///< of the machine, in each round; filled by whoever runs the part
 };
 
-/// Where it was measured and the rows, as JSON; times in microseconds unless a key says otherwise.
+/// Adds what a further round gave to `all`: to the row of the same name and condition, or as a new row. A row
+/// has the samples of all rounds, the median of each further figure, and the curves of the first round.
+void add_round(std::vector<Row>& all, std::vector<Row> round);
+
+/// In so many of its rounds the row's target `index` was met, and could be decided.
+struct Verdict {
+  std::size_t met = 0;
+  std::size_t decided = 0;
+  /// "met", "not met", "met in 2 of 3 rounds", "not measured"
+  [[nodiscard]] std::string text() const;
+};
+[[nodiscard]] Verdict verdict_of(const Row& row, std::size_t index);
+
+/// An array with an object for each row; times in microseconds unless a key says otherwise. What was not
+/// measured, and what would be held against it, is null.
 [[nodiscard]] std::string to_json(const std::vector<Row>& rows);
-/// The rows as two tables in Markdown: the figures, and what was to be shown with its verdict.
-[[nodiscard]] std::string to_markdown(const std::vector<Row>& rows);
 /// The rows as a table for people, and below it the further figures and what is met.
 [[nodiscard]] std::string to_table(const std::vector<Row>& rows);
 

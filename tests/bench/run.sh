@@ -1,28 +1,63 @@
 #!/usr/bin/env bash
-# Measures plchost beside the floor of this machine, in the same run.
+# Measures plchost beside the floor of this machine, in the same run. Standard output is a JSON array with an object for
+# each thing that was measured; standard error has the progress, and at the end the same as a table.
 #   tests/bench/run.sh [--quick] [--stress] [--json FILE] [--markdown FILE] [--plots DIR]
-#                      [--only PART,...] [--seconds N]
-# 60 s of each thing: three quarters of an hour idle, and half an hour more with --stress, which measures again
-# beside stress-ng. --quick: 5 s of each, five minutes. --seconds: so many of each. Progress is on standard error.
-# A noisy machine shows in the floor as well: read the ratios.
+#                      [--only PART,...] [--seconds N] [--rounds N]
+# 60 s of each thing in three rounds: an hour and a half idle, and half as much again with --stress, which measures again
+# beside stress-ng. --quick: 1.2 s of each, in less than four minutes after the build. --help says more.
+# A noisy machine shows in the floor and in the spread of the rounds: read the ratios.
 set -euo pipefail
 here=$PWD
 cd "$(dirname "$0")/../.."
-.ci/packages bench
+.ci/packages bench >&2
 build=.build/bench
-args=()
+arguments=()
+markdown=
 while [ $# -gt 0 ]; do
   case "$1" in
-    --json | --markdown | --plots) args+=("$1" "$(cd "$here" && realpath -m "$2")"); shift ;;
-    *) args+=("$1") ;;
+    --markdown) markdown=$(cd "$here" && realpath -m "$2"); shift ;;
+    --json | --plots) arguments+=("$1" "$(cd "$here" && realpath -m "$2")"); shift ;;
+    *) arguments+=("$1") ;;
   esac
   shift
 done
-log=$(mktemp)
-trap 'rm -f "$log"' EXIT
+
+# All that the run makes is in this folder or in /dev/shm, by the benchmark's own number, and goes with it. So do its
+# processes, which are one group.
+work=$(mktemp -d "${TMPDIR:-/tmp}/plchost-bench.XXXXXX")
+bench=
+shared() { find /dev/shm -maxdepth 1 -name "*plchost-bench-$bench*" 2>/dev/null; }
+clean_up() {
+  if [ -n "$bench" ]; then
+    kill -TERM -- "-$bench" 2>/dev/null || true
+    for _ in $(seq 100); do
+      kill -0 -- "-$bench" 2>/dev/null || break
+      sleep 0.1
+    done
+    kill -KILL -- "-$bench" 2>/dev/null || true
+    shared | xargs -r rm -rf
+    rm -f "/tmp/plchost-bench-$bench"-*  # where iceoryx has its sockets
+  fi
+  rm -rf "$work"
+}
+trap clean_up EXIT
+trap 'exit 130' INT TERM
+
 echo "building ..." >&2
-if ! { cmake -S . -B "$build" -G Ninja -DPLCHOST_TESTS=OFF && cmake --build "$build"; } >"$log" 2>&1; then
-  tail -n 60 "$log" >&2
+if ! { cmake -S . -B "$build" -G Ninja -DPLCHOST_TESTS=OFF -DPLCHOST_PYTHON=OFF -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=10 &&
+  cmake --build "$build" --target plchost-bench; } >"$work/log" 2>&1; then
+  tail -n 60 "$work/log" >&2
   exit 1
 fi
-exec "$build/bin/plchost-bench" "${args[@]}"
+mkdir "$work/tmp"
+set -m  # as a process group
+TMPDIR=$work/tmp "$build/bin/plchost-bench" "${arguments[@]}" >"$work/figures.json" &
+bench=$!
+set +m
+code=0
+wait "$bench" || code=$?
+cat "$work/figures.json"
+[ -z "$markdown" ] || [ ! -s "$work/figures.json" ] || python3 tests/bench/figures.py "$work/figures.json" >"$markdown"
+left=$(shared; find "$work/tmp" -mindepth 1)
+[ -z "$left" ] || { echo "the benchmark has left behind: $left" >&2; code=1; }
+exit "$code"

@@ -9,6 +9,8 @@ Summary summarise(const Samples& samples) {
   if (sorted.empty()) return {};
   std::ranges::sort(sorted);
   const auto at = [&](double fraction) {
+    const double above = static_cast<double>(sorted.size()) * (1 - fraction);
+    if (fraction > 0.5 && above < 0.9995) return kNotMeasured;  // a little less: 0.999 is rounded
     const auto index = static_cast<std::size_t>(fraction * static_cast<double>(sorted.size()));
     return to_us(sorted[std::min(index, sorted.size() - 1)]);
   };

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 #include "shm/base/time.hpp"
@@ -28,13 +29,17 @@ class Samples {
   std::vector<Duration> values_;
 };
 
-/// In microseconds; all 0 if there are no samples.
+/// What could not be measured, or says nothing: it is shown as such, and no target is met by it.
+inline constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
+
+/// In microseconds. kNotMeasured is a percentile that no sample lies above: p90 of less than 10 samples, p99
+/// of less than 100, p99.9 of less than 1,000, and all if there are none.
 struct Summary {
-  double p50 = 0;
-  double p90 = 0;
-  double p99 = 0;
-  double p999 = 0;
-  double max = 0;
+  double p50 = kNotMeasured;
+  double p90 = kNotMeasured;
+  double p99 = kNotMeasured;
+  double p999 = kNotMeasured;
+  double max = kNotMeasured;
 };
 
 [[nodiscard]] Summary summarise(const Samples& samples);
@@ -43,9 +48,15 @@ struct Summary {
   return static_cast<double>(value.count()) / 1e3;
 }
 
-/// 0 if there is nothing to compare with.
+/// kNotMeasured if there is nothing to compare with.
 [[nodiscard]] constexpr double ratio(double ours, double floor) noexcept {
-  return floor > 0 ? ours / floor : 0;
+  return floor > 0 ? ours / floor : kNotMeasured;
+}
+
+/// Of two times in microseconds. Times are whole nanoseconds: a floor below ten of them is none.
+[[nodiscard]] constexpr double ratio_of_times(double ours, double floor) noexcept {
+  constexpr double kLeastFloor = 0.01;
+  return floor >= kLeastFloor ? ratio(ours, floor) : kNotMeasured;
 }
 
 }  // namespace plchost::bench

@@ -18,6 +18,7 @@ anew. The table of plcctl's commands is made by plcctl itself: it is held only w
 
 import argparse
 import importlib.util
+import json
 import re
 import subprocess
 import sys
@@ -134,7 +135,8 @@ class Documents:
         return "\n".join(out)
 
 
-# Name in tests/bench/figures.md, condition, what the README says that it is.
+# Name in tests/bench/figures.json, condition, what the README says that it is.
+FIGURES_FILE = "tests/bench/figures.json"
 FIGURES = (
     ("cyclic/CmpScheduleOneShot/1ms", "idle", "`CmpScheduleOneShot`, planned release to start, idle"),
     ("cyclic/CmpScheduleOneShot/1ms", "stress", "the same beside `stress-ng`"),
@@ -147,32 +149,37 @@ FIGURES = (
 )
 
 
+def tool_of(path, name):
+    """A script of the project, as a module."""
+    tool = importlib.util.spec_from_file_location(name, Path(__file__).resolve().parent.parent.parent / path)
+    module = importlib.util.module_from_spec(tool)
+    sys.modules[name] = module
+    tool.loader.exec_module(module)
+    return module
+
+
 def figures(root):
-    found = {}
-    header = []
-    for line in (root / "tests/bench/figures.md").read_text(encoding="utf-8").split("\n"):
-        cells = [cell.strip() for cell in line.strip("|").split("|")]
-        if any("p50" in cell for cell in cells):
-            header = cells
-        elif len(cells) > 2 and len(cells) == len(header):
-            found.setdefault((cells[0].strip("`"), cells[1]), cells)
-    rows = ["| | median | 99th percentile | floor's median | floor's 99th percentile |", "| --- | --- | --- | --- | --- |"]
+    found = {(row["name"], row["condition"]): row for row in json.loads((root / FIGURES_FILE).read_text(encoding="utf-8"))}
+    rows = ["| | median | 99th percentile | 99.9th | floor's median | 99th percentile | 99.9th |",
+            "| --- | --- | --- | --- | --- | --- | --- |"]
+    text = tool_of("tests/bench/figures.py", "figures").text
     for name, condition, meaning in FIGURES:
         if (name, condition) not in found:
-            raise Fault(f"tests/bench/figures.md has no row '{name}', {condition}")
-        p50, p99, _, floor50, floor99 = found[name, condition][2:7]
-        if float(floor50) == 0:  # a grid has no floor
-            floor50 = floor99 = "none"
-        rows.append(f"| {meaning} | {p50} | {p99} | {floor50} | {floor99} |")
+            raise Fault(f"{FIGURES_FILE} has no row '{name}', {condition}")
+        row = found[name, condition]
+        rows.append("| " + " | ".join([meaning, *(text(row[floor + key]) for floor in ("", "floor_")
+                                                  for key in ("p50_us", "p99_us", "p999_us"))]) + " |")
     return rows
+
+
+def all_figures(root):
+    rows = json.loads((root / FIGURES_FILE).read_text(encoding="utf-8"))
+    return tool_of("tests/bench/figures.py", "figures").tables(rows)
 
 
 def contract_of(root):
     """api/control.idl, read by the script that makes its reference."""
-    tool = importlib.util.spec_from_file_location("reference", Path(__file__).resolve().parent.parent.parent / "api/reference.py")
-    reference = importlib.util.module_from_spec(tool)
-    sys.modules["reference"] = reference
-    tool.loader.exec_module(reference)
+    reference = tool_of("api/reference.py", "reference")
     return reference, reference.parse(root / "api/control.idl")
 
 
@@ -212,7 +219,7 @@ def reload_effects(root):
     return rows
 
 
-TABLES = {"figures": figures, "topics": topics, "reload": reload_effects}
+TABLES = {"figures": figures, "all-figures": all_figures, "topics": topics, "reload": reload_effects}
 MADE_BY_TESTS = ("settings", "commands")
 
 

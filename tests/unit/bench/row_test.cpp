@@ -1,12 +1,14 @@
 #include "tests/bench/row.hpp"
 
-#include <limits>
+#include <cmath>
+#include <cstdlib>
 #include <regex>
 #include <set>
 
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 
+#include "tests/bench/apart.hpp"
 #include "tests/bench/plot.hpp"
 
 namespace plchost::bench {
@@ -26,57 +28,155 @@ TEST(Summary, GivesTheValueThatTheShareOfSamplesIsBelow) {
   EXPECT_EQ(sut.max, 1000);
 }
 
-TEST(Summary, OfNothingIsZero) {
-  EXPECT_EQ(summarise(Samples()).max, 0);
+TEST(Summary, HasNoPercentileThatNoSampleLiesAbove) {
+  EXPECT_TRUE(std::isnan(summarise(Samples()).max));
+  EXPECT_EQ(summarise(one_to(1)).p50, 1) << "the mean of the one slice of a round";
+  const Summary few = summarise(one_to(20));
+  EXPECT_EQ(few.p50, 11);
+  EXPECT_EQ(few.p90, 19);
+  EXPECT_TRUE(std::isnan(few.p99));
+  EXPECT_EQ(few.max, 20);
+  EXPECT_FALSE(std::isnan(summarise(one_to(100)).p99));
+  EXPECT_TRUE(std::isnan(summarise(one_to(999)).p999));
+}
+
+TEST(Ratio, ToAFloorThatIsNoneIsNone) {
+  EXPECT_TRUE(std::isnan(ratio(3, 0)));
+  EXPECT_TRUE(std::isnan(ratio(3, kNotMeasured)));
+  EXPECT_TRUE(std::isnan(ratio_of_times(0.1, 0.001))) << "a nanosecond is one unit of the clock";
+  EXPECT_EQ(ratio_of_times(3, 2), 1.5);
 }
 
 TEST(Target, IsMetBelowItsBoundAndAtItOnlyIfSaid) {
-  EXPECT_TRUE((Target{"", 1, 2}.met()));
-  EXPECT_FALSE((Target{"", 2, 2}.met()));
-  EXPECT_TRUE((Target{"", 2, 2, true}.met()));
-  EXPECT_FALSE((Target{"", 3, 2, true}.met()));
+  EXPECT_TRUE((Target{"", "us", 1, 2}.met()));
+  EXPECT_FALSE((Target{"", "us", 2, 2}.met()));
+  EXPECT_TRUE((Target{"", "us", 2, 2, true}.met()));
+  EXPECT_FALSE((Target{"", "us", 3, 2, true}.met()));
 }
 
-TEST(Target, IsNotMetByWhatIsNoNumber) {
-  const double none = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_FALSE((Target{"", none, 2, true}.met()));
-  EXPECT_FALSE((Target{"", 1, none}.met()));
+TEST(Target, IsNeitherMetNorMissedByWhatIsNoNumber) {
+  for (const Target& sut :
+       {Target{"", "us", kNotMeasured, 2, true}, Target{"", "us", 1, kNotMeasured, true}}) {
+    EXPECT_FALSE(sut.met());
+    EXPECT_FALSE(sut.decided());
+    EXPECT_EQ(verdict_of({.name = "part", .targets = {sut}}, 0).text(), "not measured");
+  }
 }
 
-TEST(Row, IsMetInJsonOnlyIfAllOfItsTargetsAre) {
-  Row row{.name = "part/who", .ours = one_to(10), .floor = one_to(5)};
-  row.extra = {{"lost", 3}};
-  row.targets = {{"one", 1, 2}, {"two", 3, 2}};
-  const auto json = nlohmann::json::parse(to_json({row}));
-  const auto& sut = json["rows"][0];
+Row round_of(double measured, int samples) {
+  return {.name = "part/who",
+          .sample = "a cycle",
+          .ours = one_to(samples),
+          .floor = one_to(samples / 2),
+          .extra = {{"lost", measured}},
+          .targets = {{"below 10", "us", measured, 10}}};
+}
+
+std::vector<Row> rounds(const std::vector<double>& measured) {
+  std::vector<Row> all;
+  for (const double one : measured) add_round(all, {round_of(one, 10)});
+  return all;
+}
+
+TEST(Rounds, AreOneRowWithAllSamplesAndTheMedianOfTheRest) {
+  std::vector<Row> sut;
+  add_round(sut, {round_of(3, 1000), {.name = "part/other"}});
+  add_round(sut, {{.name = "part/other"}, round_of(9, 1000)});
+  add_round(sut, {round_of(4, 1000)});
+  ASSERT_EQ(sut.size(), 2U);
+  EXPECT_EQ(sut[0].ours.size(), 3000U);
+  EXPECT_EQ(sut[0].floor.size(), 1500U);
+  EXPECT_EQ(sut[0].extra[0].second, 4);
+  EXPECT_EQ(sut[0].targets[0].measured, 4);
+  EXPECT_EQ(sut[0].rounds.size(), 3U);
+  EXPECT_EQ(sut[0].rounds[1].targets[0].measured, 9);
+  EXPECT_EQ(sut[1].rounds.size(), 2U);
+}
+
+TEST(Rounds, OfAnotherConditionAreAnotherRow) {
+  std::vector<Row> sut;
+  add_round(sut, {{.name = "part/who"}});
+  add_round(sut, {{.name = "part/who", .condition = "stress"}});
+  EXPECT_EQ(sut.size(), 2U);
+}
+
+TEST(Rounds, MakeTheVerdict) {
+  EXPECT_EQ(verdict_of(rounds({1, 2, 3})[0], 0).text(), "met");
+  EXPECT_EQ(verdict_of(rounds({11, 12, 13})[0], 0).text(), "not met");
+  EXPECT_EQ(verdict_of(rounds({1, 12, 3})[0], 0).text(), "met in 2 of 3 rounds");
+  EXPECT_EQ(verdict_of(rounds({1, kNotMeasured, 3})[0], 0).text(), "met");
+  EXPECT_EQ(verdict_of(rounds({kNotMeasured, kNotMeasured})[0], 0).text(), "not measured");
+}
+
+TEST(Json, IsOneArrayWithARowForEach) {
+  auto rows = rounds({1, 12, 3});
+  rows[0].conditions = {{"load_average", 1.5}, {"load_average", 2.5}};
+  rows.push_back({.name = "part/other"});
+  const auto json = nlohmann::json::parse(to_json(rows));
+  ASSERT_TRUE(json.is_array());
+  ASSERT_EQ(json.size(), 2U);
+  const auto& sut = json[0];
   EXPECT_EQ(sut["name"], "part/who");
+  EXPECT_EQ(sut["sample"], "a cycle");
   EXPECT_EQ(sut["p50_us"], 6);
   EXPECT_EQ(sut["floor_p50_us"], 3);
   EXPECT_EQ(sut["ratio_p50"], 2);
+  EXPECT_EQ(sut["samples"], 30);
+  EXPECT_EQ(sut["floor_samples"], 15);
+  EXPECT_EQ(sut["rounds"], 3);
+  EXPECT_EQ(sut["p50_us_rounds"], nlohmann::json::array({6, 6, 6}));
   EXPECT_EQ(sut["extra"]["lost"], 3);
-  EXPECT_EQ(sut["targets"][0]["met"], true);
-  EXPECT_EQ(sut["targets"][1]["met"], false);
-  EXPECT_EQ(sut["met"], false);
+  EXPECT_EQ(sut["extra_rounds"]["lost"], nlohmann::json::array({1, 12, 3}));
+  EXPECT_EQ(sut["targets"][0]["unit"], "us");
+  EXPECT_EQ(sut["targets"][0]["measured_rounds"], nlohmann::json::array({1, 12, 3}));
+  EXPECT_EQ(sut["targets"][0]["verdict"], "met in 2 of 3 rounds");
+  EXPECT_EQ(sut["conditions"]["load_average"], nlohmann::json::array({1.5, 2.5}));
+  EXPECT_FALSE(json[1].contains("targets"));
+  EXPECT_TRUE(nlohmann::json::parse(to_json({})).empty());
 }
 
-TEST(Row, WithoutATargetHasNoVerdict) {
-  const auto json = nlohmann::json::parse(to_json({Row{.name = "part/who"}}));
-  EXPECT_FALSE(json["rows"][0].contains("met"));
+TEST(Json, HasNoFigureWhereNoneWasMeasured) {
+  const auto json = nlohmann::json::parse(to_json({{.name = "part/who", .ours = one_to(10)}}));
+  const auto& sut = json[0];
+  EXPECT_EQ(sut["floor_samples"], 0);
+  for (const char* const key : {"floor_p50_us", "ratio_p50", "p99_us", "p999_us", "ratio_p999"})
+    EXPECT_TRUE(sut[key].is_null()) << key;
+  EXPECT_EQ(sut["p50_us"], 6);
 }
 
 TEST(Table, SaysPlainlyWhatIsNotMet) {
-  Row row{.name = "part/who"};
-  row.targets = {{"median below 1 us", 3, 1}};
-  EXPECT_NE(to_table({row}).find("NOT MET median below 1 us"), std::string::npos);
+  const std::string sut = to_table(rounds({11, 12, 13}));
+  EXPECT_NE(sut.find("not met: below 10: 12.000 us (11.000..13.000), bound 10.000"), std::string::npos)
+      << sut;
 }
 
-TEST(Markdown, HasALineForEachRowAndForEachTarget) {
-  Row row{.name = "part/who", .ours = one_to(10), .floor = one_to(5)};
-  row.targets = {{"median below 1 us", 3, 1}, {"median below 9 us", 3, 9}};
-  const std::string sut = to_markdown({row});
-  EXPECT_NE(sut.find("| `part/who` | idle | 6.00 |"), std::string::npos);
-  EXPECT_NE(sut.find("| median below 1 us | 3 | 1 | **not met** |"), std::string::npos);
-  EXPECT_NE(sut.find("| median below 9 us | 3 | 9 | met |"), std::string::npos);
+TEST(Table, SaysWhatWasNotMeasured) {
+  const std::string sut = to_table({{.name = "part/who", .ours = one_to(10)}});
+  EXPECT_EQ(sut.find("nan"), std::string::npos);
+  EXPECT_NE(sut.find("-"), std::string::npos);
+}
+
+TEST(Apart, GivesTheRowsOfAnotherProcess) {
+  Row row = round_of(3, 10);
+  row.note = "with \"quotes\" and\na line";
+  row.targets.push_back({"none", "us", kNotMeasured, 1, true});
+  const auto sut = measure_apart([&]() -> Result<std::vector<Row>> { return std::vector<Row>(2, row); });
+  ASSERT_TRUE(sut);
+  ASSERT_EQ(sut->size(), 2U);
+  const Row& again = (*sut)[1];
+  EXPECT_EQ(to_json({again}), to_json({row}));
+  EXPECT_EQ(again.ours.values(), row.ours.values());
+  EXPECT_EQ(again.note, row.note);
+  EXPECT_TRUE(again.targets[1].or_equal);
+  EXPECT_TRUE(std::isnan(again.targets[1].measured));
+}
+
+TEST(Apart, SaysWhyNothingWasMeasured) {
+  const auto refused =
+      measure_apart([]() -> Result<std::vector<Row>> { return failure(ErrorCode::full, "no room"); });
+  ASSERT_FALSE(refused);
+  EXPECT_NE(refused.error().describe().find("no room"), std::string::npos);
+  EXPECT_FALSE(measure_apart([]() -> Result<std::vector<Row>> { std::_Exit(3); }));
 }
 
 constexpr Drawing kDrawing{.title = "title", .x = "along (s)", .y = "up", .floor = "bare", .notes = {"note"}};

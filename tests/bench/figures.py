@@ -1,0 +1,126 @@
+#!/usr/bin/env python3
+"""The figures of a run of the benchmark as Markdown: figures.py FIGURES.json > figures.md.
+
+All tables of figures.md come from figures.json by this script. tests/gates/documents.py makes them anew and compares: it sees
+a row that somebody has edited.
+"""
+
+import json
+import sys
+
+UNITS = [("_us_per_cycle", "us"), ("_us_per_activation", "us"), ("_us", "us"), ("_ms", "ms"), ("_ns", "ns"),
+         ("_gb_s", "GB/s"), ("_per_second", "per second"), ("_per_million", "per million"), ("_per_cycle", "per cycle"),
+         ("_per_stall", "per stall"), ("_percent", "%"), ("_ppb", "ppb"), ("share_of_core", "share of a core"),
+         ("load", "share of a core")]
+# The unit of the last ones stands before a number of tasks or objects.
+INFIXES = [("_us_per_activation_", "us"), ("_ns_per_", "ns"), ("_us_", "us")]
+
+
+def unit_of(key):
+    """By the end of its name."""
+    for end, unit in UNITS:
+        if key.endswith(end):
+            return unit
+    for infix, unit in INFIXES:
+        if infix in key:
+            return unit
+    return "count"
+
+
+def text(value):
+    """Four digits; "-" is what was not measured."""
+    if value is None:
+        return "-"
+    if abs(value) >= 10000:
+        return f"{value:,.0f}"
+    return f"{value:.4g}"
+
+
+def spread(values):
+    """Of the rounds: the least and the most."""
+    known = [value for value in values if value is not None]
+    if not known:
+        return "-"
+    least, most = text(min(known)), text(max(known))
+    return least if least == most else f"{least} to {most}"
+
+
+def table(heads, lines):
+    rows = [heads, ["---"] * len(heads), *lines]
+    return ["| " + " | ".join(row) + " |" for row in rows] + [""]
+
+
+def conditions(rows):
+    """Of the run: one line for the machine, one for what else it did."""
+    first = rows[0]["conditions"]
+    every = {key: [value for row in rows for value in row["conditions"][key] if value is not None]
+             for key in ("load_average", "steal_percent", "other_cpu_percent", "each_s")}
+    rounds = spread([row["rounds"] for row in rows])
+    return [f"* Machine: {first['cores']} cores, {first['processor']}, kernel {first['kernel']}.",
+            f"* {rounds} rounds of {spread(every['each_s'])} s of each thing. A spread is the least and the most of the rounds.",
+            f"* Other processes had {spread(every['other_cpu_percent'])} % of the cores while a part was measured, the hypervisor "
+            f"took {spread(every['steal_percent'])} %.",
+            f"  The load average of the minute before was {spread(every['load_average'])}.", ""]
+
+
+def percentiles(rows):
+    keys = ["p50_us", "p99_us", "p999_us"]
+    names = ["p50", "p99", "p99.9"]
+    heads = ["", "", *[f"{name} us" for name in names], *[f"floor {name} us" for name in names], "samples", "of the floor",
+             "a sample is"]
+    return table(heads, [[f"`{row['name']}`", row["condition"], *[text(row[key]) for key in keys],
+                          *[text(row["floor_" + key]) for key in keys], text(row["samples"]), text(row["floor_samples"]),
+                          row["sample"]] for row in rows])
+
+
+def ratios(rows):
+    keys = ["p50", "p99", "p999"]
+    heads = ["", "", *[word for name in ("p50", "p99", "p99.9") for word in (f"{name}, all rounds", "spread")]]
+    return table(heads, [[f"`{row['name']}`", row["condition"],
+                          *[word for key in keys for word in (text(row["ratio_" + key]), spread(row[f"ratio_{key}_rounds"]))]]
+                         for row in rows if row["floor_samples"]])
+
+
+def targets(rows):
+    heads = ["", "", "to show", "unit", "measured", "spread", "bound", "spread", "verdict"]
+    lines = []
+    for row in rows:
+        for target in row.get("targets", []):
+            verdict = target["verdict"]
+            lines.append([f"`{row['name']}`", row["condition"], target["target"], target["unit"], text(target["measured"]),
+                          spread(target["measured_rounds"]), text(target["bound"]), spread(target["bound_rounds"]),
+                          verdict if verdict == "met" else f"**{verdict}**"])
+    return table(heads, lines)
+
+
+def further(rows):
+    heads = ["", "", "figure", "unit", "median", "spread"]
+    return table(heads, [[f"`{row['name']}`", row["condition"], key, unit_of(key), text(value), spread(row["extra_rounds"][key])]
+                         for row in rows for key, value in row.get("extra", {}).items()])
+
+
+def tables(rows):
+    """The lines of the page, without its heading."""
+    without = sorted({f"`{row['name']}`" for row in rows if not row["floor_samples"]})
+    lines = ["", *conditions(rows), "## Times", "", *percentiles(rows), "## Ratios to the floor", "", *ratios(rows)]
+    if without:
+        lines += [f"Without times of a floor: {', '.join(without)}.", ""]
+    lines += ["## What was to be shown", "",
+              "Measured and bound are the medians of the rounds. Each round decides for itself whether a target is met.", "",
+              *targets(rows), "## Further figures", "", *further(rows)]
+    notes = [f"* `{name}`: {note}" for name, note in
+             dict((row["name"], row["note"]) for row in rows if row.get("note")).items()]
+    return [*lines, "## Notes", "", *notes, ""] if notes else lines
+
+
+def main():
+    with open(sys.argv[1], encoding="utf-8") as file:
+        rows = json.load(file)
+    print("# Figures", "",
+          "What is measured, how, and how to read it: [README](README.md). \"-\" says that nothing was measured, or that there are too few",
+          "samples: p99 needs 100, p99.9 needs 1,000.", "",
+          "<!-- generated: all-figures (tests/bench/figures.py figures.json) -->", *tables(rows), "<!-- end of generated -->", sep="\n")
+
+
+if __name__ == "__main__":
+    main()
