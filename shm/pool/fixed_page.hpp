@@ -79,9 +79,13 @@ void describe_page(Layout& page, const PageKind& kind) noexcept {
   page.magic = kind.magic;
 }
 
+/// An empty page needs nothing more.
+template <class Layout>
+void leave_empty(Layout& /*page*/) noexcept {}
+
 /// For MemoryFile: an empty page of that kind, as `begin` leaves it.
 template <class Layout, class Begin = void (*)(Layout&)>
-[[nodiscard]] MemoryFile::Fill new_page(const PageKind& kind, Begin begin = [](Layout&) {}) {
+[[nodiscard]] MemoryFile::Fill new_page(const PageKind& kind, Begin begin = leave_empty<Layout>) {
   return [&kind, begin](std::span<std::byte> bytes) -> Result<void> {
     auto& page = *new (bytes.data()) Layout();
     begin(page);
@@ -92,8 +96,8 @@ template <class Layout, class Begin = void (*)(Layout&)>
 
 /// Opens the page of that name, or makes a new one, to write to it. `kind` is a constant of the program.
 template <class Layout, class Begin = void (*)(Layout&)>
-[[nodiscard]] Result<MemoryFile> open_or_make_page(
-    const std::string& name, const PageKind& kind, Replaces replaces, Begin begin = [](Layout&) {}) {
+[[nodiscard]] Result<MemoryFile> open_or_make_page(const std::string& name, const PageKind& kind,
+                                                   Replaces replaces, Begin begin = leave_empty<Layout>) {
   const auto make = [&](bool replace) {
     const auto fill = new_page<Layout>(kind, begin);
     return replace ? MemoryFile::replace(name, sizeof(Layout), fill)
