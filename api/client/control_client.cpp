@@ -56,9 +56,8 @@ Result<void> ControlClient::open(const dds::DomainOptions& options) {
   auto domain = dds::open_domain(dds::Role::client, options);
   if (!domain) return std::unexpected(domain.error());
   domain_ = std::move(*domain);
-  auto participant =
-      dds::check_entity(dds_create_participant(options.domain, dds::client_participant_qos().get(), nullptr),
-                        fmt::format("enter DDS domain {}", options.domain));
+  auto participant = dds::make_participant(options.domain, dds::client_participant_qos().get(),
+                                           fmt::format("enter DDS domain {}", options.domain));
   if (!participant) return std::unexpected(participant.error());
   participant_ = std::move(*participant);
   partition_ = dds::client_partition(dds::guid_of(participant_.get()).hex(), dds::kAllHosts);

@@ -148,6 +148,11 @@ Result<std::shared_ptr<Entity>> open_domain(Role role, const DomainOptions& opti
   return domain;
 }
 
+Result<Entity> make_participant(std::uint32_t domain, const dds_qos_t* qos, std::string_view what) {
+  const std::lock_guard lock(registry_mutex());
+  return check_entity(dds_create_participant(domain, qos, nullptr), std::string(what));
+}
+
 Result<int> tie_sockets_to_loopback() {
   int tied = 0;
   std::error_code error;

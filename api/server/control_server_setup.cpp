@@ -172,8 +172,8 @@ Result<void> ControlServer::Parts::enter_domain() {
   auto opened = dds::open_domain(dds::Role::server, options.dds);
   if (!opened) return std::unexpected(opened.error());
   domain = std::move(*opened);
-  auto made = dds::check_entity(
-      dds_create_participant(options.dds.domain, nullptr, nullptr),
+  auto made = dds::make_participant(
+      options.dds.domain, nullptr,
       "enter DDS domain " + std::to_string(options.dds.domain) + " (at most 16 servers on one machine)");
   if (!made) return std::unexpected(made.error());
   participant = std::move(*made);

@@ -33,7 +33,6 @@ class OwnClients : public SecuredHost {
 TEST_F(OwnClients, AreNeverRefusedByTheGate) {
   host_.log_to(base_ + "/log");
   start();
-  // Cyclone does not make several secured participants of one process at the same time.
   std::vector<std::unique_ptr<ControlClient>> made;
   for (int i = 0; i < 6; ++i) made.push_back(make_client());
   std::vector<std::jthread> clients;
@@ -55,6 +54,22 @@ TEST_F(OwnClients, AreNeverRefusedByTheGate) {
   made.clear();
   std::this_thread::sleep_for(std::chrono::seconds(2));
   EXPECT_THAT(log(), testing::Not(testing::HasSubstr("refused")));
+}
+
+// The first ones of a process load Cyclone's security plugins.
+TEST_F(OwnClients, OfOneProcessCanBeMadeAtTheSameTime) {
+  for (int round = 0; round < 12; ++round) {
+    std::vector<std::jthread> makers;
+    for (int i = 0; i < 6; ++i) {
+      makers.emplace_back([this] {
+        dds::DomainOptions options;
+        options.domain = domain_.number();
+        options.identity = folder("operator");
+        const auto made = ControlClient::connect(options);
+        EXPECT_TRUE(made) << made.error().describe();
+      });
+    }
+  }
 }
 
 }  // namespace
