@@ -58,8 +58,11 @@ void Plant::kill_processes_about(const std::string& text) {
   for (const auto& entry : std::filesystem::directory_iterator("/proc")) {
     std::ostringstream line;
     line << std::ifstream(entry.path() / "cmdline").rdbuf();
+    // A script in place of the API server has the folder as its own.
+    std::error_code ignored;
+    const std::string folder = std::filesystem::read_symlink(entry.path() / "cwd", ignored);
     const int pid = std::atoi(entry.path().filename().c_str());
-    if (pid > 0 && line.str().contains(text)) ::kill(pid, SIGKILL);
+    if (pid > 0 && (line.str().contains(text) || folder.starts_with(text))) ::kill(pid, SIGKILL);
   }
 }
 
