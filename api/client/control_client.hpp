@@ -261,6 +261,7 @@ class ControlClient {
   SeenHosts seen_;
   TransitionLog transition_log_;
   TimePoint last_news_;
+  TimePoint told_keys_look_;  ///< when plc_forget_told_keys() was called last
   Duration quiet_ = kQuiet;
   dds::Entity reply_topic_;
   dds::Entity reply_reader_;

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <chrono>
 #include <span>
 #include <string_view>
 #include <utility>
@@ -11,11 +12,14 @@
 #include "api/dds/entries.hpp"
 #include "api/dds/host_writers.hpp"
 #include "api/dds/text.hpp"
+#include "api/dds/told_keys.h"
 #include "shm/base/names.hpp"
 
 namespace plchost {
 
 namespace {
+
+constexpr Duration kToldKeysLook = std::chrono::seconds(1);
 
 // Who answers is a stranger's text.
 std::string no_such_host(std::string_view name, const std::vector<std::string>& answering) {
@@ -59,6 +63,11 @@ void ControlClient::update_hosts() {
   // Posts that a killed server has not acknowledged would hold up those to its successor.
   for (const dds_instance_handle_t writer : seen_.take_ended(now)) {
     (void)plc_forget_participant(presence_.reader(), writer);
+  }
+  // Each server that is started anew is told keys, which a server that stays would keep here.
+  if (now - told_keys_look_ >= kToldKeysLook) {
+    told_keys_look_ = now;
+    (void)plc_forget_told_keys(presence_.reader());
   }
   host_status_.update();
   if (host_status_.size() <= SeenHosts::kMost) return;

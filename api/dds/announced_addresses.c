@@ -1,12 +1,13 @@
 #include "api/dds/announced_addresses.h"
 
-#include <dds/ddsi/ddsi_proxy_participant.h>
 #include <dds/ddsi/q_addrset.h>
 
 #include "api/dds/cyclone_internals.h"
+#include "api/dds/cyclone_version.h"
 
 static struct ddsi_domaingv* domain_of(dds_entity_t participant) {
   dds_guid_t guid;
+  if (plc_unknown_cyclone() != NULL) return NULL;
   struct ddsi_domaingv* const domain = plc_domain_of_last_call();
   if (domain == NULL || dds_get_guid(participant, &guid) != DDS_RETCODE_OK) return NULL;
   struct thread_state* const thread = lookup_thread_state();

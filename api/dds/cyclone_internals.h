@@ -5,6 +5,7 @@
 
 #include <arpa/inet.h>
 #include <dds/dds.h>
+#include <stddef.h>
 #include <string.h>
 
 // In an order in which each has what it needs.
@@ -15,12 +16,39 @@
 #include <dds/ddsi/ddsi_endpoint.h>
 #include <dds/ddsi/ddsi_entity_index.h>
 #include <dds/ddsi/ddsi_entity_match.h>
+#include <dds/ddsi/ddsi_proxy_participant.h>
 #include <dds/ddsi/ddsi_serdata.h>
 #include <dds/ddsi/ddsi_tkmap.h>
 #include <dds/ddsi/q_rtps.h>
 #include <dds/ddsi/q_thread.h>
 #include <dds/ddsi/q_whc.h>
 // clang-format on
+
+// Where what is used lies in the releases that are known. Headers that were patched, or configured otherwise,
+// do not compile here; the build says so and leaves the mends out.
+#ifdef __x86_64__
+#define PLC_LIES_AT(type, member, offset, size)                                              \
+  _Static_assert(offsetof(type, member) == (offset) && sizeof(((type*)0)->member) == (size), \
+                 #type "." #member " lies elsewhere")
+PLC_LIES_AT(struct ddsi_domaingv, m_tkmap, 960, 8);
+PLC_LIES_AT(struct ddsi_domaingv, entity_index, 968, 8);
+PLC_LIES_AT(struct ddsi_domaingv, as_disc, 2008, 8);
+PLC_LIES_AT(struct ddsi_domaingv, sedp_writer_type, 6968, 8);
+PLC_LIES_AT(struct ddsi_domaingv, sedp_writer_secure_type, 7024, 8);
+PLC_LIES_AT(struct ddsi_proxy_participant, as_meta, 264, 8);
+PLC_LIES_AT(struct ddsi_tkmap_instance, m_refc, 16, 4);
+PLC_LIES_AT(struct ddsi_writer, e.lock, 48, 40);
+PLC_LIES_AT(struct ddsi_writer, seq, 272, 8);
+PLC_LIES_AT(struct ddsi_writer, state, 368, 4);
+PLC_LIES_AT(struct ddsi_writer, type, 392, 8);
+PLC_LIES_AT(struct ddsi_writer, whc, 424, 8);
+PLC_LIES_AT(struct ddsi_writer, readers, 488, 8);
+PLC_LIES_AT(struct ddsi_wr_prd_match, min_seq, 56, 8);
+PLC_LIES_AT(struct ddsi_wr_prd_match, seq, 72, 8);
+PLC_LIES_AT(struct ddsi_wr_prd_match, last_seq, 80, 8);
+PLC_LIES_AT(struct thread_state, gv, 8, 8);
+#undef PLC_LIES_AT
+#endif
 
 /// The domain of this thread's last call: Cyclone notes it in its state of the thread.
 static inline struct ddsi_domaingv* plc_domain_of_last_call(void) {

@@ -1,10 +1,10 @@
 #include "api/dds/ended_participant.h"
 
-#include <dds/ddsi/ddsi_proxy_participant.h>
-
 #include "api/dds/cyclone_internals.h"
+#include "api/dds/cyclone_version.h"
 
 bool plc_forget_participant(dds_entity_t reader, dds_instance_handle_t publication) {
+  if (plc_unknown_cyclone() != NULL) return false;
   dds_builtintopic_endpoint_t* const endpoint = dds_get_matched_publication_data(reader, publication);
   if (endpoint == NULL) return false;
   const ddsi_guid_t guid = plc_in_host_order(&endpoint->participant_key);

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "api/dds/cyclone_internals.h"
+#include "api/dds/cyclone_version.h"
 
 static const plc_InstancePin kNoPin = {NULL, NULL, 0};
 
@@ -18,7 +19,7 @@ static plc_InstancePin pin(struct ddsi_domaingv* domain, struct ddsi_serdata* ke
 
 plc_InstancePin plc_pin_instance(dds_entity_t writer, const void* sample) {
   dds_guid_t guid;
-  if (dds_lookup_instance(writer, sample) == DDS_HANDLE_NIL ||
+  if (plc_unknown_cyclone() != NULL || dds_lookup_instance(writer, sample) == DDS_HANDLE_NIL ||
       dds_get_guid(writer, &guid) != DDS_RETCODE_OK) {
     return kNoPin;
   }
@@ -36,7 +37,8 @@ plc_InstancePin plc_pin_instance(dds_entity_t writer, const void* sample) {
 plc_InstancePin plc_pin_announcement(dds_entity_t entity) {
   dds_guid_t guid;
   // The first one for the sake of the domain.
-  if (dds_get_matched_subscriptions(entity, NULL, 0) < 0 || dds_get_guid(entity, &guid) != DDS_RETCODE_OK) {
+  if (plc_unknown_cyclone() != NULL || dds_get_matched_subscriptions(entity, NULL, 0) < 0 ||
+      dds_get_guid(entity, &guid) != DDS_RETCODE_OK) {
     return kNoPin;
   }
   struct ddsi_domaingv* const domain = plc_domain_of_last_call();

@@ -1,6 +1,7 @@
 #include "api/dds/told_keys.h"
 
 #include "api/dds/cyclone_internals.h"
+#include "api/dds/cyclone_version.h"
 
 // All that was written for this one has come. One that has never answered, or has stopped to, is not counted.
 static bool has_its_keys(const struct ddsi_wr_prd_match* match) {
@@ -37,7 +38,8 @@ static uint32_t forget(struct ddsi_writer* writer) {
 uint32_t plc_forget_told_keys(dds_entity_t reader) {
   dds_guid_t guid;
   // The first one for the sake of the domain.
-  if (dds_get_matched_publications(reader, NULL, 0) < 0 || dds_get_guid(reader, &guid) != DDS_RETCODE_OK) {
+  if (plc_unknown_cyclone() != NULL || dds_get_matched_publications(reader, NULL, 0) < 0 ||
+      dds_get_guid(reader, &guid) != DDS_RETCODE_OK) {
     return 0;
   }
   struct ddsi_domaingv* const domain = plc_domain_of_last_call();

@@ -5,6 +5,7 @@
 #include <sys/prctl.h>
 
 #include "api/control/exit_codes.hpp"
+#include "api/dds/cyclone_version.h"
 #include "api/server/access/receive_gate.hpp"
 #include "api/server/control_server.hpp"
 #include "shm/base/log.hpp"
@@ -73,6 +74,8 @@ int main(int argc, char** argv) {
   if (end_with_parent) (void)::prctl(PR_SET_PDEATHSIG, SIGKILL);
   plchost::start_log("plchost-dds", log_level);
   (void)std::signal(SIGPIPE, SIG_IGN);
+  if (const char* const why = plc_unknown_cyclone(); why != nullptr)
+    spdlog::warn("{}: memory of clients that have ended is not given back", why);
   options.dds.receive_fifo = plchost::dds::can_use_fifo(kReceiveFifo) ? kReceiveFifo : 0;
   plchost::close_receive_gate(!options.dds.identity.empty());
   options.refused_datagrams = plchost::datagrams_refused;

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # A plain "cmake -S . -B build" needs neither GoogleTest nor pybind11, and says what is left out without them; who wants them
-# for sure is told that they are missing.
+# for sure is told that they are missing. A Cyclone DDS whose internals are not known is told, too.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../../.." && pwd)
 folder=$(mktemp -d "${TMPDIR:-/tmp}/plchost-system.XXXXXX")
@@ -13,4 +13,21 @@ configure || fail "it does not configure"
 for said in "GTest is not installed: without the tests" "pybind11 is not installed: without the module for Python"; do
   grep -qF "$said" "$folder/log" || fail "it does not say '$said'"
 done
+
+# A Cyclone DDS whose internals are not known: of a release that nobody has looked at, or with other structures.
+cyclone=$(sed -n 's/^CycloneDDS_DIR:PATH=//p' "$folder/build/CMakeCache.txt")
+mkdir "$folder/newer"
+echo "include(\"$cyclone/CycloneDDSConfig.cmake\")" >"$folder/newer/CycloneDDSConfig.cmake"
+printf 'set(PACKAGE_VERSION 0.10.99)\nset(PACKAGE_VERSION_COMPATIBLE TRUE)\n' >"$folder/newer/CycloneDDSConfigVersion.cmake"
+said="memory of clients that have ended is not given back"
+! grep -qF "$said" "$folder/log" || fail "it does not know the Cyclone DDS of this machine"
+configure -DCycloneDDS_DIR="$folder/newer" || fail "it does not configure with another Cyclone DDS"
+tr -s ' \n' ' ' <"$folder/log" | grep -qF "The internals of Cyclone DDS 0.10.99 are not known: $said" || fail "it does not warn of another release"
+header=dds/ddsi/ddsi_tkmap.h
+mkdir -p "$folder/include/dds/ddsi"
+sed 's/ddsrt_atomic_uint32_t m_refc;/char more[64]; &/' "/usr/include/$header" >"$folder/include/$header"
+grep -q 'char more' "$folder/include/$header" || fail "nothing was planted in $header"
+configure -DCycloneDDS_DIR="$cyclone" -DCMAKE_C_FLAGS="-I$folder/include" || fail "it does not configure with other structures"
+tr -s ' \n' ' ' <"$folder/log" | grep -qF "are not those of the release: $said" || fail "it does not warn of other structures"
+
 ! configure -DPLCHOST_PYTHON=ON || fail "the module for Python is left out in spite of PLCHOST_PYTHON=ON"

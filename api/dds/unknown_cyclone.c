@@ -1,0 +1,67 @@
+// In the place of the mends, where the release of Cyclone DDS or the layout of its structures is not known.
+#include <dds/version.h>
+
+#include "api/dds/announced_addresses.h"
+#include "api/dds/cyclone_version.h"
+#include "api/dds/ended_participant.h"
+#include "api/dds/instance_pin.h"
+#include "api/dds/told_keys.h"
+
+static const plc_InstancePin kNoPin = {NULL, NULL, 0};
+
+const char* plc_unknown_cyclone(void) {
+  return "plchost was built with Cyclone DDS " DDS_VERSION ", whose internals it does not know";
+}
+
+plc_InstancePin plc_pin_instance(dds_entity_t writer, const void* sample) {
+  (void)writer;
+  (void)sample;
+  return kNoPin;
+}
+
+plc_InstancePin plc_pin_announcement(dds_entity_t entity) {
+  (void)entity;
+  return kNoPin;
+}
+
+void plc_take_off_pin(plc_InstancePin pin) {
+  (void)pin;
+}
+
+uint32_t plc_forget_told_keys(dds_entity_t reader) {
+  (void)reader;
+  return 0;
+}
+
+bool plc_can_tell_addresses(dds_entity_t participant) {
+  (void)participant;
+  return false;
+}
+
+size_t plc_announced_addresses(dds_entity_t participant, plc_Address* addresses, size_t most) {
+  (void)participant;
+  (void)addresses;
+  (void)most;
+  return 0;
+}
+
+size_t plc_addresses_of(dds_entity_t participant, const dds_guid_t* remote, plc_Address* addresses,
+                        size_t most) {
+  (void)participant;
+  (void)remote;
+  (void)addresses;
+  (void)most;
+  return 0;
+}
+
+bool plc_stop_announcing_to(dds_entity_t participant, const plc_Address* address) {
+  (void)participant;
+  (void)address;
+  return false;
+}
+
+bool plc_forget_participant(dds_entity_t reader, dds_instance_handle_t publication) {
+  (void)reader;
+  (void)publication;
+  return false;
+}
