@@ -476,6 +476,9 @@ void CDECL plc_log(int nLevel, const char* pszText);
  * before the application is loaded; CH_EXIT3, CH_EXIT2, CH_EXIT in reverse order, after the application's
  * tasks have ended. Another result than ERR_OK from a CH_INIT.. ends the start of the instance. Threads are
  * started in CH_INIT3 and have ended when CH_EXIT3 returns. Unknown hooks return ERR_OK.
+ * CH_TRIAL is the only hook that the trial of an application calls, in a process of its own, while the
+ * instance runs with the component initialised: the component checks whether its CH_INIT.. would succeed, and
+ * takes nothing. Another result than ERR_OK refuses the application.
  */
 #define CH_INIT 1u
 #define CH_INIT2 2u
@@ -483,6 +486,7 @@ void CDECL plc_log(int nLevel, const char* pszText);
 #define CH_EXIT3 4u
 #define CH_EXIT2 5u
 #define CH_EXIT 6u
+#define CH_TRIAL 7u
 
 PLC_EXPORT RTS_RESULT CDECL HookFunction(unsigned int ulHook, unsigned long ulParam1, unsigned long ulParam2);
 

@@ -2,16 +2,16 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdio>
 #include <utility>
 
 #include <fmt/format.h>
 #include <unistd.h>
 
 #include "instances/runtime/application/declare_application.hpp"
-#include "instances/runtime/device/device_events.hpp"
+#include "instances/runtime/set_up_watch.hpp"
 #include "instances/runtime/tasks/operator_events.hpp"
 #include "instances/runtime/tasks/task_builder.hpp"
-#include "instances/runtime/time/system_time.hpp"
 #include "schedulers/faults/watchdog_rules.hpp"
 #include "shm/base/log.hpp"
 #include "shm/base/names.hpp"
@@ -60,7 +60,7 @@ std::unique_ptr<Instance> Instance::set_up(const Options& options, SetupReporter
   };
   std::unique_ptr<Instance> instance(new Instance(options));
   for (const Step& step : kSteps) {
-    const auto remark = (instance.get()->*step.take)();
+    auto remark = instance->take_watched(step.step, reporter, step.take);
     if (!remark) {
       reporter.failed(step.step, remark.error());
       (void)instance->shut_down();
@@ -71,6 +71,20 @@ std::unique_ptr<Instance> Instance::set_up(const Options& options, SetupReporter
   instance->beat();
   reporter.done(SetupStep::ready);
   return instance;
+}
+
+// Code of components and of the application runs in these two steps.
+Result<std::string> Instance::take_watched(SetupStep step, SetupReporter& reporter,
+                                           Result<std::string> (Instance::*take)()) {
+  if (step != SetupStep::load_components && step != SetupStep::load_application) return (this->*take)();
+  SetUpWatch watch(start_.settings.scheduler.watchdog.default_time, [&](const Error& error) {
+    reporter.failed(step, error);
+    (void)std::fflush(nullptr);
+    ::_exit(kExitSetupFailed);  // the thread that sets up may hold any lock
+  });
+  auto remark = (this->*take)();
+  if (auto ended = watch.end(); !ended && remark) return std::unexpected(std::move(ended).error());
+  return remark;
 }
 
 Instance::~Instance() {
@@ -90,32 +104,24 @@ Result<std::string> Instance::lock_memory() {
 }
 
 Result<std::string> Instance::read_settings_file() {
-  if (options_.launch.settings.empty()) {
-    choose_scheduler();
-    return hold_idle_states();
-  }
-  auto settings = read_settings(options_.launch.settings);
-  if (!settings) return std::unexpected(std::move(settings).error());
-  settings_ = *std::move(settings);
-  log_what_is_left_alone(settings_);
-  if (!settings_.device_description.empty()) {
-    auto device = read_device_description(settings_.device_description);
-    if (!device) return std::unexpected(std::move(device).error());
-    device_ = *std::move(device);
-  }
+  auto start = read_start_settings(options_.launch.settings);
+  if (!start) return std::unexpected(std::move(start).error());
+  start_ = *std::move(start);
+  log_what_is_left_alone(start_.settings);
   choose_scheduler();
   return hold_idle_states();
 }
 
 // Needs the settings, and the cores that bind_core() has got.
 std::string Instance::hold_idle_states() {
-  idle_hold_ = IdleHold::take(settings_.idle_states, cores_, options_.launch.run_directory, {});
+  idle_hold_ = IdleHold::take(start_.settings.idle_states, cores_, options_.launch.run_directory, {});
   return idle_hold_.as_wanted() ? std::string() : fmt::format("idle states: {}", idle_hold_.status());
 }
 
 void Instance::choose_scheduler() {
-  const std::string asked = std::exchange(scheduler_, scheduler_for(scheduler_, settings_));
-  if (asked.empty() || settings_.timer_mode != TimerMode::one_shot || scheduler_ == "CmpScheduleOneShot")
+  const std::string asked = std::exchange(scheduler_, scheduler_for(scheduler_, start_.settings));
+  if (asked.empty() || start_.settings.timer_mode != TimerMode::one_shot ||
+      scheduler_ == "CmpScheduleOneShot")
     return;
   spdlog::warn(
       "settings: TimerMode=OneShot asks for CmpScheduleOneShot, but {} was asked for at the start and is "
@@ -138,13 +144,8 @@ Result<std::string> Instance::attach_pool() {
   host_.emplace(options_.launch.name, &*pool_);
   host_->set_start_kind(static_cast<int>(options_.launch.start_kind));
   host_->events().clear_own();
-  if (device_) {
-    if (auto done = register_device_events(*device_, host_->events()); !done)
-      return std::unexpected(done.error());
-  }
-  if (auto joined = host_->blocks().configure(settings_.blocks); !joined) {
-    return std::unexpected(std::move(joined).error());
-  }
+  if (auto prepared = prepare_host(start_, *host_); !prepared)
+    return std::unexpected(std::move(prepared).error());
   return {};
 }
 
@@ -171,23 +172,17 @@ void Instance::restore_operator_events() {
 }
 
 Result<std::string> Instance::load_components() {
-  auto loaded = components_.load(settings_.components);
-  if (loaded) {  // a component may hold the clock, and the hooks of all see it
-    loaded =
-        use_system_time(settings_.sys_time, [this](const char* symbol) { return components_.find(symbol); });
-  }
-  if (loaded) loaded = components_.init();
-  host_->write_messages();
+  auto loaded = plchost::load_components(start_.settings, ComponentHooks::init, components_, *host_);
   if (!loaded) return std::unexpected(std::move(loaded).error());
   return {};
 }
 
 Result<std::string> Instance::load_application() {
   if (options_.launch.application.empty()) return "no application is given: there is nothing to run";
-  auto application = declare_application(options_.launch.application, settings_, device_, *host_);
+  auto application = declare_application(options_.launch.application, start_, *host_);
   if (!application) return std::unexpected(std::move(application).error());
   application_.emplace(*std::move(application));
-  return host_->areas().place(areas_environment(options_.launch, settings_, *application_, &*pool_),
+  return host_->areas().place(areas_environment(options_.launch, start_.settings, *application_, &*pool_),
                               application_->tasks_to_change());
 }
 
@@ -231,11 +226,13 @@ Result<std::string> Instance::make_tasks() {
   if (!tasks) return std::unexpected(std::move(tasks).error());
   tasks_ = *std::move(tasks);
   host_->task_table().attach(tasks_.get());
-  if (const std::string& reference = settings_.scheduler.distributed_clock.reference; !reference.empty()) {
+  if (const std::string& reference = start_.settings.scheduler.distributed_clock.reference;
+      !reference.empty()) {
     reference_.follow(tasks_->distributed_clock(), options_.launch.pool, reference);
   }
   notify_tasks(EVT_ExternalEventTaskCreateDone);
-  for (const std::string& line : describe_cycle_limits(application_->tasks(), settings_.scheduler.watchdog)) {
+  for (const std::string& line :
+       describe_cycle_limits(application_->tasks(), start_.settings.scheduler.watchdog)) {
     spdlog::info("watchdog: {}", line);
   }
   life_.go_to(ApplicationState::stopped, fmt::format("{} is loaded ({} start)", application_->name(),
@@ -292,7 +289,7 @@ void Instance::beat() {
   runtime.tick_fallback.assign(tick_.fallback);
   if (application_) runtime.application.assign(application_->path());
   if (tasks_ && tasks_->running()) runtime.clock = clock_runtime(tasks_->distributed_clock());
-  runtime.clock.reference.assign(settings_.scheduler.distributed_clock.reference);
+  runtime.clock.reference.assign(start_.settings.scheduler.distributed_clock.reference);
   runtime.clock.problem.assign(reference_.problem());
   runtime.retain_problem.assign(host_->areas().retain_problem());
   page_->write_runtime(runtime);

@@ -9,6 +9,7 @@
 #include "instances/runtime/application/application.hpp"
 #include "instances/runtime/application/application_host.hpp"
 #include "instances/runtime/application/components.hpp"
+#include "instances/runtime/application/declare_application.hpp"
 #include "instances/runtime/application/online_change.hpp"
 #include "instances/runtime/application_state.hpp"
 #include "instances/runtime/device/device_description.hpp"
@@ -81,6 +82,8 @@ class Instance {
       : options_(options), scheduler_(options.launch.scheduler), life_(recorder()) {}
 
   // The steps of set_up().
+  [[nodiscard]] Result<std::string> take_watched(SetupStep step, SetupReporter& reporter,
+                                                 Result<std::string> (Instance::*take)());
   [[nodiscard]] Result<std::string> bind_core();
   [[nodiscard]] Result<std::string> lock_memory();
   [[nodiscard]] Result<std::string> read_settings_file();
@@ -138,7 +141,7 @@ class Instance {
   TickReport tick_;  // as it was logged last
   std::vector<int> cores_;
   RealTimeSetup real_time_;
-  InstanceSettings settings_;
+  StartSettings start_;
   IdleHold idle_hold_;
   NameClaim name_claim_;
   std::optional<ObjectPool> pool_;
@@ -146,7 +149,6 @@ class Instance {
   Components components_;
   std::optional<Application> application_;
   std::optional<InstancePage> page_;
-  std::optional<DeviceDescription> device_;  // nothing: any external event is allowed
   bool page_lost_told_ = false;
   TimePoint page_told_;             // when it was told last that the page was written over
   std::uint64_t page_damages_ = 0;  // how often it was

@@ -96,7 +96,7 @@ Result<std::string> Instance::obey(const ControlRequest& request) {
 Result<std::string> Instance::set_scheduler(const std::string& name) {
   if (const auto known = find_scheduler(name); !known) return std::unexpected(known.error());
   if (life_.state() == ApplicationState::running) {
-    if (auto switched = tasks_->switch_to(name, settings_.scheduler); !switched) {
+    if (auto switched = tasks_->switch_to(name, start_.settings.scheduler); !switched) {
       return std::unexpected(std::move(switched).error());
     }
   }

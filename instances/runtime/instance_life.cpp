@@ -37,7 +37,7 @@ ApplicationLife::Record Instance::recorder() {
 
 Result<std::string> Instance::start(std::string_view why) {
   if (auto bound = host_->events().check_bound(); !bound) return std::unexpected(std::move(bound).error());
-  if (auto started = tasks_->start(scheduler_, settings_.scheduler); !started) {
+  if (auto started = tasks_->start(scheduler_, start_.settings.scheduler); !started) {
     return std::unexpected(std::move(started).error());
   }
   if (auto bound = host_->events().publish_bound(true); !bound) {
@@ -60,14 +60,14 @@ void Instance::unbind(std::size_t index) {
 }
 
 void Instance::begin_stop(std::string_view why) {
-  (void)tasks_->begin_stop(settings_.stop);
+  (void)tasks_->begin_stop(start_.settings.stop);
   life_.go_to(ApplicationState::stopping, why);
 }
 
 Result<std::string> Instance::begin_single_cycle() {
-  if (auto begun = tasks_->begin_single_cycle(settings_.scheduler); !begun)
+  if (auto begun = tasks_->begin_single_cycle(start_.settings.scheduler); !begun)
     return std::unexpected(std::move(begun).error());
-  single_cycle_ends_ = MonotonicClock::now() + settings_.stop.others;
+  single_cycle_ends_ = MonotonicClock::now() + start_.settings.stop.others;
   life_.go_to(ApplicationState::single_cycle, "single cycle");
   return {};
 }
@@ -83,7 +83,7 @@ void Instance::advance() {
     const bool done = tasks_->single_cycle_done();
     if (!done && MonotonicClock::now() < single_cycle_ends_) return;
     // Those that wait for their turn park at once; whoever does not is caught in its cycle.
-    const Duration patience = done ? settings_.stop.others : Duration(kParkPatience);
+    const Duration patience = done ? start_.settings.stop.others : Duration(kParkPatience);
     (void)tasks_->begin_stop({.outputs = patience, .others = patience});
   }
   if (const auto stuck = tasks_->advance_stop()) finish_transition(*stuck);
@@ -112,7 +112,8 @@ std::string Instance::time_out(std::size_t task) {
   const bool variable = tasks_->late_variable() == task;
   StopPhase phase = config.drives_outputs && !variable ? StopPhase::outputs : StopPhase::others;
   if (life_.state() == ApplicationState::single_cycle) phase = StopPhase::single_cycle;
-  const Duration limit = phase == StopPhase::outputs ? settings_.stop.outputs : settings_.stop.others;
+  const Duration limit =
+      phase == StopPhase::outputs ? start_.settings.stop.outputs : start_.settings.stop.others;
   raise_stop_timeout(tasks_->task(task).fault(), phase, limit, variable);
   return fmt::format("{} ({}after {} ms)", config.name, variable ? "its event variable, " : "", in_ms(limit));
 }

@@ -10,7 +10,7 @@ namespace plchost {
 
 /// For how long a process's control thread has given no sign of itself: any number that changes is one. A gap
 /// between two looks counts for a little only: while the whole host or the manager stood still, nothing is
-/// known of the process. Pure.
+/// known of the process. A gap in which other programs kept it from its core does not count. Pure.
 class HeartbeatWatch {
  public:
   /// Longer than the guard against endless loops takes by default: until it hits, a loop above the control
@@ -21,8 +21,9 @@ class HeartbeatWatch {
   HeartbeatWatch() noexcept = default;
   explicit HeartbeatWatch(Duration limit) noexcept : limit_(limit) {}
 
-  void look(TimePoint now, std::int64_t beat) noexcept {
-    silence_ = beat_ == beat ? silence_ + std::min(now - looked_, kLongestGap) : Duration::zero();
+  void look(TimePoint now, std::int64_t beat, bool starved = false) noexcept {
+    const Duration counts = starved ? Duration::zero() : std::min(now - looked_, kLongestGap);
+    silence_ = beat_ == beat ? silence_ + counts : Duration::zero();
     beat_ = beat;
     looked_ = now;
   }

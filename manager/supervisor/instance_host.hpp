@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "instances/launch/launch_contract.hpp"
+#include "manager/supervisor/starvation_watch.hpp"
 #include "manager/system/child_process.hpp"
 #include "shm/base/control_message.hpp"
 #include "shm/base/result.hpp"
@@ -33,6 +34,11 @@ class InstanceHost {
   [[nodiscard]] virtual Result<void> check_application(const LaunchOptions& options) = 0;
   /// What the process says of itself in its page; nothing if it has made none yet.
   [[nodiscard]] virtual std::optional<InstanceRuntime> runtime() = 0;
+  /// What the process asks of its core and gets of it now. Reads a file for each of its threads.
+  [[nodiscard]] virtual ProcessorUse processor_use() = 0;
+  /// The program that has the process's core now, as a sentence names it; empty: none is seen. Reads a file
+  /// for each thread of the host.
+  [[nodiscard]] virtual std::string processor_taker() = 0;
   /// The cores that the kernel lets the process's threads run on.
   [[nodiscard]] virtual std::vector<int> granted_cores() = 0;
   /// Writes down the faults that the process shows in its page and cannot write down itself. In words the

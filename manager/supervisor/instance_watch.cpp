@@ -33,6 +33,11 @@ void ManagedInstance::forget_signs() {
   asked_number_ = 0;
   answers_ = 0;
   said_.reset();
+  starvation_.forget();
+  starved_by_.clear();
+  set_up_starved_ = Duration::zero();
+  step_ = SetupStep::bind_core;
+  sign_at_ = surroundings_.now();
 }
 
 // What the process says of itself now; nothing: it does not.
@@ -45,7 +50,8 @@ std::optional<InstanceRuntime> ManagedInstance::watch_process() {
     heard_of_ = true;
     answers_ = 0;
   }
-  page_beat_.look(surroundings_.now(), page ? last_beat_ : 0);
+  const bool starved = starved_now();
+  page_beat_.look(surroundings_.now(), page ? last_beat_ : 0, starved);
   // Whether the page is damaged or the process stands still, the process itself can tell.
   const bool believed = page && !page_beat_.silent();
   if (believed) {
@@ -53,7 +59,8 @@ std::optional<InstanceRuntime> ManagedInstance::watch_process() {
   } else if (page_beat_.silent() && !takes_over()) {
     ask_for_status();
   }
-  if (heard_of_) watch_heartbeat();
+  if (heard_of_) watch_heartbeat(starved);
+  tell_starvation();
   if (page_damaged_ && believed) {
     page_damaged_ = false;
     tell_problems();
@@ -101,8 +108,54 @@ void ManagedInstance::tell_problems() {
   set_state(phase_, status_.state, problem_when_up());
 }
 
-void ManagedInstance::watch_heartbeat() {
-  heartbeat_.look(surroundings_.now(), signs_);
+// Since the last look other programs have kept the process from its core. While it gives signs of itself,
+// nobody looks.
+bool ManagedInstance::starved_now() {
+  const TimePoint now = surroundings_.now();
+  if (std::exchange(seen_signs_, signs_) != signs_) {
+    sign_at_ = now;
+    starvation_.forget();
+  }
+  return now - sign_at_ >= kStarvationSuspected && starvation_.look(now, host_.processor_use());
+}
+
+void ManagedInstance::tell_starvation() {
+  const bool starved = starvation_.lasted() >= HeartbeatWatch::kLimit;
+  if (starved == !starved_by_.empty()) return;
+  starved_by_.clear();
+  if (starved) {
+    const std::string taker = host_.processor_taker();
+    starved_by_ = fmt::format(
+        "other programs have kept its core from its control thread for {} s: {}; it answers when the core is "
+        "free",
+        std::chrono::duration_cast<std::chrono::seconds>(HeartbeatWatch::kLimit).count(),
+        taker.empty() ? "none is seen there, so a limit of its control group or the machine below takes it"
+                      : taker + " has it now");
+  }
+  if (phase_ == Phase::setting_up) set_state(phase_, status_.state, starved_by_);
+  const bool excepted = silent_ || status_.state == InstanceState::exception;
+  if (phase_ == Phase::up && !excepted) set_state(phase_, status_.state, problem_when_up());
+}
+
+void ManagedInstance::watch_set_up() {
+  (void)starved_now();
+  tell_starvation();
+}
+
+// What other programs have taken of the limit is added to it.
+void ManagedInstance::set_up_timed_out() {
+  const Duration taken = starvation_.lasted() - set_up_starved_;
+  if (taken < HeartbeatWatch::kLimit) {
+    return set_up_failed(fmt::format("was not ready after {} s: its step '{}' has not ended",
+                                     std::chrono::duration_cast<std::chrono::seconds>(kSetupLimit).count(),
+                                     to_string(step_)));
+  }
+  set_up_starved_ += taken;
+  host_.set_timer(after(taken));
+}
+
+void ManagedInstance::watch_heartbeat(bool starved) {
+  heartbeat_.look(surroundings_.now(), signs_, starved);
   // The control thread is in the set-up of the new version: the command's limit counts.
   if (takes_over()) return;
   if (heartbeat_.silent() == silent_) return;

@@ -118,7 +118,10 @@ void ManagedInstance::on_report(const SetupReport& report) {
   if (!report.text.empty()) {
     spdlog::info("instance {}: {}: {}", config_.name, to_string(report.step), report.text);
   }
-  if (report.step != SetupStep::ready) return;
+  if (report.step != SetupStep::ready) {
+    step_ = static_cast<SetupStep>(std::to_underlying(report.step) + 1);
+    return;
+  }
   come_up();
 }
 
@@ -135,7 +138,9 @@ void ManagedInstance::on_reply(const ControlReply& reply) {
 
 void ManagedInstance::come_up() {
   host_.set_timer(std::nullopt);
-  up_since_ = settled_ = surroundings_.now();
+  starvation_.forget();
+  starved_by_.clear();
+  up_since_ = settled_ = sign_at_ = surroundings_.now();
   start_kind_ = StartKind::warm;
   // An adopted one may be in its set-up still, in which it answers to nobody.
   if (phase_ == Phase::setting_up) heard_of_ = true;
@@ -172,6 +177,7 @@ std::string ManagedInstance::problem_when_up() {
     add("ended last: " + last_end_);
   }
   if (const std::string changes = awaited_changes(); !changes.empty()) add(changes);
+  if (!starved_by_.empty()) add(starved_by_);
   if (page_damaged_) {
     add("another program has damaged its status page: figures of its tasks are missing or old; restart it");
   }
@@ -210,8 +216,7 @@ void ManagedInstance::on_timer() {
       ++status_.restarts;
       return spawn(wants_running_ ? Next::run : Next::stay_stopped);
     case Phase::setting_up:
-      return set_up_failed(fmt::format(
-          "was not ready after {} s", std::chrono::duration_cast<std::chrono::seconds>(kSetupLimit).count()));
+      return set_up_timed_out();
     case Phase::adopting:
       return finish_adoption("no answer");
     case Phase::up:
@@ -219,8 +224,9 @@ void ManagedInstance::on_timer() {
         const Duration limit =
             limit_of(takes_over() ? ControlVerb::change_application : operation_->request.verb);
         finish(ErrorCode::timed_out,
-               fmt::format("'{}' did not answer within {} s", config_.name,
-                           std::chrono::duration_cast<std::chrono::seconds>(limit).count()));
+               fmt::format("'{}' did not answer within {} s{}{}", config_.name,
+                           std::chrono::duration_cast<std::chrono::seconds>(limit).count(),
+                           starved_by_.empty() ? "" : ": ", starved_by_));
         look_again();
       }
       return;
@@ -296,6 +302,7 @@ void ManagedInstance::spawn(Next next) {
   }
   status_.pid = *pid;
   log_level_ = surroundings_.host.log_level;
+  forget_signs();
   host_.set_timer(after(kSetupLimit));
   set_state(Phase::setting_up, InstanceState::starting, last_end_.empty() ? "" : "ended last: " + last_end_);
 }
@@ -331,6 +338,7 @@ void ManagedInstance::refresh() {
     carry_out(decision, last_end_);
     if (decision.action != Decision::Action::leave) return;
   }
+  if (phase_ == Phase::setting_up) watch_set_up();
   if (phase_ != Phase::up) return;
   const auto runtime = watch_process();
   if (!runtime || operation_ || silent_) return;

@@ -17,12 +17,15 @@
 #include "manager/supervisor/instance_observer.hpp"
 #include "manager/supervisor/instance_phase.hpp"
 #include "manager/supervisor/restart_decision.hpp"
+#include "manager/supervisor/starvation_watch.hpp"
 #include "shm/pool/host_page.hpp"
 
 namespace plchost {
 
 /// A page that does not beat for so long is not believed: the process is asked over its control socket.
 inline constexpr Duration kPageLimit = std::chrono::seconds(1);
+/// After so long without a sign it is looked whether other programs keep it from its core.
+inline constexpr Duration kStarvationSuspected = std::chrono::milliseconds(400);
 /// How often it is asked, and how often again if it does not answer.
 inline constexpr Duration kAskInterval = std::chrono::milliseconds(500);
 inline constexpr Duration kAskAgain = std::chrono::seconds(2);
@@ -45,6 +48,9 @@ inline constexpr Duration kAskAgain = std::chrono::seconds(2);
 // * The manager reads state and heartbeat from the process's page. If another program has damaged the page or cut it
 //   short, the manager asks the process over its control socket; the problem text says so. The page alone is no reason
 //   for an exception, nor for a signal.
+// * Time in which other programs keep the process from its core does not count as silence. After kLimit of such time
+//   the problem text names them until the process beats again. The state stays, and commands wait for their limits.
+//   Such time extends the limit of the set-up.
 // * Nothing is begun after the time limit of its command, also if it waited for the process or for the trial of a file
 //   meanwhile. The process gets the lesser of that limit and limit_of() from now.
 //
@@ -225,7 +231,11 @@ class ManagedInstance : public InstanceEvents {
   [[nodiscard]] std::optional<InstanceRuntime> watch_process();
   void ask_for_status();
   bool hear(const ControlReply& reply);
-  void watch_heartbeat();
+  [[nodiscard]] bool starved_now();
+  void watch_heartbeat(bool starved);
+  void tell_starvation();
+  void watch_set_up();
+  void set_up_timed_out();
   void fall_silent(std::string_view known);
   void answers_again();
   void tell_problems();
@@ -288,15 +298,21 @@ class ManagedInstance : public InstanceEvents {
   bool name_taken_ = false;  // another process of that name kept this one from being set up
   bool silent_ = false;      // its process does not beat
   HeartbeatWatch heartbeat_;
-  HeartbeatWatch page_beat_{kPageLimit};  // of the page alone
-  std::int64_t signs_ = 0;                // of its control thread, from the page or over the socket
-  std::int64_t last_beat_ = 0;            // in the page
-  bool heard_of_ = false;                 // this process has given a sign
-  bool page_damaged_ = false;             // the page does not tell what the process says itself
-  TimePoint asked_at_;                    // for its status, last
-  std::uint64_t asked_number_ = 0;        // of the answer that is awaited; 0: none is
-  int answers_ = 0;                       // to that, since the page has beaten last
-  std::optional<InstanceRuntime> said_;   // by itself last: in its page, or when it was asked
+  HeartbeatWatch page_beat_{kPageLimit};   // of the page alone
+  std::int64_t signs_ = 0;                 // of its control thread, from the page or over the socket
+  std::int64_t last_beat_ = 0;             // in the page
+  StarvationWatch starvation_;             // since its last sign
+  std::int64_t seen_signs_ = 0;            // when signs_ was looked at last
+  TimePoint sign_at_;                      // when it was another number first
+  SetupStep step_ = SetupStep::bind_core;  // that the process takes in its set-up
+  Duration set_up_starved_{};              // that its limit was extended by
+  std::string starved_by_;                 // for the problem text; empty: it is not starved
+  bool heard_of_ = false;                  // this process has given a sign
+  bool page_damaged_ = false;              // the page does not tell what the process says itself
+  TimePoint asked_at_;                     // for its status, last
+  std::uint64_t asked_number_ = 0;         // of the answer that is awaited; 0: none is
+  int answers_ = 0;                        // to that, since the page has beaten last
+  std::optional<InstanceRuntime> said_;    // by itself last: in its page, or when it was asked
   TimePoint up_since_{};
   TimePoint settled_{};        // when the state was last known from the process's own answer
   std::string setup_failure_;  // why the set-up failed; empty: it did not

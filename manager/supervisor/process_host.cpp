@@ -8,6 +8,7 @@
 
 #include "manager/supervisor/lost_faults.hpp"
 #include "manager/system/take_packets.hpp"
+#include "manager/system/thread_states.hpp"
 #include "shm/base/log.hpp"
 
 namespace plchost {
@@ -195,6 +196,21 @@ std::string ProcessHost::keep_lost_faults() {
 
 void ProcessHost::read_output() {
   if (process_) output_.read(process_->pid);
+}
+
+ProcessorUse ProcessHost::processor_use() {
+  ProcessorUse use;
+  if (!process_) return use;
+  use.used = processor_time_of(process_->pid);
+  for (const ThreadState& thread : threads_of_process(process_->pid)) {
+    if (thread.ready) use.ready.push_back({.id = thread.id, .used = thread.used});
+  }
+  return use;
+}
+
+std::string ProcessHost::processor_taker() {
+  const auto first = process_ ? first_on_cores(granted_cores(), process_->pid) : std::nullopt;
+  return first ? describe(*first) : std::string();
 }
 
 std::vector<int> ProcessHost::granted_cores() {

@@ -36,6 +36,8 @@ class ProcessHost : public InstanceHost {
   void set_timer(std::optional<TimePoint> when) override;
   [[nodiscard]] Result<void> check_application(const LaunchOptions& options) override;
   [[nodiscard]] std::optional<InstanceRuntime> runtime() override;
+  [[nodiscard]] ProcessorUse processor_use() override;
+  [[nodiscard]] std::string processor_taker() override;
   [[nodiscard]] std::vector<int> granted_cores() override;
   [[nodiscard]] std::string keep_lost_faults() override;
   void read_output() override;

@@ -5,6 +5,7 @@
 #include <csignal>
 #include <cstdint>
 
+#include <sched.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -20,7 +21,8 @@ enum class Mailbox : std::uint8_t { empty, claimed, full };
 constinit std::atomic<bool> guarded{false};  // the handler is installed
 constinit std::atomic<Duration::rep> guard_limit{0};
 constinit std::atomic<Duration::rep> last_sign{0};
-constinit std::atomic<pid_t> signer{0};  // who gave it
+constinit std::atomic<pid_t> signer{0};      // who gave it
+constinit std::atomic<bool> sets_up{false};  // the signer does
 constinit std::atomic<Mailbox> mailbox{Mailbox::empty};
 constinit ProcessorGuard::Taker reported;  // belongs to who has made the mailbox `claimed` or found it `full`
 
@@ -35,18 +37,38 @@ void set_limit(Duration limit) noexcept {
   ::setrlimit(RLIMIT_RTTIME, &now);  // cannot fail: not above the hard limit
 }
 
+// One that was bound to other cores than the thread that sets up takes nothing from it.
+bool runs_beside(pid_t thread) noexcept {
+  cpu_set_t here;
+  cpu_set_t there;
+  CPU_ZERO(&here);
+  CPU_ZERO(&there);
+  if (::sched_getaffinity(0, sizeof here, &here) != 0 ||
+      ::sched_getaffinity(thread, sizeof there, &there) != 0)
+    return false;
+  cpu_set_t both;
+  CPU_AND(&both, &here, &there);
+  return CPU_EQUAL(&both, &there) != 0;
+}
+
+// The control thread, or the supervision, waits for the processor. A thread that sleeps is kept from its sign
+// by something else.
+bool runtime_starves(Duration limit, Duration silent) noexcept {
+  constexpr int kSigns = 4;  // at least so many belong into the limit
+  return silent > limit / kSigns && !linux_processor_times().sleeps(signer.load(std::memory_order_relaxed));
+}
+
 // In the thread that has run for so long, unless it blocks the signal: then in any other.
 void on_long_run(int) noexcept {
   const int saved = errno;
   const Duration limit(guard_limit.load(std::memory_order_relaxed));
   const Duration silent =
       MonotonicClock::now() - TimePoint(Duration(last_sign.load(std::memory_order_relaxed)));
-  constexpr int kSigns = 4;  // at least so many belong into the limit
-  // A thread that sleeps is kept from its sign by something else.
-  const bool starved = limit > Duration::zero() && silent > limit / kSigns &&
-                       !linux_processor_times().sleeps(signer.load(std::memory_order_relaxed));
+  const bool taken = sets_up.load(std::memory_order_relaxed)
+                         ? runs_beside(signer.load(std::memory_order_relaxed))
+                         : runtime_starves(limit, silent);
   // How long a cycle may take is for the watchdogs to say.
-  if (starved && !FaultTrap::armed_here()) {
+  if (limit > Duration::zero() && taken && !FaultTrap::armed_here()) {
     const ThreadText who = linux_processor_times().demote(::gettid());
     if (!who.view().empty()) ProcessorGuard::report(who, silent);
   }
@@ -69,8 +91,14 @@ Result<void> ProcessorGuard::install() {
 
 void ProcessorGuard::watch(Duration limit) noexcept {
   if (!guarded.load(std::memory_order_acquire)) return;
+  sets_up.store(false, std::memory_order_relaxed);
   guard_limit.store(limit.count(), std::memory_order_relaxed);
   alive();
+}
+
+void ProcessorGuard::watch_set_up(Duration limit) noexcept {
+  watch(limit);
+  sets_up.store(guarded.load(std::memory_order_acquire), std::memory_order_relaxed);
 }
 
 void ProcessorGuard::alive() noexcept {

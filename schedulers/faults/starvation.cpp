@@ -25,9 +25,7 @@ Starvation::Starvation(const std::vector<std::unique_ptr<Task>>& tasks, const Fa
       search_(times) {}
 
 void Starvation::begin(Duration guard) noexcept {
-  constexpr int kPart = 2;
-  const Duration limit = guard == Duration::zero() ? guard : std::max(guard / kPart, kLeast);
-  limit_.store(limit.count(), std::memory_order_relaxed);
+  limit_.store(limit_for(guard).count(), std::memory_order_relaxed);
 }
 
 TimePoint Starvation::look(TimePoint now, bool running) noexcept {

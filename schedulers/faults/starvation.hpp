@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -32,7 +33,13 @@ class Starvation {
   Starvation(const std::vector<std::unique_ptr<Task>>& tasks, const FaultTrap& event_variables,
              const ProcessorTimes& times);
 
-  /// `guard`: the time of the guard against endless loops; 0: nothing is looked for. Control thread.
+  /// For how long a task, or the runtime, may be kept from the processor. `guard`: the time of the guard
+  /// against endless loops; 0: for ever.
+  [[nodiscard]] static constexpr Duration limit_for(Duration guard) noexcept {
+    constexpr int kPart = 2;
+    return guard == Duration::zero() ? guard : std::max(guard / kPart, kLeast);
+  }
+  /// `guard`: as above. Control thread.
   void begin(Duration guard) noexcept;
   /// 0: nothing is looked for. Any thread.
   [[nodiscard]] Duration limit() const noexcept { return Duration(limit_.load(std::memory_order_relaxed)); }

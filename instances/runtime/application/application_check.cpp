@@ -1,23 +1,28 @@
 #include "instances/runtime/application/application_check.hpp"
 
+#include <cerrno>
 #include <cstdio>
-#include <deque>
 #include <memory>
 #include <optional>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
+#include <linux/rtc.h>
 
 #include "instances/launch/launch_contract.hpp"
 #include "instances/runtime/application/application.hpp"
 #include "instances/runtime/application/components.hpp"
 #include "instances/runtime/application/declare_application.hpp"
-#include "instances/runtime/device/device_description.hpp"
+#include "instances/runtime/application/trial_process.hpp"
+#include "instances/runtime/process_setup.hpp"
+#include "instances/runtime/set_up_watch.hpp"
 #include "instances/runtime/settings/settings.hpp"
+#include "instances/runtime/tasks/pool_room.hpp"
 #include "schedulers/task_set.hpp"
 #include "schedulers/tick/device_file.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/thread.hpp"
 #include "shm/pool/instance_page.hpp"
 
 namespace plchost {
@@ -38,59 +43,108 @@ std::string detail_of(const TaskConfig& task) {
   return {};
 }
 
-// No clock device is taken from an instance that has it.
-class NoDevices : public DeviceFiles {
+/// A clock with periodic interrupts that another process has: of its answers only the kind is known.
+class ClockOfAnother : public DeviceFile {
+ public:
+  explicit ClockOfAnother(bool is_rtc) noexcept : is_rtc_(is_rtc) {}
+  [[nodiscard]] int control(unsigned long request, unsigned long) noexcept override {
+    return request == RTC_IRQP_READ && !is_rtc_ ? ENOTTY : 0;
+  }
+  [[nodiscard]] Wait wait(TimePoint) noexcept override { return Wait::interrupted; }
+  [[nodiscard]] std::optional<unsigned long> read() noexcept override { return std::nullopt; }
+  void interrupt() noexcept override {}
+
+ private:
+  bool is_rtc_;
+};
+
+// A clock device can be opened once only, so none is taken from an instance that has it. The instance to be
+// tried may be that one, and then gets it.
+class TrialDevices : public DeviceFiles {
  public:
   [[nodiscard]] Result<std::unique_ptr<DeviceFile>> open(const std::string& path) override {
-    return failure(ErrorCode::unavailable, path + " is not tried");
+    auto device = linux_device_files().open(path);
+    if (!device && device.error().system_errno == EBUSY) {
+      return std::make_unique<ClockOfAnother>(path.find("hpet") == std::string::npos);
+    }
+    return device;
   }
 };
 
+// The kernel's answer, without staying there: the trial takes no time from the core of the instance.
+Result<void> try_cores(const std::vector<int>& cores) {
+  const auto before = allowed_cores(0);
+  if (!before) return std::unexpected(before.error());
+  const auto granted = bind_to_cores(cores);
+  const auto back = bind_to_cores(*before);
+  if (!granted) return std::unexpected(granted.error());
+  return back ? Result<void>() : std::unexpected(back.error());
+}
+
+// Nothing: there is no pool before the first start, and none for who may not look into it.
+std::optional<PoolRoom> room_in_pool(const LaunchOptions& launch, const std::optional<ObjectPool>& pool) {
+  if (!pool) return std::nullopt;
+  const auto page = InstancePageReader::open(launch.pool, launch.name);
+  const auto runtime = page ? page->runtime() : std::nullopt;
+  auto room = PoolRoom::of(*pool, launch.name, runtime ? runtime->pid : 0);
+  return room ? std::optional(*std::move(room)) : std::nullopt;
+}
+
 // The tasks with their threads, which stay parked, under the scheduler that they are to have.
 Result<void> try_tasks(const Options& options, const InstanceSettings& settings,
-                       const Application& application) {
+                       const Application& application, ApplicationHost& host) {
   LinuxClock clock;
-  NoDevices no_devices;
-  std::deque<CountedEvent> events;
+  TrialDevices devices;
   std::vector<TaskStatistics> statistics(application.tasks().size());
   TaskEnvironment environment{
-      .find_event = [&](std::string_view) -> Result<CountedEvent*> { return &events.emplace_back(); },
+      .find_event = [&](std::string_view event) { return host.events().bind_task(event); },
       .statistics = [&](std::size_t index) -> TaskStatistics& { return statistics[index]; },
       .fault_record = {},
       .state_changed = {},
       .to_park = {},
       .catch_faults = false,
       .allow_unprivileged = true,
-      .devices = &no_devices,
+      .devices = &devices,
   };
   auto tasks = TaskSet::create(clock, options.band, application.tasks(), std::move(environment));
   if (!tasks) return std::unexpected(std::move(tasks).error());
-  SchedulerSettings scheduler = settings.scheduler;
-  scheduler.tick_source = TickSourceKind::system;
-  return (*tasks)->check(scheduler_for(options.launch.scheduler, settings), scheduler);
+  return (*tasks)->check(scheduler_for(options.launch.scheduler, settings), settings.scheduler);
+}
+
+// The part that runs code of components and of the application.
+Result<Application> declare_watched(const std::string& path, const StartSettings& start,
+                                    Components& components, ApplicationHost& host) {
+  SetUpWatch watch(start.settings.scheduler.watchdog.default_time, [&](const Error& error) {
+    fmt::print(stderr, "{}: {}\n", path, error.describe());
+    end_trial(kExitSetupFailed);
+  });
+  if (auto loaded = load_components(start.settings, ComponentHooks::check, components, host); !loaded)
+    return std::unexpected(std::move(loaded).error());
+  auto application = declare_application(path, start, host);
+  if (auto ended = watch.end(); !ended && application) return std::unexpected(std::move(ended).error());
+  return application;
 }
 
 // All that a start does, by the same functions in the same order, as far as it takes nothing from the
-// instance that runs: hooks of components are not called, and memories, files and devices are only looked at.
+// instance that runs. What that instance has can be had only when it has ended: its name, its control socket
+// and its status page, its address among the nodes, what the CH_INIT.. hooks of its components take, and its
+// memories and outputs, which are only looked at.
 Result<Application> try_start(const Options& options, Components& components, ApplicationHost& host) {
   const LaunchOptions& launch = options.launch;
-  auto settings = launch.settings.empty() ? Result<InstanceSettings>() : read_settings(launch.settings);
-  if (!settings) return std::unexpected(std::move(settings).error());
-  std::optional<DeviceDescription> device;
-  if (!settings->device_description.empty()) {
-    auto read = read_device_description(settings->device_description);
-    if (!read) return std::unexpected(std::move(read).error());
-    device = *std::move(read);
-  }
-  if (auto loaded = components.load(settings->components); !loaded) return std::unexpected(loaded.error());
-  auto application = declare_application(options.check_application, *settings, device, host);
+  if (auto granted = try_cores(launch.cores); !granted) return std::unexpected(std::move(granted).error());
+  auto start = read_start_settings(launch.settings);
+  if (!start) return std::unexpected(std::move(start).error());
+  auto attached = ObjectPool::attach(launch.pool, ObjectPool::Access::read_only);
+  std::optional<ObjectPool> pool;
+  if (attached) pool.emplace(*std::move(attached));
+  if (auto room = room_in_pool(launch, pool)) host.events().look_for_room(*std::move(room));
+  if (auto ready = prepare_host(*start, host); !ready) return std::unexpected(std::move(ready).error());
+  auto application = declare_watched(options.check_application, *start, components, host);
   if (!application) return application;
-  // There is none before the first start, and none for who may not look into it.
-  auto pool = ObjectPool::attach(launch.pool, ObjectPool::Access::read_only);
-  const auto environment = areas_environment(launch, *settings, *application, pool ? &*pool : nullptr);
+  const auto environment = areas_environment(launch, start->settings, *application, pool ? &*pool : nullptr);
   if (auto good = host.areas().check(environment, application->tasks()); !good)
     return std::unexpected(std::move(good).error());
-  if (auto good = try_tasks(options, *settings, *application); !good)
+  if (auto good = try_tasks(options, start->settings, *application, host); !good)
     return std::unexpected(std::move(good).error());
   return application;
 }
@@ -100,7 +154,7 @@ Result<Application> try_start(const Options& options, Components& components, Ap
 int check_application(const Options& options) {
   const std::string& path = options.check_application;
   Components components;
-  ApplicationHost host("check", nullptr);
+  ApplicationHost host(options.launch.name, nullptr);
   host.set_start_kind(static_cast<int>(options.launch.start_kind));
   const auto application = try_start(options, components, host);
   if (!application) {

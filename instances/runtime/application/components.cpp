@@ -19,7 +19,6 @@ namespace {
 using Hook = RTS_RESULT (*)(unsigned, unsigned long, unsigned long);
 
 constexpr std::array<std::string_view, 1> kHookExport = {"HookFunction"};
-constexpr std::array kInitHooks = {CH_INIT, CH_INIT2, CH_INIT3};
 
 RTS_RESULT call(const SharedObject& object, unsigned hook) {
   try {
@@ -34,13 +33,11 @@ RTS_RESULT call(const SharedObject& object, unsigned hook) {
 
 }  // namespace
 
-Result<void> Components::call_all(unsigned hook) {
-  reached_ = hook;
+Result<void> Components::call_all(const InitHook& hook) const {
   for (const SharedObject& object : objects_) {
-    if (const RTS_RESULT result = call(object, hook); result != ERR_OK) {
-      return failure(ErrorCode::refused,
-                     fmt::format("component {}: its hook CH_INIT{} returned {:#06x}", object.path(),
-                                 hook == CH_INIT ? "" : std::to_string(hook), result));
+    if (const RTS_RESULT result = call(object, hook.number); result != ERR_OK) {
+      return failure(ErrorCode::refused, fmt::format("component {}: its hook {} returned {:#06x}",
+                                                     object.path(), hook.name, result));
     }
   }
   return {};
@@ -63,14 +60,21 @@ void* Components::find(const char* symbol) const noexcept {
 }
 
 Result<void> Components::init() {
+  constexpr std::array kHooks = {InitHook{CH_INIT, "CH_INIT"}, InitHook{CH_INIT2, "CH_INIT2"},
+                                 InitHook{CH_INIT3, "CH_INIT3"}};
   if (objects_.empty()) return {};
-  for (const unsigned hook : kInitHooks) {
+  for (const InitHook& hook : kHooks) {
+    reached_ = hook.number;
     if (auto called = call_all(hook); !called) {
       exit();
       return called;
     }
   }
   return {};
+}
+
+Result<void> Components::check() {
+  return call_all({CH_TRIAL, "CH_TRIAL"});
 }
 
 void Components::exit() {

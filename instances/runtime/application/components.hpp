@@ -23,11 +23,18 @@ class Components {
   /// Control thread.
   [[nodiscard]] Result<void> init();
 
+  /// Calls CH_TRIAL alone. Control thread.
+  [[nodiscard]] Result<void> check();
+
   /// Calls CH_EXIT3, CH_EXIT2, CH_EXIT in reverse order, as far as the hooks of init() came. Once.
   void exit();
 
  private:
-  [[nodiscard]] Result<void> call_all(unsigned hook);
+  struct InitHook {
+    unsigned number;
+    const char* name;
+  };
+  [[nodiscard]] Result<void> call_all(const InitHook& hook) const;
 
   std::vector<SharedObject> objects_;
   unsigned reached_ = 0;  // the last CH_INIT.. hook that was called

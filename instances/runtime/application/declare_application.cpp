@@ -3,19 +3,51 @@
 #include <utility>
 
 #include "instances/runtime/device/device_events.hpp"
+#include "instances/runtime/time/system_time.hpp"
 
 namespace plchost {
 
-Result<Application> declare_application(const std::string& path, const InstanceSettings& settings,
-                                        const std::optional<DeviceDescription>& device,
+Result<StartSettings> read_start_settings(const std::string& file) {
+  StartSettings start;
+  if (file.empty()) return start;
+  auto settings = read_settings(file);
+  if (!settings) return std::unexpected(std::move(settings).error());
+  start.settings = *std::move(settings);
+  if (!start.settings.device_description.empty()) {
+    auto device = read_device_description(start.settings.device_description);
+    if (!device) return std::unexpected(std::move(device).error());
+    start.device = *std::move(device);
+  }
+  return start;
+}
+
+Result<void> prepare_host(const StartSettings& start, ApplicationHost& host) {
+  if (start.device) {
+    if (auto done = register_device_events(*start.device, host.events()); !done) return done;
+  }
+  return host.blocks().configure(start.settings.blocks);
+}
+
+Result<void> load_components(const InstanceSettings& settings, ComponentHooks hooks, Components& components,
+                             ApplicationHost& host) {
+  auto loaded = components.load(settings.components);
+  if (loaded) {  // a component may hold the clock, and the hooks of all see it
+    loaded = use_system_time(settings.sys_time, [&](const char* symbol) { return components.find(symbol); });
+  }
+  if (loaded) loaded = hooks == ComponentHooks::init ? components.init() : components.check();
+  host.write_messages();
+  return loaded;
+}
+
+Result<Application> declare_application(const std::string& path, const StartSettings& start,
                                         ApplicationHost& host) {
   auto application = Application::load(path, host);
   if (!application) return application;
-  if (device) {
-    if (auto known = check_device_events(*device, application->tasks()); !known)
+  if (start.device) {
+    if (auto known = check_device_events(*start.device, application->tasks()); !known)
       return std::unexpected(std::move(known).error());
   }
-  if (auto applied = application->apply(settings.tasks); !applied)
+  if (auto applied = application->apply(start.settings.tasks); !applied)
     return std::unexpected(std::move(applied).error());
   return application;
 }

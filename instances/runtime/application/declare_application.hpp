@@ -6,19 +6,39 @@
 #include "instances/launch/launch_contract.hpp"
 #include "instances/runtime/application/application.hpp"
 #include "instances/runtime/application/application_host.hpp"
+#include "instances/runtime/application/components.hpp"
 #include "instances/runtime/device/device_description.hpp"
 #include "instances/runtime/settings/settings.hpp"
 
 namespace plchost {
 
-// The common part of a start and its trial: what an application declares, and the settings it is to run
-// under.
+// The steps that a start and its trial have in common: the settings, what stands ready before the application
+// is loaded, and what the application declares.
+
+/// What an instance is to run under.
+struct StartSettings {
+  InstanceSettings settings;
+  std::optional<DeviceDescription> device;  ///< nothing: any external event is allowed
+};
+
+/// `file` may be empty. The error names file, line and key. Set-up.
+[[nodiscard]] Result<StartSettings> read_start_settings(const std::string& file);
+
+/// Registers the events of the device description, and takes the instance's place among the nodes. A host
+/// without a pool does both as far as nothing of the pool is needed. Set-up.
+[[nodiscard]] Result<void> prepare_host(const StartSettings& start, ApplicationHost& host);
+
+/// Whether the hooks of the components take what they need, or only say whether they could.
+enum class ComponentHooks : bool { check, init };
+
+/// Loads the components, has [SysTime] checked and used, and calls the hooks. What they log is written.
+/// Set-up.
+[[nodiscard]] Result<void> load_components(const InstanceSettings& settings, ComponentHooks hooks,
+                                           Components& components, ApplicationHost& host);
 
 /// Loads it, has it declare itself to `host`, and applies the settings of its tasks. The error is the first
 /// thing that is wrong. Set-up.
-[[nodiscard]] Result<Application> declare_application(const std::string& path,
-                                                      const InstanceSettings& settings,
-                                                      const std::optional<DeviceDescription>& device,
+[[nodiscard]] Result<Application> declare_application(const std::string& path, const StartSettings& start,
                                                       ApplicationHost& host);
 
 /// For Areas::check() and Areas::place(). `application` and `settings` outlive it; `pool` may be null.

@@ -41,6 +41,7 @@ struct TrialCrash {
 };
 
 std::atomic<int> crash_pipe = -1;  // the handler has no argument of ours
+std::atomic<int> verdict_pipe = -1;
 
 // Signal context: the thread stays where it is, the describing thread ends the process.
 void on_trial_crash(int signal, siginfo_t*, void* context) noexcept {
@@ -95,10 +96,8 @@ void catch_crashes(const std::string& application, int verdict) {
   std::optional<AlternateStack::Use> use;
   if (stack) use.emplace(*stack);
   catch_crashes(application, verdict.get());
-  const int code = check();
-  (void)std::fflush(nullptr);
-  (void)!::write(verdict.get(), &code, sizeof code);
-  ::_exit(code);  // without the destructors of the application
+  verdict_pipe = verdict.get();
+  end_trial(check());
 }
 
 struct Trial {
@@ -175,6 +174,12 @@ int judge(const std::string& application, const Trial& trial, int signals) {
 }
 
 }  // namespace
+
+void end_trial(int code) noexcept {
+  (void)std::fflush(nullptr);
+  (void)!::write(verdict_pipe, &code, sizeof code);
+  ::_exit(code);  // without the destructors of the application
+}
 
 int run_trial(const std::string& application, int signals, const std::function<int()>& check) {
   std::array<int, 2> ends{};

@@ -12,4 +12,8 @@ namespace plchost {
 /// To be called while the process has one thread.
 [[nodiscard]] int run_trial(const std::string& application, int signals, const std::function<int()>& check);
 
+/// Within `check`, from any thread: its verdict is `code`, though it cannot return. What it has to say was
+/// said.
+[[noreturn]] void end_trial(int code) noexcept;
+
 }  // namespace plchost

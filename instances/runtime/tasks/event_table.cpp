@@ -31,7 +31,7 @@ EventTable::Slot* EventTable::find(RTS_HANDLE handle) const noexcept {
 }
 
 Result<void> EventTable::attach(Slot& slot) {
-  if (pool_ == nullptr) return {};
+  if (pool_ == nullptr) return room_ ? room_->take(slot.object) : Result<void>();
   const auto event = pool_->create_event(slot.object);
   if (!event) return std::unexpected(event.error());
   slot.events.push_back(std::make_unique<PoolEvent>(*event));
@@ -182,7 +182,7 @@ Result<CountedEvent*> EventTable::bind_task(std::string_view event) {
   if ((*slot)->bound == nullptr) (*slot)->bound = (*slot)->event.load(std::memory_order_relaxed);
   ++(*slot)->tasks;
   show_use(**slot);
-  return &(*slot)->bound->counted();
+  return (*slot)->bound == nullptr ? &(*slot)->own_counter : &(*slot)->bound->counted();
 }
 
 void EventTable::forget_tasks() {
@@ -196,7 +196,7 @@ void EventTable::forget_tasks() {
 Result<void> EventTable::check_bound() const {
   for (std::size_t i = 0; i < count_.load(std::memory_order_relaxed); ++i) {
     const Slot& slot = *slots_[i];
-    if (slot.tasks == 0 || slot.bound->valid()) continue;
+    if (slot.tasks == 0 || slot.bound == nullptr || slot.bound->valid()) continue;
     return failure(
         ErrorCode::wrong_state,
         fmt::format("external event '{}' lost its place in the object pool, which was full or damaged, "
@@ -209,7 +209,7 @@ Result<void> EventTable::check_bound() const {
 Result<void> EventTable::publish_bound(bool running) {
   for (std::size_t i = 0; i < count_.load(std::memory_order_relaxed); ++i) {
     Slot& slot = *slots_[i];
-    if (slot.tasks == 0) continue;
+    if (slot.tasks == 0 || slot.bound == nullptr) continue;
     slot.taking = running ? slot.tasks : 0;
     if (!slot.bound->set_bound_tasks(slot.taking) && running) return check_bound();
   }

@@ -5,11 +5,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "instances/plc_app.h"
+#include "instances/runtime/tasks/pool_room.hpp"
 #include "shm/base/result.hpp"
 #include "shm/pool/object_pool.hpp"
 
@@ -24,6 +26,9 @@ class EventTable {
 
   /// Without a pool (null) it only collects names: for checking an application that shall touch nothing.
   EventTable(std::string instance, ObjectPool* pool) : instance_(std::move(instance)), pool_(pool) {}
+
+  /// Without a pool: from now on each event is refused that would find no place in `room`. For a trial.
+  void look_for_room(PoolRoom room) { room_ = std::move(room); }
 
   /// Takes back what a dead process of this instance's name has left: its registrations and bound tasks.
   void clear_own();
@@ -71,6 +76,7 @@ class EventTable {
     bool by_application = false;
     bool by_operator = false;
     bool by_device = false;
+    CountedEvent own_counter;                        // without a pool
     std::uint32_t tasks = 0;                         // bound to it
     std::uint32_t taking = 0;                        // of these, as posters are told: will run what is posted
     const PoolEvent* bound = nullptr;                // what they wait on, for the life of the process
@@ -89,6 +95,7 @@ class EventTable {
 
   std::string instance_;
   ObjectPool* pool_;
+  std::optional<PoolRoom> room_;
   std::array<std::unique_ptr<Slot>, kMaxEvents> slots_;
   std::atomic<std::size_t> count_{0};  // written by the control thread; slots below it are complete
 };

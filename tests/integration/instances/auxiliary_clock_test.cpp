@@ -109,11 +109,24 @@ TEST_F(AuxiliaryClock, DeviceThatIsMissingOrUnfitIsAnErrorInTheLogAndInTheStatus
   EXPECT_NEAR(cycles_per_second(sut), 500, 25);
 }
 
-TEST_F(AuxiliaryClock, OneShotOnItIsRefusedAtTheStartWithTheReason) {
-  InstanceProcess sut(sandbox, arguments("976.5625", "Linux.TimerMode=OneShot\n"), environment("rtc"));
-  EXPECT_EQ(sut.end(), 3);
-  EXPECT_THAT(sut.log(), HasSubstr("start scheduler failed: "));
-  EXPECT_THAT(sut.log(), HasSubstr("only has frequencies that are powers of two"));
+TEST_F(AuxiliaryClock, OneShotOnItIsRefusedAtTheStartAndInATrialWithTheReason) {
+  auto all = arguments("976.5625", "Linux.TimerMode=OneShot\n");
+  {
+    InstanceProcess sut(sandbox, all, environment("rtc"));
+    EXPECT_EQ(sut.end(), 3);
+    EXPECT_THAT(sut.log(), HasSubstr("start scheduler failed: "));
+    EXPECT_THAT(sut.log(), HasSubstr("only has frequencies that are powers of two"));
+  }
+  all[2] = "--check-application";
+  InstanceProcess trial(sandbox, all, environment("rtc"));
+  EXPECT_EQ(trial.end(), 3);
+  EXPECT_THAT(trial.log(), HasSubstr("only has frequencies that are powers of two"));
+  // As long as another process has it, nobody else can open it.
+  auto more = environment("rtc");
+  more.emplace_back("CLOCK_DEVICE_BUSY=1");
+  InstanceProcess beside(sandbox, all, more);
+  EXPECT_EQ(beside.end(), 3);
+  EXPECT_THAT(beside.log(), HasSubstr("only has frequencies that are powers of two"));
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 #include <csignal>
 #include <filesystem>
 #include <fstream>
+#include <stop_token>
 #include <string>
 #include <thread>
 
@@ -13,6 +14,7 @@
 #include "shm/pool/object_pool.hpp"
 #include "tests/integration/manager/plant.hpp"
 #include "tests/support/sanitized.hpp"
+#include "tests/support/stranger.hpp"
 
 namespace plchost {
 namespace {
@@ -163,6 +165,78 @@ TEST(Manager, RestartsAnInstanceSoonWhoseApplicationTakesTheProcessor) {
   EXPECT_NE(plant.status("line1").pid, pid);
   ASSERT_TRUE(plant.wait_for("line1", InstanceState::running));
   EXPECT_TRUE(plant.wait_for_cycles("line1", 50)) << "it runs as it would have";
+}
+
+// Its set-up does not return, and nothing of the runtime gets its core.
+TEST(Manager, NamesTheThreadThatTakesTheProcessorInTheSetUpAndFreesTheCore) {
+  if (!Thread::start("probe", {.fifo = 1}, [] {})) GTEST_SKIP() << "no right to SCHED_FIFO";
+  Plant plant;
+  plant.add("line1", "manager_setup_hog");
+  plant.add("line2", "manager_setup_taker");
+  plant.add("line3", "bottling_line", "scheduler = \"CmpScheduleTimer\"");
+  plant.add("line4", "fault_loops");
+  plant.start_manager();
+  const auto problem = [&](const char* name) { return std::string(plant.status(name).problem.view()); };
+  ASSERT_TRUE(plant.wait_for("line1", InstanceState::failed));
+  EXPECT_THAT(problem("line1"), HasSubstr("load application: in the set-up, thread 'hog' (SCHED_FIFO 60) "
+                                          "took the processor for "));
+  ASSERT_TRUE(plant.wait_for("line2", InstanceState::failed));
+  EXPECT_THAT(problem("line2"), HasSubstr("in the set-up, thread 'plc-instance' (SCHED_FIFO 60) took the "));
+  ASSERT_TRUE(plant.wait_for("line3", InstanceState::running));
+  EXPECT_EQ(plant.status("line3").restarts, 0U);
+  EXPECT_TRUE(plant.wait_for_cycles("line3"));
+  EXPECT_EQ(plant.status("line1").pid, 0);
+  EXPECT_EQ(plant.status("line1").restarts, 0U) << "it would do the same again";
+  ASSERT_TRUE(plant.wait_for("line4", InstanceState::failed));
+  EXPECT_THAT(problem("line4"), HasSubstr("load application: the set-up has not returned for 25 s"));
+}
+
+// So that its control thread always has something to do: what sleeps now and then gets the little time that
+// the kernel leaves to threads without real-time priority.
+class BusyAsker {
+ public:
+  explicit BusyAsker(const Plant& plant)
+      : thread_([path = instance_socket_path(plant.run_directory(), "line1")](const std::stop_token& stop) {
+          ControlRequest request;
+          request.verb = ControlVerb::status;
+          request.instance = "line1";
+          const std::string question = encode(request);
+          auto socket = PacketSocket::connect(path);
+          while (socket && !stop.stop_requested()) {
+            if (!socket->send(question)) std::this_thread::sleep_for(std::chrono::milliseconds(1));  // full
+            for (auto answer = socket->receive(); answer && *answer;) answer = socket->receive();
+          }
+        }) {}
+
+ private:
+  std::jthread thread_;
+};
+
+// A program at the lowest real-time priority keeps the control thread from its core, and no task.
+TEST(Manager, NamesTheProgramThatKeepsAnInstanceFromAnsweringAndLetsItRun) {
+  if (!Thread::start("probe", {.fifo = 1}, [] {})) GTEST_SKIP() << "no right to SCHED_FIFO";
+  Plant plant;
+  plant.add("line1", "bottling_line");
+  plant.start_manager();
+  ASSERT_TRUE(plant.wait_for("line1", InstanceState::running));
+  const InstanceStatus before = plant.status("line1");
+  const auto problem = [&] { return std::string(plant.status("line1").problem.view()); };
+  Stranger::make_modest(before.pid, true);
+  {
+    const BusyAsker asker(plant);
+    const Stranger stranger(before.core, 1);
+    const std::string words = fmt::format("program 'stranger' (process {}, SCHED_FIFO 1)", stranger.pid());
+    EXPECT_TRUE(Plant::eventually([&] { return problem().find(words) != std::string::npos; })) << problem();
+    std::this_thread::sleep_for(HeartbeatWatch::kLimit + std::chrono::seconds(1));
+    EXPECT_EQ(plant.status("line1").state, InstanceState::running) << problem();
+    EXPECT_TRUE(plant.wait_for_cycles("line1")) << "its tasks are above that program";
+  }
+  Stranger::make_modest(before.pid, false);
+  EXPECT_TRUE(Plant::eventually([&] { return problem().empty(); })) << problem();
+  EXPECT_EQ(plant.status("line1").pid, before.pid);
+  EXPECT_EQ(plant.status("line1").restarts, 0U);
+  EXPECT_EQ(plant.status("line1").state_since_unix_ns, before.state_since_unix_ns);
+  EXPECT_EQ(plant.ask(ControlVerb::stop, "line1").code, ErrorCode::ok);
 }
 
 // Another program with the right to write the pool, and a process that stands still afterwards.

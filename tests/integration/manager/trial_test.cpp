@@ -6,6 +6,7 @@
 
 #include <gmock/gmock.h>
 
+#include "shm/base/thread.hpp"
 #include "shm/pool/object_pool.hpp"
 #include "tests/integration/manager/plant.hpp"
 
@@ -77,6 +78,59 @@ TEST_F(Trial, FindsKeptValuesOfAnotherLayoutThatTheSettingsRefuse) {
   EXPECT_TRUE(std::filesystem::exists(plant_.state_directory()));
   plant_.write_file("line1.cfg", "[Retain]\nMismatch=Ignore\n");
   const auto reply = plant_.ask(ControlVerb::load_application, "line1", Plant::application("areas_other"));
+  EXPECT_EQ(reply.code, ErrorCode::ok) << reply.text;
+}
+
+TEST_F(Trial, FindsAComponentThatSaysItCannotBeInitialised) {
+  start("bottling_line");
+  plant_.write_file("line1.cfg", "[ComponentManager]\nComponent.1=" +
+                                     Plant::application("manager_unready_component") + "\n");
+  EXPECT_THAT(refusal("packer"),
+              AllOf(HasSubstr("manager_unready_component.so"), HasSubstr("its hook CH_TRIAL returned 0x")));
+}
+
+TEST_F(Trial, FindsAFunctionThatIsNoClock) {
+  start("bottling_line");
+  plant_.write_file(
+      "line1.cfg",
+      "[SysTime]\nLinux.CustomSysTimeGetUs=MySysTimeGetUs\nLinux.CustomSysTimeGetNs=OtherBaseNs\n"
+      "Linux.CustomSysTimeLibrary=" +
+          Plant::application("clocks") + "\n");
+  EXPECT_THAT(refusal("packer"), HasSubstr("have no common base"));
+}
+
+TEST_F(Trial, FindsATaskThatItsSettingsDoNotFit) {
+  start("bottling_line");
+  plant_.write_file("line1.cfg", "[Task.Position]\nStartOffsetNs=4000000000\n");
+  EXPECT_THAT(refusal("drive_axis"), AllOf(HasSubstr("task 'Position'"), HasSubstr("its start offset of")));
+}
+
+TEST_F(Trial, FindsAThreadThatTakesTheProcessorInTheSetUp) {
+  if (!Thread::start("probe", {.fifo = 1}, [] {})) GTEST_SKIP() << "no right to SCHED_FIFO";
+  start("bottling_line");
+  EXPECT_THAT(refusal("manager_setup_hog"),
+              HasSubstr("in the set-up, thread 'hog' (SCHED_FIFO 60) took the "));
+}
+
+TEST_F(Trial, FindsThatThePoolHasNoRoomForAnEvent) {
+  plant_.set_host_keys("pool_objects = 64");
+  start("manager_chatter");
+  auto pool = ObjectPool::attach(plant_.pool());
+  ASSERT_TRUE(pool);
+  int made = 0;
+  const auto name_of = [](int number) { return "others/" + std::to_string(number); };
+  while (pool->create_semaphore(name_of(made), 1, {.keep = true})) ++made;
+  ASSERT_GT(made, 0);
+  EXPECT_THAT(refusal("packer"), AllOf(HasSubstr("has no room for event 'line1/product'"), HasSubstr("64")));
+  EXPECT_EQ(plant_.ask(ControlVerb::load_application, "line1", Plant::application("manager_chatter")).code,
+            ErrorCode::ok)
+      << "it needs no more than the one that runs";
+  pid_ = plant_.status("line1").pid;
+  for (const int number : {0, 1}) ASSERT_TRUE(pool->remove_object(name_of(number)));
+  ASSERT_TRUE(pool->create_semaphore("line1/product", 1, {.keep = true}));
+  EXPECT_THAT(refusal("packer"), HasSubstr("'line1/product' in pool"));
+  ASSERT_TRUE(pool->remove_object("line1/product"));
+  const auto reply = plant_.ask(ControlVerb::load_application, "line1", Plant::application("packer"));
   EXPECT_EQ(reply.code, ErrorCode::ok) << reply.text;
 }
 

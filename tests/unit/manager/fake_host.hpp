@@ -33,6 +33,8 @@ class FakeHost : public InstanceHost {
     return {};
   }
   [[nodiscard]] std::optional<InstanceRuntime> runtime() override { return page; }
+  [[nodiscard]] ProcessorUse processor_use() override { return use; }
+  [[nodiscard]] std::string processor_taker() override { return taker; }
   [[nodiscard]] std::vector<int> granted_cores() override { return cores; }
   [[nodiscard]] std::string keep_lost_faults() override { return lost_fault; }
   void read_output() override {}
@@ -44,6 +46,8 @@ class FakeHost : public InstanceHost {
   std::optional<TimePoint> timer;
   std::optional<InstanceRuntime> page;
   std::optional<int> adoptable;
+  ProcessorUse use;
+  std::string taker = "program 'hog' (process 7, SCHED_FIFO 50)";
   std::vector<int> cores = {1};
   bool can_spawn = true;
   int spawn_errno = 0;

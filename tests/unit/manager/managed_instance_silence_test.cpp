@@ -31,6 +31,63 @@ TEST(HeartbeatWatch, DoesNotCountWhatTheManagerSlept) {
   EXPECT_FALSE(sut.silent());
 }
 
+TEST(HeartbeatWatch, DoesNotCountWhatOtherProgramsTook) {
+  HeartbeatWatch sut;
+  TimePoint now{seconds(100)};
+  for (int i = 0; i < 1000; ++i) sut.look(now += milliseconds(50), 7, true);
+  EXPECT_FALSE(sut.silent());
+  while (!sut.silent()) sut.look(now += milliseconds(50), 7);
+  EXPECT_EQ(now, TimePoint{seconds(100)} + milliseconds(50) * 1000 + HeartbeatWatch::kLimit);
+}
+
+class AStarvation : public testing::Test {
+ protected:
+  void look_for(Duration duration, Duration process_takes = {}, Duration thread_takes = {}) {
+    for (Duration passed{}; passed < duration; passed += milliseconds(50)) {
+      use.used += process_takes;
+      for (auto& thread : use.ready) thread.used += thread_takes;
+      (void)sut.look(now += milliseconds(50), use);
+    }
+  }
+  StarvationWatch sut;
+  TimePoint now{seconds(100)};
+  ProcessorUse use;
+};
+
+TEST_F(AStarvation, IsOfAThreadThatIsReadyAndGetsNothing) {
+  use.ready = {{.id = 5, .used = {}}};
+  look_for(seconds(3));
+  EXPECT_EQ(sut.lasted(), seconds(3) - milliseconds(50))
+      << "nothing is known of the time before the first look";
+  use.ready.clear();
+  look_for(seconds(3));
+  EXPECT_EQ(sut.lasted(), seconds(3) - milliseconds(50));
+  sut.forget();
+  EXPECT_EQ(sut.lasted(), Duration::zero());
+}
+
+TEST_F(AStarvation, IsNoneOfAThreadThatRuns) {
+  use.ready = {{.id = 5, .used = {}}};
+  look_for(seconds(3), milliseconds(20), milliseconds(20));
+  EXPECT_EQ(sut.lasted(), Duration::zero());
+}
+
+TEST_F(AStarvation, IsNoneByTheProcessItself) {
+  use.ready = {{.id = 5, .used = {}}};
+  look_for(seconds(3), milliseconds(45));
+  EXPECT_EQ(sut.lasted(), Duration::zero());
+  look_for(seconds(3), milliseconds(30));
+  EXPECT_EQ(sut.lasted(), seconds(3)) << "it takes the rest";
+}
+
+TEST_F(AStarvation, IsNoneOfThreadsThatAreReadyInTurn) {
+  for (pid_t i = 0; i < 60; ++i) {
+    use.ready = {{.id = 5 + i % 2, .used = {}}};
+    look_for(milliseconds(50));
+  }
+  EXPECT_EQ(sut.lasted(), Duration::zero());
+}
+
 class SilentProcess : public ManagedInstanceTest {
  protected:
   void beat() {
@@ -94,6 +151,75 @@ TEST_F(SilentProcess, IsInExceptionAndLeftAlone) {
       << "it cannot tell this itself";
   EXPECT_TRUE(host_.signals.empty());
   EXPECT_TRUE(is_only_asked_for_its_status());
+}
+
+TEST_F(SilentProcess, IsWhatItWasWhileOtherProgramsTakeItsCore) {
+  bring_up();
+  beat();
+  host_.use.ready = {{.id = sut().status().pid, .used = {}}};
+  fall_silent();
+  EXPECT_EQ(problem(), "") << "it has not lasted for the limit";
+  go_on_for(seconds(60));
+  EXPECT_EQ(state(), InstanceState::running);
+  EXPECT_THAT(problem(), HasSubstr("for 3 s: program 'hog' (process 7, SCHED_FIFO 50) has it now"));
+  EXPECT_TRUE(host_.signals.empty());
+  EXPECT_TRUE(host_.requests.empty());
+  beat();
+  EXPECT_EQ(problem(), "");
+}
+
+TEST_F(SilentProcess, IsInExceptionIfItDoesNotAnswerWhenItsCoreIsFreeAgain) {
+  bring_up();
+  beat();
+  host_.use.ready = {{.id = sut().status().pid, .used = {}}};
+  go_on_for(seconds(60));
+  host_.use.ready.clear();
+  go_on_for(HeartbeatWatch::kLimit - kStarvationSuspected - milliseconds(100));
+  EXPECT_EQ(state(), InstanceState::running);
+  go_on_for(milliseconds(200));
+  EXPECT_EQ(state(), InstanceState::exception);
+  EXPECT_THAT(problem(), HasSubstr("its control thread has not answered for 3 s"));
+}
+
+TEST_F(SilentProcess, IsInExceptionIfItsOwnTasksTakeItsCore) {
+  bring_up();
+  beat();
+  host_.use.ready = {{.id = sut().status().pid, .used = {}}};
+  for (Duration passed{}; passed <= HeartbeatWatch::kLimit; passed += milliseconds(50)) {
+    host_.use.used += milliseconds(48);
+    go_on_for(Duration::zero());
+  }
+  EXPECT_EQ(state(), InstanceState::exception);
+}
+
+TEST_F(SilentProcess, SaysWhyACommandIsNotAnsweredWhileOtherProgramsTakeItsCore) {
+  bring_up();
+  beat();
+  host_.use.ready = {{.id = sut().status().pid, .used = {}}};
+  ask(ControlVerb::stop);
+  EXPECT_EQ(host_.requests.back().verb, ControlVerb::stop);
+  go_on_for(kStopLimit);
+  expire_timer();
+  const auto reply = take_reply();
+  EXPECT_EQ(reply.code, ErrorCode::timed_out);
+  EXPECT_THAT(reply.text, HasSubstr("program 'hog'"));
+  EXPECT_TRUE(host_.signals.empty());
+}
+
+TEST_F(SilentProcess, HasMoreTimeForItsSetUpWhileOtherProgramsTakeItsCore) {
+  sut().hold("is to be started");
+  sut().release();
+  host_.use.ready = {{.id = sut().status().pid, .used = {}}};
+  go_on_for(kSetupLimit - milliseconds(100));
+  EXPECT_THAT(problem(), HasSubstr("program 'hog'"));
+  expire_timer();
+  EXPECT_TRUE(host_.signals.empty());
+  ASSERT_TRUE(host_.timer);
+  EXPECT_GT(*host_.timer - now_, kSetupLimit - seconds(1));
+  host_.use.ready.clear();
+  go_on_for(kSetupLimit);
+  expire_timer();
+  EXPECT_THAT(host_.signals, ElementsAre(SIGKILL)) << "it had all of its time";
 }
 
 TEST_F(SilentProcess, SaysTheFaultThatTheProcessCouldNotTell) {

@@ -83,7 +83,7 @@ TEST_F(ManagedInstanceTest, KillsAProcessThatIsNotReadyInTime) {
   EXPECT_THAT(host_.signals, testing::ElementsAre(SIGKILL));
   sut().on_exit(killed_by(SIGKILL));
   EXPECT_EQ(state(), InstanceState::failed);
-  EXPECT_EQ(problem(), "killed by SIGKILL: was not ready after 30 s");
+  EXPECT_EQ(problem(), "killed by SIGKILL: was not ready after 30 s: its step 'bind core' has not ended");
 }
 
 TEST_F(ManagedInstanceTest, SaysWhyAProcessCouldNotBeStarted) {

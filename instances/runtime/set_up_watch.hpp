@@ -1,0 +1,44 @@
+#pragma once
+
+#include <condition_variable>
+#include <functional>
+#include <mutex>
+
+#include "shm/base/result.hpp"
+#include "shm/base/thread.hpp"
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+/// Watches over code of components and of the application in the set-up, which runs on the control thread
+/// outside of any cycle. A thread of theirs that takes the processor by a real-time priority loses that, and
+/// the set-up fails. So it does when it does not return.
+class SetUpWatch {
+ public:
+  /// A set-up may take so long: less than the manager gives the whole start, so that its cause is told.
+  static constexpr Duration kLimit = std::chrono::seconds(25);
+  /// Ends the process, because the thread that sets up may never return. Called by a thread of this class.
+  using Fail = std::function<void(const Error& error)>;
+
+  /// The calling thread sets up from now on. `guard`: the time of the guard against endless loops; 0: nothing
+  /// is watched, for work with a debugger.
+  SetUpWatch(Duration guard, Fail fail);
+  SetUpWatch(const SetUpWatch&) = delete;
+  SetUpWatch& operator=(const SetUpWatch&) = delete;
+  ~SetUpWatch() { stop(); }
+
+  /// The set-up has returned. The error that was found, if it has not ended the process.
+  [[nodiscard]] Result<void> end();
+
+ private:
+  void run();
+  void stop();
+
+  Fail fail_;
+  std::mutex mutex_;
+  std::condition_variable stops_;
+  bool stopped_ = false;
+  Thread thread_;
+};
+
+}  // namespace plchost
