@@ -98,7 +98,7 @@ build_sanitized() { # build_sanitized DIR SANITIZERS TARGET OPTIONS...
 build_asan() { build_sanitized .build/asan "address;undefined" all; }
 # Not by the thread sanitizer, which looks into one process: what kills others, and what has one thread and takes long.
 killing='*PoolCrash*:*BlockCrash*:*ClientDeath*:RobustMutexTest.Killed*:*Settings.ReadsAsMany*:*HoldsAHundredThousand*:*EachFlippedBit*'
-killing+=':*ReadsNothingBehindTheEnd*:*StaysWithinItsBounds*:*TheSecurityFolder*:*AnIdentity*'
+killing+=':*WishFolderTest.IsMadeAndHeld*:*ReadsNothingBehindTheEnd*:*StaysWithinItsBounds*:*TheSecurityFolder*:*AnIdentity*'
 build_tsan() { build_sanitized .build/tsan thread plchost_tests -DPLCHOST_INTEGRATION=OFF; }
 gates() { tests/gates/layers.sh && tests/gates/house.sh && tests/gates/format.sh && tests/gates/contract.sh && tests/gates/pictures.py && tests/gates/documents.py && tests/gates/prove.sh; }
 

@@ -203,6 +203,7 @@ TEST_P(Stop, GoesOnWithoutAnEventVariableThatDoesNotReturn) {
   ASSERT_TRUE(tasks_.set->begin_stop({.outputs = milliseconds(20), .others = milliseconds(50)}));
   EXPECT_THAT(finish_stop(), ElementsAre(2));
   EXPECT_EQ(tasks_.set->late_variable(), 2U);
+  wait_for([&] { return tasks_.set->still_busy(TimePoint{}).size() == 1; });
   EXPECT_THAT(tasks_.set->still_busy(TimePoint{}), ElementsAre("Edge"));
   const auto again = tasks_.set->start(GetParam(), {});
   ASSERT_FALSE(again);
