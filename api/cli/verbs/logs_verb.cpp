@@ -69,7 +69,7 @@ Result<Since> parse_since(const std::string& text) {
                              shown(text)));
 }
 
-/// What is shown of the log of one instance.
+/// The part of the log of one instance that is shown.
 class LogFollower {
  public:
   LogFollower(CliSession& session, std::string host, const LogArguments& arguments, Since since)

@@ -23,12 +23,6 @@ class SecuredStallAtAKill : public SecuredHost {
  protected:
   SecuredStallAtAKill() : other_(host_.add_event("line1", "other")) { start(); }
 
-  [[nodiscard]] std::unique_ptr<ControlClient> make_client() const {
-    dds::DomainOptions options;
-    options.domain = domain_.number();
-    options.identity = folder("operator");
-    return ControlClient::connect(options).value();
-  }
   Duration time_of_fresh_client() {
     const TimePoint begin = MonotonicClock::now();
     EXPECT_TRUE(make_client()->post_event({"cell", 0, "line1", "other"}, 1, {}, kPatience));

@@ -13,12 +13,6 @@ namespace {
 
 class SecuredMemory : public SecuredHost {
  protected:
-  [[nodiscard]] std::unique_ptr<ControlClient> make_client() const {
-    dds::DomainOptions options;
-    options.domain = domain_.number();
-    options.identity = folder("operator");
-    return ControlClient::connect(options).value();
-  }
   static bool ask_and_post(ControlClient& client) {
     constexpr Duration kLong = std::chrono::seconds(10);
     return client.call({"cell", plc_OPERATION_STOP, "line1", ""}, MonotonicClock::now() + kLong) &&

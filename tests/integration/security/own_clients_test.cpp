@@ -16,12 +16,6 @@ namespace {
 
 class OwnClients : public SecuredHost {
  protected:
-  [[nodiscard]] std::unique_ptr<ControlClient> make_client() const {
-    dds::DomainOptions options;
-    options.domain = domain_.number();
-    options.identity = folder("operator");
-    return ControlClient::connect(options).value();
-  }
   [[nodiscard]] std::string log() const {
     std::ifstream file(base_ + "/log.errors");
     return {std::istreambuf_iterator<char>(file), {}};

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
 #include <gmock/gmock.h>
 
+#include "api/client/control_client.hpp"
 #include "api/dds/domain.hpp"
 #include "api/dds/topics.hpp"
 #include "api/security/identity.hpp"
@@ -27,6 +29,13 @@ class SecuredHost : public testing::Test {
     return plant_folder_ + "/" + identity;
   }
   void start() { host_.start_server({"--identity", folder("cell")}); }
+  /// As the operator.
+  [[nodiscard]] std::unique_ptr<ControlClient> make_client() const {
+    dds::DomainOptions options;
+    options.domain = domain_.number();
+    options.identity = folder("operator");
+    return ControlClient::connect(options).value();
+  }
   /// plcctl with an identity; empty: with none.
   [[nodiscard]] RunResult run(const std::string& identity, std::vector<std::string> arguments) const {
     return run_with_folder(identity.empty() ? "" : folder(identity), std::move(arguments));
