@@ -16,6 +16,7 @@ import xml.etree.ElementTree as ElementTree
 
 from expected import Expected
 
+OUTPUT_LINES = 40  # of a failed case, repeated at the end
 HERE = pathlib.Path(__file__).resolve().parent
 
 
@@ -28,6 +29,7 @@ class Suite:
     def __init__(self, build, jobs, options):
         self.build, self.jobs, self.options = build, jobs, options
         self.shares = build / "Testing" / "shares"
+        self.outputs = {}  # of what failed in its last run
 
     def run(self):
         """The result of each test and case; None: ctest ran none."""
@@ -50,6 +52,9 @@ class Suite:
         results = {}
         for test in ElementTree.parse(file).getroot().iter("testcase"):
             name, status = test.get("name"), test.get("status")
+            self.outputs.pop(name, None)
+            if status == "fail":
+                self.outputs[name] = test.findtext("system-out", "")
             cases = self.cases_of(name)
             results.update(cases)
             # A share stands for itself if it could not tell which of its cases failed.
@@ -63,6 +68,20 @@ class Suite:
             return {}
         lines = (line.split("\t") for line in file.read_text(encoding="utf-8").splitlines())
         return {case: result for result, _, case in lines}
+
+
+def end_of(output):
+    """The last lines of a failed test's output; of a GoogleTest program the lines of the cases that failed."""
+    lines, case, failed = output.splitlines(), [""], []
+    for line in lines:
+        case = [line] if line.startswith("[ RUN ") else [*case, line]
+        if line.startswith("FAILED: "):  # said by cases.py
+            failed.append(line)
+        if line.startswith("[  FAILED  ]") and case[0].startswith("[ RUN ") and line.endswith(" ms)"):
+            failed += case[-OUTPUT_LINES:]
+        if line.startswith(("[  FAILED  ]", "[       OK ]", "[  SKIPPED ]")):
+            case = [""]
+    return (failed or lines)[-2 * OUTPUT_LINES:]
 
 
 def main():
@@ -84,6 +103,8 @@ def main():
     named = {what: sorted(name for name, result in results.items() if result == what)
              for what in ("failed", "skipped", "retried")}
     unexpected = [name for name in named["skipped"] if skips.reason(name) is None]
+    for name, output in suite.outputs.items():
+        print(f"----- {name} failed with:", *end_of(output), sep="\n")
     for name in named["retried"]:
         print(f"second run: {name}: {retries.reason(name)}")
     for name in named["skipped"]:
