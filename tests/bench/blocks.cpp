@@ -24,6 +24,7 @@
 #include "tests/bench/blocks_ways.hpp"
 #include "tests/bench/child.hpp"
 #include "tests/bench/parts.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost::bench {
 
@@ -326,7 +327,7 @@ Result<std::vector<Row>> measure_pair(const Plan& plan, const std::string& pool)
 
 Result<std::vector<Row>> measure_blocks(const Plan& plan) {
   // iceoryx can be used once in a process: it does not part from its daemon.
-  const std::string pool = fmt::format("plchost-bench-{}", ::getpid());
+  const std::string pool = own_name("bench");
   return measure_apart([&] { return measure_pair(plan, pool); });
 }
 

@@ -8,7 +8,6 @@
 
 #include <fmt/format.h>
 #include <sys/mman.h>
-#include <unistd.h>
 
 #include "shm/base/result.hpp"
 #include "shm/pool/memory_file.hpp"
@@ -16,6 +15,7 @@
 #include "tests/bench/processes.hpp"
 #include "tests/bench/row.hpp"
 #include "tests/bench/shared_board.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost::bench {
 
@@ -28,7 +28,7 @@ template <class Board, class Fork, class Measure>
   if (memory == MAP_FAILED) return failure(ErrorCode::system, "map the board", errno);
   Board& board = *new (memory) Board{};
   // What the program in the instance stamps is not looked at here, but it wants a place for it.
-  const std::string stamps = fmt::format("plchost-bench-{}.board", ::getpid());
+  const std::string stamps = own_name("board");
   if (const auto made = MemoryFile::replace(stamps, sizeof(DdsBoard)); !made)
     return std::unexpected(made.error());
   ::setenv(kBoardVariable, ("/dev/shm/" + stamps).c_str(), 1);

@@ -16,6 +16,7 @@
 #include "shm/base/system_call.hpp"
 #include "shm/pool/object_pool.hpp"
 #include "tests/bench/parts.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost::bench {
 
@@ -149,7 +150,8 @@ Result<void> run(const Steps& steps, std::uint32_t count, StepTimes& times) {
 }
 
 std::string nth(const char* kind, std::uint32_t i) {
-  return fmt::format("plchost-bench-{}-{}-{}", ::getpid(), kind, i);
+  static const std::string kOfThisRun = own_name("");
+  return fmt::format("{}{}-{}", kOfThisRun, kind, i);
 }
 
 Steps pool_semaphores(ObjectPool& pool, std::vector<SharedSemaphore>& held) {
@@ -238,7 +240,7 @@ Result<std::vector<Row>> measure_steps(const char* what, std::uint32_t count, st
 }  // namespace
 
 Result<std::vector<Row>> measure_pool(const Plan& plan) {
-  const std::string name = fmt::format("plchost-bench-{}-pool", ::getpid());
+  const std::string name = own_name("pool");
   auto pool = ObjectPool::create(name, {.max_objects = plan.objects});
   if (!pool) return std::unexpected(pool.error());
   struct Removed {

@@ -14,6 +14,7 @@
 #include "shm/pool/object_pool.hpp"
 #include "tests/bench/child.hpp"
 #include "tests/bench/parts.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost::bench {
 
@@ -163,7 +164,7 @@ Result<std::vector<Row>> measure_all(const Plan& plan, ObjectPool& pool) {
 }  // namespace
 
 Result<std::vector<Row>> measure_pool_deaths(const Plan& plan) {
-  const std::string name = fmt::format("plchost-bench-{}-deaths", ::getpid());
+  const std::string name = own_name("deaths");
   auto pool = ObjectPool::create(name, {.max_objects = 10 * plan.objects});
   if (!pool) return std::unexpected(pool.error());
   auto rows = measure_all(plan, *pool);

@@ -18,6 +18,7 @@
 #include "tests/bench/dds_poster.hpp"
 #include "tests/bench/parts.hpp"
 #include "tests/bench/shared_board.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost::bench {
 
@@ -132,7 +133,7 @@ Result<std::vector<Row>> measure_post_dds(const Plan& plan) {
   constexpr std::uint32_t kFirstDomain = 110;
   const auto salt = static_cast<std::uint32_t>(::getpid()) % 40U;
   const DdsDomains domains{.plchost = kFirstDomain + 2 * salt, .bare = kFirstDomain + 2 * salt + 1};
-  const std::string name = fmt::format("plchost-bench-{}", ::getpid());
+  const std::string name = own_name("bench");
   const std::string board_name = name + ".board";
   auto memory = MemoryFile::replace(board_name, sizeof(DdsBoard));
   if (!memory) return std::unexpected(memory.error());

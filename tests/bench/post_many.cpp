@@ -11,6 +11,7 @@
 #include "tests/bench/cell.hpp"
 #include "tests/bench/measure_beside.hpp"
 #include "tests/bench/parts.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost::bench {
 
@@ -118,7 +119,7 @@ class Measurement {
 };
 
 Result<std::vector<Row>> measure(const Plan& plan, const DdsDomains& domains, Board& board) {
-  Cell cell(plan, domains, fmt::format("plchost-bench-{}", ::getpid()));
+  Cell cell(plan, domains, own_name("bench"));
   if (auto started = cell.start(plan); !started) return std::unexpected(started.error());
   dds::DomainOptions options;
   options.domain = domains.plchost;

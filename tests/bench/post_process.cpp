@@ -14,6 +14,7 @@
 #include "shm/base/futex.hpp"
 #include "shm/pool/object_pool.hpp"
 #include "tests/bench/parts.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost::bench {
 
@@ -155,7 +156,7 @@ Result<std::vector<Row>> measure_post_process(const Plan& plan) {
   void* memory = ::mmap(nullptr, sizeof(Board), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (memory == MAP_FAILED) return failure(ErrorCode::system, "mmap", errno);
   auto* board = new (memory) Board;
-  const std::string name = fmt::format("plchost-bench-{}", ::getpid());
+  const std::string name = own_name("bench");
   auto pool = ObjectPool::create(name);
   if (!pool) return std::unexpected(std::move(pool.error()));
   auto event = pool->create_event("bench/ping");

@@ -15,6 +15,7 @@
 #include "tests/bench/cell.hpp"
 #include "tests/bench/measure_beside.hpp"
 #include "tests/bench/parts.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost::bench {
 
@@ -119,7 +120,7 @@ class RateMeasurement {
 };
 
 Result<std::vector<Row>> measure_rate(const Plan& plan, const DdsDomains& domains, TakenBoard& board) {
-  Cell cell(plan, domains, fmt::format("plchost-bench-{}", ::getpid()));
+  Cell cell(plan, domains, own_name("bench"));
   if (auto started = cell.start(plan); !started) return std::unexpected(started.error());
   auto pool = ObjectPool::attach(cell.pool());
   if (!pool) return std::unexpected(pool.error());

@@ -6,7 +6,6 @@
 #include <thread>
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include "shm/pool/memory_file.hpp"
 #include "shm/pool/object_pool.hpp"
@@ -14,6 +13,7 @@
 #include "tests/bench/parts.hpp"
 #include "tests/bench/shared_board.hpp"
 #include "tests/bench/start_board.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost::bench {
 
@@ -61,7 +61,7 @@ Result<Row> measure(const Plan& plan, const std::string& name, StartBoard& board
 }  // namespace
 
 Result<std::vector<Row>> measure_start(const Plan& plan) {
-  const std::string name = fmt::format("plchost-bench-{}", ::getpid());
+  const std::string name = own_name("bench");
   const std::string board_name = name + ".board";
   auto memory = MemoryFile::replace(board_name, sizeof(StartBoard));
   if (!memory) return std::unexpected(std::move(memory.error()));

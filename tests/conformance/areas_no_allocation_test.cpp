@@ -1,17 +1,17 @@
 // A cycle with inputs, outputs and kept variables around it.
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "instances/runtime/areas/areas.hpp"
 #include "instances/runtime/retain/kept_group.hpp"
 #include "tests/conformance/malloc_count.hpp"
+#include "tests/support/own_name.hpp"
 #include "tests/support/whole_cycle.hpp"
 
 namespace plchost {
 namespace {
 
 TEST(NoAllocation, InCyclesWithAreasOfEachKind) {
-  const std::string name = "areas-cost-" + std::to_string(::getpid());
+  const std::string name = own_name("areas");
   auto pool = ObjectPool::create(name).value();
   {
     const auto settings = parse_settings(

@@ -5,14 +5,13 @@
 #include <cstring>
 #include <string_view>
 
-#include <unistd.h>
-
 #include "api/control/application_order.hpp"
 #include "api/dds/text.hpp"
 #include "api/gateway/block_sample.hpp"
 #include "api/server/access/request_check.hpp"
 #include "api/server/downloads/download_table.hpp"
 #include "api/server/posts/event_intake.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace {
 
@@ -20,7 +19,7 @@ using namespace plchost;
 
 /// A host whose shared memory has no name any more: nothing is left when the fuzzer ends.
 struct Host {
-  std::string name = "plchost-fuzz-" + std::to_string(::getpid());
+  std::string name = own_name("fuzz");
   ObjectPool pool = ObjectPool::create(name, {.max_objects = 16}).value();
   PoolEvent event = pool.create_event("line1/ready").value();
   AccessGuard guard;
@@ -56,7 +55,7 @@ struct Entries {
 // Pieces of a download: it never has more than was announced, and is complete with exactly that.
 void take_chunks(const std::uint8_t* data, std::size_t size) {
   constexpr std::uint64_t kSize = 64;
-  static DownloadTable table("plchost-fuzz-dl-" + std::to_string(::getpid()), kSize);
+  static DownloadTable table(own_name("downloads"), kSize);
   const TimePoint now = MonotonicClock::now();
   dds::Guid client;
   const plc_SampleIdentity identity{};

@@ -8,18 +8,18 @@
 #include <string>
 #include <vector>
 
-#include <unistd.h>
-
 #include "shm/base/log.hpp"
 #include "shm/block_driver/block_channel.hpp"
 #include "shm/block_driver/block_router.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace {
 
 using namespace plchost;
 
-std::string pool_of_nodes() {
-  return "plchost-fuzz-blocks-" + std::to_string(::getpid());
+const std::string& pool_of_nodes() {
+  static const std::string kName = own_name("fuzz");
+  return kName;
 }
 
 struct Node {

@@ -6,10 +6,9 @@
 #include <string>
 #include <vector>
 
-#include <unistd.h>
-
 #include "shm/base/histogram_digest.hpp"
 #include "shm/pool/instance_page.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace {
 
@@ -18,8 +17,9 @@ using namespace plchost;
 constexpr std::size_t kTasks = kMaxFineTasks + 1;  // the smaller histograms
 constexpr std::string_view kInstance = "line1";
 
-std::string pool_name() {
-  return "plchost-fuzz-" + std::to_string(::getpid());
+const std::string& pool_name() {
+  static const std::string kName = own_name("fuzz");
+  return kName;
 }
 
 /// What the API server reads of a page.

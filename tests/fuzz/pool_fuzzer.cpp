@@ -6,17 +6,17 @@
 #include <cstring>
 #include <string>
 
-#include <unistd.h>
-
 #include "shm/pool/object_pool.hpp"
 #include "shm/pool/pool_layout.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace {
 
 using namespace plchost;
 
-std::string pool_name() {
-  return "plchost-fuzz-" + std::to_string(::getpid());
+const std::string& pool_name() {
+  static const std::string kName = own_name("fuzz");
+  return kName;
 }
 
 // A sound segment to start each run with.

@@ -30,4 +30,7 @@ git grep -nE '\bO_CREAT\b' -- "${sources[@]}" | grep -vE 'O_NOFOLLOW|O_EXCL' && 
 git grep -nE 'shm_open|sun_path *(\+ *1\b|\[0\])' -- "${sources[@]}" && fault "the lines above use names that anybody can take" || true
 # DDS alone keeps the keys of unregistered instances in memory.
 git grep -nE '\bdds_unregister_instance' -- '*.cpp' '*.hpp' ':!api/dds/instances.*' ':!tests' && fault "the lines above leak: use dds::unregister_instance" || true
+# What a killed test leaves in /dev/shm, the next one can only remove if it knows the name.
+git grep -nE 'to_string\(::getpid\(\)|"[^"(]*\{\}[^"]*", *::getpid\(\)' -- tests ':!tests/support/own_name.hpp' | grep -v HasSubstr &&
+  fault "the lines above make names that nobody clears away: use own_name() or own_path()" || true
 exit $wrong

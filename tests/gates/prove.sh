@@ -66,6 +66,10 @@ new_tree
 echo 'void f() { dds_unregister_ins''tance(1, nullptr); }' >"$plot/tree/shm/base/leak.cpp" && commit_tree
 must_be_red "house: leaked instance" "the lines above leak" "$gates/house.sh" "$plot/tree"
 
+new_tree
+echo 'std::string name = "pool-" + std::to_string(::get''pid());' >"$plot/tree/tests/name.cpp" && commit_tree
+must_be_red "house: name of a test's own making" "the lines above make names that nobody clears away" "$gates/house.sh" "$plot/tree"
+
 # plant_in_contract NAME DIAGNOSTIC EXPRESSION [--write]: the contract with that change (of sed), and with a reference made anew
 plant_in_contract() {
   new_tree

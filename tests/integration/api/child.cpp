@@ -9,6 +9,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "tests/support/own_name.hpp"
+
 extern char** environ;
 
 namespace plchost {
@@ -56,9 +58,7 @@ std::string read_and_remove(const std::string& path) {
 }  // namespace
 
 RunResult run_program(const std::string& program, const std::vector<std::string>& arguments) {
-  static int counter = 0;
-  const std::string file = std::filesystem::temp_directory_path() /
-                           ("plcctl-test-" + std::to_string(::getpid()) + "-" + std::to_string(counter++));
+  const std::string file = own_path("output");
   RunResult result;
   result.code = Child(program, arguments, file).wait();
   result.output = read_and_remove(file);

@@ -10,6 +10,7 @@
 #include "shm/base/time.hpp"
 #include "shm/pool/log_ring.hpp"
 #include "tests/integration/api/test_host.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost {
 namespace {
@@ -105,7 +106,7 @@ TEST_F(RemoteLog, OfAnInstanceThatIsNotThereIsRefused) {
 
 TEST_F(RemoteLog, IsFollowedAlsoOverTheEndOfTheServerAndANewNumbering) {
   say("before");
-  const std::string seen = testing::TempDir() + "plcctl-logs-" + std::to_string(::getpid());
+  const std::string seen = own_path("logs");
   Child follower(PLCCTL_PROGRAM,
                  {"--domain", std::to_string(domain_.number()), "logs", "line1", "-f", "--timeout", "1"},
                  seen);

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "tests/integration/api/test_host.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost {
 namespace {
@@ -110,8 +111,7 @@ TEST_F(Objects, ThatAreNotThereAreNoneOfAnyoneElse) {
 // What plcctl has written so far, line by line.
 class Watch {
  public:
-  Watch(const OwnDomain& domain, std::vector<std::string> arguments)
-      : file_(std::filesystem::temp_directory_path() / fmt::format("plcctl-watch-{}", ::getpid())) {
+  Watch(const OwnDomain& domain, std::vector<std::string> arguments) : file_(own_path("watch")) {
     arguments.insert(arguments.begin(),
                      {"--domain", std::to_string(domain.number()), "--timeout", "10", "watch", "object"});
     child_.emplace(PLCCTL_PROGRAM, arguments, file_);

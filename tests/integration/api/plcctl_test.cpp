@@ -8,6 +8,7 @@
 
 #include "schedulers/task/task_recorder.hpp"
 #include "tests/integration/api/test_host.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost {
 namespace {
@@ -182,7 +183,7 @@ TEST(Completion, LetsNoNameBeRunByTheShell) {
 
 TEST_F(Plcctl, WatchesAListUntilItIsAskedToEnd) {
   EXPECT_EQ(run({"check", "host", "--watch"}).code, 2) << "that is no list";
-  const std::string seen = testing::TempDir() + "plcctl-watch-" + std::to_string(::getpid());
+  const std::string seen = own_path("watch");
   Child watch(PLCCTL_PROGRAM,
               {"--domain", std::to_string(domain_.number()), "list", "instances", "-w", "--every", "0.1"},
               seen);
@@ -211,7 +212,7 @@ TEST_F(Plcctl, PostsAsOftenAsAsked) {
 }
 
 TEST_F(Plcctl, SaysHowManyWerePostedWhenItIsInterrupted) {
-  const std::string seen = testing::TempDir() + "plcctl-post-" + std::to_string(::getpid());
+  const std::string seen = own_path("post");
   Child post(PLCCTL_PROGRAM,
              {"--domain", std::to_string(domain_.number()), "post", "event", "line1/ready", "--count",
               "1000000", "--interval-us", "1000"},

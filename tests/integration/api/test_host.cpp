@@ -14,17 +14,9 @@
 #include "shm/base/packet_socket.hpp"
 #include "shm/pool/log_ring.hpp"
 #include "shm/pool/transition_ring.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost {
-
-namespace {
-
-std::string unique_name() {
-  static std::atomic<int> counter{0};
-  return "plchost-api-" + std::to_string(::getpid()) + "-" + std::to_string(counter++);
-}
-
-}  // namespace
 
 OwnDomain::OwnDomain() {
   // All ports of these domains are below the range that clients get theirs from. The last port of a domain is
@@ -47,7 +39,7 @@ OwnDomain::OwnDomain() {
 TestHost::TestHost(const OwnDomain& domain, std::string name, std::uint32_t max_objects)
     : domain_(domain.number()),
       name_(std::move(name)),
-      pool_name_(unique_name()),
+      pool_name_(own_name("api")),
       run_directory_(std::filesystem::temp_directory_path() / pool_name_),
       pool_(ObjectPool::create(pool_name_, {.max_objects = max_objects}).value()),
       page_(HostPageWriter::create(pool_name_).value()) {

@@ -19,17 +19,9 @@
 
 #include "instances/launch/launch_contract.hpp"
 #include "shm/pool/memory_file.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost::testing {
-
-namespace {
-
-std::string unique_name() {
-  static std::atomic<int> counter{0};
-  return fmt::format("itest-{}-{}", ::getpid(), ++counter);
-}
-
-}  // namespace
 
 std::string application(const std::string& name) {
   return fmt::format("{}/{}.so", APPLICATIONS, name);
@@ -46,7 +38,7 @@ bool eventually(const std::function<bool()>& condition) {
 }
 
 Sandbox::Sandbox()
-    : pool_(unique_name()), folder_((std::filesystem::temp_directory_path() / pool_).string()) {
+    : pool_(own_name("instance")), folder_((std::filesystem::temp_directory_path() / pool_).string()) {
   std::filesystem::create_directories(folder_);
 }
 
@@ -70,7 +62,7 @@ std::string Sandbox::write(const std::string& name, const std::string& text) con
 InstanceProcess::InstanceProcess(const Sandbox& sandbox, const std::vector<std::string>& arguments,
                                  const std::vector<std::string>& environment)
     : sandbox_(sandbox),
-      log_file_(fmt::format("{}/log-{}", sandbox.folder(), unique_name())),
+      log_file_(sandbox.folder() + "/" + own_name("log")),
       pool_(ObjectPool::create(sandbox.pool()).value()) {
   std::vector<std::string> all{PLC_INSTANCE};
   const std::array<std::array<std::string, 2>, 3> defaults{

@@ -7,9 +7,9 @@
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
-#include <unistd.h>
 
 #include "tests/integration/manager/plant.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost {
 namespace {
@@ -49,8 +49,7 @@ class CheckConfig : public testing::Test {
   }
 
  private:
-  std::filesystem::path folder_ =
-      std::filesystem::temp_directory_path() / fmt::format("plchost-check-{}", ::getpid());
+  std::filesystem::path folder_ = own_path("check");
 };
 
 TEST_F(CheckConfig, SaysThatAllIsWell) {

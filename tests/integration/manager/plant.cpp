@@ -9,12 +9,12 @@
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <poll.h>
-#include <unistd.h>
 
 #include "api/control/control_handler.hpp"
 #include "shm/pool/log_ring.hpp"
 #include "shm/pool/object_pool.hpp"
 #include "shm/pool/transition_ring.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost {
 
@@ -26,8 +26,7 @@ constexpr Duration kPatience = std::chrono::seconds(30);
 }  // namespace
 
 Plant::Plant() {
-  static int count = 0;
-  pool_ = fmt::format("plchost-t{}-{}", ::getpid(), ++count);
+  pool_ = own_name("plant");
   folder_ = std::filesystem::temp_directory_path() / pool_;
   std::filesystem::create_directories(folder_);
 }

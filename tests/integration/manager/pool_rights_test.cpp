@@ -7,6 +7,7 @@
 
 #include "shm/pool/memory_file.hpp"
 #include "tests/integration/manager/plant.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost {
 namespace {
@@ -52,7 +53,7 @@ TEST(PoolRights, OfAPoolThatIsThereAlreadyAreRenewedAndThatIsSaid) {
 TEST(PoolRights, OfAPoolThatAStrangerMadeBeforeAreNotTaken) {
   if (::geteuid() != 0) GTEST_SKIP() << "needs root to give a file to another user";
   constexpr uid_t kNobody = 65534;
-  const std::string name = fmt::format("plchost-rights-{}", ::getpid());
+  const std::string name = own_name("rights");
   const auto made = MemoryFile::create(name, 100, {}, {.owner = kNobody});
   ASSERT_TRUE(made);
   const auto refused = check_pool_owner(name, {});

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "tests/integration/manager/plant.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost {
 namespace {
@@ -20,7 +21,7 @@ using testing::HasSubstr;
 /// wishes can be opened.
 class StuckDisk {
  public:
-  StuckDisk() : flag_(fmt::format("{}/plchost-stuck-{}", testing::TempDir(), ::getpid())) {
+  StuckDisk() {
     ::setenv("LD_PRELOAD", STUCK_DISK, 1);
     ::setenv("STUCK_DISK", flag_.c_str(), 1);
     ::setenv("STUCK_PATH", "/wishes.", 1);
@@ -36,7 +37,7 @@ class StuckDisk {
   void thaw() const { std::filesystem::remove(flag_); }
 
  private:
-  std::string flag_;
+  std::string flag_ = own_path("stuck");
 };
 
 class DiskThatHangs : public testing::Test {

@@ -30,7 +30,7 @@ class Gate : public testing::Test {
   }
   void feed(const Packet& packet, std::uint64_t number) {
     if (oracle_->feed(packet)) return;
-    const auto file = std::filesystem::temp_directory_path() / fmt::format("gate-{}.packets", ::getpid());
+    const auto file = std::filesystem::temp_directory_path() / fmt::format("gate-{}.packets", number);
     oracle_->save_last(file);
     FAIL() << "Cyclone ended or hung at packet " << number << "; the last ones are in " << file;
   }

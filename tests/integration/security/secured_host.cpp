@@ -5,6 +5,8 @@
 
 #include <unistd.h>
 
+#include "tests/support/own_name.hpp"
+
 namespace plchost {
 
 namespace {
@@ -23,9 +25,7 @@ bool comes_true(Duration within, Condition condition) {
 
 }  // namespace
 
-SecuredHost::SecuredHost()
-    : base_(std::filesystem::temp_directory_path() / ("plchost-secured-" + std::to_string(::getpid()))),
-      plant_folder_(base_ + "/plant") {
+SecuredHost::SecuredHost() : base_(own_path("secured")), plant_folder_(base_ + "/plant") {
   std::filesystem::remove_all(base_);
   std::filesystem::create_directory(base_);
   EXPECT_TRUE(security::SecurityFolder::init(plant_folder_, "cell"));

@@ -2,8 +2,9 @@
 # Sourced with BIN (the programs) and APPLICATIONS set; ends everything that it started.
 set -euo pipefail
 
-cell=$(mktemp -d "${TMPDIR:-/tmp}/plchost-system.XXXXXX")
-pool=plchost-system-$$
+# As own_name() makes them: what a story that is killed leaves behind, the next test program removes.
+pool=$(printf 'plctest-%x-%d-story' "$(stat -Lc %i /proc/self/ns/pid)" $$)
+cell=$(mktemp -d "${TMPDIR:-/tmp}/$pool.XXXXXX")
 managers=()
 others=()
 

@@ -5,9 +5,9 @@
 #include <optional>
 
 #include <gmock/gmock.h>
-#include <unistd.h>
 
 #include "api/control/application_order.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost {
 namespace {
@@ -20,7 +20,7 @@ constexpr std::uint64_t kLimit = 1000;
 
 class Downloads : public testing::Test {
  protected:
-  Downloads() : pool_("plchost-dl-" + std::to_string(::getpid())) { sut_.emplace(pool_, kLimit); }
+  Downloads() : pool_(own_name("downloads")) { sut_.emplace(pool_, kLimit); }
   ~Downloads() override { remove_downloads(pool_); }
 
   static plc_SampleIdentity identity(std::int64_t number, std::uint8_t client = 1) {

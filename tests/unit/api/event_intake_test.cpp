@@ -1,9 +1,9 @@
 #include "api/server/posts/event_intake.hpp"
 
 #include <gmock/gmock.h>
-#include <unistd.h>
 
 #include "api/dds/text.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost {
 namespace {
@@ -20,10 +20,6 @@ class EventIntakeTest : public testing::Test {
     ObjectPool::remove(name_);
   }
 
-  static std::string unique_name() {
-    static int counter = 0;
-    return "plchost-intake-" + std::to_string(::getpid()) + "-" + std::to_string(counter++);
-  }
   /// As a server leaves it that was killed when so many events of it were posted.
   void leave_first_batch_at(std::uint32_t posted) const {
     PostLedger ledger = PostLedger::open(pool_).value();
@@ -51,7 +47,7 @@ class EventIntakeTest : public testing::Test {
     return acks.empty() ? plc_EventAck{} : acks.front();
   }
 
-  std::string name_ = unique_name();
+  std::string name_ = own_name("intake");
   ObjectPool pool_ = ObjectPool::create(name_, {.max_objects = 64}).value();
   AccessGuard guard_;
   PoolEvent event_;

@@ -15,6 +15,7 @@
 #include "api/server/lists/account_names.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/thread_owner.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost {
 namespace {
@@ -24,10 +25,6 @@ using testing::HasSubstr;
 
 class ObjectListerTest : public testing::Test {
  protected:
-  static std::string unique_name() {
-    static std::atomic<int> counter{0};
-    return fmt::format("lister-{}-{}", ::getpid(), ++counter);
-  }
   ~ObjectListerTest() override {
     events_.clear();
     ObjectPool::remove(name_);
@@ -58,7 +55,7 @@ class ObjectListerTest : public testing::Test {
     return all(query, pages);
   }
 
-  std::string name_ = unique_name();
+  std::string name_ = own_name("lister");
   ObjectPool pool_ = ObjectPool::create(name_, {.max_objects = 4096}).value();
   std::vector<SharedEvent> events_;
 };

@@ -16,6 +16,7 @@
 #include "api/dds/text.hpp"
 #include "api/server/posts/event_intake.hpp"
 #include "tests/support/one_core.hpp"
+#include "tests/support/own_name.hpp"
 #include "tests/support/sanitized.hpp"
 
 namespace plchost {
@@ -145,7 +146,7 @@ class EachInstructionOfAPost : public testing::Test {
   }
 
   OneCore core_;  // each step is a change from one process to the other
-  std::string name_ = "plchost-post-step-" + std::to_string(::getpid());
+  std::string name_ = own_name("post-step");
   ObjectPool pool_ = ObjectPool::create(name_, {.max_objects = 16}).value();
   AccessGuard guard_;
   PoolEvent event_ = pool_.create_event("line1/ready").value();

@@ -4,9 +4,9 @@
 #include <string>
 
 #include <gmock/gmock.h>
-#include <unistd.h>
 
 #include "api/dds/text.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost {
 namespace {
@@ -62,8 +62,7 @@ class RunWatchTest : public testing::Test {
     return awaited;
   }
 
-  std::string pool_ = "plchost-runs-" + std::to_string(::getpid()) + "-" +
-                      testing::UnitTest::GetInstance()->current_test_info()->name();
+  std::string pool_ = own_name("runs");
   TimePoint now_ = MonotonicClock::now();
   InstancePage page_ = make_page(pool_);
   TaskWatch tasks_{pool_, "hosta", 7, StatusTable<plc_TaskStatus>(),

@@ -11,11 +11,11 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <sys/resource.h>
-#include <unistd.h>
 
 #include "api/audit/audit_check.hpp"
 #include "api/audit/audit_file.hpp"
 #include "api/security/sha256.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost {
 namespace {
@@ -62,7 +62,7 @@ class AuditLogTest : public ::testing::Test {
   [[nodiscard]] AuditFindings check() const { return check_audit(folder).value(); }
   [[nodiscard]] std::string first_file() const { return audit_files(folder)->front().path; }
 
-  std::string top = ::testing::TempDir() + "audit-" + std::to_string(::getpid());
+  std::string top = own_path("audit");
   std::string folder = top + "/log";
 };
 

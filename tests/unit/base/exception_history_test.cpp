@@ -5,7 +5,8 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
+
+#include "tests/support/own_name.hpp"
 
 namespace plchost {
 namespace {
@@ -24,7 +25,7 @@ class ExceptionHistoryTest : public testing::Test {
     return made;
   }
 
-  std::string path_ = testing::TempDir() + "/exceptions-" + std::to_string(::getpid());
+  std::string path_ = own_path("exceptions");
 };
 
 TEST_F(ExceptionHistoryTest, ComesBackFromTheFileAsItWasWritten) {

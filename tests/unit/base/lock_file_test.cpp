@@ -12,6 +12,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "tests/support/own_name.hpp"
+
 namespace plchost {
 namespace {
 
@@ -33,7 +35,7 @@ class LockFileTest : public testing::Test {
     return static_cast<ErrorCode>(WEXITSTATUS(status));
   }
 
-  std::string folder_ = fmt::format("{}/lock_file.{}", testing::TempDir(), ::getpid());
+  std::string folder_ = own_path("lock");
   std::string path_ = folder_ + "/lock";
 };
 

@@ -12,15 +12,15 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "tests/support/own_name.hpp"
+
 namespace plchost {
 namespace {
 
 class PacketSocketTest : public testing::Test {
  protected:
   PacketSocketTest() {
-    static std::atomic<int> counter{0};
-    directory_ = std::filesystem::temp_directory_path() /
-                 ("plchost-socket-" + std::to_string(::getpid()) + "-" + std::to_string(counter++));
+    directory_ = own_path("socket");
     std::filesystem::create_directory(directory_);
     path_ = directory_ / "s";
   }

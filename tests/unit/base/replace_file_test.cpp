@@ -6,7 +6,8 @@
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
+
+#include "tests/support/own_name.hpp"
 
 namespace plchost {
 namespace {
@@ -21,7 +22,7 @@ class ReplaceFile : public testing::Test {
     return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
   }
 
-  std::string directory = fmt::format("{}/replace_file.{}", testing::TempDir(), ::getpid());
+  std::string directory = own_path("replace");
   std::string path = directory + "/kept";
 };
 

@@ -14,9 +14,9 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "shm/pool/memory_file.hpp"
+#include "tests/support/own_name.hpp"
 #include "tests/support/whole_cycle.hpp"
 
 namespace plchost {
@@ -72,7 +72,7 @@ class AreasUnderTest : public ::testing::Test {
                      tasks);
   }
 
-  std::string pool_ = "areas-test-" + std::to_string(::getpid());
+  std::string pool_ = own_name("areas");
   ObjectPool shared_ = ObjectPool::create(pool_).value();
   InstanceSettings settings_;
   RetainKeeper::Options retain_;

@@ -6,18 +6,16 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "tests/support/own_name.hpp"
+
 namespace plchost {
 namespace {
 
 class EventTableTest : public ::testing::Test {
  protected:
-  static std::string unique_name() {
-    static std::atomic<int> counter{0};
-    return fmt::format("evtest-{}-{}", ::getpid(), ++counter);
-  }
   ~EventTableTest() override { ObjectPool::remove(name_); }
 
-  std::string name_ = unique_name();
+  std::string name_ = own_name("events");
   ObjectPool pool_ = ObjectPool::create(name_, {.max_objects = 16384}).value();
   EventTable sut_{"line1", &pool_};
 };

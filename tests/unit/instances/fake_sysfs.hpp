@@ -7,7 +7,8 @@
 #include <string>
 
 #include <fmt/format.h>
-#include <unistd.h>
+
+#include "tests/support/own_name.hpp"
 
 namespace plchost {
 
@@ -15,9 +16,7 @@ namespace plchost {
 class FakeSysfs {
  public:
   FakeSysfs() {
-    static std::atomic<int> count{0};
-    folder_ =
-        std::filesystem::temp_directory_path() / fmt::format("plchost-sysfs-{}-{}", ::getpid(), ++count);
+    folder_ = own_path("sysfs");
     std::filesystem::create_directories(run_directory());
     write(device(), "");
   }

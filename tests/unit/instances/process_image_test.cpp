@@ -9,12 +9,12 @@
 #include <thread>
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "instances/runtime/areas/output_image.hpp"
 #include "instances/runtime/areas/task_areas.hpp"
 #include "shm/plc_process_image.h"
 #include "shm/pool/memory_file.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost {
 namespace {
@@ -228,7 +228,7 @@ TEST(Registers, AreCopiedByteForByteWhereverTheyLie) {
 class OpenedImage : public ::testing::Test {
  protected:
   ~OpenedImage() override { MemoryFile::remove(pool_memory_name(pool, "io")); }
-  const std::string pool = "image-test-" + std::to_string(::getpid());
+  const std::string pool = own_name("image");
 };
 
 TEST_F(OpenedImage, IsMadeByWhoeverComesFirstAndHasOneWriter) {

@@ -7,13 +7,13 @@
 #include <vector>
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include "instances/launch/launch_contract.hpp"
 #include "instances/plc_app.h"
 #include "instances/runtime/retain/retain_keeper.hpp"
 #include "shm/pool/memory_file.hpp"
 #include "shm/pool/object_pool.hpp"
+#include "tests/support/own_name.hpp"
 #include "tests/unit/pool/unique_pool_name.hpp"
 
 namespace plchost {
@@ -74,9 +74,7 @@ class Retain : public ::testing::Test {
     std::filesystem::rename(aside, folder_);
   }
 
-  std::filesystem::path folder_ = std::filesystem::path(::testing::TempDir()) /
-                                  ("keeper-" + std::to_string(::getpid()) +
-                                   ::testing::UnitTest::GetInstance()->current_test_info()->name());
+  std::filesystem::path folder_ = own_path("keeper");
   UniquePoolName name_;
   ObjectPool pool_ = ObjectPool::create(name_.get(), {.max_objects = 16}).value();
   std::unique_ptr<RetainKeeper> sut;

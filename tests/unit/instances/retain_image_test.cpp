@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include "instances/runtime/retain/retain_files.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost {
 namespace {
@@ -101,8 +102,7 @@ class RetainFolder : public ::testing::Test {
     std::ofstream(path, std::ios::binary | std::ios::trunc) << text;
   }
 
-  fs::path folder_ = fs::path("/dev/shm") / ("retain-" + std::to_string(::getpid()) +
-                                             ::testing::UnitTest::GetInstance()->current_test_info()->name());
+  fs::path folder_ = fs::path("/dev/shm") / own_name("retain");
 };
 
 TEST_F(RetainFolder, ThatIsNewHasNothingAndNoProblem) {

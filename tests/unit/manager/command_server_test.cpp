@@ -9,6 +9,8 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
+#include "tests/support/own_name.hpp"
+
 namespace plchost {
 namespace {
 
@@ -28,9 +30,7 @@ class SlowHandler : public ControlHandler {
 class CommandServerTest : public testing::Test {
  protected:
   CommandServerTest() {
-    static int count = 0;
-    path_ = (std::filesystem::temp_directory_path() / fmt::format("plchost-cs-{}-{}", ::getpid(), ++count))
-                .string();
+    path_ = own_path("commands").string();
     reactor_ = std::move(*Reactor::create());
     sut_ = std::move(*CommandServer::open(*reactor_, path_, handler_));
   }

@@ -5,10 +5,10 @@
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
-#include <unistd.h>
 
 #include "manager/config/load_config.hpp"
 #include "shm/pool/host_page.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost {
 namespace {
@@ -371,8 +371,7 @@ TEST(Config, SaysWhichFileIsMissing) {
 }
 
 TEST(Config, RefusesAFileThatIsMissingOrTooLarge) {
-  const auto path =
-      std::filesystem::temp_directory_path() / fmt::format("plchost-config-{}.toml", ::getpid());
+  const auto path = own_path("config.toml");
   const auto missing = load_config(path.string(), four_cores());
   ASSERT_FALSE(missing.has_value());
   EXPECT_THAT(missing.error(), ElementsAre(HasSubstr("there is no file")));

@@ -31,8 +31,7 @@ TEST(DiskThreadTest, WaitsForADiskThatHangsOnceAndBeginsNothingThatWasGivenUp) {
 class WishFolderTest : public testing::Test {
  protected:
   WishFolderTest() {
-    static int count = 0;
-    top_ = std::filesystem::temp_directory_path() / fmt::format("plchost-wf{}-{}", ::getpid(), ++count);
+    top_ = own_path("wishes");
     std::filesystem::create_directories(top_);
   }
   ~WishFolderTest() override {

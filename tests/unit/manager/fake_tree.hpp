@@ -6,9 +6,9 @@
 #include <string>
 
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include "manager/host_check/host_check.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost {
 
@@ -16,8 +16,7 @@ namespace plchost {
 class FakeTree {
  public:
   FakeTree() {
-    static std::atomic<int> count{0};
-    root_ = std::filesystem::temp_directory_path() / fmt::format("plchost-host-{}-{}", ::getpid(), ++count);
+    root_ = own_path("host");
     std::filesystem::create_directories(root_);
     write("/sys/devices/system/cpu/online", "0-3\n");
     host = {.files = HostFiles(root_), .instances = {{"line1", 2}, {"line2", 3}}, .try_fifo = [this] {

@@ -10,6 +10,7 @@
 
 #include "api/control/application_versions.hpp"
 #include "api/security/sha256.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost {
 namespace {
@@ -23,9 +24,7 @@ constexpr const char* kValid = "echo \"$2 is a valid application: Lamp, 1 tasks\
 class StoreApplication : public testing::Test {
  protected:
   StoreApplication() {
-    static int count = 0;
-    root_ = std::filesystem::temp_directory_path() /
-            ("plchost-store-" + std::to_string(::getpid()) + "-" + std::to_string(count++));
+    root_ = own_path("store");
     std::filesystem::create_directories(root_);
     order_.folder = root_ / "applications.cell" / "line1";
     order_.source = root_ / "sent";

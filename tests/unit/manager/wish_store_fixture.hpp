@@ -14,6 +14,7 @@
 
 #include "manager/store/wish_memory.hpp"
 #include "manager/store/wish_store.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost {
 
@@ -59,8 +60,7 @@ class FrozenDisk {
 class WishStoreTest : public testing::Test {
  protected:
   WishStoreTest() {
-    static int count = 0;
-    pool_ = fmt::format("plchost-w{}-{}", ::getpid(), ++count);
+    pool_ = own_name("wish");
     folder_ = std::filesystem::temp_directory_path() / pool_;
     std::filesystem::create_directories(folder_ / "run");
     make();

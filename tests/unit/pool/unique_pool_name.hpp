@@ -3,19 +3,15 @@
 #include <atomic>
 #include <string>
 
-#include <unistd.h>
-
 #include "shm/pool/memory_file.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost {
 
 /// A name for shared memory that no other test uses; what was made under it is removed at the end.
 class UniquePoolName {
  public:
-  UniquePoolName() {
-    static std::atomic<int> counter{0};
-    name_ = "plchost-test-" + std::to_string(::getpid()) + "-" + std::to_string(counter++);
-  }
+  UniquePoolName() = default;
   ~UniquePoolName() {
     MemoryFile::remove(name_);
     remove_pool_memories(name_);
@@ -25,7 +21,7 @@ class UniquePoolName {
   [[nodiscard]] const std::string& get() const { return name_; }
 
  private:
-  std::string name_;
+  std::string name_ = own_name("pool");
 };
 
 }  // namespace plchost

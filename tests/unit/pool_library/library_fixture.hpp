@@ -9,9 +9,9 @@
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>
-#include <unistd.h>
 
 #include "shm/plc_pool.h"
+#include "tests/support/own_name.hpp"
 
 /// A pool of its own, through the C library alone; its files are gone at the end.
 class LibraryFixture : public testing::Test {
@@ -21,7 +21,7 @@ class LibraryFixture : public testing::Test {
     std::string text;  // both streams
   };
 
-  LibraryFixture() : name_("plchost-test-c-" + std::to_string(::getpid()) + "-" + std::to_string(counter++)) {
+  LibraryFixture() : name_(plchost::own_name("library")) {
     EXPECT_EQ(plc_pool_open(name_.c_str(), PLC_POOL_MAKE, &pool_), PLC_POOL_OK) << plc_pool_error();
   }
   ~LibraryFixture() override {
@@ -46,7 +46,6 @@ class LibraryFixture : public testing::Test {
     return run({PROGRAMS "/walk", object}, "PLCHOST_POOL=" + name_);
   }
 
-  static inline std::atomic<int> counter{0};
   std::string name_;
   plc_pool* pool_ = nullptr;
 };

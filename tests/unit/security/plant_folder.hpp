@@ -6,10 +6,10 @@
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
-#include <unistd.h>
 
 #include "api/security/identity.hpp"
 #include "api/security/security_folder.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost::security {
 
@@ -40,7 +40,7 @@ class PlantFolder : public testing::Test {
   }
   static void write(const std::string& path, const std::string& text) { std::ofstream(path) << text; }
 
-  std::string base = fmt::format("{}/security.{}", testing::TempDir(), ::getpid());
+  std::string base = own_path("security");
   std::string plant = base + "/plant";
 };
 
