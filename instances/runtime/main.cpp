@@ -12,12 +12,12 @@
 #include <sys/timerfd.h>
 #include <unistd.h>
 
-#include "instances/runtime/application/application_check.hpp"
-#include "instances/runtime/application/trial_process.hpp"
-#include "instances/runtime/instance.hpp"
-#include "instances/runtime/options.hpp"
-#include "instances/runtime/retain/save_left_behind.hpp"
+#include "instances/runtime/instance/instance.hpp"
+#include "instances/runtime/memory/save_left_behind.hpp"
 #include "instances/runtime/settings/settings.hpp"
+#include "instances/runtime/setup/options.hpp"
+#include "instances/runtime/trial/application_check.hpp"
+#include "instances/runtime/trial/trial_process.hpp"
 #include "shm/base/log.hpp"
 #include "shm/base/memory_guard.hpp"
 #include "shm/base/system_call.hpp"

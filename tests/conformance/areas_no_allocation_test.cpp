@@ -1,8 +1,8 @@
 // A cycle with inputs, outputs and kept variables around it.
 #include <gtest/gtest.h>
 
-#include "instances/runtime/areas/areas.hpp"
-#include "instances/runtime/retain/kept_group.hpp"
+#include "instances/runtime/memory/areas.hpp"
+#include "instances/runtime/memory/kept_group.hpp"
 #include "tests/conformance/malloc_count.hpp"
 #include "tests/support/own_name.hpp"
 #include "tests/support/whole_cycle.hpp"

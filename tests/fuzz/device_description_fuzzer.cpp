@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "instances/runtime/device/device_description.hpp"
+#include "instances/runtime/settings/device_description.hpp"
 #include "shm/base/names.hpp"
 
 // Any bytes are refused with an error that begins with the file's name, or give events whose names can be.

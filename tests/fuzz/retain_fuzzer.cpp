@@ -8,7 +8,7 @@
 #include <span>
 #include <string>
 
-#include "instances/runtime/retain/retain_image.hpp"
+#include "instances/runtime/memory/retain_image.hpp"
 
 namespace {
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "instances/plc_app.h"
-#include "instances/runtime/areas/declared_area.hpp"
+#include "instances/runtime/memory/declared_area.hpp"
 #include "instances/runtime/settings/task_settings.hpp"
 
 namespace plchost {

@@ -15,7 +15,6 @@ namespace plchost {
 namespace {
 
 ApplicationHost* the_host = nullptr;  // set before anything of an application runs, cleared after
-thread_local Task_Info* task_here = nullptr;
 
 }  // namespace
 
@@ -222,97 +221,4 @@ void ApplicationHost::write_messages() {
   }
 }
 
-CurrentTask::CurrentTask(Task_Info* task) noexcept {
-  task_here = task;
-}
-CurrentTask::~CurrentTask() {
-  task_here = nullptr;
-}
-
 }  // namespace plchost
-
-// What applications and components call: see plc_app.h. exported_symbols.txt lists them for the linker.
-
-using plchost::ApplicationHost;
-
-void __sys__setup__tasks(sys_setup_tasks_struct* p) {
-  if (ApplicationHost* const host = ApplicationHost::current_for_control()) host->set_up_tasks(p);
-}
-
-RTS_RESULT plc_set_task_options(const char* pszTask, const Task_Options* pOptions) {
-  ApplicationHost* const host = ApplicationHost::current_for_control();
-  return host == nullptr ? ERR_NOTINITIALIZED : host->set_task_options(pszTask, pOptions);
-}
-
-Task_Info* plc_current_task() {
-  return plchost::task_here;
-}
-
-RTS_HANDLE SchedRegisterExternalEvent(const char* pszEvent, RTS_RESULT* pResult) {
-  const auto finish = [&](RTS_RESULT result, RTS_HANDLE handle) {
-    if (pResult != nullptr) *pResult = result;
-    return handle;
-  };
-  ApplicationHost* const host = ApplicationHost::current_for_control();
-  if (host == nullptr) return finish(ERR_NOTINITIALIZED, RTS_INVALID_HANDLE);
-  if (pszEvent == nullptr) return finish(ERR_PARAMETER, RTS_INVALID_HANDLE);
-  const auto handle = host->events().open(pszEvent);
-  if (!handle) {
-    spdlog::error("SchedRegisterExternalEvent: {}", handle.error().describe());
-    const bool name = handle.error().code == plchost::ErrorCode::invalid_argument;
-    return finish(name ? ERR_PARAMETER : ERR_NOMEMORY, RTS_INVALID_HANDLE);
-  }
-  const RTS_RESULT registered = host->register_event(*handle);
-  return finish(registered, registered == ERR_NOMEMORY ? RTS_INVALID_HANDLE : *handle);
-}
-
-RTS_RESULT SchedUnregisterExternalEvent(RTS_HANDLE hEvent) {
-  ApplicationHost* const host = ApplicationHost::current_for_control();
-  return host == nullptr ? ERR_NOTINITIALIZED : host->unregister_event(hEvent);
-}
-
-RTS_RESULT SchedPostExternalEvent(RTS_HANDLE hEvent) {
-  ApplicationHost* const host = ApplicationHost::current();
-  return host == nullptr ? ERR_NOTINITIALIZED : host->events().post(hEvent);
-}
-
-RTS_RESULT EventRegisterCallbackFunction(unsigned int EventId, PF_EVENT_CALLBACK pfCallback, void* pUser) {
-  ApplicationHost* const host = ApplicationHost::current_for_control();
-  return host == nullptr ? ERR_NOTINITIALIZED : host->add_callback(EventId, pfCallback, pUser);
-}
-
-RTS_RESULT EventUnregisterCallbackFunction(unsigned int EventId, PF_EVENT_CALLBACK pfCallback, void* pUser) {
-  ApplicationHost* const host = ApplicationHost::current_for_control();
-  return host == nullptr ? ERR_NOTINITIALIZED : host->remove_callback(EventId, pfCallback, pUser);
-}
-
-RTS_RESULT CAL_SysEventSet(RTS_HANDLE hEvent) {
-  ApplicationHost* const host = ApplicationHost::current();
-  return host == nullptr ? ERR_NOTINITIALIZED : host->events().set(hEvent);
-}
-
-RTS_RESULT plc_keep_variables(const char* pszName, void* pAddress, unsigned int dwBytes, RTS_UI64 qwLayout) {
-  ApplicationHost* const host = ApplicationHost::current_for_control();
-  if (host == nullptr) return ERR_NOTINITIALIZED;
-  return host->keep_variables({.name = pszName == nullptr
-                                           ? std::string()
-                                           : std::string(plchost::cut(pszName, PLC_MAX_VARIABLE_NAME + 1)),
-                               .address = pAddress,
-                               .bytes = dwBytes,
-                               .layout = qwLayout});
-}
-
-int plc_online_change() {
-  const ApplicationHost* const host = ApplicationHost::current_for_control();
-  return host != nullptr && host->online_change() ? 1 : 0;
-}
-
-int plc_start_kind() {
-  const ApplicationHost* const host = ApplicationHost::current();
-  return host == nullptr ? PLC_START_FIRST : host->start_kind();
-}
-
-void plc_log(int nLevel, const char* pszText) {
-  ApplicationHost* const host = ApplicationHost::current();
-  if (host != nullptr && pszText != nullptr) host->messages().push(nLevel, pszText);
-}

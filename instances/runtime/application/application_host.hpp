@@ -7,9 +7,9 @@
 
 #include "instances/plc_app.h"
 #include "instances/runtime/application/application_declaration.hpp"
-#include "instances/runtime/areas/areas.hpp"
+#include "instances/runtime/application/message_queue.hpp"
 #include "instances/runtime/blocks/block_service.hpp"
-#include "instances/runtime/message_queue.hpp"
+#include "instances/runtime/memory/areas.hpp"
 #include "instances/runtime/tasks/event_table.hpp"
 #include "instances/runtime/tasks/task_table.hpp"
 #include "shm/base/result.hpp"
@@ -92,15 +92,6 @@ class ApplicationHost {
   ApplicationDeclaration* online_declaration_ = nullptr;  // while its plc_app_init runs
   bool online_ = false;
   std::vector<Callback> callbacks_;
-};
-
-/// Says on this thread whose cycle it runs, as long as it lives: for plc_current_task(). Real-time.
-class CurrentTask {
- public:
-  explicit CurrentTask(Task_Info* task) noexcept;
-  ~CurrentTask();
-  CurrentTask(const CurrentTask&) = delete;
-  CurrentTask& operator=(const CurrentTask&) = delete;
 };
 
 }  // namespace plchost

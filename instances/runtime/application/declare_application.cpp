@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "instances/runtime/device/device_events.hpp"
+#include "instances/runtime/application/device_events.hpp"
 #include "instances/runtime/time/system_time.hpp"
 
 namespace plchost {

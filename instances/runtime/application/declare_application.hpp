@@ -7,7 +7,7 @@
 #include "instances/runtime/application/application.hpp"
 #include "instances/runtime/application/application_host.hpp"
 #include "instances/runtime/application/components.hpp"
-#include "instances/runtime/device/device_description.hpp"
+#include "instances/runtime/settings/device_description.hpp"
 #include "instances/runtime/settings/settings.hpp"
 
 namespace plchost {

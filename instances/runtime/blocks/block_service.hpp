@@ -9,7 +9,7 @@
 #include <string_view>
 
 #include "instances/plc_app.h"
-#include "instances/runtime/blocks/block_settings.hpp"
+#include "instances/runtime/settings/block_settings.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/thread.hpp"
 #include "shm/block_driver/block_channel.hpp"

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "instances/runtime/blocks/block_settings.hpp"
+#include "instances/runtime/settings/block_settings.hpp"
 #include "instances/runtime/settings/task_settings.hpp"
 #include "schedulers/scheduler.hpp"
 #include "shm/base/result.hpp"

@@ -12,7 +12,7 @@
 
 #include <fmt/format.h>
 
-#include "instances/runtime/application/application_host.hpp"
+#include "instances/runtime/tasks/current_task.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {

@@ -14,7 +14,6 @@ namespace plchost {
 namespace {
 
 constexpr RTS_SYSTIME kNsPerUs = 1000;
-constexpr RTS_SYSTIME kNsPerMs = 1'000'000;
 
 RTS_SYSTIME monotonic_ns() noexcept {
   return static_cast<RTS_SYSTIME>(MonotonicClock::now().time_since_epoch().count());
@@ -211,22 +210,12 @@ Result<void> use_system_time(const SysTimeSettings& settings, const FindSymbol& 
   return {};
 }
 
+RTS_RESULT system_time_us(RTS_SYSTIME* to) noexcept {
+  return answer(to, custom_us, kNsPerUs);
+}
+
+RTS_RESULT system_time_ns(RTS_SYSTIME* to) noexcept {
+  return answer(to, custom_ns, 1);
+}
+
 }  // namespace plchost
-
-RTS_RESULT SysTimeGetUs(RTS_SYSTIME* pTime) {
-  return plchost::answer(pTime, plchost::custom_us, plchost::kNsPerUs);
-}
-
-RTS_RESULT SysTimeGetNs(RTS_SYSTIME* pTime) {
-  return plchost::answer(pTime, plchost::custom_ns, 1);
-}
-
-unsigned int SysTimeGetMs() {
-  RTS_SYSTIME ns = 0;
-  if (plchost::custom_ns != nullptr) {
-    (void)plchost::custom_ns(&ns);
-  } else {
-    ns = plchost::monotonic_ns();
-  }
-  return static_cast<unsigned int>(ns / plchost::kNsPerMs);
-}

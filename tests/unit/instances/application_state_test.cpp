@@ -1,4 +1,4 @@
-#include "instances/runtime/application_state.hpp"
+#include "instances/runtime/instance/application_state.hpp"
 
 #include <string>
 #include <tuple>

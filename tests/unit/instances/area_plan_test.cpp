@@ -1,5 +1,5 @@
 // Where the areas of an application go, and what the settings about them may say.
-#include "instances/runtime/areas/area_plan.hpp"
+#include "instances/runtime/memory/area_plan.hpp"
 
 #include <string>
 

@@ -1,5 +1,5 @@
 // What Areas puts around the cycles of tasks.
-#include "instances/runtime/areas/areas.hpp"
+#include "instances/runtime/memory/areas.hpp"
 
 #include <array>
 #include <chrono>

@@ -1,4 +1,4 @@
-#include "instances/runtime/device/device_description.hpp"
+#include "instances/runtime/settings/device_description.hpp"
 
 #include <string>
 
@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "instances/runtime/device/device_events.hpp"
+#include "instances/runtime/application/device_events.hpp"
 
 namespace plchost {
 namespace {

@@ -1,4 +1,4 @@
-#include "instances/runtime/idle_states.hpp"
+#include "instances/runtime/setup/idle_states.hpp"
 
 #include <string>
 

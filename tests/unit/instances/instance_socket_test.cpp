@@ -1,4 +1,4 @@
-#include "instances/runtime/instance_socket.hpp"
+#include "instances/runtime/instance/instance_socket.hpp"
 
 #include <array>
 #include <filesystem>

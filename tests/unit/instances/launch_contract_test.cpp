@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "instances/runtime/options.hpp"
+#include "instances/runtime/setup/options.hpp"
 
 namespace plchost {
 namespace {

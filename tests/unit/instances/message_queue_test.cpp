@@ -1,4 +1,4 @@
-#include "instances/runtime/message_queue.hpp"
+#include "instances/runtime/application/message_queue.hpp"
 
 #include <map>
 #include <string>

@@ -10,8 +10,8 @@
 
 #include <gtest/gtest.h>
 
-#include "instances/runtime/areas/output_image.hpp"
-#include "instances/runtime/areas/task_areas.hpp"
+#include "instances/runtime/memory/output_image.hpp"
+#include "instances/runtime/memory/task_areas.hpp"
 #include "shm/plc_process_image.h"
 #include "shm/pool/memory_file.hpp"
 #include "tests/support/own_name.hpp"

@@ -10,7 +10,7 @@
 
 #include "instances/launch/launch_contract.hpp"
 #include "instances/plc_app.h"
-#include "instances/runtime/retain/retain_keeper.hpp"
+#include "instances/runtime/memory/retain_keeper.hpp"
 #include "shm/pool/memory_file.hpp"
 #include "shm/pool/object_pool.hpp"
 #include "tests/support/own_name.hpp"

@@ -1,5 +1,5 @@
 // The files of retain variables: what is cut, changed or torn is never taken for values.
-#include "instances/runtime/retain/retain_image.hpp"
+#include "instances/runtime/memory/retain_image.hpp"
 
 #include <csignal>
 #include <cstring>
@@ -13,7 +13,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "instances/runtime/retain/retain_files.hpp"
+#include "instances/runtime/memory/retain_files.hpp"
 #include "tests/support/own_name.hpp"
 
 namespace plchost {

@@ -1,5 +1,5 @@
 // Where retain and persistent variables come from at a start, and when they are written.
-#include "instances/runtime/retain/retain_keeper.hpp"
+#include "instances/runtime/memory/retain_keeper.hpp"
 
 #include <array>
 #include <atomic>

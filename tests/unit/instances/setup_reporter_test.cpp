@@ -1,4 +1,4 @@
-#include "instances/runtime/setup_reporter.hpp"
+#include "instances/runtime/setup/setup_reporter.hpp"
 
 #include <array>
 

@@ -1,0 +1,42 @@
+// What an application says of itself when it is loaded, what it asks about its start, and its log: see
+// plc_app.h.
+
+#include "instances/runtime/application/application_host.hpp"
+#include "shm/base/names.hpp"
+
+using plchost::ApplicationHost;
+
+void __sys__setup__tasks(sys_setup_tasks_struct* p) {
+  if (ApplicationHost* const host = ApplicationHost::current_for_control()) host->set_up_tasks(p);
+}
+
+RTS_RESULT plc_set_task_options(const char* pszTask, const Task_Options* pOptions) {
+  ApplicationHost* const host = ApplicationHost::current_for_control();
+  return host == nullptr ? ERR_NOTINITIALIZED : host->set_task_options(pszTask, pOptions);
+}
+
+RTS_RESULT plc_keep_variables(const char* pszName, void* pAddress, unsigned int dwBytes, RTS_UI64 qwLayout) {
+  ApplicationHost* const host = ApplicationHost::current_for_control();
+  if (host == nullptr) return ERR_NOTINITIALIZED;
+  return host->keep_variables({.name = pszName == nullptr
+                                           ? std::string()
+                                           : std::string(plchost::cut(pszName, PLC_MAX_VARIABLE_NAME + 1)),
+                               .address = pAddress,
+                               .bytes = dwBytes,
+                               .layout = qwLayout});
+}
+
+int plc_online_change() {
+  const ApplicationHost* const host = ApplicationHost::current_for_control();
+  return host != nullptr && host->online_change() ? 1 : 0;
+}
+
+int plc_start_kind() {
+  const ApplicationHost* const host = ApplicationHost::current();
+  return host == nullptr ? PLC_START_FIRST : host->start_kind();
+}
+
+void plc_log(int nLevel, const char* pszText) {
+  ApplicationHost* const host = ApplicationHost::current();
+  if (host != nullptr && pszText != nullptr) host->messages().push(nLevel, pszText);
+}

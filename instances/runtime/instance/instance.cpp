@@ -1,0 +1,325 @@
+#include "instances/runtime/instance/instance.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <utility>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "instances/runtime/application/declare_application.hpp"
+#include "instances/runtime/setup/set_up_watch.hpp"
+#include "instances/runtime/tasks/operator_events.hpp"
+#include "instances/runtime/tasks/task_builder.hpp"
+#include "schedulers/faults/watchdog_rules.hpp"
+#include "shm/base/log.hpp"
+#include "shm/base/names.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr auto kTellAgain = std::chrono::seconds(10);
+
+// As many as anybody reads: the file is a stranger's.
+void log_what_is_left_alone(const InstanceSettings& settings) {
+  if (!settings.foreign_sections.empty()) {
+    spdlog::info("settings: sections of other programs, left alone: {}",
+                 join_some(settings.foreign_sections));
+  }
+  if (!settings.foreign_components.empty()) {
+    spdlog::info("settings: components of other programs, left alone: {}",
+                 join_some(settings.foreign_components));
+  }
+  constexpr std::size_t kMost = 50;
+  const auto& remarks = settings.remarks;
+  for (std::size_t i = 0; i < std::min(remarks.size(), kMost); ++i) spdlog::warn("settings: {}", remarks[i]);
+  if (remarks.size() > kMost) spdlog::warn("settings: {} more remarks", remarks.size() - kMost);
+}
+
+}  // namespace
+
+std::unique_ptr<Instance> Instance::set_up(const Options& options, SetupReporter& reporter) {
+  struct Step {
+    SetupStep step;
+    Result<std::string> (Instance::*take)();
+  };
+  // The tasks' statistics lie in the status page, so it is made before their threads.
+  constexpr std::array kSteps = {
+      Step{SetupStep::bind_core, &Instance::bind_core},
+      Step{SetupStep::lock_memory, &Instance::lock_memory},
+      Step{SetupStep::read_settings, &Instance::read_settings_file},
+      Step{SetupStep::attach_pool, &Instance::attach_pool},
+      Step{SetupStep::open_control_socket, &Instance::open_control_socket},
+      Step{SetupStep::load_components, &Instance::load_components},
+      Step{SetupStep::load_application, &Instance::load_application},
+      Step{SetupStep::make_status_page, &Instance::make_status_page},
+      Step{SetupStep::make_tasks, &Instance::make_tasks},
+      Step{SetupStep::start_scheduler, &Instance::start_scheduler},
+  };
+  std::unique_ptr<Instance> instance(new Instance(options));
+  for (const Step& step : kSteps) {
+    auto remark = instance->take_watched(step.step, reporter, step.take);
+    if (!remark) {
+      reporter.failed(step.step, remark.error());
+      (void)instance->shut_down();
+      return nullptr;
+    }
+    reporter.done(step.step, *remark);
+  }
+  instance->beat();
+  reporter.done(SetupStep::ready);
+  return instance;
+}
+
+// Code of components and of the application runs in these two steps.
+Result<std::string> Instance::take_watched(SetupStep step, SetupReporter& reporter,
+                                           Result<std::string> (Instance::*take)()) {
+  if (step != SetupStep::load_components && step != SetupStep::load_application) return (this->*take)();
+  SetUpWatch watch(start_.settings.scheduler.watchdog.default_time, [&](const Error& error) {
+    reporter.failed(step, error);
+    (void)std::fflush(nullptr);
+    ::_exit(kExitSetupFailed);  // the thread that sets up may hold any lock
+  });
+  auto remark = (this->*take)();
+  if (auto ended = watch.end(); !ended && remark) return std::unexpected(std::move(ended).error());
+  return remark;
+}
+
+Instance::~Instance() {
+  if (!is_down_) (void)shut_down();
+}
+
+Result<std::string> Instance::bind_core() {
+  auto granted = bind_to_cores(options_.launch.cores);
+  if (!granted) return std::unexpected(std::move(granted).error());
+  cores_ = *std::move(granted);
+  return {};
+}
+
+Result<std::string> Instance::lock_memory() {
+  real_time_ = set_up_real_time();
+  return real_time_.remark;
+}
+
+Result<std::string> Instance::read_settings_file() {
+  auto start = read_start_settings(options_.launch.settings);
+  if (!start) return std::unexpected(std::move(start).error());
+  start_ = *std::move(start);
+  log_what_is_left_alone(start_.settings);
+  choose_scheduler();
+  return hold_idle_states();
+}
+
+// Needs the settings, and the cores that bind_core() has got.
+std::string Instance::hold_idle_states() {
+  idle_hold_ = IdleHold::take(start_.settings.idle_states, cores_, options_.launch.run_directory, {});
+  return idle_hold_.as_wanted() ? std::string() : fmt::format("idle states: {}", idle_hold_.status());
+}
+
+void Instance::choose_scheduler() {
+  const std::string asked = std::exchange(scheduler_, scheduler_for(scheduler_, start_.settings));
+  if (asked.empty() || start_.settings.timer_mode != TimerMode::one_shot ||
+      scheduler_ == "CmpScheduleOneShot")
+    return;
+  spdlog::warn(
+      "settings: TimerMode=OneShot asks for CmpScheduleOneShot, but {} was asked for at the start and is "
+      "used",
+      scheduler_);
+}
+
+Result<std::string> Instance::attach_pool() {
+  auto claim = claim_name(options_.launch);
+  if (!claim) return std::unexpected(std::move(claim).error());
+  name_claim_ = *std::move(claim);
+  // Of a manager's instance the manager has made sure whose the pool is, and its owner can be a third user.
+  const bool managed = options_.launch.report_fd >= 0;
+  auto pool = managed ? ObjectPool::attach(options_.launch.pool) : ObjectPool::create(options_.launch.pool);
+  if (!pool && managed && pool.error().code == ErrorCode::not_found) {
+    pool = ObjectPool::create(options_.launch.pool);
+  }
+  if (!pool) return std::unexpected(std::move(pool).error());
+  pool_.emplace(*std::move(pool));
+  host_.emplace(options_.launch.name, &*pool_);
+  host_->set_start_kind(static_cast<int>(options_.launch.start_kind));
+  host_->events().clear_own();
+  if (auto prepared = prepare_host(start_, *host_); !prepared)
+    return std::unexpected(std::move(prepared).error());
+  return {};
+}
+
+Result<std::string> Instance::open_control_socket() {
+  if (options_.launch.run_directory.empty()) return {};
+  auto server =
+      InstanceSocket::listen(instance_socket_path(options_.launch.run_directory, options_.launch.name),
+                             [this](const ControlRequest& request, const InstanceSocket::Asker& asker) {
+                               return handle(request, asker);
+                             });
+  if (!server) return std::unexpected(std::move(server).error());
+  control_.emplace(*std::move(server));
+  restore_operator_events();
+  return {};
+}
+
+void Instance::restore_operator_events() {
+  const std::string path = operator_events_path(options_.launch.run_directory, options_.launch.name);
+  for (const std::string& event : read_operator_events(path)) {
+    if (const auto done = host_->events().register_by_operator(event); !done) {
+      spdlog::warn("event '{}' of the operator: {}", event, done.error().describe());
+    }
+  }
+}
+
+Result<std::string> Instance::load_components() {
+  auto loaded = plchost::load_components(start_.settings, ComponentHooks::init, components_, *host_);
+  if (!loaded) return std::unexpected(std::move(loaded).error());
+  return {};
+}
+
+Result<std::string> Instance::load_application() {
+  if (options_.launch.application.empty()) return "no application is given: there is nothing to run";
+  auto application = declare_application(options_.launch.application, start_, *host_);
+  if (!application) return std::unexpected(std::move(application).error());
+  application_.emplace(*std::move(application));
+  return host_->areas().place(areas_environment(options_.launch, start_.settings, *application_, &*pool_),
+                              application_->tasks_to_change());
+}
+
+Result<std::string> Instance::make_status_page() {
+  std::vector<TaskIdentity> identities;
+  if (application_) {
+    for (const TaskConfig& task : application_->tasks()) identities.push_back(identity_of(task));
+  }
+  auto page = InstancePage::create(options_.launch.pool, options_.launch.name, identities);
+  if (!page) return std::unexpected(std::move(page).error());
+  page_.emplace(*std::move(page));
+  auto transitions = TransitionRing::open(options_.launch.pool, options_.launch.name);
+  if (!transitions) return std::unexpected(std::move(transitions).error());
+  transitions_.emplace(*std::move(transitions));
+  return {};
+}
+
+Result<std::string> Instance::make_tasks() {
+  if (!application_) return {};
+  TaskEnvironment environment{
+      .find_event = [this](std::string_view event) { return host_->events().bind_task(event); },
+      .statistics = [this](std::size_t index) -> TaskStatistics& {
+        return page_->statistics(static_cast<std::uint32_t>(index));
+      },
+      .fault_record = [this](std::size_t index) -> Seqlock<FaultRecord>& {
+        return page_->task(static_cast<std::uint32_t>(index)).fault;
+      },
+      .state_changed =
+          [this](std::size_t index, bool running) {
+            const auto state = running ? PageTaskState::running : PageTaskState::stopped;
+            const auto task = static_cast<std::uint32_t>(index);
+            // A task that comes back too late has been in exception all the same.
+            if (page_->task_state(task) != PageTaskState::exception) page_->set_task_state(task, state);
+          },
+      // Not before: in the first phase of a stop the others run what is posted. Nor later: a task in its last
+      // cycle does not.
+      .to_park = [this](std::size_t index) { unbind(index); },
+      .catch_faults = true,
+  };
+  auto tasks = TaskSet::create(clock_, options_.band, application_->tasks(), std::move(environment));
+  if (!tasks) return std::unexpected(std::move(tasks).error());
+  tasks_ = *std::move(tasks);
+  host_->task_table().attach(tasks_.get());
+  if (const std::string& reference = start_.settings.scheduler.distributed_clock.reference;
+      !reference.empty()) {
+    reference_.follow(tasks_->distributed_clock(), options_.launch.pool, reference);
+  }
+  notify_tasks(EVT_ExternalEventTaskCreateDone);
+  for (const std::string& line :
+       describe_cycle_limits(application_->tasks(), start_.settings.scheduler.watchdog)) {
+    spdlog::info("watchdog: {}", line);
+  }
+  life_.go_to(ApplicationState::stopped, fmt::format("{} is loaded ({} start)", application_->name(),
+                                                     to_string(options_.launch.start_kind)));
+  return {};
+}
+
+Result<std::string> Instance::start_scheduler() {
+  if (!tasks_ || options_.launch.stopped) return {};
+  return start("start of the process");
+}
+
+void Instance::notify_tasks(unsigned event) {
+  for (std::size_t i = 0; i < application_->tasks().size(); ++i) {
+    const TaskConfig& task = application_->tasks()[i];
+    if (task.kind != TaskKind::external) continue;
+    if (const auto handle = host_->events().open(task.external_event)) {
+      host_->notify(event, {.pTaskInfo = &application_->info(i), .hEvent = *handle});
+    }
+  }
+}
+
+void Instance::report_tick() {
+  if (!tasks_) return;
+  TickReport now = tasks_->tick_report();
+  if (!now.fallback.empty() && now.fallback != tick_.fallback) {
+    spdlog::error("tick source: {}; the system's clock ticks instead", now.fallback);
+  }
+  tick_ = std::move(now);
+}
+
+void Instance::beat() {
+  host_->write_messages();
+  if (control_) control_->beat();
+  report_tick();
+  if (life_.state() == ApplicationState::exception) (void)tasks_->still_busy(TimePoint{});
+  if (tasks_) tasks_->look_after_posts();
+  if (tasks_) {
+    for (const std::string& news : tasks_->look_after_processor()) spdlog::warn("{}", news);
+  }
+  host_->events().refresh();
+  reference_.refresh();
+  InstanceRuntime runtime;
+  runtime.pid = ::getpid();
+  runtime.core = cores_.size() == 1 ? cores_.front() : -1;
+  runtime.running = life_.state() == ApplicationState::running ? 1 : 0;
+  runtime.state = life_.state();
+  runtime.problem.assign(life_.problem());
+  runtime.memory_locked = real_time_.memory_locked ? 1 : 0;
+  runtime.heartbeat_ns = MonotonicClock::now().time_since_epoch().count();
+  runtime.scheduler.assign(scheduler_);
+  runtime.idle_states.assign(idle_hold_.status());
+  runtime.tick_source.assign(tick_.source);
+  runtime.tick_fallback.assign(tick_.fallback);
+  if (application_) runtime.application.assign(application_->path());
+  if (tasks_ && tasks_->running()) runtime.clock = clock_runtime(tasks_->distributed_clock());
+  runtime.clock.reference.assign(start_.settings.scheduler.distributed_clock.reference);
+  runtime.clock.problem.assign(reference_.problem());
+  runtime.retain_problem.assign(host_->areas().retain_problem());
+  page_->write_runtime(runtime);
+  look_after_page();
+  for (const std::string& loss : host_->areas().look_for_losses()) spdlog::warn("{}", loss);
+}
+
+// The manager hears of state and heartbeat over the control socket as long as the page cannot tell them.
+void Instance::look_after_page() {
+  if (page_->lost()) {
+    if (std::exchange(page_lost_told_, true)) return;
+    spdlog::warn(
+        "the page of this instance was cut short by another program: nobody sees its figures any more "
+        "until it is started again");
+    return;
+  }
+  const bool written_over = page_->keep([this](std::uint32_t index) {
+    if (!tasks_) return KnownFault{};
+    const TaskFault& fault = tasks_->task(index).fault();
+    return KnownFault{.raised = fault.raised(), .record = fault.published()};
+  });
+  if (!written_over) return;
+  const TimePoint now = MonotonicClock::now();
+  ++page_damages_;
+  if (page_damages_ > 1 && now < page_told_ + kTellAgain) return;
+  page_told_ = now;
+  spdlog::warn(
+      "the page of this instance was written over by another program ({} times so far) and is written anew; "
+      "statistics of tasks may be wrong: reset them",
+      page_damages_);
+}
+
+}  // namespace plchost

@@ -1,0 +1,172 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "instances/runtime/application/application.hpp"
+#include "instances/runtime/application/application_host.hpp"
+#include "instances/runtime/application/components.hpp"
+#include "instances/runtime/application/declare_application.hpp"
+#include "instances/runtime/application/online_change.hpp"
+#include "instances/runtime/instance/application_state.hpp"
+#include "instances/runtime/instance/instance_socket.hpp"
+#include "instances/runtime/settings/device_description.hpp"
+#include "instances/runtime/settings/settings.hpp"
+#include "instances/runtime/setup/idle_states.hpp"
+#include "instances/runtime/setup/options.hpp"
+#include "instances/runtime/setup/process_setup.hpp"
+#include "instances/runtime/setup/setup_reporter.hpp"
+#include "instances/runtime/time/reference_memory.hpp"
+#include "schedulers/task_set.hpp"
+#include "shm/pool/instance_page.hpp"
+#include "shm/pool/object_pool.hpp"
+#include "shm/pool/transition_ring.hpp"
+
+namespace plchost {
+
+/// One PLC runtime: everything that a plc-instance process owns. All of it on the control thread; the tasks'
+/// threads are TaskSet's.
+class Instance {
+ public:
+  /// Takes the steps of SetupStep one after the other and reports each. Nothing: one failed, and was
+  /// reported; all that was begun is undone.
+  [[nodiscard]] static std::unique_ptr<Instance> set_up(const Options& options, SetupReporter& reporter);
+
+  /// Ends the tasks in order, then the application and the components, and takes the instance out of the
+  /// pool.
+  ~Instance();
+  Instance(const Instance&) = delete;
+  Instance& operator=(const Instance&) = delete;
+
+  /// Readable when serve_control() has something to do; -1: no control socket.
+  [[nodiscard]] int control_fd() const noexcept { return control_ ? control_->fd() : -1; }
+  void serve_control() { control_->serve(); }
+
+  /// Readable when serve_faults() has something to do; -1: there are no tasks.
+  [[nodiscard]] int fault_fd() const noexcept { return tasks_ ? tasks_->fault_fd() : -1; }
+  /// Takes the faults of tasks: each is logged, kept, and shown in the status page; one of the whole
+  /// application puts it into exception.
+  void serve_faults();
+  /// A thread is parked in the application's code for good.
+  [[nodiscard]] bool has_parked_thread() const noexcept { return parked_; }
+
+  /// Every kHeartbeat: status page, log of the application, handles of foreign events.
+  void beat();
+  static constexpr auto kHeartbeat = std::chrono::milliseconds(100);
+
+  /// Goes on with a stop, a single cycle or an online change that is under way. Never waits. To be called now
+  /// and then.
+  void advance();
+  /// How soon advance() wants to be called; nothing: no need.
+  [[nodiscard]] std::optional<Duration> wants_advance_in() const noexcept;
+
+  /// Something went wrong in the application: `reason` says what, in which task. All tasks park at the end of
+  /// their cycles, nobody waits for them, and only a fresh process leads out of it.
+  void enter_exception(const std::string& reason);
+
+  /// Begins the end of the process: the tasks come to the end of their cycles, as in a stop. The second call
+  /// says that nobody wants to wait for that.
+  void begin_shutdown(std::string_view why);
+  /// An end was asked for, and nothing is left to wait for.
+  [[nodiscard]] bool ended() const noexcept;
+
+  /// Takes everything apart; called once before the end. timed_out: a task is caught in its cycle; then this
+  /// object cannot be destroyed, because that task's thread still uses it.
+  [[nodiscard]] Result<void> shut_down();
+
+ private:
+  explicit Instance(const Options& options)
+      : options_(options), scheduler_(options.launch.scheduler), life_(recorder()) {}
+
+  // The steps of set_up().
+  [[nodiscard]] Result<std::string> take_watched(SetupStep step, SetupReporter& reporter,
+                                                 Result<std::string> (Instance::*take)());
+  [[nodiscard]] Result<std::string> bind_core();
+  [[nodiscard]] Result<std::string> lock_memory();
+  [[nodiscard]] Result<std::string> read_settings_file();
+  [[nodiscard]] Result<std::string> attach_pool();
+  [[nodiscard]] Result<std::string> open_control_socket();
+  [[nodiscard]] Result<std::string> load_components();
+  [[nodiscard]] Result<std::string> load_application();
+  [[nodiscard]] Result<std::string> make_status_page();
+  [[nodiscard]] Result<std::string> make_tasks();
+  [[nodiscard]] Result<std::string> start_scheduler();
+
+  /// Who waits for the end of a stop, of a single cycle or of an online change.
+  struct Waiting {
+    InstanceSocket::Asker asker;
+    ControlVerb verb = ControlVerb::stop;
+  };
+
+  // What it is asked to: instance_control.cpp
+  [[nodiscard]] std::optional<ControlReply> handle(const ControlRequest& request,
+                                                   const InstanceSocket::Asker& asker);
+  [[nodiscard]] Result<std::string> obey(const ControlRequest& request);
+  [[nodiscard]] Result<std::string> set_scheduler(const std::string& name);
+  [[nodiscard]] static Result<std::string> set_log_level(const std::string& name);
+  [[nodiscard]] Result<std::string> change_registration(const ControlRequest& request);
+  [[nodiscard]] Result<std::string> reset_statistics(const std::string& task);
+  [[nodiscard]] std::string status() const;
+
+  // Another version of the application: instance_change.cpp
+  [[nodiscard]] Result<std::string> begin_change(const std::string& path);
+  void advance_change();
+  [[nodiscard]] std::string finish_change(Duration held);
+  void drop_change(const std::string& why);
+
+  // The life of the application: instance_life.cpp
+  [[nodiscard]] ApplicationLife::Record recorder();
+  [[nodiscard]] Result<std::string> start(std::string_view why);
+  void unbind(std::size_t index);
+  void begin_stop(std::string_view why);
+  [[nodiscard]] Result<std::string> begin_single_cycle();
+  [[nodiscard]] bool in_transition() const noexcept;
+  void finish_transition(const std::vector<std::size_t>& stuck);
+  [[nodiscard]] std::string time_out(std::size_t task);
+  void answer_waiting(ErrorCode code, const std::string& text);
+
+  [[nodiscard]] std::string hold_idle_states();
+  void choose_scheduler();
+  void report_tick();
+  [[nodiscard]] std::string keep_fault(const TaskSet::Fault& fault);
+  void restore_operator_events();
+  void notify_tasks(unsigned event);
+  void look_after_page();
+
+  Options options_;
+  std::string scheduler_;
+  TickReport tick_;  // as it was logged last
+  std::vector<int> cores_;
+  RealTimeSetup real_time_;
+  StartSettings start_;
+  IdleHold idle_hold_;
+  NameClaim name_claim_;
+  std::optional<ObjectPool> pool_;
+  std::optional<ApplicationHost> host_;
+  Components components_;
+  std::optional<Application> application_;
+  std::optional<InstancePage> page_;
+  bool page_lost_told_ = false;
+  TimePoint page_told_;             // when it was told last that the page was written over
+  std::uint64_t page_damages_ = 0;  // how often it was
+  ReferenceMemory reference_;
+  LinuxClock clock_;
+  std::unique_ptr<TaskSet> tasks_;        // uses all of the above: destroyed before them
+  std::unique_ptr<OnlineChange> change_;  // waits for a moment between all cycles
+  TimePoint change_ends_;                 // at the latest
+  std::optional<InstanceSocket> control_;
+  std::optional<TransitionRing> transitions_;
+  ApplicationLife life_;
+  std::vector<bool> unbound_;  // tasks of external events that run nothing any more, since the last start
+  std::optional<Waiting> waiting_;
+  TimePoint single_cycle_ends_;  // at the latest
+  bool shutdown_requested_ = false;
+  bool hurried_ = false;
+  bool is_down_ = false;
+  bool parked_ = false;
+};
+
+}  // namespace plchost

@@ -1,0 +1,72 @@
+// How another version of the application takes over while it runs.
+
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "instances/runtime/instance/instance.hpp"
+#include "shm/base/log.hpp"
+#include "shm/base/names.hpp"
+
+namespace plchost {
+
+namespace {
+
+// For a moment in which no task is in a cycle. Less than the manager waits for an answer.
+constexpr auto kPatience = std::chrono::seconds(6);
+
+}  // namespace
+
+// Text: it has taken over. Empty: it will, or not, and who asked hears of it then.
+Result<std::string> Instance::begin_change(const std::string& path) {
+  if (change_) return failure(ErrorCode::busy, "an online change is under way: try again when it is done");
+  if (const auto faulty = tasks_->tasks_in_exception(); !faulty.empty()) {
+    return failure(ErrorCode::wrong_state,
+                   fmt::format("in exception: task {}, which may be in the code that would go; reset first",
+                               join_names(faulty)));
+  }
+  auto change = OnlineChange::prepare(path, *application_, *host_, start_.settings.tasks);
+  if (!change) return std::unexpected(std::move(change).error());
+  change_ = *std::move(change);
+  change_ends_ = MonotonicClock::now() + kPatience;
+  if (const auto held = tasks_->between_cycles([this] { change_->take_over(); })) return finish_change(*held);
+  return {};
+}
+
+void Instance::advance_change() {
+  if (const auto faulty = tasks_->tasks_in_exception(); !faulty.empty()) {
+    return drop_change(fmt::format("in exception: task {}", join_names(faulty)));
+  }
+  if (const auto held = tasks_->between_cycles([this] { change_->take_over(); })) {
+    const std::string text = finish_change(*held);
+    beat();
+    return answer_waiting(ErrorCode::ok, text);
+  }
+  if (MonotonicClock::now() < change_ends_) return;
+  const auto busy = tasks_->tasks_in_cycle();
+  const std::string last = busy.empty() ? std::string() : fmt::format(", the last time {}", join_names(busy));
+  drop_change(fmt::format("at each look for {} s a task was within its cycle{}", kPatience.count(), last));
+}
+
+std::string Instance::finish_change(Duration held) {
+  const std::string before = change_->path();  // it holds the version before now
+  const std::string carried = change_->describe();
+  // The callbacks find the new version in application_.
+  change_->finish([this] { notify_tasks(EVT_ExternalEventTaskCreateDone); });
+  change_.reset();
+  const double us = std::chrono::duration<double, std::micro>(held).count();
+  life_.stay(fmt::format("online change to {}", application_->path()));
+  std::string text = fmt::format("taken over between two cycles, within {:.0f} us: {}", us, carried);
+  spdlog::info("online change from {} to {}: {}", before, application_->path(), text);
+  return text;
+}
+
+// Nothing is changed.
+void Instance::drop_change(const std::string& why) {
+  if (!change_) return;
+  const std::string path = change_->path();
+  change_.reset();
+  answer_waiting(ErrorCode::refused, fmt::format("{} has not taken over: {}; nothing is changed", path, why));
+}
+
+}  // namespace plchost

@@ -1,0 +1,151 @@
+// What an Instance does when it is asked to, over its control socket.
+
+#include <utility>
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include "instances/runtime/instance/instance.hpp"
+#include "instances/runtime/tasks/operator_events.hpp"
+#include "shm/base/log.hpp"
+#include "shm/base/log_levels.hpp"
+#include "shm/base/names.hpp"
+
+namespace plchost {
+
+std::optional<ControlReply> Instance::handle(const ControlRequest& request,
+                                             const InstanceSocket::Asker& asker) {
+  auto done = obey(request);
+  const bool takes_time = request.verb == ControlVerb::stop || request.verb == ControlVerb::single_cycle;
+  if (done && request.verb == ControlVerb::change_application && change_) {
+    waiting_ = Waiting{.asker = asker, .verb = request.verb};
+    return std::nullopt;
+  }
+  if (done && takes_time && in_transition()) {
+    answer_waiting(ErrorCode::wrong_state,
+                   "stopped before it was over");  // a single cycle that is broken off
+    waiting_ = Waiting{.asker = asker, .verb = request.verb};
+    beat();
+    advance();
+    return std::nullopt;
+  }
+  if (request.verb != ControlVerb::status) {
+    spdlog::info("{} {}: {}", to_string(request.verb), request.argument,
+                 done ? "done" : done.error().describe());
+  }
+  if (page_) beat();  // so that who was answered finds the new state in the page
+  if (!done) return ControlReply{.number = 0, .code = done.error().code, .text = done.error().describe()};
+  return ControlReply{.number = 0, .code = ErrorCode::ok, .text = *std::move(done)};
+}
+
+Result<std::string> Instance::obey(const ControlRequest& request) {
+  if (request.instance != options_.launch.name) {
+    return failure(ErrorCode::not_found, fmt::format("this is instance '{}', the request is for '{}'",
+                                                     options_.launch.name, request.instance));
+  }
+  if (auto admitted = life_.admit(request.verb); !admitted || !admitted->empty()) {
+    return admitted ? admitted
+                    : failure_in(fmt::format("instance '{}'", options_.launch.name), admitted.error());
+  }
+  const bool ends_change = request.verb == ControlVerb::start || request.verb == ControlVerb::stop ||
+                           request.verb == ControlVerb::single_cycle || request.verb == ControlVerb::shutdown;
+  if (ends_change) drop_change(fmt::format("'{}' came first", to_string(request.verb)));
+  switch (request.verb) {
+    case ControlVerb::start:
+      return start("asked to start");
+    case ControlVerb::stop:
+      begin_stop("asked to stop");
+      return {};
+    case ControlVerb::single_cycle:
+      return begin_single_cycle();
+    case ControlVerb::set_scheduler:
+      return set_scheduler(request.argument);
+    case ControlVerb::change_application:
+      return begin_change(request.argument);
+    case ControlVerb::register_event:
+    case ControlVerb::unregister_event:
+      return change_registration(request);
+    case ControlVerb::reset_statistics:
+      return reset_statistics(request.argument);
+    case ControlVerb::shutdown:
+      begin_shutdown("the process is to end");
+      return {};
+    case ControlVerb::status:
+      return status();
+    case ControlVerb::set_log_level:
+      return set_log_level(request.argument);
+    case ControlVerb::reset:
+    case ControlVerb::reset_cold:
+    case ControlVerb::restart:
+    case ControlVerb::load_application:
+    case ControlVerb::download_application:
+    case ControlVerb::rollback_application:
+    case ControlVerb::check_host:
+    case ControlVerb::reload_host:
+    case ControlVerb::list_objects:
+    case ControlVerb::list_nodes:
+    case ControlVerb::list_routes:
+    case ControlVerb::read_clock:
+    case ControlVerb::read_log:
+      break;
+  }
+  return failure(ErrorCode::unsupported,
+                 fmt::format("'{}' is the manager's to do: ask it", to_string(request.verb)));
+}
+
+Result<std::string> Instance::set_scheduler(const std::string& name) {
+  if (const auto known = find_scheduler(name); !known) return std::unexpected(known.error());
+  if (life_.state() == ApplicationState::running) {
+    if (auto switched = tasks_->switch_to(name, start_.settings.scheduler); !switched) {
+      return std::unexpected(std::move(switched).error());
+    }
+  }
+  scheduler_ = name;
+  return {};
+}
+
+Result<std::string> Instance::set_log_level(const std::string& name) {
+  if (!is_log_level(name)) {
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("no log level '{}'; there are {}", shown(name), join_names(kLogLevels)));
+  }
+  spdlog::set_level(spdlog::level::from_str(name));
+  return {};
+}
+
+Result<std::string> Instance::change_registration(const ControlRequest& request) {
+  EventTable& events = host_->events();
+  const bool add = request.verb == ControlVerb::register_event;
+  const auto changed =
+      add ? events.register_by_operator(request.argument) : events.unregister_by_operator(request.argument);
+  if (!changed && changed.error().code != ErrorCode::already_exists) return std::unexpected(changed.error());
+  const auto kept =
+      write_operator_events(operator_events_path(options_.launch.run_directory, options_.launch.name),
+                            events.registered_by_operator());
+  if (!changed) return changed.error().message;  // it was there: what was wanted holds
+  if (!kept) return fmt::format("done, but not kept for the next start: {}", kept.error().describe());
+  return {};
+}
+
+Result<std::string> Instance::reset_statistics(const std::string& task) {
+  if (!tasks_) {
+    return failure(ErrorCode::wrong_state,
+                   fmt::format("instance '{}' has no application, so no tasks", options_.launch.name));
+  }
+  if (auto done = tasks_->reset_statistics(task); !done) return std::unexpected(std::move(done).error());
+  return {};
+}
+
+static_assert(std::to_underlying(ApplicationState::exception) == kLastApplicationState);
+
+std::string Instance::status() const {
+  return encode(InstanceReport{.pid = ::getpid(),
+                               .state = std::to_underlying(life_.state()),
+                               .problem = life_.problem(),
+                               .application = application_ ? application_->path() : std::string(),
+                               .scheduler = scheduler_,
+                               .cores = cores_,
+                               .memory_locked = real_time_.memory_locked});
+}
+
+}  // namespace plchost

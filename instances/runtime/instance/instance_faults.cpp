@@ -1,0 +1,54 @@
+// What an Instance does when one of its tasks has a fault.
+
+#include <span>
+
+#include <fmt/format.h>
+
+#include "instances/runtime/application/symbol_name.hpp"
+#include "instances/runtime/instance/instance.hpp"
+#include "shm/base/exception_history.hpp"
+#include "shm/base/log.hpp"
+
+namespace plchost {
+
+namespace {
+
+ExceptionEntry entry_of(const TaskSet::Fault& fault, const std::string& application) {
+  const FaultRecord& record = fault.record;
+  ExceptionEntry entry = exception_entry(record, application, fault.name);
+  entry.whole_application = fault.whole_application;
+  entry.symbol = symbol_name(record.address);
+  if (entry.symbol.empty() && record.caller != 0) {
+    entry.symbol = fmt::format("no code; called from {}", symbol_name(record.caller));
+  }
+  return entry;
+}
+
+}  // namespace
+
+void Instance::serve_faults() {
+  while (const auto fault = tasks_->take_fault()) {
+    const std::string reason = keep_fault(*fault);
+    if (fault->whole_application) {
+      enter_exception(reason);
+    } else {
+      unbind(fault->task);  // nobody runs what is posted to it any more
+    }
+  }
+}
+
+// Logged, shown in the status page, and written down. What is to be said of it.
+std::string Instance::keep_fault(const TaskSet::Fault& fault) {
+  const ExceptionEntry entry = entry_of(fault, application_->path());
+  const std::string where = entry.symbol.empty() ? std::string() : fmt::format(" at {}", entry.symbol);
+  std::string reason = fmt::format("task '{}': {}{}", entry.task, entry.text, where);
+  spdlog::error("exception: {}", reason);
+  page_->set_task_state(static_cast<std::uint32_t>(fault.task), PageTaskState::exception);
+  const LaunchOptions& launch = options_.launch;
+  if (!launch.run_directory.empty()) {
+    keep_exceptions_of(launch.run_directory, launch.name, std::span(&entry, 1));
+  }
+  return reason;
+}
+
+}  // namespace plchost

@@ -1,0 +1,171 @@
+#include "instances/runtime/memory/area_memory.hpp"
+
+#include <cerrno>
+#include <filesystem>
+#include <utility>
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <sys/file.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "shm/base/system_call.hpp"
+#include "shm/pool/memory_file.hpp"
+
+namespace plchost {
+
+namespace {
+
+std::unexpected<Error> not_mapped(const AreaSettings& settings, std::string_view what, int error = 0) {
+  return failure(ErrorCode::refused,
+                 fmt::format("{}: [SysMem] Area.{}: {:#x} bytes at {:#x} of {}: {}", settings.where,
+                             settings.number, settings.size, settings.address, settings.device, what),
+                 error);
+}
+
+// `status` is that of an open file.
+FileRange range_in(const struct stat& status, std::uint64_t begin, std::uint64_t end) noexcept {
+  const bool device = S_ISCHR(status.st_mode);
+  return {.device = device ? status.st_rdev : status.st_dev,
+          .inode = device ? 0 : status.st_ino,
+          .begin = begin,
+          .end = end};
+}
+
+Result<void> check_file(const AreaSettings& settings, const struct stat& status) {
+  if (!S_ISREG(status.st_mode) && !S_ISCHR(status.st_mode)) {
+    return not_mapped(settings, "allowed is a character device or a plain file");
+  }
+  const auto size = static_cast<std::uint64_t>(status.st_size);
+  if (S_ISREG(status.st_mode) && (settings.address > size || settings.size > size - settings.address)) {
+    return not_mapped(settings, fmt::format("the file ends at {:#x}", size));
+  }
+  return {};
+}
+
+Result<UniqueFd> open_device(const AreaSettings& settings) {
+  UniqueFd fd(::open(settings.device.c_str(), O_RDWR | O_SYNC | O_CLOEXEC | O_NONBLOCK));
+  if (!fd) return not_mapped(settings, "cannot be opened", errno);
+  struct stat status{};
+  if (::fstat(fd.get(), &status) != 0) return not_mapped(settings, "fstat", errno);
+  if (auto fits = check_file(settings, status); !fits) return std::unexpected(fits.error());
+  return fd;
+}
+
+// The kernel takes it back when the process ends, however it ends.
+Result<UniqueFd> lock_file_of(const std::string& file) {
+  const std::string path = MemoryFile::path(file);
+  UniqueFd fd(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK));
+  if (!fd) return failure(ErrorCode::system, "open " + path, errno);
+  if (::flock(fd.get(), LOCK_EX | LOCK_NB) == 0) return fd;
+  const int error = errno;
+  if (error != EWOULDBLOCK) return failure(ErrorCode::system, "lock " + path, error);
+  return failure(ErrorCode::busy, fmt::format("{} has a writer already: another process", path));
+}
+
+}  // namespace
+
+std::optional<std::string> own_file_of_pool(const std::string& pool, const FileRange& range) {
+  std::error_code error;
+  for (std::filesystem::directory_iterator at(MemoryFile::kDirectory, error), end; !error && at != end;
+       at.increment(error)) {
+    const std::string file = at->path().filename();
+    const bool own = file == pool || (file.starts_with(pool + ".") && !memory_of_file(pool, file));
+    struct stat status{};
+    if (!own || ::stat(at->path().c_str(), &status) != 0) continue;
+    if (status.st_dev == range.device && status.st_ino == range.inode) return at->path();
+  }
+  return std::nullopt;
+}
+
+std::optional<FileRange> range_of_memory(const std::string& pool, const std::string& name) {
+  const std::string path = MemoryFile::path(pool_memory_name(pool, name));
+  struct stat status{};
+  if (::stat(path.c_str(), &status) != 0) return std::nullopt;
+  return range_in(status, 0, static_cast<std::uint64_t>(status.st_size));
+}
+
+std::optional<FileRange> range_of_device(const AreaSettings& settings) {
+  struct stat status{};
+  if (::stat(settings.device.c_str(), &status) != 0) return std::nullopt;
+  return range_in(status, settings.address, settings.address + settings.size);
+}
+
+Result<void> AreaMemory::check_device(const AreaSettings& settings) {
+  struct stat status{};
+  const bool there = ::stat(settings.device.c_str(), &status) == 0 &&
+                     ::faccessat(AT_FDCWD, settings.device.c_str(), R_OK | W_OK, AT_EACCESS) == 0;
+  if (!there) return not_mapped(settings, "cannot be opened", errno);
+  return check_file(settings, status);
+}
+
+Result<void> AreaMemory::check_pool(const ObjectPool& pool, const std::string& name, std::size_t bytes) {
+  const auto known = pool.look_at(name);
+  if (!known && known.error().code == ErrorCode::not_found) return {};
+  if (!known) return std::unexpected(known.error());
+  if (known->type != ObjectType::memory) {
+    return failure(ErrorCode::wrong_type,
+                   fmt::format("'{}' is no shared memory but a {}", name, to_string(known->type)));
+  }
+  if (known->size == bytes) return {};
+  return failure(ErrorCode::wrong_size,
+                 fmt::format("shared memory '{}' has {} bytes, {} were asked for", name, known->size, bytes));
+}
+
+Result<AreaMemory> AreaMemory::of_process(std::size_t bytes) {
+  AreaMemory memory;
+  void* const address =
+      ::mmap(nullptr, bytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
+  if (address == MAP_FAILED) {
+    const int error = errno;
+    return failure(ErrorCode::full, fmt::format("{} bytes of memory for areas", bytes), error);
+  }
+  memory.mapping_ = GuardedMapping(std::span(static_cast<std::byte*>(address), bytes));
+  memory.bytes_ = memory.mapping_.bytes();
+  return memory;
+}
+
+Result<AreaMemory> AreaMemory::of_device(const AreaSettings& settings) {
+  const auto fd = open_device(settings);
+  if (!fd) return std::unexpected(fd.error());
+  // Memory 0 of an uio device is mapped from its beginning, whatever is wanted of it.
+  const bool uio = settings.device.starts_with("/dev/uio");
+  const auto page = static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
+  const std::uint64_t begin = uio ? 0 : settings.address / page * page;
+  const std::uint64_t size = settings.address + settings.size - begin;
+  void* const address = ::mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, fd->get(),
+                               static_cast<off_t>(begin));
+  if (address == MAP_FAILED) return not_mapped(settings, "cannot be mapped", errno);
+  AreaMemory memory;
+  memory.mapping_ = GuardedMapping(std::span(static_cast<std::byte*>(address), size));
+  memory.bytes_ = memory.mapping_.bytes().subspan(settings.address - begin, settings.size);
+  memory.existed_ = true;
+  if (!memory.mapping_.guarded()) {
+    return not_mapped(settings, fmt::format("more than {} memories of others", MemoryGuard::kMost));
+  }
+  return memory;
+}
+
+Result<AreaMemory> AreaMemory::of_pool(ObjectPool& pool, const std::string& name, std::size_t bytes,
+                                       bool exclusive) {
+  auto created = pool.create_memory(name, bytes, {.keep = true});
+  if (!created) return std::unexpected(std::move(created).error());
+  AreaMemory memory;
+  memory.existed_ = !created->made;
+  memory.shared_ = std::move(created->object);
+  memory.bytes_ = memory.shared_.bytes();
+  if (!memory.shared_.guarded()) {
+    return failure(ErrorCode::full, fmt::format("shared memory '{}': more than {} memories of others", name,
+                                                MemoryGuard::kMost));
+  }
+  if (exclusive) {
+    auto lock = lock_file_of(pool_memory_name(pool.name(), name));
+    if (!lock) return std::unexpected(std::move(lock).error());
+    memory.lock_ = *std::move(lock);
+  }
+  return memory;
+}
+
+}  // namespace plchost

@@ -1,0 +1,163 @@
+#include "instances/runtime/memory/areas.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "shm/base/log.hpp"
+
+namespace plchost {
+
+namespace {
+
+thread_local const TaskCycle* cycle_here = nullptr;
+
+// Handles are numbers from 1 on.
+RTS_HANDLE handle_of(std::size_t area) noexcept {
+  // NOLINTNEXTLINE(performance-no-int-to-ptr): a number that looks like a handle
+  return reinterpret_cast<RTS_HANDLE>(area + 1);
+}
+std::size_t number_of(RTS_HANDLE handle) noexcept {
+  return reinterpret_cast<std::uintptr_t>(handle) - 1;
+}
+
+RTS_RESULT refuse_area(RTS_RESULT why, std::string_view text) {
+  spdlog::error("plc_declare_area: {}", text);
+  return why;
+}
+
+RTS_RESULT add_area(std::vector<DeclaredArea>& areas, const Plc_Area* area) {
+  if (area == nullptr) return refuse_area(ERR_PARAMETER, "pArea is null");
+  auto taken = from_declaration(*area);
+  if (!taken) return refuse_area(ERR_PARAMETER, taken.error().message);
+  if (std::ranges::find(areas, taken->name, &DeclaredArea::name) != areas.end()) {
+    return refuse_area(ERR_DUPLICATE, fmt::format("area '{}' is declared twice", taken->name));
+  }
+  if (areas.size() == PLC_MAX_AREAS) {
+    return refuse_area(ERR_NOMEMORY,
+                       fmt::format("area '{}' is one too many: {} can be", taken->name, PLC_MAX_AREAS));
+  }
+  areas.push_back(*std::move(taken));
+  return ERR_OK;
+}
+
+// Says on this thread whose cycle it runs: also if that ends with an exception.
+class CycleHere {
+ public:
+  explicit CycleHere(const TaskCycle* cycle) noexcept { cycle_here = cycle; }
+  ~CycleHere() { cycle_here = nullptr; }
+  CycleHere(const CycleHere&) = delete;
+  CycleHere& operator=(const CycleHere&) = delete;
+};
+
+}  // namespace
+
+void TaskCycle::set_address(std::size_t area, void* address) {
+  if (addresses_.size() <= area) addresses_.resize(area + 1, nullptr);
+  addresses_[area] = address;
+}
+
+void TaskCycle::begin() noexcept {
+  if (counter_ != nullptr) {
+    counter_->store(counter_->load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+    // Pairs with the acquire fence of KeptMemory::snapshot().
+    std::atomic_thread_fence(std::memory_order_release);
+  }
+  for (InputView* const view : inputs_) view->begin_cycle();
+  for (OutputView* const view : outputs_) view->begin_cycle();
+}
+
+void TaskCycle::run(const std::function<void()>& entry) const {
+  const CycleHere here(this);
+  entry();
+}
+
+void TaskCycle::end() noexcept {
+  for (OutputView* const view : outputs_) view->end_cycle();
+  if (counter_ != nullptr) {
+    counter_->store(counter_->load(std::memory_order_relaxed) + 1, std::memory_order_release);
+  }
+}
+
+RTS_HANDLE Areas::declare(const Plc_Area* area, RTS_RESULT& result) {
+  if (!open_) {
+    result = refuse_area(ERR_NOTINITIALIZED, "areas are declared from plc_app_init only");
+    return RTS_INVALID_HANDLE;
+  }
+  result = add_area(declared_, area);
+  return result == ERR_OK ? handle_of(declared_.size() - 1) : RTS_INVALID_HANDLE;
+}
+
+RTS_HANDLE Areas::declare_again(std::vector<DeclaredArea>& areas, const Plc_Area* area,
+                                RTS_RESULT& result) const {
+  result = add_area(areas, area);
+  if (result != ERR_OK) return RTS_INVALID_HANDLE;
+  const auto known = std::ranges::find(declared_, areas.back().name, &DeclaredArea::name);
+  return handle_of(static_cast<std::size_t>(known - declared_.begin()));
+}
+
+void Areas::tell_addresses(const std::vector<DeclaredArea>& areas) const {
+  for (const DeclaredArea& area : areas) {
+    const auto known = std::ranges::find(declared_, area.name, &DeclaredArea::name);
+    if (!placed_ || known == declared_.end()) continue;
+    const auto number = static_cast<std::size_t>(known - declared_.begin());
+    for (const AreaUse& use : area.uses) {
+      void* const address =
+          area.has_image() ? cycles_[task_number(use.task)].address(number) : plain_[number];
+      if (use.address != nullptr) *use.address = address;
+      if ((!area.has_image() || area.uses.size() == 1) && area.address != nullptr) *area.address = address;
+    }
+  }
+}
+
+void* Areas::address(RTS_HANDLE area) const noexcept {
+  const std::size_t number = number_of(area);
+  if (!placed_ || number >= declared_.size()) return nullptr;
+  if (!declared_[number].has_image()) return plain_[number];
+  return cycle_here == nullptr ? nullptr : cycle_here->address(number);
+}
+
+std::size_t Areas::kept_number(std::size_t area) const noexcept {
+  return static_cast<std::size_t>(std::ranges::count_if(
+      std::span(declared_).first(area), [](const DeclaredArea& one) { return one.is_kept(); }));
+}
+
+std::vector<std::string> Areas::look_for_losses() {
+  std::vector<std::string> losses;
+  for (Block& block : blocks_) {
+    if (!block.memory.lost() || std::exchange(block.loss_told, true)) continue;
+    losses.push_back(fmt::format(
+        "{} was cut short by another program: what is in these areas is seen by this instance only, "
+        "and is gone when it ends; give it its size again, and restart the instance",
+        block.source));
+  }
+  return losses;
+}
+
+RTS_RESULT Areas::state(RTS_HANDLE area, Plc_Area_State& state) const noexcept {
+  const std::size_t number = number_of(area);
+  if (number >= declared_.size() || state.dwSize != sizeof(Plc_Area_State)) return ERR_PARAMETER;
+  if (!placed_) return ERR_NOTINITIALIZED;
+  state = {};
+  state.dwSize = sizeof(Plc_Area_State);
+  const DeclaredArea& declared = declared_[number];
+  const std::size_t block = plan_.places[number].block;
+  const auto add = [&](const auto& views) {
+    for (const auto& view : views) {
+      if (view.block != block) continue;
+      state.qwImages = view.view.images();
+      state.qwMissed += view.view.missed();
+    }
+  };
+  add(inputs_);
+  add(outputs_);
+  if (declared.is_kept() && keeper_) {
+    state.dwOrigin = keeper_->origin(kept_number(number));
+    state.qwSaves = keeper_->saves();
+    state.qwUnsaved = keeper_->unsaved();
+  }
+  return ERR_OK;
+}
+
+}  // namespace plchost

@@ -1,0 +1,174 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <set>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "instances/runtime/memory/area_memory.hpp"
+#include "instances/runtime/memory/area_plan.hpp"
+#include "instances/runtime/memory/declared_area.hpp"
+#include "instances/runtime/memory/retain_keeper.hpp"
+#include "instances/runtime/memory/task_areas.hpp"
+#include "schedulers/task/task_config.hpp"
+#include "shm/base/result.hpp"
+
+namespace plchost {
+
+/// What a task does with its areas around each cycle.
+class TaskCycle {
+ public:
+  void add(InputView& view) { inputs_.push_back(&view); }
+  void add(OutputView& view) { outputs_.push_back(&view); }
+  /// The task may change kept areas, those of `group`; `may_wait`: it is not real-time.
+  void count_into(CycleCounter& counter, KeptGroup& group, bool may_wait) noexcept {
+    counter_ = &counter;
+    group_ = &group;
+    may_wait_ = may_wait;
+  }
+  /// Where it has area number `area`.
+  void set_address(std::size_t area, void* address);
+  [[nodiscard]] void* address(std::size_t area) const noexcept {
+    return area < addresses_.size() ? addresses_[area] : nullptr;
+  }
+  /// It has nothing to do.
+  [[nodiscard]] bool empty() const noexcept {
+    return inputs_.empty() && outputs_.empty() && counter_ == nullptr;
+  }
+
+  // The four parts of a cycle, all real-time on the task's thread. What `entry` throws passes through run(),
+  // and then end() is not called: nothing is put out.
+  void begin() noexcept;
+  void run(const std::function<void()>& entry) const;
+  void end() noexcept;
+  /// After the cycle: gives who saves kept variables a copy of them. false: nobody has asked for one.
+  bool give_kept() noexcept { return group_ != nullptr && group_->answer(may_wait_); }
+
+ private:
+  std::vector<InputView*> inputs_;
+  std::vector<OutputView*> outputs_;
+  std::vector<void*> addresses_;  // by area
+  CycleCounter* counter_ = nullptr;
+  KeptGroup* group_ = nullptr;  // with counter_
+  bool may_wait_ = false;
+};
+
+/// The memory areas of one application.
+class Areas {
+ public:
+  /// Who is asked for memory, and where it is kept.
+  struct Environment {
+    ObjectPool* pool = nullptr;  ///< null: check() looks at no pool; place() needs one
+    std::string instance;
+    std::string application;  ///< its name
+    std::span<const AreaSettings> settings;
+    RetainKeeper::Options retain;
+  };
+
+  /// plc_declare_area. Control thread, while the application is loaded.
+  [[nodiscard]] RTS_HANDLE declare(const Plc_Area* area, RTS_RESULT& result);
+  /// The same, for another version of the application that is to take over: collected in `areas`. The handle
+  /// is that of the area of this name.
+  [[nodiscard]] RTS_HANDLE declare_again(std::vector<DeclaredArea>& areas, const Plc_Area* area,
+                                         RTS_RESULT& result) const;
+  /// All that is declared, with the tasks that use it.
+  [[nodiscard]] const std::vector<DeclaredArea>& declared() const noexcept { return declared_; }
+  /// Tells another version of the application, which has declared the same areas, the addresses. Control
+  /// thread, before its first cycle.
+  void tell_addresses(const std::vector<DeclaredArea>& areas) const;
+  /// Whether place() would find fault with what is declared: it begins with this. Makes and changes nothing,
+  /// and opens no device, so that an instance can have all of it meanwhile. Set-up.
+  [[nodiscard]] Result<void> check(const Environment& environment, std::span<const TaskConfig> tasks) const;
+  /// Places all that is declared, fills it with what was kept or with initial values, tells the application
+  /// the addresses, and puts the exchange of inputs and outputs around the cycles of the tasks that use them:
+  /// the others stay as they are. A text: remarks. Once, after the application was loaded; set-up.
+  [[nodiscard]] Result<std::string> place(const Environment& environment, std::span<TaskConfig> tasks);
+  /// Lets no more of its areas be declared: plc_app_init has returned.
+  void close() noexcept { open_ = false; }
+
+  /// Writes what is kept, now, if no task is within a cycle. Control thread.
+  void save() {
+    if (keeper_) keeper_->save_soon();
+  }
+  /// The same at the end of the process, and waits for it.
+  void finish() {
+    if (keeper_) keeper_->finish();
+  }
+
+  /// What is to be told of memories that were cut short since it was asked last; empty: nothing. Control
+  /// thread.
+  [[nodiscard]] std::vector<std::string> look_for_losses();
+  /// RetainKeeper::problem(). Control thread.
+  [[nodiscard]] std::string retain_problem() const { return keeper_ ? keeper_->problem() : std::string(); }
+
+  /// plc_area_address, plc_get_area_state. Any context.
+  [[nodiscard]] void* address(RTS_HANDLE area) const noexcept;
+  [[nodiscard]] RTS_RESULT state(RTS_HANDLE area, Plc_Area_State& state) const noexcept;
+
+ private:
+  /// The memory of a block of the plan, and what lies in it.
+  struct Block {
+    AreaMemory memory;
+    std::unique_ptr<OutputImage> outputs;  ///< null: no image is published
+    std::optional<plc_image> inputs;       ///< nothing: no image is read
+    std::vector<std::byte> initial;
+    std::string source;  ///< the setting that placed it, and what it names
+    bool loss_told = false;
+  };
+  /// Kept areas that tasks have in common.
+  struct KeptShare {
+    std::set<std::size_t> tasks;
+    std::vector<std::size_t> areas;
+  };
+  /// A task's view of a block.
+  template <class View>
+  struct Of {
+    template <class... Arguments>
+    Of(std::size_t of_block, Arguments&&... arguments)
+        : block(of_block), view(std::forward<Arguments>(arguments)...) {}
+    std::size_t block;
+    View view;
+  };
+
+  // areas_place.cpp
+  [[nodiscard]] Result<void> make_blocks(const Environment& environment);
+  [[nodiscard]] Result<void> make_memory(const Environment& environment, Block& block,
+                                         const AreaBlock& planned);
+  void make_image(Block& block, const AreaBlock& planned);
+  [[nodiscard]] Result<void> make_keeper(const Environment& environment);
+  void tell_plain_addresses();
+  void make_views(std::size_t index);
+  void make_view(std::size_t index, std::size_t task, bool sole);
+  [[nodiscard]] OutputView::Writes writes_of(std::size_t index, std::size_t task) const;
+  [[nodiscard]] std::vector<std::size_t> users_of(std::size_t index) const;
+  void tell_view(std::size_t index, std::size_t task, std::byte* bytes);
+  void count_cycles(std::span<const TaskConfig> tasks);
+  [[nodiscard]] std::vector<KeptShare> shares_of_kept() const;
+  void wrap(std::span<TaskConfig> tasks);
+  [[nodiscard]] const DeclaredArea& first_of(const AreaBlock& planned) const {
+    return declared_[planned.areas.front()];
+  }
+  [[nodiscard]] std::size_t task_number(const std::string& name) const;
+  [[nodiscard]] std::size_t kept_number(std::size_t area) const noexcept;
+
+  bool open_ = true;
+  bool placed_ = false;
+  std::vector<DeclaredArea> declared_;
+  AreaPlan plan_;
+  std::vector<std::string> tasks_;
+  RetainLayout kept_;  // all kept areas
+  std::deque<Block> blocks_;
+  std::unique_ptr<RetainKeeper> keeper_;
+  std::deque<Of<InputView>> inputs_;
+  std::deque<Of<OutputView>> outputs_;
+  std::deque<TaskCycle> cycles_;   // of each task
+  std::vector<std::byte*> plain_;  // addresses of areas that are the same for all
+};
+
+}  // namespace plchost

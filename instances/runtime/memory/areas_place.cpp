@@ -1,0 +1,383 @@
+// How Areas places what the application declared: once, before its tasks are made.
+
+#include <algorithm>
+#include <numeric>
+#include <set>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "instances/launch/launch_contract.hpp"
+#include "instances/runtime/memory/areas.hpp"
+
+namespace plchost {
+
+namespace {
+
+// The bytes of `all` that are in none of `ranges`.
+std::vector<ByteRange> rest_of(ByteRange all, std::vector<ByteRange> ranges) {
+  std::ranges::sort(ranges, {}, &ByteRange::offset);
+  std::vector<ByteRange> rest;
+  std::size_t at = all.offset;
+  for (const ByteRange range : ranges) {
+    if (range.offset > at) rest.push_back({.offset = at, .bytes = range.offset - at});
+    at = range.offset + range.bytes;
+  }
+  const std::size_t end = all.offset + all.bytes;
+  if (end > at) rest.push_back({.offset = at, .bytes = end - at});
+  return rest;
+}
+
+// Where the next kept area lies behind one that ends at `bytes`.
+std::size_t behind_kept(std::size_t bytes) noexcept {
+  return (bytes + kRetainAlignment - 1) / kRetainAlignment * kRetainAlignment;
+}
+
+Result<void> check_kept_bytes(std::uint64_t bytes) {
+  if (bytes <= kMaxRetainBytes) return {};
+  return failure(
+      ErrorCode::invalid_argument,
+      fmt::format("the retain and persistent areas have {} bytes, {} are allowed", bytes, kMaxRetainBytes));
+}
+
+std::string name_of(const AreaSettings& settings) {
+  return fmt::format("{}: [SysMem] Area.{}", settings.where, settings.number);
+}
+
+std::size_t bytes_in_pool(const AreaSettings& settings, const DeclaredArea& first) {
+  return first.has_image() ? plc_image_bytes(static_cast<std::uint32_t>(settings.size)) : settings.size;
+}
+
+// All that is kept, with its initial values.
+RetainImage kept_image(const std::string& application, std::span<const DeclaredArea> areas) {
+  RetainImage image;
+  image.layout.application = application;
+  for (const DeclaredArea& area : areas) {
+    if (!area.is_kept()) continue;
+    image.layout.areas.push_back({.name = area.name,
+                                  .flags = area.flags & (PLC_AREA_RETAIN | PLC_AREA_PERSISTENT),
+                                  .bytes = area.bytes,
+                                  .layout = area.layout,
+                                  .offset = image.data.size()});
+    image.data.insert(image.data.end(), area.initial.begin(), area.initial.end());
+    image.data.resize(behind_kept(image.data.size()));
+  }
+  image.layout.bytes = image.data.size();
+  return image;
+}
+
+Result<void> check_memory(const Areas::Environment& environment, const AreaSettings& settings,
+                          const DeclaredArea& first) {
+  if (settings.object.empty()) return AreaMemory::check_device(settings);
+  if (environment.pool == nullptr) return {};
+  auto good = AreaMemory::check_pool(*environment.pool, settings.object, bytes_in_pool(settings, first));
+  return good ? good : failure_in(name_of(settings), std::move(good).error());
+}
+
+// The settings are checked by their texts; but a file has many: symbolic and hard links, and that of a memory
+// of the pool, one of which holds what is kept.
+Result<void> check_distinct(const Areas::Environment& environment, const AreaPlan& plan,
+                            std::span<const DeclaredArea> areas) {
+  struct Taken {
+    std::string by;
+    FileRange range;
+  };
+  if (environment.pool == nullptr) return {};
+  const std::string& pool = environment.pool->name();
+  std::vector<Taken> taken;
+  const std::string kept = kept_memory_name(environment.instance);
+  if (const auto range = range_of_memory(pool, kept);
+      range && std::ranges::any_of(areas, &DeclaredArea::is_kept)) {
+    taken.push_back({.by = fmt::format("the retain variables of the instance, memory '{}' of the pool", kept),
+                     .range = *range});
+  }
+  std::set<const AreaSettings*> seen;  // a setting has a block for each kind of area
+  for (const AreaBlock& block : plan.blocks) {
+    const AreaSettings* const settings = block.settings;
+    if (settings == nullptr || !seen.insert(settings).second) continue;
+    const bool device = settings->object.empty();
+    const auto range = device ? range_of_device(*settings) : range_of_memory(pool, settings->object);
+    if (!range) continue;
+    if (const auto own = own_file_of_pool(pool, *range)) {
+      return failure(ErrorCode::invalid_argument,
+                     fmt::format("{}: {} is {}, in which the host manages its pool; choose another file, or "
+                                 "Object=NAME for a memory of the pool",
+                                 name_of(*settings), settings->device, *own));
+    }
+    for (const Taken& other : taken) {
+      if (!range->overlaps(other.range)) continue;
+      return failure(
+          ErrorCode::invalid_argument,
+          fmt::format("{}: {} is the same file as that of {}, and they overlap; each needs bytes of "
+                      "its own",
+                      name_of(*settings), device ? settings->device : settings->object, other.by));
+    }
+    taken.push_back({.by = fmt::format("Area.{} of {}", settings->number, settings->where), .range = *range});
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<void> Areas::check(const Environment& environment, std::span<const TaskConfig> tasks) const {
+  if (declared_.empty()) return {};
+  std::vector<DeclaredArea> areas = declared_;
+  std::vector<std::string> names;
+  for (const TaskConfig& task : tasks) names.push_back(task.name);
+  if (auto done = complete_uses(areas, names); !done) return done;
+  const auto plan = plan_areas(areas, environment.settings);
+  if (!plan) return std::unexpected(plan.error());
+  for (const AreaBlock& planned : plan->blocks) {
+    if (planned.settings == nullptr) continue;
+    if (auto good = check_memory(environment, *planned.settings, areas[planned.areas.front()]); !good)
+      return good;
+  }
+  if (auto distinct = check_distinct(environment, *plan, areas); !distinct) return distinct;
+  const RetainImage kept = kept_image(environment.application, areas);
+  if (kept.layout.areas.empty()) return {};
+  if (auto good = check_kept_bytes(kept.layout.bytes); !good) return good;
+  const std::string pool = environment.pool == nullptr ? std::string() : environment.pool->name();
+  return RetainKeeper::check(pool, environment.instance, kept.layout, environment.retain);
+}
+
+Result<std::string> Areas::place(const Environment& environment, std::span<TaskConfig> tasks) {
+  open_ = false;
+  if (declared_.empty()) return std::string();
+  if (auto good = check(environment, tasks); !good) return std::unexpected(std::move(good).error());
+  for (const TaskConfig& task : tasks) tasks_.push_back(task.name);
+  if (auto done = complete_uses(declared_, tasks_); !done) return std::unexpected(done.error());
+  auto plan = plan_areas(declared_, environment.settings);
+  if (!plan) return std::unexpected(std::move(plan).error());
+  plan_ = *std::move(plan);
+  cycles_.resize(tasks.size());
+  plain_.resize(declared_.size(), nullptr);
+  if (auto made = make_blocks(environment); !made) return std::unexpected(made.error());
+  for (std::size_t i = 0; i < blocks_.size(); ++i) {
+    if (first_of(plan_.blocks[i]).has_image()) make_image(blocks_[i], plan_.blocks[i]);
+  }
+  if (auto made = make_keeper(environment); !made) return std::unexpected(made.error());
+  tell_plain_addresses();
+  for (std::size_t block = 0; block < plan_.blocks.size(); ++block) make_views(block);
+  count_cycles(tasks);
+  wrap(tasks);
+  placed_ = true;
+  if (!keeper_) return std::string();
+  if (auto started = keeper_->start(); !started) return std::unexpected(started.error());
+  return fmt::format("{}", fmt::join(keeper_->remarks(), "; "));
+}
+
+Result<void> Areas::make_blocks(const Environment& environment) {
+  for (const AreaBlock& planned : plan_.blocks) {
+    Block& block = blocks_.emplace_back();
+    if (planned.settings == nullptr && first_of(planned).is_kept()) continue;  // RetainKeeper's
+    block.initial.resize(planned.bytes);
+    for (const std::size_t area : planned.areas) {
+      std::ranges::copy(declared_[area].initial,
+                        block.initial.begin() + static_cast<std::ptrdiff_t>(plan_.places[area].offset));
+    }
+    if (auto made = make_memory(environment, block, planned); !made) return made;
+  }
+  return {};
+}
+
+Result<void> Areas::make_memory(const Environment& environment, Block& block, const AreaBlock& planned) {
+  const DeclaredArea& first = first_of(planned);
+  const auto take = [&](Result<AreaMemory> made) -> Result<void> {
+    if (!made) return std::unexpected(std::move(made).error());
+    block.memory = *std::move(made);
+    return {};
+  };
+  if (planned.settings == nullptr) {
+    // Inputs that nobody writes and outputs that nobody reads need no memory but the tasks'.
+    if (first.is_input() || (first.is_output() && first.uses.size() == 1)) return {};
+    return take(AreaMemory::of_process(first.is_output() ? plc_image_bytes(first.bytes) : planned.bytes));
+  }
+  const AreaSettings& settings = *planned.settings;
+  block.source = fmt::format("{}: [SysMem] Area.{}: {}", settings.where, settings.number,
+                             settings.object.empty() ? settings.device : settings.object);
+  if (settings.object.empty()) return take(AreaMemory::of_device(settings));
+  auto made = AreaMemory::of_pool(*environment.pool, settings.object, bytes_in_pool(settings, first),
+                                  first.is_output());
+  if (!made) return failure_in(name_of(settings), std::move(made).error());
+  return take(std::move(made));
+}
+
+// Several areas of a block are one image: a task sees all of them as they were at one time.
+void Areas::make_image(Block& block, const AreaBlock& planned) {
+  const bool of_device = planned.settings != nullptr && planned.settings->object.empty();
+  if (of_device || block.memory.bytes().empty()) return;
+  const auto size =
+      static_cast<std::uint32_t>(planned.settings != nullptr ? planned.bytes : first_of(planned).bytes);
+  auto* const header = reinterpret_cast<plc_image_header*>(block.memory.bytes().data());
+  // Made by firmware, it is one already; whatever else was there is none of theirs.
+  if (plc_image_is_one(header, size) == 0) plc_image_begin(header, size);
+  block.initial.resize(size);
+  if (first_of(planned).is_input()) {
+    block.inputs = image_in(block.memory.bytes(), size);
+  } else {
+    block.outputs = std::make_unique<OutputImage>(block.memory.bytes(), size);
+    block.outputs->write(block.initial);
+  }
+}
+
+Result<void> Areas::make_keeper(const Environment& environment) {
+  const RetainImage initial = kept_image(environment.application, declared_);
+  if (initial.layout.areas.empty()) return {};
+  kept_ = initial.layout;
+  auto keeper = RetainKeeper::make(*environment.pool, environment.instance, initial, environment.retain);
+  if (!keeper) return std::unexpected(std::move(keeper).error());
+  keeper_ = *std::move(keeper);
+  return {};
+}
+
+void Areas::tell_plain_addresses() {
+  for (std::size_t i = 0; i < declared_.size(); ++i) {
+    const DeclaredArea& area = declared_[i];
+    if (area.has_image()) continue;
+    const AreaPlan::Place place = plan_.places[i];
+    const AreaBlock& planned = plan_.blocks[place.block];
+    const auto at_kept = [&] { return kept_.areas[kept_number(i)].offset; };
+    if (area.is_kept() && planned.settings == nullptr) {
+      plain_[i] = keeper_->memory().data().data() + at_kept();
+    } else {
+      const auto bytes = blocks_[place.block].memory.bytes().subspan(place.offset, area.bytes);
+      plain_[i] = bytes.data();
+      // What lies in a device or in the pool and is not kept, others may have written: it stays.
+      if (area.is_kept()) keeper_->memory().live_elsewhere(at_kept(), bytes);
+      if (!area.is_kept() && !blocks_[place.block].memory.existed())
+        std::ranges::copy(area.initial, bytes.begin());
+    }
+    if (area.address != nullptr) *area.address = plain_[i];
+    for (const AreaUse& use : area.uses) {
+      if (use.address != nullptr) *use.address = plain_[i];
+    }
+  }
+}
+
+std::size_t Areas::task_number(const std::string& name) const {
+  return static_cast<std::size_t>(std::ranges::find(tasks_, name) - tasks_.begin());
+}
+
+// Of the tasks that use any area of the block.
+std::vector<std::size_t> Areas::users_of(std::size_t index) const {
+  std::vector<std::size_t> users;
+  for (const std::size_t area : plan_.blocks[index].areas) {
+    for (const AreaUse& use : declared_[area].uses) users.push_back(task_number(use.task));
+  }
+  std::ranges::sort(users);
+  users.erase(std::ranges::unique(users).begin(), users.end());
+  return users;
+}
+
+OutputView::Writes Areas::writes_of(std::size_t index, std::size_t task) const {
+  OutputView::Writes writes;
+  for (const std::size_t area : plan_.blocks[index].areas) {
+    const DeclaredArea& declared = declared_[area];
+    const auto place = static_cast<std::size_t>(plan_.places[area].offset);
+    std::vector<ByteRange> owned;  // by any task
+    bool uses = false;
+    for (const AreaUse& use : declared.uses) {
+      const ByteRange range{.offset = place + use.offset, .bytes = use.bytes};
+      if (range.bytes > 0) owned.push_back(range);
+      if (task_number(use.task) != task) continue;
+      uses = true;
+      if (range.bytes > 0) writes.own.push_back(range);
+    }
+    if (!uses) continue;
+    for (const ByteRange range : rest_of({.offset = place, .bytes = declared.bytes}, owned)) {
+      writes.shared.push_back(range);
+    }
+  }
+  return writes;
+}
+
+void Areas::make_views(std::size_t index) {
+  if (!first_of(plan_.blocks[index]).has_image()) return;
+  const auto users = users_of(index);
+  for (const std::size_t task : users) make_view(index, task, users.size() == 1);
+}
+
+void Areas::make_view(std::size_t index, std::size_t task, bool sole) {
+  Block& block = blocks_[index];
+  const bool registers = !block.memory.bytes().empty() && !block.inputs && !block.outputs;
+  if (first_of(plan_.blocks[index]).is_input()) {
+    auto& view =
+        registers ? inputs_.emplace_back(index, block.initial, block.memory.bytes()).view
+                  : inputs_.emplace_back(index, block.initial, block.inputs ? &*block.inputs : nullptr).view;
+    cycles_[task].add(view);
+    tell_view(index, task, view.bytes());
+  } else {
+    OutputView::Writes writes = writes_of(index, task);
+    writes.sole = sole && !registers;
+    auto& view =
+        registers ? outputs_.emplace_back(index, block.initial, std::move(writes), block.memory.bytes()).view
+                  : outputs_.emplace_back(index, block.initial, std::move(writes), block.outputs.get()).view;
+    cycles_[task].add(view);
+    tell_view(index, task, view.bytes());
+  }
+}
+
+void Areas::tell_view(std::size_t index, std::size_t task, std::byte* bytes) {
+  for (const std::size_t number : plan_.blocks[index].areas) {
+    const DeclaredArea& area = declared_[number];
+    std::byte* const address = bytes + plan_.places[number].offset;
+    for (const AreaUse& use : area.uses) {
+      if (task_number(use.task) != task) continue;
+      cycles_[task].set_address(number, address);
+      if (use.address != nullptr) *use.address = address;
+      if (area.uses.size() == 1 && area.address != nullptr) *area.address = address;
+    }
+  }
+}
+
+// Tasks that may change what is kept are seen to be within a cycle.
+void Areas::count_cycles(std::span<const TaskConfig> tasks) {
+  if (!keeper_) return;
+  KeptMemory& memory = keeper_->memory();
+  for (const KeptShare& share : shares_of_kept()) {
+    std::vector<std::pair<std::size_t, std::size_t>> stretches;
+    for (const std::size_t area : share.areas) {
+      stretches.emplace_back(kept_.areas[kept_number(area)].offset, declared_[area].bytes);
+    }
+    memory.add_group({share.tasks.begin(), share.tasks.end()}, stretches);
+    for (const std::size_t task : share.tasks) {
+      cycles_[task].count_into(memory.counter(task), memory.groups().back(),
+                               tasks[task].iec_priority > kLowestRealTimeIecPriority);
+    }
+  }
+}
+
+// Kept areas and the tasks that may change them, so that no two shares have a task in common.
+std::vector<Areas::KeptShare> Areas::shares_of_kept() const {
+  std::vector<KeptShare> shares;
+  for (std::size_t area = 0; area < declared_.size(); ++area) {
+    if (!declared_[area].is_kept()) continue;
+    KeptShare share{.tasks = {}, .areas = {area}};
+    for (const AreaUse& use : declared_[area].uses) share.tasks.insert(task_number(use.task));
+    const auto common = [&](const KeptShare& other) {
+      return std::ranges::any_of(other.tasks, [&](std::size_t task) { return share.tasks.contains(task); });
+    };
+    const auto [first, last] =
+        std::ranges::partition(shares, [&](const auto& other) { return !common(other); });
+    for (const KeptShare& other : std::ranges::subrange(first, last)) {
+      share.tasks.insert(other.tasks.begin(), other.tasks.end());
+      share.areas.insert(share.areas.end(), other.areas.begin(), other.areas.end());
+    }
+    shares.erase(first, last);
+    shares.push_back(std::move(share));
+  }
+  return shares;
+}
+
+void Areas::wrap(std::span<TaskConfig> tasks) {
+  for (std::size_t i = 0; i < tasks.size(); ++i) {
+    if (cycles_[i].empty()) continue;
+    TaskCycle* const cycle = &cycles_[i];
+    tasks[i].entry = [cycle, entry = std::move(tasks[i].entry)] { cycle->run(entry); };
+    tasks[i].before_entry = [cycle] { cycle->begin(); };
+    tasks[i].after_entry = [cycle] { cycle->end(); };
+    tasks[i].between_cycles = [cycle] { return cycle->give_kept(); };
+  }
+}
+
+}  // namespace plchost

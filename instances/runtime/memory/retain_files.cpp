@@ -1,0 +1,113 @@
+#include "instances/runtime/memory/retain_files.hpp"
+
+#include <cerrno>
+#include <filesystem>
+#include <fstream>
+#include <utility>
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+
+#include "shm/base/own_folder.hpp"
+#include "shm/base/replace_file.hpp"
+
+namespace plchost {
+
+namespace {
+
+// No file of ours is larger; what is, is not read.
+constexpr std::size_t kMaxFile = kMaxRetainBytes + (std::size_t{1} << 16);
+
+Result<std::string> read_whole(const std::string& path) {
+  std::error_code error;
+  const auto size = std::filesystem::file_size(path, error);
+  if (error == std::errc::no_such_file_or_directory) return failure(ErrorCode::not_found, path);
+  if (error) return failure(ErrorCode::system, path, error.value());
+  if (size > kMaxFile) return failure(ErrorCode::corrupt, fmt::format("{} has {} bytes", path, size));
+  std::string text(size, '\0');
+  std::ifstream stream(path, std::ios::binary);
+  stream.read(text.data(), static_cast<std::streamsize>(size));
+  if (!stream) return failure(ErrorCode::system, "read " + path, errno);
+  return text;
+}
+
+std::string stem_of(const std::string& directory, const std::string& instance) {
+  return fmt::format("{}/{}.retain", directory, instance);
+}
+
+}  // namespace
+
+auto RetainFiles::look(const std::string& directory, const std::string& instance) -> Found {
+  return RetainFiles(stem_of(directory, instance), directory).read();
+}
+
+Result<RetainFiles> RetainFiles::open(const std::string& directory, const std::string& instance) {
+  RetainFiles files(stem_of(directory, instance), directory);
+  const auto taken = files.take();
+  if (!taken && taken.error().code == ErrorCode::busy) return std::unexpected(taken.error());
+  return files;
+}
+
+Result<void> RetainFiles::take() {
+  if (lock_) return {};
+  constexpr mode_t kMode = 0755;
+  const int error = ::mkdir(directory_.c_str(), kMode) == 0 ? 0 : errno;
+  if (error != 0 && error != EEXIST && error != EROFS) {
+    return failure(ErrorCode::system, fmt::format("make the folder for retain variables {}", directory_),
+                   error);
+  }
+  if (auto ours = check_own_folder(directory_); !ours) {
+    return failure_in("folder for retain variables", ours.error());
+  }
+  auto held = LockFile::take(stem_ + ".lock");
+  if (!held && held.error().code == ErrorCode::already_exists) {
+    return failure(ErrorCode::busy, fmt::format("{}: retain files have one instance", held.error().message));
+  }
+  if (!held) return std::unexpected(std::move(held).error());
+  lock_.emplace(*std::move(held));
+  return {};
+}
+
+std::string RetainFiles::path(std::uint64_t generation) const {
+  return fmt::format("{}.{}", stem_, generation % 2);
+}
+
+auto RetainFiles::read() const -> Found {
+  Found found;
+  // What a stranger can put there becomes no value of a machine.
+  if (const auto ours = check_own_folder(directory_); !ours && ours.error().code == ErrorCode::refused) {
+    found.problems.push_back(ours.error().describe());
+    return found;
+  }
+  for (std::uint64_t file = 0; file < 2; ++file) {
+    const auto text = read_whole(path(file));
+    if (!text) {
+      if (text.error().code != ErrorCode::not_found) found.problems.push_back(text.error().describe());
+      continue;
+    }
+    auto image = decode_retain(*text);
+    if (!image) {
+      found.problems.push_back(fmt::format("{}: {}", path(file), image.error().message));
+    } else if (!found.newest || image->generation > found.newest->generation) {
+      found.newest = *std::move(image);
+    }
+  }
+  return found;
+}
+
+Result<void> RetainFiles::write(const RetainImage& image) {
+  if (auto taken = take(); !taken) return taken;
+  // The file is whole before it gets its name, and has its name for good before it counts as written.
+  if (auto written = replace_file(path(image.generation), encode(image)); !written) return written;
+  return sync_directory(directory_);
+}
+
+void RetainFiles::put_aside() const {
+  for (std::uint64_t file = 0; file < 2; ++file) {
+    std::error_code error;  // one that is not there needs no place
+    std::filesystem::copy_file(path(file), path(file) + ".old",
+                               std::filesystem::copy_options::overwrite_existing, error);
+  }
+}
+
+}  // namespace plchost

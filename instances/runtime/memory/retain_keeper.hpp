@@ -1,0 +1,112 @@
+#pragma once
+
+#include <array>
+#include <atomic>
+#include <condition_variable>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "instances/runtime/memory/kept_memory.hpp"
+#include "instances/runtime/memory/retain_files.hpp"
+#include "instances/runtime/settings/settings.hpp"
+#include "shm/base/thread.hpp"
+
+namespace plchost {
+
+/// The retain and persistent variables of one application: their memory, where they come from at the start,
+/// and a soft thread that writes them to files.
+class RetainKeeper {
+ public:
+  struct Options {
+    std::string directory{};  ///< of the files; empty: they live as long as the pool
+    Duration interval = std::chrono::seconds(1);
+    RetainMismatch mismatch = RetainMismatch::initialise;
+    /// How long a moment without any cycle is looked for, before tasks are asked at the ends of theirs.
+    Duration postpone = std::chrono::milliseconds(100);
+    bool cold = false;  ///< retain areas begin with initial values
+  };
+  /// Where an area's values come from: PLC_AREA_INITIAL, PLC_AREA_KEPT, PLC_AREA_RESTORED.
+  using Origin = unsigned;
+
+  /// Whether make() would refuse this layout, as it is now: the process that runs goes on. Changes nothing.
+  /// `pool` may be empty: only the files count. Set-up.
+  [[nodiscard]] static Result<void> check(const std::string& pool, const std::string& instance,
+                                          const RetainLayout& layout, const Options& options);
+  /// `initial`: the layout with its initial values. Goes on with what is left in memory, else with the newest
+  /// file that is whole. refused: that has another layout and the settings say so. Set-up.
+  [[nodiscard]] static Result<std::unique_ptr<RetainKeeper>> make(ObjectPool& pool,
+                                                                  const std::string& instance,
+                                                                  const RetainImage& initial,
+                                                                  const Options& options);
+  ~RetainKeeper() { finish(); }
+  RetainKeeper(const RetainKeeper&) = delete;
+  RetainKeeper& operator=(const RetainKeeper&) = delete;
+
+  [[nodiscard]] KeptMemory& memory() noexcept { return memory_; }
+  /// Begins to write: until then the memory can be arranged. Set-up, once.
+  [[nodiscard]] Result<void> start();
+  [[nodiscard]] Origin origin(std::size_t area) const noexcept { return origins_[area]; }
+  /// What is to be said of the start.
+  [[nodiscard]] const std::vector<std::string>& remarks() const noexcept { return remarks_; }
+
+  /// Does not wait for the interval. Any thread that may take a lock.
+  void save_soon();
+  /// Writes the last state and ends the thread. No cycle runs any more.
+  void finish();
+
+  /// Why the newest values are not in the files; empty: they are. Any thread that may take a lock.
+  [[nodiscard]] std::string problem() const;
+  [[nodiscard]] std::uint64_t saves() const noexcept { return saves_.load(std::memory_order_relaxed); }
+  [[nodiscard]] std::uint64_t unsaved() const noexcept { return unsaved_.load(std::memory_order_relaxed); }
+
+ private:
+  struct Start;
+  RetainKeeper(KeptMemory memory, Start start, const Options& options);
+  void run();
+  void save();
+  /// Whether the memory is lost, which is told.
+  [[nodiscard]] bool notice_loss();
+  /// What image_ has then: all as it is between cycles now; so of some areas, the others as before; nothing
+  /// new.
+  enum class Taken : std::uint8_t { all, some, none };
+  [[nodiscard]] Taken take_snapshot();
+  [[nodiscard]] bool take_whole();
+  [[nodiscard]] Taken take_groups();
+  /// False: it was woken to end.
+  [[nodiscard]] bool rest();
+  [[nodiscard]] Result<void> write();
+  void put_strange_files_aside();
+  /// Why it is not saved; the worst first.
+  enum class Fault : std::uint8_t { memory, files, cycles };
+  static constexpr std::size_t kFaults = 3;
+  /// Logs `why` if it was not so before; empty: there is no such fault any more.
+  void tell(Fault fault, std::string why);
+  void count_unsaved() noexcept;
+
+  KeptMemory memory_;
+  std::optional<RetainFiles> files_;
+  std::vector<Origin> origins_;
+  std::vector<std::string> remarks_;
+  Duration interval_;
+  Duration postpone_;
+  RetainImage image_;               // the soft thread's: as it was taken last
+  std::vector<std::byte> scratch_;  // the same thread's, and that of tasks that it asks
+  std::vector<std::byte> written_;  // the same thread's: what is in the newest file
+  bool lost_ = false;               // the same thread's: the memory is
+  std::atomic<std::uint64_t> saves_{0};
+  std::atomic<std::uint64_t> unsaved_{0};
+
+  mutable std::mutex mutex_;
+  std::array<std::string, kFaults> problems_;  // guarded by the mutex
+  std::condition_variable wake_;
+  bool soon_ = false;
+  bool ending_ = false;
+  Thread thread_;
+};
+
+}  // namespace plchost

@@ -1,0 +1,53 @@
+#include "instances/runtime/memory/save_left_behind.hpp"
+
+#include <algorithm>
+
+#include "instances/runtime/memory/kept_memory.hpp"
+#include "instances/runtime/memory/retain_files.hpp"
+#include "instances/runtime/settings/settings.hpp"
+#include "shm/base/log.hpp"
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+namespace {
+
+Result<std::string> directory_of(const LaunchOptions& launch) {
+  if (launch.settings.empty()) return launch.state_directory;
+  const auto settings = read_settings(launch.settings);
+  if (!settings) return std::unexpected(settings.error());
+  const std::string& own = settings->retain.directory;
+  return own.empty() ? launch.state_directory : own;
+}
+
+}  // namespace
+
+Result<void> save_left_behind(const LaunchOptions& launch) {
+  auto left = KeptMemory::left_behind(launch.pool, kept_memory_name(launch.name));
+  if (!left && left.error().code == ErrorCode::not_found) return {};
+  // What is damaged is worth nothing: the files hold the last good values.
+  if (!left && left.error().code == ErrorCode::corrupt) {
+    spdlog::warn("retain variables: what is left in memory is not written: {}", left.error().describe());
+    return {};
+  }
+  if (!left) return std::unexpected(left.error());
+  const auto directory = directory_of(launch);
+  if (!directory) return std::unexpected(directory.error());
+  if (directory->empty()) return failure(ErrorCode::not_found, "no folder for retain variables is given");
+  auto files = RetainFiles::open(*directory, launch.name);
+  if (!files) return std::unexpected(files.error());
+  const auto found = files->read();
+  RetainImage& image = left->image;
+  if (found.newest) {
+    const bool newer = found.newest->generation > image.generation;
+    if (newer || (found.newest->layout == image.layout && found.newest->data == image.data)) return {};
+  }
+  if (left->in_cycle > 0) {
+    spdlog::warn("retain variables: the process ended within the cycles of {} tasks", left->in_cycle);
+  }
+  ++image.generation;
+  image.unix_ns = unix_time_ns();
+  return files->write(image);
+}
+
+}  // namespace plchost

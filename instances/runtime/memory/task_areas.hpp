@@ -1,0 +1,85 @@
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "instances/runtime/memory/output_image.hpp"
+
+namespace plchost {
+
+/// Bytes of a block.
+struct ByteRange {
+  std::size_t offset = 0;
+  std::size_t bytes = 0;
+};
+
+/// What the cycles of a task count into while it is within one: odd inside, even outside. In kept memory.
+using CycleCounter = std::atomic<std::uint64_t>;
+
+/// One task's copy of a block of inputs. Real-time but for its making.
+class InputView {
+ public:
+  /// `source`: null: nobody writes them.
+  InputView(std::vector<std::byte> initial, const plc_image* source);
+  /// Registers are read as they are, without a protocol.
+  InputView(std::vector<std::byte> initial, std::span<const std::byte> registers);
+
+  void begin_cycle() noexcept;
+  [[nodiscard]] std::byte* bytes() noexcept { return bytes_.data(); }
+  [[nodiscard]] std::uint64_t missed() const noexcept { return missed_.load(std::memory_order_relaxed); }
+  [[nodiscard]] std::uint64_t images() const noexcept {
+    return image_ != nullptr ? plc_image_sequence(image_) : 0;
+  }
+
+ private:
+  std::vector<std::byte> bytes_;
+  std::vector<std::byte> scratch_;
+  const plc_image* image_ = nullptr;
+  std::span<const std::byte> registers_;
+  std::atomic<std::uint64_t> missed_{0};  // written by the task alone
+};
+
+/// One task's copy of a block of outputs. Real-time but for its making.
+class OutputView {
+ public:
+  /// Which bytes of the block it writes.
+  struct Writes {
+    std::vector<ByteRange> own;     ///< always
+    std::vector<ByteRange> shared;  ///< where it has changed them in its cycle
+    bool sole = false;              ///< no other task uses the block
+  };
+  /// `image`: null: nobody reads them.
+  OutputView(std::vector<std::byte> initial, Writes writes, OutputImage* image);
+  OutputView(std::vector<std::byte> initial, Writes writes, std::span<std::byte> registers);
+
+  /// What other tasks have put out is in its copy then.
+  void begin_cycle() noexcept;
+  void end_cycle() noexcept;
+  [[nodiscard]] std::byte* bytes() noexcept { return bytes_.data(); }
+  [[nodiscard]] std::uint64_t missed() const noexcept { return missed_.load(std::memory_order_relaxed); }
+  [[nodiscard]] std::uint64_t images() const noexcept {
+    return image_ != nullptr ? plc_image_sequence(&image_->image()) : 0;
+  }
+
+ private:
+  void refresh() noexcept;
+  void lay_over(std::span<std::byte> target) const noexcept;
+
+  std::vector<std::byte> bytes_;
+  std::vector<std::byte> base_;  // bytes_ at the start of the cycle
+  std::vector<std::byte> scratch_;
+  Writes writes_;
+  OutputImage* image_ = nullptr;
+  std::span<std::byte> registers_;
+  bool late_ = false;                     // the last cycle's are not out yet
+  std::atomic<std::uint64_t> missed_{0};  // written by the task alone
+};
+
+/// Reads or writes registers in the widest aligned accesses up to 32 bit, each byte once. Real-time.
+void copy_from_registers(std::span<std::byte> to, std::span<const std::byte> registers) noexcept;
+void copy_to_registers(std::span<std::byte> registers, std::span<const std::byte> from) noexcept;
+
+}  // namespace plchost

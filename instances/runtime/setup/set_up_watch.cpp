@@ -1,0 +1,73 @@
+#include "instances/runtime/setup/set_up_watch.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "schedulers/faults/processor_guard.hpp"
+#include "schedulers/faults/starvation.hpp"
+
+namespace plchost {
+
+namespace {
+
+constexpr Duration kLook = std::chrono::milliseconds(50);
+// While the process stood still, so did the set-up.
+constexpr Duration kLongestGap = std::chrono::milliseconds(200);
+
+Result<void> look_for_taker() {
+  const auto taker = ProcessorGuard::take();
+  if (!taker) return {};
+  return failure(ErrorCode::refused,
+                 fmt::format("in the set-up, {} took the processor for {} ms without a pause: it must sleep "
+                             "more often, or have no real-time priority",
+                             taker->who.view(),
+                             std::chrono::duration_cast<std::chrono::milliseconds>(taker->lasted).count()));
+}
+
+}  // namespace
+
+SetUpWatch::SetUpWatch(Duration guard, Fail fail) : fail_(std::move(fail)) {
+  const Duration limit = Starvation::limit_for(guard);
+  if (limit == Duration::zero() || !ProcessorGuard::install()) return;
+  auto thread = Thread::start("set-up watch", {}, [this] { run(); });
+  if (!thread) return;  // the manager's limit is left
+  thread_ = std::move(*thread);
+  ProcessorGuard::watch_set_up(limit);
+}
+
+void SetUpWatch::run() {
+  std::unique_lock lock(mutex_);
+  Duration lasted{};
+  TimePoint looked = MonotonicClock::now();
+  while (!stops_.wait_for(lock, kLook, [this] { return stopped_; })) {
+    const TimePoint now = MonotonicClock::now();
+    lasted += std::min(now - std::exchange(looked, now), kLongestGap);
+    auto good = look_for_taker();
+    if (good && lasted >= kLimit) {
+      good = failure(ErrorCode::refused,
+                     fmt::format("the set-up has not returned for {} s",
+                                 std::chrono::duration_cast<std::chrono::seconds>(kLimit).count()));
+    }
+    if (!good) return fail_(good.error());
+  }
+}
+
+void SetUpWatch::stop() {
+  if (!thread_.joinable()) return;
+  ProcessorGuard::watch(Duration::zero());
+  {
+    const std::lock_guard lock(mutex_);
+    stopped_ = true;
+  }
+  stops_.notify_all();
+  thread_.join();
+}
+
+Result<void> SetUpWatch::end() {
+  stop();
+  return look_for_taker();
+}
+
+}  // namespace plchost

@@ -1,0 +1,175 @@
+#include "instances/runtime/trial/application_check.hpp"
+
+#include <cerrno>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+#include <linux/rtc.h>
+
+#include "instances/launch/launch_contract.hpp"
+#include "instances/runtime/application/application.hpp"
+#include "instances/runtime/application/components.hpp"
+#include "instances/runtime/application/declare_application.hpp"
+#include "instances/runtime/settings/settings.hpp"
+#include "instances/runtime/setup/process_setup.hpp"
+#include "instances/runtime/setup/set_up_watch.hpp"
+#include "instances/runtime/tasks/pool_room.hpp"
+#include "instances/runtime/trial/trial_process.hpp"
+#include "schedulers/task_set.hpp"
+#include "schedulers/tick/device_file.hpp"
+#include "shm/base/names.hpp"
+#include "shm/base/thread.hpp"
+#include "shm/pool/instance_page.hpp"
+
+namespace plchost {
+
+namespace {
+
+std::string detail_of(const TaskConfig& task) {
+  switch (task.kind) {
+    case TaskKind::cyclic:
+      return fmt::format(", every {} us",
+                         std::chrono::duration_cast<std::chrono::microseconds>(task.interval).count());
+    case TaskKind::external:
+      return fmt::format(", event {}", task.external_event);
+    case TaskKind::event:
+    case TaskKind::freewheeling:
+      return {};
+  }
+  return {};
+}
+
+/// A clock with periodic interrupts that another process has: of its answers only the kind is known.
+class ClockOfAnother : public DeviceFile {
+ public:
+  explicit ClockOfAnother(bool is_rtc) noexcept : is_rtc_(is_rtc) {}
+  [[nodiscard]] int control(unsigned long request, unsigned long) noexcept override {
+    return request == RTC_IRQP_READ && !is_rtc_ ? ENOTTY : 0;
+  }
+  [[nodiscard]] Wait wait(TimePoint) noexcept override { return Wait::interrupted; }
+  [[nodiscard]] std::optional<unsigned long> read() noexcept override { return std::nullopt; }
+  void interrupt() noexcept override {}
+
+ private:
+  bool is_rtc_;
+};
+
+// A clock device can be opened once only, so none is taken from an instance that has it. The instance to be
+// tried may be that one, and then gets it.
+class TrialDevices : public DeviceFiles {
+ public:
+  [[nodiscard]] Result<std::unique_ptr<DeviceFile>> open(const std::string& path) override {
+    auto device = linux_device_files().open(path);
+    if (!device && device.error().system_errno == EBUSY) {
+      return std::make_unique<ClockOfAnother>(path.find("hpet") == std::string::npos);
+    }
+    return device;
+  }
+};
+
+// The kernel's answer, without staying there: the trial takes no time from the core of the instance.
+Result<void> try_cores(const std::vector<int>& cores) {
+  const auto before = allowed_cores(0);
+  if (!before) return std::unexpected(before.error());
+  const auto granted = bind_to_cores(cores);
+  const auto back = bind_to_cores(*before);
+  if (!granted) return std::unexpected(granted.error());
+  return back ? Result<void>() : std::unexpected(back.error());
+}
+
+// Nothing: there is no pool before the first start, and none for who may not look into it.
+std::optional<PoolRoom> room_in_pool(const LaunchOptions& launch, const std::optional<ObjectPool>& pool) {
+  if (!pool) return std::nullopt;
+  const auto page = InstancePageReader::open(launch.pool, launch.name);
+  const auto runtime = page ? page->runtime() : std::nullopt;
+  auto room = PoolRoom::of(*pool, launch.name, runtime ? runtime->pid : 0);
+  return room ? std::optional(*std::move(room)) : std::nullopt;
+}
+
+// The tasks with their threads, which stay parked, under the scheduler that they are to have.
+Result<void> try_tasks(const Options& options, const InstanceSettings& settings,
+                       const Application& application, ApplicationHost& host) {
+  LinuxClock clock;
+  TrialDevices devices;
+  std::vector<TaskStatistics> statistics(application.tasks().size());
+  TaskEnvironment environment{
+      .find_event = [&](std::string_view event) { return host.events().bind_task(event); },
+      .statistics = [&](std::size_t index) -> TaskStatistics& { return statistics[index]; },
+      .fault_record = {},
+      .state_changed = {},
+      .to_park = {},
+      .catch_faults = false,
+      .allow_unprivileged = true,
+      .devices = &devices,
+  };
+  auto tasks = TaskSet::create(clock, options.band, application.tasks(), std::move(environment));
+  if (!tasks) return std::unexpected(std::move(tasks).error());
+  return (*tasks)->check(scheduler_for(options.launch.scheduler, settings), settings.scheduler);
+}
+
+// The part that runs code of components and of the application.
+Result<Application> declare_watched(const std::string& path, const StartSettings& start,
+                                    Components& components, ApplicationHost& host) {
+  SetUpWatch watch(start.settings.scheduler.watchdog.default_time, [&](const Error& error) {
+    fmt::print(stderr, "{}: {}\n", path, error.describe());
+    end_trial(kExitSetupFailed);
+  });
+  if (auto loaded = load_components(start.settings, ComponentHooks::check, components, host); !loaded)
+    return std::unexpected(std::move(loaded).error());
+  auto application = declare_application(path, start, host);
+  if (auto ended = watch.end(); !ended && application) return std::unexpected(std::move(ended).error());
+  return application;
+}
+
+// All that a start does, by the same functions in the same order, as far as it takes nothing from the
+// instance that runs. What that instance has can be had only when it has ended: its name, its control socket
+// and its status page, its address among the nodes, what the CH_INIT.. hooks of its components take, and its
+// memories and outputs, which are only looked at.
+Result<Application> try_start(const Options& options, Components& components, ApplicationHost& host) {
+  const LaunchOptions& launch = options.launch;
+  if (auto granted = try_cores(launch.cores); !granted) return std::unexpected(std::move(granted).error());
+  auto start = read_start_settings(launch.settings);
+  if (!start) return std::unexpected(std::move(start).error());
+  auto attached = ObjectPool::attach(launch.pool, ObjectPool::Access::read_only);
+  std::optional<ObjectPool> pool;
+  if (attached) pool.emplace(*std::move(attached));
+  if (auto room = room_in_pool(launch, pool)) host.events().look_for_room(*std::move(room));
+  if (auto ready = prepare_host(*start, host); !ready) return std::unexpected(std::move(ready).error());
+  auto application = declare_watched(options.check_application, *start, components, host);
+  if (!application) return application;
+  const auto environment = areas_environment(launch, start->settings, *application, pool ? &*pool : nullptr);
+  if (auto good = host.areas().check(environment, application->tasks()); !good)
+    return std::unexpected(std::move(good).error());
+  if (auto good = try_tasks(options, start->settings, *application, host); !good)
+    return std::unexpected(std::move(good).error());
+  return application;
+}
+
+}  // namespace
+
+int check_application(const Options& options) {
+  const std::string& path = options.check_application;
+  Components components;
+  ApplicationHost host(options.launch.name, nullptr);
+  host.set_start_kind(static_cast<int>(options.launch.start_kind));
+  const auto application = try_start(options, components, host);
+  if (!application) {
+    fmt::print(stderr, "{}\n", application.error().describe());
+    return kExitSetupFailed;
+  }
+  fmt::print("{}{}{}, {} tasks\n", path, kValidApplication, printable(application->name()),
+             application->tasks().size());
+  for (const TaskConfig& task : application->tasks()) {
+    fmt::print("  {}: {}, priority {}{}\n", task.name, to_string(static_cast<PageTaskKind>(task.kind)),
+               task.iec_priority, detail_of(task));
+  }
+  // Destructors of the application may end the process without.
+  (void)std::fflush(stdout);
+  return 0;
+}
+
+}  // namespace plchost
