@@ -221,7 +221,7 @@ class PLCHOST_CLIENT_API Client {
   /// come, end with unavailable. Not from a callback.
   void close();
 
-  /// All that answer, by name. None: an empty list, after the time-out.
+  /// All that answer, by name. None: an empty list, after the timeout.
   std::vector<Host> hosts();
   /// All of one host, as it is within 20 ms (instances) or 200 ms (others). These and all that follow throw
   /// ClientError.
@@ -237,7 +237,7 @@ class PLCHOST_CLIENT_API Client {
   std::vector<LogLine> logs(const std::string& host, const std::string& instance, const LogLine& after);
 
   /// Posts an event `count` times, each counted exactly once, also if the server of the host dies meanwhile.
-  /// Returns when all are in the pool: the time-out is for each acknowledgement, so many take as long as they
+  /// Returns when all are in the pool: the timeout is for each acknowledgement, so many take as long as they
   /// take. ClientError: a post was rejected; timed_out: of some nothing is known.
   Posted post(const std::string& host, const std::string& event, unsigned long long count = 1);
   /// The same; returns at once. `done` is called once. At most 1024 calls may wait for those before them:

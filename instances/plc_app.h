@@ -1,6 +1,6 @@
 /*
- * The contract between plc-instance and an application (the user program) or a component: plain C89, no
- * library to link. An application is one shared object that exports
+ * The contract between plc-instance and an application (the program of the user) or a component: plain C89,
+ * no library to link. An application is one shared object that exports
  *
  *     plc_app_abi          PLC_APP_ABI_VERSION, checked before anything of it runs: write PLC_EXPORT_ABI;
  *     int plc_app_init(void)    called once after loading; calls __sys__setup__tasks(); 0 means success
@@ -291,7 +291,7 @@ RTS_RESULT CDECL plc_get_area_state(RTS_HANDLE hArea, Plc_Area_State* pState);
  * plc_reference_clock.h, [DistributedClock] Reference=NAME), or from a driver inside of the application:
  *
  * Reports what the reference clock shows and CLOCK_MONOTONIC at the same instant, both in nanoseconds. Best
- * in each cycle of the bus; pairs further apart than the time-out (ReferenceTimeoutMs) are hold-over in
+ * in each cycle of the bus; pairs further apart than the timeout (ReferenceTimeoutMs) are hold-over in
  * between. ERR_OK; ERR_DUPLICATE: the settings name a record; ERR_NOTINITIALIZED: the tasks are not made yet.
  * Any.
  */

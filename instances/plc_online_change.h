@@ -21,8 +21,8 @@
  * the new one does not are unregistered, EVT_ExternalEventTaskCreateDone is told again to all callbacks (the
  * same hEvent; pTaskInfo is that of the new program, and that of the one before is void), plc_app_exit of the
  * program before is called, and that is unloaded: it must leave no thread behind, and nothing that points to
- * its code or its constants, neither in areas nor in kept variables. A new program that is refused after its
- * plc_app_init has returned 0 gets its plc_app_exit, too.
+ * its code or its constants, neither in areas nor in retain variables. A new program that is refused after
+ * its plc_app_init has returned 0 gets its plc_app_exit, too.
  */
 #ifndef PLC_ONLINE_CHANGE_H
 #define PLC_ONLINE_CHANGE_H

@@ -19,7 +19,7 @@
  * handle is used by any number of threads at once, and closed by one when no other uses it (any more).
  *
  * Contexts: "set-up" takes the pool's lock and may allocate; "any" includes the cycle of a real-time task:
- * bounded by its time-out, no allocation, and no system call unless it has to wait or to wake. After fork()
+ * bounded by its timeout, no allocation, and no system call unless it has to wait or to wake. After fork()
  * the child opens the pool anew.
  */
 #ifndef PLC_POOL_H

@@ -100,7 +100,7 @@ build_asan() { build_sanitized .build/asan "address;undefined" all; }
 killing='*PoolCrash*:*BlockCrash*:*ClientDeath*:RobustMutexTest.Killed*:*Settings.ReadsAsMany*:*HoldsAHundredThousand*:*EachFlippedBit*'
 killing+=':*WishFolderTest.IsMadeAndHeld*:*ReadsNothingBehindTheEnd*:*StaysWithinItsBounds*:*TheSecurityFolder*:*AnIdentity*'
 build_tsan() { build_sanitized .build/tsan thread plchost_tests -DPLCHOST_INTEGRATION=OFF; }
-gates() { tests/gates/layers.sh && tests/gates/house.sh && tests/gates/format.sh && tests/gates/contract.sh && tests/gates/pictures.py && tests/gates/documents.py && tests/gates/prove.sh; }
+gates() { tests/gates/layers.sh && tests/gates/house.sh && tests/gates/format.sh && tests/gates/contract.sh && tests/gates/pictures.py && tests/gates/documents.py && tests/gates/prose.py && tests/gates/prove.sh; }
 
 # ctest's own lines, and at the end what CI reads
 passed=0

@@ -46,7 +46,7 @@ class CliSession {
 
   /// Connects at the first call.
   [[nodiscard]] Result<ControlClient*> client();
-  /// The end of the time-out, from now on.
+  /// The end of the timeout, from now on.
   [[nodiscard]] TimePoint deadline() const;
   [[nodiscard]] Duration timeout() const;
   /// The same, but at least `least` from now unless --timeout says otherwise: for what takes longer.

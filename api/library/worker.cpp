@@ -16,7 +16,7 @@ Duration checked_timeout(std::chrono::milliseconds timeout) {
   if (timeout >= std::chrono::milliseconds(1) && timeout <= kMaxTimeout) return timeout;
   throw_client_error(
       {ErrorCode::invalid_argument, 0,
-       fmt::format("time-out {} ms: allowed are 1 to {}", timeout.count(), kMaxTimeout.count())});
+       fmt::format("timeout {} ms: allowed are 1 to {}", timeout.count(), kMaxTimeout.count())});
 }
 
 Result<ControlClient*> ended() {

@@ -31,7 +31,7 @@ int main(int argc, char** argv) {
   options.pool = "plchost";
   std::string log_level = "info";
   bool end_with_parent = false;
-  CLI::App app("plchost-dds: the DDS server of plchost, started by plchostd");
+  CLI::App app("plchost-dds: the API server of plchost, started by plchostd");
   app.set_version_flag("--version", PLCHOST_VERSION);
   app.add_option("--host", options.host, "name of this host in the DDS domain")->required();
   app.add_option("--domain", options.dds.domain, "DDS domain")

@@ -19,7 +19,7 @@ enum class ClockState : std::uint32_t {
   free_running = 1,  ///< there is no usable reference (yet)
   acquiring = 2,     ///< pairs come in; the grid is on its way, not in sync
   locked = 3,        ///< pairs come in, in sync
-  hold_over = 4,     ///< no pair taken for the time-out: the grid goes on with the last drift
+  hold_over = 4,     ///< no pair taken for the timeout: the grid goes on with the last drift
   measuring = 5,     ///< the clock is measured, but this scheduler cannot move its releases
 };
 

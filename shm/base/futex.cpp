@@ -11,7 +11,7 @@ namespace plchost {
 
 FutexResult futex_wait(const void* word, std::uint32_t expected, TimePoint deadline) noexcept {
   const timespec until = to_timespec(std::max(deadline, TimePoint{}));  // the kernel refuses negative times
-  // FUTEX_WAIT_BITSET, because its time-out is absolute; FUTEX_WAIT's is relative and drifts.
+  // FUTEX_WAIT_BITSET, because its timeout is absolute; FUTEX_WAIT's is relative and drifts.
   const long returned =
       ::syscall(SYS_futex, word, FUTEX_WAIT_BITSET, expected, deadline == kNoDeadline ? nullptr : &until,
                 nullptr, FUTEX_BITSET_MATCH_ANY);

@@ -39,7 +39,7 @@ constexpr std::uint32_t number_of(std::uint64_t value) noexcept {
   return static_cast<std::uint32_t>(value) & FUTEX_TID_MASK;
 }
 
-// The errno, 0 on success. FUTEX_LOCK_PI2 takes its time-out from CLOCK_MONOTONIC, FUTEX_LOCK_PI from the
+// The errno, 0 on success. FUTEX_LOCK_PI2 takes its timeout from CLOCK_MONOTONIC, FUTEX_LOCK_PI from the
 // clock on the wall.
 int lock_in_kernel(std::atomic<std::uint32_t>& word, TimePoint until) noexcept {
   const timespec at = to_timespec(std::max(until, TimePoint{}));

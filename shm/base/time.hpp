@@ -8,7 +8,7 @@
 namespace plchost {
 
 /// CLOCK_MONOTONIC, in nanoseconds: the one clock that all processes of a host share, and the only one
-/// that releases, latencies and time-outs are computed with.
+/// that releases, latencies and timeouts are computed with.
 struct MonotonicClock {
   using duration = std::chrono::nanoseconds;
   using rep = duration::rep;

@@ -117,8 +117,8 @@ def main():
     with open(sys.argv[1], encoding="utf-8") as file:
         rows = json.load(file)
     print("# Figures", "",
-          "What is measured, how, and how to read it: [README](README.md). \"-\" says that nothing was measured, or that there are too few",
-          "samples: p99 needs 100, p99.9 needs 1,000.", "",
+          "The measurements, the method, and how to read the figures: [README](README.md). \"-\" says that nothing was measured, or",
+          "that there are too few samples: p99 needs 100, p99.9 needs 1,000.", "",
           "<!-- generated: all-figures (tests/bench/figures.py figures.json) -->", *tables(rows), "<!-- end of generated -->", sep="\n")
 
 

@@ -1,4 +1,4 @@
-// A cycle with inputs, outputs and kept variables around it.
+// A cycle with inputs, outputs and retain variables around it.
 #include <gtest/gtest.h>
 
 #include "instances/runtime/memory/areas.hpp"

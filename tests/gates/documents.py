@@ -185,7 +185,7 @@ def contract_of(root):
 
 def topics(root):
     reference, contract = contract_of(root)
-    rows = ["| topic | from | to | what |", "| --- | --- | --- | --- |"]
+    rows = ["| topic | from | to | meaning |", "| --- | --- | --- | --- |"]
     for kind in (kind for kind in contract.types if kind.is_topic):
         names = ", ".join(f"`{name.strip()}`" for name in kind.tags["topic"].split(","))
         what = reference.text_of(re.split(r"(?<=\.) ", kind.comment)[0])

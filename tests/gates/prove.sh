@@ -108,6 +108,34 @@ plant_in_picture "pictures: axis without a title" "an axis has no title" tests/b
 plant_in_picture "pictures: curves that only colours tell" "6 kinds of curves, 6 lines of legend, 4 shapes" tests/bench/corun.svg 's,m-3.6[^"]*,m-4\,0 a4\,4 0 1\,0 8\,0 a4\,4 0 1\,0 -8\,0,'
 plant_in_picture "pictures: outside of the picture" "does not fit into the picture" tests/bench/cyclic.svg 's/Start latency of/& each single cycle, one after the other, of this and of that task, and of/'
 
+# plant_in_prose NAME DIAGNOSTIC FILE TEXT: that file with that text, beside the glossary
+plant_in_prose() {
+  new_tree
+  mkdir -p "$plot/tree/$(dirname "$3")"
+  cp manager/glossary.md "$plot/tree/manager/"
+  printf '%s\n' "$4" >"$plot/tree/$3" && commit_tree
+  must_be_red "$1" "$2" "$gates/prose.py" --all "$plot/tree"
+}
+plant_in_prose "prose: who" "shm/planted.md:1: begins with 'Who': Who asks" shm/planted.md "Who asks is answered."
+plant_in_prose "prose: what, behind a colon" "shm/planted.md:2: begins with 'what': what it says" shm/planted.md "The manager answers
+and tells the client: what it says is final."
+plant_in_prose "prose: what, in a cell" "shm/planted.md:3: begins with 'what': what it holds" shm/planted.md "| place | holds |
+| --- | --- |
+| shm | what it holds |"
+plant_in_prose "prose: long sentence" "shm/planted.md:1: 31 words in a sentence, at most 30" shm/planted.md "A$(printf ' word%.0s' {1..30})."
+plant_in_prose "prose: synonym" "shm/planted.md:1: 'DDS server' is not a word of manager/glossary.md" shm/planted.md "The DDS server answers."
+plant_in_prose "prose: comment in C++" "shm/base/planted.cpp:2: begins with 'What': What is read" shm/base/planted.cpp "int planted = 0;
+// What is read is checked."
+plant_in_prose "prose: comment in C" "shm/planted.h:2: begins with 'Whose': Whose it" shm/planted.h "/**
+ * Whose it is, the kernel knows. */"
+plant_in_prose "prose: comment in Python" "tests/planted.py:1: begins with 'what': what it does" tests/planted.py "# Of the gate: what it does and sees."
+plant_in_prose "prose: comment in a script" "tests/planted.sh:2: begins with 'Whoever': Whoever asks" tests/planted.sh "true
+# Whoever asks is answered."
+plant_in_prose "prose: message" "shm/base/planted.cpp:1: begins with 'what': what the client asks" shm/base/planted.cpp 'const char* m = "refused: what the client asks";'
+new_tree
+echo "Who asks? The manager answers the client: \`what\` is code." >"$plot/tree/shm/planted.md" && commit_tree
+"$gates/prose.py" "$plot/tree" || { echo "good prose does not pass its gate"; failed=1; }
+
 # plant_in_documents NAME DIAGNOSTIC FILE EXPRESSION: the whole tree, one file of it with that change (of sed)
 new_tree
 git ls-files -z -c -o --exclude-standard | xargs -0 cp --parents -t "$plot/tree" && commit_tree

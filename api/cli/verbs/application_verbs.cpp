@@ -151,7 +151,7 @@ void add_application_verbs(const Command& plcctl, CliSession& session) {
       .flag("--boot", arguments->boot, kBootHelp)
       .flag("--online", arguments->online, kOnlineHelp);
   const auto back_to = std::make_shared<LoadArguments>();
-  const char* const back = "Load again what was loaded before the version that is loaded";
+  const char* const back = "Load the predecessor of the loaded version again";
   plcctl.verb("rollback", back)
       .noun("application", back,
             [&session, back_to] {

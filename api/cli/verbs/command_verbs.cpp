@@ -80,7 +80,7 @@ void add_event(const Command& plcctl, CliSession& session, const char* verb, std
 void add_reload(const Command& plcctl, CliSession& session) {
   plcctl.verb("reload", "Have a host read its configuration file again")
       .noun("host",
-            "Take over what has changed in the configuration file; says of each changed key when it is used. "
+            "Take over the changes of the configuration file; says of each changed key when it is used. "
             "Unchanged instances run on",
             [&session] { return command(session, {"", plc_OPERATION_RELOAD_HOST, "", ""}, "reloaded"); });
 }

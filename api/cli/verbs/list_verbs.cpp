@@ -78,7 +78,7 @@ void add_list_verbs(const Command& plcctl, CliSession& session) {
       .optional("INSTANCE", *instance, "only of this instance");
   verb.noun("events", "The external events",
             [&session] { return list(session, &ControlClient::events, event_columns()); });
-  verb.noun("writers", "The clients that post events, and what became of their posts",
+  verb.noun("writers", "The clients that post events, and the fate of their posts",
             [&session] { return list(session, &ControlClient::writers, writer_columns()); });
   add_list_objects(verb, session);
   add_list_nodes(verb, session);

@@ -160,7 +160,8 @@ int logs(CliSession& session, const LogArguments& arguments) {
 void add_logs_verb(const Command& plcctl, CliSession& session) {
   const auto arguments = std::make_shared<LogArguments>();
   plcctl
-      .noun("logs", "What an instance has said: its application, its runtime, and the manager about it",
+      .noun("logs",
+            "The lines of an instance: of its application, of its runtime, and of the manager about it",
             [&session, arguments] { return logs(session, *arguments); })
       .argument("INSTANCE", arguments->instance)
       .flag("-f,--follow", arguments->follow,

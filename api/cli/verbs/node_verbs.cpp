@@ -10,7 +10,7 @@ namespace plchost {
 
 namespace {
 
-// All pages of one host. The time-out is that of one page.
+// All pages of one host. The timeout is that of one page.
 Result<std::vector<NodeListing>> route_pages(CliSession& session, const std::string& host, NodeQuery query) {
   std::vector<NodeListing> pages;
   for (;;) {

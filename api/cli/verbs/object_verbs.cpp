@@ -39,7 +39,7 @@ Result<ObjectQuery> query_of(const ListArguments& arguments) {
   return query;
 }
 
-// All pages of one host. The time-out is that of one page.
+// All pages of one host. The timeout is that of one page.
 Result<std::vector<ListedObject>> all_pages(CliSession& session, const std::string& host, ObjectQuery query) {
   std::vector<ListedObject> objects;
   for (;;) {
@@ -189,7 +189,7 @@ int watch_object(CliSession& session, const WatchObjectArguments& arguments) {
 
 void add_list_objects(const Command& verb, CliSession& session) {
   const auto arguments = std::make_shared<ListArguments>();
-  verb.noun("objects", "The objects of the global pool: what they are, what they hold, and who holds them",
+  verb.noun("objects", "The objects of the pool: types, contents, and the processes that hold them",
             [&session, arguments] { return list_objects(session, *arguments); })
       .optional("PATTERN", arguments->pattern, "only names like this: '*' any characters, '?' one")
       .optional("--type", arguments->type, "only memory, semaphore, event or mutex");
@@ -197,7 +197,7 @@ void add_list_objects(const Command& verb, CliSession& session) {
 
 void add_show_object(const Command& verb, CliSession& session) {
   const auto name = std::make_shared<std::string>();
-  verb.noun("object", "One object of the global pool, with all who hold it",
+  verb.noun("object", "One object of the pool, with all who hold it",
             [&session, name] { return show_object(session, *name); })
       .argument("NAME", *name);
 }
@@ -206,8 +206,7 @@ void add_watch_object(const Command& verb, CliSession& session) {
   const auto arguments = std::make_shared<WatchObjectArguments>();
   constexpr double kMinInterval = 0.02;
   constexpr double kMaxInterval = 3600;
-  verb.noun("object",
-            "One object of the global pool: a line (with --json an object) for each change, until Ctrl-C",
+  verb.noun("object", "One object of the pool: a line (with --json an object) for each change, until Ctrl-C",
             [&session, arguments] { return watch_object(session, *arguments); })
       .argument("NAME", arguments->name)
       .option("--interval", arguments->interval_s, "seconds between two looks (default 0.2)", kMinInterval,

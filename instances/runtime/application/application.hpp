@@ -13,7 +13,7 @@
 
 namespace plchost {
 
-/// The loaded user program.
+/// The loaded program of the user.
 class Application {
  public:
   /// Checks and loads the file, calls its plc_app_init and checks the tasks that it hands to `host`. The text

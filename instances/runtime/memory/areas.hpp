@@ -26,7 +26,7 @@ class TaskCycle {
  public:
   void add(InputView& view) { inputs_.push_back(&view); }
   void add(OutputView& view) { outputs_.push_back(&view); }
-  /// The task may change kept areas, those of `group`; `may_wait`: it is not real-time.
+  /// The task may change retain areas, those of `group`; `may_wait`: it is not real-time.
   void count_into(CycleCounter& counter, KeptGroup& group, bool may_wait) noexcept {
     counter_ = &counter;
     group_ = &group;
@@ -47,7 +47,7 @@ class TaskCycle {
   void begin() noexcept;
   void run(const std::function<void()>& entry) const;
   void end() noexcept;
-  /// After the cycle: gives who saves kept variables a copy of them. false: nobody has asked for one.
+  /// After the cycle: gives who saves retain variables a copy of them. false: nobody has asked for one.
   bool give_kept() noexcept { return group_ != nullptr && group_->answer(may_wait_); }
 
  private:
@@ -121,7 +121,7 @@ class Areas {
     std::string source;  ///< the setting that placed it, and what it names
     bool loss_told = false;
   };
-  /// Kept areas that tasks have in common.
+  /// Retain areas that tasks have in common.
   struct KeptShare {
     std::set<std::size_t> tasks;
     std::vector<std::size_t> areas;
@@ -162,7 +162,7 @@ class Areas {
   std::vector<DeclaredArea> declared_;
   AreaPlan plan_;
   std::vector<std::string> tasks_;
-  RetainLayout kept_;  // all kept areas
+  RetainLayout kept_;  // all retain areas
   std::deque<Block> blocks_;
   std::unique_ptr<RetainKeeper> keeper_;
   std::deque<Of<InputView>> inputs_;

@@ -28,7 +28,7 @@ std::vector<ByteRange> rest_of(ByteRange all, std::vector<ByteRange> ranges) {
   return rest;
 }
 
-// Where the next kept area lies behind one that ends at `bytes`.
+// Where the next retain area lies behind one that ends at `bytes`.
 std::size_t behind_kept(std::size_t bytes) noexcept {
   return (bytes + kRetainAlignment - 1) / kRetainAlignment * kRetainAlignment;
 }
@@ -347,7 +347,7 @@ void Areas::count_cycles(std::span<const TaskConfig> tasks) {
   }
 }
 
-// Kept areas and the tasks that may change them, so that no two shares have a task in common.
+// Retain areas and the tasks that may change them, so that no two shares have a task in common.
 std::vector<Areas::KeptShare> Areas::shares_of_kept() const {
   std::vector<KeptShare> shares;
   for (std::size_t area = 0; area < declared_.size(); ++area) {

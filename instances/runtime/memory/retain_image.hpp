@@ -11,7 +11,7 @@
 
 namespace plchost {
 
-/// A kept area within a RetainImage.
+/// A retain area within a RetainImage.
 struct RetainArea {
   std::string name;
   std::uint32_t flags = 0;
@@ -37,7 +37,7 @@ struct RetainLayout {
 /// corrupt: an area lies outside of the data or over another, or a bound is not held.
 [[nodiscard]] Result<void> check_layout(const RetainLayout& layout);
 
-/// The kept variables of one application at the end of a cycle.
+/// The retain variables of one application at the end of a cycle.
 struct RetainImage {
   std::uint64_t generation = 0;  ///< counts up with each that is written
   std::int64_t unix_ns = 0;      ///< when it was taken

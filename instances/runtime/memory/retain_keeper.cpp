@@ -86,7 +86,7 @@ struct RetainKeeper::Start {
 
   Result<void> judge(const RetainLayout& wanted, RetainMismatch mismatch) {
     if (!source || source->layout == wanted) return {};
-    const std::string why = fmt::format("the kept values of retain variables are of another layout: {}",
+    const std::string why = fmt::format("the retain values are of another layout: {}",
                                         describe_difference(source->layout, wanted));
     switch (mismatch) {
       case RetainMismatch::refuse:

@@ -44,7 +44,7 @@ struct AreaSettings {
   bool operator==(const AreaSettings&) const = default;
 };
 
-/// [Retain] Mismatch: what happens to kept values that belong to another layout of the retain areas.
+/// [Retain] Mismatch: what happens to retain values that belong to another layout of the retain areas.
 enum class RetainMismatch : std::uint8_t {
   initialise,  ///< all areas begin with their initial values; the file is put aside
   refuse,      ///< the application is not loaded

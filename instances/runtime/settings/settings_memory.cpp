@@ -131,7 +131,7 @@ constexpr std::array kMemoryKeys = {
     SettingKey{.section = kMemory, .name = "Memlock", .prefixed = true},
     SettingKey{.section = kRetain,
                .name = "Directory",
-               .meaning = "where kept values are written; relative to the settings file",
+               .meaning = "where retain values are written; relative to the settings file",
                .value = TextSetting{"a folder, or nothing for the one of --state-directory",
                                     [](std::string_view path) { return path.size() <= kMaxPath; },
                                     [](const SettingsTarget& to, std::string_view path) {
@@ -141,7 +141,7 @@ constexpr std::array kMemoryKeys = {
                .name = "IntervalMs",
                .unit = "ms",
                .initial = "1000",
-               .meaning = "how often kept values that have changed are written",
+               .meaning = "how often retain values that have changed are written",
                .value = NumberSetting{10, 3'600'000,
                                       [](const SettingsTarget& to, std::int64_t number) {
                                         to.settings.retain.interval = std::chrono::milliseconds(number);
@@ -160,8 +160,9 @@ constexpr std::array kMemoryKeys = {
     SettingKey{.section = kRetain,
                .name = "Mismatch",
                .initial = "Initialise",
-               .meaning = "kept values of another layout: begin anew, refuse the application, or take areas "
-                          "of the same name",
+               .meaning =
+                   "retain values of another layout: begin anew, refuse the application, or take areas "
+                   "of the same name",
                .value = WordSetting{kMismatches,
                                     [](const SettingsTarget& to, std::size_t index) {
                                       to.settings.retain.mismatch = static_cast<RetainMismatch>(index);

@@ -72,7 +72,7 @@ constexpr std::array kTaskKeys = {
         .section = kTaskSections,
         .name = "Watchdog.Policy",
         .initial = "Application",
-        .meaning = "what a fault or a hit stops",
+        .meaning = "the object that a fault or a hit stops",
         .value =
             WordSetting{
                 kWatchdogPolicies,

@@ -133,7 +133,7 @@ TEST_F(Following, SaysWhereItIs) {
   EXPECT_EQ(status().state, ClockState::locked);
   writing = false;
   run(200);
-  EXPECT_EQ(status().state, ClockState::locked) << "within the time-out";
+  EXPECT_EQ(status().state, ClockState::locked) << "within the timeout";
   run(200);
   EXPECT_EQ(status().state, ClockState::hold_over);
   EXPECT_TRUE(status().in_sync);
@@ -224,7 +224,7 @@ TEST_P(FollowingBroken, IsHoldOverAndLocksAgainWithoutAJump) {
   const std::int64_t drift = status().drift_ppb;
   const auto at_bound = status().corrections_at_bound;
   run_broken(250);
-  EXPECT_EQ(status().state, ClockState::locked) << "within the time-out";
+  EXPECT_EQ(status().state, ClockState::locked) << "within the timeout";
   run_broken(4000);
   EXPECT_EQ(status().state, ClockState::hold_over);
   EXPECT_TRUE(status().in_sync);

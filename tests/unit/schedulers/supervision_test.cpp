@@ -139,7 +139,7 @@ TEST_F(SupervisionTest, CountsNoOmittedCycleInTheGraceAfterTheStart) {
   EXPECT_GE(record->figure, record->limit);
 }
 
-// The runtime copies kept variables at the end of a cycle.
+// The runtime copies retain variables at the end of a cycle.
 TEST_F(SupervisionTest, CountsNoReleaseWhileTheTaskWorksForTheRuntime) {
   TaskConfig config = task_->config();
   std::optional<FaultKind> hit;

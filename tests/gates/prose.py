@@ -1,0 +1,274 @@
+#!/usr/bin/env python3
+"""The texts that git knows are written as a reader needs them: plain, short, active.
+
+Usage: prose.py [--all] [ROOT] (a git checkout); prints each fault as "file:line: the fault". --all looks at every text, also
+at those that HELD below does not name yet.
+
+* No sentence and no cell of a table begins with "who", "what", "whose", "whoever", "whatever" or "that which", unless it asks
+  something. A part behind ":" or ";" or a dash is held to the same.
+* No sentence has more than 30 words. Code in backticks is one word, a link counts as its text. Behind a colon, the parts of a
+  list that ";" or ":" divides are counted one by one.
+* No text has a word that manager/glossary.md forbids (the column "not").
+
+A text is a paragraph, an item of a list or a cell of a table outside of fences (.md), a comment, a docstring, or a string of
+three words and more: messages are among those.
+"""
+
+import argparse
+import ast
+import fnmatch
+import io
+import re
+import subprocess
+import sys
+import tokenize
+from pathlib import Path
+
+# The texts that are held to the rules: kind and pattern of the path. Kinds: document, comment, message.
+HELD = [
+    ("document", "*.md"),
+]
+GLOSSARY = "manager/glossary.md"
+WORDS = 30
+
+OPENING = re.compile(r"[\W_]*(who|what|whose|whoever|whatever|that which)\b(?!-)", re.IGNORECASE)
+# The ends of sentences. A sentence begins with a capital letter, a digit or code.
+END_OF_SENTENCE = re.compile(r"(?<=[.!?])[\"')\]*]*\s+(?=[\"'(\[*]*[A-Z0-9`\u0001])")
+PART = re.compile(r"(?<=[:;])\s+|\s+[-\u2013]\s+")
+WORD = re.compile(r"[\w'\u0001][\w'/.,\u0001-]*")
+CODE = "\u0001"  # one word of code
+
+C_TOKEN = re.compile(
+    r"""//(?P<line>[^\n]*)|/\*(?P<block>.*?)\*/|R"(?P<mark>\w*)\((?P<raw>.*?)\)(?P=mark)"|"""
+    r""""(?P<text>(?:\\.|[^"\\\n])*)"|(?<![0-9a-fA-F])'(?:\\.[^'\n]*|[^'\\\n])'""", re.DOTALL)
+C_FILES = (".cpp", ".hpp", ".h", ".c", ".idl", ".h.in", ".hpp.in")
+HASH_FILES = (".sh", ".cmake", "CMakeLists.txt")
+ITEM = re.compile(r"([*+-]|\d+\.|\([a-z0-9]\)) +(?=\S)")
+
+
+class Text:
+    """Lines of one paragraph, each with its number."""
+
+    def __init__(self):
+        self.lines = []
+
+    def fault_line(self, offset):
+        """The line in which the character at that offset of joined() lies."""
+        for number, line in self.lines:
+            if offset <= len(line):
+                return number
+            offset -= len(line) + 1
+        return self.lines[-1][0]
+
+    def joined(self):
+        return " ".join(line for _, line in self.lines)
+
+
+def paragraphs(lines, columns=False):
+    """Texts of (number, line) pairs: divided by empty lines, items of lists, tables, fences and drawings. With `columns`, a line that
+    is indented further or has gaps in it, as in a table of a comment, is a drawing."""
+    text = Text()
+    fenced = False
+    before_empty = True
+    for number, line in lines:
+        stripped = line.strip()
+        if stripped.startswith(("```", "~~~")):
+            fenced = not fenced
+            stripped = ""
+        if fenced or not stripped or stripped.startswith(("#", "<!--", "![", "@code", "[!")):
+            if text.lines:
+                yield text
+            text = Text()
+            before_empty = True
+            continue
+        if (not text.lines and before_empty and re.match(r"    |\t", line)) or (columns and re.search(r"\S   +\S|-->|──|\|  ", line)):
+            if text.lines:
+                yield text
+            text = Text()
+            continue
+        before_empty = False
+        if stripped.startswith("|"):
+            if text.lines:
+                yield text
+            for cell in re.split(r"(?<!\\)\|", stripped.strip("|")):
+                if not re.fullmatch(r"[\s:-]*", cell):
+                    text = Text()
+                    text.lines = [(number, cell.strip())]
+                    yield text
+            text = Text()
+            continue
+        item = ITEM.match(stripped)
+        if item and (text.lines == [] or not text.lines[-1][1].endswith((" the", " of"))):
+            if text.lines:
+                yield text
+            text = Text()
+            stripped = stripped[item.end():]
+        text.lines.append((number, stripped))
+    if text.lines:
+        yield text
+
+
+def documents(source):
+    return paragraphs(enumerate(source.split("\n"), 1))
+
+
+def c_texts(source):
+    """(kind, text) of a file in C, C++ or IDL."""
+    comment, last, message, message_end = [], 0, None, 0
+    number, at = 1, 0
+    for token in C_TOKEN.finditer(source):
+        between = source[at:token.start()]
+        number += between.count("\n")
+        start = number
+        number += token.group().count("\n")
+        at = token.end()
+        if token["line"] is not None:
+            own = source.rfind("\n", 0, token.start()) + 1
+            alone = not source[own:token.start()].strip()
+            follows = comment and last == start - 1 and (alone and not between.strip())
+            if not follows:
+                yield from (("comment", text) for text in paragraphs(comment, True))
+                comment = []
+            line = re.sub(r"^[/!]?<?(?: |$)", "", token["line"])
+            comment.append((start, line))
+            last = start
+        elif token["block"] is not None:
+            lines = [(start + i, re.sub(r"^\s*\*+ ?", "", line)) for i, line in enumerate(token["block"].split("\n"))]
+            yield from (("comment", text) for text in paragraphs(lines, True))
+        elif token["text"] is not None:
+            if message is not None and not between.strip():
+                message.lines[0] = (message.lines[0][0], message.lines[0][1] + token["text"])
+            else:
+                if message is not None:
+                    yield "message", message
+                message = Text()
+                message.lines = [(start, token["text"])]
+        elif token["raw"] is not None:
+            continue
+    if message is not None:
+        yield "message", message
+    yield from (("comment", text) for text in paragraphs(comment, True))
+
+
+def hash_texts(source):
+    """(kind, text) of a file whose comments begin with #: a shell script, CMake."""
+    comment, last = [], 0
+    for number, line in enumerate(source.split("\n"), 1):
+        found = re.search(r"(?:^|\s)#(?!!)+ ?(.*)$", line)
+        if not found or (found.start() > 0 and line[:found.start()].count('"') % 2):
+            continue
+        if comment and (last != number - 1 or line[:found.start()].strip()):
+            yield from (("comment", text) for text in paragraphs(comment, True))
+            comment = []
+        comment.append((number, found[1]))
+        last = number
+    yield from (("comment", text) for text in paragraphs(comment, True))
+
+
+def python_texts(source):
+    comment, last = [], 0
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        if token.type != tokenize.COMMENT:
+            continue
+        number = token.start[0]
+        if comment and (last != number - 1 or token.line[:token.start[1]].strip()):
+            yield from (("comment", text) for text in paragraphs(comment, True))
+            comment = []
+        comment.append((number, re.sub(r"^#+!? ?", "", token.string)))
+        last = number
+    yield from (("comment", text) for text in paragraphs(comment, True))
+    tree = ast.parse(source)
+    docstrings = set()
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if isinstance(body, list) and body and isinstance(body[0], ast.Expr) and isinstance(body[0].value, ast.Constant) \
+                and isinstance(body[0].value.value, str):
+            docstrings.add(body[0].value)
+            lines = [(body[0].lineno + i, line) for i, line in enumerate(body[0].value.value.split("\n"))]
+            yield from (("comment", text) for text in paragraphs(lines, True))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and node not in docstrings:
+            text = Text()
+            text.lines = [(node.lineno, node.value)]
+            yield "message", text
+
+
+def texts_of(name, source):
+    if name.endswith(".md"):
+        return (("document", text) for text in documents(source))
+    if name.endswith(C_FILES):
+        return c_texts(source)
+    if name.endswith(".py"):
+        return python_texts(source)
+    return hash_texts(source)
+
+
+def plain(text):
+    """Code as one word, links as their text, nothing of emphasis."""
+    text = re.sub(r"`+[^`]*`+", CODE, text)
+    text = re.sub(r"\]\([^)\s]*\)", "]", text)
+    return text.replace("**", "").replace("__", "")
+
+
+def is_message(text):
+    """Has three words with letters, and is no line of a program or of a format."""
+    return len(re.findall(r"(?:^|(?<=\s))[A-Za-z][a-z'-]+(?=[\s.,:;!?]|$)", text)) >= 3
+
+
+def faults_of(text, forbidden):
+    """(offset in the text, fault)"""
+    for sentence in END_OF_SENTENCE.split(text):
+        parts = [part for part in PART.split(sentence) if part]
+        for part in parts:
+            opening = OPENING.match(part)
+            if opening and not sentence.rstrip("\"')]* ").endswith("?"):
+                yield text.find(part), f"begins with '{opening[1]}': {part[:50]}"
+        before, colon, after = sentence.partition(": ")
+        counted = [before, *re.split(r"[:;]\s", after)] if colon else [sentence]
+        for part in counted:
+            words = len(WORD.findall(part))
+            if words > WORDS:
+                yield text.find(part), f"{words} words in a sentence, at most {WORDS}: {part[:50]}"
+    for found in forbidden.finditer(text) if forbidden else ():
+        yield found.start(), f"'{found[0]}' is not a word of {GLOSSARY}"
+
+
+def forbidden_words(root):
+    """The words of the column "not" of the glossary as one expression, or None."""
+    words = []
+    if (root / GLOSSARY).exists():
+        for line in (root / GLOSSARY).read_text(encoding="utf-8").split("\n"):
+            cells = [cell.strip() for cell in line.strip("|").split("|")] if line.startswith("|") else []
+            if len(cells) == 3 and cells[2] not in ("", "not", "-") and not cells[2].startswith("--"):
+                words += [word.strip() for word in cells[2].split(",")]
+    return re.compile(r"(?<![\w-])(?:%s)(?![\w-])" % "|".join(map(re.escape, words)), re.IGNORECASE) if words else None
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--all", action="store_true")
+    parser.add_argument("root", nargs="?", type=Path, default=Path(__file__).resolve().parents[2])
+    options = parser.parse_args()
+    held = [(kind, pattern) for kind in ("document", "comment", "message") for pattern in ("*",)] if options.all else HELD
+    names = subprocess.run(["git", "ls-files", "-z"], cwd=options.root, check=True, capture_output=True,
+                           text=True).stdout.split("\0")
+    forbidden = forbidden_words(options.root)
+    wrong = 0
+    for name in names:
+        kinds = {kind for kind, pattern in held if fnmatch.fnmatch(name, pattern)}
+        if not kinds or not name.endswith((".md", ".py", *C_FILES, *HASH_FILES)) or not (options.root / name).is_file():
+            continue
+        for kind, text in texts_of(name, (options.root / name).read_text(encoding="utf-8")):
+            joined = text.joined()
+            if kind not in kinds or (kind == "message" and not is_message(joined)):
+                continue
+            shown = plain(joined)
+            words = None if name == GLOSSARY else forbidden
+            for offset, fault in faults_of(shown, words):
+                print(f"{name}:{text.fault_line(joined.find(shown[offset:offset + 20].split(CODE)[0]))}: {fault}")
+                wrong += 1
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
