@@ -12,7 +12,7 @@
 #include "api/control/application_versions.hpp"
 #include "api/control/exit_codes.hpp"
 #include "manager/system/service_manager.hpp"
-#include "shm/base/log.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

@@ -11,9 +11,10 @@
 
 #include "instances/launch/launch_contract.hpp"
 #include "manager/system/child_process.hpp"
-#include "shm/base/log.hpp"
 #include "shm/base/time.hpp"
-#include "shm/pool/memory_file.hpp"
+#include "shm/files/memory_file.hpp"
+#include "shm/files/pool_files.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

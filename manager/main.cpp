@@ -18,9 +18,9 @@
 #include "manager/store/store_process.hpp"
 #include "manager/store/wish_writer.hpp"
 #include "manager/system/child_process.hpp"
-#include "shm/base/log.hpp"
 #include "shm/base/memory_guard.hpp"
 #include "shm/base/names.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

@@ -20,13 +20,14 @@
 #include "manager/supervisor/process_host.hpp"
 #include "manager/system/child_process.hpp"
 #include "manager/system/service_manager.hpp"
-#include "shm/base/log.hpp"
-#include "shm/base/own_folder.hpp"
 #include "shm/base/thread.hpp"
 #include "shm/base/time.hpp"
-#include "shm/pool/instance_page.hpp"
-#include "shm/pool/memory_file.hpp"
-#include "shm/pool/reference_clock.hpp"
+#include "shm/files/memory_file.hpp"
+#include "shm/files/own_folder.hpp"
+#include "shm/files/pool_files.hpp"
+#include "shm/log/log.hpp"
+#include "shm/pages/instance_page.hpp"
+#include "shm/pages/reference_clock.hpp"
 
 namespace plchost {
 

@@ -21,10 +21,10 @@
 #include "manager/supervisor/supervisor.hpp"
 #include "manager/system/disk_thread.hpp"
 #include "manager/system/reactor.hpp"
-#include "shm/base/lock_file.hpp"
-#include "shm/pool/host_page.hpp"
+#include "shm/files/lock_file.hpp"
+#include "shm/pages/host_page.hpp"
+#include "shm/pages/transition_ring.hpp"
 #include "shm/pool/object_pool.hpp"
-#include "shm/pool/transition_ring.hpp"
 
 namespace plchost {
 

@@ -11,10 +11,10 @@
 #include "manager/manager.hpp"
 #include "manager/pool_rights.hpp"
 #include "manager/store/wish_memory.hpp"
-#include "shm/base/log.hpp"
 #include "shm/base/thread.hpp"
-#include "shm/pool/instance_page.hpp"
-#include "shm/pool/log_ring.hpp"
+#include "shm/log/log.hpp"
+#include "shm/pages/instance_page.hpp"
+#include "shm/pages/log_ring.hpp"
 
 namespace plchost {
 

@@ -8,10 +8,10 @@
 #include <unistd.h>
 
 #include "manager/config/accounts.hpp"
-#include "shm/base/log.hpp"
 #include "shm/base/unique_fd.hpp"
-#include "shm/pool/foreign_files.hpp"
-#include "shm/pool/memory_file.hpp"
+#include "shm/files/memory_file.hpp"
+#include "shm/log/log.hpp"
+#include "shm/pages/foreign_files.hpp"
 
 namespace plchost {
 

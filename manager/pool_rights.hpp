@@ -4,7 +4,7 @@
 
 #include "manager/config/manager_config.hpp"
 #include "shm/base/result.hpp"
-#include "shm/pool/memory_rights.hpp"
+#include "shm/files/memory_rights.hpp"
 
 namespace plchost {
 

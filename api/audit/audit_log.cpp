@@ -15,9 +15,9 @@
 #include <unistd.h>
 
 #include "api/audit/audit_file.hpp"
-#include "shm/base/replace_file.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/time.hpp"
+#include "shm/files/replace_file.hpp"
 
 namespace plchost {
 

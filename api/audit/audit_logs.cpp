@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "shm/base/log.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "shm/base/log.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

@@ -18,8 +18,8 @@
 #include "api/cli/words/overview.hpp"
 #include "api/cli/words/short_form.hpp"
 #include "api/cli/words/word_hint.hpp"
-#include "shm/base/log.hpp"
 #include "shm/base/names.hpp"
+#include "shm/log/log.hpp"
 
 namespace {
 

@@ -7,7 +7,7 @@
 
 #include "api/client/control_client.hpp"
 #include "shm/base/time.hpp"
-#include "shm/pool/log_ring.hpp"
+#include "shm/pages/log_ring.hpp"
 
 namespace plchost {
 

@@ -5,8 +5,8 @@
 #include <string>
 #include <string_view>
 
-#include "shm/base/control_message.hpp"
 #include "shm/base/result.hpp"
+#include "shm/sockets/control_message.hpp"
 
 namespace plchost {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "shm/base/control_message.hpp"
+#include "shm/sockets/control_message.hpp"
 
 namespace plchost {
 

@@ -4,7 +4,7 @@
 #include <span>
 #include <string_view>
 
-#include "shm/pool/host_page.hpp"
+#include "shm/pages/host_page.hpp"
 
 namespace plchost::dds {
 

@@ -8,7 +8,7 @@
 #include <control.h>
 
 #include "shm/base/result.hpp"
-#include "shm/pool/log_ring.hpp"
+#include "shm/pages/log_ring.hpp"
 
 namespace plchost {
 

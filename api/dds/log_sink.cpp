@@ -7,9 +7,9 @@
 #include <dds/dds.h>
 #include <dds/ddsrt/log.h>
 
-#include "shm/base/log.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/time.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost::dds {
 

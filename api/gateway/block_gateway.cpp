@@ -6,7 +6,7 @@
 #include "api/dds/samples.hpp"
 #include "api/dds/topics.hpp"
 #include "api/gateway/block_sample.hpp"
-#include "shm/base/log.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

@@ -8,8 +8,8 @@
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"
 #include "api/gateway/block_gateway.hpp"
-#include "shm/base/log.hpp"
 #include "shm/base/names.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

@@ -1,6 +1,6 @@
 #include "api/gateway/gateway_thread.hpp"
 
-#include "shm/base/log.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

@@ -16,7 +16,7 @@
 #include "api/security/policy.hpp"
 #include "api/security/signed_document.hpp"
 #include "shm/base/names.hpp"
-#include "shm/base/replace_file.hpp"
+#include "shm/files/replace_file.hpp"
 
 namespace plchost::security {
 

@@ -5,7 +5,7 @@
 #include "api/dds/text.hpp"
 #include "api/dds/time_limit.hpp"
 #include "api/server/control_server_parts.hpp"
-#include "shm/base/log.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

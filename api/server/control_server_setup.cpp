@@ -14,9 +14,9 @@
 #include "api/dds/log_sink.hpp"
 #include "api/security/identity.hpp"
 #include "api/server/control_server_parts.hpp"
-#include "shm/base/log.hpp"
 #include "shm/base/system_call.hpp"
-#include "shm/pool/host_page.hpp"
+#include "shm/log/log.hpp"
+#include "shm/pages/host_page.hpp"
 
 namespace plchost {
 

@@ -8,8 +8,8 @@
 #include "api/dds/cyclone_version.h"
 #include "api/server/access/receive_gate.hpp"
 #include "api/server/control_server.hpp"
-#include "shm/base/log.hpp"
 #include "shm/base/memory_guard.hpp"
+#include "shm/log/log.hpp"
 
 namespace {
 

@@ -9,9 +9,9 @@
 
 #include "api/dds/guid.hpp"
 #include "api/server/status/findings_collector.hpp"
-#include "shm/base/control_message.hpp"
-#include "shm/base/packet_socket.hpp"
 #include "shm/base/time.hpp"
+#include "shm/sockets/control_message.hpp"
+#include "shm/sockets/packet_socket.hpp"
 
 namespace plchost {
 

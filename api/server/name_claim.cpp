@@ -16,8 +16,8 @@
 #include "api/dds/samples.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"
-#include "shm/base/log.hpp"
 #include "shm/base/names.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

@@ -8,7 +8,7 @@
 #include "api/dds/error.hpp"
 #include "api/dds/samples.hpp"
 #include "api/dds/topics.hpp"
-#include "shm/base/log.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

@@ -12,9 +12,9 @@
 #include <sys/file.h>
 #include <unistd.h>
 
-#include "shm/base/log.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/time.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

@@ -18,10 +18,10 @@
 #include "instances/runtime/setup/options.hpp"
 #include "instances/runtime/trial/application_check.hpp"
 #include "instances/runtime/trial/trial_process.hpp"
-#include "shm/base/log.hpp"
 #include "shm/base/memory_guard.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/unique_fd.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

@@ -11,7 +11,7 @@
 #include <unistd.h>
 
 #include "shm/base/names.hpp"
-#include "shm/base/toml/section_reader.hpp"
+#include "shm/toml/section_reader.hpp"
 
 namespace plchost {
 

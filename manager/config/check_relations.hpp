@@ -5,7 +5,7 @@
 
 #include "manager/config/manager_config.hpp"
 #include "shm/base/result.hpp"
-#include "shm/base/toml/toml_document.hpp"
+#include "shm/toml/toml_document.hpp"
 
 namespace plchost {
 

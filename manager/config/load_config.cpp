@@ -13,11 +13,11 @@
 
 #include "manager/config/accounts.hpp"
 #include "manager/config/check_relations.hpp"
-#include "shm/base/log_levels.hpp"
 #include "shm/base/names.hpp"
-#include "shm/base/toml/section_reader.hpp"
-#include "shm/base/toml/toml_document.hpp"
-#include "shm/pool/host_page.hpp"
+#include "shm/log/log_levels.hpp"
+#include "shm/pages/host_page.hpp"
+#include "shm/toml/section_reader.hpp"
+#include "shm/toml/toml_document.hpp"
 
 namespace plchost {
 

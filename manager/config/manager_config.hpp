@@ -9,7 +9,7 @@
 
 #include "shm/base/time.hpp"
 #include "shm/block_driver/node_directory.hpp"
-#include "shm/pool/host_page.hpp"
+#include "shm/pages/host_page.hpp"
 
 namespace plchost {
 

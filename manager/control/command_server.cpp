@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 #include <sys/epoll.h>
 
-#include "shm/base/log.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

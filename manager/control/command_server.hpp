@@ -9,7 +9,7 @@
 
 #include "api/control/control_handler.hpp"
 #include "manager/system/reactor.hpp"
-#include "shm/base/packet_socket.hpp"
+#include "shm/sockets/packet_socket.hpp"
 
 namespace plchost {
 

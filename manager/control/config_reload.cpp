@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 
 #include "manager/system/service_manager.hpp"
-#include "shm/base/log.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

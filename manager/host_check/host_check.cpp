@@ -7,7 +7,7 @@
 #include <sched.h>
 
 #include "manager/host_check/checks.hpp"
-#include "shm/base/log.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

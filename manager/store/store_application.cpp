@@ -21,9 +21,9 @@
 #include "api/security/sha256.hpp"
 #include "manager/system/application_trial.hpp"
 #include "shm/base/names.hpp"
-#include "shm/base/replace_file.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/unique_fd.hpp"
+#include "shm/files/replace_file.hpp"
 
 namespace plchost {
 

@@ -6,7 +6,7 @@
 
 #include <fmt/format.h>
 
-#include "shm/base/replace_file.hpp"
+#include "shm/files/replace_file.hpp"
 
 namespace plchost {
 

@@ -7,9 +7,9 @@
 #include <string_view>
 
 #include "manager/system/disk_thread.hpp"
-#include "shm/base/lock_file.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
+#include "shm/files/lock_file.hpp"
 
 namespace plchost {
 

@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 
 #include "shm/base/names.hpp"
-#include "shm/pool/fixed_page.hpp"
+#include "shm/files/fixed_page.hpp"
 
 namespace plchost {
 

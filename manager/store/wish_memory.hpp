@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "manager/store/instance_wish.hpp"
-#include "shm/pool/memory_file.hpp"
+#include "shm/files/memory_file.hpp"
 
 namespace plchost {
 

@@ -11,10 +11,10 @@
 #include <unistd.h>
 
 #include "instances/launch/launch_contract.hpp"
-#include "shm/base/log.hpp"
-#include "shm/base/replace_file.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/unique_fd.hpp"
+#include "shm/files/replace_file.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

@@ -16,7 +16,7 @@
 
 #include "manager/store/wish_folder.hpp"
 #include "manager/system/take_packets.hpp"
-#include "shm/base/replace_file.hpp"
+#include "shm/files/replace_file.hpp"
 
 namespace plchost {
 

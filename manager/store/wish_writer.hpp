@@ -9,8 +9,8 @@
 
 #include "manager/system/child_process.hpp"
 #include "manager/system/reactor.hpp"
-#include "shm/base/packet_socket.hpp"
 #include "shm/base/result.hpp"
+#include "shm/sockets/packet_socket.hpp"
 
 namespace plchost {
 

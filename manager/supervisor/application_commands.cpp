@@ -4,7 +4,7 @@
 #include <fmt/format.h>
 
 #include "manager/supervisor/managed_instance.hpp"
-#include "shm/base/log.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

@@ -5,9 +5,9 @@
 
 #include "manager/config/load_config.hpp"
 #include "manager/supervisor/managed_instance.hpp"
-#include "shm/base/log.hpp"
 #include "shm/base/names.hpp"
-#include "shm/base/toml/section_reader.hpp"
+#include "shm/log/log.hpp"
+#include "shm/toml/section_reader.hpp"
 
 namespace plchost {
 

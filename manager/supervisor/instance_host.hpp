@@ -7,10 +7,10 @@
 #include "instances/launch/launch_contract.hpp"
 #include "manager/supervisor/starvation_watch.hpp"
 #include "manager/system/child_process.hpp"
-#include "shm/base/control_message.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
-#include "shm/pool/instance_page.hpp"
+#include "shm/pages/instance_page.hpp"
+#include "shm/sockets/control_message.hpp"
 
 namespace plchost {
 

@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "manager/config/manager_config.hpp"
-#include "shm/pool/host_page.hpp"
+#include "shm/pages/host_page.hpp"
 
 namespace plchost {
 

@@ -10,9 +10,9 @@
 #include <unistd.h>
 
 #include "manager/system/child_process.hpp"
-#include "shm/base/log.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/time.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

@@ -8,7 +8,7 @@
 
 #include "manager/supervisor/output_lines.hpp"
 #include "shm/base/unique_fd.hpp"
-#include "shm/pool/log_ring.hpp"
+#include "shm/pages/log_ring.hpp"
 
 namespace plchost {
 

@@ -8,8 +8,8 @@
 #include <fmt/format.h>
 
 #include "manager/supervisor/managed_instance.hpp"
-#include "shm/base/log.hpp"
 #include "shm/base/time.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

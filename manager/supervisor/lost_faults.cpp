@@ -5,8 +5,8 @@
 
 #include <fmt/format.h>
 
-#include "shm/base/exception_history.hpp"
-#include "shm/pool/instance_page.hpp"
+#include "shm/pages/exception_history.hpp"
+#include "shm/pages/instance_page.hpp"
 
 namespace plchost {
 

@@ -6,9 +6,9 @@
 
 #include <fmt/format.h>
 
-#include "shm/base/log.hpp"
 #include "shm/base/time.hpp"
 #include "shm/base/transient.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

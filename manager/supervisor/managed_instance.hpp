@@ -18,7 +18,7 @@
 #include "manager/supervisor/instance_phase.hpp"
 #include "manager/supervisor/restart_decision.hpp"
 #include "manager/supervisor/starvation_watch.hpp"
-#include "shm/pool/host_page.hpp"
+#include "shm/pages/host_page.hpp"
 
 namespace plchost {
 

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "shm/base/log_line.hpp"
+#include "shm/log/log_line.hpp"
 
 namespace plchost {
 

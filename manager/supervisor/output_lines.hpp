@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-#include "shm/pool/log_ring.hpp"
+#include "shm/pages/log_ring.hpp"
 
 namespace plchost {
 

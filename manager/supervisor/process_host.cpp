@@ -9,7 +9,7 @@
 #include "manager/supervisor/lost_faults.hpp"
 #include "manager/system/take_packets.hpp"
 #include "manager/system/thread_states.hpp"
-#include "shm/base/log.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

@@ -10,7 +10,7 @@
 #include "manager/system/application_trial.hpp"
 #include "manager/system/child_process.hpp"
 #include "manager/system/reactor.hpp"
-#include "shm/base/packet_socket.hpp"
+#include "shm/sockets/packet_socket.hpp"
 
 namespace plchost {
 

@@ -6,7 +6,7 @@
 #include <fmt/format.h>
 
 #include "shm/base/names.hpp"
-#include "shm/base/toml/section_reader.hpp"
+#include "shm/toml/section_reader.hpp"
 
 namespace plchost {
 

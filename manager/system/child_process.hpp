@@ -5,9 +5,9 @@
 
 #include <sys/types.h>
 
-#include "shm/base/packet_socket.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/unique_fd.hpp"
+#include "shm/sockets/packet_socket.hpp"
 
 namespace plchost {
 

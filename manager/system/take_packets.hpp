@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "manager/system/reactor.hpp"
-#include "shm/base/packet_socket.hpp"
+#include "shm/sockets/packet_socket.hpp"
 
 namespace plchost {
 

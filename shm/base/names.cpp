@@ -74,6 +74,22 @@ std::string printable(std::string text) {
   return text;
 }
 
+bool is_object_name(std::string_view name) noexcept {
+  return !name.empty() && name.size() <= kMaxObjectName && is_printable_utf8(name);
+}
+
+Result<void> check_object_name(std::string_view name) {
+  if (is_object_name(name)) return {};
+  std::string told(shown(name));
+  for (char& c : told) {
+    if (c < ' ' || c > '~') c = '?';
+  }
+  return failure(ErrorCode::invalid_argument,
+                 fmt::format("object name '{}' ({} bytes) is not valid: allowed are 1 to {} bytes of UTF-8 "
+                             "without control characters",
+                             told, name.size(), kMaxObjectName));
+}
+
 std::string event_object_name(std::string_view instance, std::string_view event) {
   return fmt::format("{}/{}", instance, event);
 }

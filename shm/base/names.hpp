@@ -33,6 +33,11 @@ inline constexpr std::size_t kMaxPath = 255;
 /// The text with '?' in place of characters that could drive a terminal or make two lines of one.
 [[nodiscard]] std::string printable(std::string text);
 
+/// Whether an object may have this name: 1 to kMaxObjectName bytes of UTF-8 without control characters.
+[[nodiscard]] bool is_object_name(std::string_view name) noexcept;
+/// The same; invalid_argument says what is allowed.
+[[nodiscard]] Result<void> check_object_name(std::string_view name);
+
 /// The object that holds the external event `event` of `instance` in the pool: "instance/event".
 [[nodiscard]] std::string event_object_name(std::string_view instance, std::string_view event);
 

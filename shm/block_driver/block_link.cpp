@@ -2,7 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "shm/pool/fixed_page.hpp"
+#include "shm/files/fixed_page.hpp"
+#include "shm/files/pool_files.hpp"
 
 namespace plchost {
 

@@ -10,7 +10,7 @@
 
 #include "shm/base/time.hpp"
 #include "shm/block_driver/slot_ring.hpp"
-#include "shm/pool/memory_file.hpp"
+#include "shm/files/memory_file.hpp"
 
 namespace plchost {
 

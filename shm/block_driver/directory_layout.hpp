@@ -9,7 +9,7 @@
 #include "shm/base/names.hpp"
 #include "shm/base/seqlock.hpp"
 #include "shm/block_driver/node_address.hpp"
-#include "shm/pool/fixed_page.hpp"
+#include "shm/files/fixed_page.hpp"
 
 // The directory of the nodes of a pool as it lies in shared memory. What is read here is checked before it is
 // used: strangers may have scribbled in it. It is written under a lock of its file, which the kernel gives

@@ -9,7 +9,7 @@
 #include <time.h>
 
 #include "shm/base/time.hpp"
-#include "shm/pool/memory_file.hpp"
+#include "shm/files/memory_file.hpp"
 
 namespace plchost {
 

@@ -10,7 +10,8 @@
 
 #include "shm/base/process_start.hpp"
 #include "shm/block_driver/directory_lock.hpp"
-#include "shm/pool/fixed_page.hpp"
+#include "shm/files/fixed_page.hpp"
+#include "shm/files/pool_files.hpp"
 
 namespace plchost {
 

@@ -8,7 +8,7 @@
 #include "shm/base/result.hpp"
 #include "shm/block_driver/block_link.hpp"
 #include "shm/block_driver/directory_layout.hpp"
-#include "shm/pool/memory_file.hpp"
+#include "shm/files/memory_file.hpp"
 
 namespace plchost {
 

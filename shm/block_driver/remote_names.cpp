@@ -8,7 +8,8 @@
 
 #include "shm/base/crc32c.hpp"
 #include "shm/base/seqlock.hpp"
-#include "shm/pool/fixed_page.hpp"
+#include "shm/files/fixed_page.hpp"
+#include "shm/files/pool_files.hpp"
 
 namespace plchost {
 

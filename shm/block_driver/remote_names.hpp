@@ -10,7 +10,7 @@
 #include "shm/base/names.hpp"
 #include "shm/base/result.hpp"
 #include "shm/block_driver/node_address.hpp"
-#include "shm/pool/memory_file.hpp"
+#include "shm/files/memory_file.hpp"
 
 namespace plchost {
 

@@ -5,10 +5,10 @@
 #include <fmt/format.h>
 #include <signal.h>
 
-#include "shm/base/log.hpp"
 #include "shm/base/process_start.hpp"
 #include "shm/block_driver/block_router.hpp"
 #include "shm/block_driver/routes.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

@@ -8,7 +8,7 @@
 #include <sys/stat.h>
 
 #include "shm/base/thread.hpp"
-#include "shm/pool/memory_file.hpp"
+#include "shm/files/memory_file.hpp"
 
 namespace plchost {
 

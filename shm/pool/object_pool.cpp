@@ -12,6 +12,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "shm/files/pool_files.hpp"
 #include "shm/pool/object_listing.hpp"
 #include "shm/pool/pool_adoption.hpp"
 #include "shm/pool/pool_segment.hpp"

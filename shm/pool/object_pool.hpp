@@ -9,7 +9,7 @@
 
 #include "shm/base/names.hpp"
 #include "shm/base/result.hpp"
-#include "shm/pool/memory_rights.hpp"
+#include "shm/files/memory_rights.hpp"
 #include "shm/pool/object_info.hpp"
 #include "shm/pool/object_type.hpp"
 #include "shm/pool/pool_event.hpp"

@@ -14,6 +14,7 @@
 #include <unistd.h>
 
 #include "shm/base/unique_fd.hpp"
+#include "shm/files/pool_files.hpp"
 #include "shm/plc_process_image.h"
 #include "shm/plc_reference_clock.h"
 #include "shm/pool/pool_table.hpp"
@@ -97,14 +98,6 @@ MemoryFileState examine_patiently(const std::string& path) {
   }
 }
 
-// Who may not write the pool could not have made an object of it either.
-bool may_write_pool(const std::string& pool, uid_t user) {
-  struct stat status{};
-  if (::stat(path_in_memory(pool).c_str(), &status) != 0) return false;
-  return user == ::geteuid() ||
-         allows_to_write({.owner = status.st_uid, .group = status.st_gid, .mode = status.st_mode}, user);
-}
-
 bool can_be_adopted(const MemoryFileState& state, const std::string& pool) {
   return state.kind == Kind::described && may_write_pool(pool, state.status.st_uid);
 }
@@ -156,10 +149,6 @@ bool set_right(PoolSegment& segment, PoolLock& held, std::string_view name, cons
 
 bool PoolAdoption::is_left_over(const ObjectEntry& entry) noexcept {
   return PoolTable::is_valid(entry) && is_memory(entry) && PoolTable::is_idle(entry);
-}
-
-bool PoolAdoption::may_own(std::string_view pool, uid_t user) {
-  return is_trusted_owner(user) || may_write_pool(std::string(pool), user);
 }
 
 bool PoolAdoption::is_for_adoption(const std::string& path, const std::string& pool) {

@@ -10,7 +10,7 @@
 #include <time.h>
 
 #include "shm/base/result.hpp"
-#include "shm/pool/memory_rights.hpp"
+#include "shm/files/memory_rights.hpp"
 #include "shm/pool/pool_segment.hpp"
 
 namespace plchost {
@@ -30,8 +30,6 @@ class PoolAdoption {
   /// Waits up to 20 ms for a file that is just being made.
   [[nodiscard]] static bool reconcile(PoolSegment& segment, std::string_view name);
 
-  /// Whether a memory of the pool may belong to the user: who may write the pool can make any object in it.
-  [[nodiscard]] static bool may_own(std::string_view pool, uid_t user);
   /// Of a file: whether it becomes an object.
   [[nodiscard]] static bool is_for_adoption(const std::string& path, const std::string& pool);
   /// The same, or it belongs to CmpBlkDrvShm: no memory may take its name.

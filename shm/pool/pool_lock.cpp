@@ -5,7 +5,7 @@
 #include <fmt/format.h>
 
 #include "shm/base/thread_owner.hpp"
-#include "shm/pool/memory_file.hpp"
+#include "shm/files/memory_file.hpp"
 
 namespace plchost {
 

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "shm/base/time.hpp"
-#include "shm/pool/memory_file.hpp"
+#include "shm/files/memory_file.hpp"
 #include "shm/pool/pool_event.hpp"
 #include "shm/pool/pool_layout.hpp"
 

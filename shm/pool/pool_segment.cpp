@@ -9,7 +9,8 @@
 
 #include "shm/base/process_start.hpp"
 #include "shm/base/time.hpp"
-#include "shm/pool/open_or_make.hpp"
+#include "shm/files/open_or_make.hpp"
+#include "shm/files/pool_files.hpp"
 #include "shm/pool/pool_clients.hpp"
 #include "shm/pool/pool_references.hpp"
 #include "shm/pool/pool_table.hpp"

@@ -14,7 +14,7 @@
 
 #include "shm/base/process_start.hpp"
 #include "shm/base/result.hpp"
-#include "shm/pool/memory_file.hpp"
+#include "shm/files/memory_file.hpp"
 #include "shm/pool/object_pool.hpp"
 #include "shm/pool/pool_journal.hpp"
 #include "shm/pool/pool_lock.hpp"

@@ -9,7 +9,7 @@
 #include <fmt/format.h>
 
 #include "api/client/control_client.hpp"
-#include "shm/pool/instance_page.hpp"
+#include "shm/pages/instance_page.hpp"
 #include "tests/bench/bench.hpp"
 #include "tests/bench/child.hpp"
 #include "tests/bench/dds_poster.hpp"

@@ -10,7 +10,7 @@
 #include <sys/mman.h>
 
 #include "shm/base/result.hpp"
-#include "shm/pool/memory_file.hpp"
+#include "shm/files/memory_file.hpp"
 #include "tests/bench/dds_board.hpp"
 #include "tests/bench/processes.hpp"
 #include "tests/bench/row.hpp"

@@ -11,6 +11,7 @@
 #include <unistd.h>
 
 #include "shm/base/system_call.hpp"
+#include "shm/files/pool_files.hpp"
 #include "shm/pool/object_pool.hpp"
 #include "tests/bench/child.hpp"
 #include "tests/bench/parts.hpp"

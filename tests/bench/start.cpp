@@ -7,7 +7,7 @@
 
 #include <fmt/format.h>
 
-#include "shm/pool/memory_file.hpp"
+#include "shm/files/memory_file.hpp"
 #include "shm/pool/object_pool.hpp"
 #include "tests/bench/child.hpp"
 #include "tests/bench/parts.hpp"

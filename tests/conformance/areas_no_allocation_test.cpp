@@ -3,6 +3,7 @@
 
 #include "instances/runtime/memory/areas.hpp"
 #include "instances/runtime/memory/kept_group.hpp"
+#include "shm/files/pool_files.hpp"
 #include "tests/conformance/malloc_count.hpp"
 #include "tests/support/own_name.hpp"
 #include "tests/support/whole_cycle.hpp"

@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "shm/base/log.hpp"
 #include "shm/block_driver/block_channel.hpp"
 #include "shm/block_driver/block_router.hpp"
+#include "shm/log/log.hpp"
 #include "tests/support/own_name.hpp"
 
 namespace {

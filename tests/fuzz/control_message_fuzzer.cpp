@@ -3,7 +3,7 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "shm/base/control_message.hpp"
+#include "shm/sockets/control_message.hpp"
 
 // Any packet is either refused as corrupt, or comes back the same from a round trip.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

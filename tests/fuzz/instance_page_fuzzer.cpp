@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "shm/base/histogram_digest.hpp"
-#include "shm/pool/instance_page.hpp"
+#include "shm/pages/instance_page.hpp"
 #include "tests/support/own_name.hpp"
 
 namespace {

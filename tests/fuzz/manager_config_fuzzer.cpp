@@ -4,7 +4,7 @@
 #include <string_view>
 
 #include "manager/config/load_config.hpp"
-#include "shm/pool/host_page.hpp"
+#include "shm/pages/host_page.hpp"
 
 // Any text is either refused with at least one error that begins with the file's name, or gives a
 // configuration that keeps the bounds that the rest of the manager relies on.

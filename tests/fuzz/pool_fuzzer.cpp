@@ -6,6 +6,7 @@
 #include <cstring>
 #include <string>
 
+#include "shm/files/pool_files.hpp"
 #include "shm/pool/object_pool.hpp"
 #include "shm/pool/pool_layout.hpp"
 #include "tests/support/own_name.hpp"

@@ -5,25 +5,27 @@ cd "${1:-$(dirname "$0")/../..}"
 
 # folder: the folders it may include from (besides itself)
 allowed() {
+  local rooms="shm/files shm/log shm/base"
+  local shared="shm/block_driver shm/pool shm/pages shm/sockets $rooms"
   case "$1" in
     shm/base) echo "" ;;
-    shm/pool) echo "shm/base" ;;
-    shm/block_driver) echo "shm/pool shm/base" ;;
+    shm/log | shm/toml | shm/sockets | shm/files) echo "shm/base" ;;
+    shm/pages | shm/pool | shm/block_driver) echo "$rooms" ;;
     shm/library) echo "shm/pool shm/base" ;;
     schedulers) echo "shm/base" ;;
-    instances/launch) echo "shm/base" ;;
-    instances) echo "instances/launch schedulers shm/block_driver shm/pool shm/base" ;;
-    api/control) echo "shm/base" ;;
-    api/security) echo "shm/base" ;;
-    api) echo "api/control api/security shm/block_driver shm/pool shm/base" ;;
-    manager) echo "api/control api/security instances/launch shm/block_driver shm/pool shm/base" ;;
+    instances/launch) echo "shm/log shm/base" ;;
+    instances) echo "instances/launch schedulers $shared" ;;
+    api/control) echo "shm/sockets shm/base" ;;
+    api/security) echo "shm/files shm/base" ;;
+    api) echo "api/control api/security shm/toml $shared" ;;
+    manager) echo "api/control api/security instances/launch shm/toml $shared" ;;
   esac
 }
 
 # the longest layer that a path lies in
 layer_of() {
   local layer
-  for layer in shm/base shm/pool shm/block_driver shm/library schedulers instances/launch instances api/control api/security api manager; do
+  for layer in shm/base shm/log shm/toml shm/sockets shm/files shm/pages shm/pool shm/block_driver shm/library schedulers instances/launch instances api/control api/security api manager; do
     case "$1" in "$layer"/*) echo "$layer"; return ;; esac
   done
   echo none

@@ -14,8 +14,8 @@
 
 #include "api/control/scheduler_names.hpp"
 #include "shm/base/names.hpp"
-#include "shm/base/toml/section_reader.hpp"
-#include "shm/base/toml/toml_document.hpp"
+#include "shm/toml/section_reader.hpp"
+#include "shm/toml/toml_document.hpp"
 
 namespace plchost {
 

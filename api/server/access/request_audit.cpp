@@ -13,8 +13,8 @@
 #include "api/dds/entries.hpp"
 #include "api/dds/text.hpp"
 #include "api/server/access/request_check.hpp"
-#include "shm/base/log.hpp"
 #include "shm/base/names.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

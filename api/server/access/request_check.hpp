@@ -7,7 +7,7 @@
 
 #include <control.h>
 
-#include "shm/base/control_message.hpp"
+#include "shm/sockets/control_message.hpp"
 
 namespace plchost {
 

@@ -11,10 +11,10 @@
 #include <control.h>
 
 #include "api/dds/guid.hpp"
-#include "shm/base/control_message.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
 #include "shm/base/unique_fd.hpp"
+#include "shm/sockets/control_message.hpp"
 
 namespace plchost {
 

@@ -11,7 +11,7 @@
 #include "api/dds/text.hpp"
 #include "api/dds/time_limit.hpp"
 #include "api/dds/topics.hpp"
-#include "shm/base/control_message.hpp"
+#include "shm/sockets/control_message.hpp"
 
 namespace plchost {
 

@@ -9,7 +9,7 @@
 
 #include "shm/base/robust_mutex.hpp"
 #include "shm/base/time.hpp"
-#include "shm/pool/fixed_page.hpp"
+#include "shm/files/fixed_page.hpp"
 
 namespace plchost {
 

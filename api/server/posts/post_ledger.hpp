@@ -13,7 +13,7 @@
 #include "api/server/posts/source_state.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/result.hpp"
-#include "shm/pool/memory_file.hpp"
+#include "shm/files/memory_file.hpp"
 #include "shm/pool/object_pool.hpp"
 
 namespace plchost {

@@ -5,7 +5,7 @@
 #include <sys/stat.h>
 
 #include "api/dds/text.hpp"
-#include "shm/base/log.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

@@ -10,9 +10,9 @@
 
 #include "api/server/status/status_table.hpp"
 #include "api/server/status/task_watch.hpp"
-#include "shm/base/exception_history.hpp"
 #include "shm/base/time.hpp"
-#include "shm/pool/host_page.hpp"
+#include "shm/pages/exception_history.hpp"
+#include "shm/pages/host_page.hpp"
 
 namespace plchost {
 

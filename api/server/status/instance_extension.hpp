@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "control.h"
-#include "shm/pool/host_page.hpp"
-#include "shm/pool/instance_page.hpp"
+#include "shm/pages/host_page.hpp"
+#include "shm/pages/instance_page.hpp"
 
 namespace plchost {
 

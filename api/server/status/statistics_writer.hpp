@@ -7,7 +7,7 @@
 
 #include "api/dds/entity.hpp"
 #include "shm/base/time.hpp"
-#include "shm/pool/instance_page.hpp"
+#include "shm/pages/instance_page.hpp"
 
 namespace plchost {
 

@@ -17,7 +17,7 @@
 #include "api/server/status/status_table.hpp"
 #include "api/server/status/task_watch.hpp"
 #include "api/server/status/transition_publisher.hpp"
-#include "shm/pool/host_page.hpp"
+#include "shm/pages/host_page.hpp"
 #include "shm/pool/object_pool.hpp"
 
 namespace plchost {

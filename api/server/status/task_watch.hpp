@@ -14,8 +14,8 @@
 #include "api/server/status/statistics_writer.hpp"
 #include "api/server/status/status_table.hpp"
 #include "shm/base/time.hpp"
-#include "shm/pool/host_page.hpp"
-#include "shm/pool/instance_page.hpp"
+#include "shm/pages/host_page.hpp"
+#include "shm/pages/instance_page.hpp"
 
 namespace plchost {
 

@@ -10,7 +10,7 @@
 #include "api/dds/entity.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
-#include "shm/pool/transition_ring.hpp"
+#include "shm/pages/transition_ring.hpp"
 
 namespace plchost {
 

@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "instances/runtime/application/application_host.hpp"
-#include "shm/base/log.hpp"
+#include "shm/log/log.hpp"
 
 using plchost::ApplicationHost;
 using plchost::BlockChannel;

@@ -1,7 +1,7 @@
 // What applications and components call of external events: see plc_app.h.
 
 #include "instances/runtime/application/application_host.hpp"
-#include "shm/base/log.hpp"
+#include "shm/log/log.hpp"
 
 using plchost::ApplicationHost;
 

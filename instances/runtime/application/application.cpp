@@ -8,8 +8,8 @@
 #include <fmt/format.h>
 
 #include "instances/runtime/tasks/task_builder.hpp"
-#include "shm/base/log.hpp"
 #include "shm/base/names.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

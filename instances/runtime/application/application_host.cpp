@@ -7,8 +7,8 @@
 
 #include <fmt/format.h>
 
-#include "shm/base/log.hpp"
 #include "shm/base/names.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "shm/pool/instance_page.hpp"
+#include "shm/pages/instance_page.hpp"
 
 namespace plchost {
 

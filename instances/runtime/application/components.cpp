@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 
 #include "instances/plc_app.h"
-#include "shm/base/log.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

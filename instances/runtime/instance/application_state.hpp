@@ -4,9 +4,9 @@
 #include <string>
 #include <string_view>
 
-#include "shm/base/control_message.hpp"
 #include "shm/base/result.hpp"
-#include "shm/pool/instance_page.hpp"
+#include "shm/pages/instance_page.hpp"
+#include "shm/sockets/control_message.hpp"
 
 namespace plchost {
 

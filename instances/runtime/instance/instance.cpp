@@ -13,8 +13,8 @@
 #include "instances/runtime/tasks/operator_events.hpp"
 #include "instances/runtime/tasks/task_builder.hpp"
 #include "schedulers/faults/watchdog_rules.hpp"
-#include "shm/base/log.hpp"
 #include "shm/base/names.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

@@ -21,9 +21,9 @@
 #include "instances/runtime/setup/setup_reporter.hpp"
 #include "instances/runtime/time/reference_memory.hpp"
 #include "schedulers/task_set.hpp"
-#include "shm/pool/instance_page.hpp"
+#include "shm/pages/instance_page.hpp"
+#include "shm/pages/transition_ring.hpp"
 #include "shm/pool/object_pool.hpp"
-#include "shm/pool/transition_ring.hpp"
 
 namespace plchost {
 

@@ -7,9 +7,9 @@
 
 #include "instances/runtime/instance/instance.hpp"
 #include "instances/runtime/tasks/operator_events.hpp"
-#include "shm/base/log.hpp"
-#include "shm/base/log_levels.hpp"
 #include "shm/base/names.hpp"
+#include "shm/log/log.hpp"
+#include "shm/log/log_levels.hpp"
 
 namespace plchost {
 

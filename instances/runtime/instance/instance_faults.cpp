@@ -6,8 +6,8 @@
 
 #include "instances/runtime/application/symbol_name.hpp"
 #include "instances/runtime/instance/instance.hpp"
-#include "shm/base/exception_history.hpp"
-#include "shm/base/log.hpp"
+#include "shm/log/log.hpp"
+#include "shm/pages/exception_history.hpp"
 
 namespace plchost {
 

@@ -7,7 +7,7 @@
 #include <unistd.h>
 
 #include "instances/runtime/instance/instance.hpp"
-#include "shm/base/log.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

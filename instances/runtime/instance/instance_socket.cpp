@@ -10,8 +10,8 @@
 #include <sys/epoll.h>
 #include <sys/resource.h>
 
-#include "shm/base/log.hpp"
 #include "shm/base/system_call.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

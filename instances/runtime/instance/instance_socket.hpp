@@ -7,9 +7,9 @@
 #include <optional>
 #include <string>
 
-#include "shm/base/control_message.hpp"
-#include "shm/base/packet_socket.hpp"
 #include "shm/base/result.hpp"
+#include "shm/sockets/control_message.hpp"
+#include "shm/sockets/packet_socket.hpp"
 
 namespace plchost {
 

@@ -12,7 +12,8 @@
 #include <unistd.h>
 
 #include "shm/base/system_call.hpp"
-#include "shm/pool/memory_file.hpp"
+#include "shm/files/memory_file.hpp"
+#include "shm/files/pool_files.hpp"
 
 namespace plchost {
 

@@ -9,9 +9,9 @@
 #include <sys/types.h>
 
 #include "instances/runtime/settings/settings.hpp"
-#include "shm/base/guarded_mapping.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/unique_fd.hpp"
+#include "shm/files/guarded_mapping.hpp"
 #include "shm/pool/object_pool.hpp"
 
 namespace plchost {

@@ -9,7 +9,8 @@
 
 #include "instances/runtime/memory/area_record.hpp"
 #include "shm/base/names.hpp"
-#include "shm/pool/memory_file.hpp"
+#include "shm/files/memory_file.hpp"
+#include "shm/files/pool_files.hpp"
 
 namespace plchost {
 

@@ -8,8 +8,8 @@
 #include <fmt/format.h>
 #include <sys/stat.h>
 
-#include "shm/base/own_folder.hpp"
-#include "shm/base/replace_file.hpp"
+#include "shm/files/own_folder.hpp"
+#include "shm/files/replace_file.hpp"
 
 namespace plchost {
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "instances/runtime/memory/retain_image.hpp"
-#include "shm/base/lock_file.hpp"
 #include "shm/base/result.hpp"
+#include "shm/files/lock_file.hpp"
 
 namespace plchost {
 

@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 
 #include "instances/launch/launch_contract.hpp"
-#include "shm/base/log.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

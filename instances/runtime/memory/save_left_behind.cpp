@@ -5,8 +5,8 @@
 #include "instances/runtime/memory/kept_memory.hpp"
 #include "instances/runtime/memory/retain_files.hpp"
 #include "instances/runtime/settings/settings.hpp"
-#include "shm/base/log.hpp"
 #include "shm/base/time.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

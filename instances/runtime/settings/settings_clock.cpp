@@ -2,7 +2,7 @@
 #include <array>
 
 #include "instances/runtime/settings/settings_key.hpp"
-#include "shm/pool/reference_clock.hpp"
+#include "shm/pages/reference_clock.hpp"
 
 namespace plchost {
 

@@ -7,8 +7,8 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "shm/base/log.hpp"
 #include "shm/base/system_call.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

@@ -12,8 +12,8 @@
 #include <fmt/format.h>
 
 #include "schedulers/scheduler.hpp"
-#include "shm/base/log_levels.hpp"
 #include "shm/base/names.hpp"
+#include "shm/log/log_levels.hpp"
 
 namespace plchost {
 

@@ -9,11 +9,11 @@
 #include <sys/syscall.h>
 
 #include "shm/base/cpu_list.hpp"
-#include "shm/base/log.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/thread.hpp"
-#include "shm/pool/instance_page.hpp"
-#include "shm/pool/memory_file.hpp"
+#include "shm/files/memory_file.hpp"
+#include "shm/log/log.hpp"
+#include "shm/pages/instance_page.hpp"
 
 namespace plchost {
 

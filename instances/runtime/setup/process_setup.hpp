@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "instances/launch/launch_contract.hpp"
-#include "shm/base/lock_file.hpp"
 #include "shm/base/result.hpp"
+#include "shm/files/lock_file.hpp"
 
 namespace plchost {
 

@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
-#include "shm/base/log.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/transient.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

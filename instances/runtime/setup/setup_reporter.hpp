@@ -4,8 +4,8 @@
 #include <string_view>
 
 #include "instances/launch/launch_contract.hpp"
-#include "shm/base/packet_socket.hpp"
 #include "shm/base/result.hpp"
+#include "shm/sockets/packet_socket.hpp"
 
 namespace plchost {
 

@@ -5,8 +5,8 @@
 #include <fmt/format.h>
 
 #include "instances/runtime/tasks/handle.hpp"
-#include "shm/base/log.hpp"
 #include "shm/base/names.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

@@ -7,7 +7,7 @@
 
 #include "instances/runtime/tasks/event_table.hpp"
 #include "shm/base/names.hpp"
-#include "shm/base/replace_file.hpp"
+#include "shm/files/replace_file.hpp"
 
 namespace plchost {
 

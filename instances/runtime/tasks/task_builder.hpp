@@ -6,7 +6,7 @@
 #include "instances/plc_app.h"
 #include "schedulers/task/task_config.hpp"
 #include "shm/base/result.hpp"
-#include "shm/pool/instance_page.hpp"
+#include "shm/pages/instance_page.hpp"
 
 namespace plchost {
 

@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "schedulers/distributed_clock/distributed_clock.hpp"
-#include "shm/pool/instance_page.hpp"
-#include "shm/pool/reference_clock.hpp"
+#include "shm/pages/instance_page.hpp"
+#include "shm/pages/reference_clock.hpp"
 
 namespace plchost {
 

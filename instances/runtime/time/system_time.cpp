@@ -6,8 +6,8 @@
 #include <fmt/format.h>
 #include <link.h>
 
-#include "shm/base/log.hpp"
 #include "shm/base/time.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 

@@ -23,7 +23,7 @@
 #include "schedulers/tick/device_file.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/thread.hpp"
-#include "shm/pool/instance_page.hpp"
+#include "shm/pages/instance_page.hpp"
 
 namespace plchost {
 

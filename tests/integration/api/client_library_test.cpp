@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 #include "api/plchost_client.hpp"
-#include "shm/pool/log_ring.hpp"
+#include "shm/pages/log_ring.hpp"
 #include "tests/integration/api/test_host.hpp"
 
 namespace plchost {

@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
-#include "shm/base/exception_history.hpp"
+#include "shm/pages/exception_history.hpp"
 #include "tests/integration/api/test_host.hpp"
 
 namespace plchost {

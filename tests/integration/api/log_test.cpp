@@ -8,7 +8,7 @@
 #include <unistd.h>
 
 #include "shm/base/time.hpp"
-#include "shm/pool/log_ring.hpp"
+#include "shm/pages/log_ring.hpp"
 #include "tests/integration/api/test_host.hpp"
 #include "tests/support/own_name.hpp"
 

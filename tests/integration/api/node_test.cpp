@@ -6,6 +6,7 @@
 #include <unistd.h>
 
 #include "shm/block_driver/block_channel.hpp"
+#include "shm/files/pool_files.hpp"
 #include "tests/integration/api/running_node.hpp"
 #include "tests/integration/api/test_host.hpp"
 

@@ -11,9 +11,9 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include "shm/base/packet_socket.hpp"
-#include "shm/pool/log_ring.hpp"
-#include "shm/pool/transition_ring.hpp"
+#include "shm/pages/log_ring.hpp"
+#include "shm/pages/transition_ring.hpp"
+#include "shm/sockets/packet_socket.hpp"
 #include "tests/support/own_name.hpp"
 
 namespace plchost {

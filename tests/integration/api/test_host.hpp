@@ -11,11 +11,11 @@
 
 #include "api/client/control_client.hpp"
 #include "api/control/host_finding.hpp"
-#include "shm/base/control_message.hpp"
 #include "shm/base/unique_fd.hpp"
-#include "shm/pool/host_page.hpp"
-#include "shm/pool/instance_page.hpp"
+#include "shm/pages/host_page.hpp"
+#include "shm/pages/instance_page.hpp"
 #include "shm/pool/object_pool.hpp"
+#include "shm/sockets/control_message.hpp"
 #include "tests/integration/api/child.hpp"
 
 namespace plchost {

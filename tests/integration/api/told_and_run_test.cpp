@@ -21,8 +21,8 @@
 #include <unistd.h>
 
 #include "instances/launch/launch_contract.hpp"
-#include "shm/base/packet_socket.hpp"
 #include "shm/base/thread.hpp"
+#include "shm/sockets/packet_socket.hpp"
 #include "tests/integration/api/test_host.hpp"
 
 namespace plchost {

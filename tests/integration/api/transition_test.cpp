@@ -10,7 +10,7 @@
 
 #include "api/client/control_client.hpp"
 #include "api/dds/text.hpp"
-#include "shm/pool/transition_ring.hpp"
+#include "shm/pages/transition_ring.hpp"
 #include "tests/integration/api/test_host.hpp"
 
 namespace plchost {

@@ -10,7 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "instances/launch/launch_contract.hpp"
-#include "shm/base/exception_history.hpp"
+#include "shm/pages/exception_history.hpp"
 #include "tests/integration/instances/instance_process.hpp"
 
 namespace plchost::testing {

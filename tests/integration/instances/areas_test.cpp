@@ -18,8 +18,9 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "shm/files/memory_file.hpp"
+#include "shm/files/pool_files.hpp"
 #include "shm/plc_process_image.h"
-#include "shm/pool/memory_file.hpp"
 #include "tests/integration/instances/instance_process.hpp"
 
 namespace plchost::testing {

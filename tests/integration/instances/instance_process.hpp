@@ -7,11 +7,11 @@
 
 #include <sys/types.h>
 
-#include "shm/base/control_message.hpp"
-#include "shm/base/packet_socket.hpp"
-#include "shm/pool/instance_page.hpp"
+#include "shm/pages/instance_page.hpp"
+#include "shm/pages/transition_ring.hpp"
 #include "shm/pool/object_pool.hpp"
-#include "shm/pool/transition_ring.hpp"
+#include "shm/sockets/control_message.hpp"
+#include "shm/sockets/packet_socket.hpp"
 
 namespace plchost::testing {
 

@@ -12,8 +12,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "shm/base/exception_history.hpp"
 #include "shm/base/thread.hpp"
+#include "shm/pages/exception_history.hpp"
 #include "tests/integration/instances/instance_process.hpp"
 
 namespace plchost::testing {

@@ -1,5 +1,5 @@
 // A real instance follows the reference clock of the example firmware, in a process of its own.
-#include "shm/pool/reference_clock.hpp"
+#include "shm/pages/reference_clock.hpp"
 
 #include <csignal>
 #include <cstdlib>
@@ -16,6 +16,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "shm/files/pool_files.hpp"
 #include "tests/integration/instances/instance_process.hpp"
 
 namespace plchost::testing {

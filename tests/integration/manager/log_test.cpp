@@ -5,7 +5,7 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
-#include "shm/pool/log_ring.hpp"
+#include "shm/pages/log_ring.hpp"
 #include "tests/integration/manager/plant.hpp"
 
 namespace plchost {

@@ -11,9 +11,10 @@
 #include <poll.h>
 
 #include "api/control/control_handler.hpp"
-#include "shm/pool/log_ring.hpp"
+#include "shm/files/pool_files.hpp"
+#include "shm/pages/log_ring.hpp"
+#include "shm/pages/transition_ring.hpp"
 #include "shm/pool/object_pool.hpp"
-#include "shm/pool/transition_ring.hpp"
 #include "tests/support/own_name.hpp"
 
 namespace plchost {

@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "manager/system/child_process.hpp"
-#include "shm/base/control_message.hpp"
-#include "shm/base/packet_socket.hpp"
-#include "shm/pool/host_page.hpp"
-#include "shm/pool/instance_page.hpp"
+#include "shm/pages/host_page.hpp"
+#include "shm/pages/instance_page.hpp"
+#include "shm/sockets/control_message.hpp"
+#include "shm/sockets/packet_socket.hpp"
 
 namespace plchost {
 

@@ -5,7 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "shm/pool/memory_file.hpp"
+#include "shm/files/memory_file.hpp"
 #include "tests/integration/manager/plant.hpp"
 #include "tests/support/own_name.hpp"
 

@@ -12,7 +12,7 @@
 
 #include "manager/config/config_changes.hpp"
 #include "shm/base/thread.hpp"
-#include "shm/pool/memory_file.hpp"
+#include "shm/files/memory_file.hpp"
 #include "tests/integration/manager/plant.hpp"
 
 namespace plchost {

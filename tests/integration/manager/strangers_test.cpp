@@ -11,9 +11,10 @@
 #include <unistd.h>
 
 #include "instances/launch/launch_contract.hpp"
-#include "shm/pool/memory_file.hpp"
+#include "shm/files/memory_file.hpp"
+#include "shm/files/pool_files.hpp"
+#include "shm/pages/transition_ring.hpp"
 #include "shm/pool/object_pool.hpp"
-#include "shm/pool/transition_ring.hpp"
 #include "tests/integration/manager/plant.hpp"
 
 namespace plchost {

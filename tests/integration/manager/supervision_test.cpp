@@ -9,8 +9,8 @@
 
 #include "manager/api_server.hpp"
 #include "manager/supervisor/managed_instance.hpp"
-#include "shm/base/exception_history.hpp"
 #include "shm/base/thread.hpp"
+#include "shm/pages/exception_history.hpp"
 #include "shm/pool/object_pool.hpp"
 #include "tests/integration/manager/plant.hpp"
 #include "tests/support/sanitized.hpp"

@@ -5,7 +5,7 @@
 #include "api/security/pem.hpp"
 #include "api/security/policy.hpp"
 #include "api/security/signed_document.hpp"
-#include "shm/pool/log_ring.hpp"
+#include "shm/pages/log_ring.hpp"
 #include "tests/integration/security/secured_host.hpp"
 
 namespace plchost {

@@ -3,8 +3,8 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
-#include "shm/base/control_message.hpp"
-#include "shm/base/packet_socket.hpp"
+#include "shm/sockets/control_message.hpp"
+#include "shm/sockets/packet_socket.hpp"
 
 namespace plchost {
 namespace {

@@ -1,4 +1,4 @@
-#include "shm/base/control_message.hpp"
+#include "shm/sockets/control_message.hpp"
 
 #include <limits>
 

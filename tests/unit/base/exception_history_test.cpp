@@ -1,4 +1,4 @@
-#include "shm/base/exception_history.hpp"
+#include "shm/pages/exception_history.hpp"
 
 #include <filesystem>
 #include <fstream>

@@ -1,4 +1,4 @@
-#include "shm/base/lock_file.hpp"
+#include "shm/files/lock_file.hpp"
 
 #include <array>
 #include <filesystem>

@@ -1,4 +1,4 @@
-#include "shm/base/log.hpp"
+#include "shm/log/log.hpp"
 
 #include <algorithm>
 #include <array>

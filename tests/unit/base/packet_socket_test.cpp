@@ -1,4 +1,4 @@
-#include "shm/base/packet_socket.hpp"
+#include "shm/sockets/packet_socket.hpp"
 
 #include <atomic>
 #include <chrono>

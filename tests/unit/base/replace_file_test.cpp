@@ -1,4 +1,4 @@
-#include "shm/base/replace_file.hpp"
+#include "shm/files/replace_file.hpp"
 
 #include <filesystem>
 #include <fstream>

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "shm/block_driver/node_directory.hpp"
+#include "shm/files/pool_files.hpp"
 #include "tests/unit/pool/unique_pool_name.hpp"
 
 namespace plchost {

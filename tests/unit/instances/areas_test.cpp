@@ -15,7 +15,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "shm/pool/memory_file.hpp"
+#include "shm/files/memory_file.hpp"
+#include "shm/files/pool_files.hpp"
 #include "tests/support/own_name.hpp"
 #include "tests/support/whole_cycle.hpp"
 

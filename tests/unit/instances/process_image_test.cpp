@@ -12,8 +12,9 @@
 
 #include "instances/runtime/memory/output_image.hpp"
 #include "instances/runtime/memory/task_areas.hpp"
+#include "shm/files/memory_file.hpp"
+#include "shm/files/pool_files.hpp"
 #include "shm/plc_process_image.h"
-#include "shm/pool/memory_file.hpp"
 #include "tests/support/own_name.hpp"
 
 namespace plchost {

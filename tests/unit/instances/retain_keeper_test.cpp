@@ -18,7 +18,8 @@
 
 #include "instances/launch/launch_contract.hpp"
 #include "instances/plc_app.h"
-#include "shm/pool/memory_file.hpp"
+#include "shm/files/memory_file.hpp"
+#include "shm/files/pool_files.hpp"
 #include "shm/pool/object_pool.hpp"
 #include "tests/unit/instances/retain_fixture.hpp"
 

@@ -12,6 +12,7 @@
 
 #include "instances/runtime/memory/save_left_behind.hpp"
 #include "shm/base/memory_guard.hpp"
+#include "shm/files/pool_files.hpp"
 #include "tests/unit/instances/retain_fixture.hpp"
 
 namespace plchost {

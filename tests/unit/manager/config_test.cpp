@@ -7,7 +7,7 @@
 #include <gmock/gmock.h>
 
 #include "manager/config/load_config.hpp"
-#include "shm/pool/host_page.hpp"
+#include "shm/pages/host_page.hpp"
 #include "tests/support/own_name.hpp"
 
 namespace plchost {

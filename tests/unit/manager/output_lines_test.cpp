@@ -5,8 +5,8 @@
 
 #include <gmock/gmock.h>
 
-#include "shm/base/log_line.hpp"
 #include "shm/base/time.hpp"
+#include "shm/log/log_line.hpp"
 
 namespace plchost {
 namespace {

@@ -18,6 +18,7 @@
 #include <unistd.h>
 
 #include "shm/base/process_start.hpp"
+#include "shm/files/pool_files.hpp"
 #include "shm/pool/object_pool.hpp"
 #include "shm/pool/pool_layout.hpp"
 #include "tests/unit/pool/pool_invariants.hpp"

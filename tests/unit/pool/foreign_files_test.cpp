@@ -1,5 +1,5 @@
 // What other users put under a host's names in /dev/shm is neither used nor in the way.
-#include "shm/pool/foreign_files.hpp"
+#include "shm/pages/foreign_files.hpp"
 
 #include <filesystem>
 #include <fstream>
@@ -9,11 +9,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "shm/files/pool_files.hpp"
+#include "shm/pages/host_page.hpp"
+#include "shm/pages/instance_page.hpp"
+#include "shm/pages/transition_ring.hpp"
 #include "shm/plc_process_image.h"
-#include "shm/pool/host_page.hpp"
-#include "shm/pool/instance_page.hpp"
 #include "shm/pool/object_pool.hpp"
-#include "shm/pool/transition_ring.hpp"
 #include "tests/unit/pool/unique_pool_name.hpp"
 
 namespace plchost {

@@ -1,4 +1,4 @@
-#include "shm/pool/log_ring.hpp"
+#include "shm/pages/log_ring.hpp"
 
 #include <cstring>
 #include <random>

@@ -1,4 +1,4 @@
-#include "shm/pool/memory_file.hpp"
+#include "shm/files/memory_file.hpp"
 
 #include <algorithm>
 #include <filesystem>

@@ -10,7 +10,7 @@
 #include <gmock/gmock.h>
 #include <sys/stat.h>
 
-#include "shm/pool/memory_file.hpp"
+#include "shm/files/memory_file.hpp"
 #include "tests/unit/pool/unique_pool_name.hpp"
 
 namespace plchost {

@@ -1,11 +1,11 @@
-#include "shm/pool/open_or_make.hpp"
+#include "shm/files/open_or_make.hpp"
 
 #include <string>
 #include <vector>
 
 #include <gmock/gmock.h>
 
-#include "shm/pool/fixed_page.hpp"
+#include "shm/files/fixed_page.hpp"
 #include "tests/unit/pool/unique_pool_name.hpp"
 
 namespace plchost {

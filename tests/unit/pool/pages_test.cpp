@@ -10,8 +10,8 @@
 
 #include <gmock/gmock.h>
 
-#include "shm/pool/host_page.hpp"
-#include "shm/pool/instance_page.hpp"
+#include "shm/pages/host_page.hpp"
+#include "shm/pages/instance_page.hpp"
 #include "tests/unit/pool/unique_pool_name.hpp"
 
 namespace plchost {

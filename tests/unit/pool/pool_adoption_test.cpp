@@ -18,6 +18,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "shm/files/pool_files.hpp"
 #include "shm/plc_process_image.h"
 #include "shm/plc_reference_clock.h"
 #include "shm/pool/object_pool.hpp"

@@ -1,4 +1,4 @@
-#include "shm/pool/reference_clock.hpp"
+#include "shm/pages/reference_clock.hpp"
 
 #include <atomic>
 #include <cstring>
@@ -9,6 +9,7 @@
 
 #include <gmock/gmock.h>
 
+#include "shm/files/pool_files.hpp"
 #include "tests/unit/pool/unique_pool_name.hpp"
 
 namespace plchost {

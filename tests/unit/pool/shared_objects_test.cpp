@@ -13,6 +13,7 @@
 #include <unistd.h>
 
 #include "shm/base/counting_semaphore.hpp"
+#include "shm/files/pool_files.hpp"
 #include "shm/pool/object_pool.hpp"
 #include "tests/unit/pool/unique_pool_name.hpp"
 

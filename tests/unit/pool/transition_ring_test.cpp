@@ -1,4 +1,4 @@
-#include "shm/pool/transition_ring.hpp"
+#include "shm/pages/transition_ring.hpp"
 
 #include <set>
 #include <string>

@@ -3,7 +3,8 @@
 #include <atomic>
 #include <string>
 
-#include "shm/pool/memory_file.hpp"
+#include "shm/files/memory_file.hpp"
+#include "shm/files/pool_files.hpp"
 #include "tests/support/own_name.hpp"
 
 namespace plchost {

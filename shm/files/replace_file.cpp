@@ -1,0 +1,55 @@
+#include "shm/files/replace_file.hpp"
+
+#include <filesystem>
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include "shm/base/system_call.hpp"
+#include "shm/base/unique_fd.hpp"
+
+namespace plchost {
+
+namespace {
+
+Result<void> write_all(const std::string& path, std::string_view text, mode_t mode) {
+  // What a run before this one has left may have other rights.
+  if (::unlink(path.c_str()) != 0 && errno != ENOENT)
+    return failure(ErrorCode::system, "remove " + path, errno);
+  const UniqueFd fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode));
+  if (!fd) return failure(ErrorCode::system, "open " + path, errno);
+  while (!text.empty()) {
+    const auto written = check_errno(::write(fd.get(), text.data(), text.size()), "write " + path);
+    if (!written) return std::unexpected(written.error());
+    text.remove_prefix(static_cast<std::size_t>(*written));
+  }
+  if (const auto synced = check_errno(::fsync(fd.get()), "fsync " + path); !synced) {
+    return std::unexpected(synced.error());
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<void> sync_directory(const std::string& path) {
+  const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (!fd) return failure(ErrorCode::system, "open " + path, errno);
+  if (const auto synced = check_errno(::fsync(fd.get()), "fsync " + path); !synced) {
+    return std::unexpected(synced.error());
+  }
+  return {};
+}
+
+Result<void> replace_file(const std::string& path, std::string_view text, mode_t mode) {
+  const std::string fresh = path + ".new";
+  if (auto written = write_all(fresh, text, mode); !written) {
+    ::unlink(fresh.c_str());  // half a file only takes room, of which there may be too little
+    return written;
+  }
+  std::error_code error;
+  std::filesystem::rename(fresh, path, error);
+  if (error) return failure(ErrorCode::system, "rename " + fresh, error.value());
+  return {};
+}
+
+}  // namespace plchost

@@ -1,0 +1,159 @@
+#include "shm/pages/exception_history.hpp"
+
+#include <algorithm>
+#include <csignal>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "shm/files/replace_file.hpp"
+#include "shm/log/log.hpp"
+
+namespace plchost {
+
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr int kVersion = 1;
+constexpr std::size_t kMaxFile = std::size_t{256} << 10;
+
+Json to_json(const ExceptionEntry& entry) {
+  return {{"number", entry.number},
+          {"unix_ns", entry.unix_ns},
+          {"application", entry.application},
+          {"task", entry.task},
+          {"kind", entry.kind},
+          {"whole_application", entry.whole_application},
+          {"signal", entry.signal},
+          {"address", entry.address},
+          {"symbol", entry.symbol},
+          {"memory_address", entry.memory_address},
+          {"text", entry.text}};
+}
+
+// value() throws if a key is there with another type; the caller catches.
+ExceptionEntry from_json(const Json& json) {
+  return {.number = json.value("number", std::uint64_t{0}),
+          .unix_ns = json.value("unix_ns", std::int64_t{0}),
+          .application = json.value("application", std::string()),
+          .task = json.value("task", std::string()),
+          .kind = json.value("kind", std::string()),
+          .whole_application = json.value("whole_application", true),
+          .signal = json.value("signal", std::string()),
+          .address = json.value("address", std::uint64_t{0}),
+          .symbol = json.value("symbol", std::string()),
+          .memory_address = json.value("memory_address", std::uint64_t{0}),
+          .text = json.value("text", std::string())};
+}
+
+std::unexpected<Error> corrupt(const std::string& path, std::string_view what) {
+  return failure(ErrorCode::corrupt, fmt::format("{}: {}", path, what));
+}
+
+// Without a time nothing is known to be the same.
+bool same(const ExceptionEntry& one, const ExceptionEntry& other) {
+  return one.unix_ns != 0 && one.unix_ns == other.unix_ns && one.task == other.task;
+}
+
+}  // namespace
+
+void ExceptionHistory::add(ExceptionEntry entry) {
+  const auto known =
+      std::ranges::find_if(entries, [&](const ExceptionEntry& kept) { return same(kept, entry); });
+  if (known != entries.end()) {
+    if (entry.symbol.empty()) return;
+    entry.number = known->number;
+    *known = std::move(entry);
+    return;
+  }
+  entry.number = ++count;
+  entries.push_back(std::move(entry));
+  if (entries.size() > kMaxEntries) entries.erase(entries.begin());
+}
+
+ExceptionEntry exception_entry(const FaultRecord& record, std::string_view application,
+                               std::string_view task) {
+  // Other signals give the address of the instruction once more.
+  const bool of_memory = record.signal == SIGSEGV || record.signal == SIGBUS;
+  return {.unix_ns = record.unix_ns,
+          .application = std::string(application),
+          .task = std::string(task),
+          .kind = std::string(to_string(record.kind)),
+          .whole_application = record.whole_application != 0,
+          .signal = record.signal != 0 ? signal_name(record.signal) : std::string(),
+          .address = record.address,
+          .symbol = {},
+          .memory_address = of_memory ? record.memory_address : 0,
+          .text = describe_fault(record)};
+}
+
+std::string exception_path(std::string_view run_directory, std::string_view instance) {
+  return fmt::format("{}/{}.exception", run_directory, instance);
+}
+
+Result<ExceptionHistory> read_exceptions(const std::string& path) {
+  std::error_code ignored;
+  const auto type = std::filesystem::status(path, ignored).type();
+  if (type == std::filesystem::file_type::not_found) return ExceptionHistory{};
+  // What would make the open wait for ever is not opened.
+  if (type != std::filesystem::file_type::regular && type != std::filesystem::file_type::none) {
+    return corrupt(path, "is not a regular file");
+  }
+  std::ifstream file(path, std::ios::binary);
+  if (!file) return failure(ErrorCode::system, "open " + path, errno);
+  std::string text(kMaxFile + 1, '\0');
+  file.read(text.data(), static_cast<std::streamsize>(text.size()));
+  text.resize(static_cast<std::size_t>(file.gcount()));
+  if (text.size() > kMaxFile) return corrupt(path, "is larger than any history of exceptions");
+  const Json json = Json::parse(text, nullptr, false);
+  if (!json.is_object()) return corrupt(path, "is not a JSON object");
+  try {
+    if (json.value("version", 0) != kVersion) return corrupt(path, "is of another version");
+    ExceptionHistory history{.count = json.value("count", std::uint64_t{0}), .entries = {}};
+    for (const Json& entry : json.value("exceptions", Json::array())) {
+      if (history.entries.size() == ExceptionHistory::kMaxEntries) break;
+      history.entries.push_back(from_json(entry));
+    }
+    return history;
+  } catch (const Json::exception& error) {
+    return corrupt(path, error.what());
+  }
+}
+
+Result<void> write_exceptions(const std::string& path, const ExceptionHistory& history) {
+  Json entries = Json::array();
+  for (const ExceptionEntry& entry : history.entries) entries.push_back(to_json(entry));
+  const Json json{{"version", kVersion}, {"count", history.count}, {"exceptions", std::move(entries)}};
+  return replace_file(path, json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n");
+}
+
+Result<std::string> keep_exceptions(const std::string& path, std::span<const ExceptionEntry> found) {
+  auto history = read_exceptions(path);
+  std::string remark;
+  if (!history) {
+    remark = fmt::format("the exceptions before this one are lost: {}", history.error().describe());
+    history = ExceptionHistory{};
+  }
+  for (const ExceptionEntry& entry : found) history->add(entry);
+  if (auto written = write_exceptions(path, *history); !written) {
+    return std::unexpected(std::move(written).error());
+  }
+  return remark;
+}
+
+void keep_exceptions_of(std::string_view run_directory, std::string_view instance,
+                        std::span<const ExceptionEntry> found) {
+  const auto kept = keep_exceptions(exception_path(run_directory, instance), found);
+  if (!kept) {
+    spdlog::error("instance {}: its exception is not kept: {}", instance, kept.error().describe());
+  } else if (!kept->empty()) {
+    spdlog::warn("instance {}: {}", instance, *kept);
+  }
+}
+
+}  // namespace plchost

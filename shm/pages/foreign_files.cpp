@@ -1,0 +1,68 @@
+#include "shm/pages/foreign_files.hpp"
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <optional>
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include "shm/files/memory_file.hpp"
+#include "shm/files/pool_files.hpp"
+#include "shm/pages/host_page.hpp"
+#include "shm/pages/instance_page.hpp"
+#include "shm/pages/log_ring.hpp"
+#include "shm/pages/transition_ring.hpp"
+
+namespace plchost {
+
+namespace {
+
+/// Whose a file may be.
+enum class Owners : std::uint8_t { trusted, writers_of_pool };
+
+// Nothing: the name is none of this host's.
+std::optional<Owners> owners_of(std::string_view pool, const std::string& file) {
+  if (const auto memory = memory_of_file(pool, file)) {
+    constexpr std::string_view kOfInstances = ".retain";
+    return memory->ends_with(kOfInstances) ? Owners::trusted : Owners::writers_of_pool;
+  }
+  const std::array names = {std::string(pool), host_page_name(pool), fmt::format("{}.posts", pool)};
+  const std::array beginnings = {instance_page_name(pool, ""),      instance_claim_name(pool, ""),
+                                 transition_ring_name(pool, ""),    log_ring_name(pool, ""),
+                                 fmt::format("{}.download.", pool), fmt::format("{}.wish.", pool)};
+  const bool ours =
+      std::ranges::find(names, file) != names.end() ||
+      std::ranges::any_of(beginnings, [&](const auto& begin) { return file.starts_with(begin); });
+  return ours ? std::optional(Owners::trusted) : std::nullopt;
+}
+
+bool belongs(const struct stat& status, Owners owners, const MemoryRights& rights) {
+  if (!S_ISREG(status.st_mode)) return false;
+  if (is_trusted_owner(status.st_uid) || status.st_uid == rights.owner) return true;
+  // Only a member of a group can give a file to it.
+  const bool of_group = status.st_gid == rights.group.value_or(::getegid()) && (rights.mode & S_IWGRP) != 0;
+  return owners == Owners::writers_of_pool && (of_group || allows_to_write(rights, status.st_uid));
+}
+
+}  // namespace
+
+std::vector<ForeignFile> take_away_foreign_files(std::string_view pool, const MemoryRights& rights) {
+  std::vector<ForeignFile> found;
+  std::error_code error;
+  for (std::filesystem::directory_iterator at(MemoryFile::kDirectory, error), end; !error && at != end;
+       at.increment(error)) {
+    const auto owners = owners_of(pool, at->path().filename().string());
+    struct stat status{};
+    if (!owners || ::lstat(at->path().c_str(), &status) != 0 || belongs(status, *owners, rights)) continue;
+    found.push_back({.path = at->path(),
+                     .rights = describe_rights(status.st_uid, status.st_gid, status.st_mode),
+                     .taken_away = {}});
+  }
+  for (ForeignFile& file : found) file.taken_away = take_away(file.path);
+  return found;
+}
+
+}  // namespace plchost

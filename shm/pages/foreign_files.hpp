@@ -1,0 +1,26 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "shm/base/result.hpp"
+#include "shm/files/memory_rights.hpp"
+
+namespace plchost {
+
+/// What another user has put under one of a host's names in /dev/shm.
+struct ForeignFile {
+  std::string path;
+  std::string rights;  ///< whose it was
+  Result<void> taken_away;
+};
+
+/// Takes away what lies under the names of the pool, of its pages and of its memories and does not belong
+/// there: a file of a user who is not trusted, a folder, a FIFO, a link. `rights`: those of the pool; a
+/// memory that is none of the runtime's own may belong to any user who may write the pool. For the manager,
+/// before it makes or opens any of them. Set-up.
+[[nodiscard]] std::vector<ForeignFile> take_away_foreign_files(std::string_view pool,
+                                                               const MemoryRights& rights);
+
+}  // namespace plchost

@@ -1,0 +1,169 @@
+#include "shm/sockets/control_message.hpp"
+
+#include <array>
+#include <utility>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+namespace plchost {
+
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr std::array kVerbs = {
+    std::pair{ControlVerb::start, std::string_view("start")},
+    std::pair{ControlVerb::stop, std::string_view("stop")},
+    std::pair{ControlVerb::reset, std::string_view("reset")},
+    std::pair{ControlVerb::reset_cold, std::string_view("reset cold")},
+    std::pair{ControlVerb::single_cycle, std::string_view("single cycle")},
+    std::pair{ControlVerb::restart, std::string_view("restart")},
+    std::pair{ControlVerb::reset_statistics, std::string_view("reset statistics")},
+    std::pair{ControlVerb::load_application, std::string_view("load application")},
+    std::pair{ControlVerb::download_application, std::string_view("download application")},
+    std::pair{ControlVerb::rollback_application, std::string_view("rollback application")},
+    std::pair{ControlVerb::change_application, std::string_view("change application")},
+    std::pair{ControlVerb::set_scheduler, std::string_view("set scheduler")},
+    std::pair{ControlVerb::register_event, std::string_view("register event")},
+    std::pair{ControlVerb::unregister_event, std::string_view("unregister event")},
+    std::pair{ControlVerb::check_host, std::string_view("check host")},
+    std::pair{ControlVerb::reload_host, std::string_view("reload host")},
+    std::pair{ControlVerb::list_objects, std::string_view("list objects")},
+    std::pair{ControlVerb::list_nodes, std::string_view("list nodes")},
+    std::pair{ControlVerb::list_routes, std::string_view("list routes")},
+    std::pair{ControlVerb::read_clock, std::string_view("read clock")},
+    std::pair{ControlVerb::read_log, std::string_view("read log")},
+    std::pair{ControlVerb::shutdown, std::string_view("shutdown")},
+    std::pair{ControlVerb::status, std::string_view("status")},
+    std::pair{ControlVerb::set_log_level, std::string_view("set log level")},
+};
+
+std::string dump(const Json& json) {
+  // Bytes that are not UTF-8 (a hostile name in an error text) are replaced, never thrown about.
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+Result<Json> parse(std::string_view packet) {
+  Json json = Json::parse(packet, nullptr, false);
+  if (!json.is_object()) return failure(ErrorCode::corrupt, "control message is not a JSON object");
+  const auto version = json.find("version");
+  if (version == json.end() || !version->is_number_integer() || *version != kControlVersion) {
+    // Only a number is shown: dump() calls itself for each level of nesting, and a hostile text has
+    // thousands.
+    const bool shown = version != json.end() && version->is_number();
+    return failure(ErrorCode::corrupt, fmt::format("control message version {} where {} is spoken",
+                                                   shown ? dump(*version) : "none", kControlVersion));
+  }
+  const auto number = json.find("number");
+  if (number == json.end() || !number->is_number_unsigned()) {
+    return failure(ErrorCode::corrupt, "control message has no 'number'");
+  }
+  return json;
+}
+
+Result<std::string> text_of(const Json& json, const char* key) {
+  const auto found = json.find(key);
+  if (found == json.end() || !found->is_string()) {
+    return failure(ErrorCode::corrupt, fmt::format("control message has no text '{}'", key));
+  }
+  return found->get<std::string>();
+}
+
+// None: a peer that knows of no options.
+Result<std::map<std::string, std::string>> options_of(const Json& json) {
+  std::map<std::string, std::string> options;
+  const auto found = json.find("options");
+  if (found == json.end()) return options;
+  if (!found->is_object())
+    return failure(ErrorCode::corrupt, "control message has 'options' of a wrong kind");
+  for (const auto& [name, value] : found->items()) {
+    if (!value.is_string()) {
+      return failure(ErrorCode::corrupt, "control message has an option that is no text");
+    }
+    options.emplace(name, value.get<std::string>());
+  }
+  return options;
+}
+
+// None: it may be begun at any time.
+Result<std::int64_t> limit_of(const Json& json) {
+  const auto found = json.find("limit_ns");
+  if (found == json.end()) return 0;
+  if (!found->is_number_integer())
+    return failure(ErrorCode::corrupt, "control message has a 'limit_ns' that is no integer");
+  return found->get<std::int64_t>();
+}
+
+}  // namespace
+
+Result<void> check_in_time(std::int64_t limit_ns, std::int64_t now_ns) {
+  if (limit_ns == 0 || now_ns <= limit_ns) return {};
+  constexpr double kNsPerMs = 1e6;
+  return failure(ErrorCode::timed_out,
+                 fmt::format("not done: it came {:.1f} ms after the time limit of the client",
+                             static_cast<double>(now_ns - limit_ns) / kNsPerMs));
+}
+
+std::string_view to_string(ControlVerb verb) noexcept {
+  for (const auto& [known, name] : kVerbs) {
+    if (known == verb) return name;
+  }
+  return "unknown";
+}
+
+std::string encode(const ControlRequest& request) {
+  Json json{{"version", kControlVersion},
+            {"number", request.number},
+            {"verb", to_string(request.verb)},
+            {"instance", request.instance},
+            {"argument", request.argument}};
+  if (!request.options.empty()) json["options"] = request.options;
+  if (request.limit_ns != 0) json["limit_ns"] = request.limit_ns;
+  return dump(json);
+}
+
+std::string encode(const ControlReply& reply) {
+  return dump(Json{{"version", kControlVersion},
+                   {"number", reply.number},
+                   {"code", static_cast<unsigned>(reply.code)},
+                   {"text", reply.text}});
+}
+
+Result<ControlRequest> decode_request(std::string_view packet) {
+  const auto json = parse(packet);
+  if (!json) return std::unexpected(json.error());
+  const auto verb = text_of(*json, "verb");
+  const auto instance = text_of(*json, "instance");
+  const auto argument = text_of(*json, "argument");
+  for (const auto* text : {&verb, &instance, &argument}) {
+    if (!*text) return std::unexpected(text->error());
+  }
+  auto options = options_of(*json);
+  if (!options) return std::unexpected(std::move(options).error());
+  const auto limit = limit_of(*json);
+  if (!limit) return std::unexpected(limit.error());
+  for (const auto& [known, name] : kVerbs) {
+    if (name == *verb) {
+      return ControlRequest{
+          (*json)["number"].get<std::uint64_t>(), known, *instance, *argument, *std::move(options), *limit};
+    }
+  }
+  return failure(ErrorCode::corrupt, fmt::format("control message has the unknown verb '{}'", *verb));
+}
+
+Result<ControlReply> decode_reply(std::string_view packet) {
+  const auto json = parse(packet);
+  if (!json) return std::unexpected(json.error());
+  const auto code = json->find("code");
+  constexpr unsigned kLastCode = static_cast<unsigned>(ErrorCode::wrong_size);
+  if (code == json->end() || !code->is_number_unsigned() || code->get<std::uint64_t>() > kLastCode) {
+    return failure(ErrorCode::corrupt, "control reply has no valid 'code'");
+  }
+  auto text = text_of(*json, "text");
+  if (!text) return std::unexpected(text.error());
+  return ControlReply{(*json)["number"].get<std::uint64_t>(), static_cast<ErrorCode>(code->get<unsigned>()),
+                      std::move(*text)};
+}
+
+}  // namespace plchost

@@ -1,0 +1,156 @@
+#include "shm/sockets/packet_socket.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+
+#include <fmt/format.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include "shm/base/system_call.hpp"
+
+namespace plchost {
+
+namespace {
+
+Result<sockaddr_un> to_address(const std::string& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (path.empty() || path.size() >= sizeof address.sun_path) {
+    return failure(
+        ErrorCode::invalid_argument,
+        fmt::format("socket path '{}' must have 1 to {} characters; choose a shorter run directory", path,
+                    sizeof address.sun_path - 1));
+  }
+  std::ranges::copy(path, std::begin(address.sun_path));
+  return address;
+}
+
+Result<UniqueFd> make_socket() {
+  const auto fd = check_errno(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0), "socket");
+  if (!fd) return std::unexpected(fd.error());
+  return UniqueFd(*fd);
+}
+
+const sockaddr* as_sockaddr(const sockaddr_un& address) {
+  return reinterpret_cast<const sockaddr*>(&address);  // the sockets API is made that way
+}
+
+}  // namespace
+
+Result<PacketSocket> PacketSocket::connect(const std::string& path) {
+  const auto address = to_address(path);
+  if (!address) return std::unexpected(address.error());
+  auto fd = make_socket();
+  if (!fd) return std::unexpected(fd.error());
+  if (::connect(fd->get(), as_sockaddr(*address), sizeof *address) != 0) {
+    const int error = errno;
+    // A non-blocking connect says EAGAIN when the listener's backlog is full.
+    return failure(error == EAGAIN ? ErrorCode::busy : ErrorCode::unavailable,
+                   fmt::format("connect to {}", path), error);
+  }
+  return PacketSocket(std::move(*fd));
+}
+
+Result<void> PacketSocket::send(std::string_view packet) {
+  if (packet.empty() || packet.size() > kMaxPacket) {  // an empty one would look like the end of the peer
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("packet of {} bytes; 1 to {} are allowed", packet.size(), kMaxPacket));
+  }
+  while (::send(fd_.get(), packet.data(), packet.size(), MSG_NOSIGNAL) < 0) {
+    if (errno == EINTR) continue;
+    const bool full = errno == EAGAIN || errno == EWOULDBLOCK;
+    return failure(full ? ErrorCode::busy : ErrorCode::unavailable, "send on control socket", errno);
+  }
+  return {};
+}
+
+Result<std::optional<std::string>> PacketSocket::receive() {
+  std::array<char, kMaxPacket + 1> buffer;  // NOLINT: filled by recv
+  ssize_t length = 0;
+  do {
+    length = ::recv(fd_.get(), buffer.data(), buffer.size(), 0);
+  } while (length < 0 && errno == EINTR);
+  if (length < 0 && (errno == EAGAIN || errno == EWOULDBLOCK)) return std::nullopt;
+  if (length < 0) return failure(ErrorCode::unavailable, "receive from control socket", errno);
+  if (length == 0) return failure(ErrorCode::unavailable, "the other end of the control socket is closed");
+  if (static_cast<std::size_t>(length) > kMaxPacket) {
+    return failure(ErrorCode::corrupt, fmt::format("packet larger than {} bytes", kMaxPacket));
+  }
+  return std::string(buffer.data(), static_cast<std::size_t>(length));
+}
+
+Result<std::string> PacketSocket::receive_until(TimePoint deadline) {
+  for (;;) {
+    auto packet = receive();
+    if (!packet) return std::unexpected(packet.error());
+    if (*packet) return std::move(**packet);
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - MonotonicClock::now());
+    if (left.count() <= 0) return failure(ErrorCode::timed_out, "no answer on the control socket");
+    pollfd poll{.fd = fd_.get(), .events = POLLIN, .revents = 0};
+    const auto wait = std::min<std::chrono::milliseconds::rep>(left.count(), 60'000);
+    if (::poll(&poll, 1, static_cast<int>(wait)) < 0 && errno != EINTR) {
+      return failure(ErrorCode::system, "poll control socket", errno);
+    }
+  }
+}
+
+Result<int> PacketSocket::peer_pid() const {
+  ucred credentials{};
+  socklen_t size = sizeof credentials;
+  const auto got =
+      check_errno(::getsockopt(fd_.get(), SOL_SOCKET, SO_PEERCRED, &credentials, &size), "SO_PEERCRED");
+  if (!got) return std::unexpected(got.error());
+  return static_cast<int>(credentials.pid);
+}
+
+Result<PacketListener> PacketListener::listen(const std::string& path) {
+  const auto address = to_address(path);
+  if (!address) return std::unexpected(address.error());
+  auto fd = make_socket();
+  if (!fd) return std::unexpected(fd.error());
+  ::unlink(path.c_str());
+  constexpr mode_t kMode = 0660;
+  constexpr int kBacklog = 16;
+  auto done = check_errno(::bind(fd->get(), as_sockaddr(*address), sizeof *address), "bind " + path);
+  if (done) done = check_errno(::chmod(path.c_str(), kMode), "chmod " + path);
+  if (done) done = check_errno(::listen(fd->get(), kBacklog), "listen on " + path);
+  if (!done) return std::unexpected(done.error());
+  struct stat file{};
+  const auto found = check_errno(::stat(path.c_str(), &file), "stat " + path);
+  if (!found) return std::unexpected(found.error());
+  return PacketListener(std::move(*fd), path, file.st_ino);
+}
+
+PacketListener& PacketListener::operator=(PacketListener&& other) noexcept {
+  if (this != &other) {
+    remove_file();
+    fd_ = std::move(other.fd_);
+    path_ = std::move(other.path_);
+    inode_ = other.inode_;
+  }
+  return *this;
+}
+
+PacketListener::~PacketListener() {
+  remove_file();
+}
+
+void PacketListener::remove_file() noexcept {
+  // Another listener may have taken the path over since; its file is not ours to remove.
+  struct stat file{};
+  if (fd_ && ::stat(path_.c_str(), &file) == 0 && file.st_ino == inode_) ::unlink(path_.c_str());
+}
+
+Result<std::optional<PacketSocket>> PacketListener::accept() {
+  const int fd = ::accept4(fd_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK);
+  if (fd >= 0) return PacketSocket(UniqueFd(fd));
+  if (errno == EAGAIN || errno == EWOULDBLOCK || errno == EINTR || errno == ECONNABORTED) return std::nullopt;
+  return failure(ErrorCode::system, fmt::format("accept on {}", path_), errno);
+}
+
+}  // namespace plchost

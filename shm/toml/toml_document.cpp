@@ -1,0 +1,98 @@
+#include "shm/toml/toml_document.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <utility>
+
+#include <fmt/format.h>
+#include <toml++/toml.h>
+
+#include "shm/toml/toml_advice.hpp"
+
+namespace plchost {
+
+namespace {
+
+TomlValue convert(const toml::node& node);
+
+TomlTable convert_table(const toml::table& table) {
+  TomlTable converted;
+  for (const auto& [key, node] : table) {
+    TomlValue value = convert(node);
+    // A header like [host] may span lines; the key's own line is what an editor shows.
+    if (key.source().begin) value.line = key.source().begin.line;
+    converted.emplace(std::string(key.str()), std::move(value));
+  }
+  return converted;
+}
+
+TomlValue convert(const toml::node& node) {
+  TomlValue converted;
+  converted.line = node.source().begin.line;
+  if (const auto* text = node.as_string()) {
+    converted.value = text->get();
+  } else if (const auto* number = node.as_integer()) {
+    converted.value = number->get();
+  } else if (const auto* real = node.as_floating_point()) {
+    converted.value = real->get();
+  } else if (const auto* boolean = node.as_boolean()) {
+    converted.value = boolean->get();
+  } else if (const auto* array = node.as_array()) {
+    TomlArray values;
+    for (const auto& element : *array) values.push_back(convert(element));
+    converted.value = std::move(values);
+  } else if (const auto* table = node.as_table()) {
+    converted.value = convert_table(*table);
+  }
+  return converted;
+}
+
+// Lines are counted from 1; nothing: there is no such line.
+std::string_view line_of(std::string_view text, unsigned line) {
+  for (; line > 1; --line) {
+    const std::size_t end = text.find('\n');
+    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+  }
+  return text.substr(0, text.find('\n'));
+}
+
+}  // namespace
+
+std::string describe(const std::string& file, const ConfigProblem& problem) {
+  if (problem.line == 0) return fmt::format("{}: {}", file, problem.text);
+  if (problem.column == 0) return fmt::format("{}:{}: {}", file, problem.line, problem.text);
+  return fmt::format("{}:{}:{}: {}", file, problem.line, problem.column, problem.text);
+}
+
+std::string_view TomlValue::type_name() const noexcept {
+  constexpr std::array<std::string_view, 7> kNames = {
+      "a date or time", "a text", "a whole number", "a fraction", "a truth value", "an array", "a table"};
+  return kNames[value.index()];  // NOLINT: as many names as alternatives
+}
+
+std::string TomlValue::shown() const {
+  constexpr std::size_t kShown = 80;
+  if (const auto* text = std::get_if<std::string>(&value))
+    return fmt::format("\"{}\"", text->substr(0, kShown));
+  if (const auto* number = std::get_if<std::int64_t>(&value)) return fmt::format("{}", *number);
+  if (const auto* real = std::get_if<double>(&value)) {
+    const std::string number = fmt::format("{}", *real);
+    return number.find_first_not_of("-0123456789") == std::string::npos ? number + ".0" : number;
+  }
+  if (const auto* boolean = std::get_if<bool>(&value)) return *boolean ? "true" : "false";
+  return std::string(type_name());
+}
+
+std::expected<TomlTable, ConfigProblem> parse_toml(std::string_view text) {
+  try {
+    return convert_table(toml::parse(text));
+  } catch (const toml::parse_error& error) {  // the library is built to say it so
+    const auto at = error.source().begin;
+    return std::unexpected(ConfigProblem{.line = at.line,
+                                         .text = toml_advice(line_of(text, at.line), error.description()),
+                                         .column = at.column});
+  }
+}
+
+}  // namespace plchost
