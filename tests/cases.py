@@ -100,7 +100,7 @@ class Run:
         return b"".join([*self.output, self.line]).decode(errors="replace")
 
     def take(self, pipe):
-        """What was written since; true at the end of all that will be."""
+        """The text written since; true at the end of all that will be."""
         block = pipe.read(1 << 16)
         if block == b"":
             return True

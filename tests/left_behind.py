@@ -1,12 +1,10 @@
 #!/usr/bin/env python3
-"""What a run of the tests leaves behind: processes, files, shared memories, networks and mounts.
+"""The left-overs of a run of the tests: processes, files, shared memories, networks and mounts.
 
 Usage: left_behind.py begin FILE   notes what is there already
        left_behind.py end FILE     prints what has come since; exit code 1 if that is anything
 
-The run's processes inherit PLCHOST_RUN, by which they are found, and TMPDIR, a folder of the run. What another run on the
-same machine makes meanwhile is not counted: its processes have another PLCHOST_RUN, and its memories are mapped by them or
-have the number of one of them in their names.
+The run's processes inherit PLCHOST_RUN, by which they are found, and TMPDIR, a folder of the run. Those of another run on the same machine are not counted: its processes have another PLCHOST_RUN. Its memories are mapped by them or have the number of one of them in their names.
 """
 
 import json

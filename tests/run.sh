@@ -83,8 +83,8 @@ configure() { # configure DIR OPTIONS...
   command -v ccache >/dev/null && launcher=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DCMAKE_C_COMPILER_LAUNCHER=ccache)
   cmake -S . -B "$dir" -G Ninja "${launcher[@]}" "$@"
 }
-# Several files at a time, as most of the work is the headers of others; fewer where each of them is optimised, so that
-# the round after an edit is short.
+# Several files at a time, as most of the work is the headers of others. Fewer where each of them is optimised, so that the
+# round after an edit is short.
 unity=(-DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=20)
 build_plain() { configure "$build" -DPLCHOST_TESTS=ON -DPLCHOST_PYTHON=ON "${unity[@]}" -DCMAKE_UNITY_BUILD_BATCH_SIZE=10 -DCMAKE_CXX_FLAGS_RELWITHDEBINFO="-O2 -g1 -DNDEBUG" && cmake --build "$build" -j "$jobs"; }
 # By clang, which takes half of g++'s time for it; so a second compiler has seen everything.
@@ -96,7 +96,7 @@ build_sanitized() { # build_sanitized DIR SANITIZERS TARGET OPTIONS...
     cmake --build "$dir" -j "$jobs" --target "$target"
 }
 build_asan() { build_sanitized .build/asan "address;undefined" all; }
-# Not by the thread sanitizer, which looks into one process: what kills others, and what has one thread and takes long.
+# Not by the thread sanitizer, which looks into one process: tests that kill others, and long ones with one thread.
 killing='*PoolCrash*:*BlockCrash*:*ClientDeath*:RobustMutexTest.Killed*:*Settings.ReadsAsMany*:*HoldsAHundredThousand*:*EachFlippedBit*'
 killing+=':*WishFolderTest.IsMadeAndHeld*:*ReadsNothingBehindTheEnd*:*StaysWithinItsBounds*:*TheSecurityFolder*:*AnIdentity*'
 build_tsan() { build_sanitized .build/tsan thread plchost_tests -DPLCHOST_INTEGRATION=OFF; }

@@ -64,7 +64,7 @@ std::size_t read_count(std::istream& from) {
   return from ? count : 0;
 }
 
-/// What the process has measured, or why it could not: the first word tells which.
+/// The measurements of the process, or why it has none: the first word tells which.
 std::string text_of(const Result<std::vector<Row>>& rows) {
   std::ostringstream text;
   if (!rows) {

@@ -28,7 +28,7 @@ struct BareEnd {
   [[nodiscard]] bool matched() const;
 };
 
-/// What the end that receives does besides taking and counting.
+/// The work of the receiving end besides taking and counting.
 enum class BareDuty : std::uint8_t {
   nothing,      ///< its threads have normal priority, on any core
   acknowledge,  ///< each batch; its threads have the core and the priorities of those of plchost-dds

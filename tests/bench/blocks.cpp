@@ -38,7 +38,7 @@ constexpr std::array<std::size_t, 3> kSizes = {64, 512, kLargest};
 enum class Way : std::uint32_t { ours, iceoryx, socket, bare, memcpy };
 enum class Mode : std::uint32_t { echo, sink };
 
-/// Shared by the two processes: what the peer is to do.
+/// Shared by the two processes: the order for the peer.
 struct Board {
   std::atomic<std::uint32_t> ordered{0};  // orders given so far
   std::atomic<std::uint32_t> begun{0};
@@ -83,7 +83,7 @@ void answer(BlocksPipe& pipe, Board& board) {
   std::vector<std::byte> buffer(kLargest);
   const bool echo = board.mode.load() == Mode::echo;
   board.begun.store(board.ordered.load());
-  // What is still under way when the slice ends is taken as well.
+  // A block that is still under way when the slice ends is taken as well.
   for (int idle = 0; !board.stop.load(std::memory_order_relaxed) || idle < 1000;) {
     const std::size_t size = pipe.receive(buffer.data(), buffer.size());
     idle = size == 0 ? idle + 1 : 0;

@@ -1,6 +1,6 @@
 #pragma once
 
-// C++17: what iceoryx's headers are read with.
+// C++17, in which iceoryx's headers are read.
 #include <cstddef>
 #include <memory>
 #include <string>

@@ -26,7 +26,7 @@ struct BareRing {
 
 /// Non-blocking, over one end of a pair of datagram sockets, which outlives it.
 std::unique_ptr<BlocksPipe> make_socket_pipe(int fd);
-/// Bare memcpy: what there is between the two cores.
+/// Bare memcpy: the limit between the two cores.
 std::unique_ptr<BlocksPipe> make_bare_pipe(BareRing& out, BareRing& in);
 /// CmpBlkDrvShm: a node with its router's thread. Returns when the links to the other side are there.
 Result<std::unique_ptr<BlocksPipe>> make_our_pipe(const std::string& pool, BlocksSide side);

@@ -1,6 +1,6 @@
 // 100 cyclic tasks that are due at one tick of CmpSchedule. From the planned release to the start of the last
-// one, less what the tasks before it executed, per task: what the release of one task costs. The floor is one
-// bare thread that wakes 100 bare threads through raw futexes, same priorities, same core; a second floor
+// one, less what the tasks before it executed, per task: the cost of the release of one task. The floor is
+// one bare thread that wakes 100 bare threads through raw futexes, same priorities, same core; a second floor
 // wakes them all through one futex with one call.
 
 #include <algorithm>
@@ -33,7 +33,7 @@ struct Execution {
   TimePoint end;
 };
 
-/// What each task ran, one writer per line, reserved beforehand.
+/// The runs of each task, one writer per line, reserved beforehand.
 using Log = std::vector<std::vector<Execution>>;
 
 Log make_log(Duration slice) {
@@ -116,7 +116,7 @@ struct BareBurst {
     for (;;) {
       std::uint32_t now = 0;
       while ((now = word.load(std::memory_order_acquire)) == seen) wait_private(word, seen);
-      seen = now;  // what comes from here on is not slept through
+      seen = now;  // from here on no release is slept through
       if (stopping.load()) return;
       const TimePoint start = MonotonicClock::now();
       work(kWork);

@@ -1,5 +1,5 @@
-// What the runtime costs per cycle: the processor time of an empty task with its statistics under
-// CmpScheduleTimer, beside the same loop without them, a thread that reads a periodic timerfd and calls an
+// The runtime's cost per cycle: the processor time of an empty task with its statistics under
+// CmpScheduleTimer. Beside it the same loop without them: a thread that reads a periodic timerfd and calls an
 // empty function. One sample per slice. And the same without the wait, a million cycles back to back.
 
 #include <sys/resource.h>

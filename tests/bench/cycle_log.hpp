@@ -34,7 +34,7 @@ void add_latencies(std::span<const Cycle> cycles, Samples& into);
 [[nodiscard]] std::uint64_t lost_cycles(std::span<const Cycle> cycles, Duration period) noexcept;
 
 /// Stalls of the host: stretches of time in which each of two loops on one core, out of step by half a
-/// period, started a cycle a whole period late or later. What only one of them saw is not the host's.
+/// period, started a cycle a whole period late or later. A gap that only one of them saw is not the host's.
 struct Stalls {
   std::uint64_t stalls = 0;
   std::uint64_t late_ours =

@@ -70,7 +70,7 @@ void BareLoop::run(CycleLog& log) noexcept {
     log.add({release, start});
     if (entry_) entry_();
     const TimePoint end = entry_ ? MonotonicClock::now() : start;
-    // Like ours: what passed while it was busy is skipped, never replayed.
+    // Like ours: a release that passed while it was busy is skipped, never replayed.
     do release += period_;
     while (release <= end);
   }

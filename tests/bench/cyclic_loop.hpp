@@ -97,7 +97,7 @@ class ScheduledLoop final : public CyclicLoop {
   std::unique_ptr<TaskSet> tasks_;
 };
 
-/// What all slices of one loop gave.
+/// The results of all slices of one loop.
 struct CyclicFigures {
   Samples latencies;
   std::uint64_t cycles = 0;

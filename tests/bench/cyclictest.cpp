@@ -17,7 +17,7 @@ namespace {
 constexpr Duration kPeriod = std::chrono::milliseconds(1);
 constexpr int kMaxUs = 100000;
 
-/// Lines "000012 000345": so many cycles with that latency in us, rounded down; what is above kMaxUs is only
+/// Lines "000012 000345": so many cycles with that latency in us, rounded down. Those above kMaxUs are only
 /// counted, in the line "# Histogram Overflows: 00003".
 void add_histogram(const std::string& text, Samples& into) {
   constexpr std::string_view kOverflows = "# Histogram Overflows: ";

@@ -13,7 +13,7 @@ struct DdsBoard {
   std::atomic<std::int64_t> posted_ns;      ///< CLOCK_MONOTONIC just before the post
   std::atomic<std::uint32_t> arrived;       ///< posts whose task ran
   std::atomic<std::uint32_t> posts;         ///< how many the poster shall make in this slice
-  std::atomic<std::uint32_t> order;         ///< what the poster shall do: an Order
+  std::atomic<std::uint32_t> order;         ///< an Order for the poster
   std::atomic<std::uint32_t> poster_ready;  ///< 1: both ways are open; 2: they cannot be opened
   std::array<std::int64_t, kCapacity> latency_ns;
 

@@ -1,6 +1,7 @@
-// A 1 ms task under CmpScheduleOneShot on the grid of a reference clock that drifts by 100 ppm, with +-200 ns
-// of noise on each pair of stamps, 300 us off at the start. Firmware (a thread on the other core) writes the
-// pairs into the reference record. What is measured is held against the reference without its noise.
+// A 1 ms task under CmpScheduleOneShot on the grid of a reference clock. That clock drifts by 100 ppm, has
+// +-200 ns of noise on each pair of stamps, and is 300 us off at the start. Firmware (a thread on the other
+// core) writes the pairs into the reference record. The measurements are held against the reference without
+// its noise.
 
 #include <algorithm>
 #include <array>
@@ -23,14 +24,14 @@ namespace plchost::bench {
 namespace {
 
 constexpr Duration kPeriod = std::chrono::milliseconds(1);
-constexpr Duration kSettling = std::chrono::seconds(2);  // what is promised; steady state begins there
+constexpr Duration kSettling = std::chrono::seconds(2);  // the promise; steady state begins there
 constexpr Duration kSettled = std::chrono::microseconds(1);
 constexpr auto kStopLimit = std::chrono::seconds(10);
 constexpr double kDrift = 100e-6;
 constexpr double kNoiseNs = 200;
 constexpr double kOffAtStartNs = 300'000;
 
-/// What the reference shows, against the first release.
+/// The reference's time, against the first release.
 class Reference {
  public:
   explicit Reference(TimePoint first_release) : origin_(first_release) {}
@@ -154,13 +155,14 @@ double largest_correction_us(std::span<const Cycle> cycles) {
   for (std::size_t i = 1; i < cycles.size(); ++i) {
     const Duration distance = cycles[i].release - cycles[i - 1].release;
     const auto periods = (distance + kPeriod / 2) / kPeriod;
-    // What was lost in between may have been corrected only once: no more than one bound either way.
+    // A release that was lost in between may have been corrected only once: no more than one bound either
+    // way.
     largest = std::max(largest, Duration(std::abs((distance - periods * kPeriod).count())));
   }
   return to_us(largest);
 }
 
-/// What is drawn of the deviations in a stretch.
+/// The drawn values of the deviations in a stretch.
 enum class Drawn : std::uint8_t { largest, median };
 
 /// One point for each stretch of that length, of the cycles until `end` after the first one.

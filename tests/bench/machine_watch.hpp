@@ -6,7 +6,7 @@
 
 namespace plchost::bench {
 
-/// What else the machine did since this was made: it belongs to the figures of that time.
+/// The other work that the machine did since this was made: it belongs to the figures of that time.
 class MachineWatch {
  public:
   MachineWatch();

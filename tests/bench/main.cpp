@@ -1,4 +1,4 @@
-// plchost-bench: what plchost costs, beside the floor that the machine sets in the same minute.
+// plchost-bench: the costs of plchost, beside the floor that the machine sets in the same minute.
 
 #include <algorithm>
 #include <cstdio>

@@ -27,7 +27,7 @@ template <class Board, class Fork, class Measure>
       ::mmap(nullptr, sizeof(Board), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
   if (memory == MAP_FAILED) return failure(ErrorCode::system, "map the board", errno);
   Board& board = *new (memory) Board{};
-  // What the program in the instance stamps is not looked at here, but it wants a place for it.
+  // The stamps of the program in the instance are not looked at here, but it wants a place for them.
   const std::string stamps = own_name("board");
   if (const auto made = MemoryFile::replace(stamps, sizeof(DdsBoard)); !made)
     return std::unexpected(made.error());

@@ -13,7 +13,7 @@ namespace plchost::bench {
 /// One part of the benchmark: a file of its own with one function, and a line in the table of parts.cpp.
 struct Part {
   std::string_view name;   ///< for --only, and of its picture
-  std::string_view about;  ///< what is measured beside what
+  std::string_view about;  ///< the measurement, and the floor beside it
   Drawing picture;         ///< the words of its picture; no title: none
   double turns;            ///< about how many times Plan::each it takes
   bool under_stress;       ///< measured a second time with --stress

@@ -15,7 +15,7 @@ struct Spot {
   double y;
 };
 
-/// Maps a range of values to a stretch of the picture. What lies outside of the range is drawn at its edge.
+/// Maps a range of values to a stretch of the picture. A value outside of the range is drawn at its edge.
 struct Axis {
   double first;
   double last;

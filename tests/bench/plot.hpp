@@ -12,10 +12,10 @@ namespace plchost::bench {
 /// The words of a picture. Each fits into its place in every usual font (`tests/gates/pictures.py`).
 struct Drawing {
   std::string_view title = {};  ///< empty: the part has no picture
-  std::string_view x = {};      ///< what lies along the axis below, with its unit
+  std::string_view x = {};      ///< the name of the axis below, with its unit
   std::string_view y = {};
-  std::string_view floor = {};                 ///< what the floor is
-  std::array<std::string_view, 2> notes = {};  ///< below the legend: what is seen, and why
+  std::string_view floor = {};                 ///< the floor's meaning
+  std::array<std::string_view, 2> notes = {};  ///< below the legend: the explanation
 };
 
 /// The rows as an SVG picture: for each latency, the share of samples above it; both axes logarithmic. The

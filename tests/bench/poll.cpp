@@ -1,4 +1,4 @@
-// What polling the variables of 500 event tasks costs at each tick of CmpSchedule: the CPU time of its
+// The cost of polling the variables of 500 event tasks at each tick of CmpSchedule: the CPU time of its
 // thread. The floor is a bare thread that reads the same 500 variables each ms; a third one reads none.
 
 #include <atomic>

@@ -1,5 +1,5 @@
-// The object pool: what an operation costs that needs no system call, beside the cheapest thing that does the
-// same, and what it costs to make, open and close 100,000 objects, beside sem_open and shm_open.
+// The object pool: the cost of an operation that needs no system call, beside the cheapest thing that does
+// the same. Then the cost of making, opening and closing 100,000 objects, beside sem_open and shm_open.
 
 #include <algorithm>
 #include <array>
@@ -122,7 +122,7 @@ Result<Row> measure_semaphore(const Plan& plan, ObjectPool& pool) {
       });
 }
 
-/// What is done with object i of many.
+/// The operation on object i of many.
 struct Steps {
   std::function<bool(std::uint32_t)> make, open, close;
 };

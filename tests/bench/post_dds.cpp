@@ -1,7 +1,7 @@
 // An external event posted over DDS by another process, through plchost-dds and the pool, to the first
 // instruction of the task's code in a real instance. The floor is a bare Cyclone DDS one-way, same type, same
-// QoS, from the same poster on the same core, into a waiting thread of the same priority on the same core as
-// the task.
+// QoS, from the same poster on the same core. It ends in a waiting thread of the same priority on the same
+// core as the task.
 
 #include <thread>
 

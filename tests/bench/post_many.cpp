@@ -25,7 +25,7 @@ constexpr Duration kPatience = std::chrono::seconds(20);
 
 enum class Job : std::uint32_t { wait, connect, post, flood, end };
 
-/// What the processes share.
+/// The memory that the processes share.
 struct Board {
   std::atomic<Job> job;
   std::atomic<std::uint32_t> connected;

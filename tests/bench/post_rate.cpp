@@ -1,4 +1,4 @@
-// External events over DDS at speed: a post and its acknowledgement beside a bare Cyclone DDS round trip, and
+// External events over DDS at speed: a post and its acknowledgement beside a bare Cyclone DDS round trip;
 // posts one way as fast as they go beside a bare writer and a reader that takes and counts.
 
 #include <array>
@@ -25,7 +25,7 @@ constexpr Duration kRateSlice = std::chrono::seconds(1);
 constexpr Duration kRatePatience = std::chrono::seconds(20);
 constexpr const char* kWithoutTask = "counted";
 
-/// By BareDuty: what the ends of the floor have taken.
+/// By BareDuty: the samples that the ends of the floor have taken.
 using TakenBoard = std::array<std::atomic<std::uint64_t>, 3>;
 
 std::uint32_t bare_domain(const DdsDomains& domains, BareDuty duty) {

@@ -36,7 +36,7 @@ struct Series {
 /// _per_cycle, _percent, _ppb; "share" and "load" are of a core. All others are counts.
 using Extra = std::vector<std::pair<std::string, double>>;
 
-/// What one round gave, of a row that was measured in several.
+/// The results of one round, of a row that was measured in several.
 struct Round {
   Summary ours;
   Summary floor;
@@ -44,17 +44,17 @@ struct Round {
   std::vector<Target> targets;
 };
 
-/// What was measured, beside the floor that was measured in the same run.
+/// A measurement, beside the floor that was measured in the same run.
 struct Row {
   std::string name;                ///< "cyclic/CmpScheduleTimer/1ms": part, who, what
-  std::string sample = "";         ///< what one sample is: "a cycle"
+  std::string sample = "";         ///< the meaning of one sample: "a cycle"
   std::string condition = "idle";  ///< or "stress"; filled by whoever runs the part
-  Samples ours = {};               ///< what it is stands in the README: mostly release to first instruction
+  Samples ours = {};               ///< its meaning stands in the README: mostly release to first instruction
   Samples floor = {};              ///< empty: there is none
   Extra extra = {};
   std::vector<Target> targets = {};
   std::vector<Series> series = {};
-  std::string note = {};           ///< what a reader must know about these figures
+  std::string note = {};           ///< a remark that the reader of these figures needs
   std::vector<Round> rounds = {};  ///< filled by add_round
   Extra conditions = {};           ///< of the machine, in each round; filled by whoever runs the part
 };
@@ -72,8 +72,8 @@ struct Verdict {
 };
 [[nodiscard]] Verdict verdict_of(const Row& row, std::size_t index);
 
-/// An array with an object for each row; times in microseconds unless a key says otherwise. What was not
-/// measured, and what would be held against it, is null.
+/// An array with an object for each row; times in microseconds unless a key says otherwise. A missing
+/// measurement, and a comparison with it, is null.
 [[nodiscard]] std::string to_json(const std::vector<Row>& rows);
 /// The rows as a table for people, and below it the further figures and what is met.
 [[nodiscard]] std::string to_table(const std::vector<Row>& rows);

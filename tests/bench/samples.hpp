@@ -29,7 +29,7 @@ class Samples {
   std::vector<Duration> values_;
 };
 
-/// What could not be measured, or says nothing: it is shown as such, and no target is met by it.
+/// A figure that could not be measured, or says nothing: it is shown as such, and no target is met by it.
 inline constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
 
 /// In microseconds. kNotMeasured is a percentile that no sample lies above: p90 of less than 10 samples, p99

@@ -8,7 +8,7 @@
 
 namespace plchost::bench {
 
-/// What threads have used so far.
+/// The processor time of threads so far.
 struct ThreadUsage {
   Duration cpu{};
   std::uint64_t voluntary = 0;    ///< context switches: they went to sleep

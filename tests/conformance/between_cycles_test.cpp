@@ -94,8 +94,8 @@ INSTANTIATE_TEST_SUITE_P(Each, BetweenCycles, testing::ValuesIn(every_scheduler(
 class BetweenCyclesUnderLoad : public testing::TestWithParam<std::string_view>, public Tasks<LinuxClock> {};
 
 // Real threads and real time: tasks of each kind, and variables that are read, while the code is exchanged a
-// thousand times. Nobody ever sees the exchange within its cycle, and every release has run or is accounted
-// for: what is lost, this machine has lost, not an exchange that took microseconds.
+// thousand times. No task ever sees the exchange within its cycle, and every release has run or is accounted
+// for. The machine itself loses some, but not an exchange that took microseconds.
 TEST_P(BetweenCyclesUnderLoad, NobodySeesAChangeWithinItsCycle) {
   constexpr int kChanges = 1000;
   std::array<std::uint64_t, 512> state{};  // exchanged word by word: a torn one would show

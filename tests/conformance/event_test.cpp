@@ -186,7 +186,7 @@ TEST_P(EventTasks, KeepWhatWasRaisedThroughSwitchesAndForgetItAtAStart) {
   EXPECT_EQ(starts.size(), static_cast<std::size_t>(raised));
 }
 
-// What a poll costs is one look at each variable, and nothing for those whose edges are raised by call.
+// A poll costs one look at each variable, and nothing for those whose edges are raised by call.
 TEST_P(EventTasks, EachPollLooksAtEachVariableOnce) {
   constexpr std::size_t kTasks = 500;
   std::atomic<std::uint64_t> looks{0};

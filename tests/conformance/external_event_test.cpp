@@ -20,7 +20,7 @@ class ExternalEventTasks : public testing::TestWithParam<std::string_view>, publ
     reinterpret_cast<std::atomic<std::uint64_t>&>(event).store(count << 16);
     event.nudge();
   }
-  /// What a poster does that is killed before it wakes anybody.
+  /// The actions of a poster that is killed before it wakes anybody.
   void add_without_wake(std::string_view name, std::uint64_t count) {
     reinterpret_cast<std::atomic<std::uint64_t>&>(event_named(name)).fetch_add(count << 16);
   }
@@ -221,7 +221,7 @@ TEST_P(ExternalEventTasks, StopAtTheEndOfACycleHoweverLongTheBacklogIs) {
   EXPECT_LT(counters(0).cycles, 100'000U);
 }
 
-// What was posted by several at once is run or lost, whatever starts, stops and exchanges of the scheduler
+// Each post of several posters at once is run or lost, whatever starts, stops and exchanges of the scheduler
 // there are meanwhile.
 TEST_P(ExternalEventTasks, EachPostIsRunOrLostAcrossStopsAndExchanges) {
   constexpr int kPosters = 3;

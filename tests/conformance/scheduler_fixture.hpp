@@ -16,7 +16,7 @@
 
 namespace plchost {
 
-/// The names of all schedulers in the registry: what is promised here is promised by each.
+/// The names of all schedulers in the registry: each of them keeps the promises tested here.
 inline std::vector<std::string_view> every_scheduler() {
   std::vector<std::string_view> names;
   for (const SchedulerEntry& entry : all_schedulers()) names.push_back(entry.name);
@@ -86,7 +86,7 @@ class Tasks {
   }
 
   [[nodiscard]] TaskCounters counters(std::size_t task) const {
-    // Who writes them may get no core for a while in the midst of it.
+    // Their writer may get no core for a while in the midst of it.
     for (;; std::this_thread::sleep_for(std::chrono::milliseconds(1))) {
       if (const auto counters = statistics_[task].counters.read(1000)) return *counters;
     }

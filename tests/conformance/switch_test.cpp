@@ -159,7 +159,7 @@ TEST(SwitchOfRunningTasks, TellsWhichTasksRunAndWhichAreParked) {
   EXPECT_EQ(told, (std::vector<bool>{true, false}));
 }
 
-// Real threads and real time: what may happen at any instruction happens here at some of them.
+// Real threads and real time: races that can come at any instruction come here at some of them.
 TEST(SwitchOfRunningTasks, LosesAndRepeatsNoPostAndNoRelease) {
   constexpr std::uint64_t kPosts = 10'000;
   std::atomic<bool> variable{false};

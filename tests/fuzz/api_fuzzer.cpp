@@ -90,7 +90,7 @@ bool names_what_is_there(const ControlRequest& request) {
   return request.instance == (of_host ? "" : "line1");
 }
 
-// What another host writes goes in only as a block of that host's own nodes, for this one.
+// Data of another host goes in only as a block of that host's own nodes, for this one.
 void take_block(const std::uint8_t* data, std::size_t size) {
   constexpr std::uint16_t kSender = 2;
   constexpr std::uint16_t kOwn = 1;
@@ -110,7 +110,7 @@ void take_block(const std::uint8_t* data, std::size_t size) {
 
 }  // namespace
 
-// Whatever a client writes: a request is refused with a reason or is one that the manager can be given, and a
+// Any input of a client: a request is refused with a reason or is one that the manager can be given, and a
 // post is counted at most once.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static Host host;

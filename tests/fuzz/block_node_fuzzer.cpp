@@ -36,7 +36,7 @@ struct Node {
   }
 };
 
-/// What a stranger has mapped: the directory, and the link from the first node to the second.
+/// The memories that a stranger has mapped: the directory, and the link from the first node to the second.
 void scribble(const Node& a, const Node& b, bool directory, std::size_t place, std::uint8_t value) {
   const std::string link =
       link_name(pool_of_nodes(), "blocks", a.node->address().node, b.node->address().node);

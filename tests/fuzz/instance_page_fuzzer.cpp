@@ -22,7 +22,7 @@ const std::string& pool_name() {
   return kName;
 }
 
-/// What the API server reads of a page.
+/// The API server's view of a page.
 void use(const InstancePageReader& page) {
   (void)page.runtime();
   for (std::uint32_t i = 0; i < page.task_count() && i < 2; ++i) {
@@ -45,8 +45,8 @@ void use(const InstancePageReader& page) {
 
 }  // namespace
 
-// The input is a list of [ place : 2 bytes ][ value : 1 byte ]: what a stranger scribbles into the page, into
-// its header and first tasks, or, with the highest bit of the place, among the buckets.
+// The input is a list of [ place : 2 bytes ][ value : 1 byte ]: a stranger's writes into the page, into its
+// header and first tasks, or, with the highest bit of the place, among the buckets.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const std::vector<TaskIdentity> kIdentities(kTasks);
   static auto writer = InstancePage::create(pool_name(), kInstance, kIdentities);

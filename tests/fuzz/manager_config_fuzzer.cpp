@@ -6,8 +6,8 @@
 #include "manager/config/load_config.hpp"
 #include "shm/pages/host_page.hpp"
 
-// Any text is either refused with at least one error that begins with the file's name, or gives a
-// configuration that keeps the bounds that the rest of the manager relies on.
+// Any text is either refused with at least one error that begins with the file's name, or accepted. Then the
+// configuration keeps the bounds that the rest of the manager relies on.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace plchost;
   const ConfigSurroundings surroundings{.host_name = "host",

@@ -1,6 +1,6 @@
-// The gate of an unsecured host, judged by Cyclone: what passes must not end it. Cyclone runs in a process of
-// its own, and what a real client has said to it are the seeds. With $PLCHOST_FUZZ_DOMAIN in another DDS
-// domain.
+// The gate of an unsecured host, judged by Cyclone: a packet that passes must not end it. Cyclone runs in a
+// process of its own, and what a real client has said to it are the seeds. With $PLCHOST_FUZZ_DOMAIN in
+// another DDS domain.
 #include <cstdio>
 #include <cstdlib>
 #include <optional>
@@ -48,7 +48,7 @@ void feed(const Packet& packet) {
   std::abort();
 }
 
-// What is left of a packet is admitted as it is.
+// The rest of a packet is admitted as it is.
 bool passes(Packet packet, bool secured) {
   using plchost::dds::Admission;
   if (plchost::dds::admit(packet, secured) == Admission::refused) return false;

@@ -72,8 +72,8 @@ void use(ObjectPool& pool) {
 
 }  // namespace
 
-// The input is a list of [ place : 3 bytes ][ value : 1 byte ]: what a stranger scribbles into the segment.
-// The mutex is left out: the number of a living thread in it means to wait for that.
+// The input is a list of [ place : 3 bytes ][ value : 1 byte ]: a stranger's writes into the segment. The
+// mutex is left out: the number of a living thread in it means to wait for that.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const auto& sound = sound_segment();
   const auto memory = MemoryFile::open(pool_name(), sound.size(), MemoryFile::Access::read_write);

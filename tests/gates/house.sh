@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# What the house looks like from outside: its eight entries, small files, nothing unfinished, no path of a
-# developer's machine, no file that is made through a link, no instance of DDS that stays in memory.
+# The house from outside: its eight entries, small files, nothing unfinished, no path of a developer's machine, no file that is
+# made through a link, no instance of DDS that stays in memory.
 # Usage: house.sh [ROOT] (a git checkout); prints each fault.
 set -euo pipefail
 cd "${1:-$(dirname "$0")/../..}"
@@ -24,13 +24,13 @@ git grep -nE "\b($marker)\b" -- ':!*.md' && fault "the lines above are unfinishe
 home_path='/(work|home|root)/[a-z]'
 git grep -nE "$home_path" -- ':!tests/gates' && fault "the lines above name a path of one machine" || true
 
-# What anybody on the machine can put in a program's way: a link where it makes a file, a name in a space of all.
+# These can be put in a program's way by any user of the machine: a link where it makes a file, a name in a space of all.
 sources=(shm schedulers instances manager api)
 git grep -nE '\bO_CREAT\b' -- "${sources[@]}" | grep -vE 'O_NOFOLLOW|O_EXCL' && fault "the lines above make files through links" || true
 git grep -nE 'shm_open|sun_path *(\+ *1\b|\[0\])' -- "${sources[@]}" && fault "the lines above use names that anybody can take" || true
 # DDS alone keeps the keys of unregistered instances in memory.
 git grep -nE '\bdds_unregister_instance' -- '*.cpp' '*.hpp' ':!api/dds/instances.*' ':!tests' && fault "the lines above leak: use dds::unregister_instance" || true
-# What a killed test leaves in /dev/shm, the next one can only remove if it knows the name.
+# A killed test's files in /dev/shm can only be removed by the next one if it knows the name.
 git grep -nE 'to_string\(::getpid\(\)|"[^"(]*\{\}[^"]*", *::getpid\(\)' -- tests ':!tests/support/own_name.hpp' | grep -v HasSubstr &&
   fault "the lines above make names that nobody clears away: use own_name() or own_path()" || true
 exit $wrong

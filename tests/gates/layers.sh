@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Who may include whom (the house has one direction). Usage: layers.sh [ROOT]; prints each wrong include.
+# The includes that each folder may have (the house has one direction). Usage: layers.sh [ROOT]; prints each wrong include.
 set -euo pipefail
 cd "${1:-$(dirname "$0")/../..}"
 

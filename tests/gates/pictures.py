@@ -9,8 +9,8 @@ Usage: pictures.py [ROOT] (a git checkout); prints each fault. For each file tha
   on a line or on a curve.
 * A box of the class "process" has an arrow: a path with a marker begins or ends at its edge. No end of an arrow is
   hidden by a box that is drawn after it.
-* A picture with curves has a title for each of its two axes (class "axis"), and a legend with a mark of its own shape
-  for each curve that looks like no other.
+* A picture with curves has a title for each of its two axes (class "axis"). Its legend has a mark of its own shape for each
+* curve that looks like no other.
 """
 
 import re

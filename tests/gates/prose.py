@@ -10,8 +10,7 @@ at those that HELD below does not name yet.
   list that ";" or ":" divides are counted one by one.
 * No text has a word that manager/glossary.md forbids (the column "not").
 
-A text is a paragraph, an item of a list or a cell of a table outside of fences (.md), a comment, a docstring, or a string of
-three words and more: messages are among those.
+A text is a paragraph, an item of a list or a cell of a table outside of fences (.md), a comment or a docstring. So is a string of three words and more: messages are among those.
 """
 
 import argparse
@@ -27,6 +26,7 @@ from pathlib import Path
 # The texts that are held to the rules: kind and pattern of the path. Kinds: document, comment, message.
 HELD = [
     ("document", "*.md"),
+    ("comment", "tests/*"),
 ]
 GLOSSARY = "manager/glossary.md"
 WORDS = 30
@@ -41,6 +41,8 @@ CODE = "\u0001"  # one word of code
 C_TOKEN = re.compile(
     r"""//(?P<line>[^\n]*)|/\*(?P<block>.*?)\*/|R"(?P<mark>\w*)\((?P<raw>.*?)\)(?P=mark)"|"""
     r""""(?P<text>(?:\\.|[^"\\\n])*)"|(?<![0-9a-fA-F])'(?:\\.[^'\n]*|[^'\\\n])'""", re.DOTALL)
+# Of a comment: columns, arrows, a line of usage.
+DRAWING = re.compile(r"\S   +\S|-->|──|\|  |^  +\S.*\[-")
 C_FILES = (".cpp", ".hpp", ".h", ".c", ".idl", ".h.in", ".hpp.in")
 HASH_FILES = (".sh", ".cmake", "CMakeLists.txt")
 ITEM = re.compile(r"([*+-]|\d+\.|\([a-z0-9]\)) +(?=\S)")
@@ -81,7 +83,7 @@ def paragraphs(lines, columns=False):
             text = Text()
             before_empty = True
             continue
-        if (not text.lines and before_empty and re.match(r"    |\t", line)) or (columns and re.search(r"\S   +\S|-->|──|\|  ", line)):
+        if (not text.lines and before_empty and re.match(r"    |\t", line)) or (columns and DRAWING.search(line)):
             if text.lines:
                 yield text
             text = Text()

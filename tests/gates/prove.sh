@@ -130,7 +130,7 @@ plant_in_prose "prose: comment in C" "shm/planted.h:2: begins with 'Whose': Whos
  * Whose it is, the kernel knows. */"
 plant_in_prose "prose: comment in Python" "tests/planted.py:1: begins with 'what': what it does" tests/planted.py "# Of the gate: what it does and sees."
 plant_in_prose "prose: comment in a script" "tests/planted.sh:2: begins with 'Whoever': Whoever asks" tests/planted.sh "true
-# Whoever asks is answered."
+# W""hoever asks is answered."
 plant_in_prose "prose: message" "shm/base/planted.cpp:1: begins with 'what': what the client asks" shm/base/planted.cpp 'const char* m = "refused: what the client asks";'
 new_tree
 echo "Who asks? The manager answers the client: \`what\` is code." >"$plot/tree/shm/planted.md" && commit_tree
@@ -222,7 +222,7 @@ touch /dev/shm/plchost-planted
 must_be_red "left behind: a shared memory" "in /dev/shm: plchost-planted" left_behind
 rm /dev/shm/plchost-planted
 
-# The lists of tests that may be skipped or run again: what is on none of them is told.
+# The lists of tests that may be skipped or run again: tests on none of them are reported.
 echo 'thread Planted.* planted' >"$plot/list"
 reason() { PYTHONPATH=tests python3 -c 'import expected, sys; sys.exit(expected.Expected(sys.argv[1], sys.argv[2]).reason(sys.argv[3]))' "$plot/list" "$@"; }
 must_be_red "expected tests" "planted" reason thread Planted.Case

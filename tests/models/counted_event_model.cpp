@@ -9,7 +9,7 @@ namespace {
 
 struct Shared {
   CountedEvent event;
-  int written = 0;  // plain: what a poster leaves for whom it wakes
+  int written = 0;  // plain: a poster's data for the thread that it wakes
   std::atomic<bool> stop{false};
 };
 

@@ -62,7 +62,7 @@ void two_users_one_exchange(Scene& scene) {
   });
 }
 
-// What a user has seen it does not see in an older state again.
+// A user never sees an older state after a newer one.
 void a_user_comes_back(Scene& scene) {
   Shared& shared = make(scene);
   scene.thread("user", [&] {

@@ -16,7 +16,7 @@ struct Shared {
   std::atomic<std::uint64_t> told{0};  // how far the writer has come, told another way
 };
 
-// `attempts` of them; what is read is whole and not older than what was read before.
+// `attempts` of them; each value read is whole and not older than the one before.
 void read(Shared& shared, int reads) {
   std::uint64_t last = 0;
   for (int i = 0; i < reads; ++i) {

@@ -129,7 +129,7 @@ void two_writers_one_reader(Scene& scene) {
   scene.at_end([&] { shared.check(3); });
 }
 
-// The process that puts in is killed at any instruction: what it has published is whole.
+// The process that puts in is killed at any instruction: all that it has published is whole.
 void a_writer_is_killed(Scene& scene) {
   Shared& shared = make(scene);
   scene.limits({.kills = 1});

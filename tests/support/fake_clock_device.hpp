@@ -17,7 +17,8 @@
 
 namespace plchost {
 
-/// A clock device that a test makes, on the test's clock. What the test sets holds for all that are opened.
+/// A clock device that a test makes, on the test's clock. The test's settings hold for all devices that are
+/// opened.
 class FakeClockDevice final : public DeviceFiles {
  public:
   enum class Kind : std::uint8_t { rtc, hpet, neither };

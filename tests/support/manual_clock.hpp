@@ -14,7 +14,7 @@
 namespace plchost {
 
 /// Time that a test moves by hand. Threads that sleep by this clock are woken in the order of their
-/// deadlines, and time goes on only when all of them sleep again: what happens depends on no real time.
+/// deadlines, and time goes on only when all of them sleep again: nothing depends on real time.
 class ManualClock final : public Clock {
  public:
   explicit ManualClock(TimePoint begin = TimePoint(std::chrono::seconds(1000))) { set_now(begin); }
@@ -27,7 +27,8 @@ class ManualClock final : public Clock {
     wait_until_all_sleep(lock);
   }
 
-  /// Moves from deadline to deadline up to `end`; what falls due at `end` itself has run when it returns.
+  /// Moves from deadline to deadline up to `end`; tasks that fall due at `end` itself have run when it
+  /// returns.
   void run_until(TimePoint end) {
     std::unique_lock lock(mutex_);
     for (;;) {
@@ -156,7 +157,7 @@ class ManualClock final : public Clock {
     roused_.wait(lock, [&] { return sleeper.roused; });
   }
 
-  // Who is roused counts as awake at once, not only when its thread gets the processor.
+  // A roused thread counts as awake at once, not only when its thread gets the processor.
   template <class Predicate>
   void rouse(Predicate predicate) {
     std::erase_if(sleepers_, [&](Sleeper* sleeper) {

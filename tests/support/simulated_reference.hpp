@@ -18,7 +18,7 @@ class SimulatedReference {
   SimulatedReference(TimePoint origin, double drift, double noise_ns, std::uint64_t seed = 1)
       : anchor_(origin), at_anchor_(0), drift_(drift), noise_(-noise_ns, noise_ns), random_(seed) {}
 
-  /// What it shows without noise, beyond kEpoch, in nanoseconds.
+  /// Its time without noise, beyond kEpoch, in nanoseconds.
   [[nodiscard]] double beyond_epoch(TimePoint when) const {
     return at_anchor_ + static_cast<double>((when - anchor_).count()) * (1 + drift_);
   }

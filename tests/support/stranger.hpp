@@ -65,7 +65,7 @@ class Stranger {
       done = done && ::setpriority(PRIO_PROCESS, 0, kGreediest) == 0;
       weigh(::getpid(), kGreediest);
     }
-    constexpr unsigned kSeconds = 120;  // whatever becomes of the test
+    constexpr unsigned kSeconds = 120;  // even if the test fails
     ::alarm(kSeconds);
     while (done) continue;
     ::_exit(EXIT_FAILURE);

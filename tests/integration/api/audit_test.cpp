@@ -69,7 +69,7 @@ TEST_F(Audit, ARefusedChangeIsRecordedWithTheReason) {
   const auto client = connect(domain_);
   const auto reply = client->call({"hosta", plc_OPERATION_LOAD_APPLICATION, "line1", "relative.so"}, soon());
   ASSERT_TRUE(reply) << reply.error().describe();
-  // Not before the answer: what was refused nobody has to rely on.
+  // Not before the answer: no client has to rely on a refused change.
   const auto refused = [&] { return records("load application", "/refused"); };
   for (const TimePoint end = soon(); refused().empty() && MonotonicClock::now() < end;) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
@@ -103,7 +103,7 @@ TEST_F(Audit, PostsAreCountedForEachSource) {
   (void)host_.add_event("line1", "ready");
   ASSERT_EQ(run({"post", "event", "line1/ready", "--count", "5"}).code, 0);
   ASSERT_NE(run({"post", "event", "line1/unknown"}).code, 0);
-  // A moment after the first of them was acknowledged: the sum so far. What came after it is told a minute
+  // A moment after the first of them was acknowledged: the sum so far. The ones after it are told a minute
   // later.
   const auto told = [&] {
     const Records posts = records("post");

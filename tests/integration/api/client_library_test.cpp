@@ -279,7 +279,7 @@ TEST_F(ClientLibrary, DoesNothingAfterItWasClosed) {
   EXPECT_EQ(event_.counted().count(), 0U);
 }
 
-// Without any of its threads: who waited for them would wait for ever.
+// Without any of its threads: a wait for them would never end.
 TEST_F(ClientLibrary, IsNeitherUsedNorWaitedForInAChildOfFork) {
   auto sut = std::make_unique<Client>(options());
   auto watch = sut->watch_hosts([](const Client::Host&) {});

@@ -1,4 +1,5 @@
-// A libddsc that plchost-dds was not built with: what rests on its internals is left alone, and that is told.
+// A libddsc that plchost-dds was not built with: the code that rests on its internals is left out, and the
+// log says so.
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -25,7 +26,7 @@ class LoadedCyclone : public testing::Test {
     host_.write_instance(0, "line1", InstanceState::running);
     host_.write_count(1);
   }
-  /// What a server says that loads the library of this machine under that name.
+  /// The log of a server that loads the library of this machine under that name.
   std::string words_with(const std::string& name) {
     std::filesystem::copy_file(library_, folder_ + "/" + name);
     if (name != soname_) std::filesystem::create_symlink(name, folder_ + "/" + soname_);

@@ -41,7 +41,7 @@ struct Side {
   [[nodiscard]] NodeAddress address_at(std::uint16_t number) {
     return {.host = number, .node = node.node().address().node};
   }
-  /// What comes next; nothing if nothing does.
+  /// The next block; nothing if none comes.
   [[nodiscard]] std::optional<std::vector<std::byte>> next(Duration patience = kPatience) {
     for (const TimePoint end = MonotonicClock::now() + patience;; ::usleep(200)) {
       if (channel.receive(buffer, received) == TakeResult::taken) {

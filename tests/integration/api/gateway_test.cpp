@@ -182,7 +182,7 @@ TEST_F(Gateway, IsBackByItselfAfterItsServerWasKilled) {
   ASSERT_TRUE(within_the_host());
   south.host.replace_server();
   EXPECT_TRUE(within_the_host());
-  // What is sent until both know of each other again may be lost, and is never sent twice.
+  // A block that is sent before both know of each other again may be lost, and is never sent twice.
   bool there = false;
   ASSERT_TRUE(becomes([&] {
     (void)north.channel.send(south.address_at(2), {});

@@ -1,4 +1,4 @@
-// What an instance has said, told to operators.
+// The output of an instance, told to operators.
 #include <fstream>
 #include <thread>
 

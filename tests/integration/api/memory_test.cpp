@@ -1,4 +1,4 @@
-// What clients leave behind in the API server.
+// The memory that clients leave behind in the API server.
 #include <chrono>
 #include <memory>
 #include <thread>

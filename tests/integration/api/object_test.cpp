@@ -108,7 +108,7 @@ TEST_F(Objects, ThatAreNotThereAreNoneOfAnyoneElse) {
   EXPECT_EQ(run({"show", "object", std::string(96, 'a')}).code, 2);
 }
 
-// What plcctl has written so far, line by line.
+// The output of plcctl so far, line by line.
 class Watch {
  public:
   Watch(const OwnDomain& domain, std::vector<std::string> arguments) : file_(own_path("watch")) {

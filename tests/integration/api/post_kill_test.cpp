@@ -1,4 +1,4 @@
-// What posters see when their plchost-dds is killed.
+// Posters whose plchost-dds is killed.
 
 #include <atomic>
 #include <cstdint>

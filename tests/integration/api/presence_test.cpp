@@ -79,7 +79,7 @@ TEST_F(Presence, OfAStoppedServerEndsAndComesBack) {
   until([this] { return !sut_->is_silent("hosta"); });
 }
 
-// What only DDS's own threads keep alive looks alive to leases and to automatic liveliness.
+// A server that only DDS's own threads keep up looks alive to leases and to automatic liveliness.
 TEST_F(Presence, OfAServerWhoseLoopHangsEndsAlthoughDdsGoesOn) {
   {
     const StoppedThread loop(host_.server().pid());

@@ -20,7 +20,7 @@ namespace plchost {
 
 OwnDomain::OwnDomain() {
   // All ports of these domains are below the range that clients get theirs from. The last port of a domain is
-  // used by no participant: who has it has the domain.
+  // used by no participant: the process that has it has the domain.
   constexpr std::uint32_t kDomains = 100;
   const auto first = static_cast<std::uint32_t>(::getpid());
   for (std::uint32_t i = 0; i < kDomains && number_ == 0; ++i) {

@@ -61,12 +61,12 @@ class TestHost {
 
   /// The requests that came to the manager so far.
   [[nodiscard]] std::vector<ControlRequest> requests();
-  /// What the manager answers: ok with this text, after this delay.
+  /// The manager's answer: ok with this text, after this delay.
   void answer_with(ControlReply reply) {
     const std::lock_guard lock(mutex_);
     answer_ = std::move(reply);
   }
-  /// What the manager finds at the host from the next check on.
+  /// The manager's findings at the host from the next check on.
   void find(std::vector<HostFinding> findings) {
     const std::lock_guard lock(mutex_);
     findings_ = std::move(findings);

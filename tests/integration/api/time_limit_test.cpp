@@ -1,5 +1,5 @@
-// What a client was told has failed is never done: a plchost-dds that stood still goes on with what waited
-// for it.
+// A command whose failure was told is never done: a plchost-dds that stood still goes on with the requests
+// that waited for it.
 #include <csignal>
 #include <fstream>
 #include <thread>
@@ -51,7 +51,7 @@ class StoppedServer : public testing::Test {
     const auto after = connect(domain_);
     ASSERT_TRUE(after->call({"hosta", plc_OPERATION_RESET, "line1", ""}, soon()));
   }
-  /// What the manager was asked for, but for that.
+  /// The manager's requests, but for that.
   [[nodiscard]] std::vector<ControlVerb> done() {
     std::vector<ControlVerb> verbs;
     for (const ControlRequest& request : host_.requests()) {

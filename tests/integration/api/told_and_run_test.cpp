@@ -1,5 +1,5 @@
-// What a poster is told of its post, and what a real plc-instance does for it, while that is stopped, started
-// and switched.
+// The answer to a post, and the cycles of a real plc-instance for it, while that is stopped, started and
+// switched.
 #include <array>
 #include <atomic>
 #include <cstdint>

@@ -95,7 +95,7 @@ struct EndingProgram {
   const char* text;
 };
 
-// What does not come back from its set-up, or not as it should.
+// Applications that do not return from their set-up, or not as they should.
 class TrialOf : public ::testing::TestWithParam<EndingProgram> {};
 
 TEST_P(TrialOf, SaysHowTheSetUpEnded) {

@@ -67,7 +67,7 @@ class Firmware {
   pid_t pid_;
 };
 
-/// What the application says about itself.
+/// The application's report about itself.
 struct Report {
   unsigned long torn = 0, input = 0, missed = 0, late = 0, begun = 0, persistent = 0, data = 0, saves = 0;
   unsigned origin = 0;
@@ -306,7 +306,7 @@ TEST_F(AreasOf, RetainLoseAtMostAnIntervalWithThePower) {
   for (int round = 0; round < 5; ++round) {
     Report last = report();
     ASSERT_TRUE(eventually([&] { return report().saves >= 3; }));
-    // What was there three intervals ago has been written since.
+    // The values of three intervals ago have been written since.
     const Report then = report();
     ASSERT_TRUE(eventually([&] { return report().saves >= then.saves + 2; }));
     power_cut();
@@ -390,7 +390,7 @@ class LoopMount {
   bool mounted_ = false;
 };
 
-// What lies on the disk at some moment is what a loss of power leaves of it: the file system's own cache is
+// The files on the disk at some moment are those that a loss of power leaves: the file system's own cache is
 // not in the copy.
 TEST_F(AreasOf, RetainOnADiskThatLosesItsPowerHaveWhatWasWrittenLast) {
   const std::string image = sandbox.folder() + "/disk";

@@ -42,7 +42,7 @@ TEST_F(ControlSocket, StopsAndStartsTheApplication) {
   EXPECT_EQ(sut_.ask(ControlVerb::start).code, ErrorCode::ok);
   EXPECT_EQ(sut_.ask(ControlVerb::start).code, ErrorCode::wrong_state);
   EXPECT_TRUE(eventually([&] { return sut_.task("Fast")->counters.cycles > cycles; }));
-  EXPECT_EQ(sut_.task("Work")->counters.cycles, 0U);  // what was posted while it was stopped is not run
+  EXPECT_EQ(sut_.task("Work")->counters.cycles, 0U);  // posts while it was stopped are not run
 }
 
 TEST_F(ControlSocket, DoesNotStartWhatCameWhileTheProcessStoodStillAndWasGivenUp) {

@@ -1,4 +1,4 @@
-// What a device description offers, and an application that waits for something else.
+// The events of a device description, and an application that waits for another one.
 #include <csignal>
 #include <cstdlib>
 #include <string>

@@ -52,7 +52,7 @@ class InstanceProcess {
   void wait_until_up(bool running = true);
   /// Sends the signal; 0: none. Then waits for the end: the exit code, or minus the signal that ended it.
   int end(int signal = 0);
-  /// What it wrote so far.
+  /// Its output so far.
   [[nodiscard]] std::string log() const;
   [[nodiscard]] std::optional<TaskSnapshot> task(const std::string& name) const;
   [[nodiscard]] ControlReply ask(ControlVerb verb, const std::string& argument = {}) const;

@@ -1,4 +1,4 @@
-// The real plc-instance with real applications: what it promises over its life.
+// The real plc-instance with real applications: its promises from start to end.
 #include <atomic>
 #include <csignal>
 #include <cstdlib>

@@ -24,7 +24,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-/// What the program says of itself.
+/// The program's report of itself.
 struct VersionReport {
   int version = 0;
   unsigned long counter = 0;  ///< a variable that it keeps

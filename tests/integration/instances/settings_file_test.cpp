@@ -1,4 +1,4 @@
-// What a settings file does to a plc-instance.
+// The effect of a settings file on a plc-instance.
 #include <csignal>
 #include <cstdio>
 #include <thread>

@@ -66,7 +66,7 @@ class Faulty {
   InstanceProcess process_;
 };
 
-// What holds after every fault of the whole application.
+// Holds after every fault of the whole application.
 void expect_stopped_and_reachable(Faulty& sut, const std::string& task) {
   EXPECT_TRUE(eventually([&] { return sut.state_of("Fast") == PageTaskState::stopped; }))
       << sut.process().log();
@@ -179,7 +179,7 @@ TEST_P(EachScheduler, HitsAtTheTwentiethOverrunInARow) {
 TEST_P(EachScheduler, SeesACycleThatNeverRan) {
   Faulty sut("[Task.Low]\nWatchdog.OmittedCycles=10\n", GetParam());
   EXPECT_TRUE(sut.runs("Low"));
-  std::this_thread::sleep_for(300ms);  // what happens right after a start is not counted
+  std::this_thread::sleep_for(300ms);  // cycles right after a start are not counted
   (void)sut.process().event("starve").post();
   const auto found = sut.exceptions().front();
   EXPECT_EQ(found.kind, "omitted cycles");

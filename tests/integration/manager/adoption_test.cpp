@@ -67,7 +67,7 @@ TEST(Manager, BringsAnAdoptedInstanceBackWhoseApplicationHasLeftAProcessBehind) 
   ASSERT_TRUE(Plant::eventually([&] { return plant.status("line1").restarts > 0; }));
   ASSERT_TRUE(plant.wait_for("line1", InstanceState::running));
   EXPECT_EQ(plant.ask(ControlVerb::stop, "line1").code, ErrorCode::ok);
-  EXPECT_EQ(plant.stop_manager().describe(), "exit code 0");  // what is killed leaves its children behind
+  EXPECT_EQ(plant.stop_manager().describe(), "exit code 0");  // a killed process leaves its children behind
 }
 
 TEST(Manager, TriesAgainWhileItHasNoDescriptorsForAStart) {

@@ -23,7 +23,7 @@ class CheckConfig : public testing::Test {
   CheckConfig(const CheckConfig&) = delete;
   CheckConfig& operator=(const CheckConfig&) = delete;
 
-  // What it prints, its exit code at the end.
+  // Its output, with its exit code at the end.
   std::string check(const std::string& text) {
     write("cell.toml", fmt::format("[host]\nname = \"cell1\"\nrun_directory = \"{0}/run\"\n"
                                    "state_directory = \"{0}/state\"\n{1}",

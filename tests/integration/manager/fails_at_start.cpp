@@ -1,4 +1,4 @@
-// Passes its trial and refuses to start: what no trial can find.
+// Passes its trial and refuses to start: a fault that no trial can find.
 #include <chrono>
 #include <fstream>
 #include <iterator>

@@ -1,4 +1,4 @@
-// What instances say: kept for who asks later, and never in the way of their cycles.
+// The output of instances: kept for later readers, and never in the way of their cycles.
 #include <algorithm>
 #include <csignal>
 

@@ -49,7 +49,7 @@ class Plant {
   void kill_manager();
   /// All that are there, as the kernel does when memory is short.
   void kill_instances();
-  /// What a power cut takes, when all processes have ended: shared memory and the run directory.
+  /// The losses of a power cut, when all processes have ended: shared memory and the run directory.
   void lose_memory() const;
   /// Takes back each add().
   void clear_instances() { instances_.clear(); }
@@ -68,7 +68,7 @@ class Plant {
   bool wait_for_cycles(const std::string& instance, std::uint64_t more = 5);
   static bool eventually(const std::function<bool()>& condition);
   static bool within(Duration limit, const std::function<bool()>& condition);
-  /// Whose command lines have this text.
+  /// The processes whose command lines have this text.
   static int processes_about(const std::string& text);
   [[nodiscard]] int manager_pid() const noexcept { return manager_.pid; }
   static std::string application(const std::string& name);

@@ -191,7 +191,7 @@ TEST_F(Reload, ChangesNothingWhenTheFileIsFaulty) {
   expect_nothing_left();
 }
 
-// What --check-config finds, and not only what the file says by itself.
+// The findings of --check-config, and not only those of the file by itself.
 TEST_F(Reload, ChangesNothingWhenAnApplicationIsNone) {
   start();
   plant_.write_file("lamp.so", "no shared object");

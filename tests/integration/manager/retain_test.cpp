@@ -1,4 +1,4 @@
-// What a packer has counted, over the ends of its process, of its manager and of both.
+// The count of a packer, over the ends of its process, of its manager and of both.
 #include <csignal>
 #include <filesystem>
 #include <optional>
@@ -134,7 +134,7 @@ class RetainThatIsSeldomWritten : public testing::Test {
     ASSERT_TRUE(process);
     ASSERT_TRUE(signal_process(*process, SIGKILL));
   }
-  /// Whatever the manager before had to say of it, an operator starts it.
+  /// An operator starts it, whatever the manager before had to say of it.
   void start_again() {
     plant.start_manager();
     EXPECT_EQ(plant.ask(ControlVerb::reset, "packer1").code, ErrorCode::ok);

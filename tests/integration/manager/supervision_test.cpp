@@ -94,7 +94,7 @@ TEST(Manager, PutsACrashLoopIntoSafeModeUntilAnotherApplicationIsLoaded) {
   EXPECT_TRUE(plant.wait_for_cycles("line1"));
 }
 
-// What the instance's settings do not allow, its trial finds: the machine runs on.
+// A program that the instance's settings do not allow fails its trial: the machine runs on.
 TEST(Manager, RefusesAnApplicationThatTheSettingsDoNotAllowBeforeItEndsTheOneThatRuns) {
   Plant plant;
   plant.add("line1", "bottling_line", "settings = \"line1.cfg\"");
@@ -191,8 +191,8 @@ TEST(Manager, NamesTheThreadThatTakesTheProcessorInTheSetUpAndFreesTheCore) {
   EXPECT_THAT(problem("line4"), HasSubstr("load application: the set-up has not returned for 25 s"));
 }
 
-// So that its control thread always has something to do: what sleeps now and then gets the little time that
-// the kernel leaves to threads without real-time priority.
+// So that its control thread always has something to do: a thread that sleeps now and then gets the little
+// time that the kernel leaves to threads without real-time priority.
 class BusyAsker {
  public:
   explicit BusyAsker(const Plant& plant)

@@ -1,4 +1,4 @@
-// What a start would find wrong is found by the trial: the machine that runs, runs on, and the answer says
+// The trial finds each fault that a start would find: the machine that runs, runs on, and the answer says
 // why.
 
 #include <filesystem>
@@ -25,7 +25,7 @@ class Trial : public testing::Test {
     ASSERT_TRUE(plant_.wait_for("line1", InstanceState::running));
     pid_ = plant_.status("line1").pid;
   }
-  /// Why `application` is refused; what runs must not be touched.
+  /// Why `application` is refused; the running one must not be touched.
   std::string refusal(const std::string& application) {
     const auto reply = plant_.ask(ControlVerb::load_application, "line1", Plant::application(application));
     EXPECT_NE(reply.code, ErrorCode::ok);
@@ -134,7 +134,7 @@ TEST_F(Trial, FindsThatThePoolHasNoRoomForAnEvent) {
   EXPECT_EQ(reply.code, ErrorCode::ok) << reply.text;
 }
 
-// What it looks at is left as it is: what is right can be loaded, again and again.
+// It changes nothing that it looks at: a good program can be loaded, again and again.
 TEST_F(Trial, LeavesNothingBehindAndTakesNothingAway) {
   start("areas");
   for (int i = 0; i < 2; ++i) {

@@ -32,7 +32,8 @@ class Wishes : public testing::TestWithParam<End> {
     plant_.start_manager();
     ASSERT_TRUE(plant_.wait_for("line1", InstanceState::running));
   }
-  /// What nobody asked for is on the disk a moment later; an answer comes when it is there.
+  /// A change without a command is on the disk a moment later; the answer to a command comes when it is
+  /// there.
   void wait_for_disk() {
     const auto reply = plant_.ask(ControlVerb::set_scheduler, "line1", "CmpSchedule");
     ASSERT_EQ(reply.code, ErrorCode::ok) << reply.text;

@@ -25,7 +25,7 @@ class CycloneOracle {
   CycloneOracle& operator=(const CycloneOracle&) = delete;
   ~CycloneOracle();
 
-  /// What a client has said to it before.
+  /// The packets that a client has sent to it before.
   [[nodiscard]] std::vector<Packet> seeds() const;
   /// Waits until Cyclone has few datagrams before it. False: it has ended, or has hung for 10 s.
   [[nodiscard]] bool feed(const Packet& packet);

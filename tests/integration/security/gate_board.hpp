@@ -7,7 +7,7 @@
 
 namespace plchost {
 
-/// What the program gated_cyclone and whoever feeds it share.
+/// The memory that the program gated_cyclone shares with the test that feeds it.
 struct GateBoard {
   struct Seed {
     std::uint32_t size = 0;
@@ -20,7 +20,7 @@ struct GateBoard {
   std::atomic<std::uint64_t> done{0};  ///< datagrams of the feeder that the receiving thread has left behind
   std::atomic<std::uint64_t> passed{0};  ///< of them, those that the gate let pass
   std::atomic<std::uint32_t> seed_count{0};
-  std::array<Seed, kSeeds> seeds{};  ///< what a client has really sent
+  std::array<Seed, kSeeds> seeds{};  ///< the packets that a client has really sent
 };
 
 }  // namespace plchost

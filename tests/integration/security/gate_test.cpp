@@ -1,4 +1,4 @@
-// What the gate of an unsecured host passes, Cyclone survives.
+// Cyclone survives all that the gate of an unsecured host passes.
 #include <algorithm>
 #include <array>
 #include <chrono>

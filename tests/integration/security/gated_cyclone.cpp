@@ -46,7 +46,7 @@ void keep_seed(std::span<const std::byte> datagram) {
   board->seed_count = index + 1;
 }
 
-/// The entities of one side. All are in one partition; what the host reads, the client writes.
+/// The entities of one side. All are in one partition; the client writes the topics that the host reads.
 class Side {
  public:
   Side(dds::Role role, std::uint32_t domain) : is_host_(role == dds::Role::server) {
@@ -73,7 +73,7 @@ class Side {
       if (count > 0) (void)dds_return_loan(reader.get(), samples.data(), count);
     }
   }
-  /// What a client says.
+  /// The samples of a client.
   void write_requests(int number) {
     plc_Request request{};
     request.header.request_identity.sequence_number = number;
@@ -92,7 +92,7 @@ class Side {
       (void)dds_dispose(writers_.at(3).get(), &claim);
     }
   }
-  /// What a host says.
+  /// The samples of a host.
   void write_replies() {
     const plc_Reply reply{};
     (void)dds_write(writers_.at(0).get(), &reply);

@@ -40,9 +40,9 @@ class SecuredStallAtAKill : public SecuredHost {
   PoolEvent other_;
 };
 
-// What the killed server has not confirmed fills the poster's writer, which must not wait for the end of that
-// server's lease, 3 s. A fresh client shows how slow the machine is. Each kill for itself: one that stands
-// still gets further rounds.
+// Posts that the killed server has not confirmed fill the poster's writer, which must not wait for the end of
+// that server's lease, 3 s. A fresh client shows how slow the machine is. Each kill for itself: one that
+// stands still gets further rounds.
 TEST_F(SecuredStallAtAKill, OneWayAtFullSpeed) {
   const auto client = make_client();
   ASSERT_TRUE(client->prepare_posts("cell", soon()));

@@ -1,6 +1,6 @@
 // Cyclone DDS 0.10 decodes what it receives once for each secured participant of a process, and frees the
 // last result only (q_omg_security_decode_rtps_message()). Several clients are in one process in these tests.
-// What the client library forgets of Cyclone's memory is found by the tests without security.
+// Leaks of Cyclone's memory by the client library are found by the tests without security.
 #if defined(__has_feature)
 #if __has_feature(address_sanitizer)
 

@@ -1,4 +1,4 @@
-// What clients of a secured host leave behind in its API server.
+// The memory that clients of a secured host leave behind in its API server.
 #include <atomic>
 #include <chrono>
 #include <memory>

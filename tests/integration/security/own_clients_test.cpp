@@ -1,4 +1,4 @@
-// What the gate of a secured host does with what its own clients say.
+// The gate of a secured host, and the packets of its own clients.
 #include <chrono>
 #include <fstream>
 #include <iterator>

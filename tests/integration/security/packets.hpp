@@ -19,7 +19,7 @@ class PacketCapture {
   /// Of the first server of the domain on this machine. refused: this process may not look at packets.
   [[nodiscard]] static Result<PacketCapture> open(std::uint32_t domain);
 
-  /// What has come since the last call, the newest kMost of it.
+  /// The packets since the last call, the newest kMost of them.
   [[nodiscard]] std::vector<Packet> take();
   static constexpr std::size_t kMost = 4096;
 

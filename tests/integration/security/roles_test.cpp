@@ -1,4 +1,4 @@
-// What each role may, and what is refused: with real processes over loopback.
+// The rights of each role, and the refusals: with real processes over loopback.
 #include <filesystem>
 #include <fstream>
 

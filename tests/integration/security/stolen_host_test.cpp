@@ -1,5 +1,4 @@
-// What a controller can do to another one whose identity it does not have: with a patched plugin that lets it
-// try.
+// A controller against another one whose identity it does not have: with a patched plugin that lets it try.
 #include <limits>
 #include <optional>
 #include <thread>

@@ -1,4 +1,4 @@
-// Who is not let in at all.
+// Clients that are not let in at all.
 #include <filesystem>
 #include <fstream>
 #include <thread>

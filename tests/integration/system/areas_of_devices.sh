@@ -91,7 +91,7 @@ qemu-system-x86_64 -machine pc,accel=${GUEST_ACCELERATOR:-tcg} -m 512 -nodefault
   -append "console=ttyS0 quiet panic=-1 rdinit=/init" $(device uio 4) $(device mem 5) >"$folder/qemu.log" 2>&1 &
 guest=$!
 
-# What is written into the inputs of the device comes back inverted in its outputs.
+# Values in the inputs of the device come back inverted in its outputs.
 put() { printf '%b' "$2" | dd of="$folder/$1" bs=1 conv=notrunc status=none; }
 outputs() { dd if="$folder/$1" bs=1 skip=4096 count=4 status=none | od -An -tx1 | tr -d ' \n'; }
 wait_for() {

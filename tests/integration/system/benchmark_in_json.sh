@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# What the benchmark prints is one JSON document, and tells what it could not measure; figures.py makes tables of it. It
-# leaves nothing behind.
+# The benchmark prints one JSON document, which names the missing measurements; figures.py makes tables of it. It leaves nothing
+# behind.
 . "$(dirname "$0")/common.sh"
 source=$(cd "$(dirname "$0")/../../.." && pwd)
 mkdir "$cell/tmp"

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# What stands between this host and its best: told by a real manager, over DDS, whatever this host is like. And the
-# idle states of a core that an instance holds, which are as before when it was killed.
+# The shortcomings of this host: told by a real manager, over DDS, whatever this host is like. And the idle states of a core
+# that an instance holds, which are as before when it was killed.
 . "$(dirname "$0")/common.sh"
 
 core=$first_core
@@ -10,7 +10,7 @@ write_instance north packer1 "$core" packer 'settings = "packer1.cfg"' 'restart 
 latency=/sys/devices/system/cpu/cpu$core/power/pm_qos_resume_latency_us
 if [ -w "$latency" ]; then
   exec {turn}<"$latency"
-  flock "$turn" # whoever tests with the real file takes its turn
+  flock "$turn" # tests with the real file take turns
   before=$(cat "$latency")
 fi
 start_manager north

@@ -88,7 +88,7 @@ until_true 20 saw "^host north is silent" 1
 until_true 20 saw "^host north answers" 2
 plcctl stop instance packer1
 until_true 20 saw "^north/packer1: application stopping -> stopped" 1
-plcctl start instance packer1  # what an operator has stopped stays so when the host comes again
+plcctl start instance packer1  # an instance that an operator has stopped stays so when the host comes again
 kill -TERM "${managers[0]}"
 wait "${managers[0]}" || fail "the manager ended with $?"
 until_true 20 saw "^host north is silent" 2

@@ -2,7 +2,7 @@
 # Sourced with BIN (the programs) and APPLICATIONS set; ends everything that it started.
 set -euo pipefail
 
-# As own_name() makes them: what a story that is killed leaves behind, the next test program removes.
+# As own_name() makes them: the next test program removes the files of a story that was killed.
 pool=$(printf 'plctest-%x-%d-story' "$(stat -Lc %i /proc/self/ns/pid)" $$)
 cell=$(mktemp -d "${TMPDIR:-/tmp}/$pool.XXXXXX")
 managers=()

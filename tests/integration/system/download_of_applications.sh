@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# A program from an engineer's machine to its instance: sent, kept, rolled back, started with. What is broken is refused while
-# the running one runs on; clients and servers die in the midst of it.
+# A program from an engineer's machine to its instance: sent, kept, rolled back, started with. A broken one is refused while the
+# running one runs on; clients and servers die in the midst of it.
 . "$(dirname "$0")/common.sh"
 
 write_host cell1 "$first_core"
@@ -110,7 +110,7 @@ plcctl load application line1 "$kept/000002.so" --on-host --boot
 for file in packer bottling_line packer bottling_line; do plcctl load application line1 "$APPLICATIONS/$file.so"; done
 is "$(numbers)" 2,6,7 || fail "$(plcctl list applications)"
 
-# The largest that is allowed, and still an application: what follows an ELF file is nobody's.
+# The largest that is allowed, and still an application: bytes behind an ELF file have no meaning.
 cp "$APPLICATIONS/drive_axis.so" "$cell/large.so"
 truncate -s 64M "$cell/large.so"
 echo "- a client that is killed: nothing is left of its half, and the next one gets in"

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# A task divides by zero: what the operator sees and does, while the instance beside it runs on.
+# A task divides by zero: the operator's view and actions, while the instance beside it runs on.
 . "$(dirname "$0")/common.sh"
 
 write_host cell $(seq "$first_core" "$last_core")

@@ -58,7 +58,7 @@ for program in plchostd plchost-dds plc-instance; do
   sleep 10
   echo "$program: $((($(ticks "$program") - first) * 10)) ms of processor time in 10 s, resident $(ps -C "$program" -o rss= | awk '{ sum += $1 } END { printf "%d KiB on average", sum / NR }')"
 done
-timed() { # WHAT COMMAND...
+timed() { # NAME COMMAND...
   local what=$1 begin end
   shift
   begin=$(date +%s%N)

@@ -18,7 +18,7 @@ all_run() { is "$(desk list instances --json | jq '[.[] | select(.state == "runn
 until_true 60 all_run
 table=$(desk list hosts)
 echo "$table"
-# All have the same clock here: what is measured must say so, within what it says of itself.
+# All have the same clock here: the measured offsets must be zero, within the error that they claim.
 desk list hosts --json | jq -e 'all(.[];
     .state == "alive" and .running == 1 and .instances == 1 and .cores >= 1 and .load >= 0 and
     .available_mib > 0 and .memory_mib >= .available_mib and .uptime_s >= 0 and (.secured | not) and

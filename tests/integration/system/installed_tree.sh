@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# What `cmake --install` puts below a prefix is what manager/install.md says, and it is all that a user needs: programs of
-# others are built with it, and run with it.
+# `cmake --install` puts the files of manager/install.md below a prefix, and a user needs no more: programs of others are built
+# with it, and run with it.
 . "$(dirname "$0")/common.sh"
 source=$(cd "$(dirname "$0")/../../.." && pwd)
 build=$(cd "$BIN/.." && pwd)

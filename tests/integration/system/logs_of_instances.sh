@@ -1,5 +1,6 @@
 #!/usr/bin/env bash
-# What an application says, and its last words before a crash: read from anywhere, after the instance and the manager were restarted.
+# The output of an application, up to its last lines before a crash: read from anywhere, after the instance and the manager were
+# restarted.
 . "$(dirname "$0")/common.sh"
 
 write_host cell $(seq "$first_core" "$last_core")

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# An unsecured host is for the loopback interface only, really: what comes from another machine reaches no socket, so no
-# parser. With an explicit setting it does, and the log says what that means.
+# An unsecured host is for the loopback interface only, really: packets of another machine reach no socket, so no parser. With
+# an explicit setting it does, and the log says what that means.
 . "$(dirname "$0")/spaces.sh"
 make_spaces inside outside
 cable inside 10.78.0.1 outside 10.78.0.2

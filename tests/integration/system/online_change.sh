@@ -11,7 +11,7 @@ until_true 20 state_is line1 running
 kept=$cell/cell1.state/applications.cell1/line1
 application_is() { [ "$(instance line1 application)" = "$1" ]; }
 
-# report FIELD: what the program says of itself now; FIELD: the word before the figure
+# report FIELD: the program's report of itself now; FIELD: the word before the figure
 report() {
   local before
   before=$(reports)

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# A plain "cmake -S . -B build" needs neither GoogleTest nor pybind11, and says what is left out without them; who wants them
-# for sure is told that they are missing. A Cyclone DDS whose internals are not known is told, too.
+# A plain "cmake -S . -B build" needs neither GoogleTest nor pybind11, and says which parts are left out without them. A
+# configuration that demands them fails and names the missing ones. A Cyclone DDS whose internals are not known is told, too.
 set -euo pipefail
 root=$(cd "$(dirname "$0")/../../.." && pwd)
 folder=$(mktemp -d "${TMPDIR:-/tmp}/plchost-system.XXXXXX")

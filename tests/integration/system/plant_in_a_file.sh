@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # How two controllers are to be stands in a file: `diff` shows what is not so, `apply` brings them there, and there is nothing
-# left for a second one. What cannot be done at one is told, and done at the others.
+# left for a second one. A change that fails at one is reported, and done at the others.
 . "$(dirname "$0")/common.sh"
 
 for host in north south; do
@@ -36,7 +36,7 @@ name = "line1"
 application = "$APPLICATIONS/packer.so"
 state = "stopped"
 END
-# exits CODE COMMAND...: what it says goes to $said
+# exits CODE COMMAND...: its output goes to $said
 exits() {
   local wanted=$1 code=0
   shift

@@ -29,7 +29,7 @@ line2=$(pid_of line2)
 
 [ "$(plcctl reload host)" = "nothing has changed" ] || fail "an unchanged file changes something"
 
-# What concerns plchost-dds only is used by a new one; the answer comes before, and no instance is touched.
+# A change of plchost-dds only is used by a new one; the answer comes before, and no instance is touched.
 sed -i '/^pool = /a labels = ["hall2"]' "$cell/cell.toml" "$cell/one.toml"
 [ "$(plcctl reload host)" = "[host] labels changed, used at once; plchost-dds is restarted for it, and the PLCs run on" ] ||
   fail "the answer of another label"

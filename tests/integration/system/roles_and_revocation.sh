@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# A plant's identities from the first command to a revocation: who may do what, and a PLC that runs on through it all.
+# A plant's identities from the first command to a revocation: the rights of each, and a PLC that runs on through it all.
 . "$(dirname "$0")/common.sh"
 
 plant=$cell/plant

@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# A task does not come to the end of its cycle when the application is to stop: what the operator sees of it.
+# A task does not come to the end of its cycle when the application is to stop: the operator's view of it.
 . "$(dirname "$0")/common.sh"
 
 cat >"$cell/line1.cfg" <<CFG

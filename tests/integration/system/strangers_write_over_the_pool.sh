@@ -58,7 +58,7 @@ for seed in 1 2 3 4; do
   two=$(cycles line2)
   flip "$seed" &
   flipper=$!
-  # What is asked meanwhile may be refused, but ends.
+  # A request meanwhile may be refused, but ends.
   while kill -0 "$flipper" 2>/dev/null; do
     plcctl list instances >/dev/null 2>&1 || true
     plcctl register event line1/new >/dev/null 2>&1 || true

@@ -3,9 +3,7 @@
 
 Where the tour has "<!-- run here: PAGE ... -->", the console blocks of these pages behind "<!-- run in the tour -->" are run.
 
-The commands are those of the indented lines and those behind "$ " in the console blocks; blocks of code are files, by the name
-in their first line or in the line above. What a console block shows behind a command must come in this order, with any number
-where a number stands, any spaces where spaces stand, and anything where "..." stands.
+The commands are those of the indented lines and those behind "$ " in the console blocks. Blocks of code are files, by the name in their first line or in the line above. The output that a console block shows behind a command must come in this order. Any number matches a number, any spaces match spaces, and anything matches "...".
 """
 import os
 import re
@@ -14,7 +12,7 @@ import sys
 import time
 
 ROOT, BIN, CELL, CORE, POOL = sys.argv[1:6]
-PATIENCE_S = 75  # what the longest command waits by itself, and more
+PATIENCE_S = 75  # more than the longest command waits by itself
 PLACES = {
     "$PWD/.build/demo/bin": BIN,
     "$PWD/instances": ROOT + "/instances",
@@ -104,7 +102,7 @@ def missing(expected, output):
 
 
 class Shell:
-    """A shell whose commands come from here; what they and their children say goes to one file."""
+    """A shell whose commands come from here; their output, also that of their children, goes to one file."""
 
     def __init__(self):
         self.path = CELL + "/tour.log"

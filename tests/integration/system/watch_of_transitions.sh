@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Who watches the changes of state sees each of a start, stop, reset and start once and in order, also when the
-# API server is killed in between; and the list shows the same.
+# A watcher of changes of state sees each of a start, stop, reset and start once and in order, also when the API server is
+# killed in between. The list shows the same.
 . "$(dirname "$0")/common.sh"
 
 write_host cell "$first_core"
@@ -62,7 +62,7 @@ application+="stopped>running "
 expect 11 "$application" "$process"
 
 echo "- each once and in order, with the numbers of the ring"
-sleep 0.5  # what came twice would have come by now
+sleep 0.5  # a second one would have come by now
 is "$(jq -r .sequence "$cell/watch.json" | tr '\n' ' ')" "$(seq -s' ' 1 11) " || fail "numbers: $(jq -r .sequence "$cell/watch.json")"
 is "$(lines watch.text)" 11 || fail "lines: $(cat "$cell/watch.text")"
 is "$(jq -r '[.of, .from, .to] | join(" ")' "$cell/watch.json")" \

@@ -160,7 +160,7 @@ void Explorer::run_once() {
   }
 }
 
-// What can happen next. What leads on comes first: the thread that ran last before the others.
+// The possible next steps. The most promising come first: the thread that ran last before the others.
 void Explorer::collect() {
   using Kind = Action::Kind;
   actions_.clear();
@@ -376,7 +376,7 @@ Explorer::Sleep Explorer::sleep(std::uintptr_t word, bool has_deadline) {
   thread.state = State::asleep;
   thread.word = word;
   thread.has_deadline = has_deadline;
-  thread.next_at = kAnywhere;  // what it does when it is awake, it says then
+  thread.next_at = kAnywhere;  // it announces its next step when it is awake
   back_to_scheduler();
   return std::exchange(thread.timed_out, false) ? Sleep::timed_out : Sleep::woken;
 }

@@ -49,7 +49,7 @@ class Explorer final : public Scene, private Chooser {
   void observe(unsigned outcome) noexcept { observed_ |= std::uint64_t{1} << outcome; }
   void name(const void* object, std::size_t size, const char* name) override;
 
-  // What threads of the scene come to. All but in_thread() only there.
+  // The ends of the scene's threads. All but in_thread() only there.
   [[nodiscard]] bool in_thread() const noexcept { return running_ >= 0; }
   [[nodiscard]] unsigned self() const noexcept { return static_cast<unsigned>(running_); }
   /// Before each step: others may run first. The step is at `address` (0: at none, others do not depend on
@@ -61,7 +61,7 @@ class Explorer final : public Scene, private Chooser {
   void plain_read(std::uintptr_t address, std::size_t size);
   [[nodiscard]] Memory& memory() noexcept { return memory_; }
   [[nodiscard]] bool weak_fails();
-  /// What the step gave: the thread's further way depends on nothing else.
+  /// The result of the step: the thread's further way depends on nothing else.
   void done(const char* what, std::uintptr_t address, std::uint64_t argument, std::uint64_t result);
   enum class Sleep : std::uint8_t { woken, timed_out };
   [[nodiscard]] Sleep sleep(std::uintptr_t word, bool has_deadline);
@@ -158,8 +158,8 @@ class Explorer final : public Scene, private Chooser {
 /// The one that explores now; null: none does.
 Explorer*& explorer() noexcept;
 
-/// The memory of a scene, all zero at its beginning: what is made with new while `on` lies there, too, at the
-/// same address in each execution.
+/// The memory of a scene, all zero at its beginning. Objects that are made with new while `on` lie there,
+/// too, at the same address in each execution.
 class Arena {
  public:
   static void reset() noexcept;

@@ -1,6 +1,6 @@
-// Stands in the place of shm/base/futex.cpp: what Linux promises of a futex. The kernel looks at the word and
-// puts the thread to sleep in one step, under a lock that a wake takes, too; so what was written before a
-// wake is seen by a sleep that comes after it. Nothing more is ordered by a futex here than by that lock.
+// Stands in the place of shm/base/futex.cpp: Linux's promises of a futex. The kernel looks at the word and
+// puts the thread to sleep in one step, under a lock that a wake takes, too. So a sleep that comes after a
+// wake sees all that was written before it. Nothing more is ordered by a futex here than by that lock.
 
 #include "shm/base/futex.hpp"
 

@@ -22,7 +22,7 @@ void poke(std::uintptr_t address, std::size_t size, std::uint64_t value) noexcep
 void Memory::reset() {
   threads_ = {};
   for (std::size_t i = 0; i < kMaxThreads; ++i)
-    threads_[i].now.clock[i] = 1;  // what it does before its first step
+    threads_[i].now.clock[i] = 1;  // its actions before its first step
   ended_.reset();
   learnable_.reset();
   for (std::size_t i = 0; i < used_; ++i) locations_[i].order.clear();
@@ -96,8 +96,8 @@ std::vector<unsigned>& Memory::readable(unsigned thread, std::size_t at, Order o
   return candidates_;
 }
 
-// Ranks of stores that a store, or a read-modify-write that has read it, may follow at once. What it would
-// write is taken for half a rank above.
+// Ranks of stores that a store, or a read-modify-write that has read it, may follow at once. Its own write is
+// taken for half a rank above.
 std::vector<unsigned>& Memory::replaceable(unsigned thread, std::size_t at, Order order) {
   candidates_.clear();
   const std::vector<Store>& stores = locations_[at].order;

@@ -21,7 +21,7 @@ enum class Order : std::uint8_t { relaxed, consume, acquire, release, acq_rel, s
   return order == Order::release || order == Order::acq_rel || order == Order::seq_cst;
 }
 
-/// What a thread knows: for each location the oldest store that it may still read, as its rank in the
+/// A thread's knowledge: for each location the oldest store that it may still read, as its rank in the
 /// modification order, and how far it is synchronised with each thread.
 struct View {
   std::array<std::uint8_t, kMaxLocations> rank{};
@@ -35,15 +35,15 @@ struct View {
 
 struct ThreadView {
   View now;
-  View acquired;  ///< what an acquire fence would bring
-  View released;  ///< of the last release fence: what relaxed stores pass on
+  View acquired;  ///< the gain of an acquire fence
+  View released;  ///< of the last release fence: relaxed stores pass it on
   std::uint16_t step = 0;
 };
 
 /// One store to a location. The vector of a location is its modification order.
 struct Store {
   std::uint64_t value = 0;
-  View released;                  ///< what is learned by an acquire that reads it
+  View released;                  ///< the gain of an acquire that reads it
   bool replaced_at_once = false;  ///< a read-modify-write has read it: nothing comes between the two
 };
 
@@ -89,7 +89,7 @@ class Memory {
   [[nodiscard]] bool plain_read(unsigned thread, std::uintptr_t address, std::size_t size);
   [[nodiscard]] bool plain_write(unsigned thread, std::uintptr_t address, std::size_t size);
 
-  /// The kernel's lock of a futex: who takes it knows what the one before it knew.
+  /// The kernel's lock of a futex: a thread that takes it has the knowledge of the one before it.
   void pass_lock(unsigned thread, std::uintptr_t address);
 
   /// `thread` begins, and knows all that `other` has done.
@@ -101,7 +101,7 @@ class Memory {
   void learn(unsigned thread, unsigned other) { threads_[thread].now.join(threads_[other].now); }
   /// Time has passed: it sees the newest store of each location, and knows nothing more by that.
   void catch_up(unsigned thread) noexcept;
-  /// It does nothing more: what it could still read is of no interest.
+  /// It does nothing more: the stores that it could still read are of no interest.
   void end(unsigned thread, bool may_be_learned = false) noexcept {
     ended_.set(thread);
     learnable_.set(thread, may_be_learned);

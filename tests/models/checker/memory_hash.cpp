@@ -2,7 +2,7 @@
 
 namespace plchost::models {
 
-// The oldest store that any thread can still read. What lies before it can be forgotten.
+// The oldest store that any thread can still read. All stores before it can be forgotten.
 unsigned Memory::oldest_readable(std::size_t at) const {
   unsigned oldest = ~0U;
   for (std::size_t i = 0; i < kMaxThreads; ++i) {

@@ -8,8 +8,8 @@
 #include <string>
 #include <utility>
 
-/// What a model of a protocol is written with. A model is a function that sets up a Scene: objects, and
-/// threads that use them. The checker runs each execution of it that C++ allows.
+/// The vocabulary of a model of a protocol. A model is a function that sets up a Scene: objects, and threads
+/// that use them. The checker runs each execution of it that C++ allows.
 namespace plchost::models {
 
 using ThreadNumber = unsigned;
@@ -46,10 +46,10 @@ class Scene {
   virtual ThreadNumber thread(const char* name, std::function<void()> body, ThreadOptions options = {}) = 0;
   /// Runs when all threads have ended or were killed; sees all stores.
   virtual void at_end(std::function<void()> check) = 0;
-  /// What the kernel does when a thread was killed.
+  /// The kernel's work when a thread was killed.
   virtual void when_killed(std::function<void(ThreadNumber)> then) = 0;
   virtual void limits(const Limits& limits) = 0;
-  /// What observe() tells in all executions together must be this, bit by bit: nothing else, nothing less.
+  /// The values of observe() in all executions together must be this, bit by bit: nothing else, nothing less.
   virtual void outcomes(std::uint64_t expected) = 0;
   /// For the report of a fault.
   virtual void name(const void* object, std::size_t size, const char* name) = 0;

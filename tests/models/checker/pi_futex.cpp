@@ -57,7 +57,7 @@ void PiFutex::thread_was_killed(ThreadNumber thread) {
   if (waiting_ > 0) grant(true);
 }
 
-// An errno. Whoever waits makes a state of the kernel's, which says for whom; what the word says must fit it.
+// An errno. A waiter makes a state of the kernel's, which names the owner; the word must fit it.
 int PiFutex::lock(std::uintptr_t word) {
   Explorer& scene = *explorer();
   const ThreadNumber self = scene.self();
@@ -132,7 +132,7 @@ const ThreadIdentity& this_thread() noexcept {
   return threads[self];
 }
 
-// Who sees that a thread has ended knows all that it has done: the kernel has ended it.
+// A thread that sees the end of another one knows all that it has done: the kernel has ended it.
 std::optional<ThreadLook> look_at_thread(pid_t thread) noexcept {
   const models::Arena::Use off(false);
   models::Explorer& scene = *models::explorer();

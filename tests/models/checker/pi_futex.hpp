@@ -6,7 +6,7 @@
 
 namespace plchost::models {
 
-/// What Linux does for a priority-inheriting futex, and when a thread ends that holds one: as far as
+/// Linux's work for a priority-inheriting futex, and at the end of a thread that holds one: as far as
 /// RobustMutex asks for it. One futex in a scene; handed on in the order of arrival. A timeout passes when
 /// nothing else can run. The calls come by syscall() and clock_nanosleep(), which the linker leads here
 /// (--wrap).

@@ -62,7 +62,7 @@ Octets fragment(const FragmentOf& of) {
 
 class HandshakeAssemblyTest : public testing::Test {
  protected:
-  /// What DDS gets; empty: nothing.
+  /// The bytes that DDS gets; empty: none.
   Octets after_all(const std::vector<Octets>& submessages, std::uint8_t from = 1) {
     Octets datagram = rtps_header(from);
     for (const Octets& one : submessages) datagram.insert(datagram.end(), one.begin(), one.end());

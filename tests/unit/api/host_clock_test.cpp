@@ -16,7 +16,7 @@ class HostClockTest : public testing::Test {
   static constexpr TimePoint kStart{seconds(1000)};
   static constexpr std::int64_t kAhead = 77'000'000'123;
 
-  /// What the host's clock shows at a time of the client's.
+  /// The host's time at a time of the client's.
   static std::int64_t at_host(TimePoint here) { return here.time_since_epoch().count() + kAhead; }
   static plc_Presence written(TimePoint here, std::uint64_t epoch = 7) {
     plc_Presence presence{};

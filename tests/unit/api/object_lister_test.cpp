@@ -35,7 +35,7 @@ class ObjectListerTest : public testing::Test {
       events_.push_back(pool_.create_shared_event(fmt::format("line{}/e{:04}", i % 2, i)).value().object);
     }
   }
-  // A new lister: what was looked at a moment ago is not what is there now.
+  // A new lister: it has no objects of a moment ago.
   [[nodiscard]] std::vector<std::string> all(ObjectQuery query, std::size_t& pages,
                                              TimePoint until = kNoDeadline) {
     ObjectLister sut(pool_);

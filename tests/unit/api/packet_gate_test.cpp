@@ -58,7 +58,7 @@ bool passes(std::initializer_list<Bytes> parts, bool secured = true) {
   return admission == Admission::whole;
 }
 
-/// What Cyclone gets; empty: nothing.
+/// The bytes that Cyclone gets; empty: none.
 Bytes after_gate(std::initializer_list<Bytes> parts, bool secured) {
   Bytes datagram = datagram_of(parts);
   if (admit(std::as_writable_bytes(std::span(datagram)), secured) == Admission::refused) return {};
@@ -242,7 +242,7 @@ TEST(PacketGate, ChecksTheOctetsOfLiveliness) {
   EXPECT_FALSE(passes({of_another}, false)) << "in the name of another participant";
 }
 
-// Cyclone sends them though the host must not believe them. What stands beside must come through, and a gap
+// Cyclone sends them though the host must not believe them. The others beside it must come through, and a gap
 // keeps the client from repeating them.
 TEST(PacketGate, ReplacesPlainSamplesOfASecuredHostsClientsByGaps) {
   constexpr std::array<std::uint8_t, 4> kPublications{0x00, 0x00, 0x03, 0xc2};

@@ -100,7 +100,7 @@ class EachInstructionOfAPost : public testing::Test {
         [&](const auto& begin) {
           const ObjectPool pool = ObjectPool::attach(name_).value();
           EventIntake server{"hosta", pool, PostLedger::open(pool).value(), 7, guard_};
-          server.process(other_batch_);  // what a server does only once is not what is looked at
+          server.process(other_batch_);  // the work that a server does only once is not counted
           begin();
           call(server);
         },
@@ -133,7 +133,7 @@ class EachInstructionOfAPost : public testing::Test {
     ::waitpid(child, &status, 0);
     return !ended;
   }
-  /// What became of the posts of a source, seen by the server that is there now.
+  /// The fate of the posts of a source, seen by the present server.
   static EventIntake::Writer writer_of(const EventIntake& server, std::uint8_t source) {
     for (const EventIntake::Writer& writer : server.writers()) {
       if (writer.source.bytes[0] == source) return writer;

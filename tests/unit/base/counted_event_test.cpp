@@ -55,7 +55,7 @@ TEST(CountedEvent, AWaiterBesideAPostThatWokeNobodyIsRoused) {
     woken = true;
   });
   std::this_thread::sleep_for(milliseconds(20));
-  // What a poster does that is killed between its two steps.
+  // The first step of a poster that is killed between its two steps.
   reinterpret_cast<std::atomic<std::uint64_t>&>(sut).fetch_add(std::uint64_t{1} << 16);
   std::this_thread::sleep_for(milliseconds(20));
   EXPECT_FALSE(woken);

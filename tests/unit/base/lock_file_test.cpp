@@ -69,7 +69,7 @@ TEST_F(LockFileTest, SaysWhoHoldsItAndIsFreeWhenThatOneIsKilled) {
   ::close(ready[1]);
 }
 
-// What an application starts by fork() outlives its process, and does not keep the name taken.
+// A process that an application starts by fork() outlives it, and does not keep the name taken.
 TEST_F(LockFileTest, IsNotHeldByChildrenOfItsHolder) {
   pid_t child = 0;
   {

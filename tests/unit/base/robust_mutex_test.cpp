@@ -211,7 +211,7 @@ TEST_F(RobustMutexTest, LivingOwnerThatHasNotToldItsStartYetIsWaitedFor) {
   EXPECT_TRUE(shared_.mutex.unlock());
 }
 
-/// What has no descriptor left cannot read who it is.
+/// A process that has no descriptor left cannot read its own identity.
 void use_up_descriptors() {
   rlimit limit{};
   ::getrlimit(RLIMIT_NOFILE, &limit);

@@ -263,7 +263,7 @@ TEST_F(BlockRouterTest, NodesOfTwoHostsTalkThroughTheirGateways) {
     }
     EXPECT_EQ(a.received.from, b_from_afar);
     EXPECT_EQ(at_a.send({.host = 10, .node = 1}, {}), SendResult::unreachable);
-    // Who calls the own host by its number means a neighbour.
+    // An address with the own host's number means a neighbour.
     EXPECT_EQ(at_a.send({.host = 1, .node = a.address().node}, bytes_of("me")), SendResult::sent);
   }
   NodeDirectory::remove(second_pool.get());

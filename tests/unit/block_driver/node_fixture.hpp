@@ -33,7 +33,7 @@ struct TestNode {
   [[nodiscard]] BlockChannel channel(std::string_view name = "test") const {
     return BlockChannel::open(*node, name).value();
   }
-  /// What comes next on that channel; "nothing" if nothing does.
+  /// The next block on that channel; "nothing" if none comes.
   std::string next(BlockChannel& channel) {
     if (channel.receive(buffer, received) != TakeResult::taken) return "nothing";
     std::string text(received.size, '\0');

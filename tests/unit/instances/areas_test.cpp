@@ -1,4 +1,4 @@
-// What Areas puts around the cycles of tasks.
+// The copies that Areas puts around the cycles of tasks.
 #include "instances/runtime/memory/areas.hpp"
 
 #include <array>

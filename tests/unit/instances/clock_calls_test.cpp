@@ -1,4 +1,4 @@
-// What an application reports of a reference clock, and what it is told.
+// An application's reports of a reference clock, and the answers.
 #include <array>
 #include <cstring>
 

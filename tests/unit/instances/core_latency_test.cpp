@@ -166,7 +166,7 @@ TEST_F(CoreLatency, OfThisHostIsHeldAndThenAsBefore) {
   const std::string file = "/sys/devices/system/cpu/cpu0/power/pm_qos_resume_latency_us";
   const UniqueFd turns(::open(file.c_str(), O_RDWR | O_CLOEXEC));
   if (!turns) GTEST_SKIP() << file << " is not there, or not ours to write";
-  ASSERT_EQ(::flock(turns.get(), LOCK_EX), 0);  // whoever tests with the real file takes its turn
+  ASSERT_EQ(::flock(turns.get(), LOCK_EX), 0);  // tests with the real file take turns
   const std::string before = FakeSysfs::read(file);
   {
     const auto sut = CoreLatencyHold::take(std::string(kSysfs), files_.run_directory(), 0);

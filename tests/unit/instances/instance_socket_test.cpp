@@ -87,7 +87,7 @@ TEST_F(InstanceSocketTest, ConnectionThatFailsWhileItsRequestIsWorkedOnIsClosedA
     EXPECT_EQ(::recv(fd, packet.data(), packet.size(), 0), -1) << "got what was meant for another one";
   }
   for (const int fd : opened) ::close(fd);
-  // What was sent before it failed is there, then its end.
+  // The data sent before it failed is there, then its end.
   auto received = client.receive();
   while (received && *received) received = client.receive();
   ASSERT_FALSE(received);

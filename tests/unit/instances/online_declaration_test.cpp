@@ -1,4 +1,4 @@
-// What the plc_app_init of another version calls while the first one runs: collected, and nothing else.
+// The calls of another version's plc_app_init while the first one runs: collected, and nothing else.
 #include <array>
 #include <bit>
 #include <string>

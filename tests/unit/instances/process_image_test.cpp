@@ -92,7 +92,7 @@ TEST(ProcessImage, OfAWriterThatDiedInTheMiddleIsTheOneBefore) {
   Image image{};
   image.fill(7);
   plc_image_write(&sut, image.data());
-  // What a writer has done that was killed before it published.
+  // The work of a writer that was killed before it published.
   image.fill(8);
   plc_image_fill(&sut, 2, 2, image.data(), 0);
   plc_image_slot_at(&sut, 2)->sequence = 0;

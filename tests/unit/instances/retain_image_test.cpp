@@ -1,4 +1,4 @@
-// The files of retain variables: what is cut, changed or torn is never taken for values.
+// The files of retain variables: one that is cut, changed or torn is never taken for values.
 #include "instances/runtime/memory/retain_image.hpp"
 
 #include <csignal>
@@ -66,7 +66,7 @@ TEST(RetainImage, WithAnyBitTurnedIsNone) {
   EXPECT_TRUE(decode_retain(file));
 }
 
-// Whoever makes a file on purpose makes its checksum, too.
+// A forger of a file makes its checksum, too.
 TEST(RetainImage, WithARightChecksumAndWrongContentsIsNone) {
   const auto with = [](auto spoil) {
     RetainImage bad = image(1);
@@ -158,8 +158,8 @@ TEST_F(RetainFolder, WithBothSpoiledGivesNone) {
   EXPECT_THAT(found.problems, SizeIs(2));
 }
 
-// What the power may leave of a write: nothing of it, any part of the new file under its first name, all of
-// it there, or the new name.
+// The states that a power cut may leave of a write: nothing of it, any part of the new file under its first
+// name, all of it there, or the new name.
 TEST_F(RetainFolder, LeftInTheMiddleOfAWriteGivesOneOfTheLastTwo) {
   RetainFiles sut = open();
   ASSERT_TRUE(sut.write(image(1)));

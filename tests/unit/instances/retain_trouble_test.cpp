@@ -1,4 +1,4 @@
-// What becomes of retain variables whose memory was cut, or whose folder takes nothing.
+// The fate of retain variables whose memory was cut, or whose folder takes nothing.
 #include <algorithm>
 #include <chrono>
 #include <cstring>
@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-/// What is saved when the memory or the folder is not as it should be.
+/// The saved values when the memory or the folder is not as it should be.
 class RetainInTrouble : public Retain {
  protected:
   RetainInTrouble() { MemoryGuard::watch_process(); }
@@ -137,8 +137,8 @@ TEST_F(RetainInTrouble, AFolderThatTakesNothingStopsNoMachineAndIsSavedToWhenItC
   EXPECT_EQ(value(0), 42U);
 }
 
-// A disk that is mounted late: what is on it was not loaded, so it is not overwritten, nor taken for newer
-// than what is written from then on.
+// A disk that is mounted late: the file on it was not loaded. So it is not overwritten, nor taken for newer
+// than those that are written from then on.
 TEST_F(RetainInTrouble, AFolderThatComesLateWithFilesKeepsThemAside) {
   save_42();
   set(0, 43);

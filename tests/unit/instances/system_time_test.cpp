@@ -55,7 +55,7 @@ RTS_RESULT ms_as_us(RTS_SYSTIME* time) {
   return ERR_OK;
 }
 
-// What it is for a caller to lose the processor behind its first reading, and before each tenth.
+// A caller that loses the processor behind its first reading, and before each tenth.
 constexpr auto kLost = std::chrono::milliseconds(30);
 int late_calls = 0;
 RTS_RESULT late(PF_SYSTIME clock, RTS_SYSTIME* time) {

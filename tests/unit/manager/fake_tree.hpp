@@ -44,7 +44,7 @@ class FakeTree {
     remove(path);
     make_folder(path);
   }
-  /// What the check of that name finds.
+  /// The findings of the check of that name.
   [[nodiscard]] HostFinding look(std::string_view id) const {
     for (const HostCheck& check : host_checks()) {
       if (check.id == id) return check.look(host);

@@ -10,7 +10,7 @@
 
 namespace plchost {
 
-/// What one instance is to be, in the hands of a test: it outlives the instance, as a manager's memory does.
+/// The wish of one instance, in the hands of a test: it outlives the instance, as a manager's memory does.
 class FakeWishes : public WishKeeper {
  public:
   [[nodiscard]] Result<std::optional<InstanceWish>> find() override {

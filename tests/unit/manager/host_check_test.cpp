@@ -55,7 +55,7 @@ TEST(HostCheck, LooksAtThisHost) {
   expect_complete(check_host(host));
 }
 
-/// What is for an instance ends here.
+/// Settings for an instance end here.
 class Instances : public ControlHandler {
  public:
   void handle(const ControlRequest& request, ControlReplyFunction reply) override {

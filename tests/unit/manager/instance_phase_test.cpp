@@ -1,4 +1,4 @@
-// What leads from one phase of an instance to another, against the table in the header.
+// The ways from one phase of an instance to another, against the table in the header.
 #include "manager/supervisor/instance_phase.hpp"
 
 #include <array>

@@ -1,4 +1,4 @@
-// What becomes of an instance when the configuration is read again.
+// The fate of an instance when the configuration is read again.
 
 #include <string>
 

@@ -1,4 +1,4 @@
-// A process whose control thread beats no more: what is shown, and what each command does.
+// A process whose control thread beats no more: its state, and the effect of each command.
 #include <algorithm>
 #include <csignal>
 #include <utility>

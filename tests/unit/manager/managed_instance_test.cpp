@@ -273,7 +273,7 @@ TEST_F(ManagedInstanceTest, HasNothingToAdoptIfNobodyAnswers) {
   EXPECT_FALSE(sut().adopt());
 }
 
-// --- what the process says of itself, and the end
+// --- the process's report of itself, and the end
 
 TEST_F(ManagedInstanceTest, SeesThatTheApplicationStoppedByItself) {
   bring_up();

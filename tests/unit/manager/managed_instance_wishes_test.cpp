@@ -1,4 +1,4 @@
-// What an instance is to be, over the end of its manager and over a power cut.
+// The wish of an instance, over the end of its manager and over a power cut.
 
 #include <csignal>
 

@@ -87,7 +87,7 @@ TEST(ChildProcess, SaysInWordsHowItEnded) {
 }
 
 TEST(ChildProcess, StartsWithNothingBlockedAndNoOtherDescriptor) {
-  // What the manager blocks or ignores, and what it has open, must not reach a PLC.
+  // Signals that the manager blocks or ignores, and its open files, must not reach a PLC.
   sigset_t set;
   sigset_t before;
   sigfillset(&set);

@@ -1,4 +1,4 @@
-// What follows from each end of an instance, under each policy, after each history: as one table.
+// The decision after each end of an instance, under each policy, after each history: as one table.
 #include "manager/supervisor/restart_decision.hpp"
 
 #include <array>

@@ -1,4 +1,4 @@
-// What an instance is to be, in memory that another program writes over, or whose writer is killed.
+// The wish of an instance, in memory that another program writes over, or whose writer is killed.
 
 #include <algorithm>
 #include <cstddef>
@@ -39,7 +39,7 @@ TEST_F(WishStoreTest, LeavesAWholeOneWhenItIsKilledInAWrite) {
   wish.restarts = 8;
   sut_->keep(wish);
   const std::vector<std::byte> after = memory.copy();
-  // What a kill leaves: a part of the place that is written first, then that place whole.
+  // The state after a kill: a part of the place that is written first, then that place whole.
   for (const std::size_t first : {0U, 1U}) {
     const std::span place = memory.place(first);
     const auto begin = place.data() - memory.bytes().data();

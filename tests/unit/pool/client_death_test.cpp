@@ -208,7 +208,7 @@ TEST_F(ClientDeath, SlotsOfManyDeadClientsAreUsedAgain) {
   EXPECT_TRUE(pool_.create_semaphore("s", 1)->made);
 }
 
-/// What a client does that is killed in the midst of it: all kinds of calls, in a random order.
+/// The calls of a client that is killed in the midst of one: all kinds of calls, in a random order.
 [[noreturn]] void storm(const std::string& name, unsigned seed) {
   auto pool = std::move(ObjectPool::attach(name).value());
   const auto shared = [&](const char* kind) { return kind + std::to_string(seed++ * 7 % 5); };
@@ -280,7 +280,7 @@ TEST_F(ClientDeath, AtAnyInstructionLeavesAPoolThatTheNextCallRepairs) {
   EXPECT_GT(view.header().departed.load(), kRounds);
 }
 
-/// What a process of another PID namespace finds that tries to use the pool: 0 is what it should.
+/// The result of a process of another PID namespace that tries to use the pool: 0 is right.
 int try_from_another_namespace(const std::string& name) {
   const auto is_told = [](const auto& pool) {
     return !pool && pool.error().code == ErrorCode::refused &&

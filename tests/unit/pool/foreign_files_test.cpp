@@ -1,4 +1,4 @@
-// What other users put under a host's names in /dev/shm is neither used nor in the way.
+// Files of other users under a host's names in /dev/shm are neither used nor in the way.
 #include "shm/pages/foreign_files.hpp"
 
 #include <filesystem>

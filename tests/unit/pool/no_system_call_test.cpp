@@ -35,7 +35,7 @@ bool forbid_system_calls() {
 int signal_of(const std::function<void()>& work) {
   const pid_t child = ::fork();
   if (child == 0) {
-    work();  // what a thread does only once
+    work();  // the work that a thread does only once
     if (!forbid_system_calls()) ::_exit(1);
     for (int i = 0; i < 1000; ++i) work();
     ::_exit(0);

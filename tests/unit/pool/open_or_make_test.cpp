@@ -14,7 +14,7 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-/// What open() and make() answer, one after the other; the last answer stays.
+/// The answers of open() and make(), one after the other; the last answer stays.
 class OpenOrMake : public testing::Test {
  protected:
   Result<int> call(std::vector<Result<int>> opened, std::vector<Result<int>> made, Replaces replaces) {

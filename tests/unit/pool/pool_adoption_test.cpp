@@ -232,7 +232,7 @@ class MemoriesOfOtherUsers : public testing::Test {
     pool_.emplace(
         std::move(ObjectPool::create(name_.get(), {.rights = {.group = kGroup, .mode = 0660}}).value()));
   }
-  /// What `body` says in a process of that user, which then dies without closing anything; "" is good.
+  /// The answer of `body` in a process of that user, which then ends without closing anything; "" is good.
   static std::string as_user(uid_t user, gid_t group, const std::function<std::string()>& body) {
     std::array<int, 2> pipe{};
     EXPECT_EQ(::pipe(pipe.data()), 0);

@@ -11,7 +11,7 @@
 
 namespace plchost {
 
-/// What is wrong with the lists of a pool that nobody uses at present; empty: nothing.
+/// The fault in the lists of a pool that nobody uses at present; empty: none.
 inline std::string damage_of(const PoolView& view) {
   const PoolHeader& header = view.header();
   if (header.noted != 0 || header.unsettled != 0 || header.rebuilding != 0 || (header.changes & 1) != 0) {

@@ -61,7 +61,7 @@ class EachInstruction : public testing::Test {
         if (!others.contains(address)) (void)!::write(told[1], &address, sizeof address);
       }
       before(pool);
-      call(pool);  // what a process does only once is not what is looked at
+      call(pool);  // the work that a process does only once is not counted
       ::ptrace(PTRACE_TRACEME, 0, nullptr, nullptr);
       ::raise(SIGSTOP);
       call(pool);

@@ -104,7 +104,7 @@ TEST_F(Transitions, WaitForAWriterAndGoOnWithoutOneThatDied) {
   ring.add(TransitionSource::process, 0, 1, 0, "");
   const MemoryFile memory = std::move(
       MemoryFile::open(transition_ring_name(pool(), "line1"), 1, MemoryFile::Access::read_write).value());
-  // What a writer leaves that is killed between its number and its slot.
+  // The state that a writer leaves when it is killed between its number and its slot.
   reinterpret_cast<TransitionRingLayout*>(memory.bytes().data())->last.fetch_add(1);
   ring.add(TransitionSource::process, 1, 2, 0, "");
   EXPECT_THAT(numbers(sut), testing::ElementsAre(1));

@@ -9,7 +9,7 @@
 
 namespace plchost {
 
-/// A name for shared memory that no other test uses; what was made under it is removed at the end.
+/// A name for shared memory that no other test uses; memories under it are removed at the end.
 class UniquePoolName {
  public:
   UniquePoolName() = default;

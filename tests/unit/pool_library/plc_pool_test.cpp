@@ -306,7 +306,7 @@ TEST_F(PlcPool, ListsWhatThereIs) {
 }
 
 TEST_F(PlcPool, FirmwareInCAndCppShareATray) {
-  // Who comes first makes the objects; gone with both.
+  // The first one makes the objects; they go with both.
   std::thread feeder([&] { EXPECT_EQ(run({PROGRAMS "/feeder", name_, "500"}).text, "fed 500 parts\n"); });
   EXPECT_EQ(run({PROGRAMS "/gripper", name_, "500"}).text, "took 500 parts of 500\n");
   feeder.join();

@@ -202,7 +202,7 @@ TEST_F(Regulator, StepOntoALineOfAnotherDriftIsFollowed) {
   }
 }
 
-/// What a broken reference shows at a local time, at this distance of its pairs.
+/// The time of a broken reference at a local time, at this distance of its pairs.
 struct Broken {
   const char* name;
   std::int64_t (*shows)(Duration since, std::mt19937_64& random);

@@ -17,7 +17,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// What a test says that the threads have used.
+/// A test's claim of the threads' processor time.
 class FakeTimes final : public ProcessorTimes {
  public:
   [[nodiscard]] Duration of_process() const noexcept override { return process; }

@@ -20,7 +20,7 @@ namespace {
 using std::chrono::milliseconds;
 using ::testing::HasSubstr;
 
-/// What a test says of its threads. Those with a real-time priority are in `threads`.
+/// A test's claims of its threads. Those with a real-time priority are in `threads`.
 class FakeThreads final : public ProcessorTimes {
  public:
   [[nodiscard]] Duration of_process() const noexcept override { return process; }

@@ -13,7 +13,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// What a test says that the one thread that there is has used.
+/// A test's claim of the processor time of its only thread.
 class FakeUse final : public ProcessorTimes {
  public:
   [[nodiscard]] Duration of_process() const noexcept override { return used; }
@@ -25,8 +25,8 @@ class FakeUse final : public ProcessorTimes {
   bool asleep = false;
 };
 
-// What a watchdog strikes with is blocked in this thread, as an application's code could block it: so nothing
-// but the record tells of the strike, and the test goes on.
+// The watchdog's signal is blocked in this thread, as an application's code could block it. So nothing but
+// the record tells of the strike, and the test goes on.
 class SupervisionTest : public testing::Test {
  protected:
   SupervisionTest() {

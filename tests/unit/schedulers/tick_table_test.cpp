@@ -134,7 +134,7 @@ TEST_F(TickTableTest, TaskThatComesBackAfterItsTickRunsAtOnce) {
   EXPECT_EQ(task.ran[0].release, origin);
 }
 
-// What is due at a tick, said as plainly as can be: all tasks are looked at.
+// The tasks due at a tick, found in the plainest way: all tasks are looked at.
 TEST_F(TickTableTest, ReleasesWhatANaiveTableOfRandomTasksReleases) {
   constexpr int kTasks = 60;
   std::mt19937 random(7);

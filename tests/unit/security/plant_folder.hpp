@@ -29,7 +29,7 @@ class PlantFolder : public testing::Test {
   [[nodiscard]] std::string file(const std::string& name, std::string_view file) const {
     return file_in(folder(name), file);
   }
-  /// What is wrong with the identity in that folder; empty: nothing.
+  /// The fault of the identity in that folder; empty: none.
   [[nodiscard]] std::string fault(const std::string& name) const {
     const auto checked = check_identity(folder(name));
     return checked ? "" : checked.error().describe();

@@ -1,5 +1,6 @@
 // Areas of each kind. Two tasks of different priority write one output area, each word of its half with the
-// number of its cycle; both look whether inputs and the other's outputs are whole, and count what is kept.
+// number of its cycle. Both look whether inputs and the other's outputs are whole, and count in the retain
+// area.
 #include <algorithm>
 #include <array>
 #include <cstdint>

@@ -22,7 +22,7 @@ RTS_RESULT CDECL HookFunction(unsigned int ulHook, unsigned long ulParam1, unsig
   return ERR_OK;
 }
 
-/* 1,000,000 s ahead of CLOCK_MONOTONIC: what an application sees can only come from here. */
+/* 1,000,000 s ahead of CLOCK_MONOTONIC: such a time in an application can only come from here. */
 static RTS_SYSTIME now(void) {
   struct timespec value;
   clock_gettime(CLOCK_MONOTONIC, &value);

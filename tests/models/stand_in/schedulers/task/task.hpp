@@ -10,7 +10,7 @@
 
 namespace plchost {
 
-/// In the place of the real task, for the model of the tick table: what the table asks a task for. Its
+/// In the place of the real task, for the model of the tick table: the functions that the table calls. Its
 /// releases lie an interval apart; one follows when ran() says that the one before has run.
 class Task {
  public:
