@@ -5,7 +5,7 @@ include(GNUInstallDirs)
 
 install(TARGETS plchostd plchost-dds plc-instance plcctl RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT plchost)
 
-# What the build made with the programs.
+# The results of the build beside the programs.
 install(DIRECTORY ${CMAKE_BINARY_DIR}/share/man/ DESTINATION ${CMAKE_INSTALL_MANDIR} COMPONENT plchost)
 install(DIRECTORY ${CMAKE_BINARY_DIR}/share/bash-completion ${CMAKE_BINARY_DIR}/share/zsh ${CMAKE_BINARY_DIR}/share/fish
   DESTINATION ${CMAKE_INSTALL_DATADIR} COMPONENT plchost)

@@ -59,7 +59,7 @@ function(plchost_program name)
   target_link_libraries(${name} PRIVATE ${arg_LINKS})
   plchost_options(${name})
   if(arg_HEADERS)
-    # What uses precompiled headers must be compiled as they were: for a library.
+    # A target that uses precompiled headers must be compiled as they were: for a library.
     set_target_properties(${name} PROPERTIES POSITION_INDEPENDENT_CODE OFF)
     target_compile_options(${name} PRIVATE -fPIC)
     target_precompile_headers(${name} REUSE_FROM ${arg_HEADERS})

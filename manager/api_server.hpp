@@ -79,18 +79,18 @@ inline constexpr Duration kApiRestartDelay = std::chrono::milliseconds(100);
 inline constexpr Duration kApiRestartDelayMax = std::chrono::seconds(5);
 /// A changed configuration waits so long at most for the answers of commands.
 inline constexpr Duration kRenewLimit = std::chrono::seconds(45);
-/// Whose loop stands still for so long is killed. It beats every 25 ms.
+/// The manager kills an API server whose loop stands still for so long. It beats every 25 ms.
 inline constexpr Duration kApiSilence = std::chrono::seconds(10);
 /// So long may its start take: it may have to wait for the end of the one before, and for its name.
 inline constexpr Duration kApiStart = std::chrono::seconds(30);
 /// Of those that were refused the name: doubles from the first to the second.
 inline constexpr Duration kNameDelay = std::chrono::seconds(5);
 inline constexpr Duration kNameDelayMax = std::chrono::seconds(60);
-/// Who lived that long has the name of the host: it has asked for it for less than that.
+/// An API server that ran for so long has the name of the host: it has asked for it for less than that.
 inline constexpr Duration kNameAsked = std::chrono::seconds(3);
-/// Who lived that long has recovered: its next restart is at once.
+/// An API server that ran for so long has recovered: its next restart has no delay.
 inline constexpr Duration kApiSettled = std::chrono::seconds(1);
-/// And who has served at all, after so long at most: what ends each one again and again (packets) shall not
+/// The longest delay after one that has served at all: packets that end each one again and again shall not
 /// keep the host away for longer than that.
 inline constexpr Duration kApiServedDelay = std::chrono::milliseconds(50);
 

@@ -151,7 +151,7 @@ int plchostd_main(int argc, const char* const* argv) {
 }  // namespace plchost
 
 int main(int argc, char** argv) {
-  // Who reads the log may go away: no reason to leave the instances alone.
+  // A reader of the log may end: no reason to leave the instances alone.
   (void)std::signal(SIGPIPE, SIG_IGN);
   plchost::MemoryGuard::watch_process();
   return plchost::plchostd_main(argc, argv);

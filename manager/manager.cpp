@@ -233,7 +233,7 @@ void Manager::wrong_step(const InstanceStatus& status, std::string_view what) {
                 what);
 }
 
-// The instance first: whoever reads the number finds it.
+// The instance first: a reader of the number finds it.
 void Manager::changed(std::size_t place, const InstanceStatus& status) {
   const auto index = static_cast<std::uint32_t>(place);
   page_->write_instance(index, status);
@@ -284,7 +284,7 @@ void Manager::look_after_pool() {
       config_.host.pool, MemoryFile::kDirectory);
 }
 
-// What instances held that are gone, now or before this manager.
+// The possessions of instances that are gone, now or before this manager.
 void Manager::restore_latency() {
   const auto restored = restore_core_latency(std::string(kSysfs), config_.host.run_directory);
   latency_due_ = !restored && restored.error().code == ErrorCode::busy;
@@ -318,7 +318,7 @@ void Manager::clean_up() {
     return std::ranges::find(config_.instances, instance.name, &InstanceConfig::name) ==
            config_.instances.end();
   });
-  // Whatever is named after an instance of ours: its socket, what it kept for its next process. Its
+  // Each file that is named after an instance of ours: its socket, and the state for its next process. Its
   // exceptions outlive the manager: that they are still known tomorrow is what they are kept for.
   std::error_code error;
   for (std::filesystem::directory_iterator at(config_.host.run_directory, error), end; !error && at != end;

@@ -87,7 +87,7 @@ class Manager : private InstanceObserver {
   std::map<std::string, TransitionRing, std::less<>> transitions_;  // by instance
   WishWriter wish_writer_;
   std::map<std::string, WishStore*> wishes_;  // by instance; the supervisor's
-  std::vector<InstanceConfig> gone_;          // removed and ended; what they kept is still to be saved
+  std::vector<InstanceConfig> gone_;          // removed and ended; retain variables not yet saved
   std::unique_ptr<Supervisor> supervisor_;
   std::unique_ptr<HostCheckHandler> host_check_;
   std::unique_ptr<ConfigReload> reload_;

@@ -9,19 +9,20 @@
 namespace plchost {
 
 /// Refuses a pool that is there already and belongs to a user who is neither this one, nor root, nor the
-/// configured owner: whoever makes a file in /dev/shm first could own all that instances share.
+/// configured owner. Otherwise the user that makes a file in /dev/shm first could own all that instances
+/// share.
 [[nodiscard]] Result<void> check_pool_owner(const std::string& pool, const MemoryRights& rights);
 
-/// Who may use the pool, as [host] pool_owner, pool_group and pool_mode say.
+/// Sets the rights to the pool, as [host] pool_owner, pool_group and pool_mode say.
 [[nodiscard]] Result<MemoryRights> pool_rights(const HostConfig& host);
 
 /// Takes away what other users have put under the names of this pool, and logs whose it was, or why it
 /// cannot.
 void clear_names(const std::string& pool, const MemoryRights& rights);
 
-/// Gives a pool that is there the rights that the configuration says, and logs that. What is in it already
-/// keeps its rights; a process that has it mapped keeps it. refused, system: the pool keeps the rights it
-/// has.
+/// Gives a pool that is there the rights that the configuration says, and logs that. Objects that are in it
+/// already keep their rights; a process that has it mapped keeps it. refused, system: the pool keeps the
+/// rights it has.
 [[nodiscard]] Result<void> renew_pool_rights(const std::string& pool, const MemoryRights& rights);
 
 }  // namespace plchost

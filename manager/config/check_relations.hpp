@@ -17,8 +17,8 @@ struct InstanceLines {
 };
 using ConfigLines = std::vector<InstanceLines>;
 
-/// What only shows when all instances are known: names twice, cores not allowed or shared without saying so,
-/// `after` naming nobody or going in a circle.
+/// Faults that only show when all instances are known: names twice, cores not allowed or shared without
+/// saying so, `after` naming nobody or going in a circle.
 void check_relations(const ManagerConfig& config, const ConfigLines& lines, const std::vector<int>& online,
                      std::vector<ConfigProblem>& problems);
 

@@ -24,7 +24,7 @@ struct ConfigKey {
   std::string_view section;  ///< "[host]"
   std::string_view name;
   TakesEffect when = TakesEffect::at_once;
-  std::string_view why = {};  ///< what keeps it from an earlier effect; empty: nothing to add
+  std::string_view why = {};  ///< the reason against an earlier effect; empty: nothing to add
 };
 
 /// All keys, in the order of the file.

@@ -11,14 +11,14 @@
 
 namespace plchost {
 
-/// What a configuration is checked against: this host, or what a test says.
+/// The surroundings that a configuration is checked against: this host, or those of a test.
 struct ConfigSurroundings {
   std::string host_name;            ///< the default of [host] name
   std::vector<int> online_cores;    ///< of the system
   std::vector<int> isolated_cores;  ///< by the kernel; may be empty
   std::vector<std::string_view> schedulers;
   bool check_files = true;  ///< that settings and applications are there and readable
-  /// For --check-config only: what a start finds out later, when it concerns one instance or may still
+  /// For --check-config only: faults that a start finds later, because they concern one instance or may still
   /// change.
   bool check_directories = false;            ///< that they are there or can be made
   std::vector<std::string> interfaces = {};  ///< of the system; empty: not checked

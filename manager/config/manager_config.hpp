@@ -13,19 +13,19 @@
 
 namespace plchost {
 
-/// [host]: what concerns the controller as a whole.
+/// [host]: the controller as a whole.
 struct HostConfig {
   std::string name;                 ///< default: the system's host name
   std::vector<std::string> labels;  ///< by which clients choose hosts
   int dds_domain = 0;
   std::string run_directory = "/run/plchost";
-  std::string state_directory = "/var/lib/plchost";  ///< what instances keep over a power cut
+  std::string state_directory = "/var/lib/plchost";  ///< of the data that outlive a power cut
   std::uint32_t application_limit_mib = 64;          ///< of a file that is sent
   std::uint32_t application_versions = 5;            ///< of those that are kept, for each instance
   std::string pool = "plchost";
   std::uint32_t pool_objects = 4096;
-  std::string pool_owner;   ///< user's name or number; empty: who starts the manager
-  std::string pool_group;   ///< group's name or number; empty: that of who starts the manager
+  std::string pool_owner;   ///< user's name or number; empty: the user that starts the manager
+  std::string pool_group;   ///< group's name or number; empty: that of the user that starts the manager
   mode_t pool_mode = 0660;  ///< permission bits of the pool and, where nothing else is said, of its memories
   std::vector<int> cores;   ///< where instances may run
   std::vector<int> housekeeping_cores;  ///< where the manager and the API server run
@@ -77,7 +77,7 @@ struct ManagerConfig {
 };
 
 /// Bounds of what a file may say.
-inline constexpr std::size_t kMaxLabels = 4;  // what an entry of a sample holds
+inline constexpr std::size_t kMaxLabels = 4;  // the room in an entry of a sample
 inline constexpr std::size_t kMaxLabel = 30;
 inline constexpr std::size_t kMaxConfigBytes = std::size_t{1} << 20;
 inline constexpr int kMaxDdsDomain = 230;  // its UDP ports must stay below 65536

@@ -13,7 +13,8 @@
 
 namespace plchost {
 
-/// Bounds of the control socket. Who goes beyond one is answered or disconnected; nobody else notices.
+/// Bounds of the control socket. A client that goes beyond one is answered or disconnected; other clients do
+/// not notice.
 inline constexpr std::size_t kMaxConnections = 16;
 inline constexpr std::size_t kMaxPendingRequests = 64;  ///< of one connection; more: busy
 inline constexpr std::size_t kMaxUnreadReplies = 256;  ///< of one connection that does not read; more: closed

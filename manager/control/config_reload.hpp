@@ -14,7 +14,7 @@ namespace plchost {
 
 /// So long the check of a configuration may take: it tries all applications.
 inline constexpr Duration kReloadLimit = std::chrono::seconds(60);
-/// The most bytes of an answer; what an answer of the API holds.
+/// The most bytes of an answer; the room in an answer of the API.
 inline constexpr std::size_t kMaxReloadText = 511;
 
 /// Lines as one text of at most `most` bytes. If it would be longer, its last line counts those that are left

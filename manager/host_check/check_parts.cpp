@@ -84,7 +84,7 @@ std::string boot_value(std::string_view command_line, std::string_view key) {
   std::string value;
   std::istringstream words{std::string(command_line)};
   for (std::string word; words >> word;) {
-    if (word == "--") break;  // what follows is for init
+    if (word == "--") break;  // the arguments behind it are for init
     if (word.size() > key.size() && word.starts_with(key) && word[key.size()] == '=') {
       value = word.substr(key.size() + 1);
     }

@@ -8,8 +8,8 @@
 
 #include "manager/host_check/host_check.hpp"
 
-/// The checks, by what they look at. Each is a pure function of the host; what it cannot know it says as a
-/// note, with the file and the reason.
+/// The checks, by what they look at. Each is a pure function of the host; a fact that it cannot read becomes
+/// a note, with the file and the reason.
 namespace plchost::host_check {
 
 // checks_rights.cpp
@@ -47,7 +47,7 @@ HostFinding numa_balancing(const CheckedHost& host);
 // checks_machine.cpp
 HostFinding machine(const CheckedHost& host);
 
-// What they have in common: check_parts.cpp
+// Their common parts: check_parts.cpp
 
 /// A finding of that level, before its check has filled in more.
 [[nodiscard]] HostFinding finding(FindingLevel level, std::string subject, std::string found,

@@ -45,8 +45,8 @@ constexpr std::array kChecks = {
 };
 static_assert(kChecks.size() <= kMaxFindings);
 
-// The calling thread is SCHED_FIFO for a moment, and then as before. What the instances get is the same: they
-// are in the same control group and have the same rights.
+// The calling thread is SCHED_FIFO for a moment, and then as before. The instances get the same: they are in
+// the same control group and have the same rights.
 int try_fifo() {
   const int policy = ::sched_getscheduler(0);
   sched_param before{};

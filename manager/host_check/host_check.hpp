@@ -12,7 +12,7 @@
 
 namespace plchost {
 
-/// What the checks look at.
+/// The facts that the checks look at.
 struct CheckedHost {
   struct Instance {
     std::string name;

@@ -11,15 +11,15 @@
 
 namespace plchost {
 
-/// The applications that were sent to one instance and are kept for it. Nothing in it waits; what takes time
-/// is told by `done`, never from inside the call. One thing at a time.
+/// The applications that were sent to one instance and are kept for it. Nothing in it waits; the end of a
+/// longer action is told by `done`, never from inside the call. One thing at a time.
 class ApplicationKeeper {
  public:
   using Done = std::function<void(const Result<std::string>& path)>;
 
   virtual ~ApplicationKeeper() = default;
-  /// Checks what was sent as `launch` would start it, keeps it and gives its path. `before`: what is loaded
-  /// now.
+  /// Checks what was sent as `launch` would start it, keeps it and gives its path. `before`: the application
+  /// that is loaded now.
   [[nodiscard]] virtual Result<void> keep(const ApplicationOrder& order, const std::string& name,
                                           const std::string& before, const LaunchOptions& launch,
                                           Done done) = 0;

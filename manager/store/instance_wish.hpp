@@ -11,8 +11,8 @@
 
 namespace plchost {
 
-/// What an instance is to be, and what led to it: state of the host that outlives the manager and a power
-/// cut.
+/// The state that an instance is to have, and its history: state of the host that outlives the manager and a
+/// power cut.
 struct InstanceWish {
   /// Of the process that the instance had when this was written.
   enum class Process : std::uint8_t {
@@ -30,7 +30,7 @@ struct InstanceWish {
   std::string last_end;    ///< how the last process ended by itself; empty: it did not
   std::string application;
   std::string scheduler;  ///< empty: as its settings say
-  /// What the configuration said when this was written: a value that is another one now takes effect.
+  /// The configuration when this was written: a value that is another one now takes effect.
   std::string configured_application;
   std::string configured_scheduler;
   std::string configured_process;  ///< core, priority band and settings file
@@ -47,7 +47,7 @@ struct InstanceWish {
   std::uint32_t number = 0;
 
   bool operator==(const InstanceWish&) const = default;
-  /// What of it a power cut leaves: no process.
+  /// The part of it that a power cut leaves: no process.
   [[nodiscard]] InstanceWish after_power_cut() const;
 };
 

@@ -46,7 +46,7 @@ Result<void> make_folder(const std::string& folder) {
   return {};
 }
 
-// What a helper before this one has not brought to its end.
+// The left-overs of a helper that did not come to its end.
 void remove_unfinished(const std::string& folder, const std::set<std::string>& used) {
   const ApplicationVersions versions = read_versions(folder);
   std::vector<std::filesystem::path> unfinished;
@@ -121,7 +121,7 @@ Result<void> put_in_place(const StoreOrder& order, const std::string& path) {
   return done;
 }
 
-// The trial knows the file by the name of its copy; who sent it does not.
+// The trial knows the file by the name of its copy, which its sender does not know.
 std::string in_senders_words(std::string text, const std::string& path, const std::string& name) {
   for (std::size_t at = text.find(path); at != std::string::npos; at = text.find(path, at + name.size())) {
     text.replace(at, path.size(), name);
@@ -159,7 +159,7 @@ Result<void> describe_version(const StoreOrder& order, const std::string& path) 
   return sync_directory(order.folder);
 }
 
-// The description first: what has none is no version, and is removed by the next helper.
+// The description first: a file without one is no version, and is removed by the next helper.
 void remove_oldest(const StoreOrder& order, const std::set<std::string>& used) {
   const ApplicationVersions versions = read_versions(order.folder);
   std::size_t count = versions.kept.size();

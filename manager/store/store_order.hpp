@@ -9,7 +9,7 @@
 
 namespace plchost {
 
-/// What the manager has its helper do to the kept applications of one instance: the helper may wait for a
+/// The manager's order to its helper about the kept applications of one instance. The helper may wait for a
 /// disk and read foreign files, the manager must not. One of two things: keep a file that was sent, or, if
 /// `boot` is not empty, make that path the boot application.
 struct StoreOrder {
@@ -17,7 +17,7 @@ struct StoreOrder {
   std::string boot;    ///< absolute path
   std::string
       configured;      ///< that of the configuration: as `boot` it takes back what was the boot application
-  std::string source;  ///< what was sent; the sender may still write to it
+  std::string source;  ///< the file that was sent; the sender may still write to it
   std::uint64_t size = 0;  ///< that it must have
   std::string digest;      ///< and its SHA-256
   std::string name;        ///< how it is called

@@ -17,7 +17,7 @@ Result<void> StoreProcess::keep(const ApplicationOrder& order, const std::string
                                 const std::string& before, const LaunchOptions& launch, Done done) {
   StoreOrder store;
   store.folder = settings_.folder;
-  // A number and no path: what the API server names is a shared memory of ours, whatever it says.
+  // A number and no path: so the API server can only name a shared memory of ours.
   store.source = download_file_name(settings_.pool, order.source);
   store.size = order.size;
   store.digest = order.digest;

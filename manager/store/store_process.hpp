@@ -17,7 +17,7 @@ namespace plchost {
 class StoreProcess : public ApplicationKeeper {
  public:
   struct Settings {
-    std::string pool;                     ///< whose shared memory holds what was sent
+    std::string pool;                     ///< the pool whose shared memory holds the sent file
     std::string folder;                   ///< of the versions of the instance
     std::function<std::uint32_t()> keep;  ///< so many versions
     std::string helper;                   ///< program: plchostd

@@ -17,8 +17,9 @@ class WishKeeper {
   using Kept = std::function<void(const std::string& problem)>;
 
   virtual ~WishKeeper() = default;
-  /// What was kept last. Nothing: the instance is new on this host. corrupt: something was, and cannot be
-  /// read. timed_out: the disk that may have it does not answer. To be called once, before all else.
+  /// The wish that was kept last. Nothing: the instance is new on this host. corrupt: something was, and
+  /// cannot be read. timed_out: the disk that may have it does not answer. To be called once, before all
+  /// else.
   [[nodiscard]] virtual Result<std::optional<InstanceWish>> find() = 0;
   /// Is in shared memory when it returns, and on the disk later.
   virtual void keep(const InstanceWish& wish) = 0;

@@ -46,7 +46,7 @@ Result<std::string> read_wish_file(const std::string& path, std::size_t most) {
   return text;
 }
 
-// Than any that a disk may have: what is asked for from now on is newer.
+// Than any that a disk may have: later wishes are newer.
 std::uint32_t higher_number(std::uint32_t known) {
   constexpr std::int64_t kNsPerSecond = 1'000'000'000;
   return std::max(known, static_cast<std::uint32_t>(unix_time_ns() / kNsPerSecond));
@@ -131,7 +131,7 @@ Result<std::string> WishStore::read_file(const std::string& path, std::size_t mo
   return text ? *text : std::unexpected(text.error());
 }
 
-// What instances read is in the run directory, which a power cut empties.
+// The files that instances read are in the run directory, which a power cut empties.
 void WishStore::restore_events() const {
   constexpr std::size_t kMostBytes = std::size_t{1} << 18;  // 4096 names
   const std::string registered = registered_events_path(settings_.run_directory, settings_.instance);

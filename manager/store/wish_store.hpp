@@ -20,7 +20,7 @@ inline constexpr Duration kWishLimit = std::chrono::seconds(2);
 /// memory, and of one that nothing else tells of. The host is starting then, and its disk may be, too.
 inline constexpr Duration kWishReadLimit = std::chrono::seconds(2);
 inline constexpr Duration kOnlyWishReadLimit = std::chrono::seconds(10);
-/// What could not be written is tried again after so long.
+/// A wish that could not be written is tried again after so long.
 inline constexpr Duration kWishRetry = std::chrono::seconds(10);
 
 /// The real WishKeeper: a WishMemory, and the files INSTANCE.wish and INSTANCE.events of wishes_folder().
@@ -44,7 +44,8 @@ class WishStore : public WishKeeper {
   void keep_events() override;
   void when_kept(Kept kept) override;
   [[nodiscard]] bool is_writing() const override { return writing_; }
-  /// To be called now and then: what another program has written over in memory is written anew, and told.
+  /// To be called now and then: a part of the memory that another program has overwritten is written anew,
+  /// and logged.
   void look_after_memory();
   /// The end of the manager in order: nothing stays in memory that is on the disk.
   void end() noexcept;

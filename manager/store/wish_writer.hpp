@@ -17,7 +17,7 @@ namespace plchost {
 /// One file to be written as a whole, for good.
 struct WishOrder {
   std::string path;  ///< its folder is made if it is missing
-  std::string text;  ///< what it is to hold
+  std::string text;  ///< the wanted contents
   std::string from;  ///< not empty: it is to be a copy of this file instead, and is removed if there is none
 };
 

@@ -93,7 +93,7 @@ void ManagedInstance::begin_change() {
   host_.set_timer(after(limit_of(ControlVerb::change_application)));
 }
 
-// What was loaded has not come up: the one before is started instead.
+// The loaded application has not come up: the one before is started instead.
 void ManagedInstance::take_back_application(const std::string& why) {
   operation_->refused = fmt::format("{} does not come up: {}", operation_->request.argument, why);
   application_ = *std::exchange(operation_->before, std::nullopt);
@@ -102,7 +102,7 @@ void ManagedInstance::take_back_application(const std::string& why) {
   spawn(wants_running_ ? Next::run : Next::stay_stopped);
 }
 
-// Last of all: what does not come up does not become the boot application.
+// Last of all: an application that does not come up does not become the boot application.
 void ManagedInstance::set_boot(const std::string& text) {
   operation_->step = Step::setting_boot;
   const auto tell = [this, text](const Result<std::string>& path) {
@@ -116,7 +116,7 @@ void ManagedInstance::set_boot(const std::string& text) {
   if (!started) tell(std::unexpected(started.error()));
 }
 
-// What was loaded long ago must not win without a word.
+// An application that was loaded long ago must not win without a word.
 void ManagedInstance::tell_boot_application() const {
   const auto version = surroundings_.applications.version_at(application_);
   const std::string what =
@@ -133,7 +133,7 @@ void ManagedInstance::tell_boot_application() const {
                                  config_.name, config_.application));
 }
 
-// What a client is told when it has worked: which version is in the instance now.
+// The answer to a client on success: the version that is in the instance now.
 std::string ManagedInstance::loaded_text() const {
   if (!operation_ || operation_->request.verb == ControlVerb::load_application) return "";
   const std::string& path = operation_->request.argument;

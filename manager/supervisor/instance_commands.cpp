@@ -16,7 +16,7 @@ void ManagedInstance::handle(const ControlRequest& request, ControlReplyFunction
   const auto refuse = [&](ErrorCode code, std::string text) {
     reply(ControlReply{.number = request.number, .code = code, .text = std::move(text)});
   };
-  refresh();  // what is decided now rests on it
+  refresh();  // the present decision rests on it
   if (shutting_down_) return refuse(ErrorCode::unavailable, "the manager is shutting down");
   if (auto good = check_argument(checked); !good) return refuse(good.error().code, good.error().describe());
   if (operation_) {
@@ -289,7 +289,7 @@ Duration ManagedInstance::limit_of(ControlVerb verb) noexcept {
 
 void ManagedInstance::finish(ErrorCode code, const std::string& text) {
   if (sets_boot(code)) return set_boot(text);
-  // Emptied first: whoever gets the reply may ask for the next thing at once.
+  // Emptied first: the receiver of the reply may ask for the next thing at once.
   const Operation done = std::move(*operation_);
   operation_.reset();
   if (code != ErrorCode::ok) {

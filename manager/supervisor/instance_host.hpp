@@ -14,8 +14,8 @@
 
 namespace plchost {
 
-/// What a ManagedInstance asks of the world: processes, sockets, time. Of one instance. Nothing in it waits;
-/// what takes time comes back as an InstanceEvents call, never from inside one of these functions.
+/// The world of a ManagedInstance: processes, sockets, time. Of one instance. Nothing in it waits; a longer
+/// action ends with an InstanceEvents call, never from inside one of these functions.
 class InstanceHost {
  public:
   virtual ~InstanceHost() = default;
@@ -32,9 +32,10 @@ class InstanceHost {
   /// Has an application tried by a process of its own as spawn() would start it, with a time limit; then
   /// on_application_checked().
   [[nodiscard]] virtual Result<void> check_application(const LaunchOptions& options) = 0;
-  /// What the process says of itself in its page; nothing if it has made none yet.
+  /// The process's report in its page; nothing if it has made none yet.
   [[nodiscard]] virtual std::optional<InstanceRuntime> runtime() = 0;
-  /// What the process asks of its core and gets of it now. Reads a file for each of its threads.
+  /// The processor time that the process wants of its core, and gets now. Reads a file for each of its
+  /// threads.
   [[nodiscard]] virtual ProcessorUse processor_use() = 0;
   /// The program that has the process's core now, as a sentence names it; empty: none is seen. Reads a file
   /// for each thread of the host.
@@ -48,7 +49,7 @@ class InstanceHost {
   virtual void read_output() = 0;
 };
 
-/// What happens to an instance.
+/// The events of an instance.
 class InstanceEvents {
  public:
   virtual ~InstanceEvents() = default;

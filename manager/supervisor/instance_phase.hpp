@@ -43,9 +43,8 @@ namespace plchost {
 //   ending       the process was asked to end. Limit: 38 s (a stop may take 10 s and 25 s), then SIGTERM, 2 s,
 //                SIGKILL. An adopted process may be in this phase already.
 //
-// A phase may follow itself: a text changes, or a start fails again. What decides on the way out of a phase when
-// the process ends is restart_decision.hpp.
-// clang-format on
+// A phase may follow itself: a text changes, or a start fails again. When the process ends,
+// restart_decision.hpp decides on the way out of a phase. clang-format on
 enum class InstancePhase : std::uint8_t { down, held, backing_off, setting_up, adopting, up, ending };
 inline constexpr std::uint8_t kInstancePhases = 7;
 
@@ -55,7 +54,7 @@ inline constexpr std::uint8_t kInstancePhases = 7;
 [[nodiscard]] bool leads(InstancePhase from, InstancePhase to) noexcept;
 /// The table says that a client may see `state` in that phase.
 [[nodiscard]] bool shows(InstancePhase phase, InstanceState state) noexcept;
-/// What the table says against this step; empty: nothing.
+/// The table's objection to this step; empty: none.
 [[nodiscard]] std::string wrong_step(InstancePhase from, InstancePhase to, InstanceState shown);
 
 }  // namespace plchost

@@ -1,4 +1,4 @@
-// What a ManagedInstance knows of a process whose control thread stands still, or whose page is damaged.
+// A ManagedInstance and a process whose control thread stands still, or whose page is damaged.
 
 #include <utility>
 
@@ -40,7 +40,7 @@ void ManagedInstance::forget_signs() {
   sign_at_ = surroundings_.now();
 }
 
-// What the process says of itself now; nothing: it does not.
+// The process's present report of itself; nothing: it has none.
 std::optional<InstanceRuntime> ManagedInstance::watch_process() {
   auto page = host_.runtime();
   if (page && page->pid != status_.pid) page.reset();
@@ -142,7 +142,7 @@ void ManagedInstance::watch_set_up() {
   tell_starvation();
 }
 
-// What other programs have taken of the limit is added to it.
+// Time that other programs have taken of the limit is added to it.
 void ManagedInstance::set_up_timed_out() {
   const Duration taken = starvation_.lasted() - set_up_starved_;
   if (taken < HeartbeatWatch::kLimit) {
@@ -182,7 +182,7 @@ void ManagedInstance::fall_silent(std::string_view known) {
   finish(ErrorCode::timed_out, fmt::format("it is in exception now: {}; reset it", status_.problem.view()));
 }
 
-// It was kept from answering, and has missed nothing: what it says holds again.
+// It was kept from answering, and has missed nothing: its report holds again.
 void ManagedInstance::answers_again() {
   if (history_.safe_mode) {
     set_state(Phase::up, InstanceState::safe_mode, problem_when_up());

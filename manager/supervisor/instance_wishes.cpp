@@ -1,4 +1,4 @@
-// What a ManagedInstance is to be, beyond the end of the manager: see the rules in managed_instance.hpp.
+// The wish of a ManagedInstance, beyond the end of the manager: see the rules in managed_instance.hpp.
 
 #include <algorithm>
 #include <array>
@@ -65,8 +65,8 @@ void ManagedInstance::restore() {
   wants_running_ = earlier.commanded ? earlier.running : true;
   if (!earlier.host_ended || earlier.safe_mode) last_end_ = earlier.last_end;
   status_.restarts = earlier.restarts;
-  // What begins with the host begins for the first time; but a cold start that was asked for and never came
-  // about is still due.
+  // An instance that begins with the host begins for the first time; but a cold start that was asked for and
+  // never came about is still due.
   const bool begins = earlier.host_ended && earlier.start_kind != StartKind::cold;
   start_kind_ = begins ? StartKind::first : earlier.start_kind;
   std::vector<Duration> ages;
@@ -99,7 +99,7 @@ bool ManagedInstance::use_configuration() {
     history_ = {};
     last_end_.clear();
   }
-  // What failed may be what was mended.
+  // The change may have mended the cause of the failure.
   return before.application != now.application || before.process != now.process;
 }
 
@@ -190,7 +190,7 @@ void ManagedInstance::look_for_process() {
   ended_unwatched();
 }
 
-// What an operator's stop says holds from here on, whatever becomes of the process meanwhile.
+// An operator's stop holds from here on, whatever becomes of the process meanwhile.
 void ManagedInstance::follow_command(ControlVerb verb) {
   if (verb == ControlVerb::stop) {
     commanded_ = true;

@@ -14,7 +14,7 @@ namespace plchost {
 
 namespace {
 
-// What an application does, as the world is told of its instance.
+// The application's state, as the world is told of its instance.
 InstanceState shown_state(const InstanceRuntime& runtime) noexcept {
   switch (runtime.state) {
     case ApplicationState::running:
@@ -410,7 +410,7 @@ void ManagedInstance::set_state(Phase phase, InstanceState state, const std::str
   publish();
 }
 
-// What a process says first, without having been told, is what its settings say: the next one reads them
+// A process's first report, before any command, has the values of its settings: the next process reads them
 // anew.
 void ManagedInstance::learn_scheduler(std::string_view name) {
   if (name.empty() || name == said_scheduler_) return;

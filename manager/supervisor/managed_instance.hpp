@@ -35,7 +35,7 @@ inline constexpr Duration kAskAgain = std::chrono::seconds(2);
 // =========================
 //
 // The phases of an instance, and the steps between them: instance_phase.hpp.
-// What follows from each end, and from each start that fails: restart_decision.hpp.
+// The decision after each end, and after each start that fails: restart_decision.hpp.
 //
 // * The order of `after` is for the first start (held) and for the end. A restart does not wait. An operator's start of
 //   a held instance overrides the order.
@@ -81,9 +81,9 @@ inline constexpr Duration kAskAgain = std::chrono::seconds(2);
 //   option "online"          of all three: the process that is up takes the application in (change_application) and
 //                            goes on. Refused if there is no such process, or by it; then nothing is changed.
 //
-// What an instance is to be outlives the manager and the host's power (InstanceWish)
-// * It is written down whenever it changes, before the command is answered. A stop, also that of a reset, is written
-//   before it is carried out: whatever ends meanwhile, the machine stays stopped.
+// The wish of an instance outlives the manager and the host's power (InstanceWish)
+// * It is written down whenever it changes, before the command is answered. A stop, also that of a reset, is
+//   written before it is carried out: the machine stays stopped, whichever process ends meanwhile.
 // * The next manager goes on with it. An instance that begins with its host keeps safe mode, scheduler and application.
 //   A boot application, if one was chosen, takes the application's place.
 // * A configuration that names another application or scheduler than when the wish was written takes effect, as a load
@@ -119,10 +119,10 @@ class ManagedInstance : public InstanceEvents {
   void resume();
   /// Waits for what it comes after; `why` is the problem text.
   void hold(const std::string& why);
-  /// What it comes after is up.
+  /// Its predecessor is up.
   void release();
   void handle(const ControlRequest& request, ControlReplyFunction reply);
-  /// The end of the manager: whatever goes on is broken off, and the process ends.
+  /// The end of the manager: all actions are broken off, and the process ends.
   void shut_down();
   /// The configuration says something else of it, or has it again.
   void reconfigure(const InstanceConfig& config);
@@ -143,7 +143,7 @@ class ManagedInstance : public InstanceEvents {
   [[nodiscard]] const InstanceStatus& status() const noexcept { return status_; }
   [[nodiscard]] const InstanceConfig& config() const noexcept { return config_; }
   [[nodiscard]] bool held() const noexcept { return phase_ == Phase::held; }
-  /// What comes after it may start.
+  /// Its successors may start.
   [[nodiscard]] bool ready() const noexcept {
     return phase_ == Phase::up && status_.state != InstanceState::safe_mode;
   }
@@ -206,12 +206,12 @@ class ManagedInstance : public InstanceEvents {
     return phase_ == Phase::down || phase_ == Phase::held || phase_ == Phase::backing_off;
   }
 
-  [[nodiscard]] bool loading_aside() const noexcept {  // whatever becomes of the process meanwhile
+  [[nodiscard]] bool loading_aside() const noexcept {  // also if the process ends meanwhile
     return operation_->step == Step::storing || operation_->step == Step::checking ||
            operation_->step == Step::setting_boot;
   }
 
-  // What it is to be, over the ends of managers: instance_wishes.cpp
+  // Its wish, over the ends of managers: instance_wishes.cpp
   void restore();
   bool use_configuration();
   [[nodiscard]] Configured configured() const;
@@ -259,7 +259,7 @@ class ManagedInstance : public InstanceEvents {
   [[nodiscard]] EndCause cause_of_refusal() const noexcept;
   [[nodiscard]] Order order() const noexcept;
   [[nodiscard]] bool rests() const noexcept;
-  /// What follows, see restart_decision.hpp; the history goes on with it.
+  /// The decision, see restart_decision.hpp; the history goes on with it.
   [[nodiscard]] Decision decided(End end);
   void carry_out(const Decision& decision, const std::string& why);
   void go_down(InstanceState state, const std::string& problem);
@@ -285,7 +285,7 @@ class ManagedInstance : public InstanceEvents {
   Ending ending_ = Ending::asked;
   Next next_ = Next::nothing;                // after ending
   StartKind start_kind_ = StartKind::first;  // of the next process
-  bool wants_running_ = true;                // what an operator, or the start, wanted last
+  bool wants_running_ = true;                // the last wish of an operator, or of the start
   bool begins_running_ = true;               // the process starts its application by itself
   bool commanded_ = false;                   // an operator has
   bool wish_known_ = false;                  // wants_running_ is no guess

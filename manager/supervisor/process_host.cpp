@@ -47,7 +47,7 @@ Result<int> ProcessHost::spawn(const LaunchOptions& options) {
 Result<int> ProcessHost::adopt() {
   if (auto connected = connect(); !connected) return std::unexpected(connected.error());
   const auto pid = adopt_peer();
-  if (!pid) {  // whoever holds the other end is not the instance: a link to it would stay silent
+  if (!pid) {  // the process at the other end is not the instance: a link to it would stay silent
     link_watch_.reset();
     link_.close();
   }
@@ -128,7 +128,7 @@ void ProcessHost::read_replies() {
   });
 }
 
-// The one place where an instance's exit is reaped. What it said last explains the exit, so it comes first.
+// The one place where an instance's exit is reaped. Its last report explains the exit, so it comes first.
 void ProcessHost::process_ended() {
   read_reports();
   read_replies();

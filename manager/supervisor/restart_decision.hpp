@@ -9,8 +9,8 @@
 
 namespace plchost {
 
-// What follows from each end of an instance
-// =========================================
+// The decision after each end of an instance
+// ==========================================
 //
 // decide() is the one place. Its table lists each way in which an instance ends or cannot begin, and what the
 // manager does under each restart policy. These rules are stronger than the policy, the first one most:
@@ -57,7 +57,7 @@ enum class EndCause : std::uint8_t {
   setting_up_unknown,  ///< its process was being set up when the manager ended
   host_ended,          ///< in order, or by a power cut
   given_up,            ///< failed before
-  wish_unreadable,     ///< what it is to be is not known
+  wish_unreadable,     ///< its wish is not known
   reconfigured,        ///< the configuration has it again, or changes what made it fail
 };
 inline constexpr std::uint8_t kEndCauses = static_cast<std::uint8_t>(EndCause::reconfigured) + 1;
@@ -70,7 +70,7 @@ enum class Order : std::uint8_t {
   no_process,  ///< the instance stays without a process
 };
 
-/// What counts about one end. Time comes in from outside.
+/// The facts that count about one end. Time comes in from outside.
 struct End {
   EndCause cause = EndCause::exited;
   Order order = Order::none;
@@ -109,7 +109,7 @@ struct Decision {
   bool operator==(const Decision&) const = default;
 };
 
-/// What follows from `end`. Pure. `policy`: restart, autostart, the delays and the limits count.
+/// The decision after `end`. Pure. `policy`: restart, autostart, the delays and the limits count.
 [[nodiscard]] Decision decide(const End& end, const RestartHistory& history, const InstanceConfig& policy);
 
 /// Why a process ended that nobody asked to end.

@@ -11,7 +11,7 @@
 
 namespace plchost {
 
-/// What a process asks of its core and gets of it, at one moment.
+/// The processor time that a process wants of its core and gets, at one moment.
 struct ProcessorUse {
   struct ReadyThread {
     pid_t id = 0;
@@ -48,7 +48,7 @@ class StarvationWatch {
       return std::ranges::find(before_.ready, thread) != before_.ready.end();
     });
   }
-  // What is left of the core then would do for the control thread.
+  // The rest of the core then would do for the control thread.
   [[nodiscard]] bool takes_the_core(const ProcessorUse& use, Duration gap) const noexcept {
     constexpr int kMost = 3;
     constexpr int kOf = 4;

@@ -15,7 +15,7 @@ namespace plchost {
 
 namespace {
 
-// Nobody reads before the end: what an application says at its start has to fit.
+// Nobody reads before the end: the output of an application at its start has to fit.
 constexpr int kOutputRoom = 1 << 20;
 constexpr std::size_t kShown = 2000;
 

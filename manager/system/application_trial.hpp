@@ -35,8 +35,7 @@ class ApplicationTrial {
   /// It took too long: ends it.
   void give_up();
   /// Of one that has ended: ok, or why the application is not valid, in its trial's words, without the
-  /// file's name in front. What the
-  /// application has left in the trial's session ends, too.
+  /// file's name in front. Processes that the application has left in the trial's session end, too.
   [[nodiscard]] Result<void> verdict();
 
  private:

@@ -52,7 +52,7 @@ Result<void> prepare(SpawnActions& actions, const SpawnRequest& request) {
     error = posix_spawn_file_actions_adddup2(&actions.files, request.report_fd, kChildReportFd);
     first_to_close = kChildReportFd + 1;
   }
-  // Ours are all CLOEXEC; what the manager itself inherited may not be.
+  // Ours are all CLOEXEC; descriptors that the manager itself inherited may not be.
   if (error == 0) error = posix_spawn_file_actions_addclosefrom_np(&actions.files, first_to_close);
   sigset_t none;
   sigset_t all;

@@ -72,7 +72,7 @@ struct OutputPipe {
   UniqueFd write_end;
 };
 [[nodiscard]] Result<OutputPipe> make_output_pipe();
-/// What is there to be read now, up to `most` bytes.
+/// The data that can be read now, up to `most` bytes.
 [[nodiscard]] std::string read_available(int fd, std::size_t most);
 
 /// The union of the cores that the threads of a process may run on, ascending.

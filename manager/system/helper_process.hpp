@@ -24,7 +24,7 @@ class HelperProcess {
  public:
   using Done = std::function<void(const HelperEnd& end)>;
 
-  /// What is killed ends so long later at most, or waits for a disk.
+  /// A killed process ends so long later at most, or waits for a disk.
   static constexpr Duration kKillLimit = std::chrono::seconds(1);
 
   explicit HelperProcess(Reactor& reactor) : reactor_(reactor), timer_(reactor, [this] { on_limit(); }) {}

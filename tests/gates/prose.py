@@ -26,6 +26,8 @@ from pathlib import Path
 # The texts that are held to the rules: kind and pattern of the path. Kinds: document, comment, message.
 HELD = [
     ("document", "*.md"),
+    ("comment", "manager/*"),
+    ("comment", "[.C]*"),
     ("comment", "tests/*"),
 ]
 GLOSSARY = "manager/glossary.md"
@@ -116,7 +118,7 @@ def documents(source):
 
 def c_texts(source):
     """(kind, text) of a file in C, C++ or IDL."""
-    comment, last, message, message_end = [], 0, None, 0
+    comment, last, message = [], None, None  # `last`: line and column of the comment before
     number, at = 1, 0
     for token in C_TOKEN.finditer(source):
         between = source[at:token.start()]
@@ -127,13 +129,13 @@ def c_texts(source):
         if token["line"] is not None:
             own = source.rfind("\n", 0, token.start()) + 1
             alone = not source[own:token.start()].strip()
-            follows = comment and last == start - 1 and (alone and not between.strip())
+            follows = alone and last == (start - 1, token.start() - own)
             if not follows:
                 yield from (("comment", text) for text in paragraphs(comment, True))
                 comment = []
             line = re.sub(r"^[/!]?<?(?: |$)", "", token["line"])
             comment.append((start, line))
-            last = start
+            last = (start, token.start() - own)
         elif token["block"] is not None:
             lines = [(start + i, re.sub(r"^\s*\*+ ?", "", line)) for i, line in enumerate(token["block"].split("\n"))]
             yield from (("comment", text) for text in paragraphs(lines, True))
