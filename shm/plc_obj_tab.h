@@ -9,7 +9,7 @@
  *     semGive(g_PlcObjTab->hSem);
  *
  * The pool is the one that PLCHOST_POOL in the environment names, else "plchost". The table is brought up to
- * date each time that g_PlcObjTab is read, but not while this thread holds hSem; each entry is opened in this
+ * date each time that g_PlcObjTab is read, but not while this thread holds hSem. Each entry is opened in this
  * process, so that its address and handles can be used. An object that nobody else needs any more leaves the
  * table. All of it is set-up; of the functions only semTake and semGive on an entry may be used in a cycle.
  *
@@ -74,7 +74,7 @@ typedef struct objTab_s {
 } objTab_t;
 
 /* NULL: there is no such pool, or it cannot be listed; plc_pool_error() of plc_pool.h says why. A child of
- * fork() gets a table of its own: what it had of its parent's it looks up anew. */
+ * fork() gets a table of its own: it looks up anew all that it had of its parent's. */
 objTab_t* plc_obj_tab(void);
 #define g_PlcObjTab (plc_obj_tab())
 

@@ -59,10 +59,11 @@ typedef struct plc_memory plc_memory;
 #define PLC_POOL_DEADLOCK (-8)  /* this thread holds the mutex already */
 #define PLC_POOL_NOT_OWNER (-9) /* this thread does not hold the mutex */
 #define PLC_POOL_GONE (-10)     /* the pool was damaged, and the object lost */
-#define PLC_POOL_CORRUPT (-11)  /* what is there is not of this kind or version, or was scribbled over */
+#define PLC_POOL_CORRUPT (-11)  /* the thing there is not of this kind or version, or was scribbled over */
 #define PLC_POOL_SYSTEM (-12)   /* the operating system refused; after fork(): open the pool anew */
 
-/* What the last set-up call of this thread that failed has to say; "" if none has. Valid until the next one.
+/* The error text of the last set-up call of this thread that failed; "" if none has. Valid until the next
+ * one.
  */
 const char* plc_pool_error(void);
 /* The result in a few words. Any. */
@@ -144,7 +145,8 @@ void plc_event_close(plc_event* event);
 
 #define PLC_POOL_MAX_VALUE 0x3fffffffu
 
-/* A count that waits at 0. What a client took stays taken when it is killed: for exclusive use take a mutex.
+/* A count that waits at 0. Units that a client took stay taken when it is killed: for exclusive use take a
+ * mutex.
  */
 int plc_semaphore_create(plc_pool* pool, const char* name, unsigned int value,
                          const plc_object_options* options, plc_semaphore** semaphore);
@@ -174,7 +176,7 @@ void plc_mutex_close(plc_mutex* mutex);
 
 /* `size` bytes, zero when made. An image or a reference record that firmware has made with a header alone is
  * there already. PLC_POOL_REFUSED: also if a file is in the way that only another user or root can remove.
- * What users write at once into one memory they order themselves. */
+ * Users of one memory order their writes themselves. */
 int plc_memory_create(plc_pool* pool, const char* name, size_t size, const plc_object_options* options,
                       plc_memory** memory);
 /* With PLC_POOL_READ a write to it is a SIGSEGV. */

@@ -12,12 +12,12 @@
  *         plc_image_write(&inputs, measured);
  *
  * An image is a shared memory of the pool, the file /dev/shm/POOL.memory.NAME; an instance has its inputs or
- * outputs in it with [SysMem] Linux.Area.n.Object=NAME in its settings. Whoever comes first makes it,
- * firmware or instance; it outlives both (one that was a memory of plc_pool.h before lives as long as that:
- * make it with PLC_POOL_KEEP). It has one writer at a time and any number of readers; nobody ever waits for
- * anybody, also if the other one is pre-empted or killed within. The writer fills a slot that is not the
- * latest and then publishes it; the reader copies the latest and looks whether it was overtaken meanwhile,
- * which takes the writer PLC_IMAGE_SLOTS - 2 publications.
+ * outputs in it with [SysMem] Linux.Area.n.Object=NAME in its settings. The first one makes it, firmware or
+ * instance; it outlives both. (One that was a memory of plc_pool.h before stays as long as that: make it with
+ * PLC_POOL_KEEP.) It has one writer at a time and any number of readers; nobody ever waits for anybody, also
+ * if the other one is pre-empted or killed within. The writer fills a slot that is not the latest and then
+ * publishes it. The reader copies the latest and looks whether it was overtaken meanwhile, which takes the
+ * writer PLC_IMAGE_SLOTS - 2 publications.
  *
  * Inputs are copied in at the start of a task's cycle, outputs out at its end. The stamp tells when an image
  * was published: firmware that sees an old one (the instance was stopped, or is gone) brings its outputs into
@@ -26,7 +26,7 @@
  * The file is a memory of the pool: an object like all others once anybody opens it by name there, or the
  * manager has looked, provided that its owner may write the pool.
  *
- * Who removes the file has it made anew, by an instance's next start or by the next plc_image_open: see
+ * If the file is removed, an instance's next start or the next plc_image_open makes it anew: see
  * plc_image_gone().
  */
 #ifndef PLC_PROCESS_IMAGE_H
@@ -80,8 +80,8 @@ typedef struct {
   plc_image_u64 reserved[6];
 } plc_image_slot;
 
-/* An image, opened. The numbers in it are this process's own: what strangers write into the shared header
- * leads nobody outside of the mapping. */
+/* An image, opened. The numbers in it are this process's own: values that strangers write into the shared
+ * header lead no access outside of the mapping. */
 typedef struct {
   plc_image_header* header;
   unsigned long mapped; /* bytes */
@@ -94,7 +94,7 @@ typedef struct {
 #define PLC_IMAGE_READ 0
 #define PLC_IMAGE_WRITE 1 /* and nobody else, as long as it is open: the kernel ends it with the process */
 
-/* What plc_image_read says. */
+/* The results of plc_image_read. */
 #define PLC_IMAGE_OK 0
 #define PLC_IMAGE_NONE 1 /* nothing was written yet */
 #define PLC_IMAGE_BUSY 2 /* overtaken each time, or overwritten by a stranger: keep what you have */
@@ -129,7 +129,8 @@ static __inline__ void plc_image_fill(const plc_image* image, unsigned int numbe
   const unsigned int whole = image->size / 8u;
   unsigned int i;
   __atomic_store_n(&slot->sequence, 0u, __ATOMIC_RELAXED);
-  /* Pairs with the acquire fence of the reader: who sees a new word sees that the slot is being written. */
+  /* Pairs with the acquire fence of the reader: a reader that sees a new word sees that the slot is being
+   * written. */
   __atomic_thread_fence(__ATOMIC_RELEASE);
   for (i = 0; i < whole; ++i) {
     plc_image_u64 word;
@@ -219,8 +220,9 @@ static __inline__ int plc_image_is_one(const plc_image_header* header, unsigned 
          __atomic_load_n(&header->size, __ATOMIC_RELAXED) == size;
 }
 
-/* The file of an image, `path` having PLC_IMAGE_PATH_SIZE bytes: what no file name should have in it stands
- * there as % and two hexadecimal digits. EINVAL: no name, or control characters in it; ENAMETOOLONG. Set-up.
+/* The file of an image, `path` having PLC_IMAGE_PATH_SIZE bytes: characters that no file name should have
+ * stand there as % and two hexadecimal digits. EINVAL: no name, or control characters in it; ENAMETOOLONG.
+ * Set-up.
  */
 static __inline__ int plc_image_path(const char* pool, const char* name, char* path) {
   static const char plain[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._-";
@@ -267,7 +269,7 @@ static __inline__ int plc_image_map(plc_image* image) {
   if (fstat(image->descriptor, &status) != 0) return errno;
   if (!S_ISREG(status.st_mode)) return EPROTO;
   if (status.st_size == 0) {
-    (void)fchmod(image->descriptor, 0660); /* whatever the umask */
+    (void)fchmod(image->descriptor, 0660); /* under any umask */
     if (ftruncate(image->descriptor, (off_t)image->mapped) != 0) return errno;
     /* No memory is told now, not by SIGBUS in a cycle. */
     error = posix_fallocate(image->descriptor, 0, (off_t)image->mapped);
@@ -288,7 +290,7 @@ static __inline__ int plc_image_map(plc_image* image) {
 /*
  * Opens the image of `size` bytes, or makes it (mode 0660). 0, or an errno: EINVAL: no name, or size;
  * ENAMETOOLONG; EPROTO: there is another kind of memory, another size or version; EBUSY: it has a writer
- * already; what open, ftruncate, posix_fallocate and mmap give. Set-up.
+ * already; those of open, ftruncate, posix_fallocate and mmap. Set-up.
  */
 static __inline__ int plc_image_open(const char* pool, const char* name, unsigned int size, int access,
                                      plc_image* image) {

@@ -11,19 +11,19 @@
  *         plc_reference_clock_write(clock, reference, local, 1);
  *
  * The record is a shared memory of the pool, the file /dev/shm/POOL.memory.NAME; an instance follows it with
- * [DistributedClock] Reference=NAME in its settings. Whoever comes first makes it, firmware or instance; it
- * outlives both, and is an object of the pool like all others once anybody opens it there by name, or the
+ * [DistributedClock] Reference=NAME in its settings. The first one makes it, firmware or instance; it
+ * outlives both. It is an object of the pool like all others once a program opens it there by name, or the
  * manager has looked. One writer at a time, any number of readers; nobody ever waits.
  *
- * What makes a pair good is that both stamps are of the same instant. A pair whose stamps were torn apart
- * (the writer lost the processor between them) is left out by the reader, as long as it is not the rule. Best
- * is a local stamp before and one after the reference's, their middle, and no pair if they are far apart. Ten
- * to some thousand pairs per second; more often than every 20 us is not looked at.
+ * A pair is good if both stamps are of the same instant. A pair whose stamps were torn apart (the writer lost
+ * the processor between them) is left out by the reader, as long as it is not the rule. Best is a local stamp
+ * before and one after the reference's, their middle, and no pair if they are far apart. Ten to some thousand
+ * pairs per second; more often than every 20 us is not looked at.
  *
  * A writer that is killed inside of plc_reference_clock_write leaves a record that readers do not take; the
- * next write, by whichever process, makes it good again. Who removes the file or makes it empty has it made
- * anew, by an instance or by the next plc_reference_clock_open; firmware that has it mapped then opens it
- * again (in a file that was made empty its next write could be a SIGBUS).
+ * next write, by whichever process, makes it good again. If the file is removed or emptied, an instance or
+ * the next plc_reference_clock_open makes it anew. Firmware that has it mapped then opens it again (in a file
+ * that was made empty its next write could be a SIGBUS).
  */
 #ifndef PLC_REFERENCE_CLOCK_H
 #define PLC_REFERENCE_CLOCK_H
@@ -60,11 +60,11 @@ typedef struct {
   unsigned int version;       /* PLC_REFERENCE_CLOCK_VERSION */
   unsigned int size;          /* of this struct, in bytes */
   plc_clock_u64 sequence;     /* odd while the fields below are being written */
-  plc_clock_i64 reference_ns; /* what the reference clock showed, from any zero on */
+  plc_clock_i64 reference_ns; /* the time of the reference clock, from any zero on */
   plc_clock_i64 local_ns;     /* CLOCK_MONOTONIC at the same instant */
   plc_clock_u64 updates;      /* counts the writes; 0: none yet */
   plc_clock_u64 valid;        /* 1; 0: the writer says that its clock does not hold just now */
-  plc_clock_u64 check;        /* of the four before: what two writers or a stranger make of it is no pair */
+  plc_clock_u64 check;        /* of the four before: a mixture of two writers or of a stranger is no pair */
 } plc_reference_clock;
 
 /* A copy of one reading. */
@@ -75,7 +75,7 @@ typedef struct {
   int valid;
 } plc_reference_reading;
 
-/* What plc_reference_clock_read says. */
+/* The results of plc_reference_clock_read. */
 #define PLC_REFERENCE_OK 0
 #define PLC_REFERENCE_NONE 1    /* nothing was written yet */
 #define PLC_REFERENCE_BUSY 2    /* it is being written, or its writer died within: look again later */
@@ -109,7 +109,7 @@ static __inline__ void plc_reference_clock_write(plc_reference_clock* clock, plc
   const plc_clock_u64 check =
       plc_reference_clock_check_of((plc_clock_u64)reference_ns, (plc_clock_u64)local_ns, updates, flag);
   __atomic_store_n(&clock->sequence, odd, __ATOMIC_RELAXED);
-  /* Pairs with the acquire fence of the reader: who sees a new field sees the odd sequence. */
+  /* Pairs with the acquire fence of the reader: a reader that sees a new field sees the odd sequence. */
   __atomic_thread_fence(__ATOMIC_RELEASE);
   __atomic_store_n(&clock->reference_ns, reference_ns, __ATOMIC_RELAXED);
   __atomic_store_n(&clock->local_ns, local_ns, __ATOMIC_RELAXED);
@@ -166,7 +166,7 @@ static __inline__ int plc_reference_clock_is_one(const plc_reference_clock* cloc
 
 /*
  * Opens the record, or makes it (mode 0660). 0, or an errno: ENAMETOOLONG; EPROTO: there is another kind of
- * memory, or another version; what open, ftruncate, posix_fallocate and mmap give. Set-up.
+ * memory, or another version; those of open, ftruncate, posix_fallocate and mmap. Set-up.
  */
 static __inline__ int plc_reference_clock_open(const char* pool, const char* name,
                                                plc_reference_clock** clock) {
@@ -182,7 +182,7 @@ static __inline__ int plc_reference_clock_open(const char* pool, const char* nam
   if (descriptor < 0) return errno;
   if (fstat(descriptor, &status) != 0) error = errno;
   if (error == 0 && status.st_size == 0) {
-    (void)fchmod(descriptor, 0660); /* whatever the umask */
+    (void)fchmod(descriptor, 0660); /* under any umask */
     if (ftruncate(descriptor, (off_t)sizeof(plc_reference_clock)) != 0) error = errno;
     /* No memory is told now, not by SIGBUS in a cycle. */
     if (error == 0) error = posix_fallocate(descriptor, 0, (off_t)sizeof(plc_reference_clock));

@@ -15,7 +15,7 @@ std::size_t page() noexcept {
   return static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
 }
 
-// What the kernel stores of the processor, and room for the handler.
+// The processor's state as the kernel stores it, and room for the handler.
 std::size_t usable_size() noexcept {
 #if defined(PLCHOST_THREAD_SANITIZER) || defined(PLCHOST_ADDRESS_SANITIZER)
   constexpr std::size_t kHandler = std::size_t{128} << 10;

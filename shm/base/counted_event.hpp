@@ -17,7 +17,7 @@ namespace plchost {
 ///
 /// Post is one atomic add, and at most one wake. Each waiter keeps a cursor of its own (how many posts it
 /// has seen), so nothing is consumed by anyone else and the event needs no list of waiters. `waiter` says
-/// that somebody may be asleep. Who wakes clears it afterwards, and only if the word is still the one that it
+/// that somebody may be asleep. The waker clears it afterwards, and only if the word is still the one that it
 /// made itself: each waiter changes `turns` before it sleeps, so an unchanged word means that all sleepers
 /// have been woken. A poster that dies at any point therefore leaves the flag set, never a sleeper without
 /// it; a waiter that died costs one superfluous wake. A nudge changes `turns` too, without counting a post:
@@ -49,7 +49,7 @@ class CountedEvent {
   /// Any context, real-time included. Wakes every waiter if there may be one. False: the post is counted, but
   /// no task took posts at that moment.
   bool post() noexcept {
-    // Release pairs with the acquire in snapshot(): what the poster wrote before is seen by the task.
+    // Release pairs with the acquire in snapshot(): the task sees all that the poster wrote before.
     const std::uint64_t before = state_.fetch_add(kOnePost, std::memory_order_release);
     if ((before & kWaiter) != 0) wake(before + kOnePost);
     return (before & kTaken) != 0;

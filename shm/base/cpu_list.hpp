@@ -23,7 +23,7 @@ inline constexpr int kMaxCoreNumber = 8191;
 /// Sorted, each once.
 [[nodiscard]] std::vector<int> each_once(std::vector<int> cores);
 
-/// What is in both, and what is only in the first; sorted in, sorted out.
+/// The cores in both, and those only in the first; sorted in, sorted out.
 [[nodiscard]] std::vector<int> common_cores(const std::vector<int>& a, const std::vector<int>& b);
 [[nodiscard]] std::vector<int> cores_without(const std::vector<int>& a, const std::vector<int>& b);
 

@@ -25,7 +25,8 @@ constexpr ByteTable kAfterByte = [] {
   return table;
 }();
 
-// What `length` bytes of zero make of the register: a linear map, so a table for each of its bytes will do.
+// The effect of `length` bytes of zero on the register: a linear map, so a table for each of its bytes will
+// do.
 constexpr WordTable after_zeros(std::size_t length) {
   std::array<std::uint32_t, 32> images{};  // of each bit
   for (std::size_t bit = 0; bit < images.size(); ++bit) {
@@ -99,8 +100,8 @@ __attribute__((target("sse4.2"))) std::uint32_t step_lanes(const WordTable& afte
     std::uint64_t third = 0;
     const std::byte* const from = walk.from.data();
     for (std::size_t i = 0; i < Lane; i += sizeof(std::uint64_t)) {
-      // What comes from another core's cache takes long, and three streams at once are no pattern that the
-      // processor would find by itself.
+      // Data from another core's cache take long, and three streams at once are no pattern that the processor
+      // would find by itself.
       if (How == Copy::plain && i % kCacheLine == 0) {
         for (std::size_t lane = 0; lane < kLanes; ++lane) {
           __builtin_prefetch(from + i + (lane + kLanes) * Lane);

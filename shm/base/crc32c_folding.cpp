@@ -25,7 +25,7 @@ constexpr long long factor(unsigned power) {
   return std::bit_cast<long long>(turned << 1);
 }
 
-/// What carries 128 bits over `bits` bits that follow them: the factor of the lower half, and of the upper.
+/// Carries 128 bits over `bits` bits that follow them: the factor of the lower half, and of the upper.
 struct Distance {
   long long lower;
   long long upper;
@@ -69,7 +69,7 @@ PLCHOST_FOLDING inline __m512i take(std::byte* to, const std::byte* from) noexce
   return word;
 }
 
-/// A stretch of bytes. What is folded into it has the same checksum as all that has gone in.
+/// A stretch of bytes. The folded value has the same checksum as all that has gone in.
 struct Stretch {
   __m512i first;
   __m512i second;

@@ -16,9 +16,9 @@
 namespace plchost {
 
 /// Which duration lies in which bucket: HdrHistogram's geometry, at 1 ns. With 3 significant digits linear
-/// below 2048 ns and then 1024 buckets per octave, so that all values of a bucket are the same within 0.1 %;
-/// with 2 digits linear below 256 ns, then 128, within 0.8 %. Up to 2^31 - 1 ns (2.1 s); what is beyond lies
-/// in the last bucket. Pure.
+/// below 2048 ns and then 1024 buckets per octave: all values of a bucket are the same within 0.1 %. With 2
+/// digits linear below 256 ns, then 128: within 0.8 %. Up to 2^31 - 1 ns (2.1 s); longer ones lie in the last
+/// bucket. Pure.
 class HistogramShape {
  public:
   static constexpr unsigned kCoarse = 2;

@@ -8,7 +8,7 @@
 
 namespace plchost {
 
-/// What put a task into exception.
+/// The fault that put a task into exception.
 enum class FaultKind : std::uint8_t {
   signal,                ///< SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP or SIGABRT in a cycle
   cpp_exception,         ///< a C++ exception left the cycle
@@ -21,7 +21,7 @@ enum class FaultKind : std::uint8_t {
 };
 [[nodiscard]] std::string_view to_string(FaultKind kind) noexcept;
 
-/// What was over when a task had not come to the end of its cycle.
+/// The phase that was over when a task had not come to the end of its cycle.
 enum class StopPhase : std::uint8_t {
   outputs,       ///< the first phase of a stop: tasks that drive outputs
   others,        ///< its second phase: all others
@@ -34,25 +34,25 @@ struct FaultRecord {
   static constexpr std::size_t kMaxText = 199;
 
   FaultKind kind = FaultKind::signal;
-  std::uint8_t in_event_variable = 0;    ///< while the scheduler read the task's BOOL, not in its cycle
-  std::uint8_t stack_overflow = 0;       ///< SIGSEGV just where the stack ended
-  std::uint8_t whole_application = 0;    ///< 0: only the task was stopped
-  std::uint8_t not_caught = 0;           ///< a watchdog struck its thread, and it ran on
-  std::int32_t signal = 0;               ///< 0 if it was none
-  std::int32_t signal_code = 0;          ///< si_code
-  std::uint64_t address = 0;             ///< of the instruction; 0 if not known
-  std::uint64_t caller = 0;              ///< who jumped to `address` if no code is there; 0 if not known
-  std::uint64_t memory_address = 0;      ///< what SIGSEGV and SIGBUS were about
+  std::uint8_t in_event_variable = 0;  ///< while the scheduler read the task's BOOL, not in its cycle
+  std::uint8_t stack_overflow = 0;     ///< SIGSEGV just where the stack ended
+  std::uint8_t whole_application = 0;  ///< 0: only the task was stopped
+  std::uint8_t not_caught = 0;         ///< a watchdog struck its thread, and it ran on
+  std::int32_t signal = 0;             ///< 0 if it was none
+  std::int32_t signal_code = 0;        ///< si_code
+  std::uint64_t address = 0;           ///< of the instruction; 0 if not known
+  std::uint64_t caller = 0;  ///< the origin of a jump to `address` if no code is there; 0 if not known
+  std::uint64_t memory_address = 0;      ///< the address of SIGSEGV and SIGBUS
   std::int64_t figure = 0;               ///< the watchdog's measure: ns, cycles or percent, by kind
-  std::int64_t limit = 0;                ///< what it may be at most, in the same unit
+  std::int64_t limit = 0;                ///< the most that it may be, in the same unit
   std::int64_t count = 0;                ///< consecutive_overruns: how many
-  StopPhase phase = StopPhase::outputs;  ///< stop_timeout: what was over
+  StopPhase phase = StopPhase::outputs;  ///< stop_timeout: the phase that was over
   std::int64_t unix_ns = 0;              ///< CLOCK_REALTIME
   FixedText<kMaxText> text;              ///< cpp_exception: its what(); no_processor: the thread
   FixedText<kMaxText> type;              ///< cpp_exception: the name of its type as the compiler mangles it
 };
 
-/// In words: what happened, with its figures. Without addresses, which only the process can name.
+/// In words: the cause, with its figures. Without addresses, which only the process can name.
 [[nodiscard]] std::string describe_fault(const FaultRecord& record);
 /// "SIGSEGV"; "signal 40" if it has no name here.
 [[nodiscard]] std::string signal_name(int signal);

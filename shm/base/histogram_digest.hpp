@@ -10,7 +10,7 @@
 
 namespace plchost {
 
-/// What is told of a histogram to those that cannot see it: percentiles, and 8 bars per octave to draw.
+/// A histogram for readers that cannot see it: percentiles, and 8 bars per octave to draw.
 class HistogramDigest {
  public:
   static constexpr std::array kFractions{0.5, 0.9, 0.99, 0.999, 0.9999};

@@ -36,8 +36,8 @@ class MemoryGuard {
   /// woken by a wake. Any context.
   [[nodiscard]] static bool any_lost() noexcept { return lost_any.load(std::memory_order_acquire); }
 
-  /// Installs a handler of SIGBUS that does so, once for the process. What is not guarded goes to the handler
-  /// that was there before, or ends the process as ever. Set-up.
+  /// Installs a handler of SIGBUS that does so, once for the process. A fault outside of guarded memory goes
+  /// to the handler that was there before, or ends the process as ever. Set-up.
   static void watch_process() noexcept;
   /// For a thread of others that has all signals blocked, as DDS's own: there a fault would end the process,
   /// handler or not. Costs a system call once for each thread. Any context.

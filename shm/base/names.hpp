@@ -51,7 +51,7 @@ inline constexpr std::size_t kMaxPath = 255;
 /// "a, b, c", for messages that list what is allowed; "none" if there is nothing.
 [[nodiscard]] std::string join_names(std::span<const std::string_view> names);
 
-/// What is told of the first word that looks like an option and is none of `options` ("--config", "-o"):
+/// The error text for the first word that looks like an option and is none of `options` ("--config", "-o"):
 /// "unknown option '--confg' (did you mean '--config'?); known are --config, -o". Empty: there is none.
 [[nodiscard]] std::string unknown_option(std::span<const std::string> words,
                                          std::span<const std::string> options);

@@ -88,7 +88,7 @@ bool process_is_over(const Stat& stat) noexcept {
   return thread_is_over(stat) && stat.threads <= 1;
 }
 
-// Now, in the unit of start_of(): what calls it began before.
+// Now, in the unit of start_of(): the caller began before.
 std::uint64_t this_tick() noexcept {
   timespec now{};
   ::clock_gettime(CLOCK_BOOTTIME, &now);

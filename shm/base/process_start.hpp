@@ -8,14 +8,15 @@
 namespace plchost {
 
 /// When a process began, in clock ticks since the host's start (proc(5), "starttime"; never 0).
-/// Number and start together name it for good, the number alone is given to another one some day. Who looks
+/// Number and start together name it for good, the number alone is given to another one some day. The caller
 /// is in the same PID namespace. Nothing: it has ended (a zombie has, too). Set-up: reads a file.
 [[nodiscard]] std::optional<std::uint64_t> start_of(pid_t process) noexcept;
 
-/// What names a process for good, and the program in it: exec() leaves number and start as they are.
+/// Identifies a process for good, and the program in it: exec() leaves number and start as they are.
 struct ProcessIdentity {
   pid_t pid = 0;
-  /// It began then or earlier: who has no descriptor left cannot read when it began, and says when it looked.
+  /// It began then or earlier: a process that has no descriptor left cannot read when it began, and writes
+  /// the time of its look.
   std::uint64_t start = 0;
   /// Made from where the host has put the program's code and stack; 0: not known. Two programs that follow
   /// one another in a process have the same if the host puts all at the same place (no address

@@ -7,12 +7,12 @@
 
 namespace plchost {
 
-/// What kind of failure it is, so that callers can decide without reading text. The numbers travel in
-/// control messages and in the DDS API: they are never reused.
+/// The kind of a failure, so that callers can decide without reading text. The numbers travel in control
+/// messages and in the DDS API: they are never reused.
 enum class ErrorCode : std::uint8_t {
   ok = 0,
   invalid_argument = 1,  ///< a name, value or file is not of the allowed form
-  not_found = 2,         ///< what was named does not exist
+  not_found = 2,         ///< the named thing does not exist
   already_exists = 3,
   wrong_state = 4,  ///< exists, but cannot do this now (stop what is stopped)
   refused = 5,      ///< not permitted (by configuration or by the system)

@@ -124,8 +124,8 @@ LockResult RobustMutex::lock_slowly(TimePoint deadline) noexcept {
 // unlocks, and the kernel hands over what a dead one has left. A living owner is never taken from, however
 // long it takes to write its record.
 //
-// One that is ending, which takes a large process long, is as good as gone if the kernel, asked after that
-// was seen, knows of nobody to hand the mutex to.
+// The end of a large process takes long. One that is ending is as good as gone if the kernel, asked after
+// that was seen, knows of nobody to hand the mutex to.
 RobustMutex::OwnerState RobustMutex::look_at_owner(std::uint32_t word, bool nobody_waits) const noexcept {
   const std::uint64_t record = record_.load(std::memory_order_acquire);
   const std::uint32_t image = image_.load(std::memory_order_relaxed);
@@ -141,7 +141,8 @@ RobustMutex::OwnerState RobustMutex::look_at_owner(std::uint32_t word, bool nobo
   return look->ending ? OwnerState::ending : OwnerState::alive;
 }
 
-// Only if it is still as it was seen. Who waits in the kernel for the dead one wakes at its next look.
+// Only if it is still as it was seen. A thread that waits in the kernel for the dead one wakes at its next
+// look.
 bool RobustMutex::take_over(std::uint32_t word) noexcept {
   const std::uint32_t mine = this_thread().id | (word & FUTEX_WAITERS);
   if (!word_.compare_exchange_strong(word, mine, std::memory_order_acquire, std::memory_order_relaxed)) {
@@ -171,8 +172,8 @@ bool RobustMutex::unlock() noexcept {
   word = self;
   if (word_.compare_exchange_strong(word, 0, std::memory_order_release, std::memory_order_relaxed))
     return true;
-  word_.fetch_or(
-      0, std::memory_order_release);  // what was written before is seen by whom the kernel hands it to
+  word_.fetch_or(0, std::memory_order_release);  // the thread that the kernel hands it to sees all that was
+                                                 // written before
   if (::syscall(SYS_futex, &word_, FUTEX_UNLOCK_PI, 0, nullptr, nullptr, 0) == 0) return true;
   // Those who wait do so for the dead one that it was taken over from; they look again within kLook.
   word_.store(0, std::memory_order_release);

@@ -13,7 +13,7 @@ enum class LockResult : std::uint8_t {
   owner_died,  ///< locked; the one before ended while it held it: look at what it guards
   timed_out,
   deadlock,  ///< the calling thread holds it already
-  corrupt,   ///< what lies there is no mutex of this kind
+  corrupt,   ///< no mutex of this kind lies there
 };
 
 /// A mutex that may lie in shared memory: priority-inheriting, and robust against the end of its owner at any
@@ -23,7 +23,7 @@ enum class LockResult : std::uint8_t {
 /// The word is a PI futex: the owner's thread id, and flags that the kernel sets. If the owner ends while
 /// others wait, the kernel hands the lock on and says so; if nobody waits, the next one finds a thread that
 /// is not there. The record tells a thread that was given the same number later from the owner, and a program
-/// that exec() has put in the place of the owner's: who waits looks at it every kLook.
+/// that exec() has put in the place of the owner's. A waiter looks at it every kLook.
 class RobustMutex {
  public:
   /// Not taken and not busy: no system call (a thread's first one reads a file). Any context; the deadline

@@ -24,7 +24,7 @@ class Seqlock {
     // Odd if a stranger has written over it: then readers would take every second write for a whole one.
     const std::uint64_t sequence = (sequence_.load(std::memory_order_relaxed) + 1) & ~std::uint64_t{1};
     sequence_.store(sequence + 1, std::memory_order_relaxed);
-    // Pairs with the acquire fence in read(): who sees a new word sees the odd sequence.
+    // Pairs with the acquire fence in read(): a reader that sees a new word sees the odd sequence.
     std::atomic_thread_fence(std::memory_order_release);
     for (std::size_t i = 0; i < kWords; ++i) words_[i].store(words[i], std::memory_order_relaxed);
     sequence_.store(sequence + 2, std::memory_order_release);

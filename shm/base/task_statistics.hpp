@@ -16,15 +16,15 @@
 
 namespace plchost {
 
-/// What is counted per task. Durations in nanoseconds. Everything but `cycles` and `posts_...` counts from
-/// the last reset.
+/// The counters of a task. Durations in nanoseconds. Everything but `cycles` and `posts_...` counts from the
+/// last reset.
 struct TaskCounters {
   std::uint64_t cycles;      ///< the IEC cycle count: cycles that ran, whatever was reset
   std::uint64_t posts_done;  ///< external events: the post, by the event's count, whose cycle ended last
   std::uint64_t posts_lost_first;  ///< external events: of the posts that were lost last, the first by the
                                    ///< event's count; 0: none was lost
   std::uint64_t posts_lost_last;   ///< and the last
-  std::uint64_t recorded;          ///< cycles since the last reset: what sums are divided by
+  std::uint64_t recorded;          ///< cycles since the last reset: the divisor of sums
   std::uint64_t lost_cycles;       ///< releases on the grid that passed without a cycle
   std::uint64_t lost_consecutive;  ///< those in a row right before the last cycle
   std::uint64_t lost_consecutive_max;  ///< the longest such row

@@ -54,8 +54,8 @@ void prefault_stack() noexcept {
 void* thread_main(void* argument) noexcept {
   const std::unique_ptr<StartInfo> info(static_cast<StartInfo*>(argument));
   pthread_setname_np(pthread_self(), info->name.substr(0, 15).c_str());
-  // What it makes itself shall not inherit its priority: a thread that the application makes in a cycle runs
-  // as SCHED_OTHER unless it is asked for otherwise (PTHREAD_EXPLICIT_SCHED). Cannot fail: nothing is raised.
+  // Its own threads shall not inherit its priority: a thread that the application makes in a cycle runs as
+  // SCHED_OTHER unless it is asked for otherwise (PTHREAD_EXPLICIT_SCHED). Cannot fail: nothing is raised.
   if (info->fifo > 0) {
     const sched_param same{.sched_priority = info->fifo};
     ::sched_setscheduler(0, SCHED_FIFO | SCHED_RESET_ON_FORK, &same);

@@ -6,8 +6,8 @@
 
 namespace plchost {
 
-/// What failed may succeed later with nothing changed: the host was short of processes, descriptors, memory
-/// or room in a file system (shared memory lies in one), or somebody held a lock for too long.
+/// The failed call may succeed later with nothing changed. The host was short of processes, descriptors,
+/// memory or room in a file system (shared memory lies in one), or a lock was held for too long.
 [[nodiscard]] inline bool is_transient(const Error& error) noexcept {
   switch (error.system_errno) {
     case EAGAIN:

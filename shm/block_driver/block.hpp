@@ -25,7 +25,7 @@ inline constexpr std::uint8_t kBlockKinds = 3;
 /// So many links a block goes at most.
 inline constexpr std::uint8_t kMaxHops = 8;
 
-/// What goes before the contents of a block, in shared memory and between hosts.
+/// The header of a block, in shared memory and between hosts.
 struct BlockHeader {
   std::uint32_t checksum = 0;  ///< CRC-32C of all that follows, contents included
   std::uint32_t size = 0;      ///< of the contents, bytes: at most kMaxBlockSize

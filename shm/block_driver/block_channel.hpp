@@ -9,7 +9,7 @@
 
 namespace plchost {
 
-/// What a channel has received.
+/// A block that a channel has received.
 struct Received {
   std::size_t size = 0;  ///< of the contents, which lie at the beginning of the buffer; bytes
   NodeAddress from;

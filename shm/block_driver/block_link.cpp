@@ -172,7 +172,7 @@ std::uint32_t InLink::drop_all() noexcept {
   return dropped;
 }
 
-// What stands at the head stands in everybody's way. It is a block that nobody takes, then it is dropped
+// A block at the head stands in the way of all others. It is a block that nobody takes, then it is dropped
 // with all that came before now; or one that is not there: the sender has reserved its slots and never filled
 // them, or a thread here has taken it and never given it back, or somebody has scribbled.
 std::uint32_t InLink::tidy_ring(std::size_t priority, TimePoint now, Duration hold) noexcept {

@@ -51,8 +51,8 @@ struct LinkLayout {
 static_assert(sizeof(LinkLayout) == 320 && offsetof(LinkLayout, published) == 64);
 static_assert(offsetof(LinkLayout, heads) == 192 && offsetof(LinkLayout, received) == 256);
 
-/// What a link has counted, of all priorities, since it was made. What the receiver counts is told ten times
-/// in the time that a block may wait.
+/// The counts of a link, of all priorities, since it was made. The receiver tells its counts ten times in the
+/// time that a block may wait.
 struct LinkCounts {
   std::uint64_t sent = 0;
   std::uint64_t sent_bytes = 0;
@@ -81,7 +81,7 @@ class LinkMemory {
   /// else. wrong_state: it was made for other lives. Set-up.
   [[nodiscard]] static Result<LinkMemory> open(const std::string& name, const NodeLife& from,
                                                const NodeLife& to);
-  /// Whatever link has that name, to look at.
+  /// The link of that name, of any node, to look at.
   [[nodiscard]] static Result<LinkMemory> open_to_read(const std::string& name);
 
   [[nodiscard]] LinkLayout& layout() const noexcept;

@@ -199,7 +199,7 @@ void BlockNode::set_remote_nodes(std::span<const RemoteNode> nodes) noexcept {
   remote_names_.write(nodes);
 }
 
-// What a stranger has changed is written again.
+// A part that a stranger has changed is written again.
 void BlockNode::keep_record() {
   const std::scoped_lock lock(entry_mutex_);
   directory_.keep(life_, entry_);

@@ -45,7 +45,7 @@ struct NodeOptions {
   NodeEntry entry;
   std::vector<std::string> neighbours = {};  ///< names of the nodes that it talks to; empty: all
   std::uint8_t hop_limit = kMaxHops;         ///< 1 to kMaxHops
-  Duration hold = std::chrono::seconds(1);   ///< what nobody takes is dropped after that time
+  Duration hold = std::chrono::seconds(1);   ///< a block that nobody takes is dropped after that time
   std::uint16_t host_number = 0;             ///< a gateway's: how other hosts call this one; 0: it is none
   RemoteSink remote = {};                    ///< a gateway's: where blocks for other hosts go
   RemoteRoom remote_room = {};               ///< a gateway's; none: there always is
@@ -92,7 +92,7 @@ class BlockNode {
   void set_hosts(std::vector<HostRange> hosts);
   /// A gateway's: the nodes of other hosts, for find(); see RemoteNames::write(). One soft thread.
   void set_remote_nodes(std::span<const RemoteNode> nodes) noexcept;
-  /// What the node counts, besides what its links do.
+  /// The counts of the node, besides those of its links.
   [[nodiscard]] NodeCounters& counters() noexcept { return own_slot().counters; }
   /// Its directory was cut short by a stranger. Any context.
   [[nodiscard]] bool lost() const noexcept { return directory_.lost(); }

@@ -26,14 +26,14 @@ class BlockRouter {
   /// Does what there is to do at `now`; returns when to be called again, unless there is work before.
   TimePoint serve(TimePoint now);
 
-  /// Serves until `stop`; who sets it then calls wake().
+  /// Serves until `stop`; the thread that sets it then calls wake().
   void run(const std::atomic<bool>& stop);
   void wake() noexcept { node_.own_slot().work.nudge(); }
 
  private:
   explicit BlockRouter(BlockNode& node);
 
-  // router_links.cpp: who is there, and the links to them
+  // router_links.cpp: the present nodes, and the links to them
   void tick(TimePoint now);
   void look_for_the_dead();
   void refresh();
@@ -69,7 +69,7 @@ class BlockRouter {
   std::uint64_t changes_seen_ = 0;
   TimePoint next_tick_{};
   std::uint32_t ticks_ = 0;
-  std::uint16_t suspect_ = 0;  // whose process is looked at next
+  std::uint16_t suspect_ = 0;  // the node to look at next
   std::vector<std::byte> buffer_;
   std::string last_problem_;
 };

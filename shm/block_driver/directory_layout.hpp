@@ -11,9 +11,9 @@
 #include "shm/block_driver/node_address.hpp"
 #include "shm/files/fixed_page.hpp"
 
-// The directory of the nodes of a pool as it lies in shared memory. What is read here is checked before it is
-// used: strangers may have scribbled in it. It is written under a lock of its file, which the kernel gives
-// back when its holder dies.
+// The directory of the nodes of a pool as it lies in shared memory. All values read here are checked before
+// they are used: strangers may have scribbled in it. It is written under a lock of its file, which the kernel
+// gives back when its holder dies.
 
 namespace plchost {
 
@@ -29,7 +29,7 @@ struct HostRange {
 };
 inline constexpr std::size_t kMaxHostRanges = 16;
 
-/// Who has an address.
+/// The owner of an address.
 struct NodeRecord {
   FixedText<kMaxInstanceName> name;  ///< kept when the node goes: it gets the same address again
   std::int32_t pid = 0;              ///< 0: nobody has it
@@ -40,7 +40,7 @@ struct NodeRecord {
   std::array<HostRange, kMaxHostRanges> hosts{};
 };
 
-/// What a node counts, besides what its links count.
+/// The counts of a node, besides those of its links.
 struct NodeCounters {
   std::atomic<std::uint64_t> forwarded;    ///< blocks that went through it
   std::atomic<std::uint64_t> no_route;     ///< had to be dropped: nothing leads to their destination

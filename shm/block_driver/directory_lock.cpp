@@ -15,7 +15,7 @@ namespace plchost {
 
 namespace {
 
-// What is done under the lock takes a millisecond at most; but its holder may be stopped.
+// The lock is held for a millisecond at most; but its holder may be stopped.
 constexpr auto kPatience = std::chrono::seconds(5);
 constexpr timespec kBetweenLooks{.tv_sec = 0, .tv_nsec = 200'000};
 

@@ -7,8 +7,8 @@
 
 namespace plchost {
 
-/// Where real-time threads find a link that a soft thread puts there, exchanges and takes away. What was
-/// exchanged goes when nobody is inside any more; nobody ever waits.
+/// Where real-time threads find a link that a soft thread puts there, exchanges and takes away. The old
+/// object goes when no thread is inside any more; no thread ever waits.
 template <class Link>
 class LinkGate {
  public:
@@ -42,7 +42,7 @@ class LinkGate {
 
   // The rest is for the one soft thread that owns the gate.
 
-  /// What is there now, for its owner; null: nothing.
+  /// The present object, for its owner; null: none.
   [[nodiscard]] Link* get() const noexcept { return current_.get(); }
   /// Puts `next` (or nothing) in the place of what was there. false: too many are still in use.
   bool exchange(std::unique_ptr<Link> next) {

@@ -13,7 +13,7 @@ inline constexpr std::uint32_t kMaxNodes = 128;
 /// Hosts have numbers from 1 to this one, for each other.
 inline constexpr std::uint16_t kMaxHostNumber = 0xfffe;
 
-/// Who a block is for or from: an instance on this or another host.
+/// The receiver or sender of a block: an instance on this or another host.
 struct NodeAddress {
   /// As a node number: every node of the host.
   static constexpr std::uint16_t kAllNodes = 0xffff;
@@ -39,7 +39,7 @@ struct NodeAddress {
 
 /// "17" on this host, "3.17" on host 3, "all", "3.all", "65535.all" on all hosts. Set-up.
 [[nodiscard]] std::string to_string(NodeAddress address);
-/// What to_string() writes; nothing: it is no address. Set-up.
+/// Reads the text of to_string(); nothing: it is no address. Set-up.
 [[nodiscard]] std::optional<NodeAddress> parse_node_address(std::string_view text);
 
 }  // namespace plchost

@@ -16,7 +16,7 @@ namespace plchost {
 inline constexpr std::string_view kDefaultBlockBase = "blocks";
 inline constexpr std::size_t kMaxBlockBase = 31;
 
-/// What a node says of itself when it joins.
+/// A node's claims when it joins.
 struct NodeEntry {
   std::string name;                ///< 1 to kMaxInstanceName characters, see check_name
   std::uint16_t forced_address{};  ///< 1 to kMaxNodes; 0: any that is free
@@ -36,7 +36,7 @@ class NodeDirectory {
   /// Only to look at. not_found: no node has ever joined.
   [[nodiscard]] static Result<NodeDirectory> open_to_read(std::string_view pool,
                                                           std::string_view base = kDefaultBlockBase);
-  /// Removes it with all links; who has them mapped keeps them.
+  /// Removes it with all links; processes that have them mapped keep them.
   static void remove(std::string_view pool, std::string_view base = kDefaultBlockBase) noexcept;
 
   /// Takes an address for this process: the forced one, or the one that the name had before, or a free one

@@ -63,7 +63,7 @@ void RemoteNames::write(std::span<const RemoteNode> nodes) noexcept {
       names.nodes[i].recover();  // the writer before may have died in here
       names.nodes[i].write(nodes[i]);
     }
-    // Release: who sees the number sees the name.
+    // Release: a reader that sees the number sees the name.
     names.numbers[i].store(number, std::memory_order_release);
   }
 }

@@ -26,7 +26,7 @@ struct RemoteNode {
 struct RemoteNamesLayout;
 
 /// The names of the nodes of other hosts, as the gateway tells them to the nodes of its own: one shared
-/// memory for each base name of a pool. What is read is checked, strangers may scribble in it.
+/// memory for each base name of a pool. All values read are checked, strangers may scribble in it.
 class RemoteNames {
  public:
   /// More are not found by name.
@@ -35,7 +35,7 @@ class RemoteNames {
   /// Makes it if it is not there. corrupt: there is something else of that name. Set-up.
   [[nodiscard]] static Result<RemoteNames> open(std::string_view pool, std::string_view base);
 
-  /// Takes the place of all that was there; what is more than kMost is left out. One writer, a soft thread.
+  /// Takes the place of all that was there; names beyond kMost are left out. One writer, a soft thread.
   void write(std::span<const RemoteNode> nodes) noexcept;
   /// `text`: "NAME@HOST". Nothing: it is not of that form, or nobody is called so. Any context: looks at up
   /// to kMost numbers.

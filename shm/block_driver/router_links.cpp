@@ -113,8 +113,8 @@ void BlockRouter::publish_host_routes() {
   }
 }
 
-// Links to those who are gone, or have begun a new life, lead nowhere. What has come from them is still
-// taken.
+// Links to those who are gone, or have begun a new life, lead nowhere. Blocks that have come from them are
+// still taken.
 void BlockRouter::drop_stale_links() {
   for (std::uint16_t node = 1; node <= kMaxNodes; ++node) {
     const bool linked = node == node_.life_.node || topology_.neighbours(node_.life_.node, node);
@@ -170,10 +170,10 @@ bool BlockRouter::open_from(std::uint16_t node) {
     if (memory.error().code == ErrorCode::corrupt) tell(memory.error());
     return true;
   }
-  // A fresh link in the same life replaces a broken one. What lies in that is lost, and counted.
+  // A fresh link in the same life replaces a broken one. The blocks in that are lost, and counted.
   if (gate.get() != nullptr) counters().expired.fetch_add(gate.get()->drop_all(), std::memory_order_relaxed);
   if (gate.exchange(std::make_unique<InLink>(*std::move(memory), life))) set_open(node, true);
-  node_.own_slot().arrivals.post();  // what came before it was open
+  node_.own_slot().arrivals.post();  // blocks that came before it was open
   return true;
 }
 

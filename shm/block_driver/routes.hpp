@@ -10,7 +10,7 @@
 
 namespace plchost {
 
-/// Who can talk to whom, as the directory says it at present. Soft threads.
+/// The connections between nodes, as the directory says at present. Soft threads.
 [[nodiscard]] Topology topology_of(const NodeDirectory& directory);
 
 /// The way to other hosts.
@@ -29,7 +29,7 @@ struct NodeInfo {
   std::uint16_t node = 0;
   NodeRecord record;
   std::uint64_t arrivals = 0;  ///< blocks that were sent to it over links of its own
-  // What it counts, see NodeCounters.
+  // Its counts, see NodeCounters.
   std::uint64_t forwarded = 0;
   std::uint64_t no_route = 0;
   std::uint64_t loops = 0;

@@ -108,7 +108,7 @@ PutResult RingWriter::put(BlockHeader header, std::span<const std::byte> content
   SlotDescriptor& descriptor = memory_.descriptors[tail & (memory_.slots - 1)];
   const BlockTag tag{.channel = header.channel, .destination = NodeAddress::from_number(header.destination)};
   descriptor.tag.store(tag.word(), std::memory_order_relaxed);
-  // Release pairs with the acquire in look(): who sees the position sees the block.
+  // Release pairs with the acquire in look(): a reader that sees the position sees the block.
   descriptor.position.store(position_word(tail, slots), std::memory_order_release);
   memory_.published->fetch_add(1, std::memory_order_release);
   return PutResult::put;

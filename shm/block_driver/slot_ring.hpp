@@ -26,7 +26,7 @@ inline constexpr std::uint32_t kMaxRingSlots = 16384;
   return slots >= kMinRingSlots && slots <= kMaxRingSlots && std::has_single_bit(slots);
 }
 
-/// What a reader can know of a block without touching it.
+/// A reader's knowledge of a block that it has not touched.
 struct BlockTag {
   std::uint32_t channel = 0;
   NodeAddress destination;
@@ -62,7 +62,7 @@ struct RingMemory {
 enum class PutResult : std::uint8_t {
   put,
   full,    ///< no room; nothing was put
-  broken,  ///< what the reader's end says cannot be: somebody scribbled there
+  broken,  ///< the reader's end is impossible: a stranger scribbled there
 };
 
 /// The end at which blocks are put in: one process, any number of its threads at once. A thread takes its
@@ -82,7 +82,7 @@ class RingWriter {
   Claim room_at(std::uint64_t tail, std::uint32_t slots) noexcept;
 
   RingMemory memory_;
-  // In this process only: what a stranger cannot reach need not be checked.
+  // In this process only: a stranger cannot reach it, so it need not be checked.
   alignas(64) std::atomic<std::uint64_t> tail_{0};
   std::atomic<std::uint64_t> head_seen_{0};
 };
@@ -145,7 +145,7 @@ class RingReader {
   [[nodiscard]] std::uint64_t damaged() const noexcept { return damaged_.load(std::memory_order_relaxed); }
 
  private:
-  /// What lies at a slot. `step` leads to the next one to look at.
+  /// The contents of a slot. `step` leads to the next one to look at.
   struct Found {
     std::uint64_t at = 0;
     std::uint32_t step = 1;

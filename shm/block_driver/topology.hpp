@@ -11,8 +11,8 @@ namespace plchost {
 /// Bit N - 1 is node N.
 using NodeSet = std::bitset<kMaxNodes>;
 
-/// Who can talk to whom, as the directory says it. All nodes see the same one, so all of them find the same
-/// ways; while it changes they may differ, which hop limit and path are for. Soft threads.
+/// The connections between nodes, as the directory says. All nodes see the same one, so all of them find the
+/// same ways; while it changes they may differ, which hop limit and path are for. Soft threads.
 class Topology {
  public:
   /// `talks_to`: the nodes that it is willing to talk to. Two are neighbours if both are.

@@ -126,7 +126,7 @@ Result<Opened> open_existing(const std::string& path, MemoryFile::Access access,
   Opened opened{.fd = UniqueFd(::open(path.c_str(), flags))};
   if (!opened.fd) {
     const int error = errno;
-    // What cannot be opened so: a folder to write, a link at all, a socket.
+    // These cannot be opened so: a folder to write, a link at all, a socket.
     if (::lstat(path.c_str(), &opened.status) == 0 && !S_ISREG(opened.status.st_mode)) {
       return not_a_plain_file(path, opened.status.st_mode);
     }
@@ -163,7 +163,7 @@ Result<UnnamedMemory> UnnamedMemory::make(const std::string& name, std::size_t s
 
 namespace {
 
-// A folder. What is in it is not looked at: it may be a stranger's trap.
+// A folder. Its contents are not looked at: they may be a stranger's trap.
 bool put_folder_away(const std::string& path) noexcept {
   if (::rmdir(path.c_str()) == 0 || errno == ENOENT) return true;
   if (errno != ENOTEMPTY && errno != EEXIST) return false;

@@ -52,8 +52,8 @@ class MemoryFile {
   [[nodiscard]] static Result<void> fill_empty(const std::string& name, std::size_t size,
                                                const OwnerCheck& owners = is_trusted_owner);
 
-  /// Removes the name if it is there; who has it mapped keeps it. False: it is another user's, and the folder
-  /// is sticky.
+  /// Removes the name if it is there; processes that have it mapped keep it. False: it is another user's, and
+  /// the folder is sticky.
   static bool remove(const std::string& name) noexcept;
 
   [[nodiscard]] std::span<std::byte> bytes() const noexcept { return mapping_.bytes(); }
@@ -77,8 +77,8 @@ class UnnamedMemory {
   [[nodiscard]] std::span<std::byte> bytes() const noexcept { return memory_.bytes(); }
   /// Of the file that has the name: whether this one takes its place.
   using TakeOver = std::function<bool(const std::string& path)>;
-  /// already_exists: the name is taken, and `take_over` says no. refused: it is another user's file. What has
-  /// lost its name by that is freed when this goes. Once.
+  /// already_exists: the name is taken, and `take_over` says no. refused: it is another user's file. A memory
+  /// that has lost its name by that is freed when this goes. Once.
   [[nodiscard]] Result<MemoryFile> give_name(const TakeOver& take_over);
 
  private:

@@ -11,7 +11,7 @@
 
 namespace plchost {
 
-/// Who may use a shared memory, as with any file.
+/// The rights to a shared memory, as with any file.
 struct MemoryRights {
   std::optional<uid_t> owner = std::nullopt;  ///< nothing: the caller
   std::optional<gid_t> group = std::nullopt;  ///< nothing: the caller's
@@ -26,7 +26,7 @@ using OwnerCheck = std::function<bool(uid_t owner)>;
 /// For a client that joins what another user has set up: the files of a host belong to whoever runs it.
 [[nodiscard]] bool is_any_owner(uid_t owner) noexcept;
 
-/// What an object allows the calling process. Root may do all. Set-up.
+/// The rights of the calling process to an object. Root may do all. Set-up.
 struct Permission {
   bool read = false;
   bool write = false;

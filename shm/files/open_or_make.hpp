@@ -6,7 +6,7 @@
 
 namespace plchost {
 
-/// What of another kind, that is found under the name, the new file takes the place of.
+/// The files, found under the name, whose place the new file takes.
 enum class Replaces : std::uint8_t {
   nothing,   ///< the error of `open` stays
   foreign,   ///< a file of another user, or no file at all

@@ -21,8 +21,8 @@ namespace plchost {
 /// Set-up.
 [[nodiscard]] bool may_own_memory(std::string_view pool, uid_t user);
 
-/// Removes the names of all shared memories of the pool but those in `kept`; who has one mapped keeps it.
-/// Set-up.
+/// Removes the names of all shared memories of the pool but those in `kept`; processes that have one mapped
+/// keep it. Set-up.
 void remove_pool_memories(std::string_view pool, std::span<const std::string> kept = {}) noexcept;
 
 }  // namespace plchost

@@ -13,7 +13,7 @@ namespace plchost {
 namespace {
 
 Result<void> write_all(const std::string& path, std::string_view text, mode_t mode) {
-  // What a run before this one has left may have other rights.
+  // A left-over of a run before this one may have other rights.
   if (::unlink(path.c_str()) != 0 && errno != ENOENT)
     return failure(ErrorCode::system, "remove " + path, errno);
   const UniqueFd fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode));

@@ -9,14 +9,14 @@
 
 namespace plchost {
 
-/// Gives the file at `path` the contents `text`, all or nothing: who reads it sees the old contents or the
-/// new ones, also after a loss of power. Makes the file if there is none. `mode`: its permission bits, of
-/// which umask may take some; it never has others, not even while it is written. system: why it stays as it
-/// was. Set-up.
+/// Gives the file at `path` the contents `text`, all or nothing: a reader sees the old contents or the new
+/// ones, also after a loss of power. Makes the file if there is none. `mode`: its permission bits, of which
+/// umask may take some; it never has others, not even while it is written. system: why it stays as it was.
+/// Set-up.
 [[nodiscard]] Result<void> replace_file(const std::string& path, std::string_view text, mode_t mode = 0644);
 
-/// What was made, renamed or removed in the folder is so for good when it returns, also after a loss of
-/// power. Set-up.
+/// Files that were made, renamed or removed in the folder are so for good when it returns, also after a loss
+/// of power. Set-up.
 [[nodiscard]] Result<void> sync_directory(const std::string& path);
 
 }  // namespace plchost

@@ -12,7 +12,7 @@
 #include "shm/plc_obj_tab.h"
 #include "shm/pool/object_pool.hpp"
 
-/// What a SEM_ID of the seed's table leads to: the table's own guard, or an object of the pool.
+/// The target of a SEM_ID of the seed's table: the table's own guard, or an object of the pool.
 struct plc_sem {
   std::variant<std::recursive_timed_mutex*, plchost::SharedSemaphore, plchost::SharedMutex,
                plchost::SharedEvent>

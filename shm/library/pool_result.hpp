@@ -22,7 +22,7 @@ int out_of_order(const char* text) noexcept;
 /// The name that plc_pool_open means.
 [[nodiscard]] std::string pool_name_of(const char* name);
 
-/// For set-up calls: what is thrown within becomes a result.
+/// For set-up calls: an exception thrown within becomes a result.
 template <class Call>
 int guarded(Call call) noexcept {
   try {

@@ -100,7 +100,7 @@ Result<ExceptionHistory> read_exceptions(const std::string& path) {
   std::error_code ignored;
   const auto type = std::filesystem::status(path, ignored).type();
   if (type == std::filesystem::file_type::not_found) return ExceptionHistory{};
-  // What would make the open wait for ever is not opened.
+  // A file that would make the open wait for ever is not opened.
   if (type != std::filesystem::file_type::regular && type != std::filesystem::file_type::none) {
     return corrupt(path, "is not a regular file");
   }

@@ -22,8 +22,8 @@ struct ExceptionEntry {
   std::string signal;                ///< "SIGSEGV"; empty: none
   std::uint64_t address = 0;         ///< of the instruction; 0: not known
   std::string symbol;                ///< "fill(int)+0x12 in bottling.so"; empty: not known
-  std::uint64_t memory_address = 0;  ///< what SIGSEGV and SIGBUS were about
-  std::string text;                  ///< what happened, with its figures
+  std::uint64_t memory_address = 0;  ///< the address of SIGSEGV and SIGBUS
+  std::string text;                  ///< the cause, with its figures
   bool operator==(const ExceptionEntry&) const = default;
 };
 

@@ -20,7 +20,7 @@ namespace plchost {
 
 namespace {
 
-/// Whose a file may be.
+/// The users that a file may belong to.
 enum class Owners : std::uint8_t { trusted, writers_of_pool };
 
 // Nothing: the name is none of this host's.

@@ -9,10 +9,10 @@
 
 namespace plchost {
 
-/// What another user has put under one of a host's names in /dev/shm.
+/// A file that another user has put under one of a host's names in /dev/shm.
 struct ForeignFile {
   std::string path;
-  std::string rights;  ///< whose it was
+  std::string rights;  ///< its owner
   Result<void> taken_away;
 };
 

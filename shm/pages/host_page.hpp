@@ -13,7 +13,7 @@
 
 namespace plchost {
 
-/// What the supervisor says of an instance. The numbers are part of the DDS API.
+/// The supervisor's report of an instance. The numbers are part of the DDS API.
 enum class InstanceState : std::uint32_t {
   offline = 0,    ///< no process: not started yet, or ended for good
   starting = 1,   ///< the process sets itself up
@@ -60,7 +60,7 @@ struct InstancePlan {
   std::uint32_t share_core = 0;
   FixedText<15> priority_band;
   FixedText<kMaxPath> settings;     ///< path; empty: the runtime's defaults
-  FixedText<kMaxPath> application;  ///< path; empty: none. What is loaded may be another one
+  FixedText<kMaxPath> application;  ///< path; empty: none. The loaded one may be another one
   FixedText<kMaxAfter> after;       ///< names of the instances that it waits for, with commas between
 };
 
@@ -79,7 +79,7 @@ struct InstanceStatus {
   InstancePlan plan;
 };
 
-/// What the manager knows, for others to read. One writer: the manager's Reactor thread.
+/// The manager's knowledge, for others to read. One writer: the manager's Reactor thread.
 struct HostPageLayout {
   std::uint64_t magic = 0;  ///< written last
   std::uint32_t version = 0;

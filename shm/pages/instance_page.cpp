@@ -69,7 +69,7 @@ bool is_described(const InstancePageLayout& page, std::size_t tasks, HistogramSh
          page.size == size_for(tasks, shape);
 }
 
-// As a whole: who has written over it may have changed any byte.
+// As a whole: a program that has written over it may have changed any byte.
 template <class Value>
 bool is_same(const Value& one, const Value& other) noexcept {
   static_assert(std::is_trivially_copyable_v<Value>);

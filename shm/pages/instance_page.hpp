@@ -25,7 +25,7 @@ enum class PageTaskKind : std::uint32_t { cyclic = 0, event = 1, external = 2, f
 enum class PageTaskState : std::uint32_t { created = 0, running = 1, stopped = 2, exception = 3 };
 [[nodiscard]] std::string_view to_string(PageTaskState state) noexcept;
 
-/// What the application of an instance is doing. The numbers are part of the DDS API.
+/// The state of an instance's application. The numbers are part of the DDS API.
 enum class ApplicationState : std::uint32_t {
   none = 0,          ///< there is no application
   stopped = 1,       ///< loaded; its tasks are parked
@@ -36,7 +36,7 @@ enum class ApplicationState : std::uint32_t {
 };
 [[nodiscard]] std::string_view to_string(ApplicationState state) noexcept;
 
-/// What does not change while the application is loaded.
+/// The constants of a loaded application.
 struct TaskIdentity {
   FixedText<kMaxTaskName> name;
   FixedText<kMaxEventName> external_event;  ///< empty unless kind is external
@@ -65,7 +65,7 @@ struct ClockRuntime {
   std::uint64_t steps = 0;
 };
 
-/// What the instance says of itself. Written by its control thread.
+/// The instance's report of itself. Written by its control thread.
 struct InstanceRuntime {
   std::int32_t pid = 0;
   std::int32_t core = -1;     ///< read back from the kernel; -1 if bound to several
@@ -76,7 +76,7 @@ struct InstanceRuntime {
   FixedText<kMaxPath> application;
   FixedText<kMaxTickText> tick_source;    ///< where the periodic tick comes from
   FixedText<kMaxTickText> tick_fallback;  ///< why that is not what the settings ask for; empty: it is
-  FixedText<kMaxTickText> idle_states;    ///< what of the processor's idle states is held off, or why not
+  FixedText<kMaxTickText> idle_states;    ///< the idle states of the processor that are held off, or why not
   ClockRuntime clock;
   ApplicationState state = ApplicationState::none;
   FixedText<kMaxPath> problem;         ///< why it is in exception; else empty
@@ -110,7 +110,7 @@ struct InstancePageLayout {
 /// The file whose lock says that a process runs under that name.
 [[nodiscard]] std::string instance_claim_name(std::string_view pool, std::string_view instance);
 
-/// What the process knows of the fault of a task.
+/// The process's knowledge of the fault of a task.
 struct KnownFault {
   bool raised = false;                  ///< its record may be written at any time
   const FaultRecord* record = nullptr;  ///< null: not complete yet
@@ -132,7 +132,7 @@ class InstancePage {
   void set_task_state(std::uint32_t index, PageTaskState state) noexcept;
   [[nodiscard]] PageTaskState task_state(std::uint32_t index) const noexcept { return states_[index]; }
   /// Writes the header, what tasks are, their states and their faults anew where another program has written
-  /// over them. true: one had. What a task counts is written anew by its next cycle. Control thread.
+  /// over them. true: one had. The counters of a task are written anew by its next cycle. Control thread.
   [[nodiscard]] bool keep(const std::function<KnownFault(std::uint32_t)>& fault);
   /// Where task `index` < task_count() writes its statistics. As long as the page.
   [[nodiscard]] TaskStatistics& statistics(std::uint32_t index) noexcept { return statistics_[index]; }
@@ -167,14 +167,14 @@ class InstancePageReader {
   [[nodiscard]] static Result<InstancePageReader> open(std::string_view pool, std::string_view instance);
   [[nodiscard]] std::optional<InstanceRuntime> runtime() const noexcept;
   [[nodiscard]] std::uint32_t task_count() const noexcept { return task_count_; }
-  /// What does not change of a task, so no writer is in the way. Nothing: a stranger has written over it.
+  /// The constants of a task, so no writer is in the way. Nothing: a stranger has written over it.
   [[nodiscard]] std::optional<TaskIdentity> identity(std::uint32_t index) const noexcept;
   /// Nothing if the writer was in the way; try again later.
   [[nodiscard]] std::optional<TaskSnapshot> task(std::uint32_t index) const noexcept;
   /// The histogram as it is now and goes on growing; `index` < task_count().
   [[nodiscard]] HistogramView histogram(std::uint32_t index, TaskHistogram which) const noexcept;
   [[nodiscard]] HistogramShape histogram_shape() const noexcept { return shape_; }
-  /// What put the task into exception; nothing: nothing did.
+  /// The fault that put the task into exception; nothing: none did.
   [[nodiscard]] std::optional<FaultRecord> fault(std::uint32_t index) const noexcept;
   /// Changes when the task ran: readers that publish look at this first.
   [[nodiscard]] std::uint64_t task_sequence(std::uint32_t index) const noexcept;

@@ -13,7 +13,7 @@
 
 namespace plchost {
 
-/// Who said a line. The numbers are part of the DDS API.
+/// The origin of a line. The numbers are part of the DDS API.
 enum class LogSource : std::uint32_t {
   runtime = 0,      ///< plc-instance
   application = 1,  ///< the application, by plc_log
@@ -21,7 +21,7 @@ enum class LogSource : std::uint32_t {
   manager = 3,
 };
 
-/// What was said, before it is written down.
+/// A line, before it is written down.
 struct LogEntry {
   std::int64_t time_unix_ns = 0;
   std::int32_t pid = 0;  ///< of the instance's process; 0: none
@@ -54,7 +54,7 @@ using LogRingLayout = LogRingPage::Layout;
 
 [[nodiscard]] std::string log_ring_name(std::string_view pool, std::string_view instance);
 
-/// What an instance said last, in a shared memory of its own that outlives the instance and the manager.
+/// The last lines of an instance, in a shared memory of its own that outlives the instance and the manager.
 /// One writer: the manager. It never waits, and no process of an instance writes to it.
 class LogRing {
  public:

@@ -22,7 +22,7 @@ class ReferenceClockRecord {
   /// Opens it, or makes it if it is not there or its file is empty. corrupt: there is something else of that
   /// name, or another version.
   [[nodiscard]] static Result<ReferenceClockRecord> open(std::string_view pool, std::string_view name);
-  /// Removes the name; who has it mapped keeps it.
+  /// Removes the name; processes that have it mapped keep it.
   static void remove(std::string_view pool, std::string_view name) noexcept;
 
   [[nodiscard]] plc_reference_clock& record() const noexcept;

@@ -13,7 +13,7 @@
 
 namespace plchost {
 
-/// Who changed its state. The numbers are part of the DDS API.
+/// The part that changed its state. The numbers are part of the DDS API.
 enum class TransitionSource : std::uint32_t {
   application = 0,  ///< the states are ApplicationStates; written by the instance
   process = 1,      ///< the states are InstanceStates; written by the manager
@@ -60,7 +60,7 @@ class TransitionRing {
   TransitionRingPage page_;
 };
 
-/// A reader's end, in any process: what was written since it looked last, in order.
+/// A reader's end, in any process: the entries since its last look, in order.
 class TransitionRingReader {
  public:
   /// A number that was given and is not written for so long was given to a process that died: it is left out.

@@ -10,7 +10,7 @@
 
 namespace plchost {
 
-/// Who holds an object.
+/// A process that holds an object.
 struct ReferenceInfo {
   std::uint32_t pid = 0;
   std::string program;

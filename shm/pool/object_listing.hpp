@@ -5,8 +5,8 @@
 
 namespace plchost {
 
-/// What there is to say of an object. Needs the pool's mutex, or that nothing was changed meanwhile; keeps to
-/// the segment in any case.
+/// The description of an object. Needs the pool's mutex, or that nothing was changed meanwhile; keeps to the
+/// segment in any case.
 [[nodiscard]] ObjectInfo describe_object(const PoolView& view, const ObjectEntry& entry);
 
 }  // namespace plchost

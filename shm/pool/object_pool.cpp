@@ -20,11 +20,11 @@
 
 namespace plchost {
 
-/// What is to be made or opened.
+/// The object to make or open.
 struct ObjectPool::Wanted {
   std::string_view name;
   ObjectType type = ObjectType::event;
-  std::size_t size = 0;  // memory; 0: whatever it has
+  std::size_t size = 0;  // memory; 0: the size that it has
   std::uint32_t value = 0;
 };
 
@@ -69,7 +69,8 @@ Result<void> check_group(const ObjectOptions& options) {
                                                  ::geteuid(), *options.group));
 }
 
-// What options leave open is as with the pool, but for the group of who is not in the pool's: it is his own.
+// Rights that the options leave open are those of the pool. The group of a process that is not in the pool's
+// is its own.
 MemoryRights rights_for(const ObjectOptions& options, const std::string& pool) {
   struct stat status{};
   const std::string path = MemoryFile::path(pool);
@@ -289,9 +290,9 @@ Result<Created<T>> ObjectPool::create_object(const Wanted& wanted, const ObjectO
   return created;
 }
 
-// Without the lock, whose word it may not write. What it sees while somebody changes the table it sees again,
-// until `until`; then, and if that one has died over it, what is seen has to do: each single change leaves
-// lists that can be read.
+// Without the lock, whose word it may not write. If another process changes the table meanwhile, it looks
+// again, until `until`. Then, and if that process has ended over it, the last look has to do: each single
+// change leaves lists that can be read.
 template <class Look>
 auto ObjectPool::look_only(TimePoint until, Look look) const {
   constexpr auto kPause = std::chrono::milliseconds(1);

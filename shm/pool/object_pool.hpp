@@ -23,9 +23,9 @@ inline constexpr std::uint32_t kMinObjects = 16;
 inline constexpr std::uint32_t kMaxObjects = 1'000'000;
 
 struct PoolOptions {
-  /// kMinObjects to kMaxObjects. What counts is the number that the pool was made with.
+  /// kMinObjects to kMaxObjects. The number that the pool was made with counts.
   std::uint32_t max_objects = 4096;
-  /// Who may use it. What counts is what it was made with.
+  /// The rights to it. Those that it was made with count.
   MemoryRights rights = {};
 };
 
@@ -33,15 +33,15 @@ struct PoolOptions {
 struct ObjectOptions {
   /// It lives on without a reference, also across the ends of all processes, until it is removed.
   bool keep = false;
-  /// Who may use it: nothing is the caller and the pool's group (if he is not in that, his own). Another
-  /// group than one of the caller's is refused, as with files. Permission bits as those of a file, 0 are the
-  /// pool's. Of a memory the kernel watches over them; of the others, which lie in the pool itself, this
-  /// library does, for all who have the right to write the pool.
+  /// The rights to it: nothing means the caller and the pool's group (if the caller is not in that, its own).
+  /// Another group than one of the caller's is refused, as with files. Permission bits as those of a file, 0
+  /// are the pool's. Of a memory the kernel watches over them; of the others, which lie in the pool itself,
+  /// this library does, for all who have the right to write the pool.
   std::optional<gid_t> group = std::nullopt;
   mode_t mode = 0;
 };
 
-/// What create gives: an object, and whether it was made or was there already (with its own options then).
+/// The result of create: an object, and whether it was made or was there already (with its own options then).
 template <class T>
 struct Created {
   T object;
@@ -50,7 +50,7 @@ struct Created {
 
 class PoolLock;
 
-/// What became of a pool since tidy() was called last.
+/// The changes of a pool since tidy() was called last.
 struct PoolFindings {
   bool lost = false;  ///< its file was cut short by a stranger, and this process is alone with what it has
   std::uint32_t headers_mended = 0;  ///< so often had a stranger written over its header
@@ -91,7 +91,8 @@ class ObjectPool {
   Result<PoolEvent> open_event(std::string_view name) const&& = delete;
 
   // The object of that name, made if it is not there. It goes with its last reference, unless it is kept.
-  // full: no room. wrong_type, wrong_size: what is there is another one. refused: its rights do not allow it.
+  // full: no room. wrong_type, wrong_size: the present object is another one. refused: its rights do not
+  // allow it.
   [[nodiscard]] Result<Created<SharedEvent>> create_shared_event(std::string_view name,
                                                                  const ObjectOptions& options = {});
   /// `value` <= CountingSemaphore::kMaxValue.
@@ -126,10 +127,10 @@ class ObjectPool {
   /// One of them. not_found.
   [[nodiscard]] Result<ObjectInfo> look_at(std::string_view name) const;
 
-  /// Releases what dead clients held, mends what a stranger wrote over, and makes objects of the memories
-  /// that firmware has made with a header alone (see PoolAdoption), without waiting for the next call of
-  /// anyone. Ends after some 20 ms if there is much to release, or another one holds the lock: what is left
-  /// is for the next time. For whoever watches over the host, from one thread.
+  /// Releases the references of dead clients, mends the damage of strangers, and makes objects of the
+  /// memories that firmware has made with a header alone (see PoolAdoption). It does so without waiting for
+  /// the next call of any client. Ends after some 20 ms if there is much to release, or another one holds the
+  /// lock: the rest is for the next time. For whoever watches over the host, from one thread.
   PoolFindings tidy() noexcept;
 
   [[nodiscard]] const std::string& name() const noexcept;

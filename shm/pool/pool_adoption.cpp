@@ -25,7 +25,7 @@ namespace {
 
 static_assert(PLC_IMAGE_MAX_NAME == kMaxObjectName);
 
-/// What the file of a memory is.
+/// The kind of a memory's file.
 struct MemoryFileState {
   enum class Kind : std::uint8_t {
     none,        ///< nothing, or nothing to be read
@@ -73,7 +73,7 @@ MemoryFileState examine(const std::string& path) {
   std::memcpy(&image, begin.data(), sizeof(image));
   std::memcpy(&clock, begin.data(), sizeof(clock));
   const auto size = static_cast<std::uint64_t>(state.status.st_size);
-  // What its magic numbers begin with.
+  // The beginning of its magic numbers.
   constexpr std::string_view kOfBlocks = "pblk";
   if (size == 0) {
     state.kind = Kind::empty;
@@ -213,7 +213,7 @@ void PoolAdoption::look() {
   look_at_entries();
 }
 
-// A folder that has not changed is not looked at again; the time of a change is exact only to some ms, and a
+// A folder that has not changed is not looked at again. The time of a change is exact only to some ms, and a
 // file is complete only some time after its name is there.
 void PoolAdoption::look_at_files() {
   constexpr int kNamesAtOnce = 4000;

@@ -11,7 +11,7 @@
 
 namespace plchost {
 
-/// Who uses a pool. All functions need the pool's mutex.
+/// The users of a pool. All functions need the pool's mutex.
 class PoolClients {
  public:
   PoolClients(const PoolView& view, PoolJournal& journal) noexcept : view_(view), journal_(journal) {}

@@ -8,7 +8,7 @@ namespace plchost {
 
 struct ObjectEntry;
 
-/// What a post did.
+/// The effect of a post.
 enum class PostResult : std::uint8_t {
   posted,          ///< counted, and tasks took posts at that moment: each of them runs for it, or, if it is
                    ///< stopped before, counts it as lost

@@ -8,7 +8,7 @@ namespace {
 
 constexpr unsigned kPlaceShift = 32;
 
-// A thread that is killed has done all that stands before the instruction which it did not come to, and the
+// A thread that is killed has done all that stands before the instruction which it did not come to. The
 // kernel lets others see it before they see the end of the thread. So only the compiler is to be held back.
 void keep_order() noexcept {
   std::atomic_signal_fence(std::memory_order_seq_cst);

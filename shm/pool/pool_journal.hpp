@@ -7,9 +7,9 @@
 
 namespace plchost {
 
-/// How the words that the pool's mutex guards are written: what was there is noted in the header first. Who
-/// takes the mutex after a death puts that back, so that what the dead one had begun has not happened: in a
-/// time that does not depend on the number of objects. All functions need the mutex.
+/// How the words that the pool's mutex guards are written: the old values are noted in the header first. The
+/// next process that takes the mutex after a death puts those back. So the unfinished step of the dead one
+/// has not happened: in a time that does not depend on the number of objects. All functions need the mutex.
 ///
 /// Not written this way is what nobody looks at before a word that is: the contents of a free place. Nor are
 /// generations: that of an object may grow without a reason.
@@ -19,7 +19,7 @@ class PoolJournal {
   PoolJournal(PoolHeader& header, std::size_t size) noexcept : header_(header), size_(size) {}
 
   void set(std::atomic<std::uint32_t>& word, std::uint32_t value) noexcept;
-  /// What was changed up to here stays.
+  /// All changes up to here stay.
   void commit() noexcept;
   /// Puts back what was changed since the last commit(). false, and nothing is done: a stranger has written
   /// over what was noted.
@@ -30,7 +30,7 @@ class PoolJournal {
 
   PoolHeader& header_;
   std::size_t size_;
-  std::uint32_t noted_ = 0;  // since the last commit(); what is shared could be a stranger's
+  std::uint32_t noted_ = 0;  // since the last commit(); a shared one could be a stranger's
 };
 
 }  // namespace plchost

@@ -19,7 +19,7 @@
 //
 // Objects hang in chains by the hash of their name: bucket -> entry.next -> ... References hang in two lists,
 // that of their object and that of their client. A link is the index of an entry plus one, so that
-// zero-filled memory is a valid empty table. What somebody had begun who is killed, the next one undoes (see
+// zero-filled memory is a valid empty table. The next process undoes the unfinished step of a killed one (see
 // PoolJournal). All lists can be made anew from the entries themselves: that is for what strangers do to
 // them.
 
@@ -45,9 +45,9 @@ enum class EntryState : std::uint32_t {
 struct alignas(64) ObjectEntry {
   // One cache line of its own: all that a post, wait, lock or unlock touches.
   CountedEvent event;
-  /// Who may post and wait, in one word, so that taking an entry away and binding it cannot both succeed:
-  /// [ generation : 32 ][ registered : 1 ][ bound tasks : 31 ]. Objects of all types have their generation
-  /// here.
+  /// The registration and the bound tasks in one word, so that taking an entry away and binding it cannot
+  /// both succeed: [ generation : 32 ][ registered : 1 ][ bound tasks : 31 ]. Objects of all types have their
+  /// generation here.
   std::atomic<std::uint64_t> binding;
   CountingSemaphore semaphore;
   std::atomic<std::uint32_t> state;  ///< an EntryState; written last when the object is made
@@ -86,7 +86,7 @@ struct alignas(64) ClientSlot {
   std::atomic<std::int64_t> looked_ns;    ///< CLOCK_MONOTONIC when it was last seen alive
   Link first_reference;
   std::atomic<std::uint32_t> reference_count;
-  std::atomic<std::uint32_t> ended;  ///< 1: what it holds is being released
+  std::atomic<std::uint32_t> ended;  ///< 1: its references are being released
   std::atomic<std::uint32_t> image;  ///< of the process, see image_of()
   FixedText<23> name;                ///< of the program
 };
@@ -117,7 +117,7 @@ struct alignas(64) PoolHeader {
   std::uint32_t bucket_count;
   std::uint32_t max_clients;
   std::uint32_t max_references;
-  /// Of all clients, see plchost::pid_namespace(). What is here of processes is numbers of that namespace.
+  /// Of all clients, see plchost::pid_namespace(). All numbers of processes here are of that namespace.
   std::uint64_t pid_namespace;
   std::array<std::uint32_t, 4> reserved0;
 

@@ -17,7 +17,7 @@ std::string describe_holder(std::uint32_t thread) {
   return fmt::format("process {} ({})", owner->pid, owner->program);
 }
 
-// Who holds the lock has the pool mapped. Where that cannot be seen it is taken for granted.
+// The holder of the lock has the pool mapped. Where that cannot be seen it is taken for granted.
 bool has_mapped(std::uint32_t thread, const std::string& pool) {
   std::ifstream mappings(fmt::format("/proc/{}/maps", thread));
   if (!mappings) return true;

@@ -32,10 +32,10 @@ class PoolLock {
   PoolLock& operator=(PoolLock&&) = delete;
   ~PoolLock();
 
-  /// The last owner died while it held the mutex: what it had begun must be undone.
+  /// The last owner died while it held the mutex: its unfinished step must be undone.
   [[nodiscard]] bool owner_died() const noexcept { return owner_died_; }
 
-  /// What is taken away with the lock held, and goes after its release.
+  /// The files that are taken away with the lock held, and go after its release.
   MemoryTrash trash;
   /// Dead clients still hold something.
   bool burying = false;

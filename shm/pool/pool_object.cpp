@@ -8,12 +8,12 @@ namespace plchost {
 
 namespace {
 
-// One that is killed between its post and its wake has left the post: who waits looks for it so often.
+// One that is killed between its post and its wake has left the post: a waiter looks for it so often.
 constexpr Duration kLook = std::chrono::milliseconds(40);
 // Nobody wakes who could not say that he waits.
 constexpr Duration kUnmarkedLook = std::chrono::milliseconds(1);
 
-// Who waits for ever looks now and then whether the object is still there.
+// A waiter without a limit looks now and then whether the object is still there.
 TimePoint next_look(TimePoint deadline) noexcept {
   constexpr Duration kInterval = std::chrono::milliseconds(200);
   return std::min(deadline, MonotonicClock::now() + kInterval);

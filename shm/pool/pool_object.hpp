@@ -15,7 +15,7 @@ namespace plchost {
 
 class PoolSegment;
 
-/// What an operation on an object did. The C API has a result for each.
+/// The result of an operation on an object. The C API has a result for each.
 enum class ObjectStatus : std::uint8_t {
   done = 0,
   timed_out,
@@ -99,9 +99,9 @@ class SharedEvent : public PoolObject {
   }
   /// Posts since it was made.
   [[nodiscard]] std::uint64_t count() const noexcept;
-  /// Waits until more than `cursor` posts were made, and sets it to their number: what was posted in between
-  /// is count - cursor. Begin with count(). bad_cursor: it is of another event, or of none. The right to read
-  /// is enough; through a pool that was attached to read only posts are looked for every millisecond.
+  /// Waits until more than `cursor` posts were made, and sets it to their number: count - cursor were posted
+  /// in between. Begin with count(). bad_cursor: it is of another event, or of none. The right to read is
+  /// enough; through a pool that was attached to read only posts are looked for every millisecond.
   ObjectStatus wait(std::uint64_t& cursor, TimePoint deadline = kNoDeadline) const noexcept;
   /// For the runtime, which binds tasks to it.
   [[nodiscard]] PoolEvent event() const noexcept;

@@ -5,8 +5,8 @@
 
 namespace plchost {
 
-/// Who holds which object. All functions need the pool's mutex, and keep to the segment whatever a stranger
-/// wrote into it: a list that is damaged is made anew.
+/// The references of each process to the objects of the pool. All functions need the pool's mutex, and keep
+/// to the segment whatever a stranger wrote into it: a list that is damaged is made anew.
 class PoolReferences {
  public:
   PoolReferences(const PoolView& view, PoolJournal& journal) noexcept : view_(view), journal_(journal) {}

@@ -26,7 +26,7 @@ PoolHeader& header_of(const MemoryFile& memory) noexcept {
   return *reinterpret_cast<PoolHeader*>(memory.bytes().data());
 }
 
-// What never changes while the pool is there.
+// The constants of a pool.
 void write_constants(PoolHeader& header, std::uint32_t max_objects, std::uint64_t pid_namespace) noexcept {
   header.version = kPoolVersion;
   header.entry_size = sizeof(ObjectEntry);
@@ -188,7 +188,7 @@ Result<std::shared_ptr<PoolSegment>> PoolSegment::create(const std::string& name
 }
 
 Result<PoolLock> PoolSegment::acquire(Duration patience) {
-  // Who was waited for in vain just now is waited for once more only for a moment.
+  // A second wait for a holder that was waited for in vain just now is short.
   constexpr Duration kMoment = std::chrono::milliseconds(5);
   PoolHeader& header = view_.header();
   const std::uint32_t stuck = stuck_.load(kRelaxed);
@@ -270,7 +270,7 @@ PoolFindings PoolSegment::take_findings() noexcept {
           .lost_objects = now.lost_objects - before.lost_objects};
 }
 
-// What an owner that died had begun is undone; an object that it was making or taking away goes.
+// The unfinished step of an owner that died is undone; an object that it was making or taking away goes.
 void PoolSegment::repair(PoolLock& held) noexcept {
   PoolHeader& header = view_.header();
   header.repairs.fetch_add(1, kRelaxed);

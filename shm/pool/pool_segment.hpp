@@ -42,13 +42,13 @@ class PoolSegment {
 
   /// The file was cut short by a stranger.
   [[nodiscard]] bool lost() const noexcept { return memory_.lost(); }
-  /// Who changes the pool now has died over it, and nobody has come since. Set-up; only reads.
+  /// The process that changes the pool has ended over it, and none has come since. Set-up; only reads.
   [[nodiscard]] bool holder_has_ended() const noexcept { return view_.header().mutex.owner_has_ended(); }
 
-  /// Who holds it finds nothing half-done, and what dead clients held released: as much as can be released in
-  /// `kBurial` (others have their turn meanwhile), the rest is for the next one.
-  /// refused: mapped to read only. wrong_state: this process is a child of the one that attached. timed_out:
-  /// another one holds it for longer than `patience`. corrupt: lost, or the lock is.
+  /// Its holder finds nothing half-done. The references of dead clients are released: as many as can be
+  /// released in `kBurial` (others have their turn meanwhile), the rest is for the next one. refused: mapped
+  /// to read only. wrong_state: this process is a child of the one that attached. timed_out: another one
+  /// holds it for longer than `patience`. corrupt: lost, or the lock is.
   [[nodiscard]] Result<PoolLock> lock(bool look_thoroughly = false, Duration patience = PoolLock::kPatience);
   static constexpr Duration kBurial = std::chrono::milliseconds(20);
 
@@ -106,11 +106,11 @@ class PoolSegment {
   PoolJournal journal_;
   ClientSlot* client_ = nullptr;  // that this client has
   std::uint32_t client_generation_ = 0;
-  /// Who held the lock when somebody of this process has waited for it in vain: it is not waited for again as
-  /// long. 0: nobody.
+  /// The holder of the lock when a thread of this process has waited for it in vain: it is not waited for
+  /// again as long. 0: nobody.
   std::atomic<std::uint32_t> stuck_{0};
   PoolFindings told_;
-  /// What could not be released, since the lock was not to be had.
+  /// The references that could not be released, since the lock was not to be had.
   std::mutex late_guard_;
   std::vector<std::pair<ReferenceEntry*, std::uint32_t>> late_;
 };

@@ -11,9 +11,9 @@
 
 namespace plchost {
 
-/// The objects of a pool by name. All functions but peek() need the pool's mutex. Whatever a stranger wrote
-/// into the segment, each of them ends, after at most one look at every entry, and touches nothing outside of
-/// the segment.
+/// The objects of a pool by name. All functions but peek() need the pool's mutex. Each of them ends after at
+/// most one look at every entry, and touches nothing outside of the segment, also if a stranger wrote into
+/// it.
 class PoolTable {
  public:
   PoolTable(const PoolView& view, PoolJournal& journal) noexcept : view_(view), journal_(journal) {}
@@ -30,8 +30,8 @@ class PoolTable {
   void withdraw(ObjectEntry& entry) noexcept;
   /// Frees it; handles on it are invalid from here on.
   void erase(ObjectEntry& entry) noexcept;
-  /// Makes the index and the free list anew from the entries, and frees those that are not valid. Who dies in
-  /// here leaves `rebuilding` behind.
+  /// Makes the index and the free list anew from the entries, and frees those that are not valid. A process
+  /// that dies in here leaves `rebuilding` behind.
   void rebuild() noexcept;
 
   [[nodiscard]] static bool is_valid(const ObjectEntry& entry) noexcept;

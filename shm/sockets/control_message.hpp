@@ -14,7 +14,7 @@ namespace plchost {
 /// 1: first. 2: requests have a time limit.
 inline constexpr int kControlVersion = 2;
 
-/// What can be asked of an instance, by the API server of the manager and by the manager of the instance.
+/// The requests about an instance, by the API server to the manager and by the manager to the instance.
 enum class ControlVerb : std::uint8_t {
   start,                 ///< run the application
   stop,                  ///< stop the application; the process stays

@@ -11,8 +11,8 @@
 
 namespace plchost {
 
-/// Reads one table of the file key by key. What is wrong goes to `problems`, with line, key, value and what
-/// is allowed, and leaves the target as it was; reading goes on, so that one run shows all errors.
+/// Reads one table of the file key by key. An error goes to `problems`, with line, key, value and the allowed
+/// values, and leaves the target as it was. Reading goes on, so that one run shows all errors.
 class SectionReader {
  public:
   /// `where` is how messages call the table: "[host]" or "[[instance]] 'line1'".

@@ -28,6 +28,7 @@ HELD = [
     ("document", "*.md"),
     ("comment", "manager/*"),
     ("comment", "[.C]*"),
+    ("comment", "shm/*"),
     ("comment", "tests/*"),
 ]
 GLOSSARY = "manager/glossary.md"
