@@ -1,47 +1,156 @@
 #!/usr/bin/env bash
-# The includes that each folder may have (the house has one direction). Usage: layers.sh [ROOT]; prints each wrong include.
+# Folders are layers: each of the six folders (and tests) draws its own in its README.md, in a block ```layers, and
+# every include of the code has to follow an arrow. Usage: layers.sh [ROOT]; prints each wrong include and drawing.
+#
+#   main ─► ./ ─► a/ b/        a layer may include what lies to the right of its arrow, and what those may include
+#   * ─► shm/base/             every layer of this drawing may; a name that begins with one of the six is another house's
+#
+# A layer is a folder without its sub-folders ("a/"; "./": the top), a folder with all below it ("examples/..."), or the
+# files of one name ("a/name": a/name.hpp, a/name.cpp), which are then no part of their folder's layer. To the right of
+# an arrow "a/..." may also stand for all layers below a/.
 set -euo pipefail
 cd "${1:-$(dirname "$0")/../..}"
+exec python3 - <<'PYTHON'
+import os, re, sys
 
-# folder: the folders it may include from (besides itself)
-allowed() {
-  local rooms="shm/files shm/log shm/base"
-  local shared="shm/block_driver shm/pool shm/pages shm/sockets $rooms"
-  case "$1" in
-    shm/base) echo "" ;;
-    shm/log | shm/toml | shm/sockets | shm/files) echo "shm/base" ;;
-    shm/pages | shm/pool | shm/block_driver) echo "$rooms" ;;
-    shm/library) echo "shm/pool shm/base" ;;
-    schedulers) echo "shm/base" ;;
-    instances/launch) echo "shm/log shm/base" ;;
-    instances) echo "instances/launch schedulers $shared" ;;
-    api/control) echo "shm/sockets shm/base" ;;
-    api/security) echo "shm/files shm/base" ;;
-    api) echo "api/control api/security shm/toml $shared" ;;
-    manager) echo "api/control api/security instances/launch shm/toml $shared" ;;
-  esac
-}
+HOUSES = ("shm", "schedulers", "instances", "api", "manager", "tests")
+ARROW = re.compile(r"\s*─+►\s*")
+faults = []
 
-# the longest layer that a path lies in
-layer_of() {
-  local layer
-  for layer in shm/base shm/log shm/toml shm/sockets shm/files shm/pages shm/pool shm/block_driver shm/library schedulers instances/launch instances api/control api/security api manager; do
-    case "$1" in "$layer"/*) echo "$layer"; return ;; esac
-  done
-  echo none
-}
 
-wrong=0
-while IFS=: read -r file line include; do
-  target=$(sed -E 's/.*#include "([^"]+)".*/\1/' <<<"$include")
-  from=$(layer_of "$file")
-  to=$(layer_of "$target")
-  [ "$to" = none ] && continue
-  [ "$from" = "$to" ] && continue
-  case " $(allowed "$from") " in
-    *" $to "*) ;;
-    *) echo "$file:$line: $from may not include $to ($target)"; wrong=1 ;;
-  esac
-done < <(grep -rnE '^[[:space:]]*#include "' --include='*.hpp' --include='*.cpp' --include='*.h' --include='*.c' \
-  shm schedulers instances api manager 2>/dev/null || true)
-exit $wrong
+def read_drawing(house):
+    """Adds the layers and arrows of one README to `arrows`: layer -> {layer: where it is drawn}."""
+    readme, drawn, every, inside = f"{house}/README.md", [], [], False
+    if not os.path.exists(readme):
+        return None
+    lines = open(readme, encoding="utf-8").read().splitlines()
+    if "```layers" not in lines:
+        return None
+
+    def named(word):
+        if word.split("/")[0] in HOUSES:
+            return word
+        return f"{house}/" if word == "./" else f"{house}/{word}"
+
+    for number, line in enumerate(lines, 1):
+        if line.startswith("```"):
+            inside = line == "```layers"
+        elif inside and line.strip():
+            steps = [step.split() for step in ARROW.split(line.strip())]
+            for left, right in zip(steps, steps[1:]):
+                if left == ["*"]:
+                    every += [named(word) for word in right]
+                    continue
+                drawn += [(named(a), named(b), f"{readme}:{number}") for a in left for b in right]
+            if len(steps) == 1:
+                drawn += [(named(a), named(a), f"{readme}:{number}") for a in steps[0]]
+    own = {layer for arrow in drawn for layer in arrow[:2] if layer.startswith(f"{house}/")}
+    for layer in own:
+        arrows.setdefault(layer, {})
+    for a, b, where in drawn:
+        if a != b:
+            arrows.setdefault(a, {}).setdefault(b, where)
+    for layer in own:
+        for target in every:
+            if layer != target:
+                arrows[layer].setdefault(target, readme)
+    return own
+
+
+def sources(layer):
+    """Whether there is a file in the layer."""
+    folder, _, name = layer.rpartition("/")
+    if name == "...":
+        return any(f.endswith(KINDS) for _, _, files in os.walk(folder) for f in files)
+    if not os.path.isdir(folder):
+        return False
+    return any(f.endswith(KINDS) and name in ("", f.rpartition(".")[0]) for f in os.listdir(folder))
+
+
+def layer_of(path):
+    """The layer that a file belongs to; None: it is in no drawing."""
+    folder, _, file = path.rpartition("/")
+    for layer in (f"{folder}/{file.rpartition('.')[0]}", f"{folder}/"):
+        if layer in arrows:
+            return layer
+    while folder:
+        if f"{folder}/..." in arrows:
+            return f"{folder}/..."
+        folder = folder.rpartition("/")[0]
+    return None
+
+
+def reach(layer, known):
+    """All that the layer may include, by any number of arrows."""
+    if layer not in known:
+        known[layer] = set()
+        for target in arrows.get(layer, {}):
+            known[layer] |= {target} | reach(target, known)
+    return known[layer]
+
+
+def find_circle():
+    """The layers of one way that ends where it began, or nothing."""
+    done, way = set(), []
+
+    def walk(layer):
+        if layer in way:
+            return way[way.index(layer):] + [layer]
+        if layer in done:
+            return None
+        way.append(layer)
+        for target in arrows.get(layer, {}):
+            if found := walk(target):
+                return found
+        way.pop()
+        done.add(layer)
+        return None
+
+    return next(filter(None, map(walk, list(arrows))), None)
+
+
+KINDS = (".hpp", ".cpp", ".h", ".c")
+arrows = {}
+houses = [house for house in HOUSES if os.path.isdir(house)]
+for house in houses:
+    if read_drawing(house) is None:
+        if any(f.endswith(KINDS) for _, _, files in os.walk(house) for f in files):
+            faults.append(f"{house}/README.md: it has no drawing of its layers (a block ```layers)")
+for layer, targets in arrows.items():
+    for target in [target for target in targets if target.endswith("/...") and target not in arrows]:
+        below = [name for name in arrows if name.startswith(target[:-3]) and name != layer]
+        targets.update((name, targets[target]) for name in below)
+        if below:
+            del targets[target]
+for layer in [*arrows, *(target for targets in arrows.values() for target in targets)]:
+    if not sources(layer):
+        faults.append(f"{layer.split('/')[0]}/README.md: there is no layer {layer}, or no file in it")
+    elif layer not in arrows:
+        faults.append(f"{layer.split('/')[0]}/README.md: the layer {layer} is not in the drawing of its own README.md")
+if circle := find_circle():
+    faults.append("the arrows go round: " + " ─► ".join(circle))
+else:
+    known = {}
+    include = re.compile(r'\s*#\s*include "([^"]+)"')
+    undrawn = set()
+    for house in houses:
+        for folder, _, files in os.walk(house):
+            for file in sorted(files):
+                path = f"{folder}/{file}"
+                if not file.endswith(KINDS):
+                    continue
+                here = layer_of(path)
+                if here is None:
+                    undrawn.add(folder)
+                    continue
+                for number, line in enumerate(open(path, encoding="utf-8", errors="replace"), 1):
+                    found = include.match(line)
+                    if not found or found[1].split("/")[0] not in HOUSES or "/" not in found[1]:
+                        continue
+                    there = layer_of(found[1])
+                    if there and there != here and there not in reach(here, known):
+                        faults.append(f"{path}:{number}: {here} may not include {there} ({found[1]})")
+    faults += [f"{folder}: it is not in the drawing of {folder.split('/')[0]}/README.md" for folder in sorted(undrawn)]
+print(*dict.fromkeys(faults), sep="\n", end="\n" if faults else "")
+sys.exit(bool(faults))
+PYTHON

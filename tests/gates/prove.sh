@@ -35,9 +35,43 @@ new_tree() {
 }
 commit_tree() { git -C "$plot/tree" init -q && git -C "$plot/tree" add -A; }
 
-new_tree
-echo '#include "shm/pool/object_pool.hpp"' >"$plot/tree/schedulers/task.hpp"
-must_be_red layers "schedulers/task.hpp:1: schedulers may not include shm/pool" "$gates/layers.sh" "$plot/tree"
+# The whole tree: the drawings of the layers are held against each other, too.
+rm -rf "$plot/tree" && mkdir "$plot/tree"
+git ls-files -z '*.hpp' '*.cpp' '*.h' '*.c' '*README.md' | tar -c --null -T - | tar -x -C "$plot/tree"
+"$gates/layers.sh" "$plot/tree" || { echo "the tree of the layers' proofs is wrong before anything is planted"; failed=1; }
+
+# must_not_include FILE HEADER DIAGNOSTIC: the include is planted in a header of a lower layer, and taken away again
+must_not_include() {
+  printf '#include "%s"\n' "$2" >"$plot/tree/$1"
+  must_be_red "layers: $1" "$1:1: $3" "$gates/layers.sh" "$plot/tree"
+  rm "$plot/tree/$1"
+}
+must_not_include shm/base/planted.hpp shm/files/lock_file.hpp "shm/base/ may not include shm/files/"
+must_not_include shm/pool/planted.cpp shm/pages/host_page.hpp "shm/pool/ may not include shm/pages/"
+must_not_include schedulers/tick/planted.hpp schedulers/task_set.hpp "schedulers/tick/ may not include schedulers/"
+must_not_include schedulers/planted.hpp shm/pool/object_pool.hpp "schedulers/ may not include shm/pool/"
+must_not_include instances/runtime/settings/planted.hpp instances/runtime/application/application.hpp \
+  "instances/runtime/settings/ may not include instances/runtime/application/"
+must_not_include api/dds/planted.hpp api/client/control_client.hpp "api/dds/ may not include api/client/"
+must_not_include manager/system/planted.hpp manager/config/load_config.hpp "manager/system/ may not include manager/config/"
+must_not_include manager/planted.hpp instances/runtime/settings/settings.hpp "manager/ may not include instances/runtime/settings/"
+must_not_include tests/unit/base/planted.cpp shm/pool/object_pool.hpp "tests/unit/base/ may not include shm/pool/"
+must_not_include shm/files/planted.hpp tests/support/own_name.hpp "shm/files/ may not include tests/support/own_name"
+mkdir "$plot/tree/shm/attic" && touch "$plot/tree/shm/attic/planted.hpp"
+must_be_red "layers: folder" "shm/attic: it is not in the drawing of shm/README.md" "$gates/layers.sh" "$plot/tree"
+rm -r "$plot/tree/shm/attic"
+
+# must_not_draw LINE DIAGNOSTIC: the line is planted in the drawing of shm, and taken away again
+must_not_draw() {
+  cp shm/README.md "$plot/README.md"
+  sed -i "s|^\`\`\`layers\$|&\n$1|" "$plot/tree/shm/README.md"
+  must_be_red "layers: drawing" "$2" "$gates/layers.sh" "$plot/tree"
+  mv "$plot/README.md" "$plot/tree/shm/README.md"
+}
+must_not_draw "base/ ─► library/" "shm/base/ ─► shm/library/ ─► shm/pool/"
+must_not_draw "attic/ ─► base/" "shm/README.md: there is no layer shm/attic/, or no file in it"
+rm "$plot/tree/shm/README.md"
+must_be_red "layers: no drawing" "shm/README.md: it has no drawing of its layers" "$gates/layers.sh" "$plot/tree"
 
 new_tree
 printf 'int  main( ){return 0;}\n' >"$plot/tree/shm/base/ugly.cpp"
