@@ -29,7 +29,7 @@ extern "C" {
 #define CDECL
 #define PLC_EXPORT __attribute__((visibility("default")))
 
-/* What a program must export. */
+/* The functions that a program must export. */
 PLC_EXPORT extern const unsigned int plc_app_abi;
 PLC_EXPORT int CDECL plc_app_init(void);
 PLC_EXPORT void CDECL plc_app_exit(void);
@@ -86,8 +86,8 @@ typedef void(CDECL* PLC_TASK_FUNCTION)(void);
  * tJitterMax is the one of largest magnitude; both stay 0 unless the task is cyclic. A value that does not
  * fit is cut to the nearest int.
  *
- * The functions have no argument. What belongs to one task is kept in static variables of its function; if
- * several tasks share a function, plc_current_task() tells them apart.
+ * The functions have no argument. Data of one task are kept in static variables of its function. If several
+ * tasks share a function, plc_current_task() tells them apart.
  */
 typedef struct {
   char stName[51];                           /* letters, digits, '_', '-', '.'; unique in the application */
@@ -114,8 +114,8 @@ typedef struct {
   Task_Info* ptaskinfo; /* nTasks of them; they live as long as the application */
 } sys_setup_tasks_struct;
 
-/* Hands the task configuration over. Once, from plc_app_init. What is wrong with it is reported by the
- * runtime, with the task's name, after plc_app_init has returned. Control. */
+/* Hands the task configuration over. Once, from plc_app_init. The runtime reports its faults, with the task's
+ * name, after plc_app_init has returned. Control. */
 void CDECL __sys__setup__tasks(sys_setup_tasks_struct* p);
 
 #define PLC_LATE_NEXT 0 /* a late cyclic task waits for the next point of its grid */
@@ -124,7 +124,8 @@ void CDECL __sys__setup__tasks(sys_setup_tasks_struct* p);
 #define PLC_WATCHDOG_APPLICATION 0 /* a hit puts the whole application into exception */
 #define PLC_WATCHDOG_TASK 1        /* a hit puts only the task into exception */
 
-/* What the seed's Task_Info has no place for. Fill it with zeros first: zero is the default everywhere. */
+/* The options for which the seed's Task_Info has no place. Fill it with zeros first: zero is the default
+ * everywhere. */
 typedef struct {
   unsigned int dwSize;    /* sizeof(Task_Options) */
   RTS_I64 nStartOffsetNs; /* cyclic: 0 to below the interval; where in its period the task is released */
@@ -162,7 +163,7 @@ RTS_HANDLE CDECL SchedGetCurrentTask(void);
  * A new interval is the distance between the release that is planned now and the one after it: set within the
  * task's own cycle it already places the release that follows this cycle; set by others, while the task waits
  * for a release, that release stays. It holds until it is set again, also across an exchange of the scheduler
- * and a stop and start; a reset brings the configured one back. What Get returns is what was set last.
+ * and a stop and start; a reset brings the configured one back. Get returns the value that was set last.
  * ERR_OK; ERR_PARAMETER: not the handle of a cyclic task, or out of range; ERR_NOTINITIALIZED: the tasks are
  * not made yet (plc_app_init). Any.
  */
@@ -193,8 +194,8 @@ int CDECL plc_start_kind(void);
  */
 
 /*
- * An area is a piece of memory of the application that lies where the settings of the instance want it
- * ([SysMem] Area.N, by its flags), and that the runtime may exchange with others, or keep:
+ * An area is a piece of memory of the application. It lies where the settings of the instance want it
+ * ([SysMem] Area.N, by its flags), and the runtime may exchange it with others, or keep it:
  *
  *     input     copied in at the start of each cycle of a task that uses it
  *     output    copied out at the end of each cycle of a task that uses it
@@ -202,10 +203,10 @@ int CDECL plc_start_kind(void);
  *     persistent    keeps them over a cold reset, too (with or without RETAIN)
  *     others    plain memory that all tasks share
  *
- * Inputs and outputs: each task that uses the area has a copy of its own, so that no other task, of whatever
- * priority, changes it in the middle of a cycle, and nobody outside sees half of a cycle's outputs. A cycle
+ * Inputs and outputs: each task that uses the area has a copy of its own. So no other task, of whatever
+ * priority, changes it in the middle of a cycle, and no other program sees half of a cycle's outputs. A cycle
  * that does not come to its end (a fault) puts nothing out. Each byte of an output has one task that writes
- * it, by pUses; what is in no task's range is written by whichever task changes it (the last one wins).
+ * it, by pUses; bytes in no task's range are written by whichever task changes them (the last one wins).
  */
 #define PLC_AREA_DATA 0x0001u
 #define PLC_AREA_CONSTANT 0x0002u
@@ -240,7 +241,7 @@ typedef struct {
   const char* pszName;       /* 1 to PLC_MAX_AREA_NAME letters, digits, _ - . ; unique in the application */
   unsigned int dwBytes;      /* above 0 */
   unsigned int nUses;        /* 0: all tasks use it; an output of one task is all its own then */
-  const Plc_Area_Use* pUses; /* retain, persistent: who may be inside of a cycle that changes it */
+  const Plc_Area_Use* pUses; /* retain, persistent: the tasks whose cycles may change it */
   const void* pInitial;      /* dwBytes initial values, copied in the call; null: zeros */
   RTS_UI64 qwLayout;         /* retain, persistent: changes when the meaning of the bytes does; yours */
   void** ppAddress;          /* gets the address, if it is the same for all tasks; may be null */
@@ -250,14 +251,14 @@ typedef struct {
  * Declares an area. From plc_app_init only; it is placed, and its addresses are written, when that has
  * returned and before the first task runs. *pResult (may be null): ERR_OK; with RTS_INVALID_HANDLE:
  * ERR_PARAMETER (the log says what is wrong), ERR_DUPLICATE: an area of that name, ERR_NOMEMORY: there are
- * PLC_MAX_AREAS, ERR_NOTINITIALIZED. What cannot be placed refuses the application, with the line of the
- * settings. Control.
+ * PLC_MAX_AREAS, ERR_NOTINITIALIZED. An area that cannot be placed refuses the application, with the line of
+ * the settings. Control.
  */
 RTS_HANDLE CDECL plc_declare_area(const Plc_Area* pArea, RTS_RESULT* pResult);
 
-/* Where the area is for the code that calls: an input or output as the task sees it whose cycle runs on this
- * thread, null outside of a cycle (an event function is outside) or if the task does not use it; any other
- * area wherever it lies. Null: no such handle, or not placed yet. Any. */
+/* The address of the area for the caller. An input or output: the copy of the task whose cycle runs on this
+ * thread; null outside of a cycle (an event function is outside) or if the task does not use it. Any other
+ * area: the place where it lies. Null: no such handle, or not placed yet. Any. */
 void* CDECL plc_area_address(RTS_HANDLE hArea);
 
 #define PLC_AREA_INITIAL 0u  /* began with its initial values */
@@ -374,8 +375,8 @@ RTS_RESULT CDECL CAL_SysEventSet(RTS_HANDLE hEvent);
 /*
  * Instances send each other blocks of 0 to PLC_MAX_BLOCK bytes by address, in their cycles (CmpBlkDrvShm). A
  * channel is a named place where blocks come in, and from which they go to the channel of the same name of
- * another instance. An instance that opens one gets an address ([CmpBlkDrvShm] ForcedAddress, or any). What
- * nobody receives is dropped after a second ([CmpBlkDrvShm] HoldMs).
+ * another instance. An instance that opens one gets an address ([CmpBlkDrvShm] ForcedAddress, or any). A
+ * block that nobody receives is dropped after a second ([CmpBlkDrvShm] HoldMs).
  */
 #define PLC_MAX_BLOCK 65536u
 #define PLC_MAX_CHANNELS 256
@@ -387,7 +388,7 @@ RTS_RESULT CDECL CAL_SysEventSet(RTS_HANDLE hEvent);
 #define PLC_ALL_NODES 0xFFFFu /* every other node of this host; (host << 16) | PLC_ALL_NODES: of that one */
 #define PLC_ALL_HOSTS 0xFFFFFFFFu /* every other node of this and all other hosts */
 
-/* What has the higher priority is received first; each priority has queues of its own. */
+/* Blocks of the higher priority are received first; each priority has queues of its own. */
 #define PLC_BLOCK_EMERGENCY 0
 #define PLC_BLOCK_HIGH 1
 #define PLC_BLOCK_NORMAL 2
@@ -450,7 +451,7 @@ RTS_RESULT CDECL SysTimeGetNs(RTS_SYSTIME* pTime);
 /* Milliseconds, which begin anew at 0 after 2^32 of them. Any. */
 unsigned int CDECL SysTimeGetMs(void);
 
-/* What a library has to offer that is named in the settings. It is called from any context. */
+/* The functions of a library that the settings name. It is called from any context. */
 typedef RTS_RESULT(CDECL* PF_SYSTIME)(RTS_SYSTIME* pTime);
 
 /* ---- Messages -------------------------------------------------------------------------------------------
@@ -462,8 +463,8 @@ typedef RTS_RESULT(CDECL* PF_SYSTIME)(RTS_SYSTIME* pTime);
 #define PLC_LOG_MAX_TEXT 200
 
 /* Puts one line (cut to PLC_LOG_MAX_TEXT bytes) into the instance's log. It is only queued here and written
- * by the control thread within 100 ms; what the queue has no room for is counted, and the count is logged.
- * Any. */
+ * by the control thread within 100 ms; lines for which the queue has no room are counted, and the count is
+ * logged. Any. */
 void CDECL plc_log(int nLevel, const char* pszText);
 
 /* ---- Components -----------------------------------------------------------------------------------------

@@ -102,7 +102,7 @@ class ExternalEvent {
   RTS_HANDLE handle_ = RTS_INVALID_HANDLE;
 };
 
-/// Who registers the event of an external-event task.
+/// The side that registers the event of an external-event task.
 enum class Registration { with_task, by_others };
 
 /// A task of this application, while it runs. Empty until it comes from current() or find().
@@ -118,7 +118,7 @@ class Task {
   [[nodiscard]] explicit operator bool() const noexcept { return handle_ != RTS_INVALID_HANDLE; }
   [[nodiscard]] RTS_HANDLE handle() const noexcept { return handle_; }
 
-  /// What was set last; 0: not a cyclic task. Any context.
+  /// The interval that was set last; 0: not a cyclic task. Any context.
   [[nodiscard]] std::chrono::nanoseconds interval() const noexcept {
     RTS_I64 interval = 0;
     return std::chrono::nanoseconds(SchedGetTaskInterval(handle_, &interval) == ERR_OK ? interval : 0);
@@ -135,8 +135,8 @@ class Task {
   RTS_HANDLE handle_ = RTS_INVALID_HANDLE;
 };
 
-/// What a task has beyond its kind and priority; see Task_Options in plc_app.h. The settings of the instance
-/// win.
+/// The options of a task beyond its kind and priority; see Task_Options in plc_app.h. The settings of the
+/// instance win.
 struct TaskOptions {
   std::chrono::nanoseconds start_offset{0};  ///< cyclic: 0 to below the interval
   bool late_asap = false;       ///< cyclic: a late cycle runs at once, not at the next point of the grid
@@ -147,14 +147,14 @@ struct TaskOptions {
   bool watchdog_stops_task_only = false;
 };
 
-/// Who uses an area; see Plc_Area_Use in plc_app.h.
+/// The use of an area by a task; see Plc_Area_Use in plc_app.h.
 struct AreaUse {
   std::string task;
   unsigned int offset = 0;  ///< output: the bytes that this task alone writes
   unsigned int bytes = 0;   ///< 0: none of its own
 };
 
-/// What an area has beyond its name and flags; see Plc_Area in plc_app.h.
+/// The options of an area beyond its name and flags; see Plc_Area in plc_app.h.
 struct AreaOptions {
   std::vector<AreaUse> uses;  ///< empty: all tasks
   unsigned long layout = 0;   ///< retain, persistent: another number when T's members mean something else
@@ -244,7 +244,7 @@ class Application {
   }
 
   /// Once each time `variable` goes from false to true. `variable` is called by the scheduler and only reads:
-  /// what other tasks write and it reads should be std::atomic.
+  /// values that other tasks write and it reads should be std::atomic.
   void event(const std::string& name, int priority, Variable variable, Cycle cycle) {
     if (!variable)
       throw std::invalid_argument("task '" + name + "': its event variable is an empty function");

@@ -44,7 +44,7 @@ std::optional<int> core_of_record(std::string_view name) {
   return whole ? std::optional(core) : std::nullopt;
 }
 
-// What the file may hold: "n/a" or microseconds.
+// The valid contents of the file: "n/a" or microseconds.
 bool is_latency(std::string_view text) {
   int value = -1;
   const auto [stopped, error] = std::from_chars(text.data(), text.data() + text.size(), value);

@@ -22,8 +22,8 @@ enum class StartKind : std::uint8_t {
 /// invalid_argument: no such kind; the text lists what there is.
 [[nodiscard]] Result<StartKind> start_kind_of(std::string_view name);
 
-/// What a plc-instance is told when it is started: by the manager, or by hand. Both ends use this file, so
-/// that the command line has one home.
+/// The options of a plc-instance at its start, by the manager or by hand. Both ends use this file, so that
+/// the command line has one home.
 struct LaunchOptions {
   std::string name;                      ///< --name, at most kMaxInstanceName
   std::vector<int> cores;                ///< --core N[,N...]; empty: wherever it was started
@@ -40,7 +40,7 @@ struct LaunchOptions {
   std::string log_level = "info";  ///< --log-level
 };
 
-/// What `plc-instance --check-application` says of a valid one, behind its path: the proof that the trial
+/// The words of `plc-instance --check-application` for a valid one, behind its path: the proof that the trial
 /// came to its end.
 inline constexpr std::string_view kValidApplication = " is a valid application: ";
 
@@ -92,7 +92,7 @@ struct SetupReport {
 /// The number of the last ApplicationState.
 inline constexpr unsigned kLastApplicationState = 5;
 
-/// What an instance says of itself when it is asked for its status on its control socket.
+/// An instance's answer to a request for its status on its control socket.
 struct InstanceReport {
   int pid = 0;
   unsigned state = 0;       ///< ApplicationState

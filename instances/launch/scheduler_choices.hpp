@@ -5,8 +5,8 @@
 
 namespace plchost {
 
-/// The names that LaunchOptions::scheduler may have, from the registry of schedulers: who checks a
-/// configuration needs to know them without knowing the schedulers.
+/// The names that LaunchOptions::scheduler may have, from the registry of schedulers: a check of a
+/// configuration needs them without knowing the schedulers.
 [[nodiscard]] std::vector<std::string_view> scheduler_choices();
 
 }  // namespace plchost

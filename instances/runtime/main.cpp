@@ -27,7 +27,7 @@ namespace plchost {
 
 namespace {
 
-// The mask is set as a whole: whatever the starter had blocked, we have these two. Before any thread is made.
+// The mask is set as a whole: we have these two, whatever the starter had blocked. Before any thread is made.
 Result<UniqueFd> take_signals() {
   sigset_t signals;
   sigemptyset(&signals);
@@ -74,7 +74,7 @@ Result<void> serve(Instance& instance, const UniqueFd& signals) {
     std::uint64_t expirations = 0;
     if (fds[1].revents != 0 && ::read(heartbeat->get(), &expirations, sizeof expirations) > 0)
       instance.beat();
-    if (fds[3].revents != 0) instance.serve_faults();  // first: what is asked then finds the state right
+    if (fds[3].revents != 0) instance.serve_faults();  // first: later requests find the state right
     if (fds[2].revents != 0) instance.serve_control();
     instance.advance();
   }
@@ -92,8 +92,8 @@ int check_settings(const std::string& file) {
   return EXIT_SUCCESS;
 }
 
-// Line by line, so that what an application says right before it crashes is said; a line of up to 4096 bytes
-// goes into a pipe whole or not at all.
+// Line by line, so that the last lines of an application before a crash are written. A line of up to 4096
+// bytes goes into a pipe whole or not at all.
 void print_line_by_line() noexcept {
   static std::array<char, 4096> buffer;
   (void)std::setvbuf(stdout, buffer.data(), _IOLBF, buffer.size());
@@ -108,7 +108,7 @@ int run(const Options& options) {
     return kExitSetupFailed;
   }
   if (!options.check_application.empty()) {
-    // SIGTERM and not SIGKILL: what the application has forked ends, too.
+    // SIGTERM and not SIGKILL: processes that the application has forked end, too.
     if (options.parent != 0) ::prctl(PR_SET_PDEATHSIG, SIGTERM);
     if (options.parent != 0 && ::getppid() != options.parent) return kExitSetupFailed;
     set_log_pattern("%l: %v");  // read by people and told in answers

@@ -29,6 +29,7 @@ HELD = [
     ("comment", "manager/*"),
     ("comment", "[.C]*"),
     ("comment", "shm/*"),
+    ("comment", "instances/*"),
     ("comment", "tests/*"),
 ]
 GLOSSARY = "manager/glossary.md"

@@ -6,8 +6,8 @@
 //   Stop      external event  "stop" halts the line at once, the next "stop" lets it go on
 //   Report    cyclic, 1 s     one line of figures; not real-time
 //
-// All tasks run on one core, ordered by priority: what two of them share is atomic, and each value has one
-// writer.
+// All tasks run on one core, ordered by priority: values that two of them share are atomic, and each value
+// has one writer.
 
 #include <atomic>
 #include <cmath>

@@ -84,7 +84,7 @@ static int open_image(const options_t* options, const char* direction, int acces
   return error;
 }
 
-/* What the PLC wants, or all off if it has not said so lately. */
+/* The outputs of the PLC, or all off if it has not written them lately. */
 static void read_outputs(const options_t* options, const plc_image* image, channels_t* outputs,
                          figures_t* figures) {
   static plc_image_u64 last = 0;

@@ -6,8 +6,8 @@
  *   Palletise  freewheeling    takes cartons from the belt as they come, and stacks them
  *   Report     cyclic, 1 s     one line of figures; not real-time
  *
- * What it has counted outlives a crash and a power cut (area "counts"). With an I/O terminal (areas
- * "panel.out", "panel.in") Palletise shows its figures on the channels 0 to 2 of a panel, which echoes them.
+ * Its counts outlive a crash and a power cut (area "counts"). With an I/O terminal (areas "panel.out",
+ * "panel.in") Palletise shows its figures on the channels 0 to 2 of a panel, which echoes them.
  */
 #include <stdio.h>
 

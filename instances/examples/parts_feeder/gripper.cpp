@@ -25,7 +25,7 @@ struct Closer {
 template <class Handle, void (*Close)(Handle*)>
 using Owned = std::unique_ptr<Handle, Closer<Handle, Close>>;
 
-/// What `make` puts into its last argument.
+/// The value that `make` puts into its last argument.
 template <class Handle, void (*Close)(Handle*), class Make>
 Owned<Handle, Close> owned(const char* what, Make make) {
   Handle* handle = nullptr;

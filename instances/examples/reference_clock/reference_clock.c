@@ -75,7 +75,7 @@ static double random_unit(unsigned long* state) {
   return (double)((*state * 0x2545f4914f6cdd1dUL) >> 11) * (2.0 / 9007199254740992.0) - 1.0;
 }
 
-/* What the reference shows beyond EPOCH_NS, `elapsed_s` after the begin. */
+/* The reference's time beyond EPOCH_NS, `elapsed_s` after the begin. */
 static double reference_ns(double elapsed_s) {
   double ns = elapsed_s * 1e9 * (1.0 + options.drift_ppm * 1e-6) + options.offset_us * 1e3;
   if (options.wander_s > 0) {

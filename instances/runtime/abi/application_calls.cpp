@@ -1,5 +1,4 @@
-// What an application says of itself when it is loaded, what it asks about its start, and its log: see
-// plc_app.h.
+// The calls of an application about itself when it is loaded, about its start, and its log: see plc_app.h.
 
 #include "instances/runtime/application/application_host.hpp"
 #include "shm/base/names.hpp"

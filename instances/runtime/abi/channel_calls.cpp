@@ -1,4 +1,4 @@
-// What applications call to send each other blocks: see plc_app.h.
+// The calls by which applications send each other blocks: see plc_app.h.
 #include <algorithm>
 #include <cstring>
 #include <utility>

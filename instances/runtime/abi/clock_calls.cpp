@@ -1,4 +1,4 @@
-// What applications call of the distributed clock: see plc_app.h.
+// The calls of applications about the distributed clock: see plc_app.h.
 #include <algorithm>
 #include <cstring>
 #include <utility>

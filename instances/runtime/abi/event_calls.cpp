@@ -1,4 +1,4 @@
-// What applications and components call of external events: see plc_app.h.
+// The calls of applications and components about external events: see plc_app.h.
 
 #include "instances/runtime/application/application_host.hpp"
 #include "shm/log/log.hpp"

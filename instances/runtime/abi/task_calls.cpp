@@ -1,4 +1,4 @@
-// What applications call of their tasks: see plc_app.h.
+// The calls of applications about their tasks: see plc_app.h.
 
 #include "instances/runtime/application/application_host.hpp"
 #include "instances/runtime/tasks/current_task.hpp"

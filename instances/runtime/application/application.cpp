@@ -65,7 +65,7 @@ Result<Application> Application::load(const std::string& path, ApplicationHost& 
   host.begin_init();
   auto called = call_init(*object);
   host.end_init();
-  host.write_messages();  // what it said about itself goes before what we say
+  host.write_messages();  // its own error goes before ours
   if (!called) return std::unexpected(called.error());
   return built(*object, host.declaration());
 }

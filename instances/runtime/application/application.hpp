@@ -20,12 +20,12 @@ class Application {
   /// says what is wrong with the file or with which task. Control thread.
   [[nodiscard]] static Result<Application> load(const std::string& path, ApplicationHost& host);
 
-  /// The same for another version of the one that runs, which can lie beside that: what it says is collected
-  /// in `declaration`, and changes nothing of what runs.
+  /// The same for another version of the one that runs, which can lie beside that: its calls are collected in
+  /// `declaration`, and change nothing of the running one.
   [[nodiscard]] static Result<Application> load_beside(const std::string& path, ApplicationHost& host,
                                                        ApplicationDeclaration& declaration);
 
-  /// What the settings say about its tasks: wins over what it said itself.
+  /// The settings of its tasks: they win over the application's own.
   [[nodiscard]] Result<void> apply(std::span<const TaskSettings> settings) {
     return apply_task_settings(settings, tasks_);
   }
@@ -33,7 +33,7 @@ class Application {
   /// Calls plc_app_exit, if it has one. Once, when its tasks have ended, or run the code of another version.
   void exit();
 
-  /// What its tasks run, in their order: to be exchanged.
+  /// The functions of its tasks, in their order: to be exchanged.
   [[nodiscard]] const TaskCodes& codes() const noexcept { return codes_; }
   /// The tasks, whose code was exchanged, are from now on those of `next`; that is then the version before.
   void exchange(Application& next) noexcept;
@@ -44,7 +44,7 @@ class Application {
 
   [[nodiscard]] const std::string& path() const noexcept { return object_.path(); }
   [[nodiscard]] std::string name() const;
-  /// What the schedulers need to know. Their functions point into the application.
+  /// The facts that the schedulers need. Their functions point into the application.
   [[nodiscard]] const std::vector<TaskConfig>& tasks() const noexcept { return tasks_; }
   /// For those that put something around the cycles. Before the tasks are made.
   [[nodiscard]] std::span<TaskConfig> tasks_to_change() noexcept { return tasks_; }

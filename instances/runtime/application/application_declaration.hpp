@@ -10,7 +10,7 @@
 
 namespace plchost {
 
-/// What plc_keep_variables() names.
+/// The variables that plc_keep_variables() names.
 struct KeptVariables {
   std::string name;
   void* address = nullptr;  ///< in the application
@@ -25,7 +25,7 @@ struct EventCallback {
   bool operator==(const EventCallback&) const = default;
 };
 
-/// What an application says of itself in its plc_app_init.
+/// An application's declaration of itself in its plc_app_init.
 struct ApplicationDeclaration {
   sys_setup_tasks_struct* tasks = nullptr;  ///< in the application; null: nothing yet
   bool tasks_given_twice = false;

@@ -16,8 +16,8 @@
 
 namespace plchost {
 
-/// What stands behind the functions that plc_app.h declares. Those have no argument that says which runtime
-/// is meant: so there is one of these in a process, and it is found by current().
+/// The implementation of the functions that plc_app.h declares. Those have no argument that says which
+/// runtime is meant: so there is one of these in a process, and it is found by current().
 class ApplicationHost {
  public:
   ApplicationHost(const std::string& instance, ObjectPool* pool);
@@ -41,11 +41,11 @@ class ApplicationHost {
   [[nodiscard]] Areas& areas() noexcept { return areas_; }
   [[nodiscard]] const Areas& areas() const noexcept { return areas_; }
 
-  /// What the application that runs has said of itself.
+  /// The declaration of the running application.
   [[nodiscard]] const ApplicationDeclaration& declaration() const noexcept { return declaration_; }
 
   /// From here to end_init() a plc_app_init runs. `online`: of a program that is to take over from the one
-  /// that runs: what it says is collected there, and changes nothing else.
+  /// that runs: its calls are collected there, and change nothing else.
   void begin_init(ApplicationDeclaration* online = nullptr) noexcept;
   void end_init() noexcept;
   /// The caller is in the plc_app_init of a program that is to take over. Any context.
@@ -53,8 +53,8 @@ class ApplicationHost {
   /// The answer of plc_online_change().
   [[nodiscard]] bool online_change() const noexcept { return online_; }
   void set_online_change(bool online) noexcept { online_ = online; }
-  /// What `online` has said holds from now on. Callbacks of the program before, and others in its code as
-  /// `is_code` says, are forgotten.
+  /// The declaration of `online` holds from now on. Callbacks of the program before, and others in its code
+  /// as `is_code` says, are forgotten.
   void take_over(ApplicationDeclaration online, const std::function<bool(const void*)>& is_code);
   /// Registers the events of `online` that the program before has not registered; all, or none.
   [[nodiscard]] Result<void> register_more(const ApplicationDeclaration& online);

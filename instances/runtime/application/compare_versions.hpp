@@ -9,8 +9,8 @@
 
 namespace plchost {
 
-// What keeps another version of an application from taking over while it runs: a line for each, "task 'Fill':
-// nPriority is 2, of the one that runs it is 1". Empty: nothing. Set-up.
+// The reasons against another version of an application taking over while it runs: a line for each, "task
+// 'Fill': nPriority is 2, of the one that runs it is 1". Empty: nothing. Set-up.
 
 /// The same tasks, in any order; all that the application or the settings say of them.
 [[nodiscard]] std::vector<std::string> compare_tasks(std::span<const TaskConfig> running,

@@ -15,7 +15,7 @@ namespace plchost {
 // The steps that a start and its trial have in common: the settings, what stands ready before the application
 // is loaded, and what the application declares.
 
-/// What an instance is to run under.
+/// The settings and the device description of a start.
 struct StartSettings {
   InstanceSettings settings;
   std::optional<DeviceDescription> device;  ///< nothing: any external event is allowed
@@ -31,8 +31,7 @@ struct StartSettings {
 /// Whether the hooks of the components take what they need, or only say whether they could.
 enum class ComponentHooks : bool { check, init };
 
-/// Loads the components, has [SysTime] checked and used, and calls the hooks. What they log is written.
-/// Set-up.
+/// Loads the components, has [SysTime] checked and used, and calls the hooks. Their log is written. Set-up.
 [[nodiscard]] Result<void> load_components(const InstanceSettings& settings, ComponentHooks hooks,
                                            Components& components, ApplicationHost& host);
 

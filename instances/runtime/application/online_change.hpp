@@ -21,8 +21,8 @@ class OnlineChange {
   static constexpr Duration kLongestSetup = std::chrono::seconds(8);
 
   /// Loads it, has its plc_app_init called, and compares it with what runs, of which nothing is changed.
-  /// refused: it cannot take over; the text lists the reasons. timed_out: its set-up took too long. Else:
-  /// what is wrong with the file.
+  /// refused: it cannot take over; the text lists the reasons. timed_out: its set-up took too long. Else: the
+  /// fault of the file.
   [[nodiscard]] static Result<std::unique_ptr<OnlineChange>> prepare(const std::string& path,
                                                                      Application& running,
                                                                      ApplicationHost& host,
@@ -35,7 +35,7 @@ class OnlineChange {
   /// Copies the variables and gives the tasks the new functions. Once, while no task is in a cycle and no
   /// event variable is read; as long as the copying takes.
   void take_over() noexcept;
-  /// What is left to do then: callbacks, registrations, and the end of the version before. The callbacks for
+  /// The rest of the work: callbacks, registrations, and the end of the version before. The callbacks for
   /// external-event tasks are `notify`'s.
   void finish(const std::function<void()>& notify);
 

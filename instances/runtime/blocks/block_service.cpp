@@ -14,7 +14,7 @@ BlockService::~BlockService() {
 
 Result<void> BlockService::configure(const BlockSettings& settings) {
   settings_ = settings;
-  // Who forces an address wants to be found there.
+  // A node that forces an address wants to be found there.
   return settings_.enable || settings_.forced_address != 0 ? join() : Result<void>{};
 }
 

@@ -40,8 +40,8 @@ namespace plchost {
 //   single cycle   refused  begins    refused   busy          busy      refused
 //   set scheduler  next     next      switches  busy          busy      refused
 //
-// "next": of the next start. "busy": try again when it is over. What needs a fresh process (reset, restart,
-// load) is the manager's, in any state.
+// "next": of the next start. "busy": try again when it is over. Commands that need a fresh process (reset,
+// restart, load) are the manager's, in any state.
 class ApplicationLife {
  public:
   using Record = std::function<void(ApplicationState from, ApplicationState to, std::string_view reason)>;

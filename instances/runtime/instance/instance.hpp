@@ -95,13 +95,13 @@ class Instance {
   [[nodiscard]] Result<std::string> make_tasks();
   [[nodiscard]] Result<std::string> start_scheduler();
 
-  /// Who waits for the end of a stop, of a single cycle or of an online change.
+  /// The waiter for the end of a stop, of a single cycle or of an online change.
   struct Waiting {
     InstanceSocket::Asker asker;
     ControlVerb verb = ControlVerb::stop;
   };
 
-  // What it is asked to: instance_control.cpp
+  // Its commands: instance_control.cpp
   [[nodiscard]] std::optional<ControlReply> handle(const ControlRequest& request,
                                                    const InstanceSocket::Asker& asker);
   [[nodiscard]] Result<std::string> obey(const ControlRequest& request);

@@ -1,4 +1,4 @@
-// What an Instance does when it is asked to, over its control socket.
+// The actions of an Instance on commands of its control socket.
 
 #include <utility>
 
@@ -122,7 +122,7 @@ Result<std::string> Instance::change_registration(const ControlRequest& request)
   const auto kept =
       write_operator_events(operator_events_path(options_.launch.run_directory, options_.launch.name),
                             events.registered_by_operator());
-  if (!changed) return changed.error().message;  // it was there: what was wanted holds
+  if (!changed) return changed.error().message;  // it was there: the wish is fulfilled
   if (!kept) return fmt::format("done, but not kept for the next start: {}", kept.error().describe());
   return {};
 }

@@ -1,4 +1,4 @@
-// What an Instance does when one of its tasks has a fault.
+// The actions of an Instance when one of its tasks has a fault.
 
 #include <span>
 
@@ -37,7 +37,7 @@ void Instance::serve_faults() {
   }
 }
 
-// Logged, shown in the status page, and written down. What is to be said of it.
+// Logged, shown in the status page, and written down. The text about it.
 std::string Instance::keep_fault(const TaskSet::Fault& fault) {
   const ExceptionEntry entry = entry_of(fault, application_->path());
   const std::string where = entry.symbol.empty() ? std::string() : fmt::format(" at {}", entry.symbol);

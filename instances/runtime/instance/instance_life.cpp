@@ -82,7 +82,7 @@ void Instance::advance() {
   if (life_.state() == ApplicationState::single_cycle && !tasks_->stop_begun()) {
     const bool done = tasks_->single_cycle_done();
     if (!done && MonotonicClock::now() < single_cycle_ends_) return;
-    // Those that wait for their turn park at once; whoever does not is caught in its cycle.
+    // Those that wait for their turn park at once; a task that does not is caught in its cycle.
     const Duration patience = done ? start_.settings.stop.others : Duration(kParkPatience);
     (void)tasks_->begin_stop({.outputs = patience, .others = patience});
   }
@@ -136,7 +136,7 @@ void Instance::answer_waiting(ErrorCode code, const std::string& text) {
 
 void Instance::begin_shutdown(std::string_view why) {
   if (std::exchange(shutdown_requested_, true)) {
-    hurried_ = true;  // asked twice: whoever asks does not want to wait for cycles
+    hurried_ = true;  // asked twice: the caller does not want to wait for cycles
     return;
   }
   drop_change(std::string(why));

@@ -18,7 +18,7 @@ namespace plchost {
 /// Replies may come at once or later. Control thread.
 class InstanceSocket {
  public:
-  /// Who asked for what.
+  /// A request and its sender.
   struct Asker {
     std::uint64_t connection = 0;
     std::uint64_t number = 0;  ///< of the request

@@ -56,7 +56,7 @@ class AreaMemory {
   [[nodiscard]] static Result<void> check_pool(const ObjectPool& pool, const std::string& name,
                                                std::size_t bytes);
   [[nodiscard]] std::span<std::byte> bytes() const noexcept { return bytes_; }
-  /// Its file was cut short: what is written reaches nobody. Any context.
+  /// Its file was cut short: writes reach no reader. Any context.
   [[nodiscard]] bool lost() const noexcept { return mapping_.lost() || shared_.lost(); }
   /// It was there already, with what others have written: a device always was.
   [[nodiscard]] bool existed() const noexcept { return existed_; }

@@ -21,7 +21,7 @@
 
 namespace plchost {
 
-/// What a task does with its areas around each cycle.
+/// A task's work with its areas around each cycle.
 class TaskCycle {
  public:
   void add(InputView& view) { inputs_.push_back(&view); }
@@ -42,12 +42,13 @@ class TaskCycle {
     return inputs_.empty() && outputs_.empty() && counter_ == nullptr;
   }
 
-  // The four parts of a cycle, all real-time on the task's thread. What `entry` throws passes through run(),
-  // and then end() is not called: nothing is put out.
+  // The four parts of a cycle, all real-time on the task's thread. An exception of `entry` passes through
+  // run(), and then end() is not called: no output is written.
   void begin() noexcept;
   void run(const std::function<void()>& entry) const;
   void end() noexcept;
-  /// After the cycle: gives who saves retain variables a copy of them. false: nobody has asked for one.
+  /// After the cycle: gives the thread that saves retain variables a copy of them. false: nobody has asked
+  /// for one.
   bool give_kept() noexcept { return group_ != nullptr && group_->answer(may_wait_); }
 
  private:
@@ -62,7 +63,7 @@ class TaskCycle {
 /// The memory areas of one application.
 class Areas {
  public:
-  /// Who is asked for memory, and where it is kept.
+  /// The surroundings of the areas: the pool, the settings, the folder of the files.
   struct Environment {
     ObjectPool* pool = nullptr;  ///< null: check() looks at no pool; place() needs one
     std::string instance;
@@ -85,9 +86,10 @@ class Areas {
   /// Whether place() would find fault with what is declared: it begins with this. Makes and changes nothing,
   /// and opens no device, so that an instance can have all of it meanwhile. Set-up.
   [[nodiscard]] Result<void> check(const Environment& environment, std::span<const TaskConfig> tasks) const;
-  /// Places all that is declared, fills it with what was kept or with initial values, tells the application
-  /// the addresses, and puts the exchange of inputs and outputs around the cycles of the tasks that use them:
-  /// the others stay as they are. A text: remarks. Once, after the application was loaded; set-up.
+  /// Places all areas that are declared, fills them with retain values or with initial values, and tells the
+  /// application the addresses. Then puts the exchange of inputs and outputs around the cycles of the tasks
+  /// that use them: the others stay as they are. A text: remarks. Once, after the application was loaded;
+  /// set-up.
   [[nodiscard]] Result<std::string> place(const Environment& environment, std::span<TaskConfig> tasks);
   /// Lets no more of its areas be declared: plc_app_init has returned.
   void close() noexcept { open_ = false; }
@@ -101,8 +103,7 @@ class Areas {
     if (keeper_) keeper_->finish();
   }
 
-  /// What is to be told of memories that were cut short since it was asked last; empty: nothing. Control
-  /// thread.
+  /// The text about memories that were cut short since the last call; empty: none. Control thread.
   [[nodiscard]] std::vector<std::string> look_for_losses();
   /// RetainKeeper::problem(). Control thread.
   [[nodiscard]] std::string retain_problem() const { return keeper_ ? keeper_->problem() : std::string(); }

@@ -209,7 +209,7 @@ void Areas::make_image(Block& block, const AreaBlock& planned) {
   const auto size =
       static_cast<std::uint32_t>(planned.settings != nullptr ? planned.bytes : first_of(planned).bytes);
   auto* const header = reinterpret_cast<plc_image_header*>(block.memory.bytes().data());
-  // Made by firmware, it is one already; whatever else was there is none of theirs.
+  // Made by firmware, it is one already; any other one that was there is none of theirs.
   if (plc_image_is_one(header, size) == 0) plc_image_begin(header, size);
   block.initial.resize(size);
   if (first_of(planned).is_input()) {
@@ -242,7 +242,7 @@ void Areas::tell_plain_addresses() {
     } else {
       const auto bytes = blocks_[place.block].memory.bytes().subspan(place.offset, area.bytes);
       plain_[i] = bytes.data();
-      // What lies in a device or in the pool and is not kept, others may have written: it stays.
+      // Areas in a device or in the pool that are not retain may have been written by others: they stay.
       if (area.is_kept()) keeper_->memory().live_elsewhere(at_kept(), bytes);
       if (!area.is_kept() && !blocks_[place.block].memory.existed())
         std::ranges::copy(area.initial, bytes.begin());

@@ -38,7 +38,7 @@ struct DeclaredArea {
   [[nodiscard]] bool is_persistent() const noexcept { return (flags & PLC_AREA_PERSISTENT) != 0; }
 };
 
-/// Takes over what an application declares. invalid_argument: what is wrong, and what is allowed. Control
+/// Takes over what an application declares. invalid_argument: the fault, and the allowed values. Control
 /// thread.
 [[nodiscard]] Result<DeclaredArea> from_declaration(const Plc_Area& area);
 

@@ -40,7 +40,7 @@ bool KeptGroup::copy() const noexcept {
     before += count;
   }
   for (const Part& part : parts_) copy_moving(copy_.data() + part.offset, part.live.data(), part.live.size());
-  // Pairs with the release fence at the start of a cycle: what it writes is seen after its odd count.
+  // Pairs with the release fence at the start of a cycle: its writes are seen after its odd count.
   std::atomic_thread_fence(std::memory_order_acquire);
   std::uint64_t after = 0;
   for (const CycleCounter* const counter : counters_) after += counter->load(std::memory_order_relaxed);

@@ -10,8 +10,8 @@
 
 namespace plchost {
 
-/// Kept data that the same tasks may change, and how a copy of them is had that shows none of these tasks
-/// within a cycle, also if there is nearly always one: a task that has come to the end of its cycle makes it.
+/// Retain data that the same tasks may change, and the way to a copy that shows none of these tasks within a
+/// cycle. There may nearly always be one: so a task that has come to the end of its cycle makes the copy.
 class KeptGroup {
  public:
   /// A stretch of the data, and where it lies while the application runs.

@@ -156,7 +156,7 @@ void KeptMemory::add_group(const std::vector<std::size_t>& tasks,
   groups_.emplace_back(std::move(counters), std::move(parts));
 }
 
-// Whatever a cut has taken from the data, it has taken the end, too.
+// A cut that has taken any data has taken the end, too.
 bool KeptMemory::is_whole() const noexcept {
   const bool has_end = has_its_end(memory_.bytes());
   const Header& kept = header();
@@ -183,7 +183,7 @@ bool KeptMemory::snapshot(std::span<std::byte> copy) const noexcept {
   // Nobody else writes into that part of the data: it is a copy for the next process.
   for (const auto& [offset, live] : elsewhere_) copy_moving(data().data() + offset, live.data(), live.size());
   copy_moving(copy.data(), data().data(), copy.size());
-  // Pairs with the release fence at the start of a cycle: what it writes is seen after its odd count.
+  // Pairs with the release fence at the start of a cycle: its writes are seen after its odd count.
   std::atomic_thread_fence(std::memory_order_acquire);
   for (std::size_t i = 0; i < before.size(); ++i) {
     if (counters[i].load(std::memory_order_relaxed) != before[i]) return false;

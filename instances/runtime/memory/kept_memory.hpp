@@ -20,11 +20,11 @@
 namespace plchost {
 
 /// The memory in which the variables of retain areas lie while the application runs: a memory of the pool, so
-/// that it outlives the process. What it says about itself is checked before use: strangers can write to it.
+/// that it outlives the process. Its header is checked before use: strangers can write to it.
 class KeptMemory {
  public:
-  /// What the process before left under that name. not_found: there is none. corrupt: none that is whole.
-  /// Set-up.
+  /// The data that the process before left under that name. not_found: there is none. corrupt: none that is
+  /// whole. Set-up.
   struct Left {
     RetainImage image;         ///< its generation: that of the last one that was written to a file
     std::size_t in_cycle = 0;  ///< tasks that were within a cycle when the process ended
@@ -34,7 +34,7 @@ class KeptMemory {
   /// The one that was left behind, with all that was written into it until now; it has this layout. Set-up.
   [[nodiscard]] static Result<KeptMemory> take_over(ObjectPool& pool, const std::string& name,
                                                     const RetainLayout& layout);
-  /// A new one with these data; what was there under the name goes. It has its name only when it is whole.
+  /// A new one with these data; the one before under the name goes. It has its name only when it is whole.
   /// Set-up.
   [[nodiscard]] static Result<KeptMemory> make(ObjectPool& pool, const std::string& name,
                                                const RetainImage& image);
@@ -55,10 +55,10 @@ class KeptMemory {
                  const std::vector<std::pair<std::size_t, std::size_t>>& stretches);
   /// Each stretch of the data is in one of them.
   [[nodiscard]] std::deque<KeptGroup>& groups() noexcept { return groups_; }
-  /// False: another program has cut or overwritten the memory, or one in which an area lives elsewhere. What
-  /// is in it is worth nothing, and so is a copy that was made before this was asked. Soft thread.
+  /// False: another program has cut or overwritten the memory, or one in which an area lives elsewhere. Its
+  /// contents are worth nothing, and so is a copy that was made before this was asked. Soft thread.
   [[nodiscard]] bool is_whole() const noexcept;
-  /// What lives elsewhere is in the memory as it was taken. Soft thread.
+  /// Areas that lie elsewhere are in the memory as they were copied. Soft thread.
   void copy_elsewhere(std::span<const std::byte> taken) const noexcept;
 
   /// Copies the data as they are at the end of cycles: no task was within one meanwhile. false: one was, and

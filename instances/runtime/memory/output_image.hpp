@@ -30,7 +30,7 @@ class OutputImage {
   void write(std::span<const std::byte> bytes) noexcept { plc_image_write(&image_, bytes.data()); }
 
   /// Calls `merge` on a copy of the latest image (of zeros, if there is none) in `scratch`, then publishes
-  /// that; again, with a fresh copy, as long as others were faster. false: too often.
+  /// that. It does so again, with a fresh copy, as long as others were faster. false: too often.
   template <class Merge>
   [[nodiscard]] bool merge(std::span<std::byte> scratch, const Merge& merge) noexcept {
     for (int attempt = 0; attempt < kAttempts; ++attempt) {

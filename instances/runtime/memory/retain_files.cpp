@@ -15,7 +15,7 @@ namespace plchost {
 
 namespace {
 
-// No file of ours is larger; what is, is not read.
+// No file of ours is larger; a larger one is not read.
 constexpr std::size_t kMaxFile = kMaxRetainBytes + (std::size_t{1} << 16);
 
 Result<std::string> read_whole(const std::string& path) {
@@ -74,7 +74,7 @@ std::string RetainFiles::path(std::uint64_t generation) const {
 
 auto RetainFiles::read() const -> Found {
   Found found;
-  // What a stranger can put there becomes no value of a machine.
+  // A file that a stranger can put there becomes no value of a machine.
   if (const auto ours = check_own_folder(directory_); !ours && ours.error().code == ErrorCode::refused) {
     found.problems.push_back(ours.error().describe());
     return found;

@@ -108,7 +108,7 @@ Result<RetainImage> decode_retain(std::string_view file) {
   const auto expected = take<std::uint64_t>(behind);
   const std::string_view checked = file.substr(0, file.size() - sizeof(std::uint64_t));
   if (crc64(bytes_of(checked)) != expected) return no_image("its checksum is wrong");
-  // What the checksum lets pass is checked all the same: it may be made on purpose.
+  // All fields are checked, also if the checksum is right: it may be made on purpose.
   std::string_view rest = checked;
   const auto header = take<FileHeader>(rest);
   if (header.magic != kMagic) return no_image("it is of another kind or version");

@@ -26,7 +26,8 @@ inline constexpr std::size_t kMaxRetainBytes = std::size_t{1} << 24;
 /// Of each area's offset.
 inline constexpr std::size_t kRetainAlignment = 8;
 
-/// What belongs to which variables. Two are equal exactly if values kept by the one are the other's.
+/// The layout: which bytes belong to which variables. Two are equal exactly if values kept by the one are the
+/// other's.
 struct RetainLayout {
   std::string application;
   std::vector<RetainArea> areas;
@@ -48,7 +49,7 @@ struct RetainImage {
 
 /// The contents of a file, with a checksum over all of it (CRC-64/XZ).
 [[nodiscard]] std::string encode(const RetainImage& image);
-/// corrupt: cut, changed, or something else. Whatever the bytes are, it either is a whole image or refused.
+/// corrupt: cut, changed, or something else. Any bytes are either a whole image or refused.
 [[nodiscard]] Result<RetainImage> decode_retain(std::string_view file);
 
 /// CRC-64/XZ.

@@ -13,7 +13,7 @@ namespace plchost {
 
 namespace {
 
-// What the areas of two layouts have in common, for people.
+// The common areas of two layouts, for people.
 std::string describe_difference(const RetainLayout& kept, const RetainLayout& wanted) {
   if (kept.application != wanted.application) {
     return fmt::format("they are those of application '{}'", kept.application);
@@ -38,8 +38,8 @@ struct RetainKeeper::Start {
   std::optional<RetainImage> source;  // the values to go on with
   Origin origin = PLC_AREA_INITIAL;   // of those
   std::uint64_t generation = 0;       // the highest that was used
-  std::vector<std::byte> written;     // what the newest file holds
-  RetainImage image;                  // what the memory is to hold
+  std::vector<std::byte> written;     // the contents of the newest file
+  RetainImage image;                  // the wanted contents of the memory
   std::vector<Origin> origins;
   std::vector<std::string> remarks;
 
@@ -149,7 +149,7 @@ Result<std::unique_ptr<RetainKeeper>> RetainKeeper::make(ObjectPool& pool, const
   auto memory = start.goes_on_in_place(initial, options.cold)
                     ? KeptMemory::take_over(pool, name, initial.layout)
                     : KeptMemory::make(pool, name, start.image);
-  // What was left may be a file without an object: then its values go on in a new one.
+  // The left-over may be a file without an object: then its values go on in a new one.
   if (!memory) memory = KeptMemory::make(pool, name, start.image);
   if (!memory) return std::unexpected(std::move(memory).error());
   return std::unique_ptr<RetainKeeper>(new RetainKeeper(*std::move(memory), std::move(start), options));
@@ -157,8 +157,8 @@ Result<std::unique_ptr<RetainKeeper>> RetainKeeper::make(ObjectPool& pool, const
 
 Result<void> RetainKeeper::start() {
   if (!files_) return {};
-  // What was decided for this start holds also if the power is cut before the first cycle. If the disk
-  // refuses it, the machine runs all the same.
+  // The decision for this start holds also if the power is cut before the first cycle. If the disk refuses
+  // it, the machine runs all the same.
   save();
   auto thread = Thread::start("retain", {}, [this] { run(); });
   if (!thread) return std::unexpected(std::move(thread).error());
@@ -232,8 +232,8 @@ bool RetainKeeper::rest() {
   return !wake_.wait_for(lock, kPause, [this] { return ending_; });
 }
 
-// Tasks copy what they alone change, each at the end of a cycle. Nobody waits for the others: what one of
-// them has not given until then stays as it was.
+// Tasks copy what they alone change, each at the end of a cycle. No task waits for the others: data that one
+// of them has not given until then stay as they were.
 RetainKeeper::Taken RetainKeeper::take_groups() {
   constexpr auto kPatience = std::chrono::seconds(2);
   std::deque<KeptGroup>& groups = memory_.groups();
@@ -277,7 +277,7 @@ bool RetainKeeper::notice_loss() {
 
 void RetainKeeper::save() {
   if (!files_) return;
-  // What was lost stays so: nobody knows what the memory holds if it looks whole again later.
+  // A lost memory stays lost: its contents are not known if it looks whole again later.
   if (lost_) return count_unsaved();
   const Taken taken = take_snapshot();
   if (notice_loss()) return count_unsaved();

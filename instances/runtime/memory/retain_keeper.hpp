@@ -51,7 +51,7 @@ class RetainKeeper {
   /// Begins to write: until then the memory can be arranged. Set-up, once.
   [[nodiscard]] Result<void> start();
   [[nodiscard]] Origin origin(std::size_t area) const noexcept { return origins_[area]; }
-  /// What is to be said of the start.
+  /// The text about the start.
   [[nodiscard]] const std::vector<std::string>& remarks() const noexcept { return remarks_; }
 
   /// Does not wait for the interval. Any thread that may take a lock.
@@ -71,8 +71,8 @@ class RetainKeeper {
   void save();
   /// Whether the memory is lost, which is told.
   [[nodiscard]] bool notice_loss();
-  /// What image_ has then: all as it is between cycles now; so of some areas, the others as before; nothing
-  /// new.
+  /// The state of image_ then: all as it is between cycles now; so of some areas, the others as before;
+  /// nothing new.
   enum class Taken : std::uint8_t { all, some, none };
   [[nodiscard]] Taken take_snapshot();
   [[nodiscard]] bool take_whole();
@@ -96,7 +96,7 @@ class RetainKeeper {
   Duration postpone_;
   RetainImage image_;               // the soft thread's: as it was taken last
   std::vector<std::byte> scratch_;  // the same thread's, and that of tasks that it asks
-  std::vector<std::byte> written_;  // the same thread's: what is in the newest file
+  std::vector<std::byte> written_;  // the same thread's: the contents of the newest file
   bool lost_ = false;               // the same thread's: the memory is
   std::atomic<std::uint64_t> saves_{0};
   std::atomic<std::uint64_t> unsaved_{0};

@@ -25,7 +25,7 @@ Result<std::string> directory_of(const LaunchOptions& launch) {
 Result<void> save_left_behind(const LaunchOptions& launch) {
   auto left = KeptMemory::left_behind(launch.pool, kept_memory_name(launch.name));
   if (!left && left.error().code == ErrorCode::not_found) return {};
-  // What is damaged is worth nothing: the files hold the last good values.
+  // A damaged memory is worth nothing: the files hold the last good values.
   if (!left && left.error().code == ErrorCode::corrupt) {
     spdlog::warn("retain variables: what is left in memory is not written: {}", left.error().describe());
     return {};

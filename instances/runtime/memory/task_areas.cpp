@@ -98,7 +98,7 @@ void OutputView::refresh() noexcept {
 
 void OutputView::begin_cycle() noexcept {
   if (writes_.sole) return;
-  // What is not out yet is still a change.
+  // A value that is not out yet is still a change.
   if (late_) return;
   if (image_ != nullptr) refresh();
   for (const ByteRange shared : writes_.shared) {

@@ -16,7 +16,7 @@ struct ByteRange {
   std::size_t bytes = 0;
 };
 
-/// What the cycles of a task count into while it is within one: odd inside, even outside. In kept memory.
+/// The counter of a task's cycles: odd inside of one, even outside. In kept memory.
 using CycleCounter = std::atomic<std::uint64_t>;
 
 /// One task's copy of a block of inputs. Real-time but for its making.
@@ -55,7 +55,7 @@ class OutputView {
   OutputView(std::vector<std::byte> initial, Writes writes, OutputImage* image);
   OutputView(std::vector<std::byte> initial, Writes writes, std::span<std::byte> registers);
 
-  /// What other tasks have put out is in its copy then.
+  /// The outputs of other tasks are in its copy then.
   void begin_cycle() noexcept;
   void end_cycle() noexcept;
   [[nodiscard]] std::byte* bytes() noexcept { return bytes_.data(); }

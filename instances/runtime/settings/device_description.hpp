@@ -9,7 +9,7 @@
 
 namespace plchost {
 
-/// What a device description (an XML file of the other runtime) says of external events. Source: seed
+/// The external events of a device description (an XML file of the other runtime). Source: seed
 /// iec_task_management, "Creating an external event task": of
 /// /DeviceDescription/Device/ExtendedSettings/ts:TargetSettings/ts:section[@name='taskconfiguration'] the
 /// settings 'supportexternal' and 'externalevents'.
@@ -21,7 +21,7 @@ struct DeviceDescription {
 inline constexpr std::size_t kMaxDeviceDescription = std::size_t{16} << 20;
 inline constexpr std::size_t kMaxDeviceEvents = 1024;
 
-/// `file` is how errors call it, "FILE:LINE: what is wrong, and what is allowed". Parts that have nothing to
+/// `file` is how errors call it, "FILE:LINE: the fault, and the allowed values". Parts that have nothing to
 /// do with events are not looked at; without the section nothing is supported. Set-up.
 [[nodiscard]] Result<DeviceDescription> parse_device_description(std::string_view text,
                                                                  std::string_view file);

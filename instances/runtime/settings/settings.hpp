@@ -17,7 +17,7 @@ namespace plchost {
 /// [SysTimer] TimerMode: one_shot is the seed's way to ask for distributed clocks.
 enum class TimerMode : std::uint8_t { periodic, one_shot };
 
-/// [SysTimer] IdleStates: what holds the processor out of its slow sleep states while the instance runs.
+/// [SysTimer] IdleStates: the way to hold the processor out of its slow sleep states while the instance runs.
 enum class IdleStates : std::uint8_t {
   hold,       ///< /dev/cpu_dma_latency at 0, for all cores
   hold_core,  ///< only for the instance's own core, where the kernel offers it
@@ -44,7 +44,7 @@ struct AreaSettings {
   bool operator==(const AreaSettings&) const = default;
 };
 
-/// [Retain] Mismatch: what happens to retain values that belong to another layout of the retain areas.
+/// [Retain] Mismatch: the treatment of retain values that belong to another layout of the retain areas.
 enum class RetainMismatch : std::uint8_t {
   initialise,  ///< all areas begin with their initial values; the file is put aside
   refuse,      ///< the application is not loaded
@@ -60,7 +60,7 @@ struct RetainSettings {
   bool operator==(const RetainSettings&) const = default;
 };
 
-/// What an instance's own settings file says, validated. instances/settings.md lists the keys.
+/// The values of an instance's own settings file, validated. instances/settings.md lists the keys.
 struct InstanceSettings {
   SchedulerSettings scheduler;
   StopLimits stop;
@@ -74,7 +74,7 @@ struct InstanceSettings {
   RetainSettings retain;
   std::vector<std::string> components;  ///< in order; a relative path counts from the settings file's folder
 
-  /// What was left alone: sections and components of other programs, each once; and keys without a meaning
+  /// The ignored parts: sections and components of other programs, each once; and keys without a meaning
   /// here, with their place.
   std::vector<std::string> foreign_sections;
   std::vector<std::string> foreign_components;
@@ -91,7 +91,7 @@ inline constexpr std::uint64_t kAreaAlignment = 8;
 inline constexpr std::size_t kMaxReferenceDepth = 8;
 inline constexpr std::size_t kMaxSettingsFiles = 64;
 
-/// `file` is how errors call it: "FILE:LINE: what is wrong, and what is allowed". Follows no references.
+/// `file` is how errors call it: "FILE:LINE: the fault, and the allowed values". Follows no references.
 [[nodiscard]] Result<InstanceSettings> parse_settings(std::string_view text, std::string_view file);
 
 /// With the files of its [CmpSettings] FileReference.N. Relative paths in it are made absolute. not_found: no

@@ -1,4 +1,4 @@
-// [ComponentManager]: what is loaded before the application.
+// [ComponentManager]: the libraries that are loaded before the application.
 #include <array>
 
 #include "instances/runtime/settings/settings_key.hpp"

@@ -67,7 +67,7 @@ std::string_view without_platform(std::string_view name) {
   return name;
 }
 
-// What is to be compared with the name in the table; nothing: it lacks the platform in front.
+// The part to compare with the name in the table; nothing: it lacks the platform in front.
 std::optional<std::string_view> plain_name(const SettingKey& key, std::string_view name) {
   if (!key.prefixed) return name;
   const std::string_view plain = without_platform(name);

@@ -22,7 +22,7 @@ struct AreaDraft {
   std::string device, object;
 };
 
-/// What a row of the table writes to.
+/// The targets of a row of the table.
 struct SettingsTarget {
   InstanceSettings& settings;
   std::map<std::size_t, std::string>& components;  ///< by their number, foreign ones too
@@ -64,7 +64,7 @@ struct WordSetting {
 
 /// A text.
 struct TextSetting {
-  std::string_view form;  ///< what is allowed, in words
+  std::string_view form;  ///< the allowed values, in words
   bool (*allows)(std::string_view text);
   void (*apply)(const SettingsTarget&, std::string_view text);
 };
@@ -94,7 +94,7 @@ struct SettingKey {
 };
 
 inline constexpr std::string_view kTaskSections = "Task.NAME";
-inline constexpr std::string_view kTaskPrefix = "Task.";  ///< what its name begins with
+inline constexpr std::string_view kTaskPrefix = "Task.";  ///< the beginning of its name
 
 // The tables, one for each file settings_*.cpp. A new one is added to all_setting_keys().
 [[nodiscard]] std::span<const SettingKey> schedule_keys() noexcept;
@@ -105,7 +105,7 @@ inline constexpr std::string_view kTaskPrefix = "Task.";  ///< what its name beg
 [[nodiscard]] std::span<const SettingKey> component_keys() noexcept;
 [[nodiscard]] std::span<const SettingKey> memory_keys() noexcept;
 
-/// What was said about all areas, checked as a whole. The error names the line of the area.
+/// The settings of all areas, checked as a whole. The error names the line of the area.
 [[nodiscard]] Result<std::vector<AreaSettings>> check_areas(const std::map<std::size_t, AreaDraft>& drafts);
 
 /// All rows, in the order of the table in instances/settings.md.

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::string_view kMemory = "SysMem";
 constexpr std::string_view kRetain = "Retain";
-constexpr std::string_view kDefaultDevice = "/dev/mem";  // whose addresses the seed's file has
+constexpr std::string_view kDefaultDevice = "/dev/mem";  // the addresses of the seed's file are its
 constexpr std::size_t kLastArea = kMaxAreas - 1;
 
 // In the order of their enumerators.
@@ -68,7 +68,7 @@ std::unexpected<Error> bad(std::size_t number, const AreaDraft& area, std::strin
                  fmt::format("{}: [SysMem] Area.{}: {}", area.where, number, what));
 }
 
-// What one area says must be whole.
+// The settings of one area must be complete.
 Result<AreaSettings> check_area(std::size_t number, const AreaDraft& area) {
   if (!area.flags || !area.size) return bad(number, area, "needs Flags and Size");
   if (!area.device.empty() && !area.object.empty()) {

@@ -24,7 +24,7 @@ bool is_comment(std::string_view text) {
   return text.starts_with(';') || text.starts_with('#');
 }
 
-// A comment begins with a ';' or '#' at the start or after a blank, or with a ';' before one; elsewhere both
+// A comment begins with a ';' or '#' at the start or after a blank, or with a ';' before one. Elsewhere both
 // are part of the value.
 std::string_view without_comment(std::string_view value) {
   const auto is_blank = [&](std::size_t at) { return at >= value.size() || kBlank.contains(value[at]); };
@@ -35,7 +35,7 @@ std::string_view without_comment(std::string_view value) {
   return value;
 }
 
-// What stands behind the '=', without a comment, and without quotes around it.
+// The text behind the '=', without a comment, and without quotes around it.
 std::string_view value_of(std::string_view text) {
   text = trim(text);
   const std::size_t end = text.starts_with('"') ? text.find('"', 1) : std::string_view::npos;
@@ -105,7 +105,7 @@ void SettingsParser::read_line(std::string_view line) {
   line = trim(line);
   if (line.empty() || is_comment(line)) return;
   if (line.front() == '[') return begin_section(line);
-  // What other programs write in their sections is theirs alone.
+  // Other programs' sections are theirs alone.
   if (in_foreign_section()) {
     if (section_ == kReferring) read_reference(line);
     return;

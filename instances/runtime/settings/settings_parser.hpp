@@ -20,8 +20,7 @@ struct FileReference {
   std::string where;  ///< "line1.cfg:12"
 };
 
-/// Makes one set of settings of the texts of one or more files. What a later one says about the same key
-/// counts.
+/// Makes one set of settings of the texts of one or more files. A later value of the same key counts.
 class SettingsParser {
  public:
   /// `file` is how texts call it; relative paths in it are made to count from `folder`, unless that is empty.

@@ -12,8 +12,8 @@
 
 namespace plchost {
 
-/// What a [Task.NAME] section of the settings, or a call of plc_set_task_options(), says about one task. What
-/// it is silent about stays as it is.
+/// The options of one task, by a [Task.NAME] section of the settings or by a call of plc_set_task_options().
+/// Those that it does not name stay as they are.
 struct TaskSettings {
   std::string task;
   std::string where;  ///< how errors call it: "line1.cfg:12: [Task.Fast]"
@@ -27,8 +27,8 @@ struct TaskSettings {
   bool operator==(const TaskSettings&) const = default;
 };
 
-/// What the C interface says, checked as far as it can be without the task. invalid_argument: the text names
-/// the field and what is allowed. Set-up.
+/// The options of the C interface, checked as far as they can be without the task. invalid_argument: the text
+/// names the field and the allowed values. Set-up.
 [[nodiscard]] Result<TaskSettings> from_options(const char* task, const Task_Options* options);
 
 /// Writes `settings` into the tasks that they name. invalid_argument: there is no such task (the text lists

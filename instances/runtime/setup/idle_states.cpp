@@ -43,7 +43,8 @@ IdleHold IdleHold::take(IdleStates wanted, const std::vector<int>& cores, const 
                         const Files& files) {
   IdleHold hold;
   if (!run_directory.empty()) {
-    // What an instance before us was killed with; where there is a manager, it has done this already.
+    // The left-over of an instance that was killed before us; where there is a manager, it has done this
+    // already.
     const auto restored = restore_core_latency(files.sysfs, run_directory);
     for (const std::string& line : restored.value_or(std::vector<std::string>())) spdlog::info("{}", line);
   }

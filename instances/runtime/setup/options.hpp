@@ -8,18 +8,18 @@
 
 namespace plchost {
 
-/// What plc-instance was asked to do.
+/// The order on the command line of plc-instance.
 struct Options {
   LaunchOptions launch;
   std::string start_kind = "first";          ///< launch.start_kind in words
   PriorityBand band = PriorityBand::normal;  ///< launch.priority_band, translated
   std::string check_application;             ///< not empty: only check this file
   std::string check_settings;                ///< the same for a settings file
-  int parent = 0;                            ///< whose end is that of the check, too; 0: nobody's
+  int parent = 0;                            ///< the process whose end is that of the check, too; 0: none
   bool save_retain = false;                  ///< only write what the kept memory holds to its files
 };
 
-/// What came of the command line: options, or the exit code of a program that has nothing more to do (help,
+/// The result of the command line: options, or the exit code of a program that has nothing more to do (help,
 /// version, or a usage error, whose text is printed already).
 struct ParsedOptions {
   std::optional<Options> options;

@@ -10,7 +10,7 @@ namespace plchost {
 
 namespace {
 
-// What its process holds goes with it, and so do registrations and tasks of its own events.
+// Its process's references go with it, and so do registrations and tasks of its own events.
 bool stays(const ObjectInfo& object, std::string_view prefix, pid_t process) {
   const bool held_by_others = object.reference_count > object.references.size() ||
                               std::ranges::any_of(object.references, [&](const ReferenceInfo& reference) {

@@ -45,7 +45,7 @@ Duration interval_of(const Task_Info& task) {
                                  : Duration(std::chrono::milliseconds(task.dwInterval));
 }
 
-// What only one kind of task has.
+// The parts that only one kind of task has.
 Result<void> fill_kind(const Task_Info& task, const std::shared_ptr<TaskCode>& code, TaskConfig& config) {
   switch (config.kind) {
     case TaskKind::cyclic:

@@ -10,8 +10,8 @@
 
 namespace plchost {
 
-/// What a task runs of its application. Another version of that may be put in its place while no task is in a
-/// cycle and no event variable is read.
+/// The function of its application that a task runs. Another version of that may be put in its place while no
+/// task is in a cycle and no event variable is read.
 struct TaskCode {
   Task_Info* info = nullptr;  ///< where its figures are written
   PLC_TASK_FUNCTION run = nullptr;

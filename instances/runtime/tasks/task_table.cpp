@@ -10,7 +10,7 @@ namespace plchost {
 
 namespace {
 
-// What an application hands over is checked only after it was: it may be anything.
+// An application's table is checked only after it was handed over: it may be anything.
 std::span<const Task_Info> tasks_of(const sys_setup_tasks_struct* setup) noexcept {
   if (setup == nullptr || setup->ptaskinfo == nullptr) return {};
   if (setup->nTasks < 1 || setup->nTasks > PLC_MAX_TASKS) return {};

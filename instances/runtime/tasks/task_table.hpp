@@ -18,7 +18,7 @@ namespace plchost {
 /// Any context, unless said otherwise.
 class TaskTable {
  public:
-  /// What the application handed over, once. Control thread.
+  /// The table that the application handed over, once. Control thread.
   void set_up(const sys_setup_tasks_struct* setup);
   /// The same tasks in the same order, as another version of the application has them. While no cycle runs.
   void exchange(std::span<Task_Info* const> infos) noexcept;

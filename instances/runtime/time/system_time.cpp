@@ -99,8 +99,8 @@ struct Found {
   std::string name;
 };
 
-// dlsym() finds variables, too, and those must not be called. What has no entry of its own is what the
-// function of an IFUNC has chosen.
+// dlsym() finds variables, too, and those must not be called. A function without an entry of its own is the
+// one that the function of an IFUNC has chosen.
 Result<Found> as_function(void* symbol, const std::string& name) {
   Dl_info place{};
   void* entry = nullptr;

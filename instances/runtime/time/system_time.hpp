@@ -19,8 +19,8 @@ using FindSymbol = std::function<void*(const char* symbol)>;
 [[nodiscard]] Result<void> use_system_time(const SysTimeSettings& settings,
                                            const FindSymbol& find_in_components = {});
 
-/// The time that applications see, since a start that is the same for both. ERR_PARAMETER: `to` is null; what
-/// the custom function answers. Any context.
+/// The time that applications see, since a start that is the same for both. ERR_PARAMETER: `to` is null; else
+/// the answer of the custom function. Any context.
 [[nodiscard]] RTS_RESULT system_time_us(RTS_SYSTIME* to) noexcept;
 [[nodiscard]] RTS_RESULT system_time_ns(RTS_SYSTIME* to) noexcept;
 

@@ -126,9 +126,9 @@ Result<Application> declare_watched(const std::string& path, const StartSettings
 }
 
 // All that a start does, by the same functions in the same order, as far as it takes nothing from the
-// instance that runs. What that instance has can be had only when it has ended: its name, its control socket
-// and its status page, its address among the nodes, what the CH_INIT.. hooks of its components take, and its
-// memories and outputs, which are only looked at.
+// instance that runs. Some things are free only when that instance has ended: its name, its control socket
+// and its status page, its address among the nodes, and the resources of its components' CH_INIT.. hooks. Its
+// memories and outputs are only looked at.
 Result<Application> try_start(const Options& options, Components& components, ApplicationHost& host) {
   const LaunchOptions& launch = options.launch;
   if (auto granted = try_cores(launch.cores); !granted) return std::unexpected(std::move(granted).error());

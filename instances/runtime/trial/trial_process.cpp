@@ -34,7 +34,7 @@ namespace plchost {
 
 namespace {
 
-/// What the handler of a crash tells the thread that describes it.
+/// The message of the handler of a crash to the thread that describes it.
 struct TrialCrash {
   int signal = 0;
   std::uintptr_t address = 0;  ///< of the instruction; 0: it says nothing
@@ -57,7 +57,7 @@ void say(std::string_view text) noexcept {
   (void)!::write(STDERR_FILENO, text.data(), text.size());
 }
 
-// The crashed thread may hold the lock of the heap: what needs the heap comes last and has a time limit.
+// The crashed thread may hold the lock of the heap: work that needs the heap comes last and has a time limit.
 [[noreturn]] void describe_crash(const std::string& application, int verdict, const UniqueFd& crashes) {
   TrialCrash crash;
   while (::read(crashes.get(), &crash, sizeof crash) < 0 && errno == EINTR) {
@@ -106,7 +106,7 @@ struct Trial {
   UniqueFd verdict;
 };
 
-// What the application has forked comes to us when its parent ends.
+// Processes that the application has forked come to us when their parent ends.
 void end_descendants() {
   const std::string children = fmt::format("/proc/self/task/{}/children", ::gettid());
   constexpr int kRounds = 100;  // against one that forks all the time

@@ -6,14 +6,13 @@
 namespace plchost {
 
 /// Runs `check`, which runs code of the application, in a process of its own. The returned value is that of
-/// `check`. If the check does not come to its end (a crash, an exit, an endless loop, a signal to this
-/// process), this process ends the child and all that it has forked, and says why on standard error.
-/// `application`: its file, for the texts. `signals`: a signalfd; a signal from it ends this process, too.
-/// To be called while the process has one thread.
+/// `check`. The check may not come to its end (a crash, an exit, an endless loop, a signal to this process).
+/// Then this process ends the child and all that it has forked, and says why on standard error.
+/// `application`: its file, for the texts. `signals`: a signalfd; a signal from it ends this process, too. To
+/// be called while the process has one thread.
 [[nodiscard]] int run_trial(const std::string& application, int signals, const std::function<int()>& check);
 
-/// Within `check`, from any thread: its verdict is `code`, though it cannot return. What it has to say was
-/// said.
+/// Within `check`, from any thread: its verdict is `code`, though it cannot return. Its report was written.
 [[noreturn]] void end_trial(int code) noexcept;
 
 }  // namespace plchost
