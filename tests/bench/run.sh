@@ -26,7 +26,7 @@ done
 # processes, which are one group.
 work=$(mktemp -d "${TMPDIR:-/tmp}/plchost-bench.XXXXXX")
 bench=
-shared() { find /dev/shm -maxdepth 1 -name "*plctest-*-$bench-*" 2>/dev/null; }
+shared() { find /dev/shm -maxdepth 1 -name "*plct-*-$bench-*" 2>/dev/null; }
 clean_up() {
   if [ -n "$bench" ]; then
     kill -TERM -- "-$bench" 2>/dev/null || true
@@ -36,7 +36,7 @@ clean_up() {
     done
     kill -KILL -- "-$bench" 2>/dev/null || true
     shared | xargs -r rm -rf
-    rm -f /tmp/plctest-*-"$bench"-*  # where iceoryx has its sockets
+    rm -f /tmp/plct-*-"$bench"-*  # where iceoryx has its sockets
   fi
   rm -rf "$work"
 }

@@ -18,7 +18,8 @@ namespace plchost {
 inline std::string own_prefix() {
   struct stat pids{};
   (void)::stat("/proc/self/ns/pid", &pids);
-  return fmt::format("plctest-{:x}-", pids.st_ino);
+  constexpr unsigned kShort = 0xffff;  // the name of a pool has at most 31 characters
+  return fmt::format("plct-{:x}-", pids.st_ino & kShort);
 }
 
 /// The name was made by a process of this PID namespace that has ended.

@@ -26,4 +26,4 @@ echo "- and tables of it"
 "$source/tests/bench/figures.py" "$cell/figures.json" >"$cell/figures.md" || fail "no tables"
 grep -qE '^\| `start/plc-instance` \| idle \| [0-9.,]+ \| - \| - \|' "$cell/figures.md" || fail "$(cat "$cell/figures.md")"
 
-is "$(ls "$cell/tmp"; find /dev/shm -name "*plctest-*-$bench-*")" "" || fail "left behind: $(ls "$cell/tmp")"
+is "$(ls "$cell/tmp"; find /dev/shm -name "*plct-*-$bench-*")" "" || fail "left behind: $(ls "$cell/tmp")"

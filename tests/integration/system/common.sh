@@ -3,7 +3,7 @@
 set -euo pipefail
 
 # As own_name() makes them: the next test program removes the files of a story that was killed.
-pool=$(printf 'plctest-%x-%d-story' "$(stat -Lc %i /proc/self/ns/pid)" $$)
+pool=$(printf 'plct-%x-%d-story' "$(($(stat -Lc %i /proc/self/ns/pid) & 0xffff))" $$)
 cell=$(mktemp -d "${TMPDIR:-/tmp}/$pool.XXXXXX")
 managers=()
 others=()

@@ -43,8 +43,7 @@ TEST_F(OwnName, OfAKilledProcessIsRemovedByTheNextOne) {
 TEST_F(OwnName, OfOthersStays) {
   remove_what_was_left_in(folder_);
   const std::string number = of_the_dead_.substr(own_prefix().size());
-  const std::vector<std::string> others{own_name("of one that runs"),
-                                        "plctest-1-" + number + "other-namespace",
+  const std::vector<std::string> others{own_name("of one that runs"), "plct-1-" + number + "other-namespace",
                                         own_prefix() + "x" + number, own_prefix(), "plchost-" + number};
   for (const std::string& name : others) make(name);
   remove_what_was_left_in(folder_);
@@ -52,6 +51,11 @@ TEST_F(OwnName, OfOthersStays) {
   make(of_the_dead_ + "1-x");
   remove_what_was_left_in(folder_);
   EXPECT_EQ(count(), static_cast<int>(others.size()));
+}
+
+TEST_F(OwnName, HasRoomForAWordInTheNameOfAPool) {
+  constexpr std::size_t kMaxPoolName = 31;
+  EXPECT_LE((own_prefix() + "1234567-999-downloads").size(), kMaxPoolName);
 }
 
 TEST_F(OwnName, IsAnotherOneEachTime) {
