@@ -36,7 +36,7 @@ bool CmpSchedule::prime() noexcept {
 
 void CmpSchedule::start(TimePoint origin) noexcept {
   if (!needs_tick()) return;
-  // What was due before the first tick, while a switch was under way, is only late and runs at once.
+  // A task that was due before the first tick, while a switch was under way, is only late and runs at once.
   const TimePoint first = ticker_.first_tick(origin);
   table_.start(first - settings_.scheduler_interval);
   ticker_.start(first);

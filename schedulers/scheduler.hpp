@@ -56,7 +56,7 @@ struct SchedulerSettings {
   bool operator==(const SchedulerSettings&) const = default;
 };
 
-/// What a scheduler needs to be made.
+/// The parts that a scheduler is made of.
 struct SchedulerContext {
   Clock& clock;
   SchedulerSettings settings;

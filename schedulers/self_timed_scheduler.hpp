@@ -5,8 +5,8 @@
 
 namespace plchost {
 
-/// What the schedulers share under which each cyclic and freewheeling task keeps its own time: a thread of
-/// the scheduler's own is there only to poll event variables, and only if there are any.
+/// The common part of the schedulers under which each cyclic and freewheeling task keeps its own time. A
+/// thread of the scheduler's own is there only to poll event variables, and only if there are any.
 class SelfTimedScheduler : public Scheduler {
  public:
   explicit SelfTimedScheduler(const SchedulerContext& context);

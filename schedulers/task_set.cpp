@@ -140,7 +140,7 @@ Result<void> TaskSet::start(std::string_view scheduler, const SchedulerSettings&
   for (auto& task : tasks_) task->forget_edges();
   running_ = true;
   watch_variables(settings);
-  // However long the variables take: what follows their reading is one grid, and loses nothing by it.
+  // The releases after the reading are one grid, and lose nothing by it, however long the variables take.
   prime_scheduler();
   {
     // Nobody but the tasks may come between the origin and the moment in which the last task has its source.
@@ -163,8 +163,8 @@ Result<void> TaskSet::switch_to(std::string_view scheduler, const SchedulerSetti
   auto arrangement = arrange(scheduler, settings);
   if (!arrangement) return std::unexpected(std::move(arrangement.error()));
   {
-    // Only one of the two may look at event variables at a time; what is due in between is late. Nothing but
-    // the tasks themselves may make that longer.
+    // Only one of the two may look at event variables at a time; edges in between are late. Nothing but the
+    // tasks themselves may make that longer.
     const RaisedPriority raised(environment_.allow_unprivileged ? ThreadPriority{} : switch_priority(band_));
     if (auto ended = end_scheduler(); !ended) return ended;
     retired_.push_back(std::exchange(active_, std::move(*arrangement)));
@@ -196,7 +196,7 @@ Result<void> TaskSet::end_scheduler() {
   return {};
 }
 
-// Whose event variable the scheduler's thread reads just now.
+// The task whose event variable the scheduler's thread reads just now.
 std::optional<std::size_t> TaskSet::task_in_variable() const noexcept {
   if (!poll_trap_.running_since()) return std::nullopt;
   const auto read =
@@ -263,7 +263,7 @@ void TaskSet::report(std::size_t index, bool running) {
   if (environment_.state_changed) environment_.state_changed(index, running);
 }
 
-// What was before is free to go when no thread uses it any more.
+// The old one is free to go when no thread uses it any more.
 bool TaskSet::let_retired_go() {
   if (!std::ranges::all_of(retired_, [](const auto& before) { return before->ended(TimePoint{}); }))
     return false;

@@ -62,7 +62,7 @@ class TaskSet {
   /// How long start() and switch_to() wait for tasks to take their new source. A task whose cycle takes
   /// longer takes it when the cycle ends.
   static constexpr Duration kSwitchPatience = std::chrono::milliseconds(100);
-  /// What a thread at least gets, after the deadline of a stop was first seen to be over, before it is
+  /// The least time that a thread gets, after the deadline of a stop was first seen to be over, before it is
   /// judged.
   static constexpr Duration kSecondLook = std::chrono::milliseconds(20);
   /// How long a stop waits for a task that is in no cycle and only has not had the processor.
@@ -119,18 +119,18 @@ class TaskSet {
   /// does not return, which puts its task, and all, into exception.
   [[nodiscard]] Result<void> switch_to(std::string_view scheduler, const SchedulerSettings& settings);
 
-  /// Has `action` done in a moment in which no task is in a cycle and no event variable is read, whatever the
-  /// scheduler; what would begin meanwhile begins after it, and no release is lost unless the action takes
-  /// longer than a period. For how long that was. Nothing: there was no such moment now, nothing was done and
-  /// nobody had to wait; try again. `action` is short, and does nothing that waits.
+  /// Runs `action` in a moment in which no task is in a cycle and no event variable is read, under any
+  /// scheduler. Cycles that would begin meanwhile begin after it, and no release is lost unless the action
+  /// takes longer than a period. For how long that was. Nothing: there was no such moment now, nothing was
+  /// done and nobody had to wait; try again. `action` is short, and does nothing that waits.
   [[nodiscard]] std::optional<Duration> between_cycles(const std::function<void()>& action);
   /// Those that are within a cycle just now, or in their event variables.
   [[nodiscard]] std::vector<std::string_view> tasks_in_cycle() const;
 
-  /// In the order in which they were given. What may be called on a task from which context: see Task.
+  /// In the order in which they were given. The calls on a task that each context may make: see Task.
   [[nodiscard]] std::size_t size() const noexcept { return tasks_.size(); }
   [[nodiscard]] Task& task(std::size_t index) noexcept { return *tasks_[index]; }
-  /// What the grids of the cyclic tasks follow, under a scheduler that can move releases.
+  /// The clock that the grids of the cyclic tasks follow, under a scheduler that can move releases.
   [[nodiscard]] DistributedClock& distributed_clock() noexcept { return distributed_clock_; }
 
   /// A fault, or a watchdog's hit, of one task.
@@ -143,15 +143,15 @@ class TaskSet {
   /// Readable when take_fault() has something new. Valid as long as this object.
   [[nodiscard]] int fault_fd() const noexcept { return fault_fd_.get(); }
   /// The next fault that was not taken yet, in the order of the tasks; nothing if there is none. Its task
-  /// never runs again. If it is one of the whole application, no task begins another cycle: what is left to
-  /// do is stop(), and then a fresh process.
+  /// never runs again. If it is one of the whole application, no task begins another cycle: only stop() is
+  /// left, and then a fresh process.
   [[nodiscard]] std::optional<Fault> take_fault();
-  /// Of tasks of external events. Those that are stopped or in exception: what was posted since is counted as
+  /// Of tasks of external events. Those that are stopped or in exception: posts since then are counted as
   /// lost. Those that run: one that sleeps although it was posted to is woken; its poster was ended in
   /// between. To be called now and then.
   void look_after_posts() noexcept;
   /// Finds threads of this process that take the processor from the thread that watches the tasks, where
-  /// ProcessorGuard has not: they lose their real-time priority. What is to be logged of those, and of
+  /// ProcessorGuard has not: they lose their real-time priority. The lines to log about those, and about
   /// programs that keep tasks from the processor. To be called now and then.
   [[nodiscard]] std::vector<std::string> look_after_processor();
   /// The names of the tasks that are in exception, and so keep start() from it.

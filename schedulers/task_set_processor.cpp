@@ -1,4 +1,5 @@
-// Who takes the processor from the tasks of a set, as far as the supervision cannot see to it by itself.
+// The threads that take the processor from the tasks of a set, as far as the supervision cannot see to it by
+// itself.
 #include <fmt/format.h>
 
 #include "schedulers/task_set.hpp"

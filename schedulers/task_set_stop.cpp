@@ -27,7 +27,7 @@ Result<void> TaskSet::begin_stop(const StopLimits& limits) {
   // From now on releases are missed on purpose; cycles that run are watched on.
   if (supervision_) supervision_->tasks_stop();
   park_tasks(true);
-  // Only now: what keeps this thread from asking is no time that the tasks have had.
+  // Only now: a delay of this thread's question is no time that the tasks have had.
   stop_->deadline = MonotonicClock::now() + limits.outputs;
   return {};
 }
@@ -73,9 +73,9 @@ bool TaskSet::in_cycle(std::size_t task) const noexcept {
   return tasks_[task]->trap().running_since().has_value();
 }
 
-// Who is stuck when the phase is over; nothing: it is not. Nobody is at the first look after the deadline:
-// the whole host, or this core, may have stood still until then. A task that is between two cycles only waits
-// for the processor, which somebody who is stuck may keep from it.
+// The tasks that are stuck when the phase is over; nothing: it is not over. No task is at the first look
+// after the deadline: the whole host, or this core, may have stood still until then. A task that is between
+// two cycles only waits for the processor, which somebody who is stuck may keep from it.
 std::optional<std::vector<std::size_t>> TaskSet::stuck_in_phase(const std::vector<std::size_t>& busy) {
   const bool ended = !stop_->others || active_->ended(TimePoint{});
   if ((busy.empty() && ended) || stop_->hurried) return busy;

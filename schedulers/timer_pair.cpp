@@ -32,7 +32,8 @@ std::uint64_t TimerPair::wait() noexcept {
   }
 }
 
-// Asked before it is armed: who arms the timers after us and before it sleeps sees that it is asked.
+// Asked before it is armed: a thread that arms the timers after us and before it sleeps sees that it is
+// asked.
 void TimerPair::interrupt() noexcept {
   constexpr Duration kNow(1);
   constexpr Duration kUntilSeen = std::chrono::microseconds(100);
@@ -51,8 +52,8 @@ bool TimerPair::take_interrupt() noexcept {
   }
 }
 
-// Who was busy for longer than a period finds that both went off. One that is due just now may be about to,
-// and is left for the next call: a read of it would sleep.
+// A thread that was busy for longer than a period finds that both went off. One that is due just now may be
+// about to, and is left for the next call: a read of it would sleep.
 std::uint64_t TimerPair::went_off() noexcept {
   constexpr Duration kSurely = std::chrono::microseconds(20);
   const std::uint64_t count = next().read(period_);

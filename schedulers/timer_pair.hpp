@@ -8,13 +8,13 @@
 
 namespace plchost {
 
-/// Two timers of the kernel (timerfd) that go off in turn, each every second time. A read arms its timer
-/// anew before it returns, and a timer that is the next one of its core is written to the core's clock, which
-/// takes microseconds, on a virtual machine most of all. Of two the other one is always next, so a
-/// thread is in its code that much earlier. One system call per wait.
+/// Two timers of the kernel (timerfd) that go off in turn, each every second time. A read arms its timer anew
+/// before it returns. A timer that is the next one of its core is written to the core's clock, which takes
+/// microseconds, on a virtual machine most of all. Of two the other one is always next, so a thread is in its
+/// code that much earlier. One system call per wait.
 ///
-/// An interrupt makes both go off again and again. Who is told of it first waits until the timers are not
-/// touched any more, so that a start after it is not undone.
+/// An interrupt makes both go off again and again. The thread that is told first waits until the timers are
+/// not touched any more, so that a start after it is not undone.
 class TimerPair final : public PeriodicTimer {
  public:
   TimerPair(UniqueFd first, UniqueFd second) noexcept;

@@ -7,10 +7,10 @@
 
 namespace plchost {
 
-/// Why and for when a task runs one cycle. What `release` is depends on the kind of the task: the point of
-/// the grid (cyclic), the end of its sleep (freewheeling), the poll that saw the edge (event), or the moment
-/// at which the task first saw the post in the event's counter (external; all posts seen at once share it, so
-/// those that queue behind others show their wait as latency).
+/// Why and for when a task runs one cycle. The meaning of `release` depends on the kind of the task. Cyclic:
+/// the point of the grid. Freewheeling: the end of its sleep. Event: the poll that saw the edge. External:
+/// the moment at which the task first saw the post in the event's counter. All posts seen at once share it,
+/// so those that queue behind others show their wait as latency.
 struct Activation {
   TimePoint release;              ///< planned; latency is measured from here
   std::uint64_t lost_cycles = 0;  ///< releases that passed since the last activation without a cycle
@@ -20,7 +20,8 @@ struct Activation {
   std::uint64_t timer_expirations = 0;  ///< how often the task's own kernel timer went off since the last one
 };
 
-/// What one task waits on; made by the scheduler for that task. The only place where a task thread sleeps.
+/// The source that one task waits on; made by the scheduler for that task. The only place where a task thread
+/// sleeps.
 class ActivationSource {
  public:
   virtual ~ActivationSource() = default;

@@ -8,7 +8,7 @@
 namespace plchost {
 
 /// One futex word on which one thread sleeps and which others open. Opening takes at most one system call,
-/// and there is no way back ("done"): whoever opens never waits.
+/// and there is no way back ("done"): the thread that opens never waits.
 class ActivationGate {
  public:
   enum class Outcome : std::uint8_t { opened, interrupted, timed_out };
@@ -51,8 +51,8 @@ class ActivationGate {
   static constexpr std::uint32_t kOpen = 1;
   static constexpr std::uint32_t kInterrupt = 2;
 
-  // Always a read-modify-write, also if the flag is up already: whoever closes the gate then sees all that
-  // was written before it was opened.
+  // Always a read-modify-write, also if the flag is up already: the thread that closes the gate then sees all
+  // that was written before it was opened.
   bool raise(Clock& clock, std::uint32_t flag) noexcept {
     if ((word_.fetch_or(flag, std::memory_order_acq_rel) & flag) != 0) return false;
     clock.wake(word_);

@@ -11,9 +11,9 @@
 namespace plchost {
 
 /// The rising edges of one event task, between the poller that sees them and the task that runs for them. Of
-/// its BOOL's edges it keeps one run that has not begun, of the edges that the application raises by call as
-/// many as `backlog` allows; more are counted as lost. Part of the task, so that neither the level nor a run
-/// that is due is forgotten when the scheduler is exchanged.
+/// its BOOL's edges it keeps one run that has not begun. Of the edges that the application raises by call it
+/// keeps as many as `backlog` allows. More are counted as lost. Part of the task, so that neither the level
+/// nor a run that is due is forgotten when the scheduler is exchanged.
 class EventLatch {
  public:
   /// Forgets what was due, and the level. While nobody polls or waits.
@@ -68,7 +68,7 @@ class EventLatch {
   ActivationGate gate;  ///< opened after runs have become due
 
  private:
-  // What is due already keeps its time: the runs behind it show their wait as latency.
+  // A run that is due already keeps its time: the runs behind it show their wait as latency.
   void keep(Clock& clock, std::uint64_t edges, std::uint64_t bound, TimePoint now) noexcept {
     const std::uint64_t due = due_.load(std::memory_order_acquire);
     const std::uint64_t kept = due >= bound ? 0 : std::min(edges, bound - due);

@@ -30,7 +30,8 @@ std::unique_ptr<ActivationSource> EventPoller::add(Task& task) {
   return std::make_unique<EdgeSource>(clock_, task.latch());
 }
 
-// Whoever reads for all tasks cannot be stopped for one: a fault in a variable is the whole application's.
+// A thread that reads for all tasks cannot be stopped for one: a fault in a variable is the whole
+// application's.
 template <class Use>
 void EventPoller::read_all(TimePoint now, Use use) noexcept {
   if (polled_.empty()) return;

@@ -26,7 +26,7 @@ std::optional<Activation> ExternalEventSource::wait() noexcept {
     }
     const std::uint64_t backlog = count - cursor.next;
     if (backlog / kImplausible >= max_backlog_) {
-      // Somebody wrote over the counter: what was posted nobody knows.
+      // A stranger wrote over the counter: the number of posts is not known.
       cursor = {.next = count, .seen = count, .seen_at = clock_.now()};
       const bool back = backlog > CountedEvent::kCountMask;
       return Activation{.release = cursor.seen_at, .lost_events = back ? 1 : backlog - 1};

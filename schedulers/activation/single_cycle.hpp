@@ -20,7 +20,7 @@ class SingleCycle {
   [[nodiscard]] std::unique_ptr<ActivationSource> add();
   /// Releases the first. All of their threads have their sources.
   void begin() noexcept;
-  /// Whose turn it is, in the order of add(); as many as there are: all have come back. Any thread.
+  /// The task whose turn it is, in the order of add(); the number of tasks: all have come back. Any thread.
   [[nodiscard]] std::size_t turn() const noexcept { return turn_.load(std::memory_order_acquire); }
   /// Number `link` will not come back; does nothing unless it is its turn. Any thread.
   void skip(std::size_t link) noexcept { came_back(link); }

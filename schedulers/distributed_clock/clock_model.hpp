@@ -14,11 +14,11 @@ struct ReferencePair {
   std::int64_t reference_ns = 0;
 };
 
-/// What the reference clock shows at a local time: a straight line. The fraction of a nanosecond and the
+/// The time of the reference clock at a local time: a straight line. The fraction of a nanosecond and the
 /// slope are floating-point because a drift of 1e-9 is no whole number of anything; times stay whole numbers.
 struct ClockModel {
   TimePoint local;                ///< where the line is anchored
-  std::int64_t reference_ns = 0;  ///< what the reference shows there
+  std::int64_t reference_ns = 0;  ///< the reference's time there
   double fraction_ns = 0;         ///< and this much more
   double drift = 0;               ///< how much faster the reference runs: 1e-6 is 1 ppm
 

@@ -28,8 +28,8 @@ constexpr double kWidestNoiseNs = 100'000;
 constexpr double kTimesNoise = 4;
 /// One wild pair widens what is usual by no more than a pair at this many times of it would.
 constexpr double kScatterClip = 4;
-/// What a drift may change between two pairs; while it is not known yet, and when two clocks are compared
-/// that may be different ones, it is kMaxDrift.
+/// The change of the drift that is allowed between two pairs. While it is not known yet, and when two clocks
+/// are compared that may be different ones, it is kMaxDrift.
 constexpr double kDriftChange = 20e-6;
 
 }  // namespace
@@ -98,7 +98,7 @@ double ClockRegulator::noise_ns() const noexcept {
   return std::clamp(kUsualTimes * scatter_ns_, tolerance_ns_, tolerance_ns_ + kWidestNoiseNs);
 }
 
-// A silence that goes on allows no more: what is far off after it has to show first that it is a clock.
+// A silence that goes on allows no more: a clock that is far off after it has to show first that it is one.
 double ClockRegulator::limit_ns(Duration elapsed) const noexcept {
   const double drift = usable() ? kDriftChange : kMaxDrift;
   return noise_ns() + drift * static_cast<double>(std::min(elapsed, gap_).count());

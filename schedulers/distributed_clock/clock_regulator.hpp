@@ -12,13 +12,13 @@ namespace plchost {
 /// allocation.
 ///
 /// A PI loop: each pair's deviation from the line moves the phase by Kp and the drift by Ki of it. The first
-/// pairs count more (their gains are those of a line through all pairs so far), so that phase and drift are
-/// there within a few dozen pairs, and the gains then sink to Kp and Ki. They rise again when the deviations
-/// keep to one side: then the drift has changed.
+/// pairs count more: their gains are those of a line through all pairs so far. So phase and drift are there
+/// within a few dozen pairs, and the gains then sink to Kp and Ki. They rise again when the deviations keep
+/// to one side: then the drift has changed.
 ///
-/// A pair further off than the usual scatter allows is an outlier and left out, but kStepPairs of them in a
-/// row that lie on one line of a plausible drift are a step of the reference: the line is moved there. What
-/// follows the line does so at its own bounded pace. Outliers that lie on no such line, as those of a
+/// A pair further off than the usual scatter allows is an outlier and left out. But kStepPairs of them in a
+/// row that lie on one line of a plausible drift are a step of the reference: the line is moved there. The
+/// grids follow the line at their own bounded pace. Outliers that lie on no such line, as those of a
 /// reference that stands still, runs backwards or says anything, are never taken, however long they go on:
 /// for what follows they are no pairs at all.
 class ClockRegulator {
@@ -50,7 +50,8 @@ class ClockRegulator {
   [[nodiscard]] const ClockModel& model() const noexcept { return model_; }
   /// The line is good enough to be followed.
   [[nodiscard]] bool usable() const noexcept { return pairs_ >= kUsablePairs; }
-  /// How far the last pairs lay from the line on the average, signed: what the loop has not yet made up for.
+  /// How far the last pairs lay from the line on the average, signed: the rest that the loop has not yet made
+  /// up for.
   [[nodiscard]] double bias_ns() const noexcept { return bias_ns_; }
 
  private:

@@ -174,7 +174,7 @@ Duration ClockFollower::follow(TimePoint release, Duration interval, Duration of
   const bool steering = clock_.steering_.load(std::memory_order_relaxed);
   const Duration correction = steering ? std::clamp(-deviation, -bound, bound) : Duration::zero();
   note(correction, steering && correction != -deviation);
-  // What is left after the correction, and what the pairs say that the line itself is off.
+  // The rest after the correction, and the error of the line by the pairs.
   const Duration bias(std::llround(known_.bias_ns));
   const Duration offset_left = std::clamp(deviation + correction + bias, -interval / 2, interval / 2);
   offset_ns_.store(offset_left.count(), std::memory_order_relaxed);

@@ -23,7 +23,7 @@ enum class ClockState : std::uint32_t {
   measuring = 5,     ///< the clock is measured, but this scheduler cannot move its releases
 };
 
-/// What is known of the clock, seen from one task. Durations in nanoseconds.
+/// The state of the clock, seen from one task. Durations in nanoseconds.
 struct ClockStatus {
   ClockState state = ClockState::off;
   bool in_sync = false;  ///< the task's releases are within the window, or were when the reference stopped
@@ -42,8 +42,8 @@ struct ClockStatus {
 class ClockFollower;
 
 /// The reference clock of one set of tasks. There is one regulator; whichever task plans its next release
-/// first feeds it with the newest pair, without a lock: who finds another task at it goes on with the line
-/// that it has. Each cyclic task follows the line by itself (ClockFollower).
+/// first feeds it with the newest pair, without a lock. A task that finds another one at it goes on with the
+/// line that it has. Each cyclic task follows the line by itself (ClockFollower).
 class DistributedClock {
  public:
   DistributedClock();
@@ -56,7 +56,7 @@ class DistributedClock {
   [[nodiscard]] ClockFollower& add_follower(int iec_priority);
   /// While no task runs: begins to learn anew. Set-up.
   void configure(const DistributedClockSettings& settings);
-  /// Whether releases may be moved: what the scheduler is capable of. Set-up.
+  /// Whether releases may be moved: a capability of the scheduler. Set-up.
   void set_steering(bool steering) noexcept { steering_.store(steering, std::memory_order_relaxed); }
   /// Where pairs come from from now on; null: from report(). false: a task that is not given the processor is
   /// still at the old one; try again later. When it has returned true the old one is free to go. Control
@@ -75,7 +75,7 @@ class DistributedClock {
  private:
   friend class ClockFollower;
 
-  /// What the regulator knows, for all tasks and for whoever asks.
+  /// The regulator's knowledge, for all tasks and other readers.
   struct Shared {
     ClockModel model;
     double bias_ns = 0;
@@ -104,7 +104,7 @@ class DistributedClock {
   std::atomic<bool> active_{false};
   std::atomic<bool> steering_{false};
 
-  std::atomic<bool> polling_{false};  // whoever sets it owns the next four
+  std::atomic<bool> polling_{false};  // the thread that sets it owns the next four
   ReferenceSource* source_ = nullptr;
   ClockRegulator regulator_;
   std::uint64_t updates_ = 0;
@@ -114,7 +114,7 @@ class DistributedClock {
   std::atomic<Duration::rep> last_poll_{0};
 
   std::atomic<bool> has_source_{false};
-  std::atomic<bool> reporting_{false};  // whoever sets it owns the next one
+  std::atomic<bool> reporting_{false};  // the thread that sets it owns the next one
   std::uint64_t reports_ = 0;
   Seqlock<Report> report_;
 };

@@ -6,8 +6,8 @@
 
 namespace plchost {
 
-/// How the releases of cyclic tasks follow a reference clock: [DistributedClock]. What the gains mean: see
-/// ClockRegulator.
+/// How the releases of cyclic tasks follow a reference clock: [DistributedClock]. The meaning of the gains:
+/// see ClockRegulator.
 struct DistributedClockSettings {
   static constexpr int kMaxGainPpm = 1'000'000;
   static constexpr Duration kMaxCorrection = std::chrono::milliseconds(100);

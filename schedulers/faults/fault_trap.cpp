@@ -58,7 +58,7 @@ std::uintptr_t caller_of(const ucontext_t& context) noexcept {
 #endif
 }
 
-// As if there were no handler. A fault of the processor comes back by itself when the handler returns; a
+// As if there were no handler. A fault of the processor comes back by itself when the handler returns. A
 // signal that was sent is sent again, and so is that of a breakpoint, behind which the thread would go on.
 void crash(int signal, const siginfo_t& info) noexcept {
   struct sigaction action{};
@@ -130,11 +130,11 @@ void FaultTrap::fill_struck(FaultRecord& record) const noexcept {
   record.limit = struck_limit_.load(std::memory_order_relaxed);
 }
 
-/// What runs in signal context: only atomics, system calls and the memory of the trap's task.
+/// The code in signal context uses only atomics, system calls and the memory of the trap's task.
 struct FaultHandlers {
   static void on_fault(int signal, siginfo_t* info, void* context) noexcept {
     const int saved = errno;
-    // What strangers do to a shared memory is not the application's fault, and no cause of death.
+    // A stranger's damage to a shared memory is not the application's fault, and no cause of an end.
     if (signal == SIGBUS && info->si_code == BUS_ADRERR && MemoryGuard::mend(info->si_addr)) {
       errno = saved;
       return;

@@ -32,9 +32,9 @@ class FaultTrap {
   /// Nothing happens if it has ended by then. The supervision's thread.
   void strike(TimePoint since, FaultKind kind, std::int64_t figure, std::int64_t limit) noexcept;
 
-  /// Who is or was here; 0: nobody yet. Any thread.
+  /// The thread that is or was here; 0: none yet. Any thread.
   [[nodiscard]] pid_t thread() const noexcept { return thread_.load(std::memory_order_relaxed); }
-  /// What strike() was given. Any thread.
+  /// The arguments of strike(). Any thread.
   void fill_struck(FaultRecord& record) const noexcept;
 
   /// The thread was caught and will never go on. Any thread.
@@ -48,7 +48,7 @@ class FaultTrap {
   std::atomic<pid_t> thread_{0};
   std::atomic<bool> parked_{false};
   bool event_variable_ = false;
-  // What strike() asks for; written before the signal is sent.
+  // The order of strike(); written before the signal is sent.
   std::atomic<Duration::rep> struck_{0};
   std::atomic<FaultKind> struck_kind_{FaultKind::task_watchdog};
   std::atomic<std::int64_t> struck_figure_{0};

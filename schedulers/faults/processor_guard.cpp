@@ -21,7 +21,7 @@ enum class Mailbox : std::uint8_t { empty, claimed, full };
 constinit std::atomic<bool> guarded{false};  // the handler is installed
 constinit std::atomic<Duration::rep> guard_limit{0};
 constinit std::atomic<Duration::rep> last_sign{0};
-constinit std::atomic<pid_t> signer{0};      // who gave it
+constinit std::atomic<pid_t> signer{0};      // the thread of that sign
 constinit std::atomic<bool> sets_up{false};  // the signer does
 constinit std::atomic<Mailbox> mailbox{Mailbox::empty};
 constinit ProcessorGuard::Taker reported;  // belongs to who has made the mailbox `claimed` or found it `full`

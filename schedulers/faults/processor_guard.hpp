@@ -21,7 +21,7 @@ namespace plchost {
 class ProcessorGuard {
  public:
   struct Taker {
-    ThreadText who;     ///< "thread 'hog' (SCHED_FIFO 80)": what it was
+    ThreadText who;     ///< "thread 'hog' (SCHED_FIFO 80)": its name and scheduling
     Duration lasted{};  ///< since the last sign of the runtime
   };
 
@@ -30,9 +30,9 @@ class ProcessorGuard {
   /// `limit`: for how long a thread may run without a pause while nothing of the runtime does; 0: for ever.
   /// That is the beginning of it. Any thread.
   static void watch(Duration limit) noexcept;
-  /// The calling thread sets the application up, until watch() is called: no thread that may run wherever
-  /// this one may, nor this one itself, keeps a real-time priority for longer than `limit` without a pause,
-  /// whether the runtime gives signs or not.
+  /// The calling thread sets the application up, until watch() is called. Neither this thread nor one that
+  /// may run wherever it may keeps a real-time priority for longer than `limit` without a pause, whether the
+  /// runtime gives signs or not.
   static void watch_set_up(Duration limit) noexcept;
   /// The calling thread gets the processor: the one of the runtime that must. Called several times within the
   /// limit. Real-time, three system calls.

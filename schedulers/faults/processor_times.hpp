@@ -27,8 +27,8 @@ class ProcessorTimes {
   /// The threads of this process with a real-time priority, as many as `found` has room for; how many that
   /// are. Real-time, a system call for each thread of the process.
   [[nodiscard]] virtual std::size_t real_time_threads(std::span<pid_t> found) const noexcept = 0;
-  /// Takes its real-time priority from a thread of this process. What it was; empty: it had none, or has
-  /// ended. Real-time, signal handlers included; six system calls.
+  /// Takes its real-time priority from a thread of this process. The text names thread and priority; empty:
+  /// it had none, or has ended. Real-time, signal handlers included; six system calls.
   [[nodiscard]] virtual ThreadText demote(pid_t thread) const noexcept = 0;
 };
 

@@ -61,7 +61,8 @@ void Starvation::look_at(std::size_t index, TimePoint now) noexcept {
   if (hunger.lasted < limit() || search_.begun()) return;
   constexpr int kNothing = 100;  // less than one part of so many
   const bool got_none = used_by(tasks_[index]->trap()) - hunger.used <= hunger.lasted / kNothing;
-  // A cycle may wait for something else. What is due may, too, but then because who releases it gets nothing.
+  // A cycle may wait for something else. A due task may, too, but then because the thread that releases it
+  // gets nothing.
   const bool sleeps = times_.sleeps(tasks_[index]->trap().thread());
   const bool starves = got_none && !(sleeps && hunger.demand->cycle_since);
   const Takers takers = starves ? takers_from(index) : Takers::threads_of_tasks;
@@ -74,7 +75,7 @@ void Starvation::look_at(std::size_t index, TimePoint now) noexcept {
   hunger = {.demand = demand, .looked_at = now};
 }
 
-// What the threads take that run tasks is for the other watchdogs to judge.
+// The other watchdogs judge the time of the threads that run tasks.
 Starvation::Takers Starvation::takers_from(std::size_t index) noexcept {
   const Hunger& hunger = hunger_[index];
   const Duration by_process = times_.of_process() - hunger.by_process;

@@ -51,11 +51,11 @@ class Starvation {
   [[nodiscard]] std::optional<std::size_t> take_starved_by_others() noexcept;
 
  private:
-  /// What a task has been ready to run for and has got no processor for yet.
+  /// The cycle for which a task is ready and has got no processor yet.
   struct Hunger {
     std::optional<Task::Demand> demand;
     TimePoint looked_at;    // last
-    bool measured = false;  // what follows
+    bool measured = false;  // the following members hold
     Duration lasted{};      // without what stood still
     Duration used{};        // when that began, by the task's thread,
     Duration by_process{};

@@ -158,9 +158,9 @@ TimePoint Supervision::look_at_cycle(Watched& watched, TimePoint since, TimePoin
   return now + kPatience;
 }
 
-// What counts is what the thread has used: a host, a core or a process that stood still, and what others took
-// from it, are no fault of the cycle. A cycle that uses nothing because it waits has the same time, of which
-// only what this thread has seen go by counts.
+// The processor time of the thread counts: a host, a core or a process that stood still, and time that others
+// took from it, are no fault of the cycle. A cycle that uses nothing because it waits has the same time, of
+// which only what this thread has seen go by counts.
 TimePoint Supervision::look_for_endless_loop(Watched& watched, TimePoint since, TimePoint now) noexcept {
   const Duration limit(watched.limit.load(std::memory_order_relaxed));
   const Duration step = limit / kLooks;
@@ -256,8 +256,7 @@ TimePoint Supervision::look_at_load(TimePoint now) noexcept {
   return now + interval;
 }
 
-// What threads use is asked only of who may have a reason to fear the answer: it costs a system call for
-// each.
+// The processor time is asked only of threads that may be over their limit: it costs a system call for each.
 void Supervision::look_at_overload(TimePoint now, bool first) noexcept {
   const bool suspected = overtaxed() && !first;
   const bool measured = std::exchange(overload_measured_, suspected) && !first;

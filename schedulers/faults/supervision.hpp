@@ -15,7 +15,7 @@
 
 namespace plchost {
 
-/// The watchdogs that look from outside: a thread above all others of the instance that sleeps until the
+/// The watchdogs that look from outside: a thread above all others of the instance. It sleeps until the
 /// earliest moment at which a cycle could be too long, a task could have missed too many releases, or the
 /// load is to be measured. It takes no lock: tasks say what they do in atomics of their own.
 class Supervision {

@@ -10,8 +10,8 @@
 
 namespace plchost {
 
-/// What all tasks of a set share about faults: whoever finds one raises it here, the control thread waits for
-/// it on a descriptor.
+/// The part about faults that all tasks of a set share: the finder of one raises it here, the control thread
+/// waits for it on a descriptor.
 class FaultBoard {
  public:
   /// `notify`: an eventfd; -1: nobody is told.
@@ -36,7 +36,7 @@ class TaskFault {
   void show_in(Seqlock<FaultRecord>* shown) noexcept { shown_ = shown; }
 
   /// Raises it if it was not raised before: then the caller, and only it, fills record() and calls publish().
-  /// Any context, signal handlers included. `whole_application`: whatever the policy says.
+  /// Any context, signal handlers included. `whole_application`: under any policy.
   [[nodiscard]] bool claim(bool whole_application = false) noexcept;
   [[nodiscard]] FaultRecord& record() noexcept { return record_; }
   void publish() noexcept;

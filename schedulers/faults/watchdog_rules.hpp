@@ -74,7 +74,7 @@ class OverrunRule {
 /// for 5 % of each second, if it is set as it comes; something else may run on it, too.
 inline constexpr int kOverloadPercent = 90;
 
-/// The processor load of an instance, window by window. What some tasks use does not count. One thread.
+/// The processor load of an instance, window by window. The time of some tasks does not count. One thread.
 class LoadRule {
  public:
   struct Sample {

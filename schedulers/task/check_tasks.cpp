@@ -44,7 +44,7 @@ Result<void> check_kind(const TaskConfig& task) {
                          static_cast<int>(task.kind)));
 }
 
-// What only a cyclic task can have.
+// The options that only a cyclic task can have.
 Result<void> check_not_cyclic(const TaskConfig& task) {
   if (task.kind == TaskKind::cyclic) return {};
   if (task.start_offset != Duration::zero()) return bad(task, "only a cyclic task can have a start offset");

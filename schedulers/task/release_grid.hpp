@@ -19,7 +19,7 @@ class ReleaseGrid {
   ReleaseGrid(TimePoint origin, Duration interval, LatePolicy late) noexcept
       : next_(origin), interval_(interval), late_(late) {}
 
-  /// What a task runs next that has been ready for it since `ready`. A release that came while it was ready
+  /// The next run of a task that has been ready for it since `ready`. A release that came while it was ready
   /// runs, however late the wake-up is. Of those that came before, `next` loses all and `asap` all but the
   /// last.
   [[nodiscard]] Plan plan(TimePoint ready) const noexcept {

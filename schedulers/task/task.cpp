@@ -156,7 +156,7 @@ void Task::run_cycle(const Activation& activation) noexcept {
 
 void Task::work_between_cycles() noexcept {
   free_since_.store(kAtWork, std::memory_order_relaxed);
-  // What falls due meanwhile is lost, as during a cycle.
+  // Releases that fall due meanwhile are lost, as during a cycle.
   if (config_.between_cycles()) ready_ = clock_.now();
   free_since_.store(ready_.time_since_epoch().count(), std::memory_order_relaxed);
 }

@@ -19,12 +19,12 @@
 
 namespace plchost {
 
-/// One IEC task: what it runs, its statistics, and all that outlives an exchange of its ActivationSource: the
+/// One IEC task: its function, its statistics, and all that outlives an exchange of its ActivationSource: the
 /// grid, the place in its external event, the level of its event variable.
 class Task {
  public:
   /// `config` is valid; `event` is the counter of config.external_event, null for the other kinds. `board`:
-  /// what the tasks of a set share; null: alone.
+  /// the part that the tasks of a set share; null: alone.
   Task(Clock& clock, TaskConfig config, TaskStatistics& statistics, CountedEvent* event,
        FaultBoard* board = nullptr) noexcept;
 
@@ -48,7 +48,7 @@ class Task {
   /// on, and posters are told so from the same moment on.
   void begin(TimePoint origin, bool takes_posts = false);
 
-  /// What a cyclic or freewheeling task runs next: the same answer until a cycle has run. The task's thread.
+  /// The next run of a cyclic or freewheeling task: the same answer until a cycle has run. The task's thread.
   [[nodiscard]] Activation next_release(const FreewheelRule& rule) const noexcept;
 
   /// Runs one cycle and records it. A C++ exception out of the application's code, or a cycle that the
@@ -60,8 +60,8 @@ class Task {
   [[nodiscard]] TaskFault& fault() noexcept { return fault_; }
   [[nodiscard]] const TaskFault& fault() const noexcept { return fault_; }
   [[nodiscard]] FaultTrap& trap() noexcept { return trap_; }
-  /// What a task is ready to run for, as long as it is the same: a cycle that has begun, or something due for
-  /// which none has.
+  /// The run that a task is ready for, as long as it is the same: a cycle that has begun, or a due one that
+  /// has not.
   struct Demand {
     std::optional<TimePoint> cycle_since;
     std::optional<TimePoint> due;

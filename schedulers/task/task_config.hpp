@@ -14,10 +14,10 @@ namespace plchost {
 /// The four kinds of iec_task_management, with the numbers of the seed's KindOfTask.
 enum class TaskKind : std::uint8_t { cyclic = 0, event = 1, external = 2, freewheeling = 3 };
 
-/// What happens to a cyclic task that is late: wait for the next point of its grid, or run at once.
+/// The action of a cyclic task that is late: wait for the next point of its grid, or run at once.
 enum class LatePolicy : std::uint8_t { next, asap };
 
-/// Who goes to exception when a task's watchdog hits.
+/// The part that goes to exception when a task's watchdog hits.
 enum class WatchdogPolicy : std::uint8_t { application, task };
 
 /// The watchdogs of one task.
@@ -36,10 +36,9 @@ inline constexpr Duration kMaxWatchdogTime = std::chrono::microseconds(0xffff'ff
 /// IEC priorities: 0 (highest) to 31; 0..15 are SCHED_FIFO, 16..31 SCHED_OTHER.
 inline constexpr int kLowestIecPriority = 31;
 inline constexpr int kLowestRealTimeIecPriority = 15;
-/// What a task's interval may be at most: the seed's largest, 2^32 ms, is just below.
+/// The longest interval of a task: the seed's largest, 2^32 ms, is just below.
 inline constexpr Duration kMaxInterval = std::chrono::days(50);
-/// What it may be set to at least while the task runs: the shortest that an application can be configured
-/// with.
+/// The shortest that may be set while the task runs: the shortest that an application can be configured with.
 inline constexpr Duration kMinRuntimeInterval = std::chrono::microseconds(1);
 
 /// Which part of SCHED_FIFO's range an instance uses, so that of two instances on one core one goes first.

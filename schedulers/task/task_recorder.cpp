@@ -77,7 +77,7 @@ void TaskRecorder::lose_posts(std::uint64_t count) noexcept {
   const std::uint64_t missing = count - accounted_;
   if (missing == 0) return;
   accounted_ = count;
-  // A cycle that did not come to its end holds nothing: who resets is the only other owner.
+  // A cycle that did not come to its end holds nothing: the thread that resets is the only other owner.
   const bool owns = acquire(Owner::task);
   if (owns && resets_ != obeyed_resets_) begin_anew();
   const std::uint64_t lost = missing > CountedEvent::kCountMask ? 1 : missing;

@@ -21,7 +21,7 @@ struct RecordedCycle {
   std::uint64_t posts_done = 0;  ///< external events: the event's count that it was for
 };
 
-/// Writes the statistics of one task. The task's own thread records and never waits for anybody; who resets
+/// Writes the statistics of one task. The task's own thread records and never waits. The thread that resets
 /// takes them away from it for the moment that takes, and a cycle of that moment counts as one before the
 /// reset.
 class TaskRecorder {

@@ -41,7 +41,8 @@ class TaskThread {
   std::atomic<ActivationSource*> wanted_{nullptr};
   std::atomic<bool> ending_{false};
   std::atomic<std::uint32_t> order_{0};  // changes with each demand; a parked thread sleeps on it
-  std::atomic<std::uint32_t> done_{0};   // the last order that was obeyed; who demands sleeps on it
+  std::atomic<std::uint32_t> done_{0};   // the last order that was obeyed; the thread that demands sleeps on
+                                         // it
   std::atomic<bool> resting_{false};
   Thread thread_;
 };

@@ -85,7 +85,7 @@ class DeviceTime {
   double rate_ = 0;
   std::uint64_t in_window_ = 0;
   double earliest_ = kNothing;  // of this window, against what was due
-  double corrected_ = 0;        // what the window has moved the offset down by
+  double corrected_ = 0;        // by which the window has moved the offset down
 };
 
 }  // namespace plchost

@@ -9,8 +9,8 @@
 
 namespace plchost {
 
-/// What is to come, the earliest first: a binary heap whose entries know their place, so that one that is in
-/// it can be moved or taken out. Allocates in reserve() only. One thread.
+/// The tasks to come, the earliest first: a binary heap whose entries know their place, so that one that is
+/// in it can be moved or taken out. Allocates in reserve() only. One thread.
 class DueQueue {
  public:
   /// Base of what is queued; in at most one queue.

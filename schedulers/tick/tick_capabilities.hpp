@@ -6,7 +6,7 @@
 
 namespace plchost {
 
-/// What a source of ticks can do.
+/// The capabilities of a source of ticks.
 struct TickCapabilities {
   /// linear: any period in steps of the resolution. whole_hertz: 1 s / n. powers_of_two: 1 s / 2^n.
   enum class Periods : std::uint8_t { linear, whole_hertz, powers_of_two };

@@ -16,8 +16,8 @@ struct TickChoice {
   std::string fallback;  ///< why it is not the one that the settings ask for; empty: it is
 };
 
-/// What the settings ask for, or the system's clock if that is not there or cannot make the period. `known`
-/// is used again if it is the same device: most can be opened only once. Set-up.
+/// The tick source that the settings name, or the system's clock if that is not there or cannot make the
+/// period. `known` is used again if it is the same device: most can be opened only once. Set-up.
 [[nodiscard]] TickChoice choose_tick(const SchedulerSettings& settings, DeviceFiles& files,
                                      const std::shared_ptr<TickDevice>& known);
 

@@ -22,7 +22,7 @@ class TickSource {
   virtual void interrupt() noexcept = 0;
 };
 
-/// What a timer of the kernel, and a thread in absolute sleeps, can do.
+/// The capabilities of a timer of the kernel, and of a thread in absolute sleeps.
 inline constexpr TickCapabilities kKernelTimerCapabilities{.periods = TickCapabilities::Periods::linear,
                                                            .resolution = Duration(1),
                                                            .shortest = std::chrono::microseconds(50),

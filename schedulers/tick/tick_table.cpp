@@ -9,7 +9,7 @@ namespace plchost {
 
 namespace {
 
-// What a task states while it does not wait, and what a tick makes of it when it takes the task.
+// The state of a task while it does not wait, and the one that a tick writes when it takes the task.
 constexpr Duration::rep kNotDue = std::numeric_limits<Duration::rep>::max();
 constexpr Duration::rep kClaimed = kNotDue - 1;
 
@@ -92,7 +92,7 @@ Duration::rep TickTable::slack(Duration interval) const noexcept {
   return 1'000'000'000 / Duration::rep{frequency_} * 2 / 5;
 }
 
-// The thread of the task may see a later tick than the one that released it; then the release stays as
+// The thread of the task may see a later tick than the one that released it. Then the release stays as
 // planned, and the next one is put on its tick.
 Activation TickTable::on_the_tick(Activation activation, Duration interval) const noexcept {
   if (!runs_on_ticks(interval)) return activation;
@@ -135,8 +135,8 @@ auto TickTable::on_tick(TimePoint tick) noexcept -> Work {
   return work;
 }
 
-// What came back since the tick before. The period of many tasks is one tick: they need no place in the
-// queue.
+// The tasks that came back since the tick before. The period of many tasks is one tick: they need no place in
+// the queue.
 void TickTable::take_in(Duration::rep tick, Work& work) noexcept {
   for (Slot* slot = handed_in_.exchange(nullptr); slot != nullptr; ++work.looked_at) {
     Slot* const next = slot->next_in;
@@ -156,7 +156,7 @@ void TickTable::take_due(Duration::rep tick, Work& work) noexcept {
   while (DueQueue::Entry* const entry = queue_.take_due(tick)) {
     auto& slot = static_cast<Slot&>(*entry);
     ++work.looked_at;
-    // Later now, or not waiting at all: whatever it states next, it hands itself in for it.
+    // Later now, or not waiting at all: it hands itself in for its next state.
     if (const Duration::rep due = slot.due.load(); due <= tick) claim(slot, due);
   }
 }

@@ -12,8 +12,8 @@
 namespace plchost {
 
 /// The tasks that one tick releases. Each task's thread states for when it waits and hands itself in without
-/// a lock; the tick queues what was handed in by its time and takes out what is due, so that a tick costs
-/// what is due and what came back since the tick before, however many tasks there are.
+/// a lock. The tick queues the tasks that were handed in by their time and takes out those that are due. So
+/// its cost depends on these two numbers only, not on the number of tasks.
 ///
 /// The tick wakes only the first of them, and each task wakes the one after it before it runs: the tick
 /// outranks all tasks, so the highest priority would otherwise wait until all others were woken. A cycle that

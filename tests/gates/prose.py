@@ -30,6 +30,7 @@ HELD = [
     ("comment", "[.C]*"),
     ("comment", "shm/*"),
     ("comment", "instances/*"),
+    ("comment", "schedulers/*"),
     ("comment", "tests/*"),
 ]
 GLOSSARY = "manager/glossary.md"
