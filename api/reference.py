@@ -9,129 +9,16 @@ Each exits with 1 if something is wrong. --root DIR: the folder of control.idl a
 """
 
 import argparse
-import dataclasses
 import pathlib
 import re
 import sys
 
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(pathlib.Path(__file__).parent / "generate"))
+from contract import TAGS, Fault, meaning, parse, partition_of, qos_of, quality  # noqa: E402
+
 BEGIN = "<!-- The reference begins here. It is made: api/reference.py --write -->"
 END = "<!-- The reference ends here. -->"
-TAGS = ("topic", "writer", "reader", "qos")
-
-
-@dataclasses.dataclass
-class Member:
-    """A member of a struct, or a constant; then `name` is what stands left of the `=`."""
-
-    name: str
-    type: str
-    line: int
-    key: bool = False
-    value: str = ""
-    comment: str = ""
-
-
-@dataclasses.dataclass
-class Type:
-    name: str
-    line: int
-    annotations: str
-    comment: str
-    tags: dict
-    members: list = dataclasses.field(default_factory=list)
-
-    @property
-    def is_topic(self):
-        return "@topic" in self.annotations
-
-
-@dataclasses.dataclass
-class Contract:
-    head: str
-    common: dict  # fields that mean the same everywhere: name -> meaning
-    constants: list
-    constants_comment: str
-    types: list
-
-
-class Fault(Exception):
-    pass
-
-
-def split_tags(lines):
-    """A comment's text, and what stands behind `topic:` and the like."""
-    text, tags, current = [], {}, None
-    for line in lines:
-        tag = re.match(r"(%s):\s+(.*)" % "|".join(TAGS), line)
-        if tag:
-            current = tag[1]
-            tags[current] = tag[2]
-        elif current:
-            tags[current] += " " + line.strip()
-        else:
-            text.append(line.strip())
-    return " ".join(text), tags
-
-
-def common_fields(head):
-    """The table of fields at the end of the head: `  name  meaning`, longer meanings go on below."""
-    fields, current = {}, None
-    for line in head:
-        entry = re.match(r"  (\w+)\s{2,}(\S.*)", line)
-        if entry:
-            current = entry[1]
-            fields[current] = entry[2]
-        elif current and line.startswith("   "):
-            fields[current] += " " + line.strip()
-    return fields
-
-
-def parse(path):
-    """Reads the part of IDL that control.idl uses; anything else is a Fault."""
-    contract = Contract("", {}, [], "", [])
-    comment, annotations, current, last = [], "", None, None
-    for number, line in enumerate(path.read_text().splitlines(), 1):
-        code, _, remark = line.partition("//")
-        code, remark = code.strip(), remark.removeprefix(" ").rstrip()
-        if not code:
-            if not remark and "//" not in line:  # an empty line
-                if comment and not contract.head:
-                    contract.head = "\n".join(comment)
-                    contract.common = common_fields(comment)
-                comment, last = [], None
-            elif last is not None:
-                last.comment = (last.comment + " " + remark.strip()).strip()
-            else:
-                comment.append(remark)
-            continue
-        constant = re.fullmatch(r"const (.+?)\s+(\w+)\s*=\s*(\S+);", code)
-        member = re.fullmatch(r"(@key )?(.+?)\s+(\w+)(\[\d+\])?;", code)
-        if constant and not current:
-            if comment:
-                contract.constants_comment = " ".join(comment)
-            last = Member(constant[2], constant[1], number, value=constant[3], comment=remark.strip())
-            contract.constants.append(last)
-            comment = []
-        elif code.startswith("@") and not current:
-            annotations = code
-        elif re.fullmatch(r"struct \w+ \{", code):
-            text, tags = split_tags(comment)
-            current = Type(code.split()[1], number, annotations, text, tags)
-            contract.types.append(current)
-            comment, annotations, last = [], "", None
-        elif current and member:
-            kind = member[2] + (member[4] or "")
-            last = Member(member[3], kind, number, key=bool(member[1]), comment=remark.strip())
-            current.members.append(last)
-        elif code == "};":
-            current, last, comment = None, None, []
-        elif not re.fullmatch(r"module \w+ \{", code):
-            raise Fault(f"{path.name}:{number}: not understood: {code}")
-    return contract
-
-
-def meaning(contract, member):
-    return member.comment or contract.common.get(member.name, "")
 
 
 def faults_of(contract, name):
@@ -155,6 +42,8 @@ def faults_of(contract, name):
         for tag in TAGS if kind.is_topic else ():
             if not kind.tags.get(tag):
                 yield f"{where} has no '{tag}:'"
+        if kind.is_topic and all(kind.tags.get(tag) for tag in TAGS):
+            yield from (f"{name}:{kind.line}: {fault}" for fault in faults_of_topic(contract, kind))
         if kind.is_topic and (not kind.members or kind.members[-1].name != "ext"):
             yield f"{where} does not end with ext"
         for member in kind.members:
@@ -169,6 +58,15 @@ def faults_of(contract, name):
         names = [member.name.lower() for member in first.members]
         for twice in sorted({n for n in names if names.count(n) > 1}):
             yield f"{name}:{first.line}: {first.name} has two members called {twice}"
+
+
+def faults_of_topic(contract, kind):
+    """What of a topic the generator would not understand."""
+    for read in (lambda: qos_of(contract, kind), lambda: partition_of(kind)):
+        try:
+            read()
+        except Fault as fault:
+            yield str(fault)
 
 
 def changes_since(old, new):
@@ -200,13 +98,6 @@ def changes_since(old, new):
 
 def text_of(text):
     return re.sub(r"([|<*])", r"\\\1", re.sub(r"\s+", " ", text))
-
-
-def quality(contract, kind):
-    """The QoS of a topic; `as OTHER` is written out."""
-    told = kind.tags["qos"]
-    other = re.fullmatch(r"as (\w+)", told)
-    return quality(contract, next(t for t in contract.types if t.name == other[1])) if other else told
 
 
 def reference(contract):

@@ -13,7 +13,7 @@ Result<BatchPoster> BatchPoster::create(dds_entity_t participant, dds_entity_t t
   auto publisher = dds::make_publisher(participant, dds::host_partition(host));
   if (!publisher) return std::unexpected(publisher.error());
   poster.publisher_ = std::move(*publisher);
-  auto writer = dds::make_writer(poster.publisher_.get(), topic, dds::event_qos());
+  auto writer = dds::make_writer(poster.publisher_.get(), topic, dds::qos_of(dds::kEventBatch));
   if (!writer) return std::unexpected(writer.error());
   poster.writer_ = std::move(*writer);
   poster.source_ = dds::guid_of(poster.writer_.get());

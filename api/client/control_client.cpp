@@ -69,7 +69,7 @@ Result<void> ControlClient::open(const dds::DomainOptions& options) {
   wait_set_ = std::move(*wait_set);
   last_news_ = MonotonicClock::now();
   if (options.interfaces != std::vector<std::string>{"lo"}) quiet_ = kQuietOnNetworks;
-  if (auto opened = open_cache(presence_, dds::kPresence, dds::presence_qos(),
+  if (auto opened = open_cache(presence_, dds::kPresence,
                                DDS_DATA_AVAILABLE_STATUS | DDS_REQUESTED_DEADLINE_MISSED_STATUS);
       !opened) {
     return opened;
@@ -78,14 +78,13 @@ Result<void> ControlClient::open(const dds::DomainOptions& options) {
 }
 
 template <class Cache>
-Result<void> ControlClient::open_cache(Cache& cache, const dds::TopicInfo& info, dds::Qos qos,
-                                       std::uint32_t statuses) {
+Result<void> ControlClient::open_cache(Cache& cache, const dds::TopicInfo& info, std::uint32_t statuses) {
   if (cache) return {};
   auto topic = dds::make_topic(participant_.get(), info);
   if (!topic) return std::unexpected(topic.error());
   // What another host writes under a key of this one must not push out what has not been taken yet.
-  auto reader =
-      dds::make_reader(status_subscriber_.get(), topic->get(), qos.keep_last(dds::kStatusReaderDepth));
+  auto reader = dds::make_reader(status_subscriber_.get(), topic->get(),
+                                 dds::qos_of(info).keep_last(dds::kStatusReaderDepth));
   if (!reader) return std::unexpected(reader.error());
   if (auto added = wait_set_.add(reader->get(), statuses); !added) return added;
   cache = Cache(std::move(*topic), std::move(*reader));
@@ -106,7 +105,7 @@ void ControlClient::update() {
 }
 
 template Result<void> ControlClient::open_cache(StatusCache<plc_HostFinding>&, const dds::TopicInfo&,
-                                                dds::Qos, std::uint32_t);
+                                                std::uint32_t);
 
 template <class Sample>
 Result<std::vector<Sample>> ControlClient::snapshot(StatusCache<Sample>& cache, const dds::TopicInfo& topic,
@@ -173,7 +172,7 @@ Result<std::vector<TransitionView>> ControlClient::transitions() {
   if (!transition_log_) {
     auto topic = dds::make_topic(participant_.get(), dds::kTransition);
     if (!topic) return std::unexpected(topic.error());
-    auto reader = dds::make_reader(status_subscriber_.get(), topic->get(), dds::transition_qos());
+    auto reader = dds::make_reader(status_subscriber_.get(), topic->get(), dds::qos_of(dds::kTransition));
     if (!reader) return std::unexpected(reader.error());
     if (auto added = wait_set_.add(reader->get(), DDS_DATA_AVAILABLE_STATUS); !added) {
       return std::unexpected(added.error());
@@ -221,8 +220,7 @@ Result<void> ControlClient::open_own_reader(dds::Entity& topic, dds::Entity& rea
 Result<RequestCaller*> ControlClient::caller(const std::string& host, bool engineering) {
   const std::pair key(host, engineering);
   if (const auto known = callers_.find(key); known != callers_.end()) return &known->second;
-  dds::Qos qos = dds::reply_qos();
-  qos.keep_all().max_samples(dds::kReplyDepth * dds::kMaxServersPerMachine);
+  const dds::Qos qos = dds::answers_qos(dds::kReply, dds::kReply.qos.depth);
   if (auto opened = open_own_reader(reply_topic_, reply_reader_, dds::kReply, qos); !opened) {
     return std::unexpected(opened.error());
   }

@@ -207,7 +207,6 @@ class ControlClient {
   [[nodiscard]] std::optional<HostView> view_of(std::string_view name, const SeenHost& seen) const;
   template <class Cache>
   [[nodiscard]] Result<void> open_cache(Cache& cache, const dds::TopicInfo& topic,
-                                        dds::Qos qos = dds::status_qos(),
                                         std::uint32_t statuses = DDS_DATA_AVAILABLE_STATUS);
   template <class Sample>
   [[nodiscard]] Result<std::vector<Sample>> snapshot(StatusCache<Sample>& cache, const dds::TopicInfo& topic,

@@ -37,8 +37,8 @@ Result<ApiReply> ControlClient::download(const Download& download, const Downloa
   if (auto good = check_api_request(request); !good) return std::unexpected(std::move(good).error());
   if (auto good = check_file_name(download.name); !good) return std::unexpected(std::move(good).error());
   if (download.contents.empty()) return failure(ErrorCode::invalid_argument, download.name + " is empty");
-  dds::Qos qos = dds::ack_qos();
-  qos.keep_all().max_samples(dds::kReplyDepth * dds::kMaxServersPerMachine);
+  constexpr std::int32_t kOfEachHost = 16;
+  const dds::Qos qos = dds::answers_qos(dds::kDownloadAck, kOfEachHost);
   if (auto opened = open_own_reader(download_acks_.topic, download_acks_.reader, dds::kDownloadAck, qos);
       !opened) {
     return std::unexpected(opened.error());

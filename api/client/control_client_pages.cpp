@@ -18,12 +18,13 @@ template <class Page, class Listing>
 std::optional<Listing> take_page(dds_entity_t reader, dds::HostWriters& writers, std::string_view host,
                                  const plc_SampleIdentity& identity) {
   std::optional<Listing> found;
-  dds::take_valid_told<Page, dds::kPageDepth>(reader, writers, [&](const Page& page, const auto& /*info*/) {
-    // Others answer calls that were given up, or are of a host that was not asked.
-    if (same_identity(page.related_identity, identity) && dds::text_of(page.host) == host) {
-      found = listing_of(page);
-    }
-  });
+  dds::take_valid_told<Page, dds::kTopicOf<Page>.qos.depth>(
+      reader, writers, [&](const Page& page, const auto& /*info*/) {
+        // Others answer calls that were given up, or are of a host that was not asked.
+        if (same_identity(page.related_identity, identity) && dds::text_of(page.host) == host) {
+          found = listing_of(page);
+        }
+      });
   return found;
 }
 
@@ -33,8 +34,7 @@ template <class Page, class Listing>
 Result<Listing> ControlClient::ask_for_page(PageReader& pages, const dds::TopicInfo& topic,
                                             const ApiRequest& request, TimePoint deadline) {
   if (auto good = check_host_name(request.host); !good) return std::unexpected(std::move(good).error());
-  dds::Qos qos = dds::page_qos();
-  qos.keep_all().max_samples(dds::kPageDepth * dds::kMaxServersPerMachine);
+  const dds::Qos qos = dds::answers_qos(topic, topic.qos.depth);
   if (auto opened = open_own_reader(pages.topic, pages.reader, topic, qos); !opened) {
     return std::unexpected(opened.error());
   }

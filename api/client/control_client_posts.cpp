@@ -12,11 +12,12 @@ namespace plchost {
 
 Result<EventPoster*> ControlClient::poster(const std::string& host) {
   if (const auto known = posters_.find(host); known != posters_.end()) return &known->second;
-  if (auto opened = open_own_reader(ack_topic_, ack_reader_, dds::kEventAck, dds::ack_qos()); !opened) {
+  if (auto opened = open_own_reader(ack_topic_, ack_reader_, dds::kEventAck, dds::qos_of(dds::kEventAck));
+      !opened) {
     return std::unexpected(opened.error());
   }
   if (!event_topic_) {
-    auto made = dds::make_topic(participant_.get(), dds::kEvent);
+    auto made = dds::make_topic(participant_.get(), dds::kEventPost);
     if (!made) return std::unexpected(made.error());
     event_topic_ = std::move(*made);
   }

@@ -20,8 +20,7 @@ bool has_writer(dds_entity_t reader) {
 }  // namespace
 
 Result<void> ControlClient::prepare_runs(const std::string& host, TimePoint deadline) {
-  dds::Qos qos = dds::run_qos();
-  qos.keep_all().max_samples(dds::kRunDepth * dds::kMaxServersPerMachine);
+  const dds::Qos qos = dds::answers_qos(dds::kEventRun, dds::kEventRun.qos.depth);
   if (auto opened = open_own_reader(runs_.topic, runs_.reader, dds::kEventRun, qos); !opened) return opened;
   if (auto ready = prepare_posts(host, deadline); !ready) return ready;
   while (!has_writer(runs_.reader.get())) {
@@ -95,7 +94,8 @@ Result<RunReport> ControlClient::post_and_await(const ApiRequest& event, Duratio
 
 Result<BatchPoster*> ControlClient::batch_poster(const std::string& host) {
   if (const auto known = batch_posters_.find(host); known != batch_posters_.end()) return &known->second;
-  if (auto opened = open_own_reader(ack_topic_, ack_reader_, dds::kEventAck, dds::ack_qos()); !opened) {
+  if (auto opened = open_own_reader(ack_topic_, ack_reader_, dds::kEventAck, dds::qos_of(dds::kEventAck));
+      !opened) {
     return std::unexpected(opened.error());
   }
   if (!batch_topic_) {

@@ -16,7 +16,7 @@ Result<FileSender> FileSender::create(dds_entity_t participant, dds_entity_t top
   auto publisher = dds::make_publisher(participant, dds::host_partition(host));
   if (!publisher) return std::unexpected(publisher.error());
   sender.publisher_ = std::move(*publisher);
-  auto writer = dds::make_writer(sender.publisher_.get(), topic, dds::event_qos());
+  auto writer = dds::make_writer(sender.publisher_.get(), topic, dds::qos_of(dds::kDownloadChunk));
   if (!writer) return std::unexpected(writer.error());
   sender.writer_ = std::move(*writer);
   sender.host_ = host;

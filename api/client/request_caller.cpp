@@ -35,7 +35,7 @@ Result<RequestCaller> RequestCaller::create(dds_entity_t participant, dds_entity
   auto publisher = dds::make_publisher(participant, dds::host_partition(host));
   if (!publisher) return std::unexpected(publisher.error());
   caller.publisher_ = std::move(*publisher);
-  auto writer = dds::make_writer(caller.publisher_.get(), topic, dds::request_qos());
+  auto writer = dds::make_writer(caller.publisher_.get(), topic, dds::qos_of(dds::kOperatorRequest));
   if (!writer) return std::unexpected(writer.error());
   caller.writer_ = std::move(*writer);
   caller.guid_ = dds::guid_of(caller.writer_.get());

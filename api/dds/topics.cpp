@@ -2,68 +2,34 @@
 
 #include <fmt/format.h>
 
+#include "api/dds/domain.hpp"
 #include "api/dds/error.hpp"
 
 namespace plchost::dds {
 
-Qos request_qos() {
+Qos qos_of(const TopicInfo& topic) {
   Qos qos;
-  qos.reliable(kRequestBlocking).keep_all();
+  qos.reliable(topic.qos.blocking);
+  if (topic.qos.depth > 0) {
+    qos.keep_last(topic.qos.depth);
+  } else {
+    qos.keep_all();
+  }
+  if (topic.qos.transient_local) qos.transient_local();
+  if (!topic.qos.autodispose) qos.no_autodispose();
+  if (topic.qos.deadline > Duration::zero()) qos.deadline(topic.qos.deadline);
   return qos;
 }
 
-Qos event_qos() {
-  Qos qos;
-  qos.reliable(kEventBlocking).keep_all();
+Qos bounded_qos(const TopicInfo& topic) {
+  Qos qos = qos_of(topic);
+  if (topic.qos.reader_holds > 0) qos.max_samples(topic.qos.reader_holds);
   return qos;
 }
 
-Qos reply_qos() {
-  Qos qos;
-  qos.reliable(kServerBlocking).keep_last(kReplyDepth).transient_local();
-  return qos;
-}
-
-Qos page_qos() {
-  Qos qos;
-  qos.reliable(kServerBlocking).keep_last(kPageDepth).transient_local();
-  return qos;
-}
-
-Qos ack_qos() {
-  Qos qos;
-  qos.reliable(kServerBlocking).keep_last(1).transient_local();
-  return qos;
-}
-
-Qos run_qos() {
-  Qos qos;
-  qos.reliable(kServerBlocking).keep_last(kRunDepth).transient_local();
-  return qos;
-}
-
-Qos status_qos() {
-  Qos qos;
-  qos.reliable(kServerBlocking).keep_last(1).transient_local().no_autodispose();
-  return qos;
-}
-
-Qos presence_qos() {
-  Qos qos = status_qos();
-  qos.deadline(kPresenceDeadline);
-  return qos;
-}
-
-// Never waits: how much may be under way is the business of BlockWindow.
-Qos block_qos() {
-  Qos qos;
-  qos.reliable(Duration::zero()).keep_all();
-  return qos;
-}
-
-Qos transition_qos() {
-  Qos qos;
-  qos.reliable(kServerBlocking).keep_last(kTransitionDepth).transient_local().no_autodispose();
+Qos answers_qos(const TopicInfo& topic, std::int32_t each) {
+  Qos qos = qos_of(topic);
+  qos.keep_all().max_samples(each * kMaxServersPerMachine);
   return qos;
 }
 

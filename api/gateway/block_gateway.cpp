@@ -98,12 +98,12 @@ Result<void> BlockGateway::open_topics(CountedEvent& wake) {
   subscriber_ = *std::move(subscriber);
   host_publisher_ = *std::move(told);
   host_subscriber_ = *std::move(heard);
-  auto host_writer = dds::make_writer(host_publisher_.get(), hosts->get(), dds::status_qos());
-  auto host_reader = dds::make_reader(host_subscriber_.get(), hosts->get(), dds::status_qos());
-  dds::Qos block_qos = dds::block_qos();
-  block_qos.max_samples(dds::kBlockReaderDepth);
-  auto block_reader = dds::make_reader(subscriber_.get(), block_topic_.get(), block_qos);
-  auto ack_reader = dds::make_reader(subscriber_.get(), ack_topic_.get(), dds::ack_qos());
+  auto host_writer =
+      dds::make_writer(host_publisher_.get(), hosts->get(), dds::qos_of(dds::kBlockHostStatus));
+  auto host_reader =
+      dds::make_reader(host_subscriber_.get(), hosts->get(), dds::qos_of(dds::kBlockHostStatus));
+  auto block_reader = dds::make_reader(subscriber_.get(), block_topic_.get(), dds::bounded_qos(dds::kBlock));
+  auto ack_reader = dds::make_reader(subscriber_.get(), ack_topic_.get(), dds::qos_of(dds::kBlockAck));
   topics_.push_back(*std::move(hosts));
   for (auto* const made : {&host_writer, &host_reader, &block_reader, &ack_reader}) {
     if (!*made) return std::unexpected(std::move(*made).error());

@@ -84,7 +84,8 @@ void BlockGateway::settle_peers(TimePoint now) {
 }
 
 Result<void> BlockGateway::open_block_writer(Peer& peer) const {
-  auto writer = dds::make_writer(peer.publisher.get(), block_topic_.get(), dds::block_qos());
+  // Never waits: how much may be under way is the business of BlockWindow.
+  auto writer = dds::make_writer(peer.publisher.get(), block_topic_.get(), dds::qos_of(dds::kBlock));
   if (!writer) return std::unexpected(std::move(writer).error());
   peer.blocks = *std::move(writer);
   peer.writer = dds::guid_of(peer.blocks.get());
@@ -97,7 +98,7 @@ Result<std::unique_ptr<BlockGateway::Peer>> BlockGateway::open_peer(const HostCl
   auto publisher = dds::make_publisher(participant_, dds::block_partition(claim.host, options_.host));
   if (!publisher) return std::unexpected(std::move(publisher).error());
   peer->publisher = *std::move(publisher);
-  auto acks = dds::make_writer(peer->publisher.get(), ack_topic_.get(), dds::ack_qos());
+  auto acks = dds::make_writer(peer->publisher.get(), ack_topic_.get(), dds::qos_of(dds::kBlockAck));
   if (!acks) return std::unexpected(std::move(acks).error());
   peer->acks = *std::move(acks);
   if (auto opened = open_block_writer(*peer); !opened) return std::unexpected(std::move(opened).error());

@@ -209,32 +209,22 @@ Result<void> ControlServer::Parts::make_readers() {
   auto made_subscriber = dds::make_subscriber(participant.get(), dds::host_partition(options.host));
   if (!made_subscriber) return std::unexpected(made_subscriber.error());
   subscriber = std::move(*made_subscriber);
-  const auto make = [&](const dds::TopicInfo& info, const dds::Qos& qos, dds::Entity& topic,
-                        dds::Entity& reader) -> Result<void> {
+  const auto make = [&](const dds::TopicInfo& info, dds::Entity& topic, dds::Entity& reader) -> Result<void> {
     auto made_topic = dds::make_topic(participant.get(), info);
     if (!made_topic) return std::unexpected(made_topic.error());
     topic = std::move(*made_topic);
-    auto made_reader = dds::make_reader(subscriber.get(), topic.get(), qos);
+    auto made_reader = dds::make_reader(subscriber.get(), topic.get(), dds::bounded_qos(info));
     if (!made_reader) return std::unexpected(made_reader.error());
     reader = std::move(*made_reader);
     return {};
   };
   requests[0].role = ApiRole::operating;
   requests[1].role = ApiRole::engineering;
-  auto request_qos = dds::request_qos();
-  request_qos.max_samples(dds::kRequestReaderDepth);
-  auto event_qos = dds::event_qos();
-  event_qos.max_samples(dds::kEventReaderDepth);
-  auto batch_qos = dds::event_qos();
-  batch_qos.max_samples(dds::kBatchReaderDepth);
-  auto chunk_qos = dds::event_qos();
-  chunk_qos.max_samples(dds::kChunkReaderDepth);
-  if (auto made = make(dds::kDownloadChunk, chunk_qos, chunk_topic, chunk_reader); !made) return made;
-  if (auto made = make(dds::kEvent, event_qos, event_topic, event_reader); !made) return made;
-  if (auto made = make(dds::kEventBatch, batch_qos, batch_topic, batch_reader); !made) return made;
-  if (auto made = make(dds::kOperatorRequest, request_qos, requests[0].topic, requests[0].reader); !made)
-    return made;
-  return make(dds::kEngineerRequest, request_qos, requests[1].topic, requests[1].reader);
+  if (auto made = make(dds::kDownloadChunk, chunk_topic, chunk_reader); !made) return made;
+  if (auto made = make(dds::kEventPost, event_topic, event_reader); !made) return made;
+  if (auto made = make(dds::kEventBatch, batch_topic, batch_reader); !made) return made;
+  if (auto made = make(dds::kOperatorRequest, requests[0].topic, requests[0].reader); !made) return made;
+  return make(dds::kEngineerRequest, requests[1].topic, requests[1].reader);
 }
 
 Result<void> ControlServer::Parts::listen() {

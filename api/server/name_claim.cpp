@@ -80,9 +80,12 @@ Result<NameClaim> NameClaim::create(dds_entity_t participant, const Options& opt
   if (auto done = keep(dds::make_subscriber(participant, partition), claim.subscriber_); !done)
     return std::unexpected(done.error());
   const dds_entity_t topic = claim.topic_.get();
-  if (auto done = keep(dds::make_writer(claim.publisher_.get(), topic, dds::ack_qos()), claim.writer_); !done)
+  if (auto done =
+          keep(dds::make_writer(claim.publisher_.get(), topic, dds::qos_of(dds::kNameClaim)), claim.writer_);
+      !done)
     return std::unexpected(done.error());
-  if (auto done = keep(dds::make_reader(claim.subscriber_.get(), topic, dds::ack_qos()), claim.reader_);
+  if (auto done =
+          keep(dds::make_reader(claim.subscriber_.get(), topic, dds::qos_of(dds::kNameClaim)), claim.reader_);
       !done)
     return std::unexpected(done.error());
   if (auto done = claim.write(); !done) return std::unexpected(done.error());

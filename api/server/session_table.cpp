@@ -100,12 +100,9 @@ void SessionTable::follow_readers() {
 bool SessionTable::open_writer(const dds::Guid& client, Session& session, Stream stream) {
   dds::Entity& writer = session.writers[std::to_underlying(stream)];
   if (writer) return true;
-  const auto qos = [stream] {
-    if (stream == Stream::replies) return dds::reply_qos();
-    if (stream == Stream::runs) return dds::run_qos();
-    return stream == Stream::acks || stream == Stream::downloads ? dds::ack_qos() : dds::page_qos();
-  };
-  auto made = dds::make_writer(session.publisher.get(), topics_[std::to_underlying(stream)].get(), qos());
+  const auto index = std::to_underlying(stream);
+  auto made =
+      dds::make_writer(session.publisher.get(), topics_[index].get(), dds::qos_of(kStreamTopics[index]));
   if (made) {
     writer = std::move(*made);
     if (stream == Stream::acks) ack_writers_->add(client, writer.get());

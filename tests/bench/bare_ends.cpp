@@ -20,16 +20,16 @@ Result<void> BareEnd::open(std::uint32_t number, bool receives, int fifo) {
   if (!made) return std::unexpected(made.error());
   domain = std::move(*made);
   participant = dds::Entity(dds_create_participant(number, nullptr, nullptr));
-  auto events = dds::make_topic(participant.get(), dds::kEvent);
+  auto events = dds::make_topic(participant.get(), dds::kEventPost);
   auto acks = dds::make_topic(participant.get(), dds::kEventAck);
   if (!events || !acks) return failure(ErrorCode::unavailable, "the topics of the floor cannot be made");
   event_topic = std::move(*events);
   ack_topic = std::move(*acks);
-  dds::Qos event_qos = dds::event_qos();
-  if (receives) event_qos.max_samples(dds::kEventReaderDepth);
+  dds::Qos event_qos = dds::qos_of(dds::kEventPost);
+  if (receives) event_qos.max_samples(dds::kEventPost.qos.reader_holds);
   auto from = receives ? dds::make_reader(participant.get(), event_topic.get(), event_qos)
-                       : dds::make_reader(participant.get(), ack_topic.get(), dds::ack_qos());
-  auto to = receives ? dds::make_writer(participant.get(), ack_topic.get(), dds::ack_qos())
+                       : dds::make_reader(participant.get(), ack_topic.get(), dds::qos_of(dds::kEventAck));
+  auto to = receives ? dds::make_writer(participant.get(), ack_topic.get(), dds::qos_of(dds::kEventAck))
                      : dds::make_writer(participant.get(), event_topic.get(), event_qos);
   if (!from || !to) return failure(ErrorCode::unavailable, "the ends of the floor cannot be made");
   reader = std::move(*from);

@@ -24,10 +24,10 @@ class BareWriter {
         dds::check_entity(dds_create_participant(domain, nullptr, nullptr), "make a participant");
     if (!participant) return std::unexpected(participant.error());
     participant_ = std::move(*participant);
-    auto topic = dds::make_topic(participant_.get(), dds::kEvent);
+    auto topic = dds::make_topic(participant_.get(), dds::kEventPost);
     if (!topic) return std::unexpected(topic.error());
     topic_ = std::move(*topic);
-    auto writer = dds::make_writer(participant_.get(), topic_.get(), dds::event_qos());
+    auto writer = dds::make_writer(participant_.get(), topic_.get(), dds::qos_of(dds::kEventPost));
     if (!writer) return std::unexpected(writer.error());
     writer_ = std::move(*writer);
     std::string_view(kBenchHost).copy(sample_.host, sizeof sample_.host - 1);

@@ -39,10 +39,10 @@ class BareReader {
         dds::check_entity(dds_create_participant(domains.bare, nullptr, nullptr), "make a participant");
     if (!participant) return std::unexpected(participant.error());
     participant_ = std::move(*participant);
-    auto topic = dds::make_topic(participant_.get(), dds::kEvent);
+    auto topic = dds::make_topic(participant_.get(), dds::kEventPost);
     if (!topic) return std::unexpected(topic.error());
-    dds::Qos qos = dds::event_qos();
-    qos.max_samples(dds::kEventReaderDepth);
+    dds::Qos qos = dds::qos_of(dds::kEventPost);
+    qos.max_samples(dds::kEventPost.qos.reader_holds);
     auto reader = dds::make_reader(participant_.get(), topic->get(), qos);
     if (!reader) return std::unexpected(reader.error());
     topic_ = std::move(*topic);

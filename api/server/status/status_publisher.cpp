@@ -34,23 +34,23 @@ Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const 
   if (!publisher_of_status) return failure_in("publish status", publisher_of_status.error());
   const dds_entity_t parent = publisher_of_status->get();
   std::vector<dds::Entity> topics;
-  const auto make = [&](const dds::TopicInfo& info, const dds::Qos& qos) -> Result<dds::Entity> {
+  const auto make = [&](const dds::TopicInfo& info) -> Result<dds::Entity> {
     auto topic = dds::make_topic(participant, info);
     if (!topic) return std::unexpected(topic.error());
     topics.push_back(std::move(*topic));
-    return dds::make_writer(parent, topics.back().get(), qos);
+    return dds::make_writer(parent, topics.back().get(), dds::qos_of(info));
   };
-  auto tasks = make(dds::kTaskStatus, dds::status_qos());
-  auto statistics = make(dds::kTaskStatistics, dds::status_qos());
-  auto instances = make(dds::kInstanceStatus, dds::status_qos());
-  auto events = make(dds::kEventStatus, dds::status_qos());
-  auto objects = make(dds::kObjectStatus, dds::status_qos());
-  auto findings = make(dds::kHostFinding, dds::status_qos());
-  auto exceptions = make(dds::kExceptionStatus, dds::status_qos());
-  auto hosts = make(dds::kHostStatus, dds::status_qos());
-  auto writers = make(dds::kWriterStatus, dds::status_qos());
-  auto applications = make(dds::kApplicationStatus, dds::status_qos());
-  auto presence = make(dds::kPresence, dds::presence_qos());
+  auto tasks = make(dds::kTaskStatus);
+  auto statistics = make(dds::kTaskStatistics);
+  auto instances = make(dds::kInstanceStatus);
+  auto events = make(dds::kEventStatus);
+  auto objects = make(dds::kObjectStatus);
+  auto findings = make(dds::kHostFinding);
+  auto exceptions = make(dds::kExceptionStatus);
+  auto hosts = make(dds::kHostStatus);
+  auto writers = make(dds::kWriterStatus);
+  auto applications = make(dds::kApplicationStatus);
+  auto presence = make(dds::kPresence);
   for (auto* made : {&tasks, &statistics, &instances, &events, &objects, &findings, &exceptions, &hosts,
                      &writers, &applications, &presence}) {
     if (!*made) return failure_in("publish status", made->error());

@@ -17,7 +17,7 @@ Result<TransitionPublisher> TransitionPublisher::create(dds_entity_t participant
                                                         Source source) {
   auto topic = dds::make_topic(participant, dds::kTransition);
   if (!topic) return std::unexpected(topic.error());
-  auto writer = dds::make_writer(publisher, topic->get(), dds::transition_qos());
+  auto writer = dds::make_writer(publisher, topic->get(), dds::qos_of(dds::kTransition));
   if (!writer) return std::unexpected(writer.error());
   return TransitionPublisher(std::move(source), *std::move(topic), *std::move(writer));
 }

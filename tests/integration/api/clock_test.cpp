@@ -43,7 +43,7 @@ class ClockSetBack : public testing::Test {
 };
 
 TEST_F(ClockSetBack, LetsPostsBeAcknowledgedAgain) {
-  const auto topic = dds::make_topic(participant_.get(), dds::kEvent).value();
+  const auto topic = dds::make_topic(participant_.get(), dds::kEventPost).value();
   auto sut = EventPoster::create(participant_.get(), topic.get(), "hosta").value();
   sut.post("line1", "ready", now_);
   EXPECT_TRUE(sut.on_ack(ack(sut.source(), kNewer, 1), now_));

@@ -26,7 +26,7 @@ struct IdleClient {
         own(dds::make_subscriber(participant.get(),
                                  dds::client_partition(dds::guid_of(participant.get()).hex(), dds::kAllHosts))
                 .value()),
-        reader(dds::make_reader(own.get(), topic.get(), dds::reply_qos()).value()) {}
+        reader(dds::make_reader(own.get(), topic.get(), dds::qos_of(dds::kReply)).value()) {}
   [[nodiscard]] bool is_served() const {
     dds_subscription_matched_status_t matched{};
     return dds_get_subscription_matched_status(reader.get(), &matched) == 0 && matched.current_count > 0;
@@ -210,13 +210,14 @@ TEST_F(RemoteCommand, WithAnotherWritersIdentityIsRefused) {
   const dds::Entity participant(dds_create_participant(domain_.number(), nullptr, nullptr));
   const auto topic = dds::make_topic(participant.get(), dds::kOperatorRequest).value();
   const auto publisher = dds::make_publisher(participant.get(), dds::host_partition("hosta")).value();
-  const auto writer = dds::make_writer(publisher.get(), topic.get(), dds::request_qos()).value();
+  const auto writer =
+      dds::make_writer(publisher.get(), topic.get(), dds::qos_of(dds::kOperatorRequest)).value();
   const auto reply_topic = dds::make_topic(participant.get(), dds::kReply).value();
   const auto subscriber =
       dds::make_subscriber(participant.get(),
                            dds::client_partition(dds::guid_of(participant.get()).hex(), dds::kAllHosts))
           .value();
-  const auto reader = dds::make_reader(subscriber.get(), reply_topic.get(), dds::reply_qos()).value();
+  const auto reader = dds::make_reader(subscriber.get(), reply_topic.get(), dds::qos_of(dds::kReply)).value();
   plc_Request request{};
   request.header.request_identity.writer_guid[0] = 0x55;
   dds::copy_text(request.header.instance_name, "hosta");

@@ -154,7 +154,8 @@ TEST(PostFlood, IsCountedToTheLastPost) {
   const dds::Entity participant(dds_create_participant(domain.number(), nullptr, nullptr));
   const auto topic = dds::make_topic(participant.get(), dds::kOperatorRequest).value();
   const auto publisher = dds::make_publisher(participant.get(), dds::host_partition("hosta")).value();
-  const auto writer = dds::make_writer(publisher.get(), topic.get(), dds::request_qos()).value();
+  const auto writer =
+      dds::make_writer(publisher.get(), topic.get(), dds::qos_of(dds::kOperatorRequest)).value();
   plc_Request request{};
   dds::guid_of(writer.get()).copy_to(request.header.request_identity.writer_guid);
   dds::copy_text(request.header.instance_name, "hosta");

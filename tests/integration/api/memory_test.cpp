@@ -52,7 +52,7 @@ TEST_F(Memory, ClientsThatComeAndGoLeaveNothingBehind) {
 TEST_F(Memory, WritersOfOneClientThatPostOnceLeaveNothingBehind) {
   if (kSanitized) GTEST_SKIP() << "a sanitizer keeps what was freed";
   const dds::Entity participant(dds_create_participant(domain_.number(), nullptr, nullptr));
-  const auto events = dds::make_topic(participant.get(), dds::kEvent).value();
+  const auto events = dds::make_topic(participant.get(), dds::kEventPost).value();
   expect_bounded(1200, 6000, [&] {
     auto poster = EventPoster::create(participant.get(), events.get(), "hosta").value();
     for (const TimePoint end = soon(); !poster.matched();) {
@@ -66,7 +66,7 @@ TEST_F(Memory, WritersOfOneClientThatPostOnceLeaveNothingBehind) {
 class Instances : public testing::Test {
  protected:
   [[nodiscard]] dds::Entity make_writer() const {
-    return dds::make_writer(participant_.get(), topic_.get(), dds::ack_qos()).value();
+    return dds::make_writer(participant_.get(), topic_.get(), dds::qos_of(dds::kEventAck)).value();
   }
   static plc_EventAck sample(std::uint8_t source) {
     plc_EventAck result{};

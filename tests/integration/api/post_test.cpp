@@ -175,13 +175,13 @@ TEST(RemotePost, ThatNobodyWaitsForIsAcknowledgedNevertheless) {
   options.domain = domain.number();
   const auto opened = dds::open_domain(dds::Role::client, options).value();
   const dds::Entity participant(dds_create_participant(domain.number(), nullptr, nullptr));
-  const auto events = dds::make_topic(participant.get(), dds::kEvent).value();
+  const auto events = dds::make_topic(participant.get(), dds::kEventPost).value();
   const auto acks = dds::make_topic(participant.get(), dds::kEventAck).value();
   const auto own =
       dds::make_subscriber(participant.get(),
                            dds::client_partition(dds::guid_of(participant.get()).hex(), dds::kAllHosts))
           .value();
-  const auto reader = dds::make_reader(own.get(), acks.get(), dds::ack_qos()).value();
+  const auto reader = dds::make_reader(own.get(), acks.get(), dds::qos_of(dds::kEventAck)).value();
   auto sut = EventPoster::create(participant.get(), events.get(), "hosta").value();
   while (!sut.matched()) std::this_thread::sleep_for(milliseconds(1));
 

@@ -149,7 +149,8 @@ TEST_F(StoppedServer, TellsWhoGivesNoTimeLimit) {
   const dds::Entity participant(dds_create_participant(domain_.number(), nullptr, nullptr));
   const auto topic = dds::make_topic(participant.get(), dds::kOperatorRequest).value();
   const auto publisher = dds::make_publisher(participant.get(), dds::host_partition("hosta")).value();
-  const auto writer = dds::make_writer(publisher.get(), topic.get(), dds::request_qos()).value();
+  const auto writer =
+      dds::make_writer(publisher.get(), topic.get(), dds::qos_of(dds::kOperatorRequest)).value();
   plc_Request request{};
   dds::guid_of(writer.get()).copy_to(request.header.request_identity.writer_guid);
   request.header.request_identity.sequence_number = 1;

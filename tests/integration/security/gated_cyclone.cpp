@@ -56,13 +56,13 @@ class Side {
     participant_ = dds::Entity(dds_create_participant(domain, nullptr, nullptr));
     publisher_ = dds::make_publisher(participant_.get(), "h.cell").value();
     subscriber_ = dds::make_subscriber(participant_.get(), "h.cell").value();
-    add(dds::kOperatorRequest, dds::request_qos(), is_host_);
-    add(dds::kEvent, dds::event_qos(), is_host_);
-    add(dds::kDownloadChunk, dds::event_qos(), is_host_);
-    add(dds::kNameClaim, dds::status_qos(), is_host_);
-    add(dds::kReply, dds::reply_qos(), !is_host_);
-    add(dds::kEventAck, dds::ack_qos(), !is_host_);
-    add(dds::kPresence, dds::status_qos(), !is_host_);
+    add(dds::kOperatorRequest, dds::qos_of(dds::kOperatorRequest), is_host_);
+    add(dds::kEventPost, dds::qos_of(dds::kEventPost), is_host_);
+    add(dds::kDownloadChunk, dds::qos_of(dds::kDownloadChunk), is_host_);
+    add(dds::kNameClaim, dds::qos_of(dds::kNameClaim), is_host_);
+    add(dds::kReply, dds::qos_of(dds::kReply), !is_host_);
+    add(dds::kEventAck, dds::qos_of(dds::kEventAck), !is_host_);
+    add(dds::kPresence, dds::qos_of(dds::kPresence), !is_host_);
   }
 
   void take_all() {

@@ -68,9 +68,9 @@ class RawClient {
   [[nodiscard]] dds::Guid guid() const { return dds::guid_of(participant_.get()); }
   /// A writer or reader in that partition. 0: DDS refused it.
   dds_entity_t write(const dds::TopicInfo& topic, const std::string& partition,
-                     const dds::Qos& qos = dds::request_qos());
+                     const dds::Qos& qos = dds::qos_of(dds::kOperatorRequest));
   dds_entity_t read(const dds::TopicInfo& topic, const std::string& partition,
-                    const dds::Qos& qos = dds::reply_qos());
+                    const dds::Qos& qos = dds::qos_of(dds::kReply));
 
   /// Whether it meets its other end within that time.
   static bool meets_reader(dds_entity_t writer, Duration within = kPatience);

@@ -59,7 +59,7 @@ class StolenHost : public SecuredHost {
 // So that it is known what the others below fail for.
 TEST_F(StolenHost, ItsOwnServerIsEndedByAnOlderOne) {
   RawClient twin(domain_, folder("cell"), /*patched=*/true, dds::Role::server);
-  const auto writer = twin.write(dds::kNameClaim, "n.cell", dds::ack_qos());
+  const auto writer = twin.write(dds::kNameClaim, "n.cell", dds::qos_of(dds::kNameClaim));
   ASSERT_TRUE(RawClient::meets_reader(writer));
   plc_NameClaim claim = oldest_claim();
   twin.guid().copy_to(claim.server);
@@ -70,7 +70,7 @@ TEST_F(StolenHost, ItsOwnServerIsEndedByAnOlderOne) {
 TEST_F(StolenHost, EndsNoServerOfAnother) {
   RawClient south(domain_, folder("south"), /*patched=*/true, dds::Role::server);
   ASSERT_TRUE(south.is_in_domain());
-  const auto writer = south.write(dds::kNameClaim, "n.cell", dds::ack_qos());
+  const auto writer = south.write(dds::kNameClaim, "n.cell", dds::qos_of(dds::kNameClaim));
   ASSERT_GT(writer, 0) << "it is not patched enough";
   plc_NameClaim claim = oldest_claim();
   south.guid().copy_to(claim.server);
@@ -81,9 +81,9 @@ TEST_F(StolenHost, EndsNoServerOfAnother) {
 
 TEST_F(StolenHost, ReadsNoRequestsAndPostsOfAnother) {
   RawClient south(domain_, folder("south"), /*patched=*/true, dds::Role::server);
-  const auto requests = south.read(dds::kOperatorRequest, "h.cell", dds::request_qos());
-  const auto all_requests = south.read(dds::kOperatorRequest, "h.*", dds::request_qos());
-  const auto posts = south.read(dds::kEvent, "h.cell", dds::event_qos());
+  const auto requests = south.read(dds::kOperatorRequest, "h.cell", dds::qos_of(dds::kOperatorRequest));
+  const auto all_requests = south.read(dds::kOperatorRequest, "h.*", dds::qos_of(dds::kOperatorRequest));
+  const auto posts = south.read(dds::kEventPost, "h.cell", dds::qos_of(dds::kEventPost));
   ASSERT_TRUE(requests > 0 && all_requests > 0 && posts > 0);
   Child poster(PLCCTL_PROGRAM,
                {"--domain", std::to_string(domain_.number()), "--identity", folder("operator"), "post",
@@ -103,8 +103,10 @@ TEST_F(StolenHost, AnswersForNobodyElse) {
   const auto asked_by = requests_of_operator(south);
   ASSERT_TRUE(asked_by);
   const std::string guid = asked_by->participant().hex();
-  const auto as_cell = south.write(dds::kReply, dds::client_partition(guid, "cell"), dds::reply_qos());
-  const auto as_south = south.write(dds::kReply, dds::client_partition(guid, "south"), dds::reply_qos());
+  const auto as_cell =
+      south.write(dds::kReply, dds::client_partition(guid, "cell"), dds::qos_of(dds::kReply));
+  const auto as_south =
+      south.write(dds::kReply, dds::client_partition(guid, "south"), dds::qos_of(dds::kReply));
   EXPECT_TRUE(RawClient::meets_reader(as_south)) << "as itself it may answer";
   EXPECT_FALSE(RawClient::meets_reader(as_cell, seconds(1)));
   plc_Reply reply{};
@@ -120,9 +122,9 @@ TEST_F(StolenHost, AnswersForNobodyElse) {
 
 TEST_F(StolenHost, HidesNobodyElse) {
   RawClient south(domain_, folder("south"), /*patched=*/true, dds::Role::server);
-  const auto as_cell = south.write(dds::kPresence, "s.cell", dds::presence_qos());
-  const auto as_south = south.write(dds::kPresence, "s.south", dds::presence_qos());
-  const auto of_all = south.write(dds::kPresence, "s.*", dds::presence_qos());
+  const auto as_cell = south.write(dds::kPresence, "s.cell", dds::qos_of(dds::kPresence));
+  const auto as_south = south.write(dds::kPresence, "s.south", dds::qos_of(dds::kPresence));
+  const auto of_all = south.write(dds::kPresence, "s.*", dds::qos_of(dds::kPresence));
   plc_Presence presence{};
   dds::copy_text(presence.host, "cell");
   presence.epoch = std::numeric_limits<std::uint64_t>::max();
