@@ -192,6 +192,15 @@ class PLCHOST_CLIENT_API Client {
     explicit operator bool() const noexcept { return code == 0; }
   };
 
+  /// A command that a host knows.
+  struct Operation {
+    std::string name;             ///< "set scheduler"
+    std::string argument;         ///< "scheduler", "event", "path", "task"; empty: it takes none
+    std::string help;             ///< empty for a few
+    bool names_instance = false;  ///< else it is for the whole host
+    bool engineering = false;     ///< for engineers; others are for operators, too
+  };
+
   /// Calls its callback until it is destroyed or stop() returns; after that never again (stop() waits for a
   /// callback that is running, unless it is called by that). It may outlive its Client.
   class PLCHOST_CLIENT_API Watch {
@@ -268,6 +277,16 @@ class PLCHOST_CLIENT_API Client {
   /// instances: each application is tried.
   std::string reload(const std::string& host = {});
 
+  /// What command() can do: all commands but a download. From the table that hosts and plcctl go by.
+  static std::vector<Operation> operations();
+  /// A command by its name ("reset statistics"); those above are such commands, too. Returns when it is done.
+  /// ClientError: invalid_argument: no such command; the text lists them.
+  std::string command(const std::string& operation, const std::string& host, const std::string& instance = {},
+                      const std::string& argument = {});
+  /// The same; returns at once. `done` is called once, as that of post(); its text is the host's remark.
+  void command(const std::string& operation, const std::string& host, const std::string& instance,
+               const std::string& argument, std::function<void(const Outcome&)> done);
+
   /// Calls back for each host that is there, and whenever one comes, falls silent, answers again, or has
   /// changed. Known within 100 ms.
   Watch watch_hosts(std::function<void(const Host&)> callback);
@@ -287,8 +306,6 @@ class PLCHOST_CLIENT_API Client {
   class StatusWatch;
   class TransitionsWatch;
   Watch begin_watch(std::shared_ptr<Watch::Subscription> subscription);
-  std::string command(int operation, const std::string& host, const std::string& instance,
-                      const std::string& argument);
 
   std::unique_ptr<Worker> worker_;
   std::unique_ptr<Watcher> watcher_;

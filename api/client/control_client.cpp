@@ -11,15 +11,15 @@
 #include "api/dds/entries.hpp"
 #include "api/dds/error.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/operations.hpp"
 
 namespace plchost {
 
 namespace {
 
 bool is_engineering(std::int32_t operation) {
-  return (operation >= plc_OPERATION_LOAD_APPLICATION && operation <= plc_OPERATION_UNREGISTER_EVENT) ||
-         operation == plc_OPERATION_DOWNLOAD_APPLICATION || operation == plc_OPERATION_ROLLBACK_APPLICATION ||
-         operation == plc_OPERATION_RELOAD_HOST;
+  const Operation* const known = find_operation(operation);
+  return known != nullptr && known->role == ApiRole::engineering;
 }
 
 auto order(const plc_InstanceStatus& s) {

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Makes C++ from control.idl; the build runs it: generate.py CONTROL.idl FOLDER
 
-  FOLDER/topic_table.hpp   each topic: name, type, partition, QoS
+  FOLDER/topic_table.hpp          each topic: name, type, partition, QoS
+  FOLDER/contract_operations.hpp  each OPERATION_: name, number, role, whether it names an instance
 The same contract makes the same files.
 """
 
@@ -53,6 +54,21 @@ def topic_table(contract):
     return "\n".join(lines + ["};\n", "}  // namespace plchost::dds\n"])
 
 
+def contract_operations(contract):
+    lines = [HEAD + "#include <array>\n#include <cstdint>\n#include <string_view>\n", "namespace plchost {\n"]
+    lines += ["/// An operation as the contract has it; shm/base/operations.hpp is what the programs go by.", "struct ContractOperation {"]
+    lines += ["  std::string_view name;  ///< \"reset cold\"", "  std::int32_t number;", "  bool engineering;", "  bool names_instance;", "};\n"]
+    lines.append("inline constexpr std::array kContractOperations{")
+    for constant in contract.constants:
+        name = constant.name.removeprefix("OPERATION_").lower().replace("_", " ")
+        told = re.match(r"(op|eng): +(no instance)?", constant.comment)
+        if not told:
+            raise Fault(f"{constant.name}: its comment does not begin with 'op:' or 'eng:'")
+        engineering, names_instance = cpp_bool(told[1] == "eng"), cpp_bool(not told[2])
+        lines.append(f'    ContractOperation{{"{name}", {constant.value}, {engineering}, {names_instance}}},')
+    return "\n".join(lines + ["};\n", "}  // namespace plchost\n"])
+
+
 PARTITIONS = {"h": "host", "s": "status", "c": "client", "n": "name", "b": "blocks"}
 
 
@@ -62,7 +78,7 @@ def main():
     folder = pathlib.Path(sys.argv[2])
     try:
         contract = parse(pathlib.Path(sys.argv[1]))
-        made = {"topic_table.hpp": topic_table(contract)}
+        made = {"topic_table.hpp": topic_table(contract), "contract_operations.hpp": contract_operations(contract)}
     except Fault as fault:
         sys.exit(str(fault))
     for name, text in made.items():

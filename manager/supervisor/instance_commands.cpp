@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include <fmt/format.h>
@@ -6,6 +7,7 @@
 #include "manager/config/load_config.hpp"
 #include "manager/supervisor/managed_instance.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/operations.hpp"
 #include "shm/log/log.hpp"
 #include "shm/toml/section_reader.hpp"
 
@@ -36,98 +38,83 @@ void ManagedInstance::handle(const ControlRequest& request, ControlReplyFunction
   if (loads_online()) {
     if (auto good = check_online(); !good) return finish(good.error().code, good.error().message);
   }
-  switch (operation_->request.verb) {
-    case ControlVerb::start:
-      return begin_start();
-    case ControlVerb::stop:
-      return begin_stop();
-    case ControlVerb::reset:
-      return fresh_process(Next::stay_stopped, StartKind::warm);
-    case ControlVerb::reset_cold:
-      return fresh_process(Next::stay_stopped, StartKind::cold);
-    case ControlVerb::restart:
-      return fresh_process(Next::run, StartKind::warm);
-    case ControlVerb::load_application:
-      return begin_load();
-    case ControlVerb::download_application:
-      return begin_download();
-    case ControlVerb::rollback_application:
-      return begin_rollback();
-    case ControlVerb::single_cycle:
-    case ControlVerb::set_scheduler:
-    case ControlVerb::register_event:
-    case ControlVerb::unregister_event:
-    case ControlVerb::reset_statistics:
-      return begin_forwarded();
-    case ControlVerb::check_host:
-    case ControlVerb::reload_host:
-    case ControlVerb::list_objects:
-    case ControlVerb::list_nodes:
-    case ControlVerb::list_routes:
-    case ControlVerb::read_clock:
-    case ControlVerb::read_log:
-    case ControlVerb::change_application:
-    case ControlVerb::shutdown:
-    case ControlVerb::status:
-    case ControlVerb::set_log_level:
-      return;  // refused by check_argument
-  }
+  carry_out(operation_->request.verb);
+}
+
+void ManagedInstance::carry_out(ControlVerb verb) {
+  if (operation_of(verb).place == OperationPlace::instance) return begin_forwarded();
+  using Begin = void (*)(ManagedInstance&);
+  static constexpr std::array kOwn = {
+      std::pair<ControlVerb, Begin>(ControlVerb::start, [](ManagedInstance& self) { self.begin_start(); }),
+      std::pair<ControlVerb, Begin>(ControlVerb::stop, [](ManagedInstance& self) { self.begin_stop(); }),
+      std::pair<ControlVerb, Begin>(
+          ControlVerb::reset,
+          [](ManagedInstance& self) { self.fresh_process(Next::stay_stopped, StartKind::warm); }),
+      std::pair<ControlVerb, Begin>(
+          ControlVerb::reset_cold,
+          [](ManagedInstance& self) { self.fresh_process(Next::stay_stopped, StartKind::cold); }),
+      std::pair<ControlVerb, Begin>(
+          ControlVerb::restart,
+          [](ManagedInstance& self) { self.fresh_process(Next::run, StartKind::warm); }),
+      std::pair<ControlVerb, Begin>(ControlVerb::load_application,
+                                    [](ManagedInstance& self) { self.begin_load(); }),
+      std::pair<ControlVerb, Begin>(ControlVerb::download_application,
+                                    [](ManagedInstance& self) { self.begin_download(); }),
+      std::pair<ControlVerb, Begin>(ControlVerb::rollback_application,
+                                    [](ManagedInstance& self) { self.begin_rollback(); })};
+  const auto* const own = std::ranges::find(kOwn, verb, &std::pair<ControlVerb, Begin>::first);
+  if (own != kOwn.end()) return own->second(*this);
+  finish(ErrorCode::unsupported, fmt::format("the manager does not know '{}'", to_string(verb)));
 }
 
 Result<void> ManagedInstance::check_argument(ControlRequest& request) const {
-  switch (request.verb) {
-    case ControlVerb::check_host:
-    case ControlVerb::reload_host:
+  const auto& asked = operation_of(request.verb);
+  switch (asked.place) {
+    case OperationPlace::host:
       return failure(ErrorCode::invalid_argument,
-                     fmt::format("'{}' is for the whole host: name no instance", to_string(request.verb)));
-    case ControlVerb::list_objects:
-    case ControlVerb::list_nodes:
-    case ControlVerb::list_routes:
-    case ControlVerb::read_clock:
-    case ControlVerb::read_log:
+                     fmt::format("'{}' is for the whole host: name no instance", asked.name));
+    case OperationPlace::server:
+      return failure(ErrorCode::unsupported, fmt::format("'{}' is answered by the API server", asked.name));
+    case OperationPlace::internal:
       return failure(ErrorCode::unsupported,
-                     fmt::format("'{}' is answered by the API server", to_string(request.verb)));
-    case ControlVerb::change_application:
-    case ControlVerb::shutdown:
-    case ControlVerb::status:
-    case ControlVerb::set_log_level:
-      return failure(ErrorCode::unsupported, fmt::format("'{}' is between the manager and an instance only",
-                                                         to_string(request.verb)));
-    case ControlVerb::set_scheduler: {
+                     fmt::format("'{}' is between the manager and an instance only", asked.name));
+    case OperationPlace::manager:
+    case OperationPlace::instance:
+      break;
+  }
+  switch (asked.argument) {
+    case OperationArgument::scheduler: {
       const std::vector<std::string_view>& known = surroundings_.schedulers;
       if (std::ranges::find(known, request.argument) != known.end()) return {};
       return failure(ErrorCode::invalid_argument,
                      fmt::format("no scheduler '{}'; there are {}{}", shown(request.argument),
                                  join_names(known), suggestion(cut(request.argument, kShownBytes), known)));
     }
-    case ControlVerb::register_event:
-    case ControlVerb::unregister_event:
+    case OperationArgument::event:
       return check_name("event", request.argument, kMaxEventName);
-    case ControlVerb::reset_statistics:
+    case OperationArgument::task_or_none:
       return request.argument.empty() ? Result<void>() : check_name("task", request.argument, kMaxTaskName);
-    case ControlVerb::load_application: {
-      if (request.argument.empty() || request.argument.find('\0') != std::string::npos) {
-        return failure(ErrorCode::invalid_argument, "load application needs the path of a file on the host");
-      }
-      std::string path = resolve_path(surroundings_.folder, request.argument);
-      if (path.size() > kMaxPath) {
-        return failure(ErrorCode::invalid_argument,
-                       fmt::format("path of {} characters; allowed are up to {}", path.size(), kMaxPath));
-      }
-      request.argument = std::move(path);
-      return {};
-    }
-    case ControlVerb::download_application:
+    case OperationArgument::path:
+      return check_path(request);
+    case OperationArgument::file:
       return check_file_name(request.argument);
-    case ControlVerb::start:
-    case ControlVerb::stop:
-    case ControlVerb::single_cycle:
-    case ControlVerb::reset:
-    case ControlVerb::reset_cold:
-    case ControlVerb::restart:
-    case ControlVerb::rollback_application:
+    case OperationArgument::none:
       return {};
   }
+  return {};
+}
+
+Result<void> ManagedInstance::check_path(ControlRequest& request) const {
+  if (request.argument.empty() || request.argument.find('\0') != std::string::npos) {
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("{} needs the path of a file on the host", to_string(request.verb)));
+  }
+  std::string path = resolve_path(surroundings_.folder, request.argument);
+  if (path.size() > kMaxPath) {
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("path of {} characters; allowed are up to {}", path.size(), kMaxPath));
+  }
+  request.argument = std::move(path);
   return {};
 }
 

@@ -1,13 +1,13 @@
 // The wish of a ManagedInstance, beyond the end of the manager: see the rules in managed_instance.hpp.
 
 #include <algorithm>
-#include <array>
 #include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "manager/supervisor/managed_instance.hpp"
+#include "shm/base/operations.hpp"
 #include "shm/base/time.hpp"
 #include "shm/log/log.hpp"
 
@@ -17,25 +17,6 @@ namespace {
 
 std::string configured_process(const InstanceConfig& config) {
   return fmt::format("{} {} {}", config.core, config.priority_band, config.settings).substr(0, kMaxWishText);
-}
-
-// The text for an instance when the command was done.
-std::string_view done_text(ControlVerb verb) noexcept {
-  using Done = std::pair<ControlVerb, std::string_view>;
-  constexpr std::array kDone = {
-      Done(ControlVerb::start, "is started"),
-      Done(ControlVerb::stop, "is stopped"),
-      Done(ControlVerb::reset, "is reset, and stopped"),
-      Done(ControlVerb::reset_cold, "is reset, and stopped"),
-      Done(ControlVerb::single_cycle, "has run one cycle"),
-      Done(ControlVerb::restart, "is restarted"),
-      Done(ControlVerb::reset_statistics, "has new statistics"),
-      Done(ControlVerb::set_scheduler, "has that scheduler"),
-      Done(ControlVerb::register_event, "has that event"),
-      Done(ControlVerb::unregister_event, "has that event no longer"),
-  };
-  const auto* const found = std::ranges::find(kDone, verb, &Done::first);
-  return found != kDone.end() ? found->second : "has loaded it";
 }
 
 }  // namespace
@@ -246,7 +227,9 @@ void ManagedInstance::tell_when_kept(const Operation& done, const std::string& t
   if (events) surroundings_.wishes.keep_events();
   // A client that gets no text says by itself what is done.
   const std::string said =
-      text.empty() ? fmt::format("'{}' {}", config_.name, done_text(done.request.verb)) : text;
+      text.empty() ? fmt::format("{}: {}", config_.name,
+                                 done_text(operation_of(done.request.verb), done.request.argument))
+                   : text;
   surroundings_.wishes.when_kept(
       [reply = done.reply, number = done.request.number, text, said](const std::string& problem) {
         const std::string all = fmt::format("{}; a power cut would undo it: {}", said, problem);

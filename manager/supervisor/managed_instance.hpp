@@ -177,6 +177,8 @@ class ManagedInstance : public InstanceEvents {
 
   // Commands: instance_commands.cpp, application_commands.cpp
   void begin(Operation operation);
+  /// Begins with what operation_ asks for.
+  void carry_out(ControlVerb verb);
   void begin_start();
   void begin_stop();
   void begin_load();
@@ -201,6 +203,7 @@ class ManagedInstance : public InstanceEvents {
   void look_again();
   void finish_forwarded(const ControlReply& reply);
   [[nodiscard]] Result<void> check_argument(ControlRequest& request) const;
+  [[nodiscard]] Result<void> check_path(ControlRequest& request) const;
   [[nodiscard]] static Duration limit_of(ControlVerb verb) noexcept;
   [[nodiscard]] bool idle_phase() const noexcept {
     return phase_ == Phase::down || phase_ == Phase::held || phase_ == Phase::backing_off;

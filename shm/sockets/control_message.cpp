@@ -1,6 +1,6 @@
 #include "shm/sockets/control_message.hpp"
 
-#include <array>
+#include <algorithm>
 #include <utility>
 
 #include <fmt/format.h>
@@ -11,33 +11,6 @@ namespace plchost {
 namespace {
 
 using Json = nlohmann::json;
-
-constexpr std::array kVerbs = {
-    std::pair{ControlVerb::start, std::string_view("start")},
-    std::pair{ControlVerb::stop, std::string_view("stop")},
-    std::pair{ControlVerb::reset, std::string_view("reset")},
-    std::pair{ControlVerb::reset_cold, std::string_view("reset cold")},
-    std::pair{ControlVerb::single_cycle, std::string_view("single cycle")},
-    std::pair{ControlVerb::restart, std::string_view("restart")},
-    std::pair{ControlVerb::reset_statistics, std::string_view("reset statistics")},
-    std::pair{ControlVerb::load_application, std::string_view("load application")},
-    std::pair{ControlVerb::download_application, std::string_view("download application")},
-    std::pair{ControlVerb::rollback_application, std::string_view("rollback application")},
-    std::pair{ControlVerb::change_application, std::string_view("change application")},
-    std::pair{ControlVerb::set_scheduler, std::string_view("set scheduler")},
-    std::pair{ControlVerb::register_event, std::string_view("register event")},
-    std::pair{ControlVerb::unregister_event, std::string_view("unregister event")},
-    std::pair{ControlVerb::check_host, std::string_view("check host")},
-    std::pair{ControlVerb::reload_host, std::string_view("reload host")},
-    std::pair{ControlVerb::list_objects, std::string_view("list objects")},
-    std::pair{ControlVerb::list_nodes, std::string_view("list nodes")},
-    std::pair{ControlVerb::list_routes, std::string_view("list routes")},
-    std::pair{ControlVerb::read_clock, std::string_view("read clock")},
-    std::pair{ControlVerb::read_log, std::string_view("read log")},
-    std::pair{ControlVerb::shutdown, std::string_view("shutdown")},
-    std::pair{ControlVerb::status, std::string_view("status")},
-    std::pair{ControlVerb::set_log_level, std::string_view("set log level")},
-};
 
 std::string dump(const Json& json) {
   // Bytes that are not UTF-8 (a hostile name in an error text) are replaced, never thrown about.
@@ -105,13 +78,6 @@ Result<void> check_in_time(std::int64_t limit_ns, std::int64_t now_ns) {
                              static_cast<double>(now_ns - limit_ns) / kNsPerMs));
 }
 
-std::string_view to_string(ControlVerb verb) noexcept {
-  for (const auto& [known, name] : kVerbs) {
-    if (known == verb) return name;
-  }
-  return "unknown";
-}
-
 std::string encode(const ControlRequest& request) {
   Json json{{"version", kControlVersion},
             {"number", request.number},
@@ -143,11 +109,14 @@ Result<ControlRequest> decode_request(std::string_view packet) {
   if (!options) return std::unexpected(std::move(options).error());
   const auto limit = limit_of(*json);
   if (!limit) return std::unexpected(limit.error());
-  for (const auto& [known, name] : kVerbs) {
-    if (name == *verb) {
-      return ControlRequest{
-          (*json)["number"].get<std::uint64_t>(), known, *instance, *argument, *std::move(options), *limit};
-    }
+  const auto known = std::ranges::find(operations(), *verb, &Operation::name);
+  if (known != operations().end()) {
+    return ControlRequest{(*json)["number"].get<std::uint64_t>(),
+                          known->verb,
+                          *instance,
+                          *argument,
+                          *std::move(options),
+                          *limit};
   }
   return failure(ErrorCode::corrupt, fmt::format("control message has the unknown verb '{}'", *verb));
 }

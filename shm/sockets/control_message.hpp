@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 
+#include "shm/base/operations.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
 
@@ -13,36 +14,6 @@ namespace plchost {
 /// The version of the messages on control sockets. A peer with another one is refused by name and number.
 /// 1: first. 2: requests have a time limit.
 inline constexpr int kControlVersion = 2;
-
-/// The requests about an instance, by the API server to the manager and by the manager to the instance.
-enum class ControlVerb : std::uint8_t {
-  start,                 ///< run the application
-  stop,                  ///< stop the application; the process stays
-  reset,                 ///< warm reset: fresh process, application loaded anew and stopped
-  reset_cold,            ///< the same, and the application is told so: it starts with initial values
-  single_cycle,          ///< one cycle of each cyclic and freewheeling task, from stopped
-  restart,               ///< fresh process, application running
-  reset_statistics,      ///< argument: name of a task; empty: all tasks
-  load_application,      ///< argument: path of the application on the host; options: see kBootOption
-  download_application,  ///< argument: name of what was sent; options: see api/control/application_order.hpp
-  rollback_application,  ///< load what was loaded before; options: see kBootOption
-  change_application,    ///< (manager to instance only) argument: a path; it takes over while tasks run
-  set_scheduler,         ///< argument: name of a scheduler
-  register_event,        ///< argument: name of an external event
-  unregister_event,      ///< argument: name of an external event
-  check_host,            ///< of the manager, no instance: look at the host; see api/control/host_finding.hpp
-  reload_host,           ///< of the manager, no instance: take over the configuration file as it is now
-  list_objects,          ///< answered by the API server itself, from the pool
-  list_nodes,            ///< the same, from the directory of the nodes that send blocks
-  list_routes,           ///< the same
-  read_clock,            ///< answered by the API server itself
-  read_log,              ///< the same, from the log of the instance
-  shutdown,              ///< (manager to instance only) stop the application and end the process
-  status,                ///< (manager to instance only) the reply's text is the InstanceReport
-  set_log_level,         ///< (manager to instance only) argument: one of kLogLevels
-};
-
-[[nodiscard]] std::string_view to_string(ControlVerb verb) noexcept;
 
 /// Option of what loads an application, and its value: the instance starts with it from now on.
 inline constexpr std::string_view kBootOption = "boot";

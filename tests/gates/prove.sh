@@ -116,6 +116,7 @@ plant_in_contract() {
 plant_in_contract "contract: old reference" "the reference is not up to date" 's,// of plchost-dds,// of the server,'
 plant_in_contract "contract: no comment" "Presence.pid has no comment" 's,^( *long pid;) *// of plchost-dds,\1,'
 plant_in_contract "contract: no QoS" "LogPage has no 'qos:'" '/qos: as ObjectPage/d'
+plant_in_contract "contract: QoS that the generator does not know" "this QoS is not understood: RELIABLE 1 ms" 's/qos: RELIABLE \(1 ms\), KEEP_LAST 16/qos: RELIABLE 1 ms, KEEP_LAST 16/'
 plant_in_contract "contract: text without a bound" "Transition.reason has no bound" 's/string<191> reason/string reason/'
 plant_in_contract "contract: version 1 has another type" "member string<191> reason is now string<192> reason" 's/string<191> reason/string<192> reason/' --write
 plant_in_contract "contract: version 1 has another member" "member unsigned long credits is now unsigned long credit" 's/unsigned long credits;/unsigned long credit;/' --write

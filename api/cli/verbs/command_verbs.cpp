@@ -1,5 +1,6 @@
-#include <algorithm>
+// The verbs that ask a host or an instance for something, from the table of operations.
 #include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -8,114 +9,108 @@
 #include "api/cli/cli_session.hpp"
 #include "api/cli/verbs/application_verbs.hpp"
 #include "api/cli/verbs/host_commands.hpp"
-#include "api/dds/text.hpp"
+#include "shm/base/operations.hpp"
 
 namespace plchost {
 
 namespace {
 
-int command_event(CliSession& session, std::int32_t operation, const std::string& name) {
-  const auto parts = split_name("EVENT", name);
-  if (!parts) return CliSession::fail(parts.error());
-  return command(session, {"", operation, parts->first, parts->second},
-                 fmt::format("event {} is {}", parts->second,
-                             operation == plc_OPERATION_REGISTER_EVENT ? "registered" : "unregistered"));
-}
-
-/// "INSTANCE/TASK", or "INSTANCE" for all of its tasks.
-int reset_statistics(CliSession& session, const std::string& name) {
-  constexpr std::string_view kStatistics = "its statistics begin anew";
-  if (name.find('/') == std::string::npos) {
-    return command(session, {"", plc_OPERATION_RESET_STATISTICS, name, ""}, kStatistics);
-  }
-  const auto parts = split_name("TASK", name);
-  if (!parts) return CliSession::fail(parts.error());
-  return command(session, {"", plc_OPERATION_RESET_STATISTICS, parts->first, parts->second}, kStatistics);
-}
-
-struct Plain {
-  const char* verb;
-  std::int32_t operation;
-  const char* text;
-  const char* done;  ///< what is said of the instance then
-};
-
 constexpr const char* kSeveral = "one or more; 'line*' stands for all that begin with line";
 
-void add_plain(const Command& plcctl, CliSession& session, const Plain& plain) {
+ApiRequest request_of(const Operation& operation, std::string instance, std::string argument) {
+  return {"", static_cast<std::int32_t>(operation.verb), std::move(instance), std::move(argument)};
+}
+
+int ask(CliSession& session, const Operation& operation, const std::string& instance,
+        const std::string& argument) {
+  return command(session, request_of(operation, instance, argument), done_text(operation, argument));
+}
+
+/// `name`: "INSTANCE/EVENT" or the like; `may_be_all`: or "INSTANCE".
+int ask_about_part(CliSession& session, const Operation& operation, const char* what, const std::string& name,
+                   bool may_be_all) {
+  if (may_be_all && name.find('/') == std::string::npos) return ask(session, operation, name, "");
+  const auto parts = split_name(what, name);
+  if (!parts) return CliSession::fail(parts.error());
+  return ask(session, operation, parts->first, parts->second);
+}
+
+void add_for_instances(const Command& verb, CliSession& session, const Operation& operation) {
   const auto names = std::make_shared<std::vector<std::string>>();
-  plcctl.verb(plain.verb, plain.text)
-      .noun("instance", plain.text,
-            [&session, names, plain] {
-              return command_each(session, *names, {"", plain.operation, "", ""}, plain.done);
+  verb.noun(operation.noun_word, operation.help,
+            [&session, &operation, names] {
+              return command_each(session, *names, request_of(operation, "", ""), done_text(operation, ""));
             })
       .arguments("INSTANCE", *names, kSeveral);
 }
 
-void add_reset(const Command& plcctl, CliSession& session) {
-  const Command verb = plcctl.verb("reset", "Begin anew: an instance, or its statistics");
+void add_for_part(const Command& verb, CliSession& session, const Operation& operation) {
+  const bool may_be_all = operation.argument == OperationArgument::task_or_none;
   const auto name = std::make_shared<std::string>();
+  verb.noun(operation.noun_word, operation.help,
+            [&session, &operation, name, may_be_all] {
+              return ask_about_part(session, operation, may_be_all ? "TASK" : "EVENT", *name, may_be_all);
+            })
+      .argument(may_be_all ? "INSTANCE[/TASK]" : "INSTANCE/EVENT", *name);
+}
+
+void add_with_argument(const Command& verb, CliSession& session, const Operation& operation,
+                       const char* form) {
+  const auto instance = std::make_shared<std::string>();
+  const auto argument = std::make_shared<std::string>();
+  verb.noun(operation.noun_word, operation.help,
+            [&session, &operation, instance, argument] {
+              return ask(session, operation, *instance, *argument);
+            })
+      .argument("INSTANCE", *instance)
+      .argument(form, *argument);
+}
+
+void add(const Command& plcctl, CliSession& session, const Operation& operation) {
+  const bool own_help = *operation.verb_help != '\0';
+  const Command verb = plcctl.verb(operation.verb_word, own_help ? operation.verb_help : operation.help);
+  if (!operation.names_instance) {
+    verb.noun(operation.noun_word, operation.help,
+              [&session, &operation] { return ask(session, operation, "", ""); });
+    return;
+  }
+  switch (operation.argument) {
+    case OperationArgument::none:
+      return add_for_instances(verb, session, operation);
+    case OperationArgument::event:
+    case OperationArgument::task_or_none:
+      return add_for_part(verb, session, operation);
+    case OperationArgument::scheduler:
+      return add_with_argument(verb, session, operation, "SCHEDULER");
+    case OperationArgument::path:
+    case OperationArgument::file:
+      return add_with_argument(verb, session, operation, "FILE");
+  }
+}
+
+/// One noun for two operations.
+void add_reset(const Command& plcctl, CliSession& session) {
   const auto names = std::make_shared<std::vector<std::string>>();
   const auto cold = std::make_shared<bool>(false);
-  verb.noun("instance", "Load the application anew, in a fresh process, stopped",
+  plcctl.verb("reset", "Begin anew: an instance, or its statistics")
+      .noun("instance", "Load the application anew, in a fresh process, stopped",
             [&session, names, cold] {
-              const auto operation = *cold ? plc_OPERATION_RESET_COLD : plc_OPERATION_RESET;
-              return command_each(session, *names, {"", operation, "", ""}, "reset, and stopped");
+              const Operation& reset = operation_of(*cold ? ControlVerb::reset_cold : ControlVerb::reset);
+              return command_each(session, *names, request_of(reset, "", ""), done_text(reset, ""));
             })
       .arguments("INSTANCE", *names, kSeveral)
       .flag("--cold", *cold, "tell the application to begin with initial values");
-  verb.noun("statistics", "Begin the statistics of a task, or of all of an instance, anew",
-            [&session, name] { return reset_statistics(session, *name); })
-      .argument("INSTANCE[/TASK]", *name);
-}
-
-void add_event(const Command& plcctl, CliSession& session, const char* verb, std::int32_t operation,
-               const char* text) {
-  const auto name = std::make_shared<std::string>();
-  plcctl.verb(verb, text)
-      .noun("event", text, [&session, name, operation] { return command_event(session, operation, *name); })
-      .argument("INSTANCE/EVENT", *name);
-}
-
-void add_reload(const Command& plcctl, CliSession& session) {
-  plcctl.verb("reload", "Have a host read its configuration file again")
-      .noun("host",
-            "Take over the changes of the configuration file; says of each changed key when it is used. "
-            "Unchanged instances run on",
-            [&session] { return command(session, {"", plc_OPERATION_RELOAD_HOST, "", ""}, "reloaded"); });
-}
-
-void add_set(const Command& plcctl, CliSession& session) {
-  const auto instance = std::make_shared<std::string>();
-  const auto scheduler = std::make_shared<std::string>();
-  const char* const text = "Choose the scheduler of an instance, also while it runs";
-  plcctl.verb("set", text)
-      .noun("scheduler", text,
-            [&session, instance, scheduler] {
-              return command(session, {"", plc_OPERATION_SET_SCHEDULER, *instance, *scheduler},
-                             fmt::format("runs under {}", *scheduler));
-            })
-      .argument("INSTANCE", *instance)
-      .argument("SCHEDULER", *scheduler);
 }
 
 }  // namespace
 
 void add_command_verbs(const Command& plcctl, CliSession& session) {
-  add_plain(plcctl, session, {"start", plc_OPERATION_START, "Run the application of an instance", "started"});
-  add_plain(plcctl, session, {"stop", plc_OPERATION_STOP, "Stop the application of an instance", "stopped"});
-  add_plain(
-      plcctl, session,
-      {"single-cycle", plc_OPERATION_SINGLE_CYCLE,
-       "Run one cycle of each cyclic and freewheeling task of a stopped application", "has run one cycle"});
-  add_reset(plcctl, session);
-  add_plain(plcctl, session,
-            {"restart", plc_OPERATION_RESTART, "Load the application anew and run it", "restarted"});
-  add_event(plcctl, session, "register", plc_OPERATION_REGISTER_EVENT, "Register an external event");
-  add_event(plcctl, session, "unregister", plc_OPERATION_UNREGISTER_EVENT, "Unregister an external event");
-  add_application_verbs(plcctl, session);
-  add_reload(plcctl, session);
-  add_set(plcctl, session);
+  for (const Operation& operation : operations()) {
+    if (*operation.verb_word != '\0') add(plcctl, session, operation);
+    // These have more words than an argument, where their rows stand.
+    if (operation.verb == ControlVerb::reset) add_reset(plcctl, session);
+    if (operation.verb == ControlVerb::load_application) add_application_verbs(plcctl, session);
+  }
 }
 
 }  // namespace plchost

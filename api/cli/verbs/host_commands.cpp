@@ -10,25 +10,15 @@
 #include "api/dds/object_query.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/operations.hpp"
 
 namespace plchost {
 
 namespace {
 
 bool takes_long(std::int32_t operation) {
-  switch (operation) {
-    case plc_OPERATION_STOP:
-    case plc_OPERATION_SINGLE_CYCLE:
-    case plc_OPERATION_RESET:
-    case plc_OPERATION_RESET_COLD:
-    case plc_OPERATION_RESTART:
-    case plc_OPERATION_LOAD_APPLICATION:
-    case plc_OPERATION_ROLLBACK_APPLICATION:
-    case plc_OPERATION_RELOAD_HOST:
-      return true;
-    default:
-      return false;
-  }
+  const Operation* const known = find_operation(operation);
+  return known != nullptr && known->takes_long;
 }
 
 // What a refusal does not say itself: the instance that was meant.

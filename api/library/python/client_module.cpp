@@ -1,6 +1,7 @@
 // The client library for Python: module plchost_client. Names are those of plchost_client.hpp; times are
 // floats in seconds, wall-clock times are datetime. Calls let other threads of Python run; callbacks come on
 // a thread of the library.
+#include <algorithm>
 #include <exception>
 #include <memory>
 #include <mutex>
@@ -282,6 +283,48 @@ void define_calls(ClientClass& client) {
            NoGil());
 }
 
+/// Commands that have no function of their own above, as "reset_statistics": all of the table.
+void define_commands(ClientClass& client) {
+  client.def_static("operations", [] {
+    std::vector<std::string> names;
+    for (const auto& operation : Client::operations()) names.push_back(operation.name);
+    return names;
+  });
+  client.def(
+      "command",
+      py::overload_cast<const std::string&, const std::string&, const std::string&, const std::string&>(
+          &Client::command),
+      py::arg("operation"), py::arg("host"), py::arg("instance") = "", py::arg("argument") = "", NoGil());
+  client.def(
+      "command_and_tell",
+      [](Client& self, const std::string& operation, const std::string& host, const std::string& instance,
+         const std::string& argument, py::function done) {
+        self.command(operation, host, instance, argument, guarded<Client::Outcome>(std::move(done)));
+      },
+      py::arg("operation"), py::arg("host"), py::arg("instance"), py::arg("argument"), py::arg("done"),
+      "Returns at once; done(outcome) is called once.");
+  for (const Client::Operation& operation : Client::operations()) {
+    std::string name = operation.name;
+    std::ranges::replace(name, ' ', '_');
+    if (py::hasattr(client, name.c_str())) continue;
+    const char* const argument = operation.argument.empty() ? "argument" : operation.argument.c_str();
+    if (operation.names_instance) {
+      client.def(
+          name.c_str(),
+          [name = operation.name](Client& self, const std::string& host, const std::string& instance,
+                                  const std::string& given) {
+            return self.command(name, host, instance, given);
+          },
+          py::arg("host"), py::arg("instance"), py::arg(argument) = "", operation.help.c_str(), NoGil());
+    } else {
+      client.def(
+          name.c_str(),
+          [name = operation.name](Client& self, const std::string& host) { return self.command(name, host); },
+          py::arg("host") = "", operation.help.c_str(), NoGil());
+    }
+  }
+}
+
 void define_watches(ClientClass& client) {
   client
       .def("watch_hosts",
@@ -325,6 +368,7 @@ PYBIND11_MODULE(plchost_client, module) {
              py::arg("peers") = std::vector<std::string>{}, py::arg("identity") = "",
              py::arg("timeout") = 3.0);
   define_calls(client);
+  define_commands(client);
   define_watches(client);
   py::module_::import("atexit").attr("register")(py::cpp_function([] { clients().close(); }, NoGil()));
 }

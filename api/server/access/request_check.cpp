@@ -1,7 +1,6 @@
 #include "api/server/access/request_check.hpp"
 
 #include <algorithm>
-#include <array>
 #include <map>
 #include <string>
 #include <utility>
@@ -13,64 +12,21 @@
 #include "api/dds/entries.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/operations.hpp"
 
 namespace plchost {
 
 namespace {
 
-enum class Argument : std::uint8_t { none, path, file, scheduler, event, task_or_none };
-/// What `ext` may say beside the argument.
-enum class Options : std::uint8_t { none, loading, download };
-
-struct Operation {
-  std::int32_t number;
-  ControlVerb verb;
-  ApiRole role;
-  Argument argument;
-  bool of_host = false;  // names no instance
-  Options options = Options::none;
-};
-
-constexpr std::array kOperations = {
-    Operation{plc_OPERATION_START, ControlVerb::start, ApiRole::operating, Argument::none},
-    Operation{plc_OPERATION_STOP, ControlVerb::stop, ApiRole::operating, Argument::none},
-    Operation{plc_OPERATION_RESET, ControlVerb::reset, ApiRole::operating, Argument::none},
-    Operation{plc_OPERATION_RESET_COLD, ControlVerb::reset_cold, ApiRole::operating, Argument::none},
-    Operation{plc_OPERATION_SINGLE_CYCLE, ControlVerb::single_cycle, ApiRole::operating, Argument::none},
-    Operation{plc_OPERATION_RESTART, ControlVerb::restart, ApiRole::operating, Argument::none},
-    Operation{plc_OPERATION_RESET_STATISTICS, ControlVerb::reset_statistics, ApiRole::operating,
-              Argument::task_or_none},
-    Operation{plc_OPERATION_CHECK_HOST, ControlVerb::check_host, ApiRole::operating, Argument::none,
-              /*of_host=*/true},
-    Operation{plc_OPERATION_LIST_OBJECTS, ControlVerb::list_objects, ApiRole::operating, Argument::none,
-              /*of_host=*/true},
-    Operation{plc_OPERATION_LIST_NODES, ControlVerb::list_nodes, ApiRole::operating, Argument::none,
-              /*of_host=*/true},
-    Operation{plc_OPERATION_LIST_ROUTES, ControlVerb::list_routes, ApiRole::operating, Argument::none,
-              /*of_host=*/true},
-    Operation{plc_OPERATION_READ_CLOCK, ControlVerb::read_clock, ApiRole::operating, Argument::none,
-              /*of_host=*/true},
-    Operation{plc_OPERATION_READ_LOG, ControlVerb::read_log, ApiRole::operating, Argument::none},
-    Operation{plc_OPERATION_LOAD_APPLICATION, ControlVerb::load_application, ApiRole::engineering,
-              Argument::path, /*of_host=*/false, Options::loading},
-    Operation{plc_OPERATION_DOWNLOAD_APPLICATION, ControlVerb::download_application, ApiRole::engineering,
-              Argument::file, /*of_host=*/false, Options::download},
-    Operation{plc_OPERATION_ROLLBACK_APPLICATION, ControlVerb::rollback_application, ApiRole::engineering,
-              Argument::none, /*of_host=*/false, Options::loading},
-    Operation{plc_OPERATION_RELOAD_HOST, ControlVerb::reload_host, ApiRole::engineering, Argument::none,
-              /*of_host=*/true},
-    Operation{plc_OPERATION_SET_SCHEDULER, ControlVerb::set_scheduler, ApiRole::engineering,
-              Argument::scheduler},
-    Operation{plc_OPERATION_REGISTER_EVENT, ControlVerb::register_event, ApiRole::engineering,
-              Argument::event},
-    Operation{plc_OPERATION_UNREGISTER_EVENT, ControlVerb::unregister_event, ApiRole::engineering,
-              Argument::event},
-};
+using Argument = OperationArgument;
+using Options = OperationOptions;
 
 std::string known_operations() {
   std::string list;
-  for (const Operation& operation : kOperations) {
-    list += fmt::format("{}{} {}", list.empty() ? "" : ", ", operation.number, to_string(operation.verb));
+  for (const Operation& operation : operations()) {
+    if (operation.place == OperationPlace::internal) continue;
+    list +=
+        fmt::format("{}{} {}", list.empty() ? "" : ", ", std::to_underlying(operation.verb), operation.name);
   }
   return list;
 }
@@ -79,8 +35,7 @@ Result<void> check_argument(const Operation& operation, std::string_view argumen
   switch (operation.argument) {
     case Argument::none:
       if (argument.empty()) return {};
-      return failure(ErrorCode::invalid_argument,
-                     fmt::format("{} takes no argument", to_string(operation.verb)));
+      return failure(ErrorCode::invalid_argument, fmt::format("{} takes no argument", operation.name));
     case Argument::path:
       if (argument.starts_with('/') && argument.size() <= kMaxPath) return {};
       return failure(ErrorCode::invalid_argument,
@@ -99,10 +54,10 @@ Result<void> check_argument(const Operation& operation, std::string_view argumen
 
 Result<void> check_instance(const Operation& operation, std::string_view instance, std::string_view host,
                             std::span<const std::string_view> instances) {
-  if (operation.of_host) {
+  if (!operation.names_instance) {
     if (instance.empty()) return {};
     return failure(ErrorCode::invalid_argument,
-                   fmt::format("{} is for the whole host: name no instance", to_string(operation.verb)));
+                   fmt::format("{} is for the whole host: name no instance", operation.name));
   }
   if (auto good = check_name("instance", instance, kMaxInstanceName); !good) return good;
   if (std::ranges::find(instances, instance) != instances.end()) return {};
@@ -146,16 +101,15 @@ Result<ControlRequest> check_request(const plc_Request& request, ApiRole role, s
   if (addressed != host) {
     return failure(ErrorCode::not_found, fmt::format("this is host '{}', not '{}'", host, shown(addressed)));
   }
-  const auto* const operation = std::ranges::find(kOperations, request.operation, &Operation::number);
-  if (operation == kOperations.end()) {
+  const Operation* const operation = find_operation(request.operation);
+  if (operation == nullptr) {
     return failure(ErrorCode::unsupported, fmt::format("unknown operation {}; this host knows: {}",
                                                        request.operation, known_operations()));
   }
   if (operation->role != role) {
-    return failure(
-        ErrorCode::refused,
-        fmt::format("'{}' is not for the {} role: write it to the other request topic",
-                    to_string(operation->verb), role == ApiRole::operating ? "operator" : "engineer"));
+    return failure(ErrorCode::refused,
+                   fmt::format("'{}' is not for the {} role: write it to the other request topic",
+                               operation->name, role == ApiRole::operating ? "operator" : "engineer"));
   }
   const auto instance = dds::text_of(request.instance);
   if (auto good = check_instance(*operation, instance, host, instances); !good)
@@ -168,15 +122,13 @@ Result<ControlRequest> check_request(const plc_Request& request, ApiRole role, s
 }
 
 bool only_reads(std::int32_t operation) noexcept {
-  return operation == plc_OPERATION_CHECK_HOST || operation == plc_OPERATION_LIST_OBJECTS ||
-         operation == plc_OPERATION_LIST_NODES || operation == plc_OPERATION_LIST_ROUTES ||
-         operation == plc_OPERATION_READ_CLOCK || operation == plc_OPERATION_READ_LOG;
+  const Operation* const known = find_operation(operation);
+  return known != nullptr && known->only_reads;
 }
 
 std::string operation_name(std::int32_t operation) {
-  const auto* const known = std::ranges::find(kOperations, operation, &Operation::number);
-  return known != kOperations.end() ? std::string(to_string(known->verb))
-                                    : fmt::format("operation {}", operation);
+  const Operation* const known = find_operation(operation);
+  return known != nullptr ? std::string(known->name) : fmt::format("operation {}", operation);
 }
 
 std::int32_t remote_exception(ErrorCode code) noexcept {

@@ -7,12 +7,10 @@
 
 #include <control.h>
 
+#include "shm/base/operations.hpp"
 #include "shm/sockets/control_message.hpp"
 
 namespace plchost {
-
-/// What a client may ask is decided by the topic that it could write to.
-enum class ApiRole : std::uint8_t { operating, engineering };
 
 /// A request as it came from the network, turned into the manager's. `number` is left 0. Every error names
 /// what was wrong and, where there is a list, what is allowed. not_found: another host, or no such instance;

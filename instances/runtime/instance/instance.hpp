@@ -105,6 +105,7 @@ class Instance {
   [[nodiscard]] std::optional<ControlReply> handle(const ControlRequest& request,
                                                    const InstanceSocket::Asker& asker);
   [[nodiscard]] Result<std::string> obey(const ControlRequest& request);
+  [[nodiscard]] Result<std::string> carry_out(const ControlRequest& request);
   [[nodiscard]] Result<std::string> set_scheduler(const std::string& name);
   [[nodiscard]] static Result<std::string> set_log_level(const std::string& name);
   [[nodiscard]] Result<std::string> change_registration(const ControlRequest& request);

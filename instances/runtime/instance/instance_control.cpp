@@ -1,5 +1,7 @@
 // The actions of an Instance on commands of its control socket.
 
+#include <algorithm>
+#include <array>
 #include <utility>
 
 #include <fmt/format.h>
@@ -50,45 +52,43 @@ Result<std::string> Instance::obey(const ControlRequest& request) {
   const bool ends_change = request.verb == ControlVerb::start || request.verb == ControlVerb::stop ||
                            request.verb == ControlVerb::single_cycle || request.verb == ControlVerb::shutdown;
   if (ends_change) drop_change(fmt::format("'{}' came first", to_string(request.verb)));
-  switch (request.verb) {
-    case ControlVerb::start:
-      return start("asked to start");
-    case ControlVerb::stop:
-      begin_stop("asked to stop");
-      return {};
-    case ControlVerb::single_cycle:
-      return begin_single_cycle();
-    case ControlVerb::set_scheduler:
-      return set_scheduler(request.argument);
-    case ControlVerb::change_application:
-      return begin_change(request.argument);
-    case ControlVerb::register_event:
-    case ControlVerb::unregister_event:
-      return change_registration(request);
-    case ControlVerb::reset_statistics:
-      return reset_statistics(request.argument);
-    case ControlVerb::shutdown:
-      begin_shutdown("the process is to end");
-      return {};
-    case ControlVerb::status:
-      return status();
-    case ControlVerb::set_log_level:
-      return set_log_level(request.argument);
-    case ControlVerb::reset:
-    case ControlVerb::reset_cold:
-    case ControlVerb::restart:
-    case ControlVerb::load_application:
-    case ControlVerb::download_application:
-    case ControlVerb::rollback_application:
-    case ControlVerb::check_host:
-    case ControlVerb::reload_host:
-    case ControlVerb::list_objects:
-    case ControlVerb::list_nodes:
-    case ControlVerb::list_routes:
-    case ControlVerb::read_clock:
-    case ControlVerb::read_log:
-      break;
-  }
+  return carry_out(request);
+}
+
+Result<std::string> Instance::carry_out(const ControlRequest& request) {
+  using Do = Result<std::string> (*)(Instance&, const ControlRequest&);
+  using Row = std::pair<ControlVerb, Do>;
+  static constexpr std::array kOwn = {
+      Row(ControlVerb::start,
+          [](Instance& self, const auto& /*asked*/) { return self.start("asked to start"); }),
+      Row(ControlVerb::stop,
+          [](Instance& self, const auto& /*asked*/) {
+            self.begin_stop("asked to stop");
+            return Result<std::string>();
+          }),
+      Row(ControlVerb::single_cycle,
+          [](Instance& self, const auto& /*asked*/) { return self.begin_single_cycle(); }),
+      Row(ControlVerb::set_scheduler,
+          [](Instance& self, const auto& asked) { return self.set_scheduler(asked.argument); }),
+      Row(ControlVerb::change_application,
+          [](Instance& self, const auto& asked) { return self.begin_change(asked.argument); }),
+      Row(ControlVerb::register_event,
+          [](Instance& self, const auto& asked) { return self.change_registration(asked); }),
+      Row(ControlVerb::unregister_event,
+          [](Instance& self, const auto& asked) { return self.change_registration(asked); }),
+      Row(ControlVerb::reset_statistics,
+          [](Instance& self, const auto& asked) { return self.reset_statistics(asked.argument); }),
+      Row(ControlVerb::shutdown,
+          [](Instance& self, const auto& /*asked*/) {
+            self.begin_shutdown("the process is to end");
+            return Result<std::string>();
+          }),
+      Row(ControlVerb::status,
+          [](Instance& self, const auto& /*asked*/) { return Result<std::string>(self.status()); }),
+      Row(ControlVerb::set_log_level,
+          [](Instance& /*self*/, const auto& asked) { return set_log_level(asked.argument); })};
+  const auto* const own = std::ranges::find(kOwn, request.verb, &Row::first);
+  if (own != kOwn.end()) return own->second(*this, request);
   return failure(ErrorCode::unsupported,
                  fmt::format("'{}' is the manager's to do: ask it", to_string(request.verb)));
 }

@@ -288,7 +288,7 @@ TEST_P(InstanceWishes, AreOnTheDiskBeforeACommandIsAnswered) {
   wishes_.waiting.front()("disk full");
   const ControlReply reply = take_reply();
   EXPECT_EQ(reply.code, ErrorCode::ok);
-  EXPECT_EQ(reply.text, "'line1' is stopped; a power cut would undo it: disk full");
+  EXPECT_EQ(reply.text, "line1: stopped; a power cut would undo it: disk full");
 }
 
 INSTANTIATE_TEST_SUITE_P(Deaths, InstanceWishes, testing::Values(Death::manager_killed, Death::power_cut),

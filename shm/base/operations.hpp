@@ -1,0 +1,96 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace plchost {
+
+/// The operations of a host or of an instance. Up to 99 the value is the number of OPERATION_... in
+/// api/control.idl; the others are between the manager and an instance only.
+enum class ControlVerb : std::uint8_t {
+  start = 1,
+  stop = 2,
+  reset = 3,
+  restart = 4,
+  single_cycle = 5,
+  reset_cold = 6,
+  reset_statistics = 7,
+  check_host = 8,
+  list_objects = 9,
+  load_application = 10,
+  set_scheduler = 11,
+  register_event = 12,
+  unregister_event = 13,
+  list_nodes = 14,
+  list_routes = 15,
+  read_clock = 16,
+  download_application = 17,
+  rollback_application = 18,
+  reload_host = 19,
+  read_log = 20,
+  change_application = 100,  ///< argument: a path; it takes over while tasks run
+  shutdown = 101,            ///< stop the application and end the process
+  status = 102,              ///< the reply's text is the InstanceReport
+  set_log_level = 103,       ///< argument: one of kLogLevels
+};
+
+/// The process that carries out an operation.
+enum class OperationPlace : std::uint8_t {
+  server,    ///< the API server, from shared memory
+  host,      ///< the manager, for the whole host
+  manager,   ///< the manager, for one instance
+  instance,  ///< the process of the instance; the manager passes it on
+  internal,  ///< the same, and only the manager asks for it
+};
+
+/// The role of a client is decided by the topic that it could write to.
+enum class ApiRole : std::uint8_t { operating, engineering };
+
+enum class OperationArgument : std::uint8_t {
+  none,
+  path,          ///< of an application, absolute, on the host
+  file,          ///< name of an application's file, for people
+  scheduler,     ///< name of a scheduler
+  event,         ///< name of an external event of the instance
+  task_or_none,  ///< name of a task; empty: all tasks
+};
+
+/// The options of a request beside its argument.
+enum class OperationOptions : std::uint8_t { none, loading, download };
+
+/// A row of the table of operations. Checks, roles, limits, words of plcctl with their help and completion,
+/// and functions of the client library come from it.
+struct Operation {
+  ControlVerb verb{};
+  std::string_view name;  ///< for people, in the audit log, and on control sockets
+  OperationPlace place = OperationPlace::manager;
+  ApiRole role = ApiRole::operating;
+  OperationArgument argument = OperationArgument::none;
+  OperationOptions options = OperationOptions::none;
+  bool names_instance = true;
+  bool only_reads = false;  ///< changes nothing, so the audit log does not have it
+  bool takes_long = false;  ///< up to 35 s, because it waits for cycles or for a fresh process
+  /// "verb noun" of plcctl; empty: plcctl has words of its own for it, or none.
+  const char* verb_word = "";
+  const char* noun_word = "";
+  const char* help = "";
+  const char* verb_help = "";  ///< of the verb alone; empty: that of the noun
+  /// Said of the instance when it was done; "{}": the argument.
+  const char* done = "done";
+};
+
+[[nodiscard]] std::span<const Operation> operations() noexcept;
+/// All verbs have one.
+[[nodiscard]] const Operation& operation_of(ControlVerb verb) noexcept;
+/// Of a number of control.idl, or of a name. Null: there is none, or only the manager asks for it.
+[[nodiscard]] const Operation* find_operation(std::int32_t number) noexcept;
+[[nodiscard]] const Operation* find_operation(std::string_view name) noexcept;
+[[nodiscard]] std::string_view to_string(ControlVerb verb) noexcept;
+
+/// Said when it was done with that argument.
+[[nodiscard]] std::string done_text(const Operation& operation, std::string_view argument);
+
+}  // namespace plchost

@@ -1,0 +1,62 @@
+// The table of operations against the contract, which the build reads from control.idl.
+#include <set>
+#include <string>
+
+#include <contract_operations.hpp>
+#include <gtest/gtest.h>
+
+#include "shm/base/operations.hpp"
+
+namespace plchost {
+namespace {
+
+TEST(OperationTable, HasEachOperationOfTheContractAsItIsThere) {
+  for (const ContractOperation& told : kContractOperations) {
+    SCOPED_TRACE(told.name);
+    const Operation* const own = find_operation(told.number);
+    ASSERT_NE(own, nullptr);
+    EXPECT_EQ(own->name, told.name);
+    EXPECT_EQ(own->role == ApiRole::engineering, told.engineering);
+    EXPECT_EQ(own->names_instance, told.names_instance);
+  }
+}
+
+TEST(OperationTable, HasNoOtherForClients) {
+  std::size_t count = 0;
+  for (const Operation& operation : operations())
+    count += operation.place == OperationPlace::internal ? 0 : 1;
+  EXPECT_EQ(count, kContractOperations.size());
+}
+
+TEST(OperationTable, NamesAndVerbsAreUnique) {
+  std::set<std::string_view> names;
+  std::set<ControlVerb> verbs;
+  for (const Operation& operation : operations()) {
+    EXPECT_TRUE(names.insert(operation.name).second) << operation.name;
+    EXPECT_TRUE(verbs.insert(operation.verb).second) << operation.name;
+    EXPECT_EQ(&operation_of(operation.verb), &operation);
+  }
+}
+
+TEST(OperationTable, ShowsClientsNothingThatOnlyTheManagerAsks) {
+  EXPECT_EQ(find_operation(static_cast<std::int32_t>(ControlVerb::shutdown)), nullptr);
+  EXPECT_EQ(find_operation("shutdown"), nullptr);
+  EXPECT_EQ(find_operation(0), nullptr);
+  EXPECT_EQ(find_operation("make coffee"), nullptr);
+}
+
+TEST(OperationTable, OnlyWhatIsOfAHostOrReadsNamesNoInstance) {
+  for (const Operation& operation : operations()) {
+    if (operation.names_instance) continue;
+    EXPECT_TRUE(operation.place == OperationPlace::host || operation.place == OperationPlace::server)
+        << operation.name;
+  }
+}
+
+TEST(OperationTable, SaysWhatWasDone) {
+  EXPECT_EQ(done_text(operation_of(ControlVerb::start), ""), "started");
+  EXPECT_EQ(done_text(operation_of(ControlVerb::register_event), "ready"), "event ready is registered");
+}
+
+}  // namespace
+}  // namespace plchost
