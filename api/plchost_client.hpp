@@ -37,7 +37,7 @@
 
 namespace plchost {
 
-/// What went wrong. what() says on what, and what to do.
+/// The kind of an error. what() says where, and what to do.
 class PLCHOST_CLIENT_API ClientError : public std::runtime_error {
  public:
   /// The numbers are those of Reply.code in api/control.idl; there may be more some day.
@@ -184,7 +184,7 @@ class PLCHOST_CLIENT_API Client {
     std::chrono::nanoseconds round_trip{};  ///< here: from before the post to after the news
   };
 
-  /// What became of a call with a callback.
+  /// The result of a call with a callback.
   struct Outcome {
     int code = 0;      ///< 0: done; else ClientError::Code
     std::string text;  ///< why not
@@ -238,7 +238,7 @@ class PLCHOST_CLIENT_API Client {
   std::vector<Task> tasks(const std::string& host = {});
   std::vector<Event> events(const std::string& host = {});
 
-  /// What an instance has said, oldest first: the `newest` lines of those that the host keeps (256 KiB for
+  /// The lines of an instance, oldest first: the `newest` lines of those that the host keeps (256 KiB for
   /// each instance). ClientError: not_found: no such instance; refused: only operators may ask.
   std::vector<LogLine> logs(const std::string& host, const std::string& instance,
                             unsigned long long newest = ~0ULL);
@@ -277,7 +277,7 @@ class PLCHOST_CLIENT_API Client {
   /// instances: each application is tried.
   std::string reload(const std::string& host = {});
 
-  /// What command() can do: all commands but a download. From the table that hosts and plcctl go by.
+  /// The commands of command(): all but a download. From the table that hosts and plcctl go by.
   static std::vector<Operation> operations();
   /// A command by its name ("reset statistics"); those above are such commands, too. Returns when it is done.
   /// ClientError: invalid_argument: no such command; the text lists them.

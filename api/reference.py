@@ -22,7 +22,7 @@ END = "<!-- The reference ends here. -->"
 
 
 def faults_of(contract, name):
-    """What breaks the rules that the head of control.idl states."""
+    """The breaches of the rules that the head of control.idl states."""
     seen = {}
     for constant in contract.constants:
         if not constant.comment:
@@ -61,7 +61,7 @@ def faults_of(contract, name):
 
 
 def faults_of_topic(contract, kind):
-    """What of a topic the generator would not understand."""
+    """The parts of a topic that the generator would not understand."""
     for read in (lambda: qos_of(contract, kind), lambda: partition_of(kind)):
         try:
             read()
@@ -70,7 +70,7 @@ def faults_of_topic(contract, kind):
 
 
 def changes_since(old, new):
-    """What an old program would not find as it was."""
+    """The changes that an old program would not expect."""
     constants = {c.name: (c.type, c.value) for c in new.constants}
     types = {t.name: t for t in new.types}
     for constant in old.constants:

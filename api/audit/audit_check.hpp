@@ -11,10 +11,10 @@
 
 namespace plchost {
 
-/// What was found in an audit log.
+/// The result of the check of an audit log.
 struct AuditFindings {
   std::uint64_t first = 0;  ///< number of the first record; above 1: the files before are gone. 0: none
-  AuditHead head;           ///< the last one: who has noted it earlier knows that nothing was cut off
+  AuditHead head;           ///< the last one: compared with a note of it, it shows that nothing was cut off
   std::uint64_t records = 0;
   std::vector<std::string> problems;  ///< "FILE:LINE: ...": changed, missing, inserted. At most kMostProblems
   std::vector<std::string> remarks;   ///< where the log itself says that something is missing

@@ -14,9 +14,10 @@
 
 namespace plchost {
 
-/// Who changed what, in files that are only appended to; each record carries the hash of the one before, so
-/// that a change of any of them shows (see check_audit). What append() has returned from survives the death
-/// of this process, and within kSyncPeriod a loss of power. One thread; one log for each folder.
+/// Each change and its client, in files that are only appended to. Each record carries the hash of the one
+/// before, so that a change of any of them shows (see check_audit). A record survives, when append() has
+/// returned, the death of this process, and within kSyncPeriod a loss of power. One thread; one log for each
+/// folder.
 class AuditLog {
  public:
   struct Options {
@@ -32,8 +33,8 @@ class AuditLog {
   AuditLog(const AuditLog&) = delete;
   AuditLog& operator=(const AuditLog&) = delete;
 
-  /// Writes one record. What cannot be written (a full disk) is counted, and the count written as soon as
-  /// something can be: until then the error is returned.
+  /// Writes one record. Records that cannot be written (a full disk) are counted, and the count is written as
+  /// soon as something can be: until then the error is returned.
   Result<void> append(const AuditRecord& record);
   /// So many records were lost before they came here: the next one that can be written tells of them, too.
   void miss(std::uint64_t records) noexcept { missed_ += records; }

@@ -18,7 +18,7 @@ struct AuditLogs {
 
   std::unique_ptr<AuditLog> done;         ///< never null
   std::unique_ptr<AuditLog> refused;      ///< a quota of its own; null: refusals go to `done`
-  std::optional<PendingRecords> pending;  ///< what is under way
+  std::optional<PendingRecords> pending;  ///< commands under way
 };
 
 }  // namespace plchost

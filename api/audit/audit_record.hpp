@@ -8,11 +8,11 @@
 
 namespace plchost {
 
-/// Who did what, and what came of it.
+/// A client, its command and the result.
 struct AuditRecord {
   std::int64_t time_unix_ns = 0;
   std::string who;   ///< the identity that DDS Security has proven; "" if there is none
-  std::string from;  ///< what the client says of itself: program, user, machine; and its participant
+  std::string from;  ///< the client's own words about itself: program, user, machine; and its participant
   std::string what;  ///< the operation: "stop", "post"; or "begin", "repair", "gap": of the log itself
   std::string on;    ///< the instance; "": the host
   std::string argument;
@@ -31,7 +31,7 @@ struct AuditHead {
 /// UTF-8 are made so.
 [[nodiscard]] std::string chain(const AuditRecord& record, AuditHead& head);
 
-/// What a line (without its newline) says of the chain.
+/// The part of a line (without its newline) that is about the chain.
 struct AuditLink {
   std::uint64_t number = 0;
   std::string before;

@@ -16,10 +16,10 @@
 
 namespace plchost {
 
-/// Opens and writes the audit log on a thread of its own, because a disk may take any time: whoever hands in
-/// a record never waits. In the order in which they come. Until the log is open, records wait as they do for
-/// a slow disk. Of more than kMost records that wait, the new ones are counted and the log tells how many are
-/// missing. All but the destructor: any thread.
+/// Opens and writes the audit log on a thread of its own, because a disk may take any time: the thread that
+/// hands in a record never waits. In the order in which they come. Until the log is open, records wait as
+/// they do for a slow disk. Of more than kMost records that wait, the new ones are counted and the log tells
+/// how many are missing. All but the destructor: any thread.
 class AuditWriter {
  public:
   static constexpr std::size_t kMost = 4096;

@@ -9,18 +9,18 @@
 
 namespace plchost {
 
-/// What was asked and is not answered yet, each in a small file of its own beside the audit log, so that the
-/// next process can tell of it if this one is killed. Not in the chain: it is there for as long as a command
-/// takes.
+/// Requests without an answer yet, each in a small file of its own beside the audit log, so that the next
+/// process can record it if this one is killed. Not in the chain: it is there for as long as a command takes.
 class PendingRecords {
  public:
   /// `folder` is made if it is not there, for its owner only.
   [[nodiscard]] static Result<PendingRecords> open(std::string folder);
 
-  /// `key`: letters, digits, '.', '-', '_'. What cannot be written is an error, and nothing else.
+  /// `key`: letters, digits, '.', '-', '_'. A file that cannot be written is an error, and nothing else.
   Result<void> add(std::string_view key, const AuditRecord& record) const;
   void remove(std::string_view key) const;
-  /// What the process before has left, by key; a file that is no record is left out. All are gone afterwards.
+  /// The records that the process before has left, by key; a file that is no record is left out. All are gone
+  /// afterwards.
   [[nodiscard]] std::vector<AuditRecord> take_all() const;
 
  private:

@@ -30,7 +30,7 @@ struct CliOptions {
   bool json = false;
   bool csv = false;
   std::string colour = "auto";       ///< as --color says it
-  bool coloured = false;             ///< what comes of it
+  bool coloured = false;             ///< the result
   bool wide = false;                 ///< tables are not fitted to the terminal
   bool quiet = false;                ///< nothing is said of what is done
   std::vector<std::string> columns;  ///< the fields that are shown; empty: as usual

@@ -23,12 +23,12 @@ struct HostSelection {
   [[nodiscard]] bool is_pattern() const noexcept;
 };
 
-/// What came of a command at one host.
+/// The result of a command at one host.
 struct HostOutcome {
   std::string host;
   Result<ApiReply> reply;
 };
-/// What is asked of one host, over that connection.
+/// The command to one host, over that connection.
 using HostCall = std::function<Result<ApiReply>(ControlClient& client, const std::string& host)>;
 /// Asks all hosts at the same time, each over a connection of its own. In the order of the hosts.
 [[nodiscard]] std::vector<HostOutcome> ask_each(const dds::DomainOptions& options,

@@ -141,7 +141,7 @@ bool parses(CLI::App& app, const std::vector<std::string>& words) {
   }
 }
 
-// What the shells' scripts call: a candidate in each line, a tabulator, what it is.
+// Called by the shells' scripts: a candidate in each line, a tabulator, its meaning.
 int offer(CLI::App& app, plchost::CliSession& session, std::span<const std::string> words) {
   const plchost::Completion completion = plchost::complete(plchost::syntax_of(app), words);
   constexpr double kPatienceOnTab = 1;
@@ -183,7 +183,7 @@ int main(int argc, char** argv) {
   plchost::add_completion_verb(plcctl);
   const std::vector<std::string> words(argv + 1, argv + argc);
   plchost::start_log("plcctl", "warning");
-  // For programs: what completes the command line, and what makes the manual page.
+  // For programs: the completion of the command line, and the manual page.
   if (words.size() > 1 && words.front() == "__complete")
     return offer(app, session, std::span(words).subspan(1));
   if (words.size() == 1 && words.front() == "__man") {

@@ -12,7 +12,7 @@
 namespace plchost {
 
 /// One line for each host that a file is sent to, on standard error if that is a terminal, else nothing. The
-/// lines are gone when this is: what became of it is said elsewhere. Any thread.
+/// lines are gone when this is: the results are printed elsewhere. Any thread.
 class ProgressBoard {
  public:
   ProgressBoard(const std::vector<std::string>& hosts, std::uint64_t size);

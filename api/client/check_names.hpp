@@ -9,12 +9,13 @@
 
 namespace plchost {
 
-/// What a client is given by its user, before it goes into a sample of control.idl: what does not fit there
-/// would be cut, and name something else. invalid_argument: the text says what is allowed. Any context.
+/// The names that a client gets from its user, before they go into a sample of control.idl: a name that does
+/// not fit there would be cut, and mean another thing. invalid_argument: the text says what is allowed. Any
+/// context.
 [[nodiscard]] Result<void> check_host_name(std::string_view host);
 [[nodiscard]] Result<void> check_event_name(std::string_view instance, std::string_view event);
 [[nodiscard]] Result<void> check_task_name(std::string_view instance, std::string_view task);
-/// No instance: a request for the whole host. What the argument means is the host's business.
+/// No instance: a request for the whole host. The meaning of the argument is the host's business.
 [[nodiscard]] Result<void> check_api_request(const ApiRequest& request);
 
 /// "I/T" split at the first slash. invalid_argument: no slash, or nothing on one side of it.

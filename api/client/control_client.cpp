@@ -82,7 +82,7 @@ Result<void> ControlClient::open_cache(Cache& cache, const dds::TopicInfo& info,
   if (cache) return {};
   auto topic = dds::make_topic(participant_.get(), info);
   if (!topic) return std::unexpected(topic.error());
-  // What another host writes under a key of this one must not push out what has not been taken yet.
+  // Samples of another host under a key of this one must not push out those that have not been taken yet.
   auto reader = dds::make_reader(status_subscriber_.get(), topic->get(),
                                  dds::qos_of(info).keep_last(dds::kStatusReaderDepth));
   if (!reader) return std::unexpected(reader.error());
@@ -259,7 +259,7 @@ Result<ApiReply> ControlClient::ask(const ApiRequest& request, TimePoint deadlin
 
 Result<ApiReply> ControlClient::call(const ApiRequest& request, TimePoint deadline) {
   if (auto good = check_api_request(request); !good) return std::unexpected(std::move(good).error());
-  // What has come on other topics would keep the wait from waiting.
+  // Samples that have come on other topics would keep the wait from waiting.
   const auto look = [&, woken = false](const auto& /*identity*/, TimePoint /*now*/) mutable {
     if (std::exchange(woken, true)) {
       update();

@@ -44,7 +44,7 @@ struct HostView {
   bool silent = false;            ///< it does not show its presence any more; the rest is what it said last
   bool contested = false;         ///< two servers show their presence under that name at the same time
 
-  /// What its configuration calls it, beside its name.
+  /// The labels of its configuration, beside its name.
   [[nodiscard]] std::vector<std::string> labels() const;
   /// An entry of its ext; empty: it is not there.
   [[nodiscard]] std::string entry(std::string_view key) const;
@@ -122,8 +122,7 @@ class ControlClient {
   [[nodiscard]] Result<StatisticsReport> statistics(const std::string& host, std::string_view instance,
                                                     std::string_view task, TimePoint deadline);
   [[nodiscard]] Result<std::vector<plc_EventStatus>> events(const std::string& host, TimePoint deadline);
-  /// What became of the posts of each client, as the host counts them; first (source all zero) of all
-  /// together.
+  /// The fate of the posts of each client, as the host counts them; first (source all zero) of all together.
   [[nodiscard]] Result<std::vector<plc_WriterStatus>> writers(const std::string& host, TimePoint deadline);
   [[nodiscard]] Result<std::vector<plc_ObjectStatus>> objects(const std::string& host, TimePoint deadline);
   /// A part of the objects of a host's pool, as the query asks, with all that is known of them; complete: the
@@ -150,7 +149,7 @@ class ControlClient {
   [[nodiscard]] Result<std::vector<plc_HostFinding>> check_host(const std::string& host, TimePoint deadline);
 
   /// The changes of state of all instances of all hosts that have come since the last call, each once and in
-  /// order; the first call asks for them, those that hosts keep included. Wait with wait_for_change().
+  /// order. The first call asks for them, those that hosts keep included. Wait with wait_for_change().
   [[nodiscard]] Result<std::vector<TransitionView>> transitions();
   /// Whether transitions() has returned all that this host has told of: each status of an instance says how
   /// many changes of state there were, and those are written before it. timed_out: no complete status came.
@@ -165,7 +164,7 @@ class ControlClient {
   /// moves. timed_out: it has not begun, or nothing has moved for 10 s.
   [[nodiscard]] Result<ApiReply> download(const Download& download, const DownloadProgressFunction& progress,
                                           TimePoint deadline);
-  /// What was sent to the instances of a host and is kept there.
+  /// The applications that were sent to the instances of a host and are kept there.
   [[nodiscard]] Result<std::vector<plc_ApplicationStatus>> applications(const std::string& host,
                                                                         TimePoint deadline);
 
@@ -215,7 +214,7 @@ class ControlClient {
   [[nodiscard]] Result<void> open_own_reader(dds::Entity& topic, dds::Entity& reader,
                                              const dds::TopicInfo& info, const dds::Qos& qos);
   [[nodiscard]] Result<RequestCaller*> caller(const std::string& host, bool engineering);
-  /// Asks, and waits for the answer. What was given up leaves no writer that would still send it.
+  /// Asks, and waits for the answer. A request that was given up leaves no writer that would still send it.
   [[nodiscard]] Result<ApiReply> ask(const ApiRequest& request, TimePoint deadline,
                                      const RequestCaller::Meanwhile& meanwhile);
   /// nullptr: that host has not been seen.

@@ -21,7 +21,7 @@ namespace {
 
 constexpr Duration kToldKeysLook = std::chrono::seconds(1);
 
-// Who answers is a stranger's text.
+// The name of the answering host is a stranger's text.
 std::string no_such_host(std::string_view name, const std::vector<std::string>& answering) {
   const std::vector<std::string_view> views(answering.begin(), answering.end());
   const std::string_view near = nearest_name(name, views);

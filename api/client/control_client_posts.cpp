@@ -77,8 +77,8 @@ Result<PostReport> ControlClient::post_event(const ApiRequest& event, std::uint6
   std::uint64_t sent = 0;
   for (bool woken = false;; woken = true) {
     TimePoint now = MonotonicClock::now();
-    // What else may have come is looked at when it was no acknowledgement that has woken this: nothing stands
-    // between one and the next post, or the end.
+    // Other topics are looked at when it was no acknowledgement that has woken this: nothing stands between
+    // one and the next post, or the end.
     if (!take_acks(now) && woken) {
       update();
       use_clock(posts, event.host, patience);

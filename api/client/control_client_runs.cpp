@@ -1,4 +1,4 @@
-// What a client does to learn that its post was run, and posts of several events at once.
+// A client's way to learn that its post was run, and posts of several events at once.
 #include <algorithm>
 #include <utility>
 

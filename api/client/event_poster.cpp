@@ -107,7 +107,9 @@ bool EventPoster::on_ack(const plc_EventAck& ack, TimePoint now) {
   while (!unacknowledged_.empty() && unacknowledged_.front().sequence <= ack.sequence_number) {
     unacknowledged_.pop_front();
   }
-  if (new_server) last_write_ = TimePoint{};  // what the one before took and did not do is repeated now
+  if (new_server)
+    last_write_ = TimePoint{};  // posts that the one before took and did not do are repeated
+                                // now
   if (unacknowledged_.size() == before) return false;
   last_progress_ = now;
   return true;

@@ -27,8 +27,8 @@ struct PostReport {
   std::uint64_t unacknowledged = 0;  ///< nothing is known of these; 0 unless the host stopped answering
 };
 
-/// What the acknowledgements of one source count, also when the host's ledger of posts begins anew (it is
-/// made anew for a new pool, and forgets the source that posted least recently): it counts from 0 then.
+/// The counts in the acknowledgements of one source. The host's ledger of posts may begin anew (it is made
+/// anew for a new pool, and forgets the source that posted least recently): it counts from 0 then.
 class AckAccount {
  public:
   /// Sums since the account was made.
@@ -61,8 +61,8 @@ class EventPoster {
  public:
   /// Unacknowledged posts at most.
   static constexpr std::size_t kWindow = 32;
-  /// Repeats after so long without progress; sooner while the server that was met last has not acknowledged
-  /// anything yet, since it may not have found this writer, and while DDS has no room for a post.
+  /// Repeats after so long without progress. It repeats sooner while DDS has no room for a post, and while
+  /// the server that was found last has not acknowledged anything yet: that may not have found this writer.
   static constexpr Duration kResend = std::chrono::milliseconds(200);
   static constexpr Duration kFirstResend = std::chrono::milliseconds(20);
 

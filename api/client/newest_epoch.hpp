@@ -6,7 +6,7 @@
 
 namespace plchost {
 
-/// Who has not been heard of for so long is gone.
+/// A server that has not been heard of for so long is gone.
 inline constexpr Duration kServerGone = std::chrono::milliseconds(500);
 
 /// Which server of a host counts: the one of the greatest epoch, as long as it is heard of. The last words of

@@ -17,7 +17,7 @@
 
 namespace plchost {
 
-/// What a client asks of one instance.
+/// A request to one instance.
 struct ApiRequest {
   std::string host;
   std::int32_t operation = 0;  ///< plc_OPERATION_...
@@ -52,15 +52,15 @@ class RequestCaller {
     TimePoint next = TimePoint::max();  ///< there is something to do meanwhile
     TimePoint deadline;
   };
-  /// What there is to do while the answer is waited for: called whenever something may have changed.
+  /// The work while the answer is waited for: called whenever something may have changed.
   using Meanwhile = std::function<Wait(const plc_SampleIdentity& request, TimePoint now)>;
 
   /// The host's clock, as it is known now; nullptr: the host has not been seen yet.
   using ClockOf = std::function<const HostClock*()>;
 
   /// `answering`: the writers that reply_reader takes from. timed_out: no answer until the deadline, which
-  /// `meanwhile` can move. What the host has not begun by then it does not do; whether it has begun with it
-  /// is not known.
+  /// `meanwhile` can move. A request that the host has not begun by then it does not do; whether it has begun
+  /// with it is not known.
   [[nodiscard]] Result<ApiReply> call(const ApiRequest& request, dds_entity_t reply_reader,
                                       const WaitSet& wait_set, TimePoint deadline, const ClockOf& clock,
                                       dds::HostWriters& answering, const Meanwhile& meanwhile = {});

@@ -17,7 +17,7 @@
 
 namespace plchost {
 
-/// What a host's presence has told.
+/// The values of a host's presence.
 struct SeenHost {
   std::uint64_t epoch = 0;
   std::int32_t pid = 0;

@@ -66,7 +66,7 @@ class StatusCache {
   }
 
  private:
-  // What a sequence points to is on loan only, so it is copied.
+  // The elements of a sequence are on loan only, so they are copied.
   struct Kept {
     Sample sample{};
     std::vector<plc_KeyValue> ext;

@@ -30,7 +30,7 @@ class TransitionLog {
       : topic_(std::move(topic)), reader_(std::move(reader)) {}
 
   [[nodiscard]] explicit operator bool() const noexcept { return static_cast<bool>(reader_); }
-  /// What has come since the last call.
+  /// The transitions since the last call.
   [[nodiscard]] std::vector<TransitionView> take();
   /// Whether everything has been taken that this instance's host had written when it wrote this status of it.
   [[nodiscard]] bool has_all(const plc_InstanceStatus& status) const;
@@ -41,7 +41,7 @@ class TransitionLog {
   struct Seen {
     std::uint64_t stream = 0;
     std::uint64_t last = 0;
-    // What its present server has written, also if it was no news: it begins with what is kept.
+    // The number that its present server has written, also if it was no news: it begins with the kept ones.
     NewestEpoch epoch;
     std::uint64_t written = 0;
   };

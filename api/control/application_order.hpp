@@ -40,7 +40,7 @@ struct ApplicationOrder {
 inline constexpr std::size_t kMaxFileName = 95;
 [[nodiscard]] Result<void> check_file_name(std::string_view name);
 
-/// What is on its way to an instance of the pool's host lies in the shared memory of that name.
+/// A download to an instance of the pool's host lies in the shared memory of that name.
 [[nodiscard]] std::string download_file_name(std::string_view pool, std::uint64_t number);
 /// Removes those that are there. Set-up.
 void remove_downloads(std::string_view pool) noexcept;

@@ -10,7 +10,7 @@
 
 namespace plchost {
 
-// What was sent to an instance lies in one folder, STATE_DIRECTORY/applications.HOST/INSTANCE:
+// The applications sent to an instance lie in one folder, STATE_DIRECTORY/applications.HOST/INSTANCE:
 //   000003.so    a version
 //   000003.json  what is known of it; a version without is none (yet)
 //   boot         the path that the instance starts with, instead of the configuration's; may be missing
@@ -44,7 +44,7 @@ struct ApplicationVersions {
 [[nodiscard]] std::string description_path(std::string_view path);
 [[nodiscard]] std::string boot_path(std::string_view folder);
 
-/// What is there; of a damaged description the version is left out. Soft threads: reads files.
+/// The versions that are there; one with a damaged description is left out. Soft threads: reads files.
 [[nodiscard]] ApplicationVersions read_versions(const std::string& folder);
 /// The version that lies at `path`; nothing: it is none of this folder.
 [[nodiscard]] std::optional<ApplicationVersion> version_at(const std::string& folder,

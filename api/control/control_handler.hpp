@@ -18,7 +18,7 @@ namespace plchost {
 /// Answers one request. Called exactly once, on the thread of the handler.
 using ControlReplyFunction = std::function<void(ControlReply)>;
 
-/// Who carries out control requests: the manager. Soft thread, never waits.
+/// Carries out control requests: the manager. Soft thread, never waits.
 class ControlHandler {
  public:
   virtual ~ControlHandler() = default;

@@ -40,7 +40,7 @@ std::string dump(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-// What a text takes as a JSON string inside a reply.
+// The length of a text as a JSON string inside a reply.
 std::size_t quoted_size(const std::string& text) {
   return dump(Json(text)).size();
 }

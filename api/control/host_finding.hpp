@@ -19,7 +19,7 @@ enum class FindingLevel : std::uint8_t {
 };
 [[nodiscard]] std::string_view to_string(FindingLevel level) noexcept;
 
-/// What one check of the host found. The texts are for people, and bounded as in control.idl.
+/// The result of one check of the host. The texts are for people, and bounded as in control.idl.
 struct HostFinding {
   std::string id;  ///< of the check
   FindingLevel level = FindingLevel::ok;

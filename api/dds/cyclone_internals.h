@@ -1,6 +1,6 @@
 #pragma once
 
-// What Cyclone DDS keeps to itself, for the sources that mend what it keeps too long. In C, because these
+// Internals of Cyclone DDS, for the sources that free the things that it keeps too long. In C, because these
 // headers are not valid in C++.
 
 #include <arpa/inet.h>

@@ -41,13 +41,13 @@ struct DomainOptions {
 /// Whether this process may make a SCHED_FIFO thread of that priority: tried, not guessed.
 [[nodiscard]] bool can_use_fifo(int priority);
 
-/// A domain of this process, and with it its configuration. One process can have a domain once: who asks for
-/// one that is there already gets that one, as it is configured. An identity that others would not accept is
-/// an error that says why. Thread-safe.
+/// A domain of this process, and with it its configuration. One process can have a domain once: a second
+/// request gets the same one, as it is configured. An identity that others would not accept is an error that
+/// says why. Thread-safe.
 [[nodiscard]] Result<std::shared_ptr<Entity>> open_domain(Role role, const DomainOptions& options);
 
 /// A participant in a domain of this process. `qos` may be null. Thread-safe, which Cyclone 0.10.2 is not: of
-/// a secured domain, the first two that are made at the same time both load the security plugins, and those
+/// a secured domain, the first two that are made at the same time both load the security plugins. The plugins
 /// of one of them do not know the identity that was given to those of the other.
 [[nodiscard]] Result<Entity> make_participant(std::uint32_t domain, const dds_qos_t* qos,
                                               std::string_view what);

@@ -41,7 +41,7 @@ struct GuidHash {
 /// The GUID of an entity of this process; all zero if it has none.
 [[nodiscard]] Guid guid_of(dds_entity_t entity) noexcept;
 
-/// The GUID of the remote writer that wrote a sample: what the header claims must equal it. All zero if the
+/// The GUID of the remote writer that wrote a sample: the claim of the header must equal it. All zero if the
 /// writer is gone already.
 [[nodiscard]] Guid writer_of(dds_entity_t reader, const dds_sample_info_t& info) noexcept;
 

@@ -13,7 +13,7 @@ namespace plchost::dds {
 
 /// Which host is behind a writer: the one that the writer's partition names. A writer only gets into a
 /// partition that the permission of its identity allows, which each receiver checks, and the permission of a
-/// host names that host. What one host says in the name of another is therefore found by its partition. One
+/// host names that host. A sample of one host in the name of another is therefore found by its partition. One
 /// thread.
 class HostWriters {
  public:

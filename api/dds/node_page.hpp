@@ -13,14 +13,14 @@
 
 namespace plchost {
 
-/// Which nodes, or the ways of which nodes, are asked for. What is empty asks for nothing.
+/// Which nodes, or the ways of which nodes, are asked for. An empty member asks for nothing.
 struct NodeQuery {
-  std::string base = {};    ///< empty: what the host's configuration says
+  std::string base = {};    ///< empty: that of the host's configuration
   std::string node = {};    ///< this one alone, by name or address
   std::uint16_t after = 0;  ///< greater addresses only
 };
 
-/// The query as it travels: entries of plc_Request.ext. invalid_argument: what can be no name.
+/// The query as it travels: entries of plc_Request.ext. invalid_argument: a text that can be no name.
 [[nodiscard]] Result<std::vector<plc_KeyValue>> entries_of(const NodeQuery& query);
 /// And back. invalid_argument: a value that cannot be, or an entry twice. Entries of other names are of a
 /// newer client, who can do without.

@@ -13,7 +13,7 @@
 
 namespace plchost {
 
-/// Which objects of a pool are asked for. What is empty asks for nothing.
+/// Which objects of a pool are asked for. An empty member asks for nothing.
 struct ObjectQuery {
   std::string name = {};                          ///< this one alone; then all else is empty
   std::optional<ObjectType> type = std::nullopt;  ///< of this type only

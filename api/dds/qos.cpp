@@ -9,7 +9,7 @@ Qos& Qos::reliable(Duration max_blocking) {
 
 Qos& Qos::keep_last(std::int32_t depth) {
   dds_qset_history(qos_.get(), DDS_HISTORY_KEEP_LAST, depth);
-  // What a transient-local writer keeps for late readers is a bound of its own.
+  // The history of a transient-local writer for late readers has a bound of its own.
   dds_qset_durability_service(qos_.get(), 0, DDS_HISTORY_KEEP_LAST, depth, DDS_LENGTH_UNLIMITED,
                               DDS_LENGTH_UNLIMITED, DDS_LENGTH_UNLIMITED);
   return *this;

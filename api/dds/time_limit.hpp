@@ -8,10 +8,10 @@
 
 namespace plchost::dds {
 
-/// What a host makes of the time limit of a request, a post or a piece of a download.
+/// A host's decision about the time limit of a request, a post or a piece of a download.
 enum class Timeliness : std::uint8_t {
   in_time,
-  late,         ///< whoever wrote it has given up: it must not be done
+  late,         ///< its writer has given up: it must not be done
   other_epoch,  ///< by the clock of another plchost-dds: when in doubt it is not done; it comes again
   unlimited,    ///< it has no limit
 };

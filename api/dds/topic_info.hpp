@@ -11,10 +11,10 @@
 
 namespace plchost::dds {
 
-/// Whose partitions a topic is written into; see control.idl.
+/// The kind of partitions that a topic is written into; see control.idl.
 enum class Partition : std::uint8_t { host, status, client, name, blocks };
 
-/// What `qos:` of a topic says in control.idl. All topics are reliable.
+/// The values of a topic's `qos:` in control.idl. All topics are reliable.
 struct TopicQos {
   Duration blocking{};            ///< a writer waits so long for a slow reader
   std::int32_t depth = 0;         ///< of the history; 0: all samples are kept

@@ -59,9 +59,9 @@ inline constexpr Duration kPresenceDeadline = kPresence.qos.deadline;
 inline constexpr std::string_view kAllHosts = "*";
 /// Where requests and posts for one host go.
 [[nodiscard]] std::string host_partition(std::string_view host);
-/// What a host tells all.
+/// The topics of a host for all.
 [[nodiscard]] std::string status_partition(std::string_view host);
-/// What a host tells one client (its participant's GUID in hex).
+/// The topics of a host for one client (its participant's GUID in hex).
 [[nodiscard]] std::string client_partition(std::string_view guid_hex, std::string_view host);
 /// Where hosts meet that claim the same name.
 [[nodiscard]] std::string name_partition(std::string_view host);

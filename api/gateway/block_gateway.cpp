@@ -115,7 +115,7 @@ Result<void> BlockGateway::open_topics(CountedEvent& wake) {
   for (const dds::Entity* const reader : {&host_reader_, &block_reader_, &ack_reader_}) {
     if (auto listening = listen(*reader, wake); !listening) return listening;
   }
-  wake.post();  // what came before the listeners were there
+  wake.post();  // blocks that came before the listeners were there
   return {};
 }
 

@@ -37,9 +37,9 @@ struct GatewayOptions {
   Duration hold = std::chrono::seconds(1);
 };
 
-/// The node of a pool behind which other hosts lie: what is for them goes out over DDS, what comes from them
-/// is checked and goes to the nodes of this one. Two threads: that of its router, which never waits for a
-/// host, and the one that serves.
+/// The node of a pool behind which other hosts lie: blocks for them go out over DDS. Blocks from them are
+/// checked and go to the nodes of this one. Two threads: that of its router, which never waits for a host,
+/// and the one that serves.
 class BlockGateway {
  public:
   /// A host that is silent for so long is not reached; it is heard five times in that time.
@@ -61,7 +61,7 @@ class BlockGateway {
   [[nodiscard]] bool lost() const noexcept { return node_->lost(); }
 
  private:
-  /// Another host. What both threads use is guarded by mutex_.
+  /// Another host. The members that both threads use are guarded by mutex_.
   struct Peer {
     HostClaim claim;
     dds::Entity publisher;
@@ -72,7 +72,7 @@ class BlockGateway {
     NodeSet full;          // guarded: takes no blocks for these
     bool reached = false;  // guarded
     std::optional<TimePoint> heard;
-    dds::Guid stream;         // whose blocks come from there
+    dds::Guid stream;         // the sender of the blocks from there
     std::uint64_t taken = 0;  // the last one of them
     bool has_news = false;    // to be acknowledged
   };
@@ -88,7 +88,7 @@ class BlockGateway {
                                    std::span<const std::byte> contents);
   [[nodiscard]] bool has_room(NodeAddress to, std::uint32_t slots);
 
-  // The serving thread; block_gateway_peers.cpp: who is there
+  // The serving thread; block_gateway_peers.cpp: the present hosts
   void follow_hosts(TimePoint now);
   void follow(const plc_BlockHostStatus& host, const dds_sample_info_t& info, TimePoint now);
   void settle_peers(TimePoint now);
@@ -103,7 +103,7 @@ class BlockGateway {
   void announce();
   void publish_names();
 
-  // block_gateway.cpp: what they send
+  // block_gateway.cpp: their blocks
   void take_acks(TimePoint now);
   void take_blocks(TimePoint now);
   void take(const plc_Block& block, const dds::Guid& writer, TimePoint now);

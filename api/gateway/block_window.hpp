@@ -29,7 +29,7 @@ class BlockWindow {
     sizes_.push_back(bytes);
     bytes_ += bytes;
   }
-  /// All up to this number have been taken. What cannot be is ignored. Whether that is news.
+  /// All up to this number have been taken. An impossible number is ignored. Whether that is news.
   bool acknowledge(std::uint64_t number, TimePoint now) {
     if (number <= acknowledged_ || number >= next()) return false;
     for (; acknowledged_ < number; ++acknowledged_) {

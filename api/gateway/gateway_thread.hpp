@@ -8,8 +8,8 @@
 
 namespace plchost {
 
-/// Keeps the gateway of a host: in a thread of its own, and made again for as long as it cannot be made. What
-/// goes wrong here disturbs nothing else.
+/// Keeps the gateway of a host: in a thread of its own, and made again for as long as it cannot be made. A
+/// failure here disturbs nothing else.
 class GatewayThread {
  public:
   /// `participant` outlives it.

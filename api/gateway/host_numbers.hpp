@@ -13,7 +13,7 @@
 
 namespace plchost {
 
-/// What a host says of itself to other hosts.
+/// A host's claims to other hosts.
 struct HostClaim {
   std::string host;
   std::uint16_t number = 0;   ///< 1 to kMaxHostNumber
@@ -24,8 +24,8 @@ struct HostClaim {
   bool operator==(const HostClaim&) const = default;
 };
 
-/// Who has which number. Of those that claim the same one, the host whose manager started first has it. One
-/// thread.
+/// The host of each number. Of those that claim the same one, the host whose manager started first has it.
+/// One thread.
 class HostNumbers {
  public:
   /// A host that did not have its number gets it so long after the last other one has gone: a server that was

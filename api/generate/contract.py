@@ -135,7 +135,7 @@ def quality(contract, kind):
 
 @dataclasses.dataclass
 class Qos:
-    """What `qos:` says, for programs."""
+    """The values of `qos:`, for programs."""
 
     blocking_ms: int  # of the writer
     depth: int  # 0: KEEP_ALL

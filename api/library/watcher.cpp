@@ -9,7 +9,7 @@ namespace plchost {
 
 namespace {
 
-// A watch that is new begins within this; what is watched wakes the thread itself.
+// A watch that is new begins within this; changes wake the thread themselves.
 constexpr auto kRound = std::chrono::milliseconds(20);
 constexpr auto kReconnect = std::chrono::milliseconds(500);
 constexpr std::size_t kKept = 64;  // of each instance, as hosts do
@@ -28,7 +28,7 @@ void Client::Watch::Subscription::look(const News& news) {
 
 void Client::Watch::Subscription::stop() noexcept {
   stopped_.store(true);
-  if (!maker_.is_this()) return;  // who held it is not here
+  if (!maker_.is_this()) return;  // its holder is not here
   const std::lock_guard lock(calling_);
 }
 

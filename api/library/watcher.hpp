@@ -13,14 +13,14 @@
 
 namespace plchost {
 
-/// What a Watcher has to tell.
+/// The news of a Watcher.
 struct News {
   ControlClient& client;
   const std::vector<TransitionView>& fresh;  ///< changes of state since the last time
   const std::vector<TransitionView>& kept;   ///< the last ones, those included
 };
 
-/// What one Watch wants.
+/// The callbacks of one Watch.
 class __attribute__((visibility("hidden"))) Client::Watch::Subscription {
  public:
   Subscription() = default;
@@ -68,7 +68,8 @@ class __attribute__((visibility("hidden"))) Client::Watcher {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::vector<std::shared_ptr<Watch::Subscription>> subscriptions_;
-  std::vector<TransitionView> transitions_;  // for watches that come later: what hosts keep comes only once
+  std::vector<TransitionView> transitions_;  // for watches that come later: the kept samples of hosts come
+                                             // only once
   bool ending_ = false;
   std::thread thread_;
 };

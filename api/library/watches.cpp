@@ -1,4 +1,4 @@
-// What the watches of a Client tell: each remembers what it told last.
+// The calls of a Client's watches: each remembers what it told last.
 #include <map>
 #include <set>
 #include <tuple>

@@ -24,7 +24,7 @@ struct Subject {
   std::string name;
 };
 
-/// A certificate authority: who signs.
+/// A certificate authority, which signs.
 struct Authority {
   Certificate certificate;
   Key key;

@@ -11,7 +11,7 @@
 
 namespace plchost::security {
 
-/// Who is behind which GUID: computed from the certificates of all identities that the folder of a host
+/// The identity behind each GUID: computed from the certificates of all identities that the folder of a host
 /// knows. A participant cannot choose another prefix than that of the subject that its handshake has proved.
 class KnownIdentities {
  public:

@@ -26,7 +26,7 @@ using Certificate = std::unique_ptr<X509, OpensslFree<X509_free>>;
 using RevocationList = std::unique_ptr<X509_CRL, OpensslFree<X509_CRL_free>>;
 using Bio = std::unique_ptr<BIO, OpensslFree<BIO_free_all>>;
 
-/// What went wrong, with what libcrypto says of it. Empties this thread's list of libcrypto's errors.
+/// An error, with libcrypto's text about it. Empties this thread's list of libcrypto's errors.
 [[nodiscard]] std::unexpected<Error> openssl_failure(std::string_view step,
                                                      ErrorCode code = ErrorCode::system);
 

@@ -38,7 +38,7 @@ Result<std::string> write_pem(std::string_view what, Write write) {
 
 }  // namespace
 
-// What is no file, as a FIFO, could make whoever opens or reads it wait for ever.
+// Something that is no file, as a FIFO, could make the reader wait for ever.
 Result<std::string> read_file(const std::string& path) {
   const UniqueFd file(::open(path.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC | O_NOCTTY));
   if (!file) {

@@ -13,7 +13,7 @@ inline constexpr std::size_t kMaxSecurityFile = std::size_t{1} << 20;
 /// than kMaxSecurityFile.
 [[nodiscard]] Result<std::string> read_file(const std::string& path);
 
-/// What a PEM file holds. corrupt: something else, or of a key: it is encrypted.
+/// The contents of a PEM file. corrupt: something else, or of a key: it is encrypted.
 [[nodiscard]] Result<Certificate> read_certificate(const std::string& path);
 [[nodiscard]] Result<Key> read_key(const std::string& path);
 [[nodiscard]] Result<RevocationList> read_revocations(const std::string& path);

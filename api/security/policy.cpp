@@ -30,7 +30,7 @@ constexpr std::string_view kDomains = "<domains><id_range><min>0</min><max>230</
 Topics status_topics() {
   return {"plc/v1/presence", "plc/v1/status/*", "plc/v1/transition"};
 }
-// What a host tells one client only.
+// The topics of a host for one client only.
 Topics answer_topics() {
   return {"plc/v1/reply", "plc/v1/event_ack",    "plc/v1/event_run", "plc/v1/objects",
           "plc/v1/nodes", "plc/v1/download_ack", "plc/v1/log"};
@@ -43,7 +43,7 @@ Topics name_topics() {
   return {"plc/v1/name_claim"};
 }
 
-// What a host says goes into partitions that name it: nobody believes it in the name of another.
+// A host writes into partitions that name it: no reader takes its samples in the name of another.
 std::vector<Grant> may_write(const Subject& subject) {
   const std::string& name = subject.name;
   switch (subject.role) {

@@ -6,12 +6,12 @@
 
 namespace plchost::security {
 
-/// What DDS has to protect and how, for all domains: nobody unauthenticated, discovery and liveliness
-/// encrypted, every message signed, the samples of all topics encrypted, each topic by permission only.
+/// The protection by DDS, for all domains: nobody unauthenticated, discovery and liveliness encrypted, every
+/// message signed, the samples of all topics encrypted, each topic by permission only.
 [[nodiscard]] std::string governance_text();
 
-/// What an identity of that role may write and read, by topic and partition: a host in the partitions that
-/// name it and in no other host's; a client replies and acknowledgements only in the partitions of its own
+/// The topics and partitions that an identity of that role may write and read. A host: the partitions that
+/// name it and no other host's. A client: replies and acknowledgements only in the partitions of its own
 /// participants, which begin with its GUID prefix.
 [[nodiscard]] std::string permissions_text(const Subject& subject, const std::string& subject_text,
                                            const GuidPrefix& prefix, const Validity& validity);

@@ -7,7 +7,7 @@
 
 namespace plchost::security {
 
-/// What an identity may do. Each client's role includes the one before it; a host is none of the clients.
+/// The rights of an identity. Each client's role includes the one before it; a host is none of the clients.
 enum class Role : std::uint8_t {
   viewer,     ///< reads status
   operating,  ///< "operator": posts events, starts, stops and resets

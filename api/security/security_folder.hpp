@@ -21,7 +21,7 @@ struct IdentityView {
 
 /// The folder of `plcctl security`: DIR/authorities holds the two authorities and their keys and belongs to
 /// whom manages the plant; DIR/NAME is the folder of the identity NAME, to be copied to where it is used.
-/// Whoever has an object of this has the folder for himself. Files are replaced as a whole.
+/// The owner of such an object has the folder alone. Files are replaced as a whole.
 class SecurityFolder {
  public:
   /// A fresh folder with its authorities and the identity of the plant's first host, which must be called as
@@ -42,7 +42,7 @@ class SecurityFolder {
   /// All identities, by name.
   [[nodiscard]] Result<std::vector<IdentityView>> identities() const;
 
-  /// For any time, also one that is over: what add() does.
+  /// For any time, also one that is over: the work of add().
   [[nodiscard]] Result<void> add_valid(const Subject& subject, const Validity& validity);
 
  private:

@@ -1,4 +1,4 @@
-// What lies in the security folder: see security_folder.hpp.
+// The files of the security folder: see security_folder.hpp.
 #include <algorithm>
 #include <cerrno>
 #include <filesystem>

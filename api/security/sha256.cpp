@@ -20,7 +20,7 @@ struct Sha256::Context {
   EVP_MD_CTX* raw = EVP_MD_CTX_new();
 };
 
-// What can fail in here is memory only.
+// Only memory can fail in here.
 Sha256::Sha256() : context_(std::make_unique<Context>()) {
   if (context_->raw == nullptr || EVP_DigestInit_ex(context_->raw, EVP_sha256(), nullptr) != 1) {
     throw std::bad_alloc();

@@ -18,7 +18,7 @@ Result<std::string> sign_document(std::string_view text, const Authority& author
   const Bio out = writing_bio();
   const Message message(
       PKCS7_sign(authority.certificate.get(), authority.key.get(), nullptr, in.get(), kFlags));
-  // What was read for the signature is read again for the message.
+  // The document that was read for the signature is read again for the message.
   const Bio again = reading_bio(text);
   if (!message || SMIME_write_PKCS7(out.get(), message.get(), again.get(), kFlags) != 1) {
     return openssl_failure("sign a document");

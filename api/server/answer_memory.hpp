@@ -14,7 +14,7 @@
 
 namespace plchost {
 
-/// What a request was answered with.
+/// The answer to a request.
 struct Answer {
   plc_SampleIdentity identity{};
   ErrorCode code = ErrorCode::ok;

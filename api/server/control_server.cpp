@@ -98,7 +98,7 @@ void ControlServer::Parts::on_wake_listener(dds_entity_t /*reader*/, void* serve
 }
 
 // Above the threads that receive: a flood of posts shall not keep requests, acknowledgements and the presence
-// waiting. What the loop does at a time is bounded.
+// waiting. The loop's work at a time is bounded.
 Result<void> ControlServer::Parts::raise_loop() const {
   if (options.dds.receive_fifo == 0) return {};
   const sched_param priority{.sched_priority = options.dds.receive_fifo + 1};
@@ -321,7 +321,7 @@ void ControlServer::Parts::do_request(ApiRole role, const dds::Guid& writer, con
   if (checked->verb == ControlVerb::download_application) {
     return begin_download(client, identity, *std::move(checked));
   }
-  // What this server gives up is not begun either.
+  // A request that this server gives up is not begun either.
   checked->limit_ns =
       std::min<std::int64_t>(request.limit.clock_ns, boot_time_ns() + ManagerLink::kCommandLimit.count());
   const PendingCommand command{
@@ -332,7 +332,7 @@ void ControlServer::Parts::do_request(ApiRole role, const dds::Guid& writer, con
   }
 }
 
-// The page first: who has the answer has it, or asks again.
+// The page first: a client that has the answer has it, or asks again.
 void ControlServer::Parts::list_objects(const dds::Guid& client, const plc_Request& request) {
   const plc_SampleIdentity& identity = request.header.request_identity;
   const auto query = parse_object_query(std::span(request.ext._buffer, request.ext._length));
@@ -393,8 +393,8 @@ void ControlServer::Parts::finish(std::vector<FinishedCommand> commands) {
   answer_finished(MonotonicClock::now());
 }
 
-// Who looks at the status after the answer sees what the command did. For that the pool is listed, which
-// takes its time if it is large: once for all that have finished meanwhile.
+// A client that looks at the status after the answer sees the effect of the command. For that the pool is
+// listed, which takes its time if it is large: once for all that have finished meanwhile.
 void ControlServer::Parts::answer_finished(TimePoint now) {
   if (unanswered.empty() || !status->may_flush(now)) return;
   std::vector<std::string> instances;
@@ -406,7 +406,7 @@ void ControlServer::Parts::answer_finished(TimePoint now) {
   }
 }
 
-// What the manager found when it started is published without being asked for.
+// The manager's findings at its start are published without being asked for.
 void ControlServer::Parts::ask_for_findings() {
   PendingCommand nobody;
   nobody.deadline = MonotonicClock::now() + ManagerLink::kCommandLimit;
@@ -472,7 +472,7 @@ void ControlServer::Parts::send_answer(const dds::Guid& client, const plc_Sample
   answers.remember(client, std::move(answer), MonotonicClock::now());
 }
 
-// What only reads is done again when it is asked again.
+// A read-only request is done again when it is repeated.
 void ControlServer::Parts::tell(const dds::Guid& client, const plc_SampleIdentity& identity, ErrorCode code,
                                 std::string_view text) {
   send(client,

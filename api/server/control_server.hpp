@@ -13,7 +13,7 @@
 
 namespace plchost {
 
-/// What plchost-dds is told on its command line.
+/// The options on the command line of plchost-dds.
 struct ServerOptions {
   std::string host;
   std::string pool;
@@ -46,9 +46,9 @@ class ControlServer {
   ControlServer& operator=(const ControlServer&) = delete;
   ~ControlServer();
 
-  /// Serves until SIGTERM or SIGINT, until the manager is gone, or until the files of the host's identity
-  /// have changed, or another host that had this name as well is gone, which both take a fresh process: all
-  /// of these are orderly ends. already_exists: another host of the domain has the name.
+  /// Serves until SIGTERM or SIGINT, or until the manager is gone. It also ends when the files of the host's
+  /// identity have changed, or another host that had this name as well is gone: both take a fresh process.
+  /// All of these are orderly ends. already_exists: another host of the domain has the name.
   [[nodiscard]] Result<void> run();
 
  private:

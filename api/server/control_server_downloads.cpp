@@ -16,7 +16,7 @@ constexpr Duration kStoring = std::chrono::seconds(50);
 
 }  // namespace
 
-// Its answer comes when it is loaded. Who sends it goes with it, for the list of what is kept.
+// Its answer comes when it is loaded. Its sender goes with it, for the list of kept applications.
 void ControlServer::Parts::begin_download(const dds::Guid& client, const plc_SampleIdentity& identity,
                                           ControlRequest request) {
   if (const auto subject = guard.identity_of(client)) {

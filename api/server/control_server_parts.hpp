@@ -34,7 +34,7 @@
 
 namespace plchost {
 
-/// The inside of ControlServer. What is made is in control_server_setup.cpp, what runs in control_server.cpp.
+/// The inside of ControlServer. control_server_setup.cpp makes the parts, control_server.cpp runs them.
 struct ControlServer::Parts {
   struct RequestReader {
     ApiRole role = ApiRole::operating;
@@ -119,7 +119,7 @@ struct ControlServer::Parts {
   std::optional<IdentityWatch> identity_watch;  // of a secured host
   /// A count of which the log is told how much it has grown, at most every 10 s.
   struct ToldCount {
-    /// What is to be told now.
+    /// The news to publish now.
     std::uint64_t take(std::uint64_t count, TimePoint now) noexcept {
       constexpr Duration kAtMostEvery = std::chrono::seconds(10);
       if (now - at < kAtMostEvery) return 0;

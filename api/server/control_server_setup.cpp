@@ -189,7 +189,7 @@ Result<void> ControlServer::Parts::enter_domain() {
   return {};
 }
 
-// Before anything is shown under the name. Who had it a moment ago has no time to ask.
+// Before anything is shown under the name. A server that had the name a moment ago has no time to ask.
 Result<void> ControlServer::Parts::claim_name() {
   const TimePoint entered = MonotonicClock::now();
   auto claimed = NameClaim::create(
@@ -245,7 +245,7 @@ Result<void> ControlServer::Parts::listen() {
   if (auto done = set(chunk_reader.get(), on_wake_listener); !done) return done;
   if (auto done = set(event_reader.get(), on_event_post); !done) return done;
   if (auto done = set(batch_reader.get(), on_event_batch); !done) return done;
-  // What came before the listener was there does not call it.
+  // A sample that came before the listener was there does not call it.
   on_event_post(event_reader.get(), this);
   on_event_batch(batch_reader.get(), this);
   raise_event(wake.get());

@@ -15,7 +15,7 @@
 
 namespace plchost {
 
-/// Who waits for the answer to a command.
+/// The waiter for the answer to a command.
 struct PendingCommand {
   dds::Guid client;  ///< participant
   plc_SampleIdentity identity{};
@@ -49,9 +49,9 @@ class ManagerLink {
   /// busy: too many commands are under way, or the manager does not read.
   [[nodiscard]] Result<void> send(ControlRequest request, PendingCommand command);
   [[nodiscard]] bool is_pending(const plc_SampleIdentity& identity) const;
-  /// What was answered since the last time. unavailable: the manager is gone.
+  /// The answers since the last time. unavailable: the manager is gone.
   [[nodiscard]] Result<std::vector<FinishedCommand>> receive();
-  /// What has not been answered in time.
+  /// The commands that have not been answered in time.
   [[nodiscard]] std::vector<FinishedCommand> expire(TimePoint now);
 
  private:

@@ -14,7 +14,7 @@
 
 namespace plchost {
 
-/// Who claims the name of a host.
+/// The claimant of a host's name.
 struct NameHolder {
   dds::Guid server;  ///< the participant of its plchost-dds
   std::uint64_t epoch = 0;
@@ -38,7 +38,7 @@ class NameClaim {
     std::int64_t since_ns = 0;
     bool serving = false;
   };
-  /// So long a host that comes asks before it serves: who lives nearby has answered by then.
+  /// So long a host that comes asks before it serves: a host nearby has answered by then.
   static constexpr Duration kAsking = std::chrono::milliseconds(300);
   /// One that was refused the name takes its time: also who lives behind a slow link, or speaks DDS Security,
   /// has.
@@ -55,14 +55,14 @@ class NameClaim {
   enum class State : std::uint8_t {
     ours,
     taken,  ///< another host has it: this one must end
-    left,   ///< another host has served under it and has gone: what it told must be told anew
+    left,   ///< another host has served under it and has gone: all status must be told anew
   };
   /// Reads what has come; to be called when something has, and from time to time.
   [[nodiscard]] State look(TimePoint now);
 
-  /// After State::taken: who has it, and what to do.
+  /// After State::taken: the host that has it, and what to do.
   [[nodiscard]] Error taken() const;
-  /// Who else wants the name, or wanted it a short time ago; empty: nobody.
+  /// Another host that wants the name, or wanted it a short time ago; empty: none.
   [[nodiscard]] const std::string& rival() const noexcept { return rival_; }
   /// To be listened to.
   [[nodiscard]] dds_entity_t reader() const noexcept { return reader_.get(); }

@@ -36,7 +36,7 @@ class SessionTable {
 
   /// `client` is a participant. Answers without a session, because the table is full of clients that are all
   /// busy, are dropped and counted.
-  /// What a client asks is only done if this is true: it could not be answered. The client is not idle.
+  /// False: the client cannot be answered, so its request is not executed. The client is not idle.
   [[nodiscard]] bool serves(const dds::Guid& client) { return session_of(client) != nullptr; }
   void write_reply(const dds::Guid& client, const plc_Reply& reply);
   void write_ack(const dds::Guid& client, const plc_EventAck& ack);
@@ -51,7 +51,7 @@ class SessionTable {
   [[nodiscard]] bool write_page(const dds::Guid& client, const plc_NodePage& page);
   [[nodiscard]] bool write_page(const dds::Guid& client, const plc_LogPage& page);
 
-  /// What the client says of itself, and its GUID.
+  /// The client's own words about itself, and its GUID.
   [[nodiscard]] std::string describe(const dds::Guid& client) const;
   /// Whether that participant is in the domain.
   [[nodiscard]] bool is_alive(const dds::Guid& client) const { return alive_.contains(client); }
@@ -65,7 +65,7 @@ class SessionTable {
   [[nodiscard]] std::vector<dds_entity_t> discovery_readers() const;
 
  private:
-  /// What goes to each client over a writer of its own.
+  /// The topics to each client, over a writer of its own.
   enum class Stream : std::uint8_t { replies, acks, objects, nodes, logs, runs, downloads };
   static constexpr std::size_t kStreams = 7;
   struct Session {

@@ -25,7 +25,7 @@ enum State : std::uint32_t {
   exception
 };
 
-/// What leads from a state to running, or to stopped; none: it is there.
+/// The command that leads from a state to running, or to stopped; none: it is there.
 std::optional<std::int32_t> way_to(bool to_running, std::uint32_t state) {
   switch (state) {
     case safe_mode:
@@ -58,7 +58,7 @@ std::vector<PlantChange> changes_to(const WantedInstance& wanted, const PresentI
                           *wanted.running ? "running" : "stopped", *way, ""};
     }
   }
-  // What leads out of a fault ends the process; a loaded application does that, too, and better.
+  // The command that leads out of a fault ends the process; a loaded application does that, too, and better.
   const bool faulty = present.state == safe_mode || present.state == failed || present.state == exception;
   const bool early = state && (!*wanted.running || !has_process(present.state) || faulty);
   if (early && !(faulty && other_application)) changes.push_back(*std::exchange(state, std::nullopt));

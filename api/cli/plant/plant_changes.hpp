@@ -9,7 +9,7 @@
 
 namespace plchost {
 
-/// What an instance is, as its host tells it.
+/// The state of an instance, as its host tells it.
 struct PresentInstance {
   std::uint32_t state = 0;  ///< as InstanceStatus.state
   std::string scheduler;
@@ -26,8 +26,8 @@ struct PlantChange {
   std::string argument;
 };
 
-/// All of them, in the order in which they are done: what is to be stopped first, what is to run last. Some
-/// show only when others are done (a loaded application runs, and is to be stopped): look again after them.
+/// All of them, in the order in which they are done: stops first, starts last. Some show only when others are
+/// done (a loaded application runs, and is to be stopped): look again after them.
 [[nodiscard]] std::vector<PlantChange> changes_to(const WantedInstance& wanted,
                                                   const PresentInstance& present);
 

@@ -33,7 +33,7 @@ class PlantReader {
   std::vector<ConfigProblem> problems;
 
  private:
-  /// The tables of an array of tables; what is something else is a problem. `form`: how it is written.
+  /// The tables of an array of tables; anything else is a problem. `form`: how it is written.
   [[nodiscard]] std::vector<const TomlValue*> tables(const TomlTable& parent, std::string_view key,
                                                      std::string_view form, std::size_t most);
   void read_host(const TomlValue& value);
@@ -42,7 +42,7 @@ class PlantReader {
   std::set<std::string, std::less<>> hosts_;
 };
 
-/// A text that can be a name; what is no text was told already.
+/// A text that can be a name; another type was told already.
 void read_name(SectionReader& reader, std::string_view key, std::string& name, std::size_t most) {
   reader.text(key, name);
   if (!reader.has_text(key)) return;

@@ -9,7 +9,7 @@
 
 namespace plchost {
 
-/// What an instance is to be. Empty, or no value: as it is.
+/// The wanted state of an instance. Empty, or no value: as it is.
 struct WantedInstance {
   std::string name;
   unsigned line = 0;
@@ -25,7 +25,7 @@ struct WantedHost {
   std::vector<WantedInstance> instances;
 };
 
-/// How the hosts of a plant are to be: what `plcctl diff` and `plcctl apply` read.
+/// How the hosts of a plant are to be: the file of `plcctl diff` and `plcctl apply`.
 struct Plant {
   std::string file;
   std::vector<WantedHost> hosts;

@@ -114,7 +114,7 @@ std::vector<PlantFinding> HostWork::run(const dds::DomainOptions& options) {
 }
 
 bool HostWork::look_at_all() {
-  // It answers: what it shows comes, if not at once.
+  // It answers: its status comes, if not at once.
   const auto present = look_at(*client_, wanted_, MonotonicClock::now() + work_.command_patience);
   if (!present) {
     tell(Kind::unknown, nullptr, present.error().describe());

@@ -61,7 +61,7 @@ std::vector<PlotColumn> columns_of(const HistogramReport& histogram, Range range
   std::vector<PlotColumn> columns((range.size() + bars_each - 1) / bars_each);
   for (const auto& bar : histogram.bars) {
     const std::size_t index = kPlotBars.index_of(Duration(bar.lower_ns));
-    // What comes from the network may be in any order.
+    // Bars from the network may be in any order.
     if (index >= range.begin && index < range.end)
       columns[(index - range.begin) / bars_each].count += bar.count;
   }
@@ -77,7 +77,7 @@ std::vector<PlotColumn> columns_of(const HistogramReport& histogram, Range range
   return columns;
 }
 
-/// One line of bars: what of each reaches into the row, 0 (the lowest) to kHeight - 1.
+/// One line of bars: the part of each that reaches into the row, 0 (the lowest) to kHeight - 1.
 std::string row_of(const std::vector<PlotColumn>& columns, std::size_t row, std::uint64_t highest,
                    std::size_t column_width, bool unicode) {
   constexpr std::size_t kSteps = kEighths.size() - 1;

@@ -9,7 +9,7 @@
 
 namespace plchost {
 
-/// What a drawing has room for, and with which characters.
+/// The room of a drawing, and its characters.
 struct PlotStyle {
   std::size_t width = 80;  ///< of the terminal, in characters
   bool unicode = true;     ///< bars in eighths of a character; else '#' and '.'

@@ -8,7 +8,7 @@
 
 namespace plchost {
 
-/// A host as it was seen last; `clock`: what its clock says at present, if that is known.
+/// A host as it was seen last; `clock`: its present time, if that is known.
 [[nodiscard]] Row to_row(const HostView& host, const std::optional<ClockOffset>& clock);
 [[nodiscard]] const std::vector<Column>& host_columns();
 

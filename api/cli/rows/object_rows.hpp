@@ -17,9 +17,10 @@ namespace plchost {
 [[nodiscard]] Row to_short_row(std::string_view host, const ListedObject& object);
 [[nodiscard]] const std::vector<Column>& object_columns();
 
-/// What changes of an object, in words: "12 posts, registered, 1 tasks", "held by demo(4711), thread 4713".
+/// The changing part of an object, in words: "12 posts, registered, 1 tasks", "held by demo(4711), thread
+/// 4713".
 [[nodiscard]] std::string state_text(const ListedObject& object);
-/// Who has references on it: "plc-instance(4711), python3(88) and 5 more".
+/// The processes with references on it: "plc-instance(4711), python3(88) and 5 more".
 [[nodiscard]] std::string holders_text(const ObjectInfo& object, std::size_t most);
 
 /// All that is known of it, for people.

@@ -23,7 +23,7 @@ namespace plchost {
 [[nodiscard]] Row row_of_loaded(const std::string& host, const std::string& instance,
                                 const std::string& path);
 
-/// What a host tells beyond the fields that this program knows. A name that is taken stays what it is.
+/// The values of a host beyond the fields that this program knows. A name that is taken stays what it is.
 void add_extension(Row& row, std::span<const plc_KeyValue> entries);
 
 /// A time of a host in these rows, ISO 8601, UTC, to the millisecond: "2026-11-21T10:48:59.502Z". Empty for
@@ -35,7 +35,7 @@ void add_extension(Row& row, std::span<const plc_KeyValue> entries);
   return static_cast<double>(nanoseconds) / 1000.0;
 }
 
-/// What the tables show of them.
+/// The columns of the tables.
 [[nodiscard]] const std::vector<Column>& instance_columns();
 [[nodiscard]] const std::vector<Column>& task_columns();
 [[nodiscard]] const std::vector<Column>& event_columns();

@@ -13,8 +13,8 @@
 
 namespace plchost {
 
-/// One line of output: a flat object, fields in order, units in the field names. What --json shows; a table
-/// shows some of it.
+/// One line of output: a flat object, fields in order, units in the field names. The output of --json; a
+/// table shows some of it.
 using Row = nlohmann::ordered_json;
 
 /// A column of a table: which field, under which header, with how many decimals if it is a number with a
@@ -59,7 +59,7 @@ struct TableStyle {
 [[nodiscard]] std::string format_json(const std::vector<Row>& rows);
 
 /// Comma-separated values as in RFC 4180, but with plain line ends: a header with the names of all fields of
-/// the first row, then a line for each row. What is no plain value stands as JSON in its field.
+/// the first row, then a line for each row. A value that is not plain stands as JSON in its field.
 [[nodiscard]] std::string format_csv(const std::vector<Row>& rows);
 
 }  // namespace plchost

@@ -21,7 +21,7 @@ bool takes_long(std::int32_t operation) {
   return known != nullptr && known->takes_long;
 }
 
-// What a refusal does not say itself: the instance that was meant.
+// A refusal does not name the instance that was meant.
 std::string advice(CliSession& session, const HostOutcome& outcome, const std::string& instance) {
   if (outcome.reply->code != ErrorCode::not_found) return "";
   std::vector<std::string> names;

@@ -13,7 +13,7 @@ namespace plchost {
 inline constexpr Duration kLongCommand = std::chrono::seconds(80);
 
 /// Sends a command to the hosts that are meant and says what became of it at each; the exit code.
-/// `done`: what is said of the instance when it was done ("stopped").
+/// `done`: the word about the instance when it was done ("stopped").
 [[nodiscard]] int command(CliSession& session, const ApiRequest& request, std::string_view done = "done");
 
 /// The same for each instance of these names, one after the other. A name with '*' or '?' stands for all
@@ -21,7 +21,8 @@ inline constexpr Duration kLongCommand = std::chrono::seconds(80);
 [[nodiscard]] int command_each(CliSession& session, const std::vector<std::string>& names,
                                const ApiRequest& request, std::string_view done);
 
-/// Asks those hosts and says what became of it at each; the exit code. `instance`: what is asked about.
+/// Asks those hosts and says what became of it at each; the exit code. `instance`: the one that was asked
+/// for.
 [[nodiscard]] int ask_hosts(CliSession& session, const std::vector<std::string>& hosts,
                             const std::string& instance, const HostCall& call,
                             std::string_view done = "done");

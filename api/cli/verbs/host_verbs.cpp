@@ -9,7 +9,8 @@ namespace plchost {
 
 namespace {
 
-// Who does not answer that within a second is told without it; so is who may not ask.
+// A host that does not answer that within a second is shown without it. So is one that this client may not
+// ask.
 std::optional<ClockOffset> clock_of(CliSession& session, const HostView& host) {
   constexpr Duration kPatience = std::chrono::seconds(1);
   if (host.silent) return std::nullopt;

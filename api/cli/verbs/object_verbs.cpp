@@ -127,7 +127,7 @@ int show_object(CliSession& session, const std::string& name) {
   return kExitDone;
 }
 
-// One look of a watch: what is printed when it differs from the look before.
+// One look of a watch: printed when it differs from the look before.
 struct ObjectLook {
   Row row;  // as JSON, without the time
   std::string text;

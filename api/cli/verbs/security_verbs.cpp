@@ -20,7 +20,7 @@ using security::SecurityFolder;
 
 constexpr std::time_t kDay = 86'400;
 
-/// What is said behind the words, shared by the actions.
+/// The options behind the words, shared by the actions.
 struct Said {
   std::string directory = "/etc/plchost/security";
   std::string new_directory;  // of init: no variable of the environment stands for it

@@ -4,7 +4,7 @@
 
 namespace plchost {
 
-/// `plcctl security ...`: who may do what, as files. Speaks no DDS.
+/// `plcctl security ...`: the rights of each client, as files. Speaks no DDS.
 void add_security_verb(const Command& plcctl, CliSession& session);
 
 }  // namespace plchost

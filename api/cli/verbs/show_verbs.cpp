@@ -97,7 +97,7 @@ int show_statistics(CliSession& session, const plc_TaskStatus& task) {
     add_statistics(row, *report);
     return show_row(session, row);
   }
-  // What the statistics tell in more detail is left to them.
+  // The fields that the statistics tell in more detail are left to them.
   Row identity;
   for (const char* field :
        {"host", "instance", "task", "kind", "priority", "interval_us", "state", "external_event"}) {

@@ -13,17 +13,17 @@ class App;
 
 namespace plchost {
 
-/// The most that an option counts to: what is larger is a slip of the hand.
+/// The most that an option counts to: a larger number is a slip of the hand.
 inline constexpr std::uint64_t kMaxCount = 1'000'000'000'000;
 
 /// All that can be said on the command line.
 [[nodiscard]] Syntax syntax_of(const CLI::App& app);
 
-/// What plcctl does when all options are read; gives its exit code.
+/// The work of plcctl when all options are read; gives its exit code.
 using Action = std::function<int()>;
 
 /// A word of plcctl's command line and what may stand behind it. Set-up, until the command line is read.
-/// What options and arguments are written to must live until then: capture it by value, shared, in the
+/// The variables of options and arguments must exist until then: capture them by value, shared, in the
 /// action. (CLI11 is behind this, so that its headers are not compiled again for each verb.)
 class Command {
  public:
@@ -35,11 +35,11 @@ class Command {
   /// A noun below a verb, and what is done when it was chosen.
   Command noun(const char* name, const char* text, Action action) const;  // NOLINT(modernize-use-nodiscard)
 
-  /// What must follow; `form` is how the help shows it.
+  /// An argument that must follow; `form` is how the help shows it.
   const Command& argument(const char* form, std::string& value, const char* text = "") const;
   /// One or more of what must follow.
   const Command& arguments(const char* form, std::vector<std::string>& values, const char* text = "") const;
-  /// What may follow.
+  /// An argument that may follow.
   const Command& optional(const char* form, std::string& value, const char* text) const;
   /// Any number of what may follow.
   const Command& optional(const char* form, std::vector<std::string>& values, const char* text) const;

@@ -16,7 +16,7 @@ struct Candidate {
   bool operator==(const Candidate&) const = default;
 };
 
-/// What can stand in the place of the last word.
+/// The candidates for the place of the last word.
 struct Completion {
   std::vector<Candidate> candidates;  ///< that the command line itself knows
   std::string value;                  ///< else the form of a value, as "INSTANCE/EVENT" or "--host"
@@ -26,7 +26,7 @@ struct Completion {
 /// `words`: all behind the name of the program, the last one unfinished, maybe empty.
 [[nodiscard]] Completion complete(const Syntax& plcctl, std::span<const std::string> words);
 
-/// What a shell has to read so that it completes plcctl's command line. Nothing: no shell of that name.
+/// The script that a shell reads to complete plcctl's command line. Nothing: no shell of that name.
 [[nodiscard]] std::string_view completion_script(std::string_view shell);
 
 }  // namespace plchost

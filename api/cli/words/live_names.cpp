@@ -15,7 +15,7 @@ namespace plchost {
 
 namespace {
 
-// On the Tab key an answer is wanted at once; who has thousands of objects types a letter first.
+// On the Tab key an answer is wanted at once; with thousands of objects, type a letter first.
 constexpr std::size_t kMostObjects = 1000;
 
 using Names = std::vector<Candidate>;

@@ -8,8 +8,8 @@
 
 namespace plchost {
 
-/// What there is at present of a value of that form (Completion::value), of the hosts that are shown.
-/// Nothing: nobody answers, or values of that form have no names.
+/// The present values of that form (Completion::value), of the hosts that are shown. Nothing: nobody answers,
+/// or values of that form have no names.
 [[nodiscard]] std::vector<Candidate> live_names(CliSession& session, std::string_view form);
 
 }  // namespace plchost

@@ -20,7 +20,7 @@ std::string escaped(const std::string& text) {
       out += c;
     }
   }
-  // What begins so would be a request.
+  // A line that begins so would be a request.
   return out.starts_with('.') || out.starts_with('\'') ? "\\&" + out : out;
 }
 

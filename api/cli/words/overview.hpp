@@ -6,8 +6,8 @@
 
 namespace plchost {
 
-/// What may stand behind the words of `level`, a line for each: its words, or the nouns of each verb below
-/// the program itself. `said`: the words so far, "plcctl" or "plcctl list".
+/// The words that may stand behind those of `level`, a line for each: its words, or the nouns of each verb
+/// below the program itself. `said`: the words so far, "plcctl" or "plcctl list".
 [[nodiscard]] std::string overview(const Syntax& level, const std::string& said);
 
 }  // namespace plchost

@@ -9,7 +9,7 @@ namespace plchost {
 struct Syntax {
   struct Option {
     std::vector<std::string> names;  ///< "-h", "--help"
-    std::string value;               ///< what follows, as the help shows it; empty: nothing
+    std::string value;               ///< the arguments, as the help shows them; empty: none
     std::string text;
     std::string variable;  ///< of the environment, that stands for it; empty: none
   };

@@ -14,7 +14,7 @@ namespace {
 
 using namespace submessage_kind;
 
-// What is a vendor's own is skipped by all others.
+// A vendor's own submessages are skipped by all others.
 constexpr std::uint8_t kVendors = 0x80;
 
 // A sample of one of the two writers that speak in plain text: fields as all vendors lay them out, then what
@@ -156,9 +156,9 @@ bool turn_into_padding(std::span<std::byte> bytes) noexcept {
   return true;
 }
 
-// What the clients of a secured host say to it in plain text, too, though it must not believe it: Cyclone
-// 0.10.2 sends liveliness so whatever the governance says, and the end of a reader or writer, of which it has
-// forgotten that it was protected.
+// The samples that clients of a secured host send to it in plain text, too, though it must not believe them.
+// Cyclone 0.10.2 sends liveliness so under any governance. It also sends so the end of a reader or writer, of
+// which it has forgotten that it was protected.
 bool is_said_in_vain(const Submessage& submessage) noexcept {
   constexpr std::array kWriters{kPublicationsWriter, kSubscriptionsWriter, kLivelinessWriter};
   return submessage.kind() == kData && submessage.bytes.size() >= kInlineQosCount + 2 + kDataFields &&

@@ -6,16 +6,16 @@
 
 namespace plchost::dds {
 
-/// What Cyclone gets of a datagram.
+/// The part of a datagram that Cyclone gets.
 enum class Admission : std::uint8_t {
   refused,  ///< nothing
   cut,      ///< all but submessages that are not admitted: these are padding now
-  whole,    ///< all; what clients say in vain in plain text is a gap now
+  whole,    ///< all; plain-text samples of clients, which are ignored, are gaps now
 };
 
 /// Decides what of a datagram may reach Cyclone's parser. 0.10.2 can be crashed by packets that nobody had to
 /// authenticate. The gate refuses a datagram:
-/// - whose submessages do not fill it exactly, whatever is in them;
+/// - with submessages that do not fill it exactly, whatever is in them;
 /// - that does not say which participant a part of it is of;
 /// - of which nothing would be left.
 /// Of all others it takes out single submessages, in place:
@@ -23,15 +23,14 @@ enum class Admission : std::uint8_t {
 /// - samples whose fields are not where all vendors put them, or that have neither contents nor a key, where
 ///   Cyclone takes an offset from them unchecked;
 /// - in the handshake's messages a key where contents must be (a null pointer in Cyclone);
-/// - of a secured host: all that is in plain text and is not what is said before there are keys. Samples of
-/// the
+/// - of a secured host: all that is in plain text, but for the messages before there are keys. Samples of the
 ///   writers of discovery and liveliness are replaced by a gap, because Cyclone sends some of them in plain
 ///   text;
 /// - of an unsecured host: samples of all builtin writers but those of discovery and liveliness, and these
 ///   in fragments (Cyclone copies what one fragment has into the memory that another one asked for).
-/// What passes at an unsecured host has its parameters cut down to those that the host needs, in place: see
-/// filter_parameters(). A message that is signed or encrypted as a whole is judged by its outer form only.
-/// What passes in fragments of a handshake goes through HandshakeAssembly.
+/// At an unsecured host the parameters of a datagram that passes are cut down to those that the host needs,
+/// in place: see filter_parameters(). A message that is signed or encrypted as a whole is judged by its outer
+/// form only. Fragments of a handshake that pass go through HandshakeAssembly.
 [[nodiscard]] Admission admit(std::span<std::byte> datagram, bool secured) noexcept;
 
 }  // namespace plchost::dds

@@ -35,7 +35,8 @@ constexpr std::uint16_t kKeyHash = 0x0070;
 constexpr std::uint16_t kStatusInfo = 0x0071;
 /// A reader that does not know the parameter has to refuse the whole list: Cyclone does so without parsing.
 constexpr std::uint16_t kMustBeKnown = 0x4000;
-/// Each vendor gives these numbers a meaning of its own: what is not of Cyclone's form is another vendor's.
+/// Each vendor gives these numbers a meaning of its own: a parameter that is not of Cyclone's form is another
+/// vendor's.
 constexpr std::uint16_t kOfAVendor = 0x8000;
 
 constexpr std::array kRules{

@@ -7,9 +7,9 @@
 namespace plchost::dds {
 
 enum class ParameterList : std::uint8_t {
-  discovery,          ///< what a participant says of itself and of its readers and writers
+  discovery,          ///< a participant's data about itself and about its readers and writers
   secured_discovery,  ///< the same with its tokens, of a secured host
-  inline_qos,         ///< what stands in front of the contents of a sample
+  inline_qos,         ///< the parameters in front of the contents of a sample
 };
 
 /// Keeps of a list of parameters what this host needs, and only in the exact form that it has: sizes, and

@@ -13,9 +13,9 @@
 namespace plchost::dds {
 
 /// Remembers from which port of this machine each participant sends, so that no other process speaks in its
-/// name: an unsecured host cannot tell a forged message otherwise, and one heartbeat with a number that is
-/// too high makes Cyclone drop all that the real sender says from then on. The first datagram of a
-/// participant decides. It is forgotten kForgotten after its last datagram.
+/// name. An unsecured host cannot tell a forged message otherwise. One heartbeat with a number that is too
+/// high makes Cyclone drop all later samples of the real sender. The first datagram of a participant decides.
+/// It is forgotten kForgotten after its last datagram.
 ///
 /// Bounded: of more than kSets * kWays participants, the one that has been silent for longest goes, and one
 /// that was heard only once goes before all that were heard again. One thread.

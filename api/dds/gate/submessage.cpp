@@ -6,7 +6,7 @@ namespace {
 
 constexpr std::size_t kEndOfParameters = 1;
 
-/// What is behind a list of parameters; nothing: it does not end, or has a part that does not fit.
+/// The bytes behind a list of parameters; nothing: it does not end, or has a part that does not fit.
 std::span<const std::byte> behind_parameters(std::span<const std::byte> rest, bool little) noexcept {
   constexpr std::size_t kParameterHeader = 4;
   while (rest.size() >= kParameterHeader) {

@@ -46,7 +46,7 @@ inline constexpr std::size_t kSampleNumber = kSubmessageHeader + 12;
 /// All that stands between that count and the inline QoS.
 inline constexpr std::size_t kDataFields = 16;
 inline constexpr std::size_t kFragmentFields = 28;
-/// What contents begin with.
+/// The beginning of contents.
 inline constexpr std::size_t kEncapsulation = 4;
 
 using EntityId = std::array<std::uint8_t, 4>;
@@ -57,7 +57,7 @@ inline constexpr EntityId kSubscriptionsWriter{0x00, 0x00, 0x04, 0xc2};
 inline constexpr EntityId kLivelinessWriter{0x00, 0x02, 0x00, 0xc2};
 /// In the last octet of an entity of the standard's own.
 inline constexpr std::uint8_t kBuiltinEntity = 0xc0;
-/// In the header of a message: who sends it.
+/// In the header of a message: its sender.
 inline constexpr std::size_t kGuidPrefixAt = 8;
 inline constexpr std::size_t kGuidPrefix = 12;
 
@@ -130,8 +130,8 @@ template <class Predicate>
 /// all vendors put them.
 [[nodiscard]] std::size_t fields_of_sample(const Submessage& sample) noexcept;
 
-/// What a sample says, behind its inline QoS. Empty: its fields are not where all vendors put them, or there
-/// is nothing.
+/// The contents of a sample, behind its inline QoS. Empty: its fields are not where all vendors put them, or
+/// there is nothing.
 [[nodiscard]] std::span<const std::byte> contents_of_sample(const Submessage& sample) noexcept;
 
 }  // namespace plchost::dds

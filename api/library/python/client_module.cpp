@@ -51,7 +51,7 @@ Clients& clients() {
   return all;
 }
 
-// What waits for a callback when it ends must let that callback have Python.
+// A destructor that waits for a callback must let that callback have Python.
 struct DeleteWithoutGil {
   template <class T>
   void operator()(T* object) const {
@@ -67,7 +67,7 @@ double seconds(std::chrono::nanoseconds duration) {
   return std::chrono::duration<double>(duration).count();
 }
 
-// What a callback raises cannot go to anyone: Python writes it to stderr, as for threads.
+// An exception of a callback has no receiver: Python writes it to stderr, as for threads.
 template <class Item>
 std::function<void(const Item&)> guarded(py::function callback) {
   // The last reference may go on a thread of the library.

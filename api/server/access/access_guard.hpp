@@ -10,9 +10,9 @@
 
 namespace plchost {
 
-/// Who wrote a sample, and whether he may: the check behind that of DDS Security, which keeps a sample from
-/// being written at all. It rests on the writer's GUID, which begins as the handshake has proved (see
-/// KnownIdentities). Any thread.
+/// The writer of a sample, and its right to write it: the check behind that of DDS Security, which keeps a
+/// sample from being written at all. It rests on the writer's GUID, which begins as the handshake has proved
+/// (see KnownIdentities). Any thread.
 class AccessGuard {
  public:
   /// Of an unsecured host: nobody is known, everybody may do all.
@@ -26,7 +26,7 @@ class AccessGuard {
   /// refused: that entity's identity has not the role that it takes; the text is for who asked.
   [[nodiscard]] Result<void> check(const dds::Guid& entity, security::Role needed) const;
 
-  /// What the folder knows now. Of a secured host.
+  /// The present identities of the folder. Of a secured host.
   void replace(security::KnownIdentities known);
 
  private:

@@ -6,13 +6,14 @@
 namespace plchost {
 
 /// Sees that the folder of the host's identity has changed. Looks at its files' names, times and sizes, at
-/// most some thousand; what was copied there file by file counts when all is quiet. Control loop only.
+/// most some thousand; files that are copied there one by one count when all is quiet. Control loop only.
 class IdentityWatch {
  public:
   enum class Change : std::uint8_t {
     none,
     known,     ///< the certificates of others: to be read again
-    identity,  ///< what DDS has loaded, the list of revoked certificates included: takes a fresh process
+    identity,  ///< the files that DDS has loaded, the list of revoked certificates included: takes a fresh
+               ///< process
   };
 
   explicit IdentityWatch(std::string folder);

@@ -49,7 +49,7 @@ bool may_pass(std::span<std::byte> datagram, bool secured, const msghdr& message
   });
 }
 
-// What DDS gets instead of a datagram; 0: nothing.
+// The length that DDS gets of a datagram; 0: nothing.
 std::size_t let_pass(std::span<std::byte> buffer, std::size_t size, bool secured, const msghdr& message) {
   // DDS receives with one thread, but does not promise it.
   static std::mutex mutex;

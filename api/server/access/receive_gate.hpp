@@ -5,9 +5,9 @@
 namespace plchost {
 
 /// Puts dds::admit() in front of DDS, of a secured host also dds::HandshakeAssembly, of an unsecured one
-/// dds::SourceTable: all datagrams that this process receives over IP with recvmsg() go through them, and
-/// those that are refused, or say nothing any more, are made so short that DDS drops them without a look.
-/// Only the program plchost-dds has it. Before the domain is made.
+/// dds::SourceTable. All datagrams that this process receives over IP with recvmsg() go through them. Those
+/// that are refused, or have no contents any more, are made so short that DDS drops them without a look. Only
+/// the program plchost-dds has it. Before the domain is made.
 void close_receive_gate(bool secured) noexcept;
 
 /// How many datagrams it has refused, whole or in part.

@@ -20,7 +20,8 @@ namespace plchost {
 
 namespace {
 
-// As many requests can be under way at the manager, many times over: what is not answered is forgotten.
+// Many times the requests that can be under way at the manager: those beyond it without an answer are
+// forgotten.
 constexpr std::size_t kMostUnderWay = 1024;
 constexpr std::size_t kMostSources = 1024;
 

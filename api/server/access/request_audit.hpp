@@ -17,16 +17,17 @@
 
 namespace plchost {
 
-/// What clients change, in the audit log: each request that changes something and was not refused, with its
-/// answer; and for each source of posts to which events how many were taken, at its first, then at most once
-/// in kPostPeriod. Requests and posts that were refused go into a log of their own, so that they never push
-/// out what was done: the first one of a client, then once in kRefusedPeriod how many. Control loop only.
+/// The changes by clients, in the audit log: each request that changes something and was not refused, with
+/// its answer. For each source of posts it has the events and how many posts were taken, at its first, then
+/// at most once in kPostPeriod. Requests and posts that were refused go into a log of their own, so that they
+/// never push out what was done: the first one of a client, then once in kRefusedPeriod how many. Control
+/// loop only.
 class RequestAudit {
  public:
   static constexpr Duration kPostPeriod = std::chrono::seconds(60);
   static constexpr Duration kRefusedPeriod = std::chrono::seconds(1);
 
-  /// Who a client is, for the record's `who` and `from`. By its participant.
+  /// The identity of a client, for the record's `who` and `from`. By its participant.
   using Describe = std::function<void(const dds::Guid& client, AuditRecord& record)>;
 
   /// Of more clients that are refused at a time, the requests are told together.
@@ -45,12 +46,12 @@ class RequestAudit {
   void asked(const dds::Guid& client, const plc_Request& request);
   /// Before it is given to who does it, which takes a while.
   void handed_on(const plc_SampleIdentity& identity);
-  /// Before its answer is sent, which is when the ticket is written: what was acknowledged is in the log.
+  /// Before its answer is sent, which is when the ticket is written: an acknowledged change is in the log.
   [[nodiscard]] AuditWriter::Ticket answered(const plc_SampleIdentity& identity, ErrorCode code,
                                              std::string_view text, TimePoint now);
   /// Of one that is refused before it is looked at.
   void refused(const dds::Guid& client, const plc_Request& request, const Error& error, TimePoint now);
-  /// What the acknowledgement tells of its source.
+  /// The acknowledgement's data about its source.
   void posted(const plc_EventAck& ack, TimePoint now);
   /// To which events. Before posted().
   void posted_to(const PostedEvents::BySource& events, TimePoint now);

@@ -25,7 +25,7 @@ struct DownloadProgress {
   std::uint64_t received = 0;
 };
 
-/// A download that is no more, and why; who asked for it is to be told.
+/// A download that is no more, and why; its client is to be told.
 struct DownloadEnd {
   dds::Guid client;
   plc_SampleIdentity identity{};
@@ -39,10 +39,10 @@ struct CompleteDownload {
   ControlRequest request;
 };
 
-/// The applications that are on their way to this host. What has come of each lies in shared memory, not on a
-/// disk that could make this thread wait, and nobody trusts it: the manager's helper checks the digest of
-/// what it copies. A piece is taken when it begins where the one before has ended, from the client that asked
-/// for the download, and else not at all. Control loop only.
+/// The applications that are on their way to this host. The pieces of each lie in shared memory, not on a
+/// disk that could make this thread wait. They are not trusted: the manager's helper checks the digest of its
+/// copy. A piece is taken when it begins where the one before has ended, from the client that asked for the
+/// download, and else not at all. Control loop only.
 class DownloadTable {
  public:
   static constexpr std::size_t kMost = 4;

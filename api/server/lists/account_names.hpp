@@ -6,8 +6,8 @@
 
 namespace plchost {
 
-/// The name of a user or group on this host; empty: it knows none. What was looked up once is remembered, for
-/// at most 256 of each. Control loop only.
+/// The name of a user or group on this host; empty: it knows none. Names that were looked up once are
+/// remembered, for at most 256 of each. Control loop only.
 [[nodiscard]] const std::string& user_name(uid_t user);
 [[nodiscard]] const std::string& group_name(gid_t group);
 

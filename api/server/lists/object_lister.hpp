@@ -12,9 +12,9 @@
 
 namespace plchost {
 
-/// Lists the objects of a pool for clients, page by page. A look at a large pool costs: what it has shown is
-/// used for some time, so that however many clients ask, less than a fifth of the time goes into looks.
-/// Control loop only.
+/// Lists the objects of a pool for clients, page by page. A look at a large pool takes time: its result is
+/// used for some time. So less than a fifth of the time goes into looks, however many clients ask. Control
+/// loop only.
 class ObjectLister {
  public:
   explicit ObjectLister(const ObjectPool& pool) noexcept : pool_(&pool) {}

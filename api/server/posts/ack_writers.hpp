@@ -20,8 +20,8 @@ namespace plchost {
 /// never wait for a reader. Any thread.
 ///
 /// DDS keeps the last acknowledgement of each source for readers that come late. Of more than kMostSources of
-/// one client, the one that posted least recently is unregistered, so that a client that makes a writer for
-/// each post takes no more memory than others.
+/// one client, the one that posted least recently is unregistered. So a client that makes a writer for each
+/// post takes no more memory than others.
 class AckWriters {
  public:
   static constexpr std::size_t kMostSources = 64;

@@ -138,8 +138,8 @@ void EventIntake::process_locked(const Post& post) {
   now_ = MonotonicClock::now();
   LedgerEntry& entry = ledger_.entry_for(source, now_.time_since_epoch().count());
   SourceState state = entry.state();
-  // The source waits for nothing before its base any more: what has not come of that is lost. A ledger that
-  // does not know the source starts there.
+  // The source waits for nothing before its base any more: posts before it that have not come are lost. A
+  // ledger that does not know the source starts there.
   if (const std::uint64_t before = post.base_sequence - 1; state.last < before) {
     const bool known = state.counters.received > state.counters.malformed;
     if (known) state.counters.lost += before - state.last;

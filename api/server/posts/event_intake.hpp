@@ -76,7 +76,7 @@ class EventIntake {
   /// The posts since the last call whose runs are waited for.
   [[nodiscard]] std::vector<AwaitedPost> collect_awaited();
 
-  /// What became of the posts of one source.
+  /// The fate of the posts of one source.
   struct Writer {
     dds::Guid source;  ///< all zero: of all sources together
     PostCounters counters;
@@ -94,7 +94,7 @@ class EventIntake {
   static constexpr std::size_t kMaxAwaited = 1024;
 
  private:
-  /// What the client wants to know of its post.
+  /// The client's questions about its post.
   struct Wanted {
     bool run = false;       ///< its end
     bool late_ack = false;  ///< its acknowledgement, but not at once

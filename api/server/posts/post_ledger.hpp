@@ -18,7 +18,7 @@
 
 namespace plchost {
 
-/// What is kept of one source of posts. In shared memory; all zero is a free entry.
+/// The record of one source of posts. In shared memory; all zero is a free entry.
 struct LedgerEntry {
   std::array<std::uint8_t, 16> source{};
   std::atomic<std::uint32_t> in_use{0};  ///< written last
@@ -32,7 +32,7 @@ struct LedgerEntry {
 /// The greatest number of a post. Beyond it the numbers would come to an end, where no post is the next one.
 inline constexpr std::uint64_t kMaxPostNumber = ~std::uint64_t{0} >> 1U;
 
-/// What a post's number says, seen from the last one that is done.
+/// The meaning of a post's number, seen from the last one that is done.
 enum class PostOrder : std::uint8_t {
   next,       ///< do it
   duplicate,  ///< done before: acknowledge again
@@ -45,10 +45,10 @@ enum class PostOrder : std::uint8_t {
 
 inline constexpr std::uint32_t kLedgerEntries = 1024;
 
-/// How far each source of posts has come, in a shared memory of its own ("POOL.posts"), so that the
-/// plchost-dds after a killed one neither loses nor repeats a post, whichever instruction the kill hits
-/// (PostIntent says how). One process at a time: it holds the ledger's mutex. Used by one thread at a time;
-/// opened and destroyed by the same one.
+/// How far each source of posts has come, in a shared memory of its own ("POOL.posts"). So the plchost-dds
+/// after a killed one neither loses nor repeats a post, whichever instruction the kill hits (PostIntent says
+/// how). One process at a time: it holds the ledger's mutex. Used by one thread at a time; opened and
+/// destroyed by the same one.
 class PostLedger {
  public:
   /// Opens the ledger of a pool, or makes it anew if there is none or it is of another version. Does what a
@@ -68,7 +68,7 @@ class PostLedger {
   /// The same, of a source that is known; null: it is not.
   [[nodiscard]] const LedgerEntry* find(const dds::Guid& source) const;
 
-  /// What is kept of the source is this from now on. The entry is one of this ledger.
+  /// This is the record of the source from now on. The entry is one of this ledger.
   void set(LedgerEntry& entry, const SourceState& state) noexcept;
 
   /// Which event may be posted to.

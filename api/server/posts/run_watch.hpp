@@ -35,7 +35,7 @@ class RunWatch {
   RunWatch(std::string host, std::uint64_t epoch) : host_(std::move(host)), epoch_(epoch) {}
 
   void add(const AwaitedPost& post, const TaskWatch& tasks);
-  /// What is decided by now.
+  /// The present decisions.
   [[nodiscard]] std::vector<plc_EventRun> look(const TaskWatch& tasks, TimePoint now);
   [[nodiscard]] bool empty() const noexcept { return waits_.empty(); }
 
@@ -50,7 +50,7 @@ class RunWatch {
     plc_EventRun result{};
     TimePoint received;
     std::vector<Run> runs;
-    std::vector<Target> unknown;  // whose tasks are not seen yet
+    std::vector<Target> unknown;  // without a sight of its tasks yet
     bool decided = false;
   };
   void find_tasks(Wait& wait, const TaskWatch& tasks);
@@ -61,7 +61,7 @@ class RunWatch {
 
   std::string host_;
   std::uint64_t epoch_;
-  std::list<Wait> waits_;                                // who was looked at last is last
+  std::list<Wait> waits_;                                // the one that was looked at last is last
   std::set<std::pair<dds::Guid, std::uint64_t>> known_;  // source and number of each
   std::unordered_map<dds::Guid, std::size_t, dds::GuidHash> of_client_;
   std::size_t runs_ = 0;  // of all, with targets that are not known yet

@@ -11,7 +11,8 @@ namespace plchost {
 
 namespace {
 
-// Clocks of file systems are coarse: what was changed so recently may change again within the same time.
+// Clocks of file systems are coarse: a file that was changed so recently may change again within the same
+// time.
 constexpr std::int64_t kSettled = 1'000'000'000;
 
 // 0: there is none.

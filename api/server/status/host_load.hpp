@@ -10,7 +10,7 @@
 
 namespace plchost {
 
-/// What /proc/loadavg says of the last minute, as it stands there; empty: that cannot be read from it.
+/// The load of the last minute, as it stands in /proc/loadavg; empty: it cannot be read from that.
 [[nodiscard]] std::string load_average(std::string_view text);
 /// A line of /proc/meminfo ("MemAvailable"), in MiB; empty: there is none.
 [[nodiscard]] std::string memory_mib(std::string_view text, std::string_view name);

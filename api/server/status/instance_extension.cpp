@@ -17,7 +17,7 @@ namespace {
 constexpr std::array<std::string_view, 6> kClockStates = {"off",    "free running", "acquiring",
                                                           "locked", "hold-over",    "measured, not steered"};
 
-// What moves by a little with each look would make each look news.
+// A value that moves by a little with each look would make each look news.
 std::int64_t to_hundreds(std::int64_t value) noexcept {
   constexpr std::int64_t kHundred = 100;
   return (value + (value < 0 ? -kHundred / 2 : kHundred / 2)) / kHundred * kHundred;

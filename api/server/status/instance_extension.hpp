@@ -10,8 +10,8 @@
 
 namespace plchost {
 
-/// What an instance says of itself beyond the fields of plc_InstanceStatus: entries of its ext, in this
-/// order. At most 15; what is not in use has none.
+/// An instance's status beyond the fields of plc_InstanceStatus: entries of its ext, in this order. At most
+/// 15; a feature that is not in use has none.
 ///
 ///   tick_source    where the periodic tick comes from
 ///   tick_fallback  why that is not the source that the settings ask for
@@ -19,8 +19,8 @@ namespace plchost {
 ///   clock_...      the distributed clock as the cyclic task of the highest priority sees it: name of its
 ///                  record, state, in sync, offset and drift (to the nearest hundred), corrections, pairs
 [[nodiscard]] std::vector<plc_KeyValue> extension_of(const InstanceRuntime& runtime);
-/// InstanceStatus.problem: what the manager says, and what only the process knows. `runtime`: of any process
-/// of it, or null.
+/// InstanceStatus.problem: the manager's text, and the one that only the process knows. `runtime`: of any
+/// process of it, or null.
 [[nodiscard]] std::string problem_of_instance(const InstanceStatus& status, const InstanceRuntime* runtime);
 
 /// One more entry, see dds::kTransitionsEntry.

@@ -14,7 +14,7 @@ namespace plchost {
 /// Writes the topic of task statistics from the instances' pages. Control loop only.
 class StatisticsWriter {
  public:
-  /// What of one task was told last.
+  /// The last published statistics of one task.
   struct Told {
     std::string task;            ///< empty: nothing yet
     std::uint64_t sequence = 0;  ///< of the page's counters then
@@ -29,9 +29,9 @@ class StatisticsWriter {
   StatisticsWriter(std::string host, std::uint64_t epoch, dds::Entity writer)
       : host_(std::move(host)), epoch_(epoch), writer_(std::move(writer)) {}
 
-  /// Writes task `index` of `page` if there is news since `told`, and takes that down in it. What the writer
-  /// refuses stays news. The cost is that of reading the buckets of what was recorded, up to 360 KB; false:
-  /// there was no news, and no such cost.
+  /// Writes task `index` of `page` if there is news since `told`, and takes that down in it. A sample that
+  /// the writer refuses stays news. The cost is that of reading the buckets of what was recorded, up to 360
+  /// KB; false: there was no news, and no such cost.
   bool write(const std::string& instance, const InstancePageReader& page, std::uint32_t index, Told& told);
 
   /// The task is gone.

@@ -187,7 +187,7 @@ Result<std::vector<ObjectInfo>> StatusPublisher::published_objects() const {
 bool StatusPublisher::look_at_objects(TimePoint now) {
   bool changed = false;
   const auto published = published_objects();
-  if (!published) return changed;  // what was told last holds until they can be looked at
+  if (!published) return changed;  // the last published state holds until they can be looked at
   events_.begin_round();
   objects_.begin_round();
   for (const ObjectInfo& object : *published) {

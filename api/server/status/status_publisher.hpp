@@ -45,14 +45,14 @@ class StatusPublisher {
   /// for others.
   [[nodiscard]] bool may_flush(TimePoint now) const noexcept { return now >= rested_; }
   void write_presence();
-  /// What became of each client's posts, if it is time to look at that. Comes before tick().
+  /// The fate of each client's posts, if it is time to look at that. Comes before tick().
   void look_at_writers(const EventIntake& intake, const SessionTable& sessions, TimePoint now);
   /// All findings of one check of the host, in place of those of the one before.
   void publish_findings(const std::vector<HostFinding>& findings);
 
   /// For who wants to know later that nothing was cut off the audit log.
   void set_audit(std::string head, std::string_view problem);
-  /// Who else uses the name of this host, for people; empty: nobody.
+  /// Another host that uses the name of this one, for people; empty: none.
   void set_rival(std::string rival);
 
   [[nodiscard]] const TaskWatch& tasks() const noexcept { return tasks_; }

@@ -17,9 +17,8 @@
 
 namespace plchost {
 
-/// What one status topic shows at present, and what of it has still to be written. Samples are compared as
-/// bytes, so they must be zero-initialised before they are filled; what goes into their ext comes beside
-/// them.
+/// The present samples of one status topic, and those that have still to be written. Samples are compared as
+/// bytes, so they must be zero-initialised before they are filled; the entries of their ext come beside them.
 template <class Sample>
   requires std::is_trivially_copyable_v<Sample>
 class StatusTable {
@@ -64,7 +63,8 @@ class StatusTable {
     return any;
   }
 
-  /// Writes what is not written, at most `budget` samples. What a writer refuses stays for the next time.
+  /// Writes what is not written, at most `budget` samples. A sample that a writer refuses stays for the next
+  /// time.
   void write(std::size_t budget = SIZE_MAX) {
     for (auto& [key, entry] : entries_) {
       if (!entry.unwritten) continue;

@@ -41,8 +41,8 @@ class TaskWatch {
         table_(std::move(table)),
         statistics_(std::move(statistics)) {}
 
-  /// What the manager says of an instance: opens its page when there is a new process, and forgets the tasks
-  /// of one that is gone. Returns true if tasks came or went.
+  /// Takes the manager's report of an instance: opens its page when there is a new process, and forgets the
+  /// tasks of one that is gone. Returns true if tasks came or went.
   bool follow(const InstanceStatus& instance, TimePoint now);
   bool forget(const std::string& instance);
 
@@ -65,7 +65,7 @@ class TaskWatch {
   [[nodiscard]] const InstancePageReader* page_of(const BoundTask& task) const;
 
   [[nodiscard]] std::uint32_t size() const noexcept { return table_.size(); }
-  /// What the process itself says, if its page is open.
+  /// The report of the process itself, if its page is open.
   [[nodiscard]] std::optional<InstanceRuntime> runtime(const std::string& instance) const;
   /// The process that runs now has this task in exception.
   [[nodiscard]] bool in_exception(const std::string& instance, std::string_view task) const;

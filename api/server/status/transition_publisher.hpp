@@ -25,8 +25,8 @@ class TransitionPublisher {
   [[nodiscard]] static Result<TransitionPublisher> create(dds_entity_t participant, dds_entity_t publisher,
                                                           Source source);
 
-  /// Writes what is new of this instance; the number of the last one that was written, 0: none. What DDS does
-  /// not take comes first the next time.
+  /// Writes what is new of this instance; the number of the last one that was written, 0: none. A transition
+  /// that DDS does not take comes first the next time.
   std::uint64_t publish(const std::string& instance, TimePoint now);
   /// There is no such instance any more; another one of that name has another ring.
   void forget(const std::string& instance) { followed_.erase(instance); }
