@@ -279,7 +279,8 @@ void Manager::look_after_pool() {
   if (!found.lost || pool_lost_) return;
   pool_lost_ = true;
   spdlog::error(
-      "pool '{}': another program has cut its file in {} short; what instances share is lost: stop this "
+      "pool '{}': another program has cut its file in {} short; the instances' shared objects are lost: stop "
+      "this "
       "manager, which removes it, and start it again",
       config_.host.pool, MemoryFile::kDirectory);
 }

@@ -119,7 +119,7 @@ Result<void> AuditLog::find_end(const std::string& path) {
     end = before;
   }
   return write(
-      of_the_log("repair", fmt::format("what stands before was not complete, or changed; goes on after "
+      of_the_log("repair", fmt::format("the records before were not complete, or changed; goes on after "
                                        "record {}",
                                        head_.number)));
 }

@@ -141,7 +141,7 @@ void AuditWriter::do_job(const Job& job) {
     case Kind::add_pending:
       if (!logs_.pending) return;
       if (const auto added = logs_.pending->add(job.key, job.record); !added) {
-        spdlog::error("what is under way is not recorded: {}", added.error().describe());
+        spdlog::error("commands under way are not recorded: {}", added.error().describe());
       }
       return;
     case Kind::remove_pending:

@@ -39,7 +39,7 @@ void add_options(CLI::App& app, plchost::CliOptions& options) {
   constexpr double kMinTimeout = 0.1;
   constexpr double kMaxTimeout = 3600;
   app.add_option("--timeout", options.timeout_s,
-                 "seconds to wait for an answer (default 3; what ends a cycle or a process: 80)")
+                 "seconds to wait for an answer (default 3; commands that end a cycle or a process: 80)")
       ->check(CLI::Range(kMinTimeout, kMaxTimeout))
       ->take_last();
   app.add_option_function<std::string>(

@@ -57,7 +57,7 @@ Result<Listing> ControlClient::ask_for_page(PageReader& pages, const dds::TopicI
     if (MonotonicClock::now() >= deadline) break;
   }
   return failure(ErrorCode::timed_out,
-                 fmt::format("what was asked of host '{}' has not come ({})", request.host, topic.name));
+                 fmt::format("the answer of host '{}' has not come ({})", request.host, topic.name));
 }
 
 Result<ObjectListing> ControlClient::list_objects(const std::string& host, const ObjectQuery& query,

@@ -76,9 +76,9 @@ Result<ApiReply> RequestCaller::call(const ApiRequest& request, dds_entity_t rep
     if (meanwhile) wait = meanwhile(sample.header.request_identity, now);
     wait_set.wait(std::min({wait.deadline, wait.next, std::max(next_write, now + kFirstRepeat)}));
   }
-  return failure(
-      ErrorCode::timed_out,
-      fmt::format("host '{}' has not answered; what it has not begun by now it does not do", request.host));
+  return failure(ErrorCode::timed_out,
+                 fmt::format("host '{}' has not answered; if it has not begun the command, it never will",
+                             request.host));
 }
 
 }  // namespace plchost

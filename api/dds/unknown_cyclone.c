@@ -10,7 +10,7 @@
 static const plc_InstancePin kNoPin = {NULL, NULL, 0};
 
 const char* plc_unknown_cyclone(void) {
-  return "plchost was built with Cyclone DDS " DDS_VERSION ", whose internals it does not know";
+  return "plchost was built with Cyclone DDS " DDS_VERSION " with internals that it does not know";
 }
 
 plc_InstancePin plc_pin_instance(dds_entity_t writer, const void* sample) {

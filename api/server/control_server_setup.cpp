@@ -184,7 +184,8 @@ Result<void> ControlServer::Parts::enter_domain() {
     }
     if (!identity_watch) spdlog::info("unsecured, therefore on the loopback interface only");
   } else if (!identity_watch) {
-    spdlog::warn("unsecured, and not on the loopback interface only: who reaches it controls this host");
+    spdlog::warn(
+        "unsecured, and not on the loopback interface only: any program that reaches it controls this host");
   }
   return {};
 }

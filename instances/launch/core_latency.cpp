@@ -116,7 +116,7 @@ std::string restore(const std::string& sysfs, const std::string& run_directory, 
     // Kept for somebody with the right to write it.
     if (!written) return done;
   } else if (!before || !before->empty()) {
-    done = fmt::format("core {}: what was in {} before is not known: {} is spoilt", core, file, path);
+    done = fmt::format("core {}: the former value of {} is not known: {} is spoilt", core, file, path);
   }  // An empty record was begun, and nothing was changed yet.
   ::unlink(path.c_str());
   return done;

@@ -27,8 +27,8 @@ HostFinding judge(const CheckedHost& host, const std::vector<int>& has, FindingL
 HostFinding isolated_cores(const CheckedHost& host) {
   constexpr auto kWhat = "isolated";
   constexpr auto kWhy =
-      "any program may be put there; what it leaves in caches and what it keeps the kernel busy with "
-      "delays cycles";
+      "any program may be put there; it fills the caches and keeps the kernel busy, which delays "
+      "cycles";
   const auto cores = isolated(host.files);
   if (!cores) return unknown("isolated cores", cores.error(), kWhy);
   return judge(host, *cores, FindingLevel::warning, kWhat, kWhy,
@@ -73,7 +73,7 @@ HostFinding rcu_callbacks(const CheckedHost& host) {
 HostFinding siblings(const CheckedHost& host) {
   constexpr auto kSubject = "hyper-thread siblings";
   constexpr auto kWhy =
-      "both share one core's arithmetic units and caches: what one runs slows the other down";
+      "both share one core's arithmetic units and caches: each program on one slows the other down";
   constexpr std::size_t kPairsShown = 3;
   const auto cores = plc_cores(host);
   const auto quiet = isolated(host.files);

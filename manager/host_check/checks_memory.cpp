@@ -27,7 +27,8 @@ HostFinding judge(const CheckedHost& host, const Switch& which) {
 HostFinding swap(const CheckedHost& host) {
   constexpr auto kSubject = "swap";
   constexpr auto kWhy =
-      "instances are locked in memory; what else is written out and read again keeps disk and kernel busy";
+      "instances are locked in memory; other memory that is written out and read again keeps disk and kernel "
+      "busy";
   const auto text = host.files.text("/proc/swaps");
   if (!text) return unknown(kSubject, text.error(), kWhy);
   std::istringstream lines(*text);
@@ -46,7 +47,8 @@ HostFinding huge_pages(const CheckedHost& host) {
   const std::string path = "/sys/kernel/mm/transparent_hugepage/enabled";
   constexpr auto kSubject = "transparent huge pages";
   constexpr auto kWhy =
-      "the kernel rearranges the memory of running programs into huge pages; who touches it then waits";
+      "the kernel rearranges the memory of running programs into huge pages; a thread that touches it then "
+      "waits";
   if (!host.files.exists("/sys/kernel/mm/transparent_hugepage") && host.files.exists("/sys/kernel/mm")) {
     return finding(FindingLevel::ok, kSubject, "the kernel has none", kWhy);
   }
@@ -61,11 +63,12 @@ HostFinding huge_pages(const CheckedHost& host) {
 }
 
 HostFinding compaction(const CheckedHost& host) {
-  return judge(host, {.path = "/proc/sys/vm/compact_unevictable_allowed",
-                      .subject = "compaction of locked memory",
-                      .why = "the kernel moves pages although they are locked; who touches one then waits",
-                      .advice = "sysctl -w vm.compact_unevictable_allowed=0",
-                      .on = FindingLevel::note});
+  return judge(
+      host, {.path = "/proc/sys/vm/compact_unevictable_allowed",
+             .subject = "compaction of locked memory",
+             .why = "the kernel moves pages although they are locked; a thread that touches one then waits",
+             .advice = "sysctl -w vm.compact_unevictable_allowed=0",
+             .on = FindingLevel::note});
 }
 
 HostFinding numa_balancing(const CheckedHost& host) {

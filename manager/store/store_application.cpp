@@ -88,7 +88,7 @@ Result<void> copy_checked(const StoreOrder& order, int from, int to, const std::
   }
   const std::string digest = hash.digest();
   if (digest == order.digest) return {};
-  return failure(ErrorCode::corrupt, fmt::format("what came of {} has the SHA-256 {} where {} was announced",
+  return failure(ErrorCode::corrupt, fmt::format("the copy of {} has the SHA-256 {} where {} was announced",
                                                  order.name, digest, order.digest));
 }
 

@@ -43,7 +43,7 @@ template <class Answer>
 Answer StoreProcess::look(std::function<Answer()> at_folder) const {
   auto answer = disk_.ask<Answer>(kStoreLookLimit, settings_.folder, std::move(at_folder));
   if (answer) return *std::move(answer);
-  spdlog::error("what is kept of applications is not known: {}", answer.error().describe());
+  spdlog::error("the kept applications are not known: {}", answer.error().describe());
   return {};
 }
 

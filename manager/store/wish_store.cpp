@@ -74,7 +74,7 @@ Result<std::optional<InstanceWish>> WishStore::find() {
   if (memory) {
     memory_ = *std::move(memory);
   } else {
-    spdlog::error("instance {}: what it is to be is not kept for the next manager: {}", settings_.instance,
+    spdlog::error("instance {}: its wanted state is not kept for the next manager: {}", settings_.instance,
                   memory.error().describe());
   }
   auto remembered = memory_ ? memory_->read() : std::nullopt;
@@ -93,7 +93,7 @@ Result<std::optional<InstanceWish>> WishStore::find() {
   }
   if (silent) {
     remembered->number = higher_number(remembered->number);
-    spdlog::error("instance {}: what it is to be is taken from memory: {}", settings_.instance,
+    spdlog::error("instance {}: its wanted state is taken from memory: {}", settings_.instance,
                   file.error().describe());
   }
   if (remembered) {
@@ -151,7 +151,7 @@ void WishStore::keep(const InstanceWish& wish) {
   numbered.number = ++number_;
   const auto remembered = memory_ ? memory_->write(numbered) : Result<void>();
   if (!remembered) {
-    spdlog::error("instance {}: what it is to be is not kept for the next manager: {}", settings_.instance,
+    spdlog::error("instance {}: its wanted state is not kept for the next manager: {}", settings_.instance,
                   remembered.error().describe());
   }
   std::string contents = encode(wish.after_power_cut());
@@ -200,7 +200,7 @@ void WishStore::written(const Result<void>& result, const std::string& text) {
   written_ = text;
   if (!on_disk()) return write();
   if (!problem_.empty()) {
-    spdlog::info("instance {}: what it is to be is on the disk again", settings_.instance);
+    spdlog::info("instance {}: its wanted state is on the disk again", settings_.instance);
     problem_.clear();
   }
   retry_.cancel();

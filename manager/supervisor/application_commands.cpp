@@ -40,10 +40,9 @@ void ManagedInstance::begin_rollback() {
   const auto loaded = surroundings_.applications.version_at(application_);
   if (!loaded) {
     return finish(ErrorCode::wrong_state,
-                  application_.empty()
-                      ? fmt::format("'{}' has no application", config_.name)
-                      : fmt::format("{} was not sent to '{}': what was loaded before it is not known",
-                                    application_, config_.name));
+                  application_.empty() ? fmt::format("'{}' has no application", config_.name)
+                                       : fmt::format("{} was not sent to '{}': its predecessor is not known",
+                                                     application_, config_.name));
   }
   if (loaded->before.empty()) {
     return finish(ErrorCode::not_found,
@@ -125,7 +124,7 @@ void ManagedInstance::tell_boot_application() const {
               : application_;
   const bool boot = application_ == surroundings_.applications.boot();
   spdlog::info("instance {}: {} {}, in the place of {} of the configuration{}", config_.name,
-               boot ? "its boot application is" : "what was loaded last is", what,
+               boot ? "its boot application is" : "the application that was loaded last is", what,
                config_.application.empty() ? "none" : config_.application,
                config_.application.empty()
                    ? ""

@@ -64,7 +64,7 @@ Result<UniqueFd> InstanceOutput::open_for_process() {
 void InstanceOutput::adopt() {
   if (read_end_) return;
   if (const auto opened = open_ends(); !opened) {
-    spdlog::warn("instance {}: what it says is not read: {}", settings_.instance, opened.error().describe());
+    spdlog::warn("instance {}: its output is not read: {}", settings_.instance, opened.error().describe());
   }
 }
 
@@ -105,7 +105,7 @@ void InstanceOutput::keep(const LogEntry& entry) {
       ring_ = *std::move(ring);
     } else {
       ring_failed_ = true;
-      spdlog::warn("instance {}: what it says is not kept: {}", settings_.instance, ring.error().describe());
+      spdlog::warn("instance {}: its output is not kept: {}", settings_.instance, ring.error().describe());
     }
   }
   if (ring_) ring_->add(entry);

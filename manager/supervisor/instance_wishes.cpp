@@ -28,7 +28,7 @@ void ManagedInstance::restore() {
   application_ = boot.empty() ? config_.application : boot;
   if (!found) {
     unreadable_ = found.error().describe();
-    spdlog::error("instance {}: what it is to be is not known, so it is not started: {}", config_.name,
+    spdlog::error("instance {}: its wanted state is not known, so it is not started: {}", config_.name,
                   unreadable_);
     return;
   }
@@ -151,7 +151,7 @@ EndCause ManagedInstance::cause_of_beginning() const noexcept {
 
 std::string ManagedInstance::text_of_beginning(EndCause cause) const {
   if (cause == EndCause::wish_unreadable) {
-    return fmt::format("what it is to be is not known: {}; start it or stop it", unreadable_);
+    return fmt::format("its wanted state is not known: {}; start it or stop it", unreadable_);
   }
   if (cause == EndCause::given_up) return earlier_->problem;
   if (cause == EndCause::host_ended) return "ended with the host, and its policy is never to start it again";

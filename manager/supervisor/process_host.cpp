@@ -25,7 +25,7 @@ Result<int> ProcessHost::spawn(const LaunchOptions& options) {
   if (!channel) return std::unexpected(channel.error());
   const auto output = output_.open_for_process();
   if (!output) {  // better a PLC whose words are not kept than none
-    spdlog::warn("instance {}: what it says is not kept: {}", settings_.name, output.error().describe());
+    spdlog::warn("instance {}: its output is not kept: {}", settings_.name, output.error().describe());
   }
   auto process = spawn_process({.arguments = to_arguments(settings_.program, options),
                                 .report_fd = channel->childs.get(),

@@ -92,7 +92,7 @@ constexpr std::array kOperations = {
               .role = kEngineer,
               .options = OperationOptions::loading,
               .takes_long = true,
-              .done = "what was loaded before is loaded"},
+              .done = "the predecessor is loaded"},
     Operation{
         .verb = ControlVerb::reload_host,
         .name = "reload host",

@@ -28,8 +28,8 @@ Result<std::string> path_of(const std::string& name) {
   if (name.size() > kMaxFileName) {
     return failure(
         ErrorCode::invalid_argument,
-        fmt::format("shared memory '{}' would have a file name of {} bytes, {} are allowed; choose a "
-                    "shorter name, or one with fewer characters that are not letters, digits, '_', "
+        fmt::format("shared memory '{}' would have a file name of {} bytes, {} are allowed. Choose a "
+                    "shorter name, or one with fewer characters other than letters, digits, '_', "
                     "'-' or '.': each takes three bytes",
                     shown(name), name.size(), kMaxFileName));
   }

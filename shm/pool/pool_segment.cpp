@@ -196,7 +196,7 @@ Result<PoolLock> PoolSegment::acquire(Duration patience) {
   auto held = PoolLock::acquire(header, journal_, name_, patience);
   if (lost()) {
     return failure(ErrorCode::corrupt,
-                   fmt::format("pool '{}': another program has cut its file in {} short; what is in it is "
+                   fmt::format("pool '{}': another program has cut its file in {} short; its contents are "
                                "lost to this process, which must open it anew",
                                name_, MemoryFile::kDirectory));
   }

@@ -105,7 +105,7 @@ def tables(rows):
     lines = ["", *conditions(rows), "## Times", "", *percentiles(rows), "## Ratios to the floor", "", *ratios(rows)]
     if without:
         lines += [f"Without times of a floor: {', '.join(without)}.", ""]
-    lines += ["## What was to be shown", "",
+    lines += ["## Targets", "",
               "Measured and bound are the medians of the rounds. Each round decides for itself whether a target is met.", "",
               *targets(rows), "## Further figures", "", *further(rows)]
     notes = [f"* `{name}`: {note}" for name, note in

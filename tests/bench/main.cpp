@@ -70,7 +70,7 @@ std::vector<Job> make_jobs(const Options& options) {
   std::vector<Job> jobs;
   const bool can_stress = options.stress && bench::is_installed("stress-ng");
   if (options.stress && !can_stress)
-    fmt::print(stderr, "stress-ng is not installed: what it is needed for is skipped\n");
+    fmt::print(stderr, "stress-ng is not installed: the parts that need it are skipped\n");
   for (const bool under_stress : {false, true}) {
     for (const bench::Part& part : bench::all_parts()) {
       if (!options.only.empty() && std::ranges::find(options.only, part.name) == options.only.end()) continue;
@@ -190,7 +190,7 @@ int main(int argc, char** argv) {
   for (const bench::Part& part : bench::all_parts()) names.emplace_back(part.name);
   CLI::App app("Measures plchost beside the floor of this machine", "plchost-bench");
   Options options;
-  app.footer("Standard output is a JSON array; what people read is on standard error.");
+  app.footer("Standard output is a JSON array; text for people is on standard error.");
   app.add_option("--json", options.json, "write the array to this file, too, after each part");
   app.add_option("--plots", options.plots, "draw the figures into this folder, as SVG");
   app.add_flag("--quick", options.quick, "four minutes instead of most of two hours: 1.2 s of each thing");

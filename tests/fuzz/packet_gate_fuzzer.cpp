@@ -44,7 +44,7 @@ void feed(const Packet& packet) {
   if (fuzzed().oracle->feed(packet)) return;
   constexpr const char* kFile = "gate.packets";
   fuzzed().oracle->save_last(kFile);
-  std::fprintf(stderr, "Cyclone has ended or hangs; what it was fed last is in %s\n", kFile);
+  std::fprintf(stderr, "Cyclone has ended or hangs; its last packet is in %s\n", kFile);
   std::abort();
 }
 
@@ -53,7 +53,7 @@ bool passes(Packet packet, bool secured) {
   using plchost::dds::Admission;
   if (plchost::dds::admit(packet, secured) == Admission::refused) return false;
   if (plchost::dds::admit(packet, secured) == Admission::whole) return true;
-  std::fprintf(stderr, "what the gate has passed does not pass again\n");
+  std::fprintf(stderr, "a packet that the gate has passed does not pass again\n");
   std::abort();
 }
 

@@ -1,21 +1,21 @@
 #!/usr/bin/env python3
 """The texts that git knows are written as a reader needs them: plain, short, active.
 
-Usage: prose.py [--all] [ROOT] (a git checkout); prints each fault as "file:line: the fault". --all looks at every text, also
-at those that HELD below does not name yet.
+Usage: prose.py [ROOT] (a git checkout); prints each fault as "file:line: the fault".
 
 * No sentence and no cell of a table begins with "who", "what", "whose", "whoever", "whatever" or "that which", unless it asks
   something. A part behind ":" or ";" or a dash is held to the same.
-* No sentence has more than 30 words. Code in backticks is one word, a link counts as its text. Behind a colon, the parts of a
-  list that ";" or ":" divides are counted one by one.
+* No sentence has more than 30 words. Code in backticks is one word, a link counts as its text. Behind a colon, the parts of
+  a list that ";" or ":" divides are counted one by one.
 * No text has a word that manager/glossary.md forbids (the column "not").
 
-A text is a paragraph, an item of a list or a cell of a table outside of fences (.md), a comment or a docstring. So is a string of three words and more: messages are among those.
+A text is a paragraph, a heading, an item of a list or a cell of a table outside of fences (.md), a comment or a docstring. So is
+a string of three words and more in C++ or Python: messages are among those. Not held are drawings and columns in comments, raw
+strings, strings of shell scripts, and texts in pictures.
 """
 
 import argparse
 import ast
-import fnmatch
 import io
 import re
 import subprocess
@@ -23,11 +23,6 @@ import sys
 import tokenize
 from pathlib import Path
 
-# The texts that are held to the rules: kind and pattern of the path. Kinds: document, comment, message.
-HELD = [
-    ("document", "*.md"),
-    ("comment", "*"),
-]
 GLOSSARY = "manager/glossary.md"
 WORDS = 30
 
@@ -44,7 +39,7 @@ C_TOKEN = re.compile(
 # Of a comment: columns, arrows, a line of usage.
 DRAWING = re.compile(r"\S   +\S|-->|──|\|  |^  +\S.*\[-")
 C_FILES = (".cpp", ".hpp", ".h", ".c", ".idl", ".h.in", ".hpp.in")
-HASH_FILES = (".sh", ".cmake", "CMakeLists.txt")
+HASH_FILES = (".sh", ".cmake", "CMakeLists.txt", ".sed", ".ci/run", ".ci/packages", ".ci/bare")
 ITEM = re.compile(r"([*+-]|\d+\.|\([a-z0-9]\)) +(?=\S)")
 
 
@@ -67,8 +62,8 @@ class Text:
 
 
 def paragraphs(lines, columns=False):
-    """Texts of (number, line) pairs: divided by empty lines, items of lists, tables, fences and drawings. With `columns`, a line that
-    is indented further or has gaps in it, as in a table of a comment, is a drawing."""
+    """Texts of (number, line) pairs: divided by empty lines, items of lists, tables, fences and drawings. With `columns`, as in
+    a comment, a line with gaps or arrows in it is a drawing, too."""
     text = Text()
     fenced = False
     before_empty = True
@@ -82,6 +77,11 @@ def paragraphs(lines, columns=False):
                 yield text
             text = Text()
             before_empty = True
+            heading = None if fenced or columns else re.match(r"#+ (.*)", stripped)
+            if heading:
+                text.lines = [(number, heading[1])]
+                yield text
+                text = Text()
             continue
         if (not text.lines and before_empty and re.match(r"    |\t", line)) or (columns and DRAWING.search(line)):
             if text.lines:
@@ -248,21 +248,18 @@ def forbidden_words(root):
 
 def main():
     parser = argparse.ArgumentParser()
-    parser.add_argument("--all", action="store_true")
     parser.add_argument("root", nargs="?", type=Path, default=Path(__file__).resolve().parents[2])
     options = parser.parse_args()
-    held = [(kind, pattern) for kind in ("document", "comment", "message") for pattern in ("*",)] if options.all else HELD
     names = subprocess.run(["git", "ls-files", "-z"], cwd=options.root, check=True, capture_output=True,
                            text=True).stdout.split("\0")
     forbidden = forbidden_words(options.root)
     wrong = 0
     for name in names:
-        kinds = {kind for kind, pattern in held if fnmatch.fnmatch(name, pattern)}
-        if not kinds or not name.endswith((".md", ".py", *C_FILES, *HASH_FILES)) or not (options.root / name).is_file():
+        if not name.endswith((".md", ".py", *C_FILES, *HASH_FILES)) or not (options.root / name).is_file():
             continue
         for kind, text in texts_of(name, (options.root / name).read_text(encoding="utf-8")):
             joined = text.joined()
-            if kind not in kinds or (kind == "message" and not is_message(joined)):
+            if kind == "message" and not is_message(joined):
                 continue
             shown = plain(joined)
             words = None if name == GLOSSARY else forbidden

@@ -149,7 +149,7 @@ plant_in_prose() {
   mkdir -p "$plot/tree/$(dirname "$3")"
   cp manager/glossary.md "$plot/tree/manager/"
   printf '%s\n' "$4" >"$plot/tree/$3" && commit_tree
-  must_be_red "$1" "$2" "$gates/prose.py" --all "$plot/tree"
+  must_be_red "$1" "$2" "$gates/prose.py" "$plot/tree"
 }
 plant_in_prose "prose: who" "shm/planted.md:1: begins with 'Who': Who asks" shm/planted.md "Who asks is answered."
 plant_in_prose "prose: what, behind a colon" "shm/planted.md:2: begins with 'what': what it says" shm/planted.md "The manager answers

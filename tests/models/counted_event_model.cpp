@@ -41,7 +41,7 @@ void one_poster_two_waiters(Scene& scene) {
   for (const char* name : {"waiter", "other waiter"}) {
     scene.thread(name, [&] {
       wait_for(shared.event, 0);
-      require(shared.written == 7, "who is woken does not see what was written before the post");
+      require(shared.written == 7, "the woken thread does not see all writes before the post");
     });
   }
 }

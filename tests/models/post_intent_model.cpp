@@ -47,7 +47,7 @@ void finish(Shared& shared) {
 void require_state(const Shared& shared, std::uint32_t source, std::uint64_t posts) {
   const SourceState& state = shared.sources[source].state();
   require(state.last == posts, "a source was not told of its post");
-  require(state.counters.accepted == posts, "what is kept of the source is not of its last post");
+  require(state.counters.accepted == posts, "the record of the source is not of its last post");
 }
 
 /// The work of a server: it ends the post of the one before, and makes the first one of source 0.

@@ -10,7 +10,7 @@ namespace {
 struct Shared {
   explicit Shared(Scene& scene) : kernel(scene) {
     scene.name(mutex, "mutex");
-    scene.name(guarded, "what it guards");
+    scene.name(guarded, "the guarded value");
   }
   PiFutex kernel;
   RobustMutex mutex;

@@ -158,7 +158,7 @@ void add_application_verbs(const Command& plcctl, CliSession& session) {
               return command(session,
                              {"", plc_OPERATION_ROLLBACK_APPLICATION, back_to->instance, "",
                               options_of(back_to->boot, back_to->online)},
-                             "what was loaded before is loaded");
+                             "the predecessor is loaded");
             })
       .argument("INSTANCE", back_to->instance)
       .flag("--boot", back_to->boot, kBootHelp)

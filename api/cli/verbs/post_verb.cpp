@@ -183,9 +183,8 @@ void add_post_verb(const Command& plcctl, CliSession& session) {
       .option("--interval-us", arguments->interval_us, "time between two posts, microseconds (default 0)",
               std::int64_t{0}, kMaxIntervalUs)
       .choice("--wait{pool}", arguments->wait,
-              "until the post is in the pool (--wait=pool, as without it), or until its tasks have ended "
-              "their cycles "
-              "for it, one post after the other, and how long that took (--wait=run)",
+              "until the post is in the pool (--wait=pool, as without it). Or until its tasks have ended "
+              "their cycles for it, one post after the other, and how long that took (--wait=run)",
               {"pool", "run"});
   const auto names = std::make_shared<std::vector<std::string>>();
   verb.noun("events", "Post several external events (up to 64) at once: all of them, or none",

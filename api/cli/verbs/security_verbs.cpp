@@ -138,7 +138,8 @@ constexpr const char* kDays = "for how many days from now";
 
 void add_security_verb(const Command& plcctl, CliSession& session) {
   const auto said = std::make_shared<Said>();
-  const Command verb = plcctl.verb("security", "Who may do what: identities, their roles and certificates");
+  const Command verb =
+      plcctl.verb("security", "The rights of each client: identities, their roles and certificates");
   verb.noun("init", "Make the authorities of a plant and the identity of its first host",
             [said] { return init(said->new_directory, said->first_host); })
       .argument("DIR", said->new_directory, "a folder that is not there yet, or empty")

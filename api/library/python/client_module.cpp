@@ -249,7 +249,7 @@ void define_calls(ClientClass& client) {
       .def("logs",
            py::overload_cast<const std::string&, const std::string&, unsigned long long>(&Client::logs),
            py::arg("host"), py::arg("instance"), py::arg("newest") = ~0ULL,
-           "What an instance has said, oldest first: the newest lines of those that the host keeps.", NoGil())
+           "The lines of an instance, oldest first: the newest lines of those that the host keeps.", NoGil())
       .def("logs",
            py::overload_cast<const std::string&, const std::string&, const Client::LogLine&>(&Client::logs),
            py::arg("host"), py::arg("instance"), py::arg("after"),

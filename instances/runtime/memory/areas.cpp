@@ -127,10 +127,10 @@ std::vector<std::string> Areas::look_for_losses() {
   std::vector<std::string> losses;
   for (Block& block : blocks_) {
     if (!block.memory.lost() || std::exchange(block.loss_told, true)) continue;
-    losses.push_back(fmt::format(
-        "{} was cut short by another program: what is in these areas is seen by this instance only, "
-        "and is gone when it ends; give it its size again, and restart the instance",
-        block.source));
+    losses.push_back(
+        fmt::format("{} was cut short by another program: only this instance sees the values in these areas, "
+                    "and they are gone when it ends. Give it its size again, and restart the instance",
+                    block.source));
   }
   return losses;
 }

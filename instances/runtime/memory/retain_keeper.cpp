@@ -62,8 +62,8 @@ struct RetainKeeper::Start {
     auto left = pool.empty() ? Result<KeptMemory::Left>(failure(ErrorCode::not_found, name))
                              : KeptMemory::left_behind(pool, name);
     if (!left && left.error().code != ErrorCode::not_found) {
-      remarks.push_back(
-          fmt::format("what the process before has left in memory is not used: {}", left.error().describe()));
+      remarks.push_back(fmt::format("the retain memory that the process before has left is not used: {}",
+                                    left.error().describe()));
     }
     for (std::string& problem : found.problems) remarks.push_back(std::move(problem));
     if (found.newest) {

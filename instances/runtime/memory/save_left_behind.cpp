@@ -27,7 +27,8 @@ Result<void> save_left_behind(const LaunchOptions& launch) {
   if (!left && left.error().code == ErrorCode::not_found) return {};
   // A damaged memory is worth nothing: the files hold the last good values.
   if (!left && left.error().code == ErrorCode::corrupt) {
-    spdlog::warn("retain variables: what is left in memory is not written: {}", left.error().describe());
+    spdlog::warn("retain variables: the values that are left in memory are not written: {}",
+                 left.error().describe());
     return {};
   }
   if (!left) return std::unexpected(left.error());

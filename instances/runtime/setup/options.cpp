@@ -95,7 +95,7 @@ void describe(CLI::App& app, Options& options) {
                  "Where retain variables are written; default: nowhere, they live as long as the pool");
   app.add_flag("--stopped", launch.stopped, "Load the application, do not start it");
   app.add_option("--start-kind", options.start_kind,
-                 "What the application is told about why it starts: first, warm, cold or after-fault")
+                 "The reason of the start, as told to the application: first, warm, cold or after-fault")
       ->check([](const std::string& name) {
         const auto kind = start_kind_of(name);
         return kind ? std::string() : kind.error().describe();

@@ -187,7 +187,7 @@ TEST_F(Audit, ADiskThatHangsStopsNeitherPresenceNorPostsNorCommands) {
   for (const TimePoint end = soon(); records("stop").size() < before + 3 && MonotonicClock::now() < end;) {
     std::this_thread::sleep_for(std::chrono::milliseconds(10));
   }
-  EXPECT_EQ(records("stop").size(), before + 3) << "what waited is written then";
+  EXPECT_EQ(records("stop").size(), before + 3) << "waiting records are written then";
 }
 
 TEST_F(Audit, IsVerifiedAndAChangeFound) {

@@ -119,7 +119,7 @@ TEST_F(RemoteCommand, SleepsWhileItsAnswerIsWaitedFor) {
   const auto before = used();
   const TimePoint start = MonotonicClock::now();
   EXPECT_FALSE(sut->call({"hosta", plc_OPERATION_RESET, "line1", ""}, start + seconds(1)));
-  EXPECT_LT(used() - before, (MonotonicClock::now() - start) / 4) << "what the host shows keeps it awake";
+  EXPECT_LT(used() - before, (MonotonicClock::now() - start) / 4) << "the host's status keeps it awake";
 }
 
 TEST_F(RemoteCommand, OfAKilledClientDisturbsNoOther) {

@@ -315,7 +315,7 @@ TEST_F(AreasOf, RetainLoseAtMostAnIntervalWithThePower) {
     EXPECT_GE(said.begun, then.begun);
     EXPECT_GE(said.persistent, then.persistent);
     EXPECT_EQ(said.origin, 2U);
-    EXPECT_LT(said.data, said.persistent) << "what is not kept begins anew";
+    EXPECT_LT(said.data, said.persistent) << "an area that is not retain begins anew";
     EXPECT_GE(then.begun, last.begun);
   }
 }

@@ -91,7 +91,7 @@ TEST_F(ControlSocket, ResetsTheStatisticsOfOneTaskOrOfAllWhileTheyRun) {
   const TaskCounters after = sut_.task("Fast")->counters;
   EXPECT_GE(after.cycles, before.cycles) << "the cycle count goes on";
   EXPECT_GT(after.since_ns, before.since_ns);
-  EXPECT_GE(after.cycles - after.recorded, before.recorded) << "what was before is not counted any more";
+  EXPECT_GE(after.cycles - after.recorded, before.recorded) << "earlier cycles are not counted any more";
   EXPECT_EQ(sut_.task("Loop")->counters.since_ns, since_of_loop);
   EXPECT_EQ(sut_.ask(ControlVerb::stop).code, ErrorCode::ok);
   EXPECT_EQ(sut_.ask(ControlVerb::reset_statistics).code, ErrorCode::ok) << "also of parked tasks";

@@ -133,7 +133,7 @@ TEST_P(OnlineChange, GoesOnWithTheVariablesAndTheNewCodeWithoutALostCycle) {
   EXPECT_EQ(later.area, later.counter + 7) << "the area began with 7";
   EXPECT_EQ(later.kept, later.counter);
   EXPECT_LE(by_ones + later.fresh, sut.main().cycles) << "each cycle ran one of the two versions";
-  EXPECT_EQ(later.own_figures, 1) << "what the program reads of itself goes on";
+  EXPECT_EQ(later.own_figures, 1) << "the program's own figures go on";
   EXPECT_EQ(later.init_saw_area, 0);
   EXPECT_EQ(sut.main().since_ns, counters.since_ns) << "the figures go on";
   EXPECT_GT(sut.main().cycles, counters.cycles);

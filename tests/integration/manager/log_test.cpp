@@ -42,7 +42,7 @@ TEST_F(InstanceLog, HasTheLastWordsOfAProcessThatCrashed) {
   EXPECT_GT(printed->pid, 0);
   EXPECT_TRUE(has(LogSource::output, "?[31mred?[0m")) << "a line without an end, and no colours";
   EXPECT_TRUE(has(LogSource::application, "valve 7 is stuck"));
-  EXPECT_TRUE(has(LogSource::runtime, "stopped -> running")) << "what the instance itself says";
+  EXPECT_TRUE(has(LogSource::runtime, "stopped -> running")) << "the instance's own lines";
   EXPECT_TRUE(has(LogSource::manager, "killed by SIGSEGV"));
   EXPECT_THAT(plant_.log(), HasSubstr("last words: pressure 9 bar")) << "also in the log of the manager";
 }

@@ -143,7 +143,7 @@ class RetainThatIsSeldomWritten : public testing::Test {
   }
   void expect_24_after_an_orderly_end() {
     EXPECT_EQ(plant.stop_manager().describe(), "exit code 0");
-    EXPECT_THAT(plant.leftovers(), IsEmpty()) << "what is in a file needs no memory";
+    EXPECT_THAT(plant.leftovers(), IsEmpty()) << "values in a file need no memory";
     start_again();
     EXPECT_TRUE(has_counted_24()) << plant.log();
   }

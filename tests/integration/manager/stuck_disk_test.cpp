@@ -64,7 +64,7 @@ TEST_F(DiskThatHangs, WhenAManagerStartsHidesNothingThatIsInMemory) {
   ASSERT_TRUE(plant_.wait_for("drive1", InstanceState::running));
   ASSERT_TRUE(plant_.wait_for("line1", InstanceState::stopped));
   EXPECT_EQ(plant_.status("drive1").pid, drive1);
-  EXPECT_THAT(plant_.log(), HasSubstr("what it is to be is taken from memory"));
+  EXPECT_THAT(plant_.log(), HasSubstr("its wanted state is taken from memory"));
   EXPECT_EQ(plant_.ask(ControlVerb::reset_statistics, "drive1").code, ErrorCode::ok);
   const auto stopped = plant_.ask(ControlVerb::stop, "drive1");
   EXPECT_EQ(stopped.code, ErrorCode::ok);

@@ -100,7 +100,7 @@ TEST_F(Roles, APatchedClientMeetsNobodyWhereItsRoleDoesNotReach) {
       client.read(dds::kReply, dds::client_partition(client.guid().hex(), dds::kAllHosts));
   ASSERT_TRUE(own > 0 && forbidden > 0 && chunks > 0 && presence > 0 && others > 0)
       << "it is not patched enough";
-  EXPECT_TRUE(RawClient::meets_reader(own)) << "what it may write does not work either";
+  EXPECT_TRUE(RawClient::meets_reader(own)) << "its own topics do not work either";
   EXPECT_TRUE(RawClient::meets_writer(own_replies));
   EXPECT_FALSE(RawClient::meets_reader(forbidden, std::chrono::seconds(1)));
   EXPECT_FALSE(RawClient::meets_reader(chunks, std::chrono::seconds(0)));

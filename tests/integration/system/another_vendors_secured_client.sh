@@ -45,7 +45,7 @@ if vendor "$plant/panel" --patience 4 post packer1/product; then fail "a viewer 
 
 echo "- nobody else sees anything"
 if vendor "$cell/other/anna" --patience 4 hosts; then fail "an operator of another plant sees the host"; fi
-if "$BIN/fastdds_client" --domain "$PLCHOST_DOMAIN" --patience 4 hosts 2>>"$cell/vendor.log"; then fail "who has no identity sees the host"; fi
+if "$BIN/fastdds_client" --domain "$PLCHOST_DOMAIN" --patience 4 hosts 2>>"$cell/vendor.log"; then fail "a client without an identity sees the host"; fi
 is "$(as panel list instances --json | jq -r '.[0].state')" running || fail "the instance is not running"
 is "$(as panel list events --json | jq '.[] | select(.event == "product") | .posts')" 100 || fail "there are other posts"
 

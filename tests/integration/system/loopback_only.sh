@@ -54,7 +54,7 @@ refused "without an identity opens this controller to all who reach it" refused_
 printf 'allow_unsecured = true\nmulticast = false\n' >>"$cell/cell1.toml"
 : >"$cell/cell1.log"
 start
-grep -q "who reaches it controls this host" "$cell/cell1.log" || fail "it does not say what that means"
+grep -q "any program that reaches it controls this host" "$cell/cell1.log" || fail "it does not say what that means"
 taken=$(junk outside 10.78.0.1)
 is "$taken" "10 11 " || fail "it was told to be open, and takes on ports: $taken"
 until_true 10 looked_at

@@ -12,7 +12,7 @@ plcctl security add-identity viewer panel >/dev/null
 plcctl security add-identity operator anna >/dev/null
 plcctl security add-identity engineer otto >/dev/null
 is "$(plcctl security show --json | jq -r 'map(.name + " " + .role + " " + .state) | join(",")')" \
-  "anna operator valid,cell1 host valid,otto engineer valid,panel viewer valid" || fail "what show shows"
+  "anna operator valid,cell1 host valid,otto engineer valid,panel viewer valid" || fail "the output of show"
 
 write_host cell1 "$first_core"
 printf '[dds]\nidentity = "plant/cell1"\n' >>"$cell/cell1.toml"

@@ -1,2 +1,2 @@
-# shm/base/counted_event.hpp: what the poster wrote before is not passed on
+# shm/base/counted_event.hpp: the earlier writes of the poster are not passed on
 s/fetch_add\(kOnePost, std::memory_order_release\)/fetch_add(kOnePost, std::memory_order_relaxed)/

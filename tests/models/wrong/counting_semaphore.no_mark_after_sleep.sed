@@ -1,2 +1,2 @@
-# shm/base/counting_semaphore.cpp: who was woken does not mark the word for those that still sleep
+# shm/base/counting_semaphore.cpp: a woken thread does not mark the word for those that still sleep
 s/mark = kWaiter;//

@@ -1,2 +1,2 @@
-# schedulers/task/cycle_gate.hpp: who waits at the gate is not woken
+# schedulers/task/cycle_gate.hpp: a thread that waits at the gate is not woken
 s/clock\.wake\(closed_\);//

@@ -1,2 +1,2 @@
-# shm/base/robust_mutex.cpp: what was written under the mutex is not passed on
+# shm/base/robust_mutex.cpp: the writes under the mutex are not passed on
 s/compare_exchange_strong\(word, 0, std::memory_order_release/compare_exchange_strong(word, 0, std::memory_order_relaxed/

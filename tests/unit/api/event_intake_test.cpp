@@ -198,7 +198,7 @@ TEST_F(EventIntakeTest, AnswersImpossibleNumbersAndCountsThemApart) {
   EXPECT_EQ(sut.writers().at(1).counters.malformed, 6U);
   sut.process(make_post(1));
   EXPECT_EQ(only_ack(sut).accepted, 1U);
-  EXPECT_EQ(event_.counted().count(), 1U) << "what comes after them is done, not only acknowledged";
+  EXPECT_EQ(event_.counted().count(), 1U) << "later posts are done, not only acknowledged";
 }
 
 TEST_F(EventIntakeTest, SeesThatAnEventWasUnregistered) {

@@ -49,7 +49,7 @@ TEST_F(HostClockTest, TheBestOfTheLastPresencesCounts) {
   const TimePoint later = kStart + milliseconds(2) + HostClock::kWindow;
   sut_.take(written(later - milliseconds(60)), later);
   EXPECT_EQ(sut_.limit_at(deadline).clock_ns, at_host(deadline - milliseconds(60) - HostClock::kMargin))
-      << "clocks drift: what is older does not count";
+      << "clocks drift: an older sample does not count";
 }
 
 TEST_F(HostClockTest, AnotherServerOfTheHostHasItsOwnClock) {

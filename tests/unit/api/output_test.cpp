@@ -149,7 +149,7 @@ TEST(Rows, GiveDurationsInMicroseconds) {
   const Row row = to_row(status);
   EXPECT_EQ(row["interval_us"], 1.5);
   EXPECT_EQ(row["kind"], "external");
-  EXPECT_EQ(row["state"], "9") << "what a newer host may say is shown as its number";
+  EXPECT_EQ(row["state"], "9") << "an unknown code of a newer host is shown as its number";
 }
 
 TEST(Rows, GiveWholeNumbersOfAHostAsNumbers) {

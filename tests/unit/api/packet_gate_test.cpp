@@ -326,7 +326,7 @@ TEST(PacketGate, ReadsNothingBehindTheEnd) {
     const auto bytes = std::as_writable_bytes(std::span(datagram));
     const bool secured = (i & 1) != 0;
     if (admit(bytes, secured) != Admission::refused) {
-      EXPECT_EQ(admit(bytes, secured), Admission::whole) << "what has passed once passes";
+      EXPECT_EQ(admit(bytes, secured), Admission::whole) << "a packet that has passed once passes";
     }
   }
 }

@@ -34,7 +34,7 @@ TEST_F(SourceTableTest, ForgetsAParticipantThatIsSilentAndNoOther) {
   now_ += SourceTable::kForgotten;
   EXPECT_TRUE(is_its_own(1, 40000));
   now_ += SourceTable::kForgotten;
-  EXPECT_FALSE(is_its_own(1, 40001)) << "what others send in its name does not keep it, and takes nothing";
+  EXPECT_FALSE(is_its_own(1, 40001)) << "packets of others in its name do not keep it, and take nothing";
   now_ += 1ns;
   EXPECT_TRUE(is_its_own(1, 40001));
 }

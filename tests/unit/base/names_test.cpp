@@ -63,7 +63,7 @@ TEST(Names, CutsBetweenCharacters) {
 
 TEST(Names, OfAStrangerAreShownWithoutWhatCouldDriveATerminalOrBreakALine) {
   EXPECT_EQ(shown("\x1b[31mline1\n"), "?[31mline1?");
-  EXPECT_EQ(shown("\xc3\xa4 1"), "\xc3\xa4 1") << "what is printable stays";
+  EXPECT_EQ(shown("\xc3\xa4 1"), "\xc3\xa4 1") << "printable characters stay";
   EXPECT_EQ(join_some(std::vector<std::string>{"a\tb", "c"}), "a?b, c");
 }
 

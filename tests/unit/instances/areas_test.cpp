@@ -359,7 +359,7 @@ TEST_F(AreasInFiles, InACharacterDeviceAreMappedFromIt) {
   ASSERT_TRUE(placed) << placed.error().describe();
   ASSERT_TRUE(data != nullptr && input != nullptr && output != nullptr);
   EXPECT_TRUE(is_mapped_from(data, "/dev/zero")) << "and no memory of the process";
-  EXPECT_EQ(*static_cast<std::uint64_t*>(data), 0U) << "what is in a device stays";
+  EXPECT_EQ(*static_cast<std::uint64_t*>(data), 0U) << "values in a device stay";
   EXPECT_EQ(std::memcmp(input, initial.data(), 8), 0);
   run_whole_cycle(tasks[0]);
   EXPECT_EQ(*static_cast<std::uint64_t*>(input), 0U) << "inputs are read from it at the start of a cycle";

@@ -193,7 +193,7 @@ TEST_F(Retain, IsNeverTakenFromTheMiddleOfACycle) {
   sut.reset();
   forget_memory();
   start_well();
-  EXPECT_EQ(value(0), kInitial) << "what was written last";
+  EXPECT_EQ(value(0), kInitial) << "the last written values";
 }
 
 TEST_F(Retain, OfOneFileIsOfTheEndOfOneCycle) {

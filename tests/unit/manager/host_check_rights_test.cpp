@@ -113,7 +113,7 @@ TEST(HostCheckRights, FindTheInstanceThatTheControlGroupHasNoCoreFor) {
   tree.remove("/sys/fs/cgroup");
   tree.write("/sys/devices/system/cpu/online", "0-1\n");
   EXPECT_EQ(tree.look("allowed_cores").level, FindingLevel::problem)
-      << "no control groups: what is on line counts";
+      << "no control groups: the cores on line count";
 }
 
 TEST(HostCheckRights, FindAQuotaInAnyGroupAbove) {

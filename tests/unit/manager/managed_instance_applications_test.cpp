@@ -336,7 +336,7 @@ TEST_F(OnlineApplication, IsTriedFirstAndThenTakenInByTheProcessThatIsUp) {
   EXPECT_EQ(state(), InstanceState::running);
   sut().on_exit(killed_by(SIGSEGV));
   expire_timer();
-  EXPECT_EQ(host_.spawned.back().application, "/opt/new.so") << "what comes after a crash";
+  EXPECT_EQ(host_.spawned.back().application, "/opt/new.so") << "the start after a crash";
 }
 
 TEST_F(OnlineApplication, ThatDoesNotFitChangesNothing) {

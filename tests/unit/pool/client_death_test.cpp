@@ -276,7 +276,7 @@ TEST_F(ClientDeath, AtAnyInstructionLeavesAPoolThatTheNextCallRepairs) {
     }
   }
   EXPECT_GT(view.header().repairs.load(), 0U) << "none of them died with the pool's lock held";
-  EXPECT_EQ(view.header().rebuilds.load(), 0U) << "what one of them had begun was not undone";
+  EXPECT_EQ(view.header().rebuilds.load(), 0U) << "the unfinished step of one of them was not undone";
   EXPECT_GT(view.header().departed.load(), kRounds);
 }
 

@@ -99,7 +99,7 @@ TEST_F(ForeignFiles, AreReplacedWhateverTheyAre) {
   ASSERT_EQ(::stat(path.c_str(), &status), 0);
   expect_replaced("folder with something in it");
   const std::string aside = MemoryFile::path(".put-aside." + std::to_string(status.st_ino));
-  EXPECT_TRUE(fs::exists(aside + "/trap")) << "what is in a stranger's folder is not touched";
+  EXPECT_TRUE(fs::exists(aside + "/trap")) << "the contents of a stranger's folder are not touched";
   fs::remove_all(aside);
   ASSERT_EQ(::mkfifo(path.c_str(), 0666), 0);
   expect_replaced("FIFO");

@@ -80,7 +80,7 @@ TEST_F(PoolAdoptionTest, WhatFirmwareMadeWithAHeaderAloneIsAnObjectAtTheNextLook
   EXPECT_EQ(object->mode, 0660U);
   EXPECT_TRUE(object->kept);
   EXPECT_EQ(pool_.look_at("bus1")->size, sizeof(plc_reference_clock));
-  EXPECT_EQ(pool_.list()->size(), 2U) << "what does not say what it is stays a file";
+  EXPECT_EQ(pool_.list()->size(), 2U) << "a file without a magic number stays a file";
   plc_reference_clock_close(clock);
 }
 
@@ -177,7 +177,7 @@ TEST_F(PoolAdoptionTest, AReplacedMemoryHasItsContentsFromTheFirstMoment) {
   EXPECT_EQ(sut->bytes().size(), 200U);
   EXPECT_EQ(sut->bytes()[199], std::byte{'b'});
   EXPECT_FALSE(old->valid());
-  EXPECT_EQ(old->bytes()[99], std::byte{'a'}) << "who has it keeps it";
+  EXPECT_EQ(old->bytes()[99], std::byte{'a'}) << "its holder keeps it";
   EXPECT_EQ(pool_.look_at("line1.retain")->reference_count, 1U);
   const auto event = pool_.create_shared_event("e");
   EXPECT_EQ(pool_.replace_memory("e", 10, fill('c')).error().code, ErrorCode::wrong_type);

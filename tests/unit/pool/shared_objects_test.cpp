@@ -51,7 +51,7 @@ TEST_F(SharedObjects, AreMadeOnceAndOpenedByAllOthers) {
   const auto second = other.create_semaphore("s", 7);
   ASSERT_TRUE(second);
   EXPECT_FALSE(second->made);
-  EXPECT_EQ(second->object.value(), 3U) << "what is there keeps its value";
+  EXPECT_EQ(second->object.value(), 3U) << "an object that is there keeps its value";
   EXPECT_EQ(second->object.post(), ObjectStatus::done);
   EXPECT_EQ(first->object.value(), 4U);
 }

@@ -235,7 +235,7 @@ TEST_P(BrokenReference, IsNeverFollowedAndTheRightOneAtOnce) {
   feed_until(kPowerOn + 4000 * spacing);
   const double drift = sut.model().drift;
   EXPECT_LE(taken_of(6000), 3);
-  EXPECT_NEAR(sut.model().drift, drift, 20 * kMillionth) << "what hold-over goes on with";
+  EXPECT_NEAR(sut.model().drift, drift, 20 * kMillionth) << "the drift of hold-over";
   feed_until(now + 200 * spacing);
   EXPECT_EQ(last, Verdict::taken);
   EXPECT_LT(percentile(feed_until(now + 4000 * spacing), 0.99), 100);

@@ -92,7 +92,7 @@ class LoadWatchdogTest : public testing::Test {
     EXPECT_EQ(record->kind, FaultKind::processor_load);
     EXPECT_EQ(record->figure, percent);
     EXPECT_EQ(record->limit, 60);
-    EXPECT_TRUE(board_.halted()) << "whatever the policy of the task that used the most";
+    EXPECT_TRUE(board_.halted()) << "under any policy of the task that used the most";
   }
 
   ManualClock clock_;

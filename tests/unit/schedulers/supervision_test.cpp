@@ -166,7 +166,8 @@ TEST_F(SupervisionTest, CountsNoReleaseWhileTheTaskWorksForTheRuntime) {
   clock_.run_for(Duration(1));
   (void)look();
   EXPECT_TRUE(task_->fault().raised()) << "from then on it counts";
-  EXPECT_GT(task_->next_release(FreewheelRule(settings_)).lost_cycles, 40U) << "what fell due is lost";
+  EXPECT_GT(task_->next_release(FreewheelRule(settings_)).lost_cycles, 40U)
+      << "releases that fell due are lost";
 }
 
 TEST_F(SupervisionTest, NeverMissesReleasesThatLieBehindTheEndOfTheClock) {
