@@ -55,12 +55,10 @@ std::size_t next_character(std::string_view text, std::size_t at) noexcept {
 }  // namespace
 
 Result<ObjectType> parse_object_type(std::string_view text) {
+  const auto found = std::ranges::find(kObjectTraits, text, &ObjectTraits::name);
+  if (found != kObjectTraits.end()) return found->type;
   std::array<std::string_view, kObjectTypes> names;
-  for (std::uint32_t number = 0; number < kObjectTypes; ++number) {
-    const auto type = static_cast<ObjectType>(number);
-    names.at(number) = to_string(type);
-    if (names.at(number) == text) return type;
-  }
+  std::ranges::transform(kObjectTraits, names.begin(), &ObjectTraits::name);
   return failure(ErrorCode::invalid_argument, fmt::format("no type of object is called '{}'; allowed are: {}",
                                                           shown(text), join_names(names)));
 }

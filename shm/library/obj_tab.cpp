@@ -27,17 +27,12 @@ std::unique_ptr<plc_sem> handle_of(Result<Object> opened) {
   return handle;
 }
 
-objTabType_t type_in_table(ObjectType type) noexcept {
-  switch (type) {
-    case ObjectType::memory:
-      return e_shm;
-    case ObjectType::event:
-      return e_evt;
-    case ObjectType::semaphore:
-    case ObjectType::mutex:
-      break;
-  }
-  return e_sem;
+/// Nothing: a type that the seed's table does not have, nor anything like it.
+std::optional<objTabType_t> type_in_table(ObjectType type) noexcept {
+  if (type == ObjectType::memory) return e_shm;
+  if (type == ObjectType::event) return e_evt;
+  if (type == ObjectType::semaphore || type == ObjectType::mutex) return e_sem;
+  return std::nullopt;
 }
 
 // Nobody but this table needs it any more.
@@ -150,6 +145,7 @@ Result<void> ObjTab::refresh() {
   for (auto& row : rows_) before[{row->name, row->type}] = std::move(row);
   rows_.clear();
   for (const ObjectInfo& info : *all) {
+    if (!type_in_table(info.type)) continue;
     const auto known = before.find({info.name, info.type});
     if (known == before.end()) {
       rows_.push_back(open(info));
@@ -173,30 +169,25 @@ std::unique_ptr<ObjTab::Row> ObjTab::open(const ObjectInfo& info) const {
   auto row = std::make_unique<Row>();
   row->name = info.name;
   row->type = info.type;
-  switch (info.type) {
-    case ObjectType::memory:
-      if (auto writable = pool_.open_memory(info.name)) {
-        row->memory = *std::move(writable);
-      } else if (auto readable = pool_.open_memory(info.name, MemoryFile::Access::read_only)) {
-        row->memory = *std::move(readable);
-      }
-      break;
-    case ObjectType::semaphore:
-      row->semaphore = handle_of(pool_.open_semaphore(info.name));
-      break;
-    case ObjectType::mutex:
-      row->semaphore = handle_of(pool_.open_mutex(info.name));
-      break;
-    case ObjectType::event:
-      row->semaphore = handle_of(pool_.open_shared_event(info.name));
-      if (row->semaphore) row->semaphore->cursor = std::get<SharedEvent>(row->semaphore->object).count();
-      break;
+  if (info.type == ObjectType::memory) {
+    if (auto writable = pool_.open_memory(info.name)) {
+      row->memory = *std::move(writable);
+    } else if (auto readable = pool_.open_memory(info.name, MemoryFile::Access::read_only)) {
+      row->memory = *std::move(readable);
+    }
+  } else if (info.type == ObjectType::semaphore) {
+    row->semaphore = handle_of(pool_.open_semaphore(info.name));
+  } else if (info.type == ObjectType::mutex) {
+    row->semaphore = handle_of(pool_.open_mutex(info.name));
+  } else {
+    row->semaphore = handle_of(pool_.open_shared_event(info.name));
+    if (row->semaphore) row->semaphore->cursor = std::get<SharedEvent>(row->semaphore->object).count();
   }
   return row;
 }
 
 objEntry_t ObjTab::entry_of(Row& row) noexcept {
-  objEntry_t entry{.tType = type_in_table(row.type), .pszName = row.name.data(), .u = {}};
+  objEntry_t entry{.tType = type_in_table(row.type).value_or(e_sem), .pszName = row.name.data(), .u = {}};
   if (row.type == ObjectType::memory) {
     entry.u.tShmEntry = {.ulAddress = reinterpret_cast<unsigned long>(row.memory.bytes().data()),
                          .ulSize = row.memory.bytes().size()};

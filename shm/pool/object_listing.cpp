@@ -6,20 +6,6 @@ namespace plchost {
 
 namespace {
 
-std::uint64_t value_of(const ObjectEntry& entry, ObjectType type) {
-  switch (type) {
-    case ObjectType::event:
-      return (entry.event.count() - entry.first_count.load(kRelaxed)) & CountedEvent::kCountMask;
-    case ObjectType::semaphore:
-      return entry.semaphore.value();
-    case ObjectType::mutex:
-      return entry.mutex.owner();
-    case ObjectType::memory:
-      break;
-  }
-  return 0;
-}
-
 std::vector<ReferenceInfo> references_of(const PoolView& view, const ObjectEntry& entry) {
   std::vector<ReferenceInfo> infos;
   const ReferenceEntry* reference = view.reference(entry.first_reference);
@@ -40,10 +26,11 @@ std::vector<ReferenceInfo> references_of(const PoolView& view, const ObjectEntry
 
 ObjectInfo describe_object(const PoolView& view, const ObjectEntry& entry) {
   const auto type = static_cast<ObjectType>(entry.type.load(kRelaxed));
+  const ObjectTraits* const traits = traits_of(type);
   const std::uint64_t binding = entry.binding.load(std::memory_order_acquire);
   ObjectInfo info{.name = std::string(entry.name.view()),
                   .type = type,
-                  .value = value_of(entry, type),
+                  .value = traits != nullptr ? traits->value(entry) : 0,
                   .size = entry.size.load(kRelaxed),
                   .registered = Binding::registered(binding),
                   .bound_tasks = Binding::bound(binding),

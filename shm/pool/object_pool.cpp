@@ -3,10 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <iterator>
-#include <limits>
-#include <new>
 #include <thread>
-#include <type_traits>
 
 #include <fmt/format.h>
 #include <sys/stat.h>
@@ -24,8 +21,7 @@ namespace plchost {
 struct ObjectPool::Wanted {
   std::string_view name;
   ObjectType type = ObjectType::event;
-  std::size_t size = 0;  // memory; 0: the size that it has
-  std::uint32_t value = 0;
+  std::uint64_t initial = 0;  // of a memory its size; 0: the one that it has
 };
 
 namespace {
@@ -40,7 +36,15 @@ Result<void> check_is(const ObjectEntry& entry, ObjectType type, std::string_vie
                                                     to_string(type_of(entry)), to_string(type)));
 }
 
-Result<void> check_size(const ObjectEntry& entry, std::size_t size, std::string_view name) {
+Result<void> check_initial(const ObjectTraits& traits, std::string_view name, std::uint64_t initial) {
+  if (initial >= traits.least_initial && initial <= traits.most_initial) return {};
+  return failure(ErrorCode::invalid_argument,
+                 fmt::format("{} '{}': {}; allowed are {} to {}", traits.name, shown(name),
+                             fmt::format(fmt::runtime(traits.value_form), initial), traits.least_initial,
+                             traits.most_initial));
+}
+
+Result<void> check_size(const ObjectEntry& entry, std::uint64_t size, std::string_view name) {
   const std::uint64_t found = entry.size.load(kRelaxed);
   if (size == 0 || type_of(entry) != ObjectType::memory || found == size) return {};
   return failure(ErrorCode::wrong_size, fmt::format("memory '{}' has {} bytes, not {}", name, found, size));
@@ -174,23 +178,23 @@ std::unexpected<Error> ObjectPool::no_room(const Wanted& wanted) const {
 }
 
 // `held` is null if the pool is mapped to read only.
-template <class T>
-Result<T> ObjectPool::refer(PoolLock* held, ObjectEntry& entry, const Wanted& wanted, Access access) const {
-  if (auto same = check_is(entry, wanted.type, wanted.name); !same) return std::unexpected(same.error());
-  if (auto same = check_size(entry, wanted.size, wanted.name); !same) return std::unexpected(same.error());
-  if (auto may = check_permitted(entry, access, wanted.name); !may) return std::unexpected(may.error());
-  T object;
-  object.entry_ = &entry;
-  object.generation_ = Binding::generation(entry.binding.load(std::memory_order_acquire));
-  object.writable_ = access == Access::read_write && segment_->writable();
+Result<void> ObjectPool::refer(PoolObject& object, PoolLock* held, ObjectEntry& entry, const Wanted& wanted,
+                               Access access) const {
+  if (auto same = check_is(entry, wanted.type, wanted.name); !same) return same;
+  if (auto same = check_size(entry, wanted.initial, wanted.name); !same) return same;
+  if (auto may = check_permitted(entry, access, wanted.name); !may) return may;
+  const bool writable = access == Access::read_write && segment_->writable();
   if (held != nullptr) {
-    const auto reference = segment_->add_reference(*held, entry, object.writable_);
+    const auto reference = segment_->add_reference(*held, entry, writable);
     if (!reference) return std::unexpected(reference.error());
     object.reference_ = *reference;
     object.reference_generation_ = (*reference)->generation.load(kRelaxed);
   }
+  object.entry_ = &entry;
+  object.generation_ = Binding::generation(entry.binding.load(std::memory_order_acquire));
+  object.writable_ = writable;
   object.segment_ = segment_;
-  return object;
+  return {};
 }
 
 Result<void> ObjectPool::map(SharedMemory& memory, const Wanted& wanted, Access access) const {
@@ -215,10 +219,8 @@ Result<ObjectEntry*> ObjectPool::make_entry(PoolLock& held, const Wanted& wanted
   ObjectEntry* const entry = objects.insert(wanted.name, wanted.type);
   if (entry == nullptr) return no_room(wanted);
   describe_new(*entry, rights_for(options, name()), attributes_for(options, wanted.type));
-  if (wanted.type == ObjectType::semaphore) new (&entry->semaphore) CountingSemaphore(wanted.value);
-  if (wanted.type == ObjectType::event) entry->binding.fetch_or(Binding::kRegistered);
+  traits_of(wanted.type)->begin(*entry, wanted.initial);
   if (memory != nullptr) {
-    entry->size.store(wanted.size, kRelaxed);
     // A file of that name that is no object, nor to be one, is what is left of another pool of the name.
     const auto named =
         memory->give_name([&](const std::string& path) { return !PoolAdoption::is_in_use(path, name()); });
@@ -231,16 +233,15 @@ Result<ObjectEntry*> ObjectPool::make_entry(PoolLock& held, const Wanted& wanted
   return entry;
 }
 
-template <class T>
-Result<Created<T>> ObjectPool::create_locked(const Wanted& wanted, const ObjectOptions& options,
-                                             UnnamedMemory* memory) {
+Result<bool> ObjectPool::create_locked(PoolObject& object, const Wanted& wanted, const ObjectOptions& options,
+                                       UnnamedMemory* memory) {
   auto held = segment_->lock();
   if (!held) return std::unexpected(held.error());
   ObjectEntry* entry = segment_->find(*held, wanted.name);
   bool made = entry == nullptr;
   if (entry != nullptr && wanted.type == ObjectType::memory && PoolAdoption::is_left_over(*entry)) {
     const auto left =
-        PoolAdoption::use_again(*segment_, *held, *entry, wanted.size, rights_for(options, name()),
+        PoolAdoption::use_again(*segment_, *held, *entry, wanted.initial, rights_for(options, name()),
                                 attributes_for(options, wanted.type));
     if (!left) return std::unexpected(left.error());
     made = true;
@@ -251,43 +252,46 @@ Result<Created<T>> ObjectPool::create_locked(const Wanted& wanted, const ObjectO
     if (!fresh) return std::unexpected(fresh.error());
     entry = *fresh;
   }
-  auto object = refer<T>(&*held, *entry, wanted, Access::read_write);
-  if (object) return Created<T>{.object = *std::move(object), .made = made};
+  auto referred = refer(object, &*held, *entry, wanted, Access::read_write);
+  if (referred) return made;
   if (made) segment_->destroy(*held, *entry);
-  return std::unexpected(std::move(object).error());
+  return std::unexpected(std::move(referred).error());
 }
 
-template <class T>
-Result<Created<T>> ObjectPool::create_object(const Wanted& wanted, const ObjectOptions& options) {
+Result<bool> ObjectPool::create_into(PoolObject& object, const Wanted& wanted, const ObjectOptions& options) {
   if (auto valid = check_object_name(wanted.name); !valid) return std::unexpected(valid.error());
+  if (auto good = check_initial(*traits_of(wanted.type), wanted.name, wanted.initial); !good) {
+    return std::unexpected(std::move(good).error());
+  }
   if (auto may = check_group(options); !may) return std::unexpected(may.error());
-  std::optional<UnnamedMemory> memory;
-  if constexpr (std::is_same_v<T, SharedMemory>) {
-    auto there = open_memory(wanted, Access::read_write);
-    if (there) return Created<T>{.object = *std::move(there), .made = false};
-    if (there.error().code != ErrorCode::not_found) return std::unexpected(std::move(there).error());
-    // The host takes its time to find so many bytes: not with the lock held.
-    auto unnamed =
-        UnnamedMemory::make(pool_memory_name(name(), wanted.name), wanted.size, rights_for(options, name()));
-    if (!unnamed) return std::unexpected(std::move(unnamed).error());
-    memory = *std::move(unnamed);
+  if (wanted.type == ObjectType::memory) {
+    return create_memory_into(static_cast<SharedMemory&>(object), wanted, options);
   }
-  auto created = create_locked<T>(wanted, options, memory ? &*memory : nullptr);
-  if constexpr (std::is_same_v<T, SharedMemory>) {
-    if (!created && created.error().code == ErrorCode::already_exists) {
-      // Firmware has just made it.
-      auto there = open_memory(wanted, Access::read_write);
-      if (there) return Created<T>{.object = *std::move(there), .made = false};
-      return failure(ErrorCode::refused,
-                     fmt::format("memory '{}': {}, and is in use by the runtime; choose another name",
-                                 wanted.name, created.error().message));
-    }
-    if (!created) return created;
-    if (auto mapped = map(created->object, wanted, Access::read_write); !mapped) {
-      return std::unexpected(std::move(mapped).error());
-    }
+  return create_locked(object, wanted, options, nullptr);
+}
+
+Result<bool> ObjectPool::create_memory_into(SharedMemory& object, const Wanted& wanted,
+                                            const ObjectOptions& options) {
+  const auto there = open_into(object, wanted, Access::read_write);
+  if (there) return false;
+  if (there.error().code != ErrorCode::not_found) return std::unexpected(there.error());
+  // The host takes its time to find so many bytes: not with the lock held.
+  auto unnamed =
+      UnnamedMemory::make(pool_memory_name(name(), wanted.name), wanted.initial, rights_for(options, name()));
+  if (!unnamed) return std::unexpected(std::move(unnamed).error());
+  auto made = create_locked(object, wanted, options, &*unnamed);
+  if (!made && made.error().code == ErrorCode::already_exists) {
+    // Firmware has just made it.
+    if (open_into(object, wanted, Access::read_write)) return false;
+    return failure(ErrorCode::refused,
+                   fmt::format("memory '{}': {}, and is in use by the runtime; choose another name",
+                               wanted.name, made.error().message));
   }
-  return created;
+  if (!made) return made;
+  if (auto mapped = map(object, wanted, Access::read_write); !mapped) {
+    return std::unexpected(std::move(mapped).error());
+  }
+  return made;
 }
 
 // Without the lock, whose word it may not write. If another process changes the table meanwhile, it looks
@@ -309,13 +313,12 @@ auto ObjectPool::look_only(TimePoint until, Look look) const {
   }
 }
 
-template <class T>
-Result<T> ObjectPool::find_and_refer(const Wanted& wanted, Access access) const {
-  const auto refer_to = [&](PoolLock* held, ObjectEntry* entry) -> Result<T> {
+Result<void> ObjectPool::find_and_refer(PoolObject& object, const Wanted& wanted, Access access) const {
+  const auto refer_to = [&](PoolLock* held, ObjectEntry* entry) -> Result<void> {
     if (entry == nullptr || PoolAdoption::is_left_over(*entry)) {
       return nothing_of_that_name(wanted.name, name());
     }
-    return refer<T>(held, *entry, wanted, access);
+    return refer(object, held, *entry, wanted, access);
   };
   if (!segment_->writable()) {
     if (access == Access::read_write) return std::unexpected(segment_->lock().error());
@@ -326,79 +329,41 @@ Result<T> ObjectPool::find_and_refer(const Wanted& wanted, Access access) const 
   return refer_to(&*held, segment_->find(*held, wanted.name));
 }
 
-template <class T>
-Result<T> ObjectPool::open_object(const Wanted& wanted, Access access) const {
-  if (auto valid = check_object_name(wanted.name); !valid) return std::unexpected(valid.error());
-  auto object = find_and_refer<T>(wanted, access);
-  if constexpr (std::is_same_v<T, SharedMemory>) {
-    if (!object) return object;
-    if (auto mapped = map(*object, wanted, access); !mapped)
-      return std::unexpected(std::move(mapped).error());
-  }
-  return object;
+Result<void> ObjectPool::open_once(PoolObject& object, const Wanted& wanted, Access access) const {
+  if (auto found = find_and_refer(object, wanted, access); !found) return found;
+  if (wanted.type != ObjectType::memory) return {};
+  auto mapped = map(static_cast<SharedMemory&>(object), wanted, access);
+  if (!mapped) object.close();
+  return mapped;
 }
 
-Result<Created<SharedEvent>> ObjectPool::create_shared_event(std::string_view name,
-                                                             const ObjectOptions& options) {
-  return create_object<SharedEvent>({.name = name, .type = ObjectType::event}, options);
-}
-
-Result<Created<SharedSemaphore>> ObjectPool::create_semaphore(std::string_view name, std::uint32_t value,
-                                                              const ObjectOptions& options) {
-  if (value > CountingSemaphore::kMaxValue) {
-    return failure(ErrorCode::invalid_argument,
-                   fmt::format("semaphore '{}': value {}; allowed are 0 to {}", shown(name), value,
-                               CountingSemaphore::kMaxValue));
-  }
-  return create_object<SharedSemaphore>({.name = name, .type = ObjectType::semaphore, .value = value},
-                                        options);
-}
-
-Result<Created<SharedMutex>> ObjectPool::create_mutex(std::string_view name, const ObjectOptions& options) {
-  return create_object<SharedMutex>({.name = name, .type = ObjectType::mutex}, options);
-}
-
-Result<Created<SharedMemory>> ObjectPool::create_memory(std::string_view name, std::size_t size,
-                                                        const ObjectOptions& options) {
-  constexpr auto kMost = static_cast<std::size_t>(std::numeric_limits<off_t>::max());
-  if (size == 0 || size > kMost) {
-    return failure(ErrorCode::invalid_argument,
-                   fmt::format("memory '{}': {} bytes; allowed are 1 to {}", shown(name), size, kMost));
-  }
-  return create_object<SharedMemory>({.name = name, .type = ObjectType::memory, .size = size}, options);
-}
-
-Result<SharedEvent> ObjectPool::open_shared_event(std::string_view name, Access access) const {
-  return open_object<SharedEvent>({.name = name, .type = ObjectType::event}, access);
-}
-
-Result<SharedSemaphore> ObjectPool::open_semaphore(std::string_view name, Access access) const {
-  return open_object<SharedSemaphore>({.name = name, .type = ObjectType::semaphore}, access);
-}
-
-Result<SharedMutex> ObjectPool::open_mutex(std::string_view name) const {
-  return open_object<SharedMutex>({.name = name, .type = ObjectType::mutex}, Access::read_write);
-}
-
-Result<SharedMemory> ObjectPool::open_memory(std::string_view name, Access access) const {
-  return open_memory(Wanted{.name = name, .type = ObjectType::memory}, access);
-}
-
-// A second time, if table and file disagreed.
-Result<SharedMemory> ObjectPool::open_memory(const Wanted& wanted, Access access) const {
-  auto memory = open_object<SharedMemory>(wanted, access);
-  const auto code = memory ? ErrorCode::ok : memory.error().code;
+// A memory a second time, if table and file disagreed.
+Result<void> ObjectPool::open_into(PoolObject& object, const Wanted& wanted, Access access) const {
+  if (auto valid = check_object_name(wanted.name); !valid) return valid;
+  auto opened = open_once(object, wanted, access);
+  const auto code = opened ? ErrorCode::ok : opened.error().code;
   const bool missed =
       code == ErrorCode::not_found || code == ErrorCode::corrupt || code == ErrorCode::refused;
-  if (!missed || !PoolAdoption::reconcile(*segment_, wanted.name)) return memory;
-  return open_object<SharedMemory>(wanted, access);
+  if (wanted.type != ObjectType::memory || !missed) return opened;
+  if (!PoolAdoption::reconcile(*segment_, wanted.name)) return opened;
+  return open_once(object, wanted, access);
+}
+
+Result<bool> ObjectPool::create_into(PoolObject& object, ObjectType type, std::string_view name,
+                                     std::uint64_t initial, const ObjectOptions& options) {
+  return create_into(object, Wanted{.name = name, .type = type, .initial = initial}, options);
+}
+
+Result<void> ObjectPool::open_into(PoolObject& object, ObjectType type, std::string_view name,
+                                   Access access) const {
+  return open_into(object, Wanted{.name = name, .type = type}, access);
 }
 
 // The entry of the old one goes first: a death in between leaves no half of either.
 Result<SharedMemory> ObjectPool::replace_memory(std::string_view name, std::size_t size,
                                                 const MemoryFile::Fill& fill) {
   if (auto valid = check_object_name(name); !valid) return std::unexpected(valid.error());
-  const Wanted wanted{.name = name, .type = ObjectType::memory, .size = size};
+  const Wanted wanted{.name = name, .type = ObjectType::memory, .initial = size};
   auto unnamed =
       UnnamedMemory::make(pool_memory_name(this->name(), name), size, rights_for({}, this->name()));
   if (!unnamed) return std::unexpected(std::move(unnamed).error());
@@ -415,7 +380,11 @@ Result<SharedMemory> ObjectPool::replace_memory(std::string_view name, std::size
     const auto made = make_entry(*held, wanted, {.keep = true}, &*unnamed);
     if (!made) return std::unexpected(made.error());
   }
-  return open_memory(wanted, Access::read_write);
+  SharedMemory memory;
+  if (auto opened = open_into(memory, wanted, Access::read_write); !opened) {
+    return std::unexpected(std::move(opened).error());
+  }
+  return memory;
 }
 
 Result<void> ObjectPool::remove_object(std::string_view name) {

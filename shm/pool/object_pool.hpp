@@ -90,28 +90,54 @@ class ObjectPool {
   Result<PoolEvent> create_event(std::string_view name) && = delete;
   Result<PoolEvent> open_event(std::string_view name) const&& = delete;
 
-  // The object of that name, made if it is not there. It goes with its last reference, unless it is kept.
-  // full: no room. wrong_type, wrong_size: the present object is another one. refused: its rights do not
-  // allow it.
-  [[nodiscard]] Result<Created<SharedEvent>> create_shared_event(std::string_view name,
-                                                                 const ObjectOptions& options = {});
-  /// `value` <= CountingSemaphore::kMaxValue.
-  [[nodiscard]] Result<Created<SharedSemaphore>> create_semaphore(std::string_view name, std::uint32_t value,
-                                                                  const ObjectOptions& options = {});
-  [[nodiscard]] Result<Created<SharedMutex>> create_mutex(std::string_view name,
-                                                          const ObjectOptions& options = {});
-  /// `size` in bytes, from 1 to what the host has room for; zero-filled when made.
-  [[nodiscard]] Result<Created<SharedMemory>> create_memory(std::string_view name, std::size_t size,
-                                                            const ObjectOptions& options = {});
+  /// The object of that name, made if it is not there. It goes with its last reference, unless it is kept.
+  /// `initial`: see ObjectTraits. full: no room. wrong_type, wrong_size: the present object is another one.
+  /// refused: its rights do not allow it.
+  template <class T>
+  [[nodiscard]] Result<Created<T>> create_object(std::string_view name, std::uint64_t initial = 0,
+                                                 const ObjectOptions& options = {}) {
+    Created<T> created;
+    const auto made = create_into(created.object, T::kType, name, initial, options);
+    if (!made) return std::unexpected(made.error());
+    created.made = *made;
+    return created;
+  }
+  /// not_found: no such object; and as above.
+  template <class T>
+  [[nodiscard]] Result<T> open_object(std::string_view name, Access access = Access::read_write) const {
+    T object;
+    if (const auto opened = open_into(object, T::kType, name, access); !opened) {
+      return std::unexpected(opened.error());
+    }
+    return object;
+  }
 
-  // not_found: no such object; and as above.
-  [[nodiscard]] Result<SharedEvent> open_shared_event(std::string_view name,
-                                                      Access access = Access::read_write) const;
-  [[nodiscard]] Result<SharedSemaphore> open_semaphore(std::string_view name,
-                                                       Access access = Access::read_write) const;
-  [[nodiscard]] Result<SharedMutex> open_mutex(std::string_view name) const;
-  [[nodiscard]] Result<SharedMemory> open_memory(std::string_view name,
-                                                 Access access = Access::read_write) const;
+  // The same of one type.
+  [[nodiscard]] auto create_shared_event(std::string_view name, const ObjectOptions& options = {}) {
+    return create_object<SharedEvent>(name, 0, options);
+  }
+  [[nodiscard]] auto create_semaphore(std::string_view name, std::uint32_t value,
+                                      const ObjectOptions& options = {}) {
+    return create_object<SharedSemaphore>(name, value, options);
+  }
+  [[nodiscard]] auto create_mutex(std::string_view name, const ObjectOptions& options = {}) {
+    return create_object<SharedMutex>(name, 0, options);
+  }
+  /// `size` in bytes, from 1 to what the host has room for; zero-filled when made.
+  [[nodiscard]] auto create_memory(std::string_view name, std::size_t size,
+                                   const ObjectOptions& options = {}) {
+    return create_object<SharedMemory>(name, size, options);
+  }
+  [[nodiscard]] auto open_shared_event(std::string_view name, Access access = Access::read_write) const {
+    return open_object<SharedEvent>(name, access);
+  }
+  [[nodiscard]] auto open_semaphore(std::string_view name, Access access = Access::read_write) const {
+    return open_object<SharedSemaphore>(name, access);
+  }
+  [[nodiscard]] auto open_mutex(std::string_view name) const { return open_object<SharedMutex>(name); }
+  [[nodiscard]] auto open_memory(std::string_view name, Access access = Access::read_write) const {
+    return open_object<SharedMemory>(name, access);
+  }
 
   /// A kept memory that `fill` has written, in the place of an old one of the name, which is gone for who has
   /// it open (and stays mapped). It has the name only when it is whole. wrong_type, refused, full.
@@ -142,21 +168,24 @@ class ObjectPool {
  private:
   struct Wanted;
   explicit ObjectPool(std::shared_ptr<PoolSegment> segment) noexcept : segment_(std::move(segment)) {}
-  template <class T>
-  [[nodiscard]] Result<Created<T>> create_object(const Wanted& wanted, const ObjectOptions& options);
-  template <class T>
-  [[nodiscard]] Result<Created<T>> create_locked(const Wanted& wanted, const ObjectOptions& options,
-                                                 UnnamedMemory* memory);
-  template <class T>
-  [[nodiscard]] Result<T> open_object(const Wanted& wanted, Access access) const;
-  template <class T>
-  [[nodiscard]] Result<T> find_and_refer(const Wanted& wanted, Access access) const;
-  template <class T>
-  [[nodiscard]] Result<T> refer(PoolLock* held, ObjectEntry& entry, const Wanted& wanted,
-                                Access access) const;
+  // Into an empty object of that type; true: it was made.
+  [[nodiscard]] Result<bool> create_into(PoolObject& object, ObjectType type, std::string_view name,
+                                         std::uint64_t initial, const ObjectOptions& options);
+  [[nodiscard]] Result<bool> create_into(PoolObject& object, const Wanted& wanted,
+                                         const ObjectOptions& options);
+  [[nodiscard]] Result<bool> create_memory_into(SharedMemory& object, const Wanted& wanted,
+                                                const ObjectOptions& options);
+  [[nodiscard]] Result<bool> create_locked(PoolObject& object, const Wanted& wanted,
+                                           const ObjectOptions& options, UnnamedMemory* memory);
+  [[nodiscard]] Result<void> open_into(PoolObject& object, ObjectType type, std::string_view name,
+                                       Access access) const;
+  [[nodiscard]] Result<void> open_into(PoolObject& object, const Wanted& wanted, Access access) const;
+  [[nodiscard]] Result<void> open_once(PoolObject& object, const Wanted& wanted, Access access) const;
+  [[nodiscard]] Result<void> find_and_refer(PoolObject& object, const Wanted& wanted, Access access) const;
+  [[nodiscard]] Result<void> refer(PoolObject& object, PoolLock* held, ObjectEntry& entry,
+                                   const Wanted& wanted, Access access) const;
   [[nodiscard]] Result<ObjectEntry*> make_entry(PoolLock& held, const Wanted& wanted,
                                                 const ObjectOptions& options, UnnamedMemory* memory);
-  [[nodiscard]] Result<SharedMemory> open_memory(const Wanted& wanted, Access access) const;
   [[nodiscard]] Result<void> map(SharedMemory& memory, const Wanted& wanted, Access access) const;
   [[nodiscard]] std::unexpected<Error> no_room(const Wanted& wanted) const;
   template <class Look>

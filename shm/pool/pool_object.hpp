@@ -8,6 +8,7 @@
 
 #include "shm/base/time.hpp"
 #include "shm/files/memory_file.hpp"
+#include "shm/pool/object_type.hpp"
 #include "shm/pool/pool_event.hpp"
 #include "shm/pool/pool_layout.hpp"
 
@@ -91,6 +92,8 @@ class PoolObject {
 /// A counted event: see CountedEvent. Each waiter has a cursor of its own, so nothing is taken from anyone.
 class SharedEvent : public PoolObject {
  public:
+  static constexpr ObjectType kType = ObjectType::event;
+
   /// One atomic add, and one wake if someone waits.
   ObjectStatus post() const noexcept {
     const ObjectStatus now = usable();
@@ -111,6 +114,8 @@ class SharedEvent : public PoolObject {
 /// For exclusive use take a mutex.
 class SharedSemaphore : public PoolObject {
  public:
+  static constexpr ObjectType kType = ObjectType::semaphore;
+
   ObjectStatus post() const noexcept;
   ObjectStatus wait(TimePoint deadline = kNoDeadline) const noexcept;
   ObjectStatus try_wait() const noexcept;
@@ -120,6 +125,8 @@ class SharedSemaphore : public PoolObject {
 /// See RobustMutex. It belongs to the thread that locked it.
 class SharedMutex : public PoolObject {
  public:
+  static constexpr ObjectType kType = ObjectType::mutex;
+
   ObjectStatus lock(TimePoint deadline = kNoDeadline) const noexcept;
   /// timed_out: it is held.
   ObjectStatus try_lock() const noexcept;
@@ -131,6 +138,8 @@ class SharedMutex : public PoolObject {
 /// A region of memory of its own, mapped into this process as long as this lives.
 class SharedMemory : public PoolObject {
  public:
+  static constexpr ObjectType kType = ObjectType::memory;
+
   /// Written only if writable(): else the first write is a SIGSEGV.
   [[nodiscard]] std::span<std::byte> bytes() const noexcept { return memory_.bytes(); }
   /// See MemoryFile.

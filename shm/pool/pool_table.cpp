@@ -86,8 +86,6 @@ ObjectEntry* PoolTable::insert(std::string_view name, ObjectType type) noexcept 
   begin_generation(*entry);
   // The count and the mark go on: a poster that was killed over the event before is told by them.
   entry->first_count.store(entry->event.set_taken(false).count(), kRelaxed);
-  new (&entry->semaphore) CountingSemaphore();
-  new (&entry->mutex) RobustMutex();
   entry->size.store(0, kRelaxed);
   entry->type.store(static_cast<std::uint32_t>(type), kRelaxed);
   entry->attributes.store(0, kRelaxed);

@@ -13,8 +13,8 @@ namespace {
 
 // A newer host may know more types: their numbers are shown.
 std::string type_text(ObjectType type) {
-  const auto number = static_cast<std::uint32_t>(type);
-  return number < kObjectTypes ? std::string(to_string(type)) : fmt::format("{}", number);
+  const ObjectTraits* const traits = traits_of(type);
+  return traits != nullptr ? std::string(traits->name) : fmt::format("{}", static_cast<std::uint32_t>(type));
 }
 
 std::string holder_text(const ListedObject& mutex) {
@@ -55,18 +55,15 @@ std::string holders_text(const ObjectInfo& object, std::size_t most) {
 
 std::string state_text(const ListedObject& object) {
   const ObjectInfo& info = object.info;
-  switch (info.type) {
-    case ObjectType::event:
-      return fmt::format("{} posts, {}registered, {} tasks", info.value, info.registered ? "" : "not ",
-                         info.bound_tasks);
-    case ObjectType::semaphore:
-      return fmt::format("value {}", info.value);
-    case ObjectType::mutex:
-      return holder_text(object);
-    case ObjectType::memory:
-      return fmt::format("{} bytes", info.size);
+  if (info.type == ObjectType::mutex) return holder_text(object);
+  const ObjectTraits* const traits = traits_of(info.type);
+  if (traits == nullptr) return fmt::format("value {}", info.value);
+  const std::uint64_t number = info.type == ObjectType::memory ? info.size : info.value;
+  std::string text = fmt::format(fmt::runtime(traits->value_form), number);
+  if (info.type == ObjectType::event) {
+    text += fmt::format(", {}registered, {} tasks", info.registered ? "" : "not ", info.bound_tasks);
   }
-  return fmt::format("value {}", info.value);
+  return text;
 }
 
 Row to_row(std::string_view host, const ListedObject& object) {

@@ -1,6 +1,7 @@
 #include "api/cli/verbs/object_verbs.hpp"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdio>
 #include <iterator>
@@ -37,6 +38,12 @@ Result<ObjectQuery> query_of(const ListArguments& arguments) {
   if (!type) return std::unexpected(type.error());
   query.type = *type;
   return query;
+}
+
+std::string type_names() {
+  std::array<std::string_view, kObjectTypes> names;
+  std::ranges::transform(kObjectTraits, names.begin(), &ObjectTraits::name);
+  return join_names(names);
 }
 
 // All pages of one host. The timeout is that of one page.
@@ -192,7 +199,7 @@ void add_list_objects(const Command& verb, CliSession& session) {
   verb.noun("objects", "The objects of the pool: types, contents, and the processes that hold them",
             [&session, arguments] { return list_objects(session, *arguments); })
       .optional("PATTERN", arguments->pattern, "only names like this: '*' any characters, '?' one")
-      .optional("--type", arguments->type, "only memory, semaphore, event or mutex");
+      .optional("--type", arguments->type, fmt::format("only one type: {}", type_names()).c_str());
 }
 
 void add_show_object(const Command& verb, CliSession& session) {

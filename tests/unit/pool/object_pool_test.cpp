@@ -283,6 +283,57 @@ TEST_F(ObjectPoolTest, MovedHandlesStayValid) {
   EXPECT_TRUE(sut.open_event("a"));
 }
 
+TEST(ObjectTraits, AreOneRowForEachTypeInTheOrderOfTheirNumbers) {
+  for (std::uint32_t number = 0; number < kObjectTypes; ++number) {
+    const auto type = static_cast<ObjectType>(number);
+    ASSERT_NE(traits_of(type), nullptr);
+    EXPECT_EQ(traits_of(type)->type, type);
+    EXPECT_EQ(to_string(type), traits_of(type)->name);
+  }
+  EXPECT_EQ(traits_of(ObjectType{kObjectTypes}), nullptr);
+}
+
+TEST(ObjectTraits, GiveEachObjectItsInitialValueAndTellIt) {
+  const UniquePoolName name;
+  auto pool = ObjectPool::create(name.get()).value();
+  const auto semaphore = pool.create_object<SharedSemaphore>("semaphore", 7).value();
+  const auto memory = pool.create_object<SharedMemory>("memory", 100).value();
+  const auto event = pool.create_object<SharedEvent>("event").value();
+  const auto mutex = pool.create_object<SharedMutex>("mutex").value();
+  EXPECT_EQ(semaphore.object.value(), 7U);
+  EXPECT_EQ(pool.look_at("semaphore")->value, 7U);
+  EXPECT_EQ(memory.object.bytes().size(), 100U);
+  EXPECT_EQ(pool.look_at("memory")->size, 100U);
+  EXPECT_EQ(pool.look_at("event")->value, 0U);
+  EXPECT_TRUE(pool.look_at("event")->registered);
+  EXPECT_EQ(pool.look_at("mutex")->value, 0U);
+}
+
+// The next object in a place does not see the words of an object of another type.
+TEST(ObjectTraits, BeginAnewInAPlaceThatWasUsed) {
+  const UniquePoolName name;
+  auto pool = ObjectPool::create(name.get()).value();
+  {
+    const auto semaphore = pool.create_object<SharedSemaphore>("a", 9).value();
+  }
+  const auto mutex = pool.create_object<SharedMutex>("b").value();
+  EXPECT_EQ(mutex.object.lock(), ObjectStatus::done);
+  EXPECT_EQ(mutex.object.unlock(), ObjectStatus::done);
+  const auto other = pool.create_object<SharedSemaphore>("c", 0).value();
+  EXPECT_EQ(other.object.value(), 0U);
+}
+
+TEST(ObjectTraits, RefuseAnInitialValueThatATypeDoesNotHave) {
+  const UniquePoolName name;
+  auto pool = ObjectPool::create(name.get()).value();
+  const auto event = pool.create_object<SharedEvent>("e", 1);
+  ASSERT_FALSE(event);
+  EXPECT_EQ(event.error().code, ErrorCode::invalid_argument);
+  EXPECT_EQ(event.error().message, "event 'e': 1 posts; allowed are 0 to 0");
+  EXPECT_FALSE(pool.create_object<SharedMemory>("m", 0));
+  EXPECT_FALSE(pool.look_at("e"));
+}
+
 TEST(ObjectType, HasTheNumbersOfTheSeed) {
   EXPECT_EQ(static_cast<int>(ObjectType::memory), 0);
   EXPECT_EQ(static_cast<int>(ObjectType::semaphore), 1);
