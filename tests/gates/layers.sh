@@ -90,12 +90,14 @@ def reach(layer, known):
 
 
 def find_circle():
-    """The layers of one way that ends where it began, or nothing."""
+    """The layers of one way that ends where it began, the first by name in front; or nothing."""
     done, way = set(), []
 
     def walk(layer):
         if layer in way:
-            return way[way.index(layer):] + [layer]
+            circle = way[way.index(layer):]
+            first = circle.index(min(circle))
+            return circle[first:] + circle[:first + 1]
         if layer in done:
             return None
         way.append(layer)
