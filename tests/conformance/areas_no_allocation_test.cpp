@@ -1,4 +1,9 @@
 // A cycle with inputs, outputs and retain variables around it.
+#include <array>
+#include <string>
+#include <utility>
+#include <vector>
+
 #include <gtest/gtest.h>
 
 #include "instances/runtime/memory/areas.hpp"
@@ -20,6 +25,7 @@ TEST(NoAllocation, InCyclesWithAreasOfEachKind) {
         "Linux.Area.1.Flags=8\nLinux.Area.1.Size=128\nLinux.Area.1.Object=out\n",
         "f");
     Areas areas;
+    std::vector<DeclaredArea> all;
     std::vector<TaskConfig> tasks(2);
     tasks[0].name = "High";
     tasks[1].name = "Low";
@@ -32,11 +38,12 @@ TEST(NoAllocation, InCyclesWithAreasOfEachKind) {
       declared.pszName = area;
       declared.dwBytes = 128;
       RTS_RESULT result = ERR_OK;
-      ASSERT_NE(areas.declare(&declared, result), RTS_INVALID_HANDLE);
+      ASSERT_NE(areas.declare(all, &declared, result), RTS_INVALID_HANDLE);
     }
+    ASSERT_TRUE(complete_uses(all, std::array<std::string, 2>{"High", "Low"}));
     const auto placed = areas.place(
         {.pool = &pool, .instance = "line1", .application = "A", .settings = settings->areas, .retain = {}},
-        tasks);
+        all, tasks);
     ASSERT_TRUE(placed) << placed.error().describe();
     MallocCount::begin();
     for (int cycle = 0; cycle < 10'000; ++cycle) {

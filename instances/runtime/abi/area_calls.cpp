@@ -14,11 +14,11 @@ RTS_HANDLE plc_declare_area(const Plc_Area* pArea, RTS_RESULT* pResult) {
 
 void* plc_area_address(RTS_HANDLE hArea) {
   const ApplicationHost* const host = ApplicationHost::current();
-  return host == nullptr || host->in_online_init() ? nullptr : host->areas().address(hArea);
+  return host == nullptr || host->in_init() ? nullptr : host->areas().address(hArea);
 }
 
 RTS_RESULT plc_get_area_state(RTS_HANDLE hArea, Plc_Area_State* pState) {
   const ApplicationHost* const host = ApplicationHost::current();
-  if (host == nullptr || host->in_online_init()) return ERR_NOTINITIALIZED;
+  if (host == nullptr || host->in_init()) return ERR_NOTINITIALIZED;
   return pState == nullptr ? ERR_PARAMETER : host->areas().state(hArea, *pState);
 }

@@ -25,7 +25,7 @@ namespace {
 
 TaskSet* tasks_of_host() noexcept {
   ApplicationHost* const host = ApplicationHost::current();
-  return host == nullptr || host->in_online_init() ? nullptr : host->task_table().tasks();
+  return host == nullptr || host->in_init() ? nullptr : host->task_table().tasks();
 }
 
 }  // namespace

@@ -11,8 +11,7 @@ namespace {
 // The task behind the handle, or why there is none.
 RTS_RESULT find_task(RTS_HANDLE handle, Task*& task) noexcept {
   ApplicationHost* const host = ApplicationHost::current();
-  if (host == nullptr || host->in_online_init() || host->task_table().tasks() == nullptr)
-    return ERR_NOTINITIALIZED;
+  if (host == nullptr || host->in_init() || host->task_table().tasks() == nullptr) return ERR_NOTINITIALIZED;
   task = host->task_table().task(handle);
   return task == nullptr ? ERR_PARAMETER : ERR_OK;
 }

@@ -59,32 +59,23 @@ void leave_online(SharedObject& object, ApplicationHost& host) {
 
 }  // namespace
 
-Result<Application> Application::load(const std::string& path, ApplicationHost& host) {
-  auto object = SharedObject::load(path, kExports);
+Result<DeclaredApplication> Application::load(const std::string& path, ApplicationHost& host) {
+  const bool beside = host.has_application();
+  auto object = beside ? SharedObject::load_copy(path, kExports) : SharedObject::load(path, kExports);
   if (!object) return std::unexpected(object.error());
-  host.begin_init();
+  ApplicationDeclaration declaration;
+  host.begin_init(declaration);
   auto called = call_init(*object);
   host.end_init();
   host.write_messages();  // its own error goes before ours
-  if (!called) return std::unexpected(called.error());
-  return built(*object, host.declaration());
-}
-
-Result<Application> Application::load_beside(const std::string& path, ApplicationHost& host,
-                                             ApplicationDeclaration& declaration) {
-  auto object = SharedObject::load_copy(path, kExports);
-  if (!object) return std::unexpected(object.error());
-  host.begin_init(&declaration);
-  auto called = call_init(*object);
-  host.end_init();
-  host.write_messages();
   if (!called) {
-    object->unload();
+    if (beside) object->unload();
     return std::unexpected(called.error());
   }
   auto made = built(*object, declaration);
-  if (!made) leave_online(*object, host);
-  return made;
+  if (made) return DeclaredApplication{*std::move(made), std::move(declaration)};
+  if (beside) leave_online(*object, host);
+  return std::unexpected(std::move(made).error());
 }
 
 Result<Application> Application::built(SharedObject& object, const ApplicationDeclaration& declaration) {

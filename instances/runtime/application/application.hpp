@@ -13,17 +13,15 @@
 
 namespace plchost {
 
+struct DeclaredApplication;
+
 /// The loaded program of the user.
 class Application {
  public:
-  /// Checks and loads the file, calls its plc_app_init and checks the tasks that it hands to `host`. The text
-  /// says what is wrong with the file or with which task. Control thread.
-  [[nodiscard]] static Result<Application> load(const std::string& path, ApplicationHost& host);
-
-  /// The same for another version of the one that runs, which can lie beside that: its calls are collected in
-  /// `declaration`, and change nothing of the running one.
-  [[nodiscard]] static Result<Application> load_beside(const std::string& path, ApplicationHost& host,
-                                                       ApplicationDeclaration& declaration);
+  /// Checks and loads the file, beside the application that runs if there is one, has its plc_app_init
+  /// called, which declares itself to `host`, and checks the tasks with their options. Nothing of the
+  /// declaration holds yet. The text says what is wrong with the file or with which task. Control thread.
+  [[nodiscard]] static Result<DeclaredApplication> load(const std::string& path, ApplicationHost& host);
 
   /// The settings of its tasks: they win over the application's own.
   [[nodiscard]] Result<void> apply(std::span<const TaskSettings> settings) {
@@ -61,6 +59,12 @@ class Application {
   const sys_setup_tasks_struct* setup_;  // in the application
   std::vector<TaskConfig> tasks_;
   TaskCodes codes_;  // in the order of tasks_
+};
+
+/// A program that is loaded, and what it has said of itself, of which nothing holds before a commit.
+struct DeclaredApplication {
+  Application application;
+  ApplicationDeclaration declaration;
 };
 
 }  // namespace plchost

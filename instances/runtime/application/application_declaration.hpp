@@ -25,15 +25,16 @@ struct EventCallback {
   bool operator==(const EventCallback&) const = default;
 };
 
-/// An application's declaration of itself in its plc_app_init.
+/// An application's declaration of itself in its plc_app_init. It is collected here, checked as a whole, and
+/// then committed: at the first load as in an online change. Nothing of it holds before.
 struct ApplicationDeclaration {
   sys_setup_tasks_struct* tasks = nullptr;  ///< in the application; null: nothing yet
   bool tasks_given_twice = false;
   std::vector<TaskSettings> task_options;
   std::vector<KeptVariables> variables;
-  std::vector<RTS_HANDLE> events;        ///< that it registers
-  std::vector<EventCallback> callbacks;  ///< of one that is to take over: the others' are called already
-  std::vector<DeclaredArea> areas;       ///< the same: those of the one that runs are in Areas
+  std::vector<RTS_HANDLE> events;  ///< own ones that it registers
+  std::vector<EventCallback> callbacks;
+  std::vector<DeclaredArea> areas;  ///< at the first load Areas gets them
 };
 
 }  // namespace plchost

@@ -16,6 +16,11 @@ namespace {
 
 ApplicationHost* the_host = nullptr;  // set before anything of an application runs, cleared after
 
+template <class Range, class Value, class Projection = std::identity>
+bool has(const Range& range, const Value& value, Projection projection = {}) {
+  return std::ranges::find(range, value, projection) != range.end();
+}
+
 }  // namespace
 
 ApplicationHost::ApplicationHost(const std::string& instance, ObjectPool* pool)
@@ -38,59 +43,61 @@ ApplicationHost* ApplicationHost::current_for_control() noexcept {
   return nullptr;
 }
 
-void ApplicationHost::begin_init(ApplicationDeclaration* online) noexcept {
-  in_init_ = true;
-  online_declaration_ = online;
-  online_ = online != nullptr;
+void ApplicationHost::begin_init(ApplicationDeclaration& declaration) noexcept {
+  collected_ = &declaration;
+  online_ = has_application_;
 }
 
 void ApplicationHost::end_init() noexcept {
-  in_init_ = online_ = false;
-  online_declaration_ = nullptr;
+  online_ = false;
+  collected_ = nullptr;
 }
 
-bool ApplicationHost::in_online_init() const noexcept {
-  return std::this_thread::get_id() == control_thread_ && online_declaration_ != nullptr;
+bool ApplicationHost::in_init() const noexcept {
+  return std::this_thread::get_id() == control_thread_ && collected_ != nullptr;
 }
 
-void ApplicationHost::take_over(ApplicationDeclaration online,
-                                const std::function<bool(const void*)>& is_code) {
-  for (const RTS_HANDLE event : declaration_.events) {
-    if (std::ranges::find(online.events, event) == online.events.end())
-      (void)events_.unregister_by_application(event);
-  }
-  std::erase_if(callbacks_, [&](const Callback& known) {
-    return known.of_init || is_code(std::bit_cast<const void*>(known.callback.function));
-  });
-  for (const EventCallback& callback : online.callbacks) {
-    callbacks_.push_back({.callback = callback, .of_init = true});
-  }
-  declaration_ = std::move(online);
-}
-
-Result<void> ApplicationHost::register_more(const ApplicationDeclaration& online) {
-  for (const RTS_HANDLE event : online.events) {
-    if (std::ranges::find(declaration_.events, event) != declaration_.events.end()) continue;
+Result<void> ApplicationHost::reserve(const ApplicationDeclaration& declaration) {
+  for (const RTS_HANDLE event : declaration.events) {
+    if (has(declaration_.events, event)) continue;
     if (auto done = events_.register_by_application(event); !done) {
-      unregister_more(online);
+      release(declaration);
       return done;
     }
   }
   return {};
 }
 
-void ApplicationHost::unregister_more(const ApplicationDeclaration& online) {
-  for (const RTS_HANDLE event : online.events) {
-    if (std::ranges::find(declaration_.events, event) == declaration_.events.end())
-      (void)events_.unregister_by_application(event);
+void ApplicationHost::release(const ApplicationDeclaration& declaration) {
+  for (const RTS_HANDLE event : declaration.events) {
+    if (!has(declaration_.events, event)) (void)events_.unregister_by_application(event);
   }
 }
 
+void ApplicationHost::commit(ApplicationDeclaration declaration,
+                             const std::function<bool(const void*)>& is_code) {
+  for (const RTS_HANDLE event : declaration_.events) {
+    if (!has(declaration.events, event)) (void)events_.unregister_by_application(event);
+  }
+  std::erase_if(callbacks_, [&](const Callback& known) {
+    return known.of_application || is_code(std::bit_cast<const void*>(known.callback.function));
+  });
+  for (const EventCallback& callback : declaration.callbacks) {
+    callbacks_.push_back({.callback = callback, .of_application = true});
+  }
+  declaration_ = std::move(declaration);
+  has_application_ = true;
+}
+
 void ApplicationHost::set_up_tasks(sys_setup_tasks_struct* tasks) noexcept {
-  ApplicationDeclaration& said = online_declaration_ != nullptr ? *online_declaration_ : declaration_;
-  said.tasks_given_twice = said.tasks_given_twice || said.tasks != nullptr;
-  said.tasks = tasks;
-  if (online_declaration_ == nullptr) task_table_.set_up(tasks);
+  if (collected_ == nullptr) {
+    spdlog::error("__sys__setup__tasks: tasks are handed over in plc_app_init only");
+    return;
+  }
+  collected_->tasks_given_twice = collected_->tasks_given_twice || collected_->tasks != nullptr;
+  collected_->tasks = tasks;
+  // Handles are there from this call on. Those of another version are those of the tasks that run.
+  if (!has_application_) task_table_.set_up(tasks);
 }
 
 RTS_RESULT ApplicationHost::keep_variables(const KeptVariables& variables) {
@@ -98,54 +105,49 @@ RTS_RESULT ApplicationHost::keep_variables(const KeptVariables& variables) {
     spdlog::error("plc_keep_variables: variables '{}': {}", shown(variables.name), text);
     return why;
   };
-  if (!in_init_) return refuse(ERR_NOTINITIALIZED, "they are named in plc_app_init only");
+  if (collected_ == nullptr) return refuse(ERR_NOTINITIALIZED, "they are named in plc_app_init only");
   if (auto valid = check_name("variables", variables.name, PLC_MAX_VARIABLE_NAME); !valid)
     return refuse(ERR_PARAMETER, valid.error().message);
   if (variables.address == nullptr || variables.bytes == 0)
     return refuse(ERR_PARAMETER, "pAddress is null or dwBytes is 0");
-  ApplicationDeclaration& said = online_declaration_ != nullptr ? *online_declaration_ : declaration_;
   std::uint64_t bytes = variables.bytes;
-  for (const KeptVariables& known : said.variables) {
+  for (const KeptVariables& known : collected_->variables) {
     if (known.name == variables.name) return refuse(ERR_DUPLICATE, "are named twice");
     bytes += known.bytes;
   }
-  if (said.variables.size() == PLC_MAX_VARIABLES || bytes > PLC_MAX_VARIABLE_BYTES) {
+  if (collected_->variables.size() == PLC_MAX_VARIABLES || bytes > PLC_MAX_VARIABLE_BYTES) {
     return refuse(ERR_NOMEMORY, fmt::format("at most {} with {} bytes in all can be named", PLC_MAX_VARIABLES,
                                             PLC_MAX_VARIABLE_BYTES));
   }
-  said.variables.push_back(variables);
+  collected_->variables.push_back(variables);
   return ERR_OK;
 }
 
 RTS_HANDLE ApplicationHost::declare_area(const Plc_Area* area, RTS_RESULT& result) {
-  if (online_declaration_ == nullptr) return areas_.declare(area, result);
-  return areas_.declare_again(online_declaration_->areas, area, result);
+  if (collected_ != nullptr) return areas_.declare(collected_->areas, area, result);
+  spdlog::error("plc_declare_area: areas are declared in plc_app_init only");
+  result = ERR_NOTINITIALIZED;
+  return RTS_INVALID_HANDLE;
 }
 
 RTS_RESULT ApplicationHost::register_event(RTS_HANDLE event) {
-  if (online_declaration_ != nullptr) {
-    // By the program that runs it is no obstacle; by a component it is.
-    const auto has = [&](const std::vector<RTS_HANDLE>& events) {
-      return std::ranges::find(events, event) != events.end();
-    };
-    const bool by_component = events_.is_by_application(event) && !has(declaration_.events);
-    if (by_component || has(online_declaration_->events)) return ERR_DUPLICATE;
-    online_declaration_->events.push_back(event);
+  if (collected_ != nullptr && events_.is_own(event)) {
+    // By the application that runs it is no obstacle; by a component it is.
+    const bool by_component = events_.is_by_application(event) && !has(declaration_.events, event);
+    if (by_component || has(collected_->events, event)) return ERR_DUPLICATE;
+    collected_->events.push_back(event);
     return ERR_OK;
   }
   const auto registered = events_.register_by_application(event);
-  if (registered) {
-    if (in_init_) declaration_.events.push_back(event);
-    return ERR_OK;
-  }
+  if (registered) return ERR_OK;
   if (registered.error().code == ErrorCode::already_exists) return ERR_DUPLICATE;
   spdlog::error("SchedRegisterExternalEvent: {}", registered.error().describe());
   return ERR_NOMEMORY;
 }
 
 RTS_RESULT ApplicationHost::unregister_event(RTS_HANDLE event) {
-  if (online_declaration_ != nullptr) {
-    return std::erase(online_declaration_->events, event) == 0 ? ERR_NO_OBJECT : ERR_OK;
+  if (collected_ != nullptr && events_.is_own(event)) {
+    return std::erase(collected_->events, event) == 0 ? ERR_NO_OBJECT : ERR_OK;
   }
   const auto done = events_.unregister_by_application(event);
   if (!done) return done.error().code == ErrorCode::not_found ? ERR_NO_OBJECT : ERR_PARAMETER;
@@ -154,16 +156,17 @@ RTS_RESULT ApplicationHost::unregister_event(RTS_HANDLE event) {
 }
 
 RTS_RESULT ApplicationHost::set_task_options(const char* task, const Task_Options* options) {
+  if (collected_ == nullptr) {
+    spdlog::error("plc_set_task_options: options are set in plc_app_init only");
+    return ERR_NOTINITIALIZED;
+  }
   auto settings = from_options(task, options);
   if (!settings) {
     spdlog::error("plc_set_task_options: {}", settings.error().describe());
     return ERR_PARAMETER;
   }
-  ApplicationDeclaration& said = online_declaration_ != nullptr ? *online_declaration_ : declaration_;
-  if (std::ranges::find(said.task_options, settings->task, &TaskSettings::task) != said.task_options.end()) {
-    return ERR_DUPLICATE;
-  }
-  said.task_options.push_back(*std::move(settings));
+  if (has(collected_->task_options, settings->task, &TaskSettings::task)) return ERR_DUPLICATE;
+  collected_->task_options.push_back(*std::move(settings));
   return ERR_OK;
 }
 
@@ -171,32 +174,32 @@ RTS_RESULT ApplicationHost::add_callback(unsigned event, PF_EVENT_CALLBACK callb
   const bool known = event == EVT_ExternalEventTaskCreateDone || event == EVT_PrepareExternalEventTaskDelete;
   if (!known || callback == nullptr) return ERR_PARAMETER;
   const EventCallback wanted{event, callback, user};
-  if (online_declaration_ != nullptr) {
-    auto& said = online_declaration_->callbacks;
-    if (std::ranges::find(said, wanted) != said.end()) return ERR_DUPLICATE;
-    const auto others = std::ranges::count(callbacks_, false, &Callback::of_init);
+  if (collected_ != nullptr) {
+    auto& said = collected_->callbacks;
+    if (has(said, wanted)) return ERR_DUPLICATE;
+    const auto others = std::ranges::count(callbacks_, false, &Callback::of_application);
     if (said.size() + static_cast<std::size_t>(others) == PLC_MAX_EVENT_CALLBACKS) return ERR_NOMEMORY;
     said.push_back(wanted);
     return ERR_OK;
   }
-  if (std::ranges::find(callbacks_, wanted, &Callback::callback) != callbacks_.end()) return ERR_DUPLICATE;
+  if (has(callbacks_, wanted, &Callback::callback)) return ERR_DUPLICATE;
   if (callbacks_.size() == PLC_MAX_EVENT_CALLBACKS) return ERR_NOMEMORY;
-  callbacks_.push_back({.callback = wanted, .of_init = in_init_});
+  callbacks_.push_back({.callback = wanted, .of_application = false});
   return ERR_OK;
 }
 
 RTS_RESULT ApplicationHost::remove_callback(unsigned event, PF_EVENT_CALLBACK callback, void* user) {
   const EventCallback wanted{event, callback, user};
   const bool removed =
-      online_declaration_ != nullptr
-          ? std::erase(online_declaration_->callbacks, wanted) != 0
+      collected_ != nullptr
+          ? std::erase(collected_->callbacks, wanted) != 0
           : std::erase_if(callbacks_, [&](const Callback& known) { return known.callback == wanted; }) != 0;
   return removed ? ERR_OK : ERR_NO_OBJECT;
 }
 
 void ApplicationHost::notify(unsigned event, const EVTPARAM_ExternalEventTask& parameter) const {
   const auto now = callbacks_;  // a callback may register or unregister
-  for (const auto& [callback, of_init] : now) {
+  for (const auto& [callback, of_application] : now) {
     if (callback.event != event) continue;
     try {
       callback.function(event, &parameter, callback.user);

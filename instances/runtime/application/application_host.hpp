@@ -43,22 +43,26 @@ class ApplicationHost {
 
   /// The declaration of the running application.
   [[nodiscard]] const ApplicationDeclaration& declaration() const noexcept { return declaration_; }
+  /// An application is committed: another one can only take over from it.
+  [[nodiscard]] bool has_application() const noexcept { return has_application_; }
 
-  /// From here to end_init() a plc_app_init runs. `online`: of a program that is to take over from the one
-  /// that runs: its calls are collected there, and change nothing else.
-  void begin_init(ApplicationDeclaration* online = nullptr) noexcept;
+  /// From here to end_init() a plc_app_init runs. Its calls are collected in `declaration`, and change
+  /// nothing else.
+  void begin_init(ApplicationDeclaration& declaration) noexcept;
   void end_init() noexcept;
-  /// The caller is in the plc_app_init of a program that is to take over. Any context.
-  [[nodiscard]] bool in_online_init() const noexcept;
+  /// The caller is in a plc_app_init. Any context.
+  [[nodiscard]] bool in_init() const noexcept;
   /// The answer of plc_online_change().
   [[nodiscard]] bool online_change() const noexcept { return online_; }
   void set_online_change(bool online) noexcept { online_ = online; }
-  /// The declaration of `online` holds from now on. Callbacks of the program before, and others in its code
-  /// as `is_code` says, are forgotten.
-  void take_over(ApplicationDeclaration online, const std::function<bool(const void*)>& is_code);
-  /// Registers the events of `online` that the program before has not registered; all, or none.
-  [[nodiscard]] Result<void> register_more(const ApplicationDeclaration& online);
-  void unregister_more(const ApplicationDeclaration& online);
+
+  /// The part of a commit that can fail, and that release() takes back: registers the events of `declaration`
+  /// that the application before has not registered; all, or none.
+  [[nodiscard]] Result<void> reserve(const ApplicationDeclaration& declaration);
+  void release(const ApplicationDeclaration& declaration);
+  /// The reserved `declaration` holds from now on. Callbacks of the application before, and others in its
+  /// code as `is_code` says, are forgotten, and so are its events.
+  void commit(ApplicationDeclaration declaration, const std::function<bool(const void*)>& is_code);
 
   void set_up_tasks(sys_setup_tasks_struct* tasks) noexcept;
   [[nodiscard]] RTS_RESULT set_task_options(const char* task, const Task_Options* options);
@@ -77,7 +81,7 @@ class ApplicationHost {
  private:
   struct Callback {
     EventCallback callback;
-    bool of_init;  // registered by the application in its plc_app_init
+    bool of_application;  // of its declaration
   };
 
   std::thread::id control_thread_ = std::this_thread::get_id();
@@ -88,8 +92,8 @@ class ApplicationHost {
   Areas areas_;
   int start_kind_ = PLC_START_FIRST;
   ApplicationDeclaration declaration_;
-  bool in_init_ = false;
-  ApplicationDeclaration* online_declaration_ = nullptr;  // while its plc_app_init runs
+  bool has_application_ = false;
+  ApplicationDeclaration* collected_ = nullptr;  // while a plc_app_init runs
   bool online_ = false;
   std::vector<Callback> callbacks_;
 };

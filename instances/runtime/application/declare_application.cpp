@@ -1,6 +1,8 @@
 #include "instances/runtime/application/declare_application.hpp"
 
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "instances/runtime/application/device_events.hpp"
 #include "instances/runtime/time/system_time.hpp"
@@ -39,17 +41,30 @@ Result<void> load_components(const InstanceSettings& settings, ComponentHooks ho
   return loaded;
 }
 
-Result<Application> declare_application(const std::string& path, const StartSettings& start,
-                                        ApplicationHost& host) {
-  auto application = Application::load(path, host);
-  if (!application) return application;
+namespace {
+
+// As a whole: `declared` is complete then.
+Result<void> check_declaration(const StartSettings& start, DeclaredApplication& declared) {
+  Application& application = declared.application;
   if (start.device) {
-    if (auto known = check_device_events(*start.device, application->tasks()); !known)
-      return std::unexpected(std::move(known).error());
+    if (auto known = check_device_events(*start.device, application.tasks()); !known) return known;
   }
-  if (auto applied = application->apply(start.settings.tasks); !applied)
-    return std::unexpected(std::move(applied).error());
-  return application;
+  if (auto applied = application.apply(start.settings.tasks); !applied) return applied;
+  std::vector<std::string> names;
+  for (const TaskConfig& task : application.tasks()) names.push_back(task.name);
+  return complete_uses(declared.declaration.areas, names);
+}
+
+}  // namespace
+
+Result<DeclaredApplication> declare_application(const std::string& path, const StartSettings& start,
+                                                ApplicationHost& host) {
+  auto declared = Application::load(path, host);
+  if (!declared) return declared;
+  auto checked = check_declaration(start, *declared);
+  if (checked) return declared;
+  if (host.has_application()) declared->application.leave(host);
+  return std::unexpected(std::move(checked).error());
 }
 
 Areas::Environment areas_environment(const LaunchOptions& launch, const InstanceSettings& settings,

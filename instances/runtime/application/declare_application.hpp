@@ -35,10 +35,14 @@ enum class ComponentHooks : bool { check, init };
 [[nodiscard]] Result<void> load_components(const InstanceSettings& settings, ComponentHooks hooks,
                                            Components& components, ApplicationHost& host);
 
-/// Loads it, has it declare itself to `host`, and applies the settings of its tasks. The error is the first
-/// thing that is wrong. Set-up.
-[[nodiscard]] Result<Application> declare_application(const std::string& path, const StartSettings& start,
-                                                      ApplicationHost& host);
+/// Loads it, has it declare itself to `host`, applies the settings of its tasks, and checks the declaration
+/// as a whole: tasks, external events, uses of areas. Another version of the application that runs is loaded
+/// beside that, and is gone again after an error, which is the first thing that is wrong. Then follows a
+/// commit: ApplicationHost::reserve(), Areas::place() at the first load or OnlineChange::take_over(),
+/// ApplicationHost::commit(). Set-up.
+[[nodiscard]] Result<DeclaredApplication> declare_application(const std::string& path,
+                                                              const StartSettings& start,
+                                                              ApplicationHost& host);
 
 /// For Areas::check() and Areas::place(). `application` and `settings` outlive it; `pool` may be null.
 [[nodiscard]] Areas::Environment areas_environment(const LaunchOptions& launch,

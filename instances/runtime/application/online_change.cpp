@@ -34,16 +34,14 @@ void copy_figures(const Task_Info& from, Task_Info& to) noexcept {
 
 }  // namespace
 
-Result<std::unique_ptr<OnlineChange>> OnlineChange::prepare(const std::string& path, Application& running,
-                                                            ApplicationHost& host,
-                                                            std::span<const TaskSettings> settings) {
-  ApplicationDeclaration declaration;
+Result<std::unique_ptr<OnlineChange>> OnlineChange::prepare(const std::string& path,
+                                                            const StartSettings& start, Application& running,
+                                                            ApplicationHost& host) {
   const TimePoint begin = MonotonicClock::now();
-  auto next = Application::load_beside(path, host, declaration);
+  auto next = declare_application(path, start, host);
   if (!next) return std::unexpected(std::move(next).error());
   // From here on its destructor ends the new version.
-  std::unique_ptr<OnlineChange> change(
-      new OnlineChange(running, *std::move(next), std::move(declaration), host));
+  std::unique_ptr<OnlineChange> change(new OnlineChange(running, *std::move(next), host));
   if (const Duration took = MonotonicClock::now() - begin; took > kLongestSetup) {
     return failure(ErrorCode::timed_out,
                    fmt::format("{} cannot take over online: its set-up took {:.1f} s, allowed are {:.0f} s; "
@@ -51,21 +49,17 @@ Result<std::unique_ptr<OnlineChange>> OnlineChange::prepare(const std::string& p
                                path, std::chrono::duration<double>(took).count(),
                                std::chrono::duration<double>(kLongestSetup).count()));
   }
-  if (auto checked = change->check(settings); !checked) return std::unexpected(std::move(checked).error());
+  if (auto same = change->compare(); !same) return std::unexpected(std::move(same).error());
   if (auto connected = change->connect(); !connected) return std::unexpected(std::move(connected).error());
   return change;
 }
 
 OnlineChange::~OnlineChange() {
-  if (connected_ && !taken_over_) host_.unregister_more(declaration_);
+  if (connected_ && !taken_over_) host_.release(declaration_);
   next_.leave(host_);  // or the version before
 }
 
-Result<void> OnlineChange::check(std::span<const TaskSettings> settings) {
-  if (auto applied = next_.apply(settings); !applied) return applied;
-  std::vector<std::string> names;
-  for (const TaskConfig& task : next_.tasks()) names.push_back(task.name);
-  if (auto done = complete_uses(declaration_.areas, names); !done) return done;
+Result<void> OnlineChange::compare() const {
   std::vector<std::string> lines;
   if (next_.name() != running_.name()) {
     lines.push_back(fmt::format("it is the application '{}', '{}' runs", next_.name(), running_.name()));
@@ -81,7 +75,7 @@ Result<void> OnlineChange::check(std::span<const TaskSettings> settings) {
 }
 
 Result<void> OnlineChange::connect() {
-  if (auto registered = host_.register_more(declaration_); !registered) return registered;
+  if (auto reserved = host_.reserve(declaration_); !reserved) return reserved;
   connected_ = true;
   host_.areas().tell_addresses(declaration_.areas);
   for (const TaskConfig& task : running_.tasks()) {
@@ -112,7 +106,7 @@ void OnlineChange::take_over() noexcept {
 
 void OnlineChange::finish(const std::function<void()>& notify) {
   // next_ is the version before now.
-  host_.take_over(std::move(declaration_), [this](const void* code) { return next_.contains(code); });
+  host_.commit(std::move(declaration_), [this](const void* code) { return next_.contains(code); });
   notify();
 }
 

@@ -2,13 +2,13 @@
 
 #include <cstddef>
 #include <memory>
-#include <span>
 #include <string>
 #include <vector>
 
 #include "instances/runtime/application/application.hpp"
 #include "instances/runtime/application/application_declaration.hpp"
 #include "instances/runtime/application/application_host.hpp"
+#include "instances/runtime/application/declare_application.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
 
@@ -24,9 +24,9 @@ class OnlineChange {
   /// refused: it cannot take over; the text lists the reasons. timed_out: its set-up took too long. Else: the
   /// fault of the file.
   [[nodiscard]] static Result<std::unique_ptr<OnlineChange>> prepare(const std::string& path,
+                                                                     const StartSettings& start,
                                                                      Application& running,
-                                                                     ApplicationHost& host,
-                                                                     std::span<const TaskSettings> settings);
+                                                                     ApplicationHost& host);
   /// Without take_over() the new version ends, and nothing is left of it.
   ~OnlineChange();
   OnlineChange(const OnlineChange&) = delete;
@@ -44,10 +44,12 @@ class OnlineChange {
   [[nodiscard]] std::string describe() const;
 
  private:
-  OnlineChange(Application& running, Application next, ApplicationDeclaration declaration,
-               ApplicationHost& host)
-      : running_(running), next_(std::move(next)), declaration_(std::move(declaration)), host_(host) {}
-  [[nodiscard]] Result<void> check(std::span<const TaskSettings> settings);
+  OnlineChange(Application& running, DeclaredApplication next, ApplicationHost& host)
+      : running_(running),
+        next_(std::move(next.application)),
+        declaration_(std::move(next.declaration)),
+        host_(host) {}
+  [[nodiscard]] Result<void> compare() const;
   [[nodiscard]] Result<void> connect();
 
   struct Copy {

@@ -179,11 +179,17 @@ Result<std::string> Instance::load_components() {
 
 Result<std::string> Instance::load_application() {
   if (options_.launch.application.empty()) return "no application is given: there is nothing to run";
-  auto application = declare_application(options_.launch.application, start_, *host_);
-  if (!application) return std::unexpected(std::move(application).error());
-  application_.emplace(*std::move(application));
-  return host_->areas().place(areas_environment(options_.launch, start_.settings, *application_, &*pool_),
-                              application_->tasks_to_change());
+  auto declared = declare_application(options_.launch.application, start_, *host_);
+  if (!declared) return std::unexpected(std::move(declared).error());
+  auto& [application, declaration] = *declared;
+  application_.emplace(std::move(application));
+  if (auto reserved = host_->reserve(declaration); !reserved)
+    return std::unexpected(std::move(reserved).error());
+  auto remark =
+      host_->areas().place(areas_environment(options_.launch, start_.settings, *application_, &*pool_),
+                           std::move(declaration.areas), application_->tasks_to_change());
+  if (remark) host_->commit(std::move(declaration), [](const void*) { return false; });
+  return remark;
 }
 
 Result<std::string> Instance::make_status_page() {

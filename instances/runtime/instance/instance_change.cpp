@@ -25,7 +25,7 @@ Result<std::string> Instance::begin_change(const std::string& path) {
                    fmt::format("in exception: task {}, which may be in the code that would go; reset first",
                                join_names(faulty)));
   }
-  auto change = OnlineChange::prepare(path, *application_, *host_, start_.settings.tasks);
+  auto change = OnlineChange::prepare(path, start_, *application_, *host_);
   if (!change) return std::unexpected(std::move(change).error());
   change_ = *std::move(change);
   change_ends_ = MonotonicClock::now() + kPatience;

@@ -80,19 +80,10 @@ void TaskCycle::end() noexcept {
   }
 }
 
-RTS_HANDLE Areas::declare(const Plc_Area* area, RTS_RESULT& result) {
-  if (!open_) {
-    result = refuse_area(ERR_NOTINITIALIZED, "areas are declared from plc_app_init only");
-    return RTS_INVALID_HANDLE;
-  }
-  result = add_area(declared_, area);
-  return result == ERR_OK ? handle_of(declared_.size() - 1) : RTS_INVALID_HANDLE;
-}
-
-RTS_HANDLE Areas::declare_again(std::vector<DeclaredArea>& areas, const Plc_Area* area,
-                                RTS_RESULT& result) const {
+RTS_HANDLE Areas::declare(std::vector<DeclaredArea>& areas, const Plc_Area* area, RTS_RESULT& result) const {
   result = add_area(areas, area);
   if (result != ERR_OK) return RTS_INVALID_HANDLE;
+  if (!placed_) return handle_of(areas.size() - 1);
   const auto known = std::ranges::find(declared_, areas.back().name, &DeclaredArea::name);
   return handle_of(static_cast<std::size_t>(known - declared_.begin()));
 }
@@ -137,8 +128,8 @@ std::vector<std::string> Areas::look_for_losses() {
 
 RTS_RESULT Areas::state(RTS_HANDLE area, Plc_Area_State& state) const noexcept {
   const std::size_t number = number_of(area);
-  if (number >= declared_.size() || state.dwSize != sizeof(Plc_Area_State)) return ERR_PARAMETER;
   if (!placed_) return ERR_NOTINITIALIZED;
+  if (number >= declared_.size() || state.dwSize != sizeof(Plc_Area_State)) return ERR_PARAMETER;
   state = {};
   state.dwSize = sizeof(Plc_Area_State);
   const DeclaredArea& declared = declared_[number];

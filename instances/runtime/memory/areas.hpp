@@ -72,27 +72,25 @@ class Areas {
     RetainKeeper::Options retain;
   };
 
-  /// plc_declare_area. Control thread, while the application is loaded.
-  [[nodiscard]] RTS_HANDLE declare(const Plc_Area* area, RTS_RESULT& result);
-  /// The same, for another version of the application that is to take over: collected in `areas`. The handle
-  /// is that of the area of this name.
-  [[nodiscard]] RTS_HANDLE declare_again(std::vector<DeclaredArea>& areas, const Plc_Area* area,
-                                         RTS_RESULT& result) const;
-  /// All that is declared, with the tasks that use it.
+  /// plc_declare_area: checks it and adds it to `areas`. The handle of another version's area is that of the
+  /// placed one of this name. Control thread.
+  [[nodiscard]] RTS_HANDLE declare(std::vector<DeclaredArea>& areas, const Plc_Area* area,
+                                   RTS_RESULT& result) const;
+  /// All that is placed, with the tasks that use it.
   [[nodiscard]] const std::vector<DeclaredArea>& declared() const noexcept { return declared_; }
   /// Tells another version of the application, which has declared the same areas, the addresses. Control
   /// thread, before its first cycle.
   void tell_addresses(const std::vector<DeclaredArea>& areas) const;
-  /// Whether place() would find fault with what is declared: it begins with this. Makes and changes nothing,
-  /// and opens no device, so that an instance can have all of it meanwhile. Set-up.
-  [[nodiscard]] Result<void> check(const Environment& environment, std::span<const TaskConfig> tasks) const;
-  /// Places all areas that are declared, fills them with retain values or with initial values, and tells the
-  /// application the addresses. Then puts the exchange of inputs and outputs around the cycles of the tasks
-  /// that use them: the others stay as they are. A text: remarks. Once, after the application was loaded;
-  /// set-up.
-  [[nodiscard]] Result<std::string> place(const Environment& environment, std::span<TaskConfig> tasks);
-  /// Lets no more of its areas be declared: plc_app_init has returned.
-  void close() noexcept { open_ = false; }
+  /// Whether place() would find fault with these areas, whose uses are complete: it begins with this. Makes
+  /// and changes nothing, and opens no device, so that an instance can have all of it meanwhile. Set-up.
+  [[nodiscard]] static Result<void> check(const Environment& environment,
+                                          std::span<const DeclaredArea> areas);
+  /// Places the areas, whose uses are complete, fills them with retain values or with initial values, and
+  /// tells the application the addresses. Then puts the exchange of inputs and outputs around the cycles of
+  /// the tasks that use them: the others stay as they are. A text: remarks. Once, after the application was
+  /// loaded; set-up.
+  [[nodiscard]] Result<std::string> place(const Environment& environment, std::vector<DeclaredArea> areas,
+                                          std::span<TaskConfig> tasks);
 
   /// Writes what is kept, now, if no task is within a cycle. Control thread.
   void save() {
@@ -158,7 +156,6 @@ class Areas {
   [[nodiscard]] std::size_t task_number(const std::string& name) const;
   [[nodiscard]] std::size_t kept_number(std::size_t area) const noexcept;
 
-  bool open_ = true;
   bool placed_ = false;
   std::vector<DeclaredArea> declared_;
   AreaPlan plan_;

@@ -119,12 +119,8 @@ Result<void> check_distinct(const Areas::Environment& environment, const AreaPla
 
 }  // namespace
 
-Result<void> Areas::check(const Environment& environment, std::span<const TaskConfig> tasks) const {
-  if (declared_.empty()) return {};
-  std::vector<DeclaredArea> areas = declared_;
-  std::vector<std::string> names;
-  for (const TaskConfig& task : tasks) names.push_back(task.name);
-  if (auto done = complete_uses(areas, names); !done) return done;
+Result<void> Areas::check(const Environment& environment, std::span<const DeclaredArea> areas) {
+  if (areas.empty()) return {};
   const auto plan = plan_areas(areas, environment.settings);
   if (!plan) return std::unexpected(plan.error());
   for (const AreaBlock& planned : plan->blocks) {
@@ -140,12 +136,15 @@ Result<void> Areas::check(const Environment& environment, std::span<const TaskCo
   return RetainKeeper::check(pool, environment.instance, kept.layout, environment.retain);
 }
 
-Result<std::string> Areas::place(const Environment& environment, std::span<TaskConfig> tasks) {
-  open_ = false;
-  if (declared_.empty()) return std::string();
-  if (auto good = check(environment, tasks); !good) return std::unexpected(std::move(good).error());
+Result<std::string> Areas::place(const Environment& environment, std::vector<DeclaredArea> areas,
+                                 std::span<TaskConfig> tasks) {
+  if (auto good = check(environment, areas); !good) return std::unexpected(std::move(good).error());
+  declared_ = std::move(areas);
+  if (declared_.empty()) {
+    placed_ = true;
+    return std::string();
+  }
   for (const TaskConfig& task : tasks) tasks_.push_back(task.name);
-  if (auto done = complete_uses(declared_, tasks_); !done) return std::unexpected(done.error());
   auto plan = plan_areas(declared_, environment.settings);
   if (!plan) return std::unexpected(std::move(plan).error());
   plan_ = *std::move(plan);

@@ -112,6 +112,11 @@ Result<void> EventTable::register_by_application(RTS_HANDLE handle) {
   return publish_registered(*slot);
 }
 
+bool EventTable::is_own(RTS_HANDLE handle) const noexcept {
+  const Slot* const slot = find(handle);
+  return slot != nullptr && slot->own;
+}
+
 bool EventTable::is_by_application(RTS_HANDLE handle) const noexcept {
   const Slot* const slot = find(handle);
   return slot != nullptr && slot->by_application;

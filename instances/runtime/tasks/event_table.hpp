@@ -36,6 +36,8 @@ class EventTable {
   /// The handle of "event" (own) or "instance/event". invalid_argument; full.
   [[nodiscard]] Result<RTS_HANDLE> open(std::string_view name);
 
+  /// A valid handle of an event of this instance.
+  [[nodiscard]] bool is_own(RTS_HANDLE handle) const noexcept;
   /// Registration by the application or a component. already_exists: by one of them before.
   [[nodiscard]] Result<void> register_by_application(RTS_HANDLE handle);
   [[nodiscard]] Result<void> unregister_by_application(RTS_HANDLE handle);

@@ -112,24 +112,24 @@ Result<void> try_tasks(const Options& options, const InstanceSettings& settings,
 }
 
 // The part that runs code of components and of the application.
-Result<Application> declare_watched(const std::string& path, const StartSettings& start,
-                                    Components& components, ApplicationHost& host) {
+Result<DeclaredApplication> declare_watched(const std::string& path, const StartSettings& start,
+                                            Components& components, ApplicationHost& host) {
   SetUpWatch watch(start.settings.scheduler.watchdog.default_time, [&](const Error& error) {
     fmt::print(stderr, "{}: {}\n", path, error.describe());
     end_trial(kExitSetupFailed);
   });
   if (auto loaded = load_components(start.settings, ComponentHooks::check, components, host); !loaded)
     return std::unexpected(std::move(loaded).error());
-  auto application = declare_application(path, start, host);
-  if (auto ended = watch.end(); !ended && application) return std::unexpected(std::move(ended).error());
-  return application;
+  auto declared = declare_application(path, start, host);
+  if (auto ended = watch.end(); !ended && declared) return std::unexpected(std::move(ended).error());
+  return declared;
 }
 
 // All that a start does, by the same functions in the same order, as far as it takes nothing from the
 // instance that runs. Some things are free only when that instance has ended: its name, its control socket
 // and its status page, its address among the nodes, and the resources of its components' CH_INIT.. hooks. Its
 // memories and outputs are only looked at.
-Result<Application> try_start(const Options& options, Components& components, ApplicationHost& host) {
+Result<DeclaredApplication> try_start(const Options& options, Components& components, ApplicationHost& host) {
   const LaunchOptions& launch = options.launch;
   if (auto granted = try_cores(launch.cores); !granted) return std::unexpected(std::move(granted).error());
   auto start = read_start_settings(launch.settings);
@@ -139,14 +139,17 @@ Result<Application> try_start(const Options& options, Components& components, Ap
   if (attached) pool.emplace(*std::move(attached));
   if (auto room = room_in_pool(launch, pool)) host.events().look_for_room(*std::move(room));
   if (auto ready = prepare_host(*start, host); !ready) return std::unexpected(std::move(ready).error());
-  auto application = declare_watched(options.check_application, *start, components, host);
-  if (!application) return application;
-  const auto environment = areas_environment(launch, start->settings, *application, pool ? &*pool : nullptr);
-  if (auto good = host.areas().check(environment, application->tasks()); !good)
+  auto declared = declare_watched(options.check_application, *start, components, host);
+  if (!declared) return declared;
+  const auto& [application, declaration] = *declared;
+  if (auto reserved = host.reserve(declaration); !reserved)
+    return std::unexpected(std::move(reserved).error());
+  const auto environment = areas_environment(launch, start->settings, application, pool ? &*pool : nullptr);
+  if (auto good = Areas::check(environment, declaration.areas); !good)
     return std::unexpected(std::move(good).error());
-  if (auto good = try_tasks(options, start->settings, *application, host); !good)
+  if (auto good = try_tasks(options, start->settings, application, host); !good)
     return std::unexpected(std::move(good).error());
-  return application;
+  return declared;
 }
 
 }  // namespace
@@ -156,14 +159,15 @@ int check_application(const Options& options) {
   Components components;
   ApplicationHost host(options.launch.name, nullptr);
   host.set_start_kind(static_cast<int>(options.launch.start_kind));
-  const auto application = try_start(options, components, host);
-  if (!application) {
-    fmt::print(stderr, "{}\n", application.error().describe());
+  const auto declared = try_start(options, components, host);
+  if (!declared) {
+    fmt::print(stderr, "{}\n", declared.error().describe());
     return kExitSetupFailed;
   }
-  fmt::print("{}{}{}, {} tasks\n", path, kValidApplication, printable(application->name()),
-             application->tasks().size());
-  for (const TaskConfig& task : application->tasks()) {
+  const Application& application = declared->application;
+  fmt::print("{}{}{}, {} tasks\n", path, kValidApplication, printable(application.name()),
+             application.tasks().size());
+  for (const TaskConfig& task : application.tasks()) {
     fmt::print("  {}: {}, priority {}{}\n", task.name, to_string(static_cast<PageTaskKind>(task.kind)),
                task.iec_priority, detail_of(task));
   }

@@ -33,7 +33,9 @@ class ClockCalls : public testing::Test {
     fill(infos_[1], "Bus", 0, 1, bus_cycle);
     setup_.nTasks = 2;
     setup_.ptaskinfo = infos_.data();
+    host.begin_init(declaration_);
     __sys__setup__tasks(&setup_);
+    host.end_init();
   }
   ~ClockCalls() override {
     if (tasks && tasks->running()) (void)tasks->stop(Duration::zero());
@@ -71,6 +73,7 @@ class ClockCalls : public testing::Test {
   ManualClock clock;
   SimulatedReference reference{clock.now() + std::chrono::microseconds(123), -50e-6, 100};
   ApplicationHost host{"test", nullptr};
+  ApplicationDeclaration declaration_;
   std::array<Task_Info, 2> infos_{};
   sys_setup_tasks_struct setup_{};
   std::array<TaskStatistics, 2> statistics_;

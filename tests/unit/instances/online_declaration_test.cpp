@@ -1,4 +1,5 @@
-// The calls of another version's plc_app_init while the first one runs: collected, and nothing else.
+// The calls of a plc_app_init are collected, and change nothing before the commit: at the first load, and
+// while another version runs.
 #include <array>
 #include <bit>
 #include <string>
@@ -16,8 +17,9 @@ using ::testing::IsEmpty;
 
 class KeptVariablesOf : public ::testing::Test {
  protected:
-  KeptVariablesOf() { host_.begin_init(); }
+  KeptVariablesOf() { host_.begin_init(declaration_); }
   ApplicationHost host_{"test", nullptr};
+  ApplicationDeclaration declaration_;
   std::array<char, 8> bytes_{};
 };
 
@@ -26,8 +28,8 @@ TEST_F(KeptVariablesOf, AnApplicationAreNamedInItsInit) {
   EXPECT_EQ(plc_keep_variables("a", bytes_.data(), 8, 3), ERR_DUPLICATE);
   host_.end_init();
   EXPECT_EQ(plc_keep_variables("b", bytes_.data(), 8, 3), ERR_NOTINITIALIZED);
-  ASSERT_EQ(host_.declaration().variables.size(), 1U);
-  const KeptVariables& kept = host_.declaration().variables.front();
+  ASSERT_EQ(declaration_.variables.size(), 1U);
+  const KeptVariables& kept = declaration_.variables.front();
   EXPECT_EQ(kept.name, "a");
   EXPECT_EQ(kept.address, bytes_.data());
   EXPECT_EQ(kept.bytes, 8U);
@@ -61,15 +63,84 @@ void callback(unsigned /*event*/, const EVTPARAM_ExternalEventTask* /*parameter*
   ++*static_cast<int*>(user);
 }
 
+class FirstDeclaration : public ::testing::Test {
+ protected:
+  FirstDeclaration() { host_.begin_init(declaration_); }
+  ApplicationHost host_{"test", nullptr};
+  ApplicationDeclaration declaration_;
+};
+
+TEST_F(FirstDeclaration, HoldsFromTheCommitOn) {
+  EXPECT_EQ(plc_online_change(), 0);
+  RTS_RESULT result = ERR_FAILED;
+  const RTS_HANDLE event = SchedRegisterExternalEvent("ready", &result);
+  EXPECT_EQ(result, ERR_OK);
+  EXPECT_EQ(SchedRegisterExternalEvent("ready", &result), event);
+  EXPECT_EQ(result, ERR_DUPLICATE);
+  int calls = 0;
+  EXPECT_EQ(EventRegisterCallbackFunction(EVT_ExternalEventTaskCreateDone, callback, &calls), ERR_OK);
+  host_.end_init();
+  EXPECT_FALSE(host_.has_application());
+  EXPECT_FALSE(host_.events().is_by_application(event));
+  host_.notify(EVT_ExternalEventTaskCreateDone, {});
+  EXPECT_EQ(calls, 0);
+  ASSERT_TRUE(host_.reserve(declaration_));
+  host_.commit(std::move(declaration_), [](const void*) { return false; });
+  EXPECT_TRUE(host_.has_application());
+  EXPECT_TRUE(host_.events().is_by_application(event));
+  host_.notify(EVT_ExternalEventTaskCreateDone, {});
+  EXPECT_EQ(calls, 1);
+}
+
+TEST_F(FirstDeclaration, WithdrawsAnEventThatItHasRegistered) {
+  const RTS_HANDLE event = SchedRegisterExternalEvent("ready", nullptr);
+  EXPECT_EQ(SchedUnregisterExternalEvent(event), ERR_OK);
+  EXPECT_EQ(SchedUnregisterExternalEvent(event), ERR_NO_OBJECT);
+  EXPECT_EQ(SchedUnregisterExternalEvent(RTS_INVALID_HANDLE), ERR_PARAMETER);
+  EXPECT_THAT(declaration_.events, IsEmpty());
+}
+
+TEST_F(FirstDeclaration, OfAnEventOfAnotherInstanceOnlyGivesAccess) {
+  RTS_RESULT result = ERR_FAILED;
+  const RTS_HANDLE event = SchedRegisterExternalEvent("packer1/product", &result);
+  EXPECT_EQ(result, ERR_OK);
+  EXPECT_EQ(SchedRegisterExternalEvent("packer1/product", &result), event);
+  EXPECT_EQ(result, ERR_OK);
+  EXPECT_THAT(declaration_.events, IsEmpty());
+}
+
+TEST_F(FirstDeclaration, IsMadeInTheInitOnly) {
+  host_.end_init();
+  Task_Info info{};
+  sys_setup_tasks_struct setup{.nTasks = 1, .stApplicationName = "Late", .ptaskinfo = &info};
+  __sys__setup__tasks(&setup);
+  EXPECT_EQ(declaration_.tasks, nullptr);
+  Task_Options options{};
+  options.dwSize = sizeof options;
+  EXPECT_EQ(plc_set_task_options("Main", &options), ERR_NOTINITIALIZED);
+  Plc_Area area{};
+  area.dwSize = sizeof area;
+  area.dwFlags = PLC_AREA_DATA;
+  area.pszName = "late";
+  area.dwBytes = 8;
+  RTS_RESULT result = ERR_OK;
+  EXPECT_EQ(plc_declare_area(&area, &result), RTS_INVALID_HANDLE);
+  EXPECT_EQ(result, ERR_NOTINITIALIZED);
+}
+
 class OnlineDeclaration : public ::testing::Test {
  protected:
   OnlineDeclaration() {
-    host_.begin_init();
+    ApplicationDeclaration first;
+    host_.begin_init(first);
+    __sys__setup__tasks(&setup_);
     before_ = SchedRegisterExternalEvent("before", nullptr);
     both_ = SchedRegisterExternalEvent("both", nullptr);
     EXPECT_EQ(EventRegisterCallbackFunction(EVT_ExternalEventTaskCreateDone, callback, &calls_before_),
               ERR_OK);
     host_.end_init();
+    EXPECT_TRUE(host_.reserve(first));
+    host_.commit(std::move(first), [](const void*) { return false; });
     of_component_ = SchedRegisterExternalEvent("component", nullptr);
     EXPECT_EQ(EventRegisterCallbackFunction(EVT_ExternalEventTaskCreateDone, callback, &calls_component_),
               ERR_OK);
@@ -78,6 +149,8 @@ class OnlineDeclaration : public ::testing::Test {
   void notify() { host_.notify(EVT_ExternalEventTaskCreateDone, {}); }
 
   ApplicationHost host_{"test", nullptr};
+  Task_Info info_{};
+  sys_setup_tasks_struct setup_{.nTasks = 1, .stApplicationName = "First", .ptaskinfo = &info_};
   ApplicationDeclaration online_;
   RTS_HANDLE before_ = nullptr;
   RTS_HANDLE both_ = nullptr;
@@ -89,7 +162,7 @@ class OnlineDeclaration : public ::testing::Test {
 
 TEST_F(OnlineDeclaration, OfEventsAndCallbacksHoldsFromTheTakeoverOn) {
   EXPECT_EQ(plc_online_change(), 0);
-  host_.begin_init(&online_);
+  host_.begin_init(online_);
   EXPECT_EQ(plc_online_change(), 1);
   RTS_RESULT result = ERR_FAILED;
   EXPECT_EQ(SchedRegisterExternalEvent("both", &result), both_);
@@ -114,9 +187,9 @@ TEST_F(OnlineDeclaration, OfEventsAndCallbacksHoldsFromTheTakeoverOn) {
   EXPECT_EQ(calls_before_, 1);
   EXPECT_EQ(calls_after_, 0);
 
-  ASSERT_TRUE(host_.register_more(online_));
+  ASSERT_TRUE(host_.reserve(online_));
   EXPECT_TRUE(is_registered(after));
-  host_.take_over(std::move(online_), [](const void*) { return false; });
+  host_.commit(std::move(online_), [](const void*) { return false; });
   EXPECT_FALSE(is_registered(before_));
   EXPECT_TRUE(is_registered(both_));
   EXPECT_TRUE(is_registered(of_component_));
@@ -127,23 +200,18 @@ TEST_F(OnlineDeclaration, OfEventsAndCallbacksHoldsFromTheTakeoverOn) {
 }
 
 TEST_F(OnlineDeclaration, ThatIsNotTakenLeavesAllAsItWas) {
-  host_.begin_init(&online_);
+  host_.begin_init(online_);
   const RTS_HANDLE after = SchedRegisterExternalEvent("after", nullptr);
   host_.end_init();
-  ASSERT_TRUE(host_.register_more(online_));
-  host_.unregister_more(online_);
+  ASSERT_TRUE(host_.reserve(online_));
+  host_.release(online_);
   EXPECT_FALSE(is_registered(after));
   EXPECT_TRUE(is_registered(before_));
   EXPECT_TRUE(is_registered(both_));
 }
 
 TEST_F(OnlineDeclaration, OfTasksAndOptionsDoesNotReachTheOnesThatRun) {
-  sys_setup_tasks_struct setup{};
-  Task_Info info{};
-  setup.nTasks = 1;
-  setup.ptaskinfo = &info;
-  __sys__setup__tasks(&setup);
-  host_.begin_init(&online_);
+  host_.begin_init(online_);
   sys_setup_tasks_struct other{};
   __sys__setup__tasks(&other);
   Task_Options options{};
@@ -152,7 +220,7 @@ TEST_F(OnlineDeclaration, OfTasksAndOptionsDoesNotReachTheOnesThatRun) {
   EXPECT_EQ(plc_set_task_options("Main", &options), ERR_DUPLICATE);
   EXPECT_EQ(SchedSetTaskInterval(RTS_INVALID_HANDLE, 1'000'000), ERR_NOTINITIALIZED);
   host_.end_init();
-  EXPECT_EQ(host_.declaration().tasks, &setup);
+  EXPECT_EQ(host_.declaration().tasks, &setup_);
   EXPECT_FALSE(host_.declaration().tasks_given_twice);
   EXPECT_THAT(host_.declaration().task_options, IsEmpty());
   EXPECT_EQ(online_.tasks, &other);
@@ -160,7 +228,7 @@ TEST_F(OnlineDeclaration, OfTasksAndOptionsDoesNotReachTheOnesThatRun) {
 }
 
 TEST_F(OnlineDeclaration, CallbacksInTheCodeThatGoesAreForgottenWhoeverRegisteredThem) {
-  host_.take_over({}, [](const void* code) { return code == std::bit_cast<const void*>(&callback); });
+  host_.commit({}, [](const void* code) { return code == std::bit_cast<const void*>(&callback); });
   notify();
   EXPECT_EQ(calls_component_, 0);
 }

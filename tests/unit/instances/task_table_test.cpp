@@ -37,6 +37,12 @@ class TaskCalls : public testing::Test {
     info.dwTaskEntryFunctionPointer = [] {};
   }
 
+  void hand_over() {
+    ApplicationDeclaration declaration;
+    host.begin_init(declaration);
+    __sys__setup__tasks(&setup_);
+    host.end_init();
+  }
   void make_tasks() {
     TaskEnvironment environment;
     environment.find_event = [](std::string_view) -> Result<CountedEvent*> { return nullptr; };
@@ -62,7 +68,7 @@ TEST_F(TaskCalls, FindTasksByNameOnceTheyWereHandedOver) {
   RTS_RESULT result = ERR_OK;
   EXPECT_EQ(SchedGetTaskHandle("Fast", &result), RTS_INVALID_HANDLE);
   EXPECT_EQ(result, ERR_NO_OBJECT);
-  __sys__setup__tasks(&setup_);
+  hand_over();
   const RTS_HANDLE fast = SchedGetTaskHandle("Fast", &result);
   EXPECT_NE(fast, RTS_INVALID_HANDLE);
   EXPECT_EQ(result, ERR_OK);
@@ -74,14 +80,14 @@ TEST_F(TaskCalls, FindTasksByNameOnceTheyWereHandedOver) {
 }
 
 TEST_F(TaskCalls, CurrentTaskIsTheOneWhoseCycleRuns) {
-  __sys__setup__tasks(&setup_);
+  hand_over();
   EXPECT_EQ(SchedGetCurrentTask(), RTS_INVALID_HANDLE);
   const CurrentTask current(&infos_[1]);
   EXPECT_EQ(SchedGetCurrentTask(), SchedGetTaskHandle("Loop", nullptr));
 }
 
 TEST_F(TaskCalls, IntervalIsReadAndSetToTheNanosecond) {
-  __sys__setup__tasks(&setup_);
+  hand_over();
   const RTS_HANDLE fast = SchedGetTaskHandle("Fast", nullptr);
   RTS_I64 interval = 0;
   EXPECT_EQ(SchedGetTaskInterval(fast, &interval), ERR_NOTINITIALIZED);
@@ -95,7 +101,7 @@ TEST_F(TaskCalls, IntervalIsReadAndSetToTheNanosecond) {
 }
 
 TEST_F(TaskCalls, RefuseHandlesOfNoCyclicTaskAndIntervalsOutOfRange) {
-  __sys__setup__tasks(&setup_);
+  hand_over();
   make_tasks();
   const RTS_HANDLE fast = SchedGetTaskHandle("Fast", nullptr);
   const RTS_HANDLE loop = SchedGetTaskHandle("Loop", nullptr);
@@ -115,7 +121,7 @@ TEST_F(TaskCalls, RefuseHandlesOfNoCyclicTaskAndIntervalsOutOfRange) {
 }
 
 TEST_F(TaskCalls, EventIsRaisedForEventTasksOnly) {
-  __sys__setup__tasks(&setup_);
+  hand_over();
   const RTS_HANDLE edge = SchedGetTaskHandle("Edge", nullptr);
   EXPECT_EQ(SchedRaiseEvent(edge), ERR_NOTINITIALIZED);
   make_tasks();
