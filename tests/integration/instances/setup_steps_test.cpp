@@ -10,6 +10,7 @@
 
 #include "instances/launch/launch_contract.hpp"
 #include "tests/integration/instances/instance_process.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost::testing {
 namespace {
@@ -64,15 +65,17 @@ TEST(Setup, RefusesAnUnknownKeyWithFileLineAndSuggestion) {
 
 TEST(Setup, RefusesSomethingInThePlaceOfThePool) {
   const Sandbox sandbox;
-  InstanceProcess sut(sandbox, {"--pool", sandbox.pool() + "-no", "--stopped"});
-  const std::string file = "/dev/shm/" + sandbox.pool() + "-broken";
+  const std::string none = own_name("none");
+  const std::string broken = own_name("broken");
+  InstanceProcess sut(sandbox, {"--pool", none, "--stopped"});
+  const std::string file = "/dev/shm/" + broken;
   std::ofstream(file) << std::string(100'000, 'x');
-  InstanceProcess refused(sandbox, {"--name", "line2", "--pool", sandbox.pool() + "-broken"});
+  InstanceProcess refused(sandbox, {"--name", "line2", "--pool", broken});
   EXPECT_EQ(refused.end(), 3);
   EXPECT_THAT(refused.log(), HasSubstr("attach pool failed"));
-  ObjectPool::remove(sandbox.pool() + "-broken");
+  ObjectPool::remove(broken);
   EXPECT_EQ(sut.connect() ? sut.end(SIGTERM) : -1, 0);
-  ObjectPool::remove(sandbox.pool() + "-no");
+  ObjectPool::remove(none);
 }
 
 TEST(Setup, RefusesAComponentThatIsNone) {
