@@ -245,7 +245,7 @@ class PLCHOST_CLIENT_API Client {
   /// The lines after one that was returned before, to read on; all that are kept, if the host has begun anew.
   std::vector<LogLine> logs(const std::string& host, const std::string& instance, const LogLine& after);
 
-  /// Posts an event `count` times, each counted exactly once, also if the server of the host dies meanwhile.
+  /// Posts an event `count` times, each counted exactly once, also if the server of the host ends meanwhile.
   /// Returns when all are in the pool: the timeout is for each acknowledgement, so many take as long as they
   /// take. ClientError: a post was rejected; timed_out: of some nothing is known.
   Posted post(const std::string& host, const std::string& event, unsigned long long count = 1);

@@ -81,7 +81,7 @@ int plc_pool_open(const char* name, int access, plc_pool** pool);
 /* Objects that were opened through it stay valid until they are closed themselves. Set-up. */
 void plc_pool_close(plc_pool* pool);
 
-#define PLC_POOL_KEEP 1u /* the object lives without references, until plc_pool_remove */
+#define PLC_POOL_KEEP 1u /* the object stays without references, until plc_pool_remove */
 
 /* For an object that is made; where it is there already they count nothing. Fill it with zeros first. */
 typedef struct {

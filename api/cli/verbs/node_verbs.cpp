@@ -69,7 +69,7 @@ constexpr const char* kBaseText = "nodes of this base name (default: [blocks] ba
 
 void add_list_nodes(const Command& verb, CliSession& session) {
   const auto base = std::make_shared<std::string>();
-  verb.noun("nodes", "The nodes that send each other blocks, and what they count",
+  verb.noun("nodes", "The nodes that send each other blocks, and their counts",
             [&session, base] { return list_nodes(session, *base); })
       .optional("--base", *base, kBaseText);
 }
