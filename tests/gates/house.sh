@@ -28,6 +28,13 @@ git grep -nE "$home_path" -- ':!tests/gates' && fault "the lines above name a pa
 sources=(shm schedulers instances manager api)
 git grep -nE '\bO_CREAT\b' -- "${sources[@]}" | grep -vE 'O_NOFOLLOW|O_EXCL' && fault "the lines above make files through links" || true
 git grep -nE 'shm_open|sun_path *(\+ *1\b|\[0\])' -- "${sources[@]}" && fault "the lines above use names that anybody can take" || true
+# The C functions of plc_app.h lie in one room.
+symbols=instances/runtime/exported_symbols.txt
+if [ -f "$symbols" ]; then
+  exported=$(sed -nE 's/^  ([A-Za-z_]+);$/\1/p' "$symbols" | paste -sd'|')
+  git grep -nE "^[A-Za-z_].*[ *]($exported)\(" -- 'instances/runtime/*.cpp' ':!instances/runtime/abi' &&
+    fault "the lines above define functions of plc_app.h outside of instances/runtime/abi" || true
+fi
 # DDS alone keeps the keys of unregistered instances in memory.
 git grep -nE '\bdds_unregister_instance' -- '*.cpp' '*.hpp' ':!api/dds/instances.*' ':!tests' && fault "the lines above leak: use dds::unregister_instance" || true
 # A killed test's files in /dev/shm can only be removed by the next one if it knows the name.

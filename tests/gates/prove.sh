@@ -99,6 +99,10 @@ must_be_red "house: abstract socket" "the lines above use names that anybody can
 new_tree
 echo 'void f() { dds_unregister_ins''tance(1, nullptr); }' >"$plot/tree/shm/base/leak.cpp" && commit_tree
 must_be_red "house: leaked instance" "the lines above leak" "$gates/house.sh" "$plot/tree"
+new_tree
+mkdir -p "$plot/tree/instances/runtime/"{abi,tasks} && printf '{\n  plc_call;\n};\n' >"$plot/tree/instances/runtime/exported_symbols.txt"
+echo 'void* plc_call(int x) {}' | tee "$plot/tree/instances/runtime/abi/calls.cpp" >"$plot/tree/instances/runtime/tasks/table.cpp" && commit_tree
+must_be_red "house: function of plc_app.h" "instances/runtime/tasks/table.cpp:1:void* plc_call(int x) {}" "$gates/house.sh" "$plot/tree"
 
 new_tree
 echo 'std::string name = "pool-" + std::to_string(::get''pid());' >"$plot/tree/tests/name.cpp" && commit_tree
