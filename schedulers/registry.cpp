@@ -3,19 +3,25 @@
 
 #include <fmt/format.h>
 
-#include "schedulers/cmp_schedule.hpp"
-#include "schedulers/cmp_schedule_one_shot.hpp"
-#include "schedulers/cmp_schedule_timer.hpp"
+#include "schedulers/policies/cmp_schedule.hpp"
+#include "schedulers/policies/cmp_schedule_one_shot.hpp"
+#include "schedulers/policies/cmp_schedule_timer.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
 
 namespace {
 
+template <class Policy>
+constexpr SchedulerEntry kEntryOf{.name = Policy::kName,
+                                  .make = [](const SchedulerContext& context) -> std::unique_ptr<Scheduler> {
+                                    return std::make_unique<Policy>(context);
+                                  }};
+
 constexpr std::array kSchedulers{
-    SchedulerEntry{CmpSchedule::kName, &make_cmp_schedule},
-    SchedulerEntry{CmpScheduleTimer::kName, &make_cmp_schedule_timer},
-    SchedulerEntry{CmpScheduleOneShot::kName, &make_cmp_schedule_one_shot},
+    kEntryOf<CmpSchedule>,
+    kEntryOf<CmpScheduleTimer>,
+    kEntryOf<CmpScheduleOneShot>,
 };
 
 }  // namespace

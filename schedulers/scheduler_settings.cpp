@@ -1,6 +1,8 @@
+#include "schedulers/scheduler_settings.hpp"
+
 #include <fmt/format.h>
 
-#include "schedulers/scheduler.hpp"
+#include "schedulers/task/task_config.hpp"
 
 namespace plchost {
 

@@ -22,7 +22,8 @@ TaskSet::TaskSet(Clock& clock, PriorityBand band, TaskEnvironment environment, U
 
 TaskSet::~TaskSet() {
   if (supervision_ && running_) supervision_->tasks_stop();
-  if (active_) (void)active_->ended(kNoDeadline);
+  ticker_.use(nullptr);
+  (void)ticker_.settled(kNoDeadline);
   for (auto& thread : threads_) thread->park();  // all at once; their destructors then wait one by one
 }
 
@@ -36,6 +37,10 @@ Result<std::unique_ptr<TaskSet>> TaskSet::create(Clock& clock, PriorityBand band
     const std::string step = fmt::format("task '{}'", config.name);
     if (auto added = self->add(std::move(config)); !added) return failure_in(step, std::move(added.error()));
   }
+  const ThreadPriority tick = self->environment_.allow_unprivileged ? ThreadPriority{} : tick_priority(band);
+  if (auto ticker = self->ticker_.start_thread(tick); !ticker) {
+    return failure_in("tick", std::move(ticker.error()));
+  }
   if (self->environment_.catch_faults) {
     if (auto supervised = self->supervise(); !supervised)
       return std::unexpected(std::move(supervised.error()));
@@ -45,14 +50,14 @@ Result<std::unique_ptr<TaskSet>> TaskSet::create(Clock& clock, PriorityBand band
 
 Result<void> TaskSet::supervise() {
   if (auto installed = install_fault_handlers(); !installed) return installed;
-  supervision_.emplace(clock_, tasks_, poll_trap_);
+  supervision_.emplace(clock_, tasks_, poller_.trap());
   return supervision_->start_thread(environment_.allow_unprivileged ? ThreadPriority{}
                                                                     : supervision_priority(band_));
 }
 
 Result<void> TaskSet::add(TaskConfig config) {
   CountedEvent* event = nullptr;
-  if (config.kind == TaskKind::external) {
+  if (find_task_kind(config.kind)->takes_posts) {
     auto found = environment_.find_event(config.external_event);
     if (!found) return std::unexpected(std::move(found.error()));
     event = *found;
@@ -65,10 +70,10 @@ Result<void> TaskSet::add(TaskConfig config) {
   if (environment_.fault_record) {
     tasks_.back()->fault().show_in(&environment_.fault_record(tasks_.size() - 1));
   }
-  if (const TaskConfig& made = tasks_.back()->config(); made.kind == TaskKind::cyclic) {
-    tasks_.back()->follow(distributed_clock_.add_follower(made.iec_priority));
-  }
-  auto thread = TaskThread::start(clock_, *tasks_.back(), priority);
+  Task& task = *tasks_.back();
+  if (task.kind().has_grid) task.follow(distributed_clock_.add_follower(task.config().iec_priority));
+  if (task.latch() != nullptr) poller_.add(task);
+  auto thread = TaskThread::start(clock_, task, priority);
   if (!thread) return std::unexpected(std::move(thread.error()));
   threads_.push_back(std::move(*thread));
   reported_running_.push_back(false);
@@ -83,28 +88,52 @@ auto TaskSet::arrange(std::string_view name, const SchedulerSettings& settings)
   if (auto valid = check_settings(settings); !valid) return std::unexpected(std::move(valid.error()));
   auto arrangement = std::make_unique<Arrangement>();
   arrangement->tick = choose_tick(settings, *environment_.devices, tick_.device);
-  SchedulerContext context{.clock = clock_,
-                           .settings = settings,
-                           .tick = environment_.allow_unprivileged ? ThreadPriority{} : tick_priority(band_),
-                           .poll_trap = &poll_trap_,
-                           .gate = &gate_,
-                           .tick_device = arrangement->tick.device};
-  context.settings.tick_source = arrangement->tick.kind;
-  arrangement->scheduler = (*entry)->make(context);
-  if (auto fit = check_one_shot(*arrangement->scheduler, arrangement->tick); !fit) {
-    return std::unexpected(std::move(fit).error());
+  const auto& device = arrangement->tick.device;
+  arrangement->scheduler = (*entry)->make(
+      {.clock = clock_, .settings = settings, .tick_frequency = device ? device->frequency() : 0});
+  if (arrangement->scheduler->capabilities().one_shot) {
+    if (auto fit = check_one_shot(name, arrangement->tick); !fit)
+      return std::unexpected(std::move(fit).error());
   }
   for (auto& task : tasks_) {
+    if (auto own = task->own_source(settings.max_event_backlog)) {
+      arrangement->sources.push_back(std::move(own));
+      continue;
+    }
     auto source = arrangement->scheduler->source_for(*task);
     if (!source) {
       return failure_in(fmt::format("{}: task '{}'", name, task->config().name), std::move(source.error()));
     }
     arrangement->sources.push_back(std::move(*source));
   }
-  if (auto prepared = arrangement->scheduler->prepare(); !prepared) {
-    return failure_in(name, std::move(prepared.error()));
+  if (auto planned = plan_ticks(*arrangement, settings); !planned) {
+    return failure_in(name, failure_in("tick source", std::move(planned.error())).error());
   }
   return arrangement;
+}
+
+// The ticker runs only for a scheduler that ticks, or for event variables. Those alone are looked at between
+// the releases of the cyclic tasks: at the same instant the look, which goes first, would delay them.
+Result<void> TaskSet::plan_ticks(Arrangement& arrangement, const SchedulerSettings& settings) {
+  const bool ticks = arrangement.scheduler->capabilities().ticks &&
+                     std::ranges::any_of(tasks_, [](const auto& task) { return task->kind().timed; });
+  if (!ticks && poller_.empty()) return {};
+  auto source = make_tick_source(clock_, arrangement.tick);
+  if (!source) return std::unexpected(std::move(source.error()));
+  arrangement.plan = {.source = std::move(*source),
+                      .scheduler = ticks ? arrangement.scheduler.get() : nullptr,
+                      .origin = {},
+                      .period = settings.scheduler_interval,
+                      .max_backlog = settings.max_event_backlog};
+  return {};
+}
+
+// Returns when it ticks so. false: an event variable does not return, and all tasks are in exception.
+bool TaskSet::tick_by(Arrangement& arrangement) {
+  TickPlan& plan = arrangement.plan;
+  plan.origin = plan.scheduler != nullptr ? origin_ : origin_ + plan.period / 2;
+  ticker_.use(plan.source ? &plan : nullptr);
+  return ticker_follows();
 }
 
 Result<void> TaskSet::check(std::string_view scheduler, const SchedulerSettings& settings) {
@@ -122,9 +151,7 @@ Result<void> TaskSet::check_startable() {
     return failure(ErrorCode::wrong_state,
                    fmt::format("in exception: task {}; reset first", join_names(faulty)));
   }
-  if (!retired_.empty()) {
-    return failure(ErrorCode::wrong_state, "the thread of the scheduler before has not ended yet");
-  }
+  if (!retired_.empty()) return failure(ErrorCode::wrong_state, "the last tick has not ended yet");
   return {};
 }
 
@@ -141,14 +168,15 @@ Result<void> TaskSet::start(std::string_view scheduler, const SchedulerSettings&
   running_ = true;
   watch_variables(settings);
   // The releases after the reading are one grid, and lose nothing by it, however long the variables take.
-  prime_scheduler();
+  if (!poller_.empty()) ticker_.use(&first_look_);
+  const bool looked = ticker_follows();
   {
     // Nobody but the tasks may come between the origin and the moment in which the last task has its source.
     const RaisedPriority raised(environment_.allow_unprivileged ? ThreadPriority{} : switch_priority(band_));
     origin_ = clock_.now() + kStartLead;
     for (auto& task : tasks_) task->begin(origin_, /*takes_posts=*/true);
     watch(settings);
-    active_->scheduler->start(origin_);
+    if (looked) (void)tick_by(*active_);
     hand_out_sources();
   }
   (void)wait_until_settled(MonotonicClock::now() + kSwitchPatience);
@@ -163,44 +191,40 @@ Result<void> TaskSet::switch_to(std::string_view scheduler, const SchedulerSetti
   auto arrangement = arrange(scheduler, settings);
   if (!arrangement) return std::unexpected(std::move(arrangement.error()));
   {
-    // Only one of the two may look at event variables at a time; edges in between are late. Nothing but the
-    // tasks themselves may make that longer.
+    // Nothing but the tasks themselves may delay the exchange.
     const RaisedPriority raised(environment_.allow_unprivileged ? ThreadPriority{} : switch_priority(band_));
-    if (auto ended = end_scheduler(); !ended) return ended;
+    if (!tick_by(**arrangement)) {
+      ticker_.use(nullptr);
+      retired_.push_back(std::move(*arrangement));  // the ticker may take its plan until it has seen the next
+      return failure(ErrorCode::timed_out, fmt::format("the event variable of {} does not return",
+                                                       join_names(tasks_in_exception())));
+    }
     retired_.push_back(std::exchange(active_, std::move(*arrangement)));
     tick_ = active_->tick;
     watch(settings);
     distributed_clock_.set_steering(active_->scheduler->capabilities().one_shot);
-    prime_scheduler();
-    active_->scheduler->start(origin_);
     hand_out_sources();
   }
   (void)wait_until_settled(MonotonicClock::now() + kSwitchPatience);
   return {};
 }
 
-void TaskSet::prime_scheduler() {
-  if (active_->scheduler->prime()) return;
-  if (const auto late = task_in_variable()) raise_late_variable(*late);
-}
-
-// For a switch.
-Result<void> TaskSet::end_scheduler() {
-  while (!active_->ended(MonotonicClock::now() + kVariablePatience)) {
+// Waits for it. false: an event variable does not return; its task, and so all, are in exception.
+bool TaskSet::ticker_follows() {
+  while (!ticker_.settled(MonotonicClock::now() + kVariablePatience)) {
     const auto late = task_in_variable();
     if (!late) continue;
     raise_late_variable(*late);
-    return failure(ErrorCode::timed_out, fmt::format("the event variable of task '{}' does not return",
-                                                     tasks_[*late]->config().name));
+    return false;
   }
-  return {};
+  return true;
 }
 
-// The task whose event variable the scheduler's thread reads just now.
+// The task whose event variable the ticker reads just now.
 std::optional<std::size_t> TaskSet::task_in_variable() const noexcept {
-  if (!poll_trap_.running_since()) return std::nullopt;
+  if (!poller_.trap().running_since()) return std::nullopt;
   const auto read =
-      std::ranges::find(tasks_, poll_trap_.fault(), [](const auto& task) { return &task->fault(); });
+      std::ranges::find(tasks_, poller_.trap().fault(), [](const auto& task) { return &task->fault(); });
   if (read == tasks_.end()) return std::nullopt;
   return static_cast<std::size_t>(read - tasks_.begin());
 }
@@ -265,8 +289,8 @@ void TaskSet::report(std::size_t index, bool running) {
 
 // The old one is free to go when no thread uses it any more.
 bool TaskSet::let_retired_go() {
-  if (!std::ranges::all_of(retired_, [](const auto& before) { return before->ended(TimePoint{}); }))
-    return false;
+  if (!ticker_.settled(TimePoint{})) return false;
+  if (!running_ && tick_.device) tick_.device->halt();
   retired_.clear();
   return true;
 }
@@ -281,11 +305,10 @@ std::vector<std::string_view> TaskSet::wait_until_settled(TimePoint deadline) {
       report(i, running_);
     }
   }
-  for (auto& before : retired_) {
-    if (before->ended(deadline)) continue;
+  if (!ticker_.settled(deadline)) {
     const auto late = task_in_variable();
-    if (!late || std::ranges::find(busy, tasks_[*late]->config().name) != busy.end()) continue;
-    busy.emplace_back(tasks_[*late]->config().name);
+    if (late && std::ranges::find(busy, tasks_[*late]->config().name) == busy.end())
+      busy.emplace_back(tasks_[*late]->config().name);
   }
   if (busy.empty()) (void)let_retired_go();
   return busy;
@@ -326,7 +349,7 @@ std::vector<std::string_view> TaskSet::tasks_in_exception() const {
 }
 
 bool TaskSet::has_parked_thread() const noexcept {
-  return poll_trap_.parked() ||
+  return poller_.parked() ||
          std::ranges::any_of(tasks_, [](const auto& task) { return task->trap().parked(); });
 }
 

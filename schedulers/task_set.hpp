@@ -18,6 +18,7 @@
 #include "schedulers/task/task_config.hpp"
 #include "schedulers/task/task_thread.hpp"
 #include "schedulers/tick/tick_choice.hpp"
+#include "schedulers/tick/ticker.hpp"
 #include "shm/base/counted_event.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/task_statistics.hpp"
@@ -53,10 +54,45 @@ struct TaskEnvironment {
   DeviceFiles* devices = &linux_device_files();
 };
 
+// The life of a set of tasks
+// ==========================
+//
+//      create()           start()            all are read               switch_to()
+//     ─────────► stopped ─────────► looking ──────────────► running ◄──────────────► exchanging
+//                 ▲   │                                        │
+//      all parked │   │ begin_single_cycle()                   │ begin_stop(), park_all()
+//                 │   ▼                                        ▼
+//                 │  single cycle ─────── begin_stop() ─────► stopping
+//                 └───────────────────────────────────────────┘
+//
+//   stopped       All task threads are parked, the ticker rests. Posts are counted as lost.
+//   looking       The ticker reads each event variable for the first time. From these levels the first edges
+//                 rise. The origin of all grids is chosen after that.
+//   running       Each thread waits on its source: the scheduler's (cyclic, freewheeling), or the kind's own
+//                 (event, external event). The ticker runs if the scheduler ticks, or if there are event
+//                 variables. between_cycles() holds all threads outside of the application's code for
+//                 microseconds.
+//   exchanging    The new scheduler, its tick source and all sources are made. The ticker exchanges the
+//                 scheduler between two ticks. Then each thread takes its new source at the end of its cycle.
+//   single cycle  Each cyclic and freewheeling task runs once, one after the other, under no scheduler.
+//   stopping      Tasks that drive outputs park at the end of their cycles. Then the ticker rests, and the
+//                 others park. Each of the two phases has a limit.
+//
+// A fault, a watchdog, or a variable that does not return puts a task into exception in any of these states.
+// The task never runs again, and start() is refused. By its policy, no other task begins a cycle either.
+//
+// Task threads and the ticker exist as long as the set, and each follows
+// the order that it was given last: TaskThread::use(), Ticker::use(), and settled() when it does. The
+// supervision watches them. All functions of the set are called by one control thread. A scheduler that is
+// given up, with its sources, is freed when every thread has settled.
+
 /// The tasks of one application with their threads, under one scheduler that can be exchanged while they run.
 /// All functions are set-up, from one control thread.
 class TaskSet {
  public:
+  /// Beyond this an event variable that is read is taken for one that never returns. It is above the time of
+  /// the watchdog, which knows more.
+  static constexpr Duration kVariablePatience = std::chrono::seconds(3);
   /// Between start() and the first release, so that all threads wait when it comes.
   static constexpr Duration kStartLead = std::chrono::milliseconds(2);
   /// How long start() and switch_to() wait for tasks to take their new source. A task whose cycle takes
@@ -176,16 +212,10 @@ class TaskSet {
  private:
   /// A scheduler and what it made for the tasks, in their order.
   struct Arrangement {
-    Arrangement() = default;
-    Arrangement(const Arrangement&) = delete;
-    Arrangement& operator=(const Arrangement&) = delete;
-    // The scheduler's threads use the sources.
-    ~Arrangement() { (void)ended(kNoDeadline); }
-    /// Asks its threads to end. false: one is still in an event variable.
-    [[nodiscard]] bool ended(TimePoint deadline) noexcept { return !scheduler || scheduler->stop(deadline); }
     std::unique_ptr<Scheduler> scheduler;  // or a single cycle
     std::unique_ptr<SingleCycle> single_cycle;
     TickChoice tick;
+    TickPlan plan;
     std::vector<std::unique_ptr<ActivationSource>> sources;
   };
 
@@ -203,6 +233,8 @@ class TaskSet {
   [[nodiscard]] Result<void> add(TaskConfig config);
   [[nodiscard]] Result<std::unique_ptr<Arrangement>> arrange(std::string_view name,
                                                              const SchedulerSettings& settings);
+  [[nodiscard]] Result<void> plan_ticks(Arrangement& arrangement, const SchedulerSettings& settings);
+  [[nodiscard]] bool tick_by(Arrangement& arrangement);
   void watch(const SchedulerSettings& settings);
   [[nodiscard]] Result<void> reset_statistics(Task& task);
   [[nodiscard]] Result<void> check_startable();
@@ -214,9 +246,8 @@ class TaskSet {
   [[nodiscard]] bool in_cycle(std::size_t task) const noexcept;
   [[nodiscard]] std::optional<std::vector<std::size_t>> stuck_in_phase(const std::vector<std::size_t>& busy);
   [[nodiscard]] std::optional<std::size_t> task_in_variable() const noexcept;
-  void prime_scheduler();
   void watch_variables(const SchedulerSettings& settings);
-  [[nodiscard]] Result<void> end_scheduler();
+  [[nodiscard]] bool ticker_follows();
   void raise_late_variable(std::size_t task);
   [[nodiscard]] bool let_retired_go();
   std::vector<std::string_view> wait_until_settled(TimePoint deadline);
@@ -226,7 +257,6 @@ class TaskSet {
   TaskEnvironment environment_;
   UniqueFd fault_fd_;
   FaultBoard fault_board_;
-  FaultTrap poll_trap_;  // of the thread that reads event variables
   CycleGate gate_;
   TickChoice tick_;
   bool running_ = false;
@@ -244,13 +274,11 @@ class TaskSet {
   TimePoint starved_told_;  // when a task was told of last that other programs keep from the processor
   std::unique_ptr<Arrangement> active_;
   std::vector<std::unique_ptr<Arrangement>>
-      retired_;  // a task in a long cycle may still hold a source of these
+      retired_;  // a task in a long cycle, or the ticker in an event variable, may still use one of these
+  TickPlan first_look_;
+  EventPoller poller_{clock_, gate_};
+  Ticker ticker_{clock_, poller_};
   std::vector<std::unique_ptr<TaskThread>> threads_;  // last: they use all of the above
 };
-
-/// As in TaskSet::create, one task by itself, and all. invalid_argument: the text names the task that is not
-/// valid, and what is allowed.
-[[nodiscard]] Result<void> check_task(const TaskConfig& task);
-[[nodiscard]] Result<void> check_tasks(const std::vector<TaskConfig>& tasks);
 
 }  // namespace plchost

@@ -49,7 +49,8 @@ void TaskSet::begin_second_phase() {
   stop_->others = true;
   stop_->judged_from = {};
   // Before the tasks, so that nothing releases them; but what is in an event variable gets the phase's time.
-  (void)active_->ended(MonotonicClock::now() + kSecondLook);
+  ticker_.use(nullptr);
+  (void)ticker_.settled(MonotonicClock::now() + kSecondLook);
   park_tasks(false);
   stop_->deadline = MonotonicClock::now() + stop_->limits.others;
 }
@@ -77,7 +78,7 @@ bool TaskSet::in_cycle(std::size_t task) const noexcept {
 // after the deadline: the whole host, or this core, may have stood still until then. A task that is between
 // two cycles only waits for the processor, which somebody who is stuck may keep from it.
 std::optional<std::vector<std::size_t>> TaskSet::stuck_in_phase(const std::vector<std::size_t>& busy) {
-  const bool ended = !stop_->others || active_->ended(TimePoint{});
+  const bool ended = !stop_->others || ticker_.settled(TimePoint{});
   if ((busy.empty() && ended) || stop_->hurried) return busy;
   const TimePoint now = MonotonicClock::now();
   if (now < stop_->deadline) return std::nullopt;
@@ -108,7 +109,6 @@ std::optional<std::vector<std::size_t>> TaskSet::advance_stop() {
   }
   auto stuck = std::move(stop_->stuck);
   stop_.reset();
-  if (tick_.device && active_->ended(TimePoint{})) tick_.device->halt();
   retired_.push_back(std::move(active_));
   running_ = false;
   if (stuck.empty() && let_retired_go() && supervision_) supervision_->end();
@@ -138,7 +138,7 @@ Result<void> TaskSet::stop(Duration limit) {
     if (!busy.empty()) {
       (void)threads_[busy.front()]->settled(next_look);
     } else if (stop_->others) {
-      (void)active_->ended(next_look);
+      (void)ticker_.settled(next_look);
     }
   }
 }
@@ -153,8 +153,7 @@ Result<void> TaskSet::begin_single_cycle(const SchedulerSettings& settings) {
   if (auto startable = check_startable(); !startable) return startable;
   std::vector<std::size_t> order;
   for (std::size_t i = 0; i < tasks_.size(); ++i) {
-    const TaskKind kind = tasks_[i]->config().kind;
-    if (kind == TaskKind::cyclic || kind == TaskKind::freewheeling) order.push_back(i);
+    if (tasks_[i]->kind().timed) order.push_back(i);
   }
   std::ranges::stable_sort(order, {}, [&](std::size_t i) { return tasks_[i]->config().iec_priority; });
   auto arrangement = std::make_unique<Arrangement>();

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "schedulers/activation/activation_gate.hpp"
 #include "schedulers/activation/spin_guard.hpp"
+#include "schedulers/task/activation_gate.hpp"
 #include "schedulers/task/task.hpp"
 
 namespace plchost {

@@ -5,25 +5,28 @@
 #include <memory>
 #include <vector>
 
+#include "schedulers/task/event_latch.hpp"
 #include "schedulers/task/task.hpp"
 
 namespace plchost {
 
-/// The event tasks of one scheduler: looks at their variables whenever it is told to.
+/// The event tasks of a set: looks at their variables whenever it is told to.
 class EventPoller {
  public:
-  /// `max_backlog` >= 1: of edges that are raised by call, the runs that a task may lag behind. `trap`:
-  /// catches what is faulty in the variables' code; null: one of its own. `gate`: that each look passes;
-  /// null: none.
-  EventPoller(Clock& clock, std::uint64_t max_backlog, FaultTrap* trap = nullptr,
-              CycleGate* gate = nullptr) noexcept
-      : clock_(clock), max_backlog_(max_backlog), trap_(trap != nullptr ? *trap : own_trap_), gate_(gate) {}
+  /// `gate`: that each look passes.
+  EventPoller(Clock& clock, CycleGate& gate) noexcept : clock_(clock), gate_(gate) {}
 
-  /// The source of an event task, which is polled from now on. Set-up.
-  [[nodiscard]] std::unique_ptr<ActivationSource> add(Task& task);
+  /// An event task, which is polled from now on. Set-up, before the first look.
+  void add(Task& task);
+  /// `max_backlog` >= 1: of edges that are raised by call, the runs that a task may lag behind. The thread
+  /// that polls.
+  void set_max_backlog(std::uint64_t max_backlog) noexcept { max_backlog_ = max_backlog; }
+  /// Catches what is faulty in the variables' code. Any thread.
+  [[nodiscard]] FaultTrap& trap() noexcept { return trap_; }
+  [[nodiscard]] const FaultTrap& trap() const noexcept { return trap_; }
   [[nodiscard]] bool empty() const noexcept { return polled_.empty(); }
-  /// Takes the levels of the variables that were never polled since their task began: from them the first
-  /// edge rises. On the thread that polls, before its first poll.
+  /// Takes the levels of the variables that were never read since their task began: from them the first edge
+  /// rises. The thread that polls.
   void prime(TimePoint now) noexcept;
   /// Sees the rising edges since the last poll and activates their tasks. One thread, real-time.
   void poll(TimePoint now) noexcept;
@@ -42,10 +45,9 @@ class EventPoller {
   void read_all(TimePoint now, Use use) noexcept;
 
   Clock& clock_;
-  std::uint64_t max_backlog_;
-  FaultTrap own_trap_;
-  FaultTrap& trap_;
-  CycleGate* gate_;
+  std::uint64_t max_backlog_ = 1;
+  FaultTrap trap_;
+  CycleGate& gate_;
   std::vector<Polled> polled_;
 };
 

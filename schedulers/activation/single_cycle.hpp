@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "schedulers/activation/activation_gate.hpp"
+#include "schedulers/task/activation_gate.hpp"
 #include "schedulers/task/task.hpp"
 
 namespace plchost {

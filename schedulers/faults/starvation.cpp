@@ -9,8 +9,7 @@ namespace {
 
 // Nobody waits for what has no real-time priority, or takes only what is left.
 bool must_run(const Task& task) noexcept {
-  return task.config().kind != TaskKind::freewheeling &&
-         task.config().iec_priority <= kLowestRealTimeIecPriority;
+  return !task.kind().limits_itself && task.config().iec_priority <= kLowestRealTimeIecPriority;
 }
 
 }  // namespace

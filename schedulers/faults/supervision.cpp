@@ -24,7 +24,7 @@ TimePoint at(const std::atomic<Duration::rep>& stamp) noexcept {
 
 // They take what is left and limit themselves.
 bool is_freewheeling(const TaskConfig& task) {
-  return task.kind == TaskKind::freewheeling;
+  return find_task_kind(task.kind)->limits_itself;
 }
 
 // Nobody waits for what has no real-time priority.

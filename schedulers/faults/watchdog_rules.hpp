@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "schedulers/scheduler.hpp"
+#include "schedulers/scheduler_settings.hpp"
 #include "schedulers/task/task_config.hpp"
 
 namespace plchost {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "schedulers/scheduler.hpp"
+#include "schedulers/scheduler_settings.hpp"
 
 namespace plchost {
 

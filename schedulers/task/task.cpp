@@ -1,8 +1,9 @@
 #include "schedulers/task/task.hpp"
 
-#include <algorithm>
 #include <cstdlib>
 #include <utility>
+
+#include "schedulers/task/event_latch.hpp"
 
 namespace plchost {
 
@@ -10,76 +11,48 @@ namespace {
 
 constexpr Duration::rep kAtWork = -1;
 
-// Before begin() it is not used; no grid can have an interval of 0.
-Duration grid_interval(const TaskConfig& config) noexcept {
-  return std::max(config.interval, Duration(1));
-}
-
 }  // namespace
 
 Task::Task(Clock& clock, TaskConfig config, TaskStatistics& statistics, CountedEvent* event,
            FaultBoard* board) noexcept
     : clock_(clock),
       config_(std::move(config)),
-      event_(event),
+      kind_(find_task_kind(config_.kind)),
       recorder_(statistics, clock.now()),
-      grid_(TimePoint{}, grid_interval(config_), config_.late),
-      wanted_interval_(grid_.interval().count()),
+      state_(kind_->make({.clock = clock, .config = config_, .event = event})),
       overruns_(config_.watchdog),
       fault_(board, config_.watchdog.policy) {
-  if (event_ != nullptr) recorder_.begin_posts(event_->count());
+  if (event != nullptr) recorder_.begin_posts(event->count());
 }
 
 void Task::begin(TimePoint origin, bool takes_posts) {
-  grid_ = ReleaseGrid(origin + config_.start_offset,
-                      Duration(wanted_interval_.load(std::memory_order_relaxed)), config_.late);
+  state_->begin(origin, takes_posts);
   ready_ = origin;
-  begun_ = false;
-  set_due(origin + config_.start_offset);
   overruns_.forgive_next();
   recorder_.begin();
-  if (event_ != nullptr) {
-    const std::uint64_t count = takes_posts ? event_->set_taken(true).count() : event_->count();
-    recorder_.lose_posts(count);
-    cursor_ = {.next = count, .seen = count, .seen_at = origin};
-  }
-}
-
-Activation Task::next_release(const FreewheelRule& rule) const noexcept {
-  if (config_.kind == TaskKind::freewheeling) {
-    const Duration sleep = begun_ ? rule.sleep_after(last_execution_) : Duration::zero();
-    return {.release = ready_ + sleep};
-  }
-  const auto [release, lost_cycles] = grid_.plan(ready_);
-  return {.release = release, .lost_cycles = lost_cycles};
-}
-
-bool Task::set_interval(Duration interval) noexcept {
-  if (config_.kind != TaskKind::cyclic) return false;
-  if (interval < kMinRuntimeInterval || interval > kMaxInterval) return false;
-  wanted_interval_.store(interval.count(), std::memory_order_relaxed);
-  return true;
+  if (state_->event() != nullptr) recorder_.lose_posts(state_->posts_done());
 }
 
 bool Task::raise_event() noexcept {
-  if (config_.kind != TaskKind::event) return false;
-  latch_.raise();
+  EventLatch* const latch = state_->latch();
+  if (latch == nullptr) return false;
+  latch->raise();
   return true;
 }
 
-Duration Task::interval() const noexcept {
-  if (config_.kind != TaskKind::cyclic) return Duration::zero();
-  return Duration(wanted_interval_.load(std::memory_order_relaxed));
+void Task::rouse() noexcept {
+  CountedEvent* const event = state_->event();
+  if (event != nullptr && event->count() != state_->slept_at()) event->rouse();
+}
+
+void Task::lose_posts() noexcept {
+  if (const CountedEvent* const event = state_->event()) recorder_.lose_posts(event->count());
 }
 
 std::optional<Task::Demand> Task::demand(TimePoint now) const noexcept {
-  const Demand demand{
-      .cycle_since = trap_.running_since(), .due = due(), .posts = slept_at_.load(std::memory_order_relaxed)};
+  const Demand demand{.cycle_since = trap_.running_since(), .due = due(), .posts = state_->slept_at()};
   if (fault_.halts() || !free_since()) return std::nullopt;
-  if (demand.cycle_since) return demand;
-  const bool is_due = demand.due && *demand.due < now;
-  const bool is_posted = event_ != nullptr && event_->count() != demand.posts;
-  if (is_due || is_posted || latch_.is_due()) return demand;
+  if (demand.cycle_since || state_->is_due(now)) return demand;
   return std::nullopt;
 }
 
@@ -89,17 +62,8 @@ std::optional<TimePoint> Task::free_since() const noexcept {
   return TimePoint(Duration(since));
 }
 
-std::optional<TimePoint> Task::due() const noexcept {
-  if (config_.kind != TaskKind::cyclic) return std::nullopt;
-  return TimePoint(Duration(due_.load(std::memory_order_relaxed)));
-}
-
 Task::Pace Task::pace() const noexcept {
   return {.lost = lost_.load(std::memory_order_relaxed), .on_time = on_time_.load(std::memory_order_relaxed)};
-}
-
-void Task::set_due(TimePoint due) noexcept {
-  due_.store(due.time_since_epoch().count(), std::memory_order_relaxed);
 }
 
 // false: it did not come to its end.
@@ -127,11 +91,8 @@ void Task::look_at_overrun(Duration execution) noexcept {
 
 void Task::run_cycle(const Activation& activation) noexcept {
   const CycleGate::Stay within(gate_, seat_, clock_);
-  // Only a freewheeling task sleeps by what it used itself, so only there it is worth the system calls.
-  const bool by_own_time = config_.kind == TaskKind::freewheeling;
-  const Duration used_before = by_own_time ? clock_.thread_time() : Duration::zero();
+  state_->cycle_begins(activation.release);
   const TimePoint start = clock_.now();
-  set_due(activation.release + interval());
   if (config_.before_entry) config_.before_entry();
   const TimePoint entered = config_.before_entry ? clock_.now() : start;
   trap_.arm(fault_, entered);
@@ -141,12 +102,7 @@ void Task::run_cycle(const Activation& activation) noexcept {
   const TimePoint left = clock_.now();
   if (config_.after_entry) config_.after_entry();
   const TimePoint end = config_.after_entry ? clock_.now() : left;
-  if (by_own_time) last_execution_ = clock_.thread_time() - used_before;
-  grid_.set_interval(Duration(wanted_interval_.load(std::memory_order_relaxed)));
-  grid_.ran(activation.release);
-  if (follower_ != nullptr) {
-    grid_.shift(follower_->correction(grid_.next(), grid_.interval(), config_.start_offset, end));
-  }
+  state_->cycle_ended(activation.release, end);
   ready_ = end;
   record(activation, start, end);
   if (config_.after_cycle) config_.after_cycle(recorder_.counters());
@@ -162,19 +118,18 @@ void Task::work_between_cycles() noexcept {
 }
 
 void Task::record(const Activation& activation, TimePoint start, TimePoint end) noexcept {
-  begun_ = true;
   std::atomic<std::uint64_t>& count = activation.lost_cycles > 0 ? lost_ : on_time_;
   const std::uint64_t more = activation.lost_cycles > 0 ? activation.lost_cycles : 1;
   count.store(count.load(std::memory_order_relaxed) + more, std::memory_order_relaxed);
   recorder_.record({.release = activation.release,
                     .start = start,
                     .end = end,
-                    .interval = config_.kind == TaskKind::cyclic ? grid_.interval() : Duration::zero(),
+                    .interval = interval_in_force(),
                     .lost_cycles = activation.lost_cycles,
                     .lost_events = activation.lost_events,
                     .timer_expirations = activation.timer_expirations,
                     .spun = activation.spun,
-                    .posts_done = cursor_.next});
+                    .posts_done = state_->posts_done()});
 }
 
 }  // namespace plchost

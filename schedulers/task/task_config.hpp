@@ -4,14 +4,17 @@
 #include <functional>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "shm/base/result.hpp"
 #include "shm/base/task_statistics.hpp"
 #include "shm/base/thread.hpp"
 #include "shm/base/time.hpp"
 
 namespace plchost {
 
-/// The four kinds of iec_task_management, with the numbers of the seed's KindOfTask.
+/// The four kinds of iec_task_management, with the numbers of the seed's KindOfTask. Their table is in
+/// task_kind.hpp.
 enum class TaskKind : std::uint8_t { cyclic = 0, event = 1, external = 2, freewheeling = 3 };
 
 /// The action of a cyclic task that is late: wait for the next point of its grid, or run at once.
@@ -80,6 +83,13 @@ struct TaskConfig {
   /// Called on the task's thread after each cycle with the new counters; real-time. May be empty.
   std::function<void(const TaskCounters&)> after_cycle;
 };
+
+/// As in TaskSet::create, one task by itself, and all. invalid_argument: the text names the task that is not
+/// valid, and what is allowed.
+[[nodiscard]] Result<void> check_task(const TaskConfig& task);
+[[nodiscard]] Result<void> check_tasks(const std::vector<TaskConfig>& tasks);
+/// invalid_argument: "task 'NAME': TEXT"
+[[nodiscard]] std::unexpected<Error> bad_task(const TaskConfig& task, std::string_view text);
 
 /// How long tasks may take to come to the end of their cycles, in each of the two phases of a stop.
 struct StopLimits {

@@ -15,7 +15,6 @@ class AuxiliaryTick final : public TickSource {
   AuxiliaryTick(Clock& clock, std::shared_ptr<TickDevice> device, std::unique_ptr<TickSource> backup) noexcept
       : clock_(clock), device_(std::move(device)), backup_(std::move(backup)) {}
 
-  [[nodiscard]] TickCapabilities capabilities() const noexcept override { return device_->capabilities(); }
   /// The device has its own phase: `first` is only where the backup would begin.
   void start(TimePoint first, Duration period) noexcept override;
   [[nodiscard]] std::optional<TimePoint> wait() noexcept override;

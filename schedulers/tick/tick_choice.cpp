@@ -4,8 +4,6 @@
 
 #include <fmt/format.h>
 
-#include "schedulers/tick/tick_source.hpp"
-
 namespace plchost {
 
 namespace {
@@ -28,8 +26,7 @@ Result<std::shared_ptr<TickDevice>> device_for(const SchedulerSettings& settings
 
 TickChoice choose_tick(const SchedulerSettings& settings, DeviceFiles& files,
                        const std::shared_ptr<TickDevice>& known) {
-  TickChoice choice{
-      .kind = settings.tick_source, .device = {}, .capabilities = kKernelTimerCapabilities, .fallback = {}};
+  TickChoice choice{.kind = settings.tick_source, .device = {}, .fallback = {}};
   if (settings.tick_source != TickSourceKind::auxiliary) return choice;
   auto device = device_for(settings, files, known);
   if (!device) {
@@ -38,25 +35,16 @@ TickChoice choose_tick(const SchedulerSettings& settings, DeviceFiles& files,
     return choice;
   }
   choice.device = *std::move(device);
-  choice.capabilities = choice.device->capabilities();
   return choice;
 }
 
-Result<void> check_one_shot(const Scheduler& scheduler, const TickChoice& choice) {
-  if (!scheduler.capabilities().one_shot || choice.kind != TickSourceKind::auxiliary) return {};
-  const TickCapabilities& can = choice.capabilities;
-  const bool linear = can.periods == TickCapabilities::Periods::linear;
-  if (linear && can.one_shot) return {};
+Result<void> check_one_shot(std::string_view scheduler, const TickChoice& choice) {
+  if (choice.kind != TickSourceKind::auxiliary) return {};
   return failure(
       ErrorCode::unsupported,
-      fmt::format("{} sets its timer to another time in each cycle, but {} {}{}: use the timer source "
-                  "System or Task",
-                  scheduler.name(), choice.device->path(),
-                  linear ? ""
-                         : (can.periods == TickCapabilities::Periods::powers_of_two
-                                ? "only has frequencies that are powers of two"
-                                : "only has frequencies in whole hertz"),
-                  can.one_shot ? "" : (linear ? "ticks only periodically" : " and ticks only periodically")));
+      fmt::format("{} sets its timer to another time in each cycle, but {} only has frequencies {} and ticks "
+                  "only periodically: use the timer source System or Task",
+                  scheduler, choice.device->path(), choice.device->frequencies()));
 }
 
 TickReport report_of(const TickChoice& choice) {

@@ -2,8 +2,9 @@
 
 #include <memory>
 #include <string>
+#include <string_view>
 
-#include "schedulers/scheduler.hpp"
+#include "schedulers/scheduler_settings.hpp"
 #include "schedulers/tick/tick_device.hpp"
 
 namespace plchost {
@@ -12,8 +13,7 @@ namespace plchost {
 struct TickChoice {
   TickSourceKind kind = TickSourceKind::system;
   std::shared_ptr<TickDevice> device;  ///< of TickSourceKind::auxiliary
-  TickCapabilities capabilities;
-  std::string fallback;  ///< why it is not the one that the settings ask for; empty: it is
+  std::string fallback;                ///< why it is not the one that the settings ask for; empty: it is
 };
 
 /// The tick source that the settings name, or the system's clock if that is not there or cannot make the
@@ -21,9 +21,9 @@ struct TickChoice {
 [[nodiscard]] TickChoice choose_tick(const SchedulerSettings& settings, DeviceFiles& files,
                                      const std::shared_ptr<TickDevice>& known);
 
-/// unsupported: this scheduler sets its timer anew each cycle, and the source cannot. The text says why, and
+/// Of a scheduler that sets its timer anew each cycle. unsupported: the source cannot. The text says why, and
 /// what can.
-[[nodiscard]] Result<void> check_one_shot(const Scheduler& scheduler, const TickChoice& choice);
+[[nodiscard]] Result<void> check_one_shot(std::string_view scheduler, const TickChoice& choice);
 
 /// Where the ticks come from now.
 struct TickReport {

@@ -66,22 +66,6 @@ Result<std::shared_ptr<TickDevice>> TickDevice::open(DeviceFiles& files, const s
   return std::shared_ptr<TickDevice>(new TickDevice(path, *std::move(file), kind));
 }
 
-TickCapabilities TickDevice::capabilities() const noexcept {
-  using Periods = TickCapabilities::Periods;
-  if (kind_ == Kind::rtc) {
-    return {.periods = Periods::powers_of_two,
-            .resolution = period_of(kHighestRtc),
-            .shortest = period_of(kHighestRtc),
-            .longest = period_of(kLowestRtc),
-            .one_shot = false};
-  }
-  return {.periods = Periods::whole_hertz,
-          .resolution = Duration(1),
-          .shortest = period_of(kHighestHpet),
-          .longest = period_of(1),
-          .one_shot = false};
-}
-
 Result<void> TickDevice::set_period(Duration period) {
   const auto [higher, lower] = around(period, kind_ == Kind::rtc);
   const bool is_higher = period_of(higher) == period;

@@ -9,7 +9,7 @@
 
 #include "schedulers/tick/device_file.hpp"
 #include "schedulers/tick/device_time.hpp"
-#include "schedulers/tick/tick_capabilities.hpp"
+#include "shm/base/result.hpp"
 
 namespace plchost {
 
@@ -30,7 +30,10 @@ class TickDevice {
   ~TickDevice() { halt(); }
 
   [[nodiscard]] const std::string& path() const noexcept { return path_; }
-  [[nodiscard]] TickCapabilities capabilities() const noexcept;
+  /// "that are powers of two": which it can make.
+  [[nodiscard]] std::string_view frequencies() const noexcept {
+    return kind_ == Kind::rtc ? "that are powers of two" : "in whole hertz";
+  }
 
   /// invalid_argument: it cannot make this period; the text lists the nearest that it can. Set-up.
   [[nodiscard]] Result<void> set_period(Duration period);

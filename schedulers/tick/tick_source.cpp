@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "schedulers/activation/activation_gate.hpp"
+#include "schedulers/task/activation_gate.hpp"
 #include "schedulers/tick/auxiliary_tick.hpp"
 
 namespace plchost {
@@ -35,7 +35,6 @@ class SystemTick final : public TickSource {
   SystemTick(Clock& clock, std::unique_ptr<PeriodicTimer> timer) noexcept
       : clock_(clock), timer_(std::move(timer)) {}
 
-  [[nodiscard]] TickCapabilities capabilities() const noexcept override { return kKernelTimerCapabilities; }
   void start(TimePoint first, Duration period) noexcept override {
     grid_.start(first, period);
     timer_->start(first, period);
@@ -59,7 +58,6 @@ class TaskTick final : public TickSource {
  public:
   explicit TaskTick(Clock& clock) noexcept : clock_(clock) {}
 
-  [[nodiscard]] TickCapabilities capabilities() const noexcept override { return kKernelTimerCapabilities; }
   void start(TimePoint first, Duration period) noexcept override { grid_.start(first, period); }
   std::optional<TimePoint> wait() noexcept override {
     if (gate_.wait(clock_, grid_.next()) != ActivationGate::Outcome::timed_out) return std::nullopt;
@@ -75,14 +73,13 @@ class TaskTick final : public TickSource {
 
 }  // namespace
 
-Result<std::unique_ptr<TickSource>> make_tick_source(const SchedulerContext& context) {
-  Clock& clock = context.clock;
-  if (context.settings.tick_source == TickSourceKind::task) return std::make_unique<TaskTick>(clock);
+Result<std::unique_ptr<TickSource>> make_tick_source(Clock& clock, const TickChoice& choice) {
+  if (choice.kind == TickSourceKind::task) return std::make_unique<TaskTick>(clock);
   auto timer = clock.make_periodic_timer();
   if (!timer) return std::unexpected(std::move(timer.error()));
   auto system = std::make_unique<SystemTick>(clock, std::move(*timer));
-  if (context.settings.tick_source == TickSourceKind::system) return system;
-  return std::make_unique<AuxiliaryTick>(clock, context.tick_device, std::move(system));
+  if (choice.kind == TickSourceKind::system) return system;
+  return std::make_unique<AuxiliaryTick>(clock, choice.device, std::move(system));
 }
 
 }  // namespace plchost

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "schedulers/activation/activation_gate.hpp"
+#include "schedulers/task/activation_gate.hpp"
 
 namespace plchost {
 
@@ -73,7 +73,8 @@ class TickTable::Slot final : public ActivationSource, public DueQueue::Entry {
 
 std::unique_ptr<ActivationSource> TickTable::add(const Task& task, FreewheelRule rule) {
   auto slot = std::make_unique<Slot>(*this, task, rule);
-  slots_.push_back(slot.get());
+  slots_.insert(std::ranges::upper_bound(slots_, slot->priority(), {}, &Slot::priority), slot.get());
+  for (std::size_t i = 0; i < slots_.size(); ++i) slots_[i]->rank = i;
   queue_.reserve(slots_.capacity());
   due_.reserve(slots_.capacity());
   return slot;
@@ -104,8 +105,6 @@ Activation TickTable::on_the_tick(Activation activation, Duration interval) cons
 }
 
 void TickTable::start(TimePoint tick) noexcept {
-  std::ranges::stable_sort(slots_, {}, &Slot::priority);
-  for (std::size_t i = 0; i < slots_.size(); ++i) slots_[i]->rank = i;
   last_tick_.store(to_count(tick));
 }
 

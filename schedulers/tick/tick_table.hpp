@@ -39,10 +39,7 @@ class TickTable {
   /// The source of a cyclic or freewheeling task. Set-up.
   [[nodiscard]] std::unique_ptr<ActivationSource> add(const Task& task, FreewheelRule rule);
 
-  [[nodiscard]] bool empty() const noexcept { return slots_.empty(); }
-
-  /// Orders the table by priority and takes `tick` as the last tick that passed. Set-up, after the last
-  /// add().
+  /// Takes `tick` as the last tick that passed. After the last add(), before anybody waits.
   void start(TimePoint tick) noexcept;
 
   /// Releases what is due at `tick`, in the order of priority. Depends on nothing but `tick` and the table.
@@ -63,7 +60,7 @@ class TickTable {
 
   Clock& clock_;
   std::uint32_t frequency_;
-  std::vector<Slot*> slots_;
+  std::vector<Slot*> slots_;  // by priority
   std::atomic<Duration::rep> last_tick_{0};
   std::atomic<Duration::rep> device_tick_{0};  // the last one that a device has made
   std::atomic<Slot*> handed_in_{nullptr};  // a list that tasks put themselves on, and a tick takes as a whole

@@ -8,65 +8,79 @@
 
 namespace plchost {
 
-Ticker::Ticker(const SchedulerContext& context, std::string thread_name, EventPoller& poller, OnTick on_tick)
-    : context_(context),
-      clock_(context.clock),
-      period_(context.settings.scheduler_interval),
-      thread_name_(std::move(thread_name)),
-      poller_(poller),
-      on_tick_(std::move(on_tick)) {}
+namespace {
 
-Result<void> Ticker::prepare() {
-  auto source = make_tick_source(context_);
-  if (!source) return failure_in("tick source", std::move(source.error()));
-  source_ = std::move(*source);
-  auto thread = start_clock_thread(clock_, thread_name_, context_.tick, [this] { run(); });
+constexpr Duration kParkedLook = std::chrono::milliseconds(10);
+
+}  // namespace
+
+Ticker::~Ticker() {
+  use(nullptr);
+  ending_.store(true);
+  order_.fetch_add(1);
+  clock_.wake(order_);
+  (void)thread_.join_until(kNoDeadline, [this] { return poller_.parked(); });
+}
+
+Result<void> Ticker::start_thread(ThreadPriority priority) {
+  auto thread = start_clock_thread(clock_, "tick", priority, [this] { run(); });
   if (!thread) return std::unexpected(std::move(thread.error()));
   thread_ = std::move(*thread);
   return {};
 }
 
-TimePoint Ticker::first_tick(TimePoint origin) const noexcept {
-  const Duration since = std::max(clock_.now() - origin, Duration::zero());
-  return origin + (since + period_ - Duration(1)) / period_ * period_;
+void Ticker::use(TickPlan* plan) noexcept {
+  TickPlan* const before = wanted_.exchange(plan);
+  if (before == nullptr && plan == nullptr) return;  // it rests, or is about to
+  order_.fetch_add(1);
+  clock_.wake(order_);
+  if (before != nullptr && before->source) before->source->interrupt();
 }
 
-void Ticker::start(TimePoint first) noexcept {
-  first_ = first;
-  tick_.open(clock_);
-}
-
-bool Ticker::prime() noexcept {
-  go_.open(clock_);
-  constexpr Duration kLook = std::chrono::milliseconds(10);
-  const TimePoint deadline = MonotonicClock::now() + kVariablePatience;
-  while (primed_.load(std::memory_order_acquire) == 0 && !poller_.parked()) {
+bool Ticker::settled(TimePoint deadline) noexcept {
+  for (;;) {
+    const std::uint32_t done = done_.load(std::memory_order_acquire);
+    if (done == order_.load() || !thread_.joinable() || poller_.parked()) return true;
     const TimePoint now = MonotonicClock::now();
     if (now >= deadline) return false;
-    futex_wait(&primed_, 0, std::min(deadline, now + kLook));
+    futex_wait(&done_, done, std::min(deadline, now + kParkedLook));  // a thread that is parked wakes nobody
   }
-  return true;
 }
 
-bool Ticker::stop(TimePoint deadline) noexcept {
-  if (!thread_.joinable()) return true;
-  if (!stopping_.exchange(true, std::memory_order_acq_rel)) {
-    go_.interrupt(clock_);
-    tick_.interrupt(clock_);
-    source_->interrupt();
-  }
-  return thread_.join_until(deadline, [this] { return poller_.parked(); });
+void Ticker::begin(TickPlan* plan) noexcept {
+  const std::optional<TimePoint> before = std::exchange(last_tick_, std::nullopt);
+  if (plan == nullptr) return;
+  poller_.prime(clock_.now());
+  if (!plan->source) return;
+  poller_.set_max_backlog(plan->max_backlog);
+  const Duration period = plan->period;
+  const Duration since = std::max(clock_.now() - plan->origin, Duration::zero());
+  const TimePoint first = plan->origin + (since + period - Duration(1)) / period * period;
+  const TimePoint passed = first - period;
+  if (plan->scheduler != nullptr) plan->scheduler->on_tick(passed);
+  // It fell due when the plan before was given up, or lies between the grids of the two.
+  if (before && *before < passed) poller_.poll(passed);
+  last_tick_ = passed;
+  plan->source->start(first, period);
 }
 
 void Ticker::run() noexcept {
-  if (go_.wait(clock_) != ActivationGate::Outcome::opened) return;
-  poller_.prime(clock_.now());
-  primed_.store(1, std::memory_order_release);
-  futex_wake(&primed_);
-  if (tick_.wait(clock_) != ActivationGate::Outcome::opened) return;
-  source_->start(first_, period_);
-  while (!stopping_.load(std::memory_order_acquire)) {
-    if (const auto tick = source_->wait()) on_tick_(*tick);
+  std::uint32_t obeyed = 0;
+  TickPlan* plan = nullptr;
+  while (!ending_.load(std::memory_order_acquire)) {
+    if (const std::uint32_t order = order_.load(std::memory_order_acquire); order != obeyed) {
+      plan = wanted_.load(std::memory_order_acquire);
+      begin(plan);
+      obeyed = order;
+      done_.store(order, std::memory_order_release);
+      futex_wake(&done_);
+    } else if (plan == nullptr || !plan->source) {
+      clock_.wait(order_, obeyed, kNoDeadline);
+    } else if (const auto tick = plan->source->wait()) {
+      if (plan->scheduler != nullptr) plan->scheduler->on_tick(*tick);
+      poller_.poll(*tick);
+      last_tick_ = *tick;
+    }
   }
 }
 

@@ -2,58 +2,57 @@
 
 #include <atomic>
 #include <cstdint>
-#include <functional>
 #include <memory>
-#include <string>
+#include <optional>
 
-#include "schedulers/activation/activation_gate.hpp"
 #include "schedulers/activation/event_poller.hpp"
+#include "schedulers/scheduler.hpp"
 #include "schedulers/tick/tick_source.hpp"
 #include "shm/base/thread.hpp"
 
 namespace plchost {
 
-/// A thread of a scheduler that does something at each tick. All functions but the callback: set-up, one
-/// thread.
+/// The work of the ticker. It is not changed while the ticker uses it.
+struct TickPlan {
+  std::unique_ptr<TickSource> source;  ///< null: only the first look at the event variables
+  Scheduler* scheduler = nullptr;      ///< told of each tick; null: none
+  TimePoint origin;                    ///< ticks lie on the grid origin + n * period
+  Duration period{};                   ///< > 0 with a source
+  std::uint64_t max_backlog = 1;       ///< of raised edges, the runs that a task may lag behind
+};
+
+/// The one thread of a set of tasks that ticks: at each tick it tells the scheduler, and then looks at the
+/// event variables. Between two ticks it takes the plan that it was given last. Without one it sleeps. All
+/// functions: set-up, from one control thread.
 class Ticker {
  public:
-  using OnTick = std::function<void(TimePoint tick)>;
-
-  /// `on_tick` is called on the ticker's thread with the planned time of the tick; real-time. `poller` is
-  /// primed there before the first tick. Nothing waits for a thread that is parked in a faulty variable, and
-  /// only so long for one that is in a variable that does not return.
-  Ticker(const SchedulerContext& context, std::string thread_name, EventPoller& poller, OnTick on_tick);
+  Ticker(Clock& clock, EventPoller& poller) noexcept : clock_(clock), poller_(poller) {}
   Ticker(const Ticker&) = delete;
   Ticker& operator=(const Ticker&) = delete;
-  ~Ticker() { (void)stop(kNoDeadline); }
+  /// Ends the thread, however long an event variable takes. A thread that is parked in one is left alone.
+  ~Ticker();
 
-  /// Makes the tick source and the thread, which waits.
-  [[nodiscard]] Result<void> prepare();
-  /// The first point of the grid origin + n * scheduler_interval that is not over.
-  [[nodiscard]] TimePoint first_tick(TimePoint origin) const noexcept;
-  /// Returns when the event variables have been read for the first time. After prepare(). false: they have
-  /// not, for kVariablePatience; it ticks once they have.
-  [[nodiscard]] bool prime() noexcept;
-  /// Ticks at `first` and then every scheduler_interval. After prime().
-  void start(TimePoint first) noexcept;
-  /// Ends the thread; true: it has ended before `deadline` (real time), or is parked. May be called again.
-  [[nodiscard]] bool stop(TimePoint deadline) noexcept;
+  [[nodiscard]] Result<void> start_thread(ThreadPriority priority);
+
+  /// From the end of the tick under way on the ticker follows `plan`. First it reads the event variables that
+  /// were never read since their tasks began, and tells the scheduler of the tick that has passed. It makes
+  /// up for a tick that fell due in the exchange. Null: it rests. The plan before is in use until settled().
+  void use(TickPlan* plan) noexcept;
+  /// Waits until the thread follows the plan that it was given last, at most until `deadline`, which is real
+  /// time. A thread that is parked in a faulty variable follows nothing any more: it is settled.
+  [[nodiscard]] bool settled(TimePoint deadline) noexcept;
 
  private:
   void run() noexcept;
+  void begin(TickPlan* plan) noexcept;
 
-  SchedulerContext context_;
   Clock& clock_;
-  Duration period_;
-  std::string thread_name_;
   EventPoller& poller_;
-  OnTick on_tick_;
-  std::unique_ptr<TickSource> source_;
-  ActivationGate go_;    // to the variables
-  ActivationGate tick_;  // to the first tick
-  std::atomic<bool> stopping_{false};
-  TimePoint first_;  // written before tick_ opens
-  std::atomic<std::uint32_t> primed_{0};
+  std::atomic<TickPlan*> wanted_{nullptr};
+  std::atomic<bool> ending_{false};
+  std::atomic<std::uint32_t> order_{0};  // changes with each plan; the thread sleeps on it
+  std::atomic<std::uint32_t> done_{0};   // the last order that was obeyed; the control thread sleeps on it
+  std::optional<TimePoint> last_tick_;   // the thread's own; nothing: it has rested
   Thread thread_;
 };
 

@@ -1,2 +1,2 @@
-# schedulers/activation/activation_gate.hpp: a thread that sleeps at the gate is not woken
+# schedulers/task/activation_gate.hpp: a thread that sleeps at the gate is not woken
 s/clock\.wake\(word_\);//

@@ -1,4 +1,4 @@
-#include "schedulers/activation/event_latch.hpp"
+#include "schedulers/task/event_latch.hpp"
 
 #include <gtest/gtest.h>
 

@@ -23,7 +23,7 @@ TEST(Registry, UnknownNameListsTheKnown) {
 TEST(Registry, OnlyCmpScheduleOffersBreakpointsInExternalEventTasksAndOnlyOneShotMovesReleases) {
   LinuxClock clock;
   for (const SchedulerEntry& entry : all_schedulers()) {
-    const auto scheduler = entry.make({.clock = clock, .settings = {}, .tick = {}});
+    const auto scheduler = entry.make({.clock = clock, .settings = {}});
     EXPECT_EQ(scheduler->name(), entry.name);
     EXPECT_EQ(scheduler->capabilities().external_event_breakpoints, entry.name == "CmpSchedule");
     EXPECT_EQ(scheduler->capabilities().one_shot, entry.name == "CmpScheduleOneShot");

@@ -24,10 +24,8 @@ struct Fixture {
 };
 
 TEST(TickDevice, AsksTheDeviceWhatItIs) {
-  EXPECT_EQ(Fixture(Kind::rtc).sut->capabilities().periods, TickCapabilities::Periods::powers_of_two);
-  EXPECT_EQ(Fixture(Kind::hpet).sut->capabilities().periods, TickCapabilities::Periods::whole_hertz);
-  EXPECT_FALSE(Fixture(Kind::rtc).sut->capabilities().one_shot);
-  EXPECT_EQ(Fixture(Kind::rtc).sut->capabilities().longest, std::chrono::milliseconds(500));
+  EXPECT_EQ(Fixture(Kind::rtc).sut->frequencies(), "that are powers of two");
+  EXPECT_EQ(Fixture(Kind::hpet).sut->frequencies(), "in whole hertz");
   ManualClock clock;
   FakeClockDevice files(clock, Kind::neither);
   const auto refused = TickDevice::open(files, "/dev/null");

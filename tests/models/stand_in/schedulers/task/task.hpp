@@ -3,8 +3,8 @@
 #include <optional>
 #include <utility>
 
-#include "schedulers/activation/activation.hpp"
 #include "schedulers/clock.hpp"
+#include "schedulers/task/activation.hpp"
 #include "schedulers/task/freewheel_rule.hpp"
 #include "schedulers/task/task_config.hpp"
 

@@ -1,4 +1,4 @@
-#include "schedulers/activation/external_event_source.hpp"
+#include "schedulers/task/external_event_source.hpp"
 
 namespace plchost {
 
@@ -10,24 +10,25 @@ constexpr std::uint64_t kImplausible = 16;
 }  // namespace
 
 std::optional<Activation> ExternalEventSource::wait() noexcept {
-  EventCursor& cursor = task_.cursor();
+  EventCursor& cursor = cursor_;
   for (;;) {
     // In this order no nudge is missed: see CountedEvent::wait().
-    const CountedEvent::Snapshot snapshot = task_.event().snapshot();
+    const CountedEvent::Snapshot snapshot = cursor.event.snapshot();
     if (interrupted_.load(std::memory_order_acquire)) {
       interrupted_.store(false, std::memory_order_relaxed);
       return std::nullopt;
     }
     const std::uint64_t count = snapshot.count();
     if (count == cursor.next) {
-      task_.awaits_post_after(count);
-      clock_.wait(task_.event(), snapshot);
+      cursor.slept_at.store(count, std::memory_order_relaxed);
+      clock_.wait(cursor.event, snapshot);
       continue;
     }
     const std::uint64_t backlog = count - cursor.next;
     if (backlog / kImplausible >= max_backlog_) {
       // A stranger wrote over the counter: the number of posts is not known.
-      cursor = {.next = count, .seen = count, .seen_at = clock_.now()};
+      cursor.next = cursor.seen = count;
+      cursor.seen_at = clock_.now();
       const bool back = backlog > CountedEvent::kCountMask;
       return Activation{.release = cursor.seen_at, .lost_events = back ? 1 : backlog - 1};
     }
@@ -43,7 +44,7 @@ std::optional<Activation> ExternalEventSource::wait() noexcept {
 
 void ExternalEventSource::interrupt() noexcept {
   interrupted_.store(true, std::memory_order_release);
-  task_.event().nudge();
+  cursor_.event.nudge();
 }
 
 }  // namespace plchost

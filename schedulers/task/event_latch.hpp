@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "schedulers/activation/activation_gate.hpp"
+#include "schedulers/task/activation_gate.hpp"
 #include "shm/base/time.hpp"
 
 namespace plchost {
@@ -86,13 +86,6 @@ class EventLatch {
   std::atomic<std::uint64_t> due_{0};  // runs that have not begun
   std::atomic<Duration::rep> seen_at_{0};
   std::atomic<std::uint64_t> lost_{0};
-};
-
-/// How far an external-event task has come in its event. Part of the task; only its thread uses it.
-struct EventCursor {
-  std::uint64_t next = 0;  ///< posts that were run or lost
-  std::uint64_t seen = 0;  ///< posts that were seen at `seen_at`
-  TimePoint seen_at;
 };
 
 }  // namespace plchost

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <utility>
+
+#include "schedulers/scheduler.hpp"
+#include "schedulers/tick/tick_table.hpp"
+
+namespace plchost {
+
+/// One periodic tick: all that is due is released at the same tick, so that the operating system runs it one
+/// after the other by priority. A release between two ticks waits for the next tick; its grid stays as it is.
+class CmpSchedule final : public Scheduler {
+ public:
+  static constexpr std::string_view kName = "CmpSchedule";
+
+  explicit CmpSchedule(const SchedulerContext& context)
+      : rule_(context.settings), table_(context.clock, context.tick_frequency) {}
+
+  [[nodiscard]] std::string_view name() const noexcept override { return kName; }
+  [[nodiscard]] SchedulerCapabilities capabilities() const noexcept override {
+    return {.ticks = true, .one_shot = false, .external_event_breakpoints = true};
+  }
+  [[nodiscard]] Result<std::unique_ptr<ActivationSource>> source_for(Task& task) override {
+    return table_.add(task, rule_);
+  }
+  void on_tick(TimePoint tick) noexcept override {
+    if (std::exchange(begun_, true)) {
+      table_.on_tick(tick);
+    } else {
+      table_.start(tick);  // a release before it is late, and runs as soon as its task comes
+    }
+  }
+
+ private:
+  FreewheelRule rule_;
+  TickTable table_;
+  bool begun_ = false;
+};
+
+}  // namespace plchost

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string>
+
+#include "schedulers/distributed_clock/settings.hpp"
+#include "shm/base/result.hpp"
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+/// 100: a freewheeling task sleeps no longer than it must.
+inline constexpr int kMaxProcessorLoad = 100;
+/// More than any wake-up latency that spinning is an answer to.
+inline constexpr Duration kMaxSpinAhead = std::chrono::milliseconds(1);
+
+/// system: a timer of the kernel. task: a thread of high priority in absolute sleeps. auxiliary: a clock
+/// device with an interrupt of its own.
+enum class TickSourceKind : std::uint8_t { system, task, auxiliary };
+
+/// The watchdogs that concern the instance as a whole.
+struct WatchdogSettings {
+  bool load =
+      true;  ///< the load watchdog: at processor_load_maximum percent, or if that is not set at overload
+  Duration load_interval = std::chrono::seconds(1);  ///< over which the load is measured
+  bool omitted_cycles = true;                        ///< the tasks' watchdogs of omitted cycles may hit
+  Duration default_time = std::chrono::seconds(2);   ///< of an endless loop in a task without a time; 0: off
+  bool operator==(const WatchdogSettings&) const = default;
+};
+
+/// The settings of [CmpSchedule] and [SysTimer], already validated by whoever read them.
+struct SchedulerSettings {
+  Duration scheduler_interval =
+      std::chrono::milliseconds(1);   ///< the tick, and how often event variables are polled
+  Duration freewheeling_cycletime{};  ///< fixed sleep of freewheeling tasks; 0: a share of the execution time
+  int processor_load_maximum =
+      0;  ///< percent, 1..100; freewheeling tasks sleep (100-M) %; 0: not set, sleep 20 %
+  TickSourceKind tick_source = TickSourceKind::system;
+  std::string auxiliary_device = "/dev/rtc0";  ///< of TickSourceKind::auxiliary
+  Duration spin_ahead_max =
+      std::chrono::microseconds(100);  ///< bound of the guard of CmpScheduleOneShot; 0: off
+  std::uint64_t max_event_backlog = std::uint64_t{1}
+                                    << 20;  ///< external events a task may lag behind before it drops
+  DistributedClockSettings distributed_clock;
+  WatchdogSettings watchdog;
+  bool operator==(const SchedulerSettings&) const = default;
+};
+
+/// invalid_argument: a value is out of its range; the text says which and what is allowed.
+[[nodiscard]] Result<void> check_settings(const SchedulerSettings& settings);
+
+}  // namespace plchost
