@@ -77,11 +77,10 @@ void add_list_nodes(const Command& verb, CliSession& session) {
 void add_show_routes(const Command& verb, CliSession& session) {
   const auto node = std::make_shared<std::string>();
   const auto base = std::make_shared<std::string>();
-  verb.noun(
-          "routes",
-          "How blocks go from each node to all others: the next node, the links that it takes, and what the "
-          "first of them counts",
-          [&session, node, base] { return show_routes(session, *node, *base); })
+  verb.noun("routes",
+            "How blocks go from each node to all others: the next node, the links that it takes, and the "
+            "counts of the first of them",
+            [&session, node, base] { return show_routes(session, *node, *base); })
       .optional("NODE", *node, "only from this one, by name or address")
       .optional("--base", *base, kBaseText);
 }
