@@ -44,8 +44,8 @@ class Clock {
   /// Sleeps on the event's own word while it is as `seen`. May return early. Real-time.
   virtual void wait(CountedEvent& event, CountedEvent::Snapshot seen) noexcept = 0;
 
-  /// A thread that sleeps by this clock is about to begin (called by who starts it), or ends (by itself).
-  /// Only a clock that is driven by hand needs to know.
+  /// A thread that sleeps by this clock is about to begin (called by the thread that starts it), or ends (by
+  /// itself). Only a clock that is driven by hand needs to know.
   virtual void thread_begins() noexcept {}
   virtual void thread_ends() noexcept {}
 };

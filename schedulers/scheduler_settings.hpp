@@ -29,7 +29,7 @@ struct WatchdogSettings {
   bool operator==(const WatchdogSettings&) const = default;
 };
 
-/// The settings of [CmpSchedule] and [SysTimer], already validated by whoever read them.
+/// The settings of [CmpSchedule] and [SysTimer], already validated by their reader.
 struct SchedulerSettings {
   Duration scheduler_interval =
       std::chrono::milliseconds(1);   ///< the tick, and how often event variables are polled

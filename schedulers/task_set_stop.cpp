@@ -48,7 +48,7 @@ void TaskSet::park_tasks(bool that_drive_outputs) {
 void TaskSet::begin_second_phase() {
   stop_->others = true;
   stop_->judged_from = {};
-  // Before the tasks, so that nothing releases them; but what is in an event variable gets the phase's time.
+  // Before the tasks, so that nothing releases them; but a thread in an event variable gets the phase's time.
   ticker_.use(nullptr);
   (void)ticker_.settled(MonotonicClock::now() + kSecondLook);
   park_tasks(false);

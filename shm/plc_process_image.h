@@ -65,7 +65,7 @@ typedef char plc_image_needs_64_bit_long[sizeof(long) == 8 ? 1 : -1];
 /* The layout: this, then PLC_IMAGE_SLOTS slots, each a plc_image_slot and the bytes, padded to 64. All zero
  * but for the first four is an image into which nothing was written yet. */
 typedef struct {
-  plc_image_u64 magic;  /* written last, by whoever makes the image */
+  plc_image_u64 magic;  /* written last, by the maker of the image */
   unsigned int version; /* PLC_IMAGE_VERSION */
   unsigned int slots;   /* PLC_IMAGE_SLOTS */
   plc_image_u64 size;   /* bytes of one image */

@@ -56,7 +56,7 @@ typedef char plc_clock_needs_64_bit_long[sizeof(long) == 8 ? 1 : -1];
  * from `sequence` on are only touched with the functions below.
  */
 typedef struct {
-  plc_clock_u64 magic;        /* written last, by whoever makes the record */
+  plc_clock_u64 magic;        /* written last, by the maker of the record */
   unsigned int version;       /* PLC_REFERENCE_CLOCK_VERSION */
   unsigned int size;          /* of this struct, in bytes */
   plc_clock_u64 sequence;     /* odd while the fields below are being written */
@@ -119,8 +119,8 @@ static __inline__ void plc_reference_clock_write(plc_reference_clock* clock, plc
   __atomic_store_n(&clock->sequence, odd + 1u, __ATOMIC_RELEASE);
 }
 
-/* Reads the last pair, whoever has written what there; PLC_REFERENCE_...; `reading` is filled only with _OK.
- * A few attempts, then it gives up: real-time. */
+/* Reads the last pair, even if a stranger has written there; PLC_REFERENCE_...; `reading` is filled only with
+ * _OK. A few attempts, then it gives up: real-time. */
 static __inline__ int plc_reference_clock_read(const plc_reference_clock* clock,
                                                plc_reference_reading* reading) {
   int attempt;

@@ -63,7 +63,7 @@ std::string PendingRecords::path_of(std::string_view key) const {
 Result<void> PendingRecords::add(std::string_view key, const AuditRecord& record) const {
   json text{{"time_unix_ns", record.time_unix_ns}};
   for (const Field& field : kFields) text[field.name] = record.*field.text;
-  // For who is killed, not for a loss of power: that ends what was asked, too.
+  // For a process that is killed, not for a loss of power: that ends what was asked, too.
   std::ofstream file(path_of(key), std::ios::binary | std::ios::trunc);
   file << text.dump(-1, ' ', false, json::error_handler_t::replace) << std::flush;
   if (file) return {};

@@ -85,8 +85,8 @@ class ControlClient {
  public:
   /// A host that has not shown its presence for so long is gone.
   static constexpr Duration kHostGone = kServerGone;
-  /// A host is silent after so long: a little less than the deadline of its presence, so that who is woken by
-  /// that sees it.
+  /// A host is silent after so long: a little less than the deadline of its presence, so that a thread that
+  /// is woken by that sees it.
   static constexpr Duration kSilent = dds::kPresenceDeadline - std::chrono::milliseconds(5);
   /// All hosts are known when none was news for so long; where packets can be lost, longer than it takes
   /// until each host tells again that it is there (SPDPInterval).

@@ -19,7 +19,7 @@ inline constexpr std::string_view kOnlineOption = "online";
 inline constexpr std::string_view kSizeOption = "size";      ///< bytes
 inline constexpr std::string_view kDigestOption = "sha256";  ///< 64 lower-case hexadecimal digits
 inline constexpr std::string_view kSourceOption = "source";  ///< number of the file, see download_file_name()
-inline constexpr std::string_view kByOption = "by";          ///< role and name of who sent it; may be empty
+inline constexpr std::string_view kByOption = "by";          ///< role and name of its sender; may be empty
 inline constexpr std::string_view kFromOption = "from";      ///< his client
 
 /// An application that was sent, as the options of the command say it.

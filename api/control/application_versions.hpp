@@ -25,7 +25,7 @@ struct ApplicationVersion {
   std::string digest;               ///< SHA-256, hexadecimal
   std::uint64_t size = 0;           ///< bytes
   std::int64_t stored_unix_ns = 0;  ///< when it came
-  std::string by;                   ///< role and name of who sent it; empty: not secured
+  std::string by;                   ///< role and name of its sender; empty: not secured
   std::string from;                 ///< his client
   std::string before;               ///< path of what was loaded before it; empty: nothing
 };

@@ -35,7 +35,8 @@ Result<void> check_address(std::string_view what, std::string_view text) {
   return failure(ErrorCode::invalid_argument, fmt::format("{} '{}' is not valid", what, text.substr(0, 100)));
 }
 
-// Whether the device says so; Cyclone warns of one that has none, in vain for who has named addresses.
+// Whether the device says so; Cyclone warns of one that has none, in vain for a configuration that names
+// addresses.
 bool has_multicast(const std::string& interface) {
   const UniqueFd socket(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
   ifreq request{};

@@ -12,7 +12,7 @@ extern "C" {
 /// not be authenticated again until it has dropped this process, too.
 ///
 /// Cyclone DDS keeps what a participant that was killed has not acknowledged until its lease ends. Until then
-/// a writer whose history is full blocks, whoever else has acknowledged everything.
+/// a writer whose history is full blocks, even if all others have acknowledged everything.
 ///
 /// `reader`: it is matched with `publication`. Returns false if it is not, or not any more. Any thread.
 bool plc_forget_participant(dds_entity_t reader, dds_instance_handle_t publication);

@@ -65,7 +65,7 @@ Result<std::unique_ptr<ControlServer>> ControlServer::create(ServerOptions optio
 ControlServer::ControlServer(std::unique_ptr<Parts> parts) noexcept : parts_(std::move(parts)) {}
 
 ControlServer::~ControlServer() {
-  // No listener may run while what it uses is taken apart.
+  // No listener may run while its objects are taken apart.
   for (auto& request : parts_->requests) request.reader.reset();
   parts_->event_reader.reset();
   parts_->batch_reader.reset();

@@ -11,10 +11,10 @@ namespace plchost {
 
 /// The work of the helper process. Waits for disks and for the process that tries the file.
 ///
-/// Keeps a file: copies it, and what was copied must have the announced digest, so that who sent it can no
-/// longer change it; puts the copy in place; has it tried; writes its description; removes versions that are
-/// too many. Gives its path. Was the same file loaded already, that one's. Of a file that is refused, and of
-/// a helper that was killed, nothing counts. corrupt: not the announced size or digest. invalid_argument: no
+/// Keeps a file: copies it, and the copy must have the announced digest, so that the sender can no longer
+/// change it; puts the copy in place; has it tried; writes its description; removes versions that are too
+/// many. Gives its path. Was the same file loaded already, that one's. Of a file that is refused, and of a
+/// helper that was killed, nothing counts. corrupt: not the announced size or digest. invalid_argument: no
 /// application for this host; the text is that of the trial. timed_out: the trial. system: the disk is full,
 /// the folder cannot be written.
 ///

@@ -78,7 +78,7 @@ WishMemory::Found WishMemory::newest() const {
     const std::uint64_t length = place.length;
     found.any = found.any || generation != 0;
     if (generation <= found.generation || length > place.text.size()) continue;
-    // A copy: the checksum is of what is read, whoever writes to it meanwhile.
+    // A copy: the checksum is of the bytes that are read, even if another program writes meanwhile.
     std::string text(place.text.data(), length);
     if (auto wish = decode_wish(text)) {
       found.wish = *std::move(wish);

@@ -111,7 +111,7 @@ void InstanceOutput::keep(const LogEntry& entry) {
   if (ring_) ring_->add(entry);
 }
 
-// Onto standard error, where the log of the manager goes; never waits for who reads that.
+// Onto standard error, where the log of the manager goes; never waits for its reader.
 void InstanceOutput::forward(std::string_view bytes) {
   while (!bytes.empty() && takes_more(STDERR_FILENO)) {
     // So much fits into a pipe that takes anything.

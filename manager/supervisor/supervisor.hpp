@@ -52,7 +52,7 @@ class Supervisor : public ControlHandler, private InstanceObserver {
   void use_log_level();
   /// Ends all instances in reverse order; calls `done` when none is left, possibly at once.
   void shut_down(std::function<void()> done);
-  /// Calls `done` when what all instances are to be is on the disk, or cannot be; possibly at once.
+  /// Calls `done` when the wishes of all instances are on the disk, or cannot be; possibly at once.
   void when_kept(const std::function<void()>& done);
   /// To be called now and then: see ManagedInstance::refresh.
   void refresh();

@@ -8,7 +8,7 @@
 
 namespace plchost {
 
-/// Both clocks at the same instant, as whoever sees both has stamped them.
+/// Both clocks at the same instant, as a program that sees both has stamped them.
 struct ReferencePair {
   TimePoint local;
   std::int64_t reference_ns = 0;

@@ -24,7 +24,8 @@ constinit std::atomic<Duration::rep> last_sign{0};
 constinit std::atomic<pid_t> signer{0};      // the thread of that sign
 constinit std::atomic<bool> sets_up{false};  // the signer does
 constinit std::atomic<Mailbox> mailbox{Mailbox::empty};
-constinit ProcessorGuard::Taker reported;  // belongs to who has made the mailbox `claimed` or found it `full`
+constinit ProcessorGuard::Taker reported;  // belongs to the thread that has made the mailbox `claimed` or
+                                           // found it `full`
 
 // The kernel raises the limit with each signal that it sends.
 void set_limit(Duration limit) noexcept {

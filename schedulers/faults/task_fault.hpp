@@ -27,7 +27,7 @@ class FaultBoard {
   std::atomic<bool> halted_{false};
 };
 
-/// The fault of one task: raised once, by whoever is first, and kept.
+/// The fault of one task: raised once, by the first finder, and kept.
 class TaskFault {
  public:
   TaskFault(FaultBoard* board, WatchdogPolicy policy) noexcept : board_(board), policy_(policy) {}

@@ -31,8 +31,8 @@ class ActivationGate {
     }
   }
 
-  /// Sleeps until the gate is open, and closes it; an interrupt stays for the next wait(). For who knows that
-  /// it is about to be opened. Real-time; the thread that waits.
+  /// Sleeps until the gate is open, and closes it; an interrupt stays for the next wait(). For a caller that
+  /// knows that it is about to be opened. Real-time; the thread that waits.
   void pass(Clock& clock) noexcept {
     std::uint32_t state = word_.load(std::memory_order_acquire);
     for (; (state & kOpen) == 0; state = word_.load(std::memory_order_acquire)) {

@@ -18,7 +18,7 @@ class CycleGate {
     /// Within: from here to leave(). Sleeps while the gate is closed. Real-time; the seat's own thread.
     void enter(CycleGate& gate, Clock& clock) noexcept {
       for (;;) {
-        // Either this store is seen by who has closed the gate, or the gate is seen closed here.
+        // Either the thread that has closed the gate sees this store, or the gate is seen closed here.
         taken_.store(true, std::memory_order_seq_cst);
         if (gate.closed_.load(std::memory_order_seq_cst) == 0) return;
         taken_.store(false, std::memory_order_release);

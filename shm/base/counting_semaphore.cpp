@@ -8,7 +8,7 @@ bool CountingSemaphore::post() noexcept {
   std::uint32_t before = word_.load(std::memory_order_relaxed);
   do {
     if (before / kOne >= kMaxValue) return false;
-    // Release pairs with the acquire of whoever takes the unit.
+    // Release pairs with the acquire of the thread that takes the unit.
   } while (!word_.compare_exchange_weak(before, (before & ~kWaiter) + kOne, std::memory_order_release,
                                         std::memory_order_relaxed));
   if ((before & kWaiter) != 0) futex_wake(&word_, 1);

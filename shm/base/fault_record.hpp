@@ -28,7 +28,7 @@ enum class StopPhase : std::uint8_t {
   single_cycle,  ///< a single cycle of all tasks
 };
 
-/// One fault, as it was found, in shared memory, too. Filled by who finds it, also from within a signal
+/// One fault, as it was found, in shared memory, too. Filled by its finder, also from within a signal
 /// handler: so no texts are made here, see describe_fault().
 struct FaultRecord {
   static constexpr std::size_t kMaxText = 199;

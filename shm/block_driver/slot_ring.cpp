@@ -58,8 +58,8 @@ std::uint64_t count_waiting(const RingMemory& ring) noexcept {
   return count;
 }
 
-// Whether the slots from `tail` on are free. The reader's word is looked at only if what is known of it does
-// not suffice: it lies in a cache line that the reader writes.
+// Whether the slots from `tail` on are free. The reader's word is looked at only if the last look does not
+// suffice: it lies in a cache line that the reader writes.
 RingWriter::Claim RingWriter::room_at(std::uint64_t tail, std::uint32_t slots) noexcept {
   // Acquire, here and below: pairs with the reader's release, so that it has done with the slots.
   std::uint64_t seen = head_seen_.load(std::memory_order_acquire);

@@ -94,9 +94,9 @@ enum class TakeResult : std::uint8_t {
 };
 
 /// The end at which blocks are taken out: one process, any number of its threads at once, each of which takes
-/// what is for it. A block is had by who marks it, in memory of this process, with one compare-and-swap;
-/// blocks that nobody has marked yet do not hinder those behind them. All functions are real-time but for the
-/// constructor.
+/// what is for it. A block goes to the thread that marks it, in memory of this process, with one
+/// compare-and-swap; blocks that nobody has marked yet do not hinder those behind them. All functions are
+/// real-time but for the constructor.
 class RingReader {
  public:
   explicit RingReader(const RingMemory& memory);

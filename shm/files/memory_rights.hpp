@@ -23,7 +23,7 @@ struct MemoryRights {
 using OwnerCheck = std::function<bool(uid_t owner)>;
 /// root, and the user of the calling process: those who could do all that this process does anyway.
 [[nodiscard]] bool is_trusted_owner(uid_t owner) noexcept;
-/// For a client that joins what another user has set up: the files of a host belong to whoever runs it.
+/// For a client that joins what another user has set up: the files of a host belong to the user that runs it.
 [[nodiscard]] bool is_any_owner(uid_t owner) noexcept;
 
 /// The rights of the calling process to an object. Root may do all. Set-up.

@@ -20,7 +20,7 @@ enum class InstanceState : std::uint32_t {
   running = 2,    ///< the application runs
   stopped = 3,    ///< the process is up, the application is loaded and stopped
   stopping = 4,   ///< on its way to stopped or offline
-  waiting = 5,    ///< ended; will be started again after the back-off, or when what it comes after is up
+  waiting = 5,    ///< ended; will be started again after the back-off, or when its predecessors are up
   safe_mode = 6,  ///< up without its application, after repeated crashes; load or reset to go on
   failed = 7,     ///< could not be set up, or ended and is not restarted by policy
   exception = 8,  ///< the process is up, the application was stopped by a fault; reset to go on

@@ -87,7 +87,7 @@ struct TaskSlot {
   TaskIdentity identity;
   std::atomic<std::uint32_t> state{0};  ///< a PageTaskState
   Seqlock<TaskCounters> counters;
-  Seqlock<FaultRecord> fault;  ///< written once, by who found it; never: it has none
+  Seqlock<FaultRecord> fault;  ///< written once, by its finder; never: it has none
 };
 
 inline constexpr std::uint32_t kMaxTasks = 1024;

@@ -32,7 +32,7 @@ struct Transition {
   FixedText<191> reason;
 };
 
-/// How many transitions are kept for who looks late.
+/// How many transitions are kept for late readers.
 inline constexpr std::size_t kTransitionsKept = 64;
 
 inline constexpr PageKind kTransitionsKind{.what = "ring of transitions",

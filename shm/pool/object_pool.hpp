@@ -139,8 +139,9 @@ class ObjectPool {
     return open_object<SharedMemory>(name, access);
   }
 
-  /// A kept memory that `fill` has written, in the place of an old one of the name, which is gone for who has
-  /// it open (and stays mapped). It has the name only when it is whole. wrong_type, refused, full.
+  /// A kept memory that `fill` has written, in the place of an old one of the name, which is gone for
+  /// processes that have it open (and stays mapped). It has the name only when it is whole. wrong_type,
+  /// refused, full.
   [[nodiscard]] Result<SharedMemory> replace_memory(std::string_view name, std::size_t size,
                                                     const MemoryFile::Fill& fill);
 
@@ -156,7 +157,7 @@ class ObjectPool {
   /// Releases the references of dead clients, mends the damage of strangers, and makes objects of the
   /// memories that firmware has made with a header alone (see PoolAdoption). It does so without waiting for
   /// the next call of any client. Ends after some 20 ms if there is much to release, or another one holds the
-  /// lock: the rest is for the next time. For whoever watches over the host, from one thread.
+  /// lock: the rest is for the next time. For the process that watches over the host, from one thread.
   PoolFindings tidy() noexcept;
 
   [[nodiscard]] const std::string& name() const noexcept;

@@ -26,8 +26,8 @@ class PoolAdoption {
  public:
   explicit PoolAdoption(std::shared_ptr<PoolSegment> segment) noexcept : segment_(std::move(segment)) {}
 
-  /// For who has not found a memory, or not its file: sets right what is wrong with it. True: look again.
-  /// Waits up to 20 ms for a file that is just being made.
+  /// For a call that has not found a memory, or not its file: sets right what is wrong with it. True: look
+  /// again. Waits up to 20 ms for a file that is just being made.
   [[nodiscard]] static bool reconcile(PoolSegment& segment, std::string_view name);
 
   /// Of a file: whether it becomes an object.
@@ -43,8 +43,8 @@ class PoolAdoption {
                                                       ObjectEntry& entry, std::size_t size,
                                                       const MemoryRights& rights, std::uint32_t attributes);
 
-  /// Looks at some files and entries of the pool; each call goes on where the one before ended. For whoever
-  /// watches over the host.
+  /// Looks at some files and entries of the pool; each call goes on where the one before ended. For the
+  /// process that watches over the host.
   void look();
 
  private:

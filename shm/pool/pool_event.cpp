@@ -9,7 +9,8 @@ PoolEvent::PoolEvent(ObjectEntry& entry) noexcept
 
 PostResult PoolEvent::post() const noexcept {
   if (entry_ == nullptr) return PostResult::not_registered;
-  // Acquire pairs with the release of who registered it, and of who gave the entry to another object.
+  // Acquire pairs with the release of the thread that registered it, and of the one that gave the entry to
+  // another object.
   const std::uint64_t binding = entry_->binding.load(std::memory_order_acquire);
   if (Binding::generation(binding) != generation_ || !Binding::registered(binding)) {
     return PostResult::not_registered;

@@ -125,7 +125,7 @@ struct alignas(64) PoolHeader {
   /// Odd while somebody changes what the mutex guards: for readers without the right to write.
   std::atomic<std::uint64_t> changes;
   std::array<std::uint32_t, 2> reserved1;
-  /// For who attaches when a stranger has written over the first line.
+  /// For a process that attaches when a stranger has written over the first line.
   std::atomic<std::uint64_t> magic_again;
   std::uint32_t version_again;
   std::uint32_t max_objects_again;

@@ -31,7 +31,7 @@ bool has_mapped(std::uint32_t thread, const std::string& pool) {
 }  // namespace
 
 // Only who holds the mutex writes `changes`; one that died has left it odd. Sequentially consistent, so that
-// what follows is not seen before it.
+// no later store is seen before it.
 PoolLock::PoolLock(PoolHeader& header, PoolJournal& journal, bool owner_died) noexcept
     : header_(&header), journal_(&journal), owner_died_(owner_died) {
   header.changes.fetch_or(1);

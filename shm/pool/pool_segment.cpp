@@ -140,7 +140,7 @@ Result<std::shared_ptr<PoolSegment>> PoolSegment::attach_now(const std::string& 
   return std::shared_ptr<PoolSegment>(new PoolSegment(name, std::move(*memory), max_objects, access));
 }
 
-// busy: it was not completed in time, so whoever began is gone.
+// busy: it was not completed in time, so its maker is gone.
 Result<std::shared_ptr<PoolSegment>> PoolSegment::attach_patiently(const std::string& name, Access access,
                                                                    const OwnerCheck& owners) {
   const TimePoint deadline = MonotonicClock::now() + kPatience;
@@ -407,7 +407,8 @@ bool PoolSegment::bury(PoolLock& held, ClientSlot& client, std::size_t& left) no
   }
 }
 
-// An event that was made by who posts and binds stays in its place until that is needed for another one.
+// An event that was made by a program that posts and binds stays in its place until that is needed for
+// another one.
 void PoolSegment::drop_if_idle(PoolLock& held, ObjectEntry& object) noexcept {
   const bool reclaimed_later = object.type.load(kRelaxed) == static_cast<std::uint32_t>(ObjectType::event) &&
                                (object.attributes.load(kRelaxed) & kDirect) == 0;

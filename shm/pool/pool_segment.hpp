@@ -64,7 +64,7 @@ class PoolSegment {
   [[nodiscard]] Result<ReferenceEntry*> add_reference(PoolLock& held, ObjectEntry& object, bool writable);
   /// Frees the object if nobody needs it any more.
   void drop_if_idle(PoolLock& held, ObjectEntry& object) noexcept;
-  /// Frees it, whoever needs it.
+  /// Frees it for any process that needs it.
   void destroy(PoolLock& held, ObjectEntry& object) noexcept;
   /// Keeps it no longer.
   void let_go(PoolLock& held, ObjectEntry& object) noexcept;

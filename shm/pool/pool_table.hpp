@@ -26,7 +26,7 @@ class PoolTable {
   /// it is published. Null if the table is full and nothing can be reclaimed.
   [[nodiscard]] ObjectEntry* insert(std::string_view name, ObjectType type) noexcept;
   void publish(ObjectEntry& entry) noexcept;
-  /// From here on nobody finds it, and it is erased by whoever comes next if this process ends.
+  /// From here on nobody finds it, and the next process erases it if this one ends.
   void withdraw(ObjectEntry& entry) noexcept;
   /// Frees it; handles on it are invalid from here on.
   void erase(ObjectEntry& entry) noexcept;

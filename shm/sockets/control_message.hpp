@@ -26,7 +26,7 @@ struct ControlRequest {
   std::string argument;
   std::map<std::string, std::string> options = {};  ///< further arguments, by name
   /// Until when it may be begun: boot_time_ns(), 0: at any time. Each process that takes it from a socket
-  /// looks at this first, so that what waited there while that process was stopped is not done.
+  /// looks at this first, so that requests that waited there while that process was stopped are not done.
   std::int64_t limit_ns = 0;
 };
 

@@ -13,7 +13,7 @@ namespace plchost::bench {
 [[nodiscard]] Result<std::vector<Row>> measure_apart(
     const std::function<Result<std::vector<Row>>()>& measure);
 
-/// A row as text and back, without its series and what is filled by whoever runs the part.
+/// A row as text and back, without its series and without the members that the runner of the part fills.
 void write_row(std::ostream& to, const Row& row);
 [[nodiscard]] Row read_row(std::istream& from);
 

@@ -1,5 +1,5 @@
 // The longest wait of a living client of a large pool while others are killed inside of its calls, and while
-// what they held is freed.
+// their objects are freed.
 
 #include <atomic>
 #include <functional>

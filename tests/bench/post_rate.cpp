@@ -98,7 +98,8 @@ class RateMeasurement {
   }
 
  private:
-  // DDS's threads inherit the core of who opens a domain: each measurement has domains and clients anew.
+  // DDS's threads inherit the core of the thread that opens a domain: each measurement has domains and
+  // clients anew.
   Result<void> open(BareDuty duty) {
     client_.reset();
     bare_.reset();

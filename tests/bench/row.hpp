@@ -48,7 +48,7 @@ struct Round {
 struct Row {
   std::string name;                ///< "cyclic/CmpScheduleTimer/1ms": part, who, what
   std::string sample = "";         ///< the meaning of one sample: "a cycle"
-  std::string condition = "idle";  ///< or "stress"; filled by whoever runs the part
+  std::string condition = "idle";  ///< or "stress"; filled by the runner of the part
   Samples ours = {};               ///< its meaning stands in the README: mostly release to first instruction
   Samples floor = {};              ///< empty: there is none
   Extra extra = {};
@@ -56,7 +56,7 @@ struct Row {
   std::vector<Series> series = {};
   std::string note = {};           ///< a remark that the reader of these figures needs
   std::vector<Round> rounds = {};  ///< filled by add_round
-  Extra conditions = {};           ///< of the machine, in each round; filled by whoever runs the part
+  Extra conditions = {};           ///< of the machine, in each round; filled by the runner of the part
 };
 
 /// Adds what a further round gave to `all`: to the row of the same name and condition, or as a new row. A row

@@ -77,7 +77,7 @@ class Tasks {
     return {};
   }
 
-  /// The event of that name, made when it is first asked for, by a task or by who posts.
+  /// The event of that name, made when it is first asked for, by a task or by a poster.
   CountedEvent& event_named(std::string_view name) {
     for (auto& [known, event] : events_) {
       if (known == name) return event;

@@ -4,7 +4,7 @@
 Usage: prose.py [ROOT] (a git checkout); prints each fault as "file:line: the fault".
 
 * No sentence and no cell of a table begins with "who", "what", "whose", "whoever", "whatever" or "that which", unless it asks
-  something. A part behind ":" or ";" or a dash is held to the same.
+  something. A part behind ":" or ";" or a dash is held to the same, and so is a clause behind "so", "because" and the like.
 * No sentence has more than 30 words. Code in backticks is one word, a link counts as its text. Behind a colon, the parts of
   a list that ";" or ":" divides are counted one by one.
 * No text has a word that manager/glossary.md forbids (the column "not").
@@ -27,6 +27,10 @@ GLOSSARY = "manager/glossary.md"
 WORDS = 30
 
 OPENING = re.compile(r"[\W_]*(who|what|whose|whoever|whatever|that which)\b(?!-)", re.IGNORECASE)
+# In the midst of a sentence: `so who asks`, `by who asks`, `because what is read`.
+WITHIN = re.compile(
+    r"\b(?:(?:so|because|that|if|when|while|as|than|unless|since|until|of|by|for|from|to|with|but) who"
+    r"|(?:so|because|if|when|while|unless|since|but|so that) what)\b|\bwhoever\b(?!\")", re.IGNORECASE)
 # The ends of sentences. A sentence begins with a capital letter, a digit or code.
 END_OF_SENTENCE = re.compile(r"(?<=[.!?])[\"')\]*]*\s+(?=[\"'(\[*]*[A-Z0-9`\u0001])")
 PART = re.compile(r"(?<=[:;])\s+|\s+[-\u2013]\s+")
@@ -225,6 +229,8 @@ def faults_of(text, forbidden):
             opening = OPENING.match(part)
             if opening and not sentence.rstrip("\"')]* ").endswith("?"):
                 yield text.find(part), f"begins with '{opening[1]}': {part[:50]}"
+        for found in WITHIN.finditer(sentence):
+            yield text.find(sentence) + found.start(), f"a clause begins with '{found[0]}'"
         before, colon, after = sentence.partition(": ")
         counted = [before, *re.split(r"[:;]\s", after)] if colon else [sentence]
         for part in counted:

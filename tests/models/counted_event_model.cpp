@@ -85,7 +85,7 @@ void a_waiter_is_killed(Scene& scene) {
   scene.thread("poster", [&] { shared.event.post(); });
 }
 
-// A nudge ends the wait of who has a stop flag, and counts as no post.
+// A nudge ends the wait of a waiter with a stop flag, and counts as no post.
 void a_nudge_stops_a_waiter(Scene& scene) {
   auto& shared = scene.make<Shared>();
   scene.name(shared.event, "event");

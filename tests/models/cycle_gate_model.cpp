@@ -12,7 +12,7 @@ struct Shared {
   CycleGate gate;
   CycleGate::Seat seat;
   CycleGate::Seat other_seat;
-  int state = 0;  // plain: of the application, and of who looks while the gate is closed
+  int state = 0;  // plain: of the application, and of a reader while the gate is closed
   int other_state = 0;
   bool looked = false;
 };

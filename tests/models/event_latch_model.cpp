@@ -11,7 +11,7 @@ namespace {
 struct Shared {
   ModelClock clock;
   EventLatch latch;
-  int written = 0;  // plain: by who raises an edge, for the run
+  int written = 0;  // plain: by the thread that raises an edge, for the run
   std::uint64_t edges = 0;
   std::uint64_t runs = 0;
   std::uint64_t lost = 0;

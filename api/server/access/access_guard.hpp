@@ -23,7 +23,7 @@ class AccessGuard {
   /// identity that the host's folder does not know.
   [[nodiscard]] std::optional<security::Subject> identity_of(const dds::Guid& entity) const;
 
-  /// refused: that entity's identity has not the role that it takes; the text is for who asked.
+  /// refused: that entity's identity has not the role that it takes; the text is for the client.
   [[nodiscard]] Result<void> check(const dds::Guid& entity, security::Role needed) const;
 
   /// The present identities of the folder. Of a secured host.

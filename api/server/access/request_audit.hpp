@@ -44,7 +44,7 @@ class RequestAudit {
 
   /// Before the request is looked at. One that only reads is not recorded.
   void asked(const dds::Guid& client, const plc_Request& request);
-  /// Before it is given to who does it, which takes a while.
+  /// Before it is given to the manager, which takes a while.
   void handed_on(const plc_SampleIdentity& identity);
   /// Before its answer is sent, which is when the ticket is written: an acknowledged change is in the log.
   [[nodiscard]] AuditWriter::Ticket answered(const plc_SampleIdentity& identity, ErrorCode code,

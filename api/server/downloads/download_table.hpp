@@ -56,7 +56,7 @@ class DownloadTable {
   DownloadTable& operator=(const DownloadTable&) = delete;
   ~DownloadTable();
 
-  /// `request`: as check_request() has made it, with the options of who sends it. busy: another one to that
+  /// `request`: as check_request() has made it, with the options of its sender. busy: another one to that
   /// instance, or too many; full: the file, or all together, is larger than allowed; system: no file can be
   /// made.
   [[nodiscard]] Result<void> begin(const dds::Guid& client, const plc_SampleIdentity& identity,

@@ -50,7 +50,7 @@ class StatusPublisher {
   /// All findings of one check of the host, in place of those of the one before.
   void publish_findings(const std::vector<HostFinding>& findings);
 
-  /// For who wants to know later that nothing was cut off the audit log.
+  /// By this a reader knows later that nothing was cut off the audit log.
   void set_audit(std::string head, std::string_view problem);
   /// Another host that uses the name of this one, for people; empty: none.
   void set_rival(std::string rival);

@@ -10,7 +10,7 @@
 namespace plchost {
 
 /// The way of plc_log's lines from any thread to the control thread: a bounded queue, any number of writers
-/// that never wait, one reader. Each cell carries the ticket of who may use it next (Vyukov's scheme).
+/// that never wait, one reader. Each cell carries the ticket of its next user (Vyukov's scheme).
 class MessageQueue {
  public:
   static constexpr std::size_t kCapacity = 256;  // a power of two

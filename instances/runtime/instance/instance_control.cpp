@@ -35,7 +35,7 @@ std::optional<ControlReply> Instance::handle(const ControlRequest& request,
     spdlog::info("{} {}: {}", to_string(request.verb), request.argument,
                  done ? "done" : done.error().describe());
   }
-  if (page_) beat();  // so that who was answered finds the new state in the page
+  if (page_) beat();  // so that the client finds the new state in the page after the answer
   if (!done) return ControlReply{.number = 0, .code = done.error().code, .text = done.error().describe()};
   return ControlReply{.number = 0, .code = ErrorCode::ok, .text = *std::move(done)};
 }

@@ -52,7 +52,7 @@ class KeptGroup {
 
   std::vector<const CycleCounter*> counters_;
   std::vector<Part> parts_;
-  std::span<std::byte> copy_;  // belongs to who has made `copying` of the state
+  std::span<std::byte> copy_;  // belongs to the thread that has made `copying` of the state
   std::atomic<State> state_{State::idle};
 };
 

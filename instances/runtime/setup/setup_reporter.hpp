@@ -9,7 +9,7 @@
 
 namespace plchost {
 
-/// Tells whoever started this instance how its set-up goes: the manager by packets, a person by log lines.
+/// Tells the starter of this instance how its set-up goes: the manager by packets, a person by log lines.
 class SetupReporter {
  public:
   /// `report_fd`: a SEQPACKET socket, owned from here on; -1: the log.

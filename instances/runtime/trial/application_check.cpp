@@ -81,7 +81,7 @@ Result<void> try_cores(const std::vector<int>& cores) {
   return back ? Result<void>() : std::unexpected(back.error());
 }
 
-// Nothing: there is no pool before the first start, and none for who may not look into it.
+// Nothing: there is no pool before the first start, and none for a process that may not look into it.
 std::optional<PoolRoom> room_in_pool(const LaunchOptions& launch, const std::optional<ObjectPool>& pool) {
   if (!pool) return std::nullopt;
   const auto page = InstancePageReader::open(launch.pool, launch.name);

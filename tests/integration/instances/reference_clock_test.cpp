@@ -25,7 +25,7 @@ namespace {
 using ::testing::HasSubstr;
 
 constexpr const char* kRecord = "bus1";
-// As ClockState numbers them, for whoever reads the page.
+// As ClockState numbers them, for readers of the page.
 enum State : std::uint32_t { free_running = 1, acquiring = 2, locked = 3, hold_over = 4, measuring = 5 };
 
 /// The example's firmware. Killed when it goes, as if its power were cut.

@@ -108,7 +108,8 @@ TEST_F(RetainUnderAManager, IsThereAfterAnOrderlyEndThatLeavesNoMemory) {
   EXPECT_TRUE(has_counted("24"));
 }
 
-/// Its values are written once an hour, so what is there after an orderly end was saved because of the end.
+/// Its values are written once an hour, so values that are there after an orderly end were saved because of
+/// the end.
 class RetainThatIsSeldomWritten : public testing::Test {
  protected:
   void begin(const std::string& keys) {

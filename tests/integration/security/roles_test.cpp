@@ -108,8 +108,7 @@ TEST_F(Roles, APatchedClientMeetsNobodyWhereItsRoleDoesNotReach) {
   EXPECT_FALSE(RawClient::meets_writer(others, std::chrono::seconds(0)));
 }
 
-// Permissions that say too much, as a mistake of who signs them would be: the server looks at the role
-// itself.
+// Permissions that say too much, as a mistake of their signer would be: the server looks at the role itself.
 class PermissionsThatSayTooMuch : public SecuredHost {
  protected:
   PermissionsThatSayTooMuch() {

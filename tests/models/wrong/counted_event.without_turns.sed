@@ -1,2 +1,2 @@
-# shm/base/counted_event.cpp: a waiter that finds the mark changes nothing, so who wakes cannot see that it came
+# shm/base/counted_event.cpp: a waiter that finds the mark changes nothing, so the waker cannot see that it came
 s/next_turn\(expected\) \| kWaiter/expected | kWaiter/

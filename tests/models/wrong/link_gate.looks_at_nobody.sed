@@ -1,2 +1,2 @@
-# shm/block_driver/link_gate.hpp: old links go whoever is inside
+# shm/block_driver/link_gate.hpp: old links go even if a thread is inside
 s/ && users_\.load\(std::memory_order_seq_cst\) == 0//

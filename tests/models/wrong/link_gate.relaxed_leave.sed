@@ -1,2 +1,2 @@
-# shm/block_driver/link_gate.hpp: a link goes before the last look of who was inside
+# shm/block_driver/link_gate.hpp: a link goes before the last look of a thread that was inside
 s/fetch_sub\(1, std::memory_order_release\)/fetch_sub(1, std::memory_order_relaxed)/

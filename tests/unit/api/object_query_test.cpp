@@ -58,7 +58,7 @@ TEST(MatchesPattern, TakesStarsAndQuestionMarks) {
   for (const char* pattern : {"", "line1", "line1/read", "?line1/ready", "line2/*", "*x*", "line1/ready?"}) {
     EXPECT_FALSE(matches_pattern(pattern, "line1/ready")) << pattern;
   }
-  EXPECT_TRUE(matches_pattern("a*b*c", "aXbXbXc")) << "a star takes more when what follows did not fit";
+  EXPECT_TRUE(matches_pattern("a*b*c", "aXbXbXc")) << "a star takes more when the rest did not fit";
 }
 
 TEST(MatchesPattern, TakesACharacterOfUtf8AsOne) {

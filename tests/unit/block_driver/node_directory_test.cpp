@@ -139,14 +139,14 @@ TEST_F(NodeDirectoryTest, OverWhichAStrangerHasWrittenIsMended) {
   sut_.layout().version = 99;
   EXPECT_FALSE(NodeDirectory::open_to_read(pool_.get()));
   sut_.keep(*life, entry);
-  EXPECT_TRUE(NodeDirectory::open_to_read(pool_.get())) << "by who uses it";
+  EXPECT_TRUE(NodeDirectory::open_to_read(pool_.get())) << "by its user";
   sut_.layout().magic ^= 0x40;
   EXPECT_EQ(NodeDirectory::open(pool_.get()).error().code, ErrorCode::corrupt)
-      << "it is used by who does not mend it: of another version";
+      << "a process that does not mend it uses it: of another version";
   sut_.leave(*life);
   const auto again = NodeDirectory::open(pool_.get());
   ASSERT_TRUE(again) << again.error().describe();
-  EXPECT_TRUE(NodeDirectory::open_to_read(pool_.get())) << "by who comes when nobody uses it";
+  EXPECT_TRUE(NodeDirectory::open_to_read(pool_.get())) << "by the next one when nobody uses it";
 }
 
 TEST_F(NodeDirectoryTest, RefusesAFileThatIsNoDirectory) {

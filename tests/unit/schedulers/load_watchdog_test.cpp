@@ -256,7 +256,7 @@ TEST_F(LoadWatchdogTest, IsWokenByItsThreadAtTheEndOfEachWindow) {
   expect_hit(0, 61);
 }
 
-// Nothing is set but what is set as it comes: the guard against overload, over two windows of two seconds.
+// Nothing is set but the defaults: the guard against overload, over two windows of two seconds.
 class OverloadTest : public LoadWatchdogTest {
  protected:
   static constexpr Duration kGuard = std::chrono::seconds(2);
