@@ -1,34 +1,16 @@
 #pragma once
 
-#include <cstdint>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "manager/config/config_table.hpp"
 #include "manager/config/manager_config.hpp"
 
 namespace plchost {
 
-/// When a changed key takes effect. In the order in which tables list them.
-enum class TakesEffect : std::uint8_t {
-  at_once,
-  new_server,    ///< at once; plchost-dds is restarted for it
-  next_process,  ///< with the next process of its instance
-  next_start,    ///< when the host starts the next time: it says how the host starts, nothing else
-  next_manager,  ///< when plchostd is restarted
-};
-
-/// One key of the configuration file.
-struct ConfigKey {
-  std::string_view section;  ///< "[host]"
-  std::string_view name;
-  TakesEffect when = TakesEffect::at_once;
-  std::string_view why = {};  ///< the reason against an earlier effect; empty: nothing to add
-};
-
 /// All keys, in the order of the file.
-[[nodiscard]] std::span<const ConfigKey> all_config_keys() noexcept;
+[[nodiscard]] std::vector<ConfigKey> all_config_keys();
 /// "used when plchostd is restarted".
 [[nodiscard]] std::string_view describe(TakesEffect when) noexcept;
 /// A line of the answer of a reload. `effect`: see describe().

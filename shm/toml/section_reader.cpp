@@ -32,7 +32,12 @@ unsigned SectionReader::line_of(std::string_view key) const {
 }
 
 void SectionReader::problem(std::string_view key, std::string_view text) {
+  wrong_.emplace_back(key);
   problems_.push_back({line_of(key), fmt::format("{} {}: {}", where_, key, text)});
+}
+
+bool SectionReader::wrong(std::string_view key) const {
+  return std::ranges::find(wrong_, key) != wrong_.end();
 }
 
 void SectionReader::wrong_type(std::string_view key, const TomlValue& value, std::string_view wanted) {

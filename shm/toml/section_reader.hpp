@@ -37,6 +37,8 @@ class SectionReader {
   [[nodiscard]] bool has(std::string_view key) const { return table_.contains(key); }
   /// It is there and a text.
   [[nodiscard]] bool has_text(std::string_view key) const;
+  /// Something wrong with its value was reported.
+  [[nodiscard]] bool wrong(std::string_view key) const;
   /// Line of the key if it is there, else of the table.
   [[nodiscard]] unsigned line_of(std::string_view key) const;
   /// Reports something wrong with the value of `key`.
@@ -51,6 +53,7 @@ class SectionReader {
   std::string where_;
   std::vector<ConfigProblem>& problems_;
   std::vector<std::string_view> known_;
+  std::vector<std::string> wrong_;
 };
 
 /// "; did you mean 'x'?" or nothing.

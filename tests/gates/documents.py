@@ -6,8 +6,8 @@ anew. The table of plcctl's commands is made by plcctl itself: it is held only w
 
 * Each link leads to a file or folder, and its anchor to a heading there.
 * Each document is reached from README.md by links; README.md has at most 250 lines.
-* A table between "<!-- generated: NAME -->" and "<!-- end of generated -->" is that of today (TABLES below; the one of the
-  settings is held by instances_unit_test, here only its keys and their meanings).
+* A table between "<!-- generated: NAME -->" and "<!-- end of generated -->" is that of today (TABLES below; those of
+  the settings and of the configuration are held by instances_unit_test and unit_manager, here only their keys and meanings).
 * The keys in the tables of manager/configuration.md and instances/settings.md are those of the code, and the code has each
   key that a document names, as `[Section] Key` or `Section.Key=1`.
 * Each step of manager/walks.md names a function and a file that has it.
@@ -197,18 +197,23 @@ def topics(root):
 SECTIONS = {"host": "[host]", "dds": "[dds]", "blocks": "[blocks]", "instance": "[[instance]]"}
 
 
-def changed_keys(root):
-    """(section, key, effect) of each key of the host's file."""
-    text = (root / "manager/config/config_changes.cpp").read_text(encoding="utf-8")
-    for section, key, effect in re.findall(r'\b(host|dds|blocks|instance)<&\w+::\w+>\("(\w+)"(?:,\s*(\w+))?', text):
-        yield SECTIONS[section], key, effect or "new_server"
+def configuration_rows(root):
+    """(section, key, effect, meaning) of each key of the host's file."""
+    text = (root / "manager/config/config_keys.cpp").read_text(encoding="utf-8")
+    for row in re.split(r"\n    (?=(?:host|dds|blocks|instance)<&)", text)[1:]:
+        section = SECTIONS[row.split("<")[0]]
+        name, effect = (re.search(rf"\.{field} = \"?(\w+)", row) for field in ("name", "when"))
+        meaning = re.search(r'\.meaning =\s*((?:"[^"]*"\s*)+)', row)
+        if not name or not effect or not meaning:
+            raise Fault(f"manager/config/config_keys.cpp: a row of {section} lacks its name, effect or meaning")
+        yield section, name[1], effect[1], "".join(re.findall(r'"([^"]*)"', meaning[1]))
 
 
 def reload_effects(root):
     text = (root / "manager/config/config_changes.cpp").read_text(encoding="utf-8")
     effects = dict(re.findall(r'case (\w+):\s*return "([^"]+)";', text))
     found = {effect: {} for effect in effects}
-    for section, key, effect in changed_keys(root):
+    for section, key, effect, _ in configuration_rows(root):
         if effect not in effects:
             raise Fault(f"manager/config/config_changes.cpp: describe() has no text for '{effect}'")
         found[effect].setdefault(section, []).append(f"`{key}`")
@@ -220,7 +225,7 @@ def reload_effects(root):
 
 
 TABLES = {"figures": figures, "all-figures": all_figures, "topics": topics, "reload": reload_effects}
-MADE_BY_TESTS = ("settings", "commands")
+MADE_BY_TESTS = ("settings", "configuration", "commands")
 
 
 def commands_of(programs):
@@ -287,19 +292,19 @@ def settings_faults(root, texts):
 
 def configuration_faults(root, texts):
     page = "manager/configuration.md"
-    code = [(section, key) for section, key, _ in changed_keys(root)]
-    table = []
+    code = {(section, key): meaning for section, key, _, meaning in configuration_rows(root)}
+    table = {}
     section = None
-    for row in rows_of(texts[page], "| key | meaning | default |", "\n\n")[2:]:
-        first = row.strip("|").split(" | ")[0]
+    for row in rows_of(texts[page], "<!-- generated: configuration", END)[2:]:
+        first, meaning = (cell.strip() for cell in row.strip("|").split(" | ")[:2])
         section = (re.search(r"\*\*(\[+\w+\]+)\*\*", first) or [None, section])[1]
-        table += [(section, key) for key in re.findall(r"`(\w+)`", first)]
-    read = set(re.findall(r'(?:\breader\.(?:text|texts|number|numbers|truth|choice)\(|read_file\(reader, )"(\w+)"',
-                          (root / "manager/config/load_config.cpp").read_text(encoding="utf-8")))
+        table[(section, re.search(r"`(\w+)`", first)[1])] = meaning
     faults = [f"{page}: no row for the key {' '.join(key)}" for key in code if key not in table]
     faults += [f"{page}: the code has no key {' '.join(key)}" for key in table if key not in code]
-    faults += [f"manager/config: the key {key} is read and has no row in config_changes.cpp" for key in
-               sorted(read - {key for _, key in code})]
+    faults += [f"{page}: {' '.join(key)} has another meaning than in the code" for key in code if table.get(key, code[key]) != code[key]]
+    loader = (root / "manager/config/load_config.cpp").read_text(encoding="utf-8")
+    faults += [f"manager/config/load_config.cpp: the key {key} is read outside of the table in config_keys.cpp" for key in
+               re.findall(r'\breader\.(?:text|texts|number|numbers|truth|choice|know)\("(\w+)"', loader)]
     return faults
 
 
@@ -309,7 +314,7 @@ def named_key_faults(root, texts):
     sections = {key[1:key.index("]")] for key in settings}
     names = {key.split("] ")[1].removeprefix("Linux.") for key in settings}
     stems = {name.split(".")[0] for name in names if "." in name} - {"Area", "Component", "Task", "0"}
-    configuration = {(section.strip("[]"), key) for section, key, _ in changed_keys(root)}
+    configuration = {(section.strip("[]"), key) for section, key, _, _ in configuration_rows(root)}
     hosts_sections = {section for section, _ in configuration}
     for page, text in texts.items():
         for number, line in enumerate(text.split("\n"), 1):

@@ -200,11 +200,21 @@ plant_in_documents "documents: key without a row" "no row for the key [host] kee
 plant_in_documents "documents: unknown key" "the code has no key [dds] unsecured" manager/configuration.md 's,`allow_unsecured`,`unsecured`,'
 plant_in_documents "documents: unknown key in a text" "the code has no key Stop.OutputLimitMs" instances/states.md 's,Stop.OutputsLimitMs,Stop.OutputLimitMs,'
 plant_in_documents "documents: unknown section and key in a text" "the code has no key [dds] peer" shm/blocks.md 's,\[dds\] peers,[dds] peer,'
-plant_in_documents "documents: key that is read and has no row" "has no row in config_changes.cpp" manager/config/load_config.cpp 's,truth\("keep_pool",truth("keep",'
+plant_in_documents "documents: key that is read and has no row" "is read outside of the table" manager/config/load_config.cpp 's|  check_identity\(reader\);|  reader.truth("keep", kept);|'
+plant_in_documents "documents: another meaning of a key" "[host] pool_objects has another meaning than in the code" manager/configuration.md 's,room in the pool,room in pools,'
 plant_in_documents "documents: message that is gone" "no message has 'needs SCHED_FIFO prio '" manager/troubleshooting.md 's,`needs SCHED_FIFO priority`,`needs SCHED_FIFO prio `,'
 plant_in_documents "documents: file that is gone" "there is no file schedulers/register.cpp" schedulers/README.md 's,`schedulers/registry.cpp`,`schedulers/register.cpp`,'
 plant_in_documents "documents: unknown command" "plcctl has no command 'list writer'" api/plcctl.md 's,^\| `list writers` \| Posts,| `list writer` | Posts,'
 plant_in_documents "documents: step of a walk that the code lacks" "has no function EventIntake::try_posting" manager/walks.md 's,EventIntake::try_post ,EventIntake::try_posting ,'
+
+# A key of the configuration is one row and one member: both are added to a scratch copy.
+check_keys() { g++ -std=c++23 -fsyntax-only -I "$plot/tree" "$plot/tree/manager/config/config_keys.cpp"; }
+sed -i 's,^struct BlocksConfig {,&\n  bool planted = false;,' "$plot/tree/manager/config/manager_config.hpp"
+must_be_red "configuration: member without a row" "each key of [blocks] has its row" check_keys
+sed -i 's/^constexpr std::array kBlocksKeys = {/&\n    blocks<\&BlocksConfig::planted, TruthKey>({.name = "planted", .when = at_once, .meaning = "a plant"}),/' \
+  "$plot/tree/manager/config/config_keys.cpp"
+check_keys || { echo "a member and its row are not enough for a key of the configuration"; failed=1; }
+must_be_red "configuration: row without documentation" "no row for the key [blocks] planted" "$gates/documents.py" "$plot/tree"
 
 new_tree
 echo 'int planted(int* p) { return p == 0 ? 1 : 2; }' >"$plot/tree/shm/base/planted.cpp"

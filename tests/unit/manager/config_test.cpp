@@ -1,11 +1,14 @@
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <sstream>
 #include <string>
 #include <string_view>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
+#include "manager/config/config_table.hpp"
 #include "manager/config/load_config.hpp"
 #include "shm/pages/host_page.hpp"
 #include "tests/support/own_name.hpp"
@@ -206,10 +209,9 @@ INSTANTIATE_TEST_SUITE_P(
                     "660 is a whole number; allowed is a text"},
         WrongConfig{"keep", "[host]\nkeep_pool = 1\n", "2", "1 is a whole number; allowed is true or false"},
         WrongConfig{"date", "[host]\nname = 1979-05-27\n", "2", "is a date or time; allowed is a text"},
-        WrongConfig{
-            "dds_key", "[dds]\nport = 1\n", "2",
-            "[dds] unknown key 'port'; allowed are enabled, interface, peers, multicast, allow_unsecured, "
-            "identity"},
+        WrongConfig{"dds_key", "[dds]\nport = 1\n", "2",
+                    "[dds] unknown key 'port'; allowed are enabled, interface, peers, multicast, identity, "
+                    "allow_unsecured"},
         WrongConfig{"interface", "[dds]\ninterface = \"\"\n", "2", "interface '' is not valid"},
         WrongConfig{"open_to_network", "[dds]\ninterface = \"eth0\"\n", "2",
                     "interface: \"eth0\" without an identity opens this controller to all who reach it"},
@@ -382,6 +384,25 @@ TEST(Config, RefusesAFileThatIsMissingOrTooLarge) {
   ASSERT_FALSE(large.has_value());
   EXPECT_THAT(large.error(), ElementsAre(HasSubstr("is larger than the 1048576 bytes")));
   std::filesystem::remove(path);
+}
+
+// So does tests/gates/documents.py, which knows names and meanings only.
+TEST(Config, IsDescribedByTheTableInItsDocument) {
+  constexpr std::string_view kBegin = "<!-- generated: configuration, by unit_manager -->\n";
+  constexpr std::string_view kEnd = "<!-- end of generated -->";
+  const std::string table = config_key_table();
+  std::stringstream stream;
+  stream << std::ifstream(MANAGER_CONFIGURATION).rdbuf();
+  std::string page = stream.str();
+  const std::size_t begin = page.find(kBegin);
+  ASSERT_NE(begin, std::string::npos) << MANAGER_CONFIGURATION " has no line " << kBegin;
+  const std::size_t size = page.find(kEnd, begin) - begin - kBegin.size();
+  ASSERT_LT(size, page.size()) << MANAGER_CONFIGURATION " has no line " << kEnd;
+  if (std::getenv("PLCHOST_WRITE_TABLES") != nullptr) {
+    std::ofstream(MANAGER_CONFIGURATION) << page.replace(begin + kBegin.size(), size, table);
+    return;
+  }
+  EXPECT_EQ(page.substr(begin + kBegin.size(), size), table) << "write it: PLCHOST_WRITE_TABLES=1";
 }
 
 TEST(Config, RefusesAFileThatTheDiskDoesNotGive) {

@@ -1,0 +1,300 @@
+// The keys of the configuration file: one row each. Reading, ranges, errors, what a reload does, and the
+// tables of manager/configuration.md come from here.
+
+#include <array>
+
+#include "manager/config/config_kinds.hpp"
+#include "manager/config/config_table.hpp"
+#include "shm/log/log_levels.hpp"
+
+namespace plchost {
+
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using enum TakesEffect;
+
+constexpr std::array kPriorityBands = {std::string_view("high"), std::string_view("normal"),
+                                       std::string_view("low")};
+
+// Stands for any member of an aggregate, to count them.
+struct AnyMember {
+  template <class Member>
+  operator Member() const;  // NOLINT: implicit on purpose, and never defined
+};
+
+template <class Config, class... Members>
+consteval std::size_t count_members() {
+  if constexpr (requires { Config{Members{}..., AnyMember{}}; }) {
+    return count_members<Config, Members..., AnyMember>();
+  } else {
+    return sizeof...(Members);
+  }
+}
+
+template <auto Member>
+struct Access;
+
+template <class Config, class Value, Value Config::* Member>
+struct Access<Member> {
+  static bool differs(const Config& before, const Config& now) { return !(before.*Member == now.*Member); }
+  static void take(Config& used, const Config& now) { used.*Member = now.*Member; }
+  template <class Kind>
+  static void read(const ConfigReading& reading, SectionReader& reader, std::string_view name,
+                   Config& target) {
+    Kind::read(reading, reader, name, target.*Member);
+  }
+  template <class Kind>
+  static std::string initial() {
+    return Kind::shown(Config{}.*Member);
+  }
+  template <class Kind>
+  static constexpr ConfigRow<Config> row(std::string_view section, ConfigKey key) {
+    key.section = section;
+    return {.key = key,
+            .read = &Access::read<Kind>,
+            .differs = &Access::differs,
+            .take = &Access::take,
+            .allowed = &Kind::allowed,
+            .initial = &Access::initial<Kind>};
+  }
+};
+
+template <auto Member, class Kind>
+constexpr auto host(const ConfigKey& key) {
+  return Access<Member>::template row<Kind>("[host]", key);
+}
+template <auto Member, class Kind>
+constexpr auto dds(const ConfigKey& key) {
+  return Access<Member>::template row<Kind>("[dds]", key);
+}
+template <auto Member, class Kind>
+constexpr auto blocks(const ConfigKey& key) {
+  return Access<Member>::template row<Kind>("[blocks]", key);
+}
+template <auto Member, class Kind>
+constexpr auto instance(const ConfigKey& key) {
+  return Access<Member>::template row<Kind>("[[instance]]", key);
+}
+
+constexpr std::string_view kOfNewObjects = "by the pool and by new objects; the others keep their rights";
+
+constexpr std::array kHostKeys = {
+    host<&HostConfig::name, TextKey<HostNameRule>>({.name = "name",
+                                                    .when = next_manager,
+                                                    .why = "folders of the host have this name",
+                                                    .initial = "the system's host name",
+                                                    .meaning = "how the controller is addressed"}),
+    host<&HostConfig::labels, TextsKey<kMaxLabels, NameRule<kMaxLabel>>>(
+        {.name = "labels",
+         .when = new_server,
+         .meaning = "words by which several controllers are addressed at once (`plcctl --label`)"}),
+    host<&HostConfig::dds_domain, NumberKey<0, kMaxDdsDomain>>(
+        {.name = "dds_domain", .when = new_server, .meaning = "DDS domain of the host and its clients"}),
+    host<&HostConfig::run_directory, TextKey<AbsoluteFolderRule<kMaxRunDirectory>>>(
+        {.name = "run_directory",
+         .when = next_manager,
+         .why = "the sockets of its instances are there",
+         .meaning = "control sockets and the lock"}),
+    host<&HostConfig::state_directory, TextKey<AbsoluteFolderRule<kMaxPath>>>(
+        {.name = "state_directory",
+         .when = next_manager,
+         .why = "its instances keep their files there",
+         .meaning = "folder of retain and persistent variables, wanted states of the instances "
+                    "(`wishes.HOST`, of one manager at a time), audit log (`audit.HOST`) and sent "
+                    "applications (`applications.HOST`). The manager makes it if it is not there"}),
+    host<&HostConfig::application_limit_mib, NumberKey<1, kMaxApplicationMib>>(
+        {.name = "application_limit_mib",
+         .when = new_server,
+         .meaning = "the largest application that is taken over DDS, MiB. Four at a time, together twice as "
+                    "much, lie in memory (`/dev/shm`) while they come"}),
+    host<&HostConfig::application_versions, NumberKey<1, kMaxApplicationVersions>>(
+        {.name = "application_versions",
+         .when = at_once,
+         .meaning = "so many of those that were sent are kept for each instance, beside the loaded one and "
+                    "the boot application"}),
+    host<&HostConfig::pool, TextKey<NameRule<kMaxPoolName>>>(
+        {.name = "pool",
+         .when = next_manager,
+         .why = "its instances use that pool",
+         .meaning = "name of the object pool in `/dev/shm`"}),
+    host<&HostConfig::pool_objects, NumberKey<kMinPoolObjects, kMaxPoolObjects>>(
+        {.name = "pool_objects",
+         .when = next_manager,
+         .why = "its instances have the pool mapped",
+         .meaning = "room in the pool"}),
+    host<&HostConfig::pool_owner, TextKey<UserRule>>({.name = "pool_owner",
+                                                      .when = at_once,
+                                                      .why = kOfNewObjects,
+                                                      .initial = "the user that starts the manager",
+                                                      .meaning = "user of the pool; another one needs root"}),
+    host<&HostConfig::pool_group, TextKey<GroupRule>>(
+        {.name = "pool_group",
+         .when = at_once,
+         .why = kOfNewObjects,
+         .initial = "the group of that user",
+         .meaning = "group of the pool; another one needs root, or membership of the group"}),
+    host<&HostConfig::pool_mode, ModeKey>(
+        {.name = "pool_mode",
+         .when = at_once,
+         .why = kOfNewObjects,
+         .meaning = "permission bits of the pool; also of its memories where nothing else is said. A pool "
+                    "that is there already gets these rights, too, and the log says so; processes that have "
+                    "it mapped keep it"}),
+    host<&HostConfig::cores, CoresKey>({.name = "cores",
+                                        .when = at_once,
+                                        .initial = "the kernel's isolated cores, else all",
+                                        .meaning = "where instances may run"}),
+    host<&HostConfig::housekeeping_cores, CoresKey>({.name = "housekeeping_cores",
+                                                     .when = at_once,
+                                                     .initial = "those not in `cores`, else all",
+                                                     .meaning = "where manager and API server run"}),
+    host<&HostConfig::log_level, WordKey<kLogLevels>>(
+        {.name = "log_level",
+         .when = new_server,
+         .meaning = "the least level that manager, API server and instances log"}),
+    host<&HostConfig::keep_pool, TruthKey>(
+        {.name = "keep_pool",
+         .when = at_once,
+         .meaning = "leave the pool in place at the end, for firmware that has it mapped"}),
+};
+
+constexpr std::array kDdsKeys = {
+    dds<&DdsConfig::enabled, TruthKey>(
+        {.name = "enabled", .when = new_server, .meaning = "false: no API server"}),
+    dds<&DdsConfig::interface, TextKey<InterfaceRule>>(
+        {.name = "interface",
+         .when = new_server,
+         .meaning =
+             "network interface. Another one than `lo` needs `identity`, or `allow_unsecured = true`"}),
+    dds<&DdsConfig::peers, TextsKey<kMaxPeers, PeerRule>>(
+        {.name = "peers",
+         .when = new_server,
+         .initial = "none; on `lo` 127.0.0.1",
+         .meaning = "addresses where other hosts are looked for: needed where there is no multicast, also to "
+                    "see that a name is given twice"}),
+    dds<&DdsConfig::multicast, TruthKey>(
+        {.name = "multicast",
+         .when = new_server,
+         .meaning =
+             "look for other hosts and clients by multicast, too; samples never go that way. Not on `lo`"}),
+    dds<&DdsConfig::identity, TextKey<FolderRule>>(
+        {.name = "identity",
+         .when = new_server,
+         .meaning = "folder of this host's identity, see [Security](../api/security.md): DDS Security is on. "
+                    "`--check-config` looks at all of it; when the manager runs, a bad one keeps the API "
+                    "server from starting and no instance"}),
+    dds<&DdsConfig::allow_unsecured, TruthKey>(
+        {.name = "allow_unsecured",
+         .when = new_server,
+         .meaning =
+             "without `identity`: be on that interface all the same, and be controlled by all who reach it"}),
+};
+
+constexpr std::array kBlocksKeys = {
+    blocks<&BlocksConfig::host_number, NumberKey<0, kMaxHostNumber>>(
+        {.name = "host_number",
+         .when = new_server,
+         .meaning = "how other hosts call this one, each differently; blocks go to and from their instances. "
+                    "Needs `[dds]`; then no instance is called `gateway`. 0: no blocks between hosts"}),
+    blocks<&BlocksConfig::base, TextKey<NameRule<kMaxBlockBase>>>(
+        {.name = "base",
+         .when = new_server,
+         .meaning = "the nodes that other hosts reach, by their `[CmpBlkDrvShm] BaseName`"}),
+};
+
+constexpr std::array kInstanceKeys = {
+    instance<&InstanceConfig::name, RequiredNameKey<kMaxInstanceName>>(
+        {.name = "name",
+         .when = at_once,
+         .meaning = "name of the instance; another name is another instance"}),
+    instance<&InstanceConfig::core, RequiredCoreKey>(
+        {.name = "core",
+         .when = next_process,
+         .meaning = "the one core that all of its threads are bound to"}),
+    instance<&InstanceConfig::share_core, TruthKey>(
+        {.name = "share_core",
+         .when = at_once,
+         .meaning = "must be true for every instance on a core that is not exclusive"}),
+    instance<&InstanceConfig::scheduler, SchedulerKey>(
+        {.name = "scheduler",
+         .when = next_process,
+         .initial = "that of the settings (`[SysTimer] Linux.TimerMode`), else `CmpSchedule`",
+         .meaning = "decides when a task is released"}),
+    instance<&InstanceConfig::priority_band, WordKey<kPriorityBands>>(
+        {.name = "priority_band",
+         .when = next_process,
+         .meaning = "the order of instances that share a core"}),
+    instance<&InstanceConfig::settings, FileKey>(
+        {.name = "settings",
+         .when = next_process,
+         .meaning = "the instance's own [settings file](../instances/settings.md)"}),
+    instance<&InstanceConfig::application, FileKey>(
+        {.name = "application", .when = next_process, .meaning = "the control program, a shared object"}),
+    instance<&InstanceConfig::autostart, TruthKey>(
+        {.name = "autostart",
+         .when = next_start,
+         .meaning = "starts with the host, until an operator starts or stops it: see [State that "
+                    "survives](#state-that-survives)"}),
+    instance<&InstanceConfig::after, TextsKey<kMaxInstances, InstanceRule>>(
+        {.name = "after", .when = at_once, .meaning = "instances that must be up before"}),
+    instance<&InstanceConfig::restart, WordKey<kRestartPolicyNames>>(
+        {.name = "restart", .when = at_once, .meaning = "which ends of its process the manager restarts"}),
+    instance<&InstanceConfig::restart_delay, TimeKey<milliseconds, 0, kMaxRestartDelayMs>>(
+        {.name = "restart_delay_ms",
+         .when = at_once,
+         .meaning = "back-off, doubled with each failure in a row"}),
+    instance<&InstanceConfig::restart_delay_max, TimeKey<milliseconds, 0, kMaxRestartDelayMs>>(
+        {.name = "restart_delay_max_ms",
+         .when = at_once,
+         .meaning = "the longest back-off, at least `restart_delay_ms`"}),
+    instance<&InstanceConfig::crash_limit, NumberKey<1, kMaxCrashLimit>>(
+        {.name = "crash_limit",
+         .when = at_once,
+         .meaning = "so many crashes in `crash_window_s`: safe mode, up without its application"}),
+    instance<&InstanceConfig::crash_window, TimeKey<seconds, 1, kMaxCrashWindowS>>(
+        {.name = "crash_window_s", .when = at_once, .meaning = "the time in which crashes count"}),
+};
+static_assert(kHostKeys.size() == count_members<HostConfig>(), "each key of [host] has its row");
+static_assert(kDdsKeys.size() == count_members<DdsConfig>(), "each key of [dds] has its row");
+static_assert(kBlocksKeys.size() == count_members<BlocksConfig>(), "each key of [blocks] has its row");
+static_assert(kInstanceKeys.size() == count_members<InstanceConfig>(),
+              "each key of [[instance]] has its row");
+
+template <class Rows>
+void add_section(const Rows& rows, std::string& table) {
+  bool first = true;
+  for (const auto& row : rows) {
+    const std::string section = std::exchange(first, false) ? fmt::format("**{}** ", row.key.section) : "";
+    const std::string initial = row.key.initial.empty() ? row.initial() : std::string(row.key.initial);
+    table += fmt::format("| {}`{}` | {} | {} | {} |\n", section, row.key.name, row.key.meaning, row.allowed(),
+                         initial.empty() ? "none" : initial);
+  }
+}
+
+}  // namespace
+
+std::span<const ConfigRow<HostConfig>> host_keys() noexcept {
+  return kHostKeys;
+}
+std::span<const ConfigRow<DdsConfig>> dds_keys() noexcept {
+  return kDdsKeys;
+}
+std::span<const ConfigRow<BlocksConfig>> blocks_keys() noexcept {
+  return kBlocksKeys;
+}
+std::span<const ConfigRow<InstanceConfig>> instance_keys() noexcept {
+  return kInstanceKeys;
+}
+
+std::string config_key_table() {
+  std::string table = "| key | meaning | allowed | default |\n| --- | --- | --- | --- |\n";
+  add_section(kHostKeys, table);
+  add_section(kDdsKeys, table);
+  add_section(kBlocksKeys, table);
+  add_section(kInstanceKeys, table);
+  return table;
+}
+
+}  // namespace plchost

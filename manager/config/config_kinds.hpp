@@ -1,0 +1,304 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "manager/config/accounts.hpp"
+#include "manager/config/check_relations.hpp"
+#include "manager/config/config_table.hpp"
+#include "shm/base/names.hpp"
+
+// The kinds of value that a key of the configuration can have. Each reads a key, says what it allows, and
+// shows a default for the documentation.
+
+namespace plchost {
+
+struct TruthKey {
+  static void read(const ConfigReading&, SectionReader& reader, std::string_view name, bool& target) {
+    reader.truth(name, target);
+  }
+  static std::string allowed() { return "true, false"; }
+  static std::string shown(bool value) { return value ? "true" : "false"; }
+};
+
+/// A whole number.
+template <std::int64_t Lowest, std::int64_t Highest>
+struct NumberKey {
+  template <class Number>
+  static void read(const ConfigReading&, SectionReader& reader, std::string_view name, Number& target) {
+    std::int64_t number = target;
+    reader.number(name, Lowest, Highest, number);
+    target = static_cast<Number>(number);
+  }
+  static std::string allowed() { return fmt::format("{} to {}", Lowest, Highest); }
+  static std::string shown(std::int64_t value) { return value < Lowest ? "" : fmt::format("{}", value); }
+};
+
+/// A time as a whole number of this unit.
+template <class Unit, std::int64_t Lowest, std::int64_t Highest>
+struct TimeKey {
+  static void read(const ConfigReading&, SectionReader& reader, std::string_view name, Duration& target) {
+    std::int64_t number = std::chrono::duration_cast<Unit>(target).count();
+    reader.number(name, Lowest, Highest, number);
+    target = Unit(number);
+  }
+  static std::string allowed() { return fmt::format("{} to {}", Lowest, Highest); }
+  static std::string shown(Duration value) {
+    return fmt::format("{}", std::chrono::duration_cast<Unit>(value).count());
+  }
+};
+
+/// A text. Rule has `form()`, the allowed texts in words, and `wrong()`, the fault of a text; empty: none.
+template <class Rule>
+struct TextKey {
+  static void read(const ConfigReading& reading, SectionReader& reader, std::string_view name,
+                   std::string& target) {
+    reader.text(name, target);
+    if (reader.wrong(name)) return;
+    if (const std::string wrong = Rule::wrong(reading, target); !wrong.empty()) reader.problem(name, wrong);
+  }
+  static std::string allowed() { return Rule::form(); }
+  static std::string shown(const std::string& value) {
+    return value.empty() ? "" : fmt::format("`{}`", value);
+  }
+};
+
+/// A name that the section must give.
+template <std::size_t Most>
+struct RequiredNameKey {
+  static void read(const ConfigReading&, SectionReader& reader, std::string_view name, std::string& target) {
+    reader.text(name, target);
+    if (!reader.has(name)) return reader.problem(name, "is missing");
+    if (!reader.has_text(name)) return;
+    if (const auto good = check_name("name", target, Most); !good) reader.problem(name, good.error().message);
+  }
+  static std::string allowed() { return fmt::format("up to {} letters, digits, _ - .", Most); }
+  static std::string shown(const std::string&) { return "required"; }
+};
+
+/// Up to Most of them.
+template <std::size_t Most, class Rule>
+struct TextsKey {
+  static void read(const ConfigReading& reading, SectionReader& reader, std::string_view name,
+                   std::vector<std::string>& target) {
+    reader.texts(name, Most, target);
+    for (const std::string& text : target) {
+      if (const std::string wrong = Rule::wrong(reading, text); !wrong.empty()) reader.problem(name, wrong);
+    }
+  }
+  static std::string allowed() { return fmt::format("up to {}: {}", Most, Rule::form()); }
+  static std::string shown(const std::vector<std::string>& value) {
+    return fmt::format("{}", fmt::join(value, ", "));
+  }
+};
+
+/// One of these words.
+template <const auto& Words>
+struct WordKey {
+  static void read(const ConfigReading&, SectionReader& reader, std::string_view name, std::string& target) {
+    reader.choice(name, Words, target);
+  }
+  /// The value is the number of its word.
+  template <class Enum>
+    requires std::is_enum_v<Enum>
+  static void read(const ConfigReading&, SectionReader& reader, std::string_view name, Enum& target) {
+    std::string word(Words[std::to_underlying(target)]);
+    reader.choice(name, Words, word);
+    target = static_cast<Enum>(std::ranges::find(Words, word) - std::begin(Words));
+  }
+  static std::string allowed() { return fmt::format("`{}`", fmt::join(Words, "`, `")); }
+  static std::string shown(const std::string& value) {
+    return value.empty() ? "" : fmt::format("`{}`", value);
+  }
+  template <class Enum>
+    requires std::is_enum_v<Enum>
+  static std::string shown(Enum value) {
+    return fmt::format("`{}`", Words[std::to_underlying(value)]);
+  }
+};
+
+struct SchedulerKey {
+  static void read(const ConfigReading& reading, SectionReader& reader, std::string_view name,
+                   std::string& target) {
+    reader.choice(name, reading.surroundings.schedulers, target);
+  }
+  static std::string allowed() { return "[a scheduler](../schedulers/README.md)"; }
+  static std::string shown(const std::string&) { return ""; }
+};
+
+/// Permission bits.
+struct ModeKey {
+  static void read(const ConfigReading&, SectionReader& reader, std::string_view name, mode_t& target) {
+    std::string mode = shown_plain(target);
+    reader.text(name, mode);
+    if (reader.wrong(name)) return;
+    const auto parsed = parse_mode(mode);
+    if (!parsed) return reader.problem(name, parsed.error().message);
+    target = *parsed;
+  }
+  static std::string allowed() { return "`\"0600\"` to `\"0666\"`"; }
+  static std::string shown(mode_t value) { return fmt::format("`\"{}\"`", shown_plain(value)); }
+
+ private:
+  static std::string shown_plain(mode_t value) { return fmt::format("{:04o}", value); }
+};
+
+inline constexpr std::int64_t kMaxCoreNumber = 1023;  // CPU_SETSIZE
+
+/// A core that the section must name; check_relations() looks whether it may have that.
+struct RequiredCoreKey {
+  static void read(const ConfigReading& reading, SectionReader& reader, std::string_view name, int& target) {
+    NumberKey<0, kMaxCoreNumber>::read(reading, reader, name, target);
+    if (!reader.has(name)) reader.problem(name, "is missing; say which core it runs on");
+  }
+  static std::string allowed() { return "one of `[host]` `cores`"; }
+  static std::string shown(int) { return "required"; }
+};
+
+/// Cores of this host. Without the key the list stays empty, and the loader completes it.
+struct CoresKey {
+  static void read(const ConfigReading& reading, SectionReader& reader, std::string_view name,
+                   std::vector<int>& target) {
+    const auto& online = reading.surroundings.online_cores;
+    std::optional<std::vector<int>> cores;
+    reader.numbers(name, 0, kMaxCoreNumber, cores);
+    if (!cores) return;
+    if (cores->empty()) {
+      reader.problem(name, fmt::format("is empty; online are {}", fmt::join(online, ", ")));
+    }
+    for (const int core : *cores) {
+      if (std::ranges::find(online, core) != online.end()) continue;
+      reader.problem(name,
+                     fmt::format("core {} is not online; online are {}", core, fmt::join(online, ", ")));
+    }
+    target = *cores;
+  }
+  static std::string allowed() { return "cores that are on line"; }
+  static std::string shown(const std::vector<int>&) { return ""; }
+};
+
+/// A file that is there. The target is an absolute path.
+struct FileKey {
+  static void read(const ConfigReading& reading, SectionReader& reader, std::string_view name,
+                   std::string& target) {
+    std::string path;
+    reader.text(name, path);
+    if (path.empty()) {
+      if (reader.has_text(name)) reader.problem(name, "is no path; leave the key out if there is no file");
+      return;
+    }
+    path = resolve_path(reading.folder, path);
+    if (path.size() > kMaxPath) {
+      return reader.problem(
+          name, fmt::format("path of {} characters; allowed are up to {}", path.size(), kMaxPath));
+    }
+    if (reading.surroundings.check_files) {
+      if (const auto good = check_readable_file(path); !good) reader.problem(name, good.error().describe());
+    }
+    target = path;
+  }
+  static std::string allowed() { return "a file"; }
+  static std::string shown(const std::string&) { return ""; }
+};
+
+// Rules of texts.
+
+struct FolderRule {
+  static std::string form() { return "a folder"; }
+  static std::string wrong(const ConfigReading&, const std::string&) { return ""; }
+};
+
+template <std::size_t Most>
+struct NameRule {
+  static std::string form() { return fmt::format("up to {} letters, digits, _ - .", Most); }
+  static std::string wrong(const ConfigReading&, const std::string& name) {
+    const auto good = check_name("name", name, Most);
+    return good ? "" : good.error().message;
+  }
+};
+
+struct HostNameRule : NameRule<kMaxHostName> {
+  static std::string wrong(const ConfigReading& reading, const std::string& name) {
+    constexpr std::string_view kAllHosts = "all";  // a word of plcctl --host
+    if (name == kAllHosts) return "'all' stands for all hosts; choose another name";
+    return NameRule::wrong(reading, name);
+  }
+};
+
+/// A folder that is there or can be made.
+template <std::size_t Most>
+struct AbsoluteFolderRule {
+  static std::string form() { return fmt::format("an absolute path of up to {} characters", Most); }
+  static std::string wrong(const ConfigReading& reading, const std::string& path) {
+    if (!path.starts_with('/') || path.size() > Most) {
+      return fmt::format("\"{}\" is not allowed; allowed is {}", path.substr(0, kMaxPath), form());
+    }
+    if (!reading.surroundings.check_directories) return "";
+    const auto good = check_directory_can_be_made(path);
+    return good ? "" : good.error().describe();
+  }
+};
+
+struct UserRule {
+  static std::string form() { return "name or number in quotes"; }
+  static std::string wrong(const ConfigReading&, const std::string& user) {
+    const auto number = user.empty() ? Result<uid_t>(0) : user_number(user);
+    return number ? "" : number.error().message;
+  }
+};
+
+struct GroupRule {
+  static std::string form() { return "name or number in quotes"; }
+  static std::string wrong(const ConfigReading&, const std::string& group) {
+    const auto number = group.empty() ? Result<gid_t>(0) : group_number(group);
+    return number ? "" : number.error().message;
+  }
+};
+
+struct InterfaceRule {
+  static std::string form() { return "an interface of the host"; }
+  static std::string wrong(const ConfigReading& reading, const std::string& name) {
+    constexpr std::size_t kMaxInterfaceName = 15;  // IFNAMSIZ
+    if (const auto good = check_name("interface", name, kMaxInterfaceName); !good)
+      return good.error().message;
+    const auto& there = reading.surroundings.interfaces;
+    if (!reading.config.dds.enabled || there.empty() || std::ranges::find(there, name) != there.end())
+      return "";
+    const std::vector<std::string_view> names(there.begin(), there.end());
+    return fmt::format("there is no interface '{}'; there are {}{}", shown(name), join_names(names),
+                       suggestion(name, names));
+  }
+};
+
+struct PeerRule {
+  static std::string form() { return "IP addresses or host names, with a port after a colon if it must be"; }
+  static std::string wrong(const ConfigReading&, const std::string& peer) {
+    constexpr std::string_view kAddress =
+        "0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ.:-_%[]";
+    constexpr std::size_t kMaxAddress = 255;
+    if (!peer.empty() && peer.size() <= kMaxAddress && !peer.starts_with('-') &&
+        peer.find_first_not_of(kAddress) == std::string::npos) {
+      return "";
+    }
+    return fmt::format(
+        "\"{}\" is not an address; allowed is an IP address or a host name, with a port after a colon if it "
+        "must be",
+        peer.substr(0, kMaxPath));
+  }
+};
+
+/// Names of instances: check_relations() looks whether there are such.
+struct InstanceRule {
+  static std::string form() { return "names of other instances"; }
+  static std::string wrong(const ConfigReading&, const std::string&) { return ""; }
+};
+
+}  // namespace plchost
