@@ -10,8 +10,8 @@ Usage: prose.py [ROOT] (a git checkout); prints each fault as "file:line: the fa
 * No text has a word that manager/glossary.md forbids (the column "not").
 
 A text is a paragraph, a heading, an item of a list or a cell of a table outside of fences (.md), a comment or a docstring. So is
-a string of three words and more in C++ or Python: messages are among those. Not held are drawings and columns in comments, raw
-strings, strings of shell scripts, and texts in pictures.
+a string of three words and more in C++ or Python, or one that a shell script prints: messages are among those. Not held are
+drawings and columns in comments, raw strings, and texts in pictures.
 """
 
 import argparse
@@ -26,7 +26,7 @@ from pathlib import Path
 GLOSSARY = "manager/glossary.md"
 WORDS = 30
 
-OPENING = re.compile(r"[\W_]*(who|what|whose|whoever|whatever|that which)\b(?!-)", re.IGNORECASE)
+OPENING = re.compile(r"[^\w$]*(who|what|whose|whoever|whatever|that which)\b(?!-)", re.IGNORECASE)
 # In the midst of a sentence: `so who asks`, `by who asks`, `because what is read`.
 WITHIN = re.compile(
     r"\b(?:(?:so|because|that|if|when|while|as|than|unless|since|until|of|by|for|from|to|with|but) who"
@@ -160,6 +160,10 @@ def hash_texts(source):
     """(kind, text) of a file whose comments begin with #: a shell script, CMake."""
     comment, last = [], 0
     for number, line in enumerate(source.split("\n"), 1):
+        for said in re.finditer(r"\b(?:echo|fail|fault|printf|say) (['\"])(.*?)\1", line):
+            text = Text()
+            text.lines = [(number, said[2])]
+            yield "message", text
         found = re.search(r"(?:^|\s)#(?!!)+ ?(.*)$", line)
         if not found or (found.start() > 0 and line[:found.start()].count('"') % 2):
             continue

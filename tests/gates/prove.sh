@@ -172,6 +172,7 @@ plant_in_prose "prose: comment in Python" "tests/planted.py:1: begins with 'what
 plant_in_prose "prose: comment in a script" "tests/planted.sh:2: begins with 'Whoever': Whoever asks" tests/planted.sh "true
 # W""hoever asks is answered."
 plant_in_prose "prose: message" "shm/base/planted.cpp:1: begins with 'what': what the client asks" shm/base/planted.cpp 'const char* m = "refused: what the client asks";'
+plant_in_prose "prose: message of a script" "tests/planted.sh:1: begins with 'who': who asks" tests/planted.sh 'fa''il "who asks is refused"'
 new_tree
 echo "Who asks? The manager answers the client: \`what\` is code." >"$plot/tree/shm/planted.md" && commit_tree
 "$gates/prose.py" "$plot/tree" || { echo "good prose does not pass its gate"; failed=1; }

@@ -32,7 +32,7 @@ begin_download() { # begin_download FILE: $client sends it
 }
 newest() { printf '%s/%06d.so' "$kept" "$(plcctl list applications line1 --json | jq 'map(.version | numbers) | max')"; }
 
-echo "- what is broken is refused before what runs is touched"
+echo "- a broken one is refused before the running one is touched"
 good=$APPLICATIONS/packer.so
 cp "$good" "$cell/foreign.so"
 printf '\267\000' | dd of="$cell/foreign.so" bs=1 seek=18 conv=notrunc status=none # e_machine: another processor
@@ -139,7 +139,7 @@ cmp "$cell/large.so" "$(newest)" || fail "another file is there"
 truncate -s +1 "$cell/large.so"
 refused "this host takes up to 67108864" plcctl load application line1 "$cell/large.so"
 
-echo "- what was loaded is in the audit log, with its digest; the list is as it should be"
+echo "- the loaded one is in the audit log, with its digest; the list is as it should be"
 audit=$cell/cell1.state/audit.cell1
 grep -qF "sha256 $(sha256sum "$good" | cut -d' ' -f1)" "$audit"/*.log || fail "the digest is not in the audit log"
 plcctl verify audit "$audit" >/dev/null || fail "the audit log is damaged"

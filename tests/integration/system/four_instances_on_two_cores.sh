@@ -88,7 +88,7 @@ refused "common.sh" plcctl load application line2 "$(dirname "$0")/common.sh"
 refused "nowhere.so" plcctl load application line2 "$cell/nowhere.so"
 is "$(instance line2 pid)" "$pid" || fail "a refused file disturbed line2"
 
-echo "- what does not exist is named"
+echo "- things that do not exist are named"
 refused nobody plcctl start instance nobody
 refused nothing plcctl post event packer1/nothing
 refused CmpScheduleTimer plcctl set scheduler line1 CmpSchedul

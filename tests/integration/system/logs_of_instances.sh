@@ -29,7 +29,7 @@ is "$(said --json | jq -r '.[0] | "\(.sequence) \(.text)"')" "$first" || fail "$
 twice() { [ "$(said | grep -c 'last words')" -ge 2 ]; }
 until_true 20 twice
 
-echo "- who follows saw all of it"
+echo "- a follower saw all of it"
 followed() { [ "$(grep -c 'last words' "$cell/followed.txt")" -ge 2 ]; }
 until_true 20 followed
 grep -q 'last words' "$cell/cell.log" || fail "they are missing in the log of the manager"

@@ -38,7 +38,7 @@ is "$(report version)" 2 || fail "the code of version 1 runs"
 is "$(task line1/Main lost_cycles)" "$lost" || echo "  (lost cycles: $(task line1/Main lost_cycles))"
 plcctl list transitions line1 --json | grep -q "online change to $kept/000001.so" || fail "$(plcctl show transitions line1)"
 
-echo "- what does not fit is refused with the reasons, and the line runs on"
+echo "- a version that does not fit is refused with the reasons, and the line runs on"
 refused "task 'Main': its interval is 3000 us, of the one that runs it is 2000 us" \
   plcctl load application line1 "$APPLICATIONS/online_interval.so" --online
 refused "variables 'machine': dwBytes is 24, of the one that runs it is 16" \

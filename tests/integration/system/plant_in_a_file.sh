@@ -44,7 +44,7 @@ exits() {
   [ "$code" -eq "$wanted" ] || fail "exit code $code instead of $wanted: $* ($said)"
 }
 
-echo "- what would be changed"
+echo "- the changes to come"
 differences="north/line1: application: $APPLICATIONS/packer.so -> $cell/packer2.so
 north/line1: scheduler: CmpSchedule -> CmpScheduleTimer
 north/line1: event stop: not registered -> registered
@@ -90,7 +90,7 @@ is_field south line1 state stopped || fail "south was not brought there: $said"
 printf '[[host]]\nname = "west"\n' >"$cell/west.toml"
 exits 3 "$BIN/plcctl" --timeout 1 apply -f "$cell/west.toml"
 
-echo "- what a host refuses is told with the line, and what counts on it is not done"
+echo "- a refusal of a host is told with the line, and what counts on it is not done"
 printf '[[host]]\nname = "north"\n[[host.instance]]\nname = "line1"\napplication = "/nowhere.so"\nscheduler = "CmpSchedule"\n' >"$cell/wrong.toml"
 exits 1 plcctl apply -f "$cell/wrong.toml"
 grep -qF "$cell/wrong.toml:3: north/line1: application: $cell/packer2.so -> /nowhere.so: /nowhere.so is refused" <<<"$said" || fail "$said"

@@ -30,7 +30,7 @@ plcctl --host old start instance press || fail "start"
 is "$(state_of_press)" "press running" || fail "instances: $(state_of_press)"
 is "$(plcctl --host old post event press/full --count 50)" "50 posted" || fail "post"
 
-echo "- what the old host does not know is told"
+echo "- fields that the old host does not know are told"
 refused "unknown operation" plcctl --host old stop instance press
 
 kill -TERM "$old"
