@@ -145,7 +145,7 @@ Result<void> TaskSet::check_startable() {
   if (running_) return failure(ErrorCode::wrong_state, "the tasks are running already");
   if (const auto busy = wait_until_settled(TimePoint{}); !busy.empty()) {
     return failure(ErrorCode::wrong_state,
-                   fmt::format("has not come back since it was to stop: task {}", join_names(busy)));
+                   fmt::format("has not ended its cycle since it was to stop: task {}", join_names(busy)));
   }
   if (const auto faulty = tasks_in_exception(); !faulty.empty()) {
     return failure(ErrorCode::wrong_state,

@@ -132,9 +132,8 @@ class TaskSet {
   /// Looks how far the stop is, and goes on to its second phase. Nothing: it is not over yet. Else it is: the
   /// tasks that have not come back in time.
   [[nodiscard]] std::optional<std::vector<std::size_t>> advance_stop();
-  /// Of the last stop: the one of the tasks that have not come back that did not because its event variable
-  /// has not returned. Nothing ends the thread that reads it; as long as it does not itself, start() is
-  /// refused.
+  /// The task whose event variable was still being read when the last stop timed out. Nothing ends the thread
+  /// that reads it; start() is refused until that read returns.
   [[nodiscard]] std::optional<std::size_t> late_variable() const noexcept { return late_variable_; }
   [[nodiscard]] bool stop_begun() const noexcept { return stop_.has_value(); }
   /// Stops without waiting for any cycle, also if a stop is under way. For what went wrong.

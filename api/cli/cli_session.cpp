@@ -55,8 +55,9 @@ std::unexpected<Error> none_selected(const std::vector<HostView>& hosts) {
     const auto labels = host.labels();
     names.push_back(labels.empty() ? host.name : fmt::format("{} ({})", host.name, fmt::join(labels, ", ")));
   }
-  return failure(ErrorCode::not_found, fmt::format("no host is so called and labelled; those that answer: {}",
-                                                   fmt::join(names, ", ")));
+  return failure(
+      ErrorCode::not_found,
+      fmt::format("no host matches --host and --label; those that answer: {}", fmt::join(names, ", ")));
 }
 
 }  // namespace

@@ -161,8 +161,8 @@ Client::Outcome to_public(const PostReport& report) {
       .code = 0, .text = {}, .posted = {.accepted = report.accepted, .no_task = report.no_task}};
   if (report.unacknowledged > 0) {
     outcome.code = ClientError::timed_out;
-    outcome.text =
-        fmt::format("the host has stopped answering: of {} posts nothing is known", report.unacknowledged);
+    outcome.text = fmt::format("the host has stopped answering: the fate of {} posts is not known",
+                               report.unacknowledged);
   } else if (report.rejected > 0) {
     outcome.code = static_cast<int>(report.rejected_code);
     outcome.text =

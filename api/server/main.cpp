@@ -52,7 +52,8 @@ int main(int argc, char** argv) {
   app.add_option("--audit-folder", options.audit_folder, "where the log of what clients change is kept");
   app.add_option("--name-since", options.name_since_ns,
                  "since when this host has its name (CLOCK_REALTIME, ns; default: now)");
-  app.add_option("--beat-fd", options.beat_fd, "eventfd of the manager, which sees by it that this lives");
+  app.add_option("--beat-fd", options.beat_fd,
+                 "eventfd of the manager, which sees by it that this process runs");
   app.add_flag("--name-held", options.name_held, "a server before this one had the name: do not ask for it");
   app.add_flag("--name-refused", options.name_refused,
                "a server before this one was refused the name: ask for it longer");

@@ -120,7 +120,7 @@ SessionTable::Session* SessionTable::session_of(const dds::Guid& client) {
   }
   if (!alive_.contains(client)) return nullptr;
   if (sessions_.size() >= kMaxSessions && !make_room(now)) {
-    if (dropped_++ % 1000 == 0) spdlog::warn("{} busy clients are served, one more is not", kMaxSessions);
+    if (dropped_++ % 1000 == 0) spdlog::warn("session limit {} reached; client rejected", kMaxSessions);
     return nullptr;
   }
   auto publisher = dds::make_publisher(participant_, dds::client_partition(client.hex(), host_));

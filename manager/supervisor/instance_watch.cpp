@@ -89,7 +89,7 @@ bool ManagedInstance::hear(const ControlReply& reply) {
   ++signs_;
   heard_of_ = true;
   if (reply.number == asked_number_) asked_number_ = 0;
-  // A process that was only busy answers once before its page beats again.
+  // A process that was only busy answers once before the heartbeats in its page resume.
   constexpr int kAnswers = 2;
   if (++answers_ >= kAnswers && phase_ == Phase::up && !page_damaged_) {
     page_damaged_ = true;

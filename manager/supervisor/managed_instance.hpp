@@ -42,15 +42,16 @@ inline constexpr Duration kAskAgain = std::chrono::seconds(2);
 // * An exception of the application is no crash. The process stays and answers; nothing restarts it. The manager finds
 //   it in the process's page within 50 ms. start and single cycle are refused, stop has nothing to do; reset, restart
 //   and load lead out of it.
-// * A process whose heartbeat stands still for HeartbeatWatch::kLimit is in exception, too, until it beats again.
-//   Nothing can be asked of it. A command that it was to answer fails. Commands other than reset, restart, load and
-//   stop are refused, and stop is what reset is. Its end begins with SIGTERM; SIGKILL follows 2 s later.
+// * A process whose heartbeat stands still for HeartbeatWatch::kLimit is in exception, too, until its
+//   heartbeats resume. It takes no commands. A command that it was to answer fails. Commands other than
+//   reset, restart, load and stop are refused, and stop is what reset is. Its end begins with SIGTERM;
+//   SIGKILL follows 2 s later.
 // * The manager reads state and heartbeat from the process's page. If another program has damaged the page or cut it
 //   short, the manager asks the process over its control socket; the problem text says so. The page alone is no reason
 //   for an exception, nor for a signal.
 // * Time in which other programs keep the process from its core does not count as silence. After kLimit of such time
-//   the problem text names them until the process beats again. The state stays, and commands wait for their limits.
-//   Such time extends the limit of the set-up.
+//   the problem text names them until its heartbeats resume. The state stays, and commands wait for their
+//   limits. Such time extends the limit of the set-up.
 // * Nothing is begun after the time limit of its command, also if it waited for the process or for the trial of a file
 //   meanwhile. The process gets the lesser of that limit and limit_of() from now.
 //

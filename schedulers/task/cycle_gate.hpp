@@ -7,9 +7,9 @@
 
 namespace plchost {
 
-/// Lets the control thread have a moment in which no thread is in code of the application, without that any
-/// is stopped for longer than the moment takes: it closes the gate, looks whether all seats are empty, and
-/// opens it again. A task that comes meanwhile waits at the gate.
+/// Gives the control thread a window in which no thread runs application code. Threads wait only for that
+/// window: it closes the gate, looks whether all seats are empty, and opens it again. A task that comes
+/// meanwhile waits at the gate.
 class CycleGate {
  public:
   /// Where one thread says that it is within. The gate outlives it.

@@ -14,16 +14,16 @@
 
 namespace plchost {
 
-/// Which life of which process: an address is given again, with the next generation.
+/// One run of a node's process: an address is given again, with the next generation.
 struct NodeLife {
   std::uint16_t node = 0;
   std::uint32_t generation = 0;
   bool operator==(const NodeLife&) const = default;
 };
 
-/// A link as it lies in shared memory: the queues of one direction between two lives of two nodes. Nothing in
-/// it is ever repaired: when one of the two ends, or finds that a stranger has scribbled, a fresh one takes
-/// its place, so that nothing can stay stuck in it.
+/// A link as it lies in shared memory: the queues of one direction between one run of each of two nodes.
+/// Nothing in it is ever repaired: when one of the two ends, or finds that a stranger has scribbled, a fresh
+/// one takes its place, so that nothing can stay stuck in it.
 struct LinkLayout {
   std::uint64_t magic = 0;
   std::uint32_t version = 0;
@@ -77,8 +77,8 @@ class LinkMemory {
   /// Makes a fresh one that takes the place of any before. Set-up.
   [[nodiscard]] static Result<LinkMemory> make(const std::string& name, const NodeLife& from,
                                                const NodeLife& to, std::uint32_t slots);
-  /// The one that was made for just these two lives. not_found: there is none. corrupt: it is something
-  /// else. wrong_state: it was made for other lives. Set-up.
+  /// The one that was made for just these two runs. not_found: there is none. corrupt: it is something else.
+  /// wrong_state: it was made for other runs. Set-up.
   [[nodiscard]] static Result<LinkMemory> open(const std::string& name, const NodeLife& from,
                                                const NodeLife& to);
   /// The link of that name, of any node, to look at.

@@ -28,7 +28,8 @@ void BlockRouter::tick(TimePoint now) {
   ++ticks_;
   if (node_.directory_.lost()) {
     tell({ErrorCode::corrupt, 0,
-          "the directory of the nodes was cut short by somebody: no other node is reached until this process "
+          "the directory of the nodes was cut short by another program: no other node is reached until this "
+          "process "
           "is started again"});
   }
   node_.keep_record();

@@ -49,7 +49,7 @@ int tell(CliSession& session, const std::string& host, const PostArguments& argu
   }
   if (report.unacknowledged > 0) {
     return CliSession::fail({ErrorCode::timed_out, 0,
-                             fmt::format("host '{}' has stopped answering: of {} posts nothing is known",
+                             fmt::format("host '{}' has stopped answering: the fate of {} posts is not known",
                                          host, report.unacknowledged)});
   }
   if (report.rejected == 0) return kExitDone;

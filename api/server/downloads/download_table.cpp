@@ -44,7 +44,7 @@ Result<void> DownloadTable::check_room(const std::string& instance, std::uint64_
                                downloads_.size(), kMost));
   }
   if (all <= 2 * limit_) return {};
-  return failure(ErrorCode::busy, fmt::format("with those that are being sent to this host it were {} bytes; "
+  return failure(ErrorCode::busy, fmt::format("together with the running downloads this would be {} bytes; "
                                               "at most {} at a time",
                                               all, 2 * limit_));
 }

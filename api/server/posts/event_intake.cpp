@@ -192,7 +192,7 @@ void EventIntake::post_next(const Post& post, const Result<Wanted>& wanted, Ledg
                             const SourceState& state) {
   auto done = wanted ? check(post) : std::unexpected(wanted.error());
   if (done && wanted->run && awaited_.size() >= kMaxAwaited) {
-    done = failure(ErrorCode::full, "too many posts at once are to be told of their runs");
+    done = failure(ErrorCode::full, "too many posts wait for their runs at the same time");
   }
   Targets targets;
   if (done) done = try_post(post, entry, state, wanted->run ? &targets : nullptr);

@@ -308,7 +308,7 @@ void Instance::look_after_page() {
   if (page_->lost()) {
     if (std::exchange(page_lost_told_, true)) return;
     spdlog::warn(
-        "the page of this instance was cut short by another program: nobody sees its figures any more "
+        "the page of this instance was cut short by another program: its figures are not shown any more "
         "until it is started again");
     return;
   }

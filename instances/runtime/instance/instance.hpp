@@ -68,7 +68,7 @@ class Instance {
   void enter_exception(const std::string& reason);
 
   /// Begins the end of the process: the tasks come to the end of their cycles, as in a stop. The second call
-  /// says that nobody wants to wait for that.
+  /// ends the process without waiting for them.
   void begin_shutdown(std::string_view why);
   /// An end was asked for, and nothing is left to wait for.
   [[nodiscard]] bool ended() const noexcept;
