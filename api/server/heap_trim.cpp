@@ -4,6 +4,11 @@
 
 namespace plchost {
 
+void give_large_blocks_back() noexcept {
+  constexpr int kLarge = 128 * 1024;
+  (void)::mallopt(M_MMAP_THRESHOLD, kLarge);
+}
+
 void HeapTrim::worked(std::uint64_t clients, TimePoint now) noexcept {
   if (clients == 0) return;
   work_ += clients;

@@ -8,6 +8,7 @@
 #include "api/dds/cyclone_version.h"
 #include "api/server/access/receive_gate.hpp"
 #include "api/server/control_server.hpp"
+#include "api/server/heap_trim.hpp"
 #include "shm/base/memory_guard.hpp"
 #include "shm/log/log.hpp"
 
@@ -27,6 +28,7 @@ int fail(const plchost::Error& error) {
 
 int main(int argc, char** argv) {
   plchost::MemoryGuard::watch_process();
+  plchost::give_large_blocks_back();
   plchost::ServerOptions options;
   options.pool = "plchost";
   std::string log_level = "info";

@@ -1,6 +1,7 @@
 // The memory that clients leave behind in the API server.
 #include <chrono>
 #include <memory>
+#include <optional>
 #include <thread>
 
 #include <gtest/gtest.h>
@@ -22,18 +23,19 @@ class Memory : public testing::Test {
     host_.write_instance(0, "line1", InstanceState::running);
     host_.write_count(1);
     (void)host_.add_event("line1", "ready");
-    host_.start_server({"--audit-folder", host_.run_directory() + "/audit"});
+    server_.emplace(host_, std::vector<std::string>{"--audit-folder", host_.run_directory() + "/audit"});
     staying_ = connect(domain_);
   }
   template <class Use>
   void expect_bounded(int first, int then, Use use) {
-    expect_bounded_memory(host_.server().pid(), {.first = first, .then = then, .at_once = 8}, use);
+    expect_bounded_memory(*server_, {.first = first, .then = then, .at_once = 8}, use);
   }
 
   OwnDomain domain_;
   TestHost host_{domain_, "hosta"};
 
  private:
+  std::optional<MeasuredServer> server_;
   std::unique_ptr<ControlClient> staying_;
 };
 
