@@ -78,7 +78,7 @@ typedef struct {
 /* The results of plc_reference_clock_read. */
 #define PLC_REFERENCE_OK 0
 #define PLC_REFERENCE_NONE 1    /* nothing was written yet */
-#define PLC_REFERENCE_BUSY 2    /* it is being written, or its writer died within: look again later */
+#define PLC_REFERENCE_BUSY 2    /* it is being written, or its writer ended within: look again later */
 #define PLC_REFERENCE_CORRUPT 3 /* not what a writer writes */
 
 static __inline__ plc_clock_u64 plc_reference_clock_check_of(plc_clock_u64 reference, plc_clock_u64 local,
@@ -104,7 +104,7 @@ static __inline__ void plc_reference_clock_write(plc_reference_clock* clock, plc
                                                  plc_clock_i64 local_ns, int valid) {
   const plc_clock_u64 flag = valid != 0 ? 1u : 0u;
   const plc_clock_u64 updates = __atomic_load_n(&clock->updates, __ATOMIC_RELAXED) + 1u;
-  /* Odd in any case, and another number: a writer that died within has left an odd one. */
+  /* Odd in any case, and another number: a writer that ended within has left an odd one. */
   const plc_clock_u64 odd = (__atomic_load_n(&clock->sequence, __ATOMIC_RELAXED) + 1u) | 1u;
   const plc_clock_u64 check =
       plc_reference_clock_check_of((plc_clock_u64)reference_ns, (plc_clock_u64)local_ns, updates, flag);

@@ -160,7 +160,7 @@ class ControlClient {
   [[nodiscard]] Result<ApiReply> call(const ApiRequest& request, TimePoint deadline);
 
   /// Sends an application to an instance, where it is checked, kept and loaded; the answer is that to the
-  /// load. Goes on when plchost-dds dies meanwhile. `deadline`: for the host to begin; then as long as it
+  /// load. Goes on when plchost-dds ends meanwhile. `deadline`: for the host to begin; then as long as it
   /// moves. timed_out: it has not begun, or nothing has moved for 10 s.
   [[nodiscard]] Result<ApiReply> download(const Download& download, const DownloadProgressFunction& progress,
                                           TimePoint deadline);
@@ -172,7 +172,7 @@ class ControlClient {
   [[nodiscard]] Result<void> prepare_posts(const std::string& host, TimePoint deadline);
 
   /// Posts an event `count` times, `interval` apart (0: as fast as acknowledgements come), each counted
-  /// exactly once, also if plchost-dds dies meanwhile. Ends early when the host has acknowledged nothing for
+  /// exactly once, also if plchost-dds ends meanwhile. Ends early when the host has acknowledged nothing for
   /// `patience`: then the report says how many are not known. `stop` is asked at least every 50 ms; when it
   /// says true, no more are posted, and the report is about those that were.
   [[nodiscard]] Result<PostReport> post_event(const ApiRequest& event, std::uint64_t count, Duration interval,

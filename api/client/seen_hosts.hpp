@@ -24,7 +24,7 @@ struct SeenHost {
   dds_instance_handle_t writer = DDS_HANDLE_NIL;  ///< of the presence
   TimePoint last;
   HostClock clock;
-  std::uint32_t others = 0;  ///< presences of an older server while this one lives
+  std::uint32_t others = 0;  ///< presences of an older server while this one runs
   TimePoint other_last;
 };
 

@@ -34,7 +34,7 @@ std::vector<TransitionView> TransitionLog::take() {
                                          TransitionView view;
                                          if (!is_news(sample, now, view.missed)) return;
                                          view.sample = sample;
-                                         view.sample.ext = {};  // lives on loan only
+                                         view.sample.ext = {};  // lies on loan only
                                          news.push_back(view);
                                        });
   return news;

@@ -26,7 +26,7 @@ class Connection {
 
 [[nodiscard]] dds::DomainOptions domain_options(const Client::Options& options);
 
-/// A thread that takes no signal of the program that it lives in; neither do the threads of DDS that it
+/// A thread that takes no signal of the program that it runs in; neither do the threads of DDS that it
 /// makes.
 [[nodiscard]] std::thread quiet_thread(std::function<void()> body);
 

@@ -40,7 +40,7 @@ class NameClaim {
   };
   /// So long a host that comes asks before it serves: a host nearby has answered by then.
   static constexpr Duration kAsking = std::chrono::milliseconds(300);
-  /// One that was refused the name takes its time: also who lives behind a slow link, or speaks DDS Security,
+  /// One that was refused the name takes its time: also a host behind a slow link, or speaks DDS Security,
   /// has.
   static constexpr Duration kAskingAgain = std::chrono::seconds(2);
   /// So long a rival is told of after it was seen.

@@ -40,7 +40,7 @@ class SessionTable {
   [[nodiscard]] bool serves(const dds::Guid& client) { return session_of(client) != nullptr; }
   void write_reply(const dds::Guid& client, const plc_Reply& reply);
   void write_ack(const dds::Guid& client, const plc_EventAck& ack);
-  /// Those of the clients whose acknowledgement reader was discovered: any thread, as long as this lives.
+  /// Those of the clients whose acknowledgement reader was discovered: any thread, as long as this exists.
   [[nodiscard]] AckWriters& ack_writers() noexcept { return *ack_writers_; }
   /// By one of them: the client is not idle.
   void was_answered(const dds::Guid& client, TimePoint now);

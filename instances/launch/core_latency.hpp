@@ -23,7 +23,7 @@ namespace plchost {
 /// Where the kernel's files are: "/sys", or a folder that a test has made.
 inline constexpr std::string_view kSysfs = "/sys";
 
-/// A core's latency, held at 0 as long as this lives. Set-up.
+/// A core's latency, held at 0 as long as this exists. Set-up.
 class CoreLatencyHold {
  public:
   /// unsupported: the kernel has no such file; refused, system: it may not be read or written. On failure

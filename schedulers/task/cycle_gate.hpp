@@ -33,7 +33,7 @@ class CycleGate {
     std::atomic<bool> taken_{false};
   };
 
-  /// Within, as long as it lives.
+  /// Within, as long as it exists.
   class Stay {
    public:
     Stay(CycleGate* gate, Seat& seat, Clock& clock) noexcept : seat_(gate != nullptr ? &seat : nullptr) {

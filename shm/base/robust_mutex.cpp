@@ -67,7 +67,7 @@ LockResult RobustMutex::try_lock() noexcept {
     record_.store(record_of(self), std::memory_order_release);
     return LockResult::locked;
   }
-  // One that died may have had our number, or this program may have come by exec() into the owner's place.
+  // One that ended may have had our number, or this program may have come by exec() into the owner's place.
   const bool ours = number_of(found) == self.id &&
                     record_.load(std::memory_order_acquire) == record_of(self) &&
                     image_.load(std::memory_order_relaxed) == self.image;
@@ -92,7 +92,7 @@ LockResult RobustMutex::lock_slowly(TimePoint deadline) noexcept {
     switch (error) {
       case 0:
         return taken();
-      case EDEADLK:  // one that died had our number
+      case EDEADLK:  // one that ended had our number
         if (number_of(before) == this_thread().id && take_over(before)) return LockResult::owner_died;
         break;
       case ESRCH:  // there is no such thread, or it is past what it does about its futexes when it ends

@@ -30,7 +30,7 @@ class Seqlock {
     sequence_.store(sequence + 2, std::memory_order_release);
   }
 
-  /// A consistent copy, or nothing if the writer was in the way each time (or died while writing).
+  /// A consistent copy, or nothing if the writer was in the way each time (or ended while writing).
   [[nodiscard]] std::optional<T> read(int attempts = 100) const noexcept {
     for (int i = 0; i < attempts; ++i) {
       const std::uint64_t before = sequence_.load(std::memory_order_acquire);
@@ -49,7 +49,7 @@ class Seqlock {
   /// Changes with every write: equal numbers mean that nothing was written in between.
   [[nodiscard]] std::uint64_t sequence() const noexcept { return sequence_.load(std::memory_order_acquire); }
 
-  /// Makes the lock usable again after a writer that died inside write(). Before the new writer's first
+  /// Makes the lock usable again after a writer that ended inside write(). Before the new writer's first
   /// write.
   void recover() noexcept {
     const std::uint64_t sequence = sequence_.load(std::memory_order_relaxed);

@@ -15,7 +15,7 @@
 
 namespace plchost {
 
-/// The soft side of a node, one thread: makes and opens links, sees peers die, carries blocks between other
+/// The soft side of a node, one thread: makes and opens links, sees peers end, carries blocks between other
 /// nodes, spreads those for all, and drops what nobody takes. Real-time tasks never wait for it; without it
 /// links that are open go on working.
 class BlockRouter {

@@ -13,7 +13,7 @@
 
 // The directory of the nodes of a pool as it lies in shared memory. All values read here are checked before
 // they are used: strangers may have scribbled in it. It is written under a lock of its file, which the kernel
-// gives back when its holder dies.
+// gives back when its holder ends.
 
 namespace plchost {
 

@@ -190,7 +190,7 @@ Result<std::uint16_t> NodeDirectory::choose_free(std::string_view name) const {
 }
 
 void NodeDirectory::write(std::uint16_t node, const NodeRecord& record) noexcept {
-  slot(node).record.recover();  // the writer before may have died in here
+  slot(node).record.recover();  // the writer before may have ended in here
   slot(node).record.write(record);
 }
 

@@ -60,7 +60,7 @@ void RemoteNames::write(std::span<const RemoteNode> nodes) noexcept {
     std::uint32_t number = 0;
     if (i < nodes.size()) {
       number = number_of(nodes[i].name.view(), nodes[i].host.view());
-      names.nodes[i].recover();  // the writer before may have died in here
+      names.nodes[i].recover();  // the writer before may have ended in here
       names.nodes[i].write(nodes[i]);
     }
     // Release: a reader that sees the number sees the name.

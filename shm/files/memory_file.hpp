@@ -33,7 +33,7 @@ class MemoryFile {
 
   /// Makes a new one, zero-filled and with its memory really there (a host without memory says so now and not
   /// with SIGBUS in a cycle). Takes the place of an old one of that name, whose users keep their mapping.
-  /// `name`: one path component below /dev/shm. A process that dies in here leaves nothing behind.
+  /// `name`: one path component below /dev/shm. A process that ends in here leaves nothing behind.
   [[nodiscard]] static Result<MemoryFile> replace(const std::string& name, std::size_t size,
                                                   const Fill& fill = {}, const MemoryRights& rights = {});
 

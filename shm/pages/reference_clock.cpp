@@ -63,7 +63,7 @@ Result<ReferenceClockRecord> ReferenceClockRecord::open(std::string_view pool, s
   const Identity identity = identity_of(file);
   ReferenceClockRecord opened(*std::move(memory), file, identity);
   plc_reference_clock& record = opened.record();
-  // Made by firmware that died before it had written the first line, or emptied by a stranger.
+  // Made by firmware that ended before it had written the first line, or emptied by a stranger.
   if (__atomic_load_n(&record.magic, __ATOMIC_ACQUIRE) == 0) plc_reference_clock_begin(&record);
   if (plc_reference_clock_is_one(&record) == 0) return refused();
   return opened;

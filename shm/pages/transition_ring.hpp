@@ -63,7 +63,8 @@ class TransitionRing {
 /// A reader's end, in any process: the entries since its last look, in order.
 class TransitionRingReader {
  public:
-  /// A number that was given and is not written for so long was given to a process that died: it is left out.
+  /// A number that was given and is not written for so long was given to a process that ended: it is left
+  /// out.
   static constexpr Duration kWriterGone = std::chrono::seconds(1);
 
   /// Begins with the oldest that is kept. not_found: there is none yet. corrupt: not such a ring.

@@ -9,7 +9,7 @@
 namespace plchost {
 
 /// Shared memories whose names are gone. The host takes some 150 ms to free a GiB: not as long as somebody
-/// holds a lock, so each is held open until the trash goes. If the process dies the host frees them all the
+/// holds a lock, so each is held open until the trash goes. If the process ends the host frees them all the
 /// same.
 class MemoryTrash {
  public:

@@ -27,7 +27,7 @@ struct ObjectInfo {
   bool registered = false;  ///< event: may be posted to
   std::uint32_t bound_tasks = 0;  ///< event
   std::uint32_t waiters = 0;      ///< threads that wait for it, and bound tasks
-  bool kept = false;              ///< lives without references
+  bool kept = false;              ///< stays without references
   uid_t owner = 0;
   gid_t group = 0;
   mode_t mode = 0;

@@ -31,7 +31,7 @@ struct PoolOptions {
 
 /// For an object that is made.
 struct ObjectOptions {
-  /// It lives on without a reference, also across the ends of all processes, until it is removed.
+  /// It stays without a reference, also across the ends of all processes, until it is removed.
   bool keep = false;
   /// The rights to it: nothing means the caller and the pool's group (if the caller is not in that, its own).
   /// Another group than one of the caller's is refused, as with files. Permission bits as those of a file, 0
@@ -62,7 +62,7 @@ struct PoolFindings {
 /// manager, or by the first instance that runs alone; found by name; survives every process that uses it.
 ///
 /// All functions here are set-up: they take the pool's robust, priority-inheriting mutex, repair the pool if
-/// its owner died, and release what clients held that have ended. Operations on what they give never do. A
+/// its owner ended, and release what clients held that have ended. Operations on what they give never do. A
 /// child of fork() attaches anew.
 class ObjectPool {
  public:

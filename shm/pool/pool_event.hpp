@@ -18,7 +18,7 @@ enum class PostResult : std::uint8_t {
 
 /// A handle on one external event of the pool, for programs that post to it and bind tasks to it: it is these
 /// registrations and bindings that hold the event, not the handle. Cheap to copy; valid while the ObjectPool
-/// that gave it lives.
+/// that gave it exists.
 class PoolEvent {
  public:
   PoolEvent() noexcept = default;

@@ -74,8 +74,8 @@ static_assert(offsetof(ObjectEntry, size) == 40 && offsetof(ObjectEntry, name) =
 static_assert(offsetof(ObjectEntry, first_count) == 160 && offsetof(ObjectEntry, made_unix_ns) == 184);
 
 /// ObjectEntry::attributes.
-inline constexpr std::uint32_t kKept = 1;     ///< lives without references, until it is removed
-inline constexpr std::uint32_t kDirect = 2;   ///< event: lives by its references, not by registration
+inline constexpr std::uint32_t kKept = 1;     ///< stays without references, until it is removed
+inline constexpr std::uint32_t kDirect = 2;   ///< event: stays by its references, not by registration
 inline constexpr std::uint32_t kAdopted = 4;  ///< memory: its file was there first, and outlives a repair
 
 /// One user of the pool: an ObjectPool in a process.
@@ -136,7 +136,7 @@ struct alignas(64) PoolHeader {
   std::atomic<std::uint32_t> high_water;    ///< entries from here on were never used
   Link first_free;                          ///< of the entries
   std::atomic<std::uint32_t> reclaim_hand;  ///< where the search for one to reclaim goes on
-  std::atomic<std::uint32_t> repairs;       ///< how often an owner of the mutex had died
+  std::atomic<std::uint32_t> repairs;       ///< how often an owner of the mutex had ended
   std::atomic<std::uint32_t> reference_high_water;
   Link first_free_reference;
   std::atomic<std::uint32_t> client_high_water;

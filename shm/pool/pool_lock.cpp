@@ -30,7 +30,7 @@ bool has_mapped(std::uint32_t thread, const std::string& pool) {
 
 }  // namespace
 
-// Only who holds the mutex writes `changes`; one that died has left it odd. Sequentially consistent, so that
+// Only who holds the mutex writes `changes`; one that ended has left it odd. Sequentially consistent, so that
 // no later store is seen before it.
 PoolLock::PoolLock(PoolHeader& header, PoolJournal& journal, bool owner_died) noexcept
     : header_(&header), journal_(&journal), owner_died_(owner_died) {

@@ -12,7 +12,7 @@
 namespace plchost {
 
 /// Holds the pool's mutex for set-up. Released at the end of its life, and found by the next one if the
-/// process dies. Readers without the right to write see by the header's `changes` whether it is held.
+/// process ends. Readers without the right to write see by the header's `changes` whether it is held.
 class PoolLock {
  public:
   /// Set-up under the mutex takes microseconds. It is only held for longer by a process that was stopped, or
@@ -32,7 +32,7 @@ class PoolLock {
   PoolLock& operator=(PoolLock&&) = delete;
   ~PoolLock();
 
-  /// The last owner died while it held the mutex: its unfinished step must be undone.
+  /// The last owner ended while it held the mutex: its unfinished step must be undone.
   [[nodiscard]] bool owner_died() const noexcept { return owner_died_; }
 
   /// The files that are taken away with the lock held, and go after its release.

@@ -31,7 +31,7 @@ enum class ObjectStatus : std::uint8_t {
 };
 
 /// A reference on one object of the pool, released at the end of its life, or by the next user of the pool if
-/// the process dies. Movable; outlives its ObjectPool. Operations: any context, from one thread at a time or
+/// the process ends. Movable; outlives its ObjectPool. Operations: any context, from one thread at a time or
 /// many; close and destruction: set-up.
 class PoolObject {
  public:
@@ -135,7 +135,7 @@ class SharedMutex : public PoolObject {
   [[nodiscard]] std::uint32_t owner() const noexcept;
 };
 
-/// A region of memory of its own, mapped into this process as long as this lives.
+/// A region of memory of its own, mapped into this process as long as this exists.
 class SharedMemory : public PoolObject {
  public:
   static constexpr ObjectType kType = ObjectType::memory;

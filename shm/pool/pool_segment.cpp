@@ -270,7 +270,7 @@ PoolFindings PoolSegment::take_findings() noexcept {
           .lost_objects = now.lost_objects - before.lost_objects};
 }
 
-// The unfinished step of an owner that died is undone; an object that it was making or taking away goes.
+// The unfinished step of an owner that ended is undone; an object that it was making or taking away goes.
 void PoolSegment::repair(PoolLock& held) noexcept {
   PoolHeader& header = view_.header();
   header.repairs.fetch_add(1, kRelaxed);

@@ -31,7 +31,7 @@ class PoolTable {
   /// Frees it; handles on it are invalid from here on.
   void erase(ObjectEntry& entry) noexcept;
   /// Makes the index and the free list anew from the entries, and frees those that are not valid. A process
-  /// that dies in here leaves `rebuilding` behind.
+  /// that ends in here leaves `rebuilding` behind.
   void rebuild() noexcept;
 
   [[nodiscard]] static bool is_valid(const ObjectEntry& entry) noexcept;

@@ -47,7 +47,7 @@ int main(int argc, char** argv) {
       fputs("feeder: nobody has taken a part for 10 s\n", stderr);
       return EXIT_FAILURE;
     }
-    /* A process that died with the lock held has changed one number at most: there is nothing to mend. */
+    /* A process that ended with the lock held has changed one number at most: there is nothing to mend. */
     if (plc_mutex_lock(lock, PLC_POOL_FOREVER) < 0) return fail("lock");
     ++shared->fed;
     plc_mutex_unlock(lock);

@@ -55,7 +55,7 @@ class KeptMemory {
                  const std::vector<std::pair<std::size_t, std::size_t>>& stretches);
   /// Each stretch of the data is in one of them.
   [[nodiscard]] std::deque<KeptGroup>& groups() noexcept { return groups_; }
-  /// False: another program has cut or overwritten the memory, or one in which an area lives elsewhere. Its
+  /// False: another program has cut or overwritten the memory, or one in which an area lies elsewhere. Its
   /// contents are worth nothing, and so is a copy that was made before this was asked. Soft thread.
   [[nodiscard]] bool is_whole() const noexcept;
   /// Areas that lie elsewhere are in the memory as they were copied. Soft thread.

@@ -9,7 +9,7 @@
 
 namespace plchost {
 
-/// Idle cores held awake, as long as this lives. Set-up.
+/// Idle cores held awake, as long as this exists. Set-up.
 class IdleHold {
  public:
   /// Where the kernel's files are; a test makes its own.

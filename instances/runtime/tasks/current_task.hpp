@@ -4,7 +4,7 @@
 
 namespace plchost {
 
-/// Says on this thread whose cycle it runs, as long as it lives: for plc_current_task(). Real-time.
+/// Says on this thread whose cycle it runs, as long as it exists: for plc_current_task(). Real-time.
 class CurrentTask {
  public:
   explicit CurrentTask(Task_Info* task) noexcept;
