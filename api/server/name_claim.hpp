@@ -40,8 +40,8 @@ class NameClaim {
   };
   /// So long a host that comes asks before it serves: a host nearby has answered by then.
   static constexpr Duration kAsking = std::chrono::milliseconds(300);
-  /// One that was refused the name takes its time: also a host behind a slow link, or speaks DDS Security,
-  /// has.
+  /// One that was refused the name takes its time: also a host behind a slow link, or with DDS Security, has
+  /// answered by then.
   static constexpr Duration kAskingAgain = std::chrono::seconds(2);
   /// So long a rival is told of after it was seen.
   static constexpr Duration kRivalShown = std::chrono::seconds(90);

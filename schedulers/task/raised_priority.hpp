@@ -7,7 +7,7 @@
 
 namespace plchost {
 
-/// As long as it lives, the calling thread runs at `priority`; without SCHED_FIFO, or the right to it, as
+/// As long as it exists, the calling thread runs at `priority`; without SCHED_FIFO, or the right to it, as
 /// before.
 class RaisedPriority {
  public:
