@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The house from outside: its eight entries, small files, nothing unfinished, no path of a developer's machine, no file that is
-# made through a link, no instance of DDS that stays in memory.
+# The house from outside: its eight entries, small files, no crowded folder, nothing unfinished. No path of a developer's
+# machine, no file that is made through a link, no instance of DDS that stays in memory.
 # Usage: house.sh [ROOT] (a git checkout); prints each fault.
 set -euo pipefail
 cd "${1:-$(dirname "$0")/../..}"
@@ -18,6 +18,12 @@ while read -r file; do
   lines=$(wc -l <"$file")
   [ "$lines" -le 500 ] || fault "$file: $lines lines; what is the second thing in it?"
 done < <(git ls-files '*.cpp' '*.hpp' '*.h' '*.c')
+
+# A header and its source file have one name.
+while read -r count folder; do
+  [ "$count" -le 35 ] || fault "$folder: $count names of sources; at most 35: which of them are a room of their own?"
+done < <(git ls-files shm schedulers instances api manager | grep -E '\.(cpp|hpp|h|c)$' | sed -E 's,\.[a-z]+$,,' | sort -u |
+  sed 's,/[^/]*$,,' | uniq -c)
 
 marker='TO''DO|FIX''ME|X''XX'
 git grep -nE "\b($marker)\b" -- ':!*.md' && fault "the lines above are unfinished" || true

@@ -84,6 +84,9 @@ new_tree
 seq -f '// %g' 501 >"$plot/tree/shm/base/long.cpp" && commit_tree
 must_be_red "house: long file" "shm/base/long.cpp: 501 lines" "$gates/house.sh" "$plot/tree"
 new_tree
+touch "$plot/tree/shm/base/crowd"{1..36}.cpp && commit_tree
+must_be_red "house: crowded folder" "shm/base: 36 names of sources; at most 35" "$gates/house.sh" "$plot/tree"
+new_tree
 echo "// TO""DO" >"$plot/tree/shm/base/later.cpp" && commit_tree
 must_be_red "house: unfinished" "the lines above are unfinished" "$gates/house.sh" "$plot/tree"
 new_tree
