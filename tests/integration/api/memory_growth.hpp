@@ -92,11 +92,11 @@ struct Uses {
 
 /// The promise: 10,000 clients come and go within 1 MiB. A test with fewer clients bounds the blocks that
 /// they leave in proportion. The environment may ask for more clients.
-constexpr std::int64_t kPromise = 1024 * 1024;
+constexpr std::int64_t kPromise = std::int64_t{1024} * 1024;
 constexpr int kPromised = 10'000;
 /// So much more is in use without a leak, because lists with a bound fill: each thread's freed blocks in
 /// malloc, freed samples and messages in Cyclone.
-constexpr std::int64_t kNoise = 256 * 1024;
+constexpr std::int64_t kNoise = std::int64_t{256} * 1024;
 
 /// Returns how many clients there were.
 template <class Use>
