@@ -37,8 +37,7 @@ PLC_EXPORT void CDECL plc_app_exit(void);
 /* Write it once, in one file of the application or component, with a semicolon behind it. */
 #define PLC_EXPORT_ABI const unsigned int plc_app_abi = PLC_APP_ABI_VERSION
 
-/* ---- Handles and results --------------------------------------------------------------------------------
- */
+/* ---- Handles and results ------------------------------------------------------------------------------- */
 
 typedef void* RTS_HANDLE;
 #ifdef __cplusplus
@@ -66,8 +65,7 @@ typedef unsigned int RTS_RESULT;
 typedef long RTS_I64;
 typedef unsigned long RTS_UI64;
 
-/* ---- Tasks ----------------------------------------------------------------------------------------------
- */
+/* ---- Tasks --------------------------------------------------------------------------------------------- */
 
 #define Cyclic 0x0000       /* runs every dwInterval */
 #define Event 0x0001        /* runs once each time its BOOL goes from FALSE to TRUE */
@@ -190,8 +188,16 @@ RTS_RESULT CDECL SchedRaiseEvent(RTS_HANDLE hTask);
 #define PLC_START_AFTER_FAULT 3 /* the process before ended by itself (a crash) and is started again */
 int CDECL plc_start_kind(void);
 
-/* ---- Memory areas ---------------------------------------------------------------------------------------
- */
+/* The name of the instance that runs this application: "line1". Valid until the process ends. Any. */
+const char* CDECL plc_instance_name(void);
+
+/* The text of "Parameter.pszName" in the section [Application] of the instance's settings: one program runs
+ * in several instances, each with values of its own. Valid until the process ends. NULL: pszName is null, or
+ * the parameter is not set; it may be set to an empty text. Compares names: in a cycle keep the text instead.
+ * Any. */
+const char* CDECL plc_parameter(const char* pszName);
+
+/* ---- Memory areas -------------------------------------------------------------------------------------- */
 
 /*
  * An area is a piece of memory of the application. It lies where the settings of the instance want it
@@ -278,12 +284,10 @@ typedef struct {
 /* ERR_OK; ERR_PARAMETER: not such a handle, or dwSize; ERR_NOTINITIALIZED: not placed yet. Any. */
 RTS_RESULT CDECL plc_get_area_state(RTS_HANDLE hArea, Plc_Area_State* pState);
 
-/* ---- Online change --------------------------------------------------------------------------------------
- */
+/* ---- Online change ------------------------------------------------------------------------------------- */
 #include "plc_online_change.h"
 
-/* ---- Distributed clock ----------------------------------------------------------------------------------
- */
+/* ---- Distributed clock --------------------------------------------------------------------------------- */
 
 /*
  * The grids of all cyclic tasks follow a reference clock: their releases lie where its time modulo the task's
@@ -321,8 +325,7 @@ typedef struct {
  * ERR_PARAMETER: not such a handle, or dwSize; ERR_NOTINITIALIZED. Any. */
 RTS_RESULT CDECL SchedGetClockState(RTS_HANDLE hTask, Clock_State* pState);
 
-/* ---- External events ------------------------------------------------------------------------------------
- */
+/* ---- External events ----------------------------------------------------------------------------------- */
 
 /*
  * An external event has a name and is counted: n posts run each bound task n times. "ready" is this
@@ -333,7 +336,8 @@ RTS_RESULT CDECL SchedGetClockState(RTS_HANDLE hTask, Clock_State* pState);
  * Registers an own event, or gives access to an event of another instance (whose registration is that
  * instance's own). The handle stays valid until the process ends. *pResult (may be NULL): ERR_OK;
  * ERR_DUPLICATE: the application or a component has registered it already; with RTS_INVALID_HANDLE:
- * ERR_PARAMETER, ERR_NOMEMORY, ERR_NOTINITIALIZED. Control.
+ * ERR_PARAMETER, ERR_NOMEMORY, ERR_NOTINITIALIZED. An event that plc_app_init registers counts posts when the
+ * application is accepted, after plc_app_init has returned 0. Control.
  */
 RTS_HANDLE CDECL SchedRegisterExternalEvent(const char* pszEvent, RTS_RESULT* pResult);
 
@@ -369,8 +373,7 @@ RTS_RESULT CDECL EventUnregisterCallbackFunction(unsigned int EventId, PF_EVENT_
 /* Runs the tasks bound to this event once. ERR_OK; ERR_NO_TASK; ERR_PARAMETER: not such a handle. Any. */
 RTS_RESULT CDECL CAL_SysEventSet(RTS_HANDLE hEvent);
 
-/* ---- Blocks between instances -----------------------------------------------------------------------------
- */
+/* ---- Blocks between instances -------------------------------------------------------------------------- */
 
 /*
  * Instances send each other blocks of 0 to PLC_MAX_BLOCK bytes by address, in their cycles (CmpBlkDrvShm). A
@@ -434,8 +437,7 @@ RTS_RESULT CDECL plc_channel_reply(RTS_HANDLE hChannel, const Block_Info* pReque
 RTS_RESULT CDECL plc_channel_receive(RTS_HANDLE hChannel, void* pBuffer, unsigned int dwBufferSize,
                                      Block_Info* pInfo);
 
-/* ---- Time -----------------------------------------------------------------------------------------------
- */
+/* ---- Time ---------------------------------------------------------------------------------------------- */
 
 /*
  * Clocks that only go forward, from an origin that means nothing by itself: CLOCK_MONOTONIC, or what the
@@ -454,8 +456,7 @@ unsigned int CDECL SysTimeGetMs(void);
 /* The functions of a library that the settings name. It is called from any context. */
 typedef RTS_RESULT(CDECL* PF_SYSTIME)(RTS_SYSTIME* pTime);
 
-/* ---- Messages -------------------------------------------------------------------------------------------
- */
+/* ---- Messages ------------------------------------------------------------------------------------------ */
 
 #define PLC_LOG_INFO 0
 #define PLC_LOG_WARNING 1
@@ -467,8 +468,7 @@ typedef RTS_RESULT(CDECL* PF_SYSTIME)(RTS_SYSTIME* pTime);
  * logged. Any. */
 void CDECL plc_log(int nLevel, const char* pszText);
 
-/* ---- Components -----------------------------------------------------------------------------------------
- */
+/* ---- Components ---------------------------------------------------------------------------------------- */
 
 /*
  * A component extends the runtime (a driver that posts events, say). It is a shared object that exports

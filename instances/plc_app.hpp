@@ -22,8 +22,10 @@
 #include <exception>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -41,6 +43,17 @@ __attribute__((format(printf, 1, 2))) inline void log(const char* format, ...) {
   std::vsnprintf(text, sizeof text, format, arguments);
   va_end(arguments);
   plc_log(PLC_LOG_INFO, text);
+}
+
+/// The name of the instance that runs this application. Any context.
+inline std::string_view instance_name() noexcept {
+  return plc_instance_name();
+}
+
+/// The text of [Application] Parameter.NAME in the instance's settings; nothing: it is not set. Any context.
+inline std::optional<std::string_view> parameter(const char* name) noexcept {
+  const char* const text = plc_parameter(name);
+  return text == nullptr ? std::nullopt : std::optional<std::string_view>(text);
 }
 
 /// The clock of SysTimeGetNs(), see plc_app.h. Any context.

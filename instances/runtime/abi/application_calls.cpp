@@ -30,6 +30,16 @@ int plc_online_change() {
   return host != nullptr && host->online_change() ? 1 : 0;
 }
 
+const char* plc_instance_name() {
+  const ApplicationHost* const host = ApplicationHost::current();
+  return host == nullptr ? "" : host->instance().c_str();
+}
+
+const char* plc_parameter(const char* pszName) {
+  const ApplicationHost* const host = ApplicationHost::current();
+  return host == nullptr || pszName == nullptr ? nullptr : host->parameter(pszName);
+}
+
 int plc_start_kind() {
   const ApplicationHost* const host = ApplicationHost::current();
   return host == nullptr ? PLC_START_FIRST : host->start_kind();

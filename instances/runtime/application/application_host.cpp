@@ -24,7 +24,7 @@ bool has(const Range& range, const Value& value, Projection projection = {}) {
 }  // namespace
 
 ApplicationHost::ApplicationHost(const std::string& instance, ObjectPool* pool)
-    : events_(instance, pool), blocks_(pool == nullptr ? "" : pool->name(), instance) {
+    : instance_(instance), events_(instance, pool), blocks_(pool == nullptr ? "" : pool->name(), instance) {
   the_host = this;
 }
 
@@ -41,6 +41,11 @@ ApplicationHost* ApplicationHost::current_for_control() noexcept {
   the_host->messages_.push(PLC_LOG_ERROR,
                            "a function of plc_app.h for the control thread was called elsewhere");
   return nullptr;
+}
+
+const char* ApplicationHost::parameter(std::string_view name) const noexcept {
+  const auto known = parameters_.find(name);
+  return known == parameters_.end() ? nullptr : known->second.c_str();
 }
 
 void ApplicationHost::begin_init(ApplicationDeclaration& declaration) noexcept {

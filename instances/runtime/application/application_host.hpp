@@ -2,7 +2,9 @@
 
 #include <functional>
 #include <string>
+#include <string_view>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "instances/plc_app.h"
@@ -10,6 +12,7 @@
 #include "instances/runtime/application/message_queue.hpp"
 #include "instances/runtime/blocks/block_service.hpp"
 #include "instances/runtime/memory/areas.hpp"
+#include "instances/runtime/settings/settings.hpp"
 #include "instances/runtime/tasks/event_table.hpp"
 #include "instances/runtime/tasks/task_table.hpp"
 #include "shm/base/result.hpp"
@@ -30,6 +33,13 @@ class ApplicationHost {
 
   /// The same, if the caller is on the control thread, where all that is not real-time belongs; else null.
   [[nodiscard]] static ApplicationHost* current_for_control() noexcept;
+
+  /// The answer of plc_instance_name(). Any context.
+  [[nodiscard]] const std::string& instance() const noexcept { return instance_; }
+  /// The answer of plc_parameter(): null if it is not set. Any context.
+  [[nodiscard]] const char* parameter(std::string_view name) const noexcept;
+  /// Before anything of an application or component runs.
+  void set_parameters(Parameters parameters) { parameters_ = std::move(parameters); }
 
   [[nodiscard]] EventTable& events() noexcept { return events_; }
   [[nodiscard]] BlockService& blocks() noexcept { return blocks_; }
@@ -84,6 +94,8 @@ class ApplicationHost {
     bool of_application;  // of its declaration
   };
 
+  std::string instance_;
+  Parameters parameters_;
   std::thread::id control_thread_ = std::this_thread::get_id();
   EventTable events_;
   BlockService blocks_;

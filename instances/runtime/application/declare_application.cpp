@@ -24,6 +24,7 @@ Result<StartSettings> read_start_settings(const std::string& file) {
 }
 
 Result<void> prepare_host(const StartSettings& start, ApplicationHost& host) {
+  host.set_parameters(start.settings.parameters);
   if (start.device) {
     if (auto done = register_device_events(*start.device, host.events()); !done) return done;
   }

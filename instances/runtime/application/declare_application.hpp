@@ -24,8 +24,8 @@ struct StartSettings {
 /// `file` may be empty. The error names file, line and key. Set-up.
 [[nodiscard]] Result<StartSettings> read_start_settings(const std::string& file);
 
-/// Registers the events of the device description, and takes the instance's place among the nodes. A host
-/// without a pool does both as far as nothing of the pool is needed. Set-up.
+/// Hands the parameters over, registers the events of the device description, and takes the instance's place
+/// among the nodes. A host without a pool does both as far as nothing of the pool is needed. Set-up.
 [[nodiscard]] Result<void> prepare_host(const StartSettings& start, ApplicationHost& host);
 
 /// Whether the hooks of the components take what they need, or only say whether they could.

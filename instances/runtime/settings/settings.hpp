@@ -2,6 +2,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -60,6 +62,9 @@ struct RetainSettings {
   bool operator==(const RetainSettings&) const = default;
 };
 
+/// [Application]: texts for the application, by their names.
+using Parameters = std::map<std::string, std::string, std::less<>>;
+
 /// The values of an instance's own settings file, validated. instances/settings.md lists the keys.
 struct InstanceSettings {
   SchedulerSettings scheduler;
@@ -72,6 +77,7 @@ struct InstanceSettings {
   std::vector<TaskSettings> tasks;  ///< one for each [Task.NAME]
   std::vector<AreaSettings> areas;  ///< [SysMem], in the order of their numbers: 0, 1, ...
   RetainSettings retain;
+  Parameters parameters;                ///< [Application] Parameter.NAME
   std::vector<std::string> components;  ///< in order; a relative path counts from the settings file's folder
 
   /// The ignored parts: sections and components of other programs, each once; and keys without a meaning
@@ -84,6 +90,9 @@ struct InstanceSettings {
 
 inline constexpr std::size_t kMaxSettingsFile = std::size_t{1} << 20;
 inline constexpr std::size_t kMaxComponents = 999;
+inline constexpr std::size_t kMaxParameters = 256;
+inline constexpr std::size_t kMaxParameterName = 50;
+inline constexpr std::size_t kMaxParameterText = 500;  ///< bytes
 inline constexpr std::size_t kMaxAreas = 64;
 inline constexpr std::uint64_t kMaxAreaSize = std::uint64_t{1} << 30;
 inline constexpr std::uint64_t kAreaAlignment = 8;

@@ -91,7 +91,18 @@ std::optional<std::size_t> number_of(const SettingKey& key, std::string_view nam
   return static_cast<std::size_t>(*number);
 }
 
+// The writer's name of "Parameter.speed" for the row "Parameter.NAME".
+std::optional<std::string_view> own_part(const SettingKey& key, std::string_view name) {
+  constexpr std::string_view kName = "NAME";
+  if (!std::holds_alternative<NamedSetting>(key.value)) return std::nullopt;
+  const std::string_view stem = key.name.substr(0, key.name.size() - kName.size());
+  if (!name.starts_with(stem)) return std::nullopt;
+  const std::string_view part = name.substr(stem.size());
+  return check_name("parameter", part, kMaxParameterName) ? std::optional(part) : std::nullopt;
+}
+
 bool is_named(const SettingKey& key, std::string_view name) {
+  if (std::holds_alternative<NamedSetting>(key.value)) return own_part(key, name).has_value();
   if (is_numbered(key)) return number_of(key, name).has_value();
   return plain_name(key, name) == key.name;
 }
@@ -158,7 +169,7 @@ const std::vector<SettingKey>& all_setting_keys() {
   static const std::vector<SettingKey> all = [] {
     std::vector<SettingKey> keys;
     for (const auto table : {schedule_keys(), timer_keys(), clock_keys(), block_keys(), task_keys(),
-                             component_keys(), memory_keys()}) {
+                             component_keys(), application_keys(), memory_keys()}) {
       keys.insert(keys.end(), table.begin(), table.end());
     }
     return keys;
@@ -212,6 +223,9 @@ std::string allowed_values(const SettingKey& key) {
           [](const NumberedSetting& numbered) {
             return fmt::format("{}, N 0 to {}", numbered.form, numbered.highest);
           },
+          [](const NamedSetting& named) {
+            return fmt::format("{}; NAME: 1 to {} letters, digits, _ - .", named.form, kMaxParameterName);
+          },
           [](const UnusedSetting&) { return std::string(); },
       },
       key.value);
@@ -227,6 +241,7 @@ Result<const SettingKey*> find_setting(std::string_view section, std::string_vie
 }
 
 std::string setting_identity(const SettingKey& key, std::string_view name) {
+  if (own_part(key, name)) return std::string(name);
   const auto number = number_of(key, name);
   return number ? fmt::format("{}{}", key.name, *number) : std::string(key.name);
 }
@@ -271,6 +286,9 @@ Result<std::string> apply_setting(const SettingKey& key, std::string_view name, 
           },
           [&](const NumberedSetting& setting) {
             return !value.empty() && setting.apply(target, number_of(key, name).value_or(0), value);
+          },
+          [&](const NamedSetting& setting) {
+            return setting.apply(target, own_part(key, name).value_or(std::string_view()), value);
           },
           [](const UnusedSetting&) { return true; },
       },

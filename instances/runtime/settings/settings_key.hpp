@@ -76,6 +76,12 @@ struct NumberedSetting {
   std::size_t highest = kMaxComponents;
 };
 
+/// A key with ".NAME" at its end: NAME is the writer's own. Its name in the table has it, too.
+struct NamedSetting {
+  std::string_view form;
+  bool (*apply)(const SettingsTarget&, std::string_view name, std::string_view text);  ///< false: not allowed
+};
+
 /// Documented for CODESYS, without a meaning here: accepted with a remark.
 struct UnusedSetting {};
 
@@ -89,7 +95,7 @@ struct SettingKey {
   std::string_view initial{};  ///< the default, as it would be written
   std::string_view meaning{};  ///< for the table in instances/settings.md
   std::variant<NumberSetting, OptionalNumberSetting, MicrosecondSetting, WordSetting, TextSetting,
-               NumberedSetting, UnusedSetting>
+               NumberedSetting, NamedSetting, UnusedSetting>
       value = UnusedSetting{};
 };
 
@@ -103,6 +109,7 @@ inline constexpr std::string_view kTaskPrefix = "Task.";  ///< the beginning of 
 [[nodiscard]] std::span<const SettingKey> block_keys() noexcept;
 [[nodiscard]] std::span<const SettingKey> task_keys() noexcept;
 [[nodiscard]] std::span<const SettingKey> component_keys() noexcept;
+[[nodiscard]] std::span<const SettingKey> application_keys() noexcept;
 [[nodiscard]] std::span<const SettingKey> memory_keys() noexcept;
 
 /// The settings of all areas, checked as a whole. The error names the line of the area.

@@ -47,6 +47,17 @@ TEST_F(SettingsFile, StartOffsetOfTheApplicationHoldsAndThatOfTheSettingsWins) {
   EXPECT_EQ(offset(sut, "Moved", 2ms), 250us);
 }
 
+TEST_F(SettingsFile, ApplicationLearnsItsInstancesNameAndItsParameters) {
+  {
+    InstanceProcess sut(sandbox, with(""));
+    sut.wait_until_up();
+    EXPECT_THAT(sut.log(), HasSubstr("instance line1, speed not set, empty is not set"));
+  }
+  InstanceProcess sut(sandbox, with("[Application]\nParameter.speed=\"1200 rpm; fast\"\nParameter.empty=\n"));
+  sut.wait_until_up();
+  EXPECT_THAT(sut.log(), HasSubstr("instance line1, speed 1200 rpm; fast, empty is set"));
+}
+
 // Each fifth cycle of 4 ms takes 6 ms: `next` loses a release each time, `asap` runs it 2 ms late.
 TEST_F(SettingsFile, LatePolicyAsapRunsWhatNextLoses) {
   const auto counters_with = [&](const std::string& policy) {

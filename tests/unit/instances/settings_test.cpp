@@ -333,6 +333,33 @@ TEST(Settings, ReadsTheOptionsOfEachTask) {
   EXPECT_EQ(sut->tasks[1], (TaskSettings{.task = "S.low", .where = "line1.cfg:9: [Task.S.low]"}));
 }
 
+TEST(Settings, ParametersOfTheApplicationHaveNamesOfTheirWriter) {
+  const auto sut = parse_settings(
+      "[Application]\nParameter.speed=1200 ; rpm\nParameter.a.b-c_1=\"x; "
+      "y\"\nParameter.speed=1300\nParameter.none=\n",
+      "line1.cfg");
+  ASSERT_TRUE(sut) << sut.error().message;
+  EXPECT_EQ(sut->parameters, (Parameters{{"a.b-c_1", "x; y"}, {"none", ""}, {"speed", "1300"}}));
+  EXPECT_THAT(sut->remarks,
+              ElementsAre(HasSubstr("Parameter.speed takes the place of the one in line1.cfg:2")));
+}
+
+TEST(Settings, ParametersHaveBounds) {
+  const auto error_of = [](const std::string& text) {
+    const auto sut = parse_settings("[Application]\n" + text, "line1.cfg");
+    return sut ? std::string() : sut.error().message;
+  };
+  EXPECT_THAT(error_of("Parameter.=1\n"), HasSubstr("[Application] has no key 'Parameter.'"));
+  EXPECT_THAT(error_of("Parameter." + std::string(kMaxParameterName + 1, 'x') + "=1\n"), HasSubstr("no key"));
+  EXPECT_EQ(error_of("Parameter.x=" + std::string(kMaxParameterText, 'x') + "\n"), "");
+  EXPECT_THAT(error_of("Parameter.x=" + std::string(kMaxParameterText + 1, 'x') + "\n"),
+              HasSubstr("a text of at most 500 bytes"));
+  std::string all;
+  for (std::size_t i = 0; i < kMaxParameters; ++i) all += fmt::format("Parameter.p{}=1\n", i);
+  EXPECT_EQ(error_of(all + "Parameter.p0=2\n"), "");
+  EXPECT_THAT(error_of(all + "Parameter.more=1\n"), HasSubstr("at most 256"));
+}
+
 TEST(Settings, DefaultsOfTheTableAreThoseOfTheProgram) {
   std::string file;
   for (const SettingKey& key : all_setting_keys()) {

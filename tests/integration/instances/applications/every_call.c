@@ -7,6 +7,8 @@ const any_function every_call[] = {
     (any_function)__sys__setup__tasks,
     (any_function)plc_current_task,
     (any_function)plc_start_kind,
+    (any_function)plc_instance_name,
+    (any_function)plc_parameter,
     (any_function)plc_set_task_options,
     (any_function)plc_declare_area,
     (any_function)plc_area_address,

@@ -25,6 +25,10 @@ void setup(plc::Application& app) {
   plc::TaskOptions moved;
   moved.start_offset = 3ms;
   app.options("Moved", moved);
+  const std::string name(plc::instance_name());
+  const std::string speed(plc::parameter("speed").value_or("not set"));
+  plc::log("instance %s, speed %s, empty is %s", name.c_str(), speed.c_str(),
+           plc::parameter("empty") == std::string_view() ? "set" : "not set");
 }
 
 }  // namespace
