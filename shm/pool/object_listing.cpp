@@ -1,30 +1,54 @@
 #include "shm/pool/object_listing.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace plchost {
 
-namespace {
-
-std::vector<ReferenceInfo> references_of(const PoolView& view, const ObjectEntry& entry) {
-  std::vector<ReferenceInfo> infos;
-  const ReferenceEntry* reference = view.reference(entry.first_reference);
-  for (std::uint32_t step = 0; reference != nullptr && step < kMostReferencesTold; ++step) {
-    const ClientSlot* const client = view.client(reference->client);
-    if (client != nullptr) {
-      infos.push_back({.pid = client->pid.load(kRelaxed),
-                       .program = std::string(client->name.view()),
-                       .writable = reference->writable.load(kRelaxed) != 0,
-                       .waiting = reference->waiting.load(kRelaxed)});
-    }
-    reference = view.reference(reference->next_of_object);
+auto ObjectHolders::look_at(const PoolView& view, std::size_t from, std::size_t count) -> Part {
+  Part part;
+  const auto used = view.used_references();
+  const std::size_t begin = std::min(from, used.size());
+  for (const ReferenceEntry& reference : used.subspan(begin, std::min(count, used.size() - begin))) {
+    const ObjectEntry* const object = view.object_of(reference);
+    const ClientSlot* const client = view.client_of(reference);
+    if (object == nullptr || client == nullptr) continue;
+    part.emplace_back(key_of(view, *object), ReferenceInfo{.pid = client->pid.load(kRelaxed),
+                                                           .program = std::string(client->name.view()),
+                                                           .writable = reference.writable.load(kRelaxed) != 0,
+                                                           .waiting = reference.waiting.load(kRelaxed)});
   }
-  return infos;
+  return part;
 }
 
-}  // namespace
+void ObjectHolders::add(Part part) {
+  for (auto& [key, info] : part) {
+    std::vector<ReferenceInfo>& infos = of_[key];
+    if (infos.size() < kMostReferencesTold) infos.push_back(std::move(info));
+  }
+}
 
-ObjectInfo describe_object(const PoolView& view, const ObjectEntry& entry) {
+ObjectHolders ObjectHolders::of(const PoolView& view, const ObjectEntry& object) {
+  ObjectHolders holders;
+  std::uint32_t left = object.reference_count.load(kRelaxed);
+  for (std::size_t at = 0; at < view.used_references().size() && left > 0; ++at) {
+    if (view.object_of(view.references()[at]) != &object) continue;
+    holders.add(look_at(view, at, 1));
+    --left;
+  }
+  return holders;
+}
+
+std::vector<ReferenceInfo> ObjectHolders::find(const PoolView& view, const ObjectEntry& object) const {
+  const auto found = of_.find(key_of(view, object));
+  return found == of_.end() ? std::vector<ReferenceInfo>() : found->second;
+}
+
+std::uint64_t ObjectHolders::key_of(const PoolView& view, const ObjectEntry& object) noexcept {
+  return std::uint64_t{view.link_to(object)} << 32U | Binding::generation(object.binding.load(kRelaxed));
+}
+
+ObjectInfo describe_object(const PoolView& view, const ObjectEntry& entry, const ObjectHolders& holders) {
   const auto type = static_cast<ObjectType>(entry.type.load(kRelaxed));
   const ObjectTraits* const traits = traits_of(type);
   const std::uint64_t binding = entry.binding.load(std::memory_order_acquire);
@@ -40,7 +64,7 @@ ObjectInfo describe_object(const PoolView& view, const ObjectEntry& entry) {
                   .group = entry.group.load(kRelaxed),
                   .mode = entry.mode.load(kRelaxed),
                   .made_unix_ns = entry.made_unix_ns.load(kRelaxed),
-                  .references = references_of(view, entry),
+                  .references = holders.find(view, entry),
                   .reference_count = entry.reference_count.load(kRelaxed)};
   for (const ReferenceInfo& reference : info.references) info.waiters += reference.waiting;
   return info;

@@ -121,9 +121,17 @@ const std::string& ObjectPool::name() const noexcept {
 
 PoolFindings ObjectPool::tidy() noexcept {
   constexpr auto kPatience = std::chrono::milliseconds(20);
-  const bool held = segment_->lock(true, kPatience).has_value();
   if (!adoption_) adoption_ = std::make_shared<PoolAdoption>(segment_);
-  if (held) adoption_->look();
+  const std::vector<ObjectEntry*> left_over = adoption_->look_at_entries();
+  bool locked = false;
+  if (auto held = segment_->lock(true, kPatience)) {
+    locked = true;
+    for (ObjectEntry* const entry : left_over) {
+      if (held->trash.full()) break;
+      if (PoolAdoption::is_left_over(*entry)) segment_->destroy(*held, *entry);
+    }
+  }
+  if (locked) adoption_->look_at_files();
   return segment_->take_findings();
 }
 
@@ -400,31 +408,55 @@ Result<void> ObjectPool::remove_object(std::string_view name) {
   return {};
 }
 
-// In parts, so that nobody waits for long who wants the lock meanwhile.
-Result<std::vector<ObjectInfo>> ObjectPool::list() const {
-  constexpr std::size_t kPart = 256;
-  const PoolView& view = segment_->view();
-  std::vector<ObjectInfo> all;
+// Hands each part that `look` gives to `take`, until that says that it was the last. In between others can
+// have the lock. Without the right to write a part may be looked at again.
+template <class Look, class Take>
+Result<void> ObjectPool::look_in_parts(Look look, Take take) const {
   const TimePoint until = look_until();
-  for (std::size_t at = 0; at == 0 || at < view.used_entries().size(); at += kPart) {
-    const auto part = [&] {
-      std::vector<ObjectInfo> infos;
-      const auto used = view.used_entries();
-      for (std::size_t i = at; i < std::min(at + kPart, used.size()); ++i) {
-        if (PoolTable::is_valid(used[i]) && !PoolTable::is_idle(used[i])) {
-          infos.push_back(describe_object(view, used[i]));
-        }
-      }
-      return infos;
-    };
+  for (bool first = true, more = true; more; first = false) {
     if (!segment_->writable()) {
-      std::ranges::move(look_only(until, part), std::back_inserter(all));
+      more = take(look_only(until, look));
       continue;
     }
-    const auto held = segment_->lock(at == 0);
+    const auto held = segment_->lock(first);
     if (!held) return std::unexpected(held.error());
-    std::ranges::move(part(), std::back_inserter(all));
+    more = take(look());
   }
+  return {};
+}
+
+// First the table of references, then the objects.
+Result<std::vector<ObjectInfo>> ObjectPool::list() const {
+  constexpr std::size_t kReferences = 4096;
+  constexpr std::size_t kObjects = 256;
+  const PoolView& view = segment_->view();
+  ObjectHolders holders;
+  std::size_t place = 0;
+  const auto held = look_in_parts([&] { return ObjectHolders::look_at(view, place, kReferences); },
+                                  [&](ObjectHolders::Part part) {
+                                    holders.add(std::move(part));
+                                    place += kReferences;
+                                    return place < view.used_references().size();
+                                  });
+  if (!held) return std::unexpected(held.error());
+  std::vector<ObjectInfo> all;
+  std::size_t at = 0;
+  const auto part = [&] {
+    std::vector<ObjectInfo> infos;
+    const auto used = view.used_entries();
+    for (std::size_t i = at; i < std::min(at + kObjects, used.size()); ++i) {
+      if (PoolTable::is_valid(used[i]) && !PoolTable::is_idle(used[i])) {
+        infos.push_back(describe_object(view, used[i], holders));
+      }
+    }
+    return infos;
+  };
+  const auto listed = look_in_parts(part, [&](std::vector<ObjectInfo> infos) {
+    std::ranges::move(infos, std::back_inserter(all));
+    at += kObjects;
+    return at < view.used_entries().size();
+  });
+  if (!listed) return std::unexpected(listed.error());
   return all;
 }
 
@@ -433,7 +465,7 @@ Result<ObjectInfo> ObjectPool::look_at(std::string_view name) const {
   const PoolView& view = segment_->view();
   const auto describe = [&](const ObjectEntry* entry) -> Result<ObjectInfo> {
     if (entry == nullptr || PoolTable::is_idle(*entry)) return nothing_of_that_name(name, this->name());
-    return describe_object(view, *entry);
+    return describe_object(view, *entry, ObjectHolders::of(view, *entry));
   };
   if (!segment_->writable()) return look_only(look_until(), [&] { return describe(segment_->peek(name)); });
   auto held = segment_->lock(true);

@@ -191,6 +191,8 @@ class ObjectPool {
   [[nodiscard]] std::unexpected<Error> no_room(const Wanted& wanted) const;
   template <class Look>
   auto look_only(TimePoint until, Look look) const;
+  template <class Look, class Take>
+  [[nodiscard]] Result<void> look_in_parts(Look look, Take take) const;
 
   std::shared_ptr<PoolSegment> segment_;
   std::shared_ptr<PoolAdoption> adoption_;  // made by tidy()

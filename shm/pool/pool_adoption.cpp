@@ -208,11 +208,6 @@ Result<ObjectEntry*> PoolAdoption::use_again(PoolSegment& segment, PoolLock& hel
   return left;
 }
 
-void PoolAdoption::look() {
-  look_at_files();
-  look_at_entries();
-}
-
 // A folder that has not changed is not looked at again. The time of a change is exact only to some ms, and a
 // file is complete only some time after its name is there.
 void PoolAdoption::look_at_files() {
@@ -244,17 +239,16 @@ void PoolAdoption::look_at_files() {
   }
 }
 
-void PoolAdoption::look_at_entries() {
+std::vector<ObjectEntry*> PoolAdoption::look_at_entries() {
   constexpr std::size_t kEntriesAtOnce = 20'000;
+  std::vector<ObjectEntry*> left_over;
   const auto used = segment_->view().used_entries();
   if (next_entry_ >= used.size()) next_entry_ = 0;
   const std::size_t end = std::min(used.size(), next_entry_ + kEntriesAtOnce);
   for (; next_entry_ < end; ++next_entry_) {
-    if (!is_left_over(used[next_entry_])) continue;
-    auto held = segment_->lock();
-    if (!held) return;
-    if (is_left_over(used[next_entry_])) segment_->destroy(*held, used[next_entry_]);
+    if (is_left_over(used[next_entry_])) left_over.push_back(&used[next_entry_]);
   }
+  return left_over;
 }
 
 }  // namespace plchost

@@ -5,6 +5,7 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <dirent.h>
 #include <time.h>
@@ -43,16 +44,16 @@ class PoolAdoption {
                                                       ObjectEntry& entry, std::size_t size,
                                                       const MemoryRights& rights, std::uint32_t attributes);
 
-  /// Looks at some files and entries of the pool; each call goes on where the one before ended. For the
-  /// process that watches over the host.
-  void look();
+  // For the process that watches over the host; each call goes on where the one before ended.
+  /// Some files of the pool; takes the lock where one is to become an object.
+  void look_at_files();
+  /// Some entries; without the lock: those that may be left over.
+  [[nodiscard]] std::vector<ObjectEntry*> look_at_entries();
 
  private:
   struct Close {
     void operator()(DIR* folder) const noexcept { ::closedir(folder); }
   };
-  void look_at_files();
-  void look_at_entries();
 
   std::shared_ptr<PoolSegment> segment_;
   std::unique_ptr<DIR, Close> folder_;  // null: all was looked at

@@ -33,7 +33,7 @@ ClientSlot* PoolClients::join(const ProcessIdentity& self, std::string_view name
     client.image.store(self.image, kRelaxed);
     client.ended.store(0, kRelaxed);
     client.looked_ns.store(MonotonicClock::now().time_since_epoch().count(), kRelaxed);
-    client.first_reference.store(0, kRelaxed);
+    client.released.store(0, kRelaxed);
     client.reference_count.store(0, kRelaxed);
     client.name.assign(name);
     journal_.set(client.pid, static_cast<std::uint32_t>(self.pid));

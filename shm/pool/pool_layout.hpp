@@ -17,18 +17,19 @@
 //   [ PoolHeader ][ ClientSlot clients[kMaxClients] ][ ReferenceEntry references[max_references] ]
 //   [ ObjectEntry entries[max_objects] ][ std::atomic<u32> buckets[bucket_count] ]
 //
-// Objects hang in chains by the hash of their name: bucket -> entry.next -> ... References hang in two lists,
-// that of their object and that of their client. A link is the index of an entry plus one, so that
-// zero-filled memory is a valid empty table. The next process undoes the unfinished step of a killed one (see
-// PoolJournal). All lists can be made anew from the entries themselves: that is for what strangers do to
+// Objects hang in chains by the hash of their name: bucket -> entry.next -> ... References are a flat table:
+// each names its object and its client, and both count theirs. A search goes through the whole table: for
+// the references of a client that has ended, and for lists. A link is the index of an entry plus one, so
+// that zero-filled memory is a valid empty table. The next process undoes the unfinished step of a killed one
+// (see PoolJournal). All lists can be made anew from the entries themselves: that is for what strangers do to
 // them.
 
 namespace plchost {
 
 inline constexpr std::uint64_t kPoolMagic = 0x6c6f6f70'74736f68;  // "hostpool"
 /// 1: first. 2: semaphores, mutexes, memories, clients and their references. 3: notes of what is changed. 4:
-/// the PID namespace. 5: events say whether posts are taken, and are marked.
-inline constexpr std::uint32_t kPoolVersion = 5;
+/// the PID namespace. 5: events say whether posts are taken, and are marked. 6: references are a flat table.
+inline constexpr std::uint32_t kPoolVersion = 6;
 
 /// Of what the pool's mutex orders, or what is checked after it was read without it.
 inline constexpr auto kRelaxed = std::memory_order_relaxed;
@@ -55,7 +56,7 @@ struct alignas(64) ObjectEntry {
   std::atomic<std::uint64_t> size;  ///< memory: bytes
   std::atomic<std::uint32_t> type;  ///< an ObjectType
   Link next;                        ///< in the chain of the bucket, or of the free list
-  Link first_reference;
+  std::atomic<std::uint32_t> reserved;
   std::atomic<std::uint32_t> reference_count;
 
   // Written with the mutex held, before the state.
@@ -84,7 +85,7 @@ struct alignas(64) ClientSlot {
   std::atomic<std::uint32_t> generation;  ///< grows with each client of the slot
   std::atomic<std::uint64_t> start;       ///< of the process, see start_of()
   std::atomic<std::int64_t> looked_ns;    ///< CLOCK_MONOTONIC when it was last seen alive
-  Link first_reference;
+  std::atomic<std::uint32_t> released;    ///< so many places of references were searched for those it had
   std::atomic<std::uint32_t> reference_count;
   std::atomic<std::uint32_t> ended;  ///< 1: its references are being released
   std::atomic<std::uint32_t> image;  ///< of the process, see image_of()
@@ -93,20 +94,17 @@ struct alignas(64) ClientSlot {
 static_assert(sizeof(ClientSlot) == 64 && offsetof(ClientSlot, name) == 40);
 
 /// One client's hold on one object.
-struct alignas(64) ReferenceEntry {
+struct alignas(32) ReferenceEntry {
   Link object;  ///< 0: free; written last
   std::atomic<std::uint32_t> object_generation;
   Link client;
   std::atomic<std::uint32_t> generation;  ///< grows with each reference that has this place
   std::atomic<std::uint32_t> writable;    ///< 1: may change the object; 0: only reads
   std::atomic<std::uint32_t> waiting;     ///< so many threads of the client wait for it
-  Link next_of_object;                    ///< or of the free list
-  Link previous_of_object;
-  Link next_of_client;
-  Link previous_of_client;
-  std::array<std::uint32_t, 6> reserved;
+  std::atomic<std::uint32_t> client_generation;
+  Link next_free;  ///< in the list of free places
 };
-static_assert(sizeof(ReferenceEntry) == 64 && offsetof(ReferenceEntry, waiting) == 20);
+static_assert(sizeof(ReferenceEntry) == 32 && offsetof(ReferenceEntry, waiting) == 20);
 
 struct alignas(64) PoolHeader {
   std::atomic<std::uint64_t> magic;  ///< written last, with release

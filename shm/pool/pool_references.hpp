@@ -6,7 +6,8 @@
 namespace plchost {
 
 /// The references of each process to the objects of the pool. All functions need the pool's mutex, and keep
-/// to the segment whatever a stranger wrote into it: a list that is damaged is made anew.
+/// to the segment whatever a stranger wrote into it: counts and the free list are made anew if they are
+/// damaged.
 class PoolReferences {
  public:
   PoolReferences(const PoolView& view, PoolJournal& journal) noexcept : view_(view), journal_(journal) {}
@@ -15,18 +16,13 @@ class PoolReferences {
   [[nodiscard]] ReferenceEntry* add(ObjectEntry& object, ClientSlot& client, bool writable) noexcept;
   /// Null if its object is gone already.
   ObjectEntry* release(ReferenceEntry& reference) noexcept;
-  /// The object that a used reference is on; null if it is another one now, or the place is free.
-  [[nodiscard]] ObjectEntry* object_of(const ReferenceEntry& reference) const noexcept;
-  /// Makes all lists anew; frees references on what is no object or of no client.
+  /// Makes all counts and the free list anew; frees references on what is no object or of no client.
   void rebuild() noexcept;
 
  private:
   [[nodiscard]] ReferenceEntry* allocate() noexcept;
   void free(ReferenceEntry& reference) noexcept;
-  void link(ReferenceEntry& reference, ObjectEntry& object, ClientSlot& client) noexcept;
-  [[nodiscard]] bool unlink(ReferenceEntry& reference, Link& first, Link ReferenceEntry::* next,
-                            Link ReferenceEntry::* previous) noexcept;
-
+  void count_up(std::atomic<std::uint32_t>& count) noexcept;
   void count_down(std::atomic<std::uint32_t>& count) noexcept;
 
   PoolView view_;

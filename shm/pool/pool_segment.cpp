@@ -337,12 +337,11 @@ ObjectEntry* PoolSegment::find(PoolLock& held, std::string_view name) noexcept {
   PoolTable objects = table(held);
   ObjectEntry* const object = objects.find(name);
   if (object == nullptr || !held.burying) return object;
-  ReferenceEntry* reference = view_.reference(object->first_reference);
-  for (std::size_t step = 0; reference != nullptr && step < view_.references().size(); ++step) {
-    ReferenceEntry* const next = view_.reference(reference->next_of_object);
-    const ClientSlot* const client = view_.client(reference->client);
-    if (client == nullptr || client->ended.load(kRelaxed) != 0) release_one(held, *reference);
-    reference = next;
+  for (ReferenceEntry& reference : view_.used_references()) {
+    if (object->reference_count.load(kRelaxed) == 0) break;
+    if (view_.object_of(reference) != object) continue;
+    const ClientSlot* const client = view_.client_of(reference);
+    if (client == nullptr || client->ended.load(kRelaxed) != 0) release_one(held, reference);
   }
   return objects.find(name);
 }
@@ -387,24 +386,28 @@ void PoolSegment::release_one(PoolLock& held, ReferenceEntry& reference) noexcep
   journal_.commit();
 }
 
-// False: there is more, and it is the turn of others.
+// False: there is more, and it is the turn of others. The search goes on where it ended: the client takes no
+// reference any more. A place is behind it only when its release cannot be undone.
 bool PoolSegment::bury(PoolLock& held, ClientSlot& client, std::size_t& left) noexcept {
-  bool mended = false;
-  for (;;) {
-    ReferenceEntry* const reference = view_.reference(client.first_reference);
-    if (reference == nullptr) return true;
-    if (left == 0 || held.trash.full()) return false;
-    --left;
-    const bool listed = view_.client(reference->client) == &client && reference->object.load(kRelaxed) != 0;
-    if (listed) {
-      release_one(held, *reference);
-    } else if (!mended) {
-      PoolReferences(view_, journal_).rebuild();  // the list is damaged
-      mended = true;
-    } else {
-      return true;  // a stranger goes on writing
-    }
+  constexpr std::size_t kPlacesForOne = 256;  // are searched in the time in which one is released
+  const auto all = view_.used_references();
+  const std::size_t begin = client.released.load(kRelaxed);
+  if (begin == 0 && client.reference_count.load(kRelaxed) == 0) return true;
+  std::size_t at = begin;
+  for (; at < all.size(); ++at) {
+    if (left == 0 || held.trash.full()) break;
+    if ((at - begin) % kPlacesForOne == kPlacesForOne - 1) --left;
+    if (view_.client_of(all[at]) != &client) continue;
+    if (left > 0) --left;
+    release_one(held, all[at]);
   }
+  client.released.store(static_cast<std::uint32_t>(at), kRelaxed);
+  if (at < all.size()) return false;
+  if (client.reference_count.load(kRelaxed) == 0) return true;
+  // A stranger has written over the count or the place.
+  PoolReferences(view_, journal_).rebuild();
+  client.released.store(0, kRelaxed);
+  return client.reference_count.load(kRelaxed) == 0;
 }
 
 // An event that was made by a program that posts and binds stays in its place until that is needed for

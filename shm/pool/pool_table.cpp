@@ -89,7 +89,6 @@ ObjectEntry* PoolTable::insert(std::string_view name, ObjectType type) noexcept 
   entry->size.store(0, kRelaxed);
   entry->type.store(static_cast<std::uint32_t>(type), kRelaxed);
   entry->attributes.store(0, kRelaxed);
-  entry->first_reference.store(0, kRelaxed);
   entry->reference_count.store(0, kRelaxed);
   entry->made_unix_ns.store(unix_time_ns(), kRelaxed);
   entry->name.assign(name);

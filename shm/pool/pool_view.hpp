@@ -45,6 +45,22 @@ class PoolView {
   [[nodiscard]] ReferenceEntry* reference(const Link& link) const noexcept { return at(references_, link); }
   [[nodiscard]] ClientSlot* client(const Link& link) const noexcept { return at(clients_, link); }
 
+  /// The object that a reference is on; null: the place is free, or the object is another one by now.
+  [[nodiscard]] ObjectEntry* object_of(const ReferenceEntry& reference) const noexcept {
+    ObjectEntry* const object = entry(reference.object);
+    const bool same = object != nullptr && reference.object_generation.load(kRelaxed) ==
+                                               Binding::generation(object->binding.load(kRelaxed));
+    return same ? object : nullptr;
+  }
+  /// The client that holds a reference; null: the place is free, or its slot is another client's by now.
+  [[nodiscard]] ClientSlot* client_of(const ReferenceEntry& reference) const noexcept {
+    ClientSlot* const client =
+        reference.object.load(kRelaxed) != 0 ? this->client(reference.client) : nullptr;
+    const bool same =
+        client != nullptr && reference.client_generation.load(kRelaxed) == client->generation.load(kRelaxed);
+    return same ? client : nullptr;
+  }
+
   [[nodiscard]] std::uint32_t link_to(const ObjectEntry& entry) const noexcept {
     return link_in(entries_, entry);
   }

@@ -197,6 +197,53 @@ TEST_F(ClientDeath, OfOneThatHeldMoreThanIsReleasedAtOnceLeavesNothingToBeFound)
   EXPECT_EQ(pool_.open_memory("1").error().code, ErrorCode::not_found);
 }
 
+TEST_F(ClientDeath, ReleasesItsReferencesWhereverTheyLieAndThoseOfNobodyElse) {
+  constexpr int kObjects = 100;
+  std::vector<SharedSemaphore> before;
+  for (int i = 0; i < kObjects; ++i) {
+    before.push_back(std::move(pool_.create_semaphore(std::to_string(i), 1)->object));
+    if (i % 3 == 0) before.pop_back();
+  }
+  const pid_t child = client([](ObjectPool& pool) {
+    static std::vector<SharedSemaphore> held;
+    for (int i = 0; i < kObjects; ++i) {
+      held.push_back(std::move(pool.create_semaphore(std::to_string(i), 1)->object));
+    }
+  });
+  ObjectPool other = another();
+  std::vector<SharedSemaphore> after;
+  for (int i = 0; i < kObjects; i += 2) after.push_back(*other.open_semaphore(std::to_string(i)));
+  kill_and_reap(child);
+  for (const auto all = pool_.list().value(); const ObjectInfo& info : all) {
+    const int i = std::stoi(info.name);
+    EXPECT_EQ(info.reference_count, (i % 3 != 0 ? 1U : 0U) + (i % 2 == 0 ? 1U : 0U)) << info.name;
+    EXPECT_EQ(info.references.size(), info.reference_count) << info.name;
+  }
+  for (int i = 0; i < kObjects; ++i) {
+    EXPECT_EQ(pool_.look_at(std::to_string(i)).has_value(), i % 3 != 0 || i % 2 == 0) << i;
+  }
+}
+
+// The place where the search for its references goes on lies in the pool, too.
+TEST_F(ClientDeath, ReleasesAllThoughAStrangerHasWrittenOverThePlaceOfTheSearch) {
+  const auto file = MemoryFile::open(name_.get(), 1, MemoryFile::Access::read_write);
+  ASSERT_TRUE(file);
+  for (const std::uint32_t place : {1U, 7U, 10U, kRoom, ~0U}) {
+    const pid_t child = client([](ObjectPool& pool) {
+      static std::vector<SharedSemaphore> held;
+      for (int i = 0; i < 10; ++i) {
+        held.push_back(std::move(pool.create_semaphore(std::to_string(i), 1)->object));
+      }
+    });
+    auto* const slots = reinterpret_cast<ClientSlot*>(file->bytes().data() + kClientsOffset);
+    for (std::uint32_t i = 0; i < kMaxClients; ++i) {
+      if (slots[i].pid == static_cast<std::uint32_t>(child)) slots[i].released = place;
+    }
+    kill_and_reap(child);
+    EXPECT_TRUE(pool_.list()->empty()) << place;
+  }
+}
+
 TEST_F(ClientDeath, SlotsOfManyDeadClientsAreUsedAgain) {
   for (int i = 0; i < 40; ++i) {
     std::vector<pid_t> children;
