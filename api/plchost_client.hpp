@@ -31,6 +31,8 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <utility>
+#include <variant>
 #include <vector>
 
 #define PLCHOST_CLIENT_API __attribute__((visibility("default")))
@@ -192,6 +194,10 @@ class PLCHOST_CLIENT_API Client {
     explicit operator bool() const noexcept { return code == 0; }
   };
 
+  /// A member of a status topic: codes are words, durations and times nanoseconds, GUIDs hexadecimal digits.
+  using Value = std::variant<bool, long long, unsigned long long, std::string>;
+  using Record = std::vector<std::pair<std::string, Value>>;
+
   /// A command that a host knows.
   struct Operation {
     std::string name;             ///< "set scheduler"
@@ -237,6 +243,13 @@ class PLCHOST_CLIENT_API Client {
   std::vector<Instance> instances(const std::string& host = {});
   std::vector<Task> tasks(const std::string& host = {});
   std::vector<Event> events(const std::string& host = {});
+
+  /// The status topics of the contract by name: "task", "writer", "exception".
+  static std::vector<std::string> topics();
+  /// All samples of one of them, complete: each with its members by their names in the contract, in their
+  /// order there. ClientError: invalid_argument: no such topic; unsupported: the host is older than the
+  /// topic.
+  std::vector<Record> status(const std::string& topic, const std::string& host = {});
 
   /// The lines of an instance, oldest first: the `newest` lines of those that the host keeps (256 KiB for
   /// each instance). ClientError: not_found: no such instance; refused: only operators may ask.

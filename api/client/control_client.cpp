@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "api/client/check_names.hpp"
+#include "api/client/control_client_status.hpp"
 #include "api/dds/claim.hpp"
 #include "api/dds/entries.hpp"
 #include "api/dds/error.hpp"
@@ -20,28 +21,6 @@ namespace {
 bool is_engineering(std::int32_t operation) {
   const Operation* const known = find_operation(operation);
   return known != nullptr && known->role == ApiRole::engineering;
-}
-
-auto order(const plc_InstanceStatus& s) {
-  return std::string_view(s.instance);
-}
-auto order(const plc_ExceptionStatus& s) {
-  return std::string_view(s.instance);
-}
-auto order(const plc_ApplicationStatus& s) {
-  return std::pair(std::string_view(s.instance), s.version);
-}
-auto order(const plc_TaskStatus& s) {
-  return std::tuple(std::string_view(s.instance), s.priority, std::string_view(s.task));
-}
-auto order(const plc_EventStatus& s) {
-  return std::pair(std::string_view(s.instance), std::string_view(s.event));
-}
-auto order(const plc_ObjectStatus& s) {
-  return std::string_view(s.object_name);
-}
-auto order(const plc_WriterStatus& s) {
-  return dds::Guid::from(s.source);
 }
 
 }  // namespace
@@ -77,63 +56,23 @@ Result<void> ControlClient::open(const dds::DomainOptions& options) {
   return open_cache(host_status_, dds::kHostStatus);
 }
 
-template <class Cache>
-Result<void> ControlClient::open_cache(Cache& cache, const dds::TopicInfo& info, std::uint32_t statuses) {
-  if (cache) return {};
-  auto topic = dds::make_topic(participant_.get(), info);
-  if (!topic) return std::unexpected(topic.error());
-  // Samples of another host under a key of this one must not push out those that have not been taken yet.
-  auto reader = dds::make_reader(status_subscriber_.get(), topic->get(),
-                                 dds::qos_of(info).keep_last(dds::kStatusReaderDepth));
-  if (!reader) return std::unexpected(reader.error());
-  if (auto added = wait_set_.add(reader->get(), statuses); !added) return added;
-  cache = Cache(std::move(*topic), std::move(*reader));
-  return {};
-}
-
 void ControlClient::update() {
   update_hosts();
-  instance_status_.update();
-  task_status_.update();
+  std::apply([](auto&... cache) { (cache.update(), ...); }, status_);
   statistics_.update();
-  event_status_.update();
-  writer_status_.update();
-  object_status_.update();
-  exceptions_.update();
-  applications_.update();
   host_findings_.update();
 }
 
 template Result<void> ControlClient::open_cache(StatusCache<plc_HostFinding>&, const dds::TopicInfo&,
                                                 std::uint32_t);
 
-template <class Sample>
-Result<std::vector<Sample>> ControlClient::snapshot(StatusCache<Sample>& cache, const dds::TopicInfo& topic,
-                                                    std::uint32_t plc_HostStatus::* expected,
-                                                    const std::string& host, TimePoint deadline) {
-  if (auto good = check_host_name(host); !good) return std::unexpected(std::move(good).error());
-  if (auto opened = open_cache(cache, topic); !opened) return std::unexpected(opened.error());
-  for (;;) {
-    update();
-    const auto view = present(host);
-    if (view && cache.count(host, view->epoch) == view->status.*expected) {
-      auto samples = cache.of_host(host, view->epoch);
-      std::ranges::sort(samples, {}, [](const Sample& sample) { return order(sample); });
-      return samples;
-    }
-    if (MonotonicClock::now() >= deadline) break;
-    wait_set_.wait(deadline);
-  }
-  return failure(ErrorCode::timed_out, fmt::format("the status of host '{}' has not come completely", host));
-}
-
 Result<std::vector<plc_InstanceStatus>> ControlClient::instances(const std::string& host,
                                                                  TimePoint deadline) {
-  return snapshot(instance_status_, dds::kInstanceStatus, &plc_HostStatus::instance_count, host, deadline);
+  return status<plc_InstanceStatus>(host, deadline);
 }
 
 Result<std::vector<plc_TaskStatus>> ControlClient::tasks(const std::string& host, TimePoint deadline) {
-  return snapshot(task_status_, dds::kTaskStatus, &plc_HostStatus::task_count, host, deadline);
+  return status<plc_TaskStatus>(host, deadline);
 }
 
 Result<StatisticsReport> ControlClient::statistics(const std::string& host, std::string_view instance,
@@ -157,15 +96,15 @@ Result<StatisticsReport> ControlClient::statistics(const std::string& host, std:
 }
 
 Result<std::vector<plc_EventStatus>> ControlClient::events(const std::string& host, TimePoint deadline) {
-  return snapshot(event_status_, dds::kEventStatus, &plc_HostStatus::event_count, host, deadline);
+  return status<plc_EventStatus>(host, deadline);
 }
 
 Result<std::vector<plc_WriterStatus>> ControlClient::writers(const std::string& host, TimePoint deadline) {
-  return snapshot(writer_status_, dds::kWriterStatus, &plc_HostStatus::writer_count, host, deadline);
+  return status<plc_WriterStatus>(host, deadline);
 }
 
 Result<std::vector<plc_ObjectStatus>> ControlClient::objects(const std::string& host, TimePoint deadline) {
-  return snapshot(object_status_, dds::kObjectStatus, &plc_HostStatus::object_count, host, deadline);
+  return status<plc_ObjectStatus>(host, deadline);
 }
 
 Result<std::vector<TransitionView>> ControlClient::transitions() {
@@ -186,18 +125,18 @@ Result<std::vector<TransitionView>> ControlClient::transitions() {
 Result<bool> ControlClient::has_all_transitions(const std::string& host, TimePoint deadline) {
   const auto told = instances(host, deadline);
   if (!told) return std::unexpected(told.error());
-  return std::ranges::all_of(
-      *told, [&](const plc_InstanceStatus& status) { return transition_log_.has_all(status); });
+  return std::ranges::all_of(*told,
+                             [&](const plc_InstanceStatus& one) { return transition_log_.has_all(one); });
 }
 
 Result<std::vector<plc_ExceptionStatus>> ControlClient::exceptions(const std::string& host,
                                                                    TimePoint deadline) {
-  return snapshot(exceptions_, dds::kExceptionStatus, &plc_HostStatus::instance_count, host, deadline);
+  return status<plc_ExceptionStatus>(host, deadline);
 }
 
 Result<std::vector<plc_ApplicationStatus>> ControlClient::applications(const std::string& host,
                                                                        TimePoint deadline) {
-  return snapshot(applications_, dds::kApplicationStatus, &plc_HostStatus::application_count, host, deadline);
+  return status<plc_ApplicationStatus>(host, deadline);
 }
 
 Result<void> ControlClient::open_own_reader(dds::Entity& topic, dds::Entity& reader,

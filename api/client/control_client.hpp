@@ -10,10 +10,12 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <utility>
 #include <vector>
 
 #include <control.h>
+#include <status_topics.hpp>
 
 #include "api/client/batch_poster.hpp"
 #include "api/client/event_poster.hpp"
@@ -112,8 +114,12 @@ class ControlClient {
   /// when it begins and when it ends. A host that stays silent is gone after kHostGone.
   [[nodiscard]] bool is_silent(std::string_view host);
 
-  /// All that a host shows, complete: waits until as much has come as the host says there is. Sorted by name.
-  /// timed_out: not complete at the deadline.
+  /// All samples of a status topic that a host shows, complete: waits until as much has come as the host says
+  /// there is. In the order that control.idl says. timed_out: not complete at the deadline. unsupported: the
+  /// host is of a version that has no such topic. Defined in control_client_status.hpp.
+  template <class Sample>
+  [[nodiscard]] Result<std::vector<Sample>> status(const std::string& host, TimePoint deadline);
+  /// The same, by name.
   [[nodiscard]] Result<std::vector<plc_InstanceStatus>> instances(const std::string& host,
                                                                   TimePoint deadline);
   [[nodiscard]] Result<std::vector<plc_TaskStatus>> tasks(const std::string& host, TimePoint deadline);
@@ -207,10 +213,6 @@ class ControlClient {
   template <class Cache>
   [[nodiscard]] Result<void> open_cache(Cache& cache, const dds::TopicInfo& topic,
                                         std::uint32_t statuses = DDS_DATA_AVAILABLE_STATUS);
-  template <class Sample>
-  [[nodiscard]] Result<std::vector<Sample>> snapshot(StatusCache<Sample>& cache, const dds::TopicInfo& topic,
-                                                     std::uint32_t plc_HostStatus::* expected,
-                                                     const std::string& host, TimePoint deadline);
   [[nodiscard]] Result<void> open_own_reader(dds::Entity& topic, dds::Entity& reader,
                                              const dds::TopicInfo& info, const dds::Qos& qos);
   [[nodiscard]] Result<RequestCaller*> caller(const std::string& host, bool engineering);
@@ -247,14 +249,10 @@ class ControlClient {
   dds::HostWriters answering_;  // of the readers in its own partition
   StatusCache<plc_Presence> presence_;
   StatusCache<plc_HostStatus> host_status_;
-  StatusCache<plc_InstanceStatus> instance_status_;
-  StatusCache<plc_TaskStatus> task_status_;
+  template <class... Samples>
+  using CachesOf = std::tuple<StatusCache<Samples>...>;
+  dds::OfCountedStatus<CachesOf> status_;
   StatisticsCache statistics_;
-  StatusCache<plc_EventStatus> event_status_;
-  StatusCache<plc_WriterStatus> writer_status_;
-  StatusCache<plc_ObjectStatus> object_status_;
-  StatusCache<plc_ExceptionStatus> exceptions_;
-  StatusCache<plc_ApplicationStatus> applications_;
   StatusCache<plc_HostFinding> host_findings_;
   SeenHosts seen_;
   TransitionLog transition_log_;

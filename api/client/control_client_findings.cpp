@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "api/client/control_client.hpp"
+#include "api/client/control_client_status.hpp"
 
 namespace plchost {
 

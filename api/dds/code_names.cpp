@@ -4,24 +4,17 @@
 #include <span>
 #include <string_view>
 
+#include <status_fields.hpp>
+
 #include "shm/pages/host_page.hpp"
 
 namespace plchost::dds {
 
 namespace {
 
-constexpr std::array kInstanceStates{
-    std::string_view("offline"),   std::string_view("starting"), std::string_view("running"),
-    std::string_view("stopped"),   std::string_view("stopping"), std::string_view("waiting"),
-    std::string_view("safe_mode"), std::string_view("failed"),   std::string_view("exception")};
 constexpr std::array kApplicationStates{std::string_view("none"),     std::string_view("stopped"),
                                         std::string_view("running"),  std::string_view("single_cycle"),
                                         std::string_view("stopping"), std::string_view("exception")};
-constexpr std::array kTaskKinds{std::string_view("cyclic"), std::string_view("event"),
-                                std::string_view("external"), std::string_view("freewheeling")};
-constexpr std::array kTaskStates{std::string_view("created"), std::string_view("running"),
-                                 std::string_view("stopped"), std::string_view("exception")};
-
 constexpr std::array kLogLevels{std::string_view("debug"), std::string_view("info"),
                                 std::string_view("warning"), std::string_view("error")};
 constexpr std::array kLogSources{std::string_view("runtime"), std::string_view("application"),
@@ -31,10 +24,20 @@ std::string code_name(std::span<const std::string_view> names, std::uint32_t num
   return number < names.size() ? std::string(names[number]) : std::to_string(number);
 }
 
+// The word for a code of a member, as control.idl has it.
+template <class Sample>
+std::string word_of(std::string_view member, std::uint32_t code) {
+  std::string word;
+  visit_fields(Sample{}, [&](const FieldInfo& field, const auto& /*value*/) {
+    if (field.name == member) word = word_for(field.words, code);
+  });
+  return word;
+}
+
 }  // namespace
 
 std::string instance_state_name(std::uint32_t state) {
-  return code_name(kInstanceStates, state);
+  return word_of<plc_InstanceStatus>("state", state);
 }
 
 std::string transition_state_name(std::uint32_t source, std::uint32_t state) {
@@ -42,7 +45,7 @@ std::string transition_state_name(std::uint32_t source, std::uint32_t state) {
 }
 
 std::string task_kind_name(std::uint32_t kind) {
-  return code_name(kTaskKinds, kind);
+  return word_of<plc_TaskStatus>("kind", kind);
 }
 
 std::string log_level_name(std::uint32_t level) {
@@ -58,7 +61,7 @@ std::string restart_policy_name(std::uint32_t policy) {
 }
 
 std::string task_state_name(std::uint32_t state) {
-  return code_name(kTaskStates, state);
+  return word_of<plc_TaskStatus>("state", state);
 }
 
 }  // namespace plchost::dds

@@ -4,6 +4,7 @@ import dataclasses
 import re
 
 TAGS = ("topic", "writer", "reader", "qos")
+OPTIONAL_TAGS = ("uncounted", "order", "list")
 
 
 @dataclasses.dataclass
@@ -49,7 +50,7 @@ def split_tags(lines):
     """A comment's text, and what stands behind `topic:` and the like."""
     text, tags, current = [], {}, None
     for line in lines:
-        tag = re.match(r"(%s):\s+(.*)" % "|".join(TAGS), line)
+        tag = re.match(r"(%s):\s+(.*)" % "|".join(TAGS + OPTIONAL_TAGS), line)
         if tag:
             current = tag[1]
             tags[current] = tag[2]

@@ -2,6 +2,8 @@
 """Makes C++ from control.idl; the build runs it: generate.py CONTROL.idl FOLDER
 
   FOLDER/topic_table.hpp          each topic: name, type, partition, QoS
+  FOLDER/status_topics.hpp        the status topics: all types, how HostStatus counts them, in which order they are shown
+  FOLDER/status_fields.hpp        their fields, with unit and words for codes, and how plcctl lists them
   FOLDER/contract_operations.hpp  each OPERATION_: name, number, role, whether it names an instance
 The same contract makes the same files.
 """
@@ -54,6 +56,97 @@ def topic_table(contract):
     return "\n".join(lines + ["};\n", "}  // namespace plchost::dds\n"])
 
 
+STATUS = "plc/v1/status/"
+
+
+def counted(contract):
+    """The status topics that HostStatus counts."""
+    for kind in contract.types:
+        name = names_of(kind)[0] if kind.is_topic else ""
+        if name.startswith(STATUS) and kind.name != "HostStatus" and "uncounted" not in kind.tags:
+            yield kind, name.removeprefix(STATUS)
+
+
+def value_of(member, sample="sample"):
+    """A member as C++ compares it."""
+    if member.type.startswith("string<"):
+        return f"text_of({sample}.{member.name})"
+    return f"std::to_array({sample}.{member.name})" if "[" in member.type else f"{sample}.{member.name}"
+
+
+def order_of(kind):
+    """The members that put the samples of one host in order: its keys, if nothing else is said."""
+    members = {member.name: member for member in kind.members}
+    told = kind.tags.get("order")
+    names = re.split(r",\s*", told) if told else [m.name for m in kind.members if m.key and m.name != "host"]
+    for name in names:
+        if name not in members:
+            raise Fault(f"{kind.name}: 'order:' names {name}, which is no member")
+    return [members[name] for name in names]
+
+
+def status_topics(contract):
+    all_of_them = list(counted(contract))
+    lines = [HEAD + "#include <array>\n#include <string_view>\n#include <tuple>\n", "#include <control.h>\n"]
+    lines += ['#include "api/dds/text.hpp"\n', "namespace plchost::dds {\n"]
+    lines += ["/// Of<...> of the types of all status topics that HostStatus counts.", "template <template <class...> class Of>"]
+    lines.append(f"using OfCountedStatus = Of<{', '.join(f'plc_{kind.name}' for kind, _ in all_of_them)}>;\n")
+    lines += ["/// The name of a topic in HostStatus.", "template <class Sample>", "inline constexpr std::string_view kCountedAs{};"]
+    for kind, name in all_of_them:
+        lines.append(f'template <>\ninline constexpr std::string_view kCountedAs<plc_{kind.name}> = "{name}";')
+    lines.append("\n// By which samples of one host are sorted.")
+    for kind, _ in all_of_them:
+        values = ", ".join(value_of(member) for member in order_of(kind))
+        lines.append(f"inline auto order_of(const plc_{kind.name}& sample) {{ return std::tuple({values}); }}")
+    return "\n".join(lines + ["\n}  // namespace plchost::dds\n"])
+
+
+def words_of(member):
+    """The words for the codes of a member: its comment begins with "0 offline, 1 starting"; brackets are left out."""
+    words = []
+    for part in re.sub(r" \([^)]*\)", "", member.comment).split(", "):
+        found = re.fullmatch(rf"{len(words)} ([a-z ]+)", part)
+        if not found:
+            break
+        words.append(found[1].replace(" ", "_"))
+    return words if len(words) > 1 else []
+
+
+def field(member):
+    """The FieldInfo of a member."""
+    told = [f'.name = "{member.name}"']
+    for suffix, unit in (("_unix_ns", "unix"), ("_ns", "duration")):
+        if member.name.endswith(suffix):
+            told.append(f'.base = "{member.name.removesuffix(suffix)}", .unit = Unit::{unit}')
+            break
+    else:
+        told.append(f'.base = "{member.name}"')
+    if member.key:
+        told.append(".key = true")
+    words = ", ".join(f'"{word}"' for word in words_of(member))
+    lines = [f"  static constexpr std::array<std::string_view, {len(words_of(member))}> k_{member.name}{{{words}}};"] if words else []
+    if words:
+        told.append(f".words = k_{member.name}")
+    return lines + [f"  visit(FieldInfo{{{', '.join(told)}}}, {value_of(member)});"]
+
+
+def status_fields(contract):
+    nested = {kind.name for kind in contract.types if not kind.is_topic}
+    lines = [HEAD + "#include <array>\n#include <string_view>\n", "#include <status_topics.hpp>\n"]
+    lines += ['#include "api/dds/field_info.hpp"\n', "namespace plchost::dds {\n"]
+    for kind, _ in counted(contract):
+        lines += ["template <class Visit>", f"void visit_fields(const plc_{kind.name}& sample, Visit&& visit) {{"]
+        for member in kind.members:
+            plain = member.name != "epoch" and not member.type.startswith("sequence") and member.type.split("[")[0] not in nested
+            lines += field(member) if plain else []
+        lines.append("}\n")
+    for kind, _ in counted(contract):
+        if "list" in kind.tags:
+            noun, _, text = kind.tags["list"].partition(", ")
+            lines.append(f'template <>\ninline constexpr Listing kListing<plc_{kind.name}>{{"{noun}", "{text}"}};')
+    return "\n".join(lines + ["\n}  // namespace plchost::dds\n"])
+
+
 def contract_operations(contract):
     lines = [HEAD + "#include <array>\n#include <cstdint>\n#include <string_view>\n", "namespace plchost {\n"]
     lines += ["/// An operation as the contract has it; shm/base/operations.hpp is what the programs go by.", "struct ContractOperation {"]
@@ -78,7 +171,12 @@ def main():
     folder = pathlib.Path(sys.argv[2])
     try:
         contract = parse(pathlib.Path(sys.argv[1]))
-        made = {"topic_table.hpp": topic_table(contract), "contract_operations.hpp": contract_operations(contract)}
+        made = {
+            "topic_table.hpp": topic_table(contract),
+            "status_topics.hpp": status_topics(contract),
+            "status_fields.hpp": status_fields(contract),
+            "contract_operations.hpp": contract_operations(contract),
+        }
     except Fault as fault:
         sys.exit(str(fault))
     for name, text in made.items():

@@ -6,6 +6,7 @@
 #include "api/client/check_names.hpp"
 #include "api/client/log_reader.hpp"
 #include "api/library/convert.hpp"
+#include "api/library/records.hpp"
 #include "api/library/watcher.hpp"
 #include "api/library/worker.hpp"
 #include "shm/base/names.hpp"
@@ -188,6 +189,19 @@ std::vector<Client::Event> Client::events(const std::string& host) {
   return value_or_throw(worker_->run<std::vector<Event>>([&](ControlClient& client) {
     return list<Event>(client, host, worker_->deadline(), &ControlClient::events);
   }));
+}
+
+std::vector<std::string> Client::topics() {
+  return status_names();
+}
+
+std::vector<Client::Record> Client::status(const std::string& topic, const std::string& host) {
+  return value_or_throw(
+      worker_->run<std::vector<Record>>([&](ControlClient& client) -> Result<std::vector<Record>> {
+        const auto found = host_of(client, host, worker_->deadline());
+        if (!found) return std::unexpected(found.error());
+        return read_status(client, topic, *found, worker_->deadline());
+      }));
 }
 
 std::vector<Client::LogLine> Client::logs(const std::string& host, const std::string& instance,

@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "api/client/status_count.hpp"
 #include "api/dds/code_names.hpp"
 #include "api/dds/text.hpp"
 
@@ -71,7 +72,7 @@ Client::Host to_public(const HostView& host, bool answers) {
           .answers = answers,
           .version = text(dds::text_of(host.status.version)),
           .labels = host.labels(),
-          .instances = host.status.instance_count,
+          .instances = count_of<plc_InstanceStatus>(host.status).value_or(0),
           .manager_pid = host.status.manager_pid,
           .started = wall_time(host.status.started_unix_ns)};
 }

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "api/cli/rows/rows.hpp"
+#include "api/client/status_count.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"
 
@@ -54,10 +55,10 @@ Row to_row(const HostView& host, const std::optional<ClockOffset>& clock) {
           {"uptime_s", uptime_s(host, clock)},
           {"started_unix_s", host.status.started_unix_ns / kSecond},
           {"running", number_of<std::uint32_t>(host, dds::kRunningEntry)},
-          {"instances", host.status.instance_count},
-          {"tasks", host.status.task_count},
-          {"events", host.status.event_count},
-          {"objects", host.status.object_count},
+          {"instances", count_of<plc_InstanceStatus>(host.status).value_or(0)},
+          {"tasks", count_of<plc_TaskStatus>(host.status).value_or(0)},
+          {"events", count_of<plc_EventStatus>(host.status).value_or(0)},
+          {"objects", count_of<plc_ObjectStatus>(host.status).value_or(0)},
           {"load", number_of<double>(host, dds::kLoadEntry)},
           {"cores", number_of<std::uint32_t>(host, dds::kCoresEntry)},
           {"memory_mib", number_of<std::uint64_t>(host, dds::kMemoryEntry)},

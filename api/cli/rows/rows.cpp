@@ -80,34 +80,6 @@ Row to_row(const plc_InstanceStatus& status) {
   return row;
 }
 
-Row to_row(const plc_TaskStatus& status) {
-  return {{"host", text_of(status.host)},
-          {"instance", text_of(status.instance)},
-          {"task", text_of(status.task)},
-          {"kind", dds::task_kind_name(status.kind)},
-          {"priority", status.priority},
-          {"interval_us", to_us(status.interval_ns)},
-          {"state", dds::task_state_name(status.state)},
-          {"cycles", status.cycles},
-          {"lost_cycles", status.lost_cycles},
-          {"lost_events", status.lost_events},
-          {"exec_last_us", to_us(status.exec_last_ns)},
-          {"exec_avg_us", to_us(status.exec_avg_ns)},
-          {"exec_min_us", to_us(status.exec_min_ns)},
-          {"exec_max_us", to_us(status.exec_max_ns)},
-          {"latency_p50_us", to_us(status.latency_p50_ns)},
-          {"latency_p99_us", to_us(status.latency_p99_ns)},
-          {"latency_max_us", to_us(status.latency_max_ns)},
-          {"jitter_max_us", to_us(status.jitter_max_ns)},
-          {"external_event", text_of(status.external_event)}};
-}
-
-Row to_row(const plc_EventStatus& status) {
-  return {{"host", text_of(status.host)},      {"instance", text_of(status.instance)},
-          {"event", text_of(status.event)},    {"registered", status.registered},
-          {"bound_tasks", status.bound_tasks}, {"posts", status.posts}};
-}
-
 Row to_row(const plc_Transition& transition) {
   const bool process = transition.source != 0;
   return {{"host", text_of(transition.host)},

@@ -10,10 +10,9 @@
 
 namespace plchost {
 
-/// From samples of status topics to rows of output. The field names are a promise to programs.
+/// From samples of status topics to rows of output, where status_rows.hpp does not make them from
+/// control.idl. The field names are a promise to programs.
 [[nodiscard]] Row to_row(const plc_InstanceStatus& status);
-[[nodiscard]] Row to_row(const plc_TaskStatus& status);
-[[nodiscard]] Row to_row(const plc_EventStatus& status);
 [[nodiscard]] Row to_row(const plc_WriterStatus& status);
 [[nodiscard]] Row to_row(const plc_ExceptionStatus& status);
 [[nodiscard]] Row to_row(const plc_Transition& transition);

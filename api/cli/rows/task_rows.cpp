@@ -1,6 +1,7 @@
 #include "api/cli/rows/task_rows.hpp"
 
 #include "api/cli/rows/rows.hpp"
+#include "api/cli/rows/status_rows.hpp"
 #include "api/dds/text.hpp"
 
 namespace plchost {

@@ -1,10 +1,12 @@
 #include <algorithm>
 #include <functional>
 #include <memory>
+#include <type_traits>
 #include <utility>
 
 #include "api/cli/cli_session.hpp"
 #include "api/cli/rows/rows.hpp"
+#include "api/cli/rows/status_rows.hpp"
 #include "api/cli/rows/task_rows.hpp"
 #include "api/cli/verbs/application_verbs.hpp"
 #include "api/cli/verbs/host_commands.hpp"
@@ -12,6 +14,7 @@
 #include "api/cli/verbs/node_verbs.hpp"
 #include "api/cli/verbs/object_verbs.hpp"
 #include "api/cli/verbs/transition_verbs.hpp"
+#include "api/client/control_client_status.hpp"
 #include "api/dds/text.hpp"
 
 namespace plchost {
@@ -26,7 +29,7 @@ int list_tasks(CliSession& session, const std::string& instance) {
 
 template <class Sample>
 int list(
-    CliSession& session, Snapshot<Sample> snapshot, const std::vector<Column>& columns,
+    CliSession& session,
     const std::function<bool(const Sample&)>& is_shown = [](const Sample&) { return true; }) {
   const auto hosts = session.shown_hosts();
   if (!hosts) return CliSession::fail(hosts.error());
@@ -34,17 +37,29 @@ int list(
   if (!client) return CliSession::fail(client.error());
   std::vector<Row> rows;
   for (const HostView& host : *hosts) {
-    const auto samples = ((*client)->*snapshot)(host.name, session.deadline());
+    const auto samples = (*client)->template status<Sample>(host.name, session.deadline());
     if (!samples) return CliSession::fail(samples.error());
     for (const Sample& sample : *samples) {
       if (is_shown(sample)) rows.push_back(to_row(sample));
     }
   }
-  return session.show(rows, columns);
+  return session.show(rows, columns_of<Sample>());
 }
 
+/// A noun for each status topic that control.idl says `list:` of.
+template <class... Samples>
+struct ListedTopics {
+  static void add(const Command& verb, CliSession& session) {
+    const auto add_one = [&]<class Sample>(std::type_identity<Sample> /*type*/) {
+      constexpr dds::Listing kHow = dds::kListing<Sample>;
+      if (*kHow.noun != '\0') verb.noun(kHow.noun, kHow.text, [&session] { return list<Sample>(session); });
+    };
+    (add_one(std::type_identity<Samples>()), ...);
+  }
+};
+
 int list_instances(CliSession& session, const std::vector<std::string>& names) {
-  if (names.empty()) return list(session, &ControlClient::instances, instance_columns());
+  if (names.empty()) return list<plc_InstanceStatus>(session);
   const auto wanted = expand(session, names);
   if (!wanted) return CliSession::fail(wanted.error());
   for (const NamedInstance& one : *wanted) {
@@ -54,7 +69,7 @@ int list_instances(CliSession& session, const std::vector<std::string>& names) {
   const std::function is_wanted = [&](const plc_InstanceStatus& sample) {
     return std::ranges::find(*wanted, dds::text_of(sample.instance), &NamedInstance::name) != wanted->end();
   };
-  return list(session, &ControlClient::instances, instance_columns(), is_wanted);
+  return list(session, is_wanted);
 }
 
 // Instances that never had one have nothing to show.
@@ -76,15 +91,11 @@ void add_list_verbs(const Command& plcctl, CliSession& session) {
   verb.noun("tasks", "The tasks of all applications, with their figures",
             [&session, instance] { return list_tasks(session, *instance); })
       .optional("INSTANCE", *instance, "only of this instance");
-  verb.noun("events", "The external events",
-            [&session] { return list(session, &ControlClient::events, event_columns()); });
-  verb.noun("writers", "The clients that post events, and the fate of their posts",
-            [&session] { return list(session, &ControlClient::writers, writer_columns()); });
+  dds::OfCountedStatus<ListedTopics>::add(verb, session);
   add_list_objects(verb, session);
   add_list_nodes(verb, session);
   verb.noun("exceptions", "The last exception of each instance that had any", [&session] {
-    return list(session, &ControlClient::exceptions, exception_columns(),
-                std::function<bool(const plc_ExceptionStatus&)>(has_happened));
+    return list(session, std::function<bool(const plc_ExceptionStatus&)>(has_happened));
   });
   add_list_applications(verb, session);
   add_list_transitions(verb, session);

@@ -5,6 +5,7 @@
 #include "api/cli/cli_session.hpp"
 #include "api/cli/rows/rows.hpp"
 #include "api/cli/rows/statistics_rows.hpp"
+#include "api/cli/rows/status_rows.hpp"
 #include "api/cli/terminal.hpp"
 #include "api/cli/verbs/node_verbs.hpp"
 #include "api/cli/verbs/object_verbs.hpp"

@@ -9,6 +9,8 @@
 
 #include "api/cli/rows/object_rows.hpp"
 #include "api/cli/rows/rows.hpp"
+#include "api/cli/rows/status_rows.hpp"
+#include "api/client/status_count.hpp"
 #include "api/control/scheduler_names.hpp"
 
 namespace plchost {
@@ -23,7 +25,8 @@ using Names = std::vector<Candidate>;
 using Source = std::function<void(ControlClient&, const HostView&, TimePoint, Names&)>;
 
 void add_host(ControlClient& /*client*/, const HostView& host, TimePoint /*deadline*/, Names& names) {
-  names.push_back({host.name, fmt::format("{} instances", host.status.instance_count)});
+  names.push_back(
+      {host.name, fmt::format("{} instances", count_of<plc_InstanceStatus>(host.status).value_or(0))});
 }
 
 /// `name` and `text` make a candidate of a sample's row.

@@ -285,6 +285,25 @@ void define_calls(ClientClass& client) {
 
 /// Commands that have no function of their own above, as "reset_statistics": all of the table.
 void define_commands(ClientClass& client) {
+  client.def_static("topics", &Client::topics)
+      .def(
+          "status",
+          [](Client& self, const std::string& topic, const std::string& host) {
+            std::vector<Client::Record> records;
+            {
+              const py::gil_scoped_release release;
+              records = self.status(topic, host);
+            }
+            py::list all;
+            for (const Client::Record& record : records) {
+              py::dict members;
+              for (const auto& [name, value] : record) members[name.c_str()] = py::cast(value);
+              all.append(std::move(members));
+            }
+            return all;
+          },
+          py::arg("topic"), py::arg("host") = "",
+          "All samples of a status topic: a dict each, with the names of the contract.");
   client.def_static("operations", [] {
     std::vector<std::string> names;
     for (const auto& operation : Client::operations()) names.push_back(operation.name);

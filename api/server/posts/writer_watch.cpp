@@ -24,7 +24,7 @@ bool WriterWatch::look(const EventIntake& intake, const SessionTable& sessions, 
   if (now < next_look_) return false;
   next_look_ = now + kPeriod;
   bool changed = false;
-  table_.begin_round();
+  table_->begin_round();
   const auto writers = intake.writers();
   const auto is_present = [&](const EventIntake::Writer& writer) {
     return sessions.is_alive(writer.source.participant());
@@ -53,10 +53,10 @@ bool WriterWatch::look(const EventIntake& intake, const SessionTable& sessions, 
     const bool ever = writer.used != TimePoint{};
     sample.last_unix_ns = ever ? (writer.used.time_since_epoch() + to_unix_).count() : 0;
     sample.present = present;
-    changed |= table_.update(writer.source.hex(), sample);
+    changed |= table_->update(writer.source.hex(), sample);
   }
-  changed |= table_.dispose_rest();
-  table_.write();
+  changed |= table_->dispose_rest();
+  table_->write();
   return changed;
 }
 

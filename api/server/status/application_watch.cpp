@@ -79,14 +79,14 @@ void ApplicationWatch::read(const std::string& instance, Known& known) const {
 
 bool ApplicationWatch::show() {
   bool changed = false;
-  table_.begin_round();
+  table_->begin_round();
   for (const auto& [instance, known] : known_) {
     for (const plc_ApplicationStatus& sample : known.samples) {
-      changed |= table_.update(fmt::format("{}/{}", instance, sample.version), sample);
+      changed |= table_->update(fmt::format("{}/{}", instance, sample.version), sample);
     }
   }
-  changed |= table_.dispose_rest();
-  table_.write();
+  changed |= table_->dispose_rest();
+  table_->write();
   return changed;
 }
 

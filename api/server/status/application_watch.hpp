@@ -24,14 +24,13 @@ class ApplicationWatch {
   ApplicationWatch() = default;
   /// `folder`: of all instances; empty: there is none.
   ApplicationWatch(std::string folder, std::string host, std::uint64_t epoch,
-                   StatusTable<plc_ApplicationStatus> table)
-      : folder_(std::move(folder)), host_(std::move(host)), epoch_(epoch), table_(std::move(table)) {}
+                   StatusTable<plc_ApplicationStatus>& table)
+      : folder_(std::move(folder)), host_(std::move(host)), epoch_(epoch), table_(&table) {}
 
   /// Looks at those of all instances, if it is time for that. True: there is news.
   bool look(const std::vector<std::string>& instances, TimePoint now);
   /// Looks at one, whatever the time.
   bool look_at(const std::string& instance);
-  [[nodiscard]] std::uint32_t size() const noexcept { return table_.size(); }
 
  private:
   struct Known {
@@ -45,7 +44,7 @@ class ApplicationWatch {
   std::string folder_;
   std::string host_;
   std::uint64_t epoch_ = 0;
-  StatusTable<plc_ApplicationStatus> table_;
+  StatusTable<plc_ApplicationStatus>* table_ = nullptr;
   std::map<std::string, Known> known_;
   TimePoint next_;
 };

@@ -22,14 +22,14 @@ bool ExceptionWatch::follow(const InstanceStatus& instance, const TaskWatch& tas
     watched.sample.present = watched.sample.count > 0 && watched.pid != 0 &&
                              tasks.in_exception(name, dds::text_of(watched.sample.task));
   }
-  return table_.update(name, watched.sample);
+  return table_->update(name, watched.sample);
 }
 
 bool ExceptionWatch::end_round() {
   std::erase_if(instances_, [](const auto& entry) { return !entry.second.followed; });
   for (auto& [name, watched] : instances_) watched.followed = false;
-  const bool changed = table_.dispose_rest();
-  table_.write();
+  const bool changed = table_->dispose_rest();
+  table_->write();
   return changed;
 }
 

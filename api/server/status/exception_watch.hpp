@@ -24,16 +24,13 @@ class ExceptionWatch {
   static constexpr Duration kPeriod = std::chrono::milliseconds(100);
 
   ExceptionWatch(std::string run_directory, std::string host, std::uint64_t epoch,
-                 StatusTable<plc_ExceptionStatus> table)
-      : run_directory_(std::move(run_directory)),
-        host_(std::move(host)),
-        epoch_(epoch),
-        table_(std::move(table)) {}
+                 StatusTable<plc_ExceptionStatus>& table)
+      : run_directory_(std::move(run_directory)), host_(std::move(host)), epoch_(epoch), table_(&table) {}
 
   /// A round: follow() for each instance that the manager has; end_round() disposes what is left of others
   /// and writes what is news. All return true if something changed. `tasks` follows the same instance
   /// already.
-  void begin_round() { table_.begin_round(); }
+  void begin_round() { table_->begin_round(); }
   bool follow(const InstanceStatus& instance, const TaskWatch& tasks, TimePoint now);
   bool end_round();
 
@@ -60,7 +57,7 @@ class ExceptionWatch {
   std::string run_directory_;
   std::string host_;
   std::uint64_t epoch_;
-  StatusTable<plc_ExceptionStatus> table_;
+  StatusTable<plc_ExceptionStatus>* table_;
   std::map<std::string, Watched> instances_;
 };
 

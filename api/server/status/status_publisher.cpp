@@ -33,6 +33,12 @@ Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const 
   auto publisher_of_status = dds::make_publisher(participant, dds::status_partition(source.host));
   if (!publisher_of_status) return failure_in("publish status", publisher_of_status.error());
   const dds_entity_t parent = publisher_of_status->get();
+  auto tables = StatusTables::create(participant, parent);
+  if (!tables) return failure_in("publish status", tables.error());
+  auto hosts = open_table<plc_HostStatus>(participant, parent);
+  if (!hosts) return failure_in("publish status", hosts.error());
+  auto findings = open_table<plc_HostFinding>(participant, parent);
+  if (!findings) return failure_in("publish status", findings.error());
   std::vector<dds::Entity> topics;
   const auto make = [&](const dds::TopicInfo& info) -> Result<dds::Entity> {
     auto topic = dds::make_topic(participant, info);
@@ -40,40 +46,26 @@ Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const 
     topics.push_back(std::move(*topic));
     return dds::make_writer(parent, topics.back().get(), dds::qos_of(info));
   };
-  auto tasks = make(dds::kTaskStatus);
   auto statistics = make(dds::kTaskStatistics);
-  auto instances = make(dds::kInstanceStatus);
-  auto events = make(dds::kEventStatus);
-  auto objects = make(dds::kObjectStatus);
-  auto findings = make(dds::kHostFinding);
-  auto exceptions = make(dds::kExceptionStatus);
-  auto hosts = make(dds::kHostStatus);
-  auto writers = make(dds::kWriterStatus);
-  auto applications = make(dds::kApplicationStatus);
   auto presence = make(dds::kPresence);
-  for (auto* made : {&tasks, &statistics, &instances, &events, &objects, &findings, &exceptions, &hosts,
-                     &writers, &applications, &presence}) {
+  for (auto* made : {&statistics, &presence}) {
     if (!*made) return failure_in("publish status", made->error());
   }
   auto transitions =
       TransitionPublisher::create(participant, parent, {source.host, source.pool->name(), source.epoch});
   if (!transitions) return std::unexpected(transitions.error());
-  StatusPublisher publisher(source,
-                            TaskWatch(source.pool->name(), source.host, source.epoch,
-                                      StatusTable<plc_TaskStatus>(std::move(*tasks)),
-                                      StatisticsWriter(source.host, source.epoch, std::move(*statistics))),
-                            ExceptionWatch(source.run_directory, source.host, source.epoch,
-                                           StatusTable<plc_ExceptionStatus>(std::move(*exceptions))),
-                            *std::move(transitions));
-  publisher.instances_ = StatusTable<plc_InstanceStatus>(std::move(*instances));
-  publisher.events_ = StatusTable<plc_EventStatus>(std::move(*events));
-  publisher.objects_ = StatusTable<plc_ObjectStatus>(std::move(*objects));
-  publisher.findings_ = StatusTable<plc_HostFinding>(std::move(*findings));
-  publisher.hosts_ = StatusTable<plc_HostStatus>(std::move(*hosts));
-  publisher.writers_ =
-      WriterWatch(source.host, source.epoch, StatusTable<plc_WriterStatus>(std::move(*writers)));
+  StatusTables& of_topics = **tables;
+  StatusPublisher publisher(
+      source, *std::move(tables),
+      TaskWatch(source.pool->name(), source.host, source.epoch, of_topics.of<plc_TaskStatus>(),
+                StatisticsWriter(source.host, source.epoch, std::move(*statistics))),
+      ExceptionWatch(source.run_directory, source.host, source.epoch, of_topics.of<plc_ExceptionStatus>()),
+      *std::move(transitions));
+  publisher.findings_ = *std::move(findings);
+  publisher.hosts_ = *std::move(hosts);
+  publisher.writers_ = WriterWatch(source.host, source.epoch, of_topics.of<plc_WriterStatus>());
   publisher.applications_ = ApplicationWatch(source.applications_folder, source.host, source.epoch,
-                                             StatusTable<plc_ApplicationStatus>(std::move(*applications)));
+                                             of_topics.of<plc_ApplicationStatus>());
   publisher.presence_ = std::move(*presence);
   publisher.topics_ = std::move(topics);
   publisher.publisher_ = *std::move(publisher_of_status);
@@ -120,7 +112,8 @@ bool StatusPublisher::look_at_instances(TimePoint now) {
   if (!host) return false;
   bool changed = false;
   running_ = 0;
-  instances_.begin_round();
+  auto& table = tables_->of<plc_InstanceStatus>();
+  table.begin_round();
   exceptions_.begin_round();
   std::vector<std::string> names;
   std::string unsaved;
@@ -156,9 +149,9 @@ bool StatusPublisher::look_at_instances(TimePoint now) {
     auto extension = runtime ? extension_of(*runtime) : std::vector<plc_KeyValue>();
     extension.push_back(transitions_entry(transitions_.publish(name, now)));
     if (status->removed != 0) dds::add_entry(extension, "removed", "yes");
-    changed |= instances_.update(name, sample, extension);
+    changed |= table.update(name, sample, extension);
   }
-  changed |= instances_.dispose_rest();
+  changed |= table.dispose_rest();
   changed |= exceptions_.end_round();
   for (const std::string& gone : instance_names_) {
     if (std::ranges::find(names, gone) != names.end()) continue;
@@ -166,7 +159,7 @@ bool StatusPublisher::look_at_instances(TimePoint now) {
     transitions_.forget(gone);
   }
   instance_names_ = std::move(names);
-  instances_.write();
+  table.write();
   changed |= std::exchange(unsaved_, unsaved) != unsaved;
   return changed;
 }
@@ -188,8 +181,10 @@ bool StatusPublisher::look_at_objects(TimePoint now) {
   bool changed = false;
   const auto published = published_objects();
   if (!published) return changed;  // the last published state holds until they can be looked at
-  events_.begin_round();
-  objects_.begin_round();
+  auto& events = tables_->of<plc_EventStatus>();
+  auto& objects = tables_->of<plc_ObjectStatus>();
+  events.begin_round();
+  objects.begin_round();
   for (const ObjectInfo& object : *published) {
     plc_ObjectStatus sample{};
     dds::copy_text(sample.host, source_.host);
@@ -197,13 +192,13 @@ bool StatusPublisher::look_at_objects(TimePoint now) {
     sample.epoch = source_.epoch;
     sample.type = static_cast<std::uint32_t>(object.type);
     sample.value = object.value;
-    changed |= objects_.update(object.name, sample);
+    changed |= objects.update(object.name, sample);
     if (object.type == ObjectType::event) changed |= update_event(object);
   }
-  changed |= events_.dispose_rest();
-  changed |= objects_.dispose_rest();
-  events_.write();
-  objects_.write();
+  changed |= events.dispose_rest();
+  changed |= objects.dispose_rest();
+  events.write();
+  objects.write();
   // Of a large pool it takes its time: most of the time is for others.
   constexpr int kRest = 10;
   rested_ = now + kRest * (MonotonicClock::now() - now);
@@ -223,7 +218,7 @@ bool StatusPublisher::update_event(const ObjectInfo& object) {
   sample.registered = object.registered;
   sample.bound_tasks = object.bound_tasks;
   sample.posts = object.value;
-  return events_.update(object.name, sample);
+  return tables_->of<plc_EventStatus>().update(object.name, sample);
 }
 
 void StatusPublisher::publish_findings(const std::vector<HostFinding>& findings) {
@@ -256,12 +251,7 @@ void StatusPublisher::write_host(bool changed) {
   dds::copy_text(sample.host, source_.host);
   sample.epoch = source_.epoch;
   sample.round = round_;
-  sample.instance_count = instances_.size();
-  sample.task_count = tasks_.size();
-  sample.event_count = events_.size();
-  sample.object_count = objects_.size();
-  sample.writer_count = writers_.size();
-  sample.application_count = applications_.size();
+  tables_->count(sample);
   if (host) {
     dds::copy_text(sample.version, host->version.view());
     sample.manager_pid = host->manager_pid;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -15,6 +16,7 @@
 #include "api/server/status/exception_watch.hpp"
 #include "api/server/status/host_load.hpp"
 #include "api/server/status/status_table.hpp"
+#include "api/server/status/status_tables.hpp"
 #include "api/server/status/task_watch.hpp"
 #include "api/server/status/transition_publisher.hpp"
 #include "shm/pages/host_page.hpp"
@@ -68,8 +70,10 @@ class StatusPublisher {
   static constexpr std::size_t kMostPublished = 4096;
 
  private:
-  StatusPublisher(Source source, TaskWatch tasks, ExceptionWatch exceptions, TransitionPublisher transitions)
+  StatusPublisher(Source source, std::unique_ptr<StatusTables> tables, TaskWatch tasks,
+                  ExceptionWatch exceptions, TransitionPublisher transitions)
       : source_(std::move(source)),
+        tables_(std::move(tables)),
         tasks_(std::move(tasks)),
         exceptions_(std::move(exceptions)),
         transitions_(std::move(transitions)) {}
@@ -86,14 +90,12 @@ class StatusPublisher {
   HostLoad load_;
   std::uint32_t running_ = 0;  ///< instances
   std::string unsaved_;        ///< instances whose newest retain values are in no file, with commas between
+  std::unique_ptr<StatusTables> tables_;  ///< the watches below write into them
   TaskWatch tasks_;
   ExceptionWatch exceptions_;
   TransitionPublisher transitions_;
   std::optional<HostPageReader> page_;
   std::vector<std::string> instance_names_;
-  StatusTable<plc_InstanceStatus> instances_;
-  StatusTable<plc_EventStatus> events_;
-  StatusTable<plc_ObjectStatus> objects_;
   StatusTable<plc_HostFinding> findings_;
   StatusTable<plc_HostStatus> hosts_;
   ApplicationWatch applications_;

@@ -24,7 +24,9 @@ template <class Sample>
 class StatusTable {
  public:
   StatusTable() = default;
-  explicit StatusTable(dds::Entity writer) noexcept : writer_(std::move(writer)) {}
+  /// `writer` was made from `topic`.
+  StatusTable(dds::Entity topic, dds::Entity writer) noexcept
+      : topic_(std::move(topic)), writer_(std::move(writer)) {}
 
   /// Returns true if that is news.
   bool update(const std::string& key, const Sample& sample, std::span<const plc_KeyValue> ext = {}) {
@@ -98,6 +100,7 @@ class StatusTable {
     return entries_.erase(it);
   }
 
+  dds::Entity topic_;
   dds::Entity writer_;
   Entries entries_;
 };

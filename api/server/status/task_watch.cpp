@@ -82,7 +82,7 @@ bool TaskWatch::forget(const std::string& instance) {
 bool TaskWatch::dispose_tasks(const std::string& instance, const Watched& watched) {
   bound_is_stale_ = true;
   for (const auto& told : watched.told) statistics_.dispose(instance, told);
-  return table_.dispose_under(instance + "/");
+  return table_->dispose_under(instance + "/");
 }
 
 std::optional<InstanceRuntime> TaskWatch::runtime(const std::string& instance) const {
@@ -139,7 +139,7 @@ void TaskWatch::publish(const std::string& instance, Watched& watched, std::uint
   const bool at_once = told.task.empty() || told.since_ns != task->counters.since_ns;
   if (at_once) (void)statistics_.write(instance, *watched.page, index, told);
   const std::string key = instance + "/" + std::string(task->identity.name.view());
-  (void)table_.update(key, to_sample(host_, instance, epoch_, *task, told));
+  (void)table_->update(key, to_sample(host_, instance, epoch_, *task, told));
 }
 
 void TaskWatch::look(TimePoint now) {
@@ -156,7 +156,7 @@ void TaskWatch::look(TimePoint now) {
     watched.next_task = 0;
     watched.next_look = now + kPeriod;
   }
-  table_.write(kTasksPerLook);
+  table_->write(kTasksPerLook);
   look_at_statistics(now);
 }
 
@@ -187,7 +187,7 @@ void TaskWatch::look_at(const std::string& instance, TimePoint now) {
   }
   watched.next_task = 0;
   watched.next_look = now + kPeriod;
-  table_.write();
+  table_->write();
 }
 
 }  // namespace plchost

@@ -33,12 +33,12 @@ class TaskWatch {
   /// 1,600 tasks a second. With more tasks each is told less often.
   static constexpr std::uint32_t kStatisticsPerLook = 16;
 
-  TaskWatch(std::string pool, std::string host, std::uint64_t epoch, StatusTable<plc_TaskStatus> table,
+  TaskWatch(std::string pool, std::string host, std::uint64_t epoch, StatusTable<plc_TaskStatus>& table,
             StatisticsWriter statistics)
       : pool_(std::move(pool)),
         host_(std::move(host)),
         epoch_(epoch),
-        table_(std::move(table)),
+        table_(&table),
         statistics_(std::move(statistics)) {}
 
   /// Takes the manager's report of an instance: opens its page when there is a new process, and forgets the
@@ -64,7 +64,6 @@ class TaskWatch {
   /// Null: its process is gone.
   [[nodiscard]] const InstancePageReader* page_of(const BoundTask& task) const;
 
-  [[nodiscard]] std::uint32_t size() const noexcept { return table_.size(); }
   /// The report of the process itself, if its page is open.
   [[nodiscard]] std::optional<InstanceRuntime> runtime(const std::string& instance) const;
   /// The process that runs now has this task in exception.
@@ -89,7 +88,7 @@ class TaskWatch {
   const std::string pool_;
   const std::string host_;
   const std::uint64_t epoch_;
-  StatusTable<plc_TaskStatus> table_;
+  StatusTable<plc_TaskStatus>* table_;
   StatisticsWriter statistics_;
   std::map<std::string, Watched> instances_;
   mutable std::map<std::string, std::vector<BoundTask>, std::less<>> bound_;  // by the event, in full

@@ -50,6 +50,42 @@ class ClientLibrary : public testing::Test {
   PoolEvent event_;
 };
 
+TEST_F(ClientLibrary, ReadsAnyStatusTopicByTheNamesOfTheContract) {
+  Client sut(options());
+  EXPECT_THAT(Client::topics(), testing::IsSupersetOf({"instance", "task", "event", "writer", "exception"}));
+  const auto instances = sut.status("instance", "hosta");
+  ASSERT_EQ(instances.size(), 1U);
+  EXPECT_THAT(instances.front(),
+              testing::IsSupersetOf({std::pair<std::string, Client::Value>("instance", std::string("line1")),
+                                     std::pair<std::string, Client::Value>("state", std::string("running")),
+                                     std::pair<std::string, Client::Value>("pid", 4711LL),
+                                     std::pair<std::string, Client::Value>("autostart", true)}));
+  EXPECT_THAT(sut.status("event").front(),
+              testing::Contains(std::pair<std::string, Client::Value>("bound_tasks", 1ULL)));
+  const ClientError unknown = error_of([&] { (void)sut.status("weather"); });
+  EXPECT_EQ(unknown.code(), ClientError::invalid_argument);
+  EXPECT_THAT(unknown.what(), HasSubstr("no status topic 'weather'; there are: "));
+}
+
+TEST_F(ClientLibrary, KnowsEachCommandOfTheTable) {
+  Client sut(options());
+  std::vector<std::string> names;
+  for (const auto& operation : Client::operations()) names.push_back(operation.name);
+  EXPECT_THAT(names,
+              testing::IsSupersetOf({"start", "reset cold", "reset statistics", "rollback application"}));
+  EXPECT_THAT(names, testing::Not(testing::Contains("shutdown")));
+  host_.answer_with({0, ErrorCode::ok, "done by the manager"});
+  EXPECT_EQ(sut.command("reset statistics", "hosta", "line1", "Main"), "done by the manager");
+  EXPECT_EQ(host_.requests().back().verb, ControlVerb::reset_statistics);
+  EXPECT_EQ(host_.requests().back().argument, "Main");
+  std::promise<Client::Outcome> told;
+  sut.command("stop", "hosta", "line1", "", [&](const Client::Outcome& outcome) { told.set_value(outcome); });
+  EXPECT_EQ(told.get_future().get().text, "done by the manager");
+  const ClientError unknown = error_of([&] { (void)sut.command("make coffee", "hosta", "line1"); });
+  EXPECT_EQ(unknown.code(), ClientError::invalid_argument);
+  EXPECT_THAT(unknown.what(), HasSubstr("no command 'make coffee'; there are: start,"));
+}
+
 TEST_F(ClientLibrary, CountsThePostsOfManyThreadsExactlyOnce) {
   constexpr unsigned kThreads = 4;
   constexpr unsigned kPosts = 50;

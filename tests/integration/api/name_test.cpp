@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 
 #include "api/client/control_client.hpp"
+#include "api/client/status_count.hpp"
 #include "api/control/exit_codes.hpp"
 #include "tests/integration/api/test_host.hpp"
 
@@ -23,7 +24,7 @@ class HostName : public testing::Test {
   /// Which of the two the clients see: the number of its instances.
   [[nodiscard]] std::uint32_t instances_seen() {
     const auto host = sut_->host("hosta", MonotonicClock::now());
-    return host ? host->status.instance_count : 0;
+    return host ? count_of<plc_InstanceStatus>(host->status).value_or(0) : 0;
   }
 
   static constexpr Duration kLook = std::chrono::milliseconds(10);

@@ -248,11 +248,18 @@ class Hosts {
   std::map<std::string, plc::HostStatus> statuses_;
 };
 
+std::uint32_t instances_of(const plc::HostStatus& host) {
+  for (const plc::TopicCount& count : host.counts()) {
+    if (count.topic().to_string() == "instance") return count.samples();
+  }
+  return 0;
+}
+
 void list_hosts(Client& client, const Options& options) {
   Hosts hosts(client, options.host);
   const plc::HostStatus& status = hosts.host();
   std::cout << status.host().to_string() << ' ' << hosts.pid(status.host().to_string()) << ' '
-            << status.version().to_string() << ' ' << status.instance_count() << '\n';
+            << status.version().to_string() << ' ' << instances_of(status) << '\n';
 }
 
 /// All instances of a host: complete when there are as many as it says.
@@ -267,7 +274,7 @@ void list_instances(Client& client, const Options& options) {
           if (status.host().to_string() == host.host().to_string() && status.epoch() == host.epoch())
             found[status.instance().to_string()] = status;
         });
-        return found.size() == host.instance_count();
+        return found.size() == instances_of(host);
       },
       "the status of all instances");
   for (const auto& [name, status] : found)

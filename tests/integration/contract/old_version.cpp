@@ -48,6 +48,13 @@ void set(char (&text)[Size], std::string_view value) {
   text[value.copy(text, Size - 1)] = '\0';
 }
 
+std::uint32_t count_of(const plc_HostStatus& host, std::string_view topic) {
+  for (const plc_TopicCount& count : host.counts) {
+    if (topic == count.topic) return count.samples;
+  }
+  return 0;
+}
+
 std::string hex(const dds_guid_t& guid) {
   std::string text;
   for (const unsigned byte : guid.v) {
@@ -196,7 +203,7 @@ int run_client(std::uint32_t domain, const std::string& instance, const std::str
           ++seen;
           std::cout << "instance " << status.instance << '\n';
         });
-        return seen >= host.instance_count;
+        return seen >= count_of(host, "instance");
       },
       "the instances");
 
@@ -260,7 +267,8 @@ class OldHost {
     set(status_.host, "old");
     status_.epoch = 1;
     status_.round = 1;
-    status_.instance_count = 1;
+    set(status_.counts[0].topic, "instance");
+    status_.counts[0].samples = 1;
     set(status_.version, "0.0.1");
     set(press_.host, "old");
     set(press_.instance, "press");

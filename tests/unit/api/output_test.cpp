@@ -9,6 +9,7 @@
 #include "api/cli/rows/node_rows.hpp"
 #include "api/cli/rows/object_rows.hpp"
 #include "api/cli/rows/rows.hpp"
+#include "api/cli/rows/status_rows.hpp"
 #include "api/cli/rows/table.hpp"
 #include "api/dds/domain.hpp"
 #include "api/dds/text.hpp"

@@ -65,8 +65,8 @@ class RunWatchTest : public testing::Test {
   std::string pool_ = own_name("runs");
   TimePoint now_ = MonotonicClock::now();
   InstancePage page_ = make_page(pool_);
-  TaskWatch tasks_{pool_, "hosta", 7, StatusTable<plc_TaskStatus>(),
-                   StatisticsWriter("hosta", 7, dds::Entity())};
+  StatusTable<plc_TaskStatus> table_;
+  TaskWatch tasks_{pool_, "hosta", 7, table_, StatisticsWriter("hosta", 7, dds::Entity())};
   RunWatch sut_{"hosta", 7};
 };
 

@@ -1,0 +1,101 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <concepts>
+#include <deque>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <status_fields.hpp>
+
+#include "api/cli/rows/rows.hpp"
+
+namespace plchost {
+
+namespace status_rows {
+
+template <class Value>
+void add(Row& row, const dds::FieldInfo& field, const Value& value) {
+  const std::string name(field.name);
+  if constexpr (std::integral<Value>) {
+    if (!field.words.empty()) {
+      row[name] = dds::word_for(field.words, static_cast<std::uint64_t>(value));
+    } else if (field.unit == dds::Unit::duration) {
+      row[fmt::format("{}_us", field.base)] = to_us(static_cast<std::int64_t>(value));
+    } else if (field.unit == dds::Unit::unix) {
+      row[std::string(field.base)] = time_text(static_cast<std::int64_t>(value));
+      row[name] = value;
+    } else {
+      row[name] = value;
+    }
+  } else if constexpr (std::convertible_to<Value, std::string_view>) {
+    row[name] = std::string_view(value);
+  } else {
+    row[name] = fmt::format("{:02x}", fmt::join(value, ""));
+  }
+}
+
+}  // namespace status_rows
+
+/// The row of a status topic whose members say all: each in its order, durations in us, times as a text and
+/// as a number, codes as words; then what `ext` has. Topics with rows of their own have a to_row() in
+/// rows.hpp.
+template <class Sample>
+[[nodiscard]] Row to_row(const Sample& sample) {
+  Row row;
+  dds::visit_fields(
+      sample, [&](const dds::FieldInfo& field, const auto& value) { status_rows::add(row, field, value); });
+  add_extension(row, std::span(sample.ext._buffer, sample.ext._length));
+  return row;
+}
+
+/// All members as columns; where there is no room, the last ones go first, and keys never.
+template <class Sample>
+[[nodiscard]] const std::vector<Column>& columns_of() {
+  static const auto made = [] {
+    static std::deque<std::string> texts;  // a Column names them
+    std::vector<Column> columns;
+    dds::visit_fields(Sample{}, [&](const dds::FieldInfo& field, const auto& /*value*/) {
+      const bool duration = field.unit == dds::Unit::duration;
+      const std::string& name =
+          texts.emplace_back(duration ? fmt::format("{}_us", field.base)
+                                      : std::string(field.unit == dds::Unit::unix ? field.base : field.name));
+      std::string header(field.base);
+      std::ranges::transform(header, header.begin(), [](char c) {
+        return c == '_' ? '-' : static_cast<char>(c >= 'a' && c <= 'z' ? c - 'a' + 'A' : c);
+      });
+      const std::string& shown = texts.emplace_back(duration ? header + "(us)" : header);
+      const int rank = field.name == "host" ? 1 : field.key ? 0 : static_cast<int>(columns.size()) + 1;
+      columns.push_back({.field = name.c_str(), .header = shown.c_str(), .rank = rank});
+    });
+    return columns;
+  }();
+  return made;
+}
+template <>
+[[nodiscard]] inline const std::vector<Column>& columns_of<plc_InstanceStatus>() {
+  return instance_columns();
+}
+template <>
+[[nodiscard]] inline const std::vector<Column>& columns_of<plc_TaskStatus>() {
+  return task_columns();
+}
+template <>
+[[nodiscard]] inline const std::vector<Column>& columns_of<plc_EventStatus>() {
+  return event_columns();
+}
+template <>
+[[nodiscard]] inline const std::vector<Column>& columns_of<plc_WriterStatus>() {
+  return writer_columns();
+}
+template <>
+[[nodiscard]] inline const std::vector<Column>& columns_of<plc_ExceptionStatus>() {
+  return exception_columns();
+}
+
+}  // namespace plchost

@@ -1,0 +1,59 @@
+// The parts of ControlClient that are made for each type of status.
+#pragma once
+
+#include <algorithm>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "api/client/check_names.hpp"
+#include "api/client/control_client.hpp"
+#include "api/client/status_count.hpp"
+
+namespace plchost {
+
+template <class Cache>
+Result<void> ControlClient::open_cache(Cache& cache, const dds::TopicInfo& info, std::uint32_t statuses) {
+  if (cache) return {};
+  auto topic = dds::make_topic(participant_.get(), info);
+  if (!topic) return std::unexpected(topic.error());
+  // Samples of another host under a key of this one must not push out those that have not been taken yet.
+  auto reader = dds::make_reader(status_subscriber_.get(), topic->get(),
+                                 dds::qos_of(info).keep_last(dds::kStatusReaderDepth));
+  if (!reader) return std::unexpected(reader.error());
+  if (auto added = wait_set_.add(reader->get(), statuses); !added) return added;
+  cache = Cache(std::move(*topic), std::move(*reader));
+  return {};
+}
+
+template <class Sample>
+Result<std::vector<Sample>> ControlClient::status(const std::string& host, TimePoint deadline) {
+  auto& cache = std::get<StatusCache<Sample>>(status_);
+  if (auto good = check_host_name(host); !good) return std::unexpected(std::move(good).error());
+  if (auto opened = open_cache(cache, dds::kTopicOf<Sample>); !opened) {
+    return std::unexpected(opened.error());
+  }
+  for (;;) {
+    update();
+    if (const auto view = present(host)) {
+      const auto expected = count_of<Sample>(view->status);
+      if (!expected) {
+        return failure(ErrorCode::unsupported,
+                       fmt::format("host '{}' has no topic {}: it is of another version", host,
+                                   dds::kTopicOf<Sample>.name));
+      }
+      if (cache.count(host, view->epoch) == *expected) {
+        auto samples = cache.of_host(host, view->epoch);
+        std::ranges::sort(samples, {}, [](const Sample& sample) { return dds::order_of(sample); });
+        return samples;
+      }
+    }
+    if (MonotonicClock::now() >= deadline) break;
+    wait_set_.wait(deadline);
+  }
+  return failure(ErrorCode::timed_out, fmt::format("the status of host '{}' has not come completely", host));
+}
+
+}  // namespace plchost

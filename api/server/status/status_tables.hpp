@@ -1,0 +1,78 @@
+#pragma once
+
+#include <algorithm>
+#include <memory>
+#include <tuple>
+#include <utility>
+
+#include <control.h>
+#include <status_topics.hpp>
+
+#include "api/dds/text.hpp"
+#include "api/dds/topics.hpp"
+#include "api/server/status/status_table.hpp"
+
+namespace plchost {
+
+/// A table with the topic of its type, written into the partition of `publisher`.
+template <class Sample>
+[[nodiscard]] Result<StatusTable<Sample>> open_table(dds_entity_t participant, dds_entity_t publisher) {
+  constexpr const dds::TopicInfo& kTopic = dds::kTopicOf<Sample>;
+  auto topic = dds::make_topic(participant, kTopic);
+  if (!topic) return std::unexpected(std::move(topic).error());
+  auto writer = dds::make_writer(publisher, topic->get(), dds::qos_of(kTopic));
+  if (!writer) return std::unexpected(std::move(writer).error());
+  return StatusTable<Sample>(*std::move(topic), *std::move(writer));
+}
+
+/// The tables of all status topics that HostStatus counts: those of control.idl. Stays where it is made.
+class StatusTables {
+ public:
+  [[nodiscard]] static Result<std::unique_ptr<StatusTables>> create(dds_entity_t participant,
+                                                                    dds_entity_t publisher) {
+    auto made = std::make_unique<StatusTables>();
+    Result<void> result;
+    std::apply([&](auto&... table) { (void)(open(participant, publisher, table, result) && ...); },
+               made->tables_);
+    if (!result) return std::unexpected(std::move(result).error());
+    return made;
+  }
+
+  template <class Sample>
+  [[nodiscard]] StatusTable<Sample>& of() noexcept {
+    return std::get<StatusTable<Sample>>(tables_);
+  }
+
+  /// Tells how many samples each has.
+  void count(plc_HostStatus& status) const noexcept {
+    static_assert(std::tuple_size_v<Tables> <= std::extent_v<decltype(plc_HostStatus::counts)>);
+    std::size_t next = 0;
+    const auto add = [&]<class Sample>(const StatusTable<Sample>& table) {
+      plc_TopicCount& count = status.counts[next++];
+      dds::copy_text(count.topic, dds::kCountedAs<Sample>);
+      count.samples = table.size();
+    };
+    std::apply([&](const auto&... table) { (add(table), ...); }, tables_);
+  }
+
+ private:
+  template <class... Samples>
+  using TablesOf = std::tuple<StatusTable<Samples>...>;
+  using Tables = dds::OfCountedStatus<TablesOf>;
+
+  template <class Sample>
+  static bool open(dds_entity_t participant, dds_entity_t publisher, StatusTable<Sample>& table,
+                   Result<void>& result) {
+    auto made = open_table<Sample>(participant, publisher);
+    if (made) {
+      table = *std::move(made);
+    } else {
+      result = std::unexpected(std::move(made).error());
+    }
+    return result.has_value();
+  }
+
+  Tables tables_;
+};
+
+}  // namespace plchost
