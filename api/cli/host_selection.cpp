@@ -14,8 +14,9 @@ namespace {
 
 constexpr std::string_view kAll = "all";
 
-Result<ApiReply> ask_one(const dds::DomainOptions& options, const std::string& host, const HostCall& call) {
-  const auto client = ControlClient::connect(options);
+Result<ApiReply> ask_one(const std::shared_ptr<Participant>& participant, const std::string& host,
+                         const HostCall& call) {
+  const auto client = ControlClient::connect(participant);
   if (!client) return std::unexpected(client.error());
   return call(**client, host);
 }
@@ -33,9 +34,8 @@ bool HostSelection::selects(const HostView& view) const {
       labels, [&](const std::string& label) { return std::ranges::find(has, label) != has.end(); });
 }
 
-std::vector<HostOutcome> ask_each(const dds::DomainOptions& options, const std::vector<std::string>& hosts,
-                                  const HostCall& call) {
-  // Each connection is a participant of the domain, which all others have to get to know.
+std::vector<HostOutcome> ask_each(const std::shared_ptr<Participant>& participant,
+                                  const std::vector<std::string>& hosts, const HostCall& call) {
   constexpr std::size_t kAtOnce = 16;
   std::vector<HostOutcome> outcomes;
   for (const std::string& host : hosts) {
@@ -44,7 +44,7 @@ std::vector<HostOutcome> ask_each(const dds::DomainOptions& options, const std::
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
     for (std::size_t i = next++; i < outcomes.size(); i = next++) {
-      outcomes[i].reply = ask_one(options, outcomes[i].host, call);
+      outcomes[i].reply = ask_one(participant, outcomes[i].host, call);
     }
   };
   std::vector<std::jthread> threads;

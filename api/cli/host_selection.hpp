@@ -30,8 +30,9 @@ struct HostOutcome {
 };
 /// The command to one host, over that connection.
 using HostCall = std::function<Result<ApiReply>(ControlClient& client, const std::string& host)>;
-/// Asks all hosts at the same time, each over a connection of its own. In the order of the hosts.
-[[nodiscard]] std::vector<HostOutcome> ask_each(const dds::DomainOptions& options,
+/// Asks all hosts at the same time, each by a ControlClient and a thread of its own. In the order of the
+/// hosts.
+[[nodiscard]] std::vector<HostOutcome> ask_each(const std::shared_ptr<Participant>& participant,
                                                 const std::vector<std::string>& hosts, const HostCall& call);
 
 }  // namespace plchost

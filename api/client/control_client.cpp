@@ -8,7 +8,6 @@
 
 #include "api/client/check_names.hpp"
 #include "api/client/control_client_status.hpp"
-#include "api/dds/claim.hpp"
 #include "api/dds/entries.hpp"
 #include "api/dds/error.hpp"
 #include "shm/base/names.hpp"
@@ -26,28 +25,28 @@ bool is_engineering(std::int32_t operation) {
 }  // namespace
 
 Result<std::unique_ptr<ControlClient>> ControlClient::connect(const dds::DomainOptions& options) {
+  auto entered = enter_domain(options);
+  if (!entered) return std::unexpected(std::move(entered).error());
+  return connect(*std::move(entered));
+}
+
+Result<std::unique_ptr<ControlClient>> ControlClient::connect(std::shared_ptr<Participant> participant) {
   std::unique_ptr<ControlClient> client(new ControlClient);
-  if (auto opened = client->open(options); !opened) return std::unexpected(opened.error());
+  if (auto opened = client->open(std::move(participant)); !opened) return std::unexpected(opened.error());
   return client;
 }
 
-Result<void> ControlClient::open(const dds::DomainOptions& options) {
-  auto domain = dds::open_domain(dds::Role::client, options);
-  if (!domain) return std::unexpected(domain.error());
-  domain_ = std::move(*domain);
-  auto participant = dds::make_participant(options.domain, dds::client_participant_qos().get(),
-                                           fmt::format("enter DDS domain {}", options.domain));
-  if (!participant) return std::unexpected(participant.error());
-  participant_ = std::move(*participant);
-  partition_ = dds::client_partition(dds::guid_of(participant_.get()).hex(), dds::kAllHosts);
-  auto subscriber = dds::make_subscriber(participant_.get(), dds::status_partition(dds::kAllHosts));
+Result<void> ControlClient::open(std::shared_ptr<Participant> participant) {
+  participant_ = std::move(participant);
+  partition_ = dds::client_partition(dds::guid_of(entity()).hex(), dds::kAllHosts);
+  auto subscriber = dds::make_subscriber(entity(), dds::status_partition(dds::kAllHosts));
   if (!subscriber) return std::unexpected(subscriber.error());
   status_subscriber_ = *std::move(subscriber);
-  auto wait_set = WaitSet::create(participant_.get());
+  auto wait_set = WaitSet::create(entity());
   if (!wait_set) return std::unexpected(wait_set.error());
   wait_set_ = std::move(*wait_set);
   last_news_ = MonotonicClock::now();
-  if (options.interfaces != std::vector<std::string>{"lo"}) quiet_ = kQuietOnNetworks;
+  if (!participant_->only_loopback) quiet_ = kQuietOnNetworks;
   if (auto opened = open_cache(presence_, dds::kPresence,
                                DDS_DATA_AVAILABLE_STATUS | DDS_REQUESTED_DEADLINE_MISSED_STATUS);
       !opened) {
@@ -109,7 +108,7 @@ Result<std::vector<plc_ObjectStatus>> ControlClient::objects(const std::string& 
 
 Result<std::vector<TransitionView>> ControlClient::transitions() {
   if (!transition_log_) {
-    auto topic = dds::make_topic(participant_.get(), dds::kTransition);
+    auto topic = dds::make_topic(entity(), dds::kTransition);
     if (!topic) return std::unexpected(topic.error());
     auto reader = dds::make_reader(status_subscriber_.get(), topic->get(), dds::qos_of(dds::kTransition));
     if (!reader) return std::unexpected(reader.error());
@@ -143,11 +142,11 @@ Result<void> ControlClient::open_own_reader(dds::Entity& topic, dds::Entity& rea
                                             const dds::TopicInfo& info, const dds::Qos& qos) {
   if (reader) return {};
   if (!own_subscriber_) {
-    auto made = dds::make_subscriber(participant_.get(), partition_);
+    auto made = dds::make_subscriber(entity(), partition_);
     if (!made) return std::unexpected(made.error());
     own_subscriber_ = std::move(*made);
   }
-  auto made_topic = dds::make_topic(participant_.get(), info);
+  auto made_topic = dds::make_topic(entity(), info);
   if (!made_topic) return std::unexpected(made_topic.error());
   auto made_reader = dds::make_reader(own_subscriber_.get(), made_topic->get(), qos);
   if (!made_reader) return std::unexpected(made_reader.error());
@@ -165,12 +164,11 @@ Result<RequestCaller*> ControlClient::caller(const std::string& host, bool engin
   }
   dds::Entity& topic = request_topics_.at(engineering ? 1 : 0);
   if (!topic) {
-    auto made =
-        dds::make_topic(participant_.get(), engineering ? dds::kEngineerRequest : dds::kOperatorRequest);
+    auto made = dds::make_topic(entity(), engineering ? dds::kEngineerRequest : dds::kOperatorRequest);
     if (!made) return std::unexpected(made.error());
     topic = std::move(*made);
   }
-  auto made = RequestCaller::create(participant_.get(), topic.get(), host);
+  auto made = RequestCaller::create(entity(), topic.get(), host);
   if (!made) return std::unexpected(made.error());
   if (auto added = wait_set_.add(made->writer(), DDS_PUBLICATION_MATCHED_STATUS); !added) {
     return std::unexpected(added.error());

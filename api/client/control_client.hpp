@@ -19,6 +19,7 @@
 
 #include "api/client/batch_poster.hpp"
 #include "api/client/event_poster.hpp"
+#include "api/client/participant.hpp"
 #include "api/client/request_caller.hpp"
 #include "api/client/seen_hosts.hpp"
 #include "api/client/statistics_cache.hpp"
@@ -95,7 +96,12 @@ class ControlClient {
   static constexpr Duration kQuiet = std::chrono::milliseconds(200);
   static constexpr Duration kQuietOnNetworks = std::chrono::milliseconds(1200);
 
+  /// With a participant of its own.
   [[nodiscard]] static Result<std::unique_ptr<ControlClient>> connect(const dds::DomainOptions& options);
+  /// Beside others of this process, which have the same participant and may be on other threads.
+  [[nodiscard]] static Result<std::unique_ptr<ControlClient>> connect(
+      std::shared_ptr<Participant> participant);
+  [[nodiscard]] const std::shared_ptr<Participant>& participant() const noexcept { return participant_; }
 
   /// The hosts that answer, by name: waits for the first one until the deadline, then until none is news any
   /// more. Empty: none answers.
@@ -204,7 +210,8 @@ class ControlClient {
 
  private:
   ControlClient() = default;
-  Result<void> open(const dds::DomainOptions& options);
+  Result<void> open(std::shared_ptr<Participant> participant);
+  [[nodiscard]] dds_entity_t entity() const noexcept { return participant_->entity.get(); }
   void update();
   void update_hosts();
   [[nodiscard]] std::vector<HostView> present() const;
@@ -240,8 +247,7 @@ class ControlClient {
   [[nodiscard]] Result<Listing> ask_for_page(PageReader& pages, const dds::TopicInfo& topic,
                                              const ApiRequest& request, TimePoint deadline);
 
-  std::shared_ptr<dds::Entity> domain_;
-  dds::Entity participant_;
+  std::shared_ptr<Participant> participant_;
   WaitSet wait_set_;
   std::string partition_;
   dds::Entity own_subscriber_;

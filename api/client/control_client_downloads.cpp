@@ -44,11 +44,11 @@ Result<ApiReply> ControlClient::download(const Download& download, const Downloa
     return std::unexpected(opened.error());
   }
   if (!chunk_topic_) {
-    auto topic = dds::make_topic(participant_.get(), dds::kDownloadChunk);
+    auto topic = dds::make_topic(entity(), dds::kDownloadChunk);
     if (!topic) return std::unexpected(topic.error());
     chunk_topic_ = std::move(*topic);
   }
-  auto sender = FileSender::create(participant_.get(), chunk_topic_.get(), download.host, download.contents);
+  auto sender = FileSender::create(entity(), chunk_topic_.get(), download.host, download.contents);
   if (!sender) return std::unexpected(sender.error());
   std::uint64_t told = 0;
   const auto go_on = [&](const plc_SampleIdentity& identity, TimePoint now) -> RequestCaller::Wait {

@@ -17,11 +17,11 @@ Result<EventPoster*> ControlClient::poster(const std::string& host) {
     return std::unexpected(opened.error());
   }
   if (!event_topic_) {
-    auto made = dds::make_topic(participant_.get(), dds::kEventPost);
+    auto made = dds::make_topic(entity(), dds::kEventPost);
     if (!made) return std::unexpected(made.error());
     event_topic_ = std::move(*made);
   }
-  auto made = EventPoster::create(participant_.get(), event_topic_.get(), host);
+  auto made = EventPoster::create(entity(), event_topic_.get(), host);
   if (!made) return std::unexpected(made.error());
   if (auto added = wait_set_.add(made->writer(), DDS_PUBLICATION_MATCHED_STATUS); !added) {
     return std::unexpected(added.error());

@@ -99,11 +99,11 @@ Result<BatchPoster*> ControlClient::batch_poster(const std::string& host) {
     return std::unexpected(opened.error());
   }
   if (!batch_topic_) {
-    auto made = dds::make_topic(participant_.get(), dds::kEventBatch);
+    auto made = dds::make_topic(entity(), dds::kEventBatch);
     if (!made) return std::unexpected(made.error());
     batch_topic_ = std::move(*made);
   }
-  auto made = BatchPoster::create(participant_.get(), batch_topic_.get(), host);
+  auto made = BatchPoster::create(entity(), batch_topic_.get(), host);
   if (!made) return std::unexpected(made.error());
   if (auto added = wait_set_.add(made->writer(), DDS_PUBLICATION_MATCHED_STATUS); !added) {
     return std::unexpected(added.error());

@@ -17,7 +17,7 @@ namespace plchost {
 template <class Cache>
 Result<void> ControlClient::open_cache(Cache& cache, const dds::TopicInfo& info, std::uint32_t statuses) {
   if (cache) return {};
-  auto topic = dds::make_topic(participant_.get(), info);
+  auto topic = dds::make_topic(entity(), info);
   if (!topic) return std::unexpected(topic.error());
   // Samples of another host under a key of this one must not push out those that have not been taken yet.
   auto reader = dds::make_reader(status_subscriber_.get(), topic->get(),

@@ -149,8 +149,11 @@ Client::Posted posted_or_throw(const Client::Outcome& outcome) {
 ClientError::~ClientError() = default;
 
 Client::Client() : Client(Options{}) {}
-Client::Client(const Options& options)
-    : worker_(std::make_unique<Worker>(options)), watcher_(std::make_unique<Watcher>(options)) {}
+Client::Client(const Options& options) {
+  const auto participant = std::make_shared<ParticipantSource>(domain_options(options));
+  worker_ = std::make_unique<Worker>(options, participant);
+  watcher_ = std::make_unique<Watcher>(participant);
+}
 Client::~Client() {
   if (worker_->maker().is_this()) return;
   (void)worker_.release();

@@ -6,7 +6,9 @@ namespace plchost {
 
 Result<ControlClient*> Connection::client() {
   if (!client_) {
-    auto connected = ControlClient::connect(options_);
+    auto participant = participant_->get();
+    if (!participant) return std::unexpected(std::move(participant).error());
+    auto connected = ControlClient::connect(*std::move(participant));
     if (!connected) return std::unexpected(std::move(connected).error());
     client_ = *std::move(connected);
   }

@@ -16,11 +16,12 @@ namespace plchost {
 /// may come later. One thread.
 class Connection {
  public:
-  explicit Connection(dds::DomainOptions options) : options_(std::move(options)) {}
+  explicit Connection(std::shared_ptr<ParticipantSource> participant)
+      : participant_(std::move(participant)) {}
   [[nodiscard]] Result<ControlClient*> client();
 
  private:
-  dds::DomainOptions options_;
+  std::shared_ptr<ParticipantSource> participant_;
   std::unique_ptr<ControlClient> client_;
 };
 

@@ -44,11 +44,11 @@ class __attribute__((visibility("hidden"))) Client::Watch::Subscription {
   std::atomic<bool> stopped_{false};
 };
 
-/// Looks for what watches want to be told, on a thread and with a connection of its own: a call that waits
+/// Looks for what watches want to be told, on a thread and with a ControlClient of its own: a call that waits
 /// holds up no watch.
 class __attribute__((visibility("hidden"))) Client::Watcher {
  public:
-  explicit Watcher(const Options& options) : connection_(domain_options(options)) {}
+  explicit Watcher(std::shared_ptr<ParticipantSource> participant) : connection_(std::move(participant)) {}
   ~Watcher() { end(); }
   Watcher(const Watcher&) = delete;
   Watcher& operator=(const Watcher&) = delete;

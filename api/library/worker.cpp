@@ -30,8 +30,8 @@ Result<ControlClient*> too_many(std::size_t most) {
 
 }  // namespace
 
-Client::Worker::Worker(const Options& options)
-    : connection_(domain_options(options)), timeout_(checked_timeout(options.timeout)) {
+Client::Worker::Worker(const Options& options, std::shared_ptr<ParticipantSource> participant)
+    : connection_(std::move(participant)), timeout_(checked_timeout(options.timeout)) {
   // Here, where it can be said at once.
   if (const auto good = dds::domain_configuration(dds::Role::client, domain_options(options)); !good) {
     throw_client_error(good.error());

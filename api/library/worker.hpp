@@ -19,7 +19,7 @@ class __attribute__((visibility("hidden"))) Client::Worker {
   /// A call: with the connection, or with why there is none.
   using Job = std::function<void(const Result<ControlClient*>&)>;
 
-  explicit Worker(const Options& options);
+  Worker(const Options& options, std::shared_ptr<ParticipantSource> participant);
   ~Worker() { end(); }
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;

@@ -54,10 +54,10 @@ class HostWork {
   HostWork(const WantedHost& wanted, const HostSelection& selection, const PlantWork& work)
       : wanted_(wanted), selection_(selection), work_(work) {}
 
-  std::vector<PlantFinding> run(const dds::DomainOptions& options);
+  std::vector<PlantFinding> run(ParticipantSource& participant);
 
  private:
-  bool enter(const dds::DomainOptions& options);
+  bool enter(ParticipantSource& participant);
   /// Whether something was changed, so that it is worth to look again.
   bool look_at_all();
   bool look_at_one(const WantedInstance& wanted, const PresentInstance& present);
@@ -92,8 +92,10 @@ void HostWork::tell(Kind result, const WantedInstance* instance, std::string rem
   findings_.push_back(std::move(finding));
 }
 
-bool HostWork::enter(const dds::DomainOptions& options) {
-  auto connected = ControlClient::connect(options);
+bool HostWork::enter(ParticipantSource& participant) {
+  auto entered = participant.get();
+  auto connected = entered ? ControlClient::connect(*std::move(entered))
+                           : Result<std::unique_ptr<ControlClient>>(std::unexpected(entered.error()));
   if (!connected) {
     tell(Kind::unknown, nullptr, connected.error().describe());
     return false;
@@ -107,8 +109,8 @@ bool HostWork::enter(const dds::DomainOptions& options) {
   return selection_.selects(*view);
 }
 
-std::vector<PlantFinding> HostWork::run(const dds::DomainOptions& options) {
-  if (!enter(options)) return std::move(findings_);
+std::vector<PlantFinding> HostWork::run(ParticipantSource& participant) {
+  if (!enter(participant)) return std::move(findings_);
   while (round_ <= kRounds && look_at_all()) ++round_;
   return std::move(findings_);
 }
@@ -186,7 +188,8 @@ bool may_be_selected(const WantedHost& host, const HostSelection& selection) {
 
 std::vector<PlantFinding> work_on(const Plant& plant, const HostSelection& selection,
                                   const dds::DomainOptions& options, const PlantWork& work) {
-  constexpr std::size_t kAtOnce = 16;  // each is a participant of the domain
+  constexpr std::size_t kAtOnce = 16;
+  ParticipantSource participant(options);
   std::vector<const WantedHost*> hosts;
   for (const WantedHost& host : plant.hosts) {
     if (may_be_selected(host, selection)) hosts.push_back(&host);
@@ -195,7 +198,7 @@ std::vector<PlantFinding> work_on(const Plant& plant, const HostSelection& selec
   std::atomic<std::size_t> next{0};
   const auto work_through = [&] {
     for (std::size_t i = next++; i < hosts.size(); i = next++) {
-      found[i] = HostWork(*hosts[i], selection, work).run(options);
+      found[i] = HostWork(*hosts[i], selection, work).run(participant);
     }
   };
   std::vector<std::jthread> threads;

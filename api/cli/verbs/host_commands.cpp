@@ -162,7 +162,7 @@ int ask_hosts(CliSession& session, const std::vector<std::string>& hosts, const 
   if (hosts.size() == 1) {  // over the connection that is there
     outcomes.push_back({.host = hosts.front(), .reply = call(*session.client().value(), hosts.front())});
   } else {
-    outcomes = ask_each(session.options.dds, hosts, call);
+    outcomes = ask_each(session.client().value()->participant(), hosts, call);
   }
   int code = kExitDone;
   std::vector<Row> rows;

@@ -4,7 +4,9 @@
 #include <future>
 #include <memory>
 #include <thread>
+#include <utility>
 
+#include <dds/dds.h>
 #include <gmock/gmock.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -49,6 +51,18 @@ class ClientLibrary : public testing::Test {
   TestHost host_{domain_, "hosta"};
   PoolEvent event_;
 };
+
+TEST_F(ClientLibrary, IsOneParticipantOfTheDomain) {
+  Client sut(options());
+  std::promise<void> told;
+  const auto watch =
+      sut.watch_instances("hosta", [&, first = true](const Client::Instance& /*instance*/) mutable {
+        if (std::exchange(first, false)) told.set_value();
+      });
+  EXPECT_EQ(sut.instances("hosta").size(), 1U);
+  told.get_future().wait();
+  EXPECT_EQ(dds_lookup_participant(domain_.number(), nullptr, 0), 1) << "for its calls and its watches";
+}
 
 TEST_F(ClientLibrary, ReadsAnyStatusTopicByTheNamesOfTheContract) {
   Client sut(options());

@@ -76,6 +76,30 @@ TEST_F(RemoteCommand, IsSeenInTheStatusOnceItIsAnswered) {
   EXPECT_EQ(sut->instances("hosta", soon()).value().at(0).state, 3U);
 }
 
+TEST_F(RemoteCommand, IsAnsweredToTheOneOfTwoClientsOfAParticipantThatAsked) {
+  constexpr int kEach = 50;
+  host_.write_instance(1, "line2", InstanceState::running, 4712);
+  host_.write_count(2);
+  host_.start_server();
+  const auto first = connect(domain_);
+  const auto second = ControlClient::connect(first->participant()).value();
+  const auto ask = [](ControlClient& client, const std::string& instance) {
+    for (int i = 0; i < kEach; ++i) {
+      const auto good = client.call({"hosta", plc_OPERATION_START, instance, ""}, soon());
+      ASSERT_TRUE(good) << good.error().describe();
+      EXPECT_EQ(good->code, ErrorCode::ok);
+      const auto bad = client.call({"hosta", plc_OPERATION_START, instance + "x", ""}, soon());
+      ASSERT_TRUE(bad) << bad.error().describe();
+      EXPECT_THAT(bad->text, testing::HasSubstr(instance + "x"));
+    }
+  };
+  {
+    const std::jthread one([&] { ask(*first, "line1"); });
+    const std::jthread other([&] { ask(*second, "line2"); });
+  }
+  EXPECT_EQ(host_.requests().size(), 2U * kEach);
+}
+
 TEST_F(RemoteCommand, ForAnUnknownInstanceIsRefusedByName) {
   host_.start_server();
   const auto reply = connect(domain_)->call({"hosta", plc_OPERATION_START, "line9", ""}, soon());
