@@ -10,7 +10,8 @@
 
 #include "instances/runtime/settings/block_settings.hpp"
 #include "instances/runtime/settings/task_settings.hpp"
-#include "schedulers/scheduler.hpp"
+#include "schedulers/scheduler_settings.hpp"
+#include "schedulers/task/task_config.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
 

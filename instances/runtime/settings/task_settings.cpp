@@ -6,7 +6,6 @@
 
 #include <fmt/format.h>
 
-#include "schedulers/task_set.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
