@@ -126,7 +126,9 @@ TEST_F(TaskCalls, EventIsRaisedForEventTasksOnly) {
   EXPECT_EQ(SchedRaiseEvent(edge), ERR_NOTINITIALIZED);
   make_tasks();
   EXPECT_EQ(SchedRaiseEvent(edge), ERR_OK);
-  EXPECT_TRUE(host.task_table().task(edge)->latch().is_raised());
+  const EventLatch* const latch = host.task_table().task(edge)->latch();
+  ASSERT_NE(latch, nullptr);
+  EXPECT_TRUE(latch->is_raised());
   EXPECT_EQ(SchedRaiseEvent(SchedGetTaskHandle("Fast", nullptr)), ERR_PARAMETER);
   EXPECT_EQ(SchedRaiseEvent(RTS_INVALID_HANDLE), ERR_PARAMETER);
 }
