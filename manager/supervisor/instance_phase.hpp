@@ -39,7 +39,7 @@ namespace plchost {
 //   setting_up   a process of this manager sets itself up. Limit: 30 s, then SIGKILL.
 //   adopting     a process that outlived its manager was asked for its status. Limit: 5 s; then it counts as
 //                up with a problem text, because a manager stops no PLC for being unable to talk to it.
-//   up           the process answers, or is believed to. What it shows is what the process says.
+//   up           the process answers, or is believed to. The process itself reports its state.
 //   ending       the process was asked to end. Limit: 38 s (a stop may take 10 s and 25 s), then SIGTERM, 2 s,
 //                SIGKILL. An adopted process may be in this phase already.
 //

@@ -73,7 +73,7 @@ inline constexpr Duration kAskAgain = std::chrono::seconds(2);
 //   register_event,          forwarded; repeated in each fresh process    refused               refused
 //   unregister_event
 //
-//   download_application     a helper keeps and checks the file; then as load_application. What the trial finds wrong
+//   download_application     a helper keeps and checks the file; then as load_application. A fault that the trial finds
 //                            ends nothing. If the new application does not come up, the one before starts again as it
 //                            was, and the reply tells both.
 //   rollback_application     load_application of what was loaded before. That must have been sent.

@@ -30,7 +30,7 @@ namespace plchost {
 //   single cycle  each cyclic and freewheeling task runs one cycle, one after the other by priority, under no
 //                 scheduler; event tasks rest
 //   stopping      the tasks that drive outputs come to the end of their cycles, then the others
-//   exception     a fault has stopped it. What is not caught in its cycle is parked, the variables are as
+//   exception     a fault has stopped it. Tasks between cycles are parked, the variables are as
 //                 they were, the process answers. There is no way out but a fresh process (reset, restart,
 //                 load).
 //
