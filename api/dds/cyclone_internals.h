@@ -19,6 +19,7 @@
 #include <dds/ddsi/ddsi_proxy_participant.h>
 #include <dds/ddsi/ddsi_serdata.h>
 #include <dds/ddsi/ddsi_tkmap.h>
+#include <dds/ddsi/ddsi_tran.h>
 #include <dds/ddsi/q_rtps.h>
 #include <dds/ddsi/q_thread.h>
 #include <dds/ddsi/q_whc.h>
@@ -30,6 +31,13 @@
 #define PLC_LIES_AT(type, member, offset, size)                                              \
   _Static_assert(offsetof(type, member) == (offset) && sizeof(((type*)0)->member) == (size), \
                  #type "." #member " lies elsewhere")
+PLC_LIES_AT(struct ddsi_domaingv, disc_conn_mc, 1056, 8);
+PLC_LIES_AT(struct ddsi_domaingv, data_conn_mc, 1064, 8);
+PLC_LIES_AT(struct ddsi_domaingv, disc_conn_uc, 1072, 8);
+PLC_LIES_AT(struct ddsi_domaingv, data_conn_uc, 1080, 8);
+PLC_LIES_AT(struct ddsi_domaingv, xmit_conns, 1088, sizeof(void*) * MAX_XMIT_CONNS);
+PLC_LIES_AT(struct ddsi_domaingv, n_interfaces, 1432, 4);
+PLC_LIES_AT(struct ddsi_tran_conn, m_read_fn, 32, 8);
 PLC_LIES_AT(struct ddsi_domaingv, m_tkmap, 960, 8);
 PLC_LIES_AT(struct ddsi_domaingv, entity_index, 968, 8);
 PLC_LIES_AT(struct ddsi_domaingv, as_disc, 2008, 8);
@@ -39,6 +47,7 @@ PLC_LIES_AT(struct ddsi_proxy_participant, as_meta, 264, 8);
 PLC_LIES_AT(struct ddsi_tkmap_instance, m_refc, 16, 4);
 PLC_LIES_AT(struct ddsi_writer, e.lock, 48, 40);
 PLC_LIES_AT(struct ddsi_writer, seq, 272, 8);
+PLC_LIES_AT(struct ddsi_writer, seq_xmit, 288, 8);
 PLC_LIES_AT(struct ddsi_writer, state, 368, 4);
 PLC_LIES_AT(struct ddsi_writer, type, 392, 8);
 PLC_LIES_AT(struct ddsi_writer, whc, 424, 8);

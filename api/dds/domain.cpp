@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <map>
 #include <mutex>
+#include <set>
 #include <string_view>
 #include <system_error>
 
@@ -14,7 +15,9 @@
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 
+#include "api/dds/datagram_filter.h"
 #include "api/dds/error.hpp"
+#include "api/dds/gate/client_gate.hpp"
 #include "api/dds/security_section.hpp"
 #include "api/security/identity.hpp"
 #include "shm/base/thread.hpp"
@@ -61,6 +64,13 @@ std::string threads_section(int fifo) {
 std::mutex& registry_mutex() {
   static std::mutex mutex;
   return mutex;
+}
+
+// Of secured clients. With the registry's mutex. A host has a gate of its own, which knows no release of
+// Cyclone.
+std::set<std::uint32_t>& gated_domains() {
+  static std::set<std::uint32_t> domains;
+  return domains;
 }
 
 }  // namespace
@@ -149,12 +159,16 @@ Result<std::shared_ptr<Entity>> open_domain(Role role, const DomainOptions& opti
   if (!made) return std::unexpected(made.error());
   auto domain = std::make_shared<Entity>(std::move(*made));
   domains[options.domain] = domain;
+  gated_domains().erase(options.domain);
+  if (role == Role::client && !options.identity.empty()) gated_domains().insert(options.domain);
   return domain;
 }
 
 Result<Entity> make_participant(std::uint32_t domain, const dds_qos_t* qos, std::string_view what) {
   const std::lock_guard lock(registry_mutex());
-  return check_entity(dds_create_participant(domain, qos, nullptr), std::string(what));
+  auto made = check_entity(dds_create_participant(domain, qos, nullptr), std::string(what));
+  if (made && gated_domains().contains(domain)) (void)plc_filter_datagrams(made->get(), pass_to_client);
+  return made;
 }
 
 Result<int> tie_sockets_to_loopback() {

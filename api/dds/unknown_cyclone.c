@@ -3,8 +3,10 @@
 
 #include "api/dds/announced_addresses.h"
 #include "api/dds/cyclone_version.h"
+#include "api/dds/datagram_filter.h"
 #include "api/dds/ended_participant.h"
 #include "api/dds/instance_pin.h"
+#include "api/dds/secured_announcement.h"
 #include "api/dds/told_keys.h"
 
 static const plc_InstancePin kNoPin = {NULL, NULL, 0};
@@ -63,5 +65,16 @@ bool plc_stop_announcing_to(dds_entity_t participant, const plc_Address* address
 bool plc_forget_participant(dds_entity_t reader, dds_instance_handle_t publication) {
   (void)reader;
   (void)publication;
+  return false;
+}
+
+bool plc_announce_secured(dds_entity_t participant) {
+  (void)participant;
+  return false;
+}
+
+bool plc_filter_datagrams(dds_entity_t participant, plc_DatagramFilter filter) {
+  (void)participant;
+  (void)filter;
   return false;
 }

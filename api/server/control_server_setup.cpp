@@ -12,6 +12,7 @@
 
 #include "api/dds/error.hpp"
 #include "api/dds/log_sink.hpp"
+#include "api/dds/secured_announcement.h"
 #include "api/security/identity.hpp"
 #include "api/server/control_server_parts.hpp"
 #include "shm/base/system_call.hpp"
@@ -177,6 +178,10 @@ Result<void> ControlServer::Parts::enter_domain() {
       "enter DDS domain " + std::to_string(options.dds.domain) + " (at most 16 servers on one machine)");
   if (!made) return std::unexpected(made.error());
   participant = std::move(*made);
+  if (identity_watch && !plc_announce_secured(participant.get())) {
+    spdlog::warn(
+        "secured clients by Fast DDS 3 do not meet this host: its participant is not announced to them");
+  }
   announcements = dds::Announcements(participant.get());
   if (options.dds.interfaces == std::vector<std::string>{"lo"}) {
     if (const auto tied = dds::tie_sockets_to_loopback(); !tied) {

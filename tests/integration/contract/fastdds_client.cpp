@@ -121,6 +121,8 @@ class Client {
       locator.port = 7400 + 250 * options.domain + 10 + 2 * i;
       builtin.initialPeersList.push_back(locator);
     }
+    // Fast DDS 3 describes its types differently from Cyclone. Names of types are enough for both.
+    qos.properties().properties().emplace_back("fastdds.type_propagation", "disabled");
     for (const auto& [name, value] : options.properties)
       qos.properties().properties().emplace_back(name, value);
     participant_ = made(DomainParticipantFactory::get_instance()->create_participant(options.domain, qos),

@@ -1,0 +1,12 @@
+#pragma once
+
+#include <cstddef>
+
+namespace plchost::dds {
+
+/// The gate of a secured client, as plc_filter_datagrams() asks for it: admit(), then HandshakeAssembly.
+/// Without it Cyclone believes anybody who says in plain text that a host has ended (the writer of secured
+/// announcements is never checked), and the client would drop its host.
+extern "C" std::size_t pass_to_client(unsigned char* buffer, std::size_t size, std::size_t capacity);
+
+}  // namespace plchost::dds
