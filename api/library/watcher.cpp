@@ -12,7 +12,7 @@ namespace {
 // A watch that is new begins within this; changes wake the thread themselves.
 constexpr auto kRound = std::chrono::milliseconds(20);
 constexpr auto kReconnect = std::chrono::milliseconds(500);
-constexpr std::size_t kKept = 64;  // of each instance, as hosts do
+constexpr std::size_t kKeptOfEach = 64;  // of each instance, as hosts do
 
 bool is_of_one(const TransitionView& a, const TransitionView& b) {
   return dds::text_of(a.sample.host) == dds::text_of(b.sample.host) &&
@@ -91,7 +91,7 @@ void Client::Watcher::keep(const std::vector<TransitionView>& fresh) {
   for (const TransitionView& transition : fresh) {
     transitions_.push_back(transition);
     const auto is_its = [&](const TransitionView& other) { return is_of_one(other, transition); };
-    if (static_cast<std::size_t>(std::ranges::count_if(transitions_, is_its)) > kKept) {
+    if (static_cast<std::size_t>(std::ranges::count_if(transitions_, is_its)) > kKeptOfEach) {
       transitions_.erase(std::ranges::find_if(transitions_, is_its));
     }
   }
