@@ -32,7 +32,7 @@ ObjectHolders ObjectHolders::of(const PoolView& view, const ObjectEntry& object)
   ObjectHolders holders;
   std::uint32_t left = object.reference_count.load(kRelaxed);
   for (std::size_t at = 0; at < view.used_references().size() && left > 0; ++at) {
-    if (view.object_of(view.references()[at]) != &object) continue;
+    if (!view.is_on(view.references()[at], object)) continue;
     holders.add(look_at(view, at, 1));
     --left;
   }

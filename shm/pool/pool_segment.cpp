@@ -339,7 +339,7 @@ ObjectEntry* PoolSegment::find(PoolLock& held, std::string_view name) noexcept {
   if (object == nullptr || !held.burying) return object;
   for (ReferenceEntry& reference : view_.used_references()) {
     if (object->reference_count.load(kRelaxed) == 0) break;
-    if (view_.object_of(reference) != object) continue;
+    if (!view_.is_on(reference, *object)) continue;
     const ClientSlot* const client = view_.client_of(reference);
     if (client == nullptr || client->ended.load(kRelaxed) != 0) release_one(held, reference);
   }

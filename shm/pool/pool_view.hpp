@@ -52,6 +52,10 @@ class PoolView {
                                                Binding::generation(object->binding.load(kRelaxed));
     return same ? object : nullptr;
   }
+  /// Whether it is on that object: for a search, which so reads the table of references alone.
+  [[nodiscard]] bool is_on(const ReferenceEntry& reference, const ObjectEntry& object) const noexcept {
+    return reference.object.load(kRelaxed) == link_to(object) && object_of(reference) == &object;
+  }
   /// The client that holds a reference; null: the place is free, or its slot is another client's by now.
   [[nodiscard]] ClientSlot* client_of(const ReferenceEntry& reference) const noexcept {
     ClientSlot* const client =
