@@ -80,6 +80,7 @@ std::vector<std::string> to_arguments(const std::string& program, const LaunchOp
   if (!options.scheduler.empty()) add("--scheduler", options.scheduler);
   add("--priority-band", options.priority_band);
   if (!options.settings.empty()) add("--settings", options.settings);
+  if (options.kept_settings) arguments.emplace_back("--kept-settings");
   if (!options.application.empty()) add("--application", options.application);
   add("--pool", options.pool);
   if (!options.run_directory.empty()) add("--run-directory", options.run_directory);
@@ -93,6 +94,10 @@ std::vector<std::string> to_arguments(const std::string& program, const LaunchOp
 
 std::string instance_socket_path(std::string_view run_directory, std::string_view instance) {
   return fmt::format("{}/{}.sock", run_directory, instance);
+}
+
+std::string kept_settings_path(std::string_view run_directory, std::string_view instance) {
+  return fmt::format("{}/{}.settings", run_directory, instance);
 }
 
 std::string kept_memory_name(std::string_view instance) {

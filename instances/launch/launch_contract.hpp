@@ -29,6 +29,9 @@ struct LaunchOptions {
   std::vector<int> cores;                ///< --core N[,N...]; empty: wherever it was started
   std::string scheduler;                 ///< --scheduler; empty: as the settings say, else CmpSchedule
   std::string priority_band = "normal";  ///< --priority-band high|normal|low
+  /// --kept-settings: with the texts of the settings files that the process before came up with, as it has
+  /// left them in kept_settings_path(). Paths and places in messages stay those of `settings`.
+  bool kept_settings = false;
   std::string settings;          ///< --settings FILE in the seeds' [Section] Key=Value form; may be empty
   std::string application;       ///< --application FILE; empty: none (safe mode)
   std::string pool = "plchost";  ///< --pool NAME
@@ -57,6 +60,9 @@ inline constexpr std::string_view kSaveRetainOption = "--save-retain";
 
 /// The control socket of an instance: "RUN_DIRECTORY/NAME.sock". ControlRequests in, ControlReplies out.
 [[nodiscard]] std::string instance_socket_path(std::string_view run_directory, std::string_view instance);
+
+/// Where a process keeps the texts of its settings files when it is up: "RUN_DIRECTORY/NAME.settings".
+[[nodiscard]] std::string kept_settings_path(std::string_view run_directory, std::string_view instance);
 
 /// The shared memory of the pool in which the retain variables of an instance lie: "NAME.retain". It outlives
 /// the process.

@@ -15,7 +15,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr std::uint32_t kWishVersion = 2;  // 2: number
+constexpr std::uint32_t kWishVersion = 3;  // 2: number; 3: application_before, taken_back
 
 template <class T>
 struct WishMember {
@@ -26,6 +26,8 @@ constexpr std::array kWishTexts = {
     WishMember<std::string>{"problem", &InstanceWish::problem},
     WishMember<std::string>{"last_end", &InstanceWish::last_end},
     WishMember<std::string>{"application", &InstanceWish::application},
+    WishMember<std::string>{"application_before", &InstanceWish::application_before},
+    WishMember<std::string>{"taken_back", &InstanceWish::taken_back},
     WishMember<std::string>{"scheduler", &InstanceWish::scheduler},
     WishMember<std::string>{"configured_application", &InstanceWish::configured_application},
     WishMember<std::string>{"configured_scheduler", &InstanceWish::configured_scheduler},

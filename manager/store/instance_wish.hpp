@@ -29,7 +29,10 @@ struct InstanceWish {
   std::string problem;     ///< why it failed
   std::string last_end;    ///< how the last process ended by itself; empty: it did not
   std::string application;
-  std::string scheduler;  ///< empty: as its settings say
+  std::string
+      application_before;  ///< the one that ran before `application`, while that has not come up; else empty
+  std::string taken_back;  ///< why `application` runs again, with the settings it had; empty: it does not
+  std::string scheduler;   ///< empty: as its settings say
   /// The configuration when this was written: a value that is another one now takes effect.
   std::string configured_application;
   std::string configured_scheduler;
@@ -51,10 +54,10 @@ struct InstanceWish {
   [[nodiscard]] InstanceWish after_power_cut() const;
 };
 
-/// Longer texts of `problem` and `last_end` are cut.
+/// Longer texts of `problem`, `last_end` and `taken_back` are cut.
 inline constexpr std::size_t kMaxWishText = 500;
 /// The most bytes of an encoded wish.
-inline constexpr std::size_t kMaxWishBytes = 15'000;
+inline constexpr std::size_t kMaxWishBytes = 20'000;
 
 /// As text, with a checksum over all of it.
 [[nodiscard]] std::string encode(const InstanceWish& wish);

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "manager/supervisor/managed_instance.hpp"
+#include "shm/base/names.hpp"
 #include "shm/log/log.hpp"
 
 namespace plchost {
@@ -23,8 +24,10 @@ void ManagedInstance::begin_download() {
   const auto order = ApplicationOrder::from_options(request.options);
   if (!order) return finish(order.error().code, order.error().describe());
   operation_->step = Step::storing;
+  LaunchOptions launch = launch_options(Next::run);
+  launch.kept_settings = false;
   const auto started =
-      surroundings_.applications.keep(*order, request.argument, application_, launch_options(Next::run),
+      surroundings_.applications.keep(*order, request.argument, application_, launch,
                                       [this](const Result<std::string>& path) { on_application_kept(path); });
   if (!started) finish(started.error().code, started.error().describe());
 }
@@ -94,10 +97,11 @@ void ManagedInstance::begin_change() {
 
 // The loaded application has not come up: the one before is started instead.
 void ManagedInstance::take_back_application(const std::string& why) {
-  operation_->refused = fmt::format("{} does not come up: {}", operation_->request.argument, why);
-  application_ = *std::exchange(operation_->before, std::nullopt);
+  taken_back_ = cut(fmt::format("{} does not come up: {}", application_, why), kMaxWishText);
+  application_ = *std::exchange(before_, std::nullopt);
   start_kind_ = StartKind::warm;
-  spdlog::warn("instance {}: {}; {} is started again", config_.name, operation_->refused, application_);
+  spdlog::warn("instance {}: {}; {} is started again with the settings that it ran with", config_.name,
+               taken_back_, application_);
   spawn(wants_running_ ? Next::run : Next::stay_stopped);
 }
 

@@ -146,6 +146,7 @@ void ManagedInstance::begin_load() {
   operation_->step = Step::checking;
   LaunchOptions launch = launch_options(Next::run);
   launch.application = operation_->request.argument;
+  launch.kept_settings = false;
   const auto started = host_.check_application(launch);
   if (!started) finish(started.error().code, started.error().describe());
 }
@@ -166,7 +167,7 @@ void ManagedInstance::apply_loaded_application() {
   if (removed_) return finish(ErrorCode::wrong_state, "it was removed from the configuration meanwhile");
   if (loads_online()) return begin_change();
   const bool works = phase_ == Phase::up && !history_.safe_mode && !silent_ && !application_.empty();
-  if (works) operation_->before = application_;
+  if (works) before_ = application_;
   application_ = operation_->request.argument;
   begun_with_.application = config_.application;  // the command is younger
   if (phase_ == Phase::down && status_.state == InstanceState::offline) {

@@ -33,7 +33,7 @@ void ManagedInstance::on_exit(const ExitStatus& status) {
 }
 
 void ManagedInstance::set_up_ended(const ExitStatus& status) {
-  const bool loaded = operation_ && operation_->step == Step::fresh_process && operation_->before;
+  const bool loaded = before_.has_value() && !removed_;
   const bool refused = status.exited_with(kExitSetupFailed) || status.exited_with(kExitUsage);
   if (!setup_failure_.empty()) {
     ended({.cause = cause_of_refusal(), .has_earlier = loaded},
@@ -119,6 +119,7 @@ void ManagedInstance::ended(End end, const std::string& why) {
   const bool cancelled =
       operation_ && operation_->request.verb == ControlVerb::stop && operation_->step == Step::until_up;
   end.order = cancelled ? Order::no_process : order();
+  end.has_earlier = end.has_earlier && !cancelled;
   const Decision decision = decided(end);
   if (decision.action == Decision::Action::start_earlier) return carry_out(decision, why);
   last_end_ = why;
@@ -132,7 +133,8 @@ void ManagedInstance::ended(End end, const std::string& why) {
   if (cancelled) {
     finish(ErrorCode::ok, fmt::format("its process ended meanwhile: {}; it is not started again", why));
   } else {
-    finish(ErrorCode::unavailable, fmt::format("the process of '{}' ended: {}{}", config_.name, why, later));
+    finish(ErrorCode::unavailable, fmt::format("{}{}the process of '{}' ended: {}{}", taken_back_,
+                                               taken_back_.empty() ? "" : "; ", config_.name, why, later));
   }
 }
 

@@ -45,6 +45,9 @@ void ManagedInstance::restore() {
   commanded_ = earlier.commanded;
   wants_running_ = earlier.commanded ? earlier.running : true;
   if (!earlier.host_ended || earlier.safe_mode) last_end_ = earlier.last_end;
+  if (!boots && !earlier.application_before.empty()) before_ = earlier.application_before;
+  // The run directory, where the settings of then are, may be empty after a power cut.
+  if (!earlier.host_ended) taken_back_ = earlier.taken_back;
   status_.restarts = earlier.restarts;
   // An instance that begins with the host begins for the first time; but a cold start that was asked for and
   // never came about is still due.
@@ -79,9 +82,12 @@ bool ManagedInstance::use_configuration() {
     if (application_.empty()) application_ = config_.application;
     history_ = {};
     last_end_.clear();
+    before_.reset();
   }
   // The change may have mended the cause of the failure.
-  return before.application != now.application || before.process != now.process;
+  const bool mended = before.application != now.application || before.process != now.process;
+  if (mended) taken_back_.clear();
+  return mended;
 }
 
 // The part of the configuration that the process was not begun with; empty: none.
@@ -191,6 +197,8 @@ InstanceWish ManagedInstance::wish() const {
   if (wish.failed) wish.problem = status_.problem.view();
   wish.last_end = last_end_.substr(0, kMaxWishText);
   wish.application = application_;
+  wish.application_before = before_.value_or("");
+  wish.taken_back = taken_back_;
   wish.scheduler = scheduler_;
   wish.configured_application = begun_with_.application;
   wish.configured_scheduler = begun_with_.scheduler;

@@ -112,7 +112,7 @@ void ManagedInstance::on_report(const SetupReport& report) {
     setup_failure_ = fmt::format("{}: {}", to_string(report.step), report.text);
     name_taken_ = report.code == ErrorCode::already_exists;
     transient_ = report.transient;
-    declaration_taken_ = report.step == SetupStep::load_application && report.code == ErrorCode::busy;
+    declaration_taken_ = report.code == ErrorCode::busy;
     return;  // the process ends by itself now, or the timer sees to it
   }
   if (!report.text.empty()) {
@@ -142,6 +142,7 @@ void ManagedInstance::come_up() {
   starved_by_.clear();
   up_since_ = settled_ = sign_at_ = surroundings_.now();
   start_kind_ = StartKind::warm;
+  before_.reset();
   // An adopted one may be in its set-up still, in which it answers to nobody.
   if (phase_ == Phase::setting_up) heard_of_ = true;
   if (history_.safe_mode) {
@@ -152,9 +153,9 @@ void ManagedInstance::come_up() {
   }
   if (!log_level_.empty()) use_log_level();
   if (!operation_) return;
-  if (operation_->step == Step::fresh_process && !operation_->refused.empty()) {
-    finish(ErrorCode::unavailable, fmt::format("{}; {}, which was loaded before, is started again",
-                                               operation_->refused, application_));
+  if (operation_->step == Step::fresh_process && !taken_back_.empty()) {
+    finish(ErrorCode::unavailable,
+           fmt::format("{}; {}, which was loaded before, is started again", taken_back_, application_));
   } else if (operation_->step == Step::fresh_process) {
     finish(ErrorCode::ok, application_.empty() ? "it is up without an application: load one" : loaded_text());
   } else if (operation_->step == Step::until_up) {
@@ -175,6 +176,9 @@ std::string ManagedInstance::problem_when_up() {
     add("no application; load one");
   } else if (!last_end_.empty()) {
     add("ended last: " + last_end_);
+  }
+  if (!taken_back_.empty() && !history_.safe_mode) {
+    add(fmt::format("{}; this one, which was loaded before, runs with the settings of then", taken_back_));
   }
   if (const std::string changes = awaited_changes(); !changes.empty()) add(changes);
   if (!starved_by_.empty()) add(starved_by_);
@@ -256,6 +260,7 @@ void ManagedInstance::set_up_failed(const std::string& why) {
 void ManagedInstance::fresh_process(Next next, StartKind kind) {
   commanded_ = wish_known_ = true;
   unreadable_.clear();
+  taken_back_.clear();
   if (next == Next::stay_stopped) wants_running_ = false;
   // The first process is the first one, however it was asked for.
   if (start_kind_ != StartKind::first || kind == StartKind::cold) start_kind_ = kind;
@@ -277,6 +282,7 @@ LaunchOptions ManagedInstance::launch_options(Next next) const {
   options.scheduler = scheduler_;
   options.priority_band = config_.priority_band;
   options.settings = config_.settings;
+  options.kept_settings = !taken_back_.empty();
   options.application = history_.safe_mode ? "" : application_;
   options.pool = surroundings_.host.pool;
   options.run_directory = surroundings_.host.run_directory;

@@ -74,8 +74,10 @@ inline constexpr Duration kAskAgain = std::chrono::seconds(2);
 //   unregister_event
 //
 //   download_application     a helper keeps and checks the file; then as load_application. A fault that the trial finds
-//                            ends nothing. If the new application does not come up, the one before starts again as it
-//                            was, and the reply tells both.
+//                            ends nothing.
+//                            Of all three loads: if the new application does not come up, the one before starts again
+//                            as it was, with the settings that it ran with. The reply and the problem text tell it. This
+//                            holds until the new one was up once, also after back-off and under the next manager.
 //   rollback_application     load_application of what was loaded before. That must have been sent.
 //   option "boot"            of all three: when all is done, the path becomes the boot application. The first process
 //                            begins with that instead of the configuration's.
@@ -172,8 +174,6 @@ class ManagedInstance : public InstanceEvents {
     ControlReplyFunction reply;
     Step step = Step::until_up;
     std::uint64_t forwarded_number = 0;
-    std::optional<std::string> before{};  // path of what ran until then, while it can be taken back
-    std::string refused{};                // why what was to be loaded did not come up; empty: it did
   };
 
   // Commands: instance_commands.cpp, application_commands.cpp
@@ -296,8 +296,8 @@ class ManagedInstance : public InstanceEvents {
   bool shutting_down_ = false;
   bool removed_ = false;    // from the configuration
   bool transient_ = false;  // this process could not be set up, but the next one may
-  // Another process has the thing that the application declares. It may let go of it, but the application
-  // before may do without.
+  // Another process has the thing that the application declares, or that its settings force. It may let go of
+  // it, but the application before may do without.
   bool declaration_taken_ = false;
   bool name_taken_ = false;  // another process of that name kept this one from being set up
   bool silent_ = false;      // its process does not beat
@@ -322,7 +322,12 @@ class ManagedInstance : public InstanceEvents {
   std::string setup_failure_;  // why the set-up failed; empty: it did not
   std::string last_end_;       // how the last process ended by itself; empty: it did not
   std::string application_;    // of the next process
-  std::string scheduler_;      // of the next process; empty: as its settings say
+  // Path of what ran before application_, until that has come up for the first time.
+  std::optional<std::string> before_;
+  // Why the application that was loaded last did not come up; empty: it did. If not, what ran before it runs
+  // with the settings of that time, until the next command that makes a process.
+  std::string taken_back_;
+  std::string scheduler_;  // of the next process; empty: as its settings say
   Configured begun_with_;
   std::string said_scheduler_;  // by this process
   std::string log_level_;       // that this process was given; empty: by an earlier manager

@@ -38,7 +38,7 @@ enum class EndCause : std::uint8_t {
   // The process could not be started.
   start_refused,      ///< wrong files or settings, or not ready in time
   start_transient,    ///< the host was short of something, or a lock was held
-  declaration_taken,  ///< another process has the output that the application declares
+  declaration_taken,  ///< another process has an output or a node address that the start needs
   name_taken,         ///< a process of that name is there already
   // The process is there, but its application does not run, or nobody can tell.
   exception,            ///< a fault has stopped the application

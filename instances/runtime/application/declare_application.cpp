@@ -9,12 +9,33 @@
 
 namespace plchost {
 
-Result<StartSettings> read_start_settings(const std::string& file) {
-  StartSettings start;
-  if (file.empty()) return start;
-  auto settings = read_settings(file);
+namespace {
+
+// Into `start`: the settings and their texts, from the files or as the process before has kept them.
+Result<void> read_settings_of(const LaunchOptions& launch, StartSettings& start) {
+  start.file = launch.settings;
+  Result<InstanceSettings> settings;
+  if (launch.kept_settings) {
+    auto kept = read_kept_settings(kept_settings_path(launch.run_directory, launch.name));
+    if (!kept) return std::unexpected(std::move(kept).error());
+    start.file = kept->file();
+    start.texts = kept->texts();
+    if (!start.file.empty()) settings = read_settings(start.file, *kept);
+  } else if (!start.file.empty()) {
+    SettingsFiles files;
+    settings = read_settings(start.file, files);
+    start.texts = files.texts();
+  }
   if (!settings) return std::unexpected(std::move(settings).error());
   start.settings = *std::move(settings);
+  return {};
+}
+
+}  // namespace
+
+Result<StartSettings> read_start_settings(const LaunchOptions& launch) {
+  StartSettings start;
+  if (auto read = read_settings_of(launch, start); !read) return std::unexpected(std::move(read).error());
   if (!start.settings.device_description.empty()) {
     auto device = read_device_description(start.settings.device_description);
     if (!device) return std::unexpected(std::move(device).error());

@@ -19,10 +19,12 @@ namespace plchost {
 struct StartSettings {
   InstanceSettings settings;
   std::optional<DeviceDescription> device;  ///< nothing: any external event is allowed
+  std::string file;                         ///< the settings file; empty: there is none
+  SettingsTexts texts;                      ///< of this file, and of those that it refers to
 };
 
-/// `file` may be empty. The error names file, line and key. Set-up.
-[[nodiscard]] Result<StartSettings> read_start_settings(const std::string& file);
+/// The file of `launch` may be empty. The error names file, line and key. Set-up.
+[[nodiscard]] Result<StartSettings> read_start_settings(const LaunchOptions& launch);
 
 /// Hands the parameters over, registers the events of the device description, and takes the instance's place
 /// among the nodes. A host without a pool does both as far as nothing of the pool is needed. Set-up.

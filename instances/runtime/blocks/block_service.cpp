@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "shm/base/process_start.hpp"
+#include "shm/block_driver/node_directory.hpp"
 #include "shm/log/log.hpp"
 
 namespace plchost {
@@ -10,6 +12,20 @@ BlockService::~BlockService() {
   stop_.store(true, std::memory_order_release);
   if (thread_.joinable()) router_->wake();
   thread_.join();
+}
+
+Result<void> BlockService::check(const std::string& pool, const std::string& instance,
+                                 const BlockSettings& settings) {
+  if (settings.forced_address == 0 || settings.forced_address > kMaxNodes) return {};
+  const auto directory = NodeDirectory::open_to_read(pool, settings.base);
+  if (!directory) return {};  // no node has joined yet
+  const auto owner = directory->record(settings.forced_address);
+  if (!owner || owner->name.view() == instance || process_has_ended(owner->pid, owner->process_start)) {
+    return {};
+  }
+  return failure(ErrorCode::busy, fmt::format("[CmpBlkDrvShm]: node address {} is taken: node '{}', process "
+                                              "{}, has it",
+                                              settings.forced_address, owner->name.view(), owner->pid));
 }
 
 Result<void> BlockService::configure(const BlockSettings& settings) {
@@ -30,7 +46,12 @@ Result<void> BlockService::join() {
                             .hop_limit = settings_.hop_limit,
                             .hold = settings_.hold};
   auto node = BlockNode::join(options);
-  if (!node) return failure_in("[CmpBlkDrvShm]", std::move(node).error());
+  if (!node) {
+    // To the manager already_exists is the instance's own name, for which it waits.
+    Error error = std::move(node).error();
+    if (error.code == ErrorCode::already_exists) error.code = ErrorCode::busy;
+    return failure_in("[CmpBlkDrvShm]", std::move(error));
+  }
   auto router = BlockRouter::create(**node);
   if (!router) return failure_in("[CmpBlkDrvShm]", std::move(router).error());
   auto thread = Thread::start("blocks", {}, [this, run = router->get()] { run->run(stop_); });

@@ -28,7 +28,11 @@ class BlockService {
   BlockService(const BlockService&) = delete;
   BlockService& operator=(const BlockService&) = delete;
 
-  /// Before the first channel. Joins if the settings want it. already_exists: the forced address is taken.
+  /// Whether another process has the address that the settings force, as far as that can be told without
+  /// joining. busy: it has. Set-up.
+  [[nodiscard]] static Result<void> check(const std::string& pool, const std::string& instance,
+                                          const BlockSettings& settings);
+  /// Before the first channel. Joins if the settings want it. busy: another process has the forced address.
   [[nodiscard]] Result<void> configure(const BlockSettings& settings);
 
   /// The handle of the channel of that name; one name, one handle. invalid_argument; full.

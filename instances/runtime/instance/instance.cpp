@@ -69,6 +69,7 @@ std::unique_ptr<Instance> Instance::set_up(const Options& options, SetupReporter
     reporter.done(step.step, *remark);
   }
   instance->beat();
+  instance->keep_settings();
   reporter.done(SetupStep::ready);
   return instance;
 }
@@ -104,7 +105,7 @@ Result<std::string> Instance::lock_memory() {
 }
 
 Result<std::string> Instance::read_settings_file() {
-  auto start = read_start_settings(options_.launch.settings);
+  auto start = read_start_settings(options_.launch);
   if (!start) return std::unexpected(std::move(start).error());
   start_ = *std::move(start);
   log_what_is_left_alone(start_.settings);
@@ -160,6 +161,15 @@ Result<std::string> Instance::open_control_socket() {
   control_.emplace(*std::move(server));
   restore_operator_events();
   return {};
+}
+
+// For the start that follows one that fails under other settings.
+void Instance::keep_settings() {
+  const LaunchOptions& launch = options_.launch;
+  if (launch.run_directory.empty()) return;
+  const auto kept = plchost::keep_settings(kept_settings_path(launch.run_directory, launch.name), start_.file,
+                                           start_.texts);
+  if (!kept) spdlog::warn("its settings are not kept: {}", kept.error().describe());
 }
 
 void Instance::restore_operator_events() {

@@ -134,6 +134,7 @@ class Instance {
   void report_tick();
   [[nodiscard]] std::string keep_fault(const TaskSet::Fault& fault);
   void restore_operator_events();
+  void keep_settings();
   void notify_tasks(unsigned event);
   void look_after_page();
 

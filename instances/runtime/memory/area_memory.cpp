@@ -102,15 +102,15 @@ Result<void> AreaMemory::check_device(const AreaSettings& settings) {
   return check_file(settings, status);
 }
 
-Result<void> AreaMemory::check_pool(const ObjectPool& pool, const std::string& name, std::size_t bytes) {
+Result<bool> AreaMemory::check_pool(const ObjectPool& pool, const std::string& name, std::size_t bytes) {
   const auto known = pool.look_at(name);
-  if (!known && known.error().code == ErrorCode::not_found) return {};
+  if (!known && known.error().code == ErrorCode::not_found) return false;
   if (!known) return std::unexpected(known.error());
   if (known->type != ObjectType::memory) {
     return failure(ErrorCode::wrong_type,
                    fmt::format("'{}' is no shared memory but a {}", name, to_string(known->type)));
   }
-  if (known->size == bytes) return {};
+  if (known->size == bytes) return true;
   return failure(ErrorCode::wrong_size,
                  fmt::format("shared memory '{}' has {} bytes, {} were asked for", name, known->size, bytes));
 }

@@ -53,7 +53,8 @@ class AreaMemory {
   /// Whether of_device() and of_pool() would find another thing there than they need, as far as that can be
   /// told without opening or making it. Set-up.
   [[nodiscard]] static Result<void> check_device(const AreaSettings& settings);
-  [[nodiscard]] static Result<void> check_pool(const ObjectPool& pool, const std::string& name,
+  /// False: there is no such memory yet.
+  [[nodiscard]] static Result<bool> check_pool(const ObjectPool& pool, const std::string& name,
                                                std::size_t bytes);
   [[nodiscard]] std::span<std::byte> bytes() const noexcept { return bytes_; }
   /// Its file was cut short: writes reach no reader. Any context.

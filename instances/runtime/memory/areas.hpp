@@ -18,6 +18,7 @@
 #include "instances/runtime/memory/task_areas.hpp"
 #include "schedulers/task/task_config.hpp"
 #include "shm/base/result.hpp"
+#include "shm/pool/pool_room.hpp"
 
 namespace plchost {
 
@@ -70,6 +71,7 @@ class Areas {
     std::string application;  ///< its name
     std::span<const AreaSettings> settings;
     RetainKeeper::Options retain;
+    PoolRoom* room = nullptr;  ///< null: check() does not look whether new memories find a place
   };
 
   /// plc_declare_area: checks it and adds it to `areas`. The handle of another version's area is that of the

@@ -70,8 +70,22 @@ Result<void> check_memory(const Areas::Environment& environment, const AreaSetti
                           const DeclaredArea& first) {
   if (settings.object.empty()) return AreaMemory::check_device(settings);
   if (environment.pool == nullptr) return {};
-  auto good = AreaMemory::check_pool(*environment.pool, settings.object, bytes_in_pool(settings, first));
-  return good ? good : failure_in(name_of(settings), std::move(good).error());
+  const std::size_t bytes = bytes_in_pool(settings, first);
+  const auto there = AreaMemory::check_pool(*environment.pool, settings.object, bytes);
+  if (!there) return failure_in(name_of(settings), there.error());
+  if (*there || environment.room == nullptr) return {};
+  auto room = environment.room->take_memory(settings.object, bytes);
+  return room ? room : failure_in(name_of(settings), std::move(room).error());
+}
+
+// The old memory goes only when the new one is whole, so both need their bytes.
+Result<void> check_kept(const Areas::Environment& environment, const RetainImage& kept) {
+  const std::string pool = environment.pool == nullptr ? std::string() : environment.pool->name();
+  const auto fresh = RetainKeeper::check(pool, environment.instance, kept, environment.retain);
+  if (!fresh) return std::unexpected(fresh.error());
+  if (*fresh == 0 || environment.room == nullptr) return {};
+  auto room = environment.room->take_memory(kept_memory_name(environment.instance), *fresh);
+  return room ? room : failure_in("retain variables", std::move(room).error());
 }
 
 // The settings are checked by their texts; but a file has many: symbolic and hard links, and that of a memory
@@ -132,8 +146,7 @@ Result<void> Areas::check(const Environment& environment, std::span<const Declar
   const RetainImage kept = kept_image(environment.application, areas);
   if (kept.layout.areas.empty()) return {};
   if (auto good = check_kept_bytes(kept.layout.bytes); !good) return good;
-  const std::string pool = environment.pool == nullptr ? std::string() : environment.pool->name();
-  return RetainKeeper::check(pool, environment.instance, kept.layout, environment.retain);
+  return check_kept(environment, kept);
 }
 
 Result<std::string> Areas::place(const Environment& environment, std::vector<DeclaredArea> areas,

@@ -39,6 +39,8 @@ class KeptMemory {
   [[nodiscard]] static Result<KeptMemory> make(ObjectPool& pool, const std::string& name,
                                                const RetainImage& image);
 
+  /// Of the whole memory, for so many bytes of data.
+  [[nodiscard]] static std::size_t bytes_for(std::uint64_t data) noexcept;
   [[nodiscard]] std::span<std::byte> data() const noexcept;
   /// For a task's cycles. Set-up.
   [[nodiscard]] CycleCounter& counter(std::size_t task) const noexcept;
@@ -70,7 +72,6 @@ class KeptMemory {
   explicit KeptMemory(SharedMemory memory) noexcept : memory_(std::move(memory)) {}
   [[nodiscard]] static Result<KeptMemory> of(Result<SharedMemory> opened, std::size_t bytes);
   [[nodiscard]] Header& header() const noexcept;
-  static std::size_t bytes_for(std::uint64_t data) noexcept;
 
   struct Elsewhere {
     std::size_t offset;

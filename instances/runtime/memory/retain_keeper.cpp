@@ -128,13 +128,16 @@ struct RetainKeeper::Start {
   }
 };
 
-Result<void> RetainKeeper::check(const std::string& pool, const std::string& instance,
-                                 const RetainLayout& layout, const Options& options) {
+Result<std::size_t> RetainKeeper::check(const std::string& pool, const std::string& instance,
+                                        const RetainImage& initial, const Options& options) {
   Start start;
   const bool files = !options.directory.empty();
   start.find_source(pool, kept_memory_name(instance),
                     files ? RetainFiles::look(options.directory, instance) : RetainFiles::Found{});
-  return start.judge(layout, options.mismatch);
+  if (auto judged = start.judge(initial.layout, options.mismatch); !judged)
+    return std::unexpected(std::move(judged).error());
+  if (start.goes_on_in_place(initial, options.cold)) return 0;
+  return KeptMemory::bytes_for(initial.layout.bytes);
 }
 
 Result<std::unique_ptr<RetainKeeper>> RetainKeeper::make(ObjectPool& pool, const std::string& instance,

@@ -34,9 +34,10 @@ class RetainKeeper {
   using Origin = unsigned;
 
   /// Whether make() would refuse this layout, as it is now: the process that runs goes on. Changes nothing.
-  /// `pool` may be empty: only the files count. Set-up.
-  [[nodiscard]] static Result<void> check(const std::string& pool, const std::string& instance,
-                                          const RetainLayout& layout, const Options& options);
+  /// `pool` may be empty: only the files count. The bytes of the memory that make() would make; 0: it goes on
+  /// in the one that is there. Set-up.
+  [[nodiscard]] static Result<std::size_t> check(const std::string& pool, const std::string& instance,
+                                                 const RetainImage& initial, const Options& options);
   /// `initial`: the layout with its initial values. Goes on with what is left in memory, else with the newest
   /// file that is whole. refused: that has another layout and the settings say so. Set-up.
   [[nodiscard]] static Result<std::unique_ptr<RetainKeeper>> make(ObjectPool& pool,

@@ -1,9 +1,7 @@
 #include "instances/runtime/settings/settings.hpp"
 
 #include <algorithm>
-#include <cerrno>
 #include <filesystem>
-#include <fstream>
 #include <set>
 #include <utility>
 
@@ -18,38 +16,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Result<std::string> read_text(const std::string& file) {
-  std::error_code error;
-  if (!fs::exists(file, error)) {
-    return failure(ErrorCode::not_found, fmt::format("settings file {} does not exist", file));
-  }
-  if (!fs::is_regular_file(file, error)) {
-    return failure(ErrorCode::invalid_argument, fmt::format("settings file {} is not a file", file));
-  }
-  std::ifstream stream(file, std::ios::binary);
-  std::string text(kMaxSettingsFile + 1, '\0');
-  if (!stream) return failure(ErrorCode::refused, fmt::format("open settings file {}", file), errno);
-  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (stream.bad()) return failure(ErrorCode::system, fmt::format("read settings file {}", file), errno);
-  text.resize(static_cast<std::size_t>(stream.gcount()));
-  if (text.size() > kMaxSettingsFile) {
-    return failure(ErrorCode::invalid_argument,
-                   fmt::format("settings file {} is larger than {} bytes", file, kMaxSettingsFile));
-  }
-  return text;
-}
-
 /// Reads a file, then those that it refers to, one after the other, each with its own references.
 class FileWalk {
  public:
+  explicit FileWalk(SettingsSource& source) noexcept : source_(source) {}
+
   Result<void> read(const std::string& file) {
-    const auto text = read_text(file);
+    const auto text = source_.text(file);
     if (!text) return std::unexpected(text.error());
     const fs::path folder = fs::absolute(file).parent_path();
     const auto references = parser_.read(*text, file, folder);
     if (!references) return std::unexpected(references.error());
-    std::error_code error;
-    const fs::path self = fs::canonical(file, error);
+    const fs::path self = source_.identity(file).value_or("");
     chain_.push_back(self);
     read_.insert(self);
     for (const FileReference& reference : *references) {
@@ -68,13 +46,13 @@ class FileWalk {
       return failure(ErrorCode::invalid_argument,
                      fmt::format("{}: FileReference to {}: {}", reference.where, shown(path.native()), what));
     };
-    std::error_code error;
-    const fs::path file = fs::canonical(path, error);
-    if (error) {
+    const auto known = source_.identity(path);
+    if (!known) {
       parser_.remark(reference.where, fmt::format("FileReference to {}: {}, so it is read without that",
-                                                  shown(path.native()), error.message()));
+                                                  shown(path.native()), known.error().message));
       return {};
     }
+    const fs::path file = *known;
     if (std::ranges::find(chain_, file) != chain_.end()) return bad("it refers back to this file");
     if (read_.contains(file)) return {};
     if (chain_.size() > kMaxReferenceDepth || read_.size() >= kMaxSettingsFiles) {
@@ -84,6 +62,7 @@ class FileWalk {
     return read(path);
   }
 
+  SettingsSource& source_;
   SettingsParser parser_;
   std::vector<fs::path> chain_;  // from the first file to the one that is read
   std::set<fs::path> read_;
@@ -100,7 +79,12 @@ Result<InstanceSettings> parse_settings(std::string_view text, std::string_view 
 }
 
 Result<InstanceSettings> read_settings(const std::string& file) {
-  FileWalk walk;
+  SettingsFiles files;
+  return read_settings(file, files);
+}
+
+Result<InstanceSettings> read_settings(const std::string& file, SettingsSource& source) {
+  FileWalk walk(source);
   if (auto read = walk.read(file); !read) return std::unexpected(std::move(read).error());
   return walk.finish();
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "instances/runtime/settings/block_settings.hpp"
+#include "instances/runtime/settings/settings_source.hpp"
 #include "instances/runtime/settings/task_settings.hpp"
 #include "schedulers/scheduler_settings.hpp"
 #include "schedulers/task/task_config.hpp"
@@ -89,7 +90,6 @@ struct InstanceSettings {
   bool operator==(const InstanceSettings&) const = default;
 };
 
-inline constexpr std::size_t kMaxSettingsFile = std::size_t{1} << 20;
 inline constexpr std::size_t kMaxComponents = 999;
 inline constexpr std::size_t kMaxParameters = 256;
 inline constexpr std::size_t kMaxParameterName = 50;
@@ -107,5 +107,7 @@ inline constexpr std::size_t kMaxSettingsFiles = 64;
 /// With the files of its [CmpSettings] FileReference.N. Relative paths in it are made absolute. not_found: no
 /// such file. Set-up.
 [[nodiscard]] Result<InstanceSettings> read_settings(const std::string& file);
+/// The same from `source`, or read through it.
+[[nodiscard]] Result<InstanceSettings> read_settings(const std::string& file, SettingsSource& source);
 
 }  // namespace plchost

@@ -86,6 +86,8 @@ void describe(CLI::App& app, Options& options) {
       ->check(check_band)
       ->capture_default_str();
   app.add_option("--settings", launch.settings, "Settings file, [Section] Key=Value");
+  app.add_flag("--kept-settings", launch.kept_settings,
+               "Use the settings as the process before came up with them, whatever the file says now");
   app.add_option("--application", launch.application, "The application, a shared object");
   app.add_option("--pool", launch.pool, "Name of the object pool")
       ->check(check_pool_name)

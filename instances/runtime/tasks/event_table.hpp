@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "instances/plc_app.h"
-#include "instances/runtime/tasks/pool_room.hpp"
 #include "shm/base/result.hpp"
 #include "shm/pool/object_pool.hpp"
+#include "shm/pool/pool_room.hpp"
 
 namespace plchost {
 
@@ -29,6 +29,8 @@ class EventTable {
 
   /// Without a pool: from now on each event is refused that would find no place in `room`. For a trial.
   void look_for_room(PoolRoom room) { room_ = std::move(room); }
+  /// That room, for what else the start makes; null: nobody looks for it.
+  [[nodiscard]] PoolRoom* room() noexcept { return room_ ? &*room_ : nullptr; }
 
   /// Takes back what a dead process of this instance's name has left: its registrations and bound tasks.
   void clear_own();

@@ -14,16 +14,17 @@
 #include "instances/runtime/application/application.hpp"
 #include "instances/runtime/application/components.hpp"
 #include "instances/runtime/application/declare_application.hpp"
+#include "instances/runtime/blocks/block_service.hpp"
 #include "instances/runtime/settings/settings.hpp"
 #include "instances/runtime/setup/process_setup.hpp"
 #include "instances/runtime/setup/set_up_watch.hpp"
-#include "instances/runtime/tasks/pool_room.hpp"
 #include "instances/runtime/trial/trial_process.hpp"
 #include "schedulers/task_set.hpp"
 #include "schedulers/tick/device_file.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/thread.hpp"
 #include "shm/pages/instance_page.hpp"
+#include "shm/pool/pool_room.hpp"
 
 namespace plchost {
 
@@ -127,13 +128,15 @@ Result<DeclaredApplication> declare_watched(const std::string& path, const Start
 
 // All that a start does, by the same functions in the same order, as far as it takes nothing from the
 // instance that runs. Some things are free only when that instance has ended: its name, its control socket
-// and its status page, its address among the nodes, and the resources of its components' CH_INIT.. hooks. Its
-// memories and outputs are only looked at.
+// and its status page, and the resources of its components' CH_INIT.. hooks. Its address among the nodes, its
+// memories and outputs are only looked at. If one of these fails, the manager takes the start back.
 Result<DeclaredApplication> try_start(const Options& options, Components& components, ApplicationHost& host) {
   const LaunchOptions& launch = options.launch;
   if (auto granted = try_cores(launch.cores); !granted) return std::unexpected(std::move(granted).error());
-  auto start = read_start_settings(launch.settings);
+  auto start = read_start_settings(launch);
   if (!start) return std::unexpected(std::move(start).error());
+  if (auto free = BlockService::check(launch.pool, launch.name, start->settings.blocks); !free)
+    return std::unexpected(std::move(free).error());
   auto attached = ObjectPool::attach(launch.pool, ObjectPool::Access::read_only);
   std::optional<ObjectPool> pool;
   if (attached) pool.emplace(*std::move(attached));
@@ -144,7 +147,8 @@ Result<DeclaredApplication> try_start(const Options& options, Components& compon
   const auto& [application, declaration] = *declared;
   if (auto reserved = host.reserve(declaration); !reserved)
     return std::unexpected(std::move(reserved).error());
-  const auto environment = areas_environment(launch, start->settings, application, pool ? &*pool : nullptr);
+  auto environment = areas_environment(launch, start->settings, application, pool ? &*pool : nullptr);
+  environment.room = host.events().room();
   if (auto good = Areas::check(environment, declaration.areas); !good)
     return std::unexpected(std::move(good).error());
   if (auto good = try_tasks(options, start->settings, application, host); !good)

@@ -7,6 +7,7 @@
 #include <gmock/gmock.h>
 
 #include "shm/base/thread.hpp"
+#include "shm/block_driver/node_directory.hpp"
 #include "shm/pool/object_pool.hpp"
 #include "tests/integration/manager/plant.hpp"
 
@@ -89,6 +90,49 @@ TEST_F(Trial, FindsAComponentThatSaysItCannotBeInitialised) {
               AllOf(HasSubstr("manager_unready_component.so"), HasSubstr("its hook CH_TRIAL returned 0x")));
 }
 
+// No trial finds it: the component fails in CH_INIT only. The settings that name it are not those of the
+// application that ran.
+TEST_F(Trial, IsTakenBackForAComponentThatFailsInTheStartOnly) {
+  start("bottling_line");
+  const std::string component = Plant::application("manager_late_component");
+  plant_.write_file("line1.cfg", "[ComponentManager]\nComponent.1=" + component + "\n");
+  const auto reply = plant_.ask(ControlVerb::load_application, "line1", Plant::application("packer"));
+  EXPECT_EQ(reply.code, ErrorCode::unavailable);
+  EXPECT_THAT(reply.text,
+              AllOf(HasSubstr("packer.so does not come up"), HasSubstr("its hook CH_INIT returned"),
+                    HasSubstr("which was loaded before, is started again")));
+  ASSERT_TRUE(plant_.wait_for("line1", InstanceState::running));
+  const InstanceStatus status = plant_.status("line1");
+  EXPECT_NE(status.pid, pid_);
+  EXPECT_EQ(status.application.view(), Plant::application("bottling_line"));
+  EXPECT_THAT(std::string(status.problem.view()), HasSubstr("packer.so does not come up"));
+  EXPECT_THAT(plant_.log(),
+              HasSubstr("bottling_line.so is started again with the settings that it ran with"));
+  EXPECT_TRUE(plant_.wait_for_cycles("line1"));
+  plant_.kill_instances();
+  EXPECT_TRUE(Plant::eventually([&] {
+    const auto now = plant_.status("line1");
+    return now.state == InstanceState::running && now.pid != status.pid;
+  })) << "the settings of then hold until somebody mends the file";
+  plant_.write_file("line1.cfg", "");
+  EXPECT_EQ(plant_.ask(ControlVerb::restart, "line1").code, ErrorCode::ok);
+  EXPECT_EQ(plant_.status("line1").problem.view(), "");
+}
+
+TEST_F(Trial, FindsANodeAddressThatAnotherProcessHas) {
+  start("bottling_line");
+  auto directory = NodeDirectory::open(plant_.pool());
+  ASSERT_TRUE(directory);
+  const auto life = directory->join({.name = "firmware", .forced_address = 7});
+  ASSERT_TRUE(life) << life.error().describe();
+  plant_.write_file("line1.cfg", "[CmpBlkDrvShm]\nForcedAddress=7\n");
+  EXPECT_THAT(refusal("packer"), HasSubstr("node address 7 is taken: node 'firmware'"));
+  directory->leave(*life);
+  const auto reply = plant_.ask(ControlVerb::load_application, "line1", Plant::application("packer"));
+  EXPECT_EQ(reply.code, ErrorCode::ok) << reply.text;
+  NodeDirectory::remove(plant_.pool());
+}
+
 TEST_F(Trial, FindsAFunctionThatIsNoClock) {
   start("bottling_line");
   plant_.write_file(
@@ -131,6 +175,26 @@ TEST_F(Trial, FindsThatThePoolHasNoRoomForAnEvent) {
   EXPECT_THAT(refusal("packer"), HasSubstr("'line1/product' in pool"));
   ASSERT_TRUE(pool->remove_object("line1/product"));
   const auto reply = plant_.ask(ControlVerb::load_application, "line1", Plant::application("packer"));
+  EXPECT_EQ(reply.code, ErrorCode::ok) << reply.text;
+}
+
+TEST_F(Trial, FindsThatThePoolHasNoRoomForAMemory) {
+  plant_.set_host_keys("pool_objects = 64");
+  start("manager_chatter");
+  auto pool = ObjectPool::attach(plant_.pool());
+  ASSERT_TRUE(pool);
+  int made = 0;
+  const auto name_of = [](int number) { return "others/" + std::to_string(number); };
+  while (pool->create_semaphore(name_of(made), 1, {.keep = true})) ++made;
+  ASSERT_GT(made, 3);
+  ASSERT_TRUE(pool->remove_object(name_of(0)));  // for its event
+  EXPECT_THAT(refusal("areas"), AllOf(HasSubstr("has no room for memory 'line1.retain'"), HasSubstr("64")));
+  ASSERT_TRUE(pool->remove_object(name_of(1)));
+  plant_.write_file(
+      "line1.cfg", "[SysMem]\nLinux.Area.0.Flags=0x8000\nLinux.Area.0.Object=io.data\nLinux.Area.0.Size=8\n");
+  EXPECT_THAT(refusal("areas"), HasSubstr("has no room for memory '"));
+  ASSERT_TRUE(pool->remove_object(name_of(2)));
+  const auto reply = plant_.ask(ControlVerb::load_application, "line1", Plant::application("areas"));
   EXPECT_EQ(reply.code, ErrorCode::ok) << reply.text;
 }
 

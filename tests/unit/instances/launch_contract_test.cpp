@@ -23,6 +23,7 @@ TEST(LaunchContract, CommandLineOfTheManagerIsUnderstoodByTheInstance) {
                               .cores = {1, 3},
                               .scheduler = "CmpScheduleOneShot",
                               .priority_band = "high",
+                              .kept_settings = true,
                               .settings = "/etc/line1.cfg",
                               .application = "/opt/line1.so",
                               .pool = "plant",
@@ -38,6 +39,7 @@ TEST(LaunchContract, CommandLineOfTheManagerIsUnderstoodByTheInstance) {
   EXPECT_THAT(sut.cores, ElementsAre(1, 3));
   EXPECT_EQ(sut.scheduler, "CmpScheduleOneShot");
   EXPECT_EQ(parsed.options->band, PriorityBand::high);
+  EXPECT_TRUE(sut.kept_settings);
   EXPECT_EQ(sut.settings, "/etc/line1.cfg");
   EXPECT_EQ(sut.application, "/opt/line1.so");
   EXPECT_EQ(sut.pool, "plant");

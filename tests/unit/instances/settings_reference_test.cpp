@@ -101,5 +101,32 @@ TEST_F(SettingsReference, ErrorsNameTheFileThatTheyAreIn) {
   EXPECT_THAT(sut.error().message, HasSubstr(path("user.cfg") + ":2: [CmpSchedule] SchedulerInterval: '1'"));
 }
 
+TEST_F(SettingsReference, IsReadFromTextsThatWereKept) {
+  write("a.cfg", "[CmpSchedule]\nSchedulerInterval=2000\n");
+  const std::string first =
+      write("first.cfg", "[CmpSettings]\nFileReference.0=a.cfg\nFileReference.1=gone.cfg\n");
+  SettingsFiles files;
+  const auto before = read_settings(first, files);
+  ASSERT_TRUE(before);
+  ASSERT_TRUE(keep_settings(path("kept"), first, files.texts()));
+  write("a.cfg", "[CmpSchedule]\nSchedulerInterval=5000\n");
+  write("gone.cfg", "[CmpSchedule]\nSchedulerInterval=5000\n");
+  std::filesystem::remove(first);
+  auto kept = read_kept_settings(path("kept"));
+  ASSERT_TRUE(kept);
+  EXPECT_EQ(kept->file(), first);
+  const auto sut = read_settings(first, *kept);
+  ASSERT_TRUE(sut) << sut.error().describe();
+  EXPECT_EQ(sut->scheduler, before->scheduler);
+  EXPECT_EQ(sut->remarks.size(), 1U);
+}
+
+TEST_F(SettingsReference, OfKeptTextsThatAreNoneIsRefused) {
+  EXPECT_EQ(read_kept_settings(path("none")).error().code, ErrorCode::not_found);
+  for (const char* text : {"", "[CmpSchedule]", "\xa1\x61\x61\x01"}) {
+    EXPECT_EQ(read_kept_settings(write("kept", text)).error().code, ErrorCode::corrupt);
+  }
+}
+
 }  // namespace
 }  // namespace plchost

@@ -30,6 +30,7 @@ class FakeHost : public InstanceHost {
   void set_timer(std::optional<TimePoint> when) override { timer = when; }
   [[nodiscard]] Result<void> check_application(const LaunchOptions& options) override {
     checked.push_back(options.application);
+    launch_checked = options;
     return {};
   }
   [[nodiscard]] std::optional<InstanceRuntime> runtime() override { return page; }
@@ -43,6 +44,7 @@ class FakeHost : public InstanceHost {
   std::vector<ControlRequest> requests;
   std::vector<int> signals;
   std::vector<std::string> checked;
+  LaunchOptions launch_checked;  // the last one
   std::optional<TimePoint> timer;
   std::optional<InstanceRuntime> page;
   std::optional<int> adoptable;

@@ -37,8 +37,8 @@ TEST(InstanceWishText, IsRefusedWhereAnyByteIsAnotherOne) {
 TEST(InstanceWishText, OfTheLongestTextsHasRoom) {
   InstanceWish wish = some_wish();
   constexpr std::size_t kLong = 5000;
-  wish.problem = wish.last_end = std::string(kLong, '\x01');
-  wish.application = wish.configured_application = std::string(255, '\x01');
+  wish.problem = wish.last_end = wish.taken_back = std::string(kLong, '\x01');
+  wish.application = wish.application_before = wish.configured_application = std::string(255, '\x01');
   constexpr std::size_t kMostCrashes = 100;
   wish.crashes_unix_ns.assign(kMostCrashes, INT64_MIN);
   EXPECT_LE(encode(wish).size(), kMaxWishBytes);
