@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <utility>
+#include <vector>
 
 #include <fmt/format.h>
 
+#include "instances/runtime/setup/long_run_search.hpp"
 #include "schedulers/faults/processor_guard.hpp"
 #include "schedulers/faults/starvation.hpp"
 
@@ -15,6 +17,15 @@ namespace {
 constexpr Duration kLook = std::chrono::milliseconds(50);
 // While the process stood still, so did the set-up.
 constexpr Duration kLongestGap = std::chrono::milliseconds(200);
+
+// Above all threads of the application, if the host allows it.
+constexpr int kWatchPriority = 99;
+
+// Bound to the cores of the thread that sets up, or to some of them: it takes them from that one.
+bool runs_beside(pid_t thread, const std::vector<int>& cores) {
+  const auto there = allowed_cores(thread);
+  return there && std::ranges::includes(cores, *there);
+}
 
 Result<void> look_for_taker() {
   const auto taker = ProcessorGuard::take();
@@ -31,19 +42,26 @@ Result<void> look_for_taker() {
 SetUpWatch::SetUpWatch(Duration guard, Fail fail) : fail_(std::move(fail)) {
   const Duration limit = Starvation::limit_for(guard);
   if (limit == Duration::zero() || !ProcessorGuard::install()) return;
-  auto thread = Thread::start("set-up watch", {}, [this] { run(); });
+  const auto watch = [this, limit, cores = allowed_cores(0).value_or(std::vector<int>{})] {
+    run(limit, cores);
+  };
+  auto thread = Thread::start("set-up watch", {.fifo = kWatchPriority}, watch);
+  if (!thread) thread = Thread::start("set-up watch", {}, watch);
   if (!thread) return;  // the manager's limit is left
   thread_ = std::move(*thread);
   ProcessorGuard::watch_set_up(limit);
 }
 
-void SetUpWatch::run() {
+void SetUpWatch::run(Duration limit, const std::vector<int>& cores) {
+  LongRunSearch search(linux_processor_times(), limit,
+                       [&](pid_t thread) { return runs_beside(thread, cores); });
   std::unique_lock lock(mutex_);
   Duration lasted{};
   TimePoint looked = MonotonicClock::now();
   while (!stops_.wait_for(lock, kLook, [this] { return stopped_; })) {
     const TimePoint now = MonotonicClock::now();
     lasted += std::min(now - std::exchange(looked, now), kLongestGap);
+    if (const auto taker = search.look(now)) ProcessorGuard::report(taker->who, taker->lasted);
     auto good = look_for_taker();
     if (good && lasted >= kLimit) {
       good = failure(ErrorCode::refused,

@@ -3,6 +3,7 @@
 #include <condition_variable>
 #include <functional>
 #include <mutex>
+#include <vector>
 
 #include "shm/base/result.hpp"
 #include "shm/base/thread.hpp"
@@ -12,7 +13,8 @@ namespace plchost {
 
 /// Watches over code of components and of the application in the set-up, which runs on the control thread
 /// outside of any cycle. A thread of theirs that takes the processor by a real-time priority loses that, and
-/// the set-up fails. So it does when it does not return.
+/// the set-up fails. So it does when it does not return. A thread that blocks SIGXCPU is found, too, unless
+/// it runs at SCHED_FIFO 99 and the kernel leaves no time to others (sched_rt_runtime_us is -1).
 class SetUpWatch {
  public:
   /// A set-up may take so long: less than the manager gives the whole start, so that its cause is told.
@@ -31,7 +33,7 @@ class SetUpWatch {
   [[nodiscard]] Result<void> end();
 
  private:
-  void run();
+  void run(Duration limit, const std::vector<int>& cores);
   void stop();
 
   Fail fail_;

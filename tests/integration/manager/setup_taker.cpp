@@ -3,6 +3,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <csignal>
 
 #include <pthread.h>
 #include <sched.h>
@@ -14,6 +15,11 @@ namespace {
 std::atomic<bool> always{true};
 
 void* loop(void* name) {
+#ifdef BLOCKS_SIGNALS
+  sigset_t all;
+  sigfillset(&all);
+  pthread_sigmask(SIG_BLOCK, &all, nullptr);
+#endif
   const sched_param priority{.sched_priority = 60};
   pthread_setschedparam(pthread_self(), SCHED_FIFO, &priority);
   if (name != nullptr) pthread_setname_np(pthread_self(), static_cast<const char*>(name));

@@ -156,6 +156,14 @@ TEST_F(Trial, FindsAThreadThatTakesTheProcessorInTheSetUp) {
               HasSubstr("in the set-up, thread 'hog' (SCHED_FIFO 60) took the "));
 }
 
+// The kernel's limit cannot interrupt it.
+TEST_F(Trial, FindsAThreadThatTakesTheProcessorInTheSetUpAndBlocksAllSignals) {
+  if (!Thread::start("probe", {.fifo = 1}, [] {})) GTEST_SKIP() << "no right to SCHED_FIFO";
+  start("bottling_line");
+  EXPECT_THAT(refusal("manager_setup_deaf_hog"),
+              HasSubstr("in the set-up, thread 'hog' (SCHED_FIFO 60) took the "));
+}
+
 TEST_F(Trial, FindsThatThePoolHasNoRoomForAnEvent) {
   plant_.set_host_keys("pool_objects = 64");
   start("manager_chatter");
