@@ -94,7 +94,8 @@ std::vector<std::string> ApiServer::arguments() const {
                                         fmt::format("{}", host.application_limit_mib),
                                         "--log-level",
                                         host.log_level,
-                                        "--end-with-parent"};
+                                        "--parent",
+                                        fmt::format("{}", ::getpid())};
   for (const std::string& label : host.labels) {
     arguments.emplace_back("--label");
     arguments.push_back(label);

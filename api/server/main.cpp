@@ -2,13 +2,13 @@
 #include <string>
 
 #include <CLI/CLI.hpp>
-#include <sys/prctl.h>
 
 #include "api/control/exit_codes.hpp"
 #include "api/dds/cyclone_version.h"
 #include "api/server/access/receive_gate.hpp"
 #include "api/server/control_server.hpp"
 #include "api/server/heap_trim.hpp"
+#include "shm/base/end_with_parent.hpp"
 #include "shm/base/memory_guard.hpp"
 #include "shm/log/log.hpp"
 
@@ -32,7 +32,7 @@ int main(int argc, char** argv) {
   plchost::ServerOptions options;
   options.pool = "plchost";
   std::string log_level = "info";
-  bool end_with_parent = false;
+  pid_t parent = 0;
   CLI::App app("plchost-dds: the API server of plchost, started by plchostd");
   app.set_version_flag("--version", PLCHOST_VERSION);
   app.add_option("--host", options.host, "name of this host in the DDS domain")->required();
@@ -64,8 +64,8 @@ int main(int argc, char** argv) {
                  "where the manager keeps the applications that were sent");
   app.add_option("--application-limit", options.application_limit_mib, "the largest of them, MiB")
       ->check(CLI::Range(1U, 1024U));
-  app.add_flag("--end-with-parent", end_with_parent,
-               "be killed when the process that has started this one ends");
+  app.add_option("--parent", parent, "be killed when this process ends, which has started this one")
+      ->check(CLI::NonNegativeNumber);
   app.add_option("--log-level", log_level, "trace, debug, info, warning or error")
       ->check(CLI::IsMember({"trace", "debug", "info", "warning", "error"}));
   try {
@@ -74,7 +74,7 @@ int main(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : kExitUsage;
   }
   // Also one that hangs or is stopped: two of one host would write over each other's status.
-  if (end_with_parent) (void)::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (parent != 0 && !plchost::end_with_parent(parent, SIGKILL)) return kExitFailed;
   plchost::start_log("plchost-dds", log_level);
   (void)std::signal(SIGPIPE, SIG_IGN);
   if (const char* const why = plc_unknown_cyclone(); why != nullptr)

@@ -7,7 +7,6 @@
 
 #include <fmt/format.h>
 #include <poll.h>
-#include <sys/prctl.h>
 #include <sys/signalfd.h>
 #include <sys/timerfd.h>
 #include <unistd.h>
@@ -18,6 +17,7 @@
 #include "instances/runtime/setup/options.hpp"
 #include "instances/runtime/trial/application_check.hpp"
 #include "instances/runtime/trial/trial_process.hpp"
+#include "shm/base/end_with_parent.hpp"
 #include "shm/base/memory_guard.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/unique_fd.hpp"
@@ -109,8 +109,7 @@ int run(const Options& options) {
   }
   if (!options.check_application.empty()) {
     // SIGTERM and not SIGKILL: processes that the application has forked end, too.
-    if (options.parent != 0) ::prctl(PR_SET_PDEATHSIG, SIGTERM);
-    if (options.parent != 0 && ::getppid() != options.parent) return kExitSetupFailed;
+    if (options.parent != 0 && !end_with_parent(options.parent, SIGTERM)) return kExitSetupFailed;
     set_log_pattern("%l: %v");  // read by people and told in answers
     return run_trial(options.check_application, signals->get(), [&] { return check_application(options); });
   }

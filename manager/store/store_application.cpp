@@ -13,13 +13,13 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <poll.h>
-#include <sys/prctl.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include "api/control/application_versions.hpp"
 #include "api/security/sha256.hpp"
 #include "manager/system/application_trial.hpp"
+#include "shm/base/end_with_parent.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/unique_fd.hpp"
@@ -226,9 +226,9 @@ Result<std::string> carry_out(const StoreOrder& order) {
 }
 
 int store_main(std::string_view order) {
-  // Nobody would hear of what it has kept: its manager is gone, or has given it up.
-  (void)::prctl(PR_SET_PDEATHSIG, SIGKILL);
   const auto read = decode_store_order(order);
+  // Nobody would hear of what it has kept: its manager is gone, or has given it up.
+  if (read && !end_with_parent(read->parent, SIGKILL)) return static_cast<int>(ErrorCode::unavailable);
   const auto done = read ? carry_out(*read) : Result<std::string>(std::unexpected(read.error()));
   fmt::print("{}", done ? *done : done.error().describe());
   return done ? 0 : static_cast<int>(done.error().code);

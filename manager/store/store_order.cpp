@@ -38,7 +38,7 @@ Result<std::uint64_t> order_number(const Json& json, const char* key, std::uint6
 }  // namespace
 
 std::string encode(const StoreOrder& order) {
-  Json json{{"size", order.size}, {"keep", order.keep}, {"trial", order.trial}};
+  Json json{{"parent", order.parent}, {"size", order.size}, {"keep", order.keep}, {"trial", order.trial}};
   for (const OrderText& text : kOrderTexts) json[text.key] = order.*text.member;
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
@@ -58,12 +58,15 @@ Result<StoreOrder> decode_store_order(std::string_view text) {
   const auto keep = order_number(json, "keep", std::numeric_limits<std::uint32_t>::max());
   if (!size) return std::unexpected(size.error());
   if (!keep) return std::unexpected(keep.error());
+  const auto parent = order_number(json, "parent", std::numeric_limits<std::int32_t>::max());
+  if (!parent) return std::unexpected(parent.error());
   const auto trial = json.find("trial");
   if (trial == json.end() || !trial->is_array() ||
       !std::ranges::all_of(*trial, [](const Json& argument) { return argument.is_string(); })) {
     return failure(ErrorCode::corrupt, "the order has no command line 'trial'");
   }
   order.trial = trial->get<std::vector<std::string>>();
+  order.parent = static_cast<pid_t>(*parent);
   order.size = *size;
   order.keep = static_cast<std::uint32_t>(*keep);
   return order;

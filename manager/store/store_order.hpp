@@ -5,6 +5,8 @@
 #include <string_view>
 #include <vector>
 
+#include <sys/types.h>
+
 #include "shm/base/result.hpp"
 
 namespace plchost {
@@ -13,6 +15,7 @@ namespace plchost {
 /// disk and read foreign files, the manager must not. One of two things: keep a file that was sent, or, if
 /// `boot` is not empty, make that path the boot application.
 struct StoreOrder {
+  pid_t parent = 0;    ///< the manager that waits for the answer
   std::string folder;  ///< of the instance, see api/control/application_versions.hpp; made if it is missing
   std::string boot;    ///< absolute path
   std::string

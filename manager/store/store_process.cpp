@@ -4,6 +4,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "manager/system/application_trial.hpp"
 #include "shm/log/log.hpp"
@@ -56,8 +57,9 @@ std::optional<ApplicationVersion> StoreProcess::version_at(const std::string& pa
       [folder = settings_.folder, path] { return plchost::version_at(folder, path); });
 }
 
-Result<void> StoreProcess::start(const StoreOrder& order, Done done) {
+Result<void> StoreProcess::start(StoreOrder order, Done done) {
   constexpr std::size_t kShown = 4000;
+  order.parent = ::getpid();
   return helper_.start({settings_.helper, kStoreOption, encode(order)}, kStoreLimit, kShown,
                        [done = std::move(done)](const HelperEnd& end) { ended(end, done); });
 }

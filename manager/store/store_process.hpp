@@ -37,7 +37,7 @@ class StoreProcess : public ApplicationKeeper {
  private:
   template <class Answer>
   [[nodiscard]] Answer look(std::function<Answer()> at_folder) const;
-  [[nodiscard]] Result<void> start(const StoreOrder& order, Done done);
+  [[nodiscard]] Result<void> start(StoreOrder order, Done done);
   static void ended(const HelperEnd& end, const Done& done);
 
   DiskThread& disk_;

@@ -8,10 +8,10 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <spawn.h>
-#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "shm/base/end_with_parent.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/unique_fd.hpp"
 
@@ -71,8 +71,7 @@ Result<std::string> output_of(const std::vector<std::string>& arguments) {
 }
 
 void end_with(pid_t parent, int signal) noexcept {
-  ::prctl(PR_SET_PDEATHSIG, signal);
-  if (::getppid() != parent) ::_exit(1);
+  if (!end_with_parent(parent, signal)) ::_exit(1);
 }
 
 bool is_installed(const std::string& program) {

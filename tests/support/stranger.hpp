@@ -1,6 +1,7 @@
 #pragma once
 
 #include <csignal>
+#include <cstdlib>
 #include <fstream>
 #include <string>
 #include <vector>
@@ -12,6 +13,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "shm/base/end_with_parent.hpp"
+
 namespace plchost {
 
 /// A program that has nothing to do with plchost and takes a core from all threads without real-time
@@ -21,9 +24,10 @@ class Stranger {
  public:
   Stranger(int core, int fifo) {
     constexpr int kGreedy = 4;
+    const pid_t parent = ::getpid();
     for (int i = 0; i <= kGreedy; ++i) {
       const pid_t pid = ::fork();
-      if (pid == 0) take(core, i == 0 ? fifo : 0);
+      if (pid == 0) take(core, i == 0 ? fifo : 0, parent);
       if (pid > 0) processes_.push_back(pid);
     }
   }
@@ -49,8 +53,8 @@ class Stranger {
     std::ofstream(fmt::format("/proc/{}/autogroup", process)) << nice << std::flush;
   }
 
-  [[noreturn]] static void take(int core, int fifo) {
-    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  [[noreturn]] static void take(int core, int fifo, pid_t parent) {
+    if (!end_with_parent(parent, SIGKILL)) ::_exit(EXIT_FAILURE);
     ::prctl(PR_SET_NAME, "stranger");
     ::setsid();
     cpu_set_t one;

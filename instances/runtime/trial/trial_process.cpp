@@ -27,6 +27,7 @@
 #include "instances/launch/launch_contract.hpp"
 #include "instances/runtime/application/symbol_name.hpp"
 #include "schedulers/faults/fault_signals.hpp"
+#include "shm/base/end_with_parent.hpp"
 #include "shm/base/thread.hpp"
 #include "shm/base/unique_fd.hpp"
 
@@ -90,9 +91,8 @@ void catch_crashes(const std::string& application, int verdict) {
 // The child. The verdict goes to the parent last: an exit code alone could be the application's.
 [[noreturn]] void try_out(const std::string& application, const UniqueFd& verdict, pid_t parent,
                           const std::function<int()>& check) {
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (::getppid() != parent) ::_exit(kExitSetupFailed);  // it ended before
-  const auto stack = AlternateStack::make();             // a stack that is full is a crash, too
+  if (!end_with_parent(parent, SIGKILL)) ::_exit(kExitSetupFailed);
+  const auto stack = AlternateStack::make();  // a stack that is full is a crash, too
   std::optional<AlternateStack::Use> use;
   if (stack) use.emplace(*stack);
   catch_crashes(application, verdict.get());

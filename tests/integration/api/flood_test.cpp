@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <sys/mman.h>
-#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -14,6 +13,7 @@
 #include "api/dds/domain.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"
+#include "shm/base/end_with_parent.hpp"
 #include "tests/integration/api/test_host.hpp"
 
 namespace plchost {
@@ -24,8 +24,10 @@ using std::chrono::milliseconds;
 /// A client that posts as fast as it can and waits for nothing: a process of its own, until this object goes.
 class Flood {
  public:
-  explicit Flood(const OwnDomain& domain) : pid_(::fork()) {
-    if (pid_ == 0) run(domain);
+  explicit Flood(const OwnDomain& domain) {
+    const pid_t parent = ::getpid();
+    pid_ = ::fork();
+    if (pid_ == 0) run(domain, parent);
   }
   Flood(const Flood&) = delete;
   Flood& operator=(const Flood&) = delete;
@@ -35,14 +37,14 @@ class Flood {
   }
 
  private:
-  [[noreturn]] static void run(const OwnDomain& domain) {
-    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  [[noreturn]] static void run(const OwnDomain& domain, pid_t parent) {
+    if (!end_with_parent(parent, SIGKILL)) ::_exit(EXIT_FAILURE);
     const auto client = connect(domain);
     while (!client->prepare_posts("hosta", soon())) {
     }
     for (;;) (void)client->post_one("hosta", "line1", "flood");
   }
-  pid_t pid_;
+  pid_t pid_ = 0;
 };
 
 double to_ms(Duration duration) {
@@ -146,8 +148,9 @@ TEST(PostFlood, IsCountedToTheLastPost) {
 }
 
 /// Requests as fast as they can be written, to be answered by nobody: a process of its own.
-[[noreturn]] void flood_with_requests(const OwnDomain& domain, std::atomic<std::uint64_t>& written) {
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+[[noreturn]] void flood_with_requests(const OwnDomain& domain, std::atomic<std::uint64_t>& written,
+                                      pid_t parent) {
+  if (!end_with_parent(parent, SIGKILL)) ::_exit(EXIT_FAILURE);
   dds::DomainOptions options;
   options.domain = domain.number();
   const auto opened = dds::open_domain(dds::Role::client, options).value();
@@ -176,8 +179,9 @@ TEST(RequestFlood, OfSomeClientsKeepsNeitherThePresenceNorAnotherClientWaiting) 
   auto& written = *new (shared) std::atomic<std::uint64_t>(0);
   std::vector<pid_t> floods;
   for (int i = 0; i < 2; ++i) {
+    const pid_t parent = ::getpid();
     floods.push_back(::fork());
-    if (floods.back() == 0) flood_with_requests(domain, written);
+    if (floods.back() == 0) flood_with_requests(domain, written, parent);
   }
   TestHost host(domain, "hosta");
   host.write_instance(0, "line1", InstanceState::running, 4711);

@@ -48,8 +48,9 @@ std::optional<CycloneOracle> CycloneOracle::start(const std::string& program, st
     return std::nullopt;
   }
   board->feeder_port = ntohs(own.sin_port);
-  std::array<std::string, 3> texts{program, std::to_string(domain), std::to_string(memory.get())};
-  std::array<char*, 4> arguments{texts[0].data(), texts[1].data(), texts[2].data(), nullptr};
+  std::array<std::string, 4> texts{program, std::to_string(domain), std::to_string(memory.get()),
+                                   std::to_string(pid_t{::getpid()})};
+  std::array<char*, 5> arguments{texts[0].data(), texts[1].data(), texts[2].data(), texts[3].data(), nullptr};
   pid_t pid = 0;
   if (::posix_spawn(&pid, program.c_str(), nullptr, nullptr, arguments.data(), environ) != 0) {
     return std::nullopt;

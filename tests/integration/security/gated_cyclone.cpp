@@ -1,6 +1,6 @@
-// gated_cyclone DOMAIN FD: Cyclone behind the gate of an unsecured host, as plchost-dds has it, for tests
-// that ask whether it survives what the gate passes. FD: a GateBoard. With FD -1 it is a client that says all
-// that clients say, for the seeds.
+// gated_cyclone DOMAIN FD PARENT: Cyclone behind the gate of an unsecured host, as plchost-dds has it, for
+// tests that ask whether it survives what the gate passes. FD: a GateBoard. With FD -1 it is a client that
+// says all that clients say, for the seeds.
 #include <atomic>
 #include <chrono>
 #include <cstdlib>
@@ -13,7 +13,6 @@
 #include <netinet/in.h>
 #include <spawn.h>
 #include <sys/mman.h>
-#include <sys/prctl.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
@@ -22,6 +21,7 @@
 #include "api/dds/domain.hpp"
 #include "api/dds/gate/packet_gate.hpp"
 #include "api/dds/topics.hpp"
+#include "shm/base/end_with_parent.hpp"
 #include "tests/integration/security/gate_board.hpp"
 
 extern char** environ;
@@ -134,7 +134,8 @@ void be_client(std::uint32_t domain) {
   Side side(dds::Role::server, domain);
   std::string program = "/proc/self/exe";
   std::string no_board = "-1";
-  std::array<char*, 4> arguments{argv[0], argv[1], no_board.data(), nullptr};
+  std::string parent = std::to_string(pid_t{::getpid()});
+  std::array<char*, 5> arguments{argv[0], argv[1], no_board.data(), parent.data(), nullptr};
   pid_t client = 0;
   if (::posix_spawn(&client, program.c_str(), nullptr, nullptr, arguments.data(), environ) != 0) {
     std::_Exit(1);
@@ -171,8 +172,8 @@ extern "C" __attribute__((visibility("default"))) ssize_t recvmsg(int socket, ms
 }
 
 int main(int argc, char** argv) {
-  if (argc != 3) return 2;
-  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (argc != 4) return 2;
+  if (!plchost::end_with_parent(std::atoi(argv[3]), SIGKILL)) return 1;
   const auto domain = static_cast<std::uint32_t>(std::strtoul(argv[1], nullptr, 10));
   const int fd = std::atoi(argv[2]);
   dds_set_log_mask(0);

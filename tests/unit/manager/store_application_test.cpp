@@ -261,6 +261,7 @@ TEST_F(StoreApplication, RemembersTheBootApplication) {
 
 TEST(StoreOrder, SurvivesTheRoundTrip) {
   StoreOrder order;
+  order.parent = 4711;
   order.folder = "/state/\"x\"";
   order.source = "/dev/shm/x";
   order.size = 1ULL << 40U;
@@ -269,6 +270,7 @@ TEST(StoreOrder, SurvivesTheRoundTrip) {
   order.trial = {"/usr/bin/plc-instance", "--name", "line \"1\""};
   const auto decoded = decode_store_order(encode(order));
   ASSERT_TRUE(decoded);
+  EXPECT_EQ(decoded->parent, 4711);
   EXPECT_EQ(decoded->folder, order.folder);
   EXPECT_EQ(decoded->source, order.source);
   EXPECT_EQ(decoded->size, order.size);
