@@ -23,7 +23,7 @@ std::vector<std::string_view> TaskSet::tasks_in_cycle() const {
   for (const auto& task : tasks_) {
     if (task->in_cycle()) names.emplace_back(task->config().name);
   }
-  if (names.empty() && gate_.variables().taken()) names.emplace_back("event variables");
+  if (names.empty() && poller_.trap().seat().taken()) names.emplace_back("event variables");
   return names;
 }
 

@@ -13,7 +13,7 @@ void EventPoller::add(Task& task) {
 template <class Use>
 void EventPoller::read_all(TimePoint now, Use use) noexcept {
   if (polled_.empty()) return;
-  const CycleGate::Stay within(&gate_, gate_.variables(), clock_);
+  const CycleGate::Stay within(&gate_, trap_.seat(), clock_);
   trap_.arm(*polled_.front().fault, now, true);
   for (const Polled& polled : polled_) {
     if (polled.fault->raised()) continue;

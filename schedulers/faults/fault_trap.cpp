@@ -95,7 +95,7 @@ void FaultTrap::arm(TaskFault& fault, TimePoint start, bool event_variable) noex
   thread_.store(own_thread, std::memory_order_relaxed);
   event_variable_ = event_variable;
   fault_.store(&fault, std::memory_order_relaxed);
-  started_.store(start.time_since_epoch().count(), std::memory_order_release);
+  seat_.code_begins(start);
   armed = this;
   std::atomic_signal_fence(std::memory_order_seq_cst);
 }
@@ -103,17 +103,11 @@ void FaultTrap::arm(TaskFault& fault, TimePoint start, bool event_variable) noex
 void FaultTrap::disarm() noexcept {
   std::atomic_signal_fence(std::memory_order_seq_cst);
   armed = nullptr;
-  started_.store(0, std::memory_order_release);
+  seat_.part_ends();
 }
 
 bool FaultTrap::armed_here() noexcept {
   return armed != nullptr;
-}
-
-std::optional<TimePoint> FaultTrap::running_since() const noexcept {
-  const auto started = started_.load(std::memory_order_acquire);
-  if (started == 0) return std::nullopt;
-  return TimePoint(Duration(started));
 }
 
 void FaultTrap::strike(TimePoint since, FaultKind kind, std::int64_t figure, std::int64_t limit) noexcept {
@@ -167,8 +161,9 @@ struct FaultHandlers {
   static void on_watchdog(int, siginfo_t*, void* context) noexcept {
     if (armed == nullptr) return;  // the cycle has ended in the meantime
     FaultTrap& trap = *armed;
-    const auto started = trap.started_.load(std::memory_order_relaxed);
-    if (trap.struck_.load(std::memory_order_acquire) != started) return;
+    const auto started = trap.running_since();
+    const TimePoint struck{Duration(trap.struck_.load(std::memory_order_acquire))};
+    if (started != struck) return;
     if (TaskFault& fault = *trap.fault(); fault.claim(trap.event_variable_)) {
       fill(fault.record(), trap, context);
       trap.fill_struck(fault.record());

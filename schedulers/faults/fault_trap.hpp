@@ -6,6 +6,7 @@
 #include <sys/types.h>
 
 #include "schedulers/faults/task_fault.hpp"
+#include "schedulers/task/cycle_gate.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/thread.hpp"
 
@@ -25,7 +26,10 @@ class FaultTrap {
   /// The calling thread runs code of a task. Any context.
   [[nodiscard]] static bool armed_here() noexcept;
   /// Since when the code runs that is running now. Any thread.
-  [[nodiscard]] std::optional<TimePoint> running_since() const noexcept;
+  [[nodiscard]] std::optional<TimePoint> running_since() const noexcept { return seat_.code_since(); }
+  /// Where the thread says that it is in a cycle. Any thread.
+  [[nodiscard]] CycleGate::Seat& seat() noexcept { return seat_; }
+  [[nodiscard]] const CycleGate::Seat& seat() const noexcept { return seat_; }
   [[nodiscard]] TaskFault* fault() const noexcept { return fault_.load(std::memory_order_relaxed); }
 
   /// Stops the code that runs since `since`, in its middle, with a record of this kind, figure and limit.
@@ -44,7 +48,7 @@ class FaultTrap {
   friend struct FaultHandlers;
 
   std::atomic<TaskFault*> fault_{nullptr};
-  std::atomic<Duration::rep> started_{0};  // 0: no code of an application runs
+  CycleGate::Seat seat_;
   std::atomic<pid_t> thread_{0};
   std::atomic<bool> parked_{false};
   bool event_variable_ = false;

@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <optional>
 
 #include "schedulers/clock.hpp"
 
@@ -12,25 +13,50 @@ namespace plchost {
 /// meanwhile waits at the gate.
 class CycleGate {
  public:
-  /// Where one thread says that it is within. The gate outlives it.
+  /// The one place where a thread says that it is in a cycle, and in which part of it. The gate outlives it.
   class Seat {
    public:
     /// Within: from here to leave(). Sleeps while the gate is closed. Real-time; the seat's own thread.
     void enter(CycleGate& gate, Clock& clock) noexcept {
       for (;;) {
         // Either the thread that has closed the gate sees this store, or the gate is seen closed here.
-        taken_.store(true, std::memory_order_seq_cst);
+        word_.store(kWithin, std::memory_order_seq_cst);
         if (gate.closed_.load(std::memory_order_seq_cst) == 0) return;
-        taken_.store(false, std::memory_order_release);
+        word_.store(kOutside, std::memory_order_release);
         clock.wait(gate.closed_, 1, kNoDeadline);
       }
     }
-    void leave() noexcept { taken_.store(false, std::memory_order_release); }
+    void leave() noexcept { word_.store(kOutside, std::memory_order_release); }
     /// Any thread.
-    [[nodiscard]] bool taken() const noexcept { return taken_.load(std::memory_order_seq_cst); }
+    [[nodiscard]] bool taken() const noexcept { return word_.load(std::memory_order_seq_cst) != kOutside; }
+
+    /// Code of the application runs since `start`, or the runtime does work of its own, until part_ends().
+    /// The seat's own thread, real-time.
+    void code_begins(TimePoint start) noexcept { begin_part(start.time_since_epoch().count()); }
+    void work_begins() noexcept { begin_part(kAtWork); }
+    void part_ends() noexcept { word_.store(before_, std::memory_order_release); }
+    /// Since when code of the application runs; nothing: none does. Any context.
+    [[nodiscard]] std::optional<TimePoint> code_since() const noexcept {
+      const auto word = word_.load(std::memory_order_acquire);
+      if (word <= kWithin) return std::nullopt;
+      return TimePoint(Duration(word));
+    }
+    /// The runtime does work of its own. Any thread.
+    [[nodiscard]] bool at_work() const noexcept { return word_.load(std::memory_order_acquire) == kAtWork; }
 
    private:
-    std::atomic<bool> taken_{false};
+    // Above kWithin: the time since which code of the application runs.
+    static constexpr Duration::rep kAtWork = -1;
+    static constexpr Duration::rep kOutside = 0;
+    static constexpr Duration::rep kWithin = 1;
+
+    void begin_part(Duration::rep part) noexcept {
+      before_ = word_.load(std::memory_order_relaxed);
+      word_.store(part, std::memory_order_release);
+    }
+
+    std::atomic<Duration::rep> word_{kOutside};
+    Duration::rep before_ = kOutside;  // the seat's own thread: the word outside of the part
   };
 
   /// Within, as long as it exists.
@@ -49,10 +75,6 @@ class CycleGate {
     Seat* seat_;
   };
 
-  /// Of the thread that reads event variables: there is one at a time.
-  [[nodiscard]] Seat& variables() noexcept { return variables_; }
-  [[nodiscard]] const Seat& variables() const noexcept { return variables_; }
-
   /// Control thread; open() follows soon.
   void close() noexcept { closed_.store(1, std::memory_order_seq_cst); }
   void open(Clock& clock) noexcept {
@@ -62,7 +84,6 @@ class CycleGate {
 
  private:
   std::atomic<std::uint32_t> closed_{0};
-  Seat variables_;
 };
 
 }  // namespace plchost

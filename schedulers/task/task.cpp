@@ -7,11 +7,7 @@
 
 namespace plchost {
 
-namespace {
-
-constexpr Duration::rep kAtWork = -1;
-
-}  // namespace
+namespace {}  // namespace
 
 Task::Task(Clock& clock, TaskConfig config, TaskStatistics& statistics, CountedEvent* event,
            FaultBoard* board) noexcept
@@ -57,9 +53,8 @@ std::optional<Task::Demand> Task::demand(TimePoint now) const noexcept {
 }
 
 std::optional<TimePoint> Task::free_since() const noexcept {
-  const auto since = free_since_.load(std::memory_order_relaxed);
-  if (since == kAtWork) return std::nullopt;
-  return TimePoint(Duration(since));
+  if (trap_.seat().at_work()) return std::nullopt;
+  return TimePoint(Duration(free_since_.load(std::memory_order_relaxed)));
 }
 
 Task::Pace Task::pace() const noexcept {
@@ -90,7 +85,7 @@ void Task::look_at_overrun(Duration execution) noexcept {
 }
 
 void Task::run_cycle(const Activation& activation) noexcept {
-  const CycleGate::Stay within(gate_, seat_, clock_);
+  const CycleGate::Stay within(gate_, trap_.seat(), clock_);
   state_->cycle_begins(activation.release);
   const TimePoint start = clock_.now();
   if (config_.before_entry) config_.before_entry();
@@ -111,10 +106,11 @@ void Task::run_cycle(const Activation& activation) noexcept {
 }
 
 void Task::work_between_cycles() noexcept {
-  free_since_.store(kAtWork, std::memory_order_relaxed);
+  trap_.seat().work_begins();
   // Releases that fall due meanwhile are lost, as during a cycle.
   if (config_.between_cycles()) ready_ = clock_.now();
   free_since_.store(ready_.time_since_epoch().count(), std::memory_order_relaxed);
+  trap_.seat().part_ends();
 }
 
 void Task::record(const Activation& activation, TimePoint start, TimePoint end) noexcept {

@@ -36,7 +36,7 @@ class Task {
   /// Its cycles pass `gate`, which outlives the task. Set-up, before the first begin().
   void pass(CycleGate& gate) noexcept { gate_ = &gate; }
   /// A cycle runs, with all that belongs to it, if it passes a gate. Any thread.
-  [[nodiscard]] bool in_cycle() const noexcept { return seat_.taken(); }
+  [[nodiscard]] bool in_cycle() const noexcept { return trap_.seat().taken(); }
   /// Null: it follows no clock. Any context.
   [[nodiscard]] const ClockFollower* follower() const noexcept { return state_->follower(); }
 
@@ -127,7 +127,6 @@ class Task {
   TaskConfig config_;
   const TaskKindEntry* kind_;
   CycleGate* gate_ = nullptr;
-  CycleGate::Seat seat_;
   TaskRecorder recorder_;
   std::unique_ptr<TaskKindState> state_;
 
@@ -135,8 +134,8 @@ class Task {
   OverrunRule overruns_;
   TaskFault fault_;
   FaultTrap trap_;
-  std::atomic<Duration::rep> free_since_{0};  // kAtWork: it is not
-  std::atomic<std::uint64_t> lost_{0};        // these two: one writer, the task's thread
+  std::atomic<Duration::rep> free_since_{0};
+  std::atomic<std::uint64_t> lost_{0};  // these two: one writer, the task's thread
   std::atomic<std::uint64_t> on_time_{0};
 };
 
