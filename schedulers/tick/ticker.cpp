@@ -10,7 +10,7 @@ namespace plchost {
 
 namespace {
 
-constexpr Duration kParkedLook = std::chrono::milliseconds(10);
+constexpr Duration kTickerLook = std::chrono::milliseconds(10);
 
 }  // namespace
 
@@ -43,7 +43,7 @@ bool Ticker::settled(TimePoint deadline) noexcept {
     if (done == order_.load() || !thread_.joinable() || poller_.parked()) return true;
     const TimePoint now = MonotonicClock::now();
     if (now >= deadline) return false;
-    futex_wait(&done_, done, std::min(deadline, now + kParkedLook));  // a thread that is parked wakes nobody
+    futex_wait(&done_, done, std::min(deadline, now + kTickerLook));  // a thread that is parked wakes nobody
   }
 }
 
