@@ -69,8 +69,9 @@ std::unique_ptr<Instance> Instance::set_up(const Options& options, SetupReporter
     reporter.done(step.step, *remark);
   }
   instance->beat();
-  instance->keep_settings();
   reporter.done(SetupStep::ready);
+  // Not before: the tasks run, and one that aborts with the lock of the heap holds up what allocates.
+  instance->keep_settings();
   return instance;
 }
 

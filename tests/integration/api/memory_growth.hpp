@@ -101,8 +101,12 @@ constexpr std::int64_t kNoise = std::int64_t{256} * 1024;
 /// Returns how many clients there were.
 template <class Use>
 int expect_bounded_memory(const MeasuredServer& server, Uses uses, const Use& use) {
-  // NOLINTNEXTLINE(concurrency-mt-unsafe): no thread of this test is there yet
-  if (const char* const more = std::getenv("PLCHOST_CLIENTS"); more != nullptr) uses.then = std::atoi(more);
+  const auto ask_environment = [](const char* name, int& number) {
+    // NOLINTNEXTLINE(concurrency-mt-unsafe): no thread of this test is there yet
+    if (const char* const other = std::getenv(name); other != nullptr) number = std::atoi(other);
+  };
+  ask_environment("PLCHOST_FIRST_CLIENTS", uses.first);
+  ask_environment("PLCHOST_CLIENTS", uses.then);
   repeat_at_once(uses.first, uses.at_once, use);
   const MemoryUse before = server.settled();
   EXPECT_GT(before.used, 0);
