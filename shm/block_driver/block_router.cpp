@@ -60,15 +60,21 @@ bool BlockRouter::relay() {
   bool all_done = true;
   BlockHeader header;
   for (std::size_t priority = 0; priority < kBlockPriorities; ++priority) {
+    // One that stays holds up those behind it to the same address, also if there is room by now, or if they
+    // are shorter: none overtakes another one.
     const auto wants = [&](const BlockTag& tag, std::uint32_t slots) {
       if (node_.is_for_us(tag.destination)) return false;
+      if (std::ranges::find(held_up_, tag.destination.number()) != held_up_.end()) return false;
       const bool can = can_take(tag, priority, slots);
+      if (!can) held_up_.push_back(tag.destination.number());
       all_done = all_done && can;
       return can;
     };
     for (auto& gate : node_.in_) {
       InLink* const link = gate.get();
-      while (link != nullptr && link->take(priority, wants, buffer_, header) == TakeResult::taken) {
+      while (link != nullptr) {
+        held_up_.clear();  // take() begins with the oldest one again
+        if (link->take(priority, wants, buffer_, header) != TakeResult::taken) break;
         handle(header, std::span(buffer_).first(header.size));
       }
     }

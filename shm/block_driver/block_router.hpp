@@ -71,6 +71,7 @@ class BlockRouter {
   std::uint32_t ticks_ = 0;
   std::uint16_t suspect_ = 0;  // the node to look at next
   std::vector<std::byte> buffer_;
+  std::vector<std::uint32_t> held_up_;  // numbers of addresses, while relay() looks through a queue
   std::string last_problem_;
 };
 

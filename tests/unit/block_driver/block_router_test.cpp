@@ -269,6 +269,34 @@ TEST_F(BlockRouterTest, NodesOfTwoHostsTalkThroughTheirGateways) {
   NodeDirectory::remove(second_pool.get());
 }
 
+// Another thread makes room: see BlockGateway.
+TEST_F(BlockRouterTest, ABlockForAnotherHostDoesNotOvertakeOneThatFoundNoRoom) {
+  std::vector<std::string> given;
+  int asked = 0;
+  NodeOptions options_of_gateway = options("gateway");
+  options_of_gateway.host_number = 1;
+  options_of_gateway.entry.hosts = {{.first = 2, .last = 3}};
+  options_of_gateway.remote_room = [&](NodeAddress to, std::uint32_t /*slots*/) {
+    return to.host == 3 || ++asked != 1;
+  };
+  options_of_gateway.remote = [&](const BlockHeader& /*header*/, std::span<const std::byte> contents) {
+    std::string text(contents.size(), ' ');
+    std::ranges::transform(contents, text.begin(), [](std::byte byte) { return static_cast<char>(byte); });
+    given.push_back(std::move(text));
+    return SendResult::sent;
+  };
+  TestNode gateway = join(options_of_gateway);
+  TestNode a = join("a");
+  connect(a, gateway);
+  BlockChannel channel = a.channel();
+  const NodeAddress there{.host = 2, .node = 1};
+  ASSERT_EQ(channel.send(there, bytes_of("first")), SendResult::sent);
+  ASSERT_EQ(channel.send(there, bytes_of("second")), SendResult::sent);
+  ASSERT_EQ(channel.send({.host = 3, .node = 1}, bytes_of("elsewhere")), SendResult::sent);
+  settle(a, gateway);
+  EXPECT_EQ(given, (std::vector<std::string>{"elsewhere", "first", "second"}));
+}
+
 TEST_F(BlockRouterTest, RunsInAThreadOfItsOwnUntilItIsStopped) {
   TestNode a = join("a");
   TestNode b = join("b");
