@@ -83,6 +83,7 @@ Result<StatisticsReport> ControlClient::statistics(const std::string& host, std:
   }
   for (;;) {
     update();
+    drop_replies();
     if (const auto view = present(host)) {
       if (auto found = statistics_.find(host, view->epoch, instance, task)) return std::move(*found);
     }
@@ -218,9 +219,16 @@ void ControlClient::calm_pages() const noexcept {
   }
 }
 
+void ControlClient::drop_replies() {
+  if (!reply_reader_) return;
+  dds::take_valid_told<plc_Reply, dds::kReply.qos.depth>(
+      reply_reader_.get(), answering_, [](const plc_Reply& /*reply*/, const auto& /*info*/) {});
+}
+
 void ControlClient::await_status(const std::string& host, const ApiReply& reply, TimePoint deadline) {
   for (;;) {
     update();
+    drop_replies();
     const auto view = present(host);
     if (!view || view->status.round >= reply.status_round || MonotonicClock::now() >= deadline) return;
     wait_set_.wait(deadline);

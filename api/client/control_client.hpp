@@ -243,6 +243,9 @@ class ControlClient {
     dds::Entity reader;
   };
   void calm_pages() const noexcept;
+  /// While no call is under way: those to others of the same participant come here, too. Unread, they would
+  /// keep waits from waiting, and, when the reader is full, all readers of the process from receiving.
+  void drop_replies();
   template <class Page, class Listing>
   [[nodiscard]] Result<Listing> ask_for_page(PageReader& pages, const dds::TopicInfo& topic,
                                              const ApiRequest& request, TimePoint deadline);
