@@ -22,6 +22,18 @@ using plchost::ClientError;
 
 namespace {
 
+/// Texts of hosts are cut at their bounds, also within a character: that must not cost the whole list.
+struct ToPython {
+  py::object operator()(const std::string& text) const {
+    return py::reinterpret_steal<py::object>(
+        PyUnicode_DecodeUTF8(text.data(), static_cast<Py_ssize_t>(text.size()), "replace"));
+  }
+  template <class Number>
+  py::object operator()(Number number) const {
+    return py::cast(number);
+  }
+};
+
 using NoGil = py::call_guard<py::gil_scoped_release>;
 
 // Those that are there. When Python ends they are closed before: a thread that waits for Python then would be
@@ -297,7 +309,7 @@ void define_commands(ClientClass& client) {
             py::list all;
             for (const Client::Record& record : records) {
               py::dict members;
-              for (const auto& [name, value] : record) members[name.c_str()] = py::cast(value);
+              for (const auto& [name, value] : record) members[name.c_str()] = std::visit(ToPython(), value);
               all.append(std::move(members));
             }
             return all;
