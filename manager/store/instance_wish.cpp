@@ -15,7 +15,9 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr std::uint32_t kWishVersion = 3;  // 2: number; 3: application_before, taken_back
+// 2: number. A member that a manager can do without gets no new version: the wishes of an older or a newer
+// manager would be unreadable, and no instance would start.
+constexpr std::uint32_t kWishVersion = 2;
 
 template <class T>
 struct WishMember {
@@ -26,12 +28,14 @@ constexpr std::array kWishTexts = {
     WishMember<std::string>{"problem", &InstanceWish::problem},
     WishMember<std::string>{"last_end", &InstanceWish::last_end},
     WishMember<std::string>{"application", &InstanceWish::application},
-    WishMember<std::string>{"application_before", &InstanceWish::application_before},
-    WishMember<std::string>{"taken_back", &InstanceWish::taken_back},
     WishMember<std::string>{"scheduler", &InstanceWish::scheduler},
     WishMember<std::string>{"configured_application", &InstanceWish::configured_application},
     WishMember<std::string>{"configured_scheduler", &InstanceWish::configured_scheduler},
     WishMember<std::string>{"configured_process", &InstanceWish::configured_process}};
+// Empty where an older manager has written the wish.
+constexpr std::array kLaterWishTexts = {
+    WishMember<std::string>{"application_before", &InstanceWish::application_before},
+    WishMember<std::string>{"taken_back", &InstanceWish::taken_back}};
 constexpr std::array kWishFlags = {WishMember<bool>{"commanded", &InstanceWish::commanded},
                                    WishMember<bool>{"running", &InstanceWish::running},
                                    WishMember<bool>{"offline", &InstanceWish::offline},
@@ -75,6 +79,9 @@ bool take_crashes(const Json& json, std::vector<std::int64_t>& crashes) {
 bool take_all(const Json& json, InstanceWish& wish) {
   bool whole = true;
   for (const auto& text : kWishTexts) whole = whole && take(json, text.key, wish.*text.member);
+  for (const auto& text : kLaterWishTexts) {
+    whole = whole && (!json.contains(text.key) || take(json, text.key, wish.*text.member));
+  }
   for (const auto& flag : kWishFlags) whole = whole && take(json, flag.key, wish.*flag.member);
   for (const auto& number : kWishNumbers) whole = whole && take(json, number.key, wish.*number.member);
   std::uint32_t kind = 0;
@@ -104,6 +111,7 @@ std::string encode(const InstanceWish& wish) {
             {"process", static_cast<std::uint32_t>(wish.process)},
             {"crashes_unix_ns", wish.crashes_unix_ns}};
   for (const auto& text : kWishTexts) json[text.key] = std::string(cut(wish.*text.member, kMaxWishText));
+  for (const auto& text : kLaterWishTexts) json[text.key] = std::string(cut(wish.*text.member, kMaxWishText));
   for (const auto& flag : kWishFlags) json[flag.key] = wish.*flag.member;
   for (const auto& number : kWishNumbers) json[number.key] = wish.*number.member;
   const std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);

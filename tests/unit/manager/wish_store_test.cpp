@@ -3,14 +3,17 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <span>
 #include <sstream>
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
+#include <nlohmann/json.hpp>
 
 #include "manager/store/wish_memory.hpp"
+#include "shm/base/crc32c.hpp"
 #include "tests/unit/manager/wish_store_fixture.hpp"
 
 namespace plchost {
@@ -32,6 +35,19 @@ TEST(InstanceWishText, IsRefusedWhereAnyByteIsAnotherOne) {
     EXPECT_FALSE(decode_wish(changed)) << i;
     EXPECT_FALSE(decode_wish(text.substr(0, i))) << i;
   }
+}
+
+// As plchostd wrote it before it kept what ran before, with the checksum of then.
+TEST(InstanceWishText, OfAnOlderManagerIsRead) {
+  nlohmann::json old = nlohmann::json::parse(encode(some_wish()).substr(9));
+  old.erase("application_before");
+  old.erase("taken_back");
+  old["version"] = 2;
+  const std::string text = old.dump();
+  const auto read = decode_wish(fmt::format("{:08x} {}\n", crc32c(std::as_bytes(std::span(text))), text));
+  ASSERT_TRUE(read) << read.error().describe();
+  EXPECT_EQ(read->application, some_wish().application);
+  EXPECT_EQ(read->application_before, "");
 }
 
 TEST(InstanceWishText, OfTheLongestTextsHasRoom) {
