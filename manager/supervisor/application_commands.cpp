@@ -100,6 +100,9 @@ void ManagedInstance::take_back_application(const std::string& why) {
   taken_back_ = cut(fmt::format("{} does not come up: {}", application_, why), kMaxWishText);
   application_ = *std::exchange(before_, std::nullopt);
   start_kind_ = StartKind::warm;
+  // A configuration that has changed meanwhile lets taken_back_ go in spawn(), and the client's command
+  // failed all the same.
+  if (operation_ && operation_->step == Step::fresh_process) operation_->refused = taken_back_;
   spdlog::warn("instance {}: {}; {} is started again with the settings that it ran with", config_.name,
                taken_back_, application_);
   spawn(wants_running_ ? Next::run : Next::stay_stopped);

@@ -153,9 +153,9 @@ void ManagedInstance::come_up() {
   }
   if (!log_level_.empty()) use_log_level();
   if (!operation_) return;
-  if (operation_->step == Step::fresh_process && !taken_back_.empty()) {
-    finish(ErrorCode::unavailable,
-           fmt::format("{}; {}, which was loaded before, is started again", taken_back_, application_));
+  if (operation_->step == Step::fresh_process && !operation_->refused.empty()) {
+    finish(ErrorCode::unavailable, fmt::format("{}; {}, which was loaded before, is started again",
+                                               operation_->refused, application_));
   } else if (operation_->step == Step::fresh_process) {
     finish(ErrorCode::ok, application_.empty() ? "it is up without an application: load one" : loaded_text());
   } else if (operation_->step == Step::until_up) {

@@ -174,6 +174,7 @@ class ManagedInstance : public InstanceEvents {
     ControlReplyFunction reply;
     Step step = Step::until_up;
     std::uint64_t forwarded_number = 0;
+    std::string refused{};  // why what was to be loaded did not come up; empty: it did
   };
 
   // Commands: instance_commands.cpp, application_commands.cpp

@@ -69,6 +69,25 @@ TEST_F(TakenBack, AlsoAfterABackOff) {
   }
 }
 
+// The settings file that the configuration names now counts, and the client hears of the failure all the
+// same.
+TEST_F(TakenBack, IsToldAlsoWhereTheConfigurationChangesMeanwhile) {
+  bring_up();
+  ask(ControlVerb::load_application, "/opt/new.so", {{"boot", "yes"}});
+  sut().on_application_checked({});
+  sut().on_exit(exited_with(0));
+  InstanceConfig changed = config_;
+  changed.settings = "/etc/plchost/other.cfg";
+  sut().reconfigure(changed);
+  sut().on_exit(exited_with(kExitSetupFailed));
+  EXPECT_EQ(host_.spawned.back().application, "/opt/line.so");
+  EXPECT_FALSE(host_.spawned.back().kept_settings);
+  report_ready();
+  const ControlReply reply = take_reply();
+  EXPECT_EQ(reply.code, ErrorCode::unavailable);
+  EXPECT_THAT(reply.text, HasSubstr("/opt/new.so does not come up"));
+}
+
 TEST_F(TakenBack, NotAfterItCameUpOnce) {
   bring_up();
   ask(ControlVerb::load_application, "/opt/new.so");
