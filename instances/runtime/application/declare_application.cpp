@@ -1,11 +1,13 @@
 #include "instances/runtime/application/declare_application.hpp"
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "instances/runtime/application/device_events.hpp"
 #include "instances/runtime/time/system_time.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 
@@ -15,9 +17,14 @@ namespace {
 Result<void> read_settings_of(const LaunchOptions& launch, StartSettings& start) {
   start.file = launch.settings;
   Result<InstanceSettings> settings;
+  std::optional<KeptSettings> kept;
   if (launch.kept_settings) {
-    auto kept = read_kept_settings(kept_settings_path(launch.run_directory, launch.name));
-    if (!kept) return std::unexpected(std::move(kept).error());
+    auto found = read_kept_settings(kept_settings_path(launch.run_directory, launch.name));
+    // The run directory is empty after a power cut, and a process of an older version keeps nothing there.
+    if (!found) spdlog::warn("settings: those of today are read instead: {}", found.error().describe());
+    if (found) kept = *std::move(found);
+  }
+  if (kept) {
     start.file = kept->file();
     start.texts = kept->texts();
     if (!start.file.empty()) settings = read_settings(start.file, *kept);

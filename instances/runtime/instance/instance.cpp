@@ -168,9 +168,12 @@ Result<std::string> Instance::open_control_socket() {
 void Instance::keep_settings() {
   const LaunchOptions& launch = options_.launch;
   if (launch.run_directory.empty()) return;
-  const auto kept = plchost::keep_settings(kept_settings_path(launch.run_directory, launch.name), start_.file,
-                                           start_.texts);
-  if (!kept) spdlog::warn("its settings are not kept: {}", kept.error().describe());
+  const std::string path = kept_settings_path(launch.run_directory, launch.name);
+  const auto kept = plchost::keep_settings(path, start_.file, start_.texts);
+  if (kept) return;
+  // An earlier process's are other settings than those of the application that runs.
+  ::unlink(path.c_str());
+  spdlog::warn("its settings are not kept: {}", kept.error().describe());
 }
 
 void Instance::restore_operator_events() {

@@ -6,6 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "instances/runtime/application/declare_application.hpp"
 #include "instances/runtime/settings/settings.hpp"
 
 namespace plchost {
@@ -119,6 +120,19 @@ TEST_F(SettingsReference, IsReadFromTextsThatWereKept) {
   ASSERT_TRUE(sut) << sut.error().describe();
   EXPECT_EQ(sut->scheduler, before->scheduler);
   EXPECT_EQ(sut->remarks.size(), 1U);
+}
+
+// After a power cut the run directory is empty, and the application of before is to come up all the same.
+TEST_F(SettingsReference, IsReadFromTheFilesWhereNoTextsWereKept) {
+  LaunchOptions launch;
+  launch.name = "line1";
+  launch.run_directory = path("run");
+  launch.settings = write("first.cfg", "[CmpSchedule]\nSchedulerInterval=5000\n");
+  launch.kept_settings = true;
+  const auto sut = read_start_settings(launch);
+  ASSERT_TRUE(sut) << sut.error().describe();
+  EXPECT_EQ(sut->settings, *read_settings(launch.settings));
+  EXPECT_EQ(sut->texts.size(), 1U);
 }
 
 TEST_F(SettingsReference, OfKeptTextsThatAreNoneIsRefused) {
