@@ -51,7 +51,11 @@ ReferenceEntry* PoolReferences::allocate() noexcept {
       continue;
     }
     const std::uint32_t high_water = header.reference_high_water.load(kRelaxed);
-    if (high_water >= view_.references().size()) return nullptr;
+    if (high_water >= view_.references().size()) {
+      if (is_full()) return nullptr;
+      rebuild();  // a stranger has written over the high water, the free list, or the count of a dead client
+      continue;
+    }
     ReferenceEntry& unused = view_.references()[high_water];
     if (unused.object.load(kRelaxed) == 0) {
       journal_.set(header.reference_high_water, high_water + 1);
@@ -60,6 +64,15 @@ ReferenceEntry* PoolReferences::allocate() noexcept {
     rebuild();
   }
   return nullptr;
+}
+
+// By the counts of the clients, which are few: a full table is not searched by each call that it refuses.
+bool PoolReferences::is_full() const noexcept {
+  std::uint64_t held = 0;
+  for (const ClientSlot& client : view_.clients()) {
+    if (client.pid.load(kRelaxed) != 0) held += client.reference_count.load(kRelaxed);
+  }
+  return held >= view_.references().size();
 }
 
 void PoolReferences::free(ReferenceEntry& reference) noexcept {

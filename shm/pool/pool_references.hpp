@@ -21,6 +21,7 @@ class PoolReferences {
 
  private:
   [[nodiscard]] ReferenceEntry* allocate() noexcept;
+  [[nodiscard]] bool is_full() const noexcept;
   void free(ReferenceEntry& reference) noexcept;
   void count_up(std::atomic<std::uint32_t>& count) noexcept;
   void count_down(std::atomic<std::uint32_t>& count) noexcept;

@@ -367,5 +367,23 @@ TEST_F(PoolCrash, AScribbledSegmentNeverCrashes) {
   }
 }
 
+// Else no process could open or make an object any more, though the table is nearly empty.
+TEST_F(PoolCrash, ATableOfReferencesThatOnlyLooksFullIsMadeAnew) {
+  ObjectPool pool = create(16);
+  const MemoryFile memory = map();
+  PoolHeader& header = header_of(memory);
+  const auto first = pool.create_semaphore("first", 1);
+  ASSERT_TRUE(first);
+  for (const std::uint32_t scribble : {max_references_for(16), UINT32_MAX}) {
+    for (const std::uint32_t link : {0U, UINT32_MAX}) {
+      header.reference_high_water = scribble;
+      header.first_free_reference = link;
+      const auto again = pool.open_semaphore("first");
+      ASSERT_TRUE(again) << again.error().describe();
+      EXPECT_EQ(pool.look_at("first")->reference_count, 2U);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace plchost
