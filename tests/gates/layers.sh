@@ -153,6 +153,8 @@ else:
                     if there and there != here and there not in reach(here, known):
                         faults.append(f"{path}:{number}: {here} may not include {there} ({found[1]})")
     faults += [f"{folder}: it is not in the drawing of {folder.split('/')[0]}/README.md" for folder in sorted(undrawn)]
+if not arrows:
+    faults.append("no drawing and no folder of the code was found: is this the project?")
 print(*dict.fromkeys(faults), sep="\n", end="\n" if faults else "")
 sys.exit(bool(faults))
 PYTHON

@@ -263,12 +263,13 @@ def main():
     names = subprocess.run(["git", "ls-files", "-z"], cwd=options.root, check=True, capture_output=True,
                            text=True).stdout.split("\0")
     forbidden = forbidden_words(options.root)
-    wrong = 0
+    wrong = read = 0
     for name in names:
         if not name.endswith((".md", ".py", *C_FILES, *HASH_FILES)) or not (options.root / name).is_file():
             continue
         for kind, text in texts_of(name, (options.root / name).read_text(encoding="utf-8")):
             joined = text.joined()
+            read += 1
             if kind == "message" and not is_message(joined):
                 continue
             shown = plain(joined)
@@ -276,7 +277,9 @@ def main():
             for offset, fault in faults_of(shown, words):
                 print(f"{name}:{text.fault_line(joined.find(shown[offset:offset + 20].split(CODE)[0]))}: {fault}")
                 wrong += 1
-    return 1 if wrong else 0
+    if not read:
+        print("no text was found: is this a git checkout of the project?")
+    return 1 if wrong or not read else 0
 
 
 if __name__ == "__main__":

@@ -40,6 +40,10 @@ rm -rf "$plot/tree" && mkdir "$plot/tree"
 git ls-files -z '*.hpp' '*.cpp' '*.h' '*.c' '*README.md' | tar -c --null -T - | tar -x -C "$plot/tree"
 "$gates/layers.sh" "$plot/tree" || { echo "the tree of the layers' proofs is wrong before anything is planted"; failed=1; }
 
+mkdir "$plot/empty" && git -C "$plot/empty" init -q
+must_be_red "layers: nothing" "no drawing and no folder of the code was found" "$gates/layers.sh" "$plot/empty"
+must_be_red "prose: nothing" "no text was found" "$gates/prose.py" "$plot/empty"
+
 # must_not_include FILE HEADER DIAGNOSTIC: the include is planted in a header of a lower layer, and taken away again
 must_not_include() {
   printf '#include "%s"\n' "$2" >"$plot/tree/$1"
