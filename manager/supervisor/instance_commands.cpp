@@ -243,6 +243,8 @@ void ManagedInstance::finish_forwarded(const ControlReply& reply) {
     if (loads_online()) {
       application_ = request.argument;
       begun_with_.application = config_.application;
+      // Another one runs now, and the settings of its next process are those of the file.
+      if (!std::exchange(taken_back_, {}).empty()) status_.problem.assign(problem_when_up());
     }
     if (request.verb == ControlVerb::start || request.verb == ControlVerb::stop) {
       commanded_ = true;

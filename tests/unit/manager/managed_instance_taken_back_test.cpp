@@ -131,5 +131,23 @@ TEST_F(TakenBack, WithTheSettingsOfThenUntilAnOperatorsNextStart) {
   EXPECT_EQ(problem(), "");
 }
 
+TEST_F(TakenBack, IsOverWhenAnotherOneTakesOverOnline) {
+  bring_up();
+  ask(ControlVerb::load_application, "/opt/new.so");
+  sut().on_application_checked({});
+  sut().on_exit(exited_with(0));
+  sut().on_exit(exited_with(kExitSetupFailed));
+  report_ready();
+  take_reply();
+  ask(ControlVerb::load_application, "/opt/third.so", {{"online", "yes"}});
+  sut().on_application_checked({});
+  answer();
+  EXPECT_EQ(take_reply().code, ErrorCode::ok);
+  EXPECT_EQ(problem(), "");
+  EXPECT_EQ(wishes_.wish->taken_back, "");
+  crash_once();
+  EXPECT_FALSE(host_.spawned.back().kept_settings);
+}
+
 }  // namespace
 }  // namespace plchost
