@@ -14,8 +14,9 @@
 namespace plchost {
 
 /// Finds threads of this process with a real-time priority that run without a pause, by the processor time
-/// that each uses between two looks. The kernel's own limit (see ProcessorGuard) cannot interrupt a thread
-/// that blocks SIGXCPU, and counts nothing on a core without ticks. One thread at a time; set-up.
+/// that each has used from look to look. The limit of the kernel (see ProcessorGuard) cannot interrupt one
+/// that blocks SIGXCPU, and counts nothing on a core without ticks. The 50 ms that the kernel takes in each
+/// second from all real-time threads of a core are no pause. One thread at a time; set-up.
 class LongRunSearch {
  public:
   /// More threads with a real-time priority than that are not looked at.
@@ -30,15 +31,15 @@ class LongRunSearch {
   [[nodiscard]] std::optional<ProcessorGuard::Taker> look(TimePoint now);
 
  private:
+  /// The longest run up to the last look in which the thread has done next to nothing else.
   struct Run {
-    Duration used{};    // by the thread, since its start
-    Duration lasted{};  // without a pause, as far as the looks tell
+    TimePoint began;
+    Duration used_before{};  // by the thread, when that began
   };
 
   const ProcessorTimes& times_;
   Duration limit_;
   std::function<bool(pid_t)> concerns_;
-  TimePoint looked_{};
   std::map<pid_t, Run> runs_;
 };
 
