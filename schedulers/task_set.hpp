@@ -257,6 +257,7 @@ class TaskSet {
   UniqueFd fault_fd_;
   FaultBoard fault_board_;
   CycleGate gate_;
+  EventPoller poller_{clock_, gate_};  // the supervision watches its trap
   TickChoice tick_;
   bool running_ = false;
   DistributedClock distributed_clock_;
@@ -275,7 +276,6 @@ class TaskSet {
   std::vector<std::unique_ptr<Arrangement>>
       retired_;  // a task in a long cycle, or the ticker in an event variable, may still use one of these
   TickPlan first_look_;
-  EventPoller poller_{clock_, gate_};
   Ticker ticker_{clock_, poller_};
   std::vector<std::unique_ptr<TaskThread>> threads_;  // last: they use all of the above
 };
