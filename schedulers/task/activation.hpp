@@ -20,8 +20,8 @@ struct Activation {
   std::uint64_t timer_expirations = 0;  ///< how often the task's own kernel timer went off since the last one
 };
 
-/// The source that one task waits on; made by the scheduler for that task. The only place where a task thread
-/// sleeps.
+/// The source that one task waits on; made for that task by the scheduler, or by the task's kind. The only
+/// place where a task thread sleeps.
 class ActivationSource {
  public:
   virtual ~ActivationSource() = default;

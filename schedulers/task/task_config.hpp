@@ -72,7 +72,7 @@ struct TaskConfig {
   bool drives_outputs = false;  ///< stops in the first of the two phases of a stop
   std::string external_event;   ///< external only: the event's name
   std::function<bool()>
-      event_variable;  ///< event only: reads the BOOL; called by the scheduler's poller, and by start()
+      event_variable;  ///< event only: reads the BOOL; called by the tick's thread
   std::function<void()> entry;  ///< one cycle; real-time
   // The runtime's own work around it, on the task's thread; real-time, must not throw. Each may be empty. No
   // watchdog counts or stops it.
