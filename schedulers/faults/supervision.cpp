@@ -142,9 +142,12 @@ TimePoint Supervision::look_at_cycle(Watched& watched, TimePoint since, TimePoin
   if (watched.struck_since == since) {
     TaskFault& fault = *watched.trap->fault();
     if (now < watched.struck_at + kPatience) return watched.struck_at + kPatience;
-    // It blocks the signal, or never gets the processor. It halts at the end of its cycle.
-    if (fault.claim()) {
+    // It blocks the signal, or never gets the processor. It halts at the end of its cycle. The thread that
+    // reads event variables ticks for all tasks.
+    const bool variable = watched.task == nullptr;
+    if (fault.claim(variable)) {
       watched.trap->fill_struck(fault.record());
+      fault.record().in_event_variable = variable;
       fault.record().not_caught = 1;
       fault.publish();
     }

@@ -282,6 +282,25 @@ TEST_F(EndlessLoopGuard, BeginsToCountAnewWithEachCycle) {
   }
 }
 
+// The thread that reads the variable is the one that ticks.
+TEST_F(EndlessLoopGuard, StopsAllTasksForAnEventVariableThatNoStrikeReachesWhateverThePolicyOfItsTask) {
+  TaskConfig config = task_->config();
+  config.watchdog.policy = WatchdogPolicy::task;
+  make(std::move(config));
+  begin();
+  poller_.arm(task_->fault(), clock_.now(), true);
+  next_ = look();
+  go_on_for(kLimit * 2, 100);
+  ASSERT_TRUE(is_struck());
+  clock_.run_for(Supervision::kPatience);
+  (void)look();
+  poller_.disarm();
+  const FaultRecord* const record = task_->fault().published();
+  ASSERT_NE(record, nullptr);
+  EXPECT_TRUE(record->in_event_variable);
+  EXPECT_TRUE(board_.halted());
+}
+
 TEST_F(EndlessLoopGuard, HoldsForNoTaskWithAWatchdogOfItsOwn) {
   TaskConfig config = task_->config();
   config.watchdog.time = kLimit;
