@@ -22,7 +22,8 @@
  * pTaskInfo is that of the new program, and that of the one before is void). Then plc_app_exit of the program
  * before is called, and that is unloaded. It must leave no thread behind, and nothing that points to its code
  * or its constants, neither in areas nor in retain variables. A new program that is refused after its
- * plc_app_init has returned 0 gets its plc_app_exit, too.
+ * plc_app_init has returned 0 gets its plc_app_exit, too. In both, SchedUnregisterExternalEvent() of an event
+ * that the program that runs on has registered in its plc_app_init is ERR_NO_OBJECT and changes nothing.
  */
 #ifndef PLC_ONLINE_CHANGE_H
 #define PLC_ONLINE_CHANGE_H

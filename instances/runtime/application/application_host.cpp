@@ -154,6 +154,8 @@ RTS_RESULT ApplicationHost::unregister_event(RTS_HANDLE event) {
   if (collected_ != nullptr && events_.is_own(event)) {
     return std::erase(collected_->events, event) == 0 ? ERR_NO_OBJECT : ERR_OK;
   }
+  // The plc_app_exit of a version that leaves: the registration belongs to the one that runs on.
+  if (online_ && has(declaration_.events, event)) return ERR_NO_OBJECT;
   const auto done = events_.unregister_by_application(event);
   if (!done) return done.error().code == ErrorCode::not_found ? ERR_NO_OBJECT : ERR_PARAMETER;
   std::erase(declaration_.events, event);

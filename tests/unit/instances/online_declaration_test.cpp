@@ -197,6 +197,12 @@ TEST_F(OnlineDeclaration, OfEventsAndCallbacksHoldsFromTheTakeoverOn) {
   EXPECT_EQ(calls_before_, 1) << "of the version before";
   EXPECT_EQ(calls_after_, 1);
   EXPECT_EQ(calls_component_, 2);
+
+  host_.set_online_change(true);  // the plc_app_exit of the version before
+  EXPECT_EQ(SchedUnregisterExternalEvent(both_), ERR_NO_OBJECT);
+  EXPECT_EQ(SchedUnregisterExternalEvent(before_), ERR_NO_OBJECT);
+  host_.set_online_change(false);
+  EXPECT_TRUE(is_registered(both_));
 }
 
 TEST_F(OnlineDeclaration, ThatIsNotTakenLeavesAllAsItWas) {
@@ -205,6 +211,10 @@ TEST_F(OnlineDeclaration, ThatIsNotTakenLeavesAllAsItWas) {
   host_.end_init();
   ASSERT_TRUE(host_.reserve(online_));
   host_.release(online_);
+  host_.set_online_change(true);  // its plc_app_exit
+  EXPECT_EQ(SchedUnregisterExternalEvent(after), ERR_NO_OBJECT);
+  EXPECT_EQ(SchedUnregisterExternalEvent(both_), ERR_NO_OBJECT);
+  host_.set_online_change(false);
   EXPECT_FALSE(is_registered(after));
   EXPECT_TRUE(is_registered(before_));
   EXPECT_TRUE(is_registered(both_));
