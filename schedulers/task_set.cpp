@@ -132,7 +132,8 @@ void TaskSet::report(std::size_t index, bool running) {
 // The old one is free to go when no thread uses it any more.
 bool TaskSet::let_retired_go() {
   if (!ticker_.settled(TimePoint{})) return false;
-  if (!running_ && tick_.device) tick_.device->halt();
+  const bool ticks = running_ && active_->plan.source;
+  if (!ticks && tick_.device) tick_.device->halt();  // nobody waits for its interrupts
   retired_.clear();
   return true;
 }

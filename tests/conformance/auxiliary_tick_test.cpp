@@ -171,6 +171,22 @@ TEST_F(AuxiliaryTicks, ExchangeOfTheSchedulerLeavesTheDeviceInPhase) {
   EXPECT_EQ(device.disabled, 1) << "it is not needed while nothing runs";
 }
 
+TEST_F(AuxiliaryTicks, DeviceIsOffUnderASchedulerThatNeedsNoTicks) {
+  add_noting(milliseconds(2));
+  ASSERT_TRUE(create());
+  clock.run_until(start("CmpSchedule", settings(milliseconds(1))) + milliseconds(11));
+  const auto switch_to = [&](const char* name) {
+    std::thread switching([&] { ASSERT_TRUE(set->switch_to(name, settings(milliseconds(1)))); });
+    switching.join();
+    clock.run_for(milliseconds(10));
+  };
+  switch_to("CmpScheduleTimer");
+  EXPECT_EQ(device.disabled, 1);
+  switch_to("CmpSchedule");
+  EXPECT_EQ(device.enabled, 2);
+  EXPECT_EQ(device.disabled, 1);
+}
+
 TEST_F(AuxiliaryTicks, OneShotIsRefusedAtTheStartAndAtASwitchWithTheReason) {
   FakeClockDevice rtc(clock, Kind::rtc);
   devices = &rtc;
