@@ -69,11 +69,10 @@ struct TaskConfig {
       start_offset{};  ///< cyclic only: its grid is origin + start_offset + n * interval; 0 <= . < interval
   LatePolicy late = LatePolicy::next;  ///< cyclic only
   TaskWatchdog watchdog;
-  bool drives_outputs = false;  ///< stops in the first of the two phases of a stop
-  std::string external_event;   ///< external only: the event's name
-  std::function<bool()>
-      event_variable;  ///< event only: reads the BOOL; called by the tick's thread
-  std::function<void()> entry;  ///< one cycle; real-time
+  bool drives_outputs = false;           ///< stops in the first of the two phases of a stop
+  std::string external_event;            ///< external only: the event's name
+  std::function<bool()> event_variable;  ///< event only: reads the BOOL; called by the tick's thread
+  std::function<void()> entry;           ///< one cycle; real-time
   // The runtime's own work around it, on the task's thread; real-time, must not throw. Each may be empty. No
   // watchdog counts or stops it.
   std::function<void()> before_entry;  ///< belongs to the cycle: takes inputs in
