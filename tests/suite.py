@@ -70,18 +70,26 @@ class Suite:
         return {case: result for result, _, case in lines}
 
 
+def shortened(lines):
+    left_out = len(lines) - OUTPUT_LINES
+    if left_out <= 1:
+        return lines
+    half = OUTPUT_LINES // 2
+    return [*lines[:half], f"... ({left_out} lines)", *lines[-half:]]
+
+
 def end_of(output):
-    """The last lines of a failed test's output; of a GoogleTest program the lines of the cases that failed."""
+    """First and last lines of a failed test's output; of a GoogleTest program those of each case that failed."""
     lines, case, failed = output.splitlines(), [""], []
     for line in lines:
         case = [line] if line.startswith("[ RUN ") else [*case, line]
         if line.startswith("FAILED: "):  # said by cases.py
             failed.append(line)
         if line.startswith("[  FAILED  ]") and case[0].startswith("[ RUN ") and line.endswith(" ms)"):
-            failed += case[-OUTPUT_LINES:]
+            failed += shortened(case)
         if line.startswith(("[  FAILED  ]", "[       OK ]", "[  SKIPPED ]")):
             case = [""]
-    return (failed or lines)[-2 * OUTPUT_LINES:]
+    return failed if any(line.startswith("[ RUN ") for line in lines) else shortened(lines)
 
 
 def main():

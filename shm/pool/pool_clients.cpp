@@ -5,6 +5,7 @@
 #include <signal.h>
 
 #include "shm/base/process_start.hpp"
+#include "shm/base/wrapping.hpp"
 
 namespace plchost {
 
@@ -14,7 +15,8 @@ bool is_gone(ClientSlot& client, TimePoint now, bool thoroughly) noexcept {
   if (client.ended.load(kRelaxed) != 0) return true;
   const auto pid = static_cast<pid_t>(client.pid.load(kRelaxed));
   if (pid < 0) return true;  // no number that the kernel gives
-  const std::int64_t age = now.time_since_epoch().count() - client.looked_ns.load(kRelaxed);
+  const std::int64_t age =
+      wrapping_difference(now.time_since_epoch().count(), client.looked_ns.load(kRelaxed));
   if (!thoroughly && age >= 0 && age < PoolClients::kLook.count()) {
     return ::kill(pid, 0) != 0 && errno == ESRCH;
   }
