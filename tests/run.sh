@@ -122,7 +122,7 @@ count() { # adds up the summary of the step that just ran
 tidy() {
   configure .build/tidy -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF -DCMAKE_BUILD_TYPE=Debug \
     -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON "${unity[@]}" &&
-    cmake --build .build/tidy --target plchost_idl_generate && tests/gates/tidy.sh "$PWD/.build/tidy"
+    cmake --build .build/tidy --target plchost_idl_generate plchost_generated && tests/gates/tidy.sh "$PWD/.build/tidy"
 }
 
 build_fuzzers() {

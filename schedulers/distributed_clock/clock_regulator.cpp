@@ -16,7 +16,7 @@ constexpr std::uint32_t kEnoughPairs = 1'000'000;
 constexpr std::uint32_t kPairsAfterStep = 8;
 constexpr std::uint32_t kPairsAfterChange = 16;
 /// Averages over about this many pairs.
-constexpr double kMemory = 32;
+constexpr double kAveragedPairs = 32;
 /// Deviations that keep to one side: their average is nearly as large as their magnitude.
 constexpr double kOneSided = 0.8;
 /// An outlier is this many times further off than usual.
@@ -80,18 +80,18 @@ void ClockRegulator::take(double error_ns, Duration elapsed) noexcept {
   model_.fraction_ns += kp * error_ns;
   // Of two pairs that come close together, as a writer that was late gives them, the noise is no drift.
   const auto apart = static_cast<double>(std::min(elapsed, gap_).count());
-  spacing_ns_ = spacing_ns_ > 0 ? spacing_ns_ + (apart - spacing_ns_) / std::min(n, kMemory) : apart;
+  spacing_ns_ = spacing_ns_ > 0 ? spacing_ns_ + (apart - spacing_ns_) / std::min(n, kAveragedPairs) : apart;
   const double base = std::max(static_cast<double>(elapsed.count()), spacing_ns_);
   model_.drift = std::clamp(model_.drift + ki * error_ns / base, -kMaxDrift, kMaxDrift);
-  bias_ns_ += (error_ns - bias_ns_) / std::min(n, kMemory);
-  if (n > 2 * kMemory && std::abs(bias_ns_) > kOneSided * scatter_ns_) {
+  bias_ns_ += (error_ns - bias_ns_) / std::min(n, kAveragedPairs);
+  if (n > 2 * kAveragedPairs && std::abs(bias_ns_) > kOneSided * scatter_ns_) {
     pairs_ = kPairsAfterChange;
   }
 }
 
 void ClockRegulator::widen(double error_ns) noexcept {
   const double clipped = std::min(std::abs(error_ns), kScatterClip * std::max(scatter_ns_, 1.0));
-  scatter_ns_ += (clipped - scatter_ns_) / kMemory;
+  scatter_ns_ += (clipped - scatter_ns_) / kAveragedPairs;
 }
 
 double ClockRegulator::noise_ns() const noexcept {
