@@ -31,7 +31,7 @@ struct Range {
   std::int64_t lowest;
   std::int64_t highest;
   Unit unit = kOne;
-  std::string_view zero = "";  ///< the meaning of 0, if that is a value of its own
+  std::string_view zero;  ///< the meaning of 0, if that is a value of its own
 
   Range(std::string_view setting, Duration given, Duration low, Duration high, std::string_view of_zero = "")
       : name(setting),
