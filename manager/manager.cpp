@@ -26,6 +26,7 @@
 #include "shm/files/own_folder.hpp"
 #include "shm/files/pool_files.hpp"
 #include "shm/log/log.hpp"
+#include "shm/pages/host_page_copy.hpp"
 #include "shm/pages/instance_page.hpp"
 #include "shm/pages/reference_clock.hpp"
 
@@ -48,10 +49,12 @@ Result<void> make_run_directory(const std::string& path) {
 
 // The lock is by run directory; two managers with one pool would overwrite each other's pages all the same.
 Result<void> check_pool_is_free(const std::string& pool) {
-  const auto reader = HostPageReader::open(pool);
-  if (!reader) return {};
-  const auto host = reader->host();
-  if (!host || host->manager_pid <= 0 || host->manager_pid == ::getpid()) return {};
+  if (!HostPageReader::open(pool)) return {};
+  constexpr Duration kPatience = std::chrono::milliseconds(100);
+  HostPageCopy page(pool);
+  if (!page.wait(MonotonicClock::now() + kPatience)) return {};  // its writer ended while it wrote
+  const HostStatus* const host = page.host();
+  if (host->manager_pid <= 0 || host->manager_pid == ::getpid()) return {};
   const auto program = [](const std::string& process) {
     std::error_code error;
     return std::filesystem::read_symlink(fmt::format("/proc/{}/exe", process), error).filename();

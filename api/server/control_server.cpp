@@ -399,7 +399,9 @@ void ControlServer::Parts::answer_finished(TimePoint now) {
   if (unanswered.empty() || !status->may_flush(now)) return;
   std::vector<std::string> instances;
   for (const FinishedCommand& command : unanswered) instances.push_back(command.command.instance);
-  status->flush(instances, now);
+  if (!unanswered_since) unanswered_since = now;
+  if (!status->flush(instances, now) && now - *unanswered_since < kPagePatience) return;
+  unanswered_since.reset();
   for (const FinishedCommand& command : std::exchange(unanswered, {})) {
     downloads.end(command.command.identity);
     answer(command.command.client, command.command.identity, command.code, command.text);

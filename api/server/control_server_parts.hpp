@@ -154,6 +154,9 @@ struct ControlServer::Parts {
   static constexpr Duration kAuditPatience = std::chrono::milliseconds(500);
   std::deque<LateAnswer> late_answers;
   std::vector<FinishedCommand> unanswered;  // that have finished: at most as many as may be under way
+  /// So long an answer waits until the manager's page can be read.
+  static constexpr Duration kPagePatience = std::chrono::milliseconds(500);
+  std::optional<TimePoint> unanswered_since;  // the first attempt to answer them
   std::optional<RequestAudit> audit;
   std::optional<StatusPublisher> status;
   dds::Entity subscriber;

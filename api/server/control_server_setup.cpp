@@ -17,7 +17,6 @@
 #include "api/server/control_server_parts.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/log/log.hpp"
-#include "shm/pages/host_page.hpp"
 
 namespace plchost {
 
@@ -101,13 +100,11 @@ void ControlServer::Parts::open_audit() {
 
 Result<void> ControlServer::Parts::open_gateway() {
   if (options.host_number == 0) return {};
-  const auto page = HostPageReader::open(options.pool);
-  const auto host = page ? page->host() : std::nullopt;
   auto started = GatewayThread::start(participant.get(), {.pool = options.pool,
                                                           .base = options.blocks_base,
                                                           .host = options.host,
                                                           .number = options.host_number,
-                                                          .since_ns = host ? host->started_unix_ns : 0,
+                                                          .since_ns = status->host().started_unix_ns,
                                                           .epoch = epoch});
   if (!started) return std::unexpected(std::move(started).error());
   gateway = *std::move(started);

@@ -46,6 +46,9 @@ class Seqlock {
     return std::nullopt;
   }
 
+  /// Whether there was a write since it was all zero.
+  [[nodiscard]] bool is_written() const noexcept { return sequence() != 0; }
+
   /// Changes with every write: equal numbers mean that nothing was written in between.
   [[nodiscard]] std::uint64_t sequence() const noexcept { return sequence_.load(std::memory_order_acquire); }
 

@@ -29,7 +29,7 @@ template <class Status>
 bool holds(const Seqlock<Status>& place, const Status& status) noexcept {
   static_assert(std::has_unique_object_representations_v<Status>);
   const auto seen = place.read();
-  return seen && std::memcmp(&*seen, &status, sizeof status) == 0;
+  return seen && place.is_written() && std::memcmp(&*seen, &status, sizeof status) == 0;
 }
 
 // Readers refuse a status with other texts: a path may be of any bytes, and a long text is cut within a
@@ -105,6 +105,9 @@ void HostPageWriter::write_host(const HostStatus& status) noexcept {
   make_printable(host_.name);
   make_printable(host_.version);
   HostPageLayout& page = host_layout_of(memory_);
+  for (std::uint32_t index = 0; index < std::min(host_.instance_count, kMaxInstances); ++index) {
+    if (!page.instances[index].is_written()) page.instances[index].write(instances_[index]);
+  }
   page.host.write(host_);
   page.changes.fetch_add(1, std::memory_order_release);
 }
@@ -161,14 +164,18 @@ std::uint64_t HostPageReader::changes() const noexcept {
 }
 
 std::optional<HostStatus> HostPageReader::host() const noexcept {
-  auto status = host_layout_of(memory_).host.read();
+  const auto& place = host_layout_of(memory_).host;
+  auto status = place.read();
+  if (!place.is_written() || memory_.lost()) return std::nullopt;
   if (status && (status->instance_count > kMaxInstances || !is_printable(*status))) return std::nullopt;
   return status;
 }
 
 std::optional<InstanceStatus> HostPageReader::instance(std::uint32_t index) const noexcept {
   if (index >= kMaxInstances) return std::nullopt;
-  auto status = host_layout_of(memory_).instances[index].read();
+  const auto& place = host_layout_of(memory_).instances[index];
+  auto status = place.read();
+  if (!place.is_written() || memory_.lost()) return std::nullopt;
   if (status && !is_printable(*status)) return std::nullopt;
   return status;
 }

@@ -97,6 +97,7 @@ class HostPageWriter {
   /// Goes on with the page of an earlier manager if there is one, so that readers need not open it anew.
   [[nodiscard]] static Result<HostPageWriter> create(std::string_view pool);
   static void remove(std::string_view pool) noexcept;
+  /// Readers find all places below its instance_count written, an unused one without name.
   void write_host(const HostStatus& status) noexcept;
   /// `index` < kMaxInstances; read once the instance_count written with the host is greater. A status
   /// without name: there is no instance at this place.
@@ -114,7 +115,8 @@ class HostPageWriter {
   std::vector<InstanceStatus> instances_;
 };
 
-/// A reader's end, in any process.
+/// A reader's end, in any process. A part that it cannot read at the moment is still there: readers that show
+/// all that there is use HostPageCopy.
 class HostPageReader {
  public:
   /// not_found: no manager has made it yet. corrupt: not such a page.
@@ -122,8 +124,8 @@ class HostPageReader {
   [[nodiscard]] std::uint64_t changes() const noexcept;
   /// It was cut short, and tells nothing since: open it anew.
   [[nodiscard]] bool lost() const noexcept { return memory_.lost(); }
-  /// Nothing if the writer was in the way (try again later), or nothing valid was written yet: names and
-  /// texts are what they may be, without control characters.
+  /// Nothing if the writer was in the way (try again later), the page was cut short, or nothing valid was
+  /// written yet: names and texts are what they may be, without control characters.
   [[nodiscard]] std::optional<HostStatus> host() const noexcept;
   [[nodiscard]] std::optional<InstanceStatus> instance(std::uint32_t index) const noexcept;
 

@@ -261,16 +261,22 @@ std::optional<TaskIdentity> InstancePageReader::identity(std::uint32_t index) co
   return identity;
 }
 
-std::optional<TaskSnapshot> InstancePageReader::task(std::uint32_t index) const noexcept {
+std::optional<PageTaskState> InstancePageReader::task_state(std::uint32_t index) const noexcept {
   if (index >= task_count_) return std::nullopt;
   const TaskSlot& slot = slot_of(memory_, index);
-  const auto counters = slot.counters.read();
-  const bool faulty = slot.fault.sequence() != 0;
-  const auto state = faulty ? PageTaskState::exception
-                            : static_cast<PageTaskState>(slot.state.load(std::memory_order_acquire));
-  const bool valid = state <= PageTaskState::exception && slot.identity.kind <= PageTaskKind::freewheeling;
-  if (!counters || !valid) return std::nullopt;
-  return TaskSnapshot{.identity = slot.identity, .state = state, .counters = *counters};
+  if (slot.fault.is_written()) return PageTaskState::exception;
+  const auto state = static_cast<PageTaskState>(slot.state.load(std::memory_order_acquire));
+  if (state > PageTaskState::exception) return std::nullopt;
+  return state;
+}
+
+std::optional<TaskSnapshot> InstancePageReader::task(std::uint32_t index) const noexcept {
+  if (index >= task_count_) return std::nullopt;
+  const auto counters = slot_of(memory_, index).counters.read();
+  const auto state = task_state(index);
+  const auto known = identity(index);
+  if (!counters || !state || !known) return std::nullopt;
+  return TaskSnapshot{.identity = *known, .state = *state, .counters = *counters};
 }
 
 std::optional<FaultRecord> InstancePageReader::fault(std::uint32_t index) const noexcept {

@@ -169,6 +169,8 @@ class InstancePageReader {
   [[nodiscard]] std::uint32_t task_count() const noexcept { return task_count_; }
   /// The constants of a task, so no writer is in the way. Nothing: a stranger has written over it.
   [[nodiscard]] std::optional<TaskIdentity> identity(std::uint32_t index) const noexcept;
+  /// Never in the way of a writer. Nothing: a stranger has written over it.
+  [[nodiscard]] std::optional<PageTaskState> task_state(std::uint32_t index) const noexcept;
   /// Nothing if the writer was in the way; try again later.
   [[nodiscard]] std::optional<TaskSnapshot> task(std::uint32_t index) const noexcept;
   /// The histogram as it is now and goes on growing; `index` < task_count().

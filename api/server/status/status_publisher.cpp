@@ -69,11 +69,15 @@ Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const 
   publisher.presence_ = std::move(*presence);
   publisher.topics_ = std::move(topics);
   publisher.publisher_ = *std::move(publisher_of_status);
+  if (auto read = publisher.page_.wait(MonotonicClock::now() + kPageWait); !read) {
+    return std::unexpected(std::move(read).error());
+  }
   return publisher;
 }
 
 void StatusPublisher::tick(TimePoint now) {
   bool changed = std::exchange(writers_changed_, false);
+  (void)page_.refresh();
   changed |= look_at_instances(now);
   if (now >= next_objects_) changed |= look_at_objects(now);
   changed |= applications_.look(instance_names_, now);
@@ -88,7 +92,8 @@ void StatusPublisher::look_at_writers(const EventIntake& intake, const SessionTa
   writers_changed_ |= writers_.look(intake, sessions, now);
 }
 
-void StatusPublisher::flush(const std::vector<std::string>& instances, TimePoint now) {
+bool StatusPublisher::flush(const std::vector<std::string>& instances, TimePoint now) {
+  const bool whole = page_.refresh();
   bool changed = look_at_instances(now);
   changed |= look_at_objects(now);
   for (const std::string& instance : instances) {
@@ -96,20 +101,10 @@ void StatusPublisher::flush(const std::vector<std::string>& instances, TimePoint
     tasks_.look_at(instance, now);
   }
   write_host(changed);
+  return whole;
 }
 
 bool StatusPublisher::look_at_instances(TimePoint now) {
-  if (!page_) {
-    auto opened = HostPageReader::open(source_.pool->name());
-    if (!opened) return false;
-    page_ = std::move(*opened);
-  }
-  const auto host = page_->host();
-  if (page_->lost()) {  // the manager makes it anew
-    page_.reset();
-    return false;
-  }
-  if (!host) return false;
   bool changed = false;
   running_ = 0;
   auto& table = tables_->of<plc_InstanceStatus>();
@@ -117,39 +112,9 @@ bool StatusPublisher::look_at_instances(TimePoint now) {
   exceptions_.begin_round();
   std::vector<std::string> names;
   std::string unsaved;
-  for (std::uint32_t i = 0; i < std::min(host->instance_count, kMaxInstances); ++i) {
-    const auto status = page_->instance(i);
-    if (!status || status->name.view().empty()) continue;
-    const std::string name(status->name.view());
-    names.push_back(name);
-    changed |= tasks_.follow(*status, now);
-    changed |= exceptions_.follow(*status, tasks_, now);
-    plc_InstanceStatus sample{};
-    dds::copy_text(sample.host, source_.host);
-    dds::copy_text(sample.instance, name);
-    sample.epoch = source_.epoch;
-    sample.state = static_cast<std::uint32_t>(status->state);
-    if (status->state == InstanceState::running) ++running_;
-    sample.pid = status->pid;
-    sample.core = status->core;
-    sample.restarts = status->restarts;
-    sample.state_since_unix_ns = status->state_since_unix_ns;
-    // The process knows best what it runs; the manager knows what it will run.
-    const auto runtime = tasks_.runtime(name);
-    const bool says = runtime && !runtime->scheduler.view().empty();
-    dds::copy_text(sample.scheduler, says ? runtime->scheduler.view() : status->scheduler.view());
-    dds::copy_text(sample.application, status->application.view());
-    dds::copy_text(sample.problem, problem_of_instance(*status, runtime ? &*runtime : nullptr));
-    const bool is_its_own = runtime && status->pid != 0 && runtime->pid == status->pid;
-    if (is_its_own) dds::copy_text(sample.loaded, runtime->application.view());
-    put_plan(status->plan, sample);
-    if (is_its_own && !runtime->retain_problem.view().empty()) {
-      unsaved += fmt::format("{}{}", unsaved.empty() ? "" : ",", name);
-    }
-    auto extension = runtime ? extension_of(*runtime) : std::vector<plc_KeyValue>();
-    extension.push_back(transitions_entry(transitions_.publish(name, now)));
-    if (status->removed != 0) dds::add_entry(extension, "removed", "yes");
-    changed |= table.update(name, sample, extension);
+  for (const InstanceStatus* const status : page_.instances()) {
+    names.emplace_back(status->name.view());
+    changed |= update_instance(*status, now, unsaved);
   }
   changed |= table.dispose_rest();
   changed |= exceptions_.end_round();
@@ -162,6 +127,38 @@ bool StatusPublisher::look_at_instances(TimePoint now) {
   table.write();
   changed |= std::exchange(unsaved_, unsaved) != unsaved;
   return changed;
+}
+
+bool StatusPublisher::update_instance(const InstanceStatus& status, TimePoint now, std::string& unsaved) {
+  const std::string name(status.name.view());
+  bool changed = tasks_.follow(status, now);
+  changed |= exceptions_.follow(status, tasks_, now);
+  plc_InstanceStatus sample{};
+  dds::copy_text(sample.host, source_.host);
+  dds::copy_text(sample.instance, name);
+  sample.epoch = source_.epoch;
+  sample.state = static_cast<std::uint32_t>(status.state);
+  if (status.state == InstanceState::running) ++running_;
+  sample.pid = status.pid;
+  sample.core = status.core;
+  sample.restarts = status.restarts;
+  sample.state_since_unix_ns = status.state_since_unix_ns;
+  // The process knows best what it runs; the manager knows what it will run.
+  const auto runtime = tasks_.runtime(name);
+  const bool says = runtime && !runtime->scheduler.view().empty();
+  dds::copy_text(sample.scheduler, says ? runtime->scheduler.view() : status.scheduler.view());
+  dds::copy_text(sample.application, status.application.view());
+  dds::copy_text(sample.problem, problem_of_instance(status, runtime ? &*runtime : nullptr));
+  const bool is_its_own = runtime && status.pid != 0 && runtime->pid == status.pid;
+  if (is_its_own) dds::copy_text(sample.loaded, runtime->application.view());
+  put_plan(status.plan, sample);
+  if (is_its_own && !runtime->retain_problem.view().empty()) {
+    unsaved += fmt::format("{}{}", unsaved.empty() ? "" : ",", name);
+  }
+  auto extension = runtime ? extension_of(*runtime) : std::vector<plc_KeyValue>();
+  extension.push_back(transitions_entry(transitions_.publish(name, now)));
+  if (status.removed != 0) dds::add_entry(extension, "removed", "yes");
+  return tables_->of<plc_InstanceStatus>().update(name, sample, extension) || changed;
 }
 
 // A topic with a sample for each of 100,000 objects would drown every client; see OPERATION_LIST_OBJECTS.
@@ -245,18 +242,15 @@ void StatusPublisher::publish_findings(const std::vector<HostFinding>& findings)
 }
 
 void StatusPublisher::write_host(bool changed) {
-  const auto host = page_ ? page_->host() : std::nullopt;
   if (changed || round_ == 0) ++round_;
   plc_HostStatus sample{};
   dds::copy_text(sample.host, source_.host);
   sample.epoch = source_.epoch;
   sample.round = round_;
   tables_->count(sample);
-  if (host) {
-    dds::copy_text(sample.version, host->version.view());
-    sample.manager_pid = host->manager_pid;
-    sample.started_unix_ns = host->started_unix_ns;
-  }
+  dds::copy_text(sample.version, host().version.view());
+  sample.manager_pid = host().manager_pid;
+  sample.started_unix_ns = host().started_unix_ns;
   std::vector<plc_KeyValue> ext;
   dds::add_entry(ext, dds::kLabelsEntry, source_.labels);
   dds::add_entry(ext, "audit", audit_head_);

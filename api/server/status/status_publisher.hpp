@@ -19,7 +19,7 @@
 #include "api/server/status/status_tables.hpp"
 #include "api/server/status/task_watch.hpp"
 #include "api/server/status/transition_publisher.hpp"
-#include "shm/pages/host_page.hpp"
+#include "shm/pages/host_page_copy.hpp"
 #include "shm/pool/object_pool.hpp"
 
 namespace plchost {
@@ -37,12 +37,15 @@ class StatusPublisher {
     bool secured = false;
     std::string applications_folder;  ///< of those that were sent; empty: there is none
   };
+  /// Waits until the manager's page can be read, up to kPageWait: no reader is told of a host without its
+  /// instances.
   [[nodiscard]] static Result<StatusPublisher> create(dds_entity_t participant, const Source& source);
 
   /// Writes what is due; to be called every kTick.
   void tick(TimePoint now);
-  /// Writes all that concerns an instance at once: before the answer to a command that changed it.
-  void flush(const std::vector<std::string>& instances, TimePoint now);
+  /// Writes all that concerns an instance at once: before the answer to a command that changed it. False: the
+  /// manager was just writing its page, so the command's effect may not be there yet.
+  bool flush(const std::vector<std::string>& instances, TimePoint now);
   /// Whether the objects may be looked at again: of a large pool that takes its time, and most of the time is
   /// for others.
   [[nodiscard]] bool may_flush(TimePoint now) const noexcept { return now >= rested_; }
@@ -60,6 +63,8 @@ class StatusPublisher {
   [[nodiscard]] const TaskWatch& tasks() const noexcept { return tasks_; }
   /// HostStatus.round as last written.
   [[nodiscard]] std::uint64_t round() const noexcept { return round_; }
+  /// As the manager has told it last.
+  [[nodiscard]] const HostStatus& host() const noexcept { return *page_.host(); }
   /// The instances that the manager has at present.
   [[nodiscard]] const std::vector<std::string>& instances() const noexcept { return instance_names_; }
 
@@ -68,6 +73,7 @@ class StatusPublisher {
   static constexpr Duration kObjectPeriod = std::chrono::milliseconds(200);
   /// Of a larger pool as many are published: those first that are events in use, then by name.
   static constexpr std::size_t kMostPublished = 4096;
+  static constexpr Duration kPageWait = std::chrono::seconds(1);
 
  private:
   StatusPublisher(Source source, std::unique_ptr<StatusTables> tables, TaskWatch tasks,
@@ -76,8 +82,10 @@ class StatusPublisher {
         tables_(std::move(tables)),
         tasks_(std::move(tasks)),
         exceptions_(std::move(exceptions)),
-        transitions_(std::move(transitions)) {}
+        transitions_(std::move(transitions)),
+        page_(source_.pool->name()) {}
   bool look_at_instances(TimePoint now);
+  bool update_instance(const InstanceStatus& status, TimePoint now, std::string& unsaved);
   bool look_at_objects(TimePoint now);
   bool update_event(const ObjectInfo& object);
   [[nodiscard]] Result<std::vector<ObjectInfo>> published_objects() const;
@@ -94,7 +102,7 @@ class StatusPublisher {
   TaskWatch tasks_;
   ExceptionWatch exceptions_;
   TransitionPublisher transitions_;
-  std::optional<HostPageReader> page_;
+  HostPageCopy page_;
   std::vector<std::string> instance_names_;
   StatusTable<plc_HostFinding> findings_;
   StatusTable<plc_HostStatus> hosts_;

@@ -79,6 +79,7 @@ class StatusTable {
     }
   }
 
+  [[nodiscard]] bool contains(const std::string& key) const { return entries_.contains(key); }
   [[nodiscard]] std::uint32_t size() const noexcept { return static_cast<std::uint32_t>(entries_.size()); }
 
  private:

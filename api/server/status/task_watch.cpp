@@ -49,6 +49,10 @@ bool TaskWatch::follow(const InstanceStatus& instance, TimePoint now) {
     watched = Watched{};
     watched.pid = instance.pid;
   }
+  if (watched.page) {
+    const auto runtime = watched.page->runtime();
+    if (runtime && runtime->pid == watched.pid) watched.runtime = *runtime;
+  }
   if (watched.pid != 0 && !watched.page && now >= watched.next_look) {
     watched.next_look = now + kPageRetry;
     if (open_page(name, watched)) {
@@ -66,6 +70,7 @@ bool TaskWatch::open_page(const std::string& instance, Watched& watched) {
   // The page of the life before is there until the process has made its own.
   if (!runtime || runtime->pid != watched.pid) return false;
   watched.page = std::move(*page);
+  watched.runtime = *runtime;
   watched.told.assign(watched.page->task_count(), {});
   bound_is_stale_ = true;
   return true;
@@ -88,7 +93,7 @@ bool TaskWatch::dispose_tasks(const std::string& instance, const Watched& watche
 std::optional<InstanceRuntime> TaskWatch::runtime(const std::string& instance) const {
   const auto found = instances_.find(instance);
   if (found == instances_.end() || !found->second.page) return std::nullopt;
-  return found->second.page->runtime();
+  return found->second.runtime;
 }
 
 bool TaskWatch::in_exception(const std::string& instance, std::string_view task) const {
@@ -96,8 +101,8 @@ bool TaskWatch::in_exception(const std::string& instance, std::string_view task)
   if (found == instances_.end() || !found->second.page) return false;
   const InstancePageReader& page = *found->second.page;
   for (std::uint32_t i = 0; i < page.task_count(); ++i) {
-    const auto seen = page.task(i);
-    if (seen && seen->identity.name.view() == task) return seen->state == PageTaskState::exception;
+    const auto seen = page.identity(i);
+    if (seen && seen->name.view() == task) return page.task_state(i) == PageTaskState::exception;
   }
   return false;
 }
@@ -133,13 +138,24 @@ const InstancePageReader* TaskWatch::page_of(const BoundTask& task) const {
 
 void TaskWatch::publish(const std::string& instance, Watched& watched, std::uint32_t index) {
   const auto task = watched.page->task(index);
-  if (!task) return;
+  if (!task) return publish_name(instance, watched, index);
   StatisticsWriter::Told& told = watched.told[index];
   // New, or reset since: that is told at once. It costs little, because little was recorded.
   const bool at_once = told.task.empty() || told.since_ns != task->counters.since_ns;
   if (at_once) (void)statistics_.write(instance, *watched.page, index, told);
   const std::string key = instance + "/" + std::string(task->identity.name.view());
   (void)table_->update(key, to_sample(host_, instance, epoch_, *task, told));
+}
+
+// Its figures come once they can be read. That there is such a task is told at once.
+void TaskWatch::publish_name(const std::string& instance, const Watched& watched, std::uint32_t index) {
+  const auto known = watched.page->identity(index);
+  const auto state = watched.page->task_state(index);
+  if (!known || !state) return;
+  const std::string key = instance + "/" + std::string(known->name.view());
+  if (table_->contains(key)) return;
+  const TaskSnapshot task{.identity = *known, .state = *state};
+  (void)table_->update(key, to_sample(host_, instance, epoch_, task, {}));
 }
 
 void TaskWatch::look(TimePoint now) {

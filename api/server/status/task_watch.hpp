@@ -64,7 +64,7 @@ class TaskWatch {
   /// Null: its process is gone.
   [[nodiscard]] const InstancePageReader* page_of(const BoundTask& task) const;
 
-  /// The report of the process itself, if its page is open.
+  /// The report of the process itself, if its page is open; as it was when it could be read last.
   [[nodiscard]] std::optional<InstanceRuntime> runtime(const std::string& instance) const;
   /// The process that runs now has this task in exception.
   [[nodiscard]] bool in_exception(const std::string& instance, std::string_view task) const;
@@ -73,6 +73,7 @@ class TaskWatch {
   struct Watched {
     std::int32_t pid = 0;
     std::optional<InstancePageReader> page;
+    InstanceRuntime runtime;  // of the open page
     std::uint32_t next_task = 0;
     TimePoint next_look;                       // of the page when it is not open, else of the tasks
     std::vector<StatisticsWriter::Told> told;  // one for each task of the page
@@ -82,6 +83,7 @@ class TaskWatch {
   bool open_page(const std::string& instance, Watched& watched);
   void index_bound_tasks() const;
   void publish(const std::string& instance, Watched& watched, std::uint32_t index);
+  void publish_name(const std::string& instance, const Watched& watched, std::uint32_t index);
   bool dispose_tasks(const std::string& instance, const Watched& watched);
   void look_at_statistics(TimePoint now);
 

@@ -76,6 +76,37 @@ TEST_F(RemoteCommand, IsSeenInTheStatusOnceItIsAnswered) {
   EXPECT_EQ(sut->instances("hosta", soon()).value().at(0).state, 3U);
 }
 
+TEST_F(RemoteCommand, ForAnInstanceWhoseStatusIsBeingWrittenIsDone) {
+  host_.start_server();
+  const auto sut = connect(domain_);
+  ASSERT_TRUE(sut->host("hosta", soon()));
+  host_.interrupt_instance(0);
+  std::this_thread::sleep_for(milliseconds(100));  // the server looks at the page every 10 ms
+
+  const auto reply = sut->call({"hosta", plc_OPERATION_START, "line1", ""}, soon());
+
+  ASSERT_TRUE(reply) << reply.error().describe();
+  EXPECT_EQ(reply->code, ErrorCode::ok) << reply->text;
+  EXPECT_EQ(sut->instances("hosta", soon()).value().size(), 1U);
+}
+
+TEST_F(RemoteCommand, IsAnsweredOnceTheStatusOfItsInstanceIsWritten) {
+  host_.start_server();
+  const auto sut = connect(domain_);
+  ASSERT_TRUE(sut->host("hosta", soon()));
+  host_.interrupt_instance(0);
+  const std::jthread manager([this] {
+    while (host_.requests().empty()) std::this_thread::sleep_for(milliseconds(1));
+    std::this_thread::sleep_for(milliseconds(50));
+    host_.write_instance(0, "line1", InstanceState::safe_mode, 4711);
+  });
+
+  const auto reply = sut->call({"hosta", plc_OPERATION_START, "line1", ""}, soon());
+
+  ASSERT_TRUE(reply && reply->code == ErrorCode::ok);
+  EXPECT_EQ(sut->instances("hosta", soon()).value().at(0).state, 6U);
+}
+
 TEST_F(RemoteCommand, IsAnsweredToTheOneOfTwoClientsOfAParticipantThatAsked) {
   constexpr int kEach = 50;
   host_.write_instance(1, "line2", InstanceState::running, 4712);

@@ -6,7 +6,9 @@
 #include "api/client/control_client.hpp"
 #include "api/dds/text.hpp"
 #include "schedulers/task/task_recorder.hpp"
+#include "shm/files/memory_file.hpp"
 #include "tests/integration/api/test_host.hpp"
+#include "tests/support/interrupted_write.hpp"
 
 namespace plchost {
 namespace {
@@ -67,6 +69,42 @@ TEST(RemoteStatus, FollowsTasksFromOneProcessToTheNext) {
   while (tasks.size() != 1 || dds::text_of(tasks[0].task) != "New") {
     tasks = sut->tasks("hosta", soon()).value();
   }
+  EXPECT_EQ(dds::text_of(sut->instances("hosta", soon()).value().at(0).scheduler), "CmpScheduleTimer");
+}
+
+TEST(RemoteStatus, ShowsATaskWhoseFiguresCannotBeReadYet) {
+  const OwnDomain domain;
+  TestHost host(domain, "hosta");
+  InstancePage page = host.make_page("line1", "Main", 100);
+  interrupt_write(page.task(0).counters);
+  host.write_instance(0, "line1", InstanceState::running, 100);
+  host.write_count(1);
+  host.start_server();
+  const auto sut = connect(domain);
+  ASSERT_TRUE(sut->host("hosta", soon()));
+
+  const auto tasks = sut->tasks("hosta", soon()).value();
+
+  ASSERT_EQ(tasks.size(), 1U);
+  EXPECT_EQ(dds::text_of(tasks[0].task), "Main");
+}
+
+TEST(RemoteStatus, ShowsWhatAProcessRunsAlsoWhileItWritesThat) {
+  const OwnDomain domain;
+  TestHost host(domain, "hosta");
+  const InstancePage page = host.make_page("line1", "Main", 100);
+  host.write_instance(0, "line1", InstanceState::running, 100);
+  host.write_count(1);
+  host.start_server();
+  const auto sut = connect(domain);
+  ASSERT_TRUE(sut->host("hosta", soon()));
+  ASSERT_EQ(dds::text_of(sut->instances("hosta", soon()).value().at(0).scheduler), "CmpScheduleTimer");
+  const auto memory = MemoryFile::open(instance_page_name(host.pool_name(), "line1"),
+                                       sizeof(InstancePageLayout), MemoryFile::Access::read_write)
+                          .value();
+  interrupt_write(reinterpret_cast<InstancePageLayout*>(memory.bytes().data())->runtime);
+  std::this_thread::sleep_for(milliseconds(100));  // the server looks at it every 10 ms
+
   EXPECT_EQ(dds::text_of(sut->instances("hosta", soon()).value().at(0).scheduler), "CmpScheduleTimer");
 }
 

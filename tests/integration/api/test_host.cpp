@@ -14,6 +14,7 @@
 #include "shm/pages/log_ring.hpp"
 #include "shm/pages/transition_ring.hpp"
 #include "shm/sockets/packet_socket.hpp"
+#include "tests/support/interrupted_write.hpp"
 #include "tests/support/own_name.hpp"
 
 namespace plchost {
@@ -74,6 +75,7 @@ void TestHost::write_count(std::uint32_t count) {
   status.version.assign("0.1.0");
   status.manager_pid = ::getpid();
   status.instance_count = count;
+  const std::lock_guard lock(page_mutex_);
   page_.write_host(status);
 }
 
@@ -96,7 +98,15 @@ void TestHost::write_instance(std::uint32_t index, const std::string& name, Inst
                  .settings = FixedText<kMaxPath>("/etc/line1.cfg"),
                  .application = FixedText<kMaxPath>("/opt/line1.so"),
                  .after = FixedText<kMaxAfter>("io,axis")};
+  const std::lock_guard lock(page_mutex_);
   page_.write_instance(index, status);
+}
+
+void TestHost::interrupt_instance(std::uint32_t index) {
+  const auto memory =
+      MemoryFile::open(host_page_name(pool_name_), sizeof(HostPageLayout), MemoryFile::Access::read_write)
+          .value();
+  interrupt_write(reinterpret_cast<HostPageLayout*>(memory.bytes().data())->instances[index]);
 }
 
 InstancePage TestHost::make_page(const std::string& instance, const std::string& task, std::int32_t pid) {

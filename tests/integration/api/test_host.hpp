@@ -48,6 +48,8 @@ class TestHost {
   void write_instance(std::uint32_t index, const std::string& name, InstanceState state,
                       std::int32_t pid = 0);
   void write_count(std::uint32_t count);
+  /// The manager loses its processor while it writes this instance, until write_instance() is called.
+  void interrupt_instance(std::uint32_t index);
   /// An instance page with one task, as the process `pid` would write it.
   InstancePage make_page(const std::string& instance, const std::string& task, std::int32_t pid);
 
@@ -89,7 +91,8 @@ class TestHost {
   std::string pool_name_;
   std::string run_directory_;
   ObjectPool pool_;
-  HostPageWriter page_;
+  HostPageWriter page_;  // guarded by page_mutex_: it has one writer
+  std::mutex page_mutex_;
   std::vector<std::string> instances_;
   std::vector<std::string> more_arguments_;
   std::string log_file_;  // empty: where the test's output goes

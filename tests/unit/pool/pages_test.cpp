@@ -12,6 +12,7 @@
 
 #include "shm/pages/host_page.hpp"
 #include "shm/pages/instance_page.hpp"
+#include "tests/support/interrupted_write.hpp"
 #include "tests/unit/pool/unique_pool_name.hpp"
 
 namespace plchost {
@@ -126,10 +127,17 @@ TEST_F(Pages, HostPageCarriesWhatTheManagerWrites) {
   EXPECT_FALSE(sut->instance(kMaxInstances));
 }
 
-TEST_F(Pages, AFreshHostPageHasNoState) {
-  ASSERT_TRUE(HostPageWriter::create(pool()));
+TEST_F(Pages, AFreshHostPageTellsNothing) {
+  auto writer = HostPageWriter::create(pool());
+  ASSERT_TRUE(writer);
   const auto sut = HostPageReader::open(pool());
-  EXPECT_EQ(sut->host()->instance_count, 0U);
+  EXPECT_FALSE(sut->host()) << "not that there are no instances";
+  EXPECT_FALSE(sut->instance(0));
+  HostStatus host;
+  host.instance_count = 1;
+  writer->write_host(host);
+  EXPECT_TRUE(sut->host());
+  EXPECT_TRUE(sut->instance(0)) << "all places that are counted are written";
 }
 
 TEST_F(Pages, ReadersSeeTheNextManagerWithoutOpeningAnew) {
@@ -160,6 +168,17 @@ TEST_F(Pages, TheNextManagerTakesOverFromOneThatDiedWhileWriting) {
   next->write_instance(2, {});
   EXPECT_TRUE(sut->host());
   EXPECT_TRUE(sut->instance(2));
+}
+
+TEST_F(Pages, TheStateOfATaskIsReadAlsoWhileItsCountersAreWritten) {
+  auto writer = InstancePage::create(pool(), "line1", tasks_of(1));
+  ASSERT_TRUE(writer) << writer.error().describe();
+  writer->set_task_state(0, PageTaskState::exception);
+  interrupt_write(writer->task(0).counters);
+  const auto sut = InstancePageReader::open(pool(), "line1");
+  EXPECT_FALSE(sut->task(0));
+  EXPECT_EQ(sut->task_state(0), PageTaskState::exception);
+  EXPECT_EQ(sut->task_state(1), std::nullopt);
 }
 
 TEST_F(Pages, InstancePageCarriesTasksAndRuntime) {
