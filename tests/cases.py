@@ -14,6 +14,7 @@ runs again in a process of its own. A process that a case leaves running is a fa
 
 import argparse
 import ctypes
+import functools
 import os
 import re
 import selectors
@@ -43,9 +44,12 @@ def list_cases(program):
     return [case for case in cases if "DISABLED_" not in case]
 
 
-def follow_the_parent():
+def follow(parent):
+    """In the child: ends with the parent, also if that ended before the kernel knew of this."""
     os.setsid()
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
+        os.kill(os.getpid(), signal.SIGKILL)
 
 
 class Run:
@@ -62,7 +66,7 @@ class Run:
             flags.flush()
             self.process = subprocess.Popen(
                 [program, "--gtest_flagfile=" + flags.name, "--gtest_brief=0"],
-                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, preexec_fn=follow_the_parent)
+                stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, preexec_fn=functools.partial(follow, os.getpid()))
             try:
                 self.watch()
             finally:

@@ -8,7 +8,7 @@ cell=$(mktemp -d "${TMPDIR:-/tmp}/$pool.XXXXXX")
 managers=()
 others=()
 
-exec {domain_holder}< <(exec "$(dirname "${BASH_SOURCE[0]}")/hold_domain.py")
+exec {domain_holder}< <(exec "$(dirname "${BASH_SOURCE[0]}")/hold_domain.py" $$)
 domain_pid=$!
 read -r PLCHOST_DOMAIN <&"$domain_holder" || { rm -rf "$cell"; exit 1; }
 export PLCHOST_DOMAIN
