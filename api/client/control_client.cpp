@@ -179,7 +179,7 @@ Result<RequestCaller*> ControlClient::caller(const std::string& host, bool engin
 
 const HostClock* ControlClient::clock_of(const std::string& host) const {
   const SeenHost* const seen = seen_.find(host);
-  return seen == nullptr || seen->epoch == 0 ? nullptr : &seen->clock;
+  return seen == nullptr || seen->server.value() == 0 ? nullptr : &seen->clock;
 }
 
 Result<ApiReply> ControlClient::ask(const ApiRequest& request, TimePoint deadline,

@@ -76,16 +76,16 @@ void ControlClient::update_hosts() {
 }
 
 std::optional<HostView> ControlClient::view_of(std::string_view name, const SeenHost& seen) const {
-  const auto status = host_status_.of_host(name, seen.epoch);
+  const auto status = host_status_.of_host(name, seen.server.value());
   if (status.empty()) return std::nullopt;
   constexpr std::uint32_t kMoreThanLastWords = 3;
   const TimePoint now = MonotonicClock::now();
   HostView view{.name = std::string(name),
-                .epoch = seen.epoch,
+                .epoch = seen.server.value(),
                 .server_pid = seen.pid,
                 .status = status.front(),
                 .ext = {},
-                .silent = now - seen.last >= kSilent,
+                .silent = now - seen.server.last() >= kSilent,
                 .contested = seen.others >= kMoreThanLastWords && now - seen.other_last <= kHostGone};
   const auto& ext = view.status.ext;
   view.ext.assign(ext._buffer, ext._buffer + ext._length);
@@ -95,7 +95,7 @@ std::optional<HostView> ControlClient::view_of(std::string_view name, const Seen
 
 std::optional<HostView> ControlClient::present(std::string_view name) const {
   const SeenHost* const seen = seen_.find(name);
-  if (seen == nullptr || MonotonicClock::now() - seen->last > kHostGone) return std::nullopt;
+  if (seen == nullptr || seen->server.is_gone(MonotonicClock::now())) return std::nullopt;
   return view_of(name, *seen);
 }
 
@@ -110,7 +110,7 @@ std::vector<HostView> ControlClient::present() const {
 bool ControlClient::is_silent(std::string_view host) {
   update();
   const SeenHost* const seen = seen_.find(host);
-  return seen != nullptr && MonotonicClock::now() - seen->last >= kSilent;
+  return seen != nullptr && MonotonicClock::now() - seen->server.last() >= kSilent;
 }
 
 std::vector<HostView> ControlClient::hosts(TimePoint deadline) {
@@ -136,7 +136,7 @@ Result<HostView> ControlClient::host(std::string_view name, TimePoint deadline) 
   // Those too that are late at this very moment.
   std::vector<std::string> names;
   for (const auto& [other, seen] : seen_.all()) {
-    if (seen.last >= began - kHostGone) names.push_back(other);
+    if (seen.server.last() >= began - kHostGone) names.push_back(other);
   }
   return failure(ErrorCode::not_found, no_such_host(name, names));
 }
@@ -144,7 +144,7 @@ Result<HostView> ControlClient::host(std::string_view name, TimePoint deadline) 
 std::vector<HostView> ControlClient::known_hosts(TimePoint deadline) {
   (void)hosts(deadline);
   const auto is_in_doubt = [](const auto& entry) {
-    const Duration silence = MonotonicClock::now() - entry.second.last;
+    const Duration silence = MonotonicClock::now() - entry.second.server.last();
     return silence >= kSilent && silence <= kHostGone;
   };
   // A moment of silence is not the end of a host.

@@ -64,7 +64,7 @@ Result<RunReport> ControlClient::post_and_await(const ApiRequest& event, Duratio
   EventPoster& posts = **poster(event.host);
   const auto epoch = [&] {
     const SeenHost* const seen = seen_.find(event.host);
-    return seen != nullptr ? seen->epoch : 0;
+    return seen != nullptr ? seen->server.value() : 0;
   };
   std::uint64_t asked = epoch();
   const TimePoint start = MonotonicClock::now();

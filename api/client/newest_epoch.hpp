@@ -15,13 +15,17 @@ class NewestEpoch {
  public:
   /// Whether what has come with this epoch counts.
   [[nodiscard]] bool accept(std::uint64_t epoch, TimePoint now) noexcept {
-    if (epoch < value_ && now - last_ <= kServerGone) return false;
+    if (epoch < value_ && !is_gone(now)) return false;
     value_ = epoch;
     last_ = now;
     return true;
   }
   /// 0: none yet.
   [[nodiscard]] std::uint64_t value() const noexcept { return value_; }
+  /// When something that counts has come last.
+  [[nodiscard]] TimePoint last() const noexcept { return last_; }
+  /// Whether that is so long ago that the server is gone.
+  [[nodiscard]] bool is_gone(TimePoint now) const noexcept { return now - last_ > kServerGone; }
 
  private:
   std::uint64_t value_ = 0;

@@ -19,10 +19,9 @@ namespace plchost {
 
 /// The values of a host's presence.
 struct SeenHost {
-  std::uint64_t epoch = 0;
+  NewestEpoch server;  ///< that shows its presence
   std::int32_t pid = 0;
   dds_instance_handle_t writer = DDS_HANDLE_NIL;  ///< of the presence
-  TimePoint last;
   HostClock clock;
   std::uint32_t others = 0;  ///< presences of an older server while this one runs
   TimePoint other_last;

@@ -36,11 +36,11 @@ TEST(SeenHosts, CountTheOlderServerOfAName) {
   SeenHosts sut;
   sut.take(presence("a", 8), kStart);
   EXPECT_FALSE(sut.take(presence("a", 7), kStart));
-  EXPECT_EQ(sut.find("a")->epoch, 8U);
+  EXPECT_EQ(sut.find("a")->server.value(), 8U);
   EXPECT_EQ(sut.find("a")->others, 1U);
 
   EXPECT_TRUE(sut.take(presence("a", 7), kStart + 2 * kServerGone));
-  EXPECT_EQ(sut.find("a")->epoch, 7U);
+  EXPECT_EQ(sut.find("a")->server.value(), 7U);
 }
 
 TEST(SeenHosts, TellOnceWhichServersHaveEnded) {
