@@ -17,9 +17,8 @@
 #include <control.h>
 #include <status_topics.hpp>
 
-#include "api/client/batch_poster.hpp"
-#include "api/client/event_poster.hpp"
 #include "api/client/participant.hpp"
+#include "api/client/poster.hpp"
 #include "api/client/request_caller.hpp"
 #include "api/client/seen_hosts.hpp"
 #include "api/client/statistics_cache.hpp"
@@ -229,8 +228,9 @@ class ControlClient {
   /// nullptr: that host has not been seen.
   [[nodiscard]] const HostClock* clock_of(const std::string& host) const;
   void use_clock(EventPoster& posts, const std::string& host, Duration patience) const;
-  [[nodiscard]] Result<EventPoster*> poster(const std::string& host);
-  [[nodiscard]] Result<BatchPoster*> batch_poster(const std::string& host);
+  /// The way of such posts to that host.
+  template <class Sample>
+  [[nodiscard]] Result<Poster<Sample>*> poster(const std::string& host);
   [[nodiscard]] Result<void> prepare_runs(const std::string& host, TimePoint deadline);
   [[nodiscard]] std::optional<Result<RunReport>> take_run(const EventPoster& posts, std::string_view host,
                                                           std::uint64_t number, TimePoint start);
@@ -275,15 +275,17 @@ class ControlClient {
   PageReader log_pages_;
   dds::Entity ack_topic_;
   dds::Entity ack_reader_;
-  dds::Entity event_topic_;
-  dds::Entity batch_topic_;
   PageReader runs_;
   PageReader download_acks_;
   dds::Entity chunk_topic_;
   std::array<dds::Entity, 2> request_topics_;
   std::map<std::pair<std::string, bool>, RequestCaller> callers_;
-  std::map<std::string, EventPoster, std::less<>> posters_;
-  std::map<std::string, BatchPoster, std::less<>> batch_posters_;
+  template <class Sample>
+  struct Posters {
+    dds::Entity topic;
+    std::map<std::string, Poster<Sample>, std::less<>> of_host;
+  };
+  std::tuple<Posters<plc_EventPost>, Posters<plc_EventBatch>> posters_;
 };
 
 }  // namespace plchost

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
@@ -10,24 +11,27 @@
 
 namespace plchost {
 
-Result<EventPoster*> ControlClient::poster(const std::string& host) {
-  if (const auto known = posters_.find(host); known != posters_.end()) return &known->second;
+template <class Sample>
+Result<Poster<Sample>*> ControlClient::poster(const std::string& host) {
+  auto& [topic, of_host] = std::get<Posters<Sample>>(posters_);
+  if (const auto known = of_host.find(host); known != of_host.end()) return &known->second;
   if (auto opened = open_own_reader(ack_topic_, ack_reader_, dds::kEventAck, dds::qos_of(dds::kEventAck));
       !opened) {
     return std::unexpected(opened.error());
   }
-  if (!event_topic_) {
-    auto made = dds::make_topic(entity(), dds::kEventPost);
+  if (!topic) {
+    auto made = dds::make_topic(entity(), dds::kTopicOf<Sample>);
     if (!made) return std::unexpected(made.error());
-    event_topic_ = std::move(*made);
+    topic = std::move(*made);
   }
-  auto made = EventPoster::create(entity(), event_topic_.get(), host);
+  auto made = Poster<Sample>::create(entity(), topic.get(), host);
   if (!made) return std::unexpected(made.error());
   if (auto added = wait_set_.add(made->writer(), DDS_PUBLICATION_MATCHED_STATUS); !added) {
     return std::unexpected(added.error());
   }
-  return &posters_.emplace(host, std::move(*made)).first->second;
+  return &of_host.emplace(host, std::move(*made)).first->second;
 }
+template Result<EventPoster*> ControlClient::poster<plc_EventPost>(const std::string& host);
 
 void ControlClient::use_clock(EventPoster& posts, const std::string& host, Duration patience) const {
   if (const HostClock* const clock = clock_of(host)) posts.wait_for(patience, *clock);
@@ -35,7 +39,7 @@ void ControlClient::use_clock(EventPoster& posts, const std::string& host, Durat
 
 Result<void> ControlClient::prepare_posts(const std::string& host, TimePoint deadline) {
   if (auto good = check_host_name(host); !good) return good;
-  const auto way = poster(host);
+  const auto way = poster<plc_EventPost>(host);
   if (!way) return std::unexpected(way.error());
   update_hosts();  // the limit is by the newest presence
   while (!(*way)->matched() || clock_of(host) == nullptr) {
@@ -50,14 +54,15 @@ Result<void> ControlClient::prepare_posts(const std::string& host, TimePoint dea
 
 bool ControlClient::take_acks(TimePoint now) {
   bool progress = false;
-  dds::take_valid_told<plc_EventAck>(
-      ack_reader_.get(), answering_, [&](const plc_EventAck& ack, const auto& /*info*/) {
-        const auto host = dds::text_of(ack.host);
-        if (const auto way = posters_.find(host); way != posters_.end())
-          progress |= way->second.on_ack(ack, now);
-        if (const auto way = batch_posters_.find(host); way != batch_posters_.end())
-          way->second.on_ack(ack, now);
-      });
+  dds::take_valid_told<plc_EventAck>(ack_reader_.get(), answering_,
+                                     [&](const plc_EventAck& ack, const auto& /*info*/) {
+                                       const auto tell = [&](auto& posters) {
+                                         const auto way = posters.of_host.find(dds::text_of(ack.host));
+                                         if (way != posters.of_host.end())
+                                           progress |= way->second.on_ack(ack, now);
+                                       };
+                                       std::apply([&](auto&... each) { (tell(each), ...); }, posters_);
+                                     });
   return progress;
 }
 
@@ -68,11 +73,12 @@ Result<PostReport> ControlClient::post_event(const ApiRequest& event, std::uint6
   }
   const TimePoint start = MonotonicClock::now();
   if (auto ready = prepare_posts(event.host, start + patience); !ready) return std::unexpected(ready.error());
-  const auto way = poster(event.host);
+  const auto way = poster<plc_EventPost>(event.host);
   if (!way) return std::unexpected(way.error());
   EventPoster& posts = **way;
   posts.begin_report(start);
   use_clock(posts, event.host, patience);
+  const EventId id{event.instance, event.argument};
   const TimePoint first = MonotonicClock::now();
   std::uint64_t sent = 0;
   for (bool woken = false;; woken = true) {
@@ -88,7 +94,7 @@ Result<PostReport> ControlClient::post_event(const ApiRequest& event, std::uint6
     while (sent < count && posts.has_room()) {
       next = first + interval * static_cast<Duration::rep>(sent);
       if (next > now) break;
-      posts.post(event.instance, event.argument, now);
+      posts.post(id, now);
       ++sent;
       now = MonotonicClock::now();
     }
@@ -105,11 +111,45 @@ Result<PostReport> ControlClient::post_event(const ApiRequest& event, std::uint6
   }
 }
 
+Result<PostReport> ControlClient::post_batch(const std::string& host, std::span<const EventId> events,
+                                             Duration patience) {
+  if (auto good = check_host_name(host); !good) return std::unexpected(std::move(good).error());
+  if (events.empty() || events.size() > kMaxBatch) {
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("a batch of {} events; allowed are 1 to {}", events.size(), kMaxBatch));
+  }
+  for (const EventId& event : events) {
+    if (auto good = check_event_name(event.instance, event.event); !good)
+      return std::unexpected(good.error());
+  }
+  const auto way = poster<plc_EventBatch>(host);
+  if (!way) return std::unexpected(way.error());
+  BatchPoster& posts = **way;
+  const TimePoint deadline = MonotonicClock::now() + patience;
+  update_hosts();  // the limit is by the newest presence
+  for (bool posted = false;;) {
+    const TimePoint now = MonotonicClock::now();
+    (void)take_acks(now);
+    const HostClock* const clock = clock_of(host);
+    const bool begins = !posted && clock != nullptr && posts.matched();
+    if (begins) posts.begin_report(now);
+    if (clock != nullptr) posts.wait_for(deadline - posts.last_progress(), *clock);
+    if (begins) posts.post(events, now);
+    posted |= begins;
+    if (posted && posts.unacknowledged() == 0) return posts.report();
+    if (now >= deadline) break;
+    update();
+    wait_set_.wait(std::min(deadline, posted ? posts.repeat(now) : deadline));
+  }
+  return failure(ErrorCode::timed_out, fmt::format("host '{}' has not acknowledged the batch", host));
+}
+
 Result<void> ControlClient::post_one(const std::string& host, std::string_view instance,
                                      std::string_view event) {
   if (auto good = check_event_name(instance, event); !good) return good;
-  const auto way = posters_.find(host);
-  if (way == posters_.end()) return failure(ErrorCode::wrong_state, "prepare_posts() comes first");
+  auto& posters = std::get<Posters<plc_EventPost>>(posters_).of_host;
+  const auto way = posters.find(host);
+  if (way == posters.end()) return failure(ErrorCode::wrong_state, "prepare_posts() comes first");
   auto posted = way->second.post_once(instance, event);
   // Nobody else reads meanwhile that the host has a new server, so that the one before needs no room any
   // more.

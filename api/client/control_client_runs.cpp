@@ -1,4 +1,4 @@
-// A client's way to learn that its post was run, and posts of several events at once.
+// A client's way to learn that its post was run.
 #include <algorithm>
 #include <utility>
 
@@ -61,7 +61,7 @@ Result<RunReport> ControlClient::post_and_await(const ApiRequest& event, Duratio
   }
   const TimePoint deadline = MonotonicClock::now() + patience;
   if (auto ready = prepare_runs(event.host, deadline); !ready) return std::unexpected(ready.error());
-  EventPoster& posts = **poster(event.host);
+  EventPoster& posts = **poster<plc_EventPost>(event.host);
   const auto epoch = [&] {
     const SeenHost* const seen = seen_.find(event.host);
     return seen != nullptr ? seen->server.value() : 0;
@@ -70,7 +70,8 @@ Result<RunReport> ControlClient::post_and_await(const ApiRequest& event, Duratio
   const TimePoint start = MonotonicClock::now();
   posts.begin_report(start);
   use_clock(posts, event.host, deadline - start);
-  const std::uint64_t number = posts.post(event.instance, event.argument, start, /*awaited=*/true);
+  const EventId id{event.instance, event.argument};
+  const std::uint64_t number = posts.post(id, start, /*awaited=*/true);
   for (;;) {
     const TimePoint now = MonotonicClock::now();
     (void)take_acks(now);
@@ -85,63 +86,11 @@ Result<RunReport> ControlClient::post_and_await(const ApiRequest& event, Duratio
     // The server that was asked is gone, and with it what it waited for.
     if (acknowledged && epoch() != asked) {
       asked = epoch();
-      posts.ask_again(number, event.instance, event.argument);
+      posts.ask_again(number, id);
     }
     wait_set_.wait(std::min(deadline, posts.repeat(now)));
   }
   return failure(ErrorCode::timed_out, fmt::format("host '{}' has not told that a task ran", event.host));
-}
-
-Result<BatchPoster*> ControlClient::batch_poster(const std::string& host) {
-  if (const auto known = batch_posters_.find(host); known != batch_posters_.end()) return &known->second;
-  if (auto opened = open_own_reader(ack_topic_, ack_reader_, dds::kEventAck, dds::qos_of(dds::kEventAck));
-      !opened) {
-    return std::unexpected(opened.error());
-  }
-  if (!batch_topic_) {
-    auto made = dds::make_topic(entity(), dds::kEventBatch);
-    if (!made) return std::unexpected(made.error());
-    batch_topic_ = std::move(*made);
-  }
-  auto made = BatchPoster::create(entity(), batch_topic_.get(), host);
-  if (!made) return std::unexpected(made.error());
-  if (auto added = wait_set_.add(made->writer(), DDS_PUBLICATION_MATCHED_STATUS); !added) {
-    return std::unexpected(added.error());
-  }
-  return &batch_posters_.emplace(host, std::move(*made)).first->second;
-}
-
-Result<PostReport> ControlClient::post_batch(const std::string& host, std::span<const EventId> events,
-                                             Duration patience) {
-  if (auto good = check_host_name(host); !good) return std::unexpected(std::move(good).error());
-  if (events.empty() || events.size() > kMaxBatch) {
-    return failure(ErrorCode::invalid_argument,
-                   fmt::format("a batch of {} events; allowed are 1 to {}", events.size(), kMaxBatch));
-  }
-  for (const EventId& event : events) {
-    if (auto good = check_event_name(event.instance, event.event); !good)
-      return std::unexpected(good.error());
-  }
-  const auto way = batch_poster(host);
-  if (!way) return std::unexpected(way.error());
-  BatchPoster& posts = **way;
-  const TimePoint deadline = MonotonicClock::now() + patience;
-  update_hosts();  // the limit is by the newest presence
-  for (bool posted = false;;) {
-    const TimePoint now = MonotonicClock::now();
-    (void)take_acks(now);
-    const HostClock* const clock = clock_of(host);
-    if (clock != nullptr) posts.use_clock(*clock);
-    if (!posted && clock != nullptr && posts.matched()) {
-      posts.post(events, now, deadline);
-      posted = true;
-    }
-    if (posted && posts.acknowledged()) return posts.report();
-    if (now >= deadline) break;
-    update();
-    wait_set_.wait(std::min(deadline, posted ? posts.repeat(now) : deadline));
-  }
-  return failure(ErrorCode::timed_out, fmt::format("host '{}' has not acknowledged the batch", host));
 }
 
 }  // namespace plchost

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "api/client/event_poster.hpp"
+#include "api/client/met_readers.hpp"
 #include "api/dds/sample_identity.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"

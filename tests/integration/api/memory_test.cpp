@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "api/client/event_poster.hpp"
+#include "api/client/poster.hpp"
 #include "api/dds/instances.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"

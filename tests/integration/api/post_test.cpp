@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 
 #include "api/client/control_client.hpp"
-#include "api/client/event_poster.hpp"
+#include "api/client/poster.hpp"
 #include "api/dds/domain.hpp"
 #include "api/dds/samples.hpp"
 #include "api/dds/text.hpp"

@@ -1,6 +1,7 @@
+#include "api/client/ack_account.hpp"
+
 #include <gtest/gtest.h>
 
-#include "api/client/event_poster.hpp"
 #include "api/dds/text.hpp"
 
 namespace plchost {

@@ -1,13 +1,19 @@
 #pragma once
 
+#include <concepts>
+#include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <control.h>
 
+#include "api/client/ack_account.hpp"
 #include "api/client/host_clock.hpp"
+#include "api/client/met_readers.hpp"
 #include "api/client/newest_epoch.hpp"
 #include "api/dds/entity.hpp"
 #include "api/dds/guid.hpp"
@@ -16,48 +22,19 @@
 
 namespace plchost {
 
-/// The results of posts.
-struct PostReport {
-  std::uint64_t accepted = 0;  ///< counted by the event (no_task included)
-  std::uint64_t no_task = 0;   ///< counted, but no task was bound to the event at that time
-  std::uint64_t rejected = 0;  ///< not counted
-  ErrorCode rejected_code = ErrorCode::ok;
-  std::uint64_t lost = 0;            ///< not counted: one-way posts that never came
-  std::string rejected_text;         ///< why the last rejected one was
-  std::uint64_t unacknowledged = 0;  ///< nothing is known of these; 0 unless the host stopped answering
+/// An external event by its two names.
+struct EventId {
+  std::string instance;
+  std::string event;
 };
 
-/// The counts in the acknowledgements of one source. The host's ledger of posts may begin anew (it is made
-/// anew for a new pool, and forgets the source that posted least recently): it counts from 0 then.
-class AckAccount {
- public:
-  /// Sums since the account was made.
-  struct Sums {
-    std::uint64_t accepted = 0;
-    std::uint64_t no_task = 0;
-    std::uint64_t rejected = 0;
-    std::uint64_t lost = 0;
-  };
-  /// An acknowledgement that is not older than the one before.
-  void take(const plc_EventAck& ack);
-  [[nodiscard]] Sums sums() const noexcept;
-  [[nodiscard]] PostReport report_since(const Sums& base) const;
-  /// Its epoch is 0: none yet.
-  [[nodiscard]] const plc_EventAck& newest() const noexcept { return newest_; }
+/// How many events a batch may have.
+inline constexpr std::size_t kMaxBatch = 64;
 
- private:
-  Sums earlier_;  // of the ledgers before this one
-  plc_EventAck newest_{};
-  ErrorCode rejected_code_ = ErrorCode::ok;
-  std::string rejected_text_;
-};
-/// Whether a writer has met a reader.
-[[nodiscard]] bool has_reader(dds_entity_t writer) noexcept;
-/// How many readers a writer has met so far, those that are gone included.
-[[nodiscard]] std::uint32_t readers_met(dds_entity_t writer) noexcept;
-
-/// The posts to one host: numbers them, keeps those that are not acknowledged, and repeats them.
-class EventPoster {
+/// The posts of one topic to one host: numbers them, keeps those that are not acknowledged, and repeats them.
+/// A plc_EventPost has one event, a plc_EventBatch one or more.
+template <class Sample>
+class Poster {
  public:
   /// Unacknowledged posts at most.
   static constexpr std::size_t kWindow = 32;
@@ -66,8 +43,9 @@ class EventPoster {
   static constexpr Duration kResend = std::chrono::milliseconds(200);
   static constexpr Duration kFirstResend = std::chrono::milliseconds(20);
 
-  [[nodiscard]] static Result<EventPoster> create(dds_entity_t participant, dds_entity_t topic,
-                                                  const std::string& host);
+  /// `topic` is that of Sample.
+  [[nodiscard]] static Result<Poster> create(dds_entity_t participant, dds_entity_t topic,
+                                             const std::string& host);
 
   [[nodiscard]] const dds::Guid& source() const noexcept { return source_; }
   [[nodiscard]] dds_entity_t writer() const noexcept { return writer_.get(); }
@@ -79,17 +57,21 @@ class EventPoster {
   /// changed.
   void wait_for(Duration patience, const HostClock& clock) noexcept;
 
-  /// One post that is repeated until it is acknowledged. Only while has_room(). `awaited`: the host shall
-  /// tell when it was run. Returns its number.
-  std::uint64_t post(std::string_view instance, std::string_view event, TimePoint now, bool awaited = false);
+  /// One post that is repeated until it is acknowledged. Only while has_room(). `events`: as many as a Sample
+  /// may have, whose names fit. `awaited`: the host shall tell when it was run. Returns its number.
+  std::uint64_t post(std::span<const EventId> events, TimePoint now, bool awaited = false);
+  std::uint64_t post(const EventId& event, TimePoint now, bool awaited = false) {
+    return post(std::span(&event, 1), now, awaited);
+  }
   /// The same post again, which was acknowledged: the host that is there now shall tell when it was run.
-  void ask_again(std::uint64_t number, std::string_view instance, std::string_view event);
+  void ask_again(std::uint64_t number, const EventId& event);
   [[nodiscard]] bool has_room() const noexcept { return unacknowledged_.size() < window_; }
   [[nodiscard]] std::size_t unacknowledged() const noexcept { return unacknowledged_.size(); }
 
   /// One post that is not repeated, and whose acknowledgement nobody waits for: as fast as DDS is. One call
   /// of dds_write.
-  [[nodiscard]] Result<void> post_once(std::string_view instance, std::string_view event) noexcept;
+  [[nodiscard]] Result<void> post_once(std::string_view instance, std::string_view event) noexcept
+    requires std::same_as<Sample, plc_EventPost>;
 
   /// Returns true if that acknowledged something.
   bool on_ack(const plc_EventAck& ack, TimePoint now);
@@ -100,26 +82,27 @@ class EventPoster {
   [[nodiscard]] TimePoint last_progress() const noexcept { return last_progress_; }
   /// From now on report() counts from 0, and nothing before is repeated.
   void begin_report(TimePoint now);
+  /// Counts posts, whatever number of events each has.
   [[nodiscard]] PostReport report() const;
 
  private:
-  EventPoster() = default;
+  Poster() = default;
   dds_return_t write(std::uint64_t sequence) noexcept;
 
   struct Unacknowledged {
     std::uint64_t sequence = 0;
-    std::string instance;
-    std::string event;
+    std::vector<plc_EventName> events;
     bool awaited = false;
   };
-  dds_return_t write(const Unacknowledged& post) noexcept;
+  [[nodiscard]] static std::vector<plc_EventName> names_of(std::span<const EventId> events);
+  dds_return_t write(Unacknowledged& post) noexcept;
   /// Whether there is a server that was not there at the last call.
   bool has_met_server() noexcept;
   [[nodiscard]] Duration patience_until_repeated() const noexcept;
 
   dds::Entity publisher_;
   dds::Entity writer_;
-  plc_EventPost sample_{};  // all but numbers and names is set once
+  Sample sample_{};  // all but numbers and events is set once
   dds::Guid source_;
   std::deque<Unacknowledged> unacknowledged_;
   std::size_t window_ = kWindow;
@@ -129,12 +112,15 @@ class EventPoster {
   TimePoint last_progress_;
   TimePoint last_write_;
   NewestEpoch epoch_;
-  bool answered_ = false;          // since the last write
-  bool heard_ = false;             // of the server that was met last
-  bool has_space_ = true;          // DDS had for the last post
-  std::uint32_t readers_met_ = 0;  // at the last has_met_server()
+  bool answered_ = false;  // since the last write
+  bool heard_ = false;     // of the server that was met last
+  bool has_space_ = true;  // DDS had for the last post
+  MetReaders met_;
   AckAccount account_;
   AckAccount::Sums base_;  // where the report counts from
 };
+
+using EventPoster = Poster<plc_EventPost>;
+using BatchPoster = Poster<plc_EventBatch>;
 
 }  // namespace plchost

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include <control.h>
+
+#include "shm/base/result.hpp"
+
+namespace plchost {
+
+/// The results of posts.
+struct PostReport {
+  std::uint64_t accepted = 0;  ///< counted by the event (no_task included)
+  std::uint64_t no_task = 0;   ///< counted, but no task was bound to the event at that time
+  std::uint64_t rejected = 0;  ///< not counted
+  ErrorCode rejected_code = ErrorCode::ok;
+  std::uint64_t lost = 0;            ///< not counted: one-way posts that never came
+  std::string rejected_text;         ///< why the last rejected one was
+  std::uint64_t unacknowledged = 0;  ///< nothing is known of these; 0 unless the host stopped answering
+};
+
+/// The counts in the acknowledgements of one source. The host's ledger of posts may begin anew (it is made
+/// anew for a new pool, and forgets the source that posted least recently): it counts from 0 then.
+class AckAccount {
+ public:
+  /// Sums since the account was made.
+  struct Sums {
+    std::uint64_t accepted = 0;
+    std::uint64_t no_task = 0;
+    std::uint64_t rejected = 0;
+    std::uint64_t lost = 0;
+  };
+  /// An acknowledgement that is not older than the one before.
+  void take(const plc_EventAck& ack);
+  [[nodiscard]] Sums sums() const noexcept;
+  [[nodiscard]] PostReport report_since(const Sums& base) const;
+  /// Its epoch is 0: none yet.
+  [[nodiscard]] const plc_EventAck& newest() const noexcept { return newest_; }
+
+ private:
+  Sums earlier_;  // of the ledgers before this one
+  plc_EventAck newest_{};
+  ErrorCode rejected_code_ = ErrorCode::ok;
+  std::string rejected_text_;
+};
+
+}  // namespace plchost
