@@ -159,6 +159,7 @@ TEST_P(ExternalEventTasks, ABacklogThatAStopLeavesIsLost) {
   post("ready", 1000);
   while (!entered) std::this_thread::yield();
   ASSERT_TRUE(set->begin_stop({}));
+  ASSERT_FALSE(set->advance_stop()) << "a task that drives no outputs is asked to park in the second phase";
   go = true;
   while (!set->advance_stop()) std::this_thread::yield();
   EXPECT_EQ(counters(0).cycles, 1U);
