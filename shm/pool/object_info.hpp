@@ -16,6 +16,9 @@ struct ReferenceInfo {
   std::string program;
   bool writable = false;
   std::uint32_t waiting = 0;  ///< so many of its threads wait for the object
+  // Of the process, see ProcessIdentity.
+  std::uint64_t start = 0;
+  std::uint32_t image = 0;
 };
 
 /// One object as others see it.

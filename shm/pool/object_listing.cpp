@@ -16,7 +16,9 @@ auto ObjectHolders::look_at(const PoolView& view, std::size_t from, std::size_t 
     part.emplace_back(key_of(view, *object), ReferenceInfo{.pid = client->pid.load(kRelaxed),
                                                            .program = std::string(client->name.view()),
                                                            .writable = reference.writable.load(kRelaxed) != 0,
-                                                           .waiting = reference.waiting.load(kRelaxed)});
+                                                           .waiting = reference.waiting.load(kRelaxed),
+                                                           .start = client->start.load(kRelaxed),
+                                                           .image = client->image.load(kRelaxed)});
   }
   return part;
 }

@@ -2,23 +2,43 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
 
 #include <fmt/format.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
 
 #include "shm/base/names.hpp"
+#include "shm/base/process_start.hpp"
 #include "shm/files/memory_file.hpp"
 
 namespace plchost {
 
 namespace {
 
-// The references of its process go with it, and so do registrations and tasks of its own events.
-bool stays(const ObjectInfo& object, std::string_view prefix, pid_t process) {
+/// The processes that hold references, and go on.
+class Holders {
+ public:
+  explicit Holders(pid_t that_ends) { goes_on_.emplace(static_cast<std::uint32_t>(that_ends), false); }
+  /// One whose references nobody has released yet may have ended.
+  [[nodiscard]] bool goes_on(const ReferenceInfo& reference) {
+    const auto [known, is_new] = goes_on_.try_emplace(reference.pid, false);
+    if (is_new) {
+      known->second = !process_has_ended(
+          {.pid = static_cast<pid_t>(reference.pid), .start = reference.start, .image = reference.image});
+    }
+    return known->second;
+  }
+
+ private:
+  std::map<std::uint32_t, bool> goes_on_;
+};
+
+// The references of the process that ends go with it, and so do registrations and tasks of its own events.
+bool stays(const ObjectInfo& object, std::string_view prefix, Holders& holders) {
   const bool held_by_others = object.reference_count > object.references.size() ||
                               std::ranges::any_of(object.references, [&](const ReferenceInfo& reference) {
-                                return reference.pid != static_cast<std::uint32_t>(process);
+                                return holders.goes_on(reference);
                               });
   const bool used = object.registered || object.bound_tasks > 0;
   return object.kept || held_by_others || (used && !object.name.starts_with(prefix));
@@ -53,8 +73,9 @@ Result<PoolRoom> PoolRoom::of(const ObjectPool& pool, std::string_view instance,
   if (!objects) return std::unexpected(objects.error());
   PoolRoom room(pool, free_bytes);
   const std::string prefix = fmt::format("{}/", instance);
+  Holders holders(process);
   for (const ObjectInfo& object : *objects) {
-    if (!stays(object, prefix, process)) {
+    if (!stays(object, prefix, holders)) {
       if (object.type == ObjectType::memory) {
         room.free_bytes_ = sum_of(room.free_bytes_, in_pages(object.size));
       }

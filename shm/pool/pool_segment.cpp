@@ -392,7 +392,6 @@ bool PoolSegment::bury(PoolLock& held, ClientSlot& client, std::size_t& left) no
   constexpr std::size_t kPlacesForOne = 256;  // are searched in the time in which one is released
   const auto all = view_.used_references();
   const std::size_t begin = client.released.load(kRelaxed);
-  if (begin == 0 && client.reference_count.load(kRelaxed) == 0) return true;
   std::size_t at = begin;
   for (; at < all.size(); ++at) {
     if (left == 0 || held.trash.full()) break;

@@ -244,6 +244,26 @@ TEST_F(ClientDeath, ReleasesAllThoughAStrangerHasWrittenOverThePlaceOfTheSearch)
   }
 }
 
+// The count of its references lies there, too.
+TEST_F(ClientDeath, ReleasesAllThoughAStrangerHasWrittenOverTheCount) {
+  const auto file = MemoryFile::open(name_.get(), 1, MemoryFile::Access::read_write);
+  ASSERT_TRUE(file);
+  for (const std::uint32_t count : {0U, 1U, ~0U}) {
+    const pid_t child = client([](ObjectPool& pool) {
+      static std::vector<SharedSemaphore> held;
+      for (int i = 0; i < 10; ++i) {
+        held.push_back(std::move(pool.create_semaphore(std::to_string(i), 1)->object));
+      }
+    });
+    auto* const slots = reinterpret_cast<ClientSlot*>(file->bytes().data() + kClientsOffset);
+    for (std::uint32_t i = 0; i < kMaxClients; ++i) {
+      if (slots[i].pid == static_cast<std::uint32_t>(child)) slots[i].reference_count = count;
+    }
+    kill_and_reap(child);
+    EXPECT_TRUE(pool_.list()->empty()) << count;
+  }
+}
+
 TEST_F(ClientDeath, SlotsOfManyDeadClientsAreUsedAgain) {
   for (int i = 0; i < 40; ++i) {
     std::vector<pid_t> children;

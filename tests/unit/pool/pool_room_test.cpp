@@ -4,6 +4,7 @@
 #include <string>
 
 #include <gmock/gmock.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include "shm/pool/object_pool.hpp"
@@ -63,6 +64,25 @@ TEST_F(RoomInPool, CountsWhatTheOldProcessGivesBack) {
   EXPECT_FALSE(room(0, ::getpid()).take_memory("new", 3 * kPage + 1));
   ASSERT_TRUE(pool_->create_memory("kept", kPage, {.keep = true}));
   EXPECT_FALSE(room(0, ::getpid()).take_memory("new", 4 * kPage));
+}
+
+// A trial only reads the pool, so it releases nothing itself.
+TEST_F(RoomInPool, CountsNothingOfAProcessThatHasJustEnded) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    auto pool = ObjectPool::attach(name_);
+    static auto held = pool->create_memory("old", 3 * kPage);
+    ::_exit(held ? 0 : 1);
+  }
+  int status = 0;
+  ASSERT_EQ(::waitpid(child, &status, 0), child);
+  ASSERT_EQ(status, 0);
+  const auto read_only = ObjectPool::attach(name_, ObjectPool::Access::read_only);
+  ASSERT_TRUE(read_only);
+  ASSERT_EQ(read_only->look_at("old")->references.size(), 1U) << "nobody has released it yet";
+  auto after = PoolRoom::of(*read_only, "line1", 0, 0);
+  ASSERT_TRUE(after);
+  EXPECT_TRUE(after->take_memory("new", 3 * kPage));
 }
 
 TEST(FreeSharedMemory, IsMoreThanNothing) {
