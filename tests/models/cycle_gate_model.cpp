@@ -15,7 +15,10 @@ struct Shared {
   int state = 0;  // plain: of the application, and of a reader while the gate is closed
   int other_state = 0;
   bool looked = false;
+  int seen = 0;
 };
+
+constexpr TimePoint kStart{std::chrono::seconds(1000)};
 
 Shared& make(Scene& scene) {
   auto& shared = scene.make<Shared>();
@@ -31,6 +34,19 @@ void run_cycles(Shared& shared, CycleGate::Seat& seat, int& state, int cycles) {
     const CycleGate::Stay within(&shared.gate, seat, shared.clock);
     ++state;
   }
+}
+
+// The parts of a cycle, which are in the seat's word, too: code of the application, then work of the runtime.
+void run_cycle_in_parts(Shared& shared) {
+  const CycleGate::Stay within(&shared.gate, shared.seat, shared.clock);
+  shared.seat.code_begins(kStart);
+  ++shared.state;
+  shared.seat.part_ends();
+  ++shared.state;
+  shared.seat.work_begins();
+  ++shared.state;
+  shared.seat.part_ends();
+  ++shared.state;
 }
 
 // A data race on what the cycles use is a cycle in the moment.
@@ -65,11 +81,43 @@ void two_cycles_two_looks(Scene& scene) {
   });
 }
 
+void parts_of_a_cycle_one_look(Scene& scene) {
+  Shared& shared = make(scene);
+  scene.thread("task", [&] { run_cycle_in_parts(shared); });
+  scene.thread("control", [&] { look(shared); });
+  scene.at_end([&] {
+    require(shared.state == (shared.looked ? 5 : 4), "a part or a look is lost");
+    observe(shared.looked ? 1 : 0);
+  });
+  scene.outcomes(3);
+}
+
+// The supervision looks at the word while it changes.
+void parts_of_a_cycle_seen(Scene& scene) {
+  Shared& shared = make(scene);
+  scene.thread("task", [&] { run_cycle_in_parts(shared); });
+  scene.thread("supervision", [&] {
+    const bool worked = shared.seat.at_work();
+    const auto since = shared.seat.code_since();
+    require(!since || *since == kStart, "code runs since a time that nobody has given");
+    require(!(worked && since), "the code comes after the work");
+    shared.seen = worked ? 2 : since ? 1 : 0;
+  });
+  scene.at_end([&] {
+    require(!shared.seat.taken(), "the seat is taken after the cycle");
+    observe(static_cast<unsigned>(shared.seen));
+  });
+  scene.outcomes(7);
+}
+
 }  // namespace
 }  // namespace plchost::models
 
 int main(int argc, char** argv) {
   using namespace plchost::models;
   return run(argc, argv,
-             {{"two_tasks_one_look", two_tasks_one_look}, {"two_cycles_two_looks", two_cycles_two_looks}});
+             {{"two_tasks_one_look", two_tasks_one_look},
+              {"two_cycles_two_looks", two_cycles_two_looks},
+              {"parts_of_a_cycle_one_look", parts_of_a_cycle_one_look},
+              {"parts_of_a_cycle_seen", parts_of_a_cycle_seen}});
 }
