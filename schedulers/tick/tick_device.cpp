@@ -78,7 +78,12 @@ Result<void> TickDevice::set_period(Duration period) {
                                static_cast<double>(period.count()) / 1e3, nearest));
   }
   if (runs_ && hertz == frequency_) return {};
-  halt();
+  if (runs_) {
+    return failure(ErrorCode::wrong_state,
+                   fmt::format("{} ticks at {} Hz for the tasks that run and cannot tick at {} Hz meanwhile: "
+                               "stop them first",
+                               path_, frequency_, hertz));
+  }
   const int refused = file_->control(kind_ == Kind::rtc ? RTC_IRQP_SET : HPET_IRQFREQ, hertz);
   if (refused != 0) {
     return failure(

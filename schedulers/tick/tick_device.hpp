@@ -35,7 +35,8 @@ class TickDevice {
     return kind_ == Kind::rtc ? "that are powers of two" : "in whole hertz";
   }
 
-  /// invalid_argument: it cannot make this period; the text lists the nearest that it can. Set-up.
+  /// invalid_argument: it cannot make this period; the text lists the nearest that it can. wrong_state: it
+  /// ticks with another one, for a scheduler that runs. Set-up.
   [[nodiscard]] Result<void> set_period(Duration period);
   /// Hz, after set_period().
   [[nodiscard]] std::uint32_t frequency() const noexcept { return frequency_; }

@@ -90,6 +90,23 @@ TEST(TickDevice, KeepsItsPhaseForTheNextScheduler) {
   EXPECT_EQ(device.files.disabled, 1);
 }
 
+// A scheduler that is only planned must not stop the one that runs.
+TEST(TickDevice, KeepsItsPeriodWhileItTicks) {
+  Fixture device(Kind::hpet);
+  ASSERT_TRUE(device.sut->set_period(microseconds(1000)));
+  ASSERT_TRUE(device.sut->run());
+  const auto refused = device.sut->set_period(microseconds(2000));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::wrong_state);
+  EXPECT_EQ(device.files.disabled, 0);
+  EXPECT_EQ(device.sut->frequency(), 1000U);
+  device.clock.run_for(std::chrono::milliseconds(10));
+  EXPECT_EQ(device.sut->take(), 10U);
+  device.sut->halt();
+  EXPECT_TRUE(device.sut->set_period(microseconds(2000)));
+  EXPECT_EQ(device.sut->frequency(), 500U);
+}
+
 TEST(TickDevice, IsSwitchedOffAndClosedAtTheEnd) {
   Fixture device(Kind::hpet);
   ASSERT_TRUE(device.sut->set_period(microseconds(1000)));
