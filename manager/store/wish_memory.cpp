@@ -23,6 +23,12 @@ std::string wish_memory_name(std::string_view pool, std::string_view instance) {
   return fmt::format("{}.wish.{}", pool, instance);
 }
 
+// What another user has put there in the place of none was never a wish.
+bool is_damaged(const Error& error) noexcept {
+  return error.code != ErrorCode::not_found && error.code != ErrorCode::refused &&
+         error.code != ErrorCode::wrong_type;
+}
+
 }  // namespace
 
 struct WishMemory::Layout {
@@ -43,9 +49,11 @@ WishMemory::Layout& WishMemory::layout() const noexcept {
 
 Result<WishMemory> WishMemory::open(std::string_view pool, std::string_view instance) {
   const std::string name = wish_memory_name(pool, instance);
+  const auto before = open_fixed_page<Layout>(name, kWishKind, MemoryFile::Access::read_only);
   auto memory = open_or_make_page<Layout>(name, kWishKind, Replaces::anything);
   if (!memory) return std::unexpected(std::move(memory).error());
   WishMemory opened(name, *std::move(memory));
+  opened.made_anew_ = !before && is_damaged(before.error());
   Found found = opened.newest();
   opened.generation_ = found.generation;
   opened.text_ = std::move(found.text);

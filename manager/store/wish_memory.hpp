@@ -26,10 +26,11 @@ class WishMemory {
 
   /// The newest whole one; nothing: none was written, or it is damaged.
   [[nodiscard]] std::optional<InstanceWish> read() const { return newest().wish; }
-  /// Something was written, and none of it is whole: another program has written over it.
+  /// Something was written, and none of it is whole: another program has written over it, or over the head
+  /// of the memory, so that open() has made it anew.
   [[nodiscard]] bool damaged() const {
     const Found found = newest();
-    return found.any && !found.wish;
+    return !found.wish && (found.any || made_anew_);
   }
   /// It is in both places when this returns. full: the text has more than kMaxWishBytes.
   [[nodiscard]] Result<void> write(const InstanceWish& wish);
@@ -57,6 +58,7 @@ class WishMemory {
   MemoryFile memory_;
   std::uint64_t generation_ = 0;
   std::string text_;  // as it was found or written last; empty: never
+  bool made_anew_ = false;
 };
 
 }  // namespace plchost

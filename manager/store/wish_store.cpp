@@ -99,16 +99,27 @@ Result<std::optional<InstanceWish>> WishStore::find() {
   if (remembered) {
     return take_remembered(*std::move(remembered), wish ? std::optional(*std::move(wish)) : std::nullopt);
   }
-  const bool none = !file && file.error().code == ErrorCode::not_found;
-  if (none && memory_ && memory_->damaged()) {
-    return failure(ErrorCode::corrupt, "another program has written over the memory that holds it");
-  }
-  if (none) return std::nullopt;
+  if (memory_ && memory_->damaged()) return take_without_memory(std::move(wish));
+  if (!file && file.error().code == ErrorCode::not_found) return std::nullopt;
   if (!wish) {
     return failure(ErrorCode::corrupt, fmt::format("{}: {}", path(), wish.error().describe()));
   }
   restore_events();
   return wish->after_power_cut();
+}
+
+// `kept`: of the disk. It may be older than what another program has written over: a stop that the disk did
+// not take in time.
+Result<std::optional<InstanceWish>> WishStore::take_without_memory(Result<InstanceWish> kept) const {
+  constexpr std::string_view kWhy = "another program has written over the memory that holds it";
+  if (!kept) return failure(ErrorCode::corrupt, std::string(kWhy));
+  if (!kept->commanded || kept->running) {
+    return failure(ErrorCode::corrupt, fmt::format("{}, and {} may be older", kWhy, path()));
+  }
+  spdlog::error("instance {}: its wanted state is taken from {}, which may be older: {}", settings_.instance,
+                path(), kWhy);
+  restore_events();
+  return kept->after_power_cut();
 }
 
 // `kept`: of the disk, with number_.

@@ -25,8 +25,9 @@ inline constexpr Duration kWishRetry = std::chrono::seconds(10);
 
 /// The real WishKeeper: a WishMemory, and the files INSTANCE.wish and INSTANCE.events of wishes_folder().
 /// Only what a power cut leaves of a wish goes to the disk, and only if it is another than before. find()
-/// takes the newer of the two: the memory can be that of an earlier manager with another pool in between, or
-/// damaged. If the disk does not answer, the memory's counts.
+/// takes the newer of the two: the memory can be that of an earlier manager with another pool in between. If
+/// the disk does not answer, the memory's counts. If another program has written over the memory, nobody
+/// knows whether the disk has the last wish: it counts only if it starts no machine.
 class WishStore : public WishKeeper {
  public:
   struct Settings {
@@ -61,6 +62,7 @@ class WishStore : public WishKeeper {
                                               Duration limit) const;
   [[nodiscard]] Result<std::optional<InstanceWish>> take_remembered(InstanceWish remembered,
                                                                     std::optional<InstanceWish> kept);
+  [[nodiscard]] Result<std::optional<InstanceWish>> take_without_memory(Result<InstanceWish> kept) const;
   void restore_events() const;
   void write();
   void written(const Result<void>& result, const std::string& text);

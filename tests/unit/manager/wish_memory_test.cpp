@@ -80,6 +80,38 @@ TEST_F(WishStoreTest, KeepsAnOperatorsStopWhateverByteOfTheMemoryIsAnotherOne) {
   }
 }
 
+// The disk has not taken the stop when another program writes over both places, or over the head.
+TEST_F(WishStoreTest, TakesNoOlderStartFromTheDiskForAStopThatIsDamaged) {
+  ASSERT_TRUE(sut_->find());
+  InstanceWish wish = some_wish();
+  wish.running = true;
+  ASSERT_EQ(keep(wish), "");
+  const std::string older = file() + ".older";
+  std::filesystem::copy_file(file(), older);
+  wish.running = false;
+  ASSERT_EQ(keep(wish), "");
+  const std::vector<std::byte> whole = RawWishMemory(pool_).copy();
+  std::filesystem::rename(older, file());
+  make();
+  EXPECT_FALSE(sut_->find().value()->running) << "the memory has it";
+  for (const std::size_t begin : {std::size_t{0}, std::size_t{8}, kWishHeader + 16}) {
+    WishMemory::remove(pool_, "line1");
+    make();
+    ASSERT_TRUE(sut_->find().value()->running) << "as after a power cut";
+    WishMemory::remove(pool_, "line1");
+    ASSERT_TRUE(MemoryFile::create(pool_ + ".wish.line1", whole.size(), [&](std::span<std::byte> bytes) {
+      std::ranges::copy(whole, bytes.begin());
+      std::ranges::fill(bytes.subspan(begin), std::byte{0xff});
+      return Result<void>();
+    }));
+    make();
+    const auto found = sut_->find();
+    ASSERT_FALSE(found) << begin;
+    EXPECT_EQ(found.error().code, ErrorCode::corrupt);
+    EXPECT_THAT(found.error().message, testing::HasSubstr("may be older"));
+  }
+}
+
 TEST_F(WishStoreTest, WritesAnewWhatAnotherProgramHasWrittenOver) {
   MemoryGuard::watch_process();
   ASSERT_TRUE(sut_->find());
