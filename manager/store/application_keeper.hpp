@@ -15,14 +15,18 @@ namespace plchost {
 /// longer action is told by `done`, never from inside the call. One thing at a time.
 class ApplicationKeeper {
  public:
+  /// The applications that an instance has or may go back to, as paths; empty: none.
+  struct Loaded {
+    std::string now;      ///< the one that is loaded
+    std::string earlier;  ///< the one that is started again if `now` does not come up
+  };
   using Done = std::function<void(const Result<std::string>& path)>;
 
   virtual ~ApplicationKeeper() = default;
-  /// Checks what was sent as `launch` would start it, keeps it and gives its path. `before`: the application
-  /// that is loaded now.
+  /// Checks what was sent as `launch` would start it, keeps it and gives its path. Those of `loaded` stay,
+  /// too.
   [[nodiscard]] virtual Result<void> keep(const ApplicationOrder& order, const std::string& name,
-                                          const std::string& before, const LaunchOptions& launch,
-                                          Done done) = 0;
+                                          const Loaded& loaded, const LaunchOptions& launch, Done done) = 0;
   /// The instance starts with the application at that path from now on, or as the configuration says, if that
   /// names the same one.
   [[nodiscard]] virtual Result<void> set_boot(const std::string& path, const std::string& configured,

@@ -176,7 +176,7 @@ void remove_oldest(const StoreOrder& order, const std::set<std::string>& used) {
 Result<std::string> keep_file(const StoreOrder& order) {
   if (auto made = make_folder(order.folder); !made) return std::unexpected(made.error());
   const ApplicationVersions versions = read_versions(order.folder);
-  std::set<std::string> used{order.before, versions.boot};
+  std::set<std::string> used{order.before, order.earlier, versions.boot};
   remove_unfinished(order.folder, used);
   const auto loaded = version_at(order.folder, order.before);
   const std::uint32_t number = versions.kept.empty() ? 1 : versions.kept.back().number + 1;

@@ -25,7 +25,8 @@ constexpr std::array kOrderTexts = {OrderText{"folder", &StoreOrder::folder},
                                     OrderText{"name", &StoreOrder::name},
                                     OrderText{"by", &StoreOrder::by},
                                     OrderText{"from", &StoreOrder::from},
-                                    OrderText{"before", &StoreOrder::before}};
+                                    OrderText{"before", &StoreOrder::before},
+                                    OrderText{"earlier", &StoreOrder::earlier}};
 
 Result<std::uint64_t> order_number(const Json& json, const char* key, std::uint64_t most) {
   const auto found = json.find(key);

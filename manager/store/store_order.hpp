@@ -27,7 +27,8 @@ struct StoreOrder {
   std::string by;
   std::string from;
   std::string before;              ///< path of what is loaded now; empty: nothing
-  std::uint32_t keep = 0;          ///< so many versions stay, and what is loaded and the boot application
+  std::string earlier;             ///< path of what is started again if that does not come up; empty: nothing
+  std::uint32_t keep = 0;          ///< so many versions stay, and these two and the boot application
   std::vector<std::string> trial;  ///< command line that tries it, its path is added; see trial_arguments()
 };
 

@@ -14,8 +14,8 @@ namespace plchost {
 StoreProcess::StoreProcess(Reactor& reactor, DiskThread& disk, Settings settings)
     : disk_(disk), settings_(std::move(settings)), helper_(reactor) {}
 
-Result<void> StoreProcess::keep(const ApplicationOrder& order, const std::string& name,
-                                const std::string& before, const LaunchOptions& launch, Done done) {
+Result<void> StoreProcess::keep(const ApplicationOrder& order, const std::string& name, const Loaded& loaded,
+                                const LaunchOptions& launch, Done done) {
   StoreOrder store;
   store.folder = settings_.folder;
   // A number and no path: so the API server can only name a shared memory of ours.
@@ -25,7 +25,8 @@ Result<void> StoreProcess::keep(const ApplicationOrder& order, const std::string
   store.name = name;
   store.by = order.by;
   store.from = order.from;
-  store.before = before;
+  store.before = loaded.now;
+  store.earlier = loaded.earlier;
   store.keep = settings_.keep();
   store.trial = trial_arguments(settings_.plc_instance, launch);
   return start(store, std::move(done));

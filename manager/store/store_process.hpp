@@ -28,7 +28,7 @@ class StoreProcess : public ApplicationKeeper {
   StoreProcess(Reactor& reactor, DiskThread& disk, Settings settings);
 
   [[nodiscard]] Result<void> keep(const ApplicationOrder& order, const std::string& name,
-                                  const std::string& before, const LaunchOptions& launch, Done done) override;
+                                  const Loaded& loaded, const LaunchOptions& launch, Done done) override;
   [[nodiscard]] Result<void> set_boot(const std::string& path, const std::string& configured,
                                       Done done) override;
   [[nodiscard]] std::string boot() override;

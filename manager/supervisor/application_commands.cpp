@@ -26,9 +26,9 @@ void ManagedInstance::begin_download() {
   operation_->step = Step::storing;
   LaunchOptions launch = launch_options(Next::run);
   launch.kept_settings = false;
-  const auto started =
-      surroundings_.applications.keep(*order, request.argument, application_, launch,
-                                      [this](const Result<std::string>& path) { on_application_kept(path); });
+  const auto started = surroundings_.applications.keep(
+      *order, request.argument, {.now = application_, .earlier = before_.value_or("")}, launch,
+      [this](const Result<std::string>& path) { on_application_kept(path); });
   if (!started) finish(started.error().code, started.error().describe());
 }
 

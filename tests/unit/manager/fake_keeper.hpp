@@ -16,15 +16,14 @@ class FakeKeeper : public ApplicationKeeper {
   struct Kept {
     ApplicationOrder order;
     std::string name;
-    std::string before;
+    Loaded loaded;
     LaunchOptions launch;
   };
 
   [[nodiscard]] Result<void> keep(const ApplicationOrder& order, const std::string& name,
-                                  const std::string& before, const LaunchOptions& launch,
-                                  Done done) override {
+                                  const Loaded& loaded, const LaunchOptions& launch, Done done) override {
     if (!can_start) return failure(ErrorCode::system, "start the helper");
-    kept.push_back({order, name, before, launch});
+    kept.push_back({order, name, loaded, launch});
     done_ = std::move(done);
     return {};
   }

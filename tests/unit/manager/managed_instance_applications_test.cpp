@@ -42,7 +42,8 @@ TEST_F(SentApplication, IsKeptWithWhatWasLoadedBeforeItAndThenLoaded) {
   EXPECT_EQ(applications_.kept[0].name, "new.so");
   EXPECT_EQ(applications_.kept[0].order.size, 7U);
   EXPECT_EQ(applications_.kept[0].order.source, 3U);
-  EXPECT_EQ(applications_.kept[0].before, "/opt/line.so");
+  EXPECT_EQ(applications_.kept[0].loaded.now, "/opt/line.so");
+  EXPECT_EQ(applications_.kept[0].loaded.earlier, "");
   EXPECT_EQ(state(), InstanceState::running);
   EXPECT_THAT(host_.requests, IsEmpty());
   add_version(1, kFirst, "/opt/line.so");
@@ -206,6 +207,25 @@ TEST_F(SentApplication, IsTriedAgainWhereTheHostIsShortOfSomething) {
   EXPECT_EQ(state(), InstanceState::waiting);
   expire_timer();
   EXPECT_EQ(host_.spawned.back().application, kFirst);
+}
+
+// A third one is sent before the second one was up: the store must not remove the first one for it.
+TEST_F(SentApplication, LeavesTheOneThatRanInTheStoreUntilANewerOneIsUp) {
+  bring_up();
+  ask(ControlVerb::download_application, "new.so", options());
+  applications_.end(std::string(kFirst));
+  sut().on_exit(exited_with(0));
+  sut().on_report({.step = SetupStep::load_application,
+                   .code = ErrorCode::system,
+                   .text = "no memory",
+                   .transient = true});
+  sut().on_exit(exited_with(kExitSetupFailed));
+  ASSERT_EQ(state(), InstanceState::waiting);
+  (void)take_reply();
+  ask(ControlVerb::download_application, "newer.so", options());
+  ASSERT_EQ(applications_.kept.size(), 2U);
+  EXPECT_EQ(applications_.kept[1].loaded.now, kFirst);
+  EXPECT_EQ(applications_.kept[1].loaded.earlier, "/opt/line.so");
 }
 
 TEST_F(SentApplication, ThatDoesNotComeUpLeavesAStoppedMachineStopped) {

@@ -99,6 +99,20 @@ TEST_F(StoreApplication, PutsTheFileInPlaceWithAllThatIsKnownOfIt) {
   EXPECT_EQ(perms & std::filesystem::perms::others_all, std::filesystem::perms::none);
 }
 
+// The second one has not come up, and the third one may not either.
+TEST_F(StoreApplication, KeepsWhatTheInstanceMayGoBackTo) {
+  order_.keep = 1;
+  const std::string first = keep("first");
+  order_.earlier = first;
+  const std::string second = keep("second");
+  const std::string third = keep("third");
+  EXPECT_EQ(text_of(first), "first");
+  EXPECT_EQ(text_of(second), "second");
+  order_.earlier = third;
+  keep("fourth");
+  EXPECT_FALSE(std::filesystem::exists(first));
+}
+
 TEST_F(StoreApplication, RefusesWhatHasAnotherDigestThanWasAnnounced) {
   std::ofstream(order_.source, std::ios::binary) << "contentz";
   const auto path = carry_out(order_);
