@@ -35,6 +35,8 @@
 #include <variant>
 #include <vector>
 
+#include "plchost_client_types.hpp"
+
 #define PLCHOST_CLIENT_API __attribute__((visibility("default")))
 
 namespace plchost {
@@ -77,71 +79,26 @@ class PLCHOST_CLIENT_API Client {
     std::chrono::milliseconds timeout{3000};  ///< of each call, 1 ms to an hour
   };
 
-  struct Host {
-    std::string name;
-    bool answers = false;  ///< false: silent for more than 70 ms, or gone
-    std::string version;
-    std::vector<std::string> labels;
+  // What hosts show. The contract has these types: plchost_client_types.hpp is made from it.
+
+  struct Host : client_types::Host {
+    bool answers = false;             ///< false: silent for more than 70 ms, or gone
+    std::vector<std::string> labels;  ///< of its configuration, beside its name
     unsigned instances = 0;
-    int manager_pid = 0;
-    std::chrono::system_clock::time_point started;
-  };
 
-  struct Instance {
-    std::string host;
-    std::string name;
-    std::string
-        state;      ///< offline, starting, running, stopped, stopping, waiting, safe_mode, failed, exception
-    int pid = 0;    ///< 0: there is no process
-    int core = -1;  ///< -1: none, or several
-    unsigned restarts = 0;
-    std::string scheduler;
-    std::string application;         ///< path on the host
-    std::string problem;             ///< why it is not running; empty: all is well
-    std::string loaded;              ///< path of what its process has loaded; empty: nothing
-    std::string configured;          ///< path of the application that the configuration names; empty: none
-    std::string settings;            ///< path of its settings file; empty: the runtime's defaults
-    std::string priority_band;       ///< high, normal, low
-    std::vector<std::string> after;  ///< the instances that it waits for when it starts
-    bool autostart = false;          ///< it starts with the manager
-    std::string restart;             ///< when it is started again: never, on-failure, always
-    std::chrono::nanoseconds restart_delay{};  ///< before that; doubles with each failure in a row
-    std::chrono::nanoseconds restart_delay_max{};
-    unsigned crash_limit = 0;  ///< so many crashes within crash_window: safe mode
-    std::chrono::nanoseconds crash_window{};
-    bool removed = false;  ///< told by watches only: the host has it no more
+    friend bool operator==(const Host& a, const Host& b) {
+      return static_cast<const client_types::Host&>(a) == b && a.answers == b.answers &&
+             a.labels == b.labels && a.instances == b.instances;
+    }
+    friend bool operator!=(const Host& a, const Host& b) { return !(a == b); }
   };
-
-  struct Task {
-    std::string host;
-    std::string instance;
-    std::string name;
-    std::string kind;                     ///< cyclic, event, external, freewheeling
-    int priority = 0;                     ///< 0 (highest) to 31
-    std::string state;                    ///< created, running, stopped, exception
-    std::chrono::nanoseconds interval{};  ///< 0 unless cyclic
-    std::string external_event;           ///< empty unless external
-    unsigned long long cycles = 0;
-    unsigned long long lost_cycles = 0;  ///< releases that were skipped
-    unsigned long long lost_events = 0;  ///< posts that no cycle was run for
-    std::chrono::nanoseconds execution_last{};
-    std::chrono::nanoseconds execution_average{};
-    std::chrono::nanoseconds execution_max{};
-    std::chrono::nanoseconds latency_median{};  ///< planned release to start
-    std::chrono::nanoseconds latency_max{};
-    std::chrono::nanoseconds jitter_max{};
-    bool removed = false;  ///< as Instance::removed
-  };
-
-  struct Event {
-    std::string host;
-    std::string instance;
-    std::string name;
-    bool registered = false;  ///< may be posted to
-    unsigned bound_tasks = 0;
-    unsigned long long posts = 0;  ///< since it was made
-    bool removed = false;          ///< as Instance::removed
-  };
+  using Instance = client_types::Instance;
+  using Application = client_types::Application;
+  using Task = client_types::Task;
+  using Event = client_types::Event;
+  using Writer = client_types::Writer;
+  using Exception = client_types::Exception;
+  using TaskStatistics = client_types::TaskStatistics;
 
   /// A change of state.
   struct Transition {
@@ -243,6 +200,14 @@ class PLCHOST_CLIENT_API Client {
   std::vector<Instance> instances(const std::string& host = {});
   std::vector<Task> tasks(const std::string& host = {});
   std::vector<Event> events(const std::string& host = {});
+  /// The applications that were sent to the instances and are kept there.
+  std::vector<Application> applications(const std::string& host = {});
+  /// The last exception of each instance; count 0: it never had one.
+  std::vector<Exception> exceptions(const std::string& host = {});
+  /// The fate of the posts of each client; first (source all zero) of all together.
+  std::vector<Writer> writers(const std::string& host = {});
+  /// All figures of a task, at most a second old. ClientError: timed_out: also if there is no such task.
+  TaskStatistics statistics(const std::string& host, const std::string& instance, const std::string& task);
 
   /// The status topics of the contract by name: "task", "writer", "exception".
   static std::vector<std::string> topics();
@@ -308,6 +273,8 @@ class PLCHOST_CLIENT_API Client {
   Watch watch_instances(const std::string& host, std::function<void(const Instance&)> callback);
   Watch watch_tasks(const std::string& host, std::function<void(const Task&)> callback);
   Watch watch_events(const std::string& host, std::function<void(const Event&)> callback);
+  Watch watch_applications(const std::string& host, std::function<void(const Application&)> callback);
+  Watch watch_exceptions(const std::string& host, std::function<void(const Exception&)> callback);
   /// For the last 64 of each instance, and each that comes. Empty host: of all.
   Watch watch_transitions(const std::string& host, std::function<void(const Transition&)> callback);
 
@@ -315,10 +282,12 @@ class PLCHOST_CLIENT_API Client {
   class Worker;
   class Watcher;
   class HostsWatch;
-  template <class Sample, class Item>
+  template <class Sample>
   class StatusWatch;
   class TransitionsWatch;
   Watch begin_watch(std::shared_ptr<Watch::Subscription> subscription);
+  template <class Sample, class Item>
+  Watch watch_status(const std::string& host, std::function<void(const Item&)> callback);
 
   std::unique_ptr<Worker> worker_;
   std::unique_ptr<Watcher> watcher_;

@@ -6,8 +6,6 @@
 
 #include <status_fields.hpp>
 
-#include "shm/pages/host_page.hpp"
-
 namespace plchost::dds {
 
 namespace {
@@ -57,7 +55,7 @@ std::string log_source_name(std::uint32_t source) {
 }
 
 std::string restart_policy_name(std::uint32_t policy) {
-  return code_name(kRestartPolicyNames, policy);
+  return word_of<plc_InstanceStatus>("restart_policy", policy);
 }
 
 std::string task_state_name(std::uint32_t state) {

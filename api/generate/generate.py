@@ -5,6 +5,9 @@
   FOLDER/status_topics.hpp        the status topics: all types, how HostStatus counts them, in which order they are shown
   FOLDER/status_fields.hpp        their fields, with unit and words for codes, and how plcctl lists them
   FOLDER/contract_operations.hpp  each OPERATION_: name, number, role, whether it names an instance
+  FOLDER/plchost_client_types.hpp  the public structs of the client library
+  FOLDER/library_conversions.hpp  how they are made of samples
+  FOLDER/library_members.hpp      their members, for Python
 The same contract makes the same files.
 """
 
@@ -13,6 +16,7 @@ import re
 import sys
 
 sys.dont_write_bytecode = True
+import library  # noqa: E402
 from contract import Fault, names_of, parse, partition_of, qos_of  # noqa: E402
 
 HEAD = "// Made from api/control.idl by api/generate/generate.py.\n#pragma once\n\n"
@@ -105,7 +109,7 @@ def words_of(member):
     """The words for the codes of a member: its comment begins with "0 offline, 1 starting"; brackets are left out."""
     words = []
     for part in re.sub(r" \([^)]*\)", "", member.comment).split(", "):
-        found = re.fullmatch(rf"{len(words)} ([a-z ]+)", part)
+        found = re.fullmatch(rf"{len(words)} ([a-z -]+)", part)
         if not found:
             break
         words.append(found[1].replace(" ", "_"))
@@ -171,11 +175,15 @@ def main():
     folder = pathlib.Path(sys.argv[2])
     try:
         contract = parse(pathlib.Path(sys.argv[1]))
+        records = library.records_of(contract, [kind.name for kind, _ in counted(contract)], words_of)
         made = {
             "topic_table.hpp": topic_table(contract),
             "status_topics.hpp": status_topics(contract),
             "status_fields.hpp": status_fields(contract),
             "contract_operations.hpp": contract_operations(contract),
+            "plchost_client_types.hpp": library.public_types(records),
+            "library_conversions.hpp": library.conversions(records, HEAD),
+            "library_members.hpp": library.members(records, HEAD),
         }
     except Fault as fault:
         sys.exit(str(fault))

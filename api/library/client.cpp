@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "api/client/check_names.hpp"
+#include "api/client/control_client_status.hpp"
 #include "api/client/log_reader.hpp"
 #include "api/library/convert.hpp"
 #include "api/library/records.hpp"
@@ -44,15 +45,15 @@ Result<std::string> host_of(ControlClient& client, const std::string& name, Time
                  fmt::format("several hosts answer, and none was named: {}", join_names(names)));
 }
 
-template <class Item, class Sample>
-Result<std::vector<Item>> list(ControlClient& client, const std::string& name, TimePoint deadline,
-                               Result<std::vector<Sample>> (ControlClient::*look)(const std::string&,
-                                                                                  TimePoint)) {
+/// All samples of a status topic, as the library's type of them.
+template <class Sample>
+auto list(ControlClient& client, const std::string& name, TimePoint deadline)
+    -> Result<std::vector<decltype(to_public(Sample{}))>> {
   const auto host = host_of(client, name, deadline);
   if (!host) return std::unexpected(host.error());
-  const auto samples = (client.*look)(*host, deadline);
+  const auto samples = client.status<Sample>(*host, deadline);
   if (!samples) return std::unexpected(samples.error());
-  std::vector<Item> items;
+  std::vector<decltype(to_public(Sample{}))> items;
   for (const Sample& sample : *samples) items.push_back(to_public(sample));
   return items;
 }
@@ -177,20 +178,44 @@ std::vector<Client::Host> Client::hosts() {
 }
 
 std::vector<Client::Instance> Client::instances(const std::string& host) {
-  return value_or_throw(worker_->run<std::vector<Instance>>([&](ControlClient& client) {
-    return list<Instance>(client, host, worker_->deadline(), &ControlClient::instances);
-  }));
+  return value_or_throw(worker_->run<std::vector<Instance>>(
+      [&](ControlClient& client) { return list<plc_InstanceStatus>(client, host, worker_->deadline()); }));
 }
 
 std::vector<Client::Task> Client::tasks(const std::string& host) {
-  return value_or_throw(worker_->run<std::vector<Task>>([&](ControlClient& client) {
-    return list<Task>(client, host, worker_->deadline(), &ControlClient::tasks);
-  }));
+  return value_or_throw(worker_->run<std::vector<Task>>(
+      [&](ControlClient& client) { return list<plc_TaskStatus>(client, host, worker_->deadline()); }));
 }
 
 std::vector<Client::Event> Client::events(const std::string& host) {
-  return value_or_throw(worker_->run<std::vector<Event>>([&](ControlClient& client) {
-    return list<Event>(client, host, worker_->deadline(), &ControlClient::events);
+  return value_or_throw(worker_->run<std::vector<Event>>(
+      [&](ControlClient& client) { return list<plc_EventStatus>(client, host, worker_->deadline()); }));
+}
+
+std::vector<Client::Application> Client::applications(const std::string& host) {
+  return value_or_throw(worker_->run<std::vector<Application>>(
+      [&](ControlClient& client) { return list<plc_ApplicationStatus>(client, host, worker_->deadline()); }));
+}
+
+std::vector<Client::Exception> Client::exceptions(const std::string& host) {
+  return value_or_throw(worker_->run<std::vector<Exception>>(
+      [&](ControlClient& client) { return list<plc_ExceptionStatus>(client, host, worker_->deadline()); }));
+}
+
+std::vector<Client::Writer> Client::writers(const std::string& host) {
+  return value_or_throw(worker_->run<std::vector<Writer>>(
+      [&](ControlClient& client) { return list<plc_WriterStatus>(client, host, worker_->deadline()); }));
+}
+
+Client::TaskStatistics Client::statistics(const std::string& host, const std::string& instance,
+                                          const std::string& task) {
+  return value_or_throw(worker_->run<TaskStatistics>([&](ControlClient& client) -> Result<TaskStatistics> {
+    const TimePoint deadline = worker_->deadline();
+    const auto found = host_of(client, host, deadline);
+    if (!found) return std::unexpected(found.error());
+    const auto report = client.statistics(*found, instance, task, deadline);
+    if (!report) return std::unexpected(report.error());
+    return to_public(*report);
   }));
 }
 

@@ -1,9 +1,10 @@
 // The calls of a Client's watches: each remembers what it told last.
 #include <map>
 #include <set>
-#include <tuple>
 #include <utility>
+#include <vector>
 
+#include "api/client/control_client_status.hpp"
 #include "api/library/convert.hpp"
 #include "api/library/watcher.hpp"
 #include "api/library/worker.hpp"
@@ -17,18 +18,6 @@ std::vector<std::string> hosts_of(ControlClient& client, const std::string& host
   std::vector<std::string> names;
   for (const HostView& view : client.hosts(MonotonicClock::now())) names.push_back(view.name);
   return names;
-}
-
-using Key = std::tuple<std::string, std::string, std::string>;
-
-Key key_of(const Client::Instance& instance) {
-  return {instance.host, instance.name, {}};
-}
-Key key_of(const Client::Task& task) {
-  return {task.host, task.instance, task.name};
-}
-Key key_of(const Client::Event& event) {
-  return {event.host, event.instance, event.name};
 }
 
 }  // namespace
@@ -51,7 +40,7 @@ class __attribute__((visibility("hidden"))) Client::HostsWatch final : public Cl
     }
     for (const auto& [name, host] : now) {
       const auto before = told_.find(name);
-      if (before != told_.end() && is_same(before->second, host)) continue;
+      if (before != told_.end() && before->second == host) continue;
       told_[name] = host;
       if (!stopped()) callback_(host);
     }
@@ -62,18 +51,20 @@ class __attribute__((visibility("hidden"))) Client::HostsWatch final : public Cl
 };
 
 /// Of one status topic.
-template <class Sample, class Item>
+template <class Sample>
 class __attribute__((visibility("hidden"))) Client::StatusWatch final : public Client::Watch::Subscription {
  public:
-  using Look = Result<std::vector<Sample>> (ControlClient::*)(const std::string&, TimePoint);
+  using Item = decltype(to_public(Sample{}));
 
-  StatusWatch(std::string host, Look snapshot, std::function<void(const Item&)> callback)
-      : host_(std::move(host)), snapshot_(snapshot), callback_(std::move(callback)) {}
+  StatusWatch(std::string host, std::function<void(const Item&)> callback)
+      : host_(std::move(host)), callback_(std::move(callback)) {}
 
  private:
+  using Key = std::vector<std::string>;
+
   void tell(const News& news) override {
     for (const std::string& host : hosts_of(news.client, host_)) {
-      const auto samples = (news.client.*snapshot_)(host, MonotonicClock::now());
+      const auto samples = news.client.template status<Sample>(host, MonotonicClock::now());
       if (!samples) continue;  // not complete yet: soon
       std::set<Key> there;
       for (const Sample& sample : *samples) {
@@ -100,13 +91,12 @@ class __attribute__((visibility("hidden"))) Client::StatusWatch final : public C
 
   void tell_one(Item item) {
     const auto [told, is_new] = told_.try_emplace(key_of(item));
-    if (!is_new && is_same(told->second, item)) return;
+    if (!is_new && told->second == item) return;
     told->second = std::move(item);
     if (!stopped()) callback_(told->second);
   }
 
   std::string host_;
-  Look snapshot_;
   std::function<void(const Item&)> callback_;
   std::map<Key, Item> told_;
 };
@@ -164,23 +154,33 @@ Client::Watch Client::watch_hosts(std::function<void(const Host&)> callback) {
   return begin_watch(std::make_shared<HostsWatch>(std::move(callback)));
 }
 
+template <class Sample, class Item>
+Client::Watch Client::watch_status(const std::string& host, std::function<void(const Item&)> callback) {
+  check_callback(static_cast<bool>(callback));
+  return begin_watch(std::make_shared<StatusWatch<Sample>>(host, std::move(callback)));
+}
+
 Client::Watch Client::watch_instances(const std::string& host,
                                       std::function<void(const Instance&)> callback) {
-  check_callback(static_cast<bool>(callback));
-  return begin_watch(std::make_shared<StatusWatch<plc_InstanceStatus, Instance>>(
-      host, &ControlClient::instances, std::move(callback)));
+  return watch_status<plc_InstanceStatus>(host, std::move(callback));
 }
 
 Client::Watch Client::watch_tasks(const std::string& host, std::function<void(const Task&)> callback) {
-  check_callback(static_cast<bool>(callback));
-  return begin_watch(
-      std::make_shared<StatusWatch<plc_TaskStatus, Task>>(host, &ControlClient::tasks, std::move(callback)));
+  return watch_status<plc_TaskStatus>(host, std::move(callback));
 }
 
 Client::Watch Client::watch_events(const std::string& host, std::function<void(const Event&)> callback) {
-  check_callback(static_cast<bool>(callback));
-  return begin_watch(std::make_shared<StatusWatch<plc_EventStatus, Event>>(host, &ControlClient::events,
-                                                                           std::move(callback)));
+  return watch_status<plc_EventStatus>(host, std::move(callback));
+}
+
+Client::Watch Client::watch_applications(const std::string& host,
+                                         std::function<void(const Application&)> callback) {
+  return watch_status<plc_ApplicationStatus>(host, std::move(callback));
+}
+
+Client::Watch Client::watch_exceptions(const std::string& host,
+                                       std::function<void(const Exception&)> callback) {
+  return watch_status<plc_ExceptionStatus>(host, std::move(callback));
 }
 
 Client::Watch Client::watch_transitions(const std::string& host,

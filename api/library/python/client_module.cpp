@@ -2,13 +2,18 @@
 // floats in seconds, wall-clock times are datetime. Calls let other threads of Python run; callbacks come on
 // a thread of the library.
 #include <algorithm>
+#include <array>
+#include <cstddef>
 #include <exception>
 #include <memory>
 #include <mutex>
 #include <set>
+#include <string>
 #include <type_traits>
 #include <utility>
+#include <vector>
 
+#include <library_members.hpp>
 #include <pybind11/chrono.h>
 #include <pybind11/functional.h>
 #include <pybind11/pybind11.h>
@@ -109,65 +114,51 @@ auto member_seconds(std::chrono::nanoseconds Item::* member) {
   return [member](const Item& item) { return seconds(item.*member); };
 }
 
+// Members of Python: durations are seconds, texts of hosts are cut at their bounds, and no name is a word of
+// the language.
+struct MemberToPython : ToPython {
+  using ToPython::operator();
+  py::object operator()(std::chrono::nanoseconds duration) const { return py::float_(seconds(duration)); }
+  template <std::size_t N>
+  py::object operator()(const std::array<std::chrono::nanoseconds, N>& durations) const {
+    py::list all;
+    for (const auto duration : durations) all.append((*this)(duration));
+    return all;
+  }
+  py::object operator()(const std::vector<std::string>& texts) const {
+    py::list all;
+    for (const auto& text : texts) all.append((*this)(text));
+    return all;
+  }
+};
+
+std::string python_name(const std::string& name) {
+  const bool is_word = py::module_::import("keyword").attr("iskeyword")(name).cast<bool>();
+  return is_word ? name + "_" : name;
+}
+
+/// The members that the contract has. `Type` is `Base`, or has more than that.
+template <class Base, class Type>
+void define_members(py::class_<Type>& type) {
+  plchost::client_types::visit_members(
+      std::type_identity<Base>(), [&](const char* name, auto member, const char* text) {
+        type.def_property_readonly(
+            python_name(name).c_str(),
+            [member](const Type& item) -> py::object { return MemberToPython()(item.*member); }, text);
+      });
+}
+
 void define_states(py::module_& module) {
-  py::class_<Client::Host>(module, "Host")
-      .def_readonly("name", &Client::Host::name)
-      .def_readonly("answers", &Client::Host::answers)
-      .def_readonly("version", &Client::Host::version)
+  plchost::client_types::visit_types(
+      [&]<class Type>(const char* name, std::type_identity<Type> /*type*/, const char* text) {
+        py::class_<Type> made(module, name, text);
+        define_members<Type>(made);
+      });
+  py::class_<Client::Host> host(module, "Host", "A host.");
+  define_members<plchost::client_types::Host>(host);
+  host.def_readonly("answers", &Client::Host::answers)
       .def_readonly("labels", &Client::Host::labels)
-      .def_readonly("instances", &Client::Host::instances)
-      .def_readonly("manager_pid", &Client::Host::manager_pid)
-      .def_readonly("started", &Client::Host::started);
-  py::class_<Client::Instance>(module, "Instance")
-      .def_readonly("host", &Client::Instance::host)
-      .def_readonly("name", &Client::Instance::name)
-      .def_readonly("state", &Client::Instance::state)
-      .def_readonly("pid", &Client::Instance::pid)
-      .def_readonly("core", &Client::Instance::core)
-      .def_readonly("restarts", &Client::Instance::restarts)
-      .def_readonly("scheduler", &Client::Instance::scheduler)
-      .def_readonly("application", &Client::Instance::application)
-      .def_readonly("problem", &Client::Instance::problem)
-      .def_readonly("loaded", &Client::Instance::loaded)
-      .def_readonly("configured", &Client::Instance::configured)
-      .def_readonly("settings", &Client::Instance::settings)
-      .def_readonly("priority_band", &Client::Instance::priority_band)
-      .def_readonly("after", &Client::Instance::after)
-      .def_readonly("autostart", &Client::Instance::autostart)
-      .def_readonly("restart", &Client::Instance::restart)
-      .def_property_readonly("restart_delay", member_seconds(&Client::Instance::restart_delay))
-      .def_property_readonly("restart_delay_max", member_seconds(&Client::Instance::restart_delay_max))
-      .def_readonly("crash_limit", &Client::Instance::crash_limit)
-      .def_property_readonly("crash_window", member_seconds(&Client::Instance::crash_window))
-      .def_readonly("removed", &Client::Instance::removed);
-  using Task = Client::Task;
-  py::class_<Task>(module, "Task")
-      .def_readonly("host", &Task::host)
-      .def_readonly("instance", &Task::instance)
-      .def_readonly("name", &Task::name)
-      .def_readonly("kind", &Task::kind)
-      .def_readonly("priority", &Task::priority)
-      .def_readonly("state", &Task::state)
-      .def_property_readonly("interval", member_seconds(&Task::interval))
-      .def_readonly("external_event", &Task::external_event)
-      .def_readonly("cycles", &Task::cycles)
-      .def_readonly("lost_cycles", &Task::lost_cycles)
-      .def_readonly("lost_events", &Task::lost_events)
-      .def_property_readonly("execution_last", member_seconds(&Task::execution_last))
-      .def_property_readonly("execution_average", member_seconds(&Task::execution_average))
-      .def_property_readonly("execution_max", member_seconds(&Task::execution_max))
-      .def_property_readonly("latency_median", member_seconds(&Task::latency_median))
-      .def_property_readonly("latency_max", member_seconds(&Task::latency_max))
-      .def_property_readonly("jitter_max", member_seconds(&Task::jitter_max))
-      .def_readonly("removed", &Client::Task::removed);
-  py::class_<Client::Event>(module, "Event")
-      .def_readonly("host", &Client::Event::host)
-      .def_readonly("instance", &Client::Event::instance)
-      .def_readonly("name", &Client::Event::name)
-      .def_readonly("registered", &Client::Event::registered)
-      .def_readonly("bound_tasks", &Client::Event::bound_tasks)
-      .def_readonly("posts", &Client::Event::posts)
-      .def_readonly("removed", &Client::Event::removed);
+      .def_readonly("instances", &Client::Host::instances);
   py::class_<Client::Transition>(module, "Transition")
       .def_readonly("host", &Client::Transition::host)
       .def_readonly("instance", &Client::Transition::instance)
@@ -258,6 +249,10 @@ void define_calls(ClientClass& client) {
       .def("instances", &Client::instances, py::arg("host") = "", NoGil())
       .def("tasks", &Client::tasks, py::arg("host") = "", NoGil())
       .def("events", &Client::events, py::arg("host") = "", NoGil())
+      .def("applications", &Client::applications, py::arg("host") = "", NoGil())
+      .def("exceptions", &Client::exceptions, py::arg("host") = "", NoGil())
+      .def("writers", &Client::writers, py::arg("host") = "", NoGil())
+      .def("statistics", &Client::statistics, py::arg("host"), py::arg("instance"), py::arg("task"), NoGil())
       .def("logs",
            py::overload_cast<const std::string&, const std::string&, unsigned long long>(&Client::logs),
            py::arg("host"), py::arg("instance"), py::arg("newest") = ~0ULL,
@@ -373,6 +368,14 @@ void define_watches(ClientClass& client) {
       .def("watch_events",
            [](Client& self, const std::string& host, py::function callback) {
              return begin(self, &Client::watch_events, host, std::move(callback));
+           })
+      .def("watch_applications",
+           [](Client& self, const std::string& host, py::function callback) {
+             return begin(self, &Client::watch_applications, host, std::move(callback));
+           })
+      .def("watch_exceptions",
+           [](Client& self, const std::string& host, py::function callback) {
+             return begin(self, &Client::watch_exceptions, host, std::move(callback));
            })
       .def("watch_transitions", [](Client& self, const std::string& host, py::function callback) {
         return begin(self, &Client::watch_transitions, host, std::move(callback));

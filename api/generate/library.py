@@ -1,0 +1,175 @@
+"""The types of the client library that control.idl has: the public structs, how they are made of samples, and their members.
+
+A type of the library is one of the contract without "Status": HostStatus is Host. A member keeps its name but for its unit,
+which its C++ type has. The key that names the thing itself is `name`. Left out are `epoch`, `round`, `ext` and what HostStatus counts.
+"""
+
+import dataclasses
+import re
+import textwrap
+
+from contract import Fault
+
+LEFT_OUT = ("epoch", "round", "ext", "counts")
+NUMBERS = {
+    "short": "int",
+    "long": "int",
+    "long long": "long long",
+    "octet": "unsigned",
+    "unsigned short": "unsigned",
+    "unsigned long": "unsigned",
+    "unsigned long long": "unsigned long long",
+}
+
+
+@dataclasses.dataclass
+class Field:
+    name: str
+    type: str  # in C++
+    value: str  # of `sample`, as that type
+    text: str
+    key: bool
+    words: list
+
+
+@dataclasses.dataclass
+class Record:
+    name: str
+    sample: str
+    text: str
+    topic: bool
+    removable: bool  # a watch tells that it was removed
+    fields: list
+
+
+def title(text):
+    """What a comment says first."""
+    return re.split(r"[.:,;] ", text)[0].removesuffix(".")
+
+
+def field_of(kind, member, thing, words, nested):
+    base, _, count = member.type.partition("[")
+    from_sample = f"sample.{member.name}"
+    name, text = member.name, member.comment
+    if member.key and name == thing.lower():
+        name, text = "name", ""
+    sequence = re.fullmatch(r"sequence<(\w+), \d+>", base)
+    if base == "octet" and count:
+        made = ("std::string", f"hex_text(std::to_array({from_sample}))")
+    elif words:
+        made = ("std::string", f"dds::word_for(words_of_{name}, {from_sample})")
+        text = ", ".join(words)
+    elif base.startswith("string<"):
+        is_list = "with commas between" in member.comment
+        text = text.replace(", with commas between", "")
+        made = ("std::vector<std::string>", f"list_in(dds::text_of({from_sample}))") if is_list else (
+            "std::string", f"std::string(dds::text_of({from_sample}))")
+    elif base == "boolean":
+        made = ("bool", from_sample)
+    elif name.endswith("_unix_ns"):
+        name = name.removesuffix("_unix_ns")
+        made = ("std::chrono::system_clock::time_point", f"wall_time({from_sample})")
+    elif name.endswith("_ns"):
+        name = name.removesuffix("_ns")
+        one = "std::chrono::nanoseconds"
+        made = (f"std::array<{one}, {count[:-1]}>", f"durations(std::to_array({from_sample}))") if count else (one, f"{one}({from_sample})")
+    elif base in NUMBERS and not count:
+        made = (NUMBERS[base], from_sample)
+    elif base in nested and not count:
+        made = (base, f"to_public({from_sample})")
+    elif sequence and sequence[1] in nested:
+        made = (f"std::vector<{sequence[1]}>", f"all_public({from_sample}, [](const auto& part) {{ return to_public(part); }})")
+    else:
+        raise Fault(f"{kind.name}: the client library has no type for {member.type} {member.name}")
+    return Field(name, *made, re.sub(r"_ns\b", "", text), member.key, words)
+
+
+def records_of(contract, counted, words_of):
+    """The types of the library, each behind those that it has parts of."""
+    by_name = {kind.name: kind for kind in contract.types}
+    nested = {kind.name for kind in contract.types if not kind.is_topic}
+    made = {}
+
+    def add(kind):
+        if kind.name in made:
+            return
+        members = [member for member in kind.members if member.name not in LEFT_OUT]
+        for member in members:
+            for part in re.findall(r"\w+", member.type):
+                if part in nested:
+                    add(by_name[part])
+        thing = kind.name.removesuffix("Status")
+        fields = [field_of(kind, member, thing, words_of(member), nested) for member in members]
+        made[kind.name] = Record(thing, f"plc_{kind.name}", title(kind.comment), kind.is_topic, kind.name in counted, fields)
+
+    for name in ("HostStatus", *counted, "TaskStatistics"):
+        add(by_name[name])
+    return list(made.values())
+
+
+def initial(field):
+    plain = {"bool": " = false"} | {number: " = 0" for number in NUMBERS.values()}
+    return plain.get(field.type, "{}" if field.type.startswith("std::chrono") or field.type.startswith("std::array") else "")
+
+
+def public_types(records):
+    lines = [
+        "// The types of the client library that api/control.idl has; made from it by api/generate/generate.py. See",
+        "// plchost_client.hpp. Durations and times of the host are in the unit of their type, codes are words: a code that",
+        "// this version does not know is its number. The reference of the contract, api/reference.md, has the rest.",
+        "#ifndef PLCHOST_CLIENT_TYPES_HPP",
+        "#define PLCHOST_CLIENT_TYPES_HPP\n",
+        "#include <array>\n#include <chrono>\n#include <string>\n#include <vector>\n",
+        "namespace plchost::client_types {",
+    ]
+    for record in records:
+        lines += ["", f"/// {record.text}.", f"struct {record.name} {{"]
+        for field in record.fields:
+            text = f"  ///< {field.text}" if field.text else ""
+            lines.append(f"  {field.type} {field.name}{initial(field)};{text}")
+        if record.removable:
+            lines.append("  bool removed = false;  ///< told by watches only: the host has it no more")
+        names = [field.name for field in record.fields] + (["removed"] if record.removable else [])
+        each = "&& ".join(f"a.{name}==b.{name}" for name in names)
+        each = textwrap.fill(each, 100, subsequent_indent=" " * 11, break_long_words=False).replace("==", " == ").replace("&&", " &&")
+        lines += ["", f"  friend bool operator==(const {record.name}& a, const {record.name}& b) {{"]
+        lines += [f"    return {each};", "  }"]
+        lines += [f"  friend bool operator!=(const {record.name}& a, const {record.name}& b) {{ return !(a == b); }}", "};"]
+    return "\n".join(lines + ["", "}  // namespace plchost::client_types\n", "#endif\n"])
+
+
+def conversions(records, head):
+    lines = [head + "#include <array>\n#include <string>\n#include <string_view>\n#include <vector>\n"]
+    lines += ["#include <control.h>\n", '#include "api/dds/field_info.hpp"', '#include "api/dds/text.hpp"']
+    lines += ['#include "api/library/convert_parts.hpp"', '#include "plchost_client_types.hpp"\n', "namespace plchost {"]
+    for record in records:
+        lines += ["", f"[[nodiscard]] inline client_types::{record.name} to_public(const {record.sample}& sample) {{"]
+        for field in record.fields:
+            if field.words:
+                words = ", ".join(f'"{word}"' for word in field.words)
+                lines.append(f"  static constexpr std::array<std::string_view, {len(field.words)}> words_of_{field.name}{{{words}}};")
+        lines.append(f"  client_types::{record.name} made;")
+        lines += [f"  made.{field.name} = {field.value};" for field in record.fields]
+        lines += ["  return made;", "}"]
+        if record.removable:
+            keys = [field.name if field.type == "std::string" else f"std::to_string(item.{field.name})" for field in record.fields if field.key]
+            keys = [key if key.startswith("std") else f"item.{key}" for key in keys]
+            lines += [f"[[nodiscard]] inline std::vector<std::string> key_of(const client_types::{record.name}& item) {{"]
+            lines += [f"  return {{{', '.join(keys)}}};", "}"]
+    return "\n".join(lines + ["\n}  // namespace plchost\n"])
+
+
+def members(records, head):
+    lines = [head + "#include <type_traits>\n", '#include "plchost_client_types.hpp"\n', "namespace plchost::client_types {\n"]
+    lines.append("// visit(name, member, text) for each member of a type.")
+    for record in records:
+        lines += ["template <class Visit>", f"void visit_members(std::type_identity<{record.name}> /*type*/, Visit&& visit) {{"]
+        names = [(field.name, field.text) for field in record.fields]
+        names += [("removed", "told by watches only: the host has it no more")] if record.removable else []
+        for name, text in names:
+            quoted = text.replace("\\", "\\\\").replace('"', '\\"')
+            lines.append(f'  visit("{name}", &{record.name}::{name}, "{quoted}");')
+        lines.append("}\n")
+    lines += ["/// visit(name, type, text) for each type but Host.", "template <class Visit>", "void visit_types(Visit&& visit) {"]
+    lines += [f'  visit("{record.name}", std::type_identity<{record.name}>(), "{record.text}.");' for record in records if record.name != "Host"]
+    return "\n".join(lines + ["}\n", "}  // namespace plchost::client_types\n"])
