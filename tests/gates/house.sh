@@ -44,6 +44,9 @@ if [ -d instances/runtime/abi ]; then
 fi
 # DDS alone keeps the keys of unregistered instances in memory.
 git grep -nE '\bdds_unregister_instance' -- '*.cpp' '*.hpp' ':!api/dds/instances.*' ':!tests' && fault "the lines above leak: use dds::unregister_instance" || true
+# One rule says which server of a host counts, also after its clock was set back.
+git grep -nE '\bepoch(_|\(\))? [<>]=? ' -- 'api/*.cpp' 'api/*.hpp' ':!api/client/newest_epoch.hpp' &&
+  fault "the lines above compare epochs: use NewestEpoch" || true
 # A killed test's files in /dev/shm can only be removed by the next one if it knows the name.
 git grep -nE 'to_string\(::getpid\(\)|"[^"(]*\{\}[^"]*", *::getpid\(\)' -- tests ':!tests/support/own_name.hpp' | grep -v HasSubstr &&
   fault "the lines above make names that nobody clears away: use own_name() or own_path()" || true

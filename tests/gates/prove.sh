@@ -112,6 +112,9 @@ echo 'void* plc_call(int x) {}' | tee "$plot/tree/instances/runtime/abi/calls.cp
 must_be_red "house: function of plc_app.h" "instances/runtime/tasks/table.cpp:1:void* plc_call(int x) {}" "$gates/house.sh" "$plot/tree"
 
 new_tree
+echo 'bool is_newer(const plc_Presence& one, const Seen& seen) { return one.epoch > seen.epoch; }' >"$plot/tree/api/newer.cpp" && commit_tree
+must_be_red "house: another rule for epochs" "the lines above compare epochs: use NewestEpoch" "$gates/house.sh" "$plot/tree"
+new_tree
 echo 'std::string name = "pool-" + std::to_string(::get''pid());' >"$plot/tree/tests/name.cpp" && commit_tree
 must_be_red "house: name of a test's own making" "the lines above make names that nobody clears away" "$gates/house.sh" "$plot/tree"
 
