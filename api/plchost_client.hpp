@@ -69,6 +69,13 @@ class PLCHOST_CLIENT_API ClientError : public std::runtime_error {
   int code_;
 };
 
+/// How an application is loaded.
+struct LoadOptions {
+  bool boot = false;  ///< the instance starts with it from now on, also after a restart of the host
+  bool online =
+      false;  ///< it takes over while the tasks run: no cycle is lost; refused where it does not fit
+};
+
 class PLCHOST_CLIENT_API Client {
  public:
   struct Options {
@@ -79,7 +86,7 @@ class PLCHOST_CLIENT_API Client {
     std::chrono::milliseconds timeout{3000};  ///< of each call, 1 ms to an hour
   };
 
-  // What hosts show. The contract has these types: plchost_client_types.hpp is made from it.
+  // The state of hosts, as the contract has it: plchost_client_types.hpp is made from control.idl.
 
   struct Host : client_types::Host {
     bool answers = false;             ///< false: silent for more than 70 ms, or gone
@@ -151,6 +158,9 @@ class PLCHOST_CLIENT_API Client {
     explicit operator bool() const noexcept { return code == 0; }
   };
 
+  /// Told how many bytes of a file have arrived.
+  using Progress = std::function<void(unsigned long long received)>;
+
   /// A member of a status topic: codes are words, durations and times nanoseconds, GUIDs hexadecimal digits.
   using Value = std::variant<bool, long long, unsigned long long, std::string>;
   using Record = std::vector<std::pair<std::string, Value>>;
@@ -162,6 +172,7 @@ class PLCHOST_CLIENT_API Client {
     std::string help;             ///< empty for a few
     bool names_instance = false;  ///< else it is for the whole host
     bool engineering = false;     ///< for engineers; others are for operators, too
+    bool loads = false;           ///< LoadOptions count
   };
 
   /// Calls its callback until it is destroyed or stop() returns; after that never again (stop() waits for a
@@ -244,7 +255,22 @@ class PLCHOST_CLIENT_API Client {
   std::string reset(const std::string& host, const std::string& instance, bool cold = false);
   std::string single_cycle(const std::string& host, const std::string& instance);
   /// `path`: of a file on the host.
-  std::string load_application(const std::string& host, const std::string& instance, const std::string& path);
+  std::string load_application(const std::string& host, const std::string& instance, const std::string& path,
+                               const LoadOptions& options = {});
+  /// Loads the predecessor of the loaded version again.
+  std::string rollback_application(const std::string& host, const std::string& instance,
+                                   const LoadOptions& options = {});
+  /// Sends a file of this machine to the instance, where it is checked, kept and loaded. Goes on when the
+  /// server of the host ends meanwhile. The timeout is for the host to begin; then the call takes as long as
+  /// the file needs, and ends when nothing has moved for 10 s. `progress` is told how many bytes have
+  /// arrived, on a thread of the library; from the beginning again if the server had to be started again.
+  std::string download_application(const std::string& host, const std::string& instance,
+                                   const std::string& file, const LoadOptions& options = {},
+                                   const Progress& progress = {});
+  /// The same; returns at once. `done` is called once, as that of post(); its text is the host's remark.
+  void download_application(const std::string& host, const std::string& instance, const std::string& file,
+                            const LoadOptions& options, const Progress& progress,
+                            std::function<void(const Outcome&)> done);
   std::string set_scheduler(const std::string& host, const std::string& instance,
                             const std::string& scheduler);
   std::string register_event(const std::string& host, const std::string& event);
@@ -258,12 +284,13 @@ class PLCHOST_CLIENT_API Client {
   /// The commands of command(): all but a download. From the table that hosts and plcctl go by.
   static std::vector<Operation> operations();
   /// A command by its name ("reset statistics"); those above are such commands, too. Returns when it is done.
-  /// ClientError: invalid_argument: no such command; the text lists them.
+  /// ClientError: invalid_argument: no such command, the text lists them; or options that it does not take.
   std::string command(const std::string& operation, const std::string& host, const std::string& instance = {},
-                      const std::string& argument = {});
+                      const std::string& argument = {}, const LoadOptions& options = {});
   /// The same; returns at once. `done` is called once, as that of post(); its text is the host's remark.
   void command(const std::string& operation, const std::string& host, const std::string& instance,
-               const std::string& argument, std::function<void(const Outcome&)> done);
+               const std::string& argument, std::function<void(const Outcome&)> done,
+               const LoadOptions& options = {});
 
   /// Calls back for each host that is there, and whenever one comes, falls silent, answers again, or has
   /// changed. Known within 100 ms.

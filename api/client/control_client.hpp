@@ -76,6 +76,8 @@ struct Download {
   bool boot = false;    ///< it becomes the boot application
   bool online = false;  ///< it takes over while the tasks run; see kOnlineOption
 };
+/// The ApiRequest::ext of what loads an application, with the same options.
+[[nodiscard]] std::vector<plc_KeyValue> load_options(bool boot, bool online);
 /// Told how many bytes have arrived: again from the beginning, when plchost-dds had to be started again.
 using DownloadProgressFunction = std::function<void(std::uint64_t received)>;
 

@@ -19,17 +19,23 @@ constexpr Duration kDownloadStall = std::chrono::seconds(10);
 constexpr Duration kDownloadLoad = std::chrono::seconds(130);
 
 ApiRequest request_for(const Download& download) {
-  ApiRequest request{download.host, plc_OPERATION_DOWNLOAD_APPLICATION, download.instance, download.name};
+  ApiRequest request{download.host, plc_OPERATION_DOWNLOAD_APPLICATION, download.instance, download.name,
+                     load_options(download.boot, download.online)};
   const std::string_view text(reinterpret_cast<const char*>(download.contents.data()),
                               download.contents.size());
   dds::add_entry(request.ext, kSizeOption, fmt::format("{}", text.size()));
   dds::add_entry(request.ext, kDigestOption, sha256(text));
-  if (download.boot) dds::add_entry(request.ext, kBootOption, kYes);
-  if (download.online) dds::add_entry(request.ext, kOnlineOption, kYes);
   return request;
 }
 
 }  // namespace
+
+std::vector<plc_KeyValue> load_options(bool boot, bool online) {
+  std::vector<plc_KeyValue> ext;
+  if (boot) dds::add_entry(ext, kBootOption, kYes);
+  if (online) dds::add_entry(ext, kOnlineOption, kYes);
+  return ext;
+}
 
 Result<ApiReply> ControlClient::download(const Download& download, const DownloadProgressFunction& progress,
                                          TimePoint deadline) {
@@ -76,6 +82,9 @@ Result<ApiReply> ControlClient::download(const Download& download, const Downloa
             : fmt::format("host '{}' has stopped answering: {} of {} bytes of {} are there", download.host,
                           sender->received(), download.contents.size(), download.name));
   }
+  // The answer may come before the last acknowledgement.
+  const bool done = reply && reply->code == ErrorCode::ok;
+  if (done && progress && told != download.contents.size()) progress(download.contents.size());
   if (reply) await_status(request.host, *reply, MonotonicClock::now() + kStatusPatience);
   return reply;
 }

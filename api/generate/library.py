@@ -43,7 +43,7 @@ class Record:
 
 
 def title(text):
-    """What a comment says first."""
+    """The beginning of a comment, which names the thing."""
     return re.split(r"[.:,;] ", text)[0].removesuffix(".")
 
 

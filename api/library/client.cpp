@@ -1,49 +1,17 @@
-// The calls of a Client.
+// The calls of a Client, but for commands.
 #include <utility>
 
-#include <fmt/format.h>
-
-#include "api/client/check_names.hpp"
 #include "api/client/control_client_status.hpp"
 #include "api/client/log_reader.hpp"
+#include "api/library/calls.hpp"
 #include "api/library/convert.hpp"
 #include "api/library/records.hpp"
 #include "api/library/watcher.hpp"
 #include "api/library/worker.hpp"
-#include "shm/base/names.hpp"
-#include "shm/base/operations.hpp"
 
 namespace plchost {
 
 namespace {
-
-template <class T>
-T value_or_throw(Result<T> result) {
-  if (!result) throw_client_error(result.error());
-  return *std::move(result);
-}
-
-Result<EventId> event_of(const std::string& name) {
-  auto parts = split_name("EVENT", name);
-  if (!parts) return std::unexpected(std::move(parts).error());
-  return EventId{std::move(parts->first), std::move(parts->second)};
-}
-
-/// That host, once it answers; no name: the only one.
-Result<std::string> host_of(ControlClient& client, const std::string& name, TimePoint deadline) {
-  if (!name.empty()) {
-    auto found = client.host(name, deadline);
-    if (!found) return std::unexpected(std::move(found).error());
-    return std::move(found->name);
-  }
-  const auto all = client.hosts(deadline);
-  if (all.size() == 1) return all.front().name;
-  if (all.empty()) return failure(ErrorCode::unavailable, "no host answers");
-  std::vector<std::string_view> names;
-  for (const HostView& host : all) names.emplace_back(host.name);
-  return failure(ErrorCode::invalid_argument,
-                 fmt::format("several hosts answer, and none was named: {}", join_names(names)));
-}
 
 /// All samples of a status topic, as the library's type of them.
 template <class Sample>
@@ -89,55 +57,6 @@ Result<PostReport> post_to(ControlClient& client, const std::string& name, const
 Client::Outcome outcome_of(const Result<PostReport>& report) {
   if (report) return to_public(*report);
   return {.code = static_cast<int>(report.error().code), .text = report.error().describe(), .posted = {}};
-}
-
-Client::Outcome outcome_of(const Result<ApiReply>& reply) {
-  if (!reply)
-    return {.code = static_cast<int>(reply.error().code), .text = reply.error().describe(), .posted = {}};
-  return {.code = static_cast<int>(reply->code), .text = reply->text, .posted = {}};
-}
-
-// The answers of others come as pages, and a download has contents.
-bool is_command(const Operation& known) {
-  return known.place != OperationPlace::internal && !known.only_reads &&
-         known.options != OperationOptions::download;
-}
-
-std::string_view argument_name(OperationArgument argument) {
-  switch (argument) {
-    case OperationArgument::none:
-      return "";
-    case OperationArgument::path:
-      return "path";
-    case OperationArgument::file:
-      return "file";
-    case OperationArgument::scheduler:
-      return "scheduler";
-    case OperationArgument::event:
-      return "event";
-    case OperationArgument::task_or_none:
-      return "task";
-  }
-  return "";
-}
-
-Result<std::int32_t> number_of(const std::string& name) {
-  const Operation* const known = find_operation(name);
-  if (known != nullptr && is_command(*known)) return static_cast<std::int32_t>(known->verb);
-  std::vector<std::string_view> names;
-  for (const Operation& operation : operations()) {
-    if (is_command(operation)) names.push_back(operation.name);
-  }
-  return failure(ErrorCode::invalid_argument,
-                 fmt::format("no command '{}'; there are: {}", shown(name), join_names(names)));
-}
-
-/// `request.host`: empty: the only one.
-Result<ApiReply> call(ControlClient& client, ApiRequest request, TimePoint deadline) {
-  auto found = host_of(client, request.host, deadline);
-  if (!found) return std::unexpected(std::move(found).error());
-  request.host = *std::move(found);
-  return client.call(request, deadline);
 }
 
 Client::Posted posted_or_throw(const Client::Outcome& outcome) {
@@ -284,84 +203,6 @@ Client::Run Client::post_and_wait(const std::string& host, const std::string& ev
           .to_start = run.to_start,
           .to_end = run.to_end,
           .round_trip = run.round_trip};
-}
-
-std::vector<Client::Operation> Client::operations() {
-  std::vector<Operation> all;
-  for (const plchost::Operation& known : plchost::operations()) {
-    if (!is_command(known)) continue;
-    all.push_back({.name = std::string(known.name),
-                   .argument = std::string(argument_name(known.argument)),
-                   .help = known.help,
-                   .names_instance = known.names_instance,
-                   .engineering = known.role == ApiRole::engineering});
-  }
-  return all;
-}
-
-std::string Client::command(const std::string& operation, const std::string& host,
-                            const std::string& instance, const std::string& argument) {
-  const std::int32_t number = value_or_throw(number_of(operation));
-  const auto reply = value_or_throw(worker_->run<ApiReply>([&](ControlClient& client) {
-    return call(client, {host, number, instance, argument}, worker_->deadline());
-  }));
-  if (reply.code != ErrorCode::ok) throw ClientError(static_cast<int>(reply.code), reply.text);
-  return reply.text;
-}
-
-void Client::command(const std::string& operation, const std::string& host, const std::string& instance,
-                     const std::string& argument, std::function<void(const Outcome&)> done) {
-  check_callback(static_cast<bool>(done));
-  const std::int32_t number = value_or_throw(number_of(operation));
-  worker_->begin([this, request = ApiRequest{host, number, instance, argument},
-                  done = std::move(done)](const Result<ControlClient*>& client) {
-    done(outcome_of(client ? call(**client, request, worker_->deadline())
-                           : Result<ApiReply>(std::unexpected(client.error()))));
-  });
-}
-
-std::string Client::start(const std::string& host, const std::string& instance) {
-  return command("start", host, instance);
-}
-
-std::string Client::stop(const std::string& host, const std::string& instance) {
-  return command("stop", host, instance);
-}
-
-std::string Client::restart(const std::string& host, const std::string& instance) {
-  return command("restart", host, instance);
-}
-
-std::string Client::reset(const std::string& host, const std::string& instance, bool cold) {
-  return command(cold ? "reset cold" : "reset", host, instance);
-}
-
-std::string Client::single_cycle(const std::string& host, const std::string& instance) {
-  return command("single cycle", host, instance);
-}
-
-std::string Client::load_application(const std::string& host, const std::string& instance,
-                                     const std::string& path) {
-  return command("load application", host, instance, path);
-}
-
-std::string Client::set_scheduler(const std::string& host, const std::string& instance,
-                                  const std::string& scheduler) {
-  return command("set scheduler", host, instance, scheduler);
-}
-
-std::string Client::register_event(const std::string& host, const std::string& event) {
-  const auto id = value_or_throw(event_of(event));
-  return command("register event", host, id.instance, id.event);
-}
-
-std::string Client::unregister_event(const std::string& host, const std::string& event) {
-  const auto id = value_or_throw(event_of(event));
-  return command("unregister event", host, id.instance, id.event);
-}
-
-std::string Client::reload(const std::string& host) {
-  return command("reload host", host);
 }
 
 }  // namespace plchost

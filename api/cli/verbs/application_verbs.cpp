@@ -1,8 +1,6 @@
 #include "api/cli/verbs/application_verbs.hpp"
 
 #include <filesystem>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <memory>
 #include <span>
@@ -12,8 +10,7 @@
 #include "api/cli/progress_board.hpp"
 #include "api/cli/rows/rows.hpp"
 #include "api/cli/verbs/host_commands.hpp"
-#include "api/control/application_order.hpp"
-#include "api/dds/entries.hpp"
+#include "api/client/application_file.hpp"
 #include "api/dds/text.hpp"
 
 namespace plchost {
@@ -28,45 +25,12 @@ struct LoadArguments {
   bool online = false;
 };
 
-/// The most that [host] application_limit_mib can allow.
-constexpr std::uintmax_t kLargest = std::uintmax_t{1024} << 20U;
-
 constexpr const char* kBootHelp = "the instance starts with it from now on, also after a restart of the host";
 constexpr const char* kOnlineHelp =
     "it takes over while the tasks run: no cycle is lost, variables go on; refused where it does not fit";
 
-std::vector<plc_KeyValue> options_of(bool boot, bool online) {
-  std::vector<plc_KeyValue> ext;
-  if (boot) dds::add_entry(ext, kBootOption, kYes);
-  if (online) dds::add_entry(ext, kOnlineOption, kYes);
-  return ext;
-}
-
-Result<std::string> read_application(const std::string& path) {
-  std::error_code error;
-  if (std::filesystem::is_directory(path, error)) {
-    return failure(ErrorCode::wrong_type, path + " is a folder");
-  }
-  if (std::filesystem::exists(path, error) && !std::filesystem::is_regular_file(path, error)) {
-    return failure(ErrorCode::wrong_type, path + " is no plain file");
-  }
-  if (const auto size = std::filesystem::file_size(path, error); !error && size > kLargest) {
-    return failure(ErrorCode::wrong_size,
-                   fmt::format("{} has {} bytes; no host takes more than {}", path, size, kLargest));
-  }
-  std::ifstream file(path, std::ios::binary);
-  if (!file) {
-    return failure(ErrorCode::system,
-                   fmt::format("{} cannot be opened here (a file on the host: --on-host)", path), errno);
-  }
-  std::string contents(std::istreambuf_iterator<char>(file), {});
-  if (file.bad()) return failure(ErrorCode::system, "read " + path, errno);
-  if (contents.empty()) return failure(ErrorCode::wrong_size, path + " is empty");
-  return contents;
-}
-
 int send(CliSession& session, const LoadArguments& arguments) {
-  const auto contents = read_application(arguments.file);
+  const auto contents = read_application(arguments.file, " (a file on the host: --on-host)");
   if (!contents) return CliSession::fail(contents.error());
   const auto hosts = session.target_hosts();
   if (!hosts) return CliSession::fail(hosts.error());
@@ -92,7 +56,7 @@ int load(CliSession& session, const LoadArguments& arguments) {
   const std::string path = std::filesystem::absolute(arguments.file).lexically_normal();
   return command(session,
                  {"", plc_OPERATION_LOAD_APPLICATION, arguments.instance, path,
-                  options_of(arguments.boot, arguments.online)},
+                  load_options(arguments.boot, arguments.online)},
                  fmt::format("{} is loaded", path));
 }
 
@@ -157,7 +121,7 @@ void add_application_verbs(const Command& plcctl, CliSession& session) {
             [&session, back_to] {
               return command(session,
                              {"", plc_OPERATION_ROLLBACK_APPLICATION, back_to->instance, "",
-                              options_of(back_to->boot, back_to->online)},
+                              load_options(back_to->boot, back_to->online)},
                              "the predecessor is loaded");
             })
       .argument("INSTANCE", back_to->instance)

@@ -7,6 +7,7 @@
 #include <exception>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 #include <type_traits>
@@ -24,6 +25,7 @@
 namespace py = pybind11;
 using plchost::Client;
 using plchost::ClientError;
+using plchost::LoadOptions;
 
 namespace {
 
@@ -100,6 +102,12 @@ std::function<void(const Item&)> guarded(py::function callback) {
       raised.discard_as_unraisable("a callback of plchost_client");
     }
   };
+}
+
+using Progress = std::optional<py::function>;
+Client::Progress told_progress(const Progress& progress) {
+  if (!progress) return {};
+  return [told = guarded<unsigned long long>(*progress)](unsigned long long bytes) { told(bytes); };
 }
 
 template <class Item>
@@ -278,8 +286,6 @@ void define_calls(ClientClass& client) {
       .def("restart", &Client::restart, py::arg("host"), py::arg("instance"), NoGil())
       .def("reset", &Client::reset, py::arg("host"), py::arg("instance"), py::arg("cold") = false, NoGil())
       .def("single_cycle", &Client::single_cycle, py::arg("host"), py::arg("instance"), NoGil())
-      .def("load_application", &Client::load_application, py::arg("host"), py::arg("instance"),
-           py::arg("path"), NoGil())
       .def("set_scheduler", &Client::set_scheduler, py::arg("host"), py::arg("instance"),
            py::arg("scheduler"), NoGil())
       .def("register_event", &Client::register_event, py::arg("host"), py::arg("event"), NoGil())
@@ -290,8 +296,66 @@ void define_calls(ClientClass& client) {
            NoGil());
 }
 
-/// Commands that have no function of their own above, as "reset_statistics": all of the table.
+/// A method for a command of the table.
+void define_command(ClientClass& client, const std::string& method, const Client::Operation& operation) {
+  const std::string& name = operation.name;
+  const char* const argument = operation.argument.empty() ? "argument" : operation.argument.c_str();
+  if (!operation.names_instance) {
+    client.def(
+        method.c_str(), [name](Client& self, const std::string& host) { return self.command(name, host); },
+        py::arg("host") = "", operation.help.c_str(), NoGil());
+  } else if (operation.loads && operation.argument.empty()) {
+    client.def(
+        method.c_str(),
+        [name](Client& self, const std::string& host, const std::string& instance, bool boot, bool online) {
+          return self.command(name, host, instance, {}, LoadOptions{boot, online});
+        },
+        py::arg("host"), py::arg("instance"), py::arg("boot") = false, py::arg("online") = false,
+        operation.help.c_str(), NoGil());
+  } else if (operation.loads) {
+    client.def(
+        method.c_str(),
+        [name](Client& self, const std::string& host, const std::string& instance, const std::string& given,
+               bool boot,
+               bool online) { return self.command(name, host, instance, given, LoadOptions{boot, online}); },
+        py::arg("host"), py::arg("instance"), py::arg(argument), py::arg("boot") = false,
+        py::arg("online") = false, operation.help.c_str(), NoGil());
+  } else {
+    client.def(
+        method.c_str(),
+        [name](Client& self, const std::string& host, const std::string& instance, const std::string& given) {
+          return self.command(name, host, instance, given);
+        },
+        py::arg("host"), py::arg("instance"), py::arg(argument) = "", operation.help.c_str(), NoGil());
+  }
+}
+
+/// An application that is sent, and commands that have no function of their own above, as "reset_statistics":
+/// all of the table.
 void define_commands(ClientClass& client) {
+  client
+      .def(
+          "download_application",
+          [](Client& self, const std::string& host, const std::string& instance, const std::string& file,
+             bool boot, bool online, const Progress& progress) {
+            const auto told = told_progress(progress);
+            const py::gil_scoped_release release;
+            return self.download_application(host, instance, file, LoadOptions{boot, online}, told);
+          },
+          py::arg("host"), py::arg("instance"), py::arg("file"), py::arg("boot") = false,
+          py::arg("online") = false, py::arg("progress") = py::none(),
+          "Sends a file of this machine to the instance, which loads it. progress(bytes): so many have "
+          "arrived.")
+      .def(
+          "download_and_tell",
+          [](Client& self, const std::string& host, const std::string& instance, const std::string& file,
+             py::function done, bool boot, bool online, const Progress& progress) {
+            self.download_application(host, instance, file, LoadOptions{boot, online},
+                                      told_progress(progress), guarded<Client::Outcome>(std::move(done)));
+          },
+          py::arg("host"), py::arg("instance"), py::arg("file"), py::arg("done"), py::arg("boot") = false,
+          py::arg("online") = false, py::arg("progress") = py::none(),
+          "Returns at once; done(outcome) is called once.");
   client.def_static("topics", &Client::topics)
       .def(
           "status",
@@ -318,36 +382,25 @@ void define_commands(ClientClass& client) {
   });
   client.def(
       "command",
-      py::overload_cast<const std::string&, const std::string&, const std::string&, const std::string&>(
-          &Client::command),
-      py::arg("operation"), py::arg("host"), py::arg("instance") = "", py::arg("argument") = "", NoGil());
+      [](Client& self, const std::string& operation, const std::string& host, const std::string& instance,
+         const std::string& argument, bool boot, bool online) {
+        return self.command(operation, host, instance, argument, LoadOptions{boot, online});
+      },
+      py::arg("operation"), py::arg("host"), py::arg("instance") = "", py::arg("argument") = "",
+      py::arg("boot") = false, py::arg("online") = false, NoGil());
   client.def(
       "command_and_tell",
       [](Client& self, const std::string& operation, const std::string& host, const std::string& instance,
-         const std::string& argument, py::function done) {
-        self.command(operation, host, instance, argument, guarded<Client::Outcome>(std::move(done)));
+         const std::string& argument, py::function done, bool boot, bool online) {
+        self.command(operation, host, instance, argument, guarded<Client::Outcome>(std::move(done)),
+                     LoadOptions{boot, online});
       },
       py::arg("operation"), py::arg("host"), py::arg("instance"), py::arg("argument"), py::arg("done"),
-      "Returns at once; done(outcome) is called once.");
+      py::arg("boot") = false, py::arg("online") = false, "Returns at once; done(outcome) is called once.");
   for (const Client::Operation& operation : Client::operations()) {
     std::string name = operation.name;
     std::ranges::replace(name, ' ', '_');
-    if (py::hasattr(client, name.c_str())) continue;
-    const char* const argument = operation.argument.empty() ? "argument" : operation.argument.c_str();
-    if (operation.names_instance) {
-      client.def(
-          name.c_str(),
-          [name = operation.name](Client& self, const std::string& host, const std::string& instance,
-                                  const std::string& given) {
-            return self.command(name, host, instance, given);
-          },
-          py::arg("host"), py::arg("instance"), py::arg(argument) = "", operation.help.c_str(), NoGil());
-    } else {
-      client.def(
-          name.c_str(),
-          [name = operation.name](Client& self, const std::string& host) { return self.command(name, host); },
-          py::arg("host") = "", operation.help.c_str(), NoGil());
-    }
+    if (!py::hasattr(client, name.c_str())) define_command(client, name, operation);
   }
 }
 

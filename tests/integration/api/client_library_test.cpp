@@ -1,4 +1,6 @@
 // The client library as its users see it: by plchost_client.hpp, from libplchost-client.so.
+#include "tests/integration/api/client_library.hpp"
+
 #include <atomic>
 #include <condition_variable>
 #include <future>
@@ -11,46 +13,12 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "api/plchost_client.hpp"
 #include "shm/pages/log_ring.hpp"
-#include "tests/integration/api/test_host.hpp"
 
 namespace plchost {
 namespace {
 
 using testing::HasSubstr;
-
-class ClientLibrary : public testing::Test {
- protected:
-  ClientLibrary() {
-    event_ = host_.add_event("line1", "ready");
-    event_.set_bound_tasks(1);
-    host_.write_instance(0, "line1", InstanceState::running, 4711);
-    host_.write_count(1);
-    host_.start_server();
-  }
-
-  [[nodiscard]] Client::Options options(std::chrono::milliseconds timeout = std::chrono::seconds(20)) const {
-    Client::Options options;
-    options.domain = domain_.number();
-    options.timeout = timeout;
-    return options;
-  }
-
-  template <class Call>
-  static ClientError error_of(Call call) {
-    try {
-      call();
-    } catch (const ClientError& error) {
-      return error;
-    }
-    return {0, "nothing was thrown"};
-  }
-
-  OwnDomain domain_;
-  TestHost host_{domain_, "hosta"};
-  PoolEvent event_;
-};
 
 TEST_F(ClientLibrary, IsOneParticipantOfTheDomain) {
   Client sut(options());

@@ -58,6 +58,36 @@ with plchost_client.Client(domain=int(os.environ["PLCHOST_DOMAIN"]), timeout=20.
 EOF
 PYTHONPATH=$BIN/../python python3 "$cell/logs.py" || fail "logs and reload"
 
+echo "- Python sends an application, and shows what there is"
+(cat "$APPLICATIONS/packer.so" && echo "of another digest") >"$cell/other.so"
+cat >"$cell/sends.py" <<'EOF'
+import hashlib, os, sys, time, plchost_client
+file, other = sys.argv[1:]
+with plchost_client.Client(domain=int(os.environ["PLCHOST_DOMAIN"]), timeout=20.0) as client:
+    told = []
+    client.download_application("north", "packer1", file, progress=told.append)
+    assert told[-1] == os.path.getsize(file), told
+    (kept,) = [one for one in client.applications("north") if one.version == 1]
+    assert kept.sha256 == hashlib.sha256(open(file, "rb").read()).hexdigest(), kept.sha256
+    assert kept.file_name == "packer.so" and kept.from_ and not kept.boot, (kept.file_name, kept.from_)
+    outcomes = []
+    client.download_and_tell("north", "packer1", other, outcomes.append, boot=True)
+    assert [one.version for one in client.applications("north") if one.boot] == [2]  # behind the download
+    assert outcomes and outcomes[0], outcomes
+    client.rollback_application("north", "packer1")
+    assert client.exceptions("north")[0].count == 0
+    client.post_and_wait("north", "packer1/product")
+    for _ in range(200):  # they come once a second
+        figures = client.statistics("north", "packer1", "Product")
+        if figures.recorded > 0:
+            break
+        time.sleep(0.1)
+    assert 0 < figures.execution.max < 1, figures.execution.max
+    assert figures.execution_histogram.total == sum(bar.count for bar in figures.execution_histogram.bars) > 0
+    assert client.instances("north")[0].restart_policy in ("never", "on-failure", "always")
+EOF
+PYTHONPATH=$BIN/../python python3 "$cell/sends.py" "$APPLICATIONS/packer.so" "$cell/other.so" || fail "an application that Python sends"
+
 echo "- Python ends in peace while a client watches, and a callback that raises is told"
 cat >"$cell/ends.py" <<'EOF'
 import os, time, plchost_client
