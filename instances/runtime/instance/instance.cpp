@@ -79,7 +79,8 @@ std::unique_ptr<Instance> Instance::set_up(const Options& options, SetupReporter
 Result<std::string> Instance::take_watched(SetupStep step, SetupReporter& reporter,
                                            Result<std::string> (Instance::*take)()) {
   if (step != SetupStep::load_components && step != SetupStep::load_application) return (this->*take)();
-  SetUpWatch watch(start_.settings.scheduler.watchdog.default_time, [&](const Error& error) {
+  const Duration guard = start_.settings.scheduler.watchdog.default_time;
+  SetUpWatch watch(guard, SetUpWatch::kAboveAll, [&](const Error& error) {
     reporter.failed(step, error);
     (void)std::fflush(nullptr);
     ::_exit(kExitSetupFailed);  // the thread that sets up may hold any lock

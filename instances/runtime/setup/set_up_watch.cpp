@@ -18,9 +18,6 @@ constexpr Duration kLook = std::chrono::milliseconds(50);
 // While the process stood still, so did the set-up.
 constexpr Duration kLongestGap = std::chrono::milliseconds(200);
 
-// Above all threads of the application, if the host allows it.
-constexpr int kWatchPriority = 99;
-
 // Bound to the cores of the thread that sets up, or to some of them: it takes them from that one.
 bool runs_beside(pid_t thread, const std::vector<int>& cores) {
   const auto there = allowed_cores(thread);
@@ -39,13 +36,13 @@ Result<void> look_for_taker() {
 
 }  // namespace
 
-SetUpWatch::SetUpWatch(Duration guard, Fail fail) : fail_(std::move(fail)) {
+SetUpWatch::SetUpWatch(Duration guard, ThreadPriority priority, Fail fail) : fail_(std::move(fail)) {
   const Duration limit = Starvation::limit_for(guard);
   if (limit == Duration::zero() || !ProcessorGuard::install()) return;
   const auto watch = [this, limit, cores = allowed_cores(0).value_or(std::vector<int>{})] {
     run(limit, cores);
   };
-  auto thread = Thread::start("set-up watch", {.fifo = kWatchPriority}, watch);
+  auto thread = Thread::start("set-up watch", priority, watch);
   if (!thread) thread = Thread::start("set-up watch", {}, watch);
   if (!thread) return;  // the manager's limit is left
   thread_ = std::move(*thread);

@@ -22,9 +22,14 @@ class SetUpWatch {
   /// Ends the process, because the thread that sets up may never return. Called by a thread of this class.
   using Fail = std::function<void(const Error& error)>;
 
+  /// Above all threads of the application. For an instance on its own core.
+  static constexpr ThreadPriority kAboveAll{.fifo = 99};
+
   /// The calling thread sets up from now on. `guard`: the time of the guard against endless loops; 0: nothing
-  /// is watched, for work with a debugger.
-  SetUpWatch(Duration guard, Fail fail);
+  /// is watched, for work with a debugger. `priority`: of the watching thread, if the host allows it. Without
+  /// a real-time one (a trial, which may share its core with an instance) a thread that blocks SIGXCPU is
+  /// found only in time that the kernel leaves to others.
+  SetUpWatch(Duration guard, ThreadPriority priority, Fail fail);
   SetUpWatch(const SetUpWatch&) = delete;
   SetUpWatch& operator=(const SetUpWatch&) = delete;
   ~SetUpWatch() { stop(); }

@@ -115,7 +115,8 @@ Result<void> try_tasks(const Options& options, const InstanceSettings& settings,
 // The part that runs code of components and of the application.
 Result<DeclaredApplication> declare_watched(const std::string& path, const StartSettings& start,
                                             Components& components, ApplicationHost& host) {
-  SetUpWatch watch(start.settings.scheduler.watchdog.default_time, [&](const Error& error) {
+  // Without a real-time priority: the trial may run on the core of an instance.
+  SetUpWatch watch(start.settings.scheduler.watchdog.default_time, {}, [&](const Error& error) {
     fmt::print(stderr, "{}: {}\n", path, error.describe());
     end_trial(kExitSetupFailed);
   });

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sched.h>
 
 #include "tests/integration/instances/instance_process.hpp"
 
@@ -129,6 +130,29 @@ TEST_P(SignalEndsATrial, WhoseSetUpDoesNotReturn) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Signals, SignalEndsATrial, ::testing::Values(SIGINT, SIGTERM));
+
+// It may run on the core of an instance.
+TEST(ApplicationCheck, HasNoRealTimeThread) {
+  const Sandbox sandbox;
+  InstanceProcess sut(sandbox, {"--check-application", application("fault_loops")});
+  const std::string children = fmt::format("/proc/{0}/task/{0}/children", sut.pid());
+  pid_t child = 0;
+  ASSERT_TRUE(eventually([&] { return static_cast<bool>(std::ifstream(children) >> child); }));
+  const auto has_watch = [&] {
+    bool watch = false;
+    std::error_code error;
+    for (const auto& task : std::filesystem::directory_iterator(fmt::format("/proc/{}/task", child), error)) {
+      std::string name;
+      std::getline(std::ifstream(task.path() / "comm") >> std::ws, name);
+      watch = watch || name == "set-up watch";
+      const pid_t thread = std::stoi(task.path().filename());
+      EXPECT_EQ(::sched_getscheduler(thread), SCHED_OTHER) << name;
+    }
+    return watch;
+  };
+  EXPECT_TRUE(eventually(has_watch));
+  EXPECT_EQ(sut.end(SIGTERM), -SIGTERM);
+}
 
 TEST(ApplicationCheck, EndsWhatTheApplicationHasForked) {
   const Sandbox sandbox;
