@@ -61,6 +61,7 @@ class Manager : private InstanceObserver {
   void use_housekeeping_cores(std::vector<std::string>& lines) const;
   void use_pool_rights(std::vector<std::string>& lines) const;
   void remove_pages(const std::string& instance) const;
+  void remove_kept_settings(const std::string& instance) const;
   void write_host();
   void changed(std::size_t place, const InstanceStatus& status) override;
   void transition(const InstanceStatus& status, InstanceState from, InstanceState to,

@@ -6,7 +6,9 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <unistd.h>
 
+#include "instances/launch/launch_contract.hpp"
 #include "manager/config/config_changes.hpp"
 #include "manager/manager.hpp"
 #include "manager/pool_rights.hpp"
@@ -38,6 +40,7 @@ void Manager::adopt_removed() {
     } else {
       wishes_.erase(name);
       transitions_.erase(name);
+      remove_kept_settings(name);
     }
   }
 }
@@ -112,8 +115,14 @@ void Manager::gone(std::size_t place, const InstanceConfig& instance) {
   if (const auto wishes = wishes_.extract(instance.name)) wishes.mapped()->end();
   transitions_.erase(instance.name);
   remove_pages(instance.name);
+  remove_kept_settings(instance.name);
   std::erase_if(gone_, [&](const InstanceConfig& known) { return known.name == instance.name; });
   gone_.push_back(instance);
+}
+
+// They are those of its last process, which no other one follows.
+void Manager::remove_kept_settings(const std::string& instance) const {
+  ::unlink(kept_settings_path(config_.host.run_directory, instance).c_str());
 }
 
 void Manager::remove_pages(const std::string& instance) const {

@@ -172,8 +172,11 @@ Result<void> Instance::shut_down() {
   }
   // Before its code is called once more: if that ends the process, nothing of ours is left behind.
   if (page_) InstancePage::remove(options_.launch.pool, options_.launch.name);
-  // Under a manager there will be a next process, and the numbers go on.
-  if (options_.launch.report_fd < 0) TransitionRing::remove(options_.launch.pool, options_.launch.name);
+  // Under a manager there will be a next process: the numbers go on, and it may need the settings.
+  if (options_.launch.report_fd < 0) {
+    TransitionRing::remove(options_.launch.pool, options_.launch.name);
+    ::unlink(kept_settings_path(options_.launch.run_directory, options_.launch.name).c_str());
+  }
   if (stopped) {
     // Its code may wait for what a thread that is parked in it holds.
     if (application_ && !parked_) application_->exit();

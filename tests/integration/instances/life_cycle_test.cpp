@@ -33,8 +33,11 @@ TEST_P(UnderEachScheduler, RunsTasksOfAllFourKinds) {
   EXPECT_GE(figures.edges, 2U);
   EXPECT_GE(figures.loops, 10U);
   EXPECT_EQ(sut.task("Fast")->state, PageTaskState::running);
+  const std::string settings = sandbox.folder() + "/line1.settings";
+  EXPECT_TRUE(eventually([&] { return std::filesystem::exists(settings); }));
   EXPECT_EQ(sut.end(SIGTERM), EXIT_SUCCESS);
   EXPECT_FALSE(InstancePageReader::open(sandbox.pool(), "line1"));
+  EXPECT_FALSE(std::filesystem::exists(settings));
 }
 
 INSTANTIATE_TEST_SUITE_P(Schedulers, UnderEachScheduler,

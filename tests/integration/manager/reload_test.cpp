@@ -10,6 +10,7 @@
 #include <gmock/gmock.h>
 #include <sys/stat.h>
 
+#include "instances/launch/launch_contract.hpp"
 #include "manager/config/config_changes.hpp"
 #include "shm/base/thread.hpp"
 #include "shm/files/memory_file.hpp"
@@ -111,6 +112,8 @@ TEST_F(Reload, LetsARemovedInstanceRunUntilItIsStopped) {
 
 TEST_F(Reload, DoesNotRestartARemovedInstanceThatCrashes) {
   start();
+  const std::string settings = kept_settings_path(plant_.run_directory(), "drive1");
+  EXPECT_TRUE(Plant::eventually([&] { return std::filesystem::exists(settings); }));
   remove_drive1();
   auto process = open_process(drive1_);
   ASSERT_TRUE(process);
@@ -118,6 +121,7 @@ TEST_F(Reload, DoesNotRestartARemovedInstanceThatCrashes) {
   EXPECT_TRUE(disappears("drive1"));
   const auto pages = InstancePageReader::open(plant_.pool(), "drive1");
   EXPECT_FALSE(pages) << "its page is removed with it";
+  EXPECT_FALSE(std::filesystem::exists(settings)) << "they are those of no process any more";
   expect_nothing_left();
 }
 
