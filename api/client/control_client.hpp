@@ -206,8 +206,15 @@ class ControlClient {
   [[nodiscard]] Result<void> post_one(const std::string& host, std::string_view instance,
                                       std::string_view event);
 
-  /// Sleeps until something has changed or the deadline has come.
+  /// Sleeps until something has come, wake() was called, or the deadline is there.
   void wait_for_change(TimePoint deadline) { wait_set_.wait(deadline); }
+  /// Ends wait_for_change(), or the next one. Any thread.
+  void wake() const noexcept { wait_set_.wake(); }
+  /// Takes what has come. The number grows when hosts() or a status that was asked for may have changed, and
+  /// not with presences that tell nothing new.
+  [[nodiscard]] std::uint64_t changes();
+  /// When the first of the hosts that answer would be silent.
+  [[nodiscard]] TimePoint next_silence() const;
 
  private:
   ControlClient() = default;
@@ -266,6 +273,8 @@ class ControlClient {
   StatisticsCache statistics_;
   StatusCache<plc_HostFinding> host_findings_;
   SeenHosts seen_;
+  std::vector<int> silences_;  ///< of the hosts, by name, at the last changes(): 1 silent, 2 gone
+  std::uint64_t host_changes_ = 0;
   TransitionLog transition_log_;
   TimePoint last_news_;
   TimePoint told_keys_look_;  ///< when plc_forget_told_keys() was called last

@@ -2,6 +2,7 @@
 #include <chrono>
 #include <span>
 #include <string_view>
+#include <tuple>
 #include <utility>
 
 #include <fmt/format.h>
@@ -57,8 +58,9 @@ void ControlClient::update_hosts() {
   // None is kept beside what seen_ has of it: that is bounded.
   dds::take_valid_told<plc_Presence>(presence_.reader(), presence_.writers(),
                                      [&](const plc_Presence& presence, const auto& info) {
-                                       if (seen_.take(presence, now, info.publication_handle))
-                                         last_news_ = now;
+                                       if (!seen_.take(presence, now, info.publication_handle)) return;
+                                       last_news_ = now;
+                                       ++host_changes_;
                                      });
   // Posts that a killed server has not acknowledged would hold up those to its successor.
   for (const dds_instance_handle_t writer : seen_.take_ended(now)) {
@@ -111,6 +113,33 @@ bool ControlClient::is_silent(std::string_view host) {
   update();
   const SeenHost* const seen = seen_.find(host);
   return seen != nullptr && MonotonicClock::now() - seen->server.last() >= kSilent;
+}
+
+std::uint64_t ControlClient::changes() {
+  update();
+  const TimePoint now = MonotonicClock::now();
+  std::vector<int> silences;
+  for (const auto& [name, seen] : seen_.all()) {
+    const bool silent = now - seen.server.last() >= kSilent;
+    silences.push_back(static_cast<int>(silent) + static_cast<int>(seen.server.is_gone(now)));
+  }
+  if (silences != silences_) {
+    silences_ = std::move(silences);
+    ++host_changes_;
+  }
+  const std::uint64_t status =
+      std::apply([](const auto&... cache) { return (cache.changes() + ...); }, status_);
+  return host_changes_ + host_status_.changes() + status;
+}
+
+TimePoint ControlClient::next_silence() const {
+  const TimePoint now = MonotonicClock::now();
+  TimePoint next = TimePoint::max();
+  for (const auto& [name, seen] : seen_.all()) {
+    const TimePoint silent = seen.server.last() + kSilent;
+    if (silent > now) next = std::min(next, silent);
+  }
+  return next;
 }
 
 std::vector<HostView> ControlClient::hosts(TimePoint deadline) {

@@ -37,9 +37,13 @@ class StatusCache {
         reader_.get(), writers_,
         [&](dds_instance_handle_t handle, const Sample& sample) {
           samples_[handle].take(sample);
+          ++changes_;
           on_sample(sample);
         },
-        [this](dds_instance_handle_t handle) { samples_.erase(handle); });
+        [this](dds_instance_handle_t handle) {
+          samples_.erase(handle);
+          ++changes_;
+        });
   }
   void update() {
     update([](const Sample&) {});
@@ -59,6 +63,8 @@ class StatusCache {
   }
 
   [[nodiscard]] std::size_t size() const noexcept { return samples_.size(); }
+  /// Grows with each change that was taken.
+  [[nodiscard]] std::uint64_t changes() const noexcept { return changes_; }
   /// Forgets those of which `is_gone(sample)` says so.
   template <class Predicate>
   void erase_if(Predicate is_gone) {
@@ -88,6 +94,7 @@ class StatusCache {
   dds::Entity reader_;
   dds::HostWriters writers_;
   std::map<dds_instance_handle_t, Kept> samples_;
+  std::uint64_t changes_ = 0;
 };
 
 }  // namespace plchost

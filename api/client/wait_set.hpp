@@ -6,7 +6,8 @@
 
 namespace plchost {
 
-/// Sleeps until one of several readers has data, or one of several writers meets or loses a reader.
+/// Sleeps until one of several readers has data, one of several writers meets or loses a reader, or wake() is
+/// called.
 class WaitSet {
  public:
   WaitSet() noexcept = default;
@@ -16,10 +17,13 @@ class WaitSet {
   [[nodiscard]] Result<void> add(dds_entity_t entity, std::uint32_t statuses);
   /// Returns at the deadline at the latest, and earlier without cause: look again.
   void wait(TimePoint deadline) const noexcept;
+  /// Ends the wait that is under way, else the next one. Any thread.
+  void wake() const noexcept;
 
  private:
-  explicit WaitSet(dds::Entity set) noexcept : set_(std::move(set)) {}
+  WaitSet(dds::Entity set, dds::Entity woken) noexcept : set_(std::move(set)), woken_(std::move(woken)) {}
   dds::Entity set_;
+  dds::Entity woken_;  // a guard condition
 };
 
 }  // namespace plchost

@@ -9,8 +9,8 @@ namespace plchost {
 
 namespace {
 
-// A watch that is new begins within this; changes wake the thread themselves.
-constexpr auto kRound = std::chrono::milliseconds(20);
+// Changes, new watches and the end wake the thread; this is for what nobody tells.
+constexpr auto kRound = std::chrono::seconds(1);
 constexpr auto kReconnect = std::chrono::milliseconds(500);
 constexpr std::size_t kKeptOfEach = 64;  // of each instance, as hosts do
 
@@ -32,58 +32,71 @@ void Client::Watch::Subscription::stop() noexcept {
   const std::lock_guard lock(calling_);
 }
 
+void Client::Watcher::wake() {
+  changed_.notify_all();
+  if (client_ != nullptr) client_->wake();
+}
+
 void Client::Watcher::end() {
   {
     const std::lock_guard lock(mutex_);
     ending_ = true;
+    wake();
   }
-  changed_.notify_all();
   if (thread_.joinable()) thread_.join();
 }
 
 void Client::Watcher::add(std::shared_ptr<Watch::Subscription> subscription) {
-  {
-    const std::lock_guard lock(mutex_);
-    if (ending_) return;
-    subscriptions_.push_back(std::move(subscription));
-    if (!thread_.joinable()) thread_ = quiet_thread([this] { watch(); });
-  }
-  changed_.notify_all();
+  const std::lock_guard lock(mutex_);
+  if (ending_) return;
+  subscriptions_.push_back(std::move(subscription));
+  has_new_ = true;
+  if (!thread_.joinable()) thread_ = quiet_thread([this] { watch(); });
+  wake();
 }
 
-std::vector<std::shared_ptr<Client::Watch::Subscription>> Client::Watcher::wait_for_live() {
+std::optional<Client::Watcher::Subscriptions> Client::Watcher::wait_for_live() {
   std::unique_lock lock(mutex_);
-  changed_.wait(lock, [this] { return ending_ || !subscriptions_.empty(); });
-  if (ending_) return {};
-  std::erase_if(subscriptions_, [](const auto& subscription) { return subscription->stopped(); });
+  for (;;) {
+    if (ending_) return std::nullopt;
+    std::erase_if(subscriptions_, [](const auto& subscription) { return subscription->stopped(); });
+    if (!subscriptions_.empty()) break;
+    changed_.wait(lock);
+  }
+  if (std::exchange(has_new_, false)) looked_.reset();
   return subscriptions_;
 }
 
+bool Client::Watcher::connect() {
+  if (client_ != nullptr) return false;
+  const auto made = connection_.client();
+  std::unique_lock lock(mutex_);
+  if (made) {
+    client_ = *made;
+    return true;
+  }
+  changed_.wait_for(lock, kReconnect, [this] { return ending_; });
+  return false;
+}
+
 void Client::Watcher::watch() {
-  for (;;) {
-    const auto subscriptions = wait_for_live();
-    {
-      const std::lock_guard lock(mutex_);
-      if (ending_) return;
-    }
-    if (subscriptions.empty()) continue;
-    if (const auto client = connection_.client()) {
-      look(**client, subscriptions);
-      (*client)->wait_for_change(MonotonicClock::now() + kRound);
-      continue;
-    }
-    std::unique_lock lock(mutex_);
-    changed_.wait_for(lock, kReconnect, [this] { return ending_; });
+  while (const auto subscriptions = wait_for_live()) {
+    // Nobody could wake a wait for a new one, so watches that were added meanwhile are looked for first.
+    if (connect() || client_ == nullptr) continue;
+    look(*client_, *subscriptions);
+    client_->wait_for_change(std::min<TimePoint>(MonotonicClock::now() + kRound, client_->next_silence()));
   }
 }
 
-void Client::Watcher::look(ControlClient& client,
-                           const std::vector<std::shared_ptr<Watch::Subscription>>& subscriptions) {
+void Client::Watcher::look(ControlClient& client, const Subscriptions& subscriptions) {
   std::vector<TransitionView> fresh;
   if (std::ranges::any_of(subscriptions, [](const auto& one) { return one->wants_transitions(); })) {
     if (auto came = client.transitions()) fresh = *std::move(came);
     keep(fresh);
   }
+  const std::uint64_t changes = client.changes();
+  if (changes == looked_ && fresh.empty()) return;
+  looked_ = changes;
   for (const auto& subscription : subscriptions) subscription->look({client, fresh, transitions_});
 }
 

@@ -2,8 +2,10 @@
 
 #include <atomic>
 #include <condition_variable>
+#include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -45,7 +47,7 @@ class __attribute__((visibility("hidden"))) Client::Watch::Subscription {
 };
 
 /// Looks for what watches want to be told, on a thread and with a ControlClient of its own: a call that waits
-/// holds up no watch.
+/// holds up no watch. The thread waits for DDS, and looks when something has changed.
 class __attribute__((visibility("hidden"))) Client::Watcher {
  public:
   explicit Watcher(std::shared_ptr<ParticipantSource> participant) : connection_(std::move(participant)) {}
@@ -59,17 +61,26 @@ class __attribute__((visibility("hidden"))) Client::Watcher {
   void add(std::shared_ptr<Watch::Subscription> subscription);
 
  private:
+  using Subscriptions = std::vector<std::shared_ptr<Watch::Subscription>>;
   void watch();
-  [[nodiscard]] std::vector<std::shared_ptr<Watch::Subscription>> wait_for_live();
-  void look(ControlClient& client, const std::vector<std::shared_ptr<Watch::Subscription>>& subscriptions);
+  /// Those that are there, once there are some. Nothing: it ends.
+  [[nodiscard]] std::optional<Subscriptions> wait_for_live();
+  /// Makes the ControlClient if there is none. True: it is new.
+  [[nodiscard]] bool connect();
+  /// Ends all waits of the thread. With the mutex.
+  void wake();
+  void look(ControlClient& client, const Subscriptions& subscriptions);
   void keep(const std::vector<TransitionView>& fresh);
 
   Connection connection_;
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::vector<std::shared_ptr<Watch::Subscription>> subscriptions_;
+  Subscriptions subscriptions_;
+  bool has_new_ = false;                     // of them, since the last look
+  ControlClient* client_ = nullptr;          // that of the connection, once it is there
   std::vector<TransitionView> transitions_;  // for watches that come later: the kept samples of hosts come
                                              // only once
+  std::optional<std::uint64_t> looked_;      // ControlClient::changes() at the last look
   bool ending_ = false;
   std::thread thread_;
 };

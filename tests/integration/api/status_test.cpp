@@ -1,4 +1,7 @@
+#include <algorithm>
+#include <csignal>
 #include <cstring>
+#include <future>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -155,6 +158,57 @@ TEST(RemoteStatus, TellsTheStatisticsOfATaskAndAtOnceWhenTheyBeginAnew) {
   EXPECT_EQ(next->latency.total, 0U);
   EXPECT_TRUE(next->latency.bars.empty());
   EXPECT_GE(next->numbers.since_unix_ns, report->numbers.since_unix_ns);
+}
+
+TEST(RemoteStatus, CountsChangesAndNoPresences) {
+  const OwnDomain domain;
+  TestHost host(domain, "hosta");
+  host.write_instance(0, "line1", InstanceState::running, 100);
+  host.write_count(1);
+  host.start_server();
+  const auto sut = connect(domain);
+  ASSERT_TRUE(sut->instances("hosta", soon()));
+  // The host's load is a change, every 2 s: one of the looks is between two of them.
+  constexpr auto kLook = milliseconds(200);
+  const auto is_calm = [&] {
+    const std::uint64_t before = sut->changes();
+    std::size_t woken = 0;
+    for (const TimePoint end = MonotonicClock::now() + kLook; MonotonicClock::now() < end; ++woken) {
+      sut->wait_for_change(end);
+      if (sut->changes() != before) return false;
+    }
+    return woken > 2;  // by presences
+  };
+  bool calm = false;
+  for (const TimePoint end = soon(); !calm && MonotonicClock::now() < end;) calm = is_calm();
+  EXPECT_TRUE(calm);
+
+  const std::uint64_t before = sut->changes();
+  host.write_instance(0, "line1", InstanceState::exception, 100);
+  while (sut->changes() == before) sut->wait_for_change(soon());
+  const std::uint64_t there = sut->changes();
+  host.server().signal(SIGKILL);
+  const TimePoint end = soon();
+  while (sut->changes() == there && MonotonicClock::now() < end) {
+    sut->wait_for_change(std::min(end, sut->next_silence()));
+  }
+  EXPECT_GT(sut->changes(), there) << "it is silent";
+}
+
+TEST(RemoteStatus, IsWaitedForUntilAnotherThreadWakesTheClient) {
+  const OwnDomain domain;
+  const auto sut = connect(domain);
+  std::promise<void> woken;
+  const std::jthread waits([&] {
+    sut->wait_for_change(MonotonicClock::now() + 2 * kPatience);
+    woken.set_value();
+  });
+  sut->wake();
+  EXPECT_EQ(woken.get_future().wait_for(kPatience), std::future_status::ready);
+  sut->wake();  // for the wait that follows
+  const TimePoint end = soon();
+  sut->wait_for_change(end);
+  EXPECT_LT(MonotonicClock::now(), end);
 }
 
 TEST(RemoteStatus, OfAPageThatAStrangerWroteToHarmsNobody) {
