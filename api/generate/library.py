@@ -19,6 +19,8 @@ NUMBERS = {
     "unsigned short": "unsigned",
     "unsigned long": "unsigned",
     "unsigned long long": "unsigned long long",
+    "float": "float",
+    "double": "double",
 }
 
 
