@@ -4,8 +4,9 @@
  *
  *     plc_app_abi          PLC_APP_ABI_VERSION, checked before anything of it runs: write PLC_EXPORT_ABI;
  *     int plc_app_init(void)    called once after loading; calls __sys__setup__tasks(); 0 means success
- *     void plc_app_exit(void)   optional; called once when all tasks have ended, or when another version of
- *                          the program has taken over from this one (see "Online change" below)
+ *     void plc_app_exit(void)   optional; called once when all tasks have ended, when another version of the
+ *                          program has taken over from this one (see "Online change" below), or when the
+ *                          runtime refuses the program after its plc_app_init; then areas have no addresses
  *
  * and calls the functions of the runtime that are declared below; they are found when it is loaded.
  *
@@ -337,7 +338,8 @@ RTS_RESULT CDECL SchedGetClockState(RTS_HANDLE hTask, Clock_State* pState);
  * instance's own). The handle stays valid until the process ends. *pResult (may be NULL): ERR_OK;
  * ERR_DUPLICATE: the application or a component has registered it already; with RTS_INVALID_HANDLE:
  * ERR_PARAMETER, ERR_NOMEMORY, ERR_NOTINITIALIZED. An event that plc_app_init registers counts posts when the
- * application is accepted, after plc_app_init has returned 0. Control.
+ * application is accepted, after plc_app_init has returned 0. An online change ends registrations of the
+ * application that neither plc_app_init nor a callback of the new version makes, too. Control.
  */
 RTS_HANDLE CDECL SchedRegisterExternalEvent(const char* pszEvent, RTS_RESULT* pResult);
 

@@ -20,7 +20,8 @@ RTS_HANDLE SchedRegisterExternalEvent(const char* pszEvent, RTS_RESULT* pResult)
     return finish(name ? ERR_PARAMETER : ERR_NOMEMORY, RTS_INVALID_HANDLE);
   }
   const RTS_RESULT registered = host->register_event(*handle);
-  return finish(registered, registered == ERR_NOMEMORY ? RTS_INVALID_HANDLE : *handle);
+  const bool given = registered == ERR_OK || registered == ERR_DUPLICATE;
+  return finish(registered, given ? *handle : RTS_INVALID_HANDLE);
 }
 
 RTS_RESULT SchedUnregisterExternalEvent(RTS_HANDLE hEvent) {

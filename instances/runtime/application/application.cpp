@@ -35,21 +35,33 @@ Result<void> call_init(const SharedObject& object) {
   }
 }
 
-void call_exit(const SharedObject& object) {
-  using Exit = void (*)();
-  const auto exit = std::bit_cast<Exit>(object.find("plc_app_exit"));
+using Exit = void (*)();
+
+// Null: it has none.
+Exit exit_of(const SharedObject& object) {
+  return std::bit_cast<Exit>(object.find("plc_app_exit"));
+}
+
+void call_exit(Exit exit, const std::string& path) {
   if (exit == nullptr) return;
   try {
     exit();
   } catch (const std::exception& error) {
-    spdlog::error("{}: plc_app_exit threw: {}", object.path(), error.what());
+    spdlog::error("{}: plc_app_exit threw: {}", path, error.what());
   } catch (...) {
-    spdlog::error("{}: plc_app_exit threw an exception", object.path());
+    spdlog::error("{}: plc_app_exit threw an exception", path);
   }
 }
 
-// While the machine runs on.
-void leave_online(SharedObject& object, ApplicationHost& host) {
+void call_exit(const SharedObject& object) {
+  call_exit(exit_of(object), object.path());
+}
+
+// Its plc_app_init has returned 0.
+void end_program(SharedObject& object, ApplicationHost& host) {
+  if (!host.has_application()) {
+    return host.refuse([exit = exit_of(object), path = object.path()] { call_exit(exit, path); });
+  }
   host.set_online_change(true);
   call_exit(object);
   host.set_online_change(false);
@@ -74,7 +86,7 @@ Result<DeclaredApplication> Application::load(const std::string& path, Applicati
   }
   auto made = built(*object, declaration);
   if (made) return DeclaredApplication{*std::move(made), std::move(declaration)};
-  if (beside) leave_online(*object, host);
+  end_program(*object, host);
   return std::unexpected(std::move(made).error());
 }
 
@@ -107,7 +119,7 @@ void Application::exit() {
 }
 
 void Application::leave(ApplicationHost& host) {
-  leave_online(object_, host);
+  end_program(object_, host);
 }
 
 std::string Application::name() const {

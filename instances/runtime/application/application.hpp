@@ -35,8 +35,8 @@ class Application {
   [[nodiscard]] const TaskCodes& codes() const noexcept { return codes_; }
   /// The tasks, whose code was exchanged, are from now on those of `next`; that is then the version before.
   void exchange(Application& next) noexcept;
-  /// Ends a version whose code no task runs, while the machine runs on: its plc_app_exit, and it is unloaded.
-  /// Control thread.
+  /// Ends a version whose code no task runs. While another one runs on: its plc_app_exit, and it is unloaded.
+  /// Else its plc_app_exit is left to ApplicationHost::end_refused(). Control thread.
   void leave(ApplicationHost& host);
   [[nodiscard]] bool contains(const void* address) const noexcept { return object_.contains(address); }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <exception>
+#include <iterator>
 #include <utility>
 
 #include <fmt/format.h>
@@ -48,6 +49,15 @@ const char* ApplicationHost::parameter(std::string_view name) const noexcept {
   return known == parameters_.end() ? nullptr : known->second.c_str();
 }
 
+void ApplicationHost::end_refused() {
+  if (const auto exit = std::exchange(refused_, nullptr)) exit();
+}
+
+// As it is in force: declared, or registered later.
+bool ApplicationHost::is_of_running(RTS_HANDLE event) const noexcept {
+  return has(declaration_.events, event) || has(late_events_, event);
+}
+
 void ApplicationHost::begin_init(ApplicationDeclaration& declaration) noexcept {
   collected_ = &declaration;
   online_ = has_application_;
@@ -64,7 +74,7 @@ bool ApplicationHost::in_init() const noexcept {
 
 Result<void> ApplicationHost::reserve(const ApplicationDeclaration& declaration) {
   for (const RTS_HANDLE event : declaration.events) {
-    if (has(declaration_.events, event)) continue;
+    if (is_of_running(event)) continue;
     if (auto done = events_.register_by_application(event); !done) {
       release(declaration);
       return done;
@@ -75,23 +85,29 @@ Result<void> ApplicationHost::reserve(const ApplicationDeclaration& declaration)
 
 void ApplicationHost::release(const ApplicationDeclaration& declaration) {
   for (const RTS_HANDLE event : declaration.events) {
-    if (!has(declaration_.events, event)) (void)events_.unregister_by_application(event);
+    if (!is_of_running(event)) (void)events_.unregister_by_application(event);
   }
 }
 
 void ApplicationHost::commit(ApplicationDeclaration declaration,
                              const std::function<bool(const void*)>& is_code) {
-  for (const RTS_HANDLE event : declaration_.events) {
-    if (!has(declaration.events, event)) (void)events_.unregister_by_application(event);
-  }
+  std::ranges::copy(declaration_.events, std::back_inserter(leaving_events_));
+  std::ranges::move(std::exchange(late_events_, {}), std::back_inserter(leaving_events_));
+  std::erase_if(leaving_events_, [&](RTS_HANDLE event) { return has(declaration.events, event); });
   std::erase_if(callbacks_, [&](const Callback& known) {
-    return known.of_application || is_code(std::bit_cast<const void*>(known.callback.function));
+    return !known.of_component || is_code(std::bit_cast<const void*>(known.callback.function));
   });
   for (const EventCallback& callback : declaration.callbacks) {
-    callbacks_.push_back({.callback = callback, .of_application = true});
+    callbacks_.push_back({.callback = callback, .of_component = false});
   }
   declaration_ = std::move(declaration);
   has_application_ = true;
+}
+
+void ApplicationHost::end_takeover() {
+  for (const RTS_HANDLE event : std::exchange(leaving_events_, {})) {
+    (void)events_.unregister_by_application(event);
+  }
 }
 
 void ApplicationHost::set_up_tasks(sys_setup_tasks_struct* tasks) noexcept {
@@ -138,13 +154,22 @@ RTS_HANDLE ApplicationHost::declare_area(const Plc_Area* area, RTS_RESULT& resul
 RTS_RESULT ApplicationHost::register_event(RTS_HANDLE event) {
   if (collected_ != nullptr && events_.is_own(event)) {
     // By the application that runs it is no obstacle; by a component it is.
-    const bool by_component = events_.is_by_application(event) && !has(declaration_.events, event);
+    const bool by_component = events_.is_by_application(event) && !is_of_running(event);
     if (by_component || has(collected_->events, event)) return ERR_DUPLICATE;
     collected_->events.push_back(event);
     return ERR_OK;
   }
-  const auto registered = events_.register_by_application(event);
-  if (registered) return ERR_OK;
+  // The plc_app_exit of a version that leaves while another one runs on.
+  if (online_) {
+    spdlog::error("SchedRegisterExternalEvent: a version that leaves cannot register events");
+    return ERR_NOTINITIALIZED;
+  }
+  const bool taken_over = std::erase(leaving_events_, event) != 0;
+  const auto registered = taken_over ? Result<void>() : events_.register_by_application(event);
+  if (registered) {
+    if (events_.is_own(event) && !in_component_) late_events_.push_back(event);
+    return ERR_OK;
+  }
   if (registered.error().code == ErrorCode::already_exists) return ERR_DUPLICATE;
   spdlog::error("SchedRegisterExternalEvent: {}", registered.error().describe());
   return ERR_NOMEMORY;
@@ -155,10 +180,12 @@ RTS_RESULT ApplicationHost::unregister_event(RTS_HANDLE event) {
     return std::erase(collected_->events, event) == 0 ? ERR_NO_OBJECT : ERR_OK;
   }
   // The plc_app_exit of a version that leaves: the registration belongs to the one that runs on.
-  if (online_ && has(declaration_.events, event)) return ERR_NO_OBJECT;
+  if (online_ && is_of_running(event)) return ERR_NO_OBJECT;
   const auto done = events_.unregister_by_application(event);
   if (!done) return done.error().code == ErrorCode::not_found ? ERR_NO_OBJECT : ERR_PARAMETER;
-  std::erase(declaration_.events, event);
+  for (auto* const events : {&declaration_.events, &late_events_, &leaving_events_}) {
+    std::erase(*events, event);
+  }
   return ERR_OK;
 }
 
@@ -184,14 +211,14 @@ RTS_RESULT ApplicationHost::add_callback(unsigned event, PF_EVENT_CALLBACK callb
   if (collected_ != nullptr) {
     auto& said = collected_->callbacks;
     if (has(said, wanted)) return ERR_DUPLICATE;
-    const auto others = std::ranges::count(callbacks_, false, &Callback::of_application);
+    const auto others = std::ranges::count(callbacks_, true, &Callback::of_component);
     if (said.size() + static_cast<std::size_t>(others) == PLC_MAX_EVENT_CALLBACKS) return ERR_NOMEMORY;
     said.push_back(wanted);
     return ERR_OK;
   }
   if (has(callbacks_, wanted, &Callback::callback)) return ERR_DUPLICATE;
   if (callbacks_.size() == PLC_MAX_EVENT_CALLBACKS) return ERR_NOMEMORY;
-  callbacks_.push_back({.callback = wanted, .of_application = false});
+  callbacks_.push_back({.callback = wanted, .of_component = in_component_});
   return ERR_OK;
 }
 
@@ -204,10 +231,11 @@ RTS_RESULT ApplicationHost::remove_callback(unsigned event, PF_EVENT_CALLBACK ca
   return removed ? ERR_OK : ERR_NO_OBJECT;
 }
 
-void ApplicationHost::notify(unsigned event, const EVTPARAM_ExternalEventTask& parameter) const {
+void ApplicationHost::notify(unsigned event, const EVTPARAM_ExternalEventTask& parameter) {
   const auto now = callbacks_;  // a callback may register or unregister
-  for (const auto& [callback, of_application] : now) {
+  for (const auto& [callback, of_component] : now) {
     if (callback.event != event) continue;
+    const ComponentCode code(*this, of_component);
     try {
       callback.function(event, &parameter, callback.user);
     } catch (const std::exception& error) {

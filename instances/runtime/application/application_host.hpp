@@ -56,6 +56,26 @@ class ApplicationHost {
   /// An application is committed: another one can only take over from it.
   [[nodiscard]] bool has_application() const noexcept { return has_application_; }
 
+  /// Code of components runs while it exists, on the control thread: what that registers stays, whatever
+  /// application runs.
+  class ComponentCode {
+   public:
+    explicit ComponentCode(ApplicationHost& host, bool runs = true) noexcept
+        : host_(host), before_(std::exchange(host.in_component_, runs)) {}
+    ~ComponentCode() { host_.in_component_ = before_; }
+    ComponentCode(const ComponentCode&) = delete;
+    ComponentCode& operator=(const ComponentCode&) = delete;
+
+   private:
+    ApplicationHost& host_;
+    bool before_;
+  };
+
+  /// A program is refused after its plc_app_init has returned 0, and no other one runs: `exit` calls its
+  /// plc_app_exit, which end_refused() does when the reason was reported.
+  void refuse(std::function<void()> exit) { refused_ = std::move(exit); }
+  void end_refused();
+
   /// From here to end_init() a plc_app_init runs. Its calls are collected in `declaration`, and change
   /// nothing else.
   void begin_init(ApplicationDeclaration& declaration) noexcept;
@@ -71,8 +91,12 @@ class ApplicationHost {
   [[nodiscard]] Result<void> reserve(const ApplicationDeclaration& declaration);
   void release(const ApplicationDeclaration& declaration);
   /// The reserved `declaration` holds from now on. Callbacks of the application before, and others in its
-  /// code as `is_code` says, are forgotten, and so are its events.
+  /// code as `is_code` says, are forgotten. Its events stay registered until end_takeover(), so that no post
+  /// is lost that the callbacks of the new one register, too.
   void commit(ApplicationDeclaration declaration, const std::function<bool(const void*)>& is_code);
+
+  /// Unregisters the events of the application before that the one that runs has not registered.
+  void end_takeover();
 
   void set_up_tasks(sys_setup_tasks_struct* tasks) noexcept;
   [[nodiscard]] RTS_RESULT set_task_options(const char* task, const Task_Options* options);
@@ -83,7 +107,7 @@ class ApplicationHost {
   [[nodiscard]] RTS_RESULT add_callback(unsigned event, PF_EVENT_CALLBACK callback, void* user);
   [[nodiscard]] RTS_RESULT remove_callback(unsigned event, PF_EVENT_CALLBACK callback, void* user);
   /// Calls the callbacks of `event` for one task.
-  void notify(unsigned event, const EVTPARAM_ExternalEventTask& parameter) const;
+  void notify(unsigned event, const EVTPARAM_ExternalEventTask& parameter);
 
   /// Writes what plc_log has queued into the log. Control thread.
   void write_messages();
@@ -91,8 +115,9 @@ class ApplicationHost {
  private:
   struct Callback {
     EventCallback callback;
-    bool of_application;  // of its declaration
+    bool of_component;  // else the application's
   };
+  [[nodiscard]] bool is_of_running(RTS_HANDLE event) const noexcept;
 
   std::string instance_;
   Parameters parameters_;
@@ -107,7 +132,11 @@ class ApplicationHost {
   bool has_application_ = false;
   ApplicationDeclaration* collected_ = nullptr;  // while a plc_app_init runs
   bool online_ = false;
+  bool in_component_ = false;
+  std::vector<RTS_HANDLE> late_events_;     // registered by the application outside of its plc_app_init
+  std::vector<RTS_HANDLE> leaving_events_;  // of the one before, from commit() to end_takeover()
   std::vector<Callback> callbacks_;
+  std::function<void()> refused_;  // empty: no program was refused
 };
 
 }  // namespace plchost

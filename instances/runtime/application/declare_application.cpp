@@ -61,6 +61,7 @@ Result<void> prepare_host(const StartSettings& start, ApplicationHost& host) {
 
 Result<void> load_components(const InstanceSettings& settings, ComponentHooks hooks, Components& components,
                              ApplicationHost& host) {
+  const ApplicationHost::ComponentCode code(host);
   auto loaded = components.load(settings.components);
   if (loaded) {  // a component may hold the clock, and the hooks of all see it
     loaded = use_system_time(settings.sys_time, [&](const char* symbol) { return components.find(symbol); });
@@ -92,7 +93,7 @@ Result<DeclaredApplication> declare_application(const std::string& path, const S
   if (!declared) return declared;
   auto checked = check_declaration(start, *declared);
   if (checked) return declared;
-  if (host.has_application()) declared->application.leave(host);
+  declared->application.leave(host);
   return std::unexpected(std::move(checked).error());
 }
 

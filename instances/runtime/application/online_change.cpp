@@ -108,6 +108,7 @@ void OnlineChange::finish(const std::function<void()>& notify) {
   // next_ is the version before now.
   host_.commit(std::move(declaration_), [this](const void* code) { return next_.contains(code); });
   notify();
+  host_.end_takeover();
 }
 
 std::string OnlineChange::describe() const {

@@ -180,6 +180,7 @@ Result<void> Instance::shut_down() {
   if (stopped) {
     // Its code may wait for what a thread that is parked in it holds.
     if (application_ && !parked_) application_->exit();
+    if (host_) host_->end_refused();
     components_.exit();
     if (host_) host_->areas().finish();  // also what these two have changed
     // Only now: until then a thread of a component may have used a task's handle.

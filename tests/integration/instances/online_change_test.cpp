@@ -70,6 +70,13 @@ class Online {
               8);
     return report;
   }
+  /// How often the program has said so.
+  std::size_t count(const std::string& text) {
+    const std::string log = process_.log();
+    std::size_t count = 0;
+    for (std::size_t at = log.find(text); at != std::string::npos; at = log.find(text, at + 1)) ++count;
+    return count;
+  }
   TaskCounters main() { return process_.task("Main")->counters; }
   bool runs(std::uint64_t more = 20) {
     const auto before = main().cycles;
@@ -181,6 +188,7 @@ TEST_P(RefusedOnlineChange, TellsTheReasonAndChangesNothing) {
   EXPECT_EQ(after.counter, after.fresh) << "nobody else has counted";
   EXPECT_EQ(sut.path(), path);
   EXPECT_EQ(sut.held().first, 0U) << "nothing of it is left";
+  EXPECT_EQ(sut.count("init of version 1, online 1"), sut.count("exit of version 1, online 1"));
   const auto changed = sut.change(application("online_2"));
   EXPECT_EQ(changed.code, ErrorCode::ok) << changed.text;
   EXPECT_EQ(sut.report().version, 2);
@@ -194,6 +202,7 @@ INSTANTIATE_TEST_SUITE_P(
     Each, RefusedOnlineChange,
     ::testing::Values(
         Refusal{"online_other_name", "it is the application 'Other', 'Online' runs"},
+        Refusal{"online_options", "no task 'Nobody'"},
         Refusal{"online_interval",
                 "task 'Main': its interval is 3000 us, of the one that runs it is 2000 us"},
         Refusal{"online_priority", "task 'Main': its priority is 4, of the one that runs it is 5"},
@@ -330,6 +339,19 @@ TEST(OnlineChangeOfAnInstance, AFaultOfTheNewCodeIsFoundInTheNewFile) {
   const auto refused = sut.change(application("online_1"));
   EXPECT_EQ(refused.code, ErrorCode::wrong_state);
   EXPECT_THAT(refused.text, HasSubstr("reset it first"));
+}
+
+// Registered by a callback, which runs outside of plc_app_init.
+TEST(OnlineChangeOfAnInstance, EndsALateRegistrationThatTheNewVersionDoesNotMake) {
+  Online sut("CmpSchedule", application("online_late"));
+  const PoolEvent late = sut.process().event("late");
+  EXPECT_EQ(late.post(), PostResult::no_task);
+  auto changed = sut.change(application("online_late_2"));
+  ASSERT_EQ(changed.code, ErrorCode::ok) << changed.text;
+  EXPECT_EQ(late.post(), PostResult::no_task) << "the new version has registered it, too";
+  changed = sut.change(application("online_2"));
+  ASSERT_EQ(changed.code, ErrorCode::ok) << changed.text;
+  EXPECT_EQ(late.post(), PostResult::not_registered);
 }
 
 TEST(OnlineChangeOfAnInstance, NeedsAnApplication) {

@@ -87,6 +87,40 @@ TEST(Setup, RefusesAComponentThatIsNone) {
   EXPECT_THAT(sut.log(), HasSubstr("load components failed: component: " + sandbox.folder() + "/driver.so"));
 }
 
+/// An application whose plc_app_init returns 0, and which is refused then.
+struct Refused {
+  const char* by;
+  const char* application;
+  const char* settings;
+  const char* reason;
+};
+
+class RefusedFirstLoad : public ::testing::TestWithParam<Refused> {};
+
+TEST_P(RefusedFirstLoad, CallsItsExitOnceWhenTheReasonIsTold) {
+  const Sandbox sandbox;
+  const std::string file = sandbox.write("line1.cfg", GetParam().settings);
+  InstanceProcess sut(sandbox, {"--settings", file, "--application", application(GetParam().application)});
+  EXPECT_EQ(sut.end(), 3);
+  const std::string log = sut.log();
+  const std::size_t reason = log.find(GetParam().reason);
+  const std::size_t exit = log.find("exit of version 1, online 0");
+  ASSERT_NE(reason, std::string::npos) << log;
+  ASSERT_NE(exit, std::string::npos) << log;
+  EXPECT_LT(reason, exit);
+  EXPECT_EQ(log.find("exit of version", exit + 1), std::string::npos) << log;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Each, RefusedFirstLoad,
+    ::testing::Values(Refused{"ItsTasks", "online_options", "", "no task 'Nobody'"},
+                      Refused{"SettingsOfItsTasks", "online_1", "[Task.Nobody]\nLatePolicy=Next\n", "Nobody"},
+                      Refused{"ItsAreas", "online_1",
+                              "[SysMem]\nLinux.Area.0.Flags=0x10\nLinux.Area.0.Device=/"
+                              "nonexistent\nLinux.Area.0.Address=0\nLinux.Area.0.Size=8\n",
+                              "/nonexistent"}),
+    [](const auto& test) { return std::string(test.param.by); });
+
 // The reports as the manager reads them.
 std::vector<SetupReport> reports_of(const Sandbox& sandbox, const std::string& program) {
   std::array<int, 2> ends{};

@@ -141,6 +141,7 @@ class OnlineDeclaration : public ::testing::Test {
     host_.end_init();
     EXPECT_TRUE(host_.reserve(first));
     host_.commit(std::move(first), [](const void*) { return false; });
+    const ApplicationHost::ComponentCode component(host_);
     of_component_ = SchedRegisterExternalEvent("component", nullptr);
     EXPECT_EQ(EventRegisterCallbackFunction(EVT_ExternalEventTaskCreateDone, callback, &calls_component_),
               ERR_OK);
@@ -190,10 +191,12 @@ TEST_F(OnlineDeclaration, OfEventsAndCallbacksHoldsFromTheTakeoverOn) {
   ASSERT_TRUE(host_.reserve(online_));
   EXPECT_TRUE(is_registered(after));
   host_.commit(std::move(online_), [](const void*) { return false; });
+  EXPECT_TRUE(is_registered(before_)) << "a callback of the new version may register it";
+  notify();
+  host_.end_takeover();
   EXPECT_FALSE(is_registered(before_));
   EXPECT_TRUE(is_registered(both_));
   EXPECT_TRUE(is_registered(of_component_));
-  notify();
   EXPECT_EQ(calls_before_, 1) << "of the version before";
   EXPECT_EQ(calls_after_, 1);
   EXPECT_EQ(calls_component_, 2);
@@ -203,6 +206,64 @@ TEST_F(OnlineDeclaration, OfEventsAndCallbacksHoldsFromTheTakeoverOn) {
   EXPECT_EQ(SchedUnregisterExternalEvent(before_), ERR_NO_OBJECT);
   host_.set_online_change(false);
   EXPECT_TRUE(is_registered(both_));
+}
+
+// By callbacks: the one is registered by no later version, the others by its plc_app_init or its callback.
+TEST_F(OnlineDeclaration, EndsEventsThatOnlyTheRunningApplicationHasRegisteredLater) {
+  const RTS_HANDLE gone = SchedRegisterExternalEvent("gone", nullptr);
+  const RTS_HANDLE declared = SchedRegisterExternalEvent("declared", nullptr);
+  const RTS_HANDLE again = SchedRegisterExternalEvent("again", nullptr);
+  host_.begin_init(online_);
+  RTS_RESULT result = ERR_FAILED;
+  EXPECT_EQ(SchedRegisterExternalEvent("declared", &result), declared);
+  EXPECT_EQ(result, ERR_OK);
+  host_.end_init();
+  ASSERT_TRUE(host_.reserve(online_));
+  host_.commit(std::move(online_), [](const void*) { return false; });
+  for (const RTS_HANDLE event : {gone, declared, again}) EXPECT_TRUE(is_registered(event));
+  EXPECT_EQ(SchedRegisterExternalEvent("again", &result), again);
+  EXPECT_EQ(result, ERR_OK);
+  host_.end_takeover();
+  EXPECT_FALSE(is_registered(gone));
+  EXPECT_TRUE(is_registered(declared));
+  EXPECT_TRUE(is_registered(again));
+  host_.set_online_change(true);  // the plc_app_exit of the version before
+  for (const RTS_HANDLE event : {gone, declared, again}) {
+    EXPECT_EQ(SchedUnregisterExternalEvent(event), ERR_NO_OBJECT);
+  }
+  EXPECT_EQ(SchedRegisterExternalEvent("late", &result), RTS_INVALID_HANDLE);
+  EXPECT_EQ(result, ERR_NOTINITIALIZED);
+  host_.set_online_change(false);
+  EXPECT_TRUE(is_registered(again));
+}
+
+TEST_F(OnlineDeclaration, ThatIsNotTakenKeepsEventsThatWereRegisteredLater) {
+  const RTS_HANDLE late = SchedRegisterExternalEvent("late", nullptr);
+  host_.begin_init(online_);
+  EXPECT_EQ(SchedRegisterExternalEvent("late", nullptr), late);
+  host_.end_init();
+  ASSERT_TRUE(host_.reserve(online_));
+  host_.release(online_);
+  EXPECT_TRUE(is_registered(late));
+}
+
+// What a callback of a component registers stays with the component.
+void registers(unsigned /*event*/, const EVTPARAM_ExternalEventTask* /*parameter*/, void* user) {
+  (void)SchedRegisterExternalEvent(static_cast<const char*>(user), nullptr);
+}
+
+TEST_F(OnlineDeclaration, KeepsEventsThatACallbackOfAComponentHasRegistered) {
+  static std::string name = "of_callback";
+  {
+    const ApplicationHost::ComponentCode component(host_);
+    EXPECT_EQ(EventRegisterCallbackFunction(EVT_ExternalEventTaskCreateDone, registers, name.data()), ERR_OK);
+  }
+  notify();
+  const RTS_HANDLE event = SchedRegisterExternalEvent(name.c_str(), nullptr);
+  EXPECT_TRUE(is_registered(event));
+  host_.commit({}, [](const void*) { return false; });
+  host_.end_takeover();
+  EXPECT_TRUE(is_registered(event));
 }
 
 TEST_F(OnlineDeclaration, ThatIsNotTakenLeavesAllAsItWas) {

@@ -95,8 +95,22 @@ __attribute__((noinline, no_sanitize_address, no_sanitize("undefined"))) void fa
   *nowhere = VERSION;
 }
 
+#ifdef LATE_EVENT
+void CDECL register_late(unsigned int, const EVTPARAM_ExternalEventTask*, void*) {
+  (void)SchedRegisterExternalEvent("late", nullptr);
+}
+#endif
+
 void setup(plc::Application& app) {
   INIT;
+#ifdef OPTIONS_OF_NOBODY
+  Task_Options nobody{};
+  nobody.dwSize = sizeof nobody;
+  (void)plc_set_task_options("Nobody", &nobody);
+#endif
+#ifdef LATE_EVENT
+  EventRegisterCallbackFunction(EVT_ExternalEventTaskCreateDone, register_late, nullptr);
+#endif
 #ifdef SLOW_INIT
   const timespec pause{.tv_sec = SLOW_INIT, .tv_nsec = 0};
   ::nanosleep(&pause, nullptr);
