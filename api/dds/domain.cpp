@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <charconv>
+#include <condition_variable>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <mutex>
 #include <set>
 #include <string_view>
@@ -61,16 +63,32 @@ std::string threads_section(int fifo) {
   return section + "</Threads>";
 }
 
-std::mutex& registry_mutex() {
-  static std::mutex mutex;
-  return mutex;
+struct OpenDomain {
+  std::weak_ptr<Entity> users;
+  bool is_there = false;  // also when its last user is gone, until Cyclone has ended it
+};
+
+// The DDS domains of this process.
+struct Registry {
+  std::mutex mutex;
+  std::condition_variable ended;
+  std::map<std::uint32_t, OpenDomain> domains;
+  std::set<std::uint32_t> gated;  // those of secured clients. A host has a gate of its own
+};
+
+// Never destroyed: a client may be a static object, which outlives the others.
+Registry& registry() {
+  static auto* const all = new Registry;  // NOLINT(cppcoreguidelines-owning-memory)
+  return *all;
 }
 
-// Of secured clients. With the registry's mutex. A host has a gate of its own, which knows no release of
-// Cyclone.
-std::set<std::uint32_t>& gated_domains() {
-  static std::set<std::uint32_t> domains;
-  return domains;
+// Cyclone refuses to make a domain that it is still ending.
+void end_domain(std::uint32_t number, std::unique_ptr<Entity> domain) {
+  Registry& all = registry();
+  const std::lock_guard lock(all.mutex);
+  domain.reset();
+  all.domains[number].is_there = false;
+  all.ended.notify_all();
 }
 
 }  // namespace
@@ -144,9 +162,13 @@ bool can_use_fifo(int priority) {
 Result<std::shared_ptr<Entity>> open_domain(Role role, const DomainOptions& options) {
   const auto configuration = domain_configuration(role, options);
   if (!configuration) return std::unexpected(configuration.error());
-  static std::map<std::uint32_t, std::weak_ptr<Entity>> domains;
-  const std::lock_guard lock(registry_mutex());
-  if (auto known = domains[options.domain].lock()) return known;
+  Registry& all = registry();
+  std::unique_lock lock(all.mutex);
+  OpenDomain& opened = all.domains[options.domain];
+  while (opened.is_there) {
+    if (auto known = opened.users.lock()) return known;
+    all.ended.wait(lock);
+  }
   if (!options.identity.empty()) {
     // Cyclone would say why in its log only.
     if (const auto good = security::check_identity(options.identity); !good) {
@@ -157,17 +179,19 @@ Result<std::shared_ptr<Entity>> open_domain(Role role, const DomainOptions& opti
       dds_create_domain(options.domain, configuration->c_str()),
       fmt::format("make DDS domain {} on interface {}", options.domain, fmt::join(options.interfaces, ", ")));
   if (!made) return std::unexpected(made.error());
-  auto domain = std::make_shared<Entity>(std::move(*made));
-  domains[options.domain] = domain;
-  gated_domains().erase(options.domain);
-  if (role == Role::client && !options.identity.empty()) gated_domains().insert(options.domain);
+  const std::shared_ptr<Entity> domain(
+      new Entity(std::move(*made)),  // NOLINT(cppcoreguidelines-owning-memory): for a deleter of its own
+      [number = options.domain](Entity* ended) { end_domain(number, std::unique_ptr<Entity>(ended)); });
+  opened = {.users = domain, .is_there = true};
+  all.gated.erase(options.domain);
+  if (role == Role::client && !options.identity.empty()) all.gated.insert(options.domain);
   return domain;
 }
 
 Result<Entity> make_participant(std::uint32_t domain, const dds_qos_t* qos, std::string_view what) {
-  const std::lock_guard lock(registry_mutex());
+  const std::lock_guard lock(registry().mutex);
   auto made = check_entity(dds_create_participant(domain, qos, nullptr), std::string(what));
-  if (made && gated_domains().contains(domain)) (void)plc_filter_datagrams(made->get(), pass_to_client);
+  if (made && registry().gated.contains(domain)) (void)plc_filter_datagrams(made->get(), pass_to_client);
   return made;
 }
 
