@@ -99,7 +99,7 @@ Result<std::optional<InstanceWish>> WishStore::find() {
   if (remembered) {
     return take_remembered(*std::move(remembered), wish ? std::optional(*std::move(wish)) : std::nullopt);
   }
-  if (memory_ && memory_->damaged()) return take_without_memory(std::move(wish));
+  if (memory_ && memory_->damaged()) return take_without_memory(wish);
   if (!file && file.error().code == ErrorCode::not_found) return std::nullopt;
   if (!wish) {
     return failure(ErrorCode::corrupt, fmt::format("{}: {}", path(), wish.error().describe()));
@@ -110,7 +110,7 @@ Result<std::optional<InstanceWish>> WishStore::find() {
 
 // `kept`: of the disk. It may be older than what another program has written over: a stop that the disk did
 // not take in time.
-Result<std::optional<InstanceWish>> WishStore::take_without_memory(Result<InstanceWish> kept) const {
+Result<std::optional<InstanceWish>> WishStore::take_without_memory(const Result<InstanceWish>& kept) const {
   constexpr std::string_view kWhy = "another program has written over the memory that holds it";
   if (!kept) return failure(ErrorCode::corrupt, std::string(kWhy));
   if (!kept->commanded || kept->running) {

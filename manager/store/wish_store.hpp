@@ -62,7 +62,8 @@ class WishStore : public WishKeeper {
                                               Duration limit) const;
   [[nodiscard]] Result<std::optional<InstanceWish>> take_remembered(InstanceWish remembered,
                                                                     std::optional<InstanceWish> kept);
-  [[nodiscard]] Result<std::optional<InstanceWish>> take_without_memory(Result<InstanceWish> kept) const;
+  [[nodiscard]] Result<std::optional<InstanceWish>> take_without_memory(
+      const Result<InstanceWish>& kept) const;
   void restore_events() const;
   void write();
   void written(const Result<void>& result, const std::string& text);
