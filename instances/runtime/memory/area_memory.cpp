@@ -14,6 +14,7 @@
 #include "shm/base/system_call.hpp"
 #include "shm/files/memory_file.hpp"
 #include "shm/files/pool_files.hpp"
+#include "shm/log/log.hpp"
 
 namespace plchost {
 
@@ -94,6 +95,12 @@ std::optional<FileRange> range_of_device(const AreaSettings& settings) {
   return range_in(status, settings.address, settings.address + settings.size);
 }
 
+MadeInPool::~MadeInPool() {
+  if (pool_ == nullptr) return;
+  const auto removed = pool_->remove_object(name_);
+  if (!removed) spdlog::warn("shared memory '{}' stays in the pool: {}", name_, removed.error().describe());
+}
+
 Result<void> AreaMemory::check_device(const AreaSettings& settings) {
   struct stat status{};
   const bool there = ::stat(settings.device.c_str(), &status) == 0 &&
@@ -155,6 +162,7 @@ Result<AreaMemory> AreaMemory::of_pool(ObjectPool& pool, const std::string& name
   if (!created) return std::unexpected(std::move(created).error());
   AreaMemory memory;
   memory.existed_ = !created->made;
+  if (created->made) memory.made_ = MadeInPool(pool, name);
   memory.shared_ = std::move(created->object);
   memory.bytes_ = memory.shared_.bytes();
   if (!memory.shared_.guarded()) {

@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 
 #include <sys/types.h>
 
@@ -35,6 +36,28 @@ struct FileRange {
 /// Of the device or file of these settings. Nothing: there is none. Set-up.
 [[nodiscard]] std::optional<FileRange> range_of_device(const AreaSettings& settings);
 
+/// A memory that a start has made in the pool. It is removed again unless the start keeps it: one that fails
+/// midway leaves nothing. Set-up.
+class MadeInPool {
+ public:
+  MadeInPool() noexcept = default;
+  /// `pool` outlives it, or the call of keep().
+  MadeInPool(ObjectPool& pool, std::string name) noexcept : pool_(&pool), name_(std::move(name)) {}
+  MadeInPool(MadeInPool&& other) noexcept
+      : pool_(std::exchange(other.pool_, nullptr)), name_(std::move(other.name_)) {}
+  MadeInPool& operator=(MadeInPool&& other) noexcept {
+    std::swap(pool_, other.pool_);
+    std::swap(name_, other.name_);
+    return *this;
+  }
+  ~MadeInPool();
+  void keep() noexcept { pool_ = nullptr; }
+
+ private:
+  ObjectPool* pool_ = nullptr;  ///< null: nothing was made, or it is kept
+  std::string name_;
+};
+
 /// The memory behind one block of areas, mapped, locked and touched, so that no cycle has a page fault. If
 /// others cut its file short, it is zeros from then on.
 class AreaMemory {
@@ -61,12 +84,17 @@ class AreaMemory {
   [[nodiscard]] bool lost() const noexcept { return mapping_.lost() || shared_.lost(); }
   /// It was there already, with what others have written: a device always was.
   [[nodiscard]] bool existed() const noexcept { return existed_; }
+  /// It stays in the pool when this object goes. Until then a memory that of_pool() has made goes with it.
+  void keep() noexcept { made_.keep(); }
+  /// Such a memory goes from the pool with the last process that has it. It stays mapped here.
+  void take_back() { made_ = MadeInPool(); }
 
  private:
   GuardedMapping mapping_;  // whole pages; empty: shared_ holds it
   std::span<std::byte> bytes_;
   SharedMemory shared_;
   UniqueFd lock_;
+  MadeInPool made_;
   bool existed_ = false;
 };
 

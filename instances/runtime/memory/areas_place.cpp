@@ -163,19 +163,35 @@ Result<std::string> Areas::place(const Environment& environment, std::vector<Dec
   plan_ = *std::move(plan);
   cycles_.resize(tasks.size());
   plain_.resize(declared_.size(), nullptr);
-  if (auto made = make_blocks(environment); !made) return std::unexpected(made.error());
+  // What can fail comes before anything is written that others see.
+  auto made = make_blocks(environment);
+  if (made) made = make_keeper(environment);
+  if (!made) {
+    blocks_.clear();  // with all that they have made in the pool
+    return std::unexpected(std::move(made).error());
+  }
   for (std::size_t i = 0; i < blocks_.size(); ++i) {
     if (first_of(plan_.blocks[i]).has_image()) make_image(blocks_[i], plan_.blocks[i]);
   }
-  if (auto made = make_keeper(environment); !made) return std::unexpected(made.error());
   tell_plain_addresses();
   for (std::size_t block = 0; block < plan_.blocks.size(); ++block) make_views(block);
   count_cycles(tasks);
   wrap(tasks);
+  if (keeper_) {
+    if (auto started = keeper_->start(); !started) {
+      take_back();
+      return std::unexpected(std::move(started).error());
+    }
+  }
+  for (Block& block : blocks_) block.memory.keep();
   placed_ = true;
-  if (!keeper_) return std::string();
-  if (auto started = keeper_->start(); !started) return std::unexpected(started.error());
-  return fmt::format("{}", fmt::join(keeper_->remarks(), "; "));
+  return keeper_ ? fmt::format("{}", fmt::join(keeper_->remarks(), "; ")) : std::string();
+}
+
+// The memories that were made go from the pool with this process: the application has their addresses.
+void Areas::take_back() {
+  for (Block& block : blocks_) block.memory.take_back();
+  keeper_->take_back();
 }
 
 Result<void> Areas::make_blocks(const Environment& environment) {

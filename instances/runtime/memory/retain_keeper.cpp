@@ -37,6 +37,8 @@ struct RetainKeeper::Start {
   std::optional<RetainFiles> files;
   std::optional<RetainImage> source;  // the values to go on with
   Origin origin = PLC_AREA_INITIAL;   // of those
+  bool fresh = false;                 // no process before has left a memory
+  bool aside = false;                 // the files are of another layout
   std::uint64_t generation = 0;       // the highest that was used
   std::vector<std::byte> written;     // the contents of the newest file
   RetainImage image;                  // the wanted contents of the memory
@@ -61,7 +63,8 @@ struct RetainKeeper::Start {
   void find_source(const std::string& pool, const std::string& name, RetainFiles::Found found) {
     auto left = pool.empty() ? Result<KeptMemory::Left>(failure(ErrorCode::not_found, name))
                              : KeptMemory::left_behind(pool, name);
-    if (!left && left.error().code != ErrorCode::not_found) {
+    fresh = !left && left.error().code == ErrorCode::not_found;
+    if (!left && !fresh) {
       remarks.push_back(fmt::format("the retain memory that the process before has left is not used: {}",
                                     left.error().describe()));
     }
@@ -96,7 +99,7 @@ struct RetainKeeper::Start {
                            "the files");
       case RetainMismatch::initialise:
         remarks.push_back(why + ": all begin with their initial values; the files are put aside as .old");
-        if (files) files->put_aside();
+        aside = true;
         source.reset();
         break;
       case RetainMismatch::ignore:
@@ -155,22 +158,30 @@ Result<std::unique_ptr<RetainKeeper>> RetainKeeper::make(ObjectPool& pool, const
   // The left-over may be a file without an object: then its values go on in a new one.
   if (!memory) memory = KeptMemory::make(pool, name, start.image);
   if (!memory) return std::unexpected(std::move(memory).error());
-  return std::unique_ptr<RetainKeeper>(new RetainKeeper(*std::move(memory), std::move(start), options));
+  MadeInPool made = start.fresh ? MadeInPool(pool, name) : MadeInPool();
+  if (start.aside && start.files) start.files->put_aside();
+  return std::unique_ptr<RetainKeeper>(
+      new RetainKeeper(*std::move(memory), std::move(made), std::move(start), options));
 }
 
 Result<void> RetainKeeper::start() {
-  if (!files_) return {};
+  if (!files_) {
+    made_.keep();
+    return {};
+  }
   // The decision for this start holds also if the power is cut before the first cycle. If the disk refuses
   // it, the machine runs all the same.
   save();
   auto thread = Thread::start("retain", {}, [this] { run(); });
   if (!thread) return std::unexpected(std::move(thread).error());
   thread_ = *std::move(thread);
+  made_.keep();
   return {};
 }
 
-RetainKeeper::RetainKeeper(KeptMemory memory, Start start, const Options& options)
+RetainKeeper::RetainKeeper(KeptMemory memory, MadeInPool made, Start start, const Options& options)
     : memory_(std::move(memory)),
+      made_(std::move(made)),
       files_(std::move(start.files)),
       origins_(std::move(start.origins)),
       remarks_(std::move(start.remarks)),

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "instances/runtime/memory/area_memory.hpp"
 #include "instances/runtime/memory/kept_memory.hpp"
 #include "instances/runtime/memory/retain_files.hpp"
 #include "instances/runtime/settings/settings.hpp"
@@ -49,8 +50,11 @@ class RetainKeeper {
   RetainKeeper& operator=(const RetainKeeper&) = delete;
 
   [[nodiscard]] KeptMemory& memory() noexcept { return memory_; }
-  /// Begins to write: until then the memory can be arranged. Set-up, once.
+  /// Begins to write: until then the memory can be arranged. From then on a memory that make() has made
+  /// stays in the pool; without it, one in the place of no other goes with this object. Set-up, once.
   [[nodiscard]] Result<void> start();
+  /// Such a memory goes from the pool with the last process that has it. It stays mapped here.
+  void take_back() { made_ = MadeInPool(); }
   [[nodiscard]] Origin origin(std::size_t area) const noexcept { return origins_[area]; }
   /// The text about the start.
   [[nodiscard]] const std::vector<std::string>& remarks() const noexcept { return remarks_; }
@@ -67,7 +71,7 @@ class RetainKeeper {
 
  private:
   struct Start;
-  RetainKeeper(KeptMemory memory, Start start, const Options& options);
+  RetainKeeper(KeptMemory memory, MadeInPool made, Start start, const Options& options);
   void run();
   void save();
   /// Whether the memory is lost, which is told.
@@ -90,6 +94,7 @@ class RetainKeeper {
   void count_unsaved() noexcept;
 
   KeptMemory memory_;
+  MadeInPool made_;
   std::optional<RetainFiles> files_;
   std::vector<Origin> origins_;
   std::vector<std::string> remarks_;

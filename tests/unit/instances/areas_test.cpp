@@ -11,12 +11,16 @@
 #include <string>
 #include <thread>
 
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
 
+#include "shm/base/unique_fd.hpp"
 #include "shm/files/memory_file.hpp"
 #include "shm/files/pool_files.hpp"
+#include "shm/plc_process_image.h"
 #include "tests/support/own_name.hpp"
 #include "tests/support/whole_cycle.hpp"
 
@@ -85,6 +89,40 @@ class AreasUnderTest : public ::testing::Test {
   std::vector<TaskConfig> tasks;
   RTS_RESULT result = ERR_OK;
 };
+
+// The writer of an output, or another object of the retain memory's name, is not looked for before.
+TEST_F(AreasUnderTest, ThatCannotBePlacedLeaveThePoolAsItWas) {
+  const auto taken = shared_.create_memory("taken", plc_image_bytes(8), {.keep = true});
+  ASSERT_TRUE(taken);
+  const UniqueFd writer(
+      ::open(MemoryFile::path(pool_memory_name(pool_, "taken")).c_str(), O_RDONLY | O_CLOEXEC));
+  ASSERT_EQ(::flock(writer.get(), LOCK_EX | LOCK_NB), 0);
+  task("Main", [] {});
+  declare("data", PLC_AREA_MEMORY, 8);
+  declare("out", PLC_AREA_OUTPUT, 8, {{"Main", 0, 8, nullptr}});
+  const auto placed = place(
+      "[SysMem]\nLinux.Area.0.Flags=0x10\nLinux.Area.0.Object=fresh\nLinux.Area.0.Size=8\n"
+      "Linux.Area.1.Flags=0x08\nLinux.Area.1.Object=taken\nLinux.Area.1.Size=8\n");
+  ASSERT_FALSE(placed);
+  EXPECT_THAT(placed.error().message, HasSubstr("has a writer already"));
+  EXPECT_EQ(shared_.look_at("fresh").error().code, ErrorCode::not_found);
+  EXPECT_FALSE(std::filesystem::exists(MemoryFile::path(pool_memory_name(pool_, "fresh"))));
+  EXPECT_TRUE(shared_.look_at("taken")) << "it was there before";
+}
+
+TEST_F(AreasUnderTest, WhoseRetainMemoryHasNoPlaceLeaveThePoolAsItWas) {
+  const auto other = shared_.create_semaphore("line1.retain", 1);
+  ASSERT_TRUE(other);
+  task("Main", [] {});
+  declare("data", PLC_AREA_MEMORY, 8);
+  declare("kept", PLC_AREA_RETAIN, 8);
+  const auto placed =
+      place("[SysMem]\nLinux.Area.0.Flags=0x10\nLinux.Area.0.Object=fresh\nLinux.Area.0.Size=8\n");
+  ASSERT_FALSE(placed) << *placed;
+  EXPECT_EQ(placed.error().code, ErrorCode::wrong_type);
+  EXPECT_EQ(shared_.look_at("fresh").error().code, ErrorCode::not_found);
+  EXPECT_EQ(shared_.look_at("line1.retain")->type, ObjectType::semaphore);
+}
 
 TEST_F(AreasUnderTest, LeavesATaskThatUsesNoneAsItIs) {
   struct Entry {
