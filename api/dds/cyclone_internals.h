@@ -23,6 +23,12 @@
 #include <dds/ddsi/q_rtps.h>
 #include <dds/ddsi/q_thread.h>
 #include <dds/ddsi/q_whc.h>
+// The headers below would include one of iceoryx, which Cyclone's package does not bring.
+#undef DDS_HAS_SHM
+#include <dds/ddsi/ddsi_participant.h>
+#include <dds/ddsi/ddsi_security_omg.h>
+#include <dds/security/core/dds_security_utils.h>
+#include <dds/security/dds_security_api_authentication.h>
 // clang-format on
 
 // Where what is used lies in the releases that are known. Headers that were patched, or configured otherwise,
@@ -44,6 +50,8 @@ PLC_LIES_AT(struct ddsi_domaingv, as_disc, 2008, 8);
 PLC_LIES_AT(struct ddsi_domaingv, sedp_writer_type, 6968, 8);
 PLC_LIES_AT(struct ddsi_domaingv, sedp_writer_secure_type, 7024, 8);
 PLC_LIES_AT(struct ddsi_proxy_participant, as_meta, 264, 8);
+PLC_LIES_AT(struct ddsi_participant, sec_attr, 352, 8);
+PLC_LIES_AT(struct participant_sec_attributes, local_identity_handle, 80, 8);
 PLC_LIES_AT(struct ddsi_tkmap_instance, m_refc, 16, 4);
 PLC_LIES_AT(struct ddsi_writer, e.lock, 48, 40);
 PLC_LIES_AT(struct ddsi_writer, seq, 272, 8);

@@ -17,9 +17,10 @@
 #include <sys/ioctl.h>
 #include <sys/socket.h>
 
+#include "api/dds/client_gate.hpp"
 #include "api/dds/datagram_filter.h"
 #include "api/dds/error.hpp"
-#include "api/dds/gate/client_gate.hpp"
+#include "api/dds/handshakes.h"
 #include "api/dds/security_section.hpp"
 #include "api/security/identity.hpp"
 #include "shm/base/thread.hpp"
@@ -128,7 +129,7 @@ Result<std::string> domain_configuration(Role role, const DomainOptions& options
   // A client's writer keeps what a killed server has not confirmed until that one's lease ends, or until its
   // successor shows its presence (plc_forget_participant()). One that posts fast is full within 0.1 s and
   // blocks until then. A secured host keeps the longer lease: when its process stands still and its clients
-  // drop it, the host still knows them, and may not authenticate them again.
+  // drop it, the host still knows them, and both need some 5 s to meet again.
   const std::string_view lease = role == Role::server && options.identity.empty() ? "500 ms" : "3 s";
   // Without multicast the announcement of a new server reaches no client, because clients have no known port.
   // The server finds each client by the client's next announcement.
@@ -191,6 +192,7 @@ Result<std::shared_ptr<Entity>> open_domain(Role role, const DomainOptions& opti
 Result<Entity> make_participant(std::uint32_t domain, const dds_qos_t* qos, std::string_view what) {
   const std::lock_guard lock(registry().mutex);
   auto made = check_entity(dds_create_participant(domain, qos, nullptr), std::string(what));
+  if (made) (void)plc_watch_handshakes(made->get());
   if (made && registry().gated.contains(domain)) (void)plc_filter_datagrams(made->get(), pass_to_client);
   return made;
 }

@@ -5,6 +5,7 @@
 #include "api/dds/cyclone_version.h"
 #include "api/dds/datagram_filter.h"
 #include "api/dds/ended_participant.h"
+#include "api/dds/handshakes.h"
 #include "api/dds/instance_pin.h"
 #include "api/dds/secured_announcement.h"
 #include "api/dds/told_keys.h"
@@ -76,5 +77,20 @@ bool plc_announce_secured(dds_entity_t participant) {
 bool plc_filter_datagrams(dds_entity_t participant, plc_DatagramFilter filter) {
   (void)participant;
   (void)filter;
+  return false;
+}
+
+bool plc_watch_handshakes(dds_entity_t participant) {
+  (void)participant;
+  return false;
+}
+
+bool plc_take_sign(const plc_HandshakeSign* sign) {
+  (void)sign;
+  return true;
+}
+
+bool plc_is_doubted(const unsigned char* from) {
+  (void)from;
   return false;
 }

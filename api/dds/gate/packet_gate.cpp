@@ -14,9 +14,6 @@ namespace {
 
 using namespace submessage_kind;
 
-// A vendor's own submessages are skipped by all others.
-constexpr std::uint8_t kVendors = 0x80;
-
 // A sample of one of the two writers that speak in plain text: fields as all vendors lay them out, then what
 // it says.
 bool is_well_formed_sample(const Submessage& sample) noexcept {
@@ -143,19 +140,6 @@ bool admit_submessage(std::span<std::byte> bytes, bool secured,
   return secured ? is_said_before_keys(kind) : is_said_without_security(kind);
 }
 
-void begin_submessage(std::span<std::byte> bytes, std::uint8_t kind, bool little) noexcept {
-  bytes[0] = std::byte{kind};
-  bytes[1] = std::byte{little ? kLittleEndian : std::uint8_t{0}};
-  put_number(bytes, 2, static_cast<std::uint16_t>(bytes.size() - kSubmessageHeader), little);
-}
-
-// False: it is too large for that. The length is written anew, because 0 would mean that padding ends here.
-bool turn_into_padding(std::span<std::byte> bytes) noexcept {
-  if (bytes.size() - kSubmessageHeader > std::numeric_limits<std::uint16_t>::max()) return false;
-  begin_submessage(bytes, kPad, true);
-  return true;
-}
-
 // The samples that clients of a secured host send to it in plain text, too, though it must not believe them.
 // Cyclone 0.10.2 sends liveliness so under any governance. It also sends so the end of a reader or writer, of
 // which it has forgotten that it was protected.
@@ -188,11 +172,6 @@ bool turn_into_gap(std::span<std::byte> bytes) noexcept {
   put_number(bytes, kFirstNumber + 16, std::uint32_t{0}, little);
   begin_submessage(bytes.first(kGapSize), kGap, little);
   return true;
-}
-
-// Says nothing by itself.
-bool is_frame(std::uint8_t kind) noexcept {
-  return kind == kPad || kind == kInfoTimestamp || kind == kInfoDestination || kind >= kVendors;
 }
 
 }  // namespace

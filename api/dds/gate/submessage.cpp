@@ -1,5 +1,7 @@
 #include "api/dds/gate/submessage.hpp"
 
+#include <limits>
+
 namespace plchost::dds {
 
 namespace {
@@ -30,6 +32,24 @@ std::optional<Submessage> first_submessage(std::span<const std::byte> rest) noex
   const std::size_t size = to_end ? rest.size() : kSubmessageHeader + length;
   if (size > rest.size() || size % 4 != 0) return std::nullopt;
   return Submessage{rest.first(size)};
+}
+
+bool is_frame(std::uint8_t kind) noexcept {
+  using namespace submessage_kind;
+  return kind == kPad || kind == kInfoTimestamp || kind == kInfoDestination || kind >= kVendors;
+}
+
+void begin_submessage(std::span<std::byte> bytes, std::uint8_t kind, bool little) noexcept {
+  bytes[0] = std::byte{kind};
+  bytes[1] = std::byte{little ? kLittleEndian : std::uint8_t{0}};
+  put_number(bytes, 2, static_cast<std::uint16_t>(bytes.size() - kSubmessageHeader), little);
+}
+
+// The length is written anew, because 0 would mean that padding ends here.
+bool turn_into_padding(std::span<std::byte> bytes) noexcept {
+  if (bytes.size() - kSubmessageHeader > std::numeric_limits<std::uint16_t>::max()) return false;
+  begin_submessage(bytes, submessage_kind::kPad, true);
+  return true;
 }
 
 std::size_t fields_of_sample(const Submessage& sample) noexcept {

@@ -30,6 +30,7 @@ inline constexpr std::uint8_t kSecuredBody = 0x30;
 inline constexpr std::uint8_t kSecuredPrefix = 0x31;
 inline constexpr std::uint8_t kSecuredPostfix = 0x32;
 inline constexpr std::uint8_t kSecuredMessagePrefix = 0x33;
+inline constexpr std::uint8_t kVendors = 0x80;  ///< from here on: a vendor's own, which all others skip
 }  // namespace submessage_kind
 
 inline constexpr std::uint8_t kLittleEndian = 0x01;
@@ -125,6 +126,15 @@ template <class Predicate>
   }
   return true;
 }
+
+/// Whether a submessage of this kind says nothing by itself.
+[[nodiscard]] bool is_frame(std::uint8_t kind) noexcept;
+
+/// Writes the header of a submessage that has all of `bytes`.
+void begin_submessage(std::span<std::byte> bytes, std::uint8_t kind, bool little) noexcept;
+
+/// Makes a submessage one that says nothing, of the same size. False: it is too large for that.
+[[nodiscard]] bool turn_into_padding(std::span<std::byte> bytes) noexcept;
 
 /// Where the inline QoS of a sample begins, or its contents if it has none. Zero: its fields are not where
 /// all vendors put them.

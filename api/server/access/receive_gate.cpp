@@ -10,7 +10,9 @@
 
 #include "api/dds/gate/handshake_assembly.hpp"
 #include "api/dds/gate/packet_gate.hpp"
+#include "api/dds/gate/renewal_gate.hpp"
 #include "api/dds/gate/source_table.hpp"
+#include "api/dds/handshake_record.hpp"
 #include "shm/base/time.hpp"
 
 namespace plchost {
@@ -60,7 +62,7 @@ std::size_t let_pass(std::span<std::byte> buffer, std::size_t size, bool secured
   }
   if (!secured) return size;
   static dds::HandshakeAssembly assembly;
-  return assembly.rewrite(buffer, size);
+  return dds::take_out_doubted(buffer.first(assembly.rewrite(buffer, size)), dds::own_record());
 }
 
 }  // namespace

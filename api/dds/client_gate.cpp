@@ -1,10 +1,12 @@
-#include "api/dds/gate/client_gate.hpp"
+#include "api/dds/client_gate.hpp"
 
 #include <mutex>
 #include <span>
 
 #include "api/dds/gate/handshake_assembly.hpp"
 #include "api/dds/gate/packet_gate.hpp"
+#include "api/dds/gate/renewal_gate.hpp"
+#include "api/dds/handshake_record.hpp"
 
 namespace plchost::dds {
 
@@ -15,7 +17,7 @@ extern "C" std::size_t pass_to_client(unsigned char* buffer, std::size_t size, s
   const std::span whole(reinterpret_cast<std::byte*>(buffer), capacity);
   const std::lock_guard lock(mutex);
   if (admit(whole.first(size), true) == Admission::refused) return 0;
-  return assembly.rewrite(whole, size);
+  return take_out_doubted(whole.first(assembly.rewrite(whole, size)), own_record());
 }
 
 }  // namespace plchost::dds

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "api/dds/gate/submessage.hpp"
+
+namespace plchost::dds {
+
+inline constexpr std::size_t kChallenge = 32;
+
+/// The sign of a sender in a message of a handshake.
+struct HandshakeSign {
+  std::span<const std::byte, kGuidPrefix> to;        ///< the participant that it is for
+  std::span<const std::byte, kChallenge> challenge;  ///< the sender's own
+  std::span<const std::byte> answered;               ///< the challenge that it answers; empty: none
+};
+
+/// `contents`: of a sample of the handshake's writer, with their encapsulation. Nothing: it has not the
+/// challenges of its class.
+[[nodiscard]] std::optional<HandshakeSign> read_handshake_sign(std::span<const std::byte> contents) noexcept;
+
+/// The knowledge of the participants that send, each by its GUID prefix.
+struct HandshakeRecord {
+  /// Takes a message of a handshake into account. False: it is of no use.
+  bool (*take)(std::span<const std::byte> from, const HandshakeSign& sign);
+  /// Whether plain messages of the participant are worth nothing now.
+  bool (*is_doubted)(std::span<const std::byte> from);
+};
+
+/// Tells `record` the challenges in a datagram, which admit() and HandshakeAssembly have passed, and takes
+/// out in place what participants that are doubted say in plain text. Returns the size that it has now; 0:
+/// nothing is left to be said.
+[[nodiscard]] std::size_t take_out_doubted(std::span<std::byte> datagram,
+                                           const HandshakeRecord& record) noexcept;
+
+}  // namespace plchost::dds

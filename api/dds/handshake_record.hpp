@@ -1,0 +1,28 @@
+#pragma once
+
+#include "api/dds/gate/renewal_gate.hpp"
+#include "api/dds/handshakes.h"
+
+namespace plchost::dds {
+
+static_assert(kGuidPrefix == PLC_GUID_PREFIX && kChallenge == PLC_CHALLENGE);
+
+/// The knowledge that this process has of the participants that send, for take_out_doubted(). Any thread.
+[[nodiscard]] inline HandshakeRecord own_record() noexcept {
+  const auto take = [](std::span<const std::byte> from, const HandshakeSign& sign) {
+    const auto octets = [](std::span<const std::byte> bytes) {
+      return reinterpret_cast<const unsigned char*>(bytes.data());
+    };
+    const plc_HandshakeSign told{.from = octets(from),
+                                 .to = octets(sign.to),
+                                 .challenge = octets(sign.challenge),
+                                 .answered = sign.answered.empty() ? nullptr : octets(sign.answered)};
+    return plc_take_sign(&told);
+  };
+  const auto is_doubted = [](std::span<const std::byte> from) {
+    return plc_is_doubted(reinterpret_cast<const unsigned char*>(from.data()));
+  };
+  return {.take = take, .is_doubted = is_doubted};
+}
+
+}  // namespace plchost::dds

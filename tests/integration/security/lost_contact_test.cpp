@@ -1,0 +1,113 @@
+// A secured client and its host that lose each other at different times: one drops the other, which still
+// hears announcements. They must meet again.
+#include <chrono>
+#include <limits>
+#include <string>
+#include <thread>
+
+#include <gmock/gmock.h>
+
+#include "tests/integration/security/secured_host.hpp"
+#include "tests/integration/security/wire.hpp"
+
+namespace plchost {
+namespace {
+
+// Longer than the lease of either side.
+constexpr auto kLeaseEnds = std::chrono::milliseconds(4500);
+// They need two leases and two seconds, a loaded machine more.
+constexpr auto kMeetAgain = std::chrono::seconds(60);
+
+class LostContact : public SecuredHost {
+ protected:
+  [[nodiscard]] static testing::AssertionResult can_post(ControlClient& client, Duration patience) {
+    const auto posted = client.post_event({"cell", 0, "line1", "ready"}, 1, {}, patience);
+    if (posted) return testing::AssertionSuccess();
+    return testing::AssertionFailure() << posted.error().describe();
+  }
+  /// A client whose handshake waits for its last message.
+  [[nodiscard]] std::unique_ptr<ControlClient> make_client_without_last_message() {
+    wire_.lose_last_messages(std::numeric_limits<int>::max());
+    auto client = make_client();
+    EXPECT_TRUE(wire_.await_last_message(kPatience));
+    return client;
+  }
+
+  Wire wire_;
+};
+
+TEST_F(LostContact, AClientThatHasDroppedItsHostMeetsItAgain) {
+  start();
+  const auto client = make_client();
+  ASSERT_TRUE(can_post(*client, kPatience));
+  Wire::make_deaf(kLeaseEnds);
+  EXPECT_TRUE(can_post(*client, kMeetAgain));
+  EXPECT_GE(wire_.last_messages(), 2) << "the client has not dropped its host";
+}
+
+TEST_F(LostContact, AClientThatItsHostHasDroppedMeetsItAgain) {
+  start();
+  const auto client = make_client();
+  ASSERT_TRUE(can_post(*client, kPatience));
+  Wire::make_mute(kLeaseEnds);
+  EXPECT_TRUE(can_post(*client, kMeetAgain));
+  EXPECT_GE(wire_.last_messages(), 2) << "the host has not dropped its client";
+}
+
+TEST_F(LostContact, AClientThatDropsItsHostWithinTheHandshakeMeetsItAgain) {
+  start();
+  const auto client = make_client_without_last_message();
+  Wire::make_deaf(kLeaseEnds);
+  wire_.lose_last_messages(0);
+  EXPECT_TRUE(can_post(*client, kMeetAgain));
+}
+
+TEST_F(LostContact, AClientThatItsHostDropsWithinTheHandshakeMeetsItAgain) {
+  start();
+  const auto client = make_client_without_last_message();
+  Wire::make_mute(kLeaseEnds);
+  wire_.lose_last_messages(0);
+  EXPECT_TRUE(can_post(*client, kMeetAgain));
+}
+
+TEST_F(LostContact, BothThatDropEachOtherOneAfterTheOtherMeetAgain) {
+  start();
+  const auto client = make_client_without_last_message();
+  Wire::make_mute(kLeaseEnds);
+  Wire::make_deaf(kLeaseEnds);
+  wire_.lose_last_messages(0);
+  EXPECT_TRUE(can_post(*client, kMeetAgain));
+}
+
+// A request for authentication with another challenge, as the sender would send it that begins anew.
+std::string with_other_challenge(std::string datagram) {
+  constexpr std::string_view kName("future_challenge\0", 17);
+  const std::size_t name = datagram.find(kName);
+  if (name == std::string::npos) return {};
+  const std::size_t value = (name + kName.size() + 3) / 4 * 4 + sizeof(std::uint32_t);
+  datagram.at(value) = static_cast<char>(datagram.at(value) ^ 1);
+  return datagram;
+}
+
+// Such a message is in plain text, so anybody can send it. Protected messages renew the leases beside it.
+TEST_F(LostContact, AStrangerWhoSaysThatOneBeginsAnewSeparatesNobody) {
+  start();
+  const auto client = make_client();
+  ASSERT_TRUE(can_post(*client, kPatience));
+  const auto to_host = wire_.sent_request();
+  const std::string anew_to_host = with_other_challenge(to_host.datagram);
+  const std::string anew_to_client = with_other_challenge(wire_.received_request().datagram);
+  ASSERT_FALSE(anew_to_host.empty());
+  ASSERT_FALSE(anew_to_client.empty());
+  const int handshakes = wire_.last_messages();
+  for (const auto end = MonotonicClock::now() + kLeaseEnds; MonotonicClock::now() < end;) {
+    send_to({to_host.port}, anew_to_host);
+    send_to(own_udp_ports(), anew_to_client);
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
+  EXPECT_TRUE(can_post(*client, kPatience));
+  EXPECT_EQ(wire_.last_messages(), handshakes);
+}
+
+}  // namespace
+}  // namespace plchost

@@ -1,0 +1,205 @@
+#include "tests/integration/security/wire.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <cstddef>
+#include <filesystem>
+#include <mutex>
+#include <string_view>
+#include <thread>
+
+#include <arpa/inet.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include "api/dds/gate/submessage.hpp"
+#include "shm/base/unique_fd.hpp"
+
+namespace plchost {
+
+namespace {
+
+struct State {
+  std::mutex mutex;
+  bool is_watched = false;
+  int lost = 0;
+  int last_messages = 0;
+  TimePoint deaf_until{};
+  TimePoint mute_until{};
+  std::string host;
+  Wire::Message received_request;
+  Wire::Message sent_request;
+};
+
+State& state() {
+  static State state;
+  return state;
+}
+
+constexpr std::string_view kRequest("+AuthReq\0", 9);
+constexpr std::string_view kLastMessage("PKI-DH:1.0+Final");
+
+bool has(std::string_view datagram, std::string_view text) {
+  return datagram.find(text) != std::string_view::npos;
+}
+
+// Whether the datagram is dropped.
+bool is_lost_coming(std::string_view datagram) {
+  State& wire = state();
+  const std::lock_guard lock(wire.mutex);
+  if (!wire.is_watched) return false;
+  if (MonotonicClock::now() < wire.deaf_until) return true;
+  if (has(datagram, kRequest)) wire.received_request = {.datagram = std::string(datagram), .port = 0};
+  if (!has(datagram, kLastMessage)) return false;
+  ++wire.last_messages;
+  wire.host = datagram.substr(dds::kGuidPrefixAt, dds::kGuidPrefix);
+  if (wire.lost == 0) return false;
+  --wire.lost;
+  return true;
+}
+
+bool is_lost_going(std::string_view datagram, std::uint16_t port) {
+  State& wire = state();
+  const std::lock_guard lock(wire.mutex);
+  if (!wire.is_watched) return false;
+  if (MonotonicClock::now() < wire.mute_until) return true;
+  if (has(datagram, kRequest)) wire.sent_request = {.datagram = std::string(datagram), .port = port};
+  return false;
+}
+
+std::string joined(const msghdr& message) {
+  std::string datagram;
+  for (std::size_t i = 0; i < message.msg_iovlen; ++i) {
+    const iovec& part = message.msg_iov[i];
+    datagram.append(static_cast<const char*>(part.iov_base), part.iov_len);
+  }
+  return datagram;
+}
+
+}  // namespace
+
+Wire::Wire() {
+  State& wire = state();
+  const std::lock_guard lock(wire.mutex);
+  wire.is_watched = true;
+  wire.lost = 0;
+  wire.last_messages = 0;
+  wire.deaf_until = {};
+  wire.mute_until = {};
+  wire.host.clear();
+}
+
+Wire::~Wire() {
+  const std::lock_guard lock(state().mutex);
+  state().is_watched = false;
+}
+
+void Wire::lose_last_messages(int count) {
+  const std::lock_guard lock(state().mutex);
+  state().lost = count;
+}
+
+int Wire::last_messages() const {
+  const std::lock_guard lock(state().mutex);
+  return state().last_messages;
+}
+
+bool Wire::await_last_message(Duration patience) const {
+  const int before = last_messages();
+  for (const auto end = MonotonicClock::now() + patience; MonotonicClock::now() < end;) {
+    if (last_messages() > before) return true;
+    std::this_thread::sleep_for(std::chrono::milliseconds(5));
+  }
+  return false;
+}
+
+void Wire::make_deaf(Duration time) {
+  {
+    const std::lock_guard lock(state().mutex);
+    state().deaf_until = MonotonicClock::now() + time;
+  }
+  std::this_thread::sleep_for(time);
+}
+
+void Wire::make_mute(Duration time) {
+  {
+    const std::lock_guard lock(state().mutex);
+    state().mute_until = MonotonicClock::now() + time;
+  }
+  std::this_thread::sleep_for(time);
+}
+
+std::string Wire::host() const {
+  const std::lock_guard lock(state().mutex);
+  return state().host;
+}
+
+Wire::Message Wire::received_request() const {
+  const std::lock_guard lock(state().mutex);
+  return state().received_request;
+}
+
+Wire::Message Wire::sent_request() const {
+  const std::lock_guard lock(state().mutex);
+  return state().sent_request;
+}
+
+std::vector<std::uint16_t> own_udp_ports() {
+  std::vector<std::uint16_t> ports;
+  for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
+    const std::string name = entry.path().filename();
+    int fd = -1;
+    std::from_chars(name.data(), name.data() + name.size(), fd);
+    int type = 0;
+    socklen_t size = sizeof type;
+    if (::getsockopt(fd, SOL_SOCKET, SO_TYPE, &type, &size) != 0 || type != SOCK_DGRAM) continue;
+    sockaddr_in address{};
+    size = sizeof address;
+    if (::getsockname(fd, reinterpret_cast<sockaddr*>(&address), &size) != 0) continue;
+    if (address.sin_family == AF_INET && address.sin_port != 0) ports.push_back(ntohs(address.sin_port));
+  }
+  return ports;
+}
+
+void send_to(const std::vector<std::uint16_t>& ports, const std::string& datagram) {
+  ASSERT_FALSE(ports.empty());
+  const UniqueFd stranger(::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0));
+  for (const std::uint16_t port : ports) {
+    sockaddr_in to{};
+    to.sin_family = AF_INET;
+    to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    to.sin_port = htons(port);
+    ASSERT_EQ(::sendto(stranger.get(), datagram.data(), datagram.size(), 0, reinterpret_cast<sockaddr*>(&to),
+                       sizeof to),
+              static_cast<ssize_t>(datagram.size()));
+  }
+}
+
+}  // namespace plchost
+
+// These two in front of the C library's, also for Cyclone.
+extern "C" __attribute__((visibility("default"))) ssize_t recvmsg(int socket, msghdr* message, int flags) {
+  const ssize_t got = ::syscall(SYS_recvmsg, socket, message, flags);
+  if (got <= 0 || message->msg_iovlen != 1) return got;
+  const std::size_t size = std::min(static_cast<std::size_t>(got), message->msg_iov->iov_len);
+  constexpr ssize_t kDropped = 1;
+  const std::string_view datagram(static_cast<const char*>(message->msg_iov->iov_base), size);
+  return datagram.starts_with("RTPS") && plchost::is_lost_coming(datagram) ? kDropped : got;
+}
+
+extern "C" __attribute__((visibility("default"))) ssize_t sendmsg(int socket, const msghdr* message,
+                                                                  int flags) {
+  if (message->msg_name != nullptr && message->msg_namelen >= sizeof(sockaddr_in)) {
+    const auto& to = *static_cast<const sockaddr_in*>(message->msg_name);
+    const std::string datagram = plchost::joined(*message);
+    if (to.sin_family == AF_INET && datagram.starts_with("RTPS") &&
+        plchost::is_lost_going(datagram, ntohs(to.sin_port))) {
+      return static_cast<ssize_t>(datagram.size());
+    }
+  }
+  return ::syscall(SYS_sendmsg, socket, message, flags);
+}

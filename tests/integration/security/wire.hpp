@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "shm/base/time.hpp"
+
+namespace plchost {
+
+/// The datagrams that this process, a client of one secured host, sends and receives. One at a time.
+class Wire {
+ public:
+  struct Message {
+    std::string datagram;
+    std::uint16_t port = 0;  ///< of this machine, that it was sent to; of one that has come: 0
+  };
+
+  Wire();
+  Wire(const Wire&) = delete;
+  Wire& operator=(const Wire&) = delete;
+  ~Wire();
+
+  /// The next ones that come are lost.
+  void lose_last_messages(int count);
+  /// How many last messages of a handshake have come, with those that were lost.
+  [[nodiscard]] int last_messages() const;
+  /// Returns when one more has come. False: none does.
+  [[nodiscard]] bool await_last_message(Duration patience) const;
+  /// For that long, nothing is received.
+  static void make_deaf(Duration time);
+  /// For that long, all that is sent is lost.
+  static void make_mute(Duration time);
+  /// The GUID prefix of the host; empty: it has sent no last message of a handshake.
+  [[nodiscard]] std::string host() const;
+  /// The newest request for authentication that has come, and the one that was sent.
+  [[nodiscard]] Message received_request() const;
+  [[nodiscard]] Message sent_request() const;
+};
+
+/// Of all sockets of this process.
+[[nodiscard]] std::vector<std::uint16_t> own_udp_ports();
+
+/// As a stranger on this machine.
+void send_to(const std::vector<std::uint16_t>& ports, const std::string& datagram);
+
+}  // namespace plchost
