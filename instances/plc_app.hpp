@@ -398,7 +398,9 @@ class Application {
   }
 
   Task_Info& add(const std::string& name, int priority, short kind, Cycle cycle) {
-    if (tasks_.size() >= PLC_MAX_TASKS) throw std::length_error("more than PLC_MAX_TASKS tasks");
+    if (tasks_.size() >= PLC_MAX_TASKS) {
+      throw std::length_error("more than " + std::to_string(PLC_MAX_TASKS) + " tasks");
+    }
     if (priority < 0 || priority > 31) {
       throw std::invalid_argument("task '" + name + "': priority must be 0 (highest) to 31");
     }

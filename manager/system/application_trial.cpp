@@ -77,8 +77,9 @@ Result<void> ApplicationTrial::verdict() {
   while (output.ends_with('\n')) output.pop_back();
   output = one_line(output);
   if (const std::string name = path_ + ": "; output.starts_with(name)) output.erase(0, name.size());
-  return failure(ErrorCode::invalid_argument,
-                 output.empty() ? fmt::format("trying it ended with {}", status.describe()) : output);
+  return failure(
+      ErrorCode::invalid_argument,
+      output.empty() ? fmt::format("the process that tried it has ended: {}", status.describe()) : output);
 }
 
 }  // namespace plchost

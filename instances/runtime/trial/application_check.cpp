@@ -165,6 +165,10 @@ int check_application(const Options& options) {
   ApplicationHost host(options.launch.name, nullptr);
   host.set_start_kind(static_cast<int>(options.launch.start_kind));
   const auto declared = try_start(options, components, host);
+  if (!descriptors_are_open()) {
+    fmt::print(stderr, "{}: it closes descriptors in its set-up that it has not opened\n", path);
+    return kExitSetupFailed;
+  }
   if (!declared) {
     fmt::print(stderr, "{}\n", declared.error().describe());
     return kExitSetupFailed;

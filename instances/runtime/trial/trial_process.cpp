@@ -19,6 +19,7 @@
 #include <poll.h>
 #include <sys/prctl.h>
 #include <sys/signalfd.h>
+#include <sys/stat.h>
 #include <sys/syscall.h>
 #include <sys/wait.h>
 #include <ucontext.h>
@@ -59,10 +60,14 @@ void say(std::string_view text) noexcept {
 }
 
 // The crashed thread may hold the lock of the heap: work that needs the heap comes last and has a time limit.
-[[noreturn]] void describe_crash(const std::string& application, int verdict, const UniqueFd& crashes) {
+void describe_crash(const std::string& application, int verdict, const UniqueFd& crashes) {
   TrialCrash crash;
-  while (::read(crashes.get(), &crash, sizeof crash) < 0 && errno == EINTR) {
-  }
+  ssize_t got = 0;
+  do {
+    got = ::read(crashes.get(), &crash, sizeof crash);
+  } while (got < 0 && errno == EINTR);
+  if (got != ssize_t{sizeof crash})
+    return;  // the application has closed the pipe: see descriptors_are_open()
   (void)!::write(verdict, &kExitSetupFailed, sizeof kExitSetupFailed);
   const char* const signal = ::sigabbrev_np(crash.signal);
   say(application);
@@ -88,10 +93,12 @@ void catch_crashes(const std::string& application, int verdict) {
   for (const int signal : kFaultSignals) ::sigaction(signal, &action, nullptr);
 }
 
-// The child. The verdict goes to the parent last: an exit code alone could be the application's.
+// The child. The verdict goes to the parent last: an exit code alone could be the application's. A process
+// group of its own: the application may send a signal to all of its group, which must not reach the shell or
+// script that asked for the trial.
 [[noreturn]] void try_out(const std::string& application, const UniqueFd& verdict, pid_t parent,
                           const std::function<int()>& check) {
-  if (!end_with_parent(parent, SIGKILL)) ::_exit(kExitSetupFailed);
+  if (!end_with_parent(parent, SIGKILL) || ::setpgid(0, 0) != 0) ::_exit(kExitSetupFailed);
   const auto stack = AlternateStack::make();  // a stack that is full is a crash, too
   std::optional<AlternateStack::Use> use;
   if (stack) use.emplace(*stack);
@@ -174,6 +181,11 @@ int judge(const std::string& application, const Trial& trial, int signals) {
 }
 
 }  // namespace
+
+bool descriptors_are_open() noexcept {
+  struct stat status{};
+  return ::fstat(verdict_pipe, &status) == 0 && S_ISFIFO(status.st_mode);
+}
 
 void end_trial(int code) noexcept {
   (void)std::fflush(nullptr);

@@ -12,6 +12,10 @@ namespace plchost {
 /// be called while the process has one thread.
 [[nodiscard]] int run_trial(const std::string& application, int signals, const std::function<int()>& check);
 
+/// Within `check`: the application has left the descriptors of the trial alone. A start has more of them, and
+/// does not come up without.
+[[nodiscard]] bool descriptors_are_open() noexcept;
+
 /// Within `check`, from any thread: its verdict is `code`, though it cannot return. Its report was written.
 [[noreturn]] void end_trial(int code) noexcept;
 

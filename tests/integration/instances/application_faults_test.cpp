@@ -109,12 +109,14 @@ TEST_P(TrialOf, SaysHowTheSetUpEnded) {
 
 INSTANTIATE_TEST_SUITE_P(
     Ends, TrialOf,
-    ::testing::Values(EndingProgram{"fault_exits", "it ends its process in its set-up (exit code 0)"},
-                      EndingProgram{"fault_exits_refused", "it ends its process in its set-up (exit code 3)"},
-                      EndingProgram{"fault_loops", "took longer than 10 s: does it return from its set-up?"},
-                      EndingProgram{"fault_crashes",
-                                    "it crashes in its set-up: SIGSEGV in open_valve(int volatile*)"},
-                      EndingProgram{"fault_overflows", "it crashes in its set-up: SIGSEGV in deeper(int)"}),
+    ::testing::Values(
+        EndingProgram{"fault_exits", "it ends its process in its set-up (exit code 0)"},
+        EndingProgram{"fault_exits_refused", "it ends its process in its set-up (exit code 3)"},
+        EndingProgram{"fault_kills_group", "its set-up was ended by SIGKILL"},
+        EndingProgram{"fault_closes", "it closes descriptors in its set-up that it has not opened"},
+        EndingProgram{"fault_loops", "took longer than 10 s: does it return from its set-up?"},
+        EndingProgram{"fault_crashes", "it crashes in its set-up: SIGSEGV in open_valve(int volatile*)"},
+        EndingProgram{"fault_overflows", "it crashes in its set-up: SIGSEGV in deeper(int)"}),
     [](const auto& test) { return std::string(test.param.application); });
 
 class SignalEndsATrial : public ::testing::TestWithParam<int> {};

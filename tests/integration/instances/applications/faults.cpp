@@ -1,4 +1,5 @@
 // An application with one fault, chosen when it is compiled. Everything else about it is right.
+#include <csignal>
 #include <cstdlib>
 #include <stdexcept>
 
@@ -99,6 +100,13 @@ int plc_app_init() {
 #endif
 #ifdef FAULT_OVERFLOWS
   return deeper(1);
+#endif
+#ifdef FAULT_KILLS_GROUP
+  ::kill(0, SIGKILL);
+#endif
+#ifdef FAULT_CLOSES
+  constexpr int kAll = 256;
+  for (int fd = 3; fd < kAll; ++fd) ::close(fd);
 #endif
 #ifdef FAULT_FORKS
   if (::fork() == 0) {
