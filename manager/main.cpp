@@ -137,7 +137,10 @@ int plchostd_main(int argc, const char* const* argv) {
     }
   } catch (const CLI::ParseError& error) {
     const std::vector<std::string> words(arguments.begin() + 1, arguments.end());
-    if (const std::string hint = unknown_option(words, option_names(app)); !hint.empty()) {
+    const std::string hint = unknown_option(words, option_names(app));
+    // Else the value of an option is wrong, which may look like an option: "--core -1".
+    const bool unknown = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError);
+    if (unknown && !hint.empty()) {
       fmt::print(stderr, "plchostd: {}\n", hint);
       return kExitUsage;
     }

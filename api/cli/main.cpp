@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <optional>
+#include <ranges>
 #include <span>
 #include <string>
 #include <utility>
@@ -53,11 +54,17 @@ void add_options(CLI::App& app, plchost::CliOptions& options) {
       ->check(CLI::IsMember({"table", "wide", "json", "csv"}))
       ->type_name("FORM");
   app.add_flag("--json", options.json, "the same as --output json");
-  app.add_option("--columns", options.columns,
-                 "only these fields, by their names in JSON, separated by commas: name,state")
-      ->delimiter(',')
-      ->expected(1)
-      ->type_name("FIELDS");
+  app.add_option_function<std::string>(
+         "--columns",
+         [&options](const std::string& fields) {
+           options.columns.clear();
+           for (const auto field : std::views::split(fields, ',')) {
+             options.columns.emplace_back(field.begin(), field.end());
+           }
+         },
+         "only these fields, by their names in JSON, separated by commas: name,state")
+      ->type_name("FIELDS")
+      ->take_last();
   app.add_option("--sort-by", options.sort_by, "sort by this field; -FIELD: the greatest first")
       ->type_name("FIELD")
       ->take_last();
@@ -112,11 +119,20 @@ std::string hint_of(const plchost::Syntax& plcctl, std::span<const std::string> 
   return option.empty() ? "" : fmt::format("plcctl: {}\n", option);
 }
 
+/// Only then the error is about an option that is not known, or about one that stands where a word is
+/// missing. Else the value of an option is wrong, which may look like an option: "--count -3".
+bool is_about_words(const CLI::ParseError& error) {
+  const int code = error.get_exit_code();
+  return code == static_cast<int>(CLI::ExitCodes::ExtrasError) ||
+         code == static_cast<int>(CLI::ExitCodes::RequiredError);
+}
+
 /// 'plcctl', 'plcctl help', 'plcctl help list' and 'plcctl list' list what there is. The exit code; nothing:
 /// a command is there.
 std::optional<int> overview_wanted(const plchost::Syntax& plcctl, std::span<const std::string> words) {
-  const bool asked = !words.empty() && words.front() == "help";
-  if (asked) words = words.subspan(1);
+  const std::vector<std::string> plain = plchost::without_options(plcctl, words);
+  const bool asked = !plain.empty() && plain.front() == "help";
+  if (asked) words = std::span(plain).subspan(1);
   const plchost::Syntax* level = &plcctl;
   std::string said = "plcctl";
   for (const std::string& word : words) {
@@ -195,7 +211,7 @@ int main(int argc, char** argv) {
   try {
     app.parse(std::vector<std::string>(whole.rbegin(), whole.rend()));
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() != 0) {
+    if (is_about_words(error)) {
       if (const std::string text = hint_of(plchost::syntax_of(app), whole); !text.empty()) {
         fmt::print(stderr, "{}", text);
         return plchost::kExitUsage;

@@ -13,7 +13,7 @@ namespace {
 
 // The place of the first word at or behind `at` that is neither an option nor the value of one.
 std::optional<std::size_t> next_word(const Syntax& plcctl, const Syntax& level,
-                                     const std::vector<std::string>& words, std::size_t at) {
+                                     std::span<const std::string> words, std::size_t at) {
   for (; at < words.size(); ++at) {
     const std::string& word = words[at];
     if (!word.starts_with('-')) return at;
@@ -37,6 +37,14 @@ std::vector<std::string> with_noun(const Syntax& plcctl, std::vector<std::string
   if (!nearest_name(words[*next], known).empty()) return words;
   words.insert(words.begin() + static_cast<std::ptrdiff_t>(*at) + 1, noun.name);
   return words;
+}
+
+std::vector<std::string> without_options(const Syntax& plcctl, std::span<const std::string> words) {
+  std::vector<std::string> plain;
+  for (auto at = next_word(plcctl, plcctl, words, 0); at; at = next_word(plcctl, plcctl, words, *at + 1)) {
+    plain.push_back(words[*at]);
+  }
+  return plain;
 }
 
 }  // namespace plchost

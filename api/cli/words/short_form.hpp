@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -10,5 +11,9 @@ namespace plchost {
 /// The words of a command line with the noun that was left out: a verb that has one noun only may stand
 /// without it, "start line1" for "start instance line1". A word that may be a mistyped noun is left as it is.
 [[nodiscard]] std::vector<std::string> with_noun(const Syntax& plcctl, std::vector<std::string> words);
+
+/// The words of a command line that are neither options of plcctl nor their values.
+[[nodiscard]] std::vector<std::string> without_options(const Syntax& plcctl,
+                                                       std::span<const std::string> words);
 
 }  // namespace plchost

@@ -133,7 +133,10 @@ ParsedOptions parse_options(int argc, const char* const* argv) {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     const std::vector<std::string> words(argv + 1, argv + argc);
-    if (const std::string hint = unknown_option(words, option_names(app)); !hint.empty()) {
+    const std::string hint = unknown_option(words, option_names(app));
+    // Else the value of an option is wrong, which may look like an option: "--core -1".
+    const bool unknown = error.get_exit_code() == static_cast<int>(CLI::ExitCodes::ExtrasError);
+    if (unknown && !hint.empty()) {
       fmt::print(stderr, "plc-instance: {}\n", hint);
       return {.options = std::nullopt, .exit_code = kExitUsage};
     }

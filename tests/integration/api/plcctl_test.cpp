@@ -118,9 +118,23 @@ TEST_F(Plcctl, ListsWhatThereIsWhereWordsAreMissing) {
     EXPECT_EQ(result.code, asked ? 0 : 2);
     EXPECT_THAT(result.output, HasSubstr("instances [INSTANCE]"));
   }
+  EXPECT_THAT(run({"help", "list"}).output, HasSubstr("instances [INSTANCE]")) << "behind options, too";
   const auto option = run_program(PLCCTL_PROGRAM, {"list", "instances", "--colums=name"});
   EXPECT_EQ(option.code, 2);
   EXPECT_THAT(option.errors, HasSubstr("unknown option '--colums' (did you mean '--columns'?); known are "));
+}
+
+TEST_F(Plcctl, ShowsTheColumnsThatAreAskedForInTheirOrder) {
+  const auto several =
+      run({"list", "instances", "--columns", "name,state", "--sort-by", "-name", "-o", "csv"});
+  EXPECT_EQ(several.output, "name,state\nline1,running\n") << several.errors;
+  EXPECT_EQ(run({"list", "instances", "--columns=state,name", "-o", "csv", "line1"}).output,
+            "state,name\nrunning,line1\n");
+}
+
+TEST_F(Plcctl, SaysWhatIsWrongWithAValueThatLooksLikeAnOption) {
+  EXPECT_THAT(run({"post", "event", "line1/ready", "--count", "-3"}).errors,
+              HasSubstr("Value -3 not in range"));
 }
 
 TEST_F(Plcctl, TakesSeveralNamesAndPatterns) {
