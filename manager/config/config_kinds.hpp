@@ -1,11 +1,13 @@
 #pragma once
 
 #include <algorithm>
+#include <charconv>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -285,13 +287,26 @@ struct PeerRule {
         "0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ.:-_%[]";
     constexpr std::size_t kMaxAddress = 255;
     if (!peer.empty() && peer.size() <= kMaxAddress && !peer.starts_with('-') &&
-        peer.find_first_not_of(kAddress) == std::string::npos) {
+        peer.find_first_not_of(kAddress) == std::string::npos && has_good_port(peer)) {
       return "";
     }
     return fmt::format(
-        "\"{}\" is not an address; allowed is an IP address or a host name, with a port after a colon if it "
-        "must be",
+        "\"{}\" is not an address; allowed is an IP address or a host name, with a port (1 to 65535) after a "
+        "colon if it must be",
         peer.substr(0, kMaxPath));
+  }
+
+ private:
+  /// Or none: "fe80::1" has several colons, "[fe80::1]:7410" has a port.
+  static bool has_good_port(std::string_view peer) {
+    const std::size_t colon = peer.rfind(':');
+    if (colon == std::string_view::npos) return true;
+    const bool bracketed = colon > 0 && peer[colon - 1] == ']';
+    if (!bracketed && peer.find(':') != colon) return true;
+    const std::string_view port = peer.substr(colon + 1);
+    std::uint16_t number = 0;
+    const auto [end, error] = std::from_chars(port.data(), port.data() + port.size(), number);
+    return error == std::errc() && end == port.data() + port.size() && number > 0;
   }
 };
 

@@ -42,6 +42,10 @@ std::string advice_for_word(std::string_view key, std::string_view word) {
     return fmt::format("'{}' is no value; write true or false in small letters: {} = false", shown(word),
                        key);
   }
+  const std::string_view digits = word.substr(word.starts_with('-') || word.starts_with('+') ? 1 : 0);
+  if (is_digits(digits) && digits.front() != '0') {
+    return fmt::format("the number {} of {} does not fit into 64 bit", shown(word), key);
+  }
   const bool zero_first = is_digits(word) && word.size() > 1 && word.front() == '0';
   if (zero_first) {
     return fmt::format(

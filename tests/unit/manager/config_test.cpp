@@ -218,6 +218,9 @@ INSTANTIATE_TEST_SUITE_P(
         WrongConfig{"identity_empty", "[dds]\nidentity = \"\"\n", "2", "identity: is no path"},
         WrongConfig{"identity_type", "[dds]\nidentity = true\n", "2", "allowed is a text in quotes"},
         WrongConfig{"peers", "[dds]\npeers = [\"-x\"]\n", "2", "\"-x\" is not an address"},
+        WrongConfig{"peers_port", "[dds]\npeers = [\"10.0.0.1:99999\"]\n", "2",
+                    "\"10.0.0.1:99999\" is not an address"},
+        WrongConfig{"peers_no_port", "[dds]\npeers = [\"[fe80::1]:\"]\n", "2", "is not an address"},
         WrongConfig{"peers_type", "[dds]\npeers = [1]\n", "2", "allowed is an array of texts"}),
     [](const auto& test) { return test.param.name; });
 
@@ -229,6 +232,8 @@ INSTANTIATE_TEST_SUITE_P(
         WrongConfig{"path", "[host]\nrun_directory = /tmp/x # here\n", "2:17", "run_directory = \"/tmp/x\""},
         WrongConfig{"mode", "[host]\npool_mode = 0660\n", "2:17",
                     "the number 0660 begins with 0; put a mode in quotes (pool_mode = \"0660\")"},
+        WrongConfig{"too_many_digits", "[host]\npool_objects = 99999999999999999999\n",
+                    "2:", "the number 99999999999999999999 of pool_objects does not fit into 64 bit"},
         WrongConfig{"truth", "[host]\nkeep_pool = True\n", "2:13", "keep_pool = true"},
         WrongConfig{"no", "[host]\nkeep_pool = no\n", "2:14", "keep_pool = false"},
         WrongConfig{"open_quote", "[host]\nname = \"a\n", "2:10", "the closing quote of name is missing"},
