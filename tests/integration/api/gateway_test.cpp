@@ -215,6 +215,33 @@ TEST_F(Gateway, SendersAreToldWhenAHostIsGone) {
       becomes([&] { return north.channel.send({.host = 2, .node = 1}, {}) == SendResult::unreachable; }));
 }
 
+// What has left its sender and waits for room on the way to a host that is not heard any more.
+TEST_F(Gateway, BlocksForAHostThatFallsSilentAreCountedAsWithoutARoute) {
+  Side north(domain_, "north", 1, "press");
+  Side south(domain_, "south", 2, "packer");
+  meet(north, 1, south, 2);
+  const auto without_route = [&] {
+    std::uint64_t count = 0;
+    for (const Json& node : nodes("north")) {
+      if (node["name"] == "gateway") count = node["no_route"];
+    }
+    return count;
+  };
+  ASSERT_EQ(without_route(), 0U);
+  south.host.server().signal(SIGSTOP);
+  const auto contents = pattern(20000);
+  bool waits = false;  // as many are under way as may be
+  for (int i = 0; i < 2000 && !waits; ++i) {
+    waits = north.channel.send(south.address_at(2), contents) == SendResult::congested;
+  }
+  EXPECT_TRUE(waits);
+  EXPECT_TRUE(
+      becomes([&] { return north.channel.send(south.address_at(2), contents) == SendResult::unreachable; }));
+  EXPECT_TRUE(becomes([&] { return without_route() > 0; }));
+  south.host.server().signal(SIGCONT);
+  EXPECT_TRUE(becomes([&] { return north.channel.send(south.address_at(2), {}) == SendResult::sent; }));
+}
+
 TEST_F(Gateway, ANodeThatTakesNothingIsFeltByWhoSendsToItAndByNobodyElse) {
   Side south(domain_, "south", 2, "packer");
   Side north(domain_, "north", 1, "press");
