@@ -180,7 +180,7 @@ Result<std::shared_ptr<Entity>> open_domain(Role role, const DomainOptions& opti
       dds_create_domain(options.domain, configuration->c_str()),
       fmt::format("make DDS domain {} on interface {}", options.domain, fmt::join(options.interfaces, ", ")));
   if (!made) return std::unexpected(made.error());
-  const std::shared_ptr<Entity> domain(
+  std::shared_ptr<Entity> domain(
       new Entity(std::move(*made)),  // NOLINT(cppcoreguidelines-owning-memory): for a deleter of its own
       [number = options.domain](Entity* ended) { end_domain(number, std::unique_ptr<Entity>(ended)); });
   opened = {.users = domain, .is_there = true};
