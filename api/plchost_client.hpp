@@ -243,7 +243,8 @@ class PLCHOST_CLIENT_API Client {
   void post(const std::string& host, const std::string& event, std::function<void(const Outcome&)> done);
   /// Posts several events, at most 64, at once: all of them, or none.
   Posted post_all(const std::string& host, const std::vector<std::string>& events);
-  /// Posts once and waits until the tasks that are bound to the event have ended their cycles for it.
+  /// Posts once and waits until the tasks that are bound to the event have ended their cycles for it. If the
+  /// instance is starting, the event is posted once its tasks take posts.
   Run post_and_wait(const std::string& host, const std::string& event);
 
   /// Commands. Each returns when it is done; the next look at the status shows its effect. The text that is

@@ -191,10 +191,11 @@ class ControlClient {
   [[nodiscard]] Result<PostReport> post_event(const ApiRequest& event, std::uint64_t count, Duration interval,
                                               Duration patience, const std::function<bool()>& stop = {});
 
-  /// Posts an event once and waits until the tasks that are bound to it have ended their cycles for it.
-  /// The code of the failure is the host's own: not_found: no such event, or no task is bound to it;
-  /// wrong_state: a task was stopped before it ran. timed_out: nothing has come for `patience`, or the task
-  /// has not run within 10 s; the post may be in the pool.
+  /// Posts an event once and waits until the tasks that are bound to it have ended their cycles for it. If
+  /// the instance is starting, the event is posted once its tasks take posts. The code of the failure is the
+  /// host's own: not_found: no such event, or no task is bound to it; wrong_state: a task was stopped before
+  /// it ran. timed_out: nothing has come for `patience`, or the task has not run within 10 s; the post may be
+  /// in the pool. unavailable: the instance was starting all the time.
   [[nodiscard]] Result<RunReport> post_and_await(const ApiRequest& event, Duration patience);
 
   /// Posts several events, at most kMaxBatch, at once: all of them, or none. The report counts the batch as
@@ -236,6 +237,7 @@ class ControlClient {
                                      const RequestCaller::Meanwhile& meanwhile);
   /// nullptr: that host has not been seen.
   [[nodiscard]] const HostClock* clock_of(const std::string& host) const;
+  [[nodiscard]] Result<RunReport> post_and_await_once(const ApiRequest& event, TimePoint deadline);
   void use_clock(EventPoster& posts, const std::string& host, Duration patience) const;
   /// The way of such posts to that host.
   template <class Sample>

@@ -12,6 +12,9 @@ namespace plchost {
 
 namespace {
 
+/// How often a post is posted again to an instance that is starting.
+constexpr Duration kInstanceLook = std::chrono::milliseconds(20);
+
 bool has_writer(dds_entity_t reader) {
   dds_subscription_matched_status_t status{};
   return dds_get_subscription_matched_status(reader, &status) == DDS_RETCODE_OK && status.current_count > 0;
@@ -61,6 +64,18 @@ Result<RunReport> ControlClient::post_and_await(const ApiRequest& event, Duratio
   }
   const TimePoint deadline = MonotonicClock::now() + patience;
   if (auto ready = prepare_runs(event.host, deadline); !ready) return std::unexpected(ready.error());
+  for (;;) {
+    auto run = post_and_await_once(event, deadline);
+    const TimePoint again = MonotonicClock::now() + kInstanceLook;
+    if (run || run.error().code != ErrorCode::unavailable || again >= deadline) return run;
+    while (MonotonicClock::now() < again) {
+      update();
+      wait_set_.wait(again);
+    }
+  }
+}
+
+Result<RunReport> ControlClient::post_and_await_once(const ApiRequest& event, TimePoint deadline) {
   EventPoster& posts = **poster<plc_EventPost>(event.host);
   const auto epoch = [&] {
     const SeenHost* const seen = seen_.find(event.host);

@@ -161,7 +161,7 @@ void EventIntake::process_locked(const Post& post) {
       ++state.counters.duplicate;
       ledger_.set(entry, state);
       // The server before this one may have been asked and be gone.
-      if (wanted && wanted->run) await_again(post, state);
+      if (wanted && wanted->run) await_again(post, entry);
       break;
     case PostOrder::gap:
       ++state.counters.received;
@@ -230,12 +230,39 @@ Result<void> EventIntake::check_names(std::string_view instance, std::string_vie
   return check_name("event", event, kMaxEventName);
 }
 
+// An instance that is starting registers its events, and then its tasks take posts. Only after that it is
+// told as running.
+bool EventIntake::is_starting(std::string_view instance) {
+  const bool whole = host_page_.refresh();
+  const auto instances = host_page_.instances();
+  const auto found = std::ranges::find(instances, instance,
+                                       [](const InstanceStatus* status) { return status->name.view(); });
+  if (found == instances.end()) return false;
+  const InstanceState state = (*found)->state;
+  return !whole || state == InstanceState::starting || state == InstanceState::waiting;
+}
+
+// "There is no such event" and "no task was bound" are final for a client, so they are not told while an
+// instance is starting: it may post again.
+Result<PoolEvent> EventIntake::find(std::string_view instance, std::string_view event, bool awaited) {
+  const auto there = [&](const Result<PoolEvent>& found) {
+    return found && (!awaited || found->counted().snapshot().taken());
+  };
+  if (auto found = directory_.find(instance, event); there(found)) return found;
+  if (is_starting(instance)) {
+    return failure(ErrorCode::unavailable,
+                   fmt::format("instance '{}' is starting: no task takes posts to '{}' yet; post it again",
+                               instance, event));
+  }
+  return directory_.find(instance, event);  // it may have started meanwhile
+}
+
 Result<void> EventIntake::try_post(const plc_EventPost& post, LedgerEntry& entry, const SourceState& state,
                                    Targets* targets) {
   const auto instance = text_of(post.instance);
   const auto event = text_of(post.event);
   if (auto good = check_names(instance, event); !good) return good;
-  const auto found = directory_.find(instance, event);
+  const auto found = find(instance, event, targets != nullptr);
   if (!found) return std::unexpected(found.error());
   const auto made =
       ledger_.post(entry, *found, PostLedger::Allowed::registered, [&](const CountedEvent::Snapshot& seen) {
@@ -262,14 +289,14 @@ Result<void> EventIntake::try_post(const plc_EventPost& post, LedgerEntry& entry
 
 // The events of a batch, so that all are found before the first is posted to. Of a batch that was begun those
 // count that are there still.
-Result<void> EventIntake::look_up(const plc_EventBatch& batch, bool begun) {
+Result<void> EventIntake::look_up(const plc_EventBatch& batch, bool begun, bool awaited) {
   batch_events_.clear();
   Result<void> good;
   for_each_event(batch, [&](std::string_view instance, std::string_view event) {
     if (!good) return;
     good = check_names(instance, event);
     if (!good) return;
-    const auto found = begun ? directory_.find_any(instance, event) : directory_.find(instance, event);
+    const auto found = begun ? directory_.find_any(instance, event) : find(instance, event, awaited);
     batch_events_.push_back(found.value_or(PoolEvent()));
     if (!found && !begun) {
       good = failure(found.error().code,
@@ -288,7 +315,7 @@ Result<void> EventIntake::try_post(const plc_EventBatch& batch, LedgerEntry& ent
   const std::uint32_t count = batch.events._length;
   if (count == 0) return failure(ErrorCode::invalid_argument, "a batch of no events");
   const bool begun = state.batch == batch.sequence_number && state.batch_done > 0;
-  if (auto good = look_up(batch, begun); !good) return good;
+  if (auto good = look_up(batch, begun, targets != nullptr); !good) return good;
   const auto finished = [&](const SourceState& part) {
     SourceState after = done_with(part, batch.sequence_number);
     ++after.counters.accepted;
@@ -323,18 +350,25 @@ Result<void> EventIntake::try_post(const plc_EventBatch& batch, LedgerEntry& ent
   return {};
 }
 
-// Of a post that was done before: by the last one of its source it is known what the event's count was.
+// Of a post that was done before: by the last one of its source it is known what the event's count was, or
+// why it was rejected. The client may read this before the acknowledgement: both tell the same.
 template <class Post>
-void EventIntake::await_again(const Post& post, const SourceState& state) {
+void EventIntake::await_again(const Post& post, const LedgerEntry& entry) {
+  const SourceState& state = entry.state();
   AwaitedPost awaited{.source = dds::Guid::from(post.source),
                       .sequence = post.sequence_number,
                       .targets = {},
                       .received = now_};
   const bool exact = state.last == post.sequence_number && state.last_count != 0;
   for_each_event(post, [&](std::string_view instance, std::string_view event) {
-    if (!check_names(instance, event)) return;
     const auto found = directory_.find_any(instance, event);
-    if (!found) return;
+    if (!found) {
+      awaited.unrun = {.code = ErrorCode::not_found,
+                       .system_errno = 0,
+                       .message = fmt::format("whether a task has run for the post is not known: {}",
+                                              found.error().message)};
+      return;
+    }
     awaited.targets.push_back({.instance = std::string(instance),
                                .event = std::string(event),
                                .count = exact ? state.last_count : found->counted().count(),
@@ -342,6 +376,11 @@ void EventIntake::await_again(const Post& post, const SourceState& state) {
                                .exact = exact,
                                .handle = *found});
   });
+  if (state.rejected_sequence == post.sequence_number) {
+    awaited.unrun = {.code = static_cast<ErrorCode>(state.rejected_code),
+                     .system_errno = 0,
+                     .message = std::string(entry.rejected_text.view())};
+  }
   if (awaited_.size() < kMaxAwaited) awaited_.push_back(std::move(awaited));
 }
 

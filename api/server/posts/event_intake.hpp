@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <unordered_map>
 #include <unordered_set>
@@ -17,6 +18,7 @@
 #include "api/server/posts/post_ledger.hpp"
 #include "api/server/posts/posted_events.hpp"
 #include "shm/base/time.hpp"
+#include "shm/pages/host_page_copy.hpp"
 
 namespace plchost {
 
@@ -36,6 +38,7 @@ struct AwaitedPost {
   dds::Guid source;
   std::uint64_t sequence = 0;
   std::vector<Target> targets = {};
+  std::optional<Error> unrun = {};  ///< why no task runs for it; nothing: the tasks' pages tell
   TimePoint received;
 };
 
@@ -47,7 +50,12 @@ class EventIntake {
   /// `guard` says who may post; it must outlive this.
   EventIntake(std::string host, const ObjectPool& pool, PostLedger ledger, std::uint64_t epoch,
               const AccessGuard& guard)
-      : host_(std::move(host)), epoch_(epoch), guard_(&guard), directory_(pool), ledger_(std::move(ledger)) {}
+      : host_(std::move(host)),
+        epoch_(epoch),
+        guard_(&guard),
+        host_page_(pool.name()),
+        directory_(pool),
+        ledger_(std::move(ledger)) {}
 
   /// The sources that posted since then are among the next collect_written_acks(): a server that was killed
   /// may not have told of their last posts.
@@ -119,11 +127,13 @@ class EventIntake {
                                       Targets* targets);
   [[nodiscard]] Result<void> try_post(const plc_EventBatch& batch, LedgerEntry& entry,
                                       const SourceState& state, Targets* targets);
-  [[nodiscard]] Result<void> look_up(const plc_EventBatch& batch, bool begun);
+  [[nodiscard]] Result<void> look_up(const plc_EventBatch& batch, bool begun, bool awaited);
+  [[nodiscard]] Result<PoolEvent> find(std::string_view instance, std::string_view event, bool awaited);
+  [[nodiscard]] bool is_starting(std::string_view instance);
   template <class Post>
   [[nodiscard]] Result<void> check(const Post& post) const;
   template <class Post>
-  void await_again(const Post& post, const SourceState& state);
+  void await_again(const Post& post, const LedgerEntry& entry);
   [[nodiscard]] static Result<void> check_names(std::string_view instance, std::string_view event);
   [[nodiscard]] dds::Guid writer_of(dds_entity_t reader, const dds_sample_info_t& info);
 
@@ -131,6 +141,7 @@ class EventIntake {
   const std::uint64_t epoch_;
   const AccessGuard* const guard_;
   mutable std::mutex mutex_;
+  HostPageCopy host_page_;  // is read when an event is not there
   EventDirectory directory_;
   PostLedger ledger_;
   AckWriters* ack_writers_ = nullptr;

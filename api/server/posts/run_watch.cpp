@@ -35,6 +35,7 @@ void RunWatch::add(const AwaitedPost& post, const TaskWatch& tasks) {
         fmt::format("the host waits for the runs of at most {} posts at once ({} of one client, {} tasks)",
                     kMaxWaits, kMaxOfClient, kMaxRuns));
   }
+  if (post.unrun) return decide(wait, post.unrun->code, post.unrun->message);
   std::ranges::copy_if(post.targets, std::back_inserter(wait.unknown), &Target::taken);
   runs_ += wait.unknown.size();
   find_tasks(wait, tasks);

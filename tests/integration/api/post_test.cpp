@@ -248,6 +248,30 @@ TEST(RemotePost, WhoseRunIsAwaitedFailsWhenNoTaskIsBoundOrNoEventIsThere) {
   EXPECT_THAT(no_event.error().message, testing::HasSubstr("line1/redy"));
 }
 
+TEST(RemotePost, WhoseRunIsAwaitedWaitsForAnInstanceThatIsStarting) {
+  const OwnDomain domain;
+  TestHost host(domain, "hosta");
+  host.write_instance(0, "line1", InstanceState::starting, 4711);
+  host.write_count(1);
+  host.start_server();
+  const auto sut = connect(domain);
+  const auto in_vain = sut->post_and_await({"hosta", 0, "line1", "ready"}, milliseconds(500));
+  ASSERT_FALSE(in_vain);
+  EXPECT_NE(in_vain.error().code, ErrorCode::not_found) << in_vain.error().describe();
+  const std::jthread instance([&host] {
+    std::this_thread::sleep_for(milliseconds(100));
+    host.add_event("line1", "ready");
+    std::this_thread::sleep_for(milliseconds(100));
+    host.write_instance(0, "line1", InstanceState::stopped, 4711);
+  });
+
+  const auto told = sut->post_and_await({"hosta", 0, "line1", "ready"}, kPatience);
+
+  ASSERT_FALSE(told);
+  EXPECT_THAT(told.error().message, testing::HasSubstr("no task was bound"))
+      << "it was told after the start, which ended without a task that runs";
+}
+
 // Waits until what the host tells of the writers is so, and returns it.
 template <class Condition>
 std::vector<plc_WriterStatus> writers_when(ControlClient& client, Condition condition) {

@@ -117,6 +117,20 @@ TEST_F(RunWatchTest, TellsOfAPostThatCameAgainOnceAndFromItsFirstArrival) {
   EXPECT_EQ(told[0].end_ns, 13'000);
 }
 
+TEST_F(RunWatchTest, TellsAtOnceWhyNoTaskRuns) {
+  AwaitedPost rejected = post(5, "ready", 3);
+  rejected.targets.clear();
+  rejected.unrun = {
+      .code = ErrorCode::not_found, .system_errno = 0, .message = "no external event 'line1/other'"};
+  sut_.add(rejected, tasks_);
+
+  const auto told = sut_.look(tasks_, now_);
+
+  ASSERT_EQ(told.size(), 1U);
+  EXPECT_EQ(told[0].code, static_cast<int>(ErrorCode::not_found));
+  EXPECT_EQ(dds::text_of(told[0].text), "no external event 'line1/other'");
+}
+
 TEST_F(RunWatchTest, NamesTheTaskAlsoIfItRanBeforeThePostCameAgain) {
   write_cycle(3, microseconds(10));
   AwaitedPost again = post(5, "ready", 3);
