@@ -52,7 +52,7 @@ run() {
   "$@" >"$log" 2>&1 || code=$?
   end_step "$what" "$code" $((SECONDS - began)) "$log"
 }
-# Tests wait most of the time: all that needs no test is done beside them, one step after the other.
+# The gates use one core, and tests wait most of the time. Steps that depend on neither run beside them, one after the other.
 # run_ahead STEP...: functions of this script, later join STEP WHAT
 run_ahead() {
   set -m  # as a process group, which can be ended as one
@@ -160,9 +160,9 @@ case "${1:-}" in
   "")
     run "packages" .ci/packages test
     tests/left_behind.py begin "$own/before"
-    run "gates, each proven by a planted fault" gates
+    run_ahead gates build_asan build_tsan tidy build_fuzzers
     run "build" build_plain
-    run_ahead build_asan build_tsan tidy build_fuzzers
+    join gates "gates, each proven by a planted fault"  # before the tests: one gate looks for what is left behind
     run "tests" tests "$build" "${whole[@]}"
     count
     join build_asan "address and undefined sanitizers: build"
