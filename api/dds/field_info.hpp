@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <string>
 #include <string_view>
@@ -19,7 +21,8 @@ enum class Unit : std::uint8_t {
 /// (string_view) and arrays of octets.
 struct FieldInfo {
   std::string_view name;  ///< in control.idl
-  std::string_view base;  ///< without its unit
+  std::string_view row;   ///< in the rows of plcctl: the same, if `row:` gives it no other
+  std::string_view base;  ///< of the row, without its unit
   Unit unit = Unit::none;
   bool key = false;
   std::span<const std::string_view> words;  ///< for its codes, from 0; empty: it is no code
@@ -37,5 +40,17 @@ struct Listing {
 };
 template <class Sample>
 inline constexpr Listing kListing{};
+
+/// A column of plcctl's tables, as `columns:` has it.
+struct ColumnInfo {
+  const char* field = "";
+  const char* header = "";
+  int decimals = 1;
+  int rank = 0;  ///< where the table is too wide, the greatest goes first; 0: never
+  std::int64_t none = std::numeric_limits<std::int64_t>::min();  ///< this number means that there is none
+};
+/// Empty: all members are columns.
+template <class Sample>
+inline constexpr std::array<ColumnInfo, 0> kColumns{};
 
 }  // namespace plchost::dds

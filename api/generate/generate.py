@@ -116,15 +116,47 @@ def words_of(member):
     return words if len(words) > 1 else []
 
 
-def field(member):
-    """The FieldInfo of a member."""
-    told = [f'.name = "{member.name}"']
+def listed(kind, tag):
+    """The parts of a tag."""
+    return re.split(r"[,;]\s*", kind.tags[tag]) if tag in kind.tags else []
+
+
+def row_names(kind):
+    """Members that `row:` gives other names in the rows of plcctl."""
+    return dict(part.split(" as ") for part in listed(kind, "row"))
+
+
+COLUMN = re.compile(r"(?P<member>\w+)(?: (?P<rank>\d+))?(?: none (?P<none>-?\d+))?(?P<whole> whole)?(?: as (?P<header>[\w-]+))?")
+
+
+def columns(kind):
+    """The ColumnInfo of each part of `columns:`. Fault: it is not understood, or names no member."""
+    members, lines = {member.name for member in kind.members}, []
+    for part in listed(kind, "columns"):
+        found = COLUMN.fullmatch(part)
+        if not found or found["member"] not in members:
+            raise Fault(f"{kind.name}: 'columns:' has '{part}', which is not understood or no member")
+        name = row_names(kind).get(found["member"], found["member"])
+        base = re.sub(r"(_unix)?_ns$", "", name)
+        is_duration = name.endswith("_ns") and not name.endswith("_unix_ns")
+        header = (found["header"] or base.upper().replace("_", "-")) + ("(us)" if is_duration else "")
+        told = [f'.field = "{base}{"_us" if is_duration else ""}"', f'.header = "{header}"']
+        told += [".decimals = 0"] if found["whole"] else []
+        told += [f".rank = {found['rank']}"] if found["rank"] else []
+        told += [f".none = {found['none']}"] if found["none"] else []
+        lines.append(f"    ColumnInfo{{{', '.join(told)}}},")
+    return lines
+
+
+def field(member, row):
+    """The FieldInfo of a member; `row`: its name in rows."""
+    told = [f'.name = "{member.name}"', f'.row = "{row}"']
     for suffix, unit in (("_unix_ns", "unix"), ("_ns", "duration")):
         if member.name.endswith(suffix):
             told.append(f'.base = "{member.name.removesuffix(suffix)}", .unit = Unit::{unit}')
             break
     else:
-        told.append(f'.base = "{member.name}"')
+        told.append(f'.base = "{row}"')
     if member.key:
         told.append(".key = true")
     words = ", ".join(f'"{word}"' for word in words_of(member))
@@ -142,12 +174,14 @@ def status_fields(contract):
         lines += ["template <class Visit>", f"void visit_fields(const plc_{kind.name}& sample, Visit&& visit) {{"]
         for member in kind.members:
             plain = member.name != "epoch" and not member.type.startswith("sequence") and member.type.split("[")[0] not in nested
-            lines += field(member) if plain else []
+            lines += field(member, row_names(kind).get(member.name, member.name)) if plain else []
         lines.append("}\n")
     for kind, _ in counted(contract):
         if "list" in kind.tags:
             noun, _, text = kind.tags["list"].partition(", ")
             lines.append(f'template <>\ninline constexpr Listing kListing<plc_{kind.name}>{{"{noun}", "{text}"}};')
+        if "columns" in kind.tags:
+            lines += ["template <>", f"inline constexpr std::array kColumns<plc_{kind.name}>{{", *columns(kind), "};"]
     return "\n".join(lines + ["\n}  // namespace plchost::dds\n"])
 
 

@@ -22,16 +22,4 @@ Row to_row(const plc_ExceptionStatus& status) {
           {"application", text_of(status.application)}};
 }
 
-const std::vector<Column>& exception_columns() {
-  static const std::vector<Column> columns{{.field = "host", .header = "HOST", .rank = 1},
-                                           {.field = "instance", .header = "INSTANCE"},
-                                           {.field = "present", .header = "PRESENT", .rank = 3},
-                                           {.field = "count", .header = "COUNT", .rank = 4},
-                                           {.field = "time", .header = "TIME", .rank = 2},
-                                           {.field = "task", .header = "TASK"},
-                                           {.field = "kind", .header = "KIND"},
-                                           {.field = "text", .header = "TEXT", .rank = 5}};
-  return columns;
-}
-
 }  // namespace plchost

@@ -12,8 +12,6 @@ namespace plchost {
 
 /// From samples of status topics to rows of output, where status_rows.hpp does not make them from
 /// control.idl. The field names are a promise to programs.
-[[nodiscard]] Row to_row(const plc_InstanceStatus& status);
-[[nodiscard]] Row to_row(const plc_WriterStatus& status);
 [[nodiscard]] Row to_row(const plc_ExceptionStatus& status);
 [[nodiscard]] Row to_row(const plc_Transition& transition);
 /// `loaded`: it is what the instance has loaded.
@@ -34,12 +32,7 @@ void add_extension(Row& row, std::span<const plc_KeyValue> entries);
   return static_cast<double>(nanoseconds) / 1000.0;
 }
 
-/// The columns of the tables.
-[[nodiscard]] const std::vector<Column>& instance_columns();
-[[nodiscard]] const std::vector<Column>& task_columns();
-[[nodiscard]] const std::vector<Column>& event_columns();
-[[nodiscard]] const std::vector<Column>& writer_columns();
-[[nodiscard]] const std::vector<Column>& exception_columns();
+/// The columns of their tables.
 [[nodiscard]] const std::vector<Column>& transition_columns();
 [[nodiscard]] const std::vector<Column>& application_columns();
 

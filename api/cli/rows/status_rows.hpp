@@ -21,7 +21,7 @@ namespace status_rows {
 
 template <class Value>
 void add(Row& row, const dds::FieldInfo& field, const Value& value) {
-  const std::string name(field.name);
+  const std::string name(field.row);
   if constexpr (std::integral<Value>) {
     if (!field.words.empty()) {
       row[name] = dds::word_for(field.words, static_cast<std::uint64_t>(value));
@@ -36,15 +36,16 @@ void add(Row& row, const dds::FieldInfo& field, const Value& value) {
   } else if constexpr (std::convertible_to<Value, std::string_view>) {
     row[name] = std::string_view(value);
   } else {
-    row[name] = fmt::format("{:02x}", fmt::join(value, ""));
+    const bool of_all = std::ranges::all_of(value, [](auto octet) { return octet == 0; });
+    row[name] = of_all ? "all" : fmt::format("{:02x}", fmt::join(value, ""));
   }
 }
 
 }  // namespace status_rows
 
 /// The row of a status topic whose members say all: each in its order, durations in us, times as a text and
-/// as a number, codes as words; then what `ext` has. Topics with rows of their own have a to_row() in
-/// rows.hpp.
+/// as a number, codes as words, GUIDs as digits ("all": of zeros); then what `ext` has. Topics with rows of
+/// their own have a to_row() in rows.hpp.
 template <class Sample>
 [[nodiscard]] Row to_row(const Sample& sample) {
   Row row;
@@ -54,17 +55,26 @@ template <class Sample>
   return row;
 }
 
-/// All members as columns; where there is no room, the last ones go first, and keys never.
+/// The columns that control.idl names; else all members: where there is no room, the last ones go first, and
+/// keys never.
 template <class Sample>
 [[nodiscard]] const std::vector<Column>& columns_of() {
   static const auto made = [] {
-    static std::deque<std::string> texts;  // a Column names them
     std::vector<Column> columns;
+    for (const dds::ColumnInfo& told : dds::kColumns<Sample>) {
+      columns.push_back({.field = told.field,
+                         .header = told.header,
+                         .decimals = told.decimals,
+                         .rank = told.rank,
+                         .none = told.none});
+    }
+    if (!columns.empty()) return columns;
+    static std::deque<std::string> texts;  // a Column names them
     dds::visit_fields(Sample{}, [&](const dds::FieldInfo& field, const auto& /*value*/) {
       const bool duration = field.unit == dds::Unit::duration;
       const std::string& name =
           texts.emplace_back(duration ? fmt::format("{}_us", field.base)
-                                      : std::string(field.unit == dds::Unit::unix ? field.base : field.name));
+                                      : std::string(field.unit == dds::Unit::unix ? field.base : field.row));
       std::string header(field.base);
       std::ranges::transform(header, header.begin(), [](char c) {
         return c == '_' ? '-' : static_cast<char>(c >= 'a' && c <= 'z' ? c - 'a' + 'A' : c);
@@ -76,26 +86,6 @@ template <class Sample>
     return columns;
   }();
   return made;
-}
-template <>
-[[nodiscard]] inline const std::vector<Column>& columns_of<plc_InstanceStatus>() {
-  return instance_columns();
-}
-template <>
-[[nodiscard]] inline const std::vector<Column>& columns_of<plc_TaskStatus>() {
-  return task_columns();
-}
-template <>
-[[nodiscard]] inline const std::vector<Column>& columns_of<plc_EventStatus>() {
-  return event_columns();
-}
-template <>
-[[nodiscard]] inline const std::vector<Column>& columns_of<plc_WriterStatus>() {
-  return writer_columns();
-}
-template <>
-[[nodiscard]] inline const std::vector<Column>& columns_of<plc_ExceptionStatus>() {
-  return exception_columns();
 }
 
 }  // namespace plchost

@@ -24,7 +24,7 @@ namespace {
 int list_tasks(CliSession& session, const std::string& instance) {
   const auto rows = task_rows(session, instance);
   if (!rows) return CliSession::fail(rows.error());
-  return session.show(*rows, task_columns());
+  return session.show(*rows, columns_of<plc_TaskStatus>());
 }
 
 template <class Sample>

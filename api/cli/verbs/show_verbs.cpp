@@ -48,19 +48,12 @@ Result<Sample> find(CliSession& session, Snapshot<Sample> snapshot, std::string_
   return unknown_name(what, name, names, *host);
 }
 
-// Times as people write them, and nothing where there is no process.
-Row for_people(Row row, std::int64_t state_since_unix_ns) {
-  Row said;
-  for (const auto& [field, value] : row.items()) {
-    if (field == "state_since_unix_s") {
-      said["state_since"] = time_text(state_since_unix_ns);
-    } else {
-      said[field] = value;
-    }
-  }
-  if (row.at("pid") == 0) said["pid"] = Row();
-  if (row.at("core") == -1) said["core"] = Row();
-  return said;
+// No time as a number, and nothing where there is no process.
+Row for_people(Row row) {
+  row.erase("state_since_unix_ns");
+  if (row.at("pid") == 0) row["pid"] = Row();
+  if (row.at("core") == -1) row["core"] = Row();
+  return row;
 }
 
 /// The number of the version that is loaded; null: it was not sent, but is another file of the host.
@@ -84,7 +77,7 @@ int show_instance(CliSession& session, const std::string& name) {
   Row row = to_row(*instance);
   row["loaded_version"] = *version;
   if (session.options.json || session.options.csv) return show_row(session, row);
-  fmt::print("{}", format_fields(for_people(row, instance->state_since_unix_ns)));
+  fmt::print("{}", format_fields(for_people(row)));
   return kExitDone;
 }
 

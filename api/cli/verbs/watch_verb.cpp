@@ -3,6 +3,7 @@
 #include "api/cli/cli_session.hpp"
 #include "api/cli/repeat.hpp"
 #include "api/cli/rows/rows.hpp"
+#include "api/cli/rows/status_rows.hpp"
 #include "api/cli/rows/task_rows.hpp"
 #include "api/cli/verbs/object_verbs.hpp"
 #include "api/cli/verbs/transition_verbs.hpp"
@@ -24,7 +25,7 @@ int watch(CliSession& session, const WatchArguments& arguments) {
   return repeat(repetition, [&] {
     const auto rows = task_rows(session, arguments.instance);
     if (!rows) return CliSession::fail(rows.error());
-    return session.show(*rows, task_columns());
+    return session.show(*rows, columns_of<plc_TaskStatus>());
   });
 }
 

@@ -55,14 +55,14 @@ TEST_F(Plcctl, ShowsHowAnInstanceIsStartedAndRestarted) {
   EXPECT_EQ(json["configured"], "/opt/line1.so");
   EXPECT_EQ(json["loaded"], "") << "its process says that it has none";
   EXPECT_EQ(json["loaded_version"], nullptr);
-  EXPECT_EQ(json["band"], "normal");
+  EXPECT_EQ(json["priority_band"], "normal");
   EXPECT_EQ(json["after"], "io,axis");
   EXPECT_EQ(json["autostart"], true);
-  EXPECT_EQ(json["restart"], "on-failure");
-  EXPECT_EQ(json["restart_delay_ms"], 100);
-  EXPECT_EQ(json["restart_delay_max_ms"], 5000);
+  EXPECT_EQ(json["restart_policy"], "on-failure");
+  EXPECT_EQ(json["restart_delay_us"], 100'000);
+  EXPECT_EQ(json["restart_delay_max_us"], 5'000'000);
   EXPECT_EQ(json["crash_limit"], 5);
-  EXPECT_EQ(json["crash_window_s"], 60);
+  EXPECT_EQ(json["crash_window_us"], 60'000'000);
   EXPECT_THAT(run({"show", "instance", "line1"}).output, testing::HasSubstr("on-failure"));
 }
 

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "api/cli/rows/rows.hpp"
+#include "api/cli/rows/status_rows.hpp"
 #include "api/dds/text.hpp"
 
 namespace plchost {

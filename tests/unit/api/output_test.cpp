@@ -115,8 +115,9 @@ TEST_P(EveryTable, FitsIntoATerminalOf80CharactersByItsRanks) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, EveryTable,
-                         testing::Values(&instance_columns(), &task_columns(), &event_columns(),
-                                         &writer_columns(), &exception_columns(), &transition_columns(),
+                         testing::Values(&columns_of<plc_InstanceStatus>(), &columns_of<plc_TaskStatus>(),
+                                         &columns_of<plc_EventStatus>(), &columns_of<plc_WriterStatus>(),
+                                         &columns_of<plc_ExceptionStatus>(), &transition_columns(),
                                          &application_columns(), &host_columns(), &node_columns(),
                                          &route_columns(), &object_columns()));
 

@@ -43,7 +43,9 @@ TEST(StatusRows, HaveTimesAsTextAndNumberAndGuidsAsDigits) {
   const Row row = to_row<plc_WriterStatus>(writer);
   EXPECT_EQ(row.at("last"), "1970-01-01T00:00:01.000Z");
   EXPECT_EQ(row.at("last_unix_ns"), 1'000'000'000);
-  EXPECT_EQ(row.at("source"), "ab000000000000000000000000000000");
+  EXPECT_EQ(row.at("writer"), "ab000000000000000000000000000000")
+      << "by the name that control.idl gives rows";
+  EXPECT_EQ(to_row(plc_WriterStatus{}).at("writer"), "all");
 }
 
 TEST(StatusRows, ShowWhatTheirExtensionHas) {
@@ -63,6 +65,24 @@ TEST(StatusRows, HaveAColumnForEachMember) {
   EXPECT_STREQ(columns[1].header, "OBJECT-NAME");
   EXPECT_EQ(columns[1].rank, 0) << "a key is never left out";
   EXPECT_GT(columns[3].rank, columns[2].rank);
+}
+
+TEST(StatusRows, HaveTheColumnsThatTheContractNames) {
+  const auto& columns = columns_of<plc_InstanceStatus>();
+  ASSERT_EQ(columns.size(), 9U);
+  EXPECT_STREQ(columns[1].field, "name");
+  EXPECT_STREQ(columns[1].header, "NAME");
+  EXPECT_EQ(columns[4].rank, 3);
+  EXPECT_EQ(columns[4].none, -1);
+  const auto& of_tasks = columns_of<plc_TaskStatus>();
+  const auto interval = std::ranges::find(of_tasks, std::string_view("interval_us"), &Column::field);
+  ASSERT_NE(interval, of_tasks.end());
+  EXPECT_STREQ(interval->header, "INTERVAL(us)");
+  EXPECT_EQ(interval->decimals, 0);
+  for (const Column& column : of_tasks) EXPECT_TRUE(to_row(plc_TaskStatus{}).contains(column.field));
+  for (const Column& column : columns_of<plc_ExceptionStatus>()) {
+    EXPECT_TRUE(to_row(plc_ExceptionStatus{}).contains(column.field)) << column.field;
+  }
 }
 
 TEST(StatusWords, AreThoseOfTheContract) {
