@@ -23,7 +23,7 @@ std::string wish_memory_name(std::string_view pool, std::string_view instance) {
   return fmt::format("{}.wish.{}", pool, instance);
 }
 
-// What another user has put there in the place of none was never a wish.
+// A file that another user has put there in the place of none was never a wish.
 bool is_damaged(const Error& error) noexcept {
   return error.code != ErrorCode::not_found && error.code != ErrorCode::refused &&
          error.code != ErrorCode::wrong_type;

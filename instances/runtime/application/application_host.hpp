@@ -56,7 +56,7 @@ class ApplicationHost {
   /// An application is committed: another one can only take over from it.
   [[nodiscard]] bool has_application() const noexcept { return has_application_; }
 
-  /// Code of components runs while it exists, on the control thread: what that registers stays, whatever
+  /// Code of components runs while it exists, on the control thread. Its registrations stay, whatever
   /// application runs.
   class ComponentCode {
    public:

@@ -163,7 +163,7 @@ Result<std::string> Areas::place(const Environment& environment, std::vector<Dec
   plan_ = *std::move(plan);
   cycles_.resize(tasks.size());
   plain_.resize(declared_.size(), nullptr);
-  // What can fail comes before anything is written that others see.
+  // All steps that can fail come before anything is written that others see.
   auto made = make_blocks(environment);
   if (made) made = make_keeper(environment);
   if (!made) {

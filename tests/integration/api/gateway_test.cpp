@@ -215,7 +215,7 @@ TEST_F(Gateway, SendersAreToldWhenAHostIsGone) {
       becomes([&] { return north.channel.send({.host = 2, .node = 1}, {}) == SendResult::unreachable; }));
 }
 
-// What has left its sender and waits for room on the way to a host that is not heard any more.
+// Blocks that have left their sender wait for room on the way to a host that is not heard any more.
 TEST_F(Gateway, BlocksForAHostThatFallsSilentAreCountedAsWithoutARoute) {
   Side north(domain_, "north", 1, "press");
   Side south(domain_, "south", 2, "packer");

@@ -247,7 +247,7 @@ TEST_F(OnlineDeclaration, ThatIsNotTakenKeepsEventsThatWereRegisteredLater) {
   EXPECT_TRUE(is_registered(late));
 }
 
-// What a callback of a component registers stays with the component.
+// An event that a callback of a component registers stays with the component.
 void registers(unsigned /*event*/, const EVTPARAM_ExternalEventTask* /*parameter*/, void* user) {
   (void)SchedRegisterExternalEvent(static_cast<const char*>(user), nullptr);
 }
