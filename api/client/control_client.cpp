@@ -139,19 +139,21 @@ Result<std::vector<plc_ApplicationStatus>> ControlClient::applications(const std
   return status<plc_ApplicationStatus>(host, deadline);
 }
 
-Result<void> ControlClient::open_own_reader(dds::Entity& topic, dds::Entity& reader,
-                                            const dds::TopicInfo& info, const dds::Qos& qos) {
-  if (reader) return {};
+// With the subscriber to its partition, if there is none yet.
+Result<dds::Entity> ControlClient::make_own_topic(const dds::TopicInfo& info) {
   if (!own_subscriber_) {
     auto made = dds::make_subscriber(entity(), partition_);
     if (!made) return std::unexpected(made.error());
     own_subscriber_ = std::move(*made);
   }
-  auto made_topic = dds::make_topic(entity(), info);
-  if (!made_topic) return std::unexpected(made_topic.error());
-  auto made_reader = dds::make_reader(own_subscriber_.get(), made_topic->get(), qos);
+  return dds::make_topic(entity(), info);
+}
+
+Result<void> ControlClient::read_own(dds::Entity& topic, dds::Entity& reader, dds::Entity made,
+                                     const dds::Qos& qos) {
+  auto made_reader = dds::make_reader(own_subscriber_.get(), made.get(), qos);
   if (!made_reader) return std::unexpected(made_reader.error());
-  topic = std::move(*made_topic);
+  topic = std::move(made);
   reader = std::move(*made_reader);
   return wait_set_.add(reader.get(), DDS_DATA_AVAILABLE_STATUS);
 }
@@ -160,7 +162,7 @@ Result<RequestCaller*> ControlClient::caller(const std::string& host, bool engin
   const std::pair key(host, engineering);
   if (const auto known = callers_.find(key); known != callers_.end()) return &known->second;
   const dds::Qos qos = dds::answers_qos(dds::kReply, dds::kReply.qos.depth);
-  if (auto opened = open_own_reader(reply_topic_, reply_reader_, dds::kReply, qos); !opened) {
+  if (auto opened = open_own_reader<plc_Reply>(reply_topic_, reply_reader_, qos); !opened) {
     return std::unexpected(opened.error());
   }
   dds::Entity& topic = request_topics_.at(engineering ? 1 : 0);
@@ -174,6 +176,7 @@ Result<RequestCaller*> ControlClient::caller(const std::string& host, bool engin
   if (auto added = wait_set_.add(made->writer(), DDS_PUBLICATION_MATCHED_STATUS); !added) {
     return std::unexpected(added.error());
   }
+  own_answers_.add(made->guid());
   return &callers_.emplace(key, std::move(*made)).first->second;
 }
 
@@ -191,7 +194,10 @@ Result<ApiReply> ControlClient::ask(const ApiRequest& request, TimePoint deadlin
   const auto clock = [&] { return clock_of(request.host); };
   auto reply =
       (*asked)->call(request, reply_reader_.get(), wait_set_, deadline, clock, answering_, meanwhile);
-  if (!reply) callers_.erase({request.host, engineering});
+  if (!reply) {
+    own_answers_.remove((*asked)->guid());
+    callers_.erase({request.host, engineering});
+  }
   return reply;
 }
 

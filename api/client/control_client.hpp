@@ -17,6 +17,7 @@
 #include <control.h>
 #include <status_topics.hpp>
 
+#include "api/client/own_answers.hpp"
 #include "api/client/participant.hpp"
 #include "api/client/poster.hpp"
 #include "api/client/request_caller.hpp"
@@ -229,8 +230,14 @@ class ControlClient {
   template <class Cache>
   [[nodiscard]] Result<void> open_cache(Cache& cache, const dds::TopicInfo& topic,
                                         std::uint32_t statuses = DDS_DATA_AVAILABLE_STATUS);
-  [[nodiscard]] Result<void> open_own_reader(dds::Entity& topic, dds::Entity& reader,
-                                             const dds::TopicInfo& info, const dds::Qos& qos);
+  /// Keeps answers to this client only.
+  template <class Answer>
+  [[nodiscard]] Result<void> open_own_reader(dds::Entity& topic, dds::Entity& reader, const dds::Qos& qos);
+  /// Of acknowledgements: the latest one of each source is kept, so there is nothing that fills up.
+  [[nodiscard]] Result<void> open_ack_reader();
+  [[nodiscard]] Result<dds::Entity> make_own_topic(const dds::TopicInfo& info);
+  [[nodiscard]] Result<void> read_own(dds::Entity& topic, dds::Entity& reader, dds::Entity made,
+                                      const dds::Qos& qos);
   [[nodiscard]] Result<RequestCaller*> caller(const std::string& host, bool engineering);
   /// Asks, and waits for the answer. A request that was given up leaves no writer that would still send it.
   [[nodiscard]] Result<ApiReply> ask(const ApiRequest& request, TimePoint deadline,
@@ -254,8 +261,7 @@ class ControlClient {
     dds::Entity reader;
   };
   void calm_pages() const noexcept;
-  /// While no call is under way: those to others of the same participant come here, too. Unread, they would
-  /// keep waits from waiting, and, when the reader is full, all readers of the process from receiving.
+  /// While no call is under way: answers to calls that were given up would keep waits from waiting.
   void drop_replies();
   template <class Page, class Listing>
   [[nodiscard]] Result<Listing> ask_for_page(PageReader& pages, const dds::TopicInfo& topic,
@@ -263,6 +269,7 @@ class ControlClient {
 
   std::shared_ptr<Participant> participant_;
   WaitSet wait_set_;
+  OwnAnswers own_answers_;  // its readers end before it
   std::string partition_;
   dds::Entity own_subscriber_;
   dds::Entity status_subscriber_;

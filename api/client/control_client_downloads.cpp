@@ -4,6 +4,7 @@
 
 #include "api/client/check_names.hpp"
 #include "api/client/control_client.hpp"
+#include "api/client/control_client_status.hpp"
 #include "api/client/file_sender.hpp"
 #include "api/control/application_order.hpp"
 #include "api/dds/entries.hpp"
@@ -45,7 +46,7 @@ Result<ApiReply> ControlClient::download(const Download& download, const Downloa
   if (download.contents.empty()) return failure(ErrorCode::invalid_argument, download.name + " is empty");
   constexpr std::int32_t kOfEachHost = 16;
   const dds::Qos qos = dds::answers_qos(dds::kDownloadAck, kOfEachHost);
-  if (auto opened = open_own_reader(download_acks_.topic, download_acks_.reader, dds::kDownloadAck, qos);
+  if (auto opened = open_own_reader<plc_DownloadAck>(download_acks_.topic, download_acks_.reader, qos);
       !opened) {
     return std::unexpected(opened.error());
   }

@@ -4,6 +4,7 @@
 
 #include "api/client/check_names.hpp"
 #include "api/client/control_client.hpp"
+#include "api/client/control_client_status.hpp"
 #include "api/dds/sample_identity.hpp"
 
 namespace plchost {
@@ -35,7 +36,7 @@ Result<Listing> ControlClient::ask_for_page(PageReader& pages, const dds::TopicI
                                             const ApiRequest& request, TimePoint deadline) {
   if (auto good = check_host_name(request.host); !good) return std::unexpected(std::move(good).error());
   const dds::Qos qos = dds::answers_qos(topic, topic.qos.depth);
-  if (auto opened = open_own_reader(pages.topic, pages.reader, topic, qos); !opened) {
+  if (auto opened = open_own_reader<Page>(pages.topic, pages.reader, qos); !opened) {
     return std::unexpected(opened.error());
   }
   for (;;) {

@@ -11,14 +11,18 @@
 
 namespace plchost {
 
+Result<void> ControlClient::open_ack_reader() {
+  if (ack_reader_) return {};
+  auto made = make_own_topic(dds::kEventAck);
+  if (!made) return std::unexpected(std::move(made).error());
+  return read_own(ack_topic_, ack_reader_, *std::move(made), dds::qos_of(dds::kEventAck));
+}
+
 template <class Sample>
 Result<Poster<Sample>*> ControlClient::poster(const std::string& host) {
   auto& [topic, of_host] = std::get<Posters<Sample>>(posters_);
   if (const auto known = of_host.find(host); known != of_host.end()) return &known->second;
-  if (auto opened = open_own_reader(ack_topic_, ack_reader_, dds::kEventAck, dds::qos_of(dds::kEventAck));
-      !opened) {
-    return std::unexpected(opened.error());
-  }
+  if (auto opened = open_ack_reader(); !opened) return std::unexpected(opened.error());
   if (!topic) {
     auto made = dds::make_topic(entity(), dds::kTopicOf<Sample>);
     if (!made) return std::unexpected(made.error());
@@ -29,6 +33,7 @@ Result<Poster<Sample>*> ControlClient::poster(const std::string& host) {
   if (auto added = wait_set_.add(made->writer(), DDS_PUBLICATION_MATCHED_STATUS); !added) {
     return std::unexpected(added.error());
   }
+  own_answers_.add(made->source());
   return &of_host.emplace(host, std::move(*made)).first->second;
 }
 template Result<EventPoster*> ControlClient::poster<plc_EventPost>(const std::string& host);

@@ -28,6 +28,15 @@ Result<void> ControlClient::open_cache(Cache& cache, const dds::TopicInfo& info,
   return {};
 }
 
+template <class Answer>
+Result<void> ControlClient::open_own_reader(dds::Entity& topic, dds::Entity& reader, const dds::Qos& qos) {
+  if (reader) return {};
+  auto made = make_own_topic(dds::kTopicOf<Answer>);
+  if (!made) return std::unexpected(std::move(made).error());
+  if (auto filtered = own_answers_.filter<Answer>(made->get()); !filtered) return filtered;
+  return read_own(topic, reader, *std::move(made), qos);
+}
+
 template <class Sample>
 Result<std::vector<Sample>> ControlClient::status(const std::string& host, TimePoint deadline) {
   auto& cache = std::get<StatusCache<Sample>>(status_);

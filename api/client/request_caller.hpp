@@ -46,6 +46,7 @@ class RequestCaller {
   [[nodiscard]] static Result<RequestCaller> create(dds_entity_t participant, dds_entity_t topic,
                                                     const std::string& host);
   [[nodiscard]] dds_entity_t writer() const noexcept { return writer_.get(); }
+  [[nodiscard]] const dds::Guid& guid() const noexcept { return guid_; }
 
   /// How long a call goes on waiting.
   struct Wait {

@@ -131,6 +131,20 @@ TEST_F(RemoteCommand, IsAnsweredToTheOneOfTwoClientsOfAParticipantThatAsked) {
   EXPECT_EQ(host_.requests().size(), 2U * kEach);
 }
 
+// Its readers have room for so many answers. Cyclone's receiving thread waits for a full reader.
+TEST_F(RemoteCommand, IsAnsweredWhileAnotherClientOfTheParticipantTakesNothing) {
+  host_.start_server();
+  const auto idle = connect(domain_);
+  const auto sut = ControlClient::connect(idle->participant()).value();
+  ASSERT_TRUE(idle->call({"hosta", plc_OPERATION_START, "line1", ""}, soon()));
+  constexpr int kRoom = dds::kReply.qos.depth * dds::kMaxServersPerMachine;
+  for (int i = 0; i < kRoom + 50; ++i) {
+    const auto reply = sut->call({"hosta", plc_OPERATION_START, "line1", ""}, soon());
+    ASSERT_TRUE(reply) << i << ": " << reply.error().describe();
+  }
+  EXPECT_TRUE(idle->call({"hosta", plc_OPERATION_START, "line1", ""}, soon()));
+}
+
 TEST_F(RemoteCommand, ForAnUnknownInstanceIsRefusedByName) {
   host_.start_server();
   const auto reply = connect(domain_)->call({"hosta", plc_OPERATION_START, "line9", ""}, soon());
