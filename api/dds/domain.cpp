@@ -11,6 +11,7 @@
 #include <string_view>
 #include <system_error>
 
+#include <dds/ddsrt/log.h>
 #include <fmt/format.h>
 #include <net/if.h>
 #include <netinet/in.h>
@@ -18,6 +19,7 @@
 #include <sys/socket.h>
 
 #include "api/dds/client_gate.hpp"
+#include "api/dds/cyclone_version.h"
 #include "api/dds/datagram_filter.h"
 #include "api/dds/error.hpp"
 #include "api/dds/handshakes.h"
@@ -90,6 +92,19 @@ void end_domain(std::uint32_t number, std::unique_ptr<Entity> domain) {
   domain.reset();
   all.domains[number].is_there = false;
   all.ended.notify_all();
+}
+
+// With another release of Cyclone the client works all the same, and its log says what it lacks.
+Result<void> filter_datagrams(const Entity& participant, std::string_view what) {
+  if (plc_filter_datagrams(participant.get(), pass_to_client)) return {};
+  const char* const why = plc_unknown_cyclone();
+  if (why == nullptr) {
+    return failure(ErrorCode::refused,
+                   fmt::format("{}: the packets that it would receive cannot be filtered", what));
+  }
+  dds_log(DDS_LC_WARNING, __FILE__, __LINE__, __func__,
+          "%s: packets of strangers are not filtered in this secured client\n", why);
+  return {};
 }
 
 }  // namespace
@@ -193,7 +208,8 @@ Result<Entity> make_participant(std::uint32_t domain, const dds_qos_t* qos, std:
   const std::lock_guard lock(registry().mutex);
   auto made = check_entity(dds_create_participant(domain, qos, nullptr), std::string(what));
   if (made) (void)plc_watch_handshakes(made->get());
-  if (made && registry().gated.contains(domain)) (void)plc_filter_datagrams(made->get(), pass_to_client);
+  if (!made || !registry().gated.contains(domain)) return made;
+  if (auto filtered = filter_datagrams(*made, what); !filtered) return std::unexpected(filtered.error());
   return made;
 }
 

@@ -1,5 +1,7 @@
 // The gate of a secured host, and the packets of its own clients.
 #include <chrono>
+#include <cstdlib>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <memory>
@@ -7,6 +9,7 @@
 #include <thread>
 #include <vector>
 
+#include <dlfcn.h>
 #include <gmock/gmock.h>
 
 #include "tests/integration/security/secured_host.hpp"
@@ -48,6 +51,25 @@ TEST_F(OwnClients, AreNeverRefusedByTheGate) {
   made.clear();
   std::this_thread::sleep_for(std::chrono::seconds(2));
   EXPECT_THAT(log(), testing::Not(testing::HasSubstr("refused")));
+}
+
+// A libddsc that the client was not built with, by the name of its file.
+TEST_F(OwnClients, SayThatAnUnknownCycloneFiltersNothing) {
+  start();
+  EXPECT_THAT(run("viewer", {"list", "instances"}).errors, testing::Not(testing::HasSubstr("not filtered")));
+  Dl_info library{};
+  ASSERT_NE(::dladdr(::dlsym(RTLD_DEFAULT, "dds_create_domain"), &library), 0);
+  const std::string soname = std::filesystem::path(library.dli_fname).filename();
+  const std::string libraries = base_ + "/libraries";
+  std::filesystem::create_directory(libraries);
+  std::filesystem::copy_file(std::filesystem::canonical(library.dli_fname),
+                             libraries + "/libddsc.so.0.10.99");
+  std::filesystem::create_symlink("libddsc.so.0.10.99", libraries + "/" + soname);
+  ::setenv("LD_LIBRARY_PATH", libraries.c_str(), 1);  // NOLINT(concurrency-mt-unsafe)
+  const RunResult listed = run("viewer", {"list", "instances"});
+  ::unsetenv("LD_LIBRARY_PATH");  // NOLINT(concurrency-mt-unsafe)
+  EXPECT_EQ(listed.code, 0) << listed.errors;
+  EXPECT_THAT(listed.errors, testing::HasSubstr("packets of strangers are not filtered"));
 }
 
 // The first ones of a process load Cyclone's security plugins.
