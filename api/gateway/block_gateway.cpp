@@ -227,7 +227,9 @@ void BlockGateway::write_acks() {
   const NodeSet full = pending_->full();
   constexpr NodeSet kLow(~std::uint64_t{0});
   for (const auto& [number, peer] : peers_) {
-    if (!peer->has_news) continue;
+    // It sends nothing to a full node, so no block of its own would tell it that the node takes blocks again.
+    const bool has_room_again = (peer->told_full & ~full).any();
+    if (!peer->has_news && !has_room_again) continue;
     plc_BlockAck ack{};
     ack.from_host = options_.number;
     peer->stream.copy_to(ack.writer_guid);
@@ -235,7 +237,9 @@ void BlockGateway::write_acks() {
     ack.full_nodes[0] = (full & kLow).to_ullong();
     ack.full_nodes[1] = (full >> 64).to_ullong();
     // One that cannot be written now is with the next beat.
-    if (dds_write(peer->acks.get(), &ack) == DDS_RETCODE_OK) peer->has_news = false;
+    if (dds_write(peer->acks.get(), &ack) != DDS_RETCODE_OK) continue;
+    peer->has_news = false;
+    peer->told_full = full;
   }
 }
 

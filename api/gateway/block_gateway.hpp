@@ -74,6 +74,7 @@ class BlockGateway {
     std::optional<TimePoint> heard;
     dds::Guid stream;         // the sender of the blocks from there
     std::uint64_t taken = 0;  // the last one of them
+    NodeSet told_full;        // of this host, with the last acknowledgement
     bool has_news = false;    // to be acknowledged
   };
   using Peers = std::map<std::uint16_t, std::unique_ptr<Peer>>;

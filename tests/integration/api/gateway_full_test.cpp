@@ -1,0 +1,126 @@
+// Two gateways in this process, under a clock that stands still: no beat comes.
+#include <atomic>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <gmock/gmock.h>
+#include <unistd.h>
+
+#include "api/gateway/block_gateway.hpp"
+#include "shm/block_driver/block_channel.hpp"
+#include "tests/integration/api/test_host.hpp"
+#include "tests/support/own_name.hpp"
+
+namespace plchost {
+namespace {
+
+using std::chrono::milliseconds;
+
+/// A host with a gateway and one node.
+class GatewayEnd {
+ public:
+  GatewayEnd(const OwnDomain& domain, const std::string& host, std::uint16_t number)
+      : number_(number),
+        pool_name_(own_name(host)),
+        pool_(ObjectPool::create(pool_name_, {.max_objects = 64}).value()),
+        participant_(dds_create_participant(domain.number(), nullptr, nullptr)),
+        gateway_(BlockGateway::create(participant_.get(),
+                                      {.pool = pool_name_,
+                                       .base = NodeOptions{}.base,
+                                       .host = host,
+                                       .number = number,
+                                       .since_ns = number,
+                                       .epoch = number},
+                                      wake_)
+                     .value()),
+        node_(BlockNode::join({.pool = pool_name_, .entry = {.name = "node"}}).value()),
+        router_(BlockRouter::create(*node_).value()),
+        thread_([this] { router_->run(stop_); }),
+        channel_(BlockChannel::open(*node_, "test").value()) {}
+  GatewayEnd(const GatewayEnd&) = delete;
+  GatewayEnd& operator=(const GatewayEnd&) = delete;
+  ~GatewayEnd() {
+    stop_.store(true);
+    router_->wake();
+    thread_.join();
+    gateway_.reset();
+    NodeDirectory::remove(pool_name_);
+    ObjectPool::remove(pool_name_);
+  }
+
+  void serve(TimePoint now) { (void)gateway_->serve(now); }
+  [[nodiscard]] NodeAddress address() { return {.host = number_, .node = node_->address().node}; }
+  [[nodiscard]] SendResult send(NodeAddress to, std::span<const std::byte> contents) {
+    return channel_.send(to, contents);
+  }
+  /// Takes all that is there; returns how many blocks that were.
+  std::size_t drain() {
+    std::size_t taken = 0;
+    while (channel_.receive(buffer_, received_) == TakeResult::taken) ++taken;
+    return taken;
+  }
+
+ private:
+  std::uint16_t number_;
+  std::string pool_name_;
+  ObjectPool pool_;
+  CountedEvent wake_;
+  dds::Entity participant_;
+  std::unique_ptr<BlockGateway> gateway_;
+  std::unique_ptr<BlockNode> node_;
+  std::unique_ptr<BlockRouter> router_;
+  std::atomic<bool> stop_{false};
+  std::thread thread_;
+  BlockChannel channel_;
+  std::vector<std::byte> buffer_ = std::vector<std::byte>(kMaxBlockSize);
+  Received received_;
+};
+
+class FullNode : public testing::Test {
+ protected:
+  /// Whether a send has this result within `patience`. Both ends serve meanwhile: at `now`, or at the real
+  /// time.
+  bool sends(SendResult wanted, std::span<const std::byte> contents, std::optional<TimePoint> now,
+             Duration patience = kPatience) {
+    for (const TimePoint end = MonotonicClock::now() + patience; MonotonicClock::now() < end;
+         ::usleep(1000)) {
+      const SendResult result = north_.send(south_.address(), contents);
+      for (GatewayEnd* const one : {&north_, &south_}) one->serve(now.value_or(MonotonicClock::now()));
+      if (result == wanted) return true;
+    }
+    return false;
+  }
+
+  OwnDomain domain_;
+  std::unique_ptr<ControlClient> client_ = connect(domain_);  // opens the domain for this machine only
+  GatewayEnd north_{domain_, "north", 1};
+  GatewayEnd south_{domain_, "south", 2};
+};
+
+TEST_F(FullNode, ThatHasRoomAgainIsToldWithoutWaitingForTheNextBeat) {
+  const std::vector<std::byte> large(60000);
+  ASSERT_TRUE(sends(SendResult::sent, large, std::nullopt));
+  const TimePoint frozen = MonotonicClock::now();
+  // Nobody takes blocks there. It is full when nothing can be sent any more.
+  while (sends(SendResult::sent, large, frozen, milliseconds(200))) {
+  }
+  // All blocks that have left the other host.
+  for (int quiet = 0; quiet < 100; ++quiet, ::usleep(1000)) {
+    south_.serve(frozen);
+    if (south_.drain() > 0) quiet = 0;
+  }
+
+  bool has_come = false;
+  for (const TimePoint end = soon(); !has_come && MonotonicClock::now() < end;) {
+    (void)sends(SendResult::sent, large, frozen, milliseconds(10));
+    has_come = south_.drain() > 0;
+  }
+  EXPECT_TRUE(has_come);
+}
+
+}  // namespace
+}  // namespace plchost
