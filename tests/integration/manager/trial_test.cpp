@@ -36,6 +36,18 @@ class Trial : public testing::Test {
     return reply.text;
   }
 
+  /// The pool has 64 places, and others have taken all that line1 left: name_of(0), name_of(1), and so on.
+  Result<ObjectPool> start_with_full_pool() {
+    plant_.set_host_keys("pool_objects = 64");
+    start("manager_chatter");
+    auto pool = ObjectPool::attach(plant_.pool());
+    int made = 0;
+    while (pool && pool->create_semaphore(name_of(made), 1, {.keep = true})) ++made;
+    EXPECT_GT(made, 3);
+    return pool;
+  }
+  static std::string name_of(int number) { return "others/" + std::to_string(number); }
+
   Plant plant_;
   int pid_ = 0;
 };
@@ -165,14 +177,8 @@ TEST_F(Trial, FindsAThreadThatTakesTheProcessorInTheSetUpAndBlocksAllSignals) {
 }
 
 TEST_F(Trial, FindsThatThePoolHasNoRoomForAnEvent) {
-  plant_.set_host_keys("pool_objects = 64");
-  start("manager_chatter");
-  auto pool = ObjectPool::attach(plant_.pool());
+  auto pool = start_with_full_pool();
   ASSERT_TRUE(pool);
-  int made = 0;
-  const auto name_of = [](int number) { return "others/" + std::to_string(number); };
-  while (pool->create_semaphore(name_of(made), 1, {.keep = true})) ++made;
-  ASSERT_GT(made, 0);
   EXPECT_THAT(refusal("packer"), AllOf(HasSubstr("has no room for event 'line1/product'"), HasSubstr("64")));
   EXPECT_EQ(plant_.ask(ControlVerb::load_application, "line1", Plant::application("manager_chatter")).code,
             ErrorCode::ok)
@@ -187,14 +193,8 @@ TEST_F(Trial, FindsThatThePoolHasNoRoomForAnEvent) {
 }
 
 TEST_F(Trial, FindsThatThePoolHasNoRoomForAMemory) {
-  plant_.set_host_keys("pool_objects = 64");
-  start("manager_chatter");
-  auto pool = ObjectPool::attach(plant_.pool());
+  auto pool = start_with_full_pool();
   ASSERT_TRUE(pool);
-  int made = 0;
-  const auto name_of = [](int number) { return "others/" + std::to_string(number); };
-  while (pool->create_semaphore(name_of(made), 1, {.keep = true})) ++made;
-  ASSERT_GT(made, 3);
   ASSERT_TRUE(pool->remove_object(name_of(0)));  // for its event
   EXPECT_THAT(refusal("areas"), AllOf(HasSubstr("has no room for memory 'line1.retain'"), HasSubstr("64")));
   ASSERT_TRUE(pool->remove_object(name_of(1)));

@@ -8,7 +8,22 @@ namespace {
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-class TakenBack : public ManagedInstanceTest {};
+class TakenBack : public ManagedInstanceTest {
+ protected:
+  /// Another application has passed its trial, and its process begins.
+  void begin_load(const std::map<std::string, std::string>& options = {}) {
+    ask(ControlVerb::load_application, "/opt/new.so", options);
+    sut().on_application_checked({});
+    sut().on_exit(exited_with(0));
+  }
+  /// The process of another application has failed, and the one before runs again.
+  void take_back() {
+    begin_load();
+    sut().on_exit(exited_with(kExitSetupFailed));
+    report_ready();
+    EXPECT_EQ(take_reply().code, ErrorCode::unavailable);
+  }
+};
 
 TEST_F(TakenBack, AfterAFailureInAnyStepOfTheStart) {
   using enum SetupStep;
@@ -20,9 +35,7 @@ TEST_F(TakenBack, AfterAFailureInAnyStepOfTheStart) {
       wishes_ = FakeWishes();
       make();
       bring_up();
-      ask(ControlVerb::load_application, "/opt/new.so");
-      sut().on_application_checked({});
-      sut().on_exit(exited_with(0));
+      begin_load();
       EXPECT_FALSE(host_.spawned.back().kept_settings);
       sut().on_report({.step = step, .code = code, .text = "something is taken"});
       sut().on_exit(exited_with(kExitSetupFailed));
@@ -51,9 +64,7 @@ TEST_F(TakenBack, AlsoAfterABackOff) {
     wishes_ = FakeWishes();
     make();
     bring_up();
-    ask(ControlVerb::load_application, "/opt/new.so");
-    sut().on_application_checked({});
-    sut().on_exit(exited_with(0));
+    begin_load();
     sut().on_report(first);
     sut().on_exit(exited_with(kExitSetupFailed));
     EXPECT_EQ(take_reply().code, ErrorCode::unavailable);
@@ -73,9 +84,7 @@ TEST_F(TakenBack, AlsoAfterABackOff) {
 // same.
 TEST_F(TakenBack, IsToldAlsoWhereTheConfigurationChangesMeanwhile) {
   bring_up();
-  ask(ControlVerb::load_application, "/opt/new.so", {{"boot", "yes"}});
-  sut().on_application_checked({});
-  sut().on_exit(exited_with(0));
+  begin_load({{"boot", "yes"}});
   InstanceConfig changed = config_;
   changed.settings = "/etc/plchost/other.cfg";
   sut().reconfigure(changed);
@@ -90,9 +99,7 @@ TEST_F(TakenBack, IsToldAlsoWhereTheConfigurationChangesMeanwhile) {
 
 TEST_F(TakenBack, NotAfterItCameUpOnce) {
   bring_up();
-  ask(ControlVerb::load_application, "/opt/new.so");
-  sut().on_application_checked({});
-  sut().on_exit(exited_with(0));
+  begin_load();
   report_ready();
   EXPECT_EQ(take_reply().code, ErrorCode::ok);
   sut().on_exit(killed_by(SIGSEGV));
@@ -104,12 +111,7 @@ TEST_F(TakenBack, NotAfterItCameUpOnce) {
 
 TEST_F(TakenBack, WithTheSettingsOfThenUntilAnOperatorsNextStart) {
   bring_up();
-  ask(ControlVerb::load_application, "/opt/new.so");
-  sut().on_application_checked({});
-  sut().on_exit(exited_with(0));
-  sut().on_exit(exited_with(kExitSetupFailed));
-  report_ready();
-  take_reply();
+  take_back();
   crash_once();
   EXPECT_TRUE(host_.spawned.back().kept_settings) << "nobody has mended the file since";
   ask(ControlVerb::load_application, "/opt/new.so");
@@ -133,12 +135,7 @@ TEST_F(TakenBack, WithTheSettingsOfThenUntilAnOperatorsNextStart) {
 
 TEST_F(TakenBack, IsOverWhenAnotherOneTakesOverOnline) {
   bring_up();
-  ask(ControlVerb::load_application, "/opt/new.so");
-  sut().on_application_checked({});
-  sut().on_exit(exited_with(0));
-  sut().on_exit(exited_with(kExitSetupFailed));
-  report_ready();
-  take_reply();
+  take_back();
   ask(ControlVerb::load_application, "/opt/third.so", {{"online", "yes"}});
   sut().on_application_checked({});
   answer();
