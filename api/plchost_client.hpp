@@ -89,13 +89,12 @@ class PLCHOST_CLIENT_API Client {
   // The state of hosts, as the contract has it: plchost_client_types.hpp is made from control.idl.
 
   struct Host : client_types::Host {
-    bool answers = false;             ///< false: silent for more than 70 ms, or gone
-    std::vector<std::string> labels;  ///< of its configuration, beside its name
+    bool answers = false;  ///< false: silent for more than 70 ms, or gone
     unsigned instances = 0;
 
     friend bool operator==(const Host& a, const Host& b) {
       return static_cast<const client_types::Host&>(a) == b && a.answers == b.answers &&
-             a.labels == b.labels && a.instances == b.instances;
+             a.instances == b.instances;
     }
     friend bool operator!=(const Host& a, const Host& b) { return !(a == b); }
   };
@@ -294,7 +293,7 @@ class PLCHOST_CLIENT_API Client {
                const LoadOptions& options = {});
 
   /// Calls back for each host that is there, and whenever one comes, falls silent, answers again, or has
-  /// changed. Known within 100 ms.
+  /// changed; its load alone is no change. Known within 100 ms.
   Watch watch_hosts(std::function<void(const Host&)> callback);
   /// For each that is there, whenever something in it has changed, and once with `removed` when the host has
   /// it no more. Empty host: of all.

@@ -8,7 +8,6 @@
 
 #include "api/client/check_names.hpp"
 #include "api/client/control_client_status.hpp"
-#include "api/dds/entries.hpp"
 #include "api/dds/error.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/operations.hpp"

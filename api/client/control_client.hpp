@@ -49,8 +49,6 @@ struct HostView {
 
   /// The labels of its configuration, beside its name.
   [[nodiscard]] std::vector<std::string> labels() const;
-  /// An entry of its ext; empty: it is not there.
-  [[nodiscard]] std::string entry(std::string_view key) const;
 };
 
 /// How far a host's CLOCK_REALTIME is ahead of the one here, and how wrong that can be.
@@ -77,8 +75,6 @@ struct Download {
   bool boot = false;    ///< it becomes the boot application
   bool online = false;  ///< it takes over while the tasks run; see kOnlineOption
 };
-/// The ApiRequest::ext of what loads an application, with the same options.
-[[nodiscard]] std::vector<plc_KeyValue> load_options(bool boot, bool online);
 /// Told how many bytes have arrived: again from the beginning, when plchost-dds had to be started again.
 using DownloadProgressFunction = std::function<void(std::uint64_t received)>;
 

@@ -7,7 +7,6 @@
 #include "api/client/control_client_status.hpp"
 #include "api/client/file_sender.hpp"
 #include "api/control/application_order.hpp"
-#include "api/dds/entries.hpp"
 #include "api/security/sha256.hpp"
 
 namespace plchost {
@@ -20,23 +19,17 @@ constexpr Duration kDownloadStall = std::chrono::seconds(10);
 constexpr Duration kDownloadLoad = std::chrono::seconds(130);
 
 ApiRequest request_for(const Download& download) {
-  ApiRequest request{download.host, plc_OPERATION_DOWNLOAD_APPLICATION, download.instance, download.name,
-                     load_options(download.boot, download.online)};
+  ApiRequest request{download.host, plc_OPERATION_DOWNLOAD_APPLICATION, download.instance, download.name};
   const std::string_view text(reinterpret_cast<const char*>(download.contents.data()),
                               download.contents.size());
-  dds::add_entry(request.ext, kSizeOption, fmt::format("{}", text.size()));
-  dds::add_entry(request.ext, kDigestOption, sha256(text));
+  request.boot = download.boot;
+  request.online = download.online;
+  request.size = text.size();
+  request.sha256 = sha256(text);
   return request;
 }
 
 }  // namespace
-
-std::vector<plc_KeyValue> load_options(bool boot, bool online) {
-  std::vector<plc_KeyValue> ext;
-  if (boot) dds::add_entry(ext, kBootOption, kYes);
-  if (online) dds::add_entry(ext, kOnlineOption, kYes);
-  return ext;
-}
 
 Result<ApiReply> ControlClient::download(const Download& download, const DownloadProgressFunction& progress,
                                          TimePoint deadline) {

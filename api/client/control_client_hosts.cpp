@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <chrono>
-#include <span>
 #include <string_view>
 #include <tuple>
 #include <utility>
@@ -10,7 +9,6 @@
 #include "api/client/check_names.hpp"
 #include "api/client/control_client.hpp"
 #include "api/dds/ended_participant.h"
-#include "api/dds/entries.hpp"
 #include "api/dds/host_writers.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/told_keys.h"
@@ -34,20 +32,13 @@ std::string no_such_host(std::string_view name, const std::vector<std::string>& 
 }  // namespace
 
 std::vector<std::string> HostView::labels() const {
-  const std::string all = entry(dds::kLabelsEntry);
   std::vector<std::string> labels;
-  for (std::string_view rest = all; !rest.empty();) {
+  for (std::string_view rest = dds::text_of(status.labels); !rest.empty();) {
     const std::size_t comma = rest.find(',');
     labels.emplace_back(rest.substr(0, comma));
     rest = comma == std::string_view::npos ? std::string_view() : rest.substr(comma + 1);
   }
   return labels;
-}
-
-std::string HostView::entry(std::string_view key) const {
-  std::string value;
-  const std::pair<std::string_view, std::string*> known{key, &value};
-  return dds::read_entries(ext, std::span(&known, 1)) ? value : "";
 }
 
 void ControlClient::update_hosts() {

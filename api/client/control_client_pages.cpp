@@ -64,33 +64,43 @@ Result<Listing> ControlClient::ask_for_page(PageReader& pages, const dds::TopicI
 
 Result<ObjectListing> ControlClient::list_objects(const std::string& host, const ObjectQuery& query,
                                                   TimePoint deadline) {
-  auto entries = entries_of(query);
-  if (!entries) return std::unexpected(std::move(entries).error());
+  const auto part = part_of(query);
+  if (!part) return std::unexpected(part.error());
   return ask_for_page<plc_ObjectPage, ObjectListing>(
-      object_pages_, dds::kObjectPage, {host, plc_OPERATION_LIST_OBJECTS, "", "", *std::move(entries)},
+      object_pages_, dds::kObjectPage,
+      {.host = host, .operation = plc_OPERATION_LIST_OBJECTS, .instance = "", .argument = "", .part = *part},
       deadline);
 }
 
 Result<NodeListing> ControlClient::list_nodes(const std::string& host, const NodeQuery& query,
                                               TimePoint deadline) {
-  auto entries = entries_of(query);
-  if (!entries) return std::unexpected(std::move(entries).error());
+  const auto part = part_of(query);
+  if (!part) return std::unexpected(part.error());
   return ask_for_page<plc_NodePage, NodeListing>(
-      node_pages_, dds::kNodePage, {host, plc_OPERATION_LIST_NODES, "", "", *std::move(entries)}, deadline);
+      node_pages_, dds::kNodePage,
+      {.host = host, .operation = plc_OPERATION_LIST_NODES, .instance = "", .argument = "", .part = *part},
+      deadline);
 }
 
 Result<NodeListing> ControlClient::list_routes(const std::string& host, const NodeQuery& query,
                                                TimePoint deadline) {
-  auto entries = entries_of(query);
-  if (!entries) return std::unexpected(std::move(entries).error());
+  const auto part = part_of(query);
+  if (!part) return std::unexpected(part.error());
   return ask_for_page<plc_NodePage, NodeListing>(
-      node_pages_, dds::kNodePage, {host, plc_OPERATION_LIST_ROUTES, "", "", *std::move(entries)}, deadline);
+      node_pages_, dds::kNodePage,
+      {.host = host, .operation = plc_OPERATION_LIST_ROUTES, .instance = "", .argument = "", .part = *part},
+      deadline);
 }
 
 Result<LogListing> ControlClient::read_log(const std::string& host, const std::string& instance,
                                            const LogQuery& query, TimePoint deadline) {
-  return ask_for_page<plc_LogPage, LogListing>(
-      log_pages_, dds::kLogPage, {host, plc_OPERATION_READ_LOG, instance, "", entries_of(query)}, deadline);
+  return ask_for_page<plc_LogPage, LogListing>(log_pages_, dds::kLogPage,
+                                               {.host = host,
+                                                .operation = plc_OPERATION_READ_LOG,
+                                                .instance = instance,
+                                                .argument = "",
+                                                .part = part_of(query)},
+                                               deadline);
 }
 
 }  // namespace plchost

@@ -67,17 +67,12 @@ std::vector<plc_EventName> Poster<Sample>::names_of(std::span<const EventId> eve
 template <class Sample>
 dds_return_t Poster<Sample>::write(Unacknowledged& post) noexcept {
   set_events(sample_, post.events);
-  plc_KeyValue entry{};
-  if (post.awaited) {
-    dds::copy_text(entry.name, dds::kWaitEntry);
-    dds::copy_text(entry.value, dds::kWaitForRun);
-    sample_.ext = {._maximum = 1, ._length = 1, ._buffer = &entry, ._release = false};
-  }
+  sample_.wait_run = post.awaited;
   sample_.limit = clock_.limit_at(last_progress_ + patience_);
   const dds_return_t written = write(post.sequence);
   has_space_ = written == DDS_RETCODE_OK;
   sample_.limit = {};
-  sample_.ext = {};
+  sample_.wait_run = false;
   return written;
 }
 
@@ -105,15 +100,9 @@ Result<void> Poster<Sample>::post_once(std::string_view instance, std::string_vi
 {
   dds::copy_text(sample_.instance, instance);
   dds::copy_text(sample_.event, event);
-  static plc_KeyValue late = [] {
-    plc_KeyValue entry{};
-    dds::copy_text(entry.name, dds::kAckEntry);
-    dds::copy_text(entry.value, dds::kAckLate);
-    return entry;
-  }();
-  sample_.ext = {._maximum = 1, ._length = 1, ._buffer = &late, ._release = false};
+  sample_.late_ack = true;
   const dds_return_t written = write(++last_sequence_);
-  sample_.ext = {};
+  sample_.late_ack = false;
   return dds::check_code(written, "post an event");
 }
 

@@ -52,9 +52,11 @@ Result<ApiReply> RequestCaller::call(const ApiRequest& request, dds_entity_t rep
   sample.operation = request.operation;
   dds::copy_text(sample.instance, request.instance);
   dds::copy_text(sample.argument, request.argument);
-  std::vector<plc_KeyValue> ext = request.ext;
-  sample.ext._buffer = ext.data();
-  sample.ext._length = sample.ext._maximum = static_cast<std::uint32_t>(ext.size());
+  sample.boot = request.boot;
+  sample.online = request.online;
+  sample.size = request.size;
+  dds::copy_text(sample.sha256, request.sha256);
+  sample.part = request.part;
   TimePoint next_write{};
   std::int64_t asked_unix_ns = 0;
   bool written = false;

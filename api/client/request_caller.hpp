@@ -23,7 +23,11 @@ struct ApiRequest {
   std::int32_t operation = 0;  ///< plc_OPERATION_...
   std::string instance;
   std::string argument;
-  std::vector<plc_KeyValue> ext = {};  ///< at most 16
+  bool boot = false;        ///< as in plc_Request
+  bool online = false;      ///< as in plc_Request
+  std::uint64_t size = 0;   ///< of the file of a download
+  std::string sha256 = {};  ///< of that file
+  plc_ListPart part = {};   ///< of the list that is asked for
 };
 
 /// A host's answer.

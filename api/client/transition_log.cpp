@@ -1,29 +1,8 @@
 #include "api/client/transition_log.hpp"
 
-#include <charconv>
-#include <optional>
-#include <span>
-
 #include "api/dds/text.hpp"
-#include "api/dds/topics.hpp"
 
 namespace plchost {
-
-namespace {
-
-// As its host tells; nothing: it does not tell.
-std::optional<std::uint64_t> last_number(const plc_InstanceStatus& status) {
-  for (const plc_KeyValue& entry : std::span(status.ext._buffer, status.ext._length)) {
-    if (dds::text_of(entry.name) != dds::kTransitionsEntry) continue;
-    const std::string_view text = dds::text_of(entry.value);
-    std::uint64_t number = 0;
-    const auto read = std::from_chars(text.data(), text.data() + text.size(), number);
-    if (read.ec == std::errc() && read.ptr == text.data() + text.size()) return number;
-  }
-  return std::nullopt;
-}
-
-}  // namespace
 
 std::vector<TransitionView> TransitionLog::take() {
   std::vector<TransitionView> news;
@@ -58,12 +37,11 @@ bool TransitionLog::is_news(const plc_Transition& sample, TimePoint now, std::ui
 }
 
 bool TransitionLog::has_all(const plc_InstanceStatus& status) const {
-  const auto told = last_number(status);
-  if (!told || *told == 0) return told.has_value();
+  if (status.transitions == 0) return true;
   const auto found =
       seen_.find({std::string(dds::text_of(status.host)), std::string(dds::text_of(status.instance))});
   return found != seen_.end() && found->second.epoch.value() == status.epoch &&
-         found->second.written >= *told;
+         found->second.written >= status.transitions;
 }
 
 }  // namespace plchost

@@ -1,14 +1,12 @@
 #include "api/dds/log_page.hpp"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
+#include <span>
 #include <string>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include "api/dds/entries.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/time.hpp"
@@ -17,22 +15,7 @@ namespace plchost {
 
 namespace {
 
-constexpr std::string_view kAfterRecord = "after";
-constexpr std::string_view kNewestEntry = "newest";
-
 static_assert(sizeof(plc_LogRecord::text) == kMaxLogText + 1);
-
-Result<std::uint64_t> parse_record_number(std::string_view name, std::string_view text) {
-  if (text.empty()) return 0;
-  std::uint64_t number = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error == std::errc{} && end == text.data() + text.size()) return number;
-  return failure(ErrorCode::invalid_argument, fmt::format("{} '{}' is no number", name, shown(text)));
-}
-
-std::string text_of_number(std::uint64_t number) {
-  return number == 0 ? std::string() : fmt::format("{}", number);
-}
 
 plc_LogRecord sample_of(const LogRecord& record) noexcept {
   plc_LogRecord sample{.sequence_number = record.sequence,
@@ -59,27 +42,18 @@ LogRecord record_of(const plc_LogRecord& sample) {
 
 }  // namespace
 
-std::vector<plc_KeyValue> entries_of(const LogQuery& query) {
-  std::vector<plc_KeyValue> entries;
-  dds::add_entry(entries, kAfterRecord, text_of_number(query.after));
-  dds::add_entry(entries, kNewestEntry, text_of_number(query.newest));
-  return entries;
+plc_ListPart part_of(const LogQuery& query) noexcept {
+  plc_ListPart part{};
+  part.after = query.after;
+  part.newest = query.newest;
+  return part;
 }
 
-Result<LogQuery> parse_log_query(std::span<const plc_KeyValue> entries) {
-  std::string after;
-  std::string newest;
-  const std::array<std::pair<std::string_view, std::string*>, 2> known{
-      {{kAfterRecord, &after}, {kNewestEntry, &newest}}};
-  if (auto read = dds::read_entries(entries, known); !read) return std::unexpected(std::move(read).error());
-  if (!after.empty() && !newest.empty()) {
+Result<LogQuery> log_query_of(const plc_ListPart& part) {
+  if (part.after != 0 && part.newest != 0) {
     return failure(ErrorCode::invalid_argument, "'after' and 'newest' exclude each other");
   }
-  const auto first = parse_record_number(kAfterRecord, after);
-  if (!first) return std::unexpected(first.error());
-  const auto count = parse_record_number(kNewestEntry, newest);
-  if (!count) return std::unexpected(count.error());
-  return LogQuery{.after = *first, .newest = *count};
+  return LogQuery{.after = part.after, .newest = part.newest};
 }
 
 Result<LogListing> look_at_log(std::string_view pool, std::string_view instance, const LogQuery& query) {

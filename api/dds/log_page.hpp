@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <vector>
 
 #include <control.h>
@@ -18,10 +17,10 @@ struct LogQuery {
   std::uint64_t newest = 0;  ///< so many of the newest; 0: not asked
 };
 
-/// The query as it travels: entries of plc_Request.ext.
-[[nodiscard]] std::vector<plc_KeyValue> entries_of(const LogQuery& query);
-/// And back. invalid_argument: a value that is no number, an entry twice, or both.
-[[nodiscard]] Result<LogQuery> parse_log_query(std::span<const plc_KeyValue> entries);
+/// The query as it travels.
+[[nodiscard]] plc_ListPart part_of(const LogQuery& query) noexcept;
+/// And back. invalid_argument: both.
+[[nodiscard]] Result<LogQuery> log_query_of(const plc_ListPart& part);
 
 /// A part of the log of an instance.
 struct LogListing {

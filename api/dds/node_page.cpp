@@ -1,23 +1,17 @@
 #include "api/dds/node_page.hpp"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
+#include <span>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include "api/dds/entries.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
 
 namespace {
-
-constexpr std::string_view kBaseEntry = "base";
-constexpr std::string_view kNodeEntry = "node";
-constexpr std::string_view kAfterNode = "after";
 
 static_assert(sizeof(plc_NodeRecord::name) == kMaxInstanceName + 1);
 static_assert(sizeof(plc_NodePage::base) == kMaxBlockBase + 1);
@@ -28,16 +22,6 @@ Result<void> check_nodes(const NodeQuery& query) {
   }
   if (query.node.empty()) return {};
   return check_name("node", query.node, kMaxInstanceName);
-}
-
-Result<std::uint16_t> parse_after(std::string_view text) {
-  std::uint16_t number = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error == std::errc{} && end == text.data() + text.size() && number >= 1 && number <= kMaxNodes) {
-    return number;
-  }
-  return failure(ErrorCode::invalid_argument,
-                 fmt::format("after '{}': allowed are 1 to {}", shown(text), kMaxNodes));
 }
 
 // The counters that travel, each under the same name.
@@ -128,26 +112,23 @@ RouteInfo route_of(const plc_RouteRecord& sample) {
 
 }  // namespace
 
-Result<std::vector<plc_KeyValue>> entries_of(const NodeQuery& query) {
+Result<plc_ListPart> part_of(const NodeQuery& query) {
   if (auto good = check_nodes(query); !good) return std::unexpected(std::move(good).error());
-  std::vector<plc_KeyValue> entries;
-  dds::add_entry(entries, kBaseEntry, query.base);
-  dds::add_entry(entries, kNodeEntry, query.node);
-  if (query.after != 0) dds::add_entry(entries, kAfterNode, fmt::format("{}", query.after));
-  return entries;
+  plc_ListPart part{};
+  dds::copy_text(part.base, query.base);
+  dds::copy_text(part.name, query.node);
+  part.after = query.after;
+  return part;
 }
 
-Result<NodeQuery> parse_node_query(std::span<const plc_KeyValue> entries) {
-  NodeQuery query;
-  std::string after;
-  const std::array<std::pair<std::string_view, std::string*>, 3> known{
-      {{kBaseEntry, &query.base}, {kNodeEntry, &query.node}, {kAfterNode, &after}}};
-  if (auto read = dds::read_entries(entries, known); !read) return std::unexpected(std::move(read).error());
-  if (!after.empty()) {
-    const auto parsed = parse_after(after);
-    if (!parsed) return std::unexpected(parsed.error());
-    query.after = *parsed;
+Result<NodeQuery> node_query_of(const plc_ListPart& part) {
+  if (part.after > kMaxNodes) {
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("after {}: allowed are 0 to {}", part.after, kMaxNodes));
   }
+  NodeQuery query{.base = std::string(dds::text_of(part.base)),
+                  .node = std::string(dds::text_of(part.name)),
+                  .after = static_cast<std::uint16_t>(part.after)};
   if (auto good = check_nodes(query); !good) return std::unexpected(std::move(good).error());
   return query;
 }

@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -20,11 +19,10 @@ struct NodeQuery {
   std::uint16_t after = 0;  ///< greater addresses only
 };
 
-/// The query as it travels: entries of plc_Request.ext. invalid_argument: a text that can be no name.
-[[nodiscard]] Result<std::vector<plc_KeyValue>> entries_of(const NodeQuery& query);
-/// And back. invalid_argument: a value that cannot be, or an entry twice. Entries of other names are of a
-/// newer client, who can do without.
-[[nodiscard]] Result<NodeQuery> parse_node_query(std::span<const plc_KeyValue> entries);
+/// The query as it travels. invalid_argument: a text that can be no name.
+[[nodiscard]] Result<plc_ListPart> part_of(const NodeQuery& query);
+/// And back. invalid_argument: a value that cannot be.
+[[nodiscard]] Result<NodeQuery> node_query_of(const plc_ListPart& part);
 
 /// A node as it is shown to clients.
 struct ListedNode {

@@ -2,12 +2,10 @@
 
 #include <algorithm>
 #include <functional>
-#include <map>
 #include <span>
 
 #include <fmt/format.h>
 
-#include "api/dds/entries.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
 
@@ -35,6 +33,12 @@ std::vector<plc_ObjectReference> samples_of(const std::vector<ReferenceInfo>& re
   return samples;
 }
 
+// The name of a user or a group. One that cannot be shown is left out: its number says as much.
+template <std::size_t Size>
+void copy_account(char (&to)[Size], std::string_view name) noexcept {
+  dds::copy_text(to, name.size() < Size && is_printable_utf8(name) ? name : std::string_view());
+}
+
 void fill(plc_ObjectRecord& record, const ListedObject& listed) {
   const ObjectInfo& info = listed.info;
   dds::copy_text(record.object_name, info.name);
@@ -48,7 +52,9 @@ void fill(plc_ObjectRecord& record, const ListedObject& listed) {
   record.waiters = info.waiters;
   record.kept = info.kept;
   record.owner = info.owner;
+  copy_account(record.owner_name, listed.owner_name);
   record.group = info.group;
+  copy_account(record.group_name, listed.group_name);
   record.mode = info.mode;
   record.made_unix_ns = info.made_unix_ns;
   record.reference_count = info.reference_count;
@@ -58,6 +64,8 @@ ListedObject object_of(const plc_ObjectRecord& record) {
   ListedObject listed;
   listed.holder_pid = static_cast<std::uint32_t>(record.holder_pid);
   listed.holder_program = dds::text_of(record.holder_program);
+  listed.owner_name = dds::text_of(record.owner_name);
+  listed.group_name = dds::text_of(record.group_name);
   listed.info = {.name = std::string(dds::text_of(record.object_name)),
                  .type = static_cast<ObjectType>(record.type),
                  .value = record.value,
@@ -82,15 +90,6 @@ ListedObject object_of(const plc_ObjectRecord& record) {
   return listed;
 }
 
-// Entries of ObjectPage.ext: names of the users and groups of its objects.
-std::string user_entry(uid_t user) {
-  return fmt::format("user.{}", user);
-}
-std::string group_entry(gid_t group) {
-  return fmt::format("group.{}", group);
-}
-constexpr std::size_t kMostPageEntries = 16;
-
 }  // namespace
 
 ObjectPageSample::ObjectPageSample(const ObjectListing& listing) {
@@ -102,45 +101,17 @@ ObjectPageSample::ObjectPageSample(const ObjectListing& listing) {
     records_[i].references._length = records_[i].references._maximum =
         static_cast<std::uint32_t>(references.size());
   }
-  add_names(listing);
   page_.complete = listing.complete;
   dds::copy_text(page_.next_after, listing.next_after);
   page_.objects._buffer = records_.data();
   page_.objects._length = page_.objects._maximum = static_cast<std::uint32_t>(records_.size());
 }
 
-// Each name once. A page of objects of more users and groups than there is room for shows the rest as
-// numbers.
-void ObjectPageSample::add_names(const ObjectListing& listing) {
-  std::map<std::string, std::string_view> names;
-  for (const ListedObject& object : std::span(listing.objects).first(records_.size())) {
-    names.emplace(user_entry(object.info.owner), object.owner_name);
-    names.emplace(group_entry(object.info.group), object.group_name);
-  }
-  for (const auto& [entry, name] : names) {
-    if (entries_.size() == kMostPageEntries) break;
-    if (is_printable_utf8(name) && name.size() < sizeof(plc_KeyValue::value))
-      dds::add_entry(entries_, entry, name);
-  }
-  page_.ext._buffer = entries_.data();
-  page_.ext._length = page_.ext._maximum = static_cast<std::uint32_t>(entries_.size());
-}
-
 ObjectListing listing_of(const plc_ObjectPage& page) {
   ObjectListing listing{
       .objects = {}, .complete = page.complete, .next_after = std::string(dds::text_of(page.next_after))};
-  std::map<std::string, std::string, std::less<>> names;
-  for (const plc_KeyValue& entry : std::span(page.ext._buffer, page.ext._length)) {
-    names.emplace(dds::text_of(entry.name), dds::text_of(entry.value));
-  }
-  const auto name_of = [&](const std::string& entry) {
-    const auto found = names.find(entry);
-    return found == names.end() ? std::string() : found->second;
-  };
   for (const plc_ObjectRecord& record : std::span(page.objects._buffer, page.objects._length)) {
-    ListedObject& object = listing.objects.emplace_back(object_of(record));
-    object.owner_name = name_of(user_entry(object.info.owner));
-    object.group_name = name_of(group_entry(object.info.group));
+    listing.objects.push_back(object_of(record));
   }
   return listing;
 }

@@ -44,10 +44,7 @@ class ObjectPageSample {
   [[nodiscard]] plc_ObjectPage& page() noexcept { return page_; }
 
  private:
-  void add_names(const ObjectListing& listing);
-
   plc_ObjectPage page_{};
-  std::vector<plc_KeyValue> entries_;
   std::vector<plc_ObjectRecord> records_;
   std::deque<std::vector<plc_ObjectReference>> references_;
 };

@@ -1,23 +1,19 @@
 #include "api/dds/object_query.hpp"
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include "api/dds/entries.hpp"
+#include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
 
 namespace {
 
-constexpr std::string_view kName = "name";
-constexpr std::string_view kType = "type";
-constexpr std::string_view kMatch = "match";
-constexpr std::string_view kAfter = "after";
-
-static_assert(sizeof(plc_KeyValue::value) > kMaxObjectName);
+static_assert(sizeof(plc_ListPart::name) == kMaxObjectName + 1);
 
 Result<void> check_pattern(std::string_view pattern) {
   if (pattern.size() <= kMaxObjectName && is_printable_utf8(pattern)) return {};
@@ -63,26 +59,21 @@ Result<ObjectType> parse_object_type(std::string_view text) {
                                                           shown(text), join_names(names)));
 }
 
-Result<std::vector<plc_KeyValue>> entries_of(const ObjectQuery& query) {
+Result<plc_ListPart> part_of(const ObjectQuery& query) {
   if (auto good = check_query(query); !good) return std::unexpected(std::move(good).error());
-  std::vector<plc_KeyValue> entries;
-  const auto add = [&](std::string_view name, std::string_view value) {
-    dds::add_entry(entries, name, value);
-  };
-  add(kName, query.name);
-  add(kType, query.type ? to_string(*query.type) : std::string_view());
-  add(kMatch, query.match);
-  add(kAfter, query.after);
-  return entries;
+  plc_ListPart part{};
+  dds::copy_text(part.name, query.name);
+  if (query.type) dds::copy_text(part.type, to_string(*query.type));
+  dds::copy_text(part.match, query.match);
+  dds::copy_text(part.after_name, query.after);
+  return part;
 }
 
-Result<ObjectQuery> parse_object_query(std::span<const plc_KeyValue> entries) {
-  ObjectQuery query;
-  std::string type;
-  const std::array<std::pair<std::string_view, std::string*>, 4> known{
-      {{kName, &query.name}, {kType, &type}, {kMatch, &query.match}, {kAfter, &query.after}}};
-  if (auto read = dds::read_entries(entries, known); !read) return std::unexpected(std::move(read).error());
-  if (!type.empty()) {
+Result<ObjectQuery> object_query_of(const plc_ListPart& part) {
+  ObjectQuery query{.name = std::string(dds::text_of(part.name)),
+                    .match = std::string(dds::text_of(part.match)),
+                    .after = std::string(dds::text_of(part.after_name))};
+  if (const auto type = dds::text_of(part.type); !type.empty()) {
     const auto parsed = parse_object_type(type);
     if (!parsed) return std::unexpected(parsed.error());
     query.type = *parsed;

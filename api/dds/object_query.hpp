@@ -1,10 +1,8 @@
 #pragma once
 
 #include <optional>
-#include <span>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include <control.h>
 
@@ -24,12 +22,10 @@ struct ObjectQuery {
 /// invalid_argument: no type is called so; lists those that are.
 [[nodiscard]] Result<ObjectType> parse_object_type(std::string_view text);
 
-/// The query as it travels: entries of plc_Request.ext. invalid_argument: a name, or a pattern, that is too
-/// long or no UTF-8.
-[[nodiscard]] Result<std::vector<plc_KeyValue>> entries_of(const ObjectQuery& query);
-/// And back. invalid_argument: a value that cannot be, an entry twice, or "name" beside others. Entries of
-/// other names are of a newer client, who can do without.
-[[nodiscard]] Result<ObjectQuery> parse_object_query(std::span<const plc_KeyValue> entries);
+/// The query as it travels. invalid_argument: a name, or a pattern, that is too long or no UTF-8.
+[[nodiscard]] Result<plc_ListPart> part_of(const ObjectQuery& query);
+/// And back. invalid_argument: a value that cannot be, or a name beside others.
+[[nodiscard]] Result<ObjectQuery> object_query_of(const plc_ListPart& part);
 
 /// Whether a name is like the pattern: '*' stands for any characters, '?' for one, all others for themselves.
 [[nodiscard]] bool matches_pattern(std::string_view pattern, std::string_view name) noexcept;

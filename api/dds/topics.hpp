@@ -18,27 +18,6 @@ inline constexpr std::uint32_t kApiVersion = 1;
 /// Samples of one key that a client has not taken yet: one of the host itself, and others that have no right
 /// to it.
 inline constexpr std::int32_t kStatusReaderDepth = 8;
-/// Entry of InstanceStatus.ext: the number of the last transition of this instance that its host has written;
-/// 0: none yet.
-inline constexpr std::string_view kTransitionsEntry = "transitions";
-/// Entry of HostStatus.ext: its labels, with commas between.
-inline constexpr std::string_view kLabelsEntry = "labels";
-/// More of them: see control.idl.
-inline constexpr std::string_view kRunningEntry = "running";
-inline constexpr std::string_view kSecuredEntry = "secured";
-inline constexpr std::string_view kLoadEntry = "load";
-inline constexpr std::string_view kCoresEntry = "cores";
-inline constexpr std::string_view kMemoryEntry = "memory_mib";
-inline constexpr std::string_view kAvailableEntry = "available_mib";
-inline constexpr std::string_view kRivalEntry = "rival";
-inline constexpr std::string_view kUnsavedEntry = "unsaved";
-inline constexpr std::string_view kUnrecordedEntry = "unrecorded";
-/// Entry of EventPost.ext and its value: an EventRun is wanted.
-inline constexpr std::string_view kWaitEntry = "wait";
-inline constexpr std::string_view kWaitForRun = "run";
-/// Another one: nobody waits for the acknowledgement.
-inline constexpr std::string_view kAckEntry = "ack";
-inline constexpr std::string_view kAckLate = "late";
 /// The largest piece of a download: as in control.idl.
 inline constexpr std::size_t kMaxChunk = 32768;
 inline constexpr Duration kPresencePeriod = std::chrono::milliseconds(25);

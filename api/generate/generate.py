@@ -106,9 +106,10 @@ def status_topics(contract):
 
 
 def words_of(member):
-    """The words for the codes of a member: its comment begins with "0 offline, 1 starting"; brackets are left out."""
+    """The words for the codes of a member: its comment begins with "0 offline, 1 starting"; brackets, and all from a ";" on,
+    are left out."""
     words = []
-    for part in re.sub(r" \([^)]*\)", "", member.comment).split(", "):
+    for part in re.sub(r" \([^)]*\)", "", member.comment.partition(";")[0]).split(", "):
         found = re.fullmatch(rf"{len(words)} ([a-z -]+)", part)
         if not found:
             break

@@ -70,8 +70,8 @@ Result<ApiRequest> request_of(const std::string& name, const std::string& host, 
   if ((options.boot || options.online) && (*known)->options == OperationOptions::none) {
     return failure(ErrorCode::invalid_argument, fmt::format("'{}' takes no options of loading", name));
   }
-  return ApiRequest{host, static_cast<std::int32_t>((*known)->verb), instance, argument,
-                    load_options(options.boot, options.online)};
+  return ApiRequest{
+      host, static_cast<std::int32_t>((*known)->verb), instance, argument, options.boot, options.online};
 }
 
 /// `request.host`: empty: the only one.

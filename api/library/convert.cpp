@@ -45,7 +45,6 @@ Client::Host to_public(const HostView& host, bool answers) {
   static_cast<client_types::Host&>(made) = to_public(host.status);
   made.name = host.name;
   made.answers = answers;
-  made.labels = host.labels();
   made.instances = count_of<plc_InstanceStatus>(host.status).value_or(0);
   return made;
 }

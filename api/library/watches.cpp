@@ -22,6 +22,17 @@ std::vector<std::string> hosts_of(ControlClient& client, const std::string& host
 
 }  // namespace
 
+namespace {
+
+// But for what is looked at every 2 s and nearly always another number.
+bool is_told(const Client::Host& before, Client::Host now) {
+  now.load_percent = before.load_percent;
+  now.available_mib = before.available_mib;
+  return before == now;
+}
+
+}  // namespace
+
 class __attribute__((visibility("hidden"))) Client::HostsWatch final : public Client::Watch::Subscription {
  public:
   explicit HostsWatch(std::function<void(const Host&)> callback) : callback_(std::move(callback)) {}
@@ -40,7 +51,7 @@ class __attribute__((visibility("hidden"))) Client::HostsWatch final : public Cl
     }
     for (const auto& [name, host] : now) {
       const auto before = told_.find(name);
-      if (before != told_.end() && before->second == host) continue;
+      if (before != told_.end() && is_told(before->second, host)) continue;
       told_[name] = host;
       if (!stopped()) callback_(host);
     }

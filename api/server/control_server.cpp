@@ -150,7 +150,8 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
     status->tick(now);
     lister.forget_old(now);
     audit->tick(now);
-    status->set_audit(audit->head(), audit->problem());
+    const AuditHead head = audit->head();
+    status->set_audit({.number = head.number, .hash = head.hash, .problem = audit->problem()});
     send_late_answers(now);
     answer_finished(now);
     finish(manager->expire(now));
@@ -335,7 +336,7 @@ void ControlServer::Parts::do_request(ApiRole role, const dds::Guid& writer, con
 // The page first: a client that has the answer has it, or asks again.
 void ControlServer::Parts::list_objects(const dds::Guid& client, const plc_Request& request) {
   const plc_SampleIdentity& identity = request.header.request_identity;
-  const auto query = parse_object_query(std::span(request.ext._buffer, request.ext._length));
+  const auto query = object_query_of(request.part);
   const auto listing = query ? lister.page(*query) : Result<ObjectListing>(std::unexpected(query.error()));
   if (!listing) return tell(client, identity, listing.error().code, listing.error().describe());
   ObjectPageSample sample(*listing);
@@ -344,7 +345,7 @@ void ControlServer::Parts::list_objects(const dds::Guid& client, const plc_Reque
 
 void ControlServer::Parts::list_nodes(ControlVerb verb, const dds::Guid& client, const plc_Request& request) {
   const auto look = [&]() -> Result<NodeListing> {
-    const auto query = parse_node_query(std::span(request.ext._buffer, request.ext._length));
+    const auto query = node_query_of(request.part);
     if (!query) return std::unexpected(query.error());
     return verb == ControlVerb::list_nodes ? nodes.nodes(*query) : nodes.routes(*query);
   };
@@ -357,7 +358,7 @@ void ControlServer::Parts::list_nodes(ControlVerb verb, const dds::Guid& client,
 }
 
 void ControlServer::Parts::read_log(const dds::Guid& client, const plc_Request& request) {
-  const auto query = parse_log_query(std::span(request.ext._buffer, request.ext._length));
+  const auto query = log_query_of(request.part);
   const auto slice = query ? look_at_log(pool.name(), dds::text_of(request.instance), *query)
                            : Result<LogListing>(std::unexpected(query.error()));
   if (!slice) {

@@ -40,17 +40,13 @@ Sample sample_from(const std::uint8_t* data, std::size_t size) {
   return sample;
 }
 
-/// Half of the runs have entries in their ext: of all that is there, and those that a download needs.
-struct Entries {
-  explicit Entries(const std::uint8_t* data, std::size_t size) {
-    if (size % 2 == 0) return;
-    std::memcpy(entries.data(), data, std::min(size, sizeof entries));
-    if (size % 4 == 1) dds::copy_text(entries[0].name, kSizeOption);
-    if (size % 4 == 1) dds::copy_text(entries[1].name, kDigestOption);
-    if (size % 8 == 1) dds::copy_text(entries[1].value, std::string(64, 'a'));
-  }
-  std::array<plc_KeyValue, 3> entries{};
-};
+// Half of the runs have a digest that can be one; bools are no other bytes than those.
+void make_possible(plc_Request& request, const std::uint8_t* data, std::size_t size) {
+  request.boot = size > 0 && data[0] % 2 == 1;
+  request.online = size > 0 && data[0] % 4 >= 2;
+  if (size % 2 == 1) dds::copy_text(request.sha256, std::string(64, 'a'));
+  request.sha256[sizeof request.sha256 - 1] = '\0';
+}
 
 // Pieces of a download: it never has more than was announced, and is complete with exactly that.
 void take_chunks(const std::uint8_t* data, std::size_t size) {
@@ -116,9 +112,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static Host host;
   constexpr std::array<std::string_view, 1> kInstances{"line1"};
   auto request = sample_from<plc_Request>(data, size);
-  Entries entries(data, size);
-  request.ext._buffer = entries.entries.data();
-  request.ext._length = request.ext._maximum = static_cast<std::uint32_t>(entries.entries.size());
+  make_possible(request, data, size);
   take_chunks(data, size);
   for (const ApiRole role : {ApiRole::operating, ApiRole::engineering}) {
     const auto checked = check_request(request, role, "hosta", kInstances);
@@ -129,6 +123,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   take_block(data, size);
   auto post = sample_from<plc_EventPost>(data, size);
+  post.wait_run = post.late_ack = size % 2 == 1;
   // Half of the runs get as far as the event's name.
   if (size % 2 == 0) {
     dds::copy_text(post.host, "hosta");

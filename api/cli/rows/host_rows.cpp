@@ -1,16 +1,13 @@
 #include "api/cli/rows/host_rows.hpp"
 
-#include <charconv>
-#include <string>
+#include <cstdint>
 #include <string_view>
-#include <system_error>
 
 #include <fmt/format.h>
 
 #include "api/cli/rows/rows.hpp"
 #include "api/client/status_count.hpp"
 #include "api/dds/text.hpp"
-#include "api/dds/topics.hpp"
 
 namespace plchost {
 
@@ -18,23 +15,23 @@ namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
 
-/// The number that a host tells as a text; null: it tells none.
-template <class Number>
-Row number_of(const HostView& host, std::string_view entry) {
-  const std::string text = host.entry(entry);
-  Number number{};
-  const auto read = std::from_chars(text.data(), text.data() + text.size(), number);
-  const bool whole = read.ec == std::errc() && read.ptr == text.data() + text.size();
-  return whole && !text.empty() ? Row(number) : Row();
+/// 0: the host does not know it.
+Row known(std::uint64_t number) {
+  return number == 0 ? Row() : Row(number);
+}
+
+Row load_of(const plc_HostStatus& status) {
+  constexpr double kPercent = 100;
+  return status.load_percent < 0 ? Row() : Row(status.load_percent / kPercent);
 }
 
 std::string problem_of(const HostView& host) {
   if (host.contested) return "two hosts have this name and show it at the same time";
-  const std::string rival = host.entry(dds::kRivalEntry);
+  const std::string_view rival = dds::text_of(host.status.rival);
   if (!rival.empty()) return fmt::format("another host wants this name and is refused: {}", rival);
-  const std::string unsaved = host.entry(dds::kUnsavedEntry);
+  const std::string_view unsaved = dds::text_of(host.status.unsaved);
   if (!unsaved.empty()) return fmt::format("retain variables are not written: {}", unsaved);
-  const std::string unrecorded = host.entry(dds::kUnrecordedEntry);
+  const std::string_view unrecorded = dds::text_of(host.status.unrecorded);
   return unrecorded.empty() ? "" : fmt::format("changes are not recorded: {}", unrecorded);
 }
 
@@ -48,29 +45,33 @@ Row uptime_s(const HostView& host, const std::optional<ClockOffset>& clock) {
 }  // namespace
 
 Row to_row(const HostView& host, const std::optional<ClockOffset>& clock) {
-  const std::string secured = host.entry(dds::kSecuredEntry);
   Row row{{"host", host.name},
           {"state", host.silent ? "silent" : "alive"},
           {"version", dds::text_of(host.status.version)},
           {"uptime_s", uptime_s(host, clock)},
           {"started_unix_s", host.status.started_unix_ns / kSecond},
-          {"running", number_of<std::uint32_t>(host, dds::kRunningEntry)},
+          {"running", host.status.running},
           {"instances", count_of<plc_InstanceStatus>(host.status).value_or(0)},
           {"tasks", count_of<plc_TaskStatus>(host.status).value_or(0)},
           {"events", count_of<plc_EventStatus>(host.status).value_or(0)},
           {"objects", count_of<plc_ObjectStatus>(host.status).value_or(0)},
-          {"load", number_of<double>(host, dds::kLoadEntry)},
-          {"cores", number_of<std::uint32_t>(host, dds::kCoresEntry)},
-          {"memory_mib", number_of<std::uint64_t>(host, dds::kMemoryEntry)},
-          {"available_mib", number_of<std::uint64_t>(host, dds::kAvailableEntry)},
+          {"load", load_of(host.status)},
+          {"cores", known(host.status.cores)},
+          {"memory_mib", known(host.status.memory_mib)},
+          {"available_mib", known(host.status.available_mib)},
           {"clock_offset_us", clock ? Row(to_us(clock->offset.count())) : Row()},
           {"clock_uncertainty_us", clock ? Row(to_us(clock->uncertainty.count())) : Row()},
-          {"secured", secured.empty() ? Row() : Row(secured == "yes")},
+          {"secured", host.status.secured},
           {"manager_pid", host.status.manager_pid},
           {"server_pid", host.server_pid},
-          {"problem", problem_of(host)}};
+          {"problem", problem_of(host)},
+          {"labels", dds::text_of(host.status.labels)},
+          {"audit_number", host.status.audit_number},
+          {"audit_hash", dds::text_of(host.status.audit_hash)},
+          {"unrecorded", dds::text_of(host.status.unrecorded)},
+          {"rival", dds::text_of(host.status.rival)},
+          {"unsaved", dds::text_of(host.status.unsaved)}};
   add_extension(row, host.ext);
-  row["labels"] = fmt::format("{}", fmt::join(host.labels(), ","));
   return row;
 }
 

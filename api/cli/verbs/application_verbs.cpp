@@ -54,10 +54,10 @@ int send(CliSession& session, const LoadArguments& arguments) {
 int load(CliSession& session, const LoadArguments& arguments) {
   if (!arguments.on_host) return send(session, arguments);
   const std::string path = std::filesystem::absolute(arguments.file).lexically_normal();
-  return command(session,
-                 {"", plc_OPERATION_LOAD_APPLICATION, arguments.instance, path,
-                  load_options(arguments.boot, arguments.online)},
-                 fmt::format("{} is loaded", path));
+  return command(
+      session,
+      {"", plc_OPERATION_LOAD_APPLICATION, arguments.instance, path, arguments.boot, arguments.online},
+      fmt::format("{} is loaded", path));
 }
 
 /// INSTANCE/PATH of what is loaded on a host.
@@ -120,8 +120,8 @@ void add_application_verbs(const Command& plcctl, CliSession& session) {
       .noun("application", back,
             [&session, back_to] {
               return command(session,
-                             {"", plc_OPERATION_ROLLBACK_APPLICATION, back_to->instance, "",
-                              load_options(back_to->boot, back_to->online)},
+                             {"", plc_OPERATION_ROLLBACK_APPLICATION, back_to->instance, "", back_to->boot,
+                              back_to->online},
                              "the predecessor is loaded");
             })
       .argument("INSTANCE", back_to->instance)

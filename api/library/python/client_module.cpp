@@ -164,9 +164,7 @@ void define_states(py::module_& module) {
       });
   py::class_<Client::Host> host(module, "Host", "A host.");
   define_members<plchost::client_types::Host>(host);
-  host.def_readonly("answers", &Client::Host::answers)
-      .def_readonly("labels", &Client::Host::labels)
-      .def_readonly("instances", &Client::Host::instances);
+  host.def_readonly("answers", &Client::Host::answers).def_readonly("instances", &Client::Host::instances);
   py::class_<Client::Transition>(module, "Transition")
       .def_readonly("host", &Client::Transition::host)
       .def_readonly("instance", &Client::Transition::instance)

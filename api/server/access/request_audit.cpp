@@ -3,14 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <chrono>
-#include <span>
 #include <utility>
 
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
-#include "api/control/application_order.hpp"
-#include "api/dds/entries.hpp"
 #include "api/dds/text.hpp"
 #include "api/server/access/request_check.hpp"
 #include "shm/base/names.hpp"
@@ -49,15 +46,10 @@ std::string names_of(const PostedEvents::Posts& posts) {
 // Of what was sent, its digest says what it was.
 std::string argument_of(const plc_Request& request) {
   std::string argument(dds::text_of(request.argument));
-  std::string digest;
-  std::string boot;
-  std::string online;
-  const std::array<std::pair<std::string_view, std::string*>, 3> known{
-      {{kDigestOption, &digest}, {kBootOption, &boot}, {kOnlineOption, &online}}};
-  (void)dds::read_entries(std::span(request.ext._buffer, request.ext._length), known);
+  const std::string_view digest = dds::text_of(request.sha256);
   if (!digest.empty()) argument += fmt::format(" sha256 {}", digest);
-  if (!boot.empty()) argument += " boot";
-  if (!online.empty()) argument += " online";
+  if (request.boot) argument += " boot";
+  if (request.online) argument += " online";
   return argument;
 }
 
@@ -249,11 +241,9 @@ void RequestAudit::flush() {
   if (writer_) writer_->flush();
 }
 
-std::string RequestAudit::head() const {
-  if (!writer_) return {};
-  const AuditHead head = writer_->head();
-  if (head.number == 0) return {};
-  return fmt::format("{} {}", head.number, head.hash);
+AuditHead RequestAudit::head() const {
+  const AuditHead head = writer_ ? writer_->head() : AuditHead{};
+  return head.number == 0 ? AuditHead{.number = 0, .hash = {}} : head;
 }
 
 }  // namespace plchost

@@ -61,8 +61,8 @@ class RequestAudit {
   [[nodiscard]] bool is_written(AuditWriter::Ticket ticket) const noexcept;
   /// Waits until all is written.
   void flush();
-  /// "N HASH" of the last record of what was done; empty: nothing is recorded, or not yet.
-  [[nodiscard]] std::string head() const;
+  /// The last record of what was done. Number 0, without a hash: nothing is recorded, or not yet.
+  [[nodiscard]] AuditHead head() const;
   /// As AuditWriter::problem(), at the last tick().
   [[nodiscard]] const std::string& problem() const noexcept { return problem_; }
 

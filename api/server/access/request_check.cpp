@@ -4,12 +4,10 @@
 #include <map>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include <fmt/format.h>
 
 #include "api/control/application_order.hpp"
-#include "api/dds/entries.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/operations.hpp"
@@ -67,27 +65,24 @@ Result<void> check_instance(const Operation& operation, std::string_view instanc
 
 using OptionValues = std::map<std::string, std::string>;
 
-Result<OptionValues> check_options(const Operation& operation, std::span<const plc_KeyValue> ext) {
-  OptionValues options;
-  if (operation.options == Options::none) return options;
-  std::string boot;
-  std::string online;
-  std::string size;
-  std::string digest;
+Result<OptionValues> check_options(const Operation& operation, const plc_Request& request) {
+  const bool loads = operation.options != Options::none;
   const bool download = operation.options == Options::download;
-  std::vector<std::pair<std::string_view, std::string*>> known{{kBootOption, &boot},
-                                                               {kOnlineOption, &online}};
-  if (download) known.insert(known.end(), {{kSizeOption, &size}, {kDigestOption, &digest}});
-  if (const auto read = dds::read_entries(ext, known); !read) return std::unexpected(read.error());
-  for (const auto& [name, value] : std::span(known).first(2)) {
-    if (value->empty() || *value == kYes) continue;
+  OptionValues options;
+  if (request.boot) options.emplace(kBootOption, kYes);
+  if (request.online) options.emplace(kOnlineOption, kYes);
+  if (!loads && !options.empty()) {
     return failure(ErrorCode::invalid_argument,
-                   fmt::format("'{}' is '{}'; only '{}' is allowed", name, shown(*value), kYes));
+                   fmt::format("{} takes no option '{}'", operation.name, options.begin()->first));
   }
-  for (const auto& [name, value] : known) {
-    if (!value->empty()) options.emplace(name, *value);
+  const std::string_view digest = dds::text_of(request.sha256);
+  if (!download && (request.size != 0 || !digest.empty())) {
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("{} takes no '{}' and no '{}'", operation.name, kSizeOption, kDigestOption));
   }
   if (!download) return options;
+  options.emplace(kSizeOption, fmt::format("{}", request.size));
+  options.emplace(kDigestOption, digest);
   if (const auto order = ApplicationOrder::from_options(options); !order)
     return std::unexpected(order.error());
   return options;
@@ -116,9 +111,10 @@ Result<ControlRequest> check_request(const plc_Request& request, ApiRole role, s
     return std::unexpected(good.error());
   const auto argument = dds::text_of(request.argument);
   if (auto good = check_argument(*operation, argument); !good) return std::unexpected(good.error());
-  auto ext = check_options(*operation, std::span(request.ext._buffer, request.ext._length));
-  if (!ext) return std::unexpected(std::move(ext).error());
-  return ControlRequest{0, operation->verb, std::string(instance), std::string(argument), *std::move(ext)};
+  auto options = check_options(*operation, request);
+  if (!options) return std::unexpected(std::move(options).error());
+  return ControlRequest{0, operation->verb, std::string(instance), std::string(argument),
+                        *std::move(options)};
 }
 
 bool only_reads(std::int32_t operation) noexcept {

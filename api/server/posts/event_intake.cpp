@@ -6,7 +6,6 @@
 
 #include <fmt/format.h>
 
-#include "api/dds/entries.hpp"
 #include "api/dds/samples.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/time_limit.hpp"
@@ -42,28 +41,6 @@ void for_each_event(const plc_EventBatch& batch, Use use) {
 }
 
 }  // namespace
-
-Result<EventIntake::Wanted> EventIntake::read_wanted(const dds_sequence_plc_KeyValue& ext) {
-  Wanted wanted;
-  if (ext._length == 0) return wanted;
-  std::string wait;
-  std::string ack;
-  const std::array known{std::pair(dds::kWaitEntry, &wait), std::pair(dds::kAckEntry, &ack)};
-  if (auto read = dds::read_entries(std::span(ext._buffer, ext._length), known); !read) {
-    return std::unexpected(read.error());
-  }
-  const auto is = [](std::string_view entry, std::string_view value,
-                     std::string_view allowed) -> Result<bool> {
-    if (value.empty() || value == allowed) return !value.empty();
-    return failure(ErrorCode::invalid_argument,
-                   fmt::format("{} = '{}' is not valid; allowed is: {}", entry, shown(value), allowed));
-  };
-  const auto run = is(dds::kWaitEntry, wait, dds::kWaitForRun);
-  if (!run) return std::unexpected(run.error());
-  const auto late = is(dds::kAckEntry, ack, dds::kAckLate);
-  if (!late) return std::unexpected(late.error());
-  return Wanted{.run = *run, .late_ack = *late};
-}
 
 bool EventIntake::take_posts(dds_entity_t reader) {
   return take<plc_EventPost>(reader);
@@ -145,7 +122,6 @@ void EventIntake::process_locked(const Post& post) {
     if (known) state.counters.lost += before - state.last;
     state.last = before;
   }
-  const auto wanted = read_wanted(post.ext);
   switch (order_of(number, state.last)) {
     case PostOrder::next:
       if (dds::timeliness(post.limit, epoch_) == dds::Timeliness::other_epoch) {
@@ -153,7 +129,7 @@ void EventIntake::process_locked(const Post& post) {
         ++state.counters.early;  // it comes again, with the limit by this server's clock
         ledger_.set(entry, state);
       } else {
-        post_next(post, wanted, entry, state);
+        post_next(post, entry, state);
       }
       break;
     case PostOrder::duplicate:
@@ -161,7 +137,7 @@ void EventIntake::process_locked(const Post& post) {
       ++state.counters.duplicate;
       ledger_.set(entry, state);
       // The server before this one may have been asked and be gone.
-      if (wanted && wanted->run) await_again(post, entry);
+      if (post.wait_run) await_again(post, entry);
       break;
     case PostOrder::gap:
       ++state.counters.received;
@@ -169,7 +145,7 @@ void EventIntake::process_locked(const Post& post) {
       ledger_.set(entry, state);
       break;
   }
-  (wanted && wanted->late_ack ? owed_late_ : owed_).insert(source);
+  (post.late_ack ? owed_late_ : owed_).insert(source);
 }
 
 // It has no place in the numbering of its writer, so that `rejected` does not count it; but it is told.
@@ -188,19 +164,18 @@ void EventIntake::refuse(const dds::Guid& writer, std::uint64_t sequence, std::s
 }
 
 template <class Post>
-void EventIntake::post_next(const Post& post, const Result<Wanted>& wanted, LedgerEntry& entry,
-                            const SourceState& state) {
-  auto done = wanted ? check(post) : std::unexpected(wanted.error());
-  if (done && wanted->run && awaited_.size() >= kMaxAwaited) {
+void EventIntake::post_next(const Post& post, LedgerEntry& entry, const SourceState& state) {
+  auto done = check(post);
+  if (done && post.wait_run && awaited_.size() >= kMaxAwaited) {
     done = failure(ErrorCode::full, "too many posts wait for their runs at the same time");
   }
   Targets targets;
-  if (done) done = try_post(post, entry, state, wanted->run ? &targets : nullptr);
+  if (done) done = try_post(post, entry, state, post.wait_run ? &targets : nullptr);
   if (done) {
     for_each_event(post, [&](std::string_view instance, std::string_view event) {
       posted_.note(dds::Guid::from(post.source), instance, event);
     });
-    if (wanted->run) {
+    if (post.wait_run) {
       awaited_.push_back({.source = dds::Guid::from(post.source),
                           .sequence = post.sequence_number,
                           .targets = std::move(targets),

@@ -102,12 +102,6 @@ class EventIntake {
   static constexpr std::size_t kMaxAwaited = 1024;
 
  private:
-  /// The client's questions about its post.
-  struct Wanted {
-    bool run = false;       ///< its end
-    bool late_ack = false;  ///< its acknowledgement, but not at once
-  };
-  [[nodiscard]] static Result<Wanted> read_wanted(const dds_sequence_plc_KeyValue& ext);
   using Sources = std::unordered_set<dds::Guid, dds::GuidHash>;
   template <class Post>
   bool take(dds_entity_t reader);
@@ -120,8 +114,7 @@ class EventIntake {
   void refuse(const dds::Guid& writer, std::uint64_t sequence, std::string_view why);
   using Targets = std::vector<AwaitedPost::Target>;
   template <class Post>
-  void post_next(const Post& post, const Result<Wanted>& wanted, LedgerEntry& entry,
-                 const SourceState& state);
+  void post_next(const Post& post, LedgerEntry& entry, const SourceState& state);
   // `targets` is null if nobody waits for the runs.
   [[nodiscard]] Result<void> try_post(const plc_EventPost& post, LedgerEntry& entry, const SourceState& state,
                                       Targets* targets);

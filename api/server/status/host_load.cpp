@@ -2,17 +2,15 @@
 
 #include <algorithm>
 #include <charconv>
-#include <cstdint>
+#include <cmath>
 #include <fstream>
 #include <sstream>
+#include <string>
 #include <system_error>
 #include <utility>
 
 #include <fmt/format.h>
 #include <unistd.h>
-
-#include "api/dds/entries.hpp"
-#include "api/dds/topics.hpp"
 
 namespace plchost {
 
@@ -26,39 +24,43 @@ std::string text_of_file(const char* path) {
 
 }  // namespace
 
-std::string load_average(std::string_view text) {
+std::int32_t load_percent(std::string_view text) {
   const std::string_view first = text.substr(0, text.find(' '));
-  const auto is_part = [](char c) { return (c >= '0' && c <= '9') || c == '.'; };
-  constexpr std::size_t kLongest = 12;
-  return first.size() <= kLongest && std::ranges::all_of(first, is_part) ? std::string(first) : "";
+  double load = 0;
+  const auto read =
+      std::from_chars(first.data(), first.data() + first.size(), load, std::chars_format::fixed);
+  constexpr double kMost = 1e6;
+  constexpr double kPercent = 100;
+  const bool whole = read.ec == std::errc() && read.ptr == first.data() + first.size();
+  return whole && load >= 0 && load <= kMost ? static_cast<std::int32_t>(std::lround(load * kPercent)) : -1;
 }
 
-std::string memory_mib(std::string_view text, std::string_view name) {
+std::uint64_t memory_mib(std::string_view text, std::string_view name) {
   const std::size_t line = text.find(fmt::format("{}:", name));
-  if (line == std::string_view::npos) return "";
+  if (line == std::string_view::npos) return 0;
   std::string_view rest = text.substr(line + name.size() + 1);
   rest.remove_prefix(std::min(rest.find_first_not_of(' '), rest.size()));
   std::uint64_t kib = 0;
   const auto read = std::from_chars(rest.data(), rest.data() + rest.size(), kib);
   constexpr std::uint64_t kKibInMib = 1024;
-  return read.ec == std::errc() ? fmt::format("{}", kib / kKibInMib) : "";
+  return read.ec == std::errc() ? kib / kKibInMib : 0;
 }
 
 void HostLoad::look(TimePoint now) {
   if (now < next_) return;
   next_ = now + kPeriod;
-  load_ = load_average(text_of_file("/proc/loadavg"));
-  cores_ = fmt::format("{}", ::sysconf(_SC_NPROCESSORS_ONLN));
+  load_percent_ = load_percent(text_of_file("/proc/loadavg"));
+  cores_ = static_cast<std::uint32_t>(std::max(::sysconf(_SC_NPROCESSORS_ONLN), 0L));
   const std::string memory = text_of_file("/proc/meminfo");
-  memory_ = memory_mib(memory, "MemTotal");
-  available_ = memory_mib(memory, "MemAvailable");
+  memory_mib_ = memory_mib(memory, "MemTotal");
+  available_mib_ = memory_mib(memory, "MemAvailable");
 }
 
-void HostLoad::add_to(std::vector<plc_KeyValue>& entries) const {
-  dds::add_entry(entries, dds::kLoadEntry, load_);
-  dds::add_entry(entries, dds::kCoresEntry, cores_);
-  dds::add_entry(entries, dds::kMemoryEntry, memory_);
-  dds::add_entry(entries, dds::kAvailableEntry, available_);
+void HostLoad::put(plc_HostStatus& sample) const noexcept {
+  sample.load_percent = load_percent_;
+  sample.cores = cores_;
+  sample.memory_mib = memory_mib_;
+  sample.available_mib = available_mib_;
 }
 
 }  // namespace plchost

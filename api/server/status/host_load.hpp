@@ -1,8 +1,7 @@
 #pragma once
 
-#include <string>
+#include <cstdint>
 #include <string_view>
-#include <vector>
 
 #include <control.h>
 
@@ -10,25 +9,25 @@
 
 namespace plchost {
 
-/// The load of the last minute, as it stands in /proc/loadavg; empty: it cannot be read from that.
-[[nodiscard]] std::string load_average(std::string_view text);
-/// A line of /proc/meminfo ("MemAvailable"), in MiB; empty: there is none.
-[[nodiscard]] std::string memory_mib(std::string_view text, std::string_view name);
+/// The load of the last minute in percent of one processor, by the text of /proc/loadavg; -1: it is none.
+[[nodiscard]] std::int32_t load_percent(std::string_view text);
+/// A line of /proc/meminfo ("MemAvailable"), in MiB; 0: there is none.
+[[nodiscard]] std::uint64_t memory_mib(std::string_view text, std::string_view name);
 
-/// How much the machine has to do, as entries of HostStatus.ext; looked at every kPeriod.
+/// How much the machine has to do, as members of HostStatus; looked at every kPeriod.
 class HostLoad {
  public:
   static constexpr Duration kPeriod = std::chrono::seconds(2);
 
   void look(TimePoint now);
-  void add_to(std::vector<plc_KeyValue>& entries) const;
+  void put(plc_HostStatus& sample) const noexcept;
 
  private:
   TimePoint next_;
-  std::string load_;
-  std::string cores_;
-  std::string memory_;
-  std::string available_;
+  std::int32_t load_percent_ = -1;
+  std::uint32_t cores_ = 0;
+  std::uint64_t memory_mib_ = 0;
+  std::uint64_t available_mib_ = 0;
 };
 
 }  // namespace plchost

@@ -1,21 +1,17 @@
 #include "api/server/status/instance_extension.hpp"
 
-#include <array>
 #include <cstdint>
-#include <string_view>
 
 #include <fmt/format.h>
 
-#include "api/dds/entries.hpp"
 #include "api/dds/text.hpp"
-#include "api/dds/topics.hpp"
 
 namespace plchost {
 
 namespace {
 
-constexpr std::array<std::string_view, 6> kClockStates = {"off",    "free running", "acquiring",
-                                                          "locked", "hold-over",    "measured, not steered"};
+// The states of control.idl; a stranger may have written another one.
+constexpr std::uint32_t kClockStates = 6;
 
 // A value that moves by a little with each look would make each look news.
 std::int64_t to_hundreds(std::int64_t value) noexcept {
@@ -23,33 +19,28 @@ std::int64_t to_hundreds(std::int64_t value) noexcept {
   return (value + (value < 0 ? -kHundred / 2 : kHundred / 2)) / kHundred * kHundred;
 }
 
-template <class Add>
-void add_clock(const ClockRuntime& clock, const Add& add) {
-  add("clock_reference", clock.reference.view());
-  add("clock_problem", clock.problem.view());
-  if (clock.state == 0 || clock.state >= kClockStates.size()) return;
-  add("clock_state", kClockStates[clock.state]);
-  add("clock_in_sync", clock.in_sync != 0 ? "1" : "0");
-  add("clock_offset_ns", fmt::format("{}", to_hundreds(clock.offset_ns)));
-  add("clock_drift_ppb", fmt::format("{}", to_hundreds(clock.drift_ppb)));
-  add("clock_correction_max_ns",
-      fmt::format("{}, {} times at the bound", clock.correction_max_ns, clock.corrections_at_bound));
-  add("clock_rejected_pairs",
-      fmt::format("{}, {} not valid, {} steps followed", clock.rejected, clock.invalid, clock.steps));
+void put_clock(const ClockRuntime& clock, plc_InstanceStatus& sample) noexcept {
+  dds::copy_text(sample.clock_reference, clock.reference.view());
+  dds::copy_text(sample.clock_problem, clock.problem.view());
+  if (clock.state == 0 || clock.state >= kClockStates) return;
+  sample.clock_state = clock.state;
+  sample.clock_in_sync = clock.in_sync != 0;
+  sample.clock_offset_ns = to_hundreds(clock.offset_ns);
+  sample.clock_drift_ppb = to_hundreds(clock.drift_ppb);
+  sample.clock_correction_max_ns = clock.correction_max_ns;
+  sample.clock_corrections_at_bound = clock.corrections_at_bound;
+  sample.clock_rejected_pairs = clock.rejected;
+  sample.clock_invalid_pairs = clock.invalid;
+  sample.clock_steps = clock.steps;
 }
 
 }  // namespace
 
-std::vector<plc_KeyValue> extension_of(const InstanceRuntime& runtime) {
-  std::vector<plc_KeyValue> entries;
-  const auto add = [&](std::string_view name, std::string_view value) {
-    dds::add_entry(entries, name, value);
-  };
-  add("tick_source", runtime.tick_source.view());
-  add("tick_fallback", runtime.tick_fallback.view());
-  add("idle_states", runtime.idle_states.view());
-  add_clock(runtime.clock, add);
-  return entries;
+void put_runtime(const InstanceRuntime& runtime, plc_InstanceStatus& sample) noexcept {
+  dds::copy_text(sample.tick_source, runtime.tick_source.view());
+  dds::copy_text(sample.tick_fallback, runtime.tick_fallback.view());
+  dds::copy_text(sample.idle_states, runtime.idle_states.view());
+  put_clock(runtime.clock, sample);
 }
 
 std::string problem_of_instance(const InstanceStatus& status, const InstanceRuntime* runtime) {
@@ -57,13 +48,6 @@ std::string problem_of_instance(const InstanceStatus& status, const InstanceRunt
   if (runtime == nullptr || runtime->pid != status.pid) return problem;
   const std::string_view retain = runtime->retain_problem.view();
   return problem.empty() || retain.empty() ? problem.append(retain) : fmt::format("{}; {}", problem, retain);
-}
-
-plc_KeyValue transitions_entry(std::uint64_t last) {
-  plc_KeyValue entry{};
-  dds::copy_text(entry.name, dds::kTransitionsEntry);
-  dds::copy_text(entry.value, fmt::format("{}", last));
-  return entry;
 }
 
 }  // namespace plchost

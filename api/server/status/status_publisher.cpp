@@ -6,7 +6,6 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
-#include "api/dds/entries.hpp"
 #include "api/dds/text.hpp"
 #include "api/server/status/instance_extension.hpp"
 
@@ -155,10 +154,10 @@ bool StatusPublisher::update_instance(const InstanceStatus& status, TimePoint no
   if (is_its_own && !runtime->retain_problem.view().empty()) {
     unsaved += fmt::format("{}{}", unsaved.empty() ? "" : ",", name);
   }
-  auto extension = runtime ? extension_of(*runtime) : std::vector<plc_KeyValue>();
-  extension.push_back(transitions_entry(transitions_.publish(name, now)));
-  if (status.removed != 0) dds::add_entry(extension, "removed", "yes");
-  return tables_->of<plc_InstanceStatus>().update(name, sample, extension) || changed;
+  if (runtime) put_runtime(*runtime, sample);
+  sample.transitions = transitions_.publish(name, now);
+  sample.unconfigured = status.removed != 0;
+  return tables_->of<plc_InstanceStatus>().update(name, sample) || changed;
 }
 
 // A topic with a sample for each of 100,000 objects would drown every client; see OPERATION_LIST_OBJECTS.
@@ -251,23 +250,22 @@ void StatusPublisher::write_host(bool changed) {
   dds::copy_text(sample.version, host().version.view());
   sample.manager_pid = host().manager_pid;
   sample.started_unix_ns = host().started_unix_ns;
-  std::vector<plc_KeyValue> ext;
-  dds::add_entry(ext, dds::kLabelsEntry, source_.labels);
-  dds::add_entry(ext, "audit", audit_head_);
-  dds::add_entry(ext, dds::kRunningEntry, fmt::format("{}", running_));
-  dds::add_entry(ext, dds::kSecuredEntry, source_.secured ? "yes" : "no");
-  load_.add_to(ext);
-  dds::add_entry(ext, dds::kRivalEntry, rival_);
-  dds::add_entry(ext, dds::kUnsavedEntry, unsaved_);
-  dds::add_entry(ext, dds::kUnrecordedEntry, audit_problem_);
-  (void)hosts_.update(source_.host, sample, ext);
+  dds::copy_text(sample.labels, source_.labels);
+  sample.secured = source_.secured;
+  sample.running = running_;
+  load_.put(sample);
+  sample.audit_number = audit_.number;
+  dds::copy_text(sample.audit_hash, audit_.hash);
+  dds::copy_text(sample.unrecorded, audit_.problem);
+  dds::copy_text(sample.rival, rival_);
+  dds::copy_text(sample.unsaved, unsaved_);
+  (void)hosts_.update(source_.host, sample);
   hosts_.write();
 }
 
-void StatusPublisher::set_audit(std::string head, std::string_view problem) {
-  if (head == audit_head_ && problem == audit_problem_) return;
-  audit_head_ = std::move(head);
-  audit_problem_ = problem;
+void StatusPublisher::set_audit(const AuditState& audit) {
+  if (audit == audit_) return;
+  audit_ = audit;
   write_host(true);
 }
 

@@ -55,8 +55,14 @@ class StatusPublisher {
   /// All findings of one check of the host, in place of those of the one before.
   void publish_findings(const std::vector<HostFinding>& findings);
 
-  /// By this a reader knows later that nothing was cut off the audit log.
-  void set_audit(std::string head, std::string_view problem);
+  /// The audit log as a reader can check it later: that nothing was cut off.
+  struct AuditState {
+    std::uint64_t number = 0;  ///< of the last record; 0: there is none
+    std::string hash;          ///< of that record
+    std::string problem;       ///< why changes are not recorded; empty: they are
+    bool operator==(const AuditState&) const = default;
+  };
+  void set_audit(const AuditState& audit);
   /// Another host that uses the name of this one, for people; empty: none.
   void set_rival(std::string rival);
 
@@ -92,8 +98,7 @@ class StatusPublisher {
   void write_host(bool changed);
 
   Source source_;
-  std::string audit_head_;
-  std::string audit_problem_;
+  AuditState audit_;
   std::string rival_;
   HostLoad load_;
   std::uint32_t running_ = 0;  ///< instances

@@ -4,10 +4,8 @@
 #include <cstdint>
 #include <cstring>
 #include <map>
-#include <span>
 #include <string>
 #include <type_traits>
-#include <vector>
 
 #include <dds/dds.h>
 
@@ -18,7 +16,7 @@
 namespace plchost {
 
 /// The present samples of one status topic, and those that have still to be written. Samples are compared as
-/// bytes, so they must be zero-initialised before they are filled; the entries of their ext come beside them.
+/// bytes, so they must be zero-initialised before they are filled. Their ext is empty.
 template <class Sample>
   requires std::is_trivially_copyable_v<Sample>
 class StatusTable {
@@ -29,16 +27,14 @@ class StatusTable {
       : topic_(std::move(topic)), writer_(std::move(writer)) {}
 
   /// Returns true if that is news.
-  bool update(const std::string& key, const Sample& sample, std::span<const plc_KeyValue> ext = {}) {
+  bool update(const std::string& key, const Sample& sample) {
     auto [it, added] = entries_.try_emplace(key);
     Entry& entry = it->second;
     entry.marked = true;
     // Samples begin as zeros, so the bytes between their members are equal, too.
     // NOLINTNEXTLINE(bugprone-suspicious-memory-comparison)
-    const bool same = std::memcmp(&entry.sample, &sample, sizeof sample) == 0 && is_same(entry.ext, ext);
-    if (!added && same) return false;
+    if (!added && std::memcmp(&entry.sample, &sample, sizeof sample) == 0) return false;
     std::memcpy(&entry.sample, &sample, sizeof sample);
-    entry.ext.assign(ext.begin(), ext.end());
     entry.unwritten = true;
     return true;
   }
@@ -71,10 +67,7 @@ class StatusTable {
     for (auto& [key, entry] : entries_) {
       if (!entry.unwritten) continue;
       if (budget-- == 0) return;
-      Sample sample = entry.sample;
-      sample.ext._length = sample.ext._maximum = static_cast<std::uint32_t>(entry.ext.size());
-      sample.ext._buffer = entry.ext.data();
-      if (dds_write(writer_.get(), &sample) != DDS_RETCODE_OK) return;
+      if (dds_write(writer_.get(), &entry.sample) != DDS_RETCODE_OK) return;
       entry.unwritten = false;
     }
   }
@@ -84,16 +77,11 @@ class StatusTable {
 
  private:
   struct Entry {
-    Sample sample{};                // its ext is empty
-    std::vector<plc_KeyValue> ext;  // at most the 16 of control.idl
+    Sample sample{};
     bool unwritten = true;
     bool marked = true;
   };
   using Entries = std::map<std::string, Entry>;
-
-  static bool is_same(std::span<const plc_KeyValue> a, std::span<const plc_KeyValue> b) {
-    return a.size() == b.size() && (a.empty() || std::memcmp(a.data(), b.data(), a.size_bytes()) == 0);
-  }
 
   typename Entries::iterator dispose(typename Entries::iterator it) {
     (void)dds_dispose(writer_.get(), &it->second.sample);

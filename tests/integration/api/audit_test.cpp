@@ -142,7 +142,7 @@ TEST_F(Audit, ADiskThatHangsAtTheStartOfTheServerStopsNeitherPresenceNorPostsNor
   for (const TimePoint end = soon(); told.empty() && MonotonicClock::now() < end;) {
     const auto host = client->host("hosta", soon());
     ASSERT_TRUE(host) << host.error().describe();
-    told = host->entry(dds::kUnrecordedEntry);
+    told = dds::text_of(host->status.unrecorded);
     client->wait_for_change(end);
   }
   EXPECT_THAT(told, HasSubstr("the log is not open yet"));

@@ -52,7 +52,7 @@ TEST_F(HostName, IsRefusedToWhoComesLaterWhoThenShowsNothing) {
   EXPECT_EQ(second_.server().wait(), kExitNameTaken);
   EXPECT_EQ(instances_seen(), 1U);
   EXPECT_EQ(sut_->host("hosta", soon())->epoch, epoch) << "the first one goes on";
-  until([&] { return !sut_->host("hosta", soon())->entry(dds::kRivalEntry).empty(); });
+  until([&] { return !dds::text_of(sut_->host("hosta", soon())->status.rival).empty(); });
 }
 
 TEST_F(HostName, IsNotLostToAnOlderOneThatOnlyAsks) {

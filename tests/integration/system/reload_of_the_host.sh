@@ -54,7 +54,7 @@ cp "$cell/one.toml" "$cell/cell.toml"
 [ "$(pid_of line2)" = "$line2" ] || fail "a removed instance does not run on"
 plcctl list instances -o wide 2>/dev/null | grep -q "removed from the configuration" || plcctl list instances | grep -q "removed from" ||
   fail "the removal is not listed: $(plcctl list instances)"
-plcctl list instances --json | grep -q '"removed": *"yes"' || fail "the removal is not flagged"
+plcctl list instances --json | grep -q '"removed": *true' || fail "the removal is not flagged"
 ! plcctl restart instance line2 2>"$cell/said" || fail "a removed instance is restarted"
 plcctl stop instance line2
 for _ in $(seq 100); do [ "$(pid_of line2)" = none ] && break; sleep 0.1; done

@@ -1,5 +1,10 @@
 #!/usr/bin/env bash
-# Programs that were built from the first version of the contract talk to today's, and the other way round.
+# Hosts and clients of three versions of the contract in one domain: the first one, today's, and one that is still to come,
+# with a topic, an operation, a field and a code more. The promises:
+#   a client of any version sees, commands and posts to hosts of all versions with what both know;
+#   an operation that a host does not know is answered with code 10, at once;
+#   a topic that a host does not have is known as such by its counts, without waiting; one that a client does not know is ignored;
+#   a field that a client does not know is skipped, or shown by its name; a code that it does not know is shown as its number.
 . "$(dirname "$0")/common.sh"
 
 write_host cell "$first_core"
@@ -8,7 +13,7 @@ start_manager cell
 until_true 20 state_is packer1 offline
 
 echo "- an old client and today's host"
-said=$("$BIN/old_version" client "$PLCHOST_DOMAIN" packer1 product 100) || fail "old client: $said"
+said=$("$BIN/old_version" client "$PLCHOST_DOMAIN" cell packer1 product 100) || fail "old client: $said"
 is "$said" "host cell api 1
 instance packer1
 start 0 
@@ -33,8 +38,55 @@ is "$(plcctl --host old post event press/full --count 50)" "50 posted" || fail "
 echo "- fields that the old host does not know are told"
 refused "unknown operation" plcctl --host old stop instance press
 
-kill -TERM "$old"
-wait "$old" || fail "the old host ended with $?"
+echo "- a client that is still to come and today's host"
+plcctl --host cell stop instance packer1
+said=$("$BIN/next_version" client "$PLCHOST_DOMAIN" cell packer1 product 50) || fail "next client: $said"
+is "$said" "host cell api 1
+bake 10 unknown operation
+recipes: no such topic
+recipe of packer1: not known
+start 0 
+post accepted 50 rejected 0" || fail "next client: $said"
+
+echo "- today's client and a host that is still to come, beside the others"
+"$BIN/next_version" host "$PLCHOST_DOMAIN" 2>"$cell/next.log" &
+next=$!
+others+=("$next")
+three() { is "$(plcctl list hosts --json | jq -r '[.[].host] | sort | join(" ")')" "cell next old"; }
+until_true 20 three
+press_of_next() { plcctl --host next list instances --json | jq -r '.[] | [.name, .state, .recipe] | join(" ")'; }
+is "$(press_of_next)" "press 77 rye" || fail "instances: $(press_of_next)"
+plcctl --host next start instance press || fail "start"
+is "$(press_of_next)" "press running rye" || fail "instances: $(press_of_next)"
+is "$(plcctl --host next post event press/full --count 50)" "50 posted" || fail "post"
+refused "of another version" plcctl --host next list tasks
+
+echo "- the first and the last version, without today's"
+said=$("$BIN/old_version" client "$PLCHOST_DOMAIN" next press full 20) || fail "old client: $said"
+is "$said" "host next api 1
+instance press
+start 0 
+post accepted 20 rejected 0
+objects: code 10" || fail "old client: $said"
+said=$("$BIN/next_version" client "$PLCHOST_DOMAIN" old press full 20) || fail "next client: $said"
+is "$said" "host old api 1
+bake 10 unknown operation
+recipes: no such topic
+recipe of press: not known
+start 0 
+post accepted 20 rejected 0" || fail "next client: $said"
+said=$("$BIN/next_version" client "$PLCHOST_DOMAIN" next press full 20) || fail "next client: $said"
+is "$said" "host next api 1
+bake 0 
+recipe rye loaves 1
+recipe of press: rye
+start 0 
+post accepted 20 rejected 0" || fail "the additions do not work: $said"
+
+for host in "$old" "$next"; do
+  kill -TERM "$host"
+  wait "$host" || fail "a host of another version ended with $?"
+done
 kill -TERM "${managers[0]}"
 wait "${managers[0]}" || fail "the manager ended with $?"
 nothing_left

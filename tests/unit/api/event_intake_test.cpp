@@ -336,12 +336,9 @@ TEST_F(EventIntakeTest, TellsTheNextServersLogOfWhoPostedLast) {
 
 TEST_F(EventIntakeTest, NotesThePostsWhoseRunsAreAwaited) {
   EventIntake sut = make();
-  plc_KeyValue entry{};
-  dds::copy_text(entry.name, "wait");
-  dds::copy_text(entry.value, "run");
   sut.process(make_post(1));
   auto post = make_post(2);
-  post.ext = {._maximum = 1, ._length = 1, ._buffer = &entry, ._release = false};
+  post.wait_run = true;
   sut.process(post);
   const auto awaited = sut.collect_awaited();
   ASSERT_EQ(awaited.size(), 1U);
@@ -349,33 +346,16 @@ TEST_F(EventIntakeTest, NotesThePostsWhoseRunsAreAwaited) {
   ASSERT_EQ(awaited[0].targets.size(), 1U);
   EXPECT_EQ(awaited[0].targets[0].count, 2U);
   EXPECT_TRUE(sut.collect_awaited().empty());
-
-  dds::copy_text(entry.value, "walk");
-  post.sequence_number = 3;
-  sut.process(post);
-  EXPECT_THAT(std::string(dds::text_of(only_ack(sut).rejected_text)), testing::HasSubstr("run"));
-  EXPECT_EQ(event_.counted().count(), 2U);
 }
 
 TEST_F(EventIntakeTest, OwesAnAcknowledgementAlsoToASourceThatDoesNotWaitForIt) {
   EventIntake sut = make();
-  plc_KeyValue entry{};
-  dds::copy_text(entry.name, "ack");
-  dds::copy_text(entry.value, "late");
   auto post = make_post(1);
-  post.ext = {._maximum = 1, ._length = 1, ._buffer = &entry, ._release = false};
+  post.late_ack = true;
   sut.process(post);
   EXPECT_EQ(event_.counted().count(), 1U);
   EXPECT_EQ(only_ack(sut).sequence_number, 1U);
   EXPECT_TRUE(sut.collect_acks().empty());
-
-  dds::copy_text(entry.value, "never");
-  post.sequence_number = 2;
-  sut.process(post);
-  EXPECT_EQ(event_.counted().count(), 1U);
-  const auto ack = only_ack(sut);
-  EXPECT_EQ(ack.rejected, 1U);
-  EXPECT_THAT(std::string(dds::text_of(ack.rejected_text)), testing::HasSubstr("ack = 'never'"));
 }
 
 TEST_F(EventIntakeTest, GivesEachSourceThatWasAcknowledgedOnceForTheRecords) {
@@ -390,12 +370,9 @@ TEST_F(EventIntakeTest, GivesEachSourceThatWasAcknowledgedOnceForTheRecords) {
 
 TEST_F(EventIntakeTest, AwaitsABoundedNumberOfRunsAndRejectsTheRest) {
   EventIntake sut = make();
-  plc_KeyValue entry{};
-  dds::copy_text(entry.name, "wait");
-  dds::copy_text(entry.value, "run");
   for (std::uint64_t i = 1; i <= EventIntake::kMaxAwaited + 1; ++i) {
     auto post = make_post(i);
-    post.ext = {._maximum = 1, ._length = 1, ._buffer = &entry, ._release = false};
+    post.wait_run = true;
     sut.process(post);
   }
   EXPECT_EQ(event_.counted().count(), EventIntake::kMaxAwaited);

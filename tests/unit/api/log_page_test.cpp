@@ -10,31 +10,16 @@ namespace {
 
 using testing::HasSubstr;
 
-plc_KeyValue log_entry(std::string_view name, std::string_view value) {
-  plc_KeyValue made{};
-  dds::copy_text(made.name, name);
-  dds::copy_text(made.value, value);
-  return made;
-}
-
 TEST(LogQuery, TravelsAsItIs) {
-  EXPECT_TRUE(entries_of(LogQuery{}).empty());
-  EXPECT_EQ(parse_log_query(entries_of(LogQuery{.after = ~std::uint64_t{0}})).value().after,
-            ~std::uint64_t{0});
-  EXPECT_EQ(parse_log_query(entries_of(LogQuery{.newest = 7})).value().newest, 7U);
+  EXPECT_EQ(log_query_of(plc_ListPart{}).value().after, 0U);
+  EXPECT_EQ(log_query_of(part_of(LogQuery{.after = ~std::uint64_t{0}})).value().after, ~std::uint64_t{0});
+  EXPECT_EQ(log_query_of(part_of(LogQuery{.newest = 7})).value().newest, 7U);
 }
 
-TEST(LogQuery, RefusesWhatCannotBe) {
-  const auto error = [](const std::vector<plc_KeyValue>& entries) {
-    const auto query = parse_log_query(entries);
-    return query ? std::string("none") : query.error().message;
-  };
-  EXPECT_THAT(error({log_entry("after", "x")}), HasSubstr("after 'x' is no number"));
-  EXPECT_THAT(error({log_entry("newest", "-1")}), HasSubstr("no number"));
-  EXPECT_THAT(error({log_entry("newest", "99999999999999999999")}), HasSubstr("no number"));
-  EXPECT_THAT(error({log_entry("after", "1"), log_entry("newest", "1")}), HasSubstr("exclude each other"));
-  EXPECT_THAT(error({log_entry("after", "1"), log_entry("after", "1")}), HasSubstr("twice"));
-  EXPECT_EQ(error({log_entry("later", "than this server")}), "none");
+TEST(LogQuery, RefusesAPlaceBesideANumberOfTheNewest) {
+  const auto query = log_query_of(part_of(LogQuery{.after = 1, .newest = 1}));
+  ASSERT_FALSE(query);
+  EXPECT_THAT(query.error().message, HasSubstr("exclude each other"));
 }
 
 LogRecord record(std::uint64_t sequence, std::string_view text, bool goes_on = false) {

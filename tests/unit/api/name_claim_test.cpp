@@ -38,15 +38,18 @@ TEST(NameClaim, OfAServerThatWasReplacedIsNoRival) {
 }
 
 TEST(HostLoad, IsWhatTheKernelTells) {
-  EXPECT_EQ(load_average("0.52 1.00 2.00 3/400 1234\n"), "0.52");
-  EXPECT_EQ(load_average("nonsense"), "");
-  EXPECT_EQ(load_average(""), "");
+  EXPECT_EQ(load_percent("0.52 1.00 2.00 3/400 1234\n"), 52);
+  EXPECT_EQ(load_percent("12.07 1.00"), 1207);
+  EXPECT_EQ(load_percent("0.00"), 0);
+  for (const char* none : {"nonsense", "", "-1.00 1", "0.52x 1", "1e300 1", "99999999999 1", "nan 1"}) {
+    EXPECT_EQ(load_percent(none), -1) << none;
+  }
   const std::string text = "MemTotal:       24576 kB\nMemFree:  1 kB\nMemAvailable:    2048 kB\n";
-  EXPECT_EQ(memory_mib(text, "MemTotal"), "24");
-  EXPECT_EQ(memory_mib(text, "MemAvailable"), "2");
-  EXPECT_EQ(memory_mib(text, "Buffers"), "");
-  EXPECT_EQ(memory_mib("MemTotal: lots", "MemTotal"), "");
-  EXPECT_EQ(memory_mib("MemTotal:", "MemTotal"), "");
+  EXPECT_EQ(memory_mib(text, "MemTotal"), 24U);
+  EXPECT_EQ(memory_mib(text, "MemAvailable"), 2U);
+  EXPECT_EQ(memory_mib(text, "Buffers"), 0U);
+  EXPECT_EQ(memory_mib("MemTotal: lots", "MemTotal"), 0U);
+  EXPECT_EQ(memory_mib("MemTotal:", "MemTotal"), 0U);
 }
 
 }  // namespace

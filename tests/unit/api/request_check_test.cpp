@@ -83,75 +83,56 @@ TEST(RequestCheck, NamesWhatDoesNotExist) {
   EXPECT_THAT(operation.error().message, testing::AllOf(HasSubstr("5"), HasSubstr("set scheduler")));
 }
 
-/// A request with these entries in its ext.
-class WithEntries {
- public:
-  WithEntries(std::int32_t operation, std::string_view argument,
-              const std::vector<std::pair<std::string, std::string>>& entries)
-      : request_(make(operation, "line1", argument)) {
-    for (const auto& [name, value] : entries) {
-      plc_KeyValue& entry = entries_.emplace_back();
-      dds::copy_text(entry.name, name);
-      dds::copy_text(entry.value, value);
-    }
-    request_.ext._buffer = entries_.data();
-    request_.ext._length = request_.ext._maximum = static_cast<std::uint32_t>(entries_.size());
-  }
-  [[nodiscard]] Result<ControlRequest> checked() const { return check(request_, ApiRole::engineering); }
-
- private:
-  plc_Request request_;
-  std::vector<plc_KeyValue> entries_;
-};
-
-TEST(RequestCheck, TakesWhatAnApplicationIsLoadedWith) {
-  const auto load =
-      WithEntries(plc_OPERATION_LOAD_APPLICATION, "/a.so", {{"boot", "yes"}, {"new", "x"}}).checked();
-  ASSERT_TRUE(load) << load.error().message;
-  EXPECT_EQ(load->options, (std::map<std::string, std::string>{{"boot", "yes"}}));
-  EXPECT_EQ(WithEntries(plc_OPERATION_ROLLBACK_APPLICATION, "", {{"boot", "yes"}}).checked()->verb,
-            ControlVerb::rollback_application);
-  const auto wrong = WithEntries(plc_OPERATION_LOAD_APPLICATION, "/a.so", {{"boot", "true"}}).checked();
-  EXPECT_EQ(wrong.error().code, ErrorCode::invalid_argument);
-  EXPECT_THAT(wrong.error().message, HasSubstr("only 'yes'"));
+plc_Request engineering(std::int32_t operation, std::string_view argument = "") {
+  return make(operation, "line1", argument);
 }
 
-TEST(RequestCheck, TakesWhatTakesOverOnline) {
-  const std::map<std::string, std::string> online{{"online", "yes"}};
-  const auto load = WithEntries(plc_OPERATION_LOAD_APPLICATION, "/a.so", {{"online", "yes"}}).checked();
-  ASSERT_TRUE(load) << load.error().message;
-  EXPECT_EQ(load->options, online);
-  EXPECT_EQ(WithEntries(plc_OPERATION_ROLLBACK_APPLICATION, "", {{"online", "yes"}}).checked()->options,
-            online);
-  const auto wrong = WithEntries(plc_OPERATION_ROLLBACK_APPLICATION, "", {{"online", "no"}}).checked();
-  EXPECT_THAT(wrong.error().message, HasSubstr("only 'yes'"));
+TEST(RequestCheck, TakesWhatAnApplicationIsLoadedWith) {
+  using Options = std::map<std::string, std::string>;
+  for (const auto& [operation, argument] : {std::pair(plc_OPERATION_LOAD_APPLICATION, "/a.so"),
+                                            std::pair(plc_OPERATION_ROLLBACK_APPLICATION, "")}) {
+    plc_Request request = engineering(operation, argument);
+    EXPECT_EQ(check(request, ApiRole::engineering)->options, Options{});
+    request.boot = true;
+    EXPECT_EQ(check(request, ApiRole::engineering)->options, (Options{{"boot", "yes"}}));
+    request.online = true;
+    EXPECT_EQ(check(request, ApiRole::engineering)->options, (Options{{"boot", "yes"}, {"online", "yes"}}));
+  }
+}
+
+TEST(RequestCheck, RefusesOptionsThatTheOperationDoesNotHave) {
+  plc_Request request = engineering(plc_OPERATION_REGISTER_EVENT, "ready");
+  request.online = true;
+  const auto online = check(request, ApiRole::engineering);
+  ASSERT_FALSE(online);
+  EXPECT_EQ(online.error().code, ErrorCode::invalid_argument);
+  EXPECT_THAT(online.error().message, HasSubstr("register event takes no option 'online'"));
+  request = engineering(plc_OPERATION_LOAD_APPLICATION, "/a.so");
+  request.size = 12;
+  const auto size = check(request, ApiRole::engineering);
+  ASSERT_FALSE(size);
+  EXPECT_THAT(size.error().message, HasSubstr("takes no 'size'"));
 }
 
 TEST(RequestCheck, TakesADownloadWithItsSizeAndDigestOnly) {
   const std::string digest(64, 'f');
-  const auto sent = WithEntries(plc_OPERATION_DOWNLOAD_APPLICATION, "a b.so",
-                                {{"size", "12"}, {"sha256", digest}, {"source", "7"}, {"by", "admin eve"}})
-                        .checked();
-  ASSERT_TRUE(sent) << sent.error().message;
-  EXPECT_EQ(sent->options, (std::map<std::string, std::string>{{"size", "12"}, {"sha256", digest}}));
-  using Entries = std::vector<std::pair<std::string, std::string>>;
-  for (const Entries& wrong :
-       {Entries{}, Entries{{"size", "12"}}, Entries{{"sha256", digest}},
-        Entries{{"size", "0"}, {"sha256", digest}}, Entries{{"size", "-1"}, {"sha256", digest}},
-        Entries{{"size", "12x"}, {"sha256", digest}},
-        Entries{{"size", "99999999999999999999"}, {"sha256", digest}},
-        Entries{{"size", "12"}, {"sha256", std::string(64, 'F')}},
-        Entries{{"size", "12"}, {"sha256", std::string(63, 'f')}},
-        Entries{{"size", "12"}, {"size", "13"}, {"sha256", digest}}}) {
-    const auto refused = WithEntries(plc_OPERATION_DOWNLOAD_APPLICATION, "a.so", wrong).checked();
+  const auto sent = [](const char* name, std::uint64_t size, std::string_view sha256) {
+    plc_Request request = engineering(plc_OPERATION_DOWNLOAD_APPLICATION, name);
+    request.size = size;
+    dds::copy_text(request.sha256, sha256);
+    return check(request, ApiRole::engineering);
+  };
+  const auto good = sent("a b.so", 12, digest);
+  ASSERT_TRUE(good) << good.error().message;
+  EXPECT_EQ(good->options, (std::map<std::string, std::string>{{"size", "12"}, {"sha256", digest}}));
+  for (const auto& [size, sha256] :
+       {std::pair(0, std::string()), std::pair(12, std::string()), std::pair(0, digest),
+        std::pair(12, std::string(64, 'F')), std::pair(12, std::string(63, 'f'))}) {
+    const auto refused = sent("a.so", static_cast<std::uint64_t>(size), sha256);
     ASSERT_FALSE(refused);
     EXPECT_EQ(refused.error().code, ErrorCode::invalid_argument);
   }
-  for (const char* name : {"", "a/b.so", "a\nb", "\xff"}) {
-    EXPECT_FALSE(
-        WithEntries(plc_OPERATION_DOWNLOAD_APPLICATION, name, {{"size", "12"}, {"sha256", digest}}).checked())
-        << name;
-  }
+  for (const char* name : {"", "a/b.so", "a\nb", "\xff"}) EXPECT_FALSE(sent(name, 12, digest)) << name;
 }
 
 TEST(RequestCheck, RefusesImpossibleArguments) {

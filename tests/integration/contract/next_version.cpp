@@ -1,0 +1,112 @@
+// Programs of a version of the contract that is still to come: it has a topic, an operation and a field more
+// (next_version.py). They are built from that contract and Cyclone DDS, and from nothing else of plchost.
+//   next_version client DOMAIN HOST INSTANCE EVENT COUNT   asks for what is new, then for what today's hosts
+//   can do, too next_version host DOMAIN                               host "next" with instance "press":
+//   until SIGTERM
+
+#include <span>
+
+#include "small_client.hpp"
+#include "small_host.hpp"
+
+namespace {
+
+using namespace contract;
+
+constexpr std::string_view kRecipe = "recipe";
+
+/// The field that InstanceStatus has more; empty: its host does not know it.
+std::string recipe_of(const plc_InstanceStatus& status) {
+  for (const plc_KeyValue& entry : std::span(status.ext._buffer, status.ext._length)) {
+    if (kRecipe == entry.name) return entry.value;
+  }
+  return "";
+}
+
+class NextClient : public SmallClient {
+ public:
+  using SmallClient::SmallClient;
+
+  void list_recipes_of_instances() const {
+    const auto reader =
+        party().reader(plc_InstanceStatus_desc, "plc/v1/status/instance", {.depth = 0, .partition = "s.*"});
+    take_status<plc_InstanceStatus>(reader, count_of(status(), "instance").value_or(0), "the instances",
+                                    [](const plc_InstanceStatus& one) {
+                                      const std::string recipe = recipe_of(one);
+                                      std::cout << "recipe of " << one.instance << ": "
+                                                << (recipe.empty() ? "not known" : recipe) << '\n';
+                                    });
+  }
+
+  /// A host of today counts no recipes, so that nothing is waited for.
+  void list_recipes() const {
+    const auto count = count_of(status(), kRecipe);
+    if (!count) {
+      std::cout << "recipes: no such topic\n";
+      return;
+    }
+    const auto reader =
+        party().reader(plc_RecipeStatus_desc, "plc/v1/status/recipe", {.depth = 0, .partition = "s.*"});
+    take_status<plc_RecipeStatus>(reader, *count, "the recipes", [](const plc_RecipeStatus& one) {
+      std::cout << "recipe " << one.recipe << " loaves " << one.loaves << '\n';
+    });
+  }
+
+  void bake() {
+    const plc_Reply reply = ask(plc_OPERATION_BAKE, "");
+    std::cout << "bake " << reply.code << ' ' << std::string_view(reply.text).substr(0, 17) << '\n';
+  }
+};
+
+class NextHost : public SmallHost {
+ public:
+  explicit NextHost(std::uint32_t domain) : SmallHost(domain, "next") {
+    // In front of the count that a client of today looks for.
+    status().counts[1] = status().counts[0];
+    set(status().counts[0].topic, kRecipe);
+    status().counts[0].samples = 1;
+    set(recipe_.name, kRecipe);
+    set(recipe_.value, "rye");
+    press().ext = {._maximum = 1, ._length = 1, ._buffer = &recipe_, ._release = false};
+    press().state = 77;  // a code that is new
+    set(rye_.host, "next");
+    set(rye_.recipe, "rye");
+    rye_.epoch = 1;
+  }
+
+ private:
+  void write_status() override {
+    (void)dds_write(writer_, &rye_);
+    SmallHost::write_status();
+  }
+  bool does(std::int32_t operation) override {
+    if (operation != plc_OPERATION_BAKE) return false;
+    ++rye_.loaves;
+    (void)dds_write(writer_, &rye_);
+    return true;
+  }
+
+  dds_entity_t writer_ =
+      party().writer(plc_RecipeStatus_desc, "plc/v1/status/recipe", {.partition = status_partition()});
+  plc_KeyValue recipe_{};
+  plc_RecipeStatus rye_{};
+};
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return run_program("next_version", [&] {
+    const std::string verb = argc > 2 ? argv[1] : "";
+    const std::uint32_t domain = argc > 2 ? static_cast<std::uint32_t>(std::stoul(argv[2])) : 0;
+    if (verb == "host" && argc == 3) return NextHost(domain).run();
+    if (verb != "client" || argc != 7) {
+      throw std::invalid_argument("client DOMAIN HOST INSTANCE EVENT COUNT, or host DOMAIN");
+    }
+    NextClient client(domain, argv[3]);
+    client.bake();
+    client.list_recipes();
+    client.list_recipes_of_instances();
+    client.start(argv[4]);
+    client.post(argv[4], argv[5], std::stoull(argv[6]));
+  });
+}
