@@ -17,7 +17,15 @@ static_assert(kGuidPrefix == PLC_GUID_PREFIX && kChallenge == PLC_CHALLENGE);
                                  .to = octets(sign.to),
                                  .challenge = octets(sign.challenge),
                                  .answered = sign.answered.empty() ? nullptr : octets(sign.answered)};
-    return plc_take_sign(&told);
+    switch (plc_take_sign(&told)) {
+      case PLC_SIGN_OF_NO_USE:
+        return SignUse::none;
+      case PLC_SIGN_AWAITED:
+        return SignUse::awaited;
+      case PLC_SIGN_OF_USE:
+        break;
+    }
+    return SignUse::usual;
   };
   const auto is_doubted = [](std::span<const std::byte> from) {
     return plc_is_doubted(reinterpret_cast<const unsigned char*>(from.data()));

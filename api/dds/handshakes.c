@@ -29,6 +29,7 @@ typedef struct Pair {
   unsigned char own[PLC_CHALLENGE];
   bool is_answered;  // this side has signed the remote one's challenge
   unsigned char challenge[PLC_CHALLENGE];
+  bool is_done;              // the other side has answered the challenge of this one
   bool is_stuck;             // Cyclone has lost the message that it would repeat
   dds_time_t doubted_until;  // 0: it is not doubted
 } Pair;
@@ -95,6 +96,7 @@ static void note_handshake(DDS_Security_IdentityHandle local, DDS_Security_Ident
   if (pair != NULL) {
     pair->handshake = handshake;
     pair->has_asked = true;
+    pair->is_done = false;
     memcpy(pair->own, own, sizeof pair->own);
   }
   pthread_mutex_unlock(&mutex);
@@ -110,6 +112,13 @@ static void note_answer(DDS_Security_IdentityHandle local, DDS_Security_Identity
     pair->is_stuck = false;
     trust(pair);
   }
+  pthread_mutex_unlock(&mutex);
+}
+
+static void note_success(DDS_Security_IdentityHandle local, DDS_Security_IdentityHandle remote) {
+  pthread_mutex_lock(&mutex);
+  Pair* const pair = pair_of(local, remote);
+  if (pair != NULL) pair->is_done = true;
   pthread_mutex_unlock(&mutex);
 }
 
@@ -152,8 +161,14 @@ static void take_challenge(dds_security_authentication* instance, DDS_Security_I
   DDS_Security_AuthRequestMessageToken unused = {0};
   DDS_Security_IdentityHandle same = DDS_SECURITY_HANDLE_NIL;
   DDS_Security_SecurityException error = {0};
-  (void)plugin.validate_remote_identity(instance, &same, &unused, &request, local, &token, &guid, &error);
+  const DDS_Security_ValidationResult_t result =
+      plugin.validate_remote_identity(instance, &same, &unused, &request, local, &token, &guid, &error);
   DDS_Security_Exception_clean(&error);
+  // Another thread has returned the handle meanwhile, so the plugin has made one that nobody else returns.
+  if (result != DDS_SECURITY_VALIDATION_FAILED && same != remote) {
+    (void)plugin.return_identity_handle(instance, same, &error);
+    DDS_Security_Exception_clean(&error);
+  }
   DDS_Security_DataHolder_deinit(&unused);
   DDS_Security_DataHolder_deinit(&token);
 }
@@ -225,6 +240,7 @@ static DDS_Security_ValidationResult_t process_handshake(dds_security_authentica
   if (result == DDS_SECURITY_VALIDATION_FAILED) {
     note_failure(local, remote, !is_reply);
   } else {
+    note_success(local, remote);
     note_answer(local, remote, challenge);
   }
   return result;
@@ -313,21 +329,23 @@ static bool is_to(const Pair* pair, const unsigned char* prefix) {
   return false;
 }
 
-bool plc_take_sign(const plc_HandshakeSign* sign) {
-  bool is_current = true;
+plc_SignUse plc_take_sign(const plc_HandshakeSign* sign) {
+  plc_SignUse use = PLC_SIGN_OF_USE;
   pthread_mutex_lock(&mutex);
   for (Pair* pair = pairs; pair != NULL; pair = pair->next) {
     if (memcmp(pair->guid.prefix, sign->from, PLC_GUID_PREFIX) != 0 || !is_to(pair, sign->to)) continue;
     const bool begins = sign->answered == NULL;
     if (!begins && pair->has_asked && memcmp(pair->own, sign->answered, PLC_CHALLENGE) != 0) {
-      is_current = false;
+      use = PLC_SIGN_OF_NO_USE;
     } else if ((begins && pair->is_stuck) ||
                (pair->is_answered && memcmp(pair->challenge, sign->challenge, PLC_CHALLENGE) != 0)) {
       doubt(pair);
+    } else if (!begins && pair->has_asked && pair->is_answered && !pair->is_stuck && !pair->is_done) {
+      use = PLC_SIGN_AWAITED;
     }
   }
   pthread_mutex_unlock(&mutex);
-  return is_current;
+  return use;
 }
 
 bool plc_is_doubted(const unsigned char* from) {

@@ -19,7 +19,8 @@ extern "C" {
 //   never repeats the message that the other side waits for.
 // - If the other side uses a challenge that is not the one that this side has answered, it has begun anew, or
 //   a stranger says so. For 5 s its plain messages are worth nothing. So the lease ends unless protected
-//   messages come, and this side begins anew, too.
+//   messages come, and this side begins anew, too. The answer that completes a handshake passes all the same:
+//   it has both challenges, which a stranger cannot guess. It does not end the 5 s.
 // A process with several participants has one lease for a remote participant. Messages to one of its own
 // participants keep that lease for all.
 
@@ -37,9 +38,14 @@ typedef struct plc_HandshakeSign {
   const unsigned char* answered;   ///< the challenge that it answers; NULL: none
 } plc_HandshakeSign;
 
-/// Takes a message of a handshake into account. False: it is of no use, and Cyclone must not see it. Any
-/// thread.
-bool plc_take_sign(const plc_HandshakeSign* sign);
+typedef enum plc_SignUse {
+  PLC_SIGN_OF_NO_USE,  ///< Cyclone must not see the message
+  PLC_SIGN_OF_USE,     ///< Cyclone may see it unless its sender is doubted
+  PLC_SIGN_AWAITED     ///< it answers both challenges of a handshake that is not complete
+} plc_SignUse;
+
+/// Takes a message of a handshake into account. Any thread.
+plc_SignUse plc_take_sign(const plc_HandshakeSign* sign);
 
 /// Whether plain messages of the remote participant are worth nothing now. Any thread.
 bool plc_is_doubted(const unsigned char* from);

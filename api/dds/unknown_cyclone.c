@@ -85,9 +85,9 @@ bool plc_watch_handshakes(dds_entity_t participant) {
   return false;
 }
 
-bool plc_take_sign(const plc_HandshakeSign* sign) {
+plc_SignUse plc_take_sign(const plc_HandshakeSign* sign) {
   (void)sign;
-  return true;
+  return PLC_SIGN_OF_USE;
 }
 
 bool plc_is_doubted(const unsigned char* from) {

@@ -12,6 +12,8 @@ using namespace submessage_kind;
 
 // In the contents: behind the encapsulation, this message's identity and that of the one that it answers.
 constexpr std::size_t kDestination = kEncapsulation + 24 + 24;
+// Behind the GUIDs of the destination, its endpoint and the source's endpoint.
+constexpr std::size_t kMessageClass = kDestination + 48;
 
 // How a message whose class ends so calls its sender's own challenge and the one that it answers.
 struct ChallengeNames {
@@ -54,30 +56,48 @@ std::span<const std::byte> challenge_in(std::span<const std::byte> contents, std
   return contents.subspan(value_at, kChallenge);
 }
 
-bool is_of_use(const Submessage& submessage, std::span<const std::byte> from,
+// As Cyclone reads it: of the first token.
+std::string_view class_in(std::span<const std::byte> contents) noexcept {
+  const bool little = (byte_at(contents, 1) & kLittleEndian) != 0;
+  std::size_t at = kMessageClass;
+  const auto has = [&](std::size_t size) { return at <= contents.size() && contents.size() - at >= size; };
+  if (!has(sizeof(std::uint32_t))) return {};
+  const std::size_t skipped = number_at<std::uint32_t>(contents, at, little);
+  // The message's class, up to a full word; the number of tokens.
+  at = (at + sizeof(std::uint32_t) + skipped + 3) / 4 * 4 + sizeof(std::uint32_t);
+  if (!has(sizeof(std::uint32_t))) return {};
+  const std::size_t size = number_at<std::uint32_t>(contents, at, little);
+  at += sizeof(std::uint32_t);
+  if (!has(size)) return {};
+  const std::string_view text(reinterpret_cast<const char*>(contents.data()) + at, size);
+  return text.substr(0, text.find('\0'));
+}
+
+SignUse use_of(const Submessage& submessage, std::span<const std::byte> from,
                const HandshakeRecord& record) noexcept {
   constexpr std::size_t kLeast = kInlineQosCount + 2 + kDataFields;
   if (submessage.kind() != kData || submessage.bytes.size() < kLeast ||
       submessage.writer() != kHandshakeWriter) {
-    return true;
+    return SignUse::usual;
   }
   const auto sign = read_handshake_sign(contents_of_sample(submessage));
-  return !sign || record.take(from, *sign);
+  if (sign) return record.take(from, *sign);
+  return sign.error() == NoSign::incomplete ? SignUse::none : SignUse::usual;
 }
 
 }  // namespace
 
-std::optional<HandshakeSign> read_handshake_sign(std::span<const std::byte> contents) noexcept {
-  if (contents.size() < kDestination + kGuidPrefix) return std::nullopt;
-  const std::string_view text(reinterpret_cast<const char*>(contents.data()), contents.size());
-  const auto names = std::ranges::find_if(kChallengeNames, [text](const ChallengeNames& of) {
-    return find_text(text, of.class_ends_with) != std::string_view::npos;
-  });
-  if (names == kChallengeNames.end()) return std::nullopt;
+std::expected<HandshakeSign, NoSign> read_handshake_sign(std::span<const std::byte> contents) noexcept {
+  if (contents.size() < kMessageClass) return std::unexpected(NoSign::another_class);
+  const auto names = std::ranges::find_if(
+      kChallengeNames,
+      [text = class_in(contents)](const ChallengeNames& of) { return text.ends_with(of.class_ends_with); });
+  if (names == kChallengeNames.end()) return std::unexpected(NoSign::another_class);
   const auto own = challenge_in(contents, names->own);
   const auto answered =
       names->answered.empty() ? std::span<const std::byte>{} : challenge_in(contents, names->answered);
-  if (own.empty() || (answered.empty() && !names->answered.empty())) return std::nullopt;
+  if (own.empty() || (answered.empty() && !names->answered.empty()))
+    return std::unexpected(NoSign::incomplete);
   return HandshakeSign{.to = contents.subspan<kDestination, kGuidPrefix>(),
                        .challenge = own.first<kChallenge>(),
                        .answered = answered};
@@ -97,7 +117,8 @@ std::size_t take_out_doubted(std::span<std::byte> datagram, const HandshakeRecor
     const std::uint8_t kind = submessage->kind();
     if (kind == kInfoSource && part.size() == kInfoSourceSize)
       from = part.subspan(kInfoSourcePrefix, kGuidPrefix);
-    if (!is_plain(kind) || (is_of_use(*submessage, from, record) && !record.is_doubted(from))) {
+    const SignUse use = is_plain(kind) ? use_of(*submessage, from, record) : SignUse::awaited;
+    if (use == SignUse::awaited || (use == SignUse::usual && !record.is_doubted(from))) {
       says_something |= !is_frame(kind);
     } else if (!turn_into_padding(part)) {
       return 0;

@@ -2,7 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
+#include <expected>
 #include <span>
 
 #include "api/dds/gate/submessage.hpp"
@@ -18,14 +18,25 @@ struct HandshakeSign {
   std::span<const std::byte> answered;               ///< the challenge that it answers; empty: none
 };
 
-/// `contents`: of a sample of the handshake's writer, with their encapsulation. Nothing: it has not the
-/// challenges of its class.
-[[nodiscard]] std::optional<HandshakeSign> read_handshake_sign(std::span<const std::byte> contents) noexcept;
+enum class NoSign {
+  another_class,  ///< Cyclone ignores the message
+  incomplete      ///< it has not the challenges of its class
+};
+
+/// `contents`: of a sample of the handshake's writer, with their encapsulation.
+[[nodiscard]] std::expected<HandshakeSign, NoSign> read_handshake_sign(
+    std::span<const std::byte> contents) noexcept;
+
+enum class SignUse {
+  none,    ///< the message is taken out
+  usual,   ///< it passes unless its sender is doubted
+  awaited  ///< it passes
+};
 
 /// The knowledge of the participants that send, each by its GUID prefix.
 struct HandshakeRecord {
-  /// Takes a message of a handshake into account. False: it is of no use.
-  bool (*take)(std::span<const std::byte> from, const HandshakeSign& sign);
+  /// Takes a message of a handshake into account.
+  SignUse (*take)(std::span<const std::byte> from, const HandshakeSign& sign);
   /// Whether plain messages of the participant are worth nothing now.
   bool (*is_doubted)(std::span<const std::byte> from);
 };

@@ -89,24 +89,66 @@ std::string with_other_challenge(std::string datagram) {
   return datagram;
 }
 
+// A message as the other side of the two would send it.
+std::string turned_round(std::string datagram, const std::string& one, const std::string& other) {
+  if (one.empty() || one.size() != other.size()) return {};
+  for (std::size_t at = 0; at + one.size() <= datagram.size(); ++at) {
+    const bool is_one = datagram.compare(at, one.size(), one) == 0;
+    if (!is_one && datagram.compare(at, other.size(), other) != 0) continue;
+    datagram.replace(at, one.size(), is_one ? other : one);
+    at += one.size() - 1;
+  }
+  return datagram;
+}
+
+// The messages by which a stranger says that the client, and the host, begin anew.
+struct Forged {
+  std::string to_host;
+  std::string to_client;
+};
+
+Forged forge(const Wire& wire) {
+  const Wire::Requests seen = wire.requests();
+  const auto turned = [&](const std::string& request) {
+    return turned_round(request, wire.client(), wire.host());
+  };
+  return {.to_host = with_other_challenge(seen.sent.empty() ? turned(seen.received) : seen.sent),
+          .to_client = with_other_challenge(seen.received.empty() ? turned(seen.sent) : seen.received)};
+}
+
 // Such a message is in plain text, so anybody can send it. Protected messages renew the leases beside it.
 TEST_F(LostContact, AStrangerWhoSaysThatOneBeginsAnewSeparatesNobody) {
   start();
   const auto client = make_client();
   ASSERT_TRUE(can_post(*client, kPatience));
-  const auto to_host = wire_.sent_request();
-  const std::string anew_to_host = with_other_challenge(to_host.datagram);
-  const std::string anew_to_client = with_other_challenge(wire_.received_request().datagram);
-  ASSERT_FALSE(anew_to_host.empty());
-  ASSERT_FALSE(anew_to_client.empty());
+  const Forged anew = forge(wire_);
+  ASSERT_FALSE(anew.to_host.empty());
+  ASSERT_FALSE(anew.to_client.empty());
   const int handshakes = wire_.last_messages();
   for (const auto end = MonotonicClock::now() + kLeaseEnds; MonotonicClock::now() < end;) {
-    send_to({to_host.port}, anew_to_host);
-    send_to(own_udp_ports(), anew_to_client);
+    send_to({wire_.host_port()}, anew.to_host);
+    send_to(own_udp_ports(), anew.to_client);
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
   }
   EXPECT_TRUE(can_post(*client, kPatience));
   EXPECT_EQ(wire_.last_messages(), handshakes);
+}
+
+TEST_F(LostContact, AStrangerWhoSaysSoWithinTheHandshakeDoesNotKeepThemApart) {
+  start();
+  const auto client = make_client_without_last_message();
+  const Forged anew = forge(wire_);
+  ASSERT_FALSE(anew.to_client.empty());
+  const auto ports = own_udp_ports();
+  send_to(ports, anew.to_client);
+  const std::jthread stranger([&](const std::stop_token& stop) {
+    while (!stop.stop_requested()) {
+      send_to(ports, anew.to_client);
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+  });
+  wire_.lose_last_messages(0);
+  EXPECT_TRUE(can_post(*client, kMeetAgain));
 }
 
 }  // namespace

@@ -31,8 +31,9 @@ struct State {
   TimePoint deaf_until{};
   TimePoint mute_until{};
   std::string host;
-  Wire::Message received_request;
-  Wire::Message sent_request;
+  std::uint16_t host_port = 0;
+  std::string client;
+  Wire::Requests requests;
 };
 
 State& state() {
@@ -41,6 +42,7 @@ State& state() {
 }
 
 constexpr std::string_view kRequest("+AuthReq\0", 9);
+constexpr std::string_view kHandshake("DDS:Auth:PKI-DH:1.0+");
 constexpr std::string_view kLastMessage("PKI-DH:1.0+Final");
 
 bool has(std::string_view datagram, std::string_view text) {
@@ -53,7 +55,7 @@ bool is_lost_coming(std::string_view datagram) {
   const std::lock_guard lock(wire.mutex);
   if (!wire.is_watched) return false;
   if (MonotonicClock::now() < wire.deaf_until) return true;
-  if (has(datagram, kRequest)) wire.received_request = {.datagram = std::string(datagram), .port = 0};
+  if (has(datagram, kRequest)) wire.requests.received = datagram;
   if (!has(datagram, kLastMessage)) return false;
   ++wire.last_messages;
   wire.host = datagram.substr(dds::kGuidPrefixAt, dds::kGuidPrefix);
@@ -67,7 +69,11 @@ bool is_lost_going(std::string_view datagram, std::uint16_t port) {
   const std::lock_guard lock(wire.mutex);
   if (!wire.is_watched) return false;
   if (MonotonicClock::now() < wire.mute_until) return true;
-  if (has(datagram, kRequest)) wire.sent_request = {.datagram = std::string(datagram), .port = port};
+  if (has(datagram, kHandshake)) {
+    wire.host_port = port;
+    wire.client = datagram.substr(dds::kGuidPrefixAt, dds::kGuidPrefix);
+  }
+  if (has(datagram, kRequest)) wire.requests.sent = datagram;
   return false;
 }
 
@@ -91,6 +97,9 @@ Wire::Wire() {
   wire.deaf_until = {};
   wire.mute_until = {};
   wire.host.clear();
+  wire.host_port = 0;
+  wire.client.clear();
+  wire.requests = {};
 }
 
 Wire::~Wire() {
@@ -138,14 +147,19 @@ std::string Wire::host() const {
   return state().host;
 }
 
-Wire::Message Wire::received_request() const {
+Wire::Requests Wire::requests() const {
   const std::lock_guard lock(state().mutex);
-  return state().received_request;
+  return state().requests;
 }
 
-Wire::Message Wire::sent_request() const {
+std::string Wire::client() const {
   const std::lock_guard lock(state().mutex);
-  return state().sent_request;
+  return state().client;
+}
+
+std::uint16_t Wire::host_port() const {
+  const std::lock_guard lock(state().mutex);
+  return state().host_port;
 }
 
 std::vector<std::uint16_t> own_udp_ports() {

@@ -11,9 +11,10 @@ namespace plchost {
 /// The datagrams that this process, a client of one secured host, sends and receives. One at a time.
 class Wire {
  public:
-  struct Message {
-    std::string datagram;
-    std::uint16_t port = 0;  ///< of this machine, that it was sent to; of one that has come: 0
+  /// The newest requests for authentication. Empty: none. A side sends none if the other's came in time.
+  struct Requests {
+    std::string received;
+    std::string sent;
   };
 
   Wire();
@@ -33,9 +34,11 @@ class Wire {
   static void make_mute(Duration time);
   /// The GUID prefix of the host; empty: it has sent no last message of a handshake.
   [[nodiscard]] std::string host() const;
-  /// The newest request for authentication that has come, and the one that was sent.
-  [[nodiscard]] Message received_request() const;
-  [[nodiscard]] Message sent_request() const;
+  [[nodiscard]] Requests requests() const;
+  /// The GUID prefix of this process; empty: it has sent no message of a handshake.
+  [[nodiscard]] std::string client() const;
+  /// The host's port of this machine that messages of a handshake were sent to last; 0: none were.
+  [[nodiscard]] std::uint16_t host_port() const;
 };
 
 /// Of all sockets of this process.

@@ -70,7 +70,7 @@ std::span<const std::byte> octets_of(const std::string& contents) {
 /// The calls of the gate in this test, and the answers.
 struct GateTold {
   std::vector<std::string> noted;
-  bool is_of_no_use = false;
+  SignUse use = SignUse::usual;
   std::string doubted;
 };
 GateTold gate_told;
@@ -79,11 +79,11 @@ std::string octets_text(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-bool take_sign(std::span<const std::byte> from, const HandshakeSign& sign) {
+SignUse take_sign(std::span<const std::byte> from, const HandshakeSign& sign) {
   const std::string answered = sign.answered.empty() ? "-" : octets_text(sign.answered.first(1));
   gate_told.noted.push_back(octets_text(from) + "|" + octets_text(sign.to) + "|" +
                             octets_text(sign.challenge.first(1)) + answered);
-  return !gate_told.is_of_no_use;
+  return gate_told.use;
 }
 
 bool is_doubted(std::span<const std::byte> from) {
@@ -123,6 +123,18 @@ TEST_F(RenewalGate, EachMessageTellsItsSendersOwnChallengeAndTheOneThatItAnswers
   EXPECT_EQ(challenges_of(token_message("DDS:Auth:PKI-DH:1.0+Other", both)), "");
 }
 
+TEST_F(RenewalGate, TheTextOfAnotherClassInAMessageMakesNoOtherMessageOfIt) {
+  const std::string properties = cdr_property("challenge1", '1') + cdr_property("challenge2", '2') +
+                                 cdr_property("future_challenge", 'f');
+  const std::string other = cdr_property("DDS:Auth:PKI-DH:1.0+AuthReq", 'o');
+  EXPECT_EQ(challenges_of(token_message("DDS:Auth:PKI-DH:1.0+Final", other + properties)), "12");
+  EXPECT_EQ(challenges_of(token_message("DDS:Auth:PKI-DH:1.0+Final\0+Other"s, properties)), "12");
+  const std::string usual = cdr_text("dds.sec.auth");
+  std::string behind_another = token_message("DDS:Auth:PKI-DH:1.0+Final", properties);
+  behind_another.replace(behind_another.find(usual), usual.size(), cdr_text("DDS:Auth:PKI-DH:1.0+AuthReq"));
+  EXPECT_EQ(challenges_of(behind_another), "12");
+}
+
 TEST_F(RenewalGate, AMessageThatIsCutOrHasAnotherSizeTellsNothing) {
   const std::string whole = token_message("DDS:Auth:PKI-DH:1.0+Req", cdr_property("challenge1", '1'));
   for (std::size_t size = 0; size < whole.size(); ++size)
@@ -141,7 +153,7 @@ TEST_F(RenewalGate, ChallengesAreNotedWithSenderAndReceiver) {
 }
 
 TEST_F(RenewalGate, AMessageOfNoUseIsTakenOut) {
-  gate_told.is_of_no_use = true;
+  gate_told.use = SignUse::none;
   const std::string both = cdr_property("challenge1", '1') + cdr_property("challenge2", '2');
   const std::string reply = handshake_part(token_message("DDS:Auth:PKI-DH:1.0+Reply", both));
   EXPECT_EQ(pass(header_of(kSender) + reply), "");
@@ -158,6 +170,25 @@ TEST_F(RenewalGate, PlainMessagesOfADoubtedParticipantAreTakenOut) {
   EXPECT_EQ(left.size(), (header_of(kSender) + heartbeat_part() + key).size());
   EXPECT_EQ(left.at(20), '\x01');
   EXPECT_TRUE(left.ends_with(key));
+}
+
+TEST_F(RenewalGate, AnAwaitedAnswerOfADoubtedParticipantPasses) {
+  gate_told.doubted = kSender;
+  const std::string both = cdr_property("challenge1", '1') + cdr_property("challenge2", '2');
+  const std::string datagram =
+      header_of(kSender) + handshake_part(token_message("DDS:Auth:PKI-DH:1.0+Final", both));
+  EXPECT_EQ(pass(datagram), "");
+  gate_told.use = SignUse::awaited;
+  EXPECT_EQ(pass(datagram), datagram);
+}
+
+// Cyclone would refuse it, and then repeat its own message no more.
+TEST_F(RenewalGate, AMessageWithoutTheChallengesOfItsClassIsTakenOut) {
+  for (const char* end : {"+AuthReq", "+Req", "+Reply", "+Final"}) {
+    const std::string contents = token_message("DDS:Auth:PKI-DH:1.0"s + end, cdr_property("other", '1'));
+    EXPECT_EQ(pass(header_of(kSender) + handshake_part(contents)), "") << end;
+  }
+  EXPECT_TRUE(gate_told.noted.empty());
 }
 
 TEST_F(RenewalGate, EachPartIsOfTheParticipantThatSaysIt) {
