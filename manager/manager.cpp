@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <iterator>
+#include <thread>
 #include <utility>
 
 #include <fmt/format.h>
@@ -26,7 +27,7 @@
 #include "shm/files/own_folder.hpp"
 #include "shm/files/pool_files.hpp"
 #include "shm/log/log.hpp"
-#include "shm/pages/host_page_copy.hpp"
+#include "shm/pages/host_page.hpp"
 #include "shm/pages/instance_page.hpp"
 #include "shm/pages/reference_clock.hpp"
 
@@ -49,11 +50,15 @@ Result<void> make_run_directory(const std::string& path) {
 
 // The lock is by run directory; two managers with one pool would overwrite each other's pages all the same.
 Result<void> check_pool_is_free(const std::string& pool) {
-  if (!HostPageReader::open(pool)) return {};
+  const auto page = HostPageReader::open(pool);
+  if (!page) return {};
   constexpr Duration kPatience = std::chrono::milliseconds(100);
-  HostPageCopy page(pool);
-  if (!page.wait(MonotonicClock::now() + kPatience)) return {};  // its writer ended while it wrote
-  const HostStatus* const host = page.host();
+  constexpr Duration kAgain = std::chrono::milliseconds(1);
+  const TimePoint deadline = MonotonicClock::now() + kPatience;
+  // Its own part only: those of instances may be damaged, or within a write.
+  auto host = page->host();
+  for (; !host && MonotonicClock::now() < deadline; host = page->host()) std::this_thread::sleep_for(kAgain);
+  if (!host) return {};  // its writer ended while it wrote
   if (host->manager_pid <= 0 || host->manager_pid == ::getpid()) return {};
   const auto program = [](const std::string& process) {
     std::error_code error;

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstddef>
 #include <filesystem>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -50,10 +51,17 @@ WishMemory::Layout& WishMemory::layout() const noexcept {
 Result<WishMemory> WishMemory::open(std::string_view pool, std::string_view instance) {
   const std::string name = wish_memory_name(pool, instance);
   const auto before = open_fixed_page<Layout>(name, kWishKind, MemoryFile::Access::read_only);
-  auto memory = open_or_make_page<Layout>(name, kWishKind, Replaces::anything);
+  const bool damaged = !before && is_damaged(before.error());
+  // For the managers to come: something was written, and none of it is whole.
+  const auto mark = [damaged](Layout& page) {
+    if (!damaged) return;
+    page.places[0].generation = 1;
+    page.places[0].length = std::numeric_limits<std::uint64_t>::max();
+  };
+  auto memory = open_or_make_page<Layout>(name, kWishKind, Replaces::anything, mark);
+  if (!memory && damaged) return failure(ErrorCode::corrupt, memory.error().describe());
   if (!memory) return std::unexpected(std::move(memory).error());
   WishMemory opened(name, *std::move(memory));
-  opened.made_anew_ = !before && is_damaged(before.error());
   Found found = opened.newest();
   opened.generation_ = found.generation;
   opened.text_ = std::move(found.text);

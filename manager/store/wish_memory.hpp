@@ -18,7 +18,8 @@ namespace plchost {
 /// program damages in one place is in the other one.
 class WishMemory {
  public:
-  /// Goes on with one that is there; makes it anew if it is damaged.
+  /// Goes on with one that is there; makes it anew if it is damaged. corrupt: it is damaged, and cannot be
+  /// made anew.
   [[nodiscard]] static Result<WishMemory> open(std::string_view pool, std::string_view instance);
   static void remove(std::string_view pool, std::string_view instance) noexcept;
   /// Of a pool: the instances that have one.
@@ -27,10 +28,10 @@ class WishMemory {
   /// The newest whole one; nothing: none was written, or it is damaged.
   [[nodiscard]] std::optional<InstanceWish> read() const { return newest().wish; }
   /// Something was written, and none of it is whole: another program has written over it, or over the head
-  /// of the memory, so that open() has made it anew.
+  /// of the memory, so that open() has made it anew. Until the next write() each open() finds it so.
   [[nodiscard]] bool damaged() const {
     const Found found = newest();
-    return !found.wish && (found.any || made_anew_);
+    return !found.wish && found.any;
   }
   /// It is in both places when this returns. full: the text has more than kMaxWishBytes.
   [[nodiscard]] Result<void> write(const InstanceWish& wish);
@@ -58,7 +59,6 @@ class WishMemory {
   MemoryFile memory_;
   std::uint64_t generation_ = 0;
   std::string text_;  // as it was found or written last; empty: never
-  bool made_anew_ = false;
 };
 
 }  // namespace plchost

@@ -78,6 +78,7 @@ Result<std::optional<InstanceWish>> WishStore::find() {
                   memory.error().describe());
   }
   auto remembered = memory_ ? memory_->read() : std::nullopt;
+  damaged_ = memory_ ? memory_->damaged() : memory.error().code == ErrorCode::corrupt;
   const auto file = read_file(path(), kMaxWishBytes, remembered ? kWishReadLimit : kOnlyWishReadLimit);
   auto wish = file ? decode_wish(*file) : Result<InstanceWish>(std::unexpected(file.error()));
   if (file) wanted_ = written_ = *file;
@@ -99,7 +100,7 @@ Result<std::optional<InstanceWish>> WishStore::find() {
   if (remembered) {
     return take_remembered(*std::move(remembered), wish ? std::optional(*std::move(wish)) : std::nullopt);
   }
-  if (memory_ && memory_->damaged()) return take_without_memory(wish);
+  if (damaged_) return take_without_memory(wish);
   if (!file && file.error().code == ErrorCode::not_found) return std::nullopt;
   if (!wish) {
     return failure(ErrorCode::corrupt, fmt::format("{}: {}", path(), wish.error().describe()));
@@ -160,6 +161,7 @@ void WishStore::restore_events() const {
 void WishStore::keep(const InstanceWish& wish) {
   InstanceWish numbered = wish;
   numbered.number = ++number_;
+  damaged_ = false;
   const auto remembered = memory_ ? memory_->write(numbered) : Result<void>();
   if (!remembered) {
     spdlog::error("instance {}: its wanted state is not kept for the next manager: {}", settings_.instance,
@@ -244,7 +246,8 @@ void WishStore::look_after_memory() {
 }
 
 void WishStore::end() noexcept {
-  if (on_disk()) WishMemory::remove(settings_.pool, settings_.instance);
+  // A damaged memory tells the next manager that the disk may have an older wish.
+  if (on_disk() && !damaged_) WishMemory::remove(settings_.pool, settings_.instance);
 }
 
 }  // namespace plchost

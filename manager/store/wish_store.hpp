@@ -76,6 +76,7 @@ class WishStore : public WishKeeper {
   Reactor::Timer limit_;
   Reactor::Timer retry_;
   std::optional<WishMemory> memory_;
+  bool damaged_ = false;      // the memory was written over, and keep() has not been called since
   std::uint32_t number_ = 0;  // of the newest wish
   std::string contents_;      // of wanted_, without its number
   std::string wanted_;        // on the disk

@@ -217,6 +217,7 @@ InstanceWish ManagedInstance::wish() const {
 
 void ManagedInstance::remember() {
   if (!unreadable_.empty()) return;  // it stays as it is until an operator says what is to be
+  if (phase_ == Phase::adopting && !wish_known_ && !commanded_) return;  // until the process has answered
   InstanceWish now = wish();
   if (shutting_down_) {  // in order: that all processes end is nobody's wish
     if (!kept_) return;

@@ -193,7 +193,11 @@ void ManagedInstance::finish_adoption(const std::string& problem) {
   if (!runtime || runtime->pid != status_.pid) runtime = said_;
   const bool known = runtime.has_value();
   if (known) {
-    if (!wish_known_) wants_running_ = runtime->running != 0;
+    if (!wish_known_ && !commanded_) {
+      wants_running_ = runtime->running != 0;
+      // As an operator's stop: the next manager starts no machine that was found stopped.
+      commanded_ = runtime->state == ApplicationState::stopped;
+    }
     if (!runtime->scheduler.view().empty()) scheduler_ = runtime->scheduler.view();
     history_.safe_mode = runtime->application.view().empty() && !application_.empty();
     if (!history_.safe_mode) application_ = runtime->application.view();

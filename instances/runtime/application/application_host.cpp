@@ -160,11 +160,12 @@ RTS_RESULT ApplicationHost::register_event(RTS_HANDLE event) {
     return ERR_OK;
   }
   // The plc_app_exit of a version that leaves while another one runs on.
-  if (online_) {
+  if (online_ && collected_ == nullptr) {
     spdlog::error("SchedRegisterExternalEvent: a version that leaves cannot register events");
     return ERR_NOTINITIALIZED;
   }
-  const bool taken_over = std::erase(leaving_events_, event) != 0;
+  // An operator may have unregistered it since the version that leaves registered it.
+  const bool taken_over = std::erase(leaving_events_, event) != 0 && events_.is_by_application(event);
   const auto registered = taken_over ? Result<void>() : events_.register_by_application(event);
   if (registered) {
     if (events_.is_own(event) && !in_component_) late_events_.push_back(event);

@@ -174,8 +174,9 @@ Result<void> Instance::shut_down() {
   if (page_) InstancePage::remove(options_.launch.pool, options_.launch.name);
   // Under a manager there will be a next process: the numbers go on, and it may need the settings.
   if (options_.launch.report_fd < 0) {
-    TransitionRing::remove(options_.launch.pool, options_.launch.name);
-    ::unlink(kept_settings_path(options_.launch.run_directory, options_.launch.name).c_str());
+    // Of another process of that name, if the set-up of this one has ended before.
+    if (transitions_) TransitionRing::remove(options_.launch.pool, options_.launch.name);
+    if (control_) ::unlink(kept_settings_path(options_.launch.run_directory, options_.launch.name).c_str());
   }
   if (stopped) {
     // Its code may wait for what a thread that is parked in it holds.

@@ -237,6 +237,30 @@ TEST_F(OnlineDeclaration, EndsEventsThatOnlyTheRunningApplicationHasRegisteredLa
   EXPECT_TRUE(is_registered(again));
 }
 
+TEST_F(OnlineDeclaration, OfAnEventOfAnotherInstanceOnlyGivesAccess) {
+  host_.begin_init(online_);
+  RTS_RESULT result = ERR_FAILED;
+  const RTS_HANDLE event = SchedRegisterExternalEvent("packer1/product", &result);
+  EXPECT_EQ(result, ERR_OK);
+  EXPECT_NE(event, RTS_INVALID_HANDLE);
+  host_.end_init();
+  EXPECT_THAT(online_.events, IsEmpty());
+}
+
+TEST_F(OnlineDeclaration, RegistersAgainInACallbackWhatAnOperatorHasUnregistered) {
+  ASSERT_TRUE(host_.events().unregister_by_operator("before"));
+  host_.begin_init(online_);
+  host_.end_init();
+  ASSERT_TRUE(host_.reserve(online_));
+  host_.commit(std::move(online_), [](const void*) { return false; });
+  RTS_RESULT result = ERR_FAILED;
+  EXPECT_EQ(SchedRegisterExternalEvent("before", &result), before_);
+  EXPECT_EQ(result, ERR_OK);
+  EXPECT_TRUE(is_registered(before_));
+  host_.end_takeover();
+  EXPECT_TRUE(is_registered(before_));
+}
+
 TEST_F(OnlineDeclaration, ThatIsNotTakenKeepsEventsThatWereRegisteredLater) {
   const RTS_HANDLE late = SchedRegisterExternalEvent("late", nullptr);
   host_.begin_init(online_);

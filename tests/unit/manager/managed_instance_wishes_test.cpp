@@ -358,6 +358,24 @@ TEST_F(AdoptedWishes, OfAProcessThatWasBeingSetUpAndIsNeverToBeStartedAgain) {
   EXPECT_EQ(host_.spawned.size(), 1U);
 }
 
+TEST_F(AdoptedWishes, ThatWereNotKnownAreThoseOfAProcessThatIsStopped) {
+  wishes_.damaged = true;
+  host_.adoptable = 77;
+  make();
+  ASSERT_TRUE(sut().adopt());
+  EXPECT_EQ(wishes_.writes, 0) << "before the process has answered";
+  adopt_with(ApplicationState::stopped);
+  EXPECT_EQ(state(), InstanceState::stopped);
+  wishes_.damaged = false;
+  host_.adoptable.reset();
+  make();
+  ASSERT_FALSE(sut().adopt());
+  sut().resume();
+  expire_timer();
+  ASSERT_EQ(host_.spawned.size(), 1U);
+  EXPECT_TRUE(host_.spawned.back().stopped);
+}
+
 // An accepted stop holds, whatever the application did by itself before.
 TEST_F(AdoptedWishes, OfAnOperatorsStopAreStrongerThanARestart) {
   bring_up();
