@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 #include <map>
+#include <tuple>
 
 #include <fmt/format.h>
 #include <sys/statvfs.h>
@@ -19,10 +20,12 @@ namespace {
 /// The processes that hold references, and go on.
 class Holders {
  public:
-  explicit Holders(pid_t that_ends) { goes_on_.emplace(static_cast<std::uint32_t>(that_ends), false); }
+  explicit Holders(pid_t that_ends) noexcept : that_ends_(static_cast<std::uint32_t>(that_ends)) {}
   /// One whose references nobody has released yet may have ended.
   [[nodiscard]] bool goes_on(const ReferenceInfo& reference) {
-    const auto [known, is_new] = goes_on_.try_emplace(reference.pid, false);
+    if (reference.pid == that_ends_) return false;
+    const auto [known, is_new] =
+        goes_on_.try_emplace(std::tuple(reference.pid, reference.start, reference.image), false);
     if (is_new) {
       known->second = !process_has_ended(
           {.pid = static_cast<pid_t>(reference.pid), .start = reference.start, .image = reference.image});
@@ -31,7 +34,9 @@ class Holders {
   }
 
  private:
-  std::map<std::uint32_t, bool> goes_on_;
+  std::uint32_t that_ends_;
+  // By pid, start and image: a dead process and a running one may have the same pid.
+  std::map<std::tuple<std::uint32_t, std::uint64_t, std::uint32_t>, bool> goes_on_;
 };
 
 // The references of the process that ends go with it, and so do registrations and tasks of its own events.

@@ -151,6 +151,8 @@ Result<std::unique_ptr<RetainKeeper>> RetainKeeper::make(ObjectPool& pool, const
   start.find_source(pool.name(), name, start.files ? start.files->read() : RetainFiles::Found{});
   if (auto judged = start.judge(initial.layout, options.mismatch); !judged)
     return std::unexpected(judged.error());
+  // Before the memory of then is replaced: a start after a kill finds nothing to put aside.
+  if (start.aside && start.files) start.files->put_aside();
   start.fill(initial, options.cold);
   auto memory = start.goes_on_in_place(initial, options.cold)
                     ? KeptMemory::take_over(pool, name, initial.layout)
@@ -159,7 +161,6 @@ Result<std::unique_ptr<RetainKeeper>> RetainKeeper::make(ObjectPool& pool, const
   if (!memory) memory = KeptMemory::make(pool, name, start.image);
   if (!memory) return std::unexpected(std::move(memory).error());
   MadeInPool made = start.fresh ? MadeInPool(pool, name) : MadeInPool();
-  if (start.aside && start.files) start.files->put_aside();
   return std::unique_ptr<RetainKeeper>(
       new RetainKeeper(*std::move(memory), std::move(made), std::move(start), options));
 }

@@ -60,11 +60,11 @@ void say(std::string_view text) noexcept {
 }
 
 // The crashed thread may hold the lock of the heap: work that needs the heap comes last and has a time limit.
-void describe_crash(const std::string& application, int verdict, const UniqueFd& crashes) {
+void describe_crash(const std::string& application, int verdict, int crashes) {
   TrialCrash crash;
   ssize_t got = 0;
   do {
-    got = ::read(crashes.get(), &crash, sizeof crash);
+    got = ::read(crashes, &crash, sizeof crash);
   } while (got < 0 && errno == EINTR);
   if (got != ssize_t{sizeof crash})
     return;  // the application has closed the pipe: see descriptors_are_open()
@@ -84,7 +84,8 @@ void catch_crashes(const std::string& application, int verdict) {
   std::array<int, 2> ends{};
   if (::pipe2(ends.data(), O_CLOEXEC) != 0) return;  // the parent tells the signal
   crash_pipe = ends[1];
-  std::thread([&application, verdict, crashes = UniqueFd(ends[0])] {
+  // Nothing closes it: the application may have closed it and opened a file that has its number now.
+  std::thread([&application, verdict, crashes = ends[0]] {
     describe_crash(application, verdict, crashes);
   }).detach();
   struct sigaction action{};
