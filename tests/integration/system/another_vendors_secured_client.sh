@@ -36,7 +36,8 @@ vendor() {
 echo "- an operator sees, starts and posts"
 is "$(vendor "$plant/anna" instances | cut -d' ' -f1,2)" "packer1 0" || fail "instances: $(vendor "$plant/anna" instances)"
 vendor "$plant/anna" start packer1 || fail "start"
-is "$(vendor "$plant/anna" post packer1/product 100)" "accepted 100 no_task 0 rejected 0 " || fail "post"
+posted=$(vendor "$plant/anna" post packer1/product 100)
+is "$posted" "accepted 100 no_task 0 rejected 0 " || fail "post: '$posted'"
 
 echo "- a viewer sees, and can neither start nor post"
 is "$(vendor "$plant/panel" instances | cut -d' ' -f1,2)" "packer1 2" || fail "a viewer sees nothing"

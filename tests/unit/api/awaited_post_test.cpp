@@ -10,14 +10,10 @@ namespace {
 
 class AwaitedPostAgain : public EventIntakeTest {
  protected:
-  AwaitedPostAgain() {
-    dds::copy_text(entry_.name, "wait");
-    dds::copy_text(entry_.value, "run");
-  }
-  plc_EventPost make_awaited(std::uint64_t sequence, const char* event = "ready") {
+  static plc_EventPost make_awaited(std::uint64_t sequence, const char* event = "ready") {
     plc_EventPost post = make_post(sequence);
     dds::copy_text(post.event, event);
-    post.ext = {._maximum = 1, ._length = 1, ._buffer = &entry_, ._release = false};
+    post.wait_run = true;
     return post;
   }
   static AwaitedPost only_awaited(EventIntake& sut) {
@@ -25,8 +21,6 @@ class AwaitedPostAgain : public EventIntakeTest {
     EXPECT_EQ(awaited.size(), 1U);
     return awaited.empty() ? AwaitedPost{} : awaited.front();
   }
-
-  plc_KeyValue entry_{};
 };
 
 TEST_F(AwaitedPostAgain, IsToldWhyItWasRejected) {
