@@ -84,3 +84,18 @@ bool plc_stop_announcing_to(dds_entity_t participant, const plc_Address* address
   if (search.is_found) remove_from_addrset(domain, domain->as_disc, &search.found);
   return search.is_found;
 }
+
+bool plc_announce_to(dds_entity_t participant, const dds_guid_t* remote, const plc_Address* address) {
+  struct ddsi_domaingv* const domain = domain_of(participant);
+  Search search = {.address = address};
+  if (domain == NULL) return false;
+  struct thread_state* const thread = lookup_thread_state();
+  const ddsi_guid_t guid = plc_in_host_order(remote);
+  thread_state_awake(thread, domain);
+  const struct ddsi_proxy_participant* const known =
+      entidx_lookup_proxy_participant_guid(domain->entity_index, &guid);
+  if (known != NULL) addrset_forall(known->as_meta, compare_address, &search);
+  if (search.is_found) add_xlocator_to_addrset(domain, domain->as_disc, &search.found);
+  thread_state_asleep(thread);
+  return search.is_found;
+}

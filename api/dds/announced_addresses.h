@@ -37,6 +37,10 @@ size_t plc_addresses_of(dds_entity_t participant, const dds_guid_t* remote, plc_
 /// Announces this process no longer to that address. Returns false if it did not.
 bool plc_stop_announcing_to(dds_entity_t participant, const plc_Address* address);
 
+/// Announces this process to that address of a remote participant, as when that one was discovered. Returns
+/// false if it is not there, or has another address.
+bool plc_announce_to(dds_entity_t participant, const dds_guid_t* remote, const plc_Address* address);
+
 #ifdef __cplusplus
 }
 #endif

@@ -4,6 +4,7 @@
 #include <array>
 #include <cstring>
 #include <iterator>
+#include <utility>
 
 namespace plchost::dds {
 
@@ -41,29 +42,42 @@ std::vector<plc_Address> Announcements::announced() const {
   return addresses;
 }
 
-std::size_t Announcements::forget_gone(std::span<const Guid> remote) {
-  auto doubtful = without(announced(), configured_);
-  if (doubtful.empty()) {
-    in_doubt_.clear();
-    return 0;
-  }
-  std::vector<plc_Address> used;
+bool Announcements::was_forgotten(const plc_Address& address) const noexcept {
+  return std::ranges::any_of(forgotten_, [&address](const Addresses& at_once) {
+    return std::ranges::binary_search(at_once, address, is_before);
+  });
+}
+
+// Those that were forgotten are announced to again.
+Announcements::Addresses Announcements::used_by(std::span<const Guid> remote) const {
+  Addresses used;
   for (const Guid& guid : remote) {
     dds_guid_t raw{};
     guid.copy_to(raw.v);
     std::array<plc_Address, 8> addresses{};
     const std::size_t count = plc_addresses_of(participant_, &raw, addresses.data(), addresses.size());
-    used.insert(used.end(), addresses.begin(),
-                addresses.begin() + static_cast<std::ptrdiff_t>(std::min(count, addresses.size())));
+    for (const plc_Address& address : std::span(addresses).first(std::min(count, addresses.size()))) {
+      if (was_forgotten(address)) (void)plc_announce_to(participant_, &raw, &address);
+      used.push_back(address);
+    }
   }
   std::ranges::sort(used, is_before);
-  doubtful = without(doubtful, used);
-  const auto gone = common(doubtful, in_doubt_);
+  return used;
+}
+
+std::size_t Announcements::forget_gone(std::span<const Guid> remote) {
+  auto doubtful = without(announced(), configured_);
+  Addresses gone;
+  if (!doubtful.empty() || !std::ranges::all_of(forgotten_, &Addresses::empty)) {
+    doubtful = without(doubtful, used_by(remote));
+    gone = common(doubtful, in_doubt_);
+  }
   std::size_t forgotten = 0;
   for (const plc_Address& address : gone) {
     forgotten += plc_stop_announcing_to(participant_, &address) ? 1U : 0U;
   }
   in_doubt_ = without(doubtful, gone);
+  forgotten_[calls_++ % forgotten_.size()] = std::move(gone);
   return forgotten;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <span>
 #include <vector>
@@ -22,14 +23,23 @@ class Announcements {
   /// From time to time. `remote`: the participants that are there. Forgets the addresses that belonged to
   /// none of them at the last call either, since one that is just coming has its address first. Returns how
   /// many it has forgotten.
+  ///
+  /// One that comes again between two calls may be among them too late: Cyclone announces this process no
+  /// more to a participant that it knows, which would stay deaf. So a forgotten address comes back with it.
   std::size_t forget_gone(std::span<const Guid> remote);
 
  private:
-  [[nodiscard]] std::vector<plc_Address> announced() const;
+  using Addresses = std::vector<plc_Address>;  // sorted
+
+  [[nodiscard]] Addresses announced() const;
+  [[nodiscard]] bool was_forgotten(const plc_Address& address) const noexcept;
+  [[nodiscard]] Addresses used_by(std::span<const Guid> remote) const;
 
   dds_entity_t participant_ = 0;  ///< 0: nothing is forgotten
-  std::vector<plc_Address> configured_;
-  std::vector<plc_Address> in_doubt_;
+  Addresses configured_;
+  Addresses in_doubt_;
+  std::array<Addresses, 16> forgotten_;  ///< at the last calls, each in the place of the oldest
+  std::size_t calls_ = 0;
 };
 
 }  // namespace plchost::dds

@@ -63,6 +63,13 @@ bool plc_stop_announcing_to(dds_entity_t participant, const plc_Address* address
   return false;
 }
 
+bool plc_announce_to(dds_entity_t participant, const dds_guid_t* remote, const plc_Address* address) {
+  (void)participant;
+  (void)remote;
+  (void)address;
+  return false;
+}
+
 bool plc_forget_participant(dds_entity_t reader, dds_instance_handle_t publication) {
   (void)reader;
   (void)publication;

@@ -164,6 +164,8 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
   } else if (fd == identity_timer.get()) {
     tell_of_refused(MonotonicClock::now());
     (void)plc_forget_told_keys(event_reader.get());
+    // First those that have just come again, else their addresses would be forgotten.
+    heap.worked(sessions->follow_discovery(), MonotonicClock::now());
     (void)announcements.forget_gone(sessions->participants());
     (void)heap.look(MonotonicClock::now());
     if (identity_changed()) return false;

@@ -84,5 +84,16 @@ TEST_F(AnnouncedAddresses, AreThoseOfClientsThatAreThere) {
   EXPECT_EQ(count(), configured_ + 2);
 }
 
+TEST_F(AnnouncedAddresses, ComeBackWithAClientThatWasOverlooked) {
+  const Child client = make_client();
+  ASSERT_TRUE(are_there(1));
+  EXPECT_EQ(sut_.forget_gone({}), 0U);
+  EXPECT_EQ(sut_.forget_gone({}), 1U) << "as when it has come again, and its discovery was not looked at";
+  ASSERT_EQ(count(), configured_);
+  EXPECT_EQ(sut_.forget_gone(there()), 0U);
+  EXPECT_EQ(count(), configured_ + 1)
+      << "Cyclone knows the client, and would not announce the host to it again";
+}
+
 }  // namespace
 }  // namespace plchost
