@@ -157,7 +157,8 @@ class PLCHOST_CLIENT_API Client {
     explicit operator bool() const noexcept { return code == 0; }
   };
 
-  /// Told how many bytes of a file have arrived.
+  /// Told how many bytes of a file have arrived. The download is under way: from here, only functions of this
+  /// Client with a callback may be used; the others throw wrong_state.
   using Progress = std::function<void(unsigned long long received)>;
 
   /// A member of a status topic: codes are words, durations and times nanoseconds, GUIDs hexadecimal digits.

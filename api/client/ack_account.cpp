@@ -1,5 +1,7 @@
 #include "api/client/ack_account.hpp"
 
+#include <algorithm>
+
 #include "api/dds/text.hpp"
 
 namespace plchost {
@@ -18,6 +20,7 @@ void AckAccount::take(const plc_EventAck& ack) {
   newest_ = ack;
   newest_.ext = {};
   if (ack.rejected == 0) return;
+  last_rejected_ = std::max(last_rejected_, ack.rejected_sequence);
   rejected_code_ = static_cast<ErrorCode>(ack.rejected_code);
   rejected_text_ = dds::text_of(ack.rejected_text);
 }
@@ -29,12 +32,12 @@ AckAccount::Sums AckAccount::sums() const noexcept {
           .lost = earlier_.lost + newest_.lost};
 }
 
-PostReport AckAccount::report_since(const Sums& base) const {
+PostReport AckAccount::report_since(const Sums& base, std::uint64_t first) const {
   const Sums now = sums();
   PostReport report;
   report.accepted = now.accepted - base.accepted;
   report.no_task = now.no_task - base.no_task;
-  report.rejected = now.rejected - base.rejected;
+  if (last_rejected_ >= first) report.rejected = now.rejected - base.rejected;
   report.lost = now.lost - base.lost;
   if (report.rejected > 0) {
     report.rejected_code = rejected_code_;

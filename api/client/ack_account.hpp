@@ -34,13 +34,16 @@ class AckAccount {
   /// An acknowledgement that is not older than the one before.
   void take(const plc_EventAck& ack);
   [[nodiscard]] Sums sums() const noexcept;
-  [[nodiscard]] PostReport report_since(const Sums& base) const;
+  /// `first`: the number of the first post that the report is about. If no later one was rejected, the
+  /// rejections since `base` are those of posts that were given up.
+  [[nodiscard]] PostReport report_since(const Sums& base, std::uint64_t first) const;
   /// Its epoch is 0: none yet.
   [[nodiscard]] const plc_EventAck& newest() const noexcept { return newest_; }
 
  private:
   Sums earlier_;  // of the ledgers before this one
   plc_EventAck newest_{};
+  std::uint64_t last_rejected_ = 0;  // of all ledgers
   ErrorCode rejected_code_ = ErrorCode::ok;
   std::string rejected_text_;
 };

@@ -47,12 +47,18 @@ void ControlClient::update_hosts() {
   dds_requested_deadline_missed_status_t missed{};
   (void)dds_get_requested_deadline_missed_status(presence_.reader(), &missed);
   // None is kept beside what seen_ has of it: that is bounded.
-  dds::take_valid_told<plc_Presence>(presence_.reader(), presence_.writers(),
-                                     [&](const plc_Presence& presence, const auto& info) {
-                                       if (!seen_.take(presence, now, info.publication_handle)) return;
-                                       last_news_ = now;
-                                       ++host_changes_;
-                                     });
+  dds::take_valid_told<plc_Presence>(
+      presence_.reader(), presence_.writers(), [&](const plc_Presence& presence, const auto& info) {
+        const auto is_silent = [&] {
+          const SeenHost* const seen = seen_.find(dds::text_of(presence.host));
+          return seen != nullptr && now - seen->server.last() >= kSilent;
+        };
+        const bool was_silent = is_silent();
+        const bool is_news = seen_.take(presence, now, info.publication_handle);
+        if (is_news) last_news_ = now;
+        // is_silent() may have said so although no changes() saw it.
+        if (is_news || (was_silent && !is_silent())) ++host_changes_;
+      });
   // Posts that a killed server has not acknowledged would hold up those to its successor.
   for (const dds_instance_handle_t writer : seen_.take_ended(now)) {
     (void)plc_forget_participant(presence_.reader(), writer);

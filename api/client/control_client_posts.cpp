@@ -81,6 +81,7 @@ Result<PostReport> ControlClient::post_event(const ApiRequest& event, std::uint6
   const auto way = poster<plc_EventPost>(event.host);
   if (!way) return std::unexpected(way.error());
   EventPoster& posts = **way;
+  (void)take_acks(start);  // of posts that were given up
   posts.begin_report(start);
   use_clock(posts, event.host, patience);
   const EventId id{event.instance, event.argument};

@@ -143,7 +143,7 @@ void Client::command(const std::string& operation, const std::string& host, cons
 std::string Client::download_application(const std::string& host, const std::string& instance,
                                          const std::string& file, const LoadOptions& options,
                                          const Progress& progress) {
-  const Sending sending{host, instance, file, options, progress};
+  const Sending sending{host, instance, file, options, worker_->refusing(progress)};
   return text_or_throw(outcome_of(worker_->run<ApiReply>(
       [&](ControlClient& client) { return send(client, sending, worker_->deadline()); })));
 }
@@ -152,7 +152,7 @@ void Client::download_application(const std::string& host, const std::string& in
                                   const std::string& file, const LoadOptions& options,
                                   const Progress& progress, std::function<void(const Outcome&)> done) {
   check_callback(static_cast<bool>(done));
-  worker_->begin([this, sending = Sending{host, instance, file, options, progress},
+  worker_->begin([this, sending = Sending{host, instance, file, options, worker_->refusing(progress)},
                   done = std::move(done)](const Result<ControlClient*>& client) {
     done(outcome_of(client ? send(**client, sending, worker_->deadline())
                            : Result<ApiReply>(std::unexpected(client.error()))));

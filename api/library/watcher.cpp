@@ -84,13 +84,17 @@ void Client::Watcher::watch() {
     // Nobody could wake a wait for a new one, so watches that were added meanwhile are looked for first.
     if (connect() || client_ == nullptr) continue;
     look(*client_, *subscriptions);
+    // The watches take samples, too: no wait would end because of these.
+    if (client_->changes() != looked_) continue;
     client_->wait_for_change(std::min<TimePoint>(MonotonicClock::now() + kRound, client_->next_silence()));
   }
 }
 
 void Client::Watcher::look(ControlClient& client, const Subscriptions& subscriptions) {
   std::vector<TransitionView> fresh;
-  if (std::ranges::any_of(subscriptions, [](const auto& one) { return one->wants_transitions(); })) {
+  takes_transitions_ |=
+      std::ranges::any_of(subscriptions, [](const auto& one) { return one->wants_transitions(); });
+  if (takes_transitions_) {
     if (auto came = client.transitions()) fresh = *std::move(came);
     keep(fresh);
   }

@@ -81,6 +81,8 @@ class __attribute__((visibility("hidden"))) Client::Watcher {
   std::vector<TransitionView> transitions_;  // for watches that come later: the kept samples of hosts come
                                              // only once
   std::optional<std::uint64_t> looked_;      // ControlClient::changes() at the last look
+  // Since the first watch of them; untaken ones would keep the wait from waiting, also after the last.
+  bool takes_transitions_ = false;
   bool ending_ = false;
   std::thread thread_;
 };

@@ -63,6 +63,28 @@ void Client::Worker::begin(Job job) {
   changed_.notify_all();
 }
 
+Result<ControlClient*> Client::Worker::busy() {
+  return failure(
+      ErrorCode::wrong_state,
+      "a progress callback cannot wait for a call: a download is under way; use the functions with "
+      "a callback");
+}
+
+Client::Progress Client::Worker::refusing(const Progress& progress) {
+  if (!progress) return {};
+  return [this, progress](unsigned long long received) {
+    struct Telling {
+      bool& mark;
+      explicit Telling(bool& set) noexcept : mark(set) { mark = true; }
+      ~Telling() { mark = false; }
+      Telling(const Telling&) = delete;
+      Telling& operator=(const Telling&) = delete;
+    };
+    const Telling telling(telling_);
+    progress(received);
+  };
+}
+
 void Client::Worker::work() {
   for (;;) {
     Job job;

@@ -37,6 +37,9 @@ class __attribute__((visibility("hidden"))) Client::Worker {
   void end();
   /// `job` is called later, or, if too many wait (full) or the client has ended, within this call.
   void begin(Job job);
+  /// Tells `progress`. It is called in the middle of a call, which uses the ControlClient: run() refuses
+  /// meanwhile.
+  [[nodiscard]] Progress refusing(const Progress& progress);
   /// Returns what `call(client)` returns. From a callback: at once, it is this thread's turn.
   template <class T>
   [[nodiscard]] Result<T> run(const std::function<Result<T>(ControlClient&)>& call) {
@@ -45,7 +48,7 @@ class __attribute__((visibility("hidden"))) Client::Worker {
       promise.set_value(client ? call(**client) : Result<T>(std::unexpected(client.error())));
     };
     if (std::this_thread::get_id() == thread_.get_id()) {
-      job(connection_.client());
+      job(telling_ ? busy() : connection_.client());
     } else {
       begin(job);
     }
@@ -54,6 +57,7 @@ class __attribute__((visibility("hidden"))) Client::Worker {
 
  private:
   void work();
+  [[nodiscard]] static Result<ControlClient*> busy();
 
   MakerProcess maker_;
   Connection connection_;
@@ -62,6 +66,7 @@ class __attribute__((visibility("hidden"))) Client::Worker {
   std::condition_variable changed_;
   std::deque<Job> jobs_;
   bool ending_ = false;
+  bool telling_ = false;  // progress; of the thread
   std::thread thread_;
 };
 

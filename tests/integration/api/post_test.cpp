@@ -258,10 +258,22 @@ TEST(RemotePost, WhoseRunIsAwaitedWaitsForAnInstanceThatIsStarting) {
   const auto in_vain = sut->post_and_await({"hosta", 0, "line1", "ready"}, milliseconds(500));
   ASSERT_FALSE(in_vain);
   EXPECT_NE(in_vain.error().code, ErrorCode::not_found) << in_vain.error().describe();
-  const std::jthread instance([&host] {
-    std::this_thread::sleep_for(milliseconds(100));
+  const auto watcher = connect(domain);
+  // Ends once the host has rejected posts that came after this began.
+  const auto until_more_rejected = [&] {
+    const TimePoint end = soon();
+    (void)watcher->call({"hosta", plc_OPERATION_READ_CLOCK, "", ""}, end);  // the status is of now, then
+    const auto rejected = [&] {
+      const auto writers = watcher->writers("hosta", end);
+      return writers && !writers->empty() ? writers->front().rejected : 0;
+    };
+    const std::uint64_t before = rejected();
+    while (rejected() < before + 2 && MonotonicClock::now() < end) watcher->wait_for_change(end);
+  };
+  const std::jthread instance([&] {
+    until_more_rejected();
     host.add_event("line1", "ready");
-    std::this_thread::sleep_for(milliseconds(100));
+    until_more_rejected();
     host.write_instance(0, "line1", InstanceState::stopped, 4711);
   });
 

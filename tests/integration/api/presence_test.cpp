@@ -66,6 +66,16 @@ class Presence : public testing::Test {
   std::unique_ptr<ControlClient> sut_;
 };
 
+TEST_F(Presence, ThatComesAgainIsAChangeAlsoIfItsSilenceWasNotCountedAsOne) {
+  until([this] { return sut_->changes() > 0; });
+  host_.server().signal(SIGSTOP);
+  const std::uint64_t before = sut_->changes();
+  until([this] { return sut_->is_silent("hosta"); });
+  host_.server().signal(SIGCONT);
+  until([this] { return !sut_->is_silent("hosta"); });
+  EXPECT_GT(sut_->changes(), before) << "a watch that told the silence looks again";
+}
+
 TEST_F(Presence, OfAKilledServerEnds) {
   host_.server().signal(SIGKILL);
   expect_silence("killed");

@@ -117,6 +117,31 @@ TEST_F(StoppedServer, CountsNoPostThatItsClientHasGivenUp) {
   EXPECT_EQ(event_.counted().count(), 3U);
 }
 
+TEST_F(StoppedServer, RejectsAGivenUpPostAndNotTheNextOne) {
+  const auto client = known_client();
+  const std::vector<EventId> batch{{"line1", "ready"}};
+  ASSERT_TRUE(client->post_batch("hosta", batch, kPatience));
+  stop_server();
+  const TimePoint began = MonotonicClock::now();
+  const auto report = client->post_event({"hosta", 0, "line1", "ready"}, 1, {}, milliseconds(100));
+  ASSERT_TRUE(report) << report.error().describe();
+  EXPECT_EQ(report->unacknowledged, 1U);
+  EXPECT_FALSE(client->post_batch("hosta", batch, milliseconds(100)));
+  std::this_thread::sleep_until(
+      std::chrono::steady_clock::time_point((began + kStandsStill).time_since_epoch()));
+  go_on();
+
+  const auto next = client->post_event({"hosta", 0, "line1", "ready"}, 1, {}, kPatience);
+  const auto next_batch = client->post_batch("hosta", batch, kPatience);
+
+  ASSERT_TRUE(next && next_batch);
+  EXPECT_EQ(next->rejected, 0U) << next->rejected_text;
+  EXPECT_EQ(next->accepted, 1U);
+  EXPECT_EQ(next_batch->rejected, 0U) << next_batch->rejected_text;
+  EXPECT_EQ(next_batch->accepted, 1U);
+  EXPECT_EQ(event_.counted().count(), 3U);
+}
+
 TEST_F(StoppedServer, LoadsNothingThatItsClientHasGivenUp) {
   const auto client = known_client();
   const std::vector<std::byte> contents(3'000'000, std::byte{7});
