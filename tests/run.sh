@@ -15,8 +15,8 @@ step=0
 steps=12
 # Programs that the tests crash on purpose must end by their signal, not by a sanitizer's report.
 # One of them is preloaded with a clock device, before the sanitizer's own library. Each control program has a
-# plc_app_abi, also where one is loaded for all others to see.
-export ASAN_OPTIONS=handle_segv=0:handle_sigbus=0:verify_asan_link_order=0:detect_odr_violation=0 UBSAN_OPTIONS=print_stacktrace=1 TSAN_OPTIONS=handle_segv=0:handle_sigbus=0
+# plc_app_abi, also where one is loaded for all others to see. One test forks beside threads of others, and starts one.
+export ASAN_OPTIONS=handle_segv=0:handle_sigbus=0:verify_asan_link_order=0:detect_odr_violation=0 UBSAN_OPTIONS=print_stacktrace=1 TSAN_OPTIONS=handle_segv=0:handle_sigbus=0:die_after_fork=0
 if [ "${1:-}" != --step ] && [ "${1:-}" != --fuzz ]; then
   # By these the last step finds what the tests have left behind. The name is short: sockets lie in it.
   own=$(mktemp -d "${TMPDIR:-/tmp}/plc.XXXXXX")

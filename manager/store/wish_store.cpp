@@ -71,6 +71,7 @@ WishStore::WishStore(Reactor& reactor, WishWriter& writer, DiskThread& disk, Set
 
 Result<std::optional<InstanceWish>> WishStore::find() {
   auto memory = WishMemory::open(settings_.pool, settings_.instance);
+  damaged_ = memory ? memory->damaged() : memory.error().code == ErrorCode::corrupt;
   if (memory) {
     memory_ = *std::move(memory);
   } else {
@@ -78,7 +79,6 @@ Result<std::optional<InstanceWish>> WishStore::find() {
                   memory.error().describe());
   }
   auto remembered = memory_ ? memory_->read() : std::nullopt;
-  damaged_ = memory_ ? memory_->damaged() : memory.error().code == ErrorCode::corrupt;
   const auto file = read_file(path(), kMaxWishBytes, remembered ? kWishReadLimit : kOnlyWishReadLimit);
   auto wish = file ? decode_wish(*file) : Result<InstanceWish>(std::unexpected(file.error()));
   if (file) wanted_ = written_ = *file;
