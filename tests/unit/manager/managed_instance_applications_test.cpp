@@ -33,6 +33,17 @@ class SentApplication : public ManagedInstanceTest {
     report_ready();
     ASSERT_EQ(take_reply().code, ErrorCode::ok);
   }
+  /// It is kept, and the host is short of something as the fresh process loads it.
+  void load_while_short() {
+    ask(ControlVerb::download_application, "new.so", options());
+    applications_.end(std::string(kFirst));
+    sut().on_exit(exited_with(0));
+    sut().on_report({.step = SetupStep::load_application,
+                     .code = ErrorCode::system,
+                     .text = "no memory",
+                     .transient = true});
+    sut().on_exit(exited_with(kExitSetupFailed));
+  }
 };
 
 TEST_F(SentApplication, IsKeptWithWhatWasLoadedBeforeItAndThenLoaded) {
@@ -196,14 +207,7 @@ TEST_F(SentApplication, WhoseOutputsHaveAnotherWriterMakesRoomForTheOneBefore) {
 
 TEST_F(SentApplication, IsTriedAgainWhereTheHostIsShortOfSomething) {
   bring_up();
-  ask(ControlVerb::download_application, "new.so", options());
-  applications_.end(std::string(kFirst));
-  sut().on_exit(exited_with(0));
-  sut().on_report({.step = SetupStep::load_application,
-                   .code = ErrorCode::system,
-                   .text = "no memory",
-                   .transient = true});
-  sut().on_exit(exited_with(kExitSetupFailed));
+  load_while_short();
   EXPECT_EQ(state(), InstanceState::waiting);
   expire_timer();
   EXPECT_EQ(host_.spawned.back().application, kFirst);
@@ -212,14 +216,7 @@ TEST_F(SentApplication, IsTriedAgainWhereTheHostIsShortOfSomething) {
 // A third one is sent before the second one was up: the store must not remove the first one for it.
 TEST_F(SentApplication, LeavesTheOneThatRanInTheStoreUntilANewerOneIsUp) {
   bring_up();
-  ask(ControlVerb::download_application, "new.so", options());
-  applications_.end(std::string(kFirst));
-  sut().on_exit(exited_with(0));
-  sut().on_report({.step = SetupStep::load_application,
-                   .code = ErrorCode::system,
-                   .text = "no memory",
-                   .transient = true});
-  sut().on_exit(exited_with(kExitSetupFailed));
+  load_while_short();
   ASSERT_EQ(state(), InstanceState::waiting);
   (void)take_reply();
   ask(ControlVerb::download_application, "newer.so", options());

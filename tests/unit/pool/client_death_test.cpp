@@ -57,6 +57,23 @@ class ClientDeath : public testing::Test {
     ::kill(child, SIGKILL);
     ::waitpid(child, nullptr, 0);
   }
+  /// A client that holds ten objects dies, after `scribble` in its slot: nothing of it stays.
+  void expect_all_released(const std::function<void(ClientSlot&)>& scribble, std::uint32_t written) {
+    const auto file = MemoryFile::open(name_.get(), 1, MemoryFile::Access::read_write);
+    ASSERT_TRUE(file);
+    const pid_t child = client([](ObjectPool& pool) {
+      static std::vector<SharedSemaphore> held;
+      for (int i = 0; i < 10; ++i) {
+        held.push_back(std::move(pool.create_semaphore(std::to_string(i), 1)->object));
+      }
+    });
+    auto* const slots = reinterpret_cast<ClientSlot*>(file->bytes().data() + kClientsOffset);
+    for (std::uint32_t i = 0; i < kMaxClients; ++i) {
+      if (slots[i].pid == static_cast<std::uint32_t>(child)) scribble(slots[i]);
+    }
+    kill_and_reap(child);
+    EXPECT_TRUE(pool_.list()->empty()) << written;
+  }
   UniquePoolName name_;
   ObjectPool pool_;
 };
@@ -226,41 +243,15 @@ TEST_F(ClientDeath, ReleasesItsReferencesWhereverTheyLieAndThoseOfNobodyElse) {
 
 // The place where the search for its references goes on lies in the pool, too.
 TEST_F(ClientDeath, ReleasesAllThoughAStrangerHasWrittenOverThePlaceOfTheSearch) {
-  const auto file = MemoryFile::open(name_.get(), 1, MemoryFile::Access::read_write);
-  ASSERT_TRUE(file);
   for (const std::uint32_t place : {1U, 7U, 10U, kRoom, ~0U}) {
-    const pid_t child = client([](ObjectPool& pool) {
-      static std::vector<SharedSemaphore> held;
-      for (int i = 0; i < 10; ++i) {
-        held.push_back(std::move(pool.create_semaphore(std::to_string(i), 1)->object));
-      }
-    });
-    auto* const slots = reinterpret_cast<ClientSlot*>(file->bytes().data() + kClientsOffset);
-    for (std::uint32_t i = 0; i < kMaxClients; ++i) {
-      if (slots[i].pid == static_cast<std::uint32_t>(child)) slots[i].released = place;
-    }
-    kill_and_reap(child);
-    EXPECT_TRUE(pool_.list()->empty()) << place;
+    expect_all_released([place](ClientSlot& slot) { slot.released = place; }, place);
   }
 }
 
 // The count of its references lies there, too.
 TEST_F(ClientDeath, ReleasesAllThoughAStrangerHasWrittenOverTheCount) {
-  const auto file = MemoryFile::open(name_.get(), 1, MemoryFile::Access::read_write);
-  ASSERT_TRUE(file);
   for (const std::uint32_t count : {0U, 1U, ~0U}) {
-    const pid_t child = client([](ObjectPool& pool) {
-      static std::vector<SharedSemaphore> held;
-      for (int i = 0; i < 10; ++i) {
-        held.push_back(std::move(pool.create_semaphore(std::to_string(i), 1)->object));
-      }
-    });
-    auto* const slots = reinterpret_cast<ClientSlot*>(file->bytes().data() + kClientsOffset);
-    for (std::uint32_t i = 0; i < kMaxClients; ++i) {
-      if (slots[i].pid == static_cast<std::uint32_t>(child)) slots[i].reference_count = count;
-    }
-    kill_and_reap(child);
-    EXPECT_TRUE(pool_.list()->empty()) << count;
+    expect_all_released([count](ClientSlot& slot) { slot.reference_count = count; }, count);
   }
 }
 
