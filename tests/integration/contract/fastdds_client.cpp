@@ -21,6 +21,8 @@
 
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/dds/log/Log.hpp>
+#include <fastdds/dds/log/StdoutErrConsumer.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
 #include <fastdds/dds/subscriber/DataReader.hpp>
@@ -417,9 +419,18 @@ int run(const Options& options) {
   throw std::invalid_argument("'" + verb + "' is no verb: hosts, instances, task, start, stop, post");
 }
 
+// The library's words go where errors go: by themselves they stand among what was asked for.
+void log_as_errors() {
+  auto consumer = std::make_unique<StdoutErrConsumer>();
+  consumer->stderr_threshold(Log::Kind::Info);
+  Log::ClearConsumers();
+  Log::RegisterConsumer(std::move(consumer));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  log_as_errors();
   try {
     return run(parse(argc, argv));
   } catch (const std::exception& error) {
