@@ -44,7 +44,8 @@ namespace plchost {
 //                SIGKILL. An adopted process may be in this phase already.
 //
 // A phase may follow itself: a text changes, or a start fails again. When the process ends,
-// restart_decision.hpp decides on the way out of a phase. clang-format on
+// restart_decision.hpp decides on the way out of a phase.
+// clang-format on
 enum class InstancePhase : std::uint8_t { down, held, backing_off, setting_up, adopting, up, ending };
 inline constexpr std::uint8_t kInstancePhases = 7;
 

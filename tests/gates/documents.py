@@ -10,7 +10,7 @@ anew. The table of plcctl's commands is made by plcctl itself: it is held only w
   the settings and of the configuration are held by instances_unit_test and unit_manager, here only their keys and meanings).
 * The keys in the tables of manager/configuration.md and instances/settings.md are those of the code, and the code has each
   key that a document names, as `[Section] Key` or `Section.Key=1`.
-* Each step of manager/walks.md names a function and a file that has it.
+* Each step of manager/walks.md names a function, a file that has it, and is called by the step around it (walks.py).
 * Each text of a message in manager/troubleshooting.md is a part of one in the code.
 * Each file that a document names with its folder, as `folder/file.cpp`, is there.
 * Each command in the tables of api/plcctl.md is one of the generated table.
@@ -23,6 +23,9 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+
+sys.dont_write_bytecode = True  # beside the gates nothing is left
+from walks import walk_faults
 
 README_LINES = 250
 BEGIN = re.compile(r"<!-- generated: ([\w-]+).*-->")
@@ -327,27 +330,6 @@ def named_key_faults(root, texts):
             for key in re.findall(r"`([A-Z]\w+\.\w[\w.]*)(?:=[^`]*)?`", line):
                 if key.split(".")[0] in stems and key not in names:
                     yield f"{page}:{number}: the code has no key {key}"
-
-
-def walk_faults(root, texts):
-    """Steps: "  Class::function   folder/file.cpp   what"."""
-    page = "manager/walks.md"
-    steps = 0
-    for number, line in enumerate(texts[page].split("\n"), 1):
-        step = re.match(r" *([\w:]+) +((?:\w+/)+\w+\.[ch]pp)\b", line)
-        if not step:
-            continue
-        steps += 1
-        file = root / step[2]
-        owner, _, name = step[1].rpartition("::")
-        code = file.read_text(encoding="utf-8") if file.exists() else ""
-        owner = owner.split("::")[-1]
-        defined = rf"\b{owner}::{name}\(" if owner else rf"\b{name}\("
-        in_class = owner and re.search(rf"\b(class|struct) [^;{{]*\b{owner}\b", code) and re.search(rf"\b{name}\(", code)
-        if not re.search(defined, code) and not in_class:
-            yield f"{page}:{number}: {step[2]} has no function {step[1]}"
-    if steps < 50:
-        yield f"{page}: only {steps} steps found"
 
 
 def file_faults(root, texts):

@@ -30,6 +30,10 @@ git grep -nE "\b($marker)\b" -- ':!*.md' && fault "the lines above are unfinishe
 home_path='/(work|home|root)/[a-z]'
 git grep -nE "$home_path" -- ':!tests/gates' && fault "the lines above name a path of one machine" || true
 
+# Of a comment that is joined with the line before it clang-format knows nothing, and lets the rest of the file be.
+git grep -nE 'clang-format (on|off)' -- '*.cpp' '*.hpp' '*.h' '*.c' | grep -vE ':[0-9]+: *// clang-format (on|off)$' &&
+  fault "the lines above do not switch clang-format: give the comment a line of its own" || true
+
 # These can be put in a program's way by any user of the machine: a link where it makes a file, a name in a space of all.
 sources=(shm schedulers instances manager api)
 git grep -nE '\bO_CREAT\b' -- "${sources[@]}" | grep -vE 'O_NOFOLLOW|O_EXCL' && fault "the lines above make files through links" || true

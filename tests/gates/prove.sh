@@ -112,6 +112,9 @@ echo 'void* plc_call(int x) {}' | tee "$plot/tree/instances/runtime/abi/calls.cp
 must_be_red "house: function of plc_app.h" "instances/runtime/tasks/table.cpp:1:void* plc_call(int x) {}" "$gates/house.sh" "$plot/tree"
 
 new_tree
+printf '// clang-format off\n// A table. clang-''format on\n' >"$plot/tree/shm/base/joined.hpp" && commit_tree
+must_be_red "house: joined comment" "shm/base/joined.hpp:2:// A table. clang-format on" "$gates/house.sh" "$plot/tree"
+new_tree
 echo 'bool is_newer(const plc_Presence& one, const Seen& seen) { return one.epoch > seen.epoch; }' >"$plot/tree/api/newer.cpp" && commit_tree
 must_be_red "house: another rule for epochs" "the lines above compare epochs: use NewestEpoch" "$gates/house.sh" "$plot/tree"
 new_tree
@@ -217,6 +220,7 @@ plant_in_documents "documents: message that is gone" "no message has 'needs SCHE
 plant_in_documents "documents: file that is gone" "there is no file schedulers/register.cpp" schedulers/README.md 's,`schedulers/registry.cpp`,`schedulers/register.cpp`,'
 plant_in_documents "documents: unknown command" "plcctl has no command 'list writer'" api/plcctl.md 's,^\| `list writers` \| Posts,| `list writer` | Posts,'
 plant_in_documents "documents: step of a walk that the code lacks" "has no function EventIntake::try_posting" manager/walks.md 's,EventIntake::try_post ,EventIntake::try_posting ,'
+plant_in_documents "documents: step of a walk that its caller does not call" "Task::run_cycle does not call before_cycle" manager/walks.md 's,as before_entry,as before_cycle,'
 
 # A key of the configuration is one row and one member: both are added to a scratch copy.
 check_keys() { g++ -std=c++23 -fsyntax-only -I "$plot/tree" "$plot/tree/manager/config/config_keys.cpp"; }
