@@ -12,7 +12,7 @@ anew. The table of plcctl's commands is made by plcctl itself: it is held only w
   key that a document names, as `[Section] Key` or `Section.Key=1`.
 * Each step of manager/walks.md names a function, a file that has it, and is called by the step around it (walks.py).
 * Each text of a message in manager/troubleshooting.md is a part of one in the code.
-* Each file that a document names with its folder, as `folder/file.cpp`, is there.
+* Each file that a document names with its folder, as `folder/file.cpp`, is there, and each unit of a `systemctl` command.
 * Each command in the tables of api/plcctl.md is one of the generated table.
 """
 
@@ -338,6 +338,9 @@ def file_faults(root, texts):
             for name in re.findall(r"`((?:[\w.-]+/)+[\w.-]+\.(?:cpp|hpp|h|c|py|sh|idl|md|svg))`", line):
                 if not (root / name).exists() and not (root / page).parent.joinpath(name).exists():
                     yield f"{page}:{number}: there is no file {name}"
+            for unit in re.findall(r"systemctl (?:-\S+ )*[a-z]+ (?:-\S+ )*([\w-]+)", line):
+                if not (root / "manager" / f"{unit}.service.in").exists():
+                    yield f"{page}:{number}: no unit of systemd is called {unit}"
 
 
 def message_faults(root, texts):
