@@ -11,6 +11,7 @@ anew. The table of plcctl's commands is made by plcctl itself: it is held only w
 * The keys in the tables of manager/configuration.md and instances/settings.md are those of the code, and the code has each
   key that a document names, as `[Section] Key` or `Section.Key=1`.
 * Each step of manager/walks.md names a function, a file that has it, and is called by the step around it (walks.py).
+* Each name `Class::function` is one of the code.
 * Each text of a message in manager/troubleshooting.md is a part of one in the code.
 * Each file that a document names with its folder, as `folder/file.cpp`, is there, and each unit of a `systemctl` command.
 * Each command in the tables of api/plcctl.md is one of the generated table.
@@ -343,11 +344,25 @@ def file_faults(root, texts):
                     yield f"{page}:{number}: no unit of systemd is called {unit}"
 
 
+def sources_of(root):
+    return [file for folder in ("api", "instances", "manager", "schedulers", "shm") for file in (root / folder).rglob("*.[ch]pp")]
+
+
+def name_faults(root, texts):
+    code = "\n".join(file.read_text(encoding="utf-8") for file in sources_of(root))
+    classes = set(re.findall(r"\b(?:class|struct) (?:\[\[nodiscard\]\] )?(\w+)", code))
+    words = set(re.findall(r"\w+", code))
+    for page, text in texts.items():
+        for number, line in enumerate(text.split("\n"), 1):
+            for owner, name in re.findall(r"\b([A-Z]\w+)::(\w+)", line):
+                if owner not in classes or name not in words:
+                    yield f"{page}:{number}: the code has no {owner}::{name}"
+
+
 def message_faults(root, texts):
     page = "manager/troubleshooting.md"
-    sources = [file for folder in ("api", "instances", "manager", "schedulers", "shm") for file in (root / folder).rglob("*.[ch]pp")]
     # Literals that stand one behind the other are one text.
-    code = "\n".join(re.sub(r'"\s*"', "", file.read_text(encoding="utf-8")) for file in sources)
+    code = "\n".join(re.sub(r'"\s*"', "", file.read_text(encoding="utf-8")) for file in sources_of(root))
     for row in rows_of(texts[page], "| text | cause |", "\n\n")[2:]:
         text = row.split("`")[1]
         if text not in code:
@@ -370,6 +385,7 @@ def main():
         faults += command_faults(documents.texts)
         faults += walk_faults(documents.root, documents.texts)
         faults += file_faults(documents.root, documents.texts)
+        faults += name_faults(documents.root, documents.texts)
         faults += message_faults(documents.root, documents.texts)
     except ValueError as wrong:
         faults.append(f"a table of keys is not where it is expected: {wrong}")
