@@ -344,12 +344,12 @@ def file_faults(root, texts):
                     yield f"{page}:{number}: no unit of systemd is called {unit}"
 
 
-def sources_of(root):
-    return [file for folder in ("api", "instances", "manager", "schedulers", "shm") for file in (root / folder).rglob("*.[ch]pp")]
+def sources_of(root, *more):
+    return [file for folder in ("api", "instances", "manager", "schedulers", "shm", *more) for file in (root / folder).rglob("*.[ch]pp")]
 
 
 def name_faults(root, texts):
-    code = "\n".join(file.read_text(encoding="utf-8") for file in sources_of(root))
+    code = "\n".join(file.read_text(encoding="utf-8") for file in sources_of(root, "tests"))
     classes = set(re.findall(r"\b(?:class|struct) (?:\[\[nodiscard\]\] )?(\w+)", code))
     words = set(re.findall(r"\w+", code))
     for page, text in texts.items():
