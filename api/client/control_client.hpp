@@ -271,7 +271,8 @@ class ControlClient {
   dds::Entity status_subscriber_;
   dds::HostWriters answering_;  // of the readers in its own partition
   StatusCache<plc_Presence> presence_;
-  StatusCache<plc_HostStatus> host_status_;
+  // A host that is silent is still shown as it was.
+  StatusCache<plc_HostStatus, UnseenHost::keeps_last_words> host_status_;
   template <class... Samples>
   using CachesOf = std::tuple<StatusCache<Samples>...>;
   dds::OfCountedStatus<CachesOf> status_;

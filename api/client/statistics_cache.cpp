@@ -40,7 +40,7 @@ void StatisticsCache::update() {
       [this](dds_instance_handle_t handle, const plc_TaskStatistics& sample) {
         reports_[handle] = to_report(sample);
       },
-      [this](dds_instance_handle_t handle) { reports_.erase(handle); });
+      [this](dds_instance_handle_t handle, dds::InstanceEnd /*why*/) { reports_.erase(handle); });
 }
 
 std::optional<StatisticsReport> StatisticsCache::find(std::string_view host, std::uint64_t epoch,

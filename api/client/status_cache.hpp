@@ -15,8 +15,14 @@
 
 namespace plchost {
 
+/// What becomes of a sample when nobody who has written it is seen any more.
+enum class UnseenHost : std::uint8_t {
+  forgets,           ///< the sample is gone: it may not be true any more
+  keeps_last_words,  ///< the sample stays until the host tells the next one; of topics with one sample a host
+};
+
 /// The newest sample of each instance of one status topic.
-template <class Sample>
+template <class Sample, UnseenHost kUnseen = UnseenHost::forgets>
 class StatusCache {
  public:
   StatusCache() = default;
@@ -29,24 +35,17 @@ class StatusCache {
   /// Those of its reader.
   [[nodiscard]] dds::HostWriters& writers() noexcept { return writers_; }
 
-  /// Takes what has come. `on_sample(sample)` is called for each that is there now.
-  template <class Function>
-  void update(Function on_sample) {
+  /// Takes what has come.
+  void update() {
     if (!reader_) return;
     dds::take_changes<Sample>(
         reader_.get(), writers_,
-        [&](dds_instance_handle_t handle, const Sample& sample) {
+        [this](dds_instance_handle_t handle, const Sample& sample) {
+          ++changes_;
+          if (!samples_.contains(handle)) forget_last_words(dds::text_of(sample.host));
           samples_[handle].take(sample);
-          ++changes_;
-          on_sample(sample);
         },
-        [this](dds_instance_handle_t handle) {
-          samples_.erase(handle);
-          ++changes_;
-        });
-  }
-  void update() {
-    update([](const Sample&) {});
+        [this](dds_instance_handle_t handle, dds::InstanceEnd why) { end(handle, why); });
   }
 
   /// All of one host that its present server wrote. Their ext lies in this cache: valid until it is updated.
@@ -76,8 +75,10 @@ class StatusCache {
   struct Kept {
     Sample sample{};
     std::vector<plc_KeyValue> ext;
+    bool is_last_word = false;
 
     void take(const Sample& from) {
+      is_last_word = false;
       sample = from;
       ext.assign(from.ext._buffer, from.ext._buffer + from.ext._length);
       sample.ext = {};
@@ -85,6 +86,25 @@ class StatusCache {
       sample.ext._buffer = ext.data();
     }
   };
+
+  void end(dds_instance_handle_t handle, dds::InstanceEnd why) {
+    const auto known = samples_.find(handle);
+    if (known == samples_.end()) return;
+    ++changes_;
+    if (why == dds::InstanceEnd::without_host && kUnseen == UnseenHost::keeps_last_words) {
+      known->second.is_last_word = true;
+    } else {
+      samples_.erase(known);
+    }
+  }
+  // What a host tells of itself again has another handle than its last words.
+  void forget_last_words(std::string_view host) {
+    if constexpr (kUnseen == UnseenHost::keeps_last_words) {
+      std::erase_if(samples_, [host](const auto& entry) {
+        return entry.second.is_last_word && dds::text_of(entry.second.sample.host) == host;
+      });
+    }
+  }
 
   static bool is_of(const Sample& sample, std::string_view host, std::uint64_t epoch) {
     return sample.epoch == epoch && dds::text_of(sample.host) == host;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <unordered_map>
@@ -48,15 +49,23 @@ void take_valid_told(dds_entity_t reader, HostWriters& writers, Function use) {
   });
 }
 
-/// The same, for what is kept of each instance: `update(handle, sample)`, or `forget(handle)` when it was
-/// disposed.
-template <class Sample, class Update, class Forget>
-void take_changes(dds_entity_t reader, HostWriters& writers, Update update, Forget forget) {
+/// Why an instance has no sample any more.
+enum class InstanceEnd : std::uint8_t {
+  disposed,      ///< its host says that there is no such thing
+  without_host,  ///< nobody who has written it is seen any more
+};
+
+/// The same, for what is kept of each instance: `update(handle, sample)`, then `end(handle, why)` if it has
+/// ended. After that the handle means nothing: if the same writer is seen again, as after a pause of its
+/// process or of the network, it tells all that there is then, and the same key has another handle.
+template <class Sample, class Update, class End>
+void take_changes(dds_entity_t reader, HostWriters& writers, Update update, End end) {
   take_told<Sample>(reader, writers, [&](const Sample& sample, const dds_sample_info_t& info) {
-    if (info.instance_state == DDS_IST_NOT_ALIVE_DISPOSED) {
-      forget(info.instance_handle);
-    } else if (info.valid_data) {
-      update(info.instance_handle, sample);
+    const bool disposed = info.instance_state == DDS_IST_NOT_ALIVE_DISPOSED;
+    if (info.valid_data && !disposed) update(info.instance_handle, sample);
+    if (disposed) end(info.instance_handle, InstanceEnd::disposed);
+    if (info.instance_state == DDS_IST_NOT_ALIVE_NO_WRITERS) {
+      end(info.instance_handle, InstanceEnd::without_host);
     }
   });
 }

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <csignal>
 #include <cstring>
 #include <future>
@@ -7,7 +8,9 @@
 #include <gmock/gmock.h>
 
 #include "api/client/control_client.hpp"
+#include "api/dds/ended_participant.h"
 #include "api/dds/text.hpp"
+#include "api/dds/topics.hpp"
 #include "schedulers/task/task_recorder.hpp"
 #include "shm/files/memory_file.hpp"
 #include "tests/integration/api/test_host.hpp"
@@ -262,6 +265,85 @@ TEST(RemoteStatus, OfTheNextServerReplacesThatOfAKilledOne) {
   auto after = before;
   while (after.epoch == before.epoch) after = sut->host("hosta", soon()).value();
   EXPECT_EQ(sut->instances("hosta", soon()).value().size(), 1U);
+}
+
+// As after a pause of the host's process, or of the network, that was longer than the host's lease.
+void lose_sight_of_hosts(ControlClient& client) {
+  const dds_entity_t participant = client.participant()->entity.get();
+  const auto subscriber = dds::make_subscriber(participant, dds::status_partition(dds::kAllHosts)).value();
+  const auto topic = dds::make_topic(participant, dds::kPresence).value();
+  const auto reader = dds::make_reader(subscriber.get(), topic.get(), dds::qos_of(dds::kPresence)).value();
+  std::array<dds_instance_handle_t, 1> writer{};
+  const auto hosts = [&] { return dds_get_matched_publications(reader.get(), writer.data(), writer.size()); };
+  while (hosts() != 1) std::this_thread::sleep_for(milliseconds(1));
+  ASSERT_TRUE(plc_forget_participant(reader.get(), writer.front()));
+  while (hosts() != 0) std::this_thread::sleep_for(milliseconds(1));
+  // Until the host announces itself again the client takes notice.
+  for (int i = 0; i < 40; ++i) {
+    (void)client.changes();
+    std::this_thread::sleep_for(milliseconds(5));
+  }
+}
+
+TEST(RemoteStatus, IsWholeAgainAfterTheClientHasLostSightOfTheHost) {
+  const OwnDomain domain;
+  TestHost host(domain, "hosta");
+  host.write_instance(0, "line1", InstanceState::running, 4711);
+  host.write_instance(1, "line2", InstanceState::offline);
+  host.write_count(2);
+  host.start_server();
+  const auto sut = connect(domain);
+  ASSERT_TRUE(sut->host("hosta", soon()));
+  ASSERT_EQ(sut->instances("hosta", soon()).value().size(), 2U);
+
+  ASSERT_NO_FATAL_FAILURE(lose_sight_of_hosts(*sut));
+  host.write_count(1);
+  ASSERT_TRUE(sut->host("hosta", soon()));
+  std::size_t count = 0;
+  for (const TimePoint end = soon(); count != 1 && MonotonicClock::now() < end;) {
+    const auto instances = sut->instances("hosta", end);
+    ASSERT_TRUE(instances) << instances.error().describe();
+    count = instances->size();
+  }
+  EXPECT_EQ(count, 1U) << "the host has said nothing of line2 since it is seen again";
+
+  const TimePoint limit = soon();
+  const auto reply = sut->call({"hosta", plc_OPERATION_STOP, "line1", ""}, limit);
+  ASSERT_TRUE(reply) << reply.error().describe();
+  EXPECT_LT(MonotonicClock::now(), limit) << "it waits for a state of the host that it cannot see";
+  EXPECT_EQ(sut->instances("hosta", soon()).value().at(0).state,
+            static_cast<std::uint32_t>(InstanceState::stopped));
+}
+
+TEST(RemoteStatus, OfStatisticsGoesOnAfterTheClientHasLostSightOfTheHost) {
+  const OwnDomain domain;
+  TestHost host(domain, "hosta");
+  InstancePage page = host.make_page("line1", "Main", 100);
+  host.write_instance(0, "line1", InstanceState::running, 100);
+  host.write_count(1);
+  TaskRecorder task(page.statistics(0), TimePoint(seconds(1)));
+  const auto run_cycle = [&](int number) {
+    const TimePoint release{seconds(2) + number * milliseconds(1)};
+    task.record(
+        {.release = release, .start = release, .end = release + Duration(700), .interval = milliseconds(1)});
+  };
+  run_cycle(0);
+  host.start_server();
+  const auto sut = connect(domain);
+  ASSERT_TRUE(sut->host("hosta", soon()));
+  ASSERT_EQ(sut->statistics("hosta", "line1", "Main", soon()).value().numbers.cycles, 1U);
+
+  ASSERT_NO_FATAL_FAILURE(lose_sight_of_hosts(*sut));
+  run_cycle(1);
+
+  std::uint64_t cycles = 0;
+  for (const TimePoint end = soon(); cycles != 2 && MonotonicClock::now() < end;) {
+    const auto report = sut->statistics("hosta", "line1", "Main", end);
+    ASSERT_TRUE(report) << report.error().describe();
+    cycles = report->numbers.cycles;
+    sut->wait_for_change(MonotonicClock::now() + milliseconds(20));
+  }
+  EXPECT_EQ(cycles, 2U);
 }
 
 TEST(RemoteStatus, OfADomainWithoutHostsIsEmpty) {
