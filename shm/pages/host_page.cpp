@@ -180,4 +180,13 @@ std::optional<InstanceStatus> HostPageReader::instance(std::uint32_t index) cons
   return status;
 }
 
+std::uint64_t HostPageReader::host_sequence() const noexcept {
+  return host_layout_of(memory_).host.sequence();
+}
+
+std::uint64_t HostPageReader::instance_sequence(std::uint32_t index) const noexcept {
+  assert(index < kMaxInstances);
+  return host_layout_of(memory_).instances[index].sequence();
+}
+
 }  // namespace plchost

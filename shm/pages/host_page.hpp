@@ -128,6 +128,10 @@ class HostPageReader {
   /// written yet: names and texts are what they may be, without control characters.
   [[nodiscard]] std::optional<HostStatus> host() const noexcept;
   [[nodiscard]] std::optional<InstanceStatus> instance(std::uint32_t index) const noexcept;
+  /// Numbers of the writes to a part, so that it need not be copied again: the same even number as before a
+  /// copy means that the copy holds. Odd: the part is being written.
+  [[nodiscard]] std::uint64_t host_sequence() const noexcept;
+  [[nodiscard]] std::uint64_t instance_sequence(std::uint32_t index) const noexcept;
 
  private:
   explicit HostPageReader(MemoryFile memory) noexcept : memory_(std::move(memory)) {}

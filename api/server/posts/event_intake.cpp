@@ -212,9 +212,11 @@ bool EventIntake::is_starting(std::string_view instance) {
   const auto instances = host_page_.instances();
   const auto found = std::ranges::find(instances, instance,
                                        [](const InstanceStatus* status) { return status->name.view(); });
+  // A place that was never read yet may be the one of this instance.
+  if (!whole && host_page_.is_open()) return true;
   if (found == instances.end()) return false;
   const InstanceState state = (*found)->state;
-  return !whole || state == InstanceState::starting || state == InstanceState::waiting;
+  return state == InstanceState::starting || state == InstanceState::waiting;
 }
 
 // "There is no such event" and "no task was bound" are final for a client, so they are not told while an

@@ -102,6 +102,17 @@ TEST_F(PostToAStartingInstance, IsToldToComeAgainWhileTheInstancesStateIsBeingWr
   EXPECT_EQ(code(only_ack(sut)), ErrorCode::unavailable);
 }
 
+TEST_F(PostToAStartingInstance, IsToldToComeAgainAlsoIfTheFirstLookFindsItsStateBeingWritten) {
+  const auto memory =
+      MemoryFile::open(host_page_name(name_), sizeof(HostPageLayout), MemoryFile::Access::read_write).value();
+  interrupt_write(reinterpret_cast<HostPageLayout*>(memory.bytes().data())->instances[0]);
+  EventIntake sut = make();
+  auto post = make_post(1);
+  dds::copy_text(post.event, "other");
+  sut.process(post);
+  EXPECT_EQ(code(only_ack(sut)), ErrorCode::unavailable);
+}
+
 TEST_F(PostToAStartingInstance, IsAwaitedOnceTasksTakePosts) {
   event_.set_bound_tasks(0);
   EventIntake sut = make();

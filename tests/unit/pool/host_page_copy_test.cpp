@@ -1,6 +1,9 @@
 #include "shm/pages/host_page_copy.hpp"
 
+#include <algorithm>
+#include <cstddef>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -84,6 +87,21 @@ TEST_F(CopyOfAHostPage, CountsAnInstanceThatHasComeOnceItIsRead) {
   EXPECT_FALSE(sut.refresh());
   EXPECT_EQ(sut.host()->instance_count, 2U);
   EXPECT_THAT(names(sut), ElementsAre("line1", "line2"));
+}
+
+TEST_F(CopyOfAHostPage, CopiesAPartOnlyAfterItWasWritten) {
+  HostPageCopy sut(name_.get());
+  ASSERT_TRUE(sut.refresh());
+  // As no writer does it: without another number.
+  const auto bytes = std::as_writable_bytes(std::span(&layout().instances[0], 1));
+  const auto name = std::ranges::search(bytes, std::as_bytes(std::span("line1", 5)));
+  ASSERT_FALSE(name.empty());
+  name[4] = std::byte{'7'};
+  EXPECT_TRUE(sut.refresh());
+  EXPECT_THAT(names(sut), ElementsAre("line1", "line2"));
+  write({"line3", "line2"});
+  EXPECT_TRUE(sut.refresh());
+  EXPECT_THAT(names(sut), ElementsAre("line3", "line2"));
 }
 
 TEST_F(CopyOfAHostPage, OutlastsAPageThatIsCutShort) {
