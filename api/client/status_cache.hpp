@@ -15,7 +15,7 @@
 
 namespace plchost {
 
-/// What becomes of a sample when nobody who has written it is seen any more.
+/// The end of a sample when nobody who has written it is seen any more.
 enum class UnseenHost : std::uint8_t {
   forgets,           ///< the sample is gone: it may not be true any more
   keeps_last_words,  ///< the sample stays until the host tells the next one; of topics with one sample a host
@@ -97,7 +97,7 @@ class StatusCache {
       samples_.erase(known);
     }
   }
-  // What a host tells of itself again has another handle than its last words.
+  // A host that tells of itself again uses another handle than for its last words.
   void forget_last_words(std::string_view host) {
     if constexpr (kUnseen == UnseenHost::keeps_last_words) {
       std::erase_if(samples_, [host](const auto& entry) {

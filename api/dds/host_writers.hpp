@@ -56,8 +56,8 @@ enum class InstanceEnd : std::uint8_t {
 };
 
 /// The same, for what is kept of each instance: `update(handle, sample)`, then `end(handle, why)` if it has
-/// ended. After that the handle means nothing: if the same writer is seen again, as after a pause of its
-/// process or of the network, it tells all that there is then, and the same key has another handle.
+/// ended. After that the handle means nothing. If the same writer is seen again, as after a pause of its
+/// process or of the network, it tells all that there is then. The same key has another handle then.
 template <class Sample, class Update, class End>
 void take_changes(dds_entity_t reader, HostWriters& writers, Update update, End end) {
   take_told<Sample>(reader, writers, [&](const Sample& sample, const dds_sample_info_t& info) {

@@ -2,7 +2,9 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -51,5 +53,23 @@ struct Side {
     }
   }
 };
+
+/// Sends blocks until the last one has come, so that none is under way afterwards. A block is lost if it is
+/// sent before both hosts know of each other. The same happens if the machine keeps a server from the
+/// processor for longer than its lease. false: none has come.
+[[nodiscard]] inline bool reach(Side& from, NodeAddress to, Side& at) {
+  Duration patience = std::chrono::milliseconds(50);
+  const TimePoint end = MonotonicClock::now() + kPatience;
+  for (std::uint32_t number = 1; MonotonicClock::now() < end; ++number, patience *= 2) {
+    (void)from.channel.send(to, std::as_bytes(std::span(&number, 1)));
+    const TimePoint again = MonotonicClock::now() + patience;
+    for (std::uint32_t come = 0; MonotonicClock::now() < again;) {
+      const auto block = at.next(again - MonotonicClock::now());
+      if (block && block->size() == sizeof come) std::memcpy(&come, block->data(), sizeof come);
+      if (come == number) return true;
+    }
+  }
+  return false;
+}
 
 }  // namespace plchost
