@@ -9,16 +9,21 @@
 
 namespace plchost::dds {
 
+/// No value has this number.
+inline constexpr std::int64_t kNoNumber = std::numeric_limits<std::int64_t>::min();
+
 /// The meaning of a value, by the last part of its member's name.
 enum class Unit : std::uint8_t {
   none,
-  duration,  ///< nanoseconds
-  unix,      ///< CLOCK_REALTIME of the host, ns since 1970; 0: none
+  duration,   ///< nanoseconds
+  unix,       ///< CLOCK_REALTIME of the host, ns since 1970; 0: none
+  unix_text,  ///< the same, in a row that shows it as a text only
 };
 
-/// A member of a status topic. visit_fields(sample, visit), which the build makes from control.idl, calls
-/// visit(FieldInfo, value) for each of them but epoch, ext and what has parts: values are numbers, texts
-/// (string_view) and arrays of octets.
+/// A member of a status topic, or a field of a row of plcctl. The build makes visit_fields(sample, visit)
+/// from control.idl. It calls visit(FieldInfo, value) for each member but epoch, ext and what has parts:
+/// values are numbers, texts (string_view) and arrays of octets. visit_row(sample, computed, visit) does so
+/// for each field of a row, in its order.
 struct FieldInfo {
   std::string_view name;  ///< in control.idl
   std::string_view row;   ///< in the rows of plcctl: the same, if `row:` gives it no other
@@ -26,7 +31,15 @@ struct FieldInfo {
   Unit unit = Unit::none;
   bool key = false;
   std::span<const std::string_view> words;  ///< for its codes, from 0; empty: it is no code
+  std::int64_t null = kNoNumber;            ///< this number means that it is not known
 };
+
+/// The fields of a row of `Sample` that plcctl computes: one member for each that `row:` calls computed.
+template <class Sample, class Value>
+struct Computed {};
+/// Whether there is a visit_row() for it.
+template <class Sample>
+inline constexpr bool kHasRow = false;
 
 /// The word for a code. A newer host may know more: its number is shown.
 [[nodiscard]] inline std::string word_for(std::span<const std::string_view> words, std::uint64_t code) {
@@ -46,8 +59,8 @@ struct ColumnInfo {
   const char* field = "";
   const char* header = "";
   int decimals = 1;
-  int rank = 0;  ///< where the table is too wide, the greatest goes first; 0: never
-  std::int64_t none = std::numeric_limits<std::int64_t>::min();  ///< this number means that there is none
+  int rank = 0;                   ///< where the table is too wide, the greatest goes first; 0: never
+  std::int64_t none = kNoNumber;  ///< this number means that there is none
 };
 /// Empty: all members are columns.
 template <class Sample>

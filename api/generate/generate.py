@@ -3,7 +3,8 @@
 
   FOLDER/topic_table.hpp          each topic: name, type, partition, QoS
   FOLDER/status_topics.hpp        the status topics: all types, how HostStatus counts them, in which order they are shown
-  FOLDER/status_fields.hpp        their fields, with unit and words for codes, and how plcctl lists them
+  FOLDER/code_words.hpp           the words for their codes, and for those of all other types
+  FOLDER/status_fields.hpp        their fields with unit and words, the rows of plcctl, and how it lists them
   FOLDER/contract_operations.hpp  each OPERATION_: name, number, role, whether it names an instance
   FOLDER/plchost_client_types.hpp  the public structs of the client library
   FOLDER/library_conversions.hpp  how they are made of samples
@@ -18,6 +19,7 @@ import sys
 sys.dont_write_bytecode = True
 import library  # noqa: E402
 from contract import Fault, names_of, parse, partition_of, qos_of  # noqa: E402
+from rows import code_words, status_fields, value_of, words_of  # noqa: E402
 
 HEAD = "// Made from api/control.idl by api/generate/generate.py.\n#pragma once\n\n"
 ROLES = {"op": "Operator", "eng": "Engineer"}
@@ -71,13 +73,6 @@ def counted(contract):
             yield kind, name.removeprefix(STATUS)
 
 
-def value_of(member, sample="sample"):
-    """A member as C++ compares it."""
-    if member.type.startswith("string<"):
-        return f"text_of({sample}.{member.name})"
-    return f"std::to_array({sample}.{member.name})" if "[" in member.type else f"{sample}.{member.name}"
-
-
 def order_of(kind):
     """The members that put the samples of one host in order: its keys, if nothing else is said."""
     members = {member.name: member for member in kind.members}
@@ -102,87 +97,6 @@ def status_topics(contract):
     for kind, _ in all_of_them:
         values = ", ".join(value_of(member) for member in order_of(kind))
         lines.append(f"inline auto order_of(const plc_{kind.name}& sample) {{ return std::tuple({values}); }}")
-    return "\n".join(lines + ["\n}  // namespace plchost::dds\n"])
-
-
-def words_of(member):
-    """The words for the codes of a member: its comment begins with "0 offline, 1 starting"; brackets, and all from a ";" on,
-    are left out."""
-    words = []
-    for part in re.sub(r" \([^)]*\)", "", member.comment.partition(";")[0]).split(", "):
-        found = re.fullmatch(rf"{len(words)} ([a-z -]+)", part)
-        if not found:
-            break
-        words.append(found[1].replace(" ", "_"))
-    return words if len(words) > 1 else []
-
-
-def listed(kind, tag):
-    """The parts of a tag."""
-    return re.split(r"[,;]\s*", kind.tags[tag]) if tag in kind.tags else []
-
-
-def row_names(kind):
-    """Members that `row:` gives other names in the rows of plcctl."""
-    return dict(part.split(" as ") for part in listed(kind, "row"))
-
-
-COLUMN = re.compile(r"(?P<member>\w+)(?: (?P<rank>\d+))?(?: none (?P<none>-?\d+))?(?P<whole> whole)?(?: as (?P<header>[\w-]+))?")
-
-
-def columns(kind):
-    """The ColumnInfo of each part of `columns:`. Fault: it is not understood, or names no member."""
-    members, lines = {member.name for member in kind.members}, []
-    for part in listed(kind, "columns"):
-        found = COLUMN.fullmatch(part)
-        if not found or found["member"] not in members:
-            raise Fault(f"{kind.name}: 'columns:' has '{part}', which is not understood or no member")
-        name = row_names(kind).get(found["member"], found["member"])
-        base = re.sub(r"(_unix)?_ns$", "", name)
-        is_duration = name.endswith("_ns") and not name.endswith("_unix_ns")
-        header = (found["header"] or base.upper().replace("_", "-")) + ("(us)" if is_duration else "")
-        told = [f'.field = "{base}{"_us" if is_duration else ""}"', f'.header = "{header}"']
-        told += [".decimals = 0"] if found["whole"] else []
-        told += [f".rank = {found['rank']}"] if found["rank"] else []
-        told += [f".none = {found['none']}"] if found["none"] else []
-        lines.append(f"    ColumnInfo{{{', '.join(told)}}},")
-    return lines
-
-
-def field(member, row):
-    """The FieldInfo of a member; `row`: its name in rows."""
-    told = [f'.name = "{member.name}"', f'.row = "{row}"']
-    for suffix, unit in (("_unix_ns", "unix"), ("_ns", "duration")):
-        if member.name.endswith(suffix):
-            told.append(f'.base = "{member.name.removesuffix(suffix)}", .unit = Unit::{unit}')
-            break
-    else:
-        told.append(f'.base = "{row}"')
-    if member.key:
-        told.append(".key = true")
-    words = ", ".join(f'"{word}"' for word in words_of(member))
-    lines = [f"  static constexpr std::array<std::string_view, {len(words_of(member))}> k_{member.name}{{{words}}};"] if words else []
-    if words:
-        told.append(f".words = k_{member.name}")
-    return lines + [f"  visit(FieldInfo{{{', '.join(told)}}}, {value_of(member)});"]
-
-
-def status_fields(contract):
-    nested = {kind.name for kind in contract.types if not kind.is_topic}
-    lines = [HEAD + "#include <array>\n#include <string_view>\n", "#include <status_topics.hpp>\n"]
-    lines += ['#include "api/dds/field_info.hpp"\n', "namespace plchost::dds {\n"]
-    for kind, _ in counted(contract):
-        lines += ["template <class Visit>", f"void visit_fields(const plc_{kind.name}& sample, Visit&& visit) {{"]
-        for member in kind.members:
-            plain = member.name != "epoch" and not member.type.startswith("sequence") and member.type.split("[")[0] not in nested
-            lines += field(member, row_names(kind).get(member.name, member.name)) if plain else []
-        lines.append("}\n")
-    for kind, _ in counted(contract):
-        if "list" in kind.tags:
-            noun, _, text = kind.tags["list"].partition(", ")
-            lines.append(f'template <>\ninline constexpr Listing kListing<plc_{kind.name}>{{"{noun}", "{text}"}};')
-        if "columns" in kind.tags:
-            lines += ["template <>", f"inline constexpr std::array kColumns<plc_{kind.name}>{{", *columns(kind), "};"]
     return "\n".join(lines + ["\n}  // namespace plchost::dds\n"])
 
 
@@ -214,7 +128,8 @@ def main():
         made = {
             "topic_table.hpp": topic_table(contract),
             "status_topics.hpp": status_topics(contract),
-            "status_fields.hpp": status_fields(contract),
+            "code_words.hpp": code_words(contract, HEAD),
+            "status_fields.hpp": status_fields(contract, [kind for kind, _ in counted(contract)], HEAD),
             "contract_operations.hpp": contract_operations(contract),
             "plchost_client_types.hpp": library.public_types(records),
             "library_conversions.hpp": library.conversions(records, HEAD),

@@ -31,7 +31,6 @@ class Field:
     value: str  # of `sample`, as that type
     text: str
     key: bool
-    words: list
 
 
 @dataclasses.dataclass
@@ -59,7 +58,7 @@ def field_of(kind, member, thing, words, nested):
     if base == "octet" and count:
         made = ("std::string", f"hex_text(std::to_array({from_sample}))")
     elif words:
-        made = ("std::string", f"dds::word_for(words_of_{name}, {from_sample})")
+        made = ("std::string", f"dds::word_for(dds::words::{kind.name}::{member.name}, {from_sample})")
         text = ", ".join(words)
     elif base.startswith("string<"):
         is_list = "with commas between" in member.comment
@@ -83,7 +82,7 @@ def field_of(kind, member, thing, words, nested):
         made = (f"std::vector<{sequence[1]}>", f"all_public({from_sample}, [](const auto& part) {{ return to_public(part); }})")
     else:
         raise Fault(f"{kind.name}: the client library has no type for {member.type} {member.name}")
-    return Field(name, *made, re.sub(r"_ns\b", "", text), member.key, words)
+    return Field(name, *made, re.sub(r"_ns\b", "", text), member.key)
 
 
 def records_of(contract, counted, words_of):
@@ -142,14 +141,10 @@ def public_types(records):
 
 def conversions(records, head):
     lines = [head + "#include <array>\n#include <string>\n#include <string_view>\n#include <vector>\n"]
-    lines += ["#include <control.h>\n", '#include "api/dds/field_info.hpp"', '#include "api/dds/text.hpp"']
+    lines += ["#include <code_words.hpp>\n#include <control.h>\n", '#include "api/dds/field_info.hpp"', '#include "api/dds/text.hpp"']
     lines += ['#include "api/library/convert_parts.hpp"', '#include "plchost_client_types.hpp"\n', "namespace plchost {"]
     for record in records:
         lines += ["", f"[[nodiscard]] inline client_types::{record.name} to_public(const {record.sample}& sample) {{"]
-        for field in record.fields:
-            if field.words:
-                words = ", ".join(f'"{word}"' for word in field.words)
-                lines.append(f"  static constexpr std::array<std::string_view, {len(field.words)}> words_of_{field.name}{{{words}}};")
         lines.append(f"  client_types::{record.name} made;")
         lines += [f"  made.{field.name} = {field.value};" for field in record.fields]
         lines += ["  return made;", "}"]

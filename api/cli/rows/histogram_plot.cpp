@@ -57,7 +57,7 @@ std::string decade_name(std::int64_t decade) {
   return fmt::format("{}{}", decade, kUnits[unit]);
 }
 
-std::vector<PlotColumn> columns_of(const HistogramReport& histogram, Range range, std::size_t bars_each) {
+std::vector<PlotColumn> plot_columns(const HistogramReport& histogram, Range range, std::size_t bars_each) {
   std::vector<PlotColumn> columns((range.size() + bars_each - 1) / bars_each);
   for (const auto& bar : histogram.bars) {
     const std::size_t index = kPlotBars.index_of(Duration(bar.lower_ns));
@@ -143,7 +143,7 @@ std::string short_duration(std::int64_t nanoseconds) {
 std::string plot(const HistogramReport& histogram, PlotStyle style) {
   const Range range = range_of(histogram);
   if (range.size() == 0 || range.end < range.begin || histogram.total == 0) return "  nothing recorded\n";
-  return draw(columns_of(histogram, range, bars_each(range.size(), style)), histogram.total, style);
+  return draw(plot_columns(histogram, range, bars_each(range.size(), style)), histogram.total, style);
 }
 
 std::string plot_signed(const HistogramReport& negative, const HistogramReport& positive, PlotStyle style) {
@@ -155,12 +155,12 @@ std::string plot_signed(const HistogramReport& negative, const HistogramReport& 
   }
   // One gap for zero, and the same scale on both sides of it.
   const std::size_t each = bars_each(left.size() + right.size() + 2, style);
-  std::vector<PlotColumn> columns = columns_of(negative, left, each);
+  std::vector<PlotColumn> columns = plot_columns(negative, left, each);
   std::ranges::reverse(columns);
   for (PlotColumn& column : columns) {
     if (!column.label.empty()) column.label = "-" + column.label;
   }
-  const std::vector<PlotColumn> rest = columns_of(positive, right, each);
+  const std::vector<PlotColumn> rest = plot_columns(positive, right, each);
   columns.insert(columns.end(), rest.begin(), rest.end());
   return draw(columns, total, style);
 }

@@ -15,11 +15,6 @@ namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
 
-/// 0: the host does not know it.
-Row known(std::uint64_t number) {
-  return number == 0 ? Row() : Row(number);
-}
-
 Row load_of(const plc_HostStatus& status) {
   constexpr double kPercent = 100;
   return status.load_percent < 0 ? Row() : Row(status.load_percent / kPercent);
@@ -44,54 +39,26 @@ Row uptime_s(const HostView& host, const std::optional<ClockOffset>& clock) {
 
 }  // namespace
 
-Row to_row(const HostView& host, const std::optional<ClockOffset>& clock) {
-  Row row{{"host", host.name},
-          {"state", host.silent ? "silent" : "alive"},
-          {"version", dds::text_of(host.status.version)},
-          {"uptime_s", uptime_s(host, clock)},
-          {"started_unix_s", host.status.started_unix_ns / kSecond},
-          {"running", host.status.running},
-          {"instances", count_of<plc_InstanceStatus>(host.status).value_or(0)},
-          {"tasks", count_of<plc_TaskStatus>(host.status).value_or(0)},
-          {"events", count_of<plc_EventStatus>(host.status).value_or(0)},
-          {"objects", count_of<plc_ObjectStatus>(host.status).value_or(0)},
-          {"load", load_of(host.status)},
-          {"cores", known(host.status.cores)},
-          {"memory_mib", known(host.status.memory_mib)},
-          {"available_mib", known(host.status.available_mib)},
-          {"clock_offset_us", clock ? Row(to_us(clock->offset.count())) : Row()},
-          {"clock_uncertainty_us", clock ? Row(to_us(clock->uncertainty.count())) : Row()},
-          {"secured", host.status.secured},
-          {"manager_pid", host.status.manager_pid},
-          {"server_pid", host.server_pid},
-          {"problem", problem_of(host)},
-          {"labels", dds::text_of(host.status.labels)},
-          {"audit_number", host.status.audit_number},
-          {"audit_hash", dds::text_of(host.status.audit_hash)},
-          {"unrecorded", dds::text_of(host.status.unrecorded)},
-          {"rival", dds::text_of(host.status.rival)},
-          {"unsaved", dds::text_of(host.status.unsaved)}};
-  add_extension(row, host.ext);
-  return row;
+dds::Computed<plc_HostStatus, Row> computed_of(const plc_HostStatus& status, const HostView& host,
+                                               const std::optional<ClockOffset>& clock) {
+  return {.state = host.silent ? "silent" : "alive",
+          .uptime_s = uptime_s(host, clock),
+          .started_unix_s = status.started_unix_ns / kSecond,
+          .instances = count_of<plc_InstanceStatus>(status).value_or(0),
+          .tasks = count_of<plc_TaskStatus>(status).value_or(0),
+          .events = count_of<plc_EventStatus>(status).value_or(0),
+          .objects = count_of<plc_ObjectStatus>(status).value_or(0),
+          .load = load_of(status),
+          .clock_offset_us = clock ? Row(to_us(clock->offset.count())) : Row(),
+          .clock_uncertainty_us = clock ? Row(to_us(clock->uncertainty.count())) : Row(),
+          .server_pid = host.server_pid,
+          .problem = problem_of(host)};
 }
 
-const std::vector<Column>& host_columns() {
-  static const std::vector<Column> columns{
-      {"host", "HOST"},
-      {"state", "STATE"},
-      {.field = "version", .header = "VERSION", .rank = 3},
-      {.field = "uptime_s", .header = "UP(s)", .rank = 1},
-      {"running", "RUNNING"},
-      {"instances", "INSTANCES"},
-      {.field = "load", .header = "LOAD", .decimals = 2, .rank = 2},
-      {.field = "cores", .header = "CORES", .rank = 5},
-      {.field = "available_mib", .header = "FREE(MiB)", .rank = 4},
-      {.field = "clock_offset_us", .header = "CLOCK(us)", .decimals = 0, .rank = 6},
-      {.field = "clock_uncertainty_us", .header = "+-(us)", .decimals = 0, .rank = 7},
-      {.field = "secured", .header = "SECURED", .rank = 4},
-      {"labels", "LABELS"},
-      {"problem", "PROBLEM"}};
-  return columns;
+Row to_row(const HostView& host, const std::optional<ClockOffset>& clock) {
+  Row row = to_row(host.status, host, clock);
+  add_extension(row, host.ext);
+  return row;
 }
 
 }  // namespace plchost

@@ -10,7 +10,6 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
-#include "api/dds/code_names.hpp"
 #include "api/dds/text.hpp"
 
 namespace plchost {
@@ -48,34 +47,6 @@ void add_extension(Row& row, std::span<const plc_KeyValue> entries) {
     const std::string name(text_of(entry.name));
     if (!row.contains(name)) row[name] = value_of(text_of(entry.value));
   }
-}
-
-Row to_row(const plc_Transition& transition) {
-  const bool process = transition.source != 0;
-  return {{"host", text_of(transition.host)},
-          {"instance", text_of(transition.instance)},
-          {"sequence", transition.sequence_number},
-          {"time", time_text(transition.time_unix_ns)},
-          {"of", process ? "process" : "application"},
-          {"from", dds::transition_state_name(transition.source, transition.from_state)},
-          {"to", dds::transition_state_name(transition.source, transition.to_state)},
-          {"pid", transition.pid},
-          {"time_unix_ns", transition.time_unix_ns},
-          {"time_monotonic_ns", transition.time_monotonic_ns},
-          {"reason", text_of(transition.reason)}};
-}
-
-const std::vector<Column>& transition_columns() {
-  static const std::vector<Column> columns{{"time", "TIME"},
-                                           {"host", "HOST"},
-                                           {"instance", "INSTANCE"},
-                                           {.field = "sequence", .header = "NUMBER", .rank = 3},
-                                           {.field = "of", .header = "OF", .rank = 1},
-                                           {"from", "FROM"},
-                                           {"to", "TO"},
-                                           {.field = "pid", .header = "PID", .rank = 2, .none = 0},
-                                           {"reason", "REASON"}};
-  return columns;
 }
 
 }  // namespace plchost

@@ -7,12 +7,15 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <status_fields.hpp>
 
+#include "api/cli/rows/computed_fields.hpp"
 #include "api/cli/rows/rows.hpp"
 
 namespace plchost {
@@ -22,14 +25,22 @@ namespace status_rows {
 template <class Value>
 void add(Row& row, const dds::FieldInfo& field, const Value& value) {
   const std::string name(field.row);
-  if constexpr (std::integral<Value>) {
-    if (!field.words.empty()) {
+  if constexpr (std::same_as<Value, Row>) {
+    row[name] = value;
+  } else if constexpr (std::same_as<Value, bool>) {
+    row[name] = value;
+  } else if constexpr (std::integral<Value>) {
+    if (std::cmp_equal(value, field.null)) {
+      row[name] = nullptr;
+    } else if (!field.words.empty()) {
       row[name] = dds::word_for(field.words, static_cast<std::uint64_t>(value));
     } else if (field.unit == dds::Unit::duration) {
       row[fmt::format("{}_us", field.base)] = to_us(static_cast<std::int64_t>(value));
     } else if (field.unit == dds::Unit::unix) {
       row[std::string(field.base)] = time_text(static_cast<std::int64_t>(value));
       row[name] = value;
+    } else if (field.unit == dds::Unit::unix_text) {
+      row[std::string(field.base)] = time_text(static_cast<std::int64_t>(value));
     } else {
       row[name] = value;
     }
@@ -43,14 +54,18 @@ void add(Row& row, const dds::FieldInfo& field, const Value& value) {
 
 }  // namespace status_rows
 
-/// The row of a status topic whose members say all: each in its order, durations in us, times as a text and
-/// as a number, codes as words, GUIDs as digits ("all": of zeros); then what `ext` has. Topics with rows of
-/// their own have a to_row() in rows.hpp.
-template <class Sample>
-[[nodiscard]] Row to_row(const Sample& sample) {
+/// The row of a topic, as control.idl has it; its field names are a promise to programs. Each field in its
+/// order, durations in us, times as a text and as a number, codes as words, GUIDs as digits ("all": of
+/// zeros); then what `ext` has. Computed fields come from computed_of(sample, context...).
+template <class Sample, class... Context>
+  requires dds::kHasRow<Sample>
+[[nodiscard]] Row to_row(const Sample& sample, const Context&... context) {
+  dds::Computed<Sample, Row> computed;
+  if constexpr (!std::is_empty_v<decltype(computed)>) computed = computed_of(sample, context...);
   Row row;
-  dds::visit_fields(
-      sample, [&](const dds::FieldInfo& field, const auto& value) { status_rows::add(row, field, value); });
+  dds::visit_row(sample, computed, [&](const dds::FieldInfo& field, const auto& value) {
+    status_rows::add(row, field, value);
+  });
   add_extension(row, std::span(sample.ext._buffer, sample.ext._length));
   return row;
 }
@@ -70,11 +85,11 @@ template <class Sample>
     }
     if (!columns.empty()) return columns;
     static std::deque<std::string> texts;  // a Column names them
-    dds::visit_fields(Sample{}, [&](const dds::FieldInfo& field, const auto& /*value*/) {
+    const dds::Computed<Sample, Row> computed;
+    dds::visit_row(Sample{}, computed, [&](const dds::FieldInfo& field, const auto& /*value*/) {
       const bool duration = field.unit == dds::Unit::duration;
       const std::string& name =
-          texts.emplace_back(duration ? fmt::format("{}_us", field.base)
-                                      : std::string(field.unit == dds::Unit::unix ? field.base : field.row));
+          texts.emplace_back(duration ? fmt::format("{}_us", field.base) : std::string(field.base));
       std::string header(field.base);
       std::ranges::transform(header, header.begin(), [](char c) {
         return c == '_' ? '-' : static_cast<char>(c >= 'a' && c <= 'z' ? c - 'a' + 'A' : c);

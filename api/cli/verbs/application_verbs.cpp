@@ -8,7 +8,7 @@
 #include <fmt/format.h>
 
 #include "api/cli/progress_board.hpp"
-#include "api/cli/rows/rows.hpp"
+#include "api/cli/rows/status_rows.hpp"
 #include "api/cli/verbs/host_commands.hpp"
 #include "api/client/application_file.hpp"
 #include "api/dds/text.hpp"
@@ -93,10 +93,14 @@ int list_applications(CliSession& session, const std::string& instance) {
     // A file of the host, which nobody sent.
     for (const auto& [name, path] : *loaded) {
       if (path.empty() || (!instance.empty() && name != instance)) continue;
-      rows.push_back(row_of_loaded(host.name, name, path));
+      plc_ApplicationStatus unsent{};
+      dds::copy_text(unsent.host, host.name);
+      dds::copy_text(unsent.instance, name);
+      dds::copy_text(unsent.path, path);
+      rows.push_back(to_row(unsent, true));
     }
   }
-  return session.show(rows, application_columns());
+  return session.show(rows, columns_of<plc_ApplicationStatus>());
 }
 
 }  // namespace

@@ -6,7 +6,8 @@
 #include <fmt/format.h>
 
 #include "api/cli/cli_session.hpp"
-#include "api/cli/rows/rows.hpp"
+#include "api/cli/rows/status_rows.hpp"
+#include "api/dds/code_names.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
 
@@ -14,34 +15,20 @@ namespace plchost {
 
 namespace {
 
-constexpr std::array kLevels{std::string_view("ok"), std::string_view("note"), std::string_view("warning"),
-                             std::string_view("problem")};
 enum Level : std::uint32_t { kOk, kNote, kWarning, kProblem };
-
-std::string level_name(std::uint32_t level) {
-  return level < kLevels.size() ? std::string(kLevels.at(level)) : fmt::format("level {}", level);
-}
-
-Row row_of(const plc_HostFinding& finding) {
-  using dds::text_of;
-  return {{"host", text_of(finding.host)},      {"id", text_of(finding.id)},
-          {"level", level_name(finding.level)}, {"subject", text_of(finding.subject)},
-          {"found", text_of(finding.found)},    {"why", text_of(finding.why)},
-          {"advice", text_of(finding.advice)}};
-}
 
 // The sentences of a finding are too long for the columns of a table.
 void print(const plc_HostFinding& finding) {
   const auto text = [](const auto& member) { return printable(std::string(dds::text_of(member))); };
-  fmt::print("{:<8} {:<19} {}: {}\n", level_name(finding.level), text(finding.id), text(finding.subject),
-             text(finding.found));
+  fmt::print("{:<8} {:<19} {}: {}\n", dds::finding_level_name(finding.level), text(finding.id),
+             text(finding.subject), text(finding.found));
   if (finding.level == kOk) return;
   if (const auto why = text(finding.why); !why.empty()) fmt::print("{:<8} why:    {}\n", "", why);
   if (const auto advice = text(finding.advice); !advice.empty()) fmt::print("{:<8} change: {}\n", "", advice);
 }
 
 void print_all(const std::vector<plc_HostFinding>& findings, bool all) {
-  std::array<std::size_t, kLevels.size()> count{};
+  std::array<std::size_t, kProblem + 1> count{};
   for (const plc_HostFinding& finding : findings) {
     ++count.at(std::min<std::size_t>(finding.level, kProblem));
     if (all || finding.level != kOk) print(finding);
@@ -59,7 +46,7 @@ int check_host(CliSession& session, bool all) {
   if (session.options.json || session.options.csv) {
     std::vector<Row> rows;
     for (const plc_HostFinding& finding : *findings) {
-      if (all || finding.level != kOk) rows.push_back(row_of(finding));
+      if (all || finding.level != kOk) rows.push_back(to_row(finding));
     }
     if (const int shown = session.show(rows, {}); shown != kExitDone) return shown;
   } else {

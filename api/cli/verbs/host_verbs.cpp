@@ -26,7 +26,7 @@ int list_hosts(CliSession& session) {
   if (!hosts) return CliSession::fail(hosts.error());
   std::vector<Row> rows;
   for (const HostView& host : *hosts) rows.push_back(to_row(host, clock_of(session, host)));
-  return session.show(rows, host_columns());
+  return session.show(rows, columns_of<plc_HostStatus>());
 }
 
 }  // namespace

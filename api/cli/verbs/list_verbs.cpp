@@ -52,7 +52,9 @@ struct ListedTopics {
   static void add(const Command& verb, CliSession& session) {
     const auto add_one = [&]<class Sample>(std::type_identity<Sample> /*type*/) {
       constexpr dds::Listing kHow = dds::kListing<Sample>;
-      if (*kHow.noun != '\0') verb.noun(kHow.noun, kHow.text, [&session] { return list<Sample>(session); });
+      if constexpr (*kHow.noun != '\0') {
+        verb.noun(kHow.noun, kHow.text, [&session] { return list<Sample>(session); });
+      }
     };
     (add_one(std::type_identity<Samples>()), ...);
   }

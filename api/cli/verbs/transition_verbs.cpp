@@ -7,7 +7,7 @@
 
 #include "api/cli/cli_session.hpp"
 #include "api/cli/interrupt.hpp"
-#include "api/cli/rows/rows.hpp"
+#include "api/cli/rows/status_rows.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
 
@@ -85,7 +85,7 @@ int list_transitions(CliSession& session, const TransitionArguments& arguments) 
   std::ranges::stable_sort(found, {}, [](const plc_Transition& sample) { return sample.time_unix_ns; });
   std::vector<Row> rows;
   for (const plc_Transition& sample : found) rows.push_back(to_row(sample));
-  return session.show(rows, transition_columns());
+  return session.show(rows, columns_of<plc_Transition>());
 }
 
 void print(const CliSession& session, const TransitionView& view) {

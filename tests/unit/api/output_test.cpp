@@ -117,9 +117,9 @@ TEST_P(EveryTable, FitsIntoATerminalOf80CharactersByItsRanks) {
 INSTANTIATE_TEST_SUITE_P(All, EveryTable,
                          testing::Values(&columns_of<plc_InstanceStatus>(), &columns_of<plc_TaskStatus>(),
                                          &columns_of<plc_EventStatus>(), &columns_of<plc_WriterStatus>(),
-                                         &columns_of<plc_ExceptionStatus>(), &transition_columns(),
-                                         &application_columns(), &host_columns(), &node_columns(),
-                                         &route_columns(), &object_columns()));
+                                         &columns_of<plc_ExceptionStatus>(), &columns_of<plc_Transition>(),
+                                         &columns_of<plc_ApplicationStatus>(), &columns_of<plc_HostStatus>(),
+                                         &node_columns(), &route_columns(), &object_columns()));
 
 TEST(Csv, QuotesWhatWouldBeTwoFields) {
   EXPECT_EQ(format_csv({}), "");

@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include "api/cli/rows/host_rows.hpp"
 #include "api/client/status_count.hpp"
 #include "api/dds/code_names.hpp"
 #include "api/dds/text.hpp"
@@ -48,6 +49,93 @@ TEST(StatusRows, HaveTimesAsTextAndNumberAndGuidsAsDigits) {
   EXPECT_EQ(to_row(plc_WriterStatus{}).at("writer"), "all");
 }
 
+TEST(StatusRows, OfAnExceptionSayWhatWasStopped) {
+  plc_ExceptionStatus exception{};
+  dds::copy_text(exception.host, "hosta");
+  dds::copy_text(exception.instance, "line1");
+  EXPECT_EQ(json_text(to_row(exception)),
+            R"({"host":"hosta","instance":"line1","count":0,"present":false,"time":"","time_unix_ns":0,)"
+            R"("task":"","stopped":"","kind":"","signal":"","text":"","address":0,"symbol":"",)"
+            R"("memory_address":0,"application":""})");
+  exception.count = 1;
+  EXPECT_EQ(to_row(exception).at("stopped"), "task");
+  exception.whole_application = true;
+  EXPECT_EQ(to_row(exception).at("stopped"), "application");
+}
+
+TEST(StatusRows, OfATransitionHaveTheStatesOfWhatChanged) {
+  plc_Transition transition{};
+  dds::copy_text(transition.host, "hosta");
+  dds::copy_text(transition.instance, "line1");
+  dds::copy_text(transition.reason, "start");
+  transition.sequence_number = 7;
+  transition.time_unix_ns = 1'000'000'000;
+  transition.time_monotonic_ns = 5;
+  transition.from_state = 1;
+  transition.to_state = 2;
+  transition.pid = 12;
+  EXPECT_EQ(json_text(to_row(transition)),
+            R"({"host":"hosta","instance":"line1","sequence":7,"time":"1970-01-01T00:00:01.000Z",)"
+            R"("of":"application","from":"stopped","to":"running","pid":12,"time_unix_ns":1000000000,)"
+            R"("time_monotonic_ns":5,"reason":"start"})");
+  transition.source = 1;
+  EXPECT_EQ(to_row(transition).at("of"), "process");
+  EXPECT_EQ(to_row(transition).at("from"), "starting");
+}
+
+TEST(StatusRows, OfAnApplicationHaveWhatIsKnownOfASentFile) {
+  plc_ApplicationStatus application{};
+  dds::copy_text(application.host, "hosta");
+  dds::copy_text(application.instance, "line1");
+  dds::copy_text(application.path, "/opt/a.so");
+  EXPECT_EQ(json_text(to_row(application, true)),
+            R"({"host":"hosta","instance":"line1","version":null,"file":"/opt/a.so","size":null,"sent":"",)"
+            R"("sent_unix_ns":0,"by":"","from":"","sha256":"","digest":"","loaded":"loaded","boot":"",)"
+            R"("path":"/opt/a.so","before":""})")
+      << "a file of the host, which nobody sent";
+  application.version = 3;
+  application.size = 100;
+  application.boot = true;
+  dds::copy_text(application.file_name, "a.so");
+  dds::copy_text(application.sha256, "0123456789abcdef");
+  const Row row = to_row(application, false);
+  EXPECT_EQ(row.at("version"), 3);
+  EXPECT_EQ(row.at("file"), "a.so");
+  EXPECT_EQ(row.at("size"), 100);
+  EXPECT_EQ(row.at("digest"), "0123456789ab");
+  EXPECT_EQ(row.at("loaded"), "");
+  EXPECT_EQ(row.at("boot"), "boot");
+}
+
+TEST(StatusRows, OfAHostHaveWhatItsStatusSaysAndWhatIsKnownBesideIt) {
+  HostView host{.name = "hosta", .epoch = 1, .server_pid = 11, .status = {}, .ext = {}};
+  dds::copy_text(host.status.host, "hosta");
+  dds::copy_text(host.status.labels, "hall=2");
+  dds::copy_text(host.status.counts[0].topic, "instance");
+  host.status.counts[0].samples = 3;
+  host.status.started_unix_ns = 2'000'000'000;
+  host.status.load_percent = 150;
+  const ClockOffset clock{.offset = Duration(2'000), .uncertainty = Duration(500)};
+  Row row = to_row(host, clock);
+  EXPECT_GT(row["uptime_s"], 0);
+  row.erase("uptime_s");
+  EXPECT_EQ(json_text(row),
+            R"({"host":"hosta","state":"alive","version":"","started_unix_s":2,"running":0,"instances":3,)"
+            R"("tasks":0,"events":0,"objects":0,"load":1.5,"cores":null,"memory_mib":null,)"
+            R"("available_mib":null,"clock_offset_us":2.0,"clock_uncertainty_us":0.5,"secured":false,)"
+            R"("manager_pid":0,"server_pid":11,"problem":"","labels":"hall=2","audit_number":0,)"
+            R"("audit_hash":"","unrecorded":"","rival":"","unsaved":""})");
+  host.silent = true;
+  host.status.load_percent = -1;
+  dds::copy_text(host.status.rival, "hostb");
+  row = to_row(host, std::nullopt);
+  EXPECT_EQ(row.at("state"), "silent");
+  EXPECT_TRUE(row.at("uptime_s").is_null());
+  EXPECT_TRUE(row.at("load").is_null());
+  EXPECT_TRUE(row.at("clock_offset_us").is_null());
+  EXPECT_EQ(row.at("problem"), "another host wants this name and is refused: hostb");
+}
+
 TEST(StatusRows, ShowWhatTheirExtensionHas) {
   std::array<plc_KeyValue, 1> ext{};
   dds::copy_text(ext[0].name, "colour");
@@ -83,6 +171,15 @@ TEST(StatusRows, HaveTheColumnsThatTheContractNames) {
   for (const Column& column : columns_of<plc_ExceptionStatus>()) {
     EXPECT_TRUE(to_row(plc_ExceptionStatus{}).contains(column.field)) << column.field;
   }
+  for (const Column& column : columns_of<plc_Transition>()) {
+    EXPECT_TRUE(to_row(plc_Transition{}).contains(column.field)) << column.field;
+  }
+  for (const Column& column : columns_of<plc_ApplicationStatus>()) {
+    EXPECT_TRUE(to_row(plc_ApplicationStatus{}, false).contains(column.field)) << column.field;
+  }
+  for (const Column& column : columns_of<plc_HostStatus>()) {
+    EXPECT_TRUE(to_row(HostView{}, std::nullopt).contains(column.field)) << column.field;
+  }
 }
 
 TEST(StatusWords, AreThoseOfTheContract) {
@@ -92,6 +189,11 @@ TEST(StatusWords, AreThoseOfTheContract) {
                                            "safe_mode", "failed", "exception", "9"));
   EXPECT_EQ(dds::task_kind_name(3), "freewheeling");
   EXPECT_EQ(dds::task_state_name(0), "created");
+  EXPECT_EQ(dds::log_level_name(1), "info");
+  EXPECT_EQ(dds::log_source_name(2), "output");
+  EXPECT_EQ(dds::transition_state_name(0, 3), "single_cycle");
+  EXPECT_EQ(dds::transition_state_name(1, 6), "safe_mode");
+  EXPECT_EQ(dds::finding_level_name(3), "problem");
 }
 
 TEST(StatusOrder, IsThatOfTheContract) {
