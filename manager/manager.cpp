@@ -15,8 +15,8 @@
 #include "api/control/control_handler.hpp"
 #include "instances/launch/core_latency.hpp"
 #include "manager/host_check/host_check.hpp"
-#include "manager/kept_memories.hpp"
 #include "manager/pool_rights.hpp"
+#include "manager/retain_memories.hpp"
 #include "manager/store/store_process.hpp"
 #include "manager/supervisor/process_host.hpp"
 #include "manager/system/child_process.hpp"
@@ -339,7 +339,7 @@ void Manager::clean_up() {
   remove_downloads(config_.host.pool);
   MemoryFile::remove(host_page_name(config_.host.pool));
   // Also if the pool stays: the host may be switched off next.
-  const auto unsaved = save_kept_memories(config_, options_.programs + "/plc-instance");
+  const auto unsaved = save_retain_memories(config_, options_.programs + "/plc-instance");
   if (!config_.host.keep_pool) {
     ObjectPool::remove(config_.host.pool);
     remove_pool_memories(config_.host.pool, unsaved);

@@ -144,7 +144,7 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
     return keeps_name();
   } else if (fd == status_timer.get()) {
     const TimePoint now = MonotonicClock::now();
-    write_acks();
+    write_left_acks();
     record_posts();
     status->look_at_writers(*intake, *sessions, now);
     status->tick(now);
@@ -231,7 +231,7 @@ Result<bool> ControlServer::Parts::keeps_name() {
 
 void ControlServer::Parts::on_wake() {
   heap.worked(sessions->follow_discovery(), MonotonicClock::now());
-  write_acks();
+  write_left_acks();
   send_late_answers(MonotonicClock::now());
   for (const AwaitedPost& post : intake->collect_awaited()) runs.add(post, status->tasks());
   if (!runs.empty()) look_at_runs();
@@ -240,7 +240,7 @@ void ControlServer::Parts::on_wake() {
 }
 
 // Those that the receiving thread has left.
-void ControlServer::Parts::write_acks() {
+void ControlServer::Parts::write_left_acks() {
   for (const plc_EventAck& ack : intake->collect_acks()) {
     sessions->write_ack(dds::Guid::from(ack.source).participant(), ack);
   }

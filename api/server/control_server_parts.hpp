@@ -96,7 +96,7 @@ struct ControlServer::Parts {
   void on_chunks();
   void serve_downloads(TimePoint now);
 
-  void write_acks();
+  void write_left_acks();
   void record_posts();
   void look_at_runs();
 

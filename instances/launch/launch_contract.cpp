@@ -100,7 +100,7 @@ std::string kept_settings_path(std::string_view run_directory, std::string_view 
   return fmt::format("{}/{}.settings", run_directory, instance);
 }
 
-std::string kept_memory_name(std::string_view instance) {
+std::string retain_memory_name(std::string_view instance) {
   return fmt::format("{}.retain", instance);
 }
 

@@ -50,7 +50,7 @@ inline constexpr std::string_view kValidApplication = " is a valid application: 
 /// How long the set-up of an application may take in a trial.
 inline constexpr Duration kSetUpLimit = std::chrono::seconds(10);
 
-/// `plc-instance --save-retain` writes what the kept memory of an instance holds to its retain files, and
+/// `plc-instance --save-retain` writes what the retain memory of an instance holds to its retain files, and
 /// ends with code 0 if they hold all of it. It needs the name, the pool, the settings and the state
 /// directory.
 inline constexpr std::string_view kSaveRetainOption = "--save-retain";
@@ -66,7 +66,7 @@ inline constexpr std::string_view kSaveRetainOption = "--save-retain";
 
 /// The shared memory of the pool in which the retain variables of an instance lie: "NAME.retain". It outlives
 /// the process.
-[[nodiscard]] std::string kept_memory_name(std::string_view instance);
+[[nodiscard]] std::string retain_memory_name(std::string_view instance);
 
 /// The steps that an instance takes before it runs, in order. A failed one is reported by name.
 enum class SetupStep : std::uint8_t {

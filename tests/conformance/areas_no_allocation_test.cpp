@@ -7,7 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "instances/runtime/memory/areas.hpp"
-#include "instances/runtime/memory/kept_group.hpp"
+#include "instances/runtime/memory/retain_group.hpp"
 #include "shm/files/pool_files.hpp"
 #include "tests/conformance/malloc_count.hpp"
 #include "tests/support/own_name.hpp"
@@ -59,7 +59,7 @@ TEST(NoAllocation, WhenATaskGivesItsKeptVariablesAtTheEndOfACycle) {
   CycleCounter counter{2};
   const std::vector<std::byte> live(4096, std::byte{1});
   std::vector<std::byte> copy(4096);
-  KeptGroup sut({&counter}, {{.offset = 0, .live = live}});
+  RetainGroup sut({&counter}, {{.offset = 0, .live = live}});
   int given = 0;
   MallocCount::begin();
   for (int cycle = 0; cycle < 1000; ++cycle) {

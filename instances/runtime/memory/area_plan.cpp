@@ -46,13 +46,13 @@ class Planner {
 
   // Areas that the runtime keeps lie together: they are written together.
   void put_anywhere(std::size_t area) {
-    const bool kept = areas_[area].is_kept();
-    if (!kept || !kept_) {
+    const bool retain = areas_[area].is_retain();
+    if (!retain || !retain_) {
       const std::size_t block = add({});
-      if (kept) kept_ = block;
+      if (retain) retain_ = block;
       put(block, 0, area);
     } else {
-      put(*kept_, end_of(plan.blocks[*kept_]), area);
+      put(*retain_, end_of(plan.blocks[*retain_]), area);
     }
     AreaBlock& block = plan.blocks[plan.places[area].block];
     block.bytes = aligned(plan.places[area].offset + areas_[area].bytes);
@@ -113,7 +113,7 @@ class Planner {
   }
 
   std::span<const DeclaredArea> areas_;
-  std::optional<std::size_t> kept_;
+  std::optional<std::size_t> retain_;
 };
 
 }  // namespace

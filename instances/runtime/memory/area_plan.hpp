@@ -15,7 +15,7 @@ namespace plchost {
 /// In a device or file there may be a block of each kind in the same stretch.
 struct AreaBlock {
   const AreaSettings* settings =
-      nullptr;  ///< null: memory of the process; retain and persistent: kept memory
+      nullptr;  ///< null: memory of the process; retain and persistent: retain memory
   std::uint64_t bytes = 0;
   std::vector<std::size_t> areas;  ///< in the order in which they were declared
 };

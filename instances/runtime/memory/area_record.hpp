@@ -10,7 +10,7 @@
 
 namespace plchost {
 
-/// A RetainArea as it lies in the file and in the kept memory.
+/// A RetainArea as it lies in the file and in the retain memory.
 struct AreaRecord {
   FixedText<kMaxTaskName> name;
   std::array<char, 5> zero{};

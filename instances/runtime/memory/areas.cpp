@@ -11,8 +11,6 @@ namespace plchost {
 
 namespace {
 
-thread_local const TaskCycle* cycle_here = nullptr;
-
 // Handles are numbers from 1 on.
 RTS_HANDLE handle_of(std::size_t area) noexcept {
   // NOLINTNEXTLINE(performance-no-int-to-ptr): a number that looks like a handle
@@ -42,43 +40,7 @@ RTS_RESULT add_area(std::vector<DeclaredArea>& areas, const Plc_Area* area) {
   return ERR_OK;
 }
 
-// Says on this thread whose cycle it runs: also if that ends with an exception.
-class CycleHere {
- public:
-  explicit CycleHere(const TaskCycle* cycle) noexcept { cycle_here = cycle; }
-  ~CycleHere() { cycle_here = nullptr; }
-  CycleHere(const CycleHere&) = delete;
-  CycleHere& operator=(const CycleHere&) = delete;
-};
-
 }  // namespace
-
-void TaskCycle::set_address(std::size_t area, void* address) {
-  if (addresses_.size() <= area) addresses_.resize(area + 1, nullptr);
-  addresses_[area] = address;
-}
-
-void TaskCycle::begin() noexcept {
-  if (counter_ != nullptr) {
-    counter_->store(counter_->load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
-    // Pairs with the acquire fence of KeptMemory::snapshot().
-    std::atomic_thread_fence(std::memory_order_release);
-  }
-  for (InputView* const view : inputs_) view->begin_cycle();
-  for (OutputView* const view : outputs_) view->begin_cycle();
-}
-
-void TaskCycle::run(const std::function<void()>& entry) const {
-  const CycleHere here(this);
-  entry();
-}
-
-void TaskCycle::end() noexcept {
-  for (OutputView* const view : outputs_) view->end_cycle();
-  if (counter_ != nullptr) {
-    counter_->store(counter_->load(std::memory_order_relaxed) + 1, std::memory_order_release);
-  }
-}
 
 RTS_HANDLE Areas::declare(std::vector<DeclaredArea>& areas, const Plc_Area* area, RTS_RESULT& result) const {
   result = add_area(areas, area);
@@ -106,12 +68,13 @@ void* Areas::address(RTS_HANDLE area) const noexcept {
   const std::size_t number = number_of(area);
   if (!placed_ || number >= declared_.size()) return nullptr;
   if (!declared_[number].has_image()) return plain_[number];
-  return cycle_here == nullptr ? nullptr : cycle_here->address(number);
+  const TaskCycle* const cycle = TaskCycle::here();
+  return cycle == nullptr ? nullptr : cycle->address(number);
 }
 
-std::size_t Areas::kept_number(std::size_t area) const noexcept {
+std::size_t Areas::retain_number(std::size_t area) const noexcept {
   return static_cast<std::size_t>(std::ranges::count_if(
-      std::span(declared_).first(area), [](const DeclaredArea& one) { return one.is_kept(); }));
+      std::span(declared_).first(area), [](const DeclaredArea& one) { return one.is_retain(); }));
 }
 
 std::vector<std::string> Areas::look_for_losses() {
@@ -143,8 +106,8 @@ RTS_RESULT Areas::state(RTS_HANDLE area, Plc_Area_State& state) const noexcept {
   };
   add(inputs_);
   add(outputs_);
-  if (declared.is_kept() && keeper_) {
-    state.dwOrigin = keeper_->origin(kept_number(number));
+  if (declared.is_retain() && keeper_) {
+    state.dwOrigin = keeper_->origin(retain_number(number));
     state.qwSaves = keeper_->saves();
     state.qwUnsaved = keeper_->unsaved();
   }

@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <deque>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <set>
@@ -16,50 +15,12 @@
 #include "instances/runtime/memory/declared_area.hpp"
 #include "instances/runtime/memory/retain_keeper.hpp"
 #include "instances/runtime/memory/task_areas.hpp"
+#include "instances/runtime/memory/task_cycle.hpp"
 #include "schedulers/task/task_config.hpp"
 #include "shm/base/result.hpp"
 #include "shm/pool/pool_room.hpp"
 
 namespace plchost {
-
-/// A task's work with its areas around each cycle.
-class TaskCycle {
- public:
-  void add(InputView& view) { inputs_.push_back(&view); }
-  void add(OutputView& view) { outputs_.push_back(&view); }
-  /// The task may change retain areas, those of `group`; `may_wait`: it is not real-time.
-  void count_into(CycleCounter& counter, KeptGroup& group, bool may_wait) noexcept {
-    counter_ = &counter;
-    group_ = &group;
-    may_wait_ = may_wait;
-  }
-  /// Where it has area number `area`.
-  void set_address(std::size_t area, void* address);
-  [[nodiscard]] void* address(std::size_t area) const noexcept {
-    return area < addresses_.size() ? addresses_[area] : nullptr;
-  }
-  /// It has nothing to do.
-  [[nodiscard]] bool empty() const noexcept {
-    return inputs_.empty() && outputs_.empty() && counter_ == nullptr;
-  }
-
-  // The four parts of a cycle, all real-time on the task's thread. An exception of `entry` passes through
-  // run(), and then end() is not called: no output is written.
-  void begin() noexcept;
-  void run(const std::function<void()>& entry) const;
-  void end() noexcept;
-  /// After the cycle: gives the thread that saves retain variables a copy of them. false: nobody has asked
-  /// for one.
-  bool give_kept() noexcept { return group_ != nullptr && group_->answer(may_wait_); }
-
- private:
-  std::vector<InputView*> inputs_;
-  std::vector<OutputView*> outputs_;
-  std::vector<void*> addresses_;  // by area
-  CycleCounter* counter_ = nullptr;
-  KeptGroup* group_ = nullptr;  // with counter_
-  bool may_wait_ = false;
-};
 
 /// The memory areas of one application.
 class Areas {
@@ -94,7 +55,7 @@ class Areas {
   [[nodiscard]] Result<std::string> place(const Environment& environment, std::vector<DeclaredArea> areas,
                                           std::span<TaskConfig> tasks);
 
-  /// Writes what is kept, now, if no task is within a cycle. Control thread.
+  /// Writes the retain areas now, if no task is within a cycle. Control thread.
   void save() {
     if (keeper_) keeper_->save_soon();
   }
@@ -123,7 +84,7 @@ class Areas {
     bool loss_told = false;
   };
   /// Retain areas that tasks have in common.
-  struct KeptShare {
+  struct RetainShare {
     std::set<std::size_t> tasks;
     std::vector<std::size_t> areas;
   };
@@ -151,19 +112,19 @@ class Areas {
   [[nodiscard]] std::vector<std::size_t> users_of(std::size_t index) const;
   void tell_view(std::size_t index, std::size_t task, std::byte* bytes);
   void count_cycles(std::span<const TaskConfig> tasks);
-  [[nodiscard]] std::vector<KeptShare> shares_of_kept() const;
+  [[nodiscard]] std::vector<RetainShare> shares_of_retain() const;
   void wrap(std::span<TaskConfig> tasks);
   [[nodiscard]] const DeclaredArea& first_of(const AreaBlock& planned) const {
     return declared_[planned.areas.front()];
   }
   [[nodiscard]] std::size_t task_number(const std::string& name) const;
-  [[nodiscard]] std::size_t kept_number(std::size_t area) const noexcept;
+  [[nodiscard]] std::size_t retain_number(std::size_t area) const noexcept;
 
   bool placed_ = false;
   std::vector<DeclaredArea> declared_;
   AreaPlan plan_;
   std::vector<std::string> tasks_;
-  RetainLayout kept_;  // all retain areas
+  RetainLayout retain_;  // all retain areas
   std::deque<Block> blocks_;
   std::unique_ptr<RetainKeeper> keeper_;
   std::deque<Of<InputView>> inputs_;

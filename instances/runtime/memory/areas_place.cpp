@@ -29,11 +29,11 @@ std::vector<ByteRange> rest_of(ByteRange all, std::vector<ByteRange> ranges) {
 }
 
 // Where the next retain area lies behind one that ends at `bytes`.
-std::size_t behind_kept(std::size_t bytes) noexcept {
+std::size_t behind_retain(std::size_t bytes) noexcept {
   return (bytes + kRetainAlignment - 1) / kRetainAlignment * kRetainAlignment;
 }
 
-Result<void> check_kept_bytes(std::uint64_t bytes) {
+Result<void> check_retain_bytes(std::uint64_t bytes) {
   if (bytes <= kMaxRetainBytes) return {};
   return failure(
       ErrorCode::invalid_argument,
@@ -48,19 +48,19 @@ std::size_t bytes_in_pool(const AreaSettings& settings, const DeclaredArea& firs
   return first.has_image() ? plc_image_bytes(static_cast<std::uint32_t>(settings.size)) : settings.size;
 }
 
-// All that is kept, with its initial values.
-RetainImage kept_image(const std::string& application, std::span<const DeclaredArea> areas) {
+// All retain areas, with their initial values.
+RetainImage retain_image(const std::string& application, std::span<const DeclaredArea> areas) {
   RetainImage image;
   image.layout.application = application;
   for (const DeclaredArea& area : areas) {
-    if (!area.is_kept()) continue;
+    if (!area.is_retain()) continue;
     image.layout.areas.push_back({.name = area.name,
                                   .flags = area.flags & (PLC_AREA_RETAIN | PLC_AREA_PERSISTENT),
                                   .bytes = area.bytes,
                                   .layout = area.layout,
                                   .offset = image.data.size()});
     image.data.insert(image.data.end(), area.initial.begin(), area.initial.end());
-    image.data.resize(behind_kept(image.data.size()));
+    image.data.resize(behind_retain(image.data.size()));
   }
   image.layout.bytes = image.data.size();
   return image;
@@ -79,17 +79,17 @@ Result<void> check_memory(const Areas::Environment& environment, const AreaSetti
 }
 
 // The old memory goes only when the new one is whole, so both need their bytes.
-Result<void> check_kept(const Areas::Environment& environment, const RetainImage& kept) {
+Result<void> check_retain(const Areas::Environment& environment, const RetainImage& retain) {
   const std::string pool = environment.pool == nullptr ? std::string() : environment.pool->name();
-  const auto fresh = RetainKeeper::check(pool, environment.instance, kept, environment.retain);
+  const auto fresh = RetainKeeper::check(pool, environment.instance, retain, environment.retain);
   if (!fresh) return std::unexpected(fresh.error());
   if (*fresh == 0 || environment.room == nullptr) return {};
-  auto room = environment.room->take_memory(kept_memory_name(environment.instance), *fresh);
+  auto room = environment.room->take_memory(retain_memory_name(environment.instance), *fresh);
   return room ? room : failure_in("retain variables", std::move(room).error());
 }
 
 // The settings are checked by their texts; but a file has many: symbolic and hard links, and that of a memory
-// of the pool, one of which holds what is kept.
+// of the pool, one of which holds the retain areas.
 Result<void> check_distinct(const Areas::Environment& environment, const AreaPlan& plan,
                             std::span<const DeclaredArea> areas) {
   struct Taken {
@@ -99,11 +99,12 @@ Result<void> check_distinct(const Areas::Environment& environment, const AreaPla
   if (environment.pool == nullptr) return {};
   const std::string& pool = environment.pool->name();
   std::vector<Taken> taken;
-  const std::string kept = kept_memory_name(environment.instance);
-  if (const auto range = range_of_memory(pool, kept);
-      range && std::ranges::any_of(areas, &DeclaredArea::is_kept)) {
-    taken.push_back({.by = fmt::format("the retain variables of the instance, memory '{}' of the pool", kept),
-                     .range = *range});
+  const std::string retain = retain_memory_name(environment.instance);
+  if (const auto range = range_of_memory(pool, retain);
+      range && std::ranges::any_of(areas, &DeclaredArea::is_retain)) {
+    taken.push_back(
+        {.by = fmt::format("the retain variables of the instance, memory '{}' of the pool", retain),
+         .range = *range});
   }
   std::set<const AreaSettings*> seen;  // a setting has a block for each kind of area
   for (const AreaBlock& block : plan.blocks) {
@@ -143,10 +144,10 @@ Result<void> Areas::check(const Environment& environment, std::span<const Declar
       return good;
   }
   if (auto distinct = check_distinct(environment, *plan, areas); !distinct) return distinct;
-  const RetainImage kept = kept_image(environment.application, areas);
-  if (kept.layout.areas.empty()) return {};
-  if (auto good = check_kept_bytes(kept.layout.bytes); !good) return good;
-  return check_kept(environment, kept);
+  const RetainImage retain = retain_image(environment.application, areas);
+  if (retain.layout.areas.empty()) return {};
+  if (auto good = check_retain_bytes(retain.layout.bytes); !good) return good;
+  return check_retain(environment, retain);
 }
 
 Result<std::string> Areas::place(const Environment& environment, std::vector<DeclaredArea> areas,
@@ -197,7 +198,7 @@ void Areas::take_back() {
 Result<void> Areas::make_blocks(const Environment& environment) {
   for (const AreaBlock& planned : plan_.blocks) {
     Block& block = blocks_.emplace_back();
-    if (planned.settings == nullptr && first_of(planned).is_kept()) continue;  // RetainKeeper's
+    if (planned.settings == nullptr && first_of(planned).is_retain()) continue;  // RetainKeeper's
     block.initial.resize(planned.bytes);
     for (const std::size_t area : planned.areas) {
       std::ranges::copy(declared_[area].initial,
@@ -249,9 +250,9 @@ void Areas::make_image(Block& block, const AreaBlock& planned) {
 }
 
 Result<void> Areas::make_keeper(const Environment& environment) {
-  const RetainImage initial = kept_image(environment.application, declared_);
+  const RetainImage initial = retain_image(environment.application, declared_);
   if (initial.layout.areas.empty()) return {};
-  kept_ = initial.layout;
+  retain_ = initial.layout;
   auto keeper = RetainKeeper::make(*environment.pool, environment.instance, initial, environment.retain);
   if (!keeper) return std::unexpected(std::move(keeper).error());
   keeper_ = *std::move(keeper);
@@ -264,15 +265,15 @@ void Areas::tell_plain_addresses() {
     if (area.has_image()) continue;
     const AreaPlan::Place place = plan_.places[i];
     const AreaBlock& planned = plan_.blocks[place.block];
-    const auto at_kept = [&] { return kept_.areas[kept_number(i)].offset; };
-    if (area.is_kept() && planned.settings == nullptr) {
-      plain_[i] = keeper_->memory().data().data() + at_kept();
+    const auto at_retain = [&] { return retain_.areas[retain_number(i)].offset; };
+    if (area.is_retain() && planned.settings == nullptr) {
+      plain_[i] = keeper_->memory().data().data() + at_retain();
     } else {
       const auto bytes = blocks_[place.block].memory.bytes().subspan(place.offset, area.bytes);
       plain_[i] = bytes.data();
       // Areas in a device or in the pool that are not retain may have been written by others: they stay.
-      if (area.is_kept()) keeper_->memory().live_elsewhere(at_kept(), bytes);
-      if (!area.is_kept() && !blocks_[place.block].memory.existed())
+      if (area.is_retain()) keeper_->memory().live_elsewhere(at_retain(), bytes);
+      if (!area.is_retain() && !blocks_[place.block].memory.existed())
         std::ranges::copy(area.initial, bytes.begin());
     }
     if (area.address != nullptr) *area.address = plain_[i];
@@ -358,14 +359,14 @@ void Areas::tell_view(std::size_t index, std::size_t task, std::byte* bytes) {
   }
 }
 
-// Tasks that may change what is kept are seen to be within a cycle.
+// Tasks that may change the retain areas are seen to be within a cycle.
 void Areas::count_cycles(std::span<const TaskConfig> tasks) {
   if (!keeper_) return;
-  KeptMemory& memory = keeper_->memory();
-  for (const KeptShare& share : shares_of_kept()) {
+  RetainMemory& memory = keeper_->memory();
+  for (const RetainShare& share : shares_of_retain()) {
     std::vector<std::pair<std::size_t, std::size_t>> stretches;
     for (const std::size_t area : share.areas) {
-      stretches.emplace_back(kept_.areas[kept_number(area)].offset, declared_[area].bytes);
+      stretches.emplace_back(retain_.areas[retain_number(area)].offset, declared_[area].bytes);
     }
     memory.add_group({share.tasks.begin(), share.tasks.end()}, stretches);
     for (const std::size_t task : share.tasks) {
@@ -376,18 +377,18 @@ void Areas::count_cycles(std::span<const TaskConfig> tasks) {
 }
 
 // Retain areas and the tasks that may change them, so that no two shares have a task in common.
-std::vector<Areas::KeptShare> Areas::shares_of_kept() const {
-  std::vector<KeptShare> shares;
+std::vector<Areas::RetainShare> Areas::shares_of_retain() const {
+  std::vector<RetainShare> shares;
   for (std::size_t area = 0; area < declared_.size(); ++area) {
-    if (!declared_[area].is_kept()) continue;
-    KeptShare share{.tasks = {}, .areas = {area}};
+    if (!declared_[area].is_retain()) continue;
+    RetainShare share{.tasks = {}, .areas = {area}};
     for (const AreaUse& use : declared_[area].uses) share.tasks.insert(task_number(use.task));
-    const auto common = [&](const KeptShare& other) {
+    const auto common = [&](const RetainShare& other) {
       return std::ranges::any_of(other.tasks, [&](std::size_t task) { return share.tasks.contains(task); });
     };
     const auto [first, last] =
         std::ranges::partition(shares, [&](const auto& other) { return !common(other); });
-    for (const KeptShare& other : std::ranges::subrange(first, last)) {
+    for (const RetainShare& other : std::ranges::subrange(first, last)) {
       share.tasks.insert(other.tasks.begin(), other.tasks.end());
       share.areas.insert(share.areas.end(), other.areas.begin(), other.areas.end());
     }
@@ -404,7 +405,7 @@ void Areas::wrap(std::span<TaskConfig> tasks) {
     tasks[i].entry = [cycle, entry = std::move(tasks[i].entry)] { cycle->run(entry); };
     tasks[i].before_entry = [cycle] { cycle->begin(); };
     tasks[i].after_entry = [cycle] { cycle->end(); };
-    tasks[i].between_cycles = [cycle] { return cycle->give_kept(); };
+    tasks[i].between_cycles = [cycle] { return cycle->give_retain(); };
   }
 }
 

@@ -28,16 +28,16 @@ Result<void> check_flags(const DeclaredArea& area) {
                                            kKinds | PLC_AREA_USER));
   }
   if (area.is_input() && area.is_output()) return bad_area(area.name, "is input or output, not both");
-  if (area.has_image() && area.is_kept()) {
+  if (area.has_image() && area.is_retain()) {
     return bad_area(area.name, "inputs and outputs are not kept: RETAIN and PERSISTENT are for other areas");
   }
   return {};
 }
 
 Result<void> check_size(const DeclaredArea& area) {
-  const std::uint32_t most = area.has_image() ? PLC_MAX_IMAGE
-                             : area.is_kept() ? PLC_MAX_RETAIN
-                                              : static_cast<std::uint32_t>(1) << 30U;
+  const std::uint32_t most = area.has_image()   ? PLC_MAX_IMAGE
+                             : area.is_retain() ? PLC_MAX_RETAIN
+                                                : static_cast<std::uint32_t>(1) << 30U;
   if (area.bytes >= 1 && area.bytes <= most) return {};
   return bad_area(area.name, fmt::format("dwBytes {} is not allowed: 1 to {} is", area.bytes, most));
 }

@@ -32,7 +32,7 @@ struct DeclaredArea {
   [[nodiscard]] bool is_input() const noexcept { return (flags & PLC_AREA_INPUT) != 0; }
   [[nodiscard]] bool is_output() const noexcept { return (flags & PLC_AREA_OUTPUT) != 0; }
   [[nodiscard]] bool has_image() const noexcept { return is_input() || is_output(); }
-  [[nodiscard]] bool is_kept() const noexcept {
+  [[nodiscard]] bool is_retain() const noexcept {
     return (flags & (PLC_AREA_RETAIN | PLC_AREA_PERSISTENT)) != 0;
   }
   [[nodiscard]] bool is_persistent() const noexcept { return (flags & PLC_AREA_PERSISTENT) != 0; }

@@ -61,8 +61,8 @@ struct RetainKeeper::Start {
 
   // The memory of a process that was not ended by the power is newer than any file that it wrote.
   void find_source(const std::string& pool, const std::string& name, RetainFiles::Found found) {
-    auto left = pool.empty() ? Result<KeptMemory::Left>(failure(ErrorCode::not_found, name))
-                             : KeptMemory::left_behind(pool, name);
+    auto left = pool.empty() ? Result<RetainMemory::Left>(failure(ErrorCode::not_found, name))
+                             : RetainMemory::left_behind(pool, name);
     fresh = !left && left.error().code == ErrorCode::not_found;
     if (!left && !fresh) {
       remarks.push_back(fmt::format("the retain memory that the process before has left is not used: {}",
@@ -135,17 +135,17 @@ Result<std::size_t> RetainKeeper::check(const std::string& pool, const std::stri
                                         const RetainImage& initial, const Options& options) {
   Start start;
   const bool files = !options.directory.empty();
-  start.find_source(pool, kept_memory_name(instance),
+  start.find_source(pool, retain_memory_name(instance),
                     files ? RetainFiles::look(options.directory, instance) : RetainFiles::Found{});
   if (auto judged = start.judge(initial.layout, options.mismatch); !judged)
     return std::unexpected(std::move(judged).error());
   if (start.goes_on_in_place(initial, options.cold)) return 0;
-  return KeptMemory::bytes_for(initial.layout.bytes);
+  return RetainMemory::bytes_for(initial.layout.bytes);
 }
 
 Result<std::unique_ptr<RetainKeeper>> RetainKeeper::make(ObjectPool& pool, const std::string& instance,
                                                          const RetainImage& initial, const Options& options) {
-  const std::string name = kept_memory_name(instance);
+  const std::string name = retain_memory_name(instance);
   Start start;
   if (auto opened = start.open_files(options, instance); !opened) return std::unexpected(opened.error());
   start.find_source(pool.name(), name, start.files ? start.files->read() : RetainFiles::Found{});
@@ -155,10 +155,10 @@ Result<std::unique_ptr<RetainKeeper>> RetainKeeper::make(ObjectPool& pool, const
   if (start.aside && start.files) start.files->put_aside();
   start.fill(initial, options.cold);
   auto memory = start.goes_on_in_place(initial, options.cold)
-                    ? KeptMemory::take_over(pool, name, initial.layout)
-                    : KeptMemory::make(pool, name, start.image);
+                    ? RetainMemory::take_over(pool, name, initial.layout)
+                    : RetainMemory::make(pool, name, start.image);
   // The left-over may be a file without an object: then its values go on in a new one.
-  if (!memory) memory = KeptMemory::make(pool, name, start.image);
+  if (!memory) memory = RetainMemory::make(pool, name, start.image);
   if (!memory) return std::unexpected(std::move(memory).error());
   MadeInPool made = start.fresh ? MadeInPool(pool, name) : MadeInPool();
   return std::unique_ptr<RetainKeeper>(
@@ -180,7 +180,7 @@ Result<void> RetainKeeper::start() {
   return {};
 }
 
-RetainKeeper::RetainKeeper(KeptMemory memory, MadeInPool made, Start start, const Options& options)
+RetainKeeper::RetainKeeper(RetainMemory memory, MadeInPool made, Start start, const Options& options)
     : memory_(std::move(memory)),
       made_(std::move(made)),
       files_(std::move(start.files)),
@@ -251,18 +251,18 @@ bool RetainKeeper::rest() {
 // of them has not given until then stay as they were.
 RetainKeeper::Taken RetainKeeper::take_groups() {
   constexpr auto kPatience = std::chrono::seconds(2);
-  std::deque<KeptGroup>& groups = memory_.groups();
+  std::deque<RetainGroup>& groups = memory_.groups();
   if (groups.empty()) return Taken::none;
-  for (KeptGroup& group : groups) group.ask(scratch_);
+  for (RetainGroup& group : groups) group.ask(scratch_);
   const auto all_answered = [&] {
-    const auto count = std::ranges::count_if(groups, [](KeptGroup& group) { return group.is_answered(); });
+    const auto count = std::ranges::count_if(groups, [](RetainGroup& group) { return group.is_answered(); });
     return static_cast<std::size_t>(count) == groups.size();
   };
   const TimePoint deadline = MonotonicClock::now() + kPatience;
   while (!all_answered() && MonotonicClock::now() < deadline && rest()) {
   }
   std::size_t answered = 0;
-  for (KeptGroup& group : groups) {
+  for (RetainGroup& group : groups) {
     if (!group.withdraw()) continue;
     ++answered;
     for (const auto& [offset, live] : group.parts()) {

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "instances/runtime/memory/area_memory.hpp"
-#include "instances/runtime/memory/kept_memory.hpp"
 #include "instances/runtime/memory/retain_files.hpp"
+#include "instances/runtime/memory/retain_memory.hpp"
 #include "instances/runtime/settings/settings.hpp"
 #include "shm/base/thread.hpp"
 
@@ -49,7 +49,7 @@ class RetainKeeper {
   RetainKeeper(const RetainKeeper&) = delete;
   RetainKeeper& operator=(const RetainKeeper&) = delete;
 
-  [[nodiscard]] KeptMemory& memory() noexcept { return memory_; }
+  [[nodiscard]] RetainMemory& memory() noexcept { return memory_; }
   /// Begins to write: until then the memory can be arranged. From then on a memory that make() has made
   /// stays in the pool; without it, one in the place of no other goes with this object. Set-up, once.
   [[nodiscard]] Result<void> start();
@@ -71,7 +71,7 @@ class RetainKeeper {
 
  private:
   struct Start;
-  RetainKeeper(KeptMemory memory, MadeInPool made, Start start, const Options& options);
+  RetainKeeper(RetainMemory memory, MadeInPool made, Start start, const Options& options);
   void run();
   void save();
   /// Whether the memory is lost, which is told.
@@ -93,7 +93,7 @@ class RetainKeeper {
   void tell(Fault fault, std::string why);
   void count_unsaved() noexcept;
 
-  KeptMemory memory_;
+  RetainMemory memory_;
   MadeInPool made_;
   std::optional<RetainFiles> files_;
   std::vector<Origin> origins_;

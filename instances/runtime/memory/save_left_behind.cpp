@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "instances/runtime/memory/kept_memory.hpp"
 #include "instances/runtime/memory/retain_files.hpp"
+#include "instances/runtime/memory/retain_memory.hpp"
 #include "instances/runtime/settings/settings.hpp"
 #include "shm/base/time.hpp"
 #include "shm/log/log.hpp"
@@ -23,7 +23,7 @@ Result<std::string> directory_of(const LaunchOptions& launch) {
 }  // namespace
 
 Result<void> save_left_behind(const LaunchOptions& launch) {
-  auto left = KeptMemory::left_behind(launch.pool, kept_memory_name(launch.name));
+  auto left = RetainMemory::left_behind(launch.pool, retain_memory_name(launch.name));
   if (!left && left.error().code == ErrorCode::not_found) return {};
   // A damaged memory is worth nothing: the files hold the last good values.
   if (!left && left.error().code == ErrorCode::corrupt) {

@@ -16,7 +16,7 @@ struct ByteRange {
   std::size_t bytes = 0;
 };
 
-/// The counter of a task's cycles: odd inside of one, even outside. In kept memory.
+/// The counter of a task's cycles: odd inside of one, even outside. In retain memory.
 using CycleCounter = std::atomic<std::uint64_t>;
 
 /// One task's copy of a block of inputs. Real-time but for its making.

@@ -16,7 +16,7 @@ struct Options {
   std::string check_application;             ///< not empty: only check this file
   std::string check_settings;                ///< the same for a settings file
   int parent = 0;                            ///< the process whose end is that of the check, too; 0: none
-  bool save_retain = false;                  ///< only write what the kept memory holds to its files
+  bool save_retain = false;                  ///< only write the retain memory to its files
 };
 
 /// The result of the command line: options, or the exit code of a program that has nothing more to do (help,

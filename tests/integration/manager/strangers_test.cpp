@@ -88,13 +88,13 @@ TEST_F(StrangersFiles, WithWholeRetainValuesBecomeNoValues) {
   }
   ASSERT_TRUE(says_products("24")) << plant.log();
   // A stranger's copy of them is as good as any that he makes himself.
-  const std::string kept = MemoryFile::path(pool_memory_name(plant.pool(), kept_memory_name("packer1")));
+  const std::string kept = MemoryFile::path(pool_memory_name(plant.pool(), retain_memory_name("packer1")));
   const std::string copy = MemoryFile::path(plant.pool() + "-copy");
   fs::copy_file(kept, copy);
   EXPECT_EQ(plant.stop_manager().describe(), "exit code 0");
   fs::remove_all(plant.state_directory());
   fs::rename(copy, kept);
-  give_away(pool_memory_name(plant.pool(), kept_memory_name("packer1")));
+  give_away(pool_memory_name(plant.pool(), retain_memory_name("packer1")));
   ::chmod(kept.c_str(), 0666);
   plant.start_manager();
   ASSERT_TRUE(plant.wait_for("packer1", InstanceState::running)) << plant.log();

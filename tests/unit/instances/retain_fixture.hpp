@@ -65,7 +65,9 @@ class Retain : public ::testing::Test {
     std::memcpy(sut->memory().data().data() + 8 * area, &value, 8);
   }
   /// As a power cut does.
-  void forget_memory() const { MemoryFile::remove(pool_memory_name(name_.get(), kept_memory_name("line1"))); }
+  void forget_memory() const {
+    MemoryFile::remove(pool_memory_name(name_.get(), retain_memory_name("line1")));
+  }
   /// As a kill does: nothing is written at the end. The lock of the files goes with the process.
   void lose_files_of_the_end() {
     const std::filesystem::path aside = folder_.string() + ".aside";

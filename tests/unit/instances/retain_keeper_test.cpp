@@ -235,7 +235,7 @@ TEST_F(Retain, OfOneFileIsOfTheEndOfOneCycle) {
 /// to the areas, one at its beginning, the other at its end.
 class BusyTask {
  public:
-  BusyTask(RetainKeeper& keeper, std::size_t task, KeptGroup& group, std::vector<std::uint64_t*> areas,
+  BusyTask(RetainKeeper& keeper, std::size_t task, RetainGroup& group, std::vector<std::uint64_t*> areas,
            bool may_wait = false)
       : thread_([this, &group, areas, may_wait, &counter = keeper.memory().counter(task)] {
           for (std::uint64_t cycle = 2; !stop_; ++cycle) {
@@ -270,8 +270,8 @@ class RetainOfBusyTasks : public Retain {
                               .postpone = std::chrono::milliseconds(2)})
               .value();
   }
-  KeptGroup& group(const std::vector<std::size_t>& tasks,
-                   const std::vector<std::pair<std::size_t, std::size_t>>& stretches) {
+  RetainGroup& group(const std::vector<std::size_t>& tasks,
+                     const std::vector<std::pair<std::size_t, std::size_t>>& stretches) {
     sut->memory().add_group(tasks, stretches);
     return sut->memory().groups().back();
   }
@@ -295,7 +295,7 @@ class RetainOfBusyTasks : public Retain {
 };
 
 TEST_F(RetainOfBusyTasks, IsSavedAtTheEndOfACycleIfOneFollowsTheOtherWithoutAPause) {
-  KeptGroup& both = group({0}, {{0, 8}, {8, 8}});
+  RetainGroup& both = group({0}, {{0, 8}, {8, 8}});
   ASSERT_TRUE(sut->start());
   const BusyTask task(*sut, 0, both, {area(0), area(1)});
   for (std::uint64_t seen = 1; seen < 12;) {
@@ -309,7 +309,7 @@ TEST_F(RetainOfBusyTasks, IsSavedAtTheEndOfACycleIfOneFollowsTheOtherWithoutAPau
 }
 
 TEST_F(RetainOfBusyTasks, IsSavedWhenTwoOfThemShareAnAreaAndOneMayWait) {
-  KeptGroup& both = group({0, 1}, {{0, 8}, {8, 8}});
+  RetainGroup& both = group({0, 1}, {{0, 8}, {8, 8}});
   ASSERT_TRUE(sut->start());
   const BusyTask one(*sut, 0, both, {area(0), area(0)}, true);
   const BusyTask other(*sut, 1, both, {area(1), area(1)}, true);
@@ -320,7 +320,7 @@ TEST_F(RetainOfBusyTasks, IsSavedWhenTwoOfThemShareAnAreaAndOneMayWait) {
 
 TEST_F(RetainOfBusyTasks, IsSavedThoughAnotherTaskIsStuckWithinACycle) {
   (void)group({7}, {{0, 8}});
-  KeptGroup& other = group({1}, {{8, 8}});
+  RetainGroup& other = group({1}, {{8, 8}});
   ASSERT_TRUE(sut->start());
   sut->memory().counter(7) = 1;
   *area(0) = 13;
@@ -338,7 +338,7 @@ TEST_F(RetainOfBusyTasks, IsSavedThoughAnotherTaskIsStuckWithinACycle) {
 TEST_F(RetainOfBusyTasks, IsTakenFromWhereAnAreaLives) {
   alignas(8) std::uint64_t registers = 0;
   sut->memory().live_elsewhere(0, std::as_writable_bytes(std::span(&registers, 1)));
-  KeptGroup& both = group({0}, {{0, 8}, {8, 8}});
+  RetainGroup& both = group({0}, {{0, 8}, {8, 8}});
   ASSERT_TRUE(sut->start());
   {
     const BusyTask task(*sut, 0, both, {&registers, area(1)});
@@ -377,7 +377,7 @@ TEST_F(Retain, LivesWhereTheSettingsHaveIt) {
 TEST_F(Retain, MemoryWithAnyByteOfItsHeaderSpoiledIsTakenOrLeftAsAWhole) {
   start_well();
   sut.reset();
-  const std::string name = pool_memory_name(name_.get(), kept_memory_name("line1"));
+  const std::string name = pool_memory_name(name_.get(), retain_memory_name("line1"));
   constexpr std::size_t kHeader = 96 + 3 * 80;
   for (std::size_t at = 0; at < kHeader; ++at) {
     for (const unsigned char spoil : {0x01, 0x80, 0xff}) {
@@ -386,7 +386,7 @@ TEST_F(Retain, MemoryWithAnyByteOfItsHeaderSpoiledIsTakenOrLeftAsAWhole) {
         ASSERT_TRUE(memory);
         memory->bytes()[at] ^= static_cast<std::byte>(spoil);
       }
-      const auto left = KeptMemory::left_behind(name_.get(), kept_memory_name("line1"));
+      const auto left = RetainMemory::left_behind(name_.get(), retain_memory_name("line1"));
       if (left) {
         EXPECT_TRUE(check_layout(left->image.layout));
         EXPECT_EQ(left->image.data.size(), left->image.layout.bytes);

@@ -27,7 +27,7 @@ class RetainInTrouble : public Retain {
  protected:
   RetainInTrouble() { MemoryGuard::watch_process(); }
   [[nodiscard]] std::string memory_path() const {
-    return MemoryFile::path(pool_memory_name(name_.get(), kept_memory_name("line1")));
+    return MemoryFile::path(pool_memory_name(name_.get(), retain_memory_name("line1")));
   }
   [[nodiscard]] LaunchOptions ours() const {
     LaunchOptions launch;

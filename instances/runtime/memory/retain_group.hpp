@@ -12,7 +12,7 @@ namespace plchost {
 
 /// Retain data that the same tasks may change, and the way to a copy that shows none of these tasks within a
 /// cycle. There may nearly always be one: so a task that has come to the end of its cycle makes the copy.
-class KeptGroup {
+class RetainGroup {
  public:
   /// A stretch of the data, and where it lies while the application runs.
   struct Part {
@@ -20,7 +20,7 @@ class KeptGroup {
     std::span<const std::byte> live;
   };
   /// `counters`: of the tasks; none: nobody changes the data.
-  KeptGroup(std::vector<const CycleCounter*> counters, std::vector<Part> parts)
+  RetainGroup(std::vector<const CycleCounter*> counters, std::vector<Part> parts)
       : counters_(std::move(counters)), parts_(std::move(parts)) {}
 
   [[nodiscard]] const std::vector<Part>& parts() const noexcept { return parts_; }

@@ -1,4 +1,4 @@
-#include "instances/runtime/memory/kept_memory.hpp"
+#include "instances/runtime/memory/retain_memory.hpp"
 
 #include <algorithm>
 #include <array>
@@ -17,19 +17,20 @@ namespace plchost {
 namespace {
 
 // "plckept2", as bytes in memory.
-constexpr std::uint64_t kKeptMagic = 0x327470656b636c70;
+constexpr std::uint64_t kRetainMagic = 0x327470656b636c70;
 // The last bytes of the memory. A file that was cut anywhere has lost them, also if it was made longer again.
-constexpr std::uint64_t kKeptEnd = ~kKeptMagic;
+constexpr std::uint64_t kRetainEnd = ~kRetainMagic;
 
 // Read after what was copied before.
 bool has_its_end(std::span<const std::byte> memory) noexcept {
   std::atomic_thread_fence(std::memory_order_acquire);
-  return *reinterpret_cast<const volatile std::uint64_t*>(memory.last(sizeof(kKeptEnd)).data()) == kKeptEnd;
+  return *reinterpret_cast<const volatile std::uint64_t*>(memory.last(sizeof(kRetainEnd)).data()) ==
+         kRetainEnd;
 }
 
 }  // namespace
 
-struct KeptMemory::Header {
+struct RetainMemory::Header {
   std::uint64_t magic;
   std::atomic<std::uint64_t> generation;  // written by the soft thread
   std::uint64_t areas;
@@ -40,18 +41,18 @@ struct KeptMemory::Header {
   std::array<CycleCounter, PLC_MAX_TASKS> counters;  // each written by its task
 };
 
-std::size_t KeptMemory::bytes_for(std::uint64_t data) noexcept {
+std::size_t RetainMemory::bytes_for(std::uint64_t data) noexcept {
   static_assert(sizeof(Header) == 96 + std::size_t{80} * kMaxRetainAreas + std::size_t{8} * PLC_MAX_TASKS &&
                 sizeof(Header) % kRetainAlignment == 0);
   return sizeof(Header) + (data + kRetainAlignment - 1) / kRetainAlignment * kRetainAlignment +
-         sizeof(kKeptEnd);
+         sizeof(kRetainEnd);
 }
 
-KeptMemory::Header& KeptMemory::header() const noexcept {
+RetainMemory::Header& RetainMemory::header() const noexcept {
   return *reinterpret_cast<Header*>(memory_.bytes().data());
 }
 
-Result<KeptMemory::Left> KeptMemory::left_behind(const std::string& pool, const std::string& name) {
+Result<RetainMemory::Left> RetainMemory::left_behind(const std::string& pool, const std::string& name) {
   const auto damaged = [&](std::string_view what) {
     return failure(ErrorCode::corrupt, fmt::format("memory '{}': {}", name, what));
   };
@@ -63,7 +64,7 @@ Result<KeptMemory::Left> KeptMemory::left_behind(const std::string& pool, const 
   RetainLayout& layout = left.image.layout;
   layout.bytes = header.bytes;
   const std::uint64_t areas = header.areas;
-  if (header.magic != kKeptMagic || areas > kMaxRetainAreas || layout.bytes > kMaxRetainBytes ||
+  if (header.magic != kRetainMagic || areas > kMaxRetainAreas || layout.bytes > kMaxRetainBytes ||
       file->bytes().size() != bytes_for(layout.bytes)) {
     return damaged("its header is overwritten, or of another version");
   }
@@ -85,7 +86,7 @@ Result<KeptMemory::Left> KeptMemory::left_behind(const std::string& pool, const 
   return left;
 }
 
-Result<KeptMemory> KeptMemory::of(Result<SharedMemory> opened, std::size_t bytes) {
+Result<RetainMemory> RetainMemory::of(Result<SharedMemory> opened, std::size_t bytes) {
   if (!opened) return failure_in("retain variables", std::move(opened).error());
   if (opened->bytes().size() != bytes) {
     return failure(ErrorCode::wrong_size,
@@ -96,21 +97,21 @@ Result<KeptMemory> KeptMemory::of(Result<SharedMemory> opened, std::size_t bytes
     return failure(ErrorCode::full,
                    fmt::format("retain variables: more than {} memories of others", MemoryGuard::kMost));
   }
-  return KeptMemory(*std::move(opened));
+  return RetainMemory(*std::move(opened));
 }
 
-Result<KeptMemory> KeptMemory::take_over(ObjectPool& pool, const std::string& name,
-                                         const RetainLayout& layout) {
+Result<RetainMemory> RetainMemory::take_over(ObjectPool& pool, const std::string& name,
+                                             const RetainLayout& layout) {
   auto kept = of(pool.open_memory(name), bytes_for(layout.bytes));
   if (!kept) return kept;
   for (CycleCounter& counter : kept->header().counters) counter.store(0, std::memory_order_relaxed);
   return kept;
 }
 
-Result<KeptMemory> KeptMemory::make(ObjectPool& pool, const std::string& name, const RetainImage& image) {
+Result<RetainMemory> RetainMemory::make(ObjectPool& pool, const std::string& name, const RetainImage& image) {
   const auto fill = [&](std::span<std::byte> bytes) -> Result<void> {
     auto& header = *reinterpret_cast<Header*>(bytes.data());
-    header.magic = kKeptMagic;
+    header.magic = kRetainMagic;
     header.generation.store(image.generation, std::memory_order_relaxed);
     header.areas = image.layout.areas.size();
     header.bytes = image.layout.bytes;
@@ -119,35 +120,35 @@ Result<KeptMemory> KeptMemory::make(ObjectPool& pool, const std::string& name, c
       header.entries[i] = record_of(image.layout.areas[i]);
     }
     std::ranges::copy(image.data, bytes.begin() + sizeof(Header));
-    std::memcpy(bytes.last(sizeof(kKeptEnd)).data(), &kKeptEnd, sizeof(kKeptEnd));
+    std::memcpy(bytes.last(sizeof(kRetainEnd)).data(), &kRetainEnd, sizeof(kRetainEnd));
     return {};
   };
   const std::size_t bytes = bytes_for(image.layout.bytes);
   return of(pool.replace_memory(name, bytes, fill), bytes);
 }
 
-std::span<std::byte> KeptMemory::data() const noexcept {
+std::span<std::byte> RetainMemory::data() const noexcept {
   return memory_.bytes().subspan(sizeof(Header), memory_.bytes().size() - bytes_for(0));
 }
 
-CycleCounter& KeptMemory::counter(std::size_t task) const noexcept {
+CycleCounter& RetainMemory::counter(std::size_t task) const noexcept {
   return header().counters.at(task);
 }
 
-void KeptMemory::set_generation(std::uint64_t generation) const noexcept {
+void RetainMemory::set_generation(std::uint64_t generation) const noexcept {
   header().generation.store(generation, std::memory_order_relaxed);
 }
 
-void KeptMemory::live_elsewhere(std::size_t offset, std::span<std::byte> live) {
+void RetainMemory::live_elsewhere(std::size_t offset, std::span<std::byte> live) {
   std::ranges::copy(data().subspan(offset, live.size()), live.begin());
   elsewhere_.push_back({.offset = offset, .live = live});
 }
 
-void KeptMemory::add_group(const std::vector<std::size_t>& tasks,
-                           const std::vector<std::pair<std::size_t, std::size_t>>& stretches) {
+void RetainMemory::add_group(const std::vector<std::size_t>& tasks,
+                             const std::vector<std::pair<std::size_t, std::size_t>>& stretches) {
   std::vector<const CycleCounter*> counters;
   for (const std::size_t task : tasks) counters.push_back(&counter(task));
-  std::vector<KeptGroup::Part> parts;
+  std::vector<RetainGroup::Part> parts;
   for (const auto& [offset, bytes] : stretches) {
     const auto other = std::ranges::find(elsewhere_, offset, &Elsewhere::offset);
     parts.push_back(
@@ -157,23 +158,23 @@ void KeptMemory::add_group(const std::vector<std::size_t>& tasks,
 }
 
 // A cut that has taken any data has taken the end, too.
-bool KeptMemory::is_whole() const noexcept {
+bool RetainMemory::is_whole() const noexcept {
   const bool has_end = has_its_end(memory_.bytes());
   const Header& kept = header();
-  const bool described = kept.magic == kKeptMagic && bytes_for(kept.bytes) == memory_.bytes().size();
+  const bool described = kept.magic == kRetainMagic && bytes_for(kept.bytes) == memory_.bytes().size();
   const bool elsewhere = std::ranges::none_of(
       elsewhere_, [](const Elsewhere& part) { return MemoryGuard::is_lost(part.live.data()); });
   return has_end && described && elsewhere && !memory_.lost();
 }
 
-void KeptMemory::copy_elsewhere(std::span<const std::byte> taken) const noexcept {
+void RetainMemory::copy_elsewhere(std::span<const std::byte> taken) const noexcept {
   for (const auto& [offset, live] : elsewhere_) {
     std::ranges::copy(taken.subspan(offset, live.size()),
                       data().begin() + static_cast<std::ptrdiff_t>(offset));
   }
 }
 
-bool KeptMemory::snapshot(std::span<std::byte> copy) const noexcept {
+bool RetainMemory::snapshot(std::span<std::byte> copy) const noexcept {
   std::array<std::uint64_t, PLC_MAX_TASKS> before{};
   const auto& counters = header().counters;
   for (std::size_t i = 0; i < before.size(); ++i) {

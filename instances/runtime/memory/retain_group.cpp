@@ -1,4 +1,4 @@
-#include "instances/runtime/memory/kept_group.hpp"
+#include "instances/runtime/memory/retain_group.hpp"
 
 #include <chrono>
 #include <thread>
@@ -15,24 +15,24 @@ __attribute__((no_sanitize("thread"))) void copy_moving(std::byte* to, const std
   for (; at < bytes; ++at) to[at] = *const_cast<const volatile std::byte*>(from + at);
 }
 
-void KeptGroup::ask(std::span<std::byte> copy) noexcept {
+void RetainGroup::ask(std::span<std::byte> copy) noexcept {
   copy_ = copy;
   state_.store(State::asked, std::memory_order_release);
 }
 
-bool KeptGroup::begin_copy() noexcept {
+bool RetainGroup::begin_copy() noexcept {
   State asked = State::asked;
   return state_.compare_exchange_strong(asked, State::copying, std::memory_order_acquire,
                                         std::memory_order_relaxed);
 }
 
-void KeptGroup::end_copy(bool done) noexcept {
+void RetainGroup::end_copy(bool done) noexcept {
   state_.store(done ? State::done : State::asked, std::memory_order_release);
 }
 
 // No task may begin a cycle meanwhile: each counter is even, and the sum of all, which only grow, is the same
 // after the copy.
-bool KeptGroup::copy() const noexcept {
+bool RetainGroup::copy() const noexcept {
   std::uint64_t before = 0;
   for (const CycleCounter* const counter : counters_) {
     const std::uint64_t count = counter->load(std::memory_order_acquire);  // pairs with the end of a cycle
@@ -47,12 +47,12 @@ bool KeptGroup::copy() const noexcept {
   return after == before;
 }
 
-bool KeptGroup::is_answered() noexcept {
+bool RetainGroup::is_answered() noexcept {
   if (begin_copy()) end_copy(copy());
   return state_.load(std::memory_order_acquire) == State::done;
 }
 
-bool KeptGroup::withdraw() noexcept {
+bool RetainGroup::withdraw() noexcept {
   for (;;) {
     State asked = State::asked;
     if (state_.compare_exchange_strong(asked, State::idle, std::memory_order_acquire)) return false;
@@ -66,7 +66,7 @@ bool KeptGroup::withdraw() noexcept {
 }
 
 // A task of higher priority may run through a cycle while this one copies: then again.
-void KeptGroup::answer_now(bool may_wait) noexcept {
+void RetainGroup::answer_now(bool may_wait) noexcept {
   constexpr int kAttempts = 3;
   constexpr int kPatientAttempts = 20;
   for (int attempt = 0; attempt < (may_wait ? kPatientAttempts : kAttempts); ++attempt) {

@@ -12,7 +12,7 @@ namespace plchost {
 /// it for each of them, all at the same time. To be called when all instances have ended; takes up to 20 s.
 /// Returns the memories of the pool that hold values which are in no file: they must stay. Each is logged,
 /// with the reason. Set-up.
-[[nodiscard]] std::vector<std::string> save_kept_memories(const ManagerConfig& config,
-                                                          const std::string& plc_instance);
+[[nodiscard]] std::vector<std::string> save_retain_memories(const ManagerConfig& config,
+                                                            const std::string& plc_instance);
 
 }  // namespace plchost

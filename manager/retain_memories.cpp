@@ -1,4 +1,4 @@
-#include "manager/kept_memories.hpp"
+#include "manager/retain_memories.hpp"
 
 #include <algorithm>
 #include <chrono>
@@ -29,13 +29,13 @@ struct Saving {
   Result<ChildProcess> process;
 };
 
-std::vector<std::string> kept_memories_of(const std::string& pool) {
+std::vector<std::string> retain_memories_of(const std::string& pool) {
   std::vector<std::string> memories;
   std::error_code error;
   for (std::filesystem::directory_iterator at(MemoryFile::kDirectory, error), end; !error && at != end;
        at.increment(error)) {
     auto memory = memory_of_file(pool, at->path().filename().string());
-    if (memory && memory->ends_with(kept_memory_name(""))) memories.push_back(*std::move(memory));
+    if (memory && memory->ends_with(retain_memory_name(""))) memories.push_back(*std::move(memory));
   }
   return memories;
 }
@@ -68,11 +68,11 @@ Result<void> wait_until_saved(const ChildProcess& process, TimePoint deadline) {
 
 }  // namespace
 
-std::vector<std::string> save_kept_memories(const ManagerConfig& config, const std::string& plc_instance) {
+std::vector<std::string> save_retain_memories(const ManagerConfig& config, const std::string& plc_instance) {
   std::vector<Saving> all;
-  for (const std::string& memory : kept_memories_of(config.host.pool)) {
+  for (const std::string& memory : retain_memories_of(config.host.pool)) {
     const auto instance = std::ranges::find_if(
-        config.instances, [&](const InstanceConfig& one) { return kept_memory_name(one.name) == memory; });
+        config.instances, [&](const InstanceConfig& one) { return retain_memory_name(one.name) == memory; });
     all.push_back({.memory = memory,
                    .process = instance != config.instances.end()
                                   ? start_to_save(config, plc_instance, *instance)

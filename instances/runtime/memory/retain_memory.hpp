@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "instances/plc_app.h"
-#include "instances/runtime/memory/kept_group.hpp"
+#include "instances/runtime/memory/retain_group.hpp"
 #include "instances/runtime/memory/retain_image.hpp"
 #include "instances/runtime/memory/task_areas.hpp"
 #include "shm/base/result.hpp"
@@ -21,7 +21,7 @@ namespace plchost {
 
 /// The memory in which the variables of retain areas lie while the application runs: a memory of the pool, so
 /// that it outlives the process. Its header is checked before use: strangers can write to it.
-class KeptMemory {
+class RetainMemory {
  public:
   /// The data that the process before left under that name. not_found: there is none. corrupt: none that is
   /// whole. Set-up.
@@ -32,12 +32,12 @@ class KeptMemory {
   [[nodiscard]] static Result<Left> left_behind(const std::string& pool, const std::string& name);
 
   /// The one that was left behind, with all that was written into it until now; it has this layout. Set-up.
-  [[nodiscard]] static Result<KeptMemory> take_over(ObjectPool& pool, const std::string& name,
-                                                    const RetainLayout& layout);
+  [[nodiscard]] static Result<RetainMemory> take_over(ObjectPool& pool, const std::string& name,
+                                                      const RetainLayout& layout);
   /// A new one with these data; the one before under the name goes. It has its name only when it is whole.
   /// Set-up.
-  [[nodiscard]] static Result<KeptMemory> make(ObjectPool& pool, const std::string& name,
-                                               const RetainImage& image);
+  [[nodiscard]] static Result<RetainMemory> make(ObjectPool& pool, const std::string& name,
+                                                 const RetainImage& image);
 
   /// Of the whole memory, for so many bytes of data.
   [[nodiscard]] static std::size_t bytes_for(std::uint64_t data) noexcept;
@@ -56,7 +56,7 @@ class KeptMemory {
   void add_group(const std::vector<std::size_t>& tasks,
                  const std::vector<std::pair<std::size_t, std::size_t>>& stretches);
   /// Each stretch of the data is in one of them.
-  [[nodiscard]] std::deque<KeptGroup>& groups() noexcept { return groups_; }
+  [[nodiscard]] std::deque<RetainGroup>& groups() noexcept { return groups_; }
   /// False: another program has cut or overwritten the memory, or one in which an area lies elsewhere. Its
   /// contents are worth nothing, and so is a copy that was made before this was asked. Soft thread.
   [[nodiscard]] bool is_whole() const noexcept;
@@ -69,8 +69,8 @@ class KeptMemory {
 
  private:
   struct Header;
-  explicit KeptMemory(SharedMemory memory) noexcept : memory_(std::move(memory)) {}
-  [[nodiscard]] static Result<KeptMemory> of(Result<SharedMemory> opened, std::size_t bytes);
+  explicit RetainMemory(SharedMemory memory) noexcept : memory_(std::move(memory)) {}
+  [[nodiscard]] static Result<RetainMemory> of(Result<SharedMemory> opened, std::size_t bytes);
   [[nodiscard]] Header& header() const noexcept;
 
   struct Elsewhere {
@@ -79,7 +79,7 @@ class KeptMemory {
   };
   SharedMemory memory_;
   std::vector<Elsewhere> elsewhere_;
-  std::deque<KeptGroup> groups_;
+  std::deque<RetainGroup> groups_;
 };
 
 }  // namespace plchost
