@@ -29,6 +29,8 @@
 #include <dds/ddsi/ddsi_security_omg.h>
 #include <dds/security/core/dds_security_utils.h>
 #include <dds/security/dds_security_api_authentication.h>
+#include <dds/security/dds_security_api_cryptography.h>
+#include <dds/security/dds_security_api_err.h>
 // clang-format on
 
 // Where what is used lies in the releases that are known. Headers that were patched, or configured otherwise,

@@ -24,6 +24,7 @@
 #include "api/dds/error.hpp"
 #include "api/dds/handshakes.h"
 #include "api/dds/security_section.hpp"
+#include "api/dds/signed_messages.h"
 #include "api/security/identity.hpp"
 #include "shm/base/thread.hpp"
 #include "shm/base/unique_fd.hpp"
@@ -207,7 +208,10 @@ Result<std::shared_ptr<Entity>> open_domain(Role role, const DomainOptions& opti
 Result<Entity> make_participant(std::uint32_t domain, const dds_qos_t* qos, std::string_view what) {
   const std::lock_guard lock(registry().mutex);
   auto made = check_entity(dds_create_participant(domain, qos, nullptr), std::string(what));
-  if (made) (void)plc_watch_handshakes(made->get());
+  if (made) {
+    (void)plc_watch_handshakes(made->get());
+    (void)plc_decode_signed_once(made->get());
+  }
   if (!made || !registry().gated.contains(domain)) return made;
   if (auto filtered = filter_datagrams(*made, what); !filtered) return std::unexpected(filtered.error());
   return made;

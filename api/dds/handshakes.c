@@ -163,11 +163,11 @@ static void take_challenge(dds_security_authentication* instance, DDS_Security_I
   DDS_Security_SecurityException error = {0};
   const DDS_Security_ValidationResult_t result =
       plugin.validate_remote_identity(instance, &same, &unused, &request, local, &token, &guid, &error);
-  DDS_Security_Exception_clean(&error);
+  DDS_Security_Exception_reset(&error);
   // Another thread has returned the handle meanwhile, so the plugin has made one that nobody else returns.
   if (result != DDS_SECURITY_VALIDATION_FAILED && same != remote) {
     (void)plugin.return_identity_handle(instance, same, &error);
-    DDS_Security_Exception_clean(&error);
+    DDS_Security_Exception_reset(&error);
   }
   DDS_Security_DataHolder_deinit(&unused);
   DDS_Security_DataHolder_deinit(&token);

@@ -20,11 +20,6 @@ constexpr auto kMeetAgain = std::chrono::seconds(60);
 
 class LostContact : public SecuredHost {
  protected:
-  [[nodiscard]] static testing::AssertionResult can_post(ControlClient& client, Duration patience) {
-    const auto posted = client.post_event({"cell", 0, "line1", "ready"}, 1, {}, patience);
-    if (posted) return testing::AssertionSuccess();
-    return testing::AssertionFailure() << posted.error().describe();
-  }
   /// A client whose handshake waits for its last message.
   [[nodiscard]] std::unique_ptr<ControlClient> make_client_without_last_message() {
     wire_.lose_last_messages(std::numeric_limits<int>::max());

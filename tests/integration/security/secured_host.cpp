@@ -42,6 +42,13 @@ SecuredHost::~SecuredHost() {
   std::filesystem::remove_all(base_);
 }
 
+testing::AssertionResult SecuredHost::can_post(ControlClient& client, Duration patience) {
+  const auto posted = client.post_event({"cell", 0, "line1", "ready"}, 1, {}, patience);
+  if (!posted) return testing::AssertionFailure() << posted.error().describe();
+  if (posted->unacknowledged == 0) return testing::AssertionSuccess();
+  return testing::AssertionFailure() << "the host has not acknowledged the post";
+}
+
 RunResult SecuredHost::run_with_folder(const std::string& identity_folder,
                                        std::vector<std::string> arguments) const {
   if (!identity_folder.empty()) arguments.insert(arguments.begin(), {"--identity", identity_folder});

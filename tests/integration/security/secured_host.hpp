@@ -36,6 +36,8 @@ class SecuredHost : public testing::Test {
     options.identity = folder("operator");
     return ControlClient::connect(options).value();
   }
+  /// Whether the host acknowledges a post of that client in time.
+  [[nodiscard]] static testing::AssertionResult can_post(ControlClient& client, Duration patience);
   /// plcctl with an identity; empty: with none.
   [[nodiscard]] RunResult run(const std::string& identity, std::vector<std::string> arguments) const {
     return run_with_folder(identity.empty() ? "" : folder(identity), std::move(arguments));

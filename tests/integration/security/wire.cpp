@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <mutex>
+#include <span>
 #include <string_view>
 #include <thread>
 
@@ -28,6 +29,8 @@ struct State {
   bool is_watched = false;
   int lost = 0;
   int last_messages = 0;
+  std::string has_keys;  ///< empty: all have
+  int lost_keys = 0;
   TimePoint deaf_until{};
   TimePoint mute_until{};
   std::string host;
@@ -49,12 +52,35 @@ bool has(std::string_view datagram, std::string_view text) {
   return datagram.find(text) != std::string_view::npos;
 }
 
+// Keys come in messages of one participant's own, which are encrypted and not signed as a whole.
+bool tells_keys(std::string_view datagram, std::string_view but) {
+  using namespace dds::submessage_kind;
+  constexpr std::size_t kDestinationSize = dds::kSubmessageHeader + dds::kGuidPrefix;
+  bool is_for_other = false;
+  const auto bytes = std::as_bytes(std::span(datagram));
+  for (auto rest = bytes.subspan(dds::kRtpsHeader); !rest.empty();) {
+    const auto submessage = dds::first_submessage(rest);
+    if (!submessage || submessage->kind() == kSecuredMessagePrefix) return false;
+    const std::size_t at = bytes.size() - rest.size();
+    if (submessage->kind() == kInfoDestination && submessage->bytes.size() >= kDestinationSize) {
+      is_for_other = datagram.substr(at + dds::kSubmessageHeader, dds::kGuidPrefix) != but;
+    }
+    if (submessage->kind() == kSecuredPrefix && is_for_other) return true;
+    rest = rest.subspan(submessage->bytes.size());
+  }
+  return false;
+}
+
 // Whether the datagram is dropped.
 bool is_lost_coming(std::string_view datagram) {
   State& wire = state();
   const std::lock_guard lock(wire.mutex);
   if (!wire.is_watched) return false;
   if (MonotonicClock::now() < wire.deaf_until) return true;
+  if (!wire.has_keys.empty() && tells_keys(datagram, wire.has_keys)) {
+    ++wire.lost_keys;
+    return true;
+  }
   if (has(datagram, kRequest)) wire.requests.received = datagram;
   if (!has(datagram, kLastMessage)) return false;
   ++wire.last_messages;
@@ -94,6 +120,8 @@ Wire::Wire() {
   wire.is_watched = true;
   wire.lost = 0;
   wire.last_messages = 0;
+  wire.has_keys.clear();
+  wire.lost_keys = 0;
   wire.deaf_until = {};
   wire.mute_until = {};
   wire.host.clear();
@@ -124,6 +152,16 @@ bool Wire::await_last_message(Duration patience) const {
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
   return false;
+}
+
+void Wire::lose_keys_but_of(const std::string& but) {
+  const std::lock_guard lock(state().mutex);
+  state().has_keys = but;
+}
+
+int Wire::lost_keys() const {
+  const std::lock_guard lock(state().mutex);
+  return state().lost_keys;
 }
 
 void Wire::make_deaf(Duration time) {

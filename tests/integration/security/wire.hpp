@@ -28,6 +28,11 @@ class Wire {
   [[nodiscard]] int last_messages() const;
   /// Returns when one more has come. False: none does.
   [[nodiscard]] bool await_last_message(Duration patience) const;
+  /// From now on, the keys that the host tells participants of this process are lost, except those for the
+  /// participant with that GUID prefix.
+  void lose_keys_but_of(const std::string& but);
+  /// How many datagrams with keys were lost.
+  [[nodiscard]] int lost_keys() const;
   /// For that long, nothing is received.
   static void make_deaf(Duration time);
   /// For that long, all that is sent is lost.
