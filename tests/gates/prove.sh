@@ -219,7 +219,7 @@ plant_in_documents "documents: another meaning of a key" "[host] pool_objects ha
 plant_in_documents "documents: message that is gone" "no message has 'needs SCHED_FIFO prio '" manager/troubleshooting.md 's,`needs SCHED_FIFO priority`,`needs SCHED_FIFO prio `,'
 plant_in_documents "documents: file that is gone" "there is no file schedulers/register.cpp" schedulers/README.md 's,`schedulers/registry.cpp`,`schedulers/register.cpp`,'
 plant_in_documents "documents: unknown unit" "no unit of systemd is called plchost" manager/troubleshooting.md 's,systemctl status plchostd,systemctl status plchost,'
-plant_in_documents "documents: function that is gone" "the code has no TaskSet::switch_over" schedulers/mechanisms.md 's,TaskSet::switch_to,TaskSet::switch_over,'
+plant_in_documents "documents: function that is gone" "the code has no TaskSet::switch_planted" schedulers/mechanisms.md 's,TaskSet::switch_to,TaskSet::switch_planted,'
 plant_in_documents "documents: unknown command" "plcctl has no command 'list writer'" api/plcctl.md 's,^\| `list writers` \| Posts,| `list writer` | Posts,'
 plant_in_documents "documents: step of a walk that the code lacks" "has no function EventIntake::try_posting" manager/walks.md 's,EventIntake::try_post ,EventIntake::try_posting ,'
 plant_in_documents "documents: step of a walk that its caller does not call" "Task::run_cycle does not call before_cycle" manager/walks.md 's,as before_entry,as before_cycle,'
