@@ -402,8 +402,14 @@ bool PoolSegment::bury(PoolLock& held, ClientSlot& client, std::size_t& left) no
   }
   client.released.store(static_cast<std::uint32_t>(at), kRelaxed);
   if (at < all.size()) return false;
+  const auto is_its = [&](const ReferenceEntry& reference) { return view_.client_of(reference) == &client; };
+  // The place that the search began at may be a stranger's. Without it there is nothing left.
+  if (begin != 0 && std::ranges::any_of(all, is_its)) {
+    client.released.store(0, kRelaxed);
+    return bury(held, client, left);
+  }
   if (client.reference_count.load(kRelaxed) == 0) return true;
-  // A stranger has written over the count or the place.
+  // A stranger has written over the count.
   PoolReferences(view_, journal_).rebuild();
   client.released.store(0, kRelaxed);
   return client.reference_count.load(kRelaxed) == 0;

@@ -255,6 +255,16 @@ TEST_F(ClientDeath, ReleasesAllThoughAStrangerHasWrittenOverTheCount) {
   }
 }
 
+TEST_F(ClientDeath, ReleasesAllThoughAStrangerHasWrittenOverTheCountAndThePlaceOfTheSearch) {
+  for (const std::uint32_t place : {1U, 0xffffffffU}) {
+    const auto scribble = [place](ClientSlot& slot) {
+      slot.reference_count = 0;
+      slot.released = place;
+    };
+    expect_all_released(scribble, place);
+  }
+}
+
 TEST_F(ClientDeath, SlotsOfManyDeadClientsAreUsedAgain) {
   for (int i = 0; i < 40; ++i) {
     std::vector<pid_t> children;
