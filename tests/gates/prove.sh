@@ -118,6 +118,9 @@ new_tree
 echo 'bool is_newer(const plc_Presence& one, const Seen& seen) { return one.epoch > seen.epoch; }' >"$plot/tree/api/newer.cpp" && commit_tree
 must_be_red "house: another rule for epochs" "the lines above compare epochs: use NewestEpoch" "$gates/house.sh" "$plot/tree"
 new_tree
+echo 'int result = pthread_cond_timed''wait(&changed, &mutex, &until);' >"$plot/tree/api/wait.cpp" && commit_tree
+must_be_red "house: wait by the clock on the wall" "the lines above wait by a clock that can be set" "$gates/house.sh" "$plot/tree"
+new_tree
 echo 'std::string name = "pool-" + std::to_string(::get''pid());' >"$plot/tree/tests/name.cpp" && commit_tree
 must_be_red "house: name of a test's own making" "the lines above make names that nobody clears away" "$gates/house.sh" "$plot/tree"
 

@@ -1,9 +1,16 @@
 // A host whose clock was set back: the epoch of its next plchost-dds is below that of the one before.
+#include <atomic>
+#include <chrono>
 #include <cstddef>
+#include <cstdint>
+#include <future>
 #include <memory>
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <sys/syscall.h>
+#include <time.h>
+#include <unistd.h>
 
 #include "api/client/file_sender.hpp"
 #include "api/client/poster.hpp"
@@ -12,6 +19,18 @@
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"
 #include "tests/integration/api/test_host.hpp"
+
+namespace {
+std::atomic<std::int64_t> wall_clock_ahead_s{0};
+}
+
+// In place of the C library's, for the whole program, Cyclone included: a time by this clock is one that
+// comes late, as when somebody sets the clock on the wall back while a thread waits for it.
+extern "C" int clock_gettime(clockid_t clock, timespec* time) noexcept {
+  const auto result = ::syscall(SYS_clock_gettime, clock, time);
+  if (clock == CLOCK_REALTIME && result == 0) time->tv_sec += wall_clock_ahead_s.load();
+  return static_cast<int>(result);
+}
 
 namespace plchost {
 namespace {
@@ -97,6 +116,19 @@ TEST_F(ClockSetBack, LetsChangesOfStateBeToldAgain) {
   status.epoch = kOlder;
   status.transitions = 1;
   EXPECT_TRUE(sut.has_all(status));
+}
+
+TEST_F(ClockSetBack, ProlongsNoWaitOfDds) {
+  const dds::Entity guard{dds_create_guardcondition(participant_.get())};
+  const dds::Entity waitset{dds_create_waitset(participant_.get())};
+  ASSERT_EQ(dds_waitset_attach(waitset.get(), guard.get(), 0), DDS_RETCODE_OK);
+  wall_clock_ahead_s = 3600;
+  auto waited = std::async(std::launch::async,
+                           [&] { return dds_waitset_wait(waitset.get(), nullptr, 0, DDS_MSECS(50)); });
+  const auto seen = waited.wait_for(std::chrono::seconds(20));
+  wall_clock_ahead_s = 0;
+  if (seen != std::future_status::ready) dds_set_guardcondition(guard.get(), true);
+  EXPECT_EQ(seen, std::future_status::ready) << "it waits for an hour";
 }
 
 TEST_F(ClockSetBack, LetsADownloadBeginAnew) {
