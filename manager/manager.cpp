@@ -221,6 +221,7 @@ void Manager::write_host() {
   host_status_.manager_pid = ::getpid();
   host_status_.instance_count = static_cast<std::uint32_t>(config_.instances.size());
   host_status_.started_unix_ns = unix_time_ns();
+  host_status_.schedulers.assign(fmt::format("{}", fmt::join(options_.schedulers, ",")));
   for (std::size_t i = 0; i < supervisor_->size(); ++i) {
     page_->write_instance(static_cast<std::uint32_t>(supervisor_->place(i)),
                           supervisor_->instance(i).status());

@@ -1,11 +1,7 @@
-#include <array>
-#include <vector>
+#include "schedulers/registry.hpp"
 
 #include <fmt/format.h>
 
-#include "schedulers/policies/cmp_schedule.hpp"
-#include "schedulers/policies/cmp_schedule_one_shot.hpp"
-#include "schedulers/policies/cmp_schedule_timer.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
@@ -13,16 +9,12 @@ namespace plchost {
 namespace {
 
 template <class Policy>
-constexpr SchedulerEntry kEntryOf{.name = Policy::kName,
-                                  .make = [](const SchedulerContext& context) -> std::unique_ptr<Scheduler> {
-                                    return std::make_unique<Policy>(context);
-                                  }};
+constexpr SchedulerEntry entry_of(const PolicyName<Policy>& policy) {
+  return {.name = policy.name, .make = &make_policy<Policy>};
+}
 
-constexpr std::array kSchedulers{
-    kEntryOf<CmpSchedule>,
-    kEntryOf<CmpScheduleTimer>,
-    kEntryOf<CmpScheduleOneShot>,
-};
+constexpr std::array kSchedulers =
+    std::apply([](const auto&... policy) { return std::array{entry_of(policy)...}; }, kPolicies);
 
 }  // namespace
 
@@ -31,9 +23,7 @@ std::span<const SchedulerEntry> all_schedulers() noexcept {
 }
 
 std::string scheduler_names() {
-  std::vector<std::string_view> names;
-  for (const SchedulerEntry& entry : kSchedulers) names.push_back(entry.name);
-  return join_names(names);
+  return join_names(kSchedulerNames);
 }
 
 Result<const SchedulerEntry*> find_scheduler(std::string_view name) {

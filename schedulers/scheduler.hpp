@@ -2,13 +2,12 @@
 
 #include <cstdint>
 #include <memory>
-#include <span>
-#include <string>
 #include <string_view>
 
-#include "schedulers/clock.hpp"
+#include "schedulers/clock/clock.hpp"
+#include "schedulers/registry.hpp"
 #include "schedulers/scheduler_settings.hpp"
-#include "schedulers/task/activation.hpp"
+#include "schedulers/tasks/activation.hpp"
 #include "shm/base/result.hpp"
 
 namespace plchost {
@@ -25,7 +24,6 @@ struct SchedulerContext {
 struct SchedulerCapabilities {
   bool ticks = false;     ///< on_tick() releases its tasks, so the ticks lie on their grid
   bool one_shot = false;  ///< releases may be moved each cycle (distributed clocks)
-  bool external_event_breakpoints = false;
 };
 
 /// Policy only: decides when each cyclic and freewheeling task is activated. Threads, the tick, event
@@ -44,17 +42,5 @@ class Scheduler {
   /// real-time. A scheduler without the capability `ticks` is not told of any.
   virtual void on_tick(TimePoint /*tick*/) noexcept {}
 };
-
-/// A scheduler that can be chosen by name. A new one is a file in policies/ and its lines in registry.cpp.
-struct SchedulerEntry {
-  std::string_view name;
-  std::unique_ptr<Scheduler> (*make)(const SchedulerContext&);
-};
-
-[[nodiscard]] std::span<const SchedulerEntry> all_schedulers() noexcept;
-/// "CmpSchedule, CmpScheduleTimer, CmpScheduleOneShot"
-[[nodiscard]] std::string scheduler_names();
-/// invalid_argument: no such scheduler; the text lists what there is.
-[[nodiscard]] Result<const SchedulerEntry*> find_scheduler(std::string_view name);
 
 }  // namespace plchost

@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "schedulers/task/task_config.hpp"
+#include "schedulers/tasks/task_config.hpp"
 
 namespace plchost {
 

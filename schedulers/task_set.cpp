@@ -56,7 +56,7 @@ Result<void> TaskSet::supervise() {
 
 Result<void> TaskSet::add(TaskConfig config) {
   CountedEvent* event = nullptr;
-  if (find_task_kind(config.kind)->takes_posts) {
+  if (traits_of(config.kind).names_event) {
     auto found = environment_.find_event(config.external_event);
     if (!found) return std::unexpected(std::move(found.error()));
     event = *found;

@@ -4,8 +4,8 @@
 
 #include <fmt/format.h>
 
-#include "schedulers/task/raised_priority.hpp"
 #include "schedulers/task_set.hpp"
+#include "schedulers/tasks/raised_priority.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {

@@ -49,6 +49,8 @@ struct HostView {
 
   /// The labels of its configuration, beside its name.
   [[nodiscard]] std::vector<std::string> labels() const;
+  /// The names of the schedulers that its instances can have. None: a host of an older version.
+  [[nodiscard]] std::vector<std::string> schedulers() const;
 };
 
 /// How far a host's CLOCK_REALTIME is ahead of the one here, and how wrong that can be.

@@ -29,16 +29,25 @@ std::string no_such_host(std::string_view name, const std::vector<std::string>& 
                      join_some(answering));
 }
 
+// "a,b" is a and b.
+std::vector<std::string> split_list(std::string_view all) {
+  std::vector<std::string> parts;
+  for (std::string_view rest = all; !rest.empty();) {
+    const std::size_t comma = rest.find(',');
+    parts.emplace_back(rest.substr(0, comma));
+    rest = comma == std::string_view::npos ? std::string_view() : rest.substr(comma + 1);
+  }
+  return parts;
+}
+
 }  // namespace
 
 std::vector<std::string> HostView::labels() const {
-  std::vector<std::string> labels;
-  for (std::string_view rest = dds::text_of(status.labels); !rest.empty();) {
-    const std::size_t comma = rest.find(',');
-    labels.emplace_back(rest.substr(0, comma));
-    rest = comma == std::string_view::npos ? std::string_view() : rest.substr(comma + 1);
-  }
-  return labels;
+  return split_list(dds::text_of(status.labels));
+}
+
+std::vector<std::string> HostView::schedulers() const {
+  return split_list(dds::text_of(status.schedulers));
 }
 
 void ControlClient::update_hosts() {

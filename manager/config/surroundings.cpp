@@ -4,9 +4,9 @@
 
 #include <unistd.h>
 
-#include "instances/launch/scheduler_choices.hpp"
 #include "manager/config/load_config.hpp"
 #include "manager/host_check/host_files.hpp"
+#include "schedulers/registry.hpp"
 #include "shm/base/thread.hpp"
 
 namespace plchost {
@@ -18,7 +18,7 @@ ConfigSurroundings config_surroundings() {
   surroundings.online_cores = online_cores().value_or(std::vector<int>{0});
   surroundings.isolated_cores =
       HostFiles().cores("/sys/devices/system/cpu/isolated").value_or(std::vector<int>());
-  surroundings.schedulers = scheduler_choices();
+  surroundings.schedulers.assign(kSchedulerNames.begin(), kSchedulerNames.end());
   return surroundings;
 }
 

@@ -1,8 +1,8 @@
 #pragma once
 
 #include "schedulers/activation/spin_guard.hpp"
-#include "schedulers/task/activation_gate.hpp"
-#include "schedulers/task/task.hpp"
+#include "schedulers/tasks/activation_gate.hpp"
+#include "schedulers/tasks/task.hpp"
 
 namespace plchost {
 

@@ -5,8 +5,8 @@
 #include <memory>
 #include <vector>
 
-#include "schedulers/task/event_latch.hpp"
-#include "schedulers/task/task.hpp"
+#include "schedulers/tasks/event_latch.hpp"
+#include "schedulers/tasks/task.hpp"
 
 namespace plchost {
 

@@ -5,8 +5,8 @@
 #include <memory>
 #include <vector>
 
-#include "schedulers/task/activation_gate.hpp"
-#include "schedulers/task/task.hpp"
+#include "schedulers/tasks/activation_gate.hpp"
+#include "schedulers/tasks/task.hpp"
 
 namespace plchost {
 

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "schedulers/task/task.hpp"
+#include "schedulers/tasks/task.hpp"
 
 namespace plchost {
 

@@ -6,7 +6,7 @@
 #include <sys/types.h>
 
 #include "schedulers/faults/task_fault.hpp"
-#include "schedulers/task/cycle_gate.hpp"
+#include "schedulers/tasks/cycle_gate.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/thread.hpp"
 

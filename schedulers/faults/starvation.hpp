@@ -12,7 +12,7 @@
 #include "schedulers/faults/processor_guard.hpp"
 #include "schedulers/faults/processor_times.hpp"
 #include "schedulers/faults/taker_search.hpp"
-#include "schedulers/task/task.hpp"
+#include "schedulers/tasks/task.hpp"
 
 namespace plchost {
 

@@ -5,12 +5,12 @@
 #include <memory>
 #include <vector>
 
-#include "schedulers/clock.hpp"
+#include "schedulers/clock/clock.hpp"
 #include "schedulers/faults/fault_trap.hpp"
 #include "schedulers/faults/processor_times.hpp"
 #include "schedulers/faults/starvation.hpp"
 #include "schedulers/faults/watchdog_rules.hpp"
-#include "schedulers/task/task.hpp"
+#include "schedulers/tasks/task.hpp"
 #include "shm/base/thread.hpp"
 
 namespace plchost {

@@ -3,7 +3,7 @@
 #include <atomic>
 #include <cstdint>
 
-#include "schedulers/task/task_config.hpp"
+#include "schedulers/tasks/task_config.hpp"
 #include "shm/base/fault_record.hpp"
 #include "shm/base/seqlock.hpp"
 #include "shm/base/time.hpp"

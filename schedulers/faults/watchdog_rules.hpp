@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "schedulers/scheduler_settings.hpp"
-#include "schedulers/task/task_config.hpp"
+#include "schedulers/tasks/task_config.hpp"
 
 namespace plchost {
 

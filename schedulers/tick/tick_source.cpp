@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "schedulers/task/activation_gate.hpp"
+#include "schedulers/tasks/activation_gate.hpp"
 #include "schedulers/tick/auxiliary_tick.hpp"
 
 namespace plchost {

@@ -3,7 +3,7 @@
 #include <memory>
 #include <optional>
 
-#include "schedulers/clock.hpp"
+#include "schedulers/clock/clock.hpp"
 #include "schedulers/tick/tick_choice.hpp"
 
 namespace plchost {

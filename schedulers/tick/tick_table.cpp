@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <limits>
 
-#include "schedulers/task/activation_gate.hpp"
+#include "schedulers/tasks/activation_gate.hpp"
 
 namespace plchost {
 

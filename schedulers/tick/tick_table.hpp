@@ -6,7 +6,7 @@
 #include <memory>
 #include <vector>
 
-#include "schedulers/task/task.hpp"
+#include "schedulers/tasks/task.hpp"
 #include "schedulers/tick/due_queue.hpp"
 
 namespace plchost {

@@ -19,6 +19,9 @@ inline constexpr std::size_t kMaxTaskName = 50;
 inline constexpr std::size_t kMaxEventName = 50;
 inline constexpr std::size_t kMaxObjectName = 95;
 inline constexpr std::size_t kMaxPath = 255;
+inline constexpr std::size_t kMaxSchedulerName = 31;
+/// All schedulers of a host, with commas between.
+inline constexpr std::size_t kMaxSchedulerList = 511;
 
 /// A host, instance or event name: 1 to `max` characters of A-Z a-z 0-9 _ - and (not first) a dot. Such a
 /// name can stand in a path, a DDS partition and a command line unquoted. `what` is how the error calls it.

@@ -16,10 +16,10 @@ namespace {
 
 constexpr PageKind kHostPageKind{.what = "host page",
                                  .magic = 0x65676170'74736f68,  // "hostpage"
-                                 .version = 3};                 // 1: first; 2: InstancePlan; 3: removed
+                                 .version = 4};  // 1: first; 2: InstancePlan; 3: removed; 4: schedulers
 
 static_assert(offsetof(HostPageLayout, version) == 8 && offsetof(HostPageLayout, changes) == 16);
-static_assert(sizeof(InstancePlan) == 2616 && sizeof(InstanceStatus) == 3224 && sizeof(HostStatus) == 112);
+static_assert(sizeof(InstancePlan) == 2616 && sizeof(InstanceStatus) == 3224 && sizeof(HostStatus) == 624);
 
 HostPageLayout& host_layout_of(const MemoryFile& memory) noexcept {
   return *reinterpret_cast<HostPageLayout*>(memory.bytes().data());
@@ -42,7 +42,8 @@ void make_printable(FixedText<Max>& text) noexcept {
 }
 
 bool is_printable(const HostStatus& status) noexcept {
-  return is_printable_utf8(status.name.view()) && is_printable_utf8(status.version.view());
+  return is_printable_utf8(status.name.view()) && is_printable_utf8(status.version.view()) &&
+         is_printable_utf8(status.schedulers.view());
 }
 
 bool is_printable(const InstancePlan& plan) noexcept {
@@ -104,6 +105,7 @@ void HostPageWriter::write_host(const HostStatus& status) noexcept {
   host_ = status;
   make_printable(host_.name);
   make_printable(host_.version);
+  make_printable(host_.schedulers);
   HostPageLayout& page = host_layout_of(memory_);
   for (std::uint32_t index = 0; index < std::min(host_.instance_count, kMaxInstances); ++index) {
     if (!page.instances[index].is_written()) page.instances[index].write(instances_[index]);

@@ -41,7 +41,8 @@ struct HostStatus {
   FixedText<31> version;
   std::int32_t manager_pid = 0;
   std::uint32_t instance_count = 0;
-  std::int64_t started_unix_ns = 0;  ///< CLOCK_REALTIME when the manager started
+  std::int64_t started_unix_ns = 0;         ///< CLOCK_REALTIME when the manager started
+  FixedText<kMaxSchedulerList> schedulers;  ///< that its instances can have, with commas between
 };
 
 inline constexpr std::uint32_t kMaxInstances = 64;
@@ -66,7 +67,7 @@ struct InstancePlan {
 
 struct InstanceStatus {
   FixedText<kMaxInstanceName> name;
-  FixedText<31> scheduler;
+  FixedText<kMaxSchedulerName> scheduler;
   FixedText<kMaxPath> application;  ///< path; empty if none
   FixedText<kMaxPath> problem;      ///< why it is not running, or how it ended last; empty if all is well
   InstanceState state = InstanceState::offline;

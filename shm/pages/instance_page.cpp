@@ -93,20 +93,6 @@ Result<void> fill_instance_page(std::span<std::byte> bytes, std::span<const Task
 
 }  // namespace
 
-std::string_view to_string(PageTaskKind kind) noexcept {
-  switch (kind) {
-    case PageTaskKind::cyclic:
-      return "cyclic";
-    case PageTaskKind::event:
-      return "event";
-    case PageTaskKind::external:
-      return "external event";
-    case PageTaskKind::freewheeling:
-      return "freewheeling";
-  }
-  return "unknown";
-}
-
 std::string_view to_string(PageTaskState state) noexcept {
   switch (state) {
     case PageTaskState::created:
@@ -257,7 +243,7 @@ std::optional<InstanceRuntime> InstancePageReader::runtime() const noexcept {
 std::optional<TaskIdentity> InstancePageReader::identity(std::uint32_t index) const noexcept {
   if (index >= task_count_) return std::nullopt;
   const TaskIdentity identity = slot_of(memory_, index).identity;
-  if (identity.kind > PageTaskKind::freewheeling) return std::nullopt;
+  if (find_traits(identity.kind) == nullptr) return std::nullopt;
   return identity;
 }
 

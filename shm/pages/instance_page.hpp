@@ -12,14 +12,11 @@
 #include "shm/base/fault_record.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/seqlock.hpp"
+#include "shm/base/task_kind.hpp"
 #include "shm/base/task_statistics.hpp"
 #include "shm/files/memory_file.hpp"
 
 namespace plchost {
-
-/// The numbers of the seed's KindOfTask.
-enum class PageTaskKind : std::uint32_t { cyclic = 0, event = 1, external = 2, freewheeling = 3 };
-[[nodiscard]] std::string_view to_string(PageTaskKind kind) noexcept;
 
 /// The task monitor's status word.
 enum class PageTaskState : std::uint32_t { created = 0, running = 1, stopped = 2, exception = 3 };
@@ -39,10 +36,10 @@ enum class ApplicationState : std::uint32_t {
 /// The constants of a loaded application.
 struct TaskIdentity {
   FixedText<kMaxTaskName> name;
-  FixedText<kMaxEventName> external_event;  ///< empty unless kind is external
-  PageTaskKind kind = PageTaskKind::cyclic;
+  FixedText<kMaxEventName> external_event;  ///< empty unless the kind names one
+  TaskKind kind{};
   std::int32_t iec_priority = 0;
-  std::int64_t interval_ns = 0;  ///< as configured; 0 unless kind is cyclic
+  std::int64_t interval_ns = 0;  ///< as configured; 0 unless the kind has one
 };
 
 /// The value of a plc_KeyValue.
@@ -72,7 +69,7 @@ struct InstanceRuntime {
   std::uint32_t running = 0;  ///< 1 while the application runs
   std::uint32_t memory_locked = 0;
   std::int64_t heartbeat_ns = 0;  ///< CLOCK_MONOTONIC of the last beat
-  FixedText<31> scheduler;
+  FixedText<kMaxSchedulerName> scheduler;
   FixedText<kMaxPath> application;
   FixedText<kMaxTickText> tick_source;    ///< where the periodic tick comes from
   FixedText<kMaxTickText> tick_fallback;  ///< why that is not what the settings ask for; empty: it is

@@ -46,6 +46,16 @@ if [ -d instances/runtime/abi ]; then
   git grep -nE "^[A-Za-z_].*[ *]($exported)\(" -- 'instances/runtime/*.cpp' ':!instances/runtime/abi' &&
     fault "the lines above define functions of plc_app.h outside of instances/runtime/abi" || true
 fi
+# A scheduler and a kind of task are named in one table, and in their own file.
+registry=schedulers/registry.hpp
+if [ -d schedulers/policies ]; then
+  names=$(sed -nE 's/^ *PolicyName<class [A-Za-z]+>\{"([A-Za-z]+)"\},$/\1/p' "$registry" | paste -sd'|')
+  [ -n "$names" ] || fault "$registry: it does not list the schedulers"
+  git grep -nE "\"($names)\"" -- "${sources[@]/%//*.[ch]pp}" ":!$registry" ':!schedulers/policies' ':!instances/runtime/settings' &&
+    fault "the lines above name a scheduler: ask the registry or the host" || true
+fi
+git grep -nE '\bTaskKind::' -- "${sources[@]/%//*.[ch]pp}" ':!shm/base/task_kind.hpp' ':!schedulers/tasks/kinds' &&
+  fault "the lines above know a kind of task: ask its row in shm/base/task_kind.hpp, or its object" || true
 # DDS alone keeps the keys of unregistered instances in memory.
 git grep -nE '\bdds_unregister_instance' -- '*.cpp' '*.hpp' ':!api/dds/instances.*' ':!tests' && fault "the lines above leak: use dds::unregister_instance" || true
 # One rule says which server of a host counts, also after its clock was set back.

@@ -117,6 +117,15 @@ must_be_red "house: joined comment" "shm/base/joined.hpp:2:// A table. clang-for
 new_tree
 echo 'bool is_newer(const plc_Presence& one, const Seen& seen) { return one.epoch > seen.epoch; }' >"$plot/tree/api/newer.cpp" && commit_tree
 must_be_red "house: another rule for epochs" "the lines above compare epochs: use NewestEpoch" "$gates/house.sh" "$plot/tree"
+
+new_tree
+mkdir "$plot/tree/schedulers/policies" && echo '    PolicyName<class Second>{"Second"},' >"$plot/tree/schedulers/registry.hpp"
+echo 'auto* name = "Second";' | tee "$plot/tree/schedulers/policies/second.cpp" >"$plot/tree/api/words.cpp" && commit_tree
+must_be_red "house: name of a scheduler" "api/words.cpp:1:auto* name" "$gates/house.sh" "$plot/tree"
+new_tree
+echo 'bool late = kind == Task''Kind::cyclic;' >"$plot/tree/instances/late.cpp" && commit_tree
+must_be_red "house: kind of a task" "the lines above know a kind of task" "$gates/house.sh" "$plot/tree"
+
 new_tree
 echo 'int result = pthread_cond_timed''wait(&changed, &mutex, &until);' >"$plot/tree/api/wait.cpp" && commit_tree
 must_be_red "house: wait by the clock on the wall" "the lines above wait by a clock that can be set" "$gates/house.sh" "$plot/tree"

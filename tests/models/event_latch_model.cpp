@@ -1,7 +1,7 @@
 // Each edge of an event task's variable becomes a run or is counted as lost, and the task does not sleep over
 // one.
 
-#include "schedulers/task/event_latch.hpp"
+#include "schedulers/tasks/event_latch.hpp"
 #include "tests/models/checker/model.hpp"
 #include "tests/models/model_clock.hpp"
 

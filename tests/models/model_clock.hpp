@@ -1,6 +1,6 @@
 #pragma once
 
-#include "schedulers/clock.hpp"
+#include "schedulers/clock/clock.hpp"
 
 namespace plchost::models {
 

@@ -12,7 +12,7 @@
 #include <linux/hpet.h>
 #include <linux/rtc.h>
 
-#include "schedulers/clock.hpp"
+#include "schedulers/clock/clock.hpp"
 #include "schedulers/tick/device_file.hpp"
 
 namespace plchost {

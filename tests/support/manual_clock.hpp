@@ -9,7 +9,7 @@
 #include <mutex>
 #include <vector>
 
-#include "schedulers/clock.hpp"
+#include "schedulers/clock/clock.hpp"
 
 namespace plchost {
 

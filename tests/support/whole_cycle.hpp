@@ -1,6 +1,6 @@
 #pragma once
 
-#include "schedulers/task/task_config.hpp"
+#include "schedulers/tasks/task_config.hpp"
 
 namespace plchost {
 

@@ -12,7 +12,6 @@
 
 #include <fmt/format.h>
 
-#include "api/control/scheduler_names.hpp"
 #include "shm/base/names.hpp"
 #include "shm/toml/section_reader.hpp"
 #include "shm/toml/toml_document.hpp"
@@ -120,7 +119,7 @@ WantedInstance PlantReader::read_instance(const TomlValue& value, const std::str
   WantedInstance instance;
   instance.line = value.line;
   read_name(reader, "name", instance.name, kMaxInstanceName);
-  reader.choice("scheduler", kSchedulerNames, instance.scheduler);
+  read_name(reader, "scheduler", instance.scheduler, kMaxSchedulerName);
   reader.text("application", instance.application);
   std::string state;
   reader.choice("state", kStates, state);

@@ -13,7 +13,7 @@ namespace plchost {
 struct WantedInstance {
   std::string name;
   unsigned line = 0;
-  std::string scheduler;
+  std::string scheduler;            ///< its host must have it
   std::string application;          ///< path on the host
   std::optional<bool> running;      ///< false: stopped
   std::vector<std::string> events;  ///< registered; others are left as they are

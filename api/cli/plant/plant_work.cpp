@@ -55,9 +55,13 @@ class HostWork {
       : wanted_(wanted), selection_(selection), work_(work) {}
 
   std::vector<PlantFinding> run(ParticipantSource& participant);
+  /// Changes nothing: only finds what the host must have, and has not.
+  std::vector<PlantFinding> check(ParticipantSource& participant);
 
  private:
   bool enter(ParticipantSource& participant);
+  /// Whether the host has all schedulers that the file names. A host of an older version does not say.
+  bool has_schedulers();
   /// Whether something was changed, so that it is worth to look again.
   bool look_at_all();
   bool look_at_one(const WantedInstance& wanted, const PresentInstance& present);
@@ -69,6 +73,7 @@ class HostWork {
   const HostSelection& selection_;
   const PlantWork& work_;
   std::unique_ptr<ControlClient> client_;
+  std::vector<std::string> schedulers_;  // that the host has
   std::vector<PlantFinding> findings_;
   int round_ = 0;
   std::set<std::string> given_up_;  // instances
@@ -106,11 +111,32 @@ bool HostWork::enter(ParticipantSource& participant) {
     tell(Kind::missing, nullptr, view.error().describe());
     return false;
   }
+  schedulers_ = view->schedulers();
   return selection_.selects(*view);
 }
 
+bool HostWork::has_schedulers() {
+  bool has_all = true;
+  for (const WantedInstance& instance : wanted_.instances) {
+    const bool known = instance.scheduler.empty() || schedulers_.empty() ||
+                       std::ranges::find(schedulers_, instance.scheduler) != schedulers_.end();
+    if (known) continue;
+    has_all = false;
+    tell(Kind::refused, &instance,
+         unknown_name("scheduler", instance.scheduler, schedulers_, wanted_.name).error().message);
+  }
+  return has_all;
+}
+
+std::vector<PlantFinding> HostWork::check(ParticipantSource& participant) {
+  const bool names_any = std::ranges::any_of(
+      wanted_.instances, [](const WantedInstance& instance) { return !instance.scheduler.empty(); });
+  if (names_any && enter(participant)) (void)has_schedulers();
+  return std::move(findings_);
+}
+
 std::vector<PlantFinding> HostWork::run(ParticipantSource& participant) {
-  if (!enter(participant)) return std::move(findings_);
+  if (!enter(participant) || !has_schedulers()) return std::move(findings_);
   while (round_ <= kRounds && look_at_all()) ++round_;
   return std::move(findings_);
 }
@@ -195,15 +221,21 @@ std::vector<PlantFinding> work_on(const Plant& plant, const HostSelection& selec
     if (may_be_selected(host, selection)) hosts.push_back(&host);
   }
   std::vector<std::vector<PlantFinding>> found(hosts.size());
-  std::atomic<std::size_t> next{0};
-  const auto work_through = [&] {
-    for (std::size_t i = next++; i < hosts.size(); i = next++) {
-      found[i] = HostWork(*hosts[i], selection, work).run(participant);
-    }
+  const auto visit = [&](std::vector<PlantFinding> (HostWork::*step)(ParticipantSource&)) {
+    std::atomic<std::size_t> next{0};
+    const auto work_through = [&] {
+      for (std::size_t i = next++; i < hosts.size(); i = next++) {
+        if (found[i].empty()) found[i] = (HostWork(*hosts[i], selection, work).*step)(participant);
+      }
+    };
+    std::vector<std::jthread> threads;
+    for (std::size_t i = 0; i < std::min(kAtOnce, hosts.size()); ++i) threads.emplace_back(work_through);
   };
-  std::vector<std::jthread> threads;
-  for (std::size_t i = 0; i < std::min(kAtOnce, hosts.size()); ++i) threads.emplace_back(work_through);
-  threads.clear();
+  const auto is_refused = [](const std::vector<PlantFinding>& findings) {
+    return std::ranges::find(findings, Kind::refused, &PlantFinding::result) != findings.end();
+  };
+  if (work.apply) visit(&HostWork::check);
+  if (std::ranges::none_of(found, is_refused)) visit(&HostWork::run);
   std::vector<PlantFinding> all;
   for (auto& of_host : found) std::ranges::move(of_host, std::back_inserter(all));
   return all;

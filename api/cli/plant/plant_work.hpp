@@ -17,6 +17,7 @@ struct PlantFinding {
     failed,
     missing,  ///< no such host answers
     unknown,  ///< it answers, and what it is cannot be known: no such instance, or no status came
+    refused,  ///< it does not have a scheduler that the file names
   };
   Result result = Result::differs;
   std::string host;
@@ -35,7 +36,7 @@ struct PlantWork {
 };
 
 /// Looks at all hosts of the plant that are selected, at the same time, and brings them to what they are to
-/// be. In the order of the file.
+/// be. In the order of the file. If a finding is `refused`, nothing was changed on any host.
 [[nodiscard]] std::vector<PlantFinding> work_on(const Plant& plant, const HostSelection& selection,
                                                 const dds::DomainOptions& options, const PlantWork& work);
 

@@ -26,7 +26,8 @@ constexpr Duration kLongCommand = std::chrono::seconds(80);
 using Kind = PlantFinding::Result;
 
 std::string_view result_name(Kind result) {
-  constexpr std::array<std::string_view, 5> kNames = {"differs", "done", "failed", "no answer", "unknown"};
+  constexpr std::array<std::string_view, 6> kNames = {"differs",   "done",    "failed",
+                                                      "no answer", "unknown", "refused"};
   return kNames.at(static_cast<std::size_t>(result));
 }
 
@@ -60,6 +61,8 @@ bool has(const std::vector<PlantFinding>& findings, Kind result) {
 }
 
 int exit_code(const std::vector<PlantFinding>& findings, bool apply) {
+  static_assert(kExitUsage == kDiffFailed);
+  if (has(findings, Kind::refused)) return kExitUsage;
   const bool missing = has(findings, Kind::missing);
   if (!apply) {
     if (missing || has(findings, Kind::unknown)) return kDiffFailed;

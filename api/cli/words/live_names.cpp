@@ -11,7 +11,6 @@
 #include "api/cli/rows/rows.hpp"
 #include "api/cli/rows/status_rows.hpp"
 #include "api/client/status_count.hpp"
-#include "api/control/scheduler_names.hpp"
 
 namespace plchost {
 
@@ -86,9 +85,8 @@ void add_nodes(ControlClient& client, const HostView& host, TimePoint deadline, 
     names.push_back({std::string(node.info.record.name.view()), node.program});
 }
 
-void add_schedulers(ControlClient& /*client*/, const HostView& /*host*/, TimePoint /*deadline*/,
-                    Names& names) {
-  for (const std::string_view name : kSchedulerNames) names.push_back({std::string(name), ""});
+void add_schedulers(ControlClient& /*client*/, const HostView& host, TimePoint /*deadline*/, Names& names) {
+  for (const std::string& name : host.schedulers()) names.push_back({name, ""});
 }
 
 const std::multimap<std::string_view, Source>& sources() {

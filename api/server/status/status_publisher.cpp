@@ -251,6 +251,7 @@ void StatusPublisher::write_host(bool changed) {
   sample.manager_pid = host().manager_pid;
   sample.started_unix_ns = host().started_unix_ns;
   dds::copy_text(sample.labels, source_.labels);
+  dds::copy_text(sample.schedulers, host().schedulers.view());
   sample.secured = source_.secured;
   sample.running = running_;
   load_.put(sample);

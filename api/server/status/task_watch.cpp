@@ -122,7 +122,7 @@ void TaskWatch::index_bound_tasks() const {
     if (!watched.page) continue;
     for (std::uint32_t i = 0; i < watched.page->task_count(); ++i) {
       const auto task = watched.page->identity(i);
-      if (!task || task->kind != PageTaskKind::external) continue;
+      if (!task || !traits_of(task->kind).names_event) continue;
       const std::string_view event = task->external_event.view();
       const bool in_full = event.contains('/');
       bound_[in_full ? std::string(event) : event_object_name(name, event)].push_back({name, watched.pid, i});

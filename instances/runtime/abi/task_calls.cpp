@@ -42,7 +42,7 @@ RTS_HANDLE SchedGetCurrentTask() {
 RTS_RESULT SchedGetTaskInterval(RTS_HANDLE hTask, RTS_I64* pIntervalNs) {
   Task* task = nullptr;
   if (const RTS_RESULT found = find_task(hTask, task); found != ERR_OK) return found;
-  if (pIntervalNs == nullptr || task->config().kind != plchost::TaskKind::cyclic) return ERR_PARAMETER;
+  if (pIntervalNs == nullptr || !task->kind().has_grid) return ERR_PARAMETER;
   *pIntervalNs = task->interval().count();
   return ERR_OK;
 }

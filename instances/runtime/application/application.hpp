@@ -8,7 +8,7 @@
 #include "instances/runtime/application/application_host.hpp"
 #include "instances/runtime/application/shared_object.hpp"
 #include "instances/runtime/tasks/task_builder.hpp"
-#include "schedulers/task/task_config.hpp"
+#include "schedulers/tasks/task_config.hpp"
 #include "shm/base/result.hpp"
 
 namespace plchost {

@@ -4,7 +4,7 @@
 
 #include <fmt/format.h>
 
-#include "shm/pages/instance_page.hpp"
+#include "shm/base/task_kind.hpp"
 
 namespace plchost {
 
@@ -36,10 +36,7 @@ std::string in_us(Duration duration) {
 
 void compare_task(const TaskConfig& running, const TaskConfig& next, std::vector<std::string>& lines) {
   Differences task(lines, fmt::format("task '{}'", running.name));
-  const auto kind = [](const TaskConfig& config) {
-    return to_string(static_cast<PageTaskKind>(config.kind));
-  };
-  task.look("its kind", kind(running), kind(next));
+  task.look("its kind", traits_of(running.kind).name, traits_of(next.kind).name);
   if (running.kind != next.kind) return;
   task.look("its priority", running.iec_priority, next.iec_priority);
   task.look("its interval", in_us(running.interval), in_us(next.interval));

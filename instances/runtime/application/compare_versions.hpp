@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "instances/runtime/application/application_declaration.hpp"
-#include "schedulers/task/task_config.hpp"
+#include "schedulers/tasks/task_config.hpp"
 
 namespace plchost {
 

@@ -111,11 +111,8 @@ Areas::Environment areas_environment(const LaunchOptions& launch, const Instance
                      .cold = launch.start_kind == StartKind::cold}};
 }
 
-// TimerMode=OneShot is the seed's way to ask for distributed clocks; a configuration that names a scheduler
-// gets that.
 std::string scheduler_for(const std::string& asked, const InstanceSettings& settings) {
-  if (!asked.empty()) return asked;
-  return settings.timer_mode == TimerMode::one_shot ? "CmpScheduleOneShot" : "CmpSchedule";
+  return asked.empty() ? std::string(scheduler_of(settings.timer_mode)) : asked;
 }
 
 }  // namespace plchost

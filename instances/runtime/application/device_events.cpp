@@ -21,7 +21,7 @@ Result<void> register_device_events(const DeviceDescription& device, EventTable&
 
 Result<void> check_device_events(const DeviceDescription& device, std::span<const TaskConfig> tasks) {
   for (const TaskConfig& task : tasks) {
-    if (task.kind != TaskKind::external) continue;
+    if (!traits_of(task.kind).names_event) continue;
     if (!device.supports_external) {
       return failure(
           ErrorCode::invalid_argument,

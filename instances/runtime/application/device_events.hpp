@@ -4,7 +4,7 @@
 
 #include "instances/runtime/settings/device_description.hpp"
 #include "instances/runtime/tasks/event_table.hpp"
-#include "schedulers/task/task_config.hpp"
+#include "schedulers/tasks/task_config.hpp"
 #include "shm/base/result.hpp"
 
 namespace plchost {

@@ -123,13 +123,10 @@ std::string Instance::hold_idle_states() {
 
 void Instance::choose_scheduler() {
   const std::string asked = std::exchange(scheduler_, scheduler_for(scheduler_, start_.settings));
-  if (asked.empty() || start_.settings.timer_mode != TimerMode::one_shot ||
-      scheduler_ == "CmpScheduleOneShot")
-    return;
-  spdlog::warn(
-      "settings: TimerMode=OneShot asks for CmpScheduleOneShot, but {} was asked for at the start and is "
-      "used",
-      scheduler_);
+  const std::string_view of_settings = scheduler_of(TimerMode::one_shot);
+  if (asked.empty() || start_.settings.timer_mode != TimerMode::one_shot || scheduler_ == of_settings) return;
+  spdlog::warn("settings: TimerMode=OneShot asks for {}, but {} was asked for at the start and is used",
+               of_settings, scheduler_);
 }
 
 Result<std::string> Instance::attach_pool() {
@@ -269,7 +266,7 @@ Result<std::string> Instance::start_scheduler() {
 void Instance::notify_tasks(unsigned event) {
   for (std::size_t i = 0; i < application_->tasks().size(); ++i) {
     const TaskConfig& task = application_->tasks()[i];
-    if (task.kind != TaskKind::external) continue;
+    if (!traits_of(task.kind).names_event) continue;
     if (const auto handle = host_->events().open(task.external_event)) {
       host_->notify(event, {.pTaskInfo = &application_->info(i), .hEvent = *handle});
     }

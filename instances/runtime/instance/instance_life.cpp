@@ -54,7 +54,7 @@ Result<std::string> Instance::start(std::string_view why) {
 // Once for each task: one whose fault has stopped only itself is asked to park, too, in a stop.
 void Instance::unbind(std::size_t index) {
   const TaskConfig& task = application_->tasks()[index];
-  if (task.kind != TaskKind::external || index >= unbound_.size() || unbound_[index]) return;
+  if (!traits_of(task.kind).names_event || index >= unbound_.size() || unbound_[index]) return;
   unbound_[index] = true;
   host_->events().withdraw_task(task.external_event);
 }

@@ -16,7 +16,7 @@
 #include "instances/runtime/memory/retain_keeper.hpp"
 #include "instances/runtime/memory/task_areas.hpp"
 #include "instances/runtime/memory/task_cycle.hpp"
-#include "schedulers/task/task_config.hpp"
+#include "schedulers/tasks/task_config.hpp"
 #include "shm/base/result.hpp"
 #include "shm/pool/pool_room.hpp"
 

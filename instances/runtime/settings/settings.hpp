@@ -12,7 +12,7 @@
 #include "instances/runtime/settings/settings_source.hpp"
 #include "instances/runtime/settings/task_settings.hpp"
 #include "schedulers/scheduler_settings.hpp"
-#include "schedulers/task/task_config.hpp"
+#include "schedulers/tasks/task_config.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
 
@@ -20,6 +20,10 @@ namespace plchost {
 
 /// [SysTimer] TimerMode: one_shot is the seed's way to ask for distributed clocks.
 enum class TimerMode : std::uint8_t { periodic, one_shot };
+/// The scheduler of an instance for which none is named.
+[[nodiscard]] constexpr std::string_view scheduler_of(TimerMode mode) noexcept {
+  return mode == TimerMode::one_shot ? "CmpScheduleOneShot" : "CmpSchedule";
+}
 
 /// [SysTimer] IdleStates: the way to hold the processor out of its slow sleep states while the instance runs.
 enum class IdleStates : std::uint8_t {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "instances/plc_app.h"
-#include "schedulers/task/task_config.hpp"
+#include "schedulers/tasks/task_config.hpp"
 #include "shm/base/result.hpp"
 
 namespace plchost {

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "instances/launch/launch_contract.hpp"
-#include "schedulers/task/task_config.hpp"
+#include "schedulers/tasks/task_config.hpp"
 
 namespace plchost {
 

@@ -18,10 +18,6 @@
 namespace plchost {
 
 static_assert(PLC_MAX_TASKS == kMaxTasks);
-static_assert(Cyclic == std::to_underlying(TaskKind::cyclic) &&
-              Event == std::to_underlying(TaskKind::event) &&
-              External == std::to_underlying(TaskKind::external) &&
-              Freewheeling == std::to_underlying(TaskKind::freewheeling));
 
 namespace {
 
@@ -45,32 +41,35 @@ Duration interval_of(const Task_Info& task) {
                                  : Duration(std::chrono::milliseconds(task.dwInterval));
 }
 
-// The parts that only one kind of task has.
+std::string known_kinds() {
+  std::vector<std::string> known;
+  for (const TaskKindTraits& kind : kTaskKinds)
+    known.push_back(fmt::format("{} ({})", kind.name, std::to_underlying(kind.kind)));
+  return fmt::format("{}", fmt::join(known, ", "));
+}
+
+// The parts that only some kinds of tasks have.
 Result<void> fill_kind(const Task_Info& task, const std::shared_ptr<TaskCode>& code, TaskConfig& config) {
-  switch (config.kind) {
-    case TaskKind::cyclic:
-      config.interval = interval_of(task);
-      if (config.interval <= Duration::zero())
-        return invalid_task("dwInterval of a cyclic task must be above 0");
-      if (config.interval > kMaxInterval) return invalid_task("dwInterval must be at most 50 days");
-      return {};
-    case TaskKind::event:
-      if (task.dwEventFunctionPointer == nullptr)
-        return invalid_task("dwEventFunctionPointer of an event task is null");
-      code->read = task.dwEventFunctionPointer;
-      config.event_variable = [code] {
-        const CurrentTask current(code->info);
-        return code->read() != 0;
-      };
-      return {};
-    case TaskKind::external: {
-      const auto event = text_of(task.stExternalEvent, "stExternalEvent");
-      if (!event) return std::unexpected(event.error());
-      config.external_event = *event;
-      return check_name("stExternalEvent", *event, kMaxEventName);
-    }
-    case TaskKind::freewheeling:
-      return {};
+  const TaskKindTraits& kind = traits_of(config.kind);
+  if (kind.has_interval) {
+    config.interval = interval_of(task);
+    if (config.interval <= Duration::zero() || config.interval > kMaxInterval)
+      return invalid_task(fmt::format("dwInterval must be above 0 and at most 50 days (kind {})", kind.name));
+  }
+  if (kind.reads_variable) {
+    if (task.dwEventFunctionPointer == nullptr)
+      return invalid_task(fmt::format("dwEventFunctionPointer must not be null (kind {})", kind.name));
+    code->read = task.dwEventFunctionPointer;
+    config.event_variable = [code] {
+      const CurrentTask current(code->info);
+      return code->read() != 0;
+    };
+  }
+  if (kind.names_event) {
+    const auto event = text_of(task.stExternalEvent, "stExternalEvent");
+    if (!event) return std::unexpected(event.error());
+    config.external_event = *event;
+    return check_name("stExternalEvent", *event, kMaxEventName);
   }
   return {};
 }
@@ -80,14 +79,14 @@ Result<TaskConfig> build_task(Task_Info& task, const std::shared_ptr<TaskCode>& 
     return invalid_task(
         fmt::format("nPriority {} is not allowed: 0 (highest) to {} is", task.nPriority, kLowestIecPriority));
   }
-  if (task.KindOfTask < Cyclic || task.KindOfTask > Freewheeling) {
-    return invalid_task(fmt::format(
-        "KindOfTask {} is not allowed: Cyclic (0), Event (1), External (2) and Freewheeling (3) are",
-        task.KindOfTask));
+  const auto kind = static_cast<TaskKind>(task.KindOfTask);
+  if (find_traits(kind) == nullptr) {
+    return invalid_task(
+        fmt::format("KindOfTask {} is not allowed; allowed are {}", task.KindOfTask, known_kinds()));
   }
   if (task.dwTaskEntryFunctionPointer == nullptr) return invalid_task("dwTaskEntryFunctionPointer is null");
   TaskConfig config;
-  config.kind = static_cast<TaskKind>(task.KindOfTask);
+  config.kind = kind;
   config.iec_priority = task.nPriority;
   *code = {.info = &task, .run = task.dwTaskEntryFunctionPointer};
   config.entry = [code] {
@@ -152,7 +151,7 @@ TaskIdentity identity_of(const TaskConfig& task) {
   TaskIdentity identity;
   identity.name.assign(task.name);
   identity.external_event.assign(task.external_event);
-  identity.kind = static_cast<PageTaskKind>(task.kind);
+  identity.kind = task.kind;
   identity.iec_priority = task.iec_priority;
   identity.interval_ns = task.interval.count();
   return identity;

@@ -31,17 +31,13 @@ namespace plchost {
 namespace {
 
 std::string detail_of(const TaskConfig& task) {
-  switch (task.kind) {
-    case TaskKind::cyclic:
-      return fmt::format(", every {} us",
-                         std::chrono::duration_cast<std::chrono::microseconds>(task.interval).count());
-    case TaskKind::external:
-      return fmt::format(", event {}", task.external_event);
-    case TaskKind::event:
-    case TaskKind::freewheeling:
-      return {};
+  std::string detail;
+  if (task.interval > Duration::zero()) {
+    detail += fmt::format(", every {} us",
+                          std::chrono::duration_cast<std::chrono::microseconds>(task.interval).count());
   }
-  return {};
+  if (!task.external_event.empty()) detail += fmt::format(", event {}", task.external_event);
+  return detail;
 }
 
 /// A clock with periodic interrupts that another process has: of its answers only the kind is known.
@@ -177,8 +173,8 @@ int check_application(const Options& options) {
   fmt::print("{}{}{}, {} tasks\n", path, kValidApplication, printable(application.name()),
              application.tasks().size());
   for (const TaskConfig& task : application.tasks()) {
-    fmt::print("  {}: {}, priority {}{}\n", task.name, to_string(static_cast<PageTaskKind>(task.kind)),
-               task.iec_priority, detail_of(task));
+    fmt::print("  {}: {}, priority {}{}\n", task.name, traits_of(task.kind).name, task.iec_priority,
+               detail_of(task));
   }
   // Destructors of the application may end the process without.
   (void)std::fflush(stdout);

@@ -5,7 +5,7 @@
 
 #include <gmock/gmock.h>
 
-#include "schedulers/task/task_recorder.hpp"
+#include "schedulers/tasks/task_recorder.hpp"
 #include "shm/pages/exception_history.hpp"
 #include "tests/integration/api/client_library.hpp"
 

@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <nlohmann/json.hpp>
 
-#include "schedulers/task/task_recorder.hpp"
+#include "schedulers/tasks/task_recorder.hpp"
 #include "tests/integration/api/test_host.hpp"
 #include "tests/support/own_name.hpp"
 

@@ -11,7 +11,7 @@
 #include "api/dds/ended_participant.h"
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"
-#include "schedulers/task/task_recorder.hpp"
+#include "schedulers/tasks/task_recorder.hpp"
 #include "shm/files/memory_file.hpp"
 #include "tests/integration/api/test_host.hpp"
 #include "tests/support/interrupted_write.hpp"

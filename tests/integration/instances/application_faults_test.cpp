@@ -61,7 +61,7 @@ INSTANTIATE_TEST_SUITE_P(
         CrashingProgram{"fault_throws", "plc_app_init threw: no valve is connected"},
         CrashingProgram{"fault_no_tasks", "did not call __sys__setup__tasks"},
         CrashingProgram{"fault_two_setups", "called __sys__setup__tasks more than once"},
-        CrashingProgram{"fault_bad_interval", "task 'Only': dwInterval of a cyclic task must be above 0"},
+        CrashingProgram{"fault_bad_interval", "task 'Only': dwInterval must be above 0"},
         CrashingProgram{"fault_wrong_version", "built against version 42 of plc_app.h"},
         CrashingProgram{"fault_missing_init", "does not export plc_app_init"},
         CrashingProgram{"fault_undefined_symbol", "function_of_another_runtime"},

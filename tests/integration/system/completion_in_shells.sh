@@ -23,6 +23,7 @@ bash_offers() { bash -c 'source <(plcctl completion bash); COMP_WORDS=("$@"); CO
 is "$(bash_offers plcctl sh)" show || fail "$(bash_offers plcctl sh)"
 is "$(bash_offers plcctl show instance p)" packer1 || fail "$(bash_offers plcctl show instance p)"
 is "$(bash_offers plcctl post event packer1/p)" packer1/product || fail "$(bash_offers plcctl post event packer1/p)"
+is "$(bash_offers plcctl set scheduler packer1 CmpScheduleT)" CmpScheduleTimer || fail "$(bash_offers plcctl set scheduler packer1 C)"
 
 echo "- fish"
 fish_offers() { HOME=$cell fish -c "plcctl completion fish | source; complete -C '$*'"; }

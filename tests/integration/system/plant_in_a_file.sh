@@ -96,8 +96,13 @@ exits 1 plcctl apply -f "$cell/wrong.toml"
 grep -qF "$cell/wrong.toml:3: north/line1: application: $cell/packer2.so -> /nowhere.so: /nowhere.so is refused" <<<"$said" || fail "$said"
 is_field north line1 scheduler CmpScheduleTimer || fail "it went on after a refusal"
 printf '[[host]]\nname = "north"\n[[host.instance]]\nname = "line1"\nscheduler = "CmpShedule"\n' >"$cell/wrong.toml"
-exits 2 plcctl apply -f "$cell/wrong.toml"
-grep -qF "CmpScheduleTimer" <<<"$said" || fail "the schedulers are not listed: $said"
+printf '[[host.instance]]\nname = "line2"\nstate = "stopped"\n' >>"$cell/wrong.toml"
+for verb in diff apply; do
+  exits 2 plcctl $verb -f "$cell/wrong.toml"
+  grep -qF "$cell/wrong.toml:3: north/line1: " <<<"$said" || fail "the place is not told: $said"
+  grep -qF "did you mean 'CmpSchedule'?" <<<"$said" || fail "the schedulers of the host are not listed: $said"
+done
+is_field north line2 state running || fail "a file with a scheduler that the host does not have changed something"
 
 echo "- a file that is not right changes nothing"
 printf '[[host]]\nname = "north"\n[[host.instance]]\nname = "line1"\nstate = "runing"\nshedule = "x"\n' >"$cell/wrong.toml"

@@ -1,2 +1,2 @@
-# schedulers/task/cycle_gate.hpp: a thread that waits at the gate is not woken
+# schedulers/tasks/cycle_gate.hpp: a thread that waits at the gate is not woken
 s/clock\.wake\(closed_\);//

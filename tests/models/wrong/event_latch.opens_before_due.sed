@@ -1,2 +1,2 @@
-# schedulers/task/event_latch.hpp: the task is woken before its run is due, and sleeps again
+# schedulers/tasks/event_latch.hpp: the task is woken before its run is due, and sleeps again
 s/due_\.fetch_add\(kept, std::memory_order_acq_rel\);\n *gate\.open\(clock\);/gate.open(clock);\n    due_.fetch_add(kept, std::memory_order_acq_rel);/

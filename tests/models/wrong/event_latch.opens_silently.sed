@@ -1,2 +1,2 @@
-# schedulers/task/activation_gate.hpp: a thread that sleeps at the gate is not woken
+# schedulers/tasks/activation_gate.hpp: a thread that sleeps at the gate is not woken
 s/clock\.wake\(word_\);//

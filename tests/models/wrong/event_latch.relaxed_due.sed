@@ -1,2 +1,2 @@
-# schedulers/task/event_latch.hpp: a run can be seen before when its edge was
+# schedulers/tasks/event_latch.hpp: a run can be seen before when its edge was
 s/due_\.fetch_add\(kept, std::memory_order_acq_rel\)/due_.fetch_add(kept, std::memory_order_relaxed)/

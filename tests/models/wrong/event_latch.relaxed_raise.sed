@@ -1,2 +1,2 @@
-# schedulers/task/event_latch.hpp: the writes before an edge are not passed on
+# schedulers/tasks/event_latch.hpp: the writes before an edge are not passed on
 s/raised_\.fetch_add\(1, std::memory_order_release\)/raised_.fetch_add(1, std::memory_order_relaxed)/

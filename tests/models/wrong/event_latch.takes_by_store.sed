@@ -1,2 +1,2 @@
-# schedulers/task/event_latch.hpp: a run that becomes due while another one is taken is forgotten
+# schedulers/tasks/event_latch.hpp: a run that becomes due while another one is taken is forgotten
 s/due_\.fetch_sub\(1, std::memory_order_acq_rel\)/due_.store(due_.load(std::memory_order_relaxed) - 1, std::memory_order_release)/

@@ -30,7 +30,7 @@ class RunWatchTest : public testing::Test {
     TaskIdentity task;
     task.name.assign("Fill");
     task.external_event.assign("ready");
-    task.kind = PageTaskKind::external;
+    task.kind = TaskKind::external;
     return InstancePage::create(pool, "line1", std::array{task}).value();
   }
   void write_running(std::uint32_t running, ApplicationState state = ApplicationState::none) {

@@ -1,12 +1,18 @@
 // Rows, columns and order of status topics as the build makes them from control.idl.
 #include "api/cli/rows/status_rows.hpp"
 
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
 #include <gmock/gmock.h>
 
 #include "api/cli/rows/host_rows.hpp"
 #include "api/client/status_count.hpp"
 #include "api/dds/code_names.hpp"
 #include "api/dds/text.hpp"
+#include "shm/base/task_kind.hpp"
 
 namespace plchost {
 namespace {
@@ -187,13 +193,19 @@ TEST(StatusWords, AreThoseOfTheContract) {
   for (std::uint32_t state = 0; state <= 9; ++state) states.push_back(dds::instance_state_name(state));
   EXPECT_THAT(states, testing::ElementsAre("offline", "starting", "running", "stopped", "stopping", "waiting",
                                            "safe_mode", "failed", "exception", "9"));
-  EXPECT_EQ(dds::task_kind_name(3), "freewheeling");
   EXPECT_EQ(dds::task_state_name(0), "created");
   EXPECT_EQ(dds::log_level_name(1), "info");
   EXPECT_EQ(dds::log_source_name(2), "output");
   EXPECT_EQ(dds::transition_state_name(0, 3), "single_cycle");
   EXPECT_EQ(dds::transition_state_name(1, 6), "safe_mode");
   EXPECT_EQ(dds::finding_level_name(3), "problem");
+}
+
+TEST(StatusWords, OfTheKindsOfTasksAreThoseOfTheirTable) {
+  for (const TaskKindTraits& kind : kTaskKinds)
+    EXPECT_EQ(dds::task_kind_name(std::to_underlying(kind.kind)), kind.name);
+  EXPECT_EQ(dds::task_kind_name(kTaskKinds.size()), std::to_string(kTaskKinds.size()))
+      << "the contract names a kind that is not in the table";
 }
 
 TEST(StatusOrder, IsThatOfTheContract) {

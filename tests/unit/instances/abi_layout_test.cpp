@@ -1,9 +1,11 @@
 // The layout that compiled applications rely on: a change here is a new PLC_APP_ABI_VERSION.
 #include <cstddef>
+#include <utility>
 
 #include <gtest/gtest.h>
 
 #include "instances/plc_app.h"
+#include "shm/base/task_kind.hpp"
 
 namespace {
 
@@ -47,11 +49,17 @@ static_assert(sizeof(Plc_Area) == 56);
 static_assert(offsetof(Plc_Area_State, dwOrigin) == 4 && offsetof(Plc_Area_State, qwImages) == 8);
 static_assert(offsetof(Plc_Area_State, qwUnsaved) == 32 && sizeof(Plc_Area_State) == 40);
 
-TEST(Abi, NumbersTheKindsOfTaskAsTheSeedDoes) {
+// The first four are the seed's.
+TEST(Abi, NumbersTheKindsOfTaskAsTheRuntimeDoes) {
   EXPECT_EQ(Cyclic, 0);
   EXPECT_EQ(Event, 1);
   EXPECT_EQ(External, 2);
   EXPECT_EQ(Freewheeling, 3);
+  using plchost::TaskKind;
+  EXPECT_EQ(Cyclic, std::to_underlying(TaskKind::cyclic));
+  EXPECT_EQ(Event, std::to_underlying(TaskKind::event));
+  EXPECT_EQ(External, std::to_underlying(TaskKind::external));
+  EXPECT_EQ(Freewheeling, std::to_underlying(TaskKind::freewheeling));
 }
 
 }  // namespace

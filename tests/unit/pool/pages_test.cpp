@@ -183,7 +183,7 @@ TEST_F(Pages, TheStateOfATaskIsReadAlsoWhileItsCountersAreWritten) {
 
 TEST_F(Pages, InstancePageCarriesTasksAndRuntime) {
   auto tasks = tasks_of(3);
-  tasks[1].kind = PageTaskKind::external;
+  tasks[1].kind = TaskKind::external;
   tasks[1].external_event.assign("ready");
   auto writer = InstancePage::create(pool(), "line1", tasks);
   ASSERT_TRUE(writer) << writer.error().describe();
@@ -207,7 +207,7 @@ TEST_F(Pages, InstancePageCarriesTasksAndRuntime) {
   ASSERT_TRUE(task);
   EXPECT_EQ(task->identity.name.view(), "task1");
   EXPECT_EQ(task->identity.external_event.view(), "ready");
-  EXPECT_EQ(task->identity.kind, PageTaskKind::external);
+  EXPECT_EQ(task->identity.kind, TaskKind::external);
   EXPECT_EQ(task->state, PageTaskState::exception);
   EXPECT_EQ(task->counters.cycles, 11U);
   EXPECT_EQ(sut->histogram(1, TaskHistogram::latency).percentile(0.99), Duration(20));
@@ -396,10 +396,7 @@ TEST_F(Pages, AFreshInstancePageTakesThePlaceOfTheOld) {
 
 TEST(PageEnums, EachStateHasAName) {
   for (std::uint32_t i = 0; i < 8; ++i) EXPECT_NE(to_string(static_cast<InstanceState>(i)), "unknown");
-  for (std::uint32_t i = 0; i < 4; ++i) {
-    EXPECT_NE(to_string(static_cast<PageTaskKind>(i)), "unknown");
-    EXPECT_NE(to_string(static_cast<PageTaskState>(i)), "unknown");
-  }
+  for (std::uint32_t i = 0; i < 4; ++i) EXPECT_NE(to_string(static_cast<PageTaskState>(i)), "unknown");
   EXPECT_EQ(to_string(static_cast<InstanceState>(99)), "unknown");
 }
 

@@ -1,4 +1,4 @@
-#include "schedulers/task/event_latch.hpp"
+#include "schedulers/tasks/event_latch.hpp"
 
 #include <gtest/gtest.h>
 

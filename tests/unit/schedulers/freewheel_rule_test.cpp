@@ -1,4 +1,4 @@
-#include "schedulers/task/freewheel_rule.hpp"
+#include "schedulers/tasks/freewheel_rule.hpp"
 
 #include <gtest/gtest.h>
 

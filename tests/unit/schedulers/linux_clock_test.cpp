@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "schedulers/clock.hpp"
-#include "schedulers/task/activation_gate.hpp"
+#include "schedulers/clock/clock.hpp"
+#include "schedulers/tasks/activation_gate.hpp"
 
 namespace plchost {
 namespace {

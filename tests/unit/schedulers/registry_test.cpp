@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "schedulers/scheduler.hpp"
+#include "schedulers/tasks/task_kind.hpp"
+#include "shm/base/names.hpp"
 
 namespace plchost {
 namespace {
@@ -12,6 +14,22 @@ TEST(Registry, KnowsTheThreeSchedulers) {
   EXPECT_EQ(scheduler_names(), "CmpSchedule, CmpScheduleTimer, CmpScheduleOneShot");
 }
 
+TEST(Registry, NamesFitIntoTheStatusOfAHost) {
+  std::size_t length = 0;
+  for (const std::string_view name : kSchedulerNames) length += name.size() + 1;
+  EXPECT_LE(length - 1, kMaxSchedulerList);
+}
+
+TEST(TaskKinds, EachHasItsOwnWays) {
+  for (const TaskKindTraits& kind : kTaskKinds) {
+    const TaskKindEntry* const entry = find_task_kind(kind.kind);
+    ASSERT_NE(entry, nullptr) << kind.name;
+    EXPECT_EQ(entry->kind, kind.kind);
+    EXPECT_NE(entry->check, nullptr);
+  }
+  EXPECT_EQ(find_task_kind(TaskKind{99}), nullptr);
+}
+
 TEST(Registry, UnknownNameListsTheKnown) {
   const auto found = find_scheduler("CmpSchedul");
   ASSERT_FALSE(found);
@@ -20,12 +38,12 @@ TEST(Registry, UnknownNameListsTheKnown) {
   EXPECT_THAT(found.error().message, testing::HasSubstr(scheduler_names()));
 }
 
-TEST(Registry, OnlyCmpScheduleOffersBreakpointsInExternalEventTasksAndOnlyOneShotMovesReleases) {
+TEST(Registry, EachSchedulerHasItsNameAndOnlyOneShotMovesReleases) {
   LinuxClock clock;
   for (const SchedulerEntry& entry : all_schedulers()) {
     const auto scheduler = entry.make({.clock = clock, .settings = {}});
+    EXPECT_LE(entry.name.size(), kMaxSchedulerName);
     EXPECT_EQ(scheduler->name(), entry.name);
-    EXPECT_EQ(scheduler->capabilities().external_event_breakpoints, entry.name == "CmpSchedule");
     EXPECT_EQ(scheduler->capabilities().one_shot, entry.name == "CmpScheduleOneShot");
   }
 }

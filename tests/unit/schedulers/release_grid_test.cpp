@@ -1,4 +1,4 @@
-#include "schedulers/task/release_grid.hpp"
+#include "schedulers/tasks/release_grid.hpp"
 
 #include <gtest/gtest.h>
 

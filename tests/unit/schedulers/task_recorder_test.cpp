@@ -1,4 +1,4 @@
-#include "schedulers/task/task_recorder.hpp"
+#include "schedulers/tasks/task_recorder.hpp"
 
 #include <atomic>
 #include <cstring>

@@ -1,4 +1,4 @@
-#include "schedulers/task/task.hpp"
+#include "schedulers/tasks/task.hpp"
 
 #include <stdexcept>
 

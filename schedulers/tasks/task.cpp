@@ -1,0 +1,131 @@
+#include "schedulers/tasks/task.hpp"
+
+#include <cstdlib>
+#include <utility>
+
+#include "schedulers/tasks/event_latch.hpp"
+
+namespace plchost {
+
+namespace {}  // namespace
+
+Task::Task(Clock& clock, TaskConfig config, TaskStatistics& statistics, CountedEvent* event,
+           FaultBoard* board) noexcept
+    : clock_(clock),
+      config_(std::move(config)),
+      kind_(find_task_kind(config_.kind)),
+      recorder_(statistics, clock.now()),
+      state_(kind_->make({.clock = clock, .config = config_, .event = event})),
+      overruns_(config_.watchdog),
+      fault_(board, config_.watchdog.policy) {
+  if (event != nullptr) recorder_.begin_posts(event->count());
+}
+
+void Task::begin(TimePoint origin, bool takes_posts) {
+  state_->begin(origin, takes_posts);
+  ready_ = origin;
+  overruns_.forgive_next();
+  recorder_.begin();
+  if (state_->event() != nullptr) recorder_.lose_posts(state_->posts_done());
+}
+
+bool Task::raise_event() noexcept {
+  EventLatch* const latch = state_->latch();
+  if (latch == nullptr) return false;
+  latch->raise();
+  return true;
+}
+
+void Task::rouse() noexcept {
+  CountedEvent* const event = state_->event();
+  if (event != nullptr && event->count() != state_->slept_at()) event->rouse();
+}
+
+void Task::lose_posts() noexcept {
+  if (const CountedEvent* const event = state_->event()) recorder_.lose_posts(event->count());
+}
+
+std::optional<Task::Demand> Task::demand(TimePoint now) const noexcept {
+  const Demand demand{.cycle_since = trap_.running_since(), .due = due(), .posts = state_->slept_at()};
+  if (fault_.halts() || !free_since()) return std::nullopt;
+  if (demand.cycle_since || state_->is_due(now)) return demand;
+  return std::nullopt;
+}
+
+std::optional<TimePoint> Task::free_since() const noexcept {
+  if (trap_.seat().at_work()) return std::nullopt;
+  return TimePoint(Duration(free_since_.load(std::memory_order_relaxed)));
+}
+
+Task::Pace Task::pace() const noexcept {
+  return {.lost = lost_.load(std::memory_order_relaxed), .on_time = on_time_.load(std::memory_order_relaxed)};
+}
+
+// false: it did not come to its end.
+bool Task::run_entry() noexcept {
+  try {
+    config_.entry();
+    return true;
+  } catch (...) {
+    raise_current_exception(fault_);
+  }
+  return false;
+}
+
+void Task::look_at_overrun(Duration execution) noexcept {
+  const OverrunRule::Verdict verdict = overruns_.ended(execution);
+  if (verdict == OverrunRule::Verdict::fine || !fault_.claim()) return;
+  const bool one = verdict == OverrunRule::Verdict::too_long;
+  FaultRecord& record = fault_.record();
+  record.kind = one ? FaultKind::task_watchdog : FaultKind::consecutive_overruns;
+  record.figure = execution.count();
+  record.limit = one ? overruns_.limit().count() : overruns_.time().count();
+  record.count = overruns_.in_a_row();
+  fault_.publish();
+}
+
+void Task::run_cycle(const Activation& activation) noexcept {
+  const CycleGate::Stay within(gate_, trap_.seat(), clock_);
+  state_->cycle_begins(activation.release);
+  const TimePoint start = clock_.now();
+  if (config_.before_entry) config_.before_entry();
+  const TimePoint entered = config_.before_entry ? clock_.now() : start;
+  trap_.arm(fault_, entered);
+  const bool ended = run_entry();
+  trap_.disarm();
+  if (!ended) return;
+  const TimePoint left = clock_.now();
+  if (config_.after_entry) config_.after_entry();
+  const TimePoint end = config_.after_entry ? clock_.now() : left;
+  state_->cycle_ended(activation.release, end);
+  ready_ = end;
+  record(activation, start, end);
+  if (config_.after_cycle) config_.after_cycle(recorder_.counters());
+  look_at_overrun(left - entered);
+  if (config_.between_cycles) work_between_cycles();
+}
+
+void Task::work_between_cycles() noexcept {
+  trap_.seat().work_begins();
+  // Releases that fall due meanwhile are lost, as during a cycle.
+  if (config_.between_cycles()) ready_ = clock_.now();
+  free_since_.store(ready_.time_since_epoch().count(), std::memory_order_relaxed);
+  trap_.seat().part_ends();
+}
+
+void Task::record(const Activation& activation, TimePoint start, TimePoint end) noexcept {
+  std::atomic<std::uint64_t>& count = activation.lost_cycles > 0 ? lost_ : on_time_;
+  const std::uint64_t more = activation.lost_cycles > 0 ? activation.lost_cycles : 1;
+  count.store(count.load(std::memory_order_relaxed) + more, std::memory_order_relaxed);
+  recorder_.record({.release = activation.release,
+                    .start = start,
+                    .end = end,
+                    .interval = interval_in_force(),
+                    .lost_cycles = activation.lost_cycles,
+                    .lost_events = activation.lost_events,
+                    .timer_expirations = activation.timer_expirations,
+                    .spun = activation.spun,
+                    .posts_done = state_->posts_done()});
+}
+
+}  // namespace plchost
