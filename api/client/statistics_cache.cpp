@@ -26,6 +26,7 @@ StatisticsReport to_report(const plc_TaskStatistics& sample) {
   report.numbers.ext = {};
   report.latency = take_out(report.numbers.latency_histogram);
   report.execution = take_out(report.numbers.execution_histogram);
+  report.release_jitter = take_out(report.numbers.release_jitter_histogram);
   report.jitter_negative = take_out(report.numbers.jitter_negative_histogram);
   report.jitter_positive = take_out(report.numbers.jitter_positive_histogram);
   return report;

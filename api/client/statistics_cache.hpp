@@ -26,6 +26,7 @@ struct StatisticsReport {
   plc_TaskStatistics numbers{};  ///< without the histograms
   HistogramReport latency;
   HistogramReport execution;
+  HistogramReport release_jitter;
   HistogramReport jitter_negative;
   HistogramReport jitter_positive;
 };

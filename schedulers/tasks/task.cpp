@@ -98,8 +98,7 @@ void Task::run_cycle(const Activation& activation) noexcept {
   if (config_.after_entry) config_.after_entry();
   const TimePoint end = config_.after_entry ? clock_.now() : left;
   state_->cycle_ended(activation.release, end);
-  ready_ = end;
-  record(activation, start, end);
+  record(activation, start, end, std::exchange(ready_, end));
   if (config_.after_cycle) config_.after_cycle(recorder_.counters());
   look_at_overrun(left - entered);
   if (config_.between_cycles) work_between_cycles();
@@ -113,13 +112,14 @@ void Task::work_between_cycles() noexcept {
   trap_.seat().part_ends();
 }
 
-void Task::record(const Activation& activation, TimePoint start, TimePoint end) noexcept {
+void Task::record(const Activation& activation, TimePoint start, TimePoint end, TimePoint ready) noexcept {
   std::atomic<std::uint64_t>& count = activation.lost_cycles > 0 ? lost_ : on_time_;
   const std::uint64_t more = activation.lost_cycles > 0 ? activation.lost_cycles : 1;
   count.store(count.load(std::memory_order_relaxed) + more, std::memory_order_relaxed);
   recorder_.record({.release = activation.release,
                     .start = start,
                     .end = end,
+                    .ready = ready,
                     .interval = interval_in_force(),
                     .lost_cycles = activation.lost_cycles,
                     .lost_events = activation.lost_events,

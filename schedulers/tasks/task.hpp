@@ -121,7 +121,7 @@ class Task {
   [[nodiscard]] bool run_entry() noexcept;
   void look_at_overrun(Duration execution) noexcept;
   void work_between_cycles() noexcept;
-  void record(const Activation& activation, TimePoint start, TimePoint end) noexcept;
+  void record(const Activation& activation, TimePoint start, TimePoint end, TimePoint ready) noexcept;
 
   Clock& clock_;
   TaskConfig config_;

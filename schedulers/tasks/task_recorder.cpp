@@ -120,6 +120,13 @@ void TaskRecorder::count(const RecordedCycle& cycle) noexcept {
   now.lost_cycles += cycle.lost_cycles;
   now.lost_consecutive = cycle.lost_cycles;
   now.lost_consecutive_max = std::max(now.lost_consecutive_max, cycle.lost_cycles);
+  if (cycle.lost_cycles > 0) {
+    const auto of_last = [this](TimePoint time) { return has_start_ ? time.time_since_epoch().count() : 0; };
+    now.last_loss = {.release_ns = of_last(last_release_),
+                     .start_ns = of_last(last_start_),
+                     .end_ns = cycle.ready.time_since_epoch().count(),
+                     .lost = cycle.lost_cycles};
+  }
   now.lost_events += cycle.lost_events;
   if (cycle.lost_events > 0) {
     now.posts_lost_first = cycle.posts_done - cycle.lost_events;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "shm/base/wrapping.hpp"
+
 namespace plchost {
 
 namespace {
@@ -35,6 +37,28 @@ HistogramDigest::HistogramDigest(const HistogramView& histogram, Duration least,
   for (std::size_t i = 0; i < kFractions.size(); ++i) {
     percentiles_[i] = percentile(histogram, kFractions[i], greatest);
   }
+}
+
+// Buckets that are moved lie across bars, so each is taken as its greatest duration, as percentiles are.
+HistogramDigest HistogramDigest::above_least(const HistogramView& histogram, Duration least,
+                                             Duration greatest) const noexcept {
+  HistogramDigest above;
+  const HistogramShape& shape = histogram.shape();
+  const auto moved = [&](Duration value) {
+    return Duration(std::max<Duration::rep>(wrapping_difference(value.count(), least.count()), 0));
+  };
+  const std::size_t last = shape.index_of(greatest);
+  for (std::size_t i = shape.index_of(least); i <= last; ++i) {
+    const std::uint64_t count = histogram.count(i);
+    if (count == 0) continue;
+    const Duration lower = kBars.lower_edge(kBars.index_of(moved(std::min(shape.upper_edge(i), greatest))));
+    if (above.bar_count_ == 0 || above.bars_[above.bar_count_ - 1].lower != lower)
+      above.bars_[above.bar_count_++] = {.lower = lower, .count = 0};
+    above.bars_[above.bar_count_ - 1].count += count;
+    above.total_ += count;
+  }
+  if (above.total_ > 0) std::ranges::transform(percentiles_, above.percentiles_.begin(), moved);
+  return above;
 }
 
 Duration HistogramDigest::percentile(const HistogramView& histogram, double fraction,

@@ -25,6 +25,10 @@ class HistogramDigest {
   /// what it costs. Values out of order or range do no harm.
   HistogramDigest(const HistogramView& histogram, Duration least, Duration greatest) noexcept;
 
+  /// The same records less `least`. *this is the digest of `histogram`, made with these bounds.
+  [[nodiscard]] HistogramDigest above_least(const HistogramView& histogram, Duration least,
+                                            Duration greatest) const noexcept;
+
   [[nodiscard]] std::uint64_t total() const noexcept { return total_; }
   /// By kFractions. Never above `greatest`, and just that where only the last bucket is known. 0 if total()
   /// is.
@@ -35,6 +39,7 @@ class HistogramDigest {
   [[nodiscard]] std::span<const Bar> bars() const noexcept { return std::span(bars_).first(bar_count_); }
 
  private:
+  HistogramDigest() = default;
   [[nodiscard]] Duration percentile(const HistogramView& histogram, double fraction,
                                     Duration greatest) const noexcept;
 

@@ -16,6 +16,14 @@
 
 namespace plchost {
 
+/// Cycles that a task lost, and the cycle that kept it from them. Times by CLOCK_MONOTONIC.
+struct CycleLoss {
+  std::int64_t release_ns;  ///< planned release of the cycle before; 0, as the start: none had run yet
+  std::int64_t start_ns;    ///< of that cycle
+  std::int64_t end_ns;      ///< the task was ready again: that cycle and the runtime's work behind it ended
+  std::uint64_t lost;       ///< releases that passed until then
+};
+
 /// The counters of a task. Durations in nanoseconds. Everything but `cycles` and `posts_...` counts from the
 /// last reset.
 struct TaskCounters {
@@ -28,6 +36,7 @@ struct TaskCounters {
   std::uint64_t lost_cycles;       ///< releases on the grid that passed without a cycle
   std::uint64_t lost_consecutive;  ///< those in a row right before the last cycle
   std::uint64_t lost_consecutive_max;  ///< the longest such row
+  CycleLoss last_loss;                 ///< all 0: none since the last reset
   std::uint64_t lost_events;           ///< external events that no cycle was run for
   std::int64_t exec_last_ns;           ///< start of the task's code to its end
   std::int64_t exec_sum_ns;

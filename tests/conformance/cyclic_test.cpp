@@ -48,6 +48,11 @@ TEST_P(CyclicTasks, KeepTheirGridAfterAnOverrunAndCountWhatIsLost) {
   EXPECT_EQ(starts, (Starts{at(0), at(2), at(4), at(12), at(14), at(16)}));
   EXPECT_EQ(counters(0).lost_cycles, 3U);
   EXPECT_EQ(counters(0).latency_max_ns, 0);
+  const auto ns = [](TimePoint time) { return time.time_since_epoch().count(); };
+  EXPECT_EQ(counters(0).last_loss.lost, 3U);
+  EXPECT_EQ(counters(0).last_loss.release_ns, ns(at(4)));
+  EXPECT_EQ(counters(0).last_loss.start_ns, ns(at(4)));
+  EXPECT_EQ(counters(0).last_loss.end_ns, ns(at(11)));
 }
 
 TEST_P(CyclicTasks, RunAtOnceIfTheyAreLateAndAreToldTo) {

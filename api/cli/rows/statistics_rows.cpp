@@ -10,6 +10,7 @@
 
 #include "api/cli/rows/rows.hpp"
 #include "shm/base/duration_histogram.hpp"
+#include "shm/base/wrapping.hpp"
 
 namespace plchost {
 
@@ -39,6 +40,13 @@ void add_histogram(Row& row, std::string_view name, const HistogramReport& histo
   row[fmt::format("{}_histogram", name)] = std::move(bars);
 }
 
+void add_loss(Row& row, const plc_CycleLoss& loss) {
+  row["last_loss_cycles"] = loss.lost;
+  row["last_loss_release"] = time_text(loss.release_unix_ns);
+  row["last_loss_start_us"] = to_us(wrapping_difference(loss.start_unix_ns, loss.release_unix_ns));
+  row["last_loss_end_us"] = to_us(wrapping_difference(loss.end_unix_ns, loss.release_unix_ns));
+}
+
 void add_counters(Row& row, const plc_TaskStatistics& numbers) {
   constexpr double kNsPerSecond = 1e9;
   constexpr double kPpmPerPercent = 1e4;
@@ -50,6 +58,7 @@ void add_counters(Row& row, const plc_TaskStatistics& numbers) {
   row["lost_cycles"] = numbers.lost_cycles;
   row["lost_consecutive"] = numbers.lost_consecutive;
   row["lost_consecutive_max"] = numbers.lost_consecutive_max;
+  add_loss(row, numbers.last_loss);
   row["lost_events"] = numbers.lost_events;
   row["slots_last"] = numbers.slots_last;
   row["slots_max"] = numbers.slots_max;
@@ -74,7 +83,7 @@ std::string format_quantities(const StatisticsReport& report) {
   const plc_TaskStatistics& numbers = report.numbers;
   std::vector<Row> rows{table_row("latency", &numbers.latency, &report.latency),
                         table_row("execution", &numbers.execution, &report.execution),
-                        table_row("release jitter", &numbers.release_jitter, nullptr)};
+                        table_row("release jitter", &numbers.release_jitter, &report.release_jitter)};
   if (report.jitter_negative.total + report.jitter_positive.total > 0) {
     rows.push_back(table_row("period jitter", &numbers.period_jitter, nullptr));
     rows.push_back(table_row("  too short by", nullptr, &report.jitter_negative));
@@ -97,6 +106,7 @@ void add_statistics(Row& row, const StatisticsReport& report) {
   add_summary(row, "exec", numbers.execution);
   add_histogram(row, "exec", report.execution);
   add_summary(row, "release_jitter", numbers.release_jitter);
+  add_histogram(row, "release_jitter", report.release_jitter);
   add_summary(row, "period_jitter", numbers.period_jitter);
   add_histogram(row, "period_jitter_negative", report.jitter_negative);
   add_histogram(row, "period_jitter_positive", report.jitter_positive);
@@ -107,6 +117,11 @@ std::string format_statistics(const StatisticsReport& report, PlotStyle style) {
   Row counters;
   add_counters(counters, numbers);
   counters.erase("since_unix_s");
+  if (numbers.last_loss.lost == 0) {
+    for (const char* field :
+         {"last_loss_cycles", "last_loss_release", "last_loss_start_us", "last_loss_end_us"})
+      counters.erase(field);
+  }
   std::string text = fmt::format("\n{:<20}  {}\n", "since", local_time(numbers.since_unix_ns));
   text += format_fields(counters);
   text += "\n" + format_quantities(report);

@@ -18,7 +18,8 @@ using Bars = std::array<plc_HistogramBar, HistogramDigest::kMaxBars>;
 class Histogram {
  public:
   Histogram(const HistogramView& view, std::int64_t least_ns, std::int64_t greatest_ns)
-      : digest_(view, Duration(least_ns), Duration(greatest_ns)) {
+      : Histogram(HistogramDigest(view, Duration(least_ns), Duration(greatest_ns))) {}
+  explicit Histogram(const HistogramDigest& digest) : digest_(digest) {
     for (std::size_t i = 0; i < digest_.bars().size(); ++i) {
       const auto& bar = digest_.bars()[i];
       bars_[i] = {.lower_ns = bar.lower.count(), .count = bar.count};
@@ -49,6 +50,19 @@ std::uint32_t share_ppm(std::int64_t part, std::int64_t whole) noexcept {
   return static_cast<std::uint32_t>(std::min(share, 1e6));
 }
 
+// Nothing was lost: all 0.
+plc_CycleLoss to_sample(const CycleLoss& loss, TimePoint now) noexcept {
+  if (loss.lost == 0) return {};
+  const std::int64_t ahead = wrapping_difference(unix_time_ns(), now.time_since_epoch().count());
+  const auto unix = [ahead](std::int64_t time_ns) {
+    return time_ns == 0 ? 0 : wrapping_difference(ahead, wrapping_difference(0, time_ns));
+  };
+  return {.lost = loss.lost,
+          .release_unix_ns = unix(loss.release_ns),
+          .start_unix_ns = unix(loss.start_ns),
+          .end_unix_ns = unix(loss.end_ns)};
+}
+
 void put_counters(const TaskCounters& counters, TimePoint now, plc_TaskStatistics& sample) noexcept {
   sample.since_unix_ns = counters.since_unix_ns;
   sample.elapsed_ns = wrapping_difference(now.time_since_epoch().count(), counters.since_ns);
@@ -57,6 +71,7 @@ void put_counters(const TaskCounters& counters, TimePoint now, plc_TaskStatistic
   sample.lost_cycles = counters.lost_cycles;
   sample.lost_consecutive = counters.lost_consecutive;
   sample.lost_consecutive_max = counters.lost_consecutive_max;
+  sample.last_loss = to_sample(counters.last_loss, now);
   sample.lost_events = counters.lost_events;
   sample.slots_last = counters.slots_last;
   sample.slots_max = counters.slots_max;
@@ -97,8 +112,11 @@ bool StatisticsWriter::write(const std::string& instance, const InstancePageRead
   Histogram execution(read(TaskHistogram::execution), counters.exec_min_ns, counters.exec_max_ns);
   Histogram negative(read(TaskHistogram::jitter_negative), 0, wrapping_difference(0, counters.jitter_min_ns));
   Histogram positive(read(TaskHistogram::jitter_positive), 0, counters.jitter_max_ns);
+  Histogram release_jitter(latency.digest().above_least(
+      read(TaskHistogram::latency), Duration(counters.latency_min_ns), Duration(counters.latency_max_ns)));
   latency.put_into(sample.latency_histogram);
   execution.put_into(sample.execution_histogram);
+  release_jitter.put_into(sample.release_jitter_histogram);
   negative.put_into(sample.jitter_negative_histogram);
   positive.put_into(sample.jitter_positive_histogram);
   if (dds_write(writer_.get(), &sample) != DDS_RETCODE_OK) {

@@ -144,6 +144,10 @@ TEST(RemoteStatus, TellsTheStatisticsOfATaskAndAtOnceWhenTheyBeginAnew) {
   EXPECT_EQ(report->numbers.latency.max_ns, 50'000);
   EXPECT_EQ(report->numbers.latency.average_ns, 1'490);
   EXPECT_EQ(report->numbers.release_jitter.max_ns, 49'000);
+  EXPECT_EQ(report->release_jitter.total, 1000U);
+  EXPECT_EQ(report->release_jitter.percentiles_ns[0], 0);
+  EXPECT_EQ(report->release_jitter.percentiles_ns[4], 49'000);
+  EXPECT_EQ(report->numbers.last_loss.lost, 0U);
   EXPECT_EQ(report->latency.total, 1000U);
   EXPECT_EQ(report->latency.percentiles_ns[0], 1'000);
   EXPECT_EQ(report->latency.percentiles_ns[3], 50'000);

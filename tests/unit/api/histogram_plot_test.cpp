@@ -114,8 +114,16 @@ TEST(StatisticsRows, GiveEveryNumberToPrograms) {
   report.numbers.latency = {1'000, 500, 9'000, 2'500};
   report.latency = of({{960, 7}});
   report.latency.percentiles_ns = {1'000, 2'000, 3'000, 4'000, 5'000};
+  report.numbers.last_loss = {.lost = 2,
+                              .release_unix_ns = 1'700'000'000'000'000'000,
+                              .start_unix_ns = 1'700'000'000'000'001'500,
+                              .end_unix_ns = 1'700'000'000'002'000'000};
   Row row;
   add_statistics(row, report);
+  EXPECT_EQ(row["last_loss_cycles"], 2);
+  EXPECT_EQ(row["last_loss_release"], "2023-11-14T22:13:20.000Z");
+  EXPECT_EQ(row["last_loss_start_us"], 1.5);
+  EXPECT_EQ(row["last_loss_end_us"], 2'000.0);
   EXPECT_EQ(row["cycles"], 12);
   EXPECT_EQ(row["recorded"], 7);
   EXPECT_EQ(row["lost_consecutive_max"], 3);
@@ -126,9 +134,10 @@ TEST(StatisticsRows, GiveEveryNumberToPrograms) {
   EXPECT_EQ(row["latency_histogram"][0]["from_us"], 0.96);
   EXPECT_EQ(row["latency_histogram"][0]["below_us"], 1.024);
   EXPECT_EQ(row["latency_histogram"][0]["count"], 7);
-  for (const char* field : {"exec_p50_us", "release_jitter_max_us", "period_jitter_min_us",
-                            "period_jitter_negative_p99_us", "period_jitter_positive_histogram", "slots_last",
-                            "slots_max", "lost_events", "digits", "elapsed_s", "since_unix_s"}) {
+  for (const char* field :
+       {"exec_p50_us", "release_jitter_max_us", "release_jitter_p99_us", "release_jitter_histogram",
+        "period_jitter_min_us", "period_jitter_negative_p99_us", "period_jitter_positive_histogram",
+        "slots_last", "slots_max", "lost_events", "digits", "elapsed_s", "since_unix_s"}) {
     EXPECT_TRUE(row.contains(field)) << field;
   }
 }
@@ -137,6 +146,9 @@ TEST(StatisticsRows, ShowPeopleJitterOnlyWhereThereIsSome) {
   StatisticsReport report;
   report.latency = of({{960, 7}});
   EXPECT_THAT(format_statistics(report, {}), Not(HasSubstr("period jitter")));
+  EXPECT_THAT(format_statistics(report, {}), Not(HasSubstr("last_loss")));
+  report.numbers.last_loss.lost = 1;
+  EXPECT_THAT(format_statistics(report, {}), HasSubstr("last_loss_release"));
   report.jitter_negative = of({{10, 1}});
   EXPECT_THAT(format_statistics(report, {}), HasSubstr("period jitter"));
 }

@@ -68,6 +68,40 @@ TEST_P(Digest, BeyondTheRangeTheGreatestIsTold) {
   EXPECT_EQ(digest().percentiles().front(), Duration(60'000'000'000));
 }
 
+TEST_P(Digest, AboveTheLeastIsEachRecordLessTheLeast) {
+  constexpr std::int64_t kLeast = 40'000;
+  std::mt19937_64 random(5);
+  std::lognormal_distribution<double> latencies(7.0, 1.0);
+  std::vector<std::int64_t> above;
+  record(kLeast);
+  above.push_back(0);
+  for (int i = 0; i < 20'000; ++i) {
+    above.push_back(static_cast<std::int64_t>(latencies(random)));
+    record(kLeast + above.back());
+  }
+  const HistogramDigest sut = digest().above_least(histogram_, Duration(least_), Duration(greatest_));
+  std::ranges::sort(above);
+  EXPECT_EQ(sut.total(), above.size());
+  const double width = shape_.digits() == HistogramShape::kFine ? 0.001 : 0.008;
+  for (std::size_t i = 0; i < HistogramDigest::kFractions.size(); ++i) {
+    const auto exact =
+        static_cast<double>(above[HistogramView::rank(HistogramDigest::kFractions[i], above.size()) - 1]);
+    EXPECT_NEAR(static_cast<double>(sut.percentiles()[i].count()), exact, width * (kLeast + exact) + 1) << i;
+  }
+  std::uint64_t sum = 0;
+  for (const auto& bar : sut.bars()) sum += bar.count;
+  EXPECT_EQ(sum, sut.total());
+  EXPECT_TRUE(std::ranges::is_sorted(sut.bars(), std::ranges::less(), &HistogramDigest::Bar::lower));
+  EXPECT_GT(sut.bars().size(), 10U) << "40 us less, they do not lie in two bars";
+}
+
+TEST_P(Digest, AboveTheLeastOfNothingIsNothing) {
+  const HistogramDigest empty(histogram_, Duration(0), Duration(0));
+  const HistogramDigest sut = empty.above_least(histogram_, Duration(INT64_MIN), Duration(INT64_MAX));
+  EXPECT_EQ(sut.total(), 0U);
+  EXPECT_TRUE(sut.bars().empty());
+}
+
 TEST_P(Digest, AnEmptyOneHasNothing) {
   const HistogramDigest sut(histogram_, Duration(0), Duration(0));
   EXPECT_EQ(sut.total(), 0U);

@@ -155,6 +155,31 @@ TEST_F(Recorder, LostCyclesCountInAllAndInARow) {
   EXPECT_EQ(read().lost_consecutive, 0U);
 }
 
+TEST_F(Recorder, LastLossNamesTheCycleThatWasInTheWay) {
+  const auto ns = [](TimePoint time) { return time.time_since_epoch().count(); };
+  const RecordedCycle slow = cycle(0, microseconds(30), milliseconds(25));
+  sut_.record(slow);
+  EXPECT_EQ(read().last_loss.lost, 0U);
+  RecordedCycle next = cycle(3);
+  next.lost_cycles = 2;
+  next.ready = slow.end + milliseconds(1);
+  sut_.record(next);
+  sut_.record(cycle(4));
+  EXPECT_EQ(read().last_loss.lost, 2U) << "kept until the next loss";
+  EXPECT_EQ(read().last_loss.release_ns, ns(slow.release));
+  EXPECT_EQ(read().last_loss.start_ns, ns(slow.start));
+  EXPECT_EQ(read().last_loss.end_ns, ns(next.ready)) << "with the runtime's work behind the cycle";
+  sut_.begin();
+  RecordedCycle first = cycle(9);
+  first.lost_cycles = 1;
+  first.ready = first.release;
+  sut_.record(first);
+  EXPECT_EQ(read().last_loss.release_ns, 0) << "no cycle has run since the start";
+  EXPECT_EQ(read().last_loss.end_ns, ns(first.release));
+  ASSERT_TRUE(sut_.reset(first.end));
+  EXPECT_EQ(read().last_loss.lost, 0U);
+}
+
 TEST_F(Recorder, ResetBeginsAllAnewButTheCycleCountAndTheInterval) {
   for (int n = 0; n < 5; ++n) {
     RecordedCycle one = cycle(n, microseconds(10 * (n + 1)), milliseconds(25));
