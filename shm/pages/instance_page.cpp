@@ -27,8 +27,8 @@ constexpr std::size_t kTasksOffset = (sizeof(InstancePageLayout) + 63) / 64 * 64
 static_assert(offsetof(InstancePageLayout, version) == 8 && offsetof(InstancePageLayout, size) == 16);
 static_assert(sizeof(TaskIdentity) == 120 && alignof(TaskSlot) <= 64);
 
-HistogramShape shape_for(std::size_t task_count) noexcept {
-  return HistogramShape(task_count <= kMaxFineTasks ? HistogramShape::kFine : HistogramShape::kCoarse);
+HistogramShape shape_for(std::size_t task_count, std::uint32_t fine_tasks) noexcept {
+  return HistogramShape(task_count <= fine_tasks ? HistogramShape::kFine : HistogramShape::kCoarse);
 }
 
 std::size_t buckets_offset(std::size_t task_count) noexcept {
@@ -134,13 +134,13 @@ std::string instance_claim_name(std::string_view pool, std::string_view instance
 }
 
 Result<InstancePage> InstancePage::create(std::string_view pool, std::string_view instance,
-                                          std::span<const TaskIdentity> tasks) {
+                                          std::span<const TaskIdentity> tasks, std::uint32_t fine_tasks) {
   if (tasks.size() > kMaxTasks) {
     return failure(
         ErrorCode::invalid_argument,
         fmt::format("instance '{}' has {} tasks; at most {} are allowed", instance, tasks.size(), kMaxTasks));
   }
-  const HistogramShape shape = shape_for(tasks.size());
+  const HistogramShape shape = shape_for(tasks.size(), fine_tasks);
   auto memory = MemoryFile::replace(
       instance_page_name(pool, instance), size_for(tasks.size(), shape),
       [&](std::span<std::byte> bytes) { return fill_instance_page(bytes, tasks, shape); });

@@ -88,7 +88,8 @@ struct TaskSlot {
 };
 
 inline constexpr std::uint32_t kMaxTasks = 1024;
-/// Up to so many tasks have histograms of 3 significant digits (352 KiB a task), more have 2 (50 KiB).
+/// Up to so many tasks have histograms of 3 significant digits (352 KiB a task), more have 2 (50 KiB), unless
+/// the settings say otherwise.
 inline constexpr std::uint32_t kMaxFineTasks = 64;
 
 struct InstancePageLayout {
@@ -116,9 +117,11 @@ struct KnownFault {
 /// The instance's end: a fresh page for each life of the process, made when its tasks are known.
 class InstancePage {
  public:
-  /// invalid_argument: more than kMaxTasks tasks.
+  /// `fine_tasks`: up to so many tasks have histograms of 3 digits. invalid_argument: more than kMaxTasks
+  /// tasks.
   [[nodiscard]] static Result<InstancePage> create(std::string_view pool, std::string_view instance,
-                                                   std::span<const TaskIdentity> tasks);
+                                                   std::span<const TaskIdentity> tasks,
+                                                   std::uint32_t fine_tasks = kMaxFineTasks);
   /// And the file that its process holds its name with: it has ended.
   static void remove(std::string_view pool, std::string_view instance) noexcept;
 

@@ -209,7 +209,8 @@ Result<std::string> Instance::make_status_page() {
   if (application_) {
     for (const TaskConfig& task : application_->tasks()) identities.push_back(identity_of(task));
   }
-  auto page = InstancePage::create(options_.launch.pool, options_.launch.name, identities);
+  auto page = InstancePage::create(options_.launch.pool, options_.launch.name, identities,
+                                   start_.settings.fine_tasks);
   if (!page) return std::unexpected(std::move(page).error());
   page_.emplace(*std::move(page));
   auto transitions = TransitionRing::open(options_.launch.pool, options_.launch.name);

@@ -15,6 +15,7 @@
 #include "schedulers/tasks/task_config.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
+#include "shm/pages/instance_page.hpp"
 
 namespace plchost {
 
@@ -83,7 +84,8 @@ struct InstanceSettings {
   std::vector<TaskSettings> tasks;  ///< one for each [Task.NAME]
   std::vector<AreaSettings> areas;  ///< [SysMem], in the order of their numbers: 0, 1, ...
   RetainSettings retain;
-  Parameters parameters;                ///< [Application] Parameter.NAME
+  std::uint32_t fine_tasks = kMaxFineTasks;  ///< up to so many tasks have histograms of 3 digits
+  Parameters parameters;                     ///< [Application] Parameter.NAME
   std::vector<std::string> components;  ///< in order; a relative path counts from the settings file's folder
 
   /// The ignored parts: sections and components of other programs, each once; and keys without a meaning

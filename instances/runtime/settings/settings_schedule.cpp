@@ -131,6 +131,19 @@ constexpr std::array kScheduleKeys = {
                .value = NumberSetting{1, 25'000,
                                       [](const SettingsTarget& to,
                                          std::int64_t ms) { to.settings.stop.others = milliseconds(ms); }}},
+    SettingKey{
+        .section = kScheduleSection,
+        .name = "Statistics.FineTasks",
+        .unit = "tasks",
+        .initial = "64",
+        .meaning = "up to so many tasks have histograms of 3 digits (352 KiB of locked memory for "
+                   "each), more have 2 (50 KiB)",
+        .value =
+            NumberSetting{
+                0,
+                kMaxTasks,
+                [](const SettingsTarget& to,
+                   std::int64_t tasks) { to.settings.fine_tasks = static_cast<std::uint32_t>(tasks); }}},
     // Here every scheduler times its tasks itself, without slices, and reports through the instance's log.
     SettingKey{.section = kScheduleSection, .name = "DontUseMicrosecondTiming"},
     SettingKey{.section = kScheduleSection, .name = "EnableLogger"},

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include "instances/launch/launch_contract.hpp"
+#include "shm/pages/instance_page.hpp"
 #include "tests/integration/instances/instance_process.hpp"
 
 namespace plchost::testing {
@@ -58,6 +59,15 @@ TEST_F(SettingsFile, ApplicationLearnsItsInstancesNameAndItsParameters) {
   EXPECT_THAT(sut.log(), HasSubstr("instance line1, speed 1200 rpm; fast, empty is set"));
 }
 
+TEST_F(SettingsFile, HistogramsAreAsFineAsItSays) {
+  InstanceProcess sut(sandbox, with("[CmpSchedule]\nStatistics.FineTasks=1\n"));
+  sut.wait_until_up();
+  const auto page = InstancePageReader::open(sandbox.pool(), "line1");
+  ASSERT_TRUE(page) << page.error().describe();
+  EXPECT_GT(page->task_count(), 1U);
+  EXPECT_EQ(page->histogram_shape().digits(), HistogramShape::kCoarse);
+}
+
 // Each fifth cycle of 4 ms takes 6 ms: `next` loses a release each time, `asap` runs it 2 ms late.
 TEST_F(SettingsFile, LatePolicyAsapRunsWhatNextLoses) {
   const auto counters_with = [&](const std::string& policy) {
@@ -74,6 +84,8 @@ TEST_F(SettingsFile, LatePolicyAsapRunsWhatNextLoses) {
   EXPECT_GT(share_lost(next), 0.19);
   EXPECT_LT(share_lost(asap), share_lost(next));
   EXPECT_GT(asap.latency_max_ns, 1'900'000);
+  EXPECT_GT(next.last_loss.end_ns, next.last_loss.release_ns + Duration(4ms).count())
+      << "the cycle was too long";
 }
 
 TEST_F(SettingsFile, SectionOfATaskThatThereIsNotListsTheTasks) {

@@ -39,6 +39,7 @@ TEST(Settings, ReadsEveryKey) {
       "ProcessorLoad.Maximum=60\n"
       "SpinAhead.MaxUs=0\n"
       "ExternalEvent.MaxBacklog=500\n"
+      "Statistics.FineTasks=1024\n"
       "[SysTimer]\n"
       "VxWorks.TimerSource=Task\n"
       "[ComponentManager]\n"
@@ -51,6 +52,7 @@ TEST(Settings, ReadsEveryKey) {
   EXPECT_EQ(sut->scheduler.processor_load_maximum, 60);
   EXPECT_EQ(sut->scheduler.spin_ahead_max, 0us);
   EXPECT_EQ(sut->scheduler.max_event_backlog, 500U);
+  EXPECT_EQ(sut->fine_tasks, 1024U);
   EXPECT_EQ(sut->scheduler.tick_source, TickSourceKind::task);
   EXPECT_THAT(sut->components, ElementsAre("/first.so", "later.so"));
 }

@@ -312,6 +312,17 @@ TEST_F(Pages, HistogramsAreFineUpTo64TasksAndCoarseBeyond) {
   }
 }
 
+TEST_F(Pages, HistogramsAreAsFineAsTheSettingsSay) {
+  for (const auto& [fine_tasks, digits] :
+       {std::pair{100U, HistogramShape::kFine}, std::pair{99U, HistogramShape::kCoarse}}) {
+    const auto writer = InstancePage::create(pool(), "line1", tasks_of(100), fine_tasks);
+    ASSERT_TRUE(writer);
+    const auto sut = InstancePageReader::open(pool(), "line1");
+    ASSERT_TRUE(sut) << sut.error().describe();
+    EXPECT_EQ(sut->histogram_shape().digits(), digits);
+  }
+}
+
 TEST_F(Pages, ReadersOfAnAbsentPageAreTold) {
   EXPECT_EQ(HostPageReader::open(pool()).error().code, ErrorCode::not_found);
   EXPECT_EQ(InstancePageReader::open(pool(), "line1").error().code, ErrorCode::not_found);
