@@ -13,6 +13,7 @@
 #include "api/dds/code_names.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/task_kind.hpp"
+#include "shm/pool/object_type.hpp"
 
 namespace plchost {
 namespace {
@@ -206,6 +207,17 @@ TEST(StatusWords, OfTheKindsOfTasksAreThoseOfTheirTable) {
     EXPECT_EQ(dds::task_kind_name(std::to_underlying(kind.kind)), kind.name);
   EXPECT_EQ(dds::task_kind_name(kTaskKinds.size()), std::to_string(kTaskKinds.size()))
       << "the contract names a kind that is not in the table";
+}
+
+TEST(StatusWords, OfTheTypesOfObjectsAreThoseOfTheirTable) {
+  plc_ObjectStatus object{};
+  for (const ObjectTraits& traits : kObjectTraits) {
+    object.type = std::to_underlying(traits.type);
+    EXPECT_EQ(to_row(object).at("type"), traits.name);
+  }
+  object.type = kObjectTypes;
+  EXPECT_EQ(to_row(object).at("type"), std::to_string(kObjectTypes))
+      << "the contract names a type that is not in the table";
 }
 
 TEST(StatusOrder, IsThatOfTheContract) {
