@@ -13,7 +13,7 @@ struct RecordedCycle {
   TimePoint release;  ///< planned
   TimePoint start;    ///< of the task's code
   TimePoint end;
-  TimePoint ready;                ///< since when the task could run it; releases before that were lost
+  TimePoint ready{};              ///< since when the task could run it; releases before that were lost
   Duration interval{};            ///< of the grid; 0: not a cyclic task, so neither jitter nor slots
   std::uint64_t lost_cycles = 0;  ///< right before it
   std::uint64_t lost_events = 0;
