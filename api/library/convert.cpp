@@ -53,6 +53,7 @@ Client::TaskStatistics to_public(const StatisticsReport& report) {
   Client::TaskStatistics made = to_public(report.numbers);
   made.latency_histogram = histogram_of(report.latency);
   made.execution_histogram = histogram_of(report.execution);
+  made.release_jitter_histogram = histogram_of(report.release_jitter);
   made.jitter_negative_histogram = histogram_of(report.jitter_negative);
   made.jitter_positive_histogram = histogram_of(report.jitter_positive);
   return made;
