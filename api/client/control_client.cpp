@@ -102,10 +102,6 @@ Result<std::vector<plc_WriterStatus>> ControlClient::writers(const std::string& 
   return status<plc_WriterStatus>(host, deadline);
 }
 
-Result<std::vector<plc_ObjectStatus>> ControlClient::objects(const std::string& host, TimePoint deadline) {
-  return status<plc_ObjectStatus>(host, deadline);
-}
-
 Result<std::vector<TransitionView>> ControlClient::transitions() {
   if (!transition_log_) {
     auto topic = dds::make_topic(entity(), dds::kTransition);

@@ -136,7 +136,6 @@ class ControlClient {
   [[nodiscard]] Result<std::vector<plc_EventStatus>> events(const std::string& host, TimePoint deadline);
   /// The fate of the posts of each client, as the host counts them; first (source all zero) of all together.
   [[nodiscard]] Result<std::vector<plc_WriterStatus>> writers(const std::string& host, TimePoint deadline);
-  [[nodiscard]] Result<std::vector<plc_ObjectStatus>> objects(const std::string& host, TimePoint deadline);
   /// A part of the objects of a host's pool, as the query asks, with all that is known of them; complete: the
   /// last one. Else go on with query.after = next_after. The code of the failure is the host's own:
   /// not_found: no object of the query's name.
@@ -187,7 +186,7 @@ class ControlClient {
   /// exactly once, also if plchost-dds ends meanwhile. Ends early when the host has acknowledged nothing for
   /// `patience`: then the report says how many are not known. `stop` is asked at least every 50 ms; when it
   /// says true, no more are posted, and the report is about those that were.
-  [[nodiscard]] Result<PostReport> post_event(const ApiRequest& event, std::uint64_t count, Duration interval,
+  [[nodiscard]] Result<PostReport> post_event(const HostEvent& event, std::uint64_t count, Duration interval,
                                               Duration patience, const std::function<bool()>& stop = {});
 
   /// Posts an event once and waits until the tasks that are bound to it have ended their cycles for it. If
@@ -195,7 +194,7 @@ class ControlClient {
   /// host's own: not_found: no such event, or no task is bound to it; wrong_state: a task was stopped before
   /// it ran. timed_out: nothing has come for `patience`, or the task has not run within 10 s; the post may be
   /// in the pool. unavailable: the instance was starting all the time.
-  [[nodiscard]] Result<RunReport> post_and_await(const ApiRequest& event, Duration patience);
+  [[nodiscard]] Result<RunReport> post_and_await(const HostEvent& event, Duration patience);
 
   /// Posts several events, at most kMaxBatch, at once: all of them, or none. The report counts the batch as
   /// one post.
@@ -242,7 +241,7 @@ class ControlClient {
                                      const RequestCaller::Meanwhile& meanwhile);
   /// nullptr: that host has not been seen.
   [[nodiscard]] const HostClock* clock_of(const std::string& host) const;
-  [[nodiscard]] Result<RunReport> post_and_await_once(const ApiRequest& event, TimePoint deadline);
+  [[nodiscard]] Result<RunReport> post_and_await_once(const HostEvent& event, TimePoint deadline);
   void use_clock(EventPoster& posts, const std::string& host, Duration patience) const;
   /// The way of such posts to that host.
   template <class Sample>

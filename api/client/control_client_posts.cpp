@@ -71,9 +71,9 @@ bool ControlClient::take_acks(TimePoint now) {
   return progress;
 }
 
-Result<PostReport> ControlClient::post_event(const ApiRequest& event, std::uint64_t count, Duration interval,
+Result<PostReport> ControlClient::post_event(const HostEvent& event, std::uint64_t count, Duration interval,
                                              Duration patience, const std::function<bool()>& stop) {
-  if (auto good = check_event_name(event.instance, event.argument); !good) {
+  if (auto good = check_event_name(event.instance, event.event); !good) {
     return std::unexpected(std::move(good).error());
   }
   const TimePoint start = MonotonicClock::now();
@@ -84,7 +84,7 @@ Result<PostReport> ControlClient::post_event(const ApiRequest& event, std::uint6
   (void)take_acks(start);  // of posts that were given up
   posts.begin_report(start);
   use_clock(posts, event.host, patience);
-  const EventId id{event.instance, event.argument};
+  const EventId id = event.id();
   const TimePoint first = MonotonicClock::now();
   std::uint64_t sent = 0;
   for (bool woken = false;; woken = true) {

@@ -59,8 +59,8 @@ std::optional<Result<RunReport>> ControlClient::take_run(const EventPoster& post
   return found;
 }
 
-Result<RunReport> ControlClient::post_and_await(const ApiRequest& event, Duration patience) {
-  if (auto good = check_event_name(event.instance, event.argument); !good) {
+Result<RunReport> ControlClient::post_and_await(const HostEvent& event, Duration patience) {
+  if (auto good = check_event_name(event.instance, event.event); !good) {
     return std::unexpected(std::move(good).error());
   }
   const TimePoint deadline = MonotonicClock::now() + patience;
@@ -80,7 +80,7 @@ Result<RunReport> ControlClient::post_and_await(const ApiRequest& event, Duratio
   }
 }
 
-Result<RunReport> ControlClient::post_and_await_once(const ApiRequest& event, TimePoint deadline) {
+Result<RunReport> ControlClient::post_and_await_once(const HostEvent& event, TimePoint deadline) {
   EventPoster& posts = **poster<plc_EventPost>(event.host);
   const auto epoch = [&] {
     const SeenHost* const seen = seen_.find(event.host);
@@ -91,7 +91,7 @@ Result<RunReport> ControlClient::post_and_await_once(const ApiRequest& event, Ti
   (void)take_acks(start);  // of posts that were given up
   posts.begin_report(start);
   use_clock(posts, event.host, deadline - start);
-  const EventId id{event.instance, event.argument};
+  const EventId id = event.id();
   const std::uint64_t number = posts.post(id, start, /*awaited=*/true);
   for (;;) {
     const TimePoint now = MonotonicClock::now();

@@ -28,6 +28,15 @@ struct EventId {
   std::string event;
 };
 
+/// An external event of a host.
+struct HostEvent {
+  std::string host;
+  std::string instance;
+  std::string event;
+
+  [[nodiscard]] EventId id() const { return {instance, event}; }
+};
+
 /// How many events a batch may have.
 inline constexpr std::size_t kMaxBatch = 64;
 

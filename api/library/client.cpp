@@ -50,7 +50,7 @@ Result<PostReport> post_to(ControlClient& client, const std::string& name, const
   if (!id) return std::unexpected(std::move(id).error());
   const auto host = host_of(client, name, MonotonicClock::now() + timeout);
   if (!host) return std::unexpected(host.error());
-  return client.post_event({*host, 0, std::move(id->instance), std::move(id->event)}, count, Duration{},
+  return client.post_event({*host, std::move(id->instance), std::move(id->event)}, count, Duration{},
                            timeout);
 }
 
@@ -196,7 +196,7 @@ Client::Run Client::post_and_wait(const std::string& host, const std::string& ev
   const auto run = value_or_throw(worker_->run<RunReport>([&](ControlClient& client) -> Result<RunReport> {
     const auto found = host_of(client, host, worker_->deadline());
     if (!found) return std::unexpected(found.error());
-    return client.post_and_await({*found, 0, id.instance, id.event}, worker_->timeout());
+    return client.post_and_await({*found, id.instance, id.event}, worker_->timeout());
   }));
   return {.tasks = run.tasks,
           .last_task = run.last_task,

@@ -41,8 +41,8 @@ void time_calls(Duration slice, Samples& into, Call call) {
 }
 
 /// The event of the cell.
-[[nodiscard]] inline ApiRequest ping_event() {
-  return {kBenchHost, 0, "probe", "ping"};
+[[nodiscard]] inline HostEvent ping_event() {
+  return {kBenchHost, "probe", "ping"};
 }
 
 /// plchostd with one instance that runs the probe, "probe", whose external event is "ping".

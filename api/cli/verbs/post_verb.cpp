@@ -98,7 +98,7 @@ int tell_runs(const CliSession& session, const std::string& host, const PostArgu
   return kExitDone;
 }
 
-int post_and_await(CliSession& session, const PostArguments& arguments, const ApiRequest& event) {
+int post_and_await(CliSession& session, const PostArguments& arguments, const HostEvent& event) {
   std::vector<RunReport> runs;
   if (arguments.count > 1) catch_interrupts();
   const TimePoint first = MonotonicClock::now();
@@ -132,7 +132,7 @@ int post(CliSession& session, const PostArguments& arguments) {
   if (!parts) return CliSession::fail(parts.error());
   const auto host = session.target_host();
   if (!host) return CliSession::fail(host.error());
-  const ApiRequest event{*host, 0, std::move(parts->first), std::move(parts->second)};
+  const HostEvent event{*host, std::move(parts->first), std::move(parts->second)};
   if (arguments.wait == "run") return post_and_await(session, arguments, event);
   if (arguments.count > 1) catch_interrupts();
   const auto report = session.client().value()->post_event(event, arguments.count,

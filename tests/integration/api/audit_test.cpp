@@ -134,7 +134,7 @@ TEST_F(Audit, ADiskThatHangsAtTheStartOfTheServerStopsNeitherPresenceNorPostsNor
     const auto reply = client->call({"hosta", operation, "line1", ""}, soon());
     ASSERT_TRUE(reply) << reply.error().describe();
     EXPECT_EQ(reply->code, ErrorCode::ok);
-    const auto posted = client->post_event({"hosta", 0, "line1", "ready"}, 100, {}, kPatience);
+    const auto posted = client->post_event({"hosta", "line1", "ready"}, 100, {}, kPatience);
     ASSERT_TRUE(posted) << posted.error().describe();
     EXPECT_EQ(posted->accepted, 100U);
   }
@@ -175,7 +175,7 @@ TEST_F(Audit, ADiskThatHangsStopsNeitherPresenceNorPostsNorCommands) {
     const auto reply = client->call({"hosta", plc_OPERATION_STOP, "line1", ""}, soon());
     ASSERT_TRUE(reply) << reply.error().describe();
     EXPECT_EQ(reply->code, ErrorCode::ok);
-    const auto posted = client->post_event({"hosta", 0, "line1", "ready"}, 100, {}, kPatience);
+    const auto posted = client->post_event({"hosta", "line1", "ready"}, 100, {}, kPatience);
     ASSERT_TRUE(posted) << posted.error().describe();
     EXPECT_EQ(posted->accepted, 100U);
   }

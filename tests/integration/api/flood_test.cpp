@@ -99,7 +99,7 @@ TEST(PostFlood, OfSomeClientsStarvesNeitherAnotherNorItsCommands) {
 
   constexpr int kCalm = 200;
   const std::string posts = figures(kCalm, [&] {
-    const auto report = sut->post_event({"hosta", 0, "line1", "calm"}, 1, Duration::zero(), kPatience);
+    const auto report = sut->post_event({"hosta", "line1", "calm"}, 1, Duration::zero(), kPatience);
     ASSERT_TRUE(report) << report.error().describe();
     ASSERT_EQ(report->accepted, 1U);
   });
@@ -196,9 +196,8 @@ TEST(RequestFlood, OfSomeClientsKeepsNeitherThePresenceNorAnotherClientWaiting) 
   const std::uint64_t before = written;
   const TimePoint start = MonotonicClock::now();
 
-  const std::string posts = figures(100, [&] {
-    ASSERT_TRUE(sut->post_event({"hosta", 0, "line1", "calm"}, 1, Duration::zero(), kPatience));
-  });
+  const std::string posts = figures(
+      100, [&] { ASSERT_TRUE(sut->post_event({"hosta", "line1", "calm"}, 1, Duration::zero(), kPatience)); });
   const std::string commands =
       figures(20, [&] { ASSERT_TRUE(sut->call({"hosta", plc_OPERATION_STOP, "line1", ""}, soon())); });
 

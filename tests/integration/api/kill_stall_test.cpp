@@ -21,7 +21,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-const ApiRequest kStalled{"hosta", 0, "line1", "ready"};
+const HostEvent kStalled{"hosta", "line1", "ready"};
 
 class StallAtAKill : public testing::Test {
  protected:
@@ -51,7 +51,7 @@ class StallAtAKill : public testing::Test {
   Duration time_of_fresh_client() {
     const TimePoint begin = MonotonicClock::now();
     const auto client = connect(domain_);
-    EXPECT_TRUE(client->post_event({"hosta", 0, "line1", "other"}, 1, {}, kPatience));
+    EXPECT_TRUE(client->post_event({"hosta", "line1", "other"}, 1, {}, kPatience));
     return MonotonicClock::now() - begin;
   }
   /// Signs: that the event was counted.

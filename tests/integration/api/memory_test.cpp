@@ -46,7 +46,7 @@ TEST_F(Memory, ClientsThatComeAndGoLeaveNothingBehind) {
     ASSERT_TRUE(client->instances("hosta", soon()));
     const auto reply = client->call({"hosta", plc_OPERATION_STOP, "line1", ""}, soon());
     ASSERT_TRUE(reply) << reply.error().describe();
-    const auto posted = client->post_event({"hosta", 0, "line1", "ready"}, 1, {}, kPatience);
+    const auto posted = client->post_event({"hosta", "line1", "ready"}, 1, {}, kPatience);
     ASSERT_TRUE(posted) << posted.error().describe();
   });
 }

@@ -198,7 +198,7 @@ TEST(ManyObjects, AreListedPageByPageWhileTheHostAnswers) {
   EXPECT_EQ(std::ranges::adjacent_find(names), names.end());
   EXPECT_EQ(client->list_objects("hosta", {.name = "store/09999"}, soon()).value().objects.size(), 1U);
   // Of the topic that shows objects by themselves, a part; events in use are among them.
-  EXPECT_EQ(client->objects("hosta", soon()).value().size(), 4096U);
+  EXPECT_EQ(client->status<plc_ObjectStatus>("hosta", soon()).value().size(), 4096U);
   ASSERT_EQ(client->events("hosta", soon()).value().size(), 1U);
   const auto result = run_plcctl(domain.number(), {"list", "objects", "--json"});
   EXPECT_EQ(result.code, 0) << result.errors;

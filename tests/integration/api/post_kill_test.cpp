@@ -20,7 +20,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-const ApiRequest kReady{"hosta", 0, "line1", "ready"};
+const HostEvent kReady{"hosta", "line1", "ready"};
 
 /// A figure of a test, or what the environment says, for a longer run by hand.
 std::uint64_t figure(const char* variable, std::uint64_t usual) {

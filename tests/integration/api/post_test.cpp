@@ -24,7 +24,7 @@ TEST(RemotePost, CountsEachPostExactlyOnce) {
   host.start_server();
   const auto sut = connect(domain);
 
-  const auto report = sut->post_event({"hosta", 0, "line1", "ready"}, 5000, Duration::zero(), kPatience);
+  const auto report = sut->post_event({"hosta", "line1", "ready"}, 5000, Duration::zero(), kPatience);
 
   ASSERT_TRUE(report) << report.error().describe();
   EXPECT_EQ(report->accepted, 5000U);
@@ -40,7 +40,7 @@ TEST(RemotePost, SaysWhenNoTaskIsBound) {
   host.start_server();
   const auto sut = connect(domain);
 
-  const auto report = sut->post_event({"hosta", 0, "line1", "ready"}, 3, Duration::zero(), kPatience);
+  const auto report = sut->post_event({"hosta", "line1", "ready"}, 3, Duration::zero(), kPatience);
 
   ASSERT_TRUE(report) << report.error().describe();
   EXPECT_EQ(report->accepted, 3U);
@@ -54,7 +54,7 @@ TEST(RemotePost, OfAnUnknownEventIsRejectedByName) {
   host.start_server();
   const auto sut = connect(domain);
 
-  const auto report = sut->post_event({"hosta", 0, "line1", "redy"}, 2, Duration::zero(), kPatience);
+  const auto report = sut->post_event({"hosta", "line1", "redy"}, 2, Duration::zero(), kPatience);
 
   ASSERT_TRUE(report) << report.error().describe();
   EXPECT_EQ(report->accepted, 0U);
@@ -70,8 +70,8 @@ TEST(RemotePost, WithANameThatCannotBeIsRefusedAndTheNextOneGoesThrough) {
   host.start_server();
   const auto sut = connect(domain);
 
-  const auto bad = sut->post_event({"hosta", 0, "", ""}, 1, Duration::zero(), kPatience);
-  const auto good = sut->post_event({"hosta", 0, "line1", "ready"}, 1, Duration::zero(), kPatience);
+  const auto bad = sut->post_event({"hosta", "", ""}, 1, Duration::zero(), kPatience);
+  const auto good = sut->post_event({"hosta", "line1", "ready"}, 1, Duration::zero(), kPatience);
 
   ASSERT_FALSE(bad);
   EXPECT_EQ(bad.error().code, ErrorCode::invalid_argument);
@@ -90,10 +90,9 @@ TEST(RemotePost, ToALongerNameNeverReachesTheEventThatItBeginsWith) {
   const auto sut = connect(domain);
   ASSERT_TRUE(sut->prepare_posts("hosta", MonotonicClock::now() + kPatience));
 
-  const auto counted =
-      sut->post_event({"hosta", 0, "line1", longest + "eeeee"}, 1, Duration::zero(), kPatience);
+  const auto counted = sut->post_event({"hosta", "line1", longest + "eeeee"}, 1, Duration::zero(), kPatience);
   const auto fast = sut->post_one("hosta", "line1", longest + "e");
-  const auto fits = sut->post_event({"hosta", 0, "line1", longest}, 1, Duration::zero(), kPatience);
+  const auto fits = sut->post_event({"hosta", "line1", longest}, 1, Duration::zero(), kPatience);
 
   ASSERT_FALSE(counted);
   EXPECT_EQ(counted.error().code, ErrorCode::invalid_argument);
@@ -122,7 +121,7 @@ TEST(RemotePost, SurvivesTheDeathOfTheServer) {
       host.replace_server();
     }
   });
-  const auto report = sut->post_event({"hosta", 0, "line1", "ready"}, kPosts, Duration::zero(), kPatience);
+  const auto report = sut->post_event({"hosta", "line1", "ready"}, kPosts, Duration::zero(), kPatience);
   killer.join();
 
   ASSERT_TRUE(report) << report.error().describe();
@@ -145,7 +144,7 @@ TEST(RemotePost, GoesOnWhileAnotherClientIsStopped) {
   stopped.signal(SIGSTOP);
   const auto sut = connect(domain);
 
-  const auto report = sut->post_event({"hosta", 0, "line1", "fast"}, 5000, Duration::zero(), kPatience);
+  const auto report = sut->post_event({"hosta", "line1", "fast"}, 5000, Duration::zero(), kPatience);
 
   ASSERT_TRUE(report) << report.error().describe();
   EXPECT_EQ(report->accepted, 5000U);
@@ -159,7 +158,7 @@ TEST(RemotePost, WithoutAcknowledgementReachesTheEvent) {
   host.start_server();
   const auto sut = connect(domain);
   ASSERT_TRUE(sut->prepare_posts("hosta", soon()));
-  ASSERT_TRUE(sut->post_event({"hosta", 0, "line1", "ready"}, 1, Duration::zero(), kPatience));
+  ASSERT_TRUE(sut->post_event({"hosta", "line1", "ready"}, 1, Duration::zero(), kPatience));
 
   for (int i = 0; i < 100; ++i) ASSERT_TRUE(sut->post_one("hosta", "line1", "ready"));
 
@@ -237,8 +236,8 @@ TEST(RemotePost, WhoseRunIsAwaitedFailsWhenNoTaskIsBoundOrNoEventIsThere) {
   host.start_server();
   const auto sut = connect(domain);
 
-  const auto no_task = sut->post_and_await({"hosta", 0, "line1", "ready"}, kPatience);
-  const auto no_event = sut->post_and_await({"hosta", 0, "line1", "redy"}, kPatience);
+  const auto no_task = sut->post_and_await({"hosta", "line1", "ready"}, kPatience);
+  const auto no_event = sut->post_and_await({"hosta", "line1", "redy"}, kPatience);
 
   ASSERT_FALSE(no_task);
   EXPECT_EQ(no_task.error().code, ErrorCode::not_found);
@@ -255,7 +254,7 @@ TEST(RemotePost, WhoseRunIsAwaitedWaitsForAnInstanceThatIsStarting) {
   host.write_count(1);
   host.start_server();
   const auto sut = connect(domain);
-  const auto in_vain = sut->post_and_await({"hosta", 0, "line1", "ready"}, milliseconds(500));
+  const auto in_vain = sut->post_and_await({"hosta", "line1", "ready"}, milliseconds(500));
   ASSERT_FALSE(in_vain);
   EXPECT_NE(in_vain.error().code, ErrorCode::not_found) << in_vain.error().describe();
   const auto watcher = connect(domain);
@@ -277,7 +276,7 @@ TEST(RemotePost, WhoseRunIsAwaitedWaitsForAnInstanceThatIsStarting) {
     host.write_instance(0, "line1", InstanceState::stopped, 4711);
   });
 
-  const auto told = sut->post_and_await({"hosta", 0, "line1", "ready"}, kPatience);
+  const auto told = sut->post_and_await({"hosta", "line1", "ready"}, kPatience);
 
   ASSERT_FALSE(told);
   EXPECT_THAT(told.error().message, testing::HasSubstr("no task was bound"))
@@ -300,10 +299,10 @@ TEST(RemotePost, IsCountedForItsWriterAndForAllTogether) {
   host.add_event("line1", "ready").set_bound_tasks(1);
   host.start_server();
   const auto one = connect(domain);
-  ASSERT_TRUE(one->post_event({"hosta", 0, "line1", "ready"}, 30, Duration::zero(), kPatience));
+  ASSERT_TRUE(one->post_event({"hosta", "line1", "ready"}, 30, Duration::zero(), kPatience));
   {
     const auto other = connect(domain);
-    ASSERT_TRUE(other->post_event({"hosta", 0, "line1", "redy"}, 5, Duration::zero(), kPatience));
+    ASSERT_TRUE(other->post_event({"hosta", "line1", "redy"}, 5, Duration::zero(), kPatience));
     // Not what was received: that may be more, as what is not acknowledged soon is sent again.
     const auto done = [](const plc_WriterStatus& writer) { return writer.delivered + writer.rejected; };
     const auto writers = writers_when(*one, [&](const std::vector<plc_WriterStatus>& told) {
@@ -324,8 +323,7 @@ TEST(RemotePost, ToAHostThatIsNotThereEndsWithNoAnswer) {
   const OwnDomain domain;
   const auto sut = connect(domain);
 
-  const auto report =
-      sut->post_event({"nohost", 0, "line1", "ready"}, 1, Duration::zero(), milliseconds(200));
+  const auto report = sut->post_event({"nohost", "line1", "ready"}, 1, Duration::zero(), milliseconds(200));
 
   ASSERT_FALSE(report);
   EXPECT_EQ(report.error().code, ErrorCode::timed_out);

@@ -46,11 +46,11 @@ TEST(RemoteStatus, ShowsTwoHostsOfOneDomainApart) {
   ASSERT_EQ(instances.size(), 2U);
   EXPECT_EQ(instances[0].state, 7U);
   EXPECT_EQ(dds::text_of(instances[1].instance), "line2");
-  const auto report = sut->post_event({"hostb", 0, "line1", "ready"}, 10, Duration::zero(), seconds(20));
+  const auto report = sut->post_event({"hostb", "line1", "ready"}, 10, Duration::zero(), seconds(20));
   ASSERT_TRUE(report);
   EXPECT_EQ(report->accepted, 10U);
   EXPECT_EQ(event.counted().count(), 10U);
-  const auto wrong = sut->post_event({"hosta", 0, "line1", "ready"}, 1, Duration::zero(), seconds(20));
+  const auto wrong = sut->post_event({"hosta", "line1", "ready"}, 1, Duration::zero(), seconds(20));
   ASSERT_TRUE(wrong);
   EXPECT_EQ(wrong->rejected, 1U);
 }

@@ -102,10 +102,10 @@ TEST_F(StoppedServer, DoesWhatItsClientStillWaitsForOnce) {
 
 TEST_F(StoppedServer, CountsNoPostThatItsClientHasGivenUp) {
   auto client = known_client();
-  ASSERT_TRUE(client->post_event({"hosta", 0, "line1", "ready"}, 3, {}, kPatience));
+  ASSERT_TRUE(client->post_event({"hosta", "line1", "ready"}, 3, {}, kPatience));
   stop_server();
   const TimePoint began = MonotonicClock::now();
-  const auto report = client->post_event({"hosta", 0, "line1", "ready"}, 5, {}, kGivesUp);
+  const auto report = client->post_event({"hosta", "line1", "ready"}, 5, {}, kGivesUp);
   ASSERT_TRUE(report) << report.error().describe();
   EXPECT_EQ(report->unacknowledged, 5U);
   const std::vector<EventId> batch{{"line1", "ready"}};
@@ -123,7 +123,7 @@ TEST_F(StoppedServer, RejectsAGivenUpPostAndNotTheNextOne) {
   ASSERT_TRUE(client->post_batch("hosta", batch, kPatience));
   stop_server();
   const TimePoint began = MonotonicClock::now();
-  const auto report = client->post_event({"hosta", 0, "line1", "ready"}, 1, {}, milliseconds(100));
+  const auto report = client->post_event({"hosta", "line1", "ready"}, 1, {}, milliseconds(100));
   ASSERT_TRUE(report) << report.error().describe();
   EXPECT_EQ(report->unacknowledged, 1U);
   EXPECT_FALSE(client->post_batch("hosta", batch, milliseconds(100)));
@@ -131,7 +131,7 @@ TEST_F(StoppedServer, RejectsAGivenUpPostAndNotTheNextOne) {
       std::chrono::steady_clock::time_point((began + kStandsStill).time_since_epoch()));
   go_on();
 
-  const auto next = client->post_event({"hosta", 0, "line1", "ready"}, 1, {}, kPatience);
+  const auto next = client->post_event({"hosta", "line1", "ready"}, 1, {}, kPatience);
   const auto next_batch = client->post_batch("hosta", batch, kPatience);
 
   ASSERT_TRUE(next && next_batch);

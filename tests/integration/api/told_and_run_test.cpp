@@ -207,7 +207,7 @@ struct Poster {
 
   void post(const CountingInstance& sut) {
     const std::uint64_t before = sut.runs(event);
-    const auto told = client->post_and_await({"hosta", 0, "line1", "e" + std::to_string(event)}, kPatience);
+    const auto told = client->post_and_await({"hosta", "line1", "e" + std::to_string(event)}, kPatience);
     const std::uint64_t after = sut.runs(event);
     if (told) {
       ++run;
@@ -234,7 +234,7 @@ TEST_P(PostsAroundStops, OverDdsAreToldAsRunIfAndOnlyIfTheyRun) {
     posters[i].event = i;
     // The server follows the instance.
     const TimePoint end = soon();
-    while (!posters[i].client->post_and_await({"hosta", 0, "line1", "e" + std::to_string(i)}, kPatience) &&
+    while (!posters[i].client->post_and_await({"hosta", "line1", "e" + std::to_string(i)}, kPatience) &&
            MonotonicClock::now() < end) {
       ::usleep(10'000);
     }

@@ -25,7 +25,7 @@ class SecuredStallAtAKill : public SecuredHost {
 
   Duration time_of_fresh_client() {
     const TimePoint begin = MonotonicClock::now();
-    EXPECT_TRUE(make_client()->post_event({"cell", 0, "line1", "other"}, 1, {}, kPatience));
+    EXPECT_TRUE(make_client()->post_event({"cell", "line1", "other"}, 1, {}, kPatience));
     return MonotonicClock::now() - begin;
   }
   /// Until the event counts more.

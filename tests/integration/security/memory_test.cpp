@@ -22,7 +22,7 @@ class SecuredMemory : public SecuredHost {
   static bool ask_and_post(ControlClient& client) {
     constexpr Duration kLong = std::chrono::seconds(10);
     return client.call({"cell", plc_OPERATION_STOP, "line1", ""}, MonotonicClock::now() + kLong) &&
-           client.post_event({"cell", 0, "line1", "ready"}, 1, {}, kLong);
+           client.post_event({"cell", "line1", "ready"}, 1, {}, kLong);
   }
 };
 

@@ -37,7 +37,7 @@ TEST_F(OwnClients, AreNeverRefusedByTheGate) {
     clients.emplace_back([&client] {
       const TimePoint end = MonotonicClock::now() + std::chrono::seconds(8);
       while (MonotonicClock::now() < end) {
-        EXPECT_TRUE(client->post_event({"cell", 0, "line1", "ready"}, 1, {}, kPatience));
+        EXPECT_TRUE(client->post_event({"cell", "line1", "ready"}, 1, {}, kPatience));
         EXPECT_TRUE(client->call({"cell", plc_OPERATION_STOP, "line1", ""}, soon()));
         std::this_thread::sleep_for(std::chrono::milliseconds(100));
       }

@@ -88,7 +88,7 @@ class Packets : public SecuredHost {
   }
   /// By the client that has the right; each is acknowledged.
   void post(std::uint64_t count) {
-    const auto report = client_->post_event({"cell", 0, "line1", "ready"}, count, {}, kPatience);
+    const auto report = client_->post_event({"cell", "line1", "ready"}, count, {}, kPatience);
     ASSERT_TRUE(report) << report.error().describe();
     ASSERT_EQ(report->accepted, count);
     expected_ += count;

@@ -14,7 +14,7 @@ namespace {
 class PlainText : public SecuredHost {
  protected:
   [[nodiscard]] static testing::AssertionResult can_post(ControlClient& client, Duration patience) {
-    const auto posted = client.post_event({"cell", 0, "line1", "ready"}, 1, {}, patience);
+    const auto posted = client.post_event({"cell", "line1", "ready"}, 1, {}, patience);
     if (posted) return testing::AssertionSuccess();
     return testing::AssertionFailure() << posted.error().describe();
   }

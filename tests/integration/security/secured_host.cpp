@@ -43,7 +43,7 @@ SecuredHost::~SecuredHost() {
 }
 
 testing::AssertionResult SecuredHost::can_post(ControlClient& client, Duration patience) {
-  const auto posted = client.post_event({"cell", 0, "line1", "ready"}, 1, {}, patience);
+  const auto posted = client.post_event({"cell", "line1", "ready"}, 1, {}, patience);
   if (!posted) return testing::AssertionFailure() << posted.error().describe();
   if (posted->unacknowledged == 0) return testing::AssertionSuccess();
   return testing::AssertionFailure() << "the host has not acknowledged the post";

@@ -86,10 +86,10 @@ TEST_F(Strangers, WhoseCertificateEndsWhileTheyAreServedAreServedNoMore) {
   options.domain = domain_.number();
   options.identity = folder("brief");
   const auto client = ControlClient::connect(options).value();
-  const auto served = client->post_event({"cell", 0, "line1", "ready"}, 1, {}, kPatience);
+  const auto served = client->post_event({"cell", "line1", "ready"}, 1, {}, kPatience);
   ASSERT_TRUE(served) << served.error().describe();
   while (std::time(nullptr) <= now + kSeconds) std::this_thread::sleep_for(std::chrono::milliseconds(50));
-  const auto refused = client->post_event({"cell", 0, "line1", "ready"}, 1, {}, std::chrono::seconds(1));
+  const auto refused = client->post_event({"cell", "line1", "ready"}, 1, {}, std::chrono::seconds(1));
   EXPECT_TRUE(!refused || refused->accepted == 0);
   EXPECT_EQ(event_.counted().count(), 1U);
 }
