@@ -82,7 +82,6 @@ Result<StatisticsReport> ControlClient::statistics(const std::string& host, std:
   }
   for (;;) {
     update();
-    drop_replies();
     if (const auto view = present(host)) {
       if (auto found = statistics_.find(host, view->epoch, instance, task)) return std::move(*found);
     }
@@ -113,7 +112,7 @@ Result<std::vector<TransitionView>> ControlClient::transitions() {
     }
     transition_log_ = TransitionLog(*std::move(topic), *std::move(reader));
   }
-  update();  // or what has come on other topics would keep waits from waiting
+  update();
   return transition_log_.take();
 }
 
@@ -200,10 +199,7 @@ Result<ApiReply> ControlClient::call(const ApiRequest& request, TimePoint deadli
   if (auto good = check_api_request(request); !good) return std::unexpected(std::move(good).error());
   // Samples that have come on other topics would keep the wait from waiting.
   const auto look = [&, woken = false](const auto& /*identity*/, TimePoint /*now*/) mutable {
-    if (std::exchange(woken, true)) {
-      update();
-      calm_pages();
-    }
+    if (std::exchange(woken, true)) update();
     return RequestCaller::Wait{.deadline = deadline};
   };
   auto reply = ask(request, deadline, look);
@@ -211,25 +207,9 @@ Result<ApiReply> ControlClient::call(const ApiRequest& request, TimePoint deadli
   return reply;
 }
 
-// Pages stay unread until their answer has come, and the end of a host is told by their readers, too: that
-// they woke this client is enough once.
-void ControlClient::calm_pages() const noexcept {
-  for (const PageReader* const pages : {&object_pages_, &node_pages_, &log_pages_}) {
-    std::uint32_t statuses = 0;
-    if (pages->reader) (void)dds_take_status(pages->reader.get(), &statuses, DDS_DATA_AVAILABLE_STATUS);
-  }
-}
-
-void ControlClient::drop_replies() {
-  if (!reply_reader_) return;
-  dds::take_valid_told<plc_Reply, dds::kReply.qos.depth>(
-      reply_reader_.get(), answering_, [](const plc_Reply& /*reply*/, const auto& /*info*/) {});
-}
-
 void ControlClient::await_status(const std::string& host, const ApiReply& reply, TimePoint deadline) {
   for (;;) {
     update();
-    drop_replies();
     const auto view = present(host);
     if (!view || view->status.round >= reply.status_round || MonotonicClock::now() >= deadline) return;
     wait_set_.wait(deadline);

@@ -230,8 +230,6 @@ class ControlClient {
   /// Keeps answers to this client only.
   template <class Answer>
   [[nodiscard]] Result<void> open_own_reader(dds::Entity& topic, dds::Entity& reader, const dds::Qos& qos);
-  /// Of acknowledgements: the latest one of each source is kept, so there is nothing that fills up.
-  [[nodiscard]] Result<void> open_ack_reader();
   [[nodiscard]] Result<dds::Entity> make_own_topic(const dds::TopicInfo& info);
   [[nodiscard]] Result<void> read_own(dds::Entity& topic, dds::Entity& reader, dds::Entity made,
                                       const dds::Qos& qos);
@@ -257,9 +255,6 @@ class ControlClient {
     dds::Entity topic;
     dds::Entity reader;
   };
-  void calm_pages() const noexcept;
-  /// While no call is under way: answers to calls that were given up would keep waits from waiting.
-  void drop_replies();
   template <class Page, class Listing>
   [[nodiscard]] Result<Listing> ask_for_page(PageReader& pages, const dds::TopicInfo& topic,
                                              const ApiRequest& request, TimePoint deadline);

@@ -52,7 +52,7 @@ Result<ApiReply> ControlClient::download(const Download& download, const Downloa
   if (!sender) return std::unexpected(sender.error());
   std::uint64_t told = 0;
   const auto go_on = [&](const plc_SampleIdentity& identity, TimePoint now) -> RequestCaller::Wait {
-    update();  // or what has come on other topics would keep the wait from waiting
+    update();
     dds::take_valid_told<plc_DownloadAck>(
         download_acks_.reader.get(), answering_,
         [&](const plc_DownloadAck& ack, const auto& /*info*/) { sender->on_ack(ack, identity, now); });

@@ -52,9 +52,6 @@ std::vector<std::string> HostView::schedulers() const {
 
 void ControlClient::update_hosts() {
   const TimePoint now = MonotonicClock::now();
-  // Looked at, it is over; else no wait would wait any more.
-  dds_requested_deadline_missed_status_t missed{};
-  (void)dds_get_requested_deadline_missed_status(presence_.reader(), &missed);
   // None is kept beside what seen_ has of it: that is bounded.
   dds::take_valid_told<plc_Presence>(
       presence_.reader(), presence_.writers(), [&](const plc_Presence& presence, const auto& info) {

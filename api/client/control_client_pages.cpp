@@ -52,8 +52,7 @@ Result<Listing> ControlClient::ask_for_page(PageReader& pages, const dds::TopicI
               take_page<Page, Listing>(pages.reader.get(), answering_, request.host, reply->identity))
         return *std::move(listing);
       if (MonotonicClock::now() >= until) break;
-      update();  // or what has come on other topics would keep the wait from waiting
-      drop_replies();
+      update();
       wait_set_.wait(until);
     }
     if (MonotonicClock::now() >= deadline) break;

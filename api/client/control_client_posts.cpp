@@ -11,18 +11,14 @@
 
 namespace plchost {
 
-Result<void> ControlClient::open_ack_reader() {
-  if (ack_reader_) return {};
-  auto made = make_own_topic(dds::kEventAck);
-  if (!made) return std::unexpected(std::move(made).error());
-  return read_own(ack_topic_, ack_reader_, *std::move(made), dds::qos_of(dds::kEventAck));
-}
-
 template <class Sample>
 Result<Poster<Sample>*> ControlClient::poster(const std::string& host) {
   auto& [topic, of_host] = std::get<Posters<Sample>>(posters_);
   if (const auto known = of_host.find(host); known != of_host.end()) return &known->second;
-  if (auto opened = open_ack_reader(); !opened) return std::unexpected(opened.error());
+  const dds::Qos qos = dds::qos_of(dds::kEventAck);  // the latest one of each source
+  if (auto opened = open_own_reader<plc_EventAck>(ack_topic_, ack_reader_, qos); !opened) {
+    return std::unexpected(std::move(opened).error());
+  }
   if (!topic) {
     auto made = dds::make_topic(entity(), dds::kTopicOf<Sample>);
     if (!made) return std::unexpected(made.error());

@@ -69,11 +69,7 @@ Result<RunReport> ControlClient::post_and_await(const HostEvent& event, Duration
     auto run = post_and_await_once(event, deadline);
     const TimePoint again = MonotonicClock::now() + kInstanceLook;
     if (run || run.error().code != ErrorCode::unavailable || again >= deadline) return run;
-    const EventPoster& posts = **poster<plc_EventPost>(event.host);
-    for (TimePoint now = MonotonicClock::now(); now < again; now = MonotonicClock::now()) {
-      // Answers that come late would keep the wait from waiting.
-      (void)take_acks(now);
-      (void)take_run(posts, event.host, 0, now);
+    while (MonotonicClock::now() < again) {
       update();
       wait_set_.wait(again);
     }

@@ -46,7 +46,6 @@ Result<std::vector<Sample>> ControlClient::status(const std::string& host, TimeP
   }
   for (;;) {
     update();
-    drop_replies();
     if (const auto view = present(host)) {
       const auto expected = count_of<Sample>(view->status);
       if (!expected) {

@@ -14,8 +14,9 @@
 namespace plchost {
 
 /// The answers to one client. Each client of a participant gets what hosts answer to all of them. One that
-/// takes nothing for a while would fill its readers, and Cyclone's receiving thread waits for a full reader:
-/// so answers to others are not kept in the first place.
+/// takes nothing for a while would fill its readers, and Cyclone's receiving thread waits for a full reader.
+/// An acknowledgement is kept for each source that posts, and new ones may post without an end. So answers to
+/// others are not kept in the first place.
 class OwnAnswers {
  public:
   OwnAnswers() = default;
@@ -51,6 +52,7 @@ class OwnAnswers {
     return dds::Guid::from(ack.download.writer_guid);
   }
   static dds::Guid asker_of(const plc_EventRun& run) noexcept { return dds::Guid::from(run.source); }
+  static dds::Guid asker_of(const plc_EventAck& ack) noexcept { return dds::Guid::from(ack.source); }
   /// A page.
   template <class Page>
   static dds::Guid asker_of(const Page& page) noexcept {

@@ -15,7 +15,8 @@ class WaitSet {
   /// `statuses`: DDS_DATA_AVAILABLE_STATUS and others of a reader, DDS_PUBLICATION_MATCHED_STATUS of a
   /// writer.
   [[nodiscard]] Result<void> add(dds_entity_t entity, std::uint32_t statuses);
-  /// Returns at the deadline at the latest, and earlier without cause: look again.
+  /// Returns at the deadline at the latest, and earlier without cause: look again. Look before the first wait
+  /// and after each: a sample ends one wait, also if nobody takes it.
   void wait(TimePoint deadline) const noexcept;
   /// Ends the wait that is under way, else the next one. Any thread.
   void wake() const noexcept;

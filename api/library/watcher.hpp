@@ -81,7 +81,7 @@ class __attribute__((visibility("hidden"))) Client::Watcher {
   std::vector<TransitionView> transitions_;  // for watches that come later: the kept samples of hosts come
                                              // only once
   std::optional<std::uint64_t> looked_;      // ControlClient::changes() at the last look
-  // Since the first watch of them; untaken ones would keep the wait from waiting, also after the last.
+  // Since the first watch of them, also after the last: a later one is told those that came meanwhile.
   bool takes_transitions_ = false;
   bool ending_ = false;
   std::thread thread_;
