@@ -12,8 +12,9 @@
 //       std::this_thread::sleep_for(std::chrono::minutes(1));
 //     }
 //
-// Everywhere: `host` is the name of a host; empty: the only one that answers (an error if several do). An
-// event is "INSTANCE/EVENT". Times are in the unit that their type says; wall-clock times are the host's.
+// Everywhere: `host` is the name of a host; empty: Options::host, or the only one that answers (an error if
+// several do). An event is "INSTANCE/EVENT". Times are in the unit that their type says; wall-clock times are
+// the host's.
 //
 // Connections make and mend themselves: a host may come later, end and come back, and so may the network. A
 // call waits for its host as long as Options::timeout says; a watch goes on when its host does.
@@ -84,6 +85,9 @@ class PLCHOST_CLIENT_API Client {
     std::vector<std::string> peers{};           ///< addresses of hosts; none: 127.0.0.1
     std::string identity{};                   ///< folder of `plcctl security add-identity`; empty: unsecured
     std::chrono::milliseconds timeout{3000};  ///< of each call, 1 ms to an hour
+    /// The Client is for this one host; empty: for all. No other host sends it anything, `host` of a call may
+    /// be left out, and another one is an invalid_argument.
+    std::string host{};
   };
 
   // The state of hosts, as the contract has it: plchost_client_types.hpp is made from control.idl.

@@ -17,7 +17,8 @@ namespace plchost {
 Result<ControlClient*> CliSession::client() {
   if (!client_) {
     dds::install_log_sink();
-    auto connected = ControlClient::connect(options.dds);
+    auto connected = ControlClient::connect(
+        options.dds, options.hosts.names_one() ? std::string_view(options.hosts.host) : std::string_view());
     if (!connected) return std::unexpected(connected.error());
     client_ = std::move(*connected);
   }
@@ -78,7 +79,10 @@ Result<std::vector<HostView>> CliSession::shown_hosts() {
 Result<std::vector<HostView>> CliSession::known_hosts() {
   const auto connected = client();
   if (!connected) return std::unexpected(connected.error());
-  return select((*connected)->known_hosts(deadline()));
+  const auto known = (*connected)->known_hosts(deadline());
+  // For the names of those that answer.
+  if (known.empty() && options.hosts.names_one()) return shown_hosts();
+  return select(known);
 }
 
 Result<std::vector<HostView>> CliSession::select(const std::vector<HostView>& all) const {

@@ -44,7 +44,7 @@ class CliSession {
  public:
   CliOptions options;
 
-  /// Connects at the first call.
+  /// Connects at the first call, for one host only if --host names one.
   [[nodiscard]] Result<ControlClient*> client();
   /// The end of the timeout, from now on.
   [[nodiscard]] TimePoint deadline() const;

@@ -28,7 +28,7 @@ struct HostOutcome {
   std::string host;
   Result<ApiReply> reply;
 };
-/// The command to one host, over that connection.
+/// The command to one host, over that connection, which may be for that host only.
 using HostCall = std::function<Result<ApiReply>(ControlClient& client, const std::string& host)>;
 /// Asks all hosts at the same time, each by a ControlClient and a thread of its own. In the order of the
 /// hosts.

@@ -26,6 +26,14 @@ Result<void> check_host_name(std::string_view host) {
   return check_name("host", host, kMaxHostName);
 }
 
+Result<void> check_host_name(std::string_view host, std::string_view only) {
+  if (auto good = check_host_name(host); !good || only.empty() || host == only) return good;
+  return failure(
+      ErrorCode::invalid_argument,
+      fmt::format("this client is for host '{}' only, not for '{}': use one for that host, or for all", only,
+                  host));
+}
+
 Result<void> check_event_name(std::string_view instance, std::string_view event) {
   if (auto good = check_instance_name(instance); !good) return good;
   return check_name("event", event, kMaxEventName);
@@ -36,8 +44,8 @@ Result<void> check_task_name(std::string_view instance, std::string_view task) {
   return check_name("task", task, kMaxTaskName);
 }
 
-Result<void> check_api_request(const ApiRequest& request) {
-  if (auto good = check_host_name(request.host); !good) return good;
+Result<void> check_api_request(const ApiRequest& request, std::string_view only) {
+  if (auto good = check_host_name(request.host, only); !good) return good;
   if (!request.instance.empty()) {
     if (auto good = check_instance_name(request.instance); !good) return good;
   }

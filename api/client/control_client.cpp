@@ -23,22 +23,31 @@ bool is_engineering(std::int32_t operation) {
 
 }  // namespace
 
-Result<std::unique_ptr<ControlClient>> ControlClient::connect(const dds::DomainOptions& options) {
+Result<std::unique_ptr<ControlClient>> ControlClient::connect(const dds::DomainOptions& options,
+                                                              std::string_view only) {
   auto entered = enter_domain(options);
   if (!entered) return std::unexpected(std::move(entered).error());
-  return connect(*std::move(entered));
+  return connect(*std::move(entered), only);
 }
 
-Result<std::unique_ptr<ControlClient>> ControlClient::connect(std::shared_ptr<Participant> participant) {
+Result<std::unique_ptr<ControlClient>> ControlClient::connect(std::shared_ptr<Participant> participant,
+                                                              std::string_view only) {
+  // A pattern would be one of partitions.
+  if (!only.empty()) {
+    if (auto good = check_host_name(only); !good) return std::unexpected(std::move(good).error());
+  }
   std::unique_ptr<ControlClient> client(new ControlClient);
-  if (auto opened = client->open(std::move(participant)); !opened) return std::unexpected(opened.error());
+  if (auto opened = client->open(std::move(participant), only); !opened)
+    return std::unexpected(opened.error());
   return client;
 }
 
-Result<void> ControlClient::open(std::shared_ptr<Participant> participant) {
+Result<void> ControlClient::open(std::shared_ptr<Participant> participant, std::string_view only) {
   participant_ = std::move(participant);
+  only_ = only;
   partition_ = dds::client_partition(dds::guid_of(entity()).hex(), dds::kAllHosts);
-  auto subscriber = dds::make_subscriber(entity(), dds::status_partition(dds::kAllHosts));
+  auto subscriber =
+      dds::make_subscriber(entity(), dds::status_partition(only.empty() ? dds::kAllHosts : only));
   if (!subscriber) return std::unexpected(subscriber.error());
   status_subscriber_ = *std::move(subscriber);
   auto wait_set = WaitSet::create(entity());
@@ -75,7 +84,7 @@ Result<std::vector<plc_TaskStatus>> ControlClient::tasks(const std::string& host
 
 Result<StatisticsReport> ControlClient::statistics(const std::string& host, std::string_view instance,
                                                    std::string_view task, TimePoint deadline) {
-  if (auto good = check_host_name(host); !good) return std::unexpected(std::move(good).error());
+  if (auto good = check_host_name(host, only_); !good) return std::unexpected(std::move(good).error());
   if (auto good = check_task_name(instance, task); !good) return std::unexpected(std::move(good).error());
   if (auto opened = open_cache(statistics_, dds::kTaskStatistics); !opened) {
     return std::unexpected(opened.error());
@@ -196,8 +205,7 @@ Result<ApiReply> ControlClient::ask(const ApiRequest& request, TimePoint deadlin
 }
 
 Result<ApiReply> ControlClient::call(const ApiRequest& request, TimePoint deadline) {
-  if (auto good = check_api_request(request); !good) return std::unexpected(std::move(good).error());
-  // Samples that have come on other topics would keep the wait from waiting.
+  if (auto good = check_api_request(request, only_); !good) return std::unexpected(std::move(good).error());
   const auto look = [&, woken = false](const auto& /*identity*/, TimePoint /*now*/) mutable {
     if (std::exchange(woken, true)) update();
     return RequestCaller::Wait{.deadline = deadline};

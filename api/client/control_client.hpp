@@ -82,6 +82,8 @@ using DownloadProgressFunction = std::function<void(std::uint64_t received)>;
 
 /// The client's end of the DDS API: sees all hosts of a domain (of names, at most SeenHosts::kMost) and
 /// addresses any. One thread at a time.
+/// A client for one host reads that host's partition only, so no other host sends it anything. It sees no
+/// other host, and refuses to address one (invalid_argument).
 /// Nothing here waits beyond the deadline it was given; deadlines are of MonotonicClock. invalid_argument, at
 /// once and with nothing sent: a name that no host, instance, event or task can have, or a text too long.
 class ControlClient {
@@ -96,11 +98,14 @@ class ControlClient {
   static constexpr Duration kQuiet = std::chrono::milliseconds(200);
   static constexpr Duration kQuietOnNetworks = std::chrono::milliseconds(1200);
 
-  /// With a participant of its own.
-  [[nodiscard]] static Result<std::unique_ptr<ControlClient>> connect(const dds::DomainOptions& options);
+  /// With a participant of its own. `only`: it is for that one host; empty: for all.
+  [[nodiscard]] static Result<std::unique_ptr<ControlClient>> connect(const dds::DomainOptions& options,
+                                                                      std::string_view only = {});
   /// Beside others of this process, which have the same participant and may be on other threads.
   [[nodiscard]] static Result<std::unique_ptr<ControlClient>> connect(
-      std::shared_ptr<Participant> participant);
+      std::shared_ptr<Participant> participant, std::string_view only = {});
+  /// The one host that it is for; empty: all.
+  [[nodiscard]] const std::string& only() const noexcept { return only_; }
   [[nodiscard]] const std::shared_ptr<Participant>& participant() const noexcept { return participant_; }
 
   /// The hosts that answer, by name: waits for the first one until the deadline, then until none is news any
@@ -111,8 +116,8 @@ class ControlClient {
   [[nodiscard]] std::vector<HostView> known_hosts(TimePoint deadline);
   /// Asks a host for its time, several times: the best of them counts. refused: only operators may ask.
   [[nodiscard]] Result<ClockOffset> clock_offset(const std::string& host, TimePoint deadline);
-  /// That host, as soon as it is seen. not_found: it does not answer; the text lists who does, and which of
-  /// them may be meant.
+  /// That host, as soon as it is seen. not_found: it does not answer; the text lists the hosts that do (for a
+  /// client for one host: those that DDS has discovered), and which of them may be meant.
   [[nodiscard]] Result<HostView> host(std::string_view name, TimePoint deadline);
 
   /// Whether a host that was seen does not show its presence at present: its server is dead, or hangs, or
@@ -217,7 +222,7 @@ class ControlClient {
 
  private:
   ControlClient() = default;
-  Result<void> open(std::shared_ptr<Participant> participant);
+  Result<void> open(std::shared_ptr<Participant> participant, std::string_view only);
   [[nodiscard]] dds_entity_t entity() const noexcept { return participant_->entity.get(); }
   void update();
   void update_hosts();
@@ -260,6 +265,7 @@ class ControlClient {
                                              const ApiRequest& request, TimePoint deadline);
 
   std::shared_ptr<Participant> participant_;
+  std::string only_;
   WaitSet wait_set_;
   OwnAnswers own_answers_;  // its readers end before it
   std::string partition_;

@@ -157,7 +157,7 @@ std::vector<HostView> ControlClient::hosts(TimePoint deadline) {
 }
 
 Result<HostView> ControlClient::host(std::string_view name, TimePoint deadline) {
-  if (auto good = check_host_name(name); !good) return std::unexpected(std::move(good).error());
+  if (auto good = check_host_name(name, only_); !good) return std::unexpected(std::move(good).error());
   const TimePoint began = MonotonicClock::now();
   for (;;) {
     update();
@@ -165,6 +165,9 @@ Result<HostView> ControlClient::host(std::string_view name, TimePoint deadline) 
     if (MonotonicClock::now() >= deadline) break;
     wait_set_.wait(deadline);
   }
+  // The others send it nothing.
+  if (!only_.empty())
+    return failure(ErrorCode::not_found, no_such_host(name, dds::discovered_hosts(entity())));
   // Those too that are late at this very moment.
   std::vector<std::string> names;
   for (const auto& [other, seen] : seen_.all()) {

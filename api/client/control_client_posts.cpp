@@ -39,7 +39,7 @@ void ControlClient::use_clock(EventPoster& posts, const std::string& host, Durat
 }
 
 Result<void> ControlClient::prepare_posts(const std::string& host, TimePoint deadline) {
-  if (auto good = check_host_name(host); !good) return good;
+  if (auto good = check_host_name(host, only_); !good) return good;
   const auto way = poster<plc_EventPost>(host);
   if (!way) return std::unexpected(way.error());
   update_hosts();  // the limit is by the newest presence
@@ -115,7 +115,7 @@ Result<PostReport> ControlClient::post_event(const HostEvent& event, std::uint64
 
 Result<PostReport> ControlClient::post_batch(const std::string& host, std::span<const EventId> events,
                                              Duration patience) {
-  if (auto good = check_host_name(host); !good) return std::unexpected(std::move(good).error());
+  if (auto good = check_host_name(host, only_); !good) return std::unexpected(std::move(good).error());
   if (events.empty() || events.size() > kMaxBatch) {
     return failure(ErrorCode::invalid_argument,
                    fmt::format("a batch of {} events; allowed are 1 to {}", events.size(), kMaxBatch));

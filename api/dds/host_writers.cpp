@@ -1,6 +1,11 @@
 #include "api/dds/host_writers.hpp"
 
 #include <cstdint>
+#include <set>
+#include <string_view>
+
+#include "api/dds/entity.hpp"
+#include "api/dds/topics.hpp"
 
 namespace plchost::dds {
 
@@ -26,6 +31,17 @@ std::string_view host_in_partition(std::string_view partition) noexcept {
   }
   const auto dot = partition.find('.');
   return dot == std::string_view::npos ? std::string_view() : partition.substr(dot + 1);
+}
+
+std::vector<std::string> discovered_hosts(dds_entity_t participant) {
+  const Entity writers(dds_create_reader(participant, DDS_BUILTIN_TOPIC_DCPSPUBLICATION, nullptr, nullptr));
+  std::set<std::string> hosts;
+  take_valid<dds_builtintopic_endpoint_t>(
+      writers.get(), [&](const dds_builtintopic_endpoint_t& writer, const auto& /*info*/) {
+        if (std::string_view(writer.topic_name) == kPresence.name) hosts.insert(host_of(writer.qos));
+      });
+  hosts.erase("");
+  return {hosts.begin(), hosts.end()};
 }
 
 bool HostWriters::speaks_for(std::string_view host, dds_entity_t reader, const dds_sample_info_t& info) {

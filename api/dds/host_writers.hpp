@@ -4,6 +4,7 @@
 #include <string>
 #include <string_view>
 #include <unordered_map>
+#include <vector>
 
 #include <dds/dds.h>
 
@@ -30,6 +31,10 @@ class HostWriters {
 
 /// The host that a writer's partition names; empty: it names none. See topics.hpp.
 [[nodiscard]] std::string_view host_in_partition(std::string_view partition) noexcept;
+
+/// The hosts whose presence has a writer that discovery knows, by name: also those of which no reader takes
+/// anything. Any thread.
+[[nodiscard]] std::vector<std::string> discovered_hosts(dds_entity_t participant);
 
 /// As take_all(), of the samples that the host has written that they speak of.
 template <class Sample, std::size_t Max = 64, class Function>

@@ -22,6 +22,7 @@ Result<std::string> host_of(ControlClient& client, const std::string& name, Time
     if (!found) return std::unexpected(std::move(found).error());
     return std::move(found->name);
   }
+  if (!client.only().empty()) return host_of(client, client.only(), deadline);
   const auto all = client.hosts(deadline);
   if (all.size() == 1) return all.front().name;
   if (all.empty()) return failure(ErrorCode::unavailable, "no host answers");

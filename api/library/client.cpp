@@ -72,7 +72,7 @@ Client::Client() : Client(Options{}) {}
 Client::Client(const Options& options) {
   const auto participant = std::make_shared<ParticipantSource>(domain_options(options));
   worker_ = std::make_unique<Worker>(options, participant);
-  watcher_ = std::make_unique<Watcher>(participant);
+  watcher_ = std::make_unique<Watcher>(participant, options.host);
 }
 Client::~Client() {
   if (worker_->maker().is_this()) return;

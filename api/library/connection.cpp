@@ -8,7 +8,7 @@ Result<ControlClient*> Connection::client() {
   if (!client_) {
     auto participant = participant_->get();
     if (!participant) return std::unexpected(std::move(participant).error());
-    auto connected = ControlClient::connect(*std::move(participant));
+    auto connected = ControlClient::connect(*std::move(participant), only_);
     if (!connected) return std::unexpected(std::move(connected).error());
     client_ = *std::move(connected);
   }

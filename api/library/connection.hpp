@@ -2,6 +2,7 @@
 
 #include <functional>
 #include <memory>
+#include <string>
 #include <thread>
 #include <utility>
 
@@ -16,12 +17,14 @@ namespace plchost {
 /// may come later. One thread.
 class Connection {
  public:
-  explicit Connection(std::shared_ptr<ParticipantSource> participant)
-      : participant_(std::move(participant)) {}
+  /// `only`: as for ControlClient.
+  Connection(std::shared_ptr<ParticipantSource> participant, std::string only)
+      : participant_(std::move(participant)), only_(std::move(only)) {}
   [[nodiscard]] Result<ControlClient*> client();
 
  private:
   std::shared_ptr<ParticipantSource> participant_;
+  std::string only_;
   std::unique_ptr<ControlClient> client_;
 };
 

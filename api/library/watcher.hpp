@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "api/library/connection.hpp"
@@ -50,7 +51,9 @@ class __attribute__((visibility("hidden"))) Client::Watch::Subscription {
 /// holds up no watch. The thread waits for DDS, and looks when something has changed.
 class __attribute__((visibility("hidden"))) Client::Watcher {
  public:
-  explicit Watcher(std::shared_ptr<ParticipantSource> participant) : connection_(std::move(participant)) {}
+  /// `only`: as for ControlClient.
+  Watcher(std::shared_ptr<ParticipantSource> participant, std::string only)
+      : connection_(std::move(participant), std::move(only)) {}
   ~Watcher() { end(); }
   Watcher(const Watcher&) = delete;
   Watcher& operator=(const Watcher&) = delete;

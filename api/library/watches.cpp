@@ -168,6 +168,7 @@ Client::Watch Client::watch_hosts(std::function<void(const Host&)> callback) {
 template <class Sample, class Item>
 Client::Watch Client::watch_status(const std::string& host, std::function<void(const Item&)> callback) {
   check_callback(static_cast<bool>(callback));
+  if (!host.empty()) worker_->check_watched(host);
   return begin_watch(std::make_shared<StatusWatch<Sample>>(host, std::move(callback)));
 }
 
@@ -197,6 +198,7 @@ Client::Watch Client::watch_exceptions(const std::string& host,
 Client::Watch Client::watch_transitions(const std::string& host,
                                         std::function<void(const Transition&)> callback) {
   check_callback(static_cast<bool>(callback));
+  if (!host.empty()) worker_->check_watched(host);
   return begin_watch(std::make_shared<TransitionsWatch>(host, std::move(callback)));
 }
 

@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "api/client/check_names.hpp"
 #include "api/library/convert.hpp"
 
 namespace plchost {
@@ -31,8 +32,11 @@ Result<ControlClient*> too_many(std::size_t most) {
 }  // namespace
 
 Client::Worker::Worker(const Options& options, std::shared_ptr<ParticipantSource> participant)
-    : connection_(std::move(participant)), timeout_(checked_timeout(options.timeout)) {
+    : connection_(std::move(participant), options.host),
+      timeout_(checked_timeout(options.timeout)),
+      only_(options.host) {
   // Here, where it can be said at once.
+  if (!only_.empty()) check_watched(only_);
   if (const auto good = dds::domain_configuration(dds::Role::client, domain_options(options)); !good) {
     throw_client_error(good.error());
   }
@@ -61,6 +65,10 @@ void Client::Worker::begin(Job job) {
   }
   if (job) return job(ending ? ended() : too_many(kMaxJobs));
   changed_.notify_all();
+}
+
+void Client::Worker::check_watched(const std::string& host) const {
+  if (const auto good = check_host_name(host, only_); !good) throw_client_error(good.error());
 }
 
 Result<ControlClient*> Client::Worker::busy() {

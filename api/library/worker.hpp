@@ -5,6 +5,7 @@
 #include <functional>
 #include <future>
 #include <mutex>
+#include <string>
 #include <thread>
 #include <utility>
 
@@ -31,6 +32,9 @@ class __attribute__((visibility("hidden"))) Client::Worker {
 
   /// How many calls may wait for those before them.
   static constexpr std::size_t kMaxJobs = 1024;
+
+  /// ClientError: invalid_argument: there cannot be a host of that name, or the Client is for another one.
+  void check_watched(const std::string& host) const;
 
   /// Waits for the job that is under way; those that were not begun, and all that come, are called with
   /// `unavailable`. Not from a job.
@@ -62,6 +66,7 @@ class __attribute__((visibility("hidden"))) Client::Worker {
   MakerProcess maker_;
   Connection connection_;
   Duration timeout_;
+  std::string only_;
   std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<Job> jobs_;

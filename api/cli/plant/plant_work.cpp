@@ -99,7 +99,7 @@ void HostWork::tell(Kind result, const WantedInstance* instance, std::string rem
 
 bool HostWork::enter(ParticipantSource& participant) {
   auto entered = participant.get();
-  auto connected = entered ? ControlClient::connect(*std::move(entered))
+  auto connected = entered ? ControlClient::connect(*std::move(entered), wanted_.name)
                            : Result<std::unique_ptr<ControlClient>>(std::unexpected(entered.error()));
   if (!connected) {
     tell(Kind::unknown, nullptr, connected.error().describe());

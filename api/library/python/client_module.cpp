@@ -230,7 +230,8 @@ void define_error(py::module_& module) {
 }
 
 Client::Options options_of(unsigned domain, std::vector<std::string> interfaces,
-                           std::vector<std::string> peers, std::string identity, double timeout) {
+                           std::vector<std::string> peers, std::string identity, double timeout,
+                           std::string host) {
   constexpr double kPerSecond = 1000;
   constexpr double kMost = 1e9;
   const double ms = timeout > 0 && timeout < kMost ? timeout * kPerSecond : 0;  // 0 is refused with a text
@@ -238,7 +239,8 @@ Client::Options options_of(unsigned domain, std::vector<std::string> interfaces,
           .interfaces = std::move(interfaces),
           .peers = std::move(peers),
           .identity = std::move(identity),
-          .timeout = std::chrono::milliseconds(static_cast<std::int64_t>(ms))};
+          .timeout = std::chrono::milliseconds(static_cast<std::int64_t>(ms)),
+          .host = std::move(host)};
 }
 
 using ClientClass = py::class_<Client, Holder<Client>>;
@@ -440,18 +442,19 @@ PYBIND11_MODULE(plchost_client, module) {
   define_error(module);
   define_states(module);
   define_results(module);
-  ClientClass client(module, "Client",
-                     "One connection to all hosts of a DDS domain. timeout: seconds, of each call.");
+  ClientClass client(
+      module, "Client",
+      "One connection to all hosts of a DDS domain, or to one: host. timeout: seconds, of each call.");
   client.def(py::init([](unsigned domain, std::vector<std::string> interfaces, std::vector<std::string> peers,
-                         std::string identity, double timeout) {
+                         std::string identity, double timeout, std::string host) {
                Holder<Client> made(new Client(options_of(domain, std::move(interfaces), std::move(peers),
-                                                         std::move(identity), timeout)));
+                                                         std::move(identity), timeout, std::move(host))));
                clients().add(made.get());
                return made;
              }),
              py::arg("domain") = 0U, py::arg("interfaces") = std::vector<std::string>{"lo"},
              py::arg("peers") = std::vector<std::string>{}, py::arg("identity") = "",
-             py::arg("timeout") = 3.0);
+             py::arg("timeout") = 3.0, py::arg("host") = "");
   define_calls(client);
   define_commands(client);
   define_watches(client);

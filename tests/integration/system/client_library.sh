@@ -55,6 +55,13 @@ with plchost_client.Client(domain=int(os.environ["PLCHOST_DOMAIN"]), timeout=20.
         client.logs("north", "nobody")
     except plchost_client.ClientError as error:
         assert error.code == 2, error
+with plchost_client.Client(domain=int(os.environ["PLCHOST_DOMAIN"]), timeout=20.0, host="north") as client:
+    assert client.instances()[0].name == "packer1"
+    try:
+        client.instances("south")
+        raise AssertionError("it is for another host")
+    except plchost_client.ClientError as error:
+        assert error.code == 1, error
 EOF
 PYTHONPATH=$BIN/../python python3 "$cell/logs.py" || fail "logs and reload"
 
