@@ -1,6 +1,7 @@
 #include "manager/config/check_relations.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstdint>
 #include <cstring>
@@ -8,6 +9,8 @@
 #include <string_view>
 
 #include <fmt/format.h>
+#include <linux/magic.h>
+#include <sys/vfs.h>
 #include <unistd.h>
 
 #include "shm/base/names.hpp"
@@ -150,12 +153,33 @@ Result<void> check_readable_file(const std::string& path) {
   return {};
 }
 
+namespace {
+
+// Root may write there as far as access() can tell, but nobody can make a folder or a file.
+bool is_made_by_the_kernel(const std::filesystem::path& folder) noexcept {
+  constexpr std::array<std::int64_t, 7> kKinds{PROC_SUPER_MAGIC,    SYSFS_MAGIC,   CGROUP_SUPER_MAGIC,
+                                               CGROUP2_SUPER_MAGIC, DEBUGFS_MAGIC, TRACEFS_MAGIC,
+                                               DEVPTS_SUPER_MAGIC};
+  struct statfs status{};
+  return ::statfs(folder.c_str(), &status) == 0 &&
+         std::ranges::find(kKinds, std::int64_t{status.f_type}) != kKinds.end();
+}
+
+}  // namespace
+
 Result<void> check_directory_can_be_made(const std::string& path) {
   std::error_code error;
   std::filesystem::path there = path;
   while (!std::filesystem::exists(there, error) && there.has_relative_path()) there = there.parent_path();
   if (!std::filesystem::is_directory(there, error)) {
     return failure(ErrorCode::wrong_type, fmt::format("{} is not a folder", there.native()));
+  }
+  if (is_made_by_the_kernel(there)) {
+    return failure(
+        ErrorCode::refused,
+        fmt::format("{} holds only what the kernel shows there: name a folder of a file system for "
+                    "files",
+                    there.native()));
   }
   if (::access(there.c_str(), W_OK | X_OK) != 0) {
     return failure(ErrorCode::refused,

@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 #include <sched.h>
 
+#include "shm/base/thread.hpp"
 #include "tests/integration/instances/instance_process.hpp"
 
 namespace plchost::testing {
@@ -135,6 +136,7 @@ INSTANTIATE_TEST_SUITE_P(Signals, SignalEndsATrial, ::testing::Values(SIGINT, SI
 
 // It may run on the core of an instance.
 TEST(ApplicationCheck, HasNoRealTimeThread) {
+  if (!Thread::start("probe", {.fifo = 1}, [] {})) GTEST_SKIP() << "no right to SCHED_FIFO";
   const Sandbox sandbox;
   InstanceProcess sut(sandbox, {"--check-application", application("fault_loops")});
   const std::string children = fmt::format("/proc/{0}/task/{0}/children", sut.pid());

@@ -366,6 +366,13 @@ TEST(Config, ChecksTheFoldersThatAStartMakes) {
   ASSERT_FALSE(sut.has_value());
   EXPECT_THAT(sut.error(), ElementsAre(HasSubstr(":2: [host] run_directory: /etc/hostname is not a folder"),
                                        HasSubstr(":3: [host] state_directory: /dev/null is not a folder")));
+  const auto shown =
+      parse("[host]\nrun_directory = \"/proc/x\"\nstate_directory = \"/sys/y/z\"\n", surroundings);
+  ASSERT_FALSE(shown.has_value());
+  EXPECT_THAT(
+      shown.error(),
+      ElementsAre(HasSubstr(":2: [host] run_directory: /proc holds only what the kernel shows there"),
+                  HasSubstr(":3: [host] state_directory: /sys holds only what the kernel shows there")));
 }
 
 TEST(Config, SaysWhichFileIsMissing) {
