@@ -34,14 +34,20 @@ class AckAccount {
   /// An acknowledgement that is not older than the one before.
   void take(const plc_EventAck& ack);
   [[nodiscard]] Sums sums() const noexcept;
-  /// `first`: the number of the first post that the report is about. If no later one was rejected, the
-  /// rejections since `base` are those of posts that were given up.
-  [[nodiscard]] PostReport report_since(const Sums& base, std::uint64_t first) const;
+  /// From now on report() is about the posts from this number on. Acknowledgements of earlier posts may still
+  /// come: of those that were given up, or that nobody waited for.
+  void begin(std::uint64_t first) noexcept;
+  [[nodiscard]] PostReport report() const;
   /// Its epoch is 0: none yet.
   [[nodiscard]] const plc_EventAck& newest() const noexcept { return newest_; }
 
  private:
-  Sums earlier_;  // of the ledgers before this one
+  [[nodiscard]] Sums since_base() const noexcept;
+  [[nodiscard]] Sums earlier_part(std::uint64_t before) const noexcept;
+
+  Sums earlier_;             // of the ledgers before this one
+  Sums base_;                // of the posts before first_
+  std::uint64_t first_ = 1;  // post of the report
   plc_EventAck newest_{};
   std::uint64_t last_rejected_ = 0;  // of all ledgers
   ErrorCode rejected_code_ = ErrorCode::ok;

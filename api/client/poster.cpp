@@ -156,14 +156,13 @@ Duration Poster<Sample>::patience_until_repeated() const noexcept {
 template <class Sample>
 void Poster<Sample>::begin_report(TimePoint now) {
   unacknowledged_.clear();
-  base_ = account_.sums();
-  first_ = last_sequence_ + 1;
+  account_.begin(last_sequence_ + 1);
   last_progress_ = now;
 }
 
 template <class Sample>
 PostReport Poster<Sample>::report() const {
-  PostReport report = account_.report_since(base_, first_);
+  PostReport report = account_.report();
   report.unacknowledged = unacknowledged_.size();
   return report;
 }

@@ -89,8 +89,7 @@ class Poster {
   /// has to be called again.
   TimePoint repeat(TimePoint now);
   [[nodiscard]] TimePoint last_progress() const noexcept { return last_progress_; }
-  /// From now on report() counts from 0, and nothing before is repeated. Call on_ack() before with the
-  /// acknowledgements that have come: they are about earlier posts.
+  /// From now on report() is about the posts that follow, and nothing before is repeated.
   void begin_report(TimePoint now);
   /// Counts posts, whatever number of events each has.
   [[nodiscard]] PostReport report() const;
@@ -127,8 +126,6 @@ class Poster {
   bool has_space_ = true;  // DDS had for the last post
   MetReaders met_;
   AckAccount account_;
-  AckAccount::Sums base_;    // where the report counts from
-  std::uint64_t first_ = 1;  // post of the report
 };
 
 using EventPoster = Poster<plc_EventPost>;
