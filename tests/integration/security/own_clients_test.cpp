@@ -32,13 +32,15 @@ TEST_F(OwnClients, AreNeverRefusedByTheGate) {
   start();
   std::vector<std::unique_ptr<ControlClient>> made;
   for (int i = 0; i < 6; ++i) made.push_back(make_client());
+  // 6 handshakes in one process take long on a loaded machine. A client that stays deaf is seen all the same.
+  static constexpr auto kLong = std::chrono::seconds(60);
   std::vector<std::jthread> clients;
   for (const auto& client : made) {
     clients.emplace_back([&client] {
       const TimePoint end = MonotonicClock::now() + std::chrono::seconds(8);
       while (MonotonicClock::now() < end) {
-        EXPECT_TRUE(client->post_event({"cell", "line1", "ready"}, 1, {}, kPatience));
-        EXPECT_TRUE(client->call({"cell", plc_OPERATION_STOP, "line1", ""}, soon()));
+        EXPECT_TRUE(can_post(*client, kLong));
+        EXPECT_TRUE(client->call({"cell", plc_OPERATION_STOP, "line1", ""}, MonotonicClock::now() + kLong));
         std::this_thread::sleep_for(std::chrono::milliseconds(100));
       }
     });
