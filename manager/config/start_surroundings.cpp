@@ -45,10 +45,7 @@ Result<void> try_application(const std::string& plc_instance, const HostConfig& 
   launch.state_directory = host.state_directory;
   auto trial = ApplicationTrial::start(plc_instance, launch);
   if (!trial) return std::unexpected(trial.error());
-  if (!ends_within(trial->fd(), kTrialLimit)) {
-    trial->give_up();
-    (void)ends_within(trial->fd(), kTrialLimit);
-  }
+  trial->await_end();
   return trial->verdict();
 }
 

@@ -12,7 +12,6 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <poll.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -132,12 +131,7 @@ std::string in_senders_words(std::string text, const std::string& path, const st
 Result<void> try_application(const StoreOrder& order, const std::string& path) {
   auto trial = ApplicationTrial::start(order.trial, path);
   if (!trial) return std::unexpected(trial.error());
-  pollfd end{.fd = trial->fd(), .events = POLLIN, .revents = 0};
-  constexpr auto kWait = std::chrono::duration_cast<std::chrono::milliseconds>(kTrialLimit).count();
-  if (::poll(&end, 1, static_cast<int>(kWait)) != 1) {
-    trial->give_up();
-    (void)::poll(&end, 1, -1);
-  }
+  trial->await_end();
   const auto valid = trial->verdict();
   if (valid) return {};
   return failure(valid.error().code, fmt::format("{} is refused: {}", order.name,

@@ -9,6 +9,7 @@
 #include "manager/system/child_process.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
+#include "shm/base/work_limit.hpp"
 #include "shm/pages/instance_page.hpp"
 #include "shm/sockets/control_message.hpp"
 
@@ -37,6 +38,8 @@ class InstanceHost {
   /// The processor time that the process wants of its core, and gets now. Reads a file for each of its
   /// threads.
   [[nodiscard]] virtual ProcessorUse processor_use() = 0;
+  /// Since its start, with the processes that it has started. Reads a file for each of their threads.
+  [[nodiscard]] virtual ProcessorShare processor_share() = 0;
   /// The program that has the process's core now, as a sentence names it; empty: none is seen. Reads a file
   /// for each thread of the host.
   [[nodiscard]] virtual std::string processor_taker() = 0;

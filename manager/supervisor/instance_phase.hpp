@@ -36,7 +36,8 @@ namespace plchost {
 //   down         no process. It stays so until an operator or the configuration starts it.
 //   held         no process. It waits until the instances of `after` are up.
 //   backing_off  no process. It waits for the end of the back-off, or for a process that another manager made.
-//   setting_up   a process of this manager sets itself up. Limit: 30 s, then SIGKILL.
+//   setting_up   a process of this manager sets itself up. Limit: 30 s, then SIGKILL. Time in which other
+//                programs keep it from its processor does not count.
 //   adopting     a process that outlived its manager was asked for its status. Limit: 5 s; then it counts as
 //                up with a problem text, because a manager stops no PLC for being unable to talk to it.
 //   up           the process answers, or is believed to. The process itself reports its state.

@@ -35,7 +35,6 @@ void ManagedInstance::forget_signs() {
   said_.reset();
   starvation_.forget();
   starved_by_.clear();
-  set_up_starved_ = Duration::zero();
   step_ = SetupStep::bind_core;
   sign_at_ = surroundings_.now();
 }
@@ -142,16 +141,13 @@ void ManagedInstance::watch_set_up() {
   tell_starvation();
 }
 
-// Time that other programs have taken of the limit is added to it.
 void ManagedInstance::set_up_timed_out() {
-  const Duration taken = starvation_.lasted() - set_up_starved_;
-  if (taken < HeartbeatWatch::kLimit) {
-    return set_up_failed(fmt::format("was not ready after {} s: its step '{}' has not ended",
-                                     std::chrono::duration_cast<std::chrono::seconds>(kSetupLimit).count(),
-                                     to_string(step_)));
-  }
-  set_up_starved_ += taken;
-  host_.set_timer(after(taken));
+  const Duration left =
+      set_up_limit_.left(surroundings_.now(), host_.processor_share(), starvation_.lasted());
+  if (left > Duration::zero()) return host_.set_timer(after(left));
+  set_up_failed(fmt::format("was not ready after {} s: its step '{}' has not ended",
+                            std::chrono::duration_cast<std::chrono::seconds>(kSetupLimit).count(),
+                            to_string(step_)));
 }
 
 void ManagedInstance::watch_heartbeat(bool starved) {

@@ -313,6 +313,7 @@ void ManagedInstance::spawn(Next next) {
   status_.pid = *pid;
   log_level_ = surroundings_.host.log_level;
   forget_signs();
+  set_up_limit_ = WorkLimit(kSetupLimit, surroundings_.now());
   host_.set_timer(after(kSetupLimit));
   set_state(Phase::setting_up, InstanceState::starting, last_end_.empty() ? "" : "ended last: " + last_end_);
 }

@@ -18,6 +18,7 @@
 #include "manager/supervisor/instance_phase.hpp"
 #include "manager/supervisor/restart_decision.hpp"
 #include "manager/supervisor/starvation_watch.hpp"
+#include "shm/base/work_limit.hpp"
 #include "shm/pages/host_page.hpp"
 
 namespace plchost {
@@ -310,14 +311,14 @@ class ManagedInstance : public InstanceEvents {
   std::int64_t seen_signs_ = 0;            // when signs_ was looked at last
   TimePoint sign_at_;                      // when it was another number first
   SetupStep step_ = SetupStep::bind_core;  // that the process takes in its set-up
-  Duration set_up_starved_{};              // that its limit was extended by
-  std::string starved_by_;                 // for the problem text; empty: it is not starved
-  bool heard_of_ = false;                  // this process has given a sign
-  bool page_damaged_ = false;              // the page does not tell what the process says itself
-  TimePoint asked_at_;                     // for its status, last
-  std::uint64_t asked_number_ = 0;         // of the answer that is awaited; 0: none is
-  int answers_ = 0;                        // to that, since the page has beaten last
-  std::optional<InstanceRuntime> said_;    // by itself last: in its page, or when it was asked
+  WorkLimit set_up_limit_;
+  std::string starved_by_;               // for the problem text; empty: it is not starved
+  bool heard_of_ = false;                // this process has given a sign
+  bool page_damaged_ = false;            // the page does not tell what the process says itself
+  TimePoint asked_at_;                   // for its status, last
+  std::uint64_t asked_number_ = 0;       // of the answer that is awaited; 0: none is
+  int answers_ = 0;                      // to that, since the page has beaten last
+  std::optional<InstanceRuntime> said_;  // by itself last: in its page, or when it was asked
   TimePoint up_since_{};
   TimePoint settled_{};        // when the state was last known from the process's own answer
   std::string setup_failure_;  // why the set-up failed; empty: it did not

@@ -167,7 +167,10 @@ Result<void> ProcessHost::check_application(const LaunchOptions& options) {
 }
 
 void ProcessHost::check_timed_out() {
-  if (check_) check_->give_up();  // check_ended() says the rest
+  if (!check_) return;
+  const Duration left = check_->time_left();
+  if (left > Duration::zero()) return check_timer_.set(MonotonicClock::now() + left);
+  check_->give_up();  // check_ended() says the rest
 }
 
 void ProcessHost::check_ended() {
@@ -206,6 +209,10 @@ ProcessorUse ProcessHost::processor_use() {
     if (thread.ready) use.ready.push_back({.id = thread.id, .used = thread.used});
   }
   return use;
+}
+
+ProcessorShare ProcessHost::processor_share() {
+  return process_ ? processor_share_of(process_->pid) : ProcessorShare{};
 }
 
 std::string ProcessHost::processor_taker() {

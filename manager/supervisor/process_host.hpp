@@ -37,6 +37,7 @@ class ProcessHost : public InstanceHost {
   [[nodiscard]] Result<void> check_application(const LaunchOptions& options) override;
   [[nodiscard]] std::optional<InstanceRuntime> runtime() override;
   [[nodiscard]] ProcessorUse processor_use() override;
+  [[nodiscard]] ProcessorShare processor_share() override;
   [[nodiscard]] std::string processor_taker() override;
   [[nodiscard]] std::vector<int> granted_cores() override;
   [[nodiscard]] std::string keep_lost_faults() override;

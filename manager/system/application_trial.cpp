@@ -7,6 +7,7 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
+#include <poll.h>
 #include <unistd.h>
 
 #include "instances/launch/launch_contract.hpp"
@@ -51,6 +52,23 @@ Result<ApplicationTrial> ApplicationTrial::start(std::vector<std::string> argume
   auto process = spawn_process({.arguments = std::move(arguments), .output_fd = pipe->write_end.get()});
   if (!process) return std::unexpected(process.error());
   return ApplicationTrial(path, std::move(*process), std::move(pipe->read_end));
+}
+
+Duration ApplicationTrial::time_left() const {
+  return limit_.left(MonotonicClock::now(), processor_share_of(process_.pid));
+}
+
+void ApplicationTrial::await_end() {
+  pollfd end{.fd = fd(), .events = POLLIN, .revents = 0};
+  const auto ends_within = [&end](Duration time) {
+    const auto wait = std::chrono::ceil<std::chrono::milliseconds>(time).count();
+    return ::poll(&end, 1, static_cast<int>(wait)) == 1;
+  };
+  for (Duration left = time_left(); left > Duration::zero(); left = time_left()) {
+    if (ends_within(left)) return;
+  }
+  give_up();
+  (void)ends_within(kTrialLimit);
 }
 
 void ApplicationTrial::give_up() {

@@ -7,10 +7,12 @@
 #include "instances/launch/launch_contract.hpp"
 #include "manager/system/child_process.hpp"
 #include "shm/base/time.hpp"
+#include "shm/base/work_limit.hpp"
 
 namespace plchost {
 
-/// How long a trial may take. It ends by itself after kSetUpLimit and says so; this is for one that cannot.
+/// How long a trial may take, without the time in which other programs have the processor (WorkLimit). It
+/// ends by itself after kSetUpLimit and says so; this is for one that cannot.
 inline constexpr Duration kTrialLimit = kSetUpLimit + std::chrono::seconds(2);
 
 /// The command line that tries an application as `options` would start it; its path comes last and is
@@ -32,6 +34,10 @@ class ApplicationTrial {
 
   /// Readable when it has ended.
   [[nodiscard]] int fd() const noexcept { return process_.pidfd.get(); }
+  /// The rest of kTrialLimit; zero: it takes too long.
+  [[nodiscard]] Duration time_left() const;
+  /// Waits until it has ended. One that takes too long is given up.
+  void await_end();
   /// It took too long: ends it.
   void give_up();
   /// Of one that has ended: ok, or why the application is not valid, in its trial's words, without the
@@ -45,6 +51,7 @@ class ApplicationTrial {
   std::string path_;
   ChildProcess process_;
   UniqueFd output_;
+  WorkLimit limit_{kTrialLimit, MonotonicClock::now()};
   bool gave_up_ = false;
 };
 

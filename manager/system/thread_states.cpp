@@ -12,7 +12,6 @@
 
 #include <fmt/format.h>
 #include <sched.h>
-#include <time.h>
 #include <unistd.h>
 
 namespace plchost {
@@ -116,14 +115,6 @@ std::vector<ThreadState> threads_of_process(pid_t process) {
     threads.push_back(*std::move(thread));
   }
   return threads;
-}
-
-Duration processor_time_of(pid_t process) noexcept {
-  clockid_t clock{};
-  timespec time{};
-  if (::clock_getcpuclockid(process, &clock) != 0 || ::clock_gettime(clock, &time) != 0)
-    return Duration::zero();
-  return std::chrono::seconds(time.tv_sec) + Duration(time.tv_nsec);
 }
 
 std::optional<ThreadState> first_on_cores(const std::vector<int>& cores, pid_t spared) {

@@ -30,9 +30,6 @@ struct ThreadState {
 /// The threads of one process; empty: it has ended, or others may not look at it.
 [[nodiscard]] std::vector<ThreadState> threads_of_process(pid_t process);
 
-/// All threads of a process together, exact to the nanosecond; 0: it has ended.
-[[nodiscard]] Duration processor_time_of(pid_t process) noexcept;
-
 /// The thread that takes a processor before all others: of threads that are ready on one of `cores`, the one
 /// with the highest priority. Those of process `spared` do not count. Nothing: no other is ready there. Reads
 /// one file for each thread of the host.

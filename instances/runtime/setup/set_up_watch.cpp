@@ -5,10 +5,12 @@
 #include <vector>
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "instances/runtime/setup/long_run_search.hpp"
 #include "schedulers/faults/processor_guard.hpp"
 #include "schedulers/faults/starvation.hpp"
+#include "shm/base/work_limit.hpp"
 
 namespace plchost {
 
@@ -54,13 +56,15 @@ void SetUpWatch::run(Duration limit, const std::vector<int>& cores) {
                        [&](pid_t thread) { return runs_beside(thread, cores); });
   std::unique_lock lock(mutex_);
   Duration lasted{};
+  const WorkLimit work(kLimit, TimePoint{}, processor_share_of(::getpid()));
   TimePoint looked = MonotonicClock::now();
   while (!stops_.wait_for(lock, kLook, [this] { return stopped_; })) {
     const TimePoint now = MonotonicClock::now();
     lasted += std::min(now - std::exchange(looked, now), kLongestGap);
     if (const auto taker = search.look(now)) ProcessorGuard::report(taker->who, taker->lasted);
     auto good = look_for_taker();
-    if (good && lasted >= kLimit) {
+    if (good && lasted >= kLimit &&
+        work.left(TimePoint{} + lasted, processor_share_of(::getpid())) == Duration::zero()) {
       good = failure(ErrorCode::refused,
                      fmt::format("the set-up has not returned for {} s",
                                  std::chrono::duration_cast<std::chrono::seconds>(kLimit).count()));

@@ -17,7 +17,8 @@ namespace plchost {
 /// it runs at SCHED_FIFO 99 and the kernel leaves no time to others (sched_rt_runtime_us is -1).
 class SetUpWatch {
  public:
-  /// A set-up may take so long: less than the manager gives the whole start, so that its cause is told.
+  /// A set-up may take so long: less than the manager gives the whole start, so that its cause is told. Time
+  /// in which other programs have the processor does not count, here and there (WorkLimit).
   static constexpr Duration kLimit = std::chrono::seconds(25);
   /// Ends the process, because the thread that sets up may never return. Called by a thread of this class.
   using Fail = std::function<void(const Error& error)>;

@@ -31,6 +31,7 @@
 #include "shm/base/end_with_parent.hpp"
 #include "shm/base/thread.hpp"
 #include "shm/base/unique_fd.hpp"
+#include "shm/base/work_limit.hpp"
 
 namespace plchost {
 
@@ -159,11 +160,15 @@ int end_by(int signals) {
 int judge(const std::string& application, const Trial& trial, int signals) {
   std::array<pollfd, 2> fds{{{.fd = trial.pidfd.get(), .events = POLLIN, .revents = 0},
                              {.fd = signals, .events = POLLIN, .revents = 0}}};
-  const timespec limit = to_timespec(kSetUpLimit);
-  int ready = 0;
-  do {
-    ready = ::ppoll(fds.data(), fds.size(), &limit, nullptr);
-  } while (ready < 0 && errno == EINTR);
+  const WorkLimit work(kSetUpLimit, MonotonicClock::now());
+  const auto is_over = [&] {
+    const timespec wait = to_timespec(work.left(MonotonicClock::now(), processor_share_of(trial.pid)));
+    const int ready = ::ppoll(fds.data(), fds.size(), &wait, nullptr);
+    if (ready != 0) return ready > 0 || errno != EINTR;
+    return work.left(MonotonicClock::now(), processor_share_of(trial.pid)) == Duration::zero();
+  };
+  while (!is_over()) {
+  }
   const bool ended = fds[0].revents != 0;
   if (!ended) ::kill(trial.pid, SIGKILL);
   int status = 0;

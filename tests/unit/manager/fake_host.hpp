@@ -35,6 +35,7 @@ class FakeHost : public InstanceHost {
   }
   [[nodiscard]] std::optional<InstanceRuntime> runtime() override { return page; }
   [[nodiscard]] ProcessorUse processor_use() override { return use; }
+  [[nodiscard]] ProcessorShare processor_share() override { return share; }
   [[nodiscard]] std::string processor_taker() override { return taker; }
   [[nodiscard]] std::vector<int> granted_cores() override { return cores; }
   [[nodiscard]] std::string keep_lost_faults() override { return lost_fault; }
@@ -49,6 +50,7 @@ class FakeHost : public InstanceHost {
   std::optional<InstanceRuntime> page;
   std::optional<int> adoptable;
   ProcessorUse use;
+  ProcessorShare share;
   std::string taker = "program 'hog' (process 7, SCHED_FIFO 50)";
   std::vector<int> cores = {1};
   bool can_spawn = true;

@@ -222,6 +222,31 @@ TEST_F(SilentProcess, HasMoreTimeForItsSetUpWhileOtherProgramsTakeItsCore) {
   EXPECT_THAT(host_.signals, ElementsAre(SIGKILL)) << "it had all of its time";
 }
 
+TEST_F(SilentProcess, HasAllOfTheTimeForItsSetUpThatItGetsOfABusyMachine) {
+  sut().hold("is to be started");
+  sut().release();
+  now_ += kSetupLimit;
+  host_.share = {.ran = seconds(1), .waited = seconds(24)};
+  expire_timer();
+  EXPECT_TRUE(host_.signals.empty());
+  ASSERT_TRUE(host_.timer);
+  EXPECT_EQ(*host_.timer - now_, seconds(24));
+  EXPECT_EQ(state(), InstanceState::starting);
+  // It sleeps from now on: an end that does not come.
+  now_ += seconds(24);
+  expire_timer();
+  EXPECT_THAT(host_.signals, ElementsAre(SIGKILL));
+}
+
+TEST_F(SilentProcess, IsNotWaitedForIfItsOwnThreadsTakeTheProcessorFromEachOther) {
+  sut().hold("is to be started");
+  sut().release();
+  now_ += kSetupLimit;
+  host_.share = {.ran = kSetupLimit, .waited = 3 * kSetupLimit};
+  expire_timer();
+  EXPECT_THAT(host_.signals, ElementsAre(SIGKILL));
+}
+
 TEST_F(SilentProcess, SaysTheFaultThatTheProcessCouldNotTell) {
   host_.lost_fault = "task 'Main': SIGABRT: abort";
   bring_up_and_fall_silent();
