@@ -4,6 +4,8 @@
 #include <type_traits>
 #include <utility>
 
+#include <fmt/format.h>
+
 #include "api/cli/cli_session.hpp"
 #include "api/cli/rows/rows.hpp"
 #include "api/cli/rows/status_rows.hpp"
@@ -58,6 +60,14 @@ struct ListedTopics {
     };
     (add_one(std::type_identity<Samples>()), ...);
   }
+  /// "events, writers, "
+  static std::string nouns() {
+    std::string nouns;
+    for (const char* const noun : {dds::kListing<Samples>.noun...}) {
+      if (*noun != '\0') nouns += fmt::format("{}, ", noun);
+    }
+    return nouns;
+  }
 };
 
 int list_instances(CliSession& session, const std::vector<std::string>& names) {
@@ -82,9 +92,10 @@ bool has_happened(const plc_ExceptionStatus& exception) {
 }  // namespace
 
 void add_list_verbs(const Command& plcctl, CliSession& session) {
-  const Command verb = plcctl.verb("list",
-                                   "Show all hosts, instances, tasks, events, writers, objects, nodes, "
-                                   "exceptions, applications or transitions");
+  const std::string text = fmt::format(
+      "Show all hosts, instances, tasks, {}objects, nodes, exceptions, applications or transitions",
+      dds::OfCountedStatus<ListedTopics>::nouns());
+  const Command verb = plcctl.verb("list", text.c_str());
   add_list_hosts(verb, session);
   const auto names = std::make_shared<std::vector<std::string>>();
   verb.noun("instances", "The PLC instances", [&session, names] { return list_instances(session, *names); })

@@ -4,8 +4,6 @@
 #include <functional>
 #include <vector>
 
-#include "api/dds/text.hpp"
-
 namespace plchost {
 
 namespace {
@@ -38,10 +36,8 @@ bool WriterWatch::look(const EventIntake& intake, const SessionTable& sessions, 
     const bool all = writer.source == dds::Guid{};
     const bool present = !all && is_present(writer);
     if (!all && !present && writer.used < oldest) continue;
-    plc_WriterStatus sample{};
-    dds::copy_text(sample.host, host_);
+    plc_WriterStatus sample = table_->blank();
     writer.source.copy_to(sample.source);
-    sample.epoch = epoch_;
     sample.received = writer.counters.received;
     sample.delivered = writer.counters.accepted;
     sample.no_task = writer.counters.no_task;

@@ -22,15 +22,12 @@ class WriterWatch {
   static constexpr std::size_t kMostGone = 64;
 
   WriterWatch() = default;
-  WriterWatch(std::string host, std::uint64_t epoch, StatusTable<plc_WriterStatus>& table)
-      : host_(std::move(host)), epoch_(epoch), table_(&table) {}
+  explicit WriterWatch(StatusTable<plc_WriterStatus>& table) : table_(&table) {}
 
   /// Looks if it is time to. Returns true if something has changed.
   bool look(const EventIntake& intake, const SessionTable& sessions, TimePoint now);
 
  private:
-  std::string host_;
-  std::uint64_t epoch_ = 0;
   StatusTable<plc_WriterStatus>* table_ = nullptr;
   Duration to_unix_{unix_time_ns() - MonotonicClock::now().time_since_epoch().count()};
   TimePoint next_look_;

@@ -49,10 +49,8 @@ void ApplicationWatch::read(const std::string& instance, Known& known) const {
   known.settled = unix_time_ns() - known.changed_ns > kSettled;
   known.samples.clear();
   const auto make = [&] {
-    plc_ApplicationStatus& sample = known.samples.emplace_back();
-    dds::copy_text(sample.host, host_);
+    plc_ApplicationStatus& sample = known.samples.emplace_back(table_->blank());
     dds::copy_text(sample.instance, instance);
-    sample.epoch = epoch_;
     return &sample;
   };
   const ApplicationVersions versions = read_versions(folder);

@@ -23,9 +23,8 @@ class ApplicationWatch {
 
   ApplicationWatch() = default;
   /// `folder`: of all instances; empty: there is none.
-  ApplicationWatch(std::string folder, std::string host, std::uint64_t epoch,
-                   StatusTable<plc_ApplicationStatus>& table)
-      : folder_(std::move(folder)), host_(std::move(host)), epoch_(epoch), table_(&table) {}
+  ApplicationWatch(std::string folder, StatusTable<plc_ApplicationStatus>& table)
+      : folder_(std::move(folder)), table_(&table) {}
 
   /// Looks at those of all instances, if it is time for that. True: there is news.
   bool look(const std::vector<std::string>& instances, TimePoint now);
@@ -42,8 +41,6 @@ class ApplicationWatch {
   bool show();
 
   std::string folder_;
-  std::string host_;
-  std::uint64_t epoch_ = 0;
   StatusTable<plc_ApplicationStatus>* table_ = nullptr;
   std::map<std::string, Known> known_;
   TimePoint next_;

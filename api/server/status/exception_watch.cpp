@@ -49,9 +49,10 @@ void ExceptionWatch::look(Watched& watched, const std::string& name) {
   const bool is_new = dds::text_of(watched.sample.instance).empty();
   if (!is_new && version == watched.version) return;
   watched.version = version;
-  dds::copy_text(watched.sample.host, host_);
-  dds::copy_text(watched.sample.instance, name);
-  watched.sample.epoch = epoch_;
+  if (is_new) {
+    watched.sample = table_->blank();
+    dds::copy_text(watched.sample.instance, name);
+  }
   const auto history = read_exceptions(path);
   if (history) {
     show(watched.sample, *history);

@@ -23,9 +23,8 @@ class ExceptionWatch {
   /// A file is looked at so often, and at once when its instance has changed; read when it is another one.
   static constexpr Duration kPeriod = std::chrono::milliseconds(100);
 
-  ExceptionWatch(std::string run_directory, std::string host, std::uint64_t epoch,
-                 StatusTable<plc_ExceptionStatus>& table)
-      : run_directory_(std::move(run_directory)), host_(std::move(host)), epoch_(epoch), table_(&table) {}
+  ExceptionWatch(std::string run_directory, StatusTable<plc_ExceptionStatus>& table)
+      : run_directory_(std::move(run_directory)), table_(&table) {}
 
   /// A round: follow() for each instance that the manager has; end_round() disposes what is left of others
   /// and writes what is news. All return true if something changed. `tasks` follows the same instance
@@ -55,8 +54,6 @@ class ExceptionWatch {
   void show(plc_ExceptionStatus& sample, const ExceptionHistory& history) const;
 
   std::string run_directory_;
-  std::string host_;
-  std::uint64_t epoch_;
   StatusTable<plc_ExceptionStatus>* table_;
   std::map<std::string, Watched> instances_;
 };

@@ -32,11 +32,12 @@ Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const 
   auto publisher_of_status = dds::make_publisher(participant, dds::status_partition(source.host));
   if (!publisher_of_status) return failure_in("publish status", publisher_of_status.error());
   const dds_entity_t parent = publisher_of_status->get();
-  auto tables = StatusTables::create(participant, parent);
+  const StatusSource writes{.host = source.host, .epoch = source.epoch};
+  auto tables = StatusTables::create(participant, parent, writes);
   if (!tables) return failure_in("publish status", tables.error());
-  auto hosts = open_table<plc_HostStatus>(participant, parent);
+  auto hosts = open_table<plc_HostStatus>(participant, parent, writes);
   if (!hosts) return failure_in("publish status", hosts.error());
-  auto findings = open_table<plc_HostFinding>(participant, parent);
+  auto findings = open_table<plc_HostFinding>(participant, parent, writes);
   if (!findings) return failure_in("publish status", findings.error());
   std::vector<dds::Entity> topics;
   const auto make = [&](const dds::TopicInfo& info) -> Result<dds::Entity> {
@@ -54,17 +55,16 @@ Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const 
       TransitionPublisher::create(participant, parent, {source.host, source.pool->name(), source.epoch});
   if (!transitions) return std::unexpected(transitions.error());
   StatusTables& of_topics = **tables;
-  StatusPublisher publisher(
-      source, *std::move(tables),
-      TaskWatch(source.pool->name(), source.host, source.epoch, of_topics.of<plc_TaskStatus>(),
-                StatisticsWriter(source.host, source.epoch, std::move(*statistics))),
-      ExceptionWatch(source.run_directory, source.host, source.epoch, of_topics.of<plc_ExceptionStatus>()),
-      *std::move(transitions));
+  StatusPublisher publisher(source, *std::move(tables),
+                            TaskWatch(source.pool->name(), of_topics.of<plc_TaskStatus>(),
+                                      StatisticsWriter(source.host, source.epoch, std::move(*statistics))),
+                            ExceptionWatch(source.run_directory, of_topics.of<plc_ExceptionStatus>()),
+                            *std::move(transitions));
   publisher.findings_ = *std::move(findings);
   publisher.hosts_ = *std::move(hosts);
-  publisher.writers_ = WriterWatch(source.host, source.epoch, of_topics.of<plc_WriterStatus>());
-  publisher.applications_ = ApplicationWatch(source.applications_folder, source.host, source.epoch,
-                                             of_topics.of<plc_ApplicationStatus>());
+  publisher.writers_ = WriterWatch(of_topics.of<plc_WriterStatus>());
+  publisher.applications_ =
+      ApplicationWatch(source.applications_folder, of_topics.of<plc_ApplicationStatus>());
   publisher.presence_ = std::move(*presence);
   publisher.topics_ = std::move(topics);
   publisher.publisher_ = *std::move(publisher_of_status);
@@ -132,10 +132,8 @@ bool StatusPublisher::update_instance(const InstanceStatus& status, TimePoint no
   const std::string name(status.name.view());
   bool changed = tasks_.follow(status, now);
   changed |= exceptions_.follow(status, tasks_, now);
-  plc_InstanceStatus sample{};
-  dds::copy_text(sample.host, source_.host);
+  plc_InstanceStatus sample = tables_->of<plc_InstanceStatus>().blank();
   dds::copy_text(sample.instance, name);
-  sample.epoch = source_.epoch;
   sample.state = static_cast<std::uint32_t>(status.state);
   if (status.state == InstanceState::running) ++running_;
   sample.pid = status.pid;
@@ -182,10 +180,8 @@ bool StatusPublisher::look_at_objects(TimePoint now) {
   events.begin_round();
   objects.begin_round();
   for (const ObjectInfo& object : *published) {
-    plc_ObjectStatus sample{};
-    dds::copy_text(sample.host, source_.host);
+    plc_ObjectStatus sample = objects.blank();
     dds::copy_text(sample.object_name, object.name);
-    sample.epoch = source_.epoch;
     sample.type = static_cast<std::uint32_t>(object.type);
     sample.value = object.value;
     changed |= objects.update(object.name, sample);
@@ -206,11 +202,9 @@ bool StatusPublisher::update_event(const ObjectInfo& object) {
   const auto slash = object.name.find('/');
   if (slash == std::string::npos) return false;
   const std::string_view name(object.name);
-  plc_EventStatus sample{};
-  dds::copy_text(sample.host, source_.host);
+  plc_EventStatus sample = tables_->of<plc_EventStatus>().blank();
   dds::copy_text(sample.instance, name.substr(0, slash));
   dds::copy_text(sample.event, name.substr(slash + 1));
-  sample.epoch = source_.epoch;
   sample.registered = object.registered;
   sample.bound_tasks = object.bound_tasks;
   sample.posts = object.value;
@@ -221,10 +215,8 @@ void StatusPublisher::publish_findings(const std::vector<HostFinding>& findings)
   findings_.begin_round();
   for (std::size_t i = 0; i < findings.size(); ++i) {
     const HostFinding& finding = findings[i];
-    plc_HostFinding sample{};
-    dds::copy_text(sample.host, source_.host);
+    plc_HostFinding sample = findings_.blank();
     dds::copy_text(sample.id, finding.id);
-    sample.epoch = source_.epoch;
     sample.round = round_ + 1;
     sample.finding_count = static_cast<std::uint32_t>(findings.size());
     sample.position = static_cast<std::uint32_t>(i);
@@ -242,9 +234,7 @@ void StatusPublisher::publish_findings(const std::vector<HostFinding>& findings)
 
 void StatusPublisher::write_host(bool changed) {
   if (changed || round_ == 0) ++round_;
-  plc_HostStatus sample{};
-  dds::copy_text(sample.host, source_.host);
-  sample.epoch = source_.epoch;
+  plc_HostStatus sample = hosts_.blank();
   sample.round = round_;
   tables_->count(sample);
   dds::copy_text(sample.version, host().version.view());

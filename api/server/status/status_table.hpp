@@ -11,20 +11,35 @@
 
 #include "api/dds/entity.hpp"
 #include "api/dds/instances.hpp"
+#include "api/dds/text.hpp"
 #include "shm/base/time.hpp"
 
 namespace plchost {
 
+/// The server that writes a status topic.
+struct StatusSource {
+  std::string host;
+  std::uint64_t epoch = 0;
+};
+
 /// The present samples of one status topic, and those that have still to be written. Samples are compared as
-/// bytes, so they must be zero-initialised before they are filled. Their ext is empty.
+/// bytes, so each begins as blank(). Their ext is empty.
 template <class Sample>
   requires std::is_trivially_copyable_v<Sample>
 class StatusTable {
  public:
   StatusTable() = default;
   /// `writer` was made from `topic`.
-  StatusTable(dds::Entity topic, dds::Entity writer) noexcept
-      : topic_(std::move(topic)), writer_(std::move(writer)) {}
+  StatusTable(StatusSource source, dds::Entity topic, dds::Entity writer) noexcept
+      : source_(std::move(source)), topic_(std::move(topic)), writer_(std::move(writer)) {}
+
+  /// A sample of this host and server, to be filled.
+  [[nodiscard]] Sample blank() const noexcept {
+    Sample sample{};
+    dds::copy_text(sample.host, source_.host);
+    sample.epoch = source_.epoch;
+    return sample;
+  }
 
   /// Returns true if that is news.
   bool update(const std::string& key, const Sample& sample) {
@@ -89,6 +104,7 @@ class StatusTable {
     return entries_.erase(it);
   }
 
+  StatusSource source_;
   dds::Entity topic_;
   dds::Entity writer_;
   Entries entries_;

@@ -16,23 +16,25 @@ namespace plchost {
 
 /// A table with the topic of its type, written into the partition of `publisher`.
 template <class Sample>
-[[nodiscard]] Result<StatusTable<Sample>> open_table(dds_entity_t participant, dds_entity_t publisher) {
+[[nodiscard]] Result<StatusTable<Sample>> open_table(dds_entity_t participant, dds_entity_t publisher,
+                                                     const StatusSource& source) {
   constexpr const dds::TopicInfo& kTopic = dds::kTopicOf<Sample>;
   auto topic = dds::make_topic(participant, kTopic);
   if (!topic) return std::unexpected(std::move(topic).error());
   auto writer = dds::make_writer(publisher, topic->get(), dds::qos_of(kTopic));
   if (!writer) return std::unexpected(std::move(writer).error());
-  return StatusTable<Sample>(*std::move(topic), *std::move(writer));
+  return StatusTable<Sample>(source, *std::move(topic), *std::move(writer));
 }
 
 /// The tables of all status topics that HostStatus counts: those of control.idl. Stays where it is made.
 class StatusTables {
  public:
   [[nodiscard]] static Result<std::unique_ptr<StatusTables>> create(dds_entity_t participant,
-                                                                    dds_entity_t publisher) {
+                                                                    dds_entity_t publisher,
+                                                                    const StatusSource& source) {
     auto made = std::make_unique<StatusTables>();
     Result<void> result;
-    std::apply([&](auto&... table) { (void)(open(participant, publisher, table, result) && ...); },
+    std::apply([&](auto&... table) { (void)(open(participant, publisher, source, table, result) && ...); },
                made->tables_);
     if (!result) return std::unexpected(std::move(result).error());
     return made;
@@ -61,9 +63,9 @@ class StatusTables {
   using Tables = dds::OfCountedStatus<TablesOf>;
 
   template <class Sample>
-  static bool open(dds_entity_t participant, dds_entity_t publisher, StatusTable<Sample>& table,
-                   Result<void>& result) {
-    auto made = open_table<Sample>(participant, publisher);
+  static bool open(dds_entity_t participant, dds_entity_t publisher, const StatusSource& source,
+                   StatusTable<Sample>& table, Result<void>& result) {
+    auto made = open_table<Sample>(participant, publisher, source);
     if (made) {
       table = *std::move(made);
     } else {

@@ -10,14 +10,12 @@ namespace {
 
 constexpr Duration kPageRetry = std::chrono::milliseconds(20);
 
-plc_TaskStatus to_sample(const std::string& host, const std::string& instance, std::uint64_t epoch,
+plc_TaskStatus to_sample(const StatusTable<plc_TaskStatus>& table, const std::string& instance,
                          const TaskSnapshot& task, const StatisticsWriter::Told& told) {
-  plc_TaskStatus sample{};
-  dds::copy_text(sample.host, host);
+  plc_TaskStatus sample = table.blank();
   dds::copy_text(sample.instance, instance);
   dds::copy_text(sample.task, task.identity.name.view());
   dds::copy_text(sample.external_event, task.identity.external_event.view());
-  sample.epoch = epoch;
   sample.kind = static_cast<std::uint32_t>(task.identity.kind);
   sample.priority = task.identity.iec_priority;
   sample.state = static_cast<std::uint32_t>(task.state);
@@ -144,7 +142,7 @@ void TaskWatch::publish(const std::string& instance, Watched& watched, std::uint
   const bool at_once = told.task.empty() || told.since_ns != task->counters.since_ns;
   if (at_once) (void)statistics_.write(instance, *watched.page, index, told);
   const std::string key = instance + "/" + std::string(task->identity.name.view());
-  (void)table_->update(key, to_sample(host_, instance, epoch_, *task, told));
+  (void)table_->update(key, to_sample(*table_, instance, *task, told));
 }
 
 // Its figures come once they can be read. That there is such a task is told at once.
@@ -155,7 +153,7 @@ void TaskWatch::publish_name(const std::string& instance, const Watched& watched
   const std::string key = instance + "/" + std::string(known->name.view());
   if (table_->contains(key)) return;
   const TaskSnapshot task{.identity = *known, .state = *state};
-  (void)table_->update(key, to_sample(host_, instance, epoch_, task, {}));
+  (void)table_->update(key, to_sample(*table_, instance, task, {}));
 }
 
 void TaskWatch::look(TimePoint now) {

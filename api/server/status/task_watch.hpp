@@ -33,13 +33,8 @@ class TaskWatch {
   /// 1,600 tasks a second. With more tasks each is told less often.
   static constexpr std::uint32_t kStatisticsPerLook = 16;
 
-  TaskWatch(std::string pool, std::string host, std::uint64_t epoch, StatusTable<plc_TaskStatus>& table,
-            StatisticsWriter statistics)
-      : pool_(std::move(pool)),
-        host_(std::move(host)),
-        epoch_(epoch),
-        table_(&table),
-        statistics_(std::move(statistics)) {}
+  TaskWatch(std::string pool, StatusTable<plc_TaskStatus>& table, StatisticsWriter statistics)
+      : pool_(std::move(pool)), table_(&table), statistics_(std::move(statistics)) {}
 
   /// Takes the manager's report of an instance: opens its page when there is a new process, and forgets the
   /// tasks of one that is gone. Returns true if tasks came or went.
@@ -88,8 +83,6 @@ class TaskWatch {
   void look_at_statistics(TimePoint now);
 
   const std::string pool_;
-  const std::string host_;
-  const std::uint64_t epoch_;
   StatusTable<plc_TaskStatus>* table_;
   StatisticsWriter statistics_;
   std::map<std::string, Watched> instances_;
