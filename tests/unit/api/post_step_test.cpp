@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <cstdlib>
+#include <limits>
 #include <string>
 #include <thread>
 
@@ -18,6 +19,7 @@
 #include "tests/support/one_core.hpp"
 #include "tests/support/own_name.hpp"
 #include "tests/support/sanitized.hpp"
+#include "tests/support/stepped_child.hpp"
 
 namespace plchost {
 namespace {
@@ -61,6 +63,8 @@ int stride(int usual) {
 
 class EachInstructionOfAPost : public testing::Test {
  protected:
+  static constexpr std::size_t kAll = std::numeric_limits<std::size_t>::max();
+
   void SetUp() override {
     if (kSanitized) GTEST_SKIP() << "too many instructions";
   }
@@ -92,11 +96,11 @@ class EachInstructionOfAPost : public testing::Test {
     return {"hosta", pool_, PostLedger::open(pool_).value(), 7, guard_};
   }
   /// A server that does the post, `call`, and is killed after so many instructions of it. Before that, and
-  /// when it has done half of them, `beside` is called. False: it came to the end of the post.
+  /// when it has done half of them, `beside` is called.
   template <class Call, class Beside>
-  bool kill_within(Call call, int instructions, Beside beside) {
+  void kill_within(Call call, std::size_t instructions, Beside beside) {
     other_batch_.sequence_number = other_batch_.base_sequence = ++other_batches_;
-    return kill_child_within(
+    kill_child_within(
         [&](const auto& begin) {
           const ObjectPool pool = ObjectPool::attach(name_).value();
           EventIntake server{"hosta", pool, PostLedger::open(pool).value(), 7, guard_};
@@ -108,9 +112,9 @@ class EachInstructionOfAPost : public testing::Test {
   }
   /// The same with a child that does `work(begin)`: the instructions count from when it calls begin().
   template <class Work, class Beside>
-  bool kill_child_within(Work work, int instructions, Beside beside) {
-    const pid_t child = ::fork();
-    if (child == 0) {
+  void kill_child_within(Work work, std::size_t instructions, Beside beside) {
+    const pid_t forked = ::fork();
+    if (forked == 0) {
       work([] {
         ::ptrace(PTRACE_TRACEME, 0, nullptr, nullptr);
         ::raise(SIGSTOP);
@@ -118,20 +122,28 @@ class EachInstructionOfAPost : public testing::Test {
       ::raise(SIGSTOP);
       ::_exit(0);
     }
-    int status = 0;
-    ::waitpid(child, &status, 0);
-    EXPECT_TRUE(WIFSTOPPED(status));
-    bool ended = false;
-    for (int i = 0; i < instructions && !ended; ++i) {
-      if (i == instructions / 2) beside();
-      ::ptrace(PTRACE_SINGLESTEP, child, nullptr, nullptr);
-      ::waitpid(child, &status, 0);
-      ended = WIFSTOPPED(status) && WSTOPSIG(status) == SIGSTOP;
+    SteppedChild child(forked);
+    if (instructions == kAll) {
+      trace_ = child.run_to_end();
+      return beside();
     }
+    bool within = child.go(trace_, 0, instructions / 2);
     beside();
-    ::kill(child, SIGKILL);
-    ::waitpid(child, &status, 0);
-    return !ended;
+    within = within && child.go(trace_, instructions / 2, instructions);
+    beside();
+    kills_ += within ? 1 : 0;
+  }
+  /// Calls `round(instructions)` for each `stride`-th instruction after which the child is to be killed. The
+  /// rounds before that are for what only the first post does, and for the trace of another one.
+  template <class Round>
+  void kill_at_each(int stride, Round round) {
+    for (int i = 0; i < 2; ++i) ASSERT_NO_FATAL_FAILURE(round(kAll));
+    ASSERT_GT(trace_.size(), 50U);
+    std::size_t rounds = 0;
+    for (std::size_t i = 0; i < trace_.size(); i += static_cast<std::size_t>(stride), ++rounds) {
+      ASSERT_NO_FATAL_FAILURE(round(i));
+    }
+    EXPECT_GE(kills_, rounds * 9 / 10) << "of " << rounds;  // some go another way than the trace
   }
   /// The fate of the posts of a source, seen by the present server.
   static EventIntake::Writer writer_of(const EventIntake& server, std::uint8_t source) {
@@ -139,6 +151,9 @@ class EachInstructionOfAPost : public testing::Test {
       if (writer.source.bytes[0] == source) return writer;
     }
     return {};
+  }
+  static std::string shown(std::size_t instructions) {
+    return instructions == kAll ? "all instructions" : std::to_string(instructions) + " instructions";
   }
   static void expect_sum(const PostCounters& counters, const std::string& where) {
     EXPECT_EQ(counters.received, counters.accepted + counters.duplicate) << where;
@@ -156,6 +171,8 @@ class EachInstructionOfAPost : public testing::Test {
   plc_EventBatch other_batch_{};
   std::uint64_t other_batches_ = 0;  // each posts "ready" twice and "other" once
   std::array<plc_EventName, 3> names_{};
+  SteppedChild::Trace trace_;
+  std::size_t kills_ = 0;
 };
 
 TEST_F(EachInstructionOfAPost, OfTheLedgerCountsItOnceWhileOthersPostToo) {
@@ -174,10 +191,9 @@ TEST_F(EachInstructionOfAPost, OfTheLedgerCountsItOnceWhileOthersPostToo) {
   };
   dds::Guid source;
   source.bytes[0] = 1;
-  int instructions = 0;
-  for (bool within = true; within; ++instructions) {
+  kill_at_each(1, [&](std::size_t instructions) {
     ++number;
-    within = kill_child_within(
+    kill_child_within(
         [&](const auto& begin) {
           ObjectPool pool = ObjectPool::attach(name_).value();
           const PoolEvent event = pool.open_event("line1/ready").value();
@@ -189,15 +205,14 @@ TEST_F(EachInstructionOfAPost, OfTheLedgerCountsItOnceWhileOthersPostToo) {
         instructions, beside);
     PostLedger next = PostLedger::open(pool_).value();
     LedgerEntry& entry = next.entry_for(source, 1);
-    const std::string where = std::to_string(instructions) + " instructions";
+    const std::string where = shown(instructions);
     if (entry.state().last != number) {
       ASSERT_TRUE(post_next(next, entry, event_)) << where;
     }
     ASSERT_EQ(event_.counted().count(), number + others) << where;
     ASSERT_EQ(entry.state().last, number) << where;
     ASSERT_EQ(entry.state().counters.accepted, number) << where;
-  }
-  EXPECT_GT(instructions, 50);
+  });
 }
 
 TEST_F(EachInstructionOfAPost, CountsItOnceWhereverTheServerIsKilled) {
@@ -208,34 +223,31 @@ TEST_F(EachInstructionOfAPost, CountsItOnceWhereverTheServerIsKilled) {
     ++others;
   };
   const auto call = [&](EventIntake& server) { server.process(post_); };
-  int instructions = 0;
-  for (bool within = true; within; instructions += stride(97)) {
+  kill_at_each(stride(23), [&](std::size_t instructions) {
     post_.sequence_number = post_.base_sequence = ++number;
-    within = kill_within(call, instructions, beside);
+    kill_within(call, instructions, beside);
     EventIntake next = make();
     next.process(post_);  // nothing was acknowledged
-    const std::string where = std::to_string(instructions) + " instructions";
+    const std::string where = shown(instructions);
     ASSERT_EQ(event_.counted().count(), number + others + 2 * other_batches_) << where;
     const EventIntake::Writer writer = writer_of(next, 1);
     ASSERT_EQ(writer.last, number) << where;
     ASSERT_EQ(writer.counters.accepted, number) << where;
     expect_sum(writer.counters, where);
-  }
-  EXPECT_GT(instructions, 100);
+  });
 }
 
 TEST_F(EachInstructionOfAPost, LeavesNoTaskAsleep) {
   std::uint64_t number = 0;
   const auto call = [&](EventIntake& server) { server.process(post_); };
-  int instructions = 0;
-  for (bool within = true; within; instructions += stride(151)) {
+  kill_at_each(stride(41), [&](std::size_t instructions) {
     const Follower task(event_.counted());
     post_.sequence_number = post_.base_sequence = ++number;
-    within = kill_within(call, instructions, [] {});
+    kill_within(call, instructions, [] {});
     EventIntake next = make();
     next.process(post_);
-    ASSERT_TRUE(task.reaches(number + 2 * other_batches_)) << instructions << " instructions";
-  }
+    ASSERT_TRUE(task.reaches(number + 2 * other_batches_)) << shown(instructions);
+  });
 }
 
 TEST_F(EachInstructionOfAPost, OfABatchPostsEachEventOnce) {
@@ -246,19 +258,18 @@ TEST_F(EachInstructionOfAPost, OfABatchPostsEachEventOnce) {
     ++others;
   };
   const auto call = [&](EventIntake& server) { server.process(batch_); };
-  int instructions = 0;
-  for (bool within = true; within; instructions += stride(211)) {
+  kill_at_each(stride(53), [&](std::size_t instructions) {
     batch_.sequence_number = batch_.base_sequence = ++number;
-    within = kill_within(call, instructions, beside);
+    kill_within(call, instructions, beside);
     EventIntake next = make();
     next.process(batch_);
-    const std::string where = std::to_string(instructions) + " instructions";
+    const std::string where = shown(instructions);
     ASSERT_EQ(event_.counted().count(), 2 * (number + other_batches_) + others) << where;
     ASSERT_EQ(other_.counted().count(), number + other_batches_) << where;
     const EventIntake::Writer writer = writer_of(next, 2);
     ASSERT_EQ(writer.counters.accepted, number) << where;
     expect_sum(writer.counters, where);
-  }
+  });
 }
 
 }  // namespace

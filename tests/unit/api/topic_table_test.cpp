@@ -1,5 +1,4 @@
 // The table of topics that the build makes from control.idl, and the permissions that are written by hand.
-#include <regex>
 #include <set>
 #include <string>
 #include <vector>
@@ -10,6 +9,7 @@
 
 #include "api/dds/topics.hpp"
 #include "api/security/policy.hpp"
+#include "tests/support/text_between.hpp"
 
 namespace plchost {
 namespace {
@@ -23,11 +23,8 @@ constexpr security::GuidPrefix kPrefix{1, 2, 3};
 std::vector<std::string> granted(Role role, const std::string& what) {
   const std::string text = security::permissions_text({.role = role, .name = "cell"}, "CN=cell", kPrefix, {});
   std::vector<std::string> topics;
-  const std::regex grant("<" + what + ">[^]*?</" + what + ">");
-  const std::regex topic("<topic>([^<]*)</topic>");
-  for (std::sregex_iterator g(text.begin(), text.end(), grant), end; g != end; ++g) {
-    const std::string part = g->str();
-    for (std::sregex_iterator t(part.begin(), part.end(), topic); t != end; ++t) topics.push_back((*t)[1]);
+  for (const std::string& grant : texts_between(text, "<" + what + ">", "</" + what + ">")) {
+    for (const std::string& topic : texts_between(grant, "<topic>", "</topic>")) topics.push_back(topic);
   }
   return topics;
 }

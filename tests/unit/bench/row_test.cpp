@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <cstdlib>
-#include <regex>
 #include <set>
 
 #include <gtest/gtest.h>
@@ -10,6 +9,7 @@
 
 #include "tests/bench/apart.hpp"
 #include "tests/bench/plot.hpp"
+#include "tests/support/text_between.hpp"
 
 namespace plchost::bench {
 namespace {
@@ -230,10 +230,12 @@ TEST(Plot, TellsEachCurveByItsMarks) {
   const std::vector<Row> rows{{.name = "a", .ours = one_to(30), .floor = one_to(20)},
                               {.name = "b", .ours = one_to(40), .floor = one_to(21)}};
   const auto svg = to_svg(kDrawing, "", rows);
-  const std::regex mark(R"re(class="mark" d="M[^ ]+ ([^"]+)" fill="([^"]+)")re");
   std::set<std::pair<std::string, bool>> looks;  // shape, hollow
-  for (std::sregex_iterator at(svg.begin(), svg.end(), mark), end; at != end; ++at)
-    looks.emplace((*at)[1], (*at)[2] == "#ffffff");
+  for (const std::string& mark : texts_between(svg, R"(class="mark" d="M)", "/>")) {
+    const auto shape = texts_between(mark, " ", R"(" fill=")");
+    const auto fill = texts_between(mark, R"(fill=")", R"(")");
+    if (!shape.empty() && !fill.empty()) looks.emplace(shape.front(), fill.front() == "#ffffff");
+  }
   EXPECT_EQ(looks.size(), 4U);
 }
 
