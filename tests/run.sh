@@ -125,9 +125,11 @@ tidy() {
     cmake --build .build/tidy --target plchost_idl_generate plchost_generated && tests/gates/tidy.sh "$PWD/.build/tidy"
 }
 
+# One fuzzer starts a program that the plain build has made.
 build_fuzzers() {
   configure .build/fuzz -DCMAKE_C_COMPILER=clang-19 -DCMAKE_CXX_COMPILER=clang++-19 -DPLCHOST_FUZZ=ON \
-    -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF "${unity[@]}" &&
+    -DPLCHOST_TESTS=OFF -DPLCHOST_BENCH=OFF -DPLCHOST_GATED_CYCLONE="$PWD/$build/bin/gated_cyclone" "${unity[@]}" \
+    -DCMAKE_BUILD_TYPE=Debug -DCMAKE_CXX_FLAGS_DEBUG="-O1 -g1 -DNDEBUG" -DCMAKE_C_FLAGS_DEBUG="-O1 -g1 -DNDEBUG" &&
     cmake --build .build/fuzz -j "$jobs" --target fuzzers
 }
 fuzz() {
