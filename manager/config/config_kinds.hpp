@@ -153,12 +153,12 @@ struct ModeKey {
   static std::string shown_plain(mode_t value) { return fmt::format("{:04o}", value); }
 };
 
-inline constexpr std::int64_t kMaxCoreNumber = 1023;  // CPU_SETSIZE
+inline constexpr std::int64_t kMaxConfiguredCore = 1023;  // CPU_SETSIZE
 
 /// A core that the section must name; check_relations() looks whether it may have that.
 struct RequiredCoreKey {
   static void read(const ConfigReading& reading, SectionReader& reader, std::string_view name, int& target) {
-    NumberKey<0, kMaxCoreNumber>::read(reading, reader, name, target);
+    NumberKey<0, kMaxConfiguredCore>::read(reading, reader, name, target);
     if (!reader.has(name)) reader.problem(name, "is missing; say which core it runs on");
   }
   static std::string allowed() { return "one of `[host]` `cores`"; }
@@ -171,7 +171,7 @@ struct CoresKey {
                    std::vector<int>& target) {
     const auto& online = reading.surroundings.online_cores;
     std::optional<std::vector<int>> cores;
-    reader.numbers(name, 0, kMaxCoreNumber, cores);
+    reader.numbers(name, 0, kMaxConfiguredCore, cores);
     if (!cores) return;
     if (cores->empty()) {
       reader.problem(name, fmt::format("is empty; online are {}", fmt::join(online, ", ")));

@@ -17,7 +17,7 @@ namespace plchost {
 namespace {
 
 // Nobody reads before the end: the output of an application at its start has to fit.
-constexpr int kOutputRoom = 1 << 20;
+constexpr int kTrialOutputRoom = 1 << 20;
 constexpr std::size_t kShown = 2000;
 
 // In an answer a line break would be shown as a damaged character.
@@ -47,7 +47,7 @@ Result<ApplicationTrial> ApplicationTrial::start(std::vector<std::string> argume
                                                  const std::string& path) {
   auto pipe = make_output_pipe();
   if (!pipe) return std::unexpected(pipe.error());
-  (void)::fcntl(pipe->write_end.get(), F_SETPIPE_SZ, kOutputRoom);
+  (void)::fcntl(pipe->write_end.get(), F_SETPIPE_SZ, kTrialOutputRoom);
   arguments.insert(arguments.end(), {path, "--parent", fmt::format("{}", ::getpid())});
   auto process = spawn_process({.arguments = std::move(arguments), .output_fd = pipe->write_end.get()});
   if (!process) return std::unexpected(process.error());
@@ -79,7 +79,7 @@ void ApplicationTrial::give_up() {
 Result<void> ApplicationTrial::verdict() {
   end_session(process_);
   const ExitStatus status = reap_process(process_);
-  std::string output = read_available(output_.get(), kOutputRoom);
+  std::string output = read_available(output_.get(), kTrialOutputRoom);
   // The exit code alone says nothing: the application can end the process.
   const bool valid = status.success() && output.find(kValidApplication) != std::string::npos;
   if (valid) return {};

@@ -16,7 +16,7 @@ namespace plchost {
 namespace {
 
 // The lock is held for a millisecond at most; but its holder may be stopped.
-constexpr auto kPatience = std::chrono::seconds(5);
+constexpr auto kLockPatience = std::chrono::seconds(5);
 constexpr timespec kBetweenLooks{.tv_sec = 0, .tv_nsec = 200'000};
 
 }  // namespace
@@ -29,16 +29,16 @@ Result<DirectoryLock> DirectoryLock::acquire(const std::string& name) {
     return failure(error == ENOENT ? ErrorCode::not_found : ErrorCode::system, fmt::format("open {}", path),
                    error);
   }
-  const TimePoint deadline = MonotonicClock::now() + kPatience;
+  const TimePoint deadline = MonotonicClock::now() + kLockPatience;
   while (::flock(fd.get(), LOCK_EX | LOCK_NB) != 0) {
     const int error = errno;
     if (error != EWOULDBLOCK && error != EINTR) {
       return failure(ErrorCode::system, fmt::format("lock {}", path), error);
     }
     if (MonotonicClock::now() >= deadline) {
-      return failure(
-          ErrorCode::timed_out,
-          fmt::format("another process holds the lock of {} for more than {} s", path, kPatience.count()));
+      return failure(ErrorCode::timed_out,
+                     fmt::format("another process holds the lock of {} for more than {} s", path,
+                                 kLockPatience.count()));
     }
     ::clock_nanosleep(CLOCK_MONOTONIC, 0, &kBetweenLooks, nullptr);
   }

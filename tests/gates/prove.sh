@@ -245,12 +245,25 @@ sed -i 's/^constexpr std::array kBlocksKeys = {/&\n    blocks<\&BlocksConfig::pl
 check_keys || { echo "a member and its row are not enough for a key of the configuration"; failed=1; }
 must_be_red "configuration: row without documentation" "no row for the key [blocks] planted" "$gates/documents.py" "$plot/tree"
 
+# Units are joined, and read one by one where two of them use a name.
 new_tree
-echo 'int planted(int* p) { return p == 0 ? 1 : 2; }' >"$plot/tree/shm/base/planted.cpp"
-mkdir "$plot/tidy"
-echo '[{"directory": "'"$plot"'", "command": "g++ -std=c++23 -c '"$plot"'/tree/shm/base/planted.cpp",
-  "file": "'"$plot"'/tree/shm/base/planted.cpp"}]' >"$plot/tidy/compile_commands.json"
-must_be_red clang-tidy "modernize-use-nullptr" "$gates/tidy.sh" "$plot/tidy"
+mkdir -p "$plot/tidy/shm"
+units=()
+for name in planted other; do
+  echo "#include \"$plot/tree/shm/base/$name.cpp\"" >"$plot/tidy/shm/$name.cxx"
+  units+=("{\"directory\": \"$plot\", \"command\": \"g++ -std=c++23 -c $plot/tidy/shm/$name.cxx\", \"file\": \"$plot/tidy/shm/$name.cxx\"}")
+done
+echo "[${units[0]}, ${units[1]}]" >"$plot/tidy/compile_commands.json"
+echo 'static int f(int* p) { return p == 0 ? 1 : 2; } int planted(int* p) { return f(p); }' >"$plot/tree/shm/base/planted.cpp"
+echo 'int other(int n) { return n; }' >"$plot/tree/shm/base/other.cpp"
+must_be_red clang-tidy "shm/base/planted.cpp:1:36: error: use nullptr [modernize-use-nullptr" "$gates/tidy.sh" "$plot/tidy"
+echo 'static int f(int n) { return n; } static int f(int* p) { return *p; } int other(int n) { return f(n) + f(&n); }' \
+  >"$plot/tree/shm/base/other.cpp"
+must_be_red "clang-tidy: one name twice" "shm/base/planted.cpp:1:36: error: use nullptr [modernize-use-nullptr" "$gates/tidy.sh" "$plot/tidy"
+sed -i 's/p == 0/p == nullptr/' "$plot/tree/shm/base/planted.cpp"
+"$gates/tidy.sh" "$plot/tidy" || { echo "units that use a name twice do not pass clang-tidy"; failed=1; }
+echo '[]' >"$plot/tidy/compile_commands.json"
+must_be_red "clang-tidy: nothing" "there is no unit in" "$gates/tidy.sh" "$plot/tidy"
 
 cat >"$plot/CMakeLists.txt" <<EOF
 cmake_minimum_required(VERSION 3.25)

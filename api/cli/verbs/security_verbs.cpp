@@ -44,14 +44,14 @@ int with_folder(const Said& said, Action action) {
   return action(*folder);
 }
 
-std::string machine_name() {
+std::string this_machine() {
   std::array<char, 65> name{};
   (void)::gethostname(name.data(), name.size() - 1);
   return name.data();
 }
 
 int init(const std::string& directory, const std::string& said_host) {
-  const std::string host = said_host.empty() ? machine_name() : said_host;
+  const std::string host = said_host.empty() ? this_machine() : said_host;
   return finish(
       SecurityFolder::init(directory, host),
       fmt::format("{0}/{1}: the identity of host '{1}', for its [dds] identity\n{0}/authorities: keep it "

@@ -49,33 +49,34 @@ std::string machine_name(unsigned machine) {
   }
 }
 
-std::unexpected<Error> invalid(std::string text) {
+std::unexpected<Error> invalid_program(std::string text) {
   return failure(ErrorCode::invalid_argument, std::move(text));
 }
 
 std::unexpected<Error> truncated(std::string_view part) {
-  return invalid(fmt::format("is cut short or damaged: its {} lie beyond its end; copy it again", part));
+  return invalid_program(
+      fmt::format("is cut short or damaged: its {} lie beyond its end; copy it again", part));
 }
 
 Result<Elf64_Ehdr> check_header(ElfBytes file) {
   if (file.size() < SELFMAG || std::memcmp(file.data(), ELFMAG, SELFMAG) != 0) {
-    return invalid("is not a shared object (no ELF file at all)");
+    return invalid_program("is not a shared object (no ELF file at all)");
   }
   if (file.size() < EI_NIDENT) return truncated("first bytes");
   if (std::to_integer<unsigned>(file[EI_CLASS]) != ELFCLASS64) {
-    return invalid("is built for 32 bit; this runtime needs 64 bit");
+    return invalid_program("is built for 32 bit; this runtime needs 64 bit");
   }
   if (std::to_integer<unsigned>(file[EI_DATA]) != ELFDATA2LSB) {
-    return invalid("is built for a big-endian machine");
+    return invalid_program("is built for a big-endian machine");
   }
   const auto header = elf_item<Elf64_Ehdr>(file, 0);
   if (!header) return truncated("first bytes");
   if (header->e_machine != kMachine) {
-    return invalid(fmt::format("is built for {}; this machine is {}", machine_name(header->e_machine),
-                               machine_name(kMachine)));
+    return invalid_program(fmt::format("is built for {}; this machine is {}", machine_name(header->e_machine),
+                                       machine_name(kMachine)));
   }
   if (header->e_type != ET_DYN) {
-    return invalid("is not a shared object: build it with -shared -fPIC");
+    return invalid_program("is not a shared object: build it with -shared -fPIC");
   }
   return *header;
 }
@@ -87,7 +88,7 @@ struct Tables {
 
 Result<Tables> find_tables(ElfBytes file, const Elf64_Ehdr& header) {
   if (header.e_phentsize != sizeof(Elf64_Phdr) || header.e_phnum == 0) {
-    return invalid("has no program headers: not a shared object that can be loaded");
+    return invalid_program("has no program headers: not a shared object that can be loaded");
   }
   const auto segments = elf_slice(file, header.e_phoff, std::uint64_t{header.e_phnum} * sizeof(Elf64_Phdr));
   if (!segments) return truncated("program headers");
@@ -97,7 +98,7 @@ Result<Tables> find_tables(ElfBytes file, const Elf64_Ehdr& header) {
     }
   }
   if (header.e_shnum == 0 || header.e_shentsize != sizeof(Elf64_Shdr)) {
-    return invalid("has no section headers, so its symbols cannot be checked: do not strip them");
+    return invalid_program("has no section headers, so its symbols cannot be checked: do not strip them");
   }
   const auto sections = elf_slice(file, header.e_shoff, std::uint64_t{header.e_shnum} * sizeof(Elf64_Shdr));
   if (!sections) return truncated("section headers");
@@ -118,7 +119,7 @@ Result<Symbols> find_symbols(ElfBytes file, ElfBytes sections) {
     if (!entries || !texts) return truncated("symbols");
     return Symbols{*entries, *texts};
   }
-  return invalid("exports no symbols at all");
+  return invalid_program("exports no symbols at all");
 }
 
 std::optional<Elf64_Sym> find_export(const Symbols& symbols, std::string_view wanted) {
@@ -161,7 +162,7 @@ Result<void> check_elf(ElfBytes file, std::span<const std::string_view> symbols)
   const auto version_symbol = find_export(*exported, kAbiSymbol);
   if (!version_symbol) missing.push_back(kAbiSymbol);
   if (!missing.empty() || !version_symbol) {
-    return invalid(fmt::format("does not export {}; see plc_app.h", join_names(missing)));
+    return invalid_program(fmt::format("does not export {}; see plc_app.h", join_names(missing)));
   }
   const auto version = read_version(file, tables->segments, *version_symbol);
   if (!version || *version != PLC_APP_ABI_VERSION) {
@@ -181,9 +182,9 @@ Result<std::vector<std::byte>> read_program(const std::string& path) {
   }
   struct stat status{};
   if (::fstat(fd.get(), &status) != 0) return failure(ErrorCode::system, "fstat", errno);
-  if (!S_ISREG(status.st_mode)) return invalid("is not a file");
+  if (!S_ISREG(status.st_mode)) return invalid_program("is not a file");
   if (static_cast<std::uint64_t>(status.st_size) > kMaxProgramFile) {
-    return invalid(fmt::format("is larger than {} bytes", kMaxProgramFile));
+    return invalid_program(fmt::format("is larger than {} bytes", kMaxProgramFile));
   }
   std::vector<std::byte> bytes(static_cast<std::size_t>(status.st_size));
   std::size_t filled = 0;

@@ -13,7 +13,7 @@ namespace plchost {
 namespace {
 
 // For a moment in which no task is in a cycle. Less than the manager waits for an answer.
-constexpr auto kPatience = std::chrono::seconds(6);
+constexpr auto kChangePatience = std::chrono::seconds(6);
 
 }  // namespace
 
@@ -28,7 +28,7 @@ Result<std::string> Instance::begin_change(const std::string& path) {
   auto change = OnlineChange::prepare(path, start_, *application_, *host_);
   if (!change) return std::unexpected(std::move(change).error());
   change_ = *std::move(change);
-  change_ends_ = MonotonicClock::now() + kPatience;
+  change_ends_ = MonotonicClock::now() + kChangePatience;
   if (const auto held = tasks_->between_cycles([this] { change_->take_over(); })) return finish_change(*held);
   return {};
 }
@@ -45,7 +45,8 @@ void Instance::advance_change() {
   if (MonotonicClock::now() < change_ends_) return;
   const auto busy = tasks_->tasks_in_cycle();
   const std::string last = busy.empty() ? std::string() : fmt::format(", the last time {}", join_names(busy));
-  drop_change(fmt::format("at each look for {} s a task was within its cycle{}", kPatience.count(), last));
+  drop_change(
+      fmt::format("at each look for {} s a task was within its cycle{}", kChangePatience.count(), last));
 }
 
 std::string Instance::finish_change(Duration held) {

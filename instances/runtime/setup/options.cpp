@@ -27,7 +27,7 @@ constexpr std::array kBands = {
 constexpr int kMaxCore = 1023;
 
 // In CLI11 a validator returns the text of what is wrong, or nothing.
-std::string text_of(const Result<void>& result) {
+std::string fault_text(const Result<void>& result) {
   return result ? std::string() : result.error().describe();
 }
 
@@ -37,11 +37,11 @@ std::string check_scheduler(const std::string& name) {
 }
 
 std::string check_instance_name(const std::string& name) {
-  return text_of(check_name("instance name", name, kMaxInstanceName));
+  return fault_text(check_name("instance name", name, kMaxInstanceName));
 }
 
 std::string check_pool_name(const std::string& name) {
-  return text_of(check_name("pool name", name, kMaxInstanceName));
+  return fault_text(check_name("pool name", name, kMaxInstanceName));
 }
 
 std::string check_band(const std::string& name) {

@@ -27,7 +27,7 @@ std::unexpected<Error> invalid_task(std::string text) {
 
 // A text of the ABI, which may lack its terminating zero.
 template <std::size_t Size>
-Result<std::string> text_of(const char (&field)[Size], std::string_view what) {
+Result<std::string> field_text(const char (&field)[Size], std::string_view what) {
   const char* const end = std::find(std::begin(field), std::end(field), '\0');
   if (end == std::end(field)) {
     return invalid_task(
@@ -66,7 +66,7 @@ Result<void> fill_kind(const Task_Info& task, const std::shared_ptr<TaskCode>& c
     };
   }
   if (kind.names_event) {
-    const auto event = text_of(task.stExternalEvent, "stExternalEvent");
+    const auto event = field_text(task.stExternalEvent, "stExternalEvent");
     if (!event) return std::unexpected(event.error());
     config.external_event = *event;
     return check_name("stExternalEvent", *event, kMaxEventName);
@@ -111,14 +111,14 @@ Result<std::vector<TaskConfig>> build_tasks(const sys_setup_tasks_struct& setup,
                                     setup.nTasks, PLC_MAX_TASKS));
   }
   if (setup.ptaskinfo == nullptr) return invalid_task("ptaskinfo is null");
-  if (auto name = text_of(setup.stApplicationName, "stApplicationName"); !name) {
+  if (auto name = field_text(setup.stApplicationName, "stApplicationName"); !name) {
     return std::unexpected(name.error());
   }
   std::vector<TaskConfig> configs;
   std::set<std::string> names;
   for (int i = 0; i < setup.nTasks; ++i) {
     Task_Info& task = setup.ptaskinfo[i];
-    const auto name = text_of(task.stName, "stName");
+    const auto name = field_text(task.stName, "stName");
     if (!name) return failure_in(fmt::format("task number {}", i), name.error());
     if (auto valid = check_name("stName", *name, kMaxTaskName); !valid) {
       return failure_in(fmt::format("task number {}", i), valid.error());
