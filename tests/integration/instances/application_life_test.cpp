@@ -124,9 +124,8 @@ TEST_F(LifeInProcess, ServesOthersWhileItStops) {
   expect_refused(ControlVerb::set_scheduler, ErrorCode::busy, "is stopping", "CmpScheduleTimer");
   const auto before = cycles("Free");
   EXPECT_TRUE(eventually([&] { return cycles("Free") > before + 10; }));  // the others run on
-  const auto beat = InstancePageReader::open(sandbox_.pool(), "line1")->runtime()->heartbeat_ns;
-  EXPECT_TRUE(eventually(
-      [&] { return InstancePageReader::open(sandbox_.pool(), "line1")->runtime()->heartbeat_ns > beat; }));
+  const auto beat = sut_->runtime().heartbeat_ns;
+  EXPECT_TRUE(eventually([&] { return sut_->runtime().heartbeat_ns > beat; }));
   EXPECT_EQ(sut_->event("let_go").post(), PostResult::posted);
   const auto reply = receive(socket);
   EXPECT_EQ(reply.code, ErrorCode::ok) << reply.text;

@@ -123,13 +123,30 @@ std::string InstanceProcess::log() const {
 }
 
 std::optional<TaskSnapshot> InstanceProcess::task(const std::string& name) const {
-  const auto page = InstancePageReader::open(sandbox_.pool(), "line1");
-  if (!page) return std::nullopt;
-  for (std::uint32_t i = 0; i < page->task_count(); ++i) {
-    auto task = page->task(i);
-    if (task && task->identity.name.view() == name) return task;
+  constexpr Duration kWriteTakes = std::chrono::seconds(2);  // if its task loses the processor meanwhile
+  std::optional<TaskSnapshot> found;
+  const TimePoint end = MonotonicClock::now() + kWriteTakes;
+  for (bool is_whole = false; !found && !is_whole && MonotonicClock::now() < end;) {
+    const auto page = InstancePageReader::open(sandbox_.pool(), "line1");
+    is_whole = true;
+    for (std::uint32_t i = 0; page && !found && i < page->task_count(); ++i) {
+      auto task = page->task(i);
+      is_whole = is_whole && task.has_value();
+      if (task && task->identity.name.view() == name) found = std::move(task);
+    }
   }
-  return std::nullopt;
+  return found;
+}
+
+InstanceRuntime InstanceProcess::runtime() const {
+  std::optional<InstanceRuntime> runtime;
+  const bool is_read = eventually([&] {
+    const auto page = InstancePageReader::open(sandbox_.pool(), "line1");
+    if (page) runtime = page->runtime();
+    return runtime.has_value();
+  });
+  EXPECT_TRUE(is_read) << log();
+  return runtime.value_or(InstanceRuntime{});
 }
 
 PacketSocket InstanceProcess::connect() const {

@@ -54,7 +54,10 @@ class InstanceProcess {
   int end(int signal = 0);
   /// Its output so far.
   [[nodiscard]] std::string log() const;
+  /// Nothing: it has no such task.
   [[nodiscard]] std::optional<TaskSnapshot> task(const std::string& name) const;
+  /// Its report in its page.
+  [[nodiscard]] InstanceRuntime runtime() const;
   [[nodiscard]] ControlReply ask(ControlVerb verb, const std::string& argument = {}) const;
   [[nodiscard]] PacketSocket connect() const;
   [[nodiscard]] PoolEvent event(const std::string& name);

@@ -82,10 +82,7 @@ class Online {
     const auto before = main().cycles;
     return eventually([&] { return main().cycles > before + more; });
   }
-  std::string path() {
-    const auto page = InstancePageReader::open(sandbox_.pool(), "line1");
-    return std::string(page->runtime()->application.view());
-  }
+  std::string path() { return std::string(process_.runtime().application.view()); }
   /// Parts of copies in memory that are mapped, and descriptors that are open.
   std::pair<std::size_t, std::size_t> held() const {
     const std::string of_process = fmt::format("/proc/{}/", process_.pid());

@@ -186,13 +186,22 @@ ControlReply Plant::ask(ControlVerb verb, const std::string& instance, const std
 }
 
 InstanceStatus Plant::status(const std::string& instance) {
-  const auto page = HostPageReader::open(pool_);
-  if (!page) return {};
-  for (std::uint32_t i = 0; i < kMaxInstances; ++i) {
-    const auto status = page->instance(i);
-    if (status && status->name.view() == instance) return *status;
-  }
-  return {};
+  constexpr Duration kWriteTakes = std::chrono::seconds(2);  // if the manager loses its processor meanwhile
+  InstanceStatus found;
+  (void)within(kWriteTakes, [&] {
+    const auto page = HostPageReader::open(pool_);
+    bool is_whole = true;
+    for (std::uint32_t i = 0; page && i < kMaxInstances; ++i) {
+      const auto status = page->instance(i);
+      if (status && status->name.view() == instance) {
+        found = *status;
+        return true;
+      }
+      is_whole = is_whole && (page->instance_sequence(i) & 1) == 0;
+    }
+    return is_whole;
+  });
+  return found;
 }
 
 bool Plant::eventually(const std::function<bool()>& condition) {

@@ -120,8 +120,10 @@ saw() { [ "$(grep -c "$1" "$cell/watch.log")" -ge "$2" ]; }
 until_true 20 saw "^host north answers" 1
 until_true 20 saw "^north/packer1/Product: " 1
 until_true 20 saw "^north/packer1: application stopped -> running" 1
-kill -KILL "$(plcctl list hosts --json | jq '.[0].server_pid')"
+server=$(plcctl list hosts --json | jq '.[0].server_pid')
+kill -STOP "$server"  # the next one is there within 0.1 s, sooner than a slow client sees that this one is gone
 until_true 20 saw "^host north is silent" 1
+kill -KILL "$server" || true  # or the manager has, after 10 s
 until_true 20 saw "^host north answers" 2
 plcctl stop instance packer1
 until_true 20 saw "^north/packer1: application stopping -> stopped" 1
