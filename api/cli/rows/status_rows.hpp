@@ -25,9 +25,7 @@ namespace status_rows {
 template <class Value>
 void add(Row& row, const dds::FieldInfo& field, const Value& value) {
   const std::string name(field.row);
-  if constexpr (std::same_as<Value, Row>) {
-    row[name] = value;
-  } else if constexpr (std::same_as<Value, bool>) {
+  if constexpr (std::same_as<Value, Row> || std::same_as<Value, bool>) {
     row[name] = value;
   } else if constexpr (std::integral<Value>) {
     if (std::cmp_equal(value, field.null)) {
@@ -60,8 +58,13 @@ void add(Row& row, const dds::FieldInfo& field, const Value& value) {
 template <class Sample, class... Context>
   requires dds::kHasRow<Sample>
 [[nodiscard]] Row to_row(const Sample& sample, const Context&... context) {
-  dds::Computed<Sample, Row> computed;
-  if constexpr (!std::is_empty_v<decltype(computed)>) computed = computed_of(sample, context...);
+  const auto computed = [&]() -> dds::Computed<Sample, Row> {
+    if constexpr (std::is_empty_v<dds::Computed<Sample, Row>>) {
+      return {};
+    } else {
+      return computed_of(sample, context...);
+    }
+  }();
   Row row;
   dds::visit_row(sample, computed, [&](const dds::FieldInfo& field, const auto& value) {
     status_rows::add(row, field, value);
