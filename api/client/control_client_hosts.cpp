@@ -166,8 +166,11 @@ Result<HostView> ControlClient::host(std::string_view name, TimePoint deadline) 
     wait_set_.wait(deadline);
   }
   // The others send it nothing.
-  if (!only_.empty())
-    return failure(ErrorCode::not_found, no_such_host(name, dds::discovered_hosts(entity())));
+  if (!only_.empty()) {
+    auto others = dds::discovered_hosts(entity());
+    std::erase(others, name);  // it has just not answered
+    return failure(ErrorCode::not_found, no_such_host(name, others));
+  }
   // Those too that are late at this very moment.
   std::vector<std::string> names;
   for (const auto& [other, seen] : seen_.all()) {

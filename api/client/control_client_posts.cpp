@@ -48,6 +48,7 @@ Result<void> ControlClient::prepare_posts(const std::string& host, TimePoint dea
       return failure(ErrorCode::timed_out, fmt::format("host '{}' takes no events", host));
     }
     update();
+    if ((*way)->matched() && clock_of(host) != nullptr) break;
     wait_set_.wait(deadline);
   }
   return {};

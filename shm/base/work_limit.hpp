@@ -24,7 +24,8 @@ struct ProcessorShare {
 /// A time limit for the work of a process. Time in which other programs kept the process from its processor
 /// does not count: a machine that is busy makes no good program a failed one. A process that sleeps for too
 /// long exceeds the limit as on an idle machine. So does one that computes for ever: it is not waited for
-/// once it has had a fifth of the limit as processor time. Pure.
+/// once it has had a fifth of the limit as processor time. Such time lengthens the limit to five times at
+/// most. Pure.
 class WorkLimit {
  public:
   WorkLimit() = default;
@@ -40,8 +41,9 @@ class WorkLimit {
     const Duration ran = std::max(share.ran - before_.ran, Duration::zero());
     // The time in which the process itself had the processor is its own, whichever of its threads waited.
     const Duration of_others = std::max(elapsed - ran, Duration::zero());
-    const Duration waited =
-        ran < limit_ / kPartThatComputes ? share.waited - before_.waited : Duration::zero();
+    const Duration waited = ran < limit_ / kPartThatComputes
+                                ? std::min(share.waited - before_.waited, kMostWaited * limit_)
+                                : Duration::zero();
     const Duration kept = std::clamp(std::max(waited, known), Duration::zero(), of_others);
     const Duration rest = limit_ - (elapsed - kept);
     return rest > Duration::zero() ? std::max(rest, kLook) : Duration::zero();
@@ -51,6 +53,7 @@ class WorkLimit {
 
  private:
   static constexpr int kPartThatComputes = 5;
+  static constexpr int kMostWaited = 4;  // limits: one thread that waits must not excuse another for ever
   Duration limit_{};
   TimePoint began_{};
   ProcessorShare before_{};

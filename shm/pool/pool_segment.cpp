@@ -404,6 +404,7 @@ bool PoolSegment::bury(PoolLock& held, ClientSlot& client, std::size_t& left) no
   if (at < all.size()) return false;
   const auto is_its = [&](const ReferenceEntry& reference) { return view_.client_of(reference) == &client; };
   // The place that the search began at may be a stranger's. Without it there is nothing left.
+  if (begin != 0) left -= std::min(left, all.size() / kPlacesForOne);
   if (begin != 0 && std::ranges::any_of(all, is_its)) {
     client.released.store(0, kRelaxed);
     return bury(held, client, left);

@@ -43,8 +43,12 @@ void add_histogram(Row& row, std::string_view name, const HistogramReport& histo
 void add_loss(Row& row, const plc_CycleLoss& loss) {
   row["last_loss_cycles"] = loss.lost;
   row["last_loss_release"] = time_text(loss.release_unix_ns);
-  row["last_loss_start_us"] = to_us(wrapping_difference(loss.start_unix_ns, loss.release_unix_ns));
-  row["last_loss_end_us"] = to_us(wrapping_difference(loss.end_unix_ns, loss.release_unix_ns));
+  const auto after_release = [&loss](std::int64_t unix_ns) {
+    const bool none_had_run = loss.lost != 0 && loss.release_unix_ns == 0;
+    return none_had_run ? Row() : Row(to_us(wrapping_difference(unix_ns, loss.release_unix_ns)));
+  };
+  row["last_loss_start_us"] = after_release(loss.start_unix_ns);
+  row["last_loss_end_us"] = after_release(loss.end_unix_ns);
 }
 
 void add_counters(Row& row, const plc_TaskStatistics& numbers) {

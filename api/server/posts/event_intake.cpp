@@ -205,6 +205,9 @@ Result<void> EventIntake::check_names(std::string_view instance, std::string_vie
   return check_name("event", event, kMaxEventName);
 }
 
+// Of the manager, even if it loses its processor meanwhile.
+constexpr Duration kWriteTakes = std::chrono::seconds(1);
+
 // An instance that is starting registers its events, and then its tasks take posts. Only after that it is
 // told as running.
 bool EventIntake::is_starting(std::string_view instance) {
@@ -212,8 +215,13 @@ bool EventIntake::is_starting(std::string_view instance) {
   const auto instances = host_page_.instances();
   const auto found = std::ranges::find(instances, instance,
                                        [](const InstanceStatus* status) { return status->name.view(); });
-  // A place that was never read yet may be the one of this instance.
-  if (!whole && host_page_.is_open()) return true;
+  // A place that was never read yet may be the one of this instance. A manager that is killed within a write
+  // leaves it so until the next one is there: then that is no reason any more.
+  const TimePoint now = MonotonicClock::now();
+  if (whole || now - looked_ > kWriteTakes) torn_since_.reset();
+  looked_ = now;
+  if (!whole && !torn_since_) torn_since_ = now;
+  if (!whole && host_page_.is_open() && now - *torn_since_ < kWriteTakes) return true;
   if (found == instances.end()) return false;
   const InstanceState state = (*found)->state;
   return state == InstanceState::starting || state == InstanceState::waiting;

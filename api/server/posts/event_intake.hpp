@@ -135,6 +135,8 @@ class EventIntake {
   const AccessGuard* const guard_;
   mutable std::mutex mutex_;
   HostPageCopy host_page_;  // is read when an event is not there
+  TimePoint looked_;        // at it
+  std::optional<TimePoint> torn_since_;
   EventDirectory directory_;
   PostLedger ledger_;
   AckWriters* ack_writers_ = nullptr;

@@ -51,9 +51,10 @@ std::uint32_t share_ppm(std::int64_t part, std::int64_t whole) noexcept {
 }
 
 // Nothing was lost: all 0.
-plc_CycleLoss to_sample(const CycleLoss& loss, TimePoint now) noexcept {
+plc_CycleLoss to_sample(const CycleLoss& loss) noexcept {
   if (loss.lost == 0) return {};
-  const std::int64_t ahead = wrapping_difference(unix_time_ns(), now.time_since_epoch().count());
+  const std::int64_t now_ns = MonotonicClock::now().time_since_epoch().count();
+  const std::int64_t ahead = wrapping_difference(unix_time_ns(), now_ns);
   const auto unix = [ahead](std::int64_t time_ns) {
     return time_ns == 0 ? 0 : wrapping_difference(ahead, wrapping_difference(0, time_ns));
   };
@@ -71,7 +72,7 @@ void put_counters(const TaskCounters& counters, TimePoint now, plc_TaskStatistic
   sample.lost_cycles = counters.lost_cycles;
   sample.lost_consecutive = counters.lost_consecutive;
   sample.lost_consecutive_max = counters.lost_consecutive_max;
-  sample.last_loss = to_sample(counters.last_loss, now);
+  sample.last_loss = to_sample(counters.last_loss);
   sample.lost_events = counters.lost_events;
   sample.slots_last = counters.slots_last;
   sample.slots_max = counters.slots_max;

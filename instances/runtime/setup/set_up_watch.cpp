@@ -36,6 +36,12 @@ Result<void> look_for_taker() {
                              std::chrono::duration_cast<std::chrono::milliseconds>(taker->lasted).count()));
 }
 
+Result<void> has_not_returned() {
+  return failure(ErrorCode::refused,
+                 fmt::format("the set-up has not returned for {} s",
+                             std::chrono::duration_cast<std::chrono::seconds>(SetUpWatch::kLimit).count()));
+}
+
 }  // namespace
 
 SetUpWatch::SetUpWatch(Duration guard, ThreadPriority priority, Fail fail) : fail_(std::move(fail)) {
@@ -56,18 +62,18 @@ void SetUpWatch::run(Duration limit, const std::vector<int>& cores) {
                        [&](pid_t thread) { return runs_beside(thread, cores); });
   std::unique_lock lock(mutex_);
   Duration lasted{};
-  const WorkLimit work(kLimit, TimePoint{}, processor_share_of(::getpid()));
   TimePoint looked = MonotonicClock::now();
+  const WorkLimit work(kLimit, looked, processor_share_of(::getpid()));
+  TimePoint next_look = looked + kLimit;  // at the work: that reads files
   while (!stops_.wait_for(lock, kLook, [this] { return stopped_; })) {
     const TimePoint now = MonotonicClock::now();
     lasted += std::min(now - std::exchange(looked, now), kLongestGap);
     if (const auto taker = search.look(now)) ProcessorGuard::report(taker->who, taker->lasted);
     auto good = look_for_taker();
-    if (good && lasted >= kLimit &&
-        work.left(TimePoint{} + lasted, processor_share_of(::getpid())) == Duration::zero()) {
-      good = failure(ErrorCode::refused,
-                     fmt::format("the set-up has not returned for {} s",
-                                 std::chrono::duration_cast<std::chrono::seconds>(kLimit).count()));
+    if (good && lasted >= kLimit && now >= next_look) {
+      const Duration left = work.left(now, processor_share_of(::getpid()));
+      next_look = now + left;
+      if (left == Duration::zero()) good = has_not_returned();
     }
     if (!good) return fail_(good.error());
   }

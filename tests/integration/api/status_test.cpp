@@ -3,6 +3,7 @@
 #include <csignal>
 #include <cstring>
 #include <future>
+#include <span>
 #include <thread>
 
 #include <gmock/gmock.h>
@@ -277,11 +278,21 @@ void lose_sight_of_hosts(ControlClient& client) {
   const auto subscriber = dds::make_subscriber(participant, dds::status_partition(dds::kAllHosts)).value();
   const auto topic = dds::make_topic(participant, dds::kPresence).value();
   const auto reader = dds::make_reader(subscriber.get(), topic.get(), dds::qos_of(dds::kPresence)).value();
-  std::array<dds_instance_handle_t, 1> writer{};
-  const auto hosts = [&] { return dds_get_matched_publications(reader.get(), writer.data(), writer.size()); };
-  while (hosts() != 1) std::this_thread::sleep_for(milliseconds(1));
-  ASSERT_TRUE(plc_forget_participant(reader.get(), writer.front()));
-  while (hosts() != 0) std::this_thread::sleep_for(milliseconds(1));
+  std::array<dds_instance_handle_t, 8> writers{};
+  const auto hosts = [&] {
+    const auto count = dds_get_matched_publications(reader.get(), writers.data(), writers.size());
+    return std::span(writers).first(static_cast<std::size_t>(std::max(count, 0)));
+  };
+  const TimePoint end = soon();
+  const auto wait_while = [&](const auto& condition) {
+    while (condition() && MonotonicClock::now() < end) std::this_thread::sleep_for(milliseconds(1));
+    ASSERT_FALSE(condition());
+  };
+  ASSERT_NO_FATAL_FAILURE(wait_while([&] { return hosts().size() != 1; }));
+  const dds_instance_handle_t lost = writers.front();
+  ASSERT_TRUE(plc_forget_participant(reader.get(), lost));
+  // Not that there is none: the host announces itself again, as another writer.
+  ASSERT_NO_FATAL_FAILURE(wait_while([&] { return std::ranges::find(hosts(), lost) != hosts().end(); }));
   // Until the host announces itself again the client takes notice.
   for (int i = 0; i < 40; ++i) {
     (void)client.changes();

@@ -197,7 +197,7 @@ InstanceStatus Plant::status(const std::string& instance) {
         found = *status;
         return true;
       }
-      is_whole = is_whole && (page->instance_sequence(i) & 1) == 0;
+      is_whole = is_whole && (status || page->instance_sequence(i) == 0);
     }
     return is_whole;
   });

@@ -143,7 +143,8 @@ class EachInstructionOfAPost : public testing::Test {
     for (std::size_t i = 0; i < trace_.size(); i += static_cast<std::size_t>(stride), ++rounds) {
       ASSERT_NO_FATAL_FAILURE(round(i));
     }
-    EXPECT_GE(kills_, rounds * 9 / 10) << "of " << rounds;  // some go another way than the trace
+    // Others go another way than the trace, as by a task that does not sleep yet.
+    EXPECT_GE(kills_, rounds / 2) << "of " << rounds;
   }
   /// The fate of the posts of a source, seen by the present server.
   static EventIntake::Writer writer_of(const EventIntake& server, std::uint8_t source) {

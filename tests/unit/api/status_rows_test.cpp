@@ -126,12 +126,13 @@ TEST(StatusRows, OfAHostHaveWhatItsStatusSaysAndWhatIsKnownBesideIt) {
   Row row = to_row(host, clock);
   EXPECT_GT(row["uptime_s"], 0);
   row.erase("uptime_s");
-  EXPECT_EQ(json_text(row),
-            R"({"host":"hosta","state":"alive","version":"","started_unix_s":2,"running":0,"instances":3,)"
-            R"("tasks":0,"events":0,"objects":0,"load":1.5,"cores":null,"memory_mib":null,)"
-            R"("available_mib":null,"clock_offset_us":2.0,"clock_uncertainty_us":0.5,"secured":false,)"
-            R"("manager_pid":0,"server_pid":11,"problem":"","labels":"hall=2","audit_number":0,)"
-            R"("audit_hash":"","unrecorded":"","rival":"","unsaved":""})");
+  EXPECT_EQ(
+      json_text(row),
+      R"({"host":"hosta","state":"alive","version":"","started_unix_s":2,"running":0,"instances":3,)"
+      R"("tasks":0,"events":0,"objects":0,"load":1.5,"cores":null,"memory_mib":null,)"
+      R"("available_mib":null,"clock_offset_us":2.0,"clock_uncertainty_us":0.5,"secured":false,)"
+      R"("manager_pid":0,"server_pid":11,"problem":"","labels":"hall=2","schedulers":"","audit_number":0,)"
+      R"("audit_hash":"","unrecorded":"","rival":"","unsaved":""})");
   host.silent = true;
   host.status.load_percent = -1;
   dds::copy_text(host.status.rival, "hostb");

@@ -7,6 +7,7 @@
 
 #include <gtest/gtest.h>
 #include <sched.h>
+#include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -39,6 +40,13 @@ TEST(WorkLimit, IsThatOfAClockForAProcessThatComputesForEver) {
   EXPECT_EQ(sut.left(kBegan + seconds(9), {.ran = seconds(2), .waited = seconds(7)}), seconds(1));
   EXPECT_EQ(sut.left(kBegan + seconds(10), {.ran = seconds(2), .waited = seconds(8)}), Duration::zero());
   EXPECT_EQ(sut.left(kBegan + seconds(30), {.ran = seconds(2), .waited = seconds(28)}), Duration::zero());
+}
+
+TEST(WorkLimit, IsAtMostFiveTimesAsLong) {
+  const WorkLimit sut(seconds(10), kBegan);
+  EXPECT_EQ(sut.left(kBegan + seconds(49), {.ran = seconds(1), .waited = seconds(48)}), seconds(1));
+  EXPECT_EQ(sut.left(kBegan + seconds(50), {.ran = seconds(1), .waited = seconds(49)}), Duration::zero())
+      << "a thread that waits excuses another one that hangs, but not for ever";
 }
 
 TEST(WorkLimit, CountsTheTimeThatItsThreadsTakeFromEachOther) {
@@ -99,11 +107,12 @@ TEST(ProcessorShare, TellsHowLongThreadsHaveWaited) {
 TEST(ProcessorShare, IsAlsoThatOfProcessesThatTheProcessHasStarted) {
   const pid_t child = ::fork();
   if (child == 0) {
+    ::prctl(PR_SET_PDEATHSIG, SIGKILL);
     for (volatile bool go_on = true; go_on;) {
     }
   }
   ASSERT_GT(child, 0);
-  const Duration own = processor_share_of(::getpid()).ran;
+  const Duration own = processor_time_of(::getpid());
   const TimePoint end = MonotonicClock::now() + seconds(20);
   while (processor_time_of(child) < milliseconds(50) && MonotonicClock::now() < end) {
     std::this_thread::sleep_for(milliseconds(5));
