@@ -180,7 +180,9 @@ std::uint32_t InLink::tidy_ring(std::size_t priority, TimePoint now, Duration ho
   Progress& progress = progress_[priority];
   const std::uint64_t head = ring.head();
   const std::uint64_t end = ring.waits() ? ring.end_of_published() : head;
-  if (end == head || head != progress.head || progress.since == TimePoint{}) {
+  // The sender counts blocks that are nowhere to be seen: somebody has wiped them out.
+  const bool unseen = end == head && ring.waits() && !ring.head_is_taken();
+  if ((end == head && !unseen) || head != progress.head || progress.since == TimePoint{}) {
     progress = {.head = head, .end = end, .since = now};
     return 0;
   }

@@ -90,6 +90,8 @@ class LinkMemory {
   [[nodiscard]] LinkCounts counts() const noexcept;
   /// The file was cut short by a stranger, and what is read has been zeros since. Any context.
   [[nodiscard]] bool lost() const noexcept { return file_.lost(); }
+  /// Whether it is the same link, opened twice.
+  [[nodiscard]] bool is(const LinkMemory& other) const noexcept { return file_.same_file(other.file_); }
 
  private:
   static Result<LinkMemory> open(const std::string& name, MemoryFile::Access access);
@@ -139,6 +141,7 @@ class InLink {
   /// Whether something seems to be there to take. Cheap.
   [[nodiscard]] bool waits() const noexcept;
   [[nodiscard]] const NodeLife& from() const noexcept { return from_; }
+  [[nodiscard]] bool uses(const LinkMemory& memory) const noexcept { return memory_.is(memory); }
 
  private:
   struct Progress {

@@ -171,6 +171,8 @@ bool BlockRouter::open_from(std::uint16_t node) {
     if (memory.error().code == ErrorCode::corrupt) tell(memory.error());
     return true;
   }
+  // The audit was before the sender's word. A reader begins at the first slot, so no link has two of them.
+  if (gate.get() != nullptr && gate.get()->uses(*memory)) return true;
   // A fresh link in the same life replaces a broken one. The blocks in that are lost, and counted.
   if (gate.get() != nullptr) counters().expired.fetch_add(gate.get()->drop_all(), std::memory_order_relaxed);
   if (gate.exchange(std::make_unique<InLink>(*std::move(memory), life))) set_open(node, true);

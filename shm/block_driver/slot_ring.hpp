@@ -140,6 +140,8 @@ class RingReader {
   [[nodiscard]] bool waits() const noexcept { return waiting() > 0 || head_is_published(); }
   /// Whether a block begins at the head that can be taken.
   [[nodiscard]] bool head_is_published() const noexcept { return look(head()).published; }
+  /// Whether a thread of this process has the block at the head.
+  [[nodiscard]] bool head_is_taken() const noexcept { return look(head()).mine; }
 
   [[nodiscard]] std::uint64_t taken() const noexcept { return taken_.load(std::memory_order_relaxed); }
   [[nodiscard]] std::uint64_t damaged() const noexcept { return damaged_.load(std::memory_order_relaxed); }

@@ -243,7 +243,7 @@ Result<MemoryFile> MemoryFile::open(const std::string& name, std::size_t at_leas
   }
   auto mapping = map(opened->fd, size, access, *path);
   if (!mapping) return std::unexpected(std::move(mapping).error());
-  return MemoryFile(*std::move(mapping));
+  return MemoryFile(*std::move(mapping), opened->status.st_ino);
 }
 
 Result<void> MemoryFile::fill_empty(const std::string& name, std::size_t size, const OwnerCheck& owners) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <span>
@@ -62,11 +63,18 @@ class MemoryFile {
   [[nodiscard]] bool guarded() const noexcept { return mapping_.guarded(); }
   /// It was cut short, and its bytes are zeros of this process alone. Any context.
   [[nodiscard]] bool lost() const noexcept { return mapping_.lost(); }
+  /// Whether both were opened by a name and are one file. Two that one after the other had the same name are
+  /// not.
+  [[nodiscard]] bool same_file(const MemoryFile& other) const noexcept {
+    return inode_ != 0 && inode_ == other.inode_;
+  }
 
  private:
   friend class UnnamedMemory;
-  explicit MemoryFile(GuardedMapping mapping) noexcept : mapping_(std::move(mapping)) {}
+  explicit MemoryFile(GuardedMapping mapping, std::uint64_t inode = 0) noexcept
+      : mapping_(std::move(mapping)), inode_(inode) {}
   GuardedMapping mapping_;
+  std::uint64_t inode_ = 0;
 };
 
 /// A shared memory on its way: nobody else can find it before it has its name.

@@ -271,5 +271,51 @@ TEST_F(BlockNodeTest, BlocksThatWaitInALinkThatIsMadeAnewAreCounted) {
   EXPECT_EQ(counters(b).expired.load(), sent);
 }
 
+// The receiver's audit opens a link as soon as it has its name, which is before the sender tells of it.
+TEST_F(BlockNodeTest, ALinkThatIsOpenWhenItIsToldOfLosesNothing) {
+  TestNode a = join("a");
+  TestNode b = join("b");
+  connect(a, b);
+  BlockChannel from = a.channel();
+  BlockChannel to = b.channel();
+  const auto send_all = [&] {
+    for (std::uint32_t i = 0; i < 3 * kMinRingSlots; ++i) {
+      const std::string text = std::to_string(i);
+      ASSERT_EQ(from.send(b.address(), bytes_of(text)), SendResult::sent) << text;
+      ASSERT_EQ(b.next(to), text);
+    }
+  };
+  send_all();
+  ASSERT_EQ(from.send(b.address(), bytes_of("waits")), SendResult::sent);
+  NodeDirectory directory = NodeDirectory::open(pool()).value();
+  const std::uint16_t bit = a.address().node - 1U;
+  directory.slot(b.address().node).incoming[bit / 64].fetch_or(std::uint64_t{1} << bit % 64);
+  settle(a, b);
+  EXPECT_EQ(b.next(to), "waits");
+  send_all();
+  EXPECT_EQ(counters(b).expired.load(), 0U);
+}
+
+TEST_F(BlockNodeTest, ALinkWhoseBlocksAStrangerWipedOutIsMadeAnew) {
+  TestNode a = join("a");
+  TestNode b = join("b");
+  connect(a, b);
+  BlockChannel from = a.channel();
+  BlockChannel to = b.channel();
+  const std::string name = link_name(pool(), "blocks", a.address().node, b.address().node);
+  const auto memory = MemoryFile::open(name, sizeof(LinkLayout), MemoryFile::Access::read_write);
+  ASSERT_TRUE(memory);
+  while (from.send(b.address(), bytes_of("x")) == SendResult::sent) {
+  }
+  std::ranges::fill(memory->bytes().subspan(sizeof(LinkLayout)), std::byte{});
+  bool arrived = false;
+  for (int i = 0; i < 100 && !arrived; ++i) {
+    pass(std::chrono::milliseconds(100), a, b);
+    (void)from.send(b.address(), bytes_of("again"));
+    arrived = b.next(to) == "again";
+  }
+  EXPECT_TRUE(arrived);
+}
+
 }  // namespace
 }  // namespace plchost
