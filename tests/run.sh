@@ -18,6 +18,7 @@ steps=12
 # plc_app_abi, also where one is loaded for all others to see. One test forks beside threads of others, and starts one.
 export ASAN_OPTIONS=handle_segv=0:handle_sigbus=0:verify_asan_link_order=0:detect_odr_violation=0 UBSAN_OPTIONS=print_stacktrace=1 TSAN_OPTIONS=handle_segv=0:handle_sigbus=0:die_after_fork=0
 if [ "${1:-}" != --step ] && [ "${1:-}" != --fuzz ]; then
+  [ -n "${PLCHOST_OWN_ROOT:-}" ] || PLCHOST_OWN_ROOT=1 exec tests/own_root.sh "$BASH" "$self" "$@"
   # By these the last step finds what the tests have left behind. The name is short: sockets lie in it.
   own=$(mktemp -d "${TMPDIR:-/tmp}/plc.XXXXXX")
   mkdir "$own/t"
