@@ -2,12 +2,24 @@
 # All tests, from nothing: packages, gates, build, tests, sanitizers, fuzzers.
 #   tests/run.sh           everything (what CI runs)
 #   tests/run.sh --quick   build and the tests that take seconds: the round after an edit
-#   tests/run.sh NAME...   only tests whose name matches (ctest -R), in the plain build
+#   tests/run.sh NAME...   only tests whose name matches one of these (ctest -R), in the plain build
+#   tests/run.sh --help    this text
 # A test has one attempt, unless tests/retries.txt says why it has two. Each second run and each skipped test is printed at
 # the end; one that is skipped and not listed in tests/skips.txt fails the run.
 set -uo pipefail
 cd "$(dirname "$0")/.."
 self=tests/run.sh
+case "${1:-}" in
+  "" | --quick | --step | --fuzz) ;;
+  -h | --help)
+    sed -n '2,/^[^#]/s/^# \{0,1\}//p' "$self"
+    exit
+    ;;
+  -*)
+    echo "$self: unknown option $1; allowed are --quick and --help" >&2
+    exit 2
+    ;;
+esac
 build=.build/tests
 export CCACHE_SLOPPINESS=pch_defines,time_macros  # or it would not cache what uses precompiled headers
 jobs=$(nproc)
@@ -184,7 +196,7 @@ case "${1:-}" in
     steps=3
     run "packages" .ci/packages test
     run "build" build_plain
-    run "tests matching $1" tests "$build" -R "$1"
+    run "tests matching $*" tests "$build" -R "$(IFS='|' && echo "$*")"
     count
     ;;
 esac

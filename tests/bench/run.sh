@@ -4,13 +4,21 @@
 #   tests/bench/run.sh [--quick] [--stress] [--json FILE] [--markdown FILE] [--plots DIR]
 #                      [--only PART,...] [--seconds N] [--rounds N]
 # 60 s of each thing in three rounds: an hour and a half idle, and half as much again with --stress, which measures again
-# beside stress-ng. --quick: 1.2 s of each, in less than four minutes after the build. --help says more.
+# beside stress-ng. --quick: 1.2 s of each, in less than four minutes after the build. --help: this text, and once it is built the
+# parts that there are.
 # A noisy machine shows in the floor and in the spread of the rounds: read the ratios.
 set -euo pipefail
 here=$PWD
 cd "$(dirname "$0")/../.."
-.ci/packages bench >&2
 build=.build/bench
+case " $* " in
+  *" -h "* | *" --help "*)
+    sed -n '2,/^[^#]/s/^# \{0,1\}//p' tests/bench/run.sh
+    [ ! -x "$build/bin/plchost-bench" ] || "$build/bin/plchost-bench" --help
+    exit
+    ;;
+esac
+.ci/packages bench >&2
 arguments=()
 markdown=
 while [ $# -gt 0 ]; do

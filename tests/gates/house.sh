@@ -67,4 +67,10 @@ git grep -nE '\b(sem_timedwait|pthread_(cond|mutex|rwlock)_timed[a-z]+|pthread_t
 # A killed test's files in /dev/shm can only be removed by the next one if it knows the name.
 git grep -nE 'to_string\(::getpid\(\)|"[^"(]*\{\}[^"]*", *::getpid\(\)' -- tests ':!tests/support/own_name.hpp' | grep -v HasSubstr &&
   fault "the lines above make names that nobody clears away: use own_name() or own_path()" || true
+# A question, or a word that is mistyped, starts no run of hours.
+for script in "tests/run.sh --help" "tests/run.sh --nonsense" "tests/bench/run.sh --help"; do
+  [ ! -x "${script% *}" ] && continue
+  text=$(timeout 10 $script 2>&1) || true
+  [[ $text == *--quick* ]] || fault "$script does not say what there is"
+done
 exit $wrong

@@ -91,6 +91,9 @@ new_tree
 touch "$plot/tree/shm/base/crowd"{1..36}.cpp && commit_tree
 must_be_red "house: crowded folder" "shm/base: 36 names of sources; at most 35" "$gates/house.sh" "$plot/tree"
 new_tree
+mkdir -p "$plot/tree/tests" && printf '#!/bin/sh\necho building\n' >"$plot/tree/tests/run.sh" && chmod +x "$plot/tree/tests/run.sh" && commit_tree
+must_be_red "house: script without help" "tests/run.sh --nonsense does not say what there is" "$gates/house.sh" "$plot/tree"
+new_tree
 echo "// TO""DO" >"$plot/tree/shm/base/later.cpp" && commit_tree
 must_be_red "house: unfinished" "the lines above are unfinished" "$gates/house.sh" "$plot/tree"
 new_tree
