@@ -52,11 +52,9 @@ Result<UniqueFd> start_heartbeat() {
 }
 
 // Until a signal or a client asks for the end.
-Result<void> serve(Instance& instance, const UniqueFd& signals) {
-  const auto heartbeat = start_heartbeat();
-  if (!heartbeat) return std::unexpected(heartbeat.error());
+Result<void> serve(Instance& instance, const UniqueFd& signals, const UniqueFd& heartbeat) {
   std::array<pollfd, 4> fds{{{.fd = signals.get(), .events = POLLIN, .revents = 0},
-                             {.fd = heartbeat->get(), .events = POLLIN, .revents = 0},
+                             {.fd = heartbeat.get(), .events = POLLIN, .revents = 0},
                              {.fd = instance.control_fd(), .events = POLLIN, .revents = 0},
                              {.fd = instance.fault_fd(), .events = POLLIN, .revents = 0}}};
   while (!instance.ended()) {
@@ -72,8 +70,7 @@ Result<void> serve(Instance& instance, const UniqueFd& signals) {
       instance.begin_shutdown("a signal asks for the end");
     }
     std::uint64_t expirations = 0;
-    if (fds[1].revents != 0 && ::read(heartbeat->get(), &expirations, sizeof expirations) > 0)
-      instance.beat();
+    if (fds[1].revents != 0 && ::read(heartbeat.get(), &expirations, sizeof expirations) > 0) instance.beat();
     if (fds[3].revents != 0) instance.serve_faults();  // first: later requests find the state right
     if (fds[2].revents != 0) instance.serve_control();
     instance.advance();
@@ -99,14 +96,17 @@ void print_line_by_line() noexcept {
   (void)std::setvbuf(stdout, buffer.data(), _IOLBF, buffer.size());
 }
 
+// As a step that failed: the manager repeats a start for which the host was short of something.
+int refuse_start(const Options& options, const Error& error) {
+  SetupReporter(options.launch.report_fd).failed(SetupStep::bind_core, error);
+  return kExitSetupFailed;
+}
+
 int run(const Options& options) {
   if (!options.check_settings.empty()) return check_settings(options.check_settings);
   start_log("plc-instance/" + options.launch.name, options.launch.log_level);
   const auto signals = take_signals();
-  if (!signals) {
-    spdlog::error("{}", signals.error().describe());
-    return kExitSetupFailed;
-  }
+  if (!signals) return refuse_start(options, signals.error());
   if (!options.check_application.empty()) {
     // SIGTERM and not SIGKILL: processes that the application has forked end, too.
     if (options.parent != 0 && !end_with_parent(options.parent, SIGTERM)) return kExitSetupFailed;
@@ -120,13 +120,16 @@ int run(const Options& options) {
   }
 
   print_line_by_line();
+  // Before it is told that the instance is up: nothing that it needs can be missing then.
+  const auto heartbeat = start_heartbeat();
+  if (!heartbeat) return refuse_start(options, heartbeat.error());
   std::unique_ptr<Instance> instance;
   {
     SetupReporter reporter(options.launch.report_fd);
     instance = Instance::set_up(options, reporter);
   }
   if (!instance) return kExitSetupFailed;
-  const auto served = serve(*instance, *signals);
+  const auto served = serve(*instance, *signals, *heartbeat);
   if (!served) spdlog::error("{}", served.error().describe());
   if (const auto down = instance->shut_down(); !down) {
     spdlog::error("{}; the process ends without it", down.error().describe());

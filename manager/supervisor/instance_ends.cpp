@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "manager/supervisor/managed_instance.hpp"
+#include "shm/base/dynamic_loader.hpp"
 
 namespace plchost {
 
@@ -35,6 +36,11 @@ void ManagedInstance::on_exit(const ExitStatus& status) {
 void ManagedInstance::set_up_ended(const ExitStatus& status) {
   const bool loaded = before_.has_value() && !removed_;
   const bool refused = status.exited_with(kExitSetupFailed) || status.exited_with(kExitUsage);
+  if (setup_failure_.empty() && step_ == SetupStep::bind_core && status.exited_with(kExitNotLoaded)) {
+    const std::string said = host_.last_line();
+    setup_failure_ = said.empty() ? "the program could not be loaded" : said;
+    transient_ = transient_error_of_loader(said) != 0;
+  }
   if (!setup_failure_.empty()) {
     ended({.cause = cause_of_refusal(), .has_earlier = loaded},
           fmt::format("{}: {}", status.describe(), setup_failure_));

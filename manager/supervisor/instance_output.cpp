@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "manager/system/child_process.hpp"
+#include "shm/base/names.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/time.hpp"
 #include "shm/log/log.hpp"
@@ -50,6 +51,7 @@ Result<void> InstanceOutput::open_ends() {
 }
 
 Result<UniqueFd> InstanceOutput::open_for_process() {
+  last_line_.clear();
   if (!read_end_) {
     ::unlink(path().c_str());
     constexpr mode_t kOwnerOnly = 0600;
@@ -79,14 +81,14 @@ void InstanceOutput::read(std::int32_t pid) {
 void InstanceOutput::end(std::int32_t pid) {
   if (!read_end_) return;
   (void)read_at_most(kPipeBytes, pid);
-  lines_.end(pid, unix_time_ns(), [this](const LogEntry& entry) { keep(entry); });
+  lines_.end(pid, unix_time_ns(), [this](const LogEntry& entry) { take(entry); });
 }
 
 std::size_t InstanceOutput::read_at_most(std::size_t most, std::int32_t pid) {
   const std::string bytes = read_available(read_end_.get(), most);
   if (bytes.empty()) return 0;
   forward(bytes);
-  lines_.add(bytes, pid, unix_time_ns(), [this](const LogEntry& entry) { keep(entry); });
+  lines_.add(bytes, pid, unix_time_ns(), [this](const LogEntry& entry) { take(entry); });
   return bytes.size();
 }
 
@@ -96,6 +98,11 @@ void InstanceOutput::say(LogLevel level, std::int32_t pid, std::string_view text
         .level = level,
         .source = LogSource::manager,
         .text = text});
+}
+
+void InstanceOutput::take(const LogEntry& entry) {
+  last_line_ = cut(entry.text, kLastLine);
+  keep(entry);
 }
 
 void InstanceOutput::keep(const LogEntry& entry) {

@@ -26,6 +26,7 @@ class InstanceOutput {
   static constexpr int kPipeBytes = 256 * 1024;
   /// Of one read(): an instance that says more than this every 50 ms loses lines.
   static constexpr std::size_t kReadAtOnce = std::size_t{64} * 1024;
+  static constexpr std::size_t kLastLine = 500;
 
   explicit InstanceOutput(Settings settings) : settings_(std::move(settings)) {}
 
@@ -37,6 +38,8 @@ class InstanceOutput {
   void read(std::int32_t pid);
   /// The process has ended: reads all that it has said.
   void end(std::int32_t pid);
+  /// The last line of the newest process, cut to kLastLine; empty: it has said nothing.
+  [[nodiscard]] const std::string& last_line() const noexcept { return last_line_; }
   /// Writes a line of the manager itself into the ring.
   void say(LogLevel level, std::int32_t pid, std::string_view text);
 
@@ -46,6 +49,7 @@ class InstanceOutput {
   }
   [[nodiscard]] Result<void> open_ends();
   [[nodiscard]] std::size_t read_at_most(std::size_t most, std::int32_t pid);
+  void take(const LogEntry& entry);
   void keep(const LogEntry& entry);
   void forward(std::string_view bytes);
 
@@ -53,6 +57,7 @@ class InstanceOutput {
   UniqueFd read_end_;
   UniqueFd write_end_;  // only to see whether the pipe is full
   OutputLines lines_;
+  std::string last_line_;
   std::optional<LogRing> ring_;
   std::uint64_t not_forwarded_ = 0;  // bytes
   bool ring_failed_ = false;

@@ -42,6 +42,7 @@ class ProcessHost : public InstanceHost {
   [[nodiscard]] std::vector<int> granted_cores() override;
   [[nodiscard]] std::string keep_lost_faults() override;
   void read_output() override;
+  [[nodiscard]] std::string last_line() const override { return output_.last_line(); }
 
  private:
   /// Takes the process over if it can be watched.

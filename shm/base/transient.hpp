@@ -17,6 +17,7 @@ namespace plchost {
     case ENOBUFS:
     case ENOSPC:
     case EDQUOT:
+    case ENOLCK:
     case EINTR:
       return true;
     default:

@@ -7,6 +7,7 @@
 
 #include "instances/runtime/application/device_events.hpp"
 #include "instances/runtime/time/system_time.hpp"
+#include "shm/base/transient.hpp"
 #include "shm/log/log.hpp"
 
 namespace plchost {
@@ -20,6 +21,7 @@ Result<void> read_settings_of(const LaunchOptions& launch, StartSettings& start)
   std::optional<KeptSettings> kept;
   if (launch.kept_settings) {
     auto found = read_kept_settings(kept_settings_path(launch.run_directory, launch.name));
+    if (!found && is_transient(found.error())) return std::unexpected(std::move(found).error());
     // The run directory is empty after a power cut, and a process of an older version keeps nothing there.
     if (!found) spdlog::warn("settings: those of today are read instead: {}", found.error().describe());
     if (found) kept = *std::move(found);

@@ -13,6 +13,7 @@
 
 #include "instances/runtime/application/elf_check.hpp"
 #include "instances/runtime/application/symbol_name.hpp"
+#include "shm/base/dynamic_loader.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
@@ -24,9 +25,14 @@ std::string absolute_of(const std::string& path) {
   return std::filesystem::absolute(path, error);
 }
 
-std::unexpected<Error> not_loaded(const std::string& path) {
-  return failure(ErrorCode::invalid_argument,
-                 fmt::format("{} cannot be loaded: {}", path, printable(with_readable_symbols(::dlerror()))));
+// `file` is where the loader finds it, `path` is what people know it by.
+Result<void*> open_program(const std::string& file, const std::string& path) {
+  auto opened = open_library(file, RTLD_NOW | RTLD_LOCAL);
+  if (!opened) {
+    std::string& text = opened.error().message;
+    text = fmt::format("{} cannot be loaded: {}", path, printable(with_readable_symbols(text)));
+  }
+  return opened;
 }
 
 // A file without a name that nobody can change any more.
@@ -51,9 +57,9 @@ Result<SharedObject> SharedObject::load(const std::string& path, std::span<const
   if (auto checked = check_elf_file(path, symbols); !checked) return std::unexpected(checked.error());
   // Without a slash, dlopen would search the system's folders for it.
   const std::string absolute = absolute_of(path);
-  void* const handle = ::dlopen(absolute.c_str(), RTLD_NOW | RTLD_LOCAL);
-  if (handle == nullptr) return not_loaded(path);
-  return SharedObject(handle, absolute);
+  auto handle = open_program(absolute, path);
+  if (!handle) return std::unexpected(std::move(handle).error());
+  return SharedObject(*handle, absolute);
 }
 
 Result<SharedObject> SharedObject::load_copy(const std::string& path,
@@ -69,9 +75,9 @@ Result<SharedObject> SharedObject::load_copy(const std::string& path,
   constexpr std::size_t kMaxName = 200;
   auto copy = memory_file(std::filesystem::path(path).filename().string().substr(0, kMaxName), *bytes);
   if (!copy) return fails(std::move(copy).error());
-  void* const handle = ::dlopen(fmt::format("/proc/self/fd/{}", copy->get()).c_str(), RTLD_NOW | RTLD_LOCAL);
-  if (handle == nullptr) return not_loaded(path);
-  return SharedObject(handle, absolute_of(path), *std::move(copy));
+  auto handle = open_program(fmt::format("/proc/self/fd/{}", copy->get()), path);
+  if (!handle) return std::unexpected(std::move(handle).error());
+  return SharedObject(*handle, absolute_of(path), *std::move(copy));
 }
 
 void* SharedObject::find(const char* symbol) const noexcept {

@@ -14,6 +14,7 @@
 #include "instances/runtime/tasks/task_builder.hpp"
 #include "schedulers/faults/watchdog_rules.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/transient.hpp"
 #include "shm/log/log.hpp"
 
 namespace plchost {
@@ -143,7 +144,8 @@ Result<std::string> Instance::attach_pool() {
   pool_.emplace(*std::move(pool));
   host_.emplace(options_.launch.name, &*pool_);
   host_->set_start_kind(static_cast<int>(options_.launch.start_kind));
-  host_->events().clear_own();
+  if (auto cleared = host_->events().clear_left_behind(); !cleared)
+    return failure_in("events of the process before", std::move(cleared).error());
   if (auto prepared = prepare_host(start_, *host_); !prepared)
     return std::unexpected(std::move(prepared).error());
   return {};
@@ -158,7 +160,8 @@ Result<std::string> Instance::open_control_socket() {
                              });
   if (!server) return std::unexpected(std::move(server).error());
   control_.emplace(*std::move(server));
-  restore_operator_events();
+  if (auto restored = restore_operator_events(); !restored)
+    return std::unexpected(std::move(restored).error());
   return {};
 }
 
@@ -174,13 +177,20 @@ void Instance::keep_settings() {
   spdlog::warn("its settings are not kept: {}", kept.error().describe());
 }
 
-void Instance::restore_operator_events() {
+// The next registration writes down those that are registered then, so none may be left out for a moment's
+// shortage.
+Result<void> Instance::restore_operator_events() {
   const std::string path = operator_events_path(options_.launch.run_directory, options_.launch.name);
-  for (const std::string& event : read_operator_events(path)) {
-    if (const auto done = host_->events().register_by_operator(event); !done) {
-      spdlog::warn("event '{}' of the operator: {}", event, done.error().describe());
-    }
+  const auto events = read_operator_events(path);
+  if (!events && is_transient(events.error())) return failure_in("events of the operator", events.error());
+  if (!events) spdlog::warn("events of the operator: {}", events.error().describe());
+  for (const std::string& event : events.value_or(std::vector<std::string>())) {
+    auto done = host_->events().register_by_operator(event);
+    if (!done && is_transient(done.error()))
+      return failure_in("event of the operator", std::move(done).error());
+    if (!done) spdlog::warn("event '{}' of the operator: {}", event, done.error().describe());
   }
+  return {};
 }
 
 Result<std::string> Instance::load_components() {

@@ -133,7 +133,7 @@ class Instance {
   void choose_scheduler();
   void report_tick();
   [[nodiscard]] std::string keep_fault(const TaskSet::Fault& fault);
-  void restore_operator_events();
+  [[nodiscard]] Result<void> restore_operator_events();
   void keep_settings();
   void notify_tasks(unsigned event);
   void look_after_page();

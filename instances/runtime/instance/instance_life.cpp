@@ -191,7 +191,7 @@ Result<void> Instance::shut_down() {
   }
   if (host_) {
     host_->write_messages();
-    host_->events().clear_own();
+    host_->events().withdraw_own();
   }
   control_.reset();
   return stopped;

@@ -10,18 +10,28 @@
 
 namespace plchost {
 
-void EventTable::clear_own() {
-  if (pool_ == nullptr) return;
+Result<void> EventTable::clear_left_behind() {
+  if (pool_ == nullptr) return {};
   const std::string prefix = instance_ + "/";
   const auto objects = pool_->list();
-  if (!objects)
-    return spdlog::warn("events of the process before are not cleared: {}", objects.error().describe());
+  if (!objects) return std::unexpected(objects.error());
   for (const ObjectInfo& object : *objects) {
     if (object.type != ObjectType::event || !object.name.starts_with(prefix)) continue;
-    if (const auto event = pool_->open_event(object.name)) {
-      (void)event->set_bound_tasks(0);
-      (void)event->set_registered(false);
-    }
+    const auto event = pool_->open_event(object.name);
+    if (!event && event.error().code == ErrorCode::not_found) continue;
+    if (!event) return std::unexpected(event.error());
+    (void)event->set_bound_tasks(0);
+    (void)event->set_registered(false);
+  }
+  return {};
+}
+
+void EventTable::withdraw_own() noexcept {
+  for (std::size_t i = 0; i < count_.load(std::memory_order_relaxed); ++i) {
+    const PoolEvent* const event = slots_[i]->event.load(std::memory_order_relaxed);
+    if (!slots_[i]->own || event == nullptr) continue;
+    (void)event->set_bound_tasks(0);
+    (void)event->set_registered(false);
   }
 }
 

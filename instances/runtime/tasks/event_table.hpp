@@ -32,8 +32,11 @@ class EventTable {
   /// That room, for what else the start makes; null: nobody looks for it.
   [[nodiscard]] PoolRoom* room() noexcept { return room_ ? &*room_ : nullptr; }
 
-  /// Takes back what a dead process of this instance's name has left: its registrations and bound tasks.
-  void clear_own();
+  /// Takes back the registrations and bound tasks that a process of this instance's name has left. On failure
+  /// some may stay, and posters are told that tasks run their posts. timed_out: the pool is locked.
+  [[nodiscard]] Result<void> clear_left_behind();
+  /// Takes back the registrations and bound tasks of this process. Needs no lock of the pool.
+  void withdraw_own() noexcept;
 
   /// The handle of "event" (own) or "instance/event". invalid_argument; full.
   [[nodiscard]] Result<RTS_HANDLE> open(std::string_view name);

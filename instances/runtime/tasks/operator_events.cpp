@@ -1,5 +1,6 @@
 #include "instances/runtime/tasks/operator_events.hpp"
 
+#include <cerrno>
 #include <filesystem>
 #include <fstream>
 
@@ -15,9 +16,11 @@ std::string operator_events_path(std::string_view run_directory, std::string_vie
   return fmt::format("{}/{}.events", run_directory, instance);
 }
 
-std::vector<std::string> read_operator_events(const std::string& path) {
+Result<std::vector<std::string>> read_operator_events(const std::string& path) {
   std::vector<std::string> events;
+  errno = 0;
   std::ifstream file(path);
+  if (!file && errno != ENOENT) return failure(ErrorCode::system, "open " + path, errno);
   for (std::string line; events.size() < EventTable::kMaxEvents && std::getline(file, line);) {
     if (check_name("event name", line, kMaxEventName)) events.push_back(std::move(line));
   }

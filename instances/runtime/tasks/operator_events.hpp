@@ -13,8 +13,8 @@ namespace plchost {
 /// them.
 [[nodiscard]] std::string operator_events_path(std::string_view run_directory, std::string_view instance);
 
-/// Empty if there is no such file. Lines that are no event names are left out.
-[[nodiscard]] std::vector<std::string> read_operator_events(const std::string& path);
+/// Empty if there is no such file. Lines that are no event names are left out. system: it cannot be opened.
+[[nodiscard]] Result<std::vector<std::string>> read_operator_events(const std::string& path);
 
 /// Replaces the file as a whole, or removes it if there are none.
 [[nodiscard]] Result<void> write_operator_events(const std::string& path,

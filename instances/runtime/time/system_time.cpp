@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <link.h>
 
+#include "shm/base/dynamic_loader.hpp"
 #include "shm/base/time.hpp"
 #include "shm/log/log.hpp"
 
@@ -155,14 +156,10 @@ Result<Clocks> find_clocks(const SysTimeSettings& settings, const FindSymbol& fi
                      [&](const std::string& symbol) { return find_in_loaded(find_in_components, symbol); });
   }
   // It stays loaded: an application may call it to the very end.
-  void* const library = ::dlopen(settings.library.c_str(), RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
-  if (library == nullptr) {
-    const char* const why = ::dlerror();
-    return failure(ErrorCode::invalid_argument,
-                   fmt::format("[SysTime] CustomSysTimeLibrary: {}", why == nullptr ? "dlopen failed" : why));
-  }
+  auto library = open_library(settings.library, RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
+  if (!library) return failure_in("[SysTime] CustomSysTimeLibrary", std::move(library).error());
   return find_both(settings, [&](const std::string& symbol) {
-    return find_in_library(library, settings.library, symbol);
+    return find_in_library(*library, settings.library, symbol);
   });
 }
 

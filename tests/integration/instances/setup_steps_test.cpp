@@ -2,13 +2,21 @@
 #include <array>
 #include <csignal>
 #include <fstream>
+#include <future>
+#include <thread>
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "instances/launch/launch_contract.hpp"
+#include "shm/files/memory_file.hpp"
+#include "shm/pool/pool_layout.hpp"
 #include "tests/integration/instances/instance_process.hpp"
 #include "tests/support/own_name.hpp"
 
@@ -158,6 +166,109 @@ TEST(SetupReports, EndWithTheStepThatFailed) {
   EXPECT_EQ(reports.back().step, SetupStep::load_application);
   EXPECT_EQ(reports.back().code, ErrorCode::not_found);
   EXPECT_THAT(reports.back().text, HasSubstr("/nonexistent.so"));
+}
+
+// An instance that went on would leave the events of the process before as they are, and their posters would
+// be told that tasks run what they post.
+TEST(SetupReports, OfAStartBesideALockedPoolSayThatItMayBeRepeated) {
+  const Sandbox sandbox;
+  const ObjectPool pool = ObjectPool::create(sandbox.pool()).value();
+  const auto memory =
+      MemoryFile::open(sandbox.pool(), sizeof(PoolHeader), MemoryFile::Access::read_write).value();
+  RobustMutex& mutex = reinterpret_cast<PoolHeader*>(memory.bytes().data())->mutex;
+  std::promise<void> locked;
+  std::promise<void> enough;
+  const std::jthread holder([&] {
+    (void)mutex.lock();
+    locked.set_value();
+    enough.get_future().wait();
+    mutex.unlock();
+  });
+  locked.get_future().wait();
+  const auto reports = reports_of(sandbox, application("all_kinds"));
+  enough.set_value();
+  ASSERT_FALSE(reports.empty());
+  EXPECT_EQ(reports.back().step, SetupStep::attach_pool) << to_string(reports.back().step);
+  EXPECT_EQ(reports.back().code, ErrorCode::timed_out);
+  EXPECT_TRUE(reports.back().transient);
+  EXPECT_THAT(reports.back().text, HasSubstr("holds its lock"));
+}
+
+/// The last report of a process that may have so many descriptors, and whether it goes on when it is up.
+struct Scarce {
+  SetupReport last;
+  bool up = false;
+  bool goes_on = false;
+};
+
+Scarce start_with_descriptors(const Sandbox& sandbox, rlim_t descriptors, const std::string& program) {
+  constexpr int kReports = 3;
+  std::array<int, 2> ends{};
+  EXPECT_EQ(::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, ends.data()), 0);
+  const std::string log = sandbox.folder() + "/scarce.log";
+  const pid_t child = ::fork();
+  if (child == 0) {
+    const int file = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0600);
+    ::dup2(file, STDOUT_FILENO);
+    ::dup2(file, STDERR_FILENO);
+    ::dup2(ends[1], kReports);
+    ::close_range(kReports + 1, ~0U, 0);
+    const rlimit limit{.rlim_cur = descriptors, .rlim_max = descriptors};
+    ::setrlimit(RLIMIT_NOFILE, &limit);
+    ::execl(PLC_INSTANCE, PLC_INSTANCE, "--name", "line1", "--pool", sandbox.pool().c_str(),
+            "--run-directory", sandbox.folder().c_str(), "--report-fd", "3", "--application", program.c_str(),
+            nullptr);
+    ::_exit(126);
+  }
+  ::close(ends[1]);
+  PacketSocket socket{UniqueFd(ends[0])};
+  Scarce seen;
+  while (!seen.up) {
+    const auto packet = socket.receive_until(MonotonicClock::now() + 60s);
+    const auto report =
+        packet ? decode_report(*packet) : Result<SetupReport>(std::unexpected(packet.error()));
+    if (!report) break;
+    seen.last = *report;
+    seen.up = report->step == SetupStep::ready;
+  }
+  const auto heartbeat = [&] {
+    const auto page = InstancePageReader::open(sandbox.pool(), "line1");
+    const auto runtime = page ? page->runtime() : std::nullopt;
+    return runtime ? runtime->heartbeat_ns : 0;
+  };
+  int status = 0;
+  bool ended = false;
+  const std::int64_t first = heartbeat();
+  seen.goes_on = seen.up && eventually([&] {
+                   ended = ::waitpid(child, &status, WNOHANG) == child;
+                   return ended || heartbeat() != first;
+                 }) &&
+                 !ended;
+  if (!ended) {
+    ::kill(child, SIGKILL);
+    ::waitpid(child, &status, 0);
+  }
+  return seen;
+}
+
+// The manager tries those starts again: none of them is the fault of the files, and none is a crash.
+TEST(SetupReports, OfAStartWithTooFewDescriptorsSayThatItMayBeRepeated) {
+  const Sandbox sandbox;
+  constexpr rlim_t kFewest = 5;  // one more than the program is begun with
+  constexpr rlim_t kEnough = 128;
+  for (rlim_t descriptors = kFewest; descriptors < kEnough; ++descriptors) {
+    const Scarce seen = start_with_descriptors(sandbox, descriptors, application("all_kinds"));
+    SCOPED_TRACE(
+        fmt::format("{} descriptors: {}: {}", descriptors, to_string(seen.last.step), seen.last.text));
+    if (!seen.up) {
+      ASSERT_NE(seen.last.code, ErrorCode::ok);
+      ASSERT_TRUE(seen.last.transient);
+    } else {
+      ASSERT_TRUE(seen.goes_on);
+      return;
+    }
+  }
+  FAIL() << "it never came up";
 }
 
 }  // namespace

@@ -6,7 +6,7 @@ namespace plchost {
 namespace {
 
 TEST(Transient, IsWhatTheHostIsShortOf) {
-  for (const int number : {EAGAIN, EMFILE, ENFILE, ENOMEM, ENOBUFS, ENOSPC, EDQUOT, EINTR}) {
+  for (const int number : {EAGAIN, EMFILE, ENFILE, ENOMEM, ENOBUFS, ENOSPC, EDQUOT, ENOLCK, EINTR}) {
     EXPECT_TRUE(is_transient(failure(ErrorCode::system, "x", number).error())) << number;
   }
   EXPECT_TRUE(is_transient(failure(ErrorCode::busy, "x").error()));

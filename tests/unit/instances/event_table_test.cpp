@@ -1,11 +1,16 @@
 #include "instances/runtime/tasks/event_table.hpp"
 
 #include <atomic>
+#include <future>
+#include <thread>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "shm/base/transient.hpp"
+#include "shm/files/memory_file.hpp"
+#include "shm/pool/pool_layout.hpp"
 #include "tests/support/own_name.hpp"
 
 namespace plchost {
@@ -107,9 +112,44 @@ TEST_F(EventTableTest, ClearsOnlyWhatIsItsOwn) {
   ASSERT_TRUE(other.register_by_application(other.open("ready").value()));
   ASSERT_TRUE(sut_.register_by_application(sut_.open("ready").value()));
   EventTable successor("line1", &pool_);
-  successor.clear_own();
+  ASSERT_TRUE(successor.clear_left_behind());
   EXPECT_FALSE(pool_.open_event("line1/ready").value().registered());
   EXPECT_TRUE(pool_.open_event("line10/ready").value().registered());
+}
+
+TEST_F(EventTableTest, WithdrawsItsOwnEventsAndNoOthers) {
+  EventTable other("line2", &pool_);
+  ASSERT_TRUE(other.register_by_application(other.open("ready").value()));
+  ASSERT_TRUE(sut_.register_by_application(sut_.open("ready").value()));
+  (void)sut_.open("line2/ready");
+  ASSERT_TRUE(sut_.bind_task("ready"));
+  ASSERT_TRUE(sut_.publish_bound(true));
+  sut_.withdraw_own();
+  EXPECT_FALSE(pool_.open_event("line1/ready").value().registered());
+  EXPECT_EQ(pool_.open_event("line1/ready").value().bound_tasks(), 0U);
+  EXPECT_TRUE(pool_.open_event("line2/ready").value().registered());
+}
+
+// An event that is not cleared tells its posters that tasks take what nobody runs.
+TEST_F(EventTableTest, SaysWhenThePoolIsLockedWhileItClears) {
+  ASSERT_TRUE(sut_.register_by_application(sut_.open("ready").value()));
+  const auto memory = MemoryFile::open(name_, sizeof(PoolHeader), MemoryFile::Access::read_write);
+  ASSERT_TRUE(memory);
+  RobustMutex& mutex = reinterpret_cast<PoolHeader*>(memory->bytes().data())->mutex;
+  std::promise<void> locked;
+  std::promise<void> enough;
+  const std::jthread holder([&] {
+    (void)mutex.lock();
+    locked.set_value();
+    enough.get_future().wait();
+    mutex.unlock();
+  });
+  locked.get_future().wait();
+  EventTable successor("line1", &pool_);
+  const auto cleared = successor.clear_left_behind();
+  enough.set_value();
+  ASSERT_FALSE(cleared);
+  EXPECT_TRUE(is_transient(cleared.error())) << cleared.error().describe();
 }
 
 TEST_F(EventTableTest, IsSeenToHoldWhatItRegistersAndBindsUntilItNeedsItNoMore) {

@@ -40,6 +40,7 @@ class FakeHost : public InstanceHost {
   [[nodiscard]] std::vector<int> granted_cores() override { return cores; }
   [[nodiscard]] std::string keep_lost_faults() override { return lost_fault; }
   void read_output() override {}
+  [[nodiscard]] std::string last_line() const override { return said; }
 
   std::vector<LaunchOptions> spawned;
   std::vector<ControlRequest> requests;
@@ -57,6 +58,7 @@ class FakeHost : public InstanceHost {
   int spawn_errno = 0;
   bool can_send = true;
   std::string lost_fault;
+  std::string said;
   int next_pid = 100;
 };
 

@@ -2,11 +2,13 @@
 #include <csignal>
 #include <utility>
 
+#include "shm/base/dynamic_loader.hpp"
 #include "tests/unit/manager/managed_instance_fixture.hpp"
 
 namespace plchost {
 namespace {
 
+using testing::AllOf;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
@@ -204,6 +206,47 @@ TEST_F(ShortOfSomething, IsTriedAgainWithBackOffAndIsNoCrash) {
   EXPECT_EQ(before, config_.restart_delay_max);
   report_ready();
   EXPECT_EQ(state(), InstanceState::running);
+}
+
+TEST_F(ShortOfSomething, ThatTheProgramNeedsToBeLoadedIsNoCrash) {
+  host_.said =
+      "plc-instance: error while loading shared libraries: libm.so.6: cannot open shared object file: Error "
+      "24";
+  sut().hold("is to be started");
+  sut().release();
+  for (int i = 0; i < 10; ++i) {
+    sut().on_exit(exited_with(kExitNotLoaded));
+    ASSERT_EQ(state(), InstanceState::waiting) << problem();
+    EXPECT_THAT(problem(), AllOf(HasSubstr("libm.so.6"), HasSubstr("Error 24"), HasSubstr("starts again")));
+    expire_timer();
+  }
+  report_ready();
+  EXPECT_EQ(state(), InstanceState::running);
+}
+
+TEST_F(ManagedLife, FailsIfALibraryOfTheProgramIsMissing) {
+  for (const std::string text : {"plc-instance: error while loading shared libraries: libm.so.6: cannot open "
+                                 "shared object file: No such file or directory",
+                                 ""}) {
+    make();
+    host_.said = text;
+    sut().hold("is to be started");
+    sut().release();
+    sut().on_exit(exited_with(kExitNotLoaded));
+    EXPECT_EQ(state(), InstanceState::failed);
+    EXPECT_THAT(problem(), HasSubstr(text.empty() ? "could not be loaded" : text));
+  }
+}
+
+// Its code has run by then, so it is a crash, which on_failure repeats.
+TEST_F(ManagedLife, CountsTheSameExitCodeAsACrashAfterTheFirstStep) {
+  host_.said = "plc-instance: error while loading shared libraries: x.so: file too short";
+  sut().hold("is to be started");
+  sut().release();
+  sut().on_report({.step = SetupStep::bind_core, .code = ErrorCode::ok, .text = ""});
+  sut().on_exit(exited_with(kExitNotLoaded));
+  EXPECT_EQ(state(), InstanceState::waiting);
+  EXPECT_THAT(problem(), HasSubstr("exit code 127; starts again"));
 }
 
 TEST_F(ShortOfSomething, OfProcessesIsTriedAgain) {
