@@ -26,6 +26,7 @@
 #include "api/dds/security_section.hpp"
 #include "api/dds/signed_messages.h"
 #include "api/dds/steady_waits.hpp"
+#include "api/dds/token_heap.hpp"
 #include "api/security/identity.hpp"
 #include "shm/base/thread.hpp"
 #include "shm/base/unique_fd.hpp"
@@ -179,6 +180,7 @@ bool can_use_fifo(int priority) {
 
 Result<std::shared_ptr<Entity>> open_domain(Role role, const DomainOptions& options) {
   wait_by_steady_clock();
+  keep_tokens_once();
   const auto configuration = domain_configuration(role, options);
   if (!configuration) return std::unexpected(configuration.error());
   Registry& all = registry();

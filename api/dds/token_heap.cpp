@@ -2,13 +2,18 @@
 // the time when they expire (find_or_create_pending_entity_match()). If they come once more, Cyclone puts the
 // same entry in a second time. Then the heap is broken: the thread that takes the next one out crashes, or
 // never ends. It happens when both sides begin anew before that reader or writer was announced, as after one
-// of them stood still. The keys stay for 300 s, also when their participant goes. So in plchost-dds an entry
-// that is in the heap is taken out first.
+// of them stood still. The keys stay for 300 s, also when their participant goes. So an entry that is in the
+// heap is taken out first.
+#include "api/dds/token_heap.hpp"
+
 #include <cstddef>
 
 #include <dds/ddsrt/avl.h>
 #include <dds/ddsrt/fibheap.h>
-#include <dlfcn.h>
+
+namespace plchost::dds {
+
+void keep_tokens_once() noexcept {}
 
 namespace {
 
@@ -34,18 +39,23 @@ bool is_among(const HeapNode* roots, const HeapNode* wanted) {
 
 }  // namespace
 
-// A program's own function goes before that of a library that calls it by name, as Cyclone does, with the
-// lock of the heap.
+}  // namespace plchost::dds
+
+// The function of a program, or of a library that brings Cyclone, goes before that of Cyclone, which calls it
+// by name and with the lock of the heap. It does all that Cyclone's does: a library has no other way to it.
 extern "C" __attribute__((visibility("default"))) void ddsrt_fibheap_insert(const ddsrt_fibheap_def_t* kind,
                                                                             ddsrt_fibheap_t* heap,
                                                                             const void* entry) {
+  // For the owner of the entry nothing in it changes.
+  auto* const node = reinterpret_cast<ddsrt_fibheap_node_t*>(
+      static_cast<std::byte*>(const_cast<void*>(entry)) + kind->offset);  // NOLINT(*-const-cast)
   // Such entries are in a tree as well. Those of Cyclone's busy heaps are not, and need no search.
-  if (kind->offset == sizeof(ddsrt_avl_node_t) &&
-      is_among(heap->roots,
-               reinterpret_cast<const HeapNode*>(static_cast<const std::byte*>(entry) + kind->offset))) {
+  if (kind->offset == sizeof(ddsrt_avl_node_t) && plchost::dds::is_among(heap->roots, node)) {
     ddsrt_fibheap_delete(kind, heap, entry);  // compares the others only: this one has its new time already
   }
-  using Insert = void (*)(const ddsrt_fibheap_def_t*, ddsrt_fibheap_t*, const void*);
-  static const auto insert = reinterpret_cast<Insert>(::dlsym(RTLD_NEXT, "ddsrt_fibheap_insert"));
-  insert(kind, heap, entry);
+  *node = {};
+  node->prev = node;
+  node->next = node;
+  ddsrt_fibheap_t alone{node};
+  ddsrt_fibheap_merge(kind, heap, &alone);
 }
