@@ -112,14 +112,10 @@ Result<std::vector<plc_WriterStatus>> ControlClient::writers(const std::string& 
 
 Result<std::vector<TransitionView>> ControlClient::transitions() {
   if (!transition_log_) {
-    auto topic = dds::make_topic(entity(), dds::kTransition);
-    if (!topic) return std::unexpected(topic.error());
-    auto reader = dds::make_reader(status_subscriber_.get(), topic->get(), dds::qos_of(dds::kTransition));
-    if (!reader) return std::unexpected(reader.error());
-    if (auto added = wait_set_.add(reader->get(), DDS_DATA_AVAILABLE_STATUS); !added) {
-      return std::unexpected(added.error());
-    }
-    transition_log_ = TransitionLog(*std::move(topic), *std::move(reader));
+    auto opened = open_reader(entity(), status_subscriber_.get(), dds::kTransition,
+                              dds::qos_of(dds::kTransition), wait_set_);
+    if (!opened) return std::unexpected(std::move(opened).error());
+    transition_log_ = TransitionLog(std::move(opened->topic), std::move(opened->reader));
   }
   update();
   return transition_log_.take();

@@ -24,6 +24,7 @@
 #include "api/client/seen_hosts.hpp"
 #include "api/client/statistics_cache.hpp"
 #include "api/client/status_cache.hpp"
+#include "api/client/topic_reader.hpp"
 #include "api/client/transition_log.hpp"
 #include "api/client/wait_set.hpp"
 #include "api/dds/domain.hpp"
@@ -256,12 +257,8 @@ class ControlClient {
   /// Until the status shows the effect of what was answered.
   void await_status(const std::string& host, const ApiReply& reply, TimePoint deadline);
   static constexpr Duration kStatusPatience = std::chrono::seconds(2);
-  struct PageReader {
-    dds::Entity topic;
-    dds::Entity reader;
-  };
   template <class Page, class Listing>
-  [[nodiscard]] Result<Listing> ask_for_page(PageReader& pages, const dds::TopicInfo& topic,
+  [[nodiscard]] Result<Listing> ask_for_page(dds::TopicReader& pages, const dds::TopicInfo& topic,
                                              const ApiRequest& request, TimePoint deadline);
 
   std::shared_ptr<Participant> participant_;
@@ -289,13 +286,13 @@ class ControlClient {
   Duration quiet_ = kQuiet;
   dds::Entity reply_topic_;
   dds::Entity reply_reader_;
-  PageReader object_pages_;
-  PageReader node_pages_;
-  PageReader log_pages_;
+  dds::TopicReader object_pages_;
+  dds::TopicReader node_pages_;
+  dds::TopicReader log_pages_;
   dds::Entity ack_topic_;
   dds::Entity ack_reader_;
-  PageReader runs_;
-  PageReader download_acks_;
+  dds::TopicReader runs_;
+  dds::TopicReader download_acks_;
   dds::Entity chunk_topic_;
   std::array<dds::Entity, 2> request_topics_;
   std::map<std::pair<std::string, bool>, RequestCaller> callers_;

@@ -32,7 +32,7 @@ std::optional<Listing> take_page(dds_entity_t reader, dds::HostWriters& writers,
 }  // namespace
 
 template <class Page, class Listing>
-Result<Listing> ControlClient::ask_for_page(PageReader& pages, const dds::TopicInfo& topic,
+Result<Listing> ControlClient::ask_for_page(dds::TopicReader& pages, const dds::TopicInfo& topic,
                                             const ApiRequest& request, TimePoint deadline) {
   if (auto good = check_host_name(request.host, only_); !good)
     return std::unexpected(std::move(good).error());

@@ -17,14 +17,10 @@ namespace plchost {
 template <class Cache>
 Result<void> ControlClient::open_cache(Cache& cache, const dds::TopicInfo& info, std::uint32_t statuses) {
   if (cache) return {};
-  auto topic = dds::make_topic(entity(), info);
-  if (!topic) return std::unexpected(topic.error());
-  // Samples of another host under a key of this one must not push out those that have not been taken yet.
-  auto reader = dds::make_reader(status_subscriber_.get(), topic->get(),
-                                 dds::qos_of(info).keep_last(dds::kStatusReaderDepth));
-  if (!reader) return std::unexpected(reader.error());
-  if (auto added = wait_set_.add(reader->get(), statuses); !added) return added;
-  cache = Cache(std::move(*topic), std::move(*reader));
+  auto opened =
+      open_reader(entity(), status_subscriber_.get(), info, dds::shown_qos(info), wait_set_, statuses);
+  if (!opened) return std::unexpected(std::move(opened).error());
+  cache = Cache(std::move(opened->topic), std::move(opened->reader));
   return {};
 }
 

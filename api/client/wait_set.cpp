@@ -23,7 +23,7 @@ Result<WaitSet> WaitSet::create(dds_entity_t participant) {
   return WaitSet(std::move(*made), std::move(*woken));
 }
 
-Result<void> WaitSet::add(dds_entity_t entity, std::uint32_t statuses) {
+Result<void> WaitSet::add(dds_entity_t entity, std::uint32_t statuses) const {
   if (auto set = dds::check_code(dds_set_status_mask(entity, statuses), "choose statuses"); !set) return set;
   return dds::check_code(dds_waitset_attach(set_.get(), entity, entity), "add to a wait set");
 }

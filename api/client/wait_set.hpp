@@ -14,7 +14,7 @@ class WaitSet {
   [[nodiscard]] static Result<WaitSet> create(dds_entity_t participant);
   /// `statuses`: DDS_DATA_AVAILABLE_STATUS and others of a reader, DDS_PUBLICATION_MATCHED_STATUS of a
   /// writer.
-  [[nodiscard]] Result<void> add(dds_entity_t entity, std::uint32_t statuses);
+  [[nodiscard]] Result<void> add(dds_entity_t entity, std::uint32_t statuses) const;
   /// Returns at the deadline at the latest, and earlier without cause: look again. Look before the first wait
   /// and after each: a sample ends one wait, also if nobody takes it.
   void wait(TimePoint deadline) const noexcept;

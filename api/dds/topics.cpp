@@ -1,5 +1,8 @@
 #include "api/dds/topics.hpp"
 
+#include <algorithm>
+#include <utility>
+
 #include <fmt/format.h>
 
 #include "api/dds/domain.hpp"
@@ -18,6 +21,13 @@ Qos qos_of(const TopicInfo& topic) {
   if (topic.qos.transient_local) qos.transient_local();
   if (!topic.qos.autodispose) qos.no_autodispose();
   if (topic.qos.deadline > Duration::zero()) qos.deadline(topic.qos.deadline);
+  return qos;
+}
+
+Qos shown_qos(const TopicInfo& topic) {
+  constexpr std::int32_t kOfAllHosts = 8;  // of one key: one of the host itself, and others without a right
+  Qos qos = qos_of(topic);
+  qos.keep_last(std::max(kOfAllHosts, topic.qos.depth));
   return qos;
 }
 
@@ -76,6 +86,15 @@ Result<Entity> make_subscriber(dds_entity_t participant, const std::string& part
   Qos qos;
   qos.partition(partition);
   return check_entity(dds_create_subscriber(participant, qos.get(), nullptr), "make subscriber " + partition);
+}
+
+Result<TopicReader> open_reader(dds_entity_t participant, dds_entity_t subscriber, const TopicInfo& topic,
+                                const Qos& qos) {
+  auto made = make_topic(participant, topic);
+  if (!made) return std::unexpected(std::move(made).error());
+  auto reader = make_reader(subscriber, made->get(), qos);
+  if (!reader) return std::unexpected(std::move(reader).error());
+  return TopicReader{.topic = *std::move(made), .reader = *std::move(reader)};
 }
 
 }  // namespace plchost::dds

@@ -15,9 +15,6 @@ namespace plchost::dds {
 
 inline constexpr std::uint32_t kApiVersion = 1;
 
-/// Samples of one key that a client has not taken yet: one of the host itself, and others that have no right
-/// to it.
-inline constexpr std::int32_t kStatusReaderDepth = 8;
 /// The largest piece of a download: as in control.idl.
 inline constexpr std::size_t kMaxChunk = 32768;
 inline constexpr Duration kPresencePeriod = std::chrono::milliseconds(25);
@@ -25,6 +22,9 @@ inline constexpr Duration kPresenceDeadline = kPresence.qos.deadline;
 
 /// Of a topic's writers, and of readers that need no bound of their own.
 [[nodiscard]] Qos qos_of(const TopicInfo& topic);
+/// Of a reader of what hosts show, which keeps more of each key than the topic says: samples of another host
+/// under that key must not push out what has not been taken yet.
+[[nodiscard]] Qos shown_qos(const TopicInfo& topic);
 /// Of the reader of a host, with its bound: one that is full makes the writer wait. Back-pressure, no loss.
 [[nodiscard]] Qos bounded_qos(const TopicInfo& topic);
 /// Of a client's reader of what hosts answer: holds `each` samples of each host of a machine.
@@ -53,5 +53,15 @@ inline constexpr std::string_view kAllHosts = "*";
 [[nodiscard]] Result<Entity> make_reader(dds_entity_t parent, dds_entity_t topic, const Qos& qos);
 [[nodiscard]] Result<Entity> make_publisher(dds_entity_t participant, const std::string& partition);
 [[nodiscard]] Result<Entity> make_subscriber(dds_entity_t participant, const std::string& partition);
+
+/// A topic and a reader of it, which ends first.
+struct TopicReader {
+  Entity topic;
+  Entity reader;
+
+  [[nodiscard]] explicit operator bool() const noexcept { return static_cast<bool>(reader); }
+};
+[[nodiscard]] Result<TopicReader> open_reader(dds_entity_t participant, dds_entity_t subscriber,
+                                              const TopicInfo& topic, const Qos& qos);
 
 }  // namespace plchost::dds

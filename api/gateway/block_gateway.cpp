@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "api/dds/error.hpp"
 #include "api/dds/samples.hpp"
 #include "api/dds/topics.hpp"
 #include "api/gateway/block_sample.hpp"
@@ -14,18 +13,6 @@ namespace {
 
 constexpr Duration kRetryPending = std::chrono::milliseconds(1);
 constexpr std::size_t kMostWritersKnown = 1024;
-
-void wake_up(dds_entity_t /*reader*/, void* wake) {
-  static_cast<CountedEvent*>(wake)->post();
-}
-
-Result<void> listen(const dds::Entity& reader, CountedEvent& wake) {
-  dds_listener_t* const listener = dds_create_listener(&wake);
-  dds_lset_data_available(listener, wake_up);
-  const dds_return_t returned = dds_set_listener(reader.get(), listener);
-  dds_delete_listener(listener);
-  return dds::check_code(returned, "listen to a reader");
-}
 
 }  // namespace
 
@@ -39,18 +26,16 @@ BlockGateway::BlockGateway(dds_entity_t participant, GatewayOptions options)
                 .participant = {}}) {}
 
 BlockGateway::~BlockGateway() {
-  // First what calls others: listeners, then the router.
-  for (dds::Entity* const reader : {&host_reader_, &block_reader_, &ack_reader_}) reader->reset();
   stop_.store(true, std::memory_order_release);
   if (router_thread_.joinable()) router_->wake();
   router_thread_.join();
 }
 
 Result<std::unique_ptr<BlockGateway>> BlockGateway::create(dds_entity_t participant, GatewayOptions options,
-                                                           CountedEvent& wake) {
+                                                           const WaitSet& wait_set) {
   std::unique_ptr<BlockGateway> gateway(new BlockGateway(participant, std::move(options)));
   if (auto opened = gateway->open_node(); !opened) return failure_in("gateway", std::move(opened).error());
-  if (auto opened = gateway->open_topics(wake); !opened) {
+  if (auto opened = gateway->open_topics(wait_set); !opened) {
     return failure_in("gateway", std::move(opened).error());
   }
   gateway->announce();
@@ -83,39 +68,32 @@ Result<void> BlockGateway::open_node() {
   return {};
 }
 
-Result<void> BlockGateway::open_topics(CountedEvent& wake) {
-  auto hosts = dds::make_topic(participant_, dds::kBlockHostStatus);
-  auto blocks = dds::make_topic(participant_, dds::kBlock);
-  auto acks = dds::make_topic(participant_, dds::kBlockAck);
+Result<void> BlockGateway::open_topics(const WaitSet& wait_set) {
   auto subscriber = dds::make_subscriber(participant_, dds::block_partition(options_.host, dds::kAllHosts));
   auto told = dds::make_publisher(participant_, dds::status_partition(options_.host));
   auto heard = dds::make_subscriber(participant_, dds::status_partition(dds::kAllHosts));
-  for (auto* const made : {&hosts, &blocks, &acks, &subscriber, &told, &heard}) {
+  for (auto* const made : {&subscriber, &told, &heard}) {
     if (!*made) return std::unexpected(std::move(*made).error());
   }
-  block_topic_ = *std::move(blocks);
-  ack_topic_ = *std::move(acks);
   subscriber_ = *std::move(subscriber);
   host_publisher_ = *std::move(told);
   host_subscriber_ = *std::move(heard);
-  auto host_writer =
-      dds::make_writer(host_publisher_.get(), hosts->get(), dds::qos_of(dds::kBlockHostStatus));
-  auto host_reader =
-      dds::make_reader(host_subscriber_.get(), hosts->get(), dds::qos_of(dds::kBlockHostStatus));
-  auto block_reader = dds::make_reader(subscriber_.get(), block_topic_.get(), dds::bounded_qos(dds::kBlock));
-  auto ack_reader = dds::make_reader(subscriber_.get(), ack_topic_.get(), dds::qos_of(dds::kBlockAck));
-  topics_.push_back(*std::move(hosts));
-  for (auto* const made : {&host_writer, &host_reader, &block_reader, &ack_reader}) {
+  const auto open = [&](const dds::Entity& from, const dds::TopicInfo& topic, const dds::Qos& qos) {
+    return open_reader(participant_, from.get(), topic, qos, wait_set);
+  };
+  auto hosts = open(host_subscriber_, dds::kBlockHostStatus, dds::shown_qos(dds::kBlockHostStatus));
+  auto blocks = open(subscriber_, dds::kBlock, dds::bounded_qos(dds::kBlock));
+  auto acks = open(subscriber_, dds::kBlockAck, dds::shown_qos(dds::kBlockAck));
+  for (auto* const made : {&hosts, &blocks, &acks}) {
     if (!*made) return std::unexpected(std::move(*made).error());
   }
-  host_writer_ = *std::move(host_writer);
-  host_reader_ = *std::move(host_reader);
-  block_reader_ = *std::move(block_reader);
-  ack_reader_ = *std::move(ack_reader);
-  for (const dds::Entity* const reader : {&host_reader_, &block_reader_, &ack_reader_}) {
-    if (auto listening = listen(*reader, wake); !listening) return listening;
-  }
-  wake.post();  // blocks that came before the listeners were there
+  hosts_ = *std::move(hosts);
+  blocks_ = *std::move(blocks);
+  acks_ = *std::move(acks);
+  auto writer =
+      dds::make_writer(host_publisher_.get(), hosts_.topic.get(), dds::qos_of(dds::kBlockHostStatus));
+  if (!writer) return std::unexpected(std::move(writer).error());
+  host_writer_ = *std::move(writer);
   return {};
 }
 
@@ -169,7 +147,7 @@ SendResult BlockGateway::give_to(Peer& peer, const BlockHeader& header, std::spa
 dds::Guid BlockGateway::writer_behind(const dds_sample_info_t& info) {
   if (const auto known = writers_.find(info.publication_handle); known != writers_.end())
     return known->second;
-  const dds::Guid writer = dds::writer_of(block_reader_.get(), info);
+  const dds::Guid writer = dds::writer_of(blocks_.reader.get(), info);
   if (writers_.size() >= kMostWritersKnown) writers_.clear();
   if (writer != dds::Guid{}) writers_.emplace(info.publication_handle, writer);
   return writer;
@@ -184,8 +162,8 @@ BlockGateway::Peer* BlockGateway::peer_of(const dds::Guid& writer) {
 
 void BlockGateway::take_acks(TimePoint now) {
   bool news = false;
-  dds::take_valid<plc_BlockAck>(ack_reader_.get(), [&](const plc_BlockAck& ack, const auto& info) {
-    Peer* const peer = peer_of(dds::writer_of(ack_reader_.get(), info));
+  dds::take_valid<plc_BlockAck>(acks_.reader.get(), [&](const plc_BlockAck& ack, const auto& info) {
+    Peer* const peer = peer_of(dds::writer_of(acks_.reader.get(), info));
     if (peer == nullptr || ack.from_host != peer->claim.number) return;
     peer->heard = now;
     const std::scoped_lock lock(mutex_);
@@ -200,7 +178,7 @@ void BlockGateway::take_acks(TimePoint now) {
 
 void BlockGateway::take_blocks(TimePoint now) {
   constexpr std::size_t kAtOnce = 32;
-  dds::take_valid<plc_Block, kAtOnce>(block_reader_.get(), [&](const plc_Block& block, const auto& info) {
+  dds::take_valid<plc_Block, kAtOnce>(blocks_.reader.get(), [&](const plc_Block& block, const auto& info) {
     take(block, writer_behind(info), now);
   });
 }

@@ -12,12 +12,12 @@
 
 #include <control.h>
 
+#include "api/client/topic_reader.hpp"
 #include "api/dds/entity.hpp"
 #include "api/dds/host_writers.hpp"
 #include "api/gateway/block_window.hpp"
 #include "api/gateway/host_numbers.hpp"
 #include "api/gateway/pending_blocks.hpp"
-#include "shm/base/counted_event.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/thread.hpp"
 #include "shm/block_driver/block_router.hpp"
@@ -47,10 +47,10 @@ class BlockGateway {
   static constexpr Duration kBeat = std::chrono::milliseconds(200);
   static constexpr std::size_t kMostPeers = 256;
 
-  /// `wake` is posted when there is something to serve; both it and the participant outlive the gateway.
+  /// `wait_set` waits for what there is to serve; both it and the participant outlive the gateway.
   [[nodiscard]] static Result<std::unique_ptr<BlockGateway>> create(dds_entity_t participant,
                                                                     GatewayOptions options,
-                                                                    CountedEvent& wake);
+                                                                    const WaitSet& wait_set);
   ~BlockGateway();
   BlockGateway(const BlockGateway&) = delete;
   BlockGateway& operator=(const BlockGateway&) = delete;
@@ -80,7 +80,7 @@ class BlockGateway {
   using Peers = std::map<std::uint16_t, std::unique_ptr<Peer>>;
 
   BlockGateway(dds_entity_t participant, GatewayOptions options);
-  Result<void> open_topics(CountedEvent& wake);
+  Result<void> open_topics(const WaitSet& wait_set);
   Result<void> open_node();
 
   // The router's thread.
@@ -120,17 +120,14 @@ class BlockGateway {
   HostNumbers numbers_;
   std::mutex mutex_;
   Peers peers_;  // changed by the serving thread, with the mutex
-  std::vector<dds::Entity> topics_;
-  dds::Entity block_topic_;
-  dds::Entity ack_topic_;
   dds::Entity subscriber_;
   dds::Entity host_publisher_;
   dds::Entity host_subscriber_;
   dds::HostWriters host_writers_;
+  dds::TopicReader hosts_;
+  dds::TopicReader blocks_;
+  dds::TopicReader acks_;
   dds::Entity host_writer_;
-  dds::Entity host_reader_;
-  dds::Entity block_reader_;
-  dds::Entity ack_reader_;
   std::unordered_map<dds_instance_handle_t, dds::Guid> writers_;  // a cache
   std::unique_ptr<BlockNode> node_;
   std::optional<NodeDirectory> directory_;  // to look at

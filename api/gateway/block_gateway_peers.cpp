@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include "api/client/met_readers.hpp"
 #include "api/dds/samples.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"
@@ -15,7 +16,7 @@ namespace plchost {
 
 void BlockGateway::follow_hosts(TimePoint now) {
   bool news = false;
-  dds::take_told<plc_BlockHostStatus>(host_reader_.get(), host_writers_,
+  dds::take_told<plc_BlockHostStatus>(hosts_.reader.get(), host_writers_,
                                       [&](const auto& host, const auto& info) {
                                         follow(host, info, now);
                                         news = true;
@@ -31,7 +32,7 @@ void BlockGateway::follow(const plc_BlockHostStatus& host, const dds_sample_info
     names_.erase(name);
     return numbers_.forget(name, now);
   }
-  const dds::Guid writer = dds::writer_of(host_reader_.get(), info);
+  const dds::Guid writer = dds::writer_of(hosts_.reader.get(), info);
   if (!info.valid_data || writer == dds::Guid{}) return;
   numbers_.claim({.host = name,
                   .number = host.host_number,
@@ -85,7 +86,7 @@ void BlockGateway::settle_peers(TimePoint now) {
 
 Result<void> BlockGateway::open_block_writer(Peer& peer) const {
   // Never waits: how much may be under way is the business of BlockWindow.
-  auto writer = dds::make_writer(peer.publisher.get(), block_topic_.get(), dds::qos_of(dds::kBlock));
+  auto writer = dds::make_writer(peer.publisher.get(), blocks_.topic.get(), dds::qos_of(dds::kBlock));
   if (!writer) return std::unexpected(std::move(writer).error());
   peer.blocks = *std::move(writer);
   peer.writer = dds::guid_of(peer.blocks.get());
@@ -98,7 +99,7 @@ Result<std::unique_ptr<BlockGateway::Peer>> BlockGateway::open_peer(const HostCl
   auto publisher = dds::make_publisher(participant_, dds::block_partition(claim.host, options_.host));
   if (!publisher) return std::unexpected(std::move(publisher).error());
   peer->publisher = *std::move(publisher);
-  auto acks = dds::make_writer(peer->publisher.get(), ack_topic_.get(), dds::qos_of(dds::kBlockAck));
+  auto acks = dds::make_writer(peer->publisher.get(), acks_.topic.get(), dds::qos_of(dds::kBlockAck));
   if (!acks) return std::unexpected(std::move(acks).error());
   peer->acks = *std::move(acks);
   if (auto opened = open_block_writer(*peer); !opened) return std::unexpected(std::move(opened).error());
@@ -143,11 +144,8 @@ void BlockGateway::renew_writer(Peer& peer) {
 void BlockGateway::look_at(Peer& peer, TimePoint now) {
   const bool heard = peer.heard && now - *peer.heard <= kSilence;
   const std::scoped_lock lock(mutex_);
-  dds_publication_matched_status_t matched{};
-  const bool met = dds_get_publication_matched_status(peer.blocks.get(), &matched) == DDS_RETCODE_OK &&
-                   matched.current_count > 0;
   const bool was_reached = peer.reached;
-  peer.reached = heard && met;
+  peer.reached = heard && has_reader(peer.blocks.get());
   if (!heard) peer.full = {};
   // After a silence what is under way has its time again.
   if (!was_reached) peer.window.be_patient(now);

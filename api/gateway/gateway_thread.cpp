@@ -12,7 +12,10 @@ constexpr Duration kNextAttempt = std::chrono::seconds(1);
 
 Result<std::unique_ptr<GatewayThread>> GatewayThread::start(dds_entity_t participant,
                                                             GatewayOptions options) {
-  std::unique_ptr<GatewayThread> gateway(new GatewayThread(participant, std::move(options)));
+  auto wait_set = WaitSet::create(participant);
+  if (!wait_set) return failure_in("gateway", std::move(wait_set).error());
+  std::unique_ptr<GatewayThread> gateway(
+      new GatewayThread(participant, std::move(options), *std::move(wait_set)));
   auto thread = Thread::start("gateway", {}, [gateway = gateway.get()] { gateway->run(); });
   if (!thread) return failure_in("gateway", std::move(thread).error());
   gateway->thread_ = *std::move(thread);
@@ -21,12 +24,12 @@ Result<std::unique_ptr<GatewayThread>> GatewayThread::start(dds_entity_t partici
 
 GatewayThread::~GatewayThread() {
   stop_.store(true, std::memory_order_release);
-  wake_.nudge();
+  wait_set_.wake();
   thread_.join();
 }
 
 std::unique_ptr<BlockGateway> GatewayThread::make() {
-  auto made = BlockGateway::create(participant_, options_, wake_);
+  auto made = BlockGateway::create(participant_, options_, wait_set_);
   if (made) {
     last_problem_.clear();
     spdlog::info("blocks: this host has number {}", options_.number);
@@ -41,13 +44,12 @@ std::unique_ptr<BlockGateway> GatewayThread::make() {
 void GatewayThread::run() {
   std::unique_ptr<BlockGateway> gateway;
   while (!stop_.load(std::memory_order_acquire)) {
-    const CountedEvent::Snapshot seen = wake_.snapshot();
     if (gateway && gateway->lost()) gateway.reset();
     if (!gateway) gateway = make();
     const TimePoint now = MonotonicClock::now();
     const TimePoint next = gateway ? gateway->serve(now) : now + kNextAttempt;
     if (stop_.load(std::memory_order_acquire)) return;
-    wake_.wait(seen, next);
+    wait_set_.wait(next);
   }
 }
 

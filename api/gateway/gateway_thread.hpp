@@ -20,14 +20,14 @@ class GatewayThread {
   GatewayThread& operator=(const GatewayThread&) = delete;
 
  private:
-  GatewayThread(dds_entity_t participant, GatewayOptions options) noexcept
-      : participant_(participant), options_(std::move(options)) {}
+  GatewayThread(dds_entity_t participant, GatewayOptions options, WaitSet wait_set) noexcept
+      : participant_(participant), options_(std::move(options)), wait_set_(std::move(wait_set)) {}
   void run();
   [[nodiscard]] std::unique_ptr<BlockGateway> make();
 
   const dds_entity_t participant_;
   const GatewayOptions options_;
-  CountedEvent wake_;
+  const WaitSet wait_set_;
   std::atomic<bool> stop_{false};
   std::string last_problem_;
   Thread thread_;

@@ -1,4 +1,4 @@
-// Two gateways in this process, under a clock that stands still: no beat comes.
+// Two gateways in this process. Their clock may stand still: then no beat comes.
 #include <atomic>
 #include <memory>
 #include <optional>
@@ -10,6 +10,8 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
+#include "api/dds/text.hpp"
+#include "api/dds/topics.hpp"
 #include "api/gateway/block_gateway.hpp"
 #include "shm/block_driver/block_channel.hpp"
 #include "tests/integration/api/test_host.hpp"
@@ -28,6 +30,7 @@ class GatewayEnd {
         pool_name_(own_name(host)),
         pool_(ObjectPool::create(pool_name_, {.max_objects = 64}).value()),
         participant_(dds_create_participant(domain.number(), nullptr, nullptr)),
+        wait_set_(WaitSet::create(participant_.get()).value()),
         gateway_(BlockGateway::create(participant_.get(),
                                       {.pool = pool_name_,
                                        .base = NodeOptions{}.base,
@@ -35,7 +38,7 @@ class GatewayEnd {
                                        .number = number,
                                        .since_ns = number,
                                        .epoch = number},
-                                      wake_)
+                                      wait_set_)
                      .value()),
         node_(BlockNode::join({.pool = pool_name_, .entry = {.name = "node"}}).value()),
         router_(BlockRouter::create(*node_).value()),
@@ -68,8 +71,8 @@ class GatewayEnd {
   std::uint16_t number_;
   std::string pool_name_;
   ObjectPool pool_;
-  CountedEvent wake_;
   dds::Entity participant_;
+  WaitSet wait_set_;
   std::unique_ptr<BlockGateway> gateway_;
   std::unique_ptr<BlockNode> node_;
   std::unique_ptr<BlockRouter> router_;
@@ -80,7 +83,7 @@ class GatewayEnd {
   Received received_;
 };
 
-class FullNode : public testing::Test {
+class TwoGateways : public testing::Test {
  protected:
   /// Whether a send has this result within `patience`. Both ends serve meanwhile: at `now`, or at the real
   /// time.
@@ -101,6 +104,8 @@ class FullNode : public testing::Test {
   GatewayEnd south_{domain_, "south", 2};
 };
 
+using FullNode = TwoGateways;
+
 TEST_F(FullNode, ThatHasRoomAgainIsToldWithoutWaitingForTheNextBeat) {
   const std::vector<std::byte> large(60000);
   ASSERT_TRUE(sends(SendResult::sent, large, std::nullopt));
@@ -120,6 +125,23 @@ TEST_F(FullNode, ThatHasRoomAgainIsToldWithoutWaitingForTheNextBeat) {
     has_come = south_.drain() > 0;
   }
   EXPECT_TRUE(has_come);
+}
+
+using StrangersClaim = TwoGateways;
+
+TEST_F(StrangersClaim, InTheNameOfAHostDoesNotHideThatHost) {
+  north_.serve(MonotonicClock::now());  // It tells of itself and its node, and then no more.
+  const dds::Entity stranger(dds_create_participant(domain_.number(), nullptr, nullptr));
+  const auto topic = dds::make_topic(stranger.get(), dds::kBlockHostStatus);
+  const auto publisher = dds::make_publisher(stranger.get(), dds::status_partition("west"));
+  const auto writer = dds::make_writer(publisher->get(), topic->get(), dds::qos_of(dds::kBlockHostStatus));
+  plc_BlockHostStatus claim{};
+  dds::copy_text(claim.host, "north");
+  claim.epoch = 99;
+  claim.host_number = 3;
+  claim.since_unix_ns = 1;
+  ASSERT_EQ(dds_write(writer->get(), &claim), DDS_RETCODE_OK);
+  EXPECT_TRUE(sends(SendResult::sent, std::vector<std::byte>(100), std::nullopt));
 }
 
 }  // namespace

@@ -1,0 +1,18 @@
+#include "api/client/topic_reader.hpp"
+
+#include <utility>
+
+namespace plchost {
+
+Result<dds::TopicReader> open_reader(dds_entity_t participant, dds_entity_t subscriber,
+                                     const dds::TopicInfo& topic, const dds::Qos& qos,
+                                     const WaitSet& wait_set, std::uint32_t statuses) {
+  auto opened = dds::open_reader(participant, subscriber, topic, qos);
+  if (!opened) return opened;
+  if (auto added = wait_set.add(opened->reader.get(), statuses); !added) {
+    return std::unexpected(std::move(added).error());
+  }
+  return opened;
+}
+
+}  // namespace plchost
