@@ -115,7 +115,7 @@ Result<std::vector<TransitionView>> ControlClient::transitions() {
     auto opened = open_reader(entity(), status_subscriber_.get(), dds::kTransition,
                               dds::qos_of(dds::kTransition), wait_set_);
     if (!opened) return std::unexpected(std::move(opened).error());
-    transition_log_ = TransitionLog(std::move(opened->topic), std::move(opened->reader));
+    transition_log_ = TransitionLog(*std::move(opened));
   }
   update();
   return transition_log_.take();
@@ -148,20 +148,18 @@ Result<dds::Entity> ControlClient::make_own_topic(const dds::TopicInfo& info) {
   return dds::make_topic(entity(), info);
 }
 
-Result<void> ControlClient::read_own(dds::Entity& topic, dds::Entity& reader, dds::Entity made,
-                                     const dds::Qos& qos) {
-  auto made_reader = dds::make_reader(own_subscriber_.get(), made.get(), qos);
-  if (!made_reader) return std::unexpected(made_reader.error());
-  topic = std::move(made);
-  reader = std::move(*made_reader);
-  return wait_set_.add(reader.get(), DDS_DATA_AVAILABLE_STATUS);
+Result<void> ControlClient::read_own(dds::TopicReader& answers, dds::Entity topic, const dds::Qos& qos) {
+  auto reader = dds::make_reader(own_subscriber_.get(), topic.get(), qos);
+  if (!reader) return std::unexpected(std::move(reader).error());
+  answers = {.topic = std::move(topic), .reader = *std::move(reader)};
+  return wait_set_.add(answers.reader.get(), DDS_DATA_AVAILABLE_STATUS);
 }
 
 Result<RequestCaller*> ControlClient::caller(const std::string& host, bool engineering) {
   const std::pair key(host, engineering);
   if (const auto known = callers_.find(key); known != callers_.end()) return &known->second;
   const dds::Qos qos = dds::answers_qos(dds::kReply, dds::kReply.qos.depth);
-  if (auto opened = open_own_reader<plc_Reply>(reply_topic_, reply_reader_, qos); !opened) {
+  if (auto opened = open_own_reader<plc_Reply>(replies_, qos); !opened) {
     return std::unexpected(opened.error());
   }
   dds::Entity& topic = request_topics_.at(engineering ? 1 : 0);
@@ -192,7 +190,7 @@ Result<ApiReply> ControlClient::ask(const ApiRequest& request, TimePoint deadlin
   update_hosts();  // the limit is by the newest presence
   const auto clock = [&] { return clock_of(request.host); };
   auto reply =
-      (*asked)->call(request, reply_reader_.get(), wait_set_, deadline, clock, answering_, meanwhile);
+      (*asked)->call(request, replies_.reader.get(), wait_set_, deadline, clock, answering_, meanwhile);
   if (!reply) {
     own_answers_.remove((*asked)->guid());
     callers_.erase({request.host, engineering});

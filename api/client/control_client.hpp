@@ -235,10 +235,9 @@ class ControlClient {
                                         std::uint32_t statuses = DDS_DATA_AVAILABLE_STATUS);
   /// Keeps answers to this client only.
   template <class Answer>
-  [[nodiscard]] Result<void> open_own_reader(dds::Entity& topic, dds::Entity& reader, const dds::Qos& qos);
+  [[nodiscard]] Result<void> open_own_reader(dds::TopicReader& answers, const dds::Qos& qos);
   [[nodiscard]] Result<dds::Entity> make_own_topic(const dds::TopicInfo& info);
-  [[nodiscard]] Result<void> read_own(dds::Entity& topic, dds::Entity& reader, dds::Entity made,
-                                      const dds::Qos& qos);
+  [[nodiscard]] Result<void> read_own(dds::TopicReader& answers, dds::Entity topic, const dds::Qos& qos);
   [[nodiscard]] Result<RequestCaller*> caller(const std::string& host, bool engineering);
   /// Asks, and waits for the answer. A request that was given up leaves no writer that would still send it.
   [[nodiscard]] Result<ApiReply> ask(const ApiRequest& request, TimePoint deadline,
@@ -284,13 +283,11 @@ class ControlClient {
   TimePoint last_news_;
   TimePoint told_keys_look_;  ///< when plc_forget_told_keys() was called last
   Duration quiet_ = kQuiet;
-  dds::Entity reply_topic_;
-  dds::Entity reply_reader_;
+  dds::TopicReader replies_;
   dds::TopicReader object_pages_;
   dds::TopicReader node_pages_;
   dds::TopicReader log_pages_;
-  dds::Entity ack_topic_;
-  dds::Entity ack_reader_;
+  dds::TopicReader acks_;
   dds::TopicReader runs_;
   dds::TopicReader download_acks_;
   dds::Entity chunk_topic_;

@@ -39,8 +39,7 @@ Result<ApiReply> ControlClient::download(const Download& download, const Downloa
   if (download.contents.empty()) return failure(ErrorCode::invalid_argument, download.name + " is empty");
   constexpr std::int32_t kOfEachHost = 16;
   const dds::Qos qos = dds::answers_qos(dds::kDownloadAck, kOfEachHost);
-  if (auto opened = open_own_reader<plc_DownloadAck>(download_acks_.topic, download_acks_.reader, qos);
-      !opened) {
+  if (auto opened = open_own_reader<plc_DownloadAck>(download_acks_, qos); !opened) {
     return std::unexpected(opened.error());
   }
   if (!chunk_topic_) {

@@ -37,7 +37,7 @@ Result<Listing> ControlClient::ask_for_page(dds::TopicReader& pages, const dds::
   if (auto good = check_host_name(request.host, only_); !good)
     return std::unexpected(std::move(good).error());
   const dds::Qos qos = dds::answers_qos(topic, topic.qos.depth);
-  if (auto opened = open_own_reader<Page>(pages.topic, pages.reader, qos); !opened) {
+  if (auto opened = open_own_reader<Page>(pages, qos); !opened) {
     return std::unexpected(opened.error());
   }
   for (;;) {

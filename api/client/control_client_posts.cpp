@@ -16,7 +16,7 @@ Result<Poster<Sample>*> ControlClient::poster(const std::string& host) {
   auto& [topic, of_host] = std::get<Posters<Sample>>(posters_);
   if (const auto known = of_host.find(host); known != of_host.end()) return &known->second;
   const dds::Qos qos = dds::qos_of(dds::kEventAck);  // the latest one of each source
-  if (auto opened = open_own_reader<plc_EventAck>(ack_topic_, ack_reader_, qos); !opened) {
+  if (auto opened = open_own_reader<plc_EventAck>(acks_, qos); !opened) {
     return std::unexpected(std::move(opened).error());
   }
   if (!topic) {
@@ -56,7 +56,7 @@ Result<void> ControlClient::prepare_posts(const std::string& host, TimePoint dea
 
 bool ControlClient::take_acks(TimePoint now) {
   bool progress = false;
-  dds::take_valid_told<plc_EventAck>(ack_reader_.get(), answering_,
+  dds::take_valid_told<plc_EventAck>(acks_.reader.get(), answering_,
                                      [&](const plc_EventAck& ack, const auto& /*info*/) {
                                        const auto tell = [&](auto& posters) {
                                          const auto way = posters.of_host.find(dds::text_of(ack.host));

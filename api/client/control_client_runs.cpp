@@ -25,7 +25,7 @@ bool has_writer(dds_entity_t reader) {
 
 Result<void> ControlClient::prepare_runs(const std::string& host, TimePoint deadline) {
   const dds::Qos qos = dds::answers_qos(dds::kEventRun, dds::kEventRun.qos.depth);
-  if (auto opened = open_own_reader<plc_EventRun>(runs_.topic, runs_.reader, qos); !opened) return opened;
+  if (auto opened = open_own_reader<plc_EventRun>(runs_, qos); !opened) return opened;
   if (auto ready = prepare_posts(host, deadline); !ready) return ready;
   while (!has_writer(runs_.reader.get())) {
     if (MonotonicClock::now() >= deadline) {

@@ -20,17 +20,17 @@ Result<void> ControlClient::open_cache(Cache& cache, const dds::TopicInfo& info,
   auto opened =
       open_reader(entity(), status_subscriber_.get(), info, dds::shown_qos(info), wait_set_, statuses);
   if (!opened) return std::unexpected(std::move(opened).error());
-  cache = Cache(std::move(opened->topic), std::move(opened->reader));
+  cache = Cache(*std::move(opened));
   return {};
 }
 
 template <class Answer>
-Result<void> ControlClient::open_own_reader(dds::Entity& topic, dds::Entity& reader, const dds::Qos& qos) {
-  if (reader) return {};
+Result<void> ControlClient::open_own_reader(dds::TopicReader& answers, const dds::Qos& qos) {
+  if (answers) return {};
   auto made = make_own_topic(dds::kTopicOf<Answer>);
   if (!made) return std::unexpected(std::move(made).error());
   if (auto filtered = own_answers_.filter<Answer>(made->get()); !filtered) return filtered;
-  return read_own(topic, reader, *std::move(made), qos);
+  return read_own(answers, *std::move(made), qos);
 }
 
 template <class Sample>

@@ -35,9 +35,9 @@ StatisticsReport to_report(const plc_TaskStatistics& sample) {
 }  // namespace
 
 void StatisticsCache::update() {
-  if (!reader_) return;
+  if (!from_) return;
   dds::take_changes<plc_TaskStatistics>(
-      reader_.get(), writers_,
+      from_.reader.get(), writers_,
       [this](dds_instance_handle_t handle, const plc_TaskStatistics& sample) {
         reports_[handle] = to_report(sample);
       },

@@ -9,8 +9,8 @@
 
 #include <control.h>
 
-#include "api/dds/entity.hpp"
 #include "api/dds/host_writers.hpp"
+#include "api/dds/topics.hpp"
 
 namespace plchost {
 
@@ -36,11 +36,9 @@ struct StatisticsReport {
 class StatisticsCache {
  public:
   StatisticsCache() = default;
-  /// `reader` was made from `topic`.
-  StatisticsCache(dds::Entity topic, dds::Entity reader) noexcept
-      : topic_(std::move(topic)), reader_(std::move(reader)) {}
+  explicit StatisticsCache(dds::TopicReader from) noexcept : from_(std::move(from)) {}
 
-  [[nodiscard]] explicit operator bool() const noexcept { return static_cast<bool>(reader_); }
+  [[nodiscard]] explicit operator bool() const noexcept { return static_cast<bool>(from_); }
   /// Takes what has come.
   void update();
   /// Of that task, if the host's present server wrote it.
@@ -48,8 +46,7 @@ class StatisticsCache {
                                                      std::string_view instance, std::string_view task) const;
 
  private:
-  dds::Entity topic_;
-  dds::Entity reader_;
+  dds::TopicReader from_;
   dds::HostWriters writers_;
   std::map<dds_instance_handle_t, StatisticsReport> reports_;
 };

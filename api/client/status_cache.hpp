@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "api/dds/entity.hpp"
 #include "api/dds/host_writers.hpp"
 #include "api/dds/text.hpp"
+#include "api/dds/topics.hpp"
 
 namespace plchost {
 
@@ -26,20 +26,18 @@ template <class Sample, UnseenHost kUnseen = UnseenHost::forgets>
 class StatusCache {
  public:
   StatusCache() = default;
-  /// `reader` was made from `topic`.
-  StatusCache(dds::Entity topic, dds::Entity reader) noexcept
-      : topic_(std::move(topic)), reader_(std::move(reader)) {}
+  explicit StatusCache(dds::TopicReader from) noexcept : from_(std::move(from)) {}
 
-  [[nodiscard]] explicit operator bool() const noexcept { return static_cast<bool>(reader_); }
-  [[nodiscard]] dds_entity_t reader() const noexcept { return reader_.get(); }
+  [[nodiscard]] explicit operator bool() const noexcept { return static_cast<bool>(from_); }
+  [[nodiscard]] dds_entity_t reader() const noexcept { return from_.reader.get(); }
   /// Those of its reader.
   [[nodiscard]] dds::HostWriters& writers() noexcept { return writers_; }
 
   /// Takes what has come.
   void update() {
-    if (!reader_) return;
+    if (!from_) return;
     dds::take_changes<Sample>(
-        reader_.get(), writers_,
+        from_.reader.get(), writers_,
         [this](dds_instance_handle_t handle, const Sample& sample) {
           ++changes_;
           if (!samples_.contains(handle)) forget_last_words(dds::text_of(sample.host));
@@ -110,8 +108,7 @@ class StatusCache {
     return sample.epoch == epoch && dds::text_of(sample.host) == host;
   }
 
-  dds::Entity topic_;
-  dds::Entity reader_;
+  dds::TopicReader from_;
   dds::HostWriters writers_;
   std::map<dds_instance_handle_t, Kept> samples_;
   std::uint64_t changes_ = 0;

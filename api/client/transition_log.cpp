@@ -6,9 +6,9 @@ namespace plchost {
 
 std::vector<TransitionView> TransitionLog::take() {
   std::vector<TransitionView> news;
-  if (!reader_) return news;
+  if (!from_) return news;
   const TimePoint now = MonotonicClock::now();
-  dds::take_valid_told<plc_Transition>(reader_.get(), writers_,
+  dds::take_valid_told<plc_Transition>(from_.reader.get(), writers_,
                                        [&](const plc_Transition& sample, const auto& /*info*/) {
                                          TransitionView view;
                                          if (!is_news(sample, now, view.missed)) return;

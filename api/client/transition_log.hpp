@@ -9,8 +9,8 @@
 #include <control.h>
 
 #include "api/client/newest_epoch.hpp"
-#include "api/dds/entity.hpp"
 #include "api/dds/host_writers.hpp"
+#include "api/dds/topics.hpp"
 
 namespace plchost {
 
@@ -25,11 +25,9 @@ struct TransitionView {
 class TransitionLog {
  public:
   TransitionLog() = default;
-  /// `reader` was made from `topic`.
-  TransitionLog(dds::Entity topic, dds::Entity reader) noexcept
-      : topic_(std::move(topic)), reader_(std::move(reader)) {}
+  explicit TransitionLog(dds::TopicReader from) noexcept : from_(std::move(from)) {}
 
-  [[nodiscard]] explicit operator bool() const noexcept { return static_cast<bool>(reader_); }
+  [[nodiscard]] explicit operator bool() const noexcept { return static_cast<bool>(from_); }
   /// The transitions since the last call.
   [[nodiscard]] std::vector<TransitionView> take();
   /// Whether everything has been taken that this instance's host had written when it wrote this status of it.
@@ -47,8 +45,7 @@ class TransitionLog {
   };
   [[nodiscard]] Seen& seen(const plc_Transition& sample);
 
-  dds::Entity topic_;
-  dds::Entity reader_;
+  dds::TopicReader from_;
   dds::HostWriters writers_;
   std::map<std::pair<std::string, std::string>, Seen> seen_;  // by host and instance
 };
