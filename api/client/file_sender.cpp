@@ -13,12 +13,10 @@ namespace plchost {
 Result<FileSender> FileSender::create(dds_entity_t participant, dds_entity_t topic, const std::string& host,
                                       std::span<const std::byte> contents) {
   FileSender sender;
-  auto publisher = dds::make_publisher(participant, dds::host_partition(host));
-  if (!publisher) return std::unexpected(publisher.error());
-  sender.publisher_ = std::move(*publisher);
-  auto writer = dds::make_writer(sender.publisher_.get(), topic, dds::qos_of(dds::kDownloadChunk));
-  if (!writer) return std::unexpected(writer.error());
-  sender.writer_ = std::move(*writer);
+  auto way =
+      dds::open_writer(participant, dds::host_partition(host), topic, dds::qos_of(dds::kDownloadChunk));
+  if (!way) return std::unexpected(std::move(way).error());
+  sender.way_ = *std::move(way);
   sender.host_ = host;
   sender.contents_ = contents;
   return sender;
@@ -38,7 +36,7 @@ void FileSender::on_ack(const plc_DownloadAck& ack, const plc_SampleIdentity& do
 }
 
 TimePoint FileSender::send(const plc_SampleIdentity& download, const plc_TimeLimit& limit, TimePoint now) {
-  if (epoch_.value() == 0 || !has_reader(writer_.get())) return now + kLook;
+  if (epoch_.value() == 0 || !has_reader(way_.writer.get())) return now + kLook;
   if (next_ > received_ && now - last_try_ >= kRepeat) {
     next_ = received_;
     last_try_ = now;
@@ -58,7 +56,7 @@ TimePoint FileSender::send(const plc_SampleIdentity& download, const plc_TimeLim
                       ._length = static_cast<std::uint32_t>(size),
                       ._buffer = bytes,
                       ._release = false};
-    if (dds_write(writer_.get(), &chunk) != DDS_RETCODE_OK) break;  // goes again as one that was lost
+    if (dds_write(way_.writer.get(), &chunk) != DDS_RETCODE_OK) break;  // goes again as one that was lost
     next_ += size;
   }
   return std::min(last_try_ + kRepeat, now + kRepeat);

@@ -8,8 +8,8 @@
 #include <control.h>
 
 #include "api/client/newest_epoch.hpp"
-#include "api/dds/entity.hpp"
 #include "api/dds/guid.hpp"
+#include "api/dds/topics.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
 
@@ -42,8 +42,7 @@ class FileSender {
  private:
   FileSender() = default;
 
-  dds::Entity publisher_;
-  dds::Entity writer_;
+  dds::PartitionWriter way_;  // to the host
   std::string host_;
   std::span<const std::byte> contents_;
   NewestEpoch epoch_;           // of the host's acknowledgements

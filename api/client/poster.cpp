@@ -27,13 +27,11 @@ template <class Sample>
 Result<Poster<Sample>> Poster<Sample>::create(dds_entity_t participant, dds_entity_t topic,
                                               const std::string& host) {
   Poster poster;
-  auto publisher = dds::make_publisher(participant, dds::host_partition(host));
-  if (!publisher) return std::unexpected(publisher.error());
-  poster.publisher_ = std::move(*publisher);
-  auto writer = dds::make_writer(poster.publisher_.get(), topic, dds::qos_of(dds::kTopicOf<Sample>));
-  if (!writer) return std::unexpected(writer.error());
-  poster.writer_ = std::move(*writer);
-  poster.source_ = dds::guid_of(poster.writer_.get());
+  auto way =
+      dds::open_writer(participant, dds::host_partition(host), topic, dds::qos_of(dds::kTopicOf<Sample>));
+  if (!way) return std::unexpected(std::move(way).error());
+  poster.way_ = *std::move(way);
+  poster.source_ = dds::guid_of(poster.way_.writer.get());
   poster.source_.copy_to(poster.sample_.source);
   dds::copy_text(poster.sample_.host, host);
   return poster;
@@ -43,7 +41,7 @@ template <class Sample>
 dds_return_t Poster<Sample>::write(std::uint64_t sequence) noexcept {
   sample_.sequence_number = sequence;
   sample_.base_sequence = unacknowledged_.empty() ? sequence : unacknowledged_.front().sequence;
-  return dds_write(writer_.get(), &sample_);
+  return dds_write(way_.writer.get(), &sample_);
 }
 
 template <class Sample>
@@ -143,7 +141,7 @@ TimePoint Poster<Sample>::repeat(TimePoint now) {
 
 template <class Sample>
 bool Poster<Sample>::has_met_server() noexcept {
-  if (!met_.look(writer_.get())) return false;
+  if (!met_.look(way_.writer.get())) return false;
   heard_ = false;
   return true;
 }

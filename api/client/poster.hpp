@@ -15,8 +15,8 @@
 #include "api/client/host_clock.hpp"
 #include "api/client/met_readers.hpp"
 #include "api/client/newest_epoch.hpp"
-#include "api/dds/entity.hpp"
 #include "api/dds/guid.hpp"
+#include "api/dds/topics.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
 
@@ -57,9 +57,9 @@ class Poster {
                                              const std::string& host);
 
   [[nodiscard]] const dds::Guid& source() const noexcept { return source_; }
-  [[nodiscard]] dds_entity_t writer() const noexcept { return writer_.get(); }
+  [[nodiscard]] dds_entity_t writer() const noexcept { return way_.writer.get(); }
   /// Whether the host's reader is there.
-  [[nodiscard]] bool matched() const noexcept { return has_reader(writer_.get()); }
+  [[nodiscard]] bool matched() const noexcept { return has_reader(way_.writer.get()); }
 
   /// How long posts are waited for, after the last progress, and the host's clock as it is known now: the
   /// host rejects a post that it comes to later. To be called before posts and whenever the clock may have
@@ -109,9 +109,8 @@ class Poster {
   bool has_met_server() noexcept;
   [[nodiscard]] Duration patience_until_repeated() const noexcept;
 
-  dds::Entity publisher_;
-  dds::Entity writer_;
-  Sample sample_{};  // all but numbers and events is set once
+  dds::PartitionWriter way_;  // to the host
+  Sample sample_{};           // all but numbers and events is set once
   dds::Guid source_;
   std::deque<Unacknowledged> unacknowledged_;
   std::size_t window_ = kWindow;

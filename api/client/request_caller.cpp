@@ -32,13 +32,11 @@ std::optional<ApiReply> take_reply(dds_entity_t reader, dds::HostWriters& writer
 Result<RequestCaller> RequestCaller::create(dds_entity_t participant, dds_entity_t topic,
                                             const std::string& host) {
   RequestCaller caller;
-  auto publisher = dds::make_publisher(participant, dds::host_partition(host));
-  if (!publisher) return std::unexpected(publisher.error());
-  caller.publisher_ = std::move(*publisher);
-  auto writer = dds::make_writer(caller.publisher_.get(), topic, dds::qos_of(dds::kOperatorRequest));
-  if (!writer) return std::unexpected(writer.error());
-  caller.writer_ = std::move(*writer);
-  caller.guid_ = dds::guid_of(caller.writer_.get());
+  auto way =
+      dds::open_writer(participant, dds::host_partition(host), topic, dds::qos_of(dds::kOperatorRequest));
+  if (!way) return std::unexpected(std::move(way).error());
+  caller.way_ = *std::move(way);
+  caller.guid_ = dds::guid_of(caller.way_.writer.get());
   return caller;
 }
 
@@ -68,10 +66,10 @@ Result<ApiReply> RequestCaller::call(const ApiRequest& request, dds_entity_t rep
       return *reply;
     }
     const HostClock* const host_clock = clock();
-    if (now >= next_write && host_clock != nullptr && has_reader(writer_.get())) {
+    if (now >= next_write && host_clock != nullptr && has_reader(way_.writer.get())) {
       sample.limit = host_clock->limit_at(wait.deadline);
       if (!written) asked_unix_ns = unix_time_ns();
-      (void)dds_write(writer_.get(), &sample);  // a refusal of DDS is mended by the repetition
+      (void)dds_write(way_.writer.get(), &sample);  // a refusal of DDS is mended by the repetition
       next_write = now + (written ? kRepeat : kFirstRepeat);
       written = true;
     }

@@ -9,9 +9,9 @@
 
 #include "api/client/host_clock.hpp"
 #include "api/client/wait_set.hpp"
-#include "api/dds/entity.hpp"
 #include "api/dds/guid.hpp"
 #include "api/dds/host_writers.hpp"
+#include "api/dds/topics.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
 
@@ -49,7 +49,7 @@ class RequestCaller {
 
   [[nodiscard]] static Result<RequestCaller> create(dds_entity_t participant, dds_entity_t topic,
                                                     const std::string& host);
-  [[nodiscard]] dds_entity_t writer() const noexcept { return writer_.get(); }
+  [[nodiscard]] dds_entity_t writer() const noexcept { return way_.writer.get(); }
   [[nodiscard]] const dds::Guid& guid() const noexcept { return guid_; }
 
   /// How long a call goes on waiting.
@@ -73,8 +73,7 @@ class RequestCaller {
  private:
   RequestCaller() = default;
 
-  dds::Entity publisher_;
-  dds::Entity writer_;
+  dds::PartitionWriter way_;  // to the host
   dds::Guid guid_;
   std::int64_t last_number_ = 0;
 };

@@ -97,4 +97,13 @@ Result<TopicReader> open_reader(dds_entity_t participant, dds_entity_t subscribe
   return TopicReader{.topic = *std::move(made), .reader = *std::move(reader)};
 }
 
+Result<PartitionWriter> open_writer(dds_entity_t participant, const std::string& partition,
+                                    dds_entity_t topic, const Qos& qos) {
+  auto publisher = make_publisher(participant, partition);
+  if (!publisher) return std::unexpected(std::move(publisher).error());
+  auto writer = make_writer(publisher->get(), topic, qos);
+  if (!writer) return std::unexpected(std::move(writer).error());
+  return PartitionWriter{.publisher = *std::move(publisher), .writer = *std::move(writer)};
+}
+
 }  // namespace plchost::dds

@@ -64,4 +64,12 @@ struct TopicReader {
 [[nodiscard]] Result<TopicReader> open_reader(dds_entity_t participant, dds_entity_t subscriber,
                                               const TopicInfo& topic, const Qos& qos);
 
+/// A writer with a publisher of its own, which carries the partition; it ends first.
+struct PartitionWriter {
+  Entity publisher;
+  Entity writer;
+};
+[[nodiscard]] Result<PartitionWriter> open_writer(dds_entity_t participant, const std::string& partition,
+                                                  dds_entity_t topic, const Qos& qos);
+
 }  // namespace plchost::dds

@@ -70,13 +70,11 @@ Result<void> BlockGateway::open_node() {
 
 Result<void> BlockGateway::open_topics(const WaitSet& wait_set) {
   auto subscriber = dds::make_subscriber(participant_, dds::block_partition(options_.host, dds::kAllHosts));
-  auto told = dds::make_publisher(participant_, dds::status_partition(options_.host));
   auto heard = dds::make_subscriber(participant_, dds::status_partition(dds::kAllHosts));
-  for (auto* const made : {&subscriber, &told, &heard}) {
+  for (auto* const made : {&subscriber, &heard}) {
     if (!*made) return std::unexpected(std::move(*made).error());
   }
   subscriber_ = *std::move(subscriber);
-  host_publisher_ = *std::move(told);
   host_subscriber_ = *std::move(heard);
   const auto open = [&](const dds::Entity& from, const dds::TopicInfo& topic, const dds::Qos& qos) {
     return open_reader(participant_, from.get(), topic, qos, wait_set);
@@ -90,8 +88,8 @@ Result<void> BlockGateway::open_topics(const WaitSet& wait_set) {
   hosts_ = *std::move(hosts);
   blocks_ = *std::move(blocks);
   acks_ = *std::move(acks);
-  auto writer =
-      dds::make_writer(host_publisher_.get(), hosts_.topic.get(), dds::qos_of(dds::kBlockHostStatus));
+  auto writer = dds::open_writer(participant_, dds::status_partition(options_.host), hosts_.topic.get(),
+                                 dds::qos_of(dds::kBlockHostStatus));
   if (!writer) return std::unexpected(std::move(writer).error());
   host_writer_ = *std::move(writer);
   return {};
@@ -215,7 +213,7 @@ void BlockGateway::write_acks() {
     ack.full_nodes[0] = (full & kLow).to_ullong();
     ack.full_nodes[1] = (full >> 64).to_ullong();
     // One that cannot be written now is with the next beat.
-    if (dds_write(peer->acks.get(), &ack) != DDS_RETCODE_OK) continue;
+    if (dds_write(peer->acks.writer.get(), &ack) != DDS_RETCODE_OK) continue;
     peer->has_news = false;
     peer->told_full = full;
   }

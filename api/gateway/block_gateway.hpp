@@ -64,9 +64,8 @@ class BlockGateway {
   /// Another host. The members that both threads use are guarded by mutex_.
   struct Peer {
     HostClaim claim;
-    dds::Entity publisher;
-    dds::Entity acks;
-    dds::Entity blocks;  // guarded
+    dds::PartitionWriter acks;
+    dds::Entity blocks;  // guarded; of the publisher of acks
     dds::Guid writer;
     BlockWindow window;    // guarded
     NodeSet full;          // guarded: takes no blocks for these
@@ -121,13 +120,12 @@ class BlockGateway {
   std::mutex mutex_;
   Peers peers_;  // changed by the serving thread, with the mutex
   dds::Entity subscriber_;
-  dds::Entity host_publisher_;
   dds::Entity host_subscriber_;
   dds::HostWriters host_writers_;
   dds::TopicReader hosts_;
   dds::TopicReader blocks_;
   dds::TopicReader acks_;
-  dds::Entity host_writer_;
+  dds::PartitionWriter host_writer_;
   std::unordered_map<dds_instance_handle_t, dds::Guid> writers_;  // a cache
   std::unique_ptr<BlockNode> node_;
   std::optional<NodeDirectory> directory_;  // to look at

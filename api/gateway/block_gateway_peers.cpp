@@ -86,7 +86,7 @@ void BlockGateway::settle_peers(TimePoint now) {
 
 Result<void> BlockGateway::open_block_writer(Peer& peer) const {
   // Never waits: how much may be under way is the business of BlockWindow.
-  auto writer = dds::make_writer(peer.publisher.get(), blocks_.topic.get(), dds::qos_of(dds::kBlock));
+  auto writer = dds::make_writer(peer.acks.publisher.get(), blocks_.topic.get(), dds::qos_of(dds::kBlock));
   if (!writer) return std::unexpected(std::move(writer).error());
   peer.blocks = *std::move(writer);
   peer.writer = dds::guid_of(peer.blocks.get());
@@ -96,10 +96,8 @@ Result<void> BlockGateway::open_block_writer(Peer& peer) const {
 Result<std::unique_ptr<BlockGateway::Peer>> BlockGateway::open_peer(const HostClaim& claim) const {
   auto peer = std::make_unique<Peer>();
   peer->claim = claim;
-  auto publisher = dds::make_publisher(participant_, dds::block_partition(claim.host, options_.host));
-  if (!publisher) return std::unexpected(std::move(publisher).error());
-  peer->publisher = *std::move(publisher);
-  auto acks = dds::make_writer(peer->publisher.get(), acks_.topic.get(), dds::qos_of(dds::kBlockAck));
+  auto acks = dds::open_writer(participant_, dds::block_partition(claim.host, options_.host),
+                               acks_.topic.get(), dds::qos_of(dds::kBlockAck));
   if (!acks) return std::unexpected(std::move(acks).error());
   peer->acks = *std::move(acks);
   if (auto opened = open_block_writer(*peer); !opened) return std::unexpected(std::move(opened).error());
@@ -216,7 +214,7 @@ void BlockGateway::announce() {
   }
   sample.nodes._buffer = named.data();
   sample.nodes._length = sample.nodes._maximum = static_cast<std::uint32_t>(named.size());
-  has_announced_ = dds_write(host_writer_.get(), &sample) == DDS_RETCODE_OK;
+  has_announced_ = dds_write(host_writer_.writer.get(), &sample) == DDS_RETCODE_OK;
   announced_ = std::move(nodes);
 }
 
