@@ -10,6 +10,7 @@
 #include "api/client/control_client.hpp"
 #include "api/dds/ended_participant.h"
 #include "api/dds/host_writers.hpp"
+#include "api/dds/sequence.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/told_keys.h"
 #include "shm/base/names.hpp"
@@ -92,8 +93,8 @@ std::optional<HostView> ControlClient::view_of(std::string_view name, const Seen
                 .ext = {},
                 .silent = now - seen.server.last() >= kSilent,
                 .contested = seen.others >= kMoreThanLastWords && now - seen.other_last <= kHostGone};
-  const auto& ext = view.status.ext;
-  view.ext.assign(ext._buffer, ext._buffer + ext._length);
+  const auto ext = dds::parts_of(view.status.ext);
+  view.ext.assign(ext.begin(), ext.end());
   view.status.ext = {};
   return view;
 }

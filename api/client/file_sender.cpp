@@ -5,6 +5,7 @@
 
 #include "api/client/met_readers.hpp"
 #include "api/dds/sample_identity.hpp"
+#include "api/dds/sequence.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"
 
@@ -50,12 +51,7 @@ TimePoint FileSender::send(const plc_SampleIdentity& download, const plc_TimeLim
     const auto size = std::min<std::uint64_t>(dds::kMaxChunk, end - next_);
     const auto piece = contents_.subspan(next_, size);
     chunk.offset = next_;
-    // DDS only reads it.
-    auto* const bytes = const_cast<std::uint8_t*>(reinterpret_cast<const std::uint8_t*>(piece.data()));
-    chunk.contents = {._maximum = static_cast<std::uint32_t>(size),
-                      ._length = static_cast<std::uint32_t>(size),
-                      ._buffer = bytes,
-                      ._release = false};
+    dds::lend_bytes(chunk.contents, piece);
     if (dds_write(way_.writer.get(), &chunk) != DDS_RETCODE_OK) break;  // goes again as one that was lost
     next_ += size;
   }

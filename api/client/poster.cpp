@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "api/dds/error.hpp"
+#include "api/dds/sequence.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"
 
@@ -17,8 +18,7 @@ void set_events(plc_EventPost& sample, std::span<plc_EventName> events) noexcept
 }
 
 void set_events(plc_EventBatch& sample, std::span<plc_EventName> events) noexcept {
-  const auto size = static_cast<std::uint32_t>(events.size());
-  sample.events = {._maximum = size, ._length = size, ._buffer = events.data(), ._release = false};
+  dds::lend(sample.events, events);
 }
 
 }  // namespace

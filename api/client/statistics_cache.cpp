@@ -1,9 +1,9 @@
 #include "api/client/statistics_cache.hpp"
 
 #include <algorithm>
-#include <iterator>
 
 #include "api/dds/host_writers.hpp"
+#include "api/dds/sequence.hpp"
 #include "api/dds/text.hpp"
 
 namespace plchost {
@@ -15,7 +15,8 @@ HistogramReport take_out(plc_DurationHistogram& sample) {
   HistogramReport report;
   report.total = sample.total;
   std::ranges::copy(sample.percentiles_ns, report.percentiles_ns.begin());
-  report.bars.assign(sample.bars._buffer, std::next(sample.bars._buffer, sample.bars._length));
+  const auto bars = dds::parts_of(sample.bars);
+  report.bars.assign(bars.begin(), bars.end());
   sample = {};
   return report;
 }

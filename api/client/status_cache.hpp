@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "api/dds/host_writers.hpp"
+#include "api/dds/sequence.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"
 
@@ -78,10 +79,9 @@ class StatusCache {
     void take(const Sample& from) {
       is_last_word = false;
       sample = from;
-      ext.assign(from.ext._buffer, from.ext._buffer + from.ext._length);
-      sample.ext = {};
-      sample.ext._length = sample.ext._maximum = static_cast<std::uint32_t>(ext.size());
-      sample.ext._buffer = ext.data();
+      const auto parts = dds::parts_of(from.ext);
+      ext.assign(parts.begin(), parts.end());
+      dds::lend(sample.ext, ext);
     }
   };
 

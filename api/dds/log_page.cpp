@@ -1,12 +1,12 @@
 #include "api/dds/log_page.hpp"
 
 #include <algorithm>
-#include <span>
 #include <string>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "api/dds/sequence.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/time.hpp"
@@ -81,8 +81,7 @@ LogPageSample::LogPageSample(const LogListing& listing) {
   page_.clock_unix_ns = listing.clock_unix_ns;
   page_.complete = listing.complete;
   page_.next_after = listing.next_after;
-  page_.records._buffer = records_.data();
-  page_.records._length = page_.records._maximum = static_cast<std::uint32_t>(records_.size());
+  dds::lend(page_.records, records_);
 }
 
 LogListing listing_of(const plc_LogPage& page) {
@@ -91,7 +90,7 @@ LogListing listing_of(const plc_LogPage& page) {
                      .complete = page.complete,
                      .next_after = page.next_after,
                      .records = {}};
-  for (const plc_LogRecord& record : std::span(page.records._buffer, page.records._length)) {
+  for (const plc_LogRecord& record : dds::parts_of(page.records)) {
     listing.records.push_back(record_of(record));
   }
   return listing;

@@ -1,11 +1,11 @@
 #include "api/dds/node_page.hpp"
 
 #include <algorithm>
-#include <span>
 #include <utility>
 
 #include <fmt/format.h>
 
+#include "api/dds/sequence.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
 
@@ -64,8 +64,7 @@ plc_NodeRecord sample_of(const ListedNode& listed, std::vector<plc_HostRange>& h
   for (const HostRange& range : info.record.hosts) {
     if (range.first != 0) hosts.push_back({.first = range.first, .last = range.last});
   }
-  sample.hosts._buffer = hosts.data();
-  sample.hosts._length = sample.hosts._maximum = static_cast<std::uint32_t>(hosts.size());
+  dds::lend(sample.hosts, hosts);
   return sample;
 }
 
@@ -79,9 +78,10 @@ ListedNode node_of(const plc_NodeRecord& sample) {
   record.generation = sample.generation;
   record.forwards = sample.forwards ? 1 : 0;
   record.queue_slots = sample.queue_slots;
-  const std::size_t ranges = std::min<std::size_t>(sample.hosts._length, kMaxHostRanges);
+  const auto hosts = dds::parts_of(sample.hosts);
+  const std::size_t ranges = std::min<std::size_t>(hosts.size(), kMaxHostRanges);
   for (std::size_t i = 0; i < ranges; ++i) {
-    record.hosts[i] = {.first = sample.hosts._buffer[i].first, .last = sample.hosts._buffer[i].last};
+    record.hosts[i] = {.first = hosts[i].first, .last = hosts[i].last};
   }
   copy_counters(listed.info, sample);
   return listed;
@@ -143,10 +143,8 @@ NodePageSample::NodePageSample(const NodeListing& listing) {
   page_.host_number = listing.host_number;
   page_.complete = listing.complete;
   page_.next_after = listing.next_after;
-  page_.nodes._buffer = nodes_.data();
-  page_.nodes._length = page_.nodes._maximum = static_cast<std::uint32_t>(nodes_.size());
-  page_.routes._buffer = routes_.data();
-  page_.routes._length = page_.routes._maximum = static_cast<std::uint32_t>(routes_.size());
+  dds::lend(page_.nodes, nodes_);
+  dds::lend(page_.routes, routes_);
 }
 
 NodeListing listing_of(const plc_NodePage& page) {
@@ -156,10 +154,10 @@ NodeListing listing_of(const plc_NodePage& page) {
                       .routes = {},
                       .complete = page.complete,
                       .next_after = page.next_after};
-  for (const plc_NodeRecord& node : std::span(page.nodes._buffer, page.nodes._length)) {
+  for (const plc_NodeRecord& node : dds::parts_of(page.nodes)) {
     listing.nodes.push_back(node_of(node));
   }
-  for (const plc_RouteRecord& route : std::span(page.routes._buffer, page.routes._length)) {
+  for (const plc_RouteRecord& route : dds::parts_of(page.routes)) {
     listing.routes.push_back(route_of(route));
   }
   return listing;

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <functional>
-#include <span>
 
 #include <fmt/format.h>
 
+#include "api/dds/sequence.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/names.hpp"
 
@@ -80,8 +80,7 @@ ListedObject object_of(const plc_ObjectRecord& record) {
                  .made_unix_ns = record.made_unix_ns,
                  .references = {},
                  .reference_count = record.reference_count};
-  for (const plc_ObjectReference& reference :
-       std::span(record.references._buffer, record.references._length)) {
+  for (const plc_ObjectReference& reference : dds::parts_of(record.references)) {
     listed.info.references.push_back({.pid = static_cast<std::uint32_t>(reference.pid),
                                       .program = std::string(dds::text_of(reference.program)),
                                       .writable = reference.writable,
@@ -97,20 +96,17 @@ ObjectPageSample::ObjectPageSample(const ObjectListing& listing) {
   for (std::size_t i = 0; i < records_.size(); ++i) {
     fill(records_[i], listing.objects[i]);
     auto& references = references_.emplace_back(samples_of(listing.objects[i].info.references));
-    records_[i].references._buffer = references.data();
-    records_[i].references._length = records_[i].references._maximum =
-        static_cast<std::uint32_t>(references.size());
+    dds::lend(records_[i].references, references);
   }
   page_.complete = listing.complete;
   dds::copy_text(page_.next_after, listing.next_after);
-  page_.objects._buffer = records_.data();
-  page_.objects._length = page_.objects._maximum = static_cast<std::uint32_t>(records_.size());
+  dds::lend(page_.objects, records_);
 }
 
 ObjectListing listing_of(const plc_ObjectPage& page) {
   ObjectListing listing{
       .objects = {}, .complete = page.complete, .next_after = std::string(dds::text_of(page.next_after))};
-  for (const plc_ObjectRecord& record : std::span(page.objects._buffer, page.objects._length)) {
+  for (const plc_ObjectRecord& record : dds::parts_of(page.objects)) {
     listing.objects.push_back(object_of(record));
   }
   return listing;

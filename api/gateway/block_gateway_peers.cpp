@@ -1,11 +1,11 @@
 // Which other hosts there are: see block_gateway.hpp.
 #include <algorithm>
-#include <span>
 
 #include <fmt/format.h>
 
 #include "api/client/met_readers.hpp"
 #include "api/dds/samples.hpp"
+#include "api/dds/sequence.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"
 #include "api/gateway/block_gateway.hpp"
@@ -42,7 +42,7 @@ void BlockGateway::follow(const plc_BlockHostStatus& host, const dds_sample_info
                  now);
   auto& names = names_[name];
   names.clear();
-  for (const plc_BlockNode& node : std::span(host.nodes._buffer, host.nodes._length)) {
+  for (const plc_BlockNode& node : dds::parts_of(host.nodes)) {
     names.emplace_back(node.node, dds::text_of(node.name));
   }
 }
@@ -212,8 +212,7 @@ void BlockGateway::announce() {
     named[i].node = nodes[i].first;
     dds::copy_text(named[i].name, nodes[i].second);
   }
-  sample.nodes._buffer = named.data();
-  sample.nodes._length = sample.nodes._maximum = static_cast<std::uint32_t>(named.size());
+  dds::lend(sample.nodes, named);
   has_announced_ = dds_write(host_writer_.writer.get(), &sample) == DDS_RETCODE_OK;
   announced_ = std::move(nodes);
 }

@@ -1,5 +1,7 @@
 #include "api/gateway/block_sample.hpp"
 
+#include "api/dds/sequence.hpp"
+
 namespace plchost {
 
 plc_Block block_sample(const BlockHeader& header, std::span<const std::byte> contents,
@@ -19,9 +21,7 @@ plc_Block block_sample(const BlockHeader& header, std::span<const std::byte> con
   sample.kind = header.kind;
   sample.priority = header.priority;
   sample.hosts = header.hosts;
-  // DDS only reads it; its generated types know no const.
-  sample.contents._buffer = const_cast<std::uint8_t*>(reinterpret_cast<const std::uint8_t*>(contents.data()));
-  sample.contents._length = sample.contents._maximum = static_cast<std::uint32_t>(contents.size());
+  dds::lend_bytes(sample.contents, contents);
   return sample;
 }
 
@@ -47,7 +47,7 @@ std::optional<BlockHeader> block_header(const plc_Block& sample, std::uint16_t f
 }
 
 std::span<const std::byte> block_contents(const plc_Block& sample) noexcept {
-  return std::as_bytes(std::span(sample.contents._buffer, sample.contents._length));
+  return std::as_bytes(dds::parts_of(sample.contents));
 }
 
 }  // namespace plchost

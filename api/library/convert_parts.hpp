@@ -7,13 +7,14 @@
 #include <cstdint>
 #include <iterator>
 #include <ranges>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+
+#include "api/dds/sequence.hpp"
 
 namespace plchost {
 
@@ -48,8 +49,7 @@ template <std::size_t N>
 template <class Sequence, class Convert>
 [[nodiscard]] auto all_public(const Sequence& sequence, Convert convert) {
   std::vector<decltype(convert(*sequence._buffer))> made;
-  const std::span parts(sequence._buffer, sequence._length);
-  std::ranges::transform(parts, std::back_inserter(made), convert);
+  std::ranges::transform(dds::parts_of(sequence), std::back_inserter(made), convert);
   return made;
 }
 

@@ -4,7 +4,6 @@
 #include <array>
 #include <concepts>
 #include <deque>
-#include <span>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -17,6 +16,7 @@
 
 #include "api/cli/rows/computed_fields.hpp"
 #include "api/cli/rows/rows.hpp"
+#include "api/dds/sequence.hpp"
 
 namespace plchost {
 
@@ -69,7 +69,7 @@ template <class Sample, class... Context>
   dds::visit_row(sample, computed, [&](const dds::FieldInfo& field, const auto& value) {
     status_rows::add(row, field, value);
   });
-  add_extension(row, std::span(sample.ext._buffer, sample.ext._length));
+  add_extension(row, dds::parts_of(sample.ext));
   return row;
 }
 

@@ -11,6 +11,7 @@
 
 #include "api/control/application_order.hpp"
 #include "api/dds/sample_identity.hpp"
+#include "api/dds/sequence.hpp"
 
 namespace plchost {
 
@@ -95,7 +96,7 @@ void DownloadTable::take(const plc_DownloadChunk& chunk, const dds::Guid& client
 }
 
 void DownloadTable::write(Download& download, const plc_DownloadChunk& chunk) {
-  auto bytes = std::as_bytes(std::span(chunk.contents._buffer, chunk.contents._length));
+  auto bytes = std::as_bytes(dds::parts_of(chunk.contents));
   while (!bytes.empty()) {
     const ssize_t written =
         ::pwrite(download.file.get(), bytes.data(), bytes.size(), static_cast<off_t>(download.received));

@@ -1,12 +1,12 @@
 #include "api/server/posts/event_intake.hpp"
 
 #include <algorithm>
-#include <span>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "api/dds/samples.hpp"
+#include "api/dds/sequence.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/time_limit.hpp"
 #include "api/dds/topics.hpp"
@@ -35,7 +35,7 @@ void for_each_event(const plc_EventPost& post, Use use) {
 }
 template <class Use>
 void for_each_event(const plc_EventBatch& batch, Use use) {
-  for (const plc_EventName& name : std::span(batch.events._buffer, batch.events._length)) {
+  for (const plc_EventName& name : dds::parts_of(batch.events)) {
     use(text_of(name.instance), text_of(name.event));
   }
 }

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <span>
 
 #include "api/dds/instances.hpp"
+#include "api/dds/sequence.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/histogram_digest.hpp"
 
@@ -32,10 +34,7 @@ class Histogram {
     sample.total = digest_.total();
     static_assert(std::extent_v<decltype(sample.percentiles_ns)> == HistogramDigest::kFractions.size());
     std::ranges::transform(digest_.percentiles(), std::begin(sample.percentiles_ns), &Duration::count);
-    sample.bars._maximum = static_cast<std::uint32_t>(bars_.size());
-    sample.bars._length = static_cast<std::uint32_t>(digest_.bars().size());
-    sample.bars._buffer = bars_.data();
-    sample.bars._release = false;
+    dds::lend(sample.bars, std::span(bars_).first(digest_.bars().size()));
   }
   [[nodiscard]] const HistogramDigest& digest() const noexcept { return digest_; }
 
