@@ -22,11 +22,15 @@ std::string unasked(const ExitStatus& status) {
 void ManagedInstance::on_exit(const ExitStatus& status) {
   status_.pid = 0;
   status_.core = -1;
+  const bool guessed = unheard_ && !unreadable_.empty();
   forget_signs();
   host_.set_timer(std::nullopt);
   if (phase_ == Phase::ending) return asked_end();
   if (phase_ == Phase::setting_up) return set_up_ended(status);
   if (phase_ != Phase::up && phase_ != Phase::adopting) return;
+  if (guessed) {
+    return ended({.cause = EndCause::wish_unreadable}, text_of_beginning(EndCause::wish_unreadable));
+  }
   if (phase_ == Phase::up) start_kind_ = StartKind::after_fault;
   ended({.cause = cause_of(status),
          .lasted = phase_ == Phase::up ? surroundings_.now() - up_since_ : Duration::zero()},

@@ -39,7 +39,9 @@ namespace plchost {
 //   setting_up   a process of this manager sets itself up. Limit: 30 s, then SIGKILL. Time in which other
 //                programs keep it from its processor does not count.
 //   adopting     a process that outlived its manager was asked for its status. Limit: 5 s; then it counts as
-//                up with a problem text, because a manager stops no PLC for being unable to talk to it.
+//                up with a problem text if it has a status page, because a manager stops no PLC for being unable
+//                to talk to it. Without a page it is asked again every 2 s. If it was up before, or its set-up
+//                would be over, it counts as up, in exception, until it answers.
 //   up           the process answers, or is believed to. The process itself reports its state.
 //   ending       the process was asked to end. Limit: 38 s (a stop may take 10 s and 25 s), then SIGTERM, 2 s,
 //                SIGKILL. An adopted process may be in this phase already.

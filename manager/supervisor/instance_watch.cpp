@@ -33,6 +33,8 @@ void ManagedInstance::forget_signs() {
   asked_number_ = 0;
   answers_ = 0;
   said_.reset();
+  unheard_ = false;
+  unadopted_.clear();
   starvation_.forget();
   starved_by_.clear();
   step_ = SetupStep::bind_core;
@@ -87,10 +89,14 @@ bool ManagedInstance::hear(const ControlReply& reply) {
   if (reply.code != ErrorCode::ok || !report || report->pid != status_.pid) return false;
   ++signs_;
   heard_of_ = true;
-  if (reply.number == asked_number_) asked_number_ = 0;
-  // A process that was only busy answers once before the heartbeats in its page resume.
+  // A process that was only busy answers all questions in a row before the heartbeats in its page resume: the
+  // last one counts, and is not enough.
+  if (reply.number == asked_number_) {
+    asked_number_ = 0;
+    ++answers_;
+  }
   constexpr int kAnswers = 2;
-  if (++answers_ >= kAnswers && phase_ == Phase::up && !page_damaged_) {
+  if (answers_ >= kAnswers && phase_ == Phase::up && !page_damaged_) {
     page_damaged_ = true;
     spdlog::warn(
         "instance {}: its status page does not tell what it says itself: another program has damaged "
@@ -132,6 +138,7 @@ void ManagedInstance::tell_starvation() {
                       : taker + " has it now");
   }
   if (phase_ == Phase::setting_up) set_state(phase_, status_.state, starved_by_);
+  if (phase_ == Phase::adopting) tell_adoption();
   const bool excepted = silent_ || status_.state == InstanceState::exception;
   if (phase_ == Phase::up && !excepted) set_state(phase_, status_.state, problem_when_up());
 }
@@ -173,13 +180,16 @@ void ManagedInstance::fall_silent(std::string_view known) {
                   fault, fault.empty() ? "" : "; ",
                   std::chrono::duration_cast<std::chrono::seconds>(HeartbeatWatch::kLimit).count()));
   carry_out(decided({.cause = EndCause::silent, .order = order()}), std::string(status_.problem.view()));
-  if (!operation_ || operation_->step != Step::forwarded) return;
+  if (!operation_) return;
+  if (operation_->step == Step::until_up) return carry_out(operation_->request.verb);
+  if (operation_->step != Step::forwarded) return;
   host_.set_timer(std::nullopt);
   finish(ErrorCode::timed_out, fmt::format("it is in exception now: {}; reset it", status_.problem.view()));
 }
 
 // It was kept from answering, and has missed nothing: its report holds again.
 void ManagedInstance::answers_again() {
+  if (unheard_ && said_) learn(*said_);
   if (history_.safe_mode) {
     set_state(Phase::up, InstanceState::safe_mode, problem_when_up());
   } else if (said_) {

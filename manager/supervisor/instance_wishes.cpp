@@ -210,6 +210,7 @@ InstanceWish ManagedInstance::wish() const {
   for (const TimePoint crash : history_.crashes) wish.crashes_unix_ns.push_back(unix_of(crash));
   if (status_.pid == 0) return wish;
   wish.process = phase_ == Phase::setting_up ? InstanceWish::Process::setting_up
+                 : phase_ == Phase::adopting ? adopted_as_
                  : phase_ == Phase::ending   ? InstanceWish::Process::ending
                                              : InstanceWish::Process::up;
   return wish;
@@ -217,7 +218,7 @@ InstanceWish ManagedInstance::wish() const {
 
 void ManagedInstance::remember() {
   if (!unreadable_.empty()) return;  // it stays as it is until an operator says what is to be
-  if (phase_ == Phase::adopting && !wish_known_ && !commanded_) return;  // until the process has answered
+  if (unheard_ && !wish_known_ && !commanded_) return;  // until the process has answered
   InstanceWish now = wish();
   if (shutting_down_) {  // in order: that all processes end is nobody's wish
     if (!kept_) return;

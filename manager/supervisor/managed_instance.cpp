@@ -14,23 +14,6 @@ namespace plchost {
 
 namespace {
 
-// The application's state, as the world is told of its instance.
-InstanceState shown_state(const InstanceRuntime& runtime) noexcept {
-  switch (runtime.state) {
-    case ApplicationState::running:
-    case ApplicationState::single_cycle:
-      return InstanceState::running;
-    case ApplicationState::stopping:
-      return InstanceState::stopping;
-    case ApplicationState::exception:
-      return InstanceState::exception;
-    case ApplicationState::none:
-    case ApplicationState::stopped:
-      break;
-  }
-  return InstanceState::stopped;
-}
-
 InstancePlan plan_of(const InstanceConfig& config) {
   InstancePlan plan{.restart = config.restart,
                     .crash_limit = config.crash_limit,
@@ -61,33 +44,6 @@ ManagedInstance::ManagedInstance(const InstanceConfig& config, Surroundings surr
   status_.scheduler.assign(scheduler_);
   status_.application.assign(application_);
   status_.plan = plan_of(config_);
-}
-
-bool ManagedInstance::adopt() {
-  const auto pid = host_.adopt();
-  if (!pid) return false;
-  if (application_ != config_.application) tell_boot_application();
-  status_.pid = *pid;
-  adopt_until_.reset();
-  log_level_.clear();
-  unreadable_.clear();
-  if (earlier_ &&
-      std::exchange(earlier_->process, InstanceWish::Process::none) == InstanceWish::Process::ending) {
-    next_ = wants_running_ ? Next::run : Next::stay_stopped;
-    ending_ = Ending::asked;
-    host_.set_timer(after(kShutdownLimit));
-    set_state(Phase::ending, InstanceState::stopping, "");
-    return true;
-  }
-  set_state(Phase::adopting, InstanceState::starting, "is being adopted");
-  const auto number = send(ControlVerb::status);
-  if (!number) {
-    finish_adoption(number.error().describe());
-    return true;
-  }
-  awaited_number_ = *number;
-  host_.set_timer(after(kAdoptLimit));
-  return true;
 }
 
 void ManagedInstance::hold(const std::string& why) {
@@ -128,9 +84,9 @@ void ManagedInstance::on_report(const SetupReport& report) {
 void ManagedInstance::on_reply(const ControlReply& reply) {
   if (operation_ && operation_->step == Step::forwarded && reply.number == operation_->forwarded_number) {
     finish_forwarded(reply);
-  } else if (phase_ == Phase::adopting && reply.number == awaited_number_) {
-    (void)hear(reply);
-    finish_adoption("");
+  } else if (phase_ == Phase::adopting) {
+    const bool awaited = reply.number == asked_number_;
+    if (hear(reply) || awaited) finish_adoption("");
   } else {
     (void)hear(reply);  // or an answer that came too late
   }
@@ -188,34 +144,6 @@ std::string ManagedInstance::problem_when_up() {
   return problem;
 }
 
-void ManagedInstance::finish_adoption(const std::string& problem) {
-  auto runtime = host_.runtime();
-  if (!runtime || runtime->pid != status_.pid) runtime = said_;
-  const bool known = runtime.has_value();
-  if (known) {
-    if (!wish_known_ && !commanded_) {
-      wants_running_ = runtime->running != 0;
-      // As an operator's stop: the next manager starts no machine that was found stopped.
-      commanded_ = runtime->state == ApplicationState::stopped;
-    }
-    if (!runtime->scheduler.view().empty()) scheduler_ = runtime->scheduler.view();
-    history_.safe_mode = runtime->application.view().empty() && !application_.empty();
-    if (!history_.safe_mode) application_ = runtime->application.view();
-  }
-  begins_running_ = known ? runtime->running != 0 : wants_running_;
-  come_up();
-  if (known && !history_.safe_mode && shown_state(*runtime) != status_.state) show_application(*runtime);
-  std::string text(status_.problem.view());
-  const auto add = [&](std::string_view more) { text += (text.empty() ? "" : "; ") + std::string(more); };
-  if (!problem.empty()) {
-    add("adopted, but it does not answer on its control socket: " + problem);
-    carry_out(decided({.cause = EndCause::adoption_unanswered, .order = order()}), text);
-  }
-  if (!known) add("adopted, but it has no status page yet");
-  if (text != status_.problem.view()) set_state(phase_, status_.state, text);
-  spdlog::info("instance {}: adopted process {}", config_.name, status_.pid);
-}
-
 void ManagedInstance::on_timer() {
   switch (phase_) {
     case Phase::backing_off:
@@ -226,7 +154,7 @@ void ManagedInstance::on_timer() {
     case Phase::setting_up:
       return set_up_timed_out();
     case Phase::adopting:
-      return finish_adoption("no answer");
+      return adoption_timed_out();
     case Phase::up:
       if (operation_ && operation_->step == Step::forwarded) {
         const Duration limit =
@@ -350,6 +278,7 @@ void ManagedInstance::refresh() {
     if (decision.action != Decision::Action::leave) return;
   }
   if (phase_ == Phase::setting_up) watch_set_up();
+  if (phase_ == Phase::adopting) watch_adoption();
   if (phase_ != Phase::up) return;
   const auto runtime = watch_process();
   if (!runtime || operation_ || silent_) return;
@@ -364,6 +293,23 @@ void ManagedInstance::refresh() {
   if (!history_.safe_mode) application_ = runtime->application.view();
   if (same_state) return publish();
   show_application(*runtime);
+}
+
+// The application's state, as the world is told of its instance.
+InstanceState ManagedInstance::shown_state(const InstanceRuntime& runtime) noexcept {
+  switch (runtime.state) {
+    case ApplicationState::running:
+    case ApplicationState::single_cycle:
+      return InstanceState::running;
+    case ApplicationState::stopping:
+      return InstanceState::stopping;
+    case ApplicationState::exception:
+      return InstanceState::exception;
+    case ApplicationState::none:
+    case ApplicationState::stopped:
+      break;
+  }
+  return InstanceState::stopped;
 }
 
 void ManagedInstance::show_application(const InstanceRuntime& runtime) {

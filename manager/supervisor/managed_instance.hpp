@@ -247,6 +247,16 @@ class ManagedInstance : public InstanceEvents {
   void tell_problems();
   void forget_signs();
 
+  // A process that an earlier manager has made: instance_adoption.cpp
+  /// `problem`: why it has not answered; empty: it has.
+  void finish_adoption(const std::string& problem);
+  void wait_for_sign(const std::string& problem);
+  void tell_adoption();
+  void watch_adoption();
+  void adoption_timed_out();
+  /// The report of the process replaces the assumptions about it.
+  void learn(const InstanceRuntime& said);
+
   // Life: managed_instance.cpp
   void fresh_process(Next next, StartKind kind);
   void spawn(Next next);
@@ -255,7 +265,7 @@ class ManagedInstance : public InstanceEvents {
   Next in_time(Next next);
   void set_up_failed(const std::string& why);
   void come_up();
-  void finish_adoption(const std::string& problem);
+  [[nodiscard]] static InstanceState shown_state(const InstanceRuntime& runtime) noexcept;
   void show_application(const InstanceRuntime& runtime);
   // Ends: instance_ends.cpp
   void set_up_ended(const ExitStatus& status);
@@ -334,7 +344,9 @@ class ManagedInstance : public InstanceEvents {
   std::string said_scheduler_;  // by this process
   std::string log_level_;       // that this process was given; empty: by an earlier manager
   std::uint64_t next_number_ = 1;
-  std::uint64_t awaited_number_ = 0;  // of the reply in adopting
+  InstanceWish::Process adopted_as_ = InstanceWish::Process::none;  // by the manager before
+  bool unheard_ = false;   // adopted, and it has said nothing of itself yet
+  std::string unadopted_;  // why it is still being adopted after its limit, for the problem text
   std::optional<Operation> operation_;
   std::int64_t unix_offset_ns_ = 0;       // of the manager's time, taken once
   std::optional<InstanceWish> earlier_;   // as the manager before left it

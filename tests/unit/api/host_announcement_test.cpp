@@ -1,4 +1,4 @@
-// What a secured host may announce: its own name, in its own partitions, under its own identity.
+// The announcements of a secured host: its own name, in its own partitions, under its own identity.
 #include <string>
 #include <string_view>
 #include <vector>

@@ -125,6 +125,9 @@ TEST_F(SupervisorTest, LeavesAloneWhatShallNotStartByItself) {
 TEST_F(SupervisorTest, CountsWhatWasAdoptedAsUp) {
   make();
   hosts_["drive1"]->adoptable = 5;
+  InstanceRuntime& page = hosts_["drive1"]->page.emplace();
+  page.pid = 5;
+  page.application.assign("/opt/drive.so");
   sut_->start();
   EXPECT_EQ(state("line1"), InstanceState::waiting);
   instance("drive1").on_reply(
