@@ -97,6 +97,14 @@ Result<TopicReader> open_reader(dds_entity_t participant, dds_entity_t subscribe
   return TopicReader{.topic = *std::move(made), .reader = *std::move(reader)};
 }
 
+Result<TopicWriter> open_writer(dds_entity_t participant, dds_entity_t publisher, const TopicInfo& topic) {
+  auto made = make_topic(participant, topic);
+  if (!made) return std::unexpected(std::move(made).error());
+  auto writer = make_writer(publisher, made->get(), qos_of(topic));
+  if (!writer) return std::unexpected(std::move(writer).error());
+  return TopicWriter{.topic = *std::move(made), .writer = *std::move(writer)};
+}
+
 Result<PartitionWriter> open_writer(dds_entity_t participant, const std::string& partition,
                                     dds_entity_t topic, const Qos& qos) {
   auto publisher = make_publisher(participant, partition);

@@ -64,6 +64,14 @@ struct TopicReader {
 [[nodiscard]] Result<TopicReader> open_reader(dds_entity_t participant, dds_entity_t subscriber,
                                               const TopicInfo& topic, const Qos& qos);
 
+/// A topic and a writer of it, which ends first.
+struct TopicWriter {
+  Entity topic;
+  Entity writer;
+};
+[[nodiscard]] Result<TopicWriter> open_writer(dds_entity_t participant, dds_entity_t publisher,
+                                              const TopicInfo& topic);
+
 /// A writer with a publisher of its own, which carries the partition; it ends first.
 struct PartitionWriter {
   Entity publisher;

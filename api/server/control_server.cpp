@@ -66,10 +66,10 @@ ControlServer::ControlServer(std::unique_ptr<Parts> parts) noexcept : parts_(std
 
 ControlServer::~ControlServer() {
   // No listener may run while its objects are taken apart.
-  for (auto& request : parts_->requests) request.reader.reset();
-  parts_->event_reader.reset();
-  parts_->batch_reader.reset();
-  parts_->chunk_reader.reset();
+  for (auto& request : parts_->requests) request.from.reader.reset();
+  parts_->event_posts.reader.reset();
+  parts_->event_batches.reader.reset();
+  parts_->chunks.reader.reset();
   parts_->name.reset();
   if (parts_->sessions) {
     for (const dds_entity_t reader : parts_->sessions->discovery_readers()) dds_set_listener(reader, nullptr);
@@ -163,7 +163,7 @@ Result<bool> ControlServer::Parts::dispatch(int fd) {
     if (options.beat_fd >= 0) raise_event(options.beat_fd);
   } else if (fd == identity_timer.get()) {
     tell_of_refused(MonotonicClock::now());
-    (void)plc_forget_told_keys(event_reader.get());
+    (void)plc_forget_told_keys(event_posts.reader.get());
     // First those that have just come again, else their addresses would be forgotten.
     heap.worked(sessions->follow_discovery(), MonotonicClock::now());
     (void)announcements.forget_gone(sessions->participants());
@@ -268,7 +268,7 @@ void ControlServer::Parts::look_at_runs() {
 // So many at a time: a flood of requests shall not keep acknowledgements and the presence waiting.
 void ControlServer::Parts::on_requests(const RequestReader& source) {
   constexpr std::size_t kAtOnce = 16;
-  const dds::Samples<plc_Request, kAtOnce> batch(source.reader.get());
+  const dds::Samples<plc_Request, kAtOnce> batch(source.from.reader.get());
   heap.worked(batch.size(), MonotonicClock::now());
   for (std::size_t i = 0; i < batch.size(); ++i) {
     if (batch.valid(i)) on_request(source, batch[i], batch.info(i));
@@ -278,7 +278,7 @@ void ControlServer::Parts::on_requests(const RequestReader& source) {
 
 void ControlServer::Parts::on_request(const RequestReader& source, const plc_Request& request,
                                       const dds_sample_info_t& info) {
-  const dds::Guid writer = dds::writer_of(source.reader.get(), info);
+  const dds::Guid writer = dds::writer_of(source.from.reader.get(), info);
   // Gone meanwhile, or pretending to be another: nobody to answer.
   if (writer == dds::Guid{}) return;
   const dds::Guid client = writer.participant();

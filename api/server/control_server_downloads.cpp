@@ -34,7 +34,7 @@ void ControlServer::Parts::begin_download(const dds::Guid& client, const plc_Sam
 // At most a batch at a time: others want this thread, too.
 void ControlServer::Parts::on_chunks() {
   constexpr std::size_t kAtOnce = 16;
-  const dds_entity_t reader = chunk_reader.get();
+  const dds_entity_t reader = chunks.reader.get();
   const TimePoint now = MonotonicClock::now();
   {
     const dds::Samples<plc_DownloadChunk, kAtOnce> batch(reader);

@@ -12,6 +12,7 @@
 
 #include "api/dds/announcements.hpp"
 #include "api/dds/entity.hpp"
+#include "api/dds/topics.hpp"
 #include "api/gateway/gateway_thread.hpp"
 #include "api/server/access/access_guard.hpp"
 #include "api/server/access/identity_watch.hpp"
@@ -38,8 +39,7 @@ namespace plchost {
 struct ControlServer::Parts {
   struct RequestReader {
     ApiRole role = ApiRole::operating;
-    dds::Entity topic;
-    dds::Entity reader;
+    dds::TopicReader from = {};
   };
 
   Parts(ServerOptions given, ObjectPool attached, std::uint64_t started)
@@ -160,12 +160,9 @@ struct ControlServer::Parts {
   std::optional<RequestAudit> audit;
   std::optional<StatusPublisher> status;
   dds::Entity subscriber;
-  dds::Entity event_topic;
-  dds::Entity event_reader;
-  dds::Entity batch_topic;
-  dds::Entity batch_reader;
-  dds::Entity chunk_topic;
-  dds::Entity chunk_reader;
+  dds::TopicReader event_posts;
+  dds::TopicReader event_batches;
+  dds::TopicReader chunks;
   DownloadTable downloads;
   RunWatch runs;
   std::array<RequestReader, 2> requests;

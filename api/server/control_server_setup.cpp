@@ -212,22 +212,19 @@ Result<void> ControlServer::Parts::make_readers() {
   auto made_subscriber = dds::make_subscriber(participant.get(), dds::host_partition(options.host));
   if (!made_subscriber) return std::unexpected(made_subscriber.error());
   subscriber = std::move(*made_subscriber);
-  const auto make = [&](const dds::TopicInfo& info, dds::Entity& topic, dds::Entity& reader) -> Result<void> {
-    auto made_topic = dds::make_topic(participant.get(), info);
-    if (!made_topic) return std::unexpected(made_topic.error());
-    topic = std::move(*made_topic);
-    auto made_reader = dds::make_reader(subscriber.get(), topic.get(), dds::bounded_qos(info));
-    if (!made_reader) return std::unexpected(made_reader.error());
-    reader = std::move(*made_reader);
+  const auto open = [&](const dds::TopicInfo& info, dds::TopicReader& from) -> Result<void> {
+    auto opened = dds::open_reader(participant.get(), subscriber.get(), info, dds::bounded_qos(info));
+    if (!opened) return std::unexpected(std::move(opened).error());
+    from = *std::move(opened);
     return {};
   };
   requests[0].role = ApiRole::operating;
   requests[1].role = ApiRole::engineering;
-  if (auto made = make(dds::kDownloadChunk, chunk_topic, chunk_reader); !made) return made;
-  if (auto made = make(dds::kEventPost, event_topic, event_reader); !made) return made;
-  if (auto made = make(dds::kEventBatch, batch_topic, batch_reader); !made) return made;
-  if (auto made = make(dds::kOperatorRequest, requests[0].topic, requests[0].reader); !made) return made;
-  return make(dds::kEngineerRequest, requests[1].topic, requests[1].reader);
+  if (auto made = open(dds::kDownloadChunk, chunks); !made) return made;
+  if (auto made = open(dds::kEventPost, event_posts); !made) return made;
+  if (auto made = open(dds::kEventBatch, event_batches); !made) return made;
+  if (auto made = open(dds::kOperatorRequest, requests[0].from); !made) return made;
+  return open(dds::kEngineerRequest, requests[1].from);
 }
 
 Result<void> ControlServer::Parts::listen() {
@@ -243,14 +240,14 @@ Result<void> ControlServer::Parts::listen() {
   }
   if (auto done = set(name->reader(), on_wake_listener); !done) return done;
   for (const RequestReader& request : requests) {
-    if (auto done = set(request.reader.get(), on_wake_listener); !done) return done;
+    if (auto done = set(request.from.reader.get(), on_wake_listener); !done) return done;
   }
-  if (auto done = set(chunk_reader.get(), on_wake_listener); !done) return done;
-  if (auto done = set(event_reader.get(), on_event_post); !done) return done;
-  if (auto done = set(batch_reader.get(), on_event_batch); !done) return done;
+  if (auto done = set(chunks.reader.get(), on_wake_listener); !done) return done;
+  if (auto done = set(event_posts.reader.get(), on_event_post); !done) return done;
+  if (auto done = set(event_batches.reader.get(), on_event_batch); !done) return done;
   // A sample that came before the listener was there does not call it.
-  on_event_post(event_reader.get(), this);
-  on_event_batch(batch_reader.get(), this);
+  on_event_post(event_posts.reader.get(), this);
+  on_event_batch(event_batches.reader.get(), this);
   raise_event(wake.get());
   return {};
 }

@@ -68,26 +68,16 @@ Result<NameClaim> NameClaim::create(dds_entity_t participant, const Options& opt
       .place = place_of(options.run_directory),
       .machine = fmt::format("{}, process {}, {}", machine_name(), ::getpid(), options.run_directory)};
   const std::string partition = dds::name_partition(options.host);
-  const auto keep = [](Result<dds::Entity> made, dds::Entity& entity) -> Result<void> {
-    if (!made) return failure_in("claim the host's name", made.error());
-    entity = *std::move(made);
-    return {};
-  };
-  if (auto done = keep(dds::make_topic(participant, dds::kNameClaim), claim.topic_); !done)
-    return std::unexpected(done.error());
-  if (auto done = keep(dds::make_publisher(participant, partition), claim.publisher_); !done)
-    return std::unexpected(done.error());
-  if (auto done = keep(dds::make_subscriber(participant, partition), claim.subscriber_); !done)
-    return std::unexpected(done.error());
-  const dds_entity_t topic = claim.topic_.get();
-  if (auto done =
-          keep(dds::make_writer(claim.publisher_.get(), topic, dds::qos_of(dds::kNameClaim)), claim.writer_);
-      !done)
-    return std::unexpected(done.error());
-  if (auto done =
-          keep(dds::make_reader(claim.subscriber_.get(), topic, dds::qos_of(dds::kNameClaim)), claim.reader_);
-      !done)
-    return std::unexpected(done.error());
+  const dds::Qos qos = dds::qos_of(dds::kNameClaim);
+  auto subscriber = dds::make_subscriber(participant, partition);
+  if (!subscriber) return failure_in("claim the host's name", std::move(subscriber).error());
+  auto claims = dds::open_reader(participant, subscriber->get(), dds::kNameClaim, qos);
+  if (!claims) return failure_in("claim the host's name", std::move(claims).error());
+  auto own_claim = dds::open_writer(participant, partition, claims->topic.get(), qos);
+  if (!own_claim) return failure_in("claim the host's name", std::move(own_claim).error());
+  claim.subscriber_ = *std::move(subscriber);
+  claim.claims_ = *std::move(claims);
+  claim.own_claim_ = *std::move(own_claim);
   if (auto done = claim.write(); !done) return std::unexpected(done.error());
   return claim;
 }
@@ -101,7 +91,7 @@ Result<void> NameClaim::write() {
   sample.serving = own_.serving;
   dds::copy_text(sample.place, own_.place);
   dds::copy_text(sample.machine, own_.machine);
-  return dds::check_code(dds_write(writer_.get(), &sample), "claim the host's name");
+  return dds::check_code(dds_write(own_claim_.writer.get(), &sample), "claim the host's name");
 }
 
 Result<void> NameClaim::ask(TimePoint deadline, int stop_fd) {
@@ -138,7 +128,7 @@ bool NameClaim::take(const plc_NameClaim& sample, const dds_sample_info_t& info,
   if (info.valid_data) {
     NameHolder other = holder_of(sample);
     // In the name of another; of one that is gone that cannot be known any more.
-    if (alive && dds::writer_of(reader_.get(), info).participant() != server) return false;
+    if (alive && dds::writer_of(claims_.reader.get(), info).participant() != server) return false;
     if (other.place == own_.place) return false;
     if (!alive) meet(other, now);
     others_[server] = std::move(other);
@@ -150,7 +140,7 @@ bool NameClaim::take(const plc_NameClaim& sample, const dds_sample_info_t& info,
 
 NameClaim::State NameClaim::look(TimePoint now) {
   State state = State::ours;
-  dds::take_all<plc_NameClaim>(reader_.get(),
+  dds::take_all<plc_NameClaim>(claims_.reader.get(),
                                [&](const plc_NameClaim& sample, const dds_sample_info_t& info) {
                                  if (take(sample, info, now)) state = State::left;
                                });

@@ -7,8 +7,8 @@
 
 #include <control.h>
 
-#include "api/dds/entity.hpp"
 #include "api/dds/guid.hpp"
+#include "api/dds/topics.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
 
@@ -65,7 +65,7 @@ class NameClaim {
   /// Another host that wants the name, or wanted it a short time ago; empty: none.
   [[nodiscard]] const std::string& rival() const noexcept { return rival_; }
   /// To be listened to.
-  [[nodiscard]] dds_entity_t reader() const noexcept { return reader_.get(); }
+  [[nodiscard]] dds_entity_t reader() const noexcept { return claims_.reader.get(); }
 
  private:
   NameClaim() = default;
@@ -81,11 +81,9 @@ class NameClaim {
   std::set<dds::Guid> told_;
   std::string rival_;
   TimePoint rival_seen_;
-  dds::Entity topic_;
-  dds::Entity publisher_;
   dds::Entity subscriber_;
-  dds::Entity writer_;
-  dds::Entity reader_;
+  dds::TopicReader claims_;
+  dds::PartitionWriter own_claim_;
 };
 
 }  // namespace plchost

@@ -119,7 +119,7 @@ bool StatisticsWriter::write(const std::string& instance, const InstancePageRead
   release_jitter.put_into(sample.release_jitter_histogram);
   negative.put_into(sample.jitter_negative_histogram);
   positive.put_into(sample.jitter_positive_histogram);
-  if (dds_write(writer_.get(), &sample) != DDS_RETCODE_OK) {
+  if (dds_write(way_.writer.get(), &sample) != DDS_RETCODE_OK) {
     refused_until_ = now + kPause;
     return true;
   }
@@ -137,8 +137,8 @@ void StatisticsWriter::dispose(const std::string& instance, const Told& told) {
   dds::copy_text(sample.host, host_);
   dds::copy_text(sample.instance, instance);
   dds::copy_text(sample.task, told.task);
-  (void)dds_dispose(writer_.get(), &sample);
-  dds::unregister_instance(writer_.get(), &sample);
+  (void)dds_dispose(way_.writer.get(), &sample);
+  dds::unregister_instance(way_.writer.get(), &sample);
 }
 
 }  // namespace plchost

@@ -5,7 +5,7 @@
 
 #include <control.h>
 
-#include "api/dds/entity.hpp"
+#include "api/dds/topics.hpp"
 #include "shm/base/time.hpp"
 #include "shm/pages/instance_page.hpp"
 
@@ -26,8 +26,8 @@ class StatisticsWriter {
   /// A reader that is too slow makes a write wait a millisecond: after that nothing is written for so long.
   static constexpr Duration kPause = std::chrono::milliseconds(20);
 
-  StatisticsWriter(std::string host, std::uint64_t epoch, dds::Entity writer)
-      : host_(std::move(host)), epoch_(epoch), writer_(std::move(writer)) {}
+  StatisticsWriter(std::string host, std::uint64_t epoch, dds::TopicWriter way)
+      : host_(std::move(host)), epoch_(epoch), way_(std::move(way)) {}
 
   /// Writes task `index` of `page` if there is news since `told`, and takes that down in it. A sample that
   /// the writer refuses stays news. The cost is that of reading the buckets of what was recorded, up to 360
@@ -40,7 +40,7 @@ class StatisticsWriter {
  private:
   std::string host_;
   std::uint64_t epoch_;
-  dds::Entity writer_;
+  dds::TopicWriter way_;
   TimePoint refused_until_;
 };
 

@@ -39,15 +39,8 @@ Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const 
   if (!hosts) return failure_in("publish status", hosts.error());
   auto findings = open_table<plc_HostFinding>(participant, parent, writes);
   if (!findings) return failure_in("publish status", findings.error());
-  std::vector<dds::Entity> topics;
-  const auto make = [&](const dds::TopicInfo& info) -> Result<dds::Entity> {
-    auto topic = dds::make_topic(participant, info);
-    if (!topic) return std::unexpected(topic.error());
-    topics.push_back(std::move(*topic));
-    return dds::make_writer(parent, topics.back().get(), dds::qos_of(info));
-  };
-  auto statistics = make(dds::kTaskStatistics);
-  auto presence = make(dds::kPresence);
+  auto statistics = dds::open_writer(participant, parent, dds::kTaskStatistics);
+  auto presence = dds::open_writer(participant, parent, dds::kPresence);
   for (auto* made : {&statistics, &presence}) {
     if (!*made) return failure_in("publish status", made->error());
   }
@@ -66,7 +59,6 @@ Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const 
   publisher.applications_ =
       ApplicationWatch(source.applications_folder, of_topics.of<plc_ApplicationStatus>());
   publisher.presence_ = std::move(*presence);
-  publisher.topics_ = std::move(topics);
   publisher.publisher_ = *std::move(publisher_of_status);
   if (auto read = publisher.page_.wait(MonotonicClock::now() + kPageWait); !read) {
     return std::unexpected(std::move(read).error());
@@ -273,7 +265,7 @@ void StatusPublisher::write_presence() {
   sample.pid = ::getpid();
   sample.api_version = dds::kApiVersion;
   sample.clock_ns = boot_time_ns();
-  (void)dds_write(presence_.get(), &sample);
+  (void)dds_write(presence_.writer.get(), &sample);
 }
 
 }  // namespace plchost

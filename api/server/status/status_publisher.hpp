@@ -114,9 +114,8 @@ class StatusPublisher {
   ApplicationWatch applications_;
   WriterWatch writers_;
   bool writers_changed_ = false;
-  dds::Entity presence_;
+  dds::TopicWriter presence_;
   dds::Entity publisher_;
-  std::vector<dds::Entity> topics_;
   TimePoint next_objects_;
   TimePoint rested_;
   std::uint64_t round_ = 0;

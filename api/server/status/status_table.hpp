@@ -9,9 +9,9 @@
 
 #include <dds/dds.h>
 
-#include "api/dds/entity.hpp"
 #include "api/dds/instances.hpp"
 #include "api/dds/text.hpp"
+#include "api/dds/topics.hpp"
 #include "shm/base/time.hpp"
 
 namespace plchost {
@@ -29,9 +29,8 @@ template <class Sample>
 class StatusTable {
  public:
   StatusTable() = default;
-  /// `writer` was made from `topic`.
-  StatusTable(StatusSource source, dds::Entity topic, dds::Entity writer) noexcept
-      : source_(std::move(source)), topic_(std::move(topic)), writer_(std::move(writer)) {}
+  StatusTable(StatusSource source, dds::TopicWriter way) noexcept
+      : source_(std::move(source)), way_(std::move(way)) {}
 
   /// A sample of this host and server, to be filled.
   [[nodiscard]] Sample blank() const noexcept {
@@ -82,7 +81,7 @@ class StatusTable {
     for (auto& [key, entry] : entries_) {
       if (!entry.unwritten) continue;
       if (budget-- == 0) return;
-      if (dds_write(writer_.get(), &entry.sample) != DDS_RETCODE_OK) return;
+      if (dds_write(way_.writer.get(), &entry.sample) != DDS_RETCODE_OK) return;
       entry.unwritten = false;
     }
   }
@@ -99,14 +98,13 @@ class StatusTable {
   using Entries = std::map<std::string, Entry>;
 
   typename Entries::iterator dispose(typename Entries::iterator it) {
-    (void)dds_dispose(writer_.get(), &it->second.sample);
-    dds::unregister_instance(writer_.get(), &it->second.sample);
+    (void)dds_dispose(way_.writer.get(), &it->second.sample);
+    dds::unregister_instance(way_.writer.get(), &it->second.sample);
     return entries_.erase(it);
   }
 
   StatusSource source_;
-  dds::Entity topic_;
-  dds::Entity writer_;
+  dds::TopicWriter way_;
   Entries entries_;
 };
 

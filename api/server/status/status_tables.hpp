@@ -19,11 +19,9 @@ template <class Sample>
 [[nodiscard]] Result<StatusTable<Sample>> open_table(dds_entity_t participant, dds_entity_t publisher,
                                                      const StatusSource& source) {
   constexpr const dds::TopicInfo& kTopic = dds::kTopicOf<Sample>;
-  auto topic = dds::make_topic(participant, kTopic);
-  if (!topic) return std::unexpected(std::move(topic).error());
-  auto writer = dds::make_writer(publisher, topic->get(), dds::qos_of(kTopic));
-  if (!writer) return std::unexpected(std::move(writer).error());
-  return StatusTable<Sample>(source, *std::move(topic), *std::move(writer));
+  auto way = dds::open_writer(participant, publisher, kTopic);
+  if (!way) return std::unexpected(std::move(way).error());
+  return StatusTable<Sample>(source, *std::move(way));
 }
 
 /// The tables of all status topics that HostStatus counts: those of control.idl. Stays where it is made.

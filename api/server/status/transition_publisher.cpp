@@ -15,11 +15,9 @@ constexpr Duration kRingRetry = std::chrono::milliseconds(100);
 
 Result<TransitionPublisher> TransitionPublisher::create(dds_entity_t participant, dds_entity_t publisher,
                                                         Source source) {
-  auto topic = dds::make_topic(participant, dds::kTransition);
-  if (!topic) return std::unexpected(topic.error());
-  auto writer = dds::make_writer(publisher, topic->get(), dds::qos_of(dds::kTransition));
-  if (!writer) return std::unexpected(writer.error());
-  return TransitionPublisher(std::move(source), *std::move(topic), *std::move(writer));
+  auto way = dds::open_writer(participant, publisher, dds::kTransition);
+  if (!way) return std::unexpected(std::move(way).error());
+  return TransitionPublisher(std::move(source), *std::move(way));
 }
 
 std::uint64_t TransitionPublisher::publish(const std::string& instance, TimePoint now) {
@@ -60,7 +58,7 @@ bool TransitionPublisher::write(const std::string& instance, std::int64_t stream
   sample.to_state = transition.to;
   sample.pid = transition.pid;
   dds::copy_text(sample.reason, transition.reason.view());
-  return dds_write(writer_.get(), &sample) == DDS_RETCODE_OK;
+  return dds_write(way_.writer.get(), &sample) == DDS_RETCODE_OK;
 }
 
 }  // namespace plchost

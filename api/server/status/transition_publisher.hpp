@@ -7,7 +7,7 @@
 
 #include <control.h>
 
-#include "api/dds/entity.hpp"
+#include "api/dds/topics.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
 #include "shm/pages/transition_ring.hpp"
@@ -38,14 +38,13 @@ class TransitionPublisher {
     std::optional<Transition> unsent;  // that DDS did not take
     std::uint64_t written = 0;         // the last number
   };
-  TransitionPublisher(Source source, dds::Entity topic, dds::Entity writer)
-      : source_(std::move(source)), topic_(std::move(topic)), writer_(std::move(writer)) {}
+  TransitionPublisher(Source source, dds::TopicWriter way)
+      : source_(std::move(source)), way_(std::move(way)) {}
   void follow(const std::string& instance, Followed& followed, TimePoint now);
   [[nodiscard]] bool write(const std::string& instance, std::int64_t stream, const Transition& transition);
 
   Source source_;
-  dds::Entity topic_;
-  dds::Entity writer_;
+  dds::TopicWriter way_;
   std::map<std::string, Followed> followed_;
 };
 

@@ -66,7 +66,7 @@ class RunWatchTest : public testing::Test {
   TimePoint now_ = MonotonicClock::now();
   InstancePage page_ = make_page(pool_);
   StatusTable<plc_TaskStatus> table_;
-  TaskWatch tasks_{pool_, table_, StatisticsWriter("hosta", 7, dds::Entity())};
+  TaskWatch tasks_{pool_, table_, StatisticsWriter("hosta", 7, dds::TopicWriter())};
   RunWatch sut_{"hosta", 7};
 };
 
