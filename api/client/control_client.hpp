@@ -149,10 +149,10 @@ class ControlClient {
                                                    TimePoint deadline);
   /// The nodes of a host that send blocks, or a part of the ways between them, with what they count. Not
   /// complete: go on with query.after = next_after. not_found: no node of the query's name.
-  [[nodiscard]] Result<NodeListing> list_nodes(const std::string& host, const NodeQuery& query,
-                                               TimePoint deadline);
-  [[nodiscard]] Result<NodeListing> list_routes(const std::string& host, const NodeQuery& query,
-                                                TimePoint deadline);
+  [[nodiscard]] Result<NodesTold> list_nodes(const std::string& host, const NodeQuery& query,
+                                             TimePoint deadline);
+  [[nodiscard]] Result<NodesTold> list_routes(const std::string& host, const NodeQuery& query,
+                                              TimePoint deadline);
   /// A part of what an instance has said. Not complete: go on with query.after = next_after. The code of the
   /// failure is the host's own: not_found: it has no such instance.
   [[nodiscard]] Result<LogListing> read_log(const std::string& host, const std::string& instance,

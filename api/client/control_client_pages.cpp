@@ -72,21 +72,21 @@ Result<ObjectListing> ControlClient::list_objects(const std::string& host, const
       deadline);
 }
 
-Result<NodeListing> ControlClient::list_nodes(const std::string& host, const NodeQuery& query,
-                                              TimePoint deadline) {
+Result<NodesTold> ControlClient::list_nodes(const std::string& host, const NodeQuery& query,
+                                            TimePoint deadline) {
   const auto part = part_of(query);
   if (!part) return std::unexpected(part.error());
-  return ask_for_page<plc_NodePage, NodeListing>(
+  return ask_for_page<plc_NodePage, NodesTold>(
       node_pages_, dds::kNodePage,
       {.host = host, .operation = plc_OPERATION_LIST_NODES, .instance = "", .argument = "", .part = *part},
       deadline);
 }
 
-Result<NodeListing> ControlClient::list_routes(const std::string& host, const NodeQuery& query,
-                                               TimePoint deadline) {
+Result<NodesTold> ControlClient::list_routes(const std::string& host, const NodeQuery& query,
+                                             TimePoint deadline) {
   const auto part = part_of(query);
   if (!part) return std::unexpected(part.error());
-  return ask_for_page<plc_NodePage, NodeListing>(
+  return ask_for_page<plc_NodePage, NodesTold>(
       node_pages_, dds::kNodePage,
       {.host = host, .operation = plc_OPERATION_LIST_ROUTES, .instance = "", .argument = "", .part = *part},
       deadline);

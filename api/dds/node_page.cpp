@@ -68,25 +68,6 @@ plc_NodeRecord sample_of(const ListedNode& listed, std::vector<plc_HostRange>& h
   return sample;
 }
 
-ListedNode node_of(const plc_NodeRecord& sample) {
-  ListedNode listed;
-  listed.program = dds::text_of(sample.program);
-  listed.info.node = sample.node;
-  NodeRecord& record = listed.info.record;
-  record.name.assign(dds::text_of(sample.name));
-  record.pid = sample.pid;
-  record.generation = sample.generation;
-  record.forwards = sample.forwards ? 1 : 0;
-  record.queue_slots = sample.queue_slots;
-  const auto hosts = dds::parts_of(sample.hosts);
-  const std::size_t ranges = std::min<std::size_t>(hosts.size(), kMaxHostRanges);
-  for (std::size_t i = 0; i < ranges; ++i) {
-    record.hosts[i] = {.first = hosts[i].first, .last = hosts[i].last};
-  }
-  copy_counters(listed.info, sample);
-  return listed;
-}
-
 plc_RouteRecord sample_of(const RouteInfo& route) {
   plc_RouteRecord sample{};
   sample.from_node = route.from;
@@ -97,17 +78,6 @@ plc_RouteRecord sample_of(const RouteInfo& route) {
   sample.linked = route.first.has_value();
   if (route.first) copy_counts(sample, *route.first);
   return sample;
-}
-
-RouteInfo route_of(const plc_RouteRecord& sample) {
-  RouteInfo route{.from = sample.from_node,
-                  .to = sample.to_node,
-                  .hosts = {.first = sample.hosts.first, .last = sample.hosts.last},
-                  .next_hop = sample.next_hop,
-                  .links = static_cast<std::uint8_t>(sample.links),
-                  .first = std::nullopt};
-  if (sample.linked) copy_counts(route.first.emplace(), sample);
-  return route;
 }
 
 }  // namespace
@@ -147,20 +117,20 @@ NodePageSample::NodePageSample(const NodeListing& listing) {
   dds::lend(page_.routes, routes_);
 }
 
-NodeListing listing_of(const plc_NodePage& page) {
-  NodeListing listing{.base = std::string(dds::text_of(page.base)),
-                      .host_number = page.host_number,
-                      .nodes = {},
-                      .routes = {},
-                      .complete = page.complete,
-                      .next_after = page.next_after};
-  for (const plc_NodeRecord& node : dds::parts_of(page.nodes)) {
-    listing.nodes.push_back(node_of(node));
+NodesTold listing_of(const plc_NodePage& page) {
+  NodesTold told;
+  told.base = dds::text_of(page.base);
+  told.host_number = page.host_number;
+  told.complete = page.complete;
+  told.next_after = page.next_after;
+  for (plc_NodeRecord node : dds::parts_of(page.nodes)) {
+    const auto hosts = dds::parts_of(node.hosts);
+    dds::lend(node.hosts, told.hosts.emplace_back(hosts.begin(), hosts.end()));
+    told.nodes.push_back(node);
   }
-  for (const plc_RouteRecord& route : dds::parts_of(page.routes)) {
-    listing.routes.push_back(route_of(route));
-  }
-  return listing;
+  const auto routes = dds::parts_of(page.routes);
+  told.routes.assign(routes.begin(), routes.end());
+  return told;
 }
 
 }  // namespace plchost

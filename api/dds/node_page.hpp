@@ -62,6 +62,23 @@ class NodePageSample {
   std::vector<plc_RouteRecord> routes_;
 };
 
-[[nodiscard]] NodeListing listing_of(const plc_NodePage& page);
+/// A page as a client keeps it.
+struct NodesTold {
+  NodesTold() = default;
+  NodesTold(NodesTold&&) noexcept = default;
+  NodesTold& operator=(NodesTold&&) noexcept = default;
+  NodesTold(const NodesTold&) = delete;
+  NodesTold& operator=(const NodesTold&) = delete;
+  ~NodesTold() = default;
+
+  std::string base;
+  std::uint16_t host_number = 0;
+  std::vector<plc_NodeRecord> nodes;
+  std::vector<plc_RouteRecord> routes;
+  bool complete = true;
+  std::uint16_t next_after = 0;
+  std::vector<std::vector<plc_HostRange>> hosts;  ///< of the nodes, which point to them
+};
+[[nodiscard]] NodesTold listing_of(const plc_NodePage& page);
 
 }  // namespace plchost

@@ -99,7 +99,7 @@ def row_fields(contract, kind):
 
 
 COLUMN = re.compile(
-    r"(?P<name>\w+)(?: (?P<rank>\d+))?(?: none (?P<none>-?\d+))?(?: decimals (?P<decimals>\d))?(?: as (?P<header>\S+))?"
+    r"(?P<name>\w+)(?: (?P<rank>\d+))?(?: none (?P<none>-?\d+))?(?: decimals (?P<decimals>\d))?(?: as (?P<header>\S+(?: \S+)*))?"
 )
 
 

@@ -54,7 +54,7 @@ void add(Row& row, const dds::FieldInfo& field, const Value& value) {
 
 /// The row of a topic, as control.idl has it; its field names are a promise to programs. Each field in its
 /// order, durations in us, times as a text and as a number, codes as words, GUIDs as digits ("all": of
-/// zeros); then what `ext` has. Computed fields come from computed_of(sample, context...).
+/// zeros); then what `ext` has, if there is one. Computed fields come from computed_of(sample, context...).
 template <class Sample, class... Context>
   requires dds::kHasRow<Sample>
 [[nodiscard]] Row to_row(const Sample& sample, const Context&... context) {
@@ -69,7 +69,7 @@ template <class Sample, class... Context>
   dds::visit_row(sample, computed, [&](const dds::FieldInfo& field, const auto& value) {
     status_rows::add(row, field, value);
   });
-  add_extension(row, dds::parts_of(sample.ext));
+  if constexpr (requires { sample.ext; }) add_extension(row, dds::parts_of(sample.ext));
   return row;
 }
 

@@ -11,8 +11,8 @@ namespace plchost {
 namespace {
 
 // All pages of one host. The timeout is that of one page.
-Result<std::vector<NodeListing>> route_pages(CliSession& session, const std::string& host, NodeQuery query) {
-  std::vector<NodeListing> pages;
+Result<std::vector<NodesTold>> route_pages(CliSession& session, const std::string& host, NodeQuery query) {
+  std::vector<NodesTold> pages;
   for (;;) {
     auto page = session.client().value()->list_routes(host, query, session.deadline());
     if (!page) return std::unexpected(std::move(page).error());
@@ -33,9 +33,11 @@ int list_nodes(CliSession& session, const std::string& base) {
   for (const HostView& host : *hosts) {
     const auto listing = session.client().value()->list_nodes(host.name, {.base = base}, session.deadline());
     if (!listing) return CliSession::fail(listing.error());
-    for (const ListedNode& node : listing->nodes) rows.push_back(to_row(host.name, *listing, node));
+    for (const plc_NodeRecord& node : listing->nodes) {
+      rows.push_back(to_row(node, std::string_view(host.name), *listing));
+    }
   }
-  return session.show(rows, node_columns());
+  return session.show(rows, columns_of<plc_NodeRecord>());
 }
 
 int show_routes(CliSession& session, const std::string& node, const std::string& base) {
@@ -56,11 +58,11 @@ int show_routes(CliSession& session, const std::string& node, const std::string&
     if (!pages) return CliSession::fail(pages.error());
     const auto names = session.client().value()->list_nodes(host, {.base = base}, session.deadline());
     if (!names) return CliSession::fail(names.error());
-    for (const NodeListing& page : *pages) {
-      for (const RouteInfo& route : page.routes) rows.push_back(to_row(host, page, route, names->nodes));
+    for (const NodesTold& page : *pages) {
+      for (const plc_RouteRecord& route : page.routes) rows.push_back(route_row(route, host, page, *names));
     }
   }
-  return session.show(rows, route_columns());
+  return session.show(rows, columns_of<plc_RouteRecord>());
 }
 
 constexpr const char* kBaseText = "nodes of this base name (default: [blocks] base of the host)";

@@ -11,6 +11,7 @@
 #include "api/cli/rows/rows.hpp"
 #include "api/cli/rows/status_rows.hpp"
 #include "api/client/status_count.hpp"
+#include "api/dds/text.hpp"
 
 namespace plchost {
 
@@ -81,8 +82,8 @@ void add_objects(ControlClient& client, const HostView& host, TimePoint deadline
 void add_nodes(ControlClient& client, const HostView& host, TimePoint deadline, Names& names) {
   const auto listing = client.list_nodes(host.name, {}, deadline);
   if (!listing) return;
-  for (const ListedNode& node : listing->nodes)
-    names.push_back({std::string(node.info.record.name.view()), node.program});
+  for (const plc_NodeRecord& node : listing->nodes)
+    names.push_back({std::string(dds::text_of(node.name)), std::string(dds::text_of(node.program))});
 }
 
 void add_schedulers(ControlClient& /*client*/, const HostView& host, TimePoint /*deadline*/, Names& names) {

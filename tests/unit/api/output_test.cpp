@@ -119,7 +119,8 @@ INSTANTIATE_TEST_SUITE_P(All, EveryTable,
                                          &columns_of<plc_EventStatus>(), &columns_of<plc_WriterStatus>(),
                                          &columns_of<plc_ExceptionStatus>(), &columns_of<plc_Transition>(),
                                          &columns_of<plc_ApplicationStatus>(), &columns_of<plc_HostStatus>(),
-                                         &node_columns(), &route_columns(), &object_columns()));
+                                         &columns_of<plc_NodeRecord>(), &columns_of<plc_RouteRecord>(),
+                                         &object_columns()));
 
 TEST(Csv, QuotesWhatWouldBeTwoFields) {
   EXPECT_EQ(format_csv({}), "");
