@@ -14,6 +14,7 @@ struct Shared {
   CycleGate::Seat other_seat;
   int state = 0;  // plain: of the application, and of a reader while the gate is closed
   int other_state = 0;
+  std::atomic<std::uint32_t> nobody_wakes{0};
   bool looked = false;
   int seen = 0;
 };
@@ -81,6 +82,21 @@ void two_cycles_two_looks(Scene& scene) {
   });
 }
 
+// The control thread has its moment also if a task waits for its end: it sleeps until nothing else can run.
+void a_task_waits_at_the_gate(Scene& scene) {
+  Shared& shared = make(scene);
+  scene.limits({.deadlines_rescue = true});
+  scene.thread("task", [&] { run_cycles(shared, shared.seat, shared.state, 1); });
+  scene.thread("control", [&] {
+    shared.gate.close();
+    shared.clock.wait(shared.nobody_wakes, 0, kStart);
+    require(!shared.seat.taken(), "a task that waits at the gate has taken its seat");
+    ++shared.state;
+    shared.gate.open(shared.clock);
+  });
+  scene.at_end([&] { require(shared.state == 2, "a cycle or a look is lost"); });
+}
+
 void parts_of_a_cycle_one_look(Scene& scene) {
   Shared& shared = make(scene);
   scene.thread("task", [&] { run_cycle_in_parts(shared); });
@@ -118,6 +134,7 @@ int main(int argc, char** argv) {
   return run(argc, argv,
              {{"two_tasks_one_look", two_tasks_one_look},
               {"two_cycles_two_looks", two_cycles_two_looks},
+              {"a_task_waits_at_the_gate", a_task_waits_at_the_gate},
               {"parts_of_a_cycle_one_look", parts_of_a_cycle_one_look},
               {"parts_of_a_cycle_seen", parts_of_a_cycle_seen}});
 }

@@ -59,9 +59,10 @@ void a_writer_is_killed(Scene& scene) {
   scene.thread("successor",
                [&] {
                  shared.lock.recover();
+                 require(shared.lock.read(1).has_value(), "the recovered lock cannot be read");
                  shared.lock.write({.first = 2, .second = 2});
                  const std::optional<Value> value = shared.lock.read(1);
-                 require(value && value->first == 2, "the recovered lock cannot be read");
+                 require(value && value->first == 2, "the successor's value is not there");
                },
                {.after = static_cast<int>(victim)});
   scene.thread("reader", [&] {

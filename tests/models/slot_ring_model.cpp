@@ -129,6 +129,39 @@ void two_writers_one_reader(Scene& scene) {
   scene.at_end([&] { shared.check(3); });
 }
 
+// Each writer needs a slot that the reader has freed, and may know of it only from the other writer.
+void two_writers_of_a_full_ring(Scene& scene) {
+  Shared& shared = make(scene);
+  put(shared, 1);
+  put(shared, 2);
+  for (std::uint32_t block = 3; block <= 4; ++block) {
+    scene.thread(block == 3 ? "writer" : "other writer", [&shared, block] {
+      require(put(shared, block) != PutResult::broken, "the writer calls a sound link broken");
+    });
+  }
+  scene.thread("reader", [&] {
+    take(shared, 0);
+    take(shared, 0);
+  });
+  scene.at_end([&] { shared.check(4); });
+}
+
+// A reader stands still within its take while the slots are filled and taken once more.
+void the_ring_goes_round(Scene& scene) {
+  Shared& shared = make(scene);
+  put(shared, 1);
+  put(shared, 2);
+  scene.thread("reader", [&] { take(shared, 1); });
+  scene.thread("writer and other reader", [&] {
+    take(shared, 2);
+    for (std::uint32_t block = 3; block <= 4; ++block)
+      require(put(shared, block) != PutResult::broken, "the writer calls a sound link broken");
+    take(shared, 0);
+    take(shared, 0);
+  });
+  scene.at_end([&] { shared.check(4); });
+}
+
 // The process that puts in is killed at any instruction: all that it has published is whole.
 void a_writer_is_killed(Scene& scene) {
   Shared& shared = make(scene);
@@ -155,7 +188,9 @@ void a_writer_is_killed(Scene& scene) {
 int main(int argc, char** argv) {
   using namespace plchost::models;
   return run(argc, argv,
-             {{"a_writer_is_killed", a_writer_is_killed},
+             {{"the_ring_goes_round", the_ring_goes_round},
+              {"two_writers_of_a_full_ring", two_writers_of_a_full_ring},
+              {"a_writer_is_killed", a_writer_is_killed},
               {"two_writers_one_reader", two_writers_one_reader},
               {"readers_of_two_channels", readers_of_two_channels},
               {"two_readers_one_writer", two_readers_one_writer}});

@@ -1,0 +1,2 @@
+# shm/block_driver/slot_ring.cpp: a thread that stood still sets the reader's head back
+s/if \(head_\.compare_exchange_strong\(head, next, std::memory_order_seq_cst\)\) head = next;/head_.store(next), head = next;/
