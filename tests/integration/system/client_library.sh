@@ -97,14 +97,17 @@ PYTHONPATH=$BIN/../python python3 "$cell/sends.py" "$APPLICATIONS/packer.so" "$c
 
 echo "- Python ends in peace while a client watches, and a callback that raises is told"
 cat >"$cell/ends.py" <<'EOF'
-import os, time, plchost_client
+import os, threading, plchost_client
 client = plchost_client.Client(domain=int(os.environ["PLCHOST_DOMAIN"]), timeout=10.0)
 client.hosts()
+calls = threading.Semaphore(0)
 def raises(item):
+    calls.release()
     raise ValueError("mine")
 watch = client.watch_tasks("", raises)
 other = client.watch_hosts(print)
-time.sleep(0.5)
+for _ in range(2):  # at the second call, what the first one has raised was told
+    assert calls.acquire(timeout=60)
 del other
 EOF
 for _ in $(seq 10); do
