@@ -156,9 +156,13 @@ Result<UnnamedMemory> UnnamedMemory::make(const std::string& name, std::size_t s
   if (!path) return std::unexpected(path.error());
   auto fd = make_nameless(size, rights, *path);
   if (!fd) return std::unexpected(fd.error());
+  struct stat status{};
+  if (auto got = check_errno(::fstat(fd->get(), &status), "fstat " + *path); !got) {
+    return std::unexpected(std::move(got).error());
+  }
   auto mapping = map(*fd, size, MemoryFile::Access::read_write, *path);
   if (!mapping) return std::unexpected(std::move(mapping).error());
-  return UnnamedMemory(*std::move(path), *std::move(fd), MemoryFile(*std::move(mapping)));
+  return UnnamedMemory(*std::move(path), *std::move(fd), MemoryFile(*std::move(mapping), status.st_ino));
 }
 
 namespace {
@@ -193,16 +197,16 @@ Result<void> take_away(const std::string& path) {
       error);
 }
 
-Result<MemoryFile> UnnamedMemory::give_name(const TakeOver& take_over) {
+Result<void> UnnamedMemory::give_name(const TakeOver& take_over) {
   constexpr int kAttempts = 10;  // each one fails only if another process makes the name anew in between
   for (int attempt = 1;; ++attempt) {
-    const auto named = link_to(fd_, path_);
-    if (named) return std::move(memory_);
+    auto named = link_to(fd_, path_);
+    if (named) return named;
     if (named.error().code != ErrorCode::already_exists || attempt == kAttempts || !take_over(path_)) {
-      return std::unexpected(named.error());
+      return named;
     }
     replaced_.reset(::open(path_.c_str(), O_PATH | O_NOFOLLOW | O_CLOEXEC));
-    if (auto gone = take_away(path_); !gone) return std::unexpected(std::move(gone).error());
+    if (auto gone = take_away(path_); !gone) return gone;
   }
 }
 
@@ -215,7 +219,8 @@ Result<MemoryFile> make_filled(const std::string& name, std::size_t size, const 
   if (fill) {
     if (auto filled = fill(memory->bytes()); !filled) return std::unexpected(filled.error());
   }
-  return memory->give_name(take_over);
+  if (auto named = memory->give_name(take_over); !named) return std::unexpected(std::move(named).error());
+  return memory->take();
 }
 
 }  // namespace

@@ -83,11 +83,15 @@ class UnnamedMemory {
   [[nodiscard]] static Result<UnnamedMemory> make(const std::string& name, std::size_t size,
                                                   const MemoryRights& rights);
   [[nodiscard]] std::span<std::byte> bytes() const noexcept { return memory_.bytes(); }
+  /// See MemoryFile.
+  [[nodiscard]] bool guarded() const noexcept { return memory_.guarded(); }
   /// Of the file that has the name: whether this one takes its place.
   using TakeOver = std::function<bool(const std::string& path)>;
   /// already_exists: the name is taken, and `take_over` says no. refused: it is another user's file. A memory
   /// that has lost its name by that is freed when this goes. Once.
-  [[nodiscard]] Result<MemoryFile> give_name(const TakeOver& take_over);
+  [[nodiscard]] Result<void> give_name(const TakeOver& take_over);
+  /// Once it has its name: the same bytes at the same addresses. Once.
+  [[nodiscard]] MemoryFile take() noexcept { return std::move(memory_); }
 
  private:
   UnnamedMemory(std::string path, UniqueFd fd, MemoryFile memory) noexcept

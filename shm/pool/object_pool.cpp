@@ -266,20 +266,37 @@ Result<bool> ObjectPool::create_locked(PoolObject& object, const Wanted& wanted,
   return std::unexpected(std::move(referred).error());
 }
 
-Result<bool> ObjectPool::create_into(PoolObject& object, const Wanted& wanted, const ObjectOptions& options) {
+Result<bool> ObjectPool::create_into(PoolObject& object, const Wanted& wanted, const ObjectOptions& options,
+                                     std::span<const std::byte> contents) {
   if (auto valid = check_object_name(wanted.name); !valid) return std::unexpected(valid.error());
   if (auto good = check_initial(*traits_of(wanted.type), wanted.name, wanted.initial); !good) {
     return std::unexpected(std::move(good).error());
   }
   if (auto may = check_group(options); !may) return std::unexpected(may.error());
   if (wanted.type == ObjectType::memory) {
-    return create_memory_into(static_cast<SharedMemory&>(object), wanted, options);
+    return create_memory_into(static_cast<SharedMemory&>(object), wanted, options, contents);
   }
   return create_locked(object, wanted, options, nullptr);
 }
 
+Result<Created<SharedMemory>> ObjectPool::create_memory(std::string_view name, std::size_t size,
+                                                        const ObjectOptions& options,
+                                                        std::span<const std::byte> contents) {
+  if (contents.size() > size) {
+    return failure(
+        ErrorCode::wrong_size,
+        fmt::format("memory '{}' of {} bytes cannot have {} bytes of contents", name, size, contents.size()));
+  }
+  SharedMemory object;
+  const Wanted wanted{.name = name, .type = ObjectType::memory, .initial = size};
+  auto made = create_into(object, wanted, options, contents);
+  if (!made) return std::unexpected(std::move(made).error());
+  return Created<SharedMemory>{.object = std::move(object), .made = *made};
+}
+
 Result<bool> ObjectPool::create_memory_into(SharedMemory& object, const Wanted& wanted,
-                                            const ObjectOptions& options) {
+                                            const ObjectOptions& options,
+                                            std::span<const std::byte> contents) {
   const auto there = open_into(object, wanted, Access::read_write);
   if (there) return false;
   if (there.error().code != ErrorCode::not_found) return std::unexpected(there.error());
@@ -287,6 +304,7 @@ Result<bool> ObjectPool::create_memory_into(SharedMemory& object, const Wanted& 
   auto unnamed =
       UnnamedMemory::make(pool_memory_name(name(), wanted.name), wanted.initial, rights_for(options, name()));
   if (!unnamed) return std::unexpected(std::move(unnamed).error());
+  std::ranges::copy(contents, unnamed->bytes().begin());
   auto made = create_locked(object, wanted, options, &*unnamed);
   if (!made && made.error().code == ErrorCode::already_exists) {
     // Firmware has just made it.
@@ -368,31 +386,36 @@ Result<void> ObjectPool::open_into(PoolObject& object, ObjectType type, std::str
 }
 
 // The entry of the old one goes first: a death in between leaves no half of either.
+Result<SharedMemory> ObjectPool::replace_memory(std::string_view name, UnnamedMemory& prepared) {
+  const Wanted wanted{.name = name, .type = ObjectType::memory, .initial = prepared.bytes().size()};
+  auto held = segment_->lock();
+  if (!held) return std::unexpected(held.error());
+  if (ObjectEntry* const old = segment_->find(*held, name); old != nullptr) {
+    if (auto same = check_is(*old, ObjectType::memory, name); !same) return std::unexpected(same.error());
+    if (auto may = check_permitted(*old, Access::read_write, name); !may) return std::unexpected(may.error());
+    segment_->table(*held).erase(*old);
+  }
+  const auto made = make_entry(*held, wanted, {.keep = true}, &prepared);
+  if (!made) return std::unexpected(made.error());
+  SharedMemory memory;
+  if (auto referred = refer(memory, &*held, **made, wanted, Access::read_write); !referred) {
+    return std::unexpected(std::move(referred).error());
+  }
+  memory.memory_ = prepared.take();
+  return memory;
+}
+
+Result<UnnamedMemory> ObjectPool::prepare_memory(std::string_view name, std::size_t size) const {
+  if (auto valid = check_object_name(name); !valid) return std::unexpected(valid.error());
+  return UnnamedMemory::make(pool_memory_name(this->name(), name), size, rights_for({}, this->name()));
+}
+
 Result<SharedMemory> ObjectPool::replace_memory(std::string_view name, std::size_t size,
                                                 const MemoryFile::Fill& fill) {
-  if (auto valid = check_object_name(name); !valid) return std::unexpected(valid.error());
-  const Wanted wanted{.name = name, .type = ObjectType::memory, .initial = size};
-  auto unnamed =
-      UnnamedMemory::make(pool_memory_name(this->name(), name), size, rights_for({}, this->name()));
-  if (!unnamed) return std::unexpected(std::move(unnamed).error());
-  if (auto filled = fill(unnamed->bytes()); !filled) return std::unexpected(std::move(filled).error());
-  {
-    auto held = segment_->lock();
-    if (!held) return std::unexpected(held.error());
-    if (ObjectEntry* const old = segment_->find(*held, name); old != nullptr) {
-      if (auto same = check_is(*old, ObjectType::memory, name); !same) return std::unexpected(same.error());
-      if (auto may = check_permitted(*old, Access::read_write, name); !may)
-        return std::unexpected(may.error());
-      segment_->table(*held).erase(*old);
-    }
-    const auto made = make_entry(*held, wanted, {.keep = true}, &*unnamed);
-    if (!made) return std::unexpected(made.error());
-  }
-  SharedMemory memory;
-  if (auto opened = open_into(memory, wanted, Access::read_write); !opened) {
-    return std::unexpected(std::move(opened).error());
-  }
-  return memory;
+  auto prepared = prepare_memory(name, size);
+  if (!prepared) return std::unexpected(std::move(prepared).error());
+  if (auto filled = fill(prepared->bytes()); !filled) return std::unexpected(std::move(filled).error());
+  return replace_memory(name, *prepared);
 }
 
 Result<void> ObjectPool::remove_object(std::string_view name) {

@@ -128,6 +128,10 @@ class ObjectPool {
                                    const ObjectOptions& options = {}) {
     return create_object<SharedMemory>(name, size, options);
   }
+  /// The same with other first contents: nobody sees the memory without them, whatever ends this process.
+  [[nodiscard]] Result<Created<SharedMemory>> create_memory(std::string_view name, std::size_t size,
+                                                            const ObjectOptions& options,
+                                                            std::span<const std::byte> contents);
   [[nodiscard]] auto open_shared_event(std::string_view name, Access access = Access::read_write) const {
     return open_object<SharedEvent>(name, access);
   }
@@ -144,6 +148,10 @@ class ObjectPool {
   /// refused, full.
   [[nodiscard]] Result<SharedMemory> replace_memory(std::string_view name, std::size_t size,
                                                     const MemoryFile::Fill& fill);
+  /// The same in two steps: until the second one nothing has changed. The bytes keep their addresses.
+  [[nodiscard]] Result<UnnamedMemory> prepare_memory(std::string_view name, std::size_t size) const;
+  /// After an error the memory that was prepared stays mapped.
+  [[nodiscard]] Result<SharedMemory> replace_memory(std::string_view name, UnnamedMemory& prepared);
 
   /// Keeps the object no longer: it goes now, or with its last reference. not_found, refused.
   [[nodiscard]] Result<void> remove_object(std::string_view name);
@@ -173,9 +181,11 @@ class ObjectPool {
   [[nodiscard]] Result<bool> create_into(PoolObject& object, ObjectType type, std::string_view name,
                                          std::uint64_t initial, const ObjectOptions& options);
   [[nodiscard]] Result<bool> create_into(PoolObject& object, const Wanted& wanted,
-                                         const ObjectOptions& options);
+                                         const ObjectOptions& options,
+                                         std::span<const std::byte> contents = {});
   [[nodiscard]] Result<bool> create_memory_into(SharedMemory& object, const Wanted& wanted,
-                                                const ObjectOptions& options);
+                                                const ObjectOptions& options,
+                                                std::span<const std::byte> contents = {});
   [[nodiscard]] Result<bool> create_locked(PoolObject& object, const Wanted& wanted,
                                            const ObjectOptions& options, UnnamedMemory* memory);
   [[nodiscard]] Result<void> open_into(PoolObject& object, ObjectType type, std::string_view name,

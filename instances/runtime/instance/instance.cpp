@@ -270,7 +270,15 @@ Result<std::string> Instance::make_tasks() {
 }
 
 Result<std::string> Instance::start_scheduler() {
-  if (!tasks_ || options_.launch.stopped) return {};
+  const bool runs = tasks_ && !options_.launch.stopped;
+  if (runs) {
+    if (auto fits = tasks_->check(scheduler_, start_.settings.scheduler); !fits)
+      return std::unexpected(std::move(fits).error());
+  }
+  // A start that has failed until here leaves the memories of the pool and the retain values as they were.
+  // Not later: a task that aborts with the lock of the heap would hold it up.
+  if (auto kept = host_->areas().keep(); !kept) return std::unexpected(std::move(kept).error());
+  if (!runs) return {};
   return start("start of the process");
 }
 

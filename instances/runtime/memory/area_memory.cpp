@@ -157,8 +157,8 @@ Result<AreaMemory> AreaMemory::of_device(const AreaSettings& settings) {
 }
 
 Result<AreaMemory> AreaMemory::of_pool(ObjectPool& pool, const std::string& name, std::size_t bytes,
-                                       bool exclusive) {
-  auto created = pool.create_memory(name, bytes, {.keep = true});
+                                       std::span<const std::byte> contents, bool exclusive) {
+  auto created = pool.create_memory(name, bytes, {.keep = true}, contents);
   if (!created) return std::unexpected(std::move(created).error());
   AreaMemory memory;
   memory.existed_ = !created->made;

@@ -68,11 +68,13 @@ class AreaMemory {
   [[nodiscard]] static Result<AreaMemory> of_process(std::size_t bytes);
   /// A stretch of a device or file. The error names the line of `settings`. Set-up.
   [[nodiscard]] static Result<AreaMemory> of_device(const AreaSettings& settings);
-  /// The shared memory `name` of the pool, made (zeroed) if it is not there; it outlives the process. An
-  /// image that firmware has made with a C header alone is it, too. `exclusive`: nobody else may have it so;
-  /// busy: somebody has. wrong_size: it has another one. Set-up.
+  /// The shared memory `name` of the pool, made with these first contents (zeros behind them) if it is not
+  /// there; once it is kept, it outlives the process. An image that firmware has made with a C header alone
+  /// is it, too. `exclusive`: nobody else may have it so; busy: somebody has. wrong_size: it has another one.
+  /// Set-up.
   [[nodiscard]] static Result<AreaMemory> of_pool(ObjectPool& pool, const std::string& name,
-                                                  std::size_t bytes, bool exclusive);
+                                                  std::size_t bytes, std::span<const std::byte> contents,
+                                                  bool exclusive);
   /// Whether of_device() and of_pool() would find another thing there than they need, as far as that can be
   /// told without opening or making it. Set-up.
   [[nodiscard]] static Result<void> check_device(const AreaSettings& settings);
@@ -86,8 +88,6 @@ class AreaMemory {
   [[nodiscard]] bool existed() const noexcept { return existed_; }
   /// It stays in the pool when this object goes. Until then a memory that of_pool() has made goes with it.
   void keep() noexcept { made_.keep(); }
-  /// Such a memory goes from the pool with the last process that has it. It stays mapped here.
-  void take_back() { made_ = MadeInPool(); }
 
  private:
   GuardedMapping mapping_;  // whole pages; empty: shared_ holds it

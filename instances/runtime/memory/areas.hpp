@@ -50,10 +50,15 @@ class Areas {
                                           std::span<const DeclaredArea> areas);
   /// Places the areas, whose uses are complete, fills them with retain values or with initial values, and
   /// tells the application the addresses. Then puts the exchange of inputs and outputs around the cycles of
-  /// the tasks that use them: the others stay as they are. A text: remarks. After an error the pool has
-  /// the memories that it had before. Once, after the application was loaded; set-up.
+  /// the tasks that use them: the others stay as they are. A text: remarks. After an error, and if these
+  /// areas go without keep(), the pool has the memories that it had before, and the retain values are those
+  /// of before. Once, after the application was loaded; set-up.
   [[nodiscard]] Result<std::string> place(const Environment& environment, std::vector<DeclaredArea> areas,
                                           std::span<TaskConfig> tasks);
+
+  /// The start of the instance has succeeded: the memories of place() stay, and retain areas are written.
+  /// After an error: as without it. Once; set-up.
+  [[nodiscard]] Result<void> keep();
 
   /// Writes the retain areas now, if no task is within a cycle. Control thread.
   void save() {
@@ -104,7 +109,6 @@ class Areas {
                                          const AreaBlock& planned);
   void make_image(Block& block, const AreaBlock& planned);
   [[nodiscard]] Result<void> make_keeper(const Environment& environment);
-  void take_back();
   void tell_plain_addresses();
   void make_views(std::size_t index);
   void make_view(std::size_t index, std::size_t task, bool sole);

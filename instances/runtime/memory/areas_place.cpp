@@ -178,21 +178,16 @@ Result<std::string> Areas::place(const Environment& environment, std::vector<Dec
   for (std::size_t block = 0; block < plan_.blocks.size(); ++block) make_views(block);
   count_cycles(tasks);
   wrap(tasks);
-  if (keeper_) {
-    if (auto started = keeper_->start(); !started) {
-      take_back();
-      return std::unexpected(std::move(started).error());
-    }
-  }
-  for (Block& block : blocks_) block.memory.keep();
   placed_ = true;
   return keeper_ ? fmt::format("{}", fmt::join(keeper_->remarks(), "; ")) : std::string();
 }
 
-// The memories that were made go from the pool with this process: the application has their addresses.
-void Areas::take_back() {
-  for (Block& block : blocks_) block.memory.take_back();
-  keeper_->take_back();
+Result<void> Areas::keep() {
+  if (keeper_) {
+    if (auto started = keeper_->start(); !started) return started;
+  }
+  for (Block& block : blocks_) block.memory.keep();
+  return {};
 }
 
 Result<void> Areas::make_blocks(const Environment& environment) {
@@ -225,8 +220,11 @@ Result<void> Areas::make_memory(const Environment& environment, Block& block, co
   block.source = fmt::format("{}: [SysMem] Area.{}: {}", settings.where, settings.number,
                              settings.object.empty() ? settings.device : settings.object);
   if (settings.object.empty()) return take(AreaMemory::of_device(settings));
+  // An image says by its header that it is none yet.
+  const std::span<const std::byte> contents =
+      first.has_image() ? std::span<const std::byte>() : std::span<const std::byte>(block.initial);
   auto made = AreaMemory::of_pool(*environment.pool, settings.object, bytes_in_pool(settings, first),
-                                  first.is_output());
+                                  contents, first.is_output());
   if (!made) return failure_in(name_of(settings), std::move(made).error());
   return take(std::move(made));
 }

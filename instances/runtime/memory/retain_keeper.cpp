@@ -37,7 +37,6 @@ struct RetainKeeper::Start {
   std::optional<RetainFiles> files;
   std::optional<RetainImage> source;  // the values to go on with
   Origin origin = PLC_AREA_INITIAL;   // of those
-  bool fresh = false;                 // no process before has left a memory
   bool aside = false;                 // the files are of another layout
   std::uint64_t generation = 0;       // the highest that was used
   std::vector<std::byte> written;     // the contents of the newest file
@@ -63,8 +62,7 @@ struct RetainKeeper::Start {
   void find_source(const std::string& pool, const std::string& name, RetainFiles::Found found) {
     auto left = pool.empty() ? Result<RetainMemory::Left>(failure(ErrorCode::not_found, name))
                              : RetainMemory::left_behind(pool, name);
-    fresh = !left && left.error().code == ErrorCode::not_found;
-    if (!left && !fresh) {
+    if (!left && left.error().code != ErrorCode::not_found) {
       remarks.push_back(fmt::format("the retain memory that the process before has left is not used: {}",
                                     left.error().describe()));
     }
@@ -151,38 +149,40 @@ Result<std::unique_ptr<RetainKeeper>> RetainKeeper::make(ObjectPool& pool, const
   start.find_source(pool.name(), name, start.files ? start.files->read() : RetainFiles::Found{});
   if (auto judged = start.judge(initial.layout, options.mismatch); !judged)
     return std::unexpected(judged.error());
-  // Before the memory of then is replaced: a start after a kill finds nothing to put aside.
-  if (start.aside && start.files) start.files->put_aside();
   start.fill(initial, options.cold);
   auto memory = start.goes_on_in_place(initial, options.cold)
                     ? RetainMemory::take_over(pool, name, initial.layout)
-                    : RetainMemory::make(pool, name, start.image);
+                    : RetainMemory::prepare(pool, name, start.image);
   // The left-over may be a file without an object: then its values go on in a new one.
-  if (!memory) memory = RetainMemory::make(pool, name, start.image);
+  if (!memory) memory = RetainMemory::prepare(pool, name, start.image);
   if (!memory) return std::unexpected(std::move(memory).error());
-  MadeInPool made = start.fresh ? MadeInPool(pool, name) : MadeInPool();
   return std::unique_ptr<RetainKeeper>(
-      new RetainKeeper(*std::move(memory), std::move(made), std::move(start), options));
+      new RetainKeeper(pool, name, *std::move(memory), std::move(start), options));
 }
 
 Result<void> RetainKeeper::start() {
-  if (!files_) {
-    made_.keep();
-    return {};
+  // The thread waits: the steps that can fail come before those that change anything.
+  if (files_) {
+    auto thread = Thread::start("retain", {}, [this] { run(); });
+    if (!thread) return std::unexpected(std::move(thread).error());
+    thread_ = *std::move(thread);
   }
-  // The decision for this start holds also if the power is cut before the first cycle. If the disk refuses
-  // it, the machine runs all the same.
-  save();
-  auto thread = Thread::start("retain", {}, [this] { run(); });
-  if (!thread) return std::unexpected(std::move(thread).error());
-  thread_ = *std::move(thread);
-  made_.keep();
+  // Before the memory of then is replaced: a start after a kill finds nothing to put aside.
+  if (aside_ && files_) files_->put_aside();
+  if (auto published = memory_.publish(pool_, name_); !published) return published;
+  save_first();
+  const std::lock_guard lock(mutex_);
+  started_ = true;
+  wake_.notify_one();
   return {};
 }
 
-RetainKeeper::RetainKeeper(RetainMemory memory, MadeInPool made, Start start, const Options& options)
-    : memory_(std::move(memory)),
-      made_(std::move(made)),
+RetainKeeper::RetainKeeper(ObjectPool& pool, std::string name, RetainMemory memory, Start start,
+                           const Options& options)
+    : pool_(pool),
+      name_(std::move(name)),
+      memory_(std::move(memory)),
+      aside_(start.aside),
       files_(std::move(start.files)),
       origins_(std::move(start.origins)),
       remarks_(std::move(start.remarks)),
@@ -212,7 +212,8 @@ void RetainKeeper::run() {
   constexpr Duration kLook = std::chrono::seconds(1);
   const auto awaited = [this] { return soon_ || ending_; };
   std::unique_lock lock(mutex_);
-  for (bool last = false; !last;) {
+  wake_.wait(lock, [this] { return started_ || ending_; });
+  for (bool last = !started_; !last;) {
     const TimePoint next = MonotonicClock::now() + interval_;
     for (Duration left = interval_; left > Duration::zero() && !awaited();
          left = next - MonotonicClock::now()) {
@@ -290,8 +291,15 @@ bool RetainKeeper::notice_loss() {
   return lost_;
 }
 
-void RetainKeeper::save() {
+// The decision for this start holds also if the power is cut now. If the disk refuses it, the machine runs
+// all the same.
+void RetainKeeper::save_first() {
   if (!files_) return;
+  if (notice_loss()) return count_unsaved();
+  if (write_image()) saves_.store(1, std::memory_order_relaxed);
+}
+
+void RetainKeeper::save() {
   // A lost memory stays lost: its contents are not known if it looks whole again later.
   if (lost_) return count_unsaved();
   const Taken taken = take_snapshot();
@@ -302,13 +310,18 @@ void RetainKeeper::save() {
                           : "tasks of some areas were within a cycle each time; those of the others are");
   if (taken != Taken::all) count_unsaved();
   if (taken == Taken::none || (image_.data == written_ && saves() > 0)) return;
-  if (const auto done = write(); !done) {
+  if (write_image() && taken == Taken::all) saves_.store(saves() + 1, std::memory_order_relaxed);
+}
+
+bool RetainKeeper::write_image() {
+  const auto done = write();
+  tell(Fault::files, done ? "" : done.error().describe());
+  if (done) {
+    written_ = image_.data;
+  } else {
     count_unsaved();
-    return tell(Fault::files, done.error().describe());
   }
-  tell(Fault::files, "");
-  written_ = image_.data;
-  if (taken == Taken::all) saves_.store(saves() + 1, std::memory_order_relaxed);
+  return done.has_value();
 }
 
 // An attempt that fails is repeated under the same number: so it never takes the place of the last good file.

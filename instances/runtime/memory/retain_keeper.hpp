@@ -40,7 +40,8 @@ class RetainKeeper {
   [[nodiscard]] static Result<std::size_t> check(const std::string& pool, const std::string& instance,
                                                  const RetainImage& initial, const Options& options);
   /// `initial`: the layout with its initial values. Goes on with what is left in memory, else with the newest
-  /// file that is whole. refused: that has another layout and the settings say so. Set-up.
+  /// file that is whole. Without start() the memory and the files of before stay as they were. `pool`
+  /// outlives it. refused: that has another layout and the settings say so. Set-up.
   [[nodiscard]] static Result<std::unique_ptr<RetainKeeper>> make(ObjectPool& pool,
                                                                   const std::string& instance,
                                                                   const RetainImage& initial,
@@ -50,11 +51,9 @@ class RetainKeeper {
   RetainKeeper& operator=(const RetainKeeper&) = delete;
 
   [[nodiscard]] RetainMemory& memory() noexcept { return memory_; }
-  /// Begins to write: until then the memory can be arranged. From then on a memory that make() has made
-  /// stays in the pool; without it, one in the place of no other goes with this object. Set-up, once.
+  /// The start of the instance has succeeded: from now on its memory is that of the pool, and its values are
+  /// written. Set-up, once.
   [[nodiscard]] Result<void> start();
-  /// Such a memory goes from the pool with the last process that has it. It stays mapped here.
-  void take_back() { made_ = MadeInPool(); }
   [[nodiscard]] Origin origin(std::size_t area) const noexcept { return origins_[area]; }
   /// The text about the start.
   [[nodiscard]] const std::vector<std::string>& remarks() const noexcept { return remarks_; }
@@ -71,9 +70,11 @@ class RetainKeeper {
 
  private:
   struct Start;
-  RetainKeeper(RetainMemory memory, MadeInPool made, Start start, const Options& options);
+  RetainKeeper(ObjectPool& pool, std::string name, RetainMemory memory, Start start, const Options& options);
   void run();
+  void save_first();
   void save();
+  [[nodiscard]] bool write_image();
   /// Whether the memory is lost, which is told.
   [[nodiscard]] bool notice_loss();
   /// The state of image_ then: all as it is between cycles now; so of some areas, the others as before;
@@ -93,8 +94,10 @@ class RetainKeeper {
   void tell(Fault fault, std::string why);
   void count_unsaved() noexcept;
 
+  ObjectPool& pool_;
+  std::string name_;  // of the memory
   RetainMemory memory_;
-  MadeInPool made_;
+  bool aside_;  // the files are of another layout, and are put aside
   std::optional<RetainFiles> files_;
   std::vector<Origin> origins_;
   std::vector<std::string> remarks_;
@@ -110,6 +113,7 @@ class RetainKeeper {
   mutable std::mutex mutex_;
   std::array<std::string, kFaults> problems_;  // guarded by the mutex
   std::condition_variable wake_;
+  bool started_ = false;
   bool soon_ = false;
   bool ending_ = false;
   Thread thread_;

@@ -49,7 +49,7 @@ std::size_t RetainMemory::bytes_for(std::uint64_t data) noexcept {
 }
 
 RetainMemory::Header& RetainMemory::header() const noexcept {
-  return *reinterpret_cast<Header*>(memory_.bytes().data());
+  return *reinterpret_cast<Header*>(bytes_.data());
 }
 
 Result<RetainMemory::Left> RetainMemory::left_behind(const std::string& pool, const std::string& name) {
@@ -86,49 +86,66 @@ Result<RetainMemory::Left> RetainMemory::left_behind(const std::string& pool, co
   return left;
 }
 
-Result<RetainMemory> RetainMemory::of(Result<SharedMemory> opened, std::size_t bytes) {
+namespace {
+
+std::unexpected<Error> not_guarded() {
+  return failure(ErrorCode::full,
+                 fmt::format("retain variables: more than {} memories of others", MemoryGuard::kMost));
+}
+
+}  // namespace
+
+Result<RetainMemory> RetainMemory::take_over(ObjectPool& pool, const std::string& name,
+                                             const RetainLayout& layout) {
+  auto opened = pool.open_memory(name);
   if (!opened) return failure_in("retain variables", std::move(opened).error());
+  const std::size_t bytes = bytes_for(layout.bytes);
   if (opened->bytes().size() != bytes) {
     return failure(ErrorCode::wrong_size,
                    fmt::format("retain variables: their memory has {} bytes, {} are needed",
                                opened->bytes().size(), bytes));
   }
-  if (!opened->guarded()) {
-    return failure(ErrorCode::full,
-                   fmt::format("retain variables: more than {} memories of others", MemoryGuard::kMost));
-  }
-  return RetainMemory(*std::move(opened));
-}
-
-Result<RetainMemory> RetainMemory::take_over(ObjectPool& pool, const std::string& name,
-                                             const RetainLayout& layout) {
-  auto kept = of(pool.open_memory(name), bytes_for(layout.bytes));
-  if (!kept) return kept;
-  for (CycleCounter& counter : kept->header().counters) counter.store(0, std::memory_order_relaxed);
+  if (!opened->guarded()) return not_guarded();
+  RetainMemory kept(*std::move(opened));
+  for (CycleCounter& counter : kept.header().counters) counter.store(0, std::memory_order_relaxed);
   return kept;
 }
 
-Result<RetainMemory> RetainMemory::make(ObjectPool& pool, const std::string& name, const RetainImage& image) {
-  const auto fill = [&](std::span<std::byte> bytes) -> Result<void> {
-    auto& header = *reinterpret_cast<Header*>(bytes.data());
-    header.magic = kRetainMagic;
-    header.generation.store(image.generation, std::memory_order_relaxed);
-    header.areas = image.layout.areas.size();
-    header.bytes = image.layout.bytes;
-    header.application.assign(image.layout.application);
-    for (std::size_t i = 0; i < image.layout.areas.size(); ++i) {
-      header.entries[i] = record_of(image.layout.areas[i]);
-    }
-    std::ranges::copy(image.data, bytes.begin() + sizeof(Header));
-    std::memcpy(bytes.last(sizeof(kRetainEnd)).data(), &kRetainEnd, sizeof(kRetainEnd));
-    return {};
-  };
-  const std::size_t bytes = bytes_for(image.layout.bytes);
-  return of(pool.replace_memory(name, bytes, fill), bytes);
+Result<RetainMemory> RetainMemory::prepare(ObjectPool& pool, const std::string& name,
+                                           const RetainImage& image) {
+  if (const auto known = pool.look_at(name); known && known->type != ObjectType::memory) {
+    return failure(ErrorCode::wrong_type, fmt::format("retain variables: '{}' is no shared memory but a {}",
+                                                      name, to_string(known->type)));
+  }
+  auto prepared = pool.prepare_memory(name, bytes_for(image.layout.bytes));
+  if (!prepared) return failure_in("retain variables", std::move(prepared).error());
+  if (!prepared->guarded()) return not_guarded();
+  const std::span bytes = prepared->bytes();
+  auto& header = *reinterpret_cast<Header*>(bytes.data());
+  header.magic = kRetainMagic;
+  header.generation.store(image.generation, std::memory_order_relaxed);
+  header.areas = image.layout.areas.size();
+  header.bytes = image.layout.bytes;
+  header.application.assign(image.layout.application);
+  for (std::size_t i = 0; i < image.layout.areas.size(); ++i) {
+    header.entries[i] = record_of(image.layout.areas[i]);
+  }
+  std::ranges::copy(image.data, bytes.begin() + sizeof(Header));
+  std::memcpy(bytes.last(sizeof(kRetainEnd)).data(), &kRetainEnd, sizeof(kRetainEnd));
+  return RetainMemory(*std::move(prepared));
+}
+
+Result<void> RetainMemory::publish(ObjectPool& pool, const std::string& name) {
+  if (!prepared_) return {};
+  auto published = pool.replace_memory(name, *prepared_);
+  if (!published) return failure_in("retain variables", std::move(published).error());
+  memory_ = *std::move(published);
+  prepared_.reset();
+  return {};
 }
 
 std::span<std::byte> RetainMemory::data() const noexcept {
-  return memory_.bytes().subspan(sizeof(Header), memory_.bytes().size() - bytes_for(0));
+  return bytes_.subspan(sizeof(Header), bytes_.size() - bytes_for(0));
 }
 
 CycleCounter& RetainMemory::counter(std::size_t task) const noexcept {
@@ -159,9 +176,9 @@ void RetainMemory::add_group(const std::vector<std::size_t>& tasks,
 
 // A cut that has taken any data has taken the end, too.
 bool RetainMemory::is_whole() const noexcept {
-  const bool has_end = has_its_end(memory_.bytes());
+  const bool has_end = has_its_end(bytes_);
   const Header& kept = header();
-  const bool described = kept.magic == kRetainMagic && bytes_for(kept.bytes) == memory_.bytes().size();
+  const bool described = kept.magic == kRetainMagic && bytes_for(kept.bytes) == bytes_.size();
   const bool elsewhere = std::ranges::none_of(
       elsewhere_, [](const Elsewhere& part) { return MemoryGuard::is_lost(part.live.data()); });
   return has_end && described && elsewhere && !memory_.lost();

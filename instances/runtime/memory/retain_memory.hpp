@@ -34,10 +34,13 @@ class RetainMemory {
   /// The one that was left behind, with all that was written into it until now; it has this layout. Set-up.
   [[nodiscard]] static Result<RetainMemory> take_over(ObjectPool& pool, const std::string& name,
                                                       const RetainLayout& layout);
-  /// A new one with these data; the one before under the name goes. It has its name only when it is whole.
+  /// A new one with these data. Until publish() no other process sees it. wrong_type: another object has the
+  /// name. Set-up.
+  [[nodiscard]] static Result<RetainMemory> prepare(ObjectPool& pool, const std::string& name,
+                                                    const RetainImage& image);
+  /// It has the name from now on, and the one before goes. Nothing happens to one that was taken over.
   /// Set-up.
-  [[nodiscard]] static Result<RetainMemory> make(ObjectPool& pool, const std::string& name,
-                                                 const RetainImage& image);
+  [[nodiscard]] Result<void> publish(ObjectPool& pool, const std::string& name);
 
   /// Of the whole memory, for so many bytes of data.
   [[nodiscard]] static std::size_t bytes_for(std::uint64_t data) noexcept;
@@ -69,8 +72,9 @@ class RetainMemory {
 
  private:
   struct Header;
-  explicit RetainMemory(SharedMemory memory) noexcept : memory_(std::move(memory)) {}
-  [[nodiscard]] static Result<RetainMemory> of(Result<SharedMemory> opened, std::size_t bytes);
+  explicit RetainMemory(SharedMemory memory) noexcept : memory_(std::move(memory)), bytes_(memory_.bytes()) {}
+  explicit RetainMemory(UnnamedMemory prepared) noexcept
+      : prepared_(std::move(prepared)), bytes_(prepared_->bytes()) {}
   [[nodiscard]] Header& header() const noexcept;
 
   struct Elsewhere {
@@ -78,6 +82,8 @@ class RetainMemory {
     std::span<std::byte> live;
   };
   SharedMemory memory_;
+  std::optional<UnnamedMemory> prepared_;  // until publish()
+  std::span<std::byte> bytes_;             // of one of them
   std::vector<Elsewhere> elsewhere_;
   std::deque<RetainGroup> groups_;
 };

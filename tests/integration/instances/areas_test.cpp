@@ -355,6 +355,34 @@ TEST_F(AreasOf, AnotherApplicationIsRefusedWithTheSetting) {
   EXPECT_THAT(other.log(), HasSubstr("of another layout: area 'kept' has another layout"));
 }
 
+// Its areas are placed when it comes to its clock device, which is none for this scheduler.
+TEST_F(AreasOf, AStartThatFailsLateLeaveTheMemoryAndTheRetainValuesOfBefore) {
+  start_well();
+  ASSERT_TRUE(eventually([&] { return sut->task("Fast")->counters.cycles > 50; }));
+  const Report before = report();
+  EXPECT_EQ(sut->end(SIGTERM), 0);
+  constexpr const char* kDevice = "/dev/clock-of-a-test";
+  const std::string settings =
+      sandbox.write("late.cfg", std::string("[CmpSchedule]\nSchedulerInterval=1000\n[SysTimer]\n"
+                                            "Linux.TimerSource=Auxiliary\nLinux.AuxiliaryDevice=") +
+                                    kDevice +
+                                    "\n[SysMem]\nLinux.Area.0.Flags=0x8000\nLinux.Area.0.Object=fresh\n"
+                                    "Linux.Area.0.Size=8\n");
+  InstanceProcess late(sandbox,
+                       {"--settings", settings, "--application", application("areas_other"), "--scheduler",
+                        "CmpScheduleOneShot", "--state-directory", state_directory()},
+                       {"LD_PRELOAD=" + application("clock_device"), "ASAN_OPTIONS=verify_asan_link_order=0",
+                        std::string("CLOCK_DEVICE_PATH=") + kDevice, "CLOCK_DEVICE_KIND=hpet",
+                        "CLOCK_DEVICE_PERCENT=100", "CLOCK_DEVICE_STOP=" + sandbox.folder() + "/stop"});
+  EXPECT_EQ(late.end(), 3) << late.log();
+  EXPECT_THAT(late.log(), HasSubstr("ticks only periodically"));
+  EXPECT_EQ(ObjectPool::attach(sandbox.pool())->look_at("fresh").error().code, ErrorCode::not_found);
+  start_well();
+  const Report said = report();
+  EXPECT_EQ(said.origin, 1U) << "the memory of the process before";
+  EXPECT_GE(said.begun, before.begun);
+}
+
 TEST_F(AreasOf, TwoProcessesDoNotShareRetainFiles) {
   start_well();
   InstanceProcess second(sandbox, {"--pool", sandbox.pool() + "-2", "--application", application("areas"),

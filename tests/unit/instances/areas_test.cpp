@@ -2,6 +2,7 @@
 #include "instances/runtime/memory/areas.hpp"
 
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cstdio>
 #include <cstring>
@@ -68,6 +69,13 @@ class AreasUnderTest : public ::testing::Test {
     tasks.push_back(std::move(config));
   }
   [[nodiscard]] Result<std::string> place(const std::string& settings = {}) {
+    auto placed = place_only(settings);
+    if (!placed) return placed;
+    if (auto kept = sut.keep(); !kept) return std::unexpected(std::move(kept).error());
+    return placed;
+  }
+  /// As a start does of which a later step may fail.
+  [[nodiscard]] Result<std::string> place_only(const std::string& settings = {}) {
     settings_ = parse_settings(settings, "l.cfg").value();
     std::vector<std::string> names;
     for (const TaskConfig& task : tasks) names.push_back(task.name);
@@ -122,6 +130,59 @@ TEST_F(AreasUnderTest, WhoseRetainMemoryHasNoPlaceLeaveThePoolAsItWas) {
   EXPECT_EQ(placed.error().code, ErrorCode::wrong_type);
   EXPECT_EQ(shared_.look_at("fresh").error().code, ErrorCode::not_found);
   EXPECT_EQ(shared_.look_at("line1.retain")->type, ObjectType::semaphore);
+}
+
+TEST_F(AreasUnderTest, OfAStartThatFailsAfterwardsLeaveThePoolAsItWas) {
+  const auto taken = shared_.create_memory("there", 8, {.keep = true});
+  ASSERT_TRUE(taken);
+  task("Main", [] {});
+  declare("data", PLC_AREA_DATA, 8);
+  declare("memory", PLC_AREA_MEMORY, 8);
+  declare("out", PLC_AREA_OUTPUT, 8, {{"Main", 0, 8, nullptr}});
+  declare("kept", PLC_AREA_RETAIN, 8);
+  const std::string settings =
+      "[SysMem]\nLinux.Area.0.Flags=0x10\nLinux.Area.0.Object=fresh\nLinux.Area.0.Size=8\n"
+      "Linux.Area.1.Flags=0x01\nLinux.Area.1.Object=there\nLinux.Area.1.Size=8\n"
+      "Linux.Area.2.Flags=0x08\nLinux.Area.2.Object=out\nLinux.Area.2.Size=8\n";
+  for (const bool fails : {true, false}) {
+    const auto before = tasks;
+    const auto placed = fails ? place_only(settings) : place(settings);
+    ASSERT_TRUE(placed) << placed.error().describe();
+    sut = Areas();
+    tasks = before;
+    for (const char* name : {"fresh", "out", "line1.retain"}) {
+      EXPECT_EQ(shared_.look_at(name).has_value(), !fails) << name;
+      EXPECT_EQ(std::filesystem::exists(MemoryFile::path(pool_memory_name(pool_, name))), !fails) << name;
+    }
+    EXPECT_TRUE(shared_.look_at("there")) << "it was there before";
+  }
+}
+
+// However the process ends meanwhile, the next one finds nothing, or a memory with these values.
+TEST_F(AreasUnderTest, AreSeenByOthersWithTheirInitialValuesOnly) {
+  const std::array<unsigned char, 8> initial{1, 2, 3, 4, 5, 6, 7, 8};
+  task("Main", [] {});
+  declare("data", PLC_AREA_MEMORY, 8, {}, nullptr, initial.data());
+  // It takes some ms to place, and lies between the memory before and the values in that.
+  declare("large", PLC_AREA_DATA, 16 * 1024 * 1024);
+  std::array<unsigned char, 8> seen{};
+  std::atomic<bool> looks{false};
+  std::thread other([&] {
+    const auto pool = ObjectPool::attach(pool_);
+    looks = true;
+    for (auto memory = pool->open_memory("fresh");; memory = pool->open_memory("fresh")) {
+      if (!memory) continue;
+      std::memcpy(seen.data(), memory->bytes().data(), seen.size());
+      return;
+    }
+  });
+  while (!looks) std::this_thread::yield();
+  const auto placed =
+      place("[SysMem]\nLinux.Area.0.Flags=0x10\nLinux.Area.0.Object=fresh\nLinux.Area.0.Size=8\n");
+  if (!placed) (void)shared_.create_memory("fresh", 8, {.keep = true});
+  other.join();
+  ASSERT_TRUE(placed) << placed.error().describe();
+  EXPECT_EQ(seen, initial);
 }
 
 TEST_F(AreasUnderTest, LeavesATaskThatUsesNoneAsItIs) {

@@ -130,6 +130,29 @@ TEST_F(Retain, OfAnotherLayoutIsInitialisedAndPutAside) {
   EXPECT_TRUE(fs::exists(folder_ / "line1.retain.1.old"));
 }
 
+// The application that was loaded does not come up, and the one before starts again.
+TEST_F(Retain, OfAStartThatFailsLeaveThoseOfBeforeAsTheyWere) {
+  for (const bool power_cut : {false, true}) {
+    start_well();
+    set(0, 42);
+    sut.reset();
+    if (power_cut) forget_memory();
+    for (const bool cold : {false, true}) {
+      sut = RetainKeeper::make(pool_, "line1", initial(7), {.directory = folder_, .cold = cold}).value();
+      EXPECT_EQ(value(0), kInitial);
+      set(0, 13);
+      sut.reset();
+    }
+    sut = RetainKeeper::make(pool_, "line1", initial(), {.directory = folder_, .cold = true}).value();
+    EXPECT_EQ(value(0), kInitial);
+    sut.reset();
+    EXPECT_FALSE(std::filesystem::exists(folder_ / "line1.retain.0.old"));
+    start_well();
+    EXPECT_EQ(value(0), 42U);
+    EXPECT_EQ(sut->origin(0), power_cut ? PLC_AREA_RESTORED : PLC_AREA_KEPT);
+  }
+}
+
 TEST_F(Retain, OfAnotherLayoutIsRefusedIfWanted) {
   start_well();
   set(0, 42);

@@ -183,6 +183,36 @@ TEST_F(PoolAdoptionTest, AReplacedMemoryHasItsContentsFromTheFirstMoment) {
   EXPECT_EQ(pool_.replace_memory("e", 10, fill('c')).error().code, ErrorCode::wrong_type);
 }
 
+TEST_F(PoolAdoptionTest, APreparedMemoryChangesNothingUntilItReplacesAnother) {
+  const auto old = pool_.create_memory("line1.retain", 100, {.keep = true});
+  ASSERT_TRUE(old) << old.error().describe();
+  (void)pool_.prepare_memory("line1.retain", 200).value();
+  auto prepared = pool_.prepare_memory("line1.retain", 200);
+  ASSERT_TRUE(prepared) << prepared.error().describe();
+  prepared->bytes()[199] = std::byte{'b'};
+  EXPECT_EQ(pool_.look_at("line1.retain")->size, 100U);
+  const std::byte* const address = prepared->bytes().data();
+  const auto sut = pool_.replace_memory("line1.retain", *prepared);
+  ASSERT_TRUE(sut) << sut.error().describe();
+  EXPECT_EQ(sut->bytes().data(), address);
+  EXPECT_EQ(pool_.open_memory("line1.retain")->bytes()[199], std::byte{'b'});
+  EXPECT_FALSE(old->object.valid());
+}
+
+TEST_F(PoolAdoptionTest, AMemoryIsMadeWithItsFirstContents) {
+  const std::array contents{std::byte{1}, std::byte{2}};
+  auto made = pool_.create_memory("m", 4, {.keep = true}, contents);
+  ASSERT_TRUE(made) << made.error().describe();
+  EXPECT_TRUE(made->made);
+  made->object.bytes()[0] = std::byte{9};
+  const auto again = pool_.create_memory("m", 4, {.keep = true}, contents);
+  ASSERT_TRUE(again);
+  EXPECT_FALSE(again->made);
+  const std::array<std::byte, 4> wanted{std::byte{9}, std::byte{2}, std::byte{0}, std::byte{0}};
+  EXPECT_TRUE(std::ranges::equal(again->object.bytes(), wanted)) << "of one that is there they stay";
+  EXPECT_EQ(pool_.create_memory("n", 1, {}, contents).error().code, ErrorCode::wrong_size);
+}
+
 TEST_F(PoolAdoptionTest, WhoIsKilledWhileHeTakesAnImageInLeavesItInItsPlace) {
   constexpr unsigned kSeed = 20;
   constexpr int kImages = 100;
