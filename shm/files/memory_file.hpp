@@ -63,8 +63,7 @@ class MemoryFile {
   [[nodiscard]] bool guarded() const noexcept { return mapping_.guarded(); }
   /// It was cut short, and its bytes are zeros of this process alone. Any context.
   [[nodiscard]] bool lost() const noexcept { return mapping_.lost(); }
-  /// Whether both were opened by a name and are one file. Two that one after the other had the same name are
-  /// not.
+  /// Whether both are one file, made or opened. Two that one after the other had the same name are not.
   [[nodiscard]] bool same_file(const MemoryFile& other) const noexcept {
     return inode_ != 0 && inode_ == other.inode_;
   }
