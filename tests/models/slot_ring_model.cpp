@@ -188,8 +188,8 @@ void a_writer_is_killed(Scene& scene) {
 int main(int argc, char** argv) {
   using namespace plchost::models;
   return run(argc, argv,
-             {{"the_ring_goes_round", the_ring_goes_round},
-              {"two_writers_of_a_full_ring", two_writers_of_a_full_ring},
+             {{"two_writers_of_a_full_ring", two_writers_of_a_full_ring},
+              {"the_ring_goes_round", the_ring_goes_round},
               {"a_writer_is_killed", a_writer_is_killed},
               {"two_writers_one_reader", two_writers_one_reader},
               {"readers_of_two_channels", readers_of_two_channels},
