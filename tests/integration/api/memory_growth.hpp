@@ -101,6 +101,9 @@ struct Uses {
   int first;  ///< they fill the tables that have a bound: answers and posts of the last 1,024 clients
   int then;
   int at_once;
+  /// Each has `then` uses; one of them must be within the bounds. A leak grows in each round, a list only
+  /// until it is full.
+  int rounds = 1;
 };
 
 /// The promise: 10,000 clients come and go within 1 MiB. A test with fewer clients bounds the blocks that
@@ -121,15 +124,22 @@ int expect_bounded_memory(const MeasuredServer& server, Uses uses, const Use& us
   ask_environment("PLCHOST_FIRST_CLIENTS", uses.first);
   ask_environment("PLCHOST_CLIENTS", uses.then);
   repeat_at_once(uses.first, uses.at_once, use);
-  const MemoryUse before = server.settled();
+  MemoryUse before = server.settled();
   EXPECT_GT(before.used, 0);
-  repeat_at_once(uses.then, uses.at_once, use);
-  const MemoryUse after = server.settled();
-  fmt::print("{} and {} times: {} to {} bytes in memory, {} to {} of them in use\n", uses.first, uses.then,
-             before.resident, after.resident, before.used, after.used);
-  EXPECT_LT(after.resident - before.resident, kPromise);
-  EXPECT_LT(after.used - before.used, kNoise + kPromise * uses.then / kPromised);
-  return uses.first + uses.then;
+  for (int round = 1;; ++round) {
+    repeat_at_once(uses.then, uses.at_once, use);
+    const MemoryUse after = server.settled();
+    const std::int64_t most = kNoise + kPromise * uses.then / kPromised;
+    fmt::print("{} and {} times {}: {} to {} bytes in memory, {} to {} of them in use\n", uses.first, round,
+               uses.then, before.resident, after.resident, before.used, after.used);
+    const bool is_bounded = after.resident - before.resident < kPromise && after.used - before.used < most;
+    if (is_bounded || round == uses.rounds) {
+      EXPECT_LT(after.resident - before.resident, kPromise);
+      EXPECT_LT(after.used - before.used, most);
+      return uses.first + round * uses.then;
+    }
+    before = after;
+  }
 }
 
 }  // namespace plchost

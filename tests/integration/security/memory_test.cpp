@@ -15,12 +15,13 @@ namespace {
 
 class SecuredMemory : public SecuredHost {
  protected:
+  // Five handshakes at a time in one process take seconds on a loaded machine.
+  static constexpr Duration kLong = std::chrono::seconds(30);
+
   static bool ask(ControlClient& client, const char* host = "cell") {
-    constexpr Duration kLong = std::chrono::seconds(10);
     return client.call({host, plc_OPERATION_READ_CLOCK, "", ""}, MonotonicClock::now() + kLong).has_value();
   }
   static bool ask_and_post(ControlClient& client) {
-    constexpr Duration kLong = std::chrono::seconds(10);
     return client.call({"cell", plc_OPERATION_STOP, "line1", ""}, MonotonicClock::now() + kLong) &&
            client.post_event({"cell", "line1", "ready"}, 1, {}, kLong);
   }
@@ -35,9 +36,10 @@ TEST_F(SecuredMemory, KeysThatClientsWereToldGoWithThemWhileOneStays) {
   const auto staying = make_client();
   ASSERT_TRUE(staying->instances("cell", soon()));
   std::atomic<int> unanswered{0};
-  const int clients = expect_bounded_memory(server, {.first = 110, .then = 250, .at_once = 4},
+  const int clients = expect_bounded_memory(server, {.first = 110, .then = 250, .at_once = 4, .rounds = 3},
                                             [&] { unanswered += ask(*make_client()) ? 0 : 1; });
   // On a busy machine Cyclone may not get over a handshake whose messages have crossed: one of a hundred.
+  fmt::print("{} of {} clients were not answered\n", unanswered.load(), clients);
   EXPECT_LE(unanswered, clients / 100);
   EXPECT_TRUE(ask_and_post(*staying));
 }
