@@ -23,10 +23,11 @@ void ManagedInstance::on_exit(const ExitStatus& status) {
   status_.pid = 0;
   status_.core = -1;
   const bool guessed = unheard_ && !unreadable_.empty();
+  const SetupStep reached = step_;
   forget_signs();
   host_.set_timer(std::nullopt);
   if (phase_ == Phase::ending) return asked_end();
-  if (phase_ == Phase::setting_up) return set_up_ended(status);
+  if (phase_ == Phase::setting_up) return set_up_ended(status, reached);
   if (phase_ != Phase::up && phase_ != Phase::adopting) return;
   if (guessed) {
     return ended({.cause = EndCause::wish_unreadable}, text_of_beginning(EndCause::wish_unreadable));
@@ -37,10 +38,10 @@ void ManagedInstance::on_exit(const ExitStatus& status) {
         unasked(status));
 }
 
-void ManagedInstance::set_up_ended(const ExitStatus& status) {
+void ManagedInstance::set_up_ended(const ExitStatus& status, SetupStep reached) {
   const bool loaded = before_.has_value() && !removed_;
   const bool refused = status.exited_with(kExitSetupFailed) || status.exited_with(kExitUsage);
-  if (setup_failure_.empty() && step_ == SetupStep::bind_core && status.exited_with(kExitNotLoaded)) {
+  if (setup_failure_.empty() && reached == SetupStep::bind_core && status.exited_with(kExitNotLoaded)) {
     const std::string said = host_.last_line();
     setup_failure_ = said.empty() ? "the program could not be loaded" : said;
     transient_ = transient_error_of_loader(said) != 0;

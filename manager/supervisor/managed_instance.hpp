@@ -268,7 +268,7 @@ class ManagedInstance : public InstanceEvents {
   [[nodiscard]] static InstanceState shown_state(const InstanceRuntime& runtime) noexcept;
   void show_application(const InstanceRuntime& runtime);
   // Ends: instance_ends.cpp
-  void set_up_ended(const ExitStatus& status);
+  void set_up_ended(const ExitStatus& status, SetupStep reached);
   void asked_end();
   /// The process has ended by itself, or could not be started.
   void ended(End end, const std::string& why);
