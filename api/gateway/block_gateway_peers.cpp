@@ -28,7 +28,10 @@ void BlockGateway::follow_hosts(TimePoint now) {
 
 void BlockGateway::follow(const plc_BlockHostStatus& host, const dds_sample_info_t& info, TimePoint now) {
   const std::string name(dds::text_of(host.host));
-  if (info.instance_state != DDS_IST_ALIVE) {
+  // A key belongs to no writer: another host may have disposed of it after this host wrote. None disposes of
+  // its own.
+  const bool ended = info.instance_state == DDS_IST_NOT_ALIVE_NO_WRITERS || !info.valid_data;
+  if (info.instance_state != DDS_IST_ALIVE && ended) {
     names_.erase(name);
     return numbers_.forget(name, now);
   }

@@ -64,6 +64,7 @@ void ManagedInstance::finish_adoption(const std::string& problem) {
 
 void ManagedInstance::learn(const InstanceRuntime& said) {
   unheard_ = false;
+  before_.reset();  // it is up
   unreadable_.clear();
   if (!wish_known_ && !commanded_) {
     wants_running_ = said.running != 0;

@@ -34,7 +34,8 @@ void ManagedInstance::on_exit(const ExitStatus& status) {
   }
   if (phase_ == Phase::up) start_kind_ = StartKind::after_fault;
   ended({.cause = cause_of(status),
-         .lasted = phase_ == Phase::up ? surroundings_.now() - up_since_ : Duration::zero()},
+         .lasted = phase_ == Phase::up ? surroundings_.now() - up_since_ : Duration::zero(),
+         .has_earlier = phase_ == Phase::adopting && before_.has_value() && !removed_},
         unasked(status));
 }
 

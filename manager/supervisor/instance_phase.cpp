@@ -31,6 +31,7 @@ constexpr auto kPhaseSteps = [] {
       std::pair{setting_up, ending},
       std::pair{adopting, down},
       std::pair{adopting, backing_off},
+      std::pair{adopting, setting_up},
       std::pair{adopting, up},
       std::pair{adopting, ending},
       std::pair{up, down},

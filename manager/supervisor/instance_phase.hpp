@@ -28,7 +28,7 @@ namespace plchost {
 //        held          yes   -        yes          yes        -      -     -        waiting
 //        backing_off   yes   -        -            yes        yes    -     yes      waiting
 //        setting_up    yes   -        yes          -          -      yes   yes      starting
-//        adopting      yes   -        yes          -          -      yes   yes      starting
+//        adopting      yes   -        yes          yes        -      yes   yes      starting
 //        up            yes   -        yes          -          -      -     yes      running, stopped, stopping,
 //                                                                                   exception, safe_mode
 //        ending        yes   -        yes          yes        -      -     -        stopping
@@ -41,7 +41,8 @@ namespace plchost {
 //   adopting     a process that outlived its manager was asked for its status. Limit: 5 s; then it counts as
 //                up with a problem text if it has a status page, because a manager stops no PLC for being unable
 //                to talk to it. Without a page it is asked again every 2 s. If it was up before, or its set-up
-//                would be over, it counts as up, in exception, until it answers.
+//                would be over, it counts as up, in exception, until it answers. If it ends in the set-up that
+//                a load began, the application before is set up again.
 //   up           the process answers, or is believed to. The process itself reports its state.
 //   ending       the process was asked to end. Limit: 38 s (a stop may take 10 s and 25 s), then SIGTERM, 2 s,
 //                SIGKILL. An adopted process may be in this phase already.

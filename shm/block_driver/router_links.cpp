@@ -158,7 +158,7 @@ void BlockRouter::open_incoming() {
   }
 }
 
-// false: not yet, the last life of that node has left something.
+// false: not yet. The last life of that node has left something, or threads are still in too many old links.
 bool BlockRouter::open_from(std::uint16_t node) {
   const auto record = node_.directory_.record(node);
   if (!record) return true;
@@ -175,7 +175,8 @@ bool BlockRouter::open_from(std::uint16_t node) {
   if (gate.get() != nullptr && gate.get()->uses(*memory)) return true;
   // A fresh link in the same life replaces a broken one. The blocks in that are lost, and counted.
   if (gate.get() != nullptr) counters().expired.fetch_add(gate.get()->drop_all(), std::memory_order_relaxed);
-  if (gate.exchange(std::make_unique<InLink>(*std::move(memory), life))) set_open(node, true);
+  if (!gate.exchange(std::make_unique<InLink>(*std::move(memory), life))) return false;
+  set_open(node, true);
   node_.own_slot().arrivals.post();  // blocks that came before it was open
   return true;
 }

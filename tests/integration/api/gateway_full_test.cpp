@@ -141,6 +141,7 @@ TEST_F(StrangersClaim, InTheNameOfAHostDoesNotHideThatHost) {
   claim.host_number = 3;
   claim.since_unix_ns = 1;
   ASSERT_EQ(dds_write(writer->get(), &claim), DDS_RETCODE_OK);
+  ASSERT_EQ(dds_dispose(writer->get(), &claim), DDS_RETCODE_OK);
   EXPECT_TRUE(sends(SendResult::sent, std::vector<std::byte>(100), std::nullopt));
 }
 

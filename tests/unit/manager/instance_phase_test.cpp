@@ -17,7 +17,7 @@ constexpr std::array<std::string_view, kInstancePhases> kWanted = {
     "yyyy---",  // held
     "y-yyy-y",  // backing off
     "y-yy-yy",  // setting up
-    "y-y-yyy",  // adopting
+    "y-yyyyy",  // adopting
     "y-y--yy",  // up
     "y-yy--y",  // ending
 };

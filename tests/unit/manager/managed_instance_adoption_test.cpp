@@ -122,6 +122,32 @@ TEST_F(Unheard, IsWhatItsPageSaysWhenThatComes) {
   EXPECT_EQ(state(), InstanceState::running);
 }
 
+// The manager before ended in the set-up that a load began.
+TEST_F(Unheard, HasNoApplicationBeforeOnceItAnswers) {
+  bring_up();
+  wishes_.wish->application_before = "/opt/earlier.so";
+  wishes_.wish->process = InstanceWish::Process::setting_up;
+  adopt();
+  go_on_for(kSetupLimit + seconds(1));
+  ASSERT_EQ(state(), InstanceState::exception);
+  EXPECT_EQ(wishes_.wish->application_before, "/opt/earlier.so");
+  answer_with(ApplicationState::running);
+  go_on_for(milliseconds(50));
+  EXPECT_EQ(state(), InstanceState::running);
+  EXPECT_EQ(wishes_.wish->application_before, "");
+}
+
+TEST_F(Unheard, GivesWayToTheApplicationBeforeIfItEndsInItsSetUp) {
+  bring_up();
+  wishes_.wish->application_before = "/opt/earlier.so";
+  wishes_.wish->process = InstanceWish::Process::setting_up;
+  adopt();
+  go_on_for(seconds(1));
+  sut().on_exit(exited_with(kExitSetupFailed));
+  ASSERT_FALSE(host_.spawned.empty());
+  EXPECT_EQ(host_.spawned.back().application, "/opt/earlier.so");
+}
+
 TEST_F(Unheard, IsInExceptionIfItWasUp) {
   adopt_one_that_was_up();
   go_on_for(kAdoptLimit + seconds(1));

@@ -151,6 +151,27 @@ TEST_F(SharedObjects, FullTableAndFullReferencesAreSaid) {
   EXPECT_EQ(same.size(), 2U * 64 + 1024 - 64);
 }
 
+TEST_F(SharedObjects, AMemoryTakesThePlaceOfAnotherAlsoIfAllReferencesAreTaken) {
+  auto first = pool_.prepare_memory("retain", 100).value();
+  const auto old = pool_.replace_memory("retain", first);
+  ASSERT_TRUE(old) << old.error().describe();
+  const auto mutex = pool_.create_mutex("m");
+  std::vector<SharedMutex> same;
+  for (auto opened = pool_.open_mutex("m"); opened; opened = pool_.open_mutex("m")) {
+    same.push_back(*std::move(opened));
+  }
+  // The one that `old` had is free by then.
+  auto prepared = pool_.prepare_memory("retain", 200).value();
+  const auto sut = pool_.replace_memory("retain", prepared);
+  ASSERT_TRUE(sut) << sut.error().describe();
+  auto again = pool_.prepare_memory("retain", 300).value();
+  same.push_back(pool_.open_mutex("m").value_or(SharedMutex{}));
+  const auto next = pool_.replace_memory("retain", again);
+  ASSERT_TRUE(next) << next.error().describe();
+  EXPECT_EQ(next->bytes().size(), 300U);
+  EXPECT_EQ(pool_.look_at("retain")->size, 300U);
+}
+
 TEST_F(SharedObjects, EventsAreSeenByEachWaiterWithItsOwnCursor) {
   const auto sut = pool_.create_shared_event("e");
   auto other = another();
