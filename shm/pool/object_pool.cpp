@@ -398,12 +398,10 @@ Result<SharedMemory> ObjectPool::replace_memory(std::string_view name, UnnamedMe
   const auto made = make_entry(*held, wanted, {.keep = true}, &prepared);
   if (!made) return std::unexpected(made.error());
   SharedMemory memory;
-  if (!refer(memory, &*held, **made, wanted, Access::read_write)) {
-    // The one before is gone and this one is kept, so no room for a reference is no reason to fail.
-    if (auto referred = refer(memory, nullptr, **made, wanted, Access::read_write); !referred) {
-      return std::unexpected(std::move(referred).error());
-    }
-  }
+  // The one before is gone and this one is kept, so no room for a reference is no reason to fail.
+  auto referred = refer(memory, &*held, **made, wanted, Access::read_write);
+  if (!referred) referred = refer(memory, nullptr, **made, wanted, Access::read_write);
+  if (!referred) return std::unexpected(std::move(referred).error());
   memory.memory_ = prepared.take();
   return memory;
 }
