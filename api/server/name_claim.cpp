@@ -69,14 +69,17 @@ Result<NameClaim> NameClaim::create(dds_entity_t participant, const Options& opt
       .machine = fmt::format("{}, process {}, {}", machine_name(), ::getpid(), options.run_directory)};
   const std::string partition = dds::name_partition(options.host);
   const dds::Qos qos = dds::qos_of(dds::kNameClaim);
+  auto topic = dds::make_topic(participant, dds::kNameClaim);
+  if (!topic) return failure_in("claim the host's name", std::move(topic).error());
+  // First: whoever hears of the reader and answers has heard of the claim.
+  auto own_claim = dds::open_writer(participant, partition, topic->get(), qos);
+  if (!own_claim) return failure_in("claim the host's name", std::move(own_claim).error());
   auto subscriber = dds::make_subscriber(participant, partition);
   if (!subscriber) return failure_in("claim the host's name", std::move(subscriber).error());
-  auto claims = dds::open_reader(participant, subscriber->get(), dds::kNameClaim, qos);
-  if (!claims) return failure_in("claim the host's name", std::move(claims).error());
-  auto own_claim = dds::open_writer(participant, partition, claims->topic.get(), qos);
-  if (!own_claim) return failure_in("claim the host's name", std::move(own_claim).error());
+  auto reader = dds::make_reader(subscriber->get(), topic->get(), qos);
+  if (!reader) return failure_in("claim the host's name", std::move(reader).error());
   claim.subscriber_ = *std::move(subscriber);
-  claim.claims_ = *std::move(claims);
+  claim.claims_ = {.topic = *std::move(topic), .reader = *std::move(reader)};
   claim.own_claim_ = *std::move(own_claim);
   if (auto done = claim.write(); !done) return std::unexpected(done.error());
   return claim;
@@ -97,7 +100,11 @@ Result<void> NameClaim::write() {
 Result<void> NameClaim::ask(TimePoint deadline, int stop_fd) {
   constexpr int kLookMs = 2;
   while (!own_.serving) {
-    if (look(MonotonicClock::now()) == State::taken) return std::unexpected(taken());
+    if (look(MonotonicClock::now()) == State::taken) {
+      // The other one tells its operators of the rival, so it has to hear of this claim.
+      (void)dds_wait_for_acks(own_claim_.writer.get(), DDS_MSECS(500));
+      return std::unexpected(taken());
+    }
     if (MonotonicClock::now() >= deadline) {
       own_.serving = true;
       return write();
