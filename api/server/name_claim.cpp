@@ -69,17 +69,14 @@ Result<NameClaim> NameClaim::create(dds_entity_t participant, const Options& opt
       .machine = fmt::format("{}, process {}, {}", machine_name(), ::getpid(), options.run_directory)};
   const std::string partition = dds::name_partition(options.host);
   const dds::Qos qos = dds::qos_of(dds::kNameClaim);
-  auto topic = dds::make_topic(participant, dds::kNameClaim);
-  if (!topic) return failure_in("claim the host's name", std::move(topic).error());
-  // First: whoever hears of the reader and answers has heard of the claim.
-  auto own_claim = dds::open_writer(participant, partition, topic->get(), qos);
-  if (!own_claim) return failure_in("claim the host's name", std::move(own_claim).error());
   auto subscriber = dds::make_subscriber(participant, partition);
   if (!subscriber) return failure_in("claim the host's name", std::move(subscriber).error());
-  auto reader = dds::make_reader(subscriber->get(), topic->get(), qos);
-  if (!reader) return failure_in("claim the host's name", std::move(reader).error());
+  auto claims = dds::open_reader(participant, subscriber->get(), dds::kNameClaim, qos);
+  if (!claims) return failure_in("claim the host's name", std::move(claims).error());
+  auto own_claim = dds::open_writer(participant, partition, claims->topic.get(), qos);
+  if (!own_claim) return failure_in("claim the host's name", std::move(own_claim).error());
   claim.subscriber_ = *std::move(subscriber);
-  claim.claims_ = {.topic = *std::move(topic), .reader = *std::move(reader)};
+  claim.claims_ = *std::move(claims);
   claim.own_claim_ = *std::move(own_claim);
   if (auto done = claim.write(); !done) return std::unexpected(done.error());
   return claim;
@@ -101,8 +98,7 @@ Result<void> NameClaim::ask(TimePoint deadline, int stop_fd) {
   constexpr int kLookMs = 2;
   while (!own_.serving) {
     if (look(MonotonicClock::now()) == State::taken) {
-      // The other one tells its operators of the rival, so it has to hear of this claim.
-      (void)dds_wait_for_acks(own_claim_.writer.get(), DDS_MSECS(500));
+      be_heard();
       return std::unexpected(taken());
     }
     if (MonotonicClock::now() >= deadline) {
@@ -115,6 +111,19 @@ Result<void> NameClaim::ask(TimePoint deadline, int stop_fd) {
     }
   }
   return {};
+}
+
+// The other one tells its operators of the rival, so it has to hear of this claim. Its claim may be here
+// before its reader is known: only a reader that is known is waited for.
+void NameClaim::be_heard() const {
+  constexpr int kLooks = 250;
+  constexpr int kLookMs = 2;
+  constexpr dds_return_t kReaders = 2;  // this one's own, and the other's
+  const dds_entity_t writer = own_claim_.writer.get();
+  for (int look = 0; look < kLooks && dds_get_matched_subscriptions(writer, nullptr, 0) < kReaders; ++look) {
+    (void)::poll(nullptr, 0, kLookMs);
+  }
+  (void)dds_wait_for_acks(writer, DDS_MSECS(500));
 }
 
 void NameClaim::meet(const NameHolder& other, TimePoint now) {
@@ -134,9 +143,14 @@ bool NameClaim::take(const plc_NameClaim& sample, const dds_sample_info_t& info,
   const bool alive = info.instance_state == DDS_IST_ALIVE;
   if (info.valid_data) {
     NameHolder other = holder_of(sample);
-    // In the name of another; of one that is gone that cannot be known any more.
-    if (alive && dds::writer_of(claims_.reader.get(), info).participant() != server) return false;
     if (other.place == own_.place) return false;
+    if (alive) {
+      const dds::Guid writer = dds::writer_of(claims_.reader.get(), info);
+      // It has ended since it wrote, so whose word this is cannot be known any more: it is a rival, and wins
+      // nothing.
+      if (writer == dds::Guid{}) meet(other, now);
+      if (writer.participant() != server) return false;  // or in the name of another
+    }
     if (!alive) meet(other, now);
     others_[server] = std::move(other);
   }

@@ -73,6 +73,7 @@ class NameClaim {
   /// True: that was the end of another host that has served under the name.
   bool take(const plc_NameClaim& sample, const dds_sample_info_t& info, TimePoint now);
   void meet(const NameHolder& other, TimePoint now);
+  void be_heard() const;
 
   std::string host_;
   NameHolder own_;
