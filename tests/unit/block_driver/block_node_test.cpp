@@ -5,7 +5,14 @@
 namespace plchost {
 namespace {
 
-using BlockNodeTest = BlockNodes;
+class BlockNodeTest : public BlockNodes {
+ protected:
+  /// The link as a stranger would map it; empty: there is none.
+  [[nodiscard]] MemoryFile link(const TestNode& from, const TestNode& to) const {
+    const std::string name = link_name(pool(), "blocks", from.address().node, to.address().node);
+    return MemoryFile::open(name, sizeof(LinkLayout), MemoryFile::Access::read_write).value_or(MemoryFile());
+  }
+};
 
 TEST_F(BlockNodeTest, TwoNodesTalkToEachOtherInTheirCycles) {
   TestNode a = join("a");
@@ -232,10 +239,9 @@ TEST_F(BlockNodeTest, ALinkThatAStrangerSpoiltIsMadeAnew) {
   connect(a, b);
   BlockChannel from = a.channel();
   BlockChannel to = b.channel();
-  const std::string name = link_name(pool(), "blocks", a.address().node, b.address().node);
-  const auto memory = MemoryFile::open(name, 1, MemoryFile::Access::read_write);
+  const MemoryFile memory = link(a, b);
   ASSERT_TRUE(memory);
-  std::ranges::fill(memory->bytes(), std::byte{0x5a});
+  std::ranges::fill(memory.bytes(), std::byte{0x5a});
   bool arrived = false;
   for (int i = 0; i < 100 && !arrived; ++i) {
     (void)from.send(b.address(), bytes_of("again"));
@@ -252,12 +258,11 @@ TEST_F(BlockNodeTest, BlocksThatWaitInALinkThatIsMadeAnewAreCounted) {
   BlockChannel lost = a.channel("lost");
   BlockChannel from = a.channel("alive");
   BlockChannel to = b.channel("alive");
-  const std::string name = link_name(pool(), "blocks", a.address().node, b.address().node);
-  const auto memory = MemoryFile::open(name, sizeof(LinkLayout), MemoryFile::Access::read_write);
+  const MemoryFile memory = link(a, b);
   ASSERT_TRUE(memory);
   // The writer looks at the head when the ring seems full; a stranger has written there.
-  reinterpret_cast<LinkLayout*>(memory->bytes().data())->heads[std::size_t(BlockPriority::normal)] = 1UL
-                                                                                                     << 60U;
+  reinterpret_cast<LinkLayout*>(memory.bytes().data())->heads[std::size_t(BlockPriority::normal)] = 1UL
+                                                                                                    << 60U;
   std::uint64_t sent = 0;
   while (lost.send(b.address(), bytes_of("x")) == SendResult::sent) ++sent;
   ASSERT_EQ(sent, kMinRingSlots);
@@ -302,12 +307,11 @@ TEST_F(BlockNodeTest, ALinkWhoseBlocksAStrangerWipedOutIsMadeAnew) {
   connect(a, b);
   BlockChannel from = a.channel();
   BlockChannel to = b.channel();
-  const std::string name = link_name(pool(), "blocks", a.address().node, b.address().node);
-  const auto memory = MemoryFile::open(name, sizeof(LinkLayout), MemoryFile::Access::read_write);
+  const MemoryFile memory = link(a, b);
   ASSERT_TRUE(memory);
   while (from.send(b.address(), bytes_of("x")) == SendResult::sent) {
   }
-  std::ranges::fill(memory->bytes().subspan(sizeof(LinkLayout)), std::byte{});
+  std::ranges::fill(memory.bytes().subspan(sizeof(LinkLayout)), std::byte{});
   bool arrived = false;
   for (int i = 0; i < 100 && !arrived; ++i) {
     pass(std::chrono::milliseconds(100), a, b);
