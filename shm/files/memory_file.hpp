@@ -70,7 +70,7 @@ class MemoryFile {
 
  private:
   friend class UnnamedMemory;
-  explicit MemoryFile(GuardedMapping mapping, std::uint64_t inode = 0) noexcept
+  explicit MemoryFile(GuardedMapping mapping, std::uint64_t inode) noexcept
       : mapping_(std::move(mapping)), inode_(inode) {}
   GuardedMapping mapping_;
   std::uint64_t inode_ = 0;

@@ -301,8 +301,7 @@ Result<bool> ObjectPool::create_memory_into(SharedMemory& object, const Wanted& 
   if (there) return false;
   if (there.error().code != ErrorCode::not_found) return std::unexpected(there.error());
   // The host takes its time to find so many bytes: not with the lock held.
-  auto unnamed =
-      UnnamedMemory::make(pool_memory_name(name(), wanted.name), wanted.initial, rights_for(options, name()));
+  auto unnamed = prepare_memory(wanted.name, wanted.initial, options);
   if (!unnamed) return std::unexpected(std::move(unnamed).error());
   std::ranges::copy(contents, unnamed->bytes().begin());
   auto made = create_locked(object, wanted, options, &*unnamed);
@@ -406,9 +405,10 @@ Result<SharedMemory> ObjectPool::replace_memory(std::string_view name, UnnamedMe
   return memory;
 }
 
-Result<UnnamedMemory> ObjectPool::prepare_memory(std::string_view name, std::size_t size) const {
+Result<UnnamedMemory> ObjectPool::prepare_memory(std::string_view name, std::size_t size,
+                                                 const ObjectOptions& options) const {
   if (auto valid = check_object_name(name); !valid) return std::unexpected(valid.error());
-  return UnnamedMemory::make(pool_memory_name(this->name(), name), size, rights_for({}, this->name()));
+  return UnnamedMemory::make(pool_memory_name(this->name(), name), size, rights_for(options, this->name()));
 }
 
 Result<SharedMemory> ObjectPool::replace_memory(std::string_view name, std::size_t size,

@@ -123,15 +123,11 @@ class ObjectPool {
   [[nodiscard]] auto create_mutex(std::string_view name, const ObjectOptions& options = {}) {
     return create_object<SharedMutex>(name, 0, options);
   }
-  /// `size` in bytes, from 1 to what the host has room for; zero-filled when made.
-  [[nodiscard]] auto create_memory(std::string_view name, std::size_t size,
-                                   const ObjectOptions& options = {}) {
-    return create_object<SharedMemory>(name, size, options);
-  }
-  /// The same with other first contents: nobody sees the memory without them, whatever ends this process.
+  /// `size` in bytes, from 1 to what the host has room for. When made it has `contents`, with zeros behind
+  /// them: nobody sees the memory without them, whatever ends this process.
   [[nodiscard]] Result<Created<SharedMemory>> create_memory(std::string_view name, std::size_t size,
-                                                            const ObjectOptions& options,
-                                                            std::span<const std::byte> contents);
+                                                            const ObjectOptions& options = {},
+                                                            std::span<const std::byte> contents = {});
   [[nodiscard]] auto open_shared_event(std::string_view name, Access access = Access::read_write) const {
     return open_object<SharedEvent>(name, access);
   }
@@ -149,7 +145,8 @@ class ObjectPool {
   [[nodiscard]] Result<SharedMemory> replace_memory(std::string_view name, std::size_t size,
                                                     const MemoryFile::Fill& fill);
   /// The same in two steps: until the second one nothing has changed. The bytes keep their addresses.
-  [[nodiscard]] Result<UnnamedMemory> prepare_memory(std::string_view name, std::size_t size) const;
+  [[nodiscard]] Result<UnnamedMemory> prepare_memory(std::string_view name, std::size_t size,
+                                                     const ObjectOptions& options = {}) const;
   /// After an error the memory that was prepared stays mapped.
   [[nodiscard]] Result<SharedMemory> replace_memory(std::string_view name, UnnamedMemory& prepared);
 
@@ -185,7 +182,7 @@ class ObjectPool {
                                          std::span<const std::byte> contents = {});
   [[nodiscard]] Result<bool> create_memory_into(SharedMemory& object, const Wanted& wanted,
                                                 const ObjectOptions& options,
-                                                std::span<const std::byte> contents = {});
+                                                std::span<const std::byte> contents);
   [[nodiscard]] Result<bool> create_locked(PoolObject& object, const Wanted& wanted,
                                            const ObjectOptions& options, UnnamedMemory* memory);
   [[nodiscard]] Result<void> open_into(PoolObject& object, ObjectType type, std::string_view name,

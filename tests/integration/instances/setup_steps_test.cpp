@@ -2,8 +2,7 @@
 #include <array>
 #include <csignal>
 #include <fstream>
-#include <future>
-#include <thread>
+#include <optional>
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -15,9 +14,8 @@
 #include <unistd.h>
 
 #include "instances/launch/launch_contract.hpp"
-#include "shm/files/memory_file.hpp"
-#include "shm/pool/pool_layout.hpp"
 #include "tests/integration/instances/instance_process.hpp"
+#include "tests/support/held_pool_lock.hpp"
 #include "tests/support/own_name.hpp"
 
 namespace plchost::testing {
@@ -173,20 +171,9 @@ TEST(SetupReports, EndWithTheStepThatFailed) {
 TEST(SetupReports, OfAStartBesideALockedPoolSayThatItMayBeRepeated) {
   const Sandbox sandbox;
   const ObjectPool pool = ObjectPool::create(sandbox.pool()).value();
-  const auto memory =
-      MemoryFile::open(sandbox.pool(), sizeof(PoolHeader), MemoryFile::Access::read_write).value();
-  RobustMutex& mutex = reinterpret_cast<PoolHeader*>(memory.bytes().data())->mutex;
-  std::promise<void> locked;
-  std::promise<void> enough;
-  const std::jthread holder([&] {
-    (void)mutex.lock();
-    locked.set_value();
-    enough.get_future().wait();
-    mutex.unlock();
-  });
-  locked.get_future().wait();
+  std::optional<HeldPoolLock> held(sandbox.pool());
   const auto reports = reports_of(sandbox, application("all_kinds"));
-  enough.set_value();
+  held.reset();
   ASSERT_FALSE(reports.empty());
   EXPECT_EQ(reports.back().step, SetupStep::attach_pool) << to_string(reports.back().step);
   EXPECT_EQ(reports.back().code, ErrorCode::timed_out);

@@ -12,6 +12,16 @@ class BlockNodeTest : public BlockNodes {
     const std::string name = link_name(pool(), "blocks", from.address().node, to.address().node);
     return MemoryFile::open(name, sizeof(LinkLayout), MemoryFile::Access::read_write).value_or(MemoryFile());
   }
+  bool arrives_again(TestNode& from, TestNode& to) {
+    BlockChannel sender = from.channel();
+    BlockChannel receiver = to.channel();
+    for (int i = 0; i < 100; ++i) {
+      (void)sender.send(to.address(), bytes_of("again"));
+      pass(std::chrono::milliseconds(100), from, to);
+      if (to.next(receiver) == "again") return true;
+    }
+    return false;
+  }
 };
 
 TEST_F(BlockNodeTest, TwoNodesTalkToEachOtherInTheirCycles) {
@@ -237,18 +247,10 @@ TEST_F(BlockNodeTest, ALinkThatAStrangerSpoiltIsMadeAnew) {
   TestNode a = join("a");
   TestNode b = join("b");
   connect(a, b);
-  BlockChannel from = a.channel();
-  BlockChannel to = b.channel();
   const MemoryFile memory = link(a, b);
   ASSERT_TRUE(memory);
   std::ranges::fill(memory.bytes(), std::byte{0x5a});
-  bool arrived = false;
-  for (int i = 0; i < 100 && !arrived; ++i) {
-    (void)from.send(b.address(), bytes_of("again"));
-    pass(std::chrono::milliseconds(100), a, b);
-    arrived = b.next(to) == "again";
-  }
-  EXPECT_TRUE(arrived);
+  EXPECT_TRUE(arrives_again(a, b));
 }
 
 TEST_F(BlockNodeTest, BlocksThatWaitInALinkThatIsMadeAnewAreCounted) {
@@ -306,19 +308,12 @@ TEST_F(BlockNodeTest, ALinkWhoseBlocksAStrangerWipedOutIsMadeAnew) {
   TestNode b = join("b");
   connect(a, b);
   BlockChannel from = a.channel();
-  BlockChannel to = b.channel();
   const MemoryFile memory = link(a, b);
   ASSERT_TRUE(memory);
   while (from.send(b.address(), bytes_of("x")) == SendResult::sent) {
   }
   std::ranges::fill(memory.bytes().subspan(sizeof(LinkLayout)), std::byte{});
-  bool arrived = false;
-  for (int i = 0; i < 100 && !arrived; ++i) {
-    pass(std::chrono::milliseconds(100), a, b);
-    (void)from.send(b.address(), bytes_of("again"));
-    arrived = b.next(to) == "again";
-  }
-  EXPECT_TRUE(arrived);
+  EXPECT_TRUE(arrives_again(a, b));
 }
 
 }  // namespace

@@ -1,16 +1,13 @@
 #include "instances/runtime/tasks/event_table.hpp"
 
-#include <atomic>
-#include <future>
-#include <thread>
+#include <optional>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
 #include "shm/base/transient.hpp"
-#include "shm/files/memory_file.hpp"
-#include "shm/pool/pool_layout.hpp"
+#include "tests/support/held_pool_lock.hpp"
 #include "tests/support/own_name.hpp"
 
 namespace plchost {
@@ -133,21 +130,10 @@ TEST_F(EventTableTest, WithdrawsItsOwnEventsAndNoOthers) {
 // An event that is not cleared tells its posters that tasks take what nobody runs.
 TEST_F(EventTableTest, SaysWhenThePoolIsLockedWhileItClears) {
   ASSERT_TRUE(sut_.register_by_application(sut_.open("ready").value()));
-  const auto memory = MemoryFile::open(name_, sizeof(PoolHeader), MemoryFile::Access::read_write);
-  ASSERT_TRUE(memory);
-  RobustMutex& mutex = reinterpret_cast<PoolHeader*>(memory->bytes().data())->mutex;
-  std::promise<void> locked;
-  std::promise<void> enough;
-  const std::jthread holder([&] {
-    (void)mutex.lock();
-    locked.set_value();
-    enough.get_future().wait();
-    mutex.unlock();
-  });
-  locked.get_future().wait();
+  std::optional<HeldPoolLock> held(name_);
   EventTable successor("line1", &pool_);
   const auto cleared = successor.clear_left_behind();
-  enough.set_value();
+  held.reset();
   ASSERT_FALSE(cleared);
   EXPECT_TRUE(is_transient(cleared.error())) << cleared.error().describe();
 }

@@ -47,13 +47,10 @@ class Unheard : public ManagedInstanceTest {
   void answer_with(ApplicationState said, const std::string& application = "/opt/line.so") {
     ASSERT_FALSE(host_.requests.empty());
     ASSERT_EQ(host_.requests.back().verb, ControlVerb::status);
-    answer(ErrorCode::ok, encode(InstanceReport{.pid = 77,
-                                                .state = std::to_underlying(said),
-                                                .problem = "",
-                                                .application = application,
-                                                .scheduler = "CmpScheduleTimer",
-                                                .cores = {1},
-                                                .memory_locked = true}));
+    InstanceReport report = report_of(77, said);
+    report.application = application;
+    report.scheduler = "CmpScheduleTimer";
+    answer(ErrorCode::ok, encode(report));
   }
   void show_page() {
     InstanceRuntime page;
@@ -244,13 +241,7 @@ TEST_F(Unheard, IsNotSaidToHaveADamagedPageForAnswersToOldQuestions) {
   for (const ControlRequest& request : asked) {
     sut().on_reply({.number = request.number,
                     .code = ErrorCode::ok,
-                    .text = encode(InstanceReport{.pid = 77,
-                                                  .state = std::to_underlying(ApplicationState::running),
-                                                  .problem = "",
-                                                  .application = "/opt/line.so",
-                                                  .scheduler = "CmpSchedule",
-                                                  .cores = {1},
-                                                  .memory_locked = true})});
+                    .text = encode(report_of(77, ApplicationState::running))});
   }
   show_page();
   sut().refresh();

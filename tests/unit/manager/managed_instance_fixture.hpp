@@ -91,6 +91,16 @@ class ManagedInstanceTest : public testing::Test {
     ASSERT_FALSE(host_.requests.empty());
     sut().on_reply({.number = host_.requests.back().number, .code = code, .text = text});
   }
+  /// The words of that process about itself.
+  [[nodiscard]] InstanceReport report_of(std::int32_t pid, ApplicationState said) const {
+    return {.pid = pid,
+            .state = std::to_underlying(said),
+            .problem = said == ApplicationState::exception ? "task 'A'" : "",
+            .application = config_.application,
+            .scheduler = "CmpSchedule",
+            .cores = {1},
+            .memory_locked = true};
+  }
   void crash_once() {
     sut().on_exit(killed_by(SIGSEGV));
     ASSERT_EQ(state(), InstanceState::waiting);

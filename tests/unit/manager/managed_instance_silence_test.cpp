@@ -113,14 +113,7 @@ class SilentProcess : public ManagedInstanceTest {
   /// The control thread answers what it is asked, whatever the page says.
   void answer_status(ApplicationState said) {
     if (host_.requests.empty() || host_.requests.back().verb != ControlVerb::status) return;
-    answer(ErrorCode::ok,
-           encode(InstanceReport{.pid = sut().status().pid,
-                                 .state = std::to_underlying(said),
-                                 .problem = said == ApplicationState::exception ? "task 'A'" : "",
-                                 .application = config_.application,
-                                 .scheduler = "CmpSchedule",
-                                 .cores = {1},
-                                 .memory_locked = true}));
+    answer(ErrorCode::ok, encode(report_of(sut().status().pid, said)));
   }
   void go_on_for(Duration duration, std::optional<ApplicationState> said = std::nullopt) {
     for (Duration passed{}; passed <= duration; passed += milliseconds(50)) {
