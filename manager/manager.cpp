@@ -104,7 +104,7 @@ Manager::Manager(const ManagerConfig& config, Options options, LockFile lock,
       tick_(*reactor_, [this] { tick(); }) {}
 
 Result<std::unique_ptr<Manager>> Manager::create(const ManagerConfig& config, Options options) {
-  if (auto made = make_run_directory(config.host.run_directory); !made) return std::unexpected(made.error());
+  PLCHOST_TRY(make_run_directory(config.host.run_directory));
   auto lock = LockFile::take(config.host.run_directory + "/manager.lock");
   if (!lock && lock.error().code == ErrorCode::already_exists) {
     return failure_in("another manager runs with this run directory", lock.error());
@@ -114,7 +114,7 @@ Result<std::unique_ptr<Manager>> Manager::create(const ManagerConfig& config, Op
   if (!reactor) return std::unexpected(reactor.error());
   std::unique_ptr<Manager> manager(new Manager(  // NOLINT: the constructor is private
       config, std::move(options), std::move(*lock), std::move(*reactor)));
-  if (auto done = manager->set_up(); !done) return std::unexpected(done.error());
+  PLCHOST_TRY(manager->set_up());
   return manager;
 }
 

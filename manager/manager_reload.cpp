@@ -53,7 +53,7 @@ Result<std::vector<std::string>> Manager::reload() {
     return failure(ErrorCode::invalid_argument, join_lines(read->error(), "plchostd --check-config"));
   }
   ManagerConfig& now = **read;
-  if (auto room = supervisor_->check_room(now.instances); !room) return std::unexpected(room.error());
+  PLCHOST_TRY(supervisor_->check_room(now.instances));
   for (const InstanceConfig& instance : now.instances) {
     if (transitions_.contains(instance.name)) continue;
     auto ring = TransitionRing::open(config_.host.pool, instance.name);

@@ -28,7 +28,7 @@ TaskSet::~TaskSet() {
 
 Result<std::unique_ptr<TaskSet>> TaskSet::create(Clock& clock, PriorityBand band,
                                                  std::vector<TaskConfig> tasks, TaskEnvironment environment) {
-  if (auto valid = check_tasks(tasks); !valid) return std::unexpected(std::move(valid.error()));
+  PLCHOST_TRY(check_tasks(tasks));
   UniqueFd fault_fd(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK));
   if (!fault_fd) return failure(ErrorCode::system, "eventfd for faults", errno);
   std::unique_ptr<TaskSet> self(new TaskSet(clock, band, std::move(environment), std::move(fault_fd)));
@@ -41,8 +41,7 @@ Result<std::unique_ptr<TaskSet>> TaskSet::create(Clock& clock, PriorityBand band
     return failure_in("tick", std::move(ticker.error()));
   }
   if (self->environment_.catch_faults) {
-    if (auto supervised = self->supervise(); !supervised)
-      return std::unexpected(std::move(supervised.error()));
+    PLCHOST_TRY(self->supervise());
   }
   return self;
 }

@@ -14,15 +14,14 @@ auto TaskSet::arrange(std::string_view name, const SchedulerSettings& settings)
     -> Result<std::unique_ptr<Arrangement>> {
   const auto entry = find_scheduler(name);
   if (!entry) return std::unexpected(entry.error());
-  if (auto valid = check_settings(settings); !valid) return std::unexpected(std::move(valid.error()));
+  PLCHOST_TRY(check_settings(settings));
   auto arrangement = std::make_unique<Arrangement>();
   arrangement->tick = choose_tick(settings, *environment_.devices, tick_.device);
   const auto& device = arrangement->tick.device;
   arrangement->scheduler = (*entry)->make(
       {.clock = clock_, .settings = settings, .tick_frequency = device ? device->frequency() : 0});
   if (arrangement->scheduler->capabilities().one_shot) {
-    if (auto fit = check_one_shot(name, arrangement->tick); !fit)
-      return std::unexpected(std::move(fit).error());
+    PLCHOST_TRY(check_one_shot(name, arrangement->tick));
   }
   for (auto& task : tasks_) {
     if (auto own = task->own_source(settings.max_event_backlog)) {

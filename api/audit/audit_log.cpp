@@ -61,7 +61,7 @@ Result<std::unique_ptr<AuditLog>> AuditLog::open(Options options) {
   auto lock = lock_folder(options.folder);
   if (!lock) return std::unexpected(std::move(lock).error());
   std::unique_ptr<AuditLog> log(new AuditLog(std::move(options), *std::move(lock)));
-  if (auto done = log->go_on(); !done) return std::unexpected(done.error());
+  PLCHOST_TRY(log->go_on());
   log->syncer_ =
       std::jthread([self = log.get()](const std::stop_token& stop) { self->sync_until_stopped(stop); });
   return log;
@@ -84,8 +84,7 @@ Result<void> AuditLog::open_file(const std::string& path) {
   UniqueFd fd(::open(path.c_str(), O_RDWR | O_APPEND | O_CREAT | O_CLOEXEC | O_NOFOLLOW, S_IRUSR | S_IWUSR));
   if (!fd) return failure(ErrorCode::system, "open " + path, errno);
   struct stat status{};
-  if (auto got = check_errno(::fstat(fd.get(), &status), "fstat " + path); !got)
-    return std::unexpected(got.error());
+  PLCHOST_TRY(check_errno(::fstat(fd.get(), &status), "fstat " + path));
   bytes_ = static_cast<std::size_t>(status.st_size);
   const std::lock_guard lock(guard_);
   file_ = std::move(fd);

@@ -89,7 +89,7 @@ Result<OwnIdentity> check_identity(const std::string& folder) {
   if (auto good = check_key(file_in(folder, kKeyFile), *certificate); !good) {
     return std::unexpected(good.error());
   }
-  if (auto good = check_documents(folder, *certificate); !good) return std::unexpected(good.error());
+  PLCHOST_TRY(check_documents(folder, *certificate));
   auto subject = subject_of(*certificate);
   if (!subject) return failure_in(folder, subject.error());
   const auto validity = validity_of(*certificate);

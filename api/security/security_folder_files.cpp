@@ -30,7 +30,7 @@ Result<void> make_folder(const std::string& path) {
 }
 
 Result<IdentityView> SecurityFolder::view(const std::string& name) const {
-  if (auto good = check_name("identity", name, kMaxIdentityName); !good) return std::unexpected(good.error());
+  PLCHOST_TRY(check_name("identity", name, kMaxIdentityName));
   const auto certificate = read_certificate(file_in(path(name), kCertificateFile));
   if (!certificate) {
     if (certificate.error().code != ErrorCode::not_found) return std::unexpected(certificate.error());

@@ -53,12 +53,12 @@ void raise_event(int fd) noexcept {
 }
 
 Result<std::unique_ptr<ControlServer>> ControlServer::create(ServerOptions options) {
-  if (auto good = check_name("host", options.host, kMaxHostName); !good) return std::unexpected(good.error());
+  PLCHOST_TRY(check_name("host", options.host, kMaxHostName));
   auto pool = ObjectPool::attach(options.pool);
   if (!pool) return failure_in("attach the pool", pool.error());
   const auto epoch = static_cast<std::uint64_t>(unix_time_ns());
   auto parts = std::make_unique<Parts>(std::move(options), std::move(*pool), epoch);
-  if (auto opened = parts->open(); !opened) return std::unexpected(opened.error());
+  PLCHOST_TRY(parts->open());
   return std::unique_ptr<ControlServer>(new ControlServer(std::move(parts)));
 }
 

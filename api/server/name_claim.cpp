@@ -78,7 +78,7 @@ Result<NameClaim> NameClaim::create(dds_entity_t participant, const Options& opt
   claim.subscriber_ = *std::move(subscriber);
   claim.claims_ = *std::move(claims);
   claim.own_claim_ = *std::move(own_claim);
-  if (auto done = claim.write(); !done) return std::unexpected(done.error());
+  PLCHOST_TRY(claim.write());
   return claim;
 }
 

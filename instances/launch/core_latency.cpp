@@ -77,8 +77,7 @@ Result<std::string> read_latency(const std::string& path) {
 Result<void> write_latency(const std::string& path, std::string_view value) {
   const UniqueFd fd(::open(path.c_str(), O_WRONLY | O_TRUNC | O_CLOEXEC));
   if (!fd) return failure(ErrorCode::refused, "open " + path, errno);
-  const auto written = check_errno(::write(fd.get(), value.data(), value.size()), "write " + path);
-  if (!written) return std::unexpected(written.error());
+  PLCHOST_TRY(check_errno(::write(fd.get(), value.data(), value.size()), "write " + path));
   return {};
 }
 

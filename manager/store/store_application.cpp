@@ -168,7 +168,7 @@ void remove_oldest(const StoreOrder& order, const std::set<std::string>& used) {
 }
 
 Result<std::string> keep_file(const StoreOrder& order) {
-  if (auto made = make_folder(order.folder); !made) return std::unexpected(made.error());
+  PLCHOST_TRY(make_folder(order.folder));
   const ApplicationVersions versions = read_versions(order.folder);
   std::set<std::string> used{order.before, order.earlier, versions.boot};
   remove_unfinished(order.folder, used);
@@ -181,7 +181,7 @@ Result<std::string> keep_file(const StoreOrder& order) {
                                "needed",
                                path, path.size(), kMaxPath));
   }
-  if (auto placed = put_in_place(order, path); !placed) return std::unexpected(placed.error());
+  PLCHOST_TRY(put_in_place(order, path));
   std::error_code error;
   if (auto good = try_application(order, path); !good) {
     std::filesystem::remove(path, error);
@@ -201,7 +201,7 @@ Result<std::string> keep_file(const StoreOrder& order) {
 }
 
 Result<std::string> set_boot(const StoreOrder& order) {
-  if (auto made = make_folder(order.folder); !made) return std::unexpected(made.error());
+  PLCHOST_TRY(make_folder(order.folder));
   if (order.boot == order.configured) {
     std::error_code error;
     std::filesystem::remove(boot_path(order.folder), error);
@@ -209,7 +209,7 @@ Result<std::string> set_boot(const StoreOrder& order) {
   } else if (auto written = replace_file(boot_path(order.folder), order.boot, kFileMode); !written) {
     return std::unexpected(written.error());
   }
-  if (auto synced = sync_directory(order.folder); !synced) return std::unexpected(synced.error());
+  PLCHOST_TRY(sync_directory(order.folder));
   return order.boot;
 }
 

@@ -13,7 +13,7 @@ namespace plchost {
 namespace {
 
 Result<LockFile> take_in(const std::string& folder, const WishFolderLock::Take& take_file) {
-  if (auto made = make_wish_folder(folder); !made) return std::unexpected(made.error());
+  PLCHOST_TRY(make_wish_folder(folder));
   return take_file(folder + "/manager.lock");
 }
 

@@ -27,7 +27,7 @@ bool takes_more(int fd) noexcept {
 // Each by its own open(): an application may change the flags of its standard output.
 Result<UniqueFd> open_end(const std::string& path, int flags) {
   UniqueFd fd(::open(path.c_str(), flags | O_NONBLOCK | O_CLOEXEC | O_NOFOLLOW));  // NOLINT: variadic
-  if (auto opened = check_errno(fd.get(), "open " + path); !opened) return std::unexpected(opened.error());
+  PLCHOST_TRY(check_errno(fd.get(), "open " + path));
   struct stat status{};
   if (auto seen = check_errno(::fstat(fd.get(), &status), "fstat " + path); !seen) {
     return std::unexpected(seen.error());
@@ -55,9 +55,8 @@ Result<UniqueFd> InstanceOutput::open_for_process() {
   if (!read_end_) {
     ::unlink(path().c_str());
     constexpr mode_t kOwnerOnly = 0600;
-    auto made = check_errno(::mkfifo(path().c_str(), kOwnerOnly), "make the pipe " + path());
-    if (!made) return std::unexpected(made.error());
-    if (auto opened = open_ends(); !opened) return std::unexpected(opened.error());
+    PLCHOST_TRY(check_errno(::mkfifo(path().c_str(), kOwnerOnly), "make the pipe " + path()));
+    PLCHOST_TRY(open_ends());
   }
   // To read, too: so the pipe outlives the manager.
   return open_end(path(), O_RDWR);

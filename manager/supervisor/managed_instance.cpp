@@ -342,9 +342,8 @@ Result<std::uint64_t> ManagedInstance::send_limited(ControlVerb verb) {
 Result<std::uint64_t> ManagedInstance::send(ControlVerb verb, const std::string& argument,
                                             std::int64_t limit_ns) {
   const std::uint64_t number = next_number_++;
-  const auto sent = host_.request(ControlRequest{
-      .number = number, .verb = verb, .instance = config_.name, .argument = argument, .limit_ns = limit_ns});
-  if (!sent) return std::unexpected(sent.error());
+  PLCHOST_TRY(host_.request(ControlRequest{
+      .number = number, .verb = verb, .instance = config_.name, .argument = argument, .limit_ns = limit_ns}));
   return number;
 }
 

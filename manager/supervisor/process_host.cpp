@@ -45,7 +45,7 @@ Result<int> ProcessHost::spawn(const LaunchOptions& options) {
 }
 
 Result<int> ProcessHost::adopt() {
-  if (auto connected = connect(); !connected) return std::unexpected(connected.error());
+  PLCHOST_TRY(connect());
   const auto pid = adopt_peer();
   if (!pid) {  // the process at the other end is not the instance: a link to it would stay silent
     link_watch_.reset();
@@ -59,7 +59,7 @@ Result<int> ProcessHost::adopt_peer() {
   if (!pid) return std::unexpected(pid.error());
   auto process = open_process(*pid);
   if (!process) return std::unexpected(process.error());
-  if (auto followed = follow(*process); !followed) return std::unexpected(followed.error());
+  PLCHOST_TRY(follow(*process));
   output_.adopt();
   output_.say(LogLevel::info, *pid, fmt::format("a new manager has adopted process {}", *pid));
   return *pid;

@@ -91,7 +91,7 @@ std::string ExitStatus::describe() const {
 
 Result<ChildProcess> spawn_process(const SpawnRequest& request) {
   SpawnActions actions;
-  if (auto prepared = prepare(actions, request); !prepared) return std::unexpected(prepared.error());
+  PLCHOST_TRY(prepare(actions, request));
   std::vector<std::string> arguments = request.arguments;
   std::vector<char*> pointers;
   for (std::string& argument : arguments) pointers.push_back(argument.data());
@@ -113,8 +113,7 @@ Result<ChildProcess> spawn_process(const SpawnRequest& request) {
 
 Result<ChildProcess> open_process(pid_t pid) {
   const auto fd = static_cast<int>(::syscall(SYS_pidfd_open, pid, 0));  // CLOEXEC always
-  const auto opened = check_errno(fd, fmt::format("pidfd_open of process {}", pid));
-  if (!opened) return std::unexpected(opened.error());
+  PLCHOST_TRY(check_errno(fd, fmt::format("pidfd_open of process {}", pid)));
   return ChildProcess{.pid = pid, .pidfd = UniqueFd(fd)};
 }
 
@@ -153,28 +152,23 @@ void kill_and_reap(const ChildProcess& process) noexcept {
 Result<void> signal_process(const ChildProcess& process, int signal) {
   const long sent = ::syscall(SYS_pidfd_send_signal, process.pidfd.get(), signal, nullptr, 0);
   if (sent != 0 && errno == ESRCH) return {};
-  const auto done = check_errno(sent, fmt::format("signal {} to process {}", signal, process.pid));
-  if (!done) return std::unexpected(done.error());
+  PLCHOST_TRY(check_errno(sent, fmt::format("signal {} to process {}", signal, process.pid)));
   return {};
 }
 
 Result<ReportChannel> make_report_channel() {
   std::array<int, 2> fds{};
-  auto made = check_errno(::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, fds.data()), "socketpair");
-  if (!made) return std::unexpected(made.error());
+  PLCHOST_TRY(check_errno(::socketpair(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC, 0, fds.data()), "socketpair"));
   ReportChannel channel{.ours = PacketSocket(UniqueFd(fds[0])), .childs = UniqueFd(fds[1])};
-  const auto changed = check_errno(::fcntl(fds[0], F_SETFL, O_NONBLOCK), "fcntl");
-  if (!changed) return std::unexpected(changed.error());
+  PLCHOST_TRY(check_errno(::fcntl(fds[0], F_SETFL, O_NONBLOCK), "fcntl"));
   return channel;
 }
 
 Result<OutputPipe> make_output_pipe() {
   std::array<int, 2> fds{};
-  auto made = check_errno(::pipe2(fds.data(), O_CLOEXEC), "pipe2");
-  if (!made) return std::unexpected(made.error());
+  PLCHOST_TRY(check_errno(::pipe2(fds.data(), O_CLOEXEC), "pipe2"));
   OutputPipe pipe{.read_end = UniqueFd(fds[0]), .write_end = UniqueFd(fds[1])};
-  const auto changed = check_errno(::fcntl(fds[0], F_SETFL, O_NONBLOCK), "fcntl");
-  if (!changed) return std::unexpected(changed.error());
+  PLCHOST_TRY(check_errno(::fcntl(fds[0], F_SETFL, O_NONBLOCK), "fcntl"));
   return pipe;
 }
 

@@ -53,8 +53,7 @@ Result<std::unique_ptr<Reactor>> Reactor::create() {
 Result<Reactor::Watch> Reactor::watch(int fd, std::uint32_t epoll_events, Ready ready) {
   const std::uint64_t id = next_id_++;
   epoll_event event{.events = epoll_events, .data = {.u64 = id}};
-  const auto added = check_errno(::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, fd, &event), "watch descriptor");
-  if (!added) return std::unexpected(added.error());
+  PLCHOST_TRY(check_errno(::epoll_ctl(epoll_.get(), EPOLL_CTL_ADD, fd, &event), "watch descriptor"));
   watches_.emplace(id, std::make_unique<Ready>(std::move(ready)));
   return Watch(*this, id, fd);
 }

@@ -84,8 +84,7 @@ Result<void> ProcessorGuard::install() {
   action.sa_flags = SA_ONSTACK | SA_RESTART;
   ::sigfillset(&action.sa_mask);
   action.sa_handler = &on_long_run;
-  if (const auto set = check_errno(::sigaction(SIGXCPU, &action, nullptr), "catch SIGXCPU"); !set)
-    return std::unexpected(set.error());
+  PLCHOST_TRY(check_errno(::sigaction(SIGXCPU, &action, nullptr), "catch SIGXCPU"));
   guarded.store(true, std::memory_order_release);
   return {};
 }

@@ -35,8 +35,7 @@ Result<AlternateStack> AlternateStack::make() {
   if (memory == MAP_FAILED) return failure(ErrorCode::system, "alternate signal stack", errno);
   AlternateStack stack(static_cast<std::byte*>(memory), size);
   for (std::byte* const guard : {stack.memory_, stack.memory_ + size - page()}) {
-    if (const auto set = check_errno(::mprotect(guard, page(), PROT_NONE), "guard of the signal stack"); !set)
-      return std::unexpected(set.error());
+    PLCHOST_TRY(check_errno(::mprotect(guard, page(), PROT_NONE), "guard of the signal stack"));
   }
   return stack;
 }

@@ -4,6 +4,7 @@
 #include <expected>
 #include <string>
 #include <string_view>
+#include <utility>
 
 namespace plchost {
 
@@ -49,3 +50,31 @@ using Result = std::expected<T, Error>;
 [[nodiscard]] std::unexpected<Error> failure_in(std::string_view step, Error error);
 
 }  // namespace plchost
+
+// Two macros, as in Abseil: a TRY with a value, as in SerenityOS, needs an extension of GCC. With one name
+// for both, as in Boost.Outcome, a comma between template arguments ends the declaration.
+
+/// Evaluates a call once that returns a Result or another std::expected. If it failed, the function that this
+/// stands in returns the error, unchanged; if not, the value is dropped: `PLCHOST_TRY(check_name(name));`
+#define PLCHOST_TRY(...) PLCHOST_TRY_AS(PLCHOST_TRY_JOIN(plchost_try_, __COUNTER__), __VA_ARGS__)
+
+/// The same, and initialises a variable with the value, or assigns the value to one that there is:
+/// `PLCHOST_TRY_ASSIGN(const auto file, open(path));` or `PLCHOST_TRY_ASSIGN(file_, open(path));`. Two
+/// statements: it needs braces behind an `if`, and does not compile without.
+#define PLCHOST_TRY_ASSIGN(variable, ...) \
+  PLCHOST_TRY_ASSIGN_AS(PLCHOST_TRY_JOIN(plchost_try_, __COUNTER__), variable, __VA_ARGS__)
+
+// The counted name lets a lambda in the call contain another one.
+#define PLCHOST_TRY_JOIN(name, number) PLCHOST_TRY_JOIN_EXPANDED(name, number)
+#define PLCHOST_TRY_JOIN_EXPANDED(name, number) name##number
+
+#define PLCHOST_TRY_AS(result, ...)                                           \
+  do {                                                                        \
+    if (auto&& result = (__VA_ARGS__); !result)                               \
+      return std::unexpected(std::forward<decltype(result)>(result).error()); \
+  } while (false)
+
+#define PLCHOST_TRY_ASSIGN_AS(result, variable, ...)                                   \
+  auto&& result = (__VA_ARGS__);                                                       \
+  if (!result) return std::unexpected(std::forward<decltype(result)>(result).error()); \
+  variable = *std::forward<decltype(result)>(result)

@@ -154,7 +154,7 @@ bool Thread::join_until(TimePoint deadline, const std::function<bool()>& abandon
 
 Result<Thread> Thread::start(const std::string& name, ThreadPriority priority, std::function<void()> body) {
   Attributes attributes;
-  if (auto set = set_scheduling(attributes, name, priority); !set) return std::unexpected(set.error());
+  PLCHOST_TRY(set_scheduling(attributes, name, priority));
   pthread_attr_setstacksize(attributes.get(), kStackSize);
   pthread_attr_setguardsize(attributes.get(), kGuardSize);
   auto info = std::make_unique<StartInfo>(StartInfo{name, priority.fifo, priority.nice, std::move(body)});
@@ -178,8 +178,7 @@ Result<Thread> Thread::start(const std::string& name, ThreadPriority priority, s
 Result<std::vector<int>> allowed_cores(pid_t thread) {
   cpu_set_t set;
   CPU_ZERO(&set);
-  auto got = check_errno(::sched_getaffinity(thread, sizeof set, &set), "sched_getaffinity");
-  if (!got) return std::unexpected(std::move(got.error()));
+  PLCHOST_TRY(check_errno(::sched_getaffinity(thread, sizeof set, &set), "sched_getaffinity"));
   return to_cores(set);
 }
 

@@ -209,7 +209,7 @@ void BlockNode::keep_record() {
 }
 
 Result<std::uint32_t> BlockNode::open_channel(std::string_view name) {
-  if (auto valid = check_channel_name(name); !valid) return std::unexpected(std::move(valid).error());
+  PLCHOST_TRY(check_channel_name(name));
   const std::uint32_t number = channel_number(name);
   const std::scoped_lock lock(channels_mutex_);
   const auto [known, is_new] = channels_.try_emplace(number, name);

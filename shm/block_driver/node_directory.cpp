@@ -96,20 +96,20 @@ Result<void> check_base(std::string_view base) {
 }  // namespace
 
 Result<NodeDirectory> NodeDirectory::open(std::string_view pool, std::string_view base) {
-  if (auto valid = check_base(base); !valid) return std::unexpected(std::move(valid).error());
+  PLCHOST_TRY(check_base(base));
   const std::string name = directory_name(pool, base);
   auto file = open_or_make_directory(name);
   if (!file) return failure_in("directory of nodes", std::move(file).error());
-  if (auto mended = mend_header(*file, name); !mended) return std::unexpected(std::move(mended).error());
+  PLCHOST_TRY(mend_header(*file, name));
   return NodeDirectory(std::string(pool), std::string(base), *std::move(file));
 }
 
 Result<NodeDirectory> NodeDirectory::open_to_read(std::string_view pool, std::string_view base) {
-  if (auto valid = check_base(base); !valid) return std::unexpected(std::move(valid).error());
+  PLCHOST_TRY(check_base(base));
   const std::string name = directory_name(pool, base);
   auto file = MemoryFile::open(name, sizeof(DirectoryLayout), MemoryFile::Access::read_only);
   if (!file) return failure_in("directory of nodes", std::move(file).error());
-  if (auto valid = check_directory(*file, name); !valid) return std::unexpected(std::move(valid).error());
+  PLCHOST_TRY(check_directory(*file, name));
   return NodeDirectory(std::string(pool), std::string(base), *std::move(file));
 }
 

@@ -62,7 +62,7 @@ Result<LockFile> LockFile::take(const std::string& path) {
       const int error = errno;
       return failure(code_of(error), "open " + path, error);
     }
-    if (auto ours = check_ours(fd.get(), path); !ours) return std::unexpected(ours.error());
+    PLCHOST_TRY(check_ours(fd.get(), path));
     struct flock lock = whole_file();
     if (::fcntl(fd.get(), F_SETLK, &lock) != 0) {
       const int error = errno;

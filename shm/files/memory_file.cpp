@@ -80,8 +80,8 @@ Result<UniqueFd> make_nameless(std::size_t size, const MemoryRights& rights, con
     const int error = errno;
     return failure(ErrorCode::system, fmt::format("make shared memory in {}", MemoryFile::kDirectory), error);
   }
-  if (auto given = give_rights(fd.get(), rights, path); !given) return std::unexpected(given.error());
-  if (auto allocated = allocate(fd, size, path); !allocated) return std::unexpected(allocated.error());
+  PLCHOST_TRY(give_rights(fd.get(), rights, path));
+  PLCHOST_TRY(allocate(fd, size, path));
   return fd;
 }
 
@@ -217,9 +217,9 @@ Result<MemoryFile> make_filled(const std::string& name, std::size_t size, const 
   auto memory = UnnamedMemory::make(name, size, rights);
   if (!memory) return std::unexpected(memory.error());
   if (fill) {
-    if (auto filled = fill(memory->bytes()); !filled) return std::unexpected(filled.error());
+    PLCHOST_TRY(fill(memory->bytes()));
   }
-  if (auto named = memory->give_name(take_over); !named) return std::unexpected(std::move(named).error());
+  PLCHOST_TRY(memory->give_name(take_over));
   return memory->take();
 }
 

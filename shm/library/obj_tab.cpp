@@ -132,7 +132,7 @@ ObjTab::ObjTab(ObjectPool pool) : pool_(std::move(pool)), guard_handle_{.object 
 Result<objTab_t*> ObjTab::look() {
   const std::lock_guard one_at_a_time(guard_);
   if (held_by_this_thread == 0 && (!listed_ || pool_.changes() != seen_)) {
-    if (auto done = refresh(); !done) return std::unexpected(std::move(done).error());
+    PLCHOST_TRY(refresh());
   }
   return &table_;
 }

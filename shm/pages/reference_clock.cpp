@@ -49,7 +49,7 @@ Result<void> check_reference_name(std::string_view name) {
 }
 
 Result<ReferenceClockRecord> ReferenceClockRecord::open(std::string_view pool, std::string_view name) {
-  if (auto valid = check_reference_name(name); !valid) return std::unexpected(std::move(valid).error());
+  PLCHOST_TRY(check_reference_name(name));
   const std::string file = pool_memory_name(pool, name);
   auto memory = open_or_make_record(file, [&](uid_t user) { return may_own_memory(pool, user); });
   if (!memory) return failure_in(fmt::format("reference clock '{}'", name), std::move(memory).error());

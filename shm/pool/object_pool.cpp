@@ -144,7 +144,7 @@ std::uint64_t ObjectPool::changes() const noexcept {
 }
 
 Result<PoolEvent> ObjectPool::create_event(std::string_view name) & {
-  if (auto valid = check_object_name(name); !valid) return std::unexpected(valid.error());
+  PLCHOST_TRY(check_object_name(name));
   const Wanted wanted{.name = name};
   auto held = segment_->lock();
   if (!held) return std::unexpected(held.error());
@@ -156,17 +156,17 @@ Result<PoolEvent> ObjectPool::create_event(std::string_view name) & {
     describe_new(*entry, rights_for({}, this->name()), 0);
     objects.publish(*entry);
   }
-  if (auto event = check_is(*entry, ObjectType::event, name); !event) return std::unexpected(event.error());
+  PLCHOST_TRY(check_is(*entry, ObjectType::event, name));
   return PoolEvent(*entry);
 }
 
 Result<PoolEvent> ObjectPool::open_event(std::string_view name) const& {
-  if (auto valid = check_object_name(name); !valid) return std::unexpected(valid.error());
+  PLCHOST_TRY(check_object_name(name));
   auto held = segment_->lock();
   if (!held) return std::unexpected(held.error());
   ObjectEntry* const entry = segment_->find(*held, name);
   if (entry == nullptr) return nothing_of_that_name(name, this->name());
-  if (auto event = check_is(*entry, ObjectType::event, name); !event) return std::unexpected(event.error());
+  PLCHOST_TRY(check_is(*entry, ObjectType::event, name));
   return PoolEvent(*entry);
 }
 
@@ -268,11 +268,11 @@ Result<bool> ObjectPool::create_locked(PoolObject& object, const Wanted& wanted,
 
 Result<bool> ObjectPool::create_into(PoolObject& object, const Wanted& wanted, const ObjectOptions& options,
                                      std::span<const std::byte> contents) {
-  if (auto valid = check_object_name(wanted.name); !valid) return std::unexpected(valid.error());
+  PLCHOST_TRY(check_object_name(wanted.name));
   if (auto good = check_initial(*traits_of(wanted.type), wanted.name, wanted.initial); !good) {
     return std::unexpected(std::move(good).error());
   }
-  if (auto may = check_group(options); !may) return std::unexpected(may.error());
+  PLCHOST_TRY(check_group(options));
   if (wanted.type == ObjectType::memory) {
     return create_memory_into(static_cast<SharedMemory&>(object), wanted, options, contents);
   }
@@ -390,8 +390,8 @@ Result<SharedMemory> ObjectPool::replace_memory(std::string_view name, UnnamedMe
   auto held = segment_->lock();
   if (!held) return std::unexpected(held.error());
   if (ObjectEntry* const old = segment_->find(*held, name); old != nullptr) {
-    if (auto same = check_is(*old, ObjectType::memory, name); !same) return std::unexpected(same.error());
-    if (auto may = check_permitted(*old, Access::read_write, name); !may) return std::unexpected(may.error());
+    PLCHOST_TRY(check_is(*old, ObjectType::memory, name));
+    PLCHOST_TRY(check_permitted(*old, Access::read_write, name));
     segment_->table(*held).erase(*old);
   }
   const auto made = make_entry(*held, wanted, {.keep = true}, &prepared);
@@ -407,7 +407,7 @@ Result<SharedMemory> ObjectPool::replace_memory(std::string_view name, UnnamedMe
 
 Result<UnnamedMemory> ObjectPool::prepare_memory(std::string_view name, std::size_t size,
                                                  const ObjectOptions& options) const {
-  if (auto valid = check_object_name(name); !valid) return std::unexpected(valid.error());
+  PLCHOST_TRY(check_object_name(name));
   return UnnamedMemory::make(pool_memory_name(this->name(), name), size, rights_for(options, this->name()));
 }
 
@@ -415,7 +415,7 @@ Result<SharedMemory> ObjectPool::replace_memory(std::string_view name, std::size
                                                 const MemoryFile::Fill& fill) {
   auto prepared = prepare_memory(name, size);
   if (!prepared) return std::unexpected(std::move(prepared).error());
-  if (auto filled = fill(prepared->bytes()); !filled) return std::unexpected(std::move(filled).error());
+  PLCHOST_TRY(fill(prepared->bytes()));
   return replace_memory(name, *prepared);
 }
 
@@ -456,13 +456,7 @@ Result<std::vector<ObjectInfo>> ObjectPool::list() const {
   const PoolView& view = segment_->view();
   ObjectHolders holders;
   std::size_t place = 0;
-  const auto held = look_in_parts([&] { return ObjectHolders::look_at(view, place, kReferences); },
-                                  [&](ObjectHolders::Part part) {
-                                    holders.add(std::move(part));
-                                    place += kReferences;
-                                    return place < view.used_references().size();
-                                  });
-  if (!held) return std::unexpected(held.error());
+  PLCHOST_TRY(look_in_parts([&] { return ObjectHolders::look_at(view, place, kReferences); }, [&](ObjectHolders::Part part) { holders.add(std::move(part)); place += kReferences; return place < view.used_references().size(); }));
   std::vector<ObjectInfo> all;
   std::size_t at = 0;
   const auto part = [&] {
@@ -475,17 +469,12 @@ Result<std::vector<ObjectInfo>> ObjectPool::list() const {
     }
     return infos;
   };
-  const auto listed = look_in_parts(part, [&](std::vector<ObjectInfo> infos) {
-    std::ranges::move(infos, std::back_inserter(all));
-    at += kObjects;
-    return at < view.used_entries().size();
-  });
-  if (!listed) return std::unexpected(listed.error());
+  PLCHOST_TRY(look_in_parts(part, [&](std::vector<ObjectInfo> infos) { std::ranges::move(infos, std::back_inserter(all)); at += kObjects; return at < view.used_entries().size(); }));
   return all;
 }
 
 Result<ObjectInfo> ObjectPool::look_at(std::string_view name) const {
-  if (auto valid = check_object_name(name); !valid) return std::unexpected(valid.error());
+  PLCHOST_TRY(check_object_name(name));
   const PoolView& view = segment_->view();
   const auto describe = [&](const ObjectEntry* entry) -> Result<ObjectInfo> {
     if (entry == nullptr || PoolTable::is_idle(*entry)) return nothing_of_that_name(name, this->name());

@@ -124,7 +124,7 @@ Result<std::shared_ptr<PoolSegment>> PoolSegment::attach_now(const std::string& 
   const std::uint64_t magic = header.magic.load(std::memory_order_acquire);
   std::uint32_t max_objects = header.max_objects_again;
   if (is_sound_again(header, max_objects, file_size)) {
-    if (auto same = check_pid_namespace(header, name); !same) return std::unexpected(same.error());
+    PLCHOST_TRY(check_pid_namespace(header, name));
     return std::shared_ptr<PoolSegment>(new PoolSegment(name, std::move(*memory), max_objects, access));
   }
   if (magic == 0) return unfinished();
@@ -136,7 +136,7 @@ Result<std::shared_ptr<PoolSegment>> PoolSegment::attach_now(const std::string& 
   if (auto sound = check_header(header, max_objects, file_size, name); !sound) {
     return std::unexpected(sound.error());
   }
-  if (auto same = check_pid_namespace(header, name); !same) return std::unexpected(same.error());
+  PLCHOST_TRY(check_pid_namespace(header, name));
   return std::shared_ptr<PoolSegment>(new PoolSegment(name, std::move(*memory), max_objects, access));
 }
 

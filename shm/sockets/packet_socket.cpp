@@ -121,8 +121,7 @@ Result<PacketListener> PacketListener::listen(const std::string& path) {
   if (done) done = check_errno(::listen(fd->get(), kBacklog), "listen on " + path);
   if (!done) return std::unexpected(done.error());
   struct stat file{};
-  const auto found = check_errno(::stat(path.c_str(), &file), "stat " + path);
-  if (!found) return std::unexpected(found.error());
+  PLCHOST_TRY(check_errno(::stat(path.c_str(), &file), "stat " + path));
   return PacketListener(std::move(*fd), path, file.st_ino);
 }
 

@@ -19,7 +19,7 @@ Result<std::vector<Row>> task_rows(CliSession& session, const std::string& insta
     }
   }
   if (instance.empty()) return rows;
-  if (auto known = session.check_instance(instance); !known) return std::unexpected(known.error());
+  PLCHOST_TRY(session.check_instance(instance));
   return rows;
 }
 

@@ -83,8 +83,7 @@ Result<OptionValues> check_options(const Operation& operation, const plc_Request
   if (!download) return options;
   options.emplace(kSizeOption, fmt::format("{}", request.size));
   options.emplace(kDigestOption, digest);
-  if (const auto order = ApplicationOrder::from_options(options); !order)
-    return std::unexpected(order.error());
+  PLCHOST_TRY(ApplicationOrder::from_options(options));
   return options;
 }
 
@@ -107,10 +106,9 @@ Result<ControlRequest> check_request(const plc_Request& request, ApiRole role, s
                                operation->name, role == ApiRole::operating ? "operator" : "engineer"));
   }
   const auto instance = dds::text_of(request.instance);
-  if (auto good = check_instance(*operation, instance, host, instances); !good)
-    return std::unexpected(good.error());
+  PLCHOST_TRY(check_instance(*operation, instance, host, instances));
   const auto argument = dds::text_of(request.argument);
-  if (auto good = check_argument(*operation, argument); !good) return std::unexpected(good.error());
+  PLCHOST_TRY(check_argument(*operation, argument));
   auto options = check_options(*operation, request);
   if (!options) return std::unexpected(std::move(options).error());
   return ControlRequest{0, operation->verb, std::string(instance), std::string(argument),

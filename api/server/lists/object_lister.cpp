@@ -88,7 +88,7 @@ Result<ObjectListing> ObjectLister::one(const std::string& name) {
 
 Result<ObjectListing> ObjectLister::page(const ObjectQuery& query, TimePoint until) {
   if (!query.name.empty()) return one(query.name);
-  if (auto looked = look(); !looked) return std::unexpected(std::move(looked).error());
+  PLCHOST_TRY(look());
   constexpr std::size_t kClockEvery = 64;
   ObjectListing listing;
   std::size_t references = 0;

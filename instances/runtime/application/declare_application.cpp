@@ -44,7 +44,7 @@ Result<void> read_settings_of(const LaunchOptions& launch, StartSettings& start)
 
 Result<StartSettings> read_start_settings(const LaunchOptions& launch) {
   StartSettings start;
-  if (auto read = read_settings_of(launch, start); !read) return std::unexpected(std::move(read).error());
+  PLCHOST_TRY(read_settings_of(launch, start));
   if (!start.settings.device_description.empty()) {
     auto device = read_device_description(start.settings.device_description);
     if (!device) return std::unexpected(std::move(device).error());

@@ -49,8 +49,8 @@ Result<std::unique_ptr<OnlineChange>> OnlineChange::prepare(const std::string& p
                                path, std::chrono::duration<double>(took).count(),
                                std::chrono::duration<double>(kLongestSetup).count()));
   }
-  if (auto same = change->compare(); !same) return std::unexpected(std::move(same).error());
-  if (auto connected = change->connect(); !connected) return std::unexpected(std::move(connected).error());
+  PLCHOST_TRY(change->compare());
+  PLCHOST_TRY(change->connect());
   return change;
 }
 

@@ -54,7 +54,7 @@ Result<UniqueFd> memory_file(const std::string& name, std::span<const std::byte>
 }  // namespace
 
 Result<SharedObject> SharedObject::load(const std::string& path, std::span<const std::string_view> symbols) {
-  if (auto checked = check_elf_file(path, symbols); !checked) return std::unexpected(checked.error());
+  PLCHOST_TRY(check_elf_file(path, symbols));
   // Without a slash, dlopen would search the system's folders for it.
   const std::string absolute = absolute_of(path);
   auto handle = open_program(absolute, path);

@@ -69,11 +69,11 @@ Result<RTS_HANDLE> BlockService::open_channel(std::string_view name) {
   for (std::size_t i = 0; i < count; ++i) {
     if (channels_[i].name == name) return &channels_[i];
   }
-  if (auto valid = check_channel_name(name); !valid) return std::unexpected(std::move(valid).error());
+  PLCHOST_TRY(check_channel_name(name));
   if (count == channels_.size()) {
     return failure(ErrorCode::full, fmt::format("more than {} channels", channels_.size()));
   }
-  if (auto joined = join(); !joined) return std::unexpected(std::move(joined).error());
+  PLCHOST_TRY(join());
   Channel& place = channels_[count];
   if (node_) {
     auto channel = BlockChannel::open(*node_, name);

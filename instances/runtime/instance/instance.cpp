@@ -146,8 +146,7 @@ Result<std::string> Instance::attach_pool() {
   host_->set_start_kind(static_cast<int>(options_.launch.start_kind));
   if (auto cleared = host_->events().clear_left_behind(); !cleared)
     return failure_in("events of the process before", std::move(cleared).error());
-  if (auto prepared = prepare_host(start_, *host_); !prepared)
-    return std::unexpected(std::move(prepared).error());
+  PLCHOST_TRY(prepare_host(start_, *host_));
   return {};
 }
 
@@ -160,8 +159,7 @@ Result<std::string> Instance::open_control_socket() {
                              });
   if (!server) return std::unexpected(std::move(server).error());
   control_.emplace(*std::move(server));
-  if (auto restored = restore_operator_events(); !restored)
-    return std::unexpected(std::move(restored).error());
+  PLCHOST_TRY(restore_operator_events());
   return {};
 }
 
@@ -205,8 +203,7 @@ Result<std::string> Instance::load_application() {
   if (!declared) return std::unexpected(std::move(declared).error());
   auto& [application, declaration] = *declared;
   application_.emplace(std::move(application));
-  if (auto reserved = host_->reserve(declaration); !reserved)
-    return std::unexpected(std::move(reserved).error());
+  PLCHOST_TRY(host_->reserve(declaration));
   auto remark =
       host_->areas().place(areas_environment(options_.launch, start_.settings, *application_, &*pool_),
                            std::move(declaration.areas), application_->tasks_to_change());

@@ -95,7 +95,7 @@ Result<std::string> Instance::carry_out(const ControlRequest& request) {
 }
 
 Result<std::string> Instance::set_scheduler(const std::string& name) {
-  if (const auto known = find_scheduler(name); !known) return std::unexpected(known.error());
+  PLCHOST_TRY(find_scheduler(name));
   if (life_.state() == ApplicationState::running) {
     if (auto switched = tasks_->switch_to(name, start_.settings.scheduler); !switched) {
       return std::unexpected(std::move(switched).error());
@@ -133,7 +133,7 @@ Result<std::string> Instance::reset_statistics(const std::string& task) {
     return failure(ErrorCode::wrong_state,
                    fmt::format("instance '{}' has no application, so no tasks", options_.launch.name));
   }
-  if (auto done = tasks_->reset_statistics(task); !done) return std::unexpected(std::move(done).error());
+  PLCHOST_TRY(tasks_->reset_statistics(task));
   return {};
 }
 

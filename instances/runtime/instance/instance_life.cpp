@@ -36,7 +36,7 @@ ApplicationLife::Record Instance::recorder() {
 }
 
 Result<std::string> Instance::start(std::string_view why) {
-  if (auto bound = host_->events().check_bound(); !bound) return std::unexpected(std::move(bound).error());
+  PLCHOST_TRY(host_->events().check_bound());
   if (auto started = tasks_->start(scheduler_, start_.settings.scheduler); !started) {
     return std::unexpected(std::move(started).error());
   }
@@ -65,8 +65,7 @@ void Instance::begin_stop(std::string_view why) {
 }
 
 Result<std::string> Instance::begin_single_cycle() {
-  if (auto begun = tasks_->begin_single_cycle(start_.settings.scheduler); !begun)
-    return std::unexpected(std::move(begun).error());
+  PLCHOST_TRY(tasks_->begin_single_cycle(start_.settings.scheduler));
   single_cycle_ends_ = MonotonicClock::now() + start_.settings.stop.others;
   life_.go_to(ApplicationState::single_cycle, "single cycle");
   return {};

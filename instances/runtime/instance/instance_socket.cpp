@@ -19,8 +19,7 @@ namespace {
 
 Result<void> watch(const UniqueFd& epoll, int fd, std::uint32_t events = EPOLLIN) {
   epoll_event event{.events = events, .data = {.fd = fd}};
-  const auto added = check_errno(::epoll_ctl(epoll.get(), EPOLL_CTL_ADD, fd, &event), "watch control socket");
-  if (!added) return std::unexpected(added.error());
+  PLCHOST_TRY(check_errno(::epoll_ctl(epoll.get(), EPOLL_CTL_ADD, fd, &event), "watch control socket"));
   return {};
 }
 
@@ -61,8 +60,7 @@ Result<InstanceSocket> InstanceSocket::listen(const std::string& path, Handler h
   UniqueFd epoll(::epoll_create1(EPOLL_CLOEXEC));
   if (!epoll) return failure(ErrorCode::system, "epoll_create1", errno);
   // Told once for each new connection: one that cannot be taken must not keep the control thread awake.
-  if (auto watched = watch(epoll, listener->fd(), EPOLLIN | EPOLLET); !watched)
-    return std::unexpected(watched.error());
+  PLCHOST_TRY(watch(epoll, listener->fd(), EPOLLIN | EPOLLET));
   return InstanceSocket(*std::move(listener), std::move(epoll), std::move(handler));
 }
 

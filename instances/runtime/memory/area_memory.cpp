@@ -52,7 +52,7 @@ Result<UniqueFd> open_device(const AreaSettings& settings) {
   if (!fd) return not_mapped(settings, "cannot be opened", errno);
   struct stat status{};
   if (::fstat(fd.get(), &status) != 0) return not_mapped(settings, "fstat", errno);
-  if (auto fits = check_file(settings, status); !fits) return std::unexpected(fits.error());
+  PLCHOST_TRY(check_file(settings, status));
   return fd;
 }
 

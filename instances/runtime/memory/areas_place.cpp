@@ -152,7 +152,7 @@ Result<void> Areas::check(const Environment& environment, std::span<const Declar
 
 Result<std::string> Areas::place(const Environment& environment, std::vector<DeclaredArea> areas,
                                  std::span<TaskConfig> tasks) {
-  if (auto good = check(environment, areas); !good) return std::unexpected(std::move(good).error());
+  PLCHOST_TRY(check(environment, areas));
   declared_ = std::move(areas);
   if (declared_.empty()) {
     placed_ = true;

@@ -105,7 +105,7 @@ Result<DeclaredArea> from_declaration(const Plc_Area& area) {
   if (area.dwSize != sizeof(Plc_Area)) {
     return bad_area(name, fmt::format("dwSize is {}, sizeof(Plc_Area) is {}", area.dwSize, sizeof(Plc_Area)));
   }
-  if (auto valid = check_name("area", name, PLC_MAX_AREA_NAME); !valid) return std::unexpected(valid.error());
+  PLCHOST_TRY(check_name("area", name, PLC_MAX_AREA_NAME));
   DeclaredArea taken{.name = std::string(name),
                      .flags = area.dwFlags,
                      .bytes = area.dwBytes,
@@ -113,8 +113,8 @@ Result<DeclaredArea> from_declaration(const Plc_Area& area) {
                      .uses = {},
                      .initial = {},
                      .address = area.ppAddress};
-  if (auto valid = check_flags(taken); !valid) return std::unexpected(valid.error());
-  if (auto valid = check_size(taken); !valid) return std::unexpected(valid.error());
+  PLCHOST_TRY(check_flags(taken));
+  PLCHOST_TRY(check_size(taken));
   if (area.nUses > PLC_MAX_TASKS || (area.nUses > 0 && area.pUses == nullptr)) {
     return bad_area(
         name, fmt::format("nUses is {}, pUses must point to as many, at most {}", area.nUses, PLC_MAX_TASKS));

@@ -125,7 +125,7 @@ Result<RetainImage> decode_retain(std::string_view file) {
     if (!area) return no_image("an area's name has no end");
     image.layout.areas.push_back(*std::move(area));
   }
-  if (auto valid = check_layout(image.layout); !valid) return std::unexpected(valid.error());
+  PLCHOST_TRY(check_layout(image.layout));
   const auto data = bytes_of(rest);
   image.data.assign(data.begin(), data.end());
   return image;

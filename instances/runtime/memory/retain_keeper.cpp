@@ -135,8 +135,7 @@ Result<std::size_t> RetainKeeper::check(const std::string& pool, const std::stri
   const bool files = !options.directory.empty();
   start.find_source(pool, retain_memory_name(instance),
                     files ? RetainFiles::look(options.directory, instance) : RetainFiles::Found{});
-  if (auto judged = start.judge(initial.layout, options.mismatch); !judged)
-    return std::unexpected(std::move(judged).error());
+  PLCHOST_TRY(start.judge(initial.layout, options.mismatch));
   if (start.goes_on_in_place(initial, options.cold)) return 0;
   return RetainMemory::bytes_for(initial.layout.bytes);
 }
@@ -145,10 +144,9 @@ Result<std::unique_ptr<RetainKeeper>> RetainKeeper::make(ObjectPool& pool, const
                                                          const RetainImage& initial, const Options& options) {
   const std::string name = retain_memory_name(instance);
   Start start;
-  if (auto opened = start.open_files(options, instance); !opened) return std::unexpected(opened.error());
+  PLCHOST_TRY(start.open_files(options, instance));
   start.find_source(pool.name(), name, start.files ? start.files->read() : RetainFiles::Found{});
-  if (auto judged = start.judge(initial.layout, options.mismatch); !judged)
-    return std::unexpected(judged.error());
+  PLCHOST_TRY(start.judge(initial.layout, options.mismatch));
   start.fill(initial, options.cold);
   auto memory = start.goes_on_in_place(initial, options.cold)
                     ? RetainMemory::take_over(pool, name, initial.layout)

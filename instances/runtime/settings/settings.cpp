@@ -85,7 +85,7 @@ Result<InstanceSettings> read_settings(const std::string& file) {
 
 Result<InstanceSettings> read_settings(const std::string& file, SettingsSource& source) {
   FileWalk walk(source);
-  if (auto read = walk.read(file); !read) return std::unexpected(std::move(read).error());
+  PLCHOST_TRY(walk.read(file));
   return walk.finish();
 }
 

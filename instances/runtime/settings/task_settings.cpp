@@ -71,8 +71,8 @@ std::string names_of(const std::vector<TaskConfig>& tasks) {
 Result<TaskSettings> from_options(const char* task, const Task_Options* options) {
   if (task == nullptr || options == nullptr) return invalid("a null pointer");
   const std::string_view name(task, ::strnlen(task, kMaxTaskName + 1));
-  if (auto valid = check_name("task", name, kMaxTaskName); !valid) return std::unexpected(valid.error());
-  if (auto valid = check_ranges(*options); !valid) return std::unexpected(std::move(valid).error());
+  PLCHOST_TRY(check_name("task", name, kMaxTaskName));
+  PLCHOST_TRY(check_ranges(*options));
   return TaskSettings{
       .task = std::string(name),
       .where = fmt::format("plc_set_task_options(\"{}\")", name),

@@ -18,8 +18,7 @@ Result<UniqueFd> open_at_zero(const std::string& device) {
   UniqueFd fd(::open(device.c_str(), O_WRONLY | O_CLOEXEC));
   if (!fd) return failure(ErrorCode::refused, "open " + device, errno);
   const std::int32_t microseconds = 0;
-  const auto written = check_errno(::write(fd.get(), &microseconds, sizeof microseconds), "write " + device);
-  if (!written) return std::unexpected(written.error());
+  PLCHOST_TRY(check_errno(::write(fd.get(), &microseconds, sizeof microseconds), "write " + device));
   return fd;
 }
 

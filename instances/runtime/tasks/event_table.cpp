@@ -56,8 +56,7 @@ Result<RTS_HANDLE> EventTable::open(std::string_view name) {
   if (auto valid = check_name("instance name", owner, kMaxInstanceName); !valid) {
     return std::unexpected(valid.error());
   }
-  if (auto valid = check_name("event name", event, kMaxEventName); !valid)
-    return std::unexpected(valid.error());
+  PLCHOST_TRY(check_name("event name", event, kMaxEventName));
 
   const std::string object = event_object_name(owner, event);
   const std::size_t count = count_.load(std::memory_order_relaxed);
@@ -72,7 +71,7 @@ Result<RTS_HANDLE> EventTable::open(std::string_view name) {
   slot->own = owner == instance_;
   slot->name = event;
   slot->object = object;
-  if (auto attached = attach(*slot); !attached) return std::unexpected(attached.error());
+  PLCHOST_TRY(attach(*slot));
   slots_[count] = std::move(slot);
   count_.store(count + 1, std::memory_order_release);  // pairs with the acquire in find()
   return to_handle(count);

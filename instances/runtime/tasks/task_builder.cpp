@@ -94,7 +94,7 @@ Result<TaskConfig> build_task(Task_Info& task, const std::shared_ptr<TaskCode>& 
     code->run();
   };
   config.after_cycle = [code](const TaskCounters& counters) { write_back(counters, *code->info); };
-  if (auto filled = fill_kind(task, code, config); !filled) return std::unexpected(filled.error());
+  PLCHOST_TRY(fill_kind(task, code, config));
   return config;
 }
 

@@ -116,8 +116,7 @@ Result<DeclaredApplication> declare_watched(const std::string& path, const Start
     fmt::print(stderr, "{}: {}\n", path, error.describe());
     end_trial(kExitSetupFailed);
   });
-  if (auto loaded = load_components(start.settings, ComponentHooks::check, components, host); !loaded)
-    return std::unexpected(std::move(loaded).error());
+  PLCHOST_TRY(load_components(start.settings, ComponentHooks::check, components, host));
   auto declared = declare_application(path, start, host);
   if (auto ended = watch.end(); !ended && declared) return std::unexpected(std::move(ended).error());
   return declared;
@@ -129,27 +128,23 @@ Result<DeclaredApplication> declare_watched(const std::string& path, const Start
 // memories and outputs are only looked at. If one of these fails, the manager takes the start back.
 Result<DeclaredApplication> try_start(const Options& options, Components& components, ApplicationHost& host) {
   const LaunchOptions& launch = options.launch;
-  if (auto granted = try_cores(launch.cores); !granted) return std::unexpected(std::move(granted).error());
+  PLCHOST_TRY(try_cores(launch.cores));
   auto start = read_start_settings(launch);
   if (!start) return std::unexpected(std::move(start).error());
-  if (auto free = BlockService::check(launch.pool, launch.name, start->settings.blocks); !free)
-    return std::unexpected(std::move(free).error());
+  PLCHOST_TRY(BlockService::check(launch.pool, launch.name, start->settings.blocks));
   auto attached = ObjectPool::attach(launch.pool, ObjectPool::Access::read_only);
   std::optional<ObjectPool> pool;
   if (attached) pool.emplace(*std::move(attached));
   if (auto room = room_in_pool(launch, pool)) host.events().look_for_room(*std::move(room));
-  if (auto ready = prepare_host(*start, host); !ready) return std::unexpected(std::move(ready).error());
+  PLCHOST_TRY(prepare_host(*start, host));
   auto declared = declare_watched(options.check_application, *start, components, host);
   if (!declared) return declared;
   const auto& [application, declaration] = *declared;
-  if (auto reserved = host.reserve(declaration); !reserved)
-    return std::unexpected(std::move(reserved).error());
+  PLCHOST_TRY(host.reserve(declaration));
   auto environment = areas_environment(launch, start->settings, application, pool ? &*pool : nullptr);
   environment.room = host.events().room();
-  if (auto good = Areas::check(environment, declaration.areas); !good)
-    return std::unexpected(std::move(good).error());
-  if (auto good = try_tasks(options, start->settings, application, host); !good)
-    return std::unexpected(std::move(good).error());
+  PLCHOST_TRY(Areas::check(environment, declaration.areas));
+  PLCHOST_TRY(try_tasks(options, start->settings, application, host));
   return declared;
 }
 

@@ -79,7 +79,7 @@ class AreasUnderTest : public ::testing::Test {
     settings_ = parse_settings(settings, "l.cfg").value();
     std::vector<std::string> names;
     for (const TaskConfig& task : tasks) names.push_back(task.name);
-    if (auto done = complete_uses(declared, names); !done) return std::unexpected(std::move(done).error());
+    PLCHOST_TRY(complete_uses(declared, names));
     return sut.place({.pool = &shared_,
                       .instance = "line1",
                       .application = "Test",
