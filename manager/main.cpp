@@ -65,9 +65,8 @@ std::vector<std::string> option_names(const CLI::App& app) {
 
 Result<void> check_identity(const ManagerConfig& config) {
   if (config.dds.identity.empty()) return {};
-  const auto identity = security::check_identity(config.dds.identity);
-  if (!identity) return std::unexpected(identity.error());
-  return security::check_host_identity(identity->subject, config.host.name);
+  PLCHOST_TRY_ASSIGN(const auto identity, security::check_identity(config.dds.identity));
+  return security::check_host_identity(identity.subject, config.host.name);
 }
 
 std::string programs_of(const Options& options) {

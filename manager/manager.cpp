@@ -110,10 +110,9 @@ Result<std::unique_ptr<Manager>> Manager::create(const ManagerConfig& config, Op
     return failure_in("another manager runs with this run directory", lock.error());
   }
   if (!lock) return std::unexpected(lock.error());
-  auto reactor = Reactor::create();
-  if (!reactor) return std::unexpected(reactor.error());
+  PLCHOST_TRY_ASSIGN(auto reactor, Reactor::create());
   std::unique_ptr<Manager> manager(new Manager(  // NOLINT: the constructor is private
-      config, std::move(options), std::move(*lock), std::move(*reactor)));
+      config, std::move(options), std::move(*lock), std::move(reactor)));
   PLCHOST_TRY(manager->set_up());
   return manager;
 }
@@ -140,24 +139,21 @@ Result<void> Manager::set_up() {
   if (!rights) return std::unexpected(rights.error());
   clear_names(host.pool, *rights);
   if (auto ours = check_pool_owner(host.pool, *rights); !ours) return ours;
-  auto pool = ObjectPool::create(host.pool, {.max_objects = host.pool_objects, .rights = *rights});
-  if (!pool) return std::unexpected(pool.error());
+  PLCHOST_TRY_ASSIGN(auto pool,
+                     ObjectPool::create(host.pool, {.max_objects = host.pool_objects, .rights = *rights}));
   if (auto renewed = renew_pool_rights(host.pool, *rights); !renewed) {
     spdlog::warn("{}", renewed.error().describe());
   }
-  pool_ = std::move(*pool);
-  auto page = HostPageWriter::create(host.pool);
-  if (!page) return std::unexpected(page.error());
-  page_ = std::move(*page);
+  pool_ = std::move(pool);
+  PLCHOST_TRY_ASSIGN(page_, HostPageWriter::create(host.pool));
   auto signals = reactor_->watch_signals({SIGTERM, SIGINT, SIGHUP}, [this](int signal) {
     if (signal != SIGHUP) return shut_down();
     reload_->reload_by_signal();
   });
   if (!signals) return signals;
   for (const InstanceConfig& instance : config_.instances) {
-    auto ring = TransitionRing::open(host.pool, instance.name);
-    if (!ring) return std::unexpected(ring.error());
-    transitions_.emplace(instance.name, *std::move(ring));
+    PLCHOST_TRY_ASSIGN(auto ring, TransitionRing::open(host.pool, instance.name));
+    transitions_.emplace(instance.name, std::move(ring));
   }
   make_supervisor();
   write_host();
@@ -168,9 +164,8 @@ Result<void> Manager::set_up() {
       ConfigReload::Settings{
           .file = options_.file, .program = "/proc/self/exe", .programs = options_.programs},
       *host_check_, [this] { return reload(); });
-  auto server = CommandServer::open(*reactor_, manager_socket_path(host.run_directory), *reload_);
-  if (!server) return std::unexpected(server.error());
-  command_server_ = std::move(*server);
+  PLCHOST_TRY_ASSIGN(command_server_,
+                     CommandServer::open(*reactor_, manager_socket_path(host.run_directory), *reload_));
   return {};
 }
 

@@ -46,13 +46,12 @@ void Manager::adopt_removed() {
 }
 
 Result<std::vector<std::string>> Manager::reload() {
-  auto read = config_disk_.ask<std::expected<ManagerConfig, ConfigErrors>>(kConfigReadLimit, options_.file,
-                                                                           options_.read);
-  if (!read) return std::unexpected(read.error());
-  if (!*read) {  // changed since it was checked
-    return failure(ErrorCode::invalid_argument, join_lines(read->error(), "plchostd --check-config"));
+  PLCHOST_TRY_ASSIGN(auto read, config_disk_.ask<std::expected<ManagerConfig, ConfigErrors>>(
+                                    kConfigReadLimit, options_.file, options_.read));
+  if (!read) {  // changed since it was checked
+    return failure(ErrorCode::invalid_argument, join_lines(read.error(), "plchostd --check-config"));
   }
-  ManagerConfig& now = **read;
+  ManagerConfig& now = *read;
   PLCHOST_TRY(supervisor_->check_room(now.instances));
   for (const InstanceConfig& instance : now.instances) {
     if (transitions_.contains(instance.name)) continue;

@@ -56,9 +56,7 @@ Result<void> TaskSet::supervise() {
 Result<void> TaskSet::add(TaskConfig config) {
   CountedEvent* event = nullptr;
   if (traits_of(config.kind).names_event) {
-    auto found = environment_.find_event(config.external_event);
-    if (!found) return std::unexpected(std::move(found.error()));
-    event = *found;
+    PLCHOST_TRY_ASSIGN(event, environment_.find_event(config.external_event));
   }
   const ThreadPriority priority =
       environment_.allow_unprivileged ? ThreadPriority{} : task_priority(band_, config.iec_priority);
@@ -71,9 +69,8 @@ Result<void> TaskSet::add(TaskConfig config) {
   Task& task = *tasks_.back();
   if (task.kind().has_grid) task.follow(distributed_clock_.add_follower(task.config().iec_priority));
   if (task.latch() != nullptr) poller_.add(task);
-  auto thread = TaskThread::start(clock_, task, priority);
-  if (!thread) return std::unexpected(std::move(thread.error()));
-  threads_.push_back(std::move(*thread));
+  PLCHOST_TRY_ASSIGN(auto thread, TaskThread::start(clock_, task, priority));
+  threads_.push_back(std::move(thread));
   reported_running_.push_back(false);
   fault_taken_.push_back(false);
   return {};

@@ -12,13 +12,12 @@ namespace plchost {
 
 auto TaskSet::arrange(std::string_view name, const SchedulerSettings& settings)
     -> Result<std::unique_ptr<Arrangement>> {
-  const auto entry = find_scheduler(name);
-  if (!entry) return std::unexpected(entry.error());
+  PLCHOST_TRY_ASSIGN(const auto entry, find_scheduler(name));
   PLCHOST_TRY(check_settings(settings));
   auto arrangement = std::make_unique<Arrangement>();
   arrangement->tick = choose_tick(settings, *environment_.devices, tick_.device);
   const auto& device = arrangement->tick.device;
-  arrangement->scheduler = (*entry)->make(
+  arrangement->scheduler = entry->make(
       {.clock = clock_, .settings = settings, .tick_frequency = device ? device->frequency() : 0});
   if (arrangement->scheduler->capabilities().one_shot) {
     PLCHOST_TRY(check_one_shot(name, arrangement->tick));
@@ -46,9 +45,8 @@ Result<void> TaskSet::plan_ticks(Arrangement& arrangement, const SchedulerSettin
   const bool ticks = arrangement.scheduler->capabilities().ticks &&
                      std::ranges::any_of(tasks_, [](const auto& task) { return task->kind().timed; });
   if (!ticks && poller_.empty()) return {};
-  auto source = make_tick_source(clock_, arrangement.tick);
-  if (!source) return std::unexpected(std::move(source.error()));
-  arrangement.plan = {.source = std::move(*source),
+  PLCHOST_TRY_ASSIGN(auto source, make_tick_source(clock_, arrangement.tick));
+  arrangement.plan = {.source = std::move(source),
                       .scheduler = ticks ? arrangement.scheduler.get() : nullptr,
                       .origin = {},
                       .period = settings.scheduler_interval,
@@ -86,9 +84,7 @@ Result<void> TaskSet::check_startable() {
 Result<void> TaskSet::start(std::string_view scheduler, const SchedulerSettings& settings) {
   if (auto startable = check_startable(); !startable) return startable;
   if (tick_.device && tick_.device->fault() != TickFault::none) tick_ = {};  // is opened anew
-  auto arrangement = arrange(scheduler, settings);
-  if (!arrangement) return std::unexpected(std::move(arrangement.error()));
-  active_ = std::move(*arrangement);
+  PLCHOST_TRY_ASSIGN(active_, arrange(scheduler, settings));
   tick_ = active_->tick;
   distributed_clock_.configure(settings.distributed_clock);
   distributed_clock_.set_steering(active_->scheduler->capabilities().one_shot);
@@ -116,18 +112,17 @@ Result<void> TaskSet::switch_to(std::string_view scheduler, const SchedulerSetti
     return failure(ErrorCode::wrong_state,
                    "the tasks are not running: start them under the other scheduler instead");
   }
-  auto arrangement = arrange(scheduler, settings);
-  if (!arrangement) return std::unexpected(std::move(arrangement.error()));
+  PLCHOST_TRY_ASSIGN(auto arrangement, arrange(scheduler, settings));
   {
     // Nothing but the tasks themselves may delay the exchange.
     const RaisedPriority raised(environment_.allow_unprivileged ? ThreadPriority{} : switch_priority(band_));
-    if (!tick_by(**arrangement)) {
+    if (!tick_by(*arrangement)) {
       ticker_.use(nullptr);
-      retired_.push_back(std::move(*arrangement));  // the ticker may take its plan until it has seen the next
+      retired_.push_back(std::move(arrangement));  // the ticker may take its plan until it has seen the next
       return failure(ErrorCode::timed_out, fmt::format("the event variable of {} does not return",
                                                        join_names(tasks_in_exception())));
     }
-    retired_.push_back(std::exchange(active_, std::move(*arrangement)));
+    retired_.push_back(std::exchange(active_, std::move(arrangement)));
     tick_ = active_->tick;
     watch(settings);
     distributed_clock_.set_steering(active_->scheduler->capabilities().one_shot);

@@ -53,12 +53,11 @@ void AuditWalk::problem(const std::string& text) {
 }
 
 Result<AuditFindings> check_audit(const std::string& folder) {
-  const auto files = audit_files(folder);
-  if (!files) return std::unexpected(files.error());
-  if (files->empty()) return failure(ErrorCode::not_found, fmt::format("{} has no audit.*.log", folder));
+  PLCHOST_TRY_ASSIGN(const auto files, audit_files(folder));
+  if (files.empty()) return failure(ErrorCode::not_found, fmt::format("{} has no audit.*.log", folder));
   AuditFindings findings;
   AuditWalk walk(findings);
-  for (const AuditFile& file : *files) {
+  for (const AuditFile& file : files) {
     std::ifstream lines(file.path);
     if (!lines) return failure(ErrorCode::system, "open " + file.path, errno);
     std::size_t number = 0;

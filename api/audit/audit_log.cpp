@@ -58,9 +58,8 @@ Result<std::unique_ptr<AuditLog>> AuditLog::open(Options options) {
     std::filesystem::permissions(options.folder, std::filesystem::perms::owner_all, error);
   }
   if (error) return failure(ErrorCode::system, "make folder " + options.folder, error.value());
-  auto lock = lock_folder(options.folder);
-  if (!lock) return std::unexpected(std::move(lock).error());
-  std::unique_ptr<AuditLog> log(new AuditLog(std::move(options), *std::move(lock)));
+  PLCHOST_TRY_ASSIGN(auto lock, lock_folder(options.folder));
+  std::unique_ptr<AuditLog> log(new AuditLog(std::move(options), std::move(lock)));
   PLCHOST_TRY(log->go_on());
   log->syncer_ =
       std::jthread([self = log.get()](const std::stop_token& stop) { self->sync_until_stopped(stop); });
@@ -68,13 +67,12 @@ Result<std::unique_ptr<AuditLog>> AuditLog::open(Options options) {
 }
 
 Result<void> AuditLog::go_on() {
-  const auto files = audit_files(options_.folder);
-  if (!files) return std::unexpected(files.error());
-  if (files->empty()) {
+  PLCHOST_TRY_ASSIGN(const auto files, audit_files(options_.folder));
+  if (files.empty()) {
     if (auto made = open_file(options_.folder + "/" + audit_file_name(1)); !made) return made;
     return write(of_the_log("begin", "the first record of this log"));
   }
-  const AuditFile& last = files->back();
+  const AuditFile& last = files.back();
   head_.number = last.first - 1;  // unless a record is found in it
   if (auto opened = open_file(last.path); !opened) return opened;
   return find_end(last.path);
@@ -124,9 +122,8 @@ Result<void> AuditLog::find_end(const std::string& path) {
 }
 
 Result<void> AuditLog::next_file() {
-  const auto files = audit_files(options_.folder);
-  if (!files) return std::unexpected(files.error());
-  for (std::size_t i = 0; i + options_.most_files <= files->size(); ++i) ::unlink((*files)[i].path.c_str());
+  PLCHOST_TRY_ASSIGN(const auto files, audit_files(options_.folder));
+  for (std::size_t i = 0; i + options_.most_files <= files.size(); ++i) ::unlink(files[i].path.c_str());
   return open_file(options_.folder + "/" + audit_file_name(head_.number + 1));
 }
 

@@ -8,9 +8,8 @@ namespace plchost {
 
 Result<AuditLogs> AuditLogs::open(const std::string& folder) {
   constexpr std::size_t kRefusedFiles = 8;
-  auto done = AuditLog::open({.folder = folder});
-  if (!done) return std::unexpected(std::move(done).error());
-  AuditLogs logs{.done = *std::move(done), .refused = nullptr, .pending = {}};
+  PLCHOST_TRY_ASSIGN(auto done, AuditLog::open({.folder = folder}));
+  AuditLogs logs{.done = std::move(done), .refused = nullptr, .pending = {}};
   auto refused = AuditLog::open({.folder = folder + "/refused", .most_files = kRefusedFiles});
   auto pending = PendingRecords::open(folder + "/under_way");
   for (const Error* error : {refused ? nullptr : &refused.error(), pending ? nullptr : &pending.error()}) {

@@ -17,10 +17,9 @@ namespace plchost {
 Result<ControlClient*> CliSession::client() {
   if (!client_) {
     dds::install_log_sink();
-    auto connected = ControlClient::connect(
-        options.dds, options.hosts.names_one() ? std::string_view(options.hosts.host) : std::string_view());
-    if (!connected) return std::unexpected(connected.error());
-    client_ = std::move(*connected);
+    PLCHOST_TRY_ASSIGN(client_, ControlClient::connect(options.dds, options.hosts.names_one()
+                                                                        ? std::string_view(options.hosts.host)
+                                                                        : std::string_view()));
   }
   return client_.get();
 }
@@ -64,22 +63,20 @@ std::unexpected<Error> none_selected(const std::vector<HostView>& hosts) {
 }  // namespace
 
 Result<std::vector<HostView>> CliSession::shown_hosts() {
-  const auto connected = client();
-  if (!connected) return std::unexpected(connected.error());
+  PLCHOST_TRY_ASSIGN(const auto connected, client());
   const HostSelection& selection = options.hosts;
   if (selection.names_one()) {
-    auto one = (*connected)->host(selection.host, deadline());
+    auto one = connected->host(selection.host, deadline());
     if (!one) return failure(ErrorCode::unavailable, one.error().message);
     if (selection.selects(*one)) return std::vector{std::move(*one)};
     return none_selected({*std::move(one)});
   }
-  return select((*connected)->hosts(deadline()));
+  return select(connected->hosts(deadline()));
 }
 
 Result<std::vector<HostView>> CliSession::known_hosts() {
-  const auto connected = client();
-  if (!connected) return std::unexpected(connected.error());
-  const auto known = (*connected)->known_hosts(deadline());
+  PLCHOST_TRY_ASSIGN(const auto connected, client());
+  const auto known = connected->known_hosts(deadline());
   // For the names of those that answer.
   if (known.empty() && options.hosts.names_one()) return shown_hosts();
   return select(known);
@@ -101,11 +98,10 @@ Result<std::vector<HostView>> CliSession::select(const std::vector<HostView>& al
 }
 
 Result<std::string> CliSession::target_host() {
-  const auto hosts = shown_hosts();
-  if (!hosts) return std::unexpected(hosts.error());
-  if (hosts->size() == 1) return hosts->front().name;
+  PLCHOST_TRY_ASSIGN(const auto hosts, shown_hosts());
+  if (hosts.size() == 1) return hosts.front().name;
   std::vector<std::string_view> names;
-  for (const HostView& host : *hosts) names.emplace_back(host.name);
+  for (const HostView& host : hosts) names.emplace_back(host.name);
   return failure(
       ErrorCode::invalid_argument,
       fmt::format("several hosts answer, and this is for one; say which with --host: {}", join_names(names)));
@@ -113,25 +109,21 @@ Result<std::string> CliSession::target_host() {
 
 Result<std::vector<std::string>> CliSession::target_hosts() {
   if (!options.hosts.means_many()) {
-    auto one = target_host();
-    if (!one) return std::unexpected(std::move(one).error());
-    return std::vector{*std::move(one)};
+    PLCHOST_TRY_ASSIGN(auto one, target_host());
+    return std::vector{std::move(one)};
   }
-  const auto hosts = shown_hosts();
-  if (!hosts) return std::unexpected(hosts.error());
+  PLCHOST_TRY_ASSIGN(const auto hosts, shown_hosts());
   std::vector<std::string> names;
-  for (const HostView& host : *hosts) names.push_back(host.name);
+  for (const HostView& host : hosts) names.push_back(host.name);
   return names;
 }
 
 Result<void> CliSession::check_instance(const std::string& instance) {
-  const auto hosts = shown_hosts();
-  if (!hosts) return std::unexpected(hosts.error());
+  PLCHOST_TRY_ASSIGN(const auto hosts, shown_hosts());
   std::vector<std::string> names;
-  for (const HostView& host : *hosts) {
-    const auto instances = client_->instances(host.name, deadline());
-    if (!instances) return std::unexpected(instances.error());
-    for (const auto& known : *instances) names.emplace_back(dds::text_of(known.instance));
+  for (const HostView& host : hosts) {
+    PLCHOST_TRY_ASSIGN(const auto instances, client_->instances(host.name, deadline()));
+    for (const auto& known : instances) names.emplace_back(dds::text_of(known.instance));
   }
   if (std::ranges::find(names, instance) != names.end()) return {};
   return unknown_name("instance", instance, names);

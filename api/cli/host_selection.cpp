@@ -16,9 +16,8 @@ constexpr std::string_view kAll = "all";
 
 Result<ApiReply> ask_one(const std::shared_ptr<Participant>& participant, const std::string& host,
                          const HostCall& call) {
-  const auto client = ControlClient::connect(participant, host);
-  if (!client) return std::unexpected(client.error());
-  return call(**client, host);
+  PLCHOST_TRY_ASSIGN(const auto client, ControlClient::connect(participant, host));
+  return call(*client, host);
 }
 
 }  // namespace

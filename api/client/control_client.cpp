@@ -34,11 +34,10 @@ Result<std::unique_ptr<ControlClient>> ControlClient::connect(std::shared_ptr<Pa
                                                               std::string_view only) {
   // A pattern would be one of partitions.
   if (!only.empty()) {
-    if (auto good = check_host_name(only); !good) return std::unexpected(std::move(good).error());
+    PLCHOST_TRY(check_host_name(only));
   }
   std::unique_ptr<ControlClient> client(new ControlClient);
-  if (auto opened = client->open(std::move(participant), only); !opened)
-    return std::unexpected(opened.error());
+  PLCHOST_TRY(client->open(std::move(participant), only));
   return client;
 }
 
@@ -84,8 +83,8 @@ Result<std::vector<plc_TaskStatus>> ControlClient::tasks(const std::string& host
 
 Result<StatisticsReport> ControlClient::statistics(const std::string& host, std::string_view instance,
                                                    std::string_view task, TimePoint deadline) {
-  if (auto good = check_host_name(host, only_); !good) return std::unexpected(std::move(good).error());
-  if (auto good = check_task_name(instance, task); !good) return std::unexpected(std::move(good).error());
+  PLCHOST_TRY(check_host_name(host, only_));
+  PLCHOST_TRY(check_task_name(instance, task));
   if (auto opened = open_cache(statistics_, dds::kTaskStatistics); !opened) {
     return std::unexpected(opened.error());
   }
@@ -199,7 +198,7 @@ Result<ApiReply> ControlClient::ask(const ApiRequest& request, TimePoint deadlin
 }
 
 Result<ApiReply> ControlClient::call(const ApiRequest& request, TimePoint deadline) {
-  if (auto good = check_api_request(request, only_); !good) return std::unexpected(std::move(good).error());
+  PLCHOST_TRY(check_api_request(request, only_));
   const auto look = [&, woken = false](const auto& /*identity*/, TimePoint /*now*/) mutable {
     if (std::exchange(woken, true)) update();
     return RequestCaller::Wait{.deadline = deadline};

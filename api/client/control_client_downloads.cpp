@@ -34,8 +34,8 @@ ApiRequest request_for(const Download& download) {
 Result<ApiReply> ControlClient::download(const Download& download, const DownloadProgressFunction& progress,
                                          TimePoint deadline) {
   const ApiRequest request = request_for(download);
-  if (auto good = check_api_request(request, only_); !good) return std::unexpected(std::move(good).error());
-  if (auto good = check_file_name(download.name); !good) return std::unexpected(std::move(good).error());
+  PLCHOST_TRY(check_api_request(request, only_));
+  PLCHOST_TRY(check_file_name(download.name));
   if (download.contents.empty()) return failure(ErrorCode::invalid_argument, download.name + " is empty");
   constexpr std::int32_t kOfEachHost = 16;
   const dds::Qos qos = dds::answers_qos(dds::kDownloadAck, kOfEachHost);

@@ -20,8 +20,7 @@ bool is_complete(const std::vector<plc_HostFinding>& findings, std::uint64_t rou
 }  // namespace
 
 Result<std::vector<plc_HostFinding>> ControlClient::check_host(const std::string& name, TimePoint deadline) {
-  if (auto opened = open_cache(host_findings_, dds::kHostFinding); !opened)
-    return std::unexpected(opened.error());
+  PLCHOST_TRY(open_cache(host_findings_, dds::kHostFinding));
   const auto before = host(name, deadline);
   if (!before) return std::unexpected(before.error());
   const auto reply = call({name, plc_OPERATION_CHECK_HOST, "", ""}, deadline);

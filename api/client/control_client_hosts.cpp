@@ -158,7 +158,7 @@ std::vector<HostView> ControlClient::hosts(TimePoint deadline) {
 }
 
 Result<HostView> ControlClient::host(std::string_view name, TimePoint deadline) {
-  if (auto good = check_host_name(name, only_); !good) return std::unexpected(std::move(good).error());
+  PLCHOST_TRY(check_host_name(name, only_));
   const TimePoint began = MonotonicClock::now();
   for (;;) {
     update();

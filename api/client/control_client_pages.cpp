@@ -34,8 +34,7 @@ std::optional<Listing> take_page(dds_entity_t reader, dds::HostWriters& writers,
 template <class Page, class Listing>
 Result<Listing> ControlClient::ask_for_page(dds::TopicReader& pages, const dds::TopicInfo& topic,
                                             const ApiRequest& request, TimePoint deadline) {
-  if (auto good = check_host_name(request.host, only_); !good)
-    return std::unexpected(std::move(good).error());
+  PLCHOST_TRY(check_host_name(request.host, only_));
   const dds::Qos qos = dds::answers_qos(topic, topic.qos.depth);
   if (auto opened = open_own_reader<Page>(pages, qos); !opened) {
     return std::unexpected(opened.error());

@@ -74,7 +74,7 @@ Result<PostReport> ControlClient::post_event(const HostEvent& event, std::uint64
     return std::unexpected(std::move(good).error());
   }
   const TimePoint start = MonotonicClock::now();
-  if (auto ready = prepare_posts(event.host, start + patience); !ready) return std::unexpected(ready.error());
+  PLCHOST_TRY(prepare_posts(event.host, start + patience));
   const auto way = poster<plc_EventPost>(event.host);
   if (!way) return std::unexpected(way.error());
   EventPoster& posts = **way;
@@ -116,14 +116,13 @@ Result<PostReport> ControlClient::post_event(const HostEvent& event, std::uint64
 
 Result<PostReport> ControlClient::post_batch(const std::string& host, std::span<const EventId> events,
                                              Duration patience) {
-  if (auto good = check_host_name(host, only_); !good) return std::unexpected(std::move(good).error());
+  PLCHOST_TRY(check_host_name(host, only_));
   if (events.empty() || events.size() > kMaxBatch) {
     return failure(ErrorCode::invalid_argument,
                    fmt::format("a batch of {} events; allowed are 1 to {}", events.size(), kMaxBatch));
   }
   for (const EventId& event : events) {
-    if (auto good = check_event_name(event.instance, event.event); !good)
-      return std::unexpected(good.error());
+    PLCHOST_TRY(check_event_name(event.instance, event.event));
   }
   const auto way = poster<plc_EventBatch>(host);
   if (!way) return std::unexpected(way.error());

@@ -64,7 +64,7 @@ Result<RunReport> ControlClient::post_and_await(const HostEvent& event, Duration
     return std::unexpected(std::move(good).error());
   }
   const TimePoint deadline = MonotonicClock::now() + patience;
-  if (auto ready = prepare_runs(event.host, deadline); !ready) return std::unexpected(ready.error());
+  PLCHOST_TRY(prepare_runs(event.host, deadline));
   for (;;) {
     auto run = post_and_await_once(event, deadline);
     const TimePoint again = MonotonicClock::now() + kInstanceLook;

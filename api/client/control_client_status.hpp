@@ -36,7 +36,7 @@ Result<void> ControlClient::open_own_reader(dds::TopicReader& answers, const dds
 template <class Sample>
 Result<std::vector<Sample>> ControlClient::status(const std::string& host, TimePoint deadline) {
   auto& cache = std::get<StatusCache<Sample>>(status_);
-  if (auto good = check_host_name(host, only_); !good) return std::unexpected(std::move(good).error());
+  PLCHOST_TRY(check_host_name(host, only_));
   if (auto opened = open_cache(cache, dds::kTopicOf<Sample>); !opened) {
     return std::unexpected(opened.error());
   }

@@ -55,10 +55,9 @@ Result<std::uint64_t> number_of(const Json& json, const char* key, std::uint64_t
 
 Result<HostFinding> finding_of(const Json& json) {
   if (!json.is_object()) return failure(ErrorCode::corrupt, "a finding is not a JSON object");
-  const auto level = number_of(json, "level", kLevels.size() - 1);
-  if (!level) return std::unexpected(level.error());
+  PLCHOST_TRY_ASSIGN(const auto level, number_of(json, "level", kLevels.size() - 1));
   HostFinding finding;
-  finding.level = static_cast<FindingLevel>(*level);
+  finding.level = static_cast<FindingLevel>(level);
   for (const TextField& field : kTexts) {
     const auto found = json.find(field.key);
     if (found == json.end() || !found->is_string()) {
@@ -107,9 +106,8 @@ Result<FindingsPart> decode_part(std::string_view text) {
     return failure(ErrorCode::corrupt, "findings have no array 'findings' within their total");
   }
   for (const Json& each : *findings) {
-    auto finding = finding_of(each);
-    if (!finding) return std::unexpected(finding.error());
-    part.findings.push_back(*std::move(finding));
+    PLCHOST_TRY_ASSIGN(auto finding, finding_of(each));
+    part.findings.push_back(std::move(finding));
   }
   return part;
 }

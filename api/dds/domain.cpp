@@ -121,7 +121,7 @@ Result<std::string> domain_configuration(Role role, const DomainOptions& options
   bool loopback = false;
   bool multicast = false;
   for (const std::string& name : options.interfaces) {
-    if (const auto good = check_address("interface", name); !good) return std::unexpected(good.error());
+    PLCHOST_TRY(check_address("interface", name));
     const bool by_multicast =
         options.multicast && name != "lo" && (options.peers.empty() || has_multicast(name));
     interfaces += fmt::format("<NetworkInterface name=\"{}\" multicast=\"{}\"/>", name,
@@ -133,7 +133,7 @@ Result<std::string> domain_configuration(Role role, const DomainOptions& options
   if (addresses.empty() && loopback) addresses.emplace_back("127.0.0.1");
   std::string peers;
   for (const std::string& address : addresses) {
-    if (const auto good = check_address("peer", address); !good) return std::unexpected(good.error());
+    PLCHOST_TRY(check_address("peer", address));
     peers += fmt::format("<Peer Address=\"{}\"/>", address);
   }
   if (!peers.empty()) peers = fmt::format("<Peers>{}</Peers>", peers);
@@ -217,7 +217,7 @@ Result<Entity> make_participant(std::uint32_t domain, const dds_qos_t* qos, std:
     (void)plc_decode_signed_once(made->get());
   }
   if (!made || !registry().gated.contains(domain)) return made;
-  if (auto filtered = filter_datagrams(*made, what); !filtered) return std::unexpected(filtered.error());
+  PLCHOST_TRY(filter_datagrams(*made, what));
   return made;
 }
 

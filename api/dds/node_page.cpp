@@ -83,7 +83,7 @@ plc_RouteRecord sample_of(const RouteInfo& route) {
 }  // namespace
 
 Result<plc_ListPart> part_of(const NodeQuery& query) {
-  if (auto good = check_nodes(query); !good) return std::unexpected(std::move(good).error());
+  PLCHOST_TRY(check_nodes(query));
   plc_ListPart part{};
   dds::copy_text(part.base, query.base);
   dds::copy_text(part.name, query.node);
@@ -99,7 +99,7 @@ Result<NodeQuery> node_query_of(const plc_ListPart& part) {
   NodeQuery query{.base = std::string(dds::text_of(part.base)),
                   .node = std::string(dds::text_of(part.name)),
                   .after = static_cast<std::uint16_t>(part.after)};
-  if (auto good = check_nodes(query); !good) return std::unexpected(std::move(good).error());
+  PLCHOST_TRY(check_nodes(query));
   return query;
 }
 

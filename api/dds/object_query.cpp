@@ -60,7 +60,7 @@ Result<ObjectType> parse_object_type(std::string_view text) {
 }
 
 Result<plc_ListPart> part_of(const ObjectQuery& query) {
-  if (auto good = check_query(query); !good) return std::unexpected(std::move(good).error());
+  PLCHOST_TRY(check_query(query));
   plc_ListPart part{};
   dds::copy_text(part.name, query.name);
   if (query.type) dds::copy_text(part.type, to_string(*query.type));
@@ -78,7 +78,7 @@ Result<ObjectQuery> object_query_of(const plc_ListPart& part) {
     if (!parsed) return std::unexpected(parsed.error());
     query.type = *parsed;
   }
-  if (auto good = check_query(query); !good) return std::unexpected(std::move(good).error());
+  PLCHOST_TRY(check_query(query));
   return query;
 }
 

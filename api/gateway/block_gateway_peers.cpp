@@ -103,7 +103,7 @@ Result<std::unique_ptr<BlockGateway::Peer>> BlockGateway::open_peer(const HostCl
                                acks_.topic.get(), dds::qos_of(dds::kBlockAck));
   if (!acks) return std::unexpected(std::move(acks).error());
   peer->acks = *std::move(acks);
-  if (auto opened = open_block_writer(*peer); !opened) return std::unexpected(std::move(opened).error());
+  PLCHOST_TRY(open_block_writer(*peer));
   peer->has_news = true;  // it waits to hear of this host
   return peer;
 }

@@ -11,16 +11,14 @@
 namespace plchost {
 
 Result<EventId> event_of(const std::string& name) {
-  auto parts = split_name("EVENT", name);
-  if (!parts) return std::unexpected(std::move(parts).error());
-  return EventId{std::move(parts->first), std::move(parts->second)};
+  PLCHOST_TRY_ASSIGN(auto parts, split_name("EVENT", name));
+  return EventId{std::move(parts.first), std::move(parts.second)};
 }
 
 Result<std::string> host_of(ControlClient& client, const std::string& name, TimePoint deadline) {
   if (!name.empty()) {
-    auto found = client.host(name, deadline);
-    if (!found) return std::unexpected(std::move(found).error());
-    return std::move(found->name);
+    PLCHOST_TRY_ASSIGN(auto found, client.host(name, deadline));
+    return std::move(found.name);
   }
   if (!client.only().empty()) return host_of(client, client.only(), deadline);
   const auto all = client.hosts(deadline);

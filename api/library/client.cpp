@@ -17,27 +17,23 @@ namespace {
 template <class Sample>
 auto list(ControlClient& client, const std::string& name, TimePoint deadline)
     -> Result<std::vector<decltype(to_public(Sample{}))>> {
-  const auto host = host_of(client, name, deadline);
-  if (!host) return std::unexpected(host.error());
-  const auto samples = client.status<Sample>(*host, deadline);
-  if (!samples) return std::unexpected(samples.error());
+  PLCHOST_TRY_ASSIGN(const auto host, host_of(client, name, deadline));
+  PLCHOST_TRY_ASSIGN(const auto samples, client.status<Sample>(host, deadline));
   std::vector<decltype(to_public(Sample{}))> items;
-  for (const Sample& sample : *samples) items.push_back(to_public(sample));
+  for (const Sample& sample : samples) items.push_back(to_public(sample));
   return items;
 }
 
 Result<std::vector<Client::LogLine>> read_lines(ControlClient& client, const std::string& name,
                                                 const std::string& instance, LogPlace place,
                                                 std::uint64_t newest, TimePoint deadline) {
-  auto host = host_of(client, name, deadline);
-  if (!host) return std::unexpected(std::move(host).error());
-  LogReader log(*host, instance, place);
-  const auto said = log.read(client, deadline, newest);
-  if (!said) return std::unexpected(said.error());
+  PLCHOST_TRY_ASSIGN(const auto host, host_of(client, name, deadline));
+  LogReader log(host, instance, place);
+  PLCHOST_TRY_ASSIGN(const auto said, log.read(client, deadline, newest));
   std::vector<Client::LogLine> lines;
-  for (const LogText& text : *said) {
+  for (const LogText& text : said) {
     lines.push_back(to_public(text));
-    lines.back().host = *host;
+    lines.back().host = host;
     lines.back().instance = instance;
     lines.back().stream = log.place().stream;
   }
@@ -46,12 +42,9 @@ Result<std::vector<Client::LogLine>> read_lines(ControlClient& client, const std
 
 Result<PostReport> post_to(ControlClient& client, const std::string& name, const std::string& event,
                            std::uint64_t count, Duration timeout) {
-  auto id = event_of(event);
-  if (!id) return std::unexpected(std::move(id).error());
-  const auto host = host_of(client, name, MonotonicClock::now() + timeout);
-  if (!host) return std::unexpected(host.error());
-  return client.post_event({*host, std::move(id->instance), std::move(id->event)}, count, Duration{},
-                           timeout);
+  PLCHOST_TRY_ASSIGN(auto id, event_of(event));
+  PLCHOST_TRY_ASSIGN(const auto host, host_of(client, name, MonotonicClock::now() + timeout));
+  return client.post_event({host, std::move(id.instance), std::move(id.event)}, count, Duration{}, timeout);
 }
 
 Client::Outcome outcome_of(const Result<PostReport>& report) {
@@ -130,11 +123,9 @@ Client::TaskStatistics Client::statistics(const std::string& host, const std::st
                                           const std::string& task) {
   return value_or_throw(worker_->run<TaskStatistics>([&](ControlClient& client) -> Result<TaskStatistics> {
     const TimePoint deadline = worker_->deadline();
-    const auto found = host_of(client, host, deadline);
-    if (!found) return std::unexpected(found.error());
-    const auto report = client.statistics(*found, instance, task, deadline);
-    if (!report) return std::unexpected(report.error());
-    return to_public(*report);
+    PLCHOST_TRY_ASSIGN(const auto found, host_of(client, host, deadline));
+    PLCHOST_TRY_ASSIGN(const auto report, client.statistics(found, instance, task, deadline));
+    return to_public(report);
   }));
 }
 
@@ -145,9 +136,8 @@ std::vector<std::string> Client::topics() {
 std::vector<Client::Record> Client::status(const std::string& topic, const std::string& host) {
   return value_or_throw(
       worker_->run<std::vector<Record>>([&](ControlClient& client) -> Result<std::vector<Record>> {
-        const auto found = host_of(client, host, worker_->deadline());
-        if (!found) return std::unexpected(found.error());
-        return read_status(client, topic, *found, worker_->deadline());
+        PLCHOST_TRY_ASSIGN(const auto found, host_of(client, host, worker_->deadline()));
+        return read_status(client, topic, found, worker_->deadline());
       }));
 }
 
@@ -185,18 +175,16 @@ Client::Posted Client::post_all(const std::string& host, const std::vector<std::
   for (const std::string& event : events) ids.push_back(value_or_throw(event_of(event)));
   return posted_or_throw(
       outcome_of(worker_->run<PostReport>([&](ControlClient& client) -> Result<PostReport> {
-        const auto found = host_of(client, host, worker_->deadline());
-        if (!found) return std::unexpected(found.error());
-        return client.post_batch(*found, ids, worker_->timeout());
+        PLCHOST_TRY_ASSIGN(const auto found, host_of(client, host, worker_->deadline()));
+        return client.post_batch(found, ids, worker_->timeout());
       })));
 }
 
 Client::Run Client::post_and_wait(const std::string& host, const std::string& event) {
   auto id = value_or_throw(event_of(event));
   const auto run = value_or_throw(worker_->run<RunReport>([&](ControlClient& client) -> Result<RunReport> {
-    const auto found = host_of(client, host, worker_->deadline());
-    if (!found) return std::unexpected(found.error());
-    return client.post_and_await({*found, id.instance, id.event}, worker_->timeout());
+    PLCHOST_TRY_ASSIGN(const auto found, host_of(client, host, worker_->deadline()));
+    return client.post_and_await({found, id.instance, id.event}, worker_->timeout());
   }));
   return {.tasks = run.tasks,
           .last_task = run.last_task,

@@ -65,20 +65,17 @@ Result<const Operation*> find_command(const std::string& name) {
 
 Result<ApiRequest> request_of(const std::string& name, const std::string& host, const std::string& instance,
                               const std::string& argument, const LoadOptions& options) {
-  const auto known = find_command(name);
-  if (!known) return std::unexpected(known.error());
-  if ((options.boot || options.online) && (*known)->options == OperationOptions::none) {
+  PLCHOST_TRY_ASSIGN(const auto known, find_command(name));
+  if ((options.boot || options.online) && known->options == OperationOptions::none) {
     return failure(ErrorCode::invalid_argument, fmt::format("'{}' takes no options of loading", name));
   }
-  return ApiRequest{
-      host, static_cast<std::int32_t>((*known)->verb), instance, argument, options.boot, options.online};
+  return ApiRequest{host,          static_cast<std::int32_t>(known->verb), instance, argument, options.boot,
+                    options.online};
 }
 
 /// `request.host`: empty: the only one.
 Result<ApiReply> ask(ControlClient& client, ApiRequest request, TimePoint deadline) {
-  auto found = host_of(client, request.host, deadline);
-  if (!found) return std::unexpected(std::move(found).error());
-  request.host = *std::move(found);
+  PLCHOST_TRY_ASSIGN(request.host, host_of(client, request.host, deadline));
   return client.call(request, deadline);
 }
 
@@ -92,14 +89,12 @@ struct Sending {
 };
 
 Result<ApiReply> send(ControlClient& client, const Sending& sending, TimePoint deadline) {
-  const auto contents = read_application(sending.file);
-  if (!contents) return std::unexpected(contents.error());
-  const auto host = host_of(client, sending.host, deadline);
-  if (!host) return std::unexpected(host.error());
-  return client.download({.host = *host,
+  PLCHOST_TRY_ASSIGN(const auto contents, read_application(sending.file));
+  PLCHOST_TRY_ASSIGN(const auto host, host_of(client, sending.host, deadline));
+  return client.download({.host = host,
                           .instance = sending.instance,
                           .name = std::filesystem::path(sending.file).filename().string(),
-                          .contents = std::as_bytes(std::span(*contents)),
+                          .contents = std::as_bytes(std::span(contents)),
                           .boot = sending.options.boot,
                           .online = sending.options.online},
                          sending.progress, deadline);

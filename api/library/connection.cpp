@@ -6,11 +6,8 @@ namespace plchost {
 
 Result<ControlClient*> Connection::client() {
   if (!client_) {
-    auto participant = participant_->get();
-    if (!participant) return std::unexpected(std::move(participant).error());
-    auto connected = ControlClient::connect(*std::move(participant), only_);
-    if (!connected) return std::unexpected(std::move(connected).error());
-    client_ = *std::move(connected);
+    PLCHOST_TRY_ASSIGN(auto participant, participant_->get());
+    PLCHOST_TRY_ASSIGN(client_, ControlClient::connect(std::move(participant), only_));
   }
   return client_.get();
 }

@@ -71,9 +71,8 @@ Result<Name> make_name(const Subject& subject) {
         !add_entry(name->get(), NID_serialNumber, std::to_string(number), V_ASN1_PRINTABLESTRING)) {
       return openssl_failure("make a subject");
     }
-    const auto prefix = prefix_of(name->get());
-    if (!prefix) return std::unexpected(prefix.error());
-    if (is_lowest(*prefix) == wants_lowest) return name;
+    PLCHOST_TRY_ASSIGN(const auto prefix, prefix_of(name->get()));
+    if (is_lowest(prefix) == wants_lowest) return name;
   }
   return failure(ErrorCode::system, fmt::format("no subject for '{}' has the hash it needs", subject.name));
 }
@@ -130,31 +129,28 @@ Result<Key> make_key() {
 }
 
 Result<Authority> make_authority(const std::string& name, const Validity& validity) {
-  auto key = make_key();
-  if (!key) return std::unexpected(key.error());
+  PLCHOST_TRY_ASSIGN(auto key, make_key());
   const Name subject(X509_NAME_new());
   if (!subject || !add_entry(subject.get(), NID_organizationName, kOrganisation) ||
       !add_entry(subject.get(), NID_commonName, name)) {
     return openssl_failure(fmt::format("make the subject '{}'", name));
   }
-  auto made = begin_certificate(subject, validity, *key);
-  if (!made) return std::unexpected(made.error());
-  X509* const raw = made->get();
+  PLCHOST_TRY_ASSIGN(auto made, begin_certificate(subject, validity, key));
+  X509* const raw = made.get();
   if (X509_set_issuer_name(raw, subject.get()) != 1 ||
       !add_extension(raw, raw, NID_basic_constraints, "critical,CA:TRUE") ||
       !add_extension(raw, raw, NID_key_usage, "critical,keyCertSign,cRLSign,digitalSignature") ||
       !add_extension(raw, raw, NID_subject_key_identifier, "hash") ||
-      X509_sign(raw, key->get(), EVP_sha256()) == 0) {
+      X509_sign(raw, key.get(), EVP_sha256()) == 0) {
     return openssl_failure(fmt::format("make the authority '{}'", name));
   }
-  return Authority{std::move(*made), std::move(*key)};
+  return Authority{std::move(made), std::move(key)};
 }
 
 Result<Certificate> issue_certificate(const Subject& subject, const Validity& validity, const Key& key,
                                       const Authority& authority) {
-  const auto name = make_name(subject);
-  if (!name) return std::unexpected(name.error());
-  auto made = begin_certificate(*name, validity, key);
+  PLCHOST_TRY_ASSIGN(const auto name, make_name(subject));
+  auto made = begin_certificate(name, validity, key);
   if (!made) return made;
   X509* const raw = made->get();
   X509* const issuer = authority.certificate.get();
@@ -184,11 +180,9 @@ Result<Subject> subject_of(const Certificate& certificate) {
 }
 
 Result<Validity> validity_of(const Certificate& certificate) {
-  const auto not_before = unix_time(X509_get0_notBefore(certificate.get()));
-  if (!not_before) return std::unexpected(not_before.error());
-  const auto not_after = unix_time(X509_get0_notAfter(certificate.get()));
-  if (!not_after) return std::unexpected(not_after.error());
-  return Validity{*not_before, *not_after};
+  PLCHOST_TRY_ASSIGN(const auto not_before, unix_time(X509_get0_notBefore(certificate.get())));
+  PLCHOST_TRY_ASSIGN(const auto not_after, unix_time(X509_get0_notAfter(certificate.get())));
+  return Validity{not_before, not_after};
 }
 
 Result<std::string> subject_text(const Certificate& certificate) {

@@ -22,31 +22,25 @@ Result<void> check_key(const std::string& path, const Certificate& certificate) 
     return failure(ErrorCode::refused,
                    fmt::format("{} can be read or written by others than its owner: chmod 600 it", path));
   }
-  const auto key = read_key(path);
-  if (!key) return std::unexpected(key.error());
-  if (X509_check_private_key(certificate.get(), key->get()) == 1) return {};
+  PLCHOST_TRY_ASSIGN(const auto key, read_key(path));
+  if (X509_check_private_key(certificate.get(), key.get()) == 1) return {};
   ERR_clear_error();
   return failure(ErrorCode::corrupt,
                  fmt::format("{} is not the key of {} beside it", path, kCertificateFile));
 }
 
 Result<void> check_documents(const std::string& folder, const Certificate& certificate) {
-  const auto authority = read_certificate(file_in(folder, kPermissionsAuthorityFile));
-  if (!authority) return std::unexpected(authority.error());
+  PLCHOST_TRY_ASSIGN(const auto authority, read_certificate(file_in(folder, kPermissionsAuthorityFile)));
   std::string permissions;
   for (const std::string_view file : {kGovernanceFile, kPermissionsFile}) {
     const std::string path = file_in(folder, file);
-    const auto document = read_file(path);
-    if (!document) return std::unexpected(document.error());
-    auto text = open_document(path, *document, *authority);
-    if (!text) return std::unexpected(text.error());
-    permissions = std::move(*text);
+    PLCHOST_TRY_ASSIGN(const auto document, read_file(path));
+    PLCHOST_TRY_ASSIGN(permissions, open_document(path, document, authority));
   }
-  const auto subject = subject_text(certificate);
-  if (!subject) return std::unexpected(subject.error());
-  if (permissions.contains(fmt::format("<subject_name>{}</subject_name>", *subject))) return {};
+  PLCHOST_TRY_ASSIGN(const auto subject, subject_text(certificate));
+  if (permissions.contains(fmt::format("<subject_name>{}</subject_name>", subject))) return {};
   return failure(ErrorCode::refused, fmt::format("{} are the permissions of another identity than '{}'",
-                                                 file_in(folder, kPermissionsFile), *subject));
+                                                 file_in(folder, kPermissionsFile), subject));
 }
 
 }  // namespace
@@ -77,13 +71,10 @@ Result<OwnIdentity> check_identity(const std::string& folder) {
   }
   const auto certificate = read_certificate(file_in(folder, kCertificateFile));
   if (!certificate) return std::unexpected(certificate.error());
-  const auto authority = read_certificate(file_in(folder, kIdentityAuthorityFile));
-  if (!authority) return std::unexpected(authority.error());
-  const auto revocations = read_revocations(file_in(folder, kRevocationsFile));
-  if (!revocations) return std::unexpected(revocations.error());
-  if (auto good = verify_revocations(*revocations, *authority); !good)
-    return failure_in(folder, good.error());
-  if (auto good = verify_certificate(*certificate, *authority, *revocations); !good) {
+  PLCHOST_TRY_ASSIGN(const auto authority, read_certificate(file_in(folder, kIdentityAuthorityFile)));
+  PLCHOST_TRY_ASSIGN(const auto revocations, read_revocations(file_in(folder, kRevocationsFile)));
+  if (auto good = verify_revocations(revocations, authority); !good) return failure_in(folder, good.error());
+  if (auto good = verify_certificate(*certificate, authority, revocations); !good) {
     return failure_in(folder, good.error());
   }
   if (auto good = check_key(file_in(folder, kKeyFile), *certificate); !good) {

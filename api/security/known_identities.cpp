@@ -39,10 +39,8 @@ Result<std::optional<Certified>> read_known(const std::string& path, const Certi
 }  // namespace
 
 Result<KnownIdentities> KnownIdentities::load(const std::string& folder) {
-  const auto authority = read_certificate(file_in(folder, kIdentityAuthorityFile));
-  if (!authority) return std::unexpected(authority.error());
-  const auto revocations = read_revocations(file_in(folder, kRevocationsFile));
-  if (!revocations) return std::unexpected(revocations.error());
+  PLCHOST_TRY_ASSIGN(const auto authority, read_certificate(file_in(folder, kIdentityAuthorityFile)));
+  PLCHOST_TRY_ASSIGN(const auto revocations, read_revocations(file_in(folder, kRevocationsFile)));
   const std::string known = file_in(folder, kKnownFolder);
   KnownIdentities identities;
   std::error_code error;
@@ -52,7 +50,7 @@ Result<KnownIdentities> KnownIdentities::load(const std::string& folder) {
     if (identities.size() >= kMost) {
       return failure(ErrorCode::full, fmt::format("{} holds more than {} certificates", known, kMost));
     }
-    auto one = read_known(entry->path(), *authority, *revocations);
+    auto one = read_known(entry->path(), authority, revocations);
     if (!one) {
       identities.problems_.push_back(one.error().describe());
       continue;

@@ -21,9 +21,8 @@ int no_password(char* /*buffer*/, int /*size*/, int /*writes*/, void* /*context*
 
 template <class Owner, class Read>
 Result<Owner> read_pem(const std::string& path, std::string_view what, Read read) {
-  const auto text = read_file(path);
-  if (!text) return std::unexpected(text.error());
-  const Bio bio = reading_bio(*text);
+  PLCHOST_TRY_ASSIGN(const auto text, read_file(path));
+  const Bio bio = reading_bio(text);
   Owner made(read(bio.get(), nullptr, no_password, nullptr));
   if (!made) return openssl_failure(fmt::format("{} is no {} in PEM form", path, what), ErrorCode::corrupt);
   return made;

@@ -40,32 +40,26 @@ Result<void> write_authority(const Authority& authority, const std::string& fold
 
 Result<Authority> read_authority(const std::string& folder, std::string_view certificate,
                                  std::string_view key) {
-  auto public_part = read_certificate(file_in(folder, certificate));
-  if (!public_part) return std::unexpected(public_part.error());
-  auto private_part = read_key(file_in(folder, key));
-  if (!private_part) return std::unexpected(private_part.error());
-  return Authority{std::move(*public_part), std::move(*private_part)};
+  PLCHOST_TRY_ASSIGN(auto public_part, read_certificate(file_in(folder, certificate)));
+  PLCHOST_TRY_ASSIGN(auto private_part, read_key(file_in(folder, key)));
+  return Authority{std::move(public_part), std::move(private_part)};
 }
 
 Result<void> write_authorities(const std::string& to) {
   const Validity validity = validity_for(kDaysOfAuthority);
-  const auto identity = make_authority("identity authority", validity);
-  if (!identity) return std::unexpected(identity.error());
-  const auto permissions = make_authority("permissions authority", validity);
-  if (!permissions) return std::unexpected(permissions.error());
-  if (auto done = write_authority(*identity, to, kIdentityAuthorityFile, kIdentityAuthorityKey); !done) {
+  PLCHOST_TRY_ASSIGN(const auto identity, make_authority("identity authority", validity));
+  PLCHOST_TRY_ASSIGN(const auto permissions, make_authority("permissions authority", validity));
+  if (auto done = write_authority(identity, to, kIdentityAuthorityFile, kIdentityAuthorityKey); !done) {
     return done;
   }
-  if (auto done = write_authority(*permissions, to, kPermissionsAuthorityFile, kPermissionsAuthorityKey);
+  if (auto done = write_authority(permissions, to, kPermissionsAuthorityFile, kPermissionsAuthorityKey);
       !done) {
     return done;
   }
-  const auto revocations = make_revocations(nullptr, {}, validity, *identity);
-  if (!revocations) return std::unexpected(revocations.error());
-  if (auto done = write_text(file_in(to, kRevocationsFile), to_pem(*revocations), kPublicFile); !done)
+  PLCHOST_TRY_ASSIGN(const auto revocations, make_revocations(nullptr, {}, validity, identity));
+  if (auto done = write_text(file_in(to, kRevocationsFile), to_pem(revocations), kPublicFile); !done)
     return done;
-  return write_text(file_in(to, kGovernanceFile), sign_document(governance_text(), *permissions),
-                    kPublicFile);
+  return write_text(file_in(to, kGovernanceFile), sign_document(governance_text(), permissions), kPublicFile);
 }
 
 /// Removes what was begun unless it was finished.
@@ -111,9 +105,8 @@ Result<void> SecurityFolder::init(const std::string& folder, const std::string& 
   if (auto made = make_folder(fresh); !made) return made;
   if (auto made = make_folder(authorities); !made) return made;
   if (auto written = write_authorities(authorities); !written) return written;
-  auto opened = open(fresh);
-  if (!opened) return std::unexpected(opened.error());
-  if (auto added = opened->add(Role::host, host); !added) return added;
+  PLCHOST_TRY_ASSIGN(auto opened, open(fresh));
+  if (auto added = opened.add(Role::host, host); !added) return added;
   if (auto renamed = rename_path(fresh, path); !renamed) return renamed;
   unfinished.finished();
   return sync_directory(fs::path(fresh).parent_path());
@@ -130,11 +123,11 @@ Result<SecurityFolder> SecurityFolder::open(const std::string& folder) {
                    errno);
   }
   if (::flock(lock.get(), LOCK_EX) != 0) return failure(ErrorCode::system, "lock " + authorities, errno);
-  auto identity = read_authority(authorities, kIdentityAuthorityFile, kIdentityAuthorityKey);
-  if (!identity) return std::unexpected(identity.error());
-  auto permissions = read_authority(authorities, kPermissionsAuthorityFile, kPermissionsAuthorityKey);
-  if (!permissions) return std::unexpected(permissions.error());
-  return SecurityFolder(folder, std::move(lock), std::move(*identity), std::move(*permissions));
+  PLCHOST_TRY_ASSIGN(auto identity,
+                     read_authority(authorities, kIdentityAuthorityFile, kIdentityAuthorityKey));
+  PLCHOST_TRY_ASSIGN(auto permissions,
+                     read_authority(authorities, kPermissionsAuthorityFile, kPermissionsAuthorityKey));
+  return SecurityFolder(folder, std::move(lock), std::move(identity), std::move(permissions));
 }
 
 std::string SecurityFolder::path(std::string_view name) const {
@@ -161,12 +154,11 @@ Result<void> SecurityFolder::add_valid(const Subject& subject, const Validity& v
   std::error_code error;
   const bool is_there = fs::exists(path(name), error);
   if (is_there) {
-    const auto known = view(name);
-    if (!known) return std::unexpected(known.error());
-    if (!known->revoked) {
+    PLCHOST_TRY_ASSIGN(const auto known, view(name));
+    if (!known.revoked) {
       return failure(ErrorCode::already_exists,
                      fmt::format("there is an identity '{}' ({}); revoke it first, or renew it", name,
-                                 to_string(known->subject.role)));
+                                 to_string(known.subject.role)));
     }
   }
   // Names do not begin with a dot.
@@ -188,34 +180,27 @@ Result<void> SecurityFolder::add_valid(const Subject& subject, const Validity& v
 
 Result<void> SecurityFolder::renew(const std::string& name, int days) {
   if (auto good = check_days(days); !good) return good;
-  const auto known = view(name);
-  if (!known) return std::unexpected(known.error());
-  if (known->revoked) {
+  PLCHOST_TRY_ASSIGN(const auto known, view(name));
+  if (known.revoked) {
     return failure(ErrorCode::wrong_state, fmt::format("'{}' is revoked; add it anew", name));
   }
-  if (auto written = write_identity(path(name), known->subject, validity_for(days)); !written) return written;
-  return tell_hosts(known->subject);
+  if (auto written = write_identity(path(name), known.subject, validity_for(days)); !written) return written;
+  return tell_hosts(known.subject);
 }
 
 Result<void> SecurityFolder::revoke(const std::string& name) {
-  const auto known = view(name);
-  if (!known) return std::unexpected(known.error());
-  if (known->revoked) return failure(ErrorCode::wrong_state, fmt::format("'{}' is revoked already", name));
-  auto certificates = issued(name);
-  if (!certificates) return std::unexpected(certificates.error());
-  auto newest = read_certificate(file_in(path(name), kCertificateFile));
-  if (!newest) return std::unexpected(newest.error());
-  certificates->push_back(*std::move(newest));
-  const auto revocations = read_revocations(authority_file(kRevocationsFile));
-  if (!revocations) return std::unexpected(revocations.error());
-  const auto more = make_revocations(*revocations, *certificates, validity_for(kDaysOfAuthority), identity_);
-  if (!more) return std::unexpected(more.error());
-  if (auto done = write_text(authority_file(kRevocationsFile), to_pem(*more), kPublicFile); !done)
-    return done;
-  const auto all = names();
-  if (!all) return std::unexpected(all.error());
-  for (const std::string& each : *all) {
-    if (auto done = write_text(file_in(path(each), kRevocationsFile), to_pem(*more), kPublicFile); !done) {
+  PLCHOST_TRY_ASSIGN(const auto known, view(name));
+  if (known.revoked) return failure(ErrorCode::wrong_state, fmt::format("'{}' is revoked already", name));
+  PLCHOST_TRY_ASSIGN(auto certificates, issued(name));
+  PLCHOST_TRY_ASSIGN(auto newest, read_certificate(file_in(path(name), kCertificateFile)));
+  certificates.push_back(std::move(newest));
+  PLCHOST_TRY_ASSIGN(const auto revocations, read_revocations(authority_file(kRevocationsFile)));
+  PLCHOST_TRY_ASSIGN(const auto more,
+                     make_revocations(revocations, certificates, validity_for(kDaysOfAuthority), identity_));
+  if (auto done = write_text(authority_file(kRevocationsFile), to_pem(more), kPublicFile); !done) return done;
+  PLCHOST_TRY_ASSIGN(const auto all, names());
+  for (const std::string& each : all) {
+    if (auto done = write_text(file_in(path(each), kRevocationsFile), to_pem(more), kPublicFile); !done) {
       return done;
     }
   }
@@ -223,13 +208,11 @@ Result<void> SecurityFolder::revoke(const std::string& name) {
 }
 
 Result<std::vector<IdentityView>> SecurityFolder::identities() const {
-  const auto all = names();
-  if (!all) return std::unexpected(all.error());
+  PLCHOST_TRY_ASSIGN(const auto all, names());
   std::vector<IdentityView> views;
-  for (const std::string& name : *all) {
-    auto one = view(name);
-    if (!one) return std::unexpected(one.error());
-    views.push_back(std::move(*one));
+  for (const std::string& name : all) {
+    PLCHOST_TRY_ASSIGN(auto one, view(name));
+    views.push_back(std::move(one));
   }
   return views;
 }

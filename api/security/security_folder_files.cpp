@@ -34,50 +34,42 @@ Result<IdentityView> SecurityFolder::view(const std::string& name) const {
   const auto certificate = read_certificate(file_in(path(name), kCertificateFile));
   if (!certificate) {
     if (certificate.error().code != ErrorCode::not_found) return std::unexpected(certificate.error());
-    const auto all = names();
-    if (!all) return std::unexpected(all.error());
-    const std::vector<std::string_view> known(all->begin(), all->end());
+    PLCHOST_TRY_ASSIGN(const auto all, names());
+    const std::vector<std::string_view> known(all.begin(), all.end());
     return failure(ErrorCode::not_found,
                    fmt::format("no identity '{}' in {}; there are: {}", name, folder_, join_names(known)));
   }
-  const auto revocations = read_revocations(authority_file(kRevocationsFile));
-  if (!revocations) return std::unexpected(revocations.error());
+  PLCHOST_TRY_ASSIGN(const auto revocations, read_revocations(authority_file(kRevocationsFile)));
   auto subject = subject_of(*certificate);
   if (!subject) return failure_in(path(name), subject.error());
-  const auto validity = validity_of(*certificate);
-  if (!validity) return std::unexpected(validity.error());
-  const auto prefix = guid_prefix(*certificate);
-  if (!prefix) return std::unexpected(prefix.error());
-  return IdentityView{std::move(*subject), *validity, is_revoked(*certificate, *revocations), *prefix};
+  PLCHOST_TRY_ASSIGN(const auto validity, validity_of(*certificate));
+  PLCHOST_TRY_ASSIGN(const auto prefix, guid_prefix(*certificate));
+  return IdentityView{std::move(*subject), validity, is_revoked(*certificate, revocations), prefix};
 }
 
 Result<void> SecurityFolder::write_identity(const std::string& to, const Subject& subject,
                                             const Validity& validity) const {
-  const auto key = make_key();
-  if (!key) return std::unexpected(key.error());
-  const auto certificate = issue_certificate(subject, validity, *key, identity_);
+  PLCHOST_TRY_ASSIGN(const auto key, make_key());
+  const auto certificate = issue_certificate(subject, validity, key, identity_);
   if (!certificate) return std::unexpected(certificate.error());
-  const auto text = subject_text(*certificate);
-  if (!text) return std::unexpected(text.error());
-  const auto prefix = guid_prefix(*certificate);
-  if (!prefix) return std::unexpected(prefix.error());
+  PLCHOST_TRY_ASSIGN(const auto text, subject_text(*certificate));
+  PLCHOST_TRY_ASSIGN(const auto prefix, guid_prefix(*certificate));
   if (auto kept = keep_issued(subject.name, *certificate); !kept) return kept;
-  const auto permissions = sign_document(permissions_text(subject, *text, *prefix, validity), permissions_);
+  const auto permissions = sign_document(permissions_text(subject, text, prefix, validity), permissions_);
   if (auto done = write_text(file_in(to, kPermissionsFile), permissions, kPublicFile); !done) return done;
-  if (auto done = write_text(file_in(to, kKeyFile), to_pem(*key), kSecretFile); !done) return done;
+  if (auto done = write_text(file_in(to, kKeyFile), to_pem(key), kSecretFile); !done) return done;
   return write_text(file_in(to, kCertificateFile), to_pem(*certificate), kPublicFile);
 }
 
 // First of all: no certificate is anywhere that is not kept here.
 Result<void> SecurityFolder::keep_issued(const std::string& name, const Certificate& certificate) const {
-  const auto serial = serial_text(certificate);
-  if (!serial) return std::unexpected(serial.error());
+  PLCHOST_TRY_ASSIGN(const auto serial, serial_text(certificate));
   const std::string all = authority_file(kIssuedFolder);
   const std::string of_name = file_in(all, name);
   for (const std::string& folder : {all, of_name}) {
     if (auto made = make_folder(folder); !made && made.error().code != ErrorCode::already_exists) return made;
   }
-  return write_text(file_in(of_name, *serial + ".pem"), to_pem(certificate), kPublicFile);
+  return write_text(file_in(of_name, serial + ".pem"), to_pem(certificate), kPublicFile);
 }
 
 Result<std::vector<Certificate>> SecurityFolder::issued(const std::string& name) const {
@@ -88,9 +80,8 @@ Result<std::vector<Certificate>> SecurityFolder::issued(const std::string& name)
   if (error == std::errc::no_such_file_or_directory) return found;
   for (; !error && entry != fs::directory_iterator(); entry.increment(error)) {
     if (entry->path().extension() != ".pem") continue;
-    auto certificate = read_certificate(entry->path());
-    if (!certificate) return std::unexpected(certificate.error());
-    found.push_back(*std::move(certificate));
+    PLCHOST_TRY_ASSIGN(auto certificate, read_certificate(entry->path()));
+    found.push_back(std::move(certificate));
   }
   if (error) return failure(ErrorCode::system, "read " + folder, error.value());
   return found;
@@ -106,10 +97,9 @@ Result<void> SecurityFolder::copy_common(const std::string& to) const {
 
 // Hosts know the certificates of all, to know who is behind what was written.
 Result<void> SecurityFolder::tell_hosts(const Subject& subject) const {
-  const auto all = names();
-  if (!all) return std::unexpected(all.error());
+  PLCHOST_TRY_ASSIGN(const auto all, names());
   const auto certificate = read_file(file_in(path(subject.name), kCertificateFile));
-  for (const std::string& name : *all) {
+  for (const std::string& name : all) {
     const std::string known = file_in(path(name), kKnownFolder);
     std::error_code ignored;
     if (!fs::is_directory(known, ignored)) continue;
@@ -122,9 +112,8 @@ Result<void> SecurityFolder::tell_hosts(const Subject& subject) const {
 Result<void> SecurityFolder::know_all(const std::string& host) const {
   const std::string known = file_in(path(host), kKnownFolder);
   if (auto made = make_folder(known); !made) return made;
-  const auto all = names();
-  if (!all) return std::unexpected(all.error());
-  for (const std::string& name : *all) {
+  PLCHOST_TRY_ASSIGN(const auto all, names());
+  for (const std::string& name : all) {
     const auto certificate = read_file(file_in(path(name), kCertificateFile));
     if (auto done = write_text(file_in(known, name + ".pem"), certificate, kPublicFile); !done) return done;
   }

@@ -122,9 +122,8 @@ Result<void> ControlServer::Parts::run() {
     const int count = ::epoll_wait(epoll.get(), events.data(), static_cast<int>(events.size()), -1);
     if (count < 0 && errno != EINTR) return failure(ErrorCode::system, "wait for events", errno);
     for (int i = 0; i < count; ++i) {
-      const auto go_on = dispatch(events[static_cast<std::size_t>(i)].data.fd);
-      if (!go_on) return std::unexpected(go_on.error());
-      if (!*go_on) return {};
+      PLCHOST_TRY_ASSIGN(const auto go_on, dispatch(events[static_cast<std::size_t>(i)].data.fd));
+      if (!go_on) return {};
     }
   }
 }
@@ -347,9 +346,8 @@ void ControlServer::Parts::list_objects(const dds::Guid& client, const plc_Reque
 
 void ControlServer::Parts::list_nodes(ControlVerb verb, const dds::Guid& client, const plc_Request& request) {
   const auto look = [&]() -> Result<NodeListing> {
-    const auto query = node_query_of(request.part);
-    if (!query) return std::unexpected(query.error());
-    return verb == ControlVerb::list_nodes ? nodes.nodes(*query) : nodes.routes(*query);
+    PLCHOST_TRY_ASSIGN(const auto query, node_query_of(request.part));
+    return verb == ControlVerb::list_nodes ? nodes.nodes(query) : nodes.routes(query);
   };
   const auto listing = look();
   if (!listing) {
@@ -382,9 +380,8 @@ void ControlServer::Parts::send_page(const dds::Guid& client, const plc_Request&
 }
 
 Result<void> ControlServer::Parts::on_manager() {
-  auto finished = manager->receive();
-  if (!finished) return std::unexpected(finished.error());
-  finish(*std::move(finished));
+  PLCHOST_TRY_ASSIGN(auto finished, manager->receive());
+  finish(std::move(finished));
   return {};
 }
 

@@ -27,9 +27,9 @@ constexpr Duration kIdentityLook = std::chrono::milliseconds(500);
 
 /// A period of 0: it is not set.
 Result<UniqueFd> make_timer(Duration period) {
-  const auto fd = check_errno(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK), "make a timer");
-  if (!fd) return std::unexpected(fd.error());
-  UniqueFd timer(*fd);
+  PLCHOST_TRY_ASSIGN(const auto fd, check_errno(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC | TFD_NONBLOCK),
+                                                "make a timer"));
+  UniqueFd timer(fd);
   const itimerspec times{.it_interval = to_timespec(period), .it_value = to_timespec(period)};
   if (auto set = check_errno(::timerfd_settime(timer.get(), 0, &times, nullptr), "set a timer"); !set) {
     return std::unexpected(set.error());
@@ -46,9 +46,9 @@ Result<UniqueFd> make_signal_fd() {
   if (auto blocked = check_returned(::pthread_sigmask(SIG_BLOCK, &set, nullptr), "block signals"); !blocked) {
     return std::unexpected(blocked.error());
   }
-  const auto fd = check_errno(::signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK), "make a signal descriptor");
-  if (!fd) return std::unexpected(fd.error());
-  return UniqueFd(*fd);
+  PLCHOST_TRY_ASSIGN(const auto fd, check_errno(::signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK),
+                                                "make a signal descriptor"));
+  return UniqueFd(fd);
 }
 
 }  // namespace
@@ -56,18 +56,13 @@ Result<UniqueFd> make_signal_fd() {
 Result<void> ControlServer::Parts::open() {
   if (auto made = make_loop(); !made) return made;
   if (auto made = make_guard(); !made) return made;
-  auto ledger = PostLedger::open(pool);
-  if (!ledger) return std::unexpected(ledger.error());
-  auto linked = ManagerLink::connect(options.run_directory);
-  if (!linked) return std::unexpected(linked.error());
-  manager = std::move(*linked);
-  intake.emplace(options.host, pool, std::move(*ledger), epoch, guard);
+  PLCHOST_TRY_ASSIGN(auto ledger, PostLedger::open(pool));
+  PLCHOST_TRY_ASSIGN(manager, ManagerLink::connect(options.run_directory));
+  intake.emplace(options.host, pool, std::move(ledger), epoch, guard);
   if (auto entered = enter_domain(); !entered) return entered;
   if (auto claimed = claim_name(); !claimed) return claimed;
   open_audit();
-  auto made_sessions = SessionTable::create(participant.get(), options.host);
-  if (!made_sessions) return std::unexpected(made_sessions.error());
-  sessions = std::move(*made_sessions);
+  PLCHOST_TRY_ASSIGN(sessions, SessionTable::create(participant.get(), options.host));
   intake->acknowledge_by(sessions->ack_writers());
   auto made_status =
       StatusPublisher::create(participant.get(), {options.host, &pool, epoch, options.run_directory,
@@ -100,39 +95,28 @@ void ControlServer::Parts::open_audit() {
 
 Result<void> ControlServer::Parts::open_gateway() {
   if (options.host_number == 0) return {};
-  auto started = GatewayThread::start(participant.get(), {.pool = options.pool,
-                                                          .base = options.blocks_base,
-                                                          .host = options.host,
-                                                          .number = options.host_number,
-                                                          .since_ns = status->host().started_unix_ns,
-                                                          .epoch = epoch});
-  if (!started) return std::unexpected(std::move(started).error());
-  gateway = *std::move(started);
+  PLCHOST_TRY_ASSIGN(gateway,
+                     GatewayThread::start(participant.get(), {.pool = options.pool,
+                                                              .base = options.blocks_base,
+                                                              .host = options.host,
+                                                              .number = options.host_number,
+                                                              .since_ns = status->host().started_unix_ns,
+                                                              .epoch = epoch}));
   return {};
 }
 
 Result<void> ControlServer::Parts::make_loop() {
-  auto made_signals = make_signal_fd();
-  if (!made_signals) return std::unexpected(made_signals.error());
-  signals = std::move(*made_signals);
-  auto made_status = make_timer(StatusPublisher::kTick);
-  if (!made_status) return std::unexpected(made_status.error());
-  status_timer = std::move(*made_status);
-  auto made_presence = make_timer(dds::kPresencePeriod);
-  if (!made_presence) return std::unexpected(made_presence.error());
-  presence_timer = std::move(*made_presence);
-  auto made_identity = make_timer(kIdentityLook);
-  if (!made_identity) return std::unexpected(made_identity.error());
-  identity_timer = std::move(*made_identity);
-  auto made_run = make_timer(Duration::zero());
-  if (!made_run) return std::unexpected(made_run.error());
-  run_timer = std::move(*made_run);
-  const auto event = check_errno(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "make an event descriptor");
-  if (!event) return std::unexpected(event.error());
-  wake.reset(*event);
-  const auto loop = check_errno(::epoll_create1(EPOLL_CLOEXEC), "make an epoll descriptor");
-  if (!loop) return std::unexpected(loop.error());
-  epoll.reset(*loop);
+  PLCHOST_TRY_ASSIGN(signals, make_signal_fd());
+  PLCHOST_TRY_ASSIGN(status_timer, make_timer(StatusPublisher::kTick));
+  PLCHOST_TRY_ASSIGN(presence_timer, make_timer(dds::kPresencePeriod));
+  PLCHOST_TRY_ASSIGN(identity_timer, make_timer(kIdentityLook));
+  PLCHOST_TRY_ASSIGN(run_timer, make_timer(Duration::zero()));
+  PLCHOST_TRY_ASSIGN(const auto event,
+                     check_errno(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK), "make an event descriptor"));
+  wake.reset(event);
+  PLCHOST_TRY_ASSIGN(const auto loop,
+                     check_errno(::epoll_create1(EPOLL_CLOEXEC), "make an epoll descriptor"));
+  epoll.reset(loop);
   return {};
 }
 
@@ -167,14 +151,11 @@ Result<void> ControlServer::Parts::make_guard() {
 
 Result<void> ControlServer::Parts::enter_domain() {
   dds::install_log_sink();
-  auto opened = dds::open_domain(dds::Role::server, options.dds);
-  if (!opened) return std::unexpected(opened.error());
-  domain = std::move(*opened);
-  auto made = dds::make_participant(
-      options.dds.domain, nullptr,
-      "enter DDS domain " + std::to_string(options.dds.domain) + " (at most 16 servers on one machine)");
-  if (!made) return std::unexpected(made.error());
-  participant = std::move(*made);
+  PLCHOST_TRY_ASSIGN(domain, dds::open_domain(dds::Role::server, options.dds));
+  PLCHOST_TRY_ASSIGN(participant,
+                     dds::make_participant(options.dds.domain, nullptr,
+                                           "enter DDS domain " + std::to_string(options.dds.domain) +
+                                               " (at most 16 servers on one machine)"));
   if (identity_watch && !plc_announce_secured(participant.get())) {
     spdlog::warn(
         "secured clients by Fast DDS 3 do not meet this host: its participant is not announced to them");
@@ -195,27 +176,23 @@ Result<void> ControlServer::Parts::enter_domain() {
 // Before anything is shown under the name. A server that had the name a moment ago has no time to ask.
 Result<void> ControlServer::Parts::claim_name() {
   const TimePoint entered = MonotonicClock::now();
-  auto claimed = NameClaim::create(
-      participant.get(),
-      {.host = options.host,
-       .run_directory = options.run_directory,
-       .epoch = epoch,
-       .since_ns = options.name_since_ns != 0 ? options.name_since_ns : static_cast<std::int64_t>(epoch),
-       .serving = options.name_held});
-  if (!claimed) return std::unexpected(claimed.error());
-  name = *std::move(claimed);
+  PLCHOST_TRY_ASSIGN(
+      name, NameClaim::create(participant.get(),
+                              {.host = options.host,
+                               .run_directory = options.run_directory,
+                               .epoch = epoch,
+                               .since_ns = options.name_since_ns != 0 ? options.name_since_ns
+                                                                      : static_cast<std::int64_t>(epoch),
+                               .serving = options.name_held}));
   return name->ask(entered + (options.name_refused ? NameClaim::kAskingAgain : NameClaim::kAsking),
                    signals.get());
 }
 
 Result<void> ControlServer::Parts::make_readers() {
-  auto made_subscriber = dds::make_subscriber(participant.get(), dds::host_partition(options.host));
-  if (!made_subscriber) return std::unexpected(made_subscriber.error());
-  subscriber = std::move(*made_subscriber);
+  PLCHOST_TRY_ASSIGN(subscriber, dds::make_subscriber(participant.get(), dds::host_partition(options.host)));
   const auto open = [&](const dds::TopicInfo& info, dds::TopicReader& from) -> Result<void> {
-    auto opened = dds::open_reader(participant.get(), subscriber.get(), info, dds::bounded_qos(info));
-    if (!opened) return std::unexpected(std::move(opened).error());
-    from = *std::move(opened);
+    PLCHOST_TRY_ASSIGN(from,
+                       dds::open_reader(participant.get(), subscriber.get(), info, dds::bounded_qos(info)));
     return {};
   };
   requests[0].role = ApiRole::operating;

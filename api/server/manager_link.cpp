@@ -38,14 +38,12 @@ bool ManagerLink::is_pending(const plc_SampleIdentity& identity) const {
 Result<std::vector<FinishedCommand>> ManagerLink::receive() {
   std::vector<FinishedCommand> finished;
   for (;;) {
-    auto packet = socket_.receive();
-    if (!packet) return std::unexpected(packet.error());
-    if (!*packet) return finished;
-    auto reply = decode_reply(**packet);
-    if (!reply) return std::unexpected(reply.error());
-    const auto found = pending_.find(reply->number);
+    PLCHOST_TRY_ASSIGN(auto packet, socket_.receive());
+    if (!packet) return finished;
+    PLCHOST_TRY_ASSIGN(auto reply, decode_reply(*packet));
+    const auto found = pending_.find(reply.number);
     if (found == pending_.end()) continue;  // came after its time limit
-    finished.push_back({std::move(found->second), reply->code, std::move(reply->text)});
+    finished.push_back({std::move(found->second), reply.code, std::move(reply.text)});
     pending_.erase(found);
   }
 }

@@ -23,16 +23,12 @@ constexpr std::array kStreamTopics{dds::kReply,   dds::kEventAck, dds::kObjectPa
 Result<SessionTable> SessionTable::create(dds_entity_t participant, std::string host) {
   static_assert(kStreamTopics.size() == kStreams);
   SessionTable table;
-  auto reaper = dds::EntityReaper::create();
-  if (!reaper) return std::unexpected(std::move(reaper).error());
-  table.reaper_ = std::move(*reaper);
+  PLCHOST_TRY_ASSIGN(table.reaper_, dds::EntityReaper::create());
   table.participant_ = participant;
   table.ack_writers_ = std::make_unique<AckWriters>(host);
   table.host_ = std::move(host);
   for (std::size_t i = 0; i < kStreams; ++i) {
-    auto topic = dds::make_topic(participant, kStreamTopics[i]);
-    if (!topic) return std::unexpected(std::move(topic).error());
-    table.topics_[i] = std::move(*topic);
+    PLCHOST_TRY_ASSIGN(table.topics_[i], dds::make_topic(participant, kStreamTopics[i]));
   }
   auto participants =
       dds::check_entity(dds_create_reader(participant, DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr, nullptr),

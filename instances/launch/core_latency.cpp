@@ -53,9 +53,9 @@ bool is_latency(std::string_view text) {
 
 Result<std::string> read_text(int fd, const std::string& path) {
   std::array<char, 32> buffer{};
-  const auto length = check_errno(::pread(fd, buffer.data(), buffer.size(), 0), "read " + path);
-  if (!length) return std::unexpected(length.error());
-  std::string text(buffer.data(), static_cast<std::size_t>(*length));
+  PLCHOST_TRY_ASSIGN(const auto length,
+                     check_errno(::pread(fd, buffer.data(), buffer.size(), 0), "read " + path));
+  std::string text(buffer.data(), static_cast<std::size_t>(length));
   while (text.ends_with('\n')) text.pop_back();
   return text;
 }
@@ -127,9 +127,8 @@ Result<UniqueFd> make_record(const std::string& run_directory, int core, const s
   constexpr mode_t kMode = 0640;
   UniqueFd record(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, kMode));
   if (!record) return failure(ErrorCode::refused, "open " + path, errno);
-  const auto kept = read_text(record.get(), path);
-  if (!kept) return std::unexpected(kept.error());
-  if (!is_latency(*kept)) {
+  PLCHOST_TRY_ASSIGN(const auto kept, read_text(record.get(), path));
+  if (!is_latency(kept)) {
     if (::ftruncate(record.get(), 0) != 0 ||
         ::pwrite(record.get(), before.data(), before.size(), 0) != static_cast<ssize_t>(before.size())) {
       return failure(ErrorCode::system, "write " + path, errno);
@@ -153,17 +152,15 @@ Result<CoreLatencyHold> CoreLatencyHold::take(const std::string& sysfs, const st
   const std::string file = latency_file(sysfs, core);
   const auto entered = enter_soon(run_directory);
   if (!entered) return std::unexpected(entered.error());
-  const auto before = read_latency(file);
-  if (!before) return std::unexpected(before.error());
-  auto record = make_record(run_directory, core, *before);
-  if (!record) return std::unexpected(record.error());
+  PLCHOST_TRY_ASSIGN(const auto before, read_latency(file));
+  PLCHOST_TRY_ASSIGN(auto record, make_record(run_directory, core, before));
   auto written = write_latency(file, kNoLatency);
   if (written) {
     const auto now = read_latency(file);
-    if (now && *now == kNoLatency) return CoreLatencyHold(sysfs, run_directory, core, *std::move(record));
+    if (now && *now == kNoLatency) return CoreLatencyHold(sysfs, run_directory, core, std::move(record));
     written = failure(ErrorCode::refused, fmt::format("{} does not keep 'n/a'", file));
   }
-  (void)leave(sysfs, run_directory, core, *std::move(record));
+  (void)leave(sysfs, run_directory, core, std::move(record));
   return std::unexpected(written.error());
 }
 
@@ -188,9 +185,7 @@ Result<std::vector<std::string>> restore_core_latency(const std::string& sysfs,
     const auto core = core_of_record(at->path().filename().string());
     if (!core) continue;
     if (!entered) {
-      auto place = enter(run_directory);
-      if (!place) return std::unexpected(place.error());
-      entered = *std::move(place);
+      PLCHOST_TRY_ASSIGN(entered, enter(run_directory));
     }
     const UniqueFd record(::open(at->path().c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW));
     if (!record || ::flock(record.get(), LOCK_EX | LOCK_NB) != 0) continue;  // somebody holds it

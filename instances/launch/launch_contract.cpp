@@ -116,10 +116,8 @@ std::string encode(const SetupReport& report) {
 Result<SetupReport> decode_report(std::string_view packet) {
   const Json json = Json::parse(packet, nullptr, false);
   if (!json.is_object()) return failure(ErrorCode::corrupt, "set-up report is not a JSON object");
-  const auto step = text_of(json, "step");
-  if (!step) return std::unexpected(step.error());
-  auto text = text_of(json, "text");
-  if (!text) return std::unexpected(std::move(text).error());
+  PLCHOST_TRY_ASSIGN(const auto step, text_of(json, "step"));
+  PLCHOST_TRY_ASSIGN(auto text, text_of(json, "text"));
   const auto code = json.find("code");
   if (code == json.end() || !code->is_number_unsigned() || code->get<std::uint64_t>() > kLastCode) {
     return failure(ErrorCode::corrupt, "set-up report has no valid 'code'");
@@ -129,12 +127,12 @@ Result<SetupReport> decode_report(std::string_view packet) {
     return failure(ErrorCode::corrupt, "set-up report has no valid 'transient'");
   }
   for (const auto& [known, name] : kSteps) {
-    if (name == *step) {
-      return SetupReport{known, static_cast<ErrorCode>(code->get<unsigned>()), *std::move(text),
+    if (name == step) {
+      return SetupReport{known, static_cast<ErrorCode>(code->get<unsigned>()), std::move(text),
                          transient->get<bool>()};
     }
   }
-  return failure(ErrorCode::corrupt, fmt::format("set-up report has the unknown step '{}'", *step));
+  return failure(ErrorCode::corrupt, fmt::format("set-up report has the unknown step '{}'", step));
 }
 
 std::string encode(const InstanceReport& report) {

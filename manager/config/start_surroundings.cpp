@@ -43,24 +43,22 @@ Result<void> try_application(const std::string& plc_instance, const HostConfig& 
   launch.application = instance.application;
   launch.pool = host.pool;
   launch.state_directory = host.state_directory;
-  auto trial = ApplicationTrial::start(plc_instance, launch);
-  if (!trial) return std::unexpected(trial.error());
-  trial->await_end();
-  return trial->verdict();
+  PLCHOST_TRY_ASSIGN(auto trial, ApplicationTrial::start(plc_instance, launch));
+  trial.await_end();
+  return trial.verdict();
 }
 
 Result<void> try_settings(const std::string& plc_instance, const std::string& file) {
-  auto pipe = make_output_pipe();
-  if (!pipe) return std::unexpected(pipe.error());
+  PLCHOST_TRY_ASSIGN(auto pipe, make_output_pipe());
   const auto process = spawn_process(
-      {.arguments = {plc_instance, "--check-settings", file}, .output_fd = pipe->write_end.get()});
+      {.arguments = {plc_instance, "--check-settings", file}, .output_fd = pipe.write_end.get()});
   if (!process) return std::unexpected(process.error());
   if (!ends_within(process->pidfd.get(), kTrialLimit)) (void)signal_process(*process, SIGKILL);
   (void)ends_within(process->pidfd.get(), kTrialLimit);
   const ExitStatus status = reap_process(*process);
   if (status.success()) return {};
   constexpr std::size_t kShown = 2000;
-  std::string text = read_available(pipe->read_end.get(), kShown);
+  std::string text = read_available(pipe.read_end.get(), kShown);
   while (text.ends_with('\n')) text.pop_back();
   return failure(ErrorCode::invalid_argument, text.empty() ? status.describe() : text);
 }

@@ -25,10 +25,9 @@ CommandServer::CommandServer(Reactor& reactor, PacketListener listener, ControlH
 
 Result<std::unique_ptr<CommandServer>> CommandServer::open(Reactor& reactor, const std::string& path,
                                                            ControlHandler& handler) {
-  auto listener = PacketListener::listen(path);
-  if (!listener) return std::unexpected(listener.error());
+  PLCHOST_TRY_ASSIGN(auto listener, PacketListener::listen(path));
   std::unique_ptr<CommandServer> server(
-      new CommandServer(reactor, std::move(*listener), handler));  // NOLINT: the constructor is private
+      new CommandServer(reactor, std::move(listener), handler));  // NOLINT: the constructor is private
   auto watch =
       reactor.watch(server->listener_.fd(), EPOLLIN, [sut = server.get()](std::uint32_t) { sut->accept(); });
   if (!watch) return std::unexpected(watch.error());

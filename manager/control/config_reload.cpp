@@ -108,10 +108,9 @@ Result<std::string> ConfigReload::take_over() {
     if (in_time) break;
   }
   if (!in_time) return std::unexpected(in_time.error());
-  const auto lines = apply_();
-  if (!lines) return std::unexpected(lines.error());
-  for (const std::string& line : *lines) spdlog::info("reload: {}", line);
-  return lines->empty() ? "nothing has changed" : join_lines(*lines, "the log of plchostd");
+  PLCHOST_TRY_ASSIGN(const auto lines, apply_());
+  for (const std::string& line : lines) spdlog::info("reload: {}", line);
+  return lines.empty() ? "nothing has changed" : join_lines(lines, "the log of plchostd");
 }
 
 void ConfigReload::finish(const Result<std::string>& result) {

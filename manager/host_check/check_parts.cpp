@@ -151,9 +151,8 @@ Result<bool> has_capability(const HostFiles& files, unsigned capability) {
 
 Result<std::string> soft_limit(const HostFiles& files, std::string_view name) {
   const std::string path = "/proc/self/limits";
-  const auto limits = files.text(path);
-  if (!limits) return std::unexpected(limits.error());
-  std::istringstream lines(*limits);
+  PLCHOST_TRY_ASSIGN(const auto limits, files.text(path));
+  std::istringstream lines(limits);
   for (std::string line; std::getline(lines, line);) {
     if (!line.starts_with(name)) continue;
     std::istringstream rest(line.substr(name.size()));

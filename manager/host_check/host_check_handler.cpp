@@ -31,13 +31,12 @@ Result<std::string> HostCheckHandler::part(const ControlRequest& request) {
     findings_ = look_();
     ++check_;
   } else {
-    const auto wanted = parse_first_finding(request.argument);
-    if (!wanted) return std::unexpected(wanted.error());
-    if (check_ == 0 || *wanted > findings_.size()) {
+    PLCHOST_TRY_ASSIGN(const auto wanted, parse_first_finding(request.argument));
+    if (check_ == 0 || wanted > findings_.size()) {
       return failure(ErrorCode::not_found,
-                     fmt::format("there is no finding {}; there are {}", *wanted, findings_.size()));
+                     fmt::format("there is no finding {}; there are {}", wanted, findings_.size()));
     }
-    first = *wanted;
+    first = wanted;
   }
   return encode_part(check_, findings_, first, kMaxPart);
 }

@@ -61,18 +61,16 @@ Result<std::int64_t> HostFiles::number(const std::string& path) const {
 }
 
 Result<std::vector<int>> HostFiles::cores(const std::string& path) const {
-  const auto content = text(path);
-  if (!content) return std::unexpected(content.error());
-  auto list = parse_cpu_list(*content == "(null)" ? std::string_view() : std::string_view(*content));
-  if (!list) return unexpected_content(path, *content);
+  PLCHOST_TRY_ASSIGN(const auto content, text(path));
+  auto list = parse_cpu_list(content == "(null)" ? std::string_view() : std::string_view(content));
+  if (!list) return unexpected_content(path, content);
   return *std::move(list);
 }
 
 Result<std::vector<int>> HostFiles::core_mask(const std::string& path) const {
-  const auto content = text(path);
-  if (!content) return std::unexpected(content.error());
-  auto mask = parse_cpu_mask(*content);
-  if (!mask) return unexpected_content(path, *content);
+  PLCHOST_TRY_ASSIGN(const auto content, text(path));
+  auto mask = parse_cpu_mask(content);
+  if (!mask) return unexpected_content(path, content);
   return *std::move(mask);
 }
 

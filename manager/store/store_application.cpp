@@ -62,9 +62,9 @@ void remove_unfinished(const std::string& folder, const std::set<std::string>& u
 
 Result<void> write_fully(int fd, std::span<const std::byte> bytes, const std::string& path) {
   while (!bytes.empty()) {
-    const auto written = check_errno(::write(fd, bytes.data(), bytes.size()), "write " + path);
-    if (!written) return std::unexpected(written.error());
-    bytes = bytes.subspan(static_cast<std::size_t>(*written));
+    PLCHOST_TRY_ASSIGN(const auto written,
+                       check_errno(::write(fd, bytes.data(), bytes.size()), "write " + path));
+    bytes = bytes.subspan(static_cast<std::size_t>(written));
   }
   return {};
 }
@@ -74,13 +74,13 @@ Result<void> copy_checked(const StoreOrder& order, int from, int to, const std::
   std::vector<std::byte> buffer(std::size_t{1} << 20);
   for (std::uint64_t left = order.size; left > 0;) {
     const auto wanted = static_cast<std::size_t>(std::min<std::uint64_t>(left, buffer.size()));
-    const auto got = check_errno(::read(from, buffer.data(), wanted), "read " + order.source);
-    if (!got) return std::unexpected(got.error());
-    if (*got == 0) {
+    PLCHOST_TRY_ASSIGN(const auto got,
+                       check_errno(::read(from, buffer.data(), wanted), "read " + order.source));
+    if (got == 0) {
       return failure(ErrorCode::corrupt, fmt::format("only {} of {} bytes of {} have come", order.size - left,
                                                      order.size, order.name));
     }
-    const auto bytes = std::span<const std::byte>(buffer).first(static_cast<std::size_t>(*got));
+    const auto bytes = std::span<const std::byte>(buffer).first(static_cast<std::size_t>(got));
     hash.add(bytes);
     if (auto written = write_fully(to, bytes, path); !written) return written;
     left -= bytes.size();
@@ -129,10 +129,9 @@ std::string in_senders_words(std::string text, const std::string& path, const st
 }
 
 Result<void> try_application(const StoreOrder& order, const std::string& path) {
-  auto trial = ApplicationTrial::start(order.trial, path);
-  if (!trial) return std::unexpected(trial.error());
-  trial->await_end();
-  const auto valid = trial->verdict();
+  PLCHOST_TRY_ASSIGN(auto trial, ApplicationTrial::start(order.trial, path));
+  trial.await_end();
+  const auto valid = trial.verdict();
   if (valid) return {};
   return failure(valid.error().code, fmt::format("{} is refused: {}", order.name,
                                                  in_senders_words(valid.error().message, path, order.name)));

@@ -59,15 +59,15 @@ Result<StoreOrder> decode_store_order(std::string_view text) {
   const auto keep = order_number(json, "keep", std::numeric_limits<std::uint32_t>::max());
   if (!size) return std::unexpected(size.error());
   if (!keep) return std::unexpected(keep.error());
-  const auto parent = order_number(json, "parent", std::numeric_limits<std::int32_t>::max());
-  if (!parent) return std::unexpected(parent.error());
+  PLCHOST_TRY_ASSIGN(const auto parent,
+                     order_number(json, "parent", std::numeric_limits<std::int32_t>::max()));
   const auto trial = json.find("trial");
   if (trial == json.end() || !trial->is_array() ||
       !std::ranges::all_of(*trial, [](const Json& argument) { return argument.is_string(); })) {
     return failure(ErrorCode::corrupt, "the order has no command line 'trial'");
   }
   order.trial = trial->get<std::vector<std::string>>();
-  order.parent = static_cast<pid_t>(*parent);
+  order.parent = static_cast<pid_t>(parent);
   order.size = *size;
   order.keep = static_cast<std::uint32_t>(*keep);
   return order;

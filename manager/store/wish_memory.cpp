@@ -141,9 +141,7 @@ Result<bool> WishMemory::mend() {
   const bool headed = is_of_kind(layout(), kWishKind) && layout().size == sizeof(Layout);
   if (headed && holds(0) && holds(1)) return false;
   if (memory_.lost()) {  // it has been looked at
-    auto made = MemoryFile::replace(name_, sizeof(Layout), new_page<Layout>(kWishKind));
-    if (!made) return std::unexpected(std::move(made).error());
-    memory_ = *std::move(made);
+    PLCHOST_TRY_ASSIGN(memory_, MemoryFile::replace(name_, sizeof(Layout), new_page<Layout>(kWishKind)));
   }
   const std::size_t whole = holds(0) ? 0 : 1;
   fill(1 - whole);

@@ -40,9 +40,8 @@ Result<std::string> read_wish_file(const std::string& path, std::size_t most) {
                    fmt::format("{} is no file of this user, but of user {}", path, status.st_uid));
   }
   std::string text(most + 1, '\0');
-  const auto got = check_errno(::read(fd.get(), text.data(), text.size()), "read " + path);
-  if (!got) return std::unexpected(got.error());
-  text.resize(static_cast<std::size_t>(*got));
+  PLCHOST_TRY_ASSIGN(const auto got, check_errno(::read(fd.get(), text.data(), text.size()), "read " + path));
+  text.resize(static_cast<std::size_t>(got));
   return text;
 }
 

@@ -39,12 +39,10 @@ Result<UniqueFd> open_end(const std::string& path, int flags) {
 }  // namespace
 
 Result<void> InstanceOutput::open_ends() {
-  auto read_end = open_end(path(), O_RDONLY);
-  if (!read_end) return std::unexpected(read_end.error());
-  auto write_end = open_end(path(), O_WRONLY);
-  if (!write_end) return std::unexpected(write_end.error());
-  read_end_ = std::move(*read_end);
-  write_end_ = std::move(*write_end);
+  PLCHOST_TRY_ASSIGN(auto read_end, open_end(path(), O_RDONLY));
+  PLCHOST_TRY_ASSIGN(auto write_end, open_end(path(), O_WRONLY));
+  read_end_ = std::move(read_end);
+  write_end_ = std::move(write_end);
   // Refused to a user who has many pipes: then it keeps as much as other pipes do.
   (void)::fcntl(read_end_.get(), F_SETPIPE_SZ, kPipeBytes);  // NOLINT: variadic
   return {};

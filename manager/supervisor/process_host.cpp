@@ -21,25 +21,23 @@ ProcessHost::ProcessHost(Reactor& reactor, Settings settings)
       check_timer_(reactor, [this] { check_timed_out(); }) {}
 
 Result<int> ProcessHost::spawn(const LaunchOptions& options) {
-  auto channel = make_report_channel();
-  if (!channel) return std::unexpected(channel.error());
+  PLCHOST_TRY_ASSIGN(auto channel, make_report_channel());
   const auto output = output_.open_for_process();
   if (!output) {  // better a PLC whose words are not kept than none
     spdlog::warn("instance {}: its output is not kept: {}", settings_.name, output.error().describe());
   }
-  auto process = spawn_process({.arguments = to_arguments(settings_.program, options),
-                                .report_fd = channel->childs.get(),
-                                .output_fd = output ? output->get() : -1});
-  if (!process) return std::unexpected(process.error());
-  const int pid = process->pid;
+  PLCHOST_TRY_ASSIGN(auto process, spawn_process({.arguments = to_arguments(settings_.program, options),
+                                                  .report_fd = channel.childs.get(),
+                                                  .output_fd = output ? output->get() : -1}));
+  const int pid = process.pid;
   output_.say(LogLevel::info, pid, fmt::format("process {} was started", pid));
-  auto watch = reactor_.watch(channel->ours.fd(), EPOLLIN, [this](std::uint32_t) { read_reports(); });
-  auto followed = watch ? follow(*process) : Result<void>(std::unexpected(watch.error()));
+  auto watch = reactor_.watch(channel.ours.fd(), EPOLLIN, [this](std::uint32_t) { read_reports(); });
+  auto followed = watch ? follow(process) : Result<void>(std::unexpected(watch.error()));
   if (!followed) {  // it cannot be supervised, so it must not go on
-    kill_and_reap(*process);
+    kill_and_reap(process);
     return std::unexpected(followed.error());
   }
-  report_ = std::move(channel->ours);
+  report_ = std::move(channel.ours);
   report_watch_ = std::move(*watch);
   return pid;
 }
@@ -57,30 +55,29 @@ Result<int> ProcessHost::adopt() {
 Result<int> ProcessHost::adopt_peer() {
   const auto pid = link_.peer_pid();
   if (!pid) return std::unexpected(pid.error());
-  auto process = open_process(*pid);
-  if (!process) return std::unexpected(process.error());
-  PLCHOST_TRY(follow(*process));
+  PLCHOST_TRY_ASSIGN(auto process, open_process(*pid));
+  PLCHOST_TRY(follow(process));
   output_.adopt();
   output_.say(LogLevel::info, *pid, fmt::format("a new manager has adopted process {}", *pid));
   return *pid;
 }
 
 Result<void> ProcessHost::follow(ChildProcess& process) {
-  auto watch = reactor_.watch(process.pidfd.get(), EPOLLIN, [this](std::uint32_t) { process_ended(); });
-  if (!watch) return std::unexpected(watch.error());
+  PLCHOST_TRY_ASSIGN(
+      auto watch, reactor_.watch(process.pidfd.get(), EPOLLIN, [this](std::uint32_t) { process_ended(); }));
   process_ = std::move(process);
-  exit_watch_ = std::move(*watch);
+  exit_watch_ = std::move(watch);
   return {};
 }
 
 Result<void> ProcessHost::connect() {
-  auto socket = PacketSocket::connect(instance_socket_path(settings_.run_directory, settings_.name));
-  if (!socket) return std::unexpected(socket.error());
-  auto watch = reactor_.watch(socket->fd(), EPOLLIN, [this](std::uint32_t) { read_replies(); });
-  if (!watch) return std::unexpected(watch.error());
+  PLCHOST_TRY_ASSIGN(auto socket,
+                     PacketSocket::connect(instance_socket_path(settings_.run_directory, settings_.name)));
+  PLCHOST_TRY_ASSIGN(auto watch,
+                     reactor_.watch(socket.fd(), EPOLLIN, [this](std::uint32_t) { read_replies(); }));
   link_watch_.reset();
-  link_ = std::move(*socket);
-  link_watch_ = std::move(*watch);
+  link_ = std::move(socket);
+  link_watch_ = std::move(watch);
   return {};
 }
 
@@ -153,14 +150,13 @@ void ProcessHost::forget_process() {
 }
 
 Result<void> ProcessHost::check_application(const LaunchOptions& options) {
-  auto trial = ApplicationTrial::start(settings_.program, options);
-  if (!trial) return std::unexpected(trial.error());
-  auto watch = reactor_.watch(trial->fd(), EPOLLIN, [this](std::uint32_t) { check_ended(); });
+  PLCHOST_TRY_ASSIGN(auto trial, ApplicationTrial::start(settings_.program, options));
+  auto watch = reactor_.watch(trial.fd(), EPOLLIN, [this](std::uint32_t) { check_ended(); });
   if (!watch) {
-    trial->give_up();
+    trial.give_up();
     return std::unexpected(watch.error());
   }
-  check_ = std::move(*trial);
+  check_ = std::move(trial);
   check_watch_ = std::move(*watch);
   check_timer_.set(MonotonicClock::now() + kTrialLimit);
   return {};

@@ -45,13 +45,12 @@ std::vector<std::string> trial_arguments(const std::string& plc_instance, Launch
 
 Result<ApplicationTrial> ApplicationTrial::start(std::vector<std::string> arguments,
                                                  const std::string& path) {
-  auto pipe = make_output_pipe();
-  if (!pipe) return std::unexpected(pipe.error());
-  (void)::fcntl(pipe->write_end.get(), F_SETPIPE_SZ, kTrialOutputRoom);
+  PLCHOST_TRY_ASSIGN(auto pipe, make_output_pipe());
+  (void)::fcntl(pipe.write_end.get(), F_SETPIPE_SZ, kTrialOutputRoom);
   arguments.insert(arguments.end(), {path, "--parent", fmt::format("{}", ::getpid())});
-  auto process = spawn_process({.arguments = std::move(arguments), .output_fd = pipe->write_end.get()});
-  if (!process) return std::unexpected(process.error());
-  return ApplicationTrial(path, std::move(*process), std::move(pipe->read_end));
+  PLCHOST_TRY_ASSIGN(auto process,
+                     spawn_process({.arguments = std::move(arguments), .output_fd = pipe.write_end.get()}));
+  return ApplicationTrial(path, std::move(process), std::move(pipe.read_end));
 }
 
 Duration ApplicationTrial::time_left() const {

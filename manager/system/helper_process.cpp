@@ -12,22 +12,21 @@ namespace plchost {
 Result<void> HelperProcess::start(const std::vector<std::string>& arguments, Duration limit,
                                   std::size_t most_output, Done done) {
   if (process_) return failure(ErrorCode::busy, "the helper before has not ended: it may wait for a disk");
-  auto pipe = make_output_pipe();
-  if (!pipe) return std::unexpected(pipe.error());
+  PLCHOST_TRY_ASSIGN(auto pipe, make_output_pipe());
   // Its output is read when it has ended: there must be room for it.
   constexpr std::size_t kRoom = std::size_t{1} << 16;
   const auto room = static_cast<int>(std::max(most_output, kRoom));
-  (void)::fcntl(pipe->write_end.get(), F_SETPIPE_SZ, room);  // NOLINT: variadic
-  auto process = spawn_process({.arguments = arguments, .output_fd = pipe->write_end.get()});
-  if (!process) return std::unexpected(process.error());
-  auto watch = reactor_.watch(process->pidfd.get(), EPOLLIN, [this](std::uint32_t) { ended(); });
+  (void)::fcntl(pipe.write_end.get(), F_SETPIPE_SZ, room);  // NOLINT: variadic
+  PLCHOST_TRY_ASSIGN(auto process,
+                     spawn_process({.arguments = arguments, .output_fd = pipe.write_end.get()}));
+  auto watch = reactor_.watch(process.pidfd.get(), EPOLLIN, [this](std::uint32_t) { ended(); });
   if (!watch) {
-    (void)signal_process(*process, SIGKILL);
+    (void)signal_process(process, SIGKILL);
     return std::unexpected(watch.error());
   }
-  process_ = std::move(*process);
+  process_ = std::move(process);
   watch_ = std::move(*watch);
-  output_ = std::move(pipe->read_end);
+  output_ = std::move(pipe.read_end);
   most_output_ = most_output;
   in_time_ = true;
   done_ = std::move(done);

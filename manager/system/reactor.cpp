@@ -45,9 +45,8 @@ void Reactor::Timer::cancel() noexcept {
 }
 
 Result<std::unique_ptr<Reactor>> Reactor::create() {
-  auto epoll = check_errno(::epoll_create1(EPOLL_CLOEXEC), "epoll_create1");
-  if (!epoll) return std::unexpected(epoll.error());
-  return std::unique_ptr<Reactor>(new Reactor(UniqueFd(*epoll)));  // NOLINT: the constructor is private
+  PLCHOST_TRY_ASSIGN(auto epoll, check_errno(::epoll_create1(EPOLL_CLOEXEC), "epoll_create1"));
+  return std::unique_ptr<Reactor>(new Reactor(UniqueFd(epoll)));  // NOLINT: the constructor is private
 }
 
 Result<Reactor::Watch> Reactor::watch(int fd, std::uint32_t epoll_events, Ready ready) {
@@ -73,10 +72,9 @@ Result<void> Reactor::watch_signals(std::initializer_list<int> signals, std::fun
   if (auto blocked = check_returned(pthread_sigmask(SIG_BLOCK, &set, nullptr), "block signals"); !blocked) {
     return blocked;
   }
-  auto fd = check_errno(::signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK), "signalfd");
-  if (!fd) return std::unexpected(fd.error());
-  signal_fd_ = UniqueFd(*fd);
-  auto added = watch(*fd, EPOLLIN, [this, received = std::move(received)](std::uint32_t) {
+  PLCHOST_TRY_ASSIGN(auto fd, check_errno(::signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK), "signalfd"));
+  signal_fd_ = UniqueFd(fd);
+  auto added = watch(fd, EPOLLIN, [this, received = std::move(received)](std::uint32_t) {
     signalfd_siginfo info{};
     while (::read(signal_fd_.get(), &info, sizeof info) == sizeof info) {
       received(static_cast<int>(info.ssi_signo));

@@ -9,9 +9,8 @@ namespace plchost {
 
 Result<Thread> start_clock_thread(Clock& clock, const std::string& name, ThreadPriority priority,
                                   std::function<void()> body) {
-  auto signals = AlternateStack::make();
-  if (!signals) return std::unexpected(std::move(signals.error()));
-  auto stack = std::make_shared<AlternateStack>(*std::move(signals));
+  PLCHOST_TRY_ASSIGN(auto signals, AlternateStack::make());
+  auto stack = std::make_shared<AlternateStack>(std::move(signals));
   clock.thread_begins();
   auto thread = Thread::start(name, priority, [&clock, stack = std::move(stack), body = std::move(body)] {
     const AlternateStack::Use use(*stack);

@@ -51,9 +51,9 @@ void LinuxClock::spin_until(TimePoint deadline) noexcept {
 Result<std::unique_ptr<PeriodicTimer>> LinuxClock::make_periodic_timer() {
   std::array<UniqueFd, 2> fds;
   for (UniqueFd& fd : fds) {
-    const auto made = check_errno(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC), "timerfd_create");
-    if (!made) return std::unexpected(made.error());
-    fd = UniqueFd(*made);
+    PLCHOST_TRY_ASSIGN(const auto made,
+                       check_errno(::timerfd_create(CLOCK_MONOTONIC, TFD_CLOEXEC), "timerfd_create"));
+    fd = UniqueFd(made);
   }
   return std::make_unique<TimerPair>(std::move(fds[0]), std::move(fds[1]));
 }

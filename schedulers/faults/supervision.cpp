@@ -63,9 +63,7 @@ Supervision::~Supervision() {
 }
 
 Result<void> Supervision::start_thread(ThreadPriority priority) {
-  auto thread = start_clock_thread(clock_, "supervision", priority, [this] { run(); });
-  if (!thread) return std::unexpected(std::move(thread.error()));
-  thread_ = std::move(*thread);
+  PLCHOST_TRY_ASSIGN(thread_, start_clock_thread(clock_, "supervision", priority, [this] { run(); }));
   return {};
 }
 

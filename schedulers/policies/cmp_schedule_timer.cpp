@@ -18,9 +18,8 @@ class CmpScheduleTimer final : public Scheduler {
     // A freewheeling task has no period that a timer could have.
     if (task.interval() == Duration::zero())
       return std::make_unique<DeadlineSource>(clock_, task, rule_, Duration::zero());
-    auto timer = clock_.make_periodic_timer();
-    if (!timer) return std::unexpected(std::move(timer.error()));
-    return std::make_unique<TimerSource>(clock_, task, rule_, std::move(*timer));
+    PLCHOST_TRY_ASSIGN(auto timer, clock_.make_periodic_timer());
+    return std::make_unique<TimerSource>(clock_, task, rule_, std::move(timer));
   }
 
  private:

@@ -18,9 +18,8 @@ constexpr Duration kParkedLook = std::chrono::milliseconds(10);
 
 Result<std::unique_ptr<TaskThread>> TaskThread::start(Clock& clock, Task& task, ThreadPriority priority) {
   std::unique_ptr<TaskThread> self(new TaskThread(clock, task));
-  auto thread = start_clock_thread(clock, task.config().name, priority, [raw = self.get()] { raw->run(); });
-  if (!thread) return std::unexpected(std::move(thread.error()));
-  self->thread_ = std::move(*thread);
+  PLCHOST_TRY_ASSIGN(self->thread_, start_clock_thread(clock, task.config().name, priority,
+                                                       [raw = self.get()] { raw->run(); }));
   return self;
 }
 

@@ -12,9 +12,7 @@ Result<std::shared_ptr<TickDevice>> device_for(const SchedulerSettings& settings
                                                const std::shared_ptr<TickDevice>& known) {
   auto device = known;
   if (!device || device->path() != settings.auxiliary_device) {
-    auto opened = TickDevice::open(files, settings.auxiliary_device);
-    if (!opened) return std::unexpected(std::move(opened).error());
-    device = *std::move(opened);
+    PLCHOST_TRY_ASSIGN(device, TickDevice::open(files, settings.auxiliary_device));
   }
   if (auto set = device->set_period(settings.scheduler_interval); !set) {
     return std::unexpected(std::move(set).error());

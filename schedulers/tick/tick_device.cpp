@@ -49,12 +49,11 @@ std::string shown(std::uint32_t hertz) {
 }  // namespace
 
 Result<std::shared_ptr<TickDevice>> TickDevice::open(DeviceFiles& files, const std::string& path) {
-  auto file = files.open(path);
-  if (!file) return std::unexpected(std::move(file).error());
+  PLCHOST_TRY_ASSIGN(auto file, files.open(path));
   unsigned long hertz = 0;
-  const int no_rtc = (*file)->control(RTC_IRQP_READ, address_of(hertz));
+  const int no_rtc = file->control(RTC_IRQP_READ, address_of(hertz));
   hpet_info info{};
-  const int no_hpet = no_rtc == 0 ? 0 : (*file)->control(HPET_INFO, address_of(info));
+  const int no_hpet = no_rtc == 0 ? 0 : file->control(HPET_INFO, address_of(info));
   if (no_hpet != 0) {
     return failure(
         ErrorCode::unsupported,
@@ -63,7 +62,7 @@ Result<std::shared_ptr<TickDevice>> TickDevice::open(DeviceFiles& files, const s
                     path, no_rtc, no_hpet));
   }
   const Kind kind = no_rtc == 0 ? Kind::rtc : Kind::hpet;
-  return std::shared_ptr<TickDevice>(new TickDevice(path, *std::move(file), kind));
+  return std::shared_ptr<TickDevice>(new TickDevice(path, std::move(file), kind));
 }
 
 Result<void> TickDevice::set_period(Duration period) {

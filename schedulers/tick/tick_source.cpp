@@ -75,9 +75,8 @@ class TaskTick final : public TickSource {
 
 Result<std::unique_ptr<TickSource>> make_tick_source(Clock& clock, const TickChoice& choice) {
   if (choice.kind == TickSourceKind::task) return std::make_unique<TaskTick>(clock);
-  auto timer = clock.make_periodic_timer();
-  if (!timer) return std::unexpected(std::move(timer.error()));
-  auto system = std::make_unique<SystemTick>(clock, std::move(*timer));
+  PLCHOST_TRY_ASSIGN(auto timer, clock.make_periodic_timer());
+  auto system = std::make_unique<SystemTick>(clock, std::move(timer));
   if (choice.kind == TickSourceKind::system) return system;
   return std::make_unique<AuxiliaryTick>(clock, choice.device, std::move(system));
 }

@@ -23,9 +23,7 @@ Ticker::~Ticker() {
 }
 
 Result<void> Ticker::start_thread(ThreadPriority priority) {
-  auto thread = start_clock_thread(clock_, "tick", priority, [this] { run(); });
-  if (!thread) return std::unexpected(std::move(thread.error()));
-  thread_ = std::move(*thread);
+  PLCHOST_TRY_ASSIGN(thread_, start_clock_thread(clock_, "tick", priority, [this] { run(); }));
   return {};
 }
 

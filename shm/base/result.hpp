@@ -54,13 +54,13 @@ using Result = std::expected<T, Error>;
 // Two macros, as in Abseil: a TRY with a value, as in SerenityOS, needs an extension of GCC. With one name
 // for both, as in Boost.Outcome, a comma between template arguments ends the declaration.
 
-/// Evaluates a call once that returns a Result or another std::expected. If it failed, the function that this
-/// stands in returns the error, unchanged; if not, the value is dropped: `PLCHOST_TRY(check_name(name));`
+/// Evaluates a call that returns a Result, once. If the call fails, the enclosing function returns its error,
+/// unchanged. A value is dropped, so use no call that returns a lock: `PLCHOST_TRY(check_name(name));`
 #define PLCHOST_TRY(...) PLCHOST_TRY_AS(PLCHOST_TRY_JOIN(plchost_try_, __COUNTER__), __VA_ARGS__)
 
-/// The same, and initialises a variable with the value, or assigns the value to one that there is:
-/// `PLCHOST_TRY_ASSIGN(const auto file, open(path));` or `PLCHOST_TRY_ASSIGN(file_, open(path));`. Two
-/// statements: it needs braces behind an `if`, and does not compile without.
+/// As PLCHOST_TRY, and puts the value into a new variable or into one that exists:
+/// `PLCHOST_TRY_ASSIGN(const auto file, open(path));` or `PLCHOST_TRY_ASSIGN(file_, open(path));`.
+/// It is two statements. After an `if` it needs braces, and does not compile without them.
 #define PLCHOST_TRY_ASSIGN(variable, ...) \
   PLCHOST_TRY_ASSIGN_AS(PLCHOST_TRY_JOIN(plchost_try_, __COUNTER__), variable, __VA_ARGS__)
 

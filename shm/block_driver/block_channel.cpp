@@ -3,9 +3,8 @@
 namespace plchost {
 
 Result<BlockChannel> BlockChannel::open(BlockNode& node, std::string_view name) {
-  const auto number = node.open_channel(name);
-  if (!number) return std::unexpected(number.error());
-  return BlockChannel(node, *number);
+  PLCHOST_TRY_ASSIGN(const auto number, node.open_channel(name));
+  return BlockChannel(node, number);
 }
 
 SendResult BlockChannel::send(NodeAddress to, std::span<const std::byte> contents,

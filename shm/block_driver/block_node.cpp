@@ -48,17 +48,14 @@ Result<std::unique_ptr<BlockNode>> BlockNode::join(const NodeOptions& options) {
     return failure(ErrorCode::invalid_argument,
                    fmt::format("a hop limit of {} is not possible: 1 to {} is", options.hop_limit, kMaxHops));
   }
-  auto directory = NodeDirectory::open(options.pool, options.base);
-  if (!directory) return std::unexpected(std::move(directory).error());
-  auto remote_names = RemoteNames::open(options.pool, options.base);
-  if (!remote_names) return std::unexpected(std::move(remote_names).error());
-  const auto life = directory->join(options.entry);
-  if (!life) return std::unexpected(life.error());
+  PLCHOST_TRY_ASSIGN(auto directory, NodeDirectory::open(options.pool, options.base));
+  PLCHOST_TRY_ASSIGN(auto remote_names, RemoteNames::open(options.pool, options.base));
+  PLCHOST_TRY_ASSIGN(const auto life, directory.join(options.entry));
   if (options.host_number != 0) {
-    directory->layout().host_number.store(options.host_number, std::memory_order_relaxed);
+    directory.layout().host_number.store(options.host_number, std::memory_order_relaxed);
   }
   return std::unique_ptr<BlockNode>(
-      new BlockNode(options, *std::move(directory), *std::move(remote_names), *life));
+      new BlockNode(options, std::move(directory), std::move(remote_names), life));
 }
 
 bool BlockNode::is_local(NodeAddress address) const noexcept {

@@ -152,17 +152,14 @@ Result<Opened> open_existing(const std::string& path, MemoryFile::Access access,
 
 Result<UnnamedMemory> UnnamedMemory::make(const std::string& name, std::size_t size,
                                           const MemoryRights& rights) {
-  auto path = path_of(name);
-  if (!path) return std::unexpected(path.error());
-  auto fd = make_nameless(size, rights, *path);
-  if (!fd) return std::unexpected(fd.error());
+  PLCHOST_TRY_ASSIGN(auto path, path_of(name));
+  PLCHOST_TRY_ASSIGN(auto fd, make_nameless(size, rights, path));
   struct stat status{};
-  if (auto got = check_errno(::fstat(fd->get(), &status), "fstat " + *path); !got) {
+  if (auto got = check_errno(::fstat(fd.get(), &status), "fstat " + path); !got) {
     return std::unexpected(std::move(got).error());
   }
-  auto mapping = map(*fd, size, MemoryFile::Access::read_write, *path);
-  if (!mapping) return std::unexpected(std::move(mapping).error());
-  return UnnamedMemory(*std::move(path), *std::move(fd), MemoryFile(*std::move(mapping), status.st_ino));
+  PLCHOST_TRY_ASSIGN(auto mapping, map(fd, size, MemoryFile::Access::read_write, path));
+  return UnnamedMemory(std::move(path), std::move(fd), MemoryFile(std::move(mapping), status.st_ino));
 }
 
 namespace {
@@ -214,13 +211,12 @@ namespace {
 
 Result<MemoryFile> make_filled(const std::string& name, std::size_t size, const MemoryFile::Fill& fill,
                                const MemoryRights& rights, const UnnamedMemory::TakeOver& take_over) {
-  auto memory = UnnamedMemory::make(name, size, rights);
-  if (!memory) return std::unexpected(memory.error());
+  PLCHOST_TRY_ASSIGN(auto memory, UnnamedMemory::make(name, size, rights));
   if (fill) {
-    PLCHOST_TRY(fill(memory->bytes()));
+    PLCHOST_TRY(fill(memory.bytes()));
   }
-  PLCHOST_TRY(memory->give_name(take_over));
-  return memory->take();
+  PLCHOST_TRY(memory.give_name(take_over));
+  return memory.take();
 }
 
 }  // namespace
@@ -237,27 +233,22 @@ Result<MemoryFile> MemoryFile::replace(const std::string& name, std::size_t size
 
 Result<MemoryFile> MemoryFile::open(const std::string& name, std::size_t at_least, Access access,
                                     const OwnerCheck& owners) {
-  const auto path = path_of(name);
-  if (!path) return std::unexpected(path.error());
-  const auto opened = open_existing(*path, access, owners);
-  if (!opened) return std::unexpected(opened.error());
-  const auto size = static_cast<std::size_t>(opened->status.st_size);
+  PLCHOST_TRY_ASSIGN(const auto path, path_of(name));
+  PLCHOST_TRY_ASSIGN(const auto opened, open_existing(path, access, owners));
+  const auto size = static_cast<std::size_t>(opened.status.st_size);
   if (size == 0 || size < at_least) {
     return failure(ErrorCode::corrupt,
-                   fmt::format("{} has {} bytes, at least {} are needed", *path, size, at_least));
+                   fmt::format("{} has {} bytes, at least {} are needed", path, size, at_least));
   }
-  auto mapping = map(opened->fd, size, access, *path);
-  if (!mapping) return std::unexpected(std::move(mapping).error());
-  return MemoryFile(*std::move(mapping), opened->status.st_ino);
+  PLCHOST_TRY_ASSIGN(auto mapping, map(opened.fd, size, access, path));
+  return MemoryFile(std::move(mapping), opened.status.st_ino);
 }
 
 Result<void> MemoryFile::fill_empty(const std::string& name, std::size_t size, const OwnerCheck& owners) {
-  const auto path = path_of(name);
-  if (!path) return std::unexpected(path.error());
-  const auto opened = open_existing(*path, Access::read_write, owners);
-  if (!opened) return std::unexpected(opened.error());
-  if (opened->status.st_size != 0) return {};
-  return allocate(opened->fd, size, *path);
+  PLCHOST_TRY_ASSIGN(const auto path, path_of(name));
+  PLCHOST_TRY_ASSIGN(const auto opened, open_existing(path, Access::read_write, owners));
+  if (opened.status.st_size != 0) return {};
+  return allocate(opened.fd, size, path);
 }
 
 bool MemoryFile::remove(const std::string& name) noexcept {

@@ -19,9 +19,9 @@ Result<void> write_all(const std::string& path, std::string_view text, mode_t mo
   const UniqueFd fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode));
   if (!fd) return failure(ErrorCode::system, "open " + path, errno);
   while (!text.empty()) {
-    const auto written = check_errno(::write(fd.get(), text.data(), text.size()), "write " + path);
-    if (!written) return std::unexpected(written.error());
-    text.remove_prefix(static_cast<std::size_t>(*written));
+    PLCHOST_TRY_ASSIGN(const auto written,
+                       check_errno(::write(fd.get(), text.data(), text.size()), "write " + path));
+    text.remove_prefix(static_cast<std::size_t>(written));
   }
   if (const auto synced = check_errno(::fsync(fd.get()), "fsync " + path); !synced) {
     return std::unexpected(synced.error());

@@ -110,9 +110,8 @@ Result<ObjTab*> ObjTab::of_this_process() {
   if (survives_fork != 0) return failure(ErrorCode::system, "pthread_atfork", survives_fork);
   const std::lock_guard one_at_a_time(making);
   if (table == nullptr || owner != ::getpid()) {
-    auto pool = ObjectPool::attach(pool_name_of(nullptr));
-    if (!pool) return std::unexpected(std::move(pool).error());
-    table = new ObjTab(*std::move(pool));
+    PLCHOST_TRY_ASSIGN(auto pool, ObjectPool::attach(pool_name_of(nullptr)));
+    table = new ObjTab(std::move(pool));
     owner = ::getpid();
     held_by_this_thread = 0;
   }

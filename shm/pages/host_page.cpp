@@ -89,12 +89,11 @@ std::string host_page_name(std::string_view pool) {
 
 Result<HostPageWriter> HostPageWriter::create(std::string_view pool) {
   const std::string name = host_page_name(pool);
-  auto memory = open_or_make_page<HostPageLayout>(name, kHostPageKind, Replaces::anything);
-  if (!memory) return std::unexpected(memory.error());
-  HostPageLayout& page = host_layout_of(*memory);  // of a manager that ended while it wrote, perhaps
+  PLCHOST_TRY_ASSIGN(auto memory, open_or_make_page<HostPageLayout>(name, kHostPageKind, Replaces::anything));
+  HostPageLayout& page = host_layout_of(memory);  // of a manager that ended while it wrote, perhaps
   page.host.recover();
   for (auto& instance : page.instances) instance.recover();
-  return HostPageWriter(name, std::move(*memory));
+  return HostPageWriter(name, std::move(memory));
 }
 
 void HostPageWriter::remove(std::string_view pool) noexcept {

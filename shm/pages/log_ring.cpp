@@ -38,9 +38,8 @@ LogRing::LogRing(std::string name, LogRingPage page) noexcept
 
 Result<LogRing> LogRing::open(std::string_view pool, std::string_view instance) {
   const std::string name = log_ring_name(pool, instance);
-  auto page = LogRingPage::open(name);
-  if (!page) return std::unexpected(std::move(page).error());
-  return LogRing(name, *std::move(page));
+  PLCHOST_TRY_ASSIGN(auto page, LogRingPage::open(name));
+  return LogRing(name, std::move(page));
 }
 
 void LogRing::remove(std::string_view pool, std::string_view instance) noexcept {
@@ -79,9 +78,8 @@ void LogRing::add_record(const LogRecord& record) noexcept {
 }
 
 Result<LogRingReader> LogRingReader::open(std::string_view pool, std::string_view instance) {
-  auto page = LogRingPage::open_to_read(log_ring_name(pool, instance));
-  if (!page) return std::unexpected(std::move(page).error());
-  return LogRingReader(*std::move(page));
+  PLCHOST_TRY_ASSIGN(auto page, LogRingPage::open_to_read(log_ring_name(pool, instance)));
+  return LogRingReader(std::move(page));
 }
 
 LogSlice LogRingReader::read(std::uint64_t after, std::size_t most) const {

@@ -25,9 +25,8 @@ std::string transition_ring_name(std::string_view pool, std::string_view instanc
 }
 
 Result<TransitionRing> TransitionRing::open(std::string_view pool, std::string_view instance) {
-  auto page = TransitionRingPage::open(transition_ring_name(pool, instance));
-  if (!page) return std::unexpected(std::move(page).error());
-  return TransitionRing(*std::move(page));
+  PLCHOST_TRY_ASSIGN(auto page, TransitionRingPage::open(transition_ring_name(pool, instance)));
+  return TransitionRing(std::move(page));
 }
 
 void TransitionRing::remove(std::string_view pool, std::string_view instance) noexcept {
@@ -51,9 +50,8 @@ void TransitionRing::add(TransitionSource source, std::uint32_t from, std::uint3
 }
 
 Result<TransitionRingReader> TransitionRingReader::open(std::string_view pool, std::string_view instance) {
-  auto page = TransitionRingPage::open_to_read(transition_ring_name(pool, instance));
-  if (!page) return std::unexpected(std::move(page).error());
-  return TransitionRingReader(*std::move(page));
+  PLCHOST_TRY_ASSIGN(auto page, TransitionRingPage::open_to_read(transition_ring_name(pool, instance)));
+  return TransitionRingReader(std::move(page));
 }
 
 std::int64_t TransitionRingReader::stream_unix_ns() const noexcept {

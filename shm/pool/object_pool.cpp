@@ -104,15 +104,13 @@ void describe_new(ObjectEntry& entry, const MemoryRights& rights, std::uint32_t 
 }  // namespace
 
 Result<ObjectPool> ObjectPool::create(const std::string& name, const PoolOptions& options) {
-  auto segment = PoolSegment::create(name, options);
-  if (!segment) return std::unexpected(std::move(segment).error());
-  return ObjectPool(*std::move(segment));
+  PLCHOST_TRY_ASSIGN(auto segment, PoolSegment::create(name, options));
+  return ObjectPool(std::move(segment));
 }
 
 Result<ObjectPool> ObjectPool::attach(const std::string& name, Access access) {
-  auto segment = PoolSegment::attach(name, access);
-  if (!segment) return std::unexpected(std::move(segment).error());
-  return ObjectPool(*std::move(segment));
+  PLCHOST_TRY_ASSIGN(auto segment, PoolSegment::attach(name, access));
+  return ObjectPool(std::move(segment));
 }
 
 const std::string& ObjectPool::name() const noexcept {
@@ -146,11 +144,10 @@ std::uint64_t ObjectPool::changes() const noexcept {
 Result<PoolEvent> ObjectPool::create_event(std::string_view name) & {
   PLCHOST_TRY(check_object_name(name));
   const Wanted wanted{.name = name};
-  auto held = segment_->lock();
-  if (!held) return std::unexpected(held.error());
-  ObjectEntry* entry = segment_->find(*held, name);
+  PLCHOST_TRY_ASSIGN(auto held, segment_->lock());
+  ObjectEntry* entry = segment_->find(held, name);
   if (entry == nullptr) {
-    PoolTable objects = segment_->table(*held);
+    PoolTable objects = segment_->table(held);
     entry = objects.insert(name, ObjectType::event);
     if (entry == nullptr) return no_room(wanted);
     describe_new(*entry, rights_for({}, this->name()), 0);
@@ -162,9 +159,8 @@ Result<PoolEvent> ObjectPool::create_event(std::string_view name) & {
 
 Result<PoolEvent> ObjectPool::open_event(std::string_view name) const& {
   PLCHOST_TRY(check_object_name(name));
-  auto held = segment_->lock();
-  if (!held) return std::unexpected(held.error());
-  ObjectEntry* const entry = segment_->find(*held, name);
+  PLCHOST_TRY_ASSIGN(auto held, segment_->lock());
+  ObjectEntry* const entry = segment_->find(held, name);
   if (entry == nullptr) return nothing_of_that_name(name, this->name());
   PLCHOST_TRY(check_is(*entry, ObjectType::event, name));
   return PoolEvent(*entry);
@@ -193,10 +189,9 @@ Result<void> ObjectPool::refer(PoolObject& object, PoolLock* held, ObjectEntry& 
   if (auto may = check_permitted(entry, access, wanted.name); !may) return may;
   const bool writable = access == Access::read_write && segment_->writable();
   if (held != nullptr) {
-    const auto reference = segment_->add_reference(*held, entry, writable);
-    if (!reference) return std::unexpected(reference.error());
-    object.reference_ = *reference;
-    object.reference_generation_ = (*reference)->generation.load(kRelaxed);
+    PLCHOST_TRY_ASSIGN(const auto reference, segment_->add_reference(*held, entry, writable));
+    object.reference_ = reference;
+    object.reference_generation_ = reference->generation.load(kRelaxed);
   }
   object.entry_ = &entry;
   object.generation_ = Binding::generation(entry.binding.load(std::memory_order_acquire));
@@ -243,26 +238,23 @@ Result<ObjectEntry*> ObjectPool::make_entry(PoolLock& held, const Wanted& wanted
 
 Result<bool> ObjectPool::create_locked(PoolObject& object, const Wanted& wanted, const ObjectOptions& options,
                                        UnnamedMemory* memory) {
-  auto held = segment_->lock();
-  if (!held) return std::unexpected(held.error());
-  ObjectEntry* entry = segment_->find(*held, wanted.name);
+  PLCHOST_TRY_ASSIGN(auto held, segment_->lock());
+  ObjectEntry* entry = segment_->find(held, wanted.name);
   bool made = entry == nullptr;
   if (entry != nullptr && wanted.type == ObjectType::memory && PoolAdoption::is_left_over(*entry)) {
     const auto left =
-        PoolAdoption::use_again(*segment_, *held, *entry, wanted.initial, rights_for(options, name()),
+        PoolAdoption::use_again(*segment_, held, *entry, wanted.initial, rights_for(options, name()),
                                 attributes_for(options, wanted.type));
     if (!left) return std::unexpected(left.error());
     made = true;
     entry = *left;
   }
   if (entry == nullptr) {
-    const auto fresh = make_entry(*held, wanted, options, memory);
-    if (!fresh) return std::unexpected(fresh.error());
-    entry = *fresh;
+    PLCHOST_TRY_ASSIGN(entry, make_entry(held, wanted, options, memory));
   }
-  auto referred = refer(object, &*held, *entry, wanted, Access::read_write);
+  auto referred = refer(object, &held, *entry, wanted, Access::read_write);
   if (referred) return made;
-  if (made) segment_->destroy(*held, *entry);
+  if (made) segment_->destroy(held, *entry);
   return std::unexpected(std::move(referred).error());
 }
 
@@ -289,9 +281,8 @@ Result<Created<SharedMemory>> ObjectPool::create_memory(std::string_view name, s
   }
   SharedMemory object;
   const Wanted wanted{.name = name, .type = ObjectType::memory, .initial = size};
-  auto made = create_into(object, wanted, options, contents);
-  if (!made) return std::unexpected(std::move(made).error());
-  return Created<SharedMemory>{.object = std::move(object), .made = *made};
+  PLCHOST_TRY_ASSIGN(const auto made, create_into(object, wanted, options, contents));
+  return Created<SharedMemory>{.object = std::move(object), .made = made};
 }
 
 Result<bool> ObjectPool::create_memory_into(SharedMemory& object, const Wanted& wanted,
@@ -301,10 +292,9 @@ Result<bool> ObjectPool::create_memory_into(SharedMemory& object, const Wanted& 
   if (there) return false;
   if (there.error().code != ErrorCode::not_found) return std::unexpected(there.error());
   // The host takes its time to find so many bytes: not with the lock held.
-  auto unnamed = prepare_memory(wanted.name, wanted.initial, options);
-  if (!unnamed) return std::unexpected(std::move(unnamed).error());
-  std::ranges::copy(contents, unnamed->bytes().begin());
-  auto made = create_locked(object, wanted, options, &*unnamed);
+  PLCHOST_TRY_ASSIGN(auto unnamed, prepare_memory(wanted.name, wanted.initial, options));
+  std::ranges::copy(contents, unnamed.bytes().begin());
+  auto made = create_locked(object, wanted, options, &unnamed);
   if (!made && made.error().code == ErrorCode::already_exists) {
     // Firmware has just made it.
     if (open_into(object, wanted, Access::read_write)) return false;
@@ -349,9 +339,8 @@ Result<void> ObjectPool::find_and_refer(PoolObject& object, const Wanted& wanted
     if (access == Access::read_write) return std::unexpected(segment_->lock().error());
     return look_only(look_until(), [&] { return refer_to(nullptr, segment_->peek(wanted.name)); });
   }
-  auto held = segment_->lock();
-  if (!held) return std::unexpected(held.error());
-  return refer_to(&*held, segment_->find(*held, wanted.name));
+  PLCHOST_TRY_ASSIGN(auto held, segment_->lock());
+  return refer_to(&held, segment_->find(held, wanted.name));
 }
 
 Result<void> ObjectPool::open_once(PoolObject& object, const Wanted& wanted, Access access) const {
@@ -387,19 +376,17 @@ Result<void> ObjectPool::open_into(PoolObject& object, ObjectType type, std::str
 // The entry of the old one goes first: a death in between leaves no half of either.
 Result<SharedMemory> ObjectPool::replace_memory(std::string_view name, UnnamedMemory& prepared) {
   const Wanted wanted{.name = name, .type = ObjectType::memory, .initial = prepared.bytes().size()};
-  auto held = segment_->lock();
-  if (!held) return std::unexpected(held.error());
-  if (ObjectEntry* const old = segment_->find(*held, name); old != nullptr) {
+  PLCHOST_TRY_ASSIGN(auto held, segment_->lock());
+  if (ObjectEntry* const old = segment_->find(held, name); old != nullptr) {
     PLCHOST_TRY(check_is(*old, ObjectType::memory, name));
     PLCHOST_TRY(check_permitted(*old, Access::read_write, name));
-    segment_->table(*held).erase(*old);
+    segment_->table(held).erase(*old);
   }
-  const auto made = make_entry(*held, wanted, {.keep = true}, &prepared);
-  if (!made) return std::unexpected(made.error());
+  PLCHOST_TRY_ASSIGN(const auto made, make_entry(held, wanted, {.keep = true}, &prepared));
   SharedMemory memory;
   // The one before is gone and this one is kept, so no room for a reference is no reason to fail.
-  auto referred = refer(memory, &*held, **made, wanted, Access::read_write);
-  if (!referred) referred = refer(memory, nullptr, **made, wanted, Access::read_write);
+  auto referred = refer(memory, &held, *made, wanted, Access::read_write);
+  if (!referred) referred = refer(memory, nullptr, *made, wanted, Access::read_write);
   if (!referred) return std::unexpected(std::move(referred).error());
   memory.memory_ = prepared.take();
   return memory;
@@ -413,22 +400,20 @@ Result<UnnamedMemory> ObjectPool::prepare_memory(std::string_view name, std::siz
 
 Result<SharedMemory> ObjectPool::replace_memory(std::string_view name, std::size_t size,
                                                 const MemoryFile::Fill& fill) {
-  auto prepared = prepare_memory(name, size);
-  if (!prepared) return std::unexpected(std::move(prepared).error());
-  PLCHOST_TRY(fill(prepared->bytes()));
-  return replace_memory(name, *prepared);
+  PLCHOST_TRY_ASSIGN(auto prepared, prepare_memory(name, size));
+  PLCHOST_TRY(fill(prepared.bytes()));
+  return replace_memory(name, prepared);
 }
 
 Result<void> ObjectPool::remove_object(std::string_view name) {
   if (auto valid = check_object_name(name); !valid) return valid;
   // Firmware may have made it with a header alone.
   if (segment_->peek(name) == nullptr) (void)PoolAdoption::reconcile(*segment_, name);
-  auto held = segment_->lock();
-  if (!held) return std::unexpected(held.error());
-  ObjectEntry* const entry = segment_->find(*held, name);
+  PLCHOST_TRY_ASSIGN(auto held, segment_->lock());
+  ObjectEntry* const entry = segment_->find(held, name);
   if (entry == nullptr) return nothing_of_that_name(name, this->name());
   if (auto may = check_permitted(*entry, Access::read_write, name); !may) return may;
-  segment_->let_go(*held, *entry);
+  segment_->let_go(held, *entry);
   return {};
 }
 
@@ -456,7 +441,12 @@ Result<std::vector<ObjectInfo>> ObjectPool::list() const {
   const PoolView& view = segment_->view();
   ObjectHolders holders;
   std::size_t place = 0;
-  PLCHOST_TRY(look_in_parts([&] { return ObjectHolders::look_at(view, place, kReferences); }, [&](ObjectHolders::Part part) { holders.add(std::move(part)); place += kReferences; return place < view.used_references().size(); }));
+  PLCHOST_TRY(look_in_parts([&] { return ObjectHolders::look_at(view, place, kReferences); },
+                            [&](ObjectHolders::Part part) {
+                              holders.add(std::move(part));
+                              place += kReferences;
+                              return place < view.used_references().size();
+                            }));
   std::vector<ObjectInfo> all;
   std::size_t at = 0;
   const auto part = [&] {
@@ -469,7 +459,11 @@ Result<std::vector<ObjectInfo>> ObjectPool::list() const {
     }
     return infos;
   };
-  PLCHOST_TRY(look_in_parts(part, [&](std::vector<ObjectInfo> infos) { std::ranges::move(infos, std::back_inserter(all)); at += kObjects; return at < view.used_entries().size(); }));
+  PLCHOST_TRY(look_in_parts(part, [&](std::vector<ObjectInfo> infos) {
+    std::ranges::move(infos, std::back_inserter(all));
+    at += kObjects;
+    return at < view.used_entries().size();
+  }));
   return all;
 }
 
@@ -481,9 +475,8 @@ Result<ObjectInfo> ObjectPool::look_at(std::string_view name) const {
     return describe_object(view, *entry, ObjectHolders::of(view, *entry));
   };
   if (!segment_->writable()) return look_only(look_until(), [&] { return describe(segment_->peek(name)); });
-  auto held = segment_->lock(true);
-  if (!held) return std::unexpected(held.error());
-  return describe(segment_->find(*held, name));
+  PLCHOST_TRY_ASSIGN(auto held, segment_->lock(true));
+  return describe(segment_->find(held, name));
 }
 
 }  // namespace plchost

@@ -97,9 +97,7 @@ class ObjectPool {
   [[nodiscard]] Result<Created<T>> create_object(std::string_view name, std::uint64_t initial = 0,
                                                  const ObjectOptions& options = {}) {
     Created<T> created;
-    const auto made = create_into(created.object, T::kType, name, initial, options);
-    if (!made) return std::unexpected(made.error());
-    created.made = *made;
+    PLCHOST_TRY_ASSIGN(created.made, create_into(created.object, T::kType, name, initial, options));
     return created;
   }
   /// not_found: no such object; and as above.

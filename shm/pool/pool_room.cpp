@@ -74,12 +74,11 @@ std::uint64_t free_shared_memory() noexcept {
 
 Result<PoolRoom> PoolRoom::of(const ObjectPool& pool, std::string_view instance, pid_t process,
                               std::uint64_t free_bytes) {
-  const auto objects = pool.list();
-  if (!objects) return std::unexpected(objects.error());
+  PLCHOST_TRY_ASSIGN(const auto objects, pool.list());
   PoolRoom room(pool, free_bytes);
   const std::string prefix = fmt::format("{}/", instance);
   Holders holders(process);
-  for (const ObjectInfo& object : *objects) {
+  for (const ObjectInfo& object : objects) {
     if (!stays(object, prefix, holders)) {
       if (object.type == ObjectType::memory) {
         room.free_bytes_ = sum_of(room.free_bytes_, in_pages(object.size));

@@ -347,9 +347,8 @@ ObjectEntry* PoolSegment::find(PoolLock& held, std::string_view name) noexcept {
 }
 
 Result<ReferenceEntry*> PoolSegment::add_reference(PoolLock& /*held*/, ObjectEntry& object, bool writable) {
-  const auto slot = client();
-  if (!slot) return std::unexpected(slot.error());
-  ReferenceEntry* const reference = PoolReferences(view_, journal_).add(object, **slot, writable);
+  PLCHOST_TRY_ASSIGN(const auto slot, client());
+  ReferenceEntry* const reference = PoolReferences(view_, journal_).add(object, *slot, writable);
   if (reference == nullptr) {
     return failure(ErrorCode::full, fmt::format("pool '{}' has {} references, no more are possible", name_,
                                                 view_.references().size()));

@@ -105,18 +105,12 @@ Result<ControlRequest> decode_request(std::string_view packet) {
   for (const auto* text : {&verb, &instance, &argument}) {
     if (!*text) return std::unexpected(text->error());
   }
-  auto options = options_of(*json);
-  if (!options) return std::unexpected(std::move(options).error());
-  const auto limit = limit_of(*json);
-  if (!limit) return std::unexpected(limit.error());
+  PLCHOST_TRY_ASSIGN(auto options, options_of(*json));
+  PLCHOST_TRY_ASSIGN(const auto limit, limit_of(*json));
   const auto known = std::ranges::find(operations(), *verb, &Operation::name);
   if (known != operations().end()) {
-    return ControlRequest{(*json)["number"].get<std::uint64_t>(),
-                          known->verb,
-                          *instance,
-                          *argument,
-                          *std::move(options),
-                          *limit};
+    return ControlRequest{
+        (*json)["number"].get<std::uint64_t>(), known->verb, *instance, *argument, std::move(options), limit};
   }
   return failure(ErrorCode::corrupt, fmt::format("control message has the unknown verb '{}'", *verb));
 }
@@ -129,10 +123,9 @@ Result<ControlReply> decode_reply(std::string_view packet) {
   if (code == json->end() || !code->is_number_unsigned() || code->get<std::uint64_t>() > kLastCode) {
     return failure(ErrorCode::corrupt, "control reply has no valid 'code'");
   }
-  auto text = text_of(*json, "text");
-  if (!text) return std::unexpected(text.error());
+  PLCHOST_TRY_ASSIGN(auto text, text_of(*json, "text"));
   return ControlReply{(*json)["number"].get<std::uint64_t>(), static_cast<ErrorCode>(code->get<unsigned>()),
-                      std::move(*text)};
+                      std::move(text)};
 }
 
 }  // namespace plchost

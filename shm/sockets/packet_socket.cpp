@@ -31,9 +31,10 @@ Result<sockaddr_un> to_address(const std::string& path) {
 }
 
 Result<UniqueFd> make_socket() {
-  const auto fd = check_errno(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0), "socket");
-  if (!fd) return std::unexpected(fd.error());
-  return UniqueFd(*fd);
+  PLCHOST_TRY_ASSIGN(
+      const auto fd,
+      check_errno(::socket(AF_UNIX, SOCK_SEQPACKET | SOCK_CLOEXEC | SOCK_NONBLOCK, 0), "socket"));
+  return UniqueFd(fd);
 }
 
 const sockaddr* as_sockaddr(const sockaddr_un& address) {
@@ -43,17 +44,15 @@ const sockaddr* as_sockaddr(const sockaddr_un& address) {
 }  // namespace
 
 Result<PacketSocket> PacketSocket::connect(const std::string& path) {
-  const auto address = to_address(path);
-  if (!address) return std::unexpected(address.error());
-  auto fd = make_socket();
-  if (!fd) return std::unexpected(fd.error());
-  if (::connect(fd->get(), as_sockaddr(*address), sizeof *address) != 0) {
+  PLCHOST_TRY_ASSIGN(const auto address, to_address(path));
+  PLCHOST_TRY_ASSIGN(auto fd, make_socket());
+  if (::connect(fd.get(), as_sockaddr(address), sizeof address) != 0) {
     const int error = errno;
     // A non-blocking connect says EAGAIN when the listener's backlog is full.
     return failure(error == EAGAIN ? ErrorCode::busy : ErrorCode::unavailable,
                    fmt::format("connect to {}", path), error);
   }
-  return PacketSocket(std::move(*fd));
+  return PacketSocket(std::move(fd));
 }
 
 Result<void> PacketSocket::send(std::string_view packet) {
@@ -86,9 +85,8 @@ Result<std::optional<std::string>> PacketSocket::receive() {
 
 Result<std::string> PacketSocket::receive_until(TimePoint deadline) {
   for (;;) {
-    auto packet = receive();
-    if (!packet) return std::unexpected(packet.error());
-    if (*packet) return std::move(**packet);
+    PLCHOST_TRY_ASSIGN(auto packet, receive());
+    if (packet) return std::move(*packet);
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - MonotonicClock::now());
     if (left.count() <= 0) return failure(ErrorCode::timed_out, "no answer on the control socket");
     pollfd poll{.fd = fd_.get(), .events = POLLIN, .revents = 0};
@@ -109,20 +107,18 @@ Result<int> PacketSocket::peer_pid() const {
 }
 
 Result<PacketListener> PacketListener::listen(const std::string& path) {
-  const auto address = to_address(path);
-  if (!address) return std::unexpected(address.error());
-  auto fd = make_socket();
-  if (!fd) return std::unexpected(fd.error());
+  PLCHOST_TRY_ASSIGN(const auto address, to_address(path));
+  PLCHOST_TRY_ASSIGN(auto fd, make_socket());
   ::unlink(path.c_str());
   constexpr mode_t kMode = 0660;
   constexpr int kBacklog = 16;
-  auto done = check_errno(::bind(fd->get(), as_sockaddr(*address), sizeof *address), "bind " + path);
+  auto done = check_errno(::bind(fd.get(), as_sockaddr(address), sizeof address), "bind " + path);
   if (done) done = check_errno(::chmod(path.c_str(), kMode), "chmod " + path);
-  if (done) done = check_errno(::listen(fd->get(), kBacklog), "listen on " + path);
+  if (done) done = check_errno(::listen(fd.get(), kBacklog), "listen on " + path);
   if (!done) return std::unexpected(done.error());
   struct stat file{};
   PLCHOST_TRY(check_errno(::stat(path.c_str(), &file), "stat " + path));
-  return PacketListener(std::move(*fd), path, file.st_ino);
+  return PacketListener(std::move(fd), path, file.st_ino);
 }
 
 PacketListener& PacketListener::operator=(PacketListener&& other) noexcept {

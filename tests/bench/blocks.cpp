@@ -305,7 +305,7 @@ Result<std::vector<Row>> measure_pair(const Plan& plan, const std::string& pool)
   const bool with_iceoryx = has_iceoryx() && is_installed("iox-roudi");
   RouDi roudi(pool);
   if (with_iceoryx) {
-    if (auto started = roudi.start(); !started) return std::unexpected(std::move(started).error());
+    PLCHOST_TRY(roudi.start());
   }
   const pid_t parent = ::getpid();
   const pid_t peer = ::fork();

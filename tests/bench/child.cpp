@@ -35,8 +35,7 @@ Result<Child> Child::start(const std::vector<std::string>& arguments, int output
   pid_t pid = 0;
   const int error = ::posix_spawnp(&pid, argv.front(), &actions, nullptr, argv.data(), environ);
   ::posix_spawn_file_actions_destroy(&actions);
-  if (auto started = check_returned(error, "start " + arguments.front()); !started)
-    return std::unexpected(std::move(started.error()));
+  PLCHOST_TRY(check_returned(error, "start " + arguments.front()));
   return Child(pid);
 }
 

@@ -109,7 +109,7 @@ Result<std::vector<Row>> measure_corun(const Plan& plan) {
       return run_slice(plan, loop, slice, into);
     });
   }
-  if (auto done = alternate(plan, subjects); !done) return std::unexpected(std::move(done.error()));
+  PLCHOST_TRY(alternate(plan, subjects));
   std::vector<Row> rows;
   for (std::size_t i = 0; i < figures.size(); ++i)
     rows.push_back(to_row(all_schedulers()[i].name, figures[i]));

@@ -59,7 +59,7 @@ Result<std::vector<Row>> measure_cyclic(const Plan& plan) {
     loops.push_back(std::make_unique<ScheduledLoop>(entry.name, kPeriod));
     subjects.push_back(slices_of(plan, *loops.back(), kPeriod, figures[loops.size() - 1]));
   }
-  if (auto done = alternate(plan, subjects); !done) return std::unexpected(std::move(done.error()));
+  PLCHOST_TRY(alternate(plan, subjects));
   std::vector<Row> rows;
   for (std::size_t i = 0; i < figures.size(); ++i) {
     const std::string_view scheduler = all_schedulers()[i].name;

@@ -23,8 +23,7 @@ Result<std::unique_ptr<ManyTasks>> ManyTasks::start(const Plan& plan, std::strin
   auto made = TaskSet::create(self->clock_, PriorityBand::normal, std::move(tasks), environment);
   if (!made) return std::unexpected(std::move(made.error()));
   self->tasks_ = std::move(*made);
-  if (auto started = self->tasks_->start(scheduler, {}); !started)
-    return std::unexpected(std::move(started.error()));
+  PLCHOST_TRY(self->tasks_->start(scheduler, {}));
   return self;
 }
 
@@ -49,7 +48,7 @@ Result<Duration> measure_tick(const Plan& plan, std::vector<TaskConfig> tasks, D
   std::this_thread::sleep_for(slice);
   const Duration cpu = (usage_of_other_threads("tick") - before).cpu;
   const auto ticks = (MonotonicClock::now() - begin) / kTick;
-  if (auto stopped = (*started)->stop(); !stopped) return std::unexpected(std::move(stopped.error()));
+  PLCHOST_TRY((*started)->stop());
   return cpu / ticks;
 }
 

@@ -29,8 +29,7 @@ template <class Board, class Fork, class Measure>
   Board& board = *new (memory) Board{};
   // The stamps of the program in the instance are not looked at here, but it wants a place for them.
   const std::string stamps = own_name("board");
-  if (const auto made = MemoryFile::replace(stamps, sizeof(DdsBoard)); !made)
-    return std::unexpected(made.error());
+  PLCHOST_TRY(MemoryFile::replace(stamps, sizeof(DdsBoard)));
   ::setenv(kBoardVariable, ("/dev/shm/" + stamps).c_str(), 1);
   Result<std::vector<Row>> rows;
   {

@@ -108,8 +108,7 @@ Result<Row> measure_semaphore(const Plan& plan, ObjectPool& pool) {
   const auto semaphore = pool.create_semaphore("semaphore", 0);
   if (!semaphore) return std::unexpected(semaphore.error());
   sem_t floor;
-  if (auto made = check_errno(::sem_init(&floor, 1, 0), "sem_init"); !made)
-    return std::unexpected(made.error());
+  PLCHOST_TRY(check_errno(::sem_init(&floor, 1, 0), "sem_init"));
   return measure_calls(
       plan, "pool/semaphore", "1,000 times post and wait; floor: sem_post and sem_wait", {},
       [&] {
@@ -220,8 +219,8 @@ Result<std::vector<Row>> measure_steps(const char* what, std::uint32_t count, st
                                        const char* note, const Steps& ours, const Steps& floor) {
   StepTimes our_times;
   StepTimes floor_times;
-  if (auto done = run(floor, floor_count, floor_times); !done) return std::unexpected(done.error());
-  if (auto done = run(ours, count, our_times); !done) return std::unexpected(done.error());
+  PLCHOST_TRY(run(floor, floor_count, floor_times));
+  PLCHOST_TRY(run(ours, count, our_times));
   std::vector<Row> rows;
   constexpr std::array kSteps = {"create", "open", "close"};
   for (std::size_t step = 0; step < kSteps.size(); ++step) {

@@ -95,7 +95,7 @@ Result<Samples> wait_for(Duration time, Call call) {
 /// it.
 Result<Samples> wait_for_the_end_of(ObjectPool& pool, const std::function<bool(ObjectPool&)>& hold) {
   std::array<int, 2> ready{};
-  if (auto made = check_errno(::pipe(ready.data()), "pipe"); !made) return std::unexpected(made.error());
+  PLCHOST_TRY(check_errno(::pipe(ready.data()), "pipe"));
   Killed victim([&] {
     auto own = ObjectPool::attach(pool.name());
     (void)!::write(ready[1], own && hold(*own) ? "y" : "n", 1);

@@ -105,9 +105,9 @@ Result<std::vector<Row>> measure(const Plan& plan, const DdsDomains& domains, Dd
   // The bare reader's DDS threads inherit this core: the one where plchost-dds has its own.
   const OnCore threads_inherit_it(plan.poster_core);
   Cell cell(plan, domains, name);
-  if (auto started = cell.start(plan); !started) return std::unexpected(started.error());
+  PLCHOST_TRY(cell.start(plan));
   BareReader reader;
-  if (auto started = reader.start(plan, domains, board); !started) return std::unexpected(started.error());
+  PLCHOST_TRY(reader.start(plan, domains, board));
   std::vector<Row> rows(1);
   rows[0].name = "post/dds";
   rows[0].sample = "a post";

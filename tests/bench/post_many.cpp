@@ -120,7 +120,7 @@ class Measurement {
 
 Result<std::vector<Row>> measure(const Plan& plan, const DdsDomains& domains, Board& board) {
   Cell cell(plan, domains, own_name("bench"));
-  if (auto started = cell.start(plan); !started) return std::unexpected(started.error());
+  PLCHOST_TRY(cell.start(plan));
   dds::DomainOptions options;
   options.domain = domains.plchost;
   auto client = ControlClient::connect(options);
@@ -140,9 +140,9 @@ Result<std::vector<Row>> measure(const Plan& plan, const DdsDomains& domains, Bo
   };
   board.job.store(Job::connect);
   const auto all_there = [&] { return board.connected.load() == kClients + kFloods; };
-  if (auto done = wait_until(all_there, "the clients"); !done) return std::unexpected(done.error());
-  if (auto done = take(measurement.many()); !done) return std::unexpected(done.error());
-  if (auto done = take(measurement.flood()); !done) return std::unexpected(done.error());
+  PLCHOST_TRY(wait_until(all_there, "the clients"));
+  PLCHOST_TRY(take(measurement.many()));
+  PLCHOST_TRY(take(measurement.flood()));
   return rows;
 }
 

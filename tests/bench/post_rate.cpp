@@ -56,7 +56,7 @@ class RateMeasurement {
   /// From a client on the core of plchost-dds, or on the task's.
   Result<Row> round_trip(const std::string& name, int core) {
     const OnCore threads_inherit_it(core);
-    if (auto opened = open(BareDuty::acknowledge); !opened) return std::unexpected(opened.error());
+    PLCHOST_TRY(open(BareDuty::acknowledge));
     Row row{.name = name, .sample = "a post and its acknowledgement"};
     const auto post = [&] { (void)client_->post_event(ping_event(), 1, Duration::zero(), kRatePatience); };
     const auto measure_floor = [&](Duration slice) -> Result<void> {
@@ -67,8 +67,7 @@ class RateMeasurement {
       time_calls(slice, row.ours, post);
       return {};
     };
-    if (auto done = alternate(plan_, {measure_floor, measure_ours}, kRateSlice); !done)
-      return std::unexpected(done.error());
+    PLCHOST_TRY(alternate(plan_, {measure_floor, measure_ours}, kRateSlice));
     const double p50 = ratio(summarise(row.ours).p50, summarise(row.floor).p50);
     row.targets = {{"median below 1.15 x a bare Cyclone DDS round trip", "ratio", p50, 1.15}};
     return row;
@@ -76,7 +75,7 @@ class RateMeasurement {
 
   Result<Row> rate(const std::string& name, BareDuty duty, const std::string& event_name,
                    const PoolEvent& event) {
-    if (auto opened = open(duty); !opened) return std::unexpected(opened.error());
+    PLCHOST_TRY(open(duty));
     Row row{.name = name, .sample = "none: rates"};
     double ours = 0, our_seconds = 0, bare = 0, bare_seconds = 0;
     const auto post_one = [&] { return client_->post_one(kBenchHost, "probe", event_name).has_value(); };
@@ -87,8 +86,7 @@ class RateMeasurement {
     const auto measure_ours = [&](Duration slice) {
       return run_fast(slice, ours, our_seconds, post_one, [&] { return event.counted().count(); });
     };
-    if (auto done = alternate(plan_, {measure_floor, measure_ours}, kRateSlice); !done)
-      return std::unexpected(done.error());
+    PLCHOST_TRY(alternate(plan_, {measure_floor, measure_ours}, kRateSlice));
     const double per_second = ours / our_seconds;
     const double floor = bare / bare_seconds;
     row.extra = {{"posts_per_second", per_second}, {"floor_posts_per_second", floor}};
@@ -122,7 +120,7 @@ class RateMeasurement {
 
 Result<std::vector<Row>> measure_rate(const Plan& plan, const DdsDomains& domains, TakenBoard& board) {
   Cell cell(plan, domains, own_name("bench"));
-  if (auto started = cell.start(plan); !started) return std::unexpected(started.error());
+  PLCHOST_TRY(cell.start(plan));
   auto pool = ObjectPool::attach(cell.pool());
   if (!pool) return std::unexpected(pool.error());
   const auto ping = pool->open_event("probe/ping");

@@ -207,7 +207,7 @@ Result<std::vector<Row>> measure_scale(const Plan& plan) {
         return run_ours(plan, all_schedulers()[i].name, kSizes[size], slice, figures[i][size]);
       });
     }
-    if (auto done = alternate(share, subjects); !done) return std::unexpected(std::move(done.error()));
+    PLCHOST_TRY(alternate(share, subjects));
   }
   std::vector<Row> rows;
   for (std::size_t i = 0; i < all_schedulers().size(); ++i)

@@ -49,9 +49,9 @@ Result<Row> measure(const Plan& plan, const std::string& name, StartBoard& board
   for (int i = 0; i < plan.starts; ++i) {
     {
       const OnCore child_inherits_it(plan.task_core);
-      if (auto done = measure_one(floor, board, row.floor); !done) return std::unexpected(done.error());
+      PLCHOST_TRY(measure_one(floor, board, row.floor));
     }
-    if (auto done = measure_one(ours, board, row.ours); !done) return std::unexpected(done.error());
+    PLCHOST_TRY(measure_one(ours, board, row.ours));
   }
   row.targets = {{"median below 20 ms", "ms", summarise(row.ours).p50 / 1e3, 20}};
   row.note = "the pool is there from the second start on, as under a manager";

@@ -71,9 +71,7 @@ class Tasks {
   void add(TaskConfig config) { configs_.push_back(std::move(config)); }
 
   Result<void> create() {
-    auto made = TaskSet::create(clock, PriorityBand::normal, std::move(configs_), environment());
-    if (!made) return std::unexpected(made.error());
-    set = std::move(*made);
+    PLCHOST_TRY_ASSIGN(set, TaskSet::create(clock, PriorityBand::normal, std::move(configs_), environment()));
     return {};
   }
 

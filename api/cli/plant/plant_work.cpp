@@ -27,9 +27,8 @@ constexpr int kRounds = 3;
 
 Result<Instances> look_at(ControlClient& client, const WantedHost& wanted, TimePoint deadline) {
   Instances present;
-  const auto instances = client.instances(wanted.name, deadline);
-  if (!instances) return std::unexpected(instances.error());
-  for (const plc_InstanceStatus& status : *instances) {
+  PLCHOST_TRY_ASSIGN(const auto instances, client.instances(wanted.name, deadline));
+  for (const plc_InstanceStatus& status : instances) {
     present[std::string(dds::text_of(status.instance))] = {
         .state = status.state,
         .scheduler = std::string(dds::text_of(status.scheduler)),
@@ -39,9 +38,8 @@ Result<Instances> look_at(ControlClient& client, const WantedHost& wanted, TimeP
   const bool events_count = std::ranges::any_of(
       wanted.instances, [](const WantedInstance& instance) { return !instance.events.empty(); });
   if (!events_count) return present;
-  const auto events = client.events(wanted.name, deadline);
-  if (!events) return std::unexpected(events.error());
-  for (const plc_EventStatus& event : *events) {
+  PLCHOST_TRY_ASSIGN(const auto events, client.events(wanted.name, deadline));
+  for (const plc_EventStatus& event : events) {
     const auto found = present.find(std::string(dds::text_of(event.instance)));
     if (event.registered && found != present.end()) found->second.events.emplace(dds::text_of(event.event));
   }

@@ -7,14 +7,12 @@
 namespace plchost {
 
 Result<std::vector<Row>> task_rows(CliSession& session, const std::string& instance) {
-  const auto hosts = session.shown_hosts();
-  if (!hosts) return std::unexpected(hosts.error());
+  PLCHOST_TRY_ASSIGN(const auto hosts, session.shown_hosts());
   std::vector<Row> rows;
   ControlClient& client = *session.client().value();
-  for (const HostView& host : *hosts) {
-    const auto tasks = client.tasks(host.name, session.deadline());
-    if (!tasks) return std::unexpected(tasks.error());
-    for (const auto& task : *tasks) {
+  for (const HostView& host : hosts) {
+    PLCHOST_TRY_ASSIGN(const auto tasks, client.tasks(host.name, session.deadline()));
+    for (const auto& task : tasks) {
       if (instance.empty() || dds::text_of(task.instance) == instance) rows.push_back(to_row(task));
     }
   }

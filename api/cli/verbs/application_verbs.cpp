@@ -62,10 +62,9 @@ int load(CliSession& session, const LoadArguments& arguments) {
 
 /// INSTANCE/PATH of what is loaded on a host.
 Result<std::map<std::string, std::string>> loaded_on(CliSession& session, const std::string& host) {
-  const auto instances = session.client().value()->instances(host, session.deadline());
-  if (!instances) return std::unexpected(instances.error());
+  PLCHOST_TRY_ASSIGN(const auto instances, session.client().value()->instances(host, session.deadline()));
   std::map<std::string, std::string> loaded;
-  for (const plc_InstanceStatus& status : *instances) {
+  for (const plc_InstanceStatus& status : instances) {
     loaded.emplace(dds::text_of(status.instance), dds::text_of(status.application));
   }
   return loaded;

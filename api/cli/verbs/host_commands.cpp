@@ -93,13 +93,12 @@ bool is_pattern(std::string_view name) {
 
 /// All instances of the hosts that are shown, in the order of their hosts.
 Result<std::vector<NamedInstance>> all_instances(CliSession& session) {
-  const auto hosts = session.shown_hosts();
-  if (!hosts) return std::unexpected(hosts.error());
+  PLCHOST_TRY_ASSIGN(const auto hosts, session.shown_hosts());
   std::vector<NamedInstance> all;
-  for (const HostView& host : *hosts) {
-    const auto samples = session.client().value()->instances(host.name, session.deadline());
-    if (!samples) return std::unexpected(samples.error());
-    for (const plc_InstanceStatus& sample : *samples) {
+  for (const HostView& host : hosts) {
+    PLCHOST_TRY_ASSIGN(const auto samples,
+                       session.client().value()->instances(host.name, session.deadline()));
+    for (const plc_InstanceStatus& sample : samples) {
       const std::string name(dds::text_of(sample.instance));
       auto known = std::ranges::find(all, name, &NamedInstance::name);
       if (known == all.end()) known = all.insert(all.end(), {.name = name, .hosts = {}});
@@ -126,9 +125,7 @@ Result<std::vector<NamedInstance>> expand(CliSession& session, const std::vector
       continue;
     }
     if (!all) {
-      auto known = all_instances(session);
-      if (!known) return std::unexpected(std::move(known).error());
-      all = *std::move(known);
+      PLCHOST_TRY_ASSIGN(all, all_instances(session));
     }
     const std::size_t before = expanded.size();
     std::ranges::copy_if(*all, std::back_inserter(expanded),

@@ -14,9 +14,8 @@ namespace {
 Result<std::vector<NodesTold>> route_pages(CliSession& session, const std::string& host, NodeQuery query) {
   std::vector<NodesTold> pages;
   for (;;) {
-    auto page = session.client().value()->list_routes(host, query, session.deadline());
-    if (!page) return std::unexpected(std::move(page).error());
-    pages.push_back(*std::move(page));
+    PLCHOST_TRY_ASSIGN(auto page, session.client().value()->list_routes(host, query, session.deadline()));
+    pages.push_back(std::move(page));
     if (pages.back().complete) return pages;
     if (pages.back().next_after <= query.after) {
       return failure(ErrorCode::corrupt,

@@ -34,9 +34,7 @@ struct WatchObjectArguments {
 Result<ObjectQuery> query_of(const ListArguments& arguments) {
   ObjectQuery query{.name = {}, .type = std::nullopt, .match = arguments.pattern, .after = {}};
   if (arguments.type.empty()) return query;
-  const auto type = parse_object_type(arguments.type);
-  if (!type) return std::unexpected(type.error());
-  query.type = *type;
+  PLCHOST_TRY_ASSIGN(query.type, parse_object_type(arguments.type));
   return query;
 }
 
@@ -116,12 +114,12 @@ int list_objects(CliSession& session, const ListArguments& arguments) {
 }
 
 Result<ListedObject> look_at(CliSession& session, const std::string& host, const std::string& name) {
-  auto listing = session.client().value()->list_objects(
-      host, {.name = name, .type = std::nullopt, .match = {}, .after = {}}, session.deadline());
-  if (!listing) return std::unexpected(std::move(listing).error());
-  if (listing->objects.size() == 1) return std::move(listing->objects.front());
+  PLCHOST_TRY_ASSIGN(auto listing, session.client().value()->list_objects(
+                                       host, {.name = name, .type = std::nullopt, .match = {}, .after = {}},
+                                       session.deadline()));
+  if (listing.objects.size() == 1) return std::move(listing.objects.front());
   return failure(ErrorCode::corrupt, fmt::format("host '{}' tells of {} objects where one was asked for",
-                                                 host, listing->objects.size()));
+                                                 host, listing.objects.size()));
 }
 
 int show_object(CliSession& session, const std::string& name) {

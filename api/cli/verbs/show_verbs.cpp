@@ -36,16 +36,14 @@ std::string name_of(const plc_TaskStatus& task) {
 template <class Sample>
 Result<Sample> find(CliSession& session, Snapshot<Sample> snapshot, std::string_view what,
                     const std::string& name) {
-  const auto host = session.target_host();
-  if (!host) return std::unexpected(host.error());
-  const auto all = (session.client().value()->*snapshot)(*host, session.deadline());
-  if (!all) return std::unexpected(all.error());
+  PLCHOST_TRY_ASSIGN(const auto host, session.target_host());
+  PLCHOST_TRY_ASSIGN(const auto all, (session.client().value()->*snapshot)(host, session.deadline()));
   std::vector<std::string> names;
-  for (const Sample& sample : *all) {
+  for (const Sample& sample : all) {
     names.push_back(name_of(sample));
     if (names.back() == name) return sample;
   }
-  return unknown_name(what, name, names, *host);
+  return unknown_name(what, name, names, host);
 }
 
 // No time as a number, and nothing where there is no process.
@@ -59,9 +57,8 @@ Row for_people(Row row) {
 /// The number of the version that is loaded; null: it was not sent, but is another file of the host.
 Result<Row> loaded_version(CliSession& session, const plc_InstanceStatus& instance) {
   const std::string host(dds::text_of(instance.host));
-  const auto kept = session.client().value()->applications(host, session.deadline());
-  if (!kept) return std::unexpected(kept.error());
-  for (const plc_ApplicationStatus& application : *kept) {
+  PLCHOST_TRY_ASSIGN(const auto kept, session.client().value()->applications(host, session.deadline()));
+  for (const plc_ApplicationStatus& application : kept) {
     const bool is_loaded = dds::text_of(application.instance) == dds::text_of(instance.instance) &&
                            dds::text_of(application.path) == dds::text_of(instance.loaded);
     if (is_loaded && application.version > 0) return Row(application.version);

@@ -34,10 +34,9 @@ struct Wanted {
 };
 
 Result<Wanted> wanted(CliSession& session, const TransitionArguments& arguments) {
-  auto hosts = session.shown_hosts();
-  if (!hosts) return std::unexpected(std::move(hosts).error());
+  PLCHOST_TRY_ASSIGN(auto hosts, session.shown_hosts());
   const HostSelection& selection = session.options.hosts;
-  return Wanted{.hosts = *std::move(hosts),
+  return Wanted{.hosts = std::move(hosts),
                 .of_others = selection.host.empty() && selection.labels.empty(),
                 .instance = arguments.instance};
 }
@@ -53,24 +52,21 @@ Result<bool> has_all(ControlClient& client, const std::vector<HostView>& hosts, 
 
 // All that the hosts have told of, and what came meanwhile.
 Result<std::vector<plc_Transition>> collect(CliSession& session, const TransitionArguments& arguments) {
-  const auto is_wanted = wanted(session, arguments);
-  if (!is_wanted) return std::unexpected(is_wanted.error());
+  PLCHOST_TRY_ASSIGN(const auto is_wanted, wanted(session, arguments));
   ControlClient& client = *session.client().value();
   const TimePoint deadline = session.deadline();
   std::vector<plc_Transition> found;
   for (;;) {
-    const auto complete = has_all(client, is_wanted->hosts, deadline);
-    if (!complete) return std::unexpected(complete.error());
-    if (*complete) return found;
+    PLCHOST_TRY_ASSIGN(const auto complete, has_all(client, is_wanted.hosts, deadline));
+    if (complete) return found;
     if (MonotonicClock::now() >= deadline) {
       return failure(ErrorCode::timed_out, "the changes of state have not come completely");
     }
-    const auto news = client.transitions();
-    if (!news) return std::unexpected(news.error());
-    for (const TransitionView& view : *news) {
-      if ((*is_wanted)(view.sample)) found.push_back(view.sample);
+    PLCHOST_TRY_ASSIGN(const auto news, client.transitions());
+    for (const TransitionView& view : news) {
+      if (is_wanted(view.sample)) found.push_back(view.sample);
     }
-    if (news->empty()) client.wait_for_change(deadline);
+    if (news.empty()) client.wait_for_change(deadline);
   }
 }
 

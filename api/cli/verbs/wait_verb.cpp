@@ -33,10 +33,9 @@ struct Awaited {
 /// Takes those away that have the state by now. Whether all that were named are there.
 Result<void> look(CliSession& session, const std::string& host, const std::string& state,
                   std::vector<Awaited>& awaited) {
-  const auto samples = session.client().value()->instances(host, session.deadline());
-  if (!samples) return std::unexpected(samples.error());
+  PLCHOST_TRY_ASSIGN(const auto samples, session.client().value()->instances(host, session.deadline()));
   std::vector<std::string> known;
-  for (const plc_InstanceStatus& sample : *samples) {
+  for (const plc_InstanceStatus& sample : samples) {
     known.emplace_back(dds::text_of(sample.instance));
     const auto one = std::ranges::find(awaited, known.back(), &Awaited::name);
     if (one == awaited.end()) continue;
@@ -66,15 +65,13 @@ Result<std::string> host_until(CliSession& session, TimePoint end) {
 }
 
 Result<void> wait_until(CliSession& session, const WaitArguments& arguments, TimePoint end) {
-  const auto host = host_until(session, end);
-  if (!host) return std::unexpected(host.error());
-  const auto instances = expand(session, arguments.names);
-  if (!instances) return std::unexpected(instances.error());
+  PLCHOST_TRY_ASSIGN(const auto host, host_until(session, end));
+  PLCHOST_TRY_ASSIGN(const auto instances, expand(session, arguments.names));
   std::vector<Awaited> awaited;
-  for (const NamedInstance& one : *instances)
+  for (const NamedInstance& one : instances)
     awaited.push_back({.name = one.name, .state = {}, .problem = {}});
   for (;;) {
-    const auto looked = look(session, *host, arguments.state, awaited);
+    const auto looked = look(session, host, arguments.state, awaited);
     const TimePoint now = MonotonicClock::now();
     const bool over = now >= end || interrupted();
     if (!looked && (over || !may_come(looked.error()))) return looked;

@@ -109,10 +109,8 @@ Result<ControlRequest> check_request(const plc_Request& request, ApiRole role, s
   PLCHOST_TRY(check_instance(*operation, instance, host, instances));
   const auto argument = dds::text_of(request.argument);
   PLCHOST_TRY(check_argument(*operation, argument));
-  auto options = check_options(*operation, request);
-  if (!options) return std::unexpected(std::move(options).error());
-  return ControlRequest{0, operation->verb, std::string(instance), std::string(argument),
-                        *std::move(options)};
+  PLCHOST_TRY_ASSIGN(auto options, check_options(*operation, request));
+  return ControlRequest{0, operation->verb, std::string(instance), std::string(argument), std::move(options)};
 }
 
 bool only_reads(std::int32_t operation) noexcept {

@@ -52,13 +52,12 @@ Result<void> DownloadTable::check_room(const std::string& instance, std::uint64_
 
 Result<void> DownloadTable::begin(const dds::Guid& client, const plc_SampleIdentity& identity,
                                   ControlRequest request, TimePoint now) {
-  const auto order = ApplicationOrder::from_options(request.options);
-  if (!order) return std::unexpected(order.error());
-  if (auto room = check_room(request.instance, order->size); !room) return room;
+  PLCHOST_TRY_ASSIGN(const auto order, ApplicationOrder::from_options(request.options));
+  if (auto room = check_room(request.instance, order.size); !room) return room;
   Download download{.client = client,
                     .identity = identity,
                     .request = std::move(request),
-                    .size = order->size,
+                    .size = order.size,
                     .received = 0,
                     .path = download_file_name(pool_, ++last_file_),
                     .file = {},

@@ -57,13 +57,12 @@ Result<Asked> look(const std::string& pool, const std::string& base, const NodeQ
 }  // namespace
 
 Result<NodeListing> NodeLister::nodes(const NodeQuery& query) const {
-  auto asked = look(pool_, query.base.empty() ? base_ : query.base, query);
-  if (!asked) return std::unexpected(std::move(asked).error());
-  for (const NodeInfo& node : asked->nodes) {
+  PLCHOST_TRY_ASSIGN(auto asked, look(pool_, query.base.empty() ? base_ : query.base, query));
+  for (const NodeInfo& node : asked.nodes) {
     auto owner = owner_of_thread(static_cast<std::uint32_t>(node.record.pid));
-    asked->listing.nodes.push_back({.info = node, .program = owner ? std::move(owner->program) : ""});
+    asked.listing.nodes.push_back({.info = node, .program = owner ? std::move(owner->program) : ""});
   }
-  return std::move(asked->listing);
+  return std::move(asked.listing);
 }
 
 Result<NodeListing> NodeLister::routes(const NodeQuery& query, TimePoint until) const {

@@ -49,9 +49,7 @@ Result<void> ObjectLister::look() {
   const TimePoint begin = MonotonicClock::now();
   wanted_ = begin;
   if (begin < seen_until_) return {};
-  auto seen = pool_->list();
-  if (!seen) return std::unexpected(std::move(seen).error());
-  seen_ = *std::move(seen);
+  PLCHOST_TRY_ASSIGN(seen_, pool_->list());
   std::ranges::sort(seen_, {}, &ObjectInfo::name);
   const TimePoint end = MonotonicClock::now();
   seen_until_ = end + kLookShare * (end - begin);

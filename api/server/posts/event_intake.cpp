@@ -247,10 +247,9 @@ Result<void> EventIntake::try_post(const plc_EventPost& post, LedgerEntry& entry
   const auto instance = text_of(post.instance);
   const auto event = text_of(post.event);
   if (auto good = check_names(instance, event); !good) return good;
-  const auto found = find(instance, event, targets != nullptr);
-  if (!found) return std::unexpected(found.error());
+  PLCHOST_TRY_ASSIGN(const auto found, find(instance, event, targets != nullptr));
   const auto made =
-      ledger_.post(entry, *found, PostLedger::Allowed::registered, [&](const CountedEvent::Snapshot& seen) {
+      ledger_.post(entry, found, PostLedger::Allowed::registered, [&](const CountedEvent::Snapshot& seen) {
         SourceState after = done_with(state, post.sequence_number);
         ++after.counters.accepted;
         if (!seen.taken()) ++after.counters.no_task;
@@ -267,7 +266,7 @@ Result<void> EventIntake::try_post(const plc_EventPost& post, LedgerEntry& entry
                         .event = std::string(event),
                         .count = made->count(),
                         .taken = made->taken(),
-                        .handle = *found});
+                        .handle = found});
   }
   return {};
 }

@@ -19,9 +19,8 @@ template <class Sample>
 [[nodiscard]] Result<StatusTable<Sample>> open_table(dds_entity_t participant, dds_entity_t publisher,
                                                      const StatusSource& source) {
   constexpr const dds::TopicInfo& kTopic = dds::kTopicOf<Sample>;
-  auto way = dds::open_writer(participant, publisher, kTopic);
-  if (!way) return std::unexpected(std::move(way).error());
-  return StatusTable<Sample>(source, *std::move(way));
+  PLCHOST_TRY_ASSIGN(auto way, dds::open_writer(participant, publisher, kTopic));
+  return StatusTable<Sample>(source, std::move(way));
 }
 
 /// The tables of all status topics that HostStatus counts: those of control.idl. Stays where it is made.

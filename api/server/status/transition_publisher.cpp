@@ -15,9 +15,8 @@ constexpr Duration kRingRetry = std::chrono::milliseconds(100);
 
 Result<TransitionPublisher> TransitionPublisher::create(dds_entity_t participant, dds_entity_t publisher,
                                                         Source source) {
-  auto way = dds::open_writer(participant, publisher, dds::kTransition);
-  if (!way) return std::unexpected(std::move(way).error());
-  return TransitionPublisher(std::move(source), *std::move(way));
+  PLCHOST_TRY_ASSIGN(auto way, dds::open_writer(participant, publisher, dds::kTransition));
+  return TransitionPublisher(std::move(source), std::move(way));
 }
 
 std::uint64_t TransitionPublisher::publish(const std::string& instance, TimePoint now) {

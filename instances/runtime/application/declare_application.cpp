@@ -46,9 +46,7 @@ Result<StartSettings> read_start_settings(const LaunchOptions& launch) {
   StartSettings start;
   PLCHOST_TRY(read_settings_of(launch, start));
   if (!start.settings.device_description.empty()) {
-    auto device = read_device_description(start.settings.device_description);
-    if (!device) return std::unexpected(std::move(device).error());
-    start.device = *std::move(device);
+    PLCHOST_TRY_ASSIGN(start.device, read_device_description(start.settings.device_description));
   }
   return start;
 }

@@ -149,22 +149,19 @@ std::optional<unsigned> read_version(ElfBytes file, ElfBytes segments, const Elf
 }  // namespace
 
 Result<void> check_elf(ElfBytes file, std::span<const std::string_view> symbols) {
-  const auto header = check_header(file);
-  if (!header) return std::unexpected(header.error());
-  const auto tables = find_tables(file, *header);
-  if (!tables) return std::unexpected(tables.error());
-  const auto exported = find_symbols(file, tables->sections);
-  if (!exported) return std::unexpected(exported.error());
+  PLCHOST_TRY_ASSIGN(const auto header, check_header(file));
+  PLCHOST_TRY_ASSIGN(const auto tables, find_tables(file, header));
+  PLCHOST_TRY_ASSIGN(const auto exported, find_symbols(file, tables.sections));
 
   std::vector<std::string_view> missing;
   std::ranges::copy_if(symbols, std::back_inserter(missing),
-                       [&](std::string_view symbol) { return !find_export(*exported, symbol); });
-  const auto version_symbol = find_export(*exported, kAbiSymbol);
+                       [&](std::string_view symbol) { return !find_export(exported, symbol); });
+  const auto version_symbol = find_export(exported, kAbiSymbol);
   if (!version_symbol) missing.push_back(kAbiSymbol);
   if (!missing.empty() || !version_symbol) {
     return invalid_program(fmt::format("does not export {}; see plc_app.h", join_names(missing)));
   }
-  const auto version = read_version(file, tables->segments, *version_symbol);
+  const auto version = read_version(file, tables.segments, *version_symbol);
   if (!version || *version != PLC_APP_ABI_VERSION) {
     return failure(ErrorCode::unsupported,
                    fmt::format("is built against version {} of plc_app.h; this runtime has version {}: build "
@@ -200,16 +197,13 @@ Result<std::vector<std::byte>> read_program(const std::string& path) {
 }
 
 Result<void> check_elf_can_leave(ElfBytes file) {
-  const auto header = check_header(file);
-  if (!header) return std::unexpected(header.error());
-  const auto tables = find_tables(file, *header);
-  if (!tables) return std::unexpected(tables.error());
-  const auto exported = find_symbols(file, tables->sections);
-  if (!exported) return std::unexpected(exported.error());
-  for (std::uint64_t i = 0; const auto symbol = elf_item<Elf64_Sym>(exported->entries, i); ++i) {
+  PLCHOST_TRY_ASSIGN(const auto header, check_header(file));
+  PLCHOST_TRY_ASSIGN(const auto tables, find_tables(file, header));
+  PLCHOST_TRY_ASSIGN(const auto exported, find_symbols(file, tables.sections));
+  for (std::uint64_t i = 0; const auto symbol = elf_item<Elf64_Sym>(exported.entries, i); ++i) {
     if (symbol->st_shndx == SHN_UNDEF || ELF64_ST_BIND(symbol->st_info) != STB_GNU_UNIQUE) continue;
     const ElfBytes rest =
-        exported->names.subspan(std::min<std::size_t>(symbol->st_name, exported->names.size()));
+        exported.names.subspan(std::min<std::size_t>(symbol->st_name, exported.names.size()));
     const auto* const name = reinterpret_cast<const char*>(rest.data());
     return failure(ErrorCode::unsupported,
                    fmt::format("has symbols that exist once in a process ('{}'), so that it would share them "

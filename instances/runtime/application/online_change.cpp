@@ -38,10 +38,9 @@ Result<std::unique_ptr<OnlineChange>> OnlineChange::prepare(const std::string& p
                                                             const StartSettings& start, Application& running,
                                                             ApplicationHost& host) {
   const TimePoint begin = MonotonicClock::now();
-  auto next = declare_application(path, start, host);
-  if (!next) return std::unexpected(std::move(next).error());
+  PLCHOST_TRY_ASSIGN(auto next, declare_application(path, start, host));
   // From here on its destructor ends the new version.
-  std::unique_ptr<OnlineChange> change(new OnlineChange(running, *std::move(next), host));
+  std::unique_ptr<OnlineChange> change(new OnlineChange(running, std::move(next), host));
   if (const Duration took = MonotonicClock::now() - begin; took > kLongestSetup) {
     return failure(ErrorCode::timed_out,
                    fmt::format("{} cannot take over online: its set-up took {:.1f} s, allowed are {:.0f} s; "

@@ -76,9 +76,8 @@ Result<RTS_HANDLE> BlockService::open_channel(std::string_view name) {
   PLCHOST_TRY(join());
   Channel& place = channels_[count];
   if (node_) {
-    auto channel = BlockChannel::open(*node_, name);
-    if (!channel) return std::unexpected(std::move(channel).error());
-    place.channel.emplace(*std::move(channel));
+    PLCHOST_TRY_ASSIGN(auto channel, BlockChannel::open(*node_, name));
+    place.channel.emplace(std::move(channel));
   }
   place.name = name;
   channel_count_.store(count + 1, std::memory_order_release);

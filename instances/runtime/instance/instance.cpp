@@ -96,9 +96,7 @@ Instance::~Instance() {
 }
 
 Result<std::string> Instance::bind_core() {
-  auto granted = bind_to_cores(options_.launch.cores);
-  if (!granted) return std::unexpected(std::move(granted).error());
-  cores_ = *std::move(granted);
+  PLCHOST_TRY_ASSIGN(cores_, bind_to_cores(options_.launch.cores));
   return {};
 }
 
@@ -108,9 +106,7 @@ Result<std::string> Instance::lock_memory() {
 }
 
 Result<std::string> Instance::read_settings_file() {
-  auto start = read_start_settings(options_.launch);
-  if (!start) return std::unexpected(std::move(start).error());
-  start_ = *std::move(start);
+  PLCHOST_TRY_ASSIGN(start_, read_start_settings(options_.launch));
   log_what_is_left_alone(start_.settings);
   choose_scheduler();
   return hold_idle_states();
@@ -131,9 +127,7 @@ void Instance::choose_scheduler() {
 }
 
 Result<std::string> Instance::attach_pool() {
-  auto claim = claim_name(options_.launch);
-  if (!claim) return std::unexpected(std::move(claim).error());
-  name_claim_ = *std::move(claim);
+  PLCHOST_TRY_ASSIGN(name_claim_, claim_name(options_.launch));
   // Of a manager's instance the manager has made sure whose the pool is, and its owner can be a third user.
   const bool managed = options_.launch.report_fd >= 0;
   auto pool = managed ? ObjectPool::attach(options_.launch.pool) : ObjectPool::create(options_.launch.pool);
@@ -192,16 +186,14 @@ Result<void> Instance::restore_operator_events() {
 }
 
 Result<std::string> Instance::load_components() {
-  auto loaded = plchost::load_components(start_.settings, ComponentHooks::init, components_, *host_);
-  if (!loaded) return std::unexpected(std::move(loaded).error());
+  PLCHOST_TRY(plchost::load_components(start_.settings, ComponentHooks::init, components_, *host_));
   return {};
 }
 
 Result<std::string> Instance::load_application() {
   if (options_.launch.application.empty()) return "no application is given: there is nothing to run";
-  auto declared = declare_application(options_.launch.application, start_, *host_);
-  if (!declared) return std::unexpected(std::move(declared).error());
-  auto& [application, declaration] = *declared;
+  PLCHOST_TRY_ASSIGN(auto declared, declare_application(options_.launch.application, start_, *host_));
+  auto& [application, declaration] = declared;
   application_.emplace(std::move(application));
   PLCHOST_TRY(host_->reserve(declaration));
   auto remark =
@@ -216,13 +208,11 @@ Result<std::string> Instance::make_status_page() {
   if (application_) {
     for (const TaskConfig& task : application_->tasks()) identities.push_back(identity_of(task));
   }
-  auto page = InstancePage::create(options_.launch.pool, options_.launch.name, identities,
-                                   start_.settings.fine_tasks);
-  if (!page) return std::unexpected(std::move(page).error());
-  page_.emplace(*std::move(page));
-  auto transitions = TransitionRing::open(options_.launch.pool, options_.launch.name);
-  if (!transitions) return std::unexpected(std::move(transitions).error());
-  transitions_.emplace(*std::move(transitions));
+  PLCHOST_TRY_ASSIGN(auto page, InstancePage::create(options_.launch.pool, options_.launch.name, identities,
+                                                     start_.settings.fine_tasks));
+  page_.emplace(std::move(page));
+  PLCHOST_TRY_ASSIGN(auto transitions, TransitionRing::open(options_.launch.pool, options_.launch.name));
+  transitions_.emplace(std::move(transitions));
   return {};
 }
 
@@ -248,9 +238,8 @@ Result<std::string> Instance::make_tasks() {
       .to_park = [this](std::size_t index) { unbind(index); },
       .catch_faults = true,
   };
-  auto tasks = TaskSet::create(clock_, options_.band, application_->tasks(), std::move(environment));
-  if (!tasks) return std::unexpected(std::move(tasks).error());
-  tasks_ = *std::move(tasks);
+  PLCHOST_TRY_ASSIGN(tasks_,
+                     TaskSet::create(clock_, options_.band, application_->tasks(), std::move(environment)));
   host_->task_table().attach(tasks_.get());
   if (const std::string& reference = start_.settings.scheduler.distributed_clock.reference;
       !reference.empty()) {
@@ -269,12 +258,11 @@ Result<std::string> Instance::make_tasks() {
 Result<std::string> Instance::start_scheduler() {
   const bool runs = tasks_ && !options_.launch.stopped;
   if (runs) {
-    if (auto fits = tasks_->check(scheduler_, start_.settings.scheduler); !fits)
-      return std::unexpected(std::move(fits).error());
+    PLCHOST_TRY(tasks_->check(scheduler_, start_.settings.scheduler));
   }
   // A start that has failed until here leaves the memories of the pool and the retain values as they were.
   // Not later: a task that aborts with the lock of the heap would hold it up.
-  if (auto kept = host_->areas().keep(); !kept) return std::unexpected(std::move(kept).error());
+  PLCHOST_TRY(host_->areas().keep());
   if (!runs) return {};
   return start("start of the process");
 }

@@ -54,14 +54,13 @@ class MoreDescriptors {
 }  // namespace
 
 Result<InstanceSocket> InstanceSocket::listen(const std::string& path, Handler handler) {
-  auto listener = PacketListener::listen(path);
-  if (!listener) return std::unexpected(listener.error());
+  PLCHOST_TRY_ASSIGN(auto listener, PacketListener::listen(path));
   reserve_descriptors();
   UniqueFd epoll(::epoll_create1(EPOLL_CLOEXEC));
   if (!epoll) return failure(ErrorCode::system, "epoll_create1", errno);
   // Told once for each new connection: one that cannot be taken must not keep the control thread awake.
-  PLCHOST_TRY(watch(epoll, listener->fd(), EPOLLIN | EPOLLET));
-  return InstanceSocket(*std::move(listener), std::move(epoll), std::move(handler));
+  PLCHOST_TRY(watch(epoll, listener.fd(), EPOLLIN | EPOLLET));
+  return InstanceSocket(std::move(listener), std::move(epoll), std::move(handler));
 }
 
 Result<std::optional<PacketSocket>> InstanceSocket::accept() {

@@ -136,14 +136,13 @@ Result<AreaMemory> AreaMemory::of_process(std::size_t bytes) {
 }
 
 Result<AreaMemory> AreaMemory::of_device(const AreaSettings& settings) {
-  const auto fd = open_device(settings);
-  if (!fd) return std::unexpected(fd.error());
+  PLCHOST_TRY_ASSIGN(const auto fd, open_device(settings));
   // Memory 0 of an uio device is mapped from its beginning, whatever is wanted of it.
   const bool uio = settings.device.starts_with("/dev/uio");
   const auto page = static_cast<std::uint64_t>(::sysconf(_SC_PAGESIZE));
   const std::uint64_t begin = uio ? 0 : settings.address / page * page;
   const std::uint64_t size = settings.address + settings.size - begin;
-  void* const address = ::mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, fd->get(),
+  void* const address = ::mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_POPULATE, fd.get(),
                                static_cast<off_t>(begin));
   if (address == MAP_FAILED) return not_mapped(settings, "cannot be mapped", errno);
   AreaMemory memory;
@@ -158,21 +157,18 @@ Result<AreaMemory> AreaMemory::of_device(const AreaSettings& settings) {
 
 Result<AreaMemory> AreaMemory::of_pool(ObjectPool& pool, const std::string& name, std::size_t bytes,
                                        std::span<const std::byte> contents, bool exclusive) {
-  auto created = pool.create_memory(name, bytes, {.keep = true}, contents);
-  if (!created) return std::unexpected(std::move(created).error());
+  PLCHOST_TRY_ASSIGN(auto created, pool.create_memory(name, bytes, {.keep = true}, contents));
   AreaMemory memory;
-  memory.existed_ = !created->made;
-  if (created->made) memory.made_ = MadeInPool(pool, name);
-  memory.shared_ = std::move(created->object);
+  memory.existed_ = !created.made;
+  if (created.made) memory.made_ = MadeInPool(pool, name);
+  memory.shared_ = std::move(created.object);
   memory.bytes_ = memory.shared_.bytes();
   if (!memory.shared_.guarded()) {
     return failure(ErrorCode::full, fmt::format("shared memory '{}': more than {} memories of others", name,
                                                 MemoryGuard::kMost));
   }
   if (exclusive) {
-    auto lock = lock_file_of(pool_memory_name(pool.name(), name));
-    if (!lock) return std::unexpected(std::move(lock).error());
-    memory.lock_ = *std::move(lock);
+    PLCHOST_TRY_ASSIGN(memory.lock_, lock_file_of(pool_memory_name(pool.name(), name)));
   }
   return memory;
 }

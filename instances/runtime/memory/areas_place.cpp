@@ -81,10 +81,10 @@ Result<void> check_memory(const Areas::Environment& environment, const AreaSetti
 // The old memory goes only when the new one is whole, so both need their bytes.
 Result<void> check_retain(const Areas::Environment& environment, const RetainImage& retain) {
   const std::string pool = environment.pool == nullptr ? std::string() : environment.pool->name();
-  const auto fresh = RetainKeeper::check(pool, environment.instance, retain, environment.retain);
-  if (!fresh) return std::unexpected(fresh.error());
-  if (*fresh == 0 || environment.room == nullptr) return {};
-  auto room = environment.room->take_memory(retain_memory_name(environment.instance), *fresh);
+  PLCHOST_TRY_ASSIGN(const auto fresh,
+                     RetainKeeper::check(pool, environment.instance, retain, environment.retain));
+  if (fresh == 0 || environment.room == nullptr) return {};
+  auto room = environment.room->take_memory(retain_memory_name(environment.instance), fresh);
   return room ? room : failure_in("retain variables", std::move(room).error());
 }
 
@@ -136,14 +136,13 @@ Result<void> check_distinct(const Areas::Environment& environment, const AreaPla
 
 Result<void> Areas::check(const Environment& environment, std::span<const DeclaredArea> areas) {
   if (areas.empty()) return {};
-  const auto plan = plan_areas(areas, environment.settings);
-  if (!plan) return std::unexpected(plan.error());
-  for (const AreaBlock& planned : plan->blocks) {
+  PLCHOST_TRY_ASSIGN(const auto plan, plan_areas(areas, environment.settings));
+  for (const AreaBlock& planned : plan.blocks) {
     if (planned.settings == nullptr) continue;
     if (auto good = check_memory(environment, *planned.settings, areas[planned.areas.front()]); !good)
       return good;
   }
-  if (auto distinct = check_distinct(environment, *plan, areas); !distinct) return distinct;
+  if (auto distinct = check_distinct(environment, plan, areas); !distinct) return distinct;
   const RetainImage retain = retain_image(environment.application, areas);
   if (retain.layout.areas.empty()) return {};
   if (auto good = check_retain_bytes(retain.layout.bytes); !good) return good;
@@ -159,9 +158,7 @@ Result<std::string> Areas::place(const Environment& environment, std::vector<Dec
     return std::string();
   }
   for (const TaskConfig& task : tasks) tasks_.push_back(task.name);
-  auto plan = plan_areas(declared_, environment.settings);
-  if (!plan) return std::unexpected(std::move(plan).error());
-  plan_ = *std::move(plan);
+  PLCHOST_TRY_ASSIGN(plan_, plan_areas(declared_, environment.settings));
   cycles_.resize(tasks.size());
   plain_.resize(declared_.size(), nullptr);
   // All steps that can fail come before anything is written that others see.
@@ -251,9 +248,8 @@ Result<void> Areas::make_keeper(const Environment& environment) {
   const RetainImage initial = retain_image(environment.application, declared_);
   if (initial.layout.areas.empty()) return {};
   retain_ = initial.layout;
-  auto keeper = RetainKeeper::make(*environment.pool, environment.instance, initial, environment.retain);
-  if (!keeper) return std::unexpected(std::move(keeper).error());
-  keeper_ = *std::move(keeper);
+  PLCHOST_TRY_ASSIGN(
+      keeper_, RetainKeeper::make(*environment.pool, environment.instance, initial, environment.retain));
   return {};
 }
 

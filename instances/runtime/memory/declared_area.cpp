@@ -120,9 +120,8 @@ Result<DeclaredArea> from_declaration(const Plc_Area& area) {
         name, fmt::format("nUses is {}, pUses must point to as many, at most {}", area.nUses, PLC_MAX_TASKS));
   }
   for (unsigned i = 0; i < area.nUses; ++i) {
-    auto use = from_use(taken, area.pUses[i]);
-    if (!use) return std::unexpected(use.error());
-    taken.uses.push_back(*std::move(use));
+    PLCHOST_TRY_ASSIGN(auto use, from_use(taken, area.pUses[i]));
+    taken.uses.push_back(std::move(use));
   }
   taken.initial.assign(area.dwBytes, std::byte{0});
   if (area.pInitial != nullptr) {

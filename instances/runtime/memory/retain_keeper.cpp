@@ -52,9 +52,8 @@ struct RetainKeeper::Start {
           "state_directory of the manager)");
       return {};
     }
-    auto opened = RetainFiles::open(options.directory, instance);
-    if (!opened) return std::unexpected(std::move(opened).error());
-    files.emplace(*std::move(opened));
+    PLCHOST_TRY_ASSIGN(auto opened, RetainFiles::open(options.directory, instance));
+    files.emplace(std::move(opened));
     return {};
   }
 
@@ -161,9 +160,7 @@ Result<std::unique_ptr<RetainKeeper>> RetainKeeper::make(ObjectPool& pool, const
 Result<void> RetainKeeper::start() {
   // The thread waits: the steps that can fail come before those that change anything.
   if (files_) {
-    auto thread = Thread::start("retain", {}, [this] { run(); });
-    if (!thread) return std::unexpected(std::move(thread).error());
-    thread_ = *std::move(thread);
+    PLCHOST_TRY_ASSIGN(thread_, Thread::start("retain", {}, [this] { run(); }));
   }
   // Before the memory of then is replaced: a start after a kill finds nothing to put aside.
   if (aside_ && files_) files_->put_aside();

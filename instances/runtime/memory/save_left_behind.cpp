@@ -14,9 +14,8 @@ namespace {
 
 Result<std::string> directory_of(const LaunchOptions& launch) {
   if (launch.settings.empty()) return launch.state_directory;
-  const auto settings = read_settings(launch.settings);
-  if (!settings) return std::unexpected(settings.error());
-  const std::string& own = settings->retain.directory;
+  PLCHOST_TRY_ASSIGN(const auto settings, read_settings(launch.settings));
+  const std::string& own = settings.retain.directory;
   return own.empty() ? launch.state_directory : own;
 }
 
@@ -32,12 +31,10 @@ Result<void> save_left_behind(const LaunchOptions& launch) {
     return {};
   }
   if (!left) return std::unexpected(left.error());
-  const auto directory = directory_of(launch);
-  if (!directory) return std::unexpected(directory.error());
-  if (directory->empty()) return failure(ErrorCode::not_found, "no folder for retain variables is given");
-  auto files = RetainFiles::open(*directory, launch.name);
-  if (!files) return std::unexpected(files.error());
-  const auto found = files->read();
+  PLCHOST_TRY_ASSIGN(const auto directory, directory_of(launch));
+  if (directory.empty()) return failure(ErrorCode::not_found, "no folder for retain variables is given");
+  PLCHOST_TRY_ASSIGN(auto files, RetainFiles::open(directory, launch.name));
+  const auto found = files.read();
   RetainImage& image = left->image;
   if (found.newest) {
     const bool newer = found.newest->generation > image.generation;
@@ -48,7 +45,7 @@ Result<void> save_left_behind(const LaunchOptions& launch) {
   }
   ++image.generation;
   image.unix_ns = unix_time_ns();
-  return files->write(image);
+  return files.write(image);
 }
 
 }  // namespace plchost

@@ -133,14 +133,12 @@ Result<DeviceDescription> parse_device_description(std::string_view text, std::s
   for (const std::string_view name : {"Device", "ExtendedSettings", "TargetSettings"})
     at = child_called(at, name);
   const xml_node section = child_called(at, "section", "taskconfiguration");
-  const auto supported = supports_external(child_called(section, "setting", "supportexternal"), place);
-  if (!supported) return std::unexpected(supported.error());
-  DeviceDescription device{.supports_external = *supported, .events = {}};
+  PLCHOST_TRY_ASSIGN(const auto supported,
+                     supports_external(child_called(section, "setting", "supportexternal"), place));
+  DeviceDescription device{.supports_external = supported, .events = {}};
   const xml_node setting = child_called(section, "setting", "externalevents");
   if (!device.supports_external || !setting) return device;
-  auto events = events_of(child_called(setting, "value"), place);
-  if (!events) return std::unexpected(std::move(events).error());
-  device.events = *std::move(events);
+  PLCHOST_TRY_ASSIGN(device.events, events_of(child_called(setting, "value"), place));
   return device;
 }
 

@@ -22,15 +22,13 @@ class FileWalk {
   explicit FileWalk(SettingsSource& source) noexcept : source_(source) {}
 
   Result<void> read(const std::string& file) {
-    const auto text = source_.text(file);
-    if (!text) return std::unexpected(text.error());
+    PLCHOST_TRY_ASSIGN(const auto text, source_.text(file));
     const fs::path folder = fs::absolute(file).parent_path();
-    const auto references = parser_.read(*text, file, folder);
-    if (!references) return std::unexpected(references.error());
+    PLCHOST_TRY_ASSIGN(const auto references, parser_.read(text, file, folder));
     const fs::path self = source_.identity(file).value_or("");
     chain_.push_back(self);
     read_.insert(self);
-    for (const FileReference& reference : *references) {
+    for (const FileReference& reference : references) {
       if (auto followed = follow(reference, folder); !followed) return followed;
     }
     chain_.pop_back();

@@ -182,16 +182,15 @@ Result<std::vector<AreaSettings>> check_areas(const std::map<std::size_t, AreaDr
       return bad(number, area,
                  fmt::format("there is no Area.{}; areas are numbered 0, 1, 2 without a gap", areas.size()));
     }
-    auto checked = check_area(number, area);
-    if (!checked) return std::unexpected(std::move(checked).error());
+    PLCHOST_TRY_ASSIGN(auto checked, check_area(number, area));
     const auto other =
-        std::ranges::find_if(areas, [&](const AreaSettings& before) { return overlap(before, *checked); });
+        std::ranges::find_if(areas, [&](const AreaSettings& before) { return overlap(before, checked); });
     if (other != areas.end()) {
       return bad(number, area,
                  fmt::format("overlaps with Area.{} of {}; each needs bytes of its own in {}", other->number,
                              other->where, other->object.empty() ? other->device : other->object));
     }
-    areas.push_back(*std::move(checked));
+    areas.push_back(std::move(checked));
   }
   return areas;
 }

@@ -29,9 +29,8 @@ Result<std::vector<CoreLatencyHold>> hold_each(const std::vector<int>& cores,
   }
   std::vector<CoreLatencyHold> holds;
   for (const int core : cores) {
-    auto hold = CoreLatencyHold::take(sysfs, run_directory, core);
-    if (!hold) return std::unexpected(hold.error());
-    holds.push_back(*std::move(hold));
+    PLCHOST_TRY_ASSIGN(auto hold, CoreLatencyHold::take(sysfs, run_directory, core));
+    holds.push_back(std::move(hold));
   }
   return holds;
 }

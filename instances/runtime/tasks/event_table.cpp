@@ -42,9 +42,8 @@ EventTable::Slot* EventTable::find(RTS_HANDLE handle) const noexcept {
 
 Result<void> EventTable::attach(Slot& slot) {
   if (pool_ == nullptr) return room_ ? room_->take(slot.object) : Result<void>();
-  const auto event = pool_->create_event(slot.object);
-  if (!event) return std::unexpected(event.error());
-  slot.events.push_back(std::make_unique<PoolEvent>(*event));
+  PLCHOST_TRY_ASSIGN(const auto event, pool_->create_event(slot.object));
+  slot.events.push_back(std::make_unique<PoolEvent>(event));
   slot.event.store(slot.events.back().get(), std::memory_order_release);  // pairs with the acquire in post()
   return {};
 }
@@ -78,9 +77,8 @@ Result<RTS_HANDLE> EventTable::open(std::string_view name) {
 }
 
 Result<EventTable::Slot*> EventTable::open_own(std::string_view event) {
-  const auto handle = open(event);
-  if (!handle) return std::unexpected(handle.error());
-  Slot* const slot = find(*handle);
+  PLCHOST_TRY_ASSIGN(const auto handle, open(event));
+  Slot* const slot = find(handle);
   if (slot->own) return slot;
   return failure(ErrorCode::invalid_argument,
                  fmt::format("external event '{}' belongs to another instance than '{}'", event, instance_));
@@ -143,21 +141,19 @@ Result<void> EventTable::unregister_by_application(RTS_HANDLE handle) {
 }
 
 Result<void> EventTable::register_by_device(std::string_view event) {
-  const auto slot = open_own(event);
-  if (!slot) return std::unexpected(slot.error());
-  (*slot)->by_device = true;
-  return publish_registered(**slot);
+  PLCHOST_TRY_ASSIGN(const auto slot, open_own(event));
+  slot->by_device = true;
+  return publish_registered(*slot);
 }
 
 Result<void> EventTable::register_by_operator(std::string_view event) {
-  const auto slot = open_own(event);
-  if (!slot) return std::unexpected(slot.error());
-  if ((*slot)->registered()) {
+  PLCHOST_TRY_ASSIGN(const auto slot, open_own(event));
+  if (slot->registered()) {
     return failure(ErrorCode::already_exists,
                    fmt::format("external event '{}' is registered already", event));
   }
-  (*slot)->by_operator = true;
-  return publish_registered(**slot);
+  slot->by_operator = true;
+  return publish_registered(*slot);
 }
 
 Result<void> EventTable::unregister_by_operator(std::string_view event) {

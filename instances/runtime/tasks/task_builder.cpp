@@ -66,10 +66,9 @@ Result<void> fill_kind(const Task_Info& task, const std::shared_ptr<TaskCode>& c
     };
   }
   if (kind.names_event) {
-    const auto event = field_text(task.stExternalEvent, "stExternalEvent");
-    if (!event) return std::unexpected(event.error());
-    config.external_event = *event;
-    return check_name("stExternalEvent", *event, kMaxEventName);
+    PLCHOST_TRY_ASSIGN(const auto event, field_text(task.stExternalEvent, "stExternalEvent"));
+    config.external_event = event;
+    return check_name("stExternalEvent", event, kMaxEventName);
   }
   return {};
 }

@@ -143,11 +143,9 @@ struct Clocks {
 
 template <class Find>
 Result<Clocks> find_both(const SysTimeSettings& settings, Find find) {
-  auto us = find(settings.get_us);
-  if (!us) return std::unexpected(std::move(us).error());
-  auto ns = find(settings.get_ns);
-  if (!ns) return std::unexpected(std::move(ns).error());
-  return Clocks{*std::move(us), *std::move(ns)};
+  PLCHOST_TRY_ASSIGN(auto us, find(settings.get_us));
+  PLCHOST_TRY_ASSIGN(auto ns, find(settings.get_ns));
+  return Clocks{std::move(us), std::move(ns)};
 }
 
 Result<Clocks> find_clocks(const SysTimeSettings& settings, const FindSymbol& find_in_components) {
@@ -177,17 +175,14 @@ Result<void> check_system_time(const TimeFunction& us, const TimeFunction& ns) {
   Watch ns_watch(ns, 1);
   const TimePoint limit = MonotonicClock::now() + kWatchedAtMost;
   do {
-    const auto before = ns_watch.read();
-    if (!before) return std::unexpected(before.error());
-    const auto between = us_watch.read();
-    if (!between) return std::unexpected(between.error());
-    const auto after = ns_watch.read();
-    if (!after) return std::unexpected(after.error());
-    if (*between + kSystemTimeToleranceUs < *before / kNsPerUs ||
-        *between > *after / kNsPerUs + kSystemTimeToleranceUs) {
+    PLCHOST_TRY_ASSIGN(const auto before, ns_watch.read());
+    PLCHOST_TRY_ASSIGN(const auto between, us_watch.read());
+    PLCHOST_TRY_ASSIGN(const auto after, ns_watch.read());
+    if (between + kSystemTimeToleranceUs < before / kNsPerUs ||
+        between > after / kNsPerUs + kSystemTimeToleranceUs) {
       return failure(ErrorCode::invalid_argument,
                      fmt::format("{} and {} have no common base: at the same moment {} us and {} ns", us.name,
-                                 ns.name, *between, *before));
+                                 ns.name, between, before));
     }
   } while (!(ns_watch.is_long_enough() && us_watch.is_long_enough()) && MonotonicClock::now() < limit);
   if (auto paced = ns_watch.check_pace(); !paced) return paced;
@@ -196,9 +191,8 @@ Result<void> check_system_time(const TimeFunction& us, const TimeFunction& ns) {
 
 Result<void> use_system_time(const SysTimeSettings& settings, const FindSymbol& find_in_components) {
   if (settings == SysTimeSettings{}) return {};
-  const auto clocks = find_clocks(settings, find_in_components);
-  if (!clocks) return std::unexpected(clocks.error());
-  const auto& [us, ns] = *clocks;
+  PLCHOST_TRY_ASSIGN(const auto clocks, find_clocks(settings, find_in_components));
+  const auto& [us, ns] = clocks;
   if (auto good = check_system_time({us.name, us.call}, {ns.name, ns.call}); !good) {
     return failure_in("[SysTime]", std::move(good).error());
   }

@@ -70,10 +70,9 @@ class TrialDevices : public DeviceFiles {
 
 // The kernel's answer, without staying there: the trial takes no time from the core of the instance.
 Result<void> try_cores(const std::vector<int>& cores) {
-  const auto before = allowed_cores(0);
-  if (!before) return std::unexpected(before.error());
+  PLCHOST_TRY_ASSIGN(const auto before, allowed_cores(0));
   const auto granted = bind_to_cores(cores);
-  const auto back = bind_to_cores(*before);
+  const auto back = bind_to_cores(before);
   if (!granted) return std::unexpected(granted.error());
   return back ? Result<void>() : std::unexpected(back.error());
 }
@@ -103,9 +102,9 @@ Result<void> try_tasks(const Options& options, const InstanceSettings& settings,
       .allow_unprivileged = true,
       .devices = &devices,
   };
-  auto tasks = TaskSet::create(clock, options.band, application.tasks(), std::move(environment));
-  if (!tasks) return std::unexpected(std::move(tasks).error());
-  return (*tasks)->check(scheduler_for(options.launch.scheduler, settings), settings.scheduler);
+  PLCHOST_TRY_ASSIGN(const auto tasks,
+                     TaskSet::create(clock, options.band, application.tasks(), std::move(environment)));
+  return tasks->check(scheduler_for(options.launch.scheduler, settings), settings.scheduler);
 }
 
 // The part that runs code of components and of the application.

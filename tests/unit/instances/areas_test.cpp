@@ -71,7 +71,7 @@ class AreasUnderTest : public ::testing::Test {
   [[nodiscard]] Result<std::string> place(const std::string& settings = {}) {
     auto placed = place_only(settings);
     if (!placed) return placed;
-    if (auto kept = sut.keep(); !kept) return std::unexpected(std::move(kept).error());
+    PLCHOST_TRY(sut.keep());
     return placed;
   }
   /// As a start does of which a later step may fail.

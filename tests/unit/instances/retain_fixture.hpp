@@ -47,9 +47,7 @@ class Retain : public ::testing::Test {
   [[nodiscard]] Result<void> start(const RetainImage& image, RetainKeeper::Options options = {}) {
     sut.reset();
     if (options.directory.empty()) options.directory = folder_;
-    auto made = RetainKeeper::make(pool_, "line1", image, options);
-    if (!made) return std::unexpected(made.error());
-    sut = *std::move(made);
+    PLCHOST_TRY_ASSIGN(sut, RetainKeeper::make(pool_, "line1", image, options));
     return sut->start();
   }
   void start_well(RetainKeeper::Options options = {}) {
