@@ -69,6 +69,10 @@ struct RunReport {
   Duration round_trip{};    ///< here: from before the post to after the news
 };
 
+/// What a client makes of a page: ListingOf<plc_LogPage>.
+template <class Page>
+using ListingOf = decltype(listing_of(std::declval<const Page&>()));
+
 /// An application that is to be sent to an instance.
 struct Download {
   std::string host;
@@ -256,9 +260,11 @@ class ControlClient {
   /// Until the status shows the effect of what was answered.
   void await_status(const std::string& host, const ApiReply& reply, TimePoint deadline);
   static constexpr Duration kStatusPatience = std::chrono::seconds(2);
-  template <class Page, class Listing>
-  [[nodiscard]] Result<Listing> ask_for_page(dds::TopicReader& pages, const dds::TopicInfo& topic,
-                                             const ApiRequest& request, TimePoint deadline);
+  template <class Page>
+  [[nodiscard]] Result<ListingOf<Page>> ask_for_page(const ApiRequest& request, TimePoint deadline);
+  template <class Page>
+  [[nodiscard]] Result<ListingOf<Page>> list(const std::string& host, std::int32_t operation,
+                                             const Result<plc_ListPart>& part, TimePoint deadline);
 
   std::shared_ptr<Participant> participant_;
   std::string only_;
@@ -284,9 +290,11 @@ class ControlClient {
   TimePoint told_keys_look_;  ///< when plc_forget_told_keys() was called last
   Duration quiet_ = kQuiet;
   dds::TopicReader replies_;
-  dds::TopicReader object_pages_;
-  dds::TopicReader node_pages_;
-  dds::TopicReader log_pages_;
+  template <class Page>
+  struct Pages {
+    dds::TopicReader from;
+  };
+  std::tuple<Pages<plc_ObjectPage>, Pages<plc_NodePage>, Pages<plc_LogPage>> pages_;
   dds::TopicReader acks_;
   dds::TopicReader runs_;
   dds::TopicReader download_acks_;

@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <optional>
+#include <tuple>
 
 #include <fmt/format.h>
 
@@ -15,10 +17,10 @@ namespace {
 constexpr Duration kPagePatience = std::chrono::milliseconds(500);
 constexpr Duration kBusyPause = std::chrono::milliseconds(50);
 
-template <class Page, class Listing>
-std::optional<Listing> take_page(dds_entity_t reader, dds::HostWriters& writers, std::string_view host,
-                                 const plc_SampleIdentity& identity) {
-  std::optional<Listing> found;
+template <class Page>
+std::optional<ListingOf<Page>> take_page(dds_entity_t reader, dds::HostWriters& writers,
+                                         std::string_view host, const plc_SampleIdentity& identity) {
+  std::optional<ListingOf<Page>> found;
   dds::take_valid_told<Page, dds::kTopicOf<Page>.qos.depth>(
       reader, writers, [&](const Page& page, const auto& /*info*/) {
         // Others answer calls that were given up, or are of a host that was not asked.
@@ -31,14 +33,14 @@ std::optional<Listing> take_page(dds_entity_t reader, dds::HostWriters& writers,
 
 }  // namespace
 
-template <class Page, class Listing>
-Result<Listing> ControlClient::ask_for_page(dds::TopicReader& pages, const dds::TopicInfo& topic,
-                                            const ApiRequest& request, TimePoint deadline) {
-  PLCHOST_TRY(check_host_name(request.host, only_));
+template <class Page>
+Result<ListingOf<Page>> ControlClient::ask_for_page(const ApiRequest& request, TimePoint deadline) {
+  if (auto good = check_host_name(request.host, only_); !good)
+    return std::unexpected(std::move(good).error());
+  const dds::TopicInfo& topic = dds::kTopicOf<Page>;
+  dds::TopicReader& pages = std::get<Pages<Page>>(pages_).from;
   const dds::Qos qos = dds::answers_qos(topic, topic.qos.depth);
-  if (auto opened = open_own_reader<Page>(pages, qos); !opened) {
-    return std::unexpected(opened.error());
-  }
+  if (auto opened = open_own_reader<Page>(pages, qos); !opened) return std::unexpected(opened.error());
   for (;;) {
     const auto reply = call(request, deadline);
     if (!reply) return std::unexpected(reply.error());
@@ -48,8 +50,7 @@ Result<Listing> ControlClient::ask_for_page(dds::TopicReader& pages, const dds::
         MonotonicClock::now() + (reply->code == ErrorCode::ok ? kPagePatience : kBusyPause);
     const TimePoint until = std::min(deadline, patience);
     for (;;) {
-      if (auto listing =
-              take_page<Page, Listing>(pages.reader.get(), answering_, request.host, reply->identity))
+      if (auto listing = take_page<Page>(pages.reader.get(), answering_, request.host, reply->identity))
         return *std::move(listing);
       if (MonotonicClock::now() >= until) break;
       update();
@@ -61,45 +62,37 @@ Result<Listing> ControlClient::ask_for_page(dds::TopicReader& pages, const dds::
                  fmt::format("the answer of host '{}' has not come ({})", request.host, topic.name));
 }
 
+template <class Page>
+Result<ListingOf<Page>> ControlClient::list(const std::string& host, std::int32_t operation,
+                                            const Result<plc_ListPart>& part, TimePoint deadline) {
+  if (!part) return std::unexpected(part.error());
+  return ask_for_page<Page>(
+      {.host = host, .operation = operation, .instance = "", .argument = "", .part = *part}, deadline);
+}
+
 Result<ObjectListing> ControlClient::list_objects(const std::string& host, const ObjectQuery& query,
                                                   TimePoint deadline) {
-  const auto part = part_of(query);
-  if (!part) return std::unexpected(part.error());
-  return ask_for_page<plc_ObjectPage, ObjectListing>(
-      object_pages_, dds::kObjectPage,
-      {.host = host, .operation = plc_OPERATION_LIST_OBJECTS, .instance = "", .argument = "", .part = *part},
-      deadline);
+  return list<plc_ObjectPage>(host, plc_OPERATION_LIST_OBJECTS, part_of(query), deadline);
 }
 
 Result<NodesTold> ControlClient::list_nodes(const std::string& host, const NodeQuery& query,
                                             TimePoint deadline) {
-  const auto part = part_of(query);
-  if (!part) return std::unexpected(part.error());
-  return ask_for_page<plc_NodePage, NodesTold>(
-      node_pages_, dds::kNodePage,
-      {.host = host, .operation = plc_OPERATION_LIST_NODES, .instance = "", .argument = "", .part = *part},
-      deadline);
+  return list<plc_NodePage>(host, plc_OPERATION_LIST_NODES, part_of(query), deadline);
 }
 
 Result<NodesTold> ControlClient::list_routes(const std::string& host, const NodeQuery& query,
                                              TimePoint deadline) {
-  const auto part = part_of(query);
-  if (!part) return std::unexpected(part.error());
-  return ask_for_page<plc_NodePage, NodesTold>(
-      node_pages_, dds::kNodePage,
-      {.host = host, .operation = plc_OPERATION_LIST_ROUTES, .instance = "", .argument = "", .part = *part},
-      deadline);
+  return list<plc_NodePage>(host, plc_OPERATION_LIST_ROUTES, part_of(query), deadline);
 }
 
 Result<LogListing> ControlClient::read_log(const std::string& host, const std::string& instance,
                                            const LogQuery& query, TimePoint deadline) {
-  return ask_for_page<plc_LogPage, LogListing>(log_pages_, dds::kLogPage,
-                                               {.host = host,
-                                                .operation = plc_OPERATION_READ_LOG,
-                                                .instance = instance,
-                                                .argument = "",
-                                                .part = part_of(query)},
-                                               deadline);
+  return ask_for_page<plc_LogPage>({.host = host,
+                                    .operation = plc_OPERATION_READ_LOG,
+                                    .instance = instance,
+                                    .argument = "",
+                                    .part = part_of(query)},
+                                   deadline);
 }
 
 }  // namespace plchost

@@ -6,6 +6,7 @@
 
 #include <control.h>
 
+#include "api/dds/page_sample.hpp"
 #include "shm/base/result.hpp"
 #include "shm/pages/log_ring.hpp"
 
@@ -39,18 +40,12 @@ inline constexpr std::size_t kPageRecords = 256;
                                              const LogQuery& query);
 
 /// A listing as it travels.
-class LogPageSample {
+class LogPageSample : public PageSample<plc_LogPage> {
  public:
-  /// At most kPageRecords. The caller fills in the other members.
+  /// At most kPageRecords.
   explicit LogPageSample(const LogListing& listing);
-  LogPageSample(const LogPageSample&) = delete;
-  LogPageSample& operator=(const LogPageSample&) = delete;
-  ~LogPageSample() = default;
-
-  [[nodiscard]] plc_LogPage& page() noexcept { return page_; }
 
  private:
-  plc_LogPage page_{};
   std::vector<plc_LogRecord> records_;
 };
 

@@ -7,6 +7,7 @@
 
 #include <control.h>
 
+#include "api/dds/page_sample.hpp"
 #include "shm/base/result.hpp"
 #include "shm/block_driver/routes.hpp"
 
@@ -45,18 +46,12 @@ inline constexpr std::size_t kPageRoutes = 512;
 static_assert(kPageRoutes >= kMaxRoutes);
 
 /// A listing as it travels.
-class NodePageSample {
+class NodePageSample : public PageSample<plc_NodePage> {
  public:
-  /// At most kMaxNodes and kPageRoutes. The caller fills in the other members.
+  /// At most kMaxNodes and kPageRoutes.
   explicit NodePageSample(const NodeListing& listing);
-  NodePageSample(const NodePageSample&) = delete;
-  NodePageSample& operator=(const NodePageSample&) = delete;
-  ~NodePageSample() = default;
-
-  [[nodiscard]] plc_NodePage& page() noexcept { return page_; }
 
  private:
-  plc_NodePage page_{};
   std::vector<plc_NodeRecord> nodes_;
   std::vector<std::vector<plc_HostRange>> hosts_;
   std::vector<plc_RouteRecord> routes_;

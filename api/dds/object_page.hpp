@@ -8,6 +8,7 @@
 
 #include <control.h>
 
+#include "api/dds/page_sample.hpp"
 #include "shm/pool/object_info.hpp"
 
 namespace plchost {
@@ -33,18 +34,12 @@ inline constexpr std::size_t kPageObjects = 256;
 inline constexpr std::size_t kPageReferences = 1024;
 
 /// A listing as it travels.
-class ObjectPageSample {
+class ObjectPageSample : public PageSample<plc_ObjectPage> {
  public:
-  /// At most kPageObjects. The caller fills in the other members.
+  /// At most kPageObjects.
   explicit ObjectPageSample(const ObjectListing& listing);
-  ObjectPageSample(const ObjectPageSample&) = delete;
-  ObjectPageSample& operator=(const ObjectPageSample&) = delete;
-  ~ObjectPageSample() = default;
-
-  [[nodiscard]] plc_ObjectPage& page() noexcept { return page_; }
 
  private:
-  plc_ObjectPage page_{};
   std::vector<plc_ObjectRecord> records_;
   std::deque<std::vector<plc_ObjectReference>> references_;
 };
