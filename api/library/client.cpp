@@ -24,6 +24,13 @@ auto list(ControlClient& client, const std::string& name, TimePoint deadline)
   return items;
 }
 
+template <class Sample, class Worker>
+auto list_or_throw(Worker& worker, const std::string& host) {
+  using Items = std::vector<decltype(to_public(Sample{}))>;
+  return value_or_throw(worker.template run<Items>(
+      [&](ControlClient& client) { return list<Sample>(client, host, worker.deadline()); }));
+}
+
 Result<std::vector<Client::LogLine>> read_lines(ControlClient& client, const std::string& name,
                                                 const std::string& instance, LogPlace place,
                                                 std::uint64_t newest, TimePoint deadline) {
@@ -90,33 +97,27 @@ std::vector<Client::Host> Client::hosts() {
 }
 
 std::vector<Client::Instance> Client::instances(const std::string& host) {
-  return value_or_throw(worker_->run<std::vector<Instance>>(
-      [&](ControlClient& client) { return list<plc_InstanceStatus>(client, host, worker_->deadline()); }));
+  return list_or_throw<plc_InstanceStatus>(*worker_, host);
 }
 
 std::vector<Client::Task> Client::tasks(const std::string& host) {
-  return value_or_throw(worker_->run<std::vector<Task>>(
-      [&](ControlClient& client) { return list<plc_TaskStatus>(client, host, worker_->deadline()); }));
+  return list_or_throw<plc_TaskStatus>(*worker_, host);
 }
 
 std::vector<Client::Event> Client::events(const std::string& host) {
-  return value_or_throw(worker_->run<std::vector<Event>>(
-      [&](ControlClient& client) { return list<plc_EventStatus>(client, host, worker_->deadline()); }));
+  return list_or_throw<plc_EventStatus>(*worker_, host);
 }
 
 std::vector<Client::Application> Client::applications(const std::string& host) {
-  return value_or_throw(worker_->run<std::vector<Application>>(
-      [&](ControlClient& client) { return list<plc_ApplicationStatus>(client, host, worker_->deadline()); }));
+  return list_or_throw<plc_ApplicationStatus>(*worker_, host);
 }
 
 std::vector<Client::Exception> Client::exceptions(const std::string& host) {
-  return value_or_throw(worker_->run<std::vector<Exception>>(
-      [&](ControlClient& client) { return list<plc_ExceptionStatus>(client, host, worker_->deadline()); }));
+  return list_or_throw<plc_ExceptionStatus>(*worker_, host);
 }
 
 std::vector<Client::Writer> Client::writers(const std::string& host) {
-  return value_or_throw(worker_->run<std::vector<Writer>>(
-      [&](ControlClient& client) { return list<plc_WriterStatus>(client, host, worker_->deadline()); }));
+  return list_or_throw<plc_WriterStatus>(*worker_, host);
 }
 
 Client::TaskStatistics Client::statistics(const std::string& host, const std::string& instance,
