@@ -135,13 +135,12 @@ Result<void> Manager::set_up() {
   if (auto bound = bind_process_to_cores(0, host.housekeeping_cores); !bound) {
     spdlog::warn("the manager stays where it is: {}", bound.error().describe());
   }
-  const auto rights = pool_rights(host);
-  if (!rights) return std::unexpected(rights.error());
-  clear_names(host.pool, *rights);
-  if (auto ours = check_pool_owner(host.pool, *rights); !ours) return ours;
+  PLCHOST_TRY_ASSIGN(const auto rights, pool_rights(host));
+  clear_names(host.pool, rights);
+  if (auto ours = check_pool_owner(host.pool, rights); !ours) return ours;
   PLCHOST_TRY_ASSIGN(auto pool,
-                     ObjectPool::create(host.pool, {.max_objects = host.pool_objects, .rights = *rights}));
-  if (auto renewed = renew_pool_rights(host.pool, *rights); !renewed) {
+                     ObjectPool::create(host.pool, {.max_objects = host.pool_objects, .rights = rights}));
+  if (auto renewed = renew_pool_rights(host.pool, rights); !renewed) {
     spdlog::warn("{}", renewed.error().describe());
   }
   pool_ = std::move(pool);

@@ -25,9 +25,8 @@ bool is_engineering(std::int32_t operation) {
 
 Result<std::unique_ptr<ControlClient>> ControlClient::connect(const dds::DomainOptions& options,
                                                               std::string_view only) {
-  auto entered = enter_domain(options);
-  if (!entered) return std::unexpected(std::move(entered).error());
-  return connect(*std::move(entered), only);
+  PLCHOST_TRY_ASSIGN(auto entered, enter_domain(options));
+  return connect(std::move(entered), only);
 }
 
 Result<std::unique_ptr<ControlClient>> ControlClient::connect(std::shared_ptr<Participant> participant,
@@ -49,9 +48,7 @@ Result<void> ControlClient::open(std::shared_ptr<Participant> participant, std::
       dds::make_subscriber(entity(), dds::status_partition(only.empty() ? dds::kAllHosts : only));
   if (!subscriber) return std::unexpected(subscriber.error());
   status_subscriber_ = *std::move(subscriber);
-  auto wait_set = WaitSet::create(entity());
-  if (!wait_set) return std::unexpected(wait_set.error());
-  wait_set_ = std::move(*wait_set);
+  PLCHOST_TRY_ASSIGN(wait_set_, WaitSet::create(entity()));
   last_news_ = MonotonicClock::now();
   if (!participant_->only_loopback) quiet_ = kQuietOnNetworks;
   if (auto opened = open_cache(presence_, dds::kPresence,
@@ -85,9 +82,7 @@ Result<StatisticsReport> ControlClient::statistics(const std::string& host, std:
                                                    std::string_view task, TimePoint deadline) {
   PLCHOST_TRY(check_host_name(host, only_));
   PLCHOST_TRY(check_task_name(instance, task));
-  if (auto opened = open_cache(statistics_, dds::kTaskStatistics); !opened) {
-    return std::unexpected(opened.error());
-  }
+  PLCHOST_TRY(open_cache(statistics_, dds::kTaskStatistics));
   for (;;) {
     update();
     if (const auto view = present(host)) {
@@ -111,19 +106,17 @@ Result<std::vector<plc_WriterStatus>> ControlClient::writers(const std::string& 
 
 Result<std::vector<TransitionView>> ControlClient::transitions() {
   if (!transition_log_) {
-    auto opened = open_reader(entity(), status_subscriber_.get(), dds::kTransition,
-                              dds::qos_of(dds::kTransition), wait_set_);
-    if (!opened) return std::unexpected(std::move(opened).error());
-    transition_log_ = TransitionLog(*std::move(opened));
+    PLCHOST_TRY_ASSIGN(auto opened, open_reader(entity(), status_subscriber_.get(), dds::kTransition,
+                                                dds::qos_of(dds::kTransition), wait_set_));
+    transition_log_ = TransitionLog(std::move(opened));
   }
   update();
   return transition_log_.take();
 }
 
 Result<bool> ControlClient::has_all_transitions(const std::string& host, TimePoint deadline) {
-  const auto told = instances(host, deadline);
-  if (!told) return std::unexpected(told.error());
-  return std::ranges::all_of(*told,
+  PLCHOST_TRY_ASSIGN(const auto told, instances(host, deadline));
+  return std::ranges::all_of(told,
                              [&](const plc_InstanceStatus& one) { return transition_log_.has_all(one); });
 }
 
@@ -140,17 +133,14 @@ Result<std::vector<plc_ApplicationStatus>> ControlClient::applications(const std
 // With the subscriber to its partition, if there is none yet.
 Result<dds::Entity> ControlClient::make_own_topic(const dds::TopicInfo& info) {
   if (!own_subscriber_) {
-    auto made = dds::make_subscriber(entity(), partition_);
-    if (!made) return std::unexpected(made.error());
-    own_subscriber_ = std::move(*made);
+    PLCHOST_TRY_ASSIGN(own_subscriber_, dds::make_subscriber(entity(), partition_));
   }
   return dds::make_topic(entity(), info);
 }
 
 Result<void> ControlClient::read_own(dds::TopicReader& answers, dds::Entity topic, const dds::Qos& qos) {
-  auto reader = dds::make_reader(own_subscriber_.get(), topic.get(), qos);
-  if (!reader) return std::unexpected(std::move(reader).error());
-  answers = {.topic = std::move(topic), .reader = *std::move(reader)};
+  PLCHOST_TRY_ASSIGN(auto reader, dds::make_reader(own_subscriber_.get(), topic.get(), qos));
+  answers = {.topic = std::move(topic), .reader = std::move(reader)};
   return wait_set_.add(answers.reader.get(), DDS_DATA_AVAILABLE_STATUS);
 }
 
@@ -158,22 +148,16 @@ Result<RequestCaller*> ControlClient::caller(const std::string& host, bool engin
   const std::pair key(host, engineering);
   if (const auto known = callers_.find(key); known != callers_.end()) return &known->second;
   const dds::Qos qos = dds::answers_qos(dds::kReply, dds::kReply.qos.depth);
-  if (auto opened = open_own_reader<plc_Reply>(replies_, qos); !opened) {
-    return std::unexpected(opened.error());
-  }
+  PLCHOST_TRY(open_own_reader<plc_Reply>(replies_, qos));
   dds::Entity& topic = request_topics_.at(engineering ? 1 : 0);
   if (!topic) {
-    auto made = dds::make_topic(entity(), engineering ? dds::kEngineerRequest : dds::kOperatorRequest);
-    if (!made) return std::unexpected(made.error());
-    topic = std::move(*made);
+    PLCHOST_TRY_ASSIGN(
+        topic, dds::make_topic(entity(), engineering ? dds::kEngineerRequest : dds::kOperatorRequest));
   }
-  auto made = RequestCaller::create(entity(), topic.get(), host);
-  if (!made) return std::unexpected(made.error());
-  if (auto added = wait_set_.add(made->writer(), DDS_PUBLICATION_MATCHED_STATUS); !added) {
-    return std::unexpected(added.error());
-  }
-  own_answers_.add(made->guid());
-  return &callers_.emplace(key, std::move(*made)).first->second;
+  PLCHOST_TRY_ASSIGN(auto made, RequestCaller::create(entity(), topic.get(), host));
+  PLCHOST_TRY(wait_set_.add(made.writer(), DDS_PUBLICATION_MATCHED_STATUS));
+  own_answers_.add(made.guid());
+  return &callers_.emplace(key, std::move(made)).first->second;
 }
 
 const HostClock* ControlClient::clock_of(const std::string& host) const {
@@ -184,14 +168,12 @@ const HostClock* ControlClient::clock_of(const std::string& host) const {
 Result<ApiReply> ControlClient::ask(const ApiRequest& request, TimePoint deadline,
                                     const RequestCaller::Meanwhile& meanwhile) {
   const bool engineering = is_engineering(request.operation);
-  const auto asked = caller(request.host, engineering);
-  if (!asked) return std::unexpected(asked.error());
+  PLCHOST_TRY_ASSIGN(const auto asked, caller(request.host, engineering));
   update_hosts();  // the limit is by the newest presence
   const auto clock = [&] { return clock_of(request.host); };
-  auto reply =
-      (*asked)->call(request, replies_.reader.get(), wait_set_, deadline, clock, answering_, meanwhile);
+  auto reply = asked->call(request, replies_.reader.get(), wait_set_, deadline, clock, answering_, meanwhile);
   if (!reply) {
-    own_answers_.remove((*asked)->guid());
+    own_answers_.remove(asked->guid());
     callers_.erase({request.host, engineering});
   }
   return reply;

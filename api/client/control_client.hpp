@@ -69,7 +69,7 @@ struct RunReport {
   Duration round_trip{};    ///< here: from before the post to after the news
 };
 
-/// What a client makes of a page: ListingOf<plc_LogPage>.
+/// The listing of a page: ListingOf<plc_LogPage> is a LogListing.
 template <class Page>
 using ListingOf = decltype(listing_of(std::declval<const Page&>()));
 

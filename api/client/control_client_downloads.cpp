@@ -39,41 +39,37 @@ Result<ApiReply> ControlClient::download(const Download& download, const Downloa
   if (download.contents.empty()) return failure(ErrorCode::invalid_argument, download.name + " is empty");
   constexpr std::int32_t kOfEachHost = 16;
   const dds::Qos qos = dds::answers_qos(dds::kDownloadAck, kOfEachHost);
-  if (auto opened = open_own_reader<plc_DownloadAck>(download_acks_, qos); !opened) {
-    return std::unexpected(opened.error());
-  }
+  PLCHOST_TRY(open_own_reader<plc_DownloadAck>(download_acks_, qos));
   if (!chunk_topic_) {
-    auto topic = dds::make_topic(entity(), dds::kDownloadChunk);
-    if (!topic) return std::unexpected(topic.error());
-    chunk_topic_ = std::move(*topic);
+    PLCHOST_TRY_ASSIGN(chunk_topic_, dds::make_topic(entity(), dds::kDownloadChunk));
   }
-  auto sender = FileSender::create(entity(), chunk_topic_.get(), download.host, download.contents);
-  if (!sender) return std::unexpected(sender.error());
+  PLCHOST_TRY_ASSIGN(auto sender,
+                     FileSender::create(entity(), chunk_topic_.get(), download.host, download.contents));
   std::uint64_t told = 0;
   const auto go_on = [&](const plc_SampleIdentity& identity, TimePoint now) -> RequestCaller::Wait {
     update();
     dds::take_valid_told<plc_DownloadAck>(
         download_acks_.reader.get(), answering_,
-        [&](const plc_DownloadAck& ack, const auto& /*info*/) { sender->on_ack(ack, identity, now); });
-    const bool begun = sender->last_news() != TimePoint{};
-    const Duration patience = sender->complete() ? kDownloadLoad : kDownloadStall;
-    const TimePoint end = begun ? std::max(deadline, sender->last_news() + patience) : deadline;
+        [&](const plc_DownloadAck& ack, const auto& /*info*/) { sender.on_ack(ack, identity, now); });
+    const bool begun = sender.last_news() != TimePoint{};
+    const Duration patience = sender.complete() ? kDownloadLoad : kDownloadStall;
+    const TimePoint end = begun ? std::max(deadline, sender.last_news() + patience) : deadline;
     const HostClock* const clock = clock_of(download.host);
-    const bool done = sender->complete() || clock == nullptr;
+    const bool done = sender.complete() || clock == nullptr;
     const TimePoint next =
-        done ? now + FileSender::kRepeat : sender->send(identity, clock->limit_at(end), now);
-    if (progress && sender->received() != told) progress(told = sender->received());
+        done ? now + FileSender::kRepeat : sender.send(identity, clock->limit_at(end), now);
+    if (progress && sender.received() != told) progress(told = sender.received());
     return {.next = next, .deadline = end};
   };
   auto reply = ask(request, deadline, go_on);
-  if (!reply && reply.error().code == ErrorCode::timed_out && sender->last_news() != TimePoint{}) {
+  if (!reply && reply.error().code == ErrorCode::timed_out && sender.last_news() != TimePoint{}) {
     return failure(
         ErrorCode::timed_out,
-        sender->complete()
+        sender.complete()
             ? fmt::format("host '{}' has got {} and has not said what became of it", download.host,
                           download.name)
             : fmt::format("host '{}' has stopped answering: {} of {} bytes of {} are there", download.host,
-                          sender->received(), download.contents.size(), download.name));
+                          sender.received(), download.contents.size(), download.name));
   }
   // The answer may come before the last acknowledgement.
   const bool done = reply && reply->code == ErrorCode::ok;

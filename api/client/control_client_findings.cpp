@@ -21,17 +21,15 @@ bool is_complete(const std::vector<plc_HostFinding>& findings, std::uint64_t rou
 
 Result<std::vector<plc_HostFinding>> ControlClient::check_host(const std::string& name, TimePoint deadline) {
   PLCHOST_TRY(open_cache(host_findings_, dds::kHostFinding));
-  const auto before = host(name, deadline);
-  if (!before) return std::unexpected(before.error());
-  const auto reply = call({name, plc_OPERATION_CHECK_HOST, "", ""}, deadline);
-  if (!reply) return std::unexpected(reply.error());
-  if (reply->code != ErrorCode::ok) return failure(reply->code, reply->text);
+  PLCHOST_TRY_ASSIGN(const auto before, host(name, deadline));
+  PLCHOST_TRY_ASSIGN(const auto reply, call({name, plc_OPERATION_CHECK_HOST, "", ""}, deadline));
+  if (reply.code != ErrorCode::ok) return failure(reply.code, reply.text);
   for (;;) {
     update();
     if (const auto view = present(name)) {
       auto findings = host_findings_.of_host(name, view->epoch);
       // Another server counts its rounds anew.
-      if (is_complete(findings, view->epoch == before->epoch ? before->status.round : 0)) {
+      if (is_complete(findings, view->epoch == before.epoch ? before.status.round : 0)) {
         std::ranges::sort(findings, {}, &plc_HostFinding::position);
         return findings;
       }

@@ -35,22 +35,19 @@ std::optional<ListingOf<Page>> take_page(dds_entity_t reader, dds::HostWriters& 
 
 template <class Page>
 Result<ListingOf<Page>> ControlClient::ask_for_page(const ApiRequest& request, TimePoint deadline) {
-  if (auto good = check_host_name(request.host, only_); !good)
-    return std::unexpected(std::move(good).error());
+  PLCHOST_TRY(check_host_name(request.host, only_));
   const dds::TopicInfo& topic = dds::kTopicOf<Page>;
   dds::TopicReader& pages = std::get<Pages<Page>>(pages_).from;
   const dds::Qos qos = dds::answers_qos(topic, topic.qos.depth);
-  if (auto opened = open_own_reader<Page>(pages, qos); !opened) return std::unexpected(opened.error());
+  PLCHOST_TRY(open_own_reader<Page>(pages, qos));
   for (;;) {
-    const auto reply = call(request, deadline);
-    if (!reply) return std::unexpected(reply.error());
-    if (reply->code != ErrorCode::ok && reply->code != ErrorCode::busy)
-      return failure(reply->code, reply->text);
+    PLCHOST_TRY_ASSIGN(const auto reply, call(request, deadline));
+    if (reply.code != ErrorCode::ok && reply.code != ErrorCode::busy) return failure(reply.code, reply.text);
     const TimePoint patience =
-        MonotonicClock::now() + (reply->code == ErrorCode::ok ? kPagePatience : kBusyPause);
+        MonotonicClock::now() + (reply.code == ErrorCode::ok ? kPagePatience : kBusyPause);
     const TimePoint until = std::min(deadline, patience);
     for (;;) {
-      if (auto listing = take_page<Page>(pages.reader.get(), answering_, request.host, reply->identity))
+      if (auto listing = take_page<Page>(pages.reader.get(), answering_, request.host, reply.identity))
         return *std::move(listing);
       if (MonotonicClock::now() >= until) break;
       update();

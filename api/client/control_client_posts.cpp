@@ -16,21 +16,14 @@ Result<Poster<Sample>*> ControlClient::poster(const std::string& host) {
   auto& [topic, of_host] = std::get<Posters<Sample>>(posters_);
   if (const auto known = of_host.find(host); known != of_host.end()) return &known->second;
   const dds::Qos qos = dds::qos_of(dds::kEventAck);  // the latest one of each source
-  if (auto opened = open_own_reader<plc_EventAck>(acks_, qos); !opened) {
-    return std::unexpected(std::move(opened).error());
-  }
+  PLCHOST_TRY(open_own_reader<plc_EventAck>(acks_, qos));
   if (!topic) {
-    auto made = dds::make_topic(entity(), dds::kTopicOf<Sample>);
-    if (!made) return std::unexpected(made.error());
-    topic = std::move(*made);
+    PLCHOST_TRY_ASSIGN(topic, dds::make_topic(entity(), dds::kTopicOf<Sample>));
   }
-  auto made = Poster<Sample>::create(entity(), topic.get(), host);
-  if (!made) return std::unexpected(made.error());
-  if (auto added = wait_set_.add(made->writer(), DDS_PUBLICATION_MATCHED_STATUS); !added) {
-    return std::unexpected(added.error());
-  }
-  own_answers_.add(made->source());
-  return &of_host.emplace(host, std::move(*made)).first->second;
+  PLCHOST_TRY_ASSIGN(auto made, Poster<Sample>::create(entity(), topic.get(), host));
+  PLCHOST_TRY(wait_set_.add(made.writer(), DDS_PUBLICATION_MATCHED_STATUS));
+  own_answers_.add(made.source());
+  return &of_host.emplace(host, std::move(made)).first->second;
 }
 template Result<EventPoster*> ControlClient::poster<plc_EventPost>(const std::string& host);
 
@@ -40,15 +33,14 @@ void ControlClient::use_clock(EventPoster& posts, const std::string& host, Durat
 
 Result<void> ControlClient::prepare_posts(const std::string& host, TimePoint deadline) {
   if (auto good = check_host_name(host, only_); !good) return good;
-  const auto way = poster<plc_EventPost>(host);
-  if (!way) return std::unexpected(way.error());
+  PLCHOST_TRY_ASSIGN(const auto way, poster<plc_EventPost>(host));
   update_hosts();  // the limit is by the newest presence
-  while (!(*way)->matched() || clock_of(host) == nullptr) {
+  while (!way->matched() || clock_of(host) == nullptr) {
     if (MonotonicClock::now() >= deadline) {
       return failure(ErrorCode::timed_out, fmt::format("host '{}' takes no events", host));
     }
     update();
-    if ((*way)->matched() && clock_of(host) != nullptr) break;
+    if (way->matched() && clock_of(host) != nullptr) break;
     wait_set_.wait(deadline);
   }
   return {};
@@ -70,14 +62,11 @@ bool ControlClient::take_acks(TimePoint now) {
 
 Result<PostReport> ControlClient::post_event(const HostEvent& event, std::uint64_t count, Duration interval,
                                              Duration patience, const std::function<bool()>& stop) {
-  if (auto good = check_event_name(event.instance, event.event); !good) {
-    return std::unexpected(std::move(good).error());
-  }
+  PLCHOST_TRY(check_event_name(event.instance, event.event));
   const TimePoint start = MonotonicClock::now();
   PLCHOST_TRY(prepare_posts(event.host, start + patience));
-  const auto way = poster<plc_EventPost>(event.host);
-  if (!way) return std::unexpected(way.error());
-  EventPoster& posts = **way;
+  PLCHOST_TRY_ASSIGN(const auto way, poster<plc_EventPost>(event.host));
+  EventPoster& posts = *way;
   (void)take_acks(start);  // of posts that were given up
   posts.begin_report(start);
   use_clock(posts, event.host, patience);
@@ -124,9 +113,8 @@ Result<PostReport> ControlClient::post_batch(const std::string& host, std::span<
   for (const EventId& event : events) {
     PLCHOST_TRY(check_event_name(event.instance, event.event));
   }
-  const auto way = poster<plc_EventBatch>(host);
-  if (!way) return std::unexpected(way.error());
-  BatchPoster& posts = **way;
+  PLCHOST_TRY_ASSIGN(const auto way, poster<plc_EventBatch>(host));
+  BatchPoster& posts = *way;
   const TimePoint deadline = MonotonicClock::now() + patience;
   update_hosts();  // the limit is by the newest presence
   for (bool posted = false;;) {

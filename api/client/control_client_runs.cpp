@@ -60,9 +60,7 @@ std::optional<Result<RunReport>> ControlClient::take_run(const EventPoster& post
 }
 
 Result<RunReport> ControlClient::post_and_await(const HostEvent& event, Duration patience) {
-  if (auto good = check_event_name(event.instance, event.event); !good) {
-    return std::unexpected(std::move(good).error());
-  }
+  PLCHOST_TRY(check_event_name(event.instance, event.event));
   const TimePoint deadline = MonotonicClock::now() + patience;
   PLCHOST_TRY(prepare_runs(event.host, deadline));
   for (;;) {

@@ -27,19 +27,16 @@ Result<void> ControlClient::open_cache(Cache& cache, const dds::TopicInfo& info,
 template <class Answer>
 Result<void> ControlClient::open_own_reader(dds::TopicReader& answers, const dds::Qos& qos) {
   if (answers) return {};
-  auto made = make_own_topic(dds::kTopicOf<Answer>);
-  if (!made) return std::unexpected(std::move(made).error());
-  if (auto filtered = own_answers_.filter<Answer>(made->get()); !filtered) return filtered;
-  return read_own(answers, *std::move(made), qos);
+  PLCHOST_TRY_ASSIGN(auto made, make_own_topic(dds::kTopicOf<Answer>));
+  if (auto filtered = own_answers_.filter<Answer>(made.get()); !filtered) return filtered;
+  return read_own(answers, std::move(made), qos);
 }
 
 template <class Sample>
 Result<std::vector<Sample>> ControlClient::status(const std::string& host, TimePoint deadline) {
   auto& cache = std::get<StatusCache<Sample>>(status_);
   PLCHOST_TRY(check_host_name(host, only_));
-  if (auto opened = open_cache(cache, dds::kTopicOf<Sample>); !opened) {
-    return std::unexpected(opened.error());
-  }
+  PLCHOST_TRY(open_cache(cache, dds::kTopicOf<Sample>));
   for (;;) {
     update();
     if (const auto view = present(host)) {

@@ -36,20 +36,19 @@ Result<std::vector<LogText>> LogReader::read(ControlClient& client, TimePoint de
   if (first && newest < kLogRecordsKept) query.newest = std::max<std::uint64_t>(newest, 1);
   std::vector<LogText> lines;
   for (bool goes_on = true; goes_on;) {
-    const auto page = client.read_log(host_, instance_, query, deadline);
-    if (!page) return std::unexpected(page.error());
-    clock_unix_ns_ = page->clock_unix_ns;
-    if (page->stream != place_.stream && place_.stream != 0) {  // another numbering
-      place_ = {.stream = page->stream};
+    PLCHOST_TRY_ASSIGN(const auto page, client.read_log(host_, instance_, query, deadline));
+    clock_unix_ns_ = page.clock_unix_ns;
+    if (page.stream != place_.stream && place_.stream != 0) {  // another numbering
+      place_ = {.stream = page.stream};
       lines_ = LogLines();
       query = {};
       continue;
     }
-    auto more = lines_.add(page->records);
+    auto more = lines_.add(page.records);
     std::ranges::move(more, std::back_inserter(lines));
-    goes_on = !page->complete && page->next_after > query.after;
-    place_ = {.stream = page->stream, .after = page->next_after};
-    query = {.after = page->next_after};
+    goes_on = !page.complete && page.next_after > query.after;
+    place_ = {.stream = page.stream, .after = page.next_after};
+    query = {.after = page.next_after};
   }
   if (first && lines.size() > newest)
     lines.erase(lines.begin(), lines.end() - static_cast<std::ptrdiff_t>(newest));

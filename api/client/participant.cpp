@@ -10,14 +10,12 @@
 namespace plchost {
 
 Result<std::shared_ptr<Participant>> enter_domain(const dds::DomainOptions& options) {
-  auto domain = dds::open_domain(dds::Role::client, options);
-  if (!domain) return std::unexpected(std::move(domain).error());
-  auto entity = dds::make_participant(options.domain, dds::client_participant_qos().get(),
-                                      fmt::format("enter DDS domain {}", options.domain));
-  if (!entity) return std::unexpected(std::move(entity).error());
+  PLCHOST_TRY_ASSIGN(auto domain, dds::open_domain(dds::Role::client, options));
+  PLCHOST_TRY_ASSIGN(auto entity, dds::make_participant(options.domain, dds::client_participant_qos().get(),
+                                                        fmt::format("enter DDS domain {}", options.domain)));
   return std::make_shared<Participant>(
-      Participant{.domain = *std::move(domain),
-                  .entity = *std::move(entity),
+      Participant{.domain = std::move(domain),
+                  .entity = std::move(entity),
                   .only_loopback = options.interfaces == std::vector<std::string>{"lo"}});
 }
 

@@ -9,9 +9,7 @@ Result<dds::TopicReader> open_reader(dds_entity_t participant, dds_entity_t subs
                                      const WaitSet& wait_set, std::uint32_t statuses) {
   auto opened = dds::open_reader(participant, subscriber, topic, qos);
   if (!opened) return opened;
-  if (auto added = wait_set.add(opened->reader.get(), statuses); !added) {
-    return std::unexpected(std::move(added).error());
-  }
+  PLCHOST_TRY(wait_set.add(opened->reader.get(), statuses));
   return opened;
 }
 

@@ -11,16 +11,15 @@
 namespace plchost {
 
 Result<WaitSet> WaitSet::create(dds_entity_t participant) {
-  auto made = dds::check_entity(dds_create_waitset(participant), "make a wait set");
-  if (!made) return std::unexpected(made.error());
-  auto woken = dds::check_entity(dds_create_guardcondition(participant), "make a guard condition");
-  if (!woken) return std::unexpected(woken.error());
+  PLCHOST_TRY_ASSIGN(auto made, dds::check_entity(dds_create_waitset(participant), "make a wait set"));
+  PLCHOST_TRY_ASSIGN(auto woken,
+                     dds::check_entity(dds_create_guardcondition(participant), "make a guard condition"));
   if (auto added =
-          dds::check_code(dds_waitset_attach(made->get(), woken->get(), woken->get()), "add to a wait set");
+          dds::check_code(dds_waitset_attach(made.get(), woken.get(), woken.get()), "add to a wait set");
       !added) {
     return std::unexpected(added.error());
   }
-  return WaitSet(std::move(*made), std::move(*woken));
+  return WaitSet(std::move(made), std::move(woken));
 }
 
 Result<void> WaitSet::add(dds_entity_t entity, std::uint32_t statuses) const {

@@ -137,8 +137,7 @@ Result<std::string> domain_configuration(Role role, const DomainOptions& options
     peers += fmt::format("<Peer Address=\"{}\"/>", address);
   }
   if (!peers.empty()) peers = fmt::format("<Peers>{}</Peers>", peers);
-  const auto security = security_section(options.identity);
-  if (!security) return std::unexpected(security.error());
+  PLCHOST_TRY_ASSIGN(const auto security, security_section(options.identity));
   // High at servers, because all writers of theirs are bounded by their own history or window: none may be
   // stopped because one client does not read. A client's is as much as it may have under way: some 500 posts,
   // far less than the server's sockets hold, so that several clients that post as fast as they can lose
@@ -170,7 +169,7 @@ Result<std::string> domain_configuration(Role role, const DomainOptions& options
       "</Watermarks></Internal>{}{}{}</Domain></CycloneDDS>",
       interfaces, multicast ? "spdp" : "false", role == Role::server ? "auto" : "none",
       kMaxServersPerMachine - 1, peers, announcement, lease, watermark, watermark, kSizing,
-      threads_section(options.receive_fifo), *security);
+      threads_section(options.receive_fifo), security);
 }
 
 bool can_use_fifo(int priority) {
@@ -181,8 +180,7 @@ bool can_use_fifo(int priority) {
 Result<std::shared_ptr<Entity>> open_domain(Role role, const DomainOptions& options) {
   wait_by_steady_clock();
   keep_tokens_once();
-  const auto configuration = domain_configuration(role, options);
-  if (!configuration) return std::unexpected(configuration.error());
+  PLCHOST_TRY_ASSIGN(const auto configuration, domain_configuration(role, options));
   Registry& all = registry();
   std::unique_lock lock(all.mutex);
   OpenDomain& opened = all.domains[options.domain];
@@ -196,12 +194,11 @@ Result<std::shared_ptr<Entity>> open_domain(Role role, const DomainOptions& opti
       return failure_in("identity", good.error());
     }
   }
-  auto made = check_entity(
-      dds_create_domain(options.domain, configuration->c_str()),
-      fmt::format("make DDS domain {} on interface {}", options.domain, fmt::join(options.interfaces, ", ")));
-  if (!made) return std::unexpected(made.error());
+  PLCHOST_TRY_ASSIGN(auto made, check_entity(dds_create_domain(options.domain, configuration.c_str()),
+                                             fmt::format("make DDS domain {} on interface {}", options.domain,
+                                                         fmt::join(options.interfaces, ", "))));
   std::shared_ptr<Entity> domain(
-      new Entity(std::move(*made)),  // NOLINT(cppcoreguidelines-owning-memory): for a deleter of its own
+      new Entity(std::move(made)),  // NOLINT(cppcoreguidelines-owning-memory): for a deleter of its own
       [number = options.domain](Entity* ended) { end_domain(number, std::unique_ptr<Entity>(ended)); });
   opened = {.users = domain, .is_there = true};
   all.gated.erase(options.domain);

@@ -9,9 +9,7 @@ namespace plchost::dds {
 
 Result<std::unique_ptr<EntityReaper>> EntityReaper::create() {
   std::unique_ptr<EntityReaper> reaper(new EntityReaper());
-  auto thread = Thread::start("dds-reaper", {}, [&self = *reaper] { self.run(); });
-  if (!thread) return std::unexpected(std::move(thread).error());
-  reaper->thread_ = std::move(*thread);
+  PLCHOST_TRY_ASSIGN(reaper->thread_, Thread::start("dds-reaper", {}, [&self = *reaper] { self.run(); }));
   return reaper;
 }
 

@@ -74,9 +74,7 @@ Result<ObjectQuery> object_query_of(const plc_ListPart& part) {
                     .match = std::string(dds::text_of(part.match)),
                     .after = std::string(dds::text_of(part.after_name))};
   if (const auto type = dds::text_of(part.type); !type.empty()) {
-    const auto parsed = parse_object_type(type);
-    if (!parsed) return std::unexpected(parsed.error());
-    query.type = *parsed;
+    PLCHOST_TRY_ASSIGN(query.type, parse_object_type(type));
   }
   PLCHOST_TRY(check_query(query));
   return query;

@@ -90,28 +90,22 @@ Result<Entity> make_subscriber(dds_entity_t participant, const std::string& part
 
 Result<TopicReader> open_reader(dds_entity_t participant, dds_entity_t subscriber, const TopicInfo& topic,
                                 const Qos& qos) {
-  auto made = make_topic(participant, topic);
-  if (!made) return std::unexpected(std::move(made).error());
-  auto reader = make_reader(subscriber, made->get(), qos);
-  if (!reader) return std::unexpected(std::move(reader).error());
-  return TopicReader{.topic = *std::move(made), .reader = *std::move(reader)};
+  PLCHOST_TRY_ASSIGN(auto made, make_topic(participant, topic));
+  PLCHOST_TRY_ASSIGN(auto reader, make_reader(subscriber, made.get(), qos));
+  return TopicReader{.topic = std::move(made), .reader = std::move(reader)};
 }
 
 Result<TopicWriter> open_writer(dds_entity_t participant, dds_entity_t publisher, const TopicInfo& topic) {
-  auto made = make_topic(participant, topic);
-  if (!made) return std::unexpected(std::move(made).error());
-  auto writer = make_writer(publisher, made->get(), qos_of(topic));
-  if (!writer) return std::unexpected(std::move(writer).error());
-  return TopicWriter{.topic = *std::move(made), .writer = *std::move(writer)};
+  PLCHOST_TRY_ASSIGN(auto made, make_topic(participant, topic));
+  PLCHOST_TRY_ASSIGN(auto writer, make_writer(publisher, made.get(), qos_of(topic)));
+  return TopicWriter{.topic = std::move(made), .writer = std::move(writer)};
 }
 
 Result<PartitionWriter> open_writer(dds_entity_t participant, const std::string& partition,
                                     dds_entity_t topic, const Qos& qos) {
-  auto publisher = make_publisher(participant, partition);
-  if (!publisher) return std::unexpected(std::move(publisher).error());
-  auto writer = make_writer(publisher->get(), topic, qos);
-  if (!writer) return std::unexpected(std::move(writer).error());
-  return PartitionWriter{.publisher = *std::move(publisher), .writer = *std::move(writer)};
+  PLCHOST_TRY_ASSIGN(auto publisher, make_publisher(participant, partition));
+  PLCHOST_TRY_ASSIGN(auto writer, make_writer(publisher.get(), topic, qos));
+  return PartitionWriter{.publisher = std::move(publisher), .writer = std::move(writer)};
 }
 
 }  // namespace plchost::dds

@@ -50,21 +50,14 @@ Result<void> BlockGateway::open_node() {
     return give(header, contents);
   };
   options.remote_room = [this](NodeAddress to, std::uint32_t slots) { return has_room(to, slots); };
-  auto node = BlockNode::join(options);
-  if (!node) return std::unexpected(std::move(node).error());
-  node_ = *std::move(node);
-  auto directory = NodeDirectory::open_to_read(options_.pool, options_.base);
-  if (!directory) return std::unexpected(std::move(directory).error());
-  directory_.emplace(*std::move(directory));
+  PLCHOST_TRY_ASSIGN(node_, BlockNode::join(options));
+  PLCHOST_TRY_ASSIGN(auto directory, NodeDirectory::open_to_read(options_.pool, options_.base));
+  directory_.emplace(std::move(directory));
   pending_.emplace([this](const BlockHeader& header,
                           std::span<const std::byte> contents) { return node_->inject(header, contents); },
                    options_.hold, node_->counters());
-  auto router = BlockRouter::create(*node_);
-  if (!router) return std::unexpected(std::move(router).error());
-  router_ = *std::move(router);
-  auto thread = Thread::start("blocks", {}, [this] { router_->run(stop_); });
-  if (!thread) return std::unexpected(std::move(thread).error());
-  router_thread_ = *std::move(thread);
+  PLCHOST_TRY_ASSIGN(router_, BlockRouter::create(*node_));
+  PLCHOST_TRY_ASSIGN(router_thread_, Thread::start("blocks", {}, [this] { router_->run(stop_); }));
   return {};
 }
 
@@ -88,10 +81,8 @@ Result<void> BlockGateway::open_topics(const WaitSet& wait_set) {
   hosts_ = *std::move(hosts);
   blocks_ = *std::move(blocks);
   acks_ = *std::move(acks);
-  auto writer = dds::open_writer(participant_, dds::status_partition(options_.host), hosts_.topic.get(),
-                                 dds::qos_of(dds::kBlockHostStatus));
-  if (!writer) return std::unexpected(std::move(writer).error());
-  host_writer_ = *std::move(writer);
+  PLCHOST_TRY_ASSIGN(host_writer_, dds::open_writer(participant_, dds::status_partition(options_.host),
+                                                    hosts_.topic.get(), dds::qos_of(dds::kBlockHostStatus)));
   return {};
 }
 

@@ -89,9 +89,8 @@ void BlockGateway::settle_peers(TimePoint now) {
 
 Result<void> BlockGateway::open_block_writer(Peer& peer) const {
   // Never waits: how much may be under way is the business of BlockWindow.
-  auto writer = dds::make_writer(peer.acks.publisher.get(), blocks_.topic.get(), dds::qos_of(dds::kBlock));
-  if (!writer) return std::unexpected(std::move(writer).error());
-  peer.blocks = *std::move(writer);
+  PLCHOST_TRY_ASSIGN(peer.blocks, dds::make_writer(peer.acks.publisher.get(), blocks_.topic.get(),
+                                                   dds::qos_of(dds::kBlock)));
   peer.writer = dds::guid_of(peer.blocks.get());
   return {};
 }
@@ -99,10 +98,9 @@ Result<void> BlockGateway::open_block_writer(Peer& peer) const {
 Result<std::unique_ptr<BlockGateway::Peer>> BlockGateway::open_peer(const HostClaim& claim) const {
   auto peer = std::make_unique<Peer>();
   peer->claim = claim;
-  auto acks = dds::open_writer(participant_, dds::block_partition(claim.host, options_.host),
-                               acks_.topic.get(), dds::qos_of(dds::kBlockAck));
-  if (!acks) return std::unexpected(std::move(acks).error());
-  peer->acks = *std::move(acks);
+  PLCHOST_TRY_ASSIGN(peer->acks,
+                     dds::open_writer(participant_, dds::block_partition(claim.host, options_.host),
+                                      acks_.topic.get(), dds::qos_of(dds::kBlockAck)));
   PLCHOST_TRY(open_block_writer(*peer));
   peer->has_news = true;  // it waits to hear of this host
   return peer;

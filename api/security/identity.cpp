@@ -69,21 +69,18 @@ Result<OwnIdentity> check_identity(const std::string& folder) {
         fmt::format("'{}' is no folder of an identity; 'plcctl security add-identity' makes one", folder),
         error.value());
   }
-  const auto certificate = read_certificate(file_in(folder, kCertificateFile));
-  if (!certificate) return std::unexpected(certificate.error());
+  PLCHOST_TRY_ASSIGN(const auto certificate, read_certificate(file_in(folder, kCertificateFile)));
   PLCHOST_TRY_ASSIGN(const auto authority, read_certificate(file_in(folder, kIdentityAuthorityFile)));
   PLCHOST_TRY_ASSIGN(const auto revocations, read_revocations(file_in(folder, kRevocationsFile)));
   if (auto good = verify_revocations(revocations, authority); !good) return failure_in(folder, good.error());
-  if (auto good = verify_certificate(*certificate, authority, revocations); !good) {
+  if (auto good = verify_certificate(certificate, authority, revocations); !good) {
     return failure_in(folder, good.error());
   }
-  if (auto good = check_key(file_in(folder, kKeyFile), *certificate); !good) {
-    return std::unexpected(good.error());
-  }
-  PLCHOST_TRY(check_documents(folder, *certificate));
-  auto subject = subject_of(*certificate);
+  PLCHOST_TRY(check_key(file_in(folder, kKeyFile), certificate));
+  PLCHOST_TRY(check_documents(folder, certificate));
+  auto subject = subject_of(certificate);
   if (!subject) return failure_in(folder, subject.error());
-  const auto validity = validity_of(*certificate);
+  const auto validity = validity_of(certificate);
   if (!validity) return failure_in(folder, validity.error());
   return OwnIdentity{std::move(*subject), *validity};
 }

@@ -21,17 +21,16 @@ struct Certified {
 /// None: revoked, as it may well be.
 Result<std::optional<Certified>> read_known(const std::string& path, const Certificate& authority,
                                             const RevocationList& revocations) {
-  const auto certificate = read_certificate(path);
-  if (!certificate) return std::unexpected(certificate.error());
-  if (is_revoked(*certificate, revocations)) return std::nullopt;
-  if (auto good = verify_certificate(*certificate, authority, revocations); !good) {
+  PLCHOST_TRY_ASSIGN(const auto certificate, read_certificate(path));
+  if (is_revoked(certificate, revocations)) return std::nullopt;
+  if (auto good = verify_certificate(certificate, authority, revocations); !good) {
     return failure_in(path, good.error());
   }
-  auto subject = subject_of(*certificate);
+  auto subject = subject_of(certificate);
   if (!subject) return failure_in(path, subject.error());
-  const auto prefix = guid_prefix(*certificate);
+  const auto prefix = guid_prefix(certificate);
   if (!prefix) return failure_in(path, prefix.error());
-  const auto validity = validity_of(*certificate);
+  const auto validity = validity_of(certificate);
   if (!validity) return failure_in(path, validity.error());
   return std::optional(Certified{*prefix, std::move(*subject), *validity});
 }

@@ -50,15 +50,14 @@ Result<IdentityView> SecurityFolder::view(const std::string& name) const {
 Result<void> SecurityFolder::write_identity(const std::string& to, const Subject& subject,
                                             const Validity& validity) const {
   PLCHOST_TRY_ASSIGN(const auto key, make_key());
-  const auto certificate = issue_certificate(subject, validity, key, identity_);
-  if (!certificate) return std::unexpected(certificate.error());
-  PLCHOST_TRY_ASSIGN(const auto text, subject_text(*certificate));
-  PLCHOST_TRY_ASSIGN(const auto prefix, guid_prefix(*certificate));
-  if (auto kept = keep_issued(subject.name, *certificate); !kept) return kept;
+  PLCHOST_TRY_ASSIGN(const auto certificate, issue_certificate(subject, validity, key, identity_));
+  PLCHOST_TRY_ASSIGN(const auto text, subject_text(certificate));
+  PLCHOST_TRY_ASSIGN(const auto prefix, guid_prefix(certificate));
+  if (auto kept = keep_issued(subject.name, certificate); !kept) return kept;
   const auto permissions = sign_document(permissions_text(subject, text, prefix, validity), permissions_);
   if (auto done = write_text(file_in(to, kPermissionsFile), permissions, kPublicFile); !done) return done;
   if (auto done = write_text(file_in(to, kKeyFile), to_pem(key), kSecretFile); !done) return done;
-  return write_text(file_in(to, kCertificateFile), to_pem(*certificate), kPublicFile);
+  return write_text(file_in(to, kCertificateFile), to_pem(certificate), kPublicFile);
 }
 
 // First of all: no certificate is anywhere that is not kept here.

@@ -31,9 +31,7 @@ Result<UniqueFd> make_timer(Duration period) {
                                                 "make a timer"));
   UniqueFd timer(fd);
   const itimerspec times{.it_interval = to_timespec(period), .it_value = to_timespec(period)};
-  if (auto set = check_errno(::timerfd_settime(timer.get(), 0, &times, nullptr), "set a timer"); !set) {
-    return std::unexpected(set.error());
-  }
+  PLCHOST_TRY(check_errno(::timerfd_settime(timer.get(), 0, &times, nullptr), "set a timer"));
   return timer;
 }
 
@@ -43,9 +41,7 @@ Result<UniqueFd> make_signal_fd() {
   ::sigaddset(&set, SIGTERM);
   ::sigaddset(&set, SIGINT);
   // Before any thread of DDS is made: they inherit it.
-  if (auto blocked = check_returned(::pthread_sigmask(SIG_BLOCK, &set, nullptr), "block signals"); !blocked) {
-    return std::unexpected(blocked.error());
-  }
+  PLCHOST_TRY(check_returned(::pthread_sigmask(SIG_BLOCK, &set, nullptr), "block signals"));
   PLCHOST_TRY_ASSIGN(const auto fd, check_errno(::signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK),
                                                 "make a signal descriptor"));
   return UniqueFd(fd);

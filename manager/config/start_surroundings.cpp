@@ -50,12 +50,11 @@ Result<void> try_application(const std::string& plc_instance, const HostConfig& 
 
 Result<void> try_settings(const std::string& plc_instance, const std::string& file) {
   PLCHOST_TRY_ASSIGN(auto pipe, make_output_pipe());
-  const auto process = spawn_process(
-      {.arguments = {plc_instance, "--check-settings", file}, .output_fd = pipe.write_end.get()});
-  if (!process) return std::unexpected(process.error());
-  if (!ends_within(process->pidfd.get(), kTrialLimit)) (void)signal_process(*process, SIGKILL);
-  (void)ends_within(process->pidfd.get(), kTrialLimit);
-  const ExitStatus status = reap_process(*process);
+  PLCHOST_TRY_ASSIGN(const auto process, spawn_process({.arguments = {plc_instance, "--check-settings", file},
+                                                        .output_fd = pipe.write_end.get()}));
+  if (!ends_within(process.pidfd.get(), kTrialLimit)) (void)signal_process(process, SIGKILL);
+  (void)ends_within(process.pidfd.get(), kTrialLimit);
+  const ExitStatus status = reap_process(process);
   if (status.success()) return {};
   constexpr std::size_t kShown = 2000;
   std::string text = read_available(pipe.read_end.get(), kShown);

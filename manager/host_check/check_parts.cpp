@@ -136,14 +136,13 @@ std::vector<std::string> group_folders(const HostFiles& files, std::string_view 
 
 Result<bool> has_capability(const HostFiles& files, unsigned capability) {
   const std::string path = "/proc/self/status";
-  const auto status = files.text(path);
-  if (!status) return std::unexpected(status.error());
+  PLCHOST_TRY_ASSIGN(const auto status, files.text(path));
   constexpr std::string_view kKey = "CapEff:\t";
-  const std::size_t at = status->find(kKey);
+  const std::size_t at = status.find(kKey);
   if (at != std::string::npos) {
-    const char* const begin = status->data() + at + kKey.size();
+    const char* const begin = status.data() + at + kKey.size();
     std::uint64_t set = 0;
-    const auto [stopped, error] = std::from_chars(begin, status->data() + status->size(), set, 16);
+    const auto [stopped, error] = std::from_chars(begin, status.data() + status.size(), set, 16);
     if (error == std::errc()) return (set >> capability & 1U) != 0;
   }
   return failure(ErrorCode::corrupt, fmt::format("{} has no CapEff", path));

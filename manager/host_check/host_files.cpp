@@ -51,12 +51,11 @@ Result<std::string> HostFiles::text(const std::string& path) const {
 }
 
 Result<std::int64_t> HostFiles::number(const std::string& path) const {
-  const auto content = text(path);
-  if (!content) return std::unexpected(content.error());
+  PLCHOST_TRY_ASSIGN(const auto content, text(path));
   std::int64_t number = 0;
-  const char* const end = content->data() + content->size();
-  const auto [stopped, error] = std::from_chars(content->data(), end, number);
-  if (error != std::errc() || stopped != end) return unexpected_content(path, *content);
+  const char* const end = content.data() + content.size();
+  const auto [stopped, error] = std::from_chars(content.data(), end, number);
+  if (error != std::errc() || stopped != end) return unexpected_content(path, content);
   return number;
 }
 

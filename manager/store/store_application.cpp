@@ -95,9 +95,7 @@ Result<void> copy_file(const StoreOrder& order, const std::string& path) {
   const UniqueFd from(::open(order.source.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC));
   if (!from) return failure(ErrorCode::system, "open " + order.source, errno);
   struct stat status{};
-  if (auto known = check_errno(::fstat(from.get(), &status), "look at " + order.source); !known) {
-    return std::unexpected(known.error());
-  }
+  PLCHOST_TRY(check_errno(::fstat(from.get(), &status), "look at " + order.source));
   if (!S_ISREG(status.st_mode)) return failure(ErrorCode::wrong_type, order.source + " is no plain file");
   const UniqueFd to(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_NOFOLLOW | O_CLOEXEC, kFileMode));
   if (!to) return failure(ErrorCode::system, "open " + path, errno);

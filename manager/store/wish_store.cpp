@@ -32,9 +32,7 @@ Result<std::string> read_wish_file(const std::string& path, std::size_t most) {
     return failure(none ? ErrorCode::not_found : ErrorCode::system, "open " + path, error);
   }
   struct stat status{};
-  if (auto known = check_errno(::fstat(fd.get(), &status), "look at " + path); !known) {
-    return std::unexpected(known.error());
-  }
+  PLCHOST_TRY(check_errno(::fstat(fd.get(), &status), "look at " + path));
   if (!S_ISREG(status.st_mode) || (status.st_uid != ::geteuid() && status.st_uid != 0)) {
     return failure(ErrorCode::refused,
                    fmt::format("{} is no file of this user, but of user {}", path, status.st_uid));

@@ -29,9 +29,7 @@ Result<UniqueFd> open_end(const std::string& path, int flags) {
   UniqueFd fd(::open(path.c_str(), flags | O_NONBLOCK | O_CLOEXEC | O_NOFOLLOW));  // NOLINT: variadic
   PLCHOST_TRY(check_errno(fd.get(), "open " + path));
   struct stat status{};
-  if (auto seen = check_errno(::fstat(fd.get(), &status), "fstat " + path); !seen) {
-    return std::unexpected(seen.error());
-  }
+  PLCHOST_TRY(check_errno(::fstat(fd.get(), &status), "fstat " + path));
   if (!S_ISFIFO(status.st_mode)) return failure(ErrorCode::wrong_type, path + " is no pipe");
   return fd;
 }

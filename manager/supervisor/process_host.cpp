@@ -53,13 +53,12 @@ Result<int> ProcessHost::adopt() {
 }
 
 Result<int> ProcessHost::adopt_peer() {
-  const auto pid = link_.peer_pid();
-  if (!pid) return std::unexpected(pid.error());
-  PLCHOST_TRY_ASSIGN(auto process, open_process(*pid));
+  PLCHOST_TRY_ASSIGN(const auto pid, link_.peer_pid());
+  PLCHOST_TRY_ASSIGN(auto process, open_process(pid));
   PLCHOST_TRY(follow(process));
   output_.adopt();
-  output_.say(LogLevel::info, *pid, fmt::format("a new manager has adopted process {}", *pid));
-  return *pid;
+  output_.say(LogLevel::info, pid, fmt::format("a new manager has adopted process {}", pid));
+  return pid;
 }
 
 Result<void> ProcessHost::follow(ChildProcess& process) {

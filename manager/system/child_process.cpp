@@ -99,9 +99,7 @@ Result<ChildProcess> spawn_process(const SpawnRequest& request) {
   pid_t pid = 0;
   const int error =
       ::posix_spawn(&pid, pointers.front(), &actions.files, &actions.attributes, pointers.data(), environ);
-  if (auto started = check_returned(error, "start " + request.arguments.front()); !started) {
-    return std::unexpected(started.error());
-  }
+  PLCHOST_TRY(check_returned(error, "start " + request.arguments.front()));
   auto opened = open_process(pid);
   if (!opened) {
     // Without a pidfd it could not be supervised. It was not waited for yet, so the number is still its own.

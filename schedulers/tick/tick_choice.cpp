@@ -14,9 +14,7 @@ Result<std::shared_ptr<TickDevice>> device_for(const SchedulerSettings& settings
   if (!device || device->path() != settings.auxiliary_device) {
     PLCHOST_TRY_ASSIGN(device, TickDevice::open(files, settings.auxiliary_device));
   }
-  if (auto set = device->set_period(settings.scheduler_interval); !set) {
-    return std::unexpected(std::move(set).error());
-  }
+  PLCHOST_TRY(device->set_period(settings.scheduler_interval));
   return device;
 }
 

@@ -167,9 +167,7 @@ Result<Thread> Thread::start(const std::string& name, ThreadPriority priority, s
                                name, priority.fifo),
                    error);
   }
-  if (auto started = check_returned(error, fmt::format("start thread '{}'", name)); !started) {
-    return std::unexpected(started.error());
-  }
+  PLCHOST_TRY(check_returned(error, fmt::format("start thread '{}'", name)));
   (void)info.release();  // thread_main owns it now
   thread.running_ = true;
   return thread;

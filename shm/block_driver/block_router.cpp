@@ -27,9 +27,7 @@ BlockRouter::BlockRouter(BlockNode& node)
 Result<std::unique_ptr<BlockRouter>> BlockRouter::create(BlockNode& node) {
   std::unique_ptr<BlockRouter> router(new BlockRouter(node));
   router->refresh();
-  if (auto connected = router->connect(node.life_.node); !connected) {
-    return std::unexpected(std::move(connected).error());
-  }
+  PLCHOST_TRY(router->connect(node.life_.node));
   router->open_incoming();
   return router;
 }

@@ -250,9 +250,7 @@ bool is_same(const NodeRecord& one, const NodeRecord& other) {
 }  // namespace
 
 Result<NodeLife> NodeDirectory::join(const NodeEntry& entry) {
-  if (auto valid = check_name("node name", entry.name, kMaxInstanceName); !valid) {
-    return std::unexpected(std::move(valid).error());
-  }
+  PLCHOST_TRY(check_name("node name", entry.name, kMaxInstanceName));
   if (!is_ring_size(entry.queue_slots)) {
     return failure(ErrorCode::invalid_argument,
                    fmt::format("queues of {} slots are not possible: a power of two from {} to {} is",
@@ -261,17 +259,16 @@ Result<NodeLife> NodeDirectory::join(const NodeEntry& entry) {
   const auto lock = DirectoryLock::acquire(directory_name(pool_, base_));
   if (!lock) return failure_in("join the directory of nodes", lock.error());
   reclaim_locked();
-  const auto node = choose(entry);
-  if (!node) return std::unexpected(node.error());
-  NodeSlot& place = slot(*node);
+  PLCHOST_TRY_ASSIGN(const auto node, choose(entry));
+  NodeSlot& place = slot(node);
   std::uint32_t generation = place.record.read().value_or(NodeRecord{}).generation + 1;
   if (generation == 0) ++generation;
-  remove_links(*node);
+  remove_links(node);
   for (auto& word : place.incoming) word.store(0, std::memory_order_relaxed);
   for (auto& word : place.neighbours) word.store(0, std::memory_order_relaxed);
-  write(*node, record_of(entry, generation));
+  write(node, record_of(entry, generation));
   announce();
-  return NodeLife{.node = *node, .generation = generation};
+  return NodeLife{.node = node, .generation = generation};
 }
 
 void NodeDirectory::leave(const NodeLife& life) {

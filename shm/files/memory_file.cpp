@@ -36,9 +36,7 @@ Result<std::string> path_of(const std::string& name) {
   std::string plain = name;  // as pool_memory_name() of shm/files/pool_files.hpp writes it
   std::ranges::replace_if(
       plain, [](char c) { return c == '%' || static_cast<unsigned char>(c) >= 0x80; }, '_');
-  if (auto valid = check_name("shared memory name", plain, kMaxFileName); !valid) {
-    return std::unexpected(valid.error());
-  }
+  PLCHOST_TRY(check_name("shared memory name", plain, kMaxFileName));
   return MemoryFile::path(name);
 }
 
@@ -132,9 +130,7 @@ Result<Opened> open_existing(const std::string& path, MemoryFile::Access access,
     }
     return failure(code_of_open(error), fmt::format("open {}", path), error);
   }
-  if (auto got = check_errno(::fstat(opened.fd.get(), &opened.status), "fstat " + path); !got) {
-    return std::unexpected(got.error());
-  }
+  PLCHOST_TRY(check_errno(::fstat(opened.fd.get(), &opened.status), "fstat " + path));
   if (!S_ISREG(opened.status.st_mode)) {
     return not_a_plain_file(path, opened.status.st_mode);
   }
@@ -155,9 +151,7 @@ Result<UnnamedMemory> UnnamedMemory::make(const std::string& name, std::size_t s
   PLCHOST_TRY_ASSIGN(auto path, path_of(name));
   PLCHOST_TRY_ASSIGN(auto fd, make_nameless(size, rights, path));
   struct stat status{};
-  if (auto got = check_errno(::fstat(fd.get(), &status), "fstat " + path); !got) {
-    return std::unexpected(std::move(got).error());
-  }
+  PLCHOST_TRY(check_errno(::fstat(fd.get(), &status), "fstat " + path));
   PLCHOST_TRY_ASSIGN(auto mapping, map(fd, size, MemoryFile::Access::read_write, path));
   return UnnamedMemory(std::move(path), std::move(fd), MemoryFile(std::move(mapping), status.st_ino));
 }

@@ -83,9 +83,7 @@ Result<void> give_rights(int fd, const MemoryRights& rights, const std::string& 
                                rights.group.value_or(::getegid())),
                    error);
   }
-  if (auto mode = check_errno(::fchmod(fd, rights.mode), "fchmod " + path); !mode) {
-    return std::unexpected(mode.error());
-  }
+  PLCHOST_TRY(check_errno(::fchmod(fd, rights.mode), "fchmod " + path));
   return {};
 }
 

@@ -23,9 +23,7 @@ Result<void> write_all(const std::string& path, std::string_view text, mode_t mo
                        check_errno(::write(fd.get(), text.data(), text.size()), "write " + path));
     text.remove_prefix(static_cast<std::size_t>(written));
   }
-  if (const auto synced = check_errno(::fsync(fd.get()), "fsync " + path); !synced) {
-    return std::unexpected(synced.error());
-  }
+  PLCHOST_TRY(check_errno(::fsync(fd.get()), "fsync " + path));
   return {};
 }
 
@@ -34,9 +32,7 @@ Result<void> write_all(const std::string& path, std::string_view text, mode_t mo
 Result<void> sync_directory(const std::string& path) {
   const UniqueFd fd(::open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
   if (!fd) return failure(ErrorCode::system, "open " + path, errno);
-  if (const auto synced = check_errno(::fsync(fd.get()), "fsync " + path); !synced) {
-    return std::unexpected(synced.error());
-  }
+  PLCHOST_TRY(check_errno(::fsync(fd.get()), "fsync " + path));
   return {};
 }
 

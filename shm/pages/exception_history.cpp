@@ -140,9 +140,7 @@ Result<std::string> keep_exceptions(const std::string& path, std::span<const Exc
     history = ExceptionHistory{};
   }
   for (const ExceptionEntry& entry : found) history->add(entry);
-  if (auto written = write_exceptions(path, *history); !written) {
-    return std::unexpected(std::move(written).error());
-  }
+  PLCHOST_TRY(write_exceptions(path, *history));
   return remark;
 }
 

@@ -218,22 +218,22 @@ TaskSlot& InstancePage::task(std::uint32_t index) noexcept {
 
 Result<InstancePageReader> InstancePageReader::open(std::string_view pool, std::string_view instance) {
   const std::string name = instance_page_name(pool, instance);
-  auto memory = open_page<InstancePageLayout>(name, kInstancePageKind, MemoryFile::Access::read_only);
-  if (!memory) return std::unexpected(memory.error());
-  const InstancePageLayout& page = instance_layout_of(*memory);
+  PLCHOST_TRY_ASSIGN(auto memory,
+                     open_page<InstancePageLayout>(name, kInstancePageKind, MemoryFile::Access::read_only));
+  const InstancePageLayout& page = instance_layout_of(memory);
   // Read once: a stranger may write to the page at any time.
   const std::uint32_t count = page.task_count;
   const std::uint32_t digits = page.digits;
   const std::uint64_t size = page.size;
   const bool possible = count <= kMaxTasks && HistogramShape::is_valid(digits) &&
-                        size == size_for(count, HistogramShape(digits)) && size == memory->bytes().size();
+                        size == size_for(count, HistogramShape(digits)) && size == memory.bytes().size();
   if (!possible) {
     return failure(ErrorCode::corrupt,
                    fmt::format("page '{}' says {} tasks with histograms of {} digits; this does not fit its "
                                "size of {} bytes",
-                               name, count, digits, memory->bytes().size()));
+                               name, count, digits, memory.bytes().size()));
   }
-  return InstancePageReader(std::move(*memory), count, HistogramShape(digits));
+  return InstancePageReader(std::move(memory), count, HistogramShape(digits));
 }
 
 std::optional<InstanceRuntime> InstancePageReader::runtime() const noexcept {

@@ -31,9 +31,7 @@ Result<void> begin(std::span<std::byte> bytes) {
 // same. A stranger who has emptied the file has made such a one.
 Result<MemoryFile> open_or_make_record(const std::string& name, const OwnerCheck& owners) {
   const auto open = [&]() -> Result<MemoryFile> {
-    if (auto filled = MemoryFile::fill_empty(name, sizeof(plc_reference_clock), owners); !filled) {
-      return std::unexpected(std::move(filled).error());
-    }
+    PLCHOST_TRY(MemoryFile::fill_empty(name, sizeof(plc_reference_clock), owners));
     return MemoryFile::open(name, 1, MemoryFile::Access::read_write, owners);
   };
   const auto make = [&](bool /*replace*/) {

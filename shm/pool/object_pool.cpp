@@ -261,9 +261,7 @@ Result<bool> ObjectPool::create_locked(PoolObject& object, const Wanted& wanted,
 Result<bool> ObjectPool::create_into(PoolObject& object, const Wanted& wanted, const ObjectOptions& options,
                                      std::span<const std::byte> contents) {
   PLCHOST_TRY(check_object_name(wanted.name));
-  if (auto good = check_initial(*traits_of(wanted.type), wanted.name, wanted.initial); !good) {
-    return std::unexpected(std::move(good).error());
-  }
+  PLCHOST_TRY(check_initial(*traits_of(wanted.type), wanted.name, wanted.initial));
   PLCHOST_TRY(check_group(options));
   if (wanted.type == ObjectType::memory) {
     return create_memory_into(static_cast<SharedMemory&>(object), wanted, options, contents);
@@ -303,9 +301,7 @@ Result<bool> ObjectPool::create_memory_into(SharedMemory& object, const Wanted& 
                                wanted.name, made.error().message));
   }
   if (!made) return made;
-  if (auto mapped = map(object, wanted, Access::read_write); !mapped) {
-    return std::unexpected(std::move(mapped).error());
-  }
+  PLCHOST_TRY(map(object, wanted, Access::read_write));
   return made;
 }
 

@@ -104,9 +104,7 @@ class ObjectPool {
   template <class T>
   [[nodiscard]] Result<T> open_object(std::string_view name, Access access = Access::read_write) const {
     T object;
-    if (const auto opened = open_into(object, T::kType, name, access); !opened) {
-      return std::unexpected(opened.error());
-    }
+    PLCHOST_TRY(open_into(object, T::kType, name, access));
     return object;
   }
 

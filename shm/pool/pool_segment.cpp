@@ -133,9 +133,7 @@ Result<std::shared_ptr<PoolSegment>> PoolSegment::attach_now(const std::string& 
                    fmt::format("shared memory '{}' is not a pool; choose another name", name));
   }
   max_objects = header.max_objects;
-  if (auto sound = check_header(header, max_objects, file_size, name); !sound) {
-    return std::unexpected(sound.error());
-  }
+  PLCHOST_TRY(check_header(header, max_objects, file_size, name));
   PLCHOST_TRY(check_pid_namespace(header, name));
   return std::shared_ptr<PoolSegment>(new PoolSegment(name, std::move(*memory), max_objects, access));
 }

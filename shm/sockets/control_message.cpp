@@ -97,34 +97,32 @@ std::string encode(const ControlReply& reply) {
 }
 
 Result<ControlRequest> decode_request(std::string_view packet) {
-  const auto json = parse(packet);
-  if (!json) return std::unexpected(json.error());
-  const auto verb = text_of(*json, "verb");
-  const auto instance = text_of(*json, "instance");
-  const auto argument = text_of(*json, "argument");
+  PLCHOST_TRY_ASSIGN(const auto json, parse(packet));
+  const auto verb = text_of(json, "verb");
+  const auto instance = text_of(json, "instance");
+  const auto argument = text_of(json, "argument");
   for (const auto* text : {&verb, &instance, &argument}) {
     if (!*text) return std::unexpected(text->error());
   }
-  PLCHOST_TRY_ASSIGN(auto options, options_of(*json));
-  PLCHOST_TRY_ASSIGN(const auto limit, limit_of(*json));
+  PLCHOST_TRY_ASSIGN(auto options, options_of(json));
+  PLCHOST_TRY_ASSIGN(const auto limit, limit_of(json));
   const auto known = std::ranges::find(operations(), *verb, &Operation::name);
   if (known != operations().end()) {
     return ControlRequest{
-        (*json)["number"].get<std::uint64_t>(), known->verb, *instance, *argument, std::move(options), limit};
+        json["number"].get<std::uint64_t>(), known->verb, *instance, *argument, std::move(options), limit};
   }
   return failure(ErrorCode::corrupt, fmt::format("control message has the unknown verb '{}'", *verb));
 }
 
 Result<ControlReply> decode_reply(std::string_view packet) {
-  const auto json = parse(packet);
-  if (!json) return std::unexpected(json.error());
-  const auto code = json->find("code");
+  PLCHOST_TRY_ASSIGN(const auto json, parse(packet));
+  const auto code = json.find("code");
   constexpr unsigned kLastCode = static_cast<unsigned>(ErrorCode::wrong_size);
-  if (code == json->end() || !code->is_number_unsigned() || code->get<std::uint64_t>() > kLastCode) {
+  if (code == json.end() || !code->is_number_unsigned() || code->get<std::uint64_t>() > kLastCode) {
     return failure(ErrorCode::corrupt, "control reply has no valid 'code'");
   }
-  PLCHOST_TRY_ASSIGN(auto text, text_of(*json, "text"));
-  return ControlReply{(*json)["number"].get<std::uint64_t>(), static_cast<ErrorCode>(code->get<unsigned>()),
+  PLCHOST_TRY_ASSIGN(auto text, text_of(json, "text"));
+  return ControlReply{json["number"].get<std::uint64_t>(), static_cast<ErrorCode>(code->get<unsigned>()),
                       std::move(text)};
 }
 

@@ -16,9 +16,7 @@ Result<void> BareEnd::open(std::uint32_t number, bool receives, int fifo) {
   dds::DomainOptions options;
   options.domain = number;
   options.receive_fifo = fifo;
-  auto made = dds::open_domain(receives ? dds::Role::server : dds::Role::client, options);
-  if (!made) return std::unexpected(made.error());
-  domain = std::move(*made);
+  PLCHOST_TRY_ASSIGN(domain, dds::open_domain(receives ? dds::Role::server : dds::Role::client, options));
   participant = dds::Entity(dds_create_participant(number, nullptr, nullptr));
   auto events = dds::make_topic(participant.get(), dds::kEventPost);
   auto acks = dds::make_topic(participant.get(), dds::kEventAck);
@@ -60,11 +58,9 @@ constexpr int kServerFifo = 20;  // plchost-dds receives with it
 class WokenThread {
  public:
   Result<void> start(int core) {
-    auto thread = Thread::start("bare-task", kPriority, [this, core] {
-      if (bind_thread({core})) run();
-    });
-    if (!thread) return std::unexpected(thread.error());
-    thread_ = std::move(*thread);
+    PLCHOST_TRY_ASSIGN(thread_, Thread::start("bare-task", kPriority, [this, core] {
+                         if (bind_thread({core})) run();
+                       }));
     return {};
   }
   void wake() {

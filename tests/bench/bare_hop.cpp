@@ -16,12 +16,8 @@ BareHop::~BareHop() {
 Result<void> BareHop::start(CycleLog& log) {
   stopping_.store(false);
   constexpr ThreadPriority kAbove{.fifo = kPriority.fifo + 1};
-  auto thread = Thread::start("floor", kPriority, [this, &log] { run(log); });
-  if (!thread) return std::unexpected(std::move(thread.error()));
-  thread_ = std::move(*thread);
-  auto ticking = Thread::start("floor-tick", kAbove, [this] { tick(); });
-  if (!ticking) return std::unexpected(std::move(ticking.error()));
-  tick_ = std::move(*ticking);
+  PLCHOST_TRY_ASSIGN(thread_, Thread::start("floor", kPriority, [this, &log] { run(log); }));
+  PLCHOST_TRY_ASSIGN(tick_, Thread::start("floor-tick", kAbove, [this] { tick(); }));
   return {};
 }
 

@@ -63,9 +63,7 @@ struct Pipes {
   static Result<Pipes> open(const std::string& pool, Board& board, BlocksSide side, int socket,
                             bool with_iceoryx) {
     Pipes pipes;
-    auto ours = make_our_pipe(pool, side);
-    if (!ours) return std::unexpected(std::move(ours).error());
-    pipes.ours = *std::move(ours);
+    PLCHOST_TRY_ASSIGN(pipes.ours, make_our_pipe(pool, side));
     pipes.socket = make_socket_pipe(socket);
     const bool here = side == BlocksSide::bench;
     pipes.bare = make_bare_pipe(here ? board.to_peer : board.to_bench, here ? board.to_bench : board.to_peer);
@@ -187,12 +185,11 @@ class Pair {
     const std::uint32_t order = board_.ordered.fetch_add(1) + 1;
     while (board_.begun.load() != order) pause_for(std::chrono::milliseconds(1));
     const OnCore measured(plan_.task_core);
-    auto thread = Thread::start("blocks", kPriority, [&] {
-      measure(*pipes_.of(way));
-      board_.stop.store(true);
-    });
-    if (!thread) return std::unexpected(std::move(thread).error());
-    thread->join();
+    PLCHOST_TRY_ASSIGN(auto thread, Thread::start("blocks", kPriority, [&] {
+                         measure(*pipes_.of(way));
+                         board_.stop.store(true);
+                       }));
+    thread.join();
     while (board_.ended.load() != order) pause_for(std::chrono::milliseconds(1));
     return {};
   }
@@ -219,9 +216,7 @@ Result<Row> measure_latency(const Plan& plan, Pair& pair, std::size_t size, bool
   if (with_iceoryx) {
     subjects.emplace_back([&](Duration slice) { return pair.latency(Way::iceoryx, size, slice, row.floor); });
   }
-  if (auto done = alternate(plan, subjects, kBlocksSlice); !done) {
-    return std::unexpected(std::move(done).error());
-  }
+  PLCHOST_TRY(alternate(plan, subjects, kBlocksSlice));
   row.extra = {{"socket_p50_us", summarise(socket).p50},
                {"socket_p99_us", summarise(socket).p99},
                {"bare_p50_us", summarise(bare).p50},
@@ -252,9 +247,7 @@ Result<Row> measure_throughput(const Plan& plan, Pair& pair, std::size_t size, b
   std::vector<Subject> subjects{subject(Way::ours, row.ours), subject(Way::memcpy, row.floor),
                                 subject(Way::bare, bare), subject(Way::socket, socket)};
   if (with_iceoryx) subjects.push_back(subject(Way::iceoryx, iceoryx));
-  if (auto done = alternate(plan, subjects, kBlocksSlice); !done) {
-    return std::unexpected(std::move(done).error());
-  }
+  PLCHOST_TRY(alternate(plan, subjects, kBlocksSlice));
   const double ours = gigabytes_per_second(size, row.ours);
   const double memcpy = gigabytes_per_second(size, row.floor);
   const double across = gigabytes_per_second(size, bare);
@@ -283,9 +276,8 @@ Result<std::vector<Row>> measure_all(const Plan& plan, Board& board, const std::
   std::vector<Row> rows;
   for (const auto measure : {&measure_latency, &measure_throughput}) {
     for (const std::size_t size : kSizes) {
-      auto row = measure(plan, pair, size, with_iceoryx);
-      if (!row) return std::unexpected(std::move(row).error());
-      rows.push_back(*std::move(row));
+      PLCHOST_TRY_ASSIGN(auto row, measure(plan, pair, size, with_iceoryx));
+      rows.push_back(std::move(row));
     }
   }
   board.quit.store(true);

@@ -69,18 +69,12 @@ class OurPipe : public BlocksPipe {
   static Result<std::unique_ptr<BlocksPipe>> open(const std::string& pool, BlocksSide side) {
     std::unique_ptr<OurPipe> pipe(new OurPipe);
     const NodeOptions options{.pool = pool, .entry = {.name = side == BlocksSide::bench ? "bench" : "peer"}};
-    auto node = BlockNode::join(options);
-    if (!node) return std::unexpected(std::move(node).error());
-    pipe->node_ = *std::move(node);
-    auto router = BlockRouter::create(*pipe->node_);
-    if (!router) return std::unexpected(std::move(router).error());
-    pipe->router_ = *std::move(router);
-    auto channel = BlockChannel::open(*pipe->node_, "bench");
-    if (!channel) return std::unexpected(std::move(channel).error());
-    pipe->channel_.emplace(*std::move(channel));
-    auto thread = Thread::start("router", {}, [to = pipe.get()] { to->router_->run(to->stop_); });
-    if (!thread) return std::unexpected(std::move(thread).error());
-    pipe->thread_ = *std::move(thread);
+    PLCHOST_TRY_ASSIGN(pipe->node_, BlockNode::join(options));
+    PLCHOST_TRY_ASSIGN(pipe->router_, BlockRouter::create(*pipe->node_));
+    PLCHOST_TRY_ASSIGN(auto channel, BlockChannel::open(*pipe->node_, "bench"));
+    pipe->channel_.emplace(std::move(channel));
+    PLCHOST_TRY_ASSIGN(pipe->thread_,
+                       Thread::start("router", {}, [to = pipe.get()] { to->router_->run(to->stop_); }));
     const std::string_view other = side == BlocksSide::bench ? "peer" : "bench";
     while (pipe->to_ == NodeAddress{}) pipe->to_ = pipe->node_->find(other);
     // One message each way, so that both links are there.

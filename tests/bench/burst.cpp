@@ -83,14 +83,13 @@ Result<void> run_ours(const Plan& plan, Duration slice, Samples& into) {
     };
     configs.push_back(std::move(task));
   }
-  auto tasks = ManyTasks::start(plan, "CmpSchedule", std::move(configs));
-  if (!tasks) return std::unexpected(std::move(tasks.error()));
+  PLCHOST_TRY_ASSIGN(const auto tasks, ManyTasks::start(plan, "CmpSchedule", std::move(configs)));
   const OnCore out_of_the_way(plan.poster_core);
   std::this_thread::sleep_for(kWarmUp);
   const TimePoint begin = MonotonicClock::now();
   std::this_thread::sleep_for(slice);
   const TimePoint end = MonotonicClock::now();
-  if (auto stopped = (*tasks)->stop(); !stopped) return stopped;
+  if (auto stopped = tasks->stop(); !stopped) return stopped;
   add_overheads(log, begin, end, into);
   return {};
 }

@@ -73,9 +73,7 @@ class Cell {
   [[nodiscard]] Result<void> start(const Plan& plan) {
     const std::string program = (plan.programs / "plchostd").string();
     const std::string config = (folder_ / "bench.toml").string();
-    auto child = Child::start({program, "--config", config});
-    if (!child) return std::unexpected(std::move(child.error()));
-    manager_ = std::move(*child);
+    PLCHOST_TRY_ASSIGN(manager_, Child::start({program, "--config", config}));
     return wait_until(
         [&] {
           const auto page = InstancePageReader::open(pool_, "probe");

@@ -58,14 +58,13 @@ Result<std::string> output_of(const std::vector<std::string>& arguments) {
   if (::pipe2(ends.data(), O_CLOEXEC) != 0) return failure(ErrorCode::system, "pipe", errno);
   const UniqueFd from(ends[0]);
   UniqueFd to(ends[1]);
-  auto child = Child::start(arguments, to.get());
-  if (!child) return std::unexpected(std::move(child.error()));
+  PLCHOST_TRY_ASSIGN(auto child, Child::start(arguments, to.get()));
   to = UniqueFd();
   std::string text;
   std::array<char, 4096> block{};
   for (ssize_t got = 0; (got = ::read(from.get(), block.data(), block.size())) > 0;)
     text.append(block.data(), static_cast<std::size_t>(got));
-  if (auto ended = child->wait(); !ended) return failure_in(arguments.front(), std::move(ended.error()));
+  if (auto ended = child.wait(); !ended) return failure_in(arguments.front(), std::move(ended.error()));
   return text;
 }
 

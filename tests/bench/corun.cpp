@@ -42,9 +42,8 @@ Result<void> run_slice(const Plan& plan, ScheduledLoop& loop, Duration slice, Fi
   {
     const OnCore threads_inherit_it(plan.task_core);
     if (auto started = loop.start(our_log); !started) return started;
-    const auto release = release_of(loop);
-    if (!release) return std::unexpected(release.error());
-    bare.align(*release + kPeriod / 2);
+    PLCHOST_TRY_ASSIGN(const auto release, release_of(loop));
+    bare.align(release + kPeriod / 2);
     if (auto started = bare.start(bare_log); !started) return started;
   }
   const OnCore out_of_the_way(plan.poster_core);

@@ -84,9 +84,8 @@ Result<Row> measure_back_to_back(const Plan& plan) {
     faults = page_faults() - before;
   };
   const OnCore thread_inherits_it(plan.task_core);
-  auto thread = Thread::start("cost", kPriority, body);
-  if (!thread) return std::unexpected(std::move(thread.error()));
-  thread->join();
+  PLCHOST_TRY_ASSIGN(auto thread, Thread::start("cost", kPriority, body));
+  thread.join();
   row.extra = {{"page_faults_in_a_million_cycles", faults}};
   row.targets = {{"below 1 us of CPU", "us", summarise(row.ours).p50 - summarise(row.floor).p50, 1}};
   row.note = "a sample is 20,000 cycles; one reading of the clock for the release is in ours";

@@ -45,9 +45,7 @@ BareLoop::~BareLoop() {
 
 Result<void> BareLoop::start(CycleLog& log) {
   stopping_.store(false);
-  auto thread = Thread::start("floor", kPriority, [this, &log] { run(log); });
-  if (!thread) return std::unexpected(std::move(thread.error()));
-  thread_ = std::move(*thread);
+  PLCHOST_TRY_ASSIGN(thread_, Thread::start("floor", kPriority, [this, &log] { run(log); }));
   return {};
 }
 
@@ -94,9 +92,7 @@ Result<void> ScheduledLoop::start(CycleLog& log) {
   };
   TaskEnvironment environment;
   environment.statistics = [this](std::size_t) -> TaskStatistics& { return *statistics_; };
-  auto tasks = TaskSet::create(clock_, PriorityBand::normal, {task}, environment);
-  if (!tasks) return std::unexpected(std::move(tasks.error()));
-  tasks_ = std::move(*tasks);
+  PLCHOST_TRY_ASSIGN(tasks_, TaskSet::create(clock_, PriorityBand::normal, {task}, environment));
   return tasks_->start(scheduler_, settings_);
 }
 

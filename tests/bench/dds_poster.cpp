@@ -17,19 +17,14 @@ class BareWriter {
   Result<void> open(std::uint32_t domain) {
     dds::DomainOptions options;
     options.domain = domain;
-    auto made = dds::open_domain(dds::Role::client, options);
-    if (!made) return std::unexpected(made.error());
-    domain_ = std::move(*made);
+    PLCHOST_TRY_ASSIGN(domain_, dds::open_domain(dds::Role::client, options));
     auto participant =
         dds::check_entity(dds_create_participant(domain, nullptr, nullptr), "make a participant");
     if (!participant) return std::unexpected(participant.error());
     participant_ = std::move(*participant);
-    auto topic = dds::make_topic(participant_.get(), dds::kEventPost);
-    if (!topic) return std::unexpected(topic.error());
-    topic_ = std::move(*topic);
-    auto writer = dds::make_writer(participant_.get(), topic_.get(), dds::qos_of(dds::kEventPost));
-    if (!writer) return std::unexpected(writer.error());
-    writer_ = std::move(*writer);
+    PLCHOST_TRY_ASSIGN(topic_, dds::make_topic(participant_.get(), dds::kEventPost));
+    PLCHOST_TRY_ASSIGN(writer_,
+                       dds::make_writer(participant_.get(), topic_.get(), dds::qos_of(dds::kEventPost)));
     std::string_view(kBenchHost).copy(sample_.host, sizeof sample_.host - 1);
     std::string_view("probe").copy(sample_.instance, sizeof sample_.instance - 1);
     std::string_view("ping").copy(sample_.event, sizeof sample_.event - 1);

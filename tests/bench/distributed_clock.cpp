@@ -221,9 +221,7 @@ Result<std::vector<Row>> measure_distributed_clock(const Plan& plan) {
   const Duration length = plan.each + kSettling;
   Run run{.log = CycleLog(static_cast<std::size_t>(length / kPeriod) * 2 + 10'000)};
   std::optional<Reference> reference;
-  if (auto done = run_cycles(plan, length, run, reference); !done) {
-    return std::unexpected(std::move(done.error()));
-  }
+  PLCHOST_TRY(run_cycles(plan, length, run, reference));
   const auto cycles = run.log.between(TimePoint::min(), TimePoint::max());
   const auto steady = run.log.between(cycles.front().release + kSettling, TimePoint::max());
   Row planned{.name = "distributed_clock/planned", .sample = "a cycle", .ours = Samples(steady.size())};

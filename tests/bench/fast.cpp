@@ -55,9 +55,8 @@ Result<Row> measure_period(const Plan& plan, Duration period) {
 Result<std::vector<Row>> measure_fast(const Plan& plan) {
   std::vector<Row> rows;
   for (const Duration period : {std::chrono::microseconds(250), std::chrono::microseconds(100)}) {
-    auto row = measure_period(plan, period);
-    if (!row) return std::unexpected(std::move(row.error()));
-    rows.push_back(std::move(*row));
+    PLCHOST_TRY_ASSIGN(auto row, measure_period(plan, period));
+    rows.push_back(std::move(row));
   }
   return rows;
 }

@@ -89,9 +89,7 @@ Result<bench::Child> start_stress() {
 Result<std::vector<bench::Row>> measure(const Job& job, const bench::Plan& plan) {
   std::optional<bench::Child> stress;
   if (job.under_stress) {
-    auto started = start_stress();
-    if (!started) return std::unexpected(std::move(started.error()));
-    stress = std::move(*started);
+    PLCHOST_TRY_ASSIGN(stress, start_stress());
   }
   const bench::MachineWatch machine;
   auto rows = job.part->measure(plan);

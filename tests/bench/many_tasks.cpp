@@ -20,9 +20,8 @@ Result<std::unique_ptr<ManyTasks>> ManyTasks::start(const Plan& plan, std::strin
     return raw->statistics_[i];
   };
   const OnCore threads_inherit_it(plan.task_core);
-  auto made = TaskSet::create(self->clock_, PriorityBand::normal, std::move(tasks), environment);
-  if (!made) return std::unexpected(std::move(made.error()));
-  self->tasks_ = std::move(*made);
+  PLCHOST_TRY_ASSIGN(self->tasks_,
+                     TaskSet::create(self->clock_, PriorityBand::normal, std::move(tasks), environment));
   PLCHOST_TRY(self->tasks_->start(scheduler, {}));
   return self;
 }
@@ -39,8 +38,7 @@ std::uint64_t ManyTasks::sum(std::uint64_t TaskCounters::* member) const {
 
 Result<Duration> measure_tick(const Plan& plan, std::vector<TaskConfig> tasks, Duration slice) {
   constexpr Duration kTick = std::chrono::milliseconds(1);
-  auto started = ManyTasks::start(plan, "CmpSchedule", std::move(tasks));
-  if (!started) return std::unexpected(std::move(started.error()));
+  PLCHOST_TRY_ASSIGN(const auto started, ManyTasks::start(plan, "CmpSchedule", std::move(tasks)));
   const OnCore out_of_the_way(plan.poster_core);
   std::this_thread::sleep_for(kWarmUp);
   const ThreadUsage before = usage_of_other_threads("tick");
@@ -48,7 +46,7 @@ Result<Duration> measure_tick(const Plan& plan, std::vector<TaskConfig> tasks, D
   std::this_thread::sleep_for(slice);
   const Duration cpu = (usage_of_other_threads("tick") - before).cpu;
   const auto ticks = (MonotonicClock::now() - begin) / kTick;
-  PLCHOST_TRY((*started)->stop());
+  PLCHOST_TRY(started->stop());
   return cpu / ticks;
 }
 

@@ -29,9 +29,8 @@ Result<void> run_ours(const Plan& plan, const Variables& variables, Duration sli
     task.entry = [] {};
     configs.push_back(std::move(task));
   }
-  const auto cpu = measure_tick(plan, std::move(configs), slice);
-  if (!cpu) return std::unexpected(cpu.error());
-  into.push(*cpu);
+  PLCHOST_TRY_ASSIGN(const auto cpu, measure_tick(plan, std::move(configs), slice));
+  into.push(cpu);
   return {};
 }
 

@@ -53,9 +53,7 @@ Result<Row> measure_calls(const Plan& plan, const char* name, const char* note, 
           .floor = Samples(kMostSamples),
           .note = note};
   const OnCore here(plan.task_core);
-  if (auto done = alternate(plan, {calls(row.floor, floor), calls(row.ours, ours)}, kSlice); !done) {
-    return std::unexpected(std::move(done.error()));
-  }
+  PLCHOST_TRY(alternate(plan, {calls(row.floor, floor), calls(row.ours, ours)}, kSlice));
   row.targets = std::move(targets);
   for (Target& target : row.targets) {
     target.measured = ratio_of_times(summarise(row.ours).p50, summarise(row.floor).p50);
@@ -64,39 +62,34 @@ Result<Row> measure_calls(const Plan& plan, const char* name, const char* note, 
 }
 
 Result<Row> measure_post(const Plan& plan, ObjectPool& pool) {
-  const auto event = pool.create_shared_event("event");
-  if (!event) return std::unexpected(event.error());
+  PLCHOST_TRY_ASSIGN(const auto event, pool.create_shared_event("event"));
   // In shared memory like ours.
-  auto memory = pool.create_memory("floor", 64);
-  if (!memory) return std::unexpected(memory.error());
-  auto& word = *reinterpret_cast<std::atomic<std::uint64_t>*>(memory->object.bytes().data());
-  auto& other = *reinterpret_cast<std::atomic<std::uint64_t>*>(memory->object.bytes().data() + sizeof(word));
+  PLCHOST_TRY_ASSIGN(auto memory, pool.create_memory("floor", 64));
+  auto& word = *reinterpret_cast<std::atomic<std::uint64_t>*>(memory.object.bytes().data());
+  auto& other = *reinterpret_cast<std::atomic<std::uint64_t>*>(memory.object.bytes().data() + sizeof(word));
   return measure_calls(
       plan, "pool/post", "1,000 posts that nobody waits for; floor: a relaxed atomic add and a load",
-      {{"at most 1.3 of an add and a load", "ratio", 0, 1.3, true}}, [&] { (void)event->object.post(); },
+      {{"at most 1.3 of an add and a load", "ratio", 0, 1.3, true}}, [&] { (void)event.object.post(); },
       [&] {
         if (other.load(std::memory_order_relaxed) == 0) word.fetch_add(1, std::memory_order_relaxed);
       });
 }
 
 Result<Row> measure_mutex(const Plan& plan, ObjectPool& pool) {
-  const auto mutex = pool.create_mutex("mutex");
-  if (!mutex) return std::unexpected(mutex.error());
+  PLCHOST_TRY_ASSIGN(const auto mutex, pool.create_mutex("mutex"));
   pthread_mutexattr_t attributes;
   pthread_mutexattr_init(&attributes);
   pthread_mutexattr_setpshared(&attributes, PTHREAD_PROCESS_SHARED);
   pthread_mutexattr_setrobust(&attributes, PTHREAD_MUTEX_ROBUST);
   pthread_mutexattr_setprotocol(&attributes, PTHREAD_PRIO_INHERIT);
   pthread_mutex_t floor;
-  if (auto made = check_returned(pthread_mutex_init(&floor, &attributes), "mutex"); !made) {
-    return std::unexpected(made.error());
-  }
+  PLCHOST_TRY(check_returned(pthread_mutex_init(&floor, &attributes), "mutex"));
   return measure_calls(
       plan, "pool/mutex",
       "1,000 times lock and unlock; floor: the C library's, robust and priority-inheriting", {},
       [&] {
-        (void)mutex->object.lock();
-        (void)mutex->object.unlock();
+        (void)mutex.object.lock();
+        (void)mutex.object.unlock();
       },
       [&] {
         pthread_mutex_lock(&floor);
@@ -105,15 +98,14 @@ Result<Row> measure_mutex(const Plan& plan, ObjectPool& pool) {
 }
 
 Result<Row> measure_semaphore(const Plan& plan, ObjectPool& pool) {
-  const auto semaphore = pool.create_semaphore("semaphore", 0);
-  if (!semaphore) return std::unexpected(semaphore.error());
+  PLCHOST_TRY_ASSIGN(const auto semaphore, pool.create_semaphore("semaphore", 0));
   sem_t floor;
   PLCHOST_TRY(check_errno(::sem_init(&floor, 1, 0), "sem_init"));
   return measure_calls(
       plan, "pool/semaphore", "1,000 times post and wait; floor: sem_post and sem_wait", {},
       [&] {
-        (void)semaphore->object.post();
-        (void)semaphore->object.wait();
+        (void)semaphore.object.post();
+        (void)semaphore.object.wait();
       },
       [&] {
         ::sem_post(&floor);
@@ -241,8 +233,7 @@ Result<std::vector<Row>> measure_steps(const char* what, std::uint32_t count, st
 
 Result<std::vector<Row>> measure_pool(const Plan& plan) {
   const std::string name = own_name("pool");
-  auto pool = ObjectPool::create(name, {.max_objects = plan.objects});
-  if (!pool) return std::unexpected(pool.error());
+  PLCHOST_TRY_ASSIGN(auto pool, ObjectPool::create(name, {.max_objects = plan.objects}));
   struct Removed {
     ~Removed() {
       ObjectPool::remove(name);
@@ -252,7 +243,7 @@ Result<std::vector<Row>> measure_pool(const Plan& plan) {
   } const at_the_end{name};
 
   std::vector<Row> rows;
-  for (auto row : {measure_post(plan, *pool), measure_mutex(plan, *pool), measure_semaphore(plan, *pool)}) {
+  for (auto row : {measure_post(plan, pool), measure_mutex(plan, pool), measure_semaphore(plan, pool)}) {
     if (!row) return std::unexpected(std::move(row.error()));
     rows.push_back(*std::move(row));
   }
@@ -261,10 +252,10 @@ Result<std::vector<Row>> measure_pool(const Plan& plan) {
   const std::uint32_t memories = plan.objects / 10;
   for (auto steps : {measure_steps("semaphore", plan.objects, std::min(plan.objects, kMostMappings),
                                    "per object, a sample is 1,000; floor: sem_open, sem_close",
-                                   pool_semaphores(*pool, held), host_semaphores(floor_held)),
+                                   pool_semaphores(pool, held), host_semaphores(floor_held)),
                      measure_steps("memory", memories, memories,
                                    "of 4 KiB; floor: shm_open, posix_fallocate, mmap, shm_unlink",
-                                   pool_memories(*pool), host_memories())}) {
+                                   pool_memories(pool), host_memories())}) {
     if (!steps) return std::unexpected(std::move(steps.error()));
     for (Row& row : *steps) rows.push_back(std::move(row));
   }

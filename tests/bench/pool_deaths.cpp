@@ -121,23 +121,22 @@ Result<std::vector<Row>> measure_all(const Plan& plan, ObjectPool& pool) {
     const auto made = pool.create_semaphore(std::to_string(i), 1, {.keep = true});
     if (!made) return std::unexpected(made.error());
   }
-  const auto reader = ObjectPool::attach(pool.name(), ObjectPool::Access::read_only);
-  if (!reader) return std::unexpected(reader.error());
+  PLCHOST_TRY_ASSIGN(const auto reader, ObjectPool::attach(pool.name(), ObjectPool::Access::read_only));
   std::vector<Row> rows;
   std::uint32_t at = 0;
   const auto next = [&at, objects] { return std::to_string((at += 7919) % objects); };
   {
     const Killed killer([&] { kill_many(pool.name(), objects); });
-    auto opens = wait_for(plan.each / 2, [&] { return pool.open_semaphore(next()).has_value(); });
-    if (!opens) return std::unexpected(opens.error());
+    PLCHOST_TRY_ASSIGN(auto opens,
+                       wait_for(plan.each / 2, [&] { return pool.open_semaphore(next()).has_value(); }));
     rows.push_back(row_of(
-        "pool_deaths/open", *std::move(opens),
+        "pool_deaths/open", std::move(opens),
         fmt::format("open and close of one of {} objects, while others are killed in the midst of calls",
                     objects)));
-    auto looks = wait_for(plan.each / 2, [&] { return reader->look_at(next()).has_value(); });
-    if (!looks) return std::unexpected(looks.error());
+    PLCHOST_TRY_ASSIGN(auto looks,
+                       wait_for(plan.each / 2, [&] { return reader.look_at(next()).has_value(); }));
     rows.push_back(
-        row_of("pool_deaths/look", *std::move(looks), "a look at one, with the right to read only"));
+        row_of("pool_deaths/look", std::move(looks), "a look at one, with the right to read only"));
   }
   const std::uint32_t memories = plan.objects / 5;
   auto many = wait_for_the_end_of(pool, [memories](ObjectPool& own) {
@@ -166,10 +165,9 @@ Result<std::vector<Row>> measure_all(const Plan& plan, ObjectPool& pool) {
 
 Result<std::vector<Row>> measure_pool_deaths(const Plan& plan) {
   const std::string name = own_name("deaths");
-  auto pool = ObjectPool::create(name, {.max_objects = 10 * plan.objects});
-  if (!pool) return std::unexpected(pool.error());
-  auto rows = measure_all(plan, *pool);
-  const PoolFindings found = pool->tidy();
+  PLCHOST_TRY_ASSIGN(auto pool, ObjectPool::create(name, {.max_objects = 10 * plan.objects}));
+  auto rows = measure_all(plan, pool);
+  const PoolFindings found = pool.tidy();
   if (rows) rows->front().extra = {{"lists_made_anew", found.rebuilds}};
   ObjectPool::remove(name);
   remove_pool_memories(name);

@@ -32,30 +32,24 @@ class BareReader {
   Result<void> start(const Plan& plan, const DdsDomains& domains, DdsBoard& board) {
     dds::DomainOptions options;
     options.domain = domains.bare;
-    auto domain = dds::open_domain(dds::Role::server, options);
-    if (!domain) return std::unexpected(domain.error());
-    domain_ = std::move(*domain);
+    PLCHOST_TRY_ASSIGN(domain_, dds::open_domain(dds::Role::server, options));
     auto participant =
         dds::check_entity(dds_create_participant(domains.bare, nullptr, nullptr), "make a participant");
     if (!participant) return std::unexpected(participant.error());
     participant_ = std::move(*participant);
-    auto topic = dds::make_topic(participant_.get(), dds::kEventPost);
-    if (!topic) return std::unexpected(topic.error());
+    PLCHOST_TRY_ASSIGN(auto topic, dds::make_topic(participant_.get(), dds::kEventPost));
     dds::Qos qos = dds::qos_of(dds::kEventPost);
     qos.max_samples(dds::kEventPost.qos.reader_holds);
-    auto reader = dds::make_reader(participant_.get(), topic->get(), qos);
-    if (!reader) return std::unexpected(reader.error());
-    topic_ = std::move(*topic);
-    reader_ = std::move(*reader);
+    PLCHOST_TRY_ASSIGN(auto reader, dds::make_reader(participant_.get(), topic.get(), qos));
+    topic_ = std::move(topic);
+    reader_ = std::move(reader);
     waitset_ = dds::Entity(dds_create_waitset(participant_.get()));
     dds_set_status_mask(reader_.get(), DDS_DATA_AVAILABLE_STATUS);
     dds_waitset_attach(waitset_.get(), reader_.get(), 0);
     dds_waitset_attach(waitset_.get(), waitset_.get(), 1);
-    auto thread = Thread::start("bare-reader", kPriority, [this, &plan, &board] {
-      if (bind_thread({plan.task_core})) run(board);
-    });
-    if (!thread) return std::unexpected(thread.error());
-    thread_ = std::move(*thread);
+    PLCHOST_TRY_ASSIGN(thread_, Thread::start("bare-reader", kPriority, [this, &plan, &board] {
+                         if (bind_thread({plan.task_core})) run(board);
+                       }));
     return {};
   }
   void stop() {
@@ -135,10 +129,9 @@ Result<std::vector<Row>> measure_post_dds(const Plan& plan) {
   const DdsDomains domains{.plchost = kFirstDomain + 2 * salt, .bare = kFirstDomain + 2 * salt + 1};
   const std::string name = own_name("bench");
   const std::string board_name = name + ".board";
-  auto memory = MemoryFile::replace(board_name, sizeof(DdsBoard));
-  if (!memory) return std::unexpected(memory.error());
+  PLCHOST_TRY_ASSIGN(auto memory, MemoryFile::replace(board_name, sizeof(DdsBoard)));
   ::setenv(kBoardVariable, ("/dev/shm/" + board_name).c_str(), 1);
-  auto& board = *reinterpret_cast<DdsBoard*>(memory->bytes().data());
+  auto& board = *reinterpret_cast<DdsBoard*>(memory.bytes().data());
   // Forked before this process has any thread of DDS.
   const pid_t poster = ::fork();
   if (poster == 0) ::_exit(run_dds_poster(plan, domains, board));

@@ -123,15 +123,12 @@ Result<std::vector<Row>> measure(const Plan& plan, const DdsDomains& domains, Bo
   PLCHOST_TRY(cell.start(plan));
   dds::DomainOptions options;
   options.domain = domains.plchost;
-  auto client = ControlClient::connect(options);
-  if (!client) return std::unexpected(client.error());
-  const auto first = (*client)->post_event(ping_event(), 1, Duration::zero(), kPatience);
+  PLCHOST_TRY_ASSIGN(auto client, ControlClient::connect(options));
+  const auto first = client->post_event(ping_event(), 1, Duration::zero(), kPatience);
   if (!first) return std::unexpected(first.error());
-  const auto pool = ObjectPool::attach(cell.pool());
-  if (!pool) return std::unexpected(pool.error());
-  const auto event = pool->open_event("probe/ping");
-  if (!event) return std::unexpected(event.error());
-  Measurement measurement(plan, board, **client, *event);
+  PLCHOST_TRY_ASSIGN(const auto pool, ObjectPool::attach(cell.pool()));
+  PLCHOST_TRY_ASSIGN(const auto event, pool.open_event("probe/ping"));
+  Measurement measurement(plan, board, *client, event);
   std::vector<Row> rows;
   const auto take = [&rows](Result<Row> row) -> Result<void> {
     if (!row) return std::unexpected(row.error());

@@ -127,11 +127,10 @@ Result<void> run_ours(const Setting& setting, Duration slice, Samples& into) {
     return &setting.event.counted();
   };
   environment.statistics = [&](std::size_t) -> TaskStatistics& { return *statistics; };
-  auto tasks = TaskSet::create(clock, PriorityBand::normal, {task}, environment);
-  if (!tasks) return std::unexpected(std::move(tasks.error()));
-  if (auto started = (*tasks)->start("CmpSchedule", {}); !started) return started;
+  PLCHOST_TRY_ASSIGN(const auto tasks, TaskSet::create(clock, PriorityBand::normal, {task}, environment));
+  if (auto started = tasks->start("CmpSchedule", {}); !started) return started;
   if (auto done = post(setting, Kind::ours, posts); !done) return done;
-  if (auto stopped = (*tasks)->stop(std::chrono::seconds(5)); !stopped) return stopped;
+  if (auto stopped = tasks->stop(std::chrono::seconds(5)); !stopped) return stopped;
   into.append(samples);
   return {};
 }
@@ -157,9 +156,8 @@ Result<std::vector<Row>> measure_post_process(const Plan& plan) {
   if (memory == MAP_FAILED) return failure(ErrorCode::system, "mmap", errno);
   auto* board = new (memory) Board;
   const std::string name = own_name("bench");
-  auto pool = ObjectPool::create(name);
-  if (!pool) return std::unexpected(std::move(pool.error()));
-  auto event = pool->create_event("bench/ping");
+  PLCHOST_TRY_ASSIGN(auto pool, ObjectPool::create(name));
+  auto event = pool.create_event("bench/ping");
   if (!event || !event->set_registered(true)) return failure(ErrorCode::full, "no event in the pool");
   std::vector<Row> rows;
   Result<void> done;

@@ -103,11 +103,10 @@ class RateMeasurement {
     bare_.reset();
     dds::DomainOptions options;
     options.domain = domains_.plchost;
-    auto client = ControlClient::connect(options);
-    if (!client) return std::unexpected(client.error());
-    const auto first = (*client)->post_event(ping_event(), 1, Duration::zero(), kRatePatience);
+    PLCHOST_TRY_ASSIGN(auto client, ControlClient::connect(options));
+    const auto first = client->post_event(ping_event(), 1, Duration::zero(), kRatePatience);
     if (!first) return std::unexpected(first.error());
-    client_ = std::move(*client);
+    client_ = std::move(client);
     return bare_.emplace().open(bare_domain(domains_, duty));
   }
 
@@ -121,19 +120,16 @@ class RateMeasurement {
 Result<std::vector<Row>> measure_rate(const Plan& plan, const DdsDomains& domains, TakenBoard& board) {
   Cell cell(plan, domains, own_name("bench"));
   PLCHOST_TRY(cell.start(plan));
-  auto pool = ObjectPool::attach(cell.pool());
-  if (!pool) return std::unexpected(pool.error());
-  const auto ping = pool->open_event("probe/ping");
-  if (!ping) return std::unexpected(ping.error());
-  const auto counted = pool->create_event(fmt::format("probe/{}", kWithoutTask));
-  if (!counted) return std::unexpected(counted.error());
-  (void)counted->set_registered(true);
+  PLCHOST_TRY_ASSIGN(auto pool, ObjectPool::attach(cell.pool()));
+  PLCHOST_TRY_ASSIGN(const auto ping, pool.open_event("probe/ping"));
+  PLCHOST_TRY_ASSIGN(const auto counted, pool.create_event(fmt::format("probe/{}", kWithoutTask)));
+  (void)counted.set_registered(true);
   RateMeasurement measurement(plan, domains, board);
   std::vector<Row> rows;
   for (auto row : {measurement.round_trip("post/acknowledged/same-core", plan.poster_core),
                    measurement.round_trip("post/acknowledged/other-core", plan.task_core),
-                   measurement.rate("post/rate", BareDuty::nothing, kWithoutTask, *counted),
-                   measurement.rate("post/rate/a task runs", BareDuty::wake, "ping", *ping)}) {
+                   measurement.rate("post/rate", BareDuty::nothing, kWithoutTask, counted),
+                   measurement.rate("post/rate/a task runs", BareDuty::wake, "ping", ping)}) {
     if (!row) return std::unexpected(row.error());
     rows.push_back(std::move(*row));
   }

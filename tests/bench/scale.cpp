@@ -78,10 +78,9 @@ Result<void> run_ours(const Plan& plan, std::string_view scheduler, std::size_t 
     task.entry = [] { work(kWork); };
     configs.push_back(std::move(task));
   }
-  auto tasks = ManyTasks::start(plan, scheduler, std::move(configs));
-  if (!tasks) return std::unexpected(std::move(tasks.error()));
-  measure_slice(plan, slice, into, [&] { return (*tasks)->cycles(); }, [&] { return (*tasks)->lost(); });
-  return (*tasks)->stop();
+  PLCHOST_TRY_ASSIGN(const auto tasks, ManyTasks::start(plan, scheduler, std::move(configs)));
+  measure_slice(plan, slice, into, [&] { return tasks->cycles(); }, [&] { return tasks->lost(); });
+  return tasks->stop();
 }
 
 /// The bare threads' own counters.
@@ -173,9 +172,8 @@ Result<void> measure_idle_tick(const Plan& plan, std::size_t size, Duration slic
     task.entry = [] {};
     configs.push_back(std::move(task));
   }
-  const auto cpu = measure_tick(plan, std::move(configs), slice);
-  if (!cpu) return std::unexpected(cpu.error());
-  into.push(*cpu);
+  PLCHOST_TRY_ASSIGN(const auto cpu, measure_tick(plan, std::move(configs), slice));
+  into.push(cpu);
   return {};
 }
 
@@ -214,9 +212,8 @@ Result<std::vector<Row>> measure_scale(const Plan& plan) {
     rows.push_back(to_row(all_schedulers()[i].name, figures[i], figures.back()));
   Plan share = plan;
   share.each = plan.each / 4;
-  auto ticks = measure_ticks(share);
-  if (!ticks) return std::unexpected(std::move(ticks.error()));
-  rows.push_back(std::move(*ticks));
+  PLCHOST_TRY_ASSIGN(auto ticks, measure_ticks(share));
+  rows.push_back(std::move(ticks));
   return rows;
 }
 

@@ -63,10 +63,9 @@ Result<Row> measure(const Plan& plan, const std::string& name, StartBoard& board
 Result<std::vector<Row>> measure_start(const Plan& plan) {
   const std::string name = own_name("bench");
   const std::string board_name = name + ".board";
-  auto memory = MemoryFile::replace(board_name, sizeof(StartBoard));
-  if (!memory) return std::unexpected(std::move(memory.error()));
+  PLCHOST_TRY_ASSIGN(const auto memory, MemoryFile::replace(board_name, sizeof(StartBoard)));
   ::setenv(kBoardVariable, ("/dev/shm/" + board_name).c_str(), 1);
-  auto row = measure(plan, name, *reinterpret_cast<StartBoard*>(memory->bytes().data()));
+  auto row = measure(plan, name, *reinterpret_cast<StartBoard*>(memory.bytes().data()));
   MemoryFile::remove(board_name);
   ObjectPool::remove(name);
   if (!row) return std::unexpected(std::move(row.error()));

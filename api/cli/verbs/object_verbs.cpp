@@ -48,16 +48,15 @@ std::string type_names() {
 Result<std::vector<ListedObject>> all_pages(CliSession& session, const std::string& host, ObjectQuery query) {
   std::vector<ListedObject> objects;
   for (;;) {
-    auto listing = session.client().value()->list_objects(host, query, session.deadline());
-    if (!listing) return std::unexpected(std::move(listing).error());
-    objects.insert(objects.end(), std::make_move_iterator(listing->objects.begin()),
-                   std::make_move_iterator(listing->objects.end()));
-    if (listing->complete) return objects;
-    if (listing->next_after <= query.after) {
+    PLCHOST_TRY_ASSIGN(auto listing, session.client().value()->list_objects(host, query, session.deadline()));
+    objects.insert(objects.end(), std::make_move_iterator(listing.objects.begin()),
+                   std::make_move_iterator(listing.objects.end()));
+    if (listing.complete) return objects;
+    if (listing.next_after <= query.after) {
       return failure(ErrorCode::corrupt,
                      fmt::format("host '{}' lists no objects after '{}'", host, query.after));
     }
-    query.after = std::move(listing->next_after);
+    query.after = std::move(listing.next_after);
   }
 }
 

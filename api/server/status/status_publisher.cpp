@@ -60,9 +60,7 @@ Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const 
       ApplicationWatch(source.applications_folder, of_topics.of<plc_ApplicationStatus>());
   publisher.presence_ = std::move(*presence);
   publisher.publisher_ = *std::move(publisher_of_status);
-  if (auto read = publisher.page_.wait(MonotonicClock::now() + kPageWait); !read) {
-    return std::unexpected(std::move(read).error());
-  }
+  PLCHOST_TRY(publisher.page_.wait(MonotonicClock::now() + kPageWait));
   return publisher;
 }
 

@@ -73,20 +73,20 @@ void end_program(SharedObject& object, ApplicationHost& host) {
 
 Result<DeclaredApplication> Application::load(const std::string& path, ApplicationHost& host) {
   const bool beside = host.has_application();
-  auto object = beside ? SharedObject::load_copy(path, kExports) : SharedObject::load(path, kExports);
-  if (!object) return std::unexpected(object.error());
+  PLCHOST_TRY_ASSIGN(auto object,
+                     beside ? SharedObject::load_copy(path, kExports) : SharedObject::load(path, kExports));
   ApplicationDeclaration declaration;
   host.begin_init(declaration);
-  auto called = call_init(*object);
+  auto called = call_init(object);
   host.end_init();
   host.write_messages();  // its own error goes before ours
   if (!called) {
-    if (beside) object->unload();
+    if (beside) object.unload();
     return std::unexpected(called.error());
   }
-  auto made = built(*object, declaration);
+  auto made = built(object, declaration);
   if (made) return DeclaredApplication{*std::move(made), std::move(declaration)};
-  end_program(*object, host);
+  end_program(object, host);
   return std::unexpected(std::move(made).error());
 }
 

@@ -57,9 +57,8 @@ Result<SharedObject> SharedObject::load(const std::string& path, std::span<const
   PLCHOST_TRY(check_elf_file(path, symbols));
   // Without a slash, dlopen would search the system's folders for it.
   const std::string absolute = absolute_of(path);
-  auto handle = open_program(absolute, path);
-  if (!handle) return std::unexpected(std::move(handle).error());
-  return SharedObject(*handle, absolute);
+  PLCHOST_TRY_ASSIGN(const auto handle, open_program(absolute, path));
+  return SharedObject(handle, absolute);
 }
 
 Result<SharedObject> SharedObject::load_copy(const std::string& path,
@@ -75,9 +74,8 @@ Result<SharedObject> SharedObject::load_copy(const std::string& path,
   constexpr std::size_t kMaxName = 200;
   auto copy = memory_file(std::filesystem::path(path).filename().string().substr(0, kMaxName), *bytes);
   if (!copy) return fails(std::move(copy).error());
-  auto handle = open_program(fmt::format("/proc/self/fd/{}", copy->get()), path);
-  if (!handle) return std::unexpected(std::move(handle).error());
-  return SharedObject(*handle, absolute_of(path), *std::move(copy));
+  PLCHOST_TRY_ASSIGN(const auto handle, open_program(fmt::format("/proc/self/fd/{}", copy->get()), path));
+  return SharedObject(handle, absolute_of(path), *std::move(copy));
 }
 
 void* SharedObject::find(const char* symbol) const noexcept {

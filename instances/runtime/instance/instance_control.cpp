@@ -97,9 +97,7 @@ Result<std::string> Instance::carry_out(const ControlRequest& request) {
 Result<std::string> Instance::set_scheduler(const std::string& name) {
   PLCHOST_TRY(find_scheduler(name));
   if (life_.state() == ApplicationState::running) {
-    if (auto switched = tasks_->switch_to(name, start_.settings.scheduler); !switched) {
-      return std::unexpected(std::move(switched).error());
-    }
+    PLCHOST_TRY(tasks_->switch_to(name, start_.settings.scheduler));
   }
   scheduler_ = name;
   return {};

@@ -37,9 +37,7 @@ ApplicationLife::Record Instance::recorder() {
 
 Result<std::string> Instance::start(std::string_view why) {
   PLCHOST_TRY(host_->events().check_bound());
-  if (auto started = tasks_->start(scheduler_, start_.settings.scheduler); !started) {
-    return std::unexpected(std::move(started).error());
-  }
+  PLCHOST_TRY(tasks_->start(scheduler_, start_.settings.scheduler));
   if (auto bound = host_->events().publish_bound(true); !bound) {
     tasks_->park_all();
     (void)host_->events().publish_bound(false);

@@ -70,9 +70,7 @@ class FileWalk {
 
 Result<InstanceSettings> parse_settings(std::string_view text, std::string_view file) {
   SettingsParser parser;
-  if (const auto read = parser.read(text, std::string(file), ""); !read) {
-    return std::unexpected(read.error());
-  }
+  PLCHOST_TRY(parser.read(text, std::string(file), ""));
   return std::move(parser).finish();
 }
 

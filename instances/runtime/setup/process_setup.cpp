@@ -40,9 +40,7 @@ Result<void> lock_memory() {
                                "LimitMEMLOCK=infinity",
                                limit.rlim_cur / 1024));
   }
-  if (const auto locked = check_errno(::mlockall(MCL_CURRENT | MCL_FUTURE), "mlockall"); !locked) {
-    return std::unexpected(locked.error());
-  }
+  PLCHOST_TRY(check_errno(::mlockall(MCL_CURRENT | MCL_FUTURE), "mlockall"));
   ::mallopt(M_TRIM_THRESHOLD, -1);
   ::mallopt(M_MMAP_MAX, 0);
   return {};

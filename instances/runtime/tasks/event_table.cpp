@@ -13,9 +13,8 @@ namespace plchost {
 Result<void> EventTable::clear_left_behind() {
   if (pool_ == nullptr) return {};
   const std::string prefix = instance_ + "/";
-  const auto objects = pool_->list();
-  if (!objects) return std::unexpected(objects.error());
-  for (const ObjectInfo& object : *objects) {
+  PLCHOST_TRY_ASSIGN(const auto objects, pool_->list());
+  for (const ObjectInfo& object : objects) {
     if (object.type != ObjectType::event || !object.name.starts_with(prefix)) continue;
     const auto event = pool_->open_event(object.name);
     if (!event && event.error().code == ErrorCode::not_found) continue;
@@ -52,9 +51,7 @@ Result<RTS_HANDLE> EventTable::open(std::string_view name) {
   const std::size_t slash = name.find('/');
   const std::string_view owner = slash == std::string_view::npos ? instance_ : name.substr(0, slash);
   const std::string_view event = slash == std::string_view::npos ? name : name.substr(slash + 1);
-  if (auto valid = check_name("instance name", owner, kMaxInstanceName); !valid) {
-    return std::unexpected(valid.error());
-  }
+  PLCHOST_TRY(check_name("instance name", owner, kMaxInstanceName));
   PLCHOST_TRY(check_name("event name", event, kMaxEventName));
 
   const std::string object = event_object_name(owner, event);
@@ -157,14 +154,13 @@ Result<void> EventTable::register_by_operator(std::string_view event) {
 }
 
 Result<void> EventTable::unregister_by_operator(std::string_view event) {
-  const auto slot = open_own(event);
-  if (!slot) return std::unexpected(slot.error());
-  if ((*slot)->by_device) {
+  PLCHOST_TRY_ASSIGN(const auto slot, open_own(event));
+  if (slot->by_device) {
     return failure(
         ErrorCode::refused,
         fmt::format("external event '{}' is one of the device description: it stays registered", event));
   }
-  if (!(*slot)->registered()) {
+  if (!slot->registered()) {
     std::vector<std::string_view> known;
     for (std::size_t i = 0; i < count_.load(std::memory_order_relaxed); ++i) {
       const Slot& other = *slots_[i];
@@ -174,8 +170,8 @@ Result<void> EventTable::unregister_by_operator(std::string_view event) {
         ErrorCode::not_found,
         fmt::format("external event '{}' is not registered; registered are: {}", event, join_names(known)));
   }
-  (*slot)->by_application = (*slot)->by_operator = false;
-  return publish_registered(**slot);
+  slot->by_application = slot->by_operator = false;
+  return publish_registered(*slot);
 }
 
 std::vector<std::string> EventTable::registered_by_operator() const {
@@ -187,12 +183,11 @@ std::vector<std::string> EventTable::registered_by_operator() const {
 }
 
 Result<CountedEvent*> EventTable::bind_task(std::string_view event) {
-  const auto slot = open_own(event);
-  if (!slot) return std::unexpected(slot.error());
-  if ((*slot)->bound == nullptr) (*slot)->bound = (*slot)->event.load(std::memory_order_relaxed);
-  ++(*slot)->tasks;
-  show_use(**slot);
-  return (*slot)->bound == nullptr ? &(*slot)->own_counter : &(*slot)->bound->counted();
+  PLCHOST_TRY_ASSIGN(const auto slot, open_own(event));
+  if (slot->bound == nullptr) slot->bound = slot->event.load(std::memory_order_relaxed);
+  ++slot->tasks;
+  show_use(*slot);
+  return slot->bound == nullptr ? &slot->own_counter : &slot->bound->counted();
 }
 
 void EventTable::forget_tasks() {

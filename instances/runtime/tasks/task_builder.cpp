@@ -110,9 +110,7 @@ Result<std::vector<TaskConfig>> build_tasks(const sys_setup_tasks_struct& setup,
                                     setup.nTasks, PLC_MAX_TASKS));
   }
   if (setup.ptaskinfo == nullptr) return invalid_task("ptaskinfo is null");
-  if (auto name = field_text(setup.stApplicationName, "stApplicationName"); !name) {
-    return std::unexpected(name.error());
-  }
+  PLCHOST_TRY(field_text(setup.stApplicationName, "stApplicationName"));
   std::vector<TaskConfig> configs;
   std::set<std::string> names;
   for (int i = 0; i < setup.nTasks; ++i) {

@@ -128,22 +128,21 @@ Result<DeclaredApplication> declare_watched(const std::string& path, const Start
 Result<DeclaredApplication> try_start(const Options& options, Components& components, ApplicationHost& host) {
   const LaunchOptions& launch = options.launch;
   PLCHOST_TRY(try_cores(launch.cores));
-  auto start = read_start_settings(launch);
-  if (!start) return std::unexpected(std::move(start).error());
-  PLCHOST_TRY(BlockService::check(launch.pool, launch.name, start->settings.blocks));
+  PLCHOST_TRY_ASSIGN(const auto start, read_start_settings(launch));
+  PLCHOST_TRY(BlockService::check(launch.pool, launch.name, start.settings.blocks));
   auto attached = ObjectPool::attach(launch.pool, ObjectPool::Access::read_only);
   std::optional<ObjectPool> pool;
   if (attached) pool.emplace(*std::move(attached));
   if (auto room = room_in_pool(launch, pool)) host.events().look_for_room(*std::move(room));
-  PLCHOST_TRY(prepare_host(*start, host));
-  auto declared = declare_watched(options.check_application, *start, components, host);
+  PLCHOST_TRY(prepare_host(start, host));
+  auto declared = declare_watched(options.check_application, start, components, host);
   if (!declared) return declared;
   const auto& [application, declaration] = *declared;
   PLCHOST_TRY(host.reserve(declaration));
-  auto environment = areas_environment(launch, start->settings, application, pool ? &*pool : nullptr);
+  auto environment = areas_environment(launch, start.settings, application, pool ? &*pool : nullptr);
   environment.room = host.events().room();
   PLCHOST_TRY(Areas::check(environment, declaration.areas));
-  PLCHOST_TRY(try_tasks(options, start->settings, application, host));
+  PLCHOST_TRY(try_tasks(options, start.settings, application, host));
   return declared;
 }
 
