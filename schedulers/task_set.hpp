@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "schedulers/activation/single_cycle.hpp"
@@ -114,13 +115,19 @@ class TaskSet {
   /// Stops everything; waits for the cycles that are running, however long they take.
   ~TaskSet();
 
-  /// Whether start() would refuse this scheduler with these settings. Starts nothing.
-  [[nodiscard]] Result<void> check(std::string_view scheduler, const SchedulerSettings& settings);
-  /// Releases the tasks under the scheduler of that name. wrong_state: they run already, or one of them has
-  /// not come back since stop(), or is in exception. External events posted while the tasks were stopped are
-  /// not run but counted as lost. Edges of event variables are not run: the level at the start counts as
-  /// seen. An event variable that does not return from being read for the first time puts its task into
-  /// exception.
+  /// A start that cannot fail any more. Used before the next call of prepare(), begin_single_cycle() or
+  /// switch_to(), or not at all.
+  class Prepared;
+  /// Takes all steps of a start that can fail, and starts nothing. wrong_state: the tasks run already, or one
+  /// of them has not come back since stop(), or is in exception. unsupported, invalid_argument: the scheduler
+  /// refuses these settings.
+  [[nodiscard]] Result<Prepared> prepare(std::string_view scheduler, const SchedulerSettings& settings);
+  /// Releases the tasks under the scheduler that was prepared. External events posted while the tasks were
+  /// stopped are not run but counted as lost. Edges of event variables are not run: the level at the start
+  /// counts as seen. An event variable that does not return from being read for the first time puts its task
+  /// into exception.
+  void start(Prepared prepared);
+  /// The two of them, one after the other.
   [[nodiscard]] Result<void> start(std::string_view scheduler, const SchedulerSettings& settings);
   /// Parks all tasks at the end of their cycles, those that drive outputs first. Waits, at most `limit` (real
   /// time, from when all were asked to) for each of the two phases; longer only for a task in no cycle.
@@ -278,6 +285,16 @@ class TaskSet {
   TickPlan first_look_;
   Ticker ticker_{clock_, poller_};
   std::vector<std::unique_ptr<TaskThread>> threads_;  // last: they use all of the above
+};
+
+class TaskSet::Prepared {
+ private:
+  friend class TaskSet;
+  Prepared(std::unique_ptr<Arrangement> arrangement, const SchedulerSettings& settings)
+      : arrangement_(std::move(arrangement)), settings_(settings) {}
+
+  std::unique_ptr<Arrangement> arrangement_;
+  SchedulerSettings settings_;
 };
 
 }  // namespace plchost

@@ -62,9 +62,11 @@ bool TaskSet::tick_by(Arrangement& arrangement) {
   return ticker_follows();
 }
 
-Result<void> TaskSet::check(std::string_view scheduler, const SchedulerSettings& settings) {
-  const auto arrangement = arrange(scheduler, settings);
-  return arrangement ? Result<void>() : std::unexpected(arrangement.error());
+Result<TaskSet::Prepared> TaskSet::prepare(std::string_view scheduler, const SchedulerSettings& settings) {
+  PLCHOST_TRY(check_startable());
+  if (tick_.device && tick_.device->fault() != TickFault::none) tick_ = {};  // is opened anew
+  PLCHOST_TRY_ASSIGN(auto arrangement, arrange(scheduler, settings));
+  return Prepared(std::move(arrangement), settings);
 }
 
 Result<void> TaskSet::check_startable() {
@@ -82,9 +84,14 @@ Result<void> TaskSet::check_startable() {
 }
 
 Result<void> TaskSet::start(std::string_view scheduler, const SchedulerSettings& settings) {
-  if (auto startable = check_startable(); !startable) return startable;
-  if (tick_.device && tick_.device->fault() != TickFault::none) tick_ = {};  // is opened anew
-  PLCHOST_TRY_ASSIGN(active_, arrange(scheduler, settings));
+  PLCHOST_TRY_ASSIGN(auto prepared, prepare(scheduler, settings));
+  start(std::move(prepared));
+  return {};
+}
+
+void TaskSet::start(Prepared prepared) {
+  const SchedulerSettings& settings = prepared.settings_;
+  active_ = std::move(prepared.arrangement_);
   tick_ = active_->tick;
   distributed_clock_.configure(settings.distributed_clock);
   distributed_clock_.set_steering(active_->scheduler->capabilities().one_shot);
@@ -104,7 +111,6 @@ Result<void> TaskSet::start(std::string_view scheduler, const SchedulerSettings&
     hand_out_sources();
   }
   (void)wait_until_settled(MonotonicClock::now() + kSwitchPatience);
-  return {};
 }
 
 Result<void> TaskSet::switch_to(std::string_view scheduler, const SchedulerSettings& settings) {

@@ -196,10 +196,10 @@ TEST_F(AuxiliaryTicks, OneShotIsRefusedAtTheStartAndAtASwitchWithTheReason) {
   ASSERT_FALSE(refused);
   EXPECT_EQ(refused.error().code, ErrorCode::unsupported);
   EXPECT_THAT(refused.error().message, HasSubstr("/dev/rtc7 only has frequencies that are powers of two"));
-  const auto checked = set->check("CmpScheduleOneShot", settings(k1024Hertz));
-  ASSERT_FALSE(checked) << "a trial finds what a start does";
-  EXPECT_EQ(checked.error().message, refused.error().message);
-  EXPECT_TRUE(set->check("CmpSchedule", settings(k1024Hertz)));
+  const auto prepared = set->prepare("CmpScheduleOneShot", settings(k1024Hertz));
+  ASSERT_FALSE(prepared) << "before anything is kept for the start";
+  EXPECT_EQ(prepared.error().message, refused.error().message);
+  EXPECT_TRUE(set->prepare("CmpSchedule", settings(k1024Hertz)));
   const TimePoint origin = start("CmpSchedule", settings(k1024Hertz));
   clock.run_until(origin + milliseconds(20));
   const auto switched = set->switch_to("CmpScheduleOneShot", settings(k1024Hertz));
@@ -210,6 +210,22 @@ TEST_F(AuxiliaryTicks, OneShotIsRefusedAtTheStartAndAtASwitchWithTheReason) {
   clock.run_for(milliseconds(20));
   EXPECT_GT(starts.size(), before) << "the one before goes on";
   finish();
+}
+
+// The device is busy at first, and then the scheduler would not have it.
+TEST_F(AuxiliaryTicks, AStartThatIsPreparedDoesNotFailWhateverBecomesOfTheDevice) {
+  device.absent = true;
+  add_noting(milliseconds(2));
+  ASSERT_TRUE(create());
+  auto prepared = set->prepare("CmpScheduleOneShot", settings(milliseconds(1)));
+  ASSERT_TRUE(prepared) << prepared.error().describe();
+  device.absent = false;
+  const auto refused = set->prepare("CmpScheduleOneShot", settings(milliseconds(1)));
+  ASSERT_FALSE(refused);
+  const TimePoint origin = clock.now() + TaskSet::kStartLead;
+  set->start(*std::move(prepared));
+  clock.run_until(origin + milliseconds(10));
+  EXPECT_EQ(starts, grid(origin, milliseconds(2), 6));
 }
 
 TEST_F(AuxiliaryTicks, OneShotRunsOnTheSystemsClockIfTheDeviceIsNotThere) {

@@ -256,15 +256,15 @@ Result<std::string> Instance::make_tasks() {
 }
 
 Result<std::string> Instance::start_scheduler() {
-  const bool runs = tasks_ && !options_.launch.stopped;
-  if (runs) {
-    PLCHOST_TRY(tasks_->check(scheduler_, start_.settings.scheduler));
+  std::optional<TaskSet::Prepared> prepared;
+  if (tasks_ && !options_.launch.stopped) {
+    PLCHOST_TRY_ASSIGN(prepared, prepare_start());
   }
   // A start that has failed until here leaves the memories of the pool and the retain values as they were.
-  // Not later: a task that aborts with the lock of the heap would hold it up.
+  // Nothing fails behind it. Not later: a task that aborts with the lock of the heap would hold it up.
   PLCHOST_TRY(host_->areas().keep());
-  if (!runs) return {};
-  return start("start of the process");
+  if (prepared) start(*std::move(prepared), "start of the process");
+  return {};
 }
 
 void Instance::notify_tasks(unsigned event) {

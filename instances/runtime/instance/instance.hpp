@@ -120,7 +120,10 @@ class Instance {
 
   // The life of the application: instance_life.cpp
   [[nodiscard]] ApplicationLife::Record recorder();
-  [[nodiscard]] Result<std::string> start(std::string_view why);
+  /// All steps of a start that can fail.
+  [[nodiscard]] Result<TaskSet::Prepared> prepare_start();
+  void start(TaskSet::Prepared prepared, std::string_view why);
+  [[nodiscard]] Result<std::string> start_by_command();
   void unbind(std::size_t index);
   void begin_stop(std::string_view why);
   [[nodiscard]] Result<std::string> begin_single_cycle();

@@ -60,8 +60,7 @@ Result<std::string> Instance::carry_out(const ControlRequest& request) {
   using Do = Result<std::string> (*)(Instance&, const ControlRequest&);
   using Row = std::pair<ControlVerb, Do>;
   static constexpr std::array kOwn = {
-      Row(ControlVerb::start,
-          [](Instance& self, const auto& /*asked*/) { return self.start("asked to start"); }),
+      Row(ControlVerb::start, [](Instance& self, const auto& /*asked*/) { return self.start_by_command(); }),
       Row(ControlVerb::stop,
           [](Instance& self, const auto& /*asked*/) {
             self.begin_stop("asked to stop");

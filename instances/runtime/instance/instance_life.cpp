@@ -35,17 +35,23 @@ ApplicationLife::Record Instance::recorder() {
   };
 }
 
-Result<std::string> Instance::start(std::string_view why) {
-  PLCHOST_TRY(host_->events().check_bound());
-  PLCHOST_TRY(tasks_->start(scheduler_, start_.settings.scheduler));
-  if (auto bound = host_->events().publish_bound(true); !bound) {
-    tasks_->park_all();
-    (void)host_->events().publish_bound(false);
-    return std::unexpected(std::move(bound).error());
-  }
+Result<TaskSet::Prepared> Instance::prepare_start() {
+  PLCHOST_TRY_ASSIGN(auto prepared, tasks_->prepare(scheduler_, start_.settings.scheduler));
+  PLCHOST_TRY(host_->events().hold_bound());
+  return prepared;
+}
+
+void Instance::start(TaskSet::Prepared prepared, std::string_view why) {
+  tasks_->start(std::move(prepared));
+  host_->events().publish_bound(true);
   unbound_.assign(application_->tasks().size(), false);
   life_.go_to(ApplicationState::running,
               fmt::format("{}: {} tasks under {}", why, application_->tasks().size(), scheduler_));
+}
+
+Result<std::string> Instance::start_by_command() {
+  PLCHOST_TRY_ASSIGN(auto prepared, prepare_start());
+  start(std::move(prepared), "asked to start");
   return {};
 }
 
@@ -119,7 +125,7 @@ void Instance::enter_exception(const std::string& reason) {
   if (!life_.go_to(ApplicationState::exception, reason)) return;
   drop_change("the application that runs is in exception");
   tasks_->park_all();
-  (void)host_->events().publish_bound(false);
+  host_->events().publish_bound(false);
   beat();
   answer_waiting(ErrorCode::timed_out, fmt::format("it is in exception now: {}; reset it to go on", reason));
 }
@@ -157,7 +163,7 @@ Result<void> Instance::shut_down() {
   Result<void> stopped;
   if (tasks_) {
     tasks_->park_all();
-    (void)host_->events().publish_bound(false);
+    host_->events().publish_bound(false);
     const auto busy = tasks_->still_busy(MonotonicClock::now() + kParkPatience);
     parked_ = tasks_->has_parked_thread();  // also one that a watchdog caught after its stop had timed out
     if (busy.empty()) {

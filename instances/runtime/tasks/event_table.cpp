@@ -1,6 +1,7 @@
 #include "instances/runtime/tasks/event_table.hpp"
 
 #include <span>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -81,17 +82,32 @@ Result<EventTable::Slot*> EventTable::open_own(std::string_view event) {
                  fmt::format("external event '{}' belongs to another instance than '{}'", event, instance_));
 }
 
+// It is registered by that party only if the pool tells of it: the next registration would else be told that
+// it is there already.
+Result<void> EventTable::register_by(Slot& slot, bool Slot::* party) {
+  const bool before = std::exchange(slot.*party, true);
+  auto published = publish_registered(slot);
+  if (!published) slot.*party = before;
+  return published;
+}
+
 Result<void> EventTable::publish_registered(Slot& slot) {
   if (pool_ == nullptr) return {};
-  const bool registered = slot.registered();
-  if (!slot.event.load(std::memory_order_relaxed)->set_registered(registered)) {
+  if (!slot.event.load(std::memory_order_relaxed)->set_registered(true)) {
     // It lost its place in the pool while nobody used it; a task that was bound to it notices in
-    // check_bound().
-    if (auto attached = attach(slot); !attached) return attached;
-    (void)slot.event.load(std::memory_order_relaxed)->set_registered(registered);
+    // hold_bound().
+    PLCHOST_TRY(attach(slot));
+    (void)slot.event.load(std::memory_order_relaxed)->set_registered(true);
   }
   show_use(slot);
   return {};
+}
+
+// Parties have ended their registrations. An event that lost its place in the pool is registered no more.
+void EventTable::withdraw_registered(Slot& slot) {
+  if (pool_ == nullptr) return;
+  (void)slot.event.load(std::memory_order_relaxed)->set_registered(slot.registered());
+  show_use(slot);
 }
 
 // So that others see who uses it, and so that it keeps its place in the pool while the tasks are stopped. It
@@ -112,8 +128,7 @@ Result<void> EventTable::register_by_application(RTS_HANDLE handle) {
   if (slot->by_application) {
     return failure(ErrorCode::already_exists, fmt::format("external event '{}' is registered", slot->name));
   }
-  slot->by_application = true;
-  return publish_registered(*slot);
+  return register_by(*slot, &Slot::by_application);
 }
 
 bool EventTable::is_own(RTS_HANDLE handle) const noexcept {
@@ -134,13 +149,13 @@ Result<void> EventTable::unregister_by_application(RTS_HANDLE handle) {
     return failure(ErrorCode::not_found, fmt::format("external event '{}' is not registered", slot->name));
   }
   slot->by_application = false;
-  return publish_registered(*slot);
+  withdraw_registered(*slot);
+  return {};
 }
 
 Result<void> EventTable::register_by_device(std::string_view event) {
   PLCHOST_TRY_ASSIGN(const auto slot, open_own(event));
-  slot->by_device = true;
-  return publish_registered(*slot);
+  return register_by(*slot, &Slot::by_device);
 }
 
 Result<void> EventTable::register_by_operator(std::string_view event) {
@@ -149,8 +164,7 @@ Result<void> EventTable::register_by_operator(std::string_view event) {
     return failure(ErrorCode::already_exists,
                    fmt::format("external event '{}' is registered already", event));
   }
-  slot->by_operator = true;
-  return publish_registered(*slot);
+  return register_by(*slot, &Slot::by_operator);
 }
 
 Result<void> EventTable::unregister_by_operator(std::string_view event) {
@@ -171,7 +185,8 @@ Result<void> EventTable::unregister_by_operator(std::string_view event) {
         fmt::format("external event '{}' is not registered; registered are: {}", event, join_names(known)));
   }
   slot->by_application = slot->by_operator = false;
-  return publish_registered(*slot);
+  withdraw_registered(*slot);
+  return {};
 }
 
 std::vector<std::string> EventTable::registered_by_operator() const {
@@ -191,17 +206,21 @@ Result<CountedEvent*> EventTable::bind_task(std::string_view event) {
 }
 
 void EventTable::forget_tasks() {
-  (void)publish_bound(false);
+  publish_bound(false);
   for (std::size_t i = 0; i < count_.load(std::memory_order_relaxed); ++i) {
     slots_[i]->tasks = 0;
     show_use(*slots_[i]);
   }
 }
 
-Result<void> EventTable::check_bound() const {
+// One that is registered has its place; another one has it while tasks are bound to it, and no poster may
+// post to that.
+Result<void> EventTable::hold_bound() {
   for (std::size_t i = 0; i < count_.load(std::memory_order_relaxed); ++i) {
     const Slot& slot = *slots_[i];
-    if (slot.tasks == 0 || slot.bound == nullptr || slot.bound->valid()) continue;
+    if (slot.tasks == 0 || slot.bound == nullptr) continue;
+    if (slot.registered() ? slot.bound->valid() : slot.bound->set_bound_tasks(slot.tasks)) continue;
+    publish_bound(false);
     return failure(
         ErrorCode::wrong_state,
         fmt::format("external event '{}' lost its place in the object pool, which was full or damaged, "
@@ -211,14 +230,18 @@ Result<void> EventTable::check_bound() const {
   return {};
 }
 
-Result<void> EventTable::publish_bound(bool running) {
+void EventTable::publish_bound(bool running) {
   for (std::size_t i = 0; i < count_.load(std::memory_order_relaxed); ++i) {
     Slot& slot = *slots_[i];
     if (slot.tasks == 0 || slot.bound == nullptr) continue;
     slot.taking = running ? slot.tasks : 0;
-    if (!slot.bound->set_bound_tasks(slot.taking) && running) return check_bound();
+    const bool told = slot.bound->set_bound_tasks(slot.taking);
+    if (told || !running) continue;
+    spdlog::error(
+        "external event '{}' lost its place in the object pool, which was damaged: its task does not "
+        "run for posts. Reset the instance",
+        slot.name);
   }
-  return {};
 }
 
 void EventTable::withdraw_task(std::string_view event) {

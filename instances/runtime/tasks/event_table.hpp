@@ -61,11 +61,12 @@ class EventTable {
   /// event.
   [[nodiscard]] Result<CountedEvent*> bind_task(std::string_view event);
   void forget_tasks();
-  /// Whether all counters that tasks are bound to are still theirs (see ObjectPool: an event that is
-  /// neither registered nor bound may lose its place).
-  [[nodiscard]] Result<void> check_bound() const;
+  /// Before a start: all counters that tasks are bound to are still theirs, and stay it until publish_bound()
+  /// or forget_tasks() (see ObjectPool: an event that is neither registered nor bound may lose its place).
+  /// Posters notice nothing. wrong_state: one is lost, and none is held.
+  [[nodiscard]] Result<void> hold_bound();
   /// Tells posters whether the tasks run: bound, or not.
-  [[nodiscard]] Result<void> publish_bound(bool running);
+  void publish_bound(bool running);
   /// Tells posters that one of the tasks that are bound to the own event takes no more posts, the others do.
   void withdraw_task(std::string_view event);
   /// Gets events of others that lost their place in the pool back. Now and then.
@@ -98,6 +99,8 @@ class EventTable {
   [[nodiscard]] Result<Slot*> open_own(std::string_view event);
   [[nodiscard]] Result<void> attach(Slot& slot);
   [[nodiscard]] Result<void> publish_registered(Slot& slot);
+  [[nodiscard]] Result<void> register_by(Slot& slot, bool Slot::* party);
+  void withdraw_registered(Slot& slot);
   void show_use(Slot& slot);
 
   std::string instance_;

@@ -104,7 +104,8 @@ Result<void> try_tasks(const Options& options, const InstanceSettings& settings,
   };
   PLCHOST_TRY_ASSIGN(const auto tasks,
                      TaskSet::create(clock, options.band, application.tasks(), std::move(environment)));
-  return tasks->check(scheduler_for(options.launch.scheduler, settings), settings.scheduler);
+  PLCHOST_TRY(tasks->prepare(scheduler_for(options.launch.scheduler, settings), settings.scheduler));
+  return {};
 }
 
 // The part that runs code of components and of the application.

@@ -3,6 +3,7 @@
 #include <optional>
 
 #include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -28,7 +29,7 @@ TEST_F(EventTableTest, PostTellsWhetherItIsRegisteredAndBound) {
   ASSERT_TRUE(sut_.register_by_application(handle));
   EXPECT_EQ(sut_.post(handle), ERR_NO_TASK);
   CountedEvent* const counted = sut_.bind_task("ready").value();
-  ASSERT_TRUE(sut_.publish_bound(true));
+  sut_.publish_bound(true);
   EXPECT_EQ(sut_.post(handle), ERR_OK);
   EXPECT_EQ(counted->count(), 2U);
 }
@@ -37,7 +38,7 @@ TEST_F(EventTableTest, SetNeedsNoRegistrationButATask) {
   const RTS_HANDLE handle = sut_.open("ready").value();
   EXPECT_EQ(sut_.set(handle), ERR_NO_TASK);
   CountedEvent* const counted = sut_.bind_task("ready").value();
-  ASSERT_TRUE(sut_.publish_bound(true));
+  sut_.publish_bound(true);
   EXPECT_EQ(sut_.set(handle), ERR_OK);
   EXPECT_EQ(counted->count(), 1U);
 }
@@ -48,13 +49,13 @@ TEST_F(EventTableTest, WithdrawsItsTasksOneByOne) {
   const PoolEvent other = pool_.open_event("line1/other").value();
   sut_.withdraw_task("ready");  // before any is bound
   EXPECT_EQ(ready.bound_tasks(), 0U);
-  ASSERT_TRUE(sut_.publish_bound(true));
+  sut_.publish_bound(true);
   for (const std::uint32_t left : {1U, 0U, 0U}) {
     sut_.withdraw_task("ready");
     EXPECT_EQ(ready.bound_tasks(), left);
     EXPECT_EQ(other.bound_tasks(), 1U);
   }
-  ASSERT_TRUE(sut_.publish_bound(true));
+  sut_.publish_bound(true);
   EXPECT_EQ(ready.bound_tasks(), 2U);
 }
 
@@ -120,7 +121,7 @@ TEST_F(EventTableTest, WithdrawsItsOwnEventsAndNoOthers) {
   ASSERT_TRUE(sut_.register_by_application(sut_.open("ready").value()));
   (void)sut_.open("line2/ready");
   ASSERT_TRUE(sut_.bind_task("ready"));
-  ASSERT_TRUE(sut_.publish_bound(true));
+  sut_.publish_bound(true);
   sut_.withdraw_own();
   EXPECT_FALSE(pool_.open_event("line1/ready").value().registered());
   EXPECT_EQ(pool_.open_event("line1/ready").value().bound_tasks(), 0U);
@@ -156,11 +157,81 @@ TEST_F(EventTableTest, KeepsTheEventOfAFirmwareThatEndedWhileTheTasksAreStopped)
   {
     const auto firmware = pool_.create_shared_event("line1/ready").value();
     ASSERT_TRUE(sut_.bind_task("ready"));
-    ASSERT_TRUE(sut_.publish_bound(true));
+    sut_.publish_bound(true);
   }
-  ASSERT_TRUE(sut_.publish_bound(false));
-  EXPECT_TRUE(sut_.publish_bound(true));
+  sut_.publish_bound(false);
+  sut_.publish_bound(true);
   EXPECT_EQ(pool_.look_at("line1/ready").value().bound_tasks, 1U);
+}
+
+/// Its pool is small, and gives the places of what nobody uses to others.
+class EventTableOfASmallPool : public ::testing::Test {
+ protected:
+  ~EventTableOfASmallPool() override { ObjectPool::remove(name_); }
+
+  /// Afterwards there is room again.
+  void take_all_places() {
+    int made = 0;
+    while (pool_.create_semaphore(fmt::format("s{}", made), 0, {.keep = true})) ++made;
+    for (int i = 0; i < made; ++i) ASSERT_TRUE(pool_.remove_object(fmt::format("s{}", i)));
+  }
+  [[nodiscard]] bool has_its_place() const { return pool_.open_event("line1/ready").has_value(); }
+
+  std::string name_ = own_name("events");
+  ObjectPool pool_ = ObjectPool::create(name_, {.max_objects = 64}).value();
+  EventTable sut_{"line1", &pool_};
+};
+
+// Else the operator's next attempt is told that it is there, and the restart registers what nobody was told
+// of.
+TEST_F(EventTableOfASmallPool, RegistersForNobodyIfThePoolIsLocked) {
+  const RTS_HANDLE handle = sut_.open("ready").value();
+  take_all_places();
+  ASSERT_FALSE(has_its_place());
+  {
+    const HeldPoolLock held(name_);
+    for (const auto& refused : {sut_.register_by_operator("ready"), sut_.register_by_application(handle),
+                                sut_.register_by_device("ready")}) {
+      ASSERT_FALSE(refused);
+      EXPECT_TRUE(is_transient(refused.error())) << refused.error().describe();
+    }
+  }
+  EXPECT_THAT(sut_.registered_by_operator(), ::testing::IsEmpty());
+  EXPECT_FALSE(sut_.is_by_application(handle));
+  EXPECT_EQ(sut_.unregister_by_operator("ready").error().code, ErrorCode::not_found) << "nor by the device";
+  EXPECT_EQ(sut_.post(handle), ERR_NO_OBJECT);
+  ASSERT_TRUE(sut_.register_by_operator("ready"));
+  EXPECT_THAT(sut_.registered_by_operator(), ::testing::ElementsAre("ready"));
+  EXPECT_EQ(sut_.post(handle), ERR_NO_TASK);
+}
+
+TEST_F(EventTableOfASmallPool, UnregistersWithoutTheLockOfThePool) {
+  const RTS_HANDLE handle = sut_.open("ready").value();
+  ASSERT_TRUE(sut_.register_by_operator("ready"));
+  (void)pool_.open_event("line1/ready").value().set_registered(false);  // by a stranger
+  sut_.forget_tasks();
+  take_all_places();
+  const HeldPoolLock held(name_);
+  EXPECT_TRUE(sut_.unregister_by_operator("ready"));
+  EXPECT_THAT(sut_.registered_by_operator(), ::testing::IsEmpty());
+  EXPECT_EQ(sut_.post(handle), ERR_NO_OBJECT);
+}
+
+TEST_F(EventTableOfASmallPool, HoldsWhatTasksAreBoundToForTheirStart) {
+  ASSERT_TRUE(sut_.open("ready"));
+  {
+    const HeldPoolLock held(name_);  // no reference is to be had
+    ASSERT_TRUE(sut_.bind_task("ready"));
+  }
+  ASSERT_TRUE(sut_.hold_bound());
+  take_all_places();
+  EXPECT_TRUE(has_its_place());
+  sut_.publish_bound(false);
+  take_all_places();
+  EXPECT_FALSE(has_its_place()) << "it was held by nothing else";
+  const auto lost = sut_.hold_bound();
+  ASSERT_FALSE(lost);
+  EXPECT_EQ(lost.error().code, ErrorCode::wrong_state);
 }
 
 TEST(EventTableWithoutPool, OnlyCollects) {
