@@ -68,8 +68,9 @@ void ManagedInstance::learn(const InstanceRuntime& said) {
   unreadable_.clear();
   if (!wish_known_ && !commanded_) {
     wants_running_ = said.running != 0;
-    // As an operator's stop: the next manager starts no machine that was found stopped.
-    commanded_ = said.state == ApplicationState::stopped;
+    // As an operator's stop: the next manager starts no machine that was found stopped, or on its way there.
+    commanded_ = said.state == ApplicationState::stopped || said.state == ApplicationState::stopping ||
+                 said.state == ApplicationState::single_cycle;
   }
   if (!said.scheduler.view().empty()) scheduler_ = said.scheduler.view();
   history_.safe_mode = said.application.view().empty() && !application_.empty();

@@ -23,6 +23,8 @@ void ManagedInstance::on_exit(const ExitStatus& status) {
   status_.pid = 0;
   status_.core = -1;
   const bool guessed = unheard_ && !unreadable_.empty();
+  // Neither an operator, nor an earlier manager, nor the process has said whether it is to run.
+  const bool nobodys_word = unheard_ && !wish_known_ && !commanded_;
   const SetupStep reached = step_;
   forget_signs();
   host_.set_timer(std::nullopt);
@@ -33,7 +35,7 @@ void ManagedInstance::on_exit(const ExitStatus& status) {
     return ended({.cause = EndCause::wish_unreadable}, text_of_beginning(EndCause::wish_unreadable));
   }
   if (phase_ == Phase::up) start_kind_ = StartKind::after_fault;
-  ended({.cause = cause_of(status),
+  ended({.cause = nobodys_word ? EndCause::unwatched : cause_of(status),
          .lasted = phase_ == Phase::up ? surroundings_.now() - up_since_ : Duration::zero(),
          .has_earlier = phase_ == Phase::adopting && before_.has_value() && !removed_},
         unasked(status));

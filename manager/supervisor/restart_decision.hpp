@@ -34,7 +34,7 @@ enum class EndCause : std::uint8_t {
   exited,     ///< with any code
   killed,     ///< by a signal that this manager did not send
   unknown,    ///< it was no child of this manager
-  unwatched,  ///< while no manager ran
+  unwatched,  ///< while no manager ran, or before this one knew whether it was to run
   // The process could not be started.
   start_refused,      ///< wrong files or settings, or not ready in time
   start_transient,    ///< the host was short of something, or a lock was held

@@ -233,6 +233,55 @@ TEST_F(Unheard, IsNotStartedAgainOnAGuess) {
   EXPECT_THAT(host_.spawned, IsEmpty());
 }
 
+// Its wish is not there, so only the configuration can say that it runs.
+TEST_F(Unheard, OfWhichNobodyHasSpokenFollowsItsConfigurationWhenItEnds) {
+  struct {
+    bool autostart;
+    RestartPolicy restart;
+    InstanceState wanted;
+  } const cases[] = {{false, RestartPolicy::never, InstanceState::offline},
+                     {false, RestartPolicy::on_failure, InstanceState::offline},
+                     {false, RestartPolicy::always, InstanceState::offline},
+                     {true, RestartPolicy::never, InstanceState::failed},
+                     {true, RestartPolicy::on_failure, InstanceState::waiting},
+                     {true, RestartPolicy::always, InstanceState::waiting}};
+  for (const auto& one : cases) {
+    for (const bool silent : {false, true}) {
+      SCOPED_TRACE(fmt::format("autostart {}, policy {}, silent {}", one.autostart,
+                               std::to_underlying(one.restart), silent));
+      config_.autostart = one.autostart;
+      config_.restart = one.restart;
+      wishes_.wish.reset();
+      host_.spawned.clear();
+      adopt();
+      if (silent) go_on_for(kSetupLimit + seconds(1));
+      host_.adoptable.reset();
+      sut().on_exit(ExitStatus{.known = false});
+      EXPECT_EQ(state(), one.wanted);
+      go_on_for(seconds(1));
+      EXPECT_EQ(host_.spawned.size(), one.wanted == InstanceState::waiting ? 1U : 0U);
+    }
+  }
+}
+
+TEST_F(Unheard, OfWhichNobodyHasSpokenStaysStoppedIfItIsFoundOnItsWayThere) {
+  for (const ApplicationState found :
+       {ApplicationState::stopped, ApplicationState::stopping, ApplicationState::single_cycle}) {
+    SCOPED_TRACE(std::to_underlying(found));
+    wishes_.wish.reset();
+    adopt();
+    answer_with(found);
+    ASSERT_TRUE(wishes_.wish);
+    adopt();  // by the next manager
+    host_.spawned.clear();
+    host_.adoptable.reset();
+    sut().on_exit(ExitStatus{.known = false});
+    go_on_for(seconds(1));
+    ASSERT_EQ(host_.spawned.size(), 1U);
+    EXPECT_TRUE(host_.spawned.back().stopped);
+  }
+}
+
 // A control thread that goes on after 20 s answers all questions in a row, before its page beats.
 TEST_F(Unheard, IsNotSaidToHaveADamagedPageForAnswersToOldQuestions) {
   adopt_one_in_its_set_up();

@@ -151,7 +151,8 @@ void for_each_end(Order order, const Check& check) {
         RestartHistory history = after_crashes((bits & 4U) != 0 ? 2 : 0);
         history.safe_mode = (bits & 8U) != 0;
         SCOPED_TRACE(fmt::format("cause {}, bits {:05b}", cause, bits));
-        check(end, decide(end, history, policy_of(restart, (bits & 16U) != 0)));
+        const InstanceConfig policy = policy_of(restart, (bits & 16U) != 0);
+        check(end, policy, decide(end, history, policy));
       }
     }
   }
@@ -163,17 +164,29 @@ bool starts(Action action) {
 }
 
 TEST(Decide, StartsNothingThatAnOperatorStoppedWithoutProcessUnlessAnOperatorDoes) {
-  for_each_end(Order::no_process, [](const End& end, const Decision& decision) {
+  for_each_end(Order::no_process, [](const End& end, const InstanceConfig&, const Decision& decision) {
     EXPECT_EQ(starts(decision.action), end.cause == EndCause::replaced);
   });
 }
 
+// As when a manager begins, or an adopted process ends of which nobody knows whether it was to run.
+TEST(Decide, StartsNothingThatNobodyHasStartedUnlessTheConfigurationDoes) {
+  for_each_end(Order::none, [](const End& end, const InstanceConfig& policy, const Decision& decision) {
+    const bool begins = end.cause == EndCause::unwatched || end.cause >= EndCause::never_begun;
+    EXPECT_FALSE(begins && !policy.autostart && starts(decision.action));
+  });
+}
+
 TEST(Decide, LetsNoApplicationRunThatAnOperatorStopped) {
-  for_each_end(Order::stop,
-               [](const End& /*end*/, const Decision& decision) { EXPECT_FALSE(decision.runs); });
-  for_each_end(Order::no_process,
-               [](const End& /*end*/, const Decision& decision) { EXPECT_FALSE(decision.runs); });
-  for_each_end(Order::run, [](const End& /*end*/, const Decision& decision) { EXPECT_TRUE(decision.runs); });
+  for_each_end(Order::stop, [](const End&, const InstanceConfig&, const Decision& decision) {
+    EXPECT_FALSE(decision.runs);
+  });
+  for_each_end(Order::no_process, [](const End&, const InstanceConfig&, const Decision& decision) {
+    EXPECT_FALSE(decision.runs);
+  });
+  for_each_end(Order::run, [](const End&, const InstanceConfig&, const Decision& decision) {
+    EXPECT_TRUE(decision.runs);
+  });
 }
 
 TEST(Decide, LeavesSafeModeOnlyByAnOperator) {
