@@ -7,6 +7,7 @@
 
 #include "manager/supervisor/managed_instance.hpp"
 #include "shm/base/dynamic_loader.hpp"
+#include "shm/base/transient.hpp"
 
 namespace plchost {
 
@@ -46,8 +47,9 @@ void ManagedInstance::set_up_ended(const ExitStatus& status, SetupStep reached) 
   const bool refused = status.exited_with(kExitSetupFailed) || status.exited_with(kExitUsage);
   if (setup_failure_.empty() && reached == SetupStep::bind_core && status.exited_with(kExitNotLoaded)) {
     const std::string said = host_.last_line();
-    setup_failure_ = said.empty() ? "the program could not be loaded" : said;
-    transient_ = transient_error_of_loader(said) != 0;
+    const Error error = error_of_loader(said.empty() ? "the program could not be loaded" : said);
+    transient_ = is_transient(error);
+    setup_failure_ = transient_ ? said : error.message;
   }
   if (!setup_failure_.empty()) {
     ended({.cause = cause_of_refusal(), .has_earlier = loaded},

@@ -50,7 +50,7 @@ class InstanceHost {
   [[nodiscard]] virtual std::string keep_lost_faults() = 0;
   /// Takes what the process has said into the instance's log. To be called now and then.
   virtual void read_output() = 0;
-  /// The last line that the process has said, cut to 500 bytes; empty: it has said nothing.
+  /// The last line that the process has said, of a longer one the last 500 bytes; empty: it has said nothing.
   [[nodiscard]] virtual std::string last_line() const = 0;
 };
 

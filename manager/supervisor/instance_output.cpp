@@ -96,7 +96,7 @@ void InstanceOutput::say(LogLevel level, std::int32_t pid, std::string_view text
 }
 
 void InstanceOutput::take(const LogEntry& entry) {
-  last_line_ = cut(entry.text, kLastLine);
+  last_line_ = cut_front(entry.text, kLastLine);  // the cause stands at its end
   keep(entry);
 }
 

@@ -38,7 +38,8 @@ class InstanceOutput {
   void read(std::int32_t pid);
   /// The process has ended: reads all that it has said.
   void end(std::int32_t pid);
-  /// The last line of the newest process, cut to kLastLine; empty: it has said nothing.
+  /// The last line of the newest process, of a longer one the last kLastLine bytes; empty: it has said
+  /// nothing.
   [[nodiscard]] const std::string& last_line() const noexcept { return last_line_; }
   /// Writes a line of the manager itself into the ring.
   void say(LogLevel level, std::int32_t pid, std::string_view text);

@@ -1,7 +1,7 @@
 #pragma once
 
 #include <string>
-#include <string_view>
+#include <vector>
 
 #include "shm/base/result.hpp"
 
@@ -10,14 +10,16 @@ namespace plchost {
 /// The exit code of a program that the dynamic loader could not load. None of its code has run.
 inline constexpr int kExitNotLoaded = 127;
 
-/// The transient error (see is_transient()) that a text of the dynamic loader tells. The text is that of
-/// dlerror(), or the line of a program that ends with kExitNotLoaded. 0: the text tells none, so the same
-/// files fail again.
-[[nodiscard]] int transient_error_of_loader(std::string_view text);
+/// The folders in which the dynamic loader looks for libraries of this program, in their order. Set-up.
+[[nodiscard]] std::vector<std::string> library_folders();
 
-/// dlopen() with these flags. On failure the message is the loader's. The error is transient if the host was
-/// short of something. invalid_argument: the file, or a library that it needs, is missing or wrong.
-/// refused: no program may run from the file's place. Set-up.
+/// The error that a text of the dynamic loader tells. The text is that of dlerror(), or the line of a program
+/// that ends with kExitNotLoaded. Transient (see is_transient()): the host was short of something.
+/// invalid_argument: a file is missing or wrong. refused: no program may run from the place of the library.
+/// If the text has no path of it, it is looked for in `folders`, and then in library_folders(). Set-up.
+[[nodiscard]] Error error_of_loader(std::string text, std::vector<std::string> folders = {});
+
+/// dlopen() with these flags. The errors are those of error_of_loader(). Set-up.
 [[nodiscard]] Result<void*> open_library(const std::string& file, int flags);
 
 }  // namespace plchost

@@ -135,15 +135,29 @@ std::string unknown_option(std::span<const std::string> words, std::span<const s
   return {};
 }
 
+namespace {
+
+constexpr std::size_t kLongestCharacter = 4;
+
+bool is_within_character(char c) noexcept {
+  return (static_cast<unsigned char>(c) & 0xC0U) == 0x80U;
+}
+
+}  // namespace
+
 std::string_view cut(std::string_view text, std::size_t most) noexcept {
   if (text.size() <= most) return text;
-  const auto goes_on = [&](std::size_t at) {
-    return (static_cast<unsigned char>(text[at]) & 0xC0U) == 0x80U;
-  };
   std::size_t end = most;
-  constexpr std::size_t kLongestCharacter = 4;
-  while (end > 0 && most - end < kLongestCharacter && goes_on(end)) --end;
+  while (end > 0 && most - end < kLongestCharacter && is_within_character(text[end])) --end;
   return text.substr(0, end);
+}
+
+std::string_view cut_front(std::string_view text, std::size_t most) noexcept {
+  if (text.size() <= most) return text;
+  text.remove_prefix(text.size() - most);
+  std::size_t torn = 0;
+  while (torn < std::min(text.size(), kLongestCharacter) && is_within_character(text[torn])) ++torn;
+  return text.substr(torn);
 }
 
 std::string shown(std::string_view text) {

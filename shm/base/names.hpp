@@ -62,6 +62,9 @@ inline constexpr std::size_t kMaxSchedulerList = 511;
 /// The first `most` bytes, without a torn character of UTF-8 at the end.
 [[nodiscard]] std::string_view cut(std::string_view text, std::size_t most) noexcept;
 
+/// The last `most` bytes, without a torn character at the beginning.
+[[nodiscard]] std::string_view cut_front(std::string_view text, std::size_t most) noexcept;
+
 /// Of a stranger's name or value, this much is told, and as printable() has it.
 inline constexpr std::size_t kShownBytes = 80;
 [[nodiscard]] std::string shown(std::string_view text);

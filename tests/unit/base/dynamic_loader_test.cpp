@@ -1,11 +1,14 @@
 #include "shm/base/dynamic_loader.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include <dlfcn.h>
 #include <fmt/format.h>
@@ -46,14 +49,20 @@ class Limit {
   rlimit before_{};
 };
 
+int transient_error_of(std::string_view text) {
+  const Error error = error_of_loader(std::string(text));
+  return is_transient(error) ? error.system_errno : 0;
+}
+
 TEST(LoaderText, TellsAShortageOfTheHost) {
-  EXPECT_EQ(transient_error_of_loader("a.so: cannot open shared object file: Too many open files"), EMFILE);
-  EXPECT_EQ(transient_error_of_loader("plc-instance: error while loading shared libraries: libm.so.6: cannot "
-                                      "open shared object file: Error 24"),
+  EXPECT_EQ(transient_error_of("a.so: cannot open shared object file: Too many open files"), EMFILE);
+  EXPECT_EQ(transient_error_of("plc-instance: error while loading shared libraries: libm.so.6: cannot "
+                               "open shared object file: Error 24"),
             EMFILE);
-  EXPECT_EQ(transient_error_of_loader("a.so: cannot create shared object descriptor: Cannot allocate memory"),
+  EXPECT_EQ(transient_error_of("a.so: cannot create shared object descriptor: Cannot allocate memory"),
             ENOMEM);
-  EXPECT_EQ(transient_error_of_loader("libm.so.6: failed to map segment from shared object"), ENOMEM);
+  EXPECT_EQ(transient_error_of("libm.so.6: failed to map segment from shared object"), ENOMEM);
+  EXPECT_EQ(transient_error_of("out of memory"), ENOMEM);
 }
 
 TEST(LoaderText, TellsThatTheSameFilesFailAgain) {
@@ -63,8 +72,15 @@ TEST(LoaderText, TellsThatTheSameFilesFailAgain) {
         "a.so: cannot open shared object file: Error 240", "a.so: undefined symbol: valve",
         "a.so: undefined symbol: x: Cannot allocate memory", "Cannot allocate memory.so: file too short",
         "a.so: cannot allocate memory in static TLS block"}) {
-    EXPECT_EQ(transient_error_of_loader(text), 0) << text;
+    EXPECT_EQ(transient_error_of(text), 0) << text;
   }
+}
+
+TEST(LoaderFolders, AreThoseInWhichThisProgramHasItsLibraries) {
+  const std::vector<std::string> folders = library_folders();
+  EXPECT_TRUE(std::ranges::any_of(folders, [](const std::string& folder) {
+    return std::filesystem::exists(std::filesystem::path(folder) / "libc.so.6");
+  })) << fmt::format("{}", fmt::join(folders, ", "));
 }
 
 // The loader's own words before a program runs, in which it knows fewer numbers than afterwards.
@@ -97,7 +113,7 @@ TEST(LoaderText, IsThatOfARealProgramWithoutDescriptors) {
     ::setrlimit(RLIMIT_NOFILE, &kNone);
     ::close_range(3, ~0U, 0);
   });
-  EXPECT_EQ(transient_error_of_loader(text), EMFILE) << text;
+  EXPECT_EQ(transient_error_of(text), EMFILE) << text;
 }
 
 TEST(Loader, OpensALibrary) {
@@ -138,33 +154,62 @@ TEST(Loader, WithoutTheLibraryFailsForGood) {
   }
 }
 
-// The loader has the same words for it as for a shortage of memory.
-TEST(Loader, OfAFileThatMayNotRunFailsForGood) {
-  const auto library = open_library(kLibrary, RTLD_NOW | RTLD_LOCAL);
-  ASSERT_TRUE(library);
-  link_map* map = nullptr;
-  ASSERT_EQ(::dlinfo(*library, RTLD_DI_LINKMAP, static_cast<void*>(&map)), 0);
-  const std::string path = map->l_name;
-  ASSERT_EQ(::dlclose(*library), 0);
-  const auto folder = std::filesystem::temp_directory_path() / own_name("noexec");
-  std::filesystem::create_directory(folder);
-  constexpr int kNotAllowed = 77;
-  const pid_t child = ::fork();
-  if (child == 0) {
-    if (::unshare(CLONE_NEWNS) != 0 || ::mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
-        ::mount("none", folder.c_str(), "tmpfs", MS_NOEXEC, nullptr) != 0) {
-      ::_exit(kNotAllowed);
-    }
-    std::filesystem::copy_file(path, folder / "a.so");
-    const auto refused = open_library(folder / "a.so", RTLD_NOW | RTLD_LOCAL);
-    if (!refused) fmt::print("{}\n", refused.error().describe());
-    ::_exit(!refused && refused.error().code == ErrorCode::refused && !is_transient(refused.error()) ? 0 : 1);
+/// A folder of a file system that is mounted noexec, with a library in it.
+class FolderWithoutPrograms : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const auto library = open_library(kLibrary, RTLD_NOW | RTLD_LOCAL);
+    ASSERT_TRUE(library) << library.error().describe();
+    link_map* map = nullptr;
+    ASSERT_EQ(::dlinfo(*library, RTLD_DI_LINKMAP, static_cast<void*>(&map)), 0);
+    path_ = map->l_name;
+    ASSERT_EQ(::dlclose(*library), 0);
+    std::filesystem::create_directory(folder_);
   }
-  int status = 0;
-  ::waitpid(child, &status, 0);
-  std::filesystem::remove_all(folder);
-  if (WIFEXITED(status) && WEXITSTATUS(status) == kNotAllowed) GTEST_SKIP() << "this user may not mount";
-  EXPECT_EQ(status, 0);
+  ~FolderWithoutPrograms() override { std::filesystem::remove_all(folder_); }
+
+  /// In a child that has it mounted.
+  void expect_there(const std::function<bool()>& check) {
+    constexpr int kNotAllowed = 77;
+    const pid_t child = ::fork();
+    if (child == 0) {
+      if (::unshare(CLONE_NEWNS) != 0 || ::mount(nullptr, "/", nullptr, MS_REC | MS_PRIVATE, nullptr) != 0 ||
+          ::mount("none", folder_.c_str(), "tmpfs", MS_NOEXEC, nullptr) != 0) {
+        ::_exit(kNotAllowed);
+      }
+      std::filesystem::copy_file(path_, folder_ / "a.so");
+      ::_exit(check() ? 0 : 1);
+    }
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    if (WIFEXITED(status) && WEXITSTATUS(status) == kNotAllowed) GTEST_SKIP() << "this user may not mount";
+    EXPECT_EQ(status, 0);
+  }
+
+  std::string path_;
+  std::filesystem::path folder_ = std::filesystem::temp_directory_path() / own_name("noexec");
+};
+
+// The loader has the same words for it as for a shortage of memory.
+TEST_F(FolderWithoutPrograms, LetsALibraryFailForGood) {
+  expect_there([&] {
+    const auto refused = open_library(folder_ / "a.so", RTLD_NOW | RTLD_LOCAL);
+    if (!refused) fmt::print("{}\n", refused.error().describe());
+    return !refused && refused.error().code == ErrorCode::refused && !is_transient(refused.error());
+  });
+}
+
+TEST_F(FolderWithoutPrograms, LetsAProgramThatNeedsTheLibraryFailForGood) {
+  const std::string text =
+      "x: error while loading shared libraries: a.so: failed to map segment from shared object";
+  const std::vector<std::string> before{"/nonexistent", folder_};
+  EXPECT_TRUE(is_transient(error_of_loader(text, before))) << "memory was short";
+  expect_there([&] {
+    const Error refused = error_of_loader(text, before);
+    fmt::print("{}\n", refused.describe());
+    return refused.code == ErrorCode::refused && !is_transient(refused) &&
+           refused.message.find("noexec") != std::string::npos;
+  });
 }
 
 }  // namespace

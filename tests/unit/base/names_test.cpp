@@ -58,6 +58,14 @@ TEST(Names, CutsBetweenCharacters) {
   EXPECT_EQ(cut("abcd", 3), "abc");
   EXPECT_EQ(cut("ab\xc3\xa4", 3), "ab");
   EXPECT_EQ(cut("\x80\x80\x80\x80\x80\x80\x80\x80", 6).size(), 2U) << "no UTF-8 at all";
+  EXPECT_EQ(cut_front("abc", 3), "abc");
+  EXPECT_EQ(cut_front("abcd", 3), "bcd");
+  EXPECT_EQ(cut_front("abcd", 0), "");
+  EXPECT_EQ(cut_front("\xc3\xa4"
+                      "bc",
+                      3),
+            "bc");
+  EXPECT_EQ(cut_front("\x80\x80\x80\x80\x80\x80\x80\x80", 6).size(), 2U) << "no UTF-8 at all";
   EXPECT_EQ(shown(std::string(1000, 'x')).size(), kShownBytes);
 }
 

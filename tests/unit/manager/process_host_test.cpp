@@ -57,6 +57,13 @@ TEST_F(ProcessHostTest, KnowsTheLastLineOfAProcessWhenItHasEnded) {
   EXPECT_EQ(said_, "x: error while loading shared libraries: y: Error 24");
 }
 
+// The loader begins with the path of the program, and ends with the cause.
+TEST_F(ProcessHostTest, KnowsTheEndOfALongLastLine) {
+  run("printf '/%0600d: error while loading shared libraries: y: Error 24' 0 >&2; exit 127");
+  EXPECT_EQ(said_.size(), InstanceOutput::kLastLine);
+  EXPECT_TRUE(said_.ends_with("00: error while loading shared libraries: y: Error 24")) << said_;
+}
+
 TEST_F(ProcessHostTest, TakesNoLineOfAnEarlierProcess) {
   run("echo first");
   EXPECT_EQ(said_, "first");
