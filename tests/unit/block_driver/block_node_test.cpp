@@ -243,6 +243,29 @@ TEST_F(BlockNodeTest, WhatANodeSentBeforeItWentIsStillReceived) {
   EXPECT_EQ(b.next(to), "last words");
 }
 
+// No time passes, so no audit looks for links that nobody tells of.
+TEST_F(BlockNodeTest, ALinkThatHadToWaitForTheRestOfTheLastOneIsOpenedWhenThatIsTaken) {
+  TestNode b = join("b");
+  BlockChannel to = b.channel();
+  NodeAddress address;
+  {
+    TestNode a = join("a");
+    address = a.address();
+    connect(a, b);
+    BlockChannel from = a.channel();
+    ASSERT_EQ(from.send(b.address(), bytes_of("last words")), SendResult::sent);
+  }
+  TestNode a = join("a");
+  ASSERT_EQ(a.address(), address);
+  connect(a, b);
+  BlockChannel from = a.channel();
+  ASSERT_EQ(from.send(b.address(), bytes_of("first words")), SendResult::sent);
+  settle(a, b);
+  EXPECT_EQ(b.next(to), "last words");
+  settle(a, b);
+  EXPECT_EQ(b.next(to), "first words");
+}
+
 TEST_F(BlockNodeTest, ALinkThatAStrangerSpoiltIsMadeAnew) {
   TestNode a = join("a");
   TestNode b = join("b");
