@@ -1,8 +1,11 @@
 #include "api/cli/rows/node_rows.hpp"
 
 #include <algorithm>
+#include <concepts>
+#include <cstdint>
 #include <span>
 #include <string>
+#include <type_traits>
 
 #include <fmt/format.h>
 
@@ -49,14 +52,16 @@ dds::Computed<plc_RouteRecord, Row> computed_of(const plc_RouteRecord& route, st
           .to_hosts = to_hosts ? Row(hosts_text(std::span(&route.hosts, 1))) : Row()};
 }
 
+// Without a link there is nothing to count. The counts are the 64-bit members of the record.
 Row route_row(const plc_RouteRecord& route, std::string_view host, const NodesTold& page,
               const NodesTold& names) {
   Row row = to_row(route, host, page, names);
-  bool is_count = false;
-  for (auto&& [field, value] : row.items()) {
-    if (is_count && !route.linked) value = nullptr;
-    is_count = is_count || field == "linked";
-  }
+  if (route.linked) return row;
+  dds::visit_row(route, dds::Computed<plc_RouteRecord, Row>{},
+                 [&row](const dds::FieldInfo& field, const auto& value) {
+                   using Value = std::remove_cvref_t<decltype(value)>;
+                   if constexpr (std::same_as<Value, std::uint64_t>) row[std::string(field.row)] = nullptr;
+                 });
   return row;
 }
 
