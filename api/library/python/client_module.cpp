@@ -438,7 +438,9 @@ void define_watches(ClientClass& client) {
 }  // namespace
 
 PYBIND11_MODULE(plchost_client, module) {
-  module.doc() = "Sees and commands PLC hosts from anywhere over DDS.";
+  module.doc() =
+      "Sees and commands PLC hosts from anywhere over DDS. Import it before any other module that loads "
+      "libddsc, as cyclonedds does: else waits follow the clock of the wall.";
   define_error(module);
   define_states(module);
   define_results(module);
