@@ -38,7 +38,7 @@ Result<std::unique_ptr<BlockGateway>> BlockGateway::create(dds_entity_t particip
   if (auto opened = gateway->open_topics(wait_set); !opened) {
     return failure_in("gateway", std::move(opened).error());
   }
-  gateway->announce();
+  gateway->announce(MonotonicClock::now());
   return gateway;
 }
 

@@ -45,6 +45,8 @@ class BlockGateway {
   /// A host that is silent for so long is not reached; it is heard five times in that time.
   static constexpr Duration kSilence = std::chrono::seconds(1);
   static constexpr Duration kBeat = std::chrono::milliseconds(200);
+  /// A host announces itself again so often: samples of strangers may push an announcement out of a reader.
+  static constexpr Duration kAnnounceAgain = std::chrono::seconds(2);
   static constexpr std::size_t kMostPeers = 256;
 
   /// `wait_set` waits for what there is to serve; both it and the participant outlive the gateway.
@@ -90,7 +92,7 @@ class BlockGateway {
 
   // The serving thread; block_gateway_peers.cpp: the present hosts
   void follow_hosts(TimePoint now);
-  void follow(const plc_BlockHostStatus& host, const dds_sample_info_t& info, TimePoint now);
+  [[nodiscard]] bool follow(const plc_BlockHostStatus& host, const dds_sample_info_t& info, TimePoint now);
   void settle_peers(TimePoint now);
   void add_peer(const HostClaim& claim);
   [[nodiscard]] Result<std::unique_ptr<Peer>> open_peer(const HostClaim& claim) const;
@@ -100,7 +102,7 @@ class BlockGateway {
   void look_at(Peer& peer, TimePoint now);
   void renew_writer(Peer& peer);
   void tell_of_numbers(TimePoint now);
-  void announce();
+  void announce(TimePoint now);
   void publish_names();
 
   // block_gateway.cpp: their blocks
@@ -131,7 +133,7 @@ class BlockGateway {
   std::optional<NodeDirectory> directory_;  // to look at
   std::optional<PendingBlocks> pending_;
   std::vector<std::pair<std::uint16_t, std::string>> announced_;
-  bool has_announced_ = false;
+  std::optional<TimePoint> announced_at_;
   std::map<std::string, std::vector<std::pair<std::uint16_t, std::string>>> names_;  // of each other host
   std::string told_;                                                                 // of the numbers
   std::vector<std::uint16_t> reached_;

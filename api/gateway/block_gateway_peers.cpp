@@ -1,5 +1,6 @@
 // Which other hosts there are: see block_gateway.hpp.
 #include <algorithm>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -15,39 +16,40 @@
 namespace plchost {
 
 void BlockGateway::follow_hosts(TimePoint now) {
-  bool news = false;
+  bool told = false;
+  bool has_new_names = false;
   dds::take_told<plc_BlockHostStatus>(hosts_.reader.get(), host_writers_,
                                       [&](const auto& host, const auto& info) {
-                                        follow(host, info, now);
-                                        news = true;
+                                        told = true;
+                                        has_new_names = follow(host, info, now) || has_new_names;
                                       });
-  if (!news) return;
-  settle_peers(now);
-  publish_names();
+  if (told) settle_peers(now);
+  if (has_new_names) publish_names();
 }
 
-void BlockGateway::follow(const plc_BlockHostStatus& host, const dds_sample_info_t& info, TimePoint now) {
+// Whether the names of its nodes are others than before.
+bool BlockGateway::follow(const plc_BlockHostStatus& host, const dds_sample_info_t& info, TimePoint now) {
   const std::string name(dds::text_of(host.host));
   // A key belongs to no writer: another host may have disposed of it after this host wrote. None disposes of
   // its own.
   const bool ended = info.instance_state == DDS_IST_NOT_ALIVE_NO_WRITERS || !info.valid_data;
   if (info.instance_state != DDS_IST_ALIVE && ended) {
-    names_.erase(name);
-    return numbers_.forget(name, now);
+    numbers_.forget(name, now);
+    return names_.erase(name) != 0;
   }
   const dds::Guid writer = dds::writer_of(hosts_.reader.get(), info);
-  if (!info.valid_data || writer == dds::Guid{}) return;
+  if (!info.valid_data || writer == dds::Guid{}) return false;
   numbers_.claim({.host = name,
                   .number = host.host_number,
                   .since_ns = host.since_unix_ns,
                   .epoch = host.epoch,
                   .participant = writer.participant()},
                  now);
-  auto& names = names_[name];
-  names.clear();
+  std::vector<std::pair<std::uint16_t, std::string>> names;
   for (const plc_BlockNode& node : dds::parts_of(host.nodes)) {
     names.emplace_back(node.node, dds::text_of(node.name));
   }
+  return std::exchange(names_[name], names) != names;
 }
 
 // Of the hosts that have their numbers.
@@ -167,7 +169,7 @@ void BlockGateway::beat(TimePoint now) {
                                  : fmt::format("other hosts that are reached: {}", fmt::join(reached, ", ")));
     reached_ = std::move(reached);
   }
-  announce();
+  announce(now);
 }
 
 // Once for each change.
@@ -197,12 +199,12 @@ void BlockGateway::tell_of_numbers(TimePoint now) {
   told_ = std::move(problem);
 }
 
-void BlockGateway::announce() {
+void BlockGateway::announce(TimePoint now) {
   std::vector<std::pair<std::uint16_t, std::string>> nodes;
   for (std::uint16_t node = 1; node <= kMaxNodes; ++node) {
     if (const auto record = directory_->record(node)) nodes.emplace_back(node, record->name.view());
   }
-  if (has_announced_ && nodes == announced_) return;
+  if (announced_at_ && now - *announced_at_ < kAnnounceAgain && nodes == announced_) return;
   plc_BlockHostStatus sample{};
   dds::copy_text(sample.host, options_.host);
   sample.epoch = options_.epoch;
@@ -214,7 +216,8 @@ void BlockGateway::announce() {
     dds::copy_text(named[i].name, nodes[i].second);
   }
   dds::lend(sample.nodes, named);
-  has_announced_ = dds_write(host_writer_.writer.get(), &sample) == DDS_RETCODE_OK;
+  const bool written = dds_write(host_writer_.writer.get(), &sample) == DDS_RETCODE_OK;
+  announced_at_ = written ? std::optional(now) : std::nullopt;
   announced_ = std::move(nodes);
 }
 
