@@ -32,4 +32,15 @@ Guid writer_of(dds_entity_t reader, const dds_sample_info_t& info) noexcept {
   return guid;
 }
 
+std::vector<dds_instance_handle_t> writers_of(dds_entity_t reader) {
+  std::vector<dds_instance_handle_t> writers(16);
+  for (;;) {
+    const dds_return_t count = dds_get_matched_publications(reader, writers.data(), writers.size());
+    const std::size_t found = count < 0 ? 0 : static_cast<std::size_t>(count);
+    const bool all = found <= writers.size();
+    writers.resize(found);
+    if (all) return writers;
+  }
+}
+
 }  // namespace plchost::dds

@@ -7,6 +7,7 @@
 #include <cstring>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include <dds/dds.h>
 
@@ -44,5 +45,8 @@ struct GuidHash {
 /// The GUID of the remote writer that wrote a sample: the claim of the header must equal it. All zero if the
 /// writer is gone already.
 [[nodiscard]] Guid writer_of(dds_entity_t reader, const dds_sample_info_t& info) noexcept;
+
+/// The writers that a reader has met: those whose samples are to come as well. As publication_handle.
+[[nodiscard]] std::vector<dds_instance_handle_t> writers_of(dds_entity_t reader);
 
 }  // namespace plchost::dds

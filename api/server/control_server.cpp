@@ -221,7 +221,7 @@ bool ControlServer::Parts::identity_changed() {
 // Whether this host goes on under its name; false: it does, with a fresh process.
 Result<bool> ControlServer::Parts::keeps_name() {
   const NameClaim::State state = name->look(MonotonicClock::now());
-  if (state == NameClaim::State::taken) return std::unexpected(name->taken());
+  if (state == NameClaim::State::taken) return std::unexpected(name->leave(signals.get()));
   status->set_rival(name->rival());
   if (state == NameClaim::State::ours) return true;
   spdlog::warn("the other host of the name '{}' is gone: ending, to tell all status anew", options.host);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <fstream>
+#include <span>
 #include <tuple>
 #include <utility>
 
@@ -97,12 +98,10 @@ Result<void> NameClaim::write() {
 Result<void> NameClaim::ask(TimePoint deadline, int stop_fd) {
   constexpr int kLookMs = 2;
   while (!own_.serving) {
-    if (look(MonotonicClock::now()) == State::taken) {
-      be_heard();
-      return std::unexpected(taken());
-    }
-    if (MonotonicClock::now() >= deadline) {
+    if (look(MonotonicClock::now()) == State::taken) return std::unexpected(leave(stop_fd));
+    if (MonotonicClock::now() >= (has_heard_all() ? deadline : deadline + kLateClaim)) {
       own_.serving = true;
+      heard_.clear();
       return write();
     }
     pollfd stop{.fd = stop_fd, .events = POLLIN, .revents = 0};
@@ -113,17 +112,42 @@ Result<void> NameClaim::ask(TimePoint deadline, int stop_fd) {
   return {};
 }
 
-// The other one tells its operators of the rival, so it has to hear of this claim. Its claim may be here
-// before its reader is known: only a reader that is known is waited for.
-void NameClaim::be_heard() const {
-  constexpr int kLooks = 250;
-  constexpr int kLookMs = 2;
-  constexpr dds_return_t kReaders = 2;  // this one's own, and the other's
+bool NameClaim::has_heard_all() const {
+  return std::ranges::all_of(dds::writers_of(claims_.reader.get()),
+                             [this](dds_instance_handle_t writer) { return heard_.contains(writer); });
+}
+
+bool NameClaim::is_read_by(const dds::Guid& server) const {
   const dds_entity_t writer = own_claim_.writer.get();
-  for (int look = 0; look < kLooks && dds_get_matched_subscriptions(writer, nullptr, 0) < kReaders; ++look) {
-    (void)::poll(nullptr, 0, kLookMs);
+  std::array<dds_instance_handle_t, 64> readers{};
+  const dds_return_t count = dds_get_matched_subscriptions(writer, readers.data(), readers.size());
+  const std::size_t found = std::min(count < 0 ? 0 : static_cast<std::size_t>(count), readers.size());
+  return std::ranges::any_of(std::span(readers).first(found), [&](dds_instance_handle_t reader) {
+    dds_builtintopic_endpoint_t* const endpoint = dds_get_matched_subscription_data(writer, reader);
+    if (endpoint == nullptr) return false;
+    const dds::Guid participant = dds::Guid::from(endpoint->key.v).participant();
+    dds_builtintopic_free_endpoint(endpoint);
+    return participant == server;
+  });
+}
+
+// The claim of the other one may be here before its reader is known. DDS takes what was written before that
+// for acknowledged, and sends it only as long as the writer is there: so the claim is written again for that
+// reader.
+void NameClaim::be_heard(int stop_fd) {
+  constexpr int kLookMs = 2;
+  const TimePoint end = MonotonicClock::now() + kBeingHeard;
+  const auto goes_on = [&](int wait_ms) {
+    pollfd stop{.fd = stop_fd, .events = POLLIN, .revents = 0};
+    return ::poll(&stop, 1, wait_ms) == 0 && MonotonicClock::now() < end;
+  };
+  while (!is_read_by(winner_.server)) {
+    if (!goes_on(kLookMs)) return;
   }
-  (void)dds_wait_for_acks(writer, DDS_MSECS(500));
+  if (!write()) return;
+  while (dds_wait_for_acks(own_claim_.writer.get(), DDS_MSECS(kLookMs)) == DDS_RETCODE_TIMEOUT &&
+         goes_on(0)) {
+  }
 }
 
 void NameClaim::meet(const NameHolder& other, TimePoint now) {
@@ -147,8 +171,11 @@ bool NameClaim::take(const plc_NameClaim& sample, const dds_sample_info_t& info,
     if (alive) {
       const dds::Guid writer = dds::writer_of(claims_.reader.get(), info);
       // It has ended since it wrote, so whose word this is cannot be known any more: it is a rival, and wins
-      // nothing.
-      if (writer == dds::Guid{}) meet(other, now);
+      // nothing. Its end is not told again.
+      if (writer == dds::Guid{}) {
+        meet(other, now);
+        return other.serving && own_.serving;
+      }
       if (writer.participant() != server) return false;  // or in the name of another
     }
     if (!alive) meet(other, now);
@@ -163,6 +190,7 @@ NameClaim::State NameClaim::look(TimePoint now) {
   State state = State::ours;
   dds::take_all<plc_NameClaim>(claims_.reader.get(),
                                [&](const plc_NameClaim& sample, const dds_sample_info_t& info) {
+                                 if (!own_.serving) heard_.insert(info.publication_handle);
                                  if (take(sample, info, now)) state = State::left;
                                });
   for (const auto& [server, other] : others_) {
@@ -176,7 +204,8 @@ NameClaim::State NameClaim::look(TimePoint now) {
   return state;
 }
 
-Error NameClaim::taken() const {
+Error NameClaim::leave(int stop_fd) {
+  be_heard(stop_fd);
   constexpr std::int64_t kSecond = 1'000'000'000;
   return failure(
              ErrorCode::already_exists,

@@ -43,12 +43,17 @@ class NameClaim {
   /// One that was refused the name takes its time: also a host behind a slow link, or with DDS Security, has
   /// answered by then.
   static constexpr Duration kAskingAgain = std::chrono::seconds(2);
+  /// So much longer it asks if a claim is known to come.
+  static constexpr Duration kLateClaim = std::chrono::seconds(5);
+  /// So long a host that leaves the name waits for the acknowledgement of the one that has it.
+  static constexpr Duration kBeingHeard = std::chrono::seconds(5);
   /// So long a rival is told of after it was seen.
   static constexpr Duration kRivalShown = std::chrono::seconds(90);
 
   [[nodiscard]] static Result<NameClaim> create(dds_entity_t participant, const Options& options);
 
-  /// Waits until the deadline whether somebody else has the name, then serves. already_exists: somebody has.
+  /// Waits until the deadline whether somebody else has the name, then serves. If DDS knows of another claim
+  /// that has not come yet, it waits for that, kLateClaim longer at most. already_exists: somebody has.
   /// unavailable: there is something to be read from `stop_fd`, before the deadline.
   [[nodiscard]] Result<void> ask(TimePoint deadline, int stop_fd);
 
@@ -60,8 +65,9 @@ class NameClaim {
   /// Reads what has come; to be called when something has, and from time to time.
   [[nodiscard]] State look(TimePoint now);
 
-  /// After State::taken: the host that has it, and what to do.
-  [[nodiscard]] Error taken() const;
+  /// After State::taken: waits until the host that has the name knows of this one, kBeingHeard at most and
+  /// not if there is something to be read from `stop_fd`. Returns that host, and what to do.
+  [[nodiscard]] Error leave(int stop_fd);
   /// Another host that wants the name, or wanted it a short time ago; empty: none.
   [[nodiscard]] const std::string& rival() const noexcept { return rival_; }
   /// To be listened to.
@@ -73,12 +79,15 @@ class NameClaim {
   /// True: that was the end of another host that has served under the name.
   bool take(const plc_NameClaim& sample, const dds_sample_info_t& info, TimePoint now);
   void meet(const NameHolder& other, TimePoint now);
-  void be_heard() const;
+  void be_heard(int stop_fd);
+  [[nodiscard]] bool has_heard_all() const;
+  [[nodiscard]] bool is_read_by(const dds::Guid& server) const;
 
   std::string host_;
   NameHolder own_;
   NameHolder winner_;
   std::map<dds::Guid, NameHolder> others_;
+  std::set<dds_instance_handle_t> heard_;  ///< the writers of the claims that came while it asked
   std::set<dds::Guid> told_;
   std::string rival_;
   TimePoint rival_seen_;
