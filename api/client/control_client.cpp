@@ -51,8 +51,9 @@ Result<void> ControlClient::open(std::shared_ptr<Participant> participant, std::
   PLCHOST_TRY_ASSIGN(wait_set_, WaitSet::create(entity()));
   last_news_ = MonotonicClock::now();
   if (!participant_->only_loopback) quiet_ = kQuietOnNetworks;
-  if (auto opened = open_cache(presence_, dds::kPresence,
-                               DDS_DATA_AVAILABLE_STATUS | DDS_REQUESTED_DEADLINE_MISSED_STATUS);
+  if (auto opened = open_cache(
+          presence_, dds::kPresence,
+          DDS_DATA_AVAILABLE_STATUS | DDS_REQUESTED_DEADLINE_MISSED_STATUS | DDS_SUBSCRIPTION_MATCHED_STATUS);
       !opened) {
     return opened;
   }

@@ -17,6 +17,7 @@
 #include <control.h>
 #include <status_topics.hpp>
 
+#include "api/client/late_writers.hpp"
 #include "api/client/own_answers.hpp"
 #include "api/client/participant.hpp"
 #include "api/client/poster.hpp"
@@ -98,8 +99,8 @@ class ControlClient {
   /// A host is silent after so long: a little less than the deadline of its presence, so that a thread that
   /// is woken by that sees it.
   static constexpr Duration kSilent = dds::kPresenceDeadline - std::chrono::milliseconds(5);
-  /// All hosts are known when none was news for so long; where packets can be lost, longer than it takes
-  /// until each host tells again that it is there (SPDPInterval).
+  /// All hosts are known when none was news for so long, and none is late (LateWriters). Where packets can be
+  /// lost, it is longer than it takes until each host tells again that it is there (SPDPInterval).
   static constexpr Duration kQuiet = std::chrono::milliseconds(200);
   static constexpr Duration kQuietOnNetworks = std::chrono::milliseconds(1200);
 
@@ -114,7 +115,8 @@ class ControlClient {
   [[nodiscard]] const std::shared_ptr<Participant>& participant() const noexcept { return participant_; }
 
   /// The hosts that answer, by name: waits for the first one until the deadline, then until none is news any
-  /// more. Empty: none answers.
+  /// more. A host that DDS has discovered and that has not answered yet is waited for, for
+  /// LateWriters::kPatience. Empty: none answers.
   [[nodiscard]] std::vector<HostView> hosts(TimePoint deadline);
   /// The same, and those that were seen before and are silent now; of more than SeenHosts::kMost, those that
   /// have been gone for a minute are forgotten.
@@ -234,6 +236,7 @@ class ControlClient {
   [[nodiscard]] std::vector<HostView> present() const;
   [[nodiscard]] std::optional<HostView> present(std::string_view name) const;
   [[nodiscard]] std::optional<HostView> view_of(std::string_view name, const SeenHost& seen) const;
+  [[nodiscard]] std::vector<dds_instance_handle_t> late_writers();
   template <class Cache>
   [[nodiscard]] Result<void> open_cache(Cache& cache, const dds::TopicInfo& topic,
                                         std::uint32_t statuses = DDS_DATA_AVAILABLE_STATUS);
@@ -283,6 +286,7 @@ class ControlClient {
   StatisticsCache statistics_;
   StatusCache<plc_HostFinding> host_findings_;
   SeenHosts seen_;
+  LateWriters late_writers_;
   std::vector<int> silences_;  ///< of the hosts, by name, at the last changes(): 1 silent, 2 gone
   std::uint64_t host_changes_ = 0;
   TransitionLog transition_log_;

@@ -9,6 +9,7 @@
 #include "api/client/check_names.hpp"
 #include "api/client/control_client.hpp"
 #include "api/dds/ended_participant.h"
+#include "api/dds/guid.hpp"
 #include "api/dds/host_writers.hpp"
 #include "api/dds/sequence.hpp"
 #include "api/dds/text.hpp"
@@ -146,14 +147,27 @@ TimePoint ControlClient::next_silence() const {
   return next;
 }
 
+// Of hosts that DDS has discovered, without what they show. One that has shown it and is silent is not late.
+std::vector<dds_instance_handle_t> ControlClient::late_writers() {
+  std::vector<dds_instance_handle_t> late = dds::writers_of(presence_.reader());
+  std::erase_if(late, [&](dds_instance_handle_t writer) {
+    const std::string name = presence_.writers().host_behind(presence_.reader(), writer);
+    if (name.empty() || present(name)) return true;
+    const SeenHost* const seen = seen_.find(name);
+    return seen != nullptr && seen->writer == writer && seen->server.is_gone(MonotonicClock::now());
+  });
+  return late;
+}
+
 std::vector<HostView> ControlClient::hosts(TimePoint deadline) {
   for (;;) {
     update();
     const TimePoint now = MonotonicClock::now();
     auto found = present();
-    const bool settled = !found.empty() && now - last_news_ >= quiet_;
-    if (settled || now >= deadline) return found;
-    wait_set_.wait(found.empty() ? deadline : std::min(deadline, last_news_ + quiet_));
+    TimePoint settled = deadline;
+    if (!found.empty()) settled = std::max(last_news_ + quiet_, late_writers_.until(late_writers(), now));
+    if (now >= std::min(settled, deadline)) return found;
+    wait_set_.wait(std::min(settled, deadline));
   }
 }
 

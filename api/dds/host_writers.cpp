@@ -44,17 +44,26 @@ std::vector<std::string> discovered_hosts(dds_entity_t participant) {
   return {hosts.begin(), hosts.end()};
 }
 
-bool HostWriters::speaks_for(std::string_view host, dds_entity_t reader, const dds_sample_info_t& info) {
-  auto known = hosts_.find(info.publication_handle);
+const std::string* HostWriters::find(dds_entity_t reader, dds_instance_handle_t writer) {
+  auto known = hosts_.find(writer);
   if (known == hosts_.end()) {
-    dds_builtintopic_endpoint_t* const endpoint =
-        dds_get_matched_publication_data(reader, info.publication_handle);
-    if (endpoint == nullptr) return false;
+    dds_builtintopic_endpoint_t* const endpoint = dds_get_matched_publication_data(reader, writer);
+    if (endpoint == nullptr) return nullptr;
     if (hosts_.size() >= kMost) hosts_.clear();
-    known = hosts_.emplace(info.publication_handle, host_of(endpoint->qos)).first;
+    known = hosts_.emplace(writer, host_of(endpoint->qos)).first;
     dds_builtintopic_free_endpoint(endpoint);
   }
-  return !host.empty() && known->second == host;
+  return &known->second;
+}
+
+bool HostWriters::speaks_for(std::string_view host, dds_entity_t reader, const dds_sample_info_t& info) {
+  const std::string* const behind = find(reader, info.publication_handle);
+  return behind != nullptr && !host.empty() && *behind == host;
+}
+
+std::string HostWriters::host_behind(dds_entity_t reader, dds_instance_handle_t writer) {
+  const std::string* const behind = find(reader, writer);
+  return behind == nullptr ? "" : *behind;
 }
 
 }  // namespace plchost::dds

@@ -22,9 +22,15 @@ class HostWriters {
   /// Whether the writer of that sample may speak for `host`. False, too, if that writer is gone and was not
   /// seen before.
   [[nodiscard]] bool speaks_for(std::string_view host, dds_entity_t reader, const dds_sample_info_t& info);
+  /// The host behind a writer that the reader has met. Empty: none, or that writer is gone and was not seen
+  /// before.
+  [[nodiscard]] std::string host_behind(dds_entity_t reader, dds_instance_handle_t writer);
 
  private:
   static constexpr std::size_t kMost = 16384;
+
+  /// nullptr: that writer is gone and was not seen before.
+  [[nodiscard]] const std::string* find(dds_entity_t reader, dds_instance_handle_t writer);
 
   std::unordered_map<dds_instance_handle_t, std::string> hosts_;
 };
