@@ -16,6 +16,7 @@
 #include <dds/ddsi/ddsi_endpoint.h>
 #include <dds/ddsi/ddsi_entity_index.h>
 #include <dds/ddsi/ddsi_entity_match.h>
+#include <dds/ddsi/ddsi_proxy_endpoint.h>
 #include <dds/ddsi/ddsi_proxy_participant.h>
 #include <dds/ddsi/ddsi_serdata.h>
 #include <dds/ddsi/ddsi_tkmap.h>
@@ -65,6 +66,9 @@ PLC_LIES_AT(struct ddsi_writer, readers, 488, 8);
 PLC_LIES_AT(struct ddsi_wr_prd_match, min_seq, 56, 8);
 PLC_LIES_AT(struct ddsi_wr_prd_match, seq, 72, 8);
 PLC_LIES_AT(struct ddsi_wr_prd_match, last_seq, 80, 8);
+PLC_LIES_AT(struct ddsi_proxy_reader, c.vendor, 232, 2);
+PLC_LIES_AT(struct ddsi_proxy_reader, filter, 288, 8);
+PLC_LIES_AT(struct ddsi_serdata, statusinfo, 40, 4);
 PLC_LIES_AT(struct thread_state, gv, 8, 8);
 #undef PLC_LIES_AT
 #endif

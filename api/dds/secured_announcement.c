@@ -69,6 +69,34 @@ static bool announce(struct ddsi_domaingv* domain, const ddsi_guid_t* guid) {
   return announcement != NULL && put_into_history(domain, secured, announcement);
 }
 
+// For Cyclone: whether it sends the sample to that reader. Instead of the others it says that they do not
+// come.
+static int is_end(struct ddsi_writer* writer, struct ddsi_proxy_reader* reader, struct ddsi_serdata* data) {
+  (void)writer;
+  (void)reader;
+  return data->statusinfo != 0;
+}
+
+bool plc_spare_announcement(dds_entity_t participant, const dds_guid_t* remote) {
+  dds_guid_t guid;
+  if (plc_unknown_cyclone() != NULL || dds_get_guid(participant, &guid) != DDS_RETCODE_OK) return false;
+  struct ddsi_domaingv* const domain = plc_domain_of_last_call();
+  if (domain == NULL) return false;
+  const ddsi_guid_t own = plc_in_host_order(&guid);
+  ddsi_guid_t its_reader = plc_in_host_order(remote);
+  its_reader.entityid.u = NN_ENTITYID_SPDP_RELIABLE_BUILTIN_PARTICIPANT_SECURE_READER;
+  struct thread_state* const thread = lookup_thread_state();
+  thread_state_awake(thread, domain);
+  const bool is_here = entidx_lookup_participant_guid(domain->entity_index, &own) != NULL;
+  struct ddsi_proxy_reader* const reader =
+      is_here ? entidx_lookup_proxy_reader_guid(domain->entity_index, &its_reader) : NULL;
+  const bool is_spared = reader != NULL && vendor_is_eclipse(reader->c.vendor);
+  // The threads of Cyclone read this pointer when the reader asks for a sample.
+  if (is_spared) __atomic_store_n(&reader->filter, is_end, __ATOMIC_RELEASE);
+  thread_state_asleep(thread);
+  return is_spared;
+}
+
 bool plc_announce_secured(dds_entity_t participant) {
   dds_guid_t guid;
   // This thread has made the participant, or its GUID would not be found in the domain.

@@ -82,6 +82,12 @@ bool plc_announce_secured(dds_entity_t participant) {
   return false;
 }
 
+bool plc_spare_announcement(dds_entity_t participant, const dds_guid_t* remote) {
+  (void)participant;
+  (void)remote;
+  return false;
+}
+
 bool plc_filter_datagrams(dds_entity_t participant, plc_DatagramFilter filter) {
   (void)participant;
   (void)filter;

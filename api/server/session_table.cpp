@@ -7,6 +7,7 @@
 #include "api/dds/claim.hpp"
 #include "api/dds/error.hpp"
 #include "api/dds/samples.hpp"
+#include "api/dds/secured_announcement.h"
 #include "api/dds/topics.hpp"
 #include "shm/log/log.hpp"
 
@@ -67,6 +68,7 @@ std::uint64_t SessionTable::follow_participants() {
     const dds::Guid client = dds::Guid::from(participant.key.v);
     if (info.instance_state == DDS_IST_ALIVE) {
       alive_[client] = info.valid_data ? dds::claim_of(participant.qos) : std::string();
+      (void)plc_spare_announcement(participant_, &participant.key);
     } else {
       alive_.erase(client);
       end_session(client);

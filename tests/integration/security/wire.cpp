@@ -31,6 +31,7 @@ struct State {
   int last_messages = 0;
   std::string has_keys;  ///< empty: all have
   int lost_keys = 0;
+  int sent = 0;
   TimePoint deaf_until{};
   TimePoint mute_until{};
   std::string host;
@@ -94,6 +95,7 @@ bool is_lost_going(std::string_view datagram, std::uint16_t port) {
   State& wire = state();
   const std::lock_guard lock(wire.mutex);
   if (!wire.is_watched) return false;
+  ++wire.sent;
   if (MonotonicClock::now() < wire.mute_until) return true;
   if (has(datagram, kHandshake)) {
     wire.host_port = port;
@@ -122,6 +124,7 @@ Wire::Wire() {
   wire.last_messages = 0;
   wire.has_keys.clear();
   wire.lost_keys = 0;
+  wire.sent = 0;
   wire.deaf_until = {};
   wire.mute_until = {};
   wire.host.clear();
@@ -157,6 +160,11 @@ bool Wire::await_last_message(Duration patience) const {
 void Wire::lose_keys_but_of(const std::string& but) {
   const std::lock_guard lock(state().mutex);
   state().has_keys = but;
+}
+
+int Wire::sent() const {
+  const std::lock_guard lock(state().mutex);
+  return state().sent;
 }
 
 int Wire::lost_keys() const {

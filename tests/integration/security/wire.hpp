@@ -31,6 +31,8 @@ class Wire {
   /// From now on, the keys that the host tells participants of this process are lost, except those for the
   /// participant with that GUID prefix.
   void lose_keys_but_of(const std::string& but);
+  /// How many datagrams this process has sent, to whomever.
+  [[nodiscard]] int sent() const;
   /// How many datagrams with keys were lost.
   [[nodiscard]] int lost_keys() const;
   /// For that long, nothing is received.
