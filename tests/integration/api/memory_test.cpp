@@ -28,7 +28,7 @@ class Memory : public testing::Test {
   }
   template <class Use>
   void expect_bounded(int first, int then, Use use) {
-    expect_bounded_memory(*server_, {.first = first, .then = then, .at_once = 8}, use);
+    expect_bounded_memory(*server_, {.first = first, .then = then, .at_once = 8, .rounds = 3}, use);
   }
 
   OwnDomain domain_;
