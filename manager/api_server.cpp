@@ -180,7 +180,8 @@ void ApiServer::name_is_taken(TimePoint now) {
 }
 
 void ApiServer::on_timer() {
-  if (!shut_down_ && !renewing_ && process_) {  // and was not refused the name
+  if (!shut_down_ && !renewing_ && process_) {
+    if (beats_ && !has_served()) return timer_.set(MonotonicClock::now() + kNameAsked);  // it still asks
     spdlog::info("API server: the name '{}' is this host's now", config_.host.name);
     notify_service_manager("STATUS=");
     name_delay_ = Duration::zero();

@@ -86,7 +86,7 @@ inline constexpr Duration kApiStart = std::chrono::seconds(30);
 /// Of those that were refused the name: doubles from the first to the second.
 inline constexpr Duration kNameDelay = std::chrono::seconds(5);
 inline constexpr Duration kNameDelayMax = std::chrono::seconds(60);
-/// An API server that ran for so long has the name of the host: it has asked for it for less than that.
+/// An API server that serves, and has run for so long, has the name of the host. It is looked at so often.
 inline constexpr Duration kNameAsked = std::chrono::seconds(3);
 /// An API server that ran for so long has recovered: its next restart has no delay.
 inline constexpr Duration kApiSettled = std::chrono::seconds(1);

@@ -115,8 +115,8 @@ class TaskSet {
   /// Stops everything; waits for the cycles that are running, however long they take.
   ~TaskSet();
 
-  /// A start that cannot fail any more. Used before the next call of prepare(), begin_single_cycle() or
-  /// switch_to(), or not at all.
+  /// A start that cannot fail any more. Used before the next call of prepare() that succeeds, of
+  /// begin_single_cycle() or of switch_to(), or not at all.
   class Prepared;
   /// Takes all steps of a start that can fail, and starts nothing. wrong_state: the tasks run already, or one
   /// of them has not come back since stop(), or is in exception. unsupported, invalid_argument: the scheduler

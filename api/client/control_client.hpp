@@ -116,7 +116,7 @@ class ControlClient {
 
   /// The hosts that answer, by name: waits for the first one until the deadline, then until none is news any
   /// more. A host that DDS has discovered and that has not answered yet is waited for, for
-  /// LateWriters::kPatience. Empty: none answers.
+  /// LateWriters::kPatience or half of the time until the deadline. Empty: none answers.
   [[nodiscard]] std::vector<HostView> hosts(TimePoint deadline);
   /// The same, and those that were seen before and are silent now; of more than SeenHosts::kMost, those that
   /// have been gone for a minute are forgotten.
@@ -236,7 +236,7 @@ class ControlClient {
   [[nodiscard]] std::vector<HostView> present() const;
   [[nodiscard]] std::optional<HostView> present(std::string_view name) const;
   [[nodiscard]] std::optional<HostView> view_of(std::string_view name, const SeenHost& seen) const;
-  [[nodiscard]] std::vector<dds_instance_handle_t> late_writers();
+  [[nodiscard]] std::vector<dds_instance_handle_t> late_writers(const std::vector<HostView>& found);
   template <class Cache>
   [[nodiscard]] Result<void> open_cache(Cache& cache, const dds::TopicInfo& topic,
                                         std::uint32_t statuses = DDS_DATA_AVAILABLE_STATUS);

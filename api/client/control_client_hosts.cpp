@@ -148,11 +148,11 @@ TimePoint ControlClient::next_silence() const {
 }
 
 // Of hosts that DDS has discovered, without what they show. One that has shown it and is silent is not late.
-std::vector<dds_instance_handle_t> ControlClient::late_writers() {
+std::vector<dds_instance_handle_t> ControlClient::late_writers(const std::vector<HostView>& found) {
   std::vector<dds_instance_handle_t> late = dds::writers_of(presence_.reader());
   std::erase_if(late, [&](dds_instance_handle_t writer) {
     const std::string name = presence_.writers().host_behind(presence_.reader(), writer);
-    if (name.empty() || present(name)) return true;
+    if (name.empty() || std::ranges::binary_search(found, name, {}, &HostView::name)) return true;
     const SeenHost* const seen = seen_.find(name);
     return seen != nullptr && seen->writer == writer && seen->server.is_gone(MonotonicClock::now());
   });
@@ -160,13 +160,18 @@ std::vector<dds_instance_handle_t> ControlClient::late_writers() {
 }
 
 std::vector<HostView> ControlClient::hosts(TimePoint deadline) {
+  const TimePoint began = MonotonicClock::now();
+  const TimePoint half = began + (deadline - began) / 2;  // the rest is for what is asked of the host
   for (;;) {
     update();
     const TimePoint now = MonotonicClock::now();
     auto found = present();
     TimePoint settled = deadline;
-    if (!found.empty()) settled = std::max(last_news_ + quiet_, late_writers_.until(late_writers(), now));
-    if (now >= std::min(settled, deadline)) return found;
+    if (now >= deadline) return found;
+    if (!found.empty()) {
+      settled = std::max(last_news_ + quiet_, std::min(half, late_writers_.until(late_writers(found), now)));
+    }
+    if (now >= settled) return found;
     wait_set_.wait(std::min(settled, deadline));
   }
 }

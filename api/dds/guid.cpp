@@ -32,15 +32,28 @@ Guid writer_of(dds_entity_t reader, const dds_sample_info_t& info) noexcept {
   return guid;
 }
 
-std::vector<dds_instance_handle_t> writers_of(dds_entity_t reader) {
-  std::vector<dds_instance_handle_t> writers(16);
+namespace {
+
+template <class Get>
+std::vector<dds_instance_handle_t> all_met(Get get, dds_entity_t entity) {
+  std::vector<dds_instance_handle_t> met(16);
   for (;;) {
-    const dds_return_t count = dds_get_matched_publications(reader, writers.data(), writers.size());
+    const dds_return_t count = get(entity, met.data(), met.size());
     const std::size_t found = count < 0 ? 0 : static_cast<std::size_t>(count);
-    const bool all = found <= writers.size();
-    writers.resize(found);
-    if (all) return writers;
+    const bool all = found <= met.size();
+    met.resize(found);
+    if (all) return met;
   }
+}
+
+}  // namespace
+
+std::vector<dds_instance_handle_t> writers_of(dds_entity_t reader) {
+  return all_met(&dds_get_matched_publications, reader);
+}
+
+std::vector<dds_instance_handle_t> readers_of(dds_entity_t writer) {
+  return all_met(&dds_get_matched_subscriptions, writer);
 }
 
 }  // namespace plchost::dds

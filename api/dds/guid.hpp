@@ -48,5 +48,7 @@ struct GuidHash {
 
 /// The writers that a reader has met: those whose samples are to come as well. As publication_handle.
 [[nodiscard]] std::vector<dds_instance_handle_t> writers_of(dds_entity_t reader);
+/// The readers that a writer has met.
+[[nodiscard]] std::vector<dds_instance_handle_t> readers_of(dds_entity_t writer);
 
 }  // namespace plchost::dds

@@ -19,7 +19,8 @@ extern "C" {
 bool plc_announce_secured(dds_entity_t participant);
 
 /// The secured announcement of `participant` is not sent to the remote participant if that is one of Cyclone
-/// DDS, which has no use for it. Call it when the remote one is discovered. Any thread.
+/// DDS, which has no use for it. Call it when the remote one is discovered, in
+/// a thread whose last call of DDS was to the domain of `participant`.
 ///
 /// Cyclone DDS 0.10 takes the sample as it takes a plain announcement, and does not note that it has come.
 /// So its reader would ask for the sample again each millisecond, for as long as both are there.

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <fstream>
-#include <span>
 #include <tuple>
 #include <utility>
 
@@ -119,10 +118,7 @@ bool NameClaim::has_heard_all() const {
 
 bool NameClaim::is_read_by(const dds::Guid& server) const {
   const dds_entity_t writer = own_claim_.writer.get();
-  std::array<dds_instance_handle_t, 64> readers{};
-  const dds_return_t count = dds_get_matched_subscriptions(writer, readers.data(), readers.size());
-  const std::size_t found = std::min(count < 0 ? 0 : static_cast<std::size_t>(count), readers.size());
-  return std::ranges::any_of(std::span(readers).first(found), [&](dds_instance_handle_t reader) {
+  return std::ranges::any_of(dds::readers_of(writer), [&](dds_instance_handle_t reader) {
     dds_builtintopic_endpoint_t* const endpoint = dds_get_matched_subscription_data(writer, reader);
     if (endpoint == nullptr) return false;
     const dds::Guid participant = dds::Guid::from(endpoint->key.v).participant();

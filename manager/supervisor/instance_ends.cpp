@@ -25,7 +25,8 @@ void ManagedInstance::on_exit(const ExitStatus& status) {
   status_.core = -1;
   const bool guessed = unheard_ && !unreadable_.empty();
   // Neither an operator, nor an earlier manager, nor the process has said whether it is to run.
-  const bool nobodys_word = unheard_ && !wish_known_ && !commanded_;
+  const bool start_waits = operation_ && operation_->request.verb == ControlVerb::start;
+  const bool nobodys_word = unheard_ && !wish_known_ && !commanded_ && !start_waits;
   const SetupStep reached = step_;
   forget_signs();
   host_.set_timer(std::nullopt);

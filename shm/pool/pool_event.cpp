@@ -51,6 +51,10 @@ bool PoolEvent::set_bound_tasks(std::uint32_t count) const noexcept {
   return true;
 }
 
+bool PoolEvent::hold_for_tasks(std::uint32_t count) const noexcept {
+  return change_binding(Binding::kBoundMask, count & Binding::kBoundMask);
+}
+
 CountedEvent& PoolEvent::counted() const noexcept {
   return entry_->event;
 }

@@ -36,6 +36,9 @@ class PoolEvent {
   /// False, and nothing is done, if the handle is not valid (any more). From 0 to more: the tasks run for
   /// the posts after it; back to 0: only for those before it.
   bool set_bound_tasks(std::uint32_t count) const noexcept;
+  /// For so many tasks that take no posts yet: the event keeps its place, and posters are told that there is
+  /// no task. False, and nothing is done, if the handle is not valid (any more).
+  bool hold_for_tasks(std::uint32_t count) const noexcept;
 
   /// The counter itself, for the task that waits on it. Only of a valid handle.
   [[nodiscard]] CountedEvent& counted() const noexcept;

@@ -56,7 +56,7 @@ class Areas {
   [[nodiscard]] Result<std::string> place(const Environment& environment, std::vector<DeclaredArea> areas,
                                           std::span<TaskConfig> tasks);
 
-  /// The start of the instance has succeeded: the memories of place() stay, and retain areas are written.
+  /// Nothing of the start can fail any more: the memories of place() stay, and retain areas are written.
   /// After an error: as without it. Once; set-up.
   [[nodiscard]] Result<void> keep();
 

@@ -97,7 +97,9 @@ Result<void> EventTable::publish_registered(Slot& slot) {
     // It lost its place in the pool while nobody used it; a task that was bound to it notices in
     // hold_bound().
     PLCHOST_TRY(attach(slot));
-    (void)slot.event.load(std::memory_order_relaxed)->set_registered(true);
+    if (!slot.event.load(std::memory_order_relaxed)->set_registered(true)) {
+      return failure(ErrorCode::busy, fmt::format("external event '{}' lost its place again", slot.name));
+    }
   }
   show_use(slot);
   return {};
@@ -213,13 +215,11 @@ void EventTable::forget_tasks() {
   }
 }
 
-// One that is registered has its place; another one has it while tasks are bound to it, and no poster may
-// post to that.
 Result<void> EventTable::hold_bound() {
   for (std::size_t i = 0; i < count_.load(std::memory_order_relaxed); ++i) {
     const Slot& slot = *slots_[i];
     if (slot.tasks == 0 || slot.bound == nullptr) continue;
-    if (slot.registered() ? slot.bound->valid() : slot.bound->set_bound_tasks(slot.tasks)) continue;
+    if (slot.bound->hold_for_tasks(slot.tasks)) continue;
     publish_bound(false);
     return failure(
         ErrorCode::wrong_state,
@@ -281,8 +281,7 @@ RTS_RESULT EventTable::set(RTS_HANDLE handle) const noexcept {
   const PoolEvent* const event = slot->event.load(std::memory_order_acquire);
   // Only while a task is bound is its counter surely this event's own.
   if (event == nullptr || event->bound_tasks() == 0) return ERR_NO_TASK;
-  event->counted().post();
-  return ERR_OK;
+  return event->counted().post() ? ERR_OK : ERR_NO_TASK;
 }
 
 }  // namespace plchost

@@ -108,7 +108,7 @@ TEST_F(RemoteLog, IsFollowedAlsoOverTheEndOfTheServerAndANewNumbering) {
   say("before");
   const std::string seen = own_path("logs");
   Child follower(PLCCTL_PROGRAM,
-                 {"--domain", std::to_string(domain_.number()), "logs", "line1", "-f", "--timeout", "1"},
+                 {"--domain", std::to_string(domain_.number()), "logs", "line1", "-f", "--timeout", "5"},
                  seen);
   const auto shows = [&](std::string_view text) {
     for (const TimePoint end = soon(); MonotonicClock::now() < end;) {
@@ -130,7 +130,7 @@ TEST_F(RemoteLog, IsFollowedAlsoOverTheEndOfTheServerAndANewNumbering) {
   say("of a new numbering");
   EXPECT_TRUE(shows("of a new numbering"));
   follower.signal(SIGINT);
-  EXPECT_EQ(follower.wait(), 0);
+  EXPECT_EQ(follower.wait(), 0) << std::ifstream(seen + ".errors").rdbuf();
   ::unlink(seen.c_str());
   ::unlink((seen + ".errors").c_str());
 }

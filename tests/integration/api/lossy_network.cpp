@@ -1,5 +1,5 @@
-// Loaded with LD_PRELOAD: the network loses datagrams with the text $LOST_TEXT for 0.7 s from the first one
-// on.
+// Loaded with LD_PRELOAD: the network loses datagrams with the text $LOST_TEXT for $LOST_MS from the first
+// one on.
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -14,7 +14,6 @@
 
 namespace {
 
-constexpr std::int64_t kLossNs = 700'000'000;
 std::atomic<std::int64_t> first_ns{0};
 
 std::int64_t now_ns() {
@@ -24,9 +23,12 @@ std::int64_t now_ns() {
 }
 
 bool loses() {
+  const char* const lost_ms = std::getenv("LOST_MS");  // NOLINT(concurrency-mt-unsafe): never changed
+  if (lost_ms == nullptr) return false;
+  const std::int64_t loss_ns = std::strtol(lost_ms, nullptr, 10) * 1'000'000;
   const std::int64_t now = now_ns();
   std::int64_t first = 0;
-  return first_ns.compare_exchange_strong(first, now) || now - first < kLossNs;
+  return first_ns.compare_exchange_strong(first, now) || now - first < loss_ns;
 }
 
 // A text is in one sample, and each sample in one piece.

@@ -38,13 +38,16 @@ class HostName : public testing::Test {
   std::unique_ptr<ControlClient> sut_ = connect(domain_);
 };
 
-/// Its claim is lost for 0.7 s.
-void start_behind_lossy_network(TestHost& host, std::vector<std::string> more) {
+/// Its claim is lost for so long.
+void start_behind_lossy_network(TestHost& host, std::chrono::milliseconds lost,
+                                std::vector<std::string> more) {
   ::setenv("LD_PRELOAD", LOSSY_NETWORK, 1);  // NOLINT(concurrency-mt-unsafe): the child has not started
-  ::setenv("LOST_TEXT", host.run_directory().c_str(), 1);  // NOLINT(concurrency-mt-unsafe)
+  ::setenv("LOST_TEXT", host.run_directory().c_str(), 1);        // NOLINT(concurrency-mt-unsafe)
+  ::setenv("LOST_MS", std::to_string(lost.count()).c_str(), 1);  // NOLINT(concurrency-mt-unsafe)
   host.start_server(std::move(more));
   ::unsetenv("LD_PRELOAD");  // NOLINT(concurrency-mt-unsafe)
   ::unsetenv("LOST_TEXT");   // NOLINT(concurrency-mt-unsafe)
+  ::unsetenv("LOST_MS");     // NOLINT(concurrency-mt-unsafe)
 }
 
 void write_instances(TestHost& host, std::uint32_t count) {
@@ -72,15 +75,16 @@ TEST_F(HostName, IsRefusedToWhoComesLaterWhoThenShowsNothing) {
 TEST_F(HostName, IsToldOfARivalThatHasToSendItsClaimSeveralTimes) {
   first_.start_server();
   until([&] { return sut_->host("hosta", MonotonicClock::now()).has_value(); });
-  start_behind_lossy_network(second_, {kAsksForLong});
+  start_behind_lossy_network(second_, std::chrono::milliseconds(700), {kAsksForLong});
   EXPECT_EQ(second_.server().wait(), kExitNameTaken);
   until([&] { return !dds::text_of(sut_->host("hosta", soon())->status.rival).empty(); });
 }
 
 TEST_F(HostName, IsWaitedForIfItsClaimIsLate) {
-  start_behind_lossy_network(first_, {"--name-since", "2000"});
+  const std::chrono::seconds longer_than_it_is_asked(3);
+  start_behind_lossy_network(first_, longer_than_it_is_asked, {"--name-since", "2000"});
   until([&] { return sut_->host("hosta", MonotonicClock::now()).has_value(); });
-  second_.start_server({"--name-since", "1000"});
+  second_.start_server({"--name-since", "1000", kAsksForLong});
   EXPECT_EQ(second_.server().wait(), kExitNameTaken);
 }
 

@@ -25,7 +25,8 @@ class StoppedThread {
  public:
   explicit StoppedThread(pid_t thread) : thread_(thread) {
     if (::ptrace(PTRACE_SEIZE, thread_, nullptr, nullptr) != 0) return;
-    while (interrupt() && !(stopped_ = waits_for_news())) {
+    constexpr int kMost = 5'000;
+    for (int i = 0; i < kMost && interrupt() && !(stopped_ = waits_for_news()); ++i) {
       ::ptrace(PTRACE_CONT, thread_, nullptr, nullptr);
       std::this_thread::sleep_for(milliseconds(1));
     }

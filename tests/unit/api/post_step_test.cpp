@@ -145,6 +145,7 @@ class EachInstructionOfAPost : public testing::Test {
       before = trace_;
       ASSERT_NO_FATAL_FAILURE(round(kAll));
     }
+    ASSERT_EQ(before, trace_) << "no two posts went the same way";
     ASSERT_GT(trace_.size(), 50U);
     std::size_t rounds = 0;
     for (std::size_t i = 0; i < trace_.size(); i += static_cast<std::size_t>(stride), ++rounds) {

@@ -207,10 +207,13 @@ TEST_F(EventTableOfASmallPool, RegistersForNobodyIfThePoolIsLocked) {
 
 TEST_F(EventTableOfASmallPool, UnregistersWithoutTheLockOfThePool) {
   const RTS_HANDLE handle = sut_.open("ready").value();
-  ASSERT_TRUE(sut_.register_by_operator("ready"));
+  {
+    const HeldPoolLock held(name_);  // no reference is to be had
+    ASSERT_TRUE(sut_.register_by_operator("ready"));
+  }
   (void)pool_.open_event("line1/ready").value().set_registered(false);  // by a stranger
-  sut_.forget_tasks();
   take_all_places();
+  ASSERT_FALSE(has_its_place());
   const HeldPoolLock held(name_);
   EXPECT_TRUE(sut_.unregister_by_operator("ready"));
   EXPECT_THAT(sut_.registered_by_operator(), ::testing::IsEmpty());
@@ -218,7 +221,7 @@ TEST_F(EventTableOfASmallPool, UnregistersWithoutTheLockOfThePool) {
 }
 
 TEST_F(EventTableOfASmallPool, HoldsWhatTasksAreBoundToForTheirStart) {
-  ASSERT_TRUE(sut_.open("ready"));
+  const RTS_HANDLE handle = sut_.open("ready").value();
   {
     const HeldPoolLock held(name_);  // no reference is to be had
     ASSERT_TRUE(sut_.bind_task("ready"));
@@ -226,6 +229,12 @@ TEST_F(EventTableOfASmallPool, HoldsWhatTasksAreBoundToForTheirStart) {
   ASSERT_TRUE(sut_.hold_bound());
   take_all_places();
   EXPECT_TRUE(has_its_place());
+  EXPECT_EQ(sut_.set(handle), ERR_NO_TASK) << "the tasks do not run yet";
+  ASSERT_TRUE(sut_.register_by_operator("ready"));
+  EXPECT_EQ(sut_.post(handle), ERR_NO_TASK);
+  ASSERT_TRUE(sut_.unregister_by_operator("ready"));
+  sut_.publish_bound(true);
+  EXPECT_EQ(sut_.set(handle), ERR_OK);
   sut_.publish_bound(false);
   take_all_places();
   EXPECT_FALSE(has_its_place()) << "it was held by nothing else";
