@@ -230,9 +230,6 @@ TEST_F(EventTableOfASmallPool, HoldsWhatTasksAreBoundToForTheirStart) {
   take_all_places();
   EXPECT_TRUE(has_its_place());
   EXPECT_EQ(sut_.set(handle), ERR_NO_TASK) << "the tasks do not run yet";
-  ASSERT_TRUE(sut_.register_by_operator("ready"));
-  EXPECT_EQ(sut_.post(handle), ERR_NO_TASK);
-  ASSERT_TRUE(sut_.unregister_by_operator("ready"));
   sut_.publish_bound(true);
   EXPECT_EQ(sut_.set(handle), ERR_OK);
   sut_.publish_bound(false);
