@@ -60,6 +60,10 @@ void take_valid_told(dds_entity_t reader, HostWriters& writers, Function use) {
   });
 }
 
+/// The epoch in the last sample of a row that has gone. DDS lets anyone dispose a row, and does not tell who
+/// it was as long as a sample of the row has not been taken.
+inline constexpr std::uint64_t kEndOfRow = 0;
+
 /// Why an instance has no sample any more.
 enum class InstanceEnd : std::uint8_t {
   disposed,      ///< its host says that there is no such thing
@@ -72,9 +76,10 @@ enum class InstanceEnd : std::uint8_t {
 template <class Sample, class Update, class End>
 void take_changes(dds_entity_t reader, HostWriters& writers, Update update, End end) {
   take_told<Sample>(reader, writers, [&](const Sample& sample, const dds_sample_info_t& info) {
-    const bool disposed = info.instance_state == DDS_IST_NOT_ALIVE_DISPOSED;
-    if (info.valid_data && !disposed) update(info.instance_handle, sample);
-    if (disposed) end(info.instance_handle, InstanceEnd::disposed);
+    const bool ended =
+        info.valid_data ? sample.epoch == kEndOfRow : info.instance_state == DDS_IST_NOT_ALIVE_DISPOSED;
+    if (info.valid_data && !ended) update(info.instance_handle, sample);
+    if (ended) end(info.instance_handle, InstanceEnd::disposed);
     if (info.instance_state == DDS_IST_NOT_ALIVE_NO_WRITERS) {
       end(info.instance_handle, InstanceEnd::without_host);
     }

@@ -5,6 +5,7 @@
 #include <limits>
 #include <span>
 
+#include "api/dds/host_writers.hpp"
 #include "api/dds/instances.hpp"
 #include "api/dds/sequence.hpp"
 #include "api/dds/text.hpp"
@@ -137,7 +138,8 @@ void StatisticsWriter::dispose(const std::string& instance, const Told& told) {
   dds::copy_text(sample.host, host_);
   dds::copy_text(sample.instance, instance);
   dds::copy_text(sample.task, told.task);
-  (void)dds_dispose(way_.writer.get(), &sample);
+  sample.epoch = dds::kEndOfRow;
+  (void)dds_writedispose(way_.writer.get(), &sample);
   dds::unregister_instance(way_.writer.get(), &sample);
 }
 

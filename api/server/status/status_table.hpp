@@ -9,6 +9,7 @@
 
 #include <dds/dds.h>
 
+#include "api/dds/host_writers.hpp"
 #include "api/dds/instances.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"
@@ -98,7 +99,8 @@ class StatusTable {
   using Entries = std::map<std::string, Entry>;
 
   typename Entries::iterator dispose(typename Entries::iterator it) {
-    (void)dds_dispose(way_.writer.get(), &it->second.sample);
+    it->second.sample.epoch = dds::kEndOfRow;
+    (void)dds_writedispose(way_.writer.get(), &it->second.sample);
     dds::unregister_instance(way_.writer.get(), &it->second.sample);
     return entries_.erase(it);
   }

@@ -237,6 +237,38 @@ TEST(RemoteStatus, OfAPageThatAStrangerWroteToHarmsNobody) {
   EXPECT_EQ(report->numbers.cycles, 0x8080808080808080U);
 }
 
+// DDS lets anyone dispose what another has written. A reader that has not taken that is not told by whom.
+TEST(RemoteStatus, IsNotEndedByAStranger) {
+  const OwnDomain domain;
+  TestHost host(domain, "hosta");
+  host.write_instance(0, "line1", InstanceState::offline);
+  host.write_count(1);
+  host.start_server();
+  const auto sut = connect(domain);
+  const auto other = connect(domain);
+  for (const auto& client : {&sut, &other}) {
+    ASSERT_TRUE((*client)->host("hosta", soon()));
+    ASSERT_EQ((*client)->instances("hosta", soon()).value().size(), 1U);
+  }
+  const dds::Entity stranger{dds_create_participant(domain.number(), nullptr, nullptr)};
+  const auto topic = dds::make_topic(stranger.get(), dds::kInstanceStatus);
+  const auto publisher = dds::make_publisher(stranger.get(), dds::status_partition("west"));
+  const auto writer = dds::make_writer(publisher->get(), topic->get(), dds::qos_of(dds::kInstanceStatus));
+  plc_InstanceStatus sample{};
+  dds::copy_text(sample.host, "hosta");
+  dds::copy_text(sample.instance, "line1");
+
+  constexpr auto running = static_cast<std::uint32_t>(InstanceState::running);
+  host.write_instance(0, "line1", InstanceState::running);
+  while (other->instances("hosta", soon()).value().at(0).state != running) ::usleep(1000);
+  ASSERT_EQ(dds_dispose(writer->get(), &sample), DDS_RETCODE_OK);
+
+  const auto instances = sut->instances("hosta", soon());
+  ASSERT_TRUE(instances) << instances.error().describe();
+  ASSERT_EQ(instances->size(), 1U);
+  EXPECT_EQ(instances->front().state, running);
+}
+
 TEST(RemoteStatus, ForgetsAnInstanceThatIsGone) {
   const OwnDomain domain;
   TestHost host(domain, "hosta");
