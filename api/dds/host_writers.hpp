@@ -8,6 +8,7 @@
 
 #include <dds/dds.h>
 
+#include "api/dds/instances.hpp"
 #include "api/dds/samples.hpp"
 #include "api/dds/text.hpp"
 
@@ -63,6 +64,14 @@ void take_valid_told(dds_entity_t reader, HostWriters& writers, Function use) {
 /// The epoch in the last sample of a row that has gone. DDS lets anyone dispose a row, and does not tell who
 /// it was as long as a sample of the row has not been taken.
 inline constexpr std::uint64_t kEndOfRow = 0;
+
+/// Ends the row of `row`, as its host. `writer` must have written it. What `row` says of it is lost.
+template <class Sample>
+void end_row(dds_entity_t writer, Sample& row) {
+  row.epoch = kEndOfRow;
+  (void)dds_writedispose(writer, &row);
+  unregister_instance(writer, &row);
+}
 
 /// Why an instance has no sample any more.
 enum class InstanceEnd : std::uint8_t {

@@ -23,6 +23,12 @@ namespace plchost {
 
 namespace {
 
+/// Waits for that, so long at most.
+bool is_asked_to_end(int stop_fd, int wait_ms) {
+  pollfd stop{.fd = stop_fd, .events = POLLIN, .revents = 0};
+  return ::poll(&stop, 1, wait_ms) > 0;
+}
+
 std::string machine_name() {
   std::array<char, 65> name{};
   (void)::gethostname(name.data(), name.size() - 1);
@@ -103,8 +109,7 @@ Result<void> NameClaim::ask(TimePoint deadline, int stop_fd) {
       heard_.clear();
       return write();
     }
-    pollfd stop{.fd = stop_fd, .events = POLLIN, .revents = 0};
-    if (::poll(&stop, 1, kLookMs) > 0) {
+    if (is_asked_to_end(stop_fd, kLookMs)) {
       return failure(ErrorCode::unavailable, "asked to end before it was known whether the name is free");
     }
   }
@@ -134,8 +139,7 @@ void NameClaim::be_heard(int stop_fd) {
   constexpr int kLookMs = 2;
   const TimePoint end = MonotonicClock::now() + kBeingHeard;
   const auto goes_on = [&](int wait_ms) {
-    pollfd stop{.fd = stop_fd, .events = POLLIN, .revents = 0};
-    return ::poll(&stop, 1, wait_ms) == 0 && MonotonicClock::now() < end;
+    return !is_asked_to_end(stop_fd, wait_ms) && MonotonicClock::now() < end;
   };
   while (!is_read_by(winner_.server)) {
     if (!goes_on(kLookMs)) return;

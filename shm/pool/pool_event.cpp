@@ -46,7 +46,7 @@ bool PoolEvent::set_registered(bool registered) const noexcept {
 }
 
 bool PoolEvent::set_bound_tasks(std::uint32_t count) const noexcept {
-  if (!change_binding(Binding::kBoundMask, count & Binding::kBoundMask)) return false;
+  if (!hold_for_tasks(count)) return false;
   entry_->event.set_taken(count > 0);
   return true;
 }

@@ -6,7 +6,6 @@
 #include <span>
 
 #include "api/dds/host_writers.hpp"
-#include "api/dds/instances.hpp"
 #include "api/dds/sequence.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/histogram_digest.hpp"
@@ -138,9 +137,7 @@ void StatisticsWriter::dispose(const std::string& instance, const Told& told) {
   dds::copy_text(sample.host, host_);
   dds::copy_text(sample.instance, instance);
   dds::copy_text(sample.task, told.task);
-  sample.epoch = dds::kEndOfRow;
-  (void)dds_writedispose(way_.writer.get(), &sample);
-  dds::unregister_instance(way_.writer.get(), &sample);
+  dds::end_row(way_.writer.get(), sample);
 }
 
 }  // namespace plchost

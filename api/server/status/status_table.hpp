@@ -10,7 +10,6 @@
 #include <dds/dds.h>
 
 #include "api/dds/host_writers.hpp"
-#include "api/dds/instances.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"
 #include "shm/base/time.hpp"
@@ -99,9 +98,7 @@ class StatusTable {
   using Entries = std::map<std::string, Entry>;
 
   typename Entries::iterator dispose(typename Entries::iterator it) {
-    it->second.sample.epoch = dds::kEndOfRow;
-    (void)dds_writedispose(way_.writer.get(), &it->second.sample);
-    dds::unregister_instance(way_.writer.get(), &it->second.sample);
+    dds::end_row(way_.writer.get(), it->second.sample);
     return entries_.erase(it);
   }
 

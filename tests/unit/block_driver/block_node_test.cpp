@@ -22,6 +22,14 @@ class BlockNodeTest : public BlockNodes {
     }
     return false;
   }
+  /// By a node "a" that goes then.
+  void send_last_words(TestNode& to, NodeAddress& from) {
+    TestNode a = join("a");
+    from = a.address();
+    connect(a, to);
+    BlockChannel sender = a.channel();
+    ASSERT_EQ(sender.send(to.address(), bytes_of("last words")), SendResult::sent);
+  }
 };
 
 TEST_F(BlockNodeTest, TwoNodesTalkToEachOtherInTheirCycles) {
@@ -233,12 +241,8 @@ TEST_F(BlockNodeTest, ANodeThatWentAndCameBackIsReachedByTheSameAddress) {
 TEST_F(BlockNodeTest, WhatANodeSentBeforeItWentIsStillReceived) {
   TestNode b = join("b");
   BlockChannel to = b.channel();
-  {
-    TestNode a = join("a");
-    connect(a, b);
-    BlockChannel from = a.channel();
-    ASSERT_EQ(from.send(b.address(), bytes_of("last words")), SendResult::sent);
-  }
+  NodeAddress gone;
+  ASSERT_NO_FATAL_FAILURE(send_last_words(b, gone));
   settle(b);
   EXPECT_EQ(b.next(to), "last words");
 }
@@ -248,13 +252,7 @@ TEST_F(BlockNodeTest, ALinkThatHadToWaitForTheRestOfTheLastOneIsOpenedWhenThatIs
   TestNode b = join("b");
   BlockChannel to = b.channel();
   NodeAddress address;
-  {
-    TestNode a = join("a");
-    address = a.address();
-    connect(a, b);
-    BlockChannel from = a.channel();
-    ASSERT_EQ(from.send(b.address(), bytes_of("last words")), SendResult::sent);
-  }
+  ASSERT_NO_FATAL_FAILURE(send_last_words(b, address));
   TestNode a = join("a");
   ASSERT_EQ(a.address(), address);
   connect(a, b);
