@@ -65,7 +65,7 @@ void take_valid_told(dds_entity_t reader, HostWriters& writers, Function use) {
 /// it was as long as a sample of the row has not been taken.
 inline constexpr std::uint64_t kEndOfRow = 0;
 
-/// Ends the row of `row`, as its host. `writer` must have written it. What `row` says of it is lost.
+/// Ends the row of `row`, as its host. `writer` must have written it. Changes `row`.
 template <class Sample>
 void end_row(dds_entity_t writer, Sample& row) {
   row.epoch = kEndOfRow;
