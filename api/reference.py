@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""Makes the reference in reference.md from control.idl, and holds control.idl to its own rules.
+"""Makes the operations of control.idl from shm/base/operations.def, and the reference in reference.md from control.idl;
+holds control.idl to its own rules.
 
-  reference.py --write               writes the reference into reference.md
+  reference.py --write               writes the operations into control.idl, and the reference into reference.md
   reference.py --check               says what is wrong: no comment, no QoS, a type that others would not
-                                     understand, or a reference.md that is not up to date
+                                     understand, or a file that is not up to date
   reference.py --compatible OLD.idl  says which types and constants of OLD.idl are not the same in control.idl
 Each exits with 1 if something is wrong. --root DIR: the folder of control.idl and reference.md, instead of its own.
 """
@@ -16,6 +17,7 @@ import sys
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(pathlib.Path(__file__).parent / "generate"))
 from contract import TAGS, Fault, meaning, parse, partition_of, qos_of, quality  # noqa: E402
+from operations import operations_of, with_operations  # noqa: E402
 
 BEGIN = "<!-- The reference begins here. It is made: api/reference.py --write -->"
 END = "<!-- The reference ends here. -->"
@@ -134,6 +136,16 @@ def with_reference(page, made):
     return before + made + after
 
 
+def bring_up_to_date(path, made, write):
+    """Writes what was made; or the fault, if nothing is to be written."""
+    if path.read_text() == made:
+        return []
+    if write:
+        path.write_text(made)
+        return []
+    return [f"{path.name} is not up to date: run api/reference.py --write"]
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     what = parser.add_mutually_exclusive_group(required=True)
@@ -144,18 +156,16 @@ def main():
     options = parser.parse_args()
     idl, page = options.root / "control.idl", options.root / "reference.md"
     try:
+        if not options.compatible:
+            operations = operations_of(options.root.parent / "shm/base/operations.def")
+            found = bring_up_to_date(idl, with_operations(idl.read_text(), operations), options.write)
         contract = parse(idl)
         if options.compatible:
             found = [f"{idl.name}: {f}" for f in changes_since(parse(options.compatible), contract)]
         else:
-            found = list(faults_of(contract, idl.name))
+            found += faults_of(contract, idl.name)
             if not found:
-                told = page.read_text()
-                new = with_reference(told, reference(contract))
-                if options.write:
-                    page.write_text(new)
-                elif told != new:
-                    found = ["reference.md: the reference is not up to date: run api/reference.py --write"]
+                found = bring_up_to_date(page, with_reference(page.read_text(), reference(contract)), options.write)
     except Fault as fault:
         found = [str(fault)]
     print("\n".join(found), end="\n" if found else "")

@@ -11,30 +11,9 @@ namespace plchost {
 /// The operations of a host or of an instance. Up to 99 the value is the number of OPERATION_... in
 /// api/control.idl; the others are between the manager and an instance only.
 enum class ControlVerb : std::uint8_t {
-  start = 1,
-  stop = 2,
-  reset = 3,
-  restart = 4,
-  single_cycle = 5,
-  reset_cold = 6,
-  reset_statistics = 7,
-  check_host = 8,
-  list_objects = 9,
-  load_application = 10,
-  set_scheduler = 11,
-  register_event = 12,
-  unregister_event = 13,
-  list_nodes = 14,
-  list_routes = 15,
-  read_clock = 16,
-  download_application = 17,
-  rollback_application = 18,
-  reload_host = 19,
-  read_log = 20,
-  change_application = 100,  ///< argument: a path; it takes over while tasks run
-  shutdown = 101,            ///< stop the application and end the process
-  status = 102,              ///< the reply's text is the InstanceReport
-  set_log_level = 103,       ///< argument: one of kLogLevels
+#define OPERATION(verb, number, ...) verb = number,
+#include "shm/base/operations.def"
+#undef OPERATION
 };
 
 /// The process that carries out an operation.
@@ -65,7 +44,7 @@ enum class OperationOptions : std::uint8_t { none, loading, download };
 /// and functions of the client library come from it.
 struct Operation {
   ControlVerb verb{};
-  std::string_view name;  ///< for people, in the audit log, and on control sockets
+  std::string_view name;  ///< the verb's words: for people, in the audit log, and on control sockets
   OperationPlace place = OperationPlace::manager;
   ApiRole role = ApiRole::operating;
   OperationArgument argument = OperationArgument::none;

@@ -139,13 +139,16 @@ must_be_red "house: name of a test's own making" "the lines above make names tha
 # plant_in_contract NAME DIAGNOSTIC EXPRESSION [--write]: the contract with that change (of sed), and with a reference made anew
 plant_in_contract() {
   new_tree
+  mkdir -p "$plot/tree/shm/base"
+  cp shm/base/operations.def "$plot/tree/shm/base/"
   cp api/control.idl api/reference.md "$plot/tree/api/"
-  sed -i -E "$3" "$plot/tree/api/control.idl"
-  cmp -s api/control.idl "$plot/tree/api/control.idl" && { echo "nothing was planted for '$1'"; failed=1; }
+  sed -i -E "$3" "$plot/tree/api/control.idl" "$plot/tree/shm/base/operations.def"
+  cmp -s api/control.idl "$plot/tree/api/control.idl" && cmp -s shm/base/operations.def "$plot/tree/shm/base/operations.def" &&
+    { echo "nothing was planted for '$1'"; failed=1; }
   [ "${4:-}" != --write ] || api/reference.py --root "$plot/tree/api" --write >/dev/null || true
   must_be_red "$1" "$2" "$gates/contract.sh" "$plot/tree"
 }
-plant_in_contract "contract: old reference" "the reference is not up to date" 's,// of plchost-dds,// of the server,'
+plant_in_contract "contract: old reference" "reference.md is not up to date" 's,// of plchost-dds,// of the server,'
 plant_in_contract "contract: no comment" "Presence.pid has no comment" 's,^( *long pid;) *// of plchost-dds,\1,'
 plant_in_contract "contract: no QoS" "LogPage has no 'qos:'" '/qos: as ObjectPage/d'
 plant_in_contract "contract: QoS that the generator does not know" "this QoS is not understood: RELIABLE 1 ms" 's/qos: RELIABLE \(1 ms\), KEEP_LAST 16/qos: RELIABLE 1 ms, KEEP_LAST 16/'
@@ -153,7 +156,9 @@ plant_in_contract "contract: text without a bound" "Transition.reason has no bou
 plant_in_contract "contract: version 1 has another type" "member string<191> reason is now string<192> reason" 's/string<191> reason/string<192> reason/' --write
 plant_in_contract "contract: version 1 has another member" "member unsigned long credits is now unsigned long credit" 's/unsigned long credits;/unsigned long credit;/' --write
 plant_in_contract "contract: version 1 has one more member" "type EventAck: member sequence<KeyValue, 16> ext is now long more" 's,^( *)unsigned long credits;.*,&\n\1long more; // more,' --write
-plant_in_contract "contract: version 1 has another code" "constant OPERATION_STOP = 2 is not what it was" 's/(OPERATION_STOP +=) 2;/\1 102;/' --write
+plant_in_contract "contract: an operation that its row does not have so" "control.idl is not up to date" 's/(OPERATION_STOP +=) 2;/\1 102;/'
+plant_in_contract "contract: version 1 has another code" "constant OPERATION_STOP = 2 is not what it was" 's/^(OPERATION.stop,) 2,/\1 60,/' --write
+plant_in_contract "contract: a row that nobody understands" "operations.def: a row is not understood" 's/^(OPERATION.stop,) 2,/\1 two,/'
 plant_in_contract "contract: version 1 has another topic" "type Reply is of topic plc/v1/answer, was of plc/v1/reply" 's,topic: plc/v1/reply,topic: plc/v1/answer,' --write
 
 # plant_in_picture NAME DIAGNOSTIC FILE EXPRESSION: that picture with that change (of sed)
