@@ -246,14 +246,36 @@ class Application {
 
   explicit Application(const std::string& name) { copy(setup_.stApplicationName, name, "application"); }
 
-  /// Every `interval`. Priorities everywhere: 0 (highest) to 31, of which 0..15 are real-time.
+  /// A task of any kind of plc_app.h; the functions below have one kind each. The members of Task_Info that
+  /// the kind uses are set in the result, which is valid until another task is added. Priorities everywhere:
+  /// 0 (highest) to 31, of which 0..15 are real-time.
+  Task_Info& task(const std::string& name, int priority, short kind, Cycle cycle) {
+    if (tasks_.size() >= PLC_MAX_TASKS) {
+      throw std::length_error("more than " + std::to_string(PLC_MAX_TASKS) + " tasks");
+    }
+    if (priority < 0 || priority > 31) {
+      throw std::invalid_argument("task '" + name + "': priority must be 0 (highest) to 31");
+    }
+    if (!cycle) throw std::invalid_argument("task '" + name + "': its cycle is an empty function");
+    Task_Info added{};
+    copy(added.stName, name, "task");
+    added.nPriority = static_cast<short>(priority);
+    added.KindOfTask = kind;
+    added.dwTaskEntryFunctionPointer = &run_current;
+    cycles_.push_back(std::move(cycle));
+    variables_.emplace_back();
+    tasks_.push_back(added);
+    return tasks_.back();
+  }
+
+  /// Every `interval`.
   void cyclic(const std::string& name, int priority, std::chrono::microseconds interval, Cycle cycle) {
     if (interval.count() <= 0 || interval.count() > std::numeric_limits<unsigned int>::max()) {
       throw std::invalid_argument("task '" + name + "': interval must be 1 us to 4294 s");
     }
-    Task_Info& task = add(name, priority, Cyclic, std::move(cycle));
-    task.bMicroseconds = 1;
-    task.dwInterval = static_cast<unsigned int>(interval.count());
+    Task_Info& added = task(name, priority, Cyclic, std::move(cycle));
+    added.bMicroseconds = 1;
+    added.dwInterval = static_cast<unsigned int>(interval.count());
   }
 
   /// Once each time `variable` goes from false to true. `variable` is called by the scheduler and only reads:
@@ -261,22 +283,22 @@ class Application {
   void event(const std::string& name, int priority, Variable variable, Cycle cycle) {
     if (!variable)
       throw std::invalid_argument("task '" + name + "': its event variable is an empty function");
-    Task_Info& task = add(name, priority, Event, std::move(cycle));
-    task.dwEventFunctionPointer = &read_current;
+    Task_Info& added = task(name, priority, Event, std::move(cycle));
+    added.dwEventFunctionPointer = &read_current;
     variables_.back() = std::move(variable);
   }
 
   /// Once for each post of the external event `event`, which is registered, too, unless said otherwise.
   void external(const std::string& name, int priority, const std::string& event, Cycle cycle,
                 Registration registration = Registration::with_task) {
-    Task_Info& task = add(name, priority, External, std::move(cycle));
-    copy(task.stExternalEvent, event, "external event");
+    Task_Info& added = task(name, priority, External, std::move(cycle));
+    copy(added.stExternalEvent, event, "external event");
     if (registration == Registration::with_task) to_register_.push_back(event);
   }
 
   /// In a loop, sleeping a share of its execution time.
   void freewheeling(const std::string& name, int priority, Cycle cycle) {
-    add(name, priority, Freewheeling, std::move(cycle));
+    task(name, priority, Freewheeling, std::move(cycle));
   }
 
   /// The options of a task of this application.
@@ -395,25 +417,6 @@ class Application {
                                   std::to_string(Size - 1) + " characters");
     }
     std::memcpy(to, from.c_str(), from.size() + 1);
-  }
-
-  Task_Info& add(const std::string& name, int priority, short kind, Cycle cycle) {
-    if (tasks_.size() >= PLC_MAX_TASKS) {
-      throw std::length_error("more than " + std::to_string(PLC_MAX_TASKS) + " tasks");
-    }
-    if (priority < 0 || priority > 31) {
-      throw std::invalid_argument("task '" + name + "': priority must be 0 (highest) to 31");
-    }
-    if (!cycle) throw std::invalid_argument("task '" + name + "': its cycle is an empty function");
-    Task_Info task{};
-    copy(task.stName, name, "task");
-    task.nPriority = static_cast<short>(priority);
-    task.KindOfTask = kind;
-    task.dwTaskEntryFunctionPointer = &run_current;
-    cycles_.push_back(std::move(cycle));
-    variables_.emplace_back();
-    tasks_.push_back(task);
-    return tasks_.back();
   }
 
   std::vector<Task_Info> tasks_;

@@ -48,7 +48,7 @@ void setup(plc::Application& app) {
   app.external("Hang", 17, "hang", [] {
     for (;;) ::nanosleep(std::array<timespec, 1>{timespec{.tv_sec = 1, .tv_nsec = 0}}.data(), nullptr);
   });
-  app.freewheeling("Loop", 18, loop);
+  app.task("Loop", 18, Freewheeling, loop);
   app.on_exit([] { plc::log("exit after %u works", works.load()); });
 }
 
