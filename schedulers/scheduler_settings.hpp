@@ -5,15 +5,23 @@
 #include <string>
 
 #include "schedulers/distributed_clock/settings.hpp"
+#include "shm/base/bounds.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
 
 namespace plchost {
 
+// The ranges of the settings. check_settings() allows programs more of the first two: tests have ticks of
+// 20 us.
+inline constexpr Bounds<Duration> kTickInFiles{.lowest = std::chrono::microseconds(50),
+                                               .highest = std::chrono::seconds(1)};
+inline constexpr Bounds<Duration> kFreewheelingCycletimeInFiles{.lowest = Duration(0),
+                                                                .highest = std::chrono::seconds(60)};
 /// 100: a freewheeling task sleeps no longer than it must.
-inline constexpr int kMaxProcessorLoad = 100;
+inline constexpr Bounds<int> kProcessorLoad{.lowest = 0, .highest = 100};
 /// More than any wake-up latency that spinning is an answer to.
-inline constexpr Duration kMaxSpinAhead = std::chrono::milliseconds(1);
+inline constexpr Bounds<Duration> kSpinAhead{.lowest = Duration(0), .highest = std::chrono::milliseconds(1)};
+inline constexpr Bounds<std::uint64_t> kEventBacklog{.lowest = 1, .highest = 1'000'000'000};
 
 /// system: a timer of the kernel. task: a thread of high priority in absolute sleeps. auxiliary: a clock
 /// device with an interrupt of its own.

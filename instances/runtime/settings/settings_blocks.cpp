@@ -3,6 +3,7 @@
 #include <array>
 #include <charconv>
 
+#include "instances/runtime/settings/setting_places.hpp"
 #include "instances/runtime/settings/settings_key.hpp"
 #include "shm/base/names.hpp"
 #include "shm/block_driver/block.hpp"
@@ -12,12 +13,28 @@ namespace plchost {
 
 namespace {
 
+using std::chrono::milliseconds;
+
 constexpr std::string_view kDriver = "CmpBlkDrvShm";
 constexpr std::string_view kRouter = "CmpRouter";
 constexpr std::array<std::string_view, 6> kQueueSlots = {"512", "1024", "2048", "4096", "8192", "16384"};
 
-BlockSettings& blocks_of(const SettingsTarget& target) {
-  return target.settings.blocks;
+template <auto kMember>
+using BlocksAt = At<&InstanceSettings::blocks, kMember>;
+
+std::uint32_t slots_of(std::string_view word) {
+  std::uint32_t slots = 0;
+  std::from_chars(word.data(), word.data() + word.size(), slots);
+  return slots;
+}
+
+void set_queue_slots(const SettingsTarget& to, std::size_t index) {
+  to.settings.blocks.queue_slots = slots_of(kQueueSlots[index]);
+}
+
+std::size_t initial_queue_slots() {
+  const auto word = std::ranges::find(kQueueSlots, BlockSettings{}.queue_slots, slots_of);
+  return static_cast<std::size_t>(word - kQueueSlots.begin());
 }
 
 bool is_base_name(std::string_view text) {
@@ -48,72 +65,44 @@ constexpr std::array kBlockKeys = {
     SettingKey{.section = kDriver,
                .name = "Enable",
                .unit = "1 is a node also without a channel",
-               .initial = "0",
                .meaning = "the instance is a node from its start",
-               .value = NumberSetting{0, 1,
-                                      [](const SettingsTarget& to, std::int64_t enable) {
-                                        blocks_of(to).enable = enable != 0;
-                                      }}},
+               .value = truth_setting<BlocksAt<&BlockSettings::enable>>()},
     SettingKey{.section = kDriver,
                .name = "BaseName",
-               .initial = kDefaultBlockBase,
                .meaning = "nodes of the same base name in the same pool see each other",
-               .value = TextSetting{"1 to 31 letters, digits, _ - .", is_base_name,
-                                    [](const SettingsTarget& to, std::string_view name) {
-                                      blocks_of(to).base = name;
-                                    }}},
+               .value = text_setting<BlocksAt<&BlockSettings::base>>("1 to 31 letters, digits, _ - .",
+                                                                     is_base_name)},
     SettingKey{
         .section = kDriver,
         .name = "ForcedAddress",
         .meaning = "address of the node; without it any free one. An address that is taken ends the start",
-        .value = NumberSetting{1, kMaxNodes,
-                               [](const SettingsTarget& to, std::int64_t address) {
-                                 blocks_of(to).forced_address = static_cast<std::uint16_t>(address);
-                               }}},
+        .value = number_setting<BlocksAt<&BlockSettings::forced_address>>(1, kMaxNodes)},
     SettingKey{.section = kDriver,
                .name = "QueueSlots",
-               .initial = "1024",
                .meaning = "slots of 256 bytes in each of the four queues of a link that it makes",
-               .value = WordSetting{kQueueSlots,
-                                    [](const SettingsTarget& to, std::size_t index) {
-                                      const std::string_view word = kQueueSlots[index];
-                                      std::from_chars(word.data(), word.data() + word.size(),
-                                                      blocks_of(to).queue_slots);
-                                    }}},
+               .value = WordSetting{kQueueSlots, set_queue_slots, initial_queue_slots}},
     SettingKey{.section = kDriver,
                .name = "HoldMs",
                .unit = "ms",
-               .initial = "1000",
                .meaning = "a block that nobody receives for this time is dropped and counted",
-               .value = NumberSetting{100, 60'000,
-                                      [](const SettingsTarget& to, std::int64_t ms) {
-                                        blocks_of(to).hold = std::chrono::milliseconds(ms);
-                                      }}},
+               .value = number_setting<BlocksAt<&BlockSettings::hold>, As<milliseconds>>(100, 60'000)},
     SettingKey{
         .section = kRouter,
         .name = "Neighbours",
         .meaning = "instances that it exchanges blocks with directly",
         .value = TextSetting{"names of instances with commas between; without it all are", are_node_names,
                              [](const SettingsTarget& to, std::string_view names) {
-                               blocks_of(to).neighbours = words_of(names);
+                               to.settings.blocks.neighbours = words_of(names);
                              }}},
     SettingKey{.section = kRouter,
                .name = "Forward",
                .unit = "1 is on",
-               .initial = "1",
                .meaning = "blocks of other nodes may go through it",
-               .value = NumberSetting{0, 1,
-                                      [](const SettingsTarget& to,
-                                         std::int64_t forward) { blocks_of(to).forward = forward != 0; }}},
+               .value = truth_setting<BlocksAt<&BlockSettings::forward>>()},
     SettingKey{.section = kRouter,
                .name = "HopLimit",
-               .initial = "8",
                .meaning = "nodes that a block may go through",
-               .value =
-                   NumberSetting{
-                       1, kMaxHops,
-                       [](const SettingsTarget& to,
-                          std::int64_t hops) { blocks_of(to).hop_limit = static_cast<std::uint8_t>(hops); }}},
+               .value = number_setting<BlocksAt<&BlockSettings::hop_limit>>(1, kMaxHops)},
     // Subnets of their router: here all nodes of a pool are in one.
     SettingKey{.section = kRouter, .name = "0.MainNet"},
     SettingKey{.section = kRouter, .name = "0.NumSubNets"},
@@ -123,6 +112,8 @@ constexpr std::array kBlockKeys = {
 };
 
 }  // namespace
+
+static_assert(BlockSettings{}.base == kDefaultBlockBase);
 
 std::span<const SettingKey> block_keys() noexcept {
   return kBlockKeys;

@@ -232,6 +232,29 @@ std::string allowed_values(const SettingKey& key) {
   return key.unit.empty() ? range : fmt::format("{}, {}", key.unit, range);
 }
 
+std::string initial_value(const SettingKey& key) {
+  return std::visit(
+      Overloaded{
+          [](const NumberSetting& setting) {
+            const std::int64_t number = setting.initial();
+            return number < setting.lowest ? std::string() : fmt::format("{}", number);
+          },
+          [](const OptionalNumberSetting& setting) {
+            const std::int64_t number = setting.initial();
+            return fmt::format("{}", number == 0 ? -1 : number);
+          },
+          [](const MicrosecondSetting& setting) {
+            return fmt::format("{}", setting.initial() / std::chrono::microseconds(1));
+          },
+          [](const WordSetting& setting) { return std::string(setting.words[setting.initial()]); },
+          [](const TextSetting& setting) {
+            return setting.initial == nullptr ? std::string() : setting.initial();
+          },
+          [](const auto& /*none*/) { return std::string(); },
+      },
+      key.value);
+}
+
 Result<const SettingKey*> find_setting(std::string_view section, std::string_view name) {
   const auto found = std::ranges::find_if(all_setting_keys(), [&](const SettingKey& key) {
     return key.section == table_section(section) && is_named(key, name);

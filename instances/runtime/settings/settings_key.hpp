@@ -35,11 +35,15 @@ struct SettingsTarget {
 /// The path, as it counts from the folder of its file.
 [[nodiscard]] std::string in_folder(const SettingsTarget& target, std::string_view path);
 
-/// An integer, lowest to highest.
+// The kinds of value of a key. Each has its range, where a value goes, and the default as it stands in the
+// program; null: there is none. setting_places.hpp makes both functions from a member of the settings.
+
+/// An integer, lowest to highest. A default outside of the range is none that could be written.
 struct NumberSetting {
   std::int64_t lowest;
   std::int64_t highest;
   void (*apply)(const SettingsTarget&, std::int64_t number);
+  std::int64_t (*initial)();
   bool capped = false;  ///< more acts as highest, with a remark: files of the other runtime have it
 };
 
@@ -47,6 +51,7 @@ struct NumberSetting {
 struct OptionalNumberSetting {
   std::int64_t highest;
   void (*apply)(const SettingsTarget&, std::int64_t number);
+  std::int64_t (*initial)();
 };
 
 /// Microseconds with up to four decimals, so that 1024 Hz can be written: lowest to highest.
@@ -54,12 +59,14 @@ struct MicrosecondSetting {
   std::int64_t lowest;
   std::int64_t highest;
   void (*apply)(const SettingsTarget&, Duration value);
+  Duration (*initial)();
 };
 
 /// One of these words, in any case.
 struct WordSetting {
   std::span<const std::string_view> words;
   void (*apply)(const SettingsTarget&, std::size_t index);
+  std::size_t (*initial)();
 };
 
 /// A text.
@@ -67,6 +74,7 @@ struct TextSetting {
   std::string_view form;  ///< the allowed values, in words
   bool (*allows)(std::string_view text);
   void (*apply)(const SettingsTarget&, std::string_view text);
+  std::string (*initial)() = nullptr;
 };
 
 /// A key with ".N" at its end, or ".N." in it: N is 0 to highest. Its name in the table has it, too.
@@ -92,7 +100,6 @@ struct SettingKey {
   std::string_view name;
   bool prefixed = false;       ///< written with the name of a platform in front: VxWorks.NAME, or Linux.NAME
   std::string_view unit{};     ///< empty: none
-  std::string_view initial{};  ///< the default, as it would be written
   std::string_view meaning{};  ///< for the table in instances/settings.md
   std::variant<NumberSetting, OptionalNumberSetting, MicrosecondSetting, WordSetting, TextSetting,
                NumberedSetting, NamedSetting, UnusedSetting>
@@ -132,6 +139,8 @@ inline constexpr std::string_view kTaskPrefix = "Task.";  ///< the beginning of 
 [[nodiscard]] std::string written_name(const SettingKey& key);
 /// "us, 50 to 1000000"
 [[nodiscard]] std::string allowed_values(const SettingKey& key);
+/// The default, as it would be written: "1000"; empty: there is none.
+[[nodiscard]] std::string initial_value(const SettingKey& key);
 
 /// The row for a key as written in an owned section. invalid_argument: there is none; the text lists what
 /// there is, and what may have been meant.

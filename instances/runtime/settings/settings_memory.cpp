@@ -6,12 +6,15 @@
 #include <fmt/format.h>
 
 #include "instances/plc_app.h"
+#include "instances/runtime/settings/setting_places.hpp"
 #include "instances/runtime/settings/settings_key.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
 
 namespace {
+
+using std::chrono::milliseconds;
 
 constexpr std::string_view kMemory = "SysMem";
 constexpr std::string_view kRetain = "Retain";
@@ -99,6 +102,9 @@ bool overlap(const AreaSettings& a, const AreaSettings& b) {
   return a.device == b.device && a.address < b.address + b.size && b.address < a.address + a.size;
 }
 
+template <auto kMember>
+using RetainAt = At<&InstanceSettings::retain, kMember>;
+
 constexpr std::array kMemoryKeys = {
     SettingKey{.section = kMemory,
                .name = "Area.N.Flags",
@@ -140,33 +146,21 @@ constexpr std::array kMemoryKeys = {
     SettingKey{.section = kRetain,
                .name = "IntervalMs",
                .unit = "ms",
-               .initial = "1000",
                .meaning = "how often retain values that have changed are written",
-               .value = NumberSetting{10, 3'600'000,
-                                      [](const SettingsTarget& to, std::int64_t number) {
-                                        to.settings.retain.interval = std::chrono::milliseconds(number);
-                                      }}},
+               .value = number_setting<RetainAt<&RetainSettings::interval>, As<milliseconds>>(10, 3'600'000)},
     SettingKey{
         .section = kRetain,
         .name = "PostponeMs",
         .unit = "ms",
-        .initial = "100",
         .meaning =
             "how long a time without any cycle is looked for, before tasks copy their areas themselves",
-        .value = NumberSetting{1, 60'000,
-                               [](const SettingsTarget& to, std::int64_t number) {
-                                 to.settings.retain.postpone = std::chrono::milliseconds(number);
-                               }}},
+        .value = number_setting<RetainAt<&RetainSettings::postpone>, As<milliseconds>>(1, 60'000)},
     SettingKey{.section = kRetain,
                .name = "Mismatch",
-               .initial = "Initialise",
                .meaning =
                    "retain values of another layout: begin anew, refuse the application, or take areas "
                    "of the same name",
-               .value = WordSetting{kMismatches,
-                                    [](const SettingsTarget& to, std::size_t index) {
-                                      to.settings.retain.mismatch = static_cast<RetainMismatch>(index);
-                                    }}},
+               .value = word_setting<RetainAt<&RetainSettings::mismatch>>(kMismatches)},
 };
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <array>
 #include <utility>
 
+#include "instances/runtime/settings/setting_places.hpp"
 #include "instances/runtime/settings/settings_key.hpp"
 #include "shm/base/names.hpp"
 
@@ -41,44 +42,34 @@ bool is_path_or_nothing(std::string_view text) {
   return text.size() <= kMaxPath;
 }
 
+template <auto kMember>
+using TickAt = At<&InstanceSettings::scheduler, kMember>;
+template <auto kMember>
+using TimeAt = At<&InstanceSettings::sys_time, kMember>;
+
 constexpr std::array kTimerKeys = {
     SettingKey{.section = kTimer,
                .name = "TimerSource",
                .prefixed = true,
-               .initial = "System",
                .meaning = "where the tick comes from: timerfd, a thread of high priority, a clock device",
-               .value = WordSetting{kSources,
-                                    [](const SettingsTarget& to, std::size_t index) {
-                                      to.settings.scheduler.tick_source = static_cast<TickSourceKind>(index);
-                                    }}},
+               .value = word_setting<TickAt<&SchedulerSettings::tick_source>>(kSources)},
     SettingKey{.section = kTimer,
                .name = "TimerMode",
                .prefixed = true,
-               .initial = "Periodic",
                .meaning = "OneShot chooses CmpScheduleOneShot, unless a scheduler is named",
-               .value = WordSetting{kModes,
-                                    [](const SettingsTarget& to, std::size_t index) {
-                                      to.settings.timer_mode = static_cast<TimerMode>(index);
-                                    }}},
+               .value = word_setting<At<&InstanceSettings::timer_mode>>(kModes)},
     SettingKey{.section = kTimer,
                .name = "AuxiliaryDevice",
                .prefixed = true,
-               .initial = "/dev/rtc0",
                .meaning = "RTC or HPET; System replaces a device that cannot make the interval",
-               .value = TextSetting{"absolute path of a character device", is_device_path,
-                                    [](const SettingsTarget& to, std::string_view path) {
-                                      to.settings.scheduler.auxiliary_device = path;
-                                    }}},
+               .value = text_setting<TickAt<&SchedulerSettings::auxiliary_device>>(
+                   "absolute path of a character device", is_device_path)},
     SettingKey{.section = kTimer,
                .name = "IdleStates",
                .prefixed = true,
-               .initial = "Hold",
                .meaning = "Hold: idle states of all cores are off. HoldCore: of the instance's cores, where "
                           "that is possible",
-               .value = WordSetting{kIdleStates,
-                                    [](const SettingsTarget& to, std::size_t index) {
-                                      to.settings.idle_states = static_cast<IdleStates>(index);
-                                    }}},
+               .value = word_setting<At<&InstanceSettings::idle_states>>(kIdleStates)},
     SettingKey{.section = kTimer, .name = "WinCE.IRQNumber"},
     SettingKey{.section = kTimer, .name = "WinCE.IgnoreFailureOfIoCtrlHalTimingEnable"},
     SettingKey{.section = kTimer, .name = "WinCE.Priority"},
@@ -87,18 +78,14 @@ constexpr std::array kTimerKeys = {
                .name = "CustomSysTimeGetUs",
                .prefixed = true,
                .meaning = "gives the time in us that applications see; without it CLOCK_MONOTONIC",
-               .value = TextSetting{"name of a C function, or nothing", is_symbol_or_nothing,
-                                    [](const SettingsTarget& to, std::string_view symbol) {
-                                      to.settings.sys_time.get_us = symbol;
-                                    }}},
+               .value = text_setting<TimeAt<&SysTimeSettings::get_us>>("name of a C function, or nothing",
+                                                                       is_symbol_or_nothing)},
     SettingKey{.section = kTime,
                .name = "CustomSysTimeGetNs",
                .prefixed = true,
                .meaning = "the same in ns; both functions belong together",
-               .value = TextSetting{"name of a C function, or nothing", is_symbol_or_nothing,
-                                    [](const SettingsTarget& to, std::string_view symbol) {
-                                      to.settings.sys_time.get_ns = symbol;
-                                    }}},
+               .value = text_setting<TimeAt<&SysTimeSettings::get_ns>>("name of a C function, or nothing",
+                                                                       is_symbol_or_nothing)},
     SettingKey{.section = kTime,
                .name = "CustomSysTimeLibrary",
                .prefixed = true,

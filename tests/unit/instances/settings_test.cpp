@@ -82,7 +82,8 @@ TEST(Settings, DefaultsOfTheDistributedClockAreThoseOfItsTable) {
   const DistributedClockSettings initial;
   std::string text = "[DistributedClock]\n";
   for (const SettingKey& key : clock_keys()) {
-    if (!key.initial.empty()) text += fmt::format("{}={}\n", key.name, key.initial);
+    const std::string written = initial_value(key);
+    if (!written.empty()) text += fmt::format("{}={}\n", key.name, written);
   }
   const auto sut = parse_settings(text, "line1.cfg");
   ASSERT_TRUE(sut) << sut.error().message;
@@ -365,8 +366,9 @@ TEST(Settings, ParametersHaveBounds) {
 TEST(Settings, DefaultsOfTheTableAreThoseOfTheProgram) {
   std::string file;
   for (const SettingKey& key : all_setting_keys()) {
-    if (key.initial.empty() || key.section == kTaskSections) continue;
-    file += fmt::format("[{}]\n{}={}\n", key.section, written_name(key), key.initial);
+    const std::string written = initial_value(key);
+    if (written.empty() || key.section == kTaskSections) continue;
+    file += fmt::format("[{}]\n{}={}\n", key.section, written_name(key), written);
   }
   const auto sut = parse_settings(file, "line1.cfg");
   ASSERT_TRUE(sut) << sut.error().message;
@@ -376,7 +378,7 @@ TEST(Settings, DefaultsOfTheTableAreThoseOfTheProgram) {
 TEST(Settings, DefaultsOfATaskAreThoseOfTheProgram) {
   std::string file = "[Task.T]\n";
   for (const SettingKey& key : all_setting_keys()) {
-    if (key.section == kTaskSections) file += fmt::format("{}={}\n", key.name, key.initial);
+    if (key.section == kTaskSections) file += fmt::format("{}={}\n", key.name, initial_value(key));
   }
   const auto sut = parse_settings(file, "line1.cfg");
   ASSERT_TRUE(sut) << sut.error().message;
@@ -399,8 +401,9 @@ TEST(Settings, PageHasTheTableOfTheKeys) {
   for (const SettingKey& key : all_setting_keys()) {
     if (std::holds_alternative<UnusedSetting>(key.value)) continue;
     EXPECT_FALSE(key.meaning.empty()) << key.section << " " << key.name;
+    const std::string initial = initial_value(key);
     table += fmt::format("| `[{}] {}` | {} | {} | {} |\n", key.section, written_name(key),
-                         allowed_values(key), key.initial.empty() ? "none" : key.initial, key.meaning);
+                         allowed_values(key), initial.empty() ? "none" : initial, key.meaning);
   }
   std::stringstream stream;
   stream << std::ifstream(INSTANCES_SETTINGS).rdbuf();

@@ -79,7 +79,7 @@ INSTANTIATE_TEST_SUITE_P(
         Setting{"processor_load_maximum", [](SchedulerSettings& s) { s.processor_load_maximum = 101; }},
         Setting{"spin_ahead_max", [](SchedulerSettings& s) { s.spin_ahead_max = Duration(-1); }},
         Setting{"spin_ahead_max",
-                [](SchedulerSettings& s) { s.spin_ahead_max = kMaxSpinAhead + Duration(1); }},
+                [](SchedulerSettings& s) { s.spin_ahead_max = kSpinAhead.highest + Duration(1); }},
         Setting{"max_event_backlog", [](SchedulerSettings& s) { s.max_event_backlog = 0; }}));
 
 }  // namespace
