@@ -19,9 +19,11 @@
 // Connections make and mend themselves: a host may come later, end and come back, and so may the network. A
 // call waits for its host as long as Options::timeout says; a watch goes on when its host does.
 //
-// All functions may be called from any thread; none is for real-time threads. The calls of one Client are
-// done one after the other: make another one for what must not wait (post_and_wait() waits for a task). A
-// callback runs on a thread of the library and may use the Client; it must not throw: the program would end.
+// All functions may be called from any thread; none is for real-time threads. The calls of one Client to one
+// host are done one after the other, in the order in which they were made. Those to other hosts go on at the
+// same time. A download and post_and_wait() hold up none. A callback runs on a thread of the library and may
+// use the Client; other callbacks wait meanwhile. It must not throw: the program would end. All Clients of a
+// process for one domain share a DDS participant, so they have the same options for DDS.
 // In a child of fork() a Client of the parent throws `unavailable`: make another one.
 #ifndef PLCHOST_CLIENT_HPP
 #define PLCHOST_CLIENT_HPP
@@ -161,8 +163,7 @@ class PLCHOST_CLIENT_API Client {
     explicit operator bool() const noexcept { return code == 0; }
   };
 
-  /// Told how many bytes of a file have arrived. The download is under way: from here, only functions of this
-  /// Client with a callback may be used; the others throw wrong_state.
+  /// Told how many bytes of a file have arrived. The download stands still until this returns.
   using Progress = std::function<void(unsigned long long received)>;
 
   /// A member of a status topic: codes are words, durations and times nanoseconds, GUIDs hexadecimal digits.
@@ -196,7 +197,8 @@ class PLCHOST_CLIENT_API Client {
     std::shared_ptr<Subscription> subscription_;
   };
 
-  /// Connects at the first call. ClientError: invalid_argument: an option.
+  /// Connects at the first call. ClientError: invalid_argument: an option; or another Client of this process
+  /// has other interfaces or peers, or another identity, in the same domain.
   Client();
   explicit Client(const Options& options);
   /// As close().
@@ -204,7 +206,7 @@ class PLCHOST_CLIENT_API Client {
   Client(const Client&) = delete;
   Client& operator=(const Client&) = delete;
 
-  /// Ends all watches, and waits for the call that is under way; those that were not begun, and all that
+  /// Ends all watches, and waits for the calls that are under way; those that wait for others, and all that
   /// come, end with unavailable. Not from a callback.
   void close();
 
@@ -242,7 +244,7 @@ class PLCHOST_CLIENT_API Client {
   /// Returns when all are in the pool: the timeout is for each acknowledgement, so many take as long as they
   /// take. ClientError: a post was rejected; timed_out: of some nothing is known.
   Posted post(const std::string& host, const std::string& event, unsigned long long count = 1);
-  /// The same; returns at once. `done` is called once. At most 1024 calls may wait for those before them:
+  /// The same; returns at once. `done` is called once. At most 1024 calls may be under way:
   /// for one more, `done` is called with full (11) before this returns.
   void post(const std::string& host, const std::string& event, std::function<void(const Outcome&)> done);
   /// Posts several events, at most 64, at once: all of them, or none.

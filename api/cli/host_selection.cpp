@@ -1,9 +1,8 @@
 #include "api/cli/host_selection.hpp"
 
 #include <algorithm>
-#include <atomic>
+#include <cstddef>
 #include <string_view>
-#include <thread>
 #include <utility>
 
 #include "api/dds/object_query.hpp"
@@ -13,12 +12,6 @@ namespace plchost {
 namespace {
 
 constexpr std::string_view kAll = "all";
-
-Result<ApiReply> ask_one(const std::shared_ptr<Participant>& participant, const std::string& host,
-                         const HostCall& call) {
-  PLCHOST_TRY_ASSIGN(const auto client, ControlClient::connect(participant, host));
-  return call(*client, host);
-}
 
 }  // namespace
 
@@ -33,22 +26,42 @@ bool HostSelection::selects(const HostView& view) const {
       labels, [&](const std::string& label) { return std::ranges::find(has, label) != has.end(); });
 }
 
-std::vector<HostOutcome> ask_each(const std::shared_ptr<Participant>& participant,
-                                  const std::vector<std::string>& hosts, const HostCall& call) {
+namespace {
+
+// The next host that nobody has asked yet, until none is left.
+Async<bool> ask_next(ClientCore& core, std::vector<HostOutcome>& outcomes, std::size_t& next,
+                     const HostCall& call) {
+  while (next < outcomes.size()) {
+    HostOutcome& outcome = outcomes[next++];
+    outcome.reply = co_await call(core, outcome.host);
+  }
+  core.pump().look_again();
+  co_return true;
+}
+
+Async<bool> ask_all(ClientCore& core, std::vector<HostOutcome>& outcomes, const HostCall& call) {
   constexpr std::size_t kAtOnce = 16;
+  std::size_t next = 0;
+  std::vector<Async<bool>> askers;
+  for (std::size_t i = 0; i < kAtOnce; ++i) {
+    askers.push_back(ask_next(core, outcomes, next, call));
+    askers.back().start();
+  }
+  for (const Async<bool>& asker : askers) {
+    while (!asker.done()) co_await core.pump().change(kNoDeadline);
+  }
+  co_return true;
+}
+
+}  // namespace
+
+std::vector<HostOutcome> ask_each(ControlClient& client, const std::vector<std::string>& hosts,
+                                  const HostCall& call) {
   std::vector<HostOutcome> outcomes;
   for (const std::string& host : hosts) {
     outcomes.push_back({.host = host, .reply = failure(ErrorCode::timed_out, "not asked")});
   }
-  std::atomic<std::size_t> next{0};
-  const auto work = [&] {
-    for (std::size_t i = next++; i < outcomes.size(); i = next++) {
-      outcomes[i].reply = ask_one(participant, outcomes[i].host, call);
-    }
-  };
-  std::vector<std::jthread> threads;
-  for (std::size_t i = 0; i < std::min(kAtOnce, outcomes.size()); ++i) threads.emplace_back(work);
-  threads.clear();
+  (void)client.wait(ask_all(client.core(), outcomes, call));
   return outcomes;
 }
 

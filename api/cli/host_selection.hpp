@@ -28,11 +28,10 @@ struct HostOutcome {
   std::string host;
   Result<ApiReply> reply;
 };
-/// The command to one host, over that connection, which may be for that host only.
-using HostCall = std::function<Result<ApiReply>(ControlClient& client, const std::string& host)>;
-/// Asks all hosts at the same time, each by a ControlClient and a thread of its own. In the order of the
-/// hosts.
-[[nodiscard]] std::vector<HostOutcome> ask_each(const std::shared_ptr<Participant>& participant,
-                                                const std::vector<std::string>& hosts, const HostCall& call);
+/// The command to one host.
+using HostCall = std::function<Async<Result<ApiReply>>(ClientCore& core, const std::string& host)>;
+/// Asks all hosts at the same time, 16 at most. In the order of the hosts.
+[[nodiscard]] std::vector<HostOutcome> ask_each(ControlClient& client, const std::vector<std::string>& hosts,
+                                                const HostCall& call);
 
 }  // namespace plchost

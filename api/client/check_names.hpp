@@ -4,7 +4,7 @@
 #include <string_view>
 #include <utility>
 
-#include "api/client/request_caller.hpp"
+#include "api/client/client_types.hpp"
 #include "shm/base/result.hpp"
 
 namespace plchost {

@@ -17,92 +17,30 @@
 #include <control.h>
 #include <status_topics.hpp>
 
-#include "api/client/late_writers.hpp"
-#include "api/client/own_answers.hpp"
-#include "api/client/participant.hpp"
-#include "api/client/poster.hpp"
-#include "api/client/request_caller.hpp"
-#include "api/client/seen_hosts.hpp"
-#include "api/client/statistics_cache.hpp"
-#include "api/client/status_cache.hpp"
-#include "api/client/topic_reader.hpp"
-#include "api/client/transition_log.hpp"
-#include "api/client/wait_set.hpp"
-#include "api/dds/domain.hpp"
-#include "api/dds/log_page.hpp"
-#include "api/dds/node_page.hpp"
-#include "api/dds/object_page.hpp"
-#include "api/dds/object_query.hpp"
-#include "api/dds/topics.hpp"
+#include "api/client/client_core.hpp"
+#include "api/client/client_types.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
 
 namespace plchost {
 
-/// One host, as it was seen last.
-struct HostView {
-  std::string name;
-  std::uint64_t epoch = 0;
-  std::int32_t server_pid = 0;    ///< of plchost-dds
-  plc_HostStatus status{};        ///< but for its ext
-  std::vector<plc_KeyValue> ext;  ///< of the status
-  bool silent = false;            ///< it does not show its presence any more; the rest is what it said last
-  bool contested = false;         ///< two servers show their presence under that name at the same time
-
-  /// The labels of its configuration, beside its name.
-  [[nodiscard]] std::vector<std::string> labels() const;
-  /// The names of the schedulers that its instances can have. None: a host of an older version.
-  [[nodiscard]] std::vector<std::string> schedulers() const;
-};
-
-/// How far a host's CLOCK_REALTIME is ahead of the one here, and how wrong that can be.
-struct ClockOffset {
-  Duration offset{};
-  Duration uncertainty{};
-};
-
-/// A post that was run.
-struct RunReport {
-  std::uint32_t tasks = 0;  ///< that were bound
-  std::string last_task;    ///< "INSTANCE/TASK" that ended its cycle last
-  Duration to_start{};      ///< on the host: from the post's arrival to the start of that cycle
-  Duration to_end{};        ///< and to its end
-  Duration round_trip{};    ///< here: from before the post to after the news
-};
-
-/// The listing of a page: ListingOf<plc_LogPage> is a LogListing.
-template <class Page>
-using ListingOf = decltype(listing_of(std::declval<const Page&>()));
-
-/// An application that is to be sent to an instance.
-struct Download {
-  std::string host;
-  std::string instance;
-  std::string name;  ///< of the file, for people
-  std::span<const std::byte> contents;
-  bool boot = false;    ///< it becomes the boot application
-  bool online = false;  ///< it takes over while the tasks run; see kOnlineOption
-};
-/// Told how many bytes have arrived: again from the beginning, when plchost-dds had to be started again.
-using DownloadProgressFunction = std::function<void(std::uint64_t received)>;
-
 /// The client's end of the DDS API: sees all hosts of a domain (of names, at most SeenHosts::kMost) and
-/// addresses any. One thread at a time.
-/// A client for one host reads that host's partition only, so no other host sends it anything. It sees no
-/// other host, and refuses to address one (invalid_argument).
+/// addresses any. One thread at a time. Each call is one of its ClientCore, and is waited for; those that are
+/// under way there already go on meanwhile. A client for one host reads that host's partition only, so no
+/// other host sends it anything. It sees no other host, and refuses to address one (invalid_argument).
 /// Nothing here waits beyond the deadline it was given; deadlines are of MonotonicClock. invalid_argument, at
 /// once and with nothing sent: a name that no host, instance, event or task can have, or a text too long.
 class ControlClient {
  public:
   /// A host that has not shown its presence for so long is gone.
-  static constexpr Duration kHostGone = kServerGone;
+  static constexpr Duration kHostGone = ClientCore::kHostGone;
   /// A host is silent after so long: a little less than the deadline of its presence, so that a thread that
   /// is woken by that sees it.
-  static constexpr Duration kSilent = dds::kPresenceDeadline - std::chrono::milliseconds(5);
+  static constexpr Duration kSilent = ClientCore::kSilent;
   /// All hosts are known when none was news for so long, and none is late (LateWriters). Where packets can be
   /// lost, it is longer than it takes until each host tells again that it is there (SPDPInterval).
-  static constexpr Duration kQuiet = std::chrono::milliseconds(200);
-  static constexpr Duration kQuietOnNetworks = std::chrono::milliseconds(1200);
+  static constexpr Duration kQuiet = ClientCore::kQuiet;
+  static constexpr Duration kQuietOnNetworks = ClientCore::kQuietOnNetworks;
 
   /// With a participant of its own. `only`: it is for that one host; empty: for all.
   [[nodiscard]] static Result<std::unique_ptr<ControlClient>> connect(const dds::DomainOptions& options,
@@ -111,8 +49,17 @@ class ControlClient {
   [[nodiscard]] static Result<std::unique_ptr<ControlClient>> connect(
       std::shared_ptr<Participant> participant, std::string_view only = {});
   /// The one host that it is for; empty: all.
-  [[nodiscard]] const std::string& only() const noexcept { return only_; }
-  [[nodiscard]] const std::shared_ptr<Participant>& participant() const noexcept { return participant_; }
+  [[nodiscard]] const std::string& only() const noexcept { return core_->only(); }
+  [[nodiscard]] const std::shared_ptr<Participant>& participant() const noexcept {
+    return core_->participant();
+  }
+  /// For calls that are not waited for one after the other. Its thread is this one.
+  [[nodiscard]] ClientCore& core() noexcept { return *core_; }
+  /// Waits for one of them, and returns its result.
+  template <class T>
+  [[nodiscard]] T wait(Async<T> call) {
+    return core_->pump().complete(std::move(call));
+  }
 
   /// The hosts that answer, by name: waits for the first one until the deadline, then until none is news any
   /// more. A host that DDS has discovered and that has not answered yet is waited for, for
@@ -134,7 +81,7 @@ class ControlClient {
 
   /// All samples of a status topic that a host shows, complete: waits until as much has come as the host says
   /// there is. In the order that control.idl says. timed_out: not complete at the deadline. unsupported: the
-  /// host is of a version that has no such topic. Defined in control_client_status.hpp.
+  /// host is of a version that has no such topic. Defined in client_core_status.hpp.
   template <class Sample>
   [[nodiscard]] Result<std::vector<Sample>> status(const std::string& host, TimePoint deadline);
   /// The same, by name.
@@ -218,9 +165,9 @@ class ControlClient {
                                       std::string_view event);
 
   /// Sleeps until something has come, wake() was called, or the deadline is there.
-  void wait_for_change(TimePoint deadline) { wait_set_.wait(deadline); }
+  void wait_for_change(TimePoint deadline) { core_->pump().round(deadline); }
   /// Ends wait_for_change(), or the next one. Any thread.
-  void wake() const noexcept { wait_set_.wake(); }
+  void wake() const noexcept { core_->pump().set().wake(); }
   /// Takes what has come. The number grows when hosts() or a status that was asked for may have changed, and
   /// not with presences that tell nothing new.
   [[nodiscard]] std::uint64_t changes();
@@ -228,89 +175,14 @@ class ControlClient {
   [[nodiscard]] TimePoint next_silence() const;
 
  private:
-  ControlClient() = default;
-  Result<void> open(std::shared_ptr<Participant> participant, std::string_view only);
-  [[nodiscard]] dds_entity_t entity() const noexcept { return participant_->entity.get(); }
-  void update();
-  void update_hosts();
-  [[nodiscard]] std::vector<HostView> present() const;
-  [[nodiscard]] std::optional<HostView> present(std::string_view name) const;
-  [[nodiscard]] std::optional<HostView> view_of(std::string_view name, const SeenHost& seen) const;
-  [[nodiscard]] std::vector<dds_instance_handle_t> late_writers(const std::vector<HostView>& found);
-  template <class Cache>
-  [[nodiscard]] Result<void> open_cache(Cache& cache, const dds::TopicInfo& topic,
-                                        std::uint32_t statuses = DDS_DATA_AVAILABLE_STATUS);
-  /// Keeps answers to this client only.
-  template <class Answer>
-  [[nodiscard]] Result<void> open_own_reader(dds::TopicReader& answers, const dds::Qos& qos);
-  [[nodiscard]] Result<dds::Entity> make_own_topic(const dds::TopicInfo& info);
-  [[nodiscard]] Result<void> read_own(dds::TopicReader& answers, dds::Entity topic, const dds::Qos& qos);
-  [[nodiscard]] Result<RequestCaller*> caller(const std::string& host, bool engineering);
-  /// Asks, and waits for the answer. A request that was given up leaves no writer that would still send it.
-  [[nodiscard]] Result<ApiReply> ask(const ApiRequest& request, TimePoint deadline,
-                                     const RequestCaller::Meanwhile& meanwhile);
-  /// nullptr: that host has not been seen.
-  [[nodiscard]] const HostClock* clock_of(const std::string& host) const;
-  [[nodiscard]] Result<RunReport> post_and_await_once(const HostEvent& event, TimePoint deadline);
-  void use_clock(EventPoster& posts, const std::string& host, Duration patience) const;
-  /// The way of such posts to that host.
-  template <class Sample>
-  [[nodiscard]] Result<Poster<Sample>*> poster(const std::string& host);
-  [[nodiscard]] Result<void> prepare_runs(const std::string& host, TimePoint deadline);
-  [[nodiscard]] std::optional<Result<RunReport>> take_run(const EventPoster& posts, std::string_view host,
-                                                          std::uint64_t number, TimePoint start);
-  bool take_acks(TimePoint now);
-  /// Until the status shows the effect of what was answered.
-  void await_status(const std::string& host, const ApiReply& reply, TimePoint deadline);
-  static constexpr Duration kStatusPatience = std::chrono::seconds(2);
-  template <class Page>
-  [[nodiscard]] Result<ListingOf<Page>> ask_for_page(const ApiRequest& request, TimePoint deadline);
-  template <class Page>
-  [[nodiscard]] Result<ListingOf<Page>> list(const std::string& host, std::int32_t operation,
-                                             const Result<plc_ListPart>& part, TimePoint deadline);
+  explicit ControlClient(std::unique_ptr<ClientCore> core) noexcept : core_(std::move(core)) {}
 
-  std::shared_ptr<Participant> participant_;
-  std::string only_;
-  WaitSet wait_set_;
-  OwnAnswers own_answers_;  // its readers end before it
-  std::string partition_;
-  dds::Entity own_subscriber_;
-  dds::Entity status_subscriber_;
-  dds::HostWriters answering_;  // of the readers in its own partition
-  StatusCache<plc_Presence> presence_;
-  // A host that is silent is still shown as it was.
-  StatusCache<plc_HostStatus, UnseenHost::keeps_last_words> host_status_;
-  template <class... Samples>
-  using CachesOf = std::tuple<StatusCache<Samples>...>;
-  dds::OfCountedStatus<CachesOf> status_;
-  StatisticsCache statistics_;
-  StatusCache<plc_HostFinding> host_findings_;
-  SeenHosts seen_;
-  LateWriters late_writers_;
-  std::vector<int> silences_;  ///< of the hosts, by name, at the last changes(): 1 silent, 2 gone
-  std::uint64_t host_changes_ = 0;
-  TransitionLog transition_log_;
-  TimePoint last_news_;
-  TimePoint told_keys_look_;  ///< when plc_forget_told_keys() was called last
-  Duration quiet_ = kQuiet;
-  dds::TopicReader replies_;
-  template <class Page>
-  struct Pages {
-    dds::TopicReader from;
-  };
-  std::tuple<Pages<plc_ObjectPage>, Pages<plc_NodePage>, Pages<plc_LogPage>> pages_;
-  dds::TopicReader acks_;
-  dds::TopicReader runs_;
-  dds::TopicReader download_acks_;
-  dds::Entity chunk_topic_;
-  std::array<dds::Entity, 2> request_topics_;
-  std::map<std::pair<std::string, bool>, RequestCaller> callers_;
-  template <class Sample>
-  struct Posters {
-    dds::Entity topic;
-    std::map<std::string, Poster<Sample>, std::less<>> of_host;
-  };
-  std::tuple<Posters<plc_EventPost>, Posters<plc_EventBatch>> posters_;
+  std::unique_ptr<ClientCore> core_;
 };
+
+template <class Sample>
+Result<std::vector<Sample>> ControlClient::status(const std::string& host, TimePoint deadline) {
+  return wait(core_->status<Sample>(host, deadline));
+}
 
 }  // namespace plchost

@@ -29,14 +29,14 @@ std::vector<LogText> LogLines::add(const std::vector<LogRecord>& records) {
   return lines;
 }
 
-Result<std::vector<LogText>> LogReader::read(ControlClient& client, TimePoint deadline,
-                                             std::uint64_t newest) {
+Async<Result<std::vector<LogText>>> LogReader::read(ClientCore& core, TimePoint deadline,
+                                                    std::uint64_t newest) {
   const bool first = place_.stream == 0;
   LogQuery query{.after = place_.after};
   if (first && newest < kLogRecordsKept) query.newest = std::max<std::uint64_t>(newest, 1);
   std::vector<LogText> lines;
   for (bool goes_on = true; goes_on;) {
-    PLCHOST_TRY_ASSIGN(const auto page, client.read_log(host_, instance_, query, deadline));
+    PLCHOST_CO_TRY_ASSIGN(const auto page, co_await core.read_log(host_, instance_, query, deadline));
     clock_unix_ns_ = page.clock_unix_ns;
     if (page.stream != place_.stream && place_.stream != 0) {  // another numbering
       place_ = {.stream = page.stream};
@@ -52,7 +52,7 @@ Result<std::vector<LogText>> LogReader::read(ControlClient& client, TimePoint de
   }
   if (first && lines.size() > newest)
     lines.erase(lines.begin(), lines.end() - static_cast<std::ptrdiff_t>(newest));
-  return lines;
+  co_return lines;
 }
 
 }  // namespace plchost

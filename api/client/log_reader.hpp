@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "api/client/control_client.hpp"
+#include "api/client/client_core.hpp"
 #include "shm/base/time.hpp"
 #include "shm/pages/log_ring.hpp"
 
@@ -51,8 +51,8 @@ class LogReader {
 
   /// The lines that are new. From the beginning: those that are kept, of them the `newest`. If the log has
   /// begun anew, all of it. The code of the failure is the host's own: not_found: it has no such instance.
-  [[nodiscard]] Result<std::vector<LogText>> read(ControlClient& client, TimePoint deadline,
-                                                  std::uint64_t newest = kLogRecordsKept);
+  Async<Result<std::vector<LogText>>> read(ClientCore& core, TimePoint deadline,
+                                           std::uint64_t newest = kLogRecordsKept);
   [[nodiscard]] const std::string& host() const noexcept { return host_; }
   [[nodiscard]] const LogPlace& place() const noexcept { return place_; }
   /// The host's clock at the last read.

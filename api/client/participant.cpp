@@ -1,9 +1,12 @@
 #include "api/client/participant.hpp"
 
+#include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "api/dds/claim.hpp"
 
@@ -17,6 +20,23 @@ Result<std::shared_ptr<Participant>> enter_domain(const dds::DomainOptions& opti
       Participant{.domain = std::move(domain),
                   .entity = std::move(entity),
                   .only_loopback = options.interfaces == std::vector<std::string>{"lo"}});
+}
+
+Result<std::shared_ptr<ParticipantSource>> ParticipantSource::of_process(const dds::DomainOptions& options) {
+  static std::mutex mutex;
+  static std::map<std::pair<pid_t, std::uint32_t>, std::weak_ptr<ParticipantSource>> sources;
+  const std::lock_guard lock(mutex);
+  std::weak_ptr<ParticipantSource>& known = sources[{::getpid(), options.domain}];
+  if (auto source = known.lock()) {
+    if (source->options_ == options) return source;
+    return failure(ErrorCode::invalid_argument,
+                   fmt::format("this process is in DDS domain {} already, with another identity or other "
+                               "interfaces or peers: a process has one participant of a domain",
+                               options.domain));
+  }
+  auto made = std::make_shared<ParticipantSource>(options);
+  known = made;
+  return made;
 }
 
 Result<std::shared_ptr<Participant>> ParticipantSource::get() {

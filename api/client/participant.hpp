@@ -26,6 +26,10 @@ struct Participant {
 class ParticipantSource {
  public:
   explicit ParticipantSource(dds::DomainOptions options) : options_(std::move(options)) {}
+  /// The one of this process for that domain; it ends with its last user. invalid_argument: there is one with
+  /// other options. A child of fork() has none of its parent's.
+  [[nodiscard]] static Result<std::shared_ptr<ParticipantSource>> of_process(
+      const dds::DomainOptions& options);
   [[nodiscard]] Result<std::shared_ptr<Participant>> get();
 
  private:

@@ -40,7 +40,8 @@ Result<Poster<Sample>> Poster<Sample>::create(dds_entity_t participant, dds_enti
 template <class Sample>
 dds_return_t Poster<Sample>::write(std::uint64_t sequence) noexcept {
   sample_.sequence_number = sequence;
-  sample_.base_sequence = unacknowledged_.empty() ? sequence : unacknowledged_.front().sequence;
+  sample_.base_sequence =
+      unacknowledged_.empty() ? sequence : std::min(sequence, unacknowledged_.front().sequence);
   return dds_write(way_.writer.get(), &sample_);
 }
 

@@ -32,6 +32,8 @@ struct DomainOptions {
   int receive_fifo = 0;
   /// The folder of the identity that this process shows (see api/security/identity.hpp). Empty: unsecured.
   std::string identity = {};
+
+  bool operator==(const DomainOptions&) const = default;
 };
 
 /// The configuration as Cyclone wants it. Does not look into the folder of the identity. Every value in it

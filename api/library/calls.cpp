@@ -15,19 +15,19 @@ Result<EventId> event_of(const std::string& name) {
   return EventId{std::move(parts.first), std::move(parts.second)};
 }
 
-Result<std::string> host_of(ControlClient& client, const std::string& name, TimePoint deadline) {
+Async<Result<std::string>> host_of(ClientCore& core, std::string name, TimePoint deadline) {
+  if (name.empty()) name = core.only();
   if (!name.empty()) {
-    PLCHOST_TRY_ASSIGN(auto found, client.host(name, deadline));
-    return std::move(found.name);
+    PLCHOST_CO_TRY_ASSIGN(auto found, co_await core.host(name, deadline));
+    co_return std::move(found.name);
   }
-  if (!client.only().empty()) return host_of(client, client.only(), deadline);
-  const auto all = client.hosts(deadline);
-  if (all.size() == 1) return all.front().name;
-  if (all.empty()) return failure(ErrorCode::unavailable, "no host answers");
+  const auto all = co_await core.hosts(deadline);
+  if (all.size() == 1) co_return all.front().name;
+  if (all.empty()) co_return failure(ErrorCode::unavailable, "no host answers");
   std::vector<std::string_view> names;
   for (const HostView& host : all) names.emplace_back(host.name);
-  return failure(ErrorCode::invalid_argument,
-                 fmt::format("several hosts answer, and none was named: {}", join_names(names)));
+  co_return failure(ErrorCode::invalid_argument,
+                    fmt::format("several hosts answer, and none was named: {}", join_names(names)));
 }
 
 }  // namespace plchost

@@ -20,6 +20,6 @@ template <class T>
 /// "INSTANCE/EVENT".
 [[nodiscard]] Result<EventId> event_of(const std::string& name);
 /// That host, once it answers; no name: the one that the client is for, or the only one.
-[[nodiscard]] Result<std::string> host_of(ControlClient& client, const std::string& name, TimePoint deadline);
+Async<Result<std::string>> host_of(ClientCore& core, std::string name, TimePoint deadline);
 
 }  // namespace plchost

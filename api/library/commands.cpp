@@ -74,9 +74,10 @@ Result<ApiRequest> request_of(const std::string& name, const std::string& host, 
 }
 
 /// `request.host`: empty: the only one.
-Result<ApiReply> ask(ControlClient& client, ApiRequest request, TimePoint deadline) {
-  PLCHOST_TRY_ASSIGN(request.host, host_of(client, request.host, deadline));
-  return client.call(request, deadline);
+Async<Result<ApiReply>> ask(CallOrder& order, ClientCore& core, ApiRequest request) {
+  PLCHOST_CO_TRY_ASSIGN(const auto place, co_await order.place(core, request.host));
+  request.host = place.host;
+  co_return co_await core.call(request, place.deadline);
 }
 
 /// A file that is to be sent.
@@ -88,16 +89,17 @@ struct Sending {
   Client::Progress progress;
 };
 
-Result<ApiReply> send(ControlClient& client, const Sending& sending, TimePoint deadline) {
-  PLCHOST_TRY_ASSIGN(const auto contents, read_application(sending.file));
-  PLCHOST_TRY_ASSIGN(const auto host, host_of(client, sending.host, deadline));
-  return client.download({.host = host,
-                          .instance = sending.instance,
-                          .name = std::filesystem::path(sending.file).filename().string(),
-                          .contents = std::as_bytes(std::span(contents)),
-                          .boot = sending.options.boot,
-                          .online = sending.options.online},
-                         sending.progress, deadline);
+Async<Result<ApiReply>> send(CallOrder& order, ClientCore& core, Sending sending) {
+  PLCHOST_CO_TRY_ASSIGN(const auto contents, read_application(sending.file));
+  PLCHOST_CO_TRY_ASSIGN(auto place, co_await order.place(core, sending.host));
+  place.let_others_go();
+  Download download{.host = place.host,
+                    .instance = sending.instance,
+                    .name = std::filesystem::path(sending.file).filename().string(),
+                    .contents = std::as_bytes(std::span(contents)),
+                    .boot = sending.options.boot,
+                    .online = sending.options.online};
+  co_return co_await core.download(download, sending.progress, place.deadline);
 }
 
 }  // namespace
@@ -120,38 +122,37 @@ std::string Client::command(const std::string& operation, const std::string& hos
                             const std::string& instance, const std::string& argument,
                             const LoadOptions& options) {
   const ApiRequest request = value_or_throw(request_of(operation, host, instance, argument, options));
-  return text_or_throw(outcome_of(worker_->run<ApiReply>(
-      [&](ControlClient& client) { return ask(client, request, worker_->deadline()); })));
+  return text_or_throw(outcome_of(
+      worker_->run<ApiReply>([&](ClientCore& core) { return ask(worker_->order(), core, request); })));
 }
 
 void Client::command(const std::string& operation, const std::string& host, const std::string& instance,
                      const std::string& argument, std::function<void(const Outcome&)> done,
                      const LoadOptions& options) {
   check_callback(static_cast<bool>(done));
-  worker_->begin([this, request = value_or_throw(request_of(operation, host, instance, argument, options)),
-                  done = std::move(done)](const Result<ControlClient*>& client) {
-    done(outcome_of(client ? ask(**client, request, worker_->deadline())
-                           : Result<ApiReply>(std::unexpected(client.error()))));
-  });
+  worker_->begin<ApiReply>(
+      [this, request = value_or_throw(request_of(operation, host, instance, argument, options))](
+          ClientCore& core) { return ask(worker_->order(), core, request); },
+      [done = std::move(done)](const Result<ApiReply>& reply) { done(outcome_of(reply)); });
 }
 
 std::string Client::download_application(const std::string& host, const std::string& instance,
                                          const std::string& file, const LoadOptions& options,
                                          const Progress& progress) {
-  const Sending sending{host, instance, file, options, worker_->refusing(progress)};
-  return text_or_throw(outcome_of(worker_->run<ApiReply>(
-      [&](ControlClient& client) { return send(client, sending, worker_->deadline()); })));
+  const Sending sending{host, instance, file, options, progress};
+  return text_or_throw(outcome_of(
+      worker_->run<ApiReply>([&](ClientCore& core) { return send(worker_->order(), core, sending); })));
 }
 
 void Client::download_application(const std::string& host, const std::string& instance,
                                   const std::string& file, const LoadOptions& options,
                                   const Progress& progress, std::function<void(const Outcome&)> done) {
   check_callback(static_cast<bool>(done));
-  worker_->begin([this, sending = Sending{host, instance, file, options, worker_->refusing(progress)},
-                  done = std::move(done)](const Result<ControlClient*>& client) {
-    done(outcome_of(client ? send(**client, sending, worker_->deadline())
-                           : Result<ApiReply>(std::unexpected(client.error()))));
-  });
+  worker_->begin<ApiReply>(
+      [this, sending = Sending{host, instance, file, options, progress}](ClientCore& core) {
+        return send(worker_->order(), core, sending);
+      },
+      [done = std::move(done)](const Result<ApiReply>& reply) { done(outcome_of(reply)); });
 }
 
 std::string Client::start(const std::string& host, const std::string& instance) {

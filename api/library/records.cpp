@@ -1,14 +1,13 @@
 #include "api/library/records.hpp"
 
 #include <concepts>
-#include <optional>
-#include <type_traits>
+#include <string_view>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <status_fields.hpp>
 
-#include "api/client/control_client_status.hpp"
+#include "api/client/client_core_status.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {
@@ -42,26 +41,25 @@ Client::Record record_of(const Sample& sample) {
   return record;
 }
 
+using Records = Result<std::vector<Client::Record>>;
+
+template <class Sample>
+Async<Records> read_one(ClientCore& core, std::string host, TimePoint deadline) {
+  PLCHOST_CO_TRY_ASSIGN(const auto samples, co_await core.status<Sample>(host, deadline));
+  std::vector<Client::Record> records;
+  for (const Sample& sample : samples) records.push_back(record_of(sample));
+  co_return records;
+}
+
 template <class... Samples>
 struct Topics {
-  static std::vector<std::string> names() { return {std::string(dds::kCountedAs<Samples>)...}; }
+  using Read = Async<Records> (*)(ClientCore&, std::string, TimePoint);
 
-  using Records = Result<std::vector<Client::Record>>;
-  static std::optional<Records> read(ControlClient& client, const std::string& topic, const std::string& host,
-                                     TimePoint deadline) {
-    std::optional<Records> found;
-    const auto read_one = [&]<class Sample>(std::type_identity<Sample> /*type*/) {
-      if (topic != dds::kCountedAs<Sample>) return;
-      const auto samples = client.template status<Sample>(host, deadline);
-      if (!samples) {
-        found = std::unexpected(samples.error());
-        return;
-      }
-      std::vector<Client::Record> records;
-      for (const Sample& sample : *samples) records.push_back(record_of(sample));
-      found = std::move(records);
-    };
-    (read_one(std::type_identity<Samples>()), ...);
+  static std::vector<std::string> names() { return {std::string(dds::kCountedAs<Samples>)...}; }
+  /// nullptr: no such topic.
+  static Read reader_of(std::string_view topic) {
+    Read found = nullptr;
+    ((topic == dds::kCountedAs<Samples> ? void(found = read_one<Samples>) : void()), ...);
     return found;
   }
 };
@@ -72,14 +70,13 @@ std::vector<std::string> status_names() {
   return dds::OfCountedStatus<Topics>::names();
 }
 
-Result<std::vector<Client::Record>> read_status(ControlClient& client, const std::string& topic,
-                                                const std::string& host, TimePoint deadline) {
-  if (auto found = dds::OfCountedStatus<Topics>::read(client, topic, host, deadline))
-    return *std::move(found);
+Async<Records> read_status(ClientCore& core, std::string topic, std::string host, TimePoint deadline) {
+  if (const auto read = dds::OfCountedStatus<Topics>::reader_of(topic))
+    co_return co_await read(core, host, deadline);
   const auto all = status_names();
   const std::vector<std::string_view> names(all.begin(), all.end());
-  return failure(ErrorCode::invalid_argument,
-                 fmt::format("no status topic '{}'; there are: {}", shown(topic), join_names(names)));
+  co_return failure(ErrorCode::invalid_argument,
+                    fmt::format("no status topic '{}'; there are: {}", shown(topic), join_names(names)));
 }
 
 }  // namespace plchost

@@ -11,7 +11,7 @@ namespace plchost {
 /// The status topics that read_status() knows: all that HostStatus counts.
 [[nodiscard]] std::vector<std::string> status_names();
 /// All samples of one of them, of one host. invalid_argument: no such topic; lists those that there are.
-[[nodiscard]] Result<std::vector<Client::Record>> read_status(ControlClient& client, const std::string& topic,
-                                                              const std::string& host, TimePoint deadline);
+Async<Result<std::vector<Client::Record>>> read_status(ClientCore& core, std::string topic, std::string host,
+                                                       TimePoint deadline);
 
 }  // namespace plchost

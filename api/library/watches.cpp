@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "api/client/control_client_status.hpp"
+#include "api/client/client_core_status.hpp"
 #include "api/library/convert.hpp"
 #include "api/library/watcher.hpp"
 #include "api/library/worker.hpp"

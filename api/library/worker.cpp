@@ -20,20 +20,17 @@ Duration checked_timeout(std::chrono::milliseconds timeout) {
        fmt::format("timeout {} ms: allowed are 1 to {}", timeout.count(), kMaxTimeout.count())});
 }
 
-Result<ControlClient*> ended() {
-  return failure(ErrorCode::unavailable, "the client has ended");
-}
-
-Result<ControlClient*> too_many(std::size_t most) {
-  return failure(ErrorCode::full,
-                 fmt::format("{} calls of this client wait already: wait for some of them to end", most));
+std::unexpected<Error> too_many(std::size_t most) {
+  return failure(
+      ErrorCode::full,
+      fmt::format("{} calls of this client are under way already: wait for some of them to end", most));
 }
 
 }  // namespace
 
 Client::Worker::Worker(const Options& options, std::shared_ptr<ParticipantSource> participant)
     : connection_(std::move(participant), options.host),
-      timeout_(checked_timeout(options.timeout)),
+      order_(checked_timeout(options.timeout)),
       only_(options.host) {
   // Here, where it can be said at once.
   if (!only_.empty()) check_watched(only_);
@@ -47,65 +44,83 @@ void Client::Worker::end() {
   {
     const std::lock_guard lock(mutex_);
     ending_ = true;
+    order_.end();
+    wake();
   }
-  changed_.notify_all();
   if (thread_.joinable()) thread_.join();
 }
 
+void Client::Worker::wake() {
+  changed_.notify_all();
+  if (client_ != nullptr) client_->wake();
+}
+
 void Client::Worker::begin(Job job) {
-  if (const auto ours = maker_.check(); !ours) return job(std::unexpected(ours.error()));
+  const auto refuse = [&](std::unexpected<Error> why) { job(why).start(); };
+  if (const auto ours = maker_.check(); !ours) return refuse(std::unexpected(ours.error()));
   bool ending = false;
   {
     const std::lock_guard lock(mutex_);
     ending = ending_;
-    if (!ending && jobs_.size() < kMaxJobs) {
+    if (!ending && calls_ < kMaxCalls) {
       jobs_.push_back(std::move(job));
-      job = nullptr;
+      ++calls_;
+      return wake();
     }
   }
-  if (job) return job(ending ? ended() : too_many(kMaxJobs));
-  changed_.notify_all();
+  refuse(ending ? client_has_ended() : too_many(kMaxCalls));
 }
 
 void Client::Worker::check_watched(const std::string& host) const {
   if (const auto good = check_host_name(host, only_); !good) throw_client_error(good.error());
 }
 
-Result<ControlClient*> Client::Worker::busy() {
-  return failure(
-      ErrorCode::wrong_state,
-      "a progress callback cannot wait for a call: a download is under way; use the functions with "
-      "a callback");
+bool Client::Worker::is_ending() {
+  const std::lock_guard lock(mutex_);
+  return ending_;
 }
 
-Client::Progress Client::Worker::refusing(const Progress& progress) {
-  if (!progress) return {};
-  return [this, progress](unsigned long long received) {
-    struct Telling {
-      bool& mark;
-      explicit Telling(bool& set) noexcept : mark(set) { mark = true; }
-      ~Telling() { mark = false; }
-      Telling(const Telling&) = delete;
-      Telling& operator=(const Telling&) = delete;
-    };
-    const Telling telling(telling_);
-    progress(received);
-  };
+Result<ControlClient*> Client::Worker::connect() {
+  PLCHOST_TRY_ASSIGN(ControlClient* const client, connection_.client());
+  const std::lock_guard lock(mutex_);
+  client_ = client;
+  return client;
+}
+
+// A call may end, and be told, within this.
+bool Client::Worker::begin_next() {
+  Job job;
+  {
+    const std::lock_guard lock(mutex_);
+    if (jobs_.empty()) return false;
+    job = std::move(jobs_.front());
+    jobs_.pop_front();
+  }
+  const auto client = is_ending() ? Result<ControlClient*>(client_has_ended()) : connect();
+  under_way_.push_back(job(client));
+  under_way_.back().start();
+  return true;
+}
+
+bool Client::Worker::step() {
+  while (begin_next()) {
+  }
+  const std::size_t over = std::erase_if(under_way_, [](const auto& call) { return call.done(); });
+  {
+    const std::lock_guard lock(mutex_);
+    calls_ -= over;
+  }
+  if (under_way_.empty()) return false;
+  client_->core().pump().round(TimePoint::max());
+  return true;
 }
 
 void Client::Worker::work() {
   for (;;) {
-    Job job;
-    bool ending = false;
-    {
-      std::unique_lock lock(mutex_);
-      changed_.wait(lock, [this] { return ending_ || !jobs_.empty(); });
-      if (jobs_.empty()) return;
-      job = std::move(jobs_.front());
-      jobs_.pop_front();
-      ending = ending_;
-    }
-    job(ending ? ended() : connection_.client());
+    if (step()) continue;
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [this] { return ending_ || !jobs_.empty(); });
+    if (jobs_.empty()) return;
   }
 }
 

@@ -1,25 +1,28 @@
 #pragma once
 
 #include <condition_variable>
+#include <cstddef>
 #include <deque>
 #include <functional>
 #include <future>
+#include <list>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <thread>
 #include <utility>
 
+#include "api/client/async.hpp"
+#include "api/library/call_order.hpp"
 #include "api/library/connection.hpp"
 #include "api/library/maker_process.hpp"
 
 namespace plchost {
 
-/// Does the calls of one Client, one after the other, on a thread of its own.
+/// Does the calls of one Client on a thread of its own: many at the same time, those to one host in their
+/// turn.
 class __attribute__((visibility("hidden"))) Client::Worker {
  public:
-  /// A call: with the connection, or with why there is none.
-  using Job = std::function<void(const Result<ControlClient*>&)>;
-
   Worker(const Options& options, std::shared_ptr<ParticipantSource> participant);
   ~Worker() { end(); }
   Worker(const Worker&) = delete;
@@ -27,51 +30,83 @@ class __attribute__((visibility("hidden"))) Client::Worker {
 
   /// In a child of fork() nothing of it may be touched, not even destroyed.
   [[nodiscard]] const MakerProcess& maker() const noexcept { return maker_; }
-  [[nodiscard]] Duration timeout() const noexcept { return timeout_; }
-  [[nodiscard]] TimePoint deadline() const { return MonotonicClock::now() + timeout_; }
+  [[nodiscard]] CallOrder& order() noexcept { return order_; }
 
-  /// How many calls may wait for those before them.
-  static constexpr std::size_t kMaxJobs = 1024;
+  /// How many calls there may be.
+  static constexpr std::size_t kMaxCalls = 1024;
 
   /// ClientError: invalid_argument: there cannot be a host of that name, or the Client is for another one.
   void check_watched(const std::string& host) const;
 
-  /// Waits for the job that is under way; those that were not begun, and all that come, are called with
-  /// `unavailable`. Not from a job.
+  /// Waits for the calls that are under way; those whose turn had not come, and all that come, fail with
+  /// `unavailable`. Not from a callback.
   void end();
-  /// `job` is called later, or, if too many wait (full) or the client has ended, within this call.
-  void begin(Job job);
-  /// Tells `progress`. It is called in the middle of a call, which uses the ControlClient: run() refuses
-  /// meanwhile.
-  [[nodiscard]] Progress refusing(const Progress& progress);
-  /// Returns what `call(client)` returns. From a callback: at once, it is this thread's turn.
+
   template <class T>
-  [[nodiscard]] Result<T> run(const std::function<Result<T>(ControlClient&)>& call) {
+  using Call = std::function<Async<Result<T>>(ClientCore&)>;
+  template <class T>
+  using Done = std::function<void(Result<T>)>;
+
+  /// `done` is told later, or, if there are too many calls (full) or the client has ended, within this call.
+  template <class T>
+  void begin(Call<T> call, Done<T> done) {
+    begin([call = std::move(call), done = std::move(done)](const Result<ControlClient*>& client) {
+      return client ? tell<T>(call((*client)->core()), done) : fail<T>(client.error(), done);
+    });
+  }
+  /// Waits for it. From a callback, other calls go on meanwhile.
+  template <class T>
+  [[nodiscard]] Result<T> run(const Call<T>& call) {
+    if (std::this_thread::get_id() == thread_.get_id()) return run_here(call);
     std::promise<Result<T>> promise;
-    const Job job = [&](const Result<ControlClient*>& client) {
-      promise.set_value(client ? call(**client) : Result<T>(std::unexpected(client.error())));
-    };
-    if (std::this_thread::get_id() == thread_.get_id()) {
-      job(telling_ ? busy() : connection_.client());
-    } else {
-      begin(job);
-    }
+    begin<T>(call, [&](Result<T> result) { promise.set_value(std::move(result)); });
     return promise.get_future().get();
   }
 
  private:
+  struct Over {};
+  using Job = std::function<Async<Over>(const Result<ControlClient*>&)>;
+  template <class T>
+  static Async<Over> tell(Async<Result<T>> call, Done<T> done) {
+    auto result = co_await call;
+    done(std::move(result));
+    co_return Over();
+  }
+  template <class T>
+  static Async<Over> fail(Error error, Done<T> done) {
+    done(std::unexpected(std::move(error)));
+    co_return Over();
+  }
+  template <class T>
+  [[nodiscard]] Result<T> run_here(const Call<T>& call) {
+    PLCHOST_TRY_ASSIGN(ControlClient* const client, connect());
+    Async<Result<T>> own = call(client->core());
+    own.start();
+    while (!own.done()) step();
+    return own.take();
+  }
+
+  void begin(Job job);
+  /// With the mutex.
+  void wake();
   void work();
-  [[nodiscard]] static Result<ControlClient*> busy();
+  [[nodiscard]] Result<ControlClient*> connect();
+  [[nodiscard]] bool is_ending();
+  /// Begins the calls that have come, and goes on with those that are under way. False: there are none.
+  bool step();
+  bool begin_next();
 
   MakerProcess maker_;
   Connection connection_;
-  Duration timeout_;
+  CallOrder order_;
   std::string only_;
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::deque<Job> jobs_;
+  std::deque<Job> jobs_;             // not begun
+  std::size_t calls_ = 0;            // those and the ones under way
+  ControlClient* client_ = nullptr;  // that of the connection, once it is there
   bool ending_ = false;
-  bool telling_ = false;  // progress; of the thread
+  std::list<Async<Over>> under_way_;
   std::thread thread_;
 };
 

@@ -29,6 +29,14 @@ constexpr const char* kBootHelp = "the instance starts with it from now on, also
 constexpr const char* kOnlineHelp =
     "it takes over while the tasks run: no cycle is lost, variables go on; refused where it does not fit";
 
+Async<Result<ApiReply>> send_to(ClientCore& core, Download download, TimePoint deadline,
+                                ProgressBoard& board) {
+  const DownloadProgressFunction show = [&](std::uint64_t received) { board.show(download.host, received); };
+  auto reply = co_await core.download(download, show, deadline);
+  board.end(download.host);
+  co_return reply;
+}
+
 int send(CliSession& session, const LoadArguments& arguments) {
   const auto contents = read_application(arguments.file, " (a file on the host: --on-host)");
   if (!contents) return CliSession::fail(contents.error());
@@ -37,17 +45,14 @@ int send(CliSession& session, const LoadArguments& arguments) {
   ProgressBoard board(*hosts, contents->size());
   const std::string name = std::filesystem::path(arguments.file).filename().string();
   const TimePoint deadline = session.deadline();
-  return ask_hosts(session, *hosts, arguments.instance, [&](ControlClient& client, const std::string& host) {
+  return ask_hosts(session, *hosts, arguments.instance, [&](ClientCore& core, const std::string& host) {
     const Download download{.host = host,
                             .instance = arguments.instance,
                             .name = name,
                             .contents = std::as_bytes(std::span(*contents)),
                             .boot = arguments.boot,
                             .online = arguments.online};
-    auto reply =
-        client.download(download, [&](std::uint64_t received) { board.show(host, received); }, deadline);
-    board.end(host);
-    return reply;
+    return send_to(core, download, deadline, board);
   });
 }
 

@@ -79,10 +79,10 @@ int command_on(CliSession& session, const std::vector<std::string>& hosts, const
       session.deadline(takes_long(request.operation) ? kLongCommand : Duration::zero());
   return ask_hosts(
       session, hosts, request.instance,
-      [&](ControlClient& client, const std::string& host) {
+      [&](ClientCore& core, const std::string& host) {
         ApiRequest own = request;
         own.host = host;
-        return client.call(own, deadline);
+        return core.call(own, deadline);
       },
       done);
 }
@@ -155,12 +155,7 @@ int command_each(CliSession& session, const std::vector<std::string>& names, con
 
 int ask_hosts(CliSession& session, const std::vector<std::string>& hosts, const std::string& instance,
               const HostCall& call, std::string_view done) {
-  std::vector<HostOutcome> outcomes;
-  if (hosts.size() == 1) {  // over the connection that is there
-    outcomes.push_back({.host = hosts.front(), .reply = call(*session.client().value(), hosts.front())});
-  } else {
-    outcomes = ask_each(session.client().value()->participant(), hosts, call);
-  }
+  const std::vector<HostOutcome> outcomes = ask_each(*session.client().value(), hosts, call);
   int code = kExitDone;
   std::vector<Row> rows;
   for (const HostOutcome& outcome : outcomes) {

@@ -16,7 +16,7 @@
 #include "api/cli/verbs/node_verbs.hpp"
 #include "api/cli/verbs/object_verbs.hpp"
 #include "api/cli/verbs/transition_verbs.hpp"
-#include "api/client/control_client_status.hpp"
+#include "api/client/client_core_status.hpp"
 #include "api/dds/text.hpp"
 
 namespace plchost {

@@ -77,7 +77,8 @@ class LogFollower {
 
   /// The new lines; the first time, the kept ones that were asked for.
   Result<std::vector<LogText>> read() {
-    auto lines = log_.read(*session_.client().value(), session_.deadline(), arguments_.count);
+    ControlClient& client = *session_.client().value();
+    auto lines = client.wait(log_.read(client.core(), session_.deadline(), arguments_.count));
     if (!lines) return lines;
     const std::int64_t begin = since_.by_clock(log_.clock_unix_ns());
     std::erase_if(*lines, [&](const LogText& line) { return line.time_unix_ns < begin; });

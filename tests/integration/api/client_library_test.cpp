@@ -259,7 +259,7 @@ TEST_F(ClientLibrary, TellsCallsThatWereNotBegunThatItHasEnded) {
   EXPECT_EQ(codes.back(), ClientError::unavailable);
 }
 
-TEST_F(ClientLibrary, LetsABoundedNumberOfPostsWait) {
+TEST_F(ClientLibrary, LetsABoundedNumberOfPostsBeUnderWay) {
   constexpr unsigned kMost = 1024;
   std::atomic<unsigned> refused{0};
   std::atomic<unsigned> told{0};
@@ -272,7 +272,7 @@ TEST_F(ClientLibrary, LetsABoundedNumberOfPostsWait) {
       go_on.get_future().wait();
     });
     begun.get_future().wait();
-    for (unsigned i = 0; i < kMost + 3; ++i) {
+    for (unsigned i = 1; i < kMost + 3; ++i) {  // the first one is not over
       sut.post("hosta", "line1/ready", [&](const Client::Outcome& outcome) {
         if (outcome.code == static_cast<int>(ErrorCode::full)) ++refused;
         ++told;
@@ -282,7 +282,51 @@ TEST_F(ClientLibrary, LetsABoundedNumberOfPostsWait) {
     EXPECT_EQ(told, 3U);
     go_on.set_value();
   }
-  EXPECT_EQ(told, kMost + 3);
+  EXPECT_EQ(told, kMost + 2);
+}
+
+TEST_F(ClientLibrary, DoesTheCallsToAHostInTheirOrder) {
+  constexpr int kCalls = 20;
+  host_.answer_with({0, ErrorCode::ok, {}});
+  {
+    Client sut(options());
+    (void)sut.instances("hosta");
+    for (int i = 0; i < kCalls; ++i) {
+      sut.command(i % 2 == 0 ? "start" : "set scheduler", "hosta", "line1", i % 2 == 0 ? "" : "CmpSchedule",
+                  [&](const Client::Outcome& outcome) { EXPECT_TRUE(outcome) << outcome.text; });
+    }
+    (void)sut.start("hosta", "line1");  // waits for those before it
+    ASSERT_EQ(host_.requests().size(), kCalls + 1U);
+  }
+  for (int i = 0; i < kCalls; ++i) {
+    EXPECT_EQ(host_.requests()[static_cast<std::size_t>(i)].verb,
+              i % 2 == 0 ? ControlVerb::start : ControlVerb::set_scheduler);
+  }
+}
+
+TEST_F(ClientLibrary, WaitsForOneHostAndGoesOnWithAnother) {
+  std::atomic<bool> told{false};
+  Client sut(options(std::chrono::seconds(5)));
+  sut.post("nowhere", "line1/ready", [&](const Client::Outcome& outcome) {
+    EXPECT_EQ(outcome.code, ClientError::not_found) << outcome.text;
+    told = true;
+  });
+  EXPECT_EQ(sut.instances("hosta").size(), 1U);
+  EXPECT_EQ(sut.post("hosta", "line1/ready").accepted, 1U);
+  EXPECT_FALSE(told) << "the call to the other host was waited for";
+}
+
+TEST_F(ClientLibrary, HasOneParticipantForAllClientsOfAProcess) {
+  Client first(options());
+  Client second(options());
+  EXPECT_EQ(first.instances("hosta").size(), 1U);
+  EXPECT_EQ(second.instances("hosta").size(), 1U);
+  EXPECT_EQ(dds_lookup_participant(domain_.number(), nullptr, 0), 1);
+  Client::Options other = options();
+  other.peers = {"127.0.0.1"};
+  const ClientError refused = error_of([&] { const Client sut(other); });
+  EXPECT_EQ(refused.code(), ClientError::invalid_argument);
+  EXPECT_THAT(refused.what(), HasSubstr("already, with another identity"));
 }
 
 TEST_F(ClientLibrary, DoesNothingAfterItWasClosed) {

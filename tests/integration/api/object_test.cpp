@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <unistd.h>
 
-#include "api/client/control_client_status.hpp"
+#include "api/client/client_core_status.hpp"
 #include "tests/integration/api/test_host.hpp"
 #include "tests/support/own_name.hpp"
 

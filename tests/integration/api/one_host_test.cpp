@@ -8,7 +8,7 @@
 
 #include <gmock/gmock.h>
 
-#include "api/client/control_client_status.hpp"
+#include "api/client/client_core_status.hpp"
 #include "api/plchost_client.hpp"
 #include "tests/integration/api/readers_of.hpp"
 #include "tests/integration/api/test_host.hpp"

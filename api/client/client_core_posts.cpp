@@ -5,14 +5,14 @@
 #include <fmt/format.h>
 
 #include "api/client/check_names.hpp"
-#include "api/client/control_client.hpp"
+#include "api/client/client_core.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/futex.hpp"
 
 namespace plchost {
 
 template <class Sample>
-Result<Poster<Sample>*> ControlClient::poster(const std::string& host) {
+Result<Poster<Sample>*> ClientCore::poster(const std::string& host) {
   auto& [topic, of_host] = std::get<Posters<Sample>>(posters_);
   if (const auto known = of_host.find(host); known != of_host.end()) return &known->second;
   const dds::Qos qos = dds::qos_of(dds::kEventAck);  // the latest one of each source
@@ -21,33 +21,39 @@ Result<Poster<Sample>*> ControlClient::poster(const std::string& host) {
     PLCHOST_TRY_ASSIGN(topic, dds::make_topic(entity(), dds::kTopicOf<Sample>));
   }
   PLCHOST_TRY_ASSIGN(auto made, Poster<Sample>::create(entity(), topic.get(), host));
-  PLCHOST_TRY(wait_set_.add(made.writer(), DDS_PUBLICATION_MATCHED_STATUS));
+  PLCHOST_TRY(pump_->set().add(made.writer(), DDS_PUBLICATION_MATCHED_STATUS));
   own_answers_.add(made.source());
   return &of_host.emplace(host, std::move(made)).first->second;
 }
-template Result<EventPoster*> ControlClient::poster<plc_EventPost>(const std::string& host);
+template Result<EventPoster*> ClientCore::poster<plc_EventPost>(const std::string& host);
 
-void ControlClient::use_clock(EventPoster& posts, const std::string& host, Duration patience) const {
+void ClientCore::use_clock(EventPoster& posts, const std::string& host, Duration patience) const {
   if (const HostClock* const clock = clock_of(host)) posts.wait_for(patience, *clock);
 }
 
-Result<void> ControlClient::prepare_posts(const std::string& host, TimePoint deadline) {
-  if (auto good = check_host_name(host, only_); !good) return good;
-  PLCHOST_TRY_ASSIGN(const auto way, poster<plc_EventPost>(host));
-  update_hosts();  // the limit is by the newest presence
-  while (!way->matched() || clock_of(host) == nullptr) {
-    if (MonotonicClock::now() >= deadline) {
-      return failure(ErrorCode::timed_out, fmt::format("host '{}' takes no events", host));
-    }
-    update();
-    if (way->matched() && clock_of(host) != nullptr) break;
-    wait_set_.wait(deadline);
-  }
-  return {};
+Async<std::unique_ptr<Turns::Turn>> ClientCore::turn_to_post(std::string host) {
+  auto turn = std::make_unique<Turns::Turn>(posting_[host], *pump_);
+  while (!turn->has_come()) co_await pump_->change(kNoDeadline);
+  co_return turn;
 }
 
-bool ControlClient::take_acks(TimePoint now) {
+Async<Result<void>> ClientCore::prepare_posts(std::string host, TimePoint deadline) {
+  PLCHOST_CO_TRY(check_host_name(host, only_));
+  PLCHOST_CO_TRY_ASSIGN(EventPoster* const way, poster<plc_EventPost>(host));
+  update_hosts();  // the limit is by the newest presence
+  pump_->look_again();
+  while (!way->matched() || clock_of(host) == nullptr) {
+    if (MonotonicClock::now() >= deadline) {
+      co_return failure(ErrorCode::timed_out, fmt::format("host '{}' takes no events", host));
+    }
+    co_await pump_->change(deadline);
+  }
+  co_return Result<void>();
+}
+
+bool ClientCore::take_acks(TimePoint now) {
   bool progress = false;
+  if (!acks_) return false;
   dds::take_valid_told<plc_EventAck>(acks_.reader.get(), answering_,
                                      [&](const plc_EventAck& ack, const auto& /*info*/) {
                                        const auto tell = [&](auto& posters) {
@@ -60,12 +66,13 @@ bool ControlClient::take_acks(TimePoint now) {
   return progress;
 }
 
-Result<PostReport> ControlClient::post_event(const HostEvent& event, std::uint64_t count, Duration interval,
-                                             Duration patience, const std::function<bool()>& stop) {
-  PLCHOST_TRY(check_event_name(event.instance, event.event));
+Async<Result<PostReport>> ClientCore::post_event(HostEvent event, std::uint64_t count, Duration interval,
+                                                 Duration patience, std::function<bool()> stop) {
+  PLCHOST_CO_TRY(check_event_name(event.instance, event.event));
+  const auto turn = co_await turn_to_post(event.host);
   const TimePoint start = MonotonicClock::now();
-  PLCHOST_TRY(prepare_posts(event.host, start + patience));
-  PLCHOST_TRY_ASSIGN(const auto way, poster<plc_EventPost>(event.host));
+  PLCHOST_CO_TRY(co_await prepare_posts(event.host, start + patience));
+  PLCHOST_CO_TRY_ASSIGN(EventPoster* const way, poster<plc_EventPost>(event.host));
   EventPoster& posts = *way;
   (void)take_acks(start);  // of posts that were given up
   posts.begin_report(start);
@@ -73,14 +80,9 @@ Result<PostReport> ControlClient::post_event(const HostEvent& event, std::uint64
   const EventId id = event.id();
   const TimePoint first = MonotonicClock::now();
   std::uint64_t sent = 0;
-  for (bool woken = false;; woken = true) {
+  for (;;) {
     TimePoint now = MonotonicClock::now();
-    // Other topics are looked at when it was no acknowledgement that has woken this: nothing stands between
-    // one and the next post, or the end.
-    if (!take_acks(now) && woken) {
-      update();
-      use_clock(posts, event.host, patience);
-    }
+    use_clock(posts, event.host, patience);
     TimePoint next = kNoDeadline;
     if (stop && stop()) count = sent;
     while (sent < count && posts.has_room()) {
@@ -90,52 +92,55 @@ Result<PostReport> ControlClient::post_event(const HostEvent& event, std::uint64
       ++sent;
       now = MonotonicClock::now();
     }
-    if (posts.unacknowledged() == 0 && sent == count) return posts.report();
+    if (posts.unacknowledged() == 0 && sent == count) co_return posts.report();
     if (posts.unacknowledged() > 0 && now - posts.last_progress() > patience) {
       PostReport report = posts.report();
       report.unacknowledged += count - sent;
-      return report;
+      co_return report;
     }
     constexpr Duration kStopLook = std::chrono::milliseconds(50);
     const TimePoint look = stop ? now + kStopLook : kNoDeadline;
-    wait_set_.wait(
-        std::min({posts.has_room() && sent < count ? next : kNoDeadline, posts.repeat(now), look}));
+    const TimePoint more = posts.has_room() && sent < count ? next : kNoDeadline;
+    const TimePoint again = posts.repeat(now);
+    const TimePoint until = std::min({more, again, look});
+    co_await pump_->change(until);
   }
 }
 
-Result<PostReport> ControlClient::post_batch(const std::string& host, std::span<const EventId> events,
-                                             Duration patience) {
-  PLCHOST_TRY(check_host_name(host, only_));
+Async<Result<PostReport>> ClientCore::post_batch(std::string host, std::vector<EventId> events,
+                                                 Duration patience) {
+  PLCHOST_CO_TRY(check_host_name(host, only_));
   if (events.empty() || events.size() > kMaxBatch) {
-    return failure(ErrorCode::invalid_argument,
-                   fmt::format("a batch of {} events; allowed are 1 to {}", events.size(), kMaxBatch));
+    co_return failure(ErrorCode::invalid_argument,
+                      fmt::format("a batch of {} events; allowed are 1 to {}", events.size(), kMaxBatch));
   }
   for (const EventId& event : events) {
-    PLCHOST_TRY(check_event_name(event.instance, event.event));
+    PLCHOST_CO_TRY(check_event_name(event.instance, event.event));
   }
-  PLCHOST_TRY_ASSIGN(const auto way, poster<plc_EventBatch>(host));
+  const auto turn = co_await turn_to_post(host);
+  PLCHOST_CO_TRY_ASSIGN(BatchPoster* const way, poster<plc_EventBatch>(host));
   BatchPoster& posts = *way;
   const TimePoint deadline = MonotonicClock::now() + patience;
   update_hosts();  // the limit is by the newest presence
+  pump_->look_again();
   for (bool posted = false;;) {
     const TimePoint now = MonotonicClock::now();
-    (void)take_acks(now);
     const HostClock* const clock = clock_of(host);
     const bool begins = !posted && clock != nullptr && posts.matched();
     if (begins) posts.begin_report(now);
     if (clock != nullptr) posts.wait_for(deadline - posts.last_progress(), *clock);
     if (begins) posts.post(events, now);
     posted |= begins;
-    if (posted && posts.unacknowledged() == 0) return posts.report();
+    if (posted && posts.unacknowledged() == 0) co_return posts.report();
     if (now >= deadline) break;
-    update();
-    wait_set_.wait(std::min(deadline, posted ? posts.repeat(now) : deadline));
+    const TimePoint again = posted ? posts.repeat(now) : deadline;
+    co_await pump_->change(std::min(deadline, again));
   }
-  return failure(ErrorCode::timed_out, fmt::format("host '{}' has not acknowledged the batch", host));
+  co_return failure(ErrorCode::timed_out, fmt::format("host '{}' has not acknowledged the batch", host));
 }
 
-Result<void> ControlClient::post_one(const std::string& host, std::string_view instance,
-                                     std::string_view event) {
+Result<void> ClientCore::post_one(const std::string& host, std::string_view instance,
+                                  std::string_view event) {
   if (auto good = check_event_name(instance, event); !good) return good;
   auto& posters = std::get<Posters<plc_EventPost>>(posters_).of_host;
   const auto way = posters.find(host);

@@ -3,10 +3,11 @@
 #include <fmt/format.h>
 
 #include "api/client/check_names.hpp"
-#include "api/client/control_client.hpp"
-#include "api/client/control_client_status.hpp"
+#include "api/client/client_core.hpp"
+#include "api/client/client_core_status.hpp"
 #include "api/client/file_sender.hpp"
 #include "api/control/application_order.hpp"
+#include "api/dds/text.hpp"
 #include "api/security/sha256.hpp"
 
 namespace plchost {
@@ -31,26 +32,37 @@ ApiRequest request_for(const Download& download) {
 
 }  // namespace
 
-Result<ApiReply> ControlClient::download(const Download& download, const DownloadProgressFunction& progress,
-                                         TimePoint deadline) {
+void ClientCore::take_download_acks() {
+  dds::take_valid_told<plc_DownloadAck>(download_acks_.reader.get(), answering_,
+                                        [&](const plc_DownloadAck& ack, const auto& /*info*/) {
+                                          downloaded_.put({ack.download, dds::text_of(ack.host)}, [&] {
+                                            plc_DownloadAck kept = ack;
+                                            kept.ext = {};  // it is lent
+                                            return kept;
+                                          });
+                                        });
+}
+
+Async<Result<ApiReply>> ClientCore::download(Download download, DownloadProgressFunction progress,
+                                             TimePoint deadline) {
   const ApiRequest request = request_for(download);
-  PLCHOST_TRY(check_api_request(request, only_));
-  PLCHOST_TRY(check_file_name(download.name));
-  if (download.contents.empty()) return failure(ErrorCode::invalid_argument, download.name + " is empty");
+  PLCHOST_CO_TRY(check_api_request(request, only_));
+  PLCHOST_CO_TRY(check_file_name(download.name));
+  if (download.contents.empty()) co_return failure(ErrorCode::invalid_argument, download.name + " is empty");
   constexpr std::int32_t kOfEachHost = 16;
   const dds::Qos qos = dds::answers_qos(dds::kDownloadAck, kOfEachHost);
-  PLCHOST_TRY(open_own_reader<plc_DownloadAck>(download_acks_, qos));
+  PLCHOST_CO_TRY(open_own_reader<plc_DownloadAck>(download_acks_, qos));
   if (!chunk_topic_) {
-    PLCHOST_TRY_ASSIGN(chunk_topic_, dds::make_topic(entity(), dds::kDownloadChunk));
+    PLCHOST_CO_TRY_ASSIGN(chunk_topic_, dds::make_topic(entity(), dds::kDownloadChunk));
   }
-  PLCHOST_TRY_ASSIGN(auto sender,
-                     FileSender::create(entity(), chunk_topic_.get(), download.host, download.contents));
+  PLCHOST_CO_TRY_ASSIGN(auto sender,
+                        FileSender::create(entity(), chunk_topic_.get(), download.host, download.contents));
+  PLCHOST_CO_TRY_ASSIGN(auto asking, begin_asking(request));
+  const plc_SampleIdentity identity = asking.request->header.request_identity;
+  Inbox<plc_DownloadAck>::Expected acks(downloaded_, asking.key());
   std::uint64_t told = 0;
-  const auto go_on = [&](const plc_SampleIdentity& identity, TimePoint now) -> RequestCaller::Wait {
-    update();
-    dds::take_valid_told<plc_DownloadAck>(
-        download_acks_.reader.get(), answering_,
-        [&](const plc_DownloadAck& ack, const auto& /*info*/) { sender.on_ack(ack, identity, now); });
+  const auto go_on = [&](TimePoint now) -> Wait {
+    for (const plc_DownloadAck& ack : acks.take()) sender.on_ack(ack, identity, now);
     const bool begun = sender.last_news() != TimePoint{};
     const Duration patience = sender.complete() ? kDownloadLoad : kDownloadStall;
     const TimePoint end = begun ? std::max(deadline, sender.last_news() + patience) : deadline;
@@ -61,9 +73,9 @@ Result<ApiReply> ControlClient::download(const Download& download, const Downloa
     if (progress && sender.received() != told) progress(told = sender.received());
     return {.next = next, .deadline = end};
   };
-  auto reply = ask(request, deadline, go_on);
+  auto reply = co_await ask(std::move(asking), deadline, go_on);
   if (!reply && reply.error().code == ErrorCode::timed_out && sender.last_news() != TimePoint{}) {
-    return failure(
+    co_return failure(
         ErrorCode::timed_out,
         sender.complete()
             ? fmt::format("host '{}' has got {} and has not said what became of it", download.host,
@@ -74,8 +86,11 @@ Result<ApiReply> ControlClient::download(const Download& download, const Downloa
   // The answer may come before the last acknowledgement.
   const bool done = reply && reply->code == ErrorCode::ok;
   if (done && progress && told != download.contents.size()) progress(download.contents.size());
-  if (reply) await_status(request.host, *reply, MonotonicClock::now() + kStatusPatience);
-  return reply;
+  if (reply) {
+    const std::uint64_t round = reply->status_round;
+    co_await await_status(request.host, round, MonotonicClock::now() + kStatusPatience);
+  }
+  co_return reply;
 }
 
 }  // namespace plchost

@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 
 #include "api/client/check_names.hpp"
-#include "api/client/control_client.hpp"
+#include "api/client/client_core.hpp"
 #include "api/dds/ended_participant.h"
 #include "api/dds/guid.hpp"
 #include "api/dds/host_writers.hpp"
@@ -52,7 +52,7 @@ std::vector<std::string> HostView::schedulers() const {
   return split_list(dds::text_of(status.schedulers));
 }
 
-void ControlClient::update_hosts() {
+void ClientCore::update_hosts() {
   const TimePoint now = MonotonicClock::now();
   // None is kept beside what seen_ has of it: that is bounded.
   dds::take_valid_told<plc_Presence>(
@@ -82,7 +82,7 @@ void ControlClient::update_hosts() {
       [this](const plc_HostStatus& status) { return seen_.find(dds::text_of(status.host)) == nullptr; });
 }
 
-std::optional<HostView> ControlClient::view_of(std::string_view name, const SeenHost& seen) const {
+std::optional<HostView> ClientCore::view_of(std::string_view name, const SeenHost& seen) const {
   const auto status = host_status_.of_host(name, seen.server.value());
   if (status.empty()) return std::nullopt;
   constexpr std::uint32_t kMoreThanLastWords = 3;
@@ -100,13 +100,13 @@ std::optional<HostView> ControlClient::view_of(std::string_view name, const Seen
   return view;
 }
 
-std::optional<HostView> ControlClient::present(std::string_view name) const {
+std::optional<HostView> ClientCore::present(std::string_view name) const {
   const SeenHost* const seen = seen_.find(name);
   if (seen == nullptr || seen->server.is_gone(MonotonicClock::now())) return std::nullopt;
   return view_of(name, *seen);
 }
 
-std::vector<HostView> ControlClient::present() const {
+std::vector<HostView> ClientCore::present() const {
   std::vector<HostView> found;
   for (const auto& [name, seen] : seen_.all()) {
     if (auto view = present(name)) found.push_back(std::move(*view));
@@ -114,14 +114,14 @@ std::vector<HostView> ControlClient::present() const {
   return found;
 }
 
-bool ControlClient::is_silent(std::string_view host) {
-  update();
+bool ClientCore::is_silent(std::string_view host) {
+  look();
   const SeenHost* const seen = seen_.find(host);
   return seen != nullptr && MonotonicClock::now() - seen->server.last() >= kSilent;
 }
 
-std::uint64_t ControlClient::changes() {
-  update();
+std::uint64_t ClientCore::changes() {
+  look();
   const TimePoint now = MonotonicClock::now();
   std::vector<int> silences;
   for (const auto& [name, seen] : seen_.all()) {
@@ -137,7 +137,7 @@ std::uint64_t ControlClient::changes() {
   return host_changes_ + host_status_.changes() + status;
 }
 
-TimePoint ControlClient::next_silence() const {
+TimePoint ClientCore::next_silence() const {
   const TimePoint now = MonotonicClock::now();
   TimePoint next = TimePoint::max();
   for (const auto& [name, seen] : seen_.all()) {
@@ -148,7 +148,7 @@ TimePoint ControlClient::next_silence() const {
 }
 
 // Of hosts that DDS has discovered, without what they show. One that has shown it and is silent is not late.
-std::vector<dds_instance_handle_t> ControlClient::late_writers(const std::vector<HostView>& found) {
+std::vector<dds_instance_handle_t> ClientCore::late_writers(const std::vector<HostView>& found) {
   std::vector<dds_instance_handle_t> late = dds::writers_of(presence_.reader());
   std::erase_if(late, [&](dds_instance_handle_t writer) {
     const std::string name = presence_.writers().host_behind(presence_.reader(), writer);
@@ -159,48 +159,48 @@ std::vector<dds_instance_handle_t> ControlClient::late_writers(const std::vector
   return late;
 }
 
-std::vector<HostView> ControlClient::hosts(TimePoint deadline) {
+Async<std::vector<HostView>> ClientCore::hosts(TimePoint deadline) {
   const TimePoint began = MonotonicClock::now();
   const TimePoint half = began + (deadline - began) / 2;  // the rest is for what is asked of the host
+  look();
   for (;;) {
-    update();
     const TimePoint now = MonotonicClock::now();
     auto found = present();
     TimePoint settled = deadline;
-    if (now >= deadline) return found;
+    if (now >= deadline) co_return found;
     if (!found.empty()) {
       settled = std::max(last_news_ + quiet_, std::min(half, late_writers_.until(late_writers(found), now)));
     }
-    if (now >= settled) return found;
-    wait_set_.wait(std::min(settled, deadline));
+    if (now >= settled) co_return found;
+    co_await pump_->change(std::min(settled, deadline));
   }
 }
 
-Result<HostView> ControlClient::host(std::string_view name, TimePoint deadline) {
-  PLCHOST_TRY(check_host_name(name, only_));
+Async<Result<HostView>> ClientCore::host(std::string name, TimePoint deadline) {
+  PLCHOST_CO_TRY(check_host_name(name, only_));
   const TimePoint began = MonotonicClock::now();
+  look();
   for (;;) {
-    update();
-    if (auto found = present(name)) return *found;
+    if (auto found = present(name)) co_return *std::move(found);
     if (MonotonicClock::now() >= deadline) break;
-    wait_set_.wait(deadline);
+    co_await pump_->change(deadline);
   }
   // The others send it nothing.
   if (!only_.empty()) {
     auto others = dds::discovered_hosts(entity());
     std::erase(others, name);  // it has just not answered
-    return failure(ErrorCode::not_found, no_such_host(name, others));
+    co_return failure(ErrorCode::not_found, no_such_host(name, others));
   }
   // Those too that are late at this very moment.
   std::vector<std::string> names;
   for (const auto& [other, seen] : seen_.all()) {
     if (seen.server.last() >= began - kHostGone) names.push_back(other);
   }
-  return failure(ErrorCode::not_found, no_such_host(name, names));
+  co_return failure(ErrorCode::not_found, no_such_host(name, names));
 }
 
-std::vector<HostView> ControlClient::known_hosts(TimePoint deadline) {
-  (void)hosts(deadline);
+Async<std::vector<HostView>> ClientCore::known_hosts(TimePoint deadline) {
+  co_await hosts(deadline);
   const auto is_in_doubt = [](const auto& entry) {
     const Duration silence = MonotonicClock::now() - entry.second.server.last();
     return silence >= kSilent && silence <= kHostGone;
@@ -208,32 +208,31 @@ std::vector<HostView> ControlClient::known_hosts(TimePoint deadline) {
   // A moment of silence is not the end of a host.
   const TimePoint end = MonotonicClock::now() + 2 * kHostGone;
   while (std::ranges::any_of(seen_.all(), is_in_doubt) && MonotonicClock::now() < end) {
-    wait_set_.wait(MonotonicClock::now() + dds::kPresencePeriod);
-    update();
+    co_await pump_->change(MonotonicClock::now() + dds::kPresencePeriod);
   }
   std::vector<HostView> found;
   for (const auto& [name, seen] : seen_.all()) {
     if (auto view = view_of(name, seen)) found.push_back(std::move(*view));
   }
-  return found;
+  co_return found;
 }
 
-Result<ClockOffset> ControlClient::clock_offset(const std::string& host, TimePoint deadline) {
+Async<Result<ClockOffset>> ClientCore::clock_offset(std::string host, TimePoint deadline) {
   constexpr int kTries = 5;
   std::optional<ClockOffset> best;
+  ApiRequest request{.host = host, .operation = plc_OPERATION_READ_CLOCK, .instance = "", .argument = ""};
   for (int i = 0; i < kTries; ++i) {
-    const auto reply =
-        call({.host = host, .operation = plc_OPERATION_READ_CLOCK, .instance = "", .argument = ""}, deadline);
+    const auto reply = co_await call(request, deadline);
     if (!reply && best) break;
-    if (!reply) return std::unexpected(reply.error());
-    if (reply->code != ErrorCode::ok) return failure(reply->code, reply->text);
+    if (!reply) co_return std::unexpected(reply.error());
+    if (reply->code != ErrorCode::ok) co_return failure(reply->code, reply->text);
     // It was written somewhere between.
     const std::int64_t way = reply->heard_unix_ns - reply->asked_unix_ns;
     const ClockOffset measured{.offset = Duration(reply->host_unix_ns - reply->asked_unix_ns - way / 2),
                                .uncertainty = Duration((way + 1) / 2)};
     if (!best || measured.uncertainty < best->uncertainty) best = measured;
   }
-  return *best;
+  co_return *best;
 }
 
 }  // namespace plchost

@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "api/client/control_client.hpp"
-#include "api/client/control_client_status.hpp"
+#include "api/client/client_core.hpp"
+#include "api/client/client_core_status.hpp"
 
 namespace plchost {
 
@@ -19,26 +19,26 @@ bool is_complete(const std::vector<plc_HostFinding>& findings, std::uint64_t rou
 
 }  // namespace
 
-Result<std::vector<plc_HostFinding>> ControlClient::check_host(const std::string& name, TimePoint deadline) {
-  PLCHOST_TRY(open_cache(host_findings_, dds::kHostFinding));
-  PLCHOST_TRY_ASSIGN(const auto before, host(name, deadline));
-  PLCHOST_TRY_ASSIGN(const auto reply, call({name, plc_OPERATION_CHECK_HOST, "", ""}, deadline));
-  if (reply.code != ErrorCode::ok) return failure(reply.code, reply.text);
+Async<Result<std::vector<plc_HostFinding>>> ClientCore::check_host(std::string name, TimePoint deadline) {
+  PLCHOST_CO_TRY(open_cache(host_findings_, dds::kHostFinding));
+  PLCHOST_CO_TRY_ASSIGN(const auto before, co_await host(name, deadline));
+  ApiRequest request{name, plc_OPERATION_CHECK_HOST, "", ""};
+  PLCHOST_CO_TRY_ASSIGN(const auto reply, co_await call(request, deadline));
+  if (reply.code != ErrorCode::ok) co_return failure(reply.code, reply.text);
   for (;;) {
-    update();
     if (const auto view = present(name)) {
       auto findings = host_findings_.of_host(name, view->epoch);
       // Another server counts its rounds anew.
       if (is_complete(findings, view->epoch == before.epoch ? before.status.round : 0)) {
         std::ranges::sort(findings, {}, &plc_HostFinding::position);
-        return findings;
+        co_return findings;
       }
     }
     if (MonotonicClock::now() >= deadline) break;
-    wait_set_.wait(deadline);
+    co_await pump_->change(deadline);
   }
-  return failure(ErrorCode::timed_out,
-                 fmt::format("the findings of host '{}' have not come completely", name));
+  co_return failure(ErrorCode::timed_out,
+                    fmt::format("the findings of host '{}' have not come completely", name));
 }
 
 }  // namespace plchost
