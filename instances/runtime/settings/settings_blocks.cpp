@@ -113,8 +113,6 @@ constexpr std::array kBlockKeys = {
 
 }  // namespace
 
-static_assert(BlockSettings{}.base == kDefaultBlockBase);
-
 std::span<const SettingKey> block_keys() noexcept {
   return kBlockKeys;
 }

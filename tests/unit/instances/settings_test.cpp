@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "instances/runtime/settings/settings_key.hpp"
+#include "shm/block_driver/node_directory.hpp"
 
 namespace plchost {
 namespace {
@@ -373,6 +374,7 @@ TEST(Settings, DefaultsOfTheTableAreThoseOfTheProgram) {
   const auto sut = parse_settings(file, "line1.cfg");
   ASSERT_TRUE(sut) << sut.error().message;
   EXPECT_EQ(*sut, InstanceSettings{});
+  EXPECT_EQ(sut->blocks.base, kDefaultBlockBase);
 }
 
 TEST(Settings, DefaultsOfATaskAreThoseOfTheProgram) {
