@@ -61,7 +61,9 @@ class PLCHOST_CLIENT_API ClientError : public std::runtime_error {
     failed = 9,        ///< a system call of the host, or here
     unsupported = 10,  ///< not by that host
     full = 11,         ///< a table or the pool of the host
-    corrupt = 12       ///< a file or memory of the host is not valid
+    corrupt = 12,      ///< a file or memory of the host is not valid
+    wrong_type = 13,   ///< an object of the pool has that name and another type; or no plain file
+    wrong_size = 14    ///< a memory of that name has another size; or a file is empty or too large
   };
 
   ClientError(int code, const std::string& text) : std::runtime_error(text), code_(code) {}

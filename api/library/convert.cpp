@@ -1,7 +1,9 @@
 #include "api/library/convert.hpp"
 
+#include <cstddef>
 #include <utility>
 
+#include <code_words.hpp>
 #include <fmt/format.h>
 
 #include "api/client/status_count.hpp"
@@ -16,19 +18,52 @@ std::string text(std::string_view from) {
   return std::string(from);
 }
 
-// The numbers of ErrorCode that users see; newer ones say what they are by their text.
-static_assert(static_cast<int>(ErrorCode::invalid_argument) == ClientError::invalid_argument);
-static_assert(static_cast<int>(ErrorCode::not_found) == ClientError::not_found);
-static_assert(static_cast<int>(ErrorCode::already_exists) == ClientError::already_exists);
-static_assert(static_cast<int>(ErrorCode::wrong_state) == ClientError::wrong_state);
-static_assert(static_cast<int>(ErrorCode::refused) == ClientError::refused);
-static_assert(static_cast<int>(ErrorCode::busy) == ClientError::busy);
-static_assert(static_cast<int>(ErrorCode::timed_out) == ClientError::timed_out);
-static_assert(static_cast<int>(ErrorCode::unavailable) == ClientError::unavailable);
-static_assert(static_cast<int>(ErrorCode::system) == ClientError::failed);
-static_assert(static_cast<int>(ErrorCode::unsupported) == ClientError::unsupported);
-static_assert(static_cast<int>(ErrorCode::full) == ClientError::full);
-static_assert(static_cast<int>(ErrorCode::corrupt) == ClientError::corrupt);
+// The code that users see. A new ErrorCode does not compile until it has a ClientError::Code and a word in
+// Reply.code.
+constexpr int told(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::ok:
+      return 0;
+    case ErrorCode::invalid_argument:
+      return ClientError::invalid_argument;
+    case ErrorCode::not_found:
+      return ClientError::not_found;
+    case ErrorCode::already_exists:
+      return ClientError::already_exists;
+    case ErrorCode::wrong_state:
+      return ClientError::wrong_state;
+    case ErrorCode::refused:
+      return ClientError::refused;
+    case ErrorCode::busy:
+      return ClientError::busy;
+    case ErrorCode::timed_out:
+      return ClientError::timed_out;
+    case ErrorCode::unavailable:
+      return ClientError::unavailable;
+    case ErrorCode::system:
+      return ClientError::failed;
+    case ErrorCode::unsupported:
+      return ClientError::unsupported;
+    case ErrorCode::full:
+      return ClientError::full;
+    case ErrorCode::corrupt:
+      return ClientError::corrupt;
+    case ErrorCode::wrong_type:
+      return ClientError::wrong_type;
+    case ErrorCode::wrong_size:
+      return ClientError::wrong_size;
+  }
+  return -1;
+}
+
+constexpr bool each_is_told_by_its_number() {
+  constexpr std::size_t kCodes = dds::words::Reply::code.size();
+  for (std::size_t code = 0; code < kCodes; ++code) {
+    if (told(static_cast<ErrorCode>(code)) != static_cast<int>(code)) return false;
+  }
+  return kCodes == static_cast<std::size_t>(ClientError::wrong_size) + 1;
+}
+static_assert(each_is_told_by_its_number());
 
 // A StatisticsReport has the parts of histograms beside its sample.
 client_types::DurationHistogram histogram_of(const HistogramReport& report) {

@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include <code_words.hpp>
 #include <library_members.hpp>
 #include <pybind11/chrono.h>
 #include <pybind11/functional.h>
@@ -214,10 +215,13 @@ void define_results(py::module_& module) {
       });
 }
 
-// ClientError with its code, which pybind11's own way of exceptions has no place for.
+// ClientError with its code, which pybind11's own way of exceptions has no place for, and the codes by their
+// names: ClientError.not_found.
 void define_error(py::module_& module) {
   static const py::handle type =
       py::exception<ClientError>(module, "ClientError", PyExc_RuntimeError).release();
+  const auto& words = plchost::dds::words::Reply::code;
+  for (std::size_t code = 1; code < words.size(); ++code) type.attr(std::string(words[code]).c_str()) = code;
   py::register_exception_translator([](std::exception_ptr thrown) {
     try {
       if (thrown) std::rethrow_exception(std::move(thrown));

@@ -68,6 +68,14 @@ TEST_F(ClientLibrary, KnowsEachCommandOfTheTable) {
   EXPECT_THAT(unknown.what(), HasSubstr("no command 'make coffee'; there are: start,"));
 }
 
+TEST_F(ClientLibrary, TellsOfAnObjectOfAnotherTypeByTheCodeOfTheContract) {
+  const auto slots = ObjectPool::attach(host_.pool_name()).value().create_semaphore("line1/slots", 1).value();
+  Client sut(options());
+  const ClientError refused = error_of([&] { (void)sut.post("hosta", "line1/slots"); });
+  EXPECT_EQ(refused.code(), ClientError::wrong_type);
+  EXPECT_THAT(refused.what(), HasSubstr("object 'line1/slots' is of type semaphore, not event"));
+}
+
 TEST_F(ClientLibrary, CountsThePostsOfManyThreadsExactlyOnce) {
   constexpr unsigned kThreads = 4;
   constexpr unsigned kPosts = 50;

@@ -53,8 +53,14 @@ with plchost_client.Client(domain=int(os.environ["PLCHOST_DOMAIN"]), timeout=20.
     assert client.reload("north") == "nothing has changed"
     try:
         client.logs("north", "nobody")
+        raise AssertionError("there is no such instance")
     except plchost_client.ClientError as error:
-        assert error.code == 2, error
+        assert error.code == plchost_client.ClientError.not_found == 2, error
+    try:
+        client.download_application("north", "packer1", "/dev/null")
+        raise AssertionError("it is no file")
+    except plchost_client.ClientError as error:
+        assert error.code == plchost_client.ClientError.wrong_type == 13, error
 with plchost_client.Client(domain=int(os.environ["PLCHOST_DOMAIN"]), timeout=20.0, host="north") as client:
     assert client.instances()[0].name == "packer1"
     try:
