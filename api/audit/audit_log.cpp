@@ -69,12 +69,12 @@ Result<std::unique_ptr<AuditLog>> AuditLog::open(Options options) {
 Result<void> AuditLog::go_on() {
   PLCHOST_TRY_ASSIGN(const auto files, audit_files(options_.folder));
   if (files.empty()) {
-    if (auto made = open_file(options_.folder + "/" + audit_file_name(1)); !made) return made;
+    PLCHOST_TRY(open_file(options_.folder + "/" + audit_file_name(1)));
     return write(of_the_log("begin", "the first record of this log"));
   }
   const AuditFile& last = files.back();
   head_.number = last.first - 1;  // unless a record is found in it
-  if (auto opened = open_file(last.path); !opened) return opened;
+  PLCHOST_TRY(open_file(last.path));
   return find_end(last.path);
 }
 
@@ -146,14 +146,9 @@ Result<void> AuditLog::write(const AuditRecord& record) {
 
 Result<void> AuditLog::append(const AuditRecord& record) {
   const auto all = [&]() -> Result<void> {
-    if (bytes_ >= options_.file_bytes) {
-      if (auto next = next_file(); !next) return next;
-    }
+    if (bytes_ >= options_.file_bytes) PLCHOST_TRY(next_file());
     if (missed_ > 0) {
-      if (auto told = write(of_the_log("gap", fmt::format("{} records could not be written", missed_)));
-          !told) {
-        return told;
-      }
+      PLCHOST_TRY(write(of_the_log("gap", fmt::format("{} records could not be written", missed_))));
       missed_ = 0;
     }
     return write(record);

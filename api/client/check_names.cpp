@@ -35,19 +35,19 @@ Result<void> check_host_name(std::string_view host, std::string_view only) {
 }
 
 Result<void> check_event_name(std::string_view instance, std::string_view event) {
-  if (auto good = check_instance_name(instance); !good) return good;
+  PLCHOST_TRY(check_instance_name(instance));
   return check_name("event", event, kMaxEventName);
 }
 
 Result<void> check_task_name(std::string_view instance, std::string_view task) {
-  if (auto good = check_instance_name(instance); !good) return good;
+  PLCHOST_TRY(check_instance_name(instance));
   return check_name("task", task, kMaxTaskName);
 }
 
 Result<void> check_api_request(const ApiRequest& request, std::string_view only) {
-  if (auto good = check_host_name(request.host, only); !good) return good;
+  PLCHOST_TRY(check_host_name(request.host, only));
   if (!request.instance.empty()) {
-    if (auto good = check_instance_name(request.instance); !good) return good;
+    PLCHOST_TRY(check_instance_name(request.instance));
   }
   if (request.argument.size() <= kMaxPath && !request.argument.contains('\0')) return {};
   return failure(ErrorCode::invalid_argument,

@@ -14,10 +14,8 @@ namespace plchost {
 Result<FileSender> FileSender::create(dds_entity_t participant, dds_entity_t topic, const std::string& host,
                                       std::span<const std::byte> contents) {
   FileSender sender;
-  auto way =
-      dds::open_writer(participant, dds::host_partition(host), topic, dds::qos_of(dds::kDownloadChunk));
-  if (!way) return std::unexpected(std::move(way).error());
-  sender.way_ = *std::move(way);
+  PLCHOST_TRY_ASSIGN(sender.way_, dds::open_writer(participant, dds::host_partition(host), topic,
+                                                   dds::qos_of(dds::kDownloadChunk)));
   sender.host_ = host;
   sender.contents_ = contents;
   return sender;

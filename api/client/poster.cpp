@@ -27,10 +27,8 @@ template <class Sample>
 Result<Poster<Sample>> Poster<Sample>::create(dds_entity_t participant, dds_entity_t topic,
                                               const std::string& host) {
   Poster poster;
-  auto way =
-      dds::open_writer(participant, dds::host_partition(host), topic, dds::qos_of(dds::kTopicOf<Sample>));
-  if (!way) return std::unexpected(std::move(way).error());
-  poster.way_ = *std::move(way);
+  PLCHOST_TRY_ASSIGN(poster.way_, dds::open_writer(participant, dds::host_partition(host), topic,
+                                                   dds::qos_of(dds::kTopicOf<Sample>)));
   poster.source_ = dds::guid_of(poster.way_.writer.get());
   poster.source_.copy_to(poster.sample_.source);
   dds::copy_text(poster.sample_.host, host);

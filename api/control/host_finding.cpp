@@ -94,13 +94,10 @@ std::string encode_part(std::uint64_t check, std::span<const HostFinding> all, s
 Result<FindingsPart> decode_part(std::string_view text) {
   const Json json = Json::parse(text, nullptr, false);
   if (!json.is_object()) return failure(ErrorCode::corrupt, "findings are not a JSON object");
-  const auto check = number_of(json, "check", UINT64_MAX);
-  const auto total = number_of(json, "total", kMaxFindings);
-  const auto first = number_of(json, "first", kMaxFindings);
-  for (const auto* number : {&check, &total, &first}) {
-    if (!*number) return std::unexpected(number->error());
-  }
-  FindingsPart part{*check, *total, *first, {}};
+  FindingsPart part;
+  PLCHOST_TRY_ASSIGN(part.check, number_of(json, "check", UINT64_MAX));
+  PLCHOST_TRY_ASSIGN(part.total, number_of(json, "total", kMaxFindings));
+  PLCHOST_TRY_ASSIGN(part.first, number_of(json, "first", kMaxFindings));
   const auto findings = json.find("findings");
   if (findings == json.end() || !findings->is_array() || part.first + findings->size() > part.total) {
     return failure(ErrorCode::corrupt, "findings have no array 'findings' within their total");

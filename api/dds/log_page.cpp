@@ -60,7 +60,7 @@ Result<LogListing> look_at_log(std::string_view pool, std::string_view instance,
   LogListing listing{.clock_unix_ns = unix_time_ns(), .next_after = query.after};
   const auto reader = LogRingReader::open(pool, instance);
   if (!reader && reader.error().code == ErrorCode::not_found) return listing;
-  if (!reader) return std::unexpected(reader.error());
+  PLCHOST_TRY(reader);
   LogSlice slice =
       query.newest > 0 ? reader->newest(query.newest, kPageRecords) : reader->read(query.after, kPageRecords);
   listing.stream = static_cast<std::uint64_t>(slice.stream_unix_ns);

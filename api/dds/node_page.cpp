@@ -18,7 +18,7 @@ static_assert(sizeof(plc_NodePage::base) == kMaxBlockBase + 1);
 
 Result<void> check_nodes(const NodeQuery& query) {
   if (!query.base.empty()) {
-    if (auto good = check_name("base name", query.base, kMaxBlockBase); !good) return good;
+    PLCHOST_TRY(check_name("base name", query.base, kMaxBlockBase));
   }
   if (query.node.empty()) return {};
   return check_name("node", query.node, kMaxInstanceName);

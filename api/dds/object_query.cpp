@@ -31,7 +31,7 @@ Result<void> check_query(const ObjectQuery& query) {
   }
   for (const std::string* name : {&query.name, &query.after}) {
     if (name->empty()) continue;
-    if (auto good = check_object_name(*name); !good) return good;
+    PLCHOST_TRY(check_object_name(*name));
   }
   return check_pattern(query.match);
 }

@@ -62,25 +62,17 @@ Result<void> BlockGateway::open_node() {
 }
 
 Result<void> BlockGateway::open_topics(const WaitSet& wait_set) {
-  auto subscriber = dds::make_subscriber(participant_, dds::block_partition(options_.host, dds::kAllHosts));
-  auto heard = dds::make_subscriber(participant_, dds::status_partition(dds::kAllHosts));
-  for (auto* const made : {&subscriber, &heard}) {
-    if (!*made) return std::unexpected(std::move(*made).error());
-  }
-  subscriber_ = *std::move(subscriber);
-  host_subscriber_ = *std::move(heard);
+  PLCHOST_TRY_ASSIGN(subscriber_,
+                     dds::make_subscriber(participant_, dds::block_partition(options_.host, dds::kAllHosts)));
+  PLCHOST_TRY_ASSIGN(host_subscriber_,
+                     dds::make_subscriber(participant_, dds::status_partition(dds::kAllHosts)));
   const auto open = [&](const dds::Entity& from, const dds::TopicInfo& topic, const dds::Qos& qos) {
     return open_reader(participant_, from.get(), topic, qos, wait_set);
   };
-  auto hosts = open(host_subscriber_, dds::kBlockHostStatus, dds::shown_qos(dds::kBlockHostStatus));
-  auto blocks = open(subscriber_, dds::kBlock, dds::bounded_qos(dds::kBlock));
-  auto acks = open(subscriber_, dds::kBlockAck, dds::shown_qos(dds::kBlockAck));
-  for (auto* const made : {&hosts, &blocks, &acks}) {
-    if (!*made) return std::unexpected(std::move(*made).error());
-  }
-  hosts_ = *std::move(hosts);
-  blocks_ = *std::move(blocks);
-  acks_ = *std::move(acks);
+  PLCHOST_TRY_ASSIGN(hosts_,
+                     open(host_subscriber_, dds::kBlockHostStatus, dds::shown_qos(dds::kBlockHostStatus)));
+  PLCHOST_TRY_ASSIGN(blocks_, open(subscriber_, dds::kBlock, dds::bounded_qos(dds::kBlock)));
+  PLCHOST_TRY_ASSIGN(acks_, open(subscriber_, dds::kBlockAck, dds::shown_qos(dds::kBlockAck)));
   PLCHOST_TRY_ASSIGN(host_writer_, dds::open_writer(participant_, dds::status_partition(options_.host),
                                                     hosts_.topic.get(), dds::qos_of(dds::kBlockHostStatus)));
   return {};

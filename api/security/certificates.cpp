@@ -64,14 +64,13 @@ Result<Name> make_name(const Subject& subject) {
   const bool wants_lowest = subject.role == Role::host;
   constexpr int kTries = 1 << 24;
   for (int number = 0; number < kTries; ++number) {
-    auto name = plain_name(subject);
-    if (!name) return name;
+    PLCHOST_TRY_ASSIGN(auto name, plain_name(subject));
     // The first try of a client has none: its subject says what it must and no more.
     if ((wants_lowest || number > 0) &&
-        !add_entry(name->get(), NID_serialNumber, std::to_string(number), V_ASN1_PRINTABLESTRING)) {
+        !add_entry(name.get(), NID_serialNumber, std::to_string(number), V_ASN1_PRINTABLESTRING)) {
       return openssl_failure("make a subject");
     }
-    PLCHOST_TRY_ASSIGN(const auto prefix, prefix_of(name->get()));
+    PLCHOST_TRY_ASSIGN(const auto prefix, prefix_of(name.get()));
     if (is_lowest(prefix) == wants_lowest) return name;
   }
   return failure(ErrorCode::system, fmt::format("no subject for '{}' has the hash it needs", subject.name));
@@ -150,9 +149,8 @@ Result<Authority> make_authority(const std::string& name, const Validity& validi
 Result<Certificate> issue_certificate(const Subject& subject, const Validity& validity, const Key& key,
                                       const Authority& authority) {
   PLCHOST_TRY_ASSIGN(const auto name, make_name(subject));
-  auto made = begin_certificate(name, validity, key);
-  if (!made) return made;
-  X509* const raw = made->get();
+  PLCHOST_TRY_ASSIGN(auto made, begin_certificate(name, validity, key));
+  X509* const raw = made.get();
   X509* const issuer = authority.certificate.get();
   if (X509_set_issuer_name(raw, X509_get_subject_name(issuer)) != 1 ||
       !add_extension(raw, issuer, NID_basic_constraints, "critical,CA:FALSE") ||

@@ -34,7 +34,7 @@ Result<void> rename_path(const std::string& from, const std::string& to) {
 
 Result<void> write_authority(const Authority& authority, const std::string& folder,
                              std::string_view certificate, std::string_view key) {
-  if (auto done = write_text(file_in(folder, key), to_pem(authority.key), kSecretFile); !done) return done;
+  PLCHOST_TRY(write_text(file_in(folder, key), to_pem(authority.key), kSecretFile));
   return write_text(file_in(folder, certificate), to_pem(authority.certificate), kPublicFile);
 }
 
@@ -49,16 +49,10 @@ Result<void> write_authorities(const std::string& to) {
   const Validity validity = validity_for(kDaysOfAuthority);
   PLCHOST_TRY_ASSIGN(const auto identity, make_authority("identity authority", validity));
   PLCHOST_TRY_ASSIGN(const auto permissions, make_authority("permissions authority", validity));
-  if (auto done = write_authority(identity, to, kIdentityAuthorityFile, kIdentityAuthorityKey); !done) {
-    return done;
-  }
-  if (auto done = write_authority(permissions, to, kPermissionsAuthorityFile, kPermissionsAuthorityKey);
-      !done) {
-    return done;
-  }
+  PLCHOST_TRY(write_authority(identity, to, kIdentityAuthorityFile, kIdentityAuthorityKey));
+  PLCHOST_TRY(write_authority(permissions, to, kPermissionsAuthorityFile, kPermissionsAuthorityKey));
   PLCHOST_TRY_ASSIGN(const auto revocations, make_revocations(nullptr, {}, validity, identity));
-  if (auto done = write_text(file_in(to, kRevocationsFile), to_pem(revocations), kPublicFile); !done)
-    return done;
+  PLCHOST_TRY(write_text(file_in(to, kRevocationsFile), to_pem(revocations), kPublicFile));
   return write_text(file_in(to, kGovernanceFile), sign_document(governance_text(), permissions), kPublicFile);
 }
 
@@ -102,12 +96,12 @@ Result<void> SecurityFolder::init(const std::string& folder, const std::string& 
       fmt::format("{}.new-{}", path.ends_with('/') ? path.substr(0, path.size() - 1) : path, ::getpid());
   Unfinished unfinished(fresh);
   const std::string authorities = file_in(fresh, kAuthoritiesFolder);
-  if (auto made = make_folder(fresh); !made) return made;
-  if (auto made = make_folder(authorities); !made) return made;
-  if (auto written = write_authorities(authorities); !written) return written;
+  PLCHOST_TRY(make_folder(fresh));
+  PLCHOST_TRY(make_folder(authorities));
+  PLCHOST_TRY(write_authorities(authorities));
   PLCHOST_TRY_ASSIGN(auto opened, open(fresh));
-  if (auto added = opened.add(Role::host, host); !added) return added;
-  if (auto renamed = rename_path(fresh, path); !renamed) return renamed;
+  PLCHOST_TRY(opened.add(Role::host, host));
+  PLCHOST_TRY(rename_path(fresh, path));
   unfinished.finished();
   return sync_directory(fs::path(fresh).parent_path());
 }
@@ -139,13 +133,13 @@ std::string SecurityFolder::authority_file(std::string_view name) const {
 }
 
 Result<void> SecurityFolder::add(Role role, const std::string& name, int days) {
-  if (auto good = check_days(days); !good) return good;
+  PLCHOST_TRY(check_days(days));
   return add_valid({.role = role, .name = name}, validity_for(days));
 }
 
 Result<void> SecurityFolder::add_valid(const Subject& subject, const Validity& validity) {
   const std::string& name = subject.name;
-  if (auto good = check_name("identity", name, kMaxIdentityName); !good) return good;
+  PLCHOST_TRY(check_name("identity", name, kMaxIdentityName));
   if (name == kAuthoritiesFolder) {
     return failure(
         ErrorCode::invalid_argument,
@@ -165,26 +159,26 @@ Result<void> SecurityFolder::add_valid(const Subject& subject, const Validity& v
   const std::string fresh = path(fmt::format(".{}.new", name));
   fs::remove_all(fresh, error);
   Unfinished unfinished(fresh);
-  if (auto made = make_folder(fresh); !made) return made;
-  if (auto copied = copy_common(fresh); !copied) return copied;
-  if (auto written = write_identity(fresh, subject, validity); !written) return written;
+  PLCHOST_TRY(make_folder(fresh));
+  PLCHOST_TRY(copy_common(fresh));
+  PLCHOST_TRY(write_identity(fresh, subject, validity));
   if (is_there) fs::remove_all(path(name), error);
-  if (auto renamed = rename_path(fresh, path(name)); !renamed) return renamed;
+  PLCHOST_TRY(rename_path(fresh, path(name)));
   unfinished.finished();
   if (subject.role == Role::host) {
-    if (auto known = know_all(name); !known) return known;
+    PLCHOST_TRY(know_all(name));
   }
-  if (auto told = tell_hosts(subject); !told) return told;
+  PLCHOST_TRY(tell_hosts(subject));
   return sync_directory(folder_);
 }
 
 Result<void> SecurityFolder::renew(const std::string& name, int days) {
-  if (auto good = check_days(days); !good) return good;
+  PLCHOST_TRY(check_days(days));
   PLCHOST_TRY_ASSIGN(const auto known, view(name));
   if (known.revoked) {
     return failure(ErrorCode::wrong_state, fmt::format("'{}' is revoked; add it anew", name));
   }
-  if (auto written = write_identity(path(name), known.subject, validity_for(days)); !written) return written;
+  PLCHOST_TRY(write_identity(path(name), known.subject, validity_for(days)));
   return tell_hosts(known.subject);
 }
 
@@ -197,12 +191,10 @@ Result<void> SecurityFolder::revoke(const std::string& name) {
   PLCHOST_TRY_ASSIGN(const auto revocations, read_revocations(authority_file(kRevocationsFile)));
   PLCHOST_TRY_ASSIGN(const auto more,
                      make_revocations(revocations, certificates, validity_for(kDaysOfAuthority), identity_));
-  if (auto done = write_text(authority_file(kRevocationsFile), to_pem(more), kPublicFile); !done) return done;
+  PLCHOST_TRY(write_text(authority_file(kRevocationsFile), to_pem(more), kPublicFile));
   PLCHOST_TRY_ASSIGN(const auto all, names());
   for (const std::string& each : all) {
-    if (auto done = write_text(file_in(path(each), kRevocationsFile), to_pem(more), kPublicFile); !done) {
-      return done;
-    }
+    PLCHOST_TRY(write_text(file_in(path(each), kRevocationsFile), to_pem(more), kPublicFile));
   }
   return {};
 }

@@ -19,8 +19,8 @@ namespace plchost::security {
 namespace fs = std::filesystem;
 
 Result<void> write_text(const std::string& path, const Result<std::string>& text, mode_t mode) {
-  if (!text) return std::unexpected(text.error());
-  return replace_file(path, *text, mode);
+  PLCHOST_TRY_ASSIGN(const auto& contents, text);
+  return replace_file(path, contents, mode);
 }
 
 Result<void> make_folder(const std::string& path) {
@@ -53,10 +53,10 @@ Result<void> SecurityFolder::write_identity(const std::string& to, const Subject
   PLCHOST_TRY_ASSIGN(const auto certificate, issue_certificate(subject, validity, key, identity_));
   PLCHOST_TRY_ASSIGN(const auto text, subject_text(certificate));
   PLCHOST_TRY_ASSIGN(const auto prefix, guid_prefix(certificate));
-  if (auto kept = keep_issued(subject.name, certificate); !kept) return kept;
+  PLCHOST_TRY(keep_issued(subject.name, certificate));
   const auto permissions = sign_document(permissions_text(subject, text, prefix, validity), permissions_);
-  if (auto done = write_text(file_in(to, kPermissionsFile), permissions, kPublicFile); !done) return done;
-  if (auto done = write_text(file_in(to, kKeyFile), to_pem(key), kSecretFile); !done) return done;
+  PLCHOST_TRY(write_text(file_in(to, kPermissionsFile), permissions, kPublicFile));
+  PLCHOST_TRY(write_text(file_in(to, kKeyFile), to_pem(key), kSecretFile));
   return write_text(file_in(to, kCertificateFile), to_pem(certificate), kPublicFile);
 }
 
@@ -88,8 +88,7 @@ Result<std::vector<Certificate>> SecurityFolder::issued(const std::string& name)
 
 Result<void> SecurityFolder::copy_common(const std::string& to) const {
   for (const std::string_view file : kCommonFiles) {
-    if (auto done = write_text(file_in(to, file), read_file(authority_file(file)), kPublicFile); !done)
-      return done;
+    PLCHOST_TRY(write_text(file_in(to, file), read_file(authority_file(file)), kPublicFile));
   }
   return {};
 }
@@ -102,19 +101,18 @@ Result<void> SecurityFolder::tell_hosts(const Subject& subject) const {
     const std::string known = file_in(path(name), kKnownFolder);
     std::error_code ignored;
     if (!fs::is_directory(known, ignored)) continue;
-    if (auto done = write_text(file_in(known, subject.name + ".pem"), certificate, kPublicFile); !done)
-      return done;
+    PLCHOST_TRY(write_text(file_in(known, subject.name + ".pem"), certificate, kPublicFile));
   }
   return {};
 }
 
 Result<void> SecurityFolder::know_all(const std::string& host) const {
   const std::string known = file_in(path(host), kKnownFolder);
-  if (auto made = make_folder(known); !made) return made;
+  PLCHOST_TRY(make_folder(known));
   PLCHOST_TRY_ASSIGN(const auto all, names());
   for (const std::string& name : all) {
     const auto certificate = read_file(file_in(path(name), kCertificateFile));
-    if (auto done = write_text(file_in(known, name + ".pem"), certificate, kPublicFile); !done) return done;
+    PLCHOST_TRY(write_text(file_in(known, name + ".pem"), certificate, kPublicFile));
   }
   return {};
 }

@@ -107,14 +107,11 @@ Result<void> ControlServer::Parts::raise_loop() const {
 }
 
 Result<void> ControlServer::Parts::run() {
-  if (auto raised = raise_loop(); !raised) return raised;
+  PLCHOST_TRY(raise_loop());
   for (const int fd : {wake.get(), signals.get(), status_timer.get(), presence_timer.get(), run_timer.get(),
                        identity_timer.get(), manager->fd()}) {
     epoll_event event{.events = EPOLLIN, .data = {.fd = fd}};
-    if (auto added = check_errno(::epoll_ctl(epoll.get(), EPOLL_CTL_ADD, fd, &event), "watch a descriptor");
-        !added) {
-      return std::unexpected(added.error());
-    }
+    PLCHOST_TRY(check_errno(::epoll_ctl(epoll.get(), EPOLL_CTL_ADD, fd, &event), "watch a descriptor"));
   }
   spdlog::info("host '{}' is served in DDS domain {}", options.host, options.dds.domain);
   for (;;) {
@@ -337,8 +334,11 @@ void ControlServer::Parts::do_request(ApiRole role, const dds::Guid& writer, con
 // The page first: a client that has the answer has it, or asks again.
 void ControlServer::Parts::list_objects(const dds::Guid& client, const plc_Request& request) {
   const plc_SampleIdentity& identity = request.header.request_identity;
-  const auto query = object_query_of(request.part);
-  const auto listing = query ? lister.page(*query) : Result<ObjectListing>(std::unexpected(query.error()));
+  const auto look = [&]() -> Result<ObjectListing> {
+    PLCHOST_TRY_ASSIGN(const auto query, object_query_of(request.part));
+    return lister.page(query);
+  };
+  const auto listing = look();
   if (!listing) return tell(client, identity, listing.error().code, listing.error().describe());
   ObjectPageSample sample(*listing);
   send_page(client, request, sample.page());
@@ -358,9 +358,11 @@ void ControlServer::Parts::list_nodes(ControlVerb verb, const dds::Guid& client,
 }
 
 void ControlServer::Parts::read_log(const dds::Guid& client, const plc_Request& request) {
-  const auto query = log_query_of(request.part);
-  const auto slice = query ? look_at_log(pool.name(), dds::text_of(request.instance), *query)
-                           : Result<LogListing>(std::unexpected(query.error()));
+  const auto look = [&]() -> Result<LogListing> {
+    PLCHOST_TRY_ASSIGN(const auto query, log_query_of(request.part));
+    return look_at_log(pool.name(), dds::text_of(request.instance), query);
+  };
+  const auto slice = look();
   if (!slice) {
     return tell(client, request.header.request_identity, slice.error().code, slice.error().describe());
   }

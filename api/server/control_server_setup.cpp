@@ -50,28 +50,28 @@ Result<UniqueFd> make_signal_fd() {
 }  // namespace
 
 Result<void> ControlServer::Parts::open() {
-  if (auto made = make_loop(); !made) return made;
-  if (auto made = make_guard(); !made) return made;
+  PLCHOST_TRY(make_loop());
+  PLCHOST_TRY(make_guard());
   PLCHOST_TRY_ASSIGN(auto ledger, PostLedger::open(pool));
   PLCHOST_TRY_ASSIGN(manager, ManagerLink::connect(options.run_directory));
   intake.emplace(options.host, pool, std::move(ledger), epoch, guard);
-  if (auto entered = enter_domain(); !entered) return entered;
-  if (auto claimed = claim_name(); !claimed) return claimed;
+  PLCHOST_TRY(enter_domain());
+  PLCHOST_TRY(claim_name());
   open_audit();
   PLCHOST_TRY_ASSIGN(sessions, SessionTable::create(participant.get(), options.host));
   intake->acknowledge_by(sessions->ack_writers());
-  auto made_status =
+  PLCHOST_TRY_ASSIGN(
+      auto made_status,
       StatusPublisher::create(participant.get(), {options.host, &pool, epoch, options.run_directory,
                                                   fmt::format("{}", fmt::join(options.labels, ",")),
-                                                  identity_watch.has_value(), options.applications_folder});
-  if (!made_status) return std::unexpected(made_status.error());
-  status.emplace(std::move(*made_status));
+                                                  identity_watch.has_value(), options.applications_folder}));
+  status.emplace(std::move(made_status));
   // Everything is there before a client can see that this host is: presence comes last.
   status->look_at_writers(*intake, *sessions, MonotonicClock::now());
   status->tick(MonotonicClock::now());
-  if (auto made = make_readers(); !made) return made;
-  if (auto listening = listen(); !listening) return listening;
-  if (auto opened = open_gateway(); !opened) return opened;
+  PLCHOST_TRY(make_readers());
+  PLCHOST_TRY(listen());
+  PLCHOST_TRY(open_gateway());
   status->write_presence();
   ask_for_findings();
   return {};
@@ -193,10 +193,10 @@ Result<void> ControlServer::Parts::make_readers() {
   };
   requests[0].role = ApiRole::operating;
   requests[1].role = ApiRole::engineering;
-  if (auto made = open(dds::kDownloadChunk, chunks); !made) return made;
-  if (auto made = open(dds::kEventPost, event_posts); !made) return made;
-  if (auto made = open(dds::kEventBatch, event_batches); !made) return made;
-  if (auto made = open(dds::kOperatorRequest, requests[0].from); !made) return made;
+  PLCHOST_TRY(open(dds::kDownloadChunk, chunks));
+  PLCHOST_TRY(open(dds::kEventPost, event_posts));
+  PLCHOST_TRY(open(dds::kEventBatch, event_batches));
+  PLCHOST_TRY(open(dds::kOperatorRequest, requests[0].from));
   return open(dds::kEngineerRequest, requests[1].from);
 }
 
@@ -209,15 +209,15 @@ Result<void> ControlServer::Parts::listen() {
     return dds::check_code(returned, "listen to a reader");
   };
   for (const dds_entity_t reader : sessions->discovery_readers()) {
-    if (auto done = set(reader, on_wake_listener); !done) return done;
+    PLCHOST_TRY(set(reader, on_wake_listener));
   }
-  if (auto done = set(name->reader(), on_wake_listener); !done) return done;
+  PLCHOST_TRY(set(name->reader(), on_wake_listener));
   for (const RequestReader& request : requests) {
-    if (auto done = set(request.from.reader.get(), on_wake_listener); !done) return done;
+    PLCHOST_TRY(set(request.from.reader.get(), on_wake_listener));
   }
-  if (auto done = set(chunks.reader.get(), on_wake_listener); !done) return done;
-  if (auto done = set(event_posts.reader.get(), on_event_post); !done) return done;
-  if (auto done = set(event_batches.reader.get(), on_event_batch); !done) return done;
+  PLCHOST_TRY(set(chunks.reader.get(), on_wake_listener));
+  PLCHOST_TRY(set(event_posts.reader.get(), on_event_post));
+  PLCHOST_TRY(set(event_batches.reader.get(), on_event_batch));
   // A sample that came before the listener was there does not call it.
   on_event_post(event_posts.reader.get(), this);
   on_event_batch(event_batches.reader.get(), this);

@@ -31,16 +31,14 @@ Result<SessionTable> SessionTable::create(dds_entity_t participant, std::string 
   for (std::size_t i = 0; i < kStreams; ++i) {
     PLCHOST_TRY_ASSIGN(table.topics_[i], dds::make_topic(participant, kStreamTopics[i]));
   }
-  auto participants =
+  PLCHOST_TRY_ASSIGN(
+      table.participants_,
       dds::check_entity(dds_create_reader(participant, DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr, nullptr),
-                        "watch participants");
-  auto subscriptions = dds::check_entity(
-      dds_create_reader(participant, DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION, nullptr, nullptr), "watch readers");
-  for (auto* made : {&participants, &subscriptions}) {
-    if (!*made) return std::unexpected(made->error());
-  }
-  table.participants_ = std::move(*participants);
-  table.subscriptions_ = std::move(*subscriptions);
+                        "watch participants"));
+  PLCHOST_TRY_ASSIGN(
+      table.subscriptions_,
+      dds::check_entity(dds_create_reader(participant, DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION, nullptr, nullptr),
+                        "watch readers"));
   return table;
 }
 

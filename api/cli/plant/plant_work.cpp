@@ -96,9 +96,11 @@ void HostWork::tell(Kind result, const WantedInstance* instance, std::string rem
 }
 
 bool HostWork::enter(ParticipantSource& participant) {
-  auto entered = participant.get();
-  auto connected = entered ? ControlClient::connect(*std::move(entered), wanted_.name)
-                           : Result<std::unique_ptr<ControlClient>>(std::unexpected(entered.error()));
+  const auto connect = [&]() -> Result<std::unique_ptr<ControlClient>> {
+    PLCHOST_TRY_ASSIGN(auto entered, participant.get());
+    return ControlClient::connect(std::move(entered), wanted_.name);
+  };
+  auto connected = connect();
   if (!connected) {
     tell(Kind::unknown, nullptr, connected.error().describe());
     return false;

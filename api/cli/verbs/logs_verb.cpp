@@ -78,10 +78,10 @@ class LogFollower {
   /// The new lines; the first time, the kept ones that were asked for.
   Result<std::vector<LogText>> read() {
     ControlClient& client = *session_.client().value();
-    auto lines = client.wait(log_.read(client.core(), session_.deadline(), arguments_.count));
-    if (!lines) return lines;
+    PLCHOST_TRY_ASSIGN(auto lines,
+                       client.wait(log_.read(client.core(), session_.deadline(), arguments_.count)));
     const std::int64_t begin = since_.by_clock(log_.clock_unix_ns());
-    std::erase_if(*lines, [&](const LogText& line) { return line.time_unix_ns < begin; });
+    std::erase_if(lines, [&](const LogText& line) { return line.time_unix_ns < begin; });
     return lines;
   }
   [[nodiscard]] const std::string& host() const noexcept { return log_.host(); }

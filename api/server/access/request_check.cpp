@@ -57,7 +57,7 @@ Result<void> check_instance(const Operation& operation, std::string_view instanc
     return failure(ErrorCode::invalid_argument,
                    fmt::format("{} is for the whole host: name no instance", operation.name));
   }
-  if (auto good = check_name("instance", instance, kMaxInstanceName); !good) return good;
+  PLCHOST_TRY(check_name("instance", instance, kMaxInstanceName));
   if (std::ranges::find(instances, instance) != instances.end()) return {};
   return failure(ErrorCode::not_found, fmt::format("no instance '{}' on host '{}'; there are: {}", instance,
                                                    host, join_names(instances)));

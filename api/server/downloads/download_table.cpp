@@ -53,7 +53,7 @@ Result<void> DownloadTable::check_room(const std::string& instance, std::uint64_
 Result<void> DownloadTable::begin(const dds::Guid& client, const plc_SampleIdentity& identity,
                                   ControlRequest request, TimePoint now) {
   PLCHOST_TRY_ASSIGN(const auto order, ApplicationOrder::from_options(request.options));
-  if (auto room = check_room(request.instance, order.size); !room) return room;
+  PLCHOST_TRY(check_room(request.instance, order.size));
   Download download{.client = client,
                     .identity = identity,
                     .request = std::move(request),

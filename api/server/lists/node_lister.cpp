@@ -66,19 +66,18 @@ Result<NodeListing> NodeLister::nodes(const NodeQuery& query) const {
 }
 
 Result<NodeListing> NodeLister::routes(const NodeQuery& query, TimePoint until) const {
-  auto asked = look(pool_, query.base.empty() ? base_ : query.base, query);
-  if (!asked) return std::unexpected(std::move(asked).error());
-  NodeListing& listing = asked->listing;
-  if (!asked->directory) return std::move(listing);
-  const Topology topology = topology_of(*asked->directory);
-  for (const NodeInfo& node : asked->nodes) {
+  PLCHOST_TRY_ASSIGN(auto asked, look(pool_, query.base.empty() ? base_ : query.base, query));
+  NodeListing& listing = asked.listing;
+  if (!asked.directory) return std::move(listing);
+  const Topology topology = topology_of(*asked.directory);
+  for (const NodeInfo& node : asked.nodes) {
     const bool first = listing.next_after == 0;
     const bool fits = listing.routes.size() + kMaxRoutes <= kPageRoutes;
     if (!first && (!fits || MonotonicClock::now() >= until)) {
       listing.complete = false;
       return std::move(listing);
     }
-    const auto routes = routes_from(*asked->directory, topology, node.node);
+    const auto routes = routes_from(*asked.directory, topology, node.node);
     listing.routes.insert(listing.routes.end(), routes.begin(), routes.end());
     listing.next_after = node.node;
   }

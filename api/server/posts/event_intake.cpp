@@ -193,7 +193,7 @@ void EventIntake::post_next(const Post& post, LedgerEntry& entry, const SourceSt
 
 template <class Post>
 Result<void> EventIntake::check(const Post& post) const {
-  if (auto may = guard_->check(dds::Guid::from(post.source), security::Role::operating); !may) return may;
+  PLCHOST_TRY(guard_->check(dds::Guid::from(post.source), security::Role::operating));
   if (dds::timeliness(post.limit, epoch_) == dds::Timeliness::late) return check_in_time(post.limit.clock_ns);
   const auto host = text_of(post.host);
   if (host == host_) return {};
@@ -201,7 +201,7 @@ Result<void> EventIntake::check(const Post& post) const {
 }
 
 Result<void> EventIntake::check_names(std::string_view instance, std::string_view event) {
-  if (auto good = check_name("instance", instance, kMaxInstanceName); !good) return good;
+  PLCHOST_TRY(check_name("instance", instance, kMaxInstanceName));
   return check_name("event", event, kMaxEventName);
 }
 
@@ -246,7 +246,7 @@ Result<void> EventIntake::try_post(const plc_EventPost& post, LedgerEntry& entry
                                    Targets* targets) {
   const auto instance = text_of(post.instance);
   const auto event = text_of(post.event);
-  if (auto good = check_names(instance, event); !good) return good;
+  PLCHOST_TRY(check_names(instance, event));
   PLCHOST_TRY_ASSIGN(const auto found, find(instance, event, targets != nullptr));
   const auto made =
       ledger_.post(entry, found, PostLedger::Allowed::registered, [&](const CountedEvent::Snapshot& seen) {
@@ -299,7 +299,7 @@ Result<void> EventIntake::try_post(const plc_EventBatch& batch, LedgerEntry& ent
   const std::uint32_t count = batch.events._length;
   if (count == 0) return failure(ErrorCode::invalid_argument, "a batch of no events");
   const bool begun = state.batch == batch.sequence_number && state.batch_done > 0;
-  if (auto good = look_up(batch, begun, targets != nullptr); !good) return good;
+  PLCHOST_TRY(look_up(batch, begun, targets != nullptr));
   const auto finished = [&](const SourceState& part) {
     SourceState after = done_with(part, batch.sequence_number);
     ++after.counters.accepted;

@@ -44,15 +44,15 @@ Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const 
   for (auto* made : {&statistics, &presence}) {
     if (!*made) return failure_in("publish status", made->error());
   }
-  auto transitions =
-      TransitionPublisher::create(participant, parent, {source.host, source.pool->name(), source.epoch});
-  if (!transitions) return std::unexpected(transitions.error());
+  PLCHOST_TRY_ASSIGN(
+      auto transitions,
+      TransitionPublisher::create(participant, parent, {source.host, source.pool->name(), source.epoch}));
   StatusTables& of_topics = **tables;
   StatusPublisher publisher(source, *std::move(tables),
                             TaskWatch(source.pool->name(), of_topics.of<plc_TaskStatus>(),
                                       StatisticsWriter(source.host, source.epoch, std::move(*statistics))),
                             ExceptionWatch(source.run_directory, of_topics.of<plc_ExceptionStatus>()),
-                            *std::move(transitions));
+                            std::move(transitions));
   publisher.findings_ = *std::move(findings);
   publisher.hosts_ = *std::move(hosts);
   publisher.writers_ = WriterWatch(of_topics.of<plc_WriterStatus>());

@@ -33,7 +33,7 @@ class StatusTables {
     Result<void> result;
     std::apply([&](auto&... table) { (void)(open(participant, publisher, source, table, result) && ...); },
                made->tables_);
-    if (!result) return std::unexpected(std::move(result).error());
+    PLCHOST_TRY(std::move(result));
     return made;
   }
 
@@ -62,12 +62,11 @@ class StatusTables {
   template <class Sample>
   static bool open(dds_entity_t participant, dds_entity_t publisher, const StatusSource& source,
                    StatusTable<Sample>& table, Result<void>& result) {
-    auto made = open_table<Sample>(participant, publisher, source);
-    if (made) {
-      table = *std::move(made);
-    } else {
-      result = std::unexpected(std::move(made).error());
-    }
+    const auto make = [&]() -> Result<void> {
+      PLCHOST_TRY_ASSIGN(table, open_table<Sample>(participant, publisher, source));
+      return {};
+    };
+    result = make();
     return result.has_value();
   }
 
