@@ -7,10 +7,10 @@ from contract import Fault, Member
 
 
 def words_of(member):
-    """The words for the codes of a member: its comment begins with "0 offline, 1 starting"; brackets, and all from a ";" on,
-    are left out."""
+    """The words for the codes of a member: its comment begins with "0 offline, 1 starting. 2 running". Brackets, and all behind
+    the codes, are left out."""
     words = []
-    for part in re.sub(r" \([^)]*\)", "", member.comment.partition(";")[0]).split(", "):
+    for part in re.split("[,;.] ", re.sub(r" \([^)]*\)", "", member.comment)):
         found = re.fullmatch(rf"{len(words)} ([a-z -]+)", part)
         if not found:
             break

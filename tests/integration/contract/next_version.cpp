@@ -1,10 +1,12 @@
-// Programs of a version of the contract that is still to come: it has a topic, an operation and a field more
+// Programs of a version of the contract that is still to come: it has a topic, an operation and fields more
 // (next_version.py). They are built from that contract and Cyclone DDS, and from nothing else of plchost.
 //   next_version client DOMAIN HOST INSTANCE EVENT COUNT   asks for what is new, then for what today's hosts
 //   can do, too next_version host DOMAIN                               host "next" with instance "press":
 //   until SIGTERM
 
 #include <span>
+#include <string>
+#include <utility>
 
 #include "small_client.hpp"
 #include "small_host.hpp"
@@ -15,24 +17,19 @@ using namespace contract;
 
 constexpr std::string_view kRecipe = "recipe";
 
-/// The field that InstanceStatus has more; empty: its host does not know it.
-std::string recipe_of(const plc_InstanceStatus& status) {
-  for (const plc_KeyValue& entry : std::span(status.ext._buffer, status.ext._length)) {
-    if (kRecipe == entry.name) return entry.value;
-  }
-  return "";
-}
-
 class NextClient : public SmallClient {
  public:
-  using SmallClient::SmallClient;
+  /// Requests and posts have the field that they have more.
+  NextClient(std::uint32_t domain, std::string host) : SmallClient(domain, std::move(host)) {
+    add_to_ext(kRecipe, "rye");
+  }
 
   void list_recipes_of_instances() const {
     const auto reader =
         party().reader(plc_InstanceStatus_desc, "plc/v1/status/instance", {.depth = 0, .partition = "s.*"});
     take_status<plc_InstanceStatus>(reader, count_of(status(), "instance").value_or(0), "the instances",
                                     [](const plc_InstanceStatus& one) {
-                                      const std::string recipe = recipe_of(one);
+                                      const std::string recipe = value_in(one.ext, kRecipe);
                                       std::cout << "recipe of " << one.instance << ": "
                                                 << (recipe.empty() ? "not known" : recipe) << '\n';
                                     });
@@ -67,7 +64,7 @@ class NextHost : public SmallHost {
     status().counts[0].samples = 1;
     set(recipe_.name, kRecipe);
     set(recipe_.value, "rye");
-    press().ext = {._maximum = 1, ._length = 1, ._buffer = &recipe_, ._release = false};
+    set_ext(press().ext, std::span(&recipe_, 1));
     press().state = 77;  // a code that is new
     set(rye_.host, "next");
     set(rye_.recipe, "rye");
@@ -79,8 +76,9 @@ class NextHost : public SmallHost {
     (void)dds_write(writer_, &rye_);
     SmallHost::write_status();
   }
-  bool does(std::int32_t operation) override {
-    if (operation != plc_OPERATION_BAKE) return false;
+  bool does(const plc_Request& request, plc_Reply& reply) override {
+    if (request.operation != plc_OPERATION_BAKE) return false;
+    set(reply.text, "baked " + value_in(request.ext, kRecipe));
     ++rye_.loaves;
     (void)dds_write(writer_, &rye_);
     return true;

@@ -11,6 +11,7 @@
 #include <cstring>
 #include <functional>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
@@ -141,6 +142,22 @@ void take(dds_entity_t reader, Use use) {
   }
 }
 
+/// An `ext` with these entries, for as long as they stay where they are.
+template <class Ext>
+void set_ext(Ext& ext, std::span<plc_KeyValue> entries) {
+  const auto length = static_cast<std::uint32_t>(entries.size());
+  ext = {._maximum = length, ._length = length, ._buffer = entries.data(), ._release = false};
+}
+
+/// The value of an entry of `ext`; empty: it is not there.
+template <class Ext>
+std::string value_in(const Ext& ext, std::string_view name) {
+  for (const plc_KeyValue& entry : std::span(ext._buffer, ext._length)) {
+    if (name == entry.name) return entry.value;
+  }
+  return "";
+}
+
 /// By the presence of a host that has just been taken: for as long as wait_until() waits.
 inline plc_TimeLimit limit_by(const plc_Presence& presence) {
   constexpr std::int64_t kNanoseconds = 15'000'000'000;
@@ -150,7 +167,7 @@ inline plc_TimeLimit limit_by(const plc_Presence& presence) {
 /// One request, repeated until it is answered.
 inline plc_Reply call(const plc_TimeLimit& limit, const std::string& host, std::int32_t operation,
                       const std::string& instance, std::int64_t number, dds_entity_t writer,
-                      dds_entity_t replies) {
+                      dds_entity_t replies, std::span<plc_KeyValue> ext = {}) {
   plc_Request request{};
   request.limit = limit;
   const dds_guid_t guid = guid_of(writer);
@@ -159,6 +176,7 @@ inline plc_Reply call(const plc_TimeLimit& limit, const std::string& host, std::
   set(request.header.instance_name, host);
   request.operation = operation;
   set(request.instance, instance);
+  set_ext(request.ext, ext);
   plc_Reply answer{};
   Clock::time_point next{};
   wait_until(

@@ -2,6 +2,7 @@
 
 #include <iostream>
 #include <set>
+#include <vector>
 
 #include "party.hpp"
 
@@ -55,7 +56,7 @@ class SmallClient {
     take<plc_Presence>(presence_, [&](const plc_Presence& news, const auto& /*info*/) {
       if (news.host == host_) present_ = news;
     });
-    return call(limit_by(present_), host_, operation, instance, ++last_number_, requests_, replies_);
+    return call(limit_by(present_), host_, operation, instance, ++last_number_, requests_, replies_, ext_);
   }
 
   void start(const std::string& instance) {
@@ -63,7 +64,7 @@ class SmallClient {
     std::cout << "start " << started.code << ' ' << started.text << '\n';
   }
 
-  void post(const std::string& instance, const std::string& event, std::uint64_t count) const {
+  void post(const std::string& instance, const std::string& event, std::uint64_t count) {
     const auto acks = party_.reader(plc_EventAck_desc, "plc/v1/event_ack", {.partition = party_.partition()});
     plc_EventPost post{};
     post.limit = limit_by(present_);
@@ -72,6 +73,7 @@ class SmallClient {
     set(post.host, host_);
     set(post.instance, instance);
     set(post.event, event);
+    set_ext(post.ext, ext_);
     plc_EventAck ack{};
     Clock::time_point next{};
     const auto post_the_rest = [&] {
@@ -111,6 +113,14 @@ class SmallClient {
     std::cout << "objects listed\n";
   }
 
+ protected:
+  /// Of all that it asks for and posts.
+  void add_to_ext(std::string_view name, std::string_view value) {
+    plc_KeyValue& entry = ext_.emplace_back();
+    set(entry.name, name);
+    set(entry.value, value);
+  }
+
  private:
   bool sees_host() {
     take<plc_Presence>(presence_, [&](const plc_Presence& news, const auto& /*info*/) {
@@ -129,6 +139,7 @@ class SmallClient {
   plc_Presence present_{};
   plc_HostStatus status_{};
   std::int64_t last_number_ = 0;
+  std::vector<plc_KeyValue> ext_;
   dds_entity_t presence_ =
       party_.reader(plc_Presence_desc, "plc/v1/presence", {.depth = 0, .partition = "s.*"});
   dds_entity_t hosts_ =

@@ -43,8 +43,8 @@ class SmallHost {
     (void)dds_write(instance_writer_, &press_);
     (void)dds_write(host_writer_, &status_);
   }
-  /// Does what this host can do more. false: it does not know that operation.
-  virtual bool does(std::int32_t /*operation*/) { return false; }
+  /// Does what this host can do more, and may answer with a text. false: it does not know that operation.
+  virtual bool does(const plc_Request& /*request*/, plc_Reply& /*reply*/) { return false; }
 
   [[nodiscard]] const Party& party() const { return party_; }
   [[nodiscard]] plc_HostStatus& status() { return status_; }
@@ -79,7 +79,7 @@ class SmallHost {
       press_.state = 2;
       ++status_.round;
       write_status();
-    } else if (!does(request.operation)) {
+    } else if (!does(request, reply)) {
       reply.code = 10;
       reply.header.remote_ex = 5;
       set(reply.text, "unknown operation");

@@ -1,10 +1,11 @@
 #!/usr/bin/env bash
 # Hosts and clients of three versions of the contract in one domain: the first one, today's, and one that is still to come,
-# with a topic, an operation, a field and a code more. The promises:
+# with a topic, an operation, fields and a code more. The promises:
 #   a client of any version sees, commands and posts to hosts of all versions with what both know;
 #   an operation that a host does not know is answered with code 10, at once;
 #   a topic that a host does not have is known as such by its counts, without waiting; one that a client does not know is ignored;
-#   a field that a client does not know is skipped, or shown by its name; a code that it does not know is shown as its number.
+#   a field that a host does not know, of a request or a post, is skipped; one that a client does not know is skipped, or
+#   shown by its name; a code that it does not know is shown as its number.
 . "$(dirname "$0")/common.sh"
 
 write_host cell "$first_core"
@@ -77,7 +78,7 @@ start 0
 post accepted 20 rejected 0" || fail "next client: $said"
 said=$("$BIN/next_version" client "$PLCHOST_DOMAIN" next press full 20) || fail "next client: $said"
 is "$said" "host next api 1
-bake 0 
+bake 0 baked rye
 recipe rye loaves 1
 recipe of press: rye
 start 0 
