@@ -47,7 +47,6 @@ dds::Computed<plc_HostStatus, Row> computed_of(const plc_HostStatus& status, con
           .instances = count_of<plc_InstanceStatus>(status).value_or(0),
           .tasks = count_of<plc_TaskStatus>(status).value_or(0),
           .events = count_of<plc_EventStatus>(status).value_or(0),
-          .objects = count_of<plc_ObjectStatus>(status).value_or(0),
           .load = load_of(status),
           .clock_offset_us = clock ? Row(to_us(clock->offset.count())) : Row(),
           .clock_uncertainty_us = clock ? Row(to_us(clock->uncertainty.count())) : Row(),

@@ -26,6 +26,22 @@ void put_plan(const InstancePlan& plan, plc_InstanceStatus& sample) noexcept {
   sample.crash_window_ns = plan.crash_window_ns;
 }
 
+// The external events of these objects. A topic with a sample for each of 100,000 would drown every client;
+// see OPERATION_LIST_OBJECTS.
+std::vector<ObjectInfo> published_events(std::vector<ObjectInfo> objects) {
+  std::erase_if(objects, [](const ObjectInfo& object) {
+    return object.type != ObjectType::event || !object.name.contains('/');
+  });
+  constexpr std::size_t kMost = StatusPublisher::kMostEvents;
+  if (objects.size() <= kMost) return objects;
+  const auto order = [](const ObjectInfo& event) {
+    return std::pair(!event.registered && event.bound_tasks == 0, std::string_view(event.name));
+  };
+  std::ranges::nth_element(objects, objects.begin() + kMost, {}, order);
+  objects.resize(kMost);
+  return objects;
+}
+
 }  // namespace
 
 Result<StatusPublisher> StatusPublisher::create(dds_entity_t participant, const Source& source) {
@@ -148,39 +164,16 @@ bool StatusPublisher::update_instance(const InstanceStatus& status, TimePoint no
   return tables_->of<plc_InstanceStatus>().update(name, sample) || changed;
 }
 
-// A topic with a sample for each of 100,000 objects would drown every client; see OPERATION_LIST_OBJECTS.
-Result<std::vector<ObjectInfo>> StatusPublisher::published_objects() const {
-  auto listed = source_.pool->list();
-  if (!listed || listed->size() <= kMostPublished) return listed;
-  std::vector<ObjectInfo>& objects = *listed;
-  const auto order = [](const ObjectInfo& object) {
-    return std::pair(!object.registered && object.bound_tasks == 0, std::string_view(object.name));
-  };
-  std::ranges::nth_element(objects, objects.begin() + kMostPublished, {}, order);
-  objects.resize(kMostPublished);
-  return listed;
-}
-
 bool StatusPublisher::look_at_objects(TimePoint now) {
-  bool changed = false;
-  const auto published = published_objects();
-  if (!published) return changed;  // the last published state holds until they can be looked at
+  auto listed = source_.pool->list();
+  if (!listed) return false;  // the last published state holds until they can be looked at
+  const auto count = static_cast<std::uint32_t>(listed->size());
+  bool changed = std::exchange(objects_, count) != count;
   auto& events = tables_->of<plc_EventStatus>();
-  auto& objects = tables_->of<plc_ObjectStatus>();
   events.begin_round();
-  objects.begin_round();
-  for (const ObjectInfo& object : *published) {
-    plc_ObjectStatus sample = objects.blank();
-    dds::copy_text(sample.object_name, object.name);
-    sample.type = static_cast<std::uint32_t>(object.type);
-    sample.value = object.value;
-    changed |= objects.update(object.name, sample);
-    if (object.type == ObjectType::event) changed |= update_event(object);
-  }
+  for (const ObjectInfo& event : published_events(*std::move(listed))) changed |= update_event(event);
   changed |= events.dispose_rest();
-  changed |= objects.dispose_rest();
   events.write();
-  objects.write();
   // Of a large pool it takes its time: most of the time is for others.
   constexpr int kRest = 10;
   rested_ = now + kRest * (MonotonicClock::now() - now);
@@ -188,17 +181,16 @@ bool StatusPublisher::look_at_objects(TimePoint now) {
   return changed;
 }
 
-bool StatusPublisher::update_event(const ObjectInfo& object) {
-  const auto slash = object.name.find('/');
-  if (slash == std::string::npos) return false;
-  const std::string_view name(object.name);
+bool StatusPublisher::update_event(const ObjectInfo& event) {
+  const std::string_view name(event.name);
+  const auto slash = name.find('/');
   plc_EventStatus sample = tables_->of<plc_EventStatus>().blank();
   dds::copy_text(sample.instance, name.substr(0, slash));
   dds::copy_text(sample.event, name.substr(slash + 1));
-  sample.registered = object.registered;
-  sample.bound_tasks = object.bound_tasks;
-  sample.posts = object.value;
-  return tables_->of<plc_EventStatus>().update(object.name, sample);
+  sample.registered = event.registered;
+  sample.bound_tasks = event.bound_tasks;
+  sample.posts = event.value;
+  return tables_->of<plc_EventStatus>().update(event.name, sample);
 }
 
 void StatusPublisher::publish_findings(const std::vector<HostFinding>& findings) {
@@ -234,6 +226,7 @@ void StatusPublisher::write_host(bool changed) {
   dds::copy_text(sample.schedulers, host().schedulers.view());
   sample.secured = source_.secured;
   sample.running = running_;
+  sample.objects = objects_;
   load_.put(sample);
   sample.audit_number = audit_.number;
   dds::copy_text(sample.audit_hash, audit_.hash);

@@ -77,8 +77,8 @@ class StatusPublisher {
   static constexpr Duration kTick = std::chrono::milliseconds(10);
   /// Events and objects are looked at so often.
   static constexpr Duration kObjectPeriod = std::chrono::milliseconds(200);
-  /// Of a larger pool as many are published: those first that are events in use, then by name.
-  static constexpr std::size_t kMostPublished = 4096;
+  /// Of more events as many are published: those first that are in use, then by name.
+  static constexpr std::size_t kMostEvents = 4096;
   static constexpr Duration kPageWait = std::chrono::seconds(1);
 
  private:
@@ -93,8 +93,7 @@ class StatusPublisher {
   bool look_at_instances(TimePoint now);
   bool update_instance(const InstanceStatus& status, TimePoint now, std::string& unsaved);
   bool look_at_objects(TimePoint now);
-  bool update_event(const ObjectInfo& object);
-  [[nodiscard]] Result<std::vector<ObjectInfo>> published_objects() const;
+  bool update_event(const ObjectInfo& event);
   void write_host(bool changed);
 
   Source source_;
@@ -102,6 +101,7 @@ class StatusPublisher {
   std::string rival_;
   HostLoad load_;
   std::uint32_t running_ = 0;  ///< instances
+  std::uint32_t objects_ = 0;  ///< of the pool
   std::string unsaved_;        ///< instances whose newest retain values are in no file, with commas between
   std::unique_ptr<StatusTables> tables_;  ///< the watches below write into them
   TaskWatch tasks_;

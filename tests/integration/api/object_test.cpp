@@ -198,12 +198,46 @@ TEST(ManyObjects, AreListedPageByPageWhileTheHostAnswers) {
   EXPECT_TRUE(std::ranges::is_sorted(names));
   EXPECT_EQ(std::ranges::adjacent_find(names), names.end());
   EXPECT_EQ(client->list_objects("hosta", {.name = "store/09999"}, soon()).value().objects.size(), 1U);
-  // Of the topic that shows objects by themselves, a part; events in use are among them.
-  EXPECT_EQ(client->status<plc_ObjectStatus>("hosta", soon()).value().size(), 4096U);
+  EXPECT_EQ(client->host("hosta", soon()).value().status.objects, kMany + 1) << "all, whatever their number";
   ASSERT_EQ(client->events("hosta", soon()).value().size(), 1U);
   const auto result = run_plcctl(domain.number(), {"list", "objects", "--json"});
   EXPECT_EQ(result.code, 0) << result.errors;
   EXPECT_EQ(Json::parse(result.output).size(), kMany + 1);
+  const auto hosts = run_plcctl(domain.number(), {"list", "hosts", "--json"});
+  EXPECT_EQ(Json::parse(hosts.output).at(0).at("objects"), kMany + 1) << hosts.output;
+}
+
+TEST(ManyEvents, AreShownUpToABoundThoseInUseFirst) {
+  constexpr std::size_t kMany = 5'000;
+  const OwnDomain domain;
+  TestHost host(domain, "hosta", 8'192);
+  ObjectPool pool = ObjectPool::attach(host.pool_name()).value();
+  (void)host.add_event("zone9", "ready");  // by name it would be the last
+  std::vector<SharedEvent> unused;
+  for (std::size_t i = 0; i < kMany; ++i) {
+    unused.push_back(pool.create_shared_event(fmt::format("line1/{:05}", i)).value().object);
+  }
+  host.start_server();
+  const auto client = connect(domain);
+  const auto events = client->events("hosta", soon()).value();
+  ASSERT_EQ(events.size(), 4'096U);
+  EXPECT_STREQ(events.back().event, "ready");
+  EXPECT_EQ(client->host("hosta", soon()).value().status.objects, kMany + 1);
+}
+
+TEST_F(Objects, AreCountedByTheStatusOfTheHost) {
+  const auto client = connect(domain_);
+  const auto counted = [&] { return client->host("hosta", soon()).value().status.objects; };
+  const TimePoint end = soon();
+  const auto becomes = [&](std::uint32_t count) {
+    while (counted() != count && MonotonicClock::now() < end) std::this_thread::yield();
+    return counted() == count;
+  };
+  EXPECT_TRUE(becomes(0));
+  std::optional semaphore = pool_.create_semaphore("slots", 1).value();
+  EXPECT_TRUE(becomes(1));
+  semaphore.reset();
+  EXPECT_TRUE(becomes(0));
 }
 
 }  // namespace

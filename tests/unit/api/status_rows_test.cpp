@@ -155,10 +155,10 @@ TEST(StatusRows, ShowWhatTheirExtensionHas) {
 }
 
 TEST(StatusRows, HaveAColumnForEachMember) {
-  const auto& columns = columns_of<plc_ObjectStatus>();  // none by hand
-  ASSERT_EQ(columns.size(), 4U);
-  EXPECT_STREQ(columns[1].field, "object_name");
-  EXPECT_STREQ(columns[1].header, "OBJECT-NAME");
+  const auto& columns = columns_of<plc_HostFinding>();  // none by hand
+  ASSERT_EQ(columns.size(), 7U);
+  EXPECT_STREQ(columns[1].field, "id");
+  EXPECT_STREQ(columns[1].header, "ID");
   EXPECT_EQ(columns[1].rank, 0) << "a key is never left out";
   EXPECT_GT(columns[3].rank, columns[2].rank);
 }
@@ -211,13 +211,10 @@ TEST(StatusWords, OfTheKindsOfTasksAreThoseOfTheirTable) {
 }
 
 TEST(StatusWords, OfTheTypesOfObjectsAreThoseOfTheirTable) {
-  plc_ObjectStatus object{};
-  for (const ObjectTraits& traits : kObjectTraits) {
-    object.type = std::to_underlying(traits.type);
-    EXPECT_EQ(to_row(object).at("type"), traits.name);
-  }
-  object.type = kObjectTypes;
-  EXPECT_EQ(to_row(object).at("type"), std::to_string(kObjectTypes))
+  const auto word = [](std::uint32_t type) { return dds::word_for(dds::words::ObjectRecord::type, type); };
+  for (const ObjectTraits& traits : kObjectTraits)
+    EXPECT_EQ(word(std::to_underlying(traits.type)), traits.name);
+  EXPECT_EQ(word(kObjectTypes), std::to_string(kObjectTypes))
       << "the contract names a type that is not in the table";
 }
 
