@@ -115,29 +115,15 @@ class PLCHOST_CLIENT_API Client {
   using TaskStatistics = client_types::TaskStatistics;
 
   /// A change of state.
-  struct Transition {
-    std::string host;
-    std::string instance;
-    std::string of;  ///< "application" or "process"
-    std::string from;
-    std::string to;
-    std::string reason;
-    int pid = 0;
-    std::chrono::system_clock::time_point time;
-    unsigned long long number = 0;  ///< within its instance
+  struct Transition : client_types::Transition {
     unsigned long long missed = 0;  ///< how many before it will never come
   };
 
-  /// A line that an instance has said: its application, its runtime, or the manager about it.
-  struct LogLine {
+  /// A line that an instance has said: its application, its runtime, or the manager about it. Lines may leave
+  /// numbers out.
+  struct LogLine : client_types::LogLine {
     std::string host;
     std::string instance;
-    std::string text;
-    std::string level;   ///< debug, info, warning, error
-    std::string source;  ///< runtime, application, output, manager
-    int pid = 0;
-    std::chrono::system_clock::time_point time;
-    unsigned long long number = 0;   ///< within its instance; lines may leave numbers out
     unsigned long long missing = 0;  ///< lines before it that the host has kept no longer
     unsigned long long stream = 0;   ///< numbers of another stream began anew: the host has lost its memory
   };

@@ -3,28 +3,26 @@
 #include <algorithm>
 #include <iterator>
 
+#include "api/dds/text.hpp"
+
 namespace plchost {
 
-std::vector<LogText> LogLines::add(const std::vector<LogRecord>& records) {
+std::vector<LogText> LogLines::add(const std::vector<plc_LogRecord>& records) {
   // Of a manager; a stranger may write a line without an end.
   constexpr std::size_t kLongest = 65'536;
   std::vector<LogText> lines;
-  for (const LogRecord& record : records) {
-    if (record.sequence <= last_) continue;
-    if (last_ > 0 && record.sequence > last_ + 1) {
-      missing_ += record.sequence - last_ - 1;
+  for (const plc_LogRecord& record : records) {
+    const std::uint64_t number = record.sequence_number;
+    if (number <= last_) continue;
+    if (last_ > 0 && number > last_ + 1) {
+      missing_ += number - last_ - 1;
       begun_.clear();
     }
-    last_ = record.sequence;
-    begun_ += record.text.view();
-    if (record.goes_on != 0 && begun_.size() < kLongest) continue;
-    lines.push_back({.sequence = record.sequence,
-                     .missing = std::exchange(missing_, 0),
-                     .time_unix_ns = record.time_unix_ns,
-                     .pid = record.pid,
-                     .level = record.level,
-                     .source = record.source,
-                     .text = std::exchange(begun_, {})});
+    last_ = number;
+    begun_ += dds::text_of(record.text);
+    if (record.goes_on && begun_.size() < kLongest) continue;
+    lines.push_back(
+        {.last = record, .missing = std::exchange(missing_, 0), .text = std::exchange(begun_, {})});
   }
   return lines;
 }

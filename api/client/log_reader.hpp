@@ -13,12 +13,8 @@ namespace plchost {
 
 /// A line of the log of an instance, put together from its records.
 struct LogText {
-  std::uint64_t sequence = 0;  ///< of its last record
-  std::uint64_t missing = 0;   ///< records that are missing before it
-  std::int64_t time_unix_ns = 0;
-  std::int32_t pid = 0;
-  LogLevel level = LogLevel::info;
-  LogSource source = LogSource::output;
+  plc_LogRecord last{};       ///< of its records; `text` has all of them
+  std::uint64_t missing = 0;  ///< records that are missing before it
   std::string text;
 };
 
@@ -29,7 +25,7 @@ class LogLines {
   /// All up to that number was seen.
   explicit LogLines(std::uint64_t last) noexcept : last_(last) {}
   /// The lines that are whole by now, in their order.
-  [[nodiscard]] std::vector<LogText> add(const std::vector<LogRecord>& records);
+  [[nodiscard]] std::vector<LogText> add(const std::vector<plc_LogRecord>& records);
 
  private:
   std::uint64_t last_ = 0;  // 0: none was seen

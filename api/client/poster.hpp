@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include <contract_bounds.hpp>
 #include <control.h>
 
 #include "api/client/ack_account.hpp"
@@ -38,7 +39,7 @@ struct HostEvent {
 };
 
 /// How many events a batch may have.
-inline constexpr std::size_t kMaxBatch = 64;
+inline constexpr std::size_t kMaxBatch = dds::bounds::EventBatch::events;
 
 /// The posts of one topic to one host: numbers them, keeps those that are not acknowledged, and repeats them.
 /// A plc_EventPost has one event, a plc_EventBatch one or more.

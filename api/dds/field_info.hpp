@@ -32,6 +32,7 @@ struct FieldInfo {
   bool key = false;
   std::span<const std::string_view> words;  ///< for its codes, from 0; empty: it is no code
   std::int64_t null = kNoNumber;            ///< this number means that it is not known
+  bool null_if_empty = false;               ///< an empty text means so
 };
 
 /// The fields of a row of `Sample` that plcctl computes: one member for each that `row:` calls computed.

@@ -1,6 +1,8 @@
 #include "api/dds/log_page.hpp"
 
 #include <algorithm>
+#include <cstddef>
+#include <iterator>
 #include <string>
 #include <utility>
 
@@ -17,6 +19,8 @@ namespace {
 
 static_assert(sizeof(plc_LogRecord::text) == kMaxLogText + 1);
 
+}  // namespace
+
 plc_LogRecord sample_of(const LogRecord& record) noexcept {
   plc_LogRecord sample{.sequence_number = record.sequence,
                        .time_unix_ns = record.time_unix_ns,
@@ -28,19 +32,6 @@ plc_LogRecord sample_of(const LogRecord& record) noexcept {
   dds::copy_text(sample.text, record.text.view());
   return sample;
 }
-
-// Codes that are not known here are those of a newer host.
-LogRecord record_of(const plc_LogRecord& sample) {
-  return {.sequence = sample.sequence_number,
-          .time_unix_ns = sample.time_unix_ns,
-          .pid = sample.pid,
-          .level = static_cast<LogLevel>(sample.level),
-          .source = static_cast<LogSource>(sample.source),
-          .goes_on = sample.goes_on ? 1U : 0U,
-          .text = FixedText<kMaxLogText>(dds::text_of(sample.text))};
-}
-
-}  // namespace
 
 plc_ListPart part_of(const LogQuery& query) noexcept {
   plc_ListPart part{};
@@ -61,22 +52,20 @@ Result<LogListing> look_at_log(std::string_view pool, std::string_view instance,
   const auto reader = LogRingReader::open(pool, instance);
   if (!reader && reader.error().code == ErrorCode::not_found) return listing;
   PLCHOST_TRY(reader);
-  LogSlice slice =
+  const LogSlice slice =
       query.newest > 0 ? reader->newest(query.newest, kPageRecords) : reader->read(query.after, kPageRecords);
   listing.stream = static_cast<std::uint64_t>(slice.stream_unix_ns);
-  listing.records = std::move(slice.records);
-  listing.complete = listing.records.size() < kPageRecords || listing.records.back().sequence >= slice.last;
-  if (listing.complete) {
-    listing.next_after = slice.last;
-  } else {
-    listing.next_after = listing.records.back().sequence;
-  }
+  std::ranges::transform(slice.records, std::back_inserter(listing.records),
+                         [](const LogRecord& record) { return sample_of(record); });
+  const bool whole = listing.records.size() < kPageRecords;
+  listing.complete = whole || listing.records.back().sequence_number >= slice.last;
+  listing.next_after = listing.complete ? slice.last : listing.records.back().sequence_number;
   return listing;
 }
 
 LogPageSample::LogPageSample(const LogListing& listing) {
-  const std::size_t count = std::min(listing.records.size(), kPageRecords);
-  for (std::size_t i = 0; i < count; ++i) records_.push_back(sample_of(listing.records[i]));
+  const auto count = static_cast<std::ptrdiff_t>(std::min(listing.records.size(), kPageRecords));
+  records_.assign(listing.records.begin(), listing.records.begin() + count);
   page_.stream = listing.stream;
   page_.clock_unix_ns = listing.clock_unix_ns;
   page_.complete = listing.complete;
@@ -90,9 +79,8 @@ LogListing listing_of(const plc_LogPage& page) {
                      .complete = page.complete,
                      .next_after = page.next_after,
                      .records = {}};
-  for (const plc_LogRecord& record : dds::parts_of(page.records)) {
-    listing.records.push_back(record_of(record));
-  }
+  const auto records = dds::parts_of(page.records);
+  listing.records.assign(records.begin(), records.end());
   return listing;
 }
 

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include <contract_bounds.hpp>
 #include <control.h>
 
 #include "api/dds/page_sample.hpp"
@@ -29,11 +30,11 @@ struct LogListing {
   std::int64_t clock_unix_ns = 0;  ///< of the host
   bool complete = true;
   std::uint64_t next_after = 0;  ///< the next part is what comes after this number
-  std::vector<LogRecord> records = {};
+  std::vector<plc_LogRecord> records = {};
 };
 
 /// The bound of a page.
-inline constexpr std::size_t kPageRecords = 256;
+inline constexpr std::size_t kPageRecords = dds::bounds::LogPage::records;
 
 /// The part of the log that is asked for, at most kPageRecords. An instance without a log has said nothing.
 [[nodiscard]] Result<LogListing> look_at_log(std::string_view pool, std::string_view instance,
@@ -48,6 +49,9 @@ class LogPageSample : public PageSample<plc_LogPage> {
  private:
   std::vector<plc_LogRecord> records_;
 };
+
+/// A record of the log as it travels.
+[[nodiscard]] plc_LogRecord sample_of(const LogRecord& record) noexcept;
 
 [[nodiscard]] LogListing listing_of(const plc_LogPage& page);
 

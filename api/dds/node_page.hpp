@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include <contract_bounds.hpp>
 #include <control.h>
 
 #include "api/dds/page_sample.hpp"
@@ -42,8 +43,9 @@ struct NodeListing {
 };
 
 /// The bound of a page.
-inline constexpr std::size_t kPageRoutes = 512;
+inline constexpr std::size_t kPageRoutes = dds::bounds::NodePage::routes;
 static_assert(kPageRoutes >= kMaxRoutes);
+static_assert(dds::bounds::NodePage::nodes >= kMaxNodes);
 
 /// A listing as it travels.
 class NodePageSample : public PageSample<plc_NodePage> {

@@ -3,6 +3,7 @@
 #include <string>
 #include <string_view>
 
+#include <contract_bounds.hpp>
 #include <control.h>
 #include <topic_table.hpp>
 
@@ -15,8 +16,8 @@ namespace plchost::dds {
 
 inline constexpr std::uint32_t kApiVersion = 1;
 
-/// The largest piece of a download: as in control.idl.
-inline constexpr std::size_t kMaxChunk = 32768;
+/// The largest piece of a download.
+inline constexpr std::size_t kMaxChunk = bounds::DownloadChunk::contents;
 inline constexpr Duration kPresencePeriod = std::chrono::milliseconds(25);
 inline constexpr Duration kPresenceDeadline = kPresence.qos.deadline;
 

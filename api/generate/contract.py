@@ -4,7 +4,7 @@ import dataclasses
 import re
 
 TAGS = ("topic", "writer", "reader", "qos")
-OPTIONAL_TAGS = ("uncounted", "order", "list", "row", "columns")
+OPTIONAL_TAGS = ("uncounted", "order", "list", "row", "columns", "library")
 
 
 @dataclasses.dataclass

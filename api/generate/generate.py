@@ -6,6 +6,8 @@
   FOLDER/code_words.hpp           the words for their codes, and for those of all other types
   FOLDER/status_fields.hpp        their fields with unit and words, the rows of plcctl, and how it lists them
   FOLDER/contract_operations.hpp  each OPERATION_: name, number, role, whether it names an instance
+  FOLDER/contract_bounds.hpp      how many parts each sequence may have
+  FOLDER/topic_names.hpp          the names of the topics, by who writes them for whom, for permissions
   FOLDER/plchost_client_types.hpp  the public structs of the client library
   FOLDER/library_conversions.hpp  how they are made of samples
   FOLDER/library_members.hpp      their members, for Python
@@ -115,6 +117,38 @@ def contract_operations(contract):
     return "\n".join(lines + ["};\n", "}  // namespace plchost\n"])
 
 
+def contract_bounds(contract):
+    lines = [HEAD + "#include <cstddef>\n", "namespace plchost::dds::bounds {\n"]
+    lines.append("// The bounds of the sequences of each type: bounds::EventBatch::events.")
+    for kind in contract.types:
+        bounds = [(m.name, re.fullmatch(r"sequence<\w+, (\d+)>", m.type)) for m in kind.members if m.name != "ext"]
+        bounds = [(name, found[1]) for name, found in bounds if found]
+        if bounds:
+            lines.append(f"struct {kind.name} {{")
+            lines += [f"  static constexpr std::size_t {name} = {bound};" for name, bound in bounds]
+            lines.append("};")
+    return "\n".join(lines + ["\n}  // namespace plchost::dds::bounds\n"])
+
+
+def topic_names(contract):
+    """Permissions outlive a version, so they name all status topics by their folder, and those of a role, too."""
+    of_partition = {letter: [] for letter in PARTITIONS}
+    for kind in (kind for kind in contract.types if kind.is_topic):
+        for name in names_of(kind):
+            folder = re.match(r"plc/v\d+/(?:status|%s)/" % "|".join(ROLES), name)
+            if folder and folder[0].endswith("/status/"):
+                name = folder[0] + "*"
+            names = of_partition[partition_of(kind)]
+            if name not in names and (not folder or name.endswith("*")):
+                names.append(name)
+    lines = [HEAD + "#include <array>\n#include <string_view>\n", "namespace plchost::topic_names {\n"]
+    lines.append("// By partition; of those for a host without those of a role, which have a folder of their own.")
+    for letter, what in PARTITIONS.items():
+        told = ", ".join(f'"{name}"' for name in of_partition[letter])
+        lines.append(f"inline constexpr std::array<std::string_view, {len(of_partition[letter])}> k{what.capitalize()}{{{told}}};")
+    return "\n".join(lines + ["\n}  // namespace plchost::topic_names\n"])
+
+
 PARTITIONS = {"h": "host", "s": "status", "c": "client", "n": "name", "b": "blocks"}
 
 
@@ -131,6 +165,8 @@ def main():
             "code_words.hpp": code_words(contract, HEAD),
             "status_fields.hpp": status_fields(contract, [kind for kind, _ in counted(contract)], HEAD),
             "contract_operations.hpp": contract_operations(contract),
+            "contract_bounds.hpp": contract_bounds(contract),
+            "topic_names.hpp": topic_names(contract),
             "plchost_client_types.hpp": library.public_types(records),
             "library_conversions.hpp": library.conversions(records, HEAD),
             "library_members.hpp": library.members(records, HEAD),

@@ -2,6 +2,8 @@
 
 A type of the library is one of the contract without "Status": HostStatus is Host. A member keeps its name but for its unit,
 which its C++ type has. The key that names the thing itself is `name`. Left out are `epoch`, `round`, `ext` and what HostStatus counts.
+The types are those that HostStatus counts, and those with `library:`. That says what is otherwise, in parts with ";" between: "as NAME"
+(of the type), "MEMBER as NAME", "without MEMBER", and "extended" (plchost_client.hpp has a type of that name with more members).
 """
 
 import dataclasses
@@ -40,6 +42,7 @@ class Record:
     text: str
     topic: bool
     removable: bool  # a watch tells that it was removed
+    extended: bool  # plchost_client.hpp has more of it
     fields: list
 
 
@@ -48,17 +51,49 @@ def title(text):
     return re.split(r"[.:,;] ", text)[0].removesuffix(".")
 
 
-def field_of(kind, member, thing, words, nested):
+@dataclasses.dataclass
+class Told:
+    """The tag `library:` of a type."""
+
+    name: str  # of the type
+    names: dict  # of members: another one
+    left_out: set
+    extended: bool = False
+
+
+def told_of(kind):
+    """Fault: the tag is not understood, or names no member."""
+    told = Told(kind.name.removesuffix("Status"), {}, set(LEFT_OUT))
+    for part in re.split(r";\s*", kind.tags["library"]) if "library" in kind.tags else []:
+        found = re.fullmatch(r"(?:(?P<without>without) )?(?P<member>\w+)|(?:(?P<renamed>\w+) )?as (?P<name>\w+)", part)
+        member = found and (found["renamed"] or found["without"] and found["member"])
+        if not found or (found["member"] and not found["without"] and part != "extended"):
+            raise Fault(f"{kind.name}: 'library:' has '{part}', which is not understood")
+        if member and member not in (other.name for other in kind.members):
+            raise Fault(f"{kind.name}: 'library:' names {member}, which is no member")
+        if part == "extended":
+            told.extended = True
+        elif found["without"]:
+            told.left_out.add(member)
+        elif member:
+            told.names[member] = found["name"]
+        else:
+            told.name = found["name"]
+    return told
+
+
+def field_of(kind, member, told, words, nested):
     base, _, count = member.type.partition("[")
     from_sample = f"sample.{member.name}"
-    name, text = member.name, member.comment
-    if member.key and name == thing.lower():
+    name, text = told.names.get(member.name, member.name), member.comment
+    if member.key and name == told.name.lower():
         name, text = "name", ""
     sequence = re.fullmatch(r"sequence<(\w+), \d+>", base)
     if base == "octet" and count:
         made = ("std::string", f"hex_text(std::to_array({from_sample}))")
     elif words:
-        made = ("std::string", f"dds::word_for(dds::words::{kind.name}::{member.name}, {from_sample})")
+        coded = re.fullmatch(r"as (\w+)", member.comment)
+        made = ("std::string", f"dds::word_for(dds::words::{kind.name}::{coded[1] if coded else member.name}, {from_sample})")
         text = ", ".join(words)
     elif base.startswith("string<"):
         is_list = "with commas between" in member.comment
@@ -77,9 +112,9 @@ def field_of(kind, member, thing, words, nested):
     elif base in NUMBERS and not count:
         made = (NUMBERS[base], from_sample)
     elif base in nested and not count:
-        made = (base, f"to_public({from_sample})")
+        made = (nested[base], f"to_public({from_sample})")
     elif sequence and sequence[1] in nested:
-        made = (f"std::vector<{sequence[1]}>", f"all_public({from_sample}, [](const auto& part) {{ return to_public(part); }})")
+        made = (f"std::vector<{nested[sequence[1]]}>", f"all_public({from_sample}, [](const auto& part) {{ return to_public(part); }})")
     else:
         raise Fault(f"{kind.name}: the client library has no type for {member.type} {member.name}")
     return Field(name, *made, re.sub(r"_ns\b", "", text), member.key)
@@ -88,23 +123,30 @@ def field_of(kind, member, thing, words, nested):
 def records_of(contract, counted, words_of):
     """The types of the library, each behind those that it has parts of."""
     by_name = {kind.name: kind for kind in contract.types}
-    nested = {kind.name for kind in contract.types if not kind.is_topic}
+    nested = {kind.name: told_of(kind).name for kind in contract.types if not kind.is_topic}
     made = {}
 
     def add(kind):
         if kind.name in made:
             return
-        members = [member for member in kind.members if member.name not in LEFT_OUT]
+        told = told_of(kind)
+        members = [member for member in kind.members if member.name not in told.left_out]
         for member in members:
             for part in re.findall(r"\w+", member.type):
                 if part in nested:
                     add(by_name[part])
-        thing = kind.name.removesuffix("Status")
-        fields = [field_of(kind, member, thing, words_of(member), nested) for member in members]
-        made[kind.name] = Record(thing, f"plc_{kind.name}", title(kind.comment), kind.is_topic, kind.name in counted, fields)
+        of_name = {member.name: member for member in members}
+        fields = []
+        for member in members:
+            coded = re.fullmatch(r"as (\w+)", member.comment)  # another member
+            words = words_of(of_name.get(coded[1], member) if coded else member)
+            fields.append(field_of(kind, member, told, words, nested))
+        removable = kind.name in counted
+        made[kind.name] = Record(told.name, f"plc_{kind.name}", title(kind.comment), kind.is_topic, removable, told.extended, fields)
 
-    for name in ("HostStatus", *counted, "TaskStatistics"):
-        add(by_name[name])
+    for kind in contract.types:
+        if kind.name in counted or "library" in kind.tags:
+            add(kind)
     return list(made.values())
 
 
@@ -167,6 +209,6 @@ def members(records, head):
             quoted = text.replace("\\", "\\\\").replace('"', '\\"')
             lines.append(f'  visit("{name}", &{record.name}::{name}, "{quoted}");')
         lines.append("}\n")
-    lines += ["/// visit(name, type, text) for each type but Host.", "template <class Visit>", "void visit_types(Visit&& visit) {"]
-    lines += [f'  visit("{record.name}", std::type_identity<{record.name}>(), "{record.text}.");' for record in records if record.name != "Host"]
+    lines += ["/// visit(name, type, text) for each type that plchost_client.hpp has no more of.", "template <class Visit>", "void visit_types(Visit&& visit) {"]
+    lines += [f'  visit("{record.name}", std::type_identity<{record.name}>(), "{record.text}.");' for record in records if not record.extended]
     return "\n".join(lines + ["}\n", "}  // namespace plchost::client_types\n"])

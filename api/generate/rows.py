@@ -61,7 +61,7 @@ class RowField:
         told += [f".unit = Unit::{self.unit}"] if self.unit != "none" else []
         told += [".key = true"] if self.member and self.member.key else []
         told += [f".words = words::{kind.name}::{self.member.name}"] if self.member and words_of(self.member) else []
-        told += [f".null = {self.null}"] if self.null else []
+        told += [".null_if_empty = true" if self.null == "empty" else f".null = {self.null}"] if self.null else []
         return f"FieldInfo{{{', '.join(told)}}}"
 
 
@@ -71,7 +71,7 @@ def listed(kind, tag):
 
 
 PART = re.compile(
-    r"(?P<without>without )?(?P<name>\w+)(?: (?P<form>computed|text|number))?(?: null (?P<null>-?\d+))?(?: as (?P<row>\w+))?"
+    r"(?P<without>without )?(?P<name>\w+)(?: (?P<form>computed|text|number))?(?: null (?P<null>-?\d+|empty))?(?: as (?P<row>\w+))?"
 )
 
 

@@ -14,13 +14,9 @@ namespace plchost {
 
 namespace {
 
-std::string text(std::string_view from) {
-  return std::string(from);
-}
-
 // The code that users see. A new ErrorCode does not compile until it has a ClientError::Code and a word in
 // Reply.code.
-constexpr int told(ErrorCode code) {
+constexpr int public_code(ErrorCode code) {
   switch (code) {
     case ErrorCode::ok:
       return 0;
@@ -59,7 +55,7 @@ constexpr int told(ErrorCode code) {
 constexpr bool each_is_told_by_its_number() {
   constexpr std::size_t kCodes = dds::words::Reply::code.size();
   for (std::size_t code = 0; code < kCodes; ++code) {
-    if (told(static_cast<ErrorCode>(code)) != static_cast<int>(code)) return false;
+    if (public_code(static_cast<ErrorCode>(code)) != static_cast<int>(code)) return false;
   }
   return kCodes == static_cast<std::size_t>(ClientError::wrong_size) + 1;
 }
@@ -96,29 +92,20 @@ Client::TaskStatistics to_public(const StatisticsReport& report) {
 
 Client::Transition to_public(const TransitionView& transition) {
   const plc_Transition& sample = transition.sample;
-  return {.host = text(dds::text_of(sample.host)),
-          .instance = text(dds::text_of(sample.instance)),
-          .of = sample.source == 0 ? "application" : "process",
-          .from = dds::transition_state_name(sample.source, sample.from_state),
-          .to = dds::transition_state_name(sample.source, sample.to_state),
-          .reason = text(dds::text_of(sample.reason)),
-          .pid = sample.pid,
-          .time = wall_time(sample.time_unix_ns),
-          .number = sample.sequence_number,
-          .missed = transition.missed};
+  Client::Transition made;
+  static_cast<client_types::Transition&>(made) = to_public(sample);
+  made.from_state = dds::transition_state_name(sample.source, sample.from_state);
+  made.to_state = dds::transition_state_name(sample.source, sample.to_state);
+  made.missed = transition.missed;
+  return made;
 }
 
 Client::LogLine to_public(const LogText& line) {
-  return {.host = {},
-          .instance = {},
-          .text = line.text,
-          .level = text(dds::log_level_name(std::to_underlying(line.level))),
-          .source = text(dds::log_source_name(std::to_underlying(line.source))),
-          .pid = line.pid,
-          .time = wall_time(line.time_unix_ns),
-          .number = line.sequence,
-          .missing = line.missing,
-          .stream = 0};
+  Client::LogLine made;
+  static_cast<client_types::LogLine&>(made) = to_public(line.last);
+  made.text = line.text;
+  made.missing = line.missing;
+  return made;
 }
 
 Client::Outcome to_public(const PostReport& report) {

@@ -1,10 +1,12 @@
 #include "api/security/policy.hpp"
 
-#include <span>
+#include <array>
+#include <cstddef>
 #include <string_view>
 #include <vector>
 
 #include <fmt/format.h>
+#include <topic_names.hpp>
 
 #include "api/security/xml_text.hpp"
 
@@ -27,20 +29,16 @@ constexpr std::string_view kDocument =
 
 constexpr std::string_view kDomains = "<domains><id_range><min>0</min><max>230</max></id_range></domains>";
 
-Topics status_topics() {
-  return {"plc/v1/presence", "plc/v1/status/*", "plc/v1/transition"};
-}
-// The topics of a host for one client only.
-Topics answer_topics() {
-  return {"plc/v1/reply", "plc/v1/event_ack",    "plc/v1/event_run", "plc/v1/objects",
-          "plc/v1/nodes", "plc/v1/download_ack", "plc/v1/log"};
-}
-Topics block_topics() {
-  return {"plc/v1/blocks", "plc/v1/block_ack"};
+template <std::size_t N>
+Topics topics_of(const std::array<std::string_view, N>& topics) {
+  return Topics(topics.begin(), topics.end());
 }
 
-Topics name_topics() {
-  return {"plc/v1/name_claim"};
+// Those for a host, and more of these.
+Topics asking(const Topics& more) {
+  Topics topics = topics_of(topic_names::kHost);
+  topics.insert(topics.end(), more.begin(), more.end());
+  return topics;
 }
 
 // A host writes into partitions that name it: no reader takes its samples in the name of another.
@@ -50,30 +48,31 @@ std::vector<Grant> may_write(const Subject& subject) {
     case Role::viewer:
       return {};
     case Role::operating:
-      return {{{"plc/v1/event", "plc/v1/event_batch", "plc/v1/op/request"}, "h.*"}};
+      return {{asking({"plc/v1/op/request"}), "h.*"}};
     case Role::engineer:
-      return {{{"plc/v1/event", "plc/v1/event_batch", "plc/v1/op/request", "plc/v1/eng/*"}, "h.*"}};
+      return {{asking({"plc/v1/op/request", "plc/v1/eng/*"}), "h.*"}};
     case Role::admin:
-      return {{{"plc/v1/event", "plc/v1/event_batch", "plc/v1/*/request", "plc/v1/eng/*"}, "h.*"}};
+      return {{asking({"plc/v1/*/request", "plc/v1/eng/*"}), "h.*"}};
     case Role::host:
-      return {{status_topics(), "s." + name},
-              {answer_topics(), "c.*/" + name},
-              {block_topics(), "b.*/" + name},
-              {name_topics(), "n." + name}};
+      return {{topics_of(topic_names::kStatus), "s." + name},
+              {topics_of(topic_names::kClient), "c.*/" + name},
+              {topics_of(topic_names::kBlocks), "b.*/" + name},
+              {topics_of(topic_names::kName), "n." + name}};
   }
   return {};
 }
 
 std::vector<Grant> may_read(const Subject& subject, const GuidPrefix& prefix) {
   const std::string& name = subject.name;
-  if (subject.role == Role::viewer) return {{status_topics(), "s.*"}};
+  if (subject.role == Role::viewer) return {{topics_of(topic_names::kStatus), "s.*"}};
   if (subject.role == Role::host) {
     return {{{"plc/v1/status/block_host"}, "s.*"},
-            {{"plc/v1/event", "plc/v1/event_batch", "plc/v1/*/request", "plc/v1/eng/*"}, "h." + name},
-            {block_topics(), "b." + name + "/*"},
-            {name_topics(), "n." + name}};
+            {asking({"plc/v1/*/request", "plc/v1/eng/*"}), "h." + name},
+            {topics_of(topic_names::kBlocks), "b." + name + "/*"},
+            {topics_of(topic_names::kName), "n." + name}};
   }
-  return {{status_topics(), "s.*"}, {answer_topics(), fmt::format("c.{:02x}*", fmt::join(prefix, ""))}};
+  return {{topics_of(topic_names::kStatus), "s.*"},
+          {topics_of(topic_names::kClient), fmt::format("c.{:02x}*", fmt::join(prefix, ""))}};
 }
 
 std::string criteria(std::string_view what, const std::vector<Grant>& grants) {

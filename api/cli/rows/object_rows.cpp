@@ -2,39 +2,36 @@
 
 #include <algorithm>
 #include <span>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "api/cli/rows/rows.hpp"
+#include "api/dds/text.hpp"
 
 namespace plchost {
 
 namespace {
 
 // A newer host may know more types: their numbers are shown.
-std::string type_text(ObjectType type) {
-  const ObjectTraits* const traits = traits_of(type);
-  return traits != nullptr ? std::string(traits->name) : fmt::format("{}", static_cast<std::uint32_t>(type));
+std::string type_text(const plc_ObjectRecord& object) {
+  return dds::word_for(dds::words::ObjectRecord::type, object.type);
 }
 
-std::string holder_text(const ListedObject& mutex) {
-  if (mutex.info.value == 0) return "free";
-  if (mutex.holder_pid == 0) return fmt::format("held by thread {}, which has ended", mutex.info.value);
-  return fmt::format("held by {}({}), thread {}", mutex.holder_program, mutex.holder_pid, mutex.info.value);
+bool is_of(const plc_ObjectRecord& object, ObjectType type) {
+  return object.type == std::to_underlying(type);
 }
 
-std::string mode_text(const ObjectInfo& info) {
-  return fmt::format("{:04o}", info.mode);
+std::string holder_text(const plc_ObjectRecord& mutex) {
+  if (mutex.value == 0) return "free";
+  if (mutex.holder_pid == 0) return fmt::format("held by thread {}, which has ended", mutex.value);
+  return fmt::format("held by {}({}), thread {}", dds::text_of(mutex.holder_program), mutex.holder_pid,
+                     mutex.value);
 }
 
-Row reference_rows(const ObjectInfo& info) {
+Row reference_rows(const std::vector<plc_ObjectReference>& references) {
   Row rows = Row::array();
-  for (const ReferenceInfo& reference : info.references) {
-    rows.push_back({{"pid", reference.pid},
-                    {"program", reference.program},
-                    {"writable", reference.writable},
-                    {"waiting", reference.waiting}});
-  }
+  for (const plc_ObjectReference& reference : references) rows.push_back(to_row(reference));
   return rows;
 }
 
@@ -42,73 +39,63 @@ constexpr std::size_t kHoldersInTable = 3;
 
 }  // namespace
 
-std::string holders_text(const ObjectInfo& object, std::size_t most) {
+std::string holders_text(const ListedObject& object, std::size_t most) {
   std::string text;
   const std::size_t told = std::min(most, object.references.size());
-  for (const ReferenceInfo& reference : std::span(object.references).first(told)) {
-    text += fmt::format("{}{}({})", text.empty() ? "" : ", ", reference.program, reference.pid);
+  for (const plc_ObjectReference& reference : std::span(object.references).first(told)) {
+    text += fmt::format("{}{}({})", text.empty() ? "" : ", ", dds::text_of(reference.program), reference.pid);
   }
-  if (object.reference_count > told && told > 0)
-    text += fmt::format(" and {} more", object.reference_count - told);
+  const std::uint32_t all = object.record.reference_count;
+  if (all > told && told > 0) text += fmt::format(" and {} more", all - told);
   return text;
 }
 
 std::string state_text(const ListedObject& object) {
-  const ObjectInfo& info = object.info;
-  if (info.type == ObjectType::mutex) return holder_text(object);
-  const ObjectTraits* const traits = traits_of(info.type);
-  if (traits == nullptr) return fmt::format("value {}", info.value);
-  const std::uint64_t number = info.type == ObjectType::memory ? info.size : info.value;
+  const plc_ObjectRecord& record = object.record;
+  if (is_of(record, ObjectType::mutex)) return holder_text(record);
+  const ObjectTraits* const traits = traits_of(object.type());
+  if (traits == nullptr) return fmt::format("value {}", record.value);
+  const std::uint64_t number = is_of(record, ObjectType::memory) ? record.size : record.value;
   std::string text = fmt::format(fmt::runtime(traits->value_form), number);
-  if (info.type == ObjectType::event) {
-    text += fmt::format(", {}registered, {} tasks", info.registered ? "" : "not ", info.bound_tasks);
+  if (is_of(record, ObjectType::event)) {
+    text += fmt::format(", {}registered, {} tasks", record.registered ? "" : "not ", record.bound_tasks);
   }
   return text;
 }
 
-Row to_row(std::string_view host, const ListedObject& object) {
-  const ObjectInfo& info = object.info;
-  const bool event = info.type == ObjectType::event;
-  const bool memory = info.type == ObjectType::memory;
-  const bool mutex = info.type == ObjectType::mutex;
-  const bool held = mutex && info.value != 0;
+dds::Computed<plc_ObjectRecord, Row> computed_of(const plc_ObjectRecord& object, std::string_view host,
+                                                 const ListedObject& listed) {
+  const bool event = is_of(object, ObjectType::event);
+  const bool mutex = is_of(object, ObjectType::mutex);
+  const bool held = mutex && object.value != 0;
   const auto or_null = [](bool there, const auto& value) { return there ? Row(value) : Row(); };
-  return {{"host", host},
-          {"object", info.name},
-          {"type", type_text(info.type)},
-          {"value", or_null(!memory && !mutex, info.value)},
-          {"size_bytes", or_null(memory, info.size)},
-          {"held", or_null(mutex, held)},
-          {"holder_thread", or_null(held, info.value)},
-          {"holder_pid", or_null(held && object.holder_pid != 0, object.holder_pid)},
-          {"holder_program", or_null(held && object.holder_pid != 0, object.holder_program)},
-          {"registered", or_null(event, info.registered)},
-          {"bound_tasks", or_null(event, info.bound_tasks)},
-          {"waiters", info.waiters},
-          {"kept", info.kept},
-          {"owner", info.owner},
-          {"owner_name", or_null(!object.owner_name.empty(), object.owner_name)},
-          {"group", info.group},
-          {"group_name", or_null(!object.group_name.empty(), object.group_name)},
-          {"mode", mode_text(info)},
-          {"made", time_text(info.made_unix_ns)},
-          {"reference_count", info.reference_count},
-          {"references", reference_rows(info)}};
+  return {.host = host,
+          .value = or_null(!mutex && !is_of(object, ObjectType::memory), object.value),
+          .held = or_null(mutex, held),
+          .holder_thread = or_null(held, object.value),
+          .registered = or_null(event, object.registered),
+          .bound_tasks = or_null(event, object.bound_tasks),
+          .mode = fmt::format("{:04o}", object.mode),
+          .references = reference_rows(listed.references)};
+}
+
+Row to_row(std::string_view host, const ListedObject& object) {
+  return to_row(object.record, host, object);
 }
 
 Row to_short_row(std::string_view host, const ListedObject& object) {
-  const ObjectInfo& info = object.info;
-  const bool memory = info.type == ObjectType::memory;
-  Row row{{"host", host}, {"object", info.name}, {"type", type_text(info.type)}};
-  row["size"] = memory ? Row(info.size) : Row();
-  if (info.type == ObjectType::mutex) {
-    row["value"] = holder_text(object);
+  const plc_ObjectRecord& record = object.record;
+  const bool memory = is_of(record, ObjectType::memory);
+  Row row{{"host", host}, {"object", object.name()}, {"type", type_text(record)}};
+  row["size"] = memory ? Row(record.size) : Row();
+  if (is_of(record, ObjectType::mutex)) {
+    row["value"] = holder_text(record);
   } else if (!memory) {
-    row["value"] = info.value;
+    row["value"] = record.value;
   }
-  row["waiters"] = info.waiters;
-  row["references"] = info.reference_count;
-  row["by"] = holders_text(info, kHoldersInTable);
+  row["waiters"] = record.waiters;
+  row["references"] = record.reference_count;
+  row["by"] = holders_text(object, kHoldersInTable);
   return row;
 }
 
@@ -131,14 +118,12 @@ std::string format_object(std::string_view host, const ListedObject& object) {
     if (!value.is_null() && field != "references") said[field] = value;
   }
   std::string text = format_fields(said);
-  const Row references = reference_rows(object.info);
-  if (references.empty()) return text;
-  const std::vector<Row> rows(references.begin(), references.end());
-  text += "\n" +
-          format_table(
-              rows, {{"pid", "PID"}, {"program", "PROGRAM"}, {"writable", "WRITES"}, {"waiting", "WAITING"}});
-  if (object.info.reference_count > rows.size()) {
-    text += fmt::format("and {} more\n", object.info.reference_count - rows.size());
+  if (object.references.empty()) return text;
+  std::vector<Row> rows;
+  for (const plc_ObjectReference& reference : object.references) rows.push_back(to_row(reference));
+  text += "\n" + format_table(rows, columns_of<plc_ObjectReference>());
+  if (object.record.reference_count > rows.size()) {
+    text += fmt::format("and {} more\n", object.record.reference_count - rows.size());
   }
   return text;
 }

@@ -4,13 +4,17 @@
 #include <string_view>
 #include <vector>
 
+#include "api/cli/rows/status_rows.hpp"
 #include "api/cli/rows/table.hpp"
 #include "api/dds/object_page.hpp"
 
 namespace plchost {
 
-/// One object of a host's pool, for programs: the same fields for all types, null where a type has none. The
-/// field names are a promise.
+/// Fields that are null for a type that has none of them.
+[[nodiscard]] dds::Computed<plc_ObjectRecord, Row> computed_of(const plc_ObjectRecord& object,
+                                                               std::string_view host,
+                                                               const ListedObject& listed);
+/// One object of a host's pool, for programs: the same fields for all types. The field names are a promise.
 [[nodiscard]] Row to_row(std::string_view host, const ListedObject& object);
 
 /// For the table: a line of few cells, see object_columns().
@@ -21,7 +25,7 @@ namespace plchost {
 /// 4713".
 [[nodiscard]] std::string state_text(const ListedObject& object);
 /// The processes with references on it: "plc-instance(4711), python3(88) and 5 more".
-[[nodiscard]] std::string holders_text(const ObjectInfo& object, std::size_t most);
+[[nodiscard]] std::string holders_text(const ListedObject& object, std::size_t most);
 
 /// All that is known of it, for people.
 [[nodiscard]] std::string format_object(std::string_view host, const ListedObject& object);

@@ -43,7 +43,8 @@ void add(Row& row, const dds::FieldInfo& field, const Value& value) {
       row[name] = value;
     }
   } else if constexpr (std::convertible_to<Value, std::string_view>) {
-    row[name] = std::string_view(value);
+    const std::string_view text(value);
+    row[name] = text.empty() && field.null_if_empty ? Row() : Row(text);
   } else {
     const bool of_all = std::ranges::all_of(value, [](auto octet) { return octet == 0; });
     row[name] = of_all ? "all" : fmt::format("{:02x}", fmt::join(value, ""));

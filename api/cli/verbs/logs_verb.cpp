@@ -81,7 +81,7 @@ class LogFollower {
     PLCHOST_TRY_ASSIGN(auto lines,
                        client.wait(log_.read(client.core(), session_.deadline(), arguments_.count)));
     const std::int64_t begin = since_.by_clock(log_.clock_unix_ns());
-    std::erase_if(lines, [&](const LogText& line) { return line.time_unix_ns < begin; });
+    std::erase_if(lines, [&](const LogText& line) { return line.last.time_unix_ns < begin; });
     return lines;
   }
   [[nodiscard]] const std::string& host() const noexcept { return log_.host(); }
@@ -101,7 +101,7 @@ int show_lines(const CliSession& session, const LogArguments& arguments, const s
   if (as_rows) {
     std::vector<Row> rows;
     for (const LogText& line : lines) rows.push_back(to_row(host, arguments.instance, line));
-    return session.show(std::move(rows), log_columns());
+    return session.show(std::move(rows), columns_of<plc_LogRecord>());
   }
   for (const LogText& line : lines) fmt::print("{}", format_log_line(line));
   return kExitDone;

@@ -138,12 +138,12 @@ struct ObjectLook {
 };
 
 ObjectLook look_of(const std::string& host, const ListedObject& object) {
-  const ObjectInfo& info = object.info;
+  const plc_ObjectRecord& record = object.record;
   constexpr std::size_t kHoldersInLine = 8;
-  const std::string by = holders_text(info, kHoldersInLine);
+  const std::string by = holders_text(object, kHoldersInLine);
   ObjectLook look{.row = to_row(host, object),
-                  .text = fmt::format("{}, {} waiters, {} references{}{}", state_text(object), info.waiters,
-                                      info.reference_count, by.empty() ? "" : ": ", by)};
+                  .text = fmt::format("{}, {} waiters, {} references{}{}", state_text(object), record.waiters,
+                                      record.reference_count, by.empty() ? "" : ": ", by)};
   look.row["present"] = true;
   return look;
 }

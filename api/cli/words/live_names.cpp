@@ -72,7 +72,7 @@ void add_objects(ControlClient& client, const HostView& host, TimePoint deadline
     const auto page = client.list_objects(host.name, query, deadline);
     if (!page) return;
     for (const ListedObject& one : page->objects) {
-      names.push_back({one.info.name, state_text(one)});
+      names.push_back({std::string(one.name()), state_text(one)});
     }
     if (page->complete || page->next_after <= query.after) return;
     query.after = page->next_after;

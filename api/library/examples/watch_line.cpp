@@ -16,7 +16,7 @@ void show_host(const plchost::Client::Host& host) {
 
 void show_transition(const plchost::Client::Transition& change) {
   std::printf("%s/%s: %s %s -> %s %s\n", change.host.c_str(), change.instance.c_str(), change.of.c_str(),
-              change.from.c_str(), change.to.c_str(), change.reason.c_str());
+              change.from_state.c_str(), change.to_state.c_str(), change.reason.c_str());
   std::fflush(stdout);
 }
 

@@ -166,31 +166,18 @@ void define_states(py::module_& module) {
   py::class_<Client::Host> host(module, "Host", "A host.");
   define_members<plchost::client_types::Host>(host);
   host.def_readonly("answers", &Client::Host::answers).def_readonly("instances", &Client::Host::instances);
-  py::class_<Client::Transition>(module, "Transition")
-      .def_readonly("host", &Client::Transition::host)
-      .def_readonly("instance", &Client::Transition::instance)
-      .def_readonly("of", &Client::Transition::of)
-      .def_readonly("from_state", &Client::Transition::from)  // "from" is a word of Python
-      .def_readonly("to_state", &Client::Transition::to)
-      .def_readonly("reason", &Client::Transition::reason)
-      .def_readonly("pid", &Client::Transition::pid)
-      .def_readonly("time", &Client::Transition::time)
-      .def_readonly("number", &Client::Transition::number)
-      .def_readonly("missed", &Client::Transition::missed);
+  py::class_<Client::Transition> transition(module, "Transition", "A change of state.");
+  define_members<plchost::client_types::Transition>(transition);
+  transition.def_readonly("missed", &Client::Transition::missed);
+  py::class_<Client::LogLine> line(module, "LogLine", "A line that an instance has said.");
+  define_members<plchost::client_types::LogLine>(line);
+  line.def_readonly("host", &Client::LogLine::host)
+      .def_readonly("instance", &Client::LogLine::instance)
+      .def_readonly("missing", &Client::LogLine::missing)
+      .def_readonly("stream", &Client::LogLine::stream);
 }
 
 void define_results(py::module_& module) {
-  py::class_<Client::LogLine>(module, "LogLine", "A line that an instance has said.")
-      .def_readonly("host", &Client::LogLine::host)
-      .def_readonly("instance", &Client::LogLine::instance)
-      .def_readonly("text", &Client::LogLine::text)
-      .def_readonly("level", &Client::LogLine::level)
-      .def_readonly("source", &Client::LogLine::source)
-      .def_readonly("pid", &Client::LogLine::pid)
-      .def_readonly("time", &Client::LogLine::time)
-      .def_readonly("number", &Client::LogLine::number)
-      .def_readonly("missing", &Client::LogLine::missing)
-      .def_readonly("stream", &Client::LogLine::stream);
   py::class_<Client::Posted>(module, "Posted")
       .def_readonly("accepted", &Client::Posted::accepted)
       .def_readonly("no_task", &Client::Posted::no_task);

@@ -30,17 +30,14 @@ bool may_hold(const ObjectInfo& mutex, std::uint32_t pid) {
          std::ranges::find(mutex.references, pid, &ReferenceInfo::pid) != mutex.references.end();
 }
 
-ListedObject listed_of(ObjectInfo info) {
-  ListedObject listed{
-      .info = std::move(info), .holder_pid = 0, .holder_program = {}, .owner_name = {}, .group_name = {}};
-  listed.owner_name = user_name(listed.info.owner);
-  listed.group_name = group_name(listed.info.group);
-  if (listed.info.type != ObjectType::mutex || listed.info.value == 0) return listed;
-  auto owner = owner_of_thread(static_cast<std::uint32_t>(listed.info.value));
-  if (!owner || !may_hold(listed.info, owner->pid)) return listed;
-  listed.holder_pid = owner->pid;
-  listed.holder_program = std::move(owner->program);
-  return listed;
+ObjectUsers users_of(const ObjectInfo& object) {
+  ObjectUsers users{.owner_name = user_name(object.owner), .group_name = group_name(object.group)};
+  if (object.type != ObjectType::mutex || object.value == 0) return users;
+  auto owner = owner_of_thread(static_cast<std::uint32_t>(object.value));
+  if (!owner || !may_hold(object, owner->pid)) return users;
+  users.holder_pid = owner->pid;
+  users.holder_program = std::move(owner->program);
+  return users;
 }
 
 }  // namespace
@@ -73,13 +70,13 @@ std::string ObjectLister::like(std::string_view name) {
 }
 
 Result<ObjectListing> ObjectLister::one(const std::string& name) {
-  auto found = pool_->look_at(name);
+  const auto found = pool_->look_at(name);
   if (found) {
     ObjectListing listing;
-    listing.objects.push_back(listed_of(*std::move(found)));
+    listing.objects.push_back(listed_of(*found, users_of(*found)));
     return listing;
   }
-  Error error = std::move(found).error();
+  Error error = found.error();
   if (error.code == ErrorCode::not_found) error.message += like(name);
   return std::unexpected(std::move(error));
 }
@@ -100,7 +97,7 @@ Result<ObjectListing> ObjectLister::page(const ObjectQuery& query, TimePoint unt
     listing.next_after = at->name;
     if (wanted) {
       references += at->references.size();
-      listing.objects.push_back(listed_of(*at));
+      listing.objects.push_back(listed_of(*at, users_of(*at)));
     }
     if (step % kClockEvery == 0 && MonotonicClock::now() >= until) {
       ++at;

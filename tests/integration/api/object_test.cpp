@@ -189,7 +189,7 @@ TEST(ManyObjects, AreListedPageByPageWhileTheHostAnswers) {
   std::size_t pages = 0;
   for (ObjectQuery query;; ++pages) {
     const auto listing = client->list_objects("hosta", query, soon()).value();
-    for (const ListedObject& object : listing.objects) names.push_back(object.info.name);
+    for (const ListedObject& object : listing.objects) names.emplace_back(object.name());
     if (listing.complete) break;
     query.after = listing.next_after;
   }

@@ -22,10 +22,10 @@ TEST(LogQuery, RefusesAPlaceBesideANumberOfTheNewest) {
   EXPECT_THAT(query.error().message, HasSubstr("exclude each other"));
 }
 
-LogRecord record(std::uint64_t sequence, std::string_view text, bool goes_on = false) {
+plc_LogRecord record(std::uint64_t sequence, std::string_view text, bool goes_on = false) {
   LogRecord made{.sequence = sequence, .goes_on = goes_on ? 1U : 0U, .text = {}};
   made.text.assign(text);
-  return made;
+  return sample_of(made);
 }
 
 TEST(LogLinesOfRecords, ArePutTogetherOverPages) {

@@ -43,7 +43,7 @@ class ObjectListerTest : public testing::Test {
     for (pages = 1;; ++pages) {
       auto listing = sut.page(query, until).value();
       EXPECT_LE(listing.objects.size(), kPageObjects);
-      for (const ListedObject& listed : listing.objects) names.push_back(listed.info.name);
+      for (const ListedObject& listed : listing.objects) names.emplace_back(listed.name());
       if (listing.complete) return names;
       EXPECT_GT(listing.next_after, query.after);
       if (listing.next_after <= query.after) return names;
@@ -102,7 +102,7 @@ TEST_F(ObjectListerTest, EndsAPageAtItsReferences) {
   ObjectLister sut(pool_);
   const auto listing = sut.page({}, kNoDeadline).value();
   std::size_t references = 0;
-  for (const ListedObject& listed : listing.objects) references += listed.info.references.size();
+  for (const ListedObject& listed : listing.objects) references += listed.references.size();
   EXPECT_FALSE(listing.complete);
   EXPECT_LE(references, kPageReferences);
   std::size_t pages = 0;
@@ -122,13 +122,13 @@ TEST_F(ObjectListerTest, NamesTheOneThatMayHaveBeenMeant) {
 TEST_F(ObjectListerTest, TellsWhoHoldsAMutex) {
   const auto mutex = pool_.create_mutex("line1/recipe").value();
   ObjectLister sut(pool_);
-  EXPECT_EQ(sut.page({.name = "line1/recipe"}).value().objects.at(0).holder_pid, 0U);
+  EXPECT_EQ(sut.page({.name = "line1/recipe"}).value().objects.at(0).record.holder_pid, 0);
   ASSERT_EQ(mutex.object.lock(), plchost::ObjectStatus::done);
   const auto held = sut.page({.name = "line1/recipe"}).value().objects.at(0);
-  EXPECT_EQ(held.holder_pid, static_cast<std::uint32_t>(::getpid()));
-  EXPECT_EQ(held.info.value, static_cast<std::uint64_t>(::syscall(SYS_gettid)));
+  EXPECT_EQ(held.record.holder_pid, ::getpid());
+  EXPECT_EQ(held.record.value, static_cast<std::uint64_t>(::syscall(SYS_gettid)));
   EXPECT_THAT(state_text(held),
-              HasSubstr(fmt::format("held by unit_api({}), thread {}", ::getpid(), held.info.value)));
+              HasSubstr(fmt::format("held by unit_api({}), thread {}", ::getpid(), held.record.value)));
   ASSERT_EQ(mutex.object.unlock(), plchost::ObjectStatus::done);
 }
 
@@ -170,7 +170,7 @@ TEST_F(ObjectListerTest, ASampleCarriesAllThatIsKnown) {
 
 TEST(ObjectRows, ShowUsersWithoutANameAsNumbers) {
   ListedObject object;
-  object.info.owner = 4'000'000'000;
+  object.record.owner = 4'000'000'000;
   EXPECT_EQ(to_row("hosta", object)["owner"], 4'000'000'000);
   EXPECT_TRUE(to_row("hosta", object)["owner_name"].is_null());
   EXPECT_EQ(user_name(4'000'000'000), "");
@@ -180,16 +180,14 @@ TEST(ObjectPageSample, NamesEachUserThatCanBeShown) {
   ObjectListing sent;
   const std::vector<std::string> names{"eve", std::string(63, 'x'), std::string(64, 'x'), "a\x1b[2J", ""};
   for (const std::string& name : names) {
-    ListedObject& object = sent.objects.emplace_back();
-    object.info.name = "object";
-    object.owner_name = name;
-    object.group_name = "seven";
+    sent.objects.push_back(
+        listed_of({.name = "object", .references = {}}, {.owner_name = name, .group_name = "seven"}));
   }
   ObjectPageSample sample(sent);
   std::vector<std::string> got;
   for (const ListedObject& object : listing_of(sample.page()).objects) {
-    EXPECT_EQ(object.group_name, "seven");
-    got.push_back(object.owner_name);
+    EXPECT_STREQ(object.record.group_name, "seven");
+    got.emplace_back(object.record.owner_name);
   }
   EXPECT_THAT(got, testing::ElementsAre("eve", names[1], "", "", "")) << "the others are shown as numbers";
 }
@@ -199,19 +197,20 @@ TEST(ObjectRows, CutTheListOfHolders) {
   info.reference_count = 70;
   for (std::uint32_t i = 0; i < kMostReferencesTold; ++i)
     info.references.push_back({.pid = i + 1, .program = "p"});
-  EXPECT_EQ(holders_text(info, 2), "p(1), p(2) and 68 more");
+  const auto text = [&] { return holders_text(listed_of(info, {}), 2); };
+  EXPECT_EQ(text(), "p(1), p(2) and 68 more");
   info.references.resize(1);
   info.reference_count = 1;
-  EXPECT_EQ(holders_text(info, 2), "p(1)");
+  EXPECT_EQ(text(), "p(1)");
   info.references.clear();
   info.reference_count = 0;
-  EXPECT_EQ(holders_text(info, 2), "");
+  EXPECT_EQ(text(), "");
 }
 
 TEST(ObjectRows, ShowATypeOfANewerHostAsItsNumber) {
   ListedObject object;
-  object.info.type = static_cast<ObjectType>(9);
-  object.info.value = 5;
+  object.record.type = 9;
+  object.record.value = 5;
   EXPECT_EQ(to_row("hosta", object)["type"], "9");
   EXPECT_EQ(state_text(object), "value 5");
 }
