@@ -113,6 +113,16 @@ class PLCHOST_CLIENT_API Client {
   using Writer = client_types::Writer;
   using Exception = client_types::Exception;
   using TaskStatistics = client_types::TaskStatistics;
+  using Object = client_types::Object;
+  using Node = client_types::Node;
+  using Route = client_types::Route;
+  using Finding = client_types::Finding;
+
+  /// The clock of a host, as seen from here.
+  struct Clock {
+    std::chrono::nanoseconds offset{};  ///< of the host's CLOCK_REALTIME: positive: ahead of the one here
+    std::chrono::nanoseconds uncertainty{};  ///< the greatest error of that
+  };
 
   /// A change of state.
   struct Transition : client_types::Transition {
@@ -160,12 +170,13 @@ class PLCHOST_CLIENT_API Client {
 
   /// A command that a host knows.
   struct Operation {
-    std::string name;             ///< "set scheduler"
-    std::string argument;         ///< "scheduler", "event", "path", "task"; empty: it takes none
-    std::string help;             ///< empty for a few
-    bool names_instance = false;  ///< else it is for the whole host
-    bool engineering = false;     ///< for engineers; others are for operators, too
-    bool loads = false;           ///< LoadOptions count
+    std::string name;              ///< "set scheduler"
+    std::string argument;          ///< "scheduler", "event", "path", "task"; empty: it takes none
+    bool may_be_left_out = false;  ///< the argument
+    std::string help;              ///< empty for a few
+    bool names_instance = false;   ///< else it is for the whole host
+    bool engineering = false;      ///< for engineers; others are for operators, too
+    bool loads = false;            ///< LoadOptions count
   };
 
   /// Calls its callback until it is destroyed or stop() returns; after that never again (stop() waits for a
@@ -211,8 +222,23 @@ class PLCHOST_CLIENT_API Client {
   std::vector<Exception> exceptions(const std::string& host = {});
   /// The fate of the posts of each client; first (source all zero) of all together.
   std::vector<Writer> writers(const std::string& host = {});
-  /// All figures of a task, at most a second old. ClientError: timed_out: also if there is no such task.
+  /// All figures of a task, at most a second old. From the first call on, the Client receives the figures of
+  /// all tasks that it sees, some KiB for each and second: on a large plant make one with Options::host for
+  /// it. ClientError: timed_out: also if there is no such task.
   TaskStatistics statistics(const std::string& host, const std::string& instance, const std::string& task);
+
+  /// The objects of the pool whose names match the pattern ('*' any characters, '?' one; empty: all), by
+  /// name. For these and all that follow up to check_host(): ClientError: refused: only operators may ask.
+  std::vector<Object> objects(const std::string& host = {}, const std::string& pattern = {});
+  /// The nodes that send each other blocks, by address. `base`: the set of nodes; empty: that of the host's
+  /// configuration.
+  std::vector<Node> nodes(const std::string& host = {}, const std::string& base = {});
+  /// How blocks go from one of these nodes to another, or to other hosts.
+  std::vector<Route> routes(const std::string& host = {}, const std::string& base = {});
+  /// Asks the host for its time, several times: the best answer counts.
+  Clock read_clock(const std::string& host = {});
+  /// Has the host looked at anew. The result of each check, also of those that found nothing wrong.
+  std::vector<Finding> check_host(const std::string& host = {});
 
   /// The status topics of the contract by name: "task", "writer", "exception".
   static std::vector<std::string> topics();
@@ -297,6 +323,10 @@ class PLCHOST_CLIENT_API Client {
   Watch watch_events(const std::string& host, std::function<void(const Event&)> callback);
   Watch watch_applications(const std::string& host, std::function<void(const Application&)> callback);
   Watch watch_exceptions(const std::string& host, std::function<void(const Exception&)> callback);
+  /// The same for any status topic, by its name, as status() has them; last in each record is `removed`.
+  /// ClientError: invalid_argument: no such topic.
+  Watch watch_status(const std::string& topic, const std::string& host,
+                     std::function<void(const Record&)> callback);
   /// For the last 64 of each instance, and each that comes. Empty host: of all.
   Watch watch_transitions(const std::string& host, std::function<void(const Transition&)> callback);
 
@@ -306,10 +336,11 @@ class PLCHOST_CLIENT_API Client {
   class HostsWatch;
   template <class Sample>
   class StatusWatch;
+  class RecordsWatch;
   class TransitionsWatch;
   Watch begin_watch(std::shared_ptr<Watch::Subscription> subscription);
   template <class Sample, class Item>
-  Watch watch_status(const std::string& host, std::function<void(const Item&)> callback);
+  Watch watch_items(const std::string& host, std::function<void(const Item&)> callback);
 
   std::unique_ptr<Worker> worker_;
   std::unique_ptr<Watcher> watcher_;

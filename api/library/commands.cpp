@@ -110,6 +110,7 @@ std::vector<Client::Operation> Client::operations() {
     if (!is_command(known)) continue;
     all.push_back({.name = std::string(known.name),
                    .argument = std::string(argument_name(known.argument)),
+                   .may_be_left_out = known.argument == OperationArgument::task_or_none,
                    .help = known.help,
                    .names_instance = known.names_instance,
                    .engineering = known.role == ApiRole::engineering,

@@ -1,7 +1,9 @@
 #include "api/library/records.hpp"
 
+#include <algorithm>
 #include <concepts>
 #include <string_view>
+#include <type_traits>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -56,6 +58,18 @@ struct Topics {
   using Read = Async<Records> (*)(ClientCore&, std::string, TimePoint);
 
   static std::vector<std::string> names() { return {std::string(dds::kCountedAs<Samples>)...}; }
+  /// The members that are keys; none: no such topic.
+  static std::vector<std::string_view> keys(std::string_view topic) {
+    std::vector<std::string_view> keys;
+    const auto look_at = [&]<class Sample>(std::type_identity<Sample> /*type*/) {
+      if (topic != dds::kCountedAs<Sample>) return;
+      dds::visit_fields(Sample{}, [&](const dds::FieldInfo& field, const auto& /*value*/) {
+        if (field.key) keys.push_back(field.name);
+      });
+    };
+    (look_at(std::type_identity<Samples>()), ...);
+    return keys;
+  }
   /// nullptr: no such topic.
   static Read reader_of(std::string_view topic) {
     Read found = nullptr;
@@ -70,13 +84,26 @@ std::vector<std::string> status_names() {
   return dds::OfCountedStatus<Topics>::names();
 }
 
-Async<Records> read_status(ClientCore& core, std::string topic, std::string host, TimePoint deadline) {
-  if (const auto read = dds::OfCountedStatus<Topics>::reader_of(topic))
-    co_return co_await read(core, host, deadline);
+Result<void> check_status_name(const std::string& topic) {
   const auto all = status_names();
   const std::vector<std::string_view> names(all.begin(), all.end());
-  co_return failure(ErrorCode::invalid_argument,
-                    fmt::format("no status topic '{}'; there are: {}", shown(topic), join_names(names)));
+  if (std::ranges::find(names, topic) != names.end()) return {};
+  return failure(ErrorCode::invalid_argument,
+                 fmt::format("no status topic '{}'; there are: {}", shown(topic), join_names(names)));
+}
+
+std::vector<Client::Value> status_key(const std::string& topic, const Client::Record& record) {
+  const auto keys = dds::OfCountedStatus<Topics>::keys(topic);
+  std::vector<Client::Value> values;
+  for (const auto& [name, value] : record) {
+    if (std::ranges::find(keys, name) != keys.end()) values.push_back(value);
+  }
+  return values;
+}
+
+Async<Records> read_status(ClientCore& core, std::string topic, std::string host, TimePoint deadline) {
+  PLCHOST_CO_TRY(check_status_name(topic));
+  co_return co_await dds::OfCountedStatus<Topics>::reader_of(topic)(core, host, deadline);
 }
 
 }  // namespace plchost

@@ -6,6 +6,7 @@
 
 #include "api/client/client_core_status.hpp"
 #include "api/library/convert.hpp"
+#include "api/library/records.hpp"
 #include "api/library/watcher.hpp"
 #include "api/library/worker.hpp"
 
@@ -112,6 +113,57 @@ class __attribute__((visibility("hidden"))) Client::StatusWatch final : public C
   std::map<Key, Item> told_;
 };
 
+/// Of any status topic, by its name.
+class __attribute__((visibility("hidden"))) Client::RecordsWatch final : public Client::Watch::Subscription {
+ public:
+  RecordsWatch(std::string topic, std::string host, std::function<void(const Record&)> callback)
+      : topic_(std::move(topic)), host_(std::move(host)), callback_(std::move(callback)) {}
+
+ private:
+  using Key = std::vector<Value>;
+
+  void tell(const News& news) override {
+    for (const std::string& host : hosts_of(news.client, host_)) {
+      auto records = news.client.wait(read_status(news.client.core(), topic_, host, MonotonicClock::now()));
+      if (!records) continue;  // not complete yet: soon
+      std::set<Key> there;
+      for (Record& record : *records) {
+        const Key key = status_key(topic_, record);
+        there.insert(key);
+        tell_one(host, key, std::move(record));
+      }
+      tell_removed(host, there);
+    }
+  }
+
+  void tell_one(const std::string& host, const Key& key, Record record) {
+    record.emplace_back("removed", false);
+    const auto [told, is_new] = told_[host].try_emplace(key);
+    if (!is_new && told->second == record) return;
+    told->second = std::move(record);
+    if (!stopped()) callback_(told->second);
+  }
+
+  void tell_removed(const std::string& host, const std::set<Key>& there) {
+    auto& told = told_[host];
+    for (auto known = told.begin(); known != told.end();) {
+      if (there.contains(known->first)) {
+        ++known;
+        continue;
+      }
+      Record record = std::move(known->second);
+      known = told.erase(known);
+      record.back().second = true;
+      if (!stopped()) callback_(record);
+    }
+  }
+
+  std::string topic_;
+  std::string host_;
+  std::function<void(const Record&)> callback_;
+  std::map<std::string, std::map<Key, Record>> told_;  // by host
+};
+
 class __attribute__((visibility("hidden"))) Client::TransitionsWatch final
     : public Client::Watch::Subscription {
  public:
@@ -166,7 +218,7 @@ Client::Watch Client::watch_hosts(std::function<void(const Host&)> callback) {
 }
 
 template <class Sample, class Item>
-Client::Watch Client::watch_status(const std::string& host, std::function<void(const Item&)> callback) {
+Client::Watch Client::watch_items(const std::string& host, std::function<void(const Item&)> callback) {
   check_callback(static_cast<bool>(callback));
   if (!host.empty()) worker_->check_watched(host);
   return begin_watch(std::make_shared<StatusWatch<Sample>>(host, std::move(callback)));
@@ -174,25 +226,33 @@ Client::Watch Client::watch_status(const std::string& host, std::function<void(c
 
 Client::Watch Client::watch_instances(const std::string& host,
                                       std::function<void(const Instance&)> callback) {
-  return watch_status<plc_InstanceStatus>(host, std::move(callback));
+  return watch_items<plc_InstanceStatus>(host, std::move(callback));
 }
 
 Client::Watch Client::watch_tasks(const std::string& host, std::function<void(const Task&)> callback) {
-  return watch_status<plc_TaskStatus>(host, std::move(callback));
+  return watch_items<plc_TaskStatus>(host, std::move(callback));
 }
 
 Client::Watch Client::watch_events(const std::string& host, std::function<void(const Event&)> callback) {
-  return watch_status<plc_EventStatus>(host, std::move(callback));
+  return watch_items<plc_EventStatus>(host, std::move(callback));
 }
 
 Client::Watch Client::watch_applications(const std::string& host,
                                          std::function<void(const Application&)> callback) {
-  return watch_status<plc_ApplicationStatus>(host, std::move(callback));
+  return watch_items<plc_ApplicationStatus>(host, std::move(callback));
 }
 
 Client::Watch Client::watch_exceptions(const std::string& host,
                                        std::function<void(const Exception&)> callback) {
-  return watch_status<plc_ExceptionStatus>(host, std::move(callback));
+  return watch_items<plc_ExceptionStatus>(host, std::move(callback));
+}
+
+Client::Watch Client::watch_status(const std::string& topic, const std::string& host,
+                                   std::function<void(const Record&)> callback) {
+  check_callback(static_cast<bool>(callback));
+  if (const auto known = check_status_name(topic); !known) throw_client_error(known.error());
+  if (!host.empty()) worker_->check_watched(host);
+  return begin_watch(std::make_shared<RecordsWatch>(topic, host, std::move(callback)));
 }
 
 Client::Watch Client::watch_transitions(const std::string& host,

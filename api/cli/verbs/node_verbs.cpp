@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "api/cli/rows/node_rows.hpp"
+#include "api/dds/page_sample.hpp"
 
 namespace plchost {
 
@@ -13,16 +14,12 @@ namespace {
 // All pages of one host. The timeout is that of one page.
 Result<std::vector<NodesTold>> route_pages(CliSession& session, const std::string& host, NodeQuery query) {
   std::vector<NodesTold> pages;
-  for (;;) {
+  for (bool goes_on = true; goes_on;) {
     PLCHOST_TRY_ASSIGN(auto page, session.client().value()->list_routes(host, query, session.deadline()));
+    PLCHOST_TRY_ASSIGN(goes_on, next_page(host, page, query));
     pages.push_back(std::move(page));
-    if (pages.back().complete) return pages;
-    if (pages.back().next_after <= query.after) {
-      return failure(ErrorCode::corrupt,
-                     fmt::format("host '{}' lists no routes after node {}", host, query.after));
-    }
-    query.after = pages.back().next_after;
   }
+  return pages;
 }
 
 int list_nodes(CliSession& session, const std::string& base) {

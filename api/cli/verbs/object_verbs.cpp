@@ -13,6 +13,7 @@
 #include "api/cli/interrupt.hpp"
 #include "api/cli/rows/object_rows.hpp"
 #include "api/cli/rows/rows.hpp"
+#include "api/dds/page_sample.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/time.hpp"
 
@@ -47,17 +48,12 @@ std::string type_names() {
 // All pages of one host. The timeout is that of one page.
 Result<std::vector<ListedObject>> all_pages(CliSession& session, const std::string& host, ObjectQuery query) {
   std::vector<ListedObject> objects;
-  for (;;) {
-    PLCHOST_TRY_ASSIGN(auto listing, session.client().value()->list_objects(host, query, session.deadline()));
-    objects.insert(objects.end(), std::make_move_iterator(listing.objects.begin()),
-                   std::make_move_iterator(listing.objects.end()));
-    if (listing.complete) return objects;
-    if (listing.next_after <= query.after) {
-      return failure(ErrorCode::corrupt,
-                     fmt::format("host '{}' lists no objects after '{}'", host, query.after));
-    }
-    query.after = std::move(listing.next_after);
+  for (bool goes_on = true; goes_on;) {
+    PLCHOST_TRY_ASSIGN(auto page, session.client().value()->list_objects(host, query, session.deadline()));
+    PLCHOST_TRY_ASSIGN(goes_on, next_page(host, page, query));
+    std::ranges::move(page.objects, std::back_inserter(objects));
   }
+  return objects;
 }
 
 struct HostObjects {

@@ -87,6 +87,20 @@ double seconds(std::chrono::nanoseconds duration) {
   return std::chrono::duration<double>(duration).count();
 }
 
+py::dict dict_of(const Client::Record& record) {
+  py::dict members;
+  for (const auto& [name, value] : record) members[name.c_str()] = std::visit(ToPython(), value);
+  return members;
+}
+
+template <class Item>
+const Item& to_argument(const Item& item) {
+  return item;
+}
+py::dict to_argument(const Client::Record& record) {
+  return dict_of(record);
+}
+
 // An exception of a callback has no receiver: Python writes it to stderr, as for threads.
 template <class Item>
 std::function<void(const Item&)> guarded(py::function callback) {
@@ -98,7 +112,7 @@ std::function<void(const Item&)> guarded(py::function callback) {
   return [kept](const Item& item) {
     const py::gil_scoped_acquire gil;
     try {
-      (*kept)(item);
+      (*kept)(to_argument(item));
     } catch (py::error_already_set& raised) {
       raised.discard_as_unraisable("a callback of plchost_client");
     }
@@ -178,6 +192,9 @@ void define_states(py::module_& module) {
 }
 
 void define_results(py::module_& module) {
+  py::class_<Client::Clock>(module, "Clock", "The clock of a host, as seen from here.")
+      .def_property_readonly("offset", member_seconds(&Client::Clock::offset))
+      .def_property_readonly("uncertainty", member_seconds(&Client::Clock::uncertainty));
   py::class_<Client::Posted>(module, "Posted")
       .def_readonly("accepted", &Client::Posted::accepted)
       .def_readonly("no_task", &Client::Posted::no_task);
@@ -251,6 +268,15 @@ void define_calls(ClientClass& client) {
       .def("applications", &Client::applications, py::arg("host") = "", NoGil())
       .def("exceptions", &Client::exceptions, py::arg("host") = "", NoGil())
       .def("writers", &Client::writers, py::arg("host") = "", NoGil())
+      .def("objects", &Client::objects, py::arg("host") = "", py::arg("pattern") = "",
+           "The objects of the pool whose names match: '*' any characters, '?' one.", NoGil())
+      .def("nodes", &Client::nodes, py::arg("host") = "", py::arg("base") = "",
+           "The nodes that send each other blocks.", NoGil())
+      .def("routes", &Client::routes, py::arg("host") = "", py::arg("base") = "",
+           "How blocks go from one node to another, or to other hosts.", NoGil())
+      .def("check_host", &Client::check_host, py::arg("host") = "",
+           "Has the host looked at anew. Returns the result of each check.", NoGil())
+      .def("read_clock", &Client::read_clock, py::arg("host") = "", NoGil())
       .def("statistics", &Client::statistics, py::arg("host"), py::arg("instance"), py::arg("task"), NoGil())
       .def("logs",
            py::overload_cast<const std::string&, const std::string&, unsigned long long>(&Client::logs),
@@ -272,13 +298,7 @@ void define_calls(ClientClass& client) {
           "Returns at once; done(outcome) is called once.")
       .def("post_all", &Client::post_all, py::arg("host"), py::arg("events"), NoGil())
       .def("post_and_wait", &Client::post_and_wait, py::arg("host"), py::arg("event"), NoGil())
-      .def("start", &Client::start, py::arg("host"), py::arg("instance"), NoGil())
-      .def("stop", &Client::stop, py::arg("host"), py::arg("instance"), NoGil())
-      .def("restart", &Client::restart, py::arg("host"), py::arg("instance"), NoGil())
       .def("reset", &Client::reset, py::arg("host"), py::arg("instance"), py::arg("cold") = false, NoGil())
-      .def("single_cycle", &Client::single_cycle, py::arg("host"), py::arg("instance"), NoGil())
-      .def("set_scheduler", &Client::set_scheduler, py::arg("host"), py::arg("instance"),
-           py::arg("scheduler"), NoGil())
       .def("register_event", &Client::register_event, py::arg("host"), py::arg("event"), NoGil())
       .def("unregister_event", &Client::unregister_event, py::arg("host"), py::arg("event"), NoGil())
       .def("reload", &Client::reload, py::arg("host") = "",
@@ -290,7 +310,7 @@ void define_calls(ClientClass& client) {
 /// A method for a command of the table.
 void define_command(ClientClass& client, const std::string& method, const Client::Operation& operation) {
   const std::string& name = operation.name;
-  const char* const argument = operation.argument.empty() ? "argument" : operation.argument.c_str();
+  const char* const argument = operation.argument.c_str();
   if (!operation.names_instance) {
     client.def(
         method.c_str(), [name](Client& self, const std::string& host) { return self.command(name, host); },
@@ -311,13 +331,25 @@ void define_command(ClientClass& client, const std::string& method, const Client
                bool online) { return self.command(name, host, instance, given, LoadOptions{boot, online}); },
         py::arg("host"), py::arg("instance"), py::arg(argument), py::arg("boot") = false,
         py::arg("online") = false, operation.help.c_str(), NoGil());
-  } else {
+  } else if (operation.argument.empty()) {
     client.def(
         method.c_str(),
-        [name](Client& self, const std::string& host, const std::string& instance, const std::string& given) {
-          return self.command(name, host, instance, given);
+        [name](Client& self, const std::string& host, const std::string& instance) {
+          return self.command(name, host, instance);
         },
-        py::arg("host"), py::arg("instance"), py::arg(argument) = "", operation.help.c_str(), NoGil());
+        py::arg("host"), py::arg("instance"), operation.help.c_str(), NoGil());
+  } else {
+    auto run = [name](Client& self, const std::string& host, const std::string& instance,
+                      const std::string& given) { return self.command(name, host, instance, given); };
+    const auto define = [&](const auto& last) {
+      client.def(method.c_str(), run, py::arg("host"), py::arg("instance"), last, operation.help.c_str(),
+                 NoGil());
+    };
+    if (operation.may_be_left_out) {
+      define(py::arg(argument) = "");
+    } else {
+      define(py::arg(argument));
+    }
   }
 }
 
@@ -357,11 +389,7 @@ void define_commands(ClientClass& client) {
               records = self.status(topic, host);
             }
             py::list all;
-            for (const Client::Record& record : records) {
-              py::dict members;
-              for (const auto& [name, value] : record) members[name.c_str()] = std::visit(ToPython(), value);
-              all.append(std::move(members));
-            }
+            for (const Client::Record& record : records) all.append(dict_of(record));
             return all;
           },
           py::arg("topic"), py::arg("host") = "",
@@ -421,9 +449,18 @@ void define_watches(ClientClass& client) {
            [](Client& self, const std::string& host, py::function callback) {
              return begin(self, &Client::watch_exceptions, host, std::move(callback));
            })
-      .def("watch_transitions", [](Client& self, const std::string& host, py::function callback) {
-        return begin(self, &Client::watch_transitions, host, std::move(callback));
-      });
+      .def("watch_transitions",
+           [](Client& self, const std::string& host, py::function callback) {
+             return begin(self, &Client::watch_transitions, host, std::move(callback));
+           })
+      .def(
+          "watch_status",
+          [](Client& self, const std::string& topic, const std::string& host, py::function callback) {
+            return self.watch_status(topic, host, guarded<Client::Record>(std::move(callback)));
+          },
+          py::arg("topic"), py::arg("host"), py::arg("callback"),
+          "As the others, for any status topic: a dict each, with `removed` beside the names of the "
+          "contract.");
 }
 
 }  // namespace

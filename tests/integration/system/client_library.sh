@@ -43,7 +43,7 @@ done
 
 echo "- Python reads what an instance has said, and has the host read its configuration"
 cat >"$cell/logs.py" <<'EOF'
-import os, plchost_client
+import os, threading, plchost_client
 with plchost_client.Client(domain=int(os.environ["PLCHOST_DOMAIN"]), timeout=20.0) as client:
     said = client.logs("north", "packer1")
     assert any(line.source == "manager" for line in said), [line.text for line in said]
@@ -51,6 +51,17 @@ with plchost_client.Client(domain=int(os.environ["PLCHOST_DOMAIN"]), timeout=20.
     assert client.logs("north", "packer1", after=said[-1]) == []
     assert [line.text for line in client.logs("north", "packer1", after=said[0])] == [line.text for line in said[1:]]
     assert client.reload("north") == "nothing has changed"
+    objects = client.objects("north", "packer1/*")
+    assert "packer1/product" in [one.name for one in objects], [one.name for one in objects]
+    assert len(client.objects()) == client.hosts()[0].objects
+    assert all(node.name for node in client.nodes()) and all(route.from_node for route in client.routes())
+    clock = client.read_clock()
+    assert abs(clock.offset) <= clock.uncertainty, (clock.offset, clock.uncertainty)
+    assert "clock_source" in [finding.id for finding in client.check_host()]
+    seen, there = [], threading.Event()
+    with client.watch_status("instance", "north", lambda one: (seen.append(one), there.set())):
+        assert there.wait(20)
+    assert seen[0]["instance"] == "packer1" and seen[0]["removed"] is False, seen
     try:
         client.logs("north", "nobody")
         raise AssertionError("there is no such instance")
