@@ -244,14 +244,15 @@ plant_in_documents "documents: unknown command" "plcctl has no command 'list wri
 plant_in_documents "documents: step of a walk that the code lacks" "has no function EventIntake::try_posting" manager/walks.md 's,EventIntake::try_post ,EventIntake::try_posting ,'
 plant_in_documents "documents: step of a walk that its caller does not call" "Task::run_cycle does not call before_cycle" manager/walks.md 's,as before_entry,as before_cycle,'
 
-# A key of the configuration is one row and one member: both are added to a scratch copy.
-check_keys() { g++ -std=c++23 -fsyntax-only -I "$plot/tree" "$plot/tree/manager/config/config_keys.cpp"; }
-sed -i 's,^struct BlocksConfig {,&\n  bool planted = false;,' "$plot/tree/manager/config/manager_config.hpp"
-must_be_red "configuration: member without a row" "each key of [blocks] has its row" check_keys
-sed -i 's/^constexpr std::array kBlocksKeys = {/&\n    blocks<\&BlocksConfig::planted, TruthKey>({.name = "planted", .when = at_once, .meaning = "a plant"}),/' \
-  "$plot/tree/manager/config/config_keys.cpp"
-check_keys || { echo "a member and its row are not enough for a key of the configuration"; failed=1; }
-must_be_red "configuration: row without documentation" "no row for the key [blocks] planted" "$gates/documents.py" "$plot/tree"
+# Of each thing that the READMEs tell how to add, one is added; here their tables go stale.
+"$gates/places.py" || { echo "things cannot be added as the READMEs say"; failed=1; }
+sed -i '/^| `schedulers\/registry.hpp` |/d' "$plot/tree/schedulers/README.md"
+must_be_red "places: file without a row" "'To add a scheduler' does not name schedulers/registry.hpp" "$gates/places.py" "$plot/tree" scheduler
+cp schedulers/README.md "$plot/tree/schedulers/"
+sed -i 's,^| `schedulers/registry.hpp` |,| `schedulers/registry.hpp`\, `schedulers/scheduler.hpp` |,' "$plot/tree/schedulers/README.md"
+must_be_red "places: row without a use" "'To add a scheduler' names schedulers/scheduler.hpp, which need not be touched" \
+  "$gates/places.py" "$plot/tree" scheduler
+cp schedulers/README.md "$plot/tree/schedulers/"
 
 # Units are joined, and read one by one where two of them use a name.
 new_tree
