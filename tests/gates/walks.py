@@ -1,7 +1,8 @@
 """manager/walks.md against the code. A part of documents.py.
 
 * Each step names a function and a file that has it; so does each row of "Where to look".
-* A step that is indented below another one is called there: the caller's body has its name, or the name that follows "as".
+* A step that is indented below another one is called there: the caller's body has its name, or the name that follows "as". A comment
+  calls nothing.
 """
 
 import re
@@ -9,6 +10,8 @@ import re
 PAGE = "manager/walks.md"
 STEP = re.compile(r"( *)([\w:]+) +((?:\w+/)+\w+\.[ch]pp)\b(?: +as ([\w>-]+))?")
 ROW = re.compile(r"\| [^|]+ \| `([\w:]+)` \| `([\w/]+\.[ch]pp)` \|$")
+# A comment; or a text or character, which may look like one.
+COMMENT = re.compile(r"""(//[^\n]*|/\*.*?\*/)|"(?:\\.|[^"\\\n])*"|'(?:\\.|[^'\\\n])'""", re.DOTALL)
 # Between a function's parameters and its body: const, noexcept, the type that it returns, how members begin.
 BEFORE_BODY = re.compile(r"[\s\w:<>&,*\[\]()-]*?(?::\s[^;{]*(?:\{[^{}]*\}[^;{]*)*)?\{")
 
@@ -34,6 +37,12 @@ def bodies_of(code, owner, name):
     return bodies
 
 
+def code_of(path):
+    """The text of the file without its comments."""
+    text = path.read_text(encoding="utf-8") if path.exists() else ""
+    return COMMENT.sub(lambda found: " " if found[1] else found[0], text)
+
+
 def has_function(code, owner, name):
     if not owner:
         return re.search(rf"\b{name}\(", code)
@@ -52,8 +61,7 @@ def walk_faults(root, texts):
         steps += bool(step)
         rows += bool(row)
         function, file = row.groups() if row else step.group(2, 3)
-        path = root / file
-        code = path.read_text(encoding="utf-8") if path.exists() else ""
+        code = code_of(root / file)
         owner, _, name = function.rpartition("::")
         owner = owner.split("::")[-1]
         if not has_function(code, owner, name):
