@@ -182,7 +182,7 @@ RTS_RESULT CDECL SchedRaiseEvent(RTS_HANDLE hTask);
 
 /* Why the process of this application began. An application that keeps data of its own decides by it whether
  * to go on with them, as the runtime does: PLC_START_COLD gives retain areas their initial values, and in all
- * cases retain and persistent areas go on with what was kept if its layout is theirs (see below). Any. */
+ * cases retain and persistent areas go on with retain values of their layout (see below). Any. */
 #define PLC_START_FIRST 0       /* by hand, first start by this manager, or another application was loaded */
 #define PLC_START_WARM 1        /* warm reset, or restart */
 #define PLC_START_COLD 2        /* cold reset: begin with initial values */
@@ -235,8 +235,7 @@ const char* CDECL plc_parameter(const char* pszName);
 /* A task that uses an area. */
 typedef struct {
   const char* pszTask;
-  unsigned int
-      dwOffset; /* output: the bytes that this task writes, and no other; dwBytes 0: none of its own */
+  unsigned int dwOffset; /* output: the bytes that only this task writes; dwBytes 0: none of its own */
   unsigned int dwBytes;
   void** ppAddress; /* gets the address of this task's copy of the area (input, output); may be null */
 } Plc_Area_Use;
@@ -269,8 +268,9 @@ RTS_HANDLE CDECL plc_declare_area(const Plc_Area* pArea, RTS_RESULT* pResult);
 void* CDECL plc_area_address(RTS_HANDLE hArea);
 
 #define PLC_AREA_INITIAL 0u  /* began with its initial values */
-#define PLC_AREA_KEPT 1u     /* went on with what the process before left in memory: nothing is lost */
+#define PLC_AREA_RETAINED 1u /* went on with what the process before left in memory: nothing is lost */
 #define PLC_AREA_RESTORED 2u /* went on with what was written last to a file */
+#define PLC_AREA_KEPT PLC_AREA_RETAINED /* its name before */
 
 typedef struct {
   unsigned int dwSize;   /* sizeof(Plc_Area_State), set by the caller */

@@ -322,7 +322,7 @@ class Application {
     }
   }
 
-  /// Declares an area of `flags` (PLC_AREA_...), which begins with `initial` unless its values are kept.
+  /// Declares an area of `flags` (PLC_AREA_...), which begins with `initial` unless it has retain values.
   template <class T>
   Area<T> area(const std::string& name, unsigned int flags, const T& initial = T{},
                const AreaOptions& options = {}) {

@@ -87,7 +87,7 @@ TimePoint BlockGateway::serve(TimePoint now) {
     beat(now);
     next_beat_ = now + kBeat;
   }
-  write_acks();
+  write_block_acks();
   return pending_->empty() ? next_beat_ : std::min(next_beat_, now + kRetryPending);
 }
 
@@ -182,7 +182,7 @@ void BlockGateway::take(const plc_Block& block, const dds::Guid& writer, TimePoi
   pending_->take(*header, block_contents(block), now);
 }
 
-void BlockGateway::write_acks() {
+void BlockGateway::write_block_acks() {
   const NodeSet full = pending_->full();
   constexpr NodeSet kLow(~std::uint64_t{0});
   for (const auto& [number, peer] : peers_) {

@@ -109,7 +109,7 @@ class BlockGateway {
   void take_acks(TimePoint now);
   void take_blocks(TimePoint now);
   void take(const plc_Block& block, const dds::Guid& writer, TimePoint now);
-  void write_acks();
+  void write_block_acks();
   [[nodiscard]] Peer* peer_of(const dds::Guid& writer);
   [[nodiscard]] dds::Guid writer_behind(const dds_sample_info_t& info);
   void count(std::atomic<std::uint64_t> NodeCounters::* counter, std::uint64_t by = 1) noexcept {

@@ -56,8 +56,8 @@ struct TaskCounters {
   std::int64_t release_ns;   ///< planned release of the last cycle, CLOCK_MONOTONIC
   std::int64_t spin_sum_ns;  ///< time spun ahead of releases (CmpScheduleOneShot)
   /// How often the task's own kernel timer went off, by the timer's count (CmpScheduleTimer). Beyond
-  /// `recorded` these are overruns: as many as `lost_cycles`, as long as the timer was not armed anew in
-  /// between.
+  /// `recorded` these are releases of lost cycles: as many as `lost_cycles`, as long as the timer was not
+  /// armed anew in between.
   std::uint64_t timer_expirations;
   std::int64_t interval_ns;    ///< in force since the last cycle; cyclic tasks only
   std::int64_t since_ns;       ///< the last reset, or when the task was made; CLOCK_MONOTONIC

@@ -55,7 +55,7 @@ TEST(NoAllocation, InCyclesWithAreasOfEachKind) {
   remove_pool_memories(name);
 }
 
-TEST(NoAllocation, WhenATaskGivesItsKeptVariablesAtTheEndOfACycle) {
+TEST(NoAllocation, WhenATaskGivesItsRetainAreasAtTheEndOfACycle) {
   CycleCounter counter{2};
   const std::vector<std::byte> live(4096, std::byte{1});
   std::vector<std::byte> copy(4096);

@@ -11,7 +11,7 @@
 namespace plchost {
 
 /// The variables that plc_keep_variables() names.
-struct KeptVariables {
+struct CarriedVariables {
   std::string name;
   void* address = nullptr;  ///< in the application
   std::uint32_t bytes = 0;
@@ -31,7 +31,7 @@ struct ApplicationDeclaration {
   sys_setup_tasks_struct* tasks = nullptr;  ///< in the application; null: nothing yet
   bool tasks_given_twice = false;
   std::vector<TaskSettings> task_options;
-  std::vector<KeptVariables> variables;
+  std::vector<CarriedVariables> variables;
   std::vector<RTS_HANDLE> events;  ///< own ones that it registers
   std::vector<EventCallback> callbacks;
   std::vector<DeclaredArea> areas;  ///< at the first load Areas gets them

@@ -121,7 +121,7 @@ void ApplicationHost::set_up_tasks(sys_setup_tasks_struct* tasks) noexcept {
   if (!has_application_) task_table_.set_up(tasks);
 }
 
-RTS_RESULT ApplicationHost::keep_variables(const KeptVariables& variables) {
+RTS_RESULT ApplicationHost::keep_variables(const CarriedVariables& variables) {
   const auto refuse = [&](RTS_RESULT why, std::string_view text) {
     spdlog::error("plc_keep_variables: variables '{}': {}", shown(variables.name), text);
     return why;
@@ -132,7 +132,7 @@ RTS_RESULT ApplicationHost::keep_variables(const KeptVariables& variables) {
   if (variables.address == nullptr || variables.bytes == 0)
     return refuse(ERR_PARAMETER, "pAddress is null or dwBytes is 0");
   std::uint64_t bytes = variables.bytes;
-  for (const KeptVariables& known : collected_->variables) {
+  for (const CarriedVariables& known : collected_->variables) {
     if (known.name == variables.name) return refuse(ERR_DUPLICATE, "are named twice");
     bytes += known.bytes;
   }

@@ -103,15 +103,15 @@ std::vector<std::string> compare_areas(std::span<const DeclaredArea> running,
   return compare_all("area", running, next, compare_area);
 }
 
-std::vector<std::string> compare_variables(std::span<const KeptVariables> running,
-                                           std::span<const KeptVariables> next) {
+std::vector<std::string> compare_variables(std::span<const CarriedVariables> running,
+                                           std::span<const CarriedVariables> next) {
   std::vector<std::string> lines;
-  for (const KeptVariables& kept : running) {
-    const auto same = std::ranges::find(next, kept.name, &KeptVariables::name);
+  for (const CarriedVariables& carried : running) {
+    const auto same = std::ranges::find(next, carried.name, &CarriedVariables::name);
     if (same == next.end()) continue;
-    Differences variables(lines, fmt::format("variables '{}'", kept.name));
-    variables.look("dwBytes", kept.bytes, same->bytes);
-    variables.look("qwLayout", kept.layout, same->layout);
+    Differences variables(lines, fmt::format("variables '{}'", carried.name));
+    variables.look("dwBytes", carried.bytes, same->bytes);
+    variables.look("qwLayout", carried.layout, same->layout);
   }
   return lines;
 }

@@ -82,11 +82,11 @@ Result<void> OnlineChange::connect() {
     codes_.push_back(next_.codes()[static_cast<std::size_t>(same - next_.tasks().begin())]);
     infos_.push_back(codes_.back()->info);
   }
-  for (const KeptVariables& kept : host_.declaration().variables) {
-    const auto same = std::ranges::find(declaration_.variables, kept.name, &KeptVariables::name);
+  for (const CarriedVariables& carried : host_.declaration().variables) {
+    const auto same = std::ranges::find(declaration_.variables, carried.name, &CarriedVariables::name);
     if (same == declaration_.variables.end()) continue;
-    copies_.push_back({.to = same->address, .from = kept.address, .bytes = kept.bytes});
-    copied_.push_back(kept.name);
+    copies_.push_back({.to = same->address, .from = carried.address, .bytes = carried.bytes});
+    copied_.push_back(carried.name);
   }
   return {};
 }

@@ -29,7 +29,8 @@ Result<void> check_flags(const DeclaredArea& area) {
   }
   if (area.is_input() && area.is_output()) return bad_area(area.name, "is input or output, not both");
   if (area.has_image() && area.is_retain()) {
-    return bad_area(area.name, "inputs and outputs are not kept: RETAIN and PERSISTENT are for other areas");
+    return bad_area(area.name,
+                    "inputs and outputs have no retain values: RETAIN and PERSISTENT are for other areas");
   }
   return {};
 }

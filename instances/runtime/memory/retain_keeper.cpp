@@ -76,7 +76,7 @@ struct RetainKeeper::Start {
             fmt::format("the process before ended within the cycles of {} tasks", left->in_cycle));
       }
       generation = left->image.generation;
-      origin = PLC_AREA_KEPT;
+      origin = PLC_AREA_RETAINED;
       source = std::move(left->image);
     } else if (found.newest) {
       origin = PLC_AREA_RESTORED;
@@ -124,7 +124,7 @@ struct RetainKeeper::Start {
   }
 
   [[nodiscard]] bool goes_on_in_place(const RetainImage& initial, bool cold) const {
-    return origin == PLC_AREA_KEPT && source && source->layout == initial.layout && !cold;
+    return origin == PLC_AREA_RETAINED && source && source->layout == initial.layout && !cold;
   }
 };
 

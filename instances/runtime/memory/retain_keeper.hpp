@@ -31,7 +31,7 @@ class RetainKeeper {
     Duration postpone = std::chrono::milliseconds(100);
     bool cold = false;  ///< retain areas begin with initial values
   };
-  /// Where an area's values come from: PLC_AREA_INITIAL, PLC_AREA_KEPT, PLC_AREA_RESTORED.
+  /// Where an area's values come from: PLC_AREA_INITIAL, PLC_AREA_RETAINED, PLC_AREA_RESTORED.
   using Origin = unsigned;
 
   /// Whether make() would refuse this layout, as it is now: the process that runs goes on. Changes nothing.

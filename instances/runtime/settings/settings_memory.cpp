@@ -1,4 +1,4 @@
-// [SysMem]: where the areas of an application lie. [Retain]: how its retain variables are kept.
+// [SysMem]: where the areas of an application lie. [Retain]: how its retain values are written.
 #include <algorithm>
 #include <array>
 #include <utility>

@@ -207,7 +207,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadDeclaration{"dwFlags 0x0", [](Plc_Area& area) { area.dwFlags = 0; }},
         BadDeclaration{"dwFlags 0x80", [](Plc_Area& area) { area.dwFlags = 0x80; }},
         BadDeclaration{"not both", [](Plc_Area& area) { area.dwFlags = PLC_AREA_INPUT | PLC_AREA_OUTPUT; }},
-        BadDeclaration{"are not kept", [](Plc_Area& area) { area.dwFlags |= PLC_AREA_RETAIN; }},
+        BadDeclaration{"have no retain values", [](Plc_Area& area) { area.dwFlags |= PLC_AREA_RETAIN; }},
         BadDeclaration{"dwBytes 0", [](Plc_Area& area) { area.dwBytes = 0; }},
         BadDeclaration{"1 to 1048576", [](Plc_Area& area) { area.dwBytes = PLC_MAX_IMAGE + 1; }},
         BadDeclaration{"pUses must point", [](Plc_Area& area) { area.nUses = 1; }},

@@ -15,28 +15,28 @@ namespace {
 
 using ::testing::IsEmpty;
 
-class KeptVariablesOf : public ::testing::Test {
+class CarriedVariablesOf : public ::testing::Test {
  protected:
-  KeptVariablesOf() { host_.begin_init(declaration_); }
+  CarriedVariablesOf() { host_.begin_init(declaration_); }
   ApplicationHost host_{"test", nullptr};
   ApplicationDeclaration declaration_;
   std::array<char, 8> bytes_{};
 };
 
-TEST_F(KeptVariablesOf, AnApplicationAreNamedInItsInit) {
+TEST_F(CarriedVariablesOf, AnApplicationAreNamedInItsInit) {
   EXPECT_EQ(plc_keep_variables("a", bytes_.data(), 8, 3), ERR_OK);
   EXPECT_EQ(plc_keep_variables("a", bytes_.data(), 8, 3), ERR_DUPLICATE);
   host_.end_init();
   EXPECT_EQ(plc_keep_variables("b", bytes_.data(), 8, 3), ERR_NOTINITIALIZED);
   ASSERT_EQ(declaration_.variables.size(), 1U);
-  const KeptVariables& kept = declaration_.variables.front();
+  const CarriedVariables& kept = declaration_.variables.front();
   EXPECT_EQ(kept.name, "a");
   EXPECT_EQ(kept.address, bytes_.data());
   EXPECT_EQ(kept.bytes, 8U);
   EXPECT_EQ(kept.layout, 3U);
 }
 
-TEST_F(KeptVariablesOf, NoNameOrNoBytesAreRefused) {
+TEST_F(CarriedVariablesOf, NoNameOrNoBytesAreRefused) {
   EXPECT_EQ(plc_keep_variables(nullptr, bytes_.data(), 8, 0), ERR_PARAMETER);
   EXPECT_EQ(plc_keep_variables("", bytes_.data(), 8, 0), ERR_PARAMETER);
   EXPECT_EQ(plc_keep_variables("a b", bytes_.data(), 8, 0), ERR_PARAMETER);
@@ -47,12 +47,12 @@ TEST_F(KeptVariablesOf, NoNameOrNoBytesAreRefused) {
   EXPECT_EQ(plc_keep_variables(std::string(PLC_MAX_VARIABLE_NAME, 'x').c_str(), bytes_.data(), 8, 0), ERR_OK);
 }
 
-TEST_F(KeptVariablesOf, AnApplicationHaveABound) {
+TEST_F(CarriedVariablesOf, AnApplicationHaveABound) {
   EXPECT_EQ(plc_keep_variables("all", bytes_.data(), PLC_MAX_VARIABLE_BYTES, 0), ERR_OK);
   EXPECT_EQ(plc_keep_variables("one", bytes_.data(), 1, 0), ERR_NOMEMORY);
 }
 
-TEST_F(KeptVariablesOf, AnApplicationAreSoMany) {
+TEST_F(CarriedVariablesOf, AnApplicationAreSoMany) {
   for (unsigned i = 0; i < PLC_MAX_VARIABLES; ++i) {
     ASSERT_EQ(plc_keep_variables(std::to_string(i).c_str(), bytes_.data(), 1, 0), ERR_OK);
   }

@@ -45,7 +45,7 @@ TEST_F(Retain, LosesNothingWithItsProcess) {
   lose_files_of_the_end();
   start_well();
   EXPECT_EQ(value(0), 42U);
-  EXPECT_EQ(sut->origin(0), PLC_AREA_KEPT);
+  EXPECT_EQ(sut->origin(0), PLC_AREA_RETAINED);
 }
 
 TEST_F(Retain, TheirMemoryIsAKeptObjectOfThePool) {
@@ -69,7 +69,7 @@ TEST_F(Retain, GoOnWhenThePoolWasMadeAnewAroundTheirFile) {
   pool_ = ObjectPool::create(name_.get(), {.max_objects = 16}).value();
   start_well();
   EXPECT_EQ(value(0), 42U);
-  EXPECT_EQ(sut->origin(0), PLC_AREA_KEPT);
+  EXPECT_EQ(sut->origin(0), PLC_AREA_RETAINED);
   EXPECT_TRUE(pool_.look_at("line1.retain"));
 }
 
@@ -113,7 +113,7 @@ TEST_F(Retain, ColdResetInitialisesRetainAndKeepsPersistent) {
   EXPECT_EQ(value(0), kInitial);
   EXPECT_EQ(value(1), 43U);
   EXPECT_EQ(sut->origin(0), PLC_AREA_INITIAL);
-  EXPECT_EQ(sut->origin(1), PLC_AREA_KEPT);
+  EXPECT_EQ(sut->origin(1), PLC_AREA_RETAINED);
   lose_files_of_the_end();
   forget_memory();
   start_well();
@@ -149,7 +149,7 @@ TEST_F(Retain, OfAStartThatFailsLeaveThoseOfBeforeAsTheyWere) {
     EXPECT_FALSE(std::filesystem::exists(folder_ / "line1.retain.0.old"));
     start_well();
     EXPECT_EQ(value(0), 42U);
-    EXPECT_EQ(sut->origin(0), power_cut ? PLC_AREA_RESTORED : PLC_AREA_KEPT);
+    EXPECT_EQ(sut->origin(0), power_cut ? PLC_AREA_RESTORED : PLC_AREA_RETAINED);
   }
 }
 
@@ -176,7 +176,7 @@ TEST_F(Retain, OfAnotherLayoutIsTakenByNameIfWanted) {
   EXPECT_EQ(value(0), kInitial);
   EXPECT_EQ(value(1) & 0xffffffff, 0x05060708U);
   EXPECT_EQ(sut->origin(0), PLC_AREA_INITIAL);
-  EXPECT_EQ(sut->origin(1), PLC_AREA_KEPT);
+  EXPECT_EQ(sut->origin(1), PLC_AREA_RETAINED);
 }
 
 TEST_F(Retain, OfAnotherApplicationIsOfAnotherLayout) {
