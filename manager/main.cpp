@@ -17,6 +17,7 @@
 #include "manager/store/store_application.hpp"
 #include "manager/store/store_process.hpp"
 #include "manager/store/wish_writer.hpp"
+#include "manager/surroundings.hpp"
 #include "manager/system/child_process.hpp"
 #include "shm/base/memory_guard.hpp"
 #include "shm/base/names.hpp"

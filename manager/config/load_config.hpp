@@ -27,11 +27,6 @@ struct ConfigSurroundings {
   std::function<Result<void>(const std::string& file)> check_settings = {};  ///< null: not checked
 };
 
-/// As the system is now.
-[[nodiscard]] ConfigSurroundings config_surroundings();
-/// The same with all that a start needs. `programs`: the folder of plc-instance.
-[[nodiscard]] ConfigSurroundings start_surroundings(const std::string& programs);
-
 /// All that is wrong, one line of text each: "FILE:LINE: [[instance]] 'line1' core: ...".
 using ConfigErrors = std::vector<std::string>;
 

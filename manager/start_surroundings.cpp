@@ -1,3 +1,5 @@
+// start_surroundings(): with the network, and with trials of applications and settings.
+
 #include <csignal>
 #include <memory>
 #include <string>
@@ -7,7 +9,7 @@
 #include <net/if.h>
 #include <poll.h>
 
-#include "manager/config/load_config.hpp"
+#include "manager/surroundings.hpp"
 #include "manager/system/application_trial.hpp"
 #include "manager/system/child_process.hpp"
 #include "shm/base/names.hpp"

@@ -1,10 +1,11 @@
+#include "manager/surroundings.hpp"
+
 #include <array>
 #include <climits>
 #include <string>
 
 #include <unistd.h>
 
-#include "manager/config/load_config.hpp"
 #include "manager/host_check/host_files.hpp"
 #include "schedulers/registry.hpp"
 #include "shm/base/thread.hpp"
