@@ -4,8 +4,8 @@
 #include "api/cli/repeat.hpp"
 #include "api/cli/rows/rows.hpp"
 #include "api/cli/rows/status_rows.hpp"
-#include "api/cli/rows/task_rows.hpp"
 #include "api/cli/verbs/object_verbs.hpp"
+#include "api/cli/verbs/task_rows.hpp"
 #include "api/cli/verbs/transition_verbs.hpp"
 
 namespace plchost {

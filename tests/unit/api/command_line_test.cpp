@@ -2,11 +2,11 @@
 
 #include <gmock/gmock.h>
 
+#include "api/cli/verbs/word_hint.hpp"
 #include "api/cli/words/completion.hpp"
 #include "api/cli/words/man_page.hpp"
 #include "api/cli/words/overview.hpp"
 #include "api/cli/words/short_form.hpp"
-#include "api/cli/words/word_hint.hpp"
 
 namespace plchost {
 namespace {

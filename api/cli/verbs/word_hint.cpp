@@ -1,4 +1,4 @@
-#include "api/cli/words/word_hint.hpp"
+#include "api/cli/verbs/word_hint.hpp"
 
 #include <cstddef>
 #include <string_view>

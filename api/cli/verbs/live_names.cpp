@@ -1,4 +1,4 @@
-#include "api/cli/words/live_names.hpp"
+#include "api/cli/verbs/live_names.hpp"
 
 #include <algorithm>
 #include <functional>

@@ -1,4 +1,4 @@
-#include "api/cli/rows/task_rows.hpp"
+#include "api/cli/verbs/task_rows.hpp"
 
 #include "api/cli/rows/rows.hpp"
 #include "api/cli/rows/status_rows.hpp"
