@@ -12,7 +12,7 @@
 
 #include "api/audit/audit_writer.hpp"
 #include "api/dds/guid.hpp"
-#include "api/server/posts/posted_events.hpp"
+#include "api/server/clients/posted_events.hpp"
 #include "shm/base/time.hpp"
 
 namespace plchost {

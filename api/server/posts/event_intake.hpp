@@ -12,11 +12,11 @@
 #include <control.h>
 
 #include "api/dds/guid.hpp"
-#include "api/server/access/access_guard.hpp"
-#include "api/server/posts/ack_writers.hpp"
+#include "api/server/clients/access_guard.hpp"
+#include "api/server/clients/ack_writers.hpp"
+#include "api/server/clients/posted_events.hpp"
 #include "api/server/posts/event_directory.hpp"
 #include "api/server/posts/post_ledger.hpp"
-#include "api/server/posts/posted_events.hpp"
 #include "shm/base/time.hpp"
 #include "shm/pages/host_page_copy.hpp"
 

@@ -11,7 +11,6 @@
 
 #include "api/control/host_finding.hpp"
 #include "api/dds/topics.hpp"
-#include "api/server/posts/writer_watch.hpp"
 #include "api/server/status/application_watch.hpp"
 #include "api/server/status/exception_watch.hpp"
 #include "api/server/status/host_load.hpp"
@@ -19,6 +18,7 @@
 #include "api/server/status/status_tables.hpp"
 #include "api/server/status/task_watch.hpp"
 #include "api/server/status/transition_publisher.hpp"
+#include "api/server/status/writer_watch.hpp"
 #include "shm/pages/host_page_copy.hpp"
 #include "shm/pool/object_pool.hpp"
 

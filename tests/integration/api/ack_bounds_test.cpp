@@ -11,7 +11,7 @@
 #include "api/client/poster.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"
-#include "api/server/posts/ack_writers.hpp"
+#include "api/server/clients/ack_writers.hpp"
 #include "tests/integration/api/readers_of.hpp"
 #include "tests/integration/api/test_host.hpp"
 

@@ -9,7 +9,7 @@
 #include "api/dds/samples.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"
-#include "api/server/session_table.hpp"
+#include "api/server/clients/session_table.hpp"
 #include "tests/integration/api/test_host.hpp"
 
 namespace plchost {

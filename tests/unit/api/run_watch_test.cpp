@@ -1,4 +1,4 @@
-#include "api/server/posts/run_watch.hpp"
+#include "api/server/status/run_watch.hpp"
 
 #include <map>
 #include <string>

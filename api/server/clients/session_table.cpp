@@ -1,4 +1,4 @@
-#include "api/server/session_table.hpp"
+#include "api/server/clients/session_table.hpp"
 
 #include <algorithm>
 #include <string_view>

@@ -5,8 +5,8 @@
 
 #include <control.h>
 
+#include "api/server/clients/session_table.hpp"
 #include "api/server/posts/event_intake.hpp"
-#include "api/server/session_table.hpp"
 #include "api/server/status/status_table.hpp"
 #include "shm/base/time.hpp"
 

@@ -1,4 +1,4 @@
-#include "api/server/posts/posted_events.hpp"
+#include "api/server/clients/posted_events.hpp"
 
 #include <algorithm>
 #include <utility>

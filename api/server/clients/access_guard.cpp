@@ -1,4 +1,4 @@
-#include "api/server/access/access_guard.hpp"
+#include "api/server/clients/access_guard.hpp"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "api/server/posts/writer_watch.hpp"
+#include "api/server/status/writer_watch.hpp"
 
 #include <algorithm>
 #include <functional>

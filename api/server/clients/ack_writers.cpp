@@ -1,4 +1,4 @@
-#include "api/server/posts/ack_writers.hpp"
+#include "api/server/clients/ack_writers.hpp"
 
 #include <algorithm>
 

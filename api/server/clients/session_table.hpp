@@ -13,7 +13,7 @@
 #include "api/dds/entity.hpp"
 #include "api/dds/entity_reaper.hpp"
 #include "api/dds/guid.hpp"
-#include "api/server/posts/ack_writers.hpp"
+#include "api/server/clients/ack_writers.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
 
