@@ -80,6 +80,14 @@ def layer_of(path):
     return None
 
 
+def included(folder, bracket, name):
+    """The file from the top; None: it is of the system, or made by the build."""
+    beside = os.path.normpath(f"{folder}/{name}")
+    if bracket == '"' and os.path.exists(beside):
+        name = beside
+    return name if "/" in name and name.split("/")[0] in HOUSES else None
+
+
 def reach(layer, known):
     """All that the layer may include, by any number of arrows."""
     if layer not in known:
@@ -133,7 +141,7 @@ if circle := find_circle():
     faults.append("the arrows go round: " + " ─► ".join(circle))
 else:
     known = {}
-    include = re.compile(r'\s*#\s*include "([^"]+)"')
+    include = re.compile(r'\s*#\s*include\s*(["<])([^">]+)[">]')
     undrawn = set()
     for house in houses:
         for folder, _, files in os.walk(house):
@@ -147,11 +155,10 @@ else:
                     continue
                 for number, line in enumerate(open(path, encoding="utf-8", errors="replace"), 1):
                     found = include.match(line)
-                    if not found or found[1].split("/")[0] not in HOUSES or "/" not in found[1]:
-                        continue
-                    there = layer_of(found[1])
+                    target = found and included(folder, *found.groups())
+                    there = target and layer_of(target)
                     if there and there != here and there not in reach(here, known):
-                        faults.append(f"{path}:{number}: {here} may not include {there} ({found[1]})")
+                        faults.append(f"{path}:{number}: {here} may not include {there} ({found[2]})")
     faults += [f"{folder}: it is not in the drawing of {folder.split('/')[0]}/README.md" for folder in sorted(undrawn)]
 if not arrows:
     faults.append("no drawing and no folder of the code was found: is this the project?")
