@@ -60,6 +60,11 @@ must_not_include api/dds/planted.hpp api/client/control_client.hpp "api/dds/ may
 must_not_include manager/system/planted.hpp manager/config/load_config.hpp "manager/system/ may not include manager/config/"
 must_not_include manager/planted.hpp instances/runtime/settings/settings.hpp "manager/ may not include instances/runtime/settings/"
 must_not_include tests/unit/base/planted.cpp shm/pool/object_pool.hpp "tests/unit/base/ may not include shm/pool/"
+for way in '"../pool/object_pool.hpp"' '<shm/pool/object_pool.hpp>' '"../../shm/base/../pool/object_pool.hpp"' '"./../pool/object_pool.hpp"'; do
+  printf '#  include  %s\n' "$way" >"$plot/tree/shm/base/planted.hpp"
+  must_be_red "layers: include of $way" "shm/base/planted.hpp:1: shm/base/ may not include shm/pool/" "$gates/layers.sh" "$plot/tree"
+done
+rm "$plot/tree/shm/base/planted.hpp"
 must_not_include shm/files/planted.hpp tests/support/own_name.hpp "shm/files/ may not include tests/support/own_name"
 mkdir "$plot/tree/shm/attic" && touch "$plot/tree/shm/attic/planted.hpp"
 must_be_red "layers: folder" "shm/attic: it is not in the drawing of shm/README.md" "$gates/layers.sh" "$plot/tree"
@@ -242,6 +247,7 @@ plant_in_documents "documents: unknown unit" "no unit of systemd is called plcho
 plant_in_documents "documents: function that is gone" "the code has no TaskSet::switch_planted" schedulers/mechanisms.md 's,TaskSet::switch_to,TaskSet::switch_planted,'
 plant_in_documents "documents: unknown command" "plcctl has no command 'list writer'" api/plcctl.md 's,^\| `list writers` \| Posts,| `list writer` | Posts,'
 plant_in_documents "documents: step of a walk that the code lacks" "has no function EventIntake::try_posting" manager/walks.md 's,EventIntake::try_post ,EventIntake::try_posting ,'
+plant_in_documents "documents: step of a walk that only a comment names" "Task::run_cycle does not call work_between_cycles" schedulers/tasks/task.cpp 's,work_between_cycles\(\);,// &,'
 plant_in_documents "documents: step of a walk that its caller does not call" "Task::run_cycle does not call before_cycle" manager/walks.md 's,as before_entry,as before_cycle,'
 
 # Of each thing that the READMEs tell how to add, one is added; here their tables go stale.
