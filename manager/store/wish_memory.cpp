@@ -138,7 +138,7 @@ Result<void> WishMemory::write(const InstanceWish& wish) {
 
 Result<bool> WishMemory::mend() {
   if (text_.empty()) return false;
-  const bool headed = is_of_kind(layout(), kWishKind) && layout().size == sizeof(Layout);
+  const bool headed = is_described(layout(), kWishKind);
   if (headed && holds(0) && holds(1)) return false;
   if (memory_.lost()) {  // it has been looked at
     PLCHOST_TRY_ASSIGN(memory_, MemoryFile::replace(name_, sizeof(Layout), new_page<Layout>(kWishKind)));

@@ -26,14 +26,12 @@ Result<LinkMemory> LinkMemory::make(const std::string& name, const NodeLife& fro
                                     std::uint32_t slots) {
   const auto fill = [&](std::span<std::byte> bytes) -> Result<void> {
     auto& layout = *reinterpret_cast<LinkLayout*>(bytes.data());
-    layout.magic = kLinkKind.magic;
-    layout.version = kLinkKind.version;
     layout.slots = slots;
-    layout.size = bytes.size();
     layout.from = from.node;
     layout.to = to.node;
     layout.from_generation = from.generation;
     layout.to_generation = to.generation;
+    describe_page(layout, kLinkKind, bytes.size());
     return {};
   };
   auto file = MemoryFile::replace(name, link_size(slots), fill);

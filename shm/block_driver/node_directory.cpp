@@ -23,10 +23,8 @@ std::string directory_name(std::string_view pool, std::string_view base) {
 
 Result<void> fill_directory(std::span<std::byte> bytes) {
   auto& layout = *reinterpret_cast<DirectoryLayout*>(bytes.data());
-  layout.magic = kDirectoryKind.magic;
-  layout.version = kDirectoryKind.version;
   layout.slot_count = kMaxNodes;
-  layout.size = sizeof(DirectoryLayout);
+  describe_page(layout, kDirectoryKind);
   return {};
 }
 
@@ -54,7 +52,7 @@ DirectoryLayout& directory_in(const MemoryFile& file) noexcept {
 }
 
 bool has_good_header(const DirectoryLayout& layout) noexcept {
-  return is_of_kind(layout, kDirectoryKind) && layout.slot_count == kMaxNodes;
+  return is_described(layout, kDirectoryKind) && layout.slot_count == kMaxNodes;
 }
 
 bool has_live_node(const DirectoryLayout& layout) noexcept {

@@ -15,17 +15,19 @@
 
 namespace plchost {
 
-/// How a page tells what it is, in the first fields of its layout: `magic` (64 bits) and `version` (32 bits).
+/// How a page tells what it is: by the first fields of its layout, `magic` (64 bits) and `version` (32 bits),
+/// and by its own length in `size`.
 struct PageKind {
   const char* what;  ///< for errors: "host page"
   std::uint64_t magic;
   std::uint32_t version;
 };
 
-/// Magic and version are those of the kind.
+/// Whether the page says that it is of this kind and of `size` bytes: as describe_page() has left it.
 template <class Layout>
-[[nodiscard]] bool is_of_kind(const Layout& page, const PageKind& kind) noexcept {
-  return page.magic == kind.magic && page.version == kind.version;
+[[nodiscard]] bool is_described(const Layout& page, const PageKind& kind,
+                                std::size_t size = sizeof(Layout)) noexcept {
+  return page.magic == kind.magic && page.version == kind.version && page.size == size;
 }
 
 /// Opens a page whose layout begins with magic and version, and checks the magic. Of open_page().
@@ -61,8 +63,7 @@ template <class Layout>
   auto memory = open_of_magic<Layout>(name, kind, access);
   if (!memory) return memory;
   const Layout& page = *reinterpret_cast<const Layout*>(memory->bytes().data());
-  if (page.version != kind.version || page.size != sizeof(Layout) ||
-      memory->bytes().size() != sizeof(Layout)) {
+  if (!is_described(page, kind) || memory->bytes().size() != sizeof(Layout)) {
     return failure(ErrorCode::corrupt,
                    fmt::format("{} '{}' has version {} and {} bytes; {} and {} are needed", kind.what, name,
                                page.version, memory->bytes().size(), kind.version, sizeof(Layout)));
@@ -70,11 +71,11 @@ template <class Layout>
   return memory;
 }
 
-/// Writes the head of a page of fixed size: the magic last.
+/// Writes what the page says of itself: the magic last.
 template <class Layout>
-void describe_page(Layout& page, const PageKind& kind) noexcept {
+void describe_page(Layout& page, const PageKind& kind, std::size_t size = sizeof(Layout)) noexcept {
   page.version = kind.version;
-  page.size = sizeof(Layout);
+  page.size = static_cast<decltype(page.size)>(size);
   std::atomic_signal_fence(std::memory_order_release);  // a kill sees the order of the program
   page.magic = kind.magic;
 }

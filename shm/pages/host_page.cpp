@@ -137,7 +137,7 @@ bool HostPageWriter::keep() {
     memory_ = std::move(*fresh);
   }
   HostPageLayout& page = host_layout_of(memory_);
-  bool changed = !is_of_kind(page, kHostPageKind) || page.size != sizeof(page);
+  bool changed = !is_described(page, kHostPageKind);
   if (changed) describe_page(page, kHostPageKind);
   if (!holds(page.host, host_)) {
     page.host.recover();

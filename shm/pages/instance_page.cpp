@@ -56,17 +56,15 @@ HistogramBuckets buckets_of(const MemoryFile& memory, std::uint32_t task_count, 
   return {all + index * task_bucket_count(shape), task_bucket_count(shape)};
 }
 
-// All of the header but the magic.
-void describe(InstancePageLayout& page, std::size_t tasks, HistogramShape shape) noexcept {
-  page.version = kInstancePageKind.version;
+void write_header(InstancePageLayout& page, std::size_t tasks, HistogramShape shape) noexcept {
   page.digits = shape.digits();
   page.task_count = static_cast<std::uint32_t>(tasks);
-  page.size = size_for(tasks, shape);
+  describe_page(page, kInstancePageKind, size_for(tasks, shape));
 }
 
-bool is_described(const InstancePageLayout& page, std::size_t tasks, HistogramShape shape) noexcept {
-  return is_of_kind(page, kInstancePageKind) && page.digits == shape.digits() && page.task_count == tasks &&
-         page.size == size_for(tasks, shape);
+bool has_good_header(const InstancePageLayout& page, std::size_t tasks, HistogramShape shape) noexcept {
+  return page.digits == shape.digits() && page.task_count == tasks &&
+         is_described(page, kInstancePageKind, size_for(tasks, shape));
 }
 
 // As a whole: a program that has written over it may have changed any byte.
@@ -80,14 +78,13 @@ bool is_same(const Value& one, const Value& other) noexcept {
 Result<void> fill_instance_page(std::span<std::byte> bytes, std::span<const TaskIdentity> tasks,
                                 HistogramShape shape) {
   auto* const page = new (bytes.data()) InstancePageLayout;
-  describe(*page, tasks.size(), shape);
   auto* place = bytes.data() + kTasksOffset;
   for (const TaskIdentity& identity : tasks) {
     auto* const slot = new (place) TaskSlot;
     slot->identity = identity;
     place += sizeof(TaskSlot);
   }
-  page->magic = kInstancePageKind.magic;
+  write_header(*page, tasks.size(), shape);
   return {};
 }
 
@@ -167,11 +164,8 @@ void InstancePage::set_task_state(std::uint32_t index, PageTaskState state) noex
 
 bool InstancePage::keep(const std::function<KnownFault(std::uint32_t)>& fault) {
   InstancePageLayout& page = instance_layout_of(memory_);
-  bool changed = !is_described(page, task_count_, shape_);
-  if (changed) {
-    describe(page, task_count_, shape_);
-    page.magic = kInstancePageKind.magic;
-  }
+  bool changed = !has_good_header(page, task_count_, shape_);
+  if (changed) write_header(page, task_count_, shape_);
   for (std::uint32_t i = 0; i < task_count_; ++i) {
     if (keep_task(i, fault(i))) changed = true;
   }

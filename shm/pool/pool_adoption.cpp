@@ -45,14 +45,13 @@ std::string path_in_memory(std::string_view file) {
 }
 
 bool is_image(const plc_image_header& header, std::uint64_t file_size) noexcept {
-  return header.magic == PLC_IMAGE_MAGIC && header.version == PLC_IMAGE_VERSION &&
-         header.slots == PLC_IMAGE_SLOTS && header.size > 0 && header.size <= PLC_IMAGE_MAX_SIZE &&
-         file_size == plc_image_bytes(static_cast<unsigned>(header.size));
+  if (header.size == 0 || header.size > PLC_IMAGE_MAX_SIZE) return false;
+  const auto size = static_cast<unsigned>(header.size);
+  return plc_image_is_one(&header, size) != 0 && file_size == plc_image_bytes(size);
 }
 
 bool is_reference_clock(const plc_reference_clock& record, std::uint64_t file_size) noexcept {
-  return record.magic == PLC_REFERENCE_CLOCK_MAGIC && record.version == PLC_REFERENCE_CLOCK_VERSION &&
-         record.size == sizeof(record) && file_size == sizeof(record);
+  return plc_reference_clock_is_one(&record) != 0 && file_size == sizeof(record);
 }
 
 // Read, not mapped: it may be cut short meanwhile.

@@ -26,7 +26,8 @@ PoolHeader& header_of(const MemoryFile& memory) noexcept {
   return *reinterpret_cast<PoolHeader*>(memory.bytes().data());
 }
 
-// The constants of a pool.
+// The constants of a pool. Not by describe_page(): the header says them twice, for a process that attaches
+// after a stranger has written over one of the two.
 void write_constants(PoolHeader& header, std::uint32_t max_objects, std::uint64_t pid_namespace) noexcept {
   header.version = kPoolVersion;
   header.entry_size = sizeof(ObjectEntry);

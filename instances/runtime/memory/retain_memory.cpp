@@ -16,7 +16,8 @@ namespace plchost {
 
 namespace {
 
-// "plckept2", as bytes in memory.
+// "plckept2", as bytes in memory. The version is its last letter, not a field as fixed_page.hpp has it:
+// another header would cost the values that a host keeps when it is updated.
 constexpr std::uint64_t kRetainMagic = 0x327470656b636c70;
 // The last bytes of the memory. A file that was cut anywhere has lost them, also if it was made longer again.
 constexpr std::uint64_t kRetainEnd = ~kRetainMagic;

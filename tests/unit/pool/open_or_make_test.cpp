@@ -108,8 +108,8 @@ TEST(FixedPage, GoesOnWithThePageThatIsThereAndRefusesWhatIsNone) {
   ASSERT_TRUE(made) << made.error().describe();
   auto& page = *reinterpret_cast<SmallPage*>(made->bytes().data());
   EXPECT_EQ(page.value, 7U);
-  EXPECT_EQ(page.size, sizeof(SmallPage));
-  EXPECT_TRUE(is_of_kind(page, kSmall));
+  EXPECT_TRUE(is_described(page, kSmall));
+  EXPECT_FALSE(is_described(page, kSmall, sizeof(SmallPage) + 8));
   page.value = 8;
   EXPECT_EQ(reinterpret_cast<SmallPage*>(open(Replaces::anything)->bytes().data())->value, 8U);
   page.version = 3;
