@@ -16,7 +16,7 @@ bool ManagedInstance::adopt() {
   if (!pid) return false;
   if (application_ != config_.application) tell_boot_application();
   status_.pid = *pid;
-  adopt_until_.reset();
+  awaited_.reset();
   log_level_.clear();
   forget_signs();
   adopted_as_ = earlier_ ? std::exchange(earlier_->process, Process::none) : Process::none;

@@ -115,9 +115,9 @@ void ManagedInstance::carry_out(const Decision& decision, const std::string& why
       host_.set_timer(after(decision.delay));
       return set_state(Phase::backing_off, InstanceState::waiting, why);
     case await_process:
-      adopt_until_ = after(kSetupLimit);
+      awaited_ = {.until = after(kSetupLimit), .interval = decision.delay};
       set_state(Phase::backing_off, InstanceState::waiting, why);
-      return host_.set_timer(after(config_.restart_delay));
+      return host_.set_timer(after(decision.delay));
     case bring_down:
       if (idle_phase()) return go_down(InstanceState::offline, why);
       if (phase_ != Phase::ending) end_process(Next::nothing);

@@ -172,8 +172,8 @@ void ManagedInstance::ended_unwatched() {
 // Its policy is never to start it again, so a process that is still being set up is waited for instead.
 void ManagedInstance::look_for_process() {
   if (adopt()) return;
-  if (surroundings_.now() < *adopt_until_) return host_.set_timer(after(config_.restart_delay));
-  adopt_until_.reset();
+  if (surroundings_.now() < awaited_->until) return host_.set_timer(after(awaited_->interval));
+  awaited_.reset();
   ended_unwatched();
 }
 

@@ -147,7 +147,7 @@ std::string ManagedInstance::problem_when_up() {
 void ManagedInstance::on_timer() {
   switch (phase_) {
     case Phase::backing_off:
-      if (adopt_until_) return look_for_process();
+      if (awaited_) return look_for_process();
       if (name_taken_ && adopt()) return;
       ++status_.restarts;
       return spawn(wants_running_ ? Next::run : Next::stay_stopped);

@@ -170,6 +170,11 @@ class ManagedInstance : public InstanceEvents {
     std::string process;  // core, priority band and settings file
     bool operator==(const Configured&) const = default;
   };
+  /// It was being set up when its manager ended, and may still come up.
+  struct AwaitedProcess {
+    TimePoint until;
+    Duration interval;
+  };
   struct Operation {
     ControlRequest request;
     ControlReplyFunction reply;
@@ -348,11 +353,11 @@ class ManagedInstance : public InstanceEvents {
   bool unheard_ = false;   // adopted, and it has said nothing of itself yet
   std::string unadopted_;  // why it is still being adopted after its limit, for the problem text
   std::optional<Operation> operation_;
-  std::int64_t unix_offset_ns_ = 0;       // of the manager's time, taken once
-  std::optional<InstanceWish> earlier_;   // as the manager before left it
-  std::string unreadable_;                // why it is not known; empty: it is
-  std::optional<InstanceWish> kept_;      // as it was written down last
-  std::optional<TimePoint> adopt_until_;  // a process that was being set up may still come up
+  std::int64_t unix_offset_ns_ = 0;      // of the manager's time, taken once
+  std::optional<InstanceWish> earlier_;  // as the manager before left it
+  std::string unreadable_;               // why it is not known; empty: it is
+  std::optional<InstanceWish> kept_;     // as it was written down last
+  std::optional<AwaitedProcess> awaited_;
   InstanceStatus status_;
 };
 

@@ -138,6 +138,7 @@ Decision decide(const End& end, const RestartHistory& history, const InstanceCon
     made.history.safe_mode = true;
   }
   if (made.action == Action::back_off) made.delay = delay_after(made.history, policy);
+  if (made.action == Action::await_process) made.delay = policy.restart_delay;
   return made;
 }
 

@@ -80,7 +80,9 @@ struct End {
   bool has_earlier = false;  ///< the new application has not come up, and the one before it ran
 };
 
-/// The ends so far, which lead to a longer back-off and to safe mode.
+/// The ends so far, which lead to a longer back-off and to safe mode. Besides decide(), three functions of
+/// ManagedInstance write it: restore(), learn() of an adopted process, and use_configuration() when that
+/// names another application.
 struct RestartHistory {
   std::vector<TimePoint> crashes;  ///< within crash_window, the oldest first; at most crash_limit
   std::uint32_t in_a_row = 0;      ///< ends since the instance was last up for a whole crash_window
@@ -103,7 +105,7 @@ struct Decision {
   };
   Action action = Action::leave;
   bool runs = true;  ///< the application begins by itself in the next process
-  Duration delay{};  ///< of back_off
+  Duration delay{};  ///< of back_off; of await_process: the interval of the looks for it
   RestartHistory history;
 
   bool operator==(const Decision&) const = default;

@@ -46,7 +46,7 @@ std::string_view word(Action action) {
 // "back off 100 ms", "fail safe": "safe" if the next process has no application.
 std::string text(const Decision& decision) {
   std::string text(word(decision.action));
-  if (decision.action == Action::back_off) {
+  if (decision.action == Action::back_off || decision.action == Action::await_process) {
     text += fmt::format(" {} ms", std::chrono::duration_cast<milliseconds>(decision.delay).count());
   }
   return text + (decision.history.safe_mode ? " safe" : "");
@@ -101,7 +101,7 @@ constexpr std::array<DecisionCase, kEndCauses> kDecisionCases = {{
     {EndCause::manager_ends, "bring down", "bring down", "bring down", "bring down", "bring down", "bring down", "bring down"},
     {EndCause::never_begun, "in order", "in order", "in order", "leave", "leave", "leave", "in order"},
     {EndCause::without_process, "in order", "in order", "in order", "offline", "offline", "offline", "in order"},
-    {EndCause::setting_up_unknown, "await process", "in order", "in order", "offline", "offline", "offline", "in order"},
+    {EndCause::setting_up_unknown, "await process 100 ms", "in order", "in order", "offline", "offline", "offline", "in order"},
     {EndCause::host_ended, "in order", "in order", "in order", "offline", "offline", "offline", "in order"},
     {EndCause::given_up, "fail", "fail", "fail", "fail", "fail", "fail", "fail"},
     {EndCause::wish_unreadable, "fail", "fail", "fail", "fail", "fail", "fail", "fail"},
