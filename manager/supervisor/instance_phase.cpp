@@ -12,35 +12,36 @@ namespace {
 
 constexpr auto kPhaseSteps = [] {
   using enum InstancePhase;
-  return std::array{
-      std::pair{down, held},
-      std::pair{down, backing_off},
-      std::pair{down, setting_up},
-      std::pair{down, adopting},
-      std::pair{down, ending},
-      std::pair{held, down},
-      std::pair{held, backing_off},
-      std::pair{held, setting_up},
-      std::pair{backing_off, down},
-      std::pair{backing_off, setting_up},
-      std::pair{backing_off, adopting},
-      std::pair{backing_off, ending},
-      std::pair{setting_up, down},
-      std::pair{setting_up, backing_off},
-      std::pair{setting_up, up},
-      std::pair{setting_up, ending},
-      std::pair{adopting, down},
-      std::pair{adopting, backing_off},
-      std::pair{adopting, setting_up},
-      std::pair{adopting, up},
-      std::pair{adopting, ending},
-      std::pair{up, down},
-      std::pair{up, backing_off},
-      std::pair{up, ending},
-      std::pair{ending, down},
-      std::pair{ending, backing_off},
-      std::pair{ending, setting_up},
-  };
+  // clang-format off
+  return std::to_array<PhaseStep>({
+      {down,        held,        "it is to start in the order of `after`"},
+      {down,        backing_off, "its process ended unwatched, may still come up, or cannot be made"},
+      {down,        setting_up,  "an operator starts it"},
+      {down,        adopting,    "a process has outlived its manager"},
+      {down,        ending,      "a process has outlived its manager, which had asked it to end"},
+      {held,        down,        "it is stopped or removed, or cannot be started, or its manager ends"},
+      {held,        backing_off, "its process cannot be made yet"},
+      {held,        setting_up,  "the instances of `after` are up, or an operator starts it"},
+      {backing_off, down,        "it is stopped, removed or given up, or its manager ends"},
+      {backing_off, setting_up,  "the time is over, or an operator starts it"},
+      {backing_off, adopting,    "a process of its name is there"},
+      {setting_up,  down,        "its process has ended, and no other is to start"},
+      {setting_up,  backing_off, "its process has ended, and another is to start"},
+      {setting_up,  up,          "its process reports that it is ready"},
+      {setting_up,  ending,      "its process is replaced, it is removed, or its manager ends"},
+      {adopting,    down,        "its process has ended, and no other is to start"},
+      {adopting,    backing_off, "its process has ended, and another is to start"},
+      {adopting,    setting_up,  "its process has ended in a load, and the application before starts"},
+      {adopting,    up,          "its process answers, or the limit is over"},
+      {adopting,    ending,      "its process is replaced, it is removed, or its manager ends"},
+      {up,          down,        "its process has ended, and no other is to start"},
+      {up,          backing_off, "its process has ended, and another is to start"},
+      {up,          ending,      "its process is replaced, it is removed, or its manager ends"},
+      {ending,      down,        "its process has ended, and no other is to start"},
+      {ending,      backing_off, "its process has ended, and the next one cannot be made yet"},
+      {ending,      setting_up,  "its process has ended, and the next one starts"},
+  });
+  // clang-format on
 }();
 
 constexpr auto kShownStates = [] {
@@ -77,8 +78,13 @@ std::string_view to_string(InstancePhase phase) noexcept {
   return "unknown";
 }
 
+std::span<const PhaseStep> phase_steps() noexcept {
+  return kPhaseSteps;
+}
+
 bool leads(InstancePhase from, InstancePhase to) noexcept {
-  return from == to || std::ranges::find(kPhaseSteps, std::pair(from, to)) != kPhaseSteps.end();
+  const auto is_it = [&](const PhaseStep& step) { return step.from == from && step.to == to; };
+  return from == to || std::ranges::any_of(kPhaseSteps, is_it);
 }
 
 bool shows(InstancePhase phase, InstanceState state) noexcept {

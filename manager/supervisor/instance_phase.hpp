@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 
@@ -12,26 +13,7 @@ namespace plchost {
 // The phases of one instance
 // ==========================
 //
-//   down ── in order ──► held ── released ──► setting_up ── ready ──► up ◄── answered ── adopting
-//    │                                         ▲     │               │                    ▲   │
-//    ├── an operator's start ──────────────────┘     │ ended         │ ended              │   │ ended
-//    │                                               ▼               ▼                    │   ▼
-//    ├── ended unwatched ──────────────────────► backing_off ◄───────┴────────────────────┼── backing_off
-//    │                                             │   │                                  │
-//    │                          setting_up ◄── time is over └── a process of that name ───┤
-//    └── a process that outlived its manager ─────────────────────────────────────────────┘
-//
-//   setting_up, adopting, up ── replaced or brought down ──► ending ──► setting_up, or down
-//
-//                 to: down  held  backing_off  setting_up  adopting  up   ending    shown as
-//   from down          -     yes      yes          yes        yes    -     yes      offline, failed
-//        held          yes   -        yes          yes        -      -     -        waiting
-//        backing_off   yes   -        -            yes        yes    -     yes      waiting
-//        setting_up    yes   -        yes          -          -      yes   yes      starting
-//        adopting      yes   -        yes          yes        -      yes   yes      starting
-//        up            yes   -        yes          -          -      -     yes      running, stopped, stopping,
-//                                                                                   exception, safe_mode
-//        ending        yes   -        yes          yes        -      -     -        stopping
+// The steps between them, each with its trigger: kPhaseSteps in instance_phase.cpp, which manager/README.md shows.
 //
 //   down         no process. It stays so until an operator or the configuration starts it.
 //   held         no process. It waits until the instances of `after` are up.
@@ -55,11 +37,20 @@ inline constexpr std::uint8_t kInstancePhases = 7;
 
 [[nodiscard]] std::string_view to_string(InstancePhase phase) noexcept;
 
-/// The table has "yes", or both are the same.
+/// A step from one phase to another.
+struct PhaseStep {
+  InstancePhase from;
+  InstancePhase to;
+  std::string_view trigger;
+};
+/// The table of all steps.
+[[nodiscard]] std::span<const PhaseStep> phase_steps() noexcept;
+
+/// The table has this step, or both are the same.
 [[nodiscard]] bool leads(InstancePhase from, InstancePhase to) noexcept;
-/// The table says that a client may see `state` in that phase.
+/// A client may see `state` in that phase.
 [[nodiscard]] bool shows(InstancePhase phase, InstanceState state) noexcept;
-/// The table's objection to this step; empty: none.
+/// The objection to this step; empty: none.
 [[nodiscard]] std::string wrong_step(InstancePhase from, InstancePhase to, InstanceState shown);
 
 }  // namespace plchost

@@ -228,7 +228,23 @@ def reload_effects(root):
     return rows
 
 
-TABLES = {"figures": figures, "all-figures": all_figures, "topics": topics, "reload": reload_effects}
+def phases(root):
+    text = (root / "manager/supervisor/instance_phase.cpp").read_text(encoding="utf-8")
+    steps = re.findall(r'\{(\w+), +(\w+), +"([^"]+)"\}', text)
+    shown = re.findall(r"pair\{(\w+), InstanceState::(\w+)\}", text)
+    if not steps or not shown:
+        raise Fault("manager/supervisor/instance_phase.cpp has no table of the steps, or none of the states")
+    rows = ["| phase | shown as | leads to | when |", "| --- | --- | --- | --- |"]
+    before = None
+    for phase, to, trigger in steps:
+        states = ", ".join(state for of, state in shown if of == phase)
+        cells = (phase, states) if phase != before else ("", "")
+        rows.append("| " + " | ".join(cell.replace("_", " ") for cell in (*cells, to)) + f" | {trigger} |")
+        before = phase
+    return rows
+
+
+TABLES = {"figures": figures, "all-figures": all_figures, "topics": topics, "reload": reload_effects, "phases": phases}
 MADE_BY_TESTS = ("settings", "configuration", "commands")
 
 

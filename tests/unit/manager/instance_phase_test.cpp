@@ -1,55 +1,79 @@
-// The ways from one phase of an instance to another, against the table in the header.
+// The table of the steps from one phase of an instance to another: rules that hold for any such table.
 #include "manager/supervisor/instance_phase.hpp"
 
 #include <array>
-#include <string>
-#include <string_view>
+#include <cstddef>
+#include <set>
+#include <utility>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 namespace plchost {
 namespace {
 
-// clang-format off
-constexpr std::array<std::string_view, kInstancePhases> kWanted = {
-    // to: down, held, backing off, setting up, adopting, up, ending
-    "yyyyy-y",  // from down
-    "yyyy---",  // held
-    "y-yyy-y",  // backing off
-    "y-yy-yy",  // setting up
-    "y-yyyyy",  // adopting
-    "y-y--yy",  // up
-    "y-yy--y",  // ending
-};
-// clang-format on
+constexpr auto kAllPhases = [] {
+  std::array<InstancePhase, kInstancePhases> all{};
+  for (std::uint8_t i = 0; i < kInstancePhases; ++i) all.at(i) = static_cast<InstancePhase>(i);
+  return all;
+}();
 
-TEST(InstancePhase, LeadsToThoseThatTheTableHas) {
-  for (std::uint8_t from = 0; from < kInstancePhases; ++from) {
-    std::string row;
-    for (std::uint8_t to = 0; to < kInstancePhases; ++to) {
-      row += leads(static_cast<InstancePhase>(from), static_cast<InstancePhase>(to)) ? 'y' : '-';
+// By any number of steps.
+std::set<InstancePhase> reached_from(InstancePhase begin) {
+  std::set<InstancePhase> reached{begin};
+  for (std::size_t before = 0; before != reached.size();) {
+    before = reached.size();
+    for (const PhaseStep& step : phase_steps()) {
+      if (reached.contains(step.from)) reached.insert(step.to);
     }
-    EXPECT_EQ(row, kWanted.at(from)) << "from " << to_string(static_cast<InstancePhase>(from));
+  }
+  return reached;
+}
+
+TEST(InstancePhase, IsReachedFromDownAndLeadsBackThere) {
+  for (const InstancePhase phase : kAllPhases) {
+    EXPECT_TRUE(reached_from(InstancePhase::down).contains(phase)) << to_string(phase);
+    EXPECT_TRUE(reached_from(phase).contains(InstancePhase::down)) << to_string(phase);
   }
 }
 
-TEST(InstancePhase, IsShownAsTheTableSays) {
+TEST(InstancePhase, HasEachStepOnceAndWithItsTrigger) {
+  std::set<std::pair<InstancePhase, InstancePhase>> known;
+  for (const PhaseStep& step : phase_steps()) {
+    SCOPED_TRACE(fmt::format("from {} to {}", to_string(step.from), to_string(step.to)));
+    EXPECT_FALSE(step.trigger.empty());
+    EXPECT_NE(step.from, step.to);
+    EXPECT_TRUE(known.emplace(step.from, step.to).second);
+    EXPECT_TRUE(leads(step.from, step.to));
+  }
+}
+
+// No instance is up that was neither set up nor adopted, and none loses its process without a decision.
+TEST(InstancePhase, LeadsToAProcessOnlyByMakingOrFindingOne) {
   using enum InstancePhase;
-  const auto states_of = [](InstancePhase phase) {
-    std::string all;
-    for (std::uint32_t state = 0; state <= static_cast<std::uint32_t>(InstanceState::exception); ++state) {
-      if (!shows(phase, static_cast<InstanceState>(state))) continue;
-      all += (all.empty() ? "" : ", ") + std::string(to_string(static_cast<InstanceState>(state)));
+  const auto has_process = [](InstancePhase phase) { return phase >= setting_up; };
+  for (const InstancePhase from : kAllPhases) {
+    EXPECT_EQ(leads(from, up), from == setting_up || from == adopting || from == up) << to_string(from);
+    EXPECT_EQ(leads(from, held), from == down || from == held) << to_string(from);
+    if (has_process(from)) {
+      EXPECT_TRUE(leads(from, down) && leads(from, backing_off)) << to_string(from);
     }
-    return all;
-  };
-  EXPECT_EQ(states_of(down), "offline, failed");
-  EXPECT_EQ(states_of(held), "waiting");
-  EXPECT_EQ(states_of(backing_off), "waiting");
-  EXPECT_EQ(states_of(setting_up), "starting");
-  EXPECT_EQ(states_of(adopting), "starting");
-  EXPECT_EQ(states_of(up), "running, stopped, stopping, safe mode, exception");
-  EXPECT_EQ(states_of(ending), "stopping");
+  }
+}
+
+TEST(InstancePhase, IsShownInSomeStateAndEachStateInSomePhase) {
+  std::set<InstancePhase> phases;
+  std::set<InstanceState> states;
+  for (const InstancePhase phase : kAllPhases) {
+    for (std::uint32_t i = 0; i <= std::to_underlying(InstanceState::exception); ++i) {
+      const auto state = static_cast<InstanceState>(i);
+      if (!shows(phase, state)) continue;
+      phases.insert(phase);
+      states.insert(state);
+    }
+  }
+  EXPECT_EQ(phases.size(), kAllPhases.size());
+  EXPECT_EQ(states.size(), std::to_underlying(InstanceState::exception) + std::size_t{1});
 }
 
 TEST(InstancePhase, SaysWhatIsWrongWithAStep) {

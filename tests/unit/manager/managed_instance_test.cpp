@@ -1,4 +1,5 @@
 #include <csignal>
+#include <utility>
 
 #include "tests/unit/manager/managed_instance_fixture.hpp"
 
@@ -322,6 +323,14 @@ TEST_F(ManagedInstanceTest, BreaksOffWhatGoesOnWhenTheManagerEnds) {
   sut().on_exit(killed_by(SIGKILL));
   EXPECT_EQ(state(), InstanceState::offline);
   EXPECT_FALSE(host_.timer.has_value());
+}
+
+TEST_F(ManagedInstanceTest, TellsAStepThatNoTableHasAndTakesItAllTheSame) {
+  sut().hold("is to be started");
+  host_.adoptable = 77;
+  ASSERT_TRUE(sut().adopt());
+  EXPECT_EQ(state(), InstanceState::starting);
+  EXPECT_THAT(std::exchange(observer_.wrong, {}), testing::ElementsAre("'held' does not lead to 'adopting'"));
 }
 
 TEST_F(ManagedInstanceTest, TerminatesAProcessThatHasNoControlSocketYet) {
