@@ -54,7 +54,7 @@ plc_NodeRecord sample_of(const ListedNode& listed, std::vector<plc_HostRange>& h
   plc_NodeRecord sample{};
   sample.node = info.node;
   dds::copy_text(sample.name, info.record.name.view());
-  sample.pid = info.record.pid;
+  sample.pid = info.record.process.pid;
   const bool good = is_printable_utf8(listed.program);
   dds::copy_text(sample.program, good ? cut(listed.program, sizeof sample.program - 1) : "?");
   sample.generation = info.record.generation;

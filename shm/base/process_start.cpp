@@ -116,7 +116,7 @@ ProcessIdentity this_process() noexcept {
   const pid_t self = ::getpid();
   const auto stat = read_stat(self);
   if (!stat) return {.pid = self, .start = this_tick()};
-  return {.pid = self, .start = stat->start, .image = image_of(*stat)};
+  return {.pid = self, .image = image_of(*stat), .start = stat->start};
 }
 
 std::uint64_t pid_namespace() noexcept {
@@ -124,8 +124,9 @@ std::uint64_t pid_namespace() noexcept {
   return ::stat("/proc/self/ns/pid", &status) == 0 ? status.st_ino : 0;
 }
 
-bool process_has_ended(const ProcessIdentity& process) noexcept {
+bool process_has_ended(const ProcessIdentity& process, ProcessLook look) noexcept {
   if (process.pid <= 0 || !exists(process.pid)) return true;
+  if (look == ProcessLook::quick) return false;
   const auto stat = read_stat(process.pid);
   if (!stat) return false;
   const std::uint32_t image = image_of(*stat);

@@ -15,13 +15,15 @@ namespace plchost {
 /// Identifies a process for good, and the program in it: exec() leaves number and start as they are.
 struct ProcessIdentity {
   pid_t pid = 0;
-  /// It began then or earlier: a process that has no descriptor left cannot read when it began, and writes
-  /// the time of its look.
-  std::uint64_t start = 0;
   /// Made from where the host has put the program's code and stack; 0: not known. Two programs that follow
   /// one another in a process have the same if the host puts all at the same place (no address
   /// randomisation).
   std::uint32_t image = 0;
+  /// It began then or earlier: a process that has no descriptor left cannot read when it began, and writes
+  /// the time of its look.
+  std::uint64_t start = 0;
+
+  bool operator==(const ProcessIdentity&) const = default;
 };
 /// The calling process. Set-up: reads a file.
 [[nodiscard]] ProcessIdentity this_process() noexcept;
@@ -30,12 +32,15 @@ struct ProcessIdentity {
 /// another one have other numbers for the same process. 0: not known, there is no /proc. Set-up.
 [[nodiscard]] std::uint64_t pid_namespace() noexcept;
 
-/// Whether the process that began at `start` or earlier has ended, or has another program by now. In doubt
-/// (the host hides it, as it does the image of other users' processes) it has not. Set-up.
-[[nodiscard]] bool process_has_ended(const ProcessIdentity& process) noexcept;
-[[nodiscard]] inline bool process_has_ended(pid_t process, std::uint64_t start) noexcept {
-  return process_has_ended({.pid = process, .start = start});
-}
+/// How closely a process is looked at.
+enum class ProcessLook : std::uint8_t {
+  quick,     ///< its number alone: one system call
+  thorough,  ///< also for a zombie, a number that was given again, and another program: reads a file
+};
+/// Whether the process has ended, or has another program by now. In doubt (the host hides it, as it does the
+/// image of other users' processes) it has not. Set-up.
+[[nodiscard]] bool process_has_ended(const ProcessIdentity& process,
+                                     ProcessLook look = ProcessLook::thorough) noexcept;
 
 /// A thread as others see it.
 struct ThreadLook {

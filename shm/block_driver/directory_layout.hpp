@@ -7,6 +7,7 @@
 
 #include "shm/base/counted_event.hpp"
 #include "shm/base/names.hpp"
+#include "shm/base/process_start.hpp"
 #include "shm/base/seqlock.hpp"
 #include "shm/block_driver/node_address.hpp"
 #include "shm/files/fixed_page.hpp"
@@ -19,7 +20,7 @@ namespace plchost {
 
 inline constexpr PageKind kDirectoryKind{.what = "directory of nodes",
                                          .magic = 0x65646f6e'6b6c6270,  // "pblknode"
-                                         .version = 2};
+                                         .version = 3};
 
 /// Other hosts that are reached through a node: from first to last. first 0: none.
 struct HostRange {
@@ -32,11 +33,10 @@ inline constexpr std::size_t kMaxHostRanges = 16;
 /// The owner of an address.
 struct NodeRecord {
   FixedText<kMaxInstanceName> name;  ///< kept when the node goes: it gets the same address again
-  std::int32_t pid = 0;              ///< 0: nobody has it
+  ProcessIdentity process;           ///< pid 0: nobody has it
   std::uint32_t generation = 0;      ///< of the last one who had it
   std::uint32_t forwards = 0;        ///< 1: blocks between others may go through it
   std::uint32_t queue_slots = 0;     ///< of the links that it makes
-  std::uint64_t process_start = 0;   ///< see shm/base/process_start.hpp
   std::array<HostRange, kMaxHostRanges> hosts{};
 };
 

@@ -44,7 +44,7 @@ Result<MemoryFile> open_or_make_directory(const std::string& name) {
 bool is_sane(const NodeRecord& record) noexcept {
   const std::string_view name = record.name.view();
   const bool printable = std::ranges::all_of(name, [](char c) { return c > ' ' && c <= '~'; });
-  return record.pid > 0 && record.generation != 0 && !name.empty() && printable;
+  return record.process.pid > 0 && record.generation != 0 && !name.empty() && printable;
 }
 
 DirectoryLayout& directory_in(const MemoryFile& file) noexcept {
@@ -58,7 +58,7 @@ bool has_good_header(const DirectoryLayout& layout) noexcept {
 bool has_live_node(const DirectoryLayout& layout) noexcept {
   return std::ranges::any_of(layout.slots, [](const NodeSlot& slot) {
     const auto record = slot.record.read();
-    return record && is_sane(*record) && !process_has_ended(record->pid, record->process_start);
+    return record && is_sane(*record) && !process_has_ended(record->process);
   });
 }
 
@@ -152,7 +152,7 @@ Result<std::uint16_t> NodeDirectory::choose(const NodeEntry& entry) const {
   if (const auto namesake = find(entry.name)) {
     return failure(ErrorCode::already_exists,
                    fmt::format("node name '{}' is taken: process {} has it, with address {}", entry.name,
-                               record(*namesake).value_or(NodeRecord{}).pid, *namesake));
+                               record(*namesake).value_or(NodeRecord{}).process.pid, *namesake));
   }
   if (entry.forced_address == 0) return choose_free(entry.name);
   if (entry.forced_address > kMaxNodes) {
@@ -162,7 +162,7 @@ Result<std::uint16_t> NodeDirectory::choose(const NodeEntry& entry) const {
   if (const auto owner = record(entry.forced_address)) {
     return failure(ErrorCode::already_exists,
                    fmt::format("node address {} is taken: node '{}', process {}, has it",
-                               entry.forced_address, owner->name.view(), owner->pid));
+                               entry.forced_address, owner->name.view(), owner->process.pid));
   }
   return entry.forced_address;
 }
@@ -202,8 +202,8 @@ void NodeDirectory::remove_links(std::uint16_t node) const noexcept {
 bool NodeDirectory::reclaim_one(std::uint16_t node) {
   slot(node).record.recover();
   auto owner = record(node);
-  if (!owner || !process_has_ended(owner->pid, owner->process_start)) return false;
-  owner->pid = 0;
+  if (!owner || !process_has_ended(owner->process)) return false;
+  owner->process = {};
   write(node, *owner);
   remove_links(node);
   return true;
@@ -230,19 +230,18 @@ namespace {
 NodeRecord record_of(const NodeEntry& entry, std::uint32_t generation) {
   NodeRecord record;
   record.name.assign(entry.name);
-  record.pid = ::getpid();
+  record.process = this_process();
   record.generation = generation;
   record.forwards = entry.forwards ? 1 : 0;
   record.queue_slots = entry.queue_slots;
-  record.process_start = this_process().start;
   std::copy_n(entry.hosts.begin(), std::min(entry.hosts.size(), kMaxHostRanges), record.hosts.begin());
   return record;
 }
 
 bool is_same(const NodeRecord& one, const NodeRecord& other) {
-  return one.name.view() == other.name.view() && one.pid == other.pid && one.generation == other.generation &&
-         one.forwards == other.forwards && one.queue_slots == other.queue_slots &&
-         one.process_start == other.process_start && one.hosts == other.hosts;
+  return one.name.view() == other.name.view() && one.process == other.process &&
+         one.generation == other.generation && one.forwards == other.forwards &&
+         one.queue_slots == other.queue_slots && one.hosts == other.hosts;
 }
 
 }  // namespace
@@ -273,8 +272,8 @@ void NodeDirectory::leave(const NodeLife& life) {
   const auto lock = DirectoryLock::acquire(directory_name(pool_, base_));
   auto owner = record(life.node);
   // Without the lock it is left to the others, who find that the process has ended.
-  if (!lock || !owner || owner->pid != ::getpid() || owner->generation != life.generation) return;
-  owner->pid = 0;
+  if (!lock || !owner || owner->process.pid != ::getpid() || owner->generation != life.generation) return;
+  owner->process = {};
   write(life.node, *owner);
   remove_links(life.node);
   announce();

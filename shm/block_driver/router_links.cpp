@@ -1,9 +1,7 @@
 #include <algorithm>
 #include <bit>
-#include <cerrno>
 
 #include <fmt/format.h>
-#include <signal.h>
 
 #include "shm/base/process_start.hpp"
 #include "shm/block_driver/block_router.hpp"
@@ -17,10 +15,6 @@ namespace {
 // In that many ticks once, what events should have told is looked for without them: strangers can wipe out
 // any of their words.
 constexpr std::uint32_t kTicksPerAudit = 10;
-
-bool is_gone(std::int32_t pid) noexcept {
-  return ::kill(pid, 0) != 0 && errno == ESRCH;
-}
 
 }  // namespace
 
@@ -46,18 +40,18 @@ void BlockRouter::tick(TimePoint now) {
   tidy(now);
 }
 
-// A number that is gone is seen at once; one that ended and was not waited for, or that was given to another
-// process, when its turn comes.
+// A number that is gone is seen in the same tick. A thorough look reads a file, so each node has its turn.
 void BlockRouter::look_for_the_dead() {
   bool found = false;
   for (std::uint16_t node = 1; node <= kMaxNodes; ++node) {
-    if (lives_[node - 1U].generation != 0 && is_gone(pids_[node - 1U])) found = true;
+    if (lives_[node - 1U].generation == 0) continue;
+    found = found || process_has_ended({.pid = pids_[node - 1U]}, ProcessLook::quick);
   }
   for (std::uint32_t i = 0; i < kMaxNodes && !found; ++i) {
     suspect_ = static_cast<std::uint16_t>(suspect_ % kMaxNodes + 1);
     const auto record = node_.directory_.record(suspect_);
     if (!record || suspect_ == node_.life_.node) continue;
-    found = process_has_ended(record->pid, record->process_start);
+    found = process_has_ended(record->process);
     break;
   }
   if (found && node_.directory_.reclaim() > 0) refresh();
@@ -88,7 +82,7 @@ void BlockRouter::refresh() {
   for (std::uint16_t node = 1; node <= kMaxNodes; ++node) {
     const auto record = directory.record(node);
     lives_[node - 1U] = {.node = node, .generation = record ? record->generation : 0};
-    pids_[node - 1U] = record ? record->pid : 0;
+    pids_[node - 1U] = record ? record->process.pid : 0;
   }
   topology_ = topology_of(directory);
   publish_routes();

@@ -2,8 +2,6 @@
 
 #include <cerrno>
 
-#include <signal.h>
-
 #include "shm/base/process_start.hpp"
 #include "shm/base/wrapping.hpp"
 
@@ -13,16 +11,15 @@ namespace {
 
 bool is_gone(ClientSlot& client, TimePoint now, bool thoroughly) noexcept {
   if (client.ended.load(kRelaxed) != 0) return true;
-  const auto pid = static_cast<pid_t>(client.pid.load(kRelaxed));
-  if (pid < 0) return true;  // no number that the kernel gives
   const std::int64_t age =
       wrapping_difference(now.time_since_epoch().count(), client.looked_ns.load(kRelaxed));
-  if (!thoroughly && age >= 0 && age < PoolClients::kLook.count()) {
-    return ::kill(pid, 0) != 0 && errno == ESRCH;
-  }
-  client.looked_ns.store(now.time_since_epoch().count(), kRelaxed);
-  return process_has_ended(
-      {.pid = pid, .start = client.start.load(kRelaxed), .image = client.image.load(kRelaxed)});
+  const bool looked_lately = age >= 0 && age < PoolClients::kLook.count();
+  const ProcessLook look = looked_lately && !thoroughly ? ProcessLook::quick : ProcessLook::thorough;
+  if (look == ProcessLook::thorough) client.looked_ns.store(now.time_since_epoch().count(), kRelaxed);
+  return process_has_ended({.pid = static_cast<pid_t>(client.pid.load(kRelaxed)),
+                            .image = client.image.load(kRelaxed),
+                            .start = client.start.load(kRelaxed)},
+                           look);
 }
 
 }  // namespace

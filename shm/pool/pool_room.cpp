@@ -28,7 +28,7 @@ class Holders {
         goes_on_.try_emplace(std::tuple(reference.pid, reference.start, reference.image), false);
     if (is_new) {
       known->second = !process_has_ended(
-          {.pid = static_cast<pid_t>(reference.pid), .start = reference.start, .image = reference.image});
+          {.pid = static_cast<pid_t>(reference.pid), .image = reference.image, .start = reference.start});
     }
     return known->second;
   }

@@ -59,7 +59,7 @@ Result<Asked> look(const std::string& pool, const std::string& base, const NodeQ
 Result<NodeListing> NodeLister::nodes(const NodeQuery& query) const {
   PLCHOST_TRY_ASSIGN(auto asked, look(pool_, query.base.empty() ? base_ : query.base, query));
   for (const NodeInfo& node : asked.nodes) {
-    auto owner = owner_of_thread(static_cast<std::uint32_t>(node.record.pid));
+    auto owner = owner_of_thread(static_cast<std::uint32_t>(node.record.process.pid));
     asked.listing.nodes.push_back({.info = node, .program = owner ? std::move(owner->program) : ""});
   }
   return std::move(asked.listing);

@@ -20,12 +20,11 @@ Result<void> BlockService::check(const std::string& pool, const std::string& ins
   const auto directory = NodeDirectory::open_to_read(pool, settings.base);
   if (!directory) return {};  // no node has joined yet
   const auto owner = directory->record(settings.forced_address);
-  if (!owner || owner->name.view() == instance || process_has_ended(owner->pid, owner->process_start)) {
-    return {};
-  }
-  return failure(ErrorCode::busy, fmt::format("[CmpBlkDrvShm]: node address {} is taken: node '{}', process "
-                                              "{}, has it",
-                                              settings.forced_address, owner->name.view(), owner->pid));
+  if (!owner || owner->name.view() == instance || process_has_ended(owner->process)) return {};
+  return failure(ErrorCode::busy,
+                 fmt::format("[CmpBlkDrvShm]: node address {} is taken: node '{}', process "
+                             "{}, has it",
+                             settings.forced_address, owner->name.view(), owner->process.pid));
 }
 
 Result<void> BlockService::configure(const BlockSettings& settings) {

@@ -16,7 +16,7 @@ NodesTold two_nodes() {
     ListedNode& node = listing.nodes.emplace_back();
     node.info.node = address;
     node.info.record.name.assign(address == 1 ? "gateway" : "packer");
-    node.info.record.pid = 4711;
+    node.info.record.process.pid = 4711;
     node.program = "plc-instance";
     node.info.record.generation = 7;
     node.info.record.forwards = 1;

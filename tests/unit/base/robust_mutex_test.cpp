@@ -260,7 +260,7 @@ TEST_F(RobustMutexTest, ProcessWithoutADescriptorIsNotTakenForAnotherOne) {
   await_step(1);
   EXPECT_EQ(said.pid, child);
   EXPECT_FALSE(process_has_ended(said));
-  EXPECT_TRUE(process_has_ended(child, 1)) << "that one began long before";
+  EXPECT_TRUE(process_has_ended({.pid = child, .start = 1})) << "that one began long before";
   reap(child);
   EXPECT_TRUE(process_has_ended(said));
   ::munmap(&said, sizeof(said));

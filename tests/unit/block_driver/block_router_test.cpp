@@ -99,10 +99,9 @@ TEST_F(BlockRouterTest, ABlockThatComesBackToWhereItWasIsDroppedAndCounted) {
                {b.address().node, 1});
   NodeRecord stranger;
   stranger.name.assign("stranger");
-  stranger.pid = ::getpid();
   stranger.generation = 7;
   NodeDirectory directory = NodeDirectory::open(pool()).value();
-  stranger.process_start = directory.record(a.address().node)->process_start;
+  stranger.process = directory.record(a.address().node)->process;
   directory.slot(100).record.write(stranger);
   directory.slot(b.address().node).incoming[99 / 64].fetch_or(std::uint64_t{1} << (99 % 64));
   BlockHeader header;

@@ -1,12 +1,16 @@
 #include "shm/block_driver/node_directory.hpp"
 
+#include <array>
 #include <set>
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "shm/base/process_start.hpp"
 #include "shm/pool/object_pool.hpp"
 #include "tests/unit/pool/unique_pool_name.hpp"
 
@@ -104,9 +108,29 @@ TEST_F(NodeDirectoryTest, WhoJoinsTakesTheForcedAddressOfADeadProcess) {
 TEST_F(NodeDirectoryTest, AnotherProcessOfTheSameNumberIsNotTakenForTheOldOne) {
   const NodeLife life = join("a").value();
   auto record = sut_.record(life.node).value();
-  record.process_start -= 1;  // as if this process had got the number of one before it
+  record.process.start -= 1;  // as if this process had got the number of one before it
   sut_.slot(life.node).record.write(record);
   EXPECT_EQ(sut_.reclaim(), 1U);
+}
+
+TEST_F(NodeDirectoryTest, AProgramThatExecReplacedIsNoNodeAnyMore) {
+  std::array<int, 2> closed_by_exec{};
+  ASSERT_EQ(::pipe2(closed_by_exec.data(), O_CLOEXEC), 0);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    if (join("a", 5)) ::execlp("sleep", "sleep", "60", static_cast<char*>(nullptr));
+    ::_exit(1);
+  }
+  ::close(closed_by_exec[1]);
+  char byte = 0;
+  EXPECT_EQ(::read(closed_by_exec[0], &byte, 1), 0);
+  ::close(closed_by_exec[0]);
+  ASSERT_TRUE(sut_.record(5));
+  while (look_at_thread(child)->image == 0) ::usleep(1000);
+  EXPECT_EQ(sut_.reclaim(), 1U);
+  EXPECT_FALSE(sut_.record(5));
+  ::kill(child, SIGKILL);
+  ::waitpid(child, nullptr, 0);
 }
 
 TEST_F(NodeDirectoryTest, ARecordThatAStrangerChangedIsWrittenAgain) {
@@ -115,7 +139,7 @@ TEST_F(NodeDirectoryTest, ARecordThatAStrangerChangedIsWrittenAgain) {
   for (const bool half : {false, true}) {
     auto* const words = reinterpret_cast<std::uint64_t*>(&sut_.slot(life.node).record);
     std::fill_n(words + (half ? 0 : 1), 6, 0x4141414141414141);  // half: looks as if being written for ever
-    EXPECT_FALSE(sut_.record(life.node).has_value() && sut_.record(life.node)->pid == ::getpid());
+    EXPECT_FALSE(sut_.record(life.node).has_value() && sut_.record(life.node)->process.pid == ::getpid());
     sut_.keep(life, entry);
     ASSERT_TRUE(sut_.record(life.node));
     EXPECT_EQ(sut_.record(life.node)->name.view(), "a");
