@@ -1,8 +1,10 @@
 #include "shm/library/obj_tab.hpp"
 
 #include <algorithm>
+#include <array>
 #include <map>
 #include <optional>
+#include <type_traits>
 #include <utility>
 
 #include <pthread.h>
@@ -19,20 +21,40 @@ std::mutex making;  // of the one table of the process
 // How often this thread holds the guard: std::recursive_timed_mutex does not tell.
 thread_local unsigned held_by_this_thread = 0;
 
+/// A type of objects that the seed's table shows.
+struct ShownType {
+  ObjectType type;
+  objTabType_t as;
+  /// For semTake and semGive; null: the object cannot be opened. Null of a memory, which has an address.
+  std::unique_ptr<plc_sem> (*open)(const ObjectPool& pool, const std::string& name);
+};
+
 template <class Object>
-std::unique_ptr<plc_sem> handle_of(Result<Object> opened) {
+std::unique_ptr<plc_sem> open_handle(const ObjectPool& pool, const std::string& name) {
+  auto opened = pool.open_object<Object>(name);
   if (!opened) return nullptr;
   auto handle = std::make_unique<plc_sem>();
+  if constexpr (std::is_same_v<Object, SharedEvent>) handle->cursor = opened->count();
   handle->object = *std::move(opened);
   return handle;
 }
 
-/// Nothing: a type that the seed's table does not have, nor anything like it.
-std::optional<objTabType_t> type_in_table(ObjectType type) noexcept {
-  if (type == ObjectType::memory) return e_shm;
-  if (type == ObjectType::event) return e_evt;
-  if (type == ObjectType::semaphore || type == ObjectType::mutex) return e_sem;
-  return std::nullopt;
+constexpr std::array kShownTypes{
+    ShownType{.type = SharedMemory::kType, .as = e_shm, .open = nullptr},
+    ShownType{.type = SharedSemaphore::kType, .as = e_sem, .open = open_handle<SharedSemaphore>},
+    ShownType{.type = SharedMutex::kType, .as = e_sem, .open = open_handle<SharedMutex>},
+    ShownType{.type = SharedEvent::kType, .as = e_evt, .open = open_handle<SharedEvent>}};
+
+/// Null: a type that the seed's table does not have, nor anything like it.
+const ShownType* find_shown(ObjectType type) noexcept {
+  const auto* const found = std::ranges::find(kShownTypes, type, &ShownType::type);
+  return found == kShownTypes.end() ? nullptr : found;
+}
+
+SharedMemory open_memory(const ObjectPool& pool, const std::string& name) {
+  if (auto writable = pool.open_memory(name)) return *std::move(writable);
+  if (auto readable = pool.open_memory(name, MemoryFile::Access::read_only)) return *std::move(readable);
+  return {};
 }
 
 // Nobody but this table needs it any more.
@@ -144,10 +166,14 @@ Result<void> ObjTab::refresh() {
   for (auto& row : rows_) before[{row->name, row->type}] = std::move(row);
   rows_.clear();
   for (const ObjectInfo& info : *all) {
-    if (!type_in_table(info.type)) continue;
+    const ShownType* const shown = find_shown(info.type);
+    if (shown == nullptr) continue;
     const auto known = before.find({info.name, info.type});
     if (known == before.end()) {
-      rows_.push_back(open(info));
+      auto row = std::make_unique<Row>(Row{.name = info.name, .type = info.type, .as = shown->as});
+      if (shown->open != nullptr) row->semaphore = shown->open(pool_, info.name);
+      if (shown->as == e_shm) row->memory = open_memory(pool_, info.name);
+      rows_.push_back(std::move(row));
     } else if (!is_left_over(info)) {
       rows_.push_back(std::move(known->second));
     }
@@ -164,36 +190,19 @@ Result<void> ObjTab::refresh() {
   return {};
 }
 
-std::unique_ptr<ObjTab::Row> ObjTab::open(const ObjectInfo& info) const {
-  auto row = std::make_unique<Row>();
-  row->name = info.name;
-  row->type = info.type;
-  if (info.type == ObjectType::memory) {
-    if (auto writable = pool_.open_memory(info.name)) {
-      row->memory = *std::move(writable);
-    } else if (auto readable = pool_.open_memory(info.name, MemoryFile::Access::read_only)) {
-      row->memory = *std::move(readable);
-    }
-  } else if (info.type == ObjectType::semaphore) {
-    row->semaphore = handle_of(pool_.open_semaphore(info.name));
-  } else if (info.type == ObjectType::mutex) {
-    row->semaphore = handle_of(pool_.open_mutex(info.name));
-  } else {
-    row->semaphore = handle_of(pool_.open_shared_event(info.name));
-    if (row->semaphore) row->semaphore->cursor = std::get<SharedEvent>(row->semaphore->object).count();
-  }
-  return row;
-}
-
 objEntry_t ObjTab::entry_of(Row& row) noexcept {
-  objEntry_t entry{.tType = type_in_table(row.type).value_or(e_sem), .pszName = row.name.data(), .u = {}};
-  if (row.type == ObjectType::memory) {
-    entry.u.tShmEntry = {.ulAddress = reinterpret_cast<unsigned long>(row.memory.bytes().data()),
-                         .ulSize = row.memory.bytes().size()};
-  } else if (row.type == ObjectType::event) {
-    entry.u.tEvtEntry = {.hEvt = row.semaphore.get()};
-  } else {
-    entry.u.tSemEntry = {.hSem = row.semaphore.get()};
+  objEntry_t entry{.tType = row.as, .pszName = row.name.data(), .u = {}};
+  switch (row.as) {
+    case e_shm:
+      entry.u.tShmEntry = {.ulAddress = reinterpret_cast<unsigned long>(row.memory.bytes().data()),
+                           .ulSize = row.memory.bytes().size()};
+      break;
+    case e_sem:
+      entry.u.tSemEntry = {.hSem = row.semaphore.get()};
+      break;
+    case e_evt:
+      entry.u.tEvtEntry = {.hEvt = row.semaphore.get()};
+      break;
   }
   return entry;
 }

@@ -37,14 +37,14 @@ class ObjTab {
   /// One object, opened.
   struct Row {
     std::string name;
-    ObjectType type = ObjectType::memory;
-    SharedMemory memory;
-    std::unique_ptr<plc_sem> semaphore;
+    ObjectType type{};
+    objTabType_t as{};
+    SharedMemory memory{};
+    std::unique_ptr<plc_sem> semaphore{};
   };
 
   explicit ObjTab(ObjectPool pool);
   [[nodiscard]] Result<void> refresh();
-  [[nodiscard]] std::unique_ptr<Row> open(const ObjectInfo& info) const;
   [[nodiscard]] static objEntry_t entry_of(Row& row) noexcept;
 
   ObjectPool pool_;

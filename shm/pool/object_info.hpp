@@ -6,7 +6,7 @@
 
 #include <sys/types.h>
 
-#include "shm/pool/object_type.hpp"
+#include "shm/pool/pool_layout.hpp"
 
 namespace plchost {
 

@@ -11,8 +11,8 @@
 #include "shm/base/result.hpp"
 #include "shm/files/memory_rights.hpp"
 #include "shm/pool/object_info.hpp"
-#include "shm/pool/object_type.hpp"
 #include "shm/pool/pool_event.hpp"
+#include "shm/pool/pool_layout.hpp"
 #include "shm/pool/pool_object.hpp"
 
 namespace plchost {

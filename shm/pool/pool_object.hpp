@@ -8,7 +8,6 @@
 
 #include "shm/base/time.hpp"
 #include "shm/files/memory_file.hpp"
-#include "shm/pool/object_type.hpp"
 #include "shm/pool/pool_event.hpp"
 #include "shm/pool/pool_layout.hpp"
 

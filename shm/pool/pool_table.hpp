@@ -5,8 +5,8 @@
 #include <span>
 #include <string_view>
 
-#include "shm/pool/object_type.hpp"
 #include "shm/pool/pool_journal.hpp"
+#include "shm/pool/pool_layout.hpp"
 #include "shm/pool/pool_view.hpp"
 
 namespace plchost {

@@ -13,13 +13,15 @@ namespace plchost {
 
 namespace {
 
-// A newer host may know more types: their numbers are shown.
+// A newer host may know more types: their numbers and values are shown.
 std::string type_text(const plc_ObjectRecord& object) {
   return dds::word_for(dds::words::ObjectRecord::type, object.type);
 }
 
-bool is_of(const plc_ObjectRecord& object, ObjectType type) {
-  return object.type == std::to_underlying(type);
+const ObjectTraits& shown_as(const ListedObject& object) {
+  static constexpr ObjectTraits kUnknown;
+  const ObjectTraits* const traits = traits_of(object.type());
+  return traits != nullptr ? *traits : kUnknown;
 }
 
 std::string holder_text(const plc_ObjectRecord& mutex) {
@@ -52,12 +54,10 @@ std::string holders_text(const ListedObject& object, std::size_t most) {
 
 std::string state_text(const ListedObject& object) {
   const plc_ObjectRecord& record = object.record;
-  if (is_of(record, ObjectType::mutex)) return holder_text(record);
-  const ObjectTraits* const traits = traits_of(object.type());
-  if (traits == nullptr) return fmt::format("value {}", record.value);
-  const std::uint64_t number = is_of(record, ObjectType::memory) ? record.size : record.value;
-  std::string text = fmt::format(fmt::runtime(traits->value_form), number);
-  if (is_of(record, ObjectType::event)) {
+  const ObjectTraits& traits = shown_as(object);
+  if (traits.has_holder) return holder_text(record);
+  std::string text = fmt::format(fmt::runtime(traits.value_form), traits.has_size ? record.size : record.value);
+  if (traits.has_tasks) {
     text += fmt::format(", {}registered, {} tasks", record.registered ? "" : "not ", record.bound_tasks);
   }
   return text;
@@ -65,16 +65,15 @@ std::string state_text(const ListedObject& object) {
 
 dds::Computed<plc_ObjectRecord, Row> computed_of(const plc_ObjectRecord& object, std::string_view host,
                                                  const ListedObject& listed) {
-  const bool event = is_of(object, ObjectType::event);
-  const bool mutex = is_of(object, ObjectType::mutex);
-  const bool held = mutex && object.value != 0;
+  const ObjectTraits& traits = shown_as(listed);
+  const bool held = traits.has_holder && object.value != 0;
   const auto or_null = [](bool there, const auto& value) { return there ? Row(value) : Row(); };
   return {.host = host,
-          .value = or_null(!mutex && !is_of(object, ObjectType::memory), object.value),
-          .held = or_null(mutex, held),
+          .value = or_null(!traits.has_holder && !traits.has_size, object.value),
+          .held = or_null(traits.has_holder, held),
           .holder_thread = or_null(held, object.value),
-          .registered = or_null(event, object.registered),
-          .bound_tasks = or_null(event, object.bound_tasks),
+          .registered = or_null(traits.has_tasks, object.registered),
+          .bound_tasks = or_null(traits.has_tasks, object.bound_tasks),
           .mode = fmt::format("{:04o}", object.mode),
           .references = reference_rows(listed.references)};
 }
@@ -85,12 +84,12 @@ Row to_row(std::string_view host, const ListedObject& object) {
 
 Row to_short_row(std::string_view host, const ListedObject& object) {
   const plc_ObjectRecord& record = object.record;
-  const bool memory = is_of(record, ObjectType::memory);
+  const ObjectTraits& traits = shown_as(object);
   Row row{{"host", host}, {"object", object.name()}, {"type", type_text(record)}};
-  row["size"] = memory ? Row(record.size) : Row();
-  if (is_of(record, ObjectType::mutex)) {
+  row["size"] = traits.has_size ? Row(record.size) : Row();
+  if (traits.has_holder) {
     row["value"] = holder_text(record);
-  } else if (!memory) {
+  } else if (!traits.has_size) {
     row["value"] = record.value;
   }
   row["waiters"] = record.waiters;

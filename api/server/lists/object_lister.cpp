@@ -32,7 +32,8 @@ bool may_hold(const ObjectInfo& mutex, std::uint32_t pid) {
 
 ObjectUsers users_of(const ObjectInfo& object) {
   ObjectUsers users{.owner_name = user_name(object.owner), .group_name = group_name(object.group)};
-  if (object.type != ObjectType::mutex || object.value == 0) return users;
+  const ObjectTraits* const traits = traits_of(object.type);
+  if (traits == nullptr || !traits->has_holder || object.value == 0) return users;
   auto owner = owner_of_thread(static_cast<std::uint32_t>(object.value));
   if (!owner || !may_hold(object, owner->pid)) return users;
   users.holder_pid = owner->pid;

@@ -13,7 +13,7 @@
 #include "api/dds/code_names.hpp"
 #include "api/dds/text.hpp"
 #include "shm/base/task_kind.hpp"
-#include "shm/pool/object_type.hpp"
+#include "shm/pool/pool_layout.hpp"
 
 namespace plchost {
 namespace {
