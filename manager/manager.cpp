@@ -39,6 +39,9 @@ namespace {
 constexpr Duration kTick = std::chrono::milliseconds(50);
 constexpr unsigned kTicksPerTidying = 20;  // of the pool
 
+static_assert(kMinPoolObjects == kMinObjects && kMaxPoolObjects == kMaxObjects,
+              "[host] pool_objects allows what a pool allows");
+
 Result<void> make_run_directory(const std::string& path) {
   std::error_code error;
   std::filesystem::create_directories(path, error);
@@ -201,11 +204,12 @@ Supervisor::HostedInstance Manager::make_host(const InstanceConfig& instance) {
 
 void Manager::make_supervisor() {
   supervisor_ =
-      std::make_unique<Supervisor>(config_,
-                                   Supervisor::Surroundings{.folder = options_.folder,
-                                                            .schedulers = options_.schedulers,
-                                                            .now = [] { return MonotonicClock::now(); },
-                                                            .observer = *this},
+      std::make_unique<Supervisor>(config_.instances,
+                                   ManagedInstance::Surroundings{.host = config_.host,
+                                                                 .folder = options_.folder,
+                                                                 .schedulers = options_.schedulers,
+                                                                 .now = [] { return MonotonicClock::now(); },
+                                                                 .observer = *this},
                                    [this](const InstanceConfig& instance) { return make_host(instance); });
 }
 

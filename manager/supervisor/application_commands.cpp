@@ -26,9 +26,9 @@ void ManagedInstance::begin_download() {
   operation_->step = Step::storing;
   LaunchOptions launch = launch_options(Next::run);
   launch.kept_settings = false;
-  const auto started = surroundings_.applications.keep(
-      *order, request.argument, {.now = application_, .earlier = before_.value_or("")}, launch,
-      [this](const Result<std::string>& path) { on_application_kept(path); });
+  const auto started =
+      own_.applications.keep(*order, request.argument, {.now = application_, .earlier = before_.value_or("")},
+                             launch, [this](const Result<std::string>& path) { on_application_kept(path); });
   if (!started) finish(started.error().code, started.error().describe());
 }
 
@@ -40,7 +40,7 @@ void ManagedInstance::on_application_kept(const Result<std::string>& path) {
 }
 
 void ManagedInstance::begin_rollback() {
-  const auto loaded = surroundings_.applications.version_at(application_);
+  const auto loaded = own_.applications.version_at(application_);
   if (!loaded) {
     return finish(ErrorCode::wrong_state,
                   application_.empty() ? fmt::format("'{}' has no application", config_.name)
@@ -117,19 +117,18 @@ void ManagedInstance::set_boot(const std::string& text) {
     finish(path.error().code,
            fmt::format("it is loaded, but not the boot application: {}", path.error().describe()));
   };
-  const auto started =
-      surroundings_.applications.set_boot(operation_->request.argument, config_.application, tell);
+  const auto started = own_.applications.set_boot(operation_->request.argument, config_.application, tell);
   if (!started) tell(std::unexpected(started.error()));
 }
 
 // An application that was loaded long ago must not win without a word.
 void ManagedInstance::tell_boot_application() const {
-  const auto version = surroundings_.applications.version_at(application_);
+  const auto version = own_.applications.version_at(application_);
   const std::string what =
       version ? fmt::format("version {} ({}, {})", version->number, version->name,
                             version->by.empty() ? "sent by an unsecured client" : "sent by " + version->by)
               : application_;
-  const bool boot = application_ == surroundings_.applications.boot();
+  const bool boot = application_ == own_.applications.boot();
   spdlog::info("instance {}: {} {}, in the place of {} of the configuration{}", config_.name,
                boot ? "its boot application is" : "the application that was loaded last is", what,
                config_.application.empty() ? "none" : config_.application,
@@ -144,7 +143,7 @@ std::string ManagedInstance::loaded_text() const {
   if (!operation_ || operation_->request.verb == ControlVerb::load_application) return "";
   const std::string& path = operation_->request.argument;
   if (!loads(operation_->request.verb)) return "";
-  const auto version = surroundings_.applications.version_at(path);
+  const auto version = own_.applications.version_at(path);
   return version ? fmt::format("version {} ({}) is loaded", version->number, version->name)
                  : fmt::format("{} is loaded", path);
 }

@@ -8,8 +8,8 @@
 
 namespace plchost {
 
-/// Is told what happens to the instances. A ManagedInstance tells its Supervisor, and that tells the Manager.
-/// All calls come on the Reactor's thread.
+/// Is told what happens to the instances: the Manager, by each ManagedInstance and by their Supervisor. All
+/// calls come on the Reactor's thread.
 class InstanceObserver {
  public:
   virtual ~InstanceObserver() = default;

@@ -22,9 +22,9 @@ std::string configured_process(const InstanceConfig& config) {
 }  // namespace
 
 void ManagedInstance::restore() {
-  auto found = surroundings_.wishes.find();
+  auto found = own_.wishes.find();
   // Afterwards: a disk that was slow to answer has answered then.
-  const std::string boot = surroundings_.applications.boot();
+  const std::string boot = own_.applications.boot();
   application_ = boot.empty() ? config_.application : boot;
   if (!found) {
     unreadable_ = found.error().describe();
@@ -78,7 +78,7 @@ bool ManagedInstance::use_configuration() {
   if (before.application != now.application) {
     spdlog::info("instance {}: the configuration names another application now; it takes the place of '{}'",
                  config_.name, application_);
-    application_ = surroundings_.applications.boot();
+    application_ = own_.applications.boot();
     if (application_.empty()) application_ = config_.application;
     history_ = {};
     last_end_.clear();
@@ -228,19 +228,19 @@ void ManagedInstance::remember() {
   }
   if (kept_ && now == *kept_) return;
   kept_ = now;
-  surroundings_.wishes.keep(now);
+  own_.wishes.keep(now);
 }
 
 void ManagedInstance::tell_when_kept(const Operation& done, const std::string& text) {
   const bool events =
       done.request.verb == ControlVerb::register_event || done.request.verb == ControlVerb::unregister_event;
-  if (events) surroundings_.wishes.keep_events();
+  if (events) own_.wishes.keep_events();
   // A client that gets no text says by itself what is done.
   const std::string said =
       text.empty() ? fmt::format("{}: {}", config_.name,
                                  done_text(operation_of(done.request.verb), done.request.argument))
                    : text;
-  surroundings_.wishes.when_kept(
+  own_.wishes.when_kept(
       [reply = done.reply, number = done.request.number, text, said](const std::string& problem) {
         const std::string all = fmt::format("{}; a power cut would undo it: {}", said, problem);
         reply(ControlReply{.number = number, .code = ErrorCode::ok, .text = problem.empty() ? text : all});

@@ -32,10 +32,11 @@ InstancePlan plan_of(const InstanceConfig& config) {
 
 }  // namespace
 
-ManagedInstance::ManagedInstance(const InstanceConfig& config, Surroundings surroundings, InstanceHost& host)
+ManagedInstance::ManagedInstance(const InstanceConfig& config, const Surroundings& surroundings, Own own)
     : config_(config),
-      surroundings_(std::move(surroundings)),
-      host_(host),
+      surroundings_(surroundings),
+      own_(std::move(own)),
+      host_(own_.host),
       scheduler_(config.scheduler),
       begun_with_(configured()) {
   unix_offset_ns_ = unix_time_ns() - surroundings_.now().time_since_epoch().count();
@@ -379,7 +380,8 @@ void ManagedInstance::publish() {
   status_.application.assign(application_);
   status_.plan = plan_of(config_);
   remember();
-  surroundings_.observer.changed(surroundings_.place, status_);
+  surroundings_.observer.changed(own_.place, status_);
+  own_.changed();
 }
 
 }  // namespace plchost

@@ -104,18 +104,25 @@ inline constexpr Duration kAskAgain = std::chrono::seconds(2);
 // clang-format on
 class ManagedInstance : public InstanceEvents {
  public:
+  /// One for all instances of a host.
   struct Surroundings {
     const HostConfig& host;
-    ApplicationKeeper& applications;           ///< of this instance
-    WishKeeper& wishes;                        ///< of this instance
     std::string folder;                        ///< that relative application paths start in
     std::vector<std::string_view> schedulers;  ///< names that there are
     std::function<TimePoint()> now;
-    InstanceObserver& observer;  ///< changed() may call release(), nothing else
-    std::size_t place = 0;       ///< as the observer is told it
+    InstanceObserver& observer;
+  };
+  /// One for each instance.
+  struct Own {
+    InstanceHost& host;
+    ApplicationKeeper& applications;
+    WishKeeper& wishes;
+    std::size_t place = 0;                  ///< as the observer is told it
+    std::function<void()> changed = [] {};  ///< after the observer; may call release(), nothing else
   };
 
-  ManagedInstance(const InstanceConfig& config, Surroundings surroundings, InstanceHost& host);
+  /// The surroundings outlive it.
+  ManagedInstance(const InstanceConfig& config, const Surroundings& surroundings, Own own);
 
   /// First of all: takes over a process that is there. False: there is none.
   bool adopt();
@@ -298,7 +305,8 @@ class ManagedInstance : public InstanceEvents {
   [[nodiscard]] Result<std::uint64_t> send_limited(ControlVerb verb);
 
   InstanceConfig config_;
-  Surroundings surroundings_;
+  const Surroundings& surroundings_;
+  Own own_;
   InstanceHost& host_;
   RestartHistory history_;
 

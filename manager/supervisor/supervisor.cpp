@@ -10,9 +10,10 @@
 
 namespace plchost {
 
-Supervisor::Supervisor(const ManagerConfig& config, Surroundings surroundings, HostFactory make_host)
-    : host_(config.host), surroundings_(std::move(surroundings)), make_host_(std::move(make_host)) {
-  for (const InstanceConfig& instance : config.instances) add(instance);
+Supervisor::Supervisor(const std::vector<InstanceConfig>& instances,
+                       ManagedInstance::Surroundings surroundings, HostFactory make_host)
+    : surroundings_(std::move(surroundings)), make_host_(std::move(make_host)) {
+  for (const InstanceConfig& instance : instances) add(instance);
   link();
 }
 
@@ -29,17 +30,12 @@ std::unique_ptr<Supervisor::Unit> Supervisor::make_unit(const InstanceConfig& co
   unit->host = std::move(hosted.host);
   unit->applications = std::move(hosted.applications);
   unit->wishes = std::move(hosted.wishes);
-  unit->instance =
-      std::make_unique<ManagedInstance>(config,
-                                        ManagedInstance::Surroundings{.host = host_,
-                                                                      .applications = *unit->applications,
-                                                                      .wishes = *unit->wishes,
-                                                                      .folder = surroundings_.folder,
-                                                                      .schedulers = surroundings_.schedulers,
-                                                                      .now = surroundings_.now,
-                                                                      .observer = *this,
-                                                                      .place = place},
-                                        *unit->host);
+  unit->instance = std::make_unique<ManagedInstance>(config, surroundings_,
+                                                     ManagedInstance::Own{.host = *unit->host,
+                                                                          .applications = *unit->applications,
+                                                                          .wishes = *unit->wishes,
+                                                                          .place = place,
+                                                                          .changed = [this] { advance(); }});
   hosted.connect(*unit->instance);
   return made;
 }
@@ -148,24 +144,6 @@ void Supervisor::refresh() {
     unit->instance->refresh();
   }
   if (!shut_down_) forget_gone();
-}
-
-void Supervisor::changed(std::size_t place, const InstanceStatus& status) {
-  surroundings_.observer.changed(place, status);
-  advance();
-}
-
-void Supervisor::transition(const InstanceStatus& status, InstanceState from, InstanceState to,
-                            std::string_view reason) {
-  surroundings_.observer.transition(status, from, to, reason);
-}
-
-void Supervisor::wrong_step(const InstanceStatus& status, std::string_view what) {
-  surroundings_.observer.wrong_step(status, what);
-}
-
-void Supervisor::gone(std::size_t place, const InstanceConfig& config) {
-  surroundings_.observer.gone(place, config);
 }
 
 // Starting one instance changes it, which comes back here: the outermost call does all the work.

@@ -18,14 +18,8 @@ namespace plchost {
 
 /// All instances: which one a command is for, and in which order they start and end. A later instance of
 /// `after` starts when the earlier ones are up, and ends before them.
-class Supervisor : public ControlHandler, private InstanceObserver {
+class Supervisor : public ControlHandler {
  public:
-  struct Surroundings {
-    std::string folder;
-    std::vector<std::string_view> schedulers;
-    std::function<TimePoint()> now;
-    InstanceObserver& observer;
-  };
   /// Makes the host of one instance, and is told where its events go.
   struct HostedInstance {
     std::unique_ptr<InstanceHost> host;
@@ -35,8 +29,8 @@ class Supervisor : public ControlHandler, private InstanceObserver {
   };
   using HostFactory = std::function<HostedInstance(const InstanceConfig&)>;
 
-  /// The [host] of `config` outlives it.
-  Supervisor(const ManagerConfig& config, Surroundings surroundings, HostFactory make_host);
+  Supervisor(const std::vector<InstanceConfig>& instances, ManagedInstance::Surroundings surroundings,
+             HostFactory make_host);
 
   /// Before start(): takes over a process that an earlier manager has left and whose instance is not in the
   /// configuration. False: there is none.
@@ -83,18 +77,12 @@ class Supervisor : public ControlHandler, private InstanceObserver {
   void link();
   void forget_gone();
   void tell_changes(Unit& unit, const InstanceConfig& now, std::vector<std::string>& lines);
-  void changed(std::size_t place, const InstanceStatus& status) override;
-  void transition(const InstanceStatus& status, InstanceState from, InstanceState to,
-                  std::string_view reason) override;
-  void wrong_step(const InstanceStatus& status, std::string_view what) override;
-  void gone(std::size_t place, const InstanceConfig& config) override;
   void advance();
   void advance_start(Unit& unit);
   void advance_end();
   [[nodiscard]] std::string names() const;
 
-  const HostConfig& host_;
-  Surroundings surroundings_;
+  const ManagedInstance::Surroundings surroundings_;
   HostFactory make_host_;
   std::vector<std::unique_ptr<Unit>> units_;
   std::function<void()> shut_down_;

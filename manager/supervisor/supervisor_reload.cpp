@@ -117,7 +117,7 @@ void Supervisor::forget_gone() {
   units_.erase(first, units_.end());
   link();
   for (const auto& unit : ended) {
-    gone(unit->place, unit->instance->config());
+    surroundings_.observer.gone(unit->place, unit->instance->config());
   }
   advance();
 }

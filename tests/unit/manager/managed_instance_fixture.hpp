@@ -31,15 +31,8 @@ class ManagedInstanceTest : public testing::Test {
   }
 
   void make() {
-    sut_.emplace(config_,
-                 ManagedInstance::Surroundings{.host = host_config_,
-                                               .applications = applications_,
-                                               .wishes = wishes_,
-                                               .folder = "/etc/plchost",
-                                               .schedulers = {"CmpSchedule", "CmpScheduleTimer"},
-                                               .now = [this] { return now_; },
-                                               .observer = observer_},
-                 host_);
+    sut_.emplace(config_, surroundings_,
+                 ManagedInstance::Own{.host = host_, .applications = applications_, .wishes = wishes_});
   }
 
   ManagedInstance& sut() { return *sut_; }
@@ -120,6 +113,11 @@ class ManagedInstanceTest : public testing::Test {
   FakeWishes wishes_;
   TimePoint now_{std::chrono::seconds(1000)};
   FakeObserver observer_;
+  const ManagedInstance::Surroundings surroundings_{.host = host_config_,
+                                                    .folder = "/etc/plchost",
+                                                    .schedulers = {"CmpSchedule", "CmpScheduleTimer"},
+                                                    .now = [this] { return now_; },
+                                                    .observer = observer_};
   std::vector<ControlReply> replies_;
   std::optional<ManagedInstance> sut_;
 };

@@ -37,11 +37,12 @@ class SupervisorTest : public testing::Test {
   }
 
   void make() {
-    sut_.emplace(config_,
-                 Supervisor::Surroundings{.folder = "/etc",
-                                          .schedulers = {"CmpSchedule"},
-                                          .now = [this] { return now_; },
-                                          .observer = observer_},
+    sut_.emplace(config_.instances,
+                 ManagedInstance::Surroundings{.host = config_.host,
+                                               .folder = "/etc",
+                                               .schedulers = {"CmpSchedule"},
+                                               .now = [this] { return now_; },
+                                               .observer = observer_},
                  [this](const InstanceConfig& config) {
                    auto host = std::make_unique<FakeHost>();
                    hosts_[config.name] = host.get();
