@@ -17,11 +17,11 @@
 #include "instances/runtime/setup/options.hpp"
 #include "instances/runtime/trial/application_check.hpp"
 #include "instances/runtime/trial/trial_process.hpp"
-#include "shm/base/end_with_parent.hpp"
 #include "shm/base/memory_guard.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/unique_fd.hpp"
 #include "shm/log/log.hpp"
+#include "shm/process/end_with_parent.hpp"
 
 namespace plchost {
 

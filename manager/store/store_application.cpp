@@ -18,11 +18,11 @@
 #include "api/control/application_versions.hpp"
 #include "api/security/sha256.hpp"
 #include "manager/system/application_trial.hpp"
-#include "shm/base/end_with_parent.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/unique_fd.hpp"
 #include "shm/files/replace_file.hpp"
+#include "shm/process/end_with_parent.hpp"
 
 namespace plchost {
 

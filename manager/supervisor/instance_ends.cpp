@@ -6,8 +6,8 @@
 #include <fmt/format.h>
 
 #include "manager/supervisor/managed_instance.hpp"
-#include "shm/base/dynamic_loader.hpp"
 #include "shm/base/transient.hpp"
+#include "shm/process/dynamic_loader.hpp"
 
 namespace plchost {
 
@@ -115,7 +115,7 @@ void ManagedInstance::carry_out(const Decision& decision, const std::string& why
       host_.set_timer(after(decision.delay));
       return set_state(Phase::backing_off, InstanceState::waiting, why);
     case await_process:
-      awaited_ = {.until = after(kSetupLimit), .interval = decision.delay};
+      awaited_ = AwaitedProcess{.until = after(kSetupLimit), .interval = decision.delay};
       set_state(Phase::backing_off, InstanceState::waiting, why);
       return host_.set_timer(after(decision.delay));
     case bring_down:

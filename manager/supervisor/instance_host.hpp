@@ -9,8 +9,8 @@
 #include "manager/system/child_process.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/time.hpp"
-#include "shm/base/work_limit.hpp"
 #include "shm/pages/instance_page.hpp"
+#include "shm/process/work_limit.hpp"
 #include "shm/sockets/control_message.hpp"
 
 namespace plchost {

@@ -18,8 +18,8 @@
 #include "manager/supervisor/instance_phase.hpp"
 #include "manager/supervisor/restart_decision.hpp"
 #include "manager/supervisor/starvation_watch.hpp"
-#include "shm/base/work_limit.hpp"
 #include "shm/pages/host_page.hpp"
+#include "shm/process/work_limit.hpp"
 
 namespace plchost {
 

@@ -11,7 +11,6 @@
 #include "api/control/control_handler.hpp"
 #include "manager/config/manager_config.hpp"
 #include "manager/supervisor/instance_host.hpp"
-#include "manager/supervisor/instance_observer.hpp"
 #include "manager/supervisor/managed_instance.hpp"
 
 namespace plchost {

@@ -7,7 +7,7 @@
 #include "instances/launch/launch_contract.hpp"
 #include "manager/system/child_process.hpp"
 #include "shm/base/time.hpp"
-#include "shm/base/work_limit.hpp"
+#include "shm/process/work_limit.hpp"
 
 namespace plchost {
 

@@ -4,8 +4,8 @@
 
 #include <fmt/format.h>
 
-#include "shm/base/thread_owner.hpp"
 #include "shm/files/memory_file.hpp"
+#include "shm/process/thread_owner.hpp"
 
 namespace plchost {
 

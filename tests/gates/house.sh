@@ -57,7 +57,7 @@ fi
 git grep -nE '\bTaskKind::' -- "${sources[@]/%//*.[ch]pp}" ':!shm/base/task_kind.hpp' ':!schedulers/tasks/kinds' &&
   fault "the lines above know a kind of task: ask its row in shm/base/task_kind.hpp, or its object" || true
 # dlopen() tells its cause in words only.
-git grep -nE '\bdlopen\(' -- "${sources[@]/%//*.[ch]pp}" ':!shm/base/dynamic_loader.*' &&
+git grep -nE '\bdlopen\(' -- "${sources[@]/%//*.[ch]pp}" ':!shm/process/dynamic_loader.*' &&
   fault "the lines above do not tell a shortage from a wrong file: use open_library" || true
 # DDS alone keeps the keys of unregistered instances in memory.
 git grep -nE '\bdds_unregister_instance' -- '*.cpp' '*.hpp' ':!api/dds/instances.*' ':!tests' && fault "the lines above leak: use dds::unregister_instance" || true

@@ -13,7 +13,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "shm/base/end_with_parent.hpp"
+#include "shm/process/end_with_parent.hpp"
 
 namespace plchost {
 

@@ -19,7 +19,7 @@ std::string type_text(const plc_ObjectRecord& object) {
 }
 
 const ObjectTraits& shown_as(const ListedObject& object) {
-  static constexpr ObjectTraits kUnknown;
+  static constexpr ObjectTraits kUnknown{};
   const ObjectTraits* const traits = traits_of(object.type());
   return traits != nullptr ? *traits : kUnknown;
 }

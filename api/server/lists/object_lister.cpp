@@ -7,7 +7,7 @@
 
 #include "api/server/lists/account_names.hpp"
 #include "shm/base/names.hpp"
-#include "shm/base/thread_owner.hpp"
+#include "shm/process/thread_owner.hpp"
 
 namespace plchost {
 

@@ -13,8 +13,8 @@
 
 #include "instances/runtime/application/elf_check.hpp"
 #include "instances/runtime/application/symbol_name.hpp"
-#include "shm/base/dynamic_loader.hpp"
 #include "shm/base/names.hpp"
+#include "shm/process/dynamic_loader.hpp"
 
 namespace plchost {
 

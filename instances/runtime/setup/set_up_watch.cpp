@@ -10,7 +10,7 @@
 #include "instances/runtime/setup/long_run_search.hpp"
 #include "schedulers/faults/processor_guard.hpp"
 #include "schedulers/faults/starvation.hpp"
-#include "shm/base/work_limit.hpp"
+#include "shm/process/work_limit.hpp"
 
 namespace plchost {
 

@@ -6,9 +6,9 @@
 #include <fmt/format.h>
 #include <link.h>
 
-#include "shm/base/dynamic_loader.hpp"
 #include "shm/base/time.hpp"
 #include "shm/log/log.hpp"
+#include "shm/process/dynamic_loader.hpp"
 
 namespace plchost {
 

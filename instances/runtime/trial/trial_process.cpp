@@ -28,10 +28,10 @@
 #include "instances/launch/launch_contract.hpp"
 #include "instances/runtime/application/symbol_name.hpp"
 #include "schedulers/faults/fault_signals.hpp"
-#include "shm/base/end_with_parent.hpp"
 #include "shm/base/thread.hpp"
 #include "shm/base/unique_fd.hpp"
-#include "shm/base/work_limit.hpp"
+#include "shm/process/end_with_parent.hpp"
+#include "shm/process/work_limit.hpp"
 
 namespace plchost {
 

@@ -13,7 +13,7 @@
 #include "api/dds/domain.hpp"
 #include "api/dds/text.hpp"
 #include "api/dds/topics.hpp"
-#include "shm/base/end_with_parent.hpp"
+#include "shm/process/end_with_parent.hpp"
 #include "tests/integration/api/test_host.hpp"
 
 namespace plchost {

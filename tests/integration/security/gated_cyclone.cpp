@@ -21,7 +21,7 @@
 #include "api/dds/domain.hpp"
 #include "api/dds/gate/packet_gate.hpp"
 #include "api/dds/topics.hpp"
-#include "shm/base/end_with_parent.hpp"
+#include "shm/process/end_with_parent.hpp"
 #include "tests/integration/security/gate_board.hpp"
 
 extern char** environ;

@@ -14,7 +14,7 @@
 #include "api/cli/rows/object_rows.hpp"
 #include "api/server/lists/account_names.hpp"
 #include "shm/base/names.hpp"
-#include "shm/base/thread_owner.hpp"
+#include "shm/process/thread_owner.hpp"
 #include "tests/support/own_name.hpp"
 
 namespace plchost {

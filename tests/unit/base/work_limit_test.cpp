@@ -1,4 +1,4 @@
-#include "shm/base/work_limit.hpp"
+#include "shm/process/work_limit.hpp"
 
 #include <atomic>
 #include <csignal>

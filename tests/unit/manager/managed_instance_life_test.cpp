@@ -2,7 +2,7 @@
 #include <csignal>
 #include <utility>
 
-#include "shm/base/dynamic_loader.hpp"
+#include "shm/process/dynamic_loader.hpp"
 #include "tests/unit/manager/managed_instance_fixture.hpp"
 
 namespace plchost {

@@ -5,8 +5,8 @@
 
 #include <gtest/gtest.h>
 
-#include "shm/base/dynamic_loader.hpp"
 #include "shm/pages/log_ring.hpp"
+#include "shm/process/dynamic_loader.hpp"
 #include "tests/support/own_name.hpp"
 
 namespace plchost {

@@ -10,7 +10,7 @@
 #include <unistd.h>
 
 #include "shm/base/thread.hpp"
-#include "shm/base/work_limit.hpp"
+#include "shm/process/work_limit.hpp"
 
 namespace plchost {
 namespace {

@@ -1,4 +1,4 @@
-#include "shm/base/dynamic_loader.hpp"
+#include "shm/process/dynamic_loader.hpp"
 
 #include <algorithm>
 #include <array>

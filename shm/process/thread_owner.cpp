@@ -1,4 +1,4 @@
-#include "shm/base/thread_owner.hpp"
+#include "shm/process/thread_owner.hpp"
 
 #include <charconv>
 #include <fstream>
