@@ -27,34 +27,6 @@
 
 namespace plchost {
 
-/// Where tasks find what lies outside: given by the instance (the pool), or by a test.
-struct TaskEnvironment {
-  /// The counter behind an external event's name. Called once per external task in create(). It outlives the
-  /// TaskSet.
-  std::function<Result<CountedEvent*>(std::string_view event)> find_event;
-  /// Zeroed memory for the statistics of task number `index`. It outlives the TaskSet.
-  std::function<TaskStatistics&(std::size_t index)> statistics;
-  /// Zeroed memory that shows the fault of task number `index` to other processes. May be empty. It outlives
-  /// the TaskSet.
-  std::function<Seqlock<FaultRecord>&(std::size_t index)> fault_record;
-  /// Tells that a task's thread runs cycles (true) or is parked (false). May be empty. Called by the control
-  /// thread, from within start(), stop() and switch_to().
-  std::function<void(std::size_t index, bool running)> state_changed;
-  /// Tells that a task was asked to park: after the cycle that it is in it takes no release any more. Told in
-  /// the phase of the stop that the task belongs to. May be empty. Called by the control thread,
-  /// from within begin_stop() and advance_stop().
-  std::function<void(std::size_t index)> to_park;
-  /// Faults and endless loops in the application's code put their task into exception: handlers for signals
-  /// are installed in this process (see install_fault_handlers()), and a thread supervises the tasks. Without
-  /// it a fault ends the process.
-  bool catch_faults = false;
-  /// For development, and tests in places without the right to SCHED_FIFO: all threads run as SCHED_OTHER, so
-  /// neither priorities nor times hold.
-  bool allow_unprivileged = false;
-  /// Where clock devices are opened.
-  DeviceFiles* devices = &linux_device_files();
-};
-
 // The life of a set of tasks
 // ==========================
 //
@@ -86,6 +58,34 @@ struct TaskEnvironment {
 // the order that it was given last: TaskThread::use(), Ticker::use(), and settled() when it does. The
 // supervision watches them. All functions of the set are called by one control thread. A scheduler that is
 // given up, with its sources, is freed when every thread has settled.
+
+/// Where tasks find what lies outside: given by the instance (the pool), or by a test.
+struct TaskEnvironment {
+  /// The counter behind an external event's name. Called once per external task in create(). It outlives the
+  /// TaskSet.
+  std::function<Result<CountedEvent*>(std::string_view event)> find_event;
+  /// Zeroed memory for the statistics of task number `index`. It outlives the TaskSet.
+  std::function<TaskStatistics&(std::size_t index)> statistics;
+  /// Zeroed memory that shows the fault of task number `index` to other processes. May be empty. It outlives
+  /// the TaskSet.
+  std::function<Seqlock<FaultRecord>&(std::size_t index)> fault_record;
+  /// Tells that a task's thread runs cycles (true) or is parked (false). May be empty. Called by the control
+  /// thread, from within start(), stop() and switch_to().
+  std::function<void(std::size_t index, bool running)> state_changed;
+  /// Tells that a task was asked to park: after the cycle that it is in it takes no release any more. Told in
+  /// the phase of the stop that the task belongs to. May be empty. Called by the control thread,
+  /// from within begin_stop() and advance_stop().
+  std::function<void(std::size_t index)> to_park;
+  /// Faults and endless loops in the application's code put their task into exception: handlers for signals
+  /// are installed in this process (see install_fault_handlers()), and a thread supervises the tasks. Without
+  /// it a fault ends the process.
+  bool catch_faults = false;
+  /// For development, and tests in places without the right to SCHED_FIFO: all threads run as SCHED_OTHER, so
+  /// neither priorities nor times hold.
+  bool allow_unprivileged = false;
+  /// Where clock devices are opened.
+  DeviceFiles* devices = &linux_device_files();
+};
 
 /// The tasks of one application with their threads, under one scheduler that can be exchanged while they run.
 /// All functions are set-up, from one control thread.
@@ -249,7 +249,7 @@ class TaskSet {
   void begin_second_phase();
   void park_tasks(bool that_drive_outputs);
   std::vector<std::size_t> busy_in_phase();
-  [[nodiscard]] bool in_cycle(std::size_t task) const noexcept;
+  [[nodiscard]] bool runs_code(std::size_t task) const noexcept;
   [[nodiscard]] std::optional<std::vector<std::size_t>> stuck_in_phase(const std::vector<std::size_t>& busy);
   [[nodiscard]] std::optional<std::size_t> task_in_variable() const noexcept;
   void watch_variables(const SchedulerSettings& settings);

@@ -70,7 +70,7 @@ std::vector<std::size_t> TaskSet::busy_in_phase() {
   return busy;
 }
 
-bool TaskSet::in_cycle(std::size_t task) const noexcept {
+bool TaskSet::runs_code(std::size_t task) const noexcept {
   return tasks_[task]->trap().running_since().has_value();
 }
 
@@ -85,7 +85,8 @@ std::optional<std::vector<std::size_t>> TaskSet::stuck_in_phase(const std::vecto
   if (!stop_->judged_from) stop_->judged_from = now + kSecondLook;
   if (now < *stop_->judged_from) return std::nullopt;
   std::vector<std::size_t> inside;
-  std::ranges::copy_if(busy, std::back_inserter(inside), [&](std::size_t task) { return in_cycle(task); });
+  std::ranges::copy_if(busy, std::back_inserter(inside), [&](std::size_t task) { return runs_code(task); });
+  // The limit is the stop's, not kVariablePatience: a stop names the task, and puts it into no exception.
   const auto variable = task_in_variable();
   if (!ended && variable) {
     late_variable_ = variable;

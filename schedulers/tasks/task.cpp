@@ -1,13 +1,10 @@
 #include "schedulers/tasks/task.hpp"
 
-#include <cstdlib>
 #include <utility>
 
 #include "schedulers/tasks/event_latch.hpp"
 
 namespace plchost {
-
-namespace {}  // namespace
 
 Task::Task(Clock& clock, TaskConfig config, TaskStatistics& statistics, CountedEvent* event,
            FaultBoard* board) noexcept

@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "instances/runtime/tasks/task_builder.hpp"
 #include "shm/base/names.hpp"
 #include "shm/log/log.hpp"
 

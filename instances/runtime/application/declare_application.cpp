@@ -60,11 +60,12 @@ Result<void> prepare_host(const StartSettings& start, ApplicationHost& host) {
 }
 
 Result<void> load_components(const InstanceSettings& settings, ComponentHooks hooks, Components& components,
-                             ApplicationHost& host) {
+                             ApplicationHost& host, std::span<const PF_SYSTIME> own_time) {
   const ApplicationHost::ComponentCode code(host);
   auto loaded = components.load(settings.components);
   if (loaded) {  // a component may hold the clock, and the hooks of all see it
-    loaded = use_system_time(settings.sys_time, [&](const char* symbol) { return components.find(symbol); });
+    loaded = use_system_time(settings.sys_time, own_time,
+                             [&](const char* symbol) { return components.find(symbol); });
   }
   if (loaded) loaded = hooks == ComponentHooks::init ? components.init() : components.check();
   host.write_messages();

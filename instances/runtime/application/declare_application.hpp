@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 
 #include "instances/launch/launch_contract.hpp"
@@ -33,9 +34,11 @@ struct StartSettings {
 /// Whether the hooks of the components take what they need, or only say whether they could.
 enum class ComponentHooks : bool { check, init };
 
-/// Loads the components, has [SysTime] checked and used, and calls the hooks. Their log is written. Set-up.
+/// Loads the components, has [SysTime] checked and used, and calls the hooks. Their log is written.
+/// `own_time`: see use_system_time(). Set-up.
 [[nodiscard]] Result<void> load_components(const InstanceSettings& settings, ComponentHooks hooks,
-                                           Components& components, ApplicationHost& host);
+                                           Components& components, ApplicationHost& host,
+                                           std::span<const PF_SYSTIME> own_time);
 
 /// Loads it, has it declare itself to `host`, applies the settings of its tasks, and checks the declaration
 /// as a whole: tasks, external events, uses of areas. Another version of the application that runs is loaded

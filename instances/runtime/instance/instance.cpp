@@ -186,7 +186,8 @@ Result<void> Instance::restore_operator_events() {
 }
 
 Result<std::string> Instance::load_components() {
-  PLCHOST_TRY(plchost::load_components(start_.settings, ComponentHooks::init, components_, *host_));
+  constexpr std::array<PF_SYSTIME, 2> kOwnTime = {SysTimeGetUs, SysTimeGetNs};
+  PLCHOST_TRY(plchost::load_components(start_.settings, ComponentHooks::init, components_, *host_, kOwnTime));
   return {};
 }
 

@@ -45,8 +45,8 @@ void Instance::start(TaskSet::Prepared prepared, std::string_view why) {
   tasks_->start(std::move(prepared));
   host_->events().publish_bound(true);
   unbound_.assign(application_->tasks().size(), false);
-  life_.go_to(ApplicationState::running,
-              fmt::format("{}: {} tasks under {}", why, application_->tasks().size(), scheduler_));
+  life_.go_to(ApplicationState::running, fmt::format("{}: {} tasks under {}", why,
+                                                     application_->tasks().size(), tasks_->scheduler_name()));
 }
 
 Result<std::string> Instance::start_by_command() {

@@ -35,7 +35,6 @@ struct DeclaredArea {
   [[nodiscard]] bool is_retain() const noexcept {
     return (flags & (PLC_AREA_RETAIN | PLC_AREA_PERSISTENT)) != 0;
   }
-  [[nodiscard]] bool is_persistent() const noexcept { return (flags & PLC_AREA_PERSISTENT) != 0; }
 };
 
 /// Takes over what an application declares. invalid_argument: the fault, and the allowed values. Control

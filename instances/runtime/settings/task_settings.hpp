@@ -2,13 +2,10 @@
 
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <string>
-#include <vector>
 
-#include "instances/plc_app.h"
 #include "schedulers/tasks/task_config.hpp"
-#include "shm/base/result.hpp"
+#include "shm/base/time.hpp"
 
 namespace plchost {
 
@@ -26,14 +23,5 @@ struct TaskSettings {
   std::optional<WatchdogPolicy> watchdog_policy{};
   bool operator==(const TaskSettings&) const = default;
 };
-
-/// The options of the C interface, checked as far as they can be without the task. invalid_argument: the text
-/// names the field and the allowed values. Set-up.
-[[nodiscard]] Result<TaskSettings> from_options(const char* task, const Task_Options* options);
-
-/// Writes `settings` into the tasks that they name. invalid_argument: there is no such task (the text lists
-/// what there is), or it is not of the kind that can have this. Set-up.
-[[nodiscard]] Result<void> apply_task_settings(std::span<const TaskSettings> settings,
-                                               std::vector<TaskConfig>& tasks);
 
 }  // namespace plchost

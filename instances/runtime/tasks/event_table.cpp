@@ -207,14 +207,6 @@ Result<CountedEvent*> EventTable::bind_task(std::string_view event) {
   return slot->bound == nullptr ? &slot->own_counter : &slot->bound->counted();
 }
 
-void EventTable::forget_tasks() {
-  publish_bound(false);
-  for (std::size_t i = 0; i < count_.load(std::memory_order_relaxed); ++i) {
-    slots_[i]->tasks = 0;
-    show_use(*slots_[i]);
-  }
-}
-
 Result<void> EventTable::hold_bound() {
   for (std::size_t i = 0; i < count_.load(std::memory_order_relaxed); ++i) {
     const Slot& slot = *slots_[i];

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "instances/plc_app.h"
+#include "instances/runtime/settings/task_settings.hpp"
 #include "schedulers/tasks/task_config.hpp"
 #include "shm/base/result.hpp"
 #include "shm/pages/instance_page.hpp"
@@ -26,6 +28,15 @@ using TaskCodes = std::vector<std::shared_ptr<TaskCode>>;
 [[nodiscard]] Result<std::vector<TaskConfig>> build_tasks(const sys_setup_tasks_struct& setup,
                                                           TaskCodes& codes);
 [[nodiscard]] Result<std::vector<TaskConfig>> build_tasks(const sys_setup_tasks_struct& setup);
+
+/// The options of the C interface, checked as far as they can be without the task. invalid_argument: the text
+/// names the field and the allowed values. Set-up.
+[[nodiscard]] Result<TaskSettings> from_options(const char* task, const Task_Options* options);
+
+/// Writes `settings` into the tasks that they name. invalid_argument: there is no such task (the text lists
+/// what there is), or it is not of the kind that can have this. Set-up.
+[[nodiscard]] Result<void> apply_task_settings(std::span<const TaskSettings> settings,
+                                               std::vector<TaskConfig>& tasks);
 
 /// Writes the cycle times and the jitter, in us, into the application's own memory. Real-time.
 void write_back(const TaskCounters& counters, Task_Info& task) noexcept;

@@ -1,5 +1,6 @@
 #include "instances/runtime/time/system_time.hpp"
 
+#include <algorithm>
 #include <bit>
 
 #include <dlfcn.h>
@@ -102,7 +103,7 @@ struct Found {
 
 // dlsym() finds variables, too, and those must not be called. A function without an entry of its own is the
 // one that the function of an IFUNC has chosen.
-Result<Found> as_function(void* symbol, const std::string& name) {
+Result<Found> as_function(void* symbol, const std::string& name, std::span<const PF_SYSTIME> own) {
   Dl_info place{};
   void* entry = nullptr;
   const bool is_placed = ::dladdr1(symbol, &place, &entry, RTLD_DL_SYMENT) != 0;
@@ -112,23 +113,23 @@ Result<Found> as_function(void* symbol, const std::string& name) {
     return failure(ErrorCode::invalid_argument, fmt::format("[SysTime]: '{}' is no function", name));
   }
   const auto call = std::bit_cast<PF_SYSTIME>(symbol);
-  if (call == SysTimeGetUs || call == SysTimeGetNs) {
+  if (std::ranges::find(own, call) != own.end()) {
     return failure(ErrorCode::invalid_argument,
                    fmt::format("[SysTime]: '{}' is the runtime's own and cannot stand for itself", name));
   }
   return Found{call, fmt::format("{} of {}", name, place.dli_fname)};
 }
 
-Result<Found> find_in_library(void* library, const std::string& path, const std::string& symbol) {
+Result<void*> find_in_library(void* library, const std::string& path, const std::string& symbol) {
   void* const found = ::dlsym(library, symbol.c_str());
-  if (found != nullptr) return as_function(found, symbol);
+  if (found != nullptr) return found;
   return failure(ErrorCode::not_found, fmt::format("[SysTime]: {} has no function '{}'", path, symbol));
 }
 
-Result<Found> find_in_loaded(const FindSymbol& find_in_components, const std::string& symbol) {
+Result<void*> find_in_loaded(const FindSymbol& find_in_components, const std::string& symbol) {
   void* found = find_in_components ? find_in_components(symbol.c_str()) : nullptr;
   if (found == nullptr) found = ::dlsym(RTLD_DEFAULT, symbol.c_str());
-  if (found != nullptr) return as_function(found, symbol);
+  if (found != nullptr) return found;
   return failure(
       ErrorCode::not_found,
       fmt::format("[SysTime]: no component and nothing else that is loaded has a function '{}'; the "
@@ -142,21 +143,24 @@ struct Clocks {
 };
 
 template <class Find>
-Result<Clocks> find_both(const SysTimeSettings& settings, Find find) {
-  PLCHOST_TRY_ASSIGN(auto us, find(settings.get_us));
-  PLCHOST_TRY_ASSIGN(auto ns, find(settings.get_ns));
+Result<Clocks> find_both(const SysTimeSettings& settings, std::span<const PF_SYSTIME> own, Find find) {
+  PLCHOST_TRY_ASSIGN(void* const us_symbol, find(settings.get_us));
+  PLCHOST_TRY_ASSIGN(auto us, as_function(us_symbol, settings.get_us, own));
+  PLCHOST_TRY_ASSIGN(void* const ns_symbol, find(settings.get_ns));
+  PLCHOST_TRY_ASSIGN(auto ns, as_function(ns_symbol, settings.get_ns, own));
   return Clocks{std::move(us), std::move(ns)};
 }
 
-Result<Clocks> find_clocks(const SysTimeSettings& settings, const FindSymbol& find_in_components) {
+Result<Clocks> find_clocks(const SysTimeSettings& settings, std::span<const PF_SYSTIME> own,
+                           const FindSymbol& find_in_components) {
   if (settings.library.empty()) {
-    return find_both(settings,
+    return find_both(settings, own,
                      [&](const std::string& symbol) { return find_in_loaded(find_in_components, symbol); });
   }
   // It stays loaded: an application may call it to the very end.
   auto library = open_library(settings.library, RTLD_NOW | RTLD_LOCAL | RTLD_NODELETE);
   if (!library) return failure_in("[SysTime] CustomSysTimeLibrary", std::move(library).error());
-  return find_both(settings, [&](const std::string& symbol) {
+  return find_both(settings, own, [&](const std::string& symbol) {
     return find_in_library(*library, settings.library, symbol);
   });
 }
@@ -189,9 +193,10 @@ Result<void> check_system_time(const TimeFunction& us, const TimeFunction& ns) {
   return us_watch.check_pace();
 }
 
-Result<void> use_system_time(const SysTimeSettings& settings, const FindSymbol& find_in_components) {
+Result<void> use_system_time(const SysTimeSettings& settings, std::span<const PF_SYSTIME> own,
+                             const FindSymbol& find_in_components) {
   if (settings == SysTimeSettings{}) return {};
-  PLCHOST_TRY_ASSIGN(const auto clocks, find_clocks(settings, find_in_components));
+  PLCHOST_TRY_ASSIGN(const auto clocks, find_clocks(settings, own, find_in_components));
   const auto& [us, ns] = clocks;
   if (auto good = check_system_time({us.name, us.call}, {ns.name, ns.call}); !good) {
     return failure_in("[SysTime]", std::move(good).error());

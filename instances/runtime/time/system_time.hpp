@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <span>
 #include <string_view>
 
 #include "instances/plc_app.h"
@@ -14,9 +15,10 @@ using FindSymbol = std::function<void*(const char* symbol)>;
 
 /// Makes the functions that [SysTime] names what SysTimeGetUs() and SysTimeGetNs() call, from here to the end
 /// of the process. Empty settings: CLOCK_MONOTONIC. Without a library they are looked for in the components,
-/// then in all that is loaded for everyone. The text of an error names the symbol, the library, and what was
-/// seen. Set-up, before anything of an application runs.
-[[nodiscard]] Result<void> use_system_time(const SysTimeSettings& settings,
+/// then in all that is loaded for everyone. `own`: SysTimeGetUs() and SysTimeGetNs() themselves, which are
+/// refused. The text of an error names the symbol, the library, and what was seen. Set-up, before anything of
+/// an application runs.
+[[nodiscard]] Result<void> use_system_time(const SysTimeSettings& settings, std::span<const PF_SYSTIME> own,
                                            const FindSymbol& find_in_components = {});
 
 /// The time that applications see, since a start that is the same for both. ERR_PARAMETER: `to` is null; else

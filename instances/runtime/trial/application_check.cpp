@@ -1,5 +1,6 @@
 #include "instances/runtime/trial/application_check.hpp"
 
+#include <array>
 #include <cerrno>
 #include <cstdio>
 #include <memory>
@@ -116,7 +117,8 @@ Result<DeclaredApplication> declare_watched(const std::string& path, const Start
     fmt::print(stderr, "{}: {}\n", path, error.describe());
     end_trial(kExitSetupFailed);
   });
-  PLCHOST_TRY(load_components(start.settings, ComponentHooks::check, components, host));
+  constexpr std::array<PF_SYSTIME, 2> kOwnTime = {SysTimeGetUs, SysTimeGetNs};
+  PLCHOST_TRY(load_components(start.settings, ComponentHooks::check, components, host, kOwnTime));
   auto declared = declare_application(path, start, host);
   if (auto ended = watch.end(); !ended && declared) return std::unexpected(std::move(ended).error());
   return declared;

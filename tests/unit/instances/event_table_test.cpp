@@ -142,6 +142,10 @@ TEST_F(EventTableTest, SaysWhenThePoolIsLockedWhileItClears) {
 TEST_F(EventTableTest, IsSeenToHoldWhatItRegistersAndBindsUntilItNeedsItNoMore) {
   const RTS_HANDLE handle = sut_.open("ready").value();
   EXPECT_FALSE(pool_.look_at("line1/ready")) << "a name alone holds nothing";
+  ASSERT_TRUE(sut_.register_by_application(handle));
+  EXPECT_EQ(pool_.look_at("line1/ready").value().reference_count, 1U);
+  ASSERT_TRUE(sut_.unregister_by_application(handle));
+  EXPECT_FALSE(pool_.look_at("line1/ready"));
   ASSERT_TRUE(sut_.bind_task("ready"));
   ASSERT_TRUE(sut_.register_by_application(handle));
   const auto used = pool_.look_at("line1/ready").value();
@@ -149,8 +153,6 @@ TEST_F(EventTableTest, IsSeenToHoldWhatItRegistersAndBindsUntilItNeedsItNoMore) 
   EXPECT_EQ(used.references[0].pid, static_cast<std::uint32_t>(::getpid()));
   ASSERT_TRUE(sut_.unregister_by_application(handle));
   EXPECT_EQ(pool_.look_at("line1/ready").value().reference_count, 1U) << "a task is still bound to it";
-  sut_.forget_tasks();
-  EXPECT_FALSE(pool_.look_at("line1/ready"));
 }
 
 TEST_F(EventTableTest, KeepsTheEventOfAFirmwareThatEndedWhileTheTasksAreStopped) {

@@ -9,6 +9,7 @@
 #include <gtest/gtest.h>
 
 #include "instances/runtime/settings/settings_key.hpp"
+#include "instances/runtime/tasks/task_builder.hpp"
 #include "shm/block_driver/node_directory.hpp"
 
 namespace plchost {

@@ -1,5 +1,6 @@
 #include "instances/runtime/time/system_time.hpp"
 
+#include <array>
 #include <bit>
 #include <thread>
 
@@ -12,6 +13,8 @@ namespace plchost {
 namespace {
 
 using ::testing::HasSubstr;
+
+constexpr std::array<PF_SYSTIME, 2> kOwn = {SysTimeGetUs, SysTimeGetNs};
 
 RTS_SYSTIME now_ns() {
   return static_cast<RTS_SYSTIME>(MonotonicClock::now().time_since_epoch().count());
@@ -99,7 +102,7 @@ TEST(SystemTime, RefusesWhatApplicationsCouldNotRelyOn) {
 }
 
 TEST(SystemTime, IsClockMonotonicInAllThreeUnitsByDefault) {
-  ASSERT_TRUE(use_system_time({}));
+  ASSERT_TRUE(use_system_time({}, kOwn));
   const RTS_SYSTIME before = now_ns();
   RTS_SYSTIME us = 0;
   RTS_SYSTIME ns = 0;
@@ -117,16 +120,18 @@ TEST(SystemTime, IsClockMonotonicInAllThreeUnitsByDefault) {
 }
 
 TEST(SystemTime, NamesTheLibraryThatIsNotThereAndTheSymbolThatItLacks) {
-  const auto absent = use_system_time({.get_us = "a", .get_ns = "b", .library = "/nonexistent/clock.so"});
+  const auto absent =
+      use_system_time({.get_us = "a", .get_ns = "b", .library = "/nonexistent/clock.so"}, kOwn);
   ASSERT_FALSE(absent);
   EXPECT_THAT(absent.error().message, HasSubstr("/nonexistent/clock.so"));
-  const auto lacking = use_system_time({.get_us = "my_us", .get_ns = "my_ns", .library = "libm.so.6"});
+  const auto lacking = use_system_time({.get_us = "my_us", .get_ns = "my_ns", .library = "libm.so.6"}, kOwn);
   ASSERT_FALSE(lacking);
   EXPECT_THAT(lacking.error().message, HasSubstr("libm.so.6 has no function 'my_us'"));
 }
 
 TEST(SystemTime, NamesTheKeyOfTheLibraryIfNothingThatIsLoadedHasTheSymbol) {
-  const auto sut = use_system_time({.get_us = "MySysTimeGetUs", .get_ns = "MySysTimeGetNs", .library = ""});
+  const auto sut =
+      use_system_time({.get_us = "MySysTimeGetUs", .get_ns = "MySysTimeGetNs", .library = ""}, kOwn);
   ASSERT_FALSE(sut);
   EXPECT_EQ(sut.error().code, ErrorCode::not_found);
   EXPECT_THAT(sut.error().message, HasSubstr("has a function 'MySysTimeGetUs'"));
@@ -135,10 +140,11 @@ TEST(SystemTime, NamesTheKeyOfTheLibraryIfNothingThatIsLoadedHasTheSymbol) {
 
 TEST(SystemTime, RefusesVariablesAndItself) {
   const SysTimeSettings settings{.get_us = "a", .get_ns = "b", .library = ""};
-  EXPECT_THAT(use_system_time({.get_us = "environ", .get_ns = "environ", .library = ""}).error().message,
-              HasSubstr("'environ' is no function"));
+  EXPECT_THAT(
+      use_system_time({.get_us = "environ", .get_ns = "environ", .library = ""}, kOwn).error().message,
+      HasSubstr("'environ' is no function"));
   const auto itself = [](const char*) { return std::bit_cast<void*>(&SysTimeGetUs); };
-  EXPECT_THAT(use_system_time(settings, itself).error().message, HasSubstr("'a' is the runtime's own"));
+  EXPECT_THAT(use_system_time(settings, kOwn, itself).error().message, HasSubstr("'a' is the runtime's own"));
 }
 
 }  // namespace

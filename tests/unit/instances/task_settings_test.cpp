@@ -1,7 +1,7 @@
-#include "instances/runtime/settings/task_settings.hpp"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "instances/runtime/tasks/task_builder.hpp"
 
 namespace plchost {
 namespace {
