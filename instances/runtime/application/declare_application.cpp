@@ -74,42 +74,70 @@ Result<void> load_components(const InstanceSettings& settings, ComponentHooks ho
 
 namespace {
 
+Areas::Environment areas_environment(const LoadContext& context, const Application& application) {
+  const InstanceSettings& settings = context.start.settings;
+  const std::string& directory = settings.retain.directory;
+  return {.pool = context.pool,
+          .instance = context.launch.name,
+          .application = application.name(),
+          .settings = settings.areas,
+          .retain = {.directory = directory.empty() ? context.launch.state_directory : directory,
+                     .interval = settings.retain.interval,
+                     .mismatch = settings.retain.mismatch,
+                     .postpone = settings.retain.postpone,
+                     .cold = context.launch.start_kind == StartKind::cold},
+          .room = context.host.events().room()};
+}
+
 // As a whole: `declared` is complete then.
-Result<void> check_declaration(const StartSettings& start, DeclaredApplication& declared) {
+Result<void> check_declaration(const LoadContext& context, DeclaredApplication& declared) {
   Application& application = declared.application;
-  if (start.device) {
-    if (auto known = check_device_events(*start.device, application.tasks()); !known) return known;
+  const auto& device = context.start.device;
+  if (device) {
+    if (auto known = check_device_events(*device, application.tasks()); !known) return known;
   }
-  if (auto applied = application.apply(start.settings.tasks); !applied) return applied;
+  if (auto applied = application.apply(context.start.settings.tasks); !applied) return applied;
+  PLCHOST_TRY(check_tasks(application.tasks()));
   std::vector<std::string> names;
   for (const TaskConfig& task : application.tasks()) names.push_back(task.name);
-  return complete_uses(declared.declaration.areas, names);
+  PLCHOST_TRY(complete_uses(declared.declaration.areas, names));
+  // Those of another version go on where they are: OnlineChange compares them.
+  if (context.host.has_application()) return {};
+  return Areas::check(areas_environment(context, application), declared.declaration.areas);
 }
 
 }  // namespace
 
-Result<DeclaredApplication> declare_application(const std::string& path, const StartSettings& start,
-                                                ApplicationHost& host) {
-  auto declared = Application::load(path, host);
+Result<DeclaredApplication> declare_application(const std::string& path, const LoadContext& context) {
+  auto declared = Application::load(path, context.host);
   if (!declared) return declared;
-  auto checked = check_declaration(start, *declared);
+  auto checked = check_declaration(context, *declared);
   if (checked) return declared;
-  declared->application.leave(host);
+  declared->application.leave(context.host);
   return std::unexpected(std::move(checked).error());
 }
 
-Areas::Environment areas_environment(const LaunchOptions& launch, const InstanceSettings& settings,
-                                     const Application& application, ObjectPool* pool) {
-  const std::string& directory = settings.retain.directory;
-  return {.pool = pool,
-          .instance = launch.name,
-          .application = application.name(),
-          .settings = settings.areas,
-          .retain = {.directory = directory.empty() ? launch.state_directory : directory,
-                     .interval = settings.retain.interval,
-                     .mismatch = settings.retain.mismatch,
-                     .postpone = settings.retain.postpone,
-                     .cold = launch.start_kind == StartKind::cold}};
+Result<Commit> Commit::prepare(const LoadContext& context, Application& application,
+                               ApplicationDeclaration declaration) {
+  ApplicationHost& host = context.host;
+  PLCHOST_TRY(host.reserve(declaration));
+  Commit commit(host, std::move(declaration));
+  if (host.has_application()) {
+    host.areas().tell_addresses(commit.declaration_.areas);
+    return commit;
+  }
+  PLCHOST_TRY_ASSIGN(commit.remark_,
+                     host.areas().place(areas_environment(context, application),
+                                        std::move(commit.declaration_.areas), application.tasks_to_change()));
+  return commit;
+}
+
+Commit::~Commit() {
+  if (host_ != nullptr) host_->release(declaration_);
+}
+
+void Commit::hold(const std::function<bool(const void*)>& is_code) {
+  std::exchange(host_, nullptr)->commit(std::move(declaration_), is_code);
 }
 
 std::string scheduler_for(const std::string& asked, const InstanceSettings& settings) {

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 
 #include "instances/launch/launch_contract.hpp"
 #include "instances/runtime/application/application.hpp"
@@ -13,8 +15,8 @@
 
 namespace plchost {
 
-// The steps that a start and its trial have in common: the settings, what stands ready before the application
-// is loaded, and what the application declares.
+// The steps that a start, its trial and an online change have in common: the settings, what stands ready
+// before the application is loaded, its declaration, and the commit of that.
 
 /// The settings and the device description of a start.
 struct StartSettings {
@@ -40,19 +42,52 @@ enum class ComponentHooks : bool { check, init };
                                            Components& components, ApplicationHost& host,
                                            std::span<const PF_SYSTIME> own_time);
 
-/// Loads it, has it declare itself to `host`, applies the settings of its tasks, and checks the declaration
-/// as a whole: tasks, external events, uses of areas. Another version of the application that runs is loaded
-/// beside that, and is gone again after an error, which is the first thing that is wrong. Then follows a
-/// commit: ApplicationHost::reserve(), Areas::place() at the first load or OnlineChange::take_over(),
-/// ApplicationHost::commit(). Set-up.
-[[nodiscard]] Result<DeclaredApplication> declare_application(const std::string& path,
-                                                              const StartSettings& start,
-                                                              ApplicationHost& host);
+/// The surroundings in which an application is declared and committed. All of it outlives that.
+struct LoadContext {
+  const LaunchOptions& launch;
+  const StartSettings& start;
+  ApplicationHost& host;
+  ObjectPool* pool = nullptr;  ///< null: a trial before the first start
+};
 
-/// For Areas::check() and Areas::place(). `application` and `settings` outlive it; `pool` may be null.
-[[nodiscard]] Areas::Environment areas_environment(const LaunchOptions& launch,
-                                                   const InstanceSettings& settings,
-                                                   const Application& application, ObjectPool* pool);
+/// Loads it, has it declare itself to the host, applies the settings of its tasks, and checks the declaration
+/// as a whole: external events, tasks, uses of areas, and at a first load whether the areas can be placed.
+/// Another version of the application that runs is loaded beside that, and is gone again after an error,
+/// which is the first thing that is wrong. Changes nothing else. Set-up.
+[[nodiscard]] Result<DeclaredApplication> declare_application(const std::string& path,
+                                                              const LoadContext& context);
+
+/// Makes a declaration hold that was checked as a whole: at a first load, and in an online change. Control
+/// thread.
+class Commit {
+ public:
+  /// Takes all steps that can fail: registers the events that are new and, at a first load, places the areas
+  /// around the cycles of `application`. Another version gets the addresses of those that go on. After an
+  /// error nothing of it is left. Set-up.
+  [[nodiscard]] static Result<Commit> prepare(const LoadContext& context, Application& application,
+                                              ApplicationDeclaration declaration);
+  Commit(Commit&& other) noexcept
+      : host_(std::exchange(other.host_, nullptr)),
+        declaration_(std::move(other.declaration_)),
+        remark_(std::move(other.remark_)) {}
+  Commit& operator=(Commit&&) = delete;
+  /// Without hold() the events are unregistered again.
+  ~Commit();
+
+  /// Of the areas; empty: there is nothing to say.
+  [[nodiscard]] const std::string& remark() const noexcept { return remark_; }
+  [[nodiscard]] const ApplicationDeclaration& declaration() const noexcept { return declaration_; }
+  /// The declaration holds from now on. Once. `is_code`: see ApplicationHost::commit().
+  void hold(const std::function<bool(const void*)>& is_code);
+
+ private:
+  Commit(ApplicationHost& host, ApplicationDeclaration declaration)
+      : host_(&host), declaration_(std::move(declaration)) {}
+
+  ApplicationHost* host_;  // null: it holds, or was moved away
+  ApplicationDeclaration declaration_;
+  std::string remark_;
+};
 
 /// The scheduler that `asked` and the settings lead to; `asked` may be empty.
 [[nodiscard]] std::string scheduler_for(const std::string& asked, const InstanceSettings& settings);

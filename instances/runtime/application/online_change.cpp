@@ -35,12 +35,12 @@ void copy_figures(const Task_Info& from, Task_Info& to) noexcept {
 }  // namespace
 
 Result<std::unique_ptr<OnlineChange>> OnlineChange::prepare(const std::string& path,
-                                                            const StartSettings& start, Application& running,
-                                                            ApplicationHost& host) {
+                                                            const LoadContext& context,
+                                                            Application& running) {
   const TimePoint begin = MonotonicClock::now();
-  PLCHOST_TRY_ASSIGN(auto next, declare_application(path, start, host));
+  PLCHOST_TRY_ASSIGN(auto next, declare_application(path, context));
   // From here on its destructor ends the new version.
-  std::unique_ptr<OnlineChange> change(new OnlineChange(running, std::move(next), host));
+  std::unique_ptr<OnlineChange> change(new OnlineChange(running, std::move(next.application), context.host));
   if (const Duration took = MonotonicClock::now() - begin; took > kLongestSetup) {
     return failure(ErrorCode::timed_out,
                    fmt::format("{} cannot take over online: its set-up took {:.1f} s, allowed are {:.0f} s; "
@@ -48,47 +48,46 @@ Result<std::unique_ptr<OnlineChange>> OnlineChange::prepare(const std::string& p
                                path, std::chrono::duration<double>(took).count(),
                                std::chrono::duration<double>(kLongestSetup).count()));
   }
-  PLCHOST_TRY(change->compare());
-  PLCHOST_TRY(change->connect());
+  PLCHOST_TRY(change->compare(next.declaration));
+  PLCHOST_TRY_ASSIGN(auto commit, Commit::prepare(context, change->next_, std::move(next.declaration)));
+  change->commit_.emplace(std::move(commit));
+  change->connect();
   return change;
 }
 
 OnlineChange::~OnlineChange() {
-  if (connected_ && !taken_over_) host_.release(declaration_);
+  commit_.reset();
   next_.leave(host_);  // or the version before
 }
 
-Result<void> OnlineChange::compare() const {
+Result<void> OnlineChange::compare(const ApplicationDeclaration& declaration) const {
   std::vector<std::string> lines;
   if (next_.name() != running_.name()) {
     lines.push_back(fmt::format("it is the application '{}', '{}' runs", next_.name(), running_.name()));
   }
   const auto add = [&](std::vector<std::string> more) { std::ranges::move(more, std::back_inserter(lines)); };
   add(compare_tasks(running_.tasks(), next_.tasks()));
-  add(compare_areas(host_.areas().declared(), declaration_.areas));
-  add(compare_variables(host_.declaration().variables, declaration_.variables));
+  add(compare_areas(host_.areas().declared(), declaration.areas));
+  add(compare_variables(host_.declaration().variables, declaration.variables));
   if (lines.empty()) return {};
   return failure(ErrorCode::refused,
                  fmt::format("{} cannot take over online: {}; nothing is changed; load it without --online",
                              next_.path(), first_of(lines)));
 }
 
-Result<void> OnlineChange::connect() {
-  if (auto reserved = host_.reserve(declaration_); !reserved) return reserved;
-  connected_ = true;
-  host_.areas().tell_addresses(declaration_.areas);
+void OnlineChange::connect() {
+  const auto& variables = commit_->declaration().variables;
   for (const TaskConfig& task : running_.tasks()) {
     const auto same = std::ranges::find(next_.tasks(), task.name, &TaskConfig::name);
     codes_.push_back(next_.codes()[static_cast<std::size_t>(same - next_.tasks().begin())]);
     infos_.push_back(codes_.back()->info);
   }
   for (const CarriedVariables& carried : host_.declaration().variables) {
-    const auto same = std::ranges::find(declaration_.variables, carried.name, &CarriedVariables::name);
-    if (same == declaration_.variables.end()) continue;
+    const auto same = std::ranges::find(variables, carried.name, &CarriedVariables::name);
+    if (same == variables.end()) continue;
     copies_.push_back({.to = same->address, .from = carried.address, .bytes = carried.bytes});
     copied_.push_back(carried.name);
   }
-  return {};
 }
 
 void OnlineChange::take_over() noexcept {
@@ -100,12 +99,11 @@ void OnlineChange::take_over() noexcept {
   }
   host_.task_table().exchange(infos_);
   running_.exchange(next_);
-  taken_over_ = true;
 }
 
 void OnlineChange::finish(const std::function<void()>& notify) {
   // next_ is the version before now.
-  host_.commit(std::move(declaration_), [this](const void* code) { return next_.contains(code); });
+  commit_->hold([this](const void* code) { return next_.contains(code); });
   notify();
   host_.end_takeover();
 }

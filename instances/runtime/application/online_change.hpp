@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -24,9 +25,8 @@ class OnlineChange {
   /// refused: it cannot take over; the text lists the reasons. timed_out: its set-up took too long. Else: the
   /// fault of the file.
   [[nodiscard]] static Result<std::unique_ptr<OnlineChange>> prepare(const std::string& path,
-                                                                     const StartSettings& start,
-                                                                     Application& running,
-                                                                     ApplicationHost& host);
+                                                                     const LoadContext& context,
+                                                                     Application& running);
   /// Without take_over() the new version ends, and nothing is left of it.
   ~OnlineChange();
   OnlineChange(const OnlineChange&) = delete;
@@ -44,13 +44,10 @@ class OnlineChange {
   [[nodiscard]] std::string describe() const;
 
  private:
-  OnlineChange(Application& running, DeclaredApplication next, ApplicationHost& host)
-      : running_(running),
-        next_(std::move(next.application)),
-        declaration_(std::move(next.declaration)),
-        host_(host) {}
-  [[nodiscard]] Result<void> compare() const;
-  [[nodiscard]] Result<void> connect();
+  OnlineChange(Application& running, Application next, ApplicationHost& host)
+      : running_(running), next_(std::move(next)), host_(host) {}
+  [[nodiscard]] Result<void> compare(const ApplicationDeclaration& declaration) const;
+  void connect();
 
   struct Copy {
     void* to;
@@ -60,14 +57,12 @@ class OnlineChange {
 
   Application& running_;
   Application next_;
-  ApplicationDeclaration declaration_;
   ApplicationHost& host_;
+  std::optional<Commit> commit_;   // nothing: not prepared yet
   TaskCodes codes_;                // of next_, in the order of running_'s tasks
   std::vector<Task_Info*> infos_;  // the same
   std::vector<Copy> copies_;
   std::vector<std::string> copied_;  // names
-  bool connected_ = false;
-  bool taken_over_ = false;
 };
 
 }  // namespace plchost

@@ -191,17 +191,18 @@ Result<std::string> Instance::load_components() {
   return {};
 }
 
+LoadContext Instance::load_context() {
+  return {.launch = options_.launch, .start = start_, .host = *host_, .pool = &*pool_};
+}
+
 Result<std::string> Instance::load_application() {
   if (options_.launch.application.empty()) return "no application is given: there is nothing to run";
-  PLCHOST_TRY_ASSIGN(auto declared, declare_application(options_.launch.application, start_, *host_));
-  auto& [application, declaration] = declared;
-  application_.emplace(std::move(application));
-  PLCHOST_TRY(host_->reserve(declaration));
-  auto remark =
-      host_->areas().place(areas_environment(options_.launch, start_.settings, *application_, &*pool_),
-                           std::move(declaration.areas), application_->tasks_to_change());
-  if (remark) host_->commit(std::move(declaration), [](const void*) { return false; });
-  return remark;
+  const LoadContext context = load_context();
+  PLCHOST_TRY_ASSIGN(auto declared, declare_application(options_.launch.application, context));
+  application_.emplace(std::move(declared.application));
+  PLCHOST_TRY_ASSIGN(auto commit, Commit::prepare(context, *application_, std::move(declared.declaration)));
+  commit.hold([](const void*) { return false; });
+  return commit.remark();
 }
 
 Result<std::string> Instance::make_status_page() {

@@ -132,6 +132,7 @@ class Instance {
   [[nodiscard]] std::string time_out(std::size_t task);
   void answer_waiting(ErrorCode code, const std::string& text);
 
+  [[nodiscard]] LoadContext load_context();
   [[nodiscard]] std::string hold_idle_states();
   void choose_scheduler();
   void report_tick();

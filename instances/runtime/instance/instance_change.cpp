@@ -25,7 +25,7 @@ Result<std::string> Instance::begin_change(const std::string& path) {
                    fmt::format("in exception: task {}, which may be in the code that would go; reset first",
                                join_names(faulty)));
   }
-  PLCHOST_TRY_ASSIGN(change_, OnlineChange::prepare(path, start_, *application_, *host_));
+  PLCHOST_TRY_ASSIGN(change_, OnlineChange::prepare(path, load_context(), *application_));
   change_ends_ = MonotonicClock::now() + kChangePatience;
   if (const auto held = tasks_->between_cycles([this] { change_->take_over(); })) return finish_change(*held);
   return {};

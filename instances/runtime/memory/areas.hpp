@@ -44,15 +44,15 @@ class Areas {
   /// Tells another version of the application, which has declared the same areas, the addresses. Control
   /// thread, before its first cycle.
   void tell_addresses(const std::vector<DeclaredArea>& areas) const;
-  /// Whether place() would find fault with these areas, whose uses are complete: it begins with this. Makes
-  /// and changes nothing, and opens no device, so that an instance can have all of it meanwhile. Set-up.
+  /// Whether these areas, whose uses are complete, can be placed. Makes and changes nothing, and opens no
+  /// device, so that an instance can have all of it meanwhile. Set-up.
   [[nodiscard]] static Result<void> check(const Environment& environment,
                                           std::span<const DeclaredArea> areas);
-  /// Places the areas, whose uses are complete, fills them with retain values or with initial values, and
-  /// tells the application the addresses. Then puts the exchange of inputs and outputs around the cycles of
-  /// the tasks that use them: the others stay as they are. A text: remarks. After an error, and if these
-  /// areas go without keep(), the pool has the memories that it had before, and the retain values are those
-  /// of before. Once, after the application was loaded; set-up.
+  /// Places the areas, with which check() has found no fault, fills them with retain values or with initial
+  /// values, and tells the application the addresses. Then puts the exchange of inputs and outputs around the
+  /// cycles of the tasks that use them: the others stay as they are. A text: remarks. After an error, and if
+  /// these areas go without keep(), the pool has the memories that it had before, and the retain values are
+  /// those of before. Once, after the application was loaded; set-up.
   [[nodiscard]] Result<std::string> place(const Environment& environment, std::vector<DeclaredArea> areas,
                                           std::span<TaskConfig> tasks);
 

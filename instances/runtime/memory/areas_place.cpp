@@ -151,7 +151,6 @@ Result<void> Areas::check(const Environment& environment, std::span<const Declar
 
 Result<std::string> Areas::place(const Environment& environment, std::vector<DeclaredArea> areas,
                                  std::span<TaskConfig> tasks) {
-  PLCHOST_TRY(check(environment, areas));
   declared_ = std::move(areas);
   if (declared_.empty()) {
     placed_ = true;

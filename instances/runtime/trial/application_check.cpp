@@ -110,16 +110,17 @@ Result<void> try_tasks(const Options& options, const InstanceSettings& settings,
 }
 
 // The part that runs code of components and of the application.
-Result<DeclaredApplication> declare_watched(const std::string& path, const StartSettings& start,
-                                            Components& components, ApplicationHost& host) {
+Result<DeclaredApplication> declare_watched(const std::string& path, const LoadContext& context,
+                                            Components& components) {
+  const InstanceSettings& settings = context.start.settings;
   // Without a real-time priority: the trial may run on the core of an instance.
-  SetUpWatch watch(start.settings.scheduler.watchdog.default_time, {}, [&](const Error& error) {
+  SetUpWatch watch(settings.scheduler.watchdog.default_time, {}, [&](const Error& error) {
     fmt::print(stderr, "{}: {}\n", path, error.describe());
     end_trial(kExitSetupFailed);
   });
   constexpr std::array<PF_SYSTIME, 2> kOwnTime = {SysTimeGetUs, SysTimeGetNs};
-  PLCHOST_TRY(load_components(start.settings, ComponentHooks::check, components, host, kOwnTime));
-  auto declared = declare_application(path, start, host);
+  PLCHOST_TRY(load_components(settings, ComponentHooks::check, components, context.host, kOwnTime));
+  auto declared = declare_application(path, context);
   if (auto ended = watch.end(); !ended && declared) return std::unexpected(std::move(ended).error());
   return declared;
 }
@@ -138,14 +139,11 @@ Result<DeclaredApplication> try_start(const Options& options, Components& compon
   if (attached) pool.emplace(*std::move(attached));
   if (auto room = room_in_pool(launch, pool)) host.events().look_for_room(*std::move(room));
   PLCHOST_TRY(prepare_host(start, host));
-  auto declared = declare_watched(options.check_application, start, components, host);
+  const LoadContext context{.launch = launch, .start = start, .host = host, .pool = pool ? &*pool : nullptr};
+  auto declared = declare_watched(options.check_application, context, components);
   if (!declared) return declared;
-  const auto& [application, declaration] = *declared;
-  PLCHOST_TRY(host.reserve(declaration));
-  auto environment = areas_environment(launch, start.settings, application, pool ? &*pool : nullptr);
-  environment.room = host.events().room();
-  PLCHOST_TRY(Areas::check(environment, declaration.areas));
-  PLCHOST_TRY(try_tasks(options, start.settings, application, host));
+  PLCHOST_TRY(host.reserve(declared->declaration));
+  PLCHOST_TRY(try_tasks(options, start.settings, declared->application, host));
   return declared;
 }
 

@@ -80,12 +80,13 @@ class AreasUnderTest : public ::testing::Test {
     std::vector<std::string> names;
     for (const TaskConfig& task : tasks) names.push_back(task.name);
     PLCHOST_TRY(complete_uses(declared, names));
-    return sut.place({.pool = &shared_,
-                      .instance = "line1",
-                      .application = "Test",
-                      .settings = settings_.areas,
-                      .retain = retain_},
-                     declared, tasks);
+    const Areas::Environment environment{.pool = &shared_,
+                                         .instance = "line1",
+                                         .application = "Test",
+                                         .settings = settings_.areas,
+                                         .retain = retain_};
+    PLCHOST_TRY(Areas::check(environment, declared));
+    return sut.place(environment, declared, tasks);
   }
 
   std::string pool_ = own_name("areas");
