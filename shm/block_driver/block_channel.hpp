@@ -27,6 +27,8 @@ class BlockChannel {
   [[nodiscard]] static Result<BlockChannel> open(BlockNode& node, std::string_view name);
   BlockChannel(BlockChannel&& other) noexcept : node_(other.node_), number_(other.number_) {}
   BlockChannel& operator=(BlockChannel&&) = delete;
+  /// Another one of the same number can be opened; this one is not to be used any more. Set-up.
+  void close() { node_->close_channel(number_); }
 
   SendResult send(NodeAddress to, std::span<const std::byte> contents,
                   BlockPriority priority = BlockPriority::normal) noexcept;

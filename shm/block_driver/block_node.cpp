@@ -217,6 +217,12 @@ Result<std::uint32_t> BlockNode::open_channel(std::string_view name) {
                              name, known->second));
 }
 
+void BlockNode::close_channel(std::uint32_t number) {
+  const std::scoped_lock lock(channels_mutex_);
+  channels_.erase(number);
+  has_channels_.store(!channels_.empty(), std::memory_order_release);
+}
+
 NodeAddress BlockNode::find(std::string_view name) noexcept {
   NodeAddress found;
   if (const auto remote = remote_names_.find(name)) {

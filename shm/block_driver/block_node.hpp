@@ -97,9 +97,10 @@ class BlockNode {
   /// Its directory was cut short by a stranger. Any context.
   [[nodiscard]] bool lost() const noexcept { return directory_.lost(); }
 
-  /// The number of a channel of this node, which is then in use until the node goes. already_exists: a
+  /// The number of a channel of this node, which is then in use until close_channel(). already_exists: a
   /// channel of another name has the same number. Set-up.
   [[nodiscard]] Result<std::uint32_t> open_channel(std::string_view name);
+  void close_channel(std::uint32_t number);
 
   /// A number for a request. Real-time, any thread.
   [[nodiscard]] std::uint32_t next_correlation() noexcept {

@@ -57,6 +57,12 @@ void call_exit(const SharedObject& object) {
   call_exit(exit_of(object), object.path());
 }
 
+// Another version of the application runs.
+void unload_version(SharedObject& object, ApplicationHost& host) {
+  object.unload();
+  host.end_version();
+}
+
 // Its plc_app_init has returned 0.
 void end_program(SharedObject& object, ApplicationHost& host) {
   if (!host.has_application()) {
@@ -66,7 +72,7 @@ void end_program(SharedObject& object, ApplicationHost& host) {
   call_exit(object);
   host.set_online_change(false);
   host.write_messages();
-  object.unload();
+  unload_version(object, host);
 }
 
 }  // namespace
@@ -81,7 +87,7 @@ Result<DeclaredApplication> Application::load(const std::string& path, Applicati
   host.end_init();
   host.write_messages();  // its own error goes before ours
   if (!called) {
-    if (beside) object.unload();
+    if (beside) unload_version(object, host);
     return std::unexpected(called.error());
   }
   auto made = built(object, declaration);

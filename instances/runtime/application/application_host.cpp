@@ -61,12 +61,23 @@ bool ApplicationHost::is_of_running(RTS_HANDLE event) const noexcept {
 
 void ApplicationHost::begin_init(ApplicationDeclaration& declaration) noexcept {
   collected_ = &declaration;
-  online_ = has_application_;
+  set_online_change(has_application_);
 }
 
 void ApplicationHost::end_init() noexcept {
-  online_ = false;
+  set_online_change(false);
   collected_ = nullptr;
+}
+
+void ApplicationHost::set_online_change(bool online) noexcept {
+  online_ = online;
+  events_.open_for_version(online);
+  blocks_.open_for_version(online);
+}
+
+void ApplicationHost::end_version() noexcept {
+  events_.give_back_opened();
+  blocks_.give_back_opened();
 }
 
 bool ApplicationHost::in_init() const noexcept {
@@ -101,6 +112,8 @@ void ApplicationHost::commit(ApplicationDeclaration declaration,
   for (const EventCallback& callback : declaration.callbacks) {
     callbacks_.push_back({.callback = callback, .of_component = false});
   }
+  events_.keep_opened();
+  blocks_.keep_opened();
   declaration_ = std::move(declaration);
   has_application_ = true;
 }

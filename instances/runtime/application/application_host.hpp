@@ -77,14 +77,17 @@ class ApplicationHost {
   void end_refused();
 
   /// From here to end_init() a plc_app_init runs. Its calls are collected in `declaration`, and change
-  /// nothing else.
+  /// nothing else: new events and channels have handles now, which end_version() takes back.
   void begin_init(ApplicationDeclaration& declaration) noexcept;
   void end_init() noexcept;
   /// The caller is in a plc_app_init. Any context.
   [[nodiscard]] bool in_init() const noexcept;
   /// The answer of plc_online_change().
   [[nodiscard]] bool online_change() const noexcept { return online_; }
-  void set_online_change(bool online) noexcept { online_ = online; }
+  void set_online_change(bool online) noexcept;
+  /// A version beside the application that runs is gone. The events and channels that only versions without a
+  /// commit have opened are free again, and their handles are none any more.
+  void end_version() noexcept;
 
   /// The part of a commit that can fail, and that release() takes back: registers the events of `declaration`
   /// that the application before has not registered; all, or none.

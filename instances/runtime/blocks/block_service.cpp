@@ -1,5 +1,8 @@
 #include "instances/runtime/blocks/block_service.hpp"
 
+#include <algorithm>
+#include <utility>
+
 #include <fmt/format.h>
 
 #include "shm/base/process_start.hpp"
@@ -65,22 +68,41 @@ Result<void> BlockService::join() {
 
 Result<RTS_HANDLE> BlockService::open_channel(std::string_view name) {
   const std::size_t count = channel_count_.load(std::memory_order_relaxed);
+  std::size_t free = count;
   for (std::size_t i = 0; i < count; ++i) {
-    if (channels_[i].name == name) return &channels_[i];
+    Channel& known = channels_[i];
+    if (known.name.empty() && free == count) free = i;
+    if (known.name != name || name.empty()) continue;
+    known.of_version = known.of_version && for_version_;
+    return &known;
   }
   PLCHOST_TRY(check_channel_name(name));
-  if (count == channels_.size()) {
+  if (free == channels_.size()) {
     return failure(ErrorCode::full, fmt::format("more than {} channels", channels_.size()));
   }
   PLCHOST_TRY(join());
-  Channel& place = channels_[count];
+  Channel& place = channels_[free];
   if (node_) {
     PLCHOST_TRY_ASSIGN(auto channel, BlockChannel::open(*node_, name));
-    place.channel.emplace(std::move(channel));
+    place.channels.push_back(std::make_unique<BlockChannel>(std::move(channel)));
+    place.open.store(place.channels.back().get(), std::memory_order_release);
   }
   place.name = name;
-  channel_count_.store(count + 1, std::memory_order_release);
+  place.of_version = for_version_;
+  channel_count_.store(std::max(count, free + 1), std::memory_order_release);
   return &place;
+}
+
+void BlockService::keep_opened() noexcept {
+  for (Channel& channel : channels_) channel.of_version = false;
+}
+
+void BlockService::give_back_opened() noexcept {
+  for (Channel& channel : channels_) {
+    if (!std::exchange(channel.of_version, false)) continue;
+    if (BlockChannel* const open = channel.open.exchange(nullptr)) open->close();
+    channel.name.clear();
+  }
 }
 
 BlockChannel* BlockService::channel(RTS_HANDLE handle) noexcept {
@@ -91,8 +113,7 @@ BlockChannel* BlockService::channel(RTS_HANDLE handle) noexcept {
       reinterpret_cast<std::uintptr_t>(place) - reinterpret_cast<std::uintptr_t>(&channels_[0]);
   const std::size_t index = offset / sizeof(Channel);
   if (index >= count || offset % sizeof(Channel) != 0) return nullptr;
-  std::optional<BlockChannel>& channel = channels_[index].channel;
-  return channel ? &*channel : nullptr;
+  return channels_[index].open.load(std::memory_order_acquire);
 }
 
 }  // namespace plchost

@@ -4,9 +4,9 @@
 #include <atomic>
 #include <cstddef>
 #include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "instances/plc_app.h"
 #include "instances/runtime/settings/block_settings.hpp"
@@ -37,6 +37,10 @@ class BlockService {
 
   /// The handle of the channel of that name; one name, one handle. invalid_argument; full.
   [[nodiscard]] Result<RTS_HANDLE> open_channel(std::string_view name);
+  /// As EventTable does it with events. A place among the nodes is not given back: tasks may use it.
+  void open_for_version(bool on) noexcept { for_version_ = on; }
+  void keep_opened() noexcept;
+  void give_back_opened() noexcept;
 
   /// Null: not such a handle, or there is no node behind it. Real-time.
   [[nodiscard]] BlockChannel* channel(RTS_HANDLE handle) noexcept;
@@ -45,8 +49,10 @@ class BlockService {
 
  private:
   struct Channel {
-    std::string name;
-    std::optional<BlockChannel> channel;
+    std::string name;         // empty: given back
+    bool of_version = false;  // opened by a version beside the application that runs, and by nobody else
+    std::atomic<BlockChannel*> open{nullptr};             // the last one; null: given back, or no node
+    std::vector<std::unique_ptr<BlockChannel>> channels;  // old ones stay: a task may be in one
   };
   [[nodiscard]] Result<void> join();
 
@@ -58,6 +64,7 @@ class BlockService {
   std::unique_ptr<BlockRouter> router_;
   std::array<Channel, PLC_MAX_CHANNELS> channels_;
   std::atomic<std::size_t> channel_count_{0};
+  bool for_version_ = false;
   std::atomic<bool> stop_{false};
   Thread thread_;  // of the router
 };

@@ -40,6 +40,12 @@ EventTable::Slot* EventTable::find(RTS_HANDLE handle) const noexcept {
   return index < count_.load(std::memory_order_acquire) ? slots_[index].get() : nullptr;
 }
 
+// Null, too, if the slot was given back.
+EventTable::Slot* EventTable::find_open(RTS_HANDLE handle) const noexcept {
+  Slot* const slot = find(handle);
+  return slot == nullptr || slot->free ? nullptr : slot;
+}
+
 Result<void> EventTable::attach(Slot& slot) {
   if (pool_ == nullptr) return room_ ? room_->take(slot.object) : Result<void>();
   PLCHOST_TRY_ASSIGN(const auto event, pool_->create_event(slot.object));
@@ -55,23 +61,68 @@ Result<RTS_HANDLE> EventTable::open(std::string_view name) {
   PLCHOST_TRY(check_name("instance name", owner, kMaxInstanceName));
   PLCHOST_TRY(check_name("event name", event, kMaxEventName));
 
-  const std::string object = event_object_name(owner, event);
+  std::string object = event_object_name(owner, event);
+  const std::size_t place = place_for(object);
   const std::size_t count = count_.load(std::memory_order_relaxed);
-  for (std::size_t i = 0; i < count; ++i) {
-    if (slots_[i]->object == object) return to_handle(i);
-  }
-  if (count == kMaxEvents) {
+  if (place == kMaxEvents) {
     return failure(ErrorCode::full,
                    fmt::format("external event '{}': an instance deals with at most {}", name, kMaxEvents));
   }
-  auto slot = std::make_unique<Slot>();
-  slot->own = owner == instance_;
-  slot->name = event;
-  slot->object = object;
-  PLCHOST_TRY(attach(*slot));
-  slots_[count] = std::move(slot);
-  count_.store(count + 1, std::memory_order_release);  // pairs with the acquire in find()
-  return to_handle(count);
+  if (place < count && !slots_[place]->free) {
+    slots_[place]->of_version = slots_[place]->of_version && for_version_;
+    return to_handle(place);
+  }
+  auto fresh = place == count ? std::make_unique<Slot>() : nullptr;
+  Slot& slot = fresh ? *fresh : *slots_[place];
+  PLCHOST_TRY(reopen(slot, std::move(object)));
+  slot.own = owner == instance_;
+  slot.name = event;
+  slot.of_version = for_version_;
+  if (fresh) {
+    slots_[place] = std::move(fresh);
+    count_.store(place + 1, std::memory_order_release);  // pairs with the acquire in find()
+  }
+  return to_handle(place);
+}
+
+// Where the event is, or is to be: best in a free slot that it has had before. kMaxEvents: nowhere.
+std::size_t EventTable::place_for(std::string_view object) const noexcept {
+  const std::size_t count = count_.load(std::memory_order_relaxed);
+  std::size_t place = count;
+  for (std::size_t i = 0; i < count; ++i) {
+    if (slots_[i]->object == object) return i;
+    if (slots_[i]->free && place == count) place = i;
+  }
+  return place;
+}
+
+// A slot that has no event, or has given it back.
+Result<void> EventTable::reopen(Slot& slot, std::string object) {
+  const PoolEvent* const last = slot.events.empty() ? nullptr : slot.events.back().get();
+  if (slot.object == object && last != nullptr && last->valid()) {
+    slot.event.store(last, std::memory_order_release);
+  } else {
+    slot.object = std::move(object);
+    if (auto attached = attach(slot); !attached) {
+      slot.object.clear();
+      return attached;
+    }
+  }
+  slot.free = false;
+  return {};
+}
+
+void EventTable::keep_opened() noexcept {
+  for (std::size_t i = 0; i < count_.load(std::memory_order_relaxed); ++i) slots_[i]->of_version = false;
+}
+
+void EventTable::give_back_opened() noexcept {
+  for (std::size_t i = 0; i < count_.load(std::memory_order_relaxed); ++i) {
+    Slot& slot = *slots_[i];
+    if (!std::exchange(slot.of_version, false) || slot.registered() || slot.tasks > 0) continue;
+    slot.free = true;
+    slot.event.store(nullptr, std::memory_order_release);
+  }
 }
 
 Result<EventTable::Slot*> EventTable::open_own(std::string_view event) {
@@ -124,7 +175,7 @@ void EventTable::show_use(Slot& slot) {
 }
 
 Result<void> EventTable::register_by_application(RTS_HANDLE handle) {
-  Slot* const slot = find(handle);
+  Slot* const slot = find_open(handle);
   if (slot == nullptr) return failure(ErrorCode::invalid_argument, "not the handle of an external event");
   if (!slot->own) return {};  // its registration is its own instance's
   if (slot->by_application) {
@@ -134,17 +185,17 @@ Result<void> EventTable::register_by_application(RTS_HANDLE handle) {
 }
 
 bool EventTable::is_own(RTS_HANDLE handle) const noexcept {
-  const Slot* const slot = find(handle);
+  const Slot* const slot = find_open(handle);
   return slot != nullptr && slot->own;
 }
 
 bool EventTable::is_by_application(RTS_HANDLE handle) const noexcept {
-  const Slot* const slot = find(handle);
+  const Slot* const slot = find_open(handle);
   return slot != nullptr && slot->by_application;
 }
 
 Result<void> EventTable::unregister_by_application(RTS_HANDLE handle) {
-  Slot* const slot = find(handle);
+  Slot* const slot = find_open(handle);
   if (slot == nullptr) return failure(ErrorCode::invalid_argument, "not the handle of an external event");
   if (!slot->own) return {};
   if (!slot->by_application) {
@@ -255,7 +306,7 @@ RTS_RESULT EventTable::post(RTS_HANDLE handle) const noexcept {
   const Slot* const slot = find(handle);
   if (slot == nullptr) return ERR_PARAMETER;
   const PoolEvent* const event = slot->event.load(std::memory_order_acquire);
-  if (event == nullptr) return ERR_NO_TASK;
+  if (event == nullptr) return pool_ == nullptr ? ERR_NO_TASK : ERR_PARAMETER;  // it was given back
   switch (event->post()) {
     case PostResult::posted:
       return ERR_OK;
@@ -271,8 +322,9 @@ RTS_RESULT EventTable::set(RTS_HANDLE handle) const noexcept {
   const Slot* const slot = find(handle);
   if (slot == nullptr) return ERR_PARAMETER;
   const PoolEvent* const event = slot->event.load(std::memory_order_acquire);
+  if (event == nullptr) return pool_ == nullptr ? ERR_NO_TASK : ERR_PARAMETER;
   // Only while a task is bound is its counter surely this event's own.
-  if (event == nullptr || event->bound_tasks() == 0) return ERR_NO_TASK;
+  if (event->bound_tasks() == 0) return ERR_NO_TASK;
   return event->counted().post() ? ERR_OK : ERR_NO_TASK;
 }
 

@@ -17,9 +17,9 @@
 
 namespace plchost {
 
-/// The external events that this instance deals with, and the handles that applications have on them. A slot
-/// is given to a name once and for the life of the process, so that a handle stays valid and posting takes no
-/// lock. All but post() and set(): control thread only.
+/// The external events that this instance deals with, and the handles that applications have on them. A name
+/// keeps its slot for the life of the process, unless only a version that was refused has opened it. Slots
+/// are never freed, so posting takes no lock. All but post() and set(): control thread only.
 class EventTable {
  public:
   static constexpr std::size_t kMaxEvents = 4096;
@@ -40,6 +40,13 @@ class EventTable {
 
   /// The handle of "event" (own) or "instance/event". invalid_argument; full.
   [[nodiscard]] Result<RTS_HANDLE> open(std::string_view name);
+
+  /// True: names are opened by a version beside the application that runs, from now on. They stay after
+  /// keep_opened(). give_back_opened() frees the slots of names that nobody else has opened; handles of those
+  /// are none any more.
+  void open_for_version(bool on) noexcept { for_version_ = on; }
+  void keep_opened() noexcept;
+  void give_back_opened() noexcept;
 
   /// A valid handle of an event of this instance.
   [[nodiscard]] bool is_own(RTS_HANDLE handle) const noexcept;
@@ -80,6 +87,8 @@ class EventTable {
     std::string name;    // as the application calls it; own events without the instance
     std::string object;  // in the pool
     bool own = false;
+    bool of_version = false;  // opened by a version beside the application that runs, and by nobody else
+    bool free = false;        // given back; `object` is its last one, unless that is empty
     bool by_application = false;
     bool by_operator = false;
     bool by_device = false;
@@ -95,6 +104,9 @@ class EventTable {
   };
 
   [[nodiscard]] Slot* find(RTS_HANDLE handle) const noexcept;
+  [[nodiscard]] Slot* find_open(RTS_HANDLE handle) const noexcept;
+  [[nodiscard]] std::size_t place_for(std::string_view object) const noexcept;
+  [[nodiscard]] Result<void> reopen(Slot& slot, std::string object);
   [[nodiscard]] Result<Slot*> open_own(std::string_view event);
   [[nodiscard]] Result<void> attach(Slot& slot);
   [[nodiscard]] Result<void> publish_registered(Slot& slot);
@@ -105,6 +117,7 @@ class EventTable {
   std::string instance_;
   ObjectPool* pool_;
   std::optional<PoolRoom> room_;
+  bool for_version_ = false;
   std::array<std::unique_ptr<Slot>, kMaxEvents> slots_;
   std::atomic<std::size_t> count_{0};  // written by the control thread; slots below it are complete
 };

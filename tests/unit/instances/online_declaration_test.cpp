@@ -5,10 +5,13 @@
 #include <string>
 #include <utility>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "instances/runtime/application/application_host.hpp"
+#include "shm/pool/object_pool.hpp"
+#include "tests/support/own_name.hpp"
 
 namespace plchost {
 namespace {
@@ -303,6 +306,125 @@ TEST_F(OnlineDeclaration, ThatIsNotTakenLeavesAllAsItWas) {
   EXPECT_FALSE(is_registered(after));
   EXPECT_TRUE(is_registered(before_));
   EXPECT_TRUE(is_registered(both_));
+}
+
+TEST_F(OnlineDeclaration, ThatIsRefusedGivesBackTheEventsThatOnlyItHasOpened) {
+  host_.begin_init(online_);
+  const RTS_HANDLE after = SchedRegisterExternalEvent("after", nullptr);
+  const RTS_HANDLE foreign = SchedRegisterExternalEvent("packer1/product", nullptr);
+  EXPECT_EQ(SchedRegisterExternalEvent("both", nullptr), both_);
+  host_.end_init();
+  EXPECT_TRUE(host_.events().is_own(after));
+  host_.end_version();
+  EXPECT_FALSE(host_.events().is_own(after));
+  EXPECT_EQ(SchedUnregisterExternalEvent(after), ERR_PARAMETER);
+  EXPECT_EQ(SchedUnregisterExternalEvent(foreign), ERR_PARAMETER);
+  EXPECT_TRUE(host_.events().is_own(both_));
+  EXPECT_EQ(SchedRegisterExternalEvent("other", nullptr), after) << "its slot is free for another event";
+}
+
+TEST_F(OnlineDeclaration, ThatIsCommittedKeepsItsEventsWhenTheVersionBeforeIsGone) {
+  host_.begin_init(online_);
+  const RTS_HANDLE after = SchedRegisterExternalEvent("after", nullptr);
+  host_.end_init();
+  ASSERT_TRUE(host_.reserve(online_));
+  host_.commit(std::move(online_), [](const void*) { return false; });
+  host_.end_takeover();
+  host_.set_online_change(true);  // the plc_app_exit of the version before
+  EXPECT_EQ(SchedRegisterExternalEvent("late", nullptr), RTS_INVALID_HANDLE);
+  host_.set_online_change(false);
+  host_.end_version();
+  EXPECT_TRUE(is_registered(after));
+  EXPECT_NE(SchedRegisterExternalEvent("next", nullptr), after);
+}
+
+// They are opened by somebody else while the version waits for its moment.
+TEST_F(OnlineDeclaration, ThatIsRefusedKeepsTheEventsThatOthersHaveOpened) {
+  host_.begin_init(online_);
+  const RTS_HANDLE by_operator = SchedRegisterExternalEvent("by_operator", nullptr);
+  const RTS_HANDLE by_component = SchedRegisterExternalEvent("by_component", nullptr);
+  host_.end_init();
+  ASSERT_TRUE(host_.events().register_by_operator("by_operator"));
+  {
+    const ApplicationHost::ComponentCode component(host_);
+    EXPECT_EQ(SchedRegisterExternalEvent("by_component", nullptr), by_component);
+  }
+  ASSERT_TRUE(host_.events().unregister_by_application(by_component));
+  host_.end_version();
+  EXPECT_TRUE(host_.events().is_own(by_operator));
+  EXPECT_TRUE(host_.events().is_own(by_component));
+}
+
+TEST_F(OnlineDeclaration, ThatIsRefusedAgainAndAgainUsesUpNoEventsAndNoChannels) {
+  constexpr std::size_t kEvents = EventTable::kMaxEvents / 2;
+  constexpr std::size_t kChannels = PLC_MAX_CHANNELS / 2 + 1;
+  for (int version = 0; version < 3; ++version) {
+    ApplicationDeclaration refused;
+    host_.begin_init(refused);
+    RTS_RESULT result = ERR_FAILED;
+    for (std::size_t i = 0; i < kEvents; ++i) {
+      (void)SchedRegisterExternalEvent(fmt::format("event{}_{}", version, i).c_str(), &result);
+      ASSERT_EQ(result, ERR_OK) << version << " " << i;
+    }
+    for (std::size_t i = 0; i < kChannels; ++i) {
+      (void)plc_channel_open(fmt::format("channel{}_{}", version, i).c_str(), &result);
+      ASSERT_EQ(result, ERR_OK) << version << " " << i;
+    }
+    host_.end_init();
+    host_.end_version();
+  }
+}
+
+TEST_F(OnlineDeclaration, ThatIsCommittedKeepsItsChannels) {
+  host_.begin_init(online_);
+  const RTS_HANDLE channel = plc_channel_open("values", nullptr);
+  host_.end_init();
+  host_.commit(std::move(online_), [](const void*) { return false; });
+  host_.end_version();
+  EXPECT_EQ(plc_channel_open("values", nullptr), channel);
+  EXPECT_NE(plc_channel_open("others", nullptr), channel);
+}
+
+class OnlineDeclarationInAPool : public ::testing::Test {
+ protected:
+  OnlineDeclarationInAPool() {
+    host_.commit({}, [](const void*) { return false; });
+  }
+  ~OnlineDeclarationInAPool() override { ObjectPool::remove(name_); }
+
+  std::string name_ = own_name("online");
+  ObjectPool pool_ = ObjectPool::create(name_).value();
+  ApplicationHost host_{"test", &pool_};
+  ApplicationDeclaration online_;
+};
+
+TEST_F(OnlineDeclarationInAPool, ThatIsRefusedPostsNothingByItsHandles) {
+  for (const char* name : {"first", "first", "second"}) {
+    host_.begin_init(online_);
+    const RTS_HANDLE event = SchedRegisterExternalEvent(name, nullptr);
+    EXPECT_EQ(SchedPostExternalEvent(event), ERR_NO_OBJECT) << "it is not registered before the commit";
+    host_.end_init();
+    online_ = {};
+    host_.end_version();
+    EXPECT_EQ(SchedPostExternalEvent(event), ERR_PARAMETER);
+    EXPECT_EQ(CAL_SysEventSet(event), ERR_PARAMETER);
+  }
+}
+
+TEST_F(OnlineDeclarationInAPool, ThatIsRefusedClosesTheChannelsThatOnlyItHasOpened) {
+  const RTS_HANDLE of_running = plc_channel_open("running", nullptr);
+  host_.begin_init(online_);
+  EXPECT_EQ(plc_channel_open("running", nullptr), of_running);
+  const RTS_HANDLE channel = plc_channel_open("values", nullptr);
+  const int value = 1;
+  const unsigned to = plc_node_address(nullptr);
+  EXPECT_NE(plc_channel_send(channel, to, PLC_BLOCK_LOW, &value, sizeof value), ERR_PARAMETER);
+  host_.end_init();
+  host_.end_version();
+  EXPECT_EQ(plc_channel_send(channel, to, PLC_BLOCK_LOW, &value, sizeof value), ERR_PARAMETER);
+  EXPECT_NE(plc_channel_send(of_running, to, PLC_BLOCK_LOW, &value, sizeof value), ERR_PARAMETER);
+  EXPECT_EQ(plc_channel_open("values", nullptr), channel) << "its place is free again";
+  EXPECT_NE(plc_channel_send(channel, to, PLC_BLOCK_LOW, &value, sizeof value), ERR_PARAMETER);
 }
 
 TEST_F(OnlineDeclaration, OfTasksAndOptionsDoesNotReachTheOnesThatRun) {
