@@ -7,7 +7,7 @@
 #include <unistd.h>
 
 #include "manager/host_check/host_files.hpp"
-#include "schedulers/registry.hpp"
+#include "schedulers/policies/registry.hpp"
 #include "shm/base/thread.hpp"
 
 namespace plchost {

@@ -9,12 +9,13 @@
 #include <utility>
 #include <vector>
 
+#include "schedulers/activation/scheduler.hpp"
 #include "schedulers/activation/single_cycle.hpp"
 #include "schedulers/distributed_clock/distributed_clock.hpp"
-#include "schedulers/faults/supervision.hpp"
-#include "schedulers/faults/taker_search.hpp"
-#include "schedulers/scheduler.hpp"
-#include "schedulers/tasks/cycle_gate.hpp"
+#include "schedulers/faults/cycle_gate.hpp"
+#include "schedulers/supervision/supervision.hpp"
+#include "schedulers/supervision/taker_search.hpp"
+#include "schedulers/tasks/priorities.hpp"
 #include "schedulers/tasks/task.hpp"
 #include "schedulers/tasks/task_config.hpp"
 #include "schedulers/tasks/task_thread.hpp"

@@ -1,6 +1,6 @@
 // A moment between the cycles of all tasks of a set.
 #include "schedulers/task_set.hpp"
-#include "schedulers/tasks/raised_priority.hpp"
+#include "schedulers/tasks/priorities.hpp"
 
 namespace plchost {
 

@@ -4,8 +4,9 @@
 
 #include <fmt/format.h>
 
+#include "schedulers/policies/registry.hpp"
 #include "schedulers/task_set.hpp"
-#include "schedulers/tasks/raised_priority.hpp"
+#include "schedulers/tasks/priorities.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {

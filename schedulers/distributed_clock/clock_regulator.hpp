@@ -3,7 +3,7 @@
 #include <cstdint>
 
 #include "schedulers/distributed_clock/clock_model.hpp"
-#include "schedulers/distributed_clock/settings.hpp"
+#include "schedulers/settings/scheduler_settings.hpp"
 
 namespace plchost {
 

@@ -9,7 +9,7 @@
 #include "schedulers/distributed_clock/clock_regulator.hpp"
 #include "schedulers/distributed_clock/phase.hpp"
 #include "schedulers/distributed_clock/reference_source.hpp"
-#include "schedulers/distributed_clock/settings.hpp"
+#include "schedulers/settings/scheduler_settings.hpp"
 #include "shm/base/seqlock.hpp"
 
 namespace plchost {

@@ -5,7 +5,7 @@
 #include <cstdlib>
 
 #include "schedulers/distributed_clock/clock_model.hpp"
-#include "schedulers/distributed_clock/settings.hpp"
+#include "schedulers/settings/scheduler_settings.hpp"
 
 namespace plchost {
 

@@ -5,8 +5,8 @@
 
 #include <sys/types.h>
 
+#include "schedulers/faults/cycle_gate.hpp"
 #include "schedulers/faults/task_fault.hpp"
-#include "schedulers/tasks/cycle_gate.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/thread.hpp"
 

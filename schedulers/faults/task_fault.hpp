@@ -3,7 +3,7 @@
 #include <atomic>
 #include <cstdint>
 
-#include "schedulers/tasks/task_config.hpp"
+#include "schedulers/settings/task_options.hpp"
 #include "shm/base/fault_record.hpp"
 #include "shm/base/seqlock.hpp"
 #include "shm/base/time.hpp"

@@ -2,8 +2,8 @@
 
 #include <memory>
 
-#include "schedulers/registry.hpp"
-#include "schedulers/scheduler.hpp"
+#include "schedulers/activation/scheduler.hpp"
+#include "schedulers/policies/registry.hpp"
 
 namespace plchost {
 

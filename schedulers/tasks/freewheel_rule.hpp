@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "schedulers/scheduler_settings.hpp"
+#include "schedulers/settings/scheduler_settings.hpp"
 
 namespace plchost {
 

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "schedulers/tasks/task_config.hpp"
+#include "schedulers/settings/task_options.hpp"
 #include "shm/base/time.hpp"
 
 namespace plchost {

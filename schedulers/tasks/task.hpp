@@ -6,10 +6,10 @@
 
 #include "schedulers/clock/clock.hpp"
 #include "schedulers/distributed_clock/distributed_clock.hpp"
+#include "schedulers/faults/cycle_gate.hpp"
 #include "schedulers/faults/fault_trap.hpp"
-#include "schedulers/faults/watchdog_rules.hpp"
+#include "schedulers/faults/overrun_rule.hpp"
 #include "schedulers/tasks/activation.hpp"
-#include "schedulers/tasks/cycle_gate.hpp"
 #include "schedulers/tasks/task_config.hpp"
 #include "schedulers/tasks/task_kind.hpp"
 #include "schedulers/tasks/task_recorder.hpp"

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-#include "schedulers/scheduler_settings.hpp"
+#include "schedulers/settings/scheduler_settings.hpp"
 #include "schedulers/tick/tick_device.hpp"
 
 namespace plchost {

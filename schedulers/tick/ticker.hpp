@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "schedulers/activation/event_poller.hpp"
-#include "schedulers/scheduler.hpp"
+#include "schedulers/activation/scheduler.hpp"
 #include "schedulers/tick/tick_source.hpp"
 #include "shm/base/thread.hpp"
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <thread>
 
+#include "schedulers/policies/registry.hpp"
 #include "tests/bench/cyclic_loop.hpp"
 #include "tests/bench/parts.hpp"
 

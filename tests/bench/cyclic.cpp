@@ -4,6 +4,7 @@
 
 #include <array>
 
+#include "schedulers/policies/registry.hpp"
 #include "tests/bench/cyclic_loop.hpp"
 #include "tests/bench/parts.hpp"
 

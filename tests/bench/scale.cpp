@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "schedulers/policies/registry.hpp"
 #include "tests/bench/many_tasks.hpp"
 #include "tests/bench/parts.hpp"
 #include "tests/bench/thread_usage.hpp"

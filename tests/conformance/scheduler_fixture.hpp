@@ -11,6 +11,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "schedulers/policies/registry.hpp"
 #include "schedulers/task_set.hpp"
 #include "tests/support/manual_clock.hpp"
 

@@ -47,11 +47,11 @@ if [ -d instances/runtime/abi ]; then
     fault "the lines above define functions of plc_app.h outside of instances/runtime/abi" || true
 fi
 # A scheduler and a kind of task are named in one table, and in their own file.
-registry=schedulers/registry.hpp
+registry=schedulers/policies/registry.hpp
 if [ -d schedulers/policies ]; then
   names=$(sed -nE 's/^ *PolicyName<class [A-Za-z]+>\{"([A-Za-z]+)"\},$/\1/p' "$registry" | paste -sd'|')
   [ -n "$names" ] || fault "$registry: it does not list the schedulers"
-  git grep -nE "\"($names)\"" -- "${sources[@]/%//*.[ch]pp}" ":!$registry" ':!schedulers/policies' ':!instances/runtime/settings' &&
+  git grep -nE "\"($names)\"" -- "${sources[@]/%//*.[ch]pp}" ':!schedulers/policies' ':!instances/runtime/settings' &&
     fault "the lines above name a scheduler: ask the registry or the host" || true
 fi
 git grep -nE '\bTaskKind::' -- "${sources[@]/%//*.[ch]pp}" ':!shm/base/task_kind.hpp' ':!schedulers/tasks/kinds' &&

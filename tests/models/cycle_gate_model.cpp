@@ -1,6 +1,6 @@
 // The control thread's moment in which no thread is in code of the application.
 
-#include "schedulers/tasks/cycle_gate.hpp"
+#include "schedulers/faults/cycle_gate.hpp"
 #include "tests/models/checker/model.hpp"
 #include "tests/models/model_clock.hpp"
 

@@ -12,7 +12,7 @@
 #include "instances/runtime/setup/set_up_watch.hpp"
 #include "instances/runtime/tasks/operator_events.hpp"
 #include "instances/runtime/tasks/task_builder.hpp"
-#include "schedulers/faults/watchdog_rules.hpp"
+#include "schedulers/supervision/watchdog_rules.hpp"
 #include "shm/base/names.hpp"
 #include "shm/base/transient.hpp"
 #include "shm/log/log.hpp"

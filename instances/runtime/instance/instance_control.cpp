@@ -9,7 +9,7 @@
 
 #include "instances/runtime/instance/instance.hpp"
 #include "instances/runtime/tasks/operator_events.hpp"
-#include "schedulers/scheduler.hpp"
+#include "schedulers/policies/registry.hpp"
 #include "shm/base/names.hpp"
 #include "shm/log/log.hpp"
 #include "shm/log/log_levels.hpp"

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "instances/runtime/settings/settings_key.hpp"
-#include "schedulers/tasks/task_config.hpp"
+#include "schedulers/settings/task_options.hpp"
 #include "shm/base/bounds.hpp"
 
 // The values of the rows of settings_*.cpp, made from members of the settings: where a value goes, and its

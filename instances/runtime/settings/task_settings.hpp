@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "schedulers/tasks/task_config.hpp"
+#include "schedulers/settings/task_options.hpp"
 #include "shm/base/time.hpp"
 
 namespace plchost {

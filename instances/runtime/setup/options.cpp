@@ -11,7 +11,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "schedulers/scheduler.hpp"
+#include "schedulers/policies/registry.hpp"
 #include "shm/base/names.hpp"
 #include "shm/log/log_levels.hpp"
 

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "instances/launch/launch_contract.hpp"
-#include "schedulers/tasks/task_config.hpp"
+#include "schedulers/tasks/priorities.hpp"
 
 namespace plchost {
 

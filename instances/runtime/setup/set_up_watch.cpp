@@ -9,7 +9,7 @@
 
 #include "instances/runtime/setup/long_run_search.hpp"
 #include "schedulers/faults/processor_guard.hpp"
-#include "schedulers/faults/starvation.hpp"
+#include "schedulers/supervision/starvation.hpp"
 #include "shm/process/work_limit.hpp"
 
 namespace plchost {

@@ -1,2 +1,2 @@
-# schedulers/tasks/cycle_gate.hpp: a task that waits at the gate looks as if it were in a cycle
+# schedulers/faults/cycle_gate.hpp: a task that waits at the gate looks as if it were in a cycle
 s/word_\.store\(kOutside, std::memory_order_release\);\n        clock/clock/

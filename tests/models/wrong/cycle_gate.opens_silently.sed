@@ -1,2 +1,2 @@
-# schedulers/tasks/cycle_gate.hpp: a thread that waits at the gate is not woken
+# schedulers/faults/cycle_gate.hpp: a thread that waits at the gate is not woken
 s/clock\.wake\(closed_\);//

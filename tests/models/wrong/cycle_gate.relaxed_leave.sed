@@ -1,2 +1,2 @@
-# schedulers/tasks/cycle_gate.hpp: the writes of a cycle are not there when its seat is empty
+# schedulers/faults/cycle_gate.hpp: the writes of a cycle are not there when its seat is empty
 s/void leave\(\) noexcept \{ word_\.store\(kOutside, std::memory_order_release\); \}/void leave() noexcept { word_.store(kOutside, std::memory_order_relaxed); }/

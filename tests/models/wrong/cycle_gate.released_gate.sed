@@ -1,2 +1,2 @@
-# schedulers/tasks/cycle_gate.hpp: the gate is closed without being seen
+# schedulers/faults/cycle_gate.hpp: the gate is closed without being seen
 s/closed_\.store\(1, std::memory_order_seq_cst\)/closed_.store(1, std::memory_order_release)/

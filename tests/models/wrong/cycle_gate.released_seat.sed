@@ -1,2 +1,2 @@
-# schedulers/tasks/cycle_gate.hpp: a seat is taken without being seen, and the gate looks open although it is closed
+# schedulers/faults/cycle_gate.hpp: a seat is taken without being seen, and the gate looks open although it is closed
 s/word_\.store\(kWithin, std::memory_order_seq_cst\)/word_.store(kWithin, std::memory_order_release)/

@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include "schedulers/faults/supervision.hpp"
+#include "schedulers/supervision/supervision.hpp"
 #include "tests/support/manual_clock.hpp"
 
 namespace plchost {

@@ -1,6 +1,6 @@
-#include <gtest/gtest.h>
+#include "schedulers/tasks/priorities.hpp"
 
-#include "schedulers/tasks/task_config.hpp"
+#include <gtest/gtest.h>
 
 namespace plchost {
 namespace {

@@ -1,7 +1,8 @@
+#include "schedulers/policies/registry.hpp"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "schedulers/scheduler.hpp"
 #include "schedulers/tasks/task_kind.hpp"
 #include "shm/base/names.hpp"
 

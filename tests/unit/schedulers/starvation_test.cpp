@@ -1,4 +1,4 @@
-#include "schedulers/faults/starvation.hpp"
+#include "schedulers/supervision/starvation.hpp"
 
 #include <algorithm>
 #include <map>

@@ -1,4 +1,4 @@
-#include "schedulers/faults/watchdog_rules.hpp"
+#include "schedulers/supervision/watchdog_rules.hpp"
 
 #include <array>
 #include <span>
@@ -7,6 +7,8 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "schedulers/faults/overrun_rule.hpp"
 
 namespace plchost {
 namespace {

@@ -5,8 +5,7 @@
 #include <string_view>
 
 #include "schedulers/clock/clock.hpp"
-#include "schedulers/registry.hpp"
-#include "schedulers/scheduler_settings.hpp"
+#include "schedulers/settings/scheduler_settings.hpp"
 #include "schedulers/tasks/activation.hpp"
 #include "shm/base/result.hpp"
 

@@ -1,4 +1,4 @@
-#include "schedulers/faults/supervision.hpp"
+#include "schedulers/supervision/supervision.hpp"
 
 #include <algorithm>
 #include <utility>

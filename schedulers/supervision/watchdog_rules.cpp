@@ -1,4 +1,4 @@
-#include "schedulers/faults/watchdog_rules.hpp"
+#include "schedulers/supervision/watchdog_rules.hpp"
 
 #include <algorithm>
 #include <string_view>

@@ -1,4 +1,6 @@
-#include "schedulers/tasks/task_config.hpp"
+#include "schedulers/tasks/priorities.hpp"
+
+#include "schedulers/settings/task_options.hpp"
 
 namespace plchost {
 

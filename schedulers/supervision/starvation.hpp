@@ -11,7 +11,7 @@
 #include "schedulers/faults/fault_trap.hpp"
 #include "schedulers/faults/processor_guard.hpp"
 #include "schedulers/faults/processor_times.hpp"
-#include "schedulers/faults/taker_search.hpp"
+#include "schedulers/supervision/taker_search.hpp"
 #include "schedulers/tasks/task.hpp"
 
 namespace plchost {

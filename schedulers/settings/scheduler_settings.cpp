@@ -1,10 +1,10 @@
-#include "schedulers/scheduler_settings.hpp"
+#include "schedulers/settings/scheduler_settings.hpp"
 
 #include <array>
 
 #include <fmt/format.h>
 
-#include "schedulers/tasks/task_config.hpp"
+#include "schedulers/settings/task_options.hpp"
 
 namespace plchost {
 

@@ -1,4 +1,4 @@
-#include "schedulers/faults/taker_search.hpp"
+#include "schedulers/supervision/taker_search.hpp"
 
 #include <algorithm>
 

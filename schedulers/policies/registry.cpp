@@ -1,4 +1,4 @@
-#include "schedulers/registry.hpp"
+#include "schedulers/policies/registry.hpp"
 
 #include <fmt/format.h>
 

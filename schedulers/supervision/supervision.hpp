@@ -8,8 +8,8 @@
 #include "schedulers/clock/clock.hpp"
 #include "schedulers/faults/fault_trap.hpp"
 #include "schedulers/faults/processor_times.hpp"
-#include "schedulers/faults/starvation.hpp"
-#include "schedulers/faults/watchdog_rules.hpp"
+#include "schedulers/supervision/starvation.hpp"
+#include "schedulers/supervision/watchdog_rules.hpp"
 #include "schedulers/tasks/task.hpp"
 #include "shm/base/thread.hpp"
 
