@@ -2,10 +2,13 @@
 
 #include <atomic>
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <string>
 
 #include "shm/base/counted_event.hpp"
 #include "shm/base/result.hpp"
+#include "shm/base/thread.hpp"
 #include "shm/base/time.hpp"
 
 namespace plchost {
@@ -61,5 +64,10 @@ class LinuxClock final : public Clock {
   void spin_until(TimePoint deadline) noexcept override;
   [[nodiscard]] Result<std::unique_ptr<PeriodicTimer>> make_periodic_timer() override;
 };
+
+/// Thread::start for a thread that sleeps by `clock`: tells the clock, lets the thread wake without slack,
+/// and gives it a stack for its signals. Set-up.
+[[nodiscard]] Result<Thread> start_clock_thread(Clock& clock, const std::string& name,
+                                                ThreadPriority priority, std::function<void()> body);
 
 }  // namespace plchost

@@ -6,9 +6,9 @@
 #include <optional>
 #include <vector>
 
+#include "schedulers/distributed_clock/clock_model.hpp"
 #include "schedulers/distributed_clock/clock_regulator.hpp"
 #include "schedulers/distributed_clock/phase.hpp"
-#include "schedulers/distributed_clock/reference_source.hpp"
 #include "schedulers/settings/scheduler_settings.hpp"
 #include "shm/base/seqlock.hpp"
 

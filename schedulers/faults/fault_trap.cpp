@@ -9,7 +9,6 @@
 #include <ucontext.h>
 #include <unistd.h>
 
-#include "schedulers/faults/fault_signals.hpp"
 #include "schedulers/faults/processor_guard.hpp"
 #include "shm/base/memory_guard.hpp"
 #include "shm/base/system_call.hpp"

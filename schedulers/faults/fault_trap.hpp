@@ -1,9 +1,13 @@
 #pragma once
 
+#include <array>
 #include <atomic>
+#include <csignal>
+#include <cstdint>
 #include <optional>
 
 #include <sys/types.h>
+#include <ucontext.h>
 
 #include "schedulers/faults/cycle_gate.hpp"
 #include "schedulers/faults/task_fault.hpp"
@@ -11,6 +15,22 @@
 #include "shm/base/thread.hpp"
 
 namespace plchost {
+
+/// The signals by which code ends that has a fault.
+inline constexpr std::array kFaultSignals = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGTRAP, SIGABRT};
+
+/// The address of the instruction that a signal came in; 0: it is not known on this processor. Signal
+/// context.
+[[nodiscard]] inline std::uintptr_t instruction_of(const ucontext_t& context) noexcept {
+#if defined(__x86_64__)
+  return static_cast<std::uintptr_t>(context.uc_mcontext.gregs[REG_RIP]);
+#elif defined(__aarch64__)
+  return context.uc_mcontext.pc;
+#else
+  (void)context;
+  return 0;
+#endif
+}
 
 /// One thread that runs an application's code: says for which task it does so now and since when, catches the
 /// faults of that code, and lets a watchdog stop it in the middle. A thread that is caught is parked where it

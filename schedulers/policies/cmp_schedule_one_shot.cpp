@@ -1,6 +1,6 @@
 #include <algorithm>
 
-#include "schedulers/activation/deadline_source.hpp"
+#include "schedulers/activation/self_timed_sources.hpp"
 #include "schedulers/policies/policy.hpp"
 
 namespace plchost {

@@ -1,7 +1,6 @@
 #include <utility>
 
-#include "schedulers/activation/deadline_source.hpp"
-#include "schedulers/activation/timer_source.hpp"
+#include "schedulers/activation/self_timed_sources.hpp"
 #include "schedulers/policies/policy.hpp"
 
 namespace plchost {

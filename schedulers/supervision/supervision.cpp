@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "schedulers/clock/clock_thread.hpp"
+#include "schedulers/clock/clock.hpp"
 
 namespace plchost {
 

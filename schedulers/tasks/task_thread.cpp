@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "schedulers/clock/clock_thread.hpp"
+#include "schedulers/clock/clock.hpp"
 #include "schedulers/faults/fault_trap.hpp"
 #include "shm/base/futex.hpp"
 #include "shm/base/memory_guard.hpp"

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <random>
 
-#include "schedulers/distributed_clock/reference_source.hpp"
+#include "schedulers/distributed_clock/clock_model.hpp"
 #include "shm/base/seqlock.hpp"
 
 namespace plchost {

@@ -27,7 +27,7 @@
 
 #include "instances/launch/launch_contract.hpp"
 #include "instances/runtime/application/symbol_name.hpp"
-#include "schedulers/faults/fault_signals.hpp"
+#include "schedulers/faults/fault_trap.hpp"
 #include "shm/base/thread.hpp"
 #include "shm/base/unique_fd.hpp"
 #include "shm/process/end_with_parent.hpp"

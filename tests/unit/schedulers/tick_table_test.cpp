@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "schedulers/clock/clock_thread.hpp"
+#include "schedulers/clock/clock.hpp"
 #include "tests/support/manual_clock.hpp"
 
 namespace plchost {

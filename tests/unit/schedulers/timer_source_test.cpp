@@ -1,9 +1,8 @@
-#include "schedulers/activation/timer_source.hpp"
-
 #include <random>
 
 #include <gtest/gtest.h>
 
+#include "schedulers/activation/self_timed_sources.hpp"
 #include "schedulers/task_set.hpp"
 #include "tests/conformance/scheduler_fixture.hpp"
 

@@ -1,8 +1,24 @@
-#include "schedulers/activation/timer_source.hpp"
+#include "schedulers/activation/self_timed_sources.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace plchost {
+
+std::optional<Activation> DeadlineSource::wait() noexcept {
+  Activation activation = task_.next_release(rule_);
+  // Half of the period at least stays to others, also when it is made shorter at run time.
+  const TimePoint wake_at = activation.release - std::min(guard_.value(), task_.interval_in_force() / 2);
+  const bool sleeps = clock_.now() < wake_at;
+  if (gate_.wait(clock_, wake_at) == ActivationGate::Outcome::interrupted) return std::nullopt;
+  const TimePoint woken = clock_.now();
+  if (sleeps) guard_.record(woken - wake_at);
+  if (woken < activation.release) {
+    clock_.spin_until(activation.release);
+    activation.spun = activation.release - woken;
+  }
+  return activation;
+}
 
 TimerSource::TimerSource(Clock& clock, const Task& task, FreewheelRule rule,
                          std::unique_ptr<PeriodicTimer> timer) noexcept
