@@ -12,11 +12,10 @@
 #include <unistd.h>
 
 #include "instances/runtime/instance/instance.hpp"
-#include "instances/runtime/memory/save_left_behind.hpp"
+#include "instances/runtime/memory/retain_keeper.hpp"
 #include "instances/runtime/settings/settings.hpp"
 #include "instances/runtime/setup/options.hpp"
-#include "instances/runtime/trial/application_check.hpp"
-#include "instances/runtime/trial/trial_process.hpp"
+#include "instances/runtime/trial/trial.hpp"
 #include "shm/base/memory_guard.hpp"
 #include "shm/base/system_call.hpp"
 #include "shm/base/unique_fd.hpp"

@@ -25,6 +25,15 @@ inline constexpr std::uint32_t kMaxWatchdogCount = 1'000'000;
 /// 2^32 us, the range of the C interface.
 inline constexpr Duration kMaxWatchdogTime = std::chrono::microseconds(0xffff'ffff);
 
+/// The options of a task, with their defaults.
+struct TaskOptions {
+  /// Cyclic only: its grid is origin + start_offset + n * interval; 0 <= . < interval.
+  Duration start_offset{};
+  LatePolicy late = LatePolicy::next;  ///< cyclic only
+  TaskWatchdog watchdog;
+  bool drives_outputs = false;  ///< stops in the first of the two phases of a stop
+};
+
 /// IEC priorities: 0 (highest) to 31; 0..15 are SCHED_FIFO, 16..31 SCHED_OTHER.
 inline constexpr int kLowestIecPriority = 31;
 inline constexpr int kLowestRealTimeIecPriority = 15;

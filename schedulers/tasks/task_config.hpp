@@ -14,16 +14,11 @@
 namespace plchost {
 
 /// One task as the application describes it. Validated by TaskSet::create as a whole.
-struct TaskConfig {
+struct TaskConfig : TaskOptions {
   std::string name;
   TaskKind kind{};  ///< at first cyclic
   int iec_priority = 0;
-  Duration interval{};  ///< cyclic only: > 0
-  /// Cyclic only: its grid is origin + start_offset + n * interval; 0 <= . < interval.
-  Duration start_offset{};
-  LatePolicy late = LatePolicy::next;  ///< cyclic only
-  TaskWatchdog watchdog;
-  bool drives_outputs = false;           ///< stops in the first of the two phases of a stop
+  Duration interval{};                   ///< cyclic only: > 0
   std::string external_event;            ///< external only: the event's name
   std::function<bool()> event_variable;  ///< event only: reads the BOOL; called by the tick's thread
   std::function<void()> entry;           ///< one cycle; real-time

@@ -1,9 +1,10 @@
-// The calls of applications about the distributed clock: see plc_app.h.
+// The calls of applications about the distributed clock and the system time: see plc_app.h.
 #include <algorithm>
 #include <cstring>
 #include <utility>
 
 #include "instances/runtime/application/application_host.hpp"
+#include "instances/runtime/time/system_time.hpp"
 
 using plchost::ApplicationHost;
 using plchost::ClockFollower;
@@ -62,4 +63,19 @@ RTS_RESULT SchedGetClockState(RTS_HANDLE hTask, Clock_State* pState) {
   // A program that was built with an older file knows less of it.
   std::memcpy(pState, &state, std::min<std::size_t>(state.dwSize, sizeof state));
   return ERR_OK;
+}
+
+RTS_RESULT SysTimeGetUs(RTS_SYSTIME* pTime) {
+  return plchost::system_time_us(pTime);
+}
+
+RTS_RESULT SysTimeGetNs(RTS_SYSTIME* pTime) {
+  return plchost::system_time_ns(pTime);
+}
+
+unsigned int SysTimeGetMs() {
+  constexpr RTS_SYSTIME kNsPerMs = 1'000'000;
+  RTS_SYSTIME ns = 0;
+  (void)plchost::system_time_ns(&ns);
+  return static_cast<unsigned int>(ns / kNsPerMs);
 }

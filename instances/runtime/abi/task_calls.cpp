@@ -1,7 +1,7 @@
 // The calls of applications about their tasks: see plc_app.h.
 
 #include "instances/runtime/application/application_host.hpp"
-#include "instances/runtime/tasks/current_task.hpp"
+#include "instances/runtime/tasks/task_table.hpp"
 
 using plchost::ApplicationHost;
 using plchost::Task;

@@ -6,7 +6,7 @@
 
 #include "instances/plc_app.h"
 #include "instances/runtime/memory/declared_area.hpp"
-#include "instances/runtime/settings/task_settings.hpp"
+#include "instances/runtime/settings/settings.hpp"
 
 namespace plchost {
 

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "instances/runtime/application/device_events.hpp"
+#include "instances/runtime/tasks/registered_events.hpp"
 #include "instances/runtime/time/system_time.hpp"
 #include "shm/base/transient.hpp"
 #include "shm/log/log.hpp"

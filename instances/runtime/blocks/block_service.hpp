@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "instances/plc_app.h"
-#include "instances/runtime/settings/block_settings.hpp"
+#include "instances/runtime/settings/settings.hpp"
 #include "shm/base/result.hpp"
 #include "shm/base/thread.hpp"
 #include "shm/block_driver/block_channel.hpp"

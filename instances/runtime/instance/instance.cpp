@@ -10,7 +10,7 @@
 
 #include "instances/runtime/application/declare_application.hpp"
 #include "instances/runtime/setup/set_up_watch.hpp"
-#include "instances/runtime/tasks/operator_events.hpp"
+#include "instances/runtime/tasks/registered_events.hpp"
 #include "instances/runtime/tasks/task_builder.hpp"
 #include "schedulers/supervision/watchdog_rules.hpp"
 #include "shm/base/names.hpp"

@@ -8,7 +8,7 @@
 #include <unistd.h>
 
 #include "instances/runtime/instance/instance.hpp"
-#include "instances/runtime/tasks/operator_events.hpp"
+#include "instances/runtime/tasks/registered_events.hpp"
 #include "schedulers/policies/registry.hpp"
 #include "shm/base/names.hpp"
 #include "shm/log/log.hpp"

@@ -11,10 +11,12 @@
 #include <string>
 #include <vector>
 
+#include "instances/launch/launch_contract.hpp"
 #include "instances/runtime/memory/area_memory.hpp"
 #include "instances/runtime/memory/retain_files.hpp"
 #include "instances/runtime/memory/retain_memory.hpp"
 #include "instances/runtime/settings/settings.hpp"
+#include "shm/base/result.hpp"
 #include "shm/base/thread.hpp"
 
 namespace plchost {
@@ -118,5 +120,11 @@ class RetainKeeper {
   bool ending_ = false;
   Thread thread_;
 };
+
+/// Writes what the retain memory of an instance holds to the instance's retain files, unless they hold it
+/// already. For the time after the end of the instance's process. `launch`: name, pool, settings and state
+/// directory. not_found: there is no place for the files. busy: a process has them. Other errors: the files
+/// are as they were. Set-up.
+[[nodiscard]] Result<void> save_left_behind(const LaunchOptions& launch);
 
 }  // namespace plchost

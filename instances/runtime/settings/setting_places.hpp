@@ -39,13 +39,13 @@ struct At {
   }
 };
 
-/// An option of a task: a member of TaskSettings. The default is that of TaskConfig, by the path in it.
+/// An option of a task: a member of TaskSettings. The default is that of TaskOptions, by the path in it.
 template <auto kOption, auto... kPath>
 struct AtTask {
-  using Value = std::remove_cvref_t<decltype(detail::member_of(std::declval<TaskConfig&>(), kPath...))>;
+  using Value = std::remove_cvref_t<decltype(detail::member_of(std::declval<TaskOptions&>(), kPath...))>;
   static void put(const SettingsTarget& to, Value value) { to.task->*kOption = value; }
   static Value initial() {
-    const TaskConfig task;
+    const TaskOptions task;
     return detail::member_of(task, kPath...);
   }
 };

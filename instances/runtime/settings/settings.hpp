@@ -1,16 +1,16 @@
 #pragma once
 
+#include <chrono>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "instances/runtime/settings/block_settings.hpp"
 #include "instances/runtime/settings/settings_source.hpp"
-#include "instances/runtime/settings/task_settings.hpp"
 #include "schedulers/settings/scheduler_settings.hpp"
 #include "schedulers/settings/task_options.hpp"
 #include "shm/base/result.hpp"
@@ -39,6 +39,34 @@ struct SysTimeSettings {
   std::string get_ns;   ///< the symbol of a function like SysTimeGetNs
   std::string library;  ///< the file that holds both; empty: a component, or what else is loaded
   bool operator==(const SysTimeSettings&) const = default;
+};
+
+/// [CmpBlkDrvShm] and [CmpRouter]: the instance as a node that talks to others.
+struct BlockSettings {
+  bool enable = false;               ///< a node from the start, also without a channel
+  std::string base = "blocks";       ///< nodes of the same base name in the same pool see each other
+  std::uint16_t forced_address = 0;  ///< 0: any
+  std::uint32_t queue_slots = 1024;  ///< of each queue of the links that it makes
+  Duration hold = std::chrono::seconds(1);
+  std::vector<std::string> neighbours;  ///< empty: all
+  bool forward = true;
+  std::uint8_t hop_limit = 8;
+  bool operator==(const BlockSettings&) const = default;
+};
+
+/// The options of one task, by a [Task.NAME] section of the settings or by a call of plc_set_task_options().
+/// Those that it does not name stay as they are.
+struct TaskSettings {
+  std::string task;
+  std::string where;  ///< how errors call it: "line1.cfg:12: [Task.Fast]"
+  std::optional<LatePolicy> late{};
+  std::optional<Duration> start_offset{};
+  std::optional<bool> drives_outputs{};
+  std::optional<Duration> watchdog_time{};
+  std::optional<std::uint32_t> watchdog_sensitivity{};
+  std::optional<std::uint32_t> watchdog_omitted_cycles{};
+  std::optional<WatchdogPolicy> watchdog_policy{};
+  bool operator==(const TaskSettings&) const = default;
 };
 
 /// [SysMem] Area.N: where application areas of these flags lie.

@@ -19,26 +19,26 @@ static_assert(std::to_underlying(LatePolicy::asap) == 1);
 static_assert(std::to_underlying(WatchdogPolicy::task) == 1);
 
 template <auto kOption, auto kMember>
-using TaskWatchdogAt = AtTask<kOption, &TaskConfig::watchdog, kMember>;
+using TaskWatchdogAt = AtTask<kOption, &TaskOptions::watchdog, kMember>;
 
 constexpr std::array kTaskKeys = {
     SettingKey{.section = kTaskSections,
                .name = "LatePolicy",
                .meaning = "a late cycle: at the next release of the grid, or immediately",
-               .value = word_setting<AtTask<&TaskSettings::late, &TaskConfig::late>>(kLatePolicies)},
+               .value = word_setting<AtTask<&TaskSettings::late, &TaskOptions::late>>(kLatePolicies)},
     SettingKey{
         .section = kTaskSections,
         .name = "StartOffsetNs",
         .unit = "ns, below the task's interval",
         .meaning = "phase of the task on its grid",
         .value =
-            number_setting<AtTask<&TaskSettings::start_offset, &TaskConfig::start_offset>, As<nanoseconds>>(
+            number_setting<AtTask<&TaskSettings::start_offset, &TaskOptions::start_offset>, As<nanoseconds>>(
                 0, kMaxInterval / nanoseconds(1))},
     SettingKey{.section = kTaskSections,
                .name = "DrivesOutputs",
                .unit = "1 is yes",
                .meaning = "its cycles end first in a stop",
-               .value = truth_setting<AtTask<&TaskSettings::drives_outputs, &TaskConfig::drives_outputs>>()},
+               .value = truth_setting<AtTask<&TaskSettings::drives_outputs, &TaskOptions::drives_outputs>>()},
     SettingKey{.section = kTaskSections,
                .name = "Watchdog.TimeUs",
                .unit = "us, 0 is none",

@@ -13,7 +13,7 @@
 
 #include <fmt/format.h>
 
-#include "instances/runtime/tasks/current_task.hpp"
+#include "instances/runtime/tasks/task_table.hpp"
 #include "shm/base/names.hpp"
 
 namespace plchost {

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "instances/plc_app.h"
-#include "instances/runtime/settings/task_settings.hpp"
+#include "instances/runtime/settings/settings.hpp"
 #include "schedulers/tasks/task_config.hpp"
 #include "shm/base/result.hpp"
 #include "shm/pages/instance_page.hpp"

@@ -63,4 +63,21 @@ Task* TaskTable::task(RTS_HANDLE handle) const noexcept {
   return &tasks->task(index);
 }
 
+namespace {
+
+thread_local Task_Info* task_here = nullptr;
+
+}  // namespace
+
+CurrentTask::CurrentTask(Task_Info* task) noexcept {
+  task_here = task;
+}
+CurrentTask::~CurrentTask() {
+  task_here = nullptr;
+}
+
+Task_Info* current_task() noexcept {
+  return task_here;
+}
+
 }  // namespace plchost

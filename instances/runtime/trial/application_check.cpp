@@ -1,5 +1,3 @@
-#include "instances/runtime/trial/application_check.hpp"
-
 #include <array>
 #include <cerrno>
 #include <cstdio>
@@ -19,7 +17,7 @@
 #include "instances/runtime/settings/settings.hpp"
 #include "instances/runtime/setup/process_setup.hpp"
 #include "instances/runtime/setup/set_up_watch.hpp"
-#include "instances/runtime/trial/trial_process.hpp"
+#include "instances/runtime/trial/trial.hpp"
 #include "schedulers/task_set.hpp"
 #include "schedulers/tick/device_file.hpp"
 #include "shm/base/names.hpp"

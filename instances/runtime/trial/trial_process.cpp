@@ -1,5 +1,3 @@
-#include "instances/runtime/trial/trial_process.hpp"
-
 #include <array>
 #include <atomic>
 #include <cerrno>
@@ -27,6 +25,7 @@
 
 #include "instances/launch/launch_contract.hpp"
 #include "instances/runtime/application/symbol_name.hpp"
+#include "instances/runtime/trial/trial.hpp"
 #include "schedulers/faults/fault_trap.hpp"
 #include "shm/base/thread.hpp"
 #include "shm/base/unique_fd.hpp"

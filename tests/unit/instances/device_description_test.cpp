@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "instances/runtime/application/device_events.hpp"
+#include "instances/runtime/tasks/registered_events.hpp"
 
 namespace plchost {
 namespace {
@@ -47,7 +47,7 @@ Result<DeviceDescription> parse(std::string_view text) {
   return parse_device_description(text, "d.xml");
 }
 
-std::string error_of(std::string_view settings) {
+std::string fault_of(std::string_view settings) {
   const auto parsed = parse(device_with(settings));
   return parsed ? "" : parsed.error().message;
 }
@@ -92,19 +92,19 @@ TEST(DeviceDescriptionFile, InOtherEncodingsIsRead) {
 
 TEST(DeviceDescriptionFile, IsRefusedWithItsLineAndWhatIsAllowed) {
   const std::string twice = "<externalevents>" + event("a") + event("a") + "</externalevents>";
-  EXPECT_THAT(error_of(events_setting(twice)),
+  EXPECT_THAT(fault_of(events_setting(twice)),
               ::testing::AllOf(StartsWith("d.xml:8: "), HasSubstr("'a' is there twice")));
-  EXPECT_THAT(error_of(events_setting("<externalevents>" + event("a b") + "</externalevents>")),
+  EXPECT_THAT(fault_of(events_setting("<externalevents>" + event("a b") + "</externalevents>")),
               HasSubstr("name"));
-  EXPECT_THAT(error_of(events_setting("<externalevents>" + event("") + "</externalevents>")),
+  EXPECT_THAT(fault_of(events_setting("<externalevents>" + event("") + "</externalevents>")),
               HasSubstr("name"));
-  EXPECT_THAT(error_of(events_setting("<externalevents><event/></externalevents>")),
+  EXPECT_THAT(fault_of(events_setting("<externalevents><event/></externalevents>")),
               HasSubstr("externalevent is"));
-  EXPECT_THAT(error_of(events_setting("<externalevents><externalevent/></externalevents>")),
+  EXPECT_THAT(fault_of(events_setting("<externalevents><externalevent/></externalevents>")),
               HasSubstr("without a name"));
-  EXPECT_THAT(error_of(events_setting("<![CDATA[<externalevents>]]>")), HasSubstr("is no XML"));
-  EXPECT_THAT(error_of(events_setting("<![CDATA[<x/>]]>")), HasSubstr("has no <externalevents>"));
-  EXPECT_THAT(error_of(R"(<ts:setting name="supportexternal"><ts:value>yes</ts:value></ts:setting>)"),
+  EXPECT_THAT(fault_of(events_setting("<![CDATA[<externalevents>]]>")), HasSubstr("is no XML"));
+  EXPECT_THAT(fault_of(events_setting("<![CDATA[<x/>]]>")), HasSubstr("has no <externalevents>"));
+  EXPECT_THAT(fault_of(R"(<ts:setting name="supportexternal"><ts:value>yes</ts:value></ts:setting>)"),
               ::testing::AllOf(StartsWith("d.xml:7: "), HasSubstr("0 and 1 are")));
   EXPECT_THAT(parse("<DeviceDescription>").error().message, StartsWith("d.xml:1: no XML"));
   EXPECT_THAT(parse("").error().message, StartsWith("d.xml:1: no XML"));
@@ -132,13 +132,13 @@ TEST(DeviceDescriptionFile, NestedAMillionDeepIsReadOrRefused) {
   EXPECT_FALSE(parse(deep));
   for (int i = 0; i < 1'000'000; ++i) deep += "</a>";
   EXPECT_FALSE(parse(deep));
-  EXPECT_THAT(error_of(events_setting(deep)), HasSubstr("externalevents"));
+  EXPECT_THAT(fault_of(events_setting(deep)), HasSubstr("externalevents"));
 }
 
 TEST(DeviceDescriptionFile, HasBounds) {
   std::string many = "<externalevents>";
   for (std::size_t i = 0; i <= kMaxDeviceEvents; ++i) many += event(fmt::format("e{}", i));
-  EXPECT_THAT(error_of(events_setting(many + "</externalevents>")), HasSubstr("more than 1024 events"));
+  EXPECT_THAT(fault_of(events_setting(many + "</externalevents>")), HasSubstr("more than 1024 events"));
   EXPECT_THAT(parse(std::string(kMaxDeviceDescription + 1, ' ')).error().message, HasSubstr("are allowed"));
 }
 

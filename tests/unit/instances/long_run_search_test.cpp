@@ -1,11 +1,11 @@
-#include "instances/runtime/setup/long_run_search.hpp"
-
 #include <algorithm>
 #include <map>
 #include <string>
 #include <vector>
 
 #include <gmock/gmock.h>
+
+#include "instances/runtime/setup/set_up_watch.hpp"
 
 namespace plchost {
 namespace {

@@ -1,10 +1,9 @@
-#include "instances/runtime/tasks/operator_events.hpp"
-
 #include <filesystem>
 
 #include <gmock/gmock.h>
 #include <sys/resource.h>
 
+#include "instances/runtime/tasks/registered_events.hpp"
 #include "shm/base/transient.hpp"
 #include "tests/support/own_name.hpp"
 

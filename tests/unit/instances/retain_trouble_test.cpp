@@ -10,7 +10,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "instances/runtime/memory/save_left_behind.hpp"
+#include "instances/runtime/memory/retain_keeper.hpp"
 #include "shm/base/memory_guard.hpp"
 #include "shm/files/pool_files.hpp"
 #include "tests/unit/instances/retain_fixture.hpp"

@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include "instances/runtime/application/application_host.hpp"
-#include "instances/runtime/tasks/current_task.hpp"
 #include "instances/runtime/tasks/task_builder.hpp"
 #include "tests/support/manual_clock.hpp"
 

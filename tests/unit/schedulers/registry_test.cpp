@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "schedulers/activation/scheduler.hpp"
 #include "schedulers/tasks/task_kind.hpp"
 #include "shm/base/names.hpp"
 
