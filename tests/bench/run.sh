@@ -52,7 +52,8 @@ trap clean_up EXIT
 trap 'exit 130' INT TERM
 
 echo "building ..." >&2
-if ! { cmake -S . -B "$build" -G Ninja -DPLCHOST_TESTS=OFF -DPLCHOST_PYTHON=OFF -DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=10 &&
+if ! { cmake -S . -B "$build" -G Ninja -DPLCHOST_TESTS=OFF -DPLCHOST_PYTHON=OFF -DPLCHOST_ICEORYX=ON -DCMAKE_UNITY_BUILD=ON \
+    -DCMAKE_UNITY_BUILD_BATCH_SIZE=10 &&
   cmake --build "$build" --target plchost-bench; } >"$work/log" 2>&1; then
   tail -n 60 "$work/log" >&2
   exit 1
