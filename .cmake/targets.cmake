@@ -1,7 +1,8 @@
-# One place that says how every target of ours is compiled.
+# One place that says how every target of ours is compiled. Warnings are errors in the builds of tests/run.sh only, by
+# CMAKE_COMPILE_WARNING_AS_ERROR: a compiler of tomorrow has warnings that nobody has seen yet.
 
 set(PLCHOST_WARNINGS
-    -Werror -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion -Wcast-align -Wcast-qual
+    -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wsign-conversion -Wcast-align -Wcast-qual
     -Wformat=2 -Wundef -Wvla -Wswitch-enum)
 set(PLCHOST_CXX_WARNINGS
     -Wnon-virtual-dtor -Woverloaded-virtual -Wold-style-cast -Wextra-semi -Wzero-as-null-pointer-constant)

@@ -94,7 +94,7 @@ configure() { # configure DIR OPTIONS...
   shift
   local launcher=()
   command -v ccache >/dev/null && launcher=(-DCMAKE_CXX_COMPILER_LAUNCHER=ccache -DCMAKE_C_COMPILER_LAUNCHER=ccache)
-  cmake -S . -B "$dir" -G Ninja "${launcher[@]}" "$@"
+  cmake -S . -B "$dir" -G Ninja -DCMAKE_COMPILE_WARNING_AS_ERROR=ON "${launcher[@]}" "$@"
 }
 # Several files at a time, as most of the work is the headers of others. Fewer where each of them is optimised, so that the
 # round after an edit is short.

@@ -290,7 +290,8 @@ EOF
 # build_planted COMPILER SANITIZERS: builds planted.cpp with the project's own flags and runs it
 build_planted() {
   rm -rf "$plot/build"
-  cmake -S "$plot" -B "$plot/build" -DCMAKE_CXX_COMPILER="$1" -DSANITIZER="$2" >/dev/null && cmake --build "$plot/build" 2>&1 && "$plot/build/planted" 2>&1
+  cmake -S "$plot" -B "$plot/build" -DCMAKE_COMPILE_WARNING_AS_ERROR=ON -DCMAKE_CXX_COMPILER="$1" -DSANITIZER="$2" >/dev/null &&
+    cmake --build "$plot/build" 2>&1 && "$plot/build/planted" 2>&1
 }
 echo 'int main() { return 0; }' >"$plot/planted.cpp"
 build_planted g++ "" >/dev/null || { echo "a clean program does not pass the gates"; failed=1; }
