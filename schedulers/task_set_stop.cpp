@@ -92,7 +92,7 @@ std::optional<std::vector<std::size_t>> TaskSet::stuck_in_phase(const std::vecto
     late_variable_ = variable;
     if (std::ranges::find(inside, *variable) == inside.end()) inside.push_back(*variable);
   }
-  // The variable is judged in the second phase, and who waits for it goes along.
+  // The variable is judged in the second phase, and so are the tasks that wait for it.
   if (!inside.empty() || (!stop_->others && variable)) return inside;
   if (now < *stop_->judged_from + kIdlePatience) return std::nullopt;
   return busy;

@@ -48,7 +48,7 @@ typedef struct plc_memory plc_memory;
 
 #define PLC_POOL_OK 0
 #define PLC_POOL_ALREADY_THERE 1 /* create: opened, somebody else has made it */
-#define PLC_POOL_OWNER_DIED 2    /* lock: locked, and who held it before ended within: check what it guards */
+#define PLC_POOL_OWNER_DIED 2    /* lock: locked; the last holder ended within: check the guarded data */
 #define PLC_POOL_ARGUMENT (-1)   /* a null pointer, or a name, size or value that is not allowed */
 #define PLC_POOL_NO_OBJECT (-2)  /* no pool or no object of that name */
 #define PLC_POOL_WRONG_TYPE (-3) /* the object of that name is of another type */

@@ -13,8 +13,8 @@ namespace plchost {
 /// "thread 'hog' (SCHED_FIFO 80)"; empty: none.
 using ThreadText = FixedText<63>;
 
-/// The processor time that this process and its threads have used, and who may take it first: tests give
-/// figures of their own.
+/// The processor time that this process and its threads have used, and the threads that may take it before
+/// them. Tests give figures of their own.
 class ProcessorTimes {
  public:
   virtual ~ProcessorTimes() = default;

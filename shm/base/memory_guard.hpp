@@ -32,8 +32,8 @@ class MemoryGuard {
   /// `address` lies in a guarded mapping that is lost. Any context.
   [[nodiscard]] static bool is_lost(const void* address) noexcept;
 
-  /// Some memory of this process was: a futex in it is another one since, and who slept on it before is not
-  /// woken by a wake. Any context.
+  /// Some memory of this process was lost: a futex in it is another one since, so a wake does not reach the
+  /// threads that slept on it before. Any context.
   [[nodiscard]] static bool any_lost() noexcept { return lost_any.load(std::memory_order_acquire); }
 
   /// Installs a handler of SIGBUS that does so, once for the process. A fault outside of guarded memory goes

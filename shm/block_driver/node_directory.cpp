@@ -66,9 +66,10 @@ Result<void> check_directory(const MemoryFile& file, const std::string& name) {
   if (has_good_header(directory_in(file)) && file.bytes().size() == sizeof(DirectoryLayout)) return {};
   return failure(
       ErrorCode::corrupt,
-      fmt::format("shared memory '{}' is no directory of nodes of version {}; stop who uses it and "
-                  "remove it, or choose another [CmpBlkDrvShm] BaseName",
-                  name, kDirectoryKind.version));
+      fmt::format(
+          "shared memory '{}' is no directory of nodes of version {}; stop all processes that use it, and "
+          "remove it, or choose another [CmpBlkDrvShm] BaseName",
+          name, kDirectoryKind.version));
 }
 
 // A stranger may have written over it. Nodes that run write it again within a second; without them it is

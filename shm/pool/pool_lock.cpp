@@ -30,8 +30,8 @@ bool has_mapped(std::uint32_t thread, const std::string& pool) {
 
 }  // namespace
 
-// Only who holds the mutex writes `changes`; one that ended has left it odd. Sequentially consistent, so that
-// no later store is seen before it.
+// Only the thread that holds the mutex writes `changes`; one that ended has left it odd. Sequentially
+// consistent, so that no later store is seen before it.
 PoolLock::PoolLock(PoolHeader& header, PoolJournal& journal, bool owner_died) noexcept
     : header_(&header), journal_(&journal), owner_died_(owner_died) {
   header.changes.fetch_or(1);
@@ -64,8 +64,10 @@ Result<PoolLock> PoolLock::acquire(PoolHeader& header, PoolJournal& journal, con
     case LockResult::corrupt:
       break;
   }
-  return failure(ErrorCode::corrupt,
-                 fmt::format("pool '{}': its mutex is damaged; stop who uses the pool and remove it", pool));
+  return failure(
+      ErrorCode::corrupt,
+      fmt::format("pool '{}': its mutex is damaged; stop all processes that use the pool, and remove it",
+                  pool));
 }
 
 }  // namespace plchost

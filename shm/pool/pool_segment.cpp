@@ -55,8 +55,9 @@ Result<void> check_header(const PoolHeader& header, std::uint32_t max_objects, s
   if (header.version != kPoolVersion) {
     return failure(
         ErrorCode::corrupt,
-        fmt::format("pool '{}' has version {}, this program needs {}; stop who uses it and remove it", name,
-                    header.version, kPoolVersion));
+        fmt::format(
+            "pool '{}' has version {}, this program needs {}; stop all processes that use it, and remove it",
+            name, header.version, kPoolVersion));
   }
   const bool sound = header.entry_size == sizeof(ObjectEntry) && max_objects >= kMinObjects &&
                      max_objects <= kMaxObjects && header.bucket_count == bucket_count_for(max_objects) &&
@@ -151,7 +152,7 @@ Result<std::shared_ptr<PoolSegment>> PoolSegment::attach_patiently(const std::st
 }
 
 Result<std::shared_ptr<PoolSegment>> PoolSegment::attach(const std::string& name, Access access) {
-  // A client takes what there is: only who sets a host up can say whose it has to be.
+  // A client takes what there is: only the process that sets up the host knows its owner.
   auto pool = attach_patiently(name, access, is_any_owner);
   if (!pool && pool.error().code == ErrorCode::busy) pool.error().code = ErrorCode::corrupt;
   return pool;

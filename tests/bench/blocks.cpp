@@ -111,7 +111,7 @@ int run_peer(const Plan& plan, Board& board, const std::string& pool, int socket
   return 0;
 }
 
-/// Both sides of all ways, and who measures with them.
+/// Both sides of all ways, and the measurement with them.
 class Pair {
  public:
   Pair(const Plan& plan, Board& board, const Pipes& pipes) : plan_(plan), board_(board), pipes_(pipes) {}

@@ -102,7 +102,7 @@ void wake_private(const std::atomic<std::uint32_t>& word) noexcept {
   ::syscall(SYS_futex, &word, FUTEX_WAKE_PRIVATE, INT_MAX, nullptr, nullptr, 0);
 }
 
-/// A futex per thread, or one for all, and who opens them.
+/// A futex per thread, or one for all, and the thread that opens them.
 struct BareBurst {
   bool one_word = false;
   std::atomic<bool> stopping{false};

@@ -29,7 +29,7 @@ WORDS = 30
 OPENING = re.compile(r"[^\w$]*(who|what|whose|whoever|whatever|that which)\b(?!-)", re.IGNORECASE)
 # In the midst of a sentence: `so who asks`, `by who asks`, `because what is read`.
 WITHIN = re.compile(
-    r"\b(?:(?:so|because|that|if|when|while|as|than|unless|since|until|of|by|for|from|to|with|but) who"
+    r"\b(?:(?:so|because|that|if|when|while|as|than|unless|since|until|of|by|for|from|to|with|but|and|or|nor|only|stop) who"
     r"|(?:so|because|if|when|while|unless|since|but|so that) what)\b|\bwhoever\b(?!\")", re.IGNORECASE)
 # The ends of sentences. A sentence begins with a capital letter, a digit or code.
 END_OF_SENTENCE = re.compile(r"(?<=[.!?])[\"')\]*]*\s+(?=[\"'(\[*]*[A-Z0-9`\u0001])")

@@ -201,6 +201,7 @@ plant_in_prose "prose: what, in a cell" "shm/planted.md:3: begins with 'what': w
 | shm | what it holds |"
 plant_in_prose "prose: who, within a sentence" "shm/planted.md:1: a clause begins with 'by who'" shm/planted.md "It is answered by who asks."
 plant_in_prose "prose: long sentence" "shm/planted.md:1: 31 words in a sentence, at most 30" shm/planted.md "A$(printf ' word%.0s' {1..30})."
+plant_in_prose "prose: who, behind an and" "shm/planted.md:1: a clause begins with 'and who'" shm/planted.md "The task waits, and who asked hears of it."
 plant_in_prose "prose: synonym" "shm/planted.md:1: 'DDS server' is not a word of manager/glossary.md" shm/planted.md "The DDS server answers."
 plant_in_prose "prose: comment in C++" "shm/base/planted.cpp:2: begins with 'What': What is read" shm/base/planted.cpp "int planted = 0;
 // What is read is checked."

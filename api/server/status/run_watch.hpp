@@ -18,7 +18,7 @@
 namespace plchost {
 
 /// Waits for the tasks that run for a post to come to the ends of their cycles: looks at the instances'
-/// pages, so that neither the task nor who posts has anything to do for it. Control loop only.
+/// pages, so that neither the task nor the poster has anything to do for it. Control loop only.
 class RunWatch {
  public:
   static constexpr std::size_t kMaxOfClient = 64;

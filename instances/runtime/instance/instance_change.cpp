@@ -17,7 +17,7 @@ constexpr auto kChangePatience = std::chrono::seconds(6);
 
 }  // namespace
 
-// Text: it has taken over. Empty: it will, or not, and who asked hears of it then.
+// Text: it has taken over. Empty: it will, or not, and the client hears of it then.
 Result<std::string> Instance::begin_change(const std::string& path) {
   if (change_) return failure(ErrorCode::busy, "an online change is under way: try again when it is done");
   if (const auto faulty = tasks_->tasks_in_exception(); !faulty.empty()) {

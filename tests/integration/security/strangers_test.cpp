@@ -14,7 +14,7 @@ using testing::IsEmpty;
 
 class Strangers : public SecuredHost {
  protected:
-  /// Once an operator is served, who was not would have been.
+  /// Once an operator is served, all others that are served have been.
   void operator_is_served() { EXPECT_TRUE(sees_host(folder("operator"))); }
 };
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# The client of another vendor (Fast DDS) with DDS Security: an operator starts and posts, a viewer only reads, and who has
-# no identity, or one of another plant, sees nothing.
+# The client of another vendor (Fast DDS) with DDS Security: an operator starts and posts, a viewer only reads. A
+# client without an identity, or with one of another plant, sees nothing.
 . "$(dirname "$0")/common.sh"
 
 plant=$cell/plant

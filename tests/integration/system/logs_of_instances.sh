@@ -11,7 +11,7 @@ said() { plcctl logs line1 "$@"; }
 crashed() { said | grep -q 'manager *process [0-9]*: killed by SIGSEGV'; }
 until_true 20 crashed
 
-echo "- the last words, and who said what"
+echo "- the last words, each with its process"
 "$BIN/plcctl" logs line1 -f >"$cell/followed.txt" &
 others+=($!)
 said | grep -qE 'Z  error +application +valve 7 is stuck|Z  info +application +valve 7 is stuck' || fail "$(said)"
