@@ -181,8 +181,8 @@ RTS_RESULT CDECL SchedSetTaskInterval(RTS_HANDLE hTask, RTS_I64 nIntervalNs);
 RTS_RESULT CDECL SchedRaiseEvent(RTS_HANDLE hTask);
 
 /* Why the process of this application began. An application that keeps data of its own decides by it whether
- * to go on with them, as the runtime does: PLC_START_COLD gives retain areas their initial values, and in all
- * cases retain and persistent areas go on with retain values of their layout (see below). Any. */
+ * to go on with them, as the runtime does. After PLC_START_COLD retain areas begin with initial values. Else
+ * they, and persistent areas always, go on with their last values if the layout is the same. Any. */
 #define PLC_START_FIRST 0       /* by hand, first start by this manager, or another application was loaded */
 #define PLC_START_WARM 1        /* warm reset, or restart */
 #define PLC_START_COLD 2        /* cold reset: begin with initial values */
@@ -268,8 +268,8 @@ RTS_HANDLE CDECL plc_declare_area(const Plc_Area* pArea, RTS_RESULT* pResult);
 void* CDECL plc_area_address(RTS_HANDLE hArea);
 
 #define PLC_AREA_INITIAL 0u  /* began with its initial values */
-#define PLC_AREA_RETAINED 1u /* went on with what the process before left in memory: nothing is lost */
-#define PLC_AREA_RESTORED 2u /* went on with what was written last to a file */
+#define PLC_AREA_RETAINED 1u /* went on with the memory of the process before: nothing is lost */
+#define PLC_AREA_RESTORED 2u /* went on with the newest whole file */
 #define PLC_AREA_KEPT PLC_AREA_RETAINED /* its name before */
 
 typedef struct {
@@ -480,7 +480,7 @@ void CDECL plc_log(int nLevel, const char* pszText);
  * tasks have ended. Another result than ERR_OK from a CH_INIT.. ends the start of the instance. Threads are
  * started in CH_INIT3 and have ended when CH_EXIT3 returns. Unknown hooks return ERR_OK.
  * CH_TRIAL is the only hook that the trial of an application calls, in a process of its own, while the
- * instance runs with the component initialised: the component checks whether its CH_INIT.. would succeed, and
+ * instance runs with the component initialised. The component checks whether its CH_INIT.. would succeed, and
  * takes nothing. Another result than ERR_OK refuses the application.
  */
 #define CH_INIT 1u

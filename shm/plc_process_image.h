@@ -75,7 +75,7 @@ typedef struct {
 } plc_image_header;
 
 typedef struct {
-  plc_image_u64 sequence; /* of what is in it; 0 while it is being written */
+  plc_image_u64 sequence; /* of the image in it; 0 while it is being written */
   plc_image_i64 stamp_ns; /* CLOCK_MONOTONIC, when it was published */
   plc_image_u64 reserved[6];
 } plc_image_slot;

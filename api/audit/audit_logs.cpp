@@ -12,8 +12,9 @@ Result<AuditLogs> AuditLogs::open(const std::string& folder) {
   AuditLogs logs{.done = std::move(done), .refused = nullptr, .pending = {}};
   auto refused = AuditLog::open({.folder = folder + "/refused", .most_files = kRefusedFiles});
   auto pending = PendingRecords::open(folder + "/under_way");
-  for (const Error* error : {refused ? nullptr : &refused.error(), pending ? nullptr : &pending.error()}) {
-    if (error != nullptr) spdlog::error("a part of what happens is not recorded: {}", error->describe());
+  if (!refused) spdlog::error("refused requests are not recorded: {}", refused.error().describe());
+  if (!pending) {
+    spdlog::error("requests that a crash interrupts are not recorded: {}", pending.error().describe());
   }
   if (refused) logs.refused = *std::move(refused);
   if (pending) logs.pending = *std::move(pending);

@@ -68,7 +68,7 @@ void add_options(CLI::App& app, plchost::CliOptions& options) {
   app.add_option("--sort-by", options.sort_by, "sort by this field; -FIELD: the greatest first")
       ->type_name("FIELD")
       ->take_last();
-  app.add_flag("-q,--quiet", options.quiet, "say nothing of what is done; errors are told all the same");
+  app.add_flag("-q,--quiet", options.quiet, "print errors only, and no confirmations");
   app.add_flag("-w,--watch", options.watch, "list and show: again and again, until Ctrl-C");
   app.add_option("--every", options.every_s, "seconds between two looks of --watch (default 2)")
       ->check(CLI::Range(kMinTimeout, kMaxTimeout))

@@ -378,7 +378,7 @@ void ControlServer::Parts::send_page(const dds::Guid& client, const plc_Request&
   page.epoch = epoch;
   const bool written = sessions->write_page(client, page);
   tell(client, request.header.request_identity, written ? ErrorCode::ok : ErrorCode::busy,
-       written ? "" : "the client does not take what it asked for; ask again");
+       written ? "" : "the client does not take the page that it asked for; ask again");
 }
 
 Result<void> ControlServer::Parts::on_manager() {

@@ -154,7 +154,8 @@ Result<void> ControlServer::Parts::enter_domain() {
                                                " (at most 16 servers on one machine)"));
   if (identity_watch && !plc_announce_secured(participant.get())) {
     spdlog::warn(
-        "secured clients by Fast DDS 3 do not meet this host: its participant is not announced to them");
+        "secured clients by Fast DDS 3 cannot connect: the participant of this host is not announced to "
+        "them");
   }
   announcements = dds::Announcements(participant.get());
   if (options.dds.interfaces == std::vector<std::string>{"lo"}) {

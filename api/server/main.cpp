@@ -51,7 +51,7 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(std::uint16_t{0}, plchost::kMaxHostNumber));
   app.add_option("--blocks-base", options.blocks_base, "base name of the nodes that send blocks");
   app.add_option("--label", options.labels, "by which clients choose hosts");
-  app.add_option("--audit-folder", options.audit_folder, "where the log of what clients change is kept");
+  app.add_option("--audit-folder", options.audit_folder, "folder of the log of changes by clients");
   app.add_option("--name-since", options.name_since_ns,
                  "since when this host has its name (CLOCK_REALTIME, ns; default: now)");
   app.add_option("--beat-fd", options.beat_fd,

@@ -43,7 +43,7 @@ Result<void> WishFolderLock::take(DiskThread& disk, const std::string& folder, D
   if (outcome) return {};
   if (outcome.error().code != ErrorCode::already_exists) return std::unexpected(outcome.error());
   return failure(ErrorCode::already_exists,
-                 fmt::format("another manager keeps what instances are to be in {}: {}; give [host] "
+                 fmt::format("another manager keeps the wishes of its instances in {}: {}; give [host] "
                              "state_directory another folder, or [host] name another name",
                              folder, outcome.error().message));
 }

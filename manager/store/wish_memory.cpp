@@ -16,7 +16,7 @@ namespace plchost {
 
 namespace {
 
-constexpr PageKind kWishKind{.what = "memory of what an instance is to be",
+constexpr PageKind kWishKind{.what = "memory of an instance's wish",
                              .magic = 0x68736977'6e616c70,  // "planwish"
                              .version = 1};                 // 1: first
 

@@ -219,8 +219,8 @@ void WishStore::written(const Result<void>& result, const std::string& text) {
 
 void WishStore::fail(const std::string& problem) {
   if (problem != problem_) {
-    spdlog::error("instance {}: a power cut would undo what operators asked for: {}", settings_.instance,
-                  problem);
+    spdlog::error("instance {}: a power cut would undo the last commands of operators: {}",
+                  settings_.instance, problem);
     problem_ = problem;
   }
   retry_.set(MonotonicClock::now() + kWishRetry);
@@ -235,7 +235,7 @@ void WishStore::tell(const std::string& problem) {
 void WishStore::look_after_memory() {
   const auto mended = memory_ ? memory_->mend() : Result<bool>(false);
   if (!mended || *mended) {
-    spdlog::error("instance {}: another program has written over the memory of what it is to be; {}",
+    spdlog::error("instance {}: another program has written over the memory of its wish; {}",
                   settings_.instance,
                   mended ? "it is written anew" : "it is lost there: " + mended.error().describe());
   }

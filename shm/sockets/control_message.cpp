@@ -25,8 +25,9 @@ Result<Json> parse(std::string_view packet) {
     // Only a number is shown: dump() calls itself for each level of nesting, and a hostile text has
     // thousands.
     const bool shown = version != json.end() && version->is_number();
-    return failure(ErrorCode::corrupt, fmt::format("control message version {} where {} is spoken",
-                                                   shown ? dump(*version) : "none", kControlVersion));
+    return failure(ErrorCode::corrupt,
+                   fmt::format("control message has {}; expected is version {}",
+                               shown ? "version " + dump(*version) : "no version", kControlVersion));
   }
   const auto number = json.find("number");
   if (number == json.end() || !number->is_number_unsigned()) {

@@ -5,6 +5,7 @@ Usage: prose.py [ROOT] (a git checkout); prints each fault as "file:line: the fa
 
 * No sentence and no cell of a table begins with "who", "what", "whose", "whoever", "whatever" or "that which", unless it asks
   something. A part behind ":" or ";" or a dash is held to the same, and so is a clause behind "so", "because" and the like.
+* No clause with "what" is an object where a noun belongs: "of what is posted". Comments are not held to this one.
 * No sentence has more than 30 words. Code in backticks is one word, a link counts as its text. Behind a colon, the parts of
   a list that ";" or ":" divides are counted one by one.
 * No text has a word that manager/glossary.md forbids (the column "not").
@@ -31,6 +32,8 @@ OPENING = re.compile(r"[^\w$]*(who|what|whose|whoever|whatever|that which)\b(?!-
 WITHIN = re.compile(
     r"\b(?:(?:so|because|that|if|when|while|as|than|unless|since|until|of|by|for|from|to|with|but|and|or|nor|only|stop) who"
     r"|(?:so|because|if|when|while|unless|since|but|so that) what)\b|\bwhoever\b(?!\")", re.IGNORECASE)
+# `says what is wrong` asks, `of what is wrong` does not.
+OBJECT = re.compile(r"\b(?:of|for|from|with|by|without|beside|than|takes?|adopts?) what \w", re.IGNORECASE)
 # The ends of sentences. A sentence begins with a capital letter, a digit or code.
 END_OF_SENTENCE = re.compile(r"(?<=[.!?])[\"')\]*]*\s+(?=[\"'(\[*]*[A-Z0-9`\u0001])")
 PART = re.compile(r"(?<=[:;])\s+|\s+[-\u2013]\s+")
@@ -225,7 +228,7 @@ def is_message(text):
     return len(re.findall(r"(?:^|(?<=\s))[A-Za-z][a-z'-]+(?=[\s.,:;!?]|$)", text)) >= 3
 
 
-def faults_of(text, forbidden):
+def faults_of(kind, text, forbidden):
     """(offset in the text, fault)"""
     for sentence in END_OF_SENTENCE.split(text):
         parts = [part for part in PART.split(sentence) if part]
@@ -235,6 +238,8 @@ def faults_of(text, forbidden):
                 yield text.find(part), f"begins with '{opening[1]}': {part[:50]}"
         for found in WITHIN.finditer(sentence):
             yield text.find(sentence) + found.start(), f"a clause begins with '{found[0]}'"
+        for found in OBJECT.finditer(sentence) if kind != "comment" else ():
+            yield text.find(sentence) + found.start(), f"a noun instead of '{sentence[found.start():][:30]}'"
         before, colon, after = sentence.partition(": ")
         counted = [before, *re.split(r"[:;]\s", after)] if colon else [sentence]
         for part in counted:
@@ -274,7 +279,7 @@ def main():
                 continue
             shown = plain(joined)
             words = None if name == GLOSSARY else forbidden
-            for offset, fault in faults_of(shown, words):
+            for offset, fault in faults_of(kind, shown, words):
                 print(f"{name}:{text.fault_line(joined.find(shown[offset:offset + 20].split(CODE)[0]))}: {fault}")
                 wrong += 1
     if not read:

@@ -202,6 +202,7 @@ plant_in_prose "prose: what, in a cell" "shm/planted.md:3: begins with 'what': w
 plant_in_prose "prose: who, within a sentence" "shm/planted.md:1: a clause begins with 'by who'" shm/planted.md "It is answered by who asks."
 plant_in_prose "prose: long sentence" "shm/planted.md:1: 31 words in a sentence, at most 30" shm/planted.md "A$(printf ' word%.0s' {1..30})."
 plant_in_prose "prose: who, behind an and" "shm/planted.md:1: a clause begins with 'and who'" shm/planted.md "The task waits, and who asked hears of it."
+plant_in_prose "prose: what in the place of a noun" "shm/planted.md:1: a noun instead of 'of what was posted" shm/planted.md "The manager keeps a list of what was posted."
 plant_in_prose "prose: synonym" "shm/planted.md:1: 'DDS server' is not a word of manager/glossary.md" shm/planted.md "The DDS server answers."
 plant_in_prose "prose: comment in C++" "shm/base/planted.cpp:2: begins with 'What': What is read" shm/base/planted.cpp "int planted = 0;
 // What is read is checked."
@@ -213,7 +214,7 @@ plant_in_prose "prose: comment in a script" "tests/planted.sh:2: begins with 'Wh
 plant_in_prose "prose: message" "shm/base/planted.cpp:1: begins with 'what': what the client asks" shm/base/planted.cpp 'const char* m = "refused: what the client asks";'
 plant_in_prose "prose: message of a script" "tests/planted.sh:1: begins with 'who': who asks" tests/planted.sh 'fa''il "who asks is refused"'
 new_tree
-echo "Who asks? The manager answers the client: \`what\` is code." >"$plot/tree/shm/planted.md" && commit_tree
+echo "Who asks? The manager answers the client, and says what is wrong: \`what\` is code." >"$plot/tree/shm/planted.md" && commit_tree
 "$gates/prose.py" "$plot/tree" || { echo "good prose does not pass its gate"; failed=1; }
 
 # plant_in_documents NAME DIAGNOSTIC FILE EXPRESSION: the whole tree, one file of it with that change (of sed)

@@ -171,7 +171,7 @@ bool HostWork::look_at_one(const WantedInstance& wanted, const PresentInstance& 
     if (!work_.apply) {
       tell(Kind::differs, &wanted, "", &needed);
     } else if (round_ == kRounds) {
-      tell(Kind::failed, &wanted, "all was done, and it is still so", &needed);
+      tell(Kind::failed, &wanted, "all commands succeeded, and the difference is still there", &needed);
     } else if (change(wanted, needed)) {
       changed = true;
     } else {

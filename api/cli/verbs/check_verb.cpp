@@ -61,10 +61,10 @@ int check_host(CliSession& session, bool all) {
 
 void add_check_verb(const Command& plcctl, CliSession& session) {
   const auto all = std::make_shared<bool>(false);
-  plcctl.verb("check", "Look for what stands between a controller and its best")
+  plcctl.verb("check", "Look for obstacles to the real-time behaviour of a controller")
       .noun("host", "The changes that the controller needs, the worst first",
             [&session, all] { return check_host(session, *all); })
-      .flag("--all", *all, "also what is as it should be");
+      .flag("--all", *all, "also the checks that found nothing to change");
 }
 
 }  // namespace plchost

@@ -166,7 +166,7 @@ void add_logs_verb(const Command& plcctl, CliSession& session) {
             [&session, arguments] { return logs(session, *arguments); })
       .argument("INSTANCE", arguments->instance)
       .flag("-f,--follow", arguments->follow,
-            "go on with what is new, until Ctrl-C (with --json one object a line)")
+            "go on with new lines, until Ctrl-C (with --json one object a line)")
       .option("-n,--lines", arguments->count, "only so many of the newest lines", std::uint64_t{0}, kMaxCount)
       .optional("--since", arguments->since,
                 "only lines from then on: 90s, 10m, 2h, 1d ago by the host's clock, or 2026-11-21T10:48:59Z");

@@ -109,7 +109,8 @@ void add_plant_verbs(const Command& plcctl, CliSession& session) {
           [&session, file] { return work(session, *file, false); })
       .file("-f,--file", *file, kFile);
   plcctl
-      .noun("apply", "Bring hosts to what a file says: schedulers, applications, events, running or stopped",
+      .noun("apply",
+            "Bring hosts to the state in a file: schedulers, applications, events, running or stopped",
             [&session, file, dry_run] { return work(session, *file, !*dry_run); })
       .file("-f,--file", *file, kFile)
       .flag("-n,--dry-run", *dry_run, "change nothing, the same as 'diff'");

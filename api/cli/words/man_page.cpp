@@ -82,7 +82,7 @@ std::string man_page(const Syntax& program, const std::string& exit_codes) {
   page += ".SH EXIT STATUS\n" + escaped(exit_codes) + "\n.SH ENVIRONMENT\n";
   for (const auto& option : program.options) {
     if (option.variable.empty()) continue;
-    page += fmt::format(".TP\n.B {}\nwhat {} says if it is not given\n", escaped(option.variable),
+    page += fmt::format(".TP\n.B {}\nvalue of {} if that option is not given\n", escaped(option.variable),
                         escaped(option.names.back()));
   }
   return page;

@@ -159,7 +159,7 @@ TEST_F(Objects, AreWatchedWithALineForEachChange) {
   EXPECT_THAT(watch.lines()[3], HasSubstr("value 9"));
   watch.child().signal(SIGINT);
   EXPECT_EQ(watch.child().wait(), 0);
-  EXPECT_EQ(watch.lines().size(), 4U) << "nothing is said of what did not change";
+  EXPECT_EQ(watch.lines().size(), 4U) << "nothing is said of the unchanged ones";
 }
 
 TEST_F(Objects, AreWatchedAsOneObjectOfJsonEach) {

@@ -150,10 +150,11 @@ TEST(WishesFolder, IsOneManagersOnly) {
     other.replace(other.find(own), own.size(), own.substr(0, own.size() - 1) + "-b\"");
   }
   plant.write_configuration(other);
-  EXPECT_THAT(plant.start_refused_manager(),
-              AllOf(HasSubstr("another manager keeps what instances are to be in " + plant.state_directory() +
-                              "/wishes.cell: process " + std::to_string(plant.manager_pid())),
-                    HasSubstr("give [host] state_directory another folder")));
+  EXPECT_THAT(
+      plant.start_refused_manager(),
+      AllOf(HasSubstr("another manager keeps the wishes of its instances in " + plant.state_directory() +
+                      "/wishes.cell: process " + std::to_string(plant.manager_pid())),
+            HasSubstr("give [host] state_directory another folder")));
   EXPECT_EQ(plant.ask(ControlVerb::stop, "line1").code, ErrorCode::ok) << "the first is unharmed";
 }
 

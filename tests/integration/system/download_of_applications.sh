@@ -94,7 +94,7 @@ plcctl load application line1 "$APPLICATIONS/bottling_line.so" --on-host --boot
 plcctl load application line1 "$APPLICATIONS/packer.so" --on-host --boot
 is "$(version boot boot file)" "$APPLICATIONS/packer.so" || fail "$(plcctl list applications)"
 
-echo "- a manager that is killed costs nothing: the instance runs on, with what was loaded"
+echo "- a manager that is killed costs nothing: the instance runs on, with the loaded application"
 plcctl load application line1 "$APPLICATIONS/held.so"
 pid=$(instance line1 pid)
 kill -KILL "$manager"

@@ -58,7 +58,7 @@ application_is "$APPLICATIONS/online_1.so" || fail "$(plcctl list instances)"
 is "$(report version)" 1 || fail "version 2 still runs"
 is "$(instance line1 pid)" "$pid" || fail "another process"
 
-echo "- a crash and a restart begin with what was taken over last"
+echo "- a crash and a restart begin with the version that was taken over last"
 plcctl load application line1 "$APPLICATIONS/online_2.so" --online --on-host --boot
 kill -KILL "$pid"
 another() { [ "$(instance line1 pid)" != "$pid" ] && state_is line1 running; }

@@ -116,7 +116,7 @@ INSTANTIATE_TEST_SUITE_P(ControlMessage, MalformedReply,
 TEST(ControlMessage, NamesTheVersionThatIsSpoken) {
   const auto decoded = decode_reply(R"({"version":9,"number":1,"code":0,"text":""})");
   ASSERT_FALSE(decoded);
-  EXPECT_THAT(decoded.error().message, HasSubstr("version 9 where 2 is spoken"));
+  EXPECT_THAT(decoded.error().message, HasSubstr("version 9; expected is version 2"));
 }
 
 }  // namespace

@@ -115,7 +115,7 @@ TEST_F(TakenBack, WithTheSettingsOfThenUntilAnOperatorsNextStart) {
   crash_once();
   EXPECT_TRUE(host_.spawned.back().kept_settings) << "nobody has mended the file since";
   ask(ControlVerb::load_application, "/opt/new.so");
-  EXPECT_FALSE(host_.launch_checked.kept_settings) << "a trial is one of what is to be";
+  EXPECT_FALSE(host_.launch_checked.kept_settings) << "a trial is one of the next settings";
   sut().on_application_checked(failure(ErrorCode::refused, "no"));
   take_reply();
   make();  // another manager
