@@ -1,10 +1,10 @@
 /*
  * Online change, a part of plc_app.h.
  *
- * Another version of the program takes over while its tasks run ("plcctl load application ... --online"): it
- * is loaded beside the one that runs, its plc_app_init is called, and in a moment in which no task is in a
- * cycle the tasks get its functions. Their grids, figures, posted events, handles and intervals go on, and no
- * cycle is lost. The program keeps:
+ * Another version of the program takes over while its tasks run ("plcctl load application ... --online"). It
+ * is loaded beside the one that runs, and its plc_app_init is called. When no task is in a cycle, the tasks
+ * get its functions. Their grids, figures, posted events, handles and intervals go on, and no cycle is lost.
+ * The program keeps:
  *
  *     areas         all of them: the new program gets the addresses of the same memory
  *     variables     those that both versions name by plc_keep_variables(): copied in that moment

@@ -26,9 +26,9 @@ struct AuditHead {
   std::string hash = std::string(64, '0');
 };
 
-/// The record that follows `head` as a line of JSON with a newline, and `head` moved on to it: "before" is
-/// the hash of the record before, "hash" the SHA-256 of all of the line up to its comma. Texts that are no
-/// UTF-8 are made so.
+/// The record that follows `head` as a line of JSON with a newline, and `head` moved on to it. The
+/// field "before" is the hash of the record before. "hash" is the SHA-256 of the line up to its comma. Texts
+/// that are no UTF-8 are made so.
 [[nodiscard]] std::string chain(const AuditRecord& record, AuditHead& head);
 
 /// The part of a line (without its newline) that is about the chain.

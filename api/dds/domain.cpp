@@ -139,8 +139,8 @@ Result<std::string> domain_configuration(Role role, const DomainOptions& options
   if (!peers.empty()) peers = fmt::format("<Peers>{}</Peers>", peers);
   PLCHOST_TRY_ASSIGN(const auto security, security_section(options.identity));
   // High at servers, because all writers of theirs are bounded by their own history or window: none may be
-  // stopped because one client does not read. A client's is as much as it may have under way: some 500 posts,
-  // far less than the server's sockets hold, so that several clients that post as fast as they can lose
+  // stopped because one client does not read. A client's is as much as it may have under way, some 500 posts.
+  // That is far less than the server's sockets hold, so several clients that post as fast as they can lose
   // nothing and hold up nobody.
   const std::string_view watermark = role == Role::server ? "32 MB" : "128 kB";
   // A client's writer keeps what a killed server has not confirmed until that one's lease ends, or until its

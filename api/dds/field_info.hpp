@@ -21,8 +21,8 @@ enum class Unit : std::uint8_t {
 };
 
 /// A member of a status topic, or a field of a row of plcctl. The build makes visit_fields(sample, visit)
-/// from control.idl. It calls visit(FieldInfo, value) for each member but epoch, ext and what has parts:
-/// values are numbers, texts (string_view) and arrays of octets. visit_row(sample, computed, visit) does so
+/// from control.idl. It calls visit(FieldInfo, value) for each member but epoch, ext and those with parts.
+/// Values are numbers, texts (string_view) and arrays of octets. visit_row(sample, computed, visit) does so
 /// for each field of a row, in its order.
 struct FieldInfo {
   std::string_view name;  ///< in control.idl

@@ -14,8 +14,8 @@
 namespace plchost {
 
 /// An instance's wish in the memory of the host, "POOL.wish.INSTANCE". It has two places, and each write goes
-/// to both, one after the other: a manager that is killed within a write leaves a whole one, and what another
-/// program damages in one place is in the other one.
+/// to both, one after the other. So a manager that is killed within a write leaves a whole one. If another
+/// program damages one place, the other one counts.
 class WishMemory {
  public:
   /// Goes on with one that is there; makes it anew if it is damaged. corrupt: it is damaged, and cannot be

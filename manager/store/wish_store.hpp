@@ -24,10 +24,10 @@ inline constexpr Duration kOnlyWishReadLimit = std::chrono::seconds(10);
 inline constexpr Duration kWishRetry = std::chrono::seconds(10);
 
 /// The real WishKeeper: a WishMemory, and the files INSTANCE.wish and INSTANCE.events of wishes_folder().
-/// Only what a power cut leaves of a wish goes to the disk, and only if it is another than before. find()
-/// takes the newer of the two: the memory can be that of an earlier manager with another pool in between. If
-/// the disk does not answer, the memory's counts. If another program has written over the memory, nobody
-/// knows whether the disk has the last wish: it counts only if it starts no machine.
+/// Only the part of a wish that outlives a power cut goes to the disk, and only if it is another than before.
+/// Of the two find() takes the newer one: the memory can be that of an earlier manager, with another pool
+/// since. If the disk does not answer, the memory's counts. If another program has written over the memory,
+/// nobody knows whether the disk has the last wish. It then counts only if it starts no machine.
 class WishStore : public WishKeeper {
  public:
   struct Settings {

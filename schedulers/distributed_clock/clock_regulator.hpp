@@ -19,8 +19,8 @@ namespace plchost {
 /// A pair further off than the usual scatter allows is an outlier and left out. But kStepPairs of them in a
 /// row that lie on one line of a plausible drift are a step of the reference: the line is moved there. The
 /// grids follow the line at their own bounded pace. Outliers that lie on no such line, as those of a
-/// reference that stands still, runs backwards or says anything, are never taken, however long they go on:
-/// for what follows they are no pairs at all.
+/// reference that stands still, runs backwards or says anything, are never taken, however long they go on.
+/// The followers never see them.
 class ClockRegulator {
  public:
   /// Pairs until the line may be followed.

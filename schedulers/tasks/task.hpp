@@ -91,8 +91,8 @@ class Task {
   [[nodiscard]] Pace pace() const noexcept;
 
   /// Cyclic tasks: a new interval, from kMinRuntimeInterval to kMaxInterval. The release that is planned now
-  /// stays; the grid goes on from there in steps of the new interval, until it is set again: also after an
-  /// exchange of the scheduler, and after a stop and start. Called within a cycle it already places the
+  /// stays. The grid goes on from there in steps of the new interval until it is set again, also after an
+  /// exchange of the scheduler and after a stop and start. Called within a cycle it already places the
   /// release that follows this cycle. false: not a cyclic task, or out of range. Any context.
   [[nodiscard]] bool set_interval(Duration interval) noexcept { return state_->set_interval(interval); }
   /// The interval that was set last; 0 unless cyclic. Any context.

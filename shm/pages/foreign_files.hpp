@@ -16,10 +16,10 @@ struct ForeignFile {
   Result<void> taken_away;
 };
 
-/// Takes away what lies under the names of the pool, of its pages and of its memories and does not belong
-/// there: a file of a user who is not trusted, a folder, a FIFO, a link. `rights`: those of the pool; a
-/// memory that is none of the runtime's own may belong to any user who may write the pool. For the manager,
-/// before it makes or opens any of them. Set-up.
+/// Takes away files that have the names of the pool, of its pages and of its memories and do not belong
+/// there: those of a user who is not trusted, folders, FIFOs, links. `rights`: those of the pool; a memory
+/// that is none of the runtime's own may belong to any user who may write the pool. For the manager, before
+/// it makes or opens any of them. Set-up.
 [[nodiscard]] std::vector<ForeignFile> take_away_foreign_files(std::string_view pool,
                                                                const MemoryRights& rights);
 

@@ -34,7 +34,7 @@ void TransitionRing::remove(std::string_view pool, std::string_view instance) no
 }
 
 // Each number has its slot, so two writers never write the same one, unless one of them stands still in here
-// while the other goes through the whole ring: then a reader sees a number that is not the slot's.
+// while the other goes through the whole ring. A reader then sees a number that is not the slot's.
 void TransitionRing::add(TransitionSource source, std::uint32_t from, std::uint32_t to, std::int32_t pid,
                          std::string_view reason) noexcept {
   Transition transition{.sequence = page_.layout().last.fetch_add(1, std::memory_order_acq_rel) + 1,

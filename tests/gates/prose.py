@@ -6,8 +6,9 @@ Usage: prose.py [ROOT] (a git checkout); prints each fault as "file:line: the fa
 * No sentence and no cell of a table begins with "who", "what", "whose", "whoever", "whatever" or "that which", unless it asks
   something. A part behind ":" or ";" or a dash is held to the same, and so is a clause behind "so", "because" and the like.
 * No clause with "what" is an object where a noun belongs: "of what is posted". Comments are not held to this one.
-* No sentence has more than 30 words. Code in backticks is one word, a link counts as its text. Behind a colon, the parts of
-  a list that ";" or ":" divides are counted one by one.
+* No sentence has more than 30 words. Code in backticks is one word, a link counts as its text. Of a sentence with one colon
+  neither half has more, and both together have at most 36. Behind a colon, the parts of a list that ";" or ":" divides are
+  counted one by one.
 * No text has a word that manager/glossary.md forbids (the column "not").
 
 A text is a paragraph, a heading, an item of a list or a cell of a table outside of fences (.md), a comment or a docstring. So is
@@ -26,6 +27,7 @@ from pathlib import Path
 
 GLOSSARY = "manager/glossary.md"
 WORDS = 30
+WORDS_WITH_COLON = 36
 
 OPENING = re.compile(r"[^\w$]*(who|what|whose|whoever|whatever|that which)\b(?!-)", re.IGNORECASE)
 # In the midst of a sentence: `so who asks`, `by who asks`, `because what is read`.
@@ -246,6 +248,9 @@ def faults_of(kind, text, forbidden):
             words = len(WORD.findall(part))
             if words > WORDS:
                 yield text.find(part), f"{words} words in a sentence, at most {WORDS}: {part[:50]}"
+        words = len(WORD.findall(sentence))
+        if len(counted) == 2 and words > WORDS_WITH_COLON:
+            yield text.find(sentence), f"{words} words in a sentence with a colon, at most {WORDS_WITH_COLON}: {sentence[:50]}"
     for found in forbidden.finditer(text) if forbidden else ():
         yield found.start(), f"'{found[0]}' is not a word of {GLOSSARY}"
 

@@ -203,6 +203,7 @@ plant_in_prose "prose: who, within a sentence" "shm/planted.md:1: a clause begin
 plant_in_prose "prose: long sentence" "shm/planted.md:1: 31 words in a sentence, at most 30" shm/planted.md "A$(printf ' word%.0s' {1..30})."
 plant_in_prose "prose: who, behind an and" "shm/planted.md:1: a clause begins with 'and who'" shm/planted.md "The task waits, and who asked hears of it."
 plant_in_prose "prose: what in the place of a noun" "shm/planted.md:1: a noun instead of 'of what was posted" shm/planted.md "The manager keeps a list of what was posted."
+plant_in_prose "prose: long sentence with a colon" "shm/planted.md:1: 37 words in a sentence with a colon, at most 36" shm/planted.md "A$(printf ' word%.0s' {1..18}): a$(printf ' word%.0s' {1..17})."
 plant_in_prose "prose: synonym" "shm/planted.md:1: 'DDS server' is not a word of manager/glossary.md" shm/planted.md "The DDS server answers."
 plant_in_prose "prose: comment in C++" "shm/base/planted.cpp:2: begins with 'What': What is read" shm/base/planted.cpp "int planted = 0;
 // What is read is checked."

@@ -13,9 +13,9 @@
 namespace plchost::dds {
 
 /// Puts messages of the security handshake together that come in fragments, so that Cyclone never sees a
-/// fragment that nobody has signed: 0.10.2 takes memory for the size that one fragment says, and copies what
-/// another one has. Holds kSamples messages that are not complete; of more, the one that has waited longest
-/// goes. One thread.
+/// fragment that nobody has signed. Cyclone 0.10.2 takes memory for the size that one fragment says, and
+/// copies the bytes of another one. Holds kSamples messages that are not complete; of more, the one that has
+/// waited longest goes. One thread.
 class HandshakeAssembly {
  public:
   static constexpr std::size_t kSamples = 32;

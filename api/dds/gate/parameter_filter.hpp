@@ -14,9 +14,9 @@ enum class ParameterList : std::uint8_t {
 
 /// Keeps of a list of parameters what this host needs, and only in the exact form that it has: sizes, and
 /// texts and sequences that fit. Every other parameter that a reader may skip becomes padding of the same
-/// size, so that Cyclone 0.10.2 does not parse it: type information (it aborts on some), properties, tokens,
-/// and what another vendor means by a number of Cyclone's own. Topics match by the names of their types then,
-/// as they do with the clients of other vendors.
+/// size, so that Cyclone 0.10.2 does not parse it. These are type information (it aborts on some),
+/// properties, tokens, and numbers of Cyclone's own that another vendor uses for something else. Topics match
+/// by the names of their types then, as they do with the clients of other vendors.
 ///
 /// `list` begins with the first parameter; `guid_prefix` is the one of the message's header: a participant
 /// speaks for itself only. Returns the size of the list with its end; 0: the list is malformed.

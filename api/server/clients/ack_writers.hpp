@@ -14,10 +14,10 @@
 
 namespace plchost {
 
-/// The writers of acknowledgements, by the participant of the client, for the thread that receives posts: it
-/// writes them by itself, since handing them to another thread takes longer than all else that is done for a
-/// post. It may do so within DDS's listener because these writers keep one sample for each source and so
-/// never wait for a reader. Any thread.
+/// The writers of acknowledgements, by the participant of the client, for the thread that receives posts.
+/// That thread writes them by itself: to hand them to another one would take longer than all else that is
+/// done for a post. It may do so within DDS's listener because these writers keep one sample for each source
+/// and so never wait for a reader. Any thread.
 ///
 /// DDS keeps the last acknowledgement of each source for readers that come late. Of more than kMostSources of
 /// one client, the one that posted least recently is unregistered. So a client that makes a writer for each

@@ -24,8 +24,8 @@ namespace {
 std::atomic<std::int64_t> wall_clock_ahead_s{0};
 }
 
-// In place of the C library's, for the whole program, Cyclone included: a time by this clock is one that
-// comes late, as when somebody sets the clock on the wall back while a thread waits for it.
+// In place of the C library's, for the whole program, Cyclone included. A time by this clock comes late, as
+// when somebody sets the clock on the wall back while a thread waits for it.
 extern "C" int clock_gettime(clockid_t clock, timespec* time) noexcept {
   const auto result = ::syscall(SYS_clock_gettime, clock, time);
   if (clock == CLOCK_REALTIME && result == 0) time->tv_sec += wall_clock_ahead_s.load();

@@ -31,7 +31,7 @@ struct Report {
 /// atomic or a futex.
 ///
 /// Two things keep the search small. An execution that reaches a state in which another one has been is not
-/// followed further. And of two steps that do not depend on each other only one order is run (sleep sets): a
+/// followed further. And of two steps that do not depend on each other only one order is run (sleep sets). A
 /// thread whose step was run first elsewhere sleeps until another one takes a step that depends on it.
 class Explorer final : public Scene, private Chooser {
  public:
