@@ -11,13 +11,14 @@ Usage: prose.py [ROOT] (a git checkout); prints each fault as "file:line: the fa
   counted one by one.
 * No text has a word that manager/glossary.md forbids (the column "not").
 
-A text is a paragraph, a heading, an item of a list or a cell of a table outside of fences (.md), a comment or a docstring. So is
-a string of three words and more in C++ or Python, or one that a shell script prints: messages are among those. Not held are
-drawings and columns in comments, raw strings, and texts in pictures.
+A text is a paragraph, a heading, an item of a list or a cell of a table outside of fences (.md). So are comments, docstrings and
+the texts of pictures (.svg), and strings of three words and more in C++, Python or CMake, or printed by a shell script:
+messages are among those. Not held are drawings and columns in comments, and raw strings.
 """
 
 import argparse
 import ast
+import html
 import io
 import re
 import subprocess
@@ -48,7 +49,10 @@ C_TOKEN = re.compile(
 # Of a comment: columns, arrows, a line of usage.
 DRAWING = re.compile(r"\S   +\S|-->|──|\|  |^  +\S.*\[-")
 C_FILES = (".cpp", ".hpp", ".h", ".c", ".idl", ".h.in", ".hpp.in")
-HASH_FILES = (".sh", ".cmake", "CMakeLists.txt", ".sed", ".ci/run", ".ci/packages", ".ci/bare")
+CMAKE_FILES = (".cmake", ".cmake.in", "CMakeLists.txt")
+HASH_FILES = (*CMAKE_FILES, ".sh", ".sed", ".ci/run", ".ci/packages", ".ci/bare")
+CMAKE_TOKEN = re.compile(r"""#[^\n]*|"((?:\\.|[^"\\])*)\"""", re.DOTALL)
+PICTURE_TEXT = re.compile(r"<(text|title|desc)\b[^>]*>(.*?)</\1>", re.DOTALL)
 ITEM = re.compile(r"([*+-]|\d+\.|\([a-z0-9]\)) +(?=\S)")
 
 
@@ -180,6 +184,24 @@ def hash_texts(source):
     yield from (("comment", text) for text in paragraphs(comment, True))
 
 
+def of_line(source, offset, words):
+    text = Text()
+    text.lines = [(source.count("\n", 0, offset) + 1, words)]
+    return text
+
+
+def cmake_texts(source):
+    yield from hash_texts(source)
+    for token in CMAKE_TOKEN.finditer(source):
+        if token[1] is not None:
+            yield "message", of_line(source, token.start(), token[1])
+
+
+def picture_texts(source):
+    for found in PICTURE_TEXT.finditer(source):
+        yield "picture", of_line(source, found.start(), html.unescape(re.sub(r"<[^>]*>", "", found[2])))
+
+
 def python_texts(source):
     comment, last = [], 0
     for token in tokenize.generate_tokens(io.StringIO(source).readline):
@@ -215,6 +237,10 @@ def texts_of(name, source):
         return c_texts(source)
     if name.endswith(".py"):
         return python_texts(source)
+    if name.endswith(".svg"):
+        return picture_texts(source)
+    if name.endswith(CMAKE_FILES):
+        return cmake_texts(source)
     return hash_texts(source)
 
 
@@ -275,7 +301,7 @@ def main():
     forbidden = forbidden_words(options.root)
     wrong = read = 0
     for name in names:
-        if not name.endswith((".md", ".py", *C_FILES, *HASH_FILES)) or not (options.root / name).is_file():
+        if not name.endswith((".md", ".py", ".svg", *C_FILES, *HASH_FILES)) or not (options.root / name).is_file():
             continue
         for kind, text in texts_of(name, (options.root / name).read_text(encoding="utf-8")):
             joined = text.joined()

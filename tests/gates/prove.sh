@@ -214,6 +214,10 @@ plant_in_prose "prose: comment in a script" "tests/planted.sh:2: begins with 'Wh
 # W""hoever asks is answered."
 plant_in_prose "prose: message" "shm/base/planted.cpp:1: begins with 'what': what the client asks" shm/base/planted.cpp 'const char* m = "refused: what the client asks";'
 plant_in_prose "prose: message of a script" "tests/planted.sh:1: begins with 'who': who asks" tests/planted.sh 'fa''il "who asks is refused"'
+plant_in_prose "prose: string of CMake" "api/CMakeLists.txt:2: 'DDS server' is not a word of manager/glossary.md" api/CMakeLists.txt 'project(planted)
+plchost_manual(planted "the DDS server of a host")'
+plant_in_prose "prose: text of a picture" "api/planted.svg:2: 'DDS server' is not a word of manager/glossary.md" api/planted.svg '<svg>
+<text x="1">the DDS <tspan>server</tspan></text></svg>'
 new_tree
 echo "Who asks? The manager answers the client, and says what is wrong: \`what\` is code." >"$plot/tree/shm/planted.md" && commit_tree
 "$gates/prose.py" "$plot/tree" || { echo "good prose does not pass its gate"; failed=1; }
