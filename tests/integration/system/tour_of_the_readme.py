@@ -3,13 +3,15 @@
 
 Where the tour has "<!-- run here: PAGE ... -->", the console blocks of these pages behind "<!-- run in the tour -->" are run.
 
-The commands are those of the indented lines and those behind "$ " in the console blocks. Blocks of code are files, by the name in their first line or in the line above. The output that a console block shows behind a command must come in this order. Any number matches a number, any spaces match spaces, and anything matches "...".
+The commands are those of the indented lines and those behind "$ " in the console blocks. Blocks of code are files, by the name in their first line or in the line above. The output that a console block shows behind a command must come in this order (readme_output.py).
 """
 import os
 import re
 import subprocess
 import sys
 import time
+
+from readme_output import missing
 
 ROOT, BIN, CELL, CORE, POOL = sys.argv[1:6]
 PATIENCE_S = 75  # more than the longest command waits by itself
@@ -81,26 +83,6 @@ def console(body):
     yield "run", command, expected
 
 
-def pattern_of(line):
-    """None: the line is a picture, or stands for any."""
-    axis = re.fullmatch(r"(\s*\d+(ns|us|ms|s))+", line)
-    if line.strip() in ("...", "") or axis or re.search(r"[\u2500-\u259f]", line):
-        return None
-    parts = [re.escape(part) for part in re.split(r"\.\.\.", placed(line))]
-    pattern = ".*".join(re.sub(r"\d+(\\\.\d+)*", r"[0-9.]+", part) for part in parts)
-    return re.compile(re.sub(r"(\\ )+", r"\\s+", pattern))
-
-
-def missing(expected, output):
-    """The first line that is expected and does not come."""
-    lines = iter(output.split("\n"))
-    for line in expected:
-        pattern = pattern_of(line)
-        if pattern is not None and not any(pattern.search(one) for one in lines):
-            return line
-    return None
-
-
 class Shell:
     """A shell whose commands come from here; their output, also that of their children, goes to one file."""
 
@@ -125,7 +107,7 @@ class Shell:
         end = time.monotonic() + PATIENCE_S
         while True:
             output = self.said()[begin:]
-            absent = missing(expected, output) if mark in output else "(it does not end)"
+            absent = missing(expected, output, placed) if mark in output else "(it does not end)"
             if absent is None:
                 return
             if time.monotonic() > end or self.process.poll() is not None:
