@@ -24,6 +24,8 @@ namespace plchost {
 //                            │ fault      ▼ not come back   │
 //                            └────────► exception ◄─────────┘
 //
+// A fault that is noticed in stopped leads from there to exception, too.
+//
 //   none          the instance has no application: it was given none, or is in safe mode
 //   stopped       its tasks are parked, its variables keep their values
 //   running       its tasks run under a scheduler
