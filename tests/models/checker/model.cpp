@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdio>
+#include <string>
 #include <string_view>
 
 #include "tests/models/checker/explorer.hpp"
@@ -28,8 +29,8 @@ bool was_killed(ThreadNumber thread) {
 
 namespace {
 
-// One scene: how often it was run, and the fault.
-bool run_scene(const NamedScene& scene, std::uint64_t walks) {
+// One scene: how often it was run, and the fault. The fault; empty: there is none.
+std::string run_scene(const NamedScene& scene, std::uint64_t walks) {
   const auto begin = std::chrono::steady_clock::now();
   Explorer search(scene.set_up);
   const Report report = walks > 0 ? search.walk(walks) : search.explore();
@@ -44,18 +45,21 @@ bool run_scene(const NamedScene& scene, std::uint64_t walks) {
     std::printf("    %llu executions were cut\n", static_cast<unsigned long long>(report.cut));
   for (const std::string& step : report.trace) std::printf("    %s\n", step.c_str());
   std::fflush(stdout);
-  return !report.fault.empty();
+  return report.fault;
 }
 
 }  // namespace
 
 int run(int argc, char** argv, std::initializer_list<NamedScene> scenes) {
+  // With --catches TEXT a fault that has this text must be found. Another fault is none: it was not planted.
   bool catches = false;
+  std::string_view wanted;
   std::string_view only;
   for (int i = 1; i < argc; ++i) {
-    if (std::string_view(argv[i]) == "--catches")
+    if (std::string_view(argv[i]) == "--catches" && i + 1 < argc) {
       catches = true;
-    else
+      wanted = argv[++i];
+    } else
       only = argv[i];
   }
   bool faulty = false;
@@ -64,11 +68,14 @@ int run(int argc, char** argv, std::initializer_list<NamedScene> scenes) {
   for (const std::uint64_t walks : {catches ? kWalks : 0, std::uint64_t{0}}) {
     for (const NamedScene& scene : scenes) {
       if (faulty && catches) break;
-      if (only.empty() || only == scene.name) faulty = run_scene(scene, walks) || faulty;
+      if (!only.empty() && only != scene.name) continue;
+      const std::string fault = run_scene(scene, walks);
+      faulty = faulty || (!fault.empty() && fault.find(wanted) != std::string::npos);
     }
     if (!catches) break;
   }
-  if (catches && !faulty) std::puts("the fault was not found");
+  if (catches && !faulty)
+    std::printf("no fault \"%.*s\" was found\n", static_cast<int>(wanted.size()), wanted.data());
   return faulty == catches ? 0 : 1;
 }
 

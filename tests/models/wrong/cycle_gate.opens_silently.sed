@@ -1,2 +1,3 @@
 # schedulers/faults/cycle_gate.hpp: a thread that waits at the gate is not woken
+# caught as: asleep for ever: nobody wakes who sleeps
 s/clock\.wake\(closed_\);//
