@@ -91,6 +91,8 @@ void put_percentiles(ordered_json& object, const Row& row, const std::vector<Rou
   }
   object["samples"] = row.ours.size();
   object["floor_samples"] = row.floor.size();
+  object["dropped_samples"] = row.ours.dropped();
+  object["floor_dropped_samples"] = row.floor.dropped();
   object["rounds"] = rounds.size();
   for (const auto& [value, name] : kPercentiles) {
     if (value == &Summary::p90 || value == &Summary::max) continue;

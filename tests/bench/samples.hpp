@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <limits>
 #include <vector>
@@ -13,20 +14,35 @@ class Samples {
  public:
   Samples() = default;
   explicit Samples(std::size_t capacity) { values_.reserve(capacity); }
-  /// Drops what does not fit, so that a cycle never allocates.
+  /// A cycle never allocates: of values that do not fit, only the number and the greatest one are kept.
   void add(Duration value) noexcept {
-    if (values_.size() < values_.capacity()) values_.push_back(value);
+    if (values_.size() < values_.capacity())
+      values_.push_back(value);
+    else
+      drop(1, value);
   }
   /// For figures that are computed after measuring.
   void push(Duration value) { values_.push_back(value); }
   void append(const Samples& other) {
     values_.insert(values_.end(), other.values_.begin(), other.values_.end());
+    drop(other.dropped_, other.greatest_dropped_);
   }
+  /// Values that did not fit. They are in no percentile.
+  [[nodiscard]] std::size_t dropped() const noexcept { return dropped_; }
+  /// Of those that did not fit; Duration::min() if all did.
+  [[nodiscard]] Duration greatest_dropped() const noexcept { return greatest_dropped_; }
   [[nodiscard]] std::size_t size() const noexcept { return values_.size(); }
   [[nodiscard]] const std::vector<Duration>& values() const noexcept { return values_; }
 
  private:
+  void drop(std::size_t count, Duration greatest) noexcept {
+    dropped_ += count;
+    greatest_dropped_ = std::max(greatest_dropped_, greatest);
+  }
+
   std::vector<Duration> values_;
+  std::size_t dropped_ = 0;
+  Duration greatest_dropped_ = Duration::min();
 };
 
 /// A figure that could not be measured, or says nothing: it is shown as such, and no target is met by it.

@@ -28,6 +28,27 @@ TEST(Summary, GivesTheValueThatTheShareOfSamplesIsBelow) {
   EXPECT_EQ(sut.max, 1000);
 }
 
+TEST(Samples, ThatDoNotFitAreCountedAndTheGreatestIsTheMaximum) {
+  Samples sut(10);
+  while (sut.size() < sut.values().capacity()) sut.add(std::chrono::microseconds(1));
+  EXPECT_EQ(sut.dropped(), 0U);
+  EXPECT_EQ(summarise(sut).max, 1);
+  const std::size_t fitted = sut.size();
+  sut.add(std::chrono::microseconds(7));
+  sut.add(std::chrono::microseconds(3));
+  EXPECT_EQ(sut.size(), fitted);
+  EXPECT_EQ(sut.dropped(), 2U);
+  EXPECT_EQ(summarise(sut).max, 7);
+  Samples all;
+  all.append(sut);
+  all.append(one_to(5));
+  EXPECT_EQ(all.dropped(), 2U);
+  EXPECT_EQ(summarise(all).max, 7);
+  const auto json = nlohmann::json::parse(to_json({{.name = "part/who", .ours = all}}));
+  EXPECT_EQ(json[0]["dropped_samples"], 2);
+  EXPECT_EQ(json[0]["floor_dropped_samples"], 0);
+}
+
 TEST(Summary, HasNoPercentileThatNoSampleLiesAbove) {
   EXPECT_TRUE(std::isnan(summarise(Samples()).max));
   EXPECT_EQ(summarise(one_to(1)).p50, 1) << "the mean of the one slice of a round";
