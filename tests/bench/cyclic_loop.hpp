@@ -26,9 +26,10 @@ class CyclicLoop {
 
 /// How a bare loop waits for its next release.
 enum class Wait : std::uint8_t {
-  sleep,  ///< clock_nanosleep(TIMER_ABSTIME): the floor F
-  spin,   ///< looks at the clock
-  timer   ///< read() of a periodic timerfd
+  sleep,      ///< clock_nanosleep(TIMER_ABSTIME): the floor F
+  spin,       ///< looks at the clock
+  timer,      ///< read() of a periodic timerfd
+  two_timers  ///< read() of two timerfds that go off in turn, as the timer of the schedulers does
 };
 
 /// A bare SCHED_FIFO thread with nothing of plchost: the floor. Like ours it skips what passed.

@@ -34,6 +34,10 @@ done
 # processes, which are one group.
 work=$(mktemp -d "${TMPDIR:-/tmp}/plchost-bench.XXXXXX")
 bench=
+# Files of iceoryx's daemon, which the benchmark kills. It is started once on a machine: those of another one are left alone.
+roudi() { ls -d /dev/shm/{iceoryx_mgmt,root} /tmp/roudi{,.lock} /tmp/iox-unique-roudi.lock 2>/dev/null || true; }
+roudi_before=$(roudi)
+roudi_left() { comm -13 <(sort <<<"$roudi_before") <(roudi | sort); }
 shared() { find /dev/shm -maxdepth 1 -name "*plct-*-$bench-*" 2>/dev/null; }
 clean_up() {
   if [ -n "$bench" ]; then
@@ -45,6 +49,7 @@ clean_up() {
     kill -KILL -- "-$bench" 2>/dev/null || true
     shared | xargs -r rm -rf
     rm -f /tmp/plct-*-"$bench"-*  # where iceoryx has its sockets
+    roudi_left | xargs -r rm -f
   fi
   rm -rf "$work"
 }
@@ -67,6 +72,6 @@ code=0
 wait "$bench" || code=$?
 cat "$work/figures.json"
 [ -z "$markdown" ] || [ ! -s "$work/figures.json" ] || python3 tests/bench/figures.py "$work/figures.json" >"$markdown"
-left=$(shared; find "$work/tmp" -mindepth 1)
+left=$(shared; roudi_left; find "$work/tmp" -mindepth 1)
 [ -z "$left" ] || { echo "the benchmark has left behind: $left" >&2; code=1; }
 exit "$code"
