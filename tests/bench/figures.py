@@ -6,6 +6,7 @@ a row that somebody has edited.
 """
 
 import json
+import statistics
 import sys
 
 UNITS = [("_us_per_cycle", "us"), ("_us_per_activation", "us"), ("_us", "us"), ("_ms", "ms"), ("_ns", "ns"),
@@ -50,17 +51,42 @@ def table(heads, lines):
     return ["| " + " | ".join(row) + " |" for row in rows] + [""]
 
 
+def of_conditions(rows, key):
+    return [value for row in rows for value in row["conditions"][key] if value is not None]
+
+
+def usual(values, unit=""):
+    """The median, and the least and the most."""
+    return f"{text(statistics.median(values))}{unit} (median; {spread(values)}{unit})" if values else "-"
+
+
+def others(rows):
+    """For each condition: the load of other processes."""
+    lines = []
+    for condition in dict.fromkeys(row["condition"] for row in rows):
+        those = [row for row in rows if row["condition"] == condition]
+        lines += [f"* {condition}: other processes had {usual(of_conditions(those, 'other_cpu_percent'), ' %')} of the cores "
+                  "while a part was measured.",
+                  f"  The hypervisor took {usual(of_conditions(those, 'steal_percent'), ' %')}. The load average before was "
+                  f"{usual(of_conditions(those, 'load_average'))}."]
+    return lines
+
+
+def others_in_short(rows):
+    """The same in one line."""
+    shares = {condition: [value for row in rows if row["condition"] == condition for value in row["conditions"]["other_cpu_percent"]
+                          if value is not None] for condition in dict.fromkeys(row["condition"] for row in rows)}
+    return "Other processes had, while a part was measured, of the cores: " + "; ".join(
+        f"{condition} {statistics.median(values):.0f} % (median), at most {max(values):.0f} %" for condition, values in shares.items()) + "."
+
+
 def conditions(rows):
-    """Of the run: one line for the machine, one for what else it did."""
+    """Of the run: the machine, the rounds, and what else it did."""
     first = rows[0]["conditions"]
-    every = {key: [value for row in rows for value in row["conditions"][key] if value is not None]
-             for key in ("load_average", "steal_percent", "other_cpu_percent", "each_s")}
     rounds = spread([row["rounds"] for row in rows])
     return [f"* Machine: {first['cores']} cores, {first['processor']}, kernel {first['kernel']}.",
-            f"* {rounds} rounds of {spread(every['each_s'])} s of each thing. A spread is the least and the most of the rounds.",
-            f"* Other processes had {spread(every['other_cpu_percent'])} % of the cores while a part was measured, the hypervisor "
-            f"took {spread(every['steal_percent'])} %.",
-            f"  The load average of the minute before was {spread(every['load_average'])}.", ""]
+            f"* {rounds} rounds of {spread(of_conditions(rows, 'each_s'))} s of each thing. A spread is the least and the most of "
+            "the rounds.", *others(rows), ""]
 
 
 def percentiles(rows):

@@ -163,17 +163,19 @@ def tool_of(path, name):
 
 
 def figures(root):
-    found = {(row["name"], row["condition"]): row for row in json.loads((root / FIGURES_FILE).read_text(encoding="utf-8"))}
+    all_rows = json.loads((root / FIGURES_FILE).read_text(encoding="utf-8"))
+    found = {(row["name"], row["condition"]): row for row in all_rows}
     rows = ["| | median | 99th percentile | 99.9th | floor's median | 99th percentile | 99.9th |",
             "| --- | --- | --- | --- | --- | --- | --- |"]
-    text = tool_of("tests/bench/figures.py", "figures").text
+    tool = tool_of("tests/bench/figures.py", "figures")
+    text = tool.text
     for name, condition, meaning in FIGURES:
         if (name, condition) not in found:
             raise Fault(f"{FIGURES_FILE} has no row '{name}', {condition}")
         row = found[name, condition]
         rows.append("| " + " | ".join([meaning, *(text(row[floor + key]) for floor in ("", "floor_")
                                                   for key in ("p50_us", "p99_us", "p999_us"))]) + " |")
-    return rows
+    return [*rows, "", tool.others_in_short(all_rows)]
 
 
 def all_figures(root):
