@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Runs the cases of one test program in as few processes as possible, and names each case that fails.
 
-Usage: cases.py [--share I/N] [--limit SECONDS] [--results FILE] [--retries FILE] [--kind KIND] PROGRAM
+Usage: cases.py [--share I/N] [--limit SECONDS] [--results FILE] [--retries FILE] [--skips FILE] [--without PATTERNS] [--kind KIND]
+                PROGRAM
 
 One process runs one case after the other. If a case ends the process or exceeds the limit, the case is named, and the
 next process continues with the case after it. If a process fails although none of its cases did (a leak), each of them
@@ -9,11 +10,14 @@ runs again in a process of its own. A process that a case leaves running is a fa
 --share    which cases: each N-th one, from the I-th one on (0 to N-1); GTEST_FILTER chooses among all, as usual
 --results  one line per case: result (passed, failed, skipped or retried), seconds and name, separated by tabs
 --retries  a list of tests that may run a second time if they fail (tests/retries.txt)
---kind     of the build, for that list: plain, address or thread
+--skips    a list of tests (tests/skips.txt). A case is skipped without being run if its reason there begins with "not run:"
+--without  cases that run elsewhere, names with * and ?, separated by colons
+--kind     of the build, for these lists: plain, address or thread
 """
 
 import argparse
 import ctypes
+import fnmatch
 import functools
 import os
 import re
@@ -179,18 +183,24 @@ def main():
     parser.add_argument("--limit", type=float, default=180)
     parser.add_argument("--results")
     parser.add_argument("--retries")
+    parser.add_argument("--skips")
+    parser.add_argument("--without", default="")
     parser.add_argument("--kind", default="plain")
     parser.add_argument("program")
     options = parser.parse_args()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
 
     share, of = map(int, options.share.split("/"))
-    cases = list_cases(options.program)[share::of]
+    elsewhere = options.without.split(":")
+    cases = [case for case in list_cases(options.program) if not any(fnmatch.fnmatchcase(case, pattern) for pattern in elsewhere)][share::of]
+    skips = Expected(options.skips, options.kind)
+    left_out = {case: skips.reason(case, "not run:") for case in cases if skips.reason(case, "not run:")}
     work = Share(options.program, options.limit)
-    work.run(cases)
+    work.run([case for case in cases if case not in left_out])
+    work.results.update({case: ("skipped", 0.0, reason) for case, reason in left_out.items()})
 
     retries = Expected(options.retries, options.kind)
-    for case in [case for case, result in work.results.items() if result[0] == "failed" and retries.reason(case)]:
+    for case in [case for case, result in work.results.items() if result[0] == "failed" and retries.reason(case, "time", "open")]:
         print(f"again: {case}\n{work.results[case][2]}")
         second = Share(options.program, options.limit)
         second.run([case])
@@ -201,6 +211,8 @@ def main():
         with open(options.results, "w", encoding="utf-8") as file:
             for case, (result, seconds, _) in work.results.items():
                 file.write(f"{result}\t{seconds:.3f}\t{case}\n")
+    for _, _, output in work.results.values():
+        print(*(line + "\n" for line in output.splitlines() if line.startswith("further round: ")), sep="", end="")
     failed = [case for case, result in work.results.items() if result[0] == "failed"]
     for case in failed:
         print(f"---- {case}\n{work.results[case][2]}")

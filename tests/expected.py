@@ -19,9 +19,9 @@ class Expected:
                 if words and words[0] in kinds:
                     self.entries.append((words[1], words[2].strip()))
 
-    def reason(self, name):
-        """Why it is expected of the test of this name; None: it is not."""
+    def reason(self, name, *labels):
+        """Why it is expected of the test of this name; None: it is not. With labels: only lines whose reason begins with one."""
         for pattern, reason in self.entries:
-            if fnmatch.fnmatchcase(name, pattern):
+            if fnmatch.fnmatchcase(name, pattern) and (not labels or reason.startswith(labels)):
                 return reason
         return None

@@ -4,19 +4,26 @@
 Usage: suite.py [--jobs N] BUILD [CTEST_OPTION...]
 
 A test that fails runs again only if tests/retries.txt names it. A test that is skipped although tests/skips.txt does not
-name it fails the run. Shares of whole programs (cases.py) count with each of their cases.
+name it fails the run, and so does one that needed a further round without being listed. Shares of whole programs
+(cases.py) count with each of their cases. The last lines name the tests that took most processor time.
 """
 
 import argparse
+import json
 import pathlib
 import re
 import subprocess
 import sys
+import time
 import xml.etree.ElementTree as ElementTree
 
 from expected import Expected
+from processor_time import ProcessorTime
 
 OUTPUT_LINES = 40  # of a failed case, repeated at the end
+# A test that measures time may have rounds of its own. It says so in its output at each round after the first.
+FURTHER_ROUND = re.compile(r"^further round: (\S+): (.*)$", re.MULTILINE)
+COSTLY = 20  # tests named with their processor time
 HERE = pathlib.Path(__file__).resolve().parent
 
 
@@ -30,6 +37,8 @@ class Suite:
         self.build, self.jobs, self.options = build, jobs, options
         self.shares = build / "Testing" / "shares"
         self.outputs = {}  # of what failed in its last run
+        self.rounds = []  # further ones: test and reason
+        self.seconds = {}  # of processors, by test
 
     def run(self):
         """The result of each test and case; None: ctest ran none."""
@@ -45,22 +54,46 @@ class Suite:
     def ctest(self, report, options):
         file = (self.build / "Testing" / report).resolve()
         file.unlink(missing_ok=True)
-        subprocess.run(["ctest", "--test-dir", self.build, "--output-on-failure", "-j", str(self.jobs), "--no-tests=error",
-                        "--output-junit", file, *options], check=False)
+        with subprocess.Popen(["ctest", "--test-dir", self.build, "--output-on-failure", "-j", str(self.jobs), "--no-tests=error",
+                               "--test-output-size-passed", "65536", "--output-junit", file, *options]) as process:
+            times = ProcessorTime(process.pid, self.commands(options))
+            while process.poll() is None:
+                times.look()
+                time.sleep(0.2)
+        for name, seconds in times.seconds().items():
+            self.seconds[name] = max(seconds, self.seconds.get(name, 0))
         if not file.exists():
             return None
         results = {}
         for test in ElementTree.parse(file).getroot().iter("testcase"):
             name, status = test.get("name"), test.get("status")
             self.outputs.pop(name, None)
+            output = test.findtext("system-out", "")
+            self.rounds += FURTHER_ROUND.findall(output)
             if status == "fail":
-                self.outputs[name] = test.findtext("system-out", "")
+                self.outputs[name] = output
             cases = self.cases_of(name)
             results.update(cases)
             # A share stands for itself if it could not tell which of its cases failed.
             if not cases or (status == "fail" and "failed" not in cases.values()):
                 results[name] = {"run": "passed", "disabled": "skipped", "notrun": "skipped"}.get(status, "failed")
         return results
+
+    def commands(self, options):
+        """The command of each test."""
+        said = subprocess.run(["ctest", "--test-dir", self.build, "--show-only=json-v1", *options], check=False, capture_output=True, text=True)
+        try:
+            tests = json.loads(said.stdout)["tests"]
+        except ValueError:
+            return {}
+        return {test["name"]: test["command"] for test in tests if "command" in test}
+
+    def print_costly(self):
+        """Of all tests to a file, of the first to standard output."""
+        lines = [f"{seconds:8.1f} s {name}\n" for name, seconds in
+                 sorted([*self.seconds.items(), ("(all)", sum(self.seconds.values()))], key=lambda test: -test[1])]
+        (self.build / "Testing" / "processor_time.txt").write_text("".join(lines), encoding="utf-8")
+        print("processor time:\n" + "".join(lines[:COSTLY + 1]), end="")
 
     def cases_of(self, share):
         file = self.shares / f"{share}.txt"
@@ -104,7 +137,7 @@ def main():
     results = suite.run()
     if results is None:
         return 1
-    again = [name for name, result in results.items() if result == "failed" and retries.reason(name)]
+    again = [name for name, result in results.items() if result == "failed" and retries.reason(name, "time", "open")]
     for name, result in (suite.run_again(again) if again else {}).items():
         results[name] = "retried" if result == "passed" else "failed"
 
@@ -114,12 +147,16 @@ def main():
     for name, output in suite.outputs.items():
         print(f"----- {name} failed with:", *end_of(output), sep="\n")
     for name in named["retried"]:
-        print(f"second run: {name}: {retries.reason(name)}")
+        print(f"second run: {name}: {retries.reason(name, 'time', 'open')}")
+    unlisted = [name for name, _ in suite.rounds if retries.reason(name, "rounds") is None]
+    for name, what in suite.rounds:
+        print(f"further round: {name}: {what}: {retries.reason(name, 'rounds') or 'NOT EXPECTED (tests/retries.txt)'}")
     for name in named["skipped"]:
         print(f"skipped: {name}: {skips.reason(name) or 'NOT EXPECTED (tests/skips.txt)'}")
     for name in named["failed"]:
         print(f"FAILED: {name}")
-    failed = len(named["failed"]) + len(unexpected)
+    suite.print_costly()
+    failed = len(named["failed"]) + len(unexpected) + len(unlisted)
     print(f"{len(results) - failed} passed, {failed} failed; {len(named['skipped'])} skipped, "
           f"{len(named['retried'])} in a second run")
     return 1 if failed else 0

@@ -7,7 +7,7 @@ trap 'rm -rf "$folder"' EXIT
 export PLANTED_MARK=$folder/mark
 fail() { echo "FAILED: $*"; cat "$folder/said" "$folder/results"; exit 1; }
 
-echo 'any Planted.SucceedsAtItsSecondRun planted' >"$folder/retries"
+printf 'any Planted.%s\n' 'SucceedsAtItsSecondRun time planted' 'Fails rounds planted' >"$folder/retries"
 code=0
 ./cases.py --limit 10 --results "$folder/results" --retries "$folder/retries" --kind "$2" "$1" >"$folder/said" 2>&1 || code=$?
 [ "$code" -eq 1 ] || fail "exit code $code instead of 1"
@@ -30,6 +30,7 @@ says "FAILED: Planted.Aborts ended its process by signal 6"
 says "FAILED: Planted.EndsTheProcess ended its process with exit code 0"
 says "FAILED: Planted.Hangs takes longer than 10.0 s"
 says "again: Planted.SucceedsAtItsSecondRun"
+! grep -q "again: Planted.Fails" "$folder/said" || fail "a case with rounds of its own has a second run"
 
 # A share is a part, and all of them are the whole.
 for share in 0 1 2; do
@@ -37,3 +38,11 @@ for share in 0 1 2; do
   cut -f 3 "$folder/share"
 done | sort >"$folder/shares"
 cut -f 3 "$folder/results" | sort | cmp - "$folder/shares" || fail "the shares are not the whole"
+
+# Cases that are not run here.
+echo 'any Planted.Hangs not run: planted' >"$folder/skips"
+./cases.py --limit 10 --results "$folder/results" --skips "$folder/skips" --without 'Planted.Fails:Planted.LeavesA*' --kind "$2" "$1" >"$folder/said" 2>&1 || true
+expect skipped Hangs
+expect passed Succeeds
+! grep -qE "Planted.(Fails|LeavesAProcess)" "$folder/results" || fail "a case that runs elsewhere was run"
+! grep -qF "RUN      ] Planted.Hangs" "$folder/said" || fail "a case that is not to be run was run"

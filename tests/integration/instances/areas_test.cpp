@@ -105,11 +105,12 @@ class AreasOf : public ::testing::Test {
     EXPECT_TRUE(eventually([&] { return reports() > before; })) << instance.log();
     const std::string log = instance.log();
     Report said;
-    std::sscanf(
+    const int values = std::sscanf(
         log.c_str() + log.rfind("torn "),
         "torn %lu input %lu missed %lu late %lu begun %lu persistent %lu data %lu origin %u saves %lu",
         &said.torn, &said.input, &said.missed, &said.late, &said.begun, &said.persistent, &said.data,
         &said.origin, &said.saves);
+    EXPECT_EQ(values, 9) << log;
     return said;
   }
   void power_cut() {

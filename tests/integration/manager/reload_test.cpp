@@ -14,6 +14,7 @@
 #include "manager/config/config_changes.hpp"
 #include "shm/base/thread.hpp"
 #include "shm/files/memory_file.hpp"
+#include "tests/integration/manager/least_lost.hpp"
 #include "tests/integration/manager/plant.hpp"
 
 namespace plchost {
@@ -72,6 +73,17 @@ TEST_F(Reload, SaysSoWhenNothingHasChanged) {
   EXPECT_EQ(reload().text, "nothing has changed");
   expect_undisturbed("line1", line1_);
   expect_nothing_left();
+}
+
+TEST_F(Reload, CostsNoCycleOfAnInstanceThatIsUnchanged) {
+  start();
+  EXPECT_EQ(least_lost(plant_, "drive1",
+                       [&](std::uint32_t round) {
+                         plant_.add(fmt::format("spare{}", round), "packer", "autostart = false");
+                         EXPECT_EQ(reload().code, ErrorCode::ok);
+                       }),
+            0U);
+  expect_undisturbed("drive1", drive1_);
 }
 
 TEST_F(Reload, StartsWhatIsNewAndLeavesTheOthersAlone) {

@@ -13,6 +13,7 @@
 
 #include "tests/integration/api/stall.hpp"
 #include "tests/integration/security/secured_host.hpp"
+#include "tests/support/further_round.hpp"
 
 namespace plchost {
 namespace {
@@ -68,9 +69,12 @@ TEST_F(SecuredStallAtAKill, OneWayAtFullSpeed) {
     const Duration fresh = time_of_fresh_client();
     wait_for_posts();
     const Duration stood = stall.take();
-    fmt::print("stood still: {} ms; a fresh client: {} ms\n", stood / milliseconds(1),
-               fresh / milliseconds(1));
-    soon_enough |= stood <= milliseconds(500) + fresh;
+    const std::string times = fmt::format("posts stood still for {} ms, a fresh client took {} ms",
+                                          stood / milliseconds(1), fresh / milliseconds(1));
+    fmt::print("{}\n", times);
+    const bool now = stood <= milliseconds(500) + fresh;
+    if (!now) say_further_round(times);
+    soon_enough |= now;
   }
   EXPECT_TRUE(soon_enough);
 }
