@@ -4,8 +4,9 @@
 #   tests/run.sh --quick   build and the tests that take seconds: the round after an edit
 #   tests/run.sh NAME...   only tests whose name matches one of these (ctest -R), in the plain build
 #   tests/run.sh --help    this text
-# A test has one attempt, unless tests/retries.txt says why it has two. Each second run and each skipped test is printed at
-# the end; one that is skipped and not listed in tests/skips.txt fails the run.
+# A test has one attempt, unless tests/retries.txt says why it has two. Each second run, each further round within a test and
+# each skipped test is printed at the end; one that is skipped and not listed in tests/skips.txt fails the run.
+# Each step says how long it took, and the seconds of all processors together.
 set -uo pipefail
 cd "$(dirname "$0")/.."
 self=tests/run.sh
@@ -47,23 +48,32 @@ say() { # say WHAT: the line of a step, before its result
   step=$((step + 1))
   printf '[%d/%d] %s ...' "$step" "$steps" "$1"
 }
-end_step() { # end_step WHAT CODE SECONDS LOG: the whole output only if it failed
+end_step() { # end_step WHAT CODE SECONDS PROCESSOR_SECONDS LOG: the whole output only if it failed
   if [ "$2" -eq 0 ]; then
-    printf ' ok (%d s)\n' "$3"
+    printf ' ok (%d s, %d core-s)\n' "$3" "$4"
   else
     printf ' FAILED\n'
-    tail -n 300 "$4"
+    tail -n 300 "$5"
     echo "failed: $1"
     exit 1
   fi
 }
+# The processor time of all children so far, in seconds. Not printed: a shell made for that would have no children.
+processor_seconds() {
+  local file=$own/times.$BASHPID
+  times >"$file"
+  used=$(awk 'NR == 2 { for (i = 1; i <= 2; i++) { split($i, part, /[ms]/); sum += part[1] * 60 + part[2] } printf "%d", sum }' "$file")
+}
 # run WHAT COMMAND...
 run() {
-  local what=$1 began=$SECONDS code=0
+  local what=$1 began=$SECONDS code=0 before
   shift
   say "$what"
+  processor_seconds
+  before=$used
   "$@" >"$log" 2>&1 || code=$?
-  end_step "$what" "$code" $((SECONDS - began)) "$log"
+  processor_seconds
+  end_step "$what" "$code" $((SECONDS - began)) $((used - before)) "$log"
 }
 # The gates use one core, and tests wait most of the time. Steps that depend on neither run beside them, one after the other.
 # run_ahead STEP...: functions of this script, later join STEP WHAT
@@ -73,8 +83,11 @@ run_ahead() {
     for ahead_step; do
       began=$SECONDS
       code=0
+      processor_seconds
+      before=$used
       nice -n 10 "$BASH" "$self" --step "$ahead_step" >"$own/$ahead_step.log" 2>&1 || code=$?
-      echo "$code $((SECONDS - began))" >"$own/$ahead_step.end"
+      processor_seconds
+      echo "$code $((SECONDS - began)) $((used - before))" >"$own/$ahead_step.end"
       [ "$code" -eq 0 ] || exit "$code"
     done
   ) &
@@ -82,11 +95,11 @@ run_ahead() {
   set +m
 }
 join() {
-  local code=1 seconds=0
+  local code=1 seconds=0 processors=0
   say "$2"
   until [ -s "$own/$1.end" ] || ! kill -0 "$ahead" 2>/dev/null; do sleep 0.2; done
-  read -r code seconds <"$own/$1.end" || code=1
-  end_step "$2" "$code" "$seconds" "$own/$1.log"
+  read -r code seconds processors <"$own/$1.end" || code=1
+  end_step "$2" "$code" "$seconds" "$processors" "$own/$1.log"
 }
 
 configure() { # configure DIR OPTIONS...
@@ -133,7 +146,7 @@ count() { # adds up the summary of the step that just ran
   summary=$(grep -E '^[0-9]+ passed, [0-9]+ failed' "$log" | tail -n 1)
   passed=$((passed + $(cut -d' ' -f1 <<<"${summary:-0}")))
   failed=$((failed + $(cut -d' ' -f3 <<<"${summary:-0 - 0}")))
-  grep -E '^(skipped|second run): ' "$log" >>"$notes" || true
+  grep -E '^(skipped|second run|further round): ' "$log" >>"$notes" || true
 }
 
 # Over the product's code; the tests are compiled with all warnings as errors like everything else.
