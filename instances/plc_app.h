@@ -267,9 +267,9 @@ RTS_HANDLE CDECL plc_declare_area(const Plc_Area* pArea, RTS_RESULT* pResult);
  * area: the place where it lies. Null: no such handle, or not placed yet. Any. */
 void* CDECL plc_area_address(RTS_HANDLE hArea);
 
-#define PLC_AREA_INITIAL 0u  /* began with its initial values */
-#define PLC_AREA_RETAINED 1u /* went on with the memory of the process before: nothing is lost */
-#define PLC_AREA_RESTORED 2u /* went on with the newest whole file */
+#define PLC_AREA_INITIAL 0u             /* began with its initial values */
+#define PLC_AREA_RETAINED 1u            /* went on with the memory of the process before: nothing is lost */
+#define PLC_AREA_RESTORED 2u            /* went on with the newest whole file */
 #define PLC_AREA_KEPT PLC_AREA_RETAINED /* its name before */
 
 typedef struct {

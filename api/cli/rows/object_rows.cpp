@@ -56,7 +56,8 @@ std::string state_text(const ListedObject& object) {
   const plc_ObjectRecord& record = object.record;
   const ObjectTraits& traits = shown_as(object);
   if (traits.has_holder) return holder_text(record);
-  std::string text = fmt::format(fmt::runtime(traits.value_form), traits.has_size ? record.size : record.value);
+  std::string text =
+      fmt::format(fmt::runtime(traits.value_form), traits.has_size ? record.size : record.value);
   if (traits.has_tasks) {
     text += fmt::format(", {}registered, {} tasks", record.registered ? "" : "not ", record.bound_tasks);
   }

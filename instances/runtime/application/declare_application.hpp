@@ -50,7 +50,7 @@ struct LoadContext {
   ObjectPool* pool = nullptr;  ///< null: a trial before the first start
 };
 
-/// Loads it, has it declare itself to the host, applies the settings of its tasks, and checks the declaration
+/// Loads it, has it declare itself to the host, and applies the settings of its tasks. Checks the declaration
 /// as a whole: external events, tasks, uses of areas, and at a first load whether the areas can be placed.
 /// Another version of the application that runs is loaded beside that, and is gone again after an error,
 /// which is the first thing that is wrong. Changes nothing else. Set-up.
