@@ -7,6 +7,7 @@
 #include "instances/runtime/settings/settings_key.hpp"
 #include "shm/base/names.hpp"
 #include "shm/block_driver/block.hpp"
+#include "shm/block_driver/node_directory.hpp"
 
 namespace plchost {
 
