@@ -85,7 +85,7 @@ PYTHONPATH=$BIN/../python python3 "$cell/logs.py" || fail "logs and reload"
 echo "- Python sends an application, and shows what there is"
 (cat "$APPLICATIONS/packer.so" && echo "of another digest") >"$cell/other.so"
 cat >"$cell/sends.py" <<'EOF'
-import hashlib, os, sys, time, plchost_client
+import hashlib, os, sys, threading, time, plchost_client
 file, other = sys.argv[1:]
 with plchost_client.Client(domain=int(os.environ["PLCHOST_DOMAIN"]), timeout=20.0) as client:
     told = []
@@ -94,10 +94,11 @@ with plchost_client.Client(domain=int(os.environ["PLCHOST_DOMAIN"]), timeout=20.
     (kept,) = [one for one in client.applications("north") if one.version == 1]
     assert kept.sha256 == hashlib.sha256(open(file, "rb").read()).hexdigest(), kept.sha256
     assert kept.file_name == "packer.so" and kept.from_ and not kept.boot, (kept.file_name, kept.from_)
-    outcomes = []
-    client.download_and_tell("north", "packer1", other, outcomes.append, boot=True)
-    assert [one.version for one in client.applications("north") if one.boot] == [2]  # behind the download
-    assert outcomes and outcomes[0], outcomes
+    outcomes, loaded = [], threading.Event()
+    client.download_and_tell("north", "packer1", other, lambda outcome: (outcomes.append(outcome), loaded.set()), boot=True)
+    assert client.instances("north")[0].name == "packer1"  # a download holds up no other call
+    assert loaded.wait(60) and outcomes[0], outcomes
+    assert [one.version for one in client.applications("north") if one.boot] == [2]
     client.rollback_application("north", "packer1")
     assert client.exceptions("north")[0].count == 0
     client.post_and_wait("north", "packer1/product")
