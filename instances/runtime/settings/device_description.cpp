@@ -96,6 +96,12 @@ Result<std::vector<std::string>> events_of(const xml_node& value, const Place& p
   const std::ptrdiff_t offset = value.offset_debug();
   if (const xml_node events = child_called(value, "externalevents"))
     return events_below(events, place, offset);
+  for (const xml_node other : value.children()) {
+    if (other.type() != pugi::node_element) continue;
+    return place.wrong(offset,
+                       fmt::format("externalevents: '{}' is not allowed in its value: externalevents is",
+                                   shown(local_name(other))));
+  }
   const std::string inner = text_in(value);
   if (trimmed(inner).empty()) return std::vector<std::string>();
   pugi::xml_document document;
