@@ -25,6 +25,11 @@ while read -r count folder; do
 done < <(git ls-files shm schedulers instances api manager | grep -E '\.(cpp|hpp|h|c)$' | sed -E 's,\.[a-z]+$,,' | sort -u |
   sed 's,/[^/]*$,,' | uniq -c)
 
+# A test that is in no list is never run.
+while read -r test; do
+  grep -qE "$(basename "$test")|GLOB" "$(dirname "$test")/CMakeLists.txt" 2>/dev/null || fault "$test: not in the CMakeLists.txt beside it"
+done < <(git ls-files 'tests/*_test.cpp')
+
 marker='TO''DO|FIX''ME|X''XX'
 git grep -nE "\b($marker)\b" -- ':!*.md' && fault "the lines above are unfinished" || true
 home_path='/(work|home|root)/[a-z]'

@@ -138,6 +138,9 @@ new_tree
 echo 'int result = pthread_cond_timed''wait(&changed, &mutex, &until);' >"$plot/tree/api/wait.cpp" && commit_tree
 must_be_red "house: wait by the clock on the wall" "the lines above wait by a clock that can be set" "$gates/house.sh" "$plot/tree"
 new_tree
+mkdir -p "$plot/tree/tests/unit" && touch "$plot/tree/tests/unit/lost_test.cpp" && commit_tree
+must_be_red "house: a test in no list" "tests/unit/lost_test.cpp: not in the CMakeLists.txt beside it" "$gates/house.sh" "$plot/tree"
+new_tree
 echo 'std::string name = "pool-" + std::to_string(::get''pid());' >"$plot/tree/tests/name.cpp" && commit_tree
 must_be_red "house: name of a test's own making" "the lines above make names that nobody clears away" "$gates/house.sh" "$plot/tree"
 

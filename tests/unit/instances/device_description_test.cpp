@@ -43,19 +43,19 @@ std::string event(std::string_view name) {
   return fmt::format("<externalevent> <name>{}</name> </externalevent>", name);
 }
 
-Result<DeviceDescription> parse(std::string_view text) {
+Result<DeviceDescription> parse_xml(std::string_view text) {
   return parse_device_description(text, "d.xml");
 }
 
 std::string fault_of(std::string_view settings) {
-  const auto parsed = parse(device_with(settings));
+  const auto parsed = parse_xml(device_with(settings));
   return parsed ? "" : parsed.error().message;
 }
 
 TEST(DeviceDescriptionFile, NamesItsEventsInACdataSectionAsTheSeedDoes) {
   const auto sut =
-      parse(device_with(events_setting("<![CDATA[\n<externalevents>\n" + event("myCyclicInterrupt") +
-                                       event("\n  ready\n") + "</externalevents>\n]]>")));
+      parse_xml(device_with(events_setting("<![CDATA[\n<externalevents>\n" + event("myCyclicInterrupt") +
+                                           event("\n  ready\n") + "</externalevents>\n]]>")));
   ASSERT_TRUE(sut) << sut.error().describe();
   EXPECT_TRUE(sut->supports_external);
   EXPECT_THAT(sut->events, ElementsAre("myCyclicInterrupt", "ready"));
@@ -63,10 +63,10 @@ TEST(DeviceDescriptionFile, NamesItsEventsInACdataSectionAsTheSeedDoes) {
 
 TEST(DeviceDescriptionFile, NamesItsEventsAsElementsOrEscapedText) {
   EXPECT_THAT(
-      parse(device_with(events_setting("<externalevents>" + event("a") + "</externalevents>")))->events,
+      parse_xml(device_with(events_setting("<externalevents>" + event("a") + "</externalevents>")))->events,
       ElementsAre("a"));
-  EXPECT_THAT(parse(device_with(events_setting("&lt;externalevents>&lt;externalevent>&lt;name>b&lt;/"
-                                               "name>&lt;/externalevent>&lt;/externalevents>")))
+  EXPECT_THAT(parse_xml(device_with(events_setting("&lt;externalevents>&lt;externalevent>&lt;name>b&lt;/"
+                                                   "name>&lt;/externalevent>&lt;/externalevents>")))
                   ->events,
               ElementsAre("b"));
 }
@@ -74,7 +74,7 @@ TEST(DeviceDescriptionFile, NamesItsEventsAsElementsOrEscapedText) {
 TEST(DeviceDescriptionFile, WithoutItsSettingsSupportsNoExternalEvents) {
   for (const std::string& text : {device_with(""), std::string("<DeviceDescription/>"),
                                   std::string("<DeviceDescription><Device/></DeviceDescription>")}) {
-    const auto sut = parse(text);
+    const auto sut = parse_xml(text);
     ASSERT_TRUE(sut) << sut.error().describe();
     EXPECT_FALSE(sut->supports_external);
     EXPECT_THAT(sut->events, IsEmpty());
@@ -85,7 +85,7 @@ TEST(DeviceDescriptionFile, InOtherEncodingsIsRead) {
   const std::string text = device_with(events_setting("<externalevents>" + event("a") + "</externalevents>"));
   std::string utf16 = "\xff\xfe";
   for (const char c : text.substr(text.find('\n') + 1)) utf16 += {c, '\0'};
-  const auto sut = parse(utf16);
+  const auto sut = parse_xml(utf16);
   ASSERT_TRUE(sut) << sut.error().describe();
   EXPECT_THAT(sut->events, ElementsAre("a"));
 }
@@ -106,9 +106,9 @@ TEST(DeviceDescriptionFile, IsRefusedWithItsLineAndWhatIsAllowed) {
   EXPECT_THAT(fault_of(events_setting("<![CDATA[<x/>]]>")), HasSubstr("has no <externalevents>"));
   EXPECT_THAT(fault_of(R"(<ts:setting name="supportexternal"><ts:value>yes</ts:value></ts:setting>)"),
               ::testing::AllOf(StartsWith("d.xml:7: "), HasSubstr("0 and 1 are")));
-  EXPECT_THAT(parse("<DeviceDescription>").error().message, StartsWith("d.xml:1: no XML"));
-  EXPECT_THAT(parse("").error().message, StartsWith("d.xml:1: no XML"));
-  EXPECT_THAT(parse("<html/>").error().message, HasSubstr("its root is not"));
+  EXPECT_THAT(parse_xml("<DeviceDescription>").error().message, StartsWith("d.xml:1: no XML"));
+  EXPECT_THAT(parse_xml("").error().message, StartsWith("d.xml:1: no XML"));
+  EXPECT_THAT(parse_xml("<html/>").error().message, HasSubstr("its root is not"));
 }
 
 TEST(DeviceDescriptionFile, OfAnEntityBombCostsNothingAndIsNoName) {
@@ -121,7 +121,7 @@ TEST(DeviceDescriptionFile, OfAnEntityBombCostsNothingAndIsNoName) {
   bomb += "]>";
   const std::string text =
       device_with(events_setting("<externalevents>" + event("&z;") + "</externalevents>"));
-  const auto sut = parse(bomb + text.substr(text.find('\n') + 1));
+  const auto sut = parse_xml(bomb + text.substr(text.find('\n') + 1));
   ASSERT_FALSE(sut);
   EXPECT_THAT(sut.error().message, HasSubstr("name"));
 }
@@ -129,9 +129,9 @@ TEST(DeviceDescriptionFile, OfAnEntityBombCostsNothingAndIsNoName) {
 TEST(DeviceDescriptionFile, NestedAMillionDeepIsReadOrRefused) {
   std::string deep;
   for (int i = 0; i < 1'000'000; ++i) deep += "<a>";
-  EXPECT_FALSE(parse(deep));
+  EXPECT_FALSE(parse_xml(deep));
   for (int i = 0; i < 1'000'000; ++i) deep += "</a>";
-  EXPECT_FALSE(parse(deep));
+  EXPECT_FALSE(parse_xml(deep));
   EXPECT_THAT(fault_of(events_setting(deep)), HasSubstr("externalevents"));
 }
 
@@ -139,7 +139,8 @@ TEST(DeviceDescriptionFile, HasBounds) {
   std::string many = "<externalevents>";
   for (std::size_t i = 0; i <= kMaxDeviceEvents; ++i) many += event(fmt::format("e{}", i));
   EXPECT_THAT(fault_of(events_setting(many + "</externalevents>")), HasSubstr("more than 1024 events"));
-  EXPECT_THAT(parse(std::string(kMaxDeviceDescription + 1, ' ')).error().message, HasSubstr("are allowed"));
+  EXPECT_THAT(parse_xml(std::string(kMaxDeviceDescription + 1, ' ')).error().message,
+              HasSubstr("are allowed"));
 }
 
 TaskConfig waiting_for(const std::string& name) {
