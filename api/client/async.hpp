@@ -20,10 +20,10 @@ namespace plchost {
 template <class T>
 class [[nodiscard]] Async {
  public:
-  struct promise_type;
+  struct promise_type;  // NOLINT(readability-identifier-naming): the language names it
   using Handle = std::coroutine_handle<promise_type>;
 
-  struct promise_type {
+  struct promise_type {  // NOLINT(readability-identifier-naming)
     std::optional<T> result;
     std::exception_ptr error;
     std::coroutine_handle<> awaiting = std::noop_coroutine();

@@ -159,8 +159,8 @@ class ClientCore {
   template <class Sample>
   [[nodiscard]] Result<Poster<Sample>*> poster(const std::string& host);
   Async<Result<void>> prepare_runs(std::string host, TimePoint deadline);
-  /// Waits for the turn of a call that posts to that host.
-  Async<std::unique_ptr<Turns::Turn>> turn_to_post(std::string host);
+  /// Waits for the turn of a call that posts to that host. nullptr: it has not come at the deadline.
+  Async<std::unique_ptr<Turns::Turn>> turn_to_post(std::string host, TimePoint deadline);
   /// Until the status shows the effect of what was answered.
   Async<Result<void>> await_status(std::string host, std::uint64_t round, TimePoint deadline);
   static constexpr Duration kStatusPatience = std::chrono::seconds(2);

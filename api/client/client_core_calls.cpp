@@ -91,11 +91,17 @@ Async<Result<ApiReply>> ClientCore::ask(Asking asking, TimePoint deadline, Meanw
   std::int64_t asked_unix_ns = 0;
   bool written = false;
   Wait wait{.next = TimePoint::max(), .deadline = deadline};
-  for (TimePoint now = MonotonicClock::now(); now < wait.deadline; now = MonotonicClock::now()) {
+  for (bool last_look = false;;) {
+    const TimePoint now = MonotonicClock::now();
     if (auto reply = answer.take_first()) {
       reply->asked_unix_ns = asked_unix_ns;
       reply->heard_unix_ns = unix_time_ns();
       co_return *std::move(reply);
+    }
+    if (now >= wait.deadline) {
+      if (std::exchange(last_look, true)) break;
+      look();  // another call may have kept the thread for so long
+      continue;
     }
     const HostClock* const clock = clock_of(host);
     if (now >= next_write && clock != nullptr && asking.caller->matched()) {

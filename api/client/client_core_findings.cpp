@@ -22,7 +22,7 @@ bool is_complete(const std::vector<plc_HostFinding>& findings, std::uint64_t rou
 Async<Result<std::vector<plc_HostFinding>>> ClientCore::check_host(std::string name, TimePoint deadline) {
   PLCHOST_CO_TRY(open_cache(host_findings_, dds::kHostFinding));
   PLCHOST_CO_TRY_ASSIGN(const auto before, co_await host(name, deadline));
-  ApiRequest request{name, plc_OPERATION_CHECK_HOST, "", ""};
+  const ApiRequest request{name, plc_OPERATION_CHECK_HOST, "", ""};
   PLCHOST_CO_TRY_ASSIGN(const auto reply, co_await call(request, deadline));
   if (reply.code != ErrorCode::ok) co_return failure(reply.code, reply.text);
   for (;;) {

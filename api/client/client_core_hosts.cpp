@@ -220,7 +220,8 @@ Async<std::vector<HostView>> ClientCore::known_hosts(TimePoint deadline) {
 Async<Result<ClockOffset>> ClientCore::clock_offset(std::string host, TimePoint deadline) {
   constexpr int kTries = 5;
   std::optional<ClockOffset> best;
-  ApiRequest request{.host = host, .operation = plc_OPERATION_READ_CLOCK, .instance = "", .argument = ""};
+  const ApiRequest request{
+      .host = host, .operation = plc_OPERATION_READ_CLOCK, .instance = "", .argument = ""};
   for (int i = 0; i < kTries; ++i) {
     const auto reply = co_await call(request, deadline);
     if (!reply && best) break;

@@ -62,7 +62,8 @@ template <class Page>
 Async<Result<ListingOf<Page>>> ClientCore::list(std::string host, std::int32_t operation,
                                                 Result<plc_ListPart> part, TimePoint deadline) {
   PLCHOST_CO_TRY(part);
-  ApiRequest request{.host = host, .operation = operation, .instance = "", .argument = "", .part = *part};
+  const ApiRequest request{
+      .host = host, .operation = operation, .instance = "", .argument = "", .part = *part};
   co_return co_await ask_for_page<Page>(request, deadline);
 }
 

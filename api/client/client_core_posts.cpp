@@ -31,9 +31,12 @@ void ClientCore::use_clock(EventPoster& posts, const std::string& host, Duration
   if (const HostClock* const clock = clock_of(host)) posts.wait_for(patience, *clock);
 }
 
-Async<std::unique_ptr<Turns::Turn>> ClientCore::turn_to_post(std::string host) {
+Async<std::unique_ptr<Turns::Turn>> ClientCore::turn_to_post(std::string host, TimePoint deadline) {
   auto turn = std::make_unique<Turns::Turn>(posting_[host], *pump_);
-  while (!turn->has_come()) co_await pump_->change(kNoDeadline);
+  while (!turn->has_come()) {
+    if (MonotonicClock::now() >= deadline) co_return nullptr;
+    co_await pump_->change(deadline);
+  }
   co_return turn;
 }
 
@@ -68,8 +71,9 @@ bool ClientCore::take_acks(TimePoint now) {
 
 Async<Result<PostReport>> ClientCore::post_event(HostEvent event, std::uint64_t count, Duration interval,
                                                  Duration patience, std::function<bool()> stop) {
+  PLCHOST_CO_TRY(check_host_name(event.host, only_));
   PLCHOST_CO_TRY(check_event_name(event.instance, event.event));
-  const auto turn = co_await turn_to_post(event.host);
+  const auto turn = co_await turn_to_post(event.host, kNoDeadline);
   const TimePoint start = MonotonicClock::now();
   PLCHOST_CO_TRY(co_await prepare_posts(event.host, start + patience));
   PLCHOST_CO_TRY_ASSIGN(EventPoster* const way, poster<plc_EventPost>(event.host));
@@ -93,7 +97,7 @@ Async<Result<PostReport>> ClientCore::post_event(HostEvent event, std::uint64_t 
       now = MonotonicClock::now();
     }
     if (posts.unacknowledged() == 0 && sent == count) co_return posts.report();
-    if (posts.unacknowledged() > 0 && now - posts.last_progress() > patience) {
+    if (posts.unacknowledged() > 0 && now - posts.last_progress() > patience && !take_acks(now)) {
       PostReport report = posts.report();
       report.unacknowledged += count - sent;
       co_return report;
@@ -117,7 +121,7 @@ Async<Result<PostReport>> ClientCore::post_batch(std::string host, std::vector<E
   for (const EventId& event : events) {
     PLCHOST_CO_TRY(check_event_name(event.instance, event.event));
   }
-  const auto turn = co_await turn_to_post(host);
+  const auto turn = co_await turn_to_post(host, kNoDeadline);
   PLCHOST_CO_TRY_ASSIGN(BatchPoster* const way, poster<plc_EventBatch>(host));
   BatchPoster& posts = *way;
   const TimePoint deadline = MonotonicClock::now() + patience;

@@ -55,6 +55,7 @@ void ClientCore::take_runs() {
 }
 
 Async<Result<RunReport>> ClientCore::post_and_await(HostEvent event, Duration patience) {
+  PLCHOST_CO_TRY(check_host_name(event.host, only_));
   PLCHOST_CO_TRY(check_event_name(event.instance, event.event));
   const TimePoint deadline = MonotonicClock::now() + patience;
   PLCHOST_CO_TRY(co_await prepare_runs(event.host, deadline));
@@ -68,7 +69,11 @@ Async<Result<RunReport>> ClientCore::post_and_await(HostEvent event, Duration pa
 
 // It has the turn until its post is acknowledged: other posts need not wait for the task.
 Async<Result<RunReport>> ClientCore::post_and_await_once(HostEvent event, TimePoint deadline) {
-  auto turn = co_await turn_to_post(event.host);
+  auto turn = co_await turn_to_post(event.host, deadline);
+  if (!turn) {
+    co_return failure(ErrorCode::timed_out,
+                      fmt::format("other posts of this client to host '{}' have not ended", event.host));
+  }
   PLCHOST_CO_TRY_ASSIGN(EventPoster* const way, poster<plc_EventPost>(event.host));
   EventPoster& posts = *way;
   const auto epoch = [&] {

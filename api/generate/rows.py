@@ -125,6 +125,7 @@ def columns(contract, kind):
 def code_words(contract, head):
     """The words for codes, of each member that has any: words::TaskStatus::kind."""
     lines = [head + "#include <array>\n#include <string_view>\n", "namespace plchost::dds::words {\n"]
+    lines.append("// The names of the contract. NOLINTBEGIN(readability-identifier-naming)")
     for kind in contract.types:
         members = [(member.name, words_of(member)) for member in kind.members if words_of(member)]
         lines += [f"struct {kind.name} {{"] if members else []
@@ -132,6 +133,7 @@ def code_words(contract, head):
             told = ", ".join(f'"{word}"' for word in words)
             lines.append(f"  static constexpr std::array<std::string_view, {len(words)}> {name}{{{told}}};")
         lines += ["};"] if members else []
+    lines.append("// NOLINTEND(readability-identifier-naming)")
     return "\n".join(lines + ["\n}  // namespace plchost::dds::words\n"])
 
 

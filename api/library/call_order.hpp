@@ -35,12 +35,16 @@ class CallOrder {
   /// Client is for, or the only one. unavailable: end() was called.
   Async<Result<Place>> place(ClientCore& core, std::string name);
 
+  /// Downloads to one host, which hold up no other call, but each other.
+  [[nodiscard]] Turns& downloads(const std::string& host) { return downloads_[host]; }
+
   /// No turn comes any more.
   void end() noexcept { ended_.store(true); }
 
  private:
   Duration timeout_;
   std::map<std::string, Turns> turns_;  // by host
+  std::map<std::string, Turns> downloads_;
   std::atomic<bool> ended_{false};
 };
 

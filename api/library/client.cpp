@@ -72,7 +72,7 @@ Async<Result<PostReport>> post_to(CallOrder& order, ClientCore& core, std::strin
                                   std::uint64_t count) {
   PLCHOST_CO_TRY_ASSIGN(auto id, event_of(event));
   PLCHOST_CO_TRY_ASSIGN(const auto place, co_await order.place(core, host));
-  HostEvent to{place.host, std::move(id.instance), std::move(id.event)};
+  const HostEvent to{place.host, std::move(id.instance), std::move(id.event)};
   co_return co_await core.post_event(to, count, Duration{}, order.timeout());
 }
 
@@ -85,7 +85,7 @@ Async<Result<PostReport>> post_batch(CallOrder& order, ClientCore& core, std::st
 Async<Result<RunReport>> post_and_await(CallOrder& order, ClientCore& core, std::string host, EventId id) {
   PLCHOST_CO_TRY_ASSIGN(auto place, co_await order.place(core, host));
   place.let_others_go();
-  HostEvent to{place.host, std::move(id.instance), std::move(id.event)};
+  const HostEvent to{place.host, std::move(id.instance), std::move(id.event)};
   co_return co_await core.post_and_await(to, order.timeout());
 }
 

@@ -92,14 +92,16 @@ struct Sending {
 Async<Result<ApiReply>> send(CallOrder& order, ClientCore& core, Sending sending) {
   PLCHOST_CO_TRY_ASSIGN(const auto contents, read_application(sending.file));
   PLCHOST_CO_TRY_ASSIGN(auto place, co_await order.place(core, sending.host));
+  const Turns::Turn turn(order.downloads(place.host), core.pump());
   place.let_others_go();
-  Download download{.host = place.host,
-                    .instance = sending.instance,
-                    .name = std::filesystem::path(sending.file).filename().string(),
-                    .contents = std::as_bytes(std::span(contents)),
-                    .boot = sending.options.boot,
-                    .online = sending.options.online};
-  co_return co_await core.download(download, sending.progress, place.deadline);
+  while (!turn.has_come()) co_await core.pump().change(kNoDeadline);
+  const Download download{.host = place.host,
+                          .instance = sending.instance,
+                          .name = std::filesystem::path(sending.file).filename().string(),
+                          .contents = std::as_bytes(std::span(contents)),
+                          .boot = sending.options.boot,
+                          .online = sending.options.online};
+  co_return co_await core.download(download, sending.progress, order.deadline());
 }
 
 }  // namespace

@@ -105,7 +105,10 @@ bool Client::Worker::begin_next() {
 bool Client::Worker::step() {
   while (begin_next()) {
   }
-  const std::size_t over = std::erase_if(under_way_, [](const auto& call) { return call.done(); });
+  const std::size_t over = std::erase_if(under_way_, [](auto& call) {
+    if (call.done()) (void)call.take();  // the exception of a callback ends the program
+    return call.done();
+  });
   {
     const std::lock_guard lock(mutex_);
     calls_ -= over;

@@ -50,8 +50,9 @@ class __attribute__((visibility("hidden"))) Client::Worker {
   /// `done` is told later, or, if there are too many calls (full) or the client has ended, within this call.
   template <class T>
   void begin(Call<T> call, Done<T> done) {
-    begin([call = std::move(call), done = std::move(done)](const Result<ControlClient*>& client) {
-      return client ? tell<T>(call((*client)->core()), done) : fail<T>(client.error(), done);
+    begin([this, call = std::move(call), done = std::move(done)](const Result<ControlClient*>& client) {
+      return client ? tell<T>((*client)->core().pump(), call((*client)->core()), done)
+                    : fail<T>(client.error(), done);
     });
   }
   /// Waits for it. From a callback, other calls go on meanwhile.
@@ -66,10 +67,15 @@ class __attribute__((visibility("hidden"))) Client::Worker {
  private:
   struct Over {};
   using Job = std::function<Async<Over>(const Result<ControlClient*>&)>;
+  // A callback that waits for a call lets others go on, but no other callback is told within it.
   template <class T>
-  static Async<Over> tell(Async<Result<T>> call, Done<T> done) {
+  Async<Over> tell(Pump& pump, Async<Result<T>> call, Done<T> done) {
     auto result = co_await call;
+    while (telling_) co_await pump.change(kNoDeadline);
+    telling_ = true;
     done(std::move(result));
+    telling_ = false;
+    pump.look_again();
     co_return Over();
   }
   template <class T>
@@ -106,6 +112,7 @@ class __attribute__((visibility("hidden"))) Client::Worker {
   std::size_t calls_ = 0;            // those and the ones under way
   ControlClient* client_ = nullptr;  // that of the connection, once it is there
   bool ending_ = false;
+  bool telling_ = false;  // a callback runs; of the thread
   std::list<Async<Over>> under_way_;
   std::thread thread_;
 };

@@ -58,7 +58,8 @@ bool has_good_header(const DirectoryLayout& layout) noexcept {
 bool has_live_node(const DirectoryLayout& layout) noexcept {
   return std::ranges::any_of(layout.slots, [](const NodeSlot& slot) {
     const auto record = slot.record.read();
-    return record && is_sane(*record) && !process_has_ended(record->process);
+    // Of a version before only the number of the process lies where it does now.
+    return record && is_sane(*record) && !process_has_ended({.pid = record->process.pid}, ProcessLook::quick);
   });
 }
 

@@ -130,10 +130,10 @@ class Scratch:
 
 def scheduler(scratch):
     scratch.add("schedulers/policies/planted.cpp", PLANTS["policy"])
-    scratch.plant("schedulers/registry.hpp", "inline constexpr std::tuple kPolicies{", '\n    PolicyName<class Planted>{"Planted"},')
+    scratch.plant("schedulers/policies/registry.hpp", "inline constexpr std::tuple kPolicies{", '\n    PolicyName<class Planted>{"Planted"},')
     yield
     scratch.check(PLANTS["policy is listed"])
-    scratch.must_make("make_policy<plchost::Planted>", "schedulers/registry.cpp", "schedulers/policies/planted.cpp")
+    scratch.must_make("make_policy<plchost::Planted>", "schedulers/policies/registry.cpp", "schedulers/policies/planted.cpp")
     scratch.must_build("schedulers", "policies/planted.cpp")
 
 
@@ -199,17 +199,19 @@ def setting(scratch):
 
 
 def type_of_pool_object(scratch):
-    scratch.plant("shm/pool/object_type.hpp", "event = 2, mutex = 3", ", latch = 4")
-    scratch.plant("shm/pool/object_type.hpp", "kObjectTypes = 4;", "kObjectTypes = 5;", instead=True)
-    scratch.plant("shm/pool/object_type.hpp", "return std::uint64_t{entry.mutex.owner()}; }}", PLANTS["traits of the type"].rstrip())
+    scratch.plant("shm/pool/pool_layout.hpp", "event = 2, mutex = 3", ", latch = 4")
+    scratch.plant("shm/pool/pool_layout.hpp", "kObjectTypes = 4;", "kObjectTypes = 5;", instead=True)
+    scratch.plant("shm/pool/pool_layout.hpp", "return std::uint64_t{entry.mutex.owner()}; }}", PLANTS["traits of the type"].rstrip())
     scratch.plant("shm/pool/pool_layout.hpp", "  std::atomic<std::uint32_t> reserved;", "  std::atomic<std::uint32_t> latch;", instead=True)
     scratch.plant("shm/pool/pool_layout.hpp", "kPoolVersion = 6;", "kPoolVersion = 7;", instead=True)
     scratch.add("shm/pool/shared_latch.hpp", PLANTS["class of the type"])
+    scratch.add("shm/pool/shared_latch.cpp", PLANTS["source of the class"])
     scratch.plant("shm/plc_pool.h", "typedef struct plc_memory plc_memory;", PLANTS["C interface of the type"])
     scratch.plant("shm/library/plc_pool.cpp", '#include "shm/pool/object_pool.hpp"', PLANTS["C++ side of that interface"])
     scratch.plant("api/control.idl", "0 memory, 1 semaphore, 2 event, 3 mutex", ", 4 latch")
     yield
-    scratch.compile("shm/library/plc_pool.cpp")
+    scratch.compile("shm/library/plc_pool.cpp", "shm/pool/shared_latch.cpp")
+    scratch.must_build("shm/pool", "shared_latch.cpp")
     scratch.generate()
     scratch.check(PLANTS["type has its word"])
     scratch.documents()

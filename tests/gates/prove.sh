@@ -127,7 +127,7 @@ echo 'bool is_newer(const plc_Presence& one, const Seen& seen) { return one.epoc
 must_be_red "house: another rule for epochs" "the lines above compare epochs: use NewestEpoch" "$gates/house.sh" "$plot/tree"
 
 new_tree
-mkdir "$plot/tree/schedulers/policies" && echo '    PolicyName<class Second>{"Second"},' >"$plot/tree/schedulers/registry.hpp"
+mkdir "$plot/tree/schedulers/policies" && echo '    PolicyName<class Second>{"Second"},' >"$plot/tree/schedulers/policies/registry.hpp"
 echo 'auto* name = "Second";' | tee "$plot/tree/schedulers/policies/second.cpp" >"$plot/tree/api/words.cpp" && commit_tree
 must_be_red "house: name of a scheduler" "api/words.cpp:1:auto* name" "$gates/house.sh" "$plot/tree"
 new_tree
@@ -262,11 +262,11 @@ plant_in_documents "documents: step of a walk that its caller does not call" "Ta
 
 # Of each thing that the READMEs tell how to add, one is added; here their tables go stale.
 "$gates/places.py" || { echo "things cannot be added as the READMEs say"; failed=1; }
-sed -i '/^| `schedulers\/registry.hpp` |/d' "$plot/tree/schedulers/README.md"
-must_be_red "places: file without a row" "'To add a scheduler' does not name schedulers/registry.hpp" "$gates/places.py" "$plot/tree" scheduler
+sed -i '/^| `schedulers\/policies\/registry.hpp` |/d' "$plot/tree/schedulers/README.md"
+must_be_red "places: file without a row" "'To add a scheduler' does not name schedulers/policies/registry.hpp" "$gates/places.py" "$plot/tree" scheduler
 cp schedulers/README.md "$plot/tree/schedulers/"
-sed -i 's,^| `schedulers/registry.hpp` |,| `schedulers/registry.hpp`\, `schedulers/scheduler.hpp` |,' "$plot/tree/schedulers/README.md"
-must_be_red "places: row without a use" "'To add a scheduler' names schedulers/scheduler.hpp, which need not be touched" \
+sed -i 's,^| `schedulers/policies/registry.hpp` |,| `schedulers/policies/registry.hpp`\, `schedulers/activation/scheduler.hpp` |,' "$plot/tree/schedulers/README.md"
+must_be_red "places: row without a use" "'To add a scheduler' names schedulers/activation/scheduler.hpp, which need not be touched" \
   "$gates/places.py" "$plot/tree" scheduler
 cp schedulers/README.md "$plot/tree/schedulers/"
 

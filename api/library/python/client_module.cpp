@@ -95,7 +95,7 @@ py::dict dict_of(const Client::Record& record) {
 
 template <class Item>
 const Item& to_argument(const Item& item) {
-  return item;
+  return item;  // NOLINT(bugprone-return-const-ref-from-parameter): within the call that it is an argument of
 }
 py::dict to_argument(const Client::Record& record) {
   return dict_of(record);

@@ -85,13 +85,14 @@ Result<RTS_HANDLE> EventTable::open(std::string_view name) {
   return to_handle(place);
 }
 
-// Where the event is, or is to be: best in a free slot that it has had before. kMaxEvents: nowhere.
+// Where the event is, or is to be: best in a free slot that it has had before. Another one's is taken only
+// when there is no fresh one, as somebody may have kept its handle. kMaxEvents: nowhere.
 std::size_t EventTable::place_for(std::string_view object) const noexcept {
   const std::size_t count = count_.load(std::memory_order_relaxed);
   std::size_t place = count;
   for (std::size_t i = 0; i < count; ++i) {
     if (slots_[i]->object == object) return i;
-    if (slots_[i]->free && place == count) place = i;
+    if (slots_[i]->free && count == kMaxEvents && place == count) place = i;
   }
   return place;
 }
