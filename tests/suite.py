@@ -4,8 +4,9 @@
 Usage: suite.py [--jobs N] BUILD [CTEST_OPTION...]
 
 A test that fails runs again only if tests/retries.txt names it. A test that is skipped although tests/skips.txt does not
-name it fails the run, and so does one that needed a further round without being listed. Shares of whole programs
-(cases.py) count with each of their cases. The last lines name the tests that took most processor time.
+name it fails the run, and so does one that needed a further round without being listed. So does a case of a test program
+that ctest does not have exactly once. Shares of whole programs (cases.py) count with each of their cases. The last lines
+name the tests that took most processor time.
 """
 
 import argparse
@@ -17,12 +18,14 @@ import sys
 import time
 import xml.etree.ElementTree as ElementTree
 
+from cases import list_cases
 from expected import Expected
 from processor_time import ProcessorTime
 
 OUTPUT_LINES = 40  # of a failed case, repeated at the end
 # A test that measures time may have rounds of its own. It says so in its output at each round after the first.
 FURTHER_ROUND = re.compile(r"^further round: (\S+): (.*)$", re.MULTILINE)
+ONE_CASE = "--gtest_filter="
 COSTLY = 20  # tests named with their processor time
 HERE = pathlib.Path(__file__).resolve().parent
 
@@ -54,9 +57,11 @@ class Suite:
     def ctest(self, report, options):
         file = (self.build / "Testing" / report).resolve()
         file.unlink(missing_ok=True)
+        # Alone: the first ctest after a build finds the cases of each program, and writes them into files.
+        commands = dict(self.listed(options))
         with subprocess.Popen(["ctest", "--test-dir", self.build, "--output-on-failure", "-j", str(self.jobs), "--no-tests=error",
                                "--test-output-size-passed", "65536", "--output-junit", file, *options]) as process:
-            times = ProcessorTime(process.pid, self.commands(options))
+            times = ProcessorTime(process.pid, commands)
             while process.poll() is None:
                 times.look()
                 time.sleep(0.2)
@@ -79,14 +84,24 @@ class Suite:
                 results[name] = {"run": "passed", "disabled": "skipped", "notrun": "skipped"}.get(status, "failed")
         return results
 
-    def commands(self, options):
-        """The command of each test."""
+    def listed(self, options):
+        """Name and command of each test."""
         said = subprocess.run(["ctest", "--test-dir", self.build, "--show-only=json-v1", *options], check=False, capture_output=True, text=True)
         try:
             tests = json.loads(said.stdout)["tests"]
         except ValueError:
-            return {}
-        return {test["name"]: test["command"] for test in tests if "command" in test}
+            return []
+        return [(test["name"], test["command"]) for test in tests if "command" in test]
+
+    def wrongly_listed(self):
+        """Cases of the test programs for which ctest has no test, or two: it keeps what it once found in files."""
+        programs = {}
+        for _, command in self.listed([]):
+            for case in (word.removeprefix(ONE_CASE) for word in command if word.startswith(ONE_CASE)):
+                if not set(case) & set("*?:"):
+                    programs.setdefault(command[0], []).append(case)
+        return sorted(case for program, cases in programs.items() for case in {*cases, *list_cases(program)}
+                      if cases.count(case) != 1)
 
     def print_costly(self):
         """Of all tests to a file, of the first to standard output."""
@@ -155,8 +170,11 @@ def main():
         print(f"skipped: {name}: {skips.reason(name) or 'NOT EXPECTED (tests/skips.txt)'}")
     for name in named["failed"]:
         print(f"FAILED: {name}")
+    wrongly_listed = suite.wrongly_listed()
+    for name in wrongly_listed:
+        print(f"FAILED: {name}: ctest has no test or more than one for it; remove *_tests.cmake in {options.build}")
     suite.print_costly()
-    failed = len(named["failed"]) + len(unexpected) + len(unlisted)
+    failed = len(named["failed"]) + len(unexpected) + len(unlisted) + len(wrongly_listed)
     print(f"{len(results) - failed} passed, {failed} failed; {len(named['skipped'])} skipped, "
           f"{len(named['retried'])} in a second run")
     return 1 if failed else 0
