@@ -76,8 +76,34 @@ start_manager() {
 instance() { plcctl list instances --json | jq -r ".[] | select(.name == \"$1\") | .$2"; }
 task() { plcctl list tasks --json | jq -r ".[] | select(.instance == \"${1%/*}\" and .task == \"${1#*/}\") | .$2"; }
 
-# Says that this story needs another of its rounds, and why (tests/suite.py prints it at the end of the run).
-further_round() { echo "further round: System.$(basename "$0" .sh): $1"; }
+# lost_while INSTANCE/TASK COMMAND...: sets `lost` to the cycles that the task lost meanwhile; it must go on
+lost_while() {
+  local lost_task=$1 lost_before cycles_before
+  shift
+  lost_before=$(task "$lost_task" lost_cycles) cycles_before=$(task "$lost_task" cycles)
+  "$@"
+  has_gone_on() { [ "$(task "$lost_task" cycles)" -ge $((cycles_before + 20)) ]; }
+  until_true 20 has_gone_on
+  lost=$(($(task "$lost_task" lost_cycles) - lost_before))
+}
+
+# costs_no_cycle INSTANCE/TASK COMMAND...: `COMMAND... 1`, `COMMAND... 2` and so on, until the task has lost no cycle meanwhile.
+# A core stands still for other reasons, too: after a round with a loss follows a calm stretch of the same length. If each
+# round loses cycles, and half of the calm stretches do, the losses are the machine's.
+costs_no_cycle() {
+  local of=$1 round rounds=8 began took lost disturbed calm_with_loss=0
+  shift
+  for ((round = 1; round <= rounds; round++)); do
+    began=${EPOCHREALTIME//[.,]/}
+    lost_while "$of" "$@" "$round"
+    [ "$lost" -ne 0 ] || return 0
+    disturbed=$lost took=$((${EPOCHREALTIME//[.,]/} - began))
+    lost_while "$of" sleep "$(printf '%d.%06d' $((took / 1000000)) $((took % 1000000)))"
+    [ "$lost" -eq 0 ] || calm_with_loss=$((calm_with_loss + 1))
+    echo "further round: System.$(basename "$0" .sh): $of lost $disturbed cycles in round $round, and $lost in calm"
+  done
+  [ "$calm_with_loss" -ge $((rounds / 2)) ] || fail "$of lost cycles in each of $rounds rounds, and in $calm_with_loss calm stretches of the same length"
+}
 
 # until_true SECONDS COMMAND...
 # The pause is as long as the look before it: with a sanitizer a look takes a core that the tested programs need.

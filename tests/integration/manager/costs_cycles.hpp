@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <thread>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "shm/base/time.hpp"
+#include "tests/integration/manager/plant.hpp"
+#include "tests/support/further_round.hpp"
+
+namespace plchost {
+
+/// The instance must go on meanwhile.
+inline std::uint64_t lost_while(Plant& plant, const std::string& instance,
+                                const std::function<void()>& during) {
+  const TaskCounters before = plant.counters(instance);
+  during();
+  EXPECT_TRUE(plant.wait_for_cycles(instance));
+  const TaskCounters after = plant.counters(instance);
+  EXPECT_GT(after.cycles, before.cycles);
+  return after.lost_cycles - before.lost_cycles;
+}
+
+/// Whether `disturb` costs `instance` cycles. One round without a loss shows that it does not. A core stands
+/// still for other reasons, too: after a round with a loss follows a calm stretch of the same length. If each
+/// round loses cycles, and half of the calm stretches do, the losses are the machine's.
+inline bool costs_cycles(Plant& plant, const std::string& instance,
+                         const std::function<void(std::uint32_t round)>& disturb) {
+  constexpr std::uint32_t kRounds = 8;
+  std::uint32_t calm_with_loss = 0;
+  for (std::uint32_t round = 1; round <= kRounds; ++round) {
+    const TimePoint began = MonotonicClock::now();
+    const std::uint64_t lost = lost_while(plant, instance, [&] { disturb(round); });
+    if (lost == 0) return false;
+    const Duration time = MonotonicClock::now() - began;
+    const std::uint64_t calm = lost_while(plant, instance, [&] { std::this_thread::sleep_for(time); });
+    if (calm > 0) ++calm_with_loss;
+    say_further_round(
+        fmt::format("{} lost {} cycles in round {}, and {} in calm", instance, lost, round, calm));
+  }
+  return calm_with_loss < kRounds / 2;
+}
+
+}  // namespace plchost
