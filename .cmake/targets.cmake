@@ -14,6 +14,10 @@ function(plchost_headers name)
   add_library(${name} STATIC ${CMAKE_BINARY_DIR}/headers.cpp)
   target_link_libraries(${name} PRIVATE fmt::fmt spdlog::spdlog Threads::Threads)
   plchost_options(${name})
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "Clang")
+    # A compiler cache gives back what was made of an older file with the same text.
+    target_compile_options(${name} PRIVATE "SHELL:-Xclang -fno-pch-timestamp")
+  endif()
   target_precompile_headers(${name} PRIVATE <algorithm> <array> <atomic> <chrono> <expected> <filesystem> <functional>
     <map> <memory> <optional> <string> <string_view> <thread> <utility> <vector> <fmt/format.h> ${ARGN})
 endfunction()
