@@ -19,6 +19,7 @@ struct Plan {
   Duration post_gap = std::chrono::milliseconds(1);
   int starts = 100;                 ///< of a program
   std::uint32_t objects = 100'000;  ///< that are made, opened and closed
+  int hosts = 24;                   ///< of the fleet, beside one of 8
   int task_core = 1;
   int poster_core = 0;
   std::filesystem::path programs;  ///< where plchostd and its helpers are

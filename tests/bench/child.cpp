@@ -39,9 +39,13 @@ Result<Child> Child::start(const std::vector<std::string>& arguments, int output
   return Child(pid);
 }
 
+void Child::ask_to_end() const noexcept {
+  if (pid_ != 0) ::kill(pid_, SIGTERM);
+}
+
 void Child::end() noexcept {
   if (pid_ == 0) return;
-  ::kill(pid_, SIGTERM);
+  ask_to_end();
   ::waitpid(std::exchange(pid_, 0), nullptr, 0);
 }
 

@@ -26,6 +26,9 @@ class Child {
   /// where this process's goes. It runs on all cores that this thread may use.
   [[nodiscard]] static Result<Child> start(const std::vector<std::string>& arguments, int output = -1);
   void end() noexcept;
+  /// Begins its end: several end at the same time if all are asked before the first end().
+  void ask_to_end() const noexcept;
+  [[nodiscard]] pid_t pid() const noexcept { return pid_; }
   /// For its end by itself; system: it failed.
   [[nodiscard]] Result<void> wait();
 

@@ -1,6 +1,8 @@
 #!/usr/bin/env python3
 """The figures of a run of the benchmark as Markdown: figures.py FIGURES.json > figures.md.
 
+figures.py --renew FIGURES.json PART.json > NEW.json: the rows of a run of some parts take the place of those of the same name
+and condition, or come after them. Each row has the conditions of its own run.
 All tables of figures.md come from figures.json by this script. tests/gates/documents.py makes them anew and compares: it sees
 a row that somebody has edited.
 """
@@ -10,7 +12,7 @@ import statistics
 import sys
 
 UNITS = [("_us_per_cycle", "us"), ("_us_per_activation", "us"), ("_us", "us"), ("_ms", "ms"), ("_ns", "ns"),
-         ("_gb_s", "GB/s"), ("_per_second", "per second"), ("_per_million", "per million"), ("_per_cycle", "per cycle"),
+         ("_gb_s", "GB/s"), ("_mib", "MiB"), ("_per_second", "per second"), ("_per_million", "per million"), ("_per_cycle", "per cycle"),
          ("_per_stall", "per stall"), ("_percent", "%"), ("_ppb", "ppb"), ("share_of_core", "share of a core"),
          ("load", "share of a core")]
 # The unit of the last ones stands before a number of tasks or objects.
@@ -139,9 +141,23 @@ def tables(rows):
     return [*lines, "## Notes", "", *notes, ""] if notes else lines
 
 
+def read(path):
+    with open(path, encoding="utf-8") as file:
+        return json.load(file)
+
+
+def renewed(rows, part):
+    """A line for each row, as the benchmark writes them."""
+    newer = {(row["name"], row["condition"]): row for row in part}
+    rows = [newer.pop((row["name"], row["condition"]), row) for row in rows] + list(newer.values())
+    return "[\n" + ",\n".join(json.dumps(row, ensure_ascii=False, separators=(",", ":")) for row in rows) + "\n]"
+
+
 def main():
-    with open(sys.argv[1], encoding="utf-8") as file:
-        rows = json.load(file)
+    if sys.argv[1] == "--renew":
+        print(renewed(read(sys.argv[2]), read(sys.argv[3])))
+        return
+    rows = read(sys.argv[1])
     print("# Figures", "",
           "The measurements, the method, and how to read the figures: [README](README.md). \"-\" says that nothing was measured, or",
           "that there are too few samples: p99 needs 100, p99.9 needs 1,000.", "",

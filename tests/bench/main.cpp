@@ -30,6 +30,7 @@ struct Options {
   bool stress = false;
   int seconds = 60;
   int rounds = 3;
+  int hosts = 0;  // the default of the plan
   std::vector<std::string> only;
 };
 
@@ -41,7 +42,9 @@ bench::Plan make_plan(const Options& options) {
     plan.each = kQuickEach;
     plan.starts = 30;
     plan.objects = 10'000;
+    plan.hosts = 8;
   }
+  if (options.hosts > 0) plan.hosts = options.hosts;
   plan.each /= options.rounds;
   plan.starts = std::max(plan.starts / options.rounds, 1);
   const auto cores = online_cores();
@@ -200,6 +203,8 @@ int main(int argc, char** argv) {
   app.add_option("--rounds", options.rounds, "all parts are measured so often, one after the other")
       ->check(CLI::Range(1, 100))
       ->capture_default_str();
+  app.add_option("--hosts", options.hosts, "of the fleet; 24, or 8 with --quick, if not given")
+      ->check(CLI::Range(1, 200));
   app.add_option("--only", options.only, fmt::format("only these parts: {}", fmt::join(names, ", ")))
       ->check(CLI::IsMember(names))
       ->delimiter(',');

@@ -152,6 +152,12 @@ std::span<const Part> all_parts() noexcept {
            .turns = 0.1,
            .under_stress = false,
            .measure = &measure_start},
+      Part{.name = "fleet",
+           .about = "API servers of many hosts in one DDS domain, and a viewer of all or of one",
+           .picture = {},
+           .turns = 6.0,
+           .under_stress = false,
+           .measure = &measure_fleet},
   };
   return kParts;
 }

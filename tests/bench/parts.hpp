@@ -39,5 +39,6 @@ struct Part {
 [[nodiscard]] Result<std::vector<Row>> measure_pool_deaths(const Plan& plan);
 [[nodiscard]] Result<std::vector<Row>> measure_blocks(const Plan& plan);
 [[nodiscard]] Result<std::vector<Row>> measure_start(const Plan& plan);
+[[nodiscard]] Result<std::vector<Row>> measure_fleet(const Plan& plan);
 
 }  // namespace plchost::bench

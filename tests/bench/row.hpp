@@ -32,8 +32,8 @@ struct Series {
   std::vector<std::pair<double, double>> points;
 };
 
-/// Further figures by name. The end of a name is its unit: _us, _ms, _ns, _gb_s, _per_second, _per_million,
-/// _per_cycle, _percent, _ppb; "share" and "load" are of a core. All others are counts.
+/// Further figures by name. The end of a name is its unit: _us, _ms, _ns, _gb_s, _mib, _per_second,
+/// _per_million, _per_cycle, _percent, _ppb; "share" and "load" are of a core. All others are counts.
 using Extra = std::vector<std::pair<std::string, double>>;
 
 /// The results of one round, of a row that was measured in several.
