@@ -73,7 +73,7 @@ git grep -nE '\bepoch(_|\(\))? [<>]=? ' -- 'api/*.cpp' 'api/*.hpp' ':!api/client
 git grep -nE '\b(sem_timedwait|pthread_(cond|mutex|rwlock)_timed[a-z]+|pthread_timedjoin_np)\(|SYS_futex,.*FUTEX_LOCK_PI,|(timerfd_create|clock_nanosleep|timer_create)\(CLOCK_REALTIME' \
   -- "${sources[@]}" && fault "the lines above wait by a clock that can be set" || true
 # A killed test's files in /dev/shm can only be removed by the next one if it knows the name.
-git grep -nE 'to_string\(::getpid\(\)|"[^"(]*\{\}[^"]*", *::getpid\(\)' -- tests ':!tests/support/own_name.hpp' | grep -v HasSubstr &&
+git grep -nE 'to_string\(::getpid\(\)|"[^"(]*\{\}[^"]*", *::getpid\(\)' -- tests ':!tests/support/own_name.hpp' | grep -vE 'HasSubstr|"/proc/' &&
   fault "the lines above make names that nobody clears away: use own_name() or own_path()" || true
 # A question, or a word that is mistyped, starts no run of hours.
 for script in "tests/run.sh --help" "tests/run.sh --nonsense" "tests/bench/run.sh --help"; do

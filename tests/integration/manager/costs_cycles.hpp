@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <string_view>
 #include <thread>
 
 #include <fmt/format.h>
@@ -29,7 +30,8 @@ inline std::uint64_t lost_while(Plant& plant, const std::string& instance,
 /// still for other reasons, too: after a round with a loss follows a calm stretch of the same length. If each
 /// round loses cycles, and half of the calm stretches do, the losses are the machine's.
 inline bool costs_cycles(Plant& plant, const std::string& instance,
-                         const std::function<void(std::uint32_t round)>& disturb) {
+                         const std::function<void(std::uint32_t round)>& disturb,
+                         const std::function<void(std::string_view)>& say = say_further_round) {
   constexpr std::uint32_t kRounds = 8;
   std::uint32_t calm_with_loss = 0;
   for (std::uint32_t round = 1; round <= kRounds; ++round) {
@@ -39,8 +41,7 @@ inline bool costs_cycles(Plant& plant, const std::string& instance,
     const Duration time = MonotonicClock::now() - began;
     const std::uint64_t calm = lost_while(plant, instance, [&] { std::this_thread::sleep_for(time); });
     if (calm > 0) ++calm_with_loss;
-    say_further_round(
-        fmt::format("{} lost {} cycles in round {}, and {} in calm", instance, lost, round, calm));
+    say(fmt::format("{} lost {} cycles in round {}, and {} in calm", instance, lost, round, calm));
   }
   return calm_with_loss < kRounds / 2;
 }

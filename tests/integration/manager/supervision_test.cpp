@@ -4,7 +4,9 @@
 #include <stop_token>
 #include <string>
 #include <thread>
+#include <vector>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include "manager/api_server.hpp"
@@ -48,6 +50,24 @@ TEST(Manager, StartsInOrderAndLeavesNothingBehindWhenItIsStopped) {
   EXPECT_TRUE(plant.wait_for_cycles("drive1"));
   EXPECT_EQ(plant.stop_manager().describe(), "exit code 0");
   EXPECT_THAT(plant.leftovers(), IsEmpty());
+}
+
+// The measure of the tests below sees a disturbance.
+TEST(CostsCycles, OfAnInstanceThatIsHeldUp) {
+  Plant plant;
+  plant.add("drive1", "drive_axis");
+  plant.start_manager();
+  ASSERT_TRUE(plant.wait_for("drive1", InstanceState::running));
+  const int pid = plant.status("drive1").pid;
+  const auto hold_up = [&](std::uint32_t) {
+    ASSERT_EQ(::kill(pid, SIGSTOP), 0);
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    ASSERT_EQ(::kill(pid, SIGCONT), 0);
+  };
+  std::vector<std::string> said;
+  EXPECT_TRUE(costs_cycles(plant, "drive1", hold_up, [&](std::string_view round) {
+    said.emplace_back(round);
+  })) << fmt::format("{}", fmt::join(said, "\n"));
 }
 
 TEST(Manager, BringsAKilledInstanceBackWhileTheOthersGoOn) {
