@@ -160,7 +160,8 @@ class ControlClient {
   [[nodiscard]] Result<PostReport> post_batch(const std::string& host, std::span<const EventId> events,
                                               Duration patience);
 
-  /// One post with the least latency: one dds_write, not repeated, not waited for. prepare_posts() first.
+  /// One post with the least latency: one dds_write, not repeated, not waited for. prepare_posts() first. It
+  /// needs no credit of the host, as nothing is kept to be repeated. timed_out: DDS had no room within 20 ms.
   [[nodiscard]] Result<void> post_one(const std::string& host, std::string_view instance,
                                       std::string_view event);
 

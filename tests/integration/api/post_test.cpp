@@ -1,5 +1,6 @@
 #include <thread>
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include "api/client/control_client.hpp"
@@ -164,6 +165,32 @@ TEST(RemotePost, WithoutAcknowledgementReachesTheEvent) {
 
   while (event.counted().count() < 101) std::this_thread::sleep_for(milliseconds(1));
   EXPECT_EQ(event.counted().count(), 101U);
+}
+
+// It has no credits, as it is not repeated: DDS bounds what is under way.
+TEST(RemotePost, WithoutAcknowledgementFailsWhenTheHostTakesNoMore) {
+  const OwnDomain domain;
+  TestHost host(domain, "hosta");
+  host.add_event("line1", "ready");
+  host.start_server();
+  const auto sut = connect(domain);
+  ASSERT_TRUE(sut->prepare_posts("hosta", soon()));
+  ASSERT_TRUE(sut->post_event({"hosta", "line1", "ready"}, 1, Duration::zero(), kPatience));
+
+  host.server().signal(SIGSTOP);
+  constexpr int kFarTooMany = 100'000;
+  int posted = 0;
+  Result<void> last;
+  while (posted < kFarTooMany && (last = sut->post_one("hosta", "line1", "ready"))) ++posted;
+  host.server().signal(SIGCONT);
+
+  fmt::print("{} posts were under way\n", posted);
+  EXPECT_GT(posted, 64) << "the credits of a source";
+  ASSERT_LT(posted, kFarTooMany);
+  EXPECT_EQ(last.error().code, ErrorCode::timed_out);
+  const auto report = sut->post_event({"hosta", "line1", "ready"}, 1, Duration::zero(), kPatience);
+  ASSERT_TRUE(report) << report.error().describe();
+  EXPECT_EQ(report->accepted, 1U);
 }
 
 TEST(RemotePost, ThatNobodyWaitsForIsAcknowledgedNevertheless) {
