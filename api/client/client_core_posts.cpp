@@ -35,7 +35,7 @@ Async<std::unique_ptr<Turns::Turn>> ClientCore::turn_to_post(std::string host, T
   auto turn = std::make_unique<Turns::Turn>(posting_[host], *pump_);
   while (!turn->has_come()) {
     if (MonotonicClock::now() >= deadline) co_return nullptr;
-    co_await pump_->change(deadline);
+    co_await turn->come(deadline);
   }
   co_return turn;
 }

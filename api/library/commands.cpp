@@ -92,9 +92,9 @@ struct Sending {
 Async<Result<ApiReply>> send(CallOrder& order, ClientCore& core, Sending sending) {
   PLCHOST_CO_TRY_ASSIGN(const auto contents, read_application(sending.file));
   PLCHOST_CO_TRY_ASSIGN(auto place, co_await order.place(core, sending.host));
-  const Turns::Turn turn(order.downloads(place.host), core.pump());
+  Turns::Turn turn(order.downloads(place.host), core.pump());
   place.let_others_go();
-  while (!turn.has_come()) co_await core.pump().change(kNoDeadline);
+  while (!turn.has_come()) co_await turn.come();
   const Download download{.host = place.host,
                           .instance = sending.instance,
                           .name = std::filesystem::path(sending.file).filename().string(),

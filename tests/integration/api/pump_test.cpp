@@ -44,9 +44,15 @@ class ClientPump : public testing::Test {
     throw std::runtime_error("thrown");
   }
   Async<Result<std::string>> take_turn(Turns& turns, std::string text) {
-    const Turns::Turn turn(turns, sut_);
-    while (!turn.has_come()) co_await sut_.change(kNoDeadline);
+    Turns::Turn turn(turns, sut_);
+    while (!turn.has_come()) co_await turn.come();
     co_return co_await wait_for(text);
+  }
+  /// Whether it has come at the deadline.
+  Async<bool> take_turn_until(Turns& turns, TimePoint deadline) {
+    Turns::Turn turn(turns, sut_);
+    while (!turn.has_come() && MonotonicClock::now() < deadline) co_await turn.come(deadline);
+    co_return turn.has_come();
   }
   Async<Result<std::string>> complete_within(std::string outer, std::string inner) {
     PLCHOST_CO_TRY(co_await wait_for(outer));
@@ -160,8 +166,64 @@ TEST_F(ClientPump, GivesTurnsInTheOrderInWhichTheyWereAskedFor) {
   EXPECT_FALSE(third.done()) << "it is not its turn";
   round({"first"});
   EXPECT_TRUE(first.done());
-  sut_.round(soon());  // by itself: a turn was given back
+  EXPECT_TRUE(third.done()) << "in the same round: a turn was given back";
+}
+
+TEST_F(ClientPump, DoesNotLookAtCallsWhoseTurnHasNotCome) {
+  Turns turns;
+  std::vector<Async<Result<std::string>>> calls;
+  for (int i = 0; i < 100; ++i) {
+    calls.push_back(take_turn(turns, "all"));
+    calls.back().start();
+  }
+  round();
+  round({"all"});
+  EXPECT_TRUE(calls.back().done());
+  EXPECT_THAT(several_, ElementsAre(false, false)) << "only one of them waits for DDS";
+}
+
+TEST_F(ClientPump, LetsATurnThatIsGivenBackOutsideOfARoundComeInTheNext) {
+  Turns turns;
+  auto first = take_turn(turns, "first");
+  auto second = take_turn(turns, "second");
+  come_ = {"second"};
+  first.start();
+  second.start();
+  first = {};
+  EXPECT_FALSE(second.done());
+  sut_.round(soon());
+  EXPECT_TRUE(second.done());
+  EXPECT_EQ(several_.size(), 1U) << "a round always takes";
+}
+
+TEST_F(ClientPump, EndsTheWaitForATurnAtItsDeadline) {
+  Turns turns;
+  auto first = take_turn(turns, "first");
+  first.start();
+  const TimePoint end = MonotonicClock::now() + std::chrono::milliseconds(20);
+  EXPECT_FALSE(sut_.complete(take_turn_until(turns, end)));
+  EXPECT_GE(MonotonicClock::now(), end);
+  auto third = take_turn_until(turns, kNoDeadline);
+  third.start();
+  round({"first"});
+  EXPECT_TRUE(first.done());
+  ASSERT_TRUE(third.done()) << "the second one has left the line";
+  EXPECT_TRUE(third.take());
+}
+
+TEST_F(ClientPump, ForgetsACallThatIsGivenUpWhenItsTurnHasJustCome) {
+  Turns turns;
+  auto first = take_turn(turns, "first");
+  auto second = take_turn(turns, "second");
+  auto third = take_turn(turns, "third");
+  first.start();
+  second.start();
+  third.start();
+  first = {};   // the second one's turn has come
+  second = {};  // before it went on
+  round({"third"});
   EXPECT_TRUE(third.done());
+  EXPECT_THAT(log_, ElementsAre("third"));
 }
 
 TEST(ClientInbox, KeepsAnswersOnlyToWhatIsAsked) {
