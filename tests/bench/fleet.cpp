@@ -1,5 +1,5 @@
-// API servers in one DDS domain, each on a host of its own without instances, and a viewer at a desk: the
-// time until it has seen all of them, the time of commands, and in rest memory, traffic and processor time.
+// API servers in one DDS domain, each on a host of its own without instances, and a viewer at a desk. The
+// time until it has seen all of them, and of commands. In rest memory, traffic and processor time.
 
 #include <algorithm>
 #include <charconv>

@@ -8,7 +8,7 @@
 
 namespace plchost::bench {
 
-/// What a network interface has carried since it was made. An Ethernet frame counts as a datagram, so a
+/// The traffic of a network interface since it was made. An Ethernet frame counts as a datagram, so a
 /// longer datagram counts once for each of its fragments.
 struct Traffic {
   double received_bytes = 0;
