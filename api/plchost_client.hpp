@@ -21,9 +21,11 @@
 //
 // All functions may be called from any thread; none is for real-time threads. The calls of one Client to one
 // host are done one after the other, in the order in which they were made. Those to other hosts go on at the
-// same time. A download and post_and_wait() hold up none. A callback runs on a thread of the library and may
-// use the Client; other callbacks wait meanwhile. It must not throw: the program would end. All Clients of a
-// process for one domain share a DDS participant, so they have the same options for DDS.
+// same time. While it is not known which host answers a call that names none, later calls wait. A download
+// and post_and_wait() hold up none. A callback, also one that tells the progress of a download, runs on a
+// thread of the library and may use the Client. The other callbacks of calls wait meanwhile. It must not
+// throw: the program would end. All Clients of a process for one domain share a DDS participant, so they have
+// the same options for DDS.
 // In a child of fork() a Client of the parent throws `unavailable`: make another one.
 #ifndef PLCHOST_CLIENT_HPP
 #define PLCHOST_CLIENT_HPP
@@ -259,7 +261,8 @@ class PLCHOST_CLIENT_API Client {
   /// take. ClientError: a post was rejected; timed_out: of some nothing is known.
   Posted post(const std::string& host, const std::string& event, unsigned long long count = 1);
   /// The same; returns at once. `done` is called once. At most 1024 calls may be under way:
-  /// for one more, `done` is called with full (11) before this returns.
+  /// for one more, `done` is called with full (11) before this returns. A call whose `done` is called is none
+  /// of them any more.
   void post(const std::string& host, const std::string& event, std::function<void(const Outcome&)> done);
   /// Posts several events, at most 64, at once: all of them, or none.
   Posted post_all(const std::string& host, const std::vector<std::string>& events);
@@ -285,6 +288,7 @@ class PLCHOST_CLIENT_API Client {
   /// server of the host ends meanwhile. The timeout is for the host to begin; then the call takes as long as
   /// the file needs, and ends when nothing has moved for 10 s. `progress` is told how many bytes have
   /// arrived, on a thread of the library; from the beginning again if the server had to be started again.
+  /// If other callbacks run meanwhile, it is told the newest number after them.
   std::string download_application(const std::string& host, const std::string& instance,
                                    const std::string& file, const LoadOptions& options = {},
                                    const Progress& progress = {});

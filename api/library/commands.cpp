@@ -142,7 +142,9 @@ void Client::command(const std::string& operation, const std::string& host, cons
 std::string Client::download_application(const std::string& host, const std::string& instance,
                                          const std::string& file, const LoadOptions& options,
                                          const Progress& progress) {
-  const Sending sending{host, instance, file, options, progress};
+  // A callback that waits for its own download is told its progress meanwhile.
+  const Sending sending{host, instance, file, options,
+                        worker_->is_here() ? progress : worker_->in_turn(progress)};
   return text_or_throw(outcome_of(
       worker_->run<ApiReply>([&](ClientCore& core) { return send(worker_->order(), core, sending); })));
 }
@@ -152,7 +154,7 @@ void Client::download_application(const std::string& host, const std::string& in
                                   const Progress& progress, std::function<void(const Outcome&)> done) {
   check_callback(static_cast<bool>(done));
   worker_->begin<ApiReply>(
-      [this, sending = Sending{host, instance, file, options, progress}](ClientCore& core) {
+      [this, sending = Sending{host, instance, file, options, worker_->in_turn(progress)}](ClientCore& core) {
         return send(worker_->order(), core, sending);
       },
       [done = std::move(done)](const Result<ApiReply>& reply) { done(outcome_of(reply)); });

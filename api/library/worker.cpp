@@ -56,8 +56,7 @@ void Client::Worker::wake() {
 }
 
 void Client::Worker::begin(Job job) {
-  const auto refuse = [&](std::unexpected<Error> why) { job(why).start(); };
-  if (const auto ours = maker_.check(); !ours) return refuse(std::unexpected(ours.error()));
+  if (const auto ours = maker_.check(); !ours) return job.fail(ours.error());
   bool ending = false;
   {
     const std::lock_guard lock(mutex_);
@@ -68,7 +67,7 @@ void Client::Worker::begin(Job job) {
       return wake();
     }
   }
-  refuse(ending ? client_has_ended() : too_many(kMaxCalls));
+  job.fail((ending ? client_has_ended() : too_many(kMaxCalls)).error());
 }
 
 void Client::Worker::check_watched(const std::string& host) const {
@@ -87,34 +86,77 @@ Result<ControlClient*> Client::Worker::connect() {
   return client;
 }
 
-// A call may end, and be told, within this.
-bool Client::Worker::begin_next() {
-  Job job;
+bool Client::Worker::has_jobs() {
+  const std::lock_guard lock(mutex_);
+  return !jobs_.empty();
+}
+
+void Client::Worker::free_place() {
+  const std::lock_guard lock(mutex_);
+  --calls_;
+}
+
+Client::Progress Client::Worker::in_turn(Progress progress) {
+  if (!progress) return progress;
+  struct State {
+    Progress progress;
+    unsigned long long bytes = 0;
+    bool waits = false;
+  };
+  return [this, state = std::make_shared<State>(std::move(progress))](unsigned long long bytes) {
+    state->bytes = bytes;
+    if (std::exchange(state->waits, true)) return;
+    to_tell_.emplace_back([state] {
+      state->waits = false;
+      state->progress(state->bytes);
+    });
+  };
+}
+
+void Client::Worker::begin_all() {
+  std::deque<Job> jobs;
   {
     const std::lock_guard lock(mutex_);
-    if (jobs_.empty()) return false;
-    job = std::move(jobs_.front());
-    jobs_.pop_front();
+    jobs.swap(jobs_);
   }
-  const auto client = is_ending() ? Result<ControlClient*>(client_has_ended()) : connect();
-  under_way_.push_back(job(client));
-  under_way_.back().start();
-  return true;
+  for (Job& job : jobs) {
+    const auto client = is_ending() ? Result<ControlClient*>(client_has_ended()) : connect();
+    if (client) {
+      job.start((*client)->core());
+      continue;
+    }
+    to_tell_.emplace_back([this, fail = std::move(job.fail), error = client.error()] {
+      free_place();
+      fail(error);
+    });
+  }
+  forget_ended();
+}
+
+// Those that come meanwhile wait until the calls under way have gone on.
+void Client::Worker::tell_all() {
+  for (auto& tell : std::exchange(to_tell_, {})) tell();
+}
+
+void Client::Worker::forget_ended() {
+  for (const auto call : std::exchange(over_, {})) {
+    (void)call->take();  // an exception of it ends the program
+    under_way_.erase(call);
+  }
+}
+
+void Client::Worker::round(TimePoint deadline) {
+  client_->core().pump().round(deadline);
+  forget_ended();
 }
 
 bool Client::Worker::step() {
-  while (begin_next()) {
-  }
-  const std::size_t over = std::erase_if(under_way_, [](auto& call) {
-    if (call.done()) (void)call.take();  // the exception of a callback ends the program
-    return call.done();
-  });
-  {
-    const std::lock_guard lock(mutex_);
-    calls_ -= over;
-  }
-  if (under_way_.empty()) return false;
-  client_->core().pump().round(TimePoint::max());
+  begin_all();
+  tell_all();
+  if (under_way_.empty()) return !to_tell_.empty();
+  // A callback that waited for a call may have taken the wake-up of another one.
+  const bool has_more = !to_tell_.empty() || has_jobs();
+  round(has_more ? TimePoint{} : TimePoint::max());
   return true;
 }
 

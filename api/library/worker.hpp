@@ -11,6 +11,7 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "api/client/async.hpp"
 #include "api/library/call_order.hpp"
@@ -48,47 +49,64 @@ class __attribute__((visibility("hidden"))) Client::Worker {
   using Done = std::function<void(Result<T>)>;
 
   /// `done` is told later, or, if there are too many calls (full) or the client has ended, within this call.
+  /// The call has freed its place then. All that is told is told one after the other.
   template <class T>
   void begin(Call<T> call, Done<T> done) {
-    begin([this, call = std::move(call), done = std::move(done)](const Result<ControlClient*>& client) {
-      return client ? tell<T>((*client)->core().pump(), call((*client)->core()), done)
-                    : fail<T>(client.error(), done);
-    });
+    begin({.start =
+               [this, call = std::move(call), done](ClientCore& core) {
+                 const auto here = under_way_.emplace(under_way_.end());
+                 *here = see_to_end<T>(call(core), done, here);
+                 here->start();
+               },
+           .fail = [done](Error error) { done(std::unexpected(std::move(error))); }});
   }
-  /// Waits for it. From a callback, other calls go on meanwhile.
+  /// Waits for it. From a callback, other calls go on meanwhile, and what they tell waits.
   template <class T>
   [[nodiscard]] Result<T> run(const Call<T>& call) {
-    if (std::this_thread::get_id() == thread_.get_id()) return run_here(call);
+    if (is_here()) return run_here(call);
     std::promise<Result<T>> promise;
     begin<T>(call, [&](Result<T> result) { promise.set_value(std::move(result)); });
     return promise.get_future().get();
   }
 
+  /// Whether this is the thread of the callbacks.
+  [[nodiscard]] bool is_here() const noexcept { return std::this_thread::get_id() == thread_.get_id(); }
+  /// Tells `progress` in its turn among all that is told: the newest number of bytes then.
+  [[nodiscard]] Progress in_turn(Progress progress);
+
  private:
   struct Over {};
-  using Job = std::function<Async<Over>(const Result<ControlClient*>&)>;
-  // A callback that waits for a call lets others go on, but no other callback is told within it.
+  using UnderWay = std::list<Async<Over>>;
+  struct Job {
+    std::function<void(ClientCore&)> start;
+    std::function<void(Error)> fail;
+  };
+  /// Notes that a call is over, however it ends.
+  struct Ending {
+    std::vector<UnderWay::iterator>& over;
+    UnderWay::iterator here;
+    ~Ending() { over.push_back(here); }
+  };
   template <class T>
-  Async<Over> tell(Pump& pump, Async<Result<T>> call, Done<T> done) {
+  Async<Over> see_to_end(Async<Result<T>> call, Done<T> done, UnderWay::iterator here) {
+    const Ending ending{over_, here};
     auto result = co_await call;
-    while (telling_) co_await pump.change(kNoDeadline);
-    telling_ = true;
-    done(std::move(result));
-    telling_ = false;
-    pump.look_again();
-    co_return Over();
-  }
-  template <class T>
-  static Async<Over> fail(Error error, Done<T> done) {
-    done(std::unexpected(std::move(error)));
+    to_tell_.push_back([this, done = std::move(done), result = std::move(result)]() mutable {
+      free_place();
+      done(std::move(result));
+    });
     co_return Over();
   }
   template <class T>
   [[nodiscard]] Result<T> run_here(const Call<T>& call) {
     PLCHOST_TRY_ASSIGN(ControlClient* const client, connect());
+    begin_all();  // the callback may have begun calls before this one
     Async<Result<T>> own = call(client->core());
     own.start();
-    while (!own.done()) step();
+    while (!own.done()) {
+      round(TimePoint::max());
+      begin_all();
+    }
     return own.take();
   }
 
@@ -98,9 +116,15 @@ class __attribute__((visibility("hidden"))) Client::Worker {
   void work();
   [[nodiscard]] Result<ControlClient*> connect();
   [[nodiscard]] bool is_ending();
-  /// Begins the calls that have come, and goes on with those that are under way. False: there are none.
+  [[nodiscard]] bool has_jobs();
+  void free_place();
+  /// Begins the calls that have come, tells what is to be told, and goes on with the calls that are under
+  /// way. False: there was nothing of these.
   bool step();
-  bool begin_next();
+  void begin_all();
+  void tell_all();
+  void round(TimePoint deadline);
+  void forget_ended();
 
   MakerProcess maker_;
   Connection connection_;
@@ -109,11 +133,13 @@ class __attribute__((visibility("hidden"))) Client::Worker {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<Job> jobs_;             // not begun
-  std::size_t calls_ = 0;            // those and the ones under way
+  std::size_t calls_ = 0;            // that have come and are not told
   ControlClient* client_ = nullptr;  // that of the connection, once it is there
   bool ending_ = false;
-  bool telling_ = false;  // a callback runs; of the thread
-  std::list<Async<Over>> under_way_;
+  // Of the thread.
+  std::deque<std::function<void()>> to_tell_;  // callbacks
+  std::vector<UnderWay::iterator> over_;       // of those under way
+  UnderWay under_way_;
   std::thread thread_;
 };
 

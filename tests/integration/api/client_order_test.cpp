@@ -1,7 +1,11 @@
 // The order of the calls of a client, and of its callbacks.
+#include <algorithm>
 #include <atomic>
+#include <fstream>
+#include <future>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -12,14 +16,25 @@
 namespace plchost {
 namespace {
 
+constexpr unsigned kMostCalls = 1024;
+
 class ClientOrder : public ClientLibrary {
  protected:
-  ClientOrder() { host_.answer_with({0, ErrorCode::ok, "done"}); }
+  ClientOrder() {
+    host_.answer_with({0, ErrorCode::ok, "done"});
+    std::ofstream(file_) << std::string(100'000, 'x');
+  }
+  [[nodiscard]] bool has_come(ControlVerb verb) {
+    const auto requests = host_.requests();
+    return std::ranges::find(requests, verb, &ControlRequest::verb) != requests.end();
+  }
   [[nodiscard]] std::vector<std::string> arguments() {
     std::vector<std::string> all;
     for (const ControlRequest& request : host_.requests()) all.push_back(request.argument);
     return all;
   }
+
+  const std::string file_ = host_.run_directory() + "/sent.so";
 };
 
 // Whether there is only one host is known later than that there is this one.
@@ -73,6 +88,101 @@ TEST_F(ClientOrder, DoesNotAddUpTheTimeoutsOfCallsToAHostThatDoesNotCome) {
   while (told < kCalls && MonotonicClock::now() < end)
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   EXPECT_EQ(not_found, kCalls);
+}
+
+TEST_F(ClientOrder, IsKeptByACallbackThatWaitsForItsLastCall) {
+  Client sut(options());
+  std::promise<void> ended;
+  sut.post("hosta", "line1/ready", [&](const Client::Outcome&) {
+    sut.command("reset statistics", "hosta", "line1", "First", [](const Client::Outcome&) {});
+    (void)sut.command("reset statistics", "hosta", "line1", "Second");
+    ended.set_value();
+  });
+  ended.get_future().wait();
+  EXPECT_THAT(arguments(), testing::ElementsAre("First", "Second"));
+}
+
+TEST_F(ClientOrder, OfCallbacksIsOneAfterTheOtherAlsoWhenAProgressWaits) {
+  std::atomic<bool> inside{false};
+  std::atomic<int> nested{0};
+  std::promise<void> told;
+  Client sut(options());
+  const auto progress = [&, first = true](unsigned long long /*bytes*/) mutable {
+    inside = true;
+    if (std::exchange(first, false)) {
+      sut.post("hosta", "line1/ready", [&](const Client::Outcome&) {
+        nested += inside ? 1 : 0;
+        told.set_value();
+      });
+    }
+    while (event_.counted().count() == 0) (void)sut.start("hosta", "line1");
+    (void)sut.start("hosta", "line1");  // the post has ended by now
+    inside = false;
+  };
+  (void)sut.download_application("hosta", "line1", file_, {}, progress);
+  told.get_future().wait();
+  EXPECT_EQ(nested, 0);
+}
+
+TEST_F(ClientOrder, OfCallbacksIsOneAfterTheOtherAlsoWhenADownloadGoesOn) {
+  std::atomic<bool> inside{false};
+  std::atomic<int> nested{0};
+  std::atomic<unsigned long long> received{0};
+  std::promise<void> told;
+  Client sut(options());
+  sut.post("hosta", "line1/ready", [&](const Client::Outcome&) {
+    inside = true;
+    const auto progress = [&](unsigned long long bytes) {
+      nested += inside ? 1 : 0;
+      received = bytes;
+    };
+    sut.download_application("hosta", "line1", file_, {}, progress,
+                             [&](const Client::Outcome&) { told.set_value(); });
+    while (!has_come(ControlVerb::download_application)) (void)sut.start("hosta", "line1");
+    inside = false;
+  });
+  told.get_future().wait();
+  EXPECT_EQ(nested, 0);
+  EXPECT_EQ(received, 100'000U) << "the last one is told before the end";
+}
+
+TEST_F(ClientOrder, TellsACallbackTheProgressOfItsOwnDownload) {
+  std::promise<unsigned long long> told;
+  Client sut(options());
+  sut.post("hosta", "line1/ready", [&](const Client::Outcome&) {
+    unsigned long long received = 0;
+    (void)sut.download_application("hosta", "line1", file_, {},
+                                   [&](unsigned long long bytes) { received = bytes; });
+    told.set_value(received);
+  });
+  EXPECT_EQ(told.get_future().get(), 100'000U);
+}
+
+TEST_F(ClientOrder, LetsACallThatHasEndedBeginAnotherWhileAsManyAsMayBeAreUnderWay) {
+  std::atomic<unsigned> refused{0};
+  std::atomic<unsigned> told{0};
+  {
+    Client sut(options());
+    std::promise<void> all_begun;
+    const auto last = [&](const Client::Outcome& outcome) {
+      refused += outcome.code == static_cast<int>(ErrorCode::full) ? 1 : 0;
+      ++told;
+    };
+    const auto begin_last = [&](const Client::Outcome& outcome) {
+      EXPECT_TRUE(outcome) << outcome.text;
+      sut.post("hosta", "line1/ready", last);
+    };
+    sut.post("hosta", "line1/ready",
+             [&, begun = all_begun.get_future().share()](const Client::Outcome& outcome) {
+               begun.wait();
+               begin_last(outcome);
+             });
+    for (unsigned i = 1; i < kMostCalls; ++i) sut.post("hosta", "line1/ready", begin_last);
+    all_begun.set_value();
+    while (told < kMostCalls) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  EXPECT_EQ(refused, 0U);
+  EXPECT_EQ(event_.counted().count(), 2U * kMostCalls);
 }
 
 }  // namespace
