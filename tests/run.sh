@@ -129,9 +129,6 @@ build_sanitized() { # build_sanitized DIR SANITIZERS TARGET OPTIONS...
     cmake --build "$dir" -j "$jobs" --target "$target"
 }
 build_asan() { build_sanitized .build/asan "address;undefined" all; }
-# Not by the thread sanitizer, which looks into one process: tests that kill others, and long ones with one thread.
-killing='*PoolCrash*:*BlockCrash*:*ClientDeath*:RobustMutexTest.Killed*:*Settings.ReadsAsMany*:*HoldsAHundredThousand*:*EachFlippedBit*'
-killing+=':*WishFolderTest.IsMadeAndHeld*:*ReadsNothingBehindTheEnd*:*StaysWithinItsBounds*:*TheSecurityFolder*:*AnIdentity*'
 build_tsan() { build_sanitized .build/tsan thread plchost_tests -DPLCHOST_INTEGRATION=OFF; }
 gates() { tests/gates/layers.sh && tests/gates/house.sh && tests/gates/format.sh && tests/gates/contract.sh && tests/gates/pictures.py && tests/gates/documents.py && tests/gates/prose.py && tests/gates/prove.sh; }
 
@@ -205,7 +202,7 @@ case "${1:-}" in
     count
     # Without the processes: Debian's Cyclone is not compiled for it, and reports from real-time threads stand still.
     join build_tsan "thread sanitizer: build"
-    GTEST_FILTER=-$killing run "thread sanitizer: tests" tests .build/tsan "${whole[@]}"
+    run "thread sanitizer: tests" tests .build/tsan "${whole[@]}"
     count
     join tidy "clang-tidy"
     join build_fuzzers "fuzzers: build"

@@ -26,6 +26,7 @@ OUTPUT_LINES = 40  # of a failed case, repeated at the end
 # A test that measures time may have rounds of its own. It says so in its output at each round after the first.
 FURTHER_ROUND = re.compile(r"^further round: (\S+): (.*)$", re.MULTILINE)
 ONE_CASE = "--gtest_filter="
+PROGRAM = re.compile(r"TEST_EXECUTABLE \[==\[(.*?)\]==\]")  # in what gtest_discover_tests writes
 COSTLY = 20  # tests named with their processor time
 HERE = pathlib.Path(__file__).resolve().parent
 
@@ -96,12 +97,22 @@ class Suite:
     def wrongly_listed(self):
         """Cases of the test programs for which ctest has no test, or two: it keeps what it once found in files."""
         programs = {}
+        for file in self.build.rglob("*_include.cmake"):
+            for program in PROGRAM.findall(file.read_text(encoding="utf-8")):
+                programs[program] = []
         for _, command in self.listed([]):
             for case in (word.removeprefix(ONE_CASE) for word in command if word.startswith(ONE_CASE)):
                 if not set(case) & set("*?:"):
                     programs.setdefault(command[0], []).append(case)
-        return sorted(case for program, cases in programs.items() for case in {*cases, *list_cases(program)}
-                      if cases.count(case) != 1)
+        wrong = []
+        for program, cases in programs.items():
+            try:
+                there = set(list_cases(program))
+            except (OSError, subprocess.SubprocessError) as error:
+                wrong.append(f"{program} ({error})")
+                continue
+            wrong += [case for case in {*cases, *there} if cases.count(case) != 1 or case not in there]
+        return sorted(wrong)
 
     def print_costly(self):
         """Of all tests to a file, of the first to standard output."""
@@ -140,6 +151,16 @@ def end_of(output):
     return failed if any(line.startswith("[ RUN ") for line in lines) else shortened(lines)
 
 
+def skipped(names, skips):
+    """Each test and its reason; those of one suite that are not run are one line."""
+    lines = {}
+    for name in names:
+        reason = skips.reason(name) or "NOT EXPECTED (tests/skips.txt)"
+        suite = name.split(".")[0] if reason.startswith("not run:") else name
+        lines.setdefault((suite, reason), []).append(name)
+    return [(cases[0] if len(cases) == 1 else f"{suite}, {len(cases)} cases", reason) for (suite, reason), cases in lines.items()]
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--jobs", type=int, default=4)
@@ -166,13 +187,13 @@ def main():
     unlisted = [name for name, _ in suite.rounds if retries.reason(name, "rounds") is None]
     for name, what in suite.rounds:
         print(f"further round: {name}: {what}: {retries.reason(name, 'rounds') or 'NOT EXPECTED (tests/retries.txt)'}")
-    for name in named["skipped"]:
-        print(f"skipped: {name}: {skips.reason(name) or 'NOT EXPECTED (tests/skips.txt)'}")
+    for name, reason in skipped(named["skipped"], skips):
+        print(f"skipped: {name}: {reason}")
     for name in named["failed"]:
         print(f"FAILED: {name}")
     wrongly_listed = suite.wrongly_listed()
     for name in wrongly_listed:
-        print(f"FAILED: {name}: ctest has no test or more than one for it; remove *_tests.cmake in {options.build}")
+        print(f"FAILED: {name}: ctest has not exactly one test for it; remove *_tests.cmake in {options.build}")
     suite.print_costly()
     failed = len(named["failed"]) + len(unexpected) + len(unlisted) + len(wrongly_listed)
     print(f"{len(results) - failed} passed, {failed} failed; {len(named['skipped'])} skipped, "

@@ -66,6 +66,7 @@ class CallOrder {
 
   /// No turn comes any more.
   void end() noexcept { ended_.store(true); }
+  [[nodiscard]] bool has_ended() const noexcept { return ended_.load(); }
 
  private:
   using Line = std::map<std::uint64_t, Turn*>;  // by number

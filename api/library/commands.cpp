@@ -95,6 +95,7 @@ Async<Result<ApiReply>> send(CallOrder& order, ClientCore& core, Sending sending
   Turns::Turn turn(order.downloads(place.host), core.pump());
   place.let_others_go();
   while (!turn.has_come()) co_await turn.come();
+  if (order.has_ended()) co_return client_has_ended();
   const Download download{.host = place.host,
                           .instance = sending.instance,
                           .name = std::filesystem::path(sending.file).filename().string(),
@@ -145,8 +146,8 @@ std::string Client::download_application(const std::string& host, const std::str
   // A callback that waits for its own download is told its progress meanwhile.
   const Sending sending{host, instance, file, options,
                         worker_->is_here() ? progress : worker_->in_turn(progress)};
-  return text_or_throw(outcome_of(
-      worker_->run<ApiReply>([&](ClientCore& core) { return send(worker_->order(), core, sending); })));
+  return text_or_throw(outcome_of(worker_->run<ApiReply>(
+      [&](ClientCore& core) { return send(worker_->order(), core, sending); }, Worker::Telling::in_turn)));
 }
 
 void Client::download_application(const std::string& host, const std::string& instance,

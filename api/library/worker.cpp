@@ -125,12 +125,17 @@ void Client::Worker::begin_all() {
       job.start((*client)->core());
       continue;
     }
-    to_tell_.emplace_back([this, fail = std::move(job.fail), error = client.error()] {
+    tell(job.telling, [this, fail = std::move(job.fail), error = client.error()] {
       free_place();
       fail(error);
     });
   }
   forget_ended();
+}
+
+void Client::Worker::tell(Telling telling, std::function<void()> what) {
+  if (telling == Telling::at_once) return what();
+  to_tell_.push_back(std::move(what));
 }
 
 // Those that come meanwhile wait until the calls under way have gone on.

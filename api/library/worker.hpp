@@ -48,24 +48,30 @@ class __attribute__((visibility("hidden"))) Client::Worker {
   template <class T>
   using Done = std::function<void(Result<T>)>;
 
+  enum class Telling : std::uint8_t {
+    in_turn,  ///< after all that is to be told, which may be callbacks that wait
+    at_once,  ///< of one that only wakes a thread
+  };
+
   /// `done` is told later, or, if there are too many calls (full) or the client has ended, within this call.
-  /// The call has freed its place then. All that is told is told one after the other.
+  /// The call has freed its place then. All that is told in turn is told one after the other.
   template <class T>
-  void begin(Call<T> call, Done<T> done) {
+  void begin(Call<T> call, Done<T> done, Telling telling = Telling::in_turn) {
     begin({.start =
-               [this, call = std::move(call), done](ClientCore& core) {
+               [this, call = std::move(call), done, telling](ClientCore& core) {
                  const auto here = under_way_.emplace(under_way_.end());
-                 *here = see_to_end<T>(call(core), done, here);
+                 *here = see_to_end<T>(call(core), done, telling, here);
                  here->start();
                },
-           .fail = [done](Error error) { done(std::unexpected(std::move(error))); }});
+           .fail = [done](Error error) { done(std::unexpected(std::move(error))); },
+           .telling = telling});
   }
   /// Waits for it. From a callback, other calls go on meanwhile, and what they tell waits.
   template <class T>
-  [[nodiscard]] Result<T> run(const Call<T>& call) {
+  [[nodiscard]] Result<T> run(const Call<T>& call, Telling telling = Telling::at_once) {
     if (is_here()) return run_here(call);
     std::promise<Result<T>> promise;
-    begin<T>(call, [&](Result<T> result) { promise.set_value(std::move(result)); });
+    begin<T>(call, [&](Result<T> result) { promise.set_value(std::move(result)); }, telling);
     return promise.get_future().get();
   }
 
@@ -80,7 +86,9 @@ class __attribute__((visibility("hidden"))) Client::Worker {
   struct Job {
     std::function<void(ClientCore&)> start;
     std::function<void(Error)> fail;
+    Telling telling = Telling::in_turn;
   };
+  void tell(Telling telling, std::function<void()> what);
   /// Notes that a call is over, however it ends.
   struct Ending {
     std::vector<UnderWay::iterator>& over;
@@ -88,10 +96,10 @@ class __attribute__((visibility("hidden"))) Client::Worker {
     ~Ending() { over.push_back(here); }
   };
   template <class T>
-  Async<Over> see_to_end(Async<Result<T>> call, Done<T> done, UnderWay::iterator here) {
+  Async<Over> see_to_end(Async<Result<T>> call, Done<T> done, Telling telling, UnderWay::iterator here) {
     const Ending ending{over_, here};
     auto result = co_await call;
-    to_tell_.push_back([this, done = std::move(done), result = std::move(result)]() mutable {
+    tell(telling, [this, done = std::move(done), result = std::move(result)]() mutable {
       free_place();
       done(std::move(result));
     });

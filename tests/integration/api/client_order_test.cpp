@@ -158,6 +158,36 @@ TEST_F(ClientOrder, TellsACallbackTheProgressOfItsOwnDownload) {
   EXPECT_EQ(told.get_future().get(), 100'000U);
 }
 
+TEST_F(ClientOrder, AnswersAThreadForWhichACallbackWaits) {
+  std::jthread other;
+  std::promise<bool> told;
+  Client sut(options());
+  sut.post("hosta", "line1/ready", [&](const Client::Outcome&) {
+    std::atomic<bool> answered{false};
+    other = std::jthread([&] {
+      (void)sut.post("hosta", "line1/ready");
+      answered = true;
+    });
+    for (const TimePoint end = soon(); !answered && MonotonicClock::now() < end;)
+      (void)sut.start("hosta", "line1");
+    told.set_value(answered);
+  });
+  EXPECT_TRUE(told.get_future().get());
+}
+
+TEST_F(ClientOrder, OfDownloadsThatWaitEndsWithTheClient) {
+  std::vector<int> codes;
+  {
+    Client sut(options());
+    for (int i = 0; i < 50; ++i) {
+      sut.download_application("hosta", "line1", file_, {}, {},
+                               [&](const Client::Outcome& outcome) { codes.push_back(outcome.code); });
+    }
+  }
+  ASSERT_EQ(codes.size(), 50U);
+  EXPECT_EQ(codes.back(), ClientError::unavailable);
+}
+
 TEST_F(ClientOrder, LetsACallThatHasEndedBeginAnotherWhileAsManyAsMayBeAreUnderWay) {
   std::atomic<unsigned> refused{0};
   std::atomic<unsigned> told{0};
