@@ -183,6 +183,8 @@ TEST_F(ClientOrder, OfDownloadsThatWaitEndsWithTheClient) {
       sut.download_application("hosta", "line1", file_, {}, {},
                                [&](const Client::Outcome& outcome) { codes.push_back(outcome.code); });
     }
+    while (!has_come(ControlVerb::download_application))
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   ASSERT_EQ(codes.size(), 50U);
   EXPECT_EQ(codes.back(), ClientError::unavailable);
