@@ -110,13 +110,14 @@ void Manager::use_pool_rights(std::vector<std::string>& lines) const {
 // Values that it has kept in memory and not written to a file stay for the end of this manager.
 void Manager::gone(std::size_t place, const InstanceConfig& instance) {
   spdlog::info("instance {}: was removed from the configuration and has ended", instance.name);
-  page_->write_instance(static_cast<std::uint32_t>(place), {});
   if (const auto wishes = wishes_.extract(instance.name)) wishes.mapped()->end();
   transitions_.erase(instance.name);
   remove_pages(instance.name);
   remove_kept_settings(instance.name);
   std::erase_if(gone_, [&](const InstanceConfig& known) { return known.name == instance.name; });
   gone_.push_back(instance);
+  // Last: when nobody sees it any more, nothing of it is left.
+  page_->write_instance(static_cast<std::uint32_t>(place), {});
 }
 
 // They are those of its last process, which no other one follows.
