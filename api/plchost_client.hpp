@@ -23,9 +23,10 @@
 // host are done one after the other, in the order in which they were made. Those to other hosts go on at the
 // same time. While it is not known which host answers a call that names none, later calls wait. A download
 // and post_and_wait() hold up none. A callback, also one that tells the progress of a download, runs on a
-// thread of the library and may use the Client. The other callbacks of calls wait meanwhile. It must not
-// throw: the program would end. All Clients of a process for one domain share a DDS participant, so they have
-// the same options for DDS.
+// thread of the library and may use the Client. The other callbacks of calls wait meanwhile, and a download
+// stands still: after 10 s of that it is given up. A callback must not wait for a second download to the same
+// host. It must not throw: the program would end. All Clients of a process for one domain share a DDS
+// participant, so they have the same options for DDS.
 // In a child of fork() a Client of the parent throws `unavailable`: make another one.
 #ifndef PLCHOST_CLIENT_HPP
 #define PLCHOST_CLIENT_HPP
