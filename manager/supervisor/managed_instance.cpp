@@ -233,6 +233,7 @@ void ManagedInstance::spawn(Next next) {
   wish_known_ = true;
   setup_failure_.clear();
   said_scheduler_.clear();
+  awaited_.reset();
   name_taken_ = transient_ = declaration_taken_ = false;
   const auto pid = host_.spawn(launch_options(next));
   if (!pid) {

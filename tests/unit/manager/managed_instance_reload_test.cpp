@@ -34,6 +34,24 @@ TEST_F(ManagedInstanceReload, UsesTheChangedPolicyAtOnce) {
   EXPECT_EQ(state(), InstanceState::failed);
 }
 
+// The manager before ended in its set-up.
+TEST_F(ManagedInstanceReload, NoLongerWaitsForAnEarlierProcessWhenOneWasStarted) {
+  config_.restart = RestartPolicy::never;
+  make();
+  sut().hold("is to be started");
+  sut().release();
+  next_manager();
+  ASSERT_EQ(state(), InstanceState::waiting);
+  ask(ControlVerb::start);
+  report_ready();
+  ASSERT_EQ(state(), InstanceState::running);
+  config_.restart = RestartPolicy::always;
+  sut().reconfigure(config_);
+  crash_once();
+  EXPECT_EQ(state(), InstanceState::running);
+  EXPECT_EQ(host_.spawned.size(), 3U);
+}
+
 TEST_F(ManagedInstanceReload, UsesTheRestFromTheNextProcessOn) {
   bring_up();
   config_.application = "/opt/other.so";
