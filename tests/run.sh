@@ -113,8 +113,8 @@ configure() { # configure DIR OPTIONS...
 }
 # Several files at a time, as most of the work is the headers of others.
 unity=(-DCMAKE_UNITY_BUILD=ON -DCMAKE_UNITY_BUILD_BATCH_SIZE=20)
-# Parts that a user may do without are required: with one of them its proof would go, and nobody would see it. g++ collects its
-# garbage less often than it would, which takes a tenth of its time.
+# Parts that a user may do without are required: with one of them its proof would go, and nobody would see it.
+# Collecting garbage takes a tenth of the time of g++, so it does that less often.
 build_plain() {
   configure "$build" -DPLCHOST_TESTS=ON -DPLCHOST_PYTHON=ON -DPLCHOST_OTHER_VENDOR=ON -DPLCHOST_MANUALS=ON "${unity[@]}" \
     -DCMAKE_CXX_FLAGS_RELWITHDEBINFO="-O2 -g1 -DNDEBUG --param ggc-min-heapsize=1000000" && cmake --build "$build" -j "$jobs"
