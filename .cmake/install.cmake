@@ -21,6 +21,7 @@ install(CODE "
 # For applications: their headers, and the flags that they are built with.
 install(FILES instances/plc_app.h instances/plc_app.hpp instances/plc_online_change.h
   DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/plchost COMPONENT plchost-dev)
+install(DIRECTORY ${CMAKE_BINARY_DIR}/share/plchost/adapters DESTINATION ${CMAKE_INSTALL_DATADIR}/plchost COMPONENT plchost)
 install(FILES api/control.idl DESTINATION ${CMAKE_INSTALL_DATADIR}/plchost COMPONENT plchost-dev)
 set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/plchost)
 configure_package_config_file(.cmake/plchostConfig.cmake.in ${CMAKE_BINARY_DIR}/plchostConfig.cmake

@@ -1,0 +1,60 @@
+#include <filesystem>
+#include <memory>
+#include <ranges>
+#include <string>
+
+#include <fmt/format.h>
+
+#include "api/cli/cli_session.hpp"
+#include "instances/adapters/build_application.hpp"
+#include "shm/base/names.hpp"
+
+namespace plchost {
+
+namespace {
+
+std::filesystem::path own_folder() {
+  std::error_code error;
+  return std::filesystem::read_symlink("/proc/self/exe", error).parent_path();
+}
+
+// A compiler's output has several lines.
+void tell(const std::string& text) {
+  for (const auto line : std::views::split(text, '\n')) {
+    fmt::print(stderr, "{}\n", printable(std::string(line.begin(), line.end())));
+  }
+}
+
+int build(const CliSession& session, BuildOrder order) {
+  order.adapters = own_folder().parent_path() / "share" / "plchost" / "adapters";
+  order.check_program = own_folder() / "plc-instance";
+  const BuildReport report = build_application(order);
+  for (const auto& problem : report.problems) tell(iec::describe(problem));
+  if (!report.problems.empty()) return kExitFailed;
+  for (const auto& remark : report.remarks) tell(iec::describe({remark.place, "note: " + remark.text}));
+  if (session.options.quiet) return kExitDone;
+  for (const std::string& application : report.applications)
+    fmt::print("{}: built\n", printable(application));
+  return kExitDone;
+}
+
+}  // namespace
+
+void add_build_verb(const Command& plcctl, CliSession& session) {
+  const auto order = std::make_shared<BuildOrder>();
+  plcctl.verb("build", "Translate a program into an application, on this machine")
+      .noun("application",
+            "Translate Structured Text with MATIEC. Each TASK becomes a task, located variables lie in the "
+            "areas "
+            "inputs, outputs and memory",
+            [&session, order] { return build(session, *order); })
+      .arguments("SOURCE", order->sources,
+                 "files, or folders whose *.st are meant; one CONFIGURATION in all of them")
+      .file("-o,--application", order->output,
+            "where the application goes; of several resources each has its name in it")
+      .option("--matiec", order->matiec, "folder of the compiler iec2c with its lib (else in PATH)",
+              "PLCHOST_MATIEC")
+      .option("--keep", order->keep, "leave the files between in this folder", "");
+}
+
+}  // namespace plchost

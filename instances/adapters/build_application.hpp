@@ -1,0 +1,29 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "instances/adapters/iec/source_place.hpp"
+
+namespace plchost {
+
+/// What `plcctl build application` is to make.
+struct BuildOrder {
+  std::vector<std::string> sources;  ///< files, and folders whose *.st are meant
+  std::string output;         ///< the application: line.so. Of several resources each has its name in it
+  std::string matiec;         ///< folder of the compiler; empty: PLCHOST_MATIEC, PATH
+  std::string adapters;       ///< folder of plc_app.h and of the adapters' C files
+  std::string keep;           ///< folder in which the files between are left; empty: nowhere
+  std::string check_program;  ///< plc-instance; empty: the application is not checked
+};
+
+struct BuildReport {
+  std::vector<std::string> applications;  ///< that were made
+  iec::SourceProblems problems;           ///< if there are any, no application was made
+  iec::SourceProblems remarks;
+};
+
+/// From Structured Text to applications. Runs the compilers, which may take minutes. Set-up.
+[[nodiscard]] BuildReport build_application(const BuildOrder& order);
+
+}  // namespace plchost

@@ -1,0 +1,307 @@
+#include "instances/adapters/iec/project.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "instances/adapters/iec/duration.hpp"
+#include "instances/adapters/iec/tokens.hpp"
+
+namespace plchost::iec {
+
+namespace {
+
+constexpr std::int64_t kMostPriority = 31;
+
+struct SectionWord {
+  std::string_view word;
+  Variable::Section section;
+};
+constexpr std::array<SectionWord, 9> kSections{{{"VAR", Variable::Section::local},
+                                                {"VAR_INPUT", Variable::Section::input},
+                                                {"VAR_OUTPUT", Variable::Section::output},
+                                                {"VAR_IN_OUT", Variable::Section::in_out},
+                                                {"VAR_TEMP", Variable::Section::temporary},
+                                                {"VAR_EXTERNAL", Variable::Section::external},
+                                                {"VAR_GLOBAL", Variable::Section::global},
+                                                {"VAR_ACCESS", Variable::Section::other},
+                                                {"VAR_CONFIG", Variable::Section::other}}};
+
+/// One file after the other into one project. A declaration that it does not understand is reported, and
+/// reading goes on behind it.
+class ProjectReader {
+ public:
+  void read(const Source& source) {
+    Tokens tokens = tokens_of(source.text, source.file);
+    problems_.insert(problems_.end(), tokens.problems.begin(), tokens.problems.end());
+    std::erase_if(tokens.all, [](const Token& token) { return token.kind == Token::Kind::pragma; });
+    tokens_ = std::move(tokens.all);
+    next_ = 0;
+    while (!at_end()) read_top();
+  }
+  ReadProject result() && { return {std::move(project_), std::move(problems_)}; }
+
+ private:
+  [[nodiscard]] const Token& token() const noexcept { return tokens_[next_]; }
+  [[nodiscard]] bool at_end() const noexcept { return token().kind == Token::Kind::end; }
+  [[nodiscard]] bool at(std::string_view word) const noexcept { return token().is(word); }
+  const Token& take() noexcept { return at_end() ? token() : tokens_[next_++]; }
+  bool take(std::string_view word) noexcept {
+    if (!at(word)) return false;
+    take();
+    return true;
+  }
+  bool expect(std::string_view word, std::string_view where) {
+    if (take(word)) return true;
+    report(token().place, fmt::format("'{}' is missing {}", word, where));
+    return false;
+  }
+  std::string take_name(std::string_view what) {
+    if (token().kind == Token::Kind::name) return take().text;
+    report(token().place, fmt::format("the name of {} is missing", what));
+    return "";
+  }
+  void report(const SourcePlace& place, std::string text) { problems_.push_back({place, std::move(text)}); }
+  /// Behind the next such word; the text may end before.
+  void skip_past(std::string_view word) {
+    while (!at_end() && !take(word)) take();
+  }
+
+  void read_top() {
+    if (at("PROGRAM")) return read_pou(Pou::Kind::program, "END_PROGRAM");
+    if (at("FUNCTION_BLOCK")) return read_pou(Pou::Kind::function_block, "END_FUNCTION_BLOCK");
+    if (at("FUNCTION")) return read_pou(Pou::Kind::function, "END_FUNCTION");
+    if (at("CONFIGURATION")) return read_configuration();
+    if (take("TYPE")) return read_types();
+    take();
+  }
+
+  // Mode : (idle, busy); Point : STRUCT x : REAL; END_STRUCT;
+  void read_types() {
+    while (!at_end() && !take("END_TYPE")) {
+      if (token().kind == Token::Kind::name) project_.types.push_back({token().text, token().place});
+      for (int depth = 0; !at_end() && !at("END_TYPE"); take()) {
+        if (at("STRUCT")) ++depth;
+        if (at("END_STRUCT")) --depth;
+        if (at(";") && depth <= 0) break;
+      }
+      take(";");
+    }
+  }
+
+  void read_pou(Pou::Kind kind, std::string_view end) {
+    Pou pou{.kind = kind, .name = "", .variables = {}, .place = take().place};
+    pou.name = take_name("this POU");
+    while (!at_end() && !take(end)) {
+      if (const SectionWord* const section = section_here()) {
+        read_section(section->section, pou.variables);
+      } else {
+        take();
+      }
+    }
+    if (project_.pou(pou.name) != nullptr)
+      report(pou.place, fmt::format("there are two POUs '{}'", pou.name));
+    project_.pous.push_back(std::move(pou));
+  }
+
+  [[nodiscard]] const SectionWord* section_here() const noexcept {
+    const auto* const found =
+        std::ranges::find_if(kSections, [&](const SectionWord& section) { return at(section.word); });
+    return found == kSections.end() ? nullptr : found;
+  }
+
+  void read_section(Variable::Section section, std::vector<Variable>& variables) {
+    Variable begin{.name = "", .type = "", .location = "", .section = section, .place = take().place};
+    for (;;) {
+      if (take("RETAIN")) {
+        begin.retain = true;
+      } else if (take("CONSTANT")) {
+        begin.constant = true;
+      } else if (!take("NON_RETAIN") && !take("PERSISTENT")) {
+        break;
+      }
+    }
+    if (section == Variable::Section::other) return skip_past("END_VAR");
+    while (!at_end() && !take("END_VAR")) read_declaration(begin, variables);
+  }
+
+  // a, b AT %IX0.0 : ARRAY [1..3] OF INT := [1, 2, 3];
+  void read_declaration(const Variable& begin, std::vector<Variable>& variables) {
+    const std::size_t first = variables.size();
+    do {
+      Variable variable = begin;
+      variable.place = token().place;
+      if (token().kind == Token::Kind::name && !at("AT")) variable.name = take().text;
+      if (take("AT")) {
+        if (token().kind == Token::Kind::place) variable.location = folded(take().text);
+      }
+      variables.push_back(std::move(variable));
+    } while (take(","));
+    const std::string type = take(":") ? take_type() : "";
+    // The compiler says more of a declaration that cannot be read.
+    if (type.empty() && !at_end() && !at(";") && !at("END_VAR")) take();
+    for (std::size_t i = first; i < variables.size(); ++i) variables[i].type = type;
+    while (!at_end() && !at(";") && !at("END_VAR")) take();
+    take(";");
+  }
+  std::string take_type() {
+    std::string type;
+    while (!at_end() && !at(";") && !at(":=") && !at("END_VAR")) {
+      const std::string& word = take().text;
+      const bool joined = type.empty() || type.ends_with('[') || type.ends_with('(') ||
+                          type.ends_with("..") || word == "[" || word == "]" || word == "(" || word == ")" ||
+                          word == ".." || word == ",";
+      type += (joined ? "" : " ") + word;
+    }
+    return type;
+  }
+
+  void read_configuration() {
+    Configuration configuration{.name = "", .globals = {}, .resources = {}, .place = take().place};
+    configuration.name = take_name("this CONFIGURATION");
+    Resource own{.name = "", .globals = {}, .tasks = {}, .programs = {}, .place = configuration.place};
+    while (!at_end() && !take("END_CONFIGURATION")) {
+      if (at("RESOURCE")) {
+        configuration.resources.push_back(read_resource());
+      } else {
+        read_member(own, configuration.globals);
+      }
+    }
+    if (!own.tasks.empty() || !own.programs.empty()) configuration.resources.push_back(std::move(own));
+    for (Resource& resource : configuration.resources) check(resource);
+    project_.configurations.push_back(std::move(configuration));
+  }
+
+  Resource read_resource() {
+    Resource resource{.name = "", .globals = {}, .tasks = {}, .programs = {}, .place = take().place};
+    resource.name = take_name("this RESOURCE");
+    if (take("ON")) take();
+    while (!at_end() && !at("END_CONFIGURATION") && !take("END_RESOURCE"))
+      read_member(resource, resource.globals);
+    return resource;
+  }
+
+  void read_member(Resource& resource, std::vector<Variable>& globals) {
+    if (const SectionWord* const section = section_here()) {
+      read_section(section->section, globals);
+    } else if (at("TASK")) {
+      read_task(resource);
+    } else if (at("PROGRAM")) {
+      read_program(resource);
+    } else if (!take(";")) {
+      const Token& wrong = take();
+      report(wrong.place, fmt::format("'{}' is not expected here; allowed are TASK, PROGRAM, VAR_GLOBAL, "
+                                      "RESOURCE and the end of the configuration",
+                                      wrong.text));
+      skip_past(";");
+    }
+  }
+
+  // TASK fast (SINGLE := start, INTERVAL := T#10ms, PRIORITY := 1);
+  void read_task(Resource& resource) {
+    Task task{.name = "", .interval_ns = {}, .single = "", .priority = -1, .place = take().place};
+    task.name = take_name("this TASK");
+    if (!expect("(", fmt::format("behind TASK {}", task.name))) return skip_past(";");
+    while (!at_end() && !at(")") && !at(";")) {
+      const Token key = take();
+      if (!expect(":=", fmt::format("behind {}", key.text))) break;
+      const Token value = take_value();
+      set(task, key, value);
+      if (!take(",")) break;
+    }
+    expect(")", fmt::format("at the end of TASK {}", task.name));
+    take(";");
+    if (!task.interval_ns && task.single.empty()) {
+      report(task.place, fmt::format("TASK {} has neither INTERVAL nor SINGLE, so it never runs", task.name));
+    }
+    if (task.priority < 0)
+      report(task.place, fmt::format("TASK {} has no PRIORITY; 0 to 31 is allowed", task.name));
+    resource.tasks.push_back(std::move(task));
+  }
+  /// A name may have members: instance.output.
+  Token take_value() {
+    Token value = take();
+    while (take(".")) value.text += "." + take().text;
+    return value;
+  }
+  void set(Task& task, const Token& key, const Token& value) {
+    if (key.is("SINGLE")) {
+      task.single = value.text;
+    } else if (key.is("PRIORITY")) {
+      std::int64_t priority = -1;
+      const char* const end = value.text.data() + value.text.size();
+      if (std::from_chars(value.text.data(), end, priority).ptr != end || priority < 0 ||
+          priority > kMostPriority) {
+        report(value.place, fmt::format("PRIORITY {}: allowed is 0 (the highest) to 31", value.text));
+      }
+      task.priority = static_cast<int>(std::clamp<std::int64_t>(priority, 0, kMostPriority));
+    } else if (key.is("INTERVAL")) {
+      const auto interval = nanoseconds_of(value.text);
+      if (!interval) report(value.place, fmt::format("INTERVAL {}", interval.error()));
+      if (interval && *interval < 0) report(value.place, fmt::format("INTERVAL {} is below 0", value.text));
+      if (interval && *interval > 0) task.interval_ns = *interval;
+    } else {
+      report(key.place,
+             fmt::format("'{}' is no part of a TASK; allowed are SINGLE, INTERVAL and PRIORITY", key.text));
+    }
+  }
+
+  // PROGRAM RETAIN main WITH fast : Main (in := start);
+  void read_program(Resource& resource) {
+    Program program{.name = "", .type = "", .task = "", .place = take().place};
+    if (!take("RETAIN")) take("NON_RETAIN");
+    program.name = take_name("this instance of a PROGRAM");
+    if (take("WITH")) program.task = take_name(fmt::format("the task of {}", program.name));
+    if (expect(":", fmt::format("before the type of {}", program.name))) {
+      program.type = take_name(fmt::format("the type of {}", program.name));
+    }
+    program.connected = at("(");
+    skip_past(";");
+    resource.programs.push_back(std::move(program));
+  }
+
+  void check(Resource& resource) {
+    for (const Program& program : resource.programs) {
+      const bool known = program.task.empty() || std::ranges::any_of(resource.tasks, [&](const Task& task) {
+                           return folded(task.name) == folded(program.task);
+                         });
+      if (!known) {
+        report(program.place,
+               fmt::format("PROGRAM {} runs WITH '{}', and there is no such TASK in its resource",
+                           program.name, program.task));
+      }
+    }
+    std::vector<std::string> names;
+    for (const Task& task : resource.tasks) {
+      const std::string name = folded(task.name);
+      if (std::ranges::find(names, name) != names.end()) {
+        report(task.place, fmt::format("there are two TASKs '{}'", task.name));
+      }
+      names.push_back(name);
+    }
+  }
+
+  std::vector<Token> tokens_;
+  std::size_t next_ = 0;
+  Project project_;
+  SourceProblems problems_;
+};
+
+}  // namespace
+
+const Pou* Project::pou(std::string_view name) const {
+  const auto found =
+      std::ranges::find_if(pous, [&](const Pou& pou) { return folded(pou.name) == folded(name); });
+  return found == pous.end() ? nullptr : &*found;
+}
+
+ReadProject read_project(std::span<const Source> sources) {
+  ProjectReader reader;
+  for (const Source& source : sources) reader.read(source);
+  return std::move(reader).result();
+}
+
+}  // namespace plchost::iec

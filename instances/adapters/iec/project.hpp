@@ -1,0 +1,96 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "instances/adapters/iec/source_place.hpp"
+
+namespace plchost::iec {
+
+// What the sources of a program declare, as far as tasks, areas and variables need it. The compiler reads
+// the sources, too, and finds what is wrong in the rest. Names are as they stand in the source; compare them
+// by folded().
+
+struct Variable {
+  enum class Section : unsigned char { input, output, in_out, local, temporary, external, global, other };
+  std::string name;
+  std::string type;  ///< "INT", "ARRAY[1..3] OF INT", "STRING(80)": the words of the source, one blank apart
+  std::string location;  ///< "%IX0.0"; empty: none
+  Section section = Section::local;
+  bool retain = false;
+  bool constant = false;
+  SourcePlace place;
+};
+
+struct Pou {
+  enum class Kind : unsigned char { program, function_block, function };
+  Kind kind = Kind::program;
+  std::string name;
+  std::vector<Variable> variables;
+  SourcePlace place;
+};
+
+struct Task {
+  std::string name;
+  std::optional<std::int64_t> interval_ns;  ///< none, or 0 in the source: not cyclic
+  std::string single;                       ///< the variable whose rising edge releases it; empty: none
+  int priority = 0;                         ///< 0 is the highest
+  SourcePlace place;
+};
+
+/// An instance of a program.
+struct Program {
+  std::string name;
+  std::string type;
+  std::string task;        ///< empty: it runs without one
+  bool connected = false;  ///< variables stand in parentheses behind its type
+  SourcePlace place;
+};
+
+/// The name of a type that is declared in TYPE ... END_TYPE.
+struct DeclaredType {
+  std::string name;
+  SourcePlace place;
+};
+
+struct Resource {
+  std::string name;
+  std::vector<Variable> globals;
+  std::vector<Task> tasks;
+  std::vector<Program> programs;
+  SourcePlace place;
+};
+
+struct Configuration {
+  std::string name;
+  std::vector<Variable> globals;
+  std::vector<Resource> resources;  ///< one without a name, if tasks stand in the configuration itself
+  SourcePlace place;
+};
+
+struct Project {
+  std::vector<Pou> pous;
+  std::vector<DeclaredType> types;
+  std::vector<Configuration> configurations;
+
+  [[nodiscard]] const Pou* pou(std::string_view name) const;
+};
+
+struct Source {
+  std::string file;  ///< for messages
+  std::string text;
+};
+
+struct ReadProject {
+  Project project;
+  SourceProblems problems;  ///< of tasks and declarations; those of a body are the compiler's
+};
+
+/// Any text, hostile ones included: bounded depth.
+[[nodiscard]] ReadProject read_project(std::span<const Source> sources);
+
+}  // namespace plchost::iec

@@ -1,0 +1,180 @@
+#include "instances/adapters/iec/tokens.hpp"
+
+#include <algorithm>
+#include <array>
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace plchost::iec {
+
+namespace {
+
+bool is_letter(char c) noexcept {
+  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_';
+}
+bool is_digit(char c) noexcept {
+  return c >= '0' && c <= '9';
+}
+char upper(char c) noexcept {
+  return c >= 'a' && c <= 'z' ? static_cast<char>(c - 'a' + 'A') : c;
+}
+bool same(std::string_view a, std::string_view b) noexcept {
+  return std::ranges::equal(a, b, [](char x, char y) { return upper(x) == upper(y); });
+}
+
+/// Dates and times of day have '-' and ':' between their numbers.
+bool is_date(std::string_view type) noexcept {
+  constexpr std::array<std::string_view, 12> kDates{"D",   "DATE",          "LD",   "LDATE",
+                                                    "DT",  "DATE_AND_TIME", "LDT",  "LDATE_AND_TIME",
+                                                    "TOD", "TIME_OF_DAY",   "LTOD", "LTIME_OF_DAY"};
+  return std::ranges::any_of(kDates, [&](std::string_view date) { return same(date, type); });
+}
+
+class Reader {
+ public:
+  Reader(std::string_view text, const std::string& file) : text_(text) { place_ = {file, 1, 1}; }
+
+  Tokens read() {
+    while (skip_blanks()) tokens_.all.push_back(next());
+    tokens_.all.push_back({.kind = Token::Kind::end, .text = "", .place = place_});
+    return std::move(tokens_);
+  }
+
+ private:
+  [[nodiscard]] char at(std::size_t ahead = 0) const noexcept {
+    return position_ + ahead < text_.size() ? text_[position_ + ahead] : '\0';
+  }
+  [[nodiscard]] bool at_end() const noexcept { return position_ >= text_.size(); }
+  [[nodiscard]] bool begins(std::string_view word) const noexcept {
+    return text_.substr(position_).starts_with(word);
+  }
+  void step(std::size_t count = 1) {
+    for (; count > 0 && !at_end(); --count) {
+      if (text_[position_++] == '\n') {
+        ++place_.line;
+        place_.column = 1;
+      } else {
+        ++place_.column;
+      }
+    }
+  }
+  template <class Predicate>
+  void step_while(Predicate belongs) {
+    while (!at_end() && belongs(at())) step();
+  }
+
+  /// False: the text has ended.
+  bool skip_blanks() {
+    for (;;) {
+      step_while([](char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; });
+      if (begins("(*")) {
+        skip_comment("*)");
+      } else if (begins("/*")) {
+        skip_comment("*/");
+      } else if (begins("//")) {
+        step_while([](char c) { return c != '\n'; });
+      } else {
+        return !at_end();
+      }
+    }
+  }
+  void skip_comment(std::string_view end) {
+    const SourcePlace begin = place_;
+    step(2);
+    while (!at_end() && !begins(end)) step();
+    if (at_end()) tokens_.problems.push_back({begin, fmt::format("this comment has no '{}'", end)});
+    step(end.size());
+  }
+
+  Token next() {
+    const SourcePlace place = place_;
+    const std::size_t begin = position_;
+    const Token::Kind kind = read_one();
+    return {.kind = kind, .text = std::string(text_.substr(begin, position_ - begin)), .place = place};
+  }
+  Token::Kind read_one() {
+    if (is_letter(at())) return read_name();
+    if (is_digit(at())) return read_number();
+    if (at() == '\'' || at() == '"') return read_text();
+    if (at() == '%') return read_location();
+    if (at() == '{') return read_pragma();
+    constexpr std::array<std::string_view, 8> kPairs{":=", "=>", "..", "<=", ">=", "<>", "**", "?="};
+    const auto pair = std::ranges::find_if(kPairs, [&](std::string_view two) { return begins(two); });
+    step(pair == kPairs.end() ? 1 : 2);
+    return Token::Kind::symbol;
+  }
+  Token::Kind read_name() {
+    const std::size_t begin = position_;
+    step_while([](char c) { return is_letter(c) || is_digit(c); });
+    if (at() != '#') return Token::Kind::name;
+    const bool date = is_date(text_.substr(begin, position_ - begin));
+    step();
+    if (at() == '-' || at() == '+') step();
+    step_while([&](char c) {
+      return is_letter(c) || is_digit(c) || c == '.' || c == '#' || (date && (c == '-' || c == ':'));
+    });
+    return Token::Kind::literal;
+  }
+  Token::Kind read_number() {
+    // A range has two points behind its first number: 1..10.
+    while (is_letter(at()) || is_digit(at()) || at() == '#' || (at() == '.' && is_digit(at(1)))) {
+      const bool exponent = at() == 'e' || at() == 'E';
+      step();
+      if (exponent && (at() == '-' || at() == '+')) step();
+    }
+    return Token::Kind::number;
+  }
+  Token::Kind read_text() {
+    const SourcePlace begin = place_;
+    const char quote = at();
+    step();
+    while (!at_end() && at() != quote && at() != '\n') step(at() == '$' && at(1) != '\n' ? 2 : 1);
+    if (at() != quote) tokens_.problems.push_back({begin, fmt::format("this text has no second {}", quote)});
+    if (at() == quote) step();
+    return Token::Kind::text;
+  }
+  Token::Kind read_location() {
+    step();
+    step_while([](char c) { return is_letter(c) || is_digit(c) || c == '.' || c == '*'; });
+    return Token::Kind::place;
+  }
+  Token::Kind read_pragma() {
+    const SourcePlace begin = place_;
+    step_while([](char c) { return c != '}'; });
+    if (at_end()) tokens_.problems.push_back({begin, "this pragma has no '}'"});
+    step();
+    return Token::Kind::pragma;
+  }
+
+  std::string_view text_;
+  std::size_t position_ = 0;
+  SourcePlace place_;
+  Tokens tokens_;
+};
+
+}  // namespace
+
+bool Token::is(std::string_view word) const noexcept {
+  return (kind == Kind::name || kind == Kind::symbol) && same(text, word);
+}
+
+std::string folded(std::string_view name) {
+  std::string result(name);
+  std::ranges::transform(result, result.begin(), upper);
+  return result;
+}
+
+Tokens tokens_of(std::string_view text, const std::string& file) {
+  return Reader(text, file).read();
+}
+
+std::string describe(const SourceProblem& problem) {
+  const SourcePlace& place = problem.place;
+  std::string where = place.file;
+  if (place.line != 0) where += fmt::format(":{}", place.line);
+  if (place.column != 0) where += fmt::format(":{}", place.column);
+  return where.empty() ? problem.text : fmt::format("{}: {}", where, problem.text);
+}
+
+}  // namespace plchost::iec

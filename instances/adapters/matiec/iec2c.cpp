@@ -1,0 +1,147 @@
+#include "instances/adapters/matiec/iec2c.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <ranges>
+#include <regex>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "instances/adapters/iec/tokens.hpp"
+
+namespace plchost::matiec {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_there(const fs::path& path) {
+  std::error_code error;
+  return fs::exists(path, error);
+}
+
+/// The folders of a compiler, if this is one: as MATIEC is built, and as it is installed.
+std::optional<Compiler> compiler_of(const fs::path& program) {
+  if (!is_there(program)) return std::nullopt;
+  const fs::path folder = program.parent_path();
+  for (const fs::path& library :
+       {folder / "lib", folder.parent_path() / "lib" / "matiec",
+        folder.parent_path() / "share" / "matiec" / "lib", folder.parent_path() / "lib"}) {
+    for (const fs::path& headers : {library / "C", folder.parent_path() / "include" / "matiec"}) {
+      if (is_there(library / "ieclib.txt") && is_there(headers / "iec_std_lib.h")) {
+        return Compiler{.program = program, .library = library, .headers = headers};
+      }
+    }
+  }
+  return std::nullopt;
+}
+
+std::string environment(const char* name) {
+  const char* const value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): plcctl has one thread here
+  return value == nullptr ? "" : value;
+}
+
+constexpr std::size_t kMaxLine = 4096;  // the library's expressions need more stack for longer ones
+
+// Names are compared by the case of the library's texts, which is upper.
+struct Declared {
+  std::string name;
+  iec::SourcePlace place;
+};
+std::vector<Declared> declared_names(const iec::Project& project) {
+  std::vector<Declared> names;
+  for (const iec::Pou& pou : project.pous) names.push_back({iec::folded(pou.name), pou.place});
+  for (const iec::DeclaredType& type : project.types) names.push_back({iec::folded(type.name), type.place});
+  return names;
+}
+
+/// The words of a line of the compiler's library.
+std::vector<std::string> words_in(const std::string& file, unsigned line) {
+  std::ifstream stream(file);
+  std::string text;
+  for (unsigned i = 0; i < line && std::getline(stream, text); ++i) {
+  }
+  std::vector<std::string> words;
+  for (const iec::Token& token : iec::tokens_of(text, file).all) {
+    if (token.kind == iec::Token::Kind::name) words.push_back(iec::folded(token.text));
+  }
+  return words;
+}
+
+unsigned number_of(const std::ssub_match& match) {
+  return static_cast<unsigned>(std::strtoul(match.str().c_str(), nullptr, 10));
+}
+
+}  // namespace
+
+Result<Compiler> find_compiler(const std::string& folder) {
+  const std::string chosen = folder.empty() ? environment("PLCHOST_MATIEC") : folder;
+  if (!chosen.empty()) {
+    for (const fs::path& program :
+         {fs::path(chosen) / "iec2c", fs::path(chosen) / "bin" / "iec2c", fs::path(chosen)}) {
+      if (auto found = compiler_of(program)) return *std::move(found);
+    }
+    return failure(ErrorCode::not_found, fmt::format("there is no iec2c with its lib folder in {}", chosen));
+  }
+  const std::string path = environment("PATH");
+  for (const auto part : std::views::split(path, ':')) {
+    if (auto found = compiler_of(fs::path(std::string(part.begin(), part.end())) / "iec2c"))
+      return *std::move(found);
+  }
+  return failure(
+      ErrorCode::not_found,
+      "no compiler for Structured Text was found. Build MATIEC (github.com/beremiz/matiec), and name its "
+      "folder by --matiec or PLCHOST_MATIEC");
+}
+
+JoinedSource::JoinedSource(std::span<const iec::Source> sources) {
+  unsigned line = 1;
+  for (const iec::Source& source : sources) {
+    parts_.push_back({source.file, line});
+    text_ += source.text;
+    if (!text_.ends_with('\n')) text_ += '\n';
+    line += static_cast<unsigned>(std::ranges::count(source.text, '\n')) +
+            (source.text.ends_with('\n') ? 0U : 1U);
+  }
+}
+
+iec::SourcePlace JoinedSource::place(unsigned line, unsigned column) const {
+  const auto after = std::ranges::upper_bound(parts_, line, {}, &Part::first_line);
+  if (after == parts_.begin()) return {};
+  const Part& part = *std::prev(after);
+  return {part.file, line - part.first_line + 1, column};
+}
+
+iec::SourceProblems problems_of(std::string_view output, const JoinedSource& source,
+                                const iec::Project& project) {
+  static const std::regex kLine(R"(^(.*?):(\d+)-(\d+)\.\.\d+-\d+: (error|warning): (.*)$)");
+  iec::SourceProblems problems;
+  const auto add = [&](iec::SourceProblem problem) {
+    if (std::ranges::find(problems, problem) == problems.end()) problems.push_back(std::move(problem));
+  };
+  const std::vector<Declared> names = declared_names(project);
+  for (const auto part : std::views::split(output, '\n')) {
+    const std::string line(part.begin(), part.end());
+    std::smatch match;
+    if (line.size() > kMaxLine || !std::regex_match(line, match, kLine) || match[4] != "error") continue;
+    if (fs::path(match[1].str()).filename() == kJoinedFile) {
+      add({source.place(number_of(match[2]), number_of(match[3])), match[5]});
+      continue;
+    }
+    for (const std::string& word : words_in(match[1], number_of(match[2]))) {
+      const auto declared = std::ranges::find(names, word, &Declared::name);
+      if (declared == names.end()) continue;
+      add({declared->place,
+           fmt::format("'{}' is also a name in the library of iec2c; choose another one", word)});
+    }
+  }
+  return problems;
+}
+
+}  // namespace plchost::matiec

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "instances/adapters/iec/project.hpp"
+#include "instances/adapters/iec/source_place.hpp"
+#include "shm/base/result.hpp"
+
+namespace plchost::matiec {
+
+/// A MATIEC that can be used.
+struct Compiler {
+  std::string program;  ///< iec2c
+  std::string library;  ///< folder of its functions in ST (ieclib.txt)
+  std::string headers;  ///< folder of its headers for C (iec_std_lib.h)
+};
+
+/// Looks in `folder` (of a built MATIEC, or where one is installed); empty: where PLCHOST_MATIEC says, else
+/// in PATH. The error says how to get one.
+[[nodiscard]] Result<Compiler> find_compiler(const std::string& folder);
+
+/// All sources one behind the other, as iec2c takes one file, and where each began.
+class JoinedSource {
+ public:
+  explicit JoinedSource(std::span<const iec::Source> sources);
+  [[nodiscard]] const std::string& text() const noexcept { return text_; }
+  /// Of a line of the joined file.
+  [[nodiscard]] iec::SourcePlace place(unsigned line, unsigned column) const;
+
+ private:
+  struct Part {
+    std::string file;
+    unsigned first_line;
+  };
+  std::vector<Part> parts_;
+  std::string text_;
+};
+
+/// The name of the joined file, in the folder in which iec2c runs.
+inline constexpr std::string_view kJoinedFile = "joined.st";
+
+/// What iec2c has printed, in the words and places of the sources. Errors in its own library come from a name
+/// of the program that the library has, too: such a name is named where it is declared.
+[[nodiscard]] iec::SourceProblems problems_of(std::string_view output, const JoinedSource& source,
+                                              const iec::Project& project);
+
+}  // namespace plchost::matiec

@@ -1,0 +1,182 @@
+// The adapter for programs that MATIEC has translated, and, where that compiler is, the whole way from
+// Structured Text.
+#include <array>
+#include <chrono>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "instances/adapters/run_program.hpp"
+#include "shm/files/pool_files.hpp"
+#include "shm/plc_process_image.h"
+#include "tests/integration/instances/instance_process.hpp"
+
+namespace plchost::testing {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr const char* kTwice = R"(
+PROGRAM Fast
+  VAR_EXTERNAL go : BOOL; flag : BOOL; END_VAR
+  VAR
+    raw AT %IW1 : INT;
+    lamp AT %QX0.1 : BOOL;
+    around AT %QB0 : BYTE;
+    twice AT %QW1 : INT;
+    copied AT %QB5 : BYTE;
+    preset AT %QB7 : BYTE := 9;
+  END_VAR
+  VAR late : TON; END_VAR
+  copied := around;
+  twice := raw * 2;
+  late(IN := go, PT := T#20ms);
+  lamp := late.Q;
+  flag := go;
+END_PROGRAM
+PROGRAM Counter
+  VAR edges AT %QB4 : USINT; END_VAR
+  edges := edges + 1;
+END_PROGRAM
+PROGRAM Loop
+  VAR_EXTERNAL flag : BOOL; END_VAR
+  VAR loops AT %QB6 : BYTE; END_VAR
+  loops := BOOL_TO_BYTE(flag);
+END_PROGRAM
+CONFIGURATION cell
+  VAR_GLOBAL go AT %IX0.0 : BOOL; flag AT %MX0.3 : BOOL; END_VAR
+  RESOURCE press ON PLC
+    TASK fast (INTERVAL := T#2ms, PRIORITY := 1);
+    TASK edge (SINGLE := go, PRIORITY := 0);
+    PROGRAM one WITH fast : Fast;
+    PROGRAM two WITH edge : Counter;
+    PROGRAM loop : Loop;
+  END_RESOURCE
+END_CONFIGURATION
+)";
+
+struct Inputs {
+  std::uint8_t bits = 0, unused = 0;
+  std::int16_t raw = 0;
+};
+struct Outputs {
+  std::uint8_t bits = 0, unused = 0;
+  std::int16_t twice = 0;
+  std::uint8_t edges = 0, copied = 0, loops = 0, preset = 0;
+};
+
+class StructuredText : public ::testing::Test {
+ protected:
+  ~StructuredText() override {
+    plc_image_close(&inputs_);
+    plc_image_close(&outputs_);
+    sut.reset();
+    remove_pool_memories(sandbox.pool());
+  }
+
+  void start(const std::string& application) {
+    const std::string settings =
+        sandbox.write("line1.cfg",
+                      "[SysMem]\nLinux.Area.0.Flags=0x4\nLinux.Area.0.Object=in\nLinux.Area.0.Size=64\n"
+                      "Linux.Area.1.Flags=0x8\nLinux.Area.1.Object=out\nLinux.Area.1.Size=64\n");
+    sut.emplace(sandbox, std::vector<std::string>{"--settings", settings, "--application", application});
+    sut->wait_until_up();
+    ASSERT_EQ(plc_image_open(sandbox.pool().c_str(), "in", 64, PLC_IMAGE_WRITE, &inputs_), 0);
+    ASSERT_EQ(plc_image_open(sandbox.pool().c_str(), "out", 64, PLC_IMAGE_READ, &outputs_), 0);
+  }
+  void put(Inputs inputs) {
+    std::array<char, 64> bytes{};
+    std::memcpy(bytes.data(), &inputs, sizeof inputs);
+    plc_image_write(&inputs_, bytes.data());
+  }
+  Outputs outputs() {
+    std::array<char, 64> bytes{};
+    EXPECT_EQ(plc_image_read(&outputs_, bytes.data(), nullptr), PLC_IMAGE_OK);
+    Outputs outputs;
+    std::memcpy(&outputs, bytes.data(), sizeof outputs);
+    return outputs;
+  }
+  /// The program of this file, in whichever way it was made.
+  void expect_it_works() {
+    EXPECT_TRUE(eventually([&] { return outputs().preset == 9; })) << "initial values are put out";
+    put({.raw = 21});
+    EXPECT_TRUE(eventually([&] { return outputs().twice == 42; }));
+    EXPECT_EQ(outputs().edges, 0);
+    put({.bits = 1, .raw = -3});
+    EXPECT_TRUE(eventually([&] {
+      return outputs().twice == -6 && outputs().bits == 2 && outputs().copied == 2;
+    })) << "the bit and the byte around it are one memory";
+    EXPECT_TRUE(eventually([&] { return outputs().edges == 1; })) << "SINGLE";
+    EXPECT_TRUE(eventually([&] { return outputs().loops == 1; })) << "a program without a task, by way of %M";
+    put({.bits = 0, .raw = 0});
+    EXPECT_TRUE(eventually([&] { return outputs().bits == 0 && outputs().loops == 0; }));
+    put({.bits = 1, .raw = 0});
+    EXPECT_TRUE(eventually([&] { return outputs().edges == 2; }));
+    const auto fast = sut->task("fast");
+    ASSERT_TRUE(fast);
+    EXPECT_GT(fast->counters.cycles, 0U);
+  }
+  static std::string matiec() {
+    const char* const folder = std::getenv("PLCHOST_MATIEC");  // NOLINT(concurrency-mt-unsafe)
+    return folder == nullptr ? "" : folder;
+  }
+  ProgramEnd build(const std::string& text) const {
+    return run_program({PLCCTL, "build", "application", sandbox.write("twice.st", text), "-o",
+                        sandbox.folder() + "/twice.so"},
+                       sandbox.folder())
+        .value();
+  }
+
+  Sandbox sandbox;
+  std::optional<InstanceProcess> sut;
+
+ private:
+  plc_image inputs_{};
+  plc_image outputs_{};
+};
+
+TEST_F(StructuredText, ByTheAdapterHasItsTasksAndItsLocatedVariables) {
+  start(application("located"));
+  expect_it_works();
+}
+
+TEST_F(StructuredText, ThatMatiecTranslatesRunsAsItIsWritten) {
+  if (matiec().empty()) GTEST_SKIP() << "needs MATIEC (PLCHOST_MATIEC)";
+  const ProgramEnd built = build(kTwice);
+  ASSERT_TRUE(built.success()) << built.output;
+  EXPECT_THAT(built.output, HasSubstr("twice.so: built"));
+  EXPECT_THAT(built.output, HasSubstr("PROGRAM loop has no TASK: it runs freewheeling"));
+  start(sandbox.folder() + "/twice.so");
+  expect_it_works();
+}
+
+TEST_F(StructuredText, ThatIsWrongIsToldInItsOwnWords) {
+  if (matiec().empty()) GTEST_SKIP() << "needs MATIEC (PLCHOST_MATIEC)";
+  std::string text = kTwice;
+  text.replace(text.find("raw * 2"), 7, "row * 2");
+  const ProgramEnd built = build(text);
+  EXPECT_EQ(built.exit_code, 1);
+  EXPECT_THAT(built.output, HasSubstr("twice.st:13:12: "));
+  text = kTwice;
+  text.replace(text.find("PROGRAM Loop"), 12, "PROGRAM TON");
+  EXPECT_EQ(build(text).exit_code, 1);
+}
+
+TEST_F(StructuredText, WithoutACompilerSaysHowToGetOne) {
+  const ProgramEnd built = run_program({PLCCTL, "build", "application", sandbox.write("twice.st", kTwice),
+                                        "-o", sandbox.folder() + "/twice.so", "--matiec", sandbox.folder()},
+                                       sandbox.folder())
+                               .value();
+  EXPECT_EQ(built.exit_code, 1);
+  EXPECT_THAT(built.output, HasSubstr("there is no iec2c with its lib folder in"));
+}
+
+}  // namespace
+}  // namespace plchost::testing

@@ -1,0 +1,150 @@
+#include "instances/adapters/matiec/glue.hpp"
+
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+namespace plchost::matiec {
+namespace {
+
+using testing::Contains;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::Not;
+
+class MatiecGlue : public testing::Test {
+ protected:
+  static std::vector<std::string> texts(const iec::SourceProblems& problems) {
+    std::vector<std::string> result;
+    for (const iec::SourceProblem& problem : problems) result.push_back(iec::describe(problem));
+    return result;
+  }
+  Glue write(const std::string& programs, const std::string& globals, const std::string& resource,
+             const std::vector<Located>& located = {}) {
+    const std::vector<iec::Source> sources{
+        {"a.st", programs},
+        {"c.st", "CONFIGURATION cell\n" + globals + "\nRESOURCE press ON PLC\n" + resource +
+                     "\nEND_RESOURCE END_CONFIGURATION"}};
+    auto [project, problems] = iec::read_project(sources);
+    EXPECT_THAT(texts(problems), IsEmpty());
+    const iec::Configuration& configuration = project.configurations.at(0);
+    return write_glue(project, configuration, configuration.resources.at(0), located);
+  }
+  static constexpr const char* kMain =
+      "PROGRAM Main VAR_EXTERNAL go : BOOL; END_VAR VAR raw AT %IW2 : INT; END_VAR END_PROGRAM";
+  static constexpr const char* kGo = "VAR_GLOBAL go : BOOL; END_VAR";
+  static constexpr const char* kFast = "TASK fast (INTERVAL := T#10ms, PRIORITY := 1);";
+};
+
+TEST_F(MatiecGlue, RunsTheProgramsOfATaskInTheirOrder) {
+  const Glue glue =
+      write(kMain, kGo, std::string(kFast) + "PROGRAM one WITH fast : Main; PROGRAM two WITH fast : Main;");
+  EXPECT_THAT(texts(glue.problems), IsEmpty());
+  EXPECT_THAT(
+      glue.text,
+      HasSubstr(
+          "plchost_begin(0);\n  MAIN_body__(&PRESS__ONE);\n  MAIN_body__(&PRESS__TWO);\n  plchost_end(0);"));
+  EXPECT_THAT(glue.text, HasSubstr("{\"fast\", 1, 10000000L, 0, plchost_run_0,"));
+}
+
+TEST_F(MatiecGlue, GivesATaskThePlacesThatItsProgramsUse) {
+  const std::string other = " PROGRAM Other VAR lamp AT %QX0.1 : BOOL; END_VAR END_PROGRAM";
+  const Glue glue =
+      write(std::string(kMain) + other, "VAR_GLOBAL go AT %IX0.0 : BOOL; END_VAR",
+            std::string(kFast) +
+                "TASK slow (INTERVAL := T#1s, PRIORITY := 5);"
+                "PROGRAM one WITH fast : Main; PROGRAM two WITH slow : Other;",
+            {{"INT", "__IW2", "%IW2"}, {"BOOL", "__QX0_1", "%QX0.1"}, {"BOOL", "__IX0_0", "%IX0.0"}});
+  EXPECT_THAT(texts(glue.problems), IsEmpty());
+  EXPECT_THAT(glue.text, HasSubstr("plchost_uses_0[] = {0, 2, 0}"));
+  EXPECT_THAT(glue.text, HasSubstr("plchost_uses_1[] = {1, 0}"));
+  EXPECT_THAT(glue.text, HasSubstr("{'I', 2, -1, 4u, &plchost_value_0}"));
+  EXPECT_THAT(glue.text, HasSubstr("{'Q', 1, 1, 0u, &plchost_value_1}"));
+}
+
+TEST_F(MatiecGlue, MakesAnEventTaskOfSingle) {
+  const Glue glue =
+      write(kMain, kGo, "TASK edge (SINGLE := go, PRIORITY := 0); PROGRAM one WITH edge : Main;");
+  EXPECT_THAT(texts(glue.problems), IsEmpty());
+  EXPECT_THAT(glue.text, HasSubstr("plchost_edge_0(void) { return *__GET_GLOBAL_GO(); }"));
+  EXPECT_THAT(glue.text, HasSubstr("{\"edge\", 0, 0L, plchost_edge_0,"));
+}
+
+TEST_F(MatiecGlue, SaysWhatWouldNeverRelease) {
+  const std::string edge = "TASK edge (SINGLE := go, PRIORITY := 0); PROGRAM one WITH edge : Main;";
+  const std::string input = "VAR_GLOBAL go AT %IX0.0 : BOOL; END_VAR";
+  const std::vector<Located> located{{"BOOL", "__IX0_0", "%IX0.0"}};
+  EXPECT_THAT(texts(write(kMain, input, edge, located).problems),
+              ElementsAre(HasSubstr("no other task reads go at %IX0.0, so nobody would see its edge")));
+  EXPECT_THAT(texts(write(kMain, input, edge + kFast + "PROGRAM two WITH fast : Main;", located).problems),
+              IsEmpty());
+  EXPECT_THAT(texts(write(kMain, "VAR_GLOBAL go : INT; END_VAR", edge).problems),
+              ElementsAre("c.st:4:1: SINGLE of edge: 'go' is no BOOL of a VAR_GLOBAL"));
+}
+
+TEST_F(MatiecGlue, RunsAProgramWithoutATaskFreewheelingAndSaysSo) {
+  const Glue glue = write(kMain, kGo, "PROGRAM one : Main;");
+  EXPECT_THAT(glue.text, HasSubstr("{\"one\", 31, 0L, 0, plchost_run_0,"));
+  EXPECT_THAT(texts(glue.remarks),
+              Contains("c.st:4:1: PROGRAM one has no TASK: it runs freewheeling, with priority 31"));
+}
+
+TEST_F(MatiecGlue, NamesTheGlobalsThatMayChangeInTheMiddleOfACycle) {
+  const std::string both = std::string(kFast) + "PROGRAM one WITH fast : Main; PROGRAM two WITH slow : Main;";
+  EXPECT_THAT(texts(write(kMain, kGo, "TASK slow (INTERVAL := T#1s, PRIORITY := 5);" + both).remarks),
+              ElementsAre("c.st:2:12: the tasks slow, fast use go and can pre-empt each other: it may change "
+                          "in the middle of a cycle"));
+  EXPECT_THAT(texts(write(kMain, kGo, "TASK slow (INTERVAL := T#1s, PRIORITY := 1);" + both).remarks),
+              IsEmpty());
+  EXPECT_THAT(texts(write(kMain, "VAR_GLOBAL CONSTANT go : BOOL; END_VAR",
+                          "TASK slow (INTERVAL := T#1s, PRIORITY := 5);" + both)
+                        .remarks),
+              IsEmpty());
+}
+
+TEST_F(MatiecGlue, SaysWhatTheCompilerCannotDoAndWhatIsDropped) {
+  EXPECT_THAT(
+      texts(write(kMain, kGo, std::string(kFast) + "PROGRAM one WITH fast : Main (a := go);").problems),
+      ElementsAre(HasSubstr("iec2c cannot translate connections in parentheses")));
+  EXPECT_THAT(texts(write(kMain, kGo,
+                          std::string(kFast) +
+                              "TASK idle (INTERVAL := T#1s, PRIORITY := 2); PROGRAM one WITH fast : Main;")
+                        .remarks),
+              ElementsAre(HasSubstr("TASK idle runs no program, so it is left out")));
+  EXPECT_THAT(texts(write("PROGRAM Main VAR RETAIN a, b : INT; END_VAR END_PROGRAM", "",
+                          std::string(kFast) + "PROGRAM one WITH fast : Main;")
+                        .remarks),
+              ElementsAre(HasSubstr("RETAIN of a, b in Main is not carried out")));
+  EXPECT_THAT(
+      texts(write(kMain, kGo, "TASK fast (INTERVAL := T#10ns, PRIORITY := 1); PROGRAM one WITH fast : Main;")
+                .problems),
+      ElementsAre(HasSubstr("allowed are whole microseconds up to 50 days")));
+}
+
+TEST_F(MatiecGlue, RefusesATypeThatDoesNotFitIntoItsPlace) {
+  const Glue glue = write(kMain, "VAR_GLOBAL go AT %IW0 : BOOL; END_VAR",
+                          std::string(kFast) + "PROGRAM one WITH fast : Main;", {{"BOOL", "__IW0", "%IW0"}});
+  EXPECT_THAT(texts(glue.problems), ElementsAre("c.st:2:12: BOOL does not fit into %IW0"));
+}
+
+TEST_F(MatiecGlue, LeavesTheOtherResourcesToTheirApplications) {
+  const std::vector<iec::Source> sources{{"a.st",
+                                          "PROGRAM Main END_PROGRAM CONFIGURATION cell "
+                                          "RESOURCE press ON PLC TASK t (INTERVAL := T#1s, PRIORITY := 1); "
+                                          "PROGRAM p WITH t : Main; END_RESOURCE "
+                                          "RESOURCE robot ON PLC TASK t (INTERVAL := T#1s, PRIORITY := 1); "
+                                          "PROGRAM q WITH t : Main; END_RESOURCE "
+                                          "END_CONFIGURATION"}};
+  const iec::Project project = iec::read_project(sources).project;
+  const iec::Configuration& cell = project.configurations.at(0);
+  const Glue glue = write_glue(project, cell, cell.resources.at(1), {});
+  EXPECT_THAT(glue.text, HasSubstr("#include \"robot.c\""));
+  EXPECT_THAT(glue.text, HasSubstr("void PRESS_init__(void) {}"));
+  EXPECT_THAT(glue.text, HasSubstr("&ROBOT__Q"));
+  EXPECT_THAT(glue.text, Not(HasSubstr("PRESS__P")));
+}
+
+}  // namespace
+}  // namespace plchost::matiec

@@ -1,0 +1,76 @@
+#include "instances/adapters/matiec/iec2c.hpp"
+
+#include <cstdlib>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+#include "instances/adapters/build_application.hpp"
+#include "tests/support/own_name.hpp"
+
+namespace plchost::matiec {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+const std::vector<iec::Source> kSources{{"a.st", "PROGRAM P\nEND_PROGRAM"},
+                                        {"b.st", "TYPE Mode : INT; END_TYPE\n(* *)\n"}};
+
+std::vector<std::string> told(const std::string& output) {
+  const iec::Project project = iec::read_project(kSources).project;
+  std::vector<std::string> result;
+  for (const auto& problem : problems_of(output, JoinedSource(kSources), project))
+    result.push_back(iec::describe(problem));
+  return result;
+}
+
+TEST(Iec2cErrors, AreToldAtTheirPlaceInTheSources) {
+  EXPECT_THAT(
+      told("joined.st:2-5..2-9: error: one\njoined.st:4-3..4-4: error: two\n2 error(s) found. Bailing out!"),
+      ElementsAre("a.st:2:5: one", "b.st:2:3: two"));
+}
+
+TEST(Iec2cErrors, AreToldOnceAndWarningsAreNone) {
+  EXPECT_THAT(
+      told("joined.st:1-1..1-2: error: x\njoined.st:1-1..1-2: error: x\njoined.st:1-1..1-2: warning: y"),
+      ElementsAre("a.st:1:1: x"));
+  EXPECT_THAT(told("anything\n" + std::string(100'000, 'x')), IsEmpty());
+}
+
+TEST(Iec2cErrors, InItsLibraryNameTheNameOfTheProgramThatItHasToo) {
+  const std::string library = own_path("ieclib");
+  std::ofstream(library) << "FUNCTION MAX\nVAR_INPUT P : INT; END_VAR\n";
+  EXPECT_THAT(told(library + ":2-11..2-12: error: invalid\n" + library + ":2-11..2-12: error: again"),
+              ElementsAre("a.st:1:1: 'P' is also a name in the library of iec2c; choose another one"));
+  std::remove(library.c_str());
+}
+
+TEST(BuildOfAnApplication, SaysHowToGetACompiler) {
+  const auto none = find_compiler("/nowhere");
+  ASSERT_FALSE(none);
+  EXPECT_THAT(none.error().describe(), HasSubstr("there is no iec2c with its lib folder in /nowhere"));
+}
+
+TEST(BuildOfAnApplication, SaysWhatIsWrongInTheSourcesBeforeItRunsACompiler) {
+  const std::string file = own_path("source.st");
+  std::ofstream(file)
+      << "CONFIGURATION c RESOURCE r ON PLC TASK t (PRIORITY := 1); END_RESOURCE END_CONFIGURATION";
+  const BuildReport report = build_application({.sources = {file},
+                                                .output = file + ".so",
+                                                .matiec = "/nowhere",
+                                                .adapters = "",
+                                                .keep = "",
+                                                .check_program = ""});
+  ASSERT_EQ(report.problems.size(), 1U);
+  EXPECT_THAT(iec::describe(report.problems.front()),
+              HasSubstr(file + ":1:35: TASK t has neither INTERVAL nor SINGLE"));
+  EXPECT_THAT(report.applications, IsEmpty());
+  std::remove(file.c_str());
+}
+
+}  // namespace
+}  // namespace plchost::matiec

@@ -1,0 +1,148 @@
+#include "instances/adapters/iec/project.hpp"
+
+#include <string>
+#include <vector>
+
+#include <gmock/gmock.h>
+
+namespace plchost::iec {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+constexpr std::string_view kLine = R"(
+FUNCTION_BLOCK Valve
+  VAR_INPUT open : BOOL; END_VAR
+  VAR lamp AT %QX0.1 : BOOL; END_VAR
+  lamp := open;
+END_FUNCTION_BLOCK
+
+PROGRAM Main
+  VAR RETAIN count, total : DINT := 5; END_VAR
+  VAR_EXTERNAL go : BOOL; END_VAR
+  VAR
+    raw AT %IW2 : ARRAY [1..4] OF INT := [1, 2, 3, 4];
+    text : STRING[80] := 'PROGRAM; END_VAR';
+    valve : Valve;
+  END_VAR
+  IF go THEN count := count + 1; END_IF;
+END_PROGRAM
+
+CONFIGURATION cell
+  VAR_GLOBAL go AT %IX0.0 : BOOL; END_VAR
+  RESOURCE press ON PLC
+    VAR_GLOBAL CONSTANT limit : INT := 3; END_VAR
+    TASK fast (INTERVAL := T#10ms, PRIORITY := 1);
+    TASK edge (SINGLE := go, PRIORITY := 0);
+    PROGRAM RETAIN main1 WITH fast : Main;
+    PROGRAM main2 : Main (go := go);
+  END_RESOURCE
+END_CONFIGURATION
+)";
+
+ReadProject read(std::string_view text) {
+  const std::vector<Source> sources{{"a.st", std::string(text)}};
+  return read_project(sources);
+}
+std::vector<std::string> problems_of(std::string_view text) {
+  std::vector<std::string> result;
+  for (const SourceProblem& problem : read(text).problems) result.push_back(describe(problem));
+  return result;
+}
+std::string in_resource(const std::string& text) {
+  return "CONFIGURATION c RESOURCE r ON PLC\n" + text + "\nEND_RESOURCE END_CONFIGURATION";
+}
+
+TEST(IecProject, HasTheTasksOfAResourceWithTheirPrograms) {
+  const auto [project, problems] = read(kLine);
+  EXPECT_THAT(problems, IsEmpty());
+  ASSERT_THAT(project.configurations, SizeIs(1));
+  const Configuration& cell = project.configurations.front();
+  EXPECT_EQ(cell.name, "cell");
+  ASSERT_THAT(cell.resources, SizeIs(1));
+  const Resource& press = cell.resources.front();
+  ASSERT_THAT(press.tasks, SizeIs(2));
+  EXPECT_EQ(press.tasks[0].name, "fast");
+  EXPECT_EQ(press.tasks[0].interval_ns, 10'000'000);
+  EXPECT_EQ(press.tasks[0].priority, 1);
+  EXPECT_EQ(press.tasks[1].single, "go");
+  EXPECT_EQ(press.tasks[1].interval_ns, std::nullopt);
+  ASSERT_THAT(press.programs, SizeIs(2));
+  EXPECT_EQ(press.programs[0].task, "fast");
+  EXPECT_EQ(press.programs[0].type, "Main");
+  EXPECT_EQ(press.programs[1].name, "main2");
+  EXPECT_EQ(press.programs[1].task, "");
+  EXPECT_TRUE(press.globals.at(0).constant);
+}
+
+TEST(IecProject, HasTheVariablesOfEachPou) {
+  const Project project = read(kLine).project;
+  const Pou* const main = project.pou("MAIN");
+  ASSERT_NE(main, nullptr);
+  ASSERT_THAT(main->variables, SizeIs(6));
+  EXPECT_EQ(main->variables[0].name, "count");
+  EXPECT_TRUE(main->variables[1].retain);
+  EXPECT_EQ(main->variables[1].type, "DINT");
+  EXPECT_EQ(main->variables[2].section, Variable::Section::external);
+  EXPECT_EQ(main->variables[3].location, "%IW2");
+  EXPECT_EQ(main->variables[3].type, "ARRAY[1..4] OF INT");
+  EXPECT_EQ(main->variables[4].type, "STRING[80]");
+  EXPECT_EQ(project.pou("valve")->kind, Pou::Kind::function_block);
+  EXPECT_EQ(project.configurations.front().globals.at(0).location, "%IX0.0");
+}
+
+TEST(IecProject, MayHaveItsTasksInTheConfigurationItself) {
+  const auto [project, problems] = read(
+      "CONFIGURATION c TASK t (INTERVAL := T#1s, PRIORITY := 3); PROGRAM p WITH t : Main; END_CONFIGURATION");
+  EXPECT_THAT(problems, IsEmpty());
+  ASSERT_THAT(project.configurations.at(0).resources, SizeIs(1));
+  EXPECT_EQ(project.configurations[0].resources[0].name, "");
+  EXPECT_EQ(project.configurations[0].resources[0].programs.at(0).task, "t");
+}
+
+TEST(IecProject, SaysWhatIsWrongWithATask) {
+  EXPECT_THAT(problems_of(in_resource("TASK t (PRIORITY := 1);")),
+              ElementsAre("a.st:2:1: TASK t has neither INTERVAL nor SINGLE, so it never runs"));
+  EXPECT_THAT(problems_of(in_resource("TASK t (INTERVAL := T#1s);")),
+              ElementsAre("a.st:2:1: TASK t has no PRIORITY; 0 to 31 is allowed"));
+  EXPECT_THAT(problems_of(in_resource("TASK t (INTERVAL := 20, PRIORITY := 1);")).at(0),
+              HasSubstr("a.st:2:21: INTERVAL '20' is not a duration"));
+  EXPECT_THAT(problems_of(in_resource("TASK t (INTERVAL := T#1s, PRIORITY := 32);")),
+              ElementsAre("a.st:2:39: PRIORITY 32: allowed is 0 (the highest) to 31"));
+  EXPECT_THAT(problems_of(in_resource("TASK t (INTERVL := T#1s, PRIORITY := 1);")).at(0),
+              HasSubstr("'INTERVL' is no part of a TASK"));
+  EXPECT_THAT(
+      problems_of(in_resource("TASK t (SINGLE := a, PRIORITY := 1); TASK T (SINGLE := a, PRIORITY := 1);")),
+      ElementsAre("a.st:2:38: there are two TASKs 'T'"));
+}
+
+TEST(IecProject, SaysWhichTaskOfAProgramIsMissing) {
+  EXPECT_THAT(problems_of(in_resource("PROGRAM p WITH slow : Main;")),
+              ElementsAre("a.st:2:1: PROGRAM p runs WITH 'slow', and there is no such TASK in its resource"));
+}
+
+TEST(IecProject, NamesTwoPousOfOneName) {
+  EXPECT_THAT(problems_of("PROGRAM a END_PROGRAM\nFUNCTION_BLOCK A END_FUNCTION_BLOCK"),
+              ElementsAre("a.st:2:1: there are two POUs 'A'"));
+}
+
+// Each cut of a text, and each word left out: it comes to an end, and says nothing of a place outside.
+TEST(IecProject, ComesToAnEndWithAnyText) {
+  for (std::size_t length = 0; length <= kLine.size(); ++length) {
+    for (const SourceProblem& problem : read(kLine.substr(0, length)).problems) {
+      EXPECT_EQ(problem.place.file, "a.st");
+      EXPECT_GE(problem.place.line, 1U);
+    }
+  }
+  for (const char* const text :
+       {"CONFIGURATION", "CONFIGURATION c RESOURCE", "PROGRAM p VAR a : ; b", "VAR", "PROGRAM p VAR : : AT ,",
+        "CONFIGURATION c TASK (", "CONFIGURATION c ) ( END_RESOURCE", "%", "{", "'", "T#"}) {
+    (void)read(text);
+  }
+}
+
+}  // namespace
+}  // namespace plchost::iec
