@@ -229,6 +229,9 @@ class ProjectReader {
   }
   void set(Task& task, const Token& key, const Token& value) {
     if (key.is("SINGLE")) {
+      if (value.kind != Token::Kind::name) {
+        report(value.place, fmt::format("SINGLE {}: allowed is the name of a variable", value.text));
+      }
       task.single = value.text;
     } else if (key.is("PRIORITY")) {
       std::int64_t priority = -1;

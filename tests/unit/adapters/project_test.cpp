@@ -112,6 +112,8 @@ TEST(IecProject, SaysWhatIsWrongWithATask) {
               HasSubstr("a.st:2:21: INTERVAL '20' is not a duration"));
   EXPECT_THAT(problems_of(in_resource("TASK t (INTERVAL := T#1s, PRIORITY := 32);")),
               ElementsAre("a.st:2:39: PRIORITY 32: allowed is 0 (the highest) to 31"));
+  EXPECT_THAT(problems_of(in_resource("TASK t (SINGLE := 'a', PRIORITY := 1);")),
+              ElementsAre("a.st:2:19: SINGLE 'a': allowed is the name of a variable"));
   EXPECT_THAT(problems_of(in_resource("TASK t (INTERVL := T#1s, PRIORITY := 1);")).at(0),
               HasSubstr("'INTERVL' is no part of a TASK"));
   EXPECT_THAT(

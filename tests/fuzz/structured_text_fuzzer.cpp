@@ -1,0 +1,111 @@
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "instances/adapters/iec/project.hpp"
+#include "instances/adapters/matiec/glue.hpp"
+#include "instances/adapters/matiec/iec2c.hpp"
+
+namespace {
+
+using namespace plchost;
+
+constexpr std::array<std::string_view, 40> kWords{"CONFIGURATION ",
+                                                  "END_CONFIGURATION ",
+                                                  "RESOURCE ",
+                                                  "ON ",
+                                                  "END_RESOURCE ",
+                                                  "TASK ",
+                                                  "PROGRAM ",
+                                                  "END_PROGRAM ",
+                                                  "WITH ",
+                                                  "VAR ",
+                                                  "VAR_GLOBAL ",
+                                                  "VAR_EXTERNAL ",
+                                                  "END_VAR ",
+                                                  "RETAIN ",
+                                                  "CONSTANT ",
+                                                  "AT ",
+                                                  "%IX0.1 ",
+                                                  "%QW2 ",
+                                                  "BOOL ",
+                                                  "INT ",
+                                                  "a ",
+                                                  "b ",
+                                                  "c ",
+                                                  "INTERVAL ",
+                                                  "SINGLE ",
+                                                  "PRIORITY ",
+                                                  ":= ",
+                                                  "T#10ms ",
+                                                  "1 ",
+                                                  ", ",
+                                                  "; ",
+                                                  ": ",
+                                                  "( ",
+                                                  ") ",
+                                                  "TYPE ",
+                                                  "END_TYPE ",
+                                                  "STRUCT ",
+                                                  "END_STRUCT ",
+                                                  "FUNCTION_BLOCK ",
+                                                  "END_FUNCTION_BLOCK "};
+
+/// Bytes alone seldom make a word.
+std::string text_of(std::span<const std::uint8_t> bytes) {
+  std::string text;
+  for (const std::uint8_t byte : bytes) {
+    if (byte < kWords.size()) {
+      text += kWords[byte];
+    } else {
+      text += static_cast<char>(byte);
+    }
+  }
+  return text;
+}
+
+// Names go into a C file.
+void require_name(const std::string& name) {
+  const auto belongs = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' || c == '.';
+  };
+  if (!std::ranges::all_of(name, belongs)) std::abort();
+}
+
+void require_places(const iec::SourceProblems& problems) {
+  for (const iec::SourceProblem& problem : problems) {
+    if (problem.place.file != "a.st" || problem.place.line == 0 || problem.text.empty()) std::abort();
+  }
+}
+
+}  // namespace
+
+// Any text comes to an end; problems have a place in it; nothing but names goes into the C file.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  const std::string text = text_of({data, size});
+  const std::array<iec::Source, 1> sources{{{"a.st", text}}};
+  const auto [project, problems] = iec::read_project(sources);
+  require_places(problems);
+  const std::string raw(reinterpret_cast<const char*>(data), size);
+  (void)matiec::problems_of(raw, matiec::JoinedSource(sources), project);
+  const auto located = matiec::located_variables(raw);
+  if (!problems.empty()) return 0;
+  for (const iec::Configuration& configuration : project.configurations) {
+    require_name(configuration.name);
+    for (const iec::Resource& resource : configuration.resources) {
+      require_name(resource.name);
+      for (const iec::Task& task : resource.tasks) require_name(task.name + task.single);
+      for (const iec::Program& program : resource.programs) require_name(program.name + program.type);
+      const matiec::Glue glue = matiec::write_glue(project, configuration, resource, {});
+      require_places(glue.problems);
+      require_places(glue.remarks);
+      (void)matiec::write_glue(project, configuration, resource, located);
+    }
+  }
+  return 0;
+}
