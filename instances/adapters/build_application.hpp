@@ -7,7 +7,7 @@
 
 namespace plchost {
 
-/// What `plcctl build application` is to make.
+/// The order to `plcctl build application`.
 struct BuildOrder {
   std::vector<std::string> sources;  ///< files, and folders whose *.st are meant
   std::string output;         ///< the application: line.so. Of several resources each has its name in it

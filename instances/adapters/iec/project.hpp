@@ -11,7 +11,7 @@
 
 namespace plchost::iec {
 
-// What the sources of a program declare, as far as tasks, areas and variables need it. The compiler reads
+// The declarations in the sources of a program, as far as tasks, areas and variables need them. The compiler reads
 // the sources, too, and finds what is wrong in the rest. Names are as they stand in the source; compare them
 // by folded().
 

@@ -42,7 +42,7 @@ class JoinedSource {
 /// The name of the joined file, in the folder in which iec2c runs.
 inline constexpr std::string_view kJoinedFile = "joined.st";
 
-/// What iec2c has printed, in the words and places of the sources. Errors in its own library come from a name
+/// The output of iec2c, in the words and places of the sources. Errors in its own library come from a name
 /// of the program that the library has, too: such a name is named where it is declared.
 [[nodiscard]] iec::SourceProblems problems_of(std::string_view output, const JoinedSource& source,
                                               const iec::Project& project);
