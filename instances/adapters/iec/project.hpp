@@ -11,9 +11,9 @@
 
 namespace plchost::iec {
 
-// The declarations in the sources of a program, as far as tasks, areas and variables need them. The compiler reads
-// the sources, too, and finds what is wrong in the rest. Names are as they stand in the source; compare them
-// by folded().
+// The declarations in the sources of a program, as far as tasks, areas and variables need them. The compiler
+// reads the sources, too, and finds what is wrong in the rest. Names are as they stand in the source; compare
+// them by folded().
 
 struct Variable {
   enum class Section : unsigned char { input, output, in_out, local, temporary, external, global, other };

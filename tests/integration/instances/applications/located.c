@@ -1,6 +1,6 @@
 /*
- * What `plcctl build application` writes beside application.c, here by hand: so the adapter is tested where
- * no compiler for Structured Text is. Twice.st in structured_text_test.cpp is the same program.
+ * The file that `plcctl build application` writes beside application.c, by hand. So the adapter is tested
+ * without a compiler for Structured Text. kTwice in structured_text_test.cpp is the same program.
  */
 #include "plchost_matiec.h"
 
