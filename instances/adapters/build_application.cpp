@@ -19,6 +19,7 @@
 #include "instances/adapters/matiec/glue.hpp"
 #include "instances/adapters/matiec/iec2c.hpp"
 #include "instances/adapters/matiec/located.hpp"
+#include "instances/adapters/matiec/task_plan.hpp"
 #include "instances/adapters/run_program.hpp"
 
 namespace plchost {
@@ -79,7 +80,7 @@ class Build {
   explicit Build(const BuildOrder& order) : order_(order), work_(order.keep) {}
 
   BuildReport run() {
-    if (read_sources() && translate()) {
+    if (read_sources() && can_be_planned() && translate()) {
       for (const iec::Resource& resource : configuration().resources) make(resource);
     }
     if (!report_.problems.empty()) remove_made();
@@ -141,6 +142,15 @@ class Build {
     sources_.push_back({file, text_of(file)});
   }
 
+  // Before iec2c sees them: of some it says nothing, by others it is ended.
+  bool can_be_planned() {
+    for (const iec::Resource& resource : configuration().resources) {
+      const auto plan = matiec::plan_tasks(project_, configuration(), resource);
+      std::ranges::copy(plan.problems, std::back_inserter(report_.problems));
+    }
+    return report_.problems.empty();
+  }
+
   bool translate() {
     const auto compiler = matiec::find_compiler(order_.matiec);
     if (!compiler) {
@@ -162,7 +172,7 @@ class Build {
       fail(end.error().describe());
       return false;
     }
-    std::ranges::move(matiec::problems_of(end->output, joined, project_),
+    std::ranges::move(matiec::problems_of(end->output, joined, project_, compiler_.library),
                       std::back_inserter(report_.problems));
     if (report_.problems.empty() && end->signal != 0) {
       fail(fmt::format("iec2c was ended by {}, and has not said which line it could not translate",

@@ -92,7 +92,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto [project, problems] = iec::read_project(sources);
   require_places(problems);
   const std::string raw(reinterpret_cast<const char*>(data), size);
-  (void)matiec::problems_of(raw, matiec::JoinedSource(sources), project);
+  (void)matiec::problems_of(raw, matiec::JoinedSource(sources), project, "/nowhere");
   const auto located = matiec::located_variables(raw);
   if (!problems.empty()) return 0;
   for (const iec::Configuration& configuration : project.configurations) {

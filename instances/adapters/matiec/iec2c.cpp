@@ -119,7 +119,7 @@ iec::SourcePlace JoinedSource::place(unsigned line, unsigned column) const {
 }
 
 iec::SourceProblems problems_of(std::string_view output, const JoinedSource& source,
-                                const iec::Project& project) {
+                                const iec::Project& project, const std::string& library) {
   static const std::regex kLine(R"(^(.*?):(\d+)-(\d+)\.\.\d+-\d+: (error|warning): (.*)$)");
   iec::SourceProblems problems;
   const auto add = [&](iec::SourceProblem problem) {
@@ -134,7 +134,7 @@ iec::SourceProblems problems_of(std::string_view output, const JoinedSource& sou
       add({source.place(number_of(match[2]), number_of(match[3])), match[5]});
       continue;
     }
-    for (const std::string& word : words_in(match[1], number_of(match[2]))) {
+    for (const std::string& word : words_in(fs::path(library) / match[1].str(), number_of(match[2]))) {
       const auto declared = std::ranges::find(names, word, &Declared::name);
       if (declared == names.end()) continue;
       add({declared->place,

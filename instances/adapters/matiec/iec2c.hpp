@@ -42,9 +42,10 @@ class JoinedSource {
 /// The name of the joined file, in the folder in which iec2c runs.
 inline constexpr std::string_view kJoinedFile = "joined.st";
 
-/// The output of iec2c, in the words and places of the sources. Errors in its own library come from a name
-/// of the program that the library has, too: such a name is named where it is declared.
+/// The output of iec2c, in the words and places of the sources. Errors in its own library (in the folder
+/// `library`) come from a name of the program that the library has, too: that name is told, where it is
+/// declared.
 [[nodiscard]] iec::SourceProblems problems_of(std::string_view output, const JoinedSource& source,
-                                              const iec::Project& project);
+                                              const iec::Project& project, const std::string& library);
 
 }  // namespace plchost::matiec

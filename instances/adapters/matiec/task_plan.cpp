@@ -37,6 +37,7 @@ class Planner {
     }
     for (PlannedTask& task : plan_.tasks) find_uses(task);
     for (const PlannedTask& task : plan_.tasks) check(task);
+    check_names();
     name_shared_globals();
     name_retained();
     if (plan_.tasks.empty() && plan_.problems.empty()) {
@@ -118,11 +119,28 @@ class Planner {
     if (task.interval_ns % kMicrosecond != 0 || task.interval_ns > kMaxInterval) {
       wrong(fmt::format("INTERVAL of {}: allowed are whole microseconds up to 50 days", task.name));
     }
-    const auto same = std::ranges::count_if(
-        plan_.tasks, [&](const PlannedTask& other) { return folded(other.name) == folded(task.name); });
-    if (same > 1) wrong(fmt::format("a TASK and a PROGRAM without one are both called '{}'", task.name));
     if (!task.single.empty()) check_single(task);
   }
+  // In the C of iec2c tasks, instances of programs, POUs and types have their names as they are, in upper
+  // case.
+  void check_names() {
+    std::map<std::string, std::string> taken;
+    for (const iec::Pou& pou : project_.pous) taken[folded(pou.name)] = "a POU";
+    for (const iec::DeclaredType& type : project_.types) taken[folded(type.name)] = "a TYPE";
+    const auto take = [&](const std::string& name, const iec::SourcePlace& place, const char* what) {
+      const auto [entry, is_new] = taken.try_emplace(folded(name), what);
+      if (is_new) return;
+      plan_.problems.push_back(
+          {place, fmt::format(
+                      "'{}' is the name of {}, too: iec2c cannot tell them apart; call one of them otherwise",
+                      name, entry->second)});
+    };
+    for (const iec::Task& task : resource_.tasks) take(task.name, task.place, "a TASK");
+    for (const iec::Program& program : resource_.programs) {
+      take(program.name, program.place, "an instance of a PROGRAM");
+    }
+  }
+
   // Its value must come from somewhere, also while the task waits for it.
   void check_single(const PlannedTask& task) {
     const auto global = plan_.globals.find(folded(task.single));

@@ -24,7 +24,7 @@ namespace {
 using ::testing::HasSubstr;
 
 constexpr const char* kTwice = R"(
-PROGRAM Fast
+PROGRAM Doubler
   VAR_EXTERNAL go : BOOL; flag : BOOL; END_VAR
   VAR
     raw AT %IW1 : INT;
@@ -55,18 +55,18 @@ CONFIGURATION cell
   RESOURCE press ON PLC
     TASK fast (INTERVAL := T#2ms, PRIORITY := 1);
     TASK edge (SINGLE := go, PRIORITY := 0);
-    PROGRAM one WITH fast : Fast;
+    PROGRAM one WITH fast : Doubler;
     PROGRAM two WITH edge : Counter;
-    PROGRAM loop : Loop;
+    PROGRAM rest : Loop;
   END_RESOURCE
 END_CONFIGURATION
 )";
 
-struct Inputs {
+struct ImageIn {
   std::uint8_t bits = 0, unused = 0;
   std::int16_t raw = 0;
 };
-struct Outputs {
+struct ImageOut {
   std::uint8_t bits = 0, unused = 0;
   std::int16_t twice = 0;
   std::uint8_t edges = 0, copied = 0, loops = 0, preset = 0;
@@ -91,15 +91,15 @@ class StructuredText : public ::testing::Test {
     ASSERT_EQ(plc_image_open(sandbox.pool().c_str(), "in", 64, PLC_IMAGE_WRITE, &inputs_), 0);
     ASSERT_EQ(plc_image_open(sandbox.pool().c_str(), "out", 64, PLC_IMAGE_READ, &outputs_), 0);
   }
-  void put(Inputs inputs) {
+  void put(ImageIn inputs) {
     std::array<char, 64> bytes{};
     std::memcpy(bytes.data(), &inputs, sizeof inputs);
     plc_image_write(&inputs_, bytes.data());
   }
-  Outputs outputs() {
+  ImageOut outputs() {
     std::array<char, 64> bytes{};
     EXPECT_EQ(plc_image_read(&outputs_, bytes.data(), nullptr), PLC_IMAGE_OK);
-    Outputs outputs;
+    ImageOut outputs;
     std::memcpy(&outputs, bytes.data(), sizeof outputs);
     return outputs;
   }
@@ -152,7 +152,7 @@ TEST_F(StructuredText, ThatMatiecTranslatesRunsAsItIsWritten) {
   const ProgramEnd built = build(kTwice);
   ASSERT_TRUE(built.success()) << built.output;
   EXPECT_THAT(built.output, HasSubstr("twice.so: built"));
-  EXPECT_THAT(built.output, HasSubstr("PROGRAM loop has no TASK: it runs freewheeling"));
+  EXPECT_THAT(built.output, HasSubstr("PROGRAM rest has no TASK: it runs freewheeling"));
   start(sandbox.folder() + "/twice.so");
   expect_it_works();
 }
@@ -163,10 +163,14 @@ TEST_F(StructuredText, ThatIsWrongIsToldInItsOwnWords) {
   text.replace(text.find("raw * 2"), 7, "row * 2");
   const ProgramEnd built = build(text);
   EXPECT_EQ(built.exit_code, 1);
-  EXPECT_THAT(built.output, HasSubstr("twice.st:13:12: "));
+  EXPECT_THAT(built.output, HasSubstr("twice.st:14:12: "));
   text = kTwice;
-  text.replace(text.find("PROGRAM Loop"), 12, "PROGRAM TON");
-  EXPECT_EQ(build(text).exit_code, 1);
+  text.replace(text.find(": Loop;"), 7, ": Loop (loops := 5);");
+  EXPECT_THAT(build(text).output,
+              HasSubstr("twice.st:35:5: PROGRAM rest: iec2c cannot translate connections"));
+  text = kTwice;
+  text.replace(text.find("PROGRAM Loop"), 12, "PROGRAM P");
+  EXPECT_THAT(build(text).output, HasSubstr("'P' is also a name in the library of iec2c"));
 }
 
 TEST_F(StructuredText, WithoutACompilerSaysHowToGetOne) {

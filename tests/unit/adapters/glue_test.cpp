@@ -123,6 +123,17 @@ TEST_F(MatiecGlue, SaysWhatTheCompilerCannotDoAndWhatIsDropped) {
       ElementsAre(HasSubstr("allowed are whole microseconds up to 50 days")));
 }
 
+TEST_F(MatiecGlue, RefusesTwoThingsOfOneName) {
+  const std::string one = "PROGRAM one WITH fast : Main;";
+  EXPECT_THAT(
+      texts(write(std::string(kMain) + " FUNCTION_BLOCK Fast END_FUNCTION_BLOCK", kGo, kFast + one).problems),
+      ElementsAre(HasSubstr("c.st:4:1: 'fast' is the name of a POU, too")));
+  EXPECT_THAT(texts(write(std::string(kMain) + " TYPE One : INT; END_TYPE", kGo, kFast + one).problems),
+              ElementsAre(HasSubstr("'one' is the name of a TYPE, too")));
+  EXPECT_THAT(texts(write(kMain, kGo, kFast + one + "PROGRAM Fast : Main;").problems),
+              ElementsAre(HasSubstr("'Fast' is the name of a TASK, too")));
+}
+
 TEST_F(MatiecGlue, RefusesATypeThatDoesNotFitIntoItsPlace) {
   const Glue glue = write(kMain, "VAR_GLOBAL go AT %IW0 : BOOL; END_VAR",
                           std::string(kFast) + "PROGRAM one WITH fast : Main;", {{"BOOL", "__IW0", "%IW0"}});

@@ -23,7 +23,7 @@ const std::vector<iec::Source> kSources{{"a.st", "PROGRAM P\nEND_PROGRAM"},
 std::vector<std::string> told(const std::string& output) {
   const iec::Project project = iec::read_project(kSources).project;
   std::vector<std::string> result;
-  for (const auto& problem : problems_of(output, JoinedSource(kSources), project))
+  for (const auto& problem : problems_of(output, JoinedSource(kSources), project, "/nowhere"))
     result.push_back(iec::describe(problem));
   return result;
 }
