@@ -120,7 +120,7 @@ iec::SourcePlace JoinedSource::place(unsigned line, unsigned column) const {
 
 iec::SourceProblems problems_of(std::string_view output, const JoinedSource& source,
                                 const iec::Project& project, const std::string& library) {
-  static const std::regex kLine(R"(^(.*?):(\d+)-(\d+)\.\.\d+-\d+: (error|warning): (.*)$)");
+  static const std::regex form(R"(^(.*?):(\d+)-(\d+)\.\.\d+-\d+: (error|warning): (.*)$)");
   iec::SourceProblems problems;
   const auto add = [&](iec::SourceProblem problem) {
     if (std::ranges::find(problems, problem) == problems.end()) problems.push_back(std::move(problem));
@@ -129,7 +129,7 @@ iec::SourceProblems problems_of(std::string_view output, const JoinedSource& sou
   for (const auto part : std::views::split(output, '\n')) {
     const std::string line(part.begin(), part.end());
     std::smatch match;
-    if (line.size() > kMaxLine || !std::regex_match(line, match, kLine) || match[4] != "error") continue;
+    if (line.size() > kMaxLine || !std::regex_match(line, match, form) || match[4] != "error") continue;
     if (fs::path(match[1].str()).filename() == kJoinedFile) {
       add({source.place(number_of(match[2]), number_of(match[3])), match[5]});
       continue;

@@ -20,7 +20,7 @@ constexpr unsigned kBits = 8;
 std::vector<unsigned> numbers_of(std::string_view text) {
   std::vector<unsigned> numbers;
   for (const auto part : std::views::split(text, '.')) {
-    const std::string_view digits(part.begin(), part.end());
+    const std::string digits(part.begin(), part.end());
     unsigned number = 0;
     const char* const end = digits.data() + digits.size();
     const auto read = std::from_chars(digits.data(), end, number);
