@@ -55,7 +55,7 @@ TEST_F(Memory, WritersOfOneClientThatPostOnceLeaveNothingBehind) {
   if (kSanitized) GTEST_SKIP() << "a sanitizer keeps what was freed";
   const dds::Entity participant(dds_create_participant(domain_.number(), nullptr, nullptr));
   const auto events = dds::make_topic(participant.get(), dds::kEventPost).value();
-  expect_bounded(1200, 2000, [&] {
+  expect_bounded(1200, 6000, [&] {
     auto poster = EventPoster::create(participant.get(), events.get(), "hosta").value();
     for (const TimePoint end = soon(); !poster.matched();) {
       ASSERT_LT(MonotonicClock::now(), end);
