@@ -236,7 +236,7 @@ TEST_F(RemoteCommand, WorksForTwentyClientsAtOnce) {
   for (int i = 0; i < 20; ++i) {
     clients.emplace_back(PLCCTL_PROGRAM,
                          std::vector<std::string>{"--domain", std::to_string(domain_.number()), "--timeout",
-                                                  "20", "stop", "instance", "line1"});
+                                                  "60", "stop", "instance", "line1"});
   }
   for (Child& client : clients) EXPECT_EQ(client.wait(), 0);
   EXPECT_EQ(host_.requests().size(), 20U);

@@ -266,8 +266,7 @@ TEST_F(Gateway, OfTwoHostsOfOneNumberTheLaterOneDoesNotServeAndSaysSo) {
   // Until it has heard of south.
   ASSERT_TRUE(becomes([&] { return hosts_of_gateway("west").empty(); })) << hosts_of_gateway("west");
   for (int i = 0; i < 20; ++i) {
-    send(north, south.address_at(2), {});
-    ASSERT_TRUE(south.next());
+    ASSERT_TRUE(reach(north, south.address_at(2), south));
     (void)west.channel.send(north.address_at(1), {});
     EXPECT_FALSE(north.next(std::chrono::milliseconds(20)));
   }

@@ -18,14 +18,9 @@
 #include "api/server/heap_trim.hpp"
 #include "tests/integration/api/test_host.hpp"
 #include "tests/support/own_name.hpp"
+#include "tests/support/sanitized.hpp"
 
 namespace plchost {
-
-#ifdef PLCHOST_ADDRESS_SANITIZER
-constexpr bool kSanitized = true;  // frees later
-#else
-constexpr bool kSanitized = false;
-#endif
 
 /// The memory of a process.
 struct MemoryUse {
