@@ -33,7 +33,7 @@ steps=12
 # Files and lines are told by binutils, which g++ needs anyway: clang's own symbolizer would be a large package more.
 symbols=external_symbolizer_path=/usr/bin/addr2line
 export ASAN_OPTIONS=handle_segv=0:handle_sigbus=0:verify_asan_link_order=0:detect_odr_violation=0:$symbols UBSAN_OPTIONS=print_stacktrace=1:$symbols
-export TSAN_OPTIONS=handle_segv=0:handle_sigbus=0:die_after_fork=0:ignore_noninstrumented_modules=1:$symbols
+export TSAN_OPTIONS=handle_segv=0:handle_sigbus=0:die_after_fork=0:ignore_noninstrumented_modules=1:$symbols LSAN_OPTIONS=print_suppressions=0
 if [ "${1:-}" != --step ] && [ "${1:-}" != --fuzz ]; then
   [ -n "${PLCHOST_OWN_ROOT:-}" ] || PLCHOST_OWN_ROOT=1 exec tests/own_root.sh "$BASH" "$self" "$@"
   # By these the last step finds what the tests have left behind. The name is short: sockets lie in it.
@@ -140,7 +140,7 @@ gates() { tests/gates/layers.sh && tests/gates/house.sh && tests/gates/format.sh
 passed=0
 failed=0
 tests() { # tests DIR OPTIONS...
-  # What a sanitizer has to say of a process that a test started would be lost if the test asks only for what that one does.
+  # A sanitizer's report of a process that a test started would be lost if the test looks only at its effects.
   local reports=$own/reports/r code=0
   mkdir -p -m 1777 "${reports%/*}"
   # ctest counts quarters of a core (tests/CMakeLists.txt): on each core four tests that wait, or one that computes.
@@ -210,7 +210,7 @@ case "${1:-}" in
     join build_asan "address and undefined sanitizers: build"
     run "address and undefined sanitizers: tests" tests .build/asan "${whole[@]}"
     count
-    # Of the integration tests only those of the API: what instances and the manager share is memory of several processes.
+    # Of the integration tests only those of the API: instances and the manager share memory of several processes.
     join build_tsan "thread sanitizer: build"
     run "thread sanitizer: tests" tests .build/tsan "${whole[@]}"
     count
