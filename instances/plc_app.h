@@ -62,8 +62,7 @@ typedef unsigned int RTS_RESULT;
 #define ERR_DUPLICATE 0x0012u /* was there already; the handle is valid */
 #define ERR_NO_TASK 0x4000u   /* soft: counted, but no task is bound to the event at this time */
 
-/* Whole numbers of 64 bit. */
-typedef long RTS_I64;
+typedef long RTS_I64; /* 64 bit */
 typedef unsigned long RTS_UI64;
 
 /* ---- Tasks --------------------------------------------------------------------------------------------- */
@@ -267,10 +266,9 @@ RTS_HANDLE CDECL plc_declare_area(const Plc_Area* pArea, RTS_RESULT* pResult);
  * area: the place where it lies. Null: no such handle, or not placed yet. Any. */
 void* CDECL plc_area_address(RTS_HANDLE hArea);
 
-#define PLC_AREA_INITIAL 0u             /* began with its initial values */
-#define PLC_AREA_RETAINED 1u            /* went on with the memory of the process before: nothing is lost */
-#define PLC_AREA_RESTORED 2u            /* went on with the newest whole file */
-#define PLC_AREA_KEPT PLC_AREA_RETAINED /* its name before */
+#define PLC_AREA_INITIAL 0u  /* began with its initial values */
+#define PLC_AREA_RETAINED 1u /* went on with the memory of the process before: nothing is lost */
+#define PLC_AREA_RESTORED 2u /* went on with the newest whole file */
 
 typedef struct {
   unsigned int dwSize;   /* sizeof(Plc_Area_State), set by the caller */
@@ -354,6 +352,8 @@ RTS_RESULT CDECL SchedPostExternalEvent(RTS_HANDLE hEvent);
  * and set that. It works without a registration, and runs every task that is bound to the same event. */
 #define EVT_ExternalEventTaskCreateDone 0x0001u    /* tasks are made, not yet started; or changed online */
 #define EVT_PrepareExternalEventTaskDelete 0x0002u /* forget the hEvent now */
+/* Areas have their values, no task has started. Once in a process, its parameter is all null. */
+#define EVT_PrepareStart 0x0003u
 
 typedef struct {
   const Task_Info* pTaskInfo;

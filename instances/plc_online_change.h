@@ -34,8 +34,8 @@
 extern "C" {
 #endif
 
-#define PLC_MAX_VARIABLES 256u /* that a program may name */
-#define PLC_MAX_VARIABLE_NAME 50
+#define PLC_MAX_VARIABLES 65536u /* that a program may name */
+#define PLC_MAX_VARIABLE_NAME 250
 #define PLC_MAX_VARIABLE_BYTES 0x100000u /* of all of them: they are copied while all tasks wait */
 
 /* Names variables that an online change carries over: dwBytes at pAddress, which are copied to where the new

@@ -17,12 +17,9 @@ RTS_RESULT plc_set_task_options(const char* pszTask, const Task_Options* pOption
 RTS_RESULT plc_keep_variables(const char* pszName, void* pAddress, unsigned int dwBytes, RTS_UI64 qwLayout) {
   ApplicationHost* const host = ApplicationHost::current_for_control();
   if (host == nullptr) return ERR_NOTINITIALIZED;
-  return host->keep_variables({.name = pszName == nullptr
-                                           ? std::string()
-                                           : std::string(plchost::cut(pszName, PLC_MAX_VARIABLE_NAME + 1)),
-                               .address = pAddress,
-                               .bytes = dwBytes,
-                               .layout = qwLayout});
+  return host->keep_variables(
+      pszName == nullptr ? std::string() : std::string(plchost::cut(pszName, PLC_MAX_VARIABLE_NAME + 1)),
+      {.address = pAddress, .bytes = dwBytes, .layout = qwLayout});
 }
 
 int plc_online_change() {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -10,13 +11,14 @@
 
 namespace plchost {
 
-/// The variables that plc_keep_variables() names.
+/// Variables that plc_keep_variables() names.
 struct CarriedVariables {
-  std::string name;
   void* address = nullptr;  ///< in the application
   std::uint32_t bytes = 0;
   std::uint64_t layout = 0;
 };
+
+using CarriedByName = std::map<std::string, CarriedVariables, std::less<>>;
 
 struct EventCallback {
   unsigned event = 0;
@@ -31,8 +33,9 @@ struct ApplicationDeclaration {
   sys_setup_tasks_struct* tasks = nullptr;  ///< in the application; null: nothing yet
   bool tasks_given_twice = false;
   std::vector<TaskSettings> task_options;
-  std::vector<CarriedVariables> variables;
-  std::vector<RTS_HANDLE> events;  ///< own ones that it registers
+  CarriedByName variables;
+  std::uint64_t variable_bytes = 0;  ///< of all of them
+  std::vector<RTS_HANDLE> events;    ///< own ones that it registers
   std::vector<EventCallback> callbacks;
   std::vector<DeclaredArea> areas;  ///< at the first load Areas gets them
 };

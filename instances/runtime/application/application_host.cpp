@@ -135,26 +135,24 @@ void ApplicationHost::set_up_tasks(sys_setup_tasks_struct* tasks) noexcept {
   if (!has_application_) task_table_.set_up(tasks);
 }
 
-RTS_RESULT ApplicationHost::keep_variables(const CarriedVariables& variables) {
+RTS_RESULT ApplicationHost::keep_variables(const std::string& name, const CarriedVariables& variables) {
   const auto refuse = [&](RTS_RESULT why, std::string_view text) {
-    spdlog::error("plc_keep_variables: variables '{}': {}", shown(variables.name), text);
+    spdlog::error("plc_keep_variables: variables '{}': {}", shown(name), text);
     return why;
   };
   if (collected_ == nullptr) return refuse(ERR_NOTINITIALIZED, "they are named in plc_app_init only");
-  if (auto valid = check_name("variables", variables.name, PLC_MAX_VARIABLE_NAME); !valid)
+  if (auto valid = check_name("variables", name, PLC_MAX_VARIABLE_NAME); !valid)
     return refuse(ERR_PARAMETER, valid.error().message);
   if (variables.address == nullptr || variables.bytes == 0)
     return refuse(ERR_PARAMETER, "pAddress is null or dwBytes is 0");
-  std::uint64_t bytes = variables.bytes;
-  for (const CarriedVariables& known : collected_->variables) {
-    if (known.name == variables.name) return refuse(ERR_DUPLICATE, "are named twice");
-    bytes += known.bytes;
-  }
+  if (collected_->variables.contains(name)) return refuse(ERR_DUPLICATE, "are named twice");
+  const std::uint64_t bytes = collected_->variable_bytes + variables.bytes;
   if (collected_->variables.size() == PLC_MAX_VARIABLES || bytes > PLC_MAX_VARIABLE_BYTES) {
     return refuse(ERR_NOMEMORY, fmt::format("at most {} with {} bytes in all can be named", PLC_MAX_VARIABLES,
                                             PLC_MAX_VARIABLE_BYTES));
   }
-  collected_->variables.push_back(variables);
+  collected_->variables.emplace(name, variables);
+  collected_->variable_bytes = bytes;
   return ERR_OK;
 }
 
@@ -220,7 +218,8 @@ RTS_RESULT ApplicationHost::set_task_options(const char* task, const Task_Option
 }
 
 RTS_RESULT ApplicationHost::add_callback(unsigned event, PF_EVENT_CALLBACK callback, void* user) {
-  const bool known = event == EVT_ExternalEventTaskCreateDone || event == EVT_PrepareExternalEventTaskDelete;
+  const bool known = event == EVT_ExternalEventTaskCreateDone ||
+                     event == EVT_PrepareExternalEventTaskDelete || event == EVT_PrepareStart;
   if (!known || callback == nullptr) return ERR_PARAMETER;
   const EventCallback wanted{event, callback, user};
   if (collected_ != nullptr) {

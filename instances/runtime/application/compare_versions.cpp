@@ -103,15 +103,14 @@ std::vector<std::string> compare_areas(std::span<const DeclaredArea> running,
   return compare_all("area", running, next, compare_area);
 }
 
-std::vector<std::string> compare_variables(std::span<const CarriedVariables> running,
-                                           std::span<const CarriedVariables> next) {
+std::vector<std::string> compare_variables(const CarriedByName& running, const CarriedByName& next) {
   std::vector<std::string> lines;
-  for (const CarriedVariables& carried : running) {
-    const auto same = std::ranges::find(next, carried.name, &CarriedVariables::name);
+  for (const auto& [name, carried] : running) {
+    const auto same = next.find(name);
     if (same == next.end()) continue;
-    Differences variables(lines, fmt::format("variables '{}'", carried.name));
-    variables.look("dwBytes", carried.bytes, same->bytes);
-    variables.look("qwLayout", carried.layout, same->layout);
+    Differences variables(lines, fmt::format("variables '{}'", name));
+    variables.look("dwBytes", carried.bytes, same->second.bytes);
+    variables.look("qwLayout", carried.layout, same->second.layout);
   }
   return lines;
 }

@@ -19,7 +19,7 @@ namespace plchost {
 [[nodiscard]] std::vector<std::string> compare_areas(std::span<const DeclaredArea> running,
                                                      std::span<const DeclaredArea> next);
 /// Variables that both name. Others may come and go.
-[[nodiscard]] std::vector<std::string> compare_variables(std::span<const CarriedVariables> running,
-                                                         std::span<const CarriedVariables> next);
+[[nodiscard]] std::vector<std::string> compare_variables(const CarriedByName& running,
+                                                         const CarriedByName& next);
 
 }  // namespace plchost

@@ -13,13 +13,13 @@ namespace plchost {
 
 namespace {
 
-// As many reasons as a reply has room for.
-std::string first_of(const std::vector<std::string>& lines) {
+// As many as a reply has room for.
+std::string first_of(const std::vector<std::string>& lines, std::string_view between) {
   constexpr std::size_t kMost = 8;
   std::string text = fmt::format(
       "{}", fmt::join(lines.begin(),
-                      lines.begin() + static_cast<std::ptrdiff_t>(std::min(lines.size(), kMost)), "; "));
-  if (lines.size() > kMost) text += fmt::format("; and {} more", lines.size() - kMost);
+                      lines.begin() + static_cast<std::ptrdiff_t>(std::min(lines.size(), kMost)), between));
+  if (lines.size() > kMost) text += fmt::format("{}and {} more", between, lines.size() - kMost);
   return text;
 }
 
@@ -72,7 +72,7 @@ Result<void> OnlineChange::compare(const ApplicationDeclaration& declaration) co
   if (lines.empty()) return {};
   return failure(ErrorCode::refused,
                  fmt::format("{} cannot take over online: {}; nothing is changed; load it without --online",
-                             next_.path(), first_of(lines)));
+                             next_.path(), first_of(lines, "; ")));
 }
 
 void OnlineChange::connect() {
@@ -82,11 +82,11 @@ void OnlineChange::connect() {
     codes_.push_back(next_.codes()[static_cast<std::size_t>(same - next_.tasks().begin())]);
     infos_.push_back(codes_.back()->info);
   }
-  for (const CarriedVariables& carried : host_.declaration().variables) {
-    const auto same = std::ranges::find(variables, carried.name, &CarriedVariables::name);
+  for (const auto& [name, carried] : host_.declaration().variables) {
+    const auto same = variables.find(name);
     if (same == variables.end()) continue;
-    copies_.push_back({.to = same->address, .from = carried.address, .bytes = carried.bytes});
-    copied_.push_back(carried.name);
+    copies_.push_back({.to = same->second.address, .from = carried.address, .bytes = carried.bytes});
+    copied_.push_back(name);
   }
 }
 
@@ -114,7 +114,7 @@ std::string OnlineChange::describe() const {
   return fmt::format("{} areas go on, {}", host_.areas().declared().size(),
                      copied_.empty() ? std::string("no variables were carried over")
                                      : fmt::format("variables {} were carried over ({} bytes)",
-                                                   fmt::join(copied_, ", "), bytes));
+                                                   first_of(copied_, ", "), bytes));
 }
 
 }  // namespace plchost

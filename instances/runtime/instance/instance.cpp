@@ -248,6 +248,7 @@ Result<std::string> Instance::make_tasks() {
     reference_.follow(tasks_->distributed_clock(), options_.launch.pool, reference);
   }
   notify_tasks(EVT_ExternalEventTaskCreateDone);
+  host_->notify(EVT_PrepareStart, {});
   for (const std::string& line :
        describe_cycle_limits(application_->tasks(), start_.settings.scheduler.watchdog)) {
     spdlog::info("watchdog: {}", line);

@@ -70,6 +70,7 @@ class Firmware {
 /// The application's report about itself.
 struct Report {
   unsigned long torn = 0, input = 0, missed = 0, late = 0, begun = 0, persistent = 0, data = 0, saves = 0;
+  unsigned long prepared = 0, at_start = 0;
   unsigned origin = 0;
 };
 
@@ -107,10 +108,11 @@ class AreasOf : public ::testing::Test {
     Report said;
     const int values = std::sscanf(
         log.c_str() + log.rfind("torn "),
-        "torn %lu input %lu missed %lu late %lu begun %lu persistent %lu data %lu origin %u saves %lu",
+        "torn %lu input %lu missed %lu late %lu begun %lu persistent %lu data %lu origin %u saves %lu "
+        "prepared %lu with %lu",
         &said.torn, &said.input, &said.missed, &said.late, &said.begun, &said.persistent, &said.data,
-        &said.origin, &said.saves);
-    EXPECT_EQ(values, 9) << log;
+        &said.origin, &said.saves, &said.prepared, &said.at_start);
+    EXPECT_EQ(values, 11) << log;
     return said;
   }
   void power_cut() {
@@ -300,6 +302,22 @@ TEST_F(AreasOf, RetainLoseNothingWithTheProcess) {
     sut->end(SIGKILL);
     start_well();
   }
+}
+
+TEST_F(AreasOf, AnApplicationAreToldOnceBeforeItsTasksStart) {
+  start_well();
+  EXPECT_EQ(report().at_start, 100U) << "initial values";
+  ASSERT_TRUE(eventually([&] { return sut->task("Fast")->counters.cycles > 20; }));
+  ASSERT_EQ(sut->ask(ControlVerb::stop).code, ErrorCode::ok);
+  ASSERT_EQ(sut->ask(ControlVerb::start).code, ErrorCode::ok);
+  const Report before = report();
+  EXPECT_EQ(before.prepared, 1U);
+  EXPECT_EQ(before.at_start, 100U);
+  sut->end(SIGKILL);
+  start_well("", {"--start-kind", "after-fault"});
+  const Report after = report();
+  EXPECT_EQ(after.prepared, 1U);
+  EXPECT_GE(after.at_start, before.begun);
 }
 
 TEST_F(AreasOf, RetainLoseAtMostAnIntervalWithThePower) {

@@ -123,14 +123,14 @@ TEST(AreasOfTwoVersions, MayNotComeGoOrBeOthers) {
 }
 
 TEST(VariablesOfTwoVersions, MayComeAndGoButNotChangeTheirLayout) {
-  const std::vector<CarriedVariables> running{{.name = "same", .bytes = 8, .layout = 1},
-                                              {.name = "gone", .bytes = 8},
-                                              {.name = "larger", .bytes = 8},
-                                              {.name = "other", .bytes = 8, .layout = 1}};
-  const std::vector<CarriedVariables> next{{.name = "other", .bytes = 8, .layout = 2},
-                                           {.name = "larger", .bytes = 12},
-                                           {.name = "new", .bytes = 1},
-                                           {.name = "same", .bytes = 8, .layout = 1}};
+  const CarriedByName running{{"same", {.bytes = 8, .layout = 1}},
+                              {"gone", {.bytes = 8}},
+                              {"larger", {.bytes = 8}},
+                              {"other", {.bytes = 8, .layout = 1}}};
+  const CarriedByName next{{"other", {.bytes = 8, .layout = 2}},
+                           {"larger", {.bytes = 12}},
+                           {"new", {.bytes = 1}},
+                           {"same", {.bytes = 8, .layout = 1}}};
   EXPECT_THAT(compare_variables(running, next),
               ElementsAre("variables 'larger': dwBytes is 12, of the one that runs it is 8",
                           "variables 'other': qwLayout is 2, of the one that runs it is 1"));

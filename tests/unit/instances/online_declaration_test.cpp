@@ -32,8 +32,8 @@ TEST_F(CarriedVariablesOf, AnApplicationAreNamedInItsInit) {
   host_.end_init();
   EXPECT_EQ(plc_keep_variables("b", bytes_.data(), 8, 3), ERR_NOTINITIALIZED);
   ASSERT_EQ(declaration_.variables.size(), 1U);
-  const CarriedVariables& kept = declaration_.variables.front();
-  EXPECT_EQ(kept.name, "a");
+  const auto& [name, kept] = *declaration_.variables.begin();
+  EXPECT_EQ(name, "a");
   EXPECT_EQ(kept.address, bytes_.data());
   EXPECT_EQ(kept.bytes, 8U);
   EXPECT_EQ(kept.layout, 3U);
@@ -57,7 +57,7 @@ TEST_F(CarriedVariablesOf, AnApplicationHaveABound) {
 
 TEST_F(CarriedVariablesOf, AnApplicationAreSoMany) {
   for (unsigned i = 0; i < PLC_MAX_VARIABLES; ++i) {
-    ASSERT_EQ(plc_keep_variables(std::to_string(i).c_str(), bytes_.data(), 1, 0), ERR_OK);
+    ASSERT_EQ(plc_keep_variables(std::to_string(i).c_str(), bytes_.data(), 1, 0), ERR_OK) << i;
   }
   EXPECT_EQ(plc_keep_variables("one", bytes_.data(), 1, 0), ERR_NOMEMORY);
 }

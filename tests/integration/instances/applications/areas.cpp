@@ -31,6 +31,8 @@ plc::Area<std::uint64_t> persistent;
 plc::Area<std::uint64_t> data;
 unsigned long torn = 0;
 unsigned long seen = 0;
+unsigned long prepared = 0;
+unsigned long prepared_with = 0;
 
 bool is_whole(const Words& words) {
   return std::all_of(words.begin(), words.end(), [&](std::uint64_t word) { return word == words[0]; });
@@ -69,12 +71,20 @@ void report() {
   const Plc_Area_State in = inputs.state();
   const Plc_Area_State out = outputs.state();
   const Plc_Area_State keep = kept.state();
-  plc::log("torn %lu input %lu missed %lu late %lu begun %lu persistent %lu data %lu origin %u saves %lu",
-           torn, seen, in.qwMissed, out.qwMissed, kept->begun, *persistent, *data, keep.dwOrigin,
-           keep.qwSaves);
+  plc::log(
+      "torn %lu input %lu missed %lu late %lu begun %lu persistent %lu data %lu origin %u saves %lu prepared "
+      "%lu with %lu",
+      torn, seen, in.qwMissed, out.qwMissed, kept->begun, *persistent, *data, keep.dwOrigin, keep.qwSaves,
+      prepared, prepared_with);
+}
+
+void prepare(unsigned /*event*/, const EVTPARAM_ExternalEventTask* /*parameter*/, void* /*user*/) {
+  ++prepared;
+  prepared_with = kept->begun;
 }
 
 void setup(plc::Application& app) {
+  EventRegisterCallbackFunction(EVT_PrepareStart, prepare, nullptr);
   app.cyclic("Fast", 1, 1ms, fast);
   app.cyclic("Slow", 10, 10ms, slow);
   app.external("Report", 20, "report", report);
